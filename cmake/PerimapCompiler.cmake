@@ -1,0 +1,34 @@
+# Language level, warnings and sanitizers of every target of the project.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_C_STANDARD 11)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+
+# -ffp-contract=off: a result must not depend on which instructions the compiler fuses, because lockstep replay is
+# compared byte for byte and golden vectors to 1e-9.
+add_compile_options(-ffp-contract=off)
+
+if(PERIMAP_ASSERTIONS)
+  string(REPLACE "-DNDEBUG" "" CMAKE_CXX_FLAGS_RELWITHDEBINFO "${CMAKE_CXX_FLAGS_RELWITHDEBINFO}")
+  # Light debug information: full -g triples the build time of the Eigen-heavy files.
+  string(REPLACE "-g" "-g1" CMAKE_CXX_FLAGS_RELWITHDEBINFO "${CMAKE_CXX_FLAGS_RELWITHDEBINFO}")
+endif()
+
+if(PERIMAP_SANITIZE)
+  add_compile_options(-fsanitize=${PERIMAP_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${PERIMAP_SANITIZE})
+endif()
+if(PERIMAP_FUZZ)
+  add_compile_options(-fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=address,undefined)
+endif()
+
+# Warnings as errors, for the project's own code only (generated code is not linked to this).
+add_library(perimap_warnings INTERFACE)
+target_compile_options(perimap_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast> -Werror)
+if(PERIMAP_SANITIZE)
+  # GCC's flow analysis sees uninitialised values in sanitized Eigen code that is clean without the sanitizer.
+  target_compile_options(perimap_warnings INTERFACE -Wno-maybe-uninitialized)
+endif()
