@@ -1,0 +1,147 @@
+// What the daemon can be told. One plain struct per component; every member has its default here and its limits in
+// configuration_keys.cpp. Members of a file that is loaded over a base replace the base's, key by key.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+struct SourceConfiguration {
+  std::string name = "perimapd";        // the key `source` of every published sample
+  std::string world_frame = "tracker";  // published as frame_id
+
+  bool operator==(const SourceConfiguration&) const = default;
+};
+
+struct ReplayConfiguration {
+  std::optional<std::filesystem::path> recording;  // absolute, or relative to the working directory, once loaded
+  bool realtime = true;                            // deliver at the recorded pace instead of as fast as it goes
+
+  bool operator==(const ReplayConfiguration&) const = default;
+};
+
+struct CameraConfiguration {
+  std::optional<std::filesystem::path> calibration;  // none: the recording's own attachment
+
+  bool operator==(const CameraConfiguration&) const = default;
+};
+
+struct TrackerConfiguration {
+  double position_deviation_mm = 0.0;   // RMS of the 3-D norm
+  double rotation_deviation_rad = 0.0;  // RMS of the 3-D norm
+  Duration time_offset{0};              // added to the tracker's stamps to get the camera's time
+  Duration maximum_extrapolation = std::chrono::milliseconds(20);
+  double translation_SC_mm[3] = {0.0, 0.0, 0.0};      // hand-eye X_SC
+  double rotation_SC_wxyz[4] = {1.0, 0.0, 0.0, 0.0};  // hand-eye X_SC, unit quaternion
+
+  bool operator==(const TrackerConfiguration&) const = default;
+};
+
+struct PhaseConfiguration {
+  enum class Law { kLinear, kWarped, kTimeLocked };
+
+  Law law = Law::kLinear;
+  Duration lost_after = std::chrono::seconds(3);  // without an R peak
+
+  bool operator==(const PhaseConfiguration&) const = default;
+};
+
+struct PipelineConfiguration {
+  enum class Release { kFrame, kClock };
+
+  Release release = Release::kFrame;
+  Duration latency = std::chrono::milliseconds(50);  // L: release minus capture
+  Duration budget = std::chrono::milliseconds(12);   // computing time kept free before the release
+  int workers = 2;
+  int adoption_delay_frames = 15;  // D: from a housekeeping request to the frame that adopts its result
+
+  bool operator==(const PipelineConfiguration&) const = default;
+};
+
+struct FeaturesConfiguration {
+  int maximum = 120;
+  int detection_interval_frames = 10;
+  double minimum_distance_px = 18.0;
+
+  bool operator==(const FeaturesConfiguration&) const = default;
+};
+
+struct EstimationConfiguration {
+  int harmonics = 8;  // H, cardiac
+  int start_observations = 60;
+  std::vector<double> start_depths_mm = {50.0, 90.0, 160.0};
+  double pixel_deviation_px = 0.5;
+  int iterations = 5;
+  double gate_chi2 = 13.8;
+  double prior_dc_deviation_mm = 40.0;
+  double prior_harmonic_deviation_mm = 4.0;      // of harmonic 1; harmonic k has this / k^2
+  double configured_converged_deviation_mm = 0;  // 0: automatic, see converged_deviation_mm()
+
+  bool operator==(const EstimationConfiguration&) const = default;
+};
+
+struct RealtimeConfiguration {
+  int priority = 0;  // SCHED_FIFO; 0: not requested
+  bool lock_memory = true;
+  std::vector<int> cpus;  // empty: any
+
+  bool operator==(const RealtimeConfiguration&) const = default;
+};
+
+struct DdsConfiguration {
+  bool enabled = true;
+  int domain = 0;
+  Duration surface_deadline = std::chrono::milliseconds(200);  // offered period of `surface`; 0: none
+  Duration surface_lifespan = std::chrono::milliseconds(200);  // 0: none
+  Duration surface_model_interval = std::chrono::milliseconds(500);
+
+  bool operator==(const DdsConfiguration&) const = default;
+};
+
+struct StatusConfiguration {
+  Duration interval = std::chrono::seconds(1);
+
+  bool operator==(const StatusConfiguration&) const = default;
+};
+
+struct LogConfiguration {
+  enum class Level { kTrace, kDebug, kInfo, kWarning, kError };
+
+  Level level = Level::kInfo;
+
+  bool operator==(const LogConfiguration&) const = default;
+};
+
+struct Configuration {
+  SourceConfiguration source;
+  ReplayConfiguration replay;
+  CameraConfiguration camera;
+  TrackerConfiguration tracker;
+  PhaseConfiguration phase;
+  PipelineConfiguration pipeline;
+  FeaturesConfiguration features;
+  EstimationConfiguration estimation;
+  RealtimeConfiguration realtime;
+  DdsConfiguration dds;
+  StatusConfiguration status;
+  LogConfiguration log;
+
+  bool operator==(const Configuration&) const = default;
+};
+
+// The bound below which a feature counts as converged: the configured one, or 1 mm with an exact tracker and 2 mm with
+// a noisy one.
+[[nodiscard]] inline double converged_deviation_mm(const Configuration& configuration) noexcept {
+  if (configuration.estimation.configured_converged_deviation_mm > 0) {
+    return configuration.estimation.configured_converged_deviation_mm;
+  }
+  const TrackerConfiguration& tracker = configuration.tracker;
+  return tracker.position_deviation_mm > 0 || tracker.rotation_deviation_rad > 0 ? 2.0 : 1.0;
+}
+
+}  // namespace perimap
