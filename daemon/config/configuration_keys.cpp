@@ -1,0 +1,430 @@
+#include "daemon/config/configuration_keys.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <numbers>
+#include <string_view>
+#include <utility>
+
+namespace perimap {
+namespace {
+
+constexpr int kVersion = 1;
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+std::optional<double> as_number(const ConfigurationValue& value) {
+  if (const auto* number = std::get_if<double>(&value)) {
+    return *number;
+  }
+  if (const auto* integer = std::get_if<std::int64_t>(&value)) {
+    return static_cast<double>(*integer);
+  }
+  return std::nullopt;
+}
+
+// A list of numbers; TOML lets integers stand among them, and an all-integer list arrives as such.
+std::optional<std::vector<double>> as_numbers(const ConfigurationValue& value) {
+  if (const auto* numbers = std::get_if<std::vector<double>>(&value)) {
+    return *numbers;
+  }
+  if (const auto* integers = std::get_if<std::vector<std::int64_t>>(&value)) {
+    return std::vector<double>(integers->begin(), integers->end());
+  }
+  return std::nullopt;
+}
+
+bool within(double value, double low, double high) { return std::isfinite(value) && value >= low && value <= high; }
+
+// Angles are given in degrees and kept in radians; 15 digits give the typed figure back.
+double degrees_as_typed(double rad) { return std::strtod(fmt::format("{:.15g}", rad / kDegree).c_str(), nullptr); }
+
+// Collects the keys of one section. `member` says where a key's value lives, given a Configuration.
+class Section {
+ public:
+  Section(std::string name, std::vector<ConfigurationKey>& keys) : name_(std::move(name)), keys_(keys) {}
+
+  template <class Member>
+  Section& flag(std::string name, Member member, std::string meaning) {
+    return add(
+        std::move(name), std::move(meaning), "true or false",
+        [member](const ConfigurationValue& value, Configuration& configuration) {
+          const auto* flag = std::get_if<bool>(&value);
+          if (flag != nullptr) {
+            member(configuration) = *flag;
+          }
+          return flag != nullptr;
+        },
+        [member](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          return member(configuration);
+        });
+  }
+
+  template <class Member>
+  Section& integer(std::string name, int low, int high, Member member, std::string meaning) {
+    return add(
+        std::move(name), std::move(meaning), fmt::format("an integer from {} to {}", low, high),
+        [member, low, high](const ConfigurationValue& value, Configuration& configuration) {
+          const auto* integer = std::get_if<std::int64_t>(&value);
+          const bool good = integer != nullptr && *integer >= low && *integer <= high;
+          if (good) {
+            member(configuration) = static_cast<int>(*integer);
+          }
+          return good;
+        },
+        [member](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          return std::int64_t{member(configuration)};
+        });
+  }
+
+  template <class Member>
+  Section& number(std::string name, double low, double high, Member member, std::string meaning) {
+    return add(
+        std::move(name), std::move(meaning), fmt::format("a number from {} to {}", low, high),
+        [member, low, high](const ConfigurationValue& value, Configuration& configuration) {
+          const std::optional<double> number = as_number(value);
+          const bool good = number && within(*number, low, high);
+          if (good) {
+            member(configuration) = *number;
+          }
+          return good;
+        },
+        [member](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          return member(configuration);
+        });
+  }
+
+  template <class Member>
+  Section& angle(std::string name, double low_deg, double high_deg, Member member, std::string meaning) {
+    return add(
+        std::move(name), std::move(meaning), fmt::format("a number from {} to {}", low_deg, high_deg),
+        [member, low_deg, high_deg](const ConfigurationValue& value, Configuration& configuration) {
+          const std::optional<double> number = as_number(value);
+          const bool good = number && within(*number, low_deg, high_deg);
+          if (good) {
+            member(configuration) = *number * kDegree;
+          }
+          return good;
+        },
+        [member](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          return degrees_as_typed(member(configuration));
+        });
+  }
+
+  // `unit` is the key's own (a millisecond, a second); low and high count it.
+  template <class Member>
+  Section& duration(std::string name, Duration unit, double low, double high, Member member, std::string meaning) {
+    const double unit_ns = static_cast<double>(unit.count());
+    return add(
+        std::move(name), std::move(meaning), fmt::format("a number from {} to {}", low, high),
+        [member, unit_ns, low, high](const ConfigurationValue& value, Configuration& configuration) {
+          const std::optional<double> number = as_number(value);
+          const bool good = number && within(*number, low, high);
+          if (good) {
+            member(configuration) = Duration(std::llround(*number * unit_ns));
+          }
+          return good;
+        },
+        [member, unit_ns](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          return static_cast<double>(member(configuration).count()) / unit_ns;
+        });
+  }
+
+  // Any text that fits the bounded string of the published type.
+  template <class Member>
+  Section& text(std::string name, std::size_t longest, Member member, std::string meaning) {
+    return add(
+        std::move(name), std::move(meaning), fmt::format("a printable text of 1 to {} bytes", longest),
+        [member, longest](const ConfigurationValue& value, Configuration& configuration) {
+          const auto* text = std::get_if<std::string>(&value);
+          bool good = text != nullptr && !text->empty() && text->size() <= longest;
+          for (std::size_t i = 0; good && i < text->size(); ++i) {
+            const auto byte = static_cast<unsigned char>((*text)[i]);
+            good = byte >= 0x20 && byte != 0x7F;
+          }
+          if (good) {
+            member(configuration) = *text;
+          }
+          return good;
+        },
+        [member](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          return member(configuration);
+        });
+  }
+
+  template <class Member>
+  Section& file(std::string name, Member member, std::string meaning) {
+    add(
+        std::move(name), std::move(meaning), "the name of an existing file",
+        [member](const ConfigurationValue& value, Configuration& configuration) {
+          const auto* text = std::get_if<std::string>(&value);
+          // A NUL would end the name early when the file is opened.
+          const bool good = text != nullptr && !text->empty() && text->find('\0') == std::string::npos;
+          if (good) {
+            member(configuration) = std::filesystem::path(*text);
+          }
+          return good;
+        },
+        [member](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          const std::optional<std::filesystem::path>& path = member(configuration);
+          return path ? std::optional<ConfigurationValue>(path->string()) : std::nullopt;
+        });
+    keys_.back().names_file = true;
+    return *this;
+  }
+
+  template <class Enum, std::size_t N, class Member>
+  Section& choice(std::string name, const std::array<std::pair<std::string_view, Enum>, N>& choices, Member member,
+                  std::string meaning, std::string_view note = "") {
+    std::string expected;
+    for (const auto& [text, value] : choices) {
+      expected += fmt::format("{}\"{}\"", expected.empty() ? "" : " or ", text);
+    }
+    expected += note;
+    return add(
+        std::move(name), std::move(meaning), std::move(expected),
+        [member, choices](const ConfigurationValue& value, Configuration& configuration) {
+          const auto* chosen = std::get_if<std::string>(&value);
+          for (const auto& [text, meant] : choices) {
+            if (chosen != nullptr && *chosen == text) {
+              member(configuration) = meant;
+              return true;
+            }
+          }
+          return false;
+        },
+        [member, choices](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          for (const auto& [text, meant] : choices) {
+            if (meant == member(configuration)) {
+              return std::string(text);
+            }
+          }
+          return std::nullopt;
+        });
+  }
+
+  // `accept(std::vector<double>, Configuration&)` puts the list in place or refuses it.
+  template <class Accept, class Give>
+  Section& numbers(std::string name, std::string expected, Accept accept, Give give, std::string meaning) {
+    return add(
+        std::move(name), std::move(meaning), std::move(expected),
+        [accept](const ConfigurationValue& value, Configuration& configuration) {
+          const std::optional<std::vector<double>> numbers = as_numbers(value);
+          return numbers && accept(*numbers, configuration);
+        },
+        [give](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          return give(configuration);
+        });
+  }
+
+  Section& add(std::string name, std::string meaning, std::string expected,
+               std::function<bool(const ConfigurationValue&, Configuration&)> read,
+               std::function<std::optional<ConfigurationValue>(const Configuration&)> write) {
+    keys_.push_back(
+        {name_, std::move(name), std::move(meaning), std::move(expected), false, std::move(read), std::move(write)});
+    return *this;
+  }
+
+ private:
+  std::string name_;
+  std::vector<ConfigurationKey>& keys_;
+};
+
+// Reads and writes one member of a Configuration, const or not.
+#define PERIMAP_MEMBER(path) \
+  [](auto& configuration) -> auto& { return configuration.path; }
+
+void add_version(std::vector<ConfigurationKey>& keys) {
+  Section("", keys).add(
+      "version", "version of this file's format", fmt::format("{}", kVersion),
+      [](const ConfigurationValue& value, Configuration&) {
+        const auto* version = std::get_if<std::int64_t>(&value);
+        return version != nullptr && *version == kVersion;
+      },
+      [](const Configuration&) -> std::optional<ConfigurationValue> { return std::int64_t{kVersion}; });
+}
+
+void add_sources(std::vector<ConfigurationKey>& keys) {
+  constexpr auto ms = std::chrono::milliseconds(1);
+  Section("source", keys)
+      .text("name", 63, PERIMAP_MEMBER(source.name), "key `source` of every published sample")
+      .text("world_frame", 63, PERIMAP_MEMBER(source.world_frame), "name of the frame W, published as frame_id");
+  Section("replay", keys)
+      .file("recording", PERIMAP_MEMBER(replay.recording), "the recording to replay, from this file's folder")
+      .flag("realtime", PERIMAP_MEMBER(replay.realtime), "at the recorded pace instead of as fast as it goes");
+  Section("camera", keys)
+      .file("calibration", PERIMAP_MEMBER(camera.calibration),
+            "calibration as OpenCV writes it, from this file's folder; none: the recording's own");
+  Section("tracker", keys)
+      .number("position_deviation_mm", 0, 100, PERIMAP_MEMBER(tracker.position_deviation_mm),
+              "position noise of the tracker, RMS of the 3-D norm")
+      .angle("rotation_deviation_deg", 0, 45, PERIMAP_MEMBER(tracker.rotation_deviation_rad),
+             "orientation noise of the tracker, RMS of the 3-D norm")
+      .duration("time_offset_ms", ms, -1000, 1000, PERIMAP_MEMBER(tracker.time_offset),
+                "added to the tracker's stamps to get the camera's time")
+      .duration("maximum_extrapolation_ms", ms, 0, 1000, PERIMAP_MEMBER(tracker.maximum_extrapolation),
+                "a pose is extrapolated at most this far; beyond, a frame gives no measurement")
+      .numbers(
+          "hand_eye_translation_SC_mm", "three numbers from -10000 to 10000",
+          [](const std::vector<double>& v, Configuration& configuration) {
+            bool good = v.size() == 3;
+            for (std::size_t i = 0; good && i < 3; ++i) {
+              good = within(v[i], -10000, 10000);
+            }
+            for (std::size_t i = 0; good && i < 3; ++i) {
+              configuration.tracker.translation_SC_mm[i] = v[i];
+            }
+            return good;
+          },
+          [](const Configuration& configuration) {
+            const auto& t = configuration.tracker.translation_SC_mm;
+            return std::vector<double>{t[0], t[1], t[2]};
+          },
+          "hand-eye X_SC: the camera's place in the sensor's frame")
+      .numbers(
+          "hand_eye_rotation_SC_wxyz", "four numbers of norm 1 within 1e-3",
+          [](const std::vector<double>& v, Configuration& configuration) {
+            if (v.size() != 4 || !within(std::hypot(std::hypot(v[0], v[1]), std::hypot(v[2], v[3])), 0.999, 1.001)) {
+              return false;
+            }
+            for (std::size_t i = 0; i < 4; ++i) {
+              configuration.tracker.rotation_SC_wxyz[i] = v[i];
+            }
+            return true;
+          },
+          [](const Configuration& configuration) {
+            const auto& q = configuration.tracker.rotation_SC_wxyz;
+            return std::vector<double>{q[0], q[1], q[2], q[3]};
+          },
+          "hand-eye X_SC: the camera's orientation in the sensor's frame");
+}
+
+void add_estimation(std::vector<ConfigurationKey>& keys) {
+  constexpr auto ms = std::chrono::milliseconds(1);
+  constexpr auto s = std::chrono::seconds(1);
+  using Law = PhaseConfiguration::Law;
+  constexpr std::array<std::pair<std::string_view, Law>, 3> laws{
+      {{"linear", Law::kLinear}, {"warped", Law::kWarped}, {"time-locked", Law::kTimeLocked}}};
+  Section("phase", keys)
+      .choice("law", laws, PERIMAP_MEMBER(phase.law), "how the phase runs from one R peak to the next")
+      .duration("lost_after_s", s, 0.5, 60, PERIMAP_MEMBER(phase.lost_after),
+                "without an R peak for so long the phase is lost");
+  // No pipeline serves Release::kClock, so a file that asks for it is refused.
+  using Release = PipelineConfiguration::Release;
+  constexpr std::array<std::pair<std::string_view, Release>, 1> releases{{{"frame", Release::kFrame}}};
+  Section("pipeline", keys)
+      .choice("release", releases, PERIMAP_MEMBER(pipeline.release), "what the release follows: each camera frame",
+              " (\"clock\" is not available in this version)")
+      .duration("latency_ms", ms, 1, 1000, PERIMAP_MEMBER(pipeline.latency), "release minus capture")
+      .duration("budget_ms", ms, 0.1, 1000, PERIMAP_MEMBER(pipeline.budget),
+                "computing time kept free before the release; less than latency_ms")
+      .integer("workers", 1, 64, PERIMAP_MEMBER(pipeline.workers), "worker threads")
+      .integer("adoption_delay_frames", 1, 1000, PERIMAP_MEMBER(pipeline.adoption_delay_frames),
+               "from a request for new features to the frame that takes up the answer");
+  Section("features", keys)
+      .integer("maximum", 1, 1000, PERIMAP_MEMBER(features.maximum), "features followed at a time")
+      .integer("detection_interval_frames", 1, 1000, PERIMAP_MEMBER(features.detection_interval_frames),
+               "frames from one search for new features to the next")
+      .number("minimum_distance_px", 1, 1000, PERIMAP_MEMBER(features.minimum_distance_px),
+              "a new feature keeps this distance from all others");
+  Section("estimation", keys)
+      .integer("harmonics", 1, 12, PERIMAP_MEMBER(estimation.harmonics), "cardiac harmonics of each feature's motion")
+      .integer("start_observations", 4, 1000, PERIMAP_MEMBER(estimation.start_observations),
+               "observations that the batch start of a feature takes")
+      .numbers(
+          "start_depths_mm", "1 to 8 rising numbers from 1 to 10000",
+          [](const std::vector<double>& v, Configuration& configuration) {
+            if (v.empty() || v.size() > 8) {
+              return false;
+            }
+            for (std::size_t i = 0; i < v.size(); ++i) {
+              if (!within(v[i], 1, 10000) || (i > 0 && v[i] <= v[i - 1])) {
+                return false;
+              }
+            }
+            configuration.estimation.start_depths_mm = v;
+            return true;
+          },
+          [](const Configuration& configuration) { return configuration.estimation.start_depths_mm; },
+          "depths from which the batch start tries")
+      .number("pixel_deviation_px", 0.01, 100, PERIMAP_MEMBER(estimation.pixel_deviation_px),
+              "standard deviation of a match, an axis")
+      .integer("iterations", 1, 20, PERIMAP_MEMBER(estimation.iterations), "most iterations of one update")
+      .number("gate_chi2", 0.1, 1000, PERIMAP_MEMBER(estimation.gate_chi2),
+              "a match of higher cost at the optimum is refused; 13.8: 99.9 % of chi-square, 2 degrees")
+      .number("prior_dc_deviation_mm", 0.1, 10000, PERIMAP_MEMBER(estimation.prior_dc_deviation_mm),
+              "prior standard deviation of a feature's mean position")
+      .number("prior_harmonic_deviation_mm", 0.01, 1000, PERIMAP_MEMBER(estimation.prior_harmonic_deviation_mm),
+              "prior standard deviation of harmonic 1; harmonic k has this / k^2")
+      .number("converged_deviation_mm", 0, 100, PERIMAP_MEMBER(estimation.configured_converged_deviation_mm),
+              "largest deviation over the cycle of a converged feature; 0: 1 mm, or 2 mm with tracker noise");
+}
+
+void add_running(std::vector<ConfigurationKey>& keys) {
+  constexpr auto ms = std::chrono::milliseconds(1);
+  constexpr auto s = std::chrono::seconds(1);
+  Section("realtime", keys)
+      .integer("priority", 0, 98, PERIMAP_MEMBER(realtime.priority), "SCHED_FIFO priority; 0: not requested")
+      .flag("lock_memory", PERIMAP_MEMBER(realtime.lock_memory), "keeps all memory in RAM")
+      .add(
+          "cpus", "processors that real-time threads may use; empty: any", "up to 64 integers from 0 to 1023",
+          [](const ConfigurationValue& value, Configuration& configuration) {
+            const auto* cpus = std::get_if<std::vector<std::int64_t>>(&value);
+            if (cpus == nullptr || cpus->size() > 64) {
+              return false;
+            }
+            std::vector<int> accepted;
+            for (const std::int64_t cpu : *cpus) {
+              if (cpu < 0 || cpu > 1023) {
+                return false;
+              }
+              accepted.push_back(static_cast<int>(cpu));
+            }
+            configuration.realtime.cpus = std::move(accepted);
+            return true;
+          },
+          [](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+            const std::vector<int>& cpus = configuration.realtime.cpus;
+            return std::vector<std::int64_t>(cpus.begin(), cpus.end());
+          });
+  // Domain 230 is the last whose ports fit into 16 bits (DDSI-RTPS 2.2, 9.6.1.1).
+  Section("dds", keys)
+      .flag("enabled", PERIMAP_MEMBER(dds.enabled), "publishes over DDS")
+      .integer("domain", 0, 230, PERIMAP_MEMBER(dds.domain), "domain of the DDS participant")
+      .duration("surface_deadline_ms", ms, 0, 60000, PERIMAP_MEMBER(dds.surface_deadline),
+                "longest time between two surfaces that the writer promises; 0: no promise")
+      .duration("surface_lifespan_ms", ms, 0, 60000, PERIMAP_MEMBER(dds.surface_lifespan),
+                "an undelivered surface is dropped after this; 0: never")
+      .duration("surface_model_interval_ms", ms, 1, 60000, PERIMAP_MEMBER(dds.surface_model_interval),
+                "from one surface_model to the next");
+  Section("status", keys)
+      .duration("interval_s", s, 0.1, 3600, PERIMAP_MEMBER(status.interval), "from one status to the next");
+  using Level = LogConfiguration::Level;
+  constexpr std::array<std::pair<std::string_view, Level>, 5> levels{{{"trace", Level::kTrace},
+                                                                      {"debug", Level::kDebug},
+                                                                      {"info", Level::kInfo},
+                                                                      {"warning", Level::kWarning},
+                                                                      {"error", Level::kError}}};
+  Section("log", keys).choice("level", levels, PERIMAP_MEMBER(log.level), "least severity that is logged");
+}
+
+#undef PERIMAP_MEMBER
+
+}  // namespace
+
+std::span<const ConfigurationKey> configuration_keys() {
+  static const std::vector<ConfigurationKey> keys = [] {
+    std::vector<ConfigurationKey> all;
+    add_version(all);
+    add_sources(all);
+    add_estimation(all);
+    add_running(all);
+    return all;
+  }();
+  return keys;
+}
+
+}  // namespace perimap

@@ -1,0 +1,327 @@
+#include "daemon/config/configuration_loader.hpp"
+
+// toml++ as headers, so that the fuzzer and the sanitizers see into it; errors as values, not exceptions.
+#define TOML_HEADER_ONLY 1
+#define TOML_EXCEPTIONS 0
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+#include "daemon/config/configuration_keys.hpp"
+
+namespace perimap {
+namespace {
+
+// A generous bound for a file written by hand. It also bounds the recursion of the TOML library, which is as deep as
+// a dotted key is long.
+constexpr std::size_t kLargestFile = std::size_t{64} * 1024;
+constexpr std::size_t kLongestQuote = 60;  // bytes of a wrong value that a message repeats
+
+std::string on_one_line(std::string text) {
+  for (char& c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7F) {
+      c = ' ';
+    }
+  }
+  return text;
+}
+
+std::string quote(std::string_view text) {
+  std::size_t end = std::min(text.size(), kLongestQuote);
+  while (end < text.size() && end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) {
+    --end;  // not in the middle of a UTF-8 sequence
+  }
+  return fmt::format("\"{}{}\"", text.substr(0, end), end < text.size() ? "..." : "");
+}
+
+std::string full_name(std::string_view section, std::string_view key) {
+  return section.empty() ? std::string(key) : fmt::format("{}.{}", section, key);
+}
+
+// What a message says it got.
+std::string describe(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::boolean:
+      return node.as_boolean()->get() ? "true" : "false";
+    case toml::node_type::integer:
+      return fmt::format("{}", node.as_integer()->get());
+    case toml::node_type::floating_point:
+      return fmt::format("{}", node.as_floating_point()->get());
+    case toml::node_type::string:
+      return quote(node.as_string()->get());
+    case toml::node_type::array: {
+      std::string elements;
+      for (const toml::node& element : *node.as_array()) {
+        if (elements.size() > kLongestQuote) {
+          elements += ", ...";
+          break;
+        }
+        elements +=
+            fmt::format("{}{}", elements.empty() ? "" : ", ", element.is_array() ? "an array" : describe(element));
+      }
+      return fmt::format("[{}]", elements);
+    }
+    case toml::node_type::table:
+      return "a table";
+    default:
+      return "a date or time";
+  }
+}
+
+// The node as one of the types that keys can have; none for all others.
+std::optional<ConfigurationValue> value_of(const toml::node& node) {
+  if (const auto* flag = node.as_boolean()) {
+    return flag->get();
+  }
+  if (const auto* integer = node.as_integer()) {
+    return integer->get();
+  }
+  if (const auto* number = node.as_floating_point()) {
+    return number->get();
+  }
+  if (const auto* text = node.as_string()) {
+    return text->get();
+  }
+  const toml::array* array = node.as_array();
+  if (array == nullptr) {
+    return std::nullopt;
+  }
+  std::vector<std::int64_t> integers;
+  std::vector<double> numbers;
+  for (const toml::node& element : *array) {
+    if (const auto* integer = element.as_integer()) {
+      integers.push_back(integer->get());
+      numbers.push_back(static_cast<double>(integer->get()));
+    } else if (const auto* number = element.as_floating_point()) {
+      numbers.push_back(number->get());
+    } else {
+      return std::nullopt;
+    }
+  }
+  if (integers.size() == numbers.size()) {
+    return integers;
+  }
+  return numbers;
+}
+
+// Walks one parsed file, keeps what is good and remembers the error that stands first in the file.
+class Overlay {
+ public:
+  Overlay(const std::filesystem::path& file, const Configuration& base, NamedFiles named_files)
+      : file_(file), named_files_(named_files), configuration_(base) {}
+
+  Expected<Configuration> apply(const toml::table& root) {
+    for (const auto& [key, node] : root) {
+      if (find("", key.str()) != nullptr) {
+        read("", key, node);
+      } else if (!section_exists(key.str())) {
+        refuse_unknown("", key);
+      } else if (const toml::table* section = node.as_table()) {
+        for (const auto& [name, value] : *section) {
+          read(key.str(), name, value);
+        }
+      } else {
+        refuse(node.source().begin, key.str(), "a table", describe(node));
+      }
+    }
+    if (!root.contains("version")) {
+      refuse({1, 1}, "version", find("", "version")->expected, "nothing");
+    }
+    check_budget(root);
+    if (!error_.empty()) {
+      return fail(error_);
+    }
+    return configuration_;
+  }
+
+ private:
+  static const ConfigurationKey* find(std::string_view section, std::string_view name) {
+    for (const ConfigurationKey& key : configuration_keys()) {
+      if (key.section == section && key.name == name) {
+        return &key;
+      }
+    }
+    return nullptr;
+  }
+
+  static bool section_exists(std::string_view section) {
+    for (const ConfigurationKey& key : configuration_keys()) {
+      if (!key.section.empty() && key.section == section) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  void read(std::string_view section, const toml::key& name, const toml::node& node) {
+    const ConfigurationKey* key = find(section, name.str());
+    if (key == nullptr) {
+      refuse_unknown(section, name);
+      return;
+    }
+    std::optional<ConfigurationValue> value = value_of(node);
+    if (value && key->names_file && std::holds_alternative<std::string>(*value)) {
+      // An empty name stays empty, so that the key refuses it.
+      const std::string& named = std::get<std::string>(*value);
+      std::error_code code;
+      const std::filesystem::path folder = std::filesystem::absolute(file_, code).parent_path();
+      const std::filesystem::path path = (folder / named).lexically_normal();
+      if (named_files_ == NamedFiles::kMustExist && !std::filesystem::is_regular_file(path, code)) {
+        refuse(node.source().begin, full_name(section, name.str()), key->expected,
+               fmt::format("{} ({} is {})", describe(node), path.string(),
+                           std::filesystem::exists(path, code) ? "not a file" : "not there"));
+        return;
+      }
+      value = named.empty() ? std::string() : path.string();
+    }
+    if (!value || !key->read(*value, configuration_)) {
+      refuse(node.source().begin, full_name(section, name.str()), key->expected, describe(node));
+    }
+  }
+
+  void refuse_unknown(std::string_view section, const toml::key& name) {
+    std::string known;
+    std::string_view last;
+    for (const ConfigurationKey& key : configuration_keys()) {
+      const std::string_view candidate = section.empty() && !key.section.empty() ? key.section : key.name;
+      if ((section.empty() || key.section == section) && candidate != last) {
+        known += fmt::format("{}{}", known.empty() ? "" : ", ", candidate);
+        last = candidate;
+      }
+    }
+    refuse(name.source().begin, full_name(section, name.str()), fmt::format("one of {}", known), "an unknown key");
+  }
+
+  // The one rule between two keys: without a latency longer than the budget no release can be on time.
+  void check_budget(const toml::table& root) {
+    const PipelineConfiguration& pipeline = configuration_.pipeline;
+    if (pipeline.budget < pipeline.latency) {
+      return;
+    }
+    toml::source_position where{1, 1};
+    for (const char* name : {"latency_ms", "budget_ms"}) {
+      if (const toml::node* node = root["pipeline"][name].node()) {
+        where = node->source().begin;
+      }
+    }
+    refuse(where, "pipeline.budget_ms",
+           fmt::format("less than latency_ms ({:.6g})", to_seconds(pipeline.latency) * 1e3),
+           fmt::format("{:.6g}", to_seconds(pipeline.budget) * 1e3));
+  }
+
+  void refuse(toml::source_position where, std::string_view key, std::string_view expected, std::string_view got) {
+    const bool first =
+        error_.empty() || where.line < where_.line || (where.line == where_.line && where.column < where_.column);
+    if (first) {
+      where_ = where;
+      error_ = on_one_line(fmt::format("{}:{}:{}: key '{}': expected {}, got {}", file_.string(), where.line,
+                                       where.column, key, expected, got));
+    }
+  }
+
+  const std::filesystem::path& file_;
+  NamedFiles named_files_;
+  Configuration configuration_;
+  toml::source_position where_{};
+  std::string error_;
+};
+
+std::string printed(const ConfigurationValue& value) {
+  const auto number = [](double x) {
+    std::string text = fmt::format("{}", x);
+    return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
+  };
+  const auto list = [](const auto& elements, auto print) {
+    std::string text;
+    for (const auto& element : elements) {
+      text += fmt::format("{}{}", text.empty() ? "" : ", ", print(element));
+    }
+    return fmt::format("[{}]", text);
+  };
+  struct Printer {
+    decltype(number)& print_number;
+    decltype(list)& print_list;
+    std::string operator()(bool flag) const { return flag ? "true" : "false"; }
+    std::string operator()(std::int64_t integer) const { return fmt::format("{}", integer); }
+    std::string operator()(double x) const { return print_number(x); }
+    std::string operator()(const std::string& text) const {
+      std::string escaped;
+      for (const char c : text) {
+        const auto byte = static_cast<unsigned char>(c);
+        if (c == '"' || c == '\\') {
+          escaped += fmt::format("\\{}", c);
+        } else if (byte < 0x20 || byte == 0x7F) {
+          escaped += fmt::format("\\u{:04X}", byte);
+        } else {
+          escaped += c;
+        }
+      }
+      return fmt::format("\"{}\"", escaped);
+    }
+    std::string operator()(const std::vector<std::int64_t>& integers) const {
+      return print_list(integers, [](std::int64_t integer) { return fmt::format("{}", integer); });
+    }
+    std::string operator()(const std::vector<double>& numbers) const { return print_list(numbers, print_number); }
+  };
+  return std::visit(Printer{number, list}, value);
+}
+
+}  // namespace
+
+Expected<Configuration> parse_configuration(std::string_view text, const std::filesystem::path& file,
+                                            const Configuration& base, NamedFiles named_files) {
+  if (text.size() > kLargestFile) {
+    return fail(on_one_line(
+        fmt::format("{}:1:1: expected at most {} bytes of TOML, got {}", file.string(), kLargestFile, text.size())));
+  }
+  const toml::parse_result result = toml::parse(text);
+  if (!result) {
+    const toml::source_position where = result.error().source().begin;
+    return fail(on_one_line(fmt::format("{}:{}:{}: expected TOML, got: {}", file.string(), where.line, where.column,
+                                        result.error().description())));
+  }
+  return Overlay(file, base, named_files).apply(result.table());
+}
+
+Expected<Configuration> load_configuration(const std::filesystem::path& file, const Configuration& base,
+                                           NamedFiles named_files) {
+  const auto refuse = [&file](int error) {
+    return fail(on_one_line(
+        fmt::format("{}: expected a readable configuration file, got: {}", file.string(), std::strerror(error))));
+  };
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
+  if (!stream) {
+    return refuse(errno);
+  }
+  std::string text(kLargestFile + 1, '\0');
+  errno = 0;
+  text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
+  if (std::ferror(stream.get()) != 0) {
+    return refuse(errno);
+  }
+  return parse_configuration(text, file, base, named_files);
+}
+
+std::string to_toml(const Configuration& configuration) {
+  std::string text;
+  std::string section;
+  for (const ConfigurationKey& key : configuration_keys()) {
+    if (key.section != section) {
+      section = key.section;
+      text += fmt::format("\n[{}]\n", section);
+    }
+    const std::optional<ConfigurationValue> value = key.write(configuration);
+    text += fmt::format("# {} ({})\n", key.meaning, key.expected);
+    text += value ? fmt::format("{} = {}\n", key.name, printed(*value)) : fmt::format("# {} =\n", key.name);
+  }
+  return text;
+}
+
+}  // namespace perimap

@@ -1,0 +1,296 @@
+#include "daemon/config/configuration_loader.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <numbers>
+
+#include "daemon/config/configuration_keys.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+Expected<Configuration> parse(std::string_view text, const Configuration& base = {}) {
+  return parse_configuration(text, "test.toml", base, NamedFiles::kMayBeMissing);
+}
+
+std::string error_of(std::string_view text) {
+  const Expected<Configuration> result = parse(text);
+  return result ? "accepted" : result.error().message;
+}
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "perimap-config-XXXXXX").string();
+    path_ = mkdtemp(name.data());
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  std::filesystem::path write(const std::string& name, std::string_view text) const {
+    std::ofstream(path_ / name) << text;
+    return path_ / name;
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+TEST(ConfigurationLoader, AFileWithNothingButItsVersionGivesTheDefaults) {
+  const Expected<Configuration> result = parse("version = 1\n");
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(*result, Configuration{});
+}
+
+TEST(ConfigurationLoader, ReadsEveryKindOfValueInItsUnit) {
+  const Expected<Configuration> result = parse(R"(
+version = 1
+[source]
+name = "theatre 3"
+[tracker]
+position_deviation_mm = 1.4
+rotation_deviation_deg = 0.5
+time_offset_ms = -2.5
+hand_eye_translation_SC_mm = [1, -2.5, 3]
+hand_eye_rotation_SC_wxyz = [0, 0, 1, 0]
+[phase]
+law = "time-locked"
+[pipeline]
+latency_ms = 40
+workers = 4
+[estimation]
+start_depths_mm = [60, 120.5]
+[realtime]
+lock_memory = false
+cpus = [2, 3]
+[dds]
+surface_lifespan_ms = 0.25
+[log]
+level = "debug"
+)");
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->source.name, "theatre 3");
+  EXPECT_EQ(result->tracker.position_deviation_mm, 1.4);
+  EXPECT_NEAR(result->tracker.rotation_deviation_rad, std::numbers::pi / 360.0, 1e-15);
+  EXPECT_EQ(result->tracker.time_offset, microseconds(-2500));
+  EXPECT_THAT(result->tracker.translation_SC_mm, ::testing::ElementsAre(1.0, -2.5, 3.0));
+  EXPECT_THAT(result->tracker.rotation_SC_wxyz, ::testing::ElementsAre(0.0, 0.0, 1.0, 0.0));
+  EXPECT_EQ(result->phase.law, PhaseConfiguration::Law::kTimeLocked);
+  EXPECT_EQ(result->pipeline.latency, milliseconds(40));
+  EXPECT_EQ(result->pipeline.workers, 4);
+  EXPECT_THAT(result->estimation.start_depths_mm, ::testing::ElementsAre(60.0, 120.5));
+  EXPECT_FALSE(result->realtime.lock_memory);
+  EXPECT_THAT(result->realtime.cpus, ::testing::ElementsAre(2, 3));
+  EXPECT_EQ(result->dds.surface_lifespan, microseconds(250));
+  EXPECT_EQ(result->log.level, LogConfiguration::Level::kDebug);
+}
+
+TEST(ConfigurationLoader, AFileOverlaysItsBaseKeyByKey) {
+  const Expected<Configuration> recorded =
+      parse("version = 1\n[tracker]\nposition_deviation_mm = 1.4\n[phase]\nlaw = \"warped\"\n");
+  ASSERT_TRUE(recorded);
+  const Expected<Configuration> result = parse("version = 1\n[phase]\nlaw = \"linear\"\n", *recorded);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->phase.law, PhaseConfiguration::Law::kLinear);
+  EXPECT_EQ(result->tracker.position_deviation_mm, 1.4);
+}
+
+TEST(ConfigurationLoader, WhatIsPrintedLoadsBackToTheSame) {
+  Configuration configuration;
+  configuration.source.name = "a \"quoted\" \\ name";
+  configuration.replay.recording = "/data/x.mcap";
+  configuration.replay.realtime = false;
+  configuration.tracker.rotation_deviation_rad = 0.5 * std::numbers::pi / 180.0;
+  configuration.tracker.time_offset = Duration(-1234567);
+  configuration.tracker.translation_SC_mm[1] = 1.0 / 3.0;
+  configuration.phase.law = PhaseConfiguration::Law::kWarped;
+  configuration.pipeline.latency = Duration(33333333);
+  configuration.estimation.start_depths_mm = {40, 80.25, 1e4};
+  configuration.estimation.gate_chi2 = 0.1 + 0.2;
+  configuration.realtime.cpus = {1, 3};
+  configuration.dds.enabled = false;
+  configuration.log.level = LogConfiguration::Level::kError;
+  for (const Configuration& printed : {Configuration{}, configuration}) {
+    const Expected<Configuration> result = parse(to_toml(printed));
+    ASSERT_TRUE(result) << result.error().message << "\n" << to_toml(printed);
+    EXPECT_EQ(*result, printed) << to_toml(printed);
+  }
+}
+
+TEST(ConfigurationLoader, FileNamesStartAtTheFoldersOfTheirConfiguration) {
+  const TemporaryFolder folder;
+  const std::filesystem::path recording = folder.write("x.mcap", "");
+  const std::filesystem::path file = folder.write("a.toml", "version = 1\n[replay]\nrecording = \"./x.mcap\"\n");
+  const Expected<Configuration> result = load_configuration(file);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->replay.recording, recording);
+}
+
+TEST(ConfigurationLoader, AMissingNamedFileIsAnErrorAtItsKey) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder.write("a.toml", "version = 1\n[replay]\nrecording = \"x.mcap\"\n");
+  const Expected<Configuration> result = load_configuration(file);
+  ASSERT_FALSE(result);
+  EXPECT_THAT(result.error().message,
+              StartsWith(file.string() + ":3:13: key 'replay.recording': expected the name of an existing file, got "
+                                         "\"x.mcap\""));
+}
+
+TEST(ConfigurationLoader, AMissingOrUnreadableConfigurationFileIsNamed) {
+  const TemporaryFolder folder;
+  const Expected<Configuration> missing = load_configuration("/nowhere/a.toml");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().message,
+            "/nowhere/a.toml: expected a readable configuration file, got: No such file or directory");
+  const Expected<Configuration> a_folder = load_configuration(std::filesystem::temp_directory_path());
+  ASSERT_FALSE(a_folder);
+  EXPECT_THAT(a_folder.error().message, HasSubstr("expected a readable configuration file, got: Is a directory"));
+}
+
+TEST(ConfigurationLoader, OfSeveralErrorsTheFirstInTheFileIsTold) {
+  EXPECT_THAT(
+      error_of("version = 1\n[tracker]\nposition_deviation_mm = -1\n[phase]\nlaw = 3\nx = 1\n[camera]\ny = 2\n"),
+      StartsWith("test.toml:3:25: key 'tracker.position_deviation_mm'"));
+}
+
+struct Wrong {
+  const char* name;
+  std::string text;
+  std::string error;
+};
+
+class WrongConfiguration : public ::testing::TestWithParam<Wrong> {};
+
+TEST_P(WrongConfiguration, GivesOneLineThatNamesPlaceKeyAndWhatWouldBeRight) {
+  const std::string error = error_of(GetParam().text);
+  EXPECT_THAT(error, StartsWith(GetParam().error));
+  EXPECT_EQ(error.find_first_of("\r\n"), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, WrongConfiguration,
+    ::testing::Values(
+        Wrong{"Empty", "", "test.toml:1:1: key 'version': expected 1, got nothing"},
+        Wrong{"OtherVersion", "version = 2", "test.toml:1:11: key 'version': expected 1, got 2"},
+        Wrong{"VersionAsText", "version = \"1\"", "test.toml:1:11: key 'version': expected 1, got \"1\""},
+        Wrong{"UnknownSection", "version = 1\n[traker]\n",
+              "test.toml:2:2: key 'traker': expected one of version, source, replay, camera, tracker, phase, pipeline, "
+              "features, estimation, realtime, dds, status, log, got an unknown key"},
+        Wrong{"UnknownKey", "version = 1\n[phase]\nlow = 1\n",
+              "test.toml:3:1: key 'phase.low': expected one of law, lost_after_s, got an unknown key"},
+        Wrong{"SectionIsAValue", "version = 1\nphase = 3\n", "test.toml:2:9: key 'phase': expected a table, got 3"},
+        Wrong{"SectionIsAnArrayOfTables", "version = 1\n[[phase]]\nlaw = \"linear\"\n",
+              "test.toml:2:1: key 'phase': expected a table, got [a table]"},
+        Wrong{"KeyIsATable", "version = 1\n[phase.law]\n",
+              "test.toml:2:1: key 'phase.law': expected \"linear\" or \"warped\" or \"time-locked\", got a table"},
+        Wrong{"WordForNumber", "version = 1\n[pipeline]\nworkers = \"two\"\n",
+              "test.toml:3:11: key 'pipeline.workers': expected an integer from 1 to 64, got \"two\""},
+        Wrong{"NumberForInteger", "version = 1\n[pipeline]\nworkers = 2.0\n",
+              "test.toml:3:11: key 'pipeline.workers': expected an integer from 1 to 64, got 2"},
+        Wrong{"TooFewWorkers", "version = 1\n[pipeline]\nworkers = 0\n",
+              "test.toml:3:11: key 'pipeline.workers': expected an integer from 1 to 64, got 0"},
+        Wrong{"LargestInteger", "version = 1\n[pipeline]\nworkers = 9223372036854775807\n",
+              "test.toml:3:11: key 'pipeline.workers': expected an integer from 1 to 64, got 9223372036854775807"},
+        Wrong{"NotANumber", "version = 1\n[tracker]\nposition_deviation_mm = nan\n",
+              "test.toml:3:25: key 'tracker.position_deviation_mm': expected a number from 0 to 100, got nan"},
+        Wrong{"Infinity", "version = 1\n[tracker]\ntime_offset_ms = inf\n",
+              "test.toml:3:18: key 'tracker.time_offset_ms': expected a number from -1000 to 1000, got inf"},
+        Wrong{"FlagAsNumber", "version = 1\n[replay]\nrealtime = 1\n",
+              "test.toml:3:12: key 'replay.realtime': expected true or false, got 1"},
+        Wrong{"Date", "version = 1\n[replay]\nrealtime = 1979-05-27\n",
+              "test.toml:3:12: key 'replay.realtime': expected true or false, got a date or time"},
+        Wrong{
+            "ClockRelease", "version = 1\n[pipeline]\nrelease = \"clock\"\n",
+            "test.toml:3:11: key 'pipeline.release': expected \"frame\" (\"clock\" is not available in this version), "
+            "got \"clock\""},
+        Wrong{"BudgetBeyondLatency", "version = 1\n[pipeline]\nbudget_ms = 50\n",
+              "test.toml:3:13: key 'pipeline.budget_ms': expected less than latency_ms (50), got 50"},
+        Wrong{"QuaternionNotUnit", "version = 1\n[tracker]\nhand_eye_rotation_SC_wxyz = [1, 1, 0, 0]\n",
+              "test.toml:3:29: key 'tracker.hand_eye_rotation_SC_wxyz': expected four numbers of norm 1 within "
+              "1e-3, got [1, 1, 0, 0]"},
+        Wrong{"TranslationTooShort", "version = 1\n[tracker]\nhand_eye_translation_SC_mm = [1, 2]\n",
+              "test.toml:3:30: key 'tracker.hand_eye_translation_SC_mm': expected three numbers from -10000 to 10000, "
+              "got [1, 2]"},
+        Wrong{"MixedArray", "version = 1\n[tracker]\nhand_eye_translation_SC_mm = [1, 2, \"3\"]\n",
+              "test.toml:3:30: key 'tracker.hand_eye_translation_SC_mm': expected three numbers from -10000 to 10000, "
+              "got [1, 2, \"3\"]"},
+        Wrong{"DepthsFalling", "version = 1\n[estimation]\nstart_depths_mm = [90, 50]\n",
+              "test.toml:3:19: key 'estimation.start_depths_mm': expected 1 to 8 rising numbers"},
+        Wrong{"NoDepths", "version = 1\n[estimation]\nstart_depths_mm = []\n",
+              "test.toml:3:19: key 'estimation.start_depths_mm': expected 1 to 8 rising numbers"},
+        Wrong{"NegativeCpu", "version = 1\n[realtime]\ncpus = [-1]\n",
+              "test.toml:3:8: key 'realtime.cpus': expected up to 64 integers from 0 to 1023, got [-1]"},
+        Wrong{"NameTooLong", "version = 1\n[source]\nname = \"" + std::string(64, 'x') + "\"\n",
+              "test.toml:3:8: key 'source.name': expected a printable text of 1 to 63 bytes, got \"xxx"},
+        Wrong{"NameWithNewLine", "version = 1\n[source]\nname = \"a\\nb\"\n",
+              "test.toml:3:8: key 'source.name': expected a printable text of 1 to 63 bytes, got \"a b\""},
+        Wrong{"EmptyFileName", "version = 1\n[replay]\nrecording = \"\"\n",
+              "test.toml:3:13: key 'replay.recording': expected the name of an existing file, got \"\""},
+        Wrong{"FileNameWithNul", "version = 1\n[replay]\nrecording = \"a\\u0000b\"\n",
+              "test.toml:3:13: key 'replay.recording': expected the name of an existing file, got "},
+        Wrong{"KeyTwice", "version = 1\nversion = 1\n", "test.toml:2:"},
+        Wrong{"NoValue", "version = \n", "test.toml:1:"}, Wrong{"OpenString", "version = \"1\n", "test.toml:1:"},
+        Wrong{"OpenTable", "version = 1\n[phase\n", "test.toml:2:"},
+        Wrong{"NotUtf8", "version = 1\nx = \"\xff\xfe\"\n", "test.toml:2:"},
+        Wrong{"Nul", std::string("version = 1\n\0", 13), "test.toml:2:"},
+        Wrong{"Binary", "\x89MCAP0\r\n", "test.toml:1:"},
+        Wrong{"DeepArrays", "version = 1\nx = " + std::string(5000, '['), "test.toml:2:"},
+        Wrong{"DeepKeys",
+              "version = 1\nx" +
+                  [] {
+                    std::string dots;
+                    for (int i = 0; i < 30000; ++i) dots += ".a";
+                    return dots;
+                  }() +
+                  " = 1\n",
+              "test.toml:2:1: key 'x'"},
+        Wrong{"TooLarge", std::string(70000, '#'), "test.toml:1:1: expected at most 65536 bytes of TOML, got 70000"}),
+    [](const auto& instance) { return std::string(instance.param.name); });
+
+TEST(ShippedConfiguration, EachIsAcceptedAndListsEveryKey) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(PERIMAP_CONFIG)) {
+    if (entry.path().extension() != ".toml") {
+      continue;
+    }
+    ++files;
+    const Expected<Configuration> result = load_configuration(entry.path(), {}, NamedFiles::kMayBeMissing);
+    ASSERT_TRUE(result) << result.error().message;
+    std::ifstream stream(entry.path());
+    const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+    for (const ConfigurationKey& key : configuration_keys()) {
+      EXPECT_THAT(text, ::testing::AnyOf(HasSubstr("\n" + key.name + " = "), HasSubstr("\n# " + key.name + " = ")))
+          << entry.path();
+    }
+  }
+  EXPECT_GT(files, 0);
+}
+
+TEST(ShippedConfiguration, TheReplayConfigurationHoldsTheDefaults) {
+  Expected<Configuration> result =
+      load_configuration(std::filesystem::path(PERIMAP_CONFIG) / "replay.toml", {}, NamedFiles::kMayBeMissing);
+  ASSERT_TRUE(result) << result.error().message;
+  result->replay.recording.reset();
+  EXPECT_EQ(*result, Configuration{});
+}
+
+TEST(ConvergedDeviation, FollowsTheTrackerNoiseUnlessConfigured) {
+  Configuration configuration;
+  EXPECT_EQ(converged_deviation_mm(configuration), 1.0);
+  configuration.tracker.position_deviation_mm = 1.4;
+  EXPECT_EQ(converged_deviation_mm(configuration), 2.0);
+  configuration.estimation.configured_converged_deviation_mm = 0.5;
+  EXPECT_EQ(converged_deviation_mm(configuration), 0.5);
+}
+
+}  // namespace
+}  // namespace perimap
