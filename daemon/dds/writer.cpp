@@ -1,0 +1,35 @@
+#include "daemon/dds/writer.hpp"
+
+#include <fmt/format.h>
+
+namespace perimap::dds {
+
+Expected<UntypedWriter> UntypedWriter::create(const Participant& participant, const TopicDescription& description,
+                                              const WriterPromise& promise) {
+  Entity topic(dds_create_topic(participant.handle(), description.descriptor, description.name, nullptr, nullptr));
+  if (topic.get() < 0) {
+    return fail(fmt::format("DDS topic {}: cannot create: {}", description.name, dds_strretcode(topic.get())));
+  }
+  const Qos qos = writer_qos(description, promise);
+  Entity writer(dds_create_writer(participant.handle(), topic.get(), qos.get(), nullptr));
+  if (writer.get() < 0) {
+    return fail(
+        fmt::format("DDS topic {}: cannot create a writer: {}", description.name, dds_strretcode(writer.get())));
+  }
+  return UntypedWriter(std::move(topic), std::move(writer));
+}
+
+Expected<void> UntypedWriter::write(const void* sample) {
+  const dds_return_t result = dds_write(writer_.get(), sample);
+  if (result < 0) {
+    return fail(fmt::format("DDS write: {}", dds_strretcode(result)));
+  }
+  return {};
+}
+
+int UntypedWriter::matched_readers() const noexcept {
+  dds_publication_matched_status_t status{};
+  return dds_get_publication_matched_status(writer_.get(), &status) < 0 ? 0 : static_cast<int>(status.current_count);
+}
+
+}  // namespace perimap::dds

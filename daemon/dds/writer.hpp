@@ -1,0 +1,48 @@
+// Publishes samples of one topic.
+#pragma once
+
+#include "core/error/expected.hpp"
+#include "daemon/dds/entity.hpp"
+#include "daemon/dds/participant.hpp"
+#include "daemon/dds/topic.hpp"
+
+namespace perimap::dds {
+
+// What does not depend on the type of the samples.
+class UntypedWriter {
+ public:
+  [[nodiscard]] static Expected<UntypedWriter> create(const Participant& participant, const TopicDescription& topic,
+                                                      const WriterPromise& promise);
+
+  // Copies the sample to the network and to readers in this process. Allocates, locks and calls the kernel.
+  [[nodiscard]] Expected<void> write(const void* sample);
+  // Readers that are connected now.
+  [[nodiscard]] int matched_readers() const noexcept;
+
+ private:
+  UntypedWriter(Entity topic, Entity writer) noexcept : topic_(std::move(topic)), writer_(std::move(writer)) {}
+
+  Entity topic_;
+  Entity writer_;
+};
+
+// T: a published type of perimap.idl. One thread at a time.
+template <class T>
+class Writer {
+ public:
+  [[nodiscard]] static Expected<Writer> create(const Participant& participant, const WriterPromise& promise = {}) {
+    return UntypedWriter::create(participant, topic_of<T>(), promise).map([](UntypedWriter writer) {
+      return Writer(std::move(writer));
+    });
+  }
+
+  [[nodiscard]] Expected<void> write(const T& sample) { return writer_.write(&sample); }
+  [[nodiscard]] int matched_readers() const noexcept { return writer_.matched_readers(); }
+
+ private:
+  explicit Writer(UntypedWriter writer) noexcept : writer_(std::move(writer)) {}
+
+  UntypedWriter writer_;
+};
+
+}  // namespace perimap::dds
