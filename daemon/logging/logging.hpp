@@ -1,0 +1,26 @@
+// The process's log: lines on standard error, written by a thread of their own.
+#pragma once
+
+#include <cstddef>
+
+#include "daemon/config/configuration.hpp"
+
+namespace perimap {
+
+// While it lives, spdlog's default logger (spdlog::info(...) and so on) puts lines into a bounded queue; when the queue
+// is full the oldest line is dropped and counted, so that no caller waits for a slow terminal. On the journal each
+// line carries its severity (sd-daemon(3)), elsewhere time and severity. Not for the real-time path: it locks and
+// formats. One at a time.
+class Logging {
+ public:
+  explicit Logging(LogConfiguration::Level level);
+  Logging(const Logging&) = delete;
+  Logging& operator=(const Logging&) = delete;
+  // Writes what is queued.
+  ~Logging();
+
+  // Lines dropped so far.
+  [[nodiscard]] std::size_t overruns() const;
+};
+
+}  // namespace perimap
