@@ -15,7 +15,8 @@ class WorkerTeam {
  public:
   using Task = void (*)(void* context, int worker) noexcept;
 
-  explicit WorkerTeam(int workers) : size_(workers), go_(std::make_unique<Wakeup[]>(static_cast<std::size_t>(workers))) {}
+  explicit WorkerTeam(int workers)
+      : size_(workers), go_(std::make_unique<Wakeup[]>(static_cast<std::size_t>(workers))) {}
 
   [[nodiscard]] int size() const noexcept { return size_; }
 
