@@ -1,0 +1,127 @@
+#include "core/phase/cardiac_clock.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace perimap {
+namespace {
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kOverdueDeviations = 3.0;
+
+Duration rounded(Seconds s) noexcept { return from_seconds(s.count()); }
+
+}  // namespace
+
+PhaseEstimate CardiacClock::at(Instant t) const noexcept {
+  const Located located = locate(t);
+  PhaseEstimate estimate;
+  estimate.state = located.state;
+  if (located.cycle.length <= Duration::zero()) return estimate;
+
+  const CardiacCycle& cycle = located.cycle;
+  const CyclePhase phase = phase_in_cycle(law_, t - cycle.begin, cycle.length, cycle.previous_length);
+  estimate.phase_rad = phase.phase_rad < kTwoPi ? phase.phase_rad : 0.0;
+  estimate.rate_rad_per_s = phase.rate_rad_per_s;
+  estimate.exact = located.exact;
+
+  const double w = phase.length_sensitivity;
+  const double begin = to_seconds(cycle.begin_deviation);
+  const double length = to_seconds(cycle.length_deviation);
+  if (located.exact) {
+    // Both ends are measured: their errors are shared out by how much the phase is bound to each.
+    const double irregular = w * to_seconds(located.irregularity);
+    estimate.deviation_s =
+        std::sqrt((1.0 - w) * (1.0 - w) * begin * begin + w * w * length * length + irregular * irregular);
+  } else {
+    estimate.deviation_s = std::hypot(begin, w * length);
+  }
+  return estimate;
+}
+
+CardiacClock::Located CardiacClock::locate(Instant t) const noexcept {
+  if (held_ == 0 || t < beat(std::min(held_ - 1, kCompletedCycles)).time) return {};
+  if (t >= beat(0).time) return locate_predicted(t);
+  int newer = 0;
+  while (beat(newer + 1).time > t) ++newer;
+  return locate_completed(newer);
+}
+
+// The cycle that ended with history_[newer]. Its length deviation is that of its end.
+CardiacClock::Located CardiacClock::locate_completed(int newer) const noexcept {
+  const Beat& end = beat(newer);
+  const Beat& begin = beat(newer + 1);
+  Located located;
+  if (end.index_in_run == 0) {
+    located.state = PhaseState::kLost;
+    return located;
+  }
+  // A cycle counts once its run has reached kBeatsToLock, be it by beats that came after.
+  std::uint32_t reached = end.index_in_run;
+  for (int i = newer - 1; i >= 0 && beat(i).index_in_run > reached; --i) reached = beat(i).index_in_run;
+  if (reached + 1 < kBeatsToLock) return located;
+
+  located.state = PhaseState::kLocked;
+  located.exact = true;
+  located.irregularity = end.irregularity;
+  located.cycle.begin = begin.time;
+  located.cycle.begin_deviation = begin.deviation;
+  located.cycle.length = end.time - begin.time;
+  located.cycle.length_deviation = end.deviation;
+  located.cycle.previous_length = located.cycle.length;
+  if (begin.index_in_run > 0 && newer + 2 < held_) {
+    located.cycle.previous_length = begin.time - beat(newer + 2).time;
+  }
+  return located;
+}
+
+CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
+  Located located;
+  if (beat(0).index_in_run + 1 < kBeatsToLock) return located;
+
+  const Instant due = predicted_r_peak();
+  const Duration slack = std::min(rounded(kOverdueDeviations * length_deviation_), predicted_length());
+  if (t > due + lost_after_) {
+    located.state = PhaseState::kLost;
+    return located;
+  }
+  located.state = t > due + slack + detector_delay_ ? PhaseState::kFreeRunning : PhaseState::kLocked;
+
+  CardiacCycle& cycle = located.cycle;
+  const double one_cycle = length_deviation_.count();
+  const double anchor = to_seconds(beat(0).deviation);
+  cycle.begin = beat(0).time;
+  cycle.previous_length = last_rr();
+  cycle.length_deviation = rounded(length_deviation_);
+  for (int ahead = 0;; ++ahead) {
+    cycle.length = rounded(predicted_[static_cast<std::size_t>(std::min(ahead, kPredictedCycles - 1))]);
+    cycle.begin_deviation = from_seconds(std::sqrt(anchor * anchor + ahead * one_cycle * one_cycle));
+    if (t < cycle.begin + cycle.length) return located;
+    cycle.begin += cycle.length;
+    cycle.previous_length = cycle.length;
+  }
+}
+
+CardiacCycle CardiacClock::cycle_at(Instant t) const noexcept {
+  CardiacCycle cycle = locate(t).cycle;
+  if (cycle.length > Duration::zero()) {
+    cycle.systole = rounded(systole_duration(law_, cycle.length, cycle.previous_length));
+  }
+  return cycle;
+}
+
+Instant CardiacClock::anchor() const noexcept { return beat(0).time; }
+Duration CardiacClock::anchor_deviation() const noexcept { return beat(0).deviation; }
+Duration CardiacClock::predicted_length() const noexcept { return rounded(predicted_[0]); }
+Duration CardiacClock::length_deviation() const noexcept { return rounded(length_deviation_); }
+
+Duration CardiacClock::last_rr() const noexcept {
+  return held_ > 1 && beat(0).index_in_run > 0 ? beat(0).time - beat(1).time : Duration::zero();
+}
+
+Duration CardiacClock::predicted_r_peak_deviation() const noexcept {
+  return from_seconds(std::hypot(to_seconds(anchor_deviation()), length_deviation_.count()));
+}
+
+}  // namespace perimap

@@ -1,0 +1,102 @@
+// The phase of the heart at any instant: a snapshot that can be copied between threads.
+//
+// Between two known R peaks the phase is exact. After the last one it runs on the predicted length of the current
+// cycle, and past that on the predicted lengths of the cycles to come, with a deviation that grows.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <type_traits>
+
+#include "core/phase/phase_law.hpp"
+#include "core/phase/seconds.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+enum class PhaseState : std::uint8_t {
+  kUnknown,      // fewer than three beats in a row yet, or before the history held: the phase means nothing
+  kLocked,       // between known beats, or within the cycle that follows one
+  kFreeRunning,  // a beat was due and has not come; the phase goes on from predicted lengths
+  kLost          // no beat for so long that the phase means nothing
+};
+
+struct PhaseEstimate {
+  double phase_rad = 0.0;       // [0, 2 pi), 0 = R peak
+  double rate_rad_per_s = 0.0;  // 0 when the phase means nothing
+  double deviation_s = 0.0;     // standard deviation of the phase, as time: phase deviation = rate * this
+  PhaseState state = PhaseState::kUnknown;
+  bool exact = false;  // the cycle is completed: both its R peaks are known
+};
+
+// One cycle, completed or predicted.
+struct CardiacCycle {
+  Instant begin;  // R peak, or its prediction
+  Duration begin_deviation{0};
+  Duration length{0};
+  Duration length_deviation{0};
+  Duration previous_length{0};  // the warped law depends on it
+  Duration systole{0};          // under the warped law's rule
+};
+
+class CardiacClock {
+ public:
+  static constexpr int kCompletedCycles = 32;
+  static constexpr int kPredictedCycles = 4;  // further ones repeat the last
+  static constexpr int kBeatsToLock = 3;
+
+  // Any instant. Instants before the history, and those in gaps too long to be cycles, are kUnknown or kLost with rate
+  // 0.
+  [[nodiscard]] PhaseEstimate at(Instant t) const noexcept;
+
+  // The last R peak and the cycle predicted to follow it. Zero before the first beat.
+  [[nodiscard]] Instant anchor() const noexcept;
+  [[nodiscard]] Duration anchor_deviation() const noexcept;
+  [[nodiscard]] Duration predicted_length() const noexcept;
+  [[nodiscard]] Duration length_deviation() const noexcept;
+  [[nodiscard]] Duration last_rr() const noexcept;  // zero before the second beat of a run
+  [[nodiscard]] Instant predicted_r_peak() const noexcept { return anchor() + predicted_length(); }
+  [[nodiscard]] Duration predicted_r_peak_deviation() const noexcept;
+
+  // The cycle that holds t; while free-running it begins at a predicted R peak. Lengths are zero when the phase at t
+  // means nothing.
+  [[nodiscard]] CardiacCycle cycle_at(Instant t) const noexcept;
+
+  [[nodiscard]] const PhaseLawSettings& law() const noexcept { return law_; }
+  [[nodiscard]] std::uint64_t beats() const noexcept { return beats_; }  // R peaks taken since the start
+
+ private:
+  friend class CardiacClockTracker;
+
+  struct Beat {
+    Instant time;
+    Duration deviation{0};
+    std::uint32_t index_in_run = 0;  // 0 for the first beat and for the first after a gap
+    Duration irregularity{0};        // by how much the interval before it missed its prediction, 0 when in rhythm
+  };
+
+  struct Located {
+    CardiacCycle cycle;
+    Duration irregularity{0};
+    PhaseState state = PhaseState::kUnknown;
+    bool exact = false;
+  };
+
+  [[nodiscard]] Located locate(Instant t) const noexcept;
+  [[nodiscard]] Located locate_completed(int newer) const noexcept;
+  [[nodiscard]] Located locate_predicted(Instant t) const noexcept;
+  [[nodiscard]] const Beat& beat(int i) const noexcept { return history_[static_cast<std::size_t>(i)]; }
+
+  PhaseLawSettings law_;
+  Duration lost_after_{0};
+  Duration detector_delay_{0};
+  std::uint64_t beats_ = 0;
+  int held_ = 0;
+  std::array<Beat, kCompletedCycles + 2> history_{};  // newest first; one more cycle gives the oldest its RR_previous
+  std::array<Seconds, kPredictedCycles> predicted_{};
+  Seconds length_deviation_{0.0};
+};
+
+static_assert(std::is_trivially_copyable_v<CardiacClock>);
+
+}  // namespace perimap

@@ -1,0 +1,37 @@
+// Keeps the cardiac clock: takes R peaks as they are detected and re-anchors at each peak's own time.
+#pragma once
+
+#include <chrono>
+
+#include "core/phase/cardiac_clock.hpp"
+#include "core/phase/phase_law.hpp"
+#include "core/phase/r_peak.hpp"
+#include "core/phase/rr_predictor.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+struct CardiacClockSettings {
+  PhaseLawSettings law;
+  RrMethod predictor = RrMethod::kAutoregressive;
+  // A beat is missed only when it could have been known: due time + 3 deviations + this.
+  Duration detector_delay = std::chrono::milliseconds(150);
+  // After the due beat. Four missed beats at rest; by then the free-running deviation is a good part of a cycle.
+  Duration lost_after = std::chrono::seconds(3);
+};
+
+class CardiacClockTracker {
+ public:
+  explicit CardiacClockTracker(const CardiacClockSettings& settings) noexcept;
+
+  // In order of time. A peak less than 250 ms after the last (or before it) is refused.
+  void on_r_peak(const RPeak& peak) noexcept;
+
+  [[nodiscard]] const CardiacClock& clock() const noexcept { return clock_; }
+
+ private:
+  RrPredictor predictor_;
+  CardiacClock clock_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,83 @@
+#include "core/phase/phase_law.hpp"
+
+#include <algorithm>
+
+namespace perimap {
+namespace {
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+
+// Systole may take at most this share of the cycle, and at least the other, whatever the coefficients say.
+constexpr double kLongestSystole = 0.75;
+constexpr double kShortestSystole = 0.05;
+
+// Diastasis keeps at least this share of the cycle under the time-locked law, so that the rate stays finite.
+constexpr double kShortestDiastasis = 0.05;
+
+CyclePhase linear(double s, double rr) noexcept { return {kTwoPi * s / rr, kTwoPi / rr, s / rr}; }
+
+CyclePhase warped(const PhaseLawSettings& settings, double s, double rr, double rr_previous) noexcept {
+  const double systole = systole_duration(settings, Seconds(rr), Seconds(rr_previous)).count();
+  const bool stretches = systole >= kLongestSystole * rr || systole <= kShortestSystole * rr;
+  const double fraction = settings.systole_fraction;
+  CyclePhase result;
+  if (s < systole) {
+    result = {kTwoPi * fraction * s / systole, kTwoPi * fraction / systole, 0.0};
+  } else {
+    const double diastole = rr - systole;
+    const double share = (s - systole) / diastole;
+    result = {kTwoPi * (fraction + (1.0 - fraction) * share), kTwoPi * (1.0 - fraction) / diastole, share};
+  }
+  if (stretches) result.length_sensitivity = s / rr;
+  return result;
+}
+
+CyclePhase time_locked(const PhaseLawSettings& settings, double s, double rr) noexcept {
+  double systole = settings.locked_systole.count();
+  double filling = settings.locked_filling.count();
+  const double room = (1.0 - kShortestDiastasis) * rr;
+  const bool stretches = systole + filling > room;
+  if (stretches) {
+    const double scale = room / (systole + filling);
+    systole *= scale;
+    filling *= scale;
+  }
+  const double at_systole = settings.locked_systole_phase_rad;
+  const double at_filling = settings.locked_filling_phase_rad;
+  const double filling_begins = rr - filling;
+  CyclePhase result;
+  if (s < systole) {
+    result = {at_systole * s / systole, at_systole / systole, 0.0};
+  } else if (s < filling_begins) {
+    const double diastasis = filling_begins - systole;
+    const double share = (s - systole) / diastasis;
+    result = {at_systole + (at_filling - at_systole) * share, (at_filling - at_systole) / diastasis, share};
+  } else {
+    result = {at_filling + (kTwoPi - at_filling) * (s - filling_begins) / filling, (kTwoPi - at_filling) / filling,
+              1.0};
+  }
+  if (stretches) result.length_sensitivity = s / rr;
+  return result;
+}
+
+}  // namespace
+
+Seconds systole_duration(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept {
+  const double by_rate = settings.systole_offset_s - settings.systole_slope_s_per_bpm * 60.0 / rr_previous.count();
+  return std::max(std::min(Seconds(by_rate), kLongestSystole * rr), kShortestSystole * rr);
+}
+
+CyclePhase phase_in_cycle(const PhaseLawSettings& settings, Seconds since_r, Seconds rr, Seconds rr_previous) noexcept {
+  const double s = std::clamp(since_r.count(), 0.0, rr.count());
+  switch (settings.law) {
+    case PhaseLaw::kWarped:
+      return warped(settings, s, rr.count(), rr_previous.count());
+    case PhaseLaw::kTimeLocked:
+      return time_locked(settings, s, rr.count());
+    case PhaseLaw::kLinear:
+      break;
+  }
+  return linear(s, rr.count());
+}
+
+}  // namespace perimap

@@ -1,0 +1,53 @@
+// From the time since an R peak to the phase of the heart's motion.
+//
+// Phase 0 is the R peak. The linear law is that of Tully, Kantor & Choset (ICRA 2013). But systole does not stretch
+// with the cycle as diastole does: its length follows the rate of the beat before, nearly linearly (Weissler, Harris &
+// Schoenfeld, "Systolic time intervals in heart failure in man", Circulation 37, 1968). The other two laws say so.
+#pragma once
+
+#include <cstdint>
+#include <numbers>
+
+#include "core/phase/seconds.hpp"
+
+namespace perimap {
+
+enum class PhaseLaw : std::uint8_t {
+  kLinear,     // evenly from R peak to R peak
+  kWarped,     // systole keeps its own length, diastole takes the rest
+  kTimeLocked  // systole and early filling follow the R peak, atrial filling precedes the next, diastasis stretches
+};
+
+struct PhaseLawSettings {
+  PhaseLaw law = PhaseLaw::kLinear;
+
+  // Warped law: systole lasts min(offset - slope * 60 / RR_previous, 0.75 RR) and takes this share of the phase.
+  double systole_fraction = 0.4;
+  double systole_offset_s = 0.546;
+  double systole_slope_s_per_bpm = 0.0021;
+
+  // Time-locked law: the phase reaches `locked_systole_phase_rad` this long after the R peak, and
+  // `locked_filling_phase_rad` this long before the next one. In cycles too short for both they shrink in proportion.
+  Seconds locked_systole{0.48};
+  Seconds locked_filling{0.16};
+  double locked_systole_phase_rad = 2.0 * std::numbers::pi * 0.56;
+  double locked_filling_phase_rad = 2.0 * std::numbers::pi * 0.81;
+};
+
+struct CyclePhase {
+  double phase_rad = 0.0;       // [0, 2 pi]
+  double rate_rad_per_s = 0.0;  // > 0
+  // Seconds by which the phase runs early for each second that the cycle turns out longer: 0 where the motion is bound
+  // to the R peak behind, 1 where it is bound to the one ahead.
+  double length_sensitivity = 0.0;
+};
+
+// Duration of systole under the warped law; always within the cycle.
+[[nodiscard]] Seconds systole_duration(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept;
+
+// `since_r` below 0 counts as 0 and above `rr` as `rr`: a cycle does not run past its end. `rr` and `rr_previous` must
+// be positive.
+[[nodiscard]] CyclePhase phase_in_cycle(const PhaseLawSettings& settings, Seconds since_r, Seconds rr,
+                                        Seconds rr_previous) noexcept;
+
+}  // namespace perimap

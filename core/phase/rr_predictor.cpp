@@ -1,0 +1,98 @@
+#include "core/phase/rr_predictor.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+namespace perimap {
+namespace {
+
+constexpr double kRidge = 1e-2;          // times the window's sum of squares
+constexpr double kShortestOfMean = 0.7;  // predictions stay within these shares of the window's mean
+constexpr double kLongestOfMean = 1.3;
+
+constexpr double kErrorMemory = 30.0;        // beats over which past errors fade
+constexpr double kPriorWeight = 4.0;         // beats that the starting value counts for
+constexpr double kPriorDeviation = 0.05;     // of the interval: resting sinus rhythm
+constexpr double kLargestScoredError = 0.5;  // of the prediction: a missed beat must not count as a whole cycle's error
+
+}  // namespace
+
+void RrPredictor::push(Seconds rr, Seconds learnt) noexcept {
+  if (count_ > 0) {
+    std::array<Seconds, 1> predicted;
+    predict(predicted);
+    const double bound = kLargestScoredError * predicted[0].count();
+    const double error = std::clamp(rr.count() - predicted[0].count(), -bound, bound);
+    const double keep = 1.0 - 1.0 / kErrorMemory;
+    squared_error_sum_s2_ = keep * squared_error_sum_s2_ + error * error;
+    error_weight_ = keep * error_weight_ + 1.0;
+  } else {
+    const double prior = kPriorDeviation * learnt.count();
+    squared_error_sum_s2_ = kPriorWeight * prior * prior;
+    error_weight_ = kPriorWeight;
+  }
+  if (count_ == kWindow) {
+    std::copy(rr_s_.begin() + 1, rr_s_.end(), rr_s_.begin());
+    --count_;
+  }
+  rr_s_[static_cast<std::size_t>(count_)] = learnt.count();
+  ++count_;
+}
+
+void RrPredictor::predict(std::span<Seconds> next) const noexcept {
+  if (next.empty()) return;
+  if (count_ == 0) {
+    std::fill(next.begin(), next.end(), Seconds(0.0));
+    return;
+  }
+  const auto held = std::span(rr_s_).first(static_cast<std::size_t>(count_));
+  if (method_ == RrMethod::kMeanOf8) {
+    const auto recent = held.last(std::min<std::size_t>(held.size(), 8));
+    double sum = 0.0;
+    for (const double rr : recent) sum += rr;
+    std::fill(next.begin(), next.end(), Seconds(sum / static_cast<double>(recent.size())));
+  } else if (method_ == RrMethod::kPrevious || count_ < kOrder + 6) {
+    std::fill(next.begin(), next.end(), Seconds(held.back()));
+  } else {
+    predict_autoregressive(next);
+  }
+}
+
+void RrPredictor::predict_autoregressive(std::span<Seconds> next) const noexcept {
+  using Window = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kWindow, 1>;
+  const Window y = Eigen::Map<const Eigen::VectorXd>(rr_s_.data(), count_);
+  const double mean = y.mean();
+  const Window z = y.array() - mean;
+  const double sum_of_squares = z.squaredNorm();
+  if (!(sum_of_squares > 0.0)) {
+    std::fill(next.begin(), next.end(), Seconds(mean));
+    return;
+  }
+
+  // Normal equations of z_i = sum_k c_k z_{i-1-k}; ridge * var(y) * len(y) is ridge * sum of squares.
+  Eigen::Matrix<double, kOrder, kOrder> normal = Eigen::Matrix<double, kOrder, kOrder>::Identity();
+  normal *= kRidge * sum_of_squares;
+  Eigen::Matrix<double, kOrder, 1> right = Eigen::Matrix<double, kOrder, 1>::Zero();
+  for (int i = kOrder; i < count_; ++i) {
+    const Eigen::Matrix<double, kOrder, 1> past = z.segment<kOrder>(i - kOrder).reverse();
+    normal += past * past.transpose();
+    right += past * z[i];
+  }
+  const Eigen::Matrix<double, kOrder, 1> coefficients = normal.ldlt().solve(right);
+
+  Eigen::Matrix<double, kOrder, 1> past = z.tail<kOrder>().reverse();
+  for (Seconds& rr : next) {
+    const double predicted = std::clamp(mean + coefficients.dot(past), kShortestOfMean * mean, kLongestOfMean * mean);
+    rr = Seconds(predicted);
+    for (int k = kOrder - 1; k > 0; --k) past[k] = past[k - 1];
+    past[0] = predicted - mean;
+  }
+}
+
+Seconds RrPredictor::deviation() const noexcept {
+  return Seconds(error_weight_ > 0.0 ? std::sqrt(squared_error_sum_s2_ / error_weight_) : 0.0);
+}
+
+}  // namespace perimap

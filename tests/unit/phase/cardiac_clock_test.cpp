@@ -1,0 +1,162 @@
+#include "core/phase/cardiac_clock.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "core/phase/cardiac_clock_tracker.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr Duration kPeakDeviation = std::chrono::microseconds(1500);
+
+RPeak peak_at(Instant t) { return {t, t + milliseconds(90), 0.9, kPeakDeviation}; }
+
+// A tracker that has seen `beats` beats 800 ms apart; the last is at `last`.
+struct Steady {
+  explicit Steady(int beats) {
+    for (int i = 0; i < beats; ++i) tracker.on_r_peak(peak_at(first + i * milliseconds(800)));
+    last = first + (beats - 1) * milliseconds(800);
+  }
+  PhaseEstimate at(Instant t) const { return tracker.clock().at(t); }
+
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  Instant first = from_ns(5'000'000'000);
+  Instant last;
+};
+
+TEST(CardiacClock, IsUnknownBeforeThreeBeats) {
+  EXPECT_EQ(Steady(0).at(from_ns(1)).state, PhaseState::kUnknown);
+  const Steady two(2);
+  EXPECT_EQ(two.at(two.last + milliseconds(100)).state, PhaseState::kUnknown);
+  EXPECT_EQ(two.at(two.last + milliseconds(100)).rate_rad_per_s, 0.0);
+  EXPECT_EQ(two.at(two.last - milliseconds(100)).state, PhaseState::kUnknown);
+  const Steady three(3);
+  EXPECT_EQ(three.at(three.last + milliseconds(100)).state, PhaseState::kLocked);
+  EXPECT_EQ(three.at(three.last - milliseconds(100)).state, PhaseState::kLocked);
+}
+
+TEST(CardiacClock, CurrentCycleIsCausalAndGrowsUncertain) {
+  const Steady steady(20);
+  double last = 0.0;
+  for (int ms = 0; ms < 800; ms += 50) {
+    const PhaseEstimate estimate = steady.at(steady.last + milliseconds(ms));
+    EXPECT_NEAR(estimate.phase_rad, kTwoPi * ms / 800.0, 1e-6);
+    EXPECT_NEAR(estimate.rate_rad_per_s, kTwoPi / 0.8, 1e-6);
+    EXPECT_FALSE(estimate.exact);
+    EXPECT_GE(estimate.deviation_s, last);
+    last = estimate.deviation_s;
+  }
+  EXPECT_NEAR(steady.at(steady.last).deviation_s, to_seconds(kPeakDeviation), 1e-9);
+}
+
+TEST(CardiacClock, CompletedCyclesAreExactAtLeastTwentyFourBack) {
+  const Steady steady(200);
+  const Instant back = steady.last - 24 * milliseconds(800) + milliseconds(200);
+  const PhaseEstimate estimate = steady.at(back);
+  EXPECT_TRUE(estimate.exact);
+  EXPECT_EQ(estimate.state, PhaseState::kLocked);
+  EXPECT_NEAR(estimate.phase_rad, kTwoPi * 0.25, 1e-9);
+  EXPECT_LE(estimate.deviation_s, to_seconds(kPeakDeviation));
+  EXPECT_EQ(steady.at(steady.first).state, PhaseState::kUnknown);  // long before what is held
+}
+
+TEST(CardiacClock, AnchorsAtThePeaksOwnTimeNotAtItsDetection) {
+  const Steady steady(10);
+  EXPECT_EQ(steady.tracker.clock().anchor(), steady.last);
+  EXPECT_NEAR(steady.at(steady.last + milliseconds(90)).phase_rad, kTwoPi * 90 / 800, 1e-6);
+}
+
+TEST(CardiacClock, FreeRunsWithGrowingDeviationThenIsLost) {
+  const Steady steady(40);
+  const CardiacClock& clock = steady.tracker.clock();
+  const Instant due = clock.predicted_r_peak();
+  EXPECT_EQ(steady.at(due + milliseconds(20)).state, PhaseState::kLocked);  // the detector may not have had time
+  double last = 0.0;
+  for (int ms = 1000; ms < 2900; ms += 100) {
+    const PhaseEstimate estimate = steady.at(due + milliseconds(ms));
+    EXPECT_EQ(estimate.state, PhaseState::kFreeRunning);
+    EXPECT_NEAR(std::remainder(estimate.phase_rad - kTwoPi * ms / 800.0, kTwoPi), 0.0, 1e-3);
+    EXPECT_GT(estimate.deviation_s, last);
+    last = estimate.deviation_s;
+  }
+  EXPECT_EQ(clock.anchor(), steady.last);
+  EXPECT_EQ(steady.at(due + milliseconds(3100)).state, PhaseState::kLost);
+  EXPECT_EQ(steady.at(due + milliseconds(3100)).rate_rad_per_s, 0.0);
+}
+
+TEST(CardiacClock, CycleWhileFreeRunningBeginsAtAPrediction) {
+  const Steady steady(40);
+  const CardiacCycle cycle = steady.tracker.clock().cycle_at(steady.last + milliseconds(1900));
+  EXPECT_NEAR(to_seconds(cycle.begin - steady.last), 1.6, 1e-3);
+  EXPECT_NEAR(to_seconds(cycle.length), 0.8, 1e-3);
+  EXPECT_GT(cycle.begin_deviation, kPeakDeviation);
+}
+
+TEST(CardiacClock, LocksAgainThreeBeatsAfterALoss) {
+  Steady steady(40);
+  const Instant back = steady.last + std::chrono::seconds(10);
+  steady.tracker.on_r_peak(peak_at(back));
+  EXPECT_EQ(steady.at(back + milliseconds(100)).state, PhaseState::kUnknown);
+  steady.tracker.on_r_peak(peak_at(back + milliseconds(800)));
+  steady.tracker.on_r_peak(peak_at(back + milliseconds(1600)));
+  EXPECT_EQ(steady.at(back + milliseconds(1700)).state, PhaseState::kLocked);
+  EXPECT_EQ(steady.at(back - milliseconds(100)).state, PhaseState::kLost);
+  EXPECT_FALSE(steady.at(back - milliseconds(100)).exact);
+  EXPECT_TRUE(steady.at(steady.last - milliseconds(100)).exact);
+}
+
+TEST(CardiacClock, RefusesAPeakTooSoonAfterTheLast) {
+  Steady steady(10);
+  const auto before = steady.tracker.clock().beats();
+  steady.tracker.on_r_peak(peak_at(steady.last + milliseconds(240)));
+  steady.tracker.on_r_peak(peak_at(steady.last - milliseconds(500)));
+  EXPECT_EQ(steady.tracker.clock().beats(), before);
+  EXPECT_EQ(steady.tracker.clock().anchor(), steady.last);
+}
+
+TEST(CardiacClock, AnEctopicBeatWidensTheDeviationAndHardlyMovesThePrediction) {
+  Steady steady(40);
+  const Duration calm = steady.tracker.clock().length_deviation();
+  const Instant premature = steady.last + milliseconds(500);
+  steady.tracker.on_r_peak(peak_at(premature));
+  const CardiacClock& clock = steady.tracker.clock();
+  EXPECT_EQ(clock.anchor(), premature);
+  EXPECT_EQ(clock.last_rr(), milliseconds(500));
+  EXPECT_GT(clock.length_deviation(), 2 * calm);
+  EXPECT_NEAR(to_seconds(clock.predicted_length()), 0.8, 0.08);
+  const PhaseEstimate inside = clock.at(premature - milliseconds(50));
+  EXPECT_TRUE(inside.exact);
+  EXPECT_GT(inside.deviation_s, 0.1);  // the cycle was cut short, not played faster
+}
+
+// Over many beats of a wandering rhythm, the error of the causal phase is what the clock says it is.
+TEST(CardiacClock, StatesItsOwnPhaseError) {
+  std::mt19937 generator(3);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  Instant t = from_ns(1'000'000'000);
+  double normalised = 0.0;
+  int scored = 0;
+  for (int i = 0; i < 600; ++i) {
+    tracker.on_r_peak(peak_at(t));
+    const double rr = 0.85 + 0.03 * std::sin(i * 1.2) + noise(generator);
+    if (i > 80) {
+      const PhaseEstimate estimate = tracker.clock().at(t + from_seconds(0.75 * rr));
+      const double error_s = std::remainder(estimate.phase_rad - 0.75 * kTwoPi, kTwoPi) / estimate.rate_rad_per_s;
+      normalised += std::pow(error_s / estimate.deviation_s, 2);
+      ++scored;
+    }
+    t += from_seconds(rr);
+  }
+  EXPECT_NEAR(normalised / scored, 1.0, 0.25);
+}
+
+}  // namespace
+}  // namespace perimap

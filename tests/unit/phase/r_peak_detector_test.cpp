@@ -1,0 +1,252 @@
+#include "core/phase/r_peak_detector.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace perimap {
+namespace {
+
+struct EcgRecord {
+  std::vector<double> t_s;
+  std::vector<double> mV;
+  std::vector<double> beats_s;
+};
+
+EcgRecord load(const std::string& number) {
+  EcgRecord record;
+  const std::string stem = PERIMAP_TEST_DATA "/mitbih/" + number + "_60s";
+  std::string line;
+  std::ifstream signal(stem + ".csv");
+  std::getline(signal, line);
+  while (std::getline(signal, line)) {
+    const auto comma = line.find(',');
+    record.t_s.push_back(std::stod(line.substr(0, comma)));
+    record.mV.push_back(std::stod(line.substr(comma + 1)));
+  }
+  std::ifstream beats(stem + "_beats.csv");
+  std::getline(beats, line);
+  while (std::getline(beats, line)) record.beats_s.push_back(std::stod(line.substr(0, line.find(','))));
+  return record;
+}
+
+template <class Value>
+std::vector<RPeak> detect(const EcgRecord& record, Value&& value) {
+  const auto detector = std::make_unique<RPeakDetector>();
+  std::vector<RPeak> peaks;
+  for (std::size_t i = 0; i < record.t_s.size(); ++i) {
+    const auto peak = detector->push(Instant(from_seconds(record.t_s[i])), static_cast<float>(value(i)));
+    if (peak) peaks.push_back(*peak);
+  }
+  while (const auto peak = detector->flush()) peaks.push_back(*peak);
+  return peaks;
+}
+
+std::vector<RPeak> detect(const EcgRecord& record, double gain = 1.0) {
+  return detect(record, [&](std::size_t i) { return gain * record.mV[i]; });
+}
+
+double seconds(Instant t) { return to_seconds(t.time_since_epoch()); }
+
+// Pairs within 150 ms, the tolerance of ANSI/AAMI EC57.
+struct Score {
+  int found = 0;
+  int missed = 0;
+  int extra = 0;
+};
+
+Score score(const std::vector<double>& beats_s, const std::vector<RPeak>& peaks) {
+  Score result;
+  std::vector<bool> used(peaks.size(), false);
+  for (const double beat : beats_s) {
+    std::size_t nearest = peaks.size();
+    for (std::size_t i = 0; i < peaks.size(); ++i) {
+      if (used[i] || std::abs(seconds(peaks[i].time) - beat) > 0.150) continue;
+      if (nearest == peaks.size() ||
+          std::abs(seconds(peaks[i].time) - beat) < std::abs(seconds(peaks[nearest].time) - beat)) {
+        nearest = i;
+      }
+    }
+    if (nearest == peaks.size()) {
+      ++result.missed;
+    } else {
+      used[nearest] = true;
+      ++result.found;
+    }
+  }
+  result.extra = static_cast<int>(std::count(used.begin(), used.end(), false));
+  return result;
+}
+
+class EveryExcerpt : public testing::TestWithParam<const char*> {};
+
+TEST_P(EveryExcerpt, EveryBeatIsFoundAndNothingElse) {
+  const EcgRecord record = load(GetParam());
+  ASSERT_GT(record.beats_s.size(), 50U);
+  const Score result = score(record.beats_s, detect(record));
+  EXPECT_EQ(result.missed, 0);
+  EXPECT_EQ(result.extra, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(MitBih, EveryExcerpt, testing::Values("100", "105", "119"));
+
+TEST(RPeakDetector, TimeIsThatOfTheLocalPeak) {
+  const EcgRecord record = load("100");
+  double squares = 0.0;
+  const auto peaks = detect(record);
+  for (const RPeak& peak : peaks) {
+    // The highest sample within 60 ms of the nearest reference beat.
+    const double t = seconds(peak.time);
+    const double beat = *std::min_element(record.beats_s.begin(), record.beats_s.end(),
+                                          [&](double a, double b) { return std::abs(a - t) < std::abs(b - t); });
+    std::size_t highest = record.t_s.size();
+    for (std::size_t i = 0; i < record.t_s.size(); ++i) {
+      if (std::abs(record.t_s[i] - beat) > 0.060) continue;
+      if (highest == record.t_s.size() || record.mV[i] > record.mV[highest]) highest = i;
+    }
+    squares += std::pow(t - record.t_s[highest], 2);
+  }
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(peaks.size())), 0.002);
+}
+
+TEST(RPeakDetector, KnowsABeatSoonAfterItsPeak) {
+  std::vector<Duration> delays;
+  for (const RPeak& peak : detect(load("100"))) {
+    EXPECT_GE(peak.detected_at, peak.time);
+    delays.push_back(peak.detected_at - peak.time);
+  }
+  std::nth_element(delays.begin(), delays.begin() + static_cast<std::ptrdiff_t>(delays.size() / 2), delays.end());
+  EXPECT_LE(delays[delays.size() / 2], std::chrono::milliseconds(150));
+}
+
+TEST(RPeakDetector, NeitherPolarityNorGainMatters) {
+  const EcgRecord record = load("100");
+  const auto expected = detect(record);
+  for (const double gain : {-1.0, 0.1, 10.0, -0.1}) {
+    const auto peaks = detect(record, gain);
+    ASSERT_EQ(peaks.size(), expected.size()) << "gain " << gain;
+    for (std::size_t i = 0; i < peaks.size(); ++i) {
+      EXPECT_NEAR(seconds(peaks[i].time), seconds(expected[i].time), 1e-4) << "gain " << gain;
+    }
+  }
+}
+
+TEST(RPeakDetector, BaselineWanderAndMainsDoNotDisturb) {
+  const EcgRecord record = load("100");
+  const auto peaks = detect(record, [&](std::size_t i) {
+    const double t = record.t_s[i];
+    return record.mV[i] + 0.8 * std::sin(2.0 * std::numbers::pi * 0.25 * t) +
+           0.15 * std::sin(2.0 * std::numbers::pi * 50.0 * t);
+  });
+  const Score result = score(record.beats_s, peaks);
+  EXPECT_EQ(result.missed, 0);
+  EXPECT_EQ(result.extra, 0);
+}
+
+// A synthetic lead: P, QRS and T as Gaussian bumps, R exactly at the beat. T as tall as R.
+EcgRecord synthetic(double rate_hz, double rr_s, double duration_s, double t_wave_mV) {
+  EcgRecord record;
+  for (double beat = 0.537123; beat < duration_s - 0.3; beat += rr_s) record.beats_s.push_back(beat);
+  for (int i = 0; i < static_cast<int>(duration_s * rate_hz); ++i) {
+    const double t = i / rate_hz;
+    double mV = 0.0;
+    for (const double beat : record.beats_s) {
+      const auto bump = [&](double height, double at, double width) {
+        mV += height * std::exp(-0.5 * std::pow((t - beat - at) / width, 2));
+      };
+      bump(0.15, -0.16, 0.02);
+      bump(1.0, 0.0, 0.012);
+      bump(-0.25, 0.03, 0.012);
+      bump(t_wave_mV, 0.28, 0.045);
+    }
+    record.t_s.push_back(t);
+    record.mV.push_back(mV);
+  }
+  return record;
+}
+
+TEST(RPeakDetector, WorksAtEveryRateAndSeesBetweenTheSamples) {
+  for (const double rate : {100.0, 125.0, 250.0, 500.0, 1000.0}) {
+    const EcgRecord record = synthetic(rate, 0.8137, 20.0, 0.3);
+    const auto peaks = detect(record);
+    const Score result = score(record.beats_s, peaks);
+    EXPECT_EQ(result.missed, 0) << rate;
+    EXPECT_EQ(result.extra, 0) << rate;
+    ASSERT_EQ(peaks.size(), record.beats_s.size()) << rate;
+    std::vector<double> errors;
+    for (std::size_t i = 0; i < peaks.size(); ++i) errors.push_back(seconds(peaks[i].time) - record.beats_s[i]);
+    const auto [least, most] = std::minmax_element(errors.begin(), errors.end());
+    EXPECT_LT(*most - *least, 0.3 / rate) << rate;
+    EXPECT_LT(std::abs(*most), 0.005) << rate;
+  }
+}
+
+TEST(RPeakDetector, TallTWavesAreNotBeats) {
+  const EcgRecord record = synthetic(360.0, 0.85, 30.0, 1.0);
+  const Score result = score(record.beats_s, detect(record));
+  EXPECT_EQ(result.missed, 0);
+  EXPECT_EQ(result.extra, 0);
+}
+
+TEST(RPeakDetector, FollowsAChangeOfGain) {
+  const EcgRecord record = load("100");
+  const auto peaks = detect(record, [&](std::size_t i) { return (i < 10000 ? 1.0 : 0.1) * record.mV[i]; });
+  std::vector<double> later;
+  for (const double beat : record.beats_s) {
+    if (beat > record.t_s[10000] + 8.0) later.push_back(beat);
+  }
+  EXPECT_EQ(score(later, peaks).missed, 0);
+}
+
+TEST(RPeakDetector, AFlatLineHasNoBeats) {
+  const EcgRecord record = load("100");
+  EXPECT_TRUE(detect(record, [](std::size_t) { return 0.37; }).empty());
+  std::mt19937 generator(5);
+  std::normal_distribution<double> noise(0.0, 0.4);
+  EXPECT_TRUE(detect(record, [&](std::size_t) { return 0.005 * std::round(noise(generator)); }).empty());
+}
+
+TEST(RPeakDetector, GivesNoBeatsWhileTheLeadIsOff) {
+  const EcgRecord record = load("100");
+  const auto detector = std::make_unique<RPeakDetector>();
+  std::vector<RPeak> peaks;
+  for (std::size_t i = 0; i < record.t_s.size(); ++i) {
+    const Instant t(from_seconds(record.t_s[i]));
+    const bool off = i > 8000 && i < 12000;
+    if (off) detector->lead_off(t);
+    const auto peak = off ? std::nullopt : detector->push(t, static_cast<float>(record.mV[i]));
+    if (peak) peaks.push_back(*peak);
+  }
+  for (const RPeak& peak : peaks) {
+    const double t = seconds(peak.time);
+    EXPECT_FALSE(t > record.t_s[8000] && t < record.t_s[12000]) << t;
+  }
+  std::vector<double> later;
+  for (const double beat : record.beats_s) {
+    if (beat > record.t_s[12000] + 0.3 && beat < record.t_s.back() - 0.3) later.push_back(beat);
+  }
+  EXPECT_EQ(score(later, peaks).missed, 0);
+}
+
+TEST(RPeakDetector, ValuesThatAreNotFiniteAndStampsThatDoNotAdvanceGiveNothing) {
+  const auto detector = std::make_unique<RPeakDetector>();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float huge = std::numeric_limits<float>::infinity();
+  for (int i = 0; i < 5000; ++i) {
+    EXPECT_FALSE(detector->push(from_ns(i * 2'000'000LL), i % 2 == 0 ? nan : huge));
+    EXPECT_FALSE(detector->push(from_ns(1), static_cast<float>(i % 97)));
+  }
+  EXPECT_FALSE(detector->flush());
+}
+
+}  // namespace
+}  // namespace perimap

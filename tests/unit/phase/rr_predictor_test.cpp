@@ -1,0 +1,90 @@
+#include "core/phase/rr_predictor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace perimap {
+namespace {
+
+Seconds next_of(const RrPredictor& predictor) {
+  std::array<Seconds, 1> next;
+  predictor.predict(next);
+  return next[0];
+}
+
+// RMS error of one-step predictions on a rhythm that breathing modulates, after the window has filled.
+double rms_error(RrMethod method, double* last_deviation = nullptr) {
+  std::mt19937 generator(11);
+  std::normal_distribution<double> noise(0.0, 0.008);
+  RrPredictor predictor(method);
+  double squares = 0.0;
+  int scored = 0;
+  for (int i = 0; i < 400; ++i) {
+    const Seconds rr(0.85 + 0.05 * std::sin(2.0 * std::numbers::pi * i / 5.3) + noise(generator));
+    if (predictor.count() == RrPredictor::kWindow) {
+      squares += std::pow((rr - next_of(predictor)).count(), 2);
+      ++scored;
+    }
+    predictor.push(rr);
+  }
+  if (last_deviation != nullptr) *last_deviation = predictor.deviation().count();
+  return std::sqrt(squares / scored);
+}
+
+TEST(RrPredictor, AutoregressionFollowsBreathingBetterThanMeanOrPrevious) {
+  const double autoregressive = rms_error(RrMethod::kAutoregressive);
+  EXPECT_LT(autoregressive, 0.6 * rms_error(RrMethod::kMeanOf8));
+  EXPECT_LT(autoregressive, 0.6 * rms_error(RrMethod::kPrevious));
+}
+
+TEST(RrPredictor, StatesItsOwnError) {
+  for (const RrMethod method : {RrMethod::kAutoregressive, RrMethod::kMeanOf8, RrMethod::kPrevious}) {
+    double stated = 0.0;
+    const double true_error = rms_error(method, &stated);
+    EXPECT_NEAR(stated / true_error, 1.0, 0.3);
+  }
+}
+
+TEST(RrPredictor, KnowsNothingBeforeTheFirstInterval) {
+  const RrPredictor predictor;
+  EXPECT_EQ(next_of(predictor).count(), 0.0);
+  EXPECT_EQ(predictor.deviation().count(), 0.0);
+}
+
+TEST(RrPredictor, ConstantRhythmGivesItself) {
+  RrPredictor predictor;
+  for (int i = 0; i < 100; ++i) predictor.push(Seconds(0.75));
+  std::array<Seconds, 5> next;
+  predictor.predict(next);
+  for (const Seconds rr : next) EXPECT_NEAR(rr.count(), 0.75, 1e-9);
+}
+
+TEST(RrPredictor, FurtherIntervalsAreThoseOfItsOwnForecast) {
+  RrPredictor predictor;
+  for (int i = 0; i < 60; ++i) predictor.push(Seconds(0.85 + 0.05 * std::sin(i * 1.1)));
+  std::array<Seconds, 4> next;
+  predictor.predict(next);
+  for (int k = 0; k < 4; ++k) {
+    EXPECT_NEAR(next[static_cast<std::size_t>(k)].count(), 0.85 + 0.05 * std::sin((60 + k) * 1.1), 0.01);
+  }
+}
+
+TEST(RrPredictor, LearningABoundedValueStillScoresTheTrueOne) {
+  RrPredictor told;
+  RrPredictor spared;
+  for (int i = 0; i < 30; ++i) {
+    told.push(Seconds(0.8));
+    spared.push(Seconds(0.8));
+  }
+  told.push(Seconds(0.5), Seconds(0.64));
+  spared.push(Seconds(0.8));
+  EXPECT_GT(told.deviation().count(), 1.5 * spared.deviation().count());
+  EXPECT_NEAR(next_of(told).count(), 0.8, 0.08);
+}
+
+}  // namespace
+}  // namespace perimap
