@@ -54,7 +54,7 @@ std::string Lens::opencv_yaml() const {
 }
 
 Lens scope_lens(int width_px, int height_px) noexcept {
-  const double focal = 1.1 * std::max(width_px, height_px);
+  const double focal = 1.25 * std::max(width_px, height_px);
   Lens lens;
   lens.width = width_px;
   lens.height = height_px;

@@ -24,7 +24,7 @@ struct Lens {
   [[nodiscard]] std::string opencv_yaml() const;
 };
 
-// A rigid scope's view, 49 degrees wide, for an image of this size.
+// A rigid scope's view, 44 degrees wide, for an image of this size.
 [[nodiscard]] Lens scope_lens(int width_px, int height_px) noexcept;
 
 }  // namespace perimap

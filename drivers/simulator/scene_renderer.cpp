@@ -246,7 +246,7 @@ float SceneRenderer::light_at(const Eigen::Matrix3f& R_CW, float subject_distanc
   // Two lobes of a spherical Gaussian about the mirror direction: the wet film and the tissue below it.
   const float off_mirror = 1.0F - bumpy.dot((to_eye + to_light).normalized());
   if (off_mirror < 0.08F)
-    light += falloff * (1.6F * std::exp(-1500.0F * off_mirror) + 0.10F * std::exp(-90.0F * off_mirror));
+    light += falloff * (1.1F * std::exp(-1200.0F * off_mirror) + 0.10F * std::exp(-90.0F * off_mirror));
   return light;
 }
 

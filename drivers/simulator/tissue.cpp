@@ -88,11 +88,16 @@ float cell_distance(const Vector3f& p, std::uint32_t seed) noexcept {
   return std::sqrt(nearest);
 }
 
-// About how far, in mm, the nearest zero of a noise with features of `size_mm` lies: its zero surface cuts the heart in
-// winding, branching-like lines, which serve as vessels.
+// About how far, in mm, the nearest zero of a noise with features of `size_mm` lies, to first order: its zero surface
+// cuts the heart in winding lines, which serve as vessels.
 float line_distance_mm(const Vector3f& p_mm, float size_mm, std::uint32_t seed) noexcept {
-  constexpr float kTypicalSlope = 1.3F;  // of the noise, per unit, where it passes zero
-  return std::abs(noise(p_mm / size_mm, seed)) * size_mm / kTypicalSlope;
+  const Vector3f p = p_mm / size_mm;
+  constexpr float kStep = 0.02F;
+  const float value = noise(p, seed);
+  const Vector3f slope(noise(p + kStep * Vector3f::UnitX(), seed) - value,
+                       noise(p + kStep * Vector3f::UnitY(), seed) - value,
+                       noise(p + kStep * Vector3f::UnitZ(), seed) - value);
+  return std::abs(value) * size_mm / (slope.norm() / kStep + 0.1F);
 }
 
 }  // namespace
@@ -102,10 +107,10 @@ TissueSample tissue_at(const Vector3f& p_mm, std::uint32_t seed) noexcept {
   const Vector3f q = p_mm + 3.5F * warp;
 
   // Muscle: blotches at every size, and fibres, fine across and long along an oblique direction.
-  float albedo = 0.40F + 0.13F * octaves(p_mm / 5.0F, 4, seed + 20);
+  float albedo = 0.43F + 0.17F * octaves(p_mm / 5.0F, 4, seed + 20);
   const Vector3f along = Vector3f(0.55F, 0.25F, -0.80F).normalized();
   const Vector3f fibre = q / 1.6F - along * (along.dot(q) * (1.0F / 1.6F - 1.0F / 9.0F));
-  albedo += 0.07F * noise(fibre, seed + 30);
+  albedo += 0.09F * noise(fibre, seed + 30);
 
   const float large = line_distance_mm(q, 30.0F, seed + 40);
   const float medium = line_distance_mm(q, 12.0F, seed + 41);
@@ -113,7 +118,7 @@ TissueSample tissue_at(const Vector3f& p_mm, std::uint32_t seed) noexcept {
 
   // Fat lies along the large vessels and in islands, in lobules with darker seams.
   const float islands = octaves(q / 22.0F, 3, seed + 50);
-  const float fat = smoothstep(0.10F, 0.26F, islands + 0.42F * (1.0F - smoothstep(1.0F, 7.0F, large)));
+  const float fat = smoothstep(0.10F, 0.26F, islands + 0.30F * (1.0F - smoothstep(1.0F, 6.0F, large)));
   if (fat > 0.0F) {
     const float lobule = cell_distance(q / 2.6F, seed + 60);
     const float fat_albedo =
@@ -126,16 +131,16 @@ TissueSample tissue_at(const Vector3f& p_mm, std::uint32_t seed) noexcept {
     const float blood = strength * (1.0F - smoothstep(0.75F * radius, 1.25F * radius, distance));
     const float wall = 0.35F * strength * smoothstep(0.9F * radius, 1.4F * radius, distance) *
                        (1.0F - smoothstep(1.5F * radius, 2.4F * radius, distance));
-    albedo += blood * (0.16F - albedo) + wall * 0.25F;
+    albedo += blood * (0.20F - albedo) + wall * 0.25F;
   };
-  vessel(small, 0.26F, 0.65F * (1.0F - fat));
-  vessel(medium, 0.50F, 0.80F * (1.0F - 0.7F * fat));
-  vessel(large, 1.15F, 0.90F);
+  vessel(small, 0.22F, 0.55F * (1.0F - fat));
+  vessel(medium, 0.42F, 0.65F * (1.0F - 0.7F * fat));
+  vessel(large, 0.85F, 0.75F);
 
   TissueSample sample;
   sample.albedo = std::clamp(albedo, 0.03F, 0.98F);
-  const Vector3f b = p_mm / 3.2F;
-  sample.bump = 0.11F * Vector3f(octaves(b, 2, seed + 70), octaves(b, 2, seed + 73), octaves(b, 2, seed + 76));
+  const Vector3f b = p_mm / 1.9F;
+  sample.bump = 0.10F * Vector3f(octaves(b, 2, seed + 70), octaves(b, 2, seed + 73), octaves(b, 2, seed + 76));
   return sample;
 }
 

@@ -1,0 +1,25 @@
+// Where a writer's bytes go.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/error/expected.hpp"
+
+namespace perimap {
+
+class ByteSink {
+ public:
+  virtual ~ByteSink() = default;
+  // All of the bytes, or an error.
+  [[nodiscard]] virtual Expected<void> write(std::span<const std::byte> bytes) = 0;
+  // Reports what only the end can tell (a full network disk). Nothing may be written after it.
+  [[nodiscard]] virtual Expected<void> close() = 0;
+};
+
+// Creates the file, or empties it. Errors name the path.
+[[nodiscard]] Expected<std::unique_ptr<ByteSink>> create_file(const std::string& path);
+
+}  // namespace perimap

@@ -1,0 +1,58 @@
+#include "drivers/recording/byte_source.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+namespace perimap {
+namespace {
+
+std::string errno_text(int error) { return std::generic_category().message(error); }
+
+class FileSource final : public ByteSource {
+ public:
+  explicit FileSource(int fd) noexcept : fd_(fd) {}
+  FileSource(const FileSource&) = delete;
+  FileSource& operator=(const FileSource&) = delete;
+  ~FileSource() override { ::close(fd_); }
+
+  void set_size(std::uint64_t size) noexcept { size_ = size; }
+  std::uint64_t size() const noexcept override { return size_; }
+
+  Expected<void> read_at(std::uint64_t offset, std::span<std::byte> bytes) override {
+    while (!bytes.empty()) {
+      const ssize_t got = ::pread(fd_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+      if (got < 0) {
+        if (errno == EINTR) continue;
+        return fail(fmt::format("byte {}: cannot read: {}", offset, errno_text(errno)));
+      }
+      if (got == 0) return fail(fmt::format("byte {}: the file has become shorter", offset));
+      offset += static_cast<std::uint64_t>(got);
+      bytes = bytes.subspan(static_cast<std::size_t>(got));
+    }
+    return {};
+  }
+
+ private:
+  int fd_;
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace
+
+Expected<std::unique_ptr<ByteSource>> open_file(const std::string& path) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return fail(fmt::format("{}: cannot open: {}", path, errno_text(errno)));
+  auto source = std::make_unique<FileSource>(fd);
+  struct stat status {};
+  if (::fstat(fd, &status) != 0) return fail(fmt::format("{}: cannot examine: {}", path, errno_text(errno)));
+  if (!S_ISREG(status.st_mode)) return fail(fmt::format("{}: not a regular file", path));
+  source->set_size(static_cast<std::uint64_t>(status.st_size));
+  return source;
+}
+
+}  // namespace perimap

@@ -1,0 +1,35 @@
+// The names that recordings of this project use: channels with the type of their messages, and attachments.
+#pragma once
+
+#include <string_view>
+
+namespace perimap::channels {
+
+// What the devices gave. Log time is the arrival, publish time the source's own stamp.
+inline constexpr std::string_view kCameraImage = "camera/image";      // foxglove::RawImage, "mono8"
+inline constexpr std::string_view kTrackerPose = "tracker/pose";      // perimap::TrackerPose
+inline constexpr std::string_view kTrackerViewer = "tracker/viewer";  // foxglove::PoseInFrame, metres, valid poses only
+inline constexpr std::string_view kEcgSamples = "ecg/samples";        // perimap::EcgSamples
+
+// Facts of the whole recording.
+inline constexpr std::string_view kRecordingInfo = "recording/info";  // perimap::RecordingInfo
+
+// Ground truth of a simulated heart.
+inline constexpr std::string_view kTruthMesh = "truth/mesh";      // perimap::TruthMesh
+inline constexpr std::string_view kTruthMotion = "truth/motion";  // perimap::TruthMotion
+inline constexpr std::string_view kTruthCamera = "truth/camera";  // perimap::TruthCamera
+
+// What was published.
+inline constexpr std::string_view kSurface = "surface";             // perimap::Surface
+inline constexpr std::string_view kSurfaceModel = "surface_model";  // perimap::SurfaceModel
+inline constexpr std::string_view kPhase = "phase";                 // perimap::Phase
+inline constexpr std::string_view kStatus = "status";               // perimap::Status
+
+}  // namespace perimap::channels
+
+namespace perimap::attachments {
+
+inline constexpr std::string_view kCalibration = "calibration.yaml";
+inline constexpr std::string_view kConfiguration = "configuration.toml";
+
+}  // namespace perimap::attachments

@@ -1,0 +1,11 @@
+// The IDL files as text, which a recording carries so that any reader can decode it.
+#pragma once
+
+#include <string_view>
+
+namespace perimap {
+
+extern const std::string_view kPerimapSchemaText;   // idl/perimap.idl
+extern const std::string_view kFoxgloveSchemaText;  // idl/foxglove/foxglove.idl
+
+}  // namespace perimap

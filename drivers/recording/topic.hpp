@@ -1,0 +1,52 @@
+// What ties a C++ type of `idl` to the schema of a channel.
+#pragma once
+
+#include <foxglove.h>
+#include <perimap.h>
+
+#include <string_view>
+
+namespace perimap {
+
+struct TopicType {
+  const dds_topic_descriptor_t* descriptor;
+  std::string_view schema_text;  // the whole IDL file that defines the type
+
+  // The scoped IDL name, as "perimap::Surface".
+  [[nodiscard]] std::string_view schema_name() const noexcept { return descriptor->m_typename; }
+};
+
+// MCAP's registered names (https://mcap.dev/spec/registry).
+inline constexpr std::string_view kSchemaEncoding = "omgidl";
+inline constexpr std::string_view kMessageEncoding = "cdr";
+
+// Defined for every type that a channel can carry, and for no other.
+template <class T>
+[[nodiscard]] TopicType topic_type() noexcept = delete;
+
+template <>
+[[nodiscard]] TopicType topic_type<perimap_Surface>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_SurfaceModel>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_Phase>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_Status>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_TrackerPose>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_EcgSamples>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_RecordingInfo>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_TruthMesh>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_TruthMotion>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_TruthCamera>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<foxglove_RawImage>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<foxglove_PoseInFrame>() noexcept;
+
+}  // namespace perimap
