@@ -14,9 +14,9 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr int kSubsamples = 2;  // a side of each pixel, for what covers it; shaded once where one triangle does
-constexpr int kTile = 16;       // subsamples a side
-constexpr float kGreyLevels = 255.0F;
+constexpr int kSubsamples = 2;         // a side of each pixel, for what covers it; shaded once where one triangle does
+constexpr int kTile = 16;              // subsamples a side
+constexpr float kGreyLevels = 300.0F;  // of a white surface under full light
 constexpr std::int32_t kNone = -1;
 constexpr double kNearest_mm = 5.0;  // what comes nearer to the lens than this is not drawn
 

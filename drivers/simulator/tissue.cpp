@@ -28,35 +28,48 @@ float smoothstep(float low, float high, float x) noexcept {
   return t * t * (3.0F - 2.0F * t);
 }
 
-// One of the twelve cube-edge directions, dotted with the offset (Perlin, "Improving noise", SIGGRAPH 2002).
-float gradient(std::uint32_t hash, float x, float y, float z) noexcept {
-  const std::uint32_t h = hash & 15u;
-  const float u = h < 8 ? x : y;
-  const float v = h < 4 ? y : (h == 12 || h == 14 ? x : z);
-  return ((h & 1u) != 0 ? -u : u) + ((h & 2u) != 0 ? -v : v);
-}
+// The twelve cube-edge directions, four of them twice (Perlin, "Improving noise", SIGGRAPH 2002).
+constexpr float kGradients[16][3] = {{1, 1, 0},  {-1, 1, 0},  {1, -1, 0}, {-1, -1, 0}, {1, 0, 1},  {-1, 0, 1},
+                                     {1, 0, -1}, {-1, 0, -1}, {0, 1, 1},  {0, -1, 1},  {0, 1, -1}, {0, -1, -1},
+                                     {1, 1, 0},  {0, -1, 1},  {-1, 1, 0}, {0, -1, -1}};
+
+struct NoiseSample {
+  float value;
+  Vector3f slope;  // by place
+};
 
 // Perlin's gradient noise, about -0.9 to 0.9, one feature a unit.
-float noise(const Vector3f& p, std::uint32_t seed) noexcept {
-  const int ix = floor_to_int(p.x());
-  const int iy = floor_to_int(p.y());
-  const int iz = floor_to_int(p.z());
-  const float x = p.x() - static_cast<float>(ix);
-  const float y = p.y() - static_cast<float>(iy);
-  const float z = p.z() - static_cast<float>(iz);
-  const auto fade = [](float t) { return t * t * t * (t * (t * 6.0F - 15.0F) + 10.0F); };
-  const auto mix = [](float a, float b, float t) { return a + t * (b - a); };
-  const float u = fade(x);
-  const float v = fade(y);
-  const float w = fade(z);
-  const auto corner = [&](int dx, int dy, int dz) {
-    return gradient(lattice_hash(ix + dx, iy + dy, iz + dz, seed), x - static_cast<float>(dx),
-                    y - static_cast<float>(dy), z - static_cast<float>(dz));
-  };
-  const float near_z = mix(mix(corner(0, 0, 0), corner(1, 0, 0), u), mix(corner(0, 1, 0), corner(1, 1, 0), u), v);
-  const float far_z = mix(mix(corner(0, 0, 1), corner(1, 0, 1), u), mix(corner(0, 1, 1), corner(1, 1, 1), u), v);
-  return mix(near_z, far_z, w);
+NoiseSample noise_with_slope(const Vector3f& p, std::uint32_t seed) noexcept {
+  const int cell[3] = {floor_to_int(p.x()), floor_to_int(p.y()), floor_to_int(p.z())};
+  // Of each axis: the weight of the cell's lower and upper side, and how the upper one's changes.
+  float offset[3];
+  float weight[3][2];
+  float change[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const float t = p[axis] - static_cast<float>(cell[axis]);
+    offset[axis] = t;
+    weight[axis][1] = t * t * t * (t * (t * 6.0F - 15.0F) + 10.0F);
+    weight[axis][0] = 1.0F - weight[axis][1];
+    change[axis] = 30.0F * t * t * (t * (t - 2.0F) + 1.0F);
+  }
+  NoiseSample sample{0.0F, Vector3f::Zero()};
+  for (int corner = 0; corner < 8; ++corner) {
+    const int d[3] = {corner & 1, (corner >> 1) & 1, corner >> 2};
+    const float* g = kGradients[lattice_hash(cell[0] + d[0], cell[1] + d[1], cell[2] + d[2], seed) & 15u];
+    const float value = g[0] * (offset[0] - static_cast<float>(d[0])) + g[1] * (offset[1] - static_cast<float>(d[1])) +
+                        g[2] * (offset[2] - static_cast<float>(d[2]));
+    const float w[3] = {weight[0][d[0]], weight[1][d[1]], weight[2][d[2]]};
+    const float all = w[0] * w[1] * w[2];
+    sample.value += all * value;
+    sample.slope += all * Vector3f(g[0], g[1], g[2]);
+    sample.slope.x() += (d[0] != 0 ? change[0] : -change[0]) * w[1] * w[2] * value;
+    sample.slope.y() += (d[1] != 0 ? change[1] : -change[1]) * w[0] * w[2] * value;
+    sample.slope.z() += (d[2] != 0 ? change[2] : -change[2]) * w[0] * w[1] * value;
+  }
+  return sample;
 }
+
+float noise(const Vector3f& p, std::uint32_t seed) noexcept { return noise_with_slope(p, seed).value; }
 
 // Octaves of noise, each half as large and half as strong; the first has features of one unit.
 float octaves(Vector3f p, int count, std::uint32_t seed) noexcept {
@@ -91,13 +104,8 @@ float cell_distance(const Vector3f& p, std::uint32_t seed) noexcept {
 // About how far, in mm, the nearest zero of a noise with features of `size_mm` lies, to first order: its zero surface
 // cuts the heart in winding lines, which serve as vessels.
 float line_distance_mm(const Vector3f& p_mm, float size_mm, std::uint32_t seed) noexcept {
-  const Vector3f p = p_mm / size_mm;
-  constexpr float kStep = 0.02F;
-  const float value = noise(p, seed);
-  const Vector3f slope(noise(p + kStep * Vector3f::UnitX(), seed) - value,
-                       noise(p + kStep * Vector3f::UnitY(), seed) - value,
-                       noise(p + kStep * Vector3f::UnitZ(), seed) - value);
-  return std::abs(value) * size_mm / (slope.norm() / kStep + 0.1F);
+  const NoiseSample sample = noise_with_slope(p_mm / size_mm, seed);
+  return std::abs(sample.value) * size_mm / (sample.slope.norm() + 0.1F);
 }
 
 }  // namespace
@@ -107,7 +115,7 @@ TissueSample tissue_at(const Vector3f& p_mm, std::uint32_t seed) noexcept {
   const Vector3f q = p_mm + 3.5F * warp;
 
   // Muscle: blotches at every size, and fibres, fine across and long along an oblique direction.
-  float albedo = 0.43F + 0.17F * octaves(p_mm / 5.0F, 4, seed + 20);
+  float albedo = 0.44F + 0.19F * octaves(p_mm / 5.0F, 4, seed + 20);
   const Vector3f along = Vector3f(0.55F, 0.25F, -0.80F).normalized();
   const Vector3f fibre = q / 1.6F - along * (along.dot(q) * (1.0F / 1.6F - 1.0F / 9.0F));
   albedo += 0.09F * noise(fibre, seed + 30);
@@ -128,19 +136,21 @@ TissueSample tissue_at(const Vector3f& p_mm, std::uint32_t seed) noexcept {
 
   // Vessels: dark blood with a faintly brighter wall; fat covers the small ones.
   const auto vessel = [&](float distance, float radius, float strength) {
-    const float blood = strength * (1.0F - smoothstep(0.75F * radius, 1.25F * radius, distance));
+    const float edge = std::max(0.25F * radius, 0.17F);  // mm, nothing sharper than the texture can hold
+    const float blood = strength * (1.0F - smoothstep(radius - edge, radius + edge, distance));
     const float wall = 0.35F * strength * smoothstep(0.9F * radius, 1.4F * radius, distance) *
                        (1.0F - smoothstep(1.5F * radius, 2.4F * radius, distance));
     albedo += blood * (0.20F - albedo) + wall * 0.25F;
   };
-  vessel(small, 0.22F, 0.55F * (1.0F - fat));
+  vessel(small, 0.20F, 0.60F * (1.0F - fat));
   vessel(medium, 0.42F, 0.65F * (1.0F - 0.7F * fat));
   vessel(large, 0.85F, 0.75F);
 
   TissueSample sample;
   sample.albedo = std::clamp(albedo, 0.03F, 0.98F);
-  const Vector3f b = p_mm / 1.9F;
-  sample.bump = 0.10F * Vector3f(octaves(b, 2, seed + 70), octaves(b, 2, seed + 73), octaves(b, 2, seed + 76));
+  // The film of fluid dips and rises by some hundredths of a millimetre.
+  sample.bump =
+      0.055F * (noise_with_slope(p_mm / 2.2F, seed + 70).slope + noise_with_slope(p_mm / 1.0F, seed + 71).slope);
   return sample;
 }
 
