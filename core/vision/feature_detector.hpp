@@ -11,13 +11,13 @@
 namespace perimap {
 
 struct DetectorSettings {
-  int tile_px = 40;                 // each tile gives its best corner before any gives its second
-  double min_distance_px = 14;      // between features, occupied ones included
-  int border_px = 24;               // kept clear along the frame, so that coarse windows fit too
-  double min_corner = 6.0;          // smaller eigenvalue of the mean gradient product, (grey levels / px)^2
-  int highlight_grey = 245;         // at or above: a specular highlight
+  int tile_px = 40;             // each tile gives its best corner before any gives its second
+  double min_distance_px = 14;  // between features, occupied ones included
+  int border_px = 24;           // kept clear along the frame, so that coarse windows fit too
+  double min_corner = 6.0;      // smaller eigenvalue of the mean gradient product, (grey levels / px)^2
+  int highlight_grey = 245;     // at or above: a specular highlight
   double highlight_clearance_px = 12;
-  int background_grey = 18;         // mean over background_size_px below: no tissue, or none that is lit
+  int background_grey = 18;  // mean over background_size_px below: no tissue, or none that is lit
   int background_size_px = 13;
   double background_clearance_px = 16;  // silhouettes slide over the tissue
 };

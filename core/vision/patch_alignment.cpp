@@ -26,8 +26,8 @@ void sample_window(const GreyImage& image, const PatchTemplate::Level& level, co
   const int base_u = static_cast<int>(std::floor(warp.centre.x()));
   const int base_v = static_cast<int>(std::floor(warp.centre.y()));
   const double first = -level.half();
-  const Vector2d start = warp.centre - Vector2d(base_u, base_v) +
-                         warp.A * Vector2d(first - level.offset_x, first - level.offset_y);
+  const Vector2d start =
+      warp.centre - Vector2d(base_u, base_v) + warp.A * Vector2d(first - level.offset_x, first - level.offset_y);
   const std::ptrdiff_t stride = image.stride;
   const std::uint8_t* const base = image.row(base_v) + base_u;
 

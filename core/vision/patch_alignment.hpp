@@ -23,8 +23,8 @@ enum class Alignment : std::uint8_t {
 
 struct AlignmentResult {
   Alignment outcome = Alignment::kDiverged;
-  double correlation = 0;        // zero-mean normalised, [-1, 1], of the aligned window
-  double gain = 1;               // I = gain * T + bias, grey levels
+  double correlation = 0;  // zero-mean normalised, [-1, 1], of the aligned window
+  double gain = 1;         // I = gain * T + bias, grey levels
   double bias = 0;
   double residual_variance = 0;  // of I - gain * T - bias, grey levels^2, degrees of freedom accounted for
 };
@@ -35,8 +35,8 @@ struct AlignmentResult {
 
 struct AlignmentLimits {
   int max_iterations = 10;
-  double at_rest = 0.01;   // level pixels: a step below this ends the iteration
-  double max_travel = 4;   // level pixels from the start of the iteration
+  double at_rest = 0.01;  // level pixels: a step below this ends the iteration
+  double max_travel = 4;  // level pixels from the start of the iteration
 };
 
 // Moves warp.centre only. level must be usable.

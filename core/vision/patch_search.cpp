@@ -42,7 +42,8 @@ WarpedTemplate warp_template(const PatchTemplate::Level& level, const Matrix2d& 
       // Half a pixel outside still shows the border pixel.
       if (!(u > -0.5 && v > -0.5 && u < last + 0.5 && v < last + 0.5)) continue;
       const double uc = std::clamp(u, 0.0, last), vc = std::clamp(v, 0.0, last);
-      const int u0 = std::min(static_cast<int>(uc), level.side - 2), v0 = std::min(static_cast<int>(vc), level.side - 2);
+      const int u0 = std::min(static_cast<int>(uc), level.side - 2),
+                v0 = std::min(static_cast<int>(vc), level.side - 2);
       const double fu = uc - u0, fv = vc - v0;
       const std::int16_t* const p = level.value.data() + v0 * level.stride + u0;
       const std::int16_t* const q = p + level.stride;

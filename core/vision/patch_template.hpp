@@ -37,10 +37,10 @@ struct PatchTemplate {
     double offset_x = 0, offset_y = 0;  // of the feature from the window's middle pixel, level pixels, |.| <= 0.5
     double mean = 0;                    // of T - kGreyOrigin
     double sum_squares = 0;             // sum of (T - its mean)^2
-    std::array<double, kParameters> sd_mean{};      // mean of SD_k
-    std::array<double, kParameters> sd_on_grey{};   // sum of SD_k (T - mean) / sum_squares
-    std::array<double, 4> translation_inverse{};    // inverse of the projected 2x2 Hessian, row by row
-    alignas(32) std::array<std::int16_t, kMaxSamples> value{};  // T - kGreyOrigin
+    std::array<double, kParameters> sd_mean{};                       // mean of SD_k
+    std::array<double, kParameters> sd_on_grey{};                    // sum of SD_k (T - mean) / sum_squares
+    std::array<double, 4> translation_inverse{};                     // inverse of the projected 2x2 Hessian, row by row
+    alignas(32) std::array<std::int16_t, kMaxSamples> value{};       // T - kGreyOrigin
     alignas(32) std::array<std::int16_t, kMaxSamples> gradient_x{};  // kGradientScale times it, by Sobel's operator
     alignas(32) std::array<std::int16_t, kMaxSamples> gradient_y{};
 
@@ -48,7 +48,7 @@ struct PatchTemplate {
   };
 
   std::array<Level, kMaxLevels> levels;
-  bool affine_usable = false;  // level 0 determines all six parameters
+  bool affine_usable = false;                                      // level 0 determines all six parameters
   std::array<double, kParameters * kParameters> affine_inverse{};  // inverse of level 0's projected Hessian
 };
 

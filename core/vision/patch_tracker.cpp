@@ -35,8 +35,24 @@ double larger_eigenvalue(const Matrix2d& C) noexcept {
 
 bool is_positive_definite(const Matrix2d& C) noexcept {
   constexpr double kLargest = 1e12;  // px^2; also keeps the determinant finite
-  return C.allFinite() && C(0, 0) > 0 && C(1, 1) > 0 && C(0, 0) < kLargest && C(1, 1) < kLargest &&
-         C.determinant() > 0;
+  return C.allFinite() && C(0, 0) > 0 && C(1, 1) > 0 && C(0, 0) < kLargest && C(1, 1) < kLargest && C.determinant() > 0;
+}
+
+// Covariance of the aligned position in template pixels, px^2, from the inverse of the Hessian's translation part and
+// the residual. Two things keep it from being residual variance times inverse Hessian. Bilinear interpolation takes 5/9
+// of the image's noise off the residual, on average over sub-pixel positions, but not off the low frequencies that
+// shift the patch. And the template's own noise adds to the Hessian H what no motion can be read from: with b the
+// noise's share, the least-squares estimate has covariance sigma^2 (H - b)^-1 H (H - b)^-1.
+Matrix2d match_covariance(const Matrix2d& inverse_hessian, int pixels, const AlignmentResult& fit) noexcept {
+  constexpr double kSeenOfNoise = (1 + 4.0 / 9) / 2;  // template's and image's noise, the latter interpolated
+  const double noise_variance = fit.residual_variance / (2 * kSeenOfNoise * fit.gain * fit.gain);
+  const double gradient_noise_variance = 12.0 / 64 * noise_variance;  // the squared weights of Sobel's operator over 8
+  const Matrix2d H = inverse_hessian.inverse();
+  // Of the information at least a tenth is taken to be real.
+  const double smaller = 0.5 * H.trace() - std::hypot(0.5 * (H(0, 0) - H(1, 1)), H(0, 1));
+  const double b = std::min(pixels * gradient_noise_variance, 0.9 * smaller);
+  const Matrix2d informed = (H - b * Matrix2d::Identity()).inverse();
+  return 2 * noise_variance * informed * H * informed;
 }
 
 // One attempt's outcome in level-0 pixels.
@@ -93,8 +109,8 @@ class Attempts {
       }
     }
     attempt.state = judge(attempt.fit);
-    const double per_pixel = attempt.fit.residual_variance / (attempt.fit.gain * attempt.fit.gain);
-    attempt.covariance_px2 = per_pixel * attempt.warp.A * covariance_template * attempt.warp.A.transpose();
+    const Matrix2d spread = match_covariance(covariance_template, level.side * level.side, attempt.fit);
+    attempt.covariance_px2 = attempt.warp.A * spread * attempt.warp.A.transpose();
     attempt.covariance_px2 += settings_.sigma_floor_px * settings_.sigma_floor_px * Matrix2d::Identity();
   }
 
@@ -141,8 +157,7 @@ PatchMatch track(const ImagePyramid& pyramid, const PatchTemplate& patch, PatchS
   PatchMatch match;
   match.px = predicted_px;
   if (!predicted_px.allFinite() || !is_positive_definite(prediction_covariance_px2) || !state.A.allFinite() ||
-      !is_plausible(state.A, 2 * settings.max_stretch) || !patch.levels[0].usable ||
-      pyramid.level(0).data == nullptr) {
+      !is_plausible(state.A, 2 * settings.max_stretch) || !patch.levels[0].usable || pyramid.level(0).data == nullptr) {
     return match;
   }
 
@@ -162,9 +177,8 @@ PatchMatch track(const ImagePyramid& pyramid, const PatchTemplate& patch, PatchS
     Matrix2d covariance = prediction_covariance_px2 / (scale * scale) + Matrix2d::Identity() / settings.gate;
     covariance(0, 1) = covariance(1, 0) = 0.5 * (covariance(0, 1) + covariance(1, 0));
     constexpr double kWorthAligning = 0.4;  // correlation on whole pixels before alignment
-    const SearchResult found =
-        search_peaks(pyramid.level(l), patch.levels[static_cast<std::size_t>(l)], state.A, predicted_px / scale,
-                     covariance.inverse(), settings.gate, kWorthAligning);
+    const SearchResult found = search_peaks(pyramid.level(l), patch.levels[static_cast<std::size_t>(l)], state.A,
+                                            predicted_px / scale, covariance.inverse(), settings.gate, kWorthAligning);
     MatchState why = found.any_in_view ? MatchState::kLowCorrelation : MatchState::kOutOfView;
     for (int i = 0; i < found.count; ++i) {
       const PatchWarp start{found.peaks[static_cast<std::size_t>(i)].centre * scale, state.A};

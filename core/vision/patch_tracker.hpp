@@ -28,16 +28,16 @@ enum class MatchState : std::uint8_t {
 
 struct PatchMatch {
   MatchState state = MatchState::kInvalidInput;
-  Vector2d px = Vector2d::Zero();                          // where it was found; the prediction when it was not
-  Matrix2d covariance_px2 = Matrix2d::Zero();              // of px; meaningful with kFound and kTooFar
-  double correlation = 0;                                  // zero-mean normalised, [-1, 1], of the aligned patch
+  Vector2d px = Vector2d::Zero();              // where it was found; the prediction when it was not
+  Matrix2d covariance_px2 = Matrix2d::Zero();  // of px; meaningful with kFound and kTooFar
+  double correlation = 0;                      // zero-mean normalised, [-1, 1], of the aligned patch
 };
 
 struct PatchTrackerSettings {
   double min_correlation = 0.80;
-  double gate = 13.8;                    // chi^2, 2 degrees of freedom, 99.9 %
-  double sigma_floor_px = 0.15;          // what interpolation, shading and surface curvature leave on a good match
-  double max_stretch = 2.5;              // singular values of A lie in [1/max_stretch, max_stretch]
+  double gate = 13.8;            // chi^2, 2 degrees of freedom, 99.9 %
+  double sigma_floor_px = 0.15;  // what interpolation, shading and surface curvature leave on a good match
+  double max_stretch = 2.5;      // singular values of A lie in [1/max_stretch, max_stretch]
 };
 
 // Aligns the patch, translation first and coarse to fine, then affine, by inverse composition (Baker & Matthews,
