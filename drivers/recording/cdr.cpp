@@ -52,6 +52,10 @@ Expected<std::span<const std::byte>> CdrSerializer::serialize(const void* sample
   if (written == nullptr) {
     return fail(fmt::format("{}: a member has a value that its type does not allow", type.schema_name()));
   }
+  if (stream.x.m_index > kMaxSerializedBytes) {
+    return fail(fmt::format("{}: a message of {} bytes is larger than the limit of {}", type.schema_name(),
+                            stream.x.m_index, kMaxSerializedBytes));
+  }
   return std::as_bytes(std::span(buffer_.get(), stream.x.m_index));
 }
 

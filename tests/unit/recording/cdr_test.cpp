@@ -194,6 +194,17 @@ TEST(Cdr, RefusesToWriteAnEnumeratorThatDoesNotExist) {
   EXPECT_TRUE(serializer.serialize(pose).has_value());
 }
 
+TEST(Cdr, RefusesToWriteMoreThanItWouldRead) {
+  std::vector<std::uint8_t> pixels(kMaxSerializedBytes);
+  foxglove_RawImage image{};
+  image.data = {static_cast<std::uint32_t>(pixels.size()), static_cast<std::uint32_t>(pixels.size()), pixels.data(),
+                false};
+  CdrSerializer serializer;
+  const auto bytes = serializer.serialize(image);
+  ASSERT_FALSE(bytes.has_value());
+  EXPECT_THAT(bytes.error().message, HasSubstr("larger than the limit"));
+}
+
 TEST(Cdr, SerializerForgetsTheSampleBefore) {
   CdrSerializer serializer;
   const auto large = test::make_sample<perimap_Status>(1);
