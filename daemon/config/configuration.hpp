@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/phase/phase_law.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
@@ -43,9 +44,7 @@ struct TrackerConfiguration {
 };
 
 struct PhaseConfiguration {
-  enum class Law { kLinear, kWarped, kTimeLocked };
-
-  Law law = Law::kLinear;
+  PhaseLaw law = PhaseLaw::kLinear;
   Duration lost_after = std::chrono::seconds(3);  // without an R peak
 
   bool operator==(const PhaseConfiguration&) const = default;

@@ -305,9 +305,8 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
 void add_estimation(std::vector<ConfigurationKey>& keys) {
   constexpr auto ms = std::chrono::milliseconds(1);
   constexpr auto s = std::chrono::seconds(1);
-  using Law = PhaseConfiguration::Law;
-  constexpr std::array<std::pair<std::string_view, Law>, 3> laws{
-      {{"linear", Law::kLinear}, {"warped", Law::kWarped}, {"time-locked", Law::kTimeLocked}}};
+  constexpr std::array<std::pair<std::string_view, PhaseLaw>, 3> laws{
+      {{"linear", PhaseLaw::kLinear}, {"warped", PhaseLaw::kWarped}, {"time-locked", PhaseLaw::kTimeLocked}}};
   Section("phase", keys)
       .choice("law", laws, PERIMAP_MEMBER(phase.law), "how the phase runs from one R peak to the next")
       .duration("lost_after_s", s, 0.5, 60, PERIMAP_MEMBER(phase.lost_after),

@@ -84,7 +84,7 @@ level = "debug"
   EXPECT_EQ(result->tracker.time_offset, microseconds(-2500));
   EXPECT_THAT(result->tracker.translation_SC_mm, ::testing::ElementsAre(1.0, -2.5, 3.0));
   EXPECT_THAT(result->tracker.rotation_SC_wxyz, ::testing::ElementsAre(0.0, 0.0, 1.0, 0.0));
-  EXPECT_EQ(result->phase.law, PhaseConfiguration::Law::kTimeLocked);
+  EXPECT_EQ(result->phase.law, PhaseLaw::kTimeLocked);
   EXPECT_EQ(result->pipeline.latency, milliseconds(40));
   EXPECT_EQ(result->pipeline.workers, 4);
   EXPECT_THAT(result->estimation.start_depths_mm, ::testing::ElementsAre(60.0, 120.5));
@@ -100,7 +100,7 @@ TEST(ConfigurationLoader, AFileOverlaysItsBaseKeyByKey) {
   ASSERT_TRUE(recorded);
   const Expected<Configuration> result = parse("version = 1\n[phase]\nlaw = \"linear\"\n", *recorded);
   ASSERT_TRUE(result);
-  EXPECT_EQ(result->phase.law, PhaseConfiguration::Law::kLinear);
+  EXPECT_EQ(result->phase.law, PhaseLaw::kLinear);
   EXPECT_EQ(result->tracker.position_deviation_mm, 1.4);
 }
 
@@ -112,7 +112,7 @@ TEST(ConfigurationLoader, WhatIsPrintedLoadsBackToTheSame) {
   configuration.tracker.rotation_deviation_rad = 0.5 * std::numbers::pi / 180.0;
   configuration.tracker.time_offset = Duration(-1234567);
   configuration.tracker.translation_SC_mm[1] = 1.0 / 3.0;
-  configuration.phase.law = PhaseConfiguration::Law::kWarped;
+  configuration.phase.law = PhaseLaw::kWarped;
   configuration.pipeline.latency = Duration(33333333);
   configuration.estimation.start_depths_mm = {40, 80.25, 1e4};
   configuration.estimation.gate_chi2 = 0.1 + 0.2;

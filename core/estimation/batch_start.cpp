@@ -1,0 +1,348 @@
+#include "core/estimation/batch_start.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+namespace perimap {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+enum class Loss : std::uint8_t { kQuadratic, kHuber, kStudentT };
+
+// rho(s) of the squared Mahalanobis residual s, and its derivative, the observation's weight.
+struct LossValue {
+  double rho;
+  double weight;
+};
+
+LossValue loss_of(Loss loss, double s, double huber_deviations) noexcept {
+  switch (loss) {
+    case Loss::kQuadratic:
+      break;
+    case Loss::kHuber: {
+      const double radius = std::sqrt(s);
+      if (radius <= huber_deviations) break;
+      return {huber_deviations * (2.0 * radius - huber_deviations), huber_deviations / radius};
+    }
+    case Loss::kStudentT: {
+      // -2 log of the bivariate t density: (nu + 2) log(1 + s / nu).
+      constexpr double kNu = 3.0;
+      return {(kNu + 2.0) * std::log1p(s / kNu), (kNu + 2.0) / (kNu + s)};
+    }
+  }
+  return {s, 1.0};
+}
+
+// A squared residual stands in for an observation in which the feature can't be seen from where it is supposed to be: a
+// thousand deviations, without a gradient. So a start on the wrong side of one camera is bad but not lost.
+constexpr double kInvisible = 1e6;
+
+// The cost J(y) = |y|^2 + sum_k rho_k in coordinates whitened by the prior, x = x_0 + sigma y. There the Hessian is I +
+// sum_k w_k B_k^T G_k B_k with G = J^T R^-1 J (3x3): six scalars an observation times b b^T.
+template <class Model>
+class BatchProblem {
+ public:
+  BatchProblem(std::span<const Observation> observations, const Model& model, const Basis& deviations,
+               const Vector3d& prior_mean, double huber_deviations)
+      : observations_(observations),
+        model_(model),
+        prior_mean_(prior_mean),
+        huber_deviations_(huber_deviations),
+        n_(deviations.size()),
+        scaled_basis_(n_, static_cast<Index>(observations.size())),
+        used(observations.size(), 1),
+        residual2(observations.size(), 0.0),
+        weight(observations.size(), 0.0) {
+    for (Index k = 0; k < count(); ++k) {
+      const Observation& observation = observations_[static_cast<std::size_t>(k)];
+      scaled_basis_.col(k) = deviations.cwiseProduct(observation.b);
+      R_inverse_.push_back(observation.R.inverse());
+    }
+    g_.resize(count(), 3);
+    G_.resize(count(), 6);
+    weighted_basis_.resize(6 * n_, count());
+  }
+
+  [[nodiscard]] Index count() const noexcept { return scaled_basis_.cols(); }
+  [[nodiscard]] Index dimension() const noexcept { return 3 * n_; }
+
+  // J(y); leaves residuals, weights and, for normal_equations(), the first derivatives at y.
+  double evaluate(const VectorXd& y, Loss loss) {
+    double cost = y.squaredNorm();
+    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>> coefficients(y.data(), n_, 3);
+    visible = 0;
+    for (Index k = 0; k < count(); ++k) {
+      const auto index = static_cast<std::size_t>(k);
+      const Observation& observation = observations_[index];
+      const Vector3d p = prior_mean_ + coefficients.transpose() * scaled_basis_.col(k);
+      Vector2d z;
+      Matrix23d dz_dq;
+      const bool seen = model_.predict(observation.X_CW * p, z, &dz_dq) == ProjectionStatus::kOk;
+      visible += seen ? 1 : 0;
+      double s = kInvisible;
+      Vector2d Wr = Vector2d::Zero();
+      if (seen) {
+        const Vector2d r = model_.residual(observation.z, z);
+        Wr = R_inverse_[index] * r;
+        s = r.dot(Wr);
+      }
+      residual2[index] = s;
+      if (used[index] == 0) {
+        g_.row(k).setZero();
+        G_.row(k).setZero();
+        continue;
+      }
+      const LossValue value = loss_of(loss, s, huber_deviations_);
+      cost += value.rho;
+      weight[index] = value.weight;
+      if (!seen) {
+        g_.row(k).setZero();
+        G_.row(k).setZero();
+        continue;
+      }
+      const Matrix23d J = dz_dq * observation.X_CW.R;
+      const Matrix23d WJ = value.weight * (R_inverse_[index] * J);
+      const Matrix3d G = J.transpose() * WJ;
+      g_.row(k) = value.weight * (J.transpose() * Wr).transpose();
+      G_.row(k) << G(0, 0), G(1, 0), G(2, 0), G(1, 1), G(2, 1), G(2, 2);
+    }
+    return cost;
+  }
+
+  // Half the Hessian (Gauss-Newton, lower triangle) and minus half the gradient at the y last evaluated.
+  void normal_equations(const VectorXd& y, MatrixXd& A, VectorXd& descent) {
+    // The six n x n blocks by one matrix product.
+    for (Index block = 0; block < 6; ++block) {
+      weighted_basis_.middleRows(block * n_, n_).noalias() = scaled_basis_ * G_.col(block).asDiagonal();
+    }
+    blocks_.noalias() = weighted_basis_ * scaled_basis_.transpose();
+    A.resize(dimension(), dimension());
+    Index block = 0;
+    for (Index column = 0; column < 3; ++column) {
+      for (Index row = column; row < 3; ++row, ++block) {
+        A.block(row * n_, column * n_, n_, n_) = blocks_.middleRows(block * n_, n_);
+      }
+    }
+    A.diagonal().array() += 1.0;
+    descent = -y;
+    for (Index axis = 0; axis < 3; ++axis) descent.segment(axis * n_, n_) += scaled_basis_ * g_.col(axis);
+  }
+
+ private:
+  std::span<const Observation> observations_;
+  const Model& model_;
+  Vector3d prior_mean_;
+  double huber_deviations_;
+  Index n_;
+  MatrixXd scaled_basis_;  // n x K: sigma o b of each observation
+  std::vector<Matrix2d> R_inverse_;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> g_;  // J^T R^-1 r w
+  Eigen::Matrix<double, Eigen::Dynamic, 6> G_;  // xx, yx, zx, yy, zy, zz of J^T R^-1 J w
+  MatrixXd weighted_basis_;
+  MatrixXd blocks_;
+
+ public:
+  std::vector<std::uint8_t> used;  // observations that count, 1 or 0
+  // At the y last evaluated:
+  std::vector<double> residual2;
+  std::vector<double> weight;
+  int visible = 0;
+};
+
+struct Solution {
+  VectorXd y;
+  double cost = 0.0;
+  bool converged = false;
+};
+
+// Levenberg-Marquardt (Marquardt's damping after Nielsen, IMM-REP-1999-05) from y. Ends when the cost can fall by no
+// more than `tolerance`, which is the squared length of the step in posterior deviations.
+template <class Model>
+Solution minimise(BatchProblem<Model>& problem, VectorXd y, Loss loss, int max_iterations, double tolerance,
+                  int& iterations) {
+  Solution solution;
+  MatrixXd A;
+  MatrixXd damped;
+  VectorXd descent;
+  double cost = problem.evaluate(y, loss);
+  problem.normal_equations(y, A, descent);
+  constexpr double kFirstDamping = 1e-6;
+  double mu = kFirstDamping * A.diagonal().maxCoeff();
+  double growth = 2.0;
+  for (int i = 0; i < max_iterations && std::isfinite(cost); ++i) {
+    ++iterations;
+    damped = A;
+    damped.diagonal().array() += mu;
+    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(damped);
+    if (factor.info() != Eigen::Success) break;
+    const VectorXd step = factor.solve(descent);
+    const double expected = step.dot(mu * step + descent);
+    const VectorXd trial = y + step;
+    const double trial_cost = problem.evaluate(trial, loss);
+    // As in the recursive update: rounding must not stop the last steps.
+    const double slack = 1e-9 * (1.0 + cost);
+    if (trial_cost <= cost + slack) {
+      const double gain = expected > slack ? (cost - trial_cost) / expected : 1.0;
+      const double turn = 2.0 * gain - 1.0;
+      mu *= std::max(expected > slack ? 1.0 / 10.0 : 1e-3, 1.0 - turn * turn * turn);
+      growth = 2.0;
+      y = trial;
+      cost = trial_cost;
+      problem.normal_equations(y, A, descent);
+      if (expected < tolerance) {
+        solution.converged = true;
+        break;
+      }
+    } else {
+      if (expected < tolerance) {
+        // No further descent: y is the minimum to rounding.
+        solution.converged = true;
+        break;
+      }
+      mu *= growth;
+      growth *= 2.0;
+    }
+  }
+  solution.cost = problem.evaluate(y, loss);
+  solution.y = std::move(y);
+  solution.converged = solution.converged && std::isfinite(solution.cost);
+  return solution;
+}
+
+template <class Model>
+bool usable(const Observation& observation, const Model&, int n) noexcept {
+  return observation.b.size() == n && observation.b.allFinite() && observation.z.allFinite() &&
+         observation.R.allFinite() && observation.R(0, 0) > 0.0 && observation.R.determinant() > 0.0 &&
+         observation.X_CW.R.allFinite() && observation.X_CW.t.allFinite();
+}
+
+}  // namespace
+
+template <class Model>
+BatchOutcome batch_start(std::span<const Observation> observations, const Model& model, const BasisLayout& layout,
+                         const Prior& prior, const BatchSettings& settings) {
+  BatchOutcome outcome;
+  const auto refuse = [&outcome](BatchStatus status) {
+    outcome.status = status;
+    return outcome;
+  };
+  if (observations.empty() || static_cast<int>(observations.size()) < settings.min_observations) {
+    return refuse(BatchStatus::kTooFewObservations);
+  }
+  const int n = layout.size();
+  for (const Observation& observation : observations) {
+    if (!usable(observation, model, n)) return refuse(BatchStatus::kBadObservation);
+  }
+  Vector3d ray_C;
+  if (!model.ray(observations.front().z, ray_C)) return refuse(BatchStatus::kBadObservation);
+  const Pose X_WC = observations.front().X_CW.inverse();
+  const Vector3d prior_mean = X_WC * (settings.prior_depth_mm * ray_C);
+
+  const Basis deviations = prior_deviations(layout, prior);
+  BatchProblem<Model> problem(observations, model, deviations, prior_mean, settings.huber_deviations);
+
+  // Every start, through the robust losses; the rough solutions only choose the basin.
+  constexpr double kRough = 1e-3;
+  std::optional<Solution> best;
+  std::vector<Solution> rough_solutions;
+  bool seen_somewhere = false;
+  for (const double depth_mm : settings.start_depths_mm) {
+    VectorXd y = VectorXd::Zero(problem.dimension());
+    const Vector3d offset = X_WC * (depth_mm * ray_C) - prior_mean;
+    for (Index axis = 0; axis < 3; ++axis) y(axis * n) = offset(axis) / deviations(0);
+    const Loss first_loss = settings.robust ? Loss::kHuber : Loss::kQuadratic;
+    problem.evaluate(y, first_loss);
+    if (problem.visible == 0) continue;
+    seen_somewhere = true;
+    Solution solution =
+        minimise(problem, std::move(y), first_loss, settings.max_iterations, kRough, outcome.iterations);
+    if (settings.robust) {
+      // Two starts that meet need not go on twice.
+      const bool known = std::any_of(rough_solutions.begin(), rough_solutions.end(), [&](const Solution& other) {
+        return (solution.y - other.y).squaredNorm() < 1e-4 * static_cast<double>(problem.dimension()) &&
+               std::abs(solution.cost - other.cost) < 0.1;
+      });
+      if (known) continue;
+      rough_solutions.push_back(solution);
+      solution = minimise(problem, std::move(solution.y), Loss::kStudentT, settings.max_iterations, kRough,
+                          outcome.iterations);
+    }
+    if (solution.converged && (!best || solution.cost < best->cost)) best = std::move(solution);
+  }
+  if (!seen_somewhere) return refuse(BatchStatus::kBehindCamera);
+  if (!best) return refuse(BatchStatus::kDiverged);
+  outcome.robust_cost = best->cost;
+
+  // The plain estimate of what lies within the gate, until that set stays. One that has come in stays in, so that the
+  // set can't alternate.
+  const auto count_inliers = [&] { return static_cast<int>(std::count(problem.used.begin(), problem.used.end(), 1)); };
+  const int enough =
+      std::max(settings.min_observations,
+               static_cast<int>(std::ceil(settings.min_inlier_fraction * static_cast<double>(observations.size()))));
+  Solution solution = std::move(*best);
+  if (settings.robust) {
+    problem.evaluate(solution.y, Loss::kStudentT);
+    outcome.weights = problem.weight;
+    for (std::size_t k = 0; k < observations.size(); ++k)
+      problem.used[k] = problem.residual2[k] < settings.gate ? 1 : 0;
+  } else {
+    problem.evaluate(solution.y, Loss::kQuadratic);
+    outcome.weights = problem.weight;
+  }
+  constexpr int kMaxRounds = 5;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    if (count_inliers() < enough) return refuse(BatchStatus::kTooManyOutliers);
+    solution = minimise(problem, std::move(solution.y), Loss::kQuadratic, settings.max_iterations, settings.tolerance,
+                        outcome.iterations);
+    if (!solution.converged) return refuse(BatchStatus::kDiverged);
+    if (!settings.robust) break;
+    bool changed = false;
+    for (std::size_t k = 0; k < observations.size(); ++k) {
+      if (problem.used[k] == 0 && problem.residual2[k] < settings.gate) {
+        problem.used[k] = 1;
+        changed = true;
+      }
+    }
+    if (!changed) break;
+  }
+  if (!settings.robust) outcome.robust_cost = solution.cost;
+
+  MatrixXd A;
+  VectorXd descent;
+  outcome.map_cost = problem.evaluate(solution.y, Loss::kQuadratic);
+  problem.normal_equations(solution.y, A, descent);
+  const Eigen::LLT<MatrixXd> factor(A);
+  if (factor.info() != Eigen::Success) return refuse(BatchStatus::kDiverged);
+  const Index d = problem.dimension();
+  const MatrixXd P = factor.solve(MatrixXd::Identity(d, d));
+  VectorXd sigma(d);
+  for (Index axis = 0; axis < 3; ++axis) sigma.segment(axis * n, n) = deviations;
+  FeatureEstimate& estimate = outcome.estimate;
+  estimate.x = sigma.cwiseProduct(solution.y);
+  for (Index axis = 0; axis < 3; ++axis) estimate.x(axis * n) += prior_mean(axis);
+  estimate.P.resize(d, d);
+  for (Index j = 0; j < d; ++j) {
+    for (Index i = j; i < d; ++i) {
+      estimate.P(i, j) = estimate.P(j, i) = 0.5 * (P(i, j) + P(j, i)) * sigma(i) * sigma(j);
+    }
+  }
+  if (!estimate.x.allFinite() || !estimate.P.allFinite()) return refuse(BatchStatus::kDiverged);
+  outcome.inlier = problem.used;
+  outcome.inliers = count_inliers();
+  outcome.status = BatchStatus::kOk;
+  return outcome;
+}
+
+template BatchOutcome batch_start(std::span<const Observation>, const PixelModel&, const BasisLayout&, const Prior&,
+                                  const BatchSettings&);
+template BatchOutcome batch_start(std::span<const Observation>, const BearingModel&, const BasisLayout&, const Prior&,
+                                  const BatchSettings&);
+
+}  // namespace perimap

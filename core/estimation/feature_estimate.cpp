@@ -1,0 +1,66 @@
+#include "core/estimation/feature_estimate.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace perimap {
+
+Matrix3d FeatureEstimate::position_covariance(const Basis& b) const noexcept {
+  const Eigen::Index n = b.size();
+  Matrix3d S;
+  for (int j = 0; j < 3; ++j) {
+    for (int i = j; i < 3; ++i) {
+      double sum = 0.0;
+      for (Eigen::Index k = 0; k < n; ++k) sum += b(k) * P.col(j * n + k).segment(i * n, n).dot(b);
+      S(i, j) = S(j, i) = sum;
+    }
+  }
+  return S;
+}
+
+double largest_deviation_mm(const FeatureEstimate& estimate, const BasisLayout& layout, int phases) noexcept {
+  const double step = 2.0 * std::numbers::pi / phases;
+  const int respiratory_phases = layout.respiratory_harmonics > 0 ? phases : 1;
+  double largest = 0.0;
+  for (int m = 0; m < respiratory_phases; ++m) {
+    for (int n = 0; n < phases; ++n) {
+      const Matrix3d S = estimate.position_covariance(basis_at(layout, n * step, m * step));
+      Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
+      solver.computeDirect(S, Eigen::EigenvaluesOnly);
+      largest = std::max(largest, solver.eigenvalues()(2));
+    }
+  }
+  return std::sqrt(largest);
+}
+
+Basis prior_deviations(const BasisLayout& layout, const Prior& prior) noexcept {
+  Basis deviations(layout.size());
+  deviations(0) = prior.dc_mm;
+  const auto fill = [&](int begin, int harmonics, double first_mm) {
+    for (int k = 1; k <= harmonics; ++k) {
+      const double deviation = first_mm / std::pow(k, prior.decay);
+      deviations(begin + k - 1) = deviation;
+      deviations(begin + harmonics + k - 1) = deviation;
+    }
+  };
+  fill(1, layout.cardiac_harmonics, prior.cardiac_mm);
+  fill(1 + 2 * layout.cardiac_harmonics, layout.respiratory_harmonics, prior.respiratory_mm);
+  return deviations;
+}
+
+FeatureEstimate prior_estimate(const BasisLayout& layout, const Prior& prior, const Vector3d& p_WF) noexcept {
+  const int n = layout.size();
+  const Basis deviations = prior_deviations(layout, prior);
+  FeatureEstimate estimate;
+  estimate.x.setZero(3 * n);
+  estimate.P.setZero(3 * n, 3 * n);
+  for (int axis = 0; axis < 3; ++axis) {
+    estimate.x(axis * n) = p_WF(axis);
+    estimate.P.diagonal().segment(axis * n, n) = deviations.array().square();
+  }
+  return estimate;
+}
+
+}  // namespace perimap

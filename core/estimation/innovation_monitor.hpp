@@ -1,0 +1,43 @@
+// Does a feature's filter explain what it sees? Follows the mean of its normalised innovation squared (NIS).
+//
+// A consistent filter's NIS is chi-squared with 2 degrees of freedom, so NIS/2 has mean 1 and variance 1. Its
+// exponential mean over a memory of N updates has standard deviation sqrt(1 / (2 N - 1)): 0.13 for N = 30.
+#pragma once
+
+#include <cstdint>
+
+namespace perimap {
+
+struct InnovationMonitorSettings {
+  double memory_updates = 30.0;   // N; at least 1
+  int enough_updates = 20;        // no verdict before
+  double consistent_below = 1.6;  // mean NIS/2; 4.6 standard deviations above 1 for N = 30
+  double high_above = 2.0;        // drift, wrong phase, wrong noise: 7.7 standard deviations
+  double largest_nis = 13.8;      // an outlier counts no more than this (the gate's value)
+};
+
+enum class InnovationVerdict : std::uint8_t { kTooFew, kConsistent, kElevated, kHigh };
+
+class InnovationMonitor {
+ public:
+  explicit InnovationMonitor(const InnovationMonitorSettings& settings = {}) noexcept : settings_(settings) {}
+
+  // The NIS of an update, accepted or rejected by the gate. NaN counts as an outlier.
+  void add(double nis) noexcept;
+  void reset() noexcept;
+
+  // Mean of NIS/2, 1 when the filter is consistent, 0 before the first update. While fewer than N updates have been
+  // seen it is their plain mean.
+  [[nodiscard]] double mean() const noexcept { return mean_; }
+  [[nodiscard]] int count() const noexcept { return count_; }
+  [[nodiscard]] InnovationVerdict verdict() const noexcept;
+  [[nodiscard]] bool consistent() const noexcept { return verdict() == InnovationVerdict::kConsistent; }
+  [[nodiscard]] bool high() const noexcept { return verdict() == InnovationVerdict::kHigh; }
+
+ private:
+  InnovationMonitorSettings settings_;
+  double mean_ = 0.0;
+  int count_ = 0;  // stops counting at a million
+};
+
+}  // namespace perimap

@@ -1,0 +1,210 @@
+#include "drivers/calibration/calibration_file.hpp"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace perimap {
+namespace {
+
+constexpr std::size_t kLargestFile = std::size_t{1} << 20;
+constexpr int kLargestImage = 16384;         // px a side
+constexpr double kLargestFocalLength = 1e6;  // px
+
+struct Shape {
+  int rows;
+  int columns;
+};
+
+std::string on_one_line(std::string text) {
+  for (char& c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7F) {
+      c = ' ';
+    }
+  }
+  return text;
+}
+
+class Calibration {
+ public:
+  Calibration(const YAML::Node& root, std::string_view name) : root_(root), name_(name) {}
+
+  Expected<CameraModel> camera() const {
+    CameraModel camera;
+    auto size = image_side("image_width").and_then([&](int width) {
+      camera.width = width;
+      return image_side("image_height");
+    });
+    if (!size) {
+      return tl::unexpected(size.error());
+    }
+    camera.height = *size;
+
+    constexpr Shape kMatrix[] = {{3, 3}};
+    const Expected<std::vector<double>> matrix = numbers("camera_matrix", "a 3x3 matrix of numbers", kMatrix);
+    if (!matrix) {
+      return tl::unexpected(matrix.error());
+    }
+    const std::vector<double>& K = *matrix;
+    camera.fx = K[0];
+    camera.cx = K[2];
+    camera.fy = K[4];
+    camera.cy = K[5];
+    if (K[1] != 0 || K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1) {
+      return refuse("camera_matrix", "[fx 0 cx; 0 fy cy; 0 0 1]", "another form");
+    }
+    if (!(camera.fx > 0 && camera.fx <= kLargestFocalLength && camera.fy > 0 && camera.fy <= kLargestFocalLength)) {
+      return refuse("camera_matrix", fmt::format("focal lengths above 0 and at most {} px", kLargestFocalLength),
+                    fmt::format("{} and {}", camera.fx, camera.fy));
+    }
+
+    constexpr Shape kDistortion[] = {{1, 4}, {4, 1},  {1, 5},  {5, 1},  {1, 8},
+                                     {8, 1}, {1, 12}, {12, 1}, {1, 14}, {14, 1}};
+    const Expected<std::vector<double>> distortion =
+        numbers("distortion_coefficients", "4, 5, 8, 12 or 14 numbers in a row or column", kDistortion);
+    if (!distortion) {
+      return tl::unexpected(distortion.error());
+    }
+    const std::vector<double>& d = *distortion;
+    for (std::size_t i = 5; i < d.size(); ++i) {
+      if (d[i] != 0) {
+        return refuse("distortion_coefficients", "k1 k2 p1 p2 k3 and zeros (Brown-Conrady)",
+                      fmt::format("{} as number {}", d[i], i + 1));
+      }
+    }
+    camera.k1 = d[0];
+    camera.k2 = d[1];
+    camera.p1 = d[2];
+    camera.p2 = d[3];
+    camera.k3 = d.size() > 4 ? d[4] : 0.0;
+    return camera;
+  }
+
+ private:
+  tl::unexpected<Error> refuse(std::string_view key, std::string_view expected, std::string_view got) const {
+    return fail(on_one_line(fmt::format("{}: key '{}': expected {}, got {}", name_, key, expected, got)));
+  }
+
+  Expected<int> image_side(const char* key) const {
+    const YAML::Node node = root_[key];
+    const std::string expected = fmt::format("an integer from 1 to {}", kLargestImage);
+    int side = 0;
+    if (!node.IsDefined() || !node.IsScalar() || !YAML::convert<int>::decode(node, side)) {
+      return refuse(key, expected, node.IsDefined() ? "something else" : "nothing");
+    }
+    if (side < 1 || side > kLargestImage) {
+      return refuse(key, expected, fmt::format("{}", side));
+    }
+    return side;
+  }
+
+  // The elements of a matrix of one of the shapes, row by row.
+  Expected<std::vector<double>> numbers(const char* key, const char* expected, std::span<const Shape> shapes) const {
+    const YAML::Node node = root_[key];
+    if (!node.IsDefined()) {
+      return refuse(key, expected, "nothing");
+    }
+    const auto part = [&node](const char* name) { return node.IsMap() ? node[name] : YAML::Node(); };
+    const YAML::Node rows_node = part("rows");
+    const YAML::Node columns_node = part("cols");
+    const YAML::Node data = part("data");
+    int rows = 0;
+    int columns = 0;
+    if (!rows_node.IsDefined() || !columns_node.IsDefined() || !data.IsDefined() || !data.IsSequence() ||
+        !YAML::convert<int>::decode(rows_node, rows) || !YAML::convert<int>::decode(columns_node, columns)) {
+      return refuse(key, expected, "something else than rows, cols and data");
+    }
+    const bool known = std::any_of(shapes.begin(), shapes.end(), [&](const Shape& shape) {
+      return shape.rows == rows && shape.columns == columns &&
+             static_cast<std::size_t>(shape.rows * shape.columns) == data.size();
+    });
+    if (!known) {
+      return refuse(key, expected, fmt::format("{} rows, {} columns and {} numbers", rows, columns, data.size()));
+    }
+    std::vector<double> values;
+    for (const YAML::Node& element : data) {
+      double value = 0;
+      if (!YAML::convert<double>::decode(element, value) || !std::isfinite(value)) {
+        return refuse(key, expected, "an element that is no finite number");
+      }
+      values.push_back(value);
+    }
+    return values;
+  }
+
+  const YAML::Node& root_;
+  std::string_view name_;
+};
+
+}  // namespace
+
+Expected<CameraModel> parse_calibration(std::string_view text, std::string_view name) {
+  if (text.size() > kLargestFile) {
+    return fail(on_one_line(
+        fmt::format("{}: expected a calibration of at most {} bytes, got {}", name, kLargestFile, text.size())));
+  }
+  // yaml-cpp reports what it cannot read by exceptions.
+  try {
+    const YAML::Node root = YAML::Load(std::string(text));
+    if (!root.IsMap()) {
+      return fail(on_one_line(fmt::format("{}: expected the keys of an OpenCV calibration, got none", name)));
+    }
+    return Calibration(root, name).camera();
+  } catch (const YAML::Exception& exception) {
+    return fail(on_one_line(fmt::format("{}:{}:{}: expected an OpenCV calibration as YAML or JSON, got: {}", name,
+                                        exception.mark.line + 1, exception.mark.column + 1, exception.msg)));
+  } catch (const std::exception& exception) {
+    return fail(on_one_line(
+        fmt::format("{}: expected an OpenCV calibration as YAML or JSON, got: {}", name, exception.what())));
+  }
+}
+
+Expected<CameraModel> read_calibration(const std::filesystem::path& file) {
+  const auto refuse = [&file](int error) {
+    return fail(on_one_line(
+        fmt::format("{}: expected a readable calibration file, got: {}", file.string(), std::strerror(error))));
+  };
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
+  if (!stream) {
+    return refuse(errno);
+  }
+  std::string text(kLargestFile + 1, '\0');
+  errno = 0;
+  text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
+  if (std::ferror(stream.get()) != 0) {
+    return refuse(errno);
+  }
+  return parse_calibration(text, file.string());
+}
+
+std::string format_calibration(const CameraModel& camera) {
+  // The layout of cv::FileStorage, so that OpenCV's own tools read it.
+  const auto matrix = [](std::string_view key, int rows, int columns, std::initializer_list<double> values) {
+    return fmt::format("{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: [ {} ]\n", key, rows, columns,
+                       fmt::join(values, ", "));
+  };
+  return fmt::format("%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n", camera.width, camera.height) +
+         matrix("camera_matrix", 3, 3, {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1}) +
+         matrix("distortion_coefficients", 1, 5, {camera.k1, camera.k2, camera.p1, camera.p2, camera.k3});
+}
+
+Expected<void> write_calibration(const std::filesystem::path& file, const CameraModel& camera) {
+  const std::string text = format_calibration(camera);
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "wb"), &std::fclose);
+  const bool written = stream && std::fwrite(text.data(), 1, text.size(), stream.get()) == text.size();
+  if (!written || std::fclose(stream.release()) != 0) {
+    return fail(on_one_line(fmt::format("{}: cannot write: {}", file.string(), std::strerror(errno))));
+  }
+  return {};
+}
+
+}  // namespace perimap
