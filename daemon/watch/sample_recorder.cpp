@@ -1,0 +1,68 @@
+#include "daemon/watch/sample_recorder.hpp"
+
+#include <utility>
+
+#include "drivers/recording/channels.hpp"
+
+namespace perimap {
+namespace {
+
+std::uint32_t short_sequence(std::uint64_t sequence) { return static_cast<std::uint32_t>(sequence); }
+
+}  // namespace
+
+Expected<SampleRecorder> SampleRecorder::create(const std::filesystem::path& file, std::string generator) {
+  Expected<RecordingWriter> writer = RecordingWriter::create(file.string());
+  if (!writer) {
+    return tl::unexpected(writer.error());
+  }
+  SampleRecorder recorder(std::move(*writer), std::move(generator));
+  const auto keep = [](ChannelId& place) { return [&place](ChannelId id) { place = id; }; };
+  const Expected<void> results[] = {
+      recorder.writer_.add_channel<perimap_RecordingInfo>(channels::kRecordingInfo).map(keep(recorder.info_)),
+      recorder.writer_.add_channel<perimap_Surface>(channels::kSurface).map(keep(recorder.surface_)),
+      recorder.writer_.add_channel<perimap_SurfaceModel>(channels::kSurfaceModel).map(keep(recorder.model_)),
+      recorder.writer_.add_channel<perimap_Phase>(channels::kPhase).map(keep(recorder.phase_)),
+      recorder.writer_.add_channel<perimap_Status>(channels::kStatus).map(keep(recorder.status_))};
+  for (const Expected<void>& result : results) {
+    if (!result) {
+      return tl::unexpected(result.error());
+    }
+  }
+  return recorder;
+}
+
+Expected<void> SampleRecorder::write_info(const perimap_Surface& surface, Instant receipt) {
+  std::string description = "samples received over DDS";
+  std::string world_frame = surface.frame_id;
+  perimap_RecordingInfo info{};
+  info.generator = generator_.data();
+  info.description = description.data();
+  info.utc_minus_monotonic_ns = surface.release_utc_ns - surface.release_time_ns;
+  info.world_frame_id = world_frame.data();
+  return writer_.write(info_, info, receipt, receipt, 0);
+}
+
+Expected<void> SampleRecorder::write(const perimap_Surface& surface, Instant receipt) {
+  if (!std::exchange(info_written_, true)) {
+    if (auto written = write_info(surface, receipt); !written) {
+      return written;
+    }
+  }
+  return writer_.write(surface_, surface, receipt, from_ns(surface.release_time_ns),
+                       short_sequence(surface.sample_sequence));
+}
+
+Expected<void> SampleRecorder::write(const perimap_SurfaceModel& model, Instant receipt) {
+  return writer_.write(model_, model, receipt, from_ns(model.time_ns), short_sequence(model.sample_sequence));
+}
+
+Expected<void> SampleRecorder::write(const perimap_Phase& phase, Instant receipt) {
+  return writer_.write(phase_, phase, receipt, from_ns(phase.time_ns), short_sequence(phase.sample_sequence));
+}
+
+Expected<void> SampleRecorder::write(const perimap_Status& status, Instant receipt) {
+  return writer_.write(status_, status, receipt, from_ns(status.time_ns), short_sequence(status.sample_sequence));
+}
+
+}  // namespace perimap
