@@ -1,0 +1,170 @@
+#include "core/vision/feature_detector.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <tuple>
+
+namespace perimap {
+namespace {
+
+struct Corner {
+  int x;
+  int y;
+  float strength;
+};
+
+// Stronger first; equal ones by place, so that the order is the same everywhere.
+bool stronger(const Corner& a, const Corner& b) {
+  return std::tuple(-a.strength, a.y, a.x) < std::tuple(-b.strength, b.y, b.x);
+}
+
+void widen(cv::Mat& mask, double by_px) {
+  const int reach = static_cast<int>(std::ceil(by_px));
+  if (reach <= 0) return;
+  // The distance transform costs the same whatever the reach; dilation does not.
+  cv::Mat away, distance;
+  cv::bitwise_not(mask, away);
+  cv::distanceTransform(away, distance, cv::DIST_L2, cv::DIST_MASK_3);
+  mask = distance <= by_px;
+}
+
+// 255 where no feature may be.
+cv::Mat forbidden(const cv::Mat& image, const DetectorSettings& settings) {
+  cv::Mat highlight = image >= settings.highlight_grey;
+  widen(highlight, settings.highlight_clearance_px);
+  // Averaged, so that a dark vessel or a noisy pixel is not taken for the background.
+  cv::Mat mean;
+  cv::blur(image, mean, {settings.background_size_px, settings.background_size_px});
+  cv::Mat background = mean < settings.background_grey;
+  // The mean turns dark only half a window inside the background.
+  widen(background, settings.background_clearance_px + 0.5 * settings.background_size_px);
+  return highlight | background;
+}
+
+// The smaller eigenvalue of the gradient product's mean over a patch, (grey levels / px)^2 (Shi & Tomasi, "Good
+// Features to Track", CVPR 1994).
+cv::Mat corner_strength(const cv::Mat& image) {
+  constexpr int kPatch = 15;
+  constexpr double kSobelGain = 8;
+  cv::Mat smooth, gx, gy;
+  cv::GaussianBlur(image, smooth, {5, 5}, 1.0);  // else noise counts as texture
+  cv::Sobel(smooth, gx, CV_32F, 1, 0, 3, 1 / kSobelGain);
+  cv::Sobel(smooth, gy, CV_32F, 0, 1, 3, 1 / kSobelGain);
+  cv::Mat xx = gx.mul(gx), xy = gx.mul(gy), yy = gy.mul(gy);
+  for (cv::Mat* product : {&xx, &xy, &yy}) cv::blur(*product, *product, {kPatch, kPatch});
+  cv::Mat strength(image.size(), CV_32F);
+  for (int y = 0; y < strength.rows; ++y) {
+    const float* const a = xx.ptr<float>(y);
+    const float* const b = xy.ptr<float>(y);
+    const float* const c = yy.ptr<float>(y);
+    float* const out = strength.ptr<float>(y);
+    for (int x = 0; x < strength.cols; ++x) {
+      out[x] = 0.5F * (a[x] + c[x]) - std::sqrt(0.25F * (a[x] - c[x]) * (a[x] - c[x]) + b[x] * b[x]);
+    }
+  }
+  return strength;
+}
+
+bool is_local_maximum(const cv::Mat& strength, int x, int y) {
+  const float here = strength.at<float>(y, x);
+  for (int v = y - 1; v <= y + 1; ++v) {
+    for (int u = x - 1; u <= x + 1; ++u) {
+      if (strength.at<float>(v, u) > here) return false;
+    }
+  }
+  return true;
+}
+
+struct Tile {
+  std::vector<Corner> corners;  // strongest first
+  std::size_t next = 0;         // the first corner not looked at yet
+  int features = 0;             // it holds, old and new
+
+  [[nodiscard]] bool is_spent() const { return next >= corners.size(); }
+};
+
+// The emptiest tile whose next corner is the strongest. Null when all are spent.
+Tile* neediest(std::vector<Tile>& tiles) {
+  Tile* chosen = nullptr;
+  for (Tile& tile : tiles) {
+    if (tile.is_spent()) continue;
+    if (chosen == nullptr || tile.features < chosen->features ||
+        (tile.features == chosen->features && stronger(tile.corners[tile.next], chosen->corners[chosen->next]))) {
+      chosen = &tile;
+    }
+  }
+  return chosen;
+}
+
+std::vector<Vector2d> find(const cv::Mat& image, std::span<const Vector2d> occupied, const DetectorSettings& settings,
+                           std::size_t how_many) {
+  const cv::Mat strength = corner_strength(image);
+  const cv::Mat mask = forbidden(image, settings);
+  const int columns = (image.cols + settings.tile_px - 1) / settings.tile_px;
+  const int rows = (image.rows + settings.tile_px - 1) / settings.tile_px;
+  std::vector<Tile> tiles(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  const auto tile_at = [&](int x, int y) -> Tile& {
+    return tiles[static_cast<std::size_t>(y / settings.tile_px) * static_cast<std::size_t>(columns) +
+                 static_cast<std::size_t>(x / settings.tile_px)];
+  };
+  const int border = std::max(settings.border_px, 1);  // a local maximum has neighbours
+  for (int y = border; y < image.rows - border; ++y) {
+    for (int x = border; x < image.cols - border; ++x) {
+      if (mask.at<std::uint8_t>(y, x) != 0 || strength.at<float>(y, x) < settings.min_corner) continue;
+      if (is_local_maximum(strength, x, y)) tile_at(x, y).corners.push_back({x, y, strength.at<float>(y, x)});
+    }
+  }
+  for (Tile& tile : tiles) std::sort(tile.corners.begin(), tile.corners.end(), stronger);
+
+  std::vector<Vector2d> taken;
+  for (const Vector2d& px : occupied) {
+    if (!(px.x() >= 0 && px.y() >= 0 && px.x() < image.cols && px.y() < image.rows)) continue;
+    taken.push_back(px);
+    ++tile_at(static_cast<int>(px.x()), static_cast<int>(px.y())).features;
+  }
+  std::vector<Vector2d> found;
+  const double min_squared = settings.min_distance_px * settings.min_distance_px;
+  while (found.size() < how_many) {
+    Tile* const tile = neediest(tiles);
+    if (tile == nullptr) break;
+    const Corner& corner = tile->corners[tile->next++];
+    const Vector2d px(corner.x, corner.y);
+    const auto is_near = [&](const Vector2d& other) { return (other - px).squaredNorm() < min_squared; };
+    if (std::any_of(taken.begin(), taken.end(), is_near)) continue;
+    taken.push_back(px);
+    found.push_back(px);
+    ++tile->features;
+  }
+  return found;
+}
+
+}  // namespace
+
+Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<const Vector2d> occupied,
+                                              const DetectorSettings& settings, int how_many) {
+  if (image.data == nullptr || image.width < 1 || image.height < 1 || image.stride < image.width) {
+    return fail("feature detector: image of " + std::to_string(image.width) + "x" + std::to_string(image.height) +
+                " with stride " + std::to_string(image.stride) + " cannot be read");
+  }
+  if (settings.tile_px < 1 || settings.background_size_px < 1 || !(settings.min_distance_px >= 0)) {
+    return fail("feature detector: tile_px, background_size_px and min_distance_px must be positive");
+  }
+  if (how_many <= 0) return std::vector<Vector2d>{};
+  try {
+    cv::setNumThreads(1);  // the process has the threads it made itself, and no others
+    // OpenCV takes no const data; find() only reads it.
+    const cv::Mat view(image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data),
+                       static_cast<std::size_t>(image.stride));
+    return find(view, occupied, settings, static_cast<std::size_t>(how_many));
+  } catch (const std::exception& error) {
+    std::string what = error.what();
+    std::replace(what.begin(), what.end(), '\n', ' ');
+    return fail("feature detector: " + what);
+  }
+}
+
+}  // namespace perimap

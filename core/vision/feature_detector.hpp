@@ -1,0 +1,31 @@
+// Places worth following: corners spread evenly over the visible tissue.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/error/expected.hpp"
+#include "core/geometry/pose.hpp"
+#include "core/sensors/grey_image.hpp"
+
+namespace perimap {
+
+struct DetectorSettings {
+  int tile_px = 40;             // each tile gives its best corner before any gives its second
+  double min_distance_px = 14;  // between features, occupied ones included
+  int border_px = 24;           // kept clear along the frame, so that coarse windows fit too
+  double min_corner = 6.0;      // smaller eigenvalue of the mean gradient product, (grey levels / px)^2
+  int highlight_grey = 245;     // at or above: a specular highlight
+  double highlight_clearance_px = 12;
+  int background_grey = 18;  // mean over background_size_px below: no tissue, or none that is lit
+  int background_size_px = 13;
+  double background_clearance_px = 16;  // silhouettes slide over the tissue
+};
+
+// Up to how_many new features, level-0 pixels (whole ones), none within min_distance_px of another or of occupied.
+// The same input gives the same output in the same order, best tiles' corners first. Allocates; meant for a thread
+// without a deadline. An empty list when there is nothing to be found; an error for an unusable image or setting.
+[[nodiscard]] Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<const Vector2d> occupied,
+                                                            const DetectorSettings& settings, int how_many);
+
+}  // namespace perimap

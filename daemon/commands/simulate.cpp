@@ -1,0 +1,370 @@
+#include "daemon/commands/simulate.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <thread>
+
+#include "daemon/commands/frame_renderer.hpp"
+#include "daemon/commands/progress.hpp"
+#include "daemon/commands/truth_messages.hpp"
+#include "drivers/recording/channels.hpp"
+#include "drivers/recording/foxglove_image.hpp"
+#include "drivers/recording/foxglove_pose.hpp"
+#include "drivers/recording/recording_writer.hpp"
+#include "drivers/simulator/ecg_record.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr double kRadians_per_degree = std::numbers::pi / 180.0;
+
+const char* law_name(MotionLaw law) noexcept {
+  switch (law) {
+    case MotionLaw::kWarped:
+      return "warped";
+    case MotionLaw::kTimeLocked:
+      return "time-locked";
+    case MotionLaw::kLinear:
+      break;
+  }
+  return "linear";
+}
+
+// What perimapd needs to know about this session.
+std::string configuration_toml(const Simulation& simulation, const TrackerNoise& noise) {
+  const Pose& X_SC = simulation.hand_eye_X_SC();
+  double q[4];
+  rotation_to_wxyz(X_SC.R, q);
+  return fmt::format(
+      "version = 1\n\n"
+      "[tracker]\n"
+      "position_deviation_mm = {:#}\n"
+      "rotation_deviation_deg = {:#}\n"
+      "hand_eye_translation_SC_mm = [{:#}, {:#}, {:#}]\n"
+      "hand_eye_rotation_SC_wxyz = [{:#}, {:#}, {:#}, {:#}]\n\n"
+      "[phase]\n"
+      "law = \"{}\"\n",
+      noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree, X_SC.t.x(), X_SC.t.y(), X_SC.t.z(), q[0],
+      q[1], q[2], q[3], law_name(simulation.settings().law));
+}
+
+std::string description(const Simulation& simulation, const TrackerNoise& noise) {
+  const SimulationSettings& s = simulation.settings();
+  return fmt::format(
+      "simulated heart: seed {}, {} s, {}x{} at {} Hz, ECG record {}, motion {}, respiration {} mm, tracker {} Hz with "
+      "{} mm and {:.3g} deg RMS",
+      s.seed, to_seconds(s.duration), s.width, s.height, s.frames_per_s, s.ecg_record, law_name(s.law),
+      s.respiration_mm, s.tracker_rate_hz, noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree);
+}
+
+// One recording under way, in a file beside the one it will become.
+class SessionWriter {
+ public:
+  static Expected<std::unique_ptr<SessionWriter>> create(const Simulation& simulation,
+                                                         const SimulatedRecording& recording) {
+    std::filesystem::path partial = recording.path;
+    partial += ".part";
+    auto writer = RecordingWriter::create(partial.string());
+    if (!writer) return tl::unexpected(writer.error());
+    auto session = std::unique_ptr<SessionWriter>(
+        new SessionWriter(simulation, recording, std::move(partial), *std::move(writer)));
+    if (const auto begun = session->begin(); !begun) return tl::unexpected(begun.error());
+    return session;
+  }
+
+  SessionWriter(const SessionWriter&) = delete;
+  SessionWriter& operator=(const SessionWriter&) = delete;
+  ~SessionWriter() {
+    if (finished_) return;
+    std::error_code ignored;
+    std::filesystem::remove(partial_, ignored);
+  }
+
+  Expected<void> write_frame(const Simulation::Frame& frame, std::span<const std::uint8_t> pixels) {
+    const auto sequence = static_cast<std::uint32_t>(frame.stamp.sequence);
+    const int width = simulation_.settings().width;
+    const GreyImage image{pixels.data(), width, simulation_.settings().height, width};
+    const auto raw = borrow_raw_image(image, frame.stamp.capture, kCameraFrame, packed_);
+    const auto truth = to_truth_camera({frame.stamp.capture, frame.X_WC});
+    return writer_.write(image_, raw, frame.stamp.arrival, frame.stamp.capture, sequence).and_then([&] {
+      return writer_.write(truth_camera_, truth, frame.stamp.arrival, frame.stamp.capture, sequence);
+    });
+  }
+
+  Expected<void> write_tracker(const TrackerSample& sample) {
+    perimap_TrackerPose message{};
+    message.source_time_ns = to_ns(sample.source_time);
+    message.device_frame = sample.device_frame;
+    message.state = sample.state == ToolState::kOk ? perimap_TOOL_OK : perimap_TOOL_MISSING;
+    for (int axis = 0; axis < 3; ++axis) message.translation_WS_mm[axis] = sample.X_WS.t[axis];
+    if (sample.state == ToolState::kOk) {
+      rotation_to_wxyz(sample.X_WS.R, message.rotation_WS_wxyz);
+    } else {
+      for (double& component : message.rotation_WS_wxyz) component = std::numeric_limits<double>::quiet_NaN();
+    }
+    const auto written = writer_.write(tracker_, message, sample.arrival, sample.source_time, sample.device_frame);
+    if (!written || sample.state != ToolState::kOk) return written;
+    const auto viewer = borrow_pose_in_frame(sample.X_WS, sample.source_time, kWorldFrame);
+    return writer_.write(viewer_, viewer, sample.arrival, sample.source_time, sample.device_frame);
+  }
+
+  Expected<void> write_ecg(const EcgBlock& block) {
+    perimap_EcgSamples message{};
+    message.first_sample_time_ns = to_ns(block.first_sample_time);
+    message.sample_period_ns = block.sample_period.count();
+    message.device_sequence = block.device_sequence;
+    message.lead_off = block.lead_off;
+    // The C type has no const; the serialiser does not write.
+    message.ecg_mV._buffer = const_cast<float*>(block.mV.data());
+    message.ecg_mV._length = block.count;
+    message.ecg_mV._maximum = block.count;
+    return writer_.write(ecg_, message, block.arrival, block.first_sample_time, block.device_sequence);
+  }
+
+  Expected<void> finish() {
+    if (const auto done = writer_.finish(); !done) return done;
+    std::error_code error;
+    std::filesystem::rename(partial_, recording_.path, error);
+    if (error) return fail(fmt::format("{}: {}", recording_.path.string(), error.message()));
+    finished_ = true;
+    return {};
+  }
+
+ private:
+  SessionWriter(const Simulation& simulation, const SimulatedRecording& recording, std::filesystem::path partial,
+                RecordingWriter writer)
+      : simulation_(simulation), recording_(recording), partial_(std::move(partial)), writer_(std::move(writer)) {}
+
+  Expected<void> attach(std::string_view name, std::string_view media_type, const std::string& text) {
+    return writer_.write_attachment(name, media_type, std::as_bytes(std::span(text)));
+  }
+
+  Expected<void> begin() {
+    Expected<ChannelId> info = writer_.add_channel<perimap_RecordingInfo>(channels::kRecordingInfo);
+    Expected<ChannelId> mesh = writer_.add_channel<perimap_TruthMesh>(channels::kTruthMesh);
+    Expected<ChannelId> motion = writer_.add_channel<perimap_TruthMotion>(channels::kTruthMotion);
+    Expected<ChannelId> truth_camera = writer_.add_channel<perimap_TruthCamera>(channels::kTruthCamera);
+    Expected<ChannelId> image = writer_.add_channel<foxglove_RawImage>(channels::kCameraImage);
+    Expected<ChannelId> tracker = writer_.add_channel<perimap_TrackerPose>(channels::kTrackerPose);
+    Expected<ChannelId> viewer = writer_.add_channel<foxglove_PoseInFrame>(channels::kTrackerViewer);
+    Expected<ChannelId> ecg = writer_.add_channel<perimap_EcgSamples>(channels::kEcgSamples);
+    for (const auto* channel : {&info, &mesh, &motion, &truth_camera, &image, &tracker, &viewer, &ecg})
+      if (!*channel) return tl::unexpected(channel->error());
+    truth_camera_ = *truth_camera;
+    image_ = *image;
+    tracker_ = *tracker;
+    viewer_ = *viewer;
+    ecg_ = *ecg;
+
+    std::string generator = fmt::format("perimap simulate {}", PERIMAP_VERSION);
+    std::string text = description(simulation_, recording_.noise);
+    std::string world = kWorldFrame;
+    const perimap_RecordingInfo facts{generator.data(), text.data(), simulation_.utc_minus_monotonic_ns(),
+                                      world.data()};
+    std::vector<std::int64_t> r_peaks_ns;
+    const auto truth_mesh = borrow_truth_mesh(simulation_.truth().mesh());
+    const auto truth_motion = borrow_truth_motion(simulation_.truth().motion(), r_peaks_ns);
+    const Instant start = simulation_.start();
+    return attach(attachments::kCalibration, "application/yaml", simulation_.lens().opencv_yaml())
+        .and_then([&] {
+          return attach(attachments::kConfiguration, "application/toml",
+                        configuration_toml(simulation_, recording_.noise));
+        })
+        .and_then([&] { return writer_.write(*info, facts, start, start, 0); })
+        .and_then([&] { return writer_.write(*mesh, truth_mesh, start, start, 0); })
+        .and_then([&] { return writer_.write(*motion, truth_motion, start, start, 0); });
+  }
+
+  static inline const std::string kCameraFrame = "camera";
+  static inline const std::string kWorldFrame = "tracker";
+
+  const Simulation& simulation_;
+  SimulatedRecording recording_;
+  std::filesystem::path partial_;
+  RecordingWriter writer_;
+  ChannelId image_, truth_camera_, tracker_, viewer_, ecg_;
+  std::vector<std::uint8_t> packed_;
+  bool finished_ = false;
+};
+
+// What the command line gave.
+struct Options {
+  std::filesystem::path out;
+  SimulationSettings settings;
+  double duration_s = 60.0;
+  std::string size = "640x480";
+  std::optional<double> ecg_start_s;
+  double respiration_period_s = 4.0;
+  double tracker_noise_mm = 1.4;
+  std::vector<double> tracker_noises_mm;
+  std::optional<double> tracker_rotation_noise_deg;
+  unsigned threads = 0;
+  bool force = false;
+};
+
+Expected<void> parse_size(const std::string& text, SimulationSettings& settings) {
+  const char* end = text.data() + text.size();
+  const auto width = std::from_chars(text.data(), end, settings.width);
+  if (width.ec == std::errc{} && width.ptr != end && *width.ptr == 'x') {
+    const auto height = std::from_chars(width.ptr + 1, end, settings.height);
+    if (height.ec == std::errc{} && height.ptr == end) return {};
+  }
+  return fail(fmt::format("size: expected WIDTHxHEIGHT in pixels, such as 640x480, found '{}'", text));
+}
+
+TrackerNoise tracker_noise(const Options& options, double position_mm) {
+  constexpr double kUsual_deg = 0.5;
+  const double rotation_deg = options.tracker_rotation_noise_deg.value_or(position_mm > 0.0 ? kUsual_deg : 0.0);
+  return {position_mm, rotation_deg * kRadians_per_degree};
+}
+
+std::vector<SimulatedRecording> planned(const Options& options) {
+  if (options.tracker_noises_mm.empty()) return {{options.out, tracker_noise(options, options.tracker_noise_mm)}};
+  std::vector<SimulatedRecording> recordings;
+  for (const double noise_mm : options.tracker_noises_mm) {
+    std::filesystem::path path = options.out;
+    path.replace_filename(
+        fmt::format("{}-{}mm{}", options.out.stem().string(), noise_mm, options.out.extension().string()));
+    recordings.push_back({path, tracker_noise(options, noise_mm)});
+  }
+  return recordings;
+}
+
+int complain(const Error& error, int exit_code) {
+  fmt::print(stderr, "perimap simulate: {}\n", error.message);
+  return exit_code;
+}
+
+int run(Options options) {
+  const auto begin = std::chrono::steady_clock::now();
+  if (const auto size = parse_size(options.size, options.settings); !size) return complain(size.error(), 2);
+  options.settings.duration = from_seconds(options.duration_s);
+  options.settings.respiration_period = from_seconds(options.respiration_period_s);
+  if (options.ecg_start_s) options.settings.ecg_start = from_seconds(*options.ecg_start_s);
+  const std::vector<SimulatedRecording> recordings = planned(options);
+  for (const SimulatedRecording& recording : recordings)
+    if (!options.force && std::filesystem::exists(recording.path))
+      return complain({recording.path.string() + ": the file exists; --force overwrites it"}, 2);
+  const unsigned threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
+
+  const auto simulation = Simulation::create(options.settings, threaded_for(threads));
+  if (!simulation) return complain(simulation.error(), 2);
+  {
+    Progress progress("frames", simulation->frames().size());
+    const auto written =
+        write_simulation(*simulation, recordings, threads, [&](std::uint64_t frames) { progress.update(frames); });
+    if (!written) return complain(written.error(), 1);
+  }
+  const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  for (const SimulatedRecording& recording : recordings) {
+    std::error_code ignored;
+    const auto bytes = std::filesystem::file_size(recording.path, ignored);
+    fmt::print("{}: {} frames, {:.0f} MB, tracker noise {} mm, in {:.0f} s\n", recording.path.string(),
+               simulation->frames().size(), static_cast<double>(bytes) / 1e6, recording.noise.position_rms_mm,
+               elapsed_s);
+  }
+  return 0;
+}
+
+}  // namespace
+
+Expected<void> write_simulation(const Simulation& simulation, const std::vector<SimulatedRecording>& recordings,
+                                unsigned threads, const std::function<void(std::uint64_t frames)>& progress) {
+  std::vector<std::unique_ptr<SessionWriter>> writers;
+  for (const SimulatedRecording& recording : recordings) {
+    auto writer = SessionWriter::create(simulation, recording);
+    if (!writer) return tl::unexpected(writer.error());
+    writers.push_back(*std::move(writer));
+  }
+  FrameRenderer frames(simulation, threads);
+  for (const Simulation::Arrival& arrival : simulation.arrivals()) {
+    std::span<const std::uint8_t> pixels;
+    if (arrival.source == Simulation::Source::kCamera) pixels = frames.next();
+    for (std::size_t i = 0; i < writers.size(); ++i) {
+      Expected<void> written;
+      switch (arrival.source) {
+        case Simulation::Source::kCamera:
+          written = writers[i]->write_frame(simulation.frames()[arrival.index], pixels);
+          break;
+        case Simulation::Source::kTracker:
+          written = writers[i]->write_tracker(simulation.tracker_sample(arrival.index, recordings[i].noise));
+          break;
+        case Simulation::Source::kEcg:
+          written = writers[i]->write_ecg(simulation.ecg()[arrival.index]);
+          break;
+      }
+      if (!written) return written;
+    }
+    if (arrival.source == Simulation::Source::kCamera) progress(arrival.index + 1);
+  }
+  for (const auto& writer : writers)
+    if (const auto done = writer->finish(); !done) return done;
+  return {};
+}
+
+void add_simulate_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "simulate", "Write a recording of a beating heart with its ground truth: real motion, real ECG, rendered images");
+  SimulationSettings& settings = options->settings;
+  command->add_option("OUT", options->out, "The recording to write (.mcap)")->required();
+  command
+      ->add_option("--seed", settings.seed, "Chooses texture, path, noise and part of the ECG; same seed, same bytes")
+      ->capture_default_str();
+  command->add_option("--duration", options->duration_s, "Length, s")->capture_default_str();
+  command->add_option("--size", options->size, "Image size WIDTHxHEIGHT, px")->capture_default_str();
+  command->add_option("--fps", settings.frames_per_s, "Camera frame rate, Hz")->capture_default_str();
+  command
+      ->add_option("--ecg", settings.ecg_record,
+                   "MIT-BIH record that drives the heart: " + ecg_record_names() +
+                       " (100 nearly regular, 105 noisy, 106 and 119 bigeminy, 123 slow)")
+      ->capture_default_str();
+  command->add_option("--ecg-start", options->ecg_start_s, "Where in the record to start, s [chosen by the seed]");
+  const std::map<std::string, MotionLaw> laws{
+      {"linear", MotionLaw::kLinear}, {"warped", MotionLaw::kWarped}, {"time-locked", MotionLaw::kTimeLocked}};
+  command
+      ->add_option_function<std::string>(
+          "--motion", [&settings, laws](const std::string& name) { settings.law = laws.at(name); },
+          "How motion runs between R peaks: linear, warped (systole keeps its length), time-locked (diastasis "
+          "stretches) [linear]")
+      ->check(CLI::IsMember({"linear", "warped", "time-locked"}));
+  command->add_option("--respiration", settings.respiration_mm, "Breathing displacement at full inspiration, mm")
+      ->capture_default_str();
+  command->add_option("--respiration-period", options->respiration_period_s, "Breathing period, s")
+      ->capture_default_str();
+  CLI::Option* noise =
+      command
+          ->add_option("--tracker-noise", options->tracker_noise_mm, "Tracker position noise, RMS of the 3-D norm, mm")
+          ->check(CLI::Range(0.0, 100.0))
+          ->capture_default_str();
+  command
+      ->add_option("--tracker-noises", options->tracker_noises_mm,
+                   "Several position noises, mm, from one rendering: OUT-0mm.mcap, OUT-1.4mm.mcap for 0,1.4")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 100.0))
+      ->excludes(noise);
+  command
+      ->add_option("--tracker-rotation-noise", options->tracker_rotation_noise_deg,
+                   "Tracker rotation noise, RMS of the 3-D norm, degrees [0.5, or 0 without position noise]")
+      ->check(CLI::Range(0.0, 45.0));
+  command->add_option("--tracker-rate", settings.tracker_rate_hz, "Tracker readings, Hz")->capture_default_str();
+  command
+      ->add_option("--tracker-dropouts", settings.tracker_dropouts_per_min,
+                   "Times a minute that the tracker loses the tool, for 50 to 300 ms")
+      ->capture_default_str();
+  command->add_option("--threads", options->threads, "Rendering threads; the result is the same [all processors]")
+      ->check(CLI::Range(1U, 256U));
+  command->add_flag("--force", options->force, "Overwrite OUT");
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace perimap

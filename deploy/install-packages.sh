@@ -1,0 +1,110 @@
+#!/bin/bash
+# Installs the Debian 12 packages that perimap needs, without questions, as root or through sudo.
+set -euo pipefail
+export LC_ALL=C.UTF-8
+
+usage() {
+  cat << 'END'
+deploy/install-packages.sh [--build|--test|--full] [--list]
+  --build  what perimap needs to be built and run (deploy/demo.sh)
+  --test   and what its tests need (tests/run.sh); this is the default
+  --full   and what tests/run.sh --full needs
+  --list   only names the packages
+When all of them are there already, it only says so.
+END
+}
+
+# package, or package=command where another source of that command will do
+build=(
+  cmake ninja-build g++
+  libeigen3-dev                              # core: linear algebra
+  libexpected-dev                            # core: Expected<T>
+  libboost-dev                               # core/realtime: lock-free rings
+  libopencv-core-dev libopencv-imgproc-dev   # core/vision
+  cyclonedds-dev cyclonedds-tools            # idl, daemon: DDS and its IDL compiler
+  libfmt-dev
+  libzstd-dev zlib1g-dev                     # drivers: recordings, simulator data
+  libyaml-cpp-dev                            # drivers: calibration files
+  libtomlplusplus-dev libcli11-dev libspdlog-dev nlohmann-json3-dev  # daemon
+)
+tests=(
+  libgtest-dev libgmock-dev
+  nodejs=node npm=npm ca-certificates        # recordings are read back by the official npm packages
+)
+full=(
+  clang-16 libclang-rt-16-dev                # fuzzing
+  clang-tidy clang-format
+)
+
+wanted=test
+list=no
+for argument in "$@"; do
+  case $argument in
+    --build | --test | --full) wanted=${argument#--} ;;
+    --list) list=yes ;;
+    -h | --help)
+      usage
+      exit 0
+      ;;
+    *)
+      echo "install-packages.sh: unknown option $argument" >&2
+      usage >&2
+      exit 2
+      ;;
+  esac
+done
+
+packages=("${build[@]}")
+if [ "$wanted" != build ]; then packages+=("${tests[@]}"); fi
+if [ "$wanted" = full ]; then packages+=("${full[@]}"); fi
+
+if [ "$list" = yes ]; then
+  printf '%s\n' "${packages[@]%%=*}"
+  exit 0
+fi
+
+if ! command -v apt-get > /dev/null || ! command -v dpkg-query > /dev/null; then
+  echo "install-packages.sh: this system has no apt-get; needed are: ${packages[*]%%=*}" >&2
+  exit 1
+fi
+
+missing=()
+for entry in "${packages[@]}"; do
+  package=${entry%%=*}
+  case $entry in
+    *=*) if command -v "${entry#*=}" > /dev/null; then continue; fi ;;
+  esac
+  if [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2> /dev/null)" != installed ]; then missing+=("$package"); fi
+done
+
+if [ ${#missing[@]} -eq 0 ]; then
+  echo "Packages: all ${#packages[@]} are there."
+  exit 0
+fi
+
+as_root=(env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8)
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo > /dev/null; then
+    echo "install-packages.sh: neither root nor sudo; let root run: apt-get install ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo "${as_root[@]}")
+fi
+
+# Recommended packages would double the download. Another apt may hold the lock for a while (unattended upgrades).
+options=(-q -y -o Acquire::Retries=3 -o DPkg::Lock::Timeout=300 -o Dpkg::Use-Pty=0)
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+run() {
+  if ! "${as_root[@]}" apt-get "${options[@]}" "$@" > "$log" 2>&1 < /dev/null; then
+    tail -n 30 "$log" >&2
+    echo "install-packages.sh: apt-get $1 failed" >&2
+    exit 1
+  fi
+}
+
+started=$SECONDS
+echo "Packages: installing ${#missing[@]} of ${#packages[@]} and what they depend on: ${missing[*]}"
+run update
+run install --no-install-recommends "${missing[@]}"
+echo "Packages: installed in $((SECONDS - started)) s."

@@ -1,0 +1,19 @@
+// The simulator's data files (drivers/simulator/data), linked into the program.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace perimap {
+
+struct EmbeddedEcgRecord {
+  std::string_view name;                      // MIT-BIH record, such as "100"
+  std::span<const unsigned char> samples_gz;  // gzip of int16 little-endian, 200 a mV, 360 Hz
+  std::string_view beats_csv;                 // time_s,symbol,sample
+};
+
+[[nodiscard]] std::string_view embedded_epicardium_fourier_csv() noexcept;
+[[nodiscard]] std::string_view embedded_epicardium_faces_csv() noexcept;
+[[nodiscard]] std::span<const EmbeddedEcgRecord> embedded_ecg_records() noexcept;
+
+}  // namespace perimap

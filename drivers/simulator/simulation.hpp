@@ -1,0 +1,116 @@
+// A whole simulated session: a heart that beats to a real ECG, a hand-held scope, a pose tracker, and when each of
+// their data would have arrived. Everything is a function of the settings; nothing depends on time, threads or order of
+// calls.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/error/expected.hpp"
+#include "core/sensors/ecg_block.hpp"
+#include "core/sensors/frame_stamp.hpp"
+#include "core/sensors/tracker_sample.hpp"
+#include "core/time/instant.hpp"
+#include "drivers/simulator/ground_truth.hpp"
+#include "drivers/simulator/lens.hpp"
+#include "drivers/simulator/parallel_for.hpp"
+#include "drivers/simulator/scene_renderer.hpp"
+#include "drivers/simulator/tissue_texture.hpp"
+
+namespace perimap {
+
+struct SimulationSettings {
+  std::uint64_t seed = 1;
+  Duration duration = std::chrono::seconds(60);
+  int width = 640;   // px
+  int height = 480;  // px
+  double frames_per_s = 30.0;
+  std::string ecg_record = "100";
+  std::optional<Duration> ecg_start;  // of the session, from the record's start; chosen by the seed when not given
+  MotionLaw law = MotionLaw::kLinear;
+  double respiration_mm = 0.0;
+  Duration respiration_period = std::chrono::seconds(4);
+  double tracker_rate_hz = 100.0;
+  double tracker_dropouts_per_min = 3.0;
+};
+
+// White, per reading. Norms in three dimensions: the standard deviation of one axis is 1 / sqrt(3) of them.
+struct TrackerNoise {
+  double position_rms_mm = 0.0;
+  double rotation_rms_rad = 0.0;
+};
+
+class Simulation {
+ public:
+  struct Frame {
+    FrameStamp stamp;
+    Pose X_WC;
+  };
+
+  enum class Source : std::uint8_t { kCamera, kTracker, kEcg };
+  struct Arrival {
+    Instant arrival;
+    Source source;
+    std::uint32_t index;  // into frames(), of tracker_sample(), into ecg()
+  };
+
+  // Errors name the setting that is out of range, in words of the command line.
+  [[nodiscard]] static Expected<Simulation> create(const SimulationSettings& settings,
+                                                   const ParallelFor& parallel_for = serial_for);
+
+  Simulation(Simulation&&) noexcept = default;
+  Simulation& operator=(Simulation&&) = delete;
+  Simulation(const Simulation&) = delete;
+  Simulation& operator=(const Simulation&) = delete;
+  ~Simulation() = default;
+
+  [[nodiscard]] const SimulationSettings& settings() const noexcept { return settings_; }
+  [[nodiscard]] Instant start() const noexcept { return start_; }
+  // Stands for the recording's fixed epoch; the same for every recording, since nothing may depend on today.
+  [[nodiscard]] std::int64_t utc_minus_monotonic_ns() const noexcept;
+  [[nodiscard]] const Lens& lens() const noexcept { return lens_; }
+  // Camera frame C in the tracked sensor's frame S.
+  [[nodiscard]] const Pose& hand_eye_X_SC() const noexcept { return X_SC_; }
+  [[nodiscard]] const GroundTruth& truth() const noexcept { return truth_; }
+
+  // Everything that arrives, in order of arrival; the order within a source is the order of its own stamps.
+  [[nodiscard]] std::span<const Arrival> arrivals() const noexcept { return arrivals_; }
+  [[nodiscard]] std::span<const Frame> frames() const noexcept { return frames_; }
+  [[nodiscard]] std::span<const EcgBlock> ecg() const noexcept { return ecg_; }
+  [[nodiscard]] std::size_t tracker_sample_count() const noexcept { return tracker_stamps_.size(); }
+  // A reading with this much noise; the same draw for any amount, so recordings of one rendering differ in scale alone.
+  // While the tool is missing the pose is not a number.
+  [[nodiscard]] TrackerSample tracker_sample(std::size_t index, const TrackerNoise& noise) const noexcept;
+
+  // Renders frames()[index] into width * height bytes. Safe from several threads, each with its own workspace.
+  void render(std::size_t index, RenderWorkspace& workspace, std::span<std::uint8_t> image) const;
+
+ private:
+  struct TrackerStamp {
+    Instant source_time;
+    Instant arrival;
+    bool missing = false;
+    Pose X_WS;  // true
+  };
+
+  Simulation(SimulationSettings settings, Instant start, GroundTruth truth, Lens lens, Vector3d surface_W);
+
+  SimulationSettings settings_;
+  Instant start_;
+  GroundTruth truth_;
+  Lens lens_;
+  Pose X_SC_;
+  Vector3d surface_W_;  // the point about which the scope moves; exposure is right there
+  std::unique_ptr<const TissueTexture> texture_;
+  std::unique_ptr<const SceneRenderer> renderer_;
+  std::vector<Frame> frames_;
+  std::vector<TrackerStamp> tracker_stamps_;
+  std::vector<EcgBlock> ecg_;
+  std::vector<Arrival> arrivals_;
+};
+
+}  // namespace perimap

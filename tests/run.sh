@@ -1,0 +1,143 @@
+#!/bin/bash
+# Builds perimap and runs its tests.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+
+usage() {
+  cat << 'END'
+tests/run.sh [--full] [--jobs N]
+  Installs the packages, builds the presets dev and asan, runs their tests. 15 minutes on two cores at most.
+  --full    also ThreadSanitizer, the tests labelled `long`, a minute of each fuzz target, format and clang-tidy
+  --jobs N  parallel compilations; all processors when not given
+Exit code 0 when everything passed, 1 when something failed, 2 for a wrong command line. Logs: build/logs/.
+END
+}
+
+full=no
+jobs=$(nproc)
+while [ $# -gt 0 ]; do
+  case $1 in
+    --full) full=yes ;;
+    --jobs)
+      jobs=${2:-}
+      shift
+      ;;
+    --jobs=*) jobs=${1#--jobs=} ;;
+    -h | --help)
+      usage
+      exit 0
+      ;;
+    *)
+      echo "run.sh: unknown option $1" >&2
+      usage >&2
+      exit 2
+      ;;
+  esac
+  shift
+done
+if ! [[ $jobs =~ ^[1-9][0-9]*$ ]]; then
+  echo "run.sh: --jobs needs a positive number" >&2
+  exit 2
+fi
+
+logs=build/logs
+mkdir -p "$logs"
+running=
+failures=()
+
+elapsed() { printf '%2d:%02d' $((SECONDS / 60)) $((SECONDS % 60)); }
+say() { printf '[%s] %s\n' "$(elapsed)" "$*"; }
+
+# timeout(1) makes a process group of its own and passes the signal on to all of it.
+stop() {
+  trap - INT TERM
+  if [ -n "$running" ]; then kill -TERM "$running" 2> /dev/null && wait "$running"; fi
+  say "Stopped."
+  exit 130
+}
+trap stop INT TERM
+
+# step NAME LIMIT COMMAND...: runs the command with its output in a log; tells every 20 s how far it is.
+step() {
+  local name=$1 limit=$2
+  shift 2
+  local log=$logs/${name//[^a-zA-Z0-9]/-}.log
+  local began=$SECONDS told=$SECONDS
+  say "$name ..."
+  timeout --kill-after=10 "$limit" "$@" > "$log" 2>&1 < /dev/null &
+  running=$!
+  while kill -0 "$running" 2> /dev/null; do
+    sleep 0.2
+    if [ $((SECONDS - told)) -ge 20 ]; then
+      told=$SECONDS
+      # The progress that ninja and ctest print: "[12/340] ..." and "12/340 Test ...".
+      say "$name: $(grep -aoE '^ *\[?[0-9]+/[0-9]+\]?' "$log" | tail -n 1 | tr -d '[] ')"
+    fi
+  done
+  wait "$running"
+  local status=$?
+  running=
+  if [ $status -eq 0 ]; then
+    say "$name: passed in $((SECONDS - began)) s"
+    return 0
+  fi
+  if [ $status -eq 124 ] || [ $status -eq 137 ]; then echo "(stopped after its limit of $limit)" >> "$log"; fi
+  failures+=("$name")
+  say "$name: FAILED after $((SECONDS - began)) s; the end of $log:"
+  tail -n 60 "$log"
+  return 1
+}
+
+launcher=()
+if command -v ccache > /dev/null; then
+  launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+fi
+
+build() { # PRESET
+  step "$1 configure" 5m cmake --preset "$1" "${launcher[@]}" && step "$1 build" 40m cmake --build --preset "$1" -j "$jobs"
+}
+
+run_tests() { # NAME PRESET CTEST_OPTION...
+  local name=$1 preset=$2
+  shift 2
+  step "$name" 60m ctest --preset "$preset" -j "$jobs" --timeout 300 --no-tests=error "$@"
+  grep -a -A 100 '^The following tests FAILED' "$logs/${name//[^a-zA-Z0-9]/-}.log"
+  grep -a 'tests passed' "$logs/${name//[^a-zA-Z0-9]/-}.log"
+}
+
+fuzz_smoke() {
+  local target
+  for target in build/fuzz/tests/fuzz/fuzz_*; do
+    if [ -f "$target" ] && [ -x "$target" ]; then
+      step "fuzz $(basename "$target")" 3m "$target" -max_total_time=60 -timeout=10 -rss_limit_mb=2048 \
+        -artifact_prefix="$logs/"
+    fi
+  done
+}
+
+lint() {
+  step "format" 5m bash -c \
+    "find core drivers daemon tests -name '*.cpp' -o -name '*.hpp' -o -name '*.c' | xargs clang-format --dry-run -Werror"
+  step "clang-tidy" 180m run-clang-tidy-14 -quiet -p build/dev -j "$jobs" "^$PWD/(core|drivers|daemon)/"
+}
+
+packages=--test
+if [ $full = yes ]; then packages=--full; fi
+deploy/install-packages.sh $packages || exit 1
+
+if build dev; then run_tests "dev tests" dev -LE long; fi
+if build asan; then run_tests "asan tests" asan -LE long; fi
+if [ $full = yes ]; then
+  if build tsan; then run_tests "tsan tests" tsan -LE long; fi
+  run_tests "long tests" dev -L long
+  if build fuzz; then fuzz_smoke; fi
+  lint
+fi
+
+echo
+if [ ${#failures[@]} -eq 0 ]; then
+  say "ALL PASSED"
+  exit 0
+fi
+say "FAILED: $(printf '%s; ' "${failures[@]}")"
+exit 1

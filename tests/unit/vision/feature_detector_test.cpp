@@ -1,0 +1,116 @@
+#include "core/vision/feature_detector.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/vision/synthetic_scene.hpp"
+
+namespace perimap {
+namespace {
+
+using test::ImageBuffer;
+using test::render;
+using test::Texture;
+using test::View;
+
+constexpr int kWidth = 321, kHeight = 241;
+
+ImageBuffer textured() {
+  std::mt19937 random(2);
+  return render(Texture(3), View{}, kWidth, kHeight, 2, random, 5);
+}
+
+void darken_outside_circle(ImageBuffer& image, double u, double v, double radius) {
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      if (std::hypot(x - u, y - v) > radius) image.at(x, y) = static_cast<std::uint8_t>(3 + (x * 7 + y * 3) % 5);
+    }
+  }
+}
+
+std::vector<Vector2d> found_in(const ImageBuffer& image, std::span<const Vector2d> occupied, int how_many) {
+  const auto found = find_features(image.view(), occupied, DetectorSettings{}, how_many);
+  EXPECT_TRUE(found.has_value());
+  return found.value_or(std::vector<Vector2d>{});
+}
+
+TEST(FeatureDetector, SpreadsFeaturesOverTheFrame) {
+  const std::vector<Vector2d> found = found_in(textured(), {}, 36);
+  ASSERT_GE(found.size(), 30U);
+  int quadrants[4] = {};
+  for (const Vector2d& px : found) ++quadrants[(px.x() > kWidth / 2 ? 1 : 0) + (px.y() > kHeight / 2 ? 2 : 0)];
+  for (int count : quadrants) EXPECT_GE(count, 5);
+}
+
+TEST(FeatureDetector, KeepsItsDistanceFromBorderFeaturesAndOccupiedPlaces) {
+  const ImageBuffer image = textured();
+  const std::vector<Vector2d> occupied = found_in(image, {}, 20);
+  const std::vector<Vector2d> found = found_in(image, occupied, 60);
+  ASSERT_FALSE(found.empty());
+  const DetectorSettings settings;
+  std::vector<Vector2d> all = occupied;
+  for (const Vector2d& px : found) {
+    EXPECT_GE(px.x(), settings.border_px);
+    EXPECT_GE(px.y(), settings.border_px);
+    EXPECT_LT(px.x(), kWidth - settings.border_px);
+    EXPECT_LT(px.y(), kHeight - settings.border_px);
+    for (const Vector2d& other : all) EXPECT_GE((px - other).norm(), settings.min_distance_px);
+    all.push_back(px);
+  }
+}
+
+TEST(FeatureDetector, GivesNoMoreThanAskedFor) {
+  const ImageBuffer image = textured();
+  EXPECT_EQ(found_in(image, {}, 7).size(), 7U);
+  EXPECT_TRUE(found_in(image, {}, 0).empty());
+  EXPECT_TRUE(found_in(image, {}, -3).empty());
+}
+
+TEST(FeatureDetector, StaysAwayFromTheDarkRimAndItsSilhouette) {
+  ImageBuffer image = textured();
+  darken_outside_circle(image, 160, 120, 100);
+  const std::vector<Vector2d> found = found_in(image, {}, 100);
+  ASSERT_FALSE(found.empty());
+  for (const Vector2d& px : found) EXPECT_LT((px - Vector2d(160, 120)).norm(), 100 - 12);
+}
+
+TEST(FeatureDetector, StaysAwayFromHighlights) {
+  ImageBuffer image = textured();
+  for (int y = 100; y < 130; ++y) {
+    for (int x = 140; x < 170; ++x) image.at(x, y) = 255;
+  }
+  const std::vector<Vector2d> found = found_in(image, {}, 200);
+  ASSERT_FALSE(found.empty());
+  for (const Vector2d& px : found) {
+    const double dx = std::max({140 - px.x(), px.x() - 169, 0.0}), dy = std::max({100 - px.y(), px.y() - 129, 0.0});
+    EXPECT_GT(std::hypot(dx, dy), DetectorSettings{}.highlight_clearance_px - 1);
+  }
+}
+
+TEST(FeatureDetector, FindsNothingOnFlatOrBlackFrames) {
+  std::mt19937 random(2);
+  EXPECT_TRUE(found_in(render(Texture(3, 0), View{}, kWidth, kHeight, 2, random), {}, 50).empty());
+  EXPECT_TRUE(found_in(ImageBuffer(kWidth, kHeight), {}, 50).empty());
+  EXPECT_TRUE(found_in(ImageBuffer(1, 1), {}, 50).empty());
+  EXPECT_TRUE(found_in(ImageBuffer(640, 2), {}, 50).empty());
+}
+
+TEST(FeatureDetector, GivesTheSameListEachTime) {
+  const ImageBuffer image = textured();
+  EXPECT_EQ(found_in(image, {}, 40), found_in(image, {}, 40));
+}
+
+TEST(FeatureDetector, SaysWhatItCannotUse) {
+  EXPECT_FALSE(find_features(GreyImage{}, {}, DetectorSettings{}, 5).has_value());
+  const ImageBuffer image(64, 64);
+  GreyImage narrow = image.view();
+  narrow.stride = 10;
+  EXPECT_FALSE(find_features(narrow, {}, DetectorSettings{}, 5).has_value());
+  DetectorSettings settings;
+  settings.tile_px = 0;
+  const auto refused = find_features(image.view(), {}, settings, 5);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_NE(refused.error().message.find("tile_px"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace perimap
