@@ -16,7 +16,7 @@
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/dds_publication.hpp"
-#include "daemon/publishing/sample_recorder.hpp"
+#include "daemon/publishing/publication_recorder.hpp"
 #include "daemon/report/accuracy.hpp"
 #include "daemon/report/accuracy_text.hpp"
 #include "daemon/report/recorded_truth.hpp"
@@ -45,7 +45,7 @@ struct Options {
 // Takes what is published to the accuracy report, to the file of samples and to DDS, whichever are there.
 class ReplayPublication final : public Publication {
  public:
-  ReplayPublication(const RecordedTruth* truth, SampleRecorder* recorder, Publication* dds) noexcept
+  ReplayPublication(const RecordedTruth* truth, PublicationRecorder* recorder, Publication* dds) noexcept
       : recorder_(recorder), dds_(dds), truth_(truth) {
     if (truth != nullptr) accuracy_.emplace(truth->truth, truth->camera, truth->captures.begin()->second);
   }
@@ -80,7 +80,7 @@ class ReplayPublication final : public Publication {
   }
 
  private:
-  SampleRecorder* recorder_;
+  PublicationRecorder* recorder_;
   Publication* dds_;
   const RecordedTruth* truth_;
   std::optional<Accuracy> accuracy_;
@@ -179,10 +179,11 @@ int replay(const Options& options) {
   if (!truth) return refuse(truth.error(), kFailure);
 
   const Logging logging(setup->configuration.log.level);
-  std::unique_ptr<SampleRecorder> recorder;
+  std::unique_ptr<PublicationRecorder> recorder;
   if (!options.samples.empty()) {
     auto created =
-        SampleRecorder::create(options.samples, static_cast<std::size_t>(setup->pipeline.features.maximum));
+        PublicationRecorder::create(options.samples, "perimap replay " PERIMAP_VERSION,
+                                    static_cast<std::size_t>(setup->pipeline.features.maximum));
     if (!created) return refuse(created.error(), kFailure);
     recorder = std::move(*created);
   }

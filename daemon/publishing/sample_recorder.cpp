@@ -1,8 +1,5 @@
 #include "daemon/publishing/sample_recorder.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <utility>
 
 #include "drivers/recording/channels.hpp"
@@ -10,84 +7,62 @@
 namespace perimap {
 namespace {
 
-constexpr std::size_t kBuffers = 256;  // over two seconds at 100 samples/s
+std::uint32_t short_sequence(std::uint64_t sequence) { return static_cast<std::uint32_t>(sequence); }
 
 }  // namespace
 
-Expected<std::unique_ptr<SampleRecorder>> SampleRecorder::create(const std::string& path,
-                                                                 std::size_t maximum_features) {
-  auto writer = RecordingWriter::create(path);
-  if (!writer) return tl::unexpected(writer.error());
-  const auto surface = writer->add_channel<perimap_Surface>(channels::kSurface);
-  if (!surface) return tl::unexpected(surface.error());
-  const auto model = writer->add_channel<perimap_SurfaceModel>(channels::kSurfaceModel);
-  if (!model) return tl::unexpected(model.error());
-  const auto phase = writer->add_channel<perimap_Phase>(channels::kPhase);
-  if (!phase) return tl::unexpected(phase.error());
-  return std::unique_ptr<SampleRecorder>(
-      new SampleRecorder(std::move(*writer), *surface, *model, *phase, maximum_features));
-}
-
-SampleRecorder::SampleRecorder(RecordingWriter writer, ChannelId surface, ChannelId model, ChannelId phase,
-                               std::size_t maximum_features)
-    : writer_(std::move(writer)),
-      surface_(surface),
-      model_(model),
-      phase_(phase),
-      buffers_(kBuffers),
-      free_(kBuffers),
-      filled_(kBuffers) {
-  for (std::size_t i = 0; i < buffers_.size(); ++i) {
-    buffers_[i].features.resize(maximum_features);
-    static_cast<void>(free_.push(i));
+Expected<SampleRecorder> SampleRecorder::create(const std::filesystem::path& file, std::string generator) {
+  Expected<RecordingWriter> writer = RecordingWriter::create(file.string());
+  if (!writer) {
+    return tl::unexpected(writer.error());
   }
-}
-
-void SampleRecorder::surface(const perimap_Surface& sample) {
-  std::size_t i = 0;
-  if (!free_.pop(i)) {
-    ++not_recorded_;
-    return;
+  SampleRecorder recorder(std::move(*writer), std::move(generator));
+  const auto keep = [](ChannelId& place) { return [&place](ChannelId id) { place = id; }; };
+  const Expected<void> results[] = {
+      recorder.writer_.add_channel<perimap_RecordingInfo>(channels::kRecordingInfo).map(keep(recorder.info_)),
+      recorder.writer_.add_channel<perimap_Surface>(channels::kSurface).map(keep(recorder.surface_)),
+      recorder.writer_.add_channel<perimap_SurfaceModel>(channels::kSurfaceModel).map(keep(recorder.model_)),
+      recorder.writer_.add_channel<perimap_Phase>(channels::kPhase).map(keep(recorder.phase_)),
+      recorder.writer_.add_channel<perimap_Status>(channels::kStatus).map(keep(recorder.status_))};
+  for (const Expected<void>& result : results) {
+    if (!result) {
+      return tl::unexpected(result.error());
+    }
   }
-  Buffer& buffer = buffers_[i];
-  buffer.sample = sample;
-  std::copy_n(sample.features._buffer, sample.features._length, buffer.features.begin());
-  buffer.sample.features._buffer = buffer.features.data();
-  static_cast<void>(filled_.push(i));
+  return recorder;
 }
 
-void SampleRecorder::surface_model(const perimap_SurfaceModel& model) {
-  drain();
-  const Instant time = from_ns(model.time_ns);
-  keep_first_error(writer_.write(model_, model, time, time, static_cast<std::uint32_t>(model.sample_sequence)));
+Expected<void> SampleRecorder::write_info(const perimap_Surface& surface, Instant receipt) {
+  std::string description = "published samples";
+  std::string world_frame = surface.frame_id;
+  perimap_RecordingInfo info{};
+  info.generator = generator_.data();
+  info.description = description.data();
+  info.utc_minus_monotonic_ns = surface.release_utc_ns - surface.release_time_ns;
+  info.world_frame_id = world_frame.data();
+  return writer_.write(info_, info, receipt, receipt, 0);
 }
 
-void SampleRecorder::phase(const perimap_Phase& phase) {
-  drain();
-  const Instant time = from_ns(phase.time_ns);
-  keep_first_error(writer_.write(phase_, phase, time, time, static_cast<std::uint32_t>(phase.sample_sequence)));
-}
-
-void SampleRecorder::drain() {
-  std::size_t i = 0;
-  while (filled_.pop(i)) {
-    const perimap_Surface& sample = buffers_[i].sample;
-    keep_first_error(writer_.write(surface_, sample, from_ns(sample.release_time_ns), from_ns(sample.capture_time_ns),
-                                   static_cast<std::uint32_t>(sample.sample_sequence)));
-    static_cast<void>(free_.push(i));
+Expected<void> SampleRecorder::write(const perimap_Surface& surface, Instant receipt) {
+  if (!std::exchange(info_written_, true)) {
+    if (auto written = write_info(surface, receipt); !written) {
+      return written;
+    }
   }
+  return writer_.write(surface_, surface, receipt, from_ns(surface.release_time_ns),
+                       short_sequence(surface.sample_sequence));
 }
 
-Expected<void> SampleRecorder::finish() {
-  drain();
-  keep_first_error(writer_.finish());
-  if (!first_error_) return first_error_;
-  if (not_recorded_ > 0) return fail(fmt::format("{} samples were published but not recorded", not_recorded_));
-  return {};
+Expected<void> SampleRecorder::write(const perimap_SurfaceModel& model, Instant receipt) {
+  return writer_.write(model_, model, receipt, from_ns(model.time_ns), short_sequence(model.sample_sequence));
 }
 
-void SampleRecorder::keep_first_error(const Expected<void>& written) {
-  if (first_error_ && !written) first_error_ = written;
+Expected<void> SampleRecorder::write(const perimap_Phase& phase, Instant receipt) {
+  return writer_.write(phase_, phase, receipt, from_ns(phase.time_ns), short_sequence(phase.sample_sequence));
+}
+
+Expected<void> SampleRecorder::write(const perimap_Status& status, Instant receipt) {
+  return writer_.write(status_, status, receipt, from_ns(status.time_ns), short_sequence(status.sample_sequence));
 }
 
 }  // namespace perimap

@@ -1,55 +1,44 @@
-// Writes what is published into a recording, off the publisher thread.
+// Received samples into a recording.
 #pragma once
 
-#include <memory>
+#include <perimap.h>
+
+#include <filesystem>
 #include <string>
-#include <vector>
 
 #include "core/error/expected.hpp"
-#include "core/realtime/spsc_ring.hpp"
-#include "daemon/publishing/publication.hpp"
+#include "core/time/instant.hpp"
 #include "drivers/recording/recording_writer.hpp"
 
 namespace perimap {
 
-// surface() copies into a free one of a fixed set of buffers; drain() writes them and belongs, like the other
-// topics, to the status thread. Status messages are not recorded: they tell of the machine, not of the heart, and would
-// differ from run to run.
-class SampleRecorder final : public Publication {
+// Log time is the receipt, publish time the sample's own: release_time_ns of a surface, time_ns of the others.
+class SampleRecorder {
  public:
-  [[nodiscard]] static Expected<std::unique_ptr<SampleRecorder>> create(const std::string& path,
-                                                                        std::size_t maximum_features);
+  // `generator` names the program and its version in the recording.
+  [[nodiscard]] static Expected<SampleRecorder> create(const std::filesystem::path& file, std::string generator);
 
-  void surface(const perimap_Surface& sample) override;
-  void surface_model(const perimap_SurfaceModel& model) override;
-  void phase(const perimap_Phase& phase) override;
-  void status(const perimap_Status& /*status*/) override {}
-
-  // Writes the surfaces taken so far.
-  void drain();
-
-  // Writes the rest and ends the file. An error of this or any earlier write, or samples that found no free buffer.
-  [[nodiscard]] Expected<void> finish();
+  [[nodiscard]] Expected<void> write(const perimap_Surface& surface, Instant receipt);
+  [[nodiscard]] Expected<void> write(const perimap_SurfaceModel& model, Instant receipt);
+  [[nodiscard]] Expected<void> write(const perimap_Phase& phase, Instant receipt);
+  [[nodiscard]] Expected<void> write(const perimap_Status& status, Instant receipt);
+  [[nodiscard]] Expected<void> finish() { return writer_.finish(); }
 
  private:
-  struct Buffer {
-    perimap_Surface sample{};
-    std::vector<perimap_SurfaceFeature> features;
-  };
+  SampleRecorder(RecordingWriter writer, std::string generator)
+      : writer_(std::move(writer)), generator_(std::move(generator)) {}
 
-  SampleRecorder(RecordingWriter writer, ChannelId surface, ChannelId model, ChannelId phase,
-                 std::size_t maximum_features);
-  void keep_first_error(const Expected<void>& written);
+  // The facts of the recording, known with the first surface.
+  [[nodiscard]] Expected<void> write_info(const perimap_Surface& surface, Instant receipt);
 
   RecordingWriter writer_;
+  std::string generator_;
+  bool info_written_ = false;
+  ChannelId info_;
   ChannelId surface_;
   ChannelId model_;
   ChannelId phase_;
-  std::vector<Buffer> buffers_;
-  SpscRing<std::size_t> free_;
-  SpscRing<std::size_t> filled_;
-  std::uint64_t not_recorded_ = 0;  // the publisher's own; read after it has ended
-  Expected<void> first_error_;
+  ChannelId status_;
 };
 
 }  // namespace perimap

@@ -1,0 +1,101 @@
+#include "daemon/commands/report.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "daemon/report/accuracy_picture.hpp"
+#include "daemon/report/accuracy_text.hpp"
+#include "daemon/report/samples_report.hpp"
+
+namespace perimap {
+namespace {
+
+struct Options {
+  std::string recording;
+  std::string samples;
+  std::string picture;
+  std::string json;
+  bool whole = false;
+};
+
+double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
+
+std::string figures_text(const DurationFigures& figures) {
+  return fmt::format("{:.2f} / {:.2f} / {:.2f} ms", milliseconds(figures.p50), milliseconds(figures.p99),
+                     milliseconds(figures.max));
+}
+
+nlohmann::json figures_json(const DurationFigures& figures) {
+  return {{"p50_ms", milliseconds(figures.p50)},
+          {"p99_ms", milliseconds(figures.p99)},
+          {"max_ms", milliseconds(figures.max)}};
+}
+
+int refuse(const std::string& message) {
+  fmt::print(stderr, "perimap report: {}\n", message);
+  return 1;
+}
+
+bool write_file(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  return static_cast<bool>(file.flush());
+}
+
+int report(const Options& options) {
+  const auto result =
+      report_samples(options.recording, options.samples, options.whole ? ReadMode::kWhole : ReadMode::kStrict);
+  if (!result) return refuse(result.error().message);
+  fmt::print(
+      "samples     {} received, {} missed, {} without frame, {} from a late update\n"
+      "latency     capture to receipt p50 / p99 / max {}\n"
+      "release     receipt after its deadline {}, jitter {}\n"
+      "{}\n",
+      result->samples, result->missed, result->without_frame, result->from_late_update,
+      figures_text(result->capture_to_receipt), figures_text(result->release_to_receipt), figures_text(result->jitter),
+      to_text(result->accuracy));
+  if (!options.picture.empty()) {
+    if (!write_file(options.picture, to_svg(result->accuracy, options.recording))) {
+      return refuse(options.picture + ": cannot be written");
+    }
+    fmt::print("picture     {}\n", options.picture);
+  }
+  if (!options.json.empty()) {
+    const nlohmann::json json = {{"recording", options.recording},
+                                 {"samples",
+                                  {{"received", result->samples},
+                                   {"missed", result->missed},
+                                   {"without_frame", result->without_frame},
+                                   {"from_late_update", result->from_late_update}}},
+                                 {"capture_to_receipt", figures_json(result->capture_to_receipt)},
+                                 {"release_to_receipt", figures_json(result->release_to_receipt)},
+                                 {"jitter", figures_json(result->jitter)},
+                                 {"accuracy", to_json(result->accuracy)}};
+    if (!write_file(options.json, json.dump(2) + "\n")) return refuse(options.json + ": cannot be written");
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_report_command(CLI::App& app, int& exit_code) {
+  auto* command =
+      app.add_subcommand("report", "Compare received samples with the truth of the simulated recording they are of");
+  auto options = std::make_shared<Options>();
+  command->add_option("RECORDING", options->recording, "The simulated recording (MCAP)")->required();
+  command->add_option("--samples", options->samples, "What was received (perimap watch --record, replay --samples)")
+      ->required();
+  command->add_option("--picture", options->picture, "Write motion paths and error over time to this SVG file");
+  command->add_option("--json", options->json, "Write the report as JSON to this file");
+  command->add_flag("--whole", options->whole, "Use what is whole of damaged files");
+  command->callback([options, &exit_code] { exit_code = report(*options); });
+}
+
+}  // namespace perimap

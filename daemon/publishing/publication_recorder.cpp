@@ -1,0 +1,75 @@
+#include "daemon/publishing/publication_recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace perimap {
+namespace {
+
+constexpr std::size_t kBuffers = 256;  // over two seconds at 100 samples/s
+
+}  // namespace
+
+Expected<std::unique_ptr<PublicationRecorder>> PublicationRecorder::create(const std::string& path,
+                                                                           std::string generator,
+                                                                           std::size_t maximum_features) {
+  auto recorder = SampleRecorder::create(path, std::move(generator));
+  if (!recorder) return tl::unexpected(recorder.error());
+  return std::unique_ptr<PublicationRecorder>(new PublicationRecorder(std::move(*recorder), maximum_features));
+}
+
+PublicationRecorder::PublicationRecorder(SampleRecorder recorder, std::size_t maximum_features)
+    : recorder_(std::move(recorder)), buffers_(kBuffers), free_(kBuffers), filled_(kBuffers) {
+  for (std::size_t i = 0; i < buffers_.size(); ++i) {
+    buffers_[i].features.resize(maximum_features);
+    static_cast<void>(free_.push(i));
+  }
+}
+
+void PublicationRecorder::surface(const perimap_Surface& sample) {
+  std::size_t i = 0;
+  if (!free_.pop(i)) {
+    ++not_recorded_;
+    return;
+  }
+  Buffer& buffer = buffers_[i];
+  buffer.sample = sample;
+  std::copy_n(sample.features._buffer, sample.features._length, buffer.features.begin());
+  buffer.sample.features._buffer = buffer.features.data();
+  static_cast<void>(filled_.push(i));
+}
+
+void PublicationRecorder::surface_model(const perimap_SurfaceModel& model) {
+  drain();
+  keep_first_error(recorder_.write(model, from_ns(model.time_ns)));
+}
+
+void PublicationRecorder::phase(const perimap_Phase& phase) {
+  drain();
+  keep_first_error(recorder_.write(phase, from_ns(phase.time_ns)));
+}
+
+void PublicationRecorder::drain() {
+  std::size_t i = 0;
+  while (filled_.pop(i)) {
+    const perimap_Surface& sample = buffers_[i].sample;
+    keep_first_error(recorder_.write(sample, from_ns(sample.release_time_ns)));
+    static_cast<void>(free_.push(i));
+  }
+}
+
+Expected<void> PublicationRecorder::finish() {
+  drain();
+  keep_first_error(recorder_.finish());
+  if (!first_error_) return first_error_;
+  if (not_recorded_ > 0) return fail(fmt::format("{} samples were published but not recorded", not_recorded_));
+  return {};
+}
+
+void PublicationRecorder::keep_first_error(const Expected<void>& written) {
+  if (first_error_ && !written) first_error_ = written;
+}
+
+}  // namespace perimap

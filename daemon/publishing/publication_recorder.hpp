@@ -1,0 +1,54 @@
+// Writes what is published into a recording, off the publisher thread.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/error/expected.hpp"
+#include "core/realtime/spsc_ring.hpp"
+#include "daemon/publishing/publication.hpp"
+#include "daemon/publishing/sample_recorder.hpp"
+
+namespace perimap {
+
+// surface() copies into a free one of a fixed set of buffers; the other topics and drain() belong to the status thread
+// and write. Status messages are not recorded: they tell of the machine, not of the heart, and would differ from run to
+// run of the same recording.
+class PublicationRecorder final : public Publication {
+ public:
+  // `generator` names the program and its version in the recording.
+  [[nodiscard]] static Expected<std::unique_ptr<PublicationRecorder>> create(const std::string& path,
+                                                                             std::string generator,
+                                                                             std::size_t maximum_features);
+
+  void surface(const perimap_Surface& sample) override;
+  void surface_model(const perimap_SurfaceModel& model) override;
+  void phase(const perimap_Phase& phase) override;
+  void status(const perimap_Status& /*status*/) override { drain(); }
+
+  // Writes the surfaces taken so far.
+  void drain();
+
+  // Writes the rest and ends the file. An error of this or any earlier write, or samples that found no free buffer.
+  [[nodiscard]] Expected<void> finish();
+
+ private:
+  struct Buffer {
+    perimap_Surface sample{};
+    std::vector<perimap_SurfaceFeature> features;
+  };
+
+  PublicationRecorder(SampleRecorder recorder, std::size_t maximum_features);
+  void keep_first_error(const Expected<void>& written);
+
+  SampleRecorder recorder_;
+  std::vector<Buffer> buffers_;
+  SpscRing<std::size_t> free_;
+  SpscRing<std::size_t> filled_;
+  std::uint64_t not_recorded_ = 0;  // the publisher's own; read after it has ended
+  Expected<void> first_error_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,231 @@
+#include "daemon/watch/watch_report.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string_view>
+
+namespace perimap {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
+constexpr double kPerMinutePerRadian = 60.0 / (2.0 * std::numbers::pi);  // rad/s to cycles a minute
+
+// The names are those of perimap.idl, without their prefix. The values came from outside, so none is trusted as an
+// index.
+template <std::size_t N>
+std::string_view name_in(const std::array<std::string_view, N>& names, int value) {
+  return value >= 0 && static_cast<std::size_t>(value) < N ? names[static_cast<std::size_t>(value)] : "unknown";
+}
+
+constexpr std::array<std::string_view, 4> kFeatureStates{"invalid", "converging", "converged", "inconsistent"};
+
+std::string_view name_of(perimap_SurfaceState state) {
+  return name_in<3>({"invalid", "degraded", "good"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_SurfaceReason reason) {
+  return name_in<8>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
+                     "update_late", "pose_missing"},
+                    static_cast<int>(reason));
+}
+
+std::string_view name_of(perimap_FeatureState state) { return name_in(kFeatureStates, static_cast<int>(state)); }
+
+std::string_view name_of(perimap_FeatureReason reason) {
+  return name_in<5>({"none", "not_observed", "deviation_large", "innovations_high", "phase_lost"},
+                    static_cast<int>(reason));
+}
+
+std::string_view name_of(perimap_StageKind kind) {
+  return name_in<7>({"predict_and_find", "phase_and_pose", "evaluate", "learn", "capture_to_update",
+                     "release_tardiness", "dds_write"},
+                    static_cast<int>(kind));
+}
+
+std::string_view name_of(perimap_Privilege privilege) {
+  return name_in<3>({"not_requested", "granted", "refused"}, static_cast<int>(privilege));
+}
+
+double ms(Duration duration) { return to_seconds(duration) * 1e3; }
+
+double rate_hz(const StreamReport& report, ReportKind kind) {
+  // From the first sample of a watch to its last there is one interval less than there are samples.
+  const std::uint64_t intervals =
+      kind == ReportKind::kSummary && report.received > 0 ? report.received - 1 : report.received;
+  return report.length > Duration(0) ? static_cast<double>(intervals) / to_seconds(report.length) : 0.0;
+}
+
+std::string spread_text(const DurationSpread& spread) {
+  return spread.count == 0
+             ? "-"
+             : fmt::format("{:.2f} (p99 {:.2f}, max {:.2f})", ms(spread.p50), ms(spread.p99), ms(spread.max));
+}
+
+Json spread_json(const DurationSpread& spread) {
+  if (spread.count == 0) {
+    return nullptr;
+  }
+  return {{"p50", ms(spread.p50)}, {"p99", ms(spread.p99)}, {"max", ms(spread.max)}};
+}
+
+std::string features_text(const SurfaceDigest& last) {
+  std::string text = fmt::format("{} converged, {} converging, {} inconsistent, {} invalid",
+                                 last.features[perimap_FEATURE_CONVERGED], last.features[perimap_FEATURE_CONVERGING],
+                                 last.features[perimap_FEATURE_INCONSISTENT], last.features[perimap_FEATURE_INVALID]);
+  if (last.median_deviation_mm) {
+    text += fmt::format(", median deviation {:.2f} mm", *last.median_deviation_mm);
+  }
+  return text;
+}
+
+std::string state_text(const SurfaceDigest& last) {
+  return last.reason == perimap_SURFACE_REASON_NONE ? std::string(name_of(last.state))
+                                                    : fmt::format("{} ({})", name_of(last.state), name_of(last.reason));
+}
+
+// On one line whatever bytes the publisher put into its names.
+std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+Json status_json(const StatusDigest& digest) {
+  const perimap_Status& status = digest.status;
+  Json json = {{"version", status.version},
+               {"realtime_priority", name_of(status.realtime_priority)},
+               {"memory_locked", name_of(status.memory_locked)},
+               {"latency_ms", static_cast<double>(status.latency_ns) * 1e-6},
+               {"frames", status.frames},
+               {"frames_too_late", status.frames_too_late},
+               {"frames_without_pose", status.frames_without_pose},
+               {"frames_without_phase", status.frames_without_phase},
+               {"samples", status.samples},
+               {"samples_without_frame", status.samples_without_frame},
+               {"samples_from_late_update", status.samples_from_late_update},
+               {"learning_put_off", status.learning_put_off},
+               {"adoptions_late", status.adoptions_late},
+               {"features_tracked", status.features_tracked},
+               {"features_starting", status.features_starting},
+               {"features_lost", status.features_lost}};
+  Json stages = Json::object();
+  for (const perimap_StageLatency& stage : digest.stages) {
+    stages[std::string(name_of(stage.kind))] = {{"count", stage.count},
+                                                {"p50", static_cast<double>(stage.p50_ns) * 1e-6},
+                                                {"p99", static_cast<double>(stage.p99_ns) * 1e-6},
+                                                {"max", static_cast<double>(stage.max_ns) * 1e-6}};
+  }
+  json["stages_ms"] = std::move(stages);
+  return json;
+}
+
+}  // namespace
+
+std::string report_line(const StreamReport& report) {
+  std::string line = fmt::format("{}/{}  ", report.source, report.stream);
+  if (report.length > Duration(0)) {
+    line += fmt::format("{:.1f}/s, {} lost", rate_hz(report, ReportKind::kInterval), report.missing);
+  } else if (report.last) {
+    line += fmt::format("surface {}", report.last->sample_sequence);
+  }
+  if (report.restarts > 0) {
+    line += fmt::format(", {} restarts", report.restarts);
+  }
+  if (report.received > 0) {
+    line += fmt::format(" | latency {} ms | late {} ms | jitter {} ms", spread_text(report.latency),
+                        spread_text(report.lateness), spread_text(report.jitter));
+  }
+  if (report.received > 0 && report.last) {
+    const SurfaceDigest& last = *report.last;
+    line +=
+        fmt::format(" | phase {:.0f} +- {:.1f} deg, {:.1f}/min | {} | {}", last.cardiac_phase_rad * kDegreesPerRadian,
+                    last.cardiac_phase_deviation_rad * kDegreesPerRadian,
+                    last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian, features_text(last), state_text(last));
+  }
+  return line;
+}
+
+std::string summary_text(const StreamReport& report) {
+  std::string text =
+      fmt::format("{}/{}: {} surfaces in {:.1f} s ({:.2f}/s), {} lost, {} received after their validity, {} restarts\n",
+                  report.source, report.stream, report.received, to_seconds(report.length),
+                  rate_hz(report, ReportKind::kSummary), report.missing, report.expired, report.restarts);
+  text += fmt::format("  latency, receipt minus capture   {} ms\n", spread_text(report.latency));
+  text += fmt::format("  late, receipt minus release      {} ms\n", spread_text(report.lateness));
+  text += fmt::format("  jitter as received               {} ms\n", spread_text(report.jitter));
+  if (report.last) {
+    text += fmt::format("  last surface: {}; {}\n", state_text(*report.last), features_text(*report.last));
+  }
+  return text;
+}
+
+std::string report_json(const StreamReport& report, ReportKind kind) {
+  Json json = {{"kind", kind == ReportKind::kInterval ? "interval" : "summary"},
+               {"source", report.source},
+               {"stream", report.stream},
+               {"seconds", to_seconds(report.length)},
+               {"received", report.received},
+               {"missing", report.missing},
+               {"restarts", report.restarts},
+               {"expired", report.expired},
+               {"rate_hz", rate_hz(report, kind)},
+               {"latency_ms", spread_json(report.latency)},
+               {"lateness_ms", spread_json(report.lateness)},
+               {"jitter_ms", spread_json(report.jitter)}};
+  if (report.last) {
+    const SurfaceDigest& last = *report.last;
+    json["sample_sequence"] = last.sample_sequence;
+    json["state"] = name_of(last.state);
+    json["reason"] = name_of(last.reason);
+    json["cardiac_phase_rad"] = last.cardiac_phase_rad;
+    json["cardiac_phase_deviation_rad"] = last.cardiac_phase_deviation_rad;
+    json["cardiac_rate_per_min"] = last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian;
+    Json features = Json::object();
+    for (std::size_t state = 0; state < kFeatureStates.size(); ++state) {
+      features[std::string(kFeatureStates[state])] = last.features[state];
+    }
+    json["features"] = std::move(features);
+    json["median_deviation_mm"] = last.median_deviation_mm ? Json(*last.median_deviation_mm) : Json(nullptr);
+  }
+  if (report.status) {
+    json["status"] = status_json(*report.status);
+  }
+  return dump(json);
+}
+
+std::string surface_json(const perimap_Surface& surface, Instant receipt) {
+  Json json = {{"kind", "surface"},
+               {"source", surface.source},
+               {"stream", surface.stream},
+               {"frame_id", surface.frame_id},
+               {"receipt_time_ns", to_ns(receipt)},
+               {"sample_sequence", surface.sample_sequence},
+               {"frame_sequence", surface.frame_sequence},
+               {"capture_time_ns", surface.capture_time_ns},
+               {"release_time_ns", surface.release_time_ns},
+               {"valid_time_ns", surface.valid_time_ns},
+               {"valid_until_ns", surface.valid_until_ns},
+               {"release_utc_ns", surface.release_utc_ns},
+               {"state", name_of(surface.state)},
+               {"reason", name_of(surface.reason)},
+               {"oldest_shard_frame_sequence", surface.oldest_shard_frame_sequence},
+               {"cardiac_phase_rad", surface.cardiac_phase_rad},
+               {"cardiac_phase_deviation_rad", surface.cardiac_phase_deviation_rad},
+               {"cardiac_phase_rate_rad_per_s", surface.cardiac_phase_rate_rad_per_s}};
+  Json features = Json::array();
+  for (std::uint32_t i = 0; i < surface.features._length; ++i) {
+    const perimap_SurfaceFeature& feature = surface.features._buffer[i];
+    features.push_back({{"id", feature.id},
+                        {"state", name_of(feature.state)},
+                        {"reason", name_of(feature.reason)},
+                        {"position_W_mm", feature.position_W_mm},
+                        {"velocity_W_mm_per_s", feature.velocity_W_mm_per_s},
+                        {"covariance_W_mm2", feature.covariance_W_mm2},
+                        {"last_observed_time_ns", feature.last_observed_time_ns}});
+  }
+  json["features"] = std::move(features);
+  return dump(json);
+}
+
+}  // namespace perimap
