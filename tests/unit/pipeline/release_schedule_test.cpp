@@ -1,0 +1,93 @@
+#include "core/pipeline/release_schedule.hpp"
+
+#include <gtest/gtest.h>
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr Duration kLatency = milliseconds(50);
+
+Instant at_ms(int ms) { return Instant(milliseconds(10'000 + ms)); }
+
+FrameStamp frame(std::uint64_t sequence, int capture_ms) {
+  return {sequence, at_ms(capture_ms), at_ms(capture_ms + 12)};
+}
+
+// Frames 0 to n-1, 30 ms apart, each released in time.
+ReleaseSchedule running(int n) {
+  ReleaseSchedule schedule(kLatency);
+  for (int i = 0; i < n; ++i) {
+    EXPECT_TRUE(schedule.on_frame(frame(static_cast<std::uint64_t>(i), 30 * i), at_ms(30 * i + 12)));
+    const Release release = schedule.take();
+    EXPECT_FALSE(release.frame_missing);
+    EXPECT_EQ(release.deadline, at_ms(30 * i + 50));
+  }
+  return schedule;
+}
+
+TEST(ReleaseSchedule, HasNothingDueBeforeTheFirstFrame) {
+  EXPECT_FALSE(ReleaseSchedule(kLatency).next().has_value());
+}
+
+TEST(ReleaseSchedule, ReleasesEachFrameAtCapturePlusLatency) { running(10); }
+
+TEST(ReleaseSchedule, AJitteringFrameIsReleasedAtItsOwnTime) {
+  ReleaseSchedule schedule = running(10);
+  ASSERT_TRUE(schedule.on_frame(frame(10, 303), at_ms(315)));
+  const Release release = schedule.take();
+  EXPECT_FALSE(release.frame_missing);
+  EXPECT_EQ(release.deadline, at_ms(353));
+}
+
+TEST(ReleaseSchedule, GoesOnAtTheFittedTimesWhenFramesStop) {
+  ReleaseSchedule schedule = running(10);
+  for (int k = 0; k < 5; ++k) {
+    const Release release = schedule.take();
+    EXPECT_TRUE(release.frame_missing);
+    EXPECT_EQ(release.frame_sequence, static_cast<std::uint64_t>(10 + k));
+    EXPECT_EQ(release.deadline, at_ms(300 + 30 * k + 50));
+  }
+}
+
+TEST(ReleaseSchedule, ADroppedFrameStillGetsItsRelease) {
+  ReleaseSchedule schedule = running(10);
+  ASSERT_TRUE(schedule.on_frame(frame(11, 330), at_ms(342)));
+  const Release missing = schedule.take();
+  EXPECT_TRUE(missing.frame_missing);
+  EXPECT_EQ(missing.deadline, at_ms(350));
+  const Release next = schedule.take();
+  EXPECT_FALSE(next.frame_missing);
+  EXPECT_EQ(next.frame_sequence, 11U);
+}
+
+TEST(ReleaseSchedule, RefusesAFrameThatArrivesAfterItsReleaseTime) {
+  ReleaseSchedule schedule = running(10);
+  EXPECT_FALSE(schedule.on_frame(frame(10, 300), at_ms(351)));
+}
+
+TEST(ReleaseSchedule, RefusesAFrameWhoseReleaseWasTakenAsMissing) {
+  ReleaseSchedule schedule = running(10);
+  EXPECT_TRUE(schedule.take().frame_missing);
+  EXPECT_FALSE(schedule.on_frame(frame(10, 300), at_ms(349)));
+  ASSERT_TRUE(schedule.on_frame(frame(11, 330), at_ms(360)));
+  EXPECT_EQ(schedule.take().frame_sequence, 11U);
+}
+
+TEST(ReleaseSchedule, RefusesAFrameThatGoesBackInTime) {
+  ReleaseSchedule schedule = running(10);
+  EXPECT_FALSE(schedule.on_frame(frame(3, 90), at_ms(300)));
+}
+
+TEST(ReleaseSchedule, ResumesWithRealFramesAfterAStop) {
+  ReleaseSchedule schedule = running(10);
+  for (int k = 0; k < 7; ++k) EXPECT_TRUE(schedule.take().frame_missing);
+  ASSERT_TRUE(schedule.on_frame(frame(17, 508), at_ms(520)));
+  const Release release = schedule.take();
+  EXPECT_FALSE(release.frame_missing);
+  EXPECT_EQ(release.deadline, at_ms(558));
+}
+
+}  // namespace
+}  // namespace perimap

@@ -1,0 +1,104 @@
+#include "core/pipeline/sensor_entrance.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr int kWidth = 32;
+constexpr int kHeight = 24;
+
+struct Entrance : ::testing::Test {
+  PipelineCounters counters;
+  std::unique_ptr<SensorEntrance> entrance = std::make_unique<SensorEntrance>(kWidth, kHeight, CardiacClockSettings{},
+                                                                              counters);
+  std::vector<std::uint8_t> pixels = std::vector<std::uint8_t>(40 * kHeight, 7);
+  GreyImage image{pixels.data(), kWidth, kHeight, 40};
+
+  static FrameStamp stamp(std::uint64_t sequence) {
+    const Instant capture(milliseconds(1000 + 33 * static_cast<int>(sequence)));
+    return {sequence, capture, capture + milliseconds(12)};
+  }
+};
+
+TEST_F(Entrance, CopiesTheRowsOfAPaddedImage) {
+  pixels[40 * 3 + 5] = 99;
+  ASSERT_TRUE(entrance->push_frame(stamp(0), image));
+  FrameHandle frame;
+  ASSERT_TRUE(entrance->pop_frame(frame));
+  EXPECT_EQ(entrance->image(frame).row(3)[5], 99);
+  EXPECT_EQ(entrance->image(frame).row(4)[5], 7);
+}
+
+TEST_F(Entrance, DropsAndCountsWhenTheMapperGivesNoBufferBackButStillAnnouncesTheFrame) {
+  int taken = 0;
+  for (std::uint64_t i = 0; i < 20; ++i) taken += entrance->push_frame(stamp(i), image) ? 1 : 0;
+  EXPECT_LT(taken, 20);
+  EXPECT_EQ(counters.frames_dropped.get(), static_cast<std::uint64_t>(20 - taken));
+  FrameStamp announced;
+  int stamps = 0;
+  while (entrance->pop_stamp(announced)) ++stamps;
+  EXPECT_EQ(stamps, 20);
+}
+
+TEST_F(Entrance, BuffersGivenBackServeAgain) {
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    ASSERT_TRUE(entrance->push_frame(stamp(i), image));
+    FrameHandle frame;
+    ASSERT_TRUE(entrance->pop_frame(frame));
+    EXPECT_EQ(frame.stamp.sequence, i);
+    entrance->give_back(frame);
+  }
+  EXPECT_EQ(counters.frames_dropped.get(), 0U);
+}
+
+TEST_F(Entrance, CountsFramesThatTheDeviceDropped) {
+  ASSERT_TRUE(entrance->push_frame(stamp(4), image));
+  ASSERT_TRUE(entrance->push_frame(stamp(8), image));
+  EXPECT_EQ(counters.frames_dropped.get(), 3U);
+}
+
+TEST_F(Entrance, RefusesAFrameOfAnotherSize) {
+  EXPECT_FALSE(entrance->push_frame(stamp(0), GreyImage{pixels.data(), kWidth - 1, kHeight, 40}));
+  EXPECT_EQ(counters.frames_dropped.get(), 1U);
+}
+
+TEST_F(Entrance, CountsInvalidPosesAndKeepsThem) {
+  TrackerSample sample;
+  sample.state = ToolState::kMissing;
+  entrance->push_pose(sample);
+  EXPECT_EQ(counters.poses_invalid.get(), 1U);
+  TrackerSample popped;
+  ASSERT_TRUE(entrance->pop_pose(popped));
+  EXPECT_EQ(popped.state, ToolState::kMissing);
+}
+
+TEST_F(Entrance, CountsEcgSamplesThatTheDeviceLost) {
+  EcgBlock block;
+  block.sample_period = milliseconds(4);
+  block.count = 4;
+  block.device_sequence = 0;
+  entrance->push_ecg(block);
+  block.device_sequence = 10;
+  entrance->push_ecg(block);
+  EXPECT_EQ(counters.ecg_dropped.get(), 6U);
+  EXPECT_EQ(counters.ecg_samples.get(), 8U);
+}
+
+TEST_F(Entrance, LeadOffSamplesReachTheCountersAndNotTheClock) {
+  EcgBlock block;
+  block.sample_period = milliseconds(4);
+  block.count = 4;
+  block.lead_off = true;
+  entrance->push_ecg(block);
+  EXPECT_EQ(counters.ecg_lead_off.get(), 4U);
+  EXPECT_FALSE(entrance->clocks().mapper.update());
+}
+
+}  // namespace
+}  // namespace perimap

@@ -1,0 +1,154 @@
+#include "core/pipeline/surface_composer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "core/phase/cardiac_clock_tracker.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr int kHarmonics = 2;
+
+Instant at_ms(int ms) { return Instant(milliseconds(ms)); }
+
+// Beats every 800 ms from 1 s on, the last at 9 s.
+CardiacClock steady_clock() {
+  CardiacClockTracker tracker({});
+  for (int ms = 1000; ms <= 9000; ms += 800) {
+    tracker.on_r_peak({at_ms(ms), at_ms(ms + 60), 1.0, milliseconds(1)});
+  }
+  return tracker.clock();
+}
+
+FeatureSnapshot feature(std::uint32_t id, double amplitude_mm) {
+  FeatureSnapshot snapshot;
+  snapshot.id = id;
+  snapshot.state = FeatureState::kConverged;
+  snapshot.x = StateVector::Zero(3 * (1 + 2 * kHarmonics));
+  snapshot.x(0) = 10.0;           // DC of x
+  snapshot.x(1) = amplitude_mm;   // a_1 of x
+  snapshot.covariance_W_mm2 = 0.04 * Matrix3d::Identity();
+  snapshot.largest_deviation_mm = 0.5;
+  return snapshot;
+}
+
+ShardSnapshot shard(std::uint64_t frame_sequence, std::initializer_list<FeatureSnapshot> features) {
+  ShardSnapshot snapshot;
+  snapshot.any = true;
+  snapshot.frame_sequence = frame_sequence;
+  snapshot.features = features;
+  return snapshot;
+}
+
+ComposerSettings settings() {
+  ComposerSettings s;
+  s.layout.cardiac_harmonics = kHarmonics;
+  s.maximum_features = 8;
+  return s;
+}
+
+constexpr Release kRelease{100, Instant(milliseconds(9150)), Instant(milliseconds(9200)), false};
+
+TEST(SurfaceComposer, EvaluatesPositionAndVelocityAtTheValidTimesPhase) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  const CardiacClock clock = steady_clock();
+  const SurfaceSample& sample = composer.compose(kRelease, clock, view);
+  // 200 ms after the R peak of a cycle of 800 ms: a quarter of it, where the cosine is zero and falls fastest.
+  ASSERT_EQ(sample.features.size(), 1U);
+  EXPECT_NEAR(sample.features[0].p_WF_mm.x(), 10.0, 0.2);
+  EXPECT_NEAR(sample.features[0].velocity_W_mm_per_s.x(), -4.0 * sample.cardiac_phase_rate_rad_per_s, 0.2);
+  EXPECT_EQ(sample.state, SurfaceState::kGood);
+  EXPECT_EQ(sample.valid_time, kRelease.deadline);
+}
+
+TEST(SurfaceComposer, AddsWhatThePhaseDeviationMakesOfTheMotion) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  const CardiacClock clock = steady_clock();
+  const SurfaceSample& sample = composer.compose(kRelease, clock, view);
+  const double deviation_s = clock.at(kRelease.deadline).deviation_s;
+  const double v = sample.features[0].velocity_W_mm_per_s.x();
+  EXPECT_NEAR(sample.features[0].covariance_W_mm2(0, 0), 0.04 + v * v * deviation_s * deviation_s, 1e-12);
+  EXPECT_NEAR(sample.features[0].covariance_W_mm2(1, 1), 0.04, 1e-12);
+}
+
+TEST(SurfaceComposer, OrdersFeaturesOfAllShardsById) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot a = shard(100, {feature(5, 1.0), feature(2, 1.0)});
+  const ShardSnapshot b = shard(100, {feature(3, 1.0)});
+  const std::array<const ShardSnapshot*, 2> view = {&a, &b};
+  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), view);
+  ASSERT_EQ(sample.features.size(), 3U);
+  EXPECT_EQ(sample.features[0].id, 2U);
+  EXPECT_EQ(sample.features[1].id, 3U);
+  EXPECT_EQ(sample.features[2].id, 5U);
+}
+
+TEST(SurfaceComposer, NamesTheOldestShardAndSaysThatTheUpdateIsLate) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot a = shard(100, {feature(1, 1.0)});
+  const ShardSnapshot b = shard(98, {feature(2, 1.0)});
+  const std::array<const ShardSnapshot*, 2> view = {&a, &b};
+  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), view);
+  EXPECT_EQ(sample.oldest_shard_frame_sequence, 98U);
+  EXPECT_EQ(sample.state, SurfaceState::kDegraded);
+  EXPECT_EQ(sample.reason, SurfaceReason::kUpdateLate);
+  EXPECT_NEAR(sample.features[1].covariance_W_mm2(1, 1), 0.25, 1e-12) << "the largest deviation over the cycle";
+}
+
+TEST(SurfaceComposer, SaysThatTheFrameOrThePoseIsMissing) {
+  SurfaceComposer composer(settings());
+  ShardSnapshot snapshot = shard(99, {feature(1, 1.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  Release missing = kRelease;
+  missing.frame_missing = true;
+  EXPECT_EQ(composer.compose(missing, steady_clock(), view).reason, SurfaceReason::kFrameMissing);
+  snapshot.frame_sequence = 100;
+  snapshot.pose_missing = true;
+  EXPECT_EQ(composer.compose(kRelease, steady_clock(), view).reason, SurfaceReason::kPoseMissing);
+}
+
+TEST(SurfaceComposer, MarksEveryPositionInvalidWhenThePhaseIsUnknownOrLost) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  const SurfaceSample& unknown = composer.compose(kRelease, CardiacClock{}, view);
+  EXPECT_EQ(unknown.state, SurfaceState::kInvalid);
+  EXPECT_EQ(unknown.reason, SurfaceReason::kPhaseUnknown);
+  EXPECT_EQ(unknown.features[0].state, FeatureState::kInvalid);
+  Release late = kRelease;
+  late.deadline = at_ms(30'000);
+  const SurfaceSample& lost = composer.compose(late, steady_clock(), view);
+  EXPECT_EQ(lost.reason, SurfaceReason::kPhaseLost);
+  EXPECT_EQ(lost.state, SurfaceState::kInvalid);
+  EXPECT_EQ(lost.features[0].state, FeatureState::kInvalid);
+  EXPECT_EQ(lost.features[0].reason, FeatureReason::kPhaseLost);
+}
+
+TEST(SurfaceComposer, SaysThatNothingIsMappedYet) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), view);
+  EXPECT_EQ(sample.state, SurfaceState::kInvalid);
+  EXPECT_EQ(sample.reason, SurfaceReason::kNothingMapped);
+}
+
+TEST(SurfaceComposer, CountsSamplesWithoutGaps) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  for (std::uint64_t i = 1; i <= 5; ++i) {
+    EXPECT_EQ(composer.compose(kRelease, steady_clock(), view).sample_sequence, i);
+  }
+}
+
+}  // namespace
+}  // namespace perimap

@@ -1,0 +1,69 @@
+#include "daemon/publishing/wire_surface.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+TEST(WireSurface, CarriesEveryFieldOfTheSample) {
+  SurfaceSample sample;
+  sample.sample_sequence = 7;
+  sample.release = {42, Instant(milliseconds(100)), Instant(milliseconds(150)), false};
+  sample.valid_time = Instant(milliseconds(150));
+  sample.valid_until = Instant(milliseconds(350));
+  sample.state = SurfaceState::kDegraded;
+  sample.reason = SurfaceReason::kUpdateLate;
+  sample.oldest_shard_frame_sequence = 41;
+  sample.cardiac_phase_rad = 1.5;
+  sample.cardiac_phase_deviation_rad = 0.1;
+  sample.cardiac_phase_rate_rad_per_s = 7.5;
+  SurfaceFeature feature;
+  feature.id = 9;
+  feature.state = FeatureState::kConverged;
+  feature.reason = FeatureReason::kNotObserved;
+  feature.p_WF_mm = Vector3d(1, 2, 3);
+  feature.velocity_W_mm_per_s = Vector3d(4, 5, 6);
+  feature.covariance_W_mm2 << 1, 2, 3, 2, 4, 5, 3, 5, 6;
+  feature.last_observed = Instant(milliseconds(90));
+  sample.features = {feature};
+
+  WireSurface wire({"theatre 3", "frame", "tracker"}, 4);
+  const perimap_Surface& out = wire.fill(sample, std::chrono::seconds(1000));
+  EXPECT_STREQ(out.source, "theatre 3");
+  EXPECT_STREQ(out.stream, "frame");
+  EXPECT_STREQ(out.frame_id, "tracker");
+  EXPECT_EQ(out.sample_sequence, 7U);
+  EXPECT_EQ(out.frame_sequence, 42U);
+  EXPECT_EQ(out.capture_time_ns, 100'000'000);
+  EXPECT_EQ(out.release_time_ns, 150'000'000);
+  EXPECT_EQ(out.valid_time_ns, 150'000'000);
+  EXPECT_EQ(out.valid_until_ns, 350'000'000);
+  EXPECT_EQ(out.release_utc_ns, 1000'150'000'000);
+  EXPECT_EQ(out.state, perimap_SURFACE_DEGRADED);
+  EXPECT_EQ(out.reason, perimap_SURFACE_REASON_UPDATE_LATE);
+  EXPECT_EQ(out.oldest_shard_frame_sequence, 41U);
+  EXPECT_EQ(out.cardiac_phase_rad, 1.5);
+  EXPECT_EQ(out.cardiac_phase_deviation_rad, 0.1);
+  EXPECT_EQ(out.cardiac_phase_rate_rad_per_s, 7.5);
+  ASSERT_EQ(out.features._length, 1U);
+  const perimap_SurfaceFeature& f = out.features._buffer[0];
+  EXPECT_EQ(f.id, 9U);
+  EXPECT_EQ(f.state, perimap_FEATURE_CONVERGED);
+  EXPECT_EQ(f.reason, perimap_FEATURE_REASON_NOT_OBSERVED);
+  EXPECT_EQ(f.position_W_mm[2], 3.0);
+  EXPECT_EQ(f.velocity_W_mm_per_s[0], 4.0);
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(f.covariance_W_mm2[i], i + 1.0);
+  EXPECT_EQ(f.last_observed_time_ns, 90'000'000);
+}
+
+TEST(WireSurface, CutsNamesThatAreTooLong) {
+  WireSurface wire({std::string(200, 'x'), "frame", "tracker"}, 1);
+  EXPECT_EQ(std::string(wire.fill(SurfaceSample{}, Duration(0)).source), std::string(63, 'x'));
+}
+
+}  // namespace
+}  // namespace perimap

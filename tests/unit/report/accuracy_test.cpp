@@ -1,0 +1,138 @@
+#include "daemon/report/accuracy.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+// One big still triangle at z = 100 mm before the camera at the origin.
+GroundTruth still_triangle() {
+  HeartMesh mesh;
+  mesh.vertex_count = 3;
+  mesh.harmonics = 0;
+  mesh.coefficients_mm = {-500, -500, 100, 500, -500, 100, 0, 500, 100};
+  mesh.triangles = {0, 2, 1};
+  HeartMotion motion;
+  for (int i = 0; i < 40; ++i) motion.r_peaks.push_back(Instant(milliseconds(800 * i)));
+  auto truth = GroundTruth::create(mesh, motion, {{Instant(milliseconds(1000)), Pose{}}});
+  EXPECT_TRUE(truth.has_value());
+  return std::move(*truth);
+}
+
+CameraModel camera() {
+  CameraModel c;
+  c.width = 640;
+  c.height = 480;
+  c.fx = c.fy = 500;
+  c.cx = 320;
+  c.cy = 240;
+  return c;
+}
+
+
+perimap_SurfaceFeature feature(std::uint32_t id, perimap_FeatureState state, double x_mm) {
+  perimap_SurfaceFeature f{};
+  f.id = id;
+  f.state = state;
+  f.position_W_mm[0] = x_mm;
+  f.position_W_mm[2] = 100.0;
+  f.covariance_W_mm2[0] = f.covariance_W_mm2[3] = f.covariance_W_mm2[5] = 1.0;
+  return f;
+}
+
+void publish(Accuracy& accuracy, double valid_s, std::vector<perimap_SurfaceFeature> features) {
+  perimap_Surface sample{};
+  sample.valid_time_ns = static_cast<std::int64_t>(valid_s * 1e9);
+  const auto n = static_cast<std::uint32_t>(features.size());
+  sample.features = {n, n, features.data(), false};
+  accuracy.add(sample);
+}
+
+// Feature `id` was first seen at the image centre, so its true place is (0, 0, 100).
+void tell_origin(Accuracy& accuracy, std::uint32_t id, double u_px = 320.0) {
+  perimap_ModelFeature f{};
+  f.id = id;
+  f.first_observed_time_ns = 1'000'000'000;
+  f.first_observed_px[0] = u_px;
+  f.first_observed_px[1] = 240.0;
+  perimap_SurfaceModel model{};
+  model.features = {1, 1, &f, false};
+  accuracy.add(model);
+}
+
+constexpr Instant kFirstFrame{Duration(0)};
+
+TEST(Accuracy, MeasuresTheDistanceToThePointThatTheFirstRayMet) {
+  const GroundTruth truth = still_triangle();
+  Accuracy accuracy(truth, camera(), kFirstFrame);
+  tell_origin(accuracy, 1);
+  publish(accuracy, 16.0, {feature(1, perimap_FEATURE_CONVERGED, 0.75)});
+  const AccuracyReport report = accuracy.report(Duration(0));
+  EXPECT_EQ(report.settled.count, 1U);
+  EXPECT_NEAR(report.settled.median_mm, 0.75, 1e-9);
+  EXPECT_NEAR(report.mean_nees, 0.75 * 0.75 / 3.0, 1e-9);
+}
+
+TEST(Accuracy, CountsAFeatureFromItsFirstConvergedSampleOnWhateverItBecomes) {
+  const GroundTruth truth = still_triangle();
+  Accuracy accuracy(truth, camera(), kFirstFrame);
+  tell_origin(accuracy, 1);
+  publish(accuracy, 16.0, {feature(1, perimap_FEATURE_CONVERGING, 50.0)});
+  publish(accuracy, 17.0, {feature(1, perimap_FEATURE_CONVERGED, 1.0)});
+  publish(accuracy, 18.0, {feature(1, perimap_FEATURE_INCONSISTENT, 9.0)});
+  const AccuracyReport report = accuracy.report(Duration(0));
+  EXPECT_EQ(report.settled.count, 2U);
+  EXPECT_NEAR(report.settled.max_mm, 9.0, 1e-9);
+  EXPECT_NEAR(report.share_above_3_mm, 0.5, 1e-12);
+}
+
+TEST(Accuracy, CountsOnlyWhatConvergedWithinFifteenSecondsAsEarly) {
+  const GroundTruth truth = still_triangle();
+  Accuracy accuracy(truth, camera(), kFirstFrame);
+  tell_origin(accuracy, 1);
+  tell_origin(accuracy, 2);
+  publish(accuracy, 14.0, {feature(1, perimap_FEATURE_CONVERGED, 0.0)});
+  publish(accuracy, 16.0, {feature(1, perimap_FEATURE_CONVERGED, 0.0), feature(2, perimap_FEATURE_CONVERGED, 0.0)});
+  const AccuracyReport report = accuracy.report(Duration(0));
+  EXPECT_EQ(report.converged_by_15_s, 1U);
+  EXPECT_EQ(report.features_converged, 2U);
+}
+
+TEST(Accuracy, SaysWhichConvergedFeaturesHaveNoTruth) {
+  const GroundTruth truth = still_triangle();
+  Accuracy accuracy(truth, camera(), kFirstFrame);
+  tell_origin(accuracy, 1, 1e6);
+  publish(accuracy, 16.0, {feature(1, perimap_FEATURE_CONVERGED, 0.0), feature(2, perimap_FEATURE_CONVERGED, 0.0)});
+  const AccuracyReport report = accuracy.report(Duration(0));
+  EXPECT_EQ(report.features_without_truth, 2U);
+  EXPECT_EQ(report.settled.count, 0U);
+}
+
+TEST(Accuracy, BringsPublishedInstantsToTheRecordingsClock) {
+  const GroundTruth truth = still_triangle();
+  Accuracy accuracy(truth, camera(), kFirstFrame);
+  perimap_ModelFeature f{};
+  f.id = 1;
+  f.first_observed_time_ns = 501'000'000'000;
+  f.first_observed_px[0] = 320.0;
+  f.first_observed_px[1] = 240.0;
+  perimap_SurfaceModel model{};
+  model.features = {1, 1, &f, false};
+  accuracy.add(model);
+  publish(accuracy, 516.0, {feature(1, perimap_FEATURE_CONVERGED, 2.0)});
+  const AccuracyReport report = accuracy.report(std::chrono::seconds(-500));
+  EXPECT_EQ(report.settled.count, 1U);
+  EXPECT_NEAR(report.settled.median_mm, 2.0, 1e-9);
+}
+
+TEST(Accuracy, NothingPublishedIsNotAnError) {
+  const GroundTruth truth = still_triangle();
+  EXPECT_EQ(Accuracy(truth, camera(), kFirstFrame).report(Duration(0)).settled.count, 0U);
+}
+
+}  // namespace
+}  // namespace perimap
