@@ -183,11 +183,8 @@ UpdateOutcome iterated_update(FeatureEstimate& estimate, const Observation& obse
     // Also false for NaN.
     if (!(P(i, i) - U(i, 0) * U(i, 0) - U(i, 1) * U(i, 1) > 0.0)) return refuse(UpdateStatus::kNotPositive);
   }
-  // Column by column and without sums of different order on the two sides of the diagonal: symmetric bit by bit.
-  for (Eigen::Index j = 0; j < d; ++j) {
-    P.col(j) -= U.col(0) * U(j, 0);
-    P.col(j) -= U.col(1) * U(j, 1);
-  }
+  // The same products in the same order on both sides of the diagonal: symmetric bit by bit.
+  for (Eigen::Index j = 0; j < d; ++j) P.col(j) -= U.col(0) * U(j, 0) + U.col(1) * U(j, 1);
   x = x_new;
   outcome.accepted = true;
   outcome.status = UpdateStatus::kAccepted;

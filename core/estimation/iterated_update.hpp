@@ -36,8 +36,9 @@ struct UpdateSettings {
   UpdateMethod method = UpdateMethod::kLevenbergMarquardt;
   int max_iterations = 5;    // steps tried; at least 1
   double step_factor = 1.0;  // the paper's gamma, for Gauss-Newton; 0 < gamma <= 1
-  // Ends the iterations: length of the last step in standard deviations of the posterior. 0 never ends them early.
-  double tolerance = 1e-4;
+  // Ends the iterations: length of the last step in standard deviations of the posterior. 0 never ends them early. What
+  // is then still missing is far smaller, since the steps shrink fast.
+  double tolerance = 1e-2;
   // An update with J above this at its end is refused: chi-squared with 2 degrees of freedom, 99.9 %.
   double gate = 13.8;
   CovarianceLinearisation covariance = CovarianceLinearisation::kFinalIterate;
