@@ -1,7 +1,6 @@
 #include "drivers/recording/mcap_reader.hpp"
 
 #include <fmt/format.h>
-#include <zlib.h>
 #include <zstd.h>
 
 #include <algorithm>
@@ -9,6 +8,8 @@
 #include <concepts>
 #include <cstring>
 #include <utility>
+
+#include "drivers/recording/crc32.hpp"
 
 namespace perimap {
 namespace {
@@ -19,10 +20,6 @@ using Buffer = std::vector<std::byte>;
 
 tl::unexpected<Error> fail_at(std::uint64_t byte, std::string_view what) {
   return fail(fmt::format("byte {}: {}", byte, what));
-}
-
-std::uint32_t crc_update(std::uint32_t crc, std::span<const std::byte> bytes) {
-  return static_cast<std::uint32_t>(crc32_z(crc, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
 bool is_magic(std::span<const std::byte> bytes) {
@@ -307,7 +304,7 @@ class McapReader::Impl {
     Buffer summary(static_cast<std::size_t>(footer_offset - summary_start));
     if (auto read = source_->read_at(summary_start, summary); !read) return tl::unexpected(read.error());
     if (summary_crc != 0) {
-      const std::uint32_t crc = crc_update(crc_update(0, summary), std::span(tail).first(kFooterBytes - 4));
+      const std::uint32_t crc = crc32_update(crc32_update(0, summary), std::span(tail).first(kFooterBytes - 4));
       if (crc != summary_crc) {
         return fail_at(summary_start, fmt::format("the summary's CRC is {:08x}, stored is {:08x}", crc, summary_crc));
       }
@@ -579,7 +576,7 @@ class McapReader::Impl {
       return fail_at(offset, fmt::format("the chunk's compression \"{}\" is not supported", compression));
     }
     if (uncompressed_crc != 0) {
-      const std::uint32_t crc = crc_update(0, chunk_);
+      const std::uint32_t crc = crc32_update(0, chunk_);
       if (crc != uncompressed_crc) {
         return fail_at(offset, fmt::format("the chunk's CRC is {:08x}, stored is {:08x}", crc, uncompressed_crc));
       }
@@ -637,7 +634,7 @@ class McapReader::Impl {
     const auto stored_crc = cursor.take<std::uint32_t>();
     if (!cursor.ok()) return fail_at(offset, "the attachment's fields do not fit its length");
     if (stored_crc != 0) {
-      const std::uint32_t crc = crc_update(0, std::span(*content).first(covered));
+      const std::uint32_t crc = crc32_update(0, std::span(*content).first(covered));
       if (crc != stored_crc) {
         return fail_at(offset, fmt::format("the attachment's CRC is {:08x}, stored is {:08x}", crc, stored_crc));
       }
@@ -653,10 +650,10 @@ class McapReader::Impl {
     while (data_crc_end_ < offset) {
       gap_.resize(static_cast<std::size_t>(std::min(offset - data_crc_end_, kBlockBytes)));
       if (auto read = source_->read_at(data_crc_end_, gap_); !read) return read;
-      data_crc_ = crc_update(data_crc_, gap_);
+      data_crc_ = crc32_update(data_crc_, gap_);
       data_crc_end_ += gap_.size();
     }
-    data_crc_ = crc_update(data_crc_, record);
+    data_crc_ = crc32_update(data_crc_, record);
     data_crc_end_ += record.size();
     return {};
   }

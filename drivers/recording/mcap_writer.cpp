@@ -1,7 +1,6 @@
 #include "drivers/recording/mcap_writer.hpp"
 
 #include <fmt/format.h>
-#include <zlib.h>
 #include <zstd.h>
 
 #include <algorithm>
@@ -9,6 +8,8 @@
 #include <limits>
 #include <utility>
 #include <vector>
+
+#include "drivers/recording/crc32.hpp"
 
 namespace perimap {
 namespace {
@@ -61,10 +62,6 @@ void put_record(Buffer& out, Opcode opcode, Fill fill) {
   put(out, std::uint64_t{0});
   fill();
   put_at(out, start + 1, static_cast<std::uint64_t>(out.size() - start - mcap::kRecordHeaderBytes));
-}
-
-std::uint32_t crc_update(std::uint32_t crc, std::span<const std::byte> bytes) {
-  return static_cast<std::uint32_t>(crc32_z(crc, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
 void put(Buffer& out, const McapSchema& schema) {
@@ -223,7 +220,7 @@ class McapWriter::Impl {
       put(out_, media_type);
       put(out_, static_cast<std::uint64_t>(data.size()));
       put(out_, data);
-      put(out_, crc_update(0, std::span(out_).subspan(mcap::kRecordHeaderBytes)));
+      put(out_, crc32_update(0, std::span(out_).subspan(mcap::kRecordHeaderBytes)));
     });
     attachments_.push_back(
         {offset_, out_.size(), log_time_ns, create_time_ns, data.size(), std::string(name), std::string(media_type)});
@@ -254,7 +251,7 @@ class McapWriter::Impl {
     put(out_, entry.times.first_ns);
     put(out_, entry.times.last_ns);
     put(out_, entry.uncompressed_size);
-    put(out_, crc_update(0, chunk_));
+    put(out_, crc32_update(0, chunk_));
     put(out_, options_.zstd_level ? mcap::kZstd : std::string_view());
     put(out_, std::uint64_t{0});
     const std::size_t records_at = out_.size();
@@ -331,7 +328,7 @@ class McapWriter::Impl {
 
   Expected<void> emit() {
     if (auto written = sink_->write(out_); !written) return stick(written.error().message);
-    crc_ = crc_update(crc_, out_);
+    crc_ = crc32_update(crc_, out_);
     offset_ += out_.size();
     return {};
   }
@@ -396,7 +393,7 @@ class McapWriter::Impl {
     put(out_, std::uint64_t{mcap::kFooterContentBytes});
     put(out_, summary_start);
     put(out_, offsets_start);
-    put(out_, crc_update(0, out_));
+    put(out_, crc32_update(0, out_));
   }
 
   void put_statistics() {
