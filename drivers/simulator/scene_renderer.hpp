@@ -31,7 +31,7 @@ struct RenderWorkspace {
   std::vector<float> level_count;
   std::vector<Triangle> triangles;
   std::vector<float> inverse_depth;         // per subsample, 1/mm
-  std::vector<std::int32_t> triangle_seen;  // per subsample, kNone where the heart is not
+  std::vector<std::int32_t> triangle_seen;  // per subsample, -1 where the heart is not
   std::vector<std::uint32_t> inner_sides;   // triangles that turn their inner side to the camera
   std::vector<float> farthest;              // per tile of subsamples: the least inverse depth
   std::vector<float> radiance;              // per pixel, grey levels
