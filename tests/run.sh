@@ -105,12 +105,15 @@ run_tests() { # NAME PRESET CTEST_OPTION...
   grep -a 'tests passed' "$logs/${name//[^a-zA-Z0-9]/-}.log"
 }
 
+# Each target starts from the seeds of its own name, where there are any, and adds what it finds to them.
 fuzz_smoke() {
-  local target
-  for target in build/fuzz/tests/fuzz/fuzz_*; do
+  local programs=build/fuzz/tests/fuzz corpus=build/fuzz/corpus target maker
+  for maker in "$programs"/make_*_corpus; do step "$(basename "$maker")" 5m "$maker" "$corpus"; done
+  for target in "$programs"/fuzz_*; do
     if [ -f "$target" ] && [ -x "$target" ]; then
-      step "fuzz $(basename "$target")" 3m "$target" -max_total_time=60 -timeout=10 -rss_limit_mb=2048 \
-        -artifact_prefix="$logs/"
+      mkdir -p "$corpus/${target##*/fuzz_}"
+      step "${target##*/}" 3m "$target" -max_total_time=60 -timeout=10 -rss_limit_mb=2048 \
+        -artifact_prefix="$logs/" "$corpus/${target##*/fuzz_}"
     fi
   done
 }

@@ -28,10 +28,11 @@ struct PhaseLawSettings {
 
   // Time-locked law: the phase reaches `locked_systole_phase_rad` this long after the R peak, and
   // `locked_filling_phase_rad` this long before the next one. In cycles too short for both they shrink in proportion.
-  Seconds locked_systole{0.48};
-  Seconds locked_filling{0.16};
-  double locked_systole_phase_rad = 2.0 * std::numbers::pi * 0.56;
-  double locked_filling_phase_rad = 2.0 * std::numbers::pi * 0.81;
+  // With these values the law is linear in a cycle of 863 ms.
+  Seconds locked_systole{0.535};
+  Seconds locked_filling{0.130};
+  double locked_systole_phase_rad = 2.0 * std::numbers::pi * 535.0 / 863.0;
+  double locked_filling_phase_rad = 2.0 * std::numbers::pi * (1.0 - 130.0 / 863.0);
 };
 
 struct CyclePhase {
