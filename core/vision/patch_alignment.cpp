@@ -120,8 +120,8 @@ Sums accumulate(const PatchTemplate::Level& level, const Samples& samples) noexc
   return sums;
 }
 
-// How well the sampled window fits the template, gain and bias solved for. free_parameters are those of the warp.
-AlignmentResult compare(const PatchTemplate::Level& level, const Sums& sums, int free_parameters) noexcept {
+// How well the sampled window fits the template, gain and bias solved for.
+AlignmentResult compare(const PatchTemplate::Level& level, const Sums& sums) noexcept {
   const double n = level.side * level.side;
   const double mean = sums.grey / n;
   const double variance_sum = sums.grey_squared - sums.grey * mean;
@@ -130,9 +130,33 @@ AlignmentResult compare(const PatchTemplate::Level& level, const Sums& sums, int
   result.gain = covariance_sum / level.sum_squares;
   result.bias = mean + PatchTemplate::kGreyOrigin - result.gain * (level.mean + PatchTemplate::kGreyOrigin);
   if (variance_sum > 0) result.correlation = covariance_sum / std::sqrt(variance_sum * level.sum_squares);
-  const double residual = variance_sum - result.gain * covariance_sum;
-  result.residual_variance = std::max(residual, 0.0) / (n - 2 - free_parameters);
   return result;
+}
+
+// See AlignmentResult::residual_variance. free_parameters are those of the warp.
+double residual_variance(const PatchTemplate::Level& level, const Samples& samples, const AlignmentResult& fit,
+                         int free_parameters) noexcept {
+  constexpr int kBlock = 3;
+  const int across = level.side / kBlock;
+  const float gain = static_cast<float>(fit.gain);
+  const float bias = static_cast<float>(fit.bias + (fit.gain - 1) * PatchTemplate::kGreyOrigin);
+  double sum_squares = 0;
+  for (int by = 0; by < across; ++by) {
+    std::array<float, PatchTemplate::kMaxStride> column{};  // sums over the block's rows
+    for (int y = kBlock * by; y < kBlock * (by + 1); ++y) {
+      const float* const grey = samples.data() + y * level.stride;
+      const std::int16_t* const value = level.value.data() + y * level.stride;
+      for (int x = 0; x < level.stride; ++x) column[static_cast<std::size_t>(x)] += grey[x] - gain * value[x] - bias;
+    }
+    for (int bx = 0; bx < across; ++bx) {
+      const std::size_t x = static_cast<std::size_t>(kBlock * bx);
+      const double sum = static_cast<double>(column[x]) + column[x + 1] + column[x + 2];
+      sum_squares += sum * sum;
+    }
+  }
+  // Gain, bias and warp have taken their share of the low frequencies.
+  const double free_blocks = across * across - 2 - free_parameters;
+  return sum_squares / (kBlock * kBlock * free_blocks);
 }
 
 // The projected steepest-descent images times the image, divided by the gain: the right-hand side of the normal
@@ -193,27 +217,26 @@ AlignmentResult iterate(const GreyImage& image, const PatchTemplate::Level& leve
   std::fill_n(samples.begin(), level.side * level.stride, 0.0F);
   const Vector2d start = warp.centre;
   AlignmentResult result;
-  for (int iteration = 0; iteration < limits.max_iterations; ++iteration) {
+  bool at_rest = false;
+  for (int iteration = 0; iteration < limits.max_iterations && !at_rest; ++iteration) {
     if (!warped_window_fits(image, level, warp)) {
       result.outcome = Alignment::kOutOfView;
       return result;
     }
     sample_window(image, level, warp, samples);
     const Sums sums = Step::sums(level, samples);
-    result = compare(level, sums, Step::kFree);
+    result = compare(level, sums);
     if (!(result.gain > kMinGain)) return result;
     const double moved = step.apply(right_hand_side(level, sums, result.gain), warp);
     if (!((warp.centre - start).norm() <= limits.max_travel)) return result;
-    if (moved < limits.at_rest) {
-      result.outcome = Alignment::kConverged;
-      return result;
-    }
     // Still creeping at the last step: near enough for the next stage, which has its own test.
     constexpr double kNearlyAtRest = 10;
-    if (iteration + 1 == limits.max_iterations && moved < kNearlyAtRest * limits.at_rest) {
-      result.outcome = Alignment::kConverged;
-    }
+    const bool is_last = iteration + 1 == limits.max_iterations;
+    at_rest = moved < (is_last ? kNearlyAtRest : 1) * limits.at_rest;
   }
+  if (!at_rest) return result;
+  result.outcome = Alignment::kConverged;
+  result.residual_variance = residual_variance(level, samples, result, Step::kFree);
   return result;
 }
 

@@ -26,7 +26,10 @@ struct AlignmentResult {
   double correlation = 0;  // zero-mean normalised, [-1, 1], of the aligned window
   double gain = 1;         // I = gain * T + bias, grey levels
   double bias = 0;
-  double residual_variance = 0;  // of I - gain * T - bias, grey levels^2, degrees of freedom accounted for
+  // Of I - gain * T - bias, grey levels^2 per pixel, as it acts on a patch: from sums over blocks of 3 x 3 pixels,
+  // which keep what neighbouring pixels have in common (shading, a highlight's edge) and what interpolation takes off
+  // single pixels. Where the alignment has ended; 0 otherwise.
+  double residual_variance = 0;
 };
 
 // Whether every pixel of the warped window can be interpolated in the image. False for anything not finite.

@@ -39,20 +39,18 @@ bool is_positive_definite(const Matrix2d& C) noexcept {
 }
 
 // Covariance of the aligned position in template pixels, px^2, from the inverse of the Hessian's translation part and
-// the residual. Two things keep it from being residual variance times inverse Hessian. Bilinear interpolation takes 5/9
-// of the image's noise off the residual, on average over sub-pixel positions, but not off the low frequencies that
-// shift the patch. And the template's own noise adds to the Hessian H what no motion can be read from: with b the
-// noise's share, the least-squares estimate has covariance sigma^2 (H - b)^-1 H (H - b)^-1.
+// the residual, of which the template's noise is one half and the image's the other. The template's own noise adds to
+// the Hessian H what no motion can be read from: with b its share, the least-squares estimate has covariance
+// sigma^2 (H - b)^-1 H (H - b)^-1.
 Matrix2d match_covariance(const Matrix2d& inverse_hessian, int pixels, const AlignmentResult& fit) noexcept {
-  constexpr double kSeenOfNoise = (1 + 4.0 / 9) / 2;  // template's and image's noise, the latter interpolated
-  const double noise_variance = fit.residual_variance / (2 * kSeenOfNoise * fit.gain * fit.gain);
-  const double gradient_noise_variance = 12.0 / 64 * noise_variance;  // the squared weights of Sobel's operator over 8
+  const double variance = fit.residual_variance / (fit.gain * fit.gain);
+  constexpr double kSobelNoise = 12.0 / 64;  // its squared weights, over 8 squared
   const Matrix2d H = inverse_hessian.inverse();
-  // Of the information at least a tenth is taken to be real.
   const double smaller = 0.5 * H.trace() - std::hypot(0.5 * (H(0, 0) - H(1, 1)), H(0, 1));
-  const double b = std::min(pixels * gradient_noise_variance, 0.9 * smaller);
+  // More than half cannot be told from structure that does not fit, which is in the residual too.
+  const double b = std::min(pixels * kSobelNoise * 0.5 * variance, 0.5 * smaller);
   const Matrix2d informed = (H - b * Matrix2d::Identity()).inverse();
-  return 2 * noise_variance * informed * H * informed;
+  return variance * informed * H * informed;
 }
 
 // One attempt's outcome in level-0 pixels.
@@ -93,7 +91,7 @@ class Attempts {
     const GreyImage image = pyramid_.level(0);
     const PatchTemplate::Level& level = patch_.levels[0];
     AlignmentLimits limits;
-    if (patch_.affine_usable) limits.at_rest = 0.1;  // affine alignment finishes the work
+    if (patch_.affine_usable) limits.at_rest = 0.3;  // affine alignment finishes the work
     attempt.fit = align_translation(image, level, limits, attempt.warp);
     Matrix2d covariance_template = inverse_hessian_translation();
     if (attempt.fit.outcome == Alignment::kConverged && patch_.affine_usable) {
@@ -138,13 +136,15 @@ class Attempts {
   const PatchTrackerSettings& settings_;
 };
 
-// The coarsest level is taken only when no finer one covers the gate.
+// The finest level that covers the gate in few enough positions, else the coarsest.
+constexpr int kQuickSearchRadius = 5;  // level pixels
+
 int search_level(const ImagePyramid& pyramid, const PatchTemplate& patch, double radius_px) noexcept {
   int chosen = 0;
   for (int l = 0; l < pyramid.levels(); ++l) {
     if (!patch.levels[static_cast<std::size_t>(l)].usable) continue;
     chosen = l;
-    if (radius_px <= kMaxSearchRadius * (1 << l)) break;
+    if (radius_px <= kQuickSearchRadius * (1 << l)) break;
   }
   return chosen;
 }
@@ -188,6 +188,8 @@ PatchMatch track(const ImagePyramid& pyramid, const PatchTemplate& patch, PatchS
         continue;
       }
       if (best.state != MatchState::kFound || attempt.fit.correlation > best.fit.correlation) best = attempt;
+      constexpr double kBeyondDoubt = 0.95;
+      if (best.fit.correlation > kBeyondDoubt) break;
     }
     if (best.state != MatchState::kFound) {
       match.state = why;
@@ -211,7 +213,7 @@ PatchMatch track(const ImagePyramid& pyramid, const PatchTemplate& patch, PatchS
 }
 
 bool template_is_stale(const PatchState& state) noexcept {
-  constexpr double kWorn = 1.5;
+  constexpr double kWorn = 2.0;
   const StretchRange range = stretch(state.A);
   return !(range.largest < kWorn && range.smallest > 1 / kWorn);
 }

@@ -34,17 +34,17 @@ struct PatchMatch {
 };
 
 struct PatchTrackerSettings {
-  double min_correlation = 0.80;
+  double min_correlation = 0.88;
   double gate = 13.8;            // chi^2, 2 degrees of freedom, 99.9 %
-  double sigma_floor_px = 0.15;  // what interpolation, shading and surface curvature leave on a good match
+  double sigma_floor_px = 0.10;  // what interpolation, shading and surface curvature leave on a good match
   double max_stretch = 2.5;      // singular values of A lie in [1/max_stretch, max_stretch]
 };
 
 // Aligns the patch, translation first and coarse to fine, then affine, by inverse composition (Baker & Matthews,
 // "Lucas-Kanade 20 Years On: A Unifying Framework", IJCV 56(3), 2004) with gain and bias. When the prediction's gate
 // is wider than alignment reaches, or alignment fails, every place in the gate is searched by normalised
-// cross-correlation at the level whose pixels make it at most 10 wide (at the coarsest level it is cut there: ±40 px
-// with three levels), and the best peaks are aligned.
+// cross-correlation at the level whose pixels make its radius at most 5 (at the coarsest level up to 10, and it is cut
+// there: ±40 px with three levels), and the best peaks are aligned.
 //
 // prediction_covariance_px2 is the search region and the gate: chi^2 of the found place under the sum of it and the
 // match's own covariance. The match's covariance comes from the residual's variance and the Hessian, plus the floor.
@@ -53,8 +53,9 @@ struct PatchTrackerSettings {
                                const Vector2d& predicted_px, const Matrix2d& prediction_covariance_px2,
                                const PatchTrackerSettings& settings = {}) noexcept;
 
-// True when the view has changed so much (scale beyond 1.5 or foreshortening likewise) that a fresh template at the
-// found pixel would serve better. Each renewal moves the followed point by about the match's standard deviation.
+// True when the view has changed so much (scale or foreshortening beyond 2) that a fresh template at the found pixel
+// would serve better. Each renewal moves the followed point by about the match's standard deviation, and a heart's own
+// beat stretches its picture by up to 1.5 and back: renew only what stays stale for longer than a cycle.
 [[nodiscard]] bool template_is_stale(const PatchState& state) noexcept;
 
 }  // namespace perimap

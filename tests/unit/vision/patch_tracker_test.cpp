@@ -142,9 +142,9 @@ TEST(PatchTracker, FollowsGrowingStretchThroughItsState) {
     EXPECT_LT((trial.state.A - A).cwiseAbs().maxCoeff(), 0.06);
   }
   EXPECT_FALSE(template_is_stale(PatchState{}));
-  trial.state.A = affine(1.6, 0, 0, 1.2);
+  trial.state.A = affine(2.1, 0, 0, 1.2);
   EXPECT_TRUE(template_is_stale(trial.state));
-  trial.state.A = affine(1, 0, 0, 0.6);
+  trial.state.A = affine(1, 0, 0, 0.45);
   EXPECT_TRUE(template_is_stale(trial.state));
 }
 
@@ -259,7 +259,7 @@ TEST(PatchTracker, CovarianceMatchesTheScatterOfSeededTrials) {
     normalised += 0.5 * e.dot(match.covariance_px2.inverse() * e);
     ++count;
   }
-  ASSERT_GE(count, 100);
+  ASSERT_GE(count, 80);
   EXPECT_GT(normalised / count, 0.5);
   EXPECT_LT(normalised / count, 2.0);
 }
