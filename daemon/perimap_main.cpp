@@ -4,6 +4,7 @@
 #include <exception>
 
 #include "daemon/commands/check.hpp"
+#include "daemon/commands/simulate.hpp"
 #include "daemon/commands/watch.hpp"
 
 int main(int argc, char** argv) {
@@ -13,6 +14,7 @@ int main(int argc, char** argv) {
   app.footer("Exit codes: 0 done, 1 failed, 2 wrong usage or configuration.");
   int exit_code = 0;
   perimap::add_check_command(app, exit_code);
+  perimap::add_simulate_command(app, exit_code);
   perimap::add_watch_command(app, exit_code);
   try {
     app.parse(argc, argv);
