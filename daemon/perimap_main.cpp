@@ -1,28 +1,21 @@
-// perimap, the companion of perimapd. Exit codes: 0 done, 1 failed, 2 wrong usage or configuration.
+// perimap: the companion command line of perimapd.
 #include <CLI/CLI.hpp>
-#include <cstdio>
-#include <exception>
 
-#include "daemon/commands/check.hpp"
+#include "daemon/commands/replay.hpp"
 #include "daemon/commands/simulate.hpp"
-#include "daemon/commands/watch.hpp"
 
 int main(int argc, char** argv) {
-  CLI::App app("Companion of perimapd, which predicts where a beating organ's surface will be.");
-  app.set_version_flag("--version", "perimap " PERIMAP_VERSION);
+  CLI::App app{"Tools around perimapd, which maps a beating organ. Research software, not a certified medical device.",
+               "perimap"};
+  app.set_version_flag("--version", PERIMAP_VERSION);
   app.require_subcommand(1);
-  app.footer("Exit codes: 0 done, 1 failed, 2 wrong usage or configuration.");
   int exit_code = 0;
-  perimap::add_check_command(app, exit_code);
   perimap::add_simulate_command(app, exit_code);
-  perimap::add_watch_command(app, exit_code);
+  perimap::add_replay_command(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "perimap: %s\n", error.what());
-    return 1;
   }
   return exit_code;
 }

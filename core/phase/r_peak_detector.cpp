@@ -263,7 +263,12 @@ void RPeakDetector::locate_peak(std::int64_t centre, Candidate& candidate) const
     const std::int64_t to = std::min(peak + reach, now_);
     if (peak - from != to - peak) break;  // too close to an end of the signal
     // Centred and evenly spaced, so that b separates from a and c.
-    double n = 0, sum_y = 0, sum_uy = 0, sum_u2 = 0, sum_u2y = 0, sum_u4 = 0;
+    double n = 0.0;
+    double sum_y = 0.0;
+    double sum_uy = 0.0;
+    double sum_u2 = 0.0;
+    double sum_u2y = 0.0;
+    double sum_u4 = 0.0;
     for (std::int64_t i = from; i <= to; ++i) {
       const double u = static_cast<double>(i - peak) * step_s;
       const double y = at(i).mV - baseline;

@@ -21,7 +21,7 @@ constexpr double kLargestScoredError = 0.5;  // of the prediction: a missed beat
 
 void RrPredictor::push(Seconds rr, Seconds learnt) noexcept {
   if (count_ > 0) {
-    std::array<Seconds, 1> predicted;
+    std::array<Seconds, 1> predicted{};
     predict(predicted);
     const double bound = kLargestScoredError * predicted[0].count();
     const double error = std::clamp(rr.count() - predicted[0].count(), -bound, bound);

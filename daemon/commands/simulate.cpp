@@ -15,7 +15,7 @@
 
 #include "daemon/commands/frame_renderer.hpp"
 #include "daemon/commands/progress.hpp"
-#include "daemon/commands/truth_messages.hpp"
+#include "daemon/report/truth_messages.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/foxglove_image.hpp"
 #include "drivers/recording/foxglove_pose.hpp"

@@ -8,6 +8,8 @@
 #include <cstring>
 #include <vector>
 
+#include "drivers/recording/cdr_check.hpp"
+
 namespace perimap {
 namespace {
 
@@ -50,6 +52,10 @@ Expected<std::span<const std::byte>> CdrSerializer::serialize(const void* sample
   if (written == nullptr) {
     return fail(fmt::format("{}: a member has a value that its type does not allow", type.schema_name()));
   }
+  if (stream.x.m_index > kMaxSerializedBytes) {
+    return fail(fmt::format("{}: a message of {} bytes is larger than the limit of {}", type.schema_name(),
+                            stream.x.m_index, kMaxSerializedBytes));
+  }
   return std::as_bytes(std::span(buffer_.get(), stream.x.m_index));
 }
 
@@ -66,21 +72,21 @@ Expected<void> deserialize(std::span<const std::byte> bytes, const TopicType& ty
     return fail(fmt::format("{}: encapsulation 0x{:04x}, expected 0x{:04x}", type.schema_name(), identifier,
                             representation(type)));
   }
-  // A copy, because the reader needs alignment and the check takes a mutable buffer.
-  const auto body_bytes = static_cast<std::uint32_t>(bytes.size() - kEncapsulationBytes);
-  std::vector<std::uint64_t> body((body_bytes + 7) / 8 + 1);
-  std::memcpy(body.data(), bytes.data() + kEncapsulationBytes, body_bytes);
-  std::uint32_t used = 0;
-  if (dds_stream_normalize_data(reinterpret_cast<char*>(body.data()), &used, body_bytes, /*bswap=*/false, kXcdrVersion2,
-                                type.descriptor->m_ops) == nullptr) {
-    return fail(fmt::format("{}: the {} bytes are not a valid message of this type", type.schema_name(), bytes.size()));
+  const auto body = bytes.subspan(kEncapsulationBytes);
+  const auto used = check_xcdr2(body, type.descriptor->m_ops);
+  if (!used) {
+    return fail(fmt::format("{}: the {} bytes are not a valid message of this type, {}", type.schema_name(),
+                            bytes.size(), used.error().message));
   }
   // Writers may pad a payload to a multiple of 4.
-  if (body_bytes - used > 3) {
-    return fail(fmt::format("{}: {} bytes left over after the message", type.schema_name(), body_bytes - used));
+  if (body.size() - *used > 3) {
+    return fail(fmt::format("{}: {} bytes left over after the message", type.schema_name(), body.size() - *used));
   }
+  // A copy, because the reader needs alignment.
+  std::vector<std::uint64_t> aligned(*used / sizeof(std::uint64_t) + 1);
+  std::memcpy(aligned.data(), body.data(), *used);
   dds_istream_t stream;
-  dds_istream_init(&stream, used, body.data(), kXcdrVersion2);
+  dds_istream_init(&stream, static_cast<std::uint32_t>(*used), aligned.data(), kXcdrVersion2);
   dds_stream_read(&stream, static_cast<char*>(zeroed_sample), type.descriptor->m_ops);
   return {};
 }

@@ -41,13 +41,17 @@ class Sample {
   T value_{};
 };
 
+// Larger messages are neither written nor read, so that a damaged length cannot ask for the machine's memory.
+inline constexpr std::size_t kMaxSerializedBytes = std::size_t{64} << 20;
+
 // Keeps its buffer from one sample to the next, so that nothing is allocated once it has seen the largest.
 class CdrSerializer {
  public:
   CdrSerializer();
 
   // The bytes are valid until the next call. Fails when a member cannot be represented (an enumerator that does not
-  // exist). Strings must be terminated; an unset `string` member (null) is written as the empty string.
+  // exist) or the message is too large. Strings must be terminated; an unset `string` member (null) is written as the
+  // empty string.
   template <class T>
   [[nodiscard]] Expected<std::span<const std::byte>> serialize(const T& sample) {
     return serialize(&sample, topic_type<T>());
@@ -62,9 +66,6 @@ class CdrSerializer {
   std::unique_ptr<unsigned char, Free> buffer_;
   std::uint32_t capacity_ = 0;
 };
-
-// Above this a message is refused, so that a damaged length cannot ask for the machine's memory.
-inline constexpr std::size_t kMaxSerializedBytes = std::size_t{64} << 20;
 
 // Fails unless `bytes` is one whole, valid sample of the type in the encapsulation that CdrSerializer writes; bytes of
 // any content are safe. Members that an older writer did not know are zero; members unknown here are skipped.

@@ -239,9 +239,9 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   std::stable_sort(arrivals.begin(), arrivals.end(),
                    [](const Arrival& a, const Arrival& b) { return a.arrival < b.arrival; });
 
-  // About 1.5 texels a pixel at rest.
-  const int texture_size =
-      std::min(4096, 2048 * static_cast<int>(std::bit_ceil(static_cast<unsigned>((settings.width + 639) / 640))));
+  // A texel a pixel or more, at rest.
+  const int texture_size = std::min(
+      4096, static_cast<int>(std::bit_ceil(static_cast<unsigned>(3 * std::max(settings.width, settings.height)))));
   const auto texture_seed = static_cast<std::uint32_t>(CounterNoise(settings.seed, kSession).bits(2));
   simulation.texture_ = std::make_unique<const TissueTexture>(material_W, simulation.truth_.mesh().triangles, centre_W,
                                                               axis_W, texture_size, texture_seed, parallel_for);

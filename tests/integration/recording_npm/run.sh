@@ -18,8 +18,8 @@ mkdir -p "$work_folder"
 cp "$source_folder/package.json" "$source_folder/package-lock.json" "$source_folder/check_recording.mjs" "$work_folder"
 cd "$work_folder"
 if ! cmp -s package-lock.json installed-lock.json; then
-  if ! npm ci --ignore-scripts --no-audit --no-fund; then
-    if ! npm ping >/dev/null 2>&1; then
+  if ! npm ci --ignore-scripts --no-audit --no-fund --fetch-retries=1 --fetch-timeout=30000; then
+    if ! npm ping --fetch-retries=0 --fetch-timeout=30000 >/dev/null 2>&1; then
       echo "SKIPPED: the npm registry cannot be reached"
       exit 77
     fi

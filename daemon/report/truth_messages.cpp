@@ -1,4 +1,4 @@
-#include "daemon/commands/truth_messages.hpp"
+#include "daemon/report/truth_messages.hpp"
 
 #include <cmath>
 

@@ -1,0 +1,55 @@
+#include "core/pipeline/batch_starter.hpp"
+
+namespace perimap {
+
+BatchStarter::BatchStarter(const PipelineSettings& settings, std::span<FeatureSlot> slots)
+    : model_{settings.camera},
+      layout_(settings.estimator.layout),
+      prior_(settings.estimator.prior),
+      batch_(settings.estimator.batch),
+      slots_(slots) {
+  for (int i = 0; i < settings.workers; ++i) lanes_.push_back(std::make_unique<Lane>(slots.size()));
+}
+
+void BatchStarter::request(int worker, int slot) noexcept {
+  Lane& lane = *lanes_[static_cast<std::size_t>(worker)];
+  if (!lane.ring.push(slot)) return;
+  ++lane.requested;
+  go_.post();
+}
+
+void BatchStarter::serve() noexcept {
+  for (;;) {
+    go_.wait();
+    if (dismissed_.load(std::memory_order_relaxed)) return;
+    // One post, one request; which lane it came from is found by looking.
+    int slot = 0;
+    for (auto& lane : lanes_) {
+      if (!lane->ring.pop(slot)) continue;
+      solve(slots_[static_cast<std::size_t>(slot)]);
+      break;
+    }
+  }
+}
+
+void BatchStarter::dismiss() noexcept {
+  dismissed_.store(true, std::memory_order_relaxed);
+  go_.post();
+}
+
+void BatchStarter::wait_until_done() noexcept {
+  std::uint64_t requested = 0;
+  for (const auto& lane : lanes_) requested += lane->requested;
+  for (; waited_for_ < requested; ++waited_for_) solved_.wait();
+}
+
+void BatchStarter::solve(FeatureSlot& slot) noexcept {
+  const std::span<const Observation> observations(slot.start.observations.data(),
+                                                  static_cast<std::size_t>(slot.start.count));
+  slot.start.outcome = batch_start(observations, model_, layout_, prior_, batch_);
+  // Release: the outcome is complete before the worker can see the flag (pairs with the acquire in adopt_start).
+  slot.start.ready.store(true, std::memory_order_release);
+  solved_.post();
+}
+
+}  // namespace perimap

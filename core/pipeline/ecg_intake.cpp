@@ -1,0 +1,42 @@
+#include "core/pipeline/ecg_intake.hpp"
+
+#include <optional>
+
+#include "core/realtime/realtime_scope.hpp"
+
+namespace perimap {
+
+void EcgIntake::push(const EcgBlock& block) noexcept {
+  const RealtimeScope realtime;
+  if (started_ && block.device_sequence != next_device_sequence_) {
+    counters_.ecg_dropped.add(block.device_sequence - next_device_sequence_);
+  }
+  started_ = true;
+  next_device_sequence_ = block.device_sequence + block.count;
+  counters_.ecg_samples.add(block.count);
+  if (block.count > 0) {
+    const Instant last = block.first_sample_time + (block.count - 1) * block.sample_period;
+    counters_.ecg_delay.add(block.arrival - last);
+    counters_.last_ecg_ns.set(static_cast<std::uint64_t>(to_ns(last)));
+  }
+  if (block.lead_off) {
+    counters_.ecg_lead_off.add(block.count);
+    detector_.lead_off(block.first_sample_time);
+    return;
+  }
+  bool changed = false;
+  Instant t = block.first_sample_time;
+  for (const float mV : block.samples()) {
+    if (const std::optional<RPeak> peak = detector_.push(t, mV)) {
+      tracker_.on_r_peak(*peak);
+      changed = true;
+    }
+    t += block.sample_period;
+  }
+  if (!changed) return;
+  cells_.mapper.write(tracker_.clock());
+  cells_.publisher.write(tracker_.clock());
+  cells_.status.write(tracker_.clock());
+}
+
+}  // namespace perimap

@@ -1,0 +1,94 @@
+// Housekeeping: finds new features in a frame and follows them through the next few, on a thread of its own, so that
+// they can be adopted at a stated frame.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/realtime/spsc_ring.hpp"
+#include "core/realtime/wakeup.hpp"
+#include "core/sensors/frame_stamp.hpp"
+#include "core/sensors/grey_image.hpp"
+#include "core/vision/feature_detector.hpp"
+#include "core/vision/image_pyramid.hpp"
+#include "core/vision/patch_template.hpp"
+#include "core/vision/patch_tracker.hpp"
+
+namespace perimap {
+
+// A feature found in the round's first frame and still followed in its last.
+struct FoundFeature {
+  Instant first_observed;
+  Vector2d first_observed_px = Vector2d::Zero();
+  PatchTemplate patch;
+  PatchState patch_state;                   // in the round's last frame
+  Vector2d velocity_px = Vector2d::Zero();  // per frame
+};
+
+// A round: the frame begun at, and the kFinderDelayFrames - 1 after it, are copied here by the mapper as they come; the
+// result is due at the frame after them. One round at a time.
+// offer() and adopt() belong to the mapper, serve() to the housekeeping thread.
+class FeatureFinder {
+ public:
+  static constexpr std::size_t kMaximumPerRound = 48;
+
+  FeatureFinder(const PipelineSettings& settings, PipelineCounters& counters);
+
+  // Mapper, once a frame after its features are known: takes what the round needs of it. `occupied` are the pixels of
+  // the features that are followed now; a round begins only when `wanted` > 0.
+  void offer(std::uint64_t frame_index, const FrameStamp& stamp, const GreyImage& image,
+             std::span<const Vector2d> occupied, int wanted) noexcept;
+
+  // Mapper, once a frame before its features are followed: the result that is due at this frame; empty when none is.
+  // A result that is not there in time is lost and counted; in lockstep it is waited for.
+  [[nodiscard]] std::span<const FoundFeature> adopt(std::uint64_t frame_index) noexcept;
+
+  // Until dismiss().
+  void serve() noexcept;
+  void dismiss() noexcept;
+
+ private:
+  struct Frame {
+    FrameStamp stamp;
+    std::vector<std::uint8_t> pixels;
+  };
+
+  void work(int step) noexcept;
+  void find(const Frame& frame) noexcept;
+  void follow() noexcept;
+
+  int width_;
+  int height_;
+  int interval_;
+  bool lockstep_;
+  DetectorSettings detector_;
+  TemplateSettings template_;
+  PipelineCounters& counters_;
+
+  // The mapper's own.
+  bool active_ = false;
+  std::uint64_t begun_at_ = 0;
+
+  // Filled by the mapper before the step's number goes into the ring, read by housekeeping after it comes out.
+  std::array<Frame, kFinderDelayFrames> frames_;
+  std::vector<Vector2d> occupied_;
+  int wanted_ = 0;
+  SpscRing<int> steps_;
+  Wakeup go_;
+
+  // Housekeeping's own until done_ is set; the mapper's until the next round begins.
+  std::vector<FoundFeature> found_;
+  ImagePyramid pyramid_;
+  std::atomic<bool> done_{false};
+  Wakeup finished_;
+
+  // Relaxed throughout: the flag alone is the message, and the post of go_ that follows orders it.
+  std::atomic<bool> dismissed_{false};
+};
+
+}  // namespace perimap

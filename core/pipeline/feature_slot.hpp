@@ -1,0 +1,91 @@
+// One feature's whole life in the pipeline, in memory that is there from the start.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "core/estimation/batch_start.hpp"
+#include "core/estimation/feature_estimate.hpp"
+#include "core/estimation/innovation_monitor.hpp"
+#include "core/estimation/observation.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/time/instant.hpp"
+#include "core/vision/patch_template.hpp"
+#include "core/vision/patch_tracker.hpp"
+
+namespace perimap {
+
+enum class SlotState : std::uint8_t {
+  kEmpty,
+  kTracked,   // followed in the image, gathering the observations of its start
+  kStarting,  // the batch start is under way in housekeeping
+  kMapped     // has an estimate
+};
+
+// A match that waits to be learnt. Its pose and phase are in the frame history.
+struct HeldMatch {
+  std::uint64_t frame_index = 0;
+  Vector2d px = Vector2d::Zero();
+  Matrix2d covariance_px2 = Matrix2d::Identity();
+};
+
+// The matches of one feature that are not learnt yet, oldest first. When it is full the oldest goes.
+class HeldMatches {
+ public:
+  void clear() noexcept { head_ = tail_ = 0; }
+  [[nodiscard]] std::uint32_t size() const noexcept { return head_ - tail_; }
+  [[nodiscard]] const HeldMatch& operator[](std::uint32_t i) const noexcept {
+    return matches_[(tail_ + i) % kCapacity];
+  }
+  void push(const HeldMatch& match) noexcept {
+    if (size() == kCapacity) ++tail_;
+    matches_[head_++ % kCapacity] = match;
+  }
+  void drop(std::uint32_t n) noexcept { tail_ += n < size() ? n : size(); }
+
+ private:
+  static constexpr std::uint32_t kCapacity = 256;  // a power of two, so that the indices may wrap
+  std::array<HeldMatch, kCapacity> matches_{};
+  std::uint32_t head_ = 0;
+  std::uint32_t tail_ = 0;
+};
+
+// The hand-over to housekeeping and back: the worker fills `observations`, raises `requested` through its ring, and
+// does not touch the rest before `ready`.
+struct BatchStartExchange {
+  std::array<Observation, kMaxStartObservations> observations{};
+  int count = 0;
+  std::uint64_t adopt_at_frame = 0;
+  BatchOutcome outcome;
+  // Housekeeping stores true with release after writing `outcome`; the worker's acquire load then sees all of it.
+  std::atomic<bool> ready{false};
+};
+
+struct FeatureSlot {
+  SlotState state = SlotState::kEmpty;
+  std::uint32_t id = 0;
+  Instant first_observed;
+  Vector2d first_observed_px = Vector2d::Zero();
+
+  // following
+  PatchTemplate patch;
+  PatchState patch_state;
+  Vector2d velocity_px = Vector2d::Zero();  // per frame
+  std::uint64_t last_found_frame = 0;
+  int refused_in_a_row = 0;  // found, but the estimate's gate said no
+  PatchMatch match;          // of this frame
+
+  // learning
+  HeldMatches held;
+  int failed_starts = 0;
+  BatchStartExchange start;
+  FeatureEstimate estimate;
+  InnovationMonitor monitor;
+  int updates = 0;
+  double largest_deviation_mm = 0.0;
+  bool converged = false;
+  Instant last_observed;
+};
+
+}  // namespace perimap

@@ -1,0 +1,73 @@
+// What all features share about each of the last frames: pose, phase and basis at capture.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/periodic/basis.hpp"
+#include "core/phase/cardiac_clock.hpp"
+#include "core/pipeline/pose_history.hpp"
+#include "core/sensors/frame_stamp.hpp"
+
+namespace perimap {
+
+struct FrameRecord {
+  std::uint64_t index = 0;  // the mapper's own count, without gaps
+  FrameStamp stamp;
+  bool measurable = false;  // pose and phase are there, so its matches can be learnt from
+  CameraPose pose;
+  Pose X_CW;
+  PhaseEstimate phase;  // at capture, as known at the last refresh
+  Basis b;
+  Basis b_rate;
+};
+
+// Written by the mapper while no stage runs, read by the workers during stages.
+class FrameHistory {
+ public:
+  static constexpr std::uint64_t kCapacity = 256;
+
+  explicit FrameHistory(const BasisLayout& layout) noexcept : layout_(layout) {}
+
+  FrameRecord& append(const FrameStamp& stamp) noexcept {
+    FrameRecord& record = records_[count_ % kCapacity];
+    record = FrameRecord{};
+    record.index = count_++;
+    record.stamp = stamp;
+    return record;
+  }
+
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+
+  // Null when the frame has left the history.
+  [[nodiscard]] const FrameRecord* find(std::uint64_t index) const noexcept {
+    if (index >= count_ || count_ - index > kCapacity) return nullptr;
+    return &records_[index % kCapacity];
+  }
+
+  // Fills phase and basis of a record from the clock. The basis is computed here, once a frame.
+  void set_phase(FrameRecord& record, const CardiacClock& clock) noexcept {
+    record.phase = clock.at(record.stamp.capture);
+    const bool usable = record.phase.state == PhaseState::kLocked || record.phase.state == PhaseState::kFreeRunning;
+    record.measurable = record.pose.valid() && usable;
+    record.b = basis_at(layout_, record.phase.phase_rad);
+    record.b_rate = basis_rate(layout_, record.phase.phase_rad);
+  }
+
+  // After a beat: the frames whose cycle was still open get what is known now. At most a cycle or two of frames.
+  void refresh_phases(const CardiacClock& clock) noexcept {
+    const std::uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
+    for (std::uint64_t i = count_; i > oldest; --i) {
+      FrameRecord& record = records_[(i - 1) % kCapacity];
+      if (record.phase.exact) return;
+      set_phase(record, clock);
+    }
+  }
+
+ private:
+  BasisLayout layout_;
+  std::array<FrameRecord, kCapacity> records_{};
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace perimap

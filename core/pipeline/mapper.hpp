@@ -1,0 +1,87 @@
+// A frame's stages, run by the mapper thread with the help of the workers.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/phase/cardiac_clock.hpp"
+#include "core/pipeline/batch_starter.hpp"
+#include "core/pipeline/feature_finder.hpp"
+#include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/feature_stages.hpp"
+#include "core/pipeline/frame_history.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/pose_history.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
+#include "core/realtime/worker_team.hpp"
+#include "core/sensors/frame_stamp.hpp"
+#include "core/sensors/grey_image.hpp"
+#include "core/sensors/tracker_sample.hpp"
+#include "core/vision/image_pyramid.hpp"
+
+namespace perimap {
+
+// One frame: A (workers predict and find), B (the mapper joins phase and pose), C (workers evaluate), then D (workers
+// learn). Slot s belongs to worker s mod workers; what is computed for a feature does not depend on who computes it.
+// All members are called by the mapper thread.
+class Mapper {
+ public:
+  Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells, WorkerTeam& team,
+         FeatureFinder& finder, BatchStarter& starter, PipelineCounters& counters);
+
+  void add_pose(const TrackerSample& sample) noexcept;
+
+  // The tracker has told all about instant t that it will: no need to wait longer.
+  [[nodiscard]] bool pose_reached(Instant t) const noexcept { return poses_.reached(t); }
+
+  // Stages A, B and C. `image` is not used after the return.
+  void process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& clock) noexcept;
+
+  // Stage D of the frame just processed; the workers do it while the mapper waits for the next frame. In lockstep it
+  // is done on return.
+  void learn() noexcept;
+
+ private:
+  template <void (Mapper::*Stage)(int) noexcept>
+  static void run_stage(void* self, int worker) noexcept {
+    (static_cast<Mapper*>(self)->*Stage)(worker);
+  }
+  void predict_and_find_shard(int worker) noexcept;
+  void settle_phase_and_pose(const FrameRecord& frame, const CardiacClock& clock) noexcept;
+  void evaluate_shard(int worker) noexcept;
+  void learn_shard(int worker) noexcept;
+  void finish_learning() noexcept;
+  void adopt_found_features(std::uint64_t frame_index) noexcept;
+  void offer_to_finder(const FrameRecord& frame, const GreyImage& image) noexcept;
+
+  struct alignas(64) WorkerTally {
+    std::uint64_t lost = 0;
+    std::uint64_t adoptions_late = 0;
+    bool put_off = false;
+    Instant ended;
+  };
+
+  PipelineSettings settings_;
+  PixelModel model_;
+  std::span<FeatureSlot> slots_;
+  std::span<ShardCells> cells_;
+  WorkerTeam& team_;
+  FeatureFinder& finder_;
+  BatchStarter& starter_;
+  PipelineCounters& counters_;
+
+  PoseHistory poses_;
+  std::unique_ptr<FrameHistory> history_;
+  ImagePyramid pyramid_;
+  FrameJob job_;
+  std::vector<WorkerTally> tallies_;
+  std::vector<Vector2d> occupied_;
+  std::uint64_t beats_ = 0;
+  std::uint32_t next_id_ = 1;
+  Instant last_capture_;
+  Instant learn_started_;
+};
+
+}  // namespace perimap

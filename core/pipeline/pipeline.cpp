@@ -1,0 +1,86 @@
+#include "core/pipeline/pipeline.hpp"
+
+#include "core/realtime/realtime_scope.hpp"
+
+namespace perimap {
+namespace {
+
+ComposerSettings composer_settings(const PipelineSettings& settings) {
+  ComposerSettings composer;
+  composer.layout = settings.estimator.layout;
+  composer.validity = settings.validity;
+  composer.maximum_features = static_cast<std::size_t>(settings.features.maximum);
+  return composer;
+}
+
+}  // namespace
+
+Pipeline::Pipeline(const PipelineSettings& settings)
+    : settings_(settings),
+      slots_(static_cast<std::size_t>(settings.features.maximum)),
+      cells_(static_cast<std::size_t>(settings.workers)),
+      entrance_(settings.camera.width, settings.camera.height, settings.clock, counters_),
+      team_(settings.workers),
+      finder_(settings, counters_),
+      starter_(settings, slots_),
+      mapper_(settings, slots_, cells_, team_, finder_, starter_, counters_),
+      schedule_(settings.latency),
+      composer_(composer_settings(settings)),
+      publisher_view_(cells_.size()),
+      model_view_(cells_.size()) {
+  for (ShardCells& cells : cells_) {
+    for (TripleBuffer<ShardSnapshot>* cell : {&cells.publisher, &cells.model}) {
+      // Each of the three copies needs its own reserve: copying a vector does not copy its capacity.
+      for (int i = 0; i < 3; ++i) {
+        cell->back().features.reserve(slots_.size());
+        cell->publish();
+        cell->update();
+      }
+    }
+  }
+}
+
+void Pipeline::drain_poses() noexcept {
+  TrackerSample sample;
+  while (entrance_.pop_pose(sample)) mapper_.add_pose(sample);
+}
+
+void Pipeline::map(const FrameHandle& frame) noexcept {
+  TripleBuffer<CardiacClock>& clock = entrance_.clocks().mapper;
+  clock.update();
+  mapper_.process(frame.stamp, entrance_.image(frame), clock.front());
+  entrance_.give_back(frame);
+  mapper_.learn();
+}
+
+void Pipeline::drain_stamps(Instant now) noexcept {
+  FrameStamp stamp;
+  while (entrance_.pop_stamp(stamp)) {
+    if (!schedule_.on_frame(stamp, now)) counters_.frames_too_late.add();
+  }
+}
+
+const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
+  const RealtimeScope realtime;
+  TripleBuffer<CardiacClock>& clock = entrance_.clocks().publisher;
+  clock.update();
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    cells_[i].publisher.update();
+    publisher_view_[i] = &cells_[i].publisher.front();
+  }
+  const SurfaceSample& sample = composer_.compose(release, clock.front(), publisher_view_);
+  counters_.samples.add();
+  if (release.frame_missing) counters_.samples_without_frame.add();
+  if (sample.update_late) counters_.samples_from_late_update.add();
+  return sample;
+}
+
+std::span<const ShardSnapshot* const> Pipeline::model_snapshots() noexcept {
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    cells_[i].model.update();
+    model_view_[i] = &cells_[i].model.front();
+  }
+  return model_view_;
+}
+
+}  // namespace perimap

@@ -1,0 +1,64 @@
+// All parts of the pipeline, built once and joined; the threads that run them are the daemon's.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/pipeline/batch_starter.hpp"
+#include "core/pipeline/feature_finder.hpp"
+#include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/mapper.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/release_schedule.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
+#include "core/pipeline/surface_composer.hpp"
+#include "core/realtime/worker_team.hpp"
+
+namespace perimap {
+
+class Pipeline {
+ public:
+  explicit Pipeline(const PipelineSettings& settings);
+
+  [[nodiscard]] const PipelineSettings& settings() const noexcept { return settings_; }
+  [[nodiscard]] PipelineCounters& counters() noexcept { return counters_; }
+  [[nodiscard]] SensorEntrance& entrance() noexcept { return entrance_; }
+  [[nodiscard]] WorkerTeam& team() noexcept { return team_; }
+  [[nodiscard]] FeatureFinder& finder() noexcept { return finder_; }
+  [[nodiscard]] BatchStarter& starter() noexcept { return starter_; }
+  [[nodiscard]] ReleaseSchedule& schedule() noexcept { return schedule_; }
+
+  // Mapper thread: takes over what the tracker has sent.
+  void drain_poses() noexcept;
+  [[nodiscard]] bool pose_reached(Instant t) const noexcept { return mapper_.pose_reached(t); }
+  // Mapper thread: one frame through A, B and C, its buffer given back, then D begun.
+  void map(const FrameHandle& frame) noexcept;
+
+  // Publisher thread: takes over the stamps of the frames that have arrived.
+  void drain_stamps(Instant now) noexcept;
+  // Publisher thread: the surface of one release, with all that is known now. Valid until the next call.
+  [[nodiscard]] const SurfaceSample& compose(const Release& release) noexcept;
+
+  // Status thread: each worker's newest snapshot, in order of shard; valid until the next call.
+  [[nodiscard]] std::span<const ShardSnapshot* const> model_snapshots() noexcept;
+
+ private:
+  PipelineSettings settings_;
+  PipelineCounters counters_;
+  std::vector<FeatureSlot> slots_;
+  std::vector<ShardCells> cells_;
+  SensorEntrance entrance_;
+  WorkerTeam team_;
+  FeatureFinder finder_;
+  BatchStarter starter_;
+  Mapper mapper_;
+  ReleaseSchedule schedule_;
+  SurfaceComposer composer_;
+  std::vector<const ShardSnapshot*> publisher_view_;
+  std::vector<const ShardSnapshot*> model_view_;
+};
+
+}  // namespace perimap

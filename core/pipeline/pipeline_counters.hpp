@@ -1,0 +1,57 @@
+// What the pipeline counts for the status topic.
+#pragma once
+
+#include "core/realtime/counter.hpp"
+#include "core/realtime/latency_histogram.hpp"
+
+namespace perimap {
+
+// Each member is written by one thread, named here, and read by the status thread.
+struct PipelineCounters {
+  // camera thread
+  Counter frames_received;
+  Counter frames_dropped;  // gaps in the device's sequence, no free buffer, full ring
+  LatencyHistogram camera_delay;
+  Counter last_frame_ns;
+  // tracker thread
+  Counter poses_received;
+  Counter poses_invalid;  // the device said so: tool missing, out of volume
+  Counter poses_dropped;  // full ring
+  LatencyHistogram tracker_delay;
+  Counter last_pose_ns;
+  // ECG thread
+  Counter ecg_samples;
+  Counter ecg_lead_off;  // samples
+  Counter ecg_dropped;   // gaps in the device's sequence
+  LatencyHistogram ecg_delay;
+  Counter last_ecg_ns;
+  // mapper thread
+  Counter frames;
+  Counter frames_without_pose;
+  Counter frames_without_phase;
+  Counter poses_refused;  // stamps that go back in time
+  Counter learning_put_off;
+  Counter adoptions_late;
+  Counter features_tracked;
+  Counter features_starting;
+  Counter features_converging;
+  Counter features_converged;
+  Counter features_inconsistent;
+  Counter features_lost;
+  LatencyHistogram predict_and_find;
+  LatencyHistogram phase_and_pose;
+  LatencyHistogram evaluate;
+  LatencyHistogram learn;
+  LatencyHistogram capture_to_update;
+  // finder thread
+  Counter searches_failed;
+  // publisher thread
+  Counter frames_too_late;
+  Counter samples;
+  Counter samples_without_frame;
+  Counter samples_from_late_update;
+  LatencyHistogram release_tardiness;
+  LatencyHistogram dds_write;
+};
+
+}  // namespace perimap

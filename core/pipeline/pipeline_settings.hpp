@@ -1,0 +1,52 @@
+// How the pipeline is set up; plain values, filled by the daemon from its configuration.
+#pragma once
+
+#include "core/estimation/batch_start.hpp"
+#include "core/estimation/iterated_update.hpp"
+#include "core/geometry/camera_model.hpp"
+#include "core/periodic/basis.hpp"
+#include "core/phase/cardiac_clock_tracker.hpp"
+#include "core/pipeline/pose_history.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+struct FeatureSettings {
+  int maximum = 120;
+  int detection_interval_frames = 10;
+  double minimum_distance_px = 18.0;
+};
+
+struct EstimatorSettings {
+  BasisLayout layout;
+  Prior prior;
+  UpdateSettings update;
+  BatchSettings batch;
+  int start_observations = 60;          // K, at most kMaxStartObservations
+  double pixel_deviation_px = 0.5;      // floor of a match's standard deviation, per axis
+  double converged_deviation_mm = 1.0;  // bound on the largest deviation over the cycle
+};
+
+struct PipelineSettings {
+  CameraModel camera;
+  PoseHistorySettings pose;
+  CardiacClockSettings clock;
+  FeatureSettings features;
+  EstimatorSettings estimator;
+  int workers = 2;
+  Duration latency = std::chrono::milliseconds(50);  // L: release minus capture
+  Duration budget = std::chrono::milliseconds(12);   // kept free for A to C before the release
+  Duration validity = std::chrono::milliseconds(200);
+  int adoption_delay_frames = 15;  // D, for batch starts
+  // Lockstep: nothing is shed and every housekeeping result is there at its stated frame, so that a replay gives the
+  // same samples every time.
+  bool lockstep = false;
+};
+
+// Level 0 to 2: a search of +-40 px at 640x480.
+inline constexpr int kPyramidLevels = 3;
+inline constexpr int kMaxStartObservations = 96;
+// Frames from a search for new features to their adoption: the finder follows them through these frames.
+inline constexpr int kFinderDelayFrames = 5;
+
+}  // namespace perimap

@@ -1,0 +1,72 @@
+// The tracker's recent readings, and the camera pose at any instant among them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/geometry/pose.hpp"
+#include "core/sensors/tracker_sample.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+struct PoseHistorySettings {
+  Pose X_SC;                                             // hand-eye: camera in the tracked sensor's frame
+  double position_deviation_mm = 0.0;                    // of one reading, per axis
+  double rotation_deviation_rad = 0.0;                   // of one reading, per axis
+  Duration time_offset{0};                               // added to the tracker's stamps to get the camera's time
+  Duration maximum_gap = std::chrono::milliseconds(50);  // readings farther apart are not interpolated between
+  Duration maximum_extrapolation = std::chrono::milliseconds(20);
+};
+
+// X_WC at one instant with its noise: the sensor's translation moves by an isotropic error of variance
+// position_variance_mm2 per axis, and its rotation by one of rotation_variance_rad2 per axis about the sensor, which
+// sits at -lever_W_mm from the camera centre.
+struct CameraPose {
+  enum class State : std::uint8_t {
+    kMissing,  // no valid readings near enough: there is no pose, X_WC means nothing
+    kInterpolated,
+    kExtrapolated,  // past the newest reading by at most maximum_extrapolation; variances grown
+  };
+  State state = State::kMissing;
+  Pose X_WC;
+  Vector3d lever_W_mm = Vector3d::Zero();  // R_WS * t_SC
+  double position_variance_mm2 = 0.0;
+  double rotation_variance_rad2 = 0.0;
+
+  [[nodiscard]] bool valid() const noexcept { return state != State::kMissing; }
+};
+
+// Used by one thread. Readings must be added in order of their stamps; one that goes back in time is refused and
+// counted. A reading that is not kOk is kept as what it is: a hole that is not interpolated across.
+class PoseHistory {
+ public:
+  explicit PoseHistory(const PoseHistorySettings& settings) noexcept : settings_(settings) {}
+
+  // False when the reading is refused: its stamp is not after the newest one's, or its pose is not finite.
+  bool add(const TrackerSample& sample) noexcept;
+
+  // The newest reading, valid or not, is at or after t: waiting longer can not improve at(t).
+  [[nodiscard]] bool reached(Instant t) const noexcept;
+
+  [[nodiscard]] CameraPose at(Instant t) const noexcept;
+
+ private:
+  static constexpr std::uint64_t kCapacity = 512;
+
+  struct Reading {
+    Instant time;  // on the camera's clock
+    bool valid = false;
+    Pose X_WS;
+  };
+
+  [[nodiscard]] const Reading& reading(std::uint64_t index) const noexcept { return readings_[index % kCapacity]; }
+  [[nodiscard]] CameraPose between(const Reading& r_0, const Reading& r_1, Instant t,
+                                   CameraPose::State state) const noexcept;
+
+  PoseHistorySettings settings_;
+  std::array<Reading, kCapacity> readings_{};
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace perimap

@@ -1,0 +1,57 @@
+// When each surface of the `frame` mode is due, whether or not its frame comes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "core/sensors/frame_stamp.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+// One surface that is due.
+struct Release {
+  std::uint64_t frame_sequence = 0;
+  Instant capture;             // of the frame, or where the fitted frame rate puts it
+  Instant deadline;            // capture + L
+  bool frame_missing = false;  // no frame has come for this release
+};
+
+// Every frame is released at capture + L. Where a frame is missing (dropped, or the camera has stopped) the release
+// happens all the same, at the time that the fitted frame period gives. Used by one thread.
+class ReleaseSchedule {
+ public:
+  explicit ReleaseSchedule(Duration latency) noexcept : latency_(latency) {}
+
+  // A frame's stamps, as soon as the frame has arrived. False when it comes too late: its release time has passed
+  // (`now` is past it, or a later one was taken); it then only helps to fit the frame times.
+  bool on_frame(const FrameStamp& stamp, Instant now) noexcept;
+
+  // The next release; none before the first frame. With frame_missing it is provisional: a frame that arrives before
+  // its deadline may replace it.
+  [[nodiscard]] std::optional<Release> next() const noexcept;
+
+  // Takes the next release off the schedule. Requires next().
+  Release take() noexcept;
+
+  [[nodiscard]] Duration period() const noexcept { return period_; }
+
+ private:
+  static constexpr std::uint64_t kCapacity = 64;
+
+  void fit(const FrameStamp& stamp) noexcept;
+
+  Duration latency_;
+  std::array<FrameStamp, kCapacity> pending_{};
+  std::uint64_t head_ = 0;
+  std::uint64_t tail_ = 0;
+  bool have_last_ = false;
+  Instant last_capture_;  // of the last release taken
+  std::uint64_t last_sequence_ = 0;
+  bool have_fit_ = false;
+  FrameStamp fitted_;   // newest stamp that went into the fit
+  Duration period_{0};  // 0: not known yet
+};
+
+}  // namespace perimap

@@ -1,0 +1,67 @@
+#include "core/pipeline/sensor_entrance.hpp"
+
+#include <cstring>
+
+#include "core/realtime/realtime_scope.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr int kFrameBuffers = 8;  // a quarter of a second at 30 frames/s
+constexpr std::size_t kStampRing = 64;
+constexpr std::size_t kPoseRing = 256;  // more than a second of a fast tracker
+
+}  // namespace
+
+SensorEntrance::SensorEntrance(int width, int height, const CardiacClockSettings& clock, PipelineCounters& counters)
+    : counters_(counters),
+      pool_(width, height, kFrameBuffers),
+      mapper_frames_(kFrameBuffers),
+      publisher_stamps_(kStampRing),
+      poses_(kPoseRing),
+      ecg_(clock, clocks_, counters) {}
+
+bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept {
+  const RealtimeScope realtime;
+  counters_.frames_received.add();
+  counters_.camera_delay.add(stamp.arrival - stamp.capture);
+  counters_.last_frame_ns.set(static_cast<std::uint64_t>(to_ns(stamp.capture)));
+  if (any_frame_ && stamp.sequence > last_sequence_ + 1) {
+    counters_.frames_dropped.add(stamp.sequence - last_sequence_ - 1);
+  }
+  any_frame_ = true;
+  last_sequence_ = stamp.sequence;
+  // The release is owed even when the pixels find no place, so the stamps go first.
+  if (publisher_stamps_.push(stamp)) publisher_wakeup_.post();
+  const int buffer = image.width == pool_.width() && image.height == pool_.height() ? pool_.acquire() : -1;
+  if (buffer < 0) {
+    counters_.frames_dropped.add();
+    return false;
+  }
+  const auto width = static_cast<std::size_t>(image.width);
+  for (int y = 0; y < image.height; ++y) {
+    std::memcpy(pool_.pixels(buffer) + static_cast<std::size_t>(y) * width, image.row(y), width);
+  }
+  if (!mapper_frames_.push({buffer, stamp})) {
+    pool_.give_back(buffer);
+    counters_.frames_dropped.add();
+    return false;
+  }
+  mapper_wakeup_.post();
+  return true;
+}
+
+void SensorEntrance::push_pose(const TrackerSample& sample) noexcept {
+  const RealtimeScope realtime;
+  counters_.poses_received.add();
+  counters_.tracker_delay.add(sample.arrival - sample.source_time);
+  counters_.last_pose_ns.set(static_cast<std::uint64_t>(to_ns(sample.source_time)));
+  if (sample.state != ToolState::kOk) counters_.poses_invalid.add();
+  if (!poses_.push(sample)) {
+    counters_.poses_dropped.add();
+    return;
+  }
+  mapper_wakeup_.post();
+}
+
+}  // namespace perimap

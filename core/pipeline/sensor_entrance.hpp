@@ -1,0 +1,56 @@
+// Where sensor data enters the pipeline: the same for devices and for replay.
+#pragma once
+
+#include <cstdint>
+
+#include "core/pipeline/ecg_intake.hpp"
+#include "core/pipeline/frame_pool.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/realtime/spsc_ring.hpp"
+#include "core/realtime/wakeup.hpp"
+#include "core/sensors/ecg_block.hpp"
+#include "core/sensors/frame_stamp.hpp"
+#include "core/sensors/grey_image.hpp"
+#include "core/sensors/tracker_sample.hpp"
+
+namespace perimap {
+
+// push_frame() belongs to the camera thread, push_pose() to the tracker thread, push_ecg() to the ECG thread; one
+// thread may be all three. None of them blocks or allocates. What does not fit is counted, never waited for.
+class SensorEntrance {
+ public:
+  SensorEntrance(int width, int height, const CardiacClockSettings& clock, PipelineCounters& counters);
+
+  // Copies the pixels. False when the frame was dropped: no free buffer, or another size than the pipeline's.
+  bool push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept;
+  void push_pose(const TrackerSample& sample) noexcept;
+  void push_ecg(const EcgBlock& block) noexcept { ecg_.push(block); }
+
+  // Mapper side.
+  [[nodiscard]] bool pop_frame(FrameHandle& frame) noexcept { return mapper_frames_.pop(frame); }
+  [[nodiscard]] bool pop_pose(TrackerSample& sample) noexcept { return poses_.pop(sample); }
+  [[nodiscard]] GreyImage image(const FrameHandle& frame) noexcept { return pool_.image(frame.buffer); }
+  void give_back(const FrameHandle& frame) noexcept { pool_.give_back(frame.buffer); }
+  [[nodiscard]] Wakeup& mapper_wakeup() noexcept { return mapper_wakeup_; }
+
+  // Publisher side: every frame's stamps as soon as it has arrived, however long the mapper takes.
+  [[nodiscard]] bool pop_stamp(FrameStamp& stamp) noexcept { return publisher_stamps_.pop(stamp); }
+  [[nodiscard]] Wakeup& publisher_wakeup() noexcept { return publisher_wakeup_; }
+
+  [[nodiscard]] ClockCells& clocks() noexcept { return clocks_; }
+
+ private:
+  PipelineCounters& counters_;
+  FramePool pool_;
+  SpscRing<FrameHandle> mapper_frames_;
+  SpscRing<FrameStamp> publisher_stamps_;
+  SpscRing<TrackerSample> poses_;
+  Wakeup mapper_wakeup_;
+  Wakeup publisher_wakeup_;
+  ClockCells clocks_;
+  EcgIntake ecg_;
+  bool any_frame_ = false;
+  std::uint64_t last_sequence_ = 0;
+};
+
+}  // namespace perimap

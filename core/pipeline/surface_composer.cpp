@@ -1,0 +1,96 @@
+#include "core/pipeline/surface_composer.hpp"
+
+#include <algorithm>
+
+#include "core/periodic/periodic_motion.hpp"
+#include "core/realtime/realtime_scope.hpp"
+
+namespace perimap {
+namespace {
+
+// The first thing that is wrong, worst first.
+SurfaceReason reason_of(PhaseState phase, bool mapped, bool frame_missing, bool late, bool pose_missing) noexcept {
+  if (phase == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;
+  if (phase == PhaseState::kLost) return SurfaceReason::kPhaseLost;
+  if (!mapped) return SurfaceReason::kNothingMapped;
+  if (phase == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
+  if (frame_missing) return SurfaceReason::kFrameMissing;
+  if (late) return SurfaceReason::kUpdateLate;
+  if (pose_missing) return SurfaceReason::kPoseMissing;
+  return SurfaceReason::kNone;
+}
+
+SurfaceState state_of(SurfaceReason reason) noexcept {
+  switch (reason) {
+    case SurfaceReason::kNone:
+      return SurfaceState::kGood;
+    case SurfaceReason::kPhaseUnknown:
+    case SurfaceReason::kPhaseLost:
+    case SurfaceReason::kNothingMapped:
+      return SurfaceState::kInvalid;
+    default:
+      return SurfaceState::kDegraded;
+  }
+}
+
+}  // namespace
+
+SurfaceComposer::SurfaceComposer(const ComposerSettings& settings) : settings_(settings) {
+  sample_.features.reserve(settings.maximum_features);
+  order_.reserve(settings.maximum_features);
+}
+
+const SurfaceSample& SurfaceComposer::compose(const Release& release, const CardiacClock& clock,
+                                              std::span<const ShardSnapshot* const> snapshots) noexcept {
+  const RealtimeScope realtime;
+  ++sample_.sample_sequence;
+  sample_.release = release;
+  sample_.valid_time = release.deadline;
+  sample_.valid_until = sample_.valid_time + settings_.validity;
+
+  order_.clear();
+  bool pose_missing = false;
+  std::uint64_t oldest = release.frame_sequence;
+  for (const ShardSnapshot* snapshot : snapshots) {
+    oldest = std::min(oldest, snapshot->any ? snapshot->frame_sequence : 0);
+    pose_missing = pose_missing || snapshot->pose_missing;
+    for (const FeatureSnapshot& feature : snapshot->features) order_.push_back(&feature);
+  }
+  std::sort(order_.begin(), order_.end(), [](const auto* a, const auto* b) { return a->id < b->id; });
+
+  const PhaseEstimate phase = clock.at(sample_.valid_time);
+  sample_.oldest_shard_frame_sequence = oldest;
+  sample_.cardiac_phase_rad = phase.phase_rad;
+  sample_.cardiac_phase_deviation_rad = phase.deviation_s * phase.rate_rad_per_s;
+  sample_.cardiac_phase_rate_rad_per_s = phase.rate_rad_per_s;
+  const bool late = oldest < release.frame_sequence && !release.frame_missing;
+  sample_.update_late = late;
+  sample_.reason = reason_of(phase.state, !order_.empty(), release.frame_missing, late, pose_missing);
+  sample_.state = state_of(sample_.reason);
+
+  const bool phase_usable = phase.state == PhaseState::kLocked || phase.state == PhaseState::kFreeRunning;
+  const Basis b = basis_at(settings_.layout, phase.phase_rad);
+  const Basis b_rate = basis_rate(settings_.layout, phase.phase_rad);
+  sample_.features.clear();
+  for (const FeatureSnapshot* snapshot : order_) {
+    SurfaceFeature feature;
+    feature.id = snapshot->id;
+    feature.p_WF_mm = position_of(snapshot->x, b);
+    feature.velocity_W_mm_per_s = velocity_of(snapshot->x, b_rate, phase.rate_rad_per_s);
+    const Vector3d spread_mm = feature.velocity_W_mm_per_s * phase.deviation_s;
+    // The snapshot's covariance is that of its own frame's release. Where this release is another instant, the
+    // largest one over the cycle bounds it.
+    const bool same_instant = !late && !release.frame_missing;
+    feature.covariance_W_mm2 = spread_mm * spread_mm.transpose();
+    feature.covariance_W_mm2 +=
+        same_instant ? snapshot->covariance_W_mm2
+                     : Matrix3d(Matrix3d::Identity() * snapshot->largest_deviation_mm * snapshot->largest_deviation_mm);
+    feature.last_observed = snapshot->last_observed;
+    feature.state = phase_usable ? snapshot->state : FeatureState::kInvalid;
+    feature.reason = phase_usable ? snapshot->reason : FeatureReason::kPhaseLost;
+    sample_.features.push_back(feature);
+  }
+  return sample_;
+}
+
+}  // namespace perimap

@@ -1,0 +1,37 @@
+// Makes the surface of one release from the workers' newest snapshots and the newest phase.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/periodic/basis.hpp"
+#include "core/phase/cardiac_clock.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
+#include "core/pipeline/surface_sample.hpp"
+
+namespace perimap {
+
+struct ComposerSettings {
+  BasisLayout layout;
+  Duration validity = std::chrono::milliseconds(200);  // a sample must not be used longer after its valid time
+  std::size_t maximum_features = 0;
+};
+
+// Belongs to the publisher. Positions and velocities are evaluated anew from the coefficients with the phase as it is
+// known now; to the covariance of the map comes v v^T sigma_t^2, what the phase's deviation makes of the motion.
+class SurfaceComposer {
+ public:
+  explicit SurfaceComposer(const ComposerSettings& settings);
+
+  // `snapshots` in order of shard, none null. The sample stays valid until the next call.
+  [[nodiscard]] const SurfaceSample& compose(const Release& release, const CardiacClock& clock,
+                                             std::span<const ShardSnapshot* const> snapshots) noexcept;
+
+ private:
+  ComposerSettings settings_;
+  SurfaceSample sample_;
+  std::vector<const FeatureSnapshot*> order_;
+};
+
+}  // namespace perimap

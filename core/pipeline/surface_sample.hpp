@@ -1,0 +1,53 @@
+// One published surface, as the pipeline makes it; the daemon puts it into the wire type of idl/perimap.idl.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/geometry/pose.hpp"
+#include "core/pipeline/release_schedule.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+// The meaning of each value is written in idl/perimap.idl.
+enum class SurfaceState : std::uint8_t { kInvalid, kDegraded, kGood };
+enum class SurfaceReason : std::uint8_t {
+  kNone,
+  kNothingMapped,
+  kPhaseUnknown,
+  kPhaseFreeRunning,
+  kPhaseLost,
+  kFrameMissing,
+  kUpdateLate,
+  kPoseMissing
+};
+enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
+enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost };
+
+struct SurfaceFeature {
+  std::uint32_t id = 0;
+  FeatureState state = FeatureState::kInvalid;
+  FeatureReason reason = FeatureReason::kNone;
+  Vector3d p_WF_mm = Vector3d::Zero();              // at the valid time
+  Vector3d velocity_W_mm_per_s = Vector3d::Zero();  // at the valid time
+  Matrix3d covariance_W_mm2 = Matrix3d::Zero();     // of the position, phase deviation included
+  Instant last_observed;                            // capture of the last match that was learnt
+};
+
+struct SurfaceSample {
+  std::uint64_t sample_sequence = 0;
+  Release release;
+  Instant valid_time;
+  Instant valid_until;
+  SurfaceState state = SurfaceState::kInvalid;
+  SurfaceReason reason = SurfaceReason::kNone;
+  std::uint64_t oldest_shard_frame_sequence = 0;
+  bool update_late = false;  // the frame came, its update was not ready: predicted from the state before
+  double cardiac_phase_rad = 0.0;
+  double cardiac_phase_deviation_rad = 0.0;
+  double cardiac_phase_rate_rad_per_s = 0.0;
+  std::vector<SurfaceFeature> features;  // in order of id; capacity reserved at start
+};
+
+}  // namespace perimap

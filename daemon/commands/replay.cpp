@@ -1,0 +1,265 @@
+#include "daemon/commands/replay.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/commands/progress.hpp"
+#include "daemon/logging/logging.hpp"
+#include "daemon/process/stop_signal.hpp"
+#include "daemon/publishing/dds_publication.hpp"
+#include "daemon/publishing/sample_recorder.hpp"
+#include "daemon/report/accuracy.hpp"
+#include "daemon/report/accuracy_text.hpp"
+#include "daemon/report/recorded_truth.hpp"
+#include "daemon/runtime/live_session.hpp"
+#include "daemon/runtime/lockstep_runtime.hpp"
+#include "daemon/runtime/replay_setup.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr int kOk = 0;
+constexpr int kFailure = 1;
+constexpr int kWrongUse = 2;
+
+struct Options {
+  std::string recording;
+  std::string configuration;
+  bool lockstep = false;
+  int workers = 0;
+  std::string json;
+  std::string samples;
+  bool dds = false;
+  bool whole = false;
+};
+
+// Takes what is published to the accuracy report, to the file of samples and to DDS, whichever are there.
+class ReplayPublication final : public Publication {
+ public:
+  ReplayPublication(const RecordedTruth* truth, SampleRecorder* recorder, Publication* dds) noexcept
+      : recorder_(recorder), dds_(dds), truth_(truth) {
+    if (truth != nullptr) accuracy_.emplace(truth->truth, truth->camera, truth->captures.begin()->second);
+  }
+
+  void surface(const perimap_Surface& sample) override {
+    if (recorder_ != nullptr) recorder_->surface(sample);
+    if (dds_ != nullptr) dds_->surface(sample);
+    if (!accuracy_) return;
+    if (!to_recording_ && sample.reason != perimap_SURFACE_REASON_FRAME_MISSING) {
+      to_recording_ = truth_->to_recording(sample.frame_sequence, from_ns(sample.capture_time_ns));
+    }
+    accuracy_->add(sample);
+  }
+  void surface_model(const perimap_SurfaceModel& model) override {
+    if (recorder_ != nullptr) recorder_->surface_model(model);
+    if (dds_ != nullptr) dds_->surface_model(model);
+    if (accuracy_) accuracy_->add(model);
+  }
+  void phase(const perimap_Phase& phase) override {
+    if (recorder_ != nullptr) recorder_->phase(phase);
+    if (dds_ != nullptr) dds_->phase(phase);
+  }
+  void status(const perimap_Status& status) override {
+    if (recorder_ != nullptr) recorder_->drain();
+    if (dds_ != nullptr) dds_->status(status);
+  }
+
+  // After every thread that publishes has ended.
+  [[nodiscard]] std::optional<AccuracyReport> report() {
+    if (!accuracy_ || !to_recording_) return std::nullopt;
+    return accuracy_->report(*to_recording_);
+  }
+
+ private:
+  SampleRecorder* recorder_;
+  Publication* dds_;
+  const RecordedTruth* truth_;
+  std::optional<Accuracy> accuracy_;
+  std::optional<Duration> to_recording_;
+};
+
+nlohmann::json to_json(const LatencyHistogram::Summary& s) {
+  const auto us = [](Duration d) { return std::chrono::duration<double, std::micro>(d).count(); };
+  return {{"count", s.count}, {"p50_us", us(s.p50)}, {"p99_us", us(s.p99)}, {"max_us", us(s.max)}};
+}
+
+struct Stage {
+  const char* name;
+  const LatencyHistogram* histogram;
+};
+
+std::vector<Stage> stages(const PipelineCounters& c, bool lockstep) {
+  std::vector<Stage> all = {{"predict and find", &c.predict_and_find},
+                            {"phase and pose", &c.phase_and_pose},
+                            {"evaluate", &c.evaluate},
+                            {"learn", &c.learn}};
+  // Deadlines are virtual in lockstep: nothing is early or late.
+  if (!lockstep) {
+    all.push_back({"capture to update", &c.capture_to_update});
+    all.push_back({"release tardiness", &c.release_tardiness});
+  }
+  return all;
+}
+
+std::string stage_table(const PipelineCounters& counters, bool lockstep) {
+  std::string table = fmt::format("{:<18} {:>8} {:>10} {:>10} {:>10}  (us)\n", "stage", "count", "p50", "p99", "max");
+  for (const Stage& stage : stages(counters, lockstep)) {
+    const auto s = stage.histogram->summary();
+    const auto us = [](Duration d) { return std::chrono::duration<double, std::micro>(d).count(); };
+    table += fmt::format("{:<18} {:>8} {:>10.1f} {:>10.1f} {:>10.1f}\n", stage.name, s.count, us(s.p50), us(s.p99),
+                         us(s.max));
+  }
+  return table;
+}
+
+nlohmann::json counts(const PipelineCounters& c) {
+  return {{"frames", c.frames.get()},
+          {"frames_dropped", c.frames_dropped.get()},
+          {"frames_too_late", c.frames_too_late.get()},
+          {"frames_without_pose", c.frames_without_pose.get()},
+          {"frames_without_phase", c.frames_without_phase.get()},
+          {"samples", c.samples.get()},
+          {"samples_without_frame", c.samples_without_frame.get()},
+          {"samples_from_late_update", c.samples_from_late_update.get()},
+          {"learning_put_off", c.learning_put_off.get()},
+          {"adoptions_late", c.adoptions_late.get()},
+          {"features_converged", c.features_converged.get()},
+          {"features_lost", c.features_lost.get()}};
+}
+
+int refuse(const Error& error, int code) {
+  fmt::print(stderr, "perimap replay: {}\n", error.message);
+  return code;
+}
+
+struct LockstepEnd {
+  std::vector<Error> damage;
+  bool stopped = false;
+};
+
+Expected<LockstepEnd> run_lockstep(Pipeline& pipeline, ReplaySetup& setup, Publication& publication,
+                                   Progress& progress, StopSignal& stop) {
+  LockstepRuntime runtime(pipeline, setup.identity, setup.utc_minus_monotonic, publication);
+  std::uint64_t shown = 0;
+  for (;;) {
+    auto event = setup.reader.next();
+    if (!event) return tl::unexpected(event.error());
+    if (!*event) break;
+    runtime.deliver(**event);
+    const std::uint64_t frames = pipeline.counters().frames.get();
+    if (frames == shown) continue;
+    shown = frames;
+    progress.update(frames);
+    if (stop.requested()) return LockstepEnd{{}, true};
+  }
+  runtime.finish();
+  return LockstepEnd{setup.reader.damage(), false};
+}
+
+int replay(const Options& options) {
+  auto stop = StopSignal::install();
+  if (!stop) return refuse(stop.error(), kFailure);
+  const ReadMode mode = options.whole ? ReadMode::kWhole : ReadMode::kStrict;
+  std::optional<std::filesystem::path> configuration_file;
+  if (!options.configuration.empty()) configuration_file = options.configuration;
+  auto setup = prepare_replay(options.recording, configuration_file, mode);
+  if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongUse : kFailure);
+  setup->pipeline.lockstep = options.lockstep;
+  if (options.workers > 0) setup->pipeline.workers = options.workers;
+  const auto truth = load_truth(options.recording, mode);
+  if (!truth) return refuse(truth.error(), kFailure);
+
+  const Logging logging(setup->configuration.log.level);
+  std::unique_ptr<SampleRecorder> recorder;
+  if (!options.samples.empty()) {
+    auto created =
+        SampleRecorder::create(options.samples, static_cast<std::size_t>(setup->pipeline.features.maximum));
+    if (!created) return refuse(created.error(), kFailure);
+    recorder = std::move(*created);
+  }
+  std::unique_ptr<DdsPublication> dds;
+  if (options.dds) {
+    const DdsConfiguration& c = setup->configuration.dds;
+    auto created = DdsPublication::create({c.domain, c.surface_deadline, c.surface_lifespan});
+    if (!created) return refuse(created.error(), kFailure);
+    dds = std::move(*created);
+  }
+  ReplayPublication publication(*truth ? &**truth : nullptr, recorder.get(), dds.get());
+
+  Pipeline pipeline(setup->pipeline);
+  bool stopped = false;
+  {
+    Progress progress("frames", *truth ? (*truth)->captures.size() : 0);
+    if (options.lockstep) {
+      const auto end = run_lockstep(pipeline, *setup, publication, progress, *stop);
+      if (!end) return refuse(end.error(), kFailure);
+      for (const Error& damage : end->damage) fmt::print(stderr, "perimap replay: {}\n", damage.message);
+      stopped = end->stopped;
+    } else {
+      LiveSession session(pipeline, runtime_settings(setup->configuration, setup->identity), publication,
+                          std::move(setup->reader),
+                          [&] { progress.update(pipeline.counters().frames.get()); });
+      if (const auto ended = session.run(*stop); !ended) return refuse(ended.error(), kFailure);
+      stopped = stop->requested();
+    }
+  }
+  if (recorder) {
+    if (const auto finished = recorder->finish(); !finished) return refuse(finished.error(), kFailure);
+  }
+
+  const auto report = publication.report();
+  const PipelineCounters& counters = pipeline.counters();
+  fmt::print("{}{} frames, {} samples ({} without frame, {} from a late update), {} frames without pose\n\n{}\n",
+             stopped ? "stopped early: " : "", counters.frames.get(), counters.samples.get(),
+             counters.samples_without_frame.get(), counters.samples_from_late_update.get(),
+             counters.frames_without_pose.get(), stage_table(counters, options.lockstep));
+  if (report) {
+    fmt::print("{}\n", to_text(*report));
+  } else {
+    fmt::print("no ground truth in this recording: {} features converged\n", counters.features_converged.get());
+  }
+  if (!options.json.empty()) {
+    nlohmann::json json = {{"recording", options.recording},
+                           {"lockstep", options.lockstep},
+                           {"workers", setup->pipeline.workers},
+                           {"counts", counts(counters)}};
+    for (const Stage& stage : stages(counters, options.lockstep)) {
+      json["stages"][stage.name] = to_json(stage.histogram->summary());
+    }
+    if (report) json["accuracy"] = to_json(*report);
+    std::ofstream file(options.json);
+    file << json.dump(2) << '\n';
+    if (!file.flush()) return refuse({fmt::format("{}: cannot be written", options.json)}, kFailure);
+  }
+  return kOk;
+}
+
+}  // namespace
+
+void add_replay_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("replay", "Run the pipeline over a recording and report accuracy and latencies");
+  auto options = std::make_shared<Options>();
+  command->add_option("RECORDING", options->recording, "The recording (MCAP)")->required();
+  command->add_option("-c,--config", options->configuration,
+                      "Configuration file; without it the recording's own configuration over the defaults");
+  command->add_flag("--lockstep", options->lockstep,
+                    "Virtual time, as fast as it goes: the same samples every time (otherwise real time)");
+  command->add_option("--workers", options->workers, "Worker threads (default: the configuration's)")
+      ->check(CLI::Range(1, 64));
+  command->add_option("--json", options->json, "Write the report as JSON to this file");
+  command->add_option("--samples", options->samples, "Write every published sample to this recording (MCAP)");
+  command->add_flag("--dds", options->dds, "Publish over DDS too");
+  command->add_flag("--whole", options->whole, "Use what is whole of a damaged recording, and say what is not");
+  command->callback([options, &exit_code] { exit_code = replay(*options); });
+}
+
+}  // namespace perimap

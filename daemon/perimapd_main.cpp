@@ -1,0 +1,90 @@
+// perimapd: reads the sensors, maps the beating surface, publishes it at a fixed latency.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/config/configuration_loader.hpp"
+#include "daemon/logging/logging.hpp"
+#include "daemon/process/stop_signal.hpp"
+#include "daemon/publishing/dds_publication.hpp"
+#include "daemon/runtime/live_session.hpp"
+#include "daemon/runtime/replay_setup.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr int kOk = 0;
+constexpr int kFailure = 1;
+constexpr int kWrongConfiguration = 2;
+
+int refuse(const Error& error, int code) {
+  fmt::print(stderr, "perimapd: {}\n", error.message);
+  return code;
+}
+
+int run(const std::string& configuration_file) {
+  auto stop = StopSignal::install();
+  if (!stop) return refuse(stop.error(), kFailure);
+  const auto given = load_configuration(configuration_file);
+  if (!given) return refuse(given.error(), kWrongConfiguration);
+  if (!given->replay.recording) {
+    return refuse({fmt::format("{}: key 'replay.recording': expected the recording to replay, got nothing",
+                               configuration_file)},
+                  kWrongConfiguration);
+  }
+  auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
+  if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
+  const Configuration& configuration = setup->configuration;
+
+  const Logging logging(configuration.log.level);
+  std::unique_ptr<DdsPublication> publication;
+  if (configuration.dds.enabled) {
+    auto dds = DdsPublication::create({configuration.dds.domain, configuration.dds.surface_deadline,
+                                       configuration.dds.surface_lifespan});
+    if (!dds) return refuse(dds.error(), kFailure);
+    publication = std::move(*dds);
+  } else {
+    return refuse({fmt::format("{}: key 'dds.enabled': expected true, since nothing else publishes", configuration_file)},
+                  kWrongConfiguration);
+  }
+
+  Pipeline pipeline(setup->pipeline);
+  LiveSession session(pipeline, runtime_settings(configuration, setup->identity), *publication,
+                      std::move(setup->reader));
+  spdlog::info("perimapd {}: publishing '{}' on DDS domain {}, latency {} ms, {} workers", PERIMAP_VERSION,
+               configuration.source.name, configuration.dds.domain,
+               std::chrono::duration_cast<std::chrono::milliseconds>(configuration.pipeline.latency).count(),
+               configuration.pipeline.workers);
+  const Expected<void> ended = session.run(*stop);
+  const PipelineCounters& counters = pipeline.counters();
+  spdlog::info("{}: {} frames, {} surfaces, {} features converged", stop->requested() ? "stopped" : "recording ended",
+               counters.frames.get(), counters.samples.get(), counters.features_converged.get());
+  if (!ended) {
+    spdlog::error("{}", ended.error().message);
+    return kFailure;
+  }
+  return kOk;
+}
+
+}  // namespace
+}  // namespace perimap
+
+int main(int argc, char** argv) {
+  CLI::App app{"Maps a beating organ and publishes its predicted surface over DDS at a fixed latency.\n"
+               "Research software, not a certified medical device.",
+               "perimapd"};
+  app.set_version_flag("--version", PERIMAP_VERSION);
+  std::string configuration_file;
+  app.add_option("-c,--config", configuration_file, "Configuration file (TOML; see config/replay.toml)")->required();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : perimap::kWrongConfiguration;
+  }
+  return perimap::run(configuration_file);
+}

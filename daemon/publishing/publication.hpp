@@ -1,0 +1,24 @@
+// Where what is published goes.
+#pragma once
+
+#include <perimap.h>
+
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+// surface() is called by the publisher thread, the others by the status thread.
+class Publication {
+ public:
+  Publication() = default;
+  Publication(const Publication&) = delete;
+  Publication& operator=(const Publication&) = delete;
+  virtual ~Publication() = default;
+
+  virtual void surface(const perimap_Surface& sample) = 0;
+  virtual void surface_model(const perimap_SurfaceModel& model) = 0;
+  virtual void phase(const perimap_Phase& phase) = 0;
+  virtual void status(const perimap_Status& status) = 0;
+};
+
+}  // namespace perimap

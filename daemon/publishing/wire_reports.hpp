@@ -1,0 +1,65 @@
+// The slower topics as wire types: surface model, phase, status. Not for the real-time path: they allocate.
+#pragma once
+
+#include <perimap.h>
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/periodic/basis.hpp"
+#include "core/phase/cardiac_clock.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
+#include "daemon/publishing/identity.hpp"
+
+namespace perimap {
+
+// Owns the buffers that its message points to.
+class WireModel {
+ public:
+  explicit WireModel(const Identity& identity);
+
+  // Valid until the next call. `snapshots` in order of shard.
+  [[nodiscard]] const perimap_SurfaceModel& fill(std::span<const ShardSnapshot* const> snapshots,
+                                                 const BasisLayout& layout, const CardiacClock& clock, Instant now);
+
+ private:
+  std::vector<perimap_ModelFeature> features_;
+  std::vector<std::vector<double>> coefficients_;
+  perimap_SurfaceModel wire_{};
+};
+
+class WirePhase {
+ public:
+  explicit WirePhase(const Identity& identity);
+  [[nodiscard]] const perimap_Phase& fill(const CardiacClock& clock, Instant now) noexcept;
+
+ private:
+  perimap_Phase wire_{};
+};
+
+// What the status says beside the counters.
+struct StatusFacts {
+  perimap_Privilege realtime_priority = perimap_PRIVILEGE_NOT_REQUESTED;
+  perimap_Privilege memory_locked = perimap_PRIVILEGE_NOT_REQUESTED;
+  Duration latency{0};
+  Duration stalled_after{0};  // a source that is silent for longer counts as stalled
+  bool sources_ended = false;
+};
+
+class WireStatus {
+ public:
+  explicit WireStatus(const Identity& identity);
+  [[nodiscard]] const perimap_Status& fill(const PipelineCounters& counters, const StatusFacts& facts,
+                                           Instant now) noexcept;
+
+ private:
+  static constexpr std::size_t kSources = 3;
+  static constexpr std::size_t kStages = 7;
+  perimap_SourceStatus sources_[kSources]{};
+  perimap_StageLatency stages_[kStages]{};
+  perimap_Status wire_{};
+};
+
+}  // namespace perimap

@@ -1,0 +1,28 @@
+// The pipeline's surface as the wire type of idl/perimap.idl.
+#pragma once
+
+#include <perimap.h>
+
+#include <vector>
+
+#include "core/pipeline/surface_sample.hpp"
+#include "daemon/publishing/identity.hpp"
+
+namespace perimap {
+
+class WireSurface {
+ public:
+  WireSurface(const Identity& identity, std::size_t maximum_features);
+
+  // No allocation. `utc_minus_monotonic` gives the release its UTC. Valid until the next call.
+  [[nodiscard]] const perimap_Surface& fill(const SurfaceSample& sample, Duration utc_minus_monotonic) noexcept;
+
+ private:
+  std::vector<perimap_SurfaceFeature> features_;
+  perimap_Surface wire_{};
+};
+
+[[nodiscard]] perimap_FeatureState to_wire(FeatureState state) noexcept;
+[[nodiscard]] perimap_FeatureReason to_wire(FeatureReason reason) noexcept;
+
+}  // namespace perimap

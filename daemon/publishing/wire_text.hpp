@@ -1,0 +1,18 @@
+// Text into the bounded strings of the wire types.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <string_view>
+
+namespace perimap {
+
+// Cuts what does not fit; always terminated.
+template <std::size_t N>
+void copy_text(std::string_view text, char (&out)[N]) noexcept {
+  const std::size_t n = std::min(text.size(), N - 1);
+  std::copy_n(text.data(), n, out);
+  out[n] = '\0';
+}
+
+}  // namespace perimap

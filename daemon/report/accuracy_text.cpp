@@ -1,0 +1,54 @@
+#include "daemon/report/accuracy_text.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+namespace perimap {
+namespace {
+
+nlohmann::json to_json(const ErrorFigures& error) {
+  return {{"count", error.count}, {"median_mm", error.median_mm}, {"p95_mm", error.p95_mm}, {"max_mm", error.max_mm}};
+}
+
+nlohmann::json to_json(const std::vector<ErrorSpan>& spans) {
+  nlohmann::json out = nlohmann::json::array();
+  for (const ErrorSpan& span : spans) {
+    out.push_back({{"begin_s", span.begin_s},
+                   {"end_s", span.end_s},
+                   {"converged", span.converged},
+                   {"error", to_json(span.error)}});
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string to_text(const AccuracyReport& report) {
+  return fmt::format(
+      "features    {} mapped, {} converged, {} of them within 15 s, {} without truth\n"
+      "error       median {:.2f} mm, 95th percentile {:.2f} mm, largest {:.2f} mm, above 3 mm {:.1f} %\n"
+      "            ({} positions at their valid time, 15 s to the end, every feature once called converged)\n"
+      "consistency mean NEES/3 {:.2f} (1 is consistent, below is cautious)",
+      report.features_published, report.features_converged, report.converged_by_15_s, report.features_without_truth,
+      report.settled.median_mm, report.settled.p95_mm, report.settled.max_mm, 100.0 * report.share_above_3_mm,
+      report.settled.count, report.mean_nees);
+}
+
+nlohmann::json to_json(const AccuracyReport& report) {
+  nlohmann::json features = nlohmann::json::array();
+  for (const FeaturePath& path : report.paths) features.push_back({{"id", path.id}, {"error", to_json(path.error)}});
+  return {{"samples", report.samples},
+          {"features_mapped", report.features_published},
+          {"features_converged", report.features_converged},
+          {"features_converged_by_15_s", report.converged_by_15_s},
+          {"features_without_truth", report.features_without_truth},
+          {"settled_error", to_json(report.settled)},
+          {"settled_mean_nees", report.mean_nees},
+          {"settled_share_above_3_mm", report.share_above_3_mm},
+          {"seconds", to_json(report.seconds)},
+          {"cycles", to_json(report.cycles)},
+          {"features", features}};
+}
+
+}  // namespace perimap

@@ -1,0 +1,34 @@
+// The ground truth of a simulated recording, and the clock on which it was published.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "core/error/expected.hpp"
+#include "core/geometry/camera_model.hpp"
+#include "core/time/instant.hpp"
+#include "drivers/recording/recording_reader.hpp"
+#include "drivers/simulator/ground_truth.hpp"
+
+namespace perimap {
+
+struct RecordedTruth {
+  GroundTruth truth;
+  CameraModel camera;
+  std::map<std::uint64_t, Instant> captures;  // by frame sequence
+
+  // What to add to the instants of samples to come to the recording's clock, told by one published frame. Nothing when
+  // the recording has no such frame.
+  [[nodiscard]] std::optional<Duration> to_recording(std::uint64_t frame_sequence, Instant published_capture) const {
+    const auto capture = captures.find(frame_sequence);
+    if (capture == captures.end()) return std::nullopt;
+    return capture->second - published_capture;
+  }
+};
+
+// Nothing when the recording has no ground truth (it is not a simulated one).
+[[nodiscard]] Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, ReadMode mode);
+
+}  // namespace perimap

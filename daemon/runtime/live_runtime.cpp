@@ -1,0 +1,169 @@
+#include "daemon/runtime/live_runtime.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <utility>
+
+#include "core/realtime/deadline.hpp"
+
+namespace perimap {
+namespace {
+
+Duration utc_minus_monotonic() noexcept {
+  std::timespec utc{};
+  clock_gettime(CLOCK_REALTIME, &utc);
+  return std::chrono::seconds(utc.tv_sec) + std::chrono::nanoseconds(utc.tv_nsec) -
+         MonotonicClock::now().time_since_epoch();
+}
+
+}  // namespace
+
+LiveRuntime::LiveRuntime(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication,
+                         std::function<void()> on_status_tick)
+    : pipeline_(pipeline),
+      settings_(settings),
+      publication_(publication),
+      on_status_tick_(std::move(on_status_tick)),
+      wire_surface_(settings.identity, static_cast<std::size_t>(pipeline.settings().features.maximum)),
+      wire_model_(settings.identity),
+      wire_phase_(settings.identity),
+      wire_status_(settings.identity) {}
+
+std::thread LiveRuntime::launch(std::string name, int priority, std::function<void()> body) {
+  ThreadRequest request{std::move(name), priority, priority > 0 ? settings_.cpus : std::vector<int>{}};
+  return std::thread([this, request = std::move(request), body = std::move(body)] {
+    if (!apply(request)) priority_refused_.store(true, std::memory_order_relaxed);
+    body();
+  });
+}
+
+void LiveRuntime::start() {
+  memory_locked_ = lock_memory(settings_.lock_memory);
+  const int publisher = settings_.priority;
+  const int mapper = publisher > 0 ? std::max(1, publisher - 1) : 0;
+  const int worker = publisher > 0 ? std::max(1, publisher - 2) : 0;
+  for (int i = 0; i < pipeline_.team().size(); ++i) {
+    workers_.push_back(launch("worker-" + std::to_string(i), worker, [this, i] { pipeline_.team().serve(i); }));
+  }
+  housekeepers_.push_back(launch("finder", 0, [this] { pipeline_.finder().serve(); }));
+  housekeepers_.push_back(launch("starter", 0, [this] { pipeline_.starter().serve(); }));
+  mapper_ = launch("mapper", mapper, [this] { run_mapper(); });
+  publisher_ = launch("publisher", publisher, [this] { run_publisher(); });
+  status_ = launch("status", 0, [this] { run_status(); });
+  started_ = true;
+}
+
+void LiveRuntime::end_of_sources() noexcept {
+  sources_ended_.store(true, std::memory_order_relaxed);
+  pipeline_.entrance().publisher_wakeup().post();
+}
+
+void LiveRuntime::stop() {
+  if (!started_) return;
+  started_ = false;
+  stopping_.store(true, std::memory_order_relaxed);
+  pipeline_.entrance().mapper_wakeup().post();
+  pipeline_.entrance().publisher_wakeup().post();
+  status_wakeup_.post();
+  mapper_.join();
+  publisher_.join();
+  status_.join();
+  pipeline_.team().dismiss();
+  for (std::thread& worker : workers_) worker.join();
+  pipeline_.finder().dismiss();
+  pipeline_.starter().dismiss();
+  for (std::thread& housekeeper : housekeepers_) housekeeper.join();
+}
+
+StatusFacts LiveRuntime::facts() const noexcept {
+  StatusFacts facts;
+  facts.memory_locked = memory_locked_;
+  if (settings_.priority > 0) {
+    facts.realtime_priority =
+        priority_refused_.load(std::memory_order_relaxed) ? perimap_PRIVILEGE_REFUSED : perimap_PRIVILEGE_GRANTED;
+  }
+  facts.latency = pipeline_.settings().latency;
+  facts.stalled_after = settings_.stalled_after;
+  facts.sources_ended = sources_ended_.load(std::memory_order_relaxed);
+  return facts;
+}
+
+void LiveRuntime::run_mapper() noexcept {
+  SensorEntrance& entrance = pipeline_.entrance();
+  const PipelineSettings& settings = pipeline_.settings();
+  while (!stopping_.load(std::memory_order_relaxed)) {
+    pipeline_.drain_poses();
+    FrameHandle frame;
+    if (!entrance.pop_frame(frame)) {
+      entrance.mapper_wakeup().wait();
+      continue;
+    }
+    // The named wait: for the tracker to reach the capture, at most until the budget before the release.
+    const Instant latest = frame.stamp.capture + settings.latency - settings.budget;
+    while (!pipeline_.pose_reached(frame.stamp.capture) && entrance.mapper_wakeup().wait_until(latest)) {
+      pipeline_.drain_poses();
+      if (stopping_.load(std::memory_order_relaxed)) break;
+    }
+    pipeline_.map(frame);
+  }
+}
+
+void LiveRuntime::run_publisher() {
+  Wakeup& wakeup = pipeline_.entrance().publisher_wakeup();
+  PipelineCounters& counters = pipeline_.counters();
+  while (!stopping_.load(std::memory_order_relaxed)) {
+    pipeline_.drain_stamps(MonotonicClock::now());
+    const auto next = pipeline_.schedule().next();
+    const bool ended = sources_ended_.load(std::memory_order_relaxed);
+    if (ended && (!next || next->frame_missing)) {
+      all_released_.store(true, std::memory_order_relaxed);
+      wakeup.wait();
+      continue;
+    }
+    if (!next) {
+      wakeup.wait();
+      continue;
+    }
+    if (next->frame_missing) {
+      // Provisional: a frame that still comes takes its place.
+      if (wakeup.wait_until(next->deadline)) continue;
+    } else {
+      sleep_until(next->deadline);
+    }
+    const Release release = pipeline_.schedule().take();
+    const perimap_Surface& sample = wire_surface_.fill(pipeline_.compose(release), utc_minus_monotonic());
+    const Instant ready = MonotonicClock::now();
+    publication_.surface(sample);
+    counters.dds_write.add(MonotonicClock::now() - ready);
+    counters.release_tardiness.add(ready - release.deadline);
+  }
+}
+
+void LiveRuntime::run_status() {
+  TripleBuffer<CardiacClock>& clock = pipeline_.entrance().clocks().status;
+  Instant tick = MonotonicClock::now();
+  Instant next_model = tick;
+  Instant next_status = tick;
+  for (;;) {
+    const bool last = stopping_.load(std::memory_order_relaxed);
+    const Instant now = MonotonicClock::now();
+    clock.update();
+    publication_.phase(wire_phase_.fill(clock.front(), now));
+    if (last || now >= next_model) {
+      publication_.surface_model(
+          wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout, clock.front(), now));
+      next_model = now + settings_.model_interval;
+    }
+    if (last || now >= next_status) {
+      publication_.status(wire_status_.fill(pipeline_.counters(), facts(), now));
+      next_status = now + settings_.status_interval;
+    }
+    if (on_status_tick_) on_status_tick_();
+    if (last) return;
+    tick = std::max(tick + settings_.phase_interval, now);
+    // Woken early only to stop.
+    static_cast<void>(status_wakeup_.wait_until(tick));
+  }
+}
+
+}  // namespace perimap

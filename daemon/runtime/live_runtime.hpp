@@ -1,0 +1,84 @@
+// The daemon's threads over a pipeline: they are created, named, prioritised, started and joined here and nowhere else.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/publishing/identity.hpp"
+#include "daemon/publishing/publication.hpp"
+#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/wire_surface.hpp"
+#include "daemon/runtime/privileges.hpp"
+
+namespace perimap {
+
+struct RuntimeSettings {
+  Identity identity;
+  int priority = 0;       // of the publisher; sources and mapper run one below, workers two. 0: not requested
+  std::vector<int> cpus;  // of the real-time threads
+  bool lock_memory = true;
+  Duration phase_interval = std::chrono::milliseconds(100);
+  Duration model_interval = std::chrono::milliseconds(500);
+  Duration status_interval = std::chrono::seconds(1);
+  Duration stalled_after = std::chrono::milliseconds(500);
+};
+
+// Threads: mapper, workers, publisher (real-time when permitted), finder, starter, status. Sources are threads of their
+// owner's and push into pipeline.entrance().
+class LiveRuntime {
+ public:
+  // `pipeline` and `publication` must outlive it. `on_status_tick` is called by the status thread every
+  // phase_interval, for work that must not be done on the publisher thread.
+  LiveRuntime(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication,
+              std::function<void()> on_status_tick = {});
+  LiveRuntime(const LiveRuntime&) = delete;
+  LiveRuntime& operator=(const LiveRuntime&) = delete;
+  ~LiveRuntime() { stop(); }
+
+  void start();
+
+  // Tells that no more frames will come: the surfaces of those that came are still released.
+  void end_of_sources() noexcept;
+  // After end_of_sources(): the last surface has been released.
+  [[nodiscard]] bool all_released() const noexcept { return all_released_.load(std::memory_order_relaxed); }
+
+  // Ends and joins every thread. Called twice it does nothing.
+  void stop();
+
+  // Whether scheduling priority and memory locking were granted; for the log and the status.
+  [[nodiscard]] StatusFacts facts() const noexcept;
+
+ private:
+  void run_mapper() noexcept;
+  void run_publisher();
+  void run_status();
+  [[nodiscard]] std::thread launch(std::string name, int priority, std::function<void()> body);
+
+  Pipeline& pipeline_;
+  RuntimeSettings settings_;
+  Publication& publication_;
+  std::function<void()> on_status_tick_;
+  WireSurface wire_surface_;
+  WireModel wire_model_;
+  WirePhase wire_phase_;
+  WireStatus wire_status_;
+  Wakeup status_wakeup_;
+  std::vector<std::thread> workers_;
+  std::vector<std::thread> housekeepers_;
+  std::thread mapper_;
+  std::thread publisher_;
+  std::thread status_;
+  bool started_ = false;
+  perimap_Privilege memory_locked_ = perimap_PRIVILEGE_NOT_REQUESTED;
+  // Relaxed throughout: each flag is a message by itself; the posts of the wake-ups that follow order what matters.
+  std::atomic<bool> priority_refused_{false};
+  std::atomic<bool> stopping_{false};
+  std::atomic<bool> sources_ended_{false};
+  std::atomic<bool> all_released_{false};
+};
+
+}  // namespace perimap

@@ -1,0 +1,68 @@
+#include "daemon/runtime/live_session.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <utility>
+
+namespace perimap {
+namespace {
+
+constexpr Duration kTick = std::chrono::milliseconds(100);
+constexpr std::uint64_t kFramesForLatencyCheck = 60;
+
+double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
+
+}  // namespace
+
+LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication,
+                         ReplayReader reader, std::function<void()> on_tick)
+    : pipeline_(pipeline),
+      runtime_(pipeline, settings, publication),
+      feeder_(std::move(reader), pipeline.entrance(), settings.priority > 1 ? settings.priority - 1 : settings.priority),
+      on_tick_(std::move(on_tick)) {}
+
+Expected<void> LiveSession::run(StopSignal& stop) {
+  runtime_.start();
+  warn_of_refused_privileges();
+  feeder_.start();
+  bool told_end = false;
+  while (!stop.wait_for(kTick)) {
+    if (on_tick_) on_tick_();
+    warn_of_short_latency();
+    if (!told_end && feeder_.ended()) {
+      runtime_.end_of_sources();
+      told_end = true;
+    }
+    if (told_end && runtime_.all_released()) break;
+  }
+  feeder_.stop();
+  runtime_.stop();
+  if (!feeder_.ended()) return {};
+  for (const Error& damage : feeder_.damage()) spdlog::warn("{}", damage.message);
+  if (feeder_.error()) return tl::unexpected(*feeder_.error());
+  return {};
+}
+
+void LiveSession::warn_of_refused_privileges() const {
+  const StatusFacts facts = runtime_.facts();
+  if (facts.memory_locked == perimap_PRIVILEGE_REFUSED) {
+    spdlog::warn("memory is not locked: needs an unlimited RLIMIT_MEMLOCK (LimitMEMLOCK=infinity); running on without");
+  }
+  if (facts.realtime_priority == perimap_PRIVILEGE_REFUSED) {
+    spdlog::warn("real-time priority refused: needs RLIMIT_RTPRIO (LimitRTPRIO=); running on without");
+  }
+}
+
+// L must leave room for what a frame takes to arrive and for the budget; otherwise every update would be late.
+void LiveSession::warn_of_short_latency() {
+  const LatencyHistogram::Summary delay = pipeline_.counters().camera_delay.summary();
+  if (latency_checked_ || delay.count < kFramesForLatencyCheck) return;
+  latency_checked_ = true;
+  const PipelineSettings& settings = pipeline_.settings();
+  if (delay.p99 + settings.budget <= settings.latency) return;
+  spdlog::warn("latency {:.1f} ms is too short: frames arrive up to {:.1f} ms after capture and the budget is {:.1f} ms",
+               milliseconds(settings.latency), milliseconds(delay.p99), milliseconds(settings.budget));
+}
+
+}  // namespace perimap

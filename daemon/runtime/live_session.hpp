@@ -1,0 +1,35 @@
+// A pipeline run live over a recording, from start to a stop signal or the recording's end.
+#pragma once
+
+#include <functional>
+
+#include "core/error/expected.hpp"
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/process/stop_signal.hpp"
+#include "daemon/publishing/publication.hpp"
+#include "daemon/runtime/live_runtime.hpp"
+#include "daemon/runtime/replay_feeder.hpp"
+
+namespace perimap {
+
+class LiveSession {
+ public:
+  // `on_tick`: called about ten times a second by the thread that runs run(), for progress shown to a user.
+  LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication, ReplayReader reader,
+              std::function<void()> on_tick = {});
+
+  // Returns when every surface of the recording is released, or on a stop signal; an error when reading failed.
+  [[nodiscard]] Expected<void> run(StopSignal& stop);
+
+ private:
+  void warn_of_refused_privileges() const;
+  void warn_of_short_latency();
+
+  Pipeline& pipeline_;
+  LiveRuntime runtime_;
+  ReplayFeeder feeder_;
+  std::function<void()> on_tick_;
+  bool latency_checked_ = false;
+};
+
+}  // namespace perimap

@@ -1,0 +1,111 @@
+#include "daemon/runtime/lockstep_runtime.hpp"
+
+#include <algorithm>
+#include <variant>
+
+namespace perimap {
+namespace {
+
+constexpr Duration kReportInterval = std::chrono::milliseconds(500);
+
+}  // namespace
+
+LockstepRuntime::LockstepRuntime(Pipeline& pipeline, const Identity& identity, Duration utc_minus_monotonic,
+                                 Publication& publication)
+    : pipeline_(pipeline),
+      utc_minus_monotonic_(utc_minus_monotonic),
+      publication_(publication),
+      wire_surface_(identity, static_cast<std::size_t>(pipeline.settings().features.maximum)),
+      wire_model_(identity),
+      wire_phase_(identity),
+      wire_status_(identity) {
+  for (int i = 0; i < pipeline_.team().size(); ++i) {
+    threads_.emplace_back([this, i] { pipeline_.team().serve(i); });
+  }
+  threads_.emplace_back([this] { pipeline_.finder().serve(); });
+  threads_.emplace_back([this] { pipeline_.starter().serve(); });
+}
+
+LockstepRuntime::~LockstepRuntime() {
+  pipeline_.team().dismiss();
+  pipeline_.finder().dismiss();
+  pipeline_.starter().dismiss();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void LockstepRuntime::deliver(const ReplayEvent& event) {
+  const Instant arrival = arrival_of(event);
+  advance_to(arrival);
+  now_ = std::max(now_, arrival);
+  SensorEntrance& entrance = pipeline_.entrance();
+  if (const auto* frame = std::get_if<FrameEvent>(&event)) {
+    // Live, several frames may wait; in virtual time the one before has to be mapped first.
+    if (frame_waits_) map_ready_frame();
+    static_cast<void>(entrance.push_frame(frame->stamp, frame->image()));
+    pipeline_.drain_stamps(now_);
+    frame_waits_ = entrance.pop_frame(frame_);
+  } else if (const auto* pose = std::get_if<TrackerSample>(&event)) {
+    entrance.push_pose(*pose);
+    pipeline_.drain_poses();
+  } else if (const auto* ecg = std::get_if<EcgBlock>(&event)) {
+    entrance.push_ecg(*ecg);
+  }
+  if (frame_waits_ && pipeline_.pose_reached(frame_.stamp.capture)) map_ready_frame();
+}
+
+void LockstepRuntime::finish() {
+  if (frame_waits_) map_ready_frame();
+  while (const auto next = pipeline_.schedule().next()) {
+    if (next->frame_missing) break;
+    now_ = std::max(now_, next->deadline);
+    release();
+  }
+  publish_reports(now_);
+}
+
+// Runs what falls due before t, in order: the end of a wait for a pose, and releases.
+void LockstepRuntime::advance_to(Instant t) {
+  const PipelineSettings& settings = pipeline_.settings();
+  for (;;) {
+    const auto next = pipeline_.schedule().next();
+    const Instant release_at = next ? next->deadline : Instant::max();
+    const Instant map_at =
+        frame_waits_ ? frame_.stamp.capture + settings.latency - settings.budget : Instant::max();
+    const Instant first = std::min(release_at, map_at);
+    if (first > t || first == Instant::max()) return;
+    now_ = std::max(now_, first);
+    if (map_at <= release_at) {
+      map_ready_frame();
+    } else {
+      release();
+    }
+  }
+}
+
+void LockstepRuntime::map_ready_frame() {
+  frame_waits_ = false;
+  pipeline_.map(frame_);
+}
+
+void LockstepRuntime::release() {
+  const Release release = pipeline_.schedule().take();
+  publication_.surface(wire_surface_.fill(pipeline_.compose(release), utc_minus_monotonic_));
+  if (now_ >= next_reports_) {
+    publish_reports(now_);
+    next_reports_ = now_ + kReportInterval;
+  }
+}
+
+void LockstepRuntime::publish_reports(Instant now) {
+  TripleBuffer<CardiacClock>& clock = pipeline_.entrance().clocks().status;
+  clock.update();
+  publication_.phase(wire_phase_.fill(clock.front(), now));
+  publication_.surface_model(
+      wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout, clock.front(), now));
+  StatusFacts facts;
+  facts.latency = pipeline_.settings().latency;
+  facts.stalled_after = std::chrono::milliseconds(500);
+  publication_.status(wire_status_.fill(pipeline_.counters(), facts, now));
+}
+
+}  // namespace perimap

@@ -1,0 +1,52 @@
+// The pipeline over a recording in virtual time: as fast as it goes, and the same samples every time.
+#pragma once
+
+#include <thread>
+#include <vector>
+
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/publishing/identity.hpp"
+#include "daemon/publishing/publication.hpp"
+#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/wire_surface.hpp"
+#include "drivers/recording/replay_reader.hpp"
+
+namespace perimap {
+
+// Events are delivered at their recorded arrival times and nothing is known before; deadlines fall at their virtual
+// instants; computing takes no virtual time. Workers and housekeeping are real threads, waited for where the live
+// pipeline would go on. Needs a pipeline with settings().lockstep. Used by one thread.
+class LockstepRuntime {
+ public:
+  LockstepRuntime(Pipeline& pipeline, const Identity& identity, Duration utc_minus_monotonic, Publication& publication);
+  LockstepRuntime(const LockstepRuntime&) = delete;
+  LockstepRuntime& operator=(const LockstepRuntime&) = delete;
+  ~LockstepRuntime();
+
+  // In order of arrival.
+  void deliver(const ReplayEvent& event);
+
+  // After the last event: the releases that are still owed, then the final model and status.
+  void finish();
+
+ private:
+  void advance_to(Instant t);
+  void map_ready_frame();
+  void release();
+  void publish_reports(Instant now);
+
+  Pipeline& pipeline_;
+  Duration utc_minus_monotonic_;
+  Publication& publication_;
+  WireSurface wire_surface_;
+  WireModel wire_model_;
+  WirePhase wire_phase_;
+  WireStatus wire_status_;
+  std::vector<std::thread> threads_;
+  bool frame_waits_ = false;
+  FrameHandle frame_;
+  Instant now_;
+  Instant next_reports_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,92 @@
+#include "daemon/runtime/replay_feeder.hpp"
+
+#include <utility>
+#include <variant>
+
+#include "core/realtime/deadline.hpp"
+#include "daemon/runtime/privileges.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr std::size_t kReadAhead = 256;  // events; about 1.5 s, 40 MB of 640x480 frames
+constexpr Duration kLead = std::chrono::milliseconds(500);
+// A sleep ends at least this often to look whether it should stop.
+constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
+
+}  // namespace
+
+ReplayFeeder::ReplayFeeder(ReplayReader reader, SensorEntrance& entrance, int priority)
+    : reader_(std::move(reader)), entrance_(entrance), priority_(priority) {}
+
+void ReplayFeeder::start() {
+  reading_ = std::thread([this] {
+    static_cast<void>(apply({"replay-read", 0, {}}));
+    read_ahead();
+  });
+  delivering_ = std::thread([this] {
+    static_cast<void>(apply({"replay-feed", priority_, {}}));
+    deliver();
+  });
+}
+
+void ReplayFeeder::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  if (reading_.joinable()) reading_.join();
+  if (delivering_.joinable()) delivering_.join();
+}
+
+void ReplayFeeder::read_ahead() {
+  for (;;) {
+    auto event = reader_.next();
+    std::unique_lock lock(mutex_);
+    if (!event || !*event) {
+      if (!event) error_ = std::move(event.error());
+      read_all_ = true;
+      changed_.notify_all();
+      return;
+    }
+    changed_.wait(lock, [this] { return stopping_ || ahead_.size() < kReadAhead; });
+    if (stopping_) return;
+    ahead_.push_back(std::move(**event));
+    changed_.notify_all();
+  }
+}
+
+std::optional<ReplayEvent> ReplayFeeder::take() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return stopping_ || read_all_ || !ahead_.empty(); });
+  if (stopping_ || ahead_.empty()) return std::nullopt;
+  ReplayEvent event = std::move(ahead_.front());
+  ahead_.pop_front();
+  changed_.notify_all();
+  return event;
+}
+
+void ReplayFeeder::deliver() {
+  std::optional<Duration> offset;
+  while (auto event = take()) {
+    if (!offset) offset = MonotonicClock::now() + kLead - arrival_of(*event);
+    shift(*event, *offset);
+    const Instant arrival = arrival_of(*event);
+    for (Instant now = MonotonicClock::now(); now < arrival; now = MonotonicClock::now()) {
+      sleep_until(std::min(arrival, now + kLongestSleep));
+      const std::lock_guard lock(mutex_);
+      if (stopping_) return;
+    }
+    if (const auto* frame = std::get_if<FrameEvent>(&*event)) {
+      static_cast<void>(entrance_.push_frame(frame->stamp, frame->image()));
+    } else if (const auto* pose = std::get_if<TrackerSample>(&*event)) {
+      entrance_.push_pose(*pose);
+    } else {
+      entrance_.push_ecg(std::get<EcgBlock>(*event));
+    }
+  }
+  ended_.store(true, std::memory_order_release);
+}
+
+}  // namespace perimap

@@ -1,0 +1,58 @@
+// Plays a recording into the pipeline's entrance at its recorded pace: the stand-in for the device threads.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "core/error/expected.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
+#include "drivers/recording/replay_reader.hpp"
+
+namespace perimap {
+
+// One thread reads ahead from the disk, one sleeps to each arrival and pushes. All instants are moved by one offset,
+// which brings the first arrival to shortly after start().
+class ReplayFeeder {
+ public:
+  ReplayFeeder(ReplayReader reader, SensorEntrance& entrance, int priority);
+  ReplayFeeder(const ReplayFeeder&) = delete;
+  ReplayFeeder& operator=(const ReplayFeeder&) = delete;
+  ~ReplayFeeder() { stop(); }
+
+  void start();
+  void stop();
+
+  // All events are delivered, or reading failed.
+  [[nodiscard]] bool ended() const noexcept { return ended_.load(std::memory_order_acquire); }
+  // Why reading failed; to be asked after ended().
+  [[nodiscard]] const std::optional<Error>& error() const noexcept { return error_; }
+  // What was damaged in the recording; to be asked after ended().
+  [[nodiscard]] std::vector<Error> damage() const { return reader_.damage(); }
+
+ private:
+  void read_ahead();
+  void deliver();
+  [[nodiscard]] std::optional<ReplayEvent> take();
+
+  ReplayReader reader_;
+  SensorEntrance& entrance_;
+  int priority_;
+  std::thread reading_;
+  std::thread delivering_;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<ReplayEvent> ahead_;
+  bool read_all_ = false;
+  bool stopping_ = false;
+  std::optional<Error> error_;  // written before read_all_ is set under the mutex
+
+  // Release when the last event is delivered, acquire in ended(): error_ and the reader's state are then visible.
+  std::atomic<bool> ended_{false};
+};
+
+}  // namespace perimap

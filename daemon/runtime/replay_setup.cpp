@@ -1,0 +1,146 @@
+#include "daemon/runtime/replay_setup.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "daemon/config/configuration_loader.hpp"
+#include "drivers/calibration/calibration_file.hpp"
+#include "drivers/recording/channels.hpp"
+
+namespace perimap {
+namespace {
+
+// The attachments and facts of a recording that set the pipeline up.
+struct RecordingFacts {
+  std::optional<std::string> calibration;
+  std::optional<std::string> configuration;
+  Duration utc_minus_monotonic{0};
+  std::optional<std::string> world_frame;
+};
+
+Expected<RecordingFacts> read_facts(const std::string& path, ReadMode mode) {
+  auto reader = RecordingReader::open(path, mode);
+  if (!reader) return tl::unexpected(reader.error());
+  RecordingFacts facts;
+  const auto names = reader->attachment_names();
+  const auto attached = [&](std::string_view name) -> Expected<std::optional<std::string>> {
+    if (std::find(names.begin(), names.end(), name) == names.end()) return std::optional<std::string>();
+    auto text = reader->attachment(name);
+    if (!text) return tl::unexpected(text.error());
+    return std::optional<std::string>(std::move(*text));
+  };
+  auto calibration = attached(attachments::kCalibration);
+  if (!calibration) return tl::unexpected(calibration.error());
+  facts.calibration = std::move(*calibration);
+  auto configuration = attached(attachments::kConfiguration);
+  if (!configuration) return tl::unexpected(configuration.error());
+  facts.configuration = std::move(*configuration);
+
+  const auto channels = reader->channels();
+  const bool has_info = std::any_of(channels.begin(), channels.end(),
+                                    [](const RecordedChannel& c) { return c.name == channels::kRecordingInfo; });
+  if (!has_info) return facts;
+  const std::string_view info_channel[] = {channels::kRecordingInfo};
+  if (auto selected = reader->select(info_channel); !selected) return tl::unexpected(selected.error());
+  const auto message = reader->next();
+  if (!message) return tl::unexpected(message.error());
+  if (!*message) return facts;
+  const auto info = reader->decode<perimap_RecordingInfo>(**message);
+  if (!info) return tl::unexpected(info.error());
+  facts.utc_minus_monotonic = Duration((*info)->utc_minus_monotonic_ns);
+  if ((*info)->world_frame_id != nullptr) facts.world_frame = (*info)->world_frame_id;
+  return facts;
+}
+
+PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& camera) {
+  PipelineSettings s;
+  s.camera = camera;
+  const double(&t)[3] = c.tracker.translation_SC_mm;
+  s.pose.X_SC = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), c.tracker.rotation_SC_wxyz);
+  s.pose.position_deviation_mm = c.tracker.position_deviation_mm / std::numbers::sqrt3;
+  s.pose.rotation_deviation_rad = c.tracker.rotation_deviation_rad / std::numbers::sqrt3;
+  s.pose.time_offset = c.tracker.time_offset;
+  s.pose.maximum_extrapolation = c.tracker.maximum_extrapolation;
+  s.clock.law.law = c.phase.law;
+  s.clock.lost_after = c.phase.lost_after;
+  s.features.maximum = c.features.maximum;
+  s.features.detection_interval_frames = c.features.detection_interval_frames;
+  s.features.minimum_distance_px = c.features.minimum_distance_px;
+  s.estimator.layout.cardiac_harmonics = c.estimation.harmonics;
+  s.estimator.prior.dc_mm = c.estimation.prior_dc_deviation_mm;
+  s.estimator.prior.cardiac_mm = c.estimation.prior_harmonic_deviation_mm;
+  s.estimator.update.max_iterations = c.estimation.iterations;
+  s.estimator.update.gate = c.estimation.gate_chi2;
+  s.estimator.batch.gate = c.estimation.gate_chi2;
+  s.estimator.batch.start_depths_mm = c.estimation.start_depths_mm;
+  s.estimator.batch.prior_depth_mm = c.estimation.start_depths_mm[c.estimation.start_depths_mm.size() / 2];
+  s.estimator.start_observations = c.estimation.start_observations;
+  s.estimator.pixel_deviation_px = c.estimation.pixel_deviation_px;
+  s.estimator.converged_deviation_mm = converged_deviation_mm(c);
+  s.workers = c.pipeline.workers;
+  s.latency = c.pipeline.latency;
+  s.budget = c.pipeline.budget;
+  s.validity = c.dds.surface_lifespan > Duration(0) ? c.dds.surface_lifespan : s.validity;
+  s.adoption_delay_frames = c.pipeline.adoption_delay_frames;
+  return s;
+}
+
+}  // namespace
+
+tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recording,
+                                                     const std::optional<std::filesystem::path>& configuration_file,
+                                                     ReadMode mode) {
+  const auto wrong_recording = [](Error error) { return tl::unexpected(SetupError{std::move(error), false}); };
+  const auto wrong_configuration = [](Error error) { return tl::unexpected(SetupError{std::move(error), true}); };
+
+  auto facts = read_facts(recording, mode);
+  if (!facts) return wrong_recording(std::move(facts.error()));
+  Configuration configuration;
+  if (facts->world_frame) configuration.source.world_frame = *facts->world_frame;
+  if (facts->configuration) {
+    const std::string name = fmt::format("{}:{}", recording, attachments::kConfiguration);
+    auto own = parse_configuration(*facts->configuration, name, configuration, NamedFiles::kMayBeMissing);
+    if (!own) return wrong_recording(std::move(own.error()));
+    configuration = std::move(*own);
+  }
+  if (configuration_file) {
+    auto overlaid = load_configuration(*configuration_file, configuration);
+    if (!overlaid) return wrong_configuration(std::move(overlaid.error()));
+    configuration = std::move(*overlaid);
+  }
+
+  Expected<CameraModel> camera = fail("");
+  if (configuration.camera.calibration) {
+    camera = read_calibration(*configuration.camera.calibration);
+    if (!camera) return wrong_configuration(std::move(camera.error()));
+  } else if (facts->calibration) {
+    camera = parse_calibration(*facts->calibration, fmt::format("{}:{}", recording, attachments::kCalibration));
+    if (!camera) return wrong_recording(std::move(camera.error()));
+  } else {
+    return wrong_configuration(
+        Error{fmt::format("{}: no camera calibration is attached; expected key 'camera.calibration' to name one",
+                          recording)});
+  }
+
+  auto reader = ReplayReader::open(recording, mode);
+  if (!reader) return wrong_recording(std::move(reader.error()));
+  const PipelineSettings pipeline = pipeline_settings(configuration, *camera);
+  const Identity identity{configuration.source.name, "frame", configuration.source.world_frame};
+  return ReplaySetup{std::move(configuration), pipeline, identity, facts->utc_minus_monotonic, std::move(*reader)};
+}
+
+RuntimeSettings runtime_settings(const Configuration& configuration, const Identity& identity) {
+  RuntimeSettings settings;
+  settings.identity = identity;
+  settings.priority = configuration.realtime.priority;
+  settings.cpus = configuration.realtime.cpus;
+  settings.lock_memory = configuration.realtime.lock_memory;
+  settings.model_interval = configuration.dds.surface_model_interval;
+  settings.status_interval = configuration.status.interval;
+  return settings;
+}
+
+}  // namespace perimap

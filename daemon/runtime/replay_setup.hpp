@@ -1,0 +1,37 @@
+// From a configuration and a recording to a pipeline that can replay it.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "core/error/expected.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "daemon/config/configuration.hpp"
+#include "daemon/publishing/identity.hpp"
+#include "daemon/runtime/live_runtime.hpp"
+#include "drivers/recording/replay_reader.hpp"
+
+namespace perimap {
+
+struct ReplaySetup {
+  Configuration configuration;  // effective: defaults, then the recording's own, then the file's
+  PipelineSettings pipeline;
+  Identity identity;
+  Duration utc_minus_monotonic{0};  // of the recording
+  ReplayReader reader;              // at the first event
+};
+
+// `configuration_file`: none for the recording's own configuration over the defaults. The error's `configuration` tells
+// whether it is the configuration that is wrong, or the recording.
+struct SetupError {
+  Error error;
+  bool configuration = false;
+};
+
+[[nodiscard]] tl::expected<ReplaySetup, SetupError> prepare_replay(
+    const std::string& recording, const std::optional<std::filesystem::path>& configuration_file, ReadMode mode);
+
+[[nodiscard]] RuntimeSettings runtime_settings(const Configuration& configuration, const Identity& identity);
+
+}  // namespace perimap

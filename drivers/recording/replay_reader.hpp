@@ -1,0 +1,53 @@
+// The sensors' messages of a recording as the values that sources push into the pipeline, in order of arrival.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/error/expected.hpp"
+#include "core/sensors/ecg_block.hpp"
+#include "core/sensors/frame_stamp.hpp"
+#include "core/sensors/grey_image.hpp"
+#include "core/sensors/tracker_sample.hpp"
+#include "drivers/recording/recording_reader.hpp"
+
+namespace perimap {
+
+struct FrameEvent {
+  FrameStamp stamp;
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> pixels;  // rows without gaps
+
+  [[nodiscard]] GreyImage image() const noexcept { return {pixels.data(), width, height, width}; }
+};
+
+using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock>;
+
+[[nodiscard]] Instant arrival_of(const ReplayEvent& event) noexcept;
+// The same event with all its instants moved by `offset`.
+void shift(ReplayEvent& event, Duration offset) noexcept;
+
+// Messages lie in the file in order of arrival; one that goes back by more than a stamp's rounding is an error, since
+// replay could not deliver it at its time.
+class ReplayReader {
+ public:
+  // Fails when the recording has no camera, tracker or ECG channel.
+  [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode);
+
+  // The next event; nullopt at the end. Channels other than the sensors' are passed over.
+  [[nodiscard]] Expected<std::optional<ReplayEvent>> next();
+
+  [[nodiscard]] std::vector<Error> damage() const { return reader_.damage(); }
+
+ private:
+  explicit ReplayReader(RecordingReader reader) : reader_(std::move(reader)) {}
+
+  RecordingReader reader_;
+  Instant last_arrival_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,2 @@
+// bugprone-integer-division
+double half(int n) { return n / 2; }

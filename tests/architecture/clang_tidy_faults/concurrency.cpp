@@ -1,0 +1,3 @@
+// concurrency-mt-unsafe
+#include <cstdlib>
+const char* home() { return std::getenv("HOME"); }

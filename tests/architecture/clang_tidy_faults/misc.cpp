@@ -1,0 +1,2 @@
+// misc-redundant-expression
+bool same(int a) { return a == a; }

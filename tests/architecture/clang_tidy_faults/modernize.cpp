@@ -1,0 +1,2 @@
+// modernize-use-nullptr
+int* nothing() { return 0; }

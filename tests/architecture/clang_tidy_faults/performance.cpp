@@ -1,0 +1,3 @@
+// performance-unnecessary-value-param
+#include <string>
+bool empty(const std::string text) { return text.empty(); }

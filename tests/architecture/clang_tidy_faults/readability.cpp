@@ -1,0 +1,2 @@
+// readability-identifier-naming
+int CamelCaseVariable(int Count) { return Count; }

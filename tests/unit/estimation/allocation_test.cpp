@@ -1,0 +1,93 @@
+// The recursive path takes nothing from the heap. A program of its own, because it counts the calls of the allocator.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "core/estimation/innovation_monitor.hpp"
+#include "core/estimation/iterated_update.hpp"
+
+namespace {
+
+std::atomic<long> allocations{0};
+
+}  // namespace
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+// The sanitizers own malloc, and tell of its calls.
+extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*malloc_hook)(const volatile void*, std::size_t),
+                                                         void (*free_hook)(const volatile void*));
+namespace {
+[[maybe_unused]] const int kHooks = __sanitizer_install_malloc_and_free_hooks(
+    [](const volatile void*, std::size_t) { allocations.fetch_add(1, std::memory_order_relaxed); },
+    [](const volatile void*) {});
+}  // namespace
+#else
+// operator new ends here too.
+extern "C" void* __libc_malloc(std::size_t size);
+extern "C" void* malloc(std::size_t size) {
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  return __libc_malloc(size);
+}
+#endif
+
+namespace perimap {
+namespace {
+
+template <class Function>
+long allocations_of(Function function) {
+  const long before = allocations.load();
+  function();
+  return allocations.load() - before;
+}
+
+TEST(Allocation, IsCounted) {
+  void* volatile taken = nullptr;
+  EXPECT_GT(allocations_of([&] { taken = std::malloc(100); }), 0);
+  std::free(taken);
+  int* volatile made = nullptr;
+  EXPECT_GT(allocations_of([&] { made = new int[50]; }), 0);
+  delete[] made;
+}
+
+template <class Model>
+void expect_no_allocation(const Model& model, const Vector3d& ahead_C) {
+  for (const BasisLayout layout : {BasisLayout{8, 0}, BasisLayout{kMaxHarmonics, kMaxRespiratoryHarmonics}}) {
+    FeatureEstimate estimate = prior_estimate(layout, Prior{}, ahead_C);
+    InnovationMonitor monitor;
+    Observation observation;
+    observation.R = 1e-4 * Matrix2d::Identity();
+    int accepted = 0;
+    double deviation = 0.0;
+    Vector3d v = Vector3d::Zero();
+    const long count = allocations_of([&] {
+      for (int k = 0; k < 20; ++k) {
+        observation.b = basis_at(layout, 0.3 * k, 0.1 * k);
+        observation.X_CW.t = Vector3d(0.1 * k, 0.2 * k, 0.0);
+        (void)model.predict(observation.X_CW * estimate.position(observation.b), observation.z);
+        observation.z.x() += k == 7 ? 1e6 : 1e-3;
+        const UpdateOutcome outcome = iterated_update(estimate, observation, model);
+        accepted += outcome.accepted ? 1 : 0;
+        monitor.add(outcome.normalised_innovation_squared);
+        deviation += largest_deviation_mm(estimate, layout, 4);
+        v += velocity_of(estimate.x, basis_rate(layout, 0.3 * k), 7.0);
+      }
+    });
+    EXPECT_EQ(count, 0);
+    EXPECT_GE(accepted, 18);
+    EXPECT_GT(deviation, 0.0);
+    EXPECT_TRUE(v.allFinite());
+  }
+}
+
+TEST(Allocation, PixelUpdatesTakeNothingFromTheHeap) {
+  const PixelModel model{CameraModel{
+      .width = 640, .height = 480, .fx = 520.0, .fy = 525.0, .cx = 310.0, .cy = 250.0, .k1 = -0.3, .k2 = 0.1}};
+  expect_no_allocation(model, Vector3d(5, -3, 80));
+}
+
+TEST(Allocation, BearingUpdatesTakeNothingFromTheHeap) { expect_no_allocation(BearingModel{}, Vector3d(80, -3, 5)); }
+
+}  // namespace
+}  // namespace perimap
