@@ -94,6 +94,20 @@ level = "debug"
   EXPECT_EQ(result->log.level, LogConfiguration::Level::kDebug);
 }
 
+TEST(ConfigurationLoader, TextMayBeInAnyScriptWithinStringsAndComments) {
+  const Expected<Configuration> result = parse(
+      "version = 1  # \xe3\x80\x81\n[source]\nname = \"th\xc3\xa9\xc3\xa2tre \\\"\xe3\x80\x81\\\" \"\nworld_frame = "
+      "'\xef\xbb\xa3'\n");
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->source.name, "th\xc3\xa9\xc3\xa2tre \"\xe3\x80\x81\" ");
+  EXPECT_EQ(result->source.world_frame, "\xef\xbb\xa3");
+}
+
+TEST(ConfigurationLoader, AByteOrderMarkIsSkipped) {
+  const Expected<Configuration> result = parse("\xef\xbb\xbfversion = 1\n");
+  EXPECT_TRUE(result) << result.error().message;
+}
+
 TEST(ConfigurationLoader, AFileOverlaysItsBaseKeyByKey) {
   const Expected<Configuration> recorded =
       parse("version = 1\n[tracker]\nposition_deviation_mm = 1.4\n[phase]\nlaw = \"warped\"\n");
@@ -241,6 +255,14 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"NoValue", "version = \n", "test.toml:1:"}, Wrong{"OpenString", "version = \"1\n", "test.toml:1:"},
         Wrong{"OpenTable", "version = 1\n[phase\n", "test.toml:2:"},
         Wrong{"NotUtf8", "version = 1\nx = \"\xff\xfe\"\n", "test.toml:2:"},
+        Wrong{"LetterOutsideOfStrings", "version = 1\n[source]\nn\xef\xbb\xa3me = \"a\"\n",
+              "test.toml:3:2: expected TOML, got: a letter beyond ASCII outside of strings and comments"},
+        Wrong{"LetterAfterAnEscapedQuote", "version = 1\n[source]\nname = \"a\\\"b\" \xef\xbb\xa3\n",
+              "test.toml:3:15: expected TOML, got: a letter beyond ASCII outside of strings and comments"},
+        Wrong{"StringOverSeveralLines", "version = 1\n[source]\nname = \"\"\"a\nb\"\"\"\n",
+              "test.toml:3:8: expected a string on one line, got: one over several lines"},
+        Wrong{"NoKeyInBrackets", "version = 1\n[(phase]\n", "test.toml:2:2: expected TOML"},
+        Wrong{"NotUtf8InAKey", "version = 1\n[tracker]\nhand_\xd1m = 1\n", "test.toml:3:"},
         Wrong{"Nul", std::string("version = 1\n\0", 13), "test.toml:2:"},
         Wrong{"Binary", "\x89MCAP0\r\n", "test.toml:1:"},
         Wrong{"DeepArrays", "version = 1\nx = " + std::string(5000, '['), "test.toml:2:"},

@@ -1,0 +1,20 @@
+// Any bytes as a calibration file: an error of one line, or a camera that prints and reads back to itself.
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+#include "drivers/calibration/calibration_file.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace perimap;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  const Expected<CameraModel> camera = parse_calibration(text, "fuzz.yaml");
+  if (!camera) {
+    if (camera.error().message.find_first_of("\r\n") != std::string::npos) std::abort();
+    return 0;
+  }
+  const Expected<CameraModel> again = parse_calibration(format_calibration(*camera), "again.yaml");
+  if (!again || again->fx != camera->fx || again->cy != camera->cy || again->k3 != camera->k3) std::abort();
+  return 0;
+}

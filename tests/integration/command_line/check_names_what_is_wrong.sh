@@ -1,0 +1,31 @@
+#!/bin/bash
+# `perimap check`: exit codes, one line on an error, and an effective configuration that checks again to the same.
+#   check_names_what_is_wrong.sh PERIMAP
+set -u
+perimap=$1
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+
+fail() {
+  echo "FAILED: $1"
+  exit 1
+}
+
+printf 'version = 1\n[replay]\nrecording = "x.mcap"\n[phase]\nlaw = "warped"\n' >"$scratch/good.toml"
+"$perimap" check "$scratch/good.toml" 2>"$scratch/error" && fail "a missing recording was accepted"
+touch "$scratch/x.mcap"
+"$perimap" check "$scratch/good.toml" >"$scratch/effective.toml" || fail "a good configuration ended with $?"
+"$perimap" check "$scratch/effective.toml" >"$scratch/again.toml" || fail "the effective configuration ended with $?"
+cmp "$scratch/effective.toml" "$scratch/again.toml" || fail "the effective configuration is not its own"
+
+printf 'version = 1\n[phase]\nlaw = 3\n' >"$scratch/wrong.toml"
+"$perimap" check "$scratch/wrong.toml" >"$scratch/out" 2>"$scratch/error"
+[ $? -eq 2 ] || fail "a wrong configuration must end with 2"
+[ ! -s "$scratch/out" ] || fail "a wrong configuration was printed"
+[ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line: $(cat "$scratch/error")"
+grep -q "^$scratch/wrong.toml:3:7: key 'phase.law': expected " "$scratch/error" || fail "$(cat "$scratch/error")"
+"$perimap" check /nowhere/x.toml 2>/dev/null
+[ $? -eq 2 ] || fail "a missing configuration must end with 2"
+"$perimap" check 2>/dev/null
+[ $? -eq 2 ] || fail "wrong usage must end with 2"
+"$perimap" --version | grep -q '^perimap [0-9]' || fail "no version"
