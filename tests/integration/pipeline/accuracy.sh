@@ -15,17 +15,18 @@ rm -rf "$work"
 mkdir -p "$work"
 "$perimap" simulate "$work/heart.mcap" "${simulate[@]}" 2> "$work/stderr" || { cat "$work/stderr"; exit 1; }
 "$perimap" replay "$work/heart.mcap" --lockstep --json "$work/report.json" 2> "$work/stderr" || { cat "$work/stderr"; exit 1; }
-python3 - "$work/report.json" "$@" << 'END'
-import json, sys
-report = json.load(open(sys.argv[1]))["accuracy"]
-values = {**report["settled_error"], **report}
-failed = False
-for key, limit in zip(sys.argv[2::2], sys.argv[3::2]):
-    lower = key.startswith("-")
-    value, limit = values[key.lstrip("-")], float(limit)
-    ok = value >= limit if lower else value <= limit
-    print(f"{'ok  ' if ok else 'FAIL'} {key.lstrip('-')} = {value:g}, {'at least' if lower else 'at most'} {limit:g}")
-    failed |= not ok
-sys.exit(failed)
+node - "$work/report.json" "$@" << 'END'
+const report = JSON.parse(require("fs").readFileSync(process.argv[2])).accuracy;
+const values = {...report.settled_error, ...report};
+let failed = false;
+for (let i = 3; i < process.argv.length; i += 2) {
+  const lower = process.argv[i].startsWith("-");
+  const key = process.argv[i].replace(/^-/, "");
+  const limit = Number(process.argv[i + 1]);
+  const ok = lower ? values[key] >= limit : values[key] <= limit;
+  console.log(`${ok ? "ok  " : "FAIL"} ${key} = ${values[key]}, ${lower ? "at least" : "at most"} ${limit}`);
+  failed ||= !ok;
+}
+process.exit(failed ? 1 : 0);
 END
 rm -f "$work/heart.mcap"

@@ -7,7 +7,7 @@
 #include <iterator>
 
 #include "daemon/commands/simulate.hpp"
-#include "daemon/commands/truth_messages.hpp"
+#include "daemon/report/truth_messages.hpp"
 
 namespace perimap {
 namespace {

@@ -1,4 +1,4 @@
-#include "daemon/watch/sample_recorder.hpp"
+#include "daemon/publishing/sample_recorder.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
