@@ -29,6 +29,7 @@ build=(
 )
 tests=(
   libgtest-dev libgmock-dev
+  libopencv-calib3d-dev                      # the camera model is held against OpenCV
   nodejs=node npm=npm ca-certificates        # recordings are read back by the official npm packages
 )
 full=(
