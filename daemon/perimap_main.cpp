@@ -13,8 +13,9 @@ int main(int argc, char** argv) {
   CLI::App app("Companion of perimapd, which predicts where a beating organ's surface will be.");
   app.set_version_flag("--version", "perimap " PERIMAP_VERSION);
   app.require_subcommand(1);
-  app.footer("Exit codes: 0 done, 1 failed, 2 wrong usage or configuration.\n"
-             "Research software, not a certified medical device.");
+  app.footer(
+      "Exit codes: 0 done, 1 failed, 2 wrong usage or configuration.\n"
+      "Research software, not a certified medical device.");
   int exit_code = 0;
   perimap::add_simulate_command(app, exit_code);
   perimap::add_replay_command(app, exit_code);

@@ -33,9 +33,9 @@ int run(const std::string& configuration_file) {
   const auto given = load_configuration(configuration_file);
   if (!given) return refuse(given.error(), kWrongConfiguration);
   if (!given->replay.recording) {
-    return refuse({fmt::format("{}: key 'replay.recording': expected the recording to replay, got nothing",
-                               configuration_file)},
-                  kWrongConfiguration);
+    return refuse(
+        {fmt::format("{}: key 'replay.recording': expected the recording to replay, got nothing", configuration_file)},
+        kWrongConfiguration);
   }
   auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
   if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
@@ -44,13 +44,14 @@ int run(const std::string& configuration_file) {
   const Logging logging(configuration.log.level);
   std::unique_ptr<DdsPublication> publication;
   if (configuration.dds.enabled) {
-    auto dds = DdsPublication::create({configuration.dds.domain, configuration.dds.surface_deadline,
-                                       configuration.dds.surface_lifespan});
+    auto dds = DdsPublication::create(
+        {configuration.dds.domain, configuration.dds.surface_deadline, configuration.dds.surface_lifespan});
     if (!dds) return refuse(dds.error(), kFailure);
     publication = std::move(*dds);
   } else {
-    return refuse({fmt::format("{}: key 'dds.enabled': expected true, since nothing else publishes", configuration_file)},
-                  kWrongConfiguration);
+    return refuse(
+        {fmt::format("{}: key 'dds.enabled': expected true, since nothing else publishes", configuration_file)},
+        kWrongConfiguration);
   }
 
   Pipeline pipeline(setup->pipeline);
@@ -75,9 +76,10 @@ int run(const std::string& configuration_file) {
 }  // namespace perimap
 
 int main(int argc, char** argv) {
-  CLI::App app{"Maps a beating organ and publishes its predicted surface over DDS at a fixed latency.\n"
-               "Research software, not a certified medical device.",
-               "perimapd"};
+  CLI::App app{
+      "Maps a beating organ and publishes its predicted surface over DDS at a fixed latency.\n"
+      "Research software, not a certified medical device.",
+      "perimapd"};
   app.set_version_flag("--version", PERIMAP_VERSION);
   std::string configuration_file;
   app.add_option("-c,--config", configuration_file, "Configuration file (TOML; see config/replay.toml)")->required();

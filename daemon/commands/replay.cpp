@@ -146,8 +146,8 @@ struct LockstepEnd {
   bool stopped = false;
 };
 
-Expected<LockstepEnd> run_lockstep(Pipeline& pipeline, ReplaySetup& setup, Publication& publication,
-                                   Progress& progress, StopSignal& stop) {
+Expected<LockstepEnd> run_lockstep(Pipeline& pipeline, ReplaySetup& setup, Publication& publication, Progress& progress,
+                                   StopSignal& stop) {
   LockstepRuntime runtime(pipeline, setup.identity, setup.utc_minus_monotonic, publication);
   std::uint64_t shown = 0;
   for (;;) {
@@ -181,9 +181,8 @@ int replay(const Options& options) {
   const Logging logging(setup->configuration.log.level);
   std::unique_ptr<PublicationRecorder> recorder;
   if (!options.samples.empty()) {
-    auto created =
-        PublicationRecorder::create(options.samples, "perimap replay " PERIMAP_VERSION,
-                                    static_cast<std::size_t>(setup->pipeline.features.maximum));
+    auto created = PublicationRecorder::create(options.samples, "perimap replay " PERIMAP_VERSION,
+                                               static_cast<std::size_t>(setup->pipeline.features.maximum));
     if (!created) return refuse(created.error(), kFailure);
     recorder = std::move(*created);
   }
@@ -207,8 +206,7 @@ int replay(const Options& options) {
       stopped = end->stopped;
     } else {
       LiveSession session(pipeline, runtime_settings(setup->configuration, setup->identity), publication,
-                          std::move(setup->reader),
-                          [&] { progress.update(pipeline.counters().frames.get()); });
+                          std::move(setup->reader), [&] { progress.update(pipeline.counters().frames.get()); });
       if (const auto ended = session.run(*stop); !ended) return refuse(ended.error(), kFailure);
       stopped = stop->requested();
     }

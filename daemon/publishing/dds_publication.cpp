@@ -7,8 +7,8 @@ namespace perimap {
 Expected<std::unique_ptr<DdsPublication>> DdsPublication::create(const DdsSettings& settings) {
   auto participant = dds::Participant::create(settings.domain);
   if (!participant) return tl::unexpected(participant.error());
-  auto surface = dds::Writer<perimap_Surface>::create(*participant,
-                                                      {settings.surface_deadline, settings.surface_lifespan});
+  auto surface =
+      dds::Writer<perimap_Surface>::create(*participant, {settings.surface_deadline, settings.surface_lifespan});
   if (!surface) return tl::unexpected(surface.error());
   auto model = dds::Writer<perimap_SurfaceModel>::create(*participant);
   if (!model) return tl::unexpected(model.error());

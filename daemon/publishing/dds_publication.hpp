@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/error/expected.hpp"
-
 #include "daemon/dds/participant.hpp"
 #include "daemon/dds/writer.hpp"
 #include "daemon/publishing/publication.hpp"

@@ -163,8 +163,8 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
 
   report.features_published = seen.size();
   report.features_converged = converged_at.size();
-  report.converged_by_15_s = static_cast<std::size_t>(
-      std::count_if(converged_at.begin(), converged_at.end(), [](const auto& c) { return c.second <= kSettledAfter_s; }));
+  report.converged_by_15_s = static_cast<std::size_t>(std::count_if(
+      converged_at.begin(), converged_at.end(), [](const auto& c) { return c.second <= kSettledAfter_s; }));
   report.features_without_truth = without_truth.size();
   report.settled = figures_of(settled);
   if (!settled.empty()) {

@@ -32,23 +32,23 @@ struct ErrorSpan {
 
 struct FeaturePath {
   std::uint32_t id = 0;
-  ErrorFigures error;                // since it was first published as converged
-  std::vector<Vector3d> published;   // over the last whole second of the recording, mm, W
-  std::vector<Vector3d> truth;       // at the same instants
+  ErrorFigures error;               // since it was first published as converged
+  std::vector<Vector3d> published;  // over the last whole second of the recording, mm, W
+  std::vector<Vector3d> truth;      // at the same instants
 };
 
 struct AccuracyReport {
   std::size_t samples = 0;
   std::size_t features_published = 0;
-  std::size_t features_converged = 0;         // ever
-  std::size_t converged_by_15_s = 0;          // ever converged within the first 15 s
-  std::size_t features_without_truth = 0;     // converged, but the ray of their first view misses the true surface
-  ErrorFigures settled;                       // 15 s to the end, every feature from its first converged sample on
-  double mean_nees = 0.0;                     // e' P^-1 e / 3 over the same; 1 is consistent
+  std::size_t features_converged = 0;      // ever
+  std::size_t converged_by_15_s = 0;       // ever converged within the first 15 s
+  std::size_t features_without_truth = 0;  // converged, but the ray of their first view misses the true surface
+  ErrorFigures settled;                    // 15 s to the end, every feature from its first converged sample on
+  double mean_nees = 0.0;                  // e' P^-1 e / 3 over the same; 1 is consistent
   double share_above_3_mm = 0.0;
   std::vector<ErrorSpan> seconds;
-  std::vector<ErrorSpan> cycles;              // from R peak to R peak
-  std::vector<FeaturePath> paths;             // in order of id
+  std::vector<ErrorSpan> cycles;   // from R peak to R peak
+  std::vector<FeaturePath> paths;  // in order of id
 };
 
 // The true position of a feature is that of the material point which the ray of its first detection meets, seen from
@@ -84,7 +84,7 @@ class Accuracy {
   const GroundTruth& truth_;
   CameraModel camera_;
   Instant first_frame_;
-  std::size_t samples_ = 0;              // with published_, touched by add(Surface) alone
+  std::size_t samples_ = 0;  // with published_, touched by add(Surface) alone
   std::vector<Published> published_;
   std::map<std::uint32_t, Origin> origins_;  // touched by add(SurfaceModel) alone
 };

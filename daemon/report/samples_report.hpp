@@ -21,12 +21,12 @@ struct DurationFigures {
 struct SamplesReport {
   AccuracyReport accuracy;
   std::uint64_t samples = 0;
-  std::uint64_t missed = 0;               // gaps in the sample sequence
-  std::uint64_t without_frame = 0;        // published at a fitted frame time because no frame came
+  std::uint64_t missed = 0;         // gaps in the sample sequence
+  std::uint64_t without_frame = 0;  // published at a fitted frame time because no frame came
   std::uint64_t from_late_update = 0;
   DurationFigures capture_to_receipt;
-  DurationFigures release_to_receipt;     // receipt minus the release's deadline
-  DurationFigures jitter;                 // |receipt minus deadline - its median|
+  DurationFigures release_to_receipt;  // receipt minus the release's deadline
+  DurationFigures jitter;              // |receipt minus deadline - its median|
 };
 
 // Fails when the recording has no ground truth or the samples are not of this recording.

@@ -117,8 +117,8 @@ std::string plot_group(const Plot& plot, double x_px, double y_px, double width_
     out += text_at(kMarginLeft - 6, py(v) + 4, "end", fmt::format("{:g}", std::abs(v) < 1e-9 ? 0.0 : v));
   }
   out += fmt::format(
-      "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"#555\"/>\n", kMarginLeft,
-      kMarginTop, inner_width, inner_height);
+      "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"#555\"/>\n",
+      kMarginLeft, kMarginTop, inner_width, inner_height);
   out += text_at(kMarginLeft + inner_width / 2, height_px - 10, "middle", plot.x_label);
   out += fmt::format("<text transform=\"translate(16,{:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
                      kMarginTop + inner_height / 2, escaped(plot.y_label));

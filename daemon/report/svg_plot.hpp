@@ -15,7 +15,7 @@ struct PlotLine {
   std::vector<PlotPoint> points;  // points that are not finite are left out
   std::string color = "#1f6f8b";  // an SVG colour
   double width_px = 1.5;
-  std::string label;              // in the legend; none when empty
+  std::string label;  // in the legend; none when empty
 };
 
 struct Plot {

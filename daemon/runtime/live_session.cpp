@@ -19,7 +19,8 @@ LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Pu
                          ReplayReader reader, std::function<void()> on_tick)
     : pipeline_(pipeline),
       runtime_(pipeline, settings, publication),
-      feeder_(std::move(reader), pipeline.entrance(), settings.priority > 1 ? settings.priority - 1 : settings.priority),
+      feeder_(std::move(reader), pipeline.entrance(),
+              settings.priority > 1 ? settings.priority - 1 : settings.priority),
       on_tick_(std::move(on_tick)) {}
 
 Expected<void> LiveSession::run(StopSignal& stop) {
@@ -38,6 +39,9 @@ Expected<void> LiveSession::run(StopSignal& stop) {
   }
   feeder_.stop();
   runtime_.stop();
+  if (const auto failed = pipeline_.counters().searches_failed.get(); failed > 0) {
+    spdlog::warn("{} searches for new features failed", failed);
+  }
   if (!feeder_.ended()) return {};
   for (const Error& damage : feeder_.damage()) spdlog::warn("{}", damage.message);
   if (feeder_.error()) return tl::unexpected(*feeder_.error());
@@ -61,8 +65,9 @@ void LiveSession::warn_of_short_latency() {
   latency_checked_ = true;
   const PipelineSettings& settings = pipeline_.settings();
   if (delay.p99 + settings.budget <= settings.latency) return;
-  spdlog::warn("latency {:.1f} ms is too short: frames arrive up to {:.1f} ms after capture and the budget is {:.1f} ms",
-               milliseconds(settings.latency), milliseconds(delay.p99), milliseconds(settings.budget));
+  spdlog::warn(
+      "latency {:.1f} ms is too short: frames arrive up to {:.1f} ms after capture and the budget is {:.1f} ms",
+      milliseconds(settings.latency), milliseconds(delay.p99), milliseconds(settings.budget));
 }
 
 }  // namespace perimap

@@ -69,8 +69,7 @@ void LockstepRuntime::advance_to(Instant t) {
   for (;;) {
     const auto next = pipeline_.schedule().next();
     const Instant release_at = next ? next->deadline : Instant::max();
-    const Instant map_at =
-        frame_waits_ ? frame_.stamp.capture + settings.latency - settings.budget : Instant::max();
+    const Instant map_at = frame_waits_ ? frame_.stamp.capture + settings.latency - settings.budget : Instant::max();
     const Instant first = std::min(release_at, map_at);
     if (first > t || first == Instant::max()) return;
     now_ = std::max(now_, first);

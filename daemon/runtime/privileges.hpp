@@ -15,9 +15,9 @@ namespace perimap {
 
 // What a thread asks for when it starts.
 struct ThreadRequest {
-  std::string name;        // at most 15 bytes are shown by the system
-  int priority = 0;        // SCHED_FIFO, 1 to 98; 0: the normal scheduler
-  std::vector<int> cpus;   // empty: any
+  std::string name;       // at most 15 bytes are shown by the system
+  int priority = 0;       // SCHED_FIFO, 1 to 98; 0: the normal scheduler
+  std::vector<int> cpus;  // empty: any
 };
 
 // For the calling thread. False when the priority or the affinity was refused; it then runs on without.

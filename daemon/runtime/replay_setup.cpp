@@ -120,9 +120,8 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
     camera = parse_calibration(*facts->calibration, fmt::format("{}:{}", recording, attachments::kCalibration));
     if (!camera) return wrong_recording(std::move(camera.error()));
   } else {
-    return wrong_configuration(
-        Error{fmt::format("{}: no camera calibration is attached; expected key 'camera.calibration' to name one",
-                          recording)});
+    return wrong_configuration(Error{fmt::format(
+        "{}: no camera calibration is attached; expected key 'camera.calibration' to name one", recording)});
   }
 
   auto reader = ReplayReader::open(recording, mode);

@@ -16,15 +16,16 @@ namespace {
 constexpr std::array<std::string_view, 3> kSensorChannels = {channels::kCameraImage, channels::kTrackerPose,
                                                              channels::kEcgSamples};
 
-std::string at(const RecordedMessage& message) {
-  return fmt::format("byte {}: channel {}", message.file_offset, message.channel);
+std::string at(const std::string& path, const RecordedMessage& message) {
+  return fmt::format("{}: byte {}: channel {}", path, message.file_offset, message.channel);
 }
 
-Expected<ReplayEvent> frame_event(const RecordingReader& reader, const RecordedMessage& message) {
+Expected<ReplayEvent> frame_event(const RecordingReader& reader, const std::string& path,
+                                  const RecordedMessage& message) {
   const auto raw = reader.decode<foxglove_RawImage>(message);
   if (!raw) return tl::unexpected(raw.error());
   const auto image = borrow_grey_image(**raw);
-  if (!image) return fail(fmt::format("{}: {}", at(message), image.error().message));
+  if (!image) return fail(fmt::format("{}: {}", at(path, message), image.error().message));
   FrameEvent event;
   event.stamp = {message.sequence, message.source_time, message.arrival};
   event.width = image->width;
@@ -51,7 +52,8 @@ ToolState tool_state(perimap_ToolState state) noexcept {
   return ToolState::kMissing;
 }
 
-Expected<ReplayEvent> pose_event(const RecordingReader& reader, const RecordedMessage& message) {
+Expected<ReplayEvent> pose_event(const RecordingReader& reader, const std::string& path,
+                                 const RecordedMessage& message) {
   const auto pose = reader.decode<perimap_TrackerPose>(message);
   if (!pose) return tl::unexpected(pose.error());
   TrackerSample sample;
@@ -63,18 +65,20 @@ Expected<ReplayEvent> pose_event(const RecordingReader& reader, const RecordedMe
     const double(&t)[3] = (*pose)->translation_WS_mm;
     const double(&q)[4] = (*pose)->rotation_WS_wxyz;
     const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (!(std::abs(norm - 1.0) < 1e-3)) return fail(fmt::format("{}: rotation is not a unit quaternion", at(message)));
+    if (!(std::abs(norm - 1.0) < 1e-3))
+      return fail(fmt::format("{}: rotation is not a unit quaternion", at(path, message)));
     sample.X_WS = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), q);
   }
   return sample;
 }
 
-Expected<ReplayEvent> ecg_event(const RecordingReader& reader, const RecordedMessage& message) {
+Expected<ReplayEvent> ecg_event(const RecordingReader& reader, const std::string& path,
+                                const RecordedMessage& message) {
   const auto ecg = reader.decode<perimap_EcgSamples>(message);
   if (!ecg) return tl::unexpected(ecg.error());
   const auto& samples = (*ecg)->ecg_mV;
   if (samples._length > EcgBlock::kCapacity) {
-    return fail(fmt::format("{}: {} samples in a block, at most {} can be taken", at(message), samples._length,
+    return fail(fmt::format("{}: {} samples in a block, at most {} can be taken", at(path, message), samples._length,
                             EcgBlock::kCapacity));
   }
   EcgBlock block;
@@ -114,7 +118,7 @@ Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode
   auto reader = RecordingReader::open(path, mode);
   if (!reader) return tl::unexpected(reader.error());
   if (auto selected = reader->select(kSensorChannels); !selected) return tl::unexpected(selected.error());
-  return ReplayReader(std::move(*reader));
+  return ReplayReader(std::move(*reader), path);
 }
 
 Expected<std::optional<ReplayEvent>> ReplayReader::next() {
@@ -123,12 +127,12 @@ Expected<std::optional<ReplayEvent>> ReplayReader::next() {
   if (!*message) return std::optional<ReplayEvent>();
   const RecordedMessage& m = **message;
   if (m.arrival < last_arrival_) {
-    return fail(fmt::format("{}: arrival {} ns lies before the message ahead of it", at(m), to_ns(m.arrival)));
+    return fail(fmt::format("{}: arrival {} ns lies before the message ahead of it", at(path_, m), to_ns(m.arrival)));
   }
   last_arrival_ = m.arrival;
-  auto event = m.channel == channels::kCameraImage   ? frame_event(reader_, m)
-               : m.channel == channels::kTrackerPose ? pose_event(reader_, m)
-                                                     : ecg_event(reader_, m);
+  auto event = m.channel == channels::kCameraImage   ? frame_event(reader_, path_, m)
+               : m.channel == channels::kTrackerPose ? pose_event(reader_, path_, m)
+                                                     : ecg_event(reader_, path_, m);
   if (!event) return tl::unexpected(event.error());
   return std::optional<ReplayEvent>(std::move(*event));
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -31,8 +32,8 @@ using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock>;
 // The same event with all its instants moved by `offset`.
 void shift(ReplayEvent& event, Duration offset) noexcept;
 
-// Messages lie in the file in order of arrival; one that goes back by more than a stamp's rounding is an error, since
-// replay could not deliver it at its time.
+// Errors have the form "FILE: byte N: channel NAME: what is wrong". Messages lie in the file in order of arrival; one
+// that goes back by more than a stamp's rounding is an error, since replay could not deliver it at its time.
 class ReplayReader {
  public:
   // Fails when the recording has no camera, tracker or ECG channel.
@@ -44,9 +45,10 @@ class ReplayReader {
   [[nodiscard]] std::vector<Error> damage() const { return reader_.damage(); }
 
  private:
-  explicit ReplayReader(RecordingReader reader) : reader_(std::move(reader)) {}
+  ReplayReader(RecordingReader reader, std::string path) : reader_(std::move(reader)), path_(std::move(path)) {}
 
   RecordingReader reader_;
+  std::string path_;  // for messages
   Instant last_arrival_;
 };
 

@@ -27,9 +27,7 @@ ReleaseSchedule running(int n) {
   return schedule;
 }
 
-TEST(ReleaseSchedule, HasNothingDueBeforeTheFirstFrame) {
-  EXPECT_FALSE(ReleaseSchedule(kLatency).next().has_value());
-}
+TEST(ReleaseSchedule, HasNothingDueBeforeTheFirstFrame) { EXPECT_FALSE(ReleaseSchedule(kLatency).next().has_value()); }
 
 TEST(ReleaseSchedule, ReleasesEachFrameAtCapturePlusLatency) { running(10); }
 

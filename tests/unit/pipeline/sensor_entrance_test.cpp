@@ -15,8 +15,8 @@ constexpr int kHeight = 24;
 
 struct Entrance : ::testing::Test {
   PipelineCounters counters;
-  std::unique_ptr<SensorEntrance> entrance = std::make_unique<SensorEntrance>(kWidth, kHeight, CardiacClockSettings{},
-                                                                              counters);
+  std::unique_ptr<SensorEntrance> entrance =
+      std::make_unique<SensorEntrance>(kWidth, kHeight, CardiacClockSettings{}, counters);
   std::vector<std::uint8_t> pixels = std::vector<std::uint8_t>(40 * kHeight, 7);
   GreyImage image{pixels.data(), kWidth, kHeight, 40};
 

@@ -29,8 +29,8 @@ FeatureSnapshot feature(std::uint32_t id, double amplitude_mm) {
   snapshot.id = id;
   snapshot.state = FeatureState::kConverged;
   snapshot.x = StateVector::Zero(3 * (1 + 2 * kHarmonics));
-  snapshot.x(0) = 10.0;           // DC of x
-  snapshot.x(1) = amplitude_mm;   // a_1 of x
+  snapshot.x(0) = 10.0;          // DC of x
+  snapshot.x(1) = amplitude_mm;  // a_1 of x
   snapshot.covariance_W_mm2 = 0.04 * Matrix3d::Identity();
   snapshot.largest_deviation_mm = 0.5;
   return snapshot;

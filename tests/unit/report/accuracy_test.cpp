@@ -33,7 +33,6 @@ CameraModel camera() {
   return c;
 }
 
-
 perimap_SurfaceFeature feature(std::uint32_t id, perimap_FeatureState state, double x_mm) {
   perimap_SurfaceFeature f{};
   f.id = id;
