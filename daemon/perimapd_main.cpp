@@ -65,6 +65,7 @@ int run(const std::string& configuration_file) {
   const PipelineCounters& counters = pipeline.counters();
   spdlog::info("{}: {} frames, {} surfaces, {} features converged", stop->requested() ? "stopped" : "recording ended",
                counters.frames.get(), counters.samples.get(), counters.features_converged.get());
+  if (publication->failures() > 0) spdlog::error("{} DDS writes failed", publication->failures());
   if (!ended) {
     spdlog::error("{}", ended.error().message);
     return kFailure;

@@ -112,7 +112,6 @@ version = 1
 
 [replay]
 recording = "heart-$1.mcap"
-realtime = true
 
 [dds]
 domain = $domain

@@ -8,9 +8,9 @@ namespace perimap {
 
 void EcgIntake::push(const EcgBlock& block) noexcept {
   const RealtimeScope realtime;
-  if (started_ && block.device_sequence != next_device_sequence_) {
-    counters_.ecg_dropped.add(block.device_sequence - next_device_sequence_);
-  }
+  // The count wraps, and starts over with the device: only a step forward is a loss.
+  const auto step = static_cast<std::int32_t>(block.device_sequence - next_device_sequence_);
+  if (started_ && step > 0) counters_.ecg_dropped.add(static_cast<std::uint64_t>(step));
   started_ = true;
   next_device_sequence_ = block.device_sequence + block.count;
   counters_.ecg_samples.add(block.count);

@@ -62,7 +62,7 @@ Matrix2d measurement_covariance(const HeldMatch& held, const FrameRecord& frame,
 }
 
 // Fills slot.start from the first held matches. False when one of them can not be used (its frame has left the history
-// or its pixel has no ray); the held matches up to it are then dropped.
+// or has no phase any more, or its pixel has no ray); the held matches up to it are then dropped.
 bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& model,
                    const EstimatorSettings& settings) noexcept {
   const auto& depths = settings.batch.start_depths_mm;
@@ -75,7 +75,8 @@ bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& mod
     Vector3d ray_C;
     Vector2d px;
     Matrix23d J_C;
-    if (frame == nullptr || !model.camera.unproject(held.px, ray_C) ||
+    // A frame can lose its phase after its match was held, when the next beat shows that the cycle was none.
+    if (frame == nullptr || !frame->measurable || !model.camera.unproject(held.px, ray_C) ||
         model.camera.project(depth_mm * ray_C, px, &J_C) != ProjectionStatus::kOk) {
       slot.held.drop(k + 1);
       return false;
@@ -142,6 +143,9 @@ LearnOutcome adopt_start(FeatureSlot& slot, const FrameJob& job, const PipelineS
     slot.state = SlotState::kTracked;
     return LearnOutcome::kNothing;
   }
+  if (const FrameRecord* last = job.history->find(slot.held[used - 1].frame_index)) {
+    slot.last_observed = last->stamp.capture;
+  }
   slot.held.drop(used);
   slot.estimate = slot.start.outcome.estimate;
   slot.monitor.reset();
@@ -184,20 +188,21 @@ void apply(FeatureSlot& slot, const HeldMatch& held, const FrameRecord& frame, c
 
 LearnOutcome learn_mapped(FeatureSlot& slot, const FrameJob& job, const PixelModel& model,
                           const PipelineSettings& settings) noexcept {
+  const int refused_before = slot.refused_in_a_row;
   for (int i = 0; i < kLearnPerFrame && slot.held.size() > 0; ++i) {
     const HeldMatch held = slot.held[0];
     slot.held.drop(1);
-    if (const FrameRecord* frame = job.history->find(held.frame_index)) {
-      apply(slot, held, *frame, model, settings.estimator);
-    }
+    const FrameRecord* frame = job.history->find(held.frame_index);
+    if (frame != nullptr && frame->measurable) apply(slot, held, *frame, model, settings.estimator);
   }
   const std::uint64_t now = job.frame->index;
   if (slot.refused_in_a_row >= kRefusalsBeforeLost || now - slot.last_found_frame > kUnobservedFramesBeforeLost) {
     return give_up(slot);
   }
-  if (slot.refused_in_a_row >= kRefusalsBeforeRelock && slot.refused_in_a_row % kRefusalsBeforeRelock == 0) {
+  if (refused_before / kRefusalsBeforeRelock < slot.refused_in_a_row / kRefusalsBeforeRelock) {
     // The patch follows something else: let go of it, so that the next search starts where the map says.
-    slot.last_found_frame = now - std::min<std::uint64_t>(now, kTrackedMissesAllowed + 1);
+    slot.last_found_frame =
+        std::min(slot.last_found_frame, now - std::min<std::uint64_t>(now, kTrackedMissesAllowed + 1));
   }
   // Spread over the frames by id, so that no frame pays for all features.
   if ((now + slot.id) % kConvergenceCheckFrames == 0) check_convergence(slot, settings.estimator);
@@ -230,7 +235,9 @@ bool evaluate(const FeatureSlot& slot, const FrameJob& job, FeatureSnapshot& sna
   if (slot.state != SlotState::kMapped) return false;
   snapshot.id = slot.id;
   snapshot.x = slot.estimate.x;
-  snapshot.covariance_W_mm2 = slot.estimate.position_covariance(job.b_release);
+  for (std::size_t i = 0; i < job.releases.size(); ++i) {
+    snapshot.covariances_W_mm2[i] = slot.estimate.position_covariance(job.releases[i].b);
+  }
   snapshot.last_observed = slot.last_observed;
   snapshot.first_observed = slot.first_observed;
   snapshot.first_observed_px = slot.first_observed_px;
@@ -243,7 +250,8 @@ bool evaluate(const FeatureSlot& slot, const FrameJob& job, FeatureSnapshot& sna
     snapshot.reason = FeatureReason::kDeviationLarge;
   } else {
     snapshot.state = FeatureState::kConverged;
-    snapshot.reason = slot.match.state == MatchState::kFound ? FeatureReason::kNone : FeatureReason::kNotObserved;
+    const bool observed = slot.match.state == MatchState::kFound && job.frame->measurable && slot.refused_in_a_row == 0;
+    snapshot.reason = observed ? FeatureReason::kNone : FeatureReason::kNotObserved;
   }
   return true;
 }

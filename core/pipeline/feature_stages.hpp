@@ -1,6 +1,7 @@
 // What a worker does with one feature in each stage of a frame.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "core/estimation/measurement_model.hpp"
@@ -12,12 +13,18 @@
 
 namespace perimap {
 
+// The basis at a frame's release time, with the phase as known now.
+struct ReleaseBasis {
+  std::uint64_t frame_sequence = 0;
+  Basis b;
+};
+
 // One frame's common facts: written by the mapper before a stage, read by all workers during it.
 struct FrameJob {
   const FrameRecord* frame = nullptr;
   const FrameHistory* history = nullptr;
   const ImagePyramid* pyramid = nullptr;
-  Basis b_release;      // at the release time, with the phase as known now
+  std::array<ReleaseBasis, kReleasesCovered> releases;
   Instant learn_until;  // learning that has not begun by then is put off; never in lockstep
 };
 

@@ -128,8 +128,11 @@ void Mapper::predict_and_find_shard(int worker) noexcept {
 // B settles which phase and pose C and D work with. They are the priors, what the ECG and the tracker say; a correction
 // of both from all matches of the frame belongs here, where the matches are joined.
 void Mapper::settle_phase_and_pose(const FrameRecord& frame, const CardiacClock& clock) noexcept {
-  const PhaseEstimate at_release = clock.at(frame.stamp.capture + settings_.latency);
-  job_.b_release = basis_at(settings_.estimator.layout, at_release.phase_rad);
+  for (std::size_t i = 0; i < job_.releases.size(); ++i) {
+    const FrameRecord* earlier = history_->find(frame.index - std::min<std::uint64_t>(frame.index, i));
+    const PhaseEstimate at_release = clock.at(earlier->stamp.capture + settings_.latency);
+    job_.releases[i] = {earlier->stamp.sequence, basis_at(settings_.estimator.layout, at_release.phase_rad)};
+  }
 }
 
 void Mapper::evaluate_shard(int worker) noexcept {
@@ -140,6 +143,9 @@ void Mapper::evaluate_shard(int worker) noexcept {
     snapshot.any = true;
     snapshot.frame_sequence = job_.frame->stamp.sequence;
     snapshot.pose_missing = !job_.frame->pose.valid();
+    for (std::size_t i = 0; i < job_.releases.size(); ++i) {
+      snapshot.release_sequences[i] = job_.releases[i].frame_sequence;
+    }
     snapshot.features.clear();
   }
   FeatureSnapshot feature;

@@ -41,11 +41,13 @@ Pipeline::Pipeline(const PipelineSettings& settings)
 }
 
 void Pipeline::drain_poses() noexcept {
+  const RealtimeScope realtime;
   TrackerSample sample;
   while (entrance_.pop_pose(sample)) mapper_.add_pose(sample);
 }
 
 void Pipeline::map(const FrameHandle& frame) noexcept {
+  const RealtimeScope realtime;
   TripleBuffer<CardiacClock>& clock = entrance_.clocks().mapper;
   clock.update();
   mapper_.process(frame.stamp, entrance_.image(frame), clock.front());
@@ -54,6 +56,7 @@ void Pipeline::map(const FrameHandle& frame) noexcept {
 }
 
 void Pipeline::drain_stamps(Instant now) noexcept {
+  const RealtimeScope realtime;
   FrameStamp stamp;
   while (entrance_.pop_stamp(stamp)) {
     if (!schedule_.on_frame(stamp, now)) counters_.frames_too_late.add();

@@ -28,15 +28,14 @@ bool ReleaseSchedule::on_frame(const FrameStamp& stamp, Instant now) noexcept {
 }
 
 std::optional<Release> ReleaseSchedule::next() const noexcept {
-  const bool pending = head_ != tail_;
   if (have_last_ && period_ > Duration(0)) {
     const Instant expected = last_capture_ + period_;
     // A pending frame stands for the expected one when it is within half a period of it; else one is missing before.
-    if (!pending || pending_[tail_ % kCapacity].capture > expected + period_ / 2) {
+    if (!pending() || pending_[tail_ % kCapacity].capture > expected + period_ / 2) {
       return Release{last_sequence_ + 1, expected, expected + latency_, true};
     }
   }
-  if (!pending) return std::nullopt;
+  if (!pending()) return std::nullopt;
   const FrameStamp& stamp = pending_[tail_ % kCapacity];
   return Release{stamp.sequence, stamp.capture, stamp.capture + latency_, false};
 }

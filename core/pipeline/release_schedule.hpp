@@ -32,6 +32,9 @@ class ReleaseSchedule {
   // its deadline may replace it.
   [[nodiscard]] std::optional<Release> next() const noexcept;
 
+  // Frames that have come are still to be released.
+  [[nodiscard]] bool pending() const noexcept { return head_ != tail_; }
+
   // Takes the next release off the schedule. Requires next().
   Release take() noexcept;
 

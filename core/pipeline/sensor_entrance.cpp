@@ -24,6 +24,11 @@ SensorEntrance::SensorEntrance(int width, int height, const CardiacClockSettings
 bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept {
   const RealtimeScope realtime;
   counters_.frames_received.add();
+  // A capture after its own arrival is a broken stamp; on it the release times of all that follows would be fitted.
+  if (stamp.capture > stamp.arrival) {
+    counters_.frames_dropped.add();
+    return false;
+  }
   counters_.camera_delay.add(stamp.arrival - stamp.capture);
   counters_.last_frame_ns.set(static_cast<std::uint64_t>(to_ns(stamp.capture)));
   if (any_frame_ && stamp.sequence > last_sequence_ + 1) {

@@ -1,6 +1,8 @@
 // What a worker hands to the publisher after evaluating its features for one frame.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -10,13 +12,17 @@
 
 namespace perimap {
 
+// A snapshot serves the release of its own frame and of the two before it: with L longer than the time from frame to
+// frame, the next frames are mapped before a release is due.
+inline constexpr std::size_t kReleasesCovered = 3;
+
 // One started feature: enough to evaluate it at any instant near the release.
 struct FeatureSnapshot {
   std::uint32_t id = 0;
   FeatureState state = FeatureState::kInvalid;
   FeatureReason reason = FeatureReason::kNone;
-  StateVector x;              // mm, see core/periodic
-  Matrix3d covariance_W_mm2;  // B P B^T at the release time's phase
+  StateVector x;                                             // mm, see core/periodic
+  std::array<Matrix3d, kReleasesCovered> covariances_W_mm2;  // B P B^T at the releases that the shard names
   Instant last_observed;
   Instant first_observed;
   Vector2d first_observed_px = Vector2d::Zero();
@@ -24,10 +30,11 @@ struct FeatureSnapshot {
 };
 
 struct ShardSnapshot {
-  bool any = false;                       // false until the first frame
-  std::uint64_t frame_sequence = 0;       // of the frame whose update this is
-  bool pose_missing = false;              // that frame gave no measurement for want of a pose
-  std::vector<FeatureSnapshot> features;  // capacity reserved at start
+  std::array<std::uint64_t, kReleasesCovered> release_sequences{};  // frames at whose releases covariances are given
+  bool any = false;                                                 // false until the first frame
+  std::uint64_t frame_sequence = 0;                                 // of the frame whose update this is
+  bool pose_missing = false;                                        // that frame gave no measurement for want of a pose
+  std::vector<FeatureSnapshot> features;                            // capacity reserved at start
 };
 
 // The worker is the one writer; the publisher and the model publisher read a cell each.

@@ -1,6 +1,7 @@
 #include "core/pipeline/surface_composer.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "core/periodic/periodic_motion.hpp"
 #include "core/realtime/realtime_scope.hpp"
@@ -50,13 +51,17 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
 
   order_.clear();
   bool pose_missing = false;
-  std::uint64_t oldest = release.frame_sequence;
+  std::uint64_t oldest = std::numeric_limits<std::uint64_t>::max();
   for (const ShardSnapshot* snapshot : snapshots) {
     oldest = std::min(oldest, snapshot->any ? snapshot->frame_sequence : 0);
     pose_missing = pose_missing || snapshot->pose_missing;
-    for (const FeatureSnapshot& feature : snapshot->features) order_.push_back(&feature);
+    const auto covered =
+        std::find(snapshot->release_sequences.begin(), snapshot->release_sequences.end(), release.frame_sequence);
+    const auto i = static_cast<std::size_t>(covered - snapshot->release_sequences.begin());
+    for (const FeatureSnapshot& feature : snapshot->features) order_.push_back({&feature, i});
   }
-  std::sort(order_.begin(), order_.end(), [](const auto* a, const auto* b) { return a->id < b->id; });
+  std::sort(order_.begin(), order_.end(),
+            [](const Ordered& a, const Ordered& b) { return a.feature->id < b.feature->id; });
 
   const PhaseEstimate phase = clock.at(sample_.valid_time);
   sample_.oldest_shard_frame_sequence = oldest;
@@ -72,22 +77,25 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   const Basis b = basis_at(settings_.layout, phase.phase_rad);
   const Basis b_rate = basis_rate(settings_.layout, phase.phase_rad);
   sample_.features.clear();
-  for (const FeatureSnapshot* snapshot : order_) {
+  for (const auto& [snapshot, covered] : order_) {
     SurfaceFeature feature;
     feature.id = snapshot->id;
     feature.p_WF_mm = position_of(snapshot->x, b);
     feature.velocity_W_mm_per_s = velocity_of(snapshot->x, b_rate, phase.rate_rad_per_s);
     const Vector3d spread_mm = feature.velocity_W_mm_per_s * phase.deviation_s;
-    // The snapshot's covariance is that of its own frame's release. Where this release is another instant, the
-    // largest one over the cycle bounds it.
-    const bool same_instant = !late && !release.frame_missing;
+    // Where the snapshot was not evaluated at this release (the update is late, or there is no frame), the largest
+    // deviation over the cycle bounds the covariance.
     feature.covariance_W_mm2 = spread_mm * spread_mm.transpose();
     feature.covariance_W_mm2 +=
-        same_instant ? snapshot->covariance_W_mm2
-                     : Matrix3d(Matrix3d::Identity() * snapshot->largest_deviation_mm * snapshot->largest_deviation_mm);
+        covered < kReleasesCovered && !release.frame_missing
+            ? snapshot->covariances_W_mm2[covered]
+            : Matrix3d(Matrix3d::Identity() * snapshot->largest_deviation_mm * snapshot->largest_deviation_mm);
     feature.last_observed = snapshot->last_observed;
     feature.state = phase_usable ? snapshot->state : FeatureState::kInvalid;
     feature.reason = phase_usable ? snapshot->reason : FeatureReason::kPhaseLost;
+    if (feature.reason == FeatureReason::kNone && (release.frame_missing || late)) {
+      feature.reason = FeatureReason::kNotObserved;
+    }
     sample_.features.push_back(feature);
   }
   return sample_;

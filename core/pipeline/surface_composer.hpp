@@ -31,7 +31,11 @@ class SurfaceComposer {
  private:
   ComposerSettings settings_;
   SurfaceSample sample_;
-  std::vector<const FeatureSnapshot*> order_;
+  struct Ordered {
+    const FeatureSnapshot* feature;
+    std::size_t covered;  // which of its covariances is of this release; kReleasesCovered: none
+  };
+  std::vector<Ordered> order_;
 };
 
 }  // namespace perimap

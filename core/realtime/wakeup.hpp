@@ -26,6 +26,12 @@ class Wakeup {
     }
   }
 
+  // Forgets the posts so far. What they announced must be looked for after this, or it is missed until the next post.
+  void clear() noexcept {
+    while (sem_trywait(&semaphore_) == 0) {
+    }
+  }
+
   // True when posted, false when the deadline passed first.
   [[nodiscard]] bool wait_until(Instant deadline) noexcept {
     const auto ns = to_ns(deadline);

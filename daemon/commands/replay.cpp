@@ -54,7 +54,7 @@ class ReplayPublication final : public Publication {
     if (recorder_ != nullptr) recorder_->surface(sample);
     if (dds_ != nullptr) dds_->surface(sample);
     if (!accuracy_) return;
-    if (!to_recording_ && sample.reason != perimap_SURFACE_REASON_FRAME_MISSING) {
+    if (!to_recording_ && sample.state == perimap_SURFACE_GOOD) {
       to_recording_ = truth_->to_recording(sample.frame_sequence, from_ns(sample.capture_time_ns));
     }
     accuracy_->add(sample);
@@ -181,7 +181,7 @@ int replay(const Options& options) {
   const Logging logging(setup->configuration.log.level);
   std::unique_ptr<PublicationRecorder> recorder;
   if (!options.samples.empty()) {
-    auto created = PublicationRecorder::create(options.samples, "perimap replay " PERIMAP_VERSION,
+    auto created = PublicationRecorder::create(options.samples, "perimap replay " PERIMAP_VERSION, options.lockstep,
                                                static_cast<std::size_t>(setup->pipeline.features.maximum));
     if (!created) return refuse(created.error(), kFailure);
     recorder = std::move(*created);

@@ -53,14 +53,18 @@ int report(const Options& options) {
   const auto result =
       report_samples(options.recording, options.samples, options.whole ? ReadMode::kWhole : ReadMode::kStrict);
   if (!result) return refuse(result.error().message);
-  fmt::print(
-      "samples     {} received, {} missed, {} without frame, {} from a late update\n"
-      "latency     capture to receipt p50 / p99 / max {}\n"
-      "release     receipt after its deadline {}, jitter {}\n"
-      "{}\n",
-      result->samples, result->missed, result->without_frame, result->from_late_update,
-      figures_text(result->capture_to_receipt), figures_text(result->release_to_receipt), figures_text(result->jitter),
-      to_text(result->accuracy));
+  fmt::print("samples     {} received, {} missed, {} without frame, {} from a late update\n", result->samples,
+             result->missed, result->without_frame, result->from_late_update);
+  if (result->release_to_receipt.max == Duration(0)) {
+    fmt::print("latency     not measured: these samples are of a lockstep replay\n");
+  } else {
+    fmt::print(
+        "latency     capture to receipt p50 / p99 / max {}\n"
+        "release     receipt after its deadline {}, jitter {}\n",
+        figures_text(result->capture_to_receipt), figures_text(result->release_to_receipt),
+        figures_text(result->jitter));
+  }
+  fmt::print("{}\n", to_text(result->accuracy));
   if (!options.picture.empty()) {
     if (!write_file(options.picture, to_svg(result->accuracy, options.recording))) {
       return refuse(options.picture + ": cannot be written");

@@ -21,7 +21,6 @@ struct SourceConfiguration {
 
 struct ReplayConfiguration {
   std::optional<std::filesystem::path> recording;  // absolute, or relative to the working directory, once loaded
-  bool realtime = true;                            // deliver at the recorded pace instead of as fast as it goes
 
   bool operator==(const ReplayConfiguration&) const = default;
 };

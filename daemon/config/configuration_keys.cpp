@@ -253,8 +253,7 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
       .text("name", 63, PERIMAP_MEMBER(source.name), "key `source` of every published sample")
       .text("world_frame", 63, PERIMAP_MEMBER(source.world_frame), "name of the frame W, published as frame_id");
   Section("replay", keys)
-      .file("recording", PERIMAP_MEMBER(replay.recording), "the recording to replay, from this file's folder")
-      .flag("realtime", PERIMAP_MEMBER(replay.realtime), "at the recorded pace instead of as fast as it goes");
+      .file("recording", PERIMAP_MEMBER(replay.recording), "the recording to replay, from this file's folder");
   Section("camera", keys)
       .file("calibration", PERIMAP_MEMBER(camera.calibration),
             "calibration as OpenCV writes it, from this file's folder; none: the recording's own");
@@ -321,17 +320,17 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
       .duration("budget_ms", ms, 0.1, 1000, PERIMAP_MEMBER(pipeline.budget),
                 "computing time kept free before the release; less than latency_ms")
       .integer("workers", 1, 64, PERIMAP_MEMBER(pipeline.workers), "worker threads")
-      .integer("adoption_delay_frames", 1, 1000, PERIMAP_MEMBER(pipeline.adoption_delay_frames),
-               "from a request for new features to the frame that takes up the answer");
+      .integer("adoption_delay_frames", 1, 120, PERIMAP_MEMBER(pipeline.adoption_delay_frames),
+               "frames from the request of a batch start to the frame that adopts it");
   Section("features", keys)
       .integer("maximum", 1, 1000, PERIMAP_MEMBER(features.maximum), "features followed at a time")
-      .integer("detection_interval_frames", 1, 1000, PERIMAP_MEMBER(features.detection_interval_frames),
+      .integer("detection_interval_frames", 6, 1000, PERIMAP_MEMBER(features.detection_interval_frames),
                "frames from one search for new features to the next")
       .number("minimum_distance_px", 1, 1000, PERIMAP_MEMBER(features.minimum_distance_px),
               "a new feature keeps this distance from all others");
   Section("estimation", keys)
       .integer("harmonics", 1, 12, PERIMAP_MEMBER(estimation.harmonics), "cardiac harmonics of each feature's motion")
-      .integer("start_observations", 4, 1000, PERIMAP_MEMBER(estimation.start_observations),
+      .integer("start_observations", 10, 96, PERIMAP_MEMBER(estimation.start_observations),
                "observations that the batch start of a feature takes")
       .numbers(
           "start_depths_mm", "1 to 8 rising numbers from 1 to 10000",

@@ -13,15 +13,20 @@ constexpr std::size_t kBuffers = 256;  // over two seconds at 100 samples/s
 }  // namespace
 
 Expected<std::unique_ptr<PublicationRecorder>> PublicationRecorder::create(const std::string& path,
-                                                                           std::string generator,
+                                                                           std::string generator, bool virtual_time,
                                                                            std::size_t maximum_features) {
   auto recorder = SampleRecorder::create(path, std::move(generator));
   if (!recorder) return tl::unexpected(recorder.error());
-  return std::unique_ptr<PublicationRecorder>(new PublicationRecorder(std::move(*recorder), maximum_features));
+  return std::unique_ptr<PublicationRecorder>(
+      new PublicationRecorder(std::move(*recorder), virtual_time, maximum_features));
 }
 
-PublicationRecorder::PublicationRecorder(SampleRecorder recorder, std::size_t maximum_features)
-    : recorder_(std::move(recorder)), buffers_(kBuffers), free_(kBuffers), filled_(kBuffers) {
+PublicationRecorder::PublicationRecorder(SampleRecorder recorder, bool virtual_time, std::size_t maximum_features)
+    : recorder_(std::move(recorder)),
+      virtual_time_(virtual_time),
+      buffers_(kBuffers),
+      free_(kBuffers),
+      filled_(kBuffers) {
   for (std::size_t i = 0; i < buffers_.size(); ++i) {
     buffers_[i].features.resize(maximum_features);
     static_cast<void>(free_.push(i));
@@ -35,6 +40,7 @@ void PublicationRecorder::surface(const perimap_Surface& sample) {
     return;
   }
   Buffer& buffer = buffers_[i];
+  buffer.receipt = virtual_time_ ? from_ns(sample.release_time_ns) : MonotonicClock::now();
   buffer.sample = sample;
   std::copy_n(sample.features._buffer, sample.features._length, buffer.features.begin());
   buffer.sample.features._buffer = buffer.features.data();
@@ -55,7 +61,7 @@ void PublicationRecorder::drain() {
   std::size_t i = 0;
   while (filled_.pop(i)) {
     const perimap_Surface& sample = buffers_[i].sample;
-    keep_first_error(recorder_.write(sample, from_ns(sample.release_time_ns)));
+    keep_first_error(recorder_.write(sample, buffers_[i].receipt));
     static_cast<void>(free_.push(i));
   }
 }

@@ -18,9 +18,10 @@ namespace perimap {
 // run of the same recording.
 class PublicationRecorder final : public Publication {
  public:
-  // `generator` names the program and its version in the recording.
+  // `generator` names the program and its version in the recording. In virtual time the receipt is the release itself;
+  // otherwise it is the instant at which surface() is called.
   [[nodiscard]] static Expected<std::unique_ptr<PublicationRecorder>> create(const std::string& path,
-                                                                             std::string generator,
+                                                                             std::string generator, bool virtual_time,
                                                                              std::size_t maximum_features);
 
   void surface(const perimap_Surface& sample) override;
@@ -36,14 +37,16 @@ class PublicationRecorder final : public Publication {
 
  private:
   struct Buffer {
+    Instant receipt;
     perimap_Surface sample{};
     std::vector<perimap_SurfaceFeature> features;
   };
 
-  PublicationRecorder(SampleRecorder recorder, std::size_t maximum_features);
+  PublicationRecorder(SampleRecorder recorder, bool virtual_time, std::size_t maximum_features);
   void keep_first_error(const Expected<void>& written);
 
   SampleRecorder recorder_;
+  bool virtual_time_;
   std::vector<Buffer> buffers_;
   SpscRing<std::size_t> free_;
   SpscRing<std::size_t> filled_;

@@ -60,23 +60,26 @@ class Spans {
 }  // namespace
 
 Accuracy::Accuracy(const GroundTruth& truth, const CameraModel& camera, Instant first_frame)
-    : truth_(truth), camera_(camera), first_frame_(first_frame) {}
+    : truth_(truth), camera_(camera), first_frame_(first_frame) {
+  // Surfaces may come on a thread with deadlines: a minute of them without growing.
+  published_.reserve(std::size_t{1} << 18);
+  samples_.reserve(std::size_t{1} << 12);
+}
 
 void Accuracy::add(const perimap_Surface& sample) {
-  ++samples_;
-  const Instant valid_time = from_ns(sample.valid_time_ns);
+  const std::size_t begin = published_.size();
   for (std::uint32_t i = 0; i < sample.features._length; ++i) {
     const perimap_SurfaceFeature& feature = sample.features._buffer[i];
     if (feature.state == perimap_FEATURE_INVALID) continue;
     const double* c = feature.covariance_W_mm2;
     Published published;
-    published.valid_time = valid_time;
     published.id = feature.id;
     published.converged = feature.state == perimap_FEATURE_CONVERGED;
     published.p_W_mm = Vector3d(feature.position_W_mm[0], feature.position_W_mm[1], feature.position_W_mm[2]);
     published.P_mm2 << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
     published_.push_back(published);
   }
+  samples_.push_back({from_ns(sample.valid_time_ns), begin, published_.size()});
 }
 
 void Accuracy::add(const perimap_SurfaceModel& model) {
@@ -101,11 +104,11 @@ std::map<std::uint32_t, SurfacePoint> Accuracy::resolve_origins(Duration to_reco
 
 AccuracyReport Accuracy::report(Duration to_recording) const {
   AccuracyReport report;
-  report.samples = samples_;
-  if (published_.empty()) return report;
+  report.samples = samples_.size();
+  if (samples_.empty()) return report;
   const auto points = resolve_origins(to_recording);
   const auto since_start = [this](Instant t) { return to_seconds(t - first_frame_); };
-  const double end_s = since_start(published_.back().valid_time + to_recording);
+  const double end_s = since_start(samples_.back().valid_time + to_recording);
 
   std::vector<double> second_edges;
   for (double t = 0.0; t <= end_s + 1.0; t += 1.0) second_edges.push_back(t);
@@ -123,13 +126,11 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
   std::set<std::uint32_t> without_truth;
   std::vector<double> settled;
   double nees_sum = 0.0;
-  for (std::size_t i = 0; i < published_.size();) {
-    // One sample: the run of equal valid times.
-    const Instant published_time = published_[i].valid_time;
-    const Instant valid_time = published_time + to_recording;
+  for (const SampleRange& sample : samples_) {
+    const Instant valid_time = sample.valid_time + to_recording;
     const double t = since_start(valid_time);
     std::size_t converged = 0;
-    for (; i < published_.size() && published_[i].valid_time == published_time; ++i) {
+    for (std::size_t i = sample.begin; i < sample.end; ++i) {
       const Published& feature = published_[i];
       seen.insert(feature.id);
       if (feature.converged) {
@@ -157,6 +158,7 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
         paths[feature.id].truth.push_back(p_true);
       }
     }
+    if (t <= kSettledAfter_s) report.converged_at_15_s = converged;
     seconds.add_sample(t, converged);
     cycles.add_sample(t, converged);
   }

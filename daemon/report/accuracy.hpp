@@ -42,6 +42,7 @@ struct AccuracyReport {
   std::size_t features_published = 0;
   std::size_t features_converged = 0;      // ever
   std::size_t converged_by_15_s = 0;       // ever converged within the first 15 s
+  std::size_t converged_at_15_s = 0;       // in state converged in the last sample of the first 15 s
   std::size_t features_without_truth = 0;  // converged, but the ray of their first view misses the true surface
   ErrorFigures settled;                    // 15 s to the end, every feature from its first converged sample on
   double mean_nees = 0.0;                  // e' P^-1 e / 3 over the same; 1 is consistent
@@ -53,7 +54,7 @@ struct AccuracyReport {
 
 // The true position of a feature is that of the material point which the ray of its first detection meets, seen from
 // the true camera. A feature counts from the first sample that calls it converged, and from then on always, whatever
-// its state becomes: a feature that goes wrong after it was called good is an error, not an absence.
+// its state becomes, short of invalid: a feature that goes wrong after it was called good is an error, not an absence.
 class Accuracy {
  public:
   // `first_frame`: capture of the recording's first frame, the zero of all spans.
@@ -68,11 +69,15 @@ class Accuracy {
 
  private:
   struct Published {
-    Instant valid_time;
     std::uint32_t id = 0;
     bool converged = false;
     Vector3d p_W_mm;
     Matrix3d P_mm2;
+  };
+  struct SampleRange {
+    Instant valid_time;
+    std::size_t begin;  // in published_
+    std::size_t end;
   };
   struct Origin {
     Instant first_observed;
@@ -84,7 +89,7 @@ class Accuracy {
   const GroundTruth& truth_;
   CameraModel camera_;
   Instant first_frame_;
-  std::size_t samples_ = 0;  // with published_, touched by add(Surface) alone
+  std::vector<SampleRange> samples_;  // with published_, touched by add(Surface) alone
   std::vector<Published> published_;
   std::map<std::uint32_t, Origin> origins_;  // touched by add(SurfaceModel) alone
 };

@@ -25,14 +25,19 @@ nlohmann::json to_json(const std::vector<ErrorSpan>& spans) {
 }  // namespace
 
 std::string to_text(const AccuracyReport& report) {
+  if (report.settled.count == 0) {
+    return fmt::format(
+        "features    {} mapped, {} converged, {} without truth\nerror       none: no converged position after 15 s",
+        report.features_published, report.features_converged, report.features_without_truth);
+  }
   return fmt::format(
-      "features    {} mapped, {} converged, {} of them within 15 s, {} without truth\n"
+      "features    {} mapped, {} converged, {} of them within 15 s ({} at 15 s), {} without truth\n"
       "error       median {:.2f} mm, 95th percentile {:.2f} mm, largest {:.2f} mm, above 3 mm {:.1f} %\n"
       "            ({} positions at their valid time, 15 s to the end, every feature once called converged)\n"
       "consistency mean NEES/3 {:.2f} (1 is consistent, below is cautious)",
-      report.features_published, report.features_converged, report.converged_by_15_s, report.features_without_truth,
-      report.settled.median_mm, report.settled.p95_mm, report.settled.max_mm, 100.0 * report.share_above_3_mm,
-      report.settled.count, report.mean_nees);
+      report.features_published, report.features_converged, report.converged_by_15_s, report.converged_at_15_s,
+      report.features_without_truth, report.settled.median_mm, report.settled.p95_mm, report.settled.max_mm,
+      100.0 * report.share_above_3_mm, report.settled.count, report.mean_nees);
 }
 
 nlohmann::json to_json(const AccuracyReport& report) {
@@ -42,6 +47,7 @@ nlohmann::json to_json(const AccuracyReport& report) {
           {"features_mapped", report.features_published},
           {"features_converged", report.features_converged},
           {"features_converged_by_15_s", report.converged_by_15_s},
+          {"features_converged_at_15_s", report.converged_at_15_s},
           {"features_without_truth", report.features_without_truth},
           {"settled_error", to_json(report.settled)},
           {"settled_mean_nees", report.mean_nees},

@@ -64,8 +64,9 @@ Expected<SamplesReport> report_samples(const std::string& recording, const std::
     from_capture.push_back(receipt - from_ns(surface.capture_time_ns));
     from_release.push_back(receipt - from_ns(surface.release_time_ns));
     if (surface.reason == perimap_SURFACE_REASON_FRAME_MISSING) ++report.without_frame;
-    if (surface.reason == perimap_SURFACE_REASON_UPDATE_LATE) ++report.from_late_update;
-    if (!to_recording && surface.reason != perimap_SURFACE_REASON_FRAME_MISSING) {
+    const bool behind = surface.oldest_shard_frame_sequence < surface.frame_sequence;
+    if (behind && surface.reason != perimap_SURFACE_REASON_FRAME_MISSING) ++report.from_late_update;
+    if (!to_recording && surface.state == perimap_SURFACE_GOOD) {
       to_recording = (*truth)->to_recording(surface.frame_sequence, from_ns(surface.capture_time_ns));
     }
     accuracy.add(surface);

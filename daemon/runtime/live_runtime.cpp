@@ -91,7 +91,11 @@ StatusFacts LiveRuntime::facts() const noexcept {
 void LiveRuntime::run_mapper() noexcept {
   SensorEntrance& entrance = pipeline_.entrance();
   const PipelineSettings& settings = pipeline_.settings();
-  while (!stopping_.load(std::memory_order_relaxed)) {
+  for (;;) {
+    // Posts are cleared before what they announce is looked for, the request to stop included; uncleared they would
+    // pile up and every wait would return at once.
+    entrance.mapper_wakeup().clear();
+    if (stopping_.load(std::memory_order_relaxed)) return;
     pipeline_.drain_poses();
     FrameHandle frame;
     if (!entrance.pop_frame(frame)) {
@@ -111,11 +115,13 @@ void LiveRuntime::run_mapper() noexcept {
 void LiveRuntime::run_publisher() {
   Wakeup& wakeup = pipeline_.entrance().publisher_wakeup();
   PipelineCounters& counters = pipeline_.counters();
-  while (!stopping_.load(std::memory_order_relaxed)) {
+  for (;;) {
+    wakeup.clear();  // before looking, as in run_mapper()
+    if (stopping_.load(std::memory_order_relaxed)) return;
     pipeline_.drain_stamps(MonotonicClock::now());
     const auto next = pipeline_.schedule().next();
     const bool ended = sources_ended_.load(std::memory_order_relaxed);
-    if (ended && (!next || next->frame_missing)) {
+    if (ended && !pipeline_.schedule().pending()) {
       all_released_.store(true, std::memory_order_relaxed);
       wakeup.wait();
       continue;

@@ -25,11 +25,11 @@ LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Pu
 
 Expected<void> LiveSession::run(StopSignal& stop) {
   runtime_.start();
-  warn_of_refused_privileges();
   feeder_.start();
   bool told_end = false;
   while (!stop.wait_for(kTick)) {
     if (on_tick_) on_tick_();
+    warn_of_refused_privileges();
     warn_of_short_latency();
     if (!told_end && feeder_.ended()) {
       runtime_.end_of_sources();
@@ -48,7 +48,10 @@ Expected<void> LiveSession::run(StopSignal& stop) {
   return {};
 }
 
-void LiveSession::warn_of_refused_privileges() const {
+// On the first tick: by then every thread has asked for what it was to ask for.
+void LiveSession::warn_of_refused_privileges() {
+  if (privileges_told_) return;
+  privileges_told_ = true;
   const StatusFacts facts = runtime_.facts();
   if (facts.memory_locked == perimap_PRIVILEGE_REFUSED) {
     spdlog::warn("memory is not locked: needs an unlimited RLIMIT_MEMLOCK (LimitMEMLOCK=infinity); running on without");

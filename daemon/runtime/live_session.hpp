@@ -22,13 +22,14 @@ class LiveSession {
   [[nodiscard]] Expected<void> run(StopSignal& stop);
 
  private:
-  void warn_of_refused_privileges() const;
+  void warn_of_refused_privileges();
   void warn_of_short_latency();
 
   Pipeline& pipeline_;
   LiveRuntime runtime_;
   ReplayFeeder feeder_;
   std::function<void()> on_tick_;
+  bool privileges_told_ = false;
   bool latency_checked_ = false;
 };
 

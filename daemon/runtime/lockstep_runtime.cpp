@@ -55,9 +55,8 @@ void LockstepRuntime::deliver(const ReplayEvent& event) {
 
 void LockstepRuntime::finish() {
   if (frame_waits_) map_ready_frame();
-  while (const auto next = pipeline_.schedule().next()) {
-    if (next->frame_missing) break;
-    now_ = std::max(now_, next->deadline);
+  while (pipeline_.schedule().pending()) {
+    now_ = std::max(now_, pipeline_.schedule().next()->deadline);
     release();
   }
   publish_reports(now_);

@@ -126,6 +126,7 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
 
   auto reader = ReplayReader::open(recording, mode);
   if (!reader) return wrong_recording(std::move(reader.error()));
+  reader->require_frame_size(camera->width, camera->height);
   const PipelineSettings pipeline = pipeline_settings(configuration, *camera);
   const Identity identity{configuration.source.name, "frame", configuration.source.world_frame};
   return ReplaySetup{std::move(configuration), pipeline, identity, facts->utc_minus_monotonic, std::move(*reader)};

@@ -129,11 +129,20 @@ Expected<std::optional<ReplayEvent>> ReplayReader::next() {
   if (m.arrival < last_arrival_) {
     return fail(fmt::format("{}: arrival {} ns lies before the message ahead of it", at(path_, m), to_ns(m.arrival)));
   }
+  if (m.source_time > m.arrival) {
+    return fail(fmt::format("{}: arrival {} ns lies before its own source time {} ns", at(path_, m), to_ns(m.arrival),
+                            to_ns(m.source_time)));
+  }
   last_arrival_ = m.arrival;
   auto event = m.channel == channels::kCameraImage   ? frame_event(reader_, path_, m)
                : m.channel == channels::kTrackerPose ? pose_event(reader_, path_, m)
                                                      : ecg_event(reader_, path_, m);
   if (!event) return tl::unexpected(event.error());
+  if (const auto* frame = std::get_if<FrameEvent>(&*event);
+      frame != nullptr && frame_width_ > 0 && (frame->width != frame_width_ || frame->height != frame_height_)) {
+    return fail(fmt::format("{}: frame of {}x{}, the calibration is for {}x{}", at(path_, m), frame->width,
+                            frame->height, frame_width_, frame_height_));
+  }
   return std::optional<ReplayEvent>(std::move(*event));
 }
 

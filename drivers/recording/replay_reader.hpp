@@ -42,6 +42,12 @@ class ReplayReader {
   // The next event; nullopt at the end. Channels other than the sensors' are passed over.
   [[nodiscard]] Expected<std::optional<ReplayEvent>> next();
 
+  // From now on a frame of another size is an error.
+  void require_frame_size(int width, int height) noexcept {
+    frame_width_ = width;
+    frame_height_ = height;
+  }
+
   [[nodiscard]] std::vector<Error> damage() const { return reader_.damage(); }
 
  private:
@@ -50,6 +56,8 @@ class ReplayReader {
   RecordingReader reader_;
   std::string path_;  // for messages
   Instant last_arrival_;
+  int frame_width_ = 0;
+  int frame_height_ = 0;
 };
 
 }  // namespace perimap

@@ -1,7 +1,7 @@
 #!/bin/bash
 # Lockstep replay of a simulated recording reaches the accuracy that is promised for it.
 # accuracy.sh PERIMAP WORK_FOLDER SIMULATE_OPTION... -- KEY LIMIT [KEY LIMIT ...]
-# A KEY with a leading - is a lower bound. Keys: median_mm p95_mm features_converged_by_15_s
+# A KEY with a leading - is a lower bound. Keys: those of the report's "accuracy" and of its "settled_error".
 set -euo pipefail
 perimap=$1 work=$2
 shift 2

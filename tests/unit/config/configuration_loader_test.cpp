@@ -122,7 +122,6 @@ TEST(ConfigurationLoader, WhatIsPrintedLoadsBackToTheSame) {
   Configuration configuration;
   configuration.source.name = "a \"quoted\" \\ name";
   configuration.replay.recording = "/data/x.mcap";
-  configuration.replay.realtime = false;
   configuration.tracker.rotation_deviation_rad = 0.5 * std::numbers::pi / 180.0;
   configuration.tracker.time_offset = Duration(-1234567);
   configuration.tracker.translation_SC_mm[1] = 1.0 / 3.0;
@@ -218,10 +217,10 @@ INSTANTIATE_TEST_SUITE_P(
               "test.toml:3:25: key 'tracker.position_deviation_mm': expected a number from 0 to 100, got nan"},
         Wrong{"Infinity", "version = 1\n[tracker]\ntime_offset_ms = inf\n",
               "test.toml:3:18: key 'tracker.time_offset_ms': expected a number from -1000 to 1000, got inf"},
-        Wrong{"FlagAsNumber", "version = 1\n[replay]\nrealtime = 1\n",
-              "test.toml:3:12: key 'replay.realtime': expected true or false, got 1"},
-        Wrong{"Date", "version = 1\n[replay]\nrealtime = 1979-05-27\n",
-              "test.toml:3:12: key 'replay.realtime': expected true or false, got a date or time"},
+        Wrong{"FlagAsNumber", "version = 1\n[dds]\nenabled = 1\n",
+              "test.toml:3:11: key 'dds.enabled': expected true or false, got 1"},
+        Wrong{"Date", "version = 1\n[dds]\nenabled = 1979-05-27\n",
+              "test.toml:3:11: key 'dds.enabled': expected true or false, got a date or time"},
         Wrong{
             "ClockRelease", "version = 1\n[pipeline]\nrelease = \"clock\"\n",
             "test.toml:3:11: key 'pipeline.release': expected \"frame\" (\"clock\" is not available in this version), "

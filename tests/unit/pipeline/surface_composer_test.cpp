@@ -31,7 +31,7 @@ FeatureSnapshot feature(std::uint32_t id, double amplitude_mm) {
   snapshot.x = StateVector::Zero(3 * (1 + 2 * kHarmonics));
   snapshot.x(0) = 10.0;          // DC of x
   snapshot.x(1) = amplitude_mm;  // a_1 of x
-  snapshot.covariance_W_mm2 = 0.04 * Matrix3d::Identity();
+  snapshot.covariances_W_mm2.fill(0.04 * Matrix3d::Identity());
   snapshot.largest_deviation_mm = 0.5;
   return snapshot;
 }
@@ -40,6 +40,7 @@ ShardSnapshot shard(std::uint64_t frame_sequence, std::initializer_list<FeatureS
   ShardSnapshot snapshot;
   snapshot.any = true;
   snapshot.frame_sequence = frame_sequence;
+  snapshot.release_sequences = {frame_sequence, frame_sequence - 1, frame_sequence - 2};
   snapshot.features = features;
   return snapshot;
 }
