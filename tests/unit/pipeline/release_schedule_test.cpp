@@ -87,5 +87,15 @@ TEST(ReleaseSchedule, ResumesWithRealFramesAfterAStop) {
   EXPECT_EQ(release.deadline, at_ms(558));
 }
 
+TEST(ReleaseSchedule, AFrameBehindAMissingOneIsStillPending) {
+  ReleaseSchedule schedule = running(10);
+  ASSERT_TRUE(schedule.on_frame(frame(11, 330), at_ms(342)));
+  EXPECT_TRUE(schedule.pending());
+  EXPECT_TRUE(schedule.take().frame_missing);
+  EXPECT_TRUE(schedule.pending());
+  EXPECT_EQ(schedule.take().frame_sequence, 11U);
+  EXPECT_FALSE(schedule.pending());
+}
+
 }  // namespace
 }  // namespace perimap
