@@ -25,6 +25,7 @@ namespace {
 // A generous bound for a file written by hand. It also bounds the recursion of the TOML library, which is as deep as
 // a dotted key is long.
 constexpr std::size_t kLargestFile = std::size_t{64} * 1024;
+constexpr int kMostDots = 200;  // on one line: a hundred numbers and more
 constexpr std::size_t kLongestQuote = 60;  // bytes of a wrong value that a message repeats
 
 std::string on_one_line(std::string text) {
@@ -118,12 +119,14 @@ std::optional<ConfigurationValue> value_of(const toml::node& node) {
 // The first character that toml++ 3.3 must not see, if there is one: it has undefined behaviour on some letters outside
 // of strings and comments (its is_non_ascii_horizontal_whitespace, U+3001 for one), where TOML allows ASCII alone.
 // Strings over several lines, which no key takes, are refused too, so that a string always ends with its line.
+// So are keys of very many parts: its tables nest as deep as a key is long, and it walks them by recursion.
 std::optional<std::string> refused_character(std::string_view text) {
   int line = 1;
   int column = 0;  // in characters, as toml++ counts
   char quote = 0;  // of the string we are in
   bool comment = false;
   bool escaped = false;
+  int dots = 0;  // of this line, outside of strings and comments
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
     if ((static_cast<unsigned char>(c) & 0xC0) != 0x80) {
@@ -135,8 +138,11 @@ std::optional<std::string> refused_character(std::string_view text) {
       quote = 0;
       comment = false;
       escaped = false;
+      dots = 0;
     } else if (comment) {
       continue;
+    } else if (quote == 0 && c == '.' && ++dots > kMostDots) {
+      return fmt::format("{}:{}: expected TOML, got: a line of more than {} dots", line, column, kMostDots);
     } else if (quote != 0) {
       const bool closes = c == quote && !escaped;
       escaped = c == '\\' && quote == '"' && !escaped;
