@@ -22,13 +22,13 @@ struct ReplaySetup {
   ReplayReader reader;              // at the first event
 };
 
-// `configuration_file`: none for the recording's own configuration over the defaults. The error's `configuration` tells
-// whether it is the configuration that is wrong, or the recording.
+// `configuration` tells whether it is the configuration that is wrong, or the recording.
 struct SetupError {
   Error error;
   bool configuration = false;
 };
 
+// `configuration_file`: none for the recording's own configuration over the defaults.
 [[nodiscard]] tl::expected<ReplaySetup, SetupError> prepare_replay(
     const std::string& recording, const std::optional<std::filesystem::path>& configuration_file, ReadMode mode);
 

@@ -33,7 +33,7 @@ using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock>;
 void shift(ReplayEvent& event, Duration offset) noexcept;
 
 // Errors have the form "FILE: byte N: channel NAME: what is wrong". Messages lie in the file in order of arrival; one
-// that goes back by more than a stamp's rounding is an error, since replay could not deliver it at its time.
+// that goes back, or that arrives before it was measured, is an error: replay could not deliver it at its time.
 class ReplayReader {
  public:
   // Fails when the recording has no camera, tracker or ECG channel.
