@@ -10,14 +10,12 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <memory>
 #include <system_error>
 #include <utility>
 
+#include "core/error/one_line.hpp"
 #include "daemon/config/configuration_keys.hpp"
+#include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
 namespace {
@@ -27,16 +25,6 @@ namespace {
 constexpr std::size_t kLargestFile = std::size_t{64} * 1024;
 constexpr int kMostDots = 200;  // on one line: a hundred numbers and more
 constexpr std::size_t kLongestQuote = 60;  // bytes of a wrong value that a message repeats
-
-std::string on_one_line(std::string text) {
-  for (char& c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x20 || byte == 0x7F) {
-      c = ' ';
-    }
-  }
-  return text;
-}
 
 std::string quote(std::string_view text) {
   std::size_t end = std::min(text.size(), kLongestQuote);
@@ -349,21 +337,9 @@ Expected<Configuration> parse_configuration(std::string_view text, const std::fi
 
 Expected<Configuration> load_configuration(const std::filesystem::path& file, const Configuration& base,
                                            NamedFiles named_files) {
-  const auto refuse = [&file](int error) {
-    return fail(on_one_line(
-        fmt::format("{}: expected a readable configuration file, got: {}", file.string(), std::strerror(error))));
-  };
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
-  if (!stream) {
-    return refuse(errno);
-  }
-  std::string text(kLargestFile + 1, '\0');
-  errno = 0;
-  text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
-  if (std::ferror(stream.get()) != 0) {
-    return refuse(errno);
-  }
-  return parse_configuration(text, file, base, named_files);
+  const Expected<std::string> text = read_text_file(file, kLargestFile, "configuration file");
+  if (!text) return tl::unexpected(text.error());
+  return parse_configuration(*text, file, base, named_files);
 }
 
 std::string to_toml(const Configuration& configuration) {

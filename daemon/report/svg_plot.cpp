@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace perimap {
 namespace {
@@ -43,6 +44,18 @@ double tick_step(double length) {
     if (raw <= factor * power) return factor * power;
   }
   return 10.0 * power;
+}
+
+// The values where grid lines stand: whole multiples of the step. None where the step is lost in the values' rounding
+// (a range of 1e-12 about 1e9).
+std::vector<double> ticks(const Range& range) {
+  const double step = tick_step(range.length());
+  const double first = std::ceil(range.low / step);
+  const double count = std::floor(range.high / step) - first + 1.0;
+  std::vector<double> values;
+  if (!(std::abs(first) < 1e12 && count <= 20.0)) return values;
+  for (int k = 0; k < static_cast<int>(count); ++k) values.push_back((first + k) * step);
+  return values;
 }
 
 std::string escaped(const std::string& text) {
@@ -104,17 +117,15 @@ std::string plot_group(const Plot& plot, double x_px, double y_px, double width_
 
   std::string out = fmt::format("<g transform=\"translate({:.1f},{:.1f})\">\n", x_px, y_px);
   out += text_at(width_px / 2, 20, "middle", plot.title, " font-weight=\"bold\"");
-  const double x_step = tick_step(x.length());
-  for (double v = std::ceil(x.low / x_step) * x_step; v <= x.high; v += x_step) {
+  for (const double v : ticks(x)) {
     out += fmt::format("<path d=\"M{0:.1f} {1:.1f}V{2:.1f}\" stroke=\"#e3e3e3\"/>\n", px(v), kMarginTop,
                        kMarginTop + inner_height);
-    out += text_at(px(v), kMarginTop + inner_height + 16, "middle", fmt::format("{:g}", std::abs(v) < 1e-9 ? 0.0 : v));
+    out += text_at(px(v), kMarginTop + inner_height + 16, "middle", fmt::format("{:g}", v));
   }
-  const double y_step = tick_step(y.length());
-  for (double v = std::ceil(y.low / y_step) * y_step; v <= y.high; v += y_step) {
+  for (const double v : ticks(y)) {
     out += fmt::format("<path d=\"M{0:.1f} {1:.1f}H{2:.1f}\" stroke=\"#e3e3e3\"/>\n", kMarginLeft, py(v),
                        kMarginLeft + inner_width);
-    out += text_at(kMarginLeft - 6, py(v) + 4, "end", fmt::format("{:g}", std::abs(v) < 1e-9 ? 0.0 : v));
+    out += text_at(kMarginLeft - 6, py(v) + 4, "end", fmt::format("{:g}", v));
   }
   out += fmt::format(
       "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"#555\"/>\n",
@@ -126,9 +137,14 @@ std::string plot_group(const Plot& plot, double x_px, double y_px, double width_
   double legend_y = kMarginTop + 18;
   for (const PlotLine& line : plot.lines) {
     std::string path;
+    bool drawing = false;
     for (const PlotPoint& p : line.points) {
-      if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
-      path += fmt::format("{}{:.2f} {:.2f}", path.empty() ? "M" : "L", px(p.x), py(p.y));
+      if (!std::isfinite(p.x) || !std::isfinite(p.y)) {
+        drawing = false;
+        continue;
+      }
+      path += fmt::format("{}{:.2f} {:.2f}", drawing ? "L" : "M", px(p.x), py(p.y));
+      drawing = true;
     }
     if (!path.empty()) {
       out += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{:.2f}\"/>\n", path,

@@ -12,7 +12,7 @@ struct PlotPoint {
 };
 
 struct PlotLine {
-  std::vector<PlotPoint> points;  // points that are not finite are left out
+  std::vector<PlotPoint> points;  // a point that is not finite interrupts the line
   std::string color = "#1f6f8b";  // an SVG colour
   double width_px = 1.5;
   std::string label;  // in the legend; none when empty

@@ -12,6 +12,9 @@
 #include <span>
 #include <vector>
 
+#include "core/error/one_line.hpp"
+#include "drivers/text_file/text_file.hpp"
+
 namespace perimap {
 namespace {
 
@@ -23,16 +26,6 @@ struct Shape {
   int rows;
   int columns;
 };
-
-std::string on_one_line(std::string text) {
-  for (char& c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x20 || byte == 0x7F) {
-      c = ' ';
-    }
-  }
-  return text;
-}
 
 class Calibration {
  public:
@@ -169,21 +162,9 @@ Expected<CameraModel> parse_calibration(std::string_view text, std::string_view 
 }
 
 Expected<CameraModel> read_calibration(const std::filesystem::path& file) {
-  const auto refuse = [&file](int error) {
-    return fail(on_one_line(
-        fmt::format("{}: expected a readable calibration file, got: {}", file.string(), std::strerror(error))));
-  };
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
-  if (!stream) {
-    return refuse(errno);
-  }
-  std::string text(kLargestFile + 1, '\0');
-  errno = 0;
-  text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
-  if (std::ferror(stream.get()) != 0) {
-    return refuse(errno);
-  }
-  return parse_calibration(text, file.string());
+  const Expected<std::string> text = read_text_file(file, kLargestFile, "calibration file");
+  if (!text) return tl::unexpected(text.error());
+  return parse_calibration(*text, file.string());
 }
 
 std::string format_calibration(const CameraModel& camera) {

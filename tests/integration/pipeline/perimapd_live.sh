@@ -23,7 +23,9 @@ watch=$!
 sleep 0.5
 kill -INT $watch
 wait $watch || fail "watch ended with $?: $(tail -n 5 "$work/watch")"
-grep -Eq '1[0-9][0-9] surfaces in .* 0 lost' "$work/watch" || fail "surfaces lost or too few: $(tail -n 6 "$work/watch")"
+sent=$(grep -oE '[0-9]+ surfaces' "$work/log" | tail -n 1)
+[ "${sent%% *}" -ge 100 ] || fail "published too little: $(cat "$work/log")"
+grep -Eq "(^|[^0-9])$sent in .* 0 lost" "$work/watch" || fail "of $sent: $(tail -n 6 "$work/watch")"
 if [ "${6:-}" != unmapped ]; then
   "$perimap" report "$recording" --samples "$work/received.mcap" --picture "$work/picture.svg" > "$work/report" 2>&1 ||
     fail "report ended with $?: $(cat "$work/report")"

@@ -139,6 +139,7 @@ TEST(RealtimePath, MakesNoHeapCallLiveWithAllThreads) {
   EXPECT_FALSE(feeder.error().has_value());
   EXPECT_EQ(heap_calls_in_scope, 0);
   EXPECT_GT(publication.surfaces, 100);
+  EXPECT_GT(publication.features, 0U) << "the path must have been exercised up to mapped features";
 }
 
 }  // namespace

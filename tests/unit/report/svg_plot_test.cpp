@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
 #include <vector>
@@ -51,6 +52,23 @@ TEST(SvgPlot, DrawsNothingForEmptyOrNonFiniteDataAndStaysWellFormed) {
   EXPECT_TRUE(balanced(svg));
   EXPECT_EQ(svg.find("nan"), std::string::npos);
   EXPECT_EQ(svg.find("inf"), std::string::npos);
+}
+
+TEST(SvgPlot, ALineIsInterruptedWhereAPointIsNotFinite) {
+  Plot plot;
+  plot.lines = {{{{0, 0}, {1, 1}, {2, std::numeric_limits<double>::quiet_NaN()}, {3, 1}, {4, 0}}, "red", 1.0, ""}};
+  const std::string svg = plot_group(plot, 0, 0, 500, 400);
+  const std::size_t end = svg.find("\" fill=\"none\" stroke=\"red\"");
+  ASSERT_NE(end, std::string::npos);
+  const std::string path = svg.substr(svg.rfind("d=\"", end) + 3, end - svg.rfind("d=\"", end) - 3);
+  EXPECT_EQ(std::count(path.begin(), path.end(), 'M'), 2);
+  EXPECT_EQ(std::count(path.begin(), path.end(), 'L'), 2);
+}
+
+TEST(SvgPlot, ValuesThatDifferInTheirLastDigitsAloneEndWithoutTicks) {
+  Plot plot;
+  plot.lines = {{{{1e15, 1e15}, {1e15 + 0.25, 1e15 + 0.125}}, "red", 1.0, ""}};
+  EXPECT_TRUE(balanced(svg_document({plot}, "huge")));
 }
 
 TEST(SvgPlot, ASinglePointHasFiniteAxes) {

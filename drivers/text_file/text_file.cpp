@@ -1,0 +1,28 @@
+#include "drivers/text_file/text_file.hpp"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+
+#include "core/error/one_line.hpp"
+
+namespace perimap {
+
+Expected<std::string> read_text_file(const std::filesystem::path& file, std::size_t largest, std::string_view what) {
+  const auto refuse = [&](int error) {
+    return fail(
+        on_one_line(fmt::format("{}: expected a readable {}, got: {}", file.string(), what, std::strerror(error))));
+  };
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
+  if (!stream) return refuse(errno);
+  std::string text(largest + 1, '\0');
+  errno = 0;
+  text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
+  if (std::ferror(stream.get()) != 0) return refuse(errno);
+  return text;
+}
+
+}  // namespace perimap

@@ -1,0 +1,18 @@
+// Small files written by hand: configurations and calibrations.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "core/error/expected.hpp"
+
+namespace perimap {
+
+// The file's text, at most largest + 1 bytes of it, so that a parser can refuse what is too long. `what` names the kind
+// of file in errors: "FILE: expected a readable WHAT, got: No such file or directory".
+[[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file, std::size_t largest,
+                                                   std::string_view what);
+
+}  // namespace perimap
