@@ -23,7 +23,7 @@ namespace {
 // A generous bound for a file written by hand. It also bounds the recursion of the TOML library, which is as deep as
 // a dotted key is long.
 constexpr std::size_t kLargestFile = std::size_t{64} * 1024;
-constexpr int kMostDots = 200;  // on one line: a hundred numbers and more
+constexpr int kMostDots = 200;             // on one line: a hundred numbers and more
 constexpr std::size_t kLongestQuote = 60;  // bytes of a wrong value that a message repeats
 
 std::string quote(std::string_view text) {
