@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "perimap: %s\n", error.what());
+    (void)std::fprintf(stderr, "perimap: %s\n", error.what());
     return 1;
   }
   return exit_code;

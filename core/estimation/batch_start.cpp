@@ -57,13 +57,13 @@ class BatchProblem {
         huber_deviations_(huber_deviations),
         n_(deviations.size()),
         scaled_basis_(n_, static_cast<Index>(observations.size())),
-        used(observations.size(), 1),
-        residual2(observations.size(), 0.0),
-        weight(observations.size(), 0.0) {
+        used_(observations.size(), 1),
+        residual2_(observations.size(), 0.0),
+        weight_(observations.size(), 0.0) {
     for (Index k = 0; k < count(); ++k) {
       const Observation& observation = observations_[static_cast<std::size_t>(k)];
       scaled_basis_.col(k) = deviations.cwiseProduct(observation.b);
-      R_inverse_.push_back(observation.R.inverse());
+      R_inverse_.emplace_back(observation.R.inverse());
     }
     g_.resize(count(), 3);
     G_.resize(count(), 6);
@@ -73,11 +73,18 @@ class BatchProblem {
   [[nodiscard]] Index count() const noexcept { return scaled_basis_.cols(); }
   [[nodiscard]] Index dimension() const noexcept { return 3 * n_; }
 
+  // Which observations count, 1 or 0; the caller decides.
+  [[nodiscard]] std::vector<std::uint8_t>& used() noexcept { return used_; }
+  // At the y last evaluated:
+  [[nodiscard]] const std::vector<double>& residual2() const noexcept { return residual2_; }
+  [[nodiscard]] const std::vector<double>& weight() const noexcept { return weight_; }
+  [[nodiscard]] int visible() const noexcept { return visible_; }
+
   // J(y); leaves residuals, weights and, for normal_equations(), the first derivatives at y.
   double evaluate(const VectorXd& y, Loss loss) {
     double cost = y.squaredNorm();
     const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>> coefficients(y.data(), n_, 3);
-    visible = 0;
+    visible_ = 0;
     for (Index k = 0; k < count(); ++k) {
       const auto index = static_cast<std::size_t>(k);
       const Observation& observation = observations_[index];
@@ -85,7 +92,7 @@ class BatchProblem {
       Vector2d z;
       Matrix23d dz_dq;
       const bool seen = model_.predict(observation.X_CW * p, z, &dz_dq) == ProjectionStatus::kOk;
-      visible += seen ? 1 : 0;
+      visible_ += seen ? 1 : 0;
       double s = kInvisible;
       Vector2d Wr = Vector2d::Zero();
       if (seen) {
@@ -93,15 +100,15 @@ class BatchProblem {
         Wr = R_inverse_[index] * r;
         s = r.dot(Wr);
       }
-      residual2[index] = s;
-      if (used[index] == 0) {
+      residual2_[index] = s;
+      if (used_[index] == 0) {
         g_.row(k).setZero();
         G_.row(k).setZero();
         continue;
       }
       const LossValue value = loss_of(loss, s, huber_deviations_);
       cost += value.rho;
-      weight[index] = value.weight;
+      weight_[index] = value.weight;
       if (!seen) {
         g_.row(k).setZero();
         G_.row(k).setZero();
@@ -147,13 +154,10 @@ class BatchProblem {
   Eigen::Matrix<double, Eigen::Dynamic, 6> G_;  // xx, yx, zx, yy, zy, zz of J^T R^-1 J w
   MatrixXd weighted_basis_;
   MatrixXd blocks_;
-
- public:
-  std::vector<std::uint8_t> used;  // observations that count, 1 or 0
-  // At the y last evaluated:
-  std::vector<double> residual2;
-  std::vector<double> weight;
-  int visible = 0;
+  std::vector<std::uint8_t> used_;
+  std::vector<double> residual2_;
+  std::vector<double> weight_;
+  int visible_ = 0;
 };
 
 struct Solution {
@@ -259,7 +263,7 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
     for (Index axis = 0; axis < 3; ++axis) y(axis * n) = offset(axis) / deviations(0);
     const Loss first_loss = settings.robust ? Loss::kHuber : Loss::kQuadratic;
     problem.evaluate(y, first_loss);
-    if (problem.visible == 0) continue;
+    if (problem.visible() == 0) continue;
     seen_somewhere = true;
     Solution solution =
         minimise(problem, std::move(y), first_loss, settings.max_iterations, kRough, outcome.iterations);
@@ -282,19 +286,21 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
 
   // The plain estimate of what lies within the gate, until that set stays. One that has come in stays in, so that the
   // set can't alternate.
-  const auto count_inliers = [&] { return static_cast<int>(std::count(problem.used.begin(), problem.used.end(), 1)); };
+  const auto count_inliers = [&] {
+    return static_cast<int>(std::count(problem.used().begin(), problem.used().end(), 1));
+  };
   const int enough =
       std::max(settings.min_observations,
                static_cast<int>(std::ceil(settings.min_inlier_fraction * static_cast<double>(observations.size()))));
   Solution solution = std::move(*best);
   if (settings.robust) {
     problem.evaluate(solution.y, Loss::kStudentT);
-    outcome.weights = problem.weight;
+    outcome.weights = problem.weight();
     for (std::size_t k = 0; k < observations.size(); ++k)
-      problem.used[k] = problem.residual2[k] < settings.gate ? 1 : 0;
+      problem.used()[k] = problem.residual2()[k] < settings.gate ? 1 : 0;
   } else {
     problem.evaluate(solution.y, Loss::kQuadratic);
-    outcome.weights = problem.weight;
+    outcome.weights = problem.weight();
   }
   constexpr int kMaxRounds = 5;
   for (int round = 0; round < kMaxRounds; ++round) {
@@ -305,8 +311,8 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
     if (!settings.robust) break;
     bool changed = false;
     for (std::size_t k = 0; k < observations.size(); ++k) {
-      if (problem.used[k] == 0 && problem.residual2[k] < settings.gate) {
-        problem.used[k] = 1;
+      if (problem.used()[k] == 0 && problem.residual2()[k] < settings.gate) {
+        problem.used()[k] = 1;
         changed = true;
       }
     }
@@ -334,7 +340,7 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
     }
   }
   if (!estimate.x.allFinite() || !estimate.P.allFinite()) return refuse(BatchStatus::kDiverged);
-  outcome.inlier = problem.used;
+  outcome.inlier = problem.used();
   outcome.inliers = count_inliers();
   outcome.status = BatchStatus::kOk;
   return outcome;

@@ -89,7 +89,7 @@ bool CameraModel::unproject(const Vector2d& px, Vector3d& ray_C) const noexcept 
     const Vector2d step = d.J.inverse() * (target - d.m);
     double fraction = 1.0;
     bool nearer = false;
-    for (; fraction > 1e-6 && !nearer; fraction *= 0.5) {
+    for (int halvings = 0; halvings < 20 && !nearer; ++halvings, fraction *= 0.5) {
       const Vector2d trial = m + fraction * step;
       const Distorted d_trial = distort(*this, trial.x(), trial.y());
       const double trial_error = (target - d_trial.m).norm();

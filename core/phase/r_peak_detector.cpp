@@ -227,7 +227,7 @@ void RPeakDetector::locate_peak(std::int64_t centre, Candidate& candidate) const
   const std::int64_t last = std::max(std::min(centre + samples_in(kPeakWindow), now_ - half_smooth), first);
 
   // The baseline is the median of a stretch of which the complex is the smaller part.
-  std::array<double, kHistory / 2> stretch;
+  std::array<double, kHistory / 2> stretch{};
   auto end = stretch.begin();
   for (std::int64_t i = std::max<std::int64_t>(centre - samples_in(kBaselineBefore), 0); i <= last; ++i) {
     *end++ = at(i).mV;

@@ -100,8 +100,8 @@ void Mapper::finish_learning() noexcept {
   std::uint64_t converged = 0;
   std::uint64_t inconsistent = 0;
   for (const FeatureSlot& slot : slots_) {
-    tracked += slot.state == SlotState::kTracked;
-    starting += slot.state == SlotState::kStarting;
+    if (slot.state == SlotState::kTracked) ++tracked;
+    if (slot.state == SlotState::kStarting) ++starting;
     if (slot.state != SlotState::kMapped) continue;
     if (slot.monitor.high()) {
       ++inconsistent;

@@ -32,7 +32,7 @@ class LatencyHistogram {
   }
 
   [[nodiscard]] Summary summary() const noexcept {
-    std::array<std::uint64_t, kBuckets> counts;
+    std::array<std::uint64_t, kBuckets> counts{};
     std::uint64_t total = 0;
     for (std::size_t i = 0; i < kBuckets; ++i) {
       counts[i] = buckets_[i].load(std::memory_order_relaxed);

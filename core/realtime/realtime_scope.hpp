@@ -15,6 +15,7 @@ class RealtimeScope {
   [[nodiscard]] static int depth() noexcept { return depth_; }
 
  private:
+  // NOLINTNEXTLINE(cppcoreguidelines-avoid-non-const-global-variables,readability-identifier-naming): one a thread
   static inline thread_local int depth_ = 0;
 };
 

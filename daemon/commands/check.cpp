@@ -1,5 +1,7 @@
 #include "daemon/commands/check.hpp"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
@@ -17,9 +19,9 @@ void add_check_command(CLI::App& app, int& exit_code) {
   command->callback([file, &exit_code] {
     const Expected<Configuration> configuration = load_configuration(*file);
     if (configuration) {
-      std::fputs(to_toml(*configuration).c_str(), stdout);
+      fmt::print("{}", to_toml(*configuration));
     } else {
-      std::fprintf(stderr, "%s\n", configuration.error().message.c_str());
+      fmt::print(stderr, "{}\n", configuration.error().message);
     }
     exit_code = configuration ? 0 : 2;
   });

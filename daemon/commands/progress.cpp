@@ -39,7 +39,7 @@ void Progress::update(std::uint64_t done) {
     tenth_ = 10 * done / total_;
     fmt::print(stderr, "{}\n", line());
   }
-  std::fflush(stderr);
+  (void)std::fflush(stderr);
 }
 
 }  // namespace perimap

@@ -111,7 +111,7 @@ class SessionWriter {
     } else {
       for (double& component : message.rotation_WS_wxyz) component = std::numeric_limits<double>::quiet_NaN();
     }
-    const auto written = writer_.write(tracker_, message, sample.arrival, sample.source_time, sample.device_frame);
+    auto written = writer_.write(tracker_, message, sample.arrival, sample.source_time, sample.device_frame);
     if (!written || sample.state != ToolState::kOk) return written;
     const auto viewer = borrow_pose_in_frame(sample.X_WS, sample.source_time, kWorldFrame);
     return writer_.write(viewer_, viewer, sample.arrival, sample.source_time, sample.device_frame);
@@ -131,7 +131,7 @@ class SessionWriter {
   }
 
   Expected<void> finish() {
-    if (const auto done = writer_.finish(); !done) return done;
+    if (auto done = writer_.finish(); !done) return done;
     std::error_code error;
     std::filesystem::rename(partial_, recording_.path, error);
     if (error) return fail(fmt::format("{}: {}", recording_.path.string(), error.message()));
@@ -307,7 +307,7 @@ Expected<void> write_simulation(const Simulation& simulation, const std::vector<
     if (arrival.source == Simulation::Source::kCamera) progress(arrival.index + 1);
   }
   for (const auto& writer : writers)
-    if (const auto done = writer->finish(); !done) return done;
+    if (auto done = writer->finish(); !done) return done;
   return {};
 }
 

@@ -1,5 +1,7 @@
 #include "daemon/commands/watch.hpp"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
@@ -28,13 +30,12 @@ struct Options {
 };
 
 void print(const std::string& line) {
-  std::fwrite(line.data(), 1, line.size(), stdout);
-  std::fputc('\n', stdout);
-  std::fflush(stdout);
+  fmt::print("{}\n", line);
+  (void)std::fflush(stdout);
 }
 
 int fail_with(const Error& error) {
-  std::fprintf(stderr, "perimap watch: %s\n", error.message.c_str());
+  fmt::print(stderr, "perimap watch: {}\n", error.message);
   return 1;
 }
 

@@ -48,9 +48,9 @@ class Section {
   Section(std::string name, std::vector<ConfigurationKey>& keys) : name_(std::move(name)), keys_(keys) {}
 
   template <class Member>
-  Section& flag(std::string name, Member member, std::string meaning) {
+  Section& flag(const std::string& name, Member member, const std::string& meaning) {
     return add(
-        std::move(name), std::move(meaning), "true or false",
+        name, meaning, "true or false",
         [member](const ConfigurationValue& value, Configuration& configuration) {
           const auto* flag = std::get_if<bool>(&value);
           if (flag != nullptr) {
@@ -64,9 +64,9 @@ class Section {
   }
 
   template <class Member>
-  Section& integer(std::string name, int low, int high, Member member, std::string meaning) {
+  Section& integer(const std::string& name, int low, int high, Member member, const std::string& meaning) {
     return add(
-        std::move(name), std::move(meaning), fmt::format("an integer from {} to {}", low, high),
+        name, meaning, fmt::format("an integer from {} to {}", low, high),
         [member, low, high](const ConfigurationValue& value, Configuration& configuration) {
           const auto* integer = std::get_if<std::int64_t>(&value);
           const bool good = integer != nullptr && *integer >= low && *integer <= high;
@@ -81,9 +81,9 @@ class Section {
   }
 
   template <class Member>
-  Section& number(std::string name, double low, double high, Member member, std::string meaning) {
+  Section& number(const std::string& name, double low, double high, Member member, const std::string& meaning) {
     return add(
-        std::move(name), std::move(meaning), fmt::format("a number from {} to {}", low, high),
+        name, meaning, fmt::format("a number from {} to {}", low, high),
         [member, low, high](const ConfigurationValue& value, Configuration& configuration) {
           const std::optional<double> number = as_number(value);
           const bool good = number && within(*number, low, high);
@@ -98,9 +98,9 @@ class Section {
   }
 
   template <class Member>
-  Section& angle(std::string name, double low_deg, double high_deg, Member member, std::string meaning) {
+  Section& angle(const std::string& name, double low_deg, double high_deg, Member member, const std::string& meaning) {
     return add(
-        std::move(name), std::move(meaning), fmt::format("a number from {} to {}", low_deg, high_deg),
+        name, meaning, fmt::format("a number from {} to {}", low_deg, high_deg),
         [member, low_deg, high_deg](const ConfigurationValue& value, Configuration& configuration) {
           const std::optional<double> number = as_number(value);
           const bool good = number && within(*number, low_deg, high_deg);
@@ -116,10 +116,11 @@ class Section {
 
   // `unit` is the key's own (a millisecond, a second); low and high count it.
   template <class Member>
-  Section& duration(std::string name, Duration unit, double low, double high, Member member, std::string meaning) {
+  Section& duration(const std::string& name, Duration unit, double low, double high, Member member,
+                    const std::string& meaning) {
     const double unit_ns = static_cast<double>(unit.count());
     return add(
-        std::move(name), std::move(meaning), fmt::format("a number from {} to {}", low, high),
+        name, meaning, fmt::format("a number from {} to {}", low, high),
         [member, unit_ns, low, high](const ConfigurationValue& value, Configuration& configuration) {
           const std::optional<double> number = as_number(value);
           const bool good = number && within(*number, low, high);
@@ -135,9 +136,9 @@ class Section {
 
   // Any text that fits the bounded string of the published type.
   template <class Member>
-  Section& text(std::string name, std::size_t longest, Member member, std::string meaning) {
+  Section& text(const std::string& name, std::size_t longest, Member member, const std::string& meaning) {
     return add(
-        std::move(name), std::move(meaning), fmt::format("a printable text of 1 to {} bytes", longest),
+        name, meaning, fmt::format("a printable text of 1 to {} bytes", longest),
         [member, longest](const ConfigurationValue& value, Configuration& configuration) {
           const auto* text = std::get_if<std::string>(&value);
           bool good = text != nullptr && !text->empty() && text->size() <= longest;
@@ -156,9 +157,9 @@ class Section {
   }
 
   template <class Member>
-  Section& file(std::string name, Member member, std::string meaning) {
+  Section& file(const std::string& name, Member member, const std::string& meaning) {
     add(
-        std::move(name), std::move(meaning), "the name of an existing file",
+        name, meaning, "the name of an existing file",
         [member](const ConfigurationValue& value, Configuration& configuration) {
           const auto* text = std::get_if<std::string>(&value);
           // A NUL would end the name early when the file is opened.
@@ -177,15 +178,15 @@ class Section {
   }
 
   template <class Enum, std::size_t N, class Member>
-  Section& choice(std::string name, const std::array<std::pair<std::string_view, Enum>, N>& choices, Member member,
-                  std::string meaning, std::string_view note = "") {
+  Section& choice(const std::string& name, const std::array<std::pair<std::string_view, Enum>, N>& choices,
+                  Member member, const std::string& meaning, std::string_view note = "") {
     std::string expected;
     for (const auto& [text, value] : choices) {
       expected += fmt::format("{}\"{}\"", expected.empty() ? "" : " or ", text);
     }
     expected += note;
     return add(
-        std::move(name), std::move(meaning), std::move(expected),
+        name, meaning, expected,
         [member, choices](const ConfigurationValue& value, Configuration& configuration) {
           const auto* chosen = std::get_if<std::string>(&value);
           for (const auto& [text, meant] : choices) {
@@ -208,9 +209,10 @@ class Section {
 
   // `accept(std::vector<double>, Configuration&)` puts the list in place or refuses it.
   template <class Accept, class Give>
-  Section& numbers(std::string name, std::string expected, Accept accept, Give give, std::string meaning) {
+  Section& numbers(const std::string& name, const std::string& expected, Accept accept, Give give,
+                   const std::string& meaning) {
     return add(
-        std::move(name), std::move(meaning), std::move(expected),
+        name, meaning, expected,
         [accept](const ConfigurationValue& value, Configuration& configuration) {
           const std::optional<std::vector<double>> numbers = as_numbers(value);
           return numbers && accept(*numbers, configuration);
@@ -233,7 +235,8 @@ class Section {
   std::vector<ConfigurationKey>& keys_;
 };
 
-// Reads and writes one member of a Configuration, const or not.
+// Reads and writes one member of a Configuration, const or not. A macro, because a member of a member has no pointer.
+// NOLINTNEXTLINE(cppcoreguidelines-macro-usage,bugprone-macro-parentheses)
 #define PERIMAP_MEMBER(path) \
   [](auto& configuration) -> auto& { return configuration.path; }
 
@@ -248,7 +251,7 @@ void add_version(std::vector<ConfigurationKey>& keys) {
 }
 
 void add_sources(std::vector<ConfigurationKey>& keys) {
-  constexpr auto ms = std::chrono::milliseconds(1);
+  const auto ms = std::chrono::milliseconds(1);
   Section("source", keys)
       .text("name", 63, PERIMAP_MEMBER(source.name), "key `source` of every published sample")
       .text("world_frame", 63, PERIMAP_MEMBER(source.world_frame), "name of the frame W, published as frame_id");
@@ -302,9 +305,9 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
 }
 
 void add_estimation(std::vector<ConfigurationKey>& keys) {
-  constexpr auto ms = std::chrono::milliseconds(1);
-  constexpr auto s = std::chrono::seconds(1);
-  constexpr std::array<std::pair<std::string_view, PhaseLaw>, 3> laws{
+  const auto ms = std::chrono::milliseconds(1);
+  const auto s = std::chrono::seconds(1);
+  const std::array<std::pair<std::string_view, PhaseLaw>, 3> laws{
       {{"linear", PhaseLaw::kLinear}, {"warped", PhaseLaw::kWarped}, {"time-locked", PhaseLaw::kTimeLocked}}};
   Section("phase", keys)
       .choice("law", laws, PERIMAP_MEMBER(phase.law), "how the phase runs from one R peak to the next")
@@ -312,7 +315,7 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
                 "without an R peak for so long the phase is lost");
   // No pipeline serves Release::kClock, so a file that asks for it is refused.
   using Release = PipelineConfiguration::Release;
-  constexpr std::array<std::pair<std::string_view, Release>, 1> releases{{{"frame", Release::kFrame}}};
+  const std::array<std::pair<std::string_view, Release>, 1> releases{{{"frame", Release::kFrame}}};
   Section("pipeline", keys)
       .choice("release", releases, PERIMAP_MEMBER(pipeline.release), "what the release follows: each camera frame",
               " (\"clock\" is not available in this version)")
@@ -362,8 +365,8 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
 }
 
 void add_running(std::vector<ConfigurationKey>& keys) {
-  constexpr auto ms = std::chrono::milliseconds(1);
-  constexpr auto s = std::chrono::seconds(1);
+  const auto ms = std::chrono::milliseconds(1);
+  const auto s = std::chrono::seconds(1);
   Section("realtime", keys)
       .integer("priority", 0, 98, PERIMAP_MEMBER(realtime.priority), "SCHED_FIFO priority; 0: not requested")
       .flag("lock_memory", PERIMAP_MEMBER(realtime.lock_memory), "keeps all memory in RAM")
@@ -401,11 +404,11 @@ void add_running(std::vector<ConfigurationKey>& keys) {
   Section("status", keys)
       .duration("interval_s", s, 0.1, 3600, PERIMAP_MEMBER(status.interval), "from one status to the next");
   using Level = LogConfiguration::Level;
-  constexpr std::array<std::pair<std::string_view, Level>, 5> levels{{{"trace", Level::kTrace},
-                                                                      {"debug", Level::kDebug},
-                                                                      {"info", Level::kInfo},
-                                                                      {"warning", Level::kWarning},
-                                                                      {"error", Level::kError}}};
+  const std::array<std::pair<std::string_view, Level>, 5> levels{{{"trace", Level::kTrace},
+                                                                  {"debug", Level::kDebug},
+                                                                  {"info", Level::kInfo},
+                                                                  {"warning", Level::kWarning},
+                                                                  {"error", Level::kError}}};
   Section("log", keys).choice("level", levels, PERIMAP_MEMBER(log.level), "least severity that is logged");
 }
 

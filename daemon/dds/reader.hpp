@@ -40,8 +40,8 @@ class UntypedLoan {
 // What does not depend on the type of the samples.
 class UntypedReader {
  public:
-  [[nodiscard]] static Expected<UntypedReader> create(const Participant& participant, const TopicDescription& topic,
-                                                      int depth);
+  [[nodiscard]] static Expected<UntypedReader> create(const Participant& participant,
+                                                      const TopicDescription& description, int depth);
 
   [[nodiscard]] Expected<UntypedLoan> take();
   // A condition that holds while there is something to take: for a WaitSet.

@@ -11,7 +11,8 @@ namespace perimap::dds {
 // What does not depend on the type of the samples.
 class UntypedWriter {
  public:
-  [[nodiscard]] static Expected<UntypedWriter> create(const Participant& participant, const TopicDescription& topic,
+  [[nodiscard]] static Expected<UntypedWriter> create(const Participant& participant,
+                                                      const TopicDescription& description,
                                                       const WriterPromise& promise);
 
   // Copies the sample to the network and to readers in this process. Allocates, locks and calls the kernel.

@@ -49,6 +49,7 @@ class JournalSeverity : public spdlog::custom_flag_formatter {
 
 // systemd.exec(5), $JOURNAL_STREAM: device and inode of the stream that leads to the journal.
 bool standard_error_is_the_journal() {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing here writes the environment
   const char* stream = std::getenv("JOURNAL_STREAM");
   struct stat status {};
   return stream != nullptr && fstat(STDERR_FILENO, &status) == 0 &&

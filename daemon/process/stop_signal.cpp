@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
-#include <cstring>
+#include <system_error>
 #include <utility>
 
 namespace perimap {
@@ -20,11 +20,11 @@ Expected<StopSignal> StopSignal::install() {
   sigaddset(&signals, SIGTERM);
   const int error = pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   if (error != 0) {
-    return fail(fmt::format("cannot block SIGINT and SIGTERM: {}", std::strerror(error)));
+    return fail(fmt::format("cannot block SIGINT and SIGTERM: {}", std::generic_category().message(error)));
   }
   const int descriptor = signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
   if (descriptor < 0) {
-    return fail(fmt::format("cannot open a signal descriptor: {}", std::strerror(errno)));
+    return fail(fmt::format("cannot open a signal descriptor: {}", std::generic_category().message(errno)));
   }
   return StopSignal(descriptor);
 }

@@ -111,7 +111,7 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
   const double end_s = since_start(samples_.back().valid_time + to_recording);
 
   std::vector<double> second_edges;
-  for (double t = 0.0; t <= end_s + 1.0; t += 1.0) second_edges.push_back(t);
+  for (int t = 0; t <= end_s + 1.0; ++t) second_edges.push_back(t);
   std::vector<double> cycle_edges;
   for (const Instant r : truth_.motion().r_peaks) {
     if (const double t = since_start(r); t >= 0.0 && t <= end_s) cycle_edges.push_back(t);

@@ -76,8 +76,8 @@ class Accuracy {
   };
   struct SampleRange {
     Instant valid_time;
-    std::size_t begin;  // in published_
-    std::size_t end;
+    std::size_t begin = 0;  // in published_
+    std::size_t end = 0;
   };
   struct Origin {
     Instant first_observed;

@@ -12,6 +12,7 @@ constexpr const char* kP95Color = "#e08e0b";
 
 std::vector<PlotPoint> seen_from_above(const std::vector<Vector3d>& path) {
   std::vector<PlotPoint> points;
+  points.reserve(path.size());
   for (const Vector3d& p : path) points.push_back({p.x(), p.z()});
   return points;
 }

@@ -7,9 +7,9 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <memory>
 #include <span>
+#include <system_error>
 #include <vector>
 
 #include "core/error/one_line.hpp"
@@ -183,7 +183,8 @@ Expected<void> write_calibration(const std::filesystem::path& file, const Camera
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "wb"), &std::fclose);
   const bool written = stream && std::fwrite(text.data(), 1, text.size(), stream.get()) == text.size();
   if (!written || std::fclose(stream.release()) != 0) {
-    return fail(on_one_line(fmt::format("{}: cannot write: {}", file.string(), std::strerror(errno))));
+    return fail(
+        on_one_line(fmt::format("{}: cannot write: {}", file.string(), std::generic_category().message(errno))));
   }
   return {};
 }

@@ -48,7 +48,7 @@ foxglove_RawImage borrow_raw_image(const GreyImage& image, Instant time, const s
 
 Expected<GreyImage> borrow_grey_image(const foxglove_RawImage& message) {
   if (message.encoding == nullptr || std::string_view(message.encoding) != kMono8) {
-    return fail(fmt::format("image encoding \"{}\", expected \"{}\"",
+    return fail(fmt::format(R"(image encoding "{}", expected "{}")",
                             message.encoding == nullptr ? "" : message.encoding, kMono8));
   }
   constexpr std::uint32_t kMaxSide = std::numeric_limits<std::int32_t>::max();

@@ -148,7 +148,7 @@ class McapReader::Impl {
   Expected<void> open() {
     if (size_ == 0) return fail_at(0, "the recording is empty");
     if (size_ < mcap::kMagic.size()) return fail_at(size_, "the recording ends within its first 8 bytes");
-    std::array<std::byte, mcap::kMagic.size()> magic;
+    std::array<std::byte, mcap::kMagic.size()> magic{};
     if (auto read = source_->read_at(0, magic); !read) return read;
     if (!is_magic(magic)) return fail_at(0, "this is not an MCAP recording");
     Expected<bool> indexed = open_by_index();
@@ -176,7 +176,7 @@ class McapReader::Impl {
         chunk_at_ += cursor.at();
         if (header.opcode != Opcode::kMessage) continue;
         const auto message = parse_message(content);
-        if (message && channels_.count(message->channel_id) != 0 && is_selected(message->channel_id)) return message;
+        if (message && channels_.contains(message->channel_id) && is_selected(message->channel_id)) return message;
       }
       if (next_segment_ == segments_.size()) {
         if (auto ended = check_data_section(); !ended) {
@@ -253,7 +253,7 @@ class McapReader::Impl {
     if (left < mcap::kRecordHeaderBytes) {
       return fail_at(size_, fmt::format("the recording ends within the record header at byte {}", offset));
     }
-    std::array<std::byte, mcap::kRecordHeaderBytes> bytes;
+    std::array<std::byte, mcap::kRecordHeaderBytes> bytes{};
     if (auto read = source_->read_at(offset, bytes); !read) return tl::unexpected(read.error());
     Cursor cursor(bytes);
     const RecordHeader header = take_record_header(cursor);
@@ -278,7 +278,7 @@ class McapReader::Impl {
     constexpr std::uint64_t kFooterBytes = mcap::kRecordHeaderBytes + mcap::kFooterContentBytes;
     constexpr std::uint64_t kTailBytes = kFooterBytes + mcap::kMagic.size();
     if (size_ < mcap::kMagic.size() + kTailBytes) return fail_at(size_, "the recording ends without its footer");
-    std::array<std::byte, kTailBytes> tail;
+    std::array<std::byte, kTailBytes> tail{};
     const std::uint64_t footer_offset = size_ - kTailBytes;
     if (auto read = source_->read_at(footer_offset, tail); !read) return tl::unexpected(read.error());
     if (!is_magic(std::span(tail).last(mcap::kMagic.size()))) {
@@ -315,7 +315,7 @@ class McapReader::Impl {
   }
 
   Expected<void> read_data_end(std::uint64_t offset) {
-    std::array<std::byte, mcap::kRecordHeaderBytes + mcap::kDataEndContentBytes> record;
+    std::array<std::byte, mcap::kRecordHeaderBytes + mcap::kDataEndContentBytes> record{};
     if (auto read = source_->read_at(offset, record); !read) return read;
     Cursor cursor(record);
     const RecordHeader header = take_record_header(cursor);
@@ -597,7 +597,7 @@ class McapReader::Impl {
       if (header.opcode == Opcode::kMessage) {
         const auto message = parse_message(content);
         parsed = message.has_value();
-        if (parsed && channels_.count(message->channel_id) == 0) {
+        if (parsed && !channels_.contains(message->channel_id)) {
           // Its channel's record was damaged; the chunk's other messages are well.
           const auto unknown =
               fail_at(offset, fmt::format("messages of channel {}, which is not described", message->channel_id));

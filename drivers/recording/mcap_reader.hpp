@@ -29,6 +29,8 @@ class McapReader {
  public:
   // Fails in both modes when the file does not start as MCAP or cannot be read at all.
   [[nodiscard]] static Expected<McapReader> open(std::unique_ptr<ByteSource> source, ReadMode mode);
+  McapReader(const McapReader&) = delete;
+  McapReader& operator=(const McapReader&) = delete;
   McapReader(McapReader&&) noexcept;
   McapReader& operator=(McapReader&&) noexcept;
   ~McapReader();

@@ -33,6 +33,8 @@ struct McapWriterOptions {
 class McapWriter {
  public:
   [[nodiscard]] static Expected<McapWriter> create(std::unique_ptr<ByteSink> sink, const McapWriterOptions& options);
+  McapWriter(const McapWriter&) = delete;
+  McapWriter& operator=(const McapWriter&) = delete;
   McapWriter(McapWriter&&) noexcept;
   McapWriter& operator=(McapWriter&&) noexcept;
   ~McapWriter();

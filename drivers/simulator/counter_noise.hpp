@@ -10,9 +10,9 @@ namespace perimap {
 // The finaliser of splitmix64 (Steele, Lea & Flood, OOPSLA 2014): a bijection that spreads every bit.
 [[nodiscard]] constexpr std::uint64_t mix64(std::uint64_t x) noexcept {
   x ^= x >> 30;
-  x *= 0xbf58476d1ce4e5b9u;
+  x *= 0xbf58476d1ce4e5b9U;
   x ^= x >> 27;
-  x *= 0x94d049bb133111ebu;
+  x *= 0x94d049bb133111ebU;
   return x ^ (x >> 31);
 }
 
@@ -21,10 +21,10 @@ namespace perimap {
 class CounterNoise {
  public:
   constexpr CounterNoise(std::uint64_t seed, std::uint64_t stream) noexcept
-      : key_(mix64(mix64(seed + 0x9e3779b97f4a7c15u) ^ (stream * 0xd1342543de82ef95u + 1u))) {}
+      : key_(mix64(mix64(seed + 0x9e3779b97f4a7c15U) ^ (stream * 0xd1342543de82ef95U + 1U))) {}
 
   [[nodiscard]] constexpr std::uint64_t bits(std::uint64_t index) const noexcept {
-    return mix64(key_ + index * 0x9e3779b97f4a7c15u);
+    return mix64(key_ + index * 0x9e3779b97f4a7c15U);
   }
   // In (0, 1).
   [[nodiscard]] constexpr double uniform(std::uint64_t index) const noexcept {

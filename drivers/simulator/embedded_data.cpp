@@ -4,6 +4,7 @@
 
 // The assembler copies each file in as it is; CMake gives the folder and makes this file depend on the data.
 // clang-format off
+// NOLINTNEXTLINE(cppcoreguidelines-macro-usage)
 #define PERIMAP_EMBED(symbol, file)                                       \
   __asm__(".pushsection .rodata\n"                                        \
           ".balign 16\n"                                                  \

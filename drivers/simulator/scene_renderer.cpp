@@ -23,7 +23,7 @@ constexpr double kNearest_mm = 5.0;  // what comes nearer to the lens than this 
 // The light stands beside the lens, as in an endoscope's ring of fibres.
 const Vector3f kLight_C(-3.0F, -5.0F, 0.0F);  // mm
 
-typedef std::int32_t Int4 __attribute__((vector_size(16)));
+using Int4 __attribute__((vector_size(16))) = std::int32_t;
 
 template <class Vector>
 Vector load(const typename std::remove_reference_t<decltype(std::declval<Vector>()[0])>* from) noexcept {
@@ -308,7 +308,7 @@ void SceneRenderer::expose(std::uint64_t noise_seed, RenderWorkspace& workspace,
       // Four 16-bit uniform numbers sum to nearly a normal one; read noise 0.7 grey levels, shot noise 1 at 150.
       const std::uint64_t bits = noise.bits(i);
       const auto sum =
-          static_cast<float>((bits & 0xffffu) + ((bits >> 16) & 0xffffu) + ((bits >> 32) & 0xffffu) + (bits >> 48));
+          static_cast<float>((bits & 0xffffU) + ((bits >> 16) & 0xffffU) + ((bits >> 32) & 0xffffU) + (bits >> 48));
       constexpr float kStandardDeviation = 37837.2F;  // of the sum: sqrt(4 (65536^2 - 1) / 12)
       const float normal = (sum - 4.0F * 32767.5F) / kStandardDeviation;
       const float clipped = std::min(level, 255.0F);

@@ -54,8 +54,8 @@ class Simulation {
   enum class Source : std::uint8_t { kCamera, kTracker, kEcg };
   struct Arrival {
     Instant arrival;
-    Source source;
-    std::uint32_t index;  // into frames(), of tracker_sample(), into ecg()
+    Source source = Source::kCamera;
+    std::uint32_t index = 0;  // into frames(), of tracker_sample(), into ecg()
   };
 
   // Errors name the setting that is out of range, in words of the command line.

@@ -21,9 +21,9 @@ std::uint8_t quantised(float value) noexcept {
 // Four bytes as four floats, by two interleavings with zeros: compilers make single instructions of these, but not of a
 // conversion of four bytes.
 Float4 widened(const void* bytes) noexcept {
-  typedef std::uint8_t Bytes16 __attribute__((vector_size(16)));
-  typedef std::uint16_t Shorts8 __attribute__((vector_size(16)));
-  typedef std::int32_t Ints4 __attribute__((vector_size(16)));
+  using Bytes16 __attribute__((vector_size(16))) = std::uint8_t;
+  using Shorts8 __attribute__((vector_size(16))) = std::uint16_t;
+  using Ints4 __attribute__((vector_size(16))) = std::int32_t;
   static_assert(std::endian::native == std::endian::little);
   std::int32_t word = 0;
   std::memcpy(&word, bytes, sizeof word);

@@ -13,7 +13,7 @@
 namespace perimap {
 
 // Four numbers that are computed with together: albedo and the three of the bump.
-typedef float Float4 __attribute__((vector_size(16)));
+using Float4 __attribute__((vector_size(16))) = float;
 
 class TissueTexture {
  public:

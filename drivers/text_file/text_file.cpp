@@ -4,8 +4,8 @@
 
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <memory>
+#include <system_error>
 
 #include "core/error/one_line.hpp"
 
@@ -13,8 +13,8 @@ namespace perimap {
 
 Expected<std::string> read_text_file(const std::filesystem::path& file, std::size_t largest, std::string_view what) {
   const auto refuse = [&](int error) {
-    return fail(
-        on_one_line(fmt::format("{}: expected a readable {}, got: {}", file.string(), what, std::strerror(error))));
+    return fail(on_one_line(fmt::format("{}: expected a readable {}, got: {}", file.string(), what,
+                                        std::generic_category().message(error))));
   };
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
   if (!stream) return refuse(errno);

@@ -1,5 +1,5 @@
-/* A subscriber in plain C that knows perimap by its IDL file alone (perimap.h is what idlc makes of perimap.idl), and by
- * the topic's name. Counts the gaps in the sequence numbers.
+/* A subscriber in plain C that knows perimap by its IDL file alone (perimap.h is what idlc makes of perimap.idl), and
+ * by the topic's name. Counts the gaps in the sequence numbers.
  *
  *   c_subscriber DOMAIN SAMPLES
  *
