@@ -9,7 +9,9 @@
 #include "daemon/commands/simulate.hpp"
 #include "daemon/commands/watch.hpp"
 
-int main(int argc, char** argv) {
+namespace {
+
+int run(int argc, char** argv) {
   CLI::App app("Companion of perimapd, which predicts where a beating organ's surface will be.");
   app.set_version_flag("--version", "perimap " PERIMAP_VERSION);
   app.require_subcommand(1);
@@ -26,9 +28,17 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
   } catch (const std::exception& error) {
     (void)std::fprintf(stderr, "perimap: %s\n", error.what());
     return 1;
   }
-  return exit_code;
 }

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <exception>
 #include <memory>
 #include <string>
 
@@ -73,10 +74,7 @@ int run(const std::string& configuration_file) {
   return kOk;
 }
 
-}  // namespace
-}  // namespace perimap
-
-int main(int argc, char** argv) {
+int parse_and_run(int argc, char** argv) {
   CLI::App app{
       "Maps a beating organ and publishes its predicted surface over DDS at a fixed latency.\n"
       "Research software, not a certified medical device.",
@@ -87,7 +85,19 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : perimap::kWrongConfiguration;
+    return app.exit(error) == 0 ? kOk : kWrongConfiguration;
   }
-  return perimap::run(configuration_file);
+  return run(configuration_file);
+}
+
+}  // namespace
+}  // namespace perimap
+
+int main(int argc, char** argv) {
+  try {
+    return perimap::parse_and_run(argc, argv);
+  } catch (const std::exception& error) {
+    (void)std::fprintf(stderr, "perimapd: %s\n", error.what());
+    return 1;
+  }
 }

@@ -31,7 +31,7 @@ WarpedTemplate warp_template(const PatchTemplate::Level& level, const Matrix2d& 
   warped.stride = level.stride;
   const Matrix2d back = A.inverse();
   const int half = level.half();
-  std::array<double, kMaxSide * kStride> grey;
+  std::array<double, kMaxSide * kStride> grey{};
   double sum = 0;
   for (int y = 0; y < level.side; ++y) {
     for (int x = 0; x < level.side; ++x) {
@@ -146,8 +146,8 @@ SearchResult search_peaks(const GreyImage& image, const PatchTemplate::Level& le
   }
 
   constexpr double kNotLooked = -2;
-  std::array<double, kWidth * kWidth> correlation;
-  std::array<double, kWidth * kWidth> price;
+  std::array<double, kWidth * kWidth> correlation{};
+  std::array<double, kWidth * kWidth> price{};
   correlation.fill(kNotLooked);
   const auto index = [](int du, int dv) {
     return static_cast<std::size_t>((dv + kMaxSearchRadius) * kWidth + du + kMaxSearchRadius);

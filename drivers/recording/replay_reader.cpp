@@ -107,10 +107,9 @@ void shift(ReplayEvent& event, Duration offset) noexcept {
   } else if (auto* pose = std::get_if<TrackerSample>(&event)) {
     pose->source_time += offset;
     pose->arrival += offset;
-  } else {
-    auto& ecg = std::get<EcgBlock>(event);
-    ecg.first_sample_time += offset;
-    ecg.arrival += offset;
+  } else if (auto* ecg = std::get_if<EcgBlock>(&event)) {
+    ecg->first_sample_time += offset;
+    ecg->arrival += offset;
   }
 }
 

@@ -55,9 +55,10 @@ std::optional<SurfacePoint> GroundTruth::first_hit(const Pose& X_WC, const Vecto
 Vector3d GroundTruth::position(const SurfacePoint& point, Instant t) const {
   const auto basis = fourier_basis(phase(t).phase_rad, mesh_.harmonics);
   Vector3d p = respiration_displacement(motion_, t);
-  for (std::size_t corner = 0; corner < 3; ++corner)
+  for (std::size_t corner = 0; corner < 3; ++corner) {
     p += point.barycentric[corner] *
          vertex_position(mesh_, basis, mesh_.triangles[3 * std::size_t{point.triangle} + corner]);
+  }
   return p;
 }
 

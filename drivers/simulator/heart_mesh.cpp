@@ -49,16 +49,19 @@ HeartMesh transformed(const Pose& X_AB, HeartMesh mesh_B) {
 
 Expected<void> check(const HeartMesh& mesh) {
   const std::size_t expected = std::size_t{mesh.vertex_count} * 3 * mesh.coefficients_per_axis();
-  if (mesh.coefficients_mm.size() != expected)
+  if (mesh.coefficients_mm.size() != expected) {
     return fail("heart mesh: " + std::to_string(mesh.vertex_count) + " vertices with " +
                 std::to_string(mesh.harmonics) + " harmonics need " + std::to_string(expected) +
                 " coefficients, found " + std::to_string(mesh.coefficients_mm.size()));
+  }
   if (mesh.triangles.empty() || mesh.triangles.size() % 3 != 0)
     return fail("heart mesh: " + std::to_string(mesh.triangles.size()) + " triangle indices, expected a multiple of 3");
-  for (const std::uint32_t vertex : mesh.triangles)
-    if (vertex >= mesh.vertex_count)
+  for (const std::uint32_t vertex : mesh.triangles) {
+    if (vertex >= mesh.vertex_count) {
       return fail("heart mesh: triangle index " + std::to_string(vertex) + " is not below the vertex count " +
                   std::to_string(mesh.vertex_count));
+    }
+  }
   for (const double coefficient : mesh.coefficients_mm)
     if (!std::isfinite(coefficient)) return fail("heart mesh: a coefficient is not finite");
   return {};

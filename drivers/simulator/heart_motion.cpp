@@ -42,9 +42,10 @@ MotionPhase even(double time, double time_0, double time_1, double phase_0, doub
 
 Expected<void> check(const HeartMotion& motion) {
   if (motion.r_peaks.size() < 2) return fail("heart motion: fewer than two R peaks");
-  for (std::size_t i = 1; i < motion.r_peaks.size(); ++i)
+  for (std::size_t i = 1; i < motion.r_peaks.size(); ++i) {
     if (motion.r_peaks[i] <= motion.r_peaks[i - 1])
       return fail("heart motion: R peak " + std::to_string(i) + " does not come after the one before");
+  }
   const auto inside = [](double value, double low, double high) { return value > low && value < high; };
   switch (motion.law) {
     case MotionLaw::kLinear:

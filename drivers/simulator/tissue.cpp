@@ -9,12 +9,12 @@ namespace {
 using Eigen::Vector3f;
 
 constexpr std::uint32_t lattice_hash(int x, int y, int z, std::uint32_t seed) noexcept {
-  std::uint32_t h = seed ^ (static_cast<std::uint32_t>(x) * 0x8da6b343u) ^
-                    (static_cast<std::uint32_t>(y) * 0xd8163841u) ^ (static_cast<std::uint32_t>(z) * 0xcb1ab31fu);
+  std::uint32_t h = seed ^ (static_cast<std::uint32_t>(x) * 0x8da6b343U) ^
+                    (static_cast<std::uint32_t>(y) * 0xd8163841U) ^ (static_cast<std::uint32_t>(z) * 0xcb1ab31fU);
   h ^= h >> 16;
-  h *= 0x7feb352du;
+  h *= 0x7feb352dU;
   h ^= h >> 15;
-  h *= 0x846ca68bu;
+  h *= 0x846ca68bU;
   return h ^ (h >> 16);
 }
 
@@ -55,7 +55,7 @@ NoiseSample noise_with_slope(const Vector3f& p, std::uint32_t seed) noexcept {
   NoiseSample sample{0.0F, Vector3f::Zero()};
   for (int corner = 0; corner < 8; ++corner) {
     const int d[3] = {corner & 1, (corner >> 1) & 1, corner >> 2};
-    const float* g = kGradients[lattice_hash(cell[0] + d[0], cell[1] + d[1], cell[2] + d[2], seed) & 15u];
+    const float* g = kGradients[lattice_hash(cell[0] + d[0], cell[1] + d[1], cell[2] + d[2], seed) & 15U];
     const float value = g[0] * (offset[0] - static_cast<float>(d[0])) + g[1] * (offset[1] - static_cast<float>(d[1])) +
                         g[2] * (offset[2] - static_cast<float>(d[2]));
     const float w[3] = {weight[0][d[0]], weight[1][d[1]], weight[2][d[2]]};
@@ -89,15 +89,17 @@ float cell_distance(const Vector3f& p, std::uint32_t seed) noexcept {
   const int iy = floor_to_int(p.y());
   const int iz = floor_to_int(p.z());
   float nearest = 1e9F;
-  for (int dz = -1; dz <= 1; ++dz)
-    for (int dy = -1; dy <= 1; ++dy)
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
         const std::uint32_t h = lattice_hash(ix + dx, iy + dy, iz + dz, seed);
-        const auto fraction = [h](int shift) { return static_cast<float>((h >> shift) & 1023u) / 1024.0F; };
+        const auto fraction = [h](int shift) { return static_cast<float>((h >> shift) & 1023U) / 1024.0F; };
         const Vector3f point(static_cast<float>(ix + dx) + fraction(0), static_cast<float>(iy + dy) + fraction(10),
                              static_cast<float>(iz + dz) + fraction(20));
         nearest = std::min(nearest, (point - p).squaredNorm());
       }
+    }
+  }
   return std::sqrt(nearest);
 }
 

@@ -74,7 +74,7 @@ TissueTexture::TissueTexture(std::span<const Vector3d> material_mm, std::span<co
       const int y_1 = std::min(last_row, static_cast<int>(std::floor(std::max({a.y(), b.y(), c.y()}))));
       const int x_0 = std::max(0, static_cast<int>(std::ceil(std::min({a.x(), b.x(), c.x()}))));
       const int x_1 = std::min(size - 1, static_cast<int>(std::floor(std::max({a.x(), b.x(), c.x()}))));
-      for (int row = y_0; row <= y_1; ++row)
+      for (int row = y_0; row <= y_1; ++row) {
         for (int column = x_0; column <= x_1; ++column) {
           const std::size_t texel = static_cast<std::size_t>(row) * size + column;
           if (covered[texel] != 0) continue;
@@ -91,6 +91,7 @@ TissueTexture::TissueTexture(std::span<const Vector3d> material_mm, std::span<co
           for (int i = 0; i < 3; ++i) out.value[i + 1] = quantised(tissue.bump[i] / (2.0F * kBumpRange) + 0.5F);
           covered[texel] = 1;
         }
+      }
     }
   });
 
@@ -102,7 +103,7 @@ TissueTexture::TissueTexture(std::span<const Vector3d> material_mm, std::span<co
     Level coarse{fine.size / 2, {}};
     coarse.texels.resize(static_cast<std::size_t>(coarse.size) * coarse.size);
     std::vector<std::uint8_t> coarse_covered(coarse.texels.size(), 0);
-    for (int row = 0; row < coarse.size; ++row)
+    for (int row = 0; row < coarse.size; ++row) {
       for (int column = 0; column < coarse.size; ++column) {
         int sum[4] = {};
         int count = 0;
@@ -118,6 +119,7 @@ TissueTexture::TissueTexture(std::span<const Vector3d> material_mm, std::span<co
         for (int channel = 0; channel < 4; ++channel)
           coarse.texels[to].value[channel] = static_cast<std::uint8_t>((sum[channel] + count / 2) / count);
       }
+    }
     levels_.push_back(std::move(coarse));
     coverage.push_back(std::move(coarse_covered));
   }
@@ -125,12 +127,13 @@ TissueTexture::TissueTexture(std::span<const Vector3d> material_mm, std::span<co
   for (std::size_t level = levels_.size() - 1; level-- > 0;) {
     Level& fine = levels_[level];
     const Level& coarse = levels_[level + 1];
-    for (int row = 0; row < fine.size; ++row)
+    for (int row = 0; row < fine.size; ++row) {
       for (int column = 0; column < fine.size; ++column) {
         const std::size_t to = static_cast<std::size_t>(row) * fine.size + column;
         if (coverage[level][to] == 0)
           fine.texels[to] = coarse.texels[static_cast<std::size_t>(row / 2) * coarse.size + column / 2];
       }
+    }
   }
 }
 
@@ -156,7 +159,7 @@ Float4 TissueTexture::at(float u, float v, float level) const noexcept {
   const float between = bounded - static_cast<float>(fine);
   // A texel of level n covers 2^n of level 0, so its centre lies (2^n - 1) / 2 from its first one's.
   const auto in_level = [&](std::size_t n) {
-    const float scale = 1.0F / static_cast<float>(1u << n);
+    const float scale = 1.0F / static_cast<float>(1U << n);
     return bilinear(levels_[n], (u + 0.5F) * scale - 0.5F, (v + 0.5F) * scale - 0.5F);
   };
   Float4 value = in_level(fine);
