@@ -230,9 +230,10 @@ TEST_P(GoldenRun, UpdatesFromOneRay) {
     settings.max_iterations = expected["iterations"].is_string() ? kUntilConverged : expected["iterations"].get<int>();
     // At the same update the minimum that Levenberg-Marquardt descends to is the camera's centre, where a bearing is
     // undefined and its Jacobian infinite. How near a program comes there before rounding stops it is its own affair,
-    // and later updates carry that on.
+    // and later updates carry that on: the next vector after it is met loosely, and the rest from that vector itself.
     const bool singular = lm && run["model"] == "bearing";
     constexpr std::size_t kSingularUpdate = 21;
+    bool past_singular = false;
     FeatureEstimate estimate;
     estimate.x = vector_of(run["x0"]);
     estimate.P = MatrixXd(vector_of(run["P0_diag"]).asDiagonal());
@@ -243,7 +244,11 @@ TEST_P(GoldenRun, UpdatesFromOneRay) {
         const std::string after = std::to_string(k + 1);
         if (!expected["after"].contains(after)) continue;
         SCOPED_TRACE("after " + after);
-        expect_estimate(estimate, expected["after"][after], singular && k >= kSingularUpdate ? 1e-5 : kTolerance);
+        const json& vector = expected["after"][after];
+        const bool loose = singular && !past_singular && k >= kSingularUpdate;
+        expect_estimate(estimate, vector, loose ? 1e-5 : kTolerance);
+        if (loose) estimate = {vector_of(vector["x"]), MatrixXd(matrix_of(vector["P"]))};
+        past_singular = past_singular || loose;
         ++checked;
       }
     });
