@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/kannala_brandt.hpp"
+
 namespace perimap {
 namespace {
 
@@ -54,10 +56,21 @@ bool folded_back(const CameraModel& camera, double r2, const Matrix2d& J) noexce
   return !(J.determinant() > 0.0) || !grows_up_to(camera, r2);
 }
 
+KannalaBrandt fisheye_of(const CameraModel& camera) noexcept { return {camera.k1, camera.k2, camera.k3, camera.k4}; }
+
 }  // namespace
 
 ProjectionStatus CameraModel::project(const Vector3d& p_C, Vector2d& px, Matrix23d* dpx_dp) const noexcept {
   if (!p_C.allFinite()) return ProjectionStatus::kNotFinite;
+  if (lens == Lens::kKannalaBrandt) {
+    if (p_C.norm() < kMinDepth) return ProjectionStatus::kBehindCamera;
+    Vector2d m;
+    Matrix23d dm_dp;
+    if (!fisheye_of(*this).distort(p_C, m, dm_dp)) return ProjectionStatus::kFoldedBack;
+    px << fx * m.x() + cx, fy * m.y() + cy;
+    if (dpx_dp != nullptr) *dpx_dp << fx * dm_dp.row(0), fy * dm_dp.row(1);
+    return ProjectionStatus::kOk;
+  }
   if (p_C.z() < kMinDepth) return ProjectionStatus::kBehindCamera;
   const double inverse_depth = 1.0 / p_C.z();
   const double x = p_C.x() * inverse_depth;
@@ -78,6 +91,7 @@ ProjectionStatus CameraModel::project(const Vector3d& p_C, Vector2d& px, Matrix2
 bool CameraModel::unproject(const Vector2d& px, Vector3d& ray_C) const noexcept {
   const Vector2d target((px.x() - cx) / fx, (px.y() - cy) / fy);
   if (!target.allFinite()) return false;
+  if (lens == Lens::kKannalaBrandt) return fisheye_of(*this).undistort(target, ray_C);
   // The centre is never folded, and from there a damped Newton iteration that keeps to the unfolded side and always
   // comes nearer reaches the one solution there, when there is one.
   constexpr int kMaxIterations = 50;

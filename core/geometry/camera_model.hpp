@@ -1,5 +1,6 @@
-// Pinhole camera with Brown-Conrady distortion, in OpenCV's convention (camera_matrix, distortion_coefficients k1 k2 p1
-// p2 k3; "Camera Calibration and 3D Reconstruction" of the OpenCV manual). Pixel centres have integer coordinates.
+// A calibrated camera in OpenCV's convention: pinhole with Brown-Conrady distortion (camera_matrix,
+// distortion_coefficients k1 k2 p1 p2 k3; "Camera Calibration and 3D Reconstruction" of the OpenCV manual) or
+// Kannala-Brandt fisheye (cv::fisheye, k1 k2 k3 k4). Pixel centres have integer coordinates.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,9 +12,11 @@ namespace perimap {
 
 using Matrix23d = Eigen::Matrix<double, 2, 3>;
 
+enum class Lens : std::uint8_t { kBrownConrady, kKannalaBrandt };
+
 enum class ProjectionStatus : std::uint8_t {
   kOk,
-  kBehindCamera,  // not in front of the projection centre
+  kBehindCamera,  // not in front of the projection centre; a fisheye may see there
   kFoldedBack,    // beyond the radius where the distortion polynomial turns back: no such image point exists
   kNotFinite,     // NaN or infinity came in, or the direction is undefined
 };
@@ -27,9 +30,11 @@ struct CameraModel {
   double cy = 0.0;
   double k1 = 0.0;  // radial
   double k2 = 0.0;
-  double p1 = 0.0;  // tangential
+  double p1 = 0.0;  // tangential; not with a fisheye
   double p2 = 0.0;
   double k3 = 0.0;
+  double k4 = 0.0;  // with a fisheye alone
+  Lens lens = Lens::kBrownConrady;
 
   // Pixel px of a point p_C (mm, frame C) and, when asked for, d px / d p_C (2x3, px/mm). Points outside the image are
   // projected too. px and the Jacobian are only written when the status is kOk.

@@ -60,6 +60,16 @@ class Calibration {
                     fmt::format("{} and {}", camera.fx, camera.fy));
     }
 
+    const Expected<Lens> lens = lens_of("distortion_model");
+    if (!lens) {
+      return tl::unexpected(lens.error());
+    }
+    camera.lens = *lens;
+    return camera.lens == Lens::kKannalaBrandt ? with_fisheye_distortion(camera) : with_distortion(camera);
+  }
+
+ private:
+  Expected<CameraModel> with_distortion(CameraModel camera) const {
     constexpr Shape kDistortion[] = {{1, 4}, {4, 1},  {1, 5},  {5, 1},  {1, 8},
                                      {8, 1}, {1, 12}, {12, 1}, {1, 14}, {14, 1}};
     const Expected<std::vector<double>> distortion =
@@ -82,7 +92,36 @@ class Calibration {
     return camera;
   }
 
- private:
+  Expected<CameraModel> with_fisheye_distortion(CameraModel camera) const {
+    constexpr Shape kDistortion[] = {{1, 4}, {4, 1}};
+    const Expected<std::vector<double>> distortion =
+        numbers("distortion_coefficients", "4 numbers in a row or column (k1 k2 k3 k4 of a fisheye)", kDistortion);
+    if (!distortion) {
+      return tl::unexpected(distortion.error());
+    }
+    camera.k1 = (*distortion)[0];
+    camera.k2 = (*distortion)[1];
+    camera.k3 = (*distortion)[2];
+    camera.k4 = (*distortion)[3];
+    return camera;
+  }
+
+  // OpenCV's files do not name the model; calibrators that do use the names of ROS (sensor_msgs/distortion_models.h).
+  Expected<Lens> lens_of(const char* key) const {
+    const YAML::Node node = root_[key];
+    if (!node.IsDefined()) {
+      return Lens::kBrownConrady;
+    }
+    const std::string name = node.IsScalar() ? node.Scalar() : "something else";
+    if (name == "plumb_bob" || name == "rational_polynomial") {
+      return Lens::kBrownConrady;
+    }
+    if (name == "equidistant" || name == "fisheye") {
+      return Lens::kKannalaBrandt;
+    }
+    return refuse(key, "plumb_bob, rational_polynomial, equidistant or fisheye", name);
+  }
+
   tl::unexpected<Error> refuse(std::string_view key, std::string_view expected, std::string_view got) const {
     return fail(on_one_line(fmt::format("{}: key '{}': expected {}, got {}", name_, key, expected, got)));
   }
@@ -173,9 +212,12 @@ std::string format_calibration(const CameraModel& camera) {
     return fmt::format("{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: [ {} ]\n", key, rows, columns,
                        fmt::join(values, ", "));
   };
-  return fmt::format("%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n", camera.width, camera.height) +
+  const bool fisheye = camera.lens == Lens::kKannalaBrandt;
+  return fmt::format("%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\ndistortion_model: {}\n", camera.width,
+                     camera.height, fisheye ? "equidistant" : "plumb_bob") +
          matrix("camera_matrix", 3, 3, {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1}) +
-         matrix("distortion_coefficients", 1, 5, {camera.k1, camera.k2, camera.p1, camera.p2, camera.k3});
+         (fisheye ? matrix("distortion_coefficients", 1, 4, {camera.k1, camera.k2, camera.k3, camera.k4})
+                  : matrix("distortion_coefficients", 1, 5, {camera.k1, camera.k2, camera.p1, camera.p2, camera.k3}));
 }
 
 Expected<void> write_calibration(const std::filesystem::path& file, const CameraModel& camera) {

@@ -115,6 +115,29 @@ TEST(CalibrationFile, LongerDistortionIsAcceptedOnlyWithZeros) {
             "number 7");
 }
 
+TEST(CalibrationFile, AFisheyeIsToldByItsModelsName) {
+  const std::string fisheye = with(with(with(kYaml, "rows: 5", "rows: 4"), "[ -0.25, 0.0625, 1.0e-3, -2.0e-3, 0.01 ]",
+                                        "[ 0.1, -0.02, 0.003, -4e-4 ]"),
+                                   "avg_reprojection_error: 0.2", "distortion_model: equidistant");
+  const Expected<CameraModel> camera = parse_calibration(fisheye, "cam.yaml");
+  ASSERT_TRUE(camera) << camera.error().message;
+  EXPECT_EQ(camera->lens, Lens::kKannalaBrandt);
+  EXPECT_EQ(camera->k1, 0.1);
+  EXPECT_EQ(camera->k2, -0.02);
+  EXPECT_EQ(camera->k3, 0.003);
+  EXPECT_EQ(camera->k4, -4e-4);
+  EXPECT_EQ(camera->p1, 0.0);
+  const Expected<CameraModel> again = parse_calibration(format_calibration(*camera), "again");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->lens, Lens::kKannalaBrandt);
+  EXPECT_EQ(again->k4, camera->k4);
+  EXPECT_THAT(error_of(with(fisheye, "equidistant", "cylinder")),
+              "cam.yaml: key 'distortion_model': expected plumb_bob, rational_polynomial, equidistant or fisheye, got "
+              "cylinder");
+  EXPECT_THAT(error_of(with(kYaml, "avg_reprojection_error: 0.2", "distortion_model: fisheye")),
+              StartsWith("cam.yaml: key 'distortion_coefficients': expected 4 numbers"));
+}
+
 TEST(CalibrationFile, AMissingFileIsNamed) {
   const Expected<CameraModel> result = read_calibration("/nowhere/cam.yaml");
   ASSERT_FALSE(result);

@@ -153,5 +153,95 @@ TEST(CameraModel, KnowsItsSensor) {
   EXPECT_FALSE(kBarrel.contains({639.6, 10.0}));
 }
 
+// Wide lenses with k1 of either sign; none folds back before 100 degrees.
+CameraModel fisheye(double k1, double k2, double k3, double k4) {
+  CameraModel camera{.width = 800, .height = 800, .fx = 300.0, .fy = 305.0, .cx = 400.0, .cy = 390.0};
+  camera.lens = Lens::kKannalaBrandt;
+  camera.k1 = k1;
+  camera.k2 = k2;
+  camera.k3 = k3;
+  camera.k4 = k4;
+  return camera;
+}
+const CameraModel kFisheyes[] = {fisheye(0.0, 0.0, 0.0, 0.0), fisheye(-0.06, -0.008, 0.002, -0.0003),
+                                 fisheye(0.05, 0.01, -0.004, 0.0008)};
+
+// Directions up to `most_rad` from the axis, on it and very near it included.
+std::vector<Vector3d> directions(double most_rad) {
+  std::vector<Vector3d> all = {{0.0, 0.0, 1.0}, {1e-9, 0.0, 1.0}, {-3e-5, 2e-5, 1.0}, {1e-4, -1e-4, 1.0}};
+  std::mt19937 generator(3);
+  std::uniform_real_distribution<double> u(0.0, 1.0);
+  for (int i = 0; i < 200; ++i) {
+    const double theta = most_rad * u(generator);
+    const double azimuth = 6.28 * u(generator);
+    all.emplace_back(std::sin(theta) * std::cos(azimuth), std::sin(theta) * std::sin(azimuth), std::cos(theta));
+  }
+  return all;
+}
+
+TEST(FisheyeCamera, ProjectsAsOpenCvDoes) {
+  for (const CameraModel& camera : kFisheyes) {
+    const cv::Vec4d coefficients(camera.k1, camera.k2, camera.k3, camera.k4);
+    for (const Vector3d& ray : directions(1.5)) {
+      const Vector3d p = 70.0 * ray;
+      Vector2d px;
+      ASSERT_EQ(camera.project(p, px), ProjectionStatus::kOk);
+      std::vector<cv::Point2d> expected;
+      cv::fisheye::projectPoints(std::vector<cv::Point3d>{{p.x(), p.y(), p.z()}}, expected, cv::Vec3d(0, 0, 0),
+                                 cv::Vec3d(0, 0, 0), matrix_of(camera), coefficients);
+      EXPECT_NEAR(px.x(), expected[0].x, 1e-9);
+      EXPECT_NEAR(px.y(), expected[0].y, 1e-9);
+    }
+  }
+}
+
+TEST(FisheyeCamera, JacobianIsTheDerivativeOnTheAxisAndBehindTheCameraToo) {
+  for (const CameraModel& camera : kFisheyes) {
+    for (const Vector3d& ray : directions(1.7)) {
+      const Vector3d p = 70.0 * ray;
+      Vector2d px;
+      Matrix23d J;
+      ASSERT_EQ(camera.project(p, px, &J), ProjectionStatus::kOk);
+      for (int k = 0; k < 3; ++k) {
+        constexpr double kStep_mm = 1e-3;
+        Vector2d plus;
+        Vector2d minus;
+        ASSERT_EQ(camera.project(p + kStep_mm * Vector3d::Unit(k), plus), ProjectionStatus::kOk);
+        ASSERT_EQ(camera.project(p - kStep_mm * Vector3d::Unit(k), minus), ProjectionStatus::kOk);
+        EXPECT_LT((J.col(k) - (plus - minus) / (2.0 * kStep_mm)).norm(), 1e-7 * camera.fx) << ray.transpose();
+      }
+    }
+  }
+}
+
+TEST(FisheyeCamera, UnprojectUndoesProject) {
+  for (const CameraModel& camera : kFisheyes) {
+    for (const Vector3d& direction : directions(1.7)) {
+      Vector2d px;
+      Vector3d ray;
+      ASSERT_EQ(camera.project(40.0 * direction, px), ProjectionStatus::kOk);
+      ASSERT_TRUE(camera.unproject(px, ray));
+      EXPECT_LT((ray - direction.normalized()).norm(), 1e-10);
+      EXPECT_NEAR(ray.norm(), 1.0, 1e-14);
+    }
+  }
+}
+
+TEST(FisheyeCamera, SaysWhereTheImageEnds) {
+  const CameraModel camera = fisheye(-0.1, 0.0, 0.0, 0.0);  // theta - 0.1 theta^3 turns back at sqrt(1 / 0.3) = 1.826
+  Vector2d px(1.0, 2.0);
+  Vector3d ray(1.0, 2.0, 3.0);
+  EXPECT_EQ(camera.project({std::sin(1.80), 0.0, std::cos(1.80)}, px), ProjectionStatus::kOk);
+  px = {1.0, 2.0};
+  EXPECT_EQ(camera.project({std::sin(1.84), 0.0, std::cos(1.84)}, px), ProjectionStatus::kFoldedBack);
+  EXPECT_EQ(camera.project({0.0, 0.0, 0.0}, px), ProjectionStatus::kBehindCamera);
+  EXPECT_EQ(camera.project({0.0, std::numeric_limits<double>::quiet_NaN(), 1.0}, px), ProjectionStatus::kNotFinite);
+  EXPECT_EQ(px, Vector2d(1.0, 2.0)) << "untouched on failure";
+  EXPECT_TRUE(camera.unproject({camera.cx + 1.21 * camera.fx, camera.cy}, ray));  // the largest is 1.2172
+  ray = {1.0, 2.0, 3.0};
+  EXPECT_FALSE(camera.unproject({camera.cx + 1.22 * camera.fx, camera.cy}, ray));
+  EXPECT_EQ(ray, Vector3d(1.0, 2.0, 3.0)) << "untouched on failure";
+}
+
 }  // namespace
 }  // namespace perimap

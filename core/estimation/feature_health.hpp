@@ -1,0 +1,67 @@
+// What to do about a feature whose filter does not explain what it sees.
+//
+// Two statistics of its normalised innovations squared (NIS) are followed. A slow one, over accepted updates alone,
+// tells drift: the motion changes little by little (amplitude, heart rate, posture), the filter with its small
+// covariance lags behind. Then process noise is turned on by steps and, after a long calm, off by steps: 0 while
+// consistent, because without drift noise of .01 mm/sqrt(s) doubles the error. A fast one, over all updates with
+// refused ones counted as outliers, tells that something is wrong altogether (a jump, another point followed, a wrong
+// phase): the covariance is inflated once, and when that does not help the feature is to be started anew.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/estimation/innovation_monitor.hpp"
+
+namespace perimap {
+
+struct FeatureHealthSettings {
+  InnovationMonitorSettings fast;
+  InnovationMonitorSettings slow = {
+      .memory_updates = 150.0, .enough_updates = 100, .consistent_below = 1.25, .high_above = 1.6};
+  // Random walk of each coefficient, divided by its harmonic's number (mm/sqrt(s)).
+  std::array<double, 3> process_noise = {0.0, 0.01, 0.03};
+  int updates_before_more = 150;     // process noise, after its last change
+  int updates_before_less = 900;     // half a minute at 30 frames/s
+  double calm_below = 1.1;           // mean NIS/2 of the slow statistic
+  int updates_after_inflation = 60;  // the time that inflation gets to help
+};
+
+enum class HealthState : std::uint8_t {
+  kUndecided,  // too few updates yet
+  kConsistent,
+  kDrifting,      // process noise is on
+  kInconsistent,  // innovations are high; the covariance has been inflated
+  kFailed         // inflation has not helped
+};
+
+enum class HealthAction : std::uint8_t { kNone, kInflate, kStartAnew };
+
+class FeatureHealth {
+ public:
+  explicit FeatureHealth(const FeatureHealthSettings& settings = {}) noexcept;
+
+  // After each update: its NIS and whether it was accepted. The caller carries the action out; kStartAnew comes once.
+  [[nodiscard]] HealthAction add(double nis, bool accepted) noexcept;
+  // After a new start.
+  void reset() noexcept;
+
+  [[nodiscard]] HealthState state() const noexcept;
+  // Of each coefficient of the first harmonic and the mean, to be divided by the harmonic's number (mm/sqrt(s)).
+  [[nodiscard]] double process_noise() const noexcept { return settings_.process_noise[level_]; }
+  // Of all updates: what the filter's consistency is judged by.
+  [[nodiscard]] const InnovationMonitor& monitor() const noexcept { return fast_; }
+
+ private:
+  void set_level(std::size_t level) noexcept;
+
+  FeatureHealthSettings settings_;
+  InnovationMonitor fast_;
+  InnovationMonitor slow_;
+  std::size_t level_ = 0;
+  int since_change_ = 0;      // updates since the level last changed
+  int since_inflation_ = -1;  // updates since the covariance was inflated; -1: it was not
+  bool failed_ = false;
+};
+
+}  // namespace perimap
