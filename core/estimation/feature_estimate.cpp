@@ -50,6 +50,13 @@ Basis prior_deviations(const BasisLayout& layout, const Prior& prior) noexcept {
   return deviations;
 }
 
+void diffuse(FeatureEstimate& estimate, const BasisLayout& layout, double deviation_mm) noexcept {
+  constexpr Prior kUnit{.dc_mm = 1.0, .cardiac_mm = 1.0, .respiratory_mm = 1.0, .decay = 1.0};
+  const Basis variances = (deviation_mm * prior_deviations(layout, kUnit)).cwiseAbs2();
+  const Eigen::Index n = variances.size();
+  for (Eigen::Index axis = 0; axis < 3; ++axis) estimate.P.diagonal().segment(axis * n, n) += variances;
+}
+
 FeatureEstimate prior_estimate(const BasisLayout& layout, const Prior& prior, const Vector3d& p_WF) noexcept {
   const int n = layout.size();
   const Basis deviations = prior_deviations(layout, prior);

@@ -23,6 +23,10 @@ struct FeatureEstimate {
   [[nodiscard]] Matrix3d position_covariance(const Basis& b) const noexcept;
 };
 
+// Adds the variance of a random walk: independent steps of `deviation_mm` / k of both coefficients of harmonic k on
+// each axis, k = 1 for the mean. For process noise (deviation = noise density * sqrt(time)) and for inflation.
+void diffuse(FeatureEstimate& estimate, const BasisLayout& layout, double deviation_mm) noexcept;
+
 // The largest standard deviation of the position in any direction (mm) over `phases` equal steps of the cardiac cycle
 // and, where the layout has respiration, as many of the respiratory one. The layout must be the estimate's.
 [[nodiscard]] double largest_deviation_mm(const FeatureEstimate& estimate, const BasisLayout& layout,

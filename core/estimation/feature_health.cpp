@@ -10,6 +10,7 @@ FeatureHealth::FeatureHealth(const FeatureHealthSettings& settings) noexcept
 void FeatureHealth::reset() noexcept {
   fast_.reset();
   set_level(0);
+  high_in_a_row_ = 0;
   since_inflation_ = -1;
   failed_ = false;
 }
@@ -28,9 +29,12 @@ HealthAction FeatureHealth::add(double nis, bool accepted) noexcept {
   if (since_inflation_ >= 0) since_inflation_ = std::min(since_inflation_ + 1, kCountLimit);
 
   const std::size_t most = settings_.process_noise.size() - 1;
+  high_in_a_row_ = fast_.high() ? std::min(high_in_a_row_ + 1, kCountLimit) : 0;
   if (fast_.high()) {
+    if (high_in_a_row_ < settings_.updates_before_inflation) return HealthAction::kNone;
     if (since_inflation_ < 0) {
       since_inflation_ = 0;
+      high_in_a_row_ = 0;
       fast_.reset();
       set_level(most);
       return HealthAction::kInflate;

@@ -5,7 +5,8 @@
 // covariance lags behind. Then process noise is turned on by steps and, after a long calm, off by steps: 0 while
 // consistent, because without drift noise of .01 mm/sqrt(s) doubles the error. A fast one, over all updates with
 // refused ones counted as outliers, tells that something is wrong altogether (a jump, another point followed, a wrong
-// phase): the covariance is inflated once, and when that does not help the feature is to be started anew.
+// phase). When that lasts, the covariance is inflated once, and when that does not help the feature is to be started
+// anew.
 #pragma once
 
 #include <array>
@@ -21,10 +22,11 @@ struct FeatureHealthSettings {
       .memory_updates = 150.0, .enough_updates = 100, .consistent_below = 1.25, .high_above = 1.6};
   // Random walk of each coefficient, divided by its harmonic's number (mm/sqrt(s)).
   std::array<double, 3> process_noise = {0.0, 0.01, 0.03};
-  int updates_before_more = 150;     // process noise, after its last change
-  int updates_before_less = 900;     // half a minute at 30 frames/s
-  double calm_below = 1.1;           // mean NIS/2 of the slow statistic
-  int updates_after_inflation = 60;  // the time that inflation gets to help
+  int updates_before_more = 150;      // process noise, after its last change
+  int updates_before_less = 900;      // half a minute at 30 frames/s
+  double calm_below = 1.1;            // mean NIS/2 of the slow statistic
+  int updates_before_inflation = 60;  // with the fast statistic high; shorter lies an instrument passing over
+  int updates_after_inflation = 60;   // the time that inflation gets to help
 };
 
 enum class HealthState : std::uint8_t {
@@ -60,6 +62,7 @@ class FeatureHealth {
   InnovationMonitor slow_;
   std::size_t level_ = 0;
   int since_change_ = 0;      // updates since the level last changed
+  int high_in_a_row_ = 0;     // updates with the fast statistic high
   int since_inflation_ = -1;  // updates since the covariance was inflated; -1: it was not
   bool failed_ = false;
 };

@@ -101,10 +101,9 @@ bool CameraModel::unproject(const Vector2d& px, Vector3d& ray_C) const noexcept 
   double error = (target - d.m).norm();
   for (int i = 0; i < kMaxIterations && error > tolerance; ++i) {
     const Vector2d step = d.J.inverse() * (target - d.m);
-    double fraction = 1.0;
     bool nearer = false;
-    for (int halvings = 0; halvings < 20 && !nearer; ++halvings, fraction *= 0.5) {
-      const Vector2d trial = m + fraction * step;
+    for (int halvings = 0; halvings < 20 && !nearer; ++halvings) {
+      const Vector2d trial = m + std::ldexp(1.0, -halvings) * step;
       const Distorted d_trial = distort(*this, trial.x(), trial.y());
       const double trial_error = (target - d_trial.m).norm();
       nearer = trial_error < error && !folded_back(*this, trial.squaredNorm(), d_trial.J);

@@ -7,7 +7,7 @@
 
 #include "core/estimation/batch_start.hpp"
 #include "core/estimation/feature_estimate.hpp"
-#include "core/estimation/innovation_monitor.hpp"
+#include "core/estimation/feature_health.hpp"
 #include "core/estimation/observation.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/time/instant.hpp"
@@ -81,7 +81,8 @@ struct FeatureSlot {
   int failed_starts = 0;
   BatchStartExchange start;
   FeatureEstimate estimate;
-  InnovationMonitor monitor;
+  FeatureHealth health;
+  Instant last_learnt;  // capture time of the last update, for process noise
   int updates = 0;
   double largest_deviation_mm = 0.0;
   bool converged = false;

@@ -1,6 +1,7 @@
 #include "core/pipeline/feature_stages.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/periodic/periodic_motion.hpp"
 #include "core/pipeline/pose_noise.hpp"
@@ -17,6 +18,7 @@ constexpr int kRefusalsBeforeLost = 90;
 constexpr std::uint64_t kUnobservedFramesBeforeLost = 900;
 constexpr int kFailedStartsBeforeLost = 3;
 constexpr std::uint64_t kConvergenceCheckFrames = 15;
+constexpr double kInflation_mm = 1.0;
 constexpr int kUpdatesBeforeConverged = 30;  // beyond the start, so that the innovation statistic means something
 
 struct PixelPrediction {
@@ -95,7 +97,7 @@ bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& mod
 void check_convergence(FeatureSlot& slot, const EstimatorSettings& settings) noexcept {
   slot.largest_deviation_mm = largest_deviation_mm(slot.estimate, settings.layout);
   slot.converged = slot.largest_deviation_mm <= settings.converged_deviation_mm &&
-                   slot.updates >= kUpdatesBeforeConverged && slot.monitor.consistent();
+                   slot.updates >= kUpdatesBeforeConverged && slot.health.monitor().consistent();
 }
 
 // The view has turned so far that the first template fits badly: a fresh one at the place just found. Where none can be
@@ -111,6 +113,16 @@ void renew_template(FeatureSlot& slot, const ImagePyramid& pyramid) noexcept {
 LearnOutcome give_up(FeatureSlot& slot) noexcept {
   slot.state = SlotState::kEmpty;
   return LearnOutcome::kLost;
+}
+
+// The estimate explains nothing any more: gather the observations of a new start. The feature keeps its patch and its
+// id.
+LearnOutcome start_anew(FeatureSlot& slot) noexcept {
+  slot.state = SlotState::kTracked;
+  slot.held.clear();
+  slot.failed_starts = 0;
+  slot.converged = false;
+  return LearnOutcome::kStartedAnew;
 }
 
 LearnOutcome learn_tracked(FeatureSlot& slot, const FrameJob& job, const PixelModel& model,
@@ -148,7 +160,8 @@ LearnOutcome adopt_start(FeatureSlot& slot, const FrameJob& job, const PipelineS
   }
   slot.held.drop(used);
   slot.estimate = slot.start.outcome.estimate;
-  slot.monitor.reset();
+  slot.last_learnt = slot.last_observed;
+  slot.health.reset();
   slot.updates = 0;
   slot.refused_in_a_row = 0;
   slot.state = SlotState::kMapped;
@@ -175,8 +188,14 @@ void apply(FeatureSlot& slot, const HeldMatch& held, const FrameRecord& frame, c
   observation.b = frame.b;
   observation.R = measurement_covariance(held, frame, p_WF, J_p, settings.pixel_deviation_px) +
                   phase_spread * phase_spread.transpose();
+  if (slot.health.process_noise() > 0.0 && frame.stamp.capture > slot.last_learnt) {
+    const double elapsed_s = to_seconds(frame.stamp.capture - slot.last_learnt);
+    diffuse(slot.estimate, settings.layout, slot.health.process_noise() * std::sqrt(elapsed_s));
+  }
+  slot.last_learnt = frame.stamp.capture;
   const UpdateOutcome outcome = iterated_update(slot.estimate, observation, model, settings.update);
-  slot.monitor.add(outcome.normalised_innovation_squared);
+  const HealthAction action = slot.health.add(outcome.normalised_innovation_squared, outcome.accepted);
+  if (action == HealthAction::kInflate) diffuse(slot.estimate, settings.layout, kInflation_mm);
   if (!outcome.accepted) {
     ++slot.refused_in_a_row;
     return;
@@ -206,7 +225,8 @@ LearnOutcome learn_mapped(FeatureSlot& slot, const FrameJob& job, const PixelMod
   }
   // Spread over the frames by id, so that no frame pays for all features.
   if ((now + slot.id) % kConvergenceCheckFrames == 0) check_convergence(slot, settings.estimator);
-  if (slot.monitor.high()) slot.converged = false;
+  if (slot.health.state() == HealthState::kFailed) return start_anew(slot);
+  if (slot.health.state() == HealthState::kInconsistent) slot.converged = false;
   return LearnOutcome::kNothing;
 }
 
@@ -242,7 +262,7 @@ bool evaluate(const FeatureSlot& slot, const FrameJob& job, FeatureSnapshot& sna
   snapshot.first_observed = slot.first_observed;
   snapshot.first_observed_px = slot.first_observed_px;
   snapshot.largest_deviation_mm = slot.largest_deviation_mm;
-  if (slot.monitor.high()) {
+  if (slot.health.state() == HealthState::kInconsistent) {
     snapshot.state = FeatureState::kInconsistent;
     snapshot.reason = FeatureReason::kInnovationsHigh;
   } else if (!slot.converged) {

@@ -42,6 +42,7 @@ enum class LearnOutcome : std::uint8_t {
   kNothing,
   kStartRequested,  // slot.start is filled: hand it to housekeeping
   kAdoptionLate,    // the batch start was due at this frame and is not there
+  kStartedAnew,     // innovations stayed high: the observations of a new start are being gathered
   kLost             // the feature was given up; the slot is empty
 };
 

@@ -87,6 +87,7 @@ void Mapper::finish_learning() noexcept {
   Instant ended = learn_started_;
   for (WorkerTally& tally : tallies_) {
     counters_.features_lost.add(tally.lost);
+    counters_.features_started_anew.add(tally.started_anew);
     counters_.adoptions_late.add(tally.adoptions_late);
     put_off = put_off || tally.put_off;
     ended = std::max(ended, tally.ended);
@@ -103,7 +104,7 @@ void Mapper::finish_learning() noexcept {
     if (slot.state == SlotState::kTracked) ++tracked;
     if (slot.state == SlotState::kStarting) ++starting;
     if (slot.state != SlotState::kMapped) continue;
-    if (slot.monitor.high()) {
+    if (slot.health.state() == HealthState::kInconsistent) {
       ++inconsistent;
     } else if (slot.converged) {
       ++converged;
@@ -180,6 +181,9 @@ void Mapper::learn_shard(int worker) noexcept {
         break;
       case LearnOutcome::kAdoptionLate:
         ++tally.adoptions_late;
+        break;
+      case LearnOutcome::kStartedAnew:
+        ++tally.started_anew;
         break;
       case LearnOutcome::kLost:
         ++tally.lost;

@@ -58,6 +58,7 @@ class Mapper {
 
   struct alignas(64) WorkerTally {
     std::uint64_t lost = 0;
+    std::uint64_t started_anew = 0;
     std::uint64_t adoptions_late = 0;
     bool put_off = false;
     Instant ended;

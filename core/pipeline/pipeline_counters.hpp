@@ -38,6 +38,7 @@ struct PipelineCounters {
   Counter features_converged;
   Counter features_inconsistent;
   Counter features_lost;
+  Counter features_started_anew;  // inconsistent, also after inflation
   LatencyHistogram predict_and_find;
   LatencyHistogram phase_and_pose;
   LatencyHistogram evaluate;

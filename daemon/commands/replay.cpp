@@ -133,7 +133,8 @@ nlohmann::json counts(const PipelineCounters& c) {
           {"learning_put_off", c.learning_put_off.get()},
           {"adoptions_late", c.adoptions_late.get()},
           {"features_converged", c.features_converged.get()},
-          {"features_lost", c.features_lost.get()}};
+          {"features_lost", c.features_lost.get()},
+          {"features_started_anew", c.features_started_anew.get()}};
 }
 
 int refuse(const Error& error, int code) {

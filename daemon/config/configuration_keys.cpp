@@ -236,9 +236,10 @@ class Section {
 };
 
 // Reads and writes one member of a Configuration, const or not. A macro, because a member of a member has no pointer.
-// NOLINTNEXTLINE(cppcoreguidelines-macro-usage,bugprone-macro-parentheses)
+// NOLINTBEGIN(cppcoreguidelines-macro-usage,bugprone-macro-parentheses)
 #define PERIMAP_MEMBER(path) \
   [](auto& configuration) -> auto& { return configuration.path; }
+// NOLINTEND(cppcoreguidelines-macro-usage,bugprone-macro-parentheses)
 
 void add_version(std::vector<ConfigurationKey>& keys) {
   Section("", keys).add(

@@ -167,6 +167,7 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.features_converged = static_cast<std::uint32_t>(c.features_converged.get());
   wire_.features_inconsistent = static_cast<std::uint32_t>(c.features_inconsistent.get());
   wire_.features_lost = c.features_lost.get();
+  wire_.features_started_anew = c.features_started_anew.get();
 
   sources_[0] = source_status(perimap_SOURCE_CAMERA, facts, now, c.frames_received.get(), c.frames_dropped.get(), 0,
                               c.last_frame_ns, c.camera_delay);

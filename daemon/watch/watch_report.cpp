@@ -108,7 +108,8 @@ Json status_json(const StatusDigest& digest) {
                {"adoptions_late", status.adoptions_late},
                {"features_tracked", status.features_tracked},
                {"features_starting", status.features_starting},
-               {"features_lost", status.features_lost}};
+               {"features_lost", status.features_lost},
+               {"features_started_anew", status.features_started_anew}};
   Json stages = Json::object();
   for (const perimap_StageLatency& stage : digest.stages) {
     stages[std::string(name_of(stage.kind))] = {{"count", stage.count},

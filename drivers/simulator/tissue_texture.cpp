@@ -15,7 +15,7 @@ constexpr int kRowsPerBand = 32;
 constexpr float kBumpRange = 0.5F;  // stored bump: -0.5 .. 0.5
 
 std::uint8_t quantised(float value) noexcept {
-  return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 1.0F) * 255.0F + 0.5F);
+  return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * 255.0F));
 }
 
 // Four bytes as four floats, by two interleavings with zeros: compilers make single instructions of these, but not of a
@@ -52,7 +52,7 @@ TissueTexture::TissueTexture(std::span<const Vector3d> material_mm, std::span<co
     const double angle = std::acos(std::clamp(direction.dot(z), -1.0, 1.0));
     on_chart.push_back(angle < kChartRadius_rad);
     const Vector2d azimuth = Vector2d(direction.dot(x), direction.dot(y)).normalized();
-    uv_.push_back((azimuth * angle * middle / kChartRadius_rad + Vector2d::Constant(middle)).cast<float>());
+    uv_.emplace_back((azimuth * angle * middle / kChartRadius_rad + Vector2d::Constant(middle)).cast<float>());
   }
 
   // Each texel lies in one triangle of the chart, which says what point of the material it shows.

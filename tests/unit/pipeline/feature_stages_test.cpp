@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <random>
 
 namespace perimap {
 namespace {
@@ -74,6 +75,28 @@ TEST_F(Stages, ATrackedFeatureWithoutMatchesIsGivenUpSoon) {
     ASSERT_LT(++frames, 10);
   }
   EXPECT_EQ(slot->state, SlotState::kEmpty);
+}
+
+TEST_F(Stages, AMappedFeatureThatNoMotionExplainsIsStartedAnewUnderItsId) {
+  map_feature();
+  std::mt19937 generator(1);
+  std::normal_distribution<double> normal(0.0, 3.0);
+  int frames = 0;
+  int inconsistent = 0;
+  LearnOutcome outcome = LearnOutcome::kNothing;
+  while (outcome == LearnOutcome::kNothing) {
+    beat_until(5000 + 33 * static_cast<int>(history->count()));
+    next_frame();
+    found_at({320 + normal(generator), 240 + normal(generator)});
+    outcome = learn_frame();
+    inconsistent += slot->health.state() == HealthState::kInconsistent ? 1 : 0;
+    ASSERT_LT(++frames, 600);
+  }
+  EXPECT_EQ(outcome, LearnOutcome::kStartedAnew);
+  EXPECT_GT(inconsistent, 100) << "said so before";
+  EXPECT_EQ(slot->state, SlotState::kTracked);
+  EXPECT_EQ(slot->id, 1U);
+  EXPECT_EQ(slot->held.size(), 0U);
 }
 
 TEST_F(Stages, ATrackedFeatureAsksForItsStartOnceItHasEnoughMatches) {
