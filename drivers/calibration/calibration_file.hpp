@@ -1,6 +1,6 @@
 // Camera calibration files as OpenCV writes them (cv::FileStorage, YAML or JSON): camera_matrix,
-// distortion_coefficients, image_width, image_height; distortion_model tells a fisheye. Other keys are ignored. Read by yaml-cpp, because cv::FileStorage
-// crashes on damaged files (OpenCV 4.6: XML that ends in an attribute).
+// distortion_coefficients, image_width, image_height; distortion_model tells a fisheye. Other keys are ignored. Read by
+// yaml-cpp, because cv::FileStorage crashes on damaged files (OpenCV 4.6: XML that ends in an attribute).
 #pragma once
 
 #include <filesystem>

@@ -211,6 +211,7 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.features_lost);
   next.sequence(s.sources, 3, [&](auto& source) { fill(next, source); });
   next.sequence(s.stages, 2, [&](auto& stage) { fill(next, stage); });
+  next(s.features_started_anew);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -414,7 +415,8 @@ json to_json(const perimap_Status& s) {
           MEMBER(features_inconsistent),
           MEMBER(features_lost),
           MEMBER(sources),
-          MEMBER(stages)};
+          MEMBER(stages),
+          MEMBER(features_started_anew)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {
