@@ -34,4 +34,4 @@ target_compile_options(perimap_warnings INTERFACE -Wall -Wextra -Wpedantic -Wsha
   $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast> -Werror)
 # GCC 12's flow analysis reports uninitialised values inside Eigen's fixed-capacity types, at -O3 and with sanitizers, that
 # are not there.
-target_compile_options(perimap_warnings INTERFACE -Wno-maybe-uninitialized)
+target_compile_options(perimap_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)

@@ -93,8 +93,11 @@ if command -v ccache > /dev/null; then
   launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
 fi
 
-build() { # PRESET
-  step "$1 configure" 5m cmake --preset "$1" "${launcher[@]}" && step "$1 build" 40m cmake --build --preset "$1" -j "$jobs"
+build() { # PRESET BUILD_OPTION...
+  local preset=$1
+  shift
+  step "$preset configure" 5m cmake --preset "$preset" "${launcher[@]}" &&
+    step "$preset build" 40m cmake --build --preset "$preset" -j "$jobs" "$@"
 }
 
 run_tests() { # NAME PRESET CTEST_OPTION...
@@ -137,7 +140,7 @@ if build asan; then run_tests "asan tests" asan -LE long; fi
 if [ $full = yes ]; then
   if build tsan; then run_tests "tsan tests" tsan -LE long; fi
   run_tests "long tests" dev -L long
-  if build fuzz; then fuzz_smoke; fi
+  if build fuzz --target fuzzers; then fuzz_smoke; fi
   lint
 fi
 
