@@ -99,18 +99,18 @@ class BatchProblem {
         G_.row(k).setZero();
         continue;
       }
-      const LossValue value = loss_of(loss, s, huber_deviations_);
+      const LossValue value = loss_of(loss, s / variance_scale, huber_deviations_);
       cost += value.rho;
-      weight[index] = value.weight;
+      weight[index] = value.weight / variance_scale;
       if (!seen) {
         g_.row(k).setZero();
         G_.row(k).setZero();
         continue;
       }
       const Matrix23d J = dz_dq * observation.X_CW.R;
-      const Matrix23d WJ = value.weight * (R_inverse_[index] * J);
+      const Matrix23d WJ = weight[index] * (R_inverse_[index] * J);
       const Matrix3d G = J.transpose() * WJ;
-      g_.row(k) = value.weight * (J.transpose() * Wr).transpose();
+      g_.row(k) = weight[index] * (J.transpose() * Wr).transpose();
       G_.row(k) << G(0, 0), G(1, 0), G(2, 0), G(1, 1), G(2, 1), G(2, 2);
     }
     return cost;
@@ -150,6 +150,7 @@ class BatchProblem {
 
  public:
   std::vector<std::uint8_t> used;  // observations that count, 1 or 0
+  double variance_scale = 1.0;     // every R times this
   // At the y last evaluated:
   std::vector<double> residual2;
   std::vector<double> weight;
@@ -216,6 +217,20 @@ Solution minimise(BatchProblem<Model>& problem, VectorXd y, Loss loss, int max_i
   return solution;
 }
 
+// Student's t from y, with every R first enlarged and then brought back in steps (graduated non-convexity, Blake &
+// Zisserman, Visual Reconstruction, 1987). Against a large R the prior is stiff, so that the curve can't bend to an
+// outlier at a phase that few observations share; from the plain robust solution it would never let go of it again.
+template <class Model>
+Solution graduate(BatchProblem<Model>& problem, VectorXd y, int max_iterations, double tolerance, int& iterations) {
+  Solution solution;
+  solution.y = std::move(y);
+  for (const double scale : {256.0, 64.0, 16.0, 4.0, 1.0}) {
+    problem.variance_scale = scale;
+    solution = minimise(problem, std::move(solution.y), Loss::kStudentT, max_iterations, tolerance, iterations);
+  }
+  return solution;
+}
+
 template <class Model>
 bool usable(const Observation& observation, const Model&, int n) noexcept {
   return observation.b.size() == n && observation.b.allFinite() && observation.z.allFinite() &&
@@ -271,8 +286,16 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
       });
       if (known) continue;
       rough_solutions.push_back(solution);
+      VectorXd huber_y = solution.y;
       solution = minimise(problem, std::move(solution.y), Loss::kStudentT, settings.max_iterations, kRough,
                           outcome.iterations);
+      // Without an outlier there is nothing to be caught by.
+      const bool outliers = std::any_of(problem.residual2.begin(), problem.residual2.end(),
+                                        [&](double s) { return !(s < settings.gate); });
+      if (outliers) {
+        Solution other = graduate(problem, std::move(huber_y), settings.max_iterations, kRough, outcome.iterations);
+        if (other.converged && (!solution.converged || other.cost < solution.cost)) solution = std::move(other);
+      }
     }
     if (solution.converged && (!best || solution.cost < best->cost)) best = std::move(solution);
   }

@@ -1,0 +1,4 @@
+#include "goals.hpp"
+namespace perimap::test {
+void pose_errors(const Extent&, const HeartMesh&, GoalReport&) {}
+}  // namespace perimap::test
