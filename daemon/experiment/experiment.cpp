@@ -1,8 +1,8 @@
 #include "daemon/experiment/experiment.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "daemon/experiment/accuracy_figures.hpp"
@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kFirstDepth_mm = 90.0;
 constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
+// Earlier errors, tens of millimetres in depth, would flatten the curves.
+constexpr double kErrorsFrom_s = 2.0;
 constexpr const char* kTruthColor = "#9a9a9a";
 constexpr const char* kBoundColor = "#222222";
 
@@ -106,7 +108,9 @@ Plot error_plot(const Comparison& comparison, const std::vector<MethodKind>& kin
   plot.y_from_zero = true;
   const auto line = [&](const std::string& name, const char* color) {
     PlotLine curve{{}, color, 2.0, name};
-    for (const auto& point : comparison.curve(name)) curve.points.push_back({point.time_s, point.median_mm});
+    for (const auto& point : comparison.curve(name)) {
+      if (point.time_s >= kErrorsFrom_s) curve.points.push_back({point.time_s, point.median_mm});
+    }
     plot.lines.push_back(curve);
   };
   for (const MethodKind kind : kinds) line(method_name(kind), color_of(kind));
