@@ -39,11 +39,11 @@ constexpr double kLimits_mm[kChecks] = {1.05, 0.50, 0.35};
 
 int frame_at(double seconds) { return static_cast<int>(30.0 * seconds); }
 
-Scene scene_of(const Extent& extent, const HeartMesh& heart, int trial, double correlation_s) {
+Scene scene_of(const Extent& extent, const HeartMesh& heart, int trial, double correlation_s, int frames) {
   SceneSettings settings;
   settings.seed = 300'000 * extent.seed + static_cast<std::uint64_t>(trial);
   settings.features = 24;
-  settings.frames = frame_at(kSeconds[kChecks - 1]);
+  settings.frames = frames;
   settings.pose_error = {1.4, 0.5 * std::numbers::pi / 180.0, correlation_s};
   auto scene = make_scene(settings, heart);
   if (!scene) throw std::runtime_error(scene.error().message);
@@ -62,6 +62,7 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
   const int trials = extent.whole ? 60 : 8;
   const int shared_trials = extent.whole ? 10 : 1;
   const int bound_trials = extent.whole ? 3 : 1;
+  const int checks = extent.whole ? kChecks : 2;
   for (const double correlation_s : {0.0, 0.5, 5.0}) {
     Sums alone[kChecks];
     Sums naive[kChecks];
@@ -69,10 +70,10 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
     double joint_squared_bound[kChecks] = {};
     double bounded = 0.0;
     for (int trial = 0; trial < trials; ++trial) {
-      const Scene scene = scene_of(extent, heart, trial, correlation_s);
+      const Scene scene = scene_of(extent, heart, trial, correlation_s, frame_at(kSeconds[checks - 1]));
       const auto follow = [&](PoseUse use, Sums* sums) {
         SharedMap map(scene, BasisLayout{}, Prior{}, use);
-        for (int at = 0; at < kChecks; ++at) {
+        for (int at = 0; at < checks; ++at) {
           map.advance(frame_at(kSeconds[at]));
           sums[at].add(scene, map, frame_at(kSeconds[at]), use == PoseUse::kTrackerAlone);
         }
@@ -83,14 +84,14 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
         follow(PoseUse::kSharedOthers, others);
       }
       if (trial >= bound_trials) continue;
-      for (int at = 0; at < kChecks; ++at) {
+      for (int at = 0; at < checks; ++at) {
         for (const FeatureEstimate& one : joint_cramer_rao_bound(scene, BasisLayout{}, Prior{}, frame_at(kSeconds[at])))
           joint_squared_bound[at] += std::pow(path_deviation_mm(one, BasisLayout{}), 2);
       }
       bounded += static_cast<double>(scene.features.size());
     }
     const bool white = correlation_s == 0.0;
-    for (int at = 0; at < kChecks; ++at) {
+    for (int at = 0; at < checks; ++at) {
       const double joint_bound = std::sqrt(joint_squared_bound[at] / bounded);
       const double reached = quantile(alone[at].errors_mm, 0.5);
       const double own_bound = std::sqrt(alone[at].squared_bound / alone[at].count());
