@@ -21,7 +21,7 @@ struct MethodRow {
   double worst_mm = 0.0;
   double share_above_2_mm = 0.0;
   double mean_nees = 0.0;      // of the position, divided by 3; NaN for the bound
-  double us_per_update = 0.0;  // mean over all sightings, starts included; NaN for the bound
+  double us_per_update = 0.0;  // processor time, mean over all sightings, starts included; NaN for the bound
 };
 
 class Comparison {
