@@ -16,7 +16,7 @@ END
 
 # package, or package=command where another source of that command will do
 build=(
-  cmake ninja-build g++
+  cmake ninja-build g++ pkg-config
   libeigen3-dev                              # core: linear algebra
   libexpected-dev                            # core: Expected<T>
   libboost-dev                               # core/realtime: lock-free rings
@@ -26,6 +26,7 @@ build=(
   libzstd-dev zlib1g-dev                     # drivers: recordings, simulator data
   libyaml-cpp-dev                            # drivers: calibration files
   libtomlplusplus-dev libcli11-dev libspdlog-dev nlohmann-json3-dev  # daemon
+  librsvg2-dev fonts-dejavu-core             # daemon/report: figures as PNG
 )
 tests=(
   libgtest-dev libgmock-dev

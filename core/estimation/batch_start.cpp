@@ -73,6 +73,8 @@ class BatchProblem {
   [[nodiscard]] Index count() const noexcept { return scaled_basis_.cols(); }
   [[nodiscard]] Index dimension() const noexcept { return 3 * n_; }
 
+  // Every R times this; 1 at first.
+  void set_variance_scale(double scale) noexcept { variance_scale_ = scale; }
   // Which observations count, 1 or 0; the caller decides.
   [[nodiscard]] std::vector<std::uint8_t>& used() noexcept { return used_; }
   // At the y last evaluated:
@@ -106,18 +108,18 @@ class BatchProblem {
         G_.row(k).setZero();
         continue;
       }
-      const LossValue value = loss_of(loss, s, huber_deviations_);
+      const LossValue value = loss_of(loss, s / variance_scale_, huber_deviations_);
       cost += value.rho;
-      weight_[index] = value.weight;
+      weight_[index] = value.weight / variance_scale_;
       if (!seen) {
         g_.row(k).setZero();
         G_.row(k).setZero();
         continue;
       }
       const Matrix23d J = dz_dq * observation.X_CW.R;
-      const Matrix23d WJ = value.weight * (R_inverse_[index] * J);
+      const Matrix23d WJ = weight_[index] * (R_inverse_[index] * J);
       const Matrix3d G = J.transpose() * WJ;
-      g_.row(k) = value.weight * (J.transpose() * Wr).transpose();
+      g_.row(k) = weight_[index] * (J.transpose() * Wr).transpose();
       G_.row(k) << G(0, 0), G(1, 0), G(2, 0), G(1, 1), G(2, 1), G(2, 2);
     }
     return cost;
@@ -154,6 +156,7 @@ class BatchProblem {
   Eigen::Matrix<double, Eigen::Dynamic, 6> G_;  // xx, yx, zx, yy, zy, zz of J^T R^-1 J w
   MatrixXd weighted_basis_;
   MatrixXd blocks_;
+  double variance_scale_ = 1.0;
   std::vector<std::uint8_t> used_;
   std::vector<double> residual2_;
   std::vector<double> weight_;
@@ -220,6 +223,20 @@ Solution minimise(BatchProblem<Model>& problem, VectorXd y, Loss loss, int max_i
   return solution;
 }
 
+// Student's t from y, with every R first enlarged and then brought back in steps (graduated non-convexity, Blake &
+// Zisserman, Visual Reconstruction, 1987). Against a large R the prior is stiff, so that the curve can't bend to an
+// outlier at a phase that few observations share; from the plain robust solution it would never let go of it again.
+template <class Model>
+Solution graduate(BatchProblem<Model>& problem, VectorXd y, int max_iterations, double tolerance, int& iterations) {
+  Solution solution;
+  solution.y = std::move(y);
+  for (const double scale : {256.0, 64.0, 16.0, 4.0, 1.0}) {
+    problem.set_variance_scale(scale);
+    solution = minimise(problem, std::move(solution.y), Loss::kStudentT, max_iterations, tolerance, iterations);
+  }
+  return solution;
+}
+
 template <class Model>
 bool usable(const Observation& observation, const Model&, int n) noexcept {
   return observation.b.size() == n && observation.b.allFinite() && observation.z.allFinite() &&
@@ -275,8 +292,16 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
       });
       if (known) continue;
       rough_solutions.push_back(solution);
+      VectorXd huber_y = solution.y;
       solution = minimise(problem, std::move(solution.y), Loss::kStudentT, settings.max_iterations, kRough,
                           outcome.iterations);
+      // Without an outlier there is nothing to be caught by.
+      const bool outliers = std::any_of(problem.residual2().begin(), problem.residual2().end(),
+                                        [&](double s) { return !(s < settings.gate); });
+      if (outliers) {
+        Solution other = graduate(problem, std::move(huber_y), settings.max_iterations, kRough, outcome.iterations);
+        if (other.converged && (!solution.converged || other.cost < solution.cost)) solution = std::move(other);
+      }
     }
     if (solution.converged && (!best || solution.cost < best->cost)) best = std::move(solution);
   }

@@ -2,8 +2,9 @@
 //
 // The paper starts its filter on the first ray alone. Early on the cost then has two minima, and iterating invents
 // depth; a batch over two seconds or so of motion, solved from several start depths, does not suffer from it. The loss
-// is Huber's first (wide basin), then Student's t with 3 degrees of freedom (rejects gross outliers), then the plain
-// quadratic on what lies within the gate, which is what the recursion goes on from.
+// is Huber's first (wide basin), then Student's t with 3 degrees of freedom (rejects gross outliers; where it finds
+// any, once more by way of enlarged covariances, and the lower cost counts), then the plain quadratic on what lies
+// within the gate, which is what the recursion goes on from.
 //
 // Not for the real-time path: it allocates. Deterministic.
 #pragma once
@@ -23,7 +24,7 @@ struct BatchSettings {
   double prior_depth_mm = 90.0;   // the prior's mean lies there on the same ray, whatever the start
   bool robust = true;             // false: the plain MAP estimate of all observations
   double huber_deviations = 2.0;  // Mahalanobis radius where Huber's loss turns linear
-  double gate = 13.8;             // chi-squared, 2 degrees of freedom, 99.9 %: what is beyond is an outlier
+  double gate = 23.0;             // chi-squared, 2 degrees of freedom, 99.999 %: what is beyond is an outlier
   double min_inlier_fraction = 0.5;
   int min_observations = 10;
   int max_iterations = 60;  // of Levenberg-Marquardt, for each loss

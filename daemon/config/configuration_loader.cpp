@@ -105,7 +105,9 @@ std::optional<ConfigurationValue> value_of(const toml::node& node) {
 }
 
 // The first character that toml++ 3.3 must not see, if there is one: it has undefined behaviour on some letters outside
-// of strings and comments (its is_non_ascii_horizontal_whitespace, U+3001 for one), where TOML allows ASCII alone.
+// of strings and comments (its is_non_ascii_horizontal_whitespace, U+3001 for one), where TOML allows ASCII alone. On a
+// malformed line it may not take for a string what looks like one ("a = 1x='..."), so letters beyond ASCII may stand
+// only in comments and where nothing but strings follows the line's first "=".
 // Strings over several lines, which no key takes, are refused too, so that a string always ends with its line.
 // So are keys of very many parts: its tables nest as deep as a key is long, and it walks them by recursion.
 std::optional<std::string> refused_character(std::string_view text) {
@@ -115,6 +117,8 @@ std::optional<std::string> refused_character(std::string_view text) {
   bool comment = false;
   bool escaped = false;
   int dots = 0;  // of this line, outside of strings and comments
+  enum class Place : std::uint8_t { kBeforeEquals, kStringsAfterEquals, kOtherAfterEquals };
+  Place place = Place::kBeforeEquals;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
     if ((static_cast<unsigned char>(c) & 0xC0) != 0x80) {
@@ -127,23 +131,30 @@ std::optional<std::string> refused_character(std::string_view text) {
       comment = false;
       escaped = false;
       dots = 0;
+      place = Place::kBeforeEquals;
     } else if (comment) {
       continue;
     } else if (quote == 0 && c == '.' && ++dots > kMostDots) {
       return fmt::format("{}:{}: expected TOML, got: a line of more than {} dots", line, column, kMostDots);
+    } else if (static_cast<unsigned char>(c) >= 0x80 && (quote == 0 || place != Place::kStringsAfterEquals)) {
+      return fmt::format("{}:{}: expected TOML, got: a letter beyond ASCII outside of strings and comments", line,
+                         column);
     } else if (quote != 0) {
       const bool closes = c == quote && !escaped;
       escaped = c == '\\' && quote == '"' && !escaped;
       quote = closes ? '\0' : quote;
-    } else if (static_cast<unsigned char>(c) >= 0x80) {
-      return fmt::format("{}:{}: expected TOML, got: a letter beyond ASCII outside of strings and comments", line,
-                         column);
     } else if (text.substr(i, 3) == "\"\"\"" || text.substr(i, 3) == "'''") {
       return fmt::format("{}:{}: expected a string on one line, got: one over several lines", line, column);
     } else if (c == '"' || c == '\'') {
       quote = c;
     } else {
       comment = c == '#';
+      constexpr std::string_view kBetweenStrings = " \t\r,[]";
+      if (place == Place::kBeforeEquals) {
+        place = c == '=' ? Place::kStringsAfterEquals : place;
+      } else if (!comment && kBetweenStrings.find(c) == std::string_view::npos) {
+        place = Place::kOtherAfterEquals;
+      }
     }
   }
   return std::nullopt;

@@ -1,12 +1,16 @@
 // The recursive path takes nothing from the heap. A program of its own, because it counts the calls of the allocator.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdlib>
 #include <new>
 
+#include "core/estimation/correlated_pose_noise.hpp"
 #include "core/estimation/innovation_monitor.hpp"
 #include "core/estimation/iterated_update.hpp"
+#include "core/estimation/shared_pose.hpp"
 
 namespace {
 
@@ -88,6 +92,40 @@ TEST(Allocation, PixelUpdatesTakeNothingFromTheHeap) {
 }
 
 TEST(Allocation, BearingUpdatesTakeNothingFromTheHeap) { expect_no_allocation(BearingModel{}, Vector3d(80, -3, 5)); }
+
+TEST(Allocation, TheSharedPoseTakesNothingFromTheHeap) {
+  const BearingModel model;
+  std::array<CommonMatch, 20> matches;
+  std::array<std::uint8_t, 20> used{};
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    const auto i = static_cast<double>(k);
+    matches[k].p_WF = Vector3d(80.0, 20.0 * std::sin(i), 15.0 * std::cos(2.0 * i));
+    matches[k].S = 0.1 * Matrix3d::Identity();
+    matches[k].R = 1e-5 * Matrix2d::Identity();
+    matches[k].D = Vector3d(1.0, i, 2.0);
+    EXPECT_EQ(model.predict(matches[k].p_WF, matches[k].z), ProjectionStatus::kOk);
+  }
+  const BasisLayout layout{kMaxHarmonics, kMaxRespiratoryHarmonics};
+  const FeatureEstimate estimate = prior_estimate(layout, Prior{}, Vector3d::Zero());
+  CorrelatedPoseNoise noise(layout.state_size());
+  StateMatrix larger;
+  bool ok = true;
+  const long count = allocations_of([&] {
+    const CommonInformation prior =
+        with_appended(tracker_prior(1e-4 * Matrix3d::Identity(), Matrix3d::Identity()), 1e-4);
+    const SharedPose shared =
+        estimate_shared_pose(model, Pose{}, prior, std::span<const CommonMatch>(matches), std::span(used));
+    ok = shared.estimate.ok;
+    for (const CommonMatch& match : matches) ok = ok && what_others_say(model, shared, Pose{}, match).ok;
+    for (int f = 0; f < 3; ++f)
+      noise.add(basis_at(layout, f, f), Matrix23d::Ones(), Matrix2d::Identity(), Matrix26d::Ones(),
+                Matrix6d::Identity(), 0.9);
+    larger = noise.enlarged(estimate.P);
+  });
+  EXPECT_EQ(count, 0);
+  EXPECT_TRUE(ok);
+  EXPECT_TRUE(larger.allFinite());
+}
 
 }  // namespace
 }  // namespace perimap

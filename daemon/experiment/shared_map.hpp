@@ -1,0 +1,57 @@
+// All features of a trial followed together, frame by frame, so that a frame's matches can say where its camera was.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/estimation/correlated_pose_noise.hpp"
+#include "core/estimation/feature_estimate.hpp"
+#include "daemon/experiment/scene.hpp"
+
+namespace perimap {
+
+enum class PoseUse : std::uint8_t {
+  kTrackerAlone,  // the pose's noise enters each match's covariance
+  kSharedNaive,   // the pose of all matches, then each match once more for its feature: counted twice
+  kSharedOthers   // the pose of all matches but the feature's own
+};
+
+class SharedMap {
+ public:
+  // Features start after `buffered` sightings, from the tracker's poses.
+  SharedMap(const Scene& scene, const BasisLayout& layout, const Prior& prior, PoseUse use, int buffered = 60);
+
+  // Takes the frames up to, not including, this one.
+  void advance(int end_frame);
+
+  // Of feature i; nothing before its start.
+  [[nodiscard]] const std::optional<FeatureEstimate>& estimate(std::size_t i) const { return estimates_[i]; }
+  // The same with the common part of the pose's error, which its correlation time keeps from averaging out, counted
+  // into the covariance. For kTrackerAlone.
+  [[nodiscard]] FeatureEstimate published(std::size_t i) const;
+  [[nodiscard]] std::size_t size() const noexcept { return estimates_.size(); }
+
+ private:
+  void take_frame(int frame);
+  void start(std::size_t i);
+  // Counts a sighting that the estimate was made from.
+  void count_pose_noise(std::size_t i, const Sighting& sighting);
+
+  const Scene& scene_;
+  BasisLayout layout_;
+  Prior prior_;
+  PoseUse use_;
+  std::size_t buffered_;
+  int next_frame_ = 0;
+  std::vector<std::size_t> next_sighting_;
+  std::vector<std::optional<FeatureEstimate>> estimates_;
+  std::vector<CorrelatedPoseNoise> pose_noise_;
+  std::vector<int> last_counted_frame_;
+};
+
+// Posterior Cramer-Rao bound of all features together when the pose errors are unknowns too, with their true
+// statistics: covariance of feature i's state, mm^2. Sightings before `end_frame`, outliers left out.
+[[nodiscard]] std::vector<FeatureEstimate> joint_cramer_rao_bound(const Scene& scene, const BasisLayout& layout,
+                                                                  const Prior& prior, int end_frame);
+
+}  // namespace perimap

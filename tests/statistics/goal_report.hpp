@@ -1,0 +1,47 @@
+// What was to be reached beside what is: one line a goal, printed as it is known.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+namespace perimap::test {
+
+class GoalReport {
+ public:
+  GoalReport() {
+    fmt::print("{:<66}{:>11}{:>11}{:>11}\n", "", "goal", "reached", "bound");
+    std::fflush(stdout);
+  }
+
+  // `bound`: what no estimator can better on these data; NaN when it has no meaning here.
+  void at_most(const std::string& what, double limit, double reached, double bound = NAN) {
+    const bool good = reached <= limit;
+    line(what, fmt::format("<= {:g}", limit), reached, bound, good ? "" : "  FAILED");
+    failed_ += good ? 0 : 1;
+  }
+  void within(const std::string& what, double low, double high, double reached) {
+    const bool good = reached >= low && reached <= high;
+    line(what, fmt::format("{:g}..{:g}", low, high), reached, NAN, good ? "" : "  FAILED");
+    failed_ += good ? 0 : 1;
+  }
+  // A goal that the bound forbids, or none at all: shown, not judged.
+  void shown(const std::string& what, const std::string& goal, double reached, double bound = NAN) {
+    line(what, goal, reached, bound, "");
+  }
+
+  [[nodiscard]] int failed() const noexcept { return failed_; }
+
+ private:
+  static std::string number(double value) { return std::isnan(value) ? "" : fmt::format("{:.4g}", value); }
+  static void line(const std::string& what, const std::string& goal, double reached, double bound,
+                   const char* verdict) {
+    fmt::print("{:<66}{:>11}{:>11}{:>11}{}\n", what, goal, number(reached), number(bound), verdict);
+    std::fflush(stdout);
+  }
+  int failed_ = 0;
+};
+
+}  // namespace perimap::test

@@ -1,0 +1,23 @@
+// The estimator's goals that can be tried with known phase and association; docs/experiments.md has what is reached.
+#pragma once
+
+#include <cstdint>
+
+#include "drivers/simulator/heart_mesh.hpp"
+#include "goal_report.hpp"
+
+namespace perimap::test {
+
+struct Extent {
+  bool whole = false;  // the long form
+  std::uint64_t seed = 1;
+};
+
+// No feature is lost, whatever depth it is supposed at and with gross outliers.
+void no_feature_is_lost(const Extent& extent, const HeartMesh& heart, GoalReport& report);
+// Path error against the batch estimate and the Cramer-Rao bound; covariances are true.
+void as_exact_as_the_data_allow(const Extent& extent, const HeartMesh& heart, GoalReport& report);
+// Path error and covariance with errors of the camera pose, white and slow, without and with the shared pose.
+void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& report);
+
+}  // namespace perimap::test

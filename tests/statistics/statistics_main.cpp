@@ -1,0 +1,39 @@
+// The Monte Carlo programme: how good the estimator is, beside what was to be reached. Exit code 1 when a goal that can
+// be reached is missed.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "daemon/experiment/scene.hpp"
+#include "goals.hpp"
+
+int main(int argc, char** argv) {
+  using perimap::test::Extent;
+  using perimap::test::GoalReport;
+  using Goal = void (*)(const Extent&, const perimap::HeartMesh&, GoalReport&);
+  const std::map<std::string, Goal> goals{{"lost", perimap::test::no_feature_is_lost},
+                                          {"optimal", perimap::test::as_exact_as_the_data_allow},
+                                          {"pose", perimap::test::pose_errors}};
+  CLI::App app("Monte Carlo statistics of the estimator, with known phase and association");
+  Extent extent;
+  std::vector<std::string> chosen;
+  app.add_option("GOALS", chosen, "lost, optimal, pose; all when none is named")
+      ->check(CLI::IsMember({"lost", "optimal", "pose"}));
+  app.add_flag("--long", extent.whole, "As many trials as the figures in docs/experiments.md");
+  app.add_option("--seed", extent.seed, "Another seed, other trials")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  if (chosen.empty()) chosen = {"lost", "optimal", "pose"};
+  try {
+    const auto heart = perimap::load_heart();
+    if (!heart) throw std::runtime_error(heart.error().message);
+    GoalReport report;
+    for (const std::string& name : chosen) goals.at(name)(extent, *heart, report);
+    return report.failed() == 0 ? 0 : 1;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "statistics: %s\n", error.what());
+    return 1;
+  }
+}
