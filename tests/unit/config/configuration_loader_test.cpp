@@ -259,7 +259,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"LetterAfterAnEscapedQuote", "version = 1\n[source]\nname = \"a\\\"b\" \xef\xbb\xa3\n",
               "test.toml:3:15: expected TOML, got: a letter beyond ASCII outside of strings and comments"},
         Wrong{"LetterInWhatOnlyLooksLikeAString", "version = 1ro==='=oke\xcc\x8dro='\n",
-              "test.toml:1:20: expected TOML, got: a letter beyond ASCII outside of strings and comments"},
+              "test.toml:1:22: expected TOML, got: a letter beyond ASCII outside of strings and comments"},
         Wrong{"LetterInAQuotedKey", "version = 1\n\"\xc3\xa9\" = 2\n",
               "test.toml:2:2: expected TOML, got: a letter beyond ASCII outside of strings and comments"},
         Wrong{"StringOverSeveralLines", "version = 1\n[source]\nname = \"\"\"a\nb\"\"\"\n",
