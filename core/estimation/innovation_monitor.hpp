@@ -13,7 +13,7 @@ struct InnovationMonitorSettings {
   int enough_updates = 20;        // no verdict before
   double consistent_below = 1.6;  // mean NIS/2; 4.6 standard deviations above 1 for N = 30
   double high_above = 2.0;        // drift, wrong phase, wrong noise: 7.7 standard deviations
-  double largest_nis = 13.8;      // an outlier counts no more than this (the gate's value)
+  double largest_nis = 13.8;      // an outlier counts no more than this: chi-squared, 2 degrees, 99.9 %
 };
 
 enum class InnovationVerdict : std::uint8_t { kTooFew, kConsistent, kElevated, kHigh };

@@ -81,10 +81,10 @@ bool KannalaBrandt::undistort(const Vector2d& m, Vector3d& ray_C) const noexcept
   double theta = 0.0;
   ImageAngle angle = image_angle(*this, theta);
   for (int i = 0; i < kMaxIterations && std::abs(target - angle.value) > tolerance; ++i) {
-    double step = (target - angle.value) / angle.slope;
+    const double step = (target - angle.value) / angle.slope;
     bool nearer = false;
-    for (int halvings = 0; halvings < kMaxHalvings && !nearer; ++halvings, step *= 0.5) {
-      const double trial = theta + step;
+    for (int halvings = 0; halvings < kMaxHalvings && !nearer; ++halvings) {
+      const double trial = theta + std::ldexp(step, -halvings);
       if (trial < 0.0 || trial > kMaxAngle || !grows_up_to(*this, trial)) continue;
       const ImageAngle trial_angle = image_angle(*this, trial);
       nearer = std::abs(target - trial_angle.value) < std::abs(target - angle.value);

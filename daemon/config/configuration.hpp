@@ -75,7 +75,7 @@ struct EstimationConfiguration {
   std::vector<double> start_depths_mm = {50.0, 90.0, 160.0};
   double pixel_deviation_px = 0.5;
   int iterations = 5;
-  double gate_chi2 = 13.8;
+  double gate_chi2 = 23.0;
   double prior_dc_deviation_mm = 40.0;
   double prior_harmonic_deviation_mm = 4.0;      // of harmonic 1; harmonic k has this / k^2
   double configured_converged_deviation_mm = 0;  // 0: automatic, see converged_deviation_mm()

@@ -356,7 +356,7 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
               "standard deviation of a match, an axis")
       .integer("iterations", 1, 20, PERIMAP_MEMBER(estimation.iterations), "most iterations of one update")
       .number("gate_chi2", 0.1, 1000, PERIMAP_MEMBER(estimation.gate_chi2),
-              "a match of higher cost at the optimum is refused; 13.8: 99.9 % of chi-square, 2 degrees")
+              "a match of higher cost at the optimum is refused; 23: 99.999 % of chi-square, 2 degrees")
       .number("prior_dc_deviation_mm", 0.1, 10000, PERIMAP_MEMBER(estimation.prior_dc_deviation_mm),
               "prior standard deviation of a feature's mean position")
       .number("prior_harmonic_deviation_mm", 0.01, 1000, PERIMAP_MEMBER(estimation.prior_harmonic_deviation_mm),

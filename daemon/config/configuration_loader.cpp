@@ -143,7 +143,7 @@ std::optional<std::string> refused_character(std::string_view text) {
       const bool closes = c == quote && !escaped;
       escaped = c == '\\' && quote == '"' && !escaped;
       quote = closes ? '\0' : quote;
-    } else if (text.substr(i, 3) == "\"\"\"" || text.substr(i, 3) == "'''") {
+    } else if (text.substr(i, 3) == R"(""")" || text.substr(i, 3) == "'''") {
       return fmt::format("{}:{}: expected a string on one line, got: one over several lines", line, column);
     } else if (c == '"' || c == '\'') {
       quote = c;
