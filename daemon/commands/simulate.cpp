@@ -251,9 +251,11 @@ int run(Options options) {
   options.settings.respiration_period = from_seconds(options.respiration_period_s);
   if (options.ecg_start_s) options.settings.ecg_start = from_seconds(*options.ecg_start_s);
   const std::vector<SimulatedRecording> recordings = planned(options);
-  for (const SimulatedRecording& recording : recordings)
-    if (!options.force && std::filesystem::exists(recording.path))
+  for (const SimulatedRecording& recording : recordings) {
+    if (!options.force && std::filesystem::exists(recording.path)) {
       return complain({recording.path.string() + ": the file exists; --force overwrites it"}, 2);
+    }
+  }
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
 
   const auto simulation = Simulation::create(options.settings, threaded_for(threads));
