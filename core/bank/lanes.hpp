@@ -16,8 +16,8 @@ using LaneMask = std::uint8_t;
 template <class Real>
 struct LaneObservations {
   LaneMask measured = 0;
-  alignas(64) Real z[2][kLanes]{};  // px, or rad for bearings
-  alignas(64) Real R[3][kLanes]{};  // covariance of z, pose noise included: R_00, R_10, R_11
+  Real z[2][kLanes]{};  // px, or rad for bearings
+  Real R[3][kLanes]{};  // covariance of z, pose noise included: R_00, R_10, R_11
 
   void set(int lane, const Vector2d& z_lane, const Matrix2d& R_lane) noexcept {
     measured = static_cast<LaneMask>(measured | 1U << lane);
@@ -36,18 +36,18 @@ struct LaneOutcomes {
   LaneMask accepted = 0;
   UpdateStatus status[kLanes]{};
   int iterations[kLanes]{};
-  alignas(64) Real map_cost[kLanes]{};
-  alignas(64) Real innovation[2][kLanes]{};
-  alignas(64) Real normalised_innovation_squared[kLanes]{};
+  Real map_cost[kLanes]{};
+  Real innovation[2][kLanes]{};
+  Real normalised_innovation_squared[kLanes]{};
 };
 
 // Features at one instant, in frame W. Says something only of the lanes in `valid`.
 template <class Real>
 struct LaneMotions {
   LaneMask valid = 0;
-  alignas(64) Real position[3][kLanes]{};    // mm
-  alignas(64) Real velocity[3][kLanes]{};    // mm/s
-  alignas(64) Real covariance[6][kLanes]{};  // mm^2: xx, yx, yy, zx, zy, zz
+  Real position[3][kLanes]{};    // mm
+  Real velocity[3][kLanes]{};    // mm/s
+  Real covariance[6][kLanes]{};  // mm^2: xx, yx, yy, zx, zy, zz
 
   [[nodiscard]] Vector3d position_of(int lane) const noexcept {
     return {double(position[0][lane]), double(position[1][lane]), double(position[2][lane])};

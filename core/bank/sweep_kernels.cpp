@@ -328,11 +328,11 @@ void motion(const GroupView<Real>& group, const SweepPhase<Real>& phase, const R
       }
       const V velocity = hn::Mul(rate, hn::Set(tag, phase.rate_rad_per_s));
       spread[a] = hn::Mul(velocity, hn::Set(tag, phase.deviation_s));
-      hn::Store(position, tag, motions.position[a] + lane);
-      hn::Store(velocity, tag, motions.velocity[a] + lane);
+      hn::StoreU(position, tag, motions.position[a] + lane);
+      hn::StoreU(velocity, tag, motions.velocity[a] + lane);
       for (int c = 0; c <= a; ++c) {
         const V s = hn::Load(tag, at(S, lower_index(a, c), lane));
-        hn::Store(hn::MulAdd(spread[a], spread[c], s), tag, motions.covariance[lower_index(a, c)] + lane);
+        hn::StoreU(hn::MulAdd(spread[a], spread[c], s), tag, motions.covariance[lower_index(a, c)] + lane);
       }
     }
   }

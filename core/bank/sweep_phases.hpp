@@ -12,8 +12,8 @@ inline constexpr int kMaxSweepPhases = 8;  // learnt ones included
 
 template <class Real>
 struct SweepPhase {
-  alignas(64) std::array<Real, kMaxBasis> b{};       // basis
-  alignas(64) std::array<Real, kMaxBasis> b_rate{};  // db/dphi, 1/rad
+  std::array<Real, kMaxBasis> b{};       // basis
+  std::array<Real, kMaxBasis> b_rate{};  // db/dphi, 1/rad
   Real rate_rad_per_s = 0;                           // dphi/dt
   Real deviation_s = 0;                              // standard deviation of the phase, as a time
 };

@@ -332,8 +332,8 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
   problem.task = &task;
   problem.lane = lane;
   V R[3];
-  for (int i = 0; i < 2; ++i) problem.z[i] = hn::Load(tag, observations.z[i] + lane);
-  for (int i = 0; i < 3; ++i) R[i] = hn::Load(tag, observations.R[i] + lane);
+  for (int i = 0; i < 2; ++i) problem.z[i] = hn::LoadU(tag, observations.z[i] + lane);
+  for (int i = 0; i < 3; ++i) R[i] = hn::LoadU(tag, observations.R[i] + lane);
   for (int i = 0; i < 6; ++i) problem.S[i] = hn::Load(tag, at(task.S, i, lane));
   const V* S = problem.S;
   for (int a = 0; a < 3; ++a) {
@@ -358,14 +358,14 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
   linearise(problem, progress.alive, lambda, w, now);
   progress.refuse(hn::Ne(now.status, accepted), now.status);
   for (int i = 0; i < 2; ++i) {
-    hn::Store(hn::IfThenElseZero(progress.alive, now.r[i]), tag, outcomes.innovation[i] + lane);
+    hn::StoreU(hn::IfThenElseZero(progress.alive, now.r[i]), tag, outcomes.innovation[i] + lane);
   }
   V JS[2][3];
   V A[3];
   innovation_covariance<Real>(now.J, S, R, JS, A);
   Whitening<Real> whitening;
   progress.refuse(hn::Not(whitening.factor(A[0], A[1], A[2])), not_positive);
-  hn::Store(hn::IfThenElseZero(progress.alive, whitening.squared_length(now.r[0], now.r[1])), tag,
+  hn::StoreU(hn::IfThenElseZero(progress.alive, whitening.squared_length(now.r[0], now.r[1])), tag,
             outcomes.normalised_innovation_squared + lane);
 
   const bool damped = settings.method == UpdateMethod::kLevenbergMarquardt;
@@ -451,7 +451,7 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
     iterating = hn::AndNot(hn::And(taken, hn::Lt(length2, tolerance2)), iterating);
   }
   progress.refuse(hn::AndNot(moved, hn::Ne(last_failure, accepted)), last_failure);
-  hn::Store(hn::IfThenElseZero(progress.alive, now.cost), tag, outcomes.map_cost + lane);
+  hn::StoreU(hn::IfThenElseZero(progress.alive, now.cost), tag, outcomes.map_cost + lane);
   progress.refuse(hn::Not(hn::Le(now.cost, hn::Set(tag, static_cast<Real>(settings.gate)))),
                   number<Real>(UpdateStatus::kRejectedByGate));
 
