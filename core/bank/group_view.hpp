@@ -29,7 +29,7 @@ struct GroupView {
   Real* x = nullptr;         // [d]
   Real* diagonal = nullptr;  // [d] of P
   Real* lower = nullptr;     // [d (d - 1) / 2]
-  Real* pending = nullptr;   // [kMaxPendingUpdates][d][2]: U, with P = stored - sum U U^T off the diagonal
+  Real* pending = nullptr;   // [kMaxPendingUpdates][d][2]: U; off the diagonal P is what is stored - sum U U^T
   Real* gains = nullptr;     // [kMaxLearntPhases][3][d]: M = P B^T by columns
   Real* S = nullptr;         // [kMaxSweepPhases][6]: B P B^T, lower triangle by rows
 };

@@ -301,13 +301,33 @@ void correct(const GroupView<Real>& group, const SweepPhase<Real>& phase, const 
   }
 }
 
+// Adds to S what a pending update has already taken from the diagonal of P, so that the whole of it can be subtracted.
+template <class Real>
+void restore_diagonal(const GroupView<Real>& group, const SweepPhase<Real>& phase, const Real* U, Real* S) noexcept {
+  const Tag<Real> tag;
+  for (int lane = 0; lane < kLanes; lane += static_cast<int>(hn::Lanes(tag))) {
+    for (int a = 0; a < 3; ++a) {
+      Vector<Real> sum = hn::Load(tag, at(S, lower_index(a, a), lane));
+      for (int k = 0; k < group.n; ++k) {
+        const Vector<Real> b = hn::Set(tag, phase.b[static_cast<std::size_t>(k)]);
+        const Vector<Real> bU_0 = hn::Mul(b, hn::Load(tag, at(U, 2 * (a * group.n + k), lane)));
+        const Vector<Real> bU_1 = hn::Mul(b, hn::Load(tag, at(U, 2 * (a * group.n + k) + 1, lane)));
+        sum = hn::MulAdd(bU_1, bU_1, hn::MulAdd(bU_0, bU_0, sum));
+      }
+      hn::Store(sum, tag, at(S, lower_index(a, a), lane));
+    }
+  }
+}
+
 template <class Real>
 void position_covariance(const GroupView<Real>& group, const SweepPhase<Real>& phase, int pending, Real* S) noexcept {
   set_zero(S, 6);
   const TileWork<Real> work{nullptr, nullptr, nullptr, &phase, S};
   for (int t = 0; t < group.tile_count; ++t) visit<0, 0, 1>(group, group.tiles[t], work);
   for (int m = 0; m < pending; ++m) {
-    correct<Real>(group, phase, group.pending + m * 2 * group.d * kLanes, S, nullptr);
+    const Real* U = group.pending + m * 2 * group.d * kLanes;
+    restore_diagonal(group, phase, U, S);
+    correct<Real>(group, phase, U, S, nullptr);
   }
 }
 

@@ -363,7 +363,7 @@ TEST_P(Bank, MotionFollowsPendingUpdatesWithoutAnotherSweep) {
         for (const LaneMotions<double>& motions : {from_sweep, by_pass}) {
           EXPECT_LT(largest_difference(motions.position_of(lane), position_of(estimate.x, b)), 1e-12);
           EXPECT_LT(largest_difference(motions.velocity_of(lane), velocity), 1e-11);
-          EXPECT_LT(largest_difference(motions.covariance_of(lane), S), 1e-12 * S.norm());
+          EXPECT_LT(largest_difference(motions.covariance_of(lane), S), 1e-12 * S.norm()) << "phase " << k;
         }
       }
     }
