@@ -36,6 +36,7 @@ tests=(
 full=(
   clang-16 libclang-rt-16-dev                # fuzzing
   clang-tidy clang-format
+  libceres-dev                               # tests/bench: the batch alternative
 )
 
 wanted=test

@@ -91,7 +91,7 @@ class FeatureBank {
     int pending = 0;
     std::array<int, kMaxSweepPhases> corrected{};  // how many of the pending updates S and M of a phase contain
     LaneMask occupied = 0;
-    LaneMask swept = 0;                   // occupied, and S and M are theirs
+    LaneMask swept = 0;                  // occupied, and S and M are theirs
     std::array<Real, kLanes> noise_s{};  // process noise to be added at the next sweep
   };
   struct Place {

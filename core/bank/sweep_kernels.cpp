@@ -138,8 +138,7 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
         for (int q = 0; q < kLearnt; ++q) M_i[q][r] = hn::MulAdd(p, b_i[q][r], M_i[q][r]);
         // Half: the block on the diagonal is doubled below.
         for (int q = 0; q < kPredicted; ++q) {
-          Pb_i[q][r] =
-              hn::MulAdd(p, hn::Set(tag, Real(0.5) * b_predicted[q][k_0 + r]), Pb_i[q][r]);
+          Pb_i[q][r] = hn::MulAdd(p, hn::Set(tag, Real(0.5) * b_predicted[q][k_0 + r]), Pb_i[q][r]);
         }
       }
     }
@@ -162,8 +161,7 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
 }
 
 template <int kPairs, int kLearnt, int kPredicted, class Real>
-HWY_NOINLINE void visit(const GroupView<Real>& group, const CovarianceTile& tile,
-                        const TileWork<Real>& work) noexcept {
+HWY_NOINLINE void visit(const GroupView<Real>& group, const CovarianceTile& tile, const TileWork<Real>& work) noexcept {
   for (int lane = 0; lane < kLanes; lane += static_cast<int>(hn::Lanes(Tag<Real>()))) {
     if (tile.rows == 4) {
       visit_tile<4, kPairs, kLearnt, kPredicted>(group, tile, work, lane);
@@ -262,8 +260,7 @@ void sweep(const GroupView<Real>& group, const SweepPhases<Real>& phases, int pe
 
 // S <- S - (B U)(B U)^T, M <- M - U (B U)^T.
 template <class Real>
-void correct(const GroupView<Real>& group, const SweepPhase<Real>& phase, const Real* U, Real* S,
-             Real* gain) noexcept {
+void correct(const GroupView<Real>& group, const SweepPhase<Real>& phase, const Real* U, Real* S, Real* gain) noexcept {
   using V = Vector<Real>;
   const Tag<Real> tag;
   for (int lane = 0; lane < kLanes; lane += static_cast<int>(hn::Lanes(tag))) {

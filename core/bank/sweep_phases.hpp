@@ -14,8 +14,8 @@ template <class Real>
 struct SweepPhase {
   std::array<Real, kMaxBasis> b{};       // basis
   std::array<Real, kMaxBasis> b_rate{};  // db/dphi, 1/rad
-  Real rate_rad_per_s = 0;                           // dphi/dt
-  Real deviation_s = 0;                              // standard deviation of the phase, as a time
+  Real rate_rad_per_s = 0;               // dphi/dt
+  Real deviation_s = 0;                  // standard deviation of the phase, as a time
 };
 
 // Phases to learn at come first: for these a sweep forms M = P B^T (d x 3), which the update needs; for those that are

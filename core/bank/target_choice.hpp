@@ -2,8 +2,8 @@
 // before Highway.
 #pragma once
 
-// SSE4, AVX2 and AVX-512; besides them Highway always compiles the baseline of the compiler's flags. The rest would only
-// cost build time.
+// SSE4, AVX2 and AVX-512; besides them Highway always compiles the baseline of the compiler's flags. The rest would
+// only cost build time.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 
 #include <hwy/targets.h>
@@ -14,8 +14,8 @@
 
 namespace perimap {
 
-// Calls choose() while Highway's dynamic dispatch points to `target`. Highway keeps its choice for the whole process, so
-// the lock keeps two banks that are made at once from taking each other's.
+// Calls choose() while Highway's dynamic dispatch points to `target`. Highway keeps its choice for the whole process,
+// so the lock keeps two banks that are made at once from taking each other's.
 template <class Choose>
 auto with_target(SimdTarget target, Choose choose) {
   static std::mutex mutex;

@@ -7,8 +7,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-// The steps and their reasons are those of core/estimation/iterated_update.cpp, with a lane mask in place of each branch.
-// Lanes that are done or refused keep computing; what they compute is dropped.
+// The steps and their reasons are those of core/estimation/iterated_update.cpp, with a lane mask in place of each
+// branch. Lanes that are done or refused keep computing; what they compute is dropped.
 HWY_BEFORE_NAMESPACE();
 namespace perimap {
 namespace HWY_NAMESPACE {
@@ -93,7 +93,7 @@ struct Whitening {
 // The model at one point of the iteration.
 template <class Real>
 struct Linearisation {
-  Vector<Real> r[2];    // z - h(p)
+  Vector<Real> r[2];     // z - h(p)
   Vector<Real> J[2][3];  // dh/dp
   Vector<Real> cost;
   Vector<Real> status;
@@ -231,8 +231,8 @@ HWY_INLINE void linearise(const Problem<Real>& problem, Mask<Real> wanted, const
     }
   }
   at_point.cost = hn::Add(dot3(lambda, w), problem.R_factor.squared_length(at_point.r[0], at_point.r[1]));
-  const Mask<Real> not_finite = hn::And(hn::Eq(at_point.status, number<Real>(UpdateStatus::kAccepted)),
-                                        hn::Not(hn::IsFinite(at_point.cost)));
+  const Mask<Real> not_finite =
+      hn::And(hn::Eq(at_point.status, number<Real>(UpdateStatus::kAccepted)), hn::Not(hn::IsFinite(at_point.cost)));
   choose(not_finite, number<Real>(UpdateStatus::kNotFinite), at_point.status);
 }
 
@@ -366,7 +366,7 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
   Whitening<Real> whitening;
   progress.refuse(hn::Not(whitening.factor(A[0], A[1], A[2])), not_positive);
   hn::StoreU(hn::IfThenElseZero(progress.alive, whitening.squared_length(now.r[0], now.r[1])), tag,
-            outcomes.normalised_innovation_squared + lane);
+             outcomes.normalised_innovation_squared + lane);
 
   const bool damped = settings.method == UpdateMethod::kLevenbergMarquardt;
   const V step_factor = hn::Set(tag, damped ? Real(1) : static_cast<Real>(settings.step_factor));
@@ -429,8 +429,7 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
       const Mask<Real> poor = hn::Lt(fall, hn::Mul(hn::Set(tag, Real(0.25)), expected_fall));
       const Mask<Real> good = hn::Gt(fall, hn::Mul(hn::Set(tag, Real(0.75)), expected_fall));
       const V mu_poor = hn::IfThenElse(undamped, hn::Set(tag, Real(0.5)), twice);
-      const V mu_good =
-          hn::IfThenElseZero(hn::Gt(mu, hn::Set(tag, Real(1e-2))), hn::Mul(hn::Set(tag, Real(0.25)), mu));
+      const V mu_good = hn::IfThenElseZero(hn::Gt(mu, hn::Set(tag, Real(1e-2))), hn::Mul(hn::Set(tag, Real(0.25)), mu));
       choose(hn::And(telling, good), mu_good, mu);
       choose(hn::And(telling, poor), mu_poor, mu);
       choose(rejected, mu_rejected, mu);

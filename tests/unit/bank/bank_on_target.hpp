@@ -16,9 +16,7 @@ class OnEveryTarget : public testing::TestWithParam<SimdTarget> {
   }
 };
 
-inline std::string target_name(const testing::TestParamInfo<SimdTarget>& info) {
-  return simd_target_name(info.param);
-}
+inline std::string target_name(const testing::TestParamInfo<SimdTarget>& info) { return simd_target_name(info.param); }
 
 // A sweep for one observation and its update.
 template <class Real, class Model>

@@ -65,8 +65,8 @@ void expect_identical(const FeatureEstimate& got, const FeatureEstimate& expecte
 
 struct UglyCase {
   const char* name;
-  Vector3d p_C;           // where the feature is thought to be, frame C
-  Vector2d offset_px;     // of the measurement from where it would be seen
+  Vector3d p_C;        // where the feature is thought to be, frame C
+  Vector2d offset_px;  // of the measurement from where it would be seen
   double deviation_mm;
   double noise_px;
 };
@@ -140,8 +140,8 @@ TEST_P(Bank, UpdatesAsTheScalarUpdateAtUglyPoints) {
   newton.covariance = CovarianceLinearisation::kLastStep;
   UpdateSettings open;
   open.gate = 1e12;
-  for (const BasisLayout layout : {BasisLayout{0, 0}, BasisLayout{1, 0}, BasisLayout{3, 0}, BasisLayout{8, 0},
-                                   BasisLayout{12, 2}}) {
+  for (const BasisLayout layout :
+       {BasisLayout{0, 0}, BasisLayout{1, 0}, BasisLayout{3, 0}, BasisLayout{8, 0}, BasisLayout{12, 2}}) {
     SCOPED_TRACE("basis of " + std::to_string(layout.size()));
     for (const UpdateSettings& settings : {UpdateSettings{}, newton, open}) {
       for (const UglyCase& ugly : kUglyCases) {
@@ -318,7 +318,8 @@ TEST_P(Bank, ResultsDoNotDependOnLaneGroupOrWorkers) {
           measured.set(lane, observation.z, observation.R);
         }
         LaneOutcomes<double> outcomes;
-        shuffled.update(g, phases, i, moved.frames[static_cast<std::size_t>(i)].X_CW, kDistorted, measured, {}, outcomes);
+        shuffled.update(g, phases, i, moved.frames[static_cast<std::size_t>(i)].X_CW, kDistorted, measured, {},
+                        outcomes);
       }
     }
   };
@@ -358,8 +359,8 @@ TEST_P(Bank, MotionFollowsPendingUpdatesWithoutAnotherSweep) {
           b_rate(i) = phases[k].b_rate[static_cast<std::size_t>(i)];
         }
         const Vector3d velocity = velocity_of(estimate.x, b_rate, phases[k].rate_rad_per_s);
-        const Matrix3d S = estimate.position_covariance(b) +
-                           std::pow(phases[k].deviation_s, 2) * velocity * velocity.transpose();
+        const Matrix3d S =
+            estimate.position_covariance(b) + std::pow(phases[k].deviation_s, 2) * velocity * velocity.transpose();
         for (const LaneMotions<double>& motions : {from_sweep, by_pass}) {
           EXPECT_LT(largest_difference(motions.position_of(lane), position_of(estimate.x, b)), 1e-12);
           EXPECT_LT(largest_difference(motions.velocity_of(lane), velocity), 1e-11);
@@ -554,7 +555,9 @@ TEST_P(Bank, CovarianceStaysPositiveDefiniteOverAMillionUpdates) {
   expect_positive_definite(bank({1, 0}, 2 * kLanes), kUpdates);
 }
 
-TEST_P(Bank, CovarianceStaysPositiveDefiniteWithManyHarmonics) { expect_positive_definite(bank({8, 0}, kLanes), 2'000); }
+TEST_P(Bank, CovarianceStaysPositiveDefiniteWithManyHarmonics) {
+  expect_positive_definite(bank({8, 0}, kLanes), 2'000);
+}
 
 }  // namespace
 }  // namespace perimap
