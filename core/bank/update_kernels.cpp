@@ -236,15 +236,15 @@ HWY_INLINE void linearise(const Problem<Real>& problem, Mask<Real> wanted, const
   choose(not_finite, number<Real>(UpdateStatus::kNotFinite), at_point.status);
 }
 
-// JS = J S (2x3) and its product with J^T (2x2, lower triangle), to which scale R is added.
+// J S J^T (2x2, lower triangle).
 template <class Real>
-HWY_INLINE void innovation_covariance(const Vector<Real> (*J)[3], const Vector<Real>* S, const Vector<Real>* R,
-                                      Vector<Real> (*JS)[3], Vector<Real>* A) noexcept {
+HWY_INLINE void predicted_covariance(const Vector<Real> (*J)[3], const Vector<Real>* S, Vector<Real>* G) noexcept {
+  Vector<Real> JS[2][3];
   times_symmetric(S, J[0], JS[0]);
   times_symmetric(S, J[1], JS[1]);
-  A[0] = hn::Add(dot3(JS[0], J[0]), R[0]);
-  A[1] = hn::Add(dot3(JS[1], J[0]), R[1]);
-  A[2] = hn::Add(dot3(JS[1], J[1]), R[2]);
+  G[0] = dot3(JS[0], J[0]);
+  G[1] = dot3(JS[1], J[0]);
+  G[2] = dot3(JS[1], J[1]);
 }
 
 // The lanes that still take part, and why the others do not.
@@ -273,46 +273,50 @@ HWY_INLINE void commit(const GroupView<Real>& group, const UpdateTask<Real>& tas
                        const Vector<Real> (*K)[2], Progress<Real>& progress) noexcept {
   using V = Vector<Real>;
   const Tag<Real> tag;
-  HWY_ALIGN Real x_new[kMaxState * kLanes];
-  HWY_ALIGN Real diagonal_new[kMaxState * kLanes];
+  HWY_ALIGN Real x_before[kMaxState * kLanes];
+  HWY_ALIGN Real diagonal_before[kMaxState * kLanes];
   V l[3];
   V k[3][2];
   for (int c = 0; c < 3; ++c) {
     l[c] = hn::IfThenElseZero(progress.alive, lambda[c]);
     for (int m = 0; m < 2; ++m) k[c][m] = hn::IfThenElseZero(progress.alive, K[c][m]);
   }
-  // Both stay finite as long as every term is: one infinity or NaN makes the sum NaN or infinite.
+  // Stays zero as long as every term is finite: one infinity or NaN makes it NaN.
   V finite = hn::Zero(tag);
   Mask<Real> positive = progress.alive;
   for (int i = 0; i < group.d; ++i) {
-    const V M[3] = {hn::Load(tag, at(task.gain, i, lane)), hn::Load(tag, at(task.gain, group.d + i, lane)),
-                    hn::Load(tag, at(task.gain, 2 * group.d + i, lane))};
-    const V x = hn::Add(hn::Load(tag, at(group.x, i, lane)), dot3(M, l));
-    const V U_0 = hn::MulAdd(M[2], k[2][0], hn::MulAdd(M[1], k[1][0], hn::Mul(M[0], k[0][0])));
-    const V U_1 = hn::MulAdd(M[2], k[2][1], hn::MulAdd(M[1], k[1][1], hn::Mul(M[0], k[0][1])));
-    const V variance = hn::NegMulAdd(U_1, U_1, hn::NegMulAdd(U_0, U_0, hn::Load(tag, at(group.diagonal, i, lane))));
-    finite = hn::MulAdd(x, hn::Zero(tag), finite);
-    positive = hn::And(positive, hn::Gt(variance, hn::Zero(tag)));
-    hn::Store(U_0, tag, at(task.U, 2 * i, lane));
-    hn::Store(U_1, tag, at(task.U, 2 * i + 1, lane));
-    hn::Store(x, tag, x_new + i * kLanes);
-    hn::Store(variance, tag, diagonal_new + i * kLanes);
-  }
-  const Mask<Real> before = progress.alive;
-  progress.refuse(hn::Not(hn::Eq(finite, hn::Zero(tag))), number<Real>(UpdateStatus::kNotFinite));
-  progress.refuse(hn::Not(positive), number<Real>(UpdateStatus::kNotPositive));
-  if (!hn::AllFalse(tag, hn::AndNot(progress.alive, before))) {
-    for (int i = 0; i < 2 * group.d; ++i) {
-      Real* U = at(task.U, i, lane);
-      hn::Store(hn::IfThenElseZero(progress.alive, hn::Load(tag, U)), tag, U);
-    }
-  }
-  for (int i = 0; i < group.d; ++i) {
     Real* x = at(group.x, i, lane);
     Real* variance = at(group.diagonal, i, lane);
-    hn::Store(hn::IfThenElse(progress.alive, hn::Load(tag, x_new + i * kLanes), hn::Load(tag, x)), tag, x);
-    hn::Store(hn::IfThenElse(progress.alive, hn::Load(tag, diagonal_new + i * kLanes), hn::Load(tag, variance)), tag,
-              variance);
+    const V M[3] = {hn::Load(tag, at(task.gain, i, lane)), hn::Load(tag, at(task.gain, group.d + i, lane)),
+                    hn::Load(tag, at(task.gain, 2 * group.d + i, lane))};
+    const V x_old = hn::Load(tag, x);
+    const V variance_old = hn::Load(tag, variance);
+    const V x_new = hn::Add(x_old, dot3(M, l));
+    const V U_0 = hn::MulAdd(M[2], k[2][0], hn::MulAdd(M[1], k[1][0], hn::Mul(M[0], k[0][0])));
+    const V U_1 = hn::MulAdd(M[2], k[2][1], hn::MulAdd(M[1], k[1][1], hn::Mul(M[0], k[0][1])));
+    const V variance_new = hn::NegMulAdd(U_1, U_1, hn::NegMulAdd(U_0, U_0, variance_old));
+    finite = hn::MulAdd(x_new, hn::Zero(tag), finite);
+    positive = hn::And(positive, hn::Gt(variance_new, hn::Zero(tag)));
+    hn::Store(U_0, tag, at(task.U, 2 * i, lane));
+    hn::Store(U_1, tag, at(task.U, 2 * i + 1, lane));
+    hn::Store(x_old, tag, x_before + i * kLanes);
+    hn::Store(variance_old, tag, diagonal_before + i * kLanes);
+    hn::Store(x_new, tag, x);
+    hn::Store(variance_new, tag, variance);
+  }
+  const Mask<Real> spoilt = hn::Not(hn::Eq(finite, hn::Zero(tag)));
+  const Mask<Real> lost = hn::Or(spoilt, hn::AndNot(positive, progress.alive));
+  progress.refuse(spoilt, number<Real>(UpdateStatus::kNotFinite));
+  progress.refuse(hn::Not(positive), number<Real>(UpdateStatus::kNotPositive));
+  if (hn::AllFalse(tag, lost)) return;
+  const auto restore = [&](Real* elements, V before) HWY_ATTR {
+    hn::Store(hn::IfThenElse(lost, before, hn::Load(tag, elements)), tag, elements);
+  };
+  for (int i = 0; i < group.d; ++i) {
+    restore(at(group.x, i, lane), hn::Load(tag, x_before + i * kLanes));
+    restore(at(group.diagonal, i, lane), hn::Load(tag, diagonal_before + i * kLanes));
+    restore(at(task.U, 2 * i, lane), hn::Zero(tag));
+    restore(at(task.U, 2 * i + 1, lane), hn::Zero(tag));
   }
 }
 
@@ -360,14 +364,15 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
   for (int i = 0; i < 2; ++i) {
     hn::StoreU(hn::IfThenElseZero(progress.alive, now.r[i]), tag, outcomes.innovation[i] + lane);
   }
-  V JS[2][3];
-  V A[3];
-  innovation_covariance<Real>(now.J, S, R, JS, A);
+  V G[3];  // J S J^T at `now`
+  predicted_covariance<Real>(now.J, S, G);
   Whitening<Real> whitening;
-  progress.refuse(hn::Not(whitening.factor(A[0], A[1], A[2])), not_positive);
+  progress.refuse(hn::Not(whitening.factor(hn::Add(G[0], R[0]), hn::Add(G[1], R[1]), hn::Add(G[2], R[2]))),
+                  not_positive);
   hn::StoreU(hn::IfThenElseZero(progress.alive, whitening.squared_length(now.r[0], now.r[1])), tag,
              outcomes.normalised_innovation_squared + lane);
 
+  const bool at_final = settings.covariance == CovarianceLinearisation::kFinalIterate;
   const bool damped = settings.method == UpdateMethod::kLevenbergMarquardt;
   const V step_factor = hn::Set(tag, damped ? Real(1) : static_cast<Real>(settings.step_factor));
   const V tolerance2 = hn::Set(tag, static_cast<Real>(settings.tolerance * settings.tolerance));
@@ -383,8 +388,7 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
   for (int iteration = 0; iteration < settings.max_iterations && !hn::AllFalse(tag, iterating); ++iteration) {
     iterations = hn::Add(iterations, hn::IfThenElseZero(iterating, one));
     const V damping = hn::Add(one, mu);
-    const V scaled_R[3] = {hn::Mul(damping, R[0]), hn::Mul(damping, R[1]), hn::Mul(damping, R[2])};
-    innovation_covariance<Real>(now.J, S, scaled_R, JS, A);
+    const V A[3] = {hn::MulAdd(damping, R[0], G[0]), hn::MulAdd(damping, R[1], G[1]), hn::MulAdd(damping, R[2], G[2])};
     const V determinant = difference_of_products(A[0], A[2], A[1], A[1]);
     const Mask<Real> positive =
         hn::And(hn::And(hn::Gt(A[0], zero), hn::Gt(determinant, zero)), hn::IsFinite(determinant));
@@ -406,7 +410,7 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
       trial[j] = hn::Add(lambda[j], step[j]);
     }
     times_symmetric(S, step, S_step);
-    times_symmetric(S, trial, w_trial);
+    for (int j = 0; j < 3; ++j) w_trial[j] = hn::Add(w[j], S_step[j]);
     const V prior_length2 = dot3(step, S_step);
     const V length2 =
         hn::Add(prior_length2, problem.R_factor.squared_length(dot3(now.J[0], S_step), dot3(now.J[1], S_step)));
@@ -437,14 +441,25 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
       progress.refuse(hn::And(iterating, failed), next.status);
       taken = hn::And(iterating, progress.alive);
     }
-    for (int i = 0; i < 2; ++i) {
-      for (int j = 0; j < 3; ++j) choose(taken, now.J[i][j], J_before[i][j]);
+    if (!at_final) {
+      for (int i = 0; i < 2; ++i) {
+        for (int j = 0; j < 3; ++j) choose(taken, now.J[i][j], J_before[i][j]);
+      }
     }
-    for (int j = 0; j < 3; ++j) {
-      choose(taken, trial[j], lambda[j]);
-      choose(taken, w_trial[j], w[j]);
+    if (hn::AllTrue(tag, taken)) {
+      for (int j = 0; j < 3; ++j) {
+        lambda[j] = trial[j];
+        w[j] = w_trial[j];
+      }
+      now = next;
+    } else {
+      for (int j = 0; j < 3; ++j) {
+        choose(taken, trial[j], lambda[j]);
+        choose(taken, w_trial[j], w[j]);
+      }
+      choose<Real>(taken, next, now);
     }
-    choose<Real>(taken, next, now);
+    predicted_covariance<Real>(now.J, S, G);
     moved = hn::Or(moved, taken);
     iterating = hn::And(iterating, progress.alive);
     iterating = hn::AndNot(hn::And(taken, hn::Lt(length2, tolerance2)), iterating);
@@ -454,10 +469,10 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
   progress.refuse(hn::Not(hn::Le(now.cost, hn::Set(tag, static_cast<Real>(settings.gate)))),
                   number<Real>(UpdateStatus::kRejectedByGate));
 
-  const bool at_final = settings.covariance == CovarianceLinearisation::kFinalIterate;
   const V(*J)[3] = at_final ? now.J : J_before;
-  innovation_covariance<Real>(J, S, R, JS, A);
-  progress.refuse(hn::Not(whitening.factor(A[0], A[1], A[2])), not_positive);
+  if (!at_final) predicted_covariance<Real>(J, S, G);
+  progress.refuse(hn::Not(whitening.factor(hn::Add(G[0], R[0]), hn::Add(G[1], R[1]), hn::Add(G[2], R[2]))),
+                  not_positive);
   // U = M J^T L^-T, so that U U^T = M J^T (J S J^T + R)^-1 J M^T.
   V K[3][2];
   for (int j = 0; j < 3; ++j) whitening.apply(J[0][j], J[1][j], K[j][0], K[j][1]);

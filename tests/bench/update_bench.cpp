@@ -4,6 +4,7 @@
 #include <barrier>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <random>
@@ -13,7 +14,7 @@
 #include "core/estimation/iterated_update.hpp"
 #include "dense_baselines.hpp"
 #include "interleaved_timing.hpp"
-#include "memory_pass.hpp"
+#include "machine_bounds.hpp"
 #include "simulated_feature.hpp"
 
 namespace perimap::bench {
@@ -156,13 +157,14 @@ double covariance_bytes(const BasisLayout& layout) {
   return d * (d + 1.0) / 2.0 * sizeof(double);
 }
 
-void print_rows(const std::vector<Candidate>& candidates, double bound_ns) {
+void print_rows(const std::vector<Candidate>& candidates, double memory_ns, double arithmetic_ns) {
   const double paper = candidates.front().median();
   for (const Candidate& candidate : candidates) {
     std::printf("  %-58s %10.0f %10.0f %10.0f %9.1f", candidate.name.c_str(), candidate.median(),
                 candidate.quantile(0.99), candidate.quantile(1.0), paper / candidate.median());
     if (candidate.name.find("double") != std::string::npos) {
-      std::printf(" %7.0f %%", 100.0 * bound_ns / candidate.median());
+      std::printf(" %7.0f %% %7.0f %%", 100.0 * memory_ns / candidate.median(),
+                  100.0 * arithmetic_ns / candidate.median());
     }
     std::printf("\n");
   }
@@ -230,12 +232,17 @@ void bench_updates(int harmonics) {
   candidates.emplace_back("bound: P read and written once (double)", features,
                           [&] { memory_pass(memory.get(), count); });
 
+  double sum = 0.0;
+  candidates.emplace_back("bound: 4 multiply-adds an element of P (double)", features,
+                          [&] { sum += arithmetic_pass(count); });
+
   time_interleaved(candidates, kRounds);
+  if (!std::isfinite(sum)) std::abort();
   std::printf("\nH = %d, d = %d: %d features in the bank, P %.0f KiB\n", harmonics, layout.state_size(),
               groups * kLanes, features * covariance_bytes(layout) / 1024.0);
-  std::printf("  %-58s %10s %10s %10s %9s %9s\n", "ns per feature update", "median", "p99", "max", "x paper",
-              "of bound");
-  print_rows(candidates, candidates.back().median());
+  std::printf("  %-58s %10s %10s %10s %9s %9s %9s\n", "ns per feature update", "median", "p99", "max", "x paper",
+              "of memory", "of arith.");
+  print_rows(candidates, candidates[candidates.size() - 2].median(), candidates.back().median());
   if (one.refused + one_single.refused > 0) {
     std::printf("  refused updates: double %ld, float %ld\n", one.refused, one_single.refused);
   }
