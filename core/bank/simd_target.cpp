@@ -8,7 +8,7 @@ std::vector<SimdTarget> simd_targets() {
   const std::int64_t usable = hwy::SupportedTargets() & HWY_TARGETS;
   std::vector<SimdTarget> targets;
   // Better targets have lower bits.
-  for (int bit = 0; bit < 62; ++bit) {
+  for (int bit = 0; bit < 63; ++bit) {
     if ((usable >> bit & 1) != 0) targets.push_back(SimdTarget{std::int64_t{1} << bit});
   }
   return targets;

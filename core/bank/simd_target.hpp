@@ -14,7 +14,7 @@ enum class SimdTarget : std::int64_t {};
 [[nodiscard]] std::vector<SimdTarget> simd_targets();
 [[nodiscard]] inline SimdTarget best_simd_target() { return simd_targets().front(); }
 
-// "AVX3" (AVX-512), "AVX2", "SSE4", or "EMU128" (no vector instructions asked for).
+// "AVX3" (AVX-512), "AVX2", "SSE4", or "SCALAR".
 [[nodiscard]] const char* simd_target_name(SimdTarget target);
 
 }  // namespace perimap

@@ -1,5 +1,7 @@
 #include "core/bank/sweep_kernels.hpp"
 
+#include <utility>
+
 #include "core/bank/target_choice.hpp"
 
 #undef HWY_TARGET_INCLUDE
@@ -20,6 +22,18 @@ using Vector = hn::Vec<Tag<Real>>;
 
 // Where (row, column) of a symmetric 3x3 matrix stands, row >= column.
 HWY_INLINE constexpr int lower_index(int row, int column) noexcept { return row * (row + 1) / 2 + column; }
+
+template <class Visit, int... kIndices>
+HWY_INLINE void unroll(std::integer_sequence<int, kIndices...>, const Visit& visit) noexcept {
+  (visit(std::integral_constant<int, kIndices>()), ...);
+}
+
+// Calls visit(0) to visit(kCount - 1) with the number as a type. For nested loops, which the compiler would unroll too
+// late to keep arrays of vectors in registers.
+template <int kCount, class Visit>
+HWY_INLINE void unroll(const Visit& visit) noexcept {
+  unroll(std::make_integer_sequence<int, kCount>(), visit);
+}
 
 // Element i of an array of lane groups, from lane `lane` on.
 template <class Real>
@@ -115,8 +129,8 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
       P += kRows * kLanes;
     }
     if (c == a) {
-      for (int r = 0; r < kRows; ++r) {
-        for (int s = 0; s < r; ++s) {
+      unroll<kRows>([&](auto r) HWY_ATTR {
+        unroll<r>([&](auto s) HWY_ATTR {
           V p = hn::Load(tag, P);
           for (int m = 0; m < kPairs; ++m) {
             p = hn::NegMulAdd(U_i[m][r][0], U_i[m][s][0], p);
@@ -131,8 +145,8 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
           for (int q = 0; q < kPredicted; ++q) {
             Pb_i[q][r] = hn::MulAdd(p, hn::Set(tag, b_predicted[q][k_0 + s]), Pb_i[q][r]);
           }
-        }
-      }
+        });
+      });
       for (int r = 0; r < kRows; ++r) {
         const V p = hn::Load(tag, at(group.diagonal, i_0 + r, lane));
         for (int q = 0; q < kLearnt; ++q) M_i[q][r] = hn::MulAdd(p, b_i[q][r], M_i[q][r]);

@@ -28,8 +28,10 @@ double multiply_adds(std::size_t count) {
   const hn::ScalableTag<double> tag;
   const auto shrink = hn::Set(tag, 0.999);
   // Twelve chains: more than latency times throughput of any machine, and few enough for sixteen registers.
-  auto a = hn::Set(tag, 1.0);
-  auto b = a, c = a, d = a, e = a, f = a, g = a, h = a, k = a, l = a, m = a, n = a;
+  // All begin differently, or the compiler would see that they are one.
+  const auto start = [&](double value) HWY_ATTR { return hn::Set(tag, value); };
+  auto a = start(1), b = start(2), c = start(3), d = start(4), e = start(5), f = start(6);
+  auto g = start(7), h = start(8), k = start(9), l = start(10), m = start(11), n = start(12);
   for (std::size_t i = 0; i < count; i += 3 * hn::Lanes(tag)) {
     a = hn::MulAdd(a, shrink, shrink);
     b = hn::MulAdd(b, shrink, shrink);
