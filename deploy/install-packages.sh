@@ -20,6 +20,7 @@ build=(
   libeigen3-dev                              # core: linear algebra
   libexpected-dev                            # core: Expected<T>
   libboost-dev                               # core/realtime: lock-free rings
+  libhwy-dev                                 # core/bank: portable SIMD with a choice at run time
   libopencv-core-dev libopencv-imgproc-dev   # core/vision
   cyclonedds-dev cyclonedds-tools            # idl, daemon: DDS and its IDL compiler
   libfmt-dev
@@ -36,6 +37,7 @@ tests=(
 full=(
   clang-16 libclang-rt-16-dev                # fuzzing
   clang-tidy clang-format
+  libceres-dev                               # tests/bench: the batch alternative
 )
 
 wanted=test

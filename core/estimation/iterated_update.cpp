@@ -39,6 +39,15 @@ struct Cholesky2 {
   }
 };
 
+// The model at one point of the iteration.
+struct Linearisation {
+  Vector2d r;   // z - h(p)
+  Matrix23d J;  // dh/dp
+  double cost = 0.0;
+};
+
+}  // namespace
+
 UpdateStatus status_of(ProjectionStatus status) noexcept {
   switch (status) {
     case ProjectionStatus::kOk:
@@ -52,15 +61,6 @@ UpdateStatus status_of(ProjectionStatus status) noexcept {
   }
   return UpdateStatus::kNotFinite;
 }
-
-// The model at one point of the iteration.
-struct Linearisation {
-  Vector2d r;   // z - h(p)
-  Matrix23d J;  // dh/dp
-  double cost = 0.0;
-};
-
-}  // namespace
 
 template <class Model>
 UpdateOutcome iterated_update(FeatureEstimate& estimate, const Observation& observation, const Model& model,

@@ -56,6 +56,9 @@ enum class UpdateStatus : std::uint8_t {
   kSizeMismatch,  // basis, state and covariance do not fit together
 };
 
+// Why an update is refused whose measurement can not be predicted; kAccepted for kOk.
+[[nodiscard]] UpdateStatus status_of(ProjectionStatus status) noexcept;
+
 struct UpdateOutcome {
   bool accepted = false;
   UpdateStatus status = UpdateStatus::kNotFinite;

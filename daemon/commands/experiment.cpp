@@ -42,9 +42,9 @@ Expected<void> write_files(const Experiment& experiment, const std::filesystem::
     const auto png = png_of_svg(svg);
     if (!png) return tl::unexpected(png.error());
     for (const auto& [rest, text] : {std::pair{".svg", &svg}, std::pair{".png", &*png}}) {
-      if (const auto done = write_file(path("-" + figure.name + rest), *text); !done) return done;
+      if (auto done = write_file(path("-" + figure.name + rest), *text); !done) return done;
     }
-    if (const auto done = write_file(path("-" + figure.name + ".csv"), to_csv(figure)); !done) return done;
+    if (auto done = write_file(path("-" + figure.name + ".csv"), to_csv(figure)); !done) return done;
   }
   return write_file(path(".csv"), to_csv(experiment))
       .and_then([&] { return write_file(path(".json"), to_json(experiment).dump(2) + "\n"); })

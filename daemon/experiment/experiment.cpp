@@ -173,7 +173,9 @@ PlotLine exponential_fit(const std::vector<PlotPoint>& points, const char* color
   double a = 0.0;
   double b = 0.0;
   double tau = 1.0;
-  for (double trial = 0.1; trial < 30.0; trial *= 1.1) {
+  constexpr int kTrials = 60;
+  for (int k = 0; k < kTrials; ++k) {
+    const double trial = 0.1 * std::pow(1.1, k);
     double n = 0.0;
     double se = 0.0;
     double see = 0.0;

@@ -40,9 +40,10 @@ Expected<std::vector<Instant>> r_peaks(const SceneSettings& settings) {
   const auto& beats = record->beat_samples;
   const auto seconds = [](std::uint32_t sample) { return sample / EcgRecord::kSampleRate_hz; };
   const double last_start = seconds(beats.back()) - duration_s - 3.0;
-  if (last_start < seconds(beats.front()))
+  if (last_start < seconds(beats.front())) {
     return fail("ECG record " + settings.ecg_record + " is too short for " + std::to_string(settings.frames) +
                 " frames");
+  }
   const double start = noise.uniform(0, seconds(beats.front()), last_start);
   for (const std::uint32_t beat : beats) {
     const double t = seconds(beat) - start;

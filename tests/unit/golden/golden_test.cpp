@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <complex>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
@@ -14,6 +13,7 @@
 #include "core/estimation/measurement_model.hpp"
 #include "core/periodic/basis.hpp"
 #include "core/periodic/periodic_motion.hpp"
+#include "golden_data.hpp"
 
 namespace perimap {
 namespace {
@@ -22,58 +22,18 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using nlohmann::json;
 
-constexpr double kTolerance = 1e-9;
-constexpr int kUntilConverged = 200;
-
-json load(const std::string& name) {
-  const std::string path = std::string(PERIMAP_TEST_DATA) + "/golden/" + name;
-  std::ifstream file(path);
-  EXPECT_TRUE(file) << path;
-  return json::parse(file);
-}
-
-VectorXd vector_of(const json& values) {
-  const auto v = values.get<std::vector<double>>();
-  return Eigen::Map<const VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
-}
-
-MatrixXd matrix_of(const json& rows) {
-  MatrixXd M(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(rows.front().size()));
-  for (Eigen::Index i = 0; i < M.rows(); ++i) M.row(i) = vector_of(rows[static_cast<std::size_t>(i)]).transpose();
-  return M;
-}
-
-Matrix3d rotation_of(const json& nine) {
-  const VectorXd v = vector_of(nine);
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v.data());
-}
-
-Pose pose_of(const Matrix3d& R, const Vector3d& c) { return {R, -(R * c)}; }
-
-PixelModel pixel_model(double f = 700.0, double cx = 640.0, double cy = 360.0) {
-  return {CameraModel{.width = 1280, .height = 720, .fx = f, .fy = f, .cx = cx, .cy = cy}};
-}
-
-// Largest difference relative to the largest expected magnitude.
-testing::AssertionResult matches(const MatrixXd& got, const MatrixXd& expected, double tolerance = kTolerance) {
-  if (got.rows() != expected.rows() || got.cols() != expected.cols()) {
-    return testing::AssertionFailure() << "size " << got.rows() << "x" << got.cols();
-  }
-  const double error = (got - expected).cwiseAbs().maxCoeff() / expected.cwiseAbs().maxCoeff();
-  if (error <= tolerance) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "relative difference " << error;
-}
-
-// Calls visit(model, case) with the model that the case names.
-template <class Visit>
-void with_model(const std::string& name, Visit visit) {
-  if (name == "bearing") {
-    visit(BearingModel{});
-  } else {
-    ASSERT_EQ(name, "pixel");
-    visit(pixel_model());
-  }
-}
+using golden::exact_settings;
+using golden::kTolerance;
+using golden::kUntilConverged;
+using golden::load;
+using golden::matches;
+using golden::matrix_of;
+using golden::observation_of;
+using golden::observations_of;
+using golden::pixel_model;
+using golden::pose_of;
+using golden::vector_of;
+using golden::with_model;
 
 TEST(Golden, PositionsEqualTheInverseFft) {
   for (const json& c : load("a_reconstruct.json")) {
@@ -161,23 +121,12 @@ TEST(Golden, MeasurementsAndTheirJacobians) {
   }
 }
 
-UpdateSettings exact_settings() {
-  UpdateSettings settings;
-  settings.tolerance = 0.0;
-  settings.gate = 1e300;
-  return settings;
-}
-
 TEST(Golden, SingleUpdates) {
   int i = 0;
   for (const json& c : load("c_update.json")) {
     SCOPED_TRACE("case " + std::to_string(i++));
     const BasisLayout layout{.cardiac_harmonics = c["H"].get<int>()};
-    Observation observation;
-    observation.z = vector_of(c["z"]);
-    observation.R = matrix_of(c["Rm"]);
-    observation.b = basis_at(layout, c["phi"].get<double>());
-    observation.X_CW = pose_of(matrix_of(c["R"]), vector_of(c["c"]));
+    const Observation observation = observation_of(c, layout);
     UpdateSettings settings = exact_settings();
     settings.method = UpdateMethod::kGaussNewton;
     settings.step_factor = c["gamma"].get<double>();
@@ -195,17 +144,6 @@ TEST(Golden, SingleUpdates) {
       EXPECT_NEAR(outcome.map_cost, c["map_cost"].get<double>(), 1e-9 * (1.0 + c["map_cost"].get<double>()));
     }
   }
-}
-
-std::vector<Observation> observations_of(const json& run, const BasisLayout& layout) {
-  std::vector<Observation> observations(run["z"].size());
-  for (std::size_t k = 0; k < observations.size(); ++k) {
-    observations[k].z = vector_of(run["z"][k]);
-    observations[k].R = matrix_of(run["Rm"]);
-    observations[k].b = basis_at(layout, run["phi"][k].get<double>());
-    observations[k].X_CW = pose_of(rotation_of(run["R"][k]), vector_of(run["c"][k]));
-  }
-  return observations;
 }
 
 void expect_estimate(const FeatureEstimate& estimate, const json& expected, double tolerance = kTolerance) {

@@ -1,0 +1,405 @@
+#include "core/bank/sweep_kernels.hpp"
+
+#include <utility>
+
+#include "core/bank/target_choice.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/bank/sweep_kernels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace perimap {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class Real>
+using Tag = hn::CappedTag<Real, kLanes>;
+template <class Real>
+using Vector = hn::Vec<Tag<Real>>;
+
+// Where (row, column) of a symmetric 3x3 matrix stands, row >= column.
+HWY_INLINE constexpr int lower_index(int row, int column) noexcept { return row * (row + 1) / 2 + column; }
+
+template <class Visit, int... kIndices>
+HWY_INLINE void unroll(std::integer_sequence<int, kIndices...>, const Visit& visit) noexcept {
+  (visit(std::integral_constant<int, kIndices>()), ...);
+}
+
+// Calls visit(0) to visit(kCount - 1) with the number as a type. For nested loops, which the compiler would unroll too
+// late to keep arrays of vectors in registers.
+template <int kCount, class Visit>
+HWY_INLINE void unroll(const Visit& visit) noexcept {
+  unroll(std::make_integer_sequence<int, kCount>(), visit);
+}
+
+// Element i of an array of lane groups, from lane `lane` on.
+template <class Real>
+HWY_INLINE Real* at(Real* elements, int i, int lane) noexcept {
+  return elements + i * kLanes + lane;
+}
+
+// What to do at a visit of a tile: the first of the pending updates, of the learnt phases with their M, and of the
+// predicted phases with their S. How many of each are template parameters.
+template <class Real>
+struct TileWork {
+  const Real* U = nullptr;
+  const SweepPhase<Real>* learnt = nullptr;
+  Real* gain = nullptr;
+  const SweepPhase<Real>* predicted = nullptr;
+  Real* S = nullptr;
+};
+
+// Applies kPairs pending updates, then adds the tile's part to M and to S.
+//
+// An element P_ij left of the diagonal counts twice, as P_ij and as P_ji: M gets P_ij b_j in row i and P_ij b_i in row
+// j. Row i of M is set here; to row j is added, which its own tile, an earlier one, has set.
+template <int kRows, int kPairs, int kLearnt, int kPredicted, class Real>
+HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& tile, const TileWork<Real>& work,
+                           int lane) noexcept {
+  using V = Vector<Real>;
+  const Tag<Real> tag;
+  const int n = group.n;
+  const int a = tile.axis;
+  const int i_0 = tile.first_row;
+  const int k_0 = i_0 - a * n;  // the first row's coefficient
+  // Arrays of length zero are not C++.
+  constexpr int kU = kPairs > 0 ? kPairs : 1;
+  constexpr int kL = kLearnt > 0 ? kLearnt : 1;
+  constexpr int kQ = kPredicted > 0 ? kPredicted : 1;
+
+  const Real* U[kU];
+  V U_i[kU][kRows][2];
+  for (int m = 0; m < kPairs; ++m) {
+    U[m] = at(work.U, m * group.d * 2, lane);
+    for (int r = 0; r < kRows; ++r) {
+      U_i[m][r][0] = hn::Load(tag, U[m] + 2 * (i_0 + r) * kLanes);
+      U_i[m][r][1] = hn::Load(tag, U[m] + (2 * (i_0 + r) + 1) * kLanes);
+    }
+  }
+  const Real* b[kL];
+  Real* M[kL];
+  V b_i[kL][kRows];
+  for (int q = 0; q < kLearnt; ++q) {
+    b[q] = work.learnt[q].b.data();
+    M[q] = at(work.gain, q * 3 * group.d, lane);
+    for (int r = 0; r < kRows; ++r) b_i[q][r] = hn::Set(tag, b[q][k_0 + r]);
+  }
+  const Real* b_predicted[kQ];
+  for (int q = 0; q < kPredicted; ++q) b_predicted[q] = work.predicted[q].b.data();
+
+  Real* P = at(group.lower, static_cast<int>(tile.offset), lane);
+  for (int c = 0; c <= a; ++c) {
+    V M_i[kL][kRows];
+    V Pb_i[kQ][kRows];
+    for (int q = 0; q < kLearnt; ++q) {
+      for (int r = 0; r < kRows; ++r) M_i[q][r] = hn::Zero(tag);
+    }
+    for (int q = 0; q < kPredicted; ++q) {
+      for (int r = 0; r < kRows; ++r) Pb_i[q][r] = hn::Zero(tag);
+    }
+    const int columns = c < a ? n : k_0;
+    for (int k = 0; k < columns; ++k) {
+      const int j = c * n + k;
+      V U_j[kU][2];
+      for (int m = 0; m < kPairs; ++m) {
+        U_j[m][0] = hn::Load(tag, U[m] + 2 * j * kLanes);
+        U_j[m][1] = hn::Load(tag, U[m] + (2 * j + 1) * kLanes);
+      }
+      V M_j[kL];
+      for (int q = 0; q < kLearnt; ++q) M_j[q] = hn::Load(tag, M[q] + (a * group.d + j) * kLanes);
+      for (int r = 0; r < kRows; ++r) {
+        V p = hn::Load(tag, P + r * kLanes);
+        for (int m = 0; m < kPairs; ++m) {
+          p = hn::NegMulAdd(U_i[m][r][0], U_j[m][0], p);
+          p = hn::NegMulAdd(U_i[m][r][1], U_j[m][1], p);
+        }
+        if constexpr (kPairs > 0) hn::Store(p, tag, P + r * kLanes);
+        for (int q = 0; q < kLearnt; ++q) {
+          M_i[q][r] = hn::MulAdd(p, hn::Set(tag, b[q][k]), M_i[q][r]);
+          M_j[q] = hn::MulAdd(p, b_i[q][r], M_j[q]);
+        }
+        for (int q = 0; q < kPredicted; ++q) {
+          Pb_i[q][r] = hn::MulAdd(p, hn::Set(tag, b_predicted[q][k]), Pb_i[q][r]);
+        }
+      }
+      for (int q = 0; q < kLearnt; ++q) hn::Store(M_j[q], tag, M[q] + (a * group.d + j) * kLanes);
+      P += kRows * kLanes;
+    }
+    if (c == a) {
+      unroll<kRows>([&](auto r) HWY_ATTR {
+        unroll<r>([&](auto s) HWY_ATTR {
+          V p = hn::Load(tag, P);
+          for (int m = 0; m < kPairs; ++m) {
+            p = hn::NegMulAdd(U_i[m][r][0], U_i[m][s][0], p);
+            p = hn::NegMulAdd(U_i[m][r][1], U_i[m][s][1], p);
+          }
+          if constexpr (kPairs > 0) hn::Store(p, tag, P);
+          P += kLanes;
+          for (int q = 0; q < kLearnt; ++q) {
+            M_i[q][r] = hn::MulAdd(p, b_i[q][s], M_i[q][r]);
+            M_i[q][s] = hn::MulAdd(p, b_i[q][r], M_i[q][s]);
+          }
+          for (int q = 0; q < kPredicted; ++q) {
+            Pb_i[q][r] = hn::MulAdd(p, hn::Set(tag, b_predicted[q][k_0 + s]), Pb_i[q][r]);
+          }
+        });
+      });
+      for (int r = 0; r < kRows; ++r) {
+        const V p = hn::Load(tag, at(group.diagonal, i_0 + r, lane));
+        for (int q = 0; q < kLearnt; ++q) M_i[q][r] = hn::MulAdd(p, b_i[q][r], M_i[q][r]);
+        // Half: the block on the diagonal is doubled below.
+        for (int q = 0; q < kPredicted; ++q) {
+          Pb_i[q][r] = hn::MulAdd(p, hn::Set(tag, Real(0.5) * b_predicted[q][k_0 + r]), Pb_i[q][r]);
+        }
+      }
+    }
+    for (int q = 0; q < kLearnt; ++q) {
+      for (int r = 0; r < kRows; ++r) hn::Store(M_i[q][r], tag, M[q] + (c * group.d + i_0 + r) * kLanes);
+    }
+    for (int q = 0; q < kPredicted; ++q) {
+      V sum = hn::Zero(tag);
+      for (int r = 0; r < kRows; ++r) sum = hn::MulAdd(Pb_i[q][r], hn::Set(tag, b_predicted[q][k_0 + r]), sum);
+      if (c == a) sum = hn::Add(sum, sum);
+      Real* S = at(work.S, q * 6 + lower_index(a, c), lane);
+      hn::Store(hn::Add(hn::Load(tag, S), sum), tag, S);
+    }
+  }
+  for (int q = 0; q < kLearnt; ++q) {
+    for (int c = a + 1; c < 3; ++c) {
+      for (int r = 0; r < kRows; ++r) hn::Store(hn::Zero(tag), tag, M[q] + (c * group.d + i_0 + r) * kLanes);
+    }
+  }
+}
+
+template <int kPairs, int kLearnt, int kPredicted, class Real>
+HWY_NOINLINE void visit(const GroupView<Real>& group, const CovarianceTile& tile, const TileWork<Real>& work) noexcept {
+  for (int lane = 0; lane < kLanes; lane += static_cast<int>(hn::Lanes(Tag<Real>()))) {
+    if (tile.rows == 4) {
+      visit_tile<4, kPairs, kLearnt, kPredicted>(group, tile, work, lane);
+    } else if (tile.rows == 3) {
+      visit_tile<3, kPairs, kLearnt, kPredicted>(group, tile, work, lane);
+    } else {
+      visit_tile<1, kPairs, kLearnt, kPredicted>(group, tile, work, lane);
+    }
+  }
+}
+
+// S = B M of a learnt phase.
+template <class Real>
+void contract_gain(const GroupView<Real>& group, const SweepPhase<Real>& phase, const Real* gain, Real* S) noexcept {
+  const Tag<Real> tag;
+  for (int lane = 0; lane < kLanes; lane += static_cast<int>(hn::Lanes(tag))) {
+    for (int a = 0; a < 3; ++a) {
+      for (int c = 0; c <= a; ++c) {
+        Vector<Real> even = hn::Zero(tag);
+        Vector<Real> odd = hn::Zero(tag);
+        const Real* M = at(gain, c * group.d + a * group.n, lane);
+        const Real* b = phase.b.data();
+        int k = 0;
+        for (; k + 1 < group.n; k += 2) {
+          even = hn::MulAdd(hn::Load(tag, M + k * kLanes), hn::Set(tag, b[k]), even);
+          odd = hn::MulAdd(hn::Load(tag, M + (k + 1) * kLanes), hn::Set(tag, b[k + 1]), odd);
+        }
+        if (k < group.n) even = hn::MulAdd(hn::Load(tag, M + k * kLanes), hn::Set(tag, b[k]), even);
+        hn::Store(hn::Add(even, odd), tag, at(S, lower_index(a, c), lane));
+      }
+    }
+  }
+}
+
+template <class Real>
+void set_zero(Real* elements, int count) noexcept {
+  const Tag<Real> tag;
+  for (int i = 0; i < count * kLanes; i += static_cast<int>(hn::Lanes(tag))) {
+    hn::Store(hn::Zero(tag), tag, elements + i);
+  }
+}
+
+// A tile is small enough to stay in the first-level cache, so it is visited as often as it takes, and P as a whole is
+// still read once. The first visit does what a frame usually needs: the last pending update, one phase to learn at, two
+// to predict at.
+template <class Real>
+void sweep_tile(const GroupView<Real>& group, const CovarianceTile& tile, const SweepPhases<Real>& phases,
+                int pending) noexcept {
+  int updates = pending;
+  int learnt = phases.learnt();
+  int predicted = phases.count() - learnt;
+  TileWork<Real> work{group.pending, &phases[0], group.gains, &phases[learnt], group.S + learnt * 6 * kLanes};
+  const auto next_updates = [&](int count) noexcept {
+    updates -= count;
+    work.U += count * 2 * group.d * kLanes;
+  };
+  const auto next_learnt = [&](int count) noexcept {
+    learnt -= count;
+    work.learnt += count;
+    work.gain += count * 3 * group.d * kLanes;
+  };
+  const auto next_predicted = [&](int count) noexcept {
+    predicted -= count;
+    work.predicted += count;
+    work.S += count * 6 * kLanes;
+  };
+  for (; updates > 2; next_updates(2)) visit<2, 0, 0>(group, tile, work);
+  for (; updates > 1; next_updates(1)) visit<1, 0, 0>(group, tile, work);
+  if (updates > 0) {
+    if (learnt > 0 && predicted > 1) {
+      visit<1, 1, 2>(group, tile, work);
+      next_learnt(1);
+      next_predicted(2);
+    } else if (learnt > 0) {
+      visit<1, 1, 0>(group, tile, work);
+      next_learnt(1);
+    } else {
+      visit<1, 0, 0>(group, tile, work);
+    }
+  }
+  for (; learnt > 1; next_learnt(2)) visit<0, 2, 0>(group, tile, work);
+  for (; learnt > 0; next_learnt(1)) visit<0, 1, 0>(group, tile, work);
+  for (; predicted > 1; next_predicted(2)) visit<0, 0, 2>(group, tile, work);
+  for (; predicted > 0; next_predicted(1)) visit<0, 0, 1>(group, tile, work);
+}
+
+template <class Real>
+void sweep(const GroupView<Real>& group, const SweepPhases<Real>& phases, int pending) noexcept {
+  const int learnt = phases.learnt();
+  set_zero(group.S + learnt * 6 * kLanes, 6 * (phases.count() - learnt));
+  for (int t = 0; t < group.tile_count; ++t) sweep_tile(group, group.tiles[t], phases, pending);
+  for (int k = 0; k < learnt; ++k) {
+    contract_gain(group, phases[k], group.gains + k * 3 * group.d * kLanes, group.S + k * 6 * kLanes);
+  }
+}
+
+// S <- S - (B U)(B U)^T, M <- M - U (B U)^T.
+template <class Real>
+void correct(const GroupView<Real>& group, const SweepPhase<Real>& phase, const Real* U, Real* S, Real* gain) noexcept {
+  using V = Vector<Real>;
+  const Tag<Real> tag;
+  for (int lane = 0; lane < kLanes; lane += static_cast<int>(hn::Lanes(tag))) {
+    V BU[3][2];
+    for (int a = 0; a < 3; ++a) {
+      V sum_0 = hn::Zero(tag);
+      V sum_1 = hn::Zero(tag);
+      for (int k = 0; k < group.n; ++k) {
+        const V b = hn::Set(tag, phase.b[static_cast<std::size_t>(k)]);
+        sum_0 = hn::MulAdd(hn::Load(tag, at(U, 2 * (a * group.n + k), lane)), b, sum_0);
+        sum_1 = hn::MulAdd(hn::Load(tag, at(U, 2 * (a * group.n + k) + 1, lane)), b, sum_1);
+      }
+      BU[a][0] = sum_0;
+      BU[a][1] = sum_1;
+    }
+    for (int a = 0; a < 3; ++a) {
+      for (int c = 0; c <= a; ++c) {
+        Real* entry = at(S, lower_index(a, c), lane);
+        V s = hn::Load(tag, entry);
+        s = hn::NegMulAdd(BU[a][0], BU[c][0], s);
+        hn::Store(hn::NegMulAdd(BU[a][1], BU[c][1], s), tag, entry);
+      }
+    }
+    if (gain == nullptr) continue;
+    for (int i = 0; i < group.d; ++i) {
+      const V U_0 = hn::Load(tag, at(U, 2 * i, lane));
+      const V U_1 = hn::Load(tag, at(U, 2 * i + 1, lane));
+      for (int c = 0; c < 3; ++c) {
+        Real* entry = at(gain, c * group.d + i, lane);
+        V m = hn::Load(tag, entry);
+        m = hn::NegMulAdd(U_0, BU[c][0], m);
+        hn::Store(hn::NegMulAdd(U_1, BU[c][1], m), tag, entry);
+      }
+    }
+  }
+}
+
+// Adds to S what a pending update has already taken from the diagonal of P, so that the whole of it can be subtracted.
+template <class Real>
+void restore_diagonal(const GroupView<Real>& group, const SweepPhase<Real>& phase, const Real* U, Real* S) noexcept {
+  const Tag<Real> tag;
+  for (int lane = 0; lane < kLanes; lane += static_cast<int>(hn::Lanes(tag))) {
+    for (int a = 0; a < 3; ++a) {
+      Vector<Real> sum = hn::Load(tag, at(S, lower_index(a, a), lane));
+      for (int k = 0; k < group.n; ++k) {
+        const Vector<Real> b = hn::Set(tag, phase.b[static_cast<std::size_t>(k)]);
+        const Vector<Real> bU_0 = hn::Mul(b, hn::Load(tag, at(U, 2 * (a * group.n + k), lane)));
+        const Vector<Real> bU_1 = hn::Mul(b, hn::Load(tag, at(U, 2 * (a * group.n + k) + 1, lane)));
+        sum = hn::MulAdd(bU_1, bU_1, hn::MulAdd(bU_0, bU_0, sum));
+      }
+      hn::Store(sum, tag, at(S, lower_index(a, a), lane));
+    }
+  }
+}
+
+template <class Real>
+void position_covariance(const GroupView<Real>& group, const SweepPhase<Real>& phase, int pending, Real* S) noexcept {
+  set_zero(S, 6);
+  const TileWork<Real> work{nullptr, nullptr, nullptr, &phase, S};
+  for (int t = 0; t < group.tile_count; ++t) visit<0, 0, 1>(group, group.tiles[t], work);
+  for (int m = 0; m < pending; ++m) {
+    const Real* U = group.pending + m * 2 * group.d * kLanes;
+    restore_diagonal(group, phase, U, S);
+    correct<Real>(group, phase, U, S, nullptr);
+  }
+}
+
+template <class Real>
+void motion(const GroupView<Real>& group, const SweepPhase<Real>& phase, const Real* S,
+            LaneMotions<Real>& motions) noexcept {
+  using V = Vector<Real>;
+  const Tag<Real> tag;
+  for (int lane = 0; lane < kLanes; lane += static_cast<int>(hn::Lanes(tag))) {
+    V spread[3];  // what one standard deviation of the phase moves the feature by
+    for (int a = 0; a < 3; ++a) {
+      V position = hn::Zero(tag);
+      V rate = hn::Zero(tag);
+      for (int k = 0; k < group.n; ++k) {
+        const V x = hn::Load(tag, at(group.x, a * group.n + k, lane));
+        position = hn::MulAdd(x, hn::Set(tag, phase.b[static_cast<std::size_t>(k)]), position);
+        rate = hn::MulAdd(x, hn::Set(tag, phase.b_rate[static_cast<std::size_t>(k)]), rate);
+      }
+      const V velocity = hn::Mul(rate, hn::Set(tag, phase.rate_rad_per_s));
+      spread[a] = hn::Mul(velocity, hn::Set(tag, phase.deviation_s));
+      hn::StoreU(position, tag, motions.position[a] + lane);
+      hn::StoreU(velocity, tag, motions.velocity[a] + lane);
+      for (int c = 0; c <= a; ++c) {
+        const V s = hn::Load(tag, at(S, lower_index(a, c), lane));
+        hn::StoreU(hn::MulAdd(spread[a], spread[c], s), tag, motions.covariance[lower_index(a, c)] + lane);
+      }
+    }
+  }
+}
+
+const SweepKernels<double>* sweep_table_double() {
+  static constexpr SweepKernels<double> kTable{&sweep<double>, &position_covariance<double>, &correct<double>,
+                                               &motion<double>};
+  return &kTable;
+}
+
+const SweepKernels<float>* sweep_table_float() {
+  static constexpr SweepKernels<float> kTable{&sweep<float>, &position_covariance<float>, &correct<float>,
+                                              &motion<float>};
+  return &kTable;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace perimap
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace perimap {
+
+HWY_EXPORT(sweep_table_double);
+HWY_EXPORT(sweep_table_float);
+
+template <>
+const SweepKernels<double>& sweep_kernels(SimdTarget target) {
+  return *with_target(target, [] { return HWY_DYNAMIC_DISPATCH(sweep_table_double)(); });
+}
+
+template <>
+const SweepKernels<float>& sweep_kernels(SimdTarget target) {
+  return *with_target(target, [] { return HWY_DYNAMIC_DISPATCH(sweep_table_float)(); });
+}
+
+}  // namespace perimap
+#endif

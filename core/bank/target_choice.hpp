@@ -1,0 +1,29 @@
+// Which of Highway's targets are compiled, and how one of them is chosen for a bank. For the kernels alone; include it
+// before Highway.
+#pragma once
+
+// SSE4, AVX2 and AVX-512; besides them Highway always compiles the baseline of the compiler's flags. The rest would
+// only cost build time.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+
+#include <hwy/targets.h>
+
+#include <mutex>
+
+#include "core/bank/simd_target.hpp"
+
+namespace perimap {
+
+// Calls choose() while Highway's dynamic dispatch points to `target`. Highway keeps its choice for the whole process,
+// so the lock keeps two banks that are made at once from taking each other's.
+template <class Choose>
+auto with_target(SimdTarget target, Choose choose) {
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  hwy::GetChosenTarget().Update(static_cast<std::int64_t>(target));
+  const auto chosen = choose();
+  hwy::GetChosenTarget().DeInit();
+  return chosen;
+}
+
+}  // namespace perimap
