@@ -1,54 +1,13 @@
 // The bank, once made, takes nothing from the heap. A program of its own, because it counts the calls of the allocator.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
 #include "core/bank/motion_predictor.hpp"
-
-namespace {
-
-std::atomic<long> allocations{0};
-
-}  // namespace
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-// The sanitizers own malloc, and tell of its calls.
-extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*malloc_hook)(const volatile void*, std::size_t),
-                                                         void (*free_hook)(const volatile void*));
-namespace {
-[[maybe_unused]] const int kHooks = __sanitizer_install_malloc_and_free_hooks(
-    [](const volatile void*, std::size_t) { allocations.fetch_add(1, std::memory_order_relaxed); },
-    [](const volatile void*) {});
-}  // namespace
-#else
-// operator new ends here too.
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  return __libc_malloc(size);
-}
-#endif
+#include "counted_allocations.hpp"
 
 namespace perimap {
 namespace {
 
-template <class Function>
-long allocations_of(Function function) {
-  const long before = allocations.load();
-  function();
-  return allocations.load() - before;
-}
-
-TEST(Allocation, IsCounted) {
-  void* volatile taken = nullptr;
-  EXPECT_GT(allocations_of([&] { taken = std::malloc(100); }), 0);
-  std::free(taken);
-  int* volatile made = nullptr;
-  EXPECT_GT(allocations_of([&] { made = new int[50]; }), 0);
-  delete[] made;
-}
+using test::allocations_of;
 
 template <class Real, class Model>
 void expect_no_allocation(const Model& model, const Vector3d& ahead_C) {
