@@ -7,6 +7,8 @@
 #include <limits>
 #include <optional>
 
+#include "core/estimation/student_t_loss.hpp"
+
 namespace perimap {
 namespace {
 
@@ -31,11 +33,8 @@ LossValue loss_of(Loss loss, double s, double huber_deviations) noexcept {
       if (radius <= huber_deviations) break;
       return {huber_deviations * (2.0 * radius - huber_deviations), huber_deviations / radius};
     }
-    case Loss::kStudentT: {
-      // -2 log of the bivariate t density: (nu + 2) log(1 + s / nu).
-      constexpr double kNu = 3.0;
-      return {(kNu + 2.0) * std::log1p(s / kNu), (kNu + 2.0) / (kNu + s)};
-    }
+    case Loss::kStudentT:
+      return {student_t_loss(s), student_t_weight(s)};
   }
   return {s, 1.0};
 }

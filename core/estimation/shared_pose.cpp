@@ -4,14 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/estimation/student_t_loss.hpp"
+
 namespace perimap {
 namespace {
-
-// Weight of Student's t with 3 degrees of freedom, two-dimensional: the same loss as the batch start's.
-double student_weight(double s) noexcept {
-  constexpr double kNu = 3.0;
-  return (kNu + 2.0) / (kNu + s);
-}
 
 // Inverse of a symmetric positive definite 2x2; false when it is not one, or not finite.
 bool invert(const Matrix2d& C, Matrix2d& inverse) noexcept {
@@ -108,7 +104,7 @@ SharedPose estimate_shared_pose(const Model& model, const Pose& X_CW, const Comm
       for (std::size_t k = begin; k < std::min(begin + kCommonGroup, matches.size()); ++k) {
         CommonTerm term = linearise(model, shared.linearised_at, matches[k]);
         double weight = term.visible ? 1.0 : 0.0;
-        if (term.visible && weighting == Weighting::kStudent) weight = student_weight(term.squared_residual);
+        if (term.visible && weighting == Weighting::kStudent) weight = student_t_weight(term.squared_residual);
         if (term.visible && weighting == Weighting::kGate) weight = term.squared_residual < settings.gate ? 1.0 : 0.0;
         if (k < used.size()) used[k] = weight > 0.0 ? 1 : 0;
         if (weight == 0.0) continue;
