@@ -79,14 +79,14 @@ class FeatureBank {
   void update(int group, const SweepPhases<Real>& phases, int k, const Pose& X_CW, const PixelModel& model,
               const LaneObservations<Real>& observations, const UpdateSettings& settings,
               LaneOutcomes<Real>& outcomes) noexcept {
+    // A fisheye's trigonometry goes lane by lane.
+    if (model.camera.lens != Lens::kBrownConrady) {
+      update<PixelModel>(group, phases, k, X_CW, model, observations, settings, outcomes);
+      return;
+    }
     const PinholeLens<Real> lens = pinhole_lens<Real>(model.camera);
     UpdateTask<Real> task;
-    // A fisheye's trigonometry goes lane by lane.
-    if (model.camera.lens == Lens::kBrownConrady) {
-      task.lens = &lens;
-    } else {
-      task.other_model = {&model, &linearise_lanes<PixelModel>};
-    }
+    task.lens = &lens;
     run(task, group, phases, k, X_CW, observations, settings, outcomes);
   }
 
