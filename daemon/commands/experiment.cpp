@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -14,6 +13,7 @@
 #include "daemon/experiment/experiment.hpp"
 #include "daemon/experiment/experiment_text.hpp"
 #include "daemon/report/png_picture.hpp"
+#include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
 namespace {
@@ -23,13 +23,6 @@ struct Options {
   std::filesystem::path out;
   bool json = false;
 };
-
-Expected<void> write_file(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  if (!file.flush()) return fail(path.string() + ": cannot be written");
-  return {};
-}
 
 Expected<void> write_files(const Experiment& experiment, const std::filesystem::path& folder) {
   std::error_code error;
@@ -42,13 +35,13 @@ Expected<void> write_files(const Experiment& experiment, const std::filesystem::
     const auto png = png_of_svg(svg);
     if (!png) return tl::unexpected(png.error());
     for (const auto& [rest, text] : {std::pair{".svg", &svg}, std::pair{".png", &*png}}) {
-      if (auto done = write_file(path("-" + figure.name + rest), *text); !done) return done;
+      if (auto done = write_text_file(path("-" + figure.name + rest), *text); !done) return done;
     }
-    if (auto done = write_file(path("-" + figure.name + ".csv"), to_csv(figure)); !done) return done;
+    if (auto done = write_text_file(path("-" + figure.name + ".csv"), to_csv(figure)); !done) return done;
   }
-  return write_file(path(".csv"), to_csv(experiment))
-      .and_then([&] { return write_file(path(".json"), to_json(experiment).dump(2) + "\n"); })
-      .and_then([&] { return write_file(path(".html"), to_html(experiment)); });
+  return write_text_file(path(".csv"), to_csv(experiment))
+      .and_then([&] { return write_text_file(path(".json"), to_json(experiment).dump(2) + "\n"); })
+      .and_then([&] { return write_text_file(path(".html"), to_html(experiment)); });
 }
 
 int complain(const Error& error) {

@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -23,6 +22,7 @@
 #include "daemon/runtime/live_session.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/replay_setup.hpp"
+#include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
 namespace {
@@ -236,9 +236,8 @@ int replay(const Options& options) {
       json["stages"][stage.name] = to_json(stage.histogram->summary());
     }
     if (report) json["accuracy"] = to_json(*report);
-    std::ofstream file(options.json);
-    file << json.dump(2) << '\n';
-    if (!file.flush()) return refuse({fmt::format("{}: cannot be written", options.json)}, kFailure);
+    const auto written = write_text_file(options.json, json.dump(2) + "\n");
+    if (!written) return refuse(written.error(), kFailure);
   }
   return kOk;
 }

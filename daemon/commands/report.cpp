@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -13,6 +12,7 @@
 #include "daemon/report/accuracy_picture.hpp"
 #include "daemon/report/accuracy_text.hpp"
 #include "daemon/report/samples_report.hpp"
+#include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
 namespace {
@@ -43,12 +43,6 @@ int refuse(const std::string& message) {
   return 1;
 }
 
-bool write_file(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  return static_cast<bool>(file.flush());
-}
-
 int report(const Options& options) {
   const auto result =
       report_samples(options.recording, options.samples, options.whole ? ReadMode::kWhole : ReadMode::kStrict);
@@ -66,9 +60,8 @@ int report(const Options& options) {
   }
   fmt::print("{}\n", to_text(result->accuracy));
   if (!options.picture.empty()) {
-    if (!write_file(options.picture, to_svg(result->accuracy, options.recording))) {
-      return refuse(options.picture + ": cannot be written");
-    }
+    const auto written = write_text_file(options.picture, to_svg(result->accuracy, options.recording));
+    if (!written) return refuse(written.error().message);
     fmt::print("picture     {}\n", options.picture);
   }
   if (!options.json.empty()) {
@@ -82,7 +75,8 @@ int report(const Options& options) {
                                  {"release_to_receipt", figures_json(result->release_to_receipt)},
                                  {"jitter", figures_json(result->jitter)},
                                  {"accuracy", to_json(result->accuracy)}};
-    if (!write_file(options.json, json.dump(2) + "\n")) return refuse(options.json + ": cannot be written");
+    const auto written = write_text_file(options.json, json.dump(2) + "\n");
+    if (!written) return refuse(written.error().message);
   }
   return 0;
 }

@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 #include <system_error>
 
@@ -23,6 +24,13 @@ Expected<std::string> read_text_file(const std::filesystem::path& file, std::siz
   text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
   if (std::ferror(stream.get()) != 0) return refuse(errno);
   return text;
+}
+
+Expected<void> write_text_file(const std::filesystem::path& file, std::string_view text) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+  if (!stream.flush()) return fail(file.string() + ": cannot be written");
+  return {};
 }
 
 }  // namespace perimap

@@ -1,4 +1,4 @@
-// Small files written by hand: configurations and calibrations.
+// Small text files: what people write by hand (configurations, calibrations) and what programs leave for them.
 #pragma once
 
 #include <cstddef>
@@ -14,5 +14,8 @@ namespace perimap {
 // of file in errors: "FILE: expected a readable WHAT, got: No such file or directory".
 [[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file, std::size_t largest,
                                                    std::string_view what);
+
+// Replaces the file by the text, byte for byte. Error: "FILE: cannot be written".
+[[nodiscard]] Expected<void> write_text_file(const std::filesystem::path& file, std::string_view text);
 
 }  // namespace perimap
