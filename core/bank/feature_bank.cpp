@@ -1,7 +1,6 @@
 #include "core/bank/feature_bank.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace perimap {
 namespace {
@@ -41,8 +40,9 @@ FeatureBank<Real>::FeatureBank(const BankSettings& settings)
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     for (int r = 0; r < tiles_[t].rows; ++r) tile_of_row_[static_cast<std::size_t>(tiles_[t].first_row + r)] = t;
   }
-  for (Eigen::Index i = 0; i < settings.noise_mm2_per_s.size(); ++i) {
-    noise_mm2_per_s_[static_cast<std::size_t>(i)] = static_cast<Real>(settings.noise_mm2_per_s(i));
+  const Basis shape = diffusion_shape(layout_);
+  for (Eigen::Index i = 0; i < shape.size(); ++i) {
+    diffusion_shape_[static_cast<std::size_t>(i)] = static_cast<Real>(shape(i));
   }
 
   const auto size = static_cast<std::size_t>(d);
@@ -108,7 +108,7 @@ void FeatureBank<Real>::clear(int feature) noexcept {
   for (std::size_t i = 0; i < d; ++i) lane_of(view.x, i, lane) = lane_of(view.diagonal, i, lane) = Real(0);
   for (std::size_t i = 0; i < d * (d - 1) / 2; ++i) lane_of(view.lower, i, lane) = Real(0);
   for (std::size_t i = 0; i < kMaxPendingUpdates * d * 2; ++i) lane_of(view.pending, i, lane) = Real(0);
-  group->noise_s[static_cast<std::size_t>(lane)] = Real(0);
+  group->diffusion_mm2[static_cast<std::size_t>(lane)] = Real(0);
   const auto others = static_cast<LaneMask>(~(1U << lane));
   group->occupied = group->occupied & others;
   group->swept = group->swept & others;
@@ -126,12 +126,12 @@ void FeatureBank<Real>::get(int feature, FeatureEstimate& estimate) const noexce
   const int lane = feature % kLanes;
   estimate.x.resize(view.d);
   estimate.P.resize(view.d, view.d);
-  const double noise_s = double(group.noise_s[static_cast<std::size_t>(lane)]);
+  const double diffusion_mm2 = double(group.diffusion_mm2[static_cast<std::size_t>(lane)]);
   for (int i = 0; i < view.d; ++i) {
     const auto row = static_cast<std::size_t>(i);
     estimate.x(i) = double(lane_of(view.x, row, lane));
     estimate.P(i, i) = double(lane_of(view.diagonal, row, lane)) +
-                       noise_s * double(noise_mm2_per_s_[static_cast<std::size_t>(i % view.n)]);
+                       diffusion_mm2 * double(diffusion_shape_[static_cast<std::size_t>(i % view.n)]);
     for (int j = 0; j < i; ++j) {
       double p = double(lane_of(view.lower, lower_element(i, j), lane));
       for (int m = 0; m < group.pending; ++m) {
@@ -148,39 +148,32 @@ void FeatureBank<Real>::get(int feature, FeatureEstimate& estimate) const noexce
 }
 
 template <class Real>
-void FeatureBank<Real>::inflate(int feature, double factor) noexcept {
-  const auto [group, lane] = place(feature);
-  const GroupView<Real>& view = group->view;
-  const auto d = static_cast<std::size_t>(view.d);
-  const auto whole = static_cast<Real>(factor);
-  const auto root = static_cast<Real>(std::sqrt(factor));
-  for (std::size_t i = 0; i < d; ++i) lane_of(view.diagonal, i, lane) *= whole;
-  for (std::size_t i = 0; i < d * (d - 1) / 2; ++i) lane_of(view.lower, i, lane) *= whole;
-  for (std::size_t i = 0; i < kMaxPendingUpdates * d * 2; ++i) lane_of(view.pending, i, lane) *= root;
-  group->noise_s[static_cast<std::size_t>(lane)] *= whole;
-  group->swept = static_cast<LaneMask>(group->swept & ~(1U << lane));
+void FeatureBank<Real>::get(int feature, StateVector& x) const noexcept {
+  const GroupView<Real>& view = groups_[static_cast<std::size_t>(feature / kLanes)].view;
+  x.resize(view.d);
+  for (int i = 0; i < view.d; ++i) x(i) = double(lane_of(view.x, static_cast<std::size_t>(i), feature % kLanes));
 }
 
 template <class Real>
-void FeatureBank<Real>::add_process_noise(int feature, double seconds) noexcept {
+void FeatureBank<Real>::diffuse(int feature, double deviation_mm) noexcept {
   const auto [group, lane] = place(feature);
   if ((group->occupied >> lane & 1) == 0) return;
-  group->noise_s[static_cast<std::size_t>(lane)] += static_cast<Real>(seconds);
+  group->diffusion_mm2[static_cast<std::size_t>(lane)] += static_cast<Real>(deviation_mm * deviation_mm);
 }
 
 template <class Real>
 void FeatureBank<Real>::sweep(int group_index, const SweepPhases<Real>& phases) noexcept {
   Group& group = groups_[static_cast<std::size_t>(group_index)];
   const GroupView<Real>& view = group.view;
-  if (std::any_of(group.noise_s.begin(), group.noise_s.end(), [](Real s) { return s != Real(0); })) {
+  if (std::any_of(group.diffusion_mm2.begin(), group.diffusion_mm2.end(), [](Real v) { return v != Real(0); })) {
     for (int i = 0; i < view.d; ++i) {
-      const Real noise = noise_mm2_per_s_[static_cast<std::size_t>(i % view.n)];
+      const Real shape = diffusion_shape_[static_cast<std::size_t>(i % view.n)];
       for (int lane = 0; lane < kLanes; ++lane) {
         lane_of(view.diagonal, static_cast<std::size_t>(i), lane) +=
-            group.noise_s[static_cast<std::size_t>(lane)] * noise;
+            group.diffusion_mm2[static_cast<std::size_t>(lane)] * shape;
       }
     }
-    group.noise_s.fill(Real(0));
+    group.diffusion_mm2.fill(Real(0));
   }
   sweep_kernels_.sweep(view, phases, group.pending);
   group.pending = 0;

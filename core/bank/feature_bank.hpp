@@ -30,9 +30,6 @@ namespace perimap {
 struct BankSettings {
   BasisLayout layout;
   int features = 0;  // rounded up to whole groups
-  // What a second of process noise adds to the variance of each coefficient of an axis (mm^2/s), layout.size() long;
-  // empty: nothing.
-  Basis noise_mm2_per_s;
   SimdTarget target = best_simd_target();
 };
 
@@ -51,18 +48,19 @@ class FeatureBank {
   [[nodiscard]] bool occupied(int feature) const noexcept;
   // With all that is pending; of a lane without a feature all zero.
   void get(int feature, FeatureEstimate& estimate) const noexcept;
+  // Its coefficients alone (mm).
+  void get(int feature, StateVector& x) const noexcept;
 
-  // P <- factor P. The feature takes part again from the next sweep on.
-  void inflate(int feature, double factor) noexcept;
-  // Takes effect at the next sweep.
-  void add_process_noise(int feature, double seconds) noexcept;
+  // As diffuse(FeatureEstimate&): the variance of a random walk, taking effect at the next sweep.
+  void diffuse(int feature, double deviation_mm) noexcept;
 
   void sweep(int group, const SweepPhases<Real>& phases) noexcept;
 
-  // At phase k of the last sweep, whose phases these must be.
+  // Position, velocity and covariance at phase k of the last sweep, whose phases these must be: hardly more than
+  // reading them off.
   void motion(int group, const SweepPhases<Real>& phases, int k, LaneMotions<Real>& motions) noexcept;
 
-  // At any phase, by a pass over P that writes nothing.
+  // The same at any phase, by a pass over P that writes nothing.
   void motion_at(int group, const SweepPhase<Real>& phase, LaneMotions<Real>& motions) const noexcept;
 
   // Learns what was measured at phase k < phases.learnt() of the last sweep, whose phases these must be. Settings and
@@ -96,8 +94,8 @@ class FeatureBank {
     int pending = 0;
     std::array<int, kMaxSweepPhases> corrected{};  // how many of the pending updates S and M of a phase contain
     LaneMask occupied = 0;
-    LaneMask swept = 0;                  // occupied, and S and M are theirs
-    std::array<Real, kLanes> noise_s{};  // process noise to be added at the next sweep
+    LaneMask swept = 0;                        // occupied, and S and M are theirs
+    std::array<Real, kLanes> diffusion_mm2{};  // to be added at the next sweep, to the variance of the mean
   };
   struct Place {
     Group* group;
@@ -142,7 +140,7 @@ class FeatureBank {
   const UpdateKernels<Real>& update_kernels_;
   std::vector<CovarianceTile> tiles_;
   std::vector<std::size_t> tile_of_row_;
-  std::array<Real, kMaxBasis> noise_mm2_per_s_{};
+  std::array<Real, kMaxBasis> diffusion_shape_{};  // variance of each coefficient of an axis for that of the mean
   std::unique_ptr<Real[], AlignedDelete> memory_;
   std::vector<Group> groups_;
 };

@@ -50,9 +50,13 @@ Basis prior_deviations(const BasisLayout& layout, const Prior& prior) noexcept {
   return deviations;
 }
 
-void diffuse(FeatureEstimate& estimate, const BasisLayout& layout, double deviation_mm) noexcept {
+Basis diffusion_shape(const BasisLayout& layout) noexcept {
   constexpr Prior kUnit{.dc_mm = 1.0, .cardiac_mm = 1.0, .respiratory_mm = 1.0, .decay = 1.0};
-  const Basis variances = (deviation_mm * prior_deviations(layout, kUnit)).cwiseAbs2();
+  return prior_deviations(layout, kUnit).cwiseAbs2();
+}
+
+void diffuse(FeatureEstimate& estimate, const BasisLayout& layout, double deviation_mm) noexcept {
+  const Basis variances = deviation_mm * deviation_mm * diffusion_shape(layout);
   const Eigen::Index n = variances.size();
   for (Eigen::Index axis = 0; axis < 3; ++axis) estimate.P.diagonal().segment(axis * n, n) += variances;
 }

@@ -26,6 +26,8 @@ struct FeatureEstimate {
 // Adds the variance of a random walk: independent steps of `deviation_mm` / k of both coefficients of harmonic k on
 // each axis, k = 1 for the mean. For process noise (deviation = noise density * sqrt(time)) and for inflation.
 void diffuse(FeatureEstimate& estimate, const BasisLayout& layout, double deviation_mm) noexcept;
+// The variance that it adds to each coefficient of an axis, for a deviation of 1 (no unit), in the order of the basis.
+[[nodiscard]] Basis diffusion_shape(const BasisLayout& layout) noexcept;
 
 // The largest standard deviation of the position in any direction (mm) over `phases` equal steps of the cardiac cycle
 // and, where the layout has respiration, as many of the respiratory one. The layout must be the estimate's.

@@ -87,7 +87,6 @@ class Fed {
   Fed(const Scene& scene, int learnt, int predicted)
       : bank_({.layout = scene.layout,
                .features = static_cast<int>(scene.estimates.size()),
-               .noise_mm2_per_s = {},
                .target = best_simd_target()}),
         X_CW_(scene.X_CW),
         predicted_(predicted) {

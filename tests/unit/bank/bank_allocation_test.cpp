@@ -1,7 +1,7 @@
 // The bank, once made, takes nothing from the heap. A program of its own, because it counts the calls of the allocator.
 #include <gtest/gtest.h>
 
-#include "core/bank/motion_predictor.hpp"
+#include "core/bank/feature_bank.hpp"
 #include "counted_allocations.hpp"
 
 namespace perimap {
@@ -12,9 +12,8 @@ using test::allocations_of;
 template <class Real, class Model>
 void expect_no_allocation(const Model& model, const Vector3d& ahead_C) {
   const BasisLayout layout{8, 1};
-  BankSettings settings{.layout = layout, .features = 3 * kLanes, .noise_mm2_per_s = Basis::Ones(layout.size())};
-  FeatureBank<Real> bank(settings);
-  MotionPredictor<Real> predictor(bank.groups());
+  FeatureBank<Real> bank({.layout = layout, .features = 3 * kLanes});
+  LaneMotions<Real> motions;
   const FeatureEstimate start = prior_estimate(layout, Prior{.dc_mm = 1.0}, ahead_C);
   FeatureEstimate estimate;
   int accepted = 0;
@@ -28,17 +27,17 @@ void expect_no_allocation(const Model& model, const Vector3d& ahead_C) {
       (void)model.predict(ahead_C, z);
       for (int g = 0; g < bank.groups(); ++g) {
         bank.sweep(g, phases);
-        predictor.predict(bank, g, phases, 0);
+        bank.motion(g, phases, 0, motions);
         LaneObservations<Real> measured;
         for (int lane = 0; lane < kLanes; ++lane) measured.set(lane, z, 1e-2 * Matrix2d::Identity());
         LaneOutcomes<Real> outcomes;
         bank.update(g, phases, 0, Pose{}, model, measured, UpdateSettings{}, outcomes);
         accepted += outcomes.accepted != 0 ? 1 : 0;
-        predictor.predict_at(bank, g, phases[1]);
+        bank.motion_at(g, phases[1], motions);
       }
       bank.get(k, estimate);
-      bank.add_process_noise(k, 0.1);
-      bank.inflate(k, 1.1);
+      bank.get(k, estimate.x);
+      bank.diffuse(k, 0.1);
       bank.clear(k + 10);
     }
   });

@@ -12,7 +12,7 @@ class OnEveryTarget : public testing::TestWithParam<SimdTarget> {
  protected:
   template <class Real = double>
   FeatureBank<Real> bank(const BasisLayout& layout, int features) const {
-    return FeatureBank<Real>({.layout = layout, .features = features, .noise_mm2_per_s = {}, .target = GetParam()});
+    return FeatureBank<Real>({.layout = layout, .features = features, .target = GetParam()});
   }
 };
 

@@ -12,7 +12,6 @@
 #include <thread>
 
 #include "bank_on_target.hpp"
-#include "core/bank/motion_predictor.hpp"
 #include "simulated_feature.hpp"
 
 namespace perimap {
@@ -395,21 +394,21 @@ TEST_P(Bank, MotionFollowsPendingUpdatesWithoutAnotherSweep) {
   }
 }
 
-TEST_P(Bank, MotionPredictorServesAllGroups) {
+TEST_P(Bank, PredictsTheSameWithAndWithoutASweep) {
   const Group group(2 * kLanes, 1, 46);
   FeatureBank<double> bank = this->bank(group.layout, 2 * kLanes);
   fill(bank, group);
   SweepPhases<double> phases;
   phases.add_predicted(basis_at(group.layout, 1.0), basis_rate(group.layout, 1.0), 7.0, 0.0);
-  MotionPredictor<double> predictor(bank.groups());
   for (int g = 0; g < bank.groups(); ++g) {
     bank.sweep(g, phases);
-    predictor.predict(bank, g, phases, 0);
-    const LaneMotions<double> from_sweep = predictor[g];
-    predictor.predict_at(bank, g, phases[0]);
+    LaneMotions<double> from_sweep;
+    bank.motion(g, phases, 0, from_sweep);
+    LaneMotions<double> without;
+    bank.motion_at(g, phases[0], without);
     for (int lane = 0; lane < kLanes; ++lane) {
-      EXPECT_EQ(predictor[g].position_of(lane), from_sweep.position_of(lane));
-      EXPECT_EQ(predictor[g].covariance_of(lane), from_sweep.covariance_of(lane));
+      EXPECT_EQ(without.position_of(lane), from_sweep.position_of(lane));
+      EXPECT_EQ(without.covariance_of(lane), from_sweep.covariance_of(lane));
     }
   }
 }
@@ -439,24 +438,31 @@ TEST_P(Bank, AFeatureTakesPartFromTheSweepAfterItIsSet) {
   EXPECT_EQ(outcomes.considered, 1 << 4);
 }
 
-TEST_P(Bank, ProcessNoiseAndInflationChangeTheirLaneAlone) {
+TEST_P(Bank, DiffusionChangesItsLaneAlone) {
   const Group group(kLanes, 1, 48);
-  BankSettings settings{.layout = group.layout, .features = kLanes, .noise_mm2_per_s = {}, .target = GetParam()};
-  settings.noise_mm2_per_s = Basis::LinSpaced(group.layout.size(), 0.1, 0.9);
-  FeatureBank<double> bank(settings);
+  FeatureBank<double> bank = this->bank(group.layout, kLanes);
   fill(bank, group);
   learn_in_one_sweep(bank, group, [](int, int) { return true; });
-  std::vector<FeatureEstimate> before;
-  for (int f = 0; f < kLanes; ++f) before.push_back(estimate_of(bank, f));
-  bank.inflate(1, 4.0);
-  bank.add_process_noise(6, 2.0);
-  before[1].P *= 4.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    before[6].P.diagonal().segment(axis * group.layout.size(), group.layout.size()) += 2.0 * settings.noise_mm2_per_s;
-  }
+  std::vector<FeatureEstimate> expected;
+  for (int f = 0; f < kLanes; ++f) expected.push_back(estimate_of(bank, f));
+  bank.diffuse(6, 0.3);
+  bank.diffuse(6, 0.4);
+  diffuse(expected[6], group.layout, 0.5);
   for (const bool swept : {false, true}) {
     if (swept) bank.sweep(0, SweepPhases<double>{});
-    for (int f = 0; f < kLanes; ++f) expect_close(estimate_of(bank, f), before[static_cast<std::size_t>(f)], 1e-14);
+    for (int f = 0; f < kLanes; ++f) expect_close(estimate_of(bank, f), expected[static_cast<std::size_t>(f)], 1e-14);
+  }
+}
+
+TEST_P(Bank, GivesTheCoefficientsAlone) {
+  const Group group(kLanes, 1, 50);
+  FeatureBank<double> bank = this->bank(group.layout, kLanes);
+  fill(bank, group);
+  learn_in_one_sweep(bank, group, [](int, int) { return true; });
+  StateVector x;
+  for (int f = 0; f < kLanes; ++f) {
+    bank.get(f, x);
+    EXPECT_EQ(x, estimate_of(bank, f).x);
   }
 }
 
