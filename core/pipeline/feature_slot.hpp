@@ -1,4 +1,5 @@
-// One feature's whole life in the pipeline, in memory that is there from the start.
+// One feature's whole life in the pipeline but its estimate, which the bank holds; in memory that is there from the
+// start.
 #pragma once
 
 #include <array>
@@ -6,7 +7,6 @@
 #include <cstdint>
 
 #include "core/estimation/batch_start.hpp"
-#include "core/estimation/feature_estimate.hpp"
 #include "core/estimation/feature_health.hpp"
 #include "core/estimation/observation.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
@@ -16,11 +16,14 @@
 
 namespace perimap {
 
+// Frames without a match after which the image alone no longer tells where a feature is.
+inline constexpr std::uint64_t kTrackedMissesAllowed = 5;
+
 enum class SlotState : std::uint8_t {
   kEmpty,
   kTracked,   // followed in the image, gathering the observations of its start
   kStarting,  // the batch start is under way in housekeeping
-  kMapped     // has an estimate
+  kMapped     // has an estimate in the bank
 };
 
 // A match that waits to be learnt. Its pose and phase are in the frame history.
@@ -73,14 +76,14 @@ struct FeatureSlot {
   PatchState patch_state;
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   std::uint64_t last_found_frame = 0;
-  int refused_in_a_row = 0;  // found, but the estimate's gate said no
-  PatchMatch match;          // of this frame
+  int refused_in_a_row = 0;             // found, but the estimate's gate said no
+  bool follows_something_else = false;  // refused so often that the patch must be let go
+  PatchMatch match;                     // of this frame
 
   // learning
   HeldMatches held;
   int failed_starts = 0;
   BatchStartExchange start;
-  FeatureEstimate estimate;
   FeatureHealth health;
   Instant last_learnt;  // capture time of the last update, for process noise
   int updates = 0;

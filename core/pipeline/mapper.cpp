@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/pipeline/feature_life.hpp"
+#include "core/pipeline/feature_stages.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
@@ -19,8 +21,13 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       poses_(settings.pose),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       pyramid_(settings.camera.width, settings.camera.height, kPyramidLevels),
+      bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())}),
       tallies_(static_cast<std::size_t>(team.size())) {
   occupied_.reserve(slots.size());
+  for (int g = 0; g < bank_.groups(); ++g) {
+    const auto first = static_cast<std::size_t>(g) * kLanes;
+    groups_.emplace_back(bank_, g, slots.subspan(first, std::min<std::size_t>(kLanes, slots.size() - first)));
+  }
 }
 
 void Mapper::add_pose(const TrackerSample& sample) noexcept {
@@ -44,12 +51,14 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   job_.frame = &frame;
   job_.history = history_.get();
   job_.pyramid = &pyramid_;
+  predict_releases(frame, clock);
   adopt_found_features(frame.index);
 
   pyramid_.build(image);
   team_.run(&run_stage<&Mapper::predict_and_find_shard>, this);
   const Instant found = MonotonicClock::now();
-  settle_phase_and_pose(frame, clock);
+  // B settles which phase and pose C and D work with: the priors, what the ECG and the tracker say. A correction of
+  // both from all matches of the frame belongs here, where the matches are joined.
   const Instant joined = MonotonicClock::now();
   team_.run(&run_stage<&Mapper::evaluate_shard>, this);
   const Instant evaluated = MonotonicClock::now();
@@ -121,14 +130,16 @@ void Mapper::finish_learning() noexcept {
 
 void Mapper::predict_and_find_shard(int worker) noexcept {
   const RealtimeScope realtime;
-  for (auto s = static_cast<std::size_t>(worker); s < slots_.size(); s += static_cast<std::size_t>(team_.size())) {
-    predict_and_find(slots_[s], job_, model_, settings_);
+  for (auto g = static_cast<std::size_t>(worker); g < groups_.size(); g += tallies_.size()) {
+    FeatureGroup& group = groups_[g];
+    group.sweep(job_);
+    for (std::size_t lane = 0; lane < group.slots().size(); ++lane) {
+      predict_and_find(group.slots()[lane], group.prediction(lane), job_, model_, settings_);
+    }
   }
 }
 
-// B settles which phase and pose C and D work with. They are the priors, what the ECG and the tracker say; a correction
-// of both from all matches of the frame belongs here, where the matches are joined.
-void Mapper::settle_phase_and_pose(const FrameRecord& frame, const CardiacClock& clock) noexcept {
+void Mapper::predict_releases(const FrameRecord& frame, const CardiacClock& clock) noexcept {
   for (std::size_t i = 0; i < job_.releases.size(); ++i) {
     const FrameRecord* earlier = history_->find(frame.index - std::min<std::uint64_t>(frame.index, i));
     const PhaseEstimate at_release = clock.at(earlier->stamp.capture + settings_.latency);
@@ -149,11 +160,8 @@ void Mapper::evaluate_shard(int worker) noexcept {
     }
     snapshot.features.clear();
   }
-  FeatureSnapshot feature;
-  for (auto s = static_cast<std::size_t>(worker); s < slots_.size(); s += static_cast<std::size_t>(team_.size())) {
-    if (!evaluate(slots_[s], job_, feature)) continue;
-    cells.publisher.back().features.push_back(feature);
-    cells.model.back().features.push_back(feature);
+  for (auto g = static_cast<std::size_t>(worker); g < groups_.size(); g += tallies_.size()) {
+    groups_[g].evaluate(job_, cells.publisher.back(), cells.model.back());
   }
   cells.publisher.publish();
   cells.model.publish();
@@ -162,35 +170,44 @@ void Mapper::evaluate_shard(int worker) noexcept {
 void Mapper::learn_shard(int worker) noexcept {
   const RealtimeScope realtime;
   WorkerTally& tally = tallies_[static_cast<std::size_t>(worker)];
-  const auto stride = static_cast<std::size_t>(team_.size());
+  const std::size_t stride = tallies_.size();
   const auto first = static_cast<std::size_t>(worker);
-  for (std::size_t s = first; s < slots_.size(); s += stride) hold_match(slots_[s], job_);
-  const std::size_t shard = slots_.size() > first ? (slots_.size() - first + stride - 1) / stride : 0;
+  for (std::size_t g = first; g < groups_.size(); g += stride) {
+    for (FeatureSlot& slot : groups_[g].slots()) hold_match(slot, job_);
+  }
+  const std::size_t shard = groups_.size() > first ? (groups_.size() - first + stride - 1) / stride : 0;
   for (std::size_t i = 0; i < shard; ++i) {
     if (!settings_.lockstep && MonotonicClock::now() > job_.learn_until) {
       tally.put_off = true;
       break;
     }
-    // Each frame begins at another slot, so that what is put off is not always the same.
-    const std::size_t s = first + stride * ((i + job_.frame->index) % shard);
-    switch (perimap::learn(slots_[s], job_, model_, settings_)) {
-      case LearnOutcome::kNothing:
-        break;
-      case LearnOutcome::kStartRequested:
-        starter_.request(worker, static_cast<int>(s));
-        break;
-      case LearnOutcome::kAdoptionLate:
-        ++tally.adoptions_late;
-        break;
-      case LearnOutcome::kStartedAnew:
-        ++tally.started_anew;
-        break;
-      case LearnOutcome::kLost:
-        ++tally.lost;
-        break;
-    }
+    // Each frame begins at another group, so that what is put off is not always the same.
+    FeatureGroup& group = groups_[first + stride * ((i + job_.frame->index) % shard)];
+    group.learn(model_, settings_.estimator);
+    for (std::size_t lane = 0; lane < group.slots().size(); ++lane) advance_slot(group, lane, worker);
   }
   tally.ended = MonotonicClock::now();
+}
+
+void Mapper::advance_slot(FeatureGroup& group, std::size_t lane, int worker) noexcept {
+  WorkerTally& tally = tallies_[static_cast<std::size_t>(worker)];
+  const int feature = group.feature(lane);
+  switch (advance(group.slots()[lane], bank_, feature, job_, model_, settings_)) {
+    case LifeEvent::kNone:
+      break;
+    case LifeEvent::kStartRequested:
+      starter_.request(worker, feature);
+      break;
+    case LifeEvent::kAdoptionLate:
+      ++tally.adoptions_late;
+      break;
+    case LifeEvent::kStartedAnew:
+      ++tally.started_anew;
+      break;
+    case LifeEvent::kLost:
+      ++tally.lost;
+      break;
+  }
 }
 
 void Mapper::adopt_found_features(std::uint64_t frame_index) noexcept {

@@ -5,12 +5,14 @@
 #include <span>
 #include <vector>
 
+#include "core/bank/feature_bank.hpp"
 #include "core/phase/cardiac_clock.hpp"
 #include "core/pipeline/batch_starter.hpp"
 #include "core/pipeline/feature_finder.hpp"
+#include "core/pipeline/feature_group.hpp"
 #include "core/pipeline/feature_slot.hpp"
-#include "core/pipeline/feature_stages.hpp"
 #include "core/pipeline/frame_history.hpp"
+#include "core/pipeline/frame_job.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
@@ -23,8 +25,9 @@
 
 namespace perimap {
 
-// One frame: A (workers predict and find), B (the mapper joins phase and pose), C (workers evaluate), then D (workers
-// learn). Slot s belongs to worker s mod workers; what is computed for a feature does not depend on who computes it.
+// One frame: A (workers sweep, predict and find), B (the mapper joins phase and pose), C (workers evaluate), then D
+// (workers learn). The group of eight slots g belongs to worker g mod workers; what is computed for a feature does not
+// depend on who computes it.
 // All members are called by the mapper thread.
 class Mapper {
  public:
@@ -49,9 +52,10 @@ class Mapper {
     (static_cast<Mapper*>(self)->*Stage)(worker);
   }
   void predict_and_find_shard(int worker) noexcept;
-  void settle_phase_and_pose(const FrameRecord& frame, const CardiacClock& clock) noexcept;
+  void predict_releases(const FrameRecord& frame, const CardiacClock& clock) noexcept;
   void evaluate_shard(int worker) noexcept;
   void learn_shard(int worker) noexcept;
+  void advance_slot(FeatureGroup& group, std::size_t lane, int worker) noexcept;
   void finish_learning() noexcept;
   void adopt_found_features(std::uint64_t frame_index) noexcept;
   void offer_to_finder(const FrameRecord& frame, const GreyImage& image) noexcept;
@@ -76,6 +80,8 @@ class Mapper {
   PoseHistory poses_;
   std::unique_ptr<FrameHistory> history_;
   ImagePyramid pyramid_;
+  FeatureBank<double> bank_;
+  std::vector<FeatureGroup> groups_;
   FrameJob job_;
   std::vector<WorkerTally> tallies_;
   std::vector<Vector2d> occupied_;

@@ -1,22 +1,29 @@
-#include "core/pipeline/feature_stages.hpp"
+#include "core/pipeline/feature_group.hpp"
 
 #include <gtest/gtest.h>
 
 #include <memory>
 #include <random>
+#include <vector>
+
+#include "core/pipeline/feature_life.hpp"
 
 namespace perimap {
 namespace {
 
 using std::chrono::milliseconds;
 
-// A still camera at the origin looking along z, beats every 800 ms, frames every 33 ms from 5 s on.
+// A still camera at the origin looking along z, beats every 800 ms, frames every 33 ms from 5 s on. Tests that need one
+// feature use the first slot.
 struct Stages : ::testing::Test {
   PipelineSettings settings;
   PixelModel model;
   CardiacClockTracker clock{{}};
   std::unique_ptr<FrameHistory> history;
-  std::unique_ptr<FeatureSlot> slot = std::make_unique<FeatureSlot>();
+  std::vector<FeatureSlot> slots{2};
+  FeatureSlot* slot = slots.data();
+  std::unique_ptr<FeatureBank<double>> bank;
+  std::unique_ptr<FeatureGroup> group;
   FrameJob job;
   int next_beat_ms = 1000;
 
@@ -25,8 +32,11 @@ struct Stages : ::testing::Test {
     settings.estimator.layout.cardiac_harmonics = 2;
     model.camera = settings.camera;
     history = std::make_unique<FrameHistory>(settings.estimator.layout);
+    bank = std::make_unique<FeatureBank<double>>(BankSettings{.layout = settings.estimator.layout, .features = 2});
+    group = std::make_unique<FeatureGroup>(*bank, 0, slots);
     beat_until(5000);
-    slot->id = 1;
+    slots[0].id = 1;
+    slots[1].id = 2;
   }
 
   void beat_until(int ms) {
@@ -44,24 +54,42 @@ struct Stages : ::testing::Test {
     history->set_phase(frame, clock.clock());
     job.frame = &frame;
     job.history = history.get();
-    slot->match = PatchMatch{};
+    for (ReleaseBasis& release : job.releases) release.b = basis_at(settings.estimator.layout, 1.0);
+    for (FeatureSlot& s : slots) s.match = PatchMatch{};
+    group->sweep(job);
   }
 
-  void found_at(const Vector2d& px) {
-    slot->match.state = MatchState::kFound;
-    slot->match.px = px;
-    slot->match.covariance_px2 = 0.05 * Matrix2d::Identity();
-    slot->last_found_frame = job.frame->index;
-    hold_match(*slot, job);
+  void found_at(const Vector2d& px, int lane = 0) {
+    FeatureSlot& found = slots[static_cast<std::size_t>(lane)];
+    found.match.state = MatchState::kFound;
+    found.match.px = px;
+    found.match.covariance_px2 = 0.05 * Matrix2d::Identity();
+    found.last_found_frame = job.frame->index;
+    hold_match(found, job);
   }
 
-  LearnOutcome learn_frame() { return learn(*slot, job, model, settings); }
+  LifeEvent learn_frame() {
+    group->learn(model, settings.estimator);
+    return advance(*slot, *bank, 0, job, model, settings);
+  }
 
   // A mapped feature at (0, 0, 100) mm, seen at the image centre, with little deviation.
-  void map_feature() {
-    slot->state = SlotState::kMapped;
-    slot->estimate = prior_estimate(settings.estimator.layout, settings.estimator.prior, Vector3d(0, 0, 100));
-    slot->estimate.P *= 1e-4;
+  FeatureEstimate still_feature() const {
+    FeatureEstimate estimate = prior_estimate(settings.estimator.layout, settings.estimator.prior, Vector3d(0, 0, 100));
+    estimate.P *= 1e-4;
+    return estimate;
+  }
+  void map_feature(int lane = 0) {
+    slots[static_cast<std::size_t>(lane)].state = SlotState::kMapped;
+    bank->set(lane, still_feature());
+  }
+
+  std::vector<FeatureSnapshot> shown() {
+    ShardSnapshot publisher;
+    ShardSnapshot model_view;
+    group->evaluate(job, publisher, model_view);
+    EXPECT_EQ(publisher.features.size(), model_view.features.size());
+    return publisher.features;
   }
 };
 
@@ -70,7 +98,7 @@ TEST_F(Stages, ATrackedFeatureWithoutMatchesIsGivenUpSoon) {
   next_frame();
   found_at({320, 240});
   int frames = 0;
-  while (learn_frame() != LearnOutcome::kLost) {
+  while (learn_frame() != LifeEvent::kLost) {
     next_frame();
     ASSERT_LT(++frames, 10);
   }
@@ -83,8 +111,8 @@ TEST_F(Stages, AMappedFeatureThatNoMotionExplainsIsStartedAnewUnderItsId) {
   std::normal_distribution<double> normal(0.0, 3.0);
   int frames = 0;
   int inconsistent = 0;
-  LearnOutcome outcome = LearnOutcome::kNothing;
-  while (outcome == LearnOutcome::kNothing) {
+  LifeEvent outcome = LifeEvent::kNone;
+  while (outcome == LifeEvent::kNone) {
     beat_until(5000 + 33 * static_cast<int>(history->count()));
     next_frame();
     found_at({320 + normal(generator), 240 + normal(generator)});
@@ -92,7 +120,7 @@ TEST_F(Stages, AMappedFeatureThatNoMotionExplainsIsStartedAnewUnderItsId) {
     inconsistent += slot->health.state() == HealthState::kInconsistent ? 1 : 0;
     ASSERT_LT(++frames, 600);
   }
-  EXPECT_EQ(outcome, LearnOutcome::kStartedAnew);
+  EXPECT_EQ(outcome, LifeEvent::kStartedAnew);
   EXPECT_GT(inconsistent, 100) << "said so before";
   EXPECT_EQ(slot->state, SlotState::kTracked);
   EXPECT_EQ(slot->id, 1U);
@@ -102,15 +130,15 @@ TEST_F(Stages, AMappedFeatureThatNoMotionExplainsIsStartedAnewUnderItsId) {
 TEST_F(Stages, ATrackedFeatureAsksForItsStartOnceItHasEnoughMatches) {
   slot->state = SlotState::kTracked;
   int frames = 0;
-  LearnOutcome outcome = LearnOutcome::kNothing;
-  while (outcome == LearnOutcome::kNothing) {
+  LifeEvent outcome = LifeEvent::kNone;
+  while (outcome == LifeEvent::kNone) {
     beat_until(5000 + 33 * static_cast<int>(history->count()));
     next_frame();
     found_at({320, 240});
     outcome = learn_frame();
     ++frames;
   }
-  EXPECT_EQ(outcome, LearnOutcome::kStartRequested);
+  EXPECT_EQ(outcome, LifeEvent::kStartRequested);
   EXPECT_EQ(frames, settings.estimator.start_observations);
   EXPECT_EQ(slot->start.count, settings.estimator.start_observations);
   EXPECT_EQ(slot->start.adopt_at_frame, job.frame->index + static_cast<std::uint64_t>(settings.adoption_delay_frames));
@@ -118,8 +146,8 @@ TEST_F(Stages, ATrackedFeatureAsksForItsStartOnceItHasEnoughMatches) {
 
 TEST_F(Stages, AnAdoptedFeatureWasLastObservedWhenItsStartsLastMatchWas) {
   slot->state = SlotState::kTracked;
-  LearnOutcome outcome = LearnOutcome::kNothing;
-  while (outcome == LearnOutcome::kNothing) {
+  LifeEvent outcome = LifeEvent::kNone;
+  while (outcome == LifeEvent::kNone) {
     beat_until(5000 + 33 * static_cast<int>(history->count()));
     next_frame();
     found_at({320, 240});
@@ -132,7 +160,7 @@ TEST_F(Stages, AnAdoptedFeatureWasLastObservedWhenItsStartsLastMatchWas) {
   slot->start.ready.store(true);
   while (slot->state == SlotState::kStarting) {
     next_frame();
-    ASSERT_EQ(learn_frame(), LearnOutcome::kNothing);
+    ASSERT_EQ(learn_frame(), LifeEvent::kNone);
   }
   EXPECT_EQ(slot->state, SlotState::kMapped);
   EXPECT_EQ(job.frame->index, slot->start.adopt_at_frame);
@@ -145,12 +173,12 @@ TEST_F(Stages, ALateStartIsToldOnceAndAdoptedWhenItComes) {
   slot->start.count = 0;
   slot->start.outcome.status = BatchStatus::kDiverged;
   next_frame();
-  EXPECT_EQ(learn_frame(), LearnOutcome::kAdoptionLate);
+  EXPECT_EQ(learn_frame(), LifeEvent::kAdoptionLate);
   next_frame();
-  EXPECT_EQ(learn_frame(), LearnOutcome::kNothing);
+  EXPECT_EQ(learn_frame(), LifeEvent::kNone);
   slot->start.ready.store(true);
   next_frame();
-  EXPECT_EQ(learn_frame(), LearnOutcome::kNothing);
+  EXPECT_EQ(learn_frame(), LifeEvent::kNone);
   EXPECT_EQ(slot->state, SlotState::kTracked) << "a failed start tries again";
 }
 
@@ -158,12 +186,12 @@ TEST_F(Stages, AMatchThatFitsIsLearntAndOneThatDoesNotIsRefused) {
   map_feature();
   next_frame();
   found_at({320.3, 240.0});
-  ASSERT_EQ(learn_frame(), LearnOutcome::kNothing);
+  ASSERT_EQ(learn_frame(), LifeEvent::kNone);
   EXPECT_EQ(slot->updates, 1);
   EXPECT_EQ(slot->last_observed, job.frame->stamp.capture);
   next_frame();
   found_at({360.0, 240.0});
-  ASSERT_EQ(learn_frame(), LearnOutcome::kNothing);
+  ASSERT_EQ(learn_frame(), LifeEvent::kNone);
   EXPECT_EQ(slot->updates, 1);
   EXPECT_EQ(slot->refused_in_a_row, 1);
 }
@@ -171,15 +199,69 @@ TEST_F(Stages, AMatchThatFitsIsLearntAndOneThatDoesNotIsRefused) {
 TEST_F(Stages, AMatchWhoseFrameLostItsPhaseIsNotLearnt) {
   map_feature();
   next_frame();
-  found_at({320, 240});
+  found_at({320, 240});  // and its learning is put off
+  const FrameRecord* lost = job.frame;
   // No beat for ten seconds, then beats again: the frame lay in a gap that was no cycle.
   next_beat_ms = 15'000;
   beat_until(18'000);
   history->refresh_phases(clock.clock());
-  ASSERT_FALSE(job.frame->measurable);
-  ASSERT_EQ(learn_frame(), LearnOutcome::kNothing);
+  ASSERT_FALSE(lost->measurable);
+  next_frame();
+  ASSERT_EQ(learn_frame(), LifeEvent::kNone);
   EXPECT_EQ(slot->updates, 0);
   EXPECT_EQ(slot->held.size(), 0U);
+}
+
+TEST_F(Stages, WhatWasPutOffIsLearntLaterInOrderAndGivesTheSameEstimate) {
+  std::mt19937 generator(3);
+  std::normal_distribution<double> normal(0.0, 0.2);
+  std::vector<Vector2d> places(12);
+  for (Vector2d& px : places) px = {320 + normal(generator), 240 + normal(generator)};
+  const auto learnt_when = [&](auto put_off) {
+    history = std::make_unique<FrameHistory>(settings.estimator.layout);
+    slot->updates = 0;
+    slot->health.reset();
+    map_feature();
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      next_frame();
+      found_at(places[i]);
+      if (put_off(i)) continue;
+      EXPECT_EQ(learn_frame(), LifeEvent::kNone);
+    }
+    EXPECT_EQ(slot->held.size(), 0U);
+    EXPECT_EQ(slot->updates, 12);
+    FeatureEstimate estimate;
+    bank->get(0, estimate);
+    return estimate;
+  };
+  const FeatureEstimate at_once = learnt_when([](std::size_t) { return false; });
+  const FeatureEstimate later = learnt_when([](std::size_t i) { return i >= 3 && i < 7; });
+  EXPECT_LT((at_once.x - later.x).norm(), 1e-9);
+  EXPECT_LT((at_once.P - later.P).norm(), 1e-9);
+}
+
+TEST_F(Stages, AFeatureWithMuchToLearnDoesNotKeepItsNeighbourFromLearning) {
+  map_feature(1);
+  slot->state = SlotState::kStarting;  // gathers matches that wait for its start
+  slot->start.adopt_at_frame = 1000;
+  for (int i = 0; i < 15; ++i) {
+    next_frame();
+    found_at({320, 240}, 0);
+    found_at({320, 240}, 1);
+    ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+    EXPECT_EQ(slots[1].updates, i + 1);
+  }
+  map_feature(0);
+  int frames = 0;
+  while (slot->held.size() > 0) {
+    next_frame();
+    found_at({320, 240}, 0);
+    found_at({320, 240}, 1);
+    ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+    ASSERT_LT(++frames, 15);
+  }
+  EXPECT_EQ(slots[0].updates, 15 + frames);
+  EXPECT_EQ(slots[1].updates, 15 + frames);
 }
 
 TEST_F(Stages, AFeatureRefusedTenTimesLetsGoOfItsPatchAndIsStillGivenUpWhenUnseen) {
@@ -188,23 +270,23 @@ TEST_F(Stages, AFeatureRefusedTenTimesLetsGoOfItsPatchAndIsStillGivenUpWhenUnsee
     beat_until(5000 + 33 * static_cast<int>(history->count()));
     next_frame();
     found_at({420.0, 240.0});
-    ASSERT_EQ(learn_frame(), LearnOutcome::kNothing);
+    ASSERT_EQ(learn_frame(), LifeEvent::kNone);
   }
   EXPECT_LT(slot->last_found_frame + 5, job.frame->index) << "the next search starts where the map says";
   int frames = 0;
   do {
     next_frame();
     ASSERT_LT(++frames, 1000);
-  } while (learn_frame() != LearnOutcome::kLost);
+  } while (learn_frame() != LifeEvent::kLost);
   EXPECT_EQ(slot->state, SlotState::kEmpty);
 }
 
 TEST_F(Stages, NothingIsShownOfAFeatureBeforeItsStart) {
-  FeatureSnapshot snapshot;
-  next_frame();
   for (const SlotState state : {SlotState::kEmpty, SlotState::kTracked, SlotState::kStarting}) {
     slot->state = state;
-    EXPECT_FALSE(evaluate(*slot, job, snapshot));
+    next_frame();
+    EXPECT_FALSE(group->prediction(0).valid);
+    EXPECT_TRUE(shown().empty());
   }
 }
 
@@ -212,14 +294,36 @@ TEST_F(Stages, AMappedFeatureThatIsNotMatchedSaysSo) {
   map_feature();
   slot->converged = true;
   next_frame();
-  for (ReleaseBasis& release : job.releases) release.b = basis_at(settings.estimator.layout, 1.0);
-  FeatureSnapshot snapshot;
-  ASSERT_TRUE(evaluate(*slot, job, snapshot));
-  EXPECT_EQ(snapshot.state, FeatureState::kConverged);
-  EXPECT_EQ(snapshot.reason, FeatureReason::kNotObserved);
+  ASSERT_EQ(shown().size(), 1U);
+  EXPECT_EQ(shown()[0].state, FeatureState::kConverged);
+  EXPECT_EQ(shown()[0].reason, FeatureReason::kNotObserved);
   found_at({320, 240});
-  ASSERT_TRUE(evaluate(*slot, job, snapshot));
-  EXPECT_EQ(snapshot.reason, FeatureReason::kNone);
+  EXPECT_EQ(shown()[0].reason, FeatureReason::kNone);
+}
+
+TEST_F(Stages, WhatIsPredictedAndShownIsWhatTheBankHolds) {
+  map_feature();
+  for (int i = 0; i < 5; ++i) {
+    next_frame();
+    found_at({320.5, 239.5});
+    ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+  }
+  next_frame();
+  FeatureEstimate estimate;
+  bank->get(0, estimate);
+  const FrameRecord& frame = *job.frame;
+  const Vector3d spread = velocity_of(estimate.x, frame.b_rate, frame.phase.rate_rad_per_s) * frame.phase.deviation_s;
+  const MapPrediction prediction = group->prediction(0);
+  ASSERT_TRUE(prediction.valid);
+  EXPECT_LT((prediction.p_WF - estimate.position(frame.b)).norm(), 1e-12);
+  EXPECT_LT((prediction.covariance_W - estimate.position_covariance(frame.b) - spread * spread.transpose()).norm(),
+            1e-12);
+  const std::vector<FeatureSnapshot> snapshots = shown();
+  ASSERT_EQ(snapshots.size(), 1U);
+  EXPECT_EQ(snapshots[0].x, estimate.x);
+  for (const Matrix3d& covariance : snapshots[0].covariances_W_mm2) {
+    EXPECT_LT((covariance - estimate.position_covariance(job.releases[0].b)).norm(), 1e-12);
+  }
 }
 
 }  // namespace

@@ -1,0 +1,163 @@
+#include "core/pipeline/feature_group.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/pipeline/match_covariance.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr double kInflation_mm = 1.0;
+constexpr int kRefusalsBeforeRelock = 10;
+constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::max();
+
+// The oldest frame after `after` (or the oldest of all) that a mapped slot holds a match of.
+std::uint64_t next_held_frame(std::span<const FeatureSlot> slots, std::uint64_t after) noexcept {
+  std::uint64_t next = kNoFrame;
+  for (const FeatureSlot& slot : slots) {
+    if (slot.state != SlotState::kMapped) continue;
+    for (std::uint32_t i = 0; i < slot.held.size(); ++i) {
+      const std::uint64_t frame = slot.held[i].frame_index;
+      if (after != kNoFrame && frame <= after) continue;
+      next = std::min(next, frame);
+      break;
+    }
+  }
+  return next;
+}
+
+// A frame that has left the history, or that lost its phase when the next beat showed that its cycle was none, teaches
+// nothing.
+void drop_what_can_not_be_learnt(FeatureSlot& slot, const FrameHistory& history) noexcept {
+  while (slot.held.size() > 0) {
+    const FrameRecord* frame = history.find(slot.held[0].frame_index);
+    if (frame != nullptr && frame->measurable) return;
+    slot.held.drop(1);
+  }
+}
+
+void count_update(FeatureSlot& slot, const FrameRecord& frame, bool accepted) noexcept {
+  if (!accepted) {
+    slot.follows_something_else = ++slot.refused_in_a_row % kRefusalsBeforeRelock == 0 || slot.follows_something_else;
+    return;
+  }
+  slot.refused_in_a_row = 0;
+  ++slot.updates;
+  slot.last_observed = frame.stamp.capture;
+}
+
+}  // namespace
+
+void FeatureGroup::plan(const FrameJob& job) noexcept {
+  plan_.phases.clear();
+  plan_.learnt.fill(nullptr);
+  plan_.capture = -1;
+  bool mapped = false;
+  for (FeatureSlot& slot : slots_) {
+    if (slot.state != SlotState::kMapped) continue;
+    mapped = true;
+    drop_what_can_not_be_learnt(slot, *job.history);
+  }
+  if (!mapped) return;
+
+  const auto add_learnt = [this](const FrameRecord& frame) {
+    const int k = plan_.phases.add_learnt(frame.b, frame.b_rate, frame.phase.rate_rad_per_s, frame.phase.deviation_s);
+    plan_.learnt[static_cast<std::size_t>(k)] = &frame;
+    return k;
+  };
+  std::uint64_t held = kNoFrame;
+  while (plan_.phases.learnt() < kLearnPerFrame && (held = next_held_frame(slots_, held)) != kNoFrame) {
+    const FrameRecord* frame = job.history->find(held);
+    if (frame != nullptr && frame->measurable) add_learnt(*frame);
+  }
+  // This frame's matches come when its features are found.
+  const FrameRecord& now = *job.frame;
+  if (now.measurable && plan_.phases.learnt() < kLearnPerFrame) {
+    plan_.capture = add_learnt(now);
+  } else {
+    plan_.capture = plan_.phases.add_predicted(now.b, now.b_rate, now.phase.rate_rad_per_s, now.phase.deviation_s);
+  }
+  for (std::size_t i = 0; i < job.releases.size(); ++i) {
+    plan_.releases[i] = plan_.phases.add_predicted(job.releases[i].b, Basis());
+  }
+}
+
+void FeatureGroup::sweep(const FrameJob& job) noexcept {
+  plan(job);
+  if (plan_.capture < 0) return;
+  bank_.sweep(index_, plan_.phases);
+  bank_.motion(index_, plan_.phases, plan_.capture, at_capture_);
+}
+
+MapPrediction FeatureGroup::prediction(std::size_t lane) const noexcept {
+  if (plan_.capture < 0 || slots_[lane].state != SlotState::kMapped) return {};
+  const auto l = static_cast<int>(lane);
+  return {true, at_capture_.position_of(l), at_capture_.covariance_of(l)};
+}
+
+void FeatureGroup::evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept {
+  if (plan_.capture < 0) return;
+  std::array<LaneMotions<double>, kReleasesCovered> at_releases;
+  for (std::size_t i = 0; i < kReleasesCovered; ++i) {
+    bank_.motion(index_, plan_.phases, plan_.releases[i], at_releases[i]);
+  }
+  FeatureSnapshot snapshot;
+  for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
+    if (slots_[lane].state != SlotState::kMapped) continue;
+    describe(slots_[lane], job, snapshot);
+    bank_.get(feature(lane), snapshot.x);
+    for (std::size_t i = 0; i < kReleasesCovered; ++i) {
+      snapshot.covariances_W_mm2[i] = at_releases[i].covariance_of(static_cast<int>(lane));
+    }
+    publisher.features.push_back(snapshot);
+    model.features.push_back(snapshot);
+  }
+}
+
+void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& settings) noexcept {
+  for (int k = 0; k < plan_.phases.learnt(); ++k) {
+    const FrameRecord& frame = *plan_.learnt[static_cast<std::size_t>(k)];
+    LaneMotions<double> motions;
+    bank_.motion(index_, plan_.phases, k, motions);
+    LaneObservations<double> observations;
+    for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
+      FeatureSlot& slot = slots_[lane];
+      if (slot.state != SlotState::kMapped || slot.held.size() == 0 || slot.held[0].frame_index != frame.index)
+        continue;
+      const HeldMatch held = slot.held[0];
+      slot.held.drop(1);
+      const auto l = static_cast<int>(lane);
+      const Vector3d p_WF = motions.position_of(l);
+      Vector2d predicted_px;
+      Matrix23d J_C;
+      if (model.camera.project(frame.X_CW * p_WF, predicted_px, &J_C) != ProjectionStatus::kOk) {
+        count_update(slot, frame, false);
+        continue;
+      }
+      const Matrix23d J_p = J_C * frame.X_CW.R;
+      const Vector2d phase_spread = J_p * motions.velocity_of(l) * frame.phase.deviation_s;
+      observations.set(l, held.px,
+                       match_covariance(held, frame, p_WF, J_p, settings.pixel_deviation_px) +
+                           phase_spread * phase_spread.transpose());
+    }
+    LaneOutcomes<double> outcomes;
+    bank_.update(index_, plan_.phases, k, frame.X_CW, model, observations, settings.update, outcomes);
+    for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
+      if ((outcomes.considered >> lane & 1) == 0) continue;
+      FeatureSlot& slot = slots_[lane];
+      const bool accepted = (outcomes.accepted >> lane & 1) != 0;
+      const HealthAction action = slot.health.add(outcomes.normalised_innovation_squared[lane], accepted);
+      if (action == HealthAction::kInflate) bank_.diffuse(feature(lane), kInflation_mm);
+      if (slot.health.process_noise() > 0.0 && frame.stamp.capture > slot.last_learnt) {
+        const double elapsed_s = to_seconds(frame.stamp.capture - slot.last_learnt);
+        bank_.diffuse(feature(lane), slot.health.process_noise() * std::sqrt(elapsed_s));
+      }
+      slot.last_learnt = std::max(slot.last_learnt, frame.stamp.capture);
+      count_update(slot, frame, accepted);
+    }
+  }
+}
+
+}  // namespace perimap

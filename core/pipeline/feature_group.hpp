@@ -1,0 +1,60 @@
+// Eight slots and the group of the bank that holds their estimates: what a worker does with all of them at once.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "core/bank/feature_bank.hpp"
+#include "core/estimation/measurement_model.hpp"
+#include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/feature_stages.hpp"
+#include "core/pipeline/frame_job.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+
+namespace perimap {
+
+// Frames learnt from per group and frame: more than one, so that what is held drains.
+inline constexpr int kLearnPerFrame = 3;
+static_assert(kLearnPerFrame <= kMaxLearntPhases && kLearnPerFrame <= kMaxPendingUpdates);
+static_assert(kLearnPerFrame + 1 + static_cast<int>(kReleasesCovered) <= kMaxSweepPhases);
+
+// What one sweep serves: held frames to learn from, this frame's capture, the releases.
+struct SweepPlan {
+  SweepPhases<double> phases;
+  std::array<const FrameRecord*, kLearnPerFrame> learnt{};  // the frames of the learnt phases, oldest first
+  int capture = -1;                                         // the phases' numbers; -1: the group has no estimate
+  std::array<int, kReleasesCovered> releases{};
+};
+
+class FeatureGroup {
+ public:
+  // Slot l of at most kLanes is lane l of the bank's group `index`. Both must outlive this.
+  FeatureGroup(FeatureBank<double>& bank, int index, std::span<FeatureSlot> slots) noexcept
+      : bank_(bank), index_(index), slots_(slots) {}
+
+  [[nodiscard]] std::span<FeatureSlot> slots() const noexcept { return slots_; }
+  [[nodiscard]] int feature(std::size_t lane) const noexcept { return index_ * kLanes + static_cast<int>(lane); }
+
+  // A, before the search: plans the frame's sweep and makes it.
+  void sweep(const FrameJob& job) noexcept;
+  // After sweep().
+  [[nodiscard]] MapPrediction prediction(std::size_t lane) const noexcept;
+
+  // C: appends the snapshots of the mapped features to both.
+  void evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept;
+
+  // D, after hold_match(): learns the held matches of the planned frames. The phase's deviation counts as noise along
+  // the motion: R + J v v^T J^T sigma_t^2.
+  void learn(const PixelModel& model, const EstimatorSettings& settings) noexcept;
+
+ private:
+  void plan(const FrameJob& job) noexcept;
+
+  FeatureBank<double>& bank_;
+  int index_;
+  std::span<FeatureSlot> slots_;
+  SweepPlan plan_;
+  LaneMotions<double> at_capture_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,167 @@
+#include "core/pipeline/feature_life.hpp"
+
+#include <algorithm>
+
+#include "core/pipeline/match_covariance.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr int kRefusalsBeforeLost = 90;
+constexpr std::uint64_t kUnobservedFramesBeforeLost = 900;
+constexpr int kFailedStartsBeforeLost = 3;
+constexpr std::uint64_t kConvergenceCheckFrames = 15;
+constexpr int kUpdatesBeforeConverged = 30;  // beyond the start, so that the innovation statistic means something
+
+// Fills slot.start from the first held matches. False when one of them can not be used (its frame has left the history
+// or has no phase any more, or its pixel has no ray); the held matches up to it are then dropped.
+bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& model,
+                   const EstimatorSettings& settings) noexcept {
+  const auto& depths = settings.batch.start_depths_mm;
+  const double depth_mm = depths[depths.size() / 2];  // only scales the pose noise; the start finds the true depth
+  slot.start.count = 0;
+  for (int i = 0; i < settings.start_observations; ++i) {
+    const auto k = static_cast<std::uint32_t>(i);
+    const HeldMatch& held = slot.held[k];
+    const FrameRecord* frame = job.history->find(held.frame_index);
+    Vector3d ray_C;
+    Vector2d px;
+    Matrix23d J_C;
+    // A frame can lose its phase after its match was held, when the next beat shows that the cycle was none.
+    if (frame == nullptr || !frame->measurable || !model.camera.unproject(held.px, ray_C) ||
+        model.camera.project(depth_mm * ray_C, px, &J_C) != ProjectionStatus::kOk) {
+      slot.held.drop(k + 1);
+      return false;
+    }
+    Observation& observation = slot.start.observations[k];
+    observation.z = held.px;
+    observation.X_CW = frame->X_CW;
+    observation.b = frame->b;
+    observation.R = match_covariance(held, *frame, frame->pose.X_WC * (depth_mm * ray_C), J_C * frame->X_CW.R,
+                                     settings.pixel_deviation_px);
+    ++slot.start.count;
+  }
+  return true;
+}
+
+// The life of one slot in one frame.
+class Step {
+ public:
+  Step(FeatureSlot& slot, FeatureBank<double>& bank, int feature, const FrameJob& job, const PixelModel& model,
+       const PipelineSettings& settings) noexcept
+      : slot_(slot), bank_(bank), feature_(feature), job_(job), model_(model), settings_(settings) {}
+
+  LifeEvent tracked() noexcept {
+    if (now() - slot_.last_found_frame > kTrackedMissesAllowed) return give_up();
+    while (slot_.held.size() > 0 && job_.history->find(slot_.held[0].frame_index) == nullptr) slot_.held.drop(1);
+    if (slot_.held.size() < static_cast<std::uint32_t>(settings_.estimator.start_observations)) {
+      return LifeEvent::kNone;
+    }
+    if (!prepare_start(slot_, job_, model_, settings_.estimator)) return LifeEvent::kNone;
+    slot_.start.adopt_at_frame = now() + static_cast<std::uint64_t>(settings_.adoption_delay_frames);
+    // Relaxed: housekeeping touches the flag only after it has popped this slot's request, and the ring orders that.
+    slot_.start.ready.store(false, std::memory_order_relaxed);
+    slot_.state = SlotState::kStarting;
+    return LifeEvent::kStartRequested;
+  }
+
+  LifeEvent starting() noexcept {
+    if (now() < slot_.start.adopt_at_frame) return LifeEvent::kNone;
+    // Acquire: pairs with housekeeping's release store, so that the whole outcome is visible.
+    if (!slot_.start.ready.load(std::memory_order_acquire)) {
+      return now() == slot_.start.adopt_at_frame ? LifeEvent::kAdoptionLate : LifeEvent::kNone;
+    }
+    const auto used = static_cast<std::uint32_t>(slot_.start.count);
+    if (!slot_.start.outcome.ok()) {
+      if (++slot_.failed_starts >= kFailedStartsBeforeLost) return give_up();
+      slot_.held.drop(used / 2);
+      slot_.state = SlotState::kTracked;
+      return LifeEvent::kNone;
+    }
+    if (const FrameRecord* last = job_.history->find(slot_.held[used - 1].frame_index)) {
+      slot_.last_observed = last->stamp.capture;
+    }
+    slot_.held.drop(used);
+    bank_.set(feature_, slot_.start.outcome.estimate);
+    slot_.last_learnt = slot_.last_observed;
+    slot_.health.reset();
+    slot_.updates = 0;
+    slot_.refused_in_a_row = 0;
+    slot_.follows_something_else = false;
+    slot_.state = SlotState::kMapped;
+    check_convergence();
+    return LifeEvent::kNone;
+  }
+
+  LifeEvent mapped() noexcept {
+    if (slot_.refused_in_a_row >= kRefusalsBeforeLost || now() - slot_.last_found_frame > kUnobservedFramesBeforeLost) {
+      return give_up();
+    }
+    if (slot_.follows_something_else) {
+      // Let go of the patch, so that the next search starts where the map says.
+      slot_.follows_something_else = false;
+      slot_.last_found_frame =
+          std::min(slot_.last_found_frame, now() - std::min<std::uint64_t>(now(), kTrackedMissesAllowed + 1));
+    }
+    // Spread over the frames by id, so that no frame pays for all features.
+    if ((now() + slot_.id) % kConvergenceCheckFrames == 0) check_convergence();
+    if (slot_.health.state() == HealthState::kFailed) return start_anew();
+    if (slot_.health.state() == HealthState::kInconsistent) slot_.converged = false;
+    return LifeEvent::kNone;
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t now() const noexcept { return job_.frame->index; }
+
+  LifeEvent give_up() noexcept {
+    slot_.state = SlotState::kEmpty;
+    bank_.clear(feature_);
+    return LifeEvent::kLost;
+  }
+
+  // The estimate explains nothing any more: gather the observations of a new start. The feature keeps its patch and its
+  // id.
+  LifeEvent start_anew() noexcept {
+    slot_.state = SlotState::kTracked;
+    slot_.held.clear();
+    slot_.failed_starts = 0;
+    slot_.converged = false;
+    bank_.clear(feature_);
+    return LifeEvent::kStartedAnew;
+  }
+
+  void check_convergence() noexcept {
+    FeatureEstimate estimate;
+    bank_.get(feature_, estimate);
+    slot_.largest_deviation_mm = largest_deviation_mm(estimate, settings_.estimator.layout);
+    slot_.converged = slot_.largest_deviation_mm <= settings_.estimator.converged_deviation_mm &&
+                      slot_.updates >= kUpdatesBeforeConverged && slot_.health.monitor().consistent();
+  }
+
+  FeatureSlot& slot_;
+  FeatureBank<double>& bank_;
+  int feature_;
+  const FrameJob& job_;
+  const PixelModel& model_;
+  const PipelineSettings& settings_;
+};
+
+}  // namespace
+
+LifeEvent advance(FeatureSlot& slot, FeatureBank<double>& bank, int feature, const FrameJob& job,
+                  const PixelModel& model, const PipelineSettings& settings) noexcept {
+  Step step(slot, bank, feature, job, model, settings);
+  switch (slot.state) {
+    case SlotState::kEmpty:
+      return LifeEvent::kNone;
+    case SlotState::kTracked:
+      return step.tracked();
+    case SlotState::kStarting:
+      return step.starting();
+    case SlotState::kMapped:
+      return step.mapped();
+  }
+  return LifeEvent::kNone;
+}
+
+}  // namespace perimap

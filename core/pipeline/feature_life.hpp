@@ -1,0 +1,26 @@
+// How a feature passes from one state of its life to the next (docs/architecture.md has the table).
+#pragma once
+
+#include <cstdint>
+
+#include "core/bank/feature_bank.hpp"
+#include "core/estimation/measurement_model.hpp"
+#include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/frame_job.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+
+namespace perimap {
+
+enum class LifeEvent : std::uint8_t {
+  kNone,
+  kStartRequested,  // slot.start is filled: hand it to housekeeping
+  kAdoptionLate,    // the batch start was due at this frame and is not there
+  kStartedAnew,     // innovations stayed high: the observations of a new start are being gathered
+  kLost             // the feature was given up; the slot is empty
+};
+
+// D, last part, after the frame's learning. `bank` holds the estimate of the slot as that of `feature`.
+[[nodiscard]] LifeEvent advance(FeatureSlot& slot, FeatureBank<double>& bank, int feature, const FrameJob& job,
+                                const PixelModel& model, const PipelineSettings& settings) noexcept;
+
+}  // namespace perimap

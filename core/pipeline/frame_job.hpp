@@ -1,0 +1,30 @@
+// One frame's facts that all features share.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/periodic/basis.hpp"
+#include "core/pipeline/frame_history.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
+#include "core/time/instant.hpp"
+#include "core/vision/image_pyramid.hpp"
+
+namespace perimap {
+
+// The basis at a frame's release time, with the phase as known now.
+struct ReleaseBasis {
+  std::uint64_t frame_sequence = 0;
+  Basis b;
+};
+
+// Written by the mapper before a stage, read by all workers during it.
+struct FrameJob {
+  const FrameRecord* frame = nullptr;
+  const FrameHistory* history = nullptr;
+  const ImagePyramid* pyramid = nullptr;
+  std::array<ReleaseBasis, kReleasesCovered> releases;
+  Instant learn_until;  // learning that has not begun by then is put off; never in lockstep
+};
+
+}  // namespace perimap
