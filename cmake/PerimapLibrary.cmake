@@ -1,10 +1,12 @@
-# perimap_library(NAME FOLDER [SOURCES f...] [DEPENDS target...] [PRIVATE_DEPENDS target...])
+# perimap_library(NAME FOLDER [PRELUDE p] [SOURCES f...] [DEPENDS target...] [PRIVATE_DEPENDS target...])
 #
 # One target per folder. Headers are included by their path from the project's root ("core/time/instant.hpp"), but a
 # target sees a folder's headers only when it depends on that folder's target: each target carries an include root of
 # its own that holds nothing but its folder. So an include against the direction of the architecture does not build.
+#
+# PRELUDE names the precompiled headers (perimap_prelude) that its files begin with.
 function(perimap_library NAME FOLDER)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "" "PRELUDE" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
   set(root ${CMAKE_BINARY_DIR}/include_roots/${NAME})
   get_filename_component(parent ${root}/${FOLDER} DIRECTORY)
   file(MAKE_DIRECTORY ${parent})
@@ -13,10 +15,30 @@ function(perimap_library NAME FOLDER)
     add_library(${NAME} STATIC ${ARG_SOURCES})
     target_include_directories(${NAME} PUBLIC ${root})
     target_link_libraries(${NAME} PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS} perimap_warnings)
+    if(ARG_PRELUDE AND TARGET ${ARG_PRELUDE})
+      target_precompile_headers(${NAME} REUSE_FROM ${ARG_PRELUDE})
+    endif()
   else()
     add_library(${NAME} INTERFACE)
     target_include_directories(${NAME} INTERFACE ${root})
     target_link_libraries(${NAME} INTERFACE ${ARG_DEPENDS})
+  endif()
+endfunction()
+
+# perimap_prelude(NAME [FOR_PROGRAMS] HEADERS <header>... DEPENDS target...)
+#
+# Headers of others that take longer to read than most files take to compile, read once for all. Not in release builds:
+# there each file must compile with what it includes itself. Programs are compiled with other flags than libraries.
+function(perimap_prelude NAME)
+  cmake_parse_arguments(ARG "FOR_PROGRAMS" "" "HEADERS;DEPENDS" ${ARGN})
+  if(CMAKE_BUILD_TYPE STREQUAL RelWithDebInfo)
+    if(ARG_FOR_PROGRAMS)
+      add_executable(${NAME} ${CMAKE_SOURCE_DIR}/cmake/prelude.cpp)
+    else()
+      add_library(${NAME} OBJECT ${CMAKE_SOURCE_DIR}/cmake/prelude.cpp)
+    endif()
+    target_link_libraries(${NAME} PRIVATE ${ARG_DEPENDS} perimap_warnings)
+    target_precompile_headers(${NAME} PRIVATE ${ARG_HEADERS})
   endif()
 endfunction()
 
@@ -27,7 +49,9 @@ function(perimap_test NAME)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;LABELS" ${ARGN})
   add_executable(${NAME} ${ARG_SOURCES})
   target_link_libraries(${NAME} PRIVATE ${ARG_DEPENDS} GTest::gtest GTest::gmock GTest::gtest_main perimap_warnings)
-  target_precompile_headers(${NAME} REUSE_FROM test_prelude)
+  if(TARGET test_prelude)
+    target_precompile_headers(${NAME} REUSE_FROM test_prelude)
+  endif()
   target_compile_definitions(${NAME} PRIVATE PERIMAP_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
   gtest_discover_tests(${NAME} TEST_PREFIX "${NAME}." DISCOVERY_TIMEOUT 60 PROPERTIES LABELS "${ARG_LABELS}")
 endfunction()

@@ -7,7 +7,8 @@ usage() {
   cat << 'END'
 tests/run.sh [--full] [--jobs N]
   Installs the packages, builds the presets dev and asan, runs their tests. 15 minutes on two cores at most.
-  --full    also ThreadSanitizer, the tests labelled `long`, a minute of each fuzz target, format and clang-tidy
+  --full    also ThreadSanitizer, all of UndefinedBehaviorSanitizer, the tests labelled `long`, a minute of each fuzz
+            target, format and clang-tidy
   --jobs N  parallel compilations; all processors when not given
 Exit code 0 when everything passed, 1 when something failed, 2 for a wrong command line. Logs: build/logs/.
 END
@@ -139,6 +140,7 @@ if build dev; then run_tests "dev tests" dev -LE long; fi
 if build asan; then run_tests "asan tests" asan -LE long; fi
 if [ $full = yes ]; then
   if build tsan; then run_tests "tsan tests" tsan -LE long; fi
+  if build ubsan; then run_tests "ubsan tests" ubsan -LE long; fi
   run_tests "long tests" dev -L long
   if build fuzz --target fuzzers; then fuzz_smoke; fi
   lint
