@@ -38,14 +38,13 @@ void drop_what_can_not_be_learnt(FeatureSlot& slot, const FrameHistory& history)
   }
 }
 
-void count_update(FeatureSlot& slot, const FrameRecord& frame, bool accepted) noexcept {
+void count_update(FeatureSlot& slot, bool accepted) noexcept {
   if (!accepted) {
     slot.follows_something_else = ++slot.refused_in_a_row % kRefusalsBeforeRelock == 0 || slot.follows_something_else;
     return;
   }
   slot.refused_in_a_row = 0;
   ++slot.updates;
-  slot.last_observed = frame.stamp.capture;
 }
 
 }  // namespace
@@ -62,23 +61,17 @@ void FeatureGroup::plan(const FrameJob& job) noexcept {
   }
   if (!mapped) return;
 
-  const auto add_learnt = [this](const FrameRecord& frame) {
-    const int k = plan_.phases.add_learnt(frame.b, frame.b_rate, frame.phase.rate_rad_per_s, frame.phase.deviation_s);
-    plan_.learnt[static_cast<std::size_t>(k)] = &frame;
-    return k;
-  };
   std::uint64_t held = kNoFrame;
   while (plan_.phases.learnt() < kLearnPerFrame && (held = next_held_frame(slots_, held)) != kNoFrame) {
     const FrameRecord* frame = job.history->find(held);
-    if (frame != nullptr && frame->measurable) add_learnt(*frame);
+    if (frame == nullptr || !frame->measurable) continue;
+    if (!frame->phase.exact) break;
+    const int k =
+        plan_.phases.add_learnt(frame->b, frame->b_rate, frame->phase.rate_rad_per_s, frame->phase.deviation_s);
+    plan_.learnt[static_cast<std::size_t>(k)] = frame;
   }
-  // This frame's matches come when its features are found.
   const FrameRecord& now = *job.frame;
-  if (now.measurable && plan_.phases.learnt() < kLearnPerFrame) {
-    plan_.capture = add_learnt(now);
-  } else {
-    plan_.capture = plan_.phases.add_predicted(now.b, now.b_rate, now.phase.rate_rad_per_s, now.phase.deviation_s);
-  }
+  plan_.capture = plan_.phases.add_predicted(now.b, now.b_rate, now.phase.rate_rad_per_s, now.phase.deviation_s);
   for (std::size_t i = 0; i < job.releases.size(); ++i) {
     plan_.releases[i] = plan_.phases.add_predicted(job.releases[i].b, Basis());
   }
@@ -97,7 +90,7 @@ MapPrediction FeatureGroup::prediction(std::size_t lane) const noexcept {
   return {true, at_capture_.position_of(l), at_capture_.covariance_of(l)};
 }
 
-void FeatureGroup::evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept {
+void FeatureGroup::evaluate(ShardSnapshot& publisher, ShardSnapshot& model) noexcept {
   if (plan_.capture < 0) return;
   std::array<LaneMotions<double>, kReleasesCovered> at_releases;
   for (std::size_t i = 0; i < kReleasesCovered; ++i) {
@@ -106,7 +99,7 @@ void FeatureGroup::evaluate(const FrameJob& job, ShardSnapshot& publisher, Shard
   FeatureSnapshot snapshot;
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
     if (slots_[lane].state != SlotState::kMapped) continue;
-    describe(slots_[lane], job, snapshot);
+    describe(slots_[lane], snapshot);
     bank_.get(feature(lane), snapshot.x);
     for (std::size_t i = 0; i < kReleasesCovered; ++i) {
       snapshot.covariances_W_mm2[i] = at_releases[i].covariance_of(static_cast<int>(lane));
@@ -133,7 +126,7 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
       Vector2d predicted_px;
       Matrix23d J_C;
       if (model.camera.project(frame.X_CW * p_WF, predicted_px, &J_C) != ProjectionStatus::kOk) {
-        count_update(slot, frame, false);
+        count_update(slot, false);
         continue;
       }
       const Matrix23d J_p = J_C * frame.X_CW.R;
@@ -155,7 +148,7 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
         bank_.diffuse(feature(lane), slot.health.process_noise() * std::sqrt(elapsed_s));
       }
       slot.last_learnt = std::max(slot.last_learnt, frame.stamp.capture);
-      count_update(slot, frame, accepted);
+      count_update(slot, accepted);
     }
   }
 }

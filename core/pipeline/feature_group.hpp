@@ -13,7 +13,8 @@
 
 namespace perimap {
 
-// Frames learnt from per group and frame: more than one, so that what is held drains.
+// Frames learnt from per group and frame. A cycle's matches wait for the R peak that ends it; then they drain over some
+// frames, without a burst.
 inline constexpr int kLearnPerFrame = 3;
 static_assert(kLearnPerFrame <= kMaxLearntPhases && kLearnPerFrame <= kMaxPendingUpdates);
 static_assert(kLearnPerFrame + 1 + static_cast<int>(kReleasesCovered) <= kMaxSweepPhases);
@@ -41,10 +42,11 @@ class FeatureGroup {
   [[nodiscard]] MapPrediction prediction(std::size_t lane) const noexcept;
 
   // C: appends the snapshots of the mapped features to both.
-  void evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept;
+  void evaluate(ShardSnapshot& publisher, ShardSnapshot& model) noexcept;
 
-  // D, after hold_match(): learns the held matches of the planned frames. The phase's deviation counts as noise along
-  // the motion: R + J v v^T J^T sigma_t^2.
+  // D, after hold_match(): learns the held matches of the planned frames, whose cycles are completed, so that their
+  // phases are known. What is left of the phase's deviation counts as noise along the motion: R + J v v^T J^T
+  // sigma_t^2.
   void learn(const PixelModel& model, const EstimatorSettings& settings) noexcept;
 
  private:

@@ -54,9 +54,12 @@ class Step {
   LifeEvent tracked() noexcept {
     if (now() - slot_.last_found_frame > kTrackedMissesAllowed) return give_up();
     while (slot_.held.size() > 0 && job_.history->find(slot_.held[0].frame_index) == nullptr) slot_.held.drop(1);
-    if (slot_.held.size() < static_cast<std::uint32_t>(settings_.estimator.start_observations)) {
-      return LifeEvent::kNone;
-    }
+    const auto wanted = static_cast<std::uint32_t>(settings_.estimator.start_observations);
+    if (slot_.held.size() < wanted) return LifeEvent::kNone;
+    // The start waits for the end of the last observation's cycle, as all learning does. (A frame that has left the
+    // history or lost its phase is dealt with below.)
+    const FrameRecord* last = job_.history->find(slot_.held[wanted - 1].frame_index);
+    if (last != nullptr && last->measurable && !last->phase.exact) return LifeEvent::kNone;
     if (!prepare_start(slot_, job_, model_, settings_.estimator)) return LifeEvent::kNone;
     slot_.start.adopt_at_frame = now() + static_cast<std::uint64_t>(settings_.adoption_delay_frames);
     // Relaxed: housekeeping touches the flag only after it has popped this slot's request, and the ring orders that.

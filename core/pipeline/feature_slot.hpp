@@ -76,9 +76,10 @@ struct FeatureSlot {
   PatchState patch_state;
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   std::uint64_t last_found_frame = 0;
-  int refused_in_a_row = 0;             // found, but the estimate's gate said no
+  int refused_in_a_row = 0;             // found, but at learning the estimate's gate said no
   bool follows_something_else = false;  // refused so often that the patch must be let go
   PatchMatch match;                     // of this frame
+  bool match_agrees = false;            // it lies where the map predicted it
 
   // learning
   HeldMatches held;

@@ -41,6 +41,14 @@ PixelPrediction predict_from_image(const FeatureSlot& slot, const FrameRecord& f
   return prediction;
 }
 
+// Whether the match can be the feature, as far as the map and the causal phase tell. What is learnt from it is judged
+// again when its phase is known.
+bool agrees(const PatchMatch& match, const PixelPrediction& from_map, double gate) noexcept {
+  const Vector2d r = match.px - from_map.px;
+  const Matrix2d C = from_map.covariance_px2 + match.covariance_px2;
+  return r.dot(C.inverse() * r) <= gate;
+}
+
 // The view has turned so far that the first template fits badly: a fresh one at the place just found. Where none can be
 // made there the old one stays.
 void renew_template(FeatureSlot& slot, const ImagePyramid& pyramid) noexcept {
@@ -56,6 +64,7 @@ void renew_template(FeatureSlot& slot, const ImagePyramid& pyramid) noexcept {
 void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJob& job, const PixelModel& model,
                       const PipelineSettings& settings) noexcept {
   slot.match = PatchMatch{};
+  slot.match_agrees = false;
   if (slot.state == SlotState::kEmpty) return;
   const PixelPrediction from_map = predict_from_map(map, *job.frame, model);
   const PixelPrediction from_image = predict_from_image(slot, *job.frame);
@@ -66,13 +75,14 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   const Vector2d last_px = slot.patch_state.px;
   slot.match = track(*job.pyramid, slot.patch, slot.patch_state, prediction.px, prediction.covariance_px2);
   if (slot.match.state != MatchState::kFound) return;
+  slot.match_agrees = from_map.valid && agrees(slot.match, from_map, settings.estimator.update.gate);
   const bool in_a_row = slot.last_found_frame + 1 == job.frame->index;
   if (template_is_stale(slot.patch_state)) renew_template(slot, *job.pyramid);
   slot.velocity_px = in_a_row ? Vector2d(slot.match.px - last_px) : Vector2d::Zero();
   slot.last_found_frame = job.frame->index;
 }
 
-void describe(const FeatureSlot& slot, const FrameJob& job, FeatureSnapshot& snapshot) noexcept {
+void describe(const FeatureSlot& slot, FeatureSnapshot& snapshot) noexcept {
   snapshot.id = slot.id;
   snapshot.last_observed = slot.last_observed;
   snapshot.first_observed = slot.first_observed;
@@ -86,14 +96,14 @@ void describe(const FeatureSlot& slot, const FrameJob& job, FeatureSnapshot& sna
     snapshot.reason = FeatureReason::kDeviationLarge;
   } else {
     snapshot.state = FeatureState::kConverged;
-    const bool observed = slot.match.state == MatchState::kFound && job.frame->measurable && slot.refused_in_a_row == 0;
-    snapshot.reason = observed ? FeatureReason::kNone : FeatureReason::kNotObserved;
+    snapshot.reason = slot.match_agrees ? FeatureReason::kNone : FeatureReason::kNotObserved;
   }
 }
 
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept {
   if (slot.state == SlotState::kEmpty || slot.match.state != MatchState::kFound || !job.frame->measurable) return;
   slot.held.push({job.frame->index, slot.match.px, slot.match.covariance_px2});
+  if (slot.match_agrees) slot.last_observed = job.frame->stamp.capture;
 }
 
 }  // namespace perimap

@@ -22,7 +22,7 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& from_map, const Fr
                       const PipelineSettings& settings) noexcept;
 
 // C: all of a mapped feature's snapshot but its coefficients and covariances, which the bank has.
-void describe(const FeatureSlot& slot, const FrameJob& job, FeatureSnapshot& snapshot) noexcept;
+void describe(const FeatureSlot& slot, FeatureSnapshot& snapshot) noexcept;
 
 // D, first part, never put off: takes this frame's match into the queue of what is to be learnt.
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept;
