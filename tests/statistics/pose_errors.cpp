@@ -50,6 +50,16 @@ Scene scene_of(const Extent& extent, const HeartMesh& heart, int trial, double c
   return *std::move(scene);
 }
 
+// Independent priors of many features say that their mean motion is small, which no heart's is. With this one the mean
+// is as free as each feature is with the plain prior.
+Prior in_common_prior(const Scene& scene) {
+  Prior prior;
+  const double wider = std::sqrt(static_cast<double>(scene.features.size()));
+  prior.dc_mm *= wider;
+  prior.cardiac_mm *= wider;
+  return prior;
+}
+
 std::string title(double correlation_s, const char* name, int at) {
   const std::string kind = correlation_s == 0.0 ? "white" : fmt::format("{} s", correlation_s);
   return fmt::format("pose error {}, {}, {} s: median (mm)", kind, name, kSeconds[at]);
@@ -68,6 +78,7 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
     Sums naive[kChecks];
     Sums others[kChecks];
     double joint_squared_bound[kChecks] = {};
+    double in_common_squared_bound[kChecks] = {};
     double bounded = 0.0;
     for (int trial = 0; trial < trials; ++trial) {
       const Scene scene = scene_of(extent, heart, trial, correlation_s, frame_at(kSeconds[checks - 1]));
@@ -87,6 +98,9 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
       for (int at = 0; at < checks; ++at) {
         for (const FeatureEstimate& one : joint_cramer_rao_bound(scene, BasisLayout{}, Prior{}, frame_at(kSeconds[at])))
           joint_squared_bound[at] += std::pow(path_deviation_mm(one, BasisLayout{}), 2);
+        for (const FeatureEstimate& one :
+             joint_cramer_rao_bound(scene, BasisLayout{}, in_common_prior(scene), frame_at(kSeconds[at])))
+          in_common_squared_bound[at] += std::pow(path_deviation_mm(one, BasisLayout{}), 2);
       }
       bounded += static_cast<double>(scene.features.size());
     }
@@ -110,6 +124,7 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
         report.shown(title(correlation_s, name, at), half, quantile(sums[at].errors_mm, 0.5), joint_bound);
         report.shown("  NEES/3", "", sums[at].nees / sums[at].count());
       }
+      report.shown("  joint bound where the mean motion is free", "", std::sqrt(in_common_squared_bound[at] / bounded));
     }
   }
 }
