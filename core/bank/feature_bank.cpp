@@ -193,11 +193,16 @@ void FeatureBank<Real>::correct(Group& group, const SweepPhases<Real>& phases, i
 }
 
 template <class Real>
-void FeatureBank<Real>::motion(int group_index, const SweepPhases<Real>& phases, int k,
-                               LaneMotions<Real>& motions) noexcept {
+void FeatureBank<Real>::motion(int group, const SweepPhases<Real>& phases, int k, LaneMotions<Real>& motions) noexcept {
+  motion_near(group, phases, k, phases[k], motions);
+}
+
+template <class Real>
+void FeatureBank<Real>::motion_near(int group_index, const SweepPhases<Real>& phases, int k, const SweepPhase<Real>& at,
+                                    LaneMotions<Real>& motions) noexcept {
   Group& group = groups_[static_cast<std::size_t>(group_index)];
   correct(group, phases, k);
-  sweep_kernels_.motion(group.view, phases[k], group.view.S + k * 6 * kLanes, motions);
+  sweep_kernels_.motion(group.view, at, group.view.S + k * 6 * kLanes, motions);
   motions.valid = group.swept;
 }
 

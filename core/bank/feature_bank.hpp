@@ -60,6 +60,10 @@ class FeatureBank {
   // reading them off.
   void motion(int group, const SweepPhases<Real>& phases, int k, LaneMotions<Real>& motions) noexcept;
 
+  // Position and velocity at another phase, near phase k of the last sweep, whose covariance it takes.
+  void motion_near(int group, const SweepPhases<Real>& phases, int k, const SweepPhase<Real>& at,
+                   LaneMotions<Real>& motions) noexcept;
+
   // The same at any phase, by a pass over P that writes nothing.
   void motion_at(int group, const SweepPhase<Real>& phase, LaneMotions<Real>& motions) const noexcept;
 

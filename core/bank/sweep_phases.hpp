@@ -16,6 +16,15 @@ struct SweepPhase {
   std::array<Real, kMaxBasis> b_rate{};  // db/dphi, 1/rad
   Real rate_rad_per_s = 0;               // dphi/dt
   Real deviation_s = 0;                  // standard deviation of the phase, as a time
+
+  void set(const Basis& at_phase, const Basis& rate, double phase_rate_rad_per_s, double phase_deviation_s) noexcept {
+    for (Eigen::Index i = 0; i < at_phase.size(); ++i) {
+      b[static_cast<std::size_t>(i)] = static_cast<Real>(at_phase(i));
+      b_rate[static_cast<std::size_t>(i)] = i < rate.size() ? static_cast<Real>(rate(i)) : Real(0);
+    }
+    rate_rad_per_s = static_cast<Real>(phase_rate_rad_per_s);
+    deviation_s = static_cast<Real>(phase_deviation_s);
+  }
 };
 
 // Phases to learn at come first: for these a sweep forms M = P B^T (d x 3), which the update needs; for those that are
@@ -44,13 +53,7 @@ class SweepPhases {
 
  private:
   int add(const Basis& b, const Basis& b_rate, double rate_rad_per_s, double deviation_s) noexcept {
-    SweepPhase<Real>& phase = phases_[static_cast<std::size_t>(count_)];
-    for (Eigen::Index i = 0; i < b.size(); ++i) {
-      phase.b[static_cast<std::size_t>(i)] = static_cast<Real>(b(i));
-      phase.b_rate[static_cast<std::size_t>(i)] = i < b_rate.size() ? static_cast<Real>(b_rate(i)) : Real(0);
-    }
-    phase.rate_rad_per_s = static_cast<Real>(rate_rad_per_s);
-    phase.deviation_s = static_cast<Real>(deviation_s);
+    phases_[static_cast<std::size_t>(count_)].set(b, b_rate, rate_rad_per_s, deviation_s);
     return count_++;
   }
 

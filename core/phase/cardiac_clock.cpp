@@ -40,6 +40,20 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   return estimate;
 }
 
+CardiacClock CardiacClock::corrected(const CycleCorrection& correction) const noexcept {
+  CardiacClock clock = *this;
+  if (correction.beats == 0 || correction.beats != beats_) return clock;
+  clock.history_[0].time = correction.begin;
+  clock.history_[0].deviation = correction.begin_deviation;
+  clock.predicted_[0] = Seconds(to_seconds(correction.length));
+  clock.running_deviation_ = Seconds(to_seconds(correction.length_deviation));
+  if (correction.next_length > Duration::zero()) {
+    clock.predicted_[1] = Seconds(to_seconds(correction.next_length));
+    clock.next_deviation_ = Seconds(to_seconds(correction.next_length_deviation));
+  }
+  return clock;
+}
+
 CardiacClock::Located CardiacClock::locate(Instant t) const noexcept {
   if (held_ == 0 || t < beat(std::min(held_ - 1, kCompletedCycles)).time) return {};
   if (t >= beat(0).time) return locate_predicted(t);
@@ -81,7 +95,7 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   if (beat(0).index_in_run + 1 < kBeatsToLock) return located;
 
   const Instant due = predicted_r_peak();
-  const Duration slack = std::min(rounded(kOverdueDeviations * length_deviation_), predicted_length());
+  const Duration slack = std::min(rounded(kOverdueDeviations * running_deviation_), predicted_length());
   if (t > due + lost_after_) {
     located.state = PhaseState::kLost;
     return located;
@@ -89,16 +103,18 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   located.state = t > due + slack + detector_delay_ ? PhaseState::kFreeRunning : PhaseState::kLocked;
 
   CardiacCycle& cycle = located.cycle;
-  const double one_cycle = length_deviation_.count();
-  const double anchor = to_seconds(beat(0).deviation);
   cycle.begin = beat(0).time;
+  cycle.begin_deviation = beat(0).deviation;
   cycle.previous_length = last_rr();
-  cycle.length_deviation = rounded(length_deviation_);
+  double variance_s2 = to_seconds(beat(0).deviation) * to_seconds(beat(0).deviation);
   for (int ahead = 0;; ++ahead) {
-    cycle.length = rounded(predicted_[static_cast<std::size_t>(std::min(ahead, kPredictedCycles - 1))]);
-    cycle.begin_deviation = from_seconds(std::sqrt(anchor * anchor + ahead * one_cycle * one_cycle));
+    const Seconds deviation = ahead == 0 ? running_deviation_ : ahead == 1 ? next_deviation_ : length_deviation_;
+    cycle.length = predicted_length(ahead);
+    cycle.length_deviation = rounded(deviation);
     if (t < cycle.begin + cycle.length) return located;
     cycle.begin += cycle.length;
+    variance_s2 += deviation.count() * deviation.count();
+    cycle.begin_deviation = from_seconds(std::sqrt(variance_s2));
     cycle.previous_length = cycle.length;
   }
 }
@@ -113,15 +129,17 @@ CardiacCycle CardiacClock::cycle_at(Instant t) const noexcept {
 
 Instant CardiacClock::anchor() const noexcept { return beat(0).time; }
 Duration CardiacClock::anchor_deviation() const noexcept { return beat(0).deviation; }
-Duration CardiacClock::predicted_length() const noexcept { return rounded(predicted_[0]); }
-Duration CardiacClock::length_deviation() const noexcept { return rounded(length_deviation_); }
+Duration CardiacClock::predicted_length(int ahead) const noexcept {
+  return rounded(predicted_[static_cast<std::size_t>(std::min(ahead, kPredictedCycles - 1))]);
+}
+Duration CardiacClock::length_deviation() const noexcept { return rounded(running_deviation_); }
 
 Duration CardiacClock::last_rr() const noexcept {
   return held_ > 1 && beat(0).index_in_run > 0 ? beat(0).time - beat(1).time : Duration::zero();
 }
 
 Duration CardiacClock::predicted_r_peak_deviation() const noexcept {
-  return from_seconds(std::hypot(to_seconds(anchor_deviation()), length_deviation_.count()));
+  return from_seconds(std::hypot(to_seconds(anchor_deviation()), running_deviation_.count()));
 }
 
 }  // namespace perimap

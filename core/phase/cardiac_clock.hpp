@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "core/phase/cycle_correction.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/phase/seconds.hpp"
 #include "core/time/instant.hpp"
@@ -45,6 +46,9 @@ class CardiacClock {
   static constexpr int kPredictedCycles = 4;  // further ones repeat the last
   static constexpr int kBeatsToLock = 3;
 
+  // The same with the running cycle as corrected; unchanged when the correction is of another cycle.
+  [[nodiscard]] CardiacClock corrected(const CycleCorrection& correction) const noexcept;
+
   // Any instant. Instants before the history, and those in gaps too long to be cycles, are kUnknown or kLost with rate
   // 0.
   [[nodiscard]] PhaseEstimate at(Instant t) const noexcept;
@@ -52,11 +56,13 @@ class CardiacClock {
   // The last R peak and the cycle predicted to follow it. Zero before the first beat.
   [[nodiscard]] Instant anchor() const noexcept;
   [[nodiscard]] Duration anchor_deviation() const noexcept;
-  [[nodiscard]] Duration predicted_length() const noexcept;
+  [[nodiscard]] Duration predicted_length(int ahead = 0) const noexcept;  // of the running cycle or a later one
   [[nodiscard]] Duration length_deviation() const noexcept;
   [[nodiscard]] Duration last_rr() const noexcept;  // zero before the second beat of a run
   [[nodiscard]] Instant predicted_r_peak() const noexcept { return anchor() + predicted_length(); }
   [[nodiscard]] Duration predicted_r_peak_deviation() const noexcept;
+  // An R peak is known this long after it at the latest.
+  [[nodiscard]] Duration detector_delay() const noexcept { return detector_delay_; }
 
   // The cycle that holds t; while free-running it begins at a predicted R peak. Lengths are zero when the phase at t
   // means nothing.
@@ -94,7 +100,9 @@ class CardiacClock {
   int held_ = 0;
   std::array<Beat, kCompletedCycles + 2> history_{};  // newest first; one more cycle gives the oldest its RR_previous
   std::array<Seconds, kPredictedCycles> predicted_{};
-  Seconds length_deviation_{0.0};
+  Seconds length_deviation_{0.0};   // of the prediction by one cycle
+  Seconds running_deviation_{0.0};  // of the running cycle's length
+  Seconds next_deviation_{0.0};     // of the length of the cycle after it
 };
 
 static_assert(std::is_trivially_copyable_v<CardiacClock>);

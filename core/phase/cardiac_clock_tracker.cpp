@@ -49,6 +49,8 @@ void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
   ++clock_.beats_;
   predictor_.predict(clock_.predicted_);
   clock_.length_deviation_ = predictor_.deviation();
+  clock_.running_deviation_ = clock_.length_deviation_;
+  clock_.next_deviation_ = clock_.length_deviation_;
 }
 
 }  // namespace perimap

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "core/pipeline/match_covariance.hpp"
 
@@ -71,7 +72,7 @@ void FeatureGroup::plan(const FrameJob& job) noexcept {
     plan_.learnt[static_cast<std::size_t>(k)] = frame;
   }
   const FrameRecord& now = *job.frame;
-  plan_.capture = plan_.phases.add_predicted(now.b, now.b_rate, now.phase.rate_rad_per_s, now.phase.deviation_s);
+  plan_.capture = plan_.phases.add_predicted(now.b, now.b_rate, now.phase.rate_rad_per_s);
   for (std::size_t i = 0; i < job.releases.size(); ++i) {
     plan_.releases[i] = plan_.phases.add_predicted(job.releases[i].b, Basis());
   }
@@ -82,12 +83,45 @@ void FeatureGroup::sweep(const FrameJob& job) noexcept {
   if (plan_.capture < 0) return;
   bank_.sweep(index_, plan_.phases);
   bank_.motion(index_, plan_.phases, plan_.capture, at_capture_);
+  const PhaseEstimate& phase = job.frame->phase;
+  const double deviation_rad = std::min(phase.deviation_s * phase.rate_rad_per_s, std::numbers::pi);
+  for (std::size_t i = 0; i < about_it_.size(); ++i) {
+    SweepPhase<double> at;
+    at.set(basis_at(bank_.layout(), phase.phase_rad + (i == 0 ? -deviation_rad : deviation_rad)), Basis(), 0.0, 0.0);
+    bank_.motion_near(index_, plan_.phases, plan_.capture, at, about_it_[i]);
+  }
 }
 
 MapPrediction FeatureGroup::prediction(std::size_t lane) const noexcept {
   if (plan_.capture < 0 || slots_[lane].state != SlotState::kMapped) return {};
   const auto l = static_cast<int>(lane);
-  return {true, at_capture_.position_of(l), at_capture_.covariance_of(l)};
+  const Vector3d p = at_capture_.position_of(l);
+  const Vector3d earlier = about_it_[0].position_of(l) - p;
+  const Vector3d later = about_it_[1].position_of(l) - p;
+  return {true, p, at_capture_.covariance_of(l) + 0.5 * (earlier * earlier.transpose() + later * later.transpose())};
+}
+
+void FeatureGroup::collect(const FrameRecord& frame, double shift_s, const EstimatorSettings& settings,
+                           std::vector<CommonMatch>& matches) noexcept {
+  if (plan_.capture < 0) return;
+  const double phase_rad = frame.phase.phase_rad + shift_s * frame.phase.rate_rad_per_s;
+  SweepPhase<double> at;
+  at.set(basis_at(settings.layout, phase_rad), basis_rate(settings.layout, phase_rad), frame.phase.rate_rad_per_s, 0.0);
+  LaneMotions<double> motions;
+  bank_.motion_near(index_, plan_.phases, plan_.capture, at, motions);
+  for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
+    const FeatureSlot& slot = slots_[lane];
+    if (slot.state != SlotState::kMapped || !slot.converged || slot.match.state != MatchState::kFound) continue;
+    const auto l = static_cast<int>(lane);
+    CommonMatch match;
+    match.z = slot.match.px;
+    match.R =
+        slot.match.covariance_px2 + settings.pixel_deviation_px * settings.pixel_deviation_px * Matrix2d::Identity();
+    match.p_WF = motions.position_of(l);
+    match.S = motions.covariance_of(l);
+    match.D = motions.velocity_of(l);
+    matches.push_back(match);
+  }
 }
 
 void FeatureGroup::evaluate(ShardSnapshot& publisher, ShardSnapshot& model) noexcept {

@@ -3,9 +3,11 @@
 
 #include <array>
 #include <span>
+#include <vector>
 
 #include "core/bank/feature_bank.hpp"
 #include "core/estimation/measurement_model.hpp"
+#include "core/estimation/shared_pose.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/feature_stages.hpp"
 #include "core/pipeline/frame_job.hpp"
@@ -41,6 +43,11 @@ class FeatureGroup {
   // After sweep().
   [[nodiscard]] MapPrediction prediction(std::size_t lane) const noexcept;
 
+  // B: appends what the converged features that were found say of the frame's pose and of its phase `shift_s` after
+  // frame.phase, the velocity (mm/s) being the appended motion.
+  void collect(const FrameRecord& frame, double shift_s, const EstimatorSettings& settings,
+               std::vector<CommonMatch>& matches) noexcept;
+
   // C: appends the snapshots of the mapped features to both.
   void evaluate(ShardSnapshot& publisher, ShardSnapshot& model) noexcept;
 
@@ -56,7 +63,8 @@ class FeatureGroup {
   int index_;
   std::span<FeatureSlot> slots_;
   SweepPlan plan_;
-  LaneMotions<double> at_capture_;
+  LaneMotions<double> at_capture_;               // without the phase's deviation
+  std::array<LaneMotions<double>, 2> about_it_;  // one deviation of the phase earlier and later
 };
 
 }  // namespace perimap

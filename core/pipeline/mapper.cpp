@@ -9,7 +9,8 @@
 namespace perimap {
 
 Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells,
-               WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter, PipelineCounters& counters)
+               WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter,
+               TripleBuffer<CycleCorrection>& correction, PipelineCounters& counters)
     : settings_(settings),
       model_{settings.camera},
       slots_(slots),
@@ -18,10 +19,12 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       finder_(finder),
       starter_(starter),
       counters_(counters),
+      correction_(correction),
       poses_(settings.pose),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       pyramid_(settings.camera.width, settings.camera.height, kPyramidLevels),
       bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())}),
+      image_phase_(slots.size()),
       tallies_(static_cast<std::size_t>(team.size())) {
   occupied_.reserve(slots.size());
   for (int g = 0; g < bank_.groups(); ++g) {
@@ -35,15 +38,17 @@ void Mapper::add_pose(const TrackerSample& sample) noexcept {
   if (!poses_.add(sample)) counters_.poses_refused.add();
 }
 
-void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& clock) noexcept {
+void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& ecg_clock) noexcept {
   const RealtimeScope realtime;
   finish_learning();
   const Instant begun = MonotonicClock::now();
 
-  if (clock.beats() != beats_) {
-    history_->refresh_phases(clock);
-    beats_ = clock.beats();
+  if (ecg_clock.beats() != beats_) {
+    history_->refresh_phases(ecg_clock);
+    beats_ = ecg_clock.beats();
   }
+  cycle_.follow(ecg_clock, stamp.capture);
+  const CardiacClock clock = ecg_clock.corrected(cycle_.correction());
   FrameRecord& frame = history_->append(stamp);
   frame.pose = poses_.at(stamp.capture);
   if (frame.pose.valid()) frame.X_CW = frame.pose.X_WC.inverse();
@@ -57,8 +62,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   pyramid_.build(image);
   team_.run(&run_stage<&Mapper::predict_and_find_shard>, this);
   const Instant found = MonotonicClock::now();
-  // B settles which phase and pose C and D work with: the priors, what the ECG and the tracker say. A correction of
-  // both from all matches of the frame belongs here, where the matches are joined.
+  if (settings_.phase_from_image) settle_phase(frame);
   const Instant joined = MonotonicClock::now();
   team_.run(&run_stage<&Mapper::evaluate_shard>, this);
   const Instant evaluated = MonotonicClock::now();
@@ -73,6 +77,24 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   counters_.frames.add();
   if (!frame.pose.valid()) counters_.frames_without_pose.add();
   if (frame.pose.valid() && !frame.measurable) counters_.frames_without_phase.add();
+}
+
+// B. What the correction changes is the time to come: the publisher evaluates with it, and so does the next frame's A.
+void Mapper::settle_phase(const FrameRecord& frame) noexcept {
+  ObservedPhase observed;
+  switch (image_phase_.observe(groups_, frame, model_, settings_.estimator, observed)) {
+    case ImagePhaseOutcome::kObserved:
+      cycle_.add(observed);
+      counters_.phases_from_image.add();
+      break;
+    case ImagePhaseOutcome::kContradicts:
+      cycle_.add_contradiction();
+      break;
+    case ImagePhaseOutcome::kCanNotTell:
+      break;
+  }
+  correction_.back() = cycle_.correction();
+  correction_.publish();
 }
 
 void Mapper::learn() noexcept {

@@ -7,16 +7,19 @@
 
 #include "core/bank/feature_bank.hpp"
 #include "core/phase/cardiac_clock.hpp"
+#include "core/phase/cycle_posterior.hpp"
 #include "core/pipeline/batch_starter.hpp"
 #include "core/pipeline/feature_finder.hpp"
 #include "core/pipeline/feature_group.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/frame_job.hpp"
+#include "core/pipeline/image_phase.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
+#include "core/realtime/triple_buffer.hpp"
 #include "core/realtime/worker_team.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
@@ -32,7 +35,8 @@ namespace perimap {
 class Mapper {
  public:
   Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells, WorkerTeam& team,
-         FeatureFinder& finder, BatchStarter& starter, PipelineCounters& counters);
+         FeatureFinder& finder, BatchStarter& starter, TripleBuffer<CycleCorrection>& correction,
+         PipelineCounters& counters);
 
   void add_pose(const TrackerSample& sample) noexcept;
 
@@ -40,7 +44,7 @@ class Mapper {
   [[nodiscard]] bool pose_reached(Instant t) const noexcept { return poses_.reached(t); }
 
   // Stages A, B and C. `image` is not used after the return.
-  void process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& clock) noexcept;
+  void process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& ecg_clock) noexcept;
 
   // Stage D of the frame just processed; the workers do it while the mapper waits for the next frame. In lockstep it
   // is done on return.
@@ -57,6 +61,7 @@ class Mapper {
   void learn_shard(int worker) noexcept;
   void advance_slot(FeatureGroup& group, std::size_t lane, int worker) noexcept;
   void finish_learning() noexcept;
+  void settle_phase(const FrameRecord& frame) noexcept;
   void adopt_found_features(std::uint64_t frame_index) noexcept;
   void offer_to_finder(const FrameRecord& frame, const GreyImage& image) noexcept;
 
@@ -77,11 +82,15 @@ class Mapper {
   BatchStarter& starter_;
   PipelineCounters& counters_;
 
+  TripleBuffer<CycleCorrection>& correction_;
+
   PoseHistory poses_;
   std::unique_ptr<FrameHistory> history_;
   ImagePyramid pyramid_;
   FeatureBank<double> bank_;
   std::vector<FeatureGroup> groups_;
+  ImagePhase image_phase_;
+  CyclePosterior cycle_;
   FrameJob job_;
   std::vector<WorkerTally> tallies_;
   std::vector<Vector2d> occupied_;

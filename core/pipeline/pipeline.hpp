@@ -54,6 +54,7 @@ class Pipeline {
   WorkerTeam team_;
   FeatureFinder finder_;
   BatchStarter starter_;
+  TripleBuffer<CycleCorrection> correction_;  // the mapper's word to the publisher
   Mapper mapper_;
   ReleaseSchedule schedule_;
   SurfaceComposer composer_;

@@ -29,7 +29,8 @@ struct PipelineCounters {
   Counter frames;
   Counter frames_without_pose;
   Counter frames_without_phase;
-  Counter poses_refused;  // stamps that go back in time
+  Counter phases_from_image;  // frames whose matches told the phase
+  Counter poses_refused;      // stamps that go back in time
   Counter learning_put_off;
   Counter adoptions_late;
   Counter features_tracked;

@@ -37,6 +37,7 @@ struct PipelineSettings {
   Duration latency = std::chrono::milliseconds(50);  // L: release minus capture
   Duration budget = std::chrono::milliseconds(12);   // kept free for A to C before the release
   Duration validity = std::chrono::milliseconds(200);
+  bool phase_from_image = true;
   int adoption_delay_frames = 15;  // D, for batch starts
   // Lockstep: nothing is shed and every housekeeping result is there at its stated frame, so that a replay gives the
   // same samples every time.

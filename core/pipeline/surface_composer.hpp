@@ -19,7 +19,9 @@ struct ComposerSettings {
 };
 
 // Belongs to the publisher. Positions and velocities are evaluated anew from the coefficients with the phase as it is
-// known now; to the covariance of the map comes v v^T sigma_t^2, what the phase's deviation makes of the motion.
+// known now. To the covariance of the map comes what the phase's deviation makes of the motion: the mean square of
+// where the feature would be one deviation earlier and one later, which is v v^T sigma_t^2 while the deviation is
+// small, and does not vanish with a large one where the motion turns.
 class SurfaceComposer {
  public:
   explicit SurfaceComposer(const ComposerSettings& settings);

@@ -127,6 +127,7 @@ nlohmann::json counts(const PipelineCounters& c) {
           {"frames_too_late", c.frames_too_late.get()},
           {"frames_without_pose", c.frames_without_pose.get()},
           {"frames_without_phase", c.frames_without_phase.get()},
+          {"phases_from_image", c.phases_from_image.get()},
           {"samples", c.samples.get()},
           {"samples_without_frame", c.samples_without_frame.get()},
           {"samples_from_late_update", c.samples_from_late_update.get()},

@@ -45,6 +45,7 @@ struct TrackerConfiguration {
 struct PhaseConfiguration {
   PhaseLaw law = PhaseLaw::kLinear;
   Duration lost_after = std::chrono::seconds(3);  // without an R peak
+  bool from_image = true;
 
   bool operator==(const PhaseConfiguration&) const = default;
 };

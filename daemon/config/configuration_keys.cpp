@@ -313,7 +313,9 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
   Section("phase", keys)
       .choice("law", laws, PERIMAP_MEMBER(phase.law), "how the phase runs from one R peak to the next")
       .duration("lost_after_s", s, 0.5, 60, PERIMAP_MEMBER(phase.lost_after),
-                "without an R peak for so long the phase is lost");
+                "without an R peak for so long the phase is lost")
+      .flag("from_image", PERIMAP_MEMBER(phase.from_image),
+            "corrects the running cycle by what the features' motion in the image tells");
   // No pipeline serves Release::kClock, so a file that asks for it is refused.
   using Release = PipelineConfiguration::Release;
   const std::array<std::pair<std::string_view, Release>, 1> releases{{{"frame", Release::kFrame}}};

@@ -156,6 +156,7 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.frames_too_late = c.frames_too_late.get();
   wire_.frames_without_pose = c.frames_without_pose.get();
   wire_.frames_without_phase = c.frames_without_phase.get();
+  wire_.phases_from_image = c.phases_from_image.get();
   wire_.samples = c.samples.get();
   wire_.samples_without_frame = c.samples_without_frame.get();
   wire_.samples_from_late_update = c.samples_from_late_update.get();

@@ -66,6 +66,7 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.pose.maximum_extrapolation = c.tracker.maximum_extrapolation;
   s.clock.law.law = c.phase.law;
   s.clock.lost_after = c.phase.lost_after;
+  s.phase_from_image = c.phase.from_image;
   s.features.maximum = c.features.maximum;
   s.features.detection_interval_frames = c.features.detection_interval_frames;
   s.features.minimum_distance_px = c.features.minimum_distance_px;

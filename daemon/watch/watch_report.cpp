@@ -101,6 +101,7 @@ Json status_json(const StatusDigest& digest) {
                {"frames_too_late", status.frames_too_late},
                {"frames_without_pose", status.frames_without_pose},
                {"frames_without_phase", status.frames_without_phase},
+               {"phases_from_image", status.phases_from_image},
                {"samples", status.samples},
                {"samples_without_frame", status.samples_without_frame},
                {"samples_from_late_update", status.samples_from_late_update},

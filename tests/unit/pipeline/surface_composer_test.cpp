@@ -76,8 +76,26 @@ TEST(SurfaceComposer, AddsWhatThePhaseDeviationMakesOfTheMotion) {
   const SurfaceSample& sample = composer.compose(kRelease, clock, view);
   const double deviation_s = clock.at(kRelease.deadline).deviation_s;
   const double v = sample.features[0].velocity_W_mm_per_s.x();
-  EXPECT_NEAR(sample.features[0].covariance_W_mm2(0, 0), 0.04 + v * v * deviation_s * deviation_s, 1e-12);
+  EXPECT_NEAR(sample.features[0].covariance_W_mm2(0, 0), 0.04 + v * v * deviation_s * deviation_s,
+              0.05 * v * v * deviation_s * deviation_s)
+      << "v v^T sigma^2, to first order";
   EXPECT_NEAR(sample.features[0].covariance_W_mm2(1, 1), 0.04, 1e-12);
+}
+
+TEST(SurfaceComposer, ALargePhaseDeviationIsFeltWhereTheMotionTurns) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  // Valid at the R peak, where the cosine stands still, and a fifth of a cycle uncertain.
+  const Release at_peak{100, Instant(milliseconds(9750)), Instant(milliseconds(9800)), false};
+  CycleCorrection correction;
+  correction.beats = steady_clock().beats();
+  correction.begin = at_ms(9000);
+  correction.begin_deviation = milliseconds(160);
+  correction.length = milliseconds(800);
+  const SurfaceSample& sample = composer.compose(at_peak, steady_clock().corrected(correction), view);
+  EXPECT_NEAR(sample.features[0].velocity_W_mm_per_s.x(), 0.0, 0.5);
+  EXPECT_GT(sample.features[0].covariance_W_mm2(0, 0), 5.0);
 }
 
 TEST(SurfaceComposer, OrdersFeaturesOfAllShardsById) {

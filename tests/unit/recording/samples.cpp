@@ -212,6 +212,7 @@ void fill(Filler& next, perimap_Status& s) {
   next.sequence(s.sources, 3, [&](auto& source) { fill(next, source); });
   next.sequence(s.stages, 2, [&](auto& stage) { fill(next, stage); });
   next(s.features_started_anew);
+  next(s.phases_from_image);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -416,7 +417,8 @@ json to_json(const perimap_Status& s) {
           MEMBER(features_lost),
           MEMBER(sources),
           MEMBER(stages),
-          MEMBER(features_started_anew)};
+          MEMBER(features_started_anew),
+          MEMBER(phases_from_image)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {

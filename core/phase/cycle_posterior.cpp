@@ -1,0 +1,206 @@
+#include "core/phase/cycle_posterior.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace perimap {
+namespace {
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kLengthSpan = 4.0;     // deviations to either side
+constexpr double kBeginningSpan = 2.5;  // likewise
+constexpr double kLeastBeginDeviation_s = 1e-3;
+constexpr double kLeastLengthDeviation = 0.005;   // share of the length
+constexpr double kFreedom = 3.0;                  // of Student's likelihood
+constexpr double kMissedBeatDeviation_s = 0.010;  // of the detector's delay
+constexpr double kLargestSquare = 9.0;
+constexpr double kContradicts = 3.0;  // deviations
+constexpr double kContradicted_s = 0.15;
+// Below this many observations the misfit says little.
+constexpr int kEnoughForMisfit = 5;
+
+}  // namespace
+
+double CyclePosterior::begin_s(int i) const noexcept {
+  return begin_deviation_s_ * kBeginningSpan * (2.0 * i / (kBeginnings - 1) - 1.0);
+}
+
+double CyclePosterior::length_s(int j) const noexcept {
+  return length_mean_s_ + length_deviation_s_ * kLengthSpan * (2.0 * j / (kLengths - 1) - 1.0);
+}
+
+void CyclePosterior::follow(const CardiacClock& clock, Instant now) noexcept {
+  now_ = now;
+  locked_ = clock.at(now).state == PhaseState::kLocked;
+  if (clock.beats() == beats_) return;
+  beats_ = clock.beats();
+  begin_cycle(clock);
+}
+
+void CyclePosterior::begin_cycle(const CardiacClock& clock) noexcept {
+  law_ = clock.law();
+  r_peak_ = clock.anchor();
+  detector_delay_ = clock.detector_delay();
+  begin_deviation_s_ = std::max(to_seconds(clock.anchor_deviation()), kLeastBeginDeviation_s);
+  length_mean_s_ = to_seconds(clock.predicted_length());
+  length_deviation_s_ = std::max(to_seconds(clock.length_deviation()), kLeastLengthDeviation * length_mean_s_);
+  // A length must stay one.
+  length_deviation_s_ = std::min(length_deviation_s_, 0.5 * length_mean_s_ / kLengthSpan);
+  previous_length_s_ = to_seconds(clock.last_rr());
+  if (previous_length_s_ <= 0.0) previous_length_s_ = length_mean_s_;
+  next_length_s_ = to_seconds(clock.predicted_length(1));
+  one_length_deviation_s_ = length_deviation_s_;
+  contradicted_ = false;
+  observed_ = 0;
+  for (int i = 0; i < kBeginnings; ++i) {
+    for (int j = 0; j < kLengths; ++j) {
+      const double b = begin_s(i) / begin_deviation_s_;
+      const double l = (length_s(j) - length_mean_s_) / length_deviation_s_;
+      candidate(i, j) = {-0.5 * (b * b + l * l), 0.0};
+    }
+  }
+  const std::uint64_t oldest = kept_count_ > kKept ? kept_count_ - kKept : 0;
+  for (std::uint64_t k = oldest; k < kept_count_; ++k) {
+    if (kept_[k % kKept].time >= r_peak_) weigh(kept_[k % kKept]);
+  }
+}
+
+void CyclePosterior::add(const ObservedPhase& observed) noexcept {
+  kept_[kept_count_++ % kKept] = observed;
+  contradicted_ = false;
+  if (locked_) weigh(observed);
+}
+
+void CyclePosterior::weigh(const ObservedPhase& observed) noexcept {
+  if (length_mean_s_ <= 0.0) return;
+  ++observed_;
+  for (int i = 0; i < kBeginnings; ++i) {
+    for (int j = 0; j < kLengths; ++j) {
+      const CyclePhase phase = phase_of(observed.time, begin_s(i), length_s(j), next_length_s_);
+      const bool past_end = to_seconds(observed.time - r_peak_) - begin_s(i) >= length_s(j);
+      const double difference = std::remainder(observed.phase_rad - phase.phase_rad, kTwoPi);
+      // Past the end runs a cycle whose own length is only predicted.
+      const double loose = past_end ? phase.length_sensitivity * phase.rate_rad_per_s * one_length_deviation_s_ : 0.0;
+      const double square = difference * difference / (observed.deviation_rad * observed.deviation_rad + loose * loose);
+      Candidate& c = candidate(i, j);
+      c.log_likelihood -= 0.5 * (kFreedom + 1.0) * std::log1p(square / kFreedom);
+      c.misfit += std::min(square, kLargestSquare);
+    }
+  }
+}
+
+CyclePhase CyclePosterior::phase_of(Instant t, double begin_s, double length_s, double next_s) const noexcept {
+  const double since_s = to_seconds(t - r_peak_) - begin_s;
+  return since_s < length_s ? phase_in_cycle(law_, Seconds(since_s), Seconds(length_s), Seconds(previous_length_s_))
+                            : phase_in_cycle(law_, Seconds(since_s - length_s), Seconds(next_s), Seconds(length_s));
+}
+
+double CyclePosterior::contradiction_s(double begin_s, double length_s,
+                                       const CycleCorrection& correction) const noexcept {
+  if (contradicted_) return kContradicted_s;
+  const ObservedPhase& newest = kept_[(kept_count_ - 1) % kKept];
+  const double next_s = correction.next_length > Duration::zero() ? to_seconds(correction.next_length) : next_length_s_;
+  const CyclePhase phase = phase_of(newest.time, begin_s, length_s, next_s);
+  const double difference = std::abs(std::remainder(newest.phase_rad - phase.phase_rad, kTwoPi));
+  return difference > kContradicts * newest.deviation_rad ? difference / phase.rate_rad_per_s : 0.0;
+}
+
+CycleCorrection CyclePosterior::correction() const noexcept {
+  CycleCorrection correction;
+  if (!locked_ || observed_ == 0) return correction;
+  const double known_until_s = to_seconds(now_ - detector_delay_ - r_peak_);
+  std::array<double, kLengths * kBeginnings> log_weights;
+  double best = -std::numeric_limits<double>::infinity();
+  double best_misfit = 0.0;
+  for (int i = 0; i < kBeginnings; ++i) {
+    for (int j = 0; j < kLengths; ++j) {
+      const auto k = static_cast<std::size_t>(i * kLengths + j);
+      const double overdue = std::max(0.0, known_until_s - begin_s(i) - length_s(j)) / kMissedBeatDeviation_s;
+      log_weights[k] = grid_[k].log_likelihood - 0.5 * overdue * overdue;
+      if (log_weights[k] <= best) continue;
+      best = log_weights[k];
+      best_misfit = grid_[k].misfit;
+    }
+  }
+  double sum = 0.0;
+  double begin = 0.0;
+  double begin_square = 0.0;
+  double length = 0.0;
+  double length_square = 0.0;
+  for (int i = 0; i < kBeginnings; ++i) {
+    for (int j = 0; j < kLengths; ++j) {
+      const double weight = std::exp(log_weights[static_cast<std::size_t>(i * kLengths + j)] - best);
+      const double b = begin_s(i);
+      const double l = length_s(j) - length_mean_s_;
+      sum += weight;
+      begin += weight * b;
+      begin_square += weight * b * b;
+      length += weight * l;
+      length_square += weight * l * l;
+    }
+  }
+  if (!(sum > 0.0) || !std::isfinite(sum)) return correction;
+  begin /= sum;
+  length /= sum;
+  // Between two candidates nothing is known better than half their distance allows.
+  const double begin_step = 2.0 * kBeginningSpan * begin_deviation_s_ / (kBeginnings - 1);
+  const double length_step = 2.0 * kLengthSpan * length_deviation_s_ / (kLengths - 1);
+  double begin_variance = std::max(begin_square / sum - begin * begin, begin_step * begin_step / 12.0);
+  double length_variance = std::max(length_square / sum - length * length, length_step * length_step / 12.0);
+  // Where even the best candidate does not explain the observations, they are worth less than they say.
+  if (observed_ >= kEnoughForMisfit) {
+    const double worse = std::max(1.0, best_misfit / observed_);
+    begin_variance *= worse;
+    length_variance *= worse;
+  }
+  correction.beats = beats_;
+  correction.begin = r_peak_ + from_seconds(begin);
+  correction.length = from_seconds(length_mean_s_ + length);
+  correction.length_deviation = from_seconds(std::sqrt(length_variance));
+  correct_next(begin + length_mean_s_ + length, begin_variance + length_variance, correction);
+  const double contradiction = contradiction_s(begin, length_mean_s_ + length, correction);
+  correction.begin_deviation = from_seconds(std::sqrt(begin_variance + contradiction * contradiction));
+  return correction;
+}
+
+// The length of the next cycle from what was observed since the end of this one.
+void CyclePosterior::correct_next(double end_s, double end_variance_s2, CycleCorrection& correction) const noexcept {
+  const std::uint64_t oldest = kept_count_ > kKept ? kept_count_ - kKept : 0;
+  const Instant end = r_peak_ + from_seconds(end_s);
+  double log_weights[kLengths] = {};
+  bool any = false;
+  for (std::uint64_t k = kept_count_; k > oldest && kept_[(k - 1) % kKept].time > end; --k) {
+    const ObservedPhase& observed = kept_[(k - 1) % kKept];
+    any = true;
+    for (int j = 0; j < kLengths; ++j) {
+      const double next = next_length_s_ + one_length_deviation_s_ * kLengthSpan * (2.0 * j / (kLengths - 1) - 1.0);
+      const CyclePhase phase =
+          phase_in_cycle(law_, Seconds(to_seconds(observed.time - end)), Seconds(next), Seconds(end_s));
+      const double difference = std::remainder(observed.phase_rad - phase.phase_rad, kTwoPi);
+      const double variance = observed.deviation_rad * observed.deviation_rad +
+                              phase.rate_rad_per_s * phase.rate_rad_per_s * end_variance_s2;
+      log_weights[j] -= 0.5 * (kFreedom + 1.0) * std::log1p(difference * difference / variance / kFreedom);
+    }
+  }
+  if (!any) return;
+  const double best = *std::max_element(std::begin(log_weights), std::end(log_weights));
+  double sum = 0.0;
+  double mean = 0.0;
+  double square = 0.0;
+  for (int j = 0; j < kLengths; ++j) {
+    const double deviations = kLengthSpan * (2.0 * j / (kLengths - 1) - 1.0);
+    const double weight = std::exp(log_weights[j] - best - 0.5 * deviations * deviations);
+    sum += weight;
+    mean += weight * deviations;
+    square += weight * deviations * deviations;
+  }
+  if (!(sum > 0.0)) return;
+  mean /= sum;
+  const double variance = std::max(square / sum - mean * mean, 0.0);
+  correction.next_length = from_seconds(next_length_s_ + one_length_deviation_s_ * mean);
+  correction.next_length_deviation = from_seconds(one_length_deviation_s_ * std::sqrt(variance));
+}
+
+}  // namespace perimap

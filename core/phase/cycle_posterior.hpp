@@ -1,0 +1,85 @@
+// What phases seen in the images tell of the running cardiac cycle: when it began and how long it will be.
+//
+// A posterior on a grid of beginnings and lengths: the ECG's R peak and the predicted RR interval with their deviations
+// as the prior; each observed phase multiplies it by Student's likelihood (3 degrees of freedom), so that a few wrong
+// ones do not move it; and a cycle that should have ended without an R peak seen in spite of the detector's delay
+// becomes unlikely. What the newest observation contradicts widens the deviation at once: a premature beat moves the
+// heart before its R peak is known. A beat may be known only some frames after it: the observations since then are
+// kept, and taken again for the new cycle.
+//
+// No heap, no locks.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/phase/cardiac_clock.hpp"
+#include "core/phase/cycle_correction.hpp"
+#include "core/phase/phase_law.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+struct ObservedPhase {
+  Instant time;
+  double phase_rad = 0.0;  // any multiple of 2 pi added
+  double deviation_rad = 0.0;
+};
+
+class CyclePosterior {
+ public:
+  // Before each frame: the clock as the ECG has it. A beat more begins a new cycle.
+  void follow(const CardiacClock& clock, Instant now) noexcept;
+
+  // In order of time. Ignored before the clock is locked.
+  void add(const ObservedPhase& observed) noexcept;
+  // The images fit no phase near the predicted one. Until one is observed, or a beat comes, the deviation is wide.
+  void add_contradiction() noexcept { contradicted_ = true; }
+
+  // Of the running cycle; beats = 0 when nothing was observed in it, or the clock is not locked.
+  [[nodiscard]] CycleCorrection correction() const noexcept;
+
+ private:
+  static constexpr int kLengths = 81;
+  static constexpr int kBeginnings = 7;
+  static constexpr int kKept = 128;  // observations: two seconds at 60 frames/s
+
+  struct Candidate {
+    double log_likelihood = 0.0;
+    double misfit = 0.0;  // sum of squared normalised residuals, each at most 9
+  };
+
+  void begin_cycle(const CardiacClock& clock) noexcept;
+  void weigh(const ObservedPhase& observed) noexcept;
+  // Phase and rate at an instant if the cycle began then and lasted so long, and the next one too.
+  [[nodiscard]] CyclePhase phase_of(Instant t, double begin_s, double length_s, double next_s) const noexcept;
+  // By how much the newest observation contradicts that cycle, s; 0 while it lies within its own deviation.
+  [[nodiscard]] double contradiction_s(double begin_s, double length_s,
+                                       const CycleCorrection& correction) const noexcept;
+  void correct_next(double end_s, double end_variance_s2, CycleCorrection& correction) const noexcept;
+  [[nodiscard]] double begin_s(int i) const noexcept;  // after the R peak of the ECG
+  [[nodiscard]] double length_s(int j) const noexcept;
+  [[nodiscard]] Candidate& candidate(int i, int j) noexcept {
+    return grid_[static_cast<std::size_t>(i * kLengths + j)];
+  }
+
+  bool locked_ = false;
+  std::uint64_t beats_ = 0;
+  PhaseLawSettings law_;
+  Instant now_;
+  Instant r_peak_;
+  Duration detector_delay_{0};
+  double begin_deviation_s_ = 0.0;
+  double length_mean_s_ = 0.0;
+  double length_deviation_s_ = 0.0;
+  double previous_length_s_ = 0.0;
+  double next_length_s_ = 0.0;
+  double one_length_deviation_s_ = 0.0;  // of any cycle, as predicted
+  bool contradicted_ = false;
+  int observed_ = 0;
+  std::array<Candidate, kLengths * kBeginnings> grid_{};
+  std::array<ObservedPhase, kKept> kept_{};
+  std::uint64_t kept_count_ = 0;
+};
+
+}  // namespace perimap

@@ -1,0 +1,76 @@
+#include "core/pipeline/image_phase.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+namespace perimap {
+namespace {
+
+constexpr int kPasses = 2;
+// What is looked for lies within some tens of milliseconds; wide enough not to matter where the image can tell.
+constexpr double kPriorDeviation_s = 0.1;
+// A patch that follows a little late or slides does so on all features alike.
+constexpr double kCommonDeviation_s = 1.5e-3;
+constexpr double kLargestDeviation_s = 0.03;
+constexpr double kLargestShift_s = 0.15;
+
+Matrix3d cross_matrix(const Vector3d& v) noexcept {
+  Matrix3d m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
+}  // namespace
+
+CommonInformation pose_prior(const CameraPose& pose) noexcept {
+  // The sensor turns by theta_W about itself and moves by d: the camera turns by -R_CW theta_W in its own frame and its
+  // centre moves by theta_W x lever + d.
+  using Matrix6d = Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns>;
+  Matrix6d A = Matrix6d::Zero();
+  A.topLeftCorner<3, 3>() = -pose.X_WC.R.transpose();
+  A.bottomLeftCorner<3, 3>() = -cross_matrix(pose.lever_W_mm);
+  A.bottomRightCorner<3, 3>().setIdentity();
+  Eigen::Matrix<double, kPoseUnknowns, 1> variances;
+  variances << Vector3d::Constant(pose.rotation_variance_rad2), Vector3d::Constant(pose.position_variance_mm2);
+  const Matrix6d covariance = A * variances.asDiagonal() * A.transpose();
+  CommonInformation prior = CommonInformation::zero(kPoseUnknowns);
+  const Matrix6d Lambda = covariance.llt().solve(Matrix6d::Identity());
+  prior.Lambda = 0.5 * (Lambda + Lambda.transpose());
+  return prior;
+}
+
+ImagePhaseOutcome ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
+                                      const EstimatorSettings& settings, ObservedPhase& observed) noexcept {
+  if (!frame.measurable) return ImagePhaseOutcome::kCanNotTell;
+  constexpr double kPriorVariance_s2 = kPriorDeviation_s * kPriorDeviation_s;
+  constexpr Eigen::Index kShift = kPoseUnknowns;  // the appended unknown, s
+  CommonInformation prior = with_appended(pose_prior(frame.pose), kPriorVariance_s2);
+  double shift_s = 0.0;
+  double variance_s2 = 0.0;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    matches_.clear();
+    for (FeatureGroup& group : groups) group.collect(frame, shift_s, settings, matches_);
+    if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return ImagePhaseOutcome::kCanNotTell;
+    used_.assign(matches_.size(), 0);
+    prior.eta(kShift) = -shift_s / kPriorVariance_s2;
+    const SharedPose shared =
+        estimate_shared_pose(model, frame.X_CW, prior, std::span<const CommonMatch>(matches_), std::span(used_));
+    if (!shared.estimate.ok || 2 * static_cast<std::size_t>(shared.used) < matches_.size() ||
+        shared.used < kFewestMatches) {
+      return ImagePhaseOutcome::kContradicts;
+    }
+    shift_s += shared.estimate.s(kShift);
+    variance_s2 = shared.estimate.covariance(kShift, kShift);
+    if (!(std::abs(shift_s) < kLargestShift_s)) return ImagePhaseOutcome::kContradicts;
+  }
+  // Without what the prior said.
+  const double precision = 1.0 / variance_s2 - 1.0 / kPriorVariance_s2;
+  if (!(precision > 1.0 / (kLargestDeviation_s * kLargestDeviation_s))) return ImagePhaseOutcome::kCanNotTell;
+  shift_s /= variance_s2 * precision;
+  const double rate = frame.phase.rate_rad_per_s;
+  observed = {frame.stamp.capture, frame.phase.phase_rad + rate * shift_s,
+              rate * std::sqrt(1.0 / precision + kCommonDeviation_s * kCommonDeviation_s)};
+  return ImagePhaseOutcome::kObserved;
+}
+
+}  // namespace perimap

@@ -1,0 +1,50 @@
+// Stage B: the cardiac phase and the camera pose that all matches of a frame agree on.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/estimation/measurement_model.hpp"
+#include "core/estimation/shared_pose.hpp"
+#include "core/phase/cycle_posterior.hpp"
+#include "core/pipeline/feature_group.hpp"
+#include "core/pipeline/frame_history.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+
+namespace perimap {
+
+enum class ImagePhaseOutcome : std::uint8_t { kObserved, kCanNotTell, kContradicts };
+
+// An error of the phase moves every feature along its velocity, one of the pose moves them all alike; both explain the
+// same innovations, so they are estimated together, the tracker being the pose's prior. Each match weighs by how well
+// its feature is known. The surface turns its direction within some 30 ms, so the features are moved to the phase found
+// and the rest is estimated again.
+//
+// No answer is better than a wrong one: there is none when fewer than kFewestMatches converged features were found or
+// when the heart stands too still to tell. When fewer than half of the matches agree on a solution near the prediction,
+// that is said: the heart is elsewhere than predicted, or something else moves in the view.
+class ImagePhase {
+ public:
+  static constexpr int kFewestMatches = 8;
+
+  explicit ImagePhase(std::size_t features) {
+    matches_.reserve(features);
+    used_.reserve(features);
+  }
+
+  // After stage A. frame.phase need not be right by more than some tens of milliseconds.
+  [[nodiscard]] ImagePhaseOutcome observe(std::span<FeatureGroup> groups, const FrameRecord& frame,
+                                          const PixelModel& model, const EstimatorSettings& settings,
+                                          ObservedPhase& observed) noexcept;
+
+ private:
+  std::vector<CommonMatch> matches_;
+  std::vector<std::uint8_t> used_;
+};
+
+// The prior of a camera pose's error as estimate_shared_pose() has it: that of the sensor, carried over to the camera.
+[[nodiscard]] CommonInformation pose_prior(const CameraPose& pose) noexcept;
+
+}  // namespace perimap
