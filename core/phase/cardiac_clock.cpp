@@ -25,6 +25,7 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   estimate.phase_rad = phase.phase_rad < kTwoPi ? phase.phase_rad : 0.0;
   estimate.rate_rad_per_s = phase.rate_rad_per_s;
   estimate.exact = located.exact;
+  estimate.contradicted = contradicted_ && !located.exact;
 
   const double w = phase.length_sensitivity;
   const double begin = to_seconds(cycle.begin_deviation);
@@ -47,6 +48,7 @@ CardiacClock CardiacClock::corrected(const CycleCorrection& correction) const no
   clock.history_[0].deviation = correction.begin_deviation;
   clock.predicted_[0] = Seconds(to_seconds(correction.length));
   clock.running_deviation_ = Seconds(to_seconds(correction.length_deviation));
+  clock.contradicted_ = correction.contradicted;
   if (correction.next_length > Duration::zero()) {
     clock.predicted_[1] = Seconds(to_seconds(correction.next_length));
     clock.next_deviation_ = Seconds(to_seconds(correction.next_length_deviation));

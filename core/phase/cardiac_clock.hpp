@@ -27,7 +27,8 @@ struct PhaseEstimate {
   double rate_rad_per_s = 0.0;  // 0 when the phase means nothing
   double deviation_s = 0.0;     // standard deviation of the phase, as time: phase deviation = rate * this
   PhaseState state = PhaseState::kUnknown;
-  bool exact = false;  // the cycle is completed: both its R peaks are known
+  bool exact = false;         // the cycle is completed: both its R peaks are known
+  bool contradicted = false;  // the images show another phase
 };
 
 // One cycle, completed or predicted.
@@ -103,6 +104,7 @@ class CardiacClock {
   Seconds length_deviation_{0.0};   // of the prediction by one cycle
   Seconds running_deviation_{0.0};  // of the running cycle's length
   Seconds next_deviation_{0.0};     // of the length of the cycle after it
+  bool contradicted_ = false;
 };
 
 static_assert(std::is_trivially_copyable_v<CardiacClock>);

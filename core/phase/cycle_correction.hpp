@@ -15,6 +15,7 @@ struct CycleCorrection {
   Duration length_deviation{0};
   Duration next_length{0};  // of the cycle after it; 0: nothing is known
   Duration next_length_deviation{0};
+  bool contradicted = false;  // the images show another phase than this; the deviation has been widened
 };
 
 }  // namespace perimap

@@ -18,6 +18,8 @@ constexpr double kMissedBeatDeviation_s = 0.010;  // of the detector's delay
 constexpr double kLargestSquare = 9.0;
 constexpr double kContradicts = 3.0;  // deviations
 constexpr double kContradicted_s = 0.15;
+// Less than this moves no surface by more than about a millimetre (48 mm/s RMS on a heart); the deviation says enough.
+constexpr double kWorthSaying_s = 0.02;
 // Below this many observations the misfit says little.
 constexpr int kEnoughForMisfit = 5;
 
@@ -162,6 +164,7 @@ CycleCorrection CyclePosterior::correction() const noexcept {
   correct_next(begin + length_mean_s_ + length, begin_variance + length_variance, correction);
   const double contradiction = contradiction_s(begin, length_mean_s_ + length, correction);
   correction.begin_deviation = from_seconds(std::sqrt(begin_variance + contradiction * contradiction));
+  correction.contradicted = contradiction > kWorthSaying_s;
   return correction;
 }
 

@@ -11,11 +11,13 @@ namespace perimap {
 namespace {
 
 // The first thing that is wrong, worst first.
-SurfaceReason reason_of(PhaseState phase, bool mapped, bool frame_missing, bool late, bool pose_missing) noexcept {
-  if (phase == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;
-  if (phase == PhaseState::kLost) return SurfaceReason::kPhaseLost;
+SurfaceReason reason_of(const PhaseEstimate& phase, bool mapped, bool frame_missing, bool late,
+                        bool pose_missing) noexcept {
+  if (phase.state == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;
+  if (phase.state == PhaseState::kLost) return SurfaceReason::kPhaseLost;
   if (!mapped) return SurfaceReason::kNothingMapped;
-  if (phase == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
+  if (phase.state == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
+  if (phase.contradicted) return SurfaceReason::kPhaseContradicted;
   if (frame_missing) return SurfaceReason::kFrameMissing;
   if (late) return SurfaceReason::kUpdateLate;
   if (pose_missing) return SurfaceReason::kPoseMissing;
@@ -71,7 +73,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   sample_.cardiac_phase_rate_rad_per_s = phase.rate_rad_per_s;
   const bool late = oldest < release.frame_sequence && !release.frame_missing;
   sample_.update_late = late;
-  sample_.reason = reason_of(phase.state, !order_.empty(), release.frame_missing, late, pose_missing);
+  sample_.reason = reason_of(phase, !order_.empty(), release.frame_missing, late, pose_missing);
   sample_.state = state_of(sample_.reason);
 
   const bool phase_usable = phase.state == PhaseState::kLocked || phase.state == PhaseState::kFreeRunning;

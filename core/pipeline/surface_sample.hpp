@@ -20,7 +20,8 @@ enum class SurfaceReason : std::uint8_t {
   kPhaseLost,
   kFrameMissing,
   kUpdateLate,
-  kPoseMissing
+  kPoseMissing,
+  kPhaseContradicted
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost };
@@ -32,7 +33,7 @@ struct SurfaceFeature {
   Vector3d p_WF_mm = Vector3d::Zero();              // at the valid time
   Vector3d velocity_W_mm_per_s = Vector3d::Zero();  // at the valid time
   Matrix3d covariance_W_mm2 = Matrix3d::Zero();     // of the position, phase deviation included
-  Instant last_observed;                            // capture of the last match that was learnt
+  Instant last_observed;                            // capture of the last match that agreed with the map
 };
 
 struct SurfaceSample {

@@ -38,6 +38,8 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_UPDATE_LATE;
     case SurfaceReason::kPoseMissing:
       return perimap_SURFACE_REASON_POSE_MISSING;
+    case SurfaceReason::kPhaseContradicted:
+      return perimap_SURFACE_REASON_PHASE_CONTRADICTED;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }

@@ -29,8 +29,8 @@ std::string_view name_of(perimap_SurfaceState state) {
 }
 
 std::string_view name_of(perimap_SurfaceReason reason) {
-  return name_in<8>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
-                     "update_late", "pose_missing"},
+  return name_in<9>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
+                     "update_late", "pose_missing", "phase_contradicted"},
                     static_cast<int>(reason));
 }
 

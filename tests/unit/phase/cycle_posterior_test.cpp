@@ -86,6 +86,7 @@ TEST_F(Cycle, TheCorrectedClockPredictsThePhaseToCome) {
   const Instant later = begin + milliseconds(600);
   const PhaseEstimate phase = corrected.at(later);
   EXPECT_EQ(phase.state, PhaseState::kLocked);
+  EXPECT_FALSE(phase.contradicted);
   const double error_s = (phase.phase_rad - true_phase(later)) / phase.rate_rad_per_s;
   EXPECT_LT(std::abs(error_s), 0.006);
   EXPECT_LT(std::abs(error_s), 4.0 * phase.deviation_s);
@@ -152,6 +153,7 @@ TEST_F(Cycle, WhatContradictsThePredictionWidensTheDeviationAtOnceAndUntilItIsEx
   EXPECT_GT(posterior.correction().begin_deviation, milliseconds(100));
   posterior.follow(tracker.clock(), t + milliseconds(150));
   EXPECT_GT(posterior.correction().begin_deviation, milliseconds(100)) << "with nothing seen since";
+  EXPECT_TRUE(tracker.clock().corrected(posterior.correction()).at(t + milliseconds(150)).contradicted);
   // Its R peak is known.
   tracker.on_r_peak({t, t + milliseconds(160), 1.0, milliseconds(2)});
   posterior.follow(tracker.clock(), t + milliseconds(170));

@@ -82,6 +82,20 @@ TEST(SurfaceComposer, AddsWhatThePhaseDeviationMakesOfTheMotion) {
   EXPECT_NEAR(sample.features[0].covariance_W_mm2(1, 1), 0.04, 1e-12);
 }
 
+TEST(SurfaceComposer, APhaseThatTheImagesContradictDegradesTheSurface) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  CycleCorrection correction;
+  correction.beats = steady_clock().beats();
+  correction.begin = at_ms(9000);
+  correction.length = milliseconds(800);
+  correction.contradicted = true;
+  const SurfaceSample& sample = composer.compose(kRelease, steady_clock().corrected(correction), view);
+  EXPECT_EQ(sample.state, SurfaceState::kDegraded);
+  EXPECT_EQ(sample.reason, SurfaceReason::kPhaseContradicted);
+}
+
 TEST(SurfaceComposer, ALargePhaseDeviationIsFeltWhereTheMotionTurns) {
   SurfaceComposer composer(settings());
   const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
@@ -94,6 +108,7 @@ TEST(SurfaceComposer, ALargePhaseDeviationIsFeltWhereTheMotionTurns) {
   correction.begin_deviation = milliseconds(160);
   correction.length = milliseconds(800);
   const SurfaceSample& sample = composer.compose(at_peak, steady_clock().corrected(correction), view);
+  EXPECT_EQ(sample.state, SurfaceState::kGood);
   EXPECT_NEAR(sample.features[0].velocity_W_mm_per_s.x(), 0.0, 0.5);
   EXPECT_GT(sample.features[0].covariance_W_mm2(0, 0), 5.0);
 }
