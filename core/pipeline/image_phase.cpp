@@ -45,11 +45,14 @@ ImagePhaseOutcome ImagePhase::observe(std::span<FeatureGroup> groups, const Fram
   constexpr double kPriorVariance_s2 = kPriorDeviation_s * kPriorDeviation_s;
   constexpr Eigen::Index kShift = kPoseUnknowns;  // the appended unknown, s
   CommonInformation prior = with_appended(pose_prior(frame.pose), kPriorVariance_s2);
+  const std::size_t stride = (groups.size() + kMostGroups - 1) / kMostGroups;
   double shift_s = 0.0;
   double variance_s2 = 0.0;
   for (int pass = 0; pass < kPasses; ++pass) {
     matches_.clear();
-    for (FeatureGroup& group : groups) group.collect(frame, shift_s, settings, matches_);
+    for (std::size_t g = frame.index % stride; g < groups.size(); g += stride) {
+      groups[g].collect(frame, shift_s, settings, matches_);
+    }
     if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return ImagePhaseOutcome::kCanNotTell;
     used_.assign(matches_.size(), 0);
     prior.eta(kShift) = -shift_s / kPriorVariance_s2;

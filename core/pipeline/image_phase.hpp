@@ -28,10 +28,13 @@ enum class ImagePhaseOutcome : std::uint8_t { kObserved, kCanNotTell, kContradic
 class ImagePhase {
  public:
   static constexpr int kFewestMatches = 8;
+  // More would hardly tell more, and this stands before the release: of more groups every other, third... is asked, the
+  // next ones in the next frame.
+  static constexpr std::size_t kMostGroups = 16;
 
-  explicit ImagePhase(std::size_t features) {
-    matches_.reserve(features);
-    used_.reserve(features);
+  ImagePhase() {
+    matches_.reserve(kMostGroups * kLanes);
+    used_.reserve(kMostGroups * kLanes);
   }
 
   // After stage A. frame.phase need not be right by more than some tens of milliseconds.

@@ -24,7 +24,6 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       pyramid_(settings.camera.width, settings.camera.height, kPyramidLevels),
       bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())}),
-      image_phase_(slots.size()),
       tallies_(static_cast<std::size_t>(team.size())) {
   occupied_.reserve(slots.size());
   for (int g = 0; g < bank_.groups(); ++g) {

@@ -26,7 +26,7 @@ struct Surface : ::testing::Test {
   std::vector<FeatureGroup> groups;
   std::vector<FeatureEstimate> estimates;
   FrameJob job;
-  ImagePhase image_phase{kFeatures};
+  ImagePhase image_phase;
   std::mt19937 generator{3};
 
   Surface() {
