@@ -62,7 +62,7 @@ class CardiacClock {
   [[nodiscard]] Duration last_rr() const noexcept;  // zero before the second beat of a run
   [[nodiscard]] Instant predicted_r_peak() const noexcept { return anchor() + predicted_length(); }
   [[nodiscard]] Duration predicted_r_peak_deviation() const noexcept;
-  // An R peak is known this long after it at the latest.
+  // An R peak is usually known so long after it.
   [[nodiscard]] Duration detector_delay() const noexcept { return detector_delay_; }
 
   // The cycle that holds t; while free-running it begins at a predicted R peak. Lengths are zero when the phase at t

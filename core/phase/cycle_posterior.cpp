@@ -72,7 +72,7 @@ void CyclePosterior::begin_cycle(const CardiacClock& clock) noexcept {
 void CyclePosterior::add(const ObservedPhase& observed) noexcept {
   kept_[kept_count_++ % kKept] = observed;
   contradicted_ = false;
-  if (locked_) weigh(observed);
+  if (locked_ && observed.time >= r_peak_) weigh(observed);
 }
 
 void CyclePosterior::weigh(const ObservedPhase& observed) noexcept {
@@ -103,6 +103,7 @@ double CyclePosterior::contradiction_s(double begin_s, double length_s,
                                        const CycleCorrection& correction) const noexcept {
   if (contradicted_) return kContradicted_s;
   const ObservedPhase& newest = kept_[(kept_count_ - 1) % kKept];
+  if (newest.time < r_peak_) return 0.0;
   const double next_s = correction.next_length > Duration::zero() ? to_seconds(correction.next_length) : next_length_s_;
   const CyclePhase phase = phase_of(newest.time, begin_s, length_s, next_s);
   const double difference = std::abs(std::remainder(newest.phase_rad - phase.phase_rad, kTwoPi));
@@ -111,7 +112,7 @@ double CyclePosterior::contradiction_s(double begin_s, double length_s,
 
 CycleCorrection CyclePosterior::correction() const noexcept {
   CycleCorrection correction;
-  if (!locked_ || observed_ == 0) return correction;
+  if (!locked_ || (observed_ == 0 && !contradicted_)) return correction;
   const double known_until_s = to_seconds(now_ - detector_delay_ - r_peak_);
   std::array<double, kLengths * kBeginnings> log_weights;
   double best = -std::numeric_limits<double>::infinity();
@@ -161,7 +162,7 @@ CycleCorrection CyclePosterior::correction() const noexcept {
   correction.begin = r_peak_ + from_seconds(begin);
   correction.length = from_seconds(length_mean_s_ + length);
   correction.length_deviation = from_seconds(std::sqrt(length_variance));
-  correct_next(begin + length_mean_s_ + length, begin_variance + length_variance, correction);
+  correct_next(begin, length_mean_s_ + length, begin_variance + length_variance, correction);
   const double contradiction = contradiction_s(begin, length_mean_s_ + length, correction);
   correction.begin_deviation = from_seconds(std::sqrt(begin_variance + contradiction * contradiction));
   correction.contradicted = contradiction > kWorthSaying_s;
@@ -169,9 +170,10 @@ CycleCorrection CyclePosterior::correction() const noexcept {
 }
 
 // The length of the next cycle from what was observed since the end of this one.
-void CyclePosterior::correct_next(double end_s, double end_variance_s2, CycleCorrection& correction) const noexcept {
+void CyclePosterior::correct_next(double begin_s, double length_s, double end_variance_s2,
+                                  CycleCorrection& correction) const noexcept {
   const std::uint64_t oldest = kept_count_ > kKept ? kept_count_ - kKept : 0;
-  const Instant end = r_peak_ + from_seconds(end_s);
+  const Instant end = r_peak_ + from_seconds(begin_s + length_s);
   double log_weights[kLengths] = {};
   bool any = false;
   for (std::uint64_t k = kept_count_; k > oldest && kept_[(k - 1) % kKept].time > end; --k) {
@@ -180,7 +182,7 @@ void CyclePosterior::correct_next(double end_s, double end_variance_s2, CycleCor
     for (int j = 0; j < kLengths; ++j) {
       const double next = next_length_s_ + one_length_deviation_s_ * kLengthSpan * (2.0 * j / (kLengths - 1) - 1.0);
       const CyclePhase phase =
-          phase_in_cycle(law_, Seconds(to_seconds(observed.time - end)), Seconds(next), Seconds(end_s));
+          phase_in_cycle(law_, Seconds(to_seconds(observed.time - end)), Seconds(next), Seconds(length_s));
       const double difference = std::remainder(observed.phase_rad - phase.phase_rad, kTwoPi);
       const double variance = observed.deviation_rad * observed.deviation_rad +
                               phase.rate_rad_per_s * phase.rate_rad_per_s * end_variance_s2;
@@ -201,7 +203,8 @@ void CyclePosterior::correct_next(double end_s, double end_variance_s2, CycleCor
   }
   if (!(sum > 0.0)) return;
   mean /= sum;
-  const double variance = std::max(square / sum - mean * mean, 0.0);
+  constexpr double kStep = 2.0 * kLengthSpan / (kLengths - 1);
+  const double variance = std::max(square / sum - mean * mean, kStep * kStep / 12.0);
   correction.next_length = from_seconds(next_length_s_ + one_length_deviation_s_ * mean);
   correction.next_length_deviation = from_seconds(one_length_deviation_s_ * std::sqrt(variance));
 }

@@ -56,7 +56,8 @@ class CyclePosterior {
   // By how much the newest observation contradicts that cycle, s; 0 while it lies within its own deviation.
   [[nodiscard]] double contradiction_s(double begin_s, double length_s,
                                        const CycleCorrection& correction) const noexcept;
-  void correct_next(double end_s, double end_variance_s2, CycleCorrection& correction) const noexcept;
+  void correct_next(double begin_s, double length_s, double end_variance_s2,
+                    CycleCorrection& correction) const noexcept;
   [[nodiscard]] double begin_s(int i) const noexcept;  // after the R peak of the ECG
   [[nodiscard]] double length_s(int j) const noexcept;
   [[nodiscard]] Candidate& candidate(int i, int j) noexcept {

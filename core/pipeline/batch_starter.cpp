@@ -47,7 +47,7 @@ void BatchStarter::solve(FeatureSlot& slot) noexcept {
   const std::span<const Observation> observations(slot.start.observations.data(),
                                                   static_cast<std::size_t>(slot.start.count));
   slot.start.outcome = batch_start(observations, model_, layout_, prior_, batch_);
-  // Release: the outcome is complete before the worker can see the flag (pairs with the acquire in adopt_start).
+  // Release: the outcome is complete before the worker can see the flag (pairs with the acquire in feature_life).
   slot.start.ready.store(true, std::memory_order_release);
   solved_.post();
 }

@@ -67,8 +67,7 @@ void FeatureGroup::plan(const FrameJob& job) noexcept {
     const FrameRecord* frame = job.history->find(held);
     if (frame == nullptr || !frame->measurable) continue;
     if (!frame->phase.exact) break;
-    const int k =
-        plan_.phases.add_learnt(frame->b, frame->b_rate, frame->phase.rate_rad_per_s, frame->phase.deviation_s);
+    const int k = plan_.phases.add_learnt(frame->b, frame->b_rate, frame->phase.rate_rad_per_s);
     plan_.learnt[static_cast<std::size_t>(k)] = frame;
   }
   const FrameRecord& now = *job.frame;

@@ -97,14 +97,18 @@ class Step {
   }
 
   LifeEvent mapped() noexcept {
-    if (slot_.refused_in_a_row >= kRefusalsBeforeLost || now() - slot_.last_found_frame > kUnobservedFramesBeforeLost) {
+    // Refusals come up to a cycle late; what the map and this frame's match say of each other is newer.
+    const bool refused = slot_.refused_in_a_row >= kRefusalsBeforeLost && !slot_.match_agrees;
+    if (refused || now() - slot_.last_found_frame > kUnobservedFramesBeforeLost) {
       return give_up();
     }
     if (slot_.follows_something_else) {
-      // Let go of the patch, so that the next search starts where the map says.
       slot_.follows_something_else = false;
-      slot_.last_found_frame =
-          std::min(slot_.last_found_frame, now() - std::min<std::uint64_t>(now(), kTrackedMissesAllowed + 1));
+      if (!slot_.match_agrees) {
+        // Let go of the patch, so that the next search starts where the map says.
+        slot_.last_found_frame =
+            std::min(slot_.last_found_frame, now() - std::min<std::uint64_t>(now(), kTrackedMissesAllowed + 1));
+      }
     }
     // Spread over the frames by id, so that no frame pays for all features.
     if ((now() + slot_.id) % kConvergenceCheckFrames == 0) check_convergence();

@@ -41,7 +41,7 @@ CommonInformation pose_prior(const CameraPose& pose) noexcept {
 
 ImagePhaseOutcome ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
                                       const EstimatorSettings& settings, ObservedPhase& observed) noexcept {
-  if (!frame.measurable) return ImagePhaseOutcome::kCanNotTell;
+  if (!frame.measurable || groups.empty()) return ImagePhaseOutcome::kCanNotTell;
   constexpr double kPriorVariance_s2 = kPriorDeviation_s * kPriorDeviation_s;
   constexpr Eigen::Index kShift = kPoseUnknowns;  // the appended unknown, s
   CommonInformation prior = with_appended(pose_prior(frame.pose), kPriorVariance_s2);
@@ -58,10 +58,9 @@ ImagePhaseOutcome ImagePhase::observe(std::span<FeatureGroup> groups, const Fram
     prior.eta(kShift) = -shift_s / kPriorVariance_s2;
     const SharedPose shared =
         estimate_shared_pose(model, frame.X_CW, prior, std::span<const CommonMatch>(matches_), std::span(used_));
-    if (!shared.estimate.ok || 2 * static_cast<std::size_t>(shared.used) < matches_.size() ||
-        shared.used < kFewestMatches) {
-      return ImagePhaseOutcome::kContradicts;
-    }
+    if (!shared.estimate.ok) return ImagePhaseOutcome::kCanNotTell;
+    if (2 * static_cast<std::size_t>(shared.used) < matches_.size()) return ImagePhaseOutcome::kContradicts;
+    if (shared.used < kFewestMatches) return ImagePhaseOutcome::kCanNotTell;
     shift_s += shared.estimate.s(kShift);
     variance_s2 = shared.estimate.covariance(kShift, kShift);
     if (!(std::abs(shift_s) < kLargestShift_s)) return ImagePhaseOutcome::kContradicts;

@@ -9,8 +9,8 @@
 namespace perimap {
 
 Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells,
-               WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter,
-               TripleBuffer<CycleCorrection>& correction, PipelineCounters& counters)
+               WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter, CorrectionCells& corrections,
+               PipelineCounters& counters)
     : settings_(settings),
       model_{settings.camera},
       slots_(slots),
@@ -19,7 +19,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       finder_(finder),
       starter_(starter),
       counters_(counters),
-      correction_(correction),
+      corrections_(corrections),
       poses_(settings.pose),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       pyramid_(settings.camera.width, settings.camera.height, kPyramidLevels),
@@ -52,6 +52,8 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   frame.pose = poses_.at(stamp.capture);
   if (frame.pose.valid()) frame.X_CW = frame.pose.X_WC.inverse();
   history_->set_phase(frame, clock);
+  // Only the ECG completes a cycle. A corrected beginning may lie after a frame of the running one.
+  frame.phase.exact = frame.phase.exact && stamp.capture < ecg_clock.anchor();
   job_.frame = &frame;
   job_.history = history_.get();
   job_.pyramid = &pyramid_;
@@ -92,8 +94,9 @@ void Mapper::settle_phase(const FrameRecord& frame) noexcept {
     case ImagePhaseOutcome::kCanNotTell:
       break;
   }
-  correction_.back() = cycle_.correction();
-  correction_.publish();
+  const CycleCorrection correction = cycle_.correction();
+  corrections_.publisher.write(correction);
+  corrections_.status.write(correction);
 }
 
 void Mapper::learn() noexcept {

@@ -9,6 +9,7 @@
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cycle_posterior.hpp"
 #include "core/pipeline/batch_starter.hpp"
+#include "core/pipeline/correction_cells.hpp"
 #include "core/pipeline/feature_finder.hpp"
 #include "core/pipeline/feature_group.hpp"
 #include "core/pipeline/feature_slot.hpp"
@@ -19,7 +20,6 @@
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
-#include "core/realtime/triple_buffer.hpp"
 #include "core/realtime/worker_team.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
@@ -35,8 +35,7 @@ namespace perimap {
 class Mapper {
  public:
   Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells, WorkerTeam& team,
-         FeatureFinder& finder, BatchStarter& starter, TripleBuffer<CycleCorrection>& correction,
-         PipelineCounters& counters);
+         FeatureFinder& finder, BatchStarter& starter, CorrectionCells& corrections, PipelineCounters& counters);
 
   void add_pose(const TrackerSample& sample) noexcept;
 
@@ -82,7 +81,7 @@ class Mapper {
   BatchStarter& starter_;
   PipelineCounters& counters_;
 
-  TripleBuffer<CycleCorrection>& correction_;
+  CorrectionCells& corrections_;
 
   PoseHistory poses_;
   std::unique_ptr<FrameHistory> history_;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/pipeline/batch_starter.hpp"
+#include "core/pipeline/correction_cells.hpp"
 #include "core/pipeline/feature_finder.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/mapper.hpp"
@@ -42,6 +43,8 @@ class Pipeline {
   // Publisher thread: the surface of one release, with all that is known now. Valid until the next call.
   [[nodiscard]] const SurfaceSample& compose(const Release& release) noexcept;
 
+  // Status thread: the clock with what the image makes of the running cycle.
+  [[nodiscard]] CardiacClock status_clock() noexcept;
   // Status thread: each worker's newest snapshot, in order of shard; valid until the next call.
   [[nodiscard]] std::span<const ShardSnapshot* const> model_snapshots() noexcept;
 
@@ -54,7 +57,7 @@ class Pipeline {
   WorkerTeam team_;
   FeatureFinder finder_;
   BatchStarter starter_;
-  TripleBuffer<CycleCorrection> correction_;  // the mapper's word to the publisher
+  CorrectionCells corrections_;
   Mapper mapper_;
   ReleaseSchedule schedule_;
   SurfaceComposer composer_;

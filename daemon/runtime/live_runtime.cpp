@@ -146,18 +146,17 @@ void LiveRuntime::run_publisher() {
 }
 
 void LiveRuntime::run_status() {
-  TripleBuffer<CardiacClock>& clock = pipeline_.entrance().clocks().status;
   Instant tick = MonotonicClock::now();
   Instant next_model = tick;
   Instant next_status = tick;
   for (;;) {
     const bool last = stopping_.load(std::memory_order_relaxed);
     const Instant now = MonotonicClock::now();
-    clock.update();
-    publication_.phase(wire_phase_.fill(clock.front(), now));
+    const CardiacClock clock = pipeline_.status_clock();
+    publication_.phase(wire_phase_.fill(clock, now));
     if (last || now >= next_model) {
       publication_.surface_model(
-          wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout, clock.front(), now));
+          wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout, clock, now));
       next_model = now + settings_.model_interval;
     }
     if (last || now >= next_status) {

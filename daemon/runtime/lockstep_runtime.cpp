@@ -95,11 +95,10 @@ void LockstepRuntime::release() {
 }
 
 void LockstepRuntime::publish_reports(Instant now) {
-  TripleBuffer<CardiacClock>& clock = pipeline_.entrance().clocks().status;
-  clock.update();
-  publication_.phase(wire_phase_.fill(clock.front(), now));
+  const CardiacClock clock = pipeline_.status_clock();
+  publication_.phase(wire_phase_.fill(clock, now));
   publication_.surface_model(
-      wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout, clock.front(), now));
+      wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout, clock, now));
   StatusFacts facts;
   facts.latency = pipeline_.settings().latency;
   facts.stalled_after = std::chrono::milliseconds(500);

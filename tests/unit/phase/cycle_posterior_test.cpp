@@ -157,6 +157,7 @@ TEST_F(Cycle, WhatContradictsThePredictionWidensTheDeviationAtOnceAndUntilItIsEx
   // Its R peak is known.
   tracker.on_r_peak({t, t + milliseconds(160), 1.0, milliseconds(2)});
   posterior.follow(tracker.clock(), t + milliseconds(170));
+  EXPECT_EQ(posterior.correction().beats, tracker.clock().beats());
   EXPECT_LE(posterior.correction().begin_deviation, std::max(calm, Duration(milliseconds(30))));
 }
 
@@ -165,7 +166,26 @@ TEST_F(Cycle, ImagesThatFitNoPhaseWidenTheDeviationUntilOneFits) {
   posterior.add_contradiction();
   EXPECT_GT(posterior.correction().begin_deviation, milliseconds(100));
   observe(begin + milliseconds(450));
+  EXPECT_EQ(posterior.correction().beats, tracker.clock().beats());
   EXPECT_LT(posterior.correction().begin_deviation, milliseconds(5));
+}
+
+TEST_F(Cycle, ACycleInWhichNothingButContradictionsWereSeenIsWide) {
+  posterior.follow(tracker.clock(), begin + milliseconds(100));
+  posterior.add_contradiction();
+  EXPECT_EQ(posterior.correction().beats, tracker.clock().beats());
+  EXPECT_TRUE(posterior.correction().contradicted);
+  EXPECT_GT(posterior.correction().begin_deviation, milliseconds(100));
+}
+
+TEST_F(Cycle, AFrameFromBeforeTheRPeakThatComesAfterItIsNotOfTheNewCycle) {
+  observe_until(milliseconds(300));
+  const CycleCorrection before = posterior.correction();
+  posterior.add({begin - milliseconds(30), kTwoPi - 0.2, 0.015});
+  const CycleCorrection after = posterior.correction();
+  EXPECT_EQ(after.length, before.length);
+  EXPECT_EQ(after.begin_deviation, before.begin_deviation);
+  EXPECT_FALSE(after.contradicted);
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ struct Stages : ::testing::Test {
     found.match.state = MatchState::kFound;
     found.match.px = px;
     found.match.covariance_px2 = 0.05 * Matrix2d::Identity();
-    found.match_agrees = true;
+    found.match_agrees = (px - Vector2d(320, 240)).norm() < 20.0;
     found.last_found_frame = job.frame->index;
     hold_match(found, job);
   }

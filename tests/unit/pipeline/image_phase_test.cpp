@@ -117,6 +117,13 @@ TEST_F(Surface, AThirdOfTheMatchesOnAnInstrumentChangesNothing) {
   EXPECT_NEAR((observed.phase_rad - kPhase) / kRate, 0.02, 0.004);
 }
 
+TEST_F(Surface, AnOutlierAmongTheFewestMatchesIsNoContradiction) {
+  see(0.02, Vector3d::Zero(), 0, ImagePhase::kFewestMatches);
+  slots[2].match.px += Vector2d(25.0, -40.0);
+  ObservedPhase observed;
+  EXPECT_EQ(observe(observed), ImagePhaseOutcome::kCanNotTell);
+}
+
 TEST_F(Surface, FewFeaturesSayNothing) {
   see(0.02, Vector3d::Zero(), 0, ImagePhase::kFewestMatches - 1);
   ObservedPhase observed;
