@@ -7,8 +7,8 @@ usage() {
   cat << 'END'
 tests/run.sh [--full] [--jobs N]
   Installs the packages, builds the presets dev and asan, runs their tests. 15 minutes on two cores at most.
-  --full    also ThreadSanitizer, all of UndefinedBehaviorSanitizer, the tests labelled `long`, a minute of each fuzz
-            target, format and clang-tidy
+  --full    also ThreadSanitizer, all of UndefinedBehaviorSanitizer, a release build, the tests labelled `long`, a minute
+            of each fuzz target, format and clang-tidy
   --jobs N  parallel compilations; all processors when not given
 Exit code 0 when everything passed, 1 when something failed, 2 for a wrong command line. Logs: build/logs/.
 END
