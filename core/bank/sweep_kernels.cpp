@@ -1,17 +1,18 @@
 #include "core/bank/sweep_kernels.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/bank/target_choice.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "core/bank/sweep_kernels.cpp"
+// Highway reads its name and compiles it once for each target.
+#define HWY_TARGET_INCLUDE "core/bank/sweep_kernels.cpp"  // NOLINT(cppcoreguidelines-macro-usage)
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace perimap {
-namespace HWY_NAMESPACE {
+namespace perimap::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -66,9 +67,9 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
   const int i_0 = tile.first_row;
   const int k_0 = i_0 - a * n;  // the first row's coefficient
   // Arrays of length zero are not C++.
-  constexpr int kU = kPairs > 0 ? kPairs : 1;
-  constexpr int kL = kLearnt > 0 ? kLearnt : 1;
-  constexpr int kQ = kPredicted > 0 ? kPredicted : 1;
+  constexpr int kU = std::max(kPairs, 1);
+  constexpr int kL = std::max(kLearnt, 1);
+  constexpr int kQ = std::max(kPredicted, 1);
 
   const Real* U[kU];
   V U_i[kU][kRows][2];
@@ -228,38 +229,48 @@ void sweep_tile(const GroupView<Real>& group, const CovarianceTile& tile, const 
   int learnt = phases.learnt();
   int predicted = phases.count() - learnt;
   TileWork<Real> work{group.pending, &phases[0], group.gains, &phases[learnt], group.S + learnt * 6 * kLanes};
-  const auto next_updates = [&](int count) noexcept {
-    updates -= count;
-    work.U += count * 2 * group.d * kLanes;
-  };
+  const auto next_updates = [&](int count) noexcept { work.U += count * 2 * group.d * kLanes; };
   const auto next_learnt = [&](int count) noexcept {
-    learnt -= count;
     work.learnt += count;
     work.gain += count * 3 * group.d * kLanes;
   };
   const auto next_predicted = [&](int count) noexcept {
-    predicted -= count;
     work.predicted += count;
     work.S += count * 6 * kLanes;
   };
-  for (; updates > 2; next_updates(2)) visit<2, 0, 0>(group, tile, work);
-  for (; updates > 1; next_updates(1)) visit<1, 0, 0>(group, tile, work);
+  for (; updates > 2; updates -= 2) {
+    visit<2, 0, 0>(group, tile, work);
+    next_updates(2);
+  }
+  for (; updates > 1; --updates) {
+    visit<1, 0, 0>(group, tile, work);
+    next_updates(1);
+  }
   if (updates > 0) {
     if (learnt > 0 && predicted > 1) {
       visit<1, 1, 2>(group, tile, work);
       next_learnt(1);
       next_predicted(2);
+      --learnt;
+      predicted -= 2;
     } else if (learnt > 0) {
       visit<1, 1, 0>(group, tile, work);
       next_learnt(1);
+      --learnt;
     } else {
       visit<1, 0, 0>(group, tile, work);
     }
   }
-  for (; learnt > 1; next_learnt(2)) visit<0, 2, 0>(group, tile, work);
-  for (; learnt > 0; next_learnt(1)) visit<0, 1, 0>(group, tile, work);
-  for (; predicted > 1; next_predicted(2)) visit<0, 0, 2>(group, tile, work);
-  for (; predicted > 0; next_predicted(1)) visit<0, 0, 1>(group, tile, work);
+  for (; learnt > 1; learnt -= 2) {
+    visit<0, 2, 0>(group, tile, work);
+    next_learnt(2);
+  }
+  if (learnt > 0) visit<0, 1, 0>(group, tile, work);
+  for (; predicted > 1; predicted -= 2) {
+    visit<0, 0, 2>(group, tile, work);
+    next_predicted(2);
+  }
+  if (predicted > 0) visit<0, 0, 1>(group, tile, work);
 }
 
 template <class Real>
@@ -321,9 +332,9 @@ void restore_diagonal(const GroupView<Real>& group, const SweepPhase<Real>& phas
       Vector<Real> sum = hn::Load(tag, at(S, lower_index(a, a), lane));
       for (int k = 0; k < group.n; ++k) {
         const Vector<Real> b = hn::Set(tag, phase.b[static_cast<std::size_t>(k)]);
-        const Vector<Real> bU_0 = hn::Mul(b, hn::Load(tag, at(U, 2 * (a * group.n + k), lane)));
-        const Vector<Real> bU_1 = hn::Mul(b, hn::Load(tag, at(U, 2 * (a * group.n + k) + 1, lane)));
-        sum = hn::MulAdd(bU_1, bU_1, hn::MulAdd(bU_0, bU_0, sum));
+        const Vector<Real> weighted_0 = hn::Mul(b, hn::Load(tag, at(U, 2 * (a * group.n + k), lane)));
+        const Vector<Real> weighted_1 = hn::Mul(b, hn::Load(tag, at(U, 2 * (a * group.n + k) + 1, lane)));
+        sum = hn::MulAdd(weighted_1, weighted_1, hn::MulAdd(weighted_0, weighted_0, sum));
       }
       hn::Store(sum, tag, at(S, lower_index(a, a), lane));
     }
@@ -381,8 +392,7 @@ const SweepKernels<float>* sweep_table_float() {
   return &kTable;
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace perimap
+}  // namespace perimap::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -3,15 +3,15 @@
 #include "core/bank/target_choice.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "core/bank/update_kernels.cpp"
+// Highway reads its name and compiles it once for each target.
+#define HWY_TARGET_INCLUDE "core/bank/update_kernels.cpp"  // NOLINT(cppcoreguidelines-macro-usage)
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 // The steps and their reasons are those of core/estimation/iterated_update.cpp, with a lane mask in place of each
 // branch. Lanes that are done or refused keep computing; what they compute is dropped.
 HWY_BEFORE_NAMESPACE();
-namespace perimap {
-namespace HWY_NAMESPACE {
+namespace perimap::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -102,8 +102,7 @@ struct Linearisation {
 // What stays the same during an update, for the lanes of one vector.
 template <class Real>
 struct Problem {
-  const UpdateTask<Real>* task;
-  int lane;
+  const UpdateTask<Real>* task = nullptr;
   Vector<Real> z[2];
   Vector<Real> S[6];
   Vector<Real> p_hat[3];
@@ -334,7 +333,6 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
 
   Problem<Real> problem;
   problem.task = &task;
-  problem.lane = lane;
   V R[3];
   for (int i = 0; i < 2; ++i) problem.z[i] = hn::LoadU(tag, observations.z[i] + lane);
   for (int i = 0; i < 3; ++i) R[i] = hn::LoadU(tag, observations.R[i] + lane);
@@ -351,8 +349,8 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
 
   Progress<Real> progress{considered_lanes<Real>(task.considered, lane), accepted};
   V sum = zero;
-  for (int i = 0; i < 2; ++i) sum = hn::MulAdd(problem.z[i], zero, sum);
-  for (int i = 0; i < 3; ++i) sum = hn::MulAdd(R[i], zero, sum);
+  for (const V& z : problem.z) sum = hn::MulAdd(z, zero, sum);
+  for (const V& r : R) sum = hn::MulAdd(r, zero, sum);
   progress.refuse(hn::Not(hn::Eq(sum, zero)), number<Real>(UpdateStatus::kNotFinite));
   progress.refuse(hn::Not(problem.R_factor.factor(R[0], R[1], R[2])), not_positive);
 
@@ -511,8 +509,7 @@ const UpdateKernels<float>* update_table_float() {
   return &kTable;
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace perimap
+}  // namespace perimap::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -114,7 +114,7 @@ CycleCorrection CyclePosterior::correction() const noexcept {
   CycleCorrection correction;
   if (!locked_ || (observed_ == 0 && !contradicted_)) return correction;
   const double known_until_s = to_seconds(now_ - detector_delay_ - r_peak_);
-  std::array<double, kLengths * kBeginnings> log_weights;
+  std::array<double, kLengths * kBeginnings> log_weights{};
   double best = -std::numeric_limits<double>::infinity();
   double best_misfit = 0.0;
   for (int i = 0; i < kBeginnings; ++i) {
