@@ -5,6 +5,12 @@
 
 namespace perimap {
 
+Matrix3d cross_matrix(const Vector3d& v) noexcept {
+  Matrix3d m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
 Matrix3d so3_exp(const Vector3d& w) noexcept {
   const double angle2 = w.squaredNorm();
   const double angle = std::sqrt(angle2);
@@ -18,8 +24,7 @@ Matrix3d so3_exp(const Vector3d& w) noexcept {
     const double half_sine = std::sin(0.5 * angle);
     b = 2.0 * half_sine * half_sine / angle2;
   }
-  Matrix3d W;
-  W << 0.0, -w.z(), w.y(), w.z(), 0.0, -w.x(), -w.y(), w.x(), 0.0;
+  const Matrix3d W = cross_matrix(w);
   return Matrix3d::Identity() + a * W + b * W * W;
 }
 

@@ -28,6 +28,9 @@ struct Pose {
   [[nodiscard]] Pose inverse() const noexcept { return {R.transpose(), -(R.transpose() * t)}; }
 };
 
+// [v]x, so that cross_matrix(v) * u = v x u.
+[[nodiscard]] Matrix3d cross_matrix(const Vector3d& v) noexcept;
+
 // so(3): rotation by |w| rad about w (Rodrigues), with the series at small angles, and its inverse with |w| <= pi.
 [[nodiscard]] Matrix3d so3_exp(const Vector3d& w) noexcept;
 [[nodiscard]] Vector3d so3_log(const Matrix3d& R) noexcept;

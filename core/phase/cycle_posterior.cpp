@@ -23,14 +23,27 @@ constexpr double kWorthSaying_s = 0.02;
 // Below this many observations the misfit says little.
 constexpr int kEnoughForMisfit = 5;
 
+// Where the i-th of n even steps from -span to span lies.
+double step_of(int i, int n, double span) noexcept { return span * (2.0 * i / (n - 1) - 1.0); }
+
+// Variance of an even distribution over one such step: nothing is known better between two of them.
+double step_variance(int n, double span) noexcept {
+  const double step = 2.0 * span / (n - 1);
+  return step * step / 12.0;
+}
+
+double student_log_likelihood(double square) noexcept {
+  return -0.5 * (kFreedom + 1.0) * std::log1p(square / kFreedom);
+}
+
 }  // namespace
 
 double CyclePosterior::begin_s(int i) const noexcept {
-  return begin_deviation_s_ * kBeginningSpan * (2.0 * i / (kBeginnings - 1) - 1.0);
+  return begin_deviation_s_ * step_of(i, kBeginnings, kBeginningSpan);
 }
 
 double CyclePosterior::length_s(int j) const noexcept {
-  return length_mean_s_ + length_deviation_s_ * kLengthSpan * (2.0 * j / (kLengths - 1) - 1.0);
+  return length_mean_s_ + length_deviation_s_ * step_of(j, kLengths, kLengthSpan);
 }
 
 void CyclePosterior::follow(const CardiacClock& clock, Instant now) noexcept {
@@ -53,7 +66,6 @@ void CyclePosterior::begin_cycle(const CardiacClock& clock) noexcept {
   previous_length_s_ = to_seconds(clock.last_rr());
   if (previous_length_s_ <= 0.0) previous_length_s_ = length_mean_s_;
   next_length_s_ = to_seconds(clock.predicted_length(1));
-  one_length_deviation_s_ = length_deviation_s_;
   contradicted_ = false;
   observed_ = 0;
   for (int i = 0; i < kBeginnings; ++i) {
@@ -63,8 +75,7 @@ void CyclePosterior::begin_cycle(const CardiacClock& clock) noexcept {
       candidate(i, j) = {-0.5 * (b * b + l * l), 0.0};
     }
   }
-  const std::uint64_t oldest = kept_count_ > kKept ? kept_count_ - kKept : 0;
-  for (std::uint64_t k = oldest; k < kept_count_; ++k) {
+  for (std::uint64_t k = oldest_kept(); k < kept_count_; ++k) {
     if (kept_[k % kKept].time >= r_peak_) weigh(kept_[k % kKept]);
   }
 }
@@ -84,10 +95,10 @@ void CyclePosterior::weigh(const ObservedPhase& observed) noexcept {
       const bool past_end = to_seconds(observed.time - r_peak_) - begin_s(i) >= length_s(j);
       const double difference = std::remainder(observed.phase_rad - phase.phase_rad, kTwoPi);
       // Past the end runs a cycle whose own length is only predicted.
-      const double loose = past_end ? phase.length_sensitivity * phase.rate_rad_per_s * one_length_deviation_s_ : 0.0;
+      const double loose = past_end ? phase.length_sensitivity * phase.rate_rad_per_s * length_deviation_s_ : 0.0;
       const double square = difference * difference / (observed.deviation_rad * observed.deviation_rad + loose * loose);
       Candidate& c = candidate(i, j);
-      c.log_likelihood -= 0.5 * (kFreedom + 1.0) * std::log1p(square / kFreedom);
+      c.log_likelihood += student_log_likelihood(square);
       c.misfit += std::min(square, kLargestSquare);
     }
   }
@@ -147,11 +158,10 @@ CycleCorrection CyclePosterior::correction() const noexcept {
   if (!(sum > 0.0) || !std::isfinite(sum)) return correction;
   begin /= sum;
   length /= sum;
-  // Between two candidates nothing is known better than half their distance allows.
-  const double begin_step = 2.0 * kBeginningSpan * begin_deviation_s_ / (kBeginnings - 1);
-  const double length_step = 2.0 * kLengthSpan * length_deviation_s_ / (kLengths - 1);
-  double begin_variance = std::max(begin_square / sum - begin * begin, begin_step * begin_step / 12.0);
-  double length_variance = std::max(length_square / sum - length * length, length_step * length_step / 12.0);
+  double begin_variance =
+      std::max(begin_square / sum - begin * begin, step_variance(kBeginnings, begin_deviation_s_ * kBeginningSpan));
+  double length_variance =
+      std::max(length_square / sum - length * length, step_variance(kLengths, length_deviation_s_ * kLengthSpan));
   // Where even the best candidate does not explain the observations, they are worth less than they say.
   if (observed_ >= kEnoughForMisfit) {
     const double worse = std::max(1.0, best_misfit / observed_);
@@ -172,21 +182,20 @@ CycleCorrection CyclePosterior::correction() const noexcept {
 // The length of the next cycle from what was observed since the end of this one.
 void CyclePosterior::correct_next(double begin_s, double length_s, double end_variance_s2,
                                   CycleCorrection& correction) const noexcept {
-  const std::uint64_t oldest = kept_count_ > kKept ? kept_count_ - kKept : 0;
   const Instant end = r_peak_ + from_seconds(begin_s + length_s);
   double log_weights[kLengths] = {};
   bool any = false;
-  for (std::uint64_t k = kept_count_; k > oldest && kept_[(k - 1) % kKept].time > end; --k) {
+  for (std::uint64_t k = kept_count_; k > oldest_kept() && kept_[(k - 1) % kKept].time > end; --k) {
     const ObservedPhase& observed = kept_[(k - 1) % kKept];
     any = true;
     for (int j = 0; j < kLengths; ++j) {
-      const double next = next_length_s_ + one_length_deviation_s_ * kLengthSpan * (2.0 * j / (kLengths - 1) - 1.0);
+      const double next = next_length_s_ + length_deviation_s_ * step_of(j, kLengths, kLengthSpan);
       const CyclePhase phase =
           phase_in_cycle(law_, Seconds(to_seconds(observed.time - end)), Seconds(next), Seconds(length_s));
       const double difference = std::remainder(observed.phase_rad - phase.phase_rad, kTwoPi);
       const double variance = observed.deviation_rad * observed.deviation_rad +
                               phase.rate_rad_per_s * phase.rate_rad_per_s * end_variance_s2;
-      log_weights[j] -= 0.5 * (kFreedom + 1.0) * std::log1p(difference * difference / variance / kFreedom);
+      log_weights[j] += student_log_likelihood(difference * difference / variance);
     }
   }
   if (!any) return;
@@ -195,7 +204,7 @@ void CyclePosterior::correct_next(double begin_s, double length_s, double end_va
   double mean = 0.0;
   double square = 0.0;
   for (int j = 0; j < kLengths; ++j) {
-    const double deviations = kLengthSpan * (2.0 * j / (kLengths - 1) - 1.0);
+    const double deviations = step_of(j, kLengths, kLengthSpan);
     const double weight = std::exp(log_weights[j] - best - 0.5 * deviations * deviations);
     sum += weight;
     mean += weight * deviations;
@@ -203,10 +212,9 @@ void CyclePosterior::correct_next(double begin_s, double length_s, double end_va
   }
   if (!(sum > 0.0)) return;
   mean /= sum;
-  constexpr double kStep = 2.0 * kLengthSpan / (kLengths - 1);
-  const double variance = std::max(square / sum - mean * mean, kStep * kStep / 12.0);
-  correction.next_length = from_seconds(next_length_s_ + one_length_deviation_s_ * mean);
-  correction.next_length_deviation = from_seconds(one_length_deviation_s_ * std::sqrt(variance));
+  const double variance = std::max(square / sum - mean * mean, step_variance(kLengths, kLengthSpan));
+  correction.next_length = from_seconds(next_length_s_ + length_deviation_s_ * mean);
+  correction.next_length_deviation = from_seconds(length_deviation_s_ * std::sqrt(variance));
 }
 
 }  // namespace perimap

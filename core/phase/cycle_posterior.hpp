@@ -60,6 +60,7 @@ class CyclePosterior {
                     CycleCorrection& correction) const noexcept;
   [[nodiscard]] double begin_s(int i) const noexcept;  // after the R peak of the ECG
   [[nodiscard]] double length_s(int j) const noexcept;
+  [[nodiscard]] std::uint64_t oldest_kept() const noexcept { return kept_count_ > kKept ? kept_count_ - kKept : 0; }
   [[nodiscard]] Candidate& candidate(int i, int j) noexcept {
     return grid_[static_cast<std::size_t>(i * kLengths + j)];
   }
@@ -72,10 +73,9 @@ class CyclePosterior {
   Duration detector_delay_{0};
   double begin_deviation_s_ = 0.0;
   double length_mean_s_ = 0.0;
-  double length_deviation_s_ = 0.0;
+  double length_deviation_s_ = 0.0;  // of any cycle, as predicted
   double previous_length_s_ = 0.0;
   double next_length_s_ = 0.0;
-  double one_length_deviation_s_ = 0.0;  // of any cycle, as predicted
   bool contradicted_ = false;
   int observed_ = 0;
   std::array<Candidate, kLengths * kBeginnings> grid_{};

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "core/pipeline/match_covariance.hpp"
+#include "core/pipeline/phase_spread.hpp"
 
 namespace perimap {
 namespace {
@@ -82,30 +82,23 @@ void FeatureGroup::sweep(const FrameJob& job) noexcept {
   if (plan_.capture < 0) return;
   bank_.sweep(index_, plan_.phases);
   bank_.motion(index_, plan_.phases, plan_.capture, at_capture_);
-  const PhaseEstimate& phase = job.frame->phase;
-  const double deviation_rad = std::min(phase.deviation_s * phase.rate_rad_per_s, std::numbers::pi);
-  for (std::size_t i = 0; i < about_it_.size(); ++i) {
-    SweepPhase<double> at;
-    at.set(basis_at(bank_.layout(), phase.phase_rad + (i == 0 ? -deviation_rad : deviation_rad)), Basis(), 0.0, 0.0);
-    bank_.motion_near(index_, plan_.phases, plan_.capture, at, about_it_[i]);
-  }
+  SweepPhase<double> at;
+  at.set(job.about_capture.earlier, Basis(), 0.0, 0.0);
+  bank_.motion_near(index_, plan_.phases, plan_.capture, at, earlier_);
+  at.set(job.about_capture.later, Basis(), 0.0, 0.0);
+  bank_.motion_near(index_, plan_.phases, plan_.capture, at, later_);
 }
 
 MapPrediction FeatureGroup::prediction(std::size_t lane) const noexcept {
   if (plan_.capture < 0 || slots_[lane].state != SlotState::kMapped) return {};
   const auto l = static_cast<int>(lane);
   const Vector3d p = at_capture_.position_of(l);
-  const Vector3d earlier = about_it_[0].position_of(l) - p;
-  const Vector3d later = about_it_[1].position_of(l) - p;
-  return {true, p, at_capture_.covariance_of(l) + 0.5 * (earlier * earlier.transpose() + later * later.transpose())};
+  return {true, p, at_capture_.covariance_of(l) + phase_spread(p, earlier_.position_of(l), later_.position_of(l))};
 }
 
-void FeatureGroup::collect(const FrameRecord& frame, double shift_s, const EstimatorSettings& settings,
+void FeatureGroup::collect(const SweepPhase<double>& at, double pixel_deviation_px,
                            std::vector<CommonMatch>& matches) noexcept {
   if (plan_.capture < 0) return;
-  const double phase_rad = frame.phase.phase_rad + shift_s * frame.phase.rate_rad_per_s;
-  SweepPhase<double> at;
-  at.set(basis_at(settings.layout, phase_rad), basis_rate(settings.layout, phase_rad), frame.phase.rate_rad_per_s, 0.0);
   LaneMotions<double> motions;
   bank_.motion_near(index_, plan_.phases, plan_.capture, at, motions);
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
@@ -114,8 +107,7 @@ void FeatureGroup::collect(const FrameRecord& frame, double shift_s, const Estim
     const auto l = static_cast<int>(lane);
     CommonMatch match;
     match.z = slot.match.px;
-    match.R =
-        slot.match.covariance_px2 + settings.pixel_deviation_px * settings.pixel_deviation_px * Matrix2d::Identity();
+    match.R = match_covariance(slot.match.covariance_px2, pixel_deviation_px);
     match.p_WF = motions.position_of(l);
     match.S = motions.covariance_of(l);
     match.D = motions.velocity_of(l);

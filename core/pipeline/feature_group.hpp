@@ -43,10 +43,9 @@ class FeatureGroup {
   // After sweep().
   [[nodiscard]] MapPrediction prediction(std::size_t lane) const noexcept;
 
-  // B: appends what the converged features that were found say of the frame's pose and of its phase `shift_s` after
-  // frame.phase, the velocity (mm/s) being the appended motion.
-  void collect(const FrameRecord& frame, double shift_s, const EstimatorSettings& settings,
-               std::vector<CommonMatch>& matches) noexcept;
+  // B: appends what the converged features that were found say of the frame's pose and of its phase near `at`, whose
+  // velocity (mm/s) is the appended motion.
+  void collect(const SweepPhase<double>& at, double pixel_deviation_px, std::vector<CommonMatch>& matches) noexcept;
 
   // C: appends the snapshots of the mapped features to both.
   void evaluate(ShardSnapshot& publisher, ShardSnapshot& model) noexcept;
@@ -63,8 +62,9 @@ class FeatureGroup {
   int index_;
   std::span<FeatureSlot> slots_;
   SweepPlan plan_;
-  LaneMotions<double> at_capture_;               // without the phase's deviation
-  std::array<LaneMotions<double>, 2> about_it_;  // one deviation of the phase earlier and later
+  LaneMotions<double> at_capture_;  // without the phase's deviation
+  LaneMotions<double> earlier_;     // by one deviation of the phase
+  LaneMotions<double> later_;
 };
 
 }  // namespace perimap

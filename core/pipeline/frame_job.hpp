@@ -6,6 +6,7 @@
 
 #include "core/periodic/basis.hpp"
 #include "core/pipeline/frame_history.hpp"
+#include "core/pipeline/phase_spread.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/time/instant.hpp"
 #include "core/vision/image_pyramid.hpp"
@@ -23,6 +24,7 @@ struct FrameJob {
   const FrameRecord* frame = nullptr;
   const FrameHistory* history = nullptr;
   const ImagePyramid* pyramid = nullptr;
+  BasesAbout about_capture;
   std::array<ReleaseBasis, kReleasesCovered> releases;
   Instant learn_until;  // learning that has not begun by then is put off; never in lockstep
 };

@@ -14,12 +14,6 @@ constexpr double kCommonDeviation_s = 1.5e-3;
 constexpr double kLargestDeviation_s = 0.03;
 constexpr double kLargestShift_s = 0.15;
 
-Matrix3d cross_matrix(const Vector3d& v) noexcept {
-  Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 }  // namespace
 
 CommonInformation pose_prior(const CameraPose& pose) noexcept {
@@ -50,8 +44,12 @@ ImagePhaseOutcome ImagePhase::observe(std::span<FeatureGroup> groups, const Fram
   double variance_s2 = 0.0;
   for (int pass = 0; pass < kPasses; ++pass) {
     matches_.clear();
+    const double phase_rad = frame.phase.phase_rad + shift_s * frame.phase.rate_rad_per_s;
+    SweepPhase<double> at;
+    at.set(basis_at(settings.layout, phase_rad), basis_rate(settings.layout, phase_rad), frame.phase.rate_rad_per_s,
+           0.0);
     for (std::size_t g = frame.index % stride; g < groups.size(); g += stride) {
-      groups[g].collect(frame, shift_s, settings, matches_);
+      groups[g].collect(at, settings.pixel_deviation_px, matches_);
     }
     if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return ImagePhaseOutcome::kCanNotTell;
     used_.assign(matches_.size(), 0);

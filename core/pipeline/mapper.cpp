@@ -18,8 +18,8 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       team_(team),
       finder_(finder),
       starter_(starter),
-      counters_(counters),
       corrections_(corrections),
+      counters_(counters),
       poses_(settings.pose),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       pyramid_(settings.camera.width, settings.camera.height, kPyramidLevels),
@@ -57,6 +57,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   job_.frame = &frame;
   job_.history = history_.get();
   job_.pyramid = &pyramid_;
+  job_.about_capture = bases_about(settings_.estimator.layout, frame.phase);
   predict_releases(frame, clock);
   adopt_found_features(frame.index);
 

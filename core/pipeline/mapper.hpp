@@ -79,9 +79,8 @@ class Mapper {
   WorkerTeam& team_;
   FeatureFinder& finder_;
   BatchStarter& starter_;
-  PipelineCounters& counters_;
-
   CorrectionCells& corrections_;
+  PipelineCounters& counters_;
 
   PoseHistory poses_;
   std::unique_ptr<FrameHistory> history_;

@@ -12,9 +12,7 @@ namespace perimap {
 [[nodiscard]] inline Matrix2d pose_noise_covariance(const CameraPose& pose, const Vector3d& p_WF_mm,
                                                     const Matrix23d& J_p) noexcept {
   const Vector3d r = p_WF_mm - pose.X_WC.t + pose.lever_W_mm;
-  Matrix3d r_cross;
-  r_cross << 0.0, -r.z(), r.y(), r.z(), 0.0, -r.x(), -r.y(), r.x(), 0.0;
-  const Matrix23d G = J_p * r_cross;
+  const Matrix23d G = J_p * cross_matrix(r);
   return pose.position_variance_mm2 * J_p * J_p.transpose() + pose.rotation_variance_rad2 * G * G.transpose();
 }
 

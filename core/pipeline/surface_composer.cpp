@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <limits>
-#include <numbers>
 
 #include "core/periodic/periodic_motion.hpp"
+#include "core/pipeline/phase_spread.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
@@ -78,10 +78,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
 
   const bool phase_usable = phase.state == PhaseState::kLocked || phase.state == PhaseState::kFreeRunning;
   const Basis b = basis_at(settings_.layout, phase.phase_rad);
-  // Half a cycle is as wrong as a phase can be.
-  const double deviation_rad = std::min(sample_.cardiac_phase_deviation_rad, std::numbers::pi);
-  const Basis b_earlier = basis_at(settings_.layout, phase.phase_rad - deviation_rad);
-  const Basis b_later = basis_at(settings_.layout, phase.phase_rad + deviation_rad);
+  const BasesAbout about = bases_about(settings_.layout, phase);
   const Basis b_rate = basis_rate(settings_.layout, phase.phase_rad);
   sample_.features.clear();
   for (const auto& [snapshot, covered] : order_) {
@@ -89,11 +86,10 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
     feature.id = snapshot->id;
     feature.p_WF_mm = position_of(snapshot->x, b);
     feature.velocity_W_mm_per_s = velocity_of(snapshot->x, b_rate, phase.rate_rad_per_s);
-    const Vector3d earlier_mm = position_of(snapshot->x, b_earlier) - feature.p_WF_mm;
-    const Vector3d later_mm = position_of(snapshot->x, b_later) - feature.p_WF_mm;
     // Where the snapshot was not evaluated at this release (the update is late, or there is no frame), the largest
     // deviation over the cycle bounds the covariance.
-    feature.covariance_W_mm2 = 0.5 * (earlier_mm * earlier_mm.transpose() + later_mm * later_mm.transpose());
+    feature.covariance_W_mm2 =
+        phase_spread(feature.p_WF_mm, position_of(snapshot->x, about.earlier), position_of(snapshot->x, about.later));
     feature.covariance_W_mm2 +=
         covered < kReleasesCovered && !release.frame_missing
             ? snapshot->covariances_W_mm2[covered]

@@ -19,9 +19,7 @@ struct ComposerSettings {
 };
 
 // Belongs to the publisher. Positions and velocities are evaluated anew from the coefficients with the phase as it is
-// known now. To the covariance of the map comes what the phase's deviation makes of the motion: the mean square of
-// where the feature would be one deviation earlier and one later, which is v v^T sigma_t^2 while the deviation is
-// small, and does not vanish with a large one where the motion turns.
+// known now. To the covariance of the map comes phase_spread(), what the phase's deviation makes of the motion.
 class SurfaceComposer {
  public:
   explicit SurfaceComposer(const ComposerSettings& settings);

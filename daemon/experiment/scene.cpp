@@ -55,9 +55,9 @@ Expected<std::vector<Instant>> r_peaks(const SceneSettings& settings) {
 // Where the camera looks from, and what moves before it.
 struct Stage {
   BasisLayout layout;
-  Vector3d target_W;  // of the surface, below the camera's rest
-  Vector3d axis_W;    // from the camera's rest to the target
-  Vector3d up_W;
+  Vector3d target_W;                    // of the surface, below the camera's rest
+  Vector3d axis_W = Vector3d::UnitZ();  // from the camera's rest to the target
+  Vector3d up_W = -Vector3d::UnitY();
   std::vector<StateVector> points;
 };
 
@@ -99,8 +99,6 @@ Stage ellipsoid_stage(const SceneSettings& settings) {
   Stage stage;
   constexpr int kHarmonics = 6;
   stage.layout = {kHarmonics, 0};
-  stage.axis_W = Vector3d::UnitZ();
-  stage.up_W = -Vector3d::UnitY();
   const Vector3d axes_mm(45.0, 35.0, 35.0);
   stage.target_W = Vector3d(0.0, 0.0, -axes_mm.z());
   // Harmonic k moves p by Q p + t; half of the variance (4 / k^2 mm)^2 of each coefficient comes from either term.
@@ -136,8 +134,6 @@ Stage plate_stage(const SceneSettings& settings) {
   Stage stage;
   constexpr int kHarmonics = 3;
   stage.layout = {kHarmonics, 0};
-  stage.axis_W = Vector3d::UnitZ();
-  stage.up_W = -Vector3d::UnitY();
   stage.target_W = Vector3d::Zero();
   // A steep rise and a slow fall, 13 mm from end to end.
   const double along_mm[] = {0.0, 4.8, 1.6, 0.5, 3.2, 1.9, 0.9};

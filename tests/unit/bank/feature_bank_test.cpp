@@ -20,6 +20,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using test::estimate_of;
+using test::kFisheye;
 using test::learn;
 
 class Bank : public test::OnEveryTarget {};
@@ -36,18 +37,6 @@ const PixelModel kDistorted{CameraModel{.width = 640,
                                         .p1 = 1e-3,
                                         .p2 = -2e-3,
                                         .k3 = 0.01}};
-const PixelModel kFisheye{CameraModel{.width = 800,
-                                      .height = 800,
-                                      .fx = 300.0,
-                                      .fy = 305.0,
-                                      .cx = 400.0,
-                                      .cy = 390.0,
-                                      .k1 = 0.05,
-                                      .k2 = 0.01,
-                                      .k3 = -0.004,
-                                      .k4 = 0.0008,
-                                      .lens = Lens::kKannalaBrandt}};
-
 // Well conditioned, with correlations.
 FeatureEstimate correlated(const Vector3d& p_WF, const BasisLayout& layout, double deviation, std::mt19937& generator) {
   std::normal_distribution<double> normal;

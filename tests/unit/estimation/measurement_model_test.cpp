@@ -7,6 +7,8 @@
 #include <numbers>
 #include <random>
 
+#include "simulated_feature.hpp"
+
 namespace perimap {
 namespace {
 
@@ -85,19 +87,9 @@ TEST(PixelModel, JacobiansAreDerivativesAtUglyPoints) {
 }
 
 TEST(PixelModel, JacobiansOfAFisheyeAreDerivativesBehindTheCameraToo) {
-  PixelModel fisheye{CameraModel{.width = 800,
-                                 .height = 800,
-                                 .fx = 300.0,
-                                 .fy = 305.0,
-                                 .cx = 400.0,
-                                 .cy = 390.0,
-                                 .k1 = 0.05,
-                                 .k2 = 0.01,
-                                 .k3 = -0.004,
-                                 .k4 = 0.0008,
-                                 .lens = Lens::kKannalaBrandt}};
-  expect_jacobians_to_be_derivatives(fisheye, {Vector3d(0, 0, 90), Vector3d(1e-9, -1e-9, 90), Vector3d(60, 40, 90),
-                                               Vector3d(-5, 4, 1.0), Vector3d(80, 10, 0.0), Vector3d(70, -30, -8)});
+  expect_jacobians_to_be_derivatives(
+      test::kFisheye, {Vector3d(0, 0, 90), Vector3d(1e-9, -1e-9, 90), Vector3d(60, 40, 90), Vector3d(-5, 4, 1.0),
+                       Vector3d(80, 10, 0.0), Vector3d(70, -30, -8)});
 }
 
 TEST(BearingModel, JacobiansAreDerivativesAtUglyPoints) {

@@ -14,6 +14,17 @@ namespace perimap::test {
 
 inline const PixelModel kPixelModel{
     CameraModel{.width = 1280, .height = 720, .fx = 700.0, .fy = 700.0, .cx = 640.0, .cy = 360.0}};
+inline const PixelModel kFisheye{CameraModel{.width = 800,
+                                             .height = 800,
+                                             .fx = 300.0,
+                                             .fy = 305.0,
+                                             .cx = 400.0,
+                                             .cy = 390.0,
+                                             .k1 = 0.05,
+                                             .k2 = 0.01,
+                                             .k3 = -0.004,
+                                             .k4 = 0.0008,
+                                             .lens = Lens::kKannalaBrandt}};
 inline constexpr double kPixelDeviation = 0.7;
 inline constexpr double kBearingDeviation = 0.2 * std::numbers::pi / 180.0;
 

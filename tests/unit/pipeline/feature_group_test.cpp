@@ -57,6 +57,7 @@ struct Stages : ::testing::Test {
     frame.pose.state = CameraPose::State::kInterpolated;
     history->set_phase(frame, clock.clock());
     job.frame = &frame;
+    job.about_capture = bases_about(settings.estimator.layout, frame.phase);
     job.history = history.get();
     for (ReleaseBasis& release : job.releases) release.b = basis_at(settings.estimator.layout, 1.0);
     for (FeatureSlot& s : slots) s.match = PatchMatch{};

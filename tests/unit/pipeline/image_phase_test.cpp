@@ -61,6 +61,7 @@ struct Surface : ::testing::Test {
     frame.b = basis_at(settings.layout, kPhase);
     frame.b_rate = basis_rate(settings.layout, kPhase);
     job.frame = &frame;
+    job.about_capture = bases_about(settings.layout, frame.phase);
     job.history = &history;
     for (ReleaseBasis& release : job.releases) release.b = frame.b;
     for (FeatureGroup& group : groups) group.sweep(job);
