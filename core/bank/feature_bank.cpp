@@ -198,6 +198,17 @@ void FeatureBank<Real>::motion(int group, const SweepPhases<Real>& phases, int k
 }
 
 template <class Real>
+void FeatureBank<Real>::position_gain(int feature, const SweepPhases<Real>& phases, int k, PositionGain& M) noexcept {
+  const auto [group, lane] = place(feature);
+  correct(*group, phases, k);
+  const int d = group->view.d;
+  M.resize(d, 3);
+  for (int i = 0; i < 3 * d; ++i) {
+    M(i % d, i / d) = double(lane_of(group->view.gains, static_cast<std::size_t>(k * 3 * d + i), lane));
+  }
+}
+
+template <class Real>
 void FeatureBank<Real>::motion_near(int group_index, const SweepPhases<Real>& phases, int k, const SweepPhase<Real>& at,
                                     LaneMotions<Real>& motions) noexcept {
   Group& group = groups_[static_cast<std::size_t>(group_index)];

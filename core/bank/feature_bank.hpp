@@ -60,6 +60,9 @@ class FeatureBank {
   // reading them off.
   void motion(int group, const SweepPhases<Real>& phases, int k, LaneMotions<Real>& motions) noexcept;
 
+  // P B^T at phase k < phases.learnt() of the last sweep, updates since then counted.
+  void position_gain(int feature, const SweepPhases<Real>& phases, int k, PositionGain& M) noexcept;
+
   // Position and velocity at another phase, near phase k of the last sweep, whose covariance it takes.
   void motion_near(int group, const SweepPhases<Real>& phases, int k, const SweepPhase<Real>& at,
                    LaneMotions<Real>& motions) noexcept;

@@ -7,7 +7,16 @@
 
 namespace perimap {
 
-Matrix3d FeatureEstimate::position_covariance(const Basis& b) const noexcept {
+PositionGain position_gain(const StateMatrix& P, const Basis& b) noexcept {
+  const Eigen::Index n = b.size();
+  PositionGain M(P.rows(), 3);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    M.col(axis).noalias() = P.middleCols(axis * n, n).lazyProduct(b);
+  }
+  return M;
+}
+
+Matrix3d position_covariance(const StateMatrix& P, const Basis& b) noexcept {
   const Eigen::Index n = b.size();
   Matrix3d S;
   for (int j = 0; j < 3; ++j) {

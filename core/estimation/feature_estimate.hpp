@@ -10,6 +10,12 @@
 namespace perimap {
 
 using StateMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxState, kMaxState>;
+// P B^T (d x 3, mm^2): covariance of the state with the position at a phase.
+using PositionGain = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMaxState, 3>;
+
+// B P B^T (3x3, mm^2, frame W): covariance of the position at the basis' phase. P is symmetric, 3 b.size() wide.
+[[nodiscard]] Matrix3d position_covariance(const StateMatrix& P, const Basis& b) noexcept;
+[[nodiscard]] PositionGain position_gain(const StateMatrix& P, const Basis& b) noexcept;
 
 // Invariant: P is symmetric bit by bit and x and P are finite. Order of x and P: see periodic_motion.hpp. Basis vectors
 // handed in must be x.size() / 3 long.
@@ -19,8 +25,9 @@ struct FeatureEstimate {
 
   // p_WF (mm) at the basis' phase.
   [[nodiscard]] Vector3d position(const Basis& b) const noexcept { return position_of(x, b); }
-  // Its covariance B P B^T (3x3, mm^2, frame W).
-  [[nodiscard]] Matrix3d position_covariance(const Basis& b) const noexcept;
+  [[nodiscard]] Matrix3d position_covariance(const Basis& b) const noexcept {
+    return perimap::position_covariance(P, b);
+  }
 };
 
 // Adds the variance of a random walk: independent steps of `deviation_mm` / k of both coefficients of harmonic k on

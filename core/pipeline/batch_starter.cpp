@@ -1,5 +1,7 @@
 #include "core/pipeline/batch_starter.hpp"
 
+#include "core/pipeline/pose_noise.hpp"
+
 namespace perimap {
 
 BatchStarter::BatchStarter(const PipelineSettings& settings, std::span<FeatureSlot> slots)
@@ -47,9 +49,31 @@ void BatchStarter::solve(FeatureSlot& slot) noexcept {
   const std::span<const Observation> observations(slot.start.observations.data(),
                                                   static_cast<std::size_t>(slot.start.count));
   slot.start.outcome = batch_start(observations, model_, layout_, prior_, batch_);
+  if (slot.slow_error != nullptr && slot.start.outcome.ok()) begin_slow_error(slot);
   // Release: the outcome is complete before the worker can see the flag (pairs with the acquire in feature_life).
   slot.start.ready.store(true, std::memory_order_release);
   solved_.post();
+}
+
+void BatchStarter::begin_slow_error(FeatureSlot& slot) const noexcept {
+  const BatchStartExchange& start = slot.start;
+  const FeatureEstimate& estimate = start.outcome.estimate;
+  slot.slow_error->reset();
+  PoseNoiseTerm term;
+  Instant last = start.captures.front();
+  for (std::size_t i = 0; i < static_cast<std::size_t>(start.count); ++i) {
+    const Observation& observation = start.observations[i];
+    slot.slow_error->pass(to_seconds(start.captures[i] - last));
+    last = start.captures[i];
+    if (start.outcome.inlier[i] == 0 ||
+        !describe_pose_noise(model_, observation.X_CW, start.poses[i], estimate.position(observation.b), term)) {
+      continue;
+    }
+    term.b = observation.b;
+    term.R = observation.R;
+    term.M = position_gain(estimate.P, observation.b);
+    slot.slow_error->add_of_batch(term);
+  }
 }
 
 }  // namespace perimap

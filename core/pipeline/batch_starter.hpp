@@ -32,6 +32,7 @@ class BatchStarter {
 
  private:
   void solve(FeatureSlot& slot) noexcept;
+  void begin_slow_error(FeatureSlot& slot) const noexcept;
 
   PixelModel model_;
   BasisLayout layout_;

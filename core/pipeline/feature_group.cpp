@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/pipeline/match_covariance.hpp"
 #include "core/pipeline/phase_spread.hpp"
@@ -115,7 +116,7 @@ void FeatureGroup::collect(const SweepPhase<double>& at, double pixel_deviation_
   }
 }
 
-void FeatureGroup::evaluate(ShardSnapshot& publisher, ShardSnapshot& model) noexcept {
+void FeatureGroup::evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept {
   if (plan_.capture < 0) return;
   std::array<LaneMotions<double>, kReleasesCovered> at_releases;
   for (std::size_t i = 0; i < kReleasesCovered; ++i) {
@@ -128,9 +129,33 @@ void FeatureGroup::evaluate(ShardSnapshot& publisher, ShardSnapshot& model) noex
     bank_.get(feature(lane), snapshot.x);
     for (std::size_t i = 0; i < kReleasesCovered; ++i) {
       snapshot.covariances_W_mm2[i] = at_releases[i].covariance_of(static_cast<int>(lane));
+      if (const auto& slow_error = slots_[lane].slow_error) {
+        snapshot.covariances_W_mm2[i] += slow_error->position_covariance(job.releases[i].b);
+      }
     }
     publisher.features.push_back(snapshot);
     model.features.push_back(snapshot);
+  }
+}
+
+// The updates at learnt phase k, with the covariances that their matches were given.
+void FeatureGroup::follow_slow_errors(const PixelModel& model, int k, const LaneOutcomes<double>& outcomes,
+                                      const std::array<Matrix2d, kLanes>& R) noexcept {
+  const FrameRecord& frame = *plan_.learnt[static_cast<std::size_t>(k)];
+  LaneMotions<double> learnt;
+  bool any = false;
+  PoseNoiseTerm term;
+  for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
+    const FeatureSlot& slot = slots_[lane];
+    if (slot.slow_error == nullptr || (outcomes.considered >> lane & 1) == 0) continue;
+    slot.slow_error->pass(to_seconds(frame.stamp.capture - slot.last_learnt));
+    if ((outcomes.accepted >> lane & 1) == 0) continue;
+    if (!std::exchange(any, true)) bank_.motion(index_, plan_.phases, k, learnt);
+    if (!describe_pose_noise(model, frame.X_CW, frame.pose, learnt.position_of(static_cast<int>(lane)), term)) continue;
+    term.b = frame.b;
+    term.R = R[lane];
+    bank_.position_gain(feature(lane), plan_.phases, k, term.M);
+    slot.slow_error->add(term);
   }
 }
 
@@ -140,6 +165,7 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
     LaneMotions<double> motions;
     bank_.motion(index_, plan_.phases, k, motions);
     LaneObservations<double> observations;
+    std::array<Matrix2d, kLanes> R;
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
       FeatureSlot& slot = slots_[lane];
       if (slot.state != SlotState::kMapped || slot.held.size() == 0 || slot.held[0].frame_index != frame.index)
@@ -156,12 +182,13 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
       }
       const Matrix23d J_p = J_C * frame.X_CW.R;
       const Vector2d phase_spread = J_p * motions.velocity_of(l) * frame.phase.deviation_s;
-      observations.set(l, held.px,
-                       match_covariance(held, frame, p_WF, J_p, settings.pixel_deviation_px) +
-                           phase_spread * phase_spread.transpose());
+      R[lane] = match_covariance(held, frame, p_WF, J_p, settings.pixel_deviation_px) +
+                phase_spread * phase_spread.transpose();
+      observations.set(l, held.px, R[lane]);
     }
     LaneOutcomes<double> outcomes;
     bank_.update(index_, plan_.phases, k, frame.X_CW, model, observations, settings.update, outcomes);
+    follow_slow_errors(model, k, outcomes, R);
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
       if ((outcomes.considered >> lane & 1) == 0) continue;
       FeatureSlot& slot = slots_[lane];

@@ -48,7 +48,7 @@ class FeatureGroup {
   void collect(const SweepPhase<double>& at, double pixel_deviation_px, std::vector<CommonMatch>& matches) noexcept;
 
   // C: appends the snapshots of the mapped features to both.
-  void evaluate(ShardSnapshot& publisher, ShardSnapshot& model) noexcept;
+  void evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept;
 
   // D, after hold_match(): learns the held matches of the planned frames, whose cycles are completed, so that their
   // phases are known. What is left of the phase's deviation counts as noise along the motion: R + J v v^T J^T
@@ -57,6 +57,8 @@ class FeatureGroup {
 
  private:
   void plan(const FrameJob& job) noexcept;
+  void follow_slow_errors(const PixelModel& model, int k, const LaneOutcomes<double>& outcomes,
+                          const std::array<Matrix2d, kLanes>& R) noexcept;
 
   FeatureBank<double>& bank_;
   int index_;

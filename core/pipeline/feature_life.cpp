@@ -39,6 +39,8 @@ bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& mod
     observation.b = frame->b;
     observation.R = match_covariance(held, *frame, frame->pose.X_WC * (depth_mm * ray_C), J_C * frame->X_CW.R,
                                      settings.pixel_deviation_px);
+    slot.start.captures[k] = frame->stamp.capture;
+    slot.start.poses[k] = frame->pose;
     ++slot.start.count;
   }
   return true;
@@ -140,6 +142,7 @@ class Step {
   void check_convergence() noexcept {
     FeatureEstimate estimate;
     bank_.get(feature_, estimate);
+    if (slot_.slow_error != nullptr) estimate.P += slot_.slow_error->covariance();
     slot_.largest_deviation_mm = largest_deviation_mm(estimate, settings_.estimator.layout);
     slot_.converged = slot_.largest_deviation_mm <= settings_.estimator.converged_deviation_mm &&
                       slot_.updates >= kUpdatesBeforeConverged && slot_.health.monitor().consistent();

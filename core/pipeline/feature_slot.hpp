@@ -5,11 +5,14 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <memory>
 
 #include "core/estimation/batch_start.hpp"
+#include "core/estimation/correlated_pose_noise.hpp"
 #include "core/estimation/feature_health.hpp"
 #include "core/estimation/observation.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/pose_history.hpp"
 #include "core/time/instant.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
@@ -58,6 +61,8 @@ class HeldMatches {
 // does not touch the rest before `ready`.
 struct BatchStartExchange {
   std::array<Observation, kMaxStartObservations> observations{};
+  std::array<Instant, kMaxStartObservations> captures{};
+  std::array<CameraPose, kMaxStartObservations> poses{};  // with their noise
   int count = 0;
   std::uint64_t adopt_at_frame = 0;
   BatchOutcome outcome;
@@ -88,6 +93,9 @@ struct FeatureSlot {
   FeatureHealth health;
   Instant last_learnt;  // capture time of the last update, for process noise
   int updates = 0;
+  // What a slow error of the tracker adds to the estimate's covariance; null where that error is white. Belongs to
+  // housekeeping while the batch start is under way, which begins it.
+  std::unique_ptr<CorrelatedPoseNoise> slow_error;
   double largest_deviation_mm = 0.0;
   bool converged = false;
   Instant last_observed;

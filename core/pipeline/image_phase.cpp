@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "core/pipeline/pose_noise.hpp"
+
 namespace perimap {
 namespace {
 
@@ -19,14 +21,11 @@ constexpr double kLargestShift_s = 0.15;
 CommonInformation pose_prior(const CameraPose& pose) noexcept {
   // The sensor turns by theta_W about itself and moves by d: the camera turns by -R_CW theta_W in its own frame and its
   // centre moves by theta_W x lever + d.
-  using Matrix6d = Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns>;
   Matrix6d A = Matrix6d::Zero();
   A.topLeftCorner<3, 3>() = -pose.X_WC.R.transpose();
   A.bottomLeftCorner<3, 3>() = -cross_matrix(pose.lever_W_mm);
   A.bottomRightCorner<3, 3>().setIdentity();
-  Eigen::Matrix<double, kPoseUnknowns, 1> variances;
-  variances << Vector3d::Constant(pose.rotation_variance_rad2), Vector3d::Constant(pose.position_variance_mm2);
-  const Matrix6d covariance = A * variances.asDiagonal() * A.transpose();
+  const Matrix6d covariance = A * pose_error_covariance(pose) * A.transpose();
   CommonInformation prior = CommonInformation::zero(kPoseUnknowns);
   const Matrix6d Lambda = covariance.llt().solve(Matrix6d::Identity());
   prior.Lambda = 0.5 * (Lambda + Lambda.transpose());

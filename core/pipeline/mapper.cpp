@@ -186,7 +186,7 @@ void Mapper::evaluate_shard(int worker) noexcept {
     snapshot.features.clear();
   }
   for (auto g = static_cast<std::size_t>(worker); g < groups_.size(); g += tallies_.size()) {
-    groups_[g].evaluate(cells.publisher.back(), cells.model.back());
+    groups_[g].evaluate(job_, cells.publisher.back(), cells.model.back());
   }
   cells.publisher.publish();
   cells.model.publish();

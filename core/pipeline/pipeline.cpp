@@ -28,6 +28,12 @@ Pipeline::Pipeline(const PipelineSettings& settings)
       composer_(composer_settings(settings)),
       publisher_view_(cells_.size()),
       model_view_(cells_.size()) {
+  if (settings.pose.error_correlation > Duration(0)) {
+    for (FeatureSlot& slot : slots_) {
+      slot.slow_error = std::make_unique<CorrelatedPoseNoise>(settings.estimator.layout.state_size(),
+                                                              to_seconds(settings.pose.error_correlation));
+    }
+  }
   for (ShardCells& cells : cells_) {
     for (TripleBuffer<ShardSnapshot>* cell : {&cells.publisher, &cells.model}) {
       // Each of the three copies needs its own reserve: copying a vector does not copy its capacity.

@@ -38,9 +38,12 @@ CameraPose PoseHistory::between(const Reading& r_0, const Reading& r_1, Instant 
   pose.state = state;
   pose.X_WC = X_WS * settings_.X_SC;
   pose.lever_W_mm = X_WS.R * settings_.X_SC.t;
-  // The pose is (1-s) r_0 + s r_1 with independent errors; between readings that is less than one reading's variance,
-  // beyond them more.
-  const double weight = square(1.0 - s) + square(s);
+  // The pose is (1-s) r_0 + s r_1; where their errors are independent that has less than one reading's variance between
+  // them, and more beyond.
+  const double common = settings_.error_correlation > Duration(0)
+                            ? std::exp(-to_seconds(r_1.time - r_0.time) / to_seconds(settings_.error_correlation))
+                            : 0.0;
+  const double weight = square(1.0 - s) + square(s) + 2.0 * common * s * (1.0 - s);
   const double beyond_s = std::max(0.0, to_seconds(t - r_1.time));
   pose.position_variance_mm2 = weight * square(settings_.position_deviation_mm) + square(kInterpolationDeviation_mm) +
                                square(0.5 * kHandAcceleration_mm_per_s2 * square(beyond_s));

@@ -11,9 +11,11 @@
 namespace perimap {
 
 struct PoseHistorySettings {
-  Pose X_SC;                                             // hand-eye: camera in the tracked sensor's frame
-  double position_deviation_mm = 0.0;                    // of one reading, per axis
-  double rotation_deviation_rad = 0.0;                   // of one reading, per axis
+  Pose X_SC;                            // hand-eye: camera in the tracked sensor's frame
+  double position_deviation_mm = 0.0;   // of one reading, per axis
+  double rotation_deviation_rad = 0.0;  // of one reading, per axis
+  // Time in which the tracker's error falls to 1/e of what it was (Gauss-Markov); 0: it is new at each reading.
+  Duration error_correlation{0};
   Duration time_offset{0};                               // added to the tracker's stamps to get the camera's time
   Duration maximum_gap = std::chrono::milliseconds(50);  // readings farther apart are not interpolated between
   Duration maximum_extrapolation = std::chrono::milliseconds(20);

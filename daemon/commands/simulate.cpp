@@ -44,26 +44,31 @@ std::string configuration_toml(const Simulation& simulation, const TrackerNoise&
   const Pose& X_SC = simulation.hand_eye_X_SC();
   double q[4];
   rotation_to_wxyz(X_SC.R, q);
+  const double correlation_s = to_seconds(simulation.settings().tracker_correlation);
   return fmt::format(
       "version = 1\n\n"
       "[tracker]\n"
       "position_deviation_mm = {:#}\n"
       "rotation_deviation_deg = {:#}\n"
+      "{}"
       "hand_eye_translation_SC_mm = [{:#}, {:#}, {:#}]\n"
       "hand_eye_rotation_SC_wxyz = [{:#}, {:#}, {:#}, {:#}]\n\n"
       "[phase]\n"
       "law = \"{}\"\n",
-      noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree, X_SC.t.x(), X_SC.t.y(), X_SC.t.z(), q[0],
-      q[1], q[2], q[3], law_name(simulation.settings().law));
+      noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
+      correlation_s > 0.0 ? fmt::format("error_correlation_s = {:#}\n", correlation_s) : "", X_SC.t.x(), X_SC.t.y(),
+      X_SC.t.z(), q[0], q[1], q[2], q[3], law_name(simulation.settings().law));
 }
 
 std::string description(const Simulation& simulation, const TrackerNoise& noise) {
   const SimulationSettings& s = simulation.settings();
+  const double correlation_s = to_seconds(s.tracker_correlation);
   return fmt::format(
       "simulated heart: seed {}, {} s, {}x{} at {} Hz, ECG record {}, motion {}, respiration {} mm, tracker {} Hz with "
-      "{} mm and {:.3g} deg RMS",
+      "{} mm and {:.3g} deg RMS{}",
       s.seed, to_seconds(s.duration), s.width, s.height, s.frames_per_s, s.ecg_record, law_name(s.law),
-      s.respiration_mm, s.tracker_rate_hz, noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree);
+      s.respiration_mm, s.tracker_rate_hz, noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
+      correlation_s > 0.0 ? fmt::format(", correlated over {} s", correlation_s) : "");
 }
 
 // One recording under way, in a file beside the one it will become.
@@ -204,6 +209,7 @@ struct Options {
   std::string size = "640x480";
   std::optional<double> ecg_start_s;
   double respiration_period_s = 4.0;
+  double tracker_correlation_s = 0.0;
   double tracker_noise_mm = 1.4;
   std::vector<double> tracker_noises_mm;
   std::optional<double> tracker_rotation_noise_deg;
@@ -249,6 +255,7 @@ int run(Options options) {
   if (const auto size = parse_size(options.size, options.settings); !size) return complain(size.error(), 2);
   options.settings.duration = from_seconds(options.duration_s);
   options.settings.respiration_period = from_seconds(options.respiration_period_s);
+  options.settings.tracker_correlation = from_seconds(options.tracker_correlation_s);
   if (options.ecg_start_s) options.settings.ecg_start = from_seconds(*options.ecg_start_s);
   const std::vector<SimulatedRecording> recordings = planned(options);
   for (const SimulatedRecording& recording : recordings) {
@@ -358,6 +365,10 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
       ->add_option("--tracker-rotation-noise", options->tracker_rotation_noise_deg,
                    "Tracker rotation noise, RMS of the 3-D norm, degrees [0.5, or 0 without position noise]")
       ->check(CLI::Range(0.0, 45.0));
+  command
+      ->add_option("--tracker-correlation", options->tracker_correlation_s,
+                   "Time in which the tracker's error falls to 1/e of what it was, s; 0: it is new at each reading")
+      ->capture_default_str();
   command->add_option("--tracker-rate", settings.tracker_rate_hz, "Tracker readings, Hz")->capture_default_str();
   command
       ->add_option("--tracker-dropouts", settings.tracker_dropouts_per_min,

@@ -34,6 +34,7 @@ struct CameraConfiguration {
 struct TrackerConfiguration {
   double position_deviation_mm = 0.0;   // RMS of the 3-D norm
   double rotation_deviation_rad = 0.0;  // RMS of the 3-D norm
+  Duration error_correlation{0};        // in which the error falls to 1/e; 0: white
   Duration time_offset{0};              // added to the tracker's stamps to get the camera's time
   Duration maximum_extrapolation = std::chrono::milliseconds(20);
   double translation_SC_mm[3] = {0.0, 0.0, 0.0};      // hand-eye X_SC

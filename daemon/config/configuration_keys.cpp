@@ -253,6 +253,7 @@ void add_version(std::vector<ConfigurationKey>& keys) {
 
 void add_sources(std::vector<ConfigurationKey>& keys) {
   const auto ms = std::chrono::milliseconds(1);
+  const auto s = std::chrono::seconds(1);
   Section("source", keys)
       .text("name", 63, PERIMAP_MEMBER(source.name), "key `source` of every published sample")
       .text("world_frame", 63, PERIMAP_MEMBER(source.world_frame), "name of the frame W, published as frame_id");
@@ -266,6 +267,8 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
               "position noise of the tracker, RMS of the 3-D norm")
       .angle("rotation_deviation_deg", 0, 45, PERIMAP_MEMBER(tracker.rotation_deviation_rad),
              "orientation noise of the tracker, RMS of the 3-D norm")
+      .duration("error_correlation_s", s, 0, 1000, PERIMAP_MEMBER(tracker.error_correlation),
+                "time in which the tracker's error falls to 1/e of what it was; 0: it is new at each frame")
       .duration("time_offset_ms", ms, -1000, 1000, PERIMAP_MEMBER(tracker.time_offset),
                 "added to the tracker's stamps to get the camera's time")
       .duration("maximum_extrapolation_ms", ms, 0, 1000, PERIMAP_MEMBER(tracker.maximum_extrapolation),

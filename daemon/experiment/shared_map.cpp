@@ -24,7 +24,8 @@ SharedMap::SharedMap(const Scene& scene, const BasisLayout& layout, const Prior&
       buffered_(static_cast<std::size_t>(buffered)),
       next_sighting_(scene.features.size(), 0),
       estimates_(scene.features.size()),
-      pose_noise_(scene.features.size(), CorrelatedPoseNoise(layout.state_size())),
+      pose_noise_(scene.features.size(),
+                  CorrelatedPoseNoise(layout.state_size(), scene.settings.pose_error.correlation_s)),
       last_counted_frame_(scene.features.size(), 0) {}
 
 void SharedMap::advance(int end_frame) {
@@ -39,10 +40,10 @@ void SharedMap::start(std::size_t i) {
   const FeatureEstimate* estimate = method->estimate();
   if (estimate == nullptr) return;
   estimates_[i] = *estimate;
-  for (std::size_t k = 0; k < next_sighting_[i]; ++k) count_pose_noise(i, sightings[k]);
+  for (std::size_t k = 0; k < next_sighting_[i]; ++k) count_pose_noise(i, sightings[k], Learnt::kInBatch);
 }
 
-void SharedMap::count_pose_noise(std::size_t i, const Sighting& sighting) {
+void SharedMap::count_pose_noise(std::size_t i, const Sighting& sighting, Learnt learnt) {
   if (use_ != PoseUse::kTrackerAlone) return;
   const PoseError& error = scene_.settings.pose_error;
   const SceneFrame& frame = scene_.frames[static_cast<std::size_t>(sighting.frame)];
@@ -54,17 +55,26 @@ void SharedMap::count_pose_noise(std::size_t i, const Sighting& sighting) {
       ProjectionStatus::kOk)
     return;
   const double passed_s = (sighting.frame - last_counted_frame_[i]) / scene_.settings.frames_per_s;
-  const double kept = error.correlation_s > 0.0 ? std::exp(-passed_s / error.correlation_s) : 0.0;
   last_counted_frame_[i] = sighting.frame;
-  Matrix26d J_s;
-  J_s << J.dz_dtheta, J.dz_dc;
-  Vector6d sigma;
-  sigma << Vector3d::Constant(error.rotation_variance_rad2()), Vector3d::Constant(error.position_variance_mm2());
-  pose_noise_[i].add(b, J.dz_dp, observation_of(scene_, layout_, sighting, p).R, J_s, sigma.asDiagonal(), kept);
+  PoseNoiseTerm term;
+  term.b = b;
+  term.M = position_gain(estimates_[i]->P, b);
+  term.dz_dp = J.dz_dp;
+  term.R = observation_of(scene_, layout_, sighting, p).R;
+  term.dz_ds << J.dz_dtheta, J.dz_dc;
+  Vector6d variances;
+  variances << Vector3d::Constant(error.rotation_variance_rad2()), Vector3d::Constant(error.position_variance_mm2());
+  term.sigma = variances.asDiagonal();
+  pose_noise_[i].pass(passed_s);
+  if (learnt == Learnt::kInBatch) {
+    pose_noise_[i].add_of_batch(term);
+  } else {
+    pose_noise_[i].add(term);
+  }
 }
 
 FeatureEstimate SharedMap::published(std::size_t i) const {
-  return {estimates_[i]->x, pose_noise_[i].enlarged(estimates_[i]->P)};
+  return {estimates_[i]->x, estimates_[i]->P + pose_noise_[i].covariance()};
 }
 
 void SharedMap::take_frame(int frame) {
@@ -110,7 +120,7 @@ void SharedMap::take_frame(int frame) {
                                         pose.X_CW};
           const std::size_t i = seen[k];
           if (iterated_update(*estimates_[i], observation, model).accepted)
-            count_pose_noise(i, scene_.features[i].sightings[next_sighting_[i] - 1]);
+            count_pose_noise(i, scene_.features[i].sightings[next_sighting_[i] - 1], Learnt::kByUpdate);
         }
       },
       scene_.model);

@@ -34,8 +34,9 @@ class SharedMap {
  private:
   void take_frame(int frame);
   void start(std::size_t i);
-  // Counts a sighting that the estimate was made from.
-  void count_pose_noise(std::size_t i, const Sighting& sighting);
+  // Counts a sighting that the estimate was made from, by an update or in the batch start.
+  enum class Learnt : std::uint8_t { kByUpdate, kInBatch };
+  void count_pose_noise(std::size_t i, const Sighting& sighting, Learnt learnt);
 
   const Scene& scene_;
   BasisLayout layout_;

@@ -62,6 +62,7 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.pose.X_SC = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), c.tracker.rotation_SC_wxyz);
   s.pose.position_deviation_mm = c.tracker.position_deviation_mm / std::numbers::sqrt3;
   s.pose.rotation_deviation_rad = c.tracker.rotation_deviation_rad / std::numbers::sqrt3;
+  s.pose.error_correlation = c.tracker.error_correlation;
   s.pose.time_offset = c.tracker.time_offset;
   s.pose.maximum_extrapolation = c.tracker.maximum_extrapolation;
   s.clock.law.law = c.phase.law;

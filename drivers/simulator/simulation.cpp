@@ -100,6 +100,7 @@ Expected<void> check(const SimulationSettings& s) {
         outside("respiration", s.respiration_mm, 0.0, 50.0, "mm"),
         outside("respiration period", to_seconds(s.respiration_period), 0.5, 60.0, "s"),
         outside("tracker rate", s.tracker_rate_hz, 1.0, 1000.0, "Hz"),
+        outside("tracker correlation", to_seconds(s.tracker_correlation), 0.0, 1000.0, "s"),
         outside("tracker dropouts", s.tracker_dropouts_per_min, 0.0, 60.0, "a minute")})
     if (!result) return result;
   return {};
@@ -199,6 +200,17 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   const auto gaps = dropouts(settings.seed, settings.duration, settings.tracker_dropouts_per_min);
   const Pose X_CS = simulation.X_SC_.inverse();
   const CounterNoise period(settings.seed, kTrackerPeriod);
+  const CounterNoise position(settings.seed, kTrackerPosition);
+  const CounterNoise rotation(settings.seed, kTrackerRotation);
+  const double correlation =
+      settings.tracker_correlation > Duration(0)
+          ? std::exp(-1.0 / (settings.tracker_rate_hz * to_seconds(settings.tracker_correlation)))
+          : 0.0;
+  Vector3d position_error = Vector3d::Zero();
+  Vector3d rotation_error = Vector3d::Zero();
+  // The first reading's error is all its own.
+  double kept = 0.0;
+  double drive = 1.0;
   Transport tracker(CounterNoise(settings.seed, kTrackerDelay), milliseconds(7), microseconds(1000));
   const auto reading_count = static_cast<std::uint64_t>(to_seconds(settings.duration) * settings.tracker_rate_hz);
   for (std::uint64_t k = 0; k < reading_count; ++k) {
@@ -206,8 +218,12 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
         from_seconds((static_cast<double>(k) + period.uniform(k, -0.02, 0.02) + 0.5) / settings.tracker_rate_hz);
     const bool missing = std::any_of(gaps.begin(), gaps.end(),
                                      [&](const Interval& gap) { return since >= gap.begin && since < gap.end; });
-    simulation.tracker_stamps_.push_back(
-        {start + since, tracker.arrival(start + since, k), missing, path.X_WC(since) * X_CS});
+    position_error = kept * position_error + drive * normal3(position, k);
+    rotation_error = kept * rotation_error + drive * normal3(rotation, k);
+    simulation.tracker_stamps_.push_back({start + since, tracker.arrival(start + since, k), missing,
+                                          path.X_WC(since) * X_CS, position_error, rotation_error});
+    kept = correlation;
+    drive = std::sqrt(1.0 - kept * kept);
   }
 
   // ECG: small blocks, sent when their last sample is there.
@@ -263,11 +279,9 @@ TrackerSample Simulation::tracker_sample(std::size_t index, const TrackerNoise& 
     return sample;
   }
   const double per_axis = 1.0 / std::numbers::sqrt3;
-  const CounterNoise position(settings_.seed, kTrackerPosition);
-  const CounterNoise rotation(settings_.seed, kTrackerRotation);
   sample.state = ToolState::kOk;
-  sample.X_WS.t = stamp.X_WS.t + noise.position_rms_mm * per_axis * normal3(position, index);
-  sample.X_WS.R = stamp.X_WS.R * so3_exp(noise.rotation_rms_rad * per_axis * normal3(rotation, index));
+  sample.X_WS.t = stamp.X_WS.t + noise.position_rms_mm * per_axis * stamp.position_error;
+  sample.X_WS.R = stamp.X_WS.R * so3_exp(noise.rotation_rms_rad * per_axis * stamp.rotation_error);
   return sample;
 }
 

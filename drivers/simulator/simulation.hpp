@@ -35,10 +35,12 @@ struct SimulationSettings {
   double respiration_mm = 0.0;
   Duration respiration_period = std::chrono::seconds(4);
   double tracker_rate_hz = 100.0;
+  // Time in which the tracker's error falls to 1/e of what it was (Gauss-Markov); 0: new at each reading.
+  Duration tracker_correlation{0};
   double tracker_dropouts_per_min = 3.0;
 };
 
-// White, per reading. Norms in three dimensions: the standard deviation of one axis is 1 / sqrt(3) of them.
+// Norms in three dimensions: the standard deviation of one axis is 1 / sqrt(3) of them.
 struct TrackerNoise {
   double position_rms_mm = 0.0;
   double rotation_rms_rad = 0.0;
@@ -94,7 +96,9 @@ class Simulation {
     Instant source_time;
     Instant arrival;
     bool missing = false;
-    Pose X_WS;  // true
+    Pose X_WS;                                   // true
+    Vector3d position_error = Vector3d::Zero();  // of unit variance per axis
+    Vector3d rotation_error = Vector3d::Zero();
   };
 
   Simulation(SimulationSettings settings, Instant start, GroundTruth truth, Lens lens, Vector3d surface_W);

@@ -59,6 +59,7 @@ name = "theatre 3"
 [tracker]
 position_deviation_mm = 1.4
 rotation_deviation_deg = 0.5
+error_correlation_s = 5
 time_offset_ms = -2.5
 hand_eye_translation_SC_mm = [1, -2.5, 3]
 hand_eye_rotation_SC_wxyz = [0, 0, 1, 0]
@@ -81,6 +82,7 @@ level = "debug"
   EXPECT_EQ(result->source.name, "theatre 3");
   EXPECT_EQ(result->tracker.position_deviation_mm, 1.4);
   EXPECT_NEAR(result->tracker.rotation_deviation_rad, std::numbers::pi / 360.0, 1e-15);
+  EXPECT_EQ(result->tracker.error_correlation, std::chrono::seconds(5));
   EXPECT_EQ(result->tracker.time_offset, microseconds(-2500));
   EXPECT_THAT(result->tracker.translation_SC_mm, ::testing::ElementsAre(1.0, -2.5, 3.0));
   EXPECT_THAT(result->tracker.rotation_SC_wxyz, ::testing::ElementsAre(0.0, 0.0, 1.0, 0.0));

@@ -67,7 +67,7 @@ TEST(Allocation, TheSharedPoseTakesNothingFromTheHeap) {
   }
   const BasisLayout layout{kMaxHarmonics, kMaxRespiratoryHarmonics};
   const FeatureEstimate estimate = prior_estimate(layout, Prior{}, Vector3d::Zero());
-  CorrelatedPoseNoise noise(layout.state_size());
+  CorrelatedPoseNoise noise(layout.state_size(), 5.0);
   StateMatrix larger;
   bool ok = true;
   const long count = allocations_of([&] {
@@ -77,10 +77,15 @@ TEST(Allocation, TheSharedPoseTakesNothingFromTheHeap) {
         estimate_shared_pose(model, Pose{}, prior, std::span<const CommonMatch>(matches), std::span(used));
     ok = shared.estimate.ok;
     for (const CommonMatch& match : matches) ok = ok && what_others_say(model, shared, Pose{}, match).ok;
-    for (int f = 0; f < 3; ++f)
-      noise.add(basis_at(layout, f, f), Matrix23d::Ones(), Matrix2d::Identity(), Matrix26d::Ones(),
-                Matrix6d::Identity(), 0.9);
-    larger = noise.enlarged(estimate.P);
+    for (int f = 0; f < 3; ++f) {
+      PoseNoiseTerm term{basis_at(layout, f, f), {}, Matrix23d::Ones(), Matrix2d::Identity(), Matrix26d::Ones(),
+                         Matrix6d::Identity()};
+      term.M = position_gain(estimate.P, term.b);
+      noise.pass(0.5);
+      noise.add_of_batch(term);
+      noise.add(term);
+    }
+    larger = estimate.P + noise.covariance();
   });
   EXPECT_EQ(count, 0);
   EXPECT_TRUE(ok);

@@ -210,46 +210,83 @@ TEST(SharedPose, SaysWhenThereIsNoSolution) {
   EXPECT_EQ(used[5], 0);
 }
 
-TEST(CorrelatedPoseNoise, IsTheCovarianceOfTheWeightedMeanUnderCorrelatedNoise) {
-  std::mt19937 generator(8);
-  std::normal_distribution<double> normal;
+// A linear Kalman filter with sightings whose pose errors are correlated, and what each error is worth in its estimate,
+// written out.
+struct CorrelatedSightings {
+  static constexpr int kFrames = 12;
+  static constexpr double kCorrelation_s = 0.15;
+  static constexpr double kPeriod_s = 0.033;
   const BasisLayout layout{2, 0};
   const int d = layout.state_size();
-  constexpr int kFrames = 12;
-  constexpr double kKept = 0.8;
   const Matrix6d sigma = Vector6d(1.0, 2.0, 0.5, 3.0, 1.5, 0.7).asDiagonal();
-  CorrelatedPoseNoise noise(d);
-  CorrelatedPoseNoise white(d);
-  std::vector<Eigen::MatrixXd> A;
-  const auto random = [&](int rows, int columns) {
-    Eigen::MatrixXd m(rows, columns);
-    for (int i = 0; i < m.size(); ++i) m(i) = normal(generator);
-    return m;
-  };
-  for (int f = 0; f < kFrames; ++f) {
-    const Basis b = basis_at(layout, 0.9 * f);
-    const Matrix23d J = random(2, 3);
-    const Matrix26d J_s = random(2, 6);
-    const Matrix2d R = Vector2d(1.0, 2.0).asDiagonal();
-    noise.add(b, J, R, J_s, sigma, kKept);
-    white.add(b, J, R, J_s, sigma, 0.0);
-    Eigen::MatrixXd B = Eigen::MatrixXd::Zero(3, d);
-    for (int axis = 0; axis < 3; ++axis) B.block(axis, axis * layout.size(), 1, layout.size()) = b.transpose();
-    A.emplace_back((J * B).transpose() * R.inverse() * J_s);
-  }
-  Eigen::MatrixXd V = Eigen::MatrixXd::Zero(d, d);
-  for (int f = 0; f < kFrames; ++f) {
-    for (int g = 0; g < kFrames; ++g) {
-      const std::size_t i = static_cast<std::size_t>(f);
-      const std::size_t j = static_cast<std::size_t>(g);
-      if (f != g) V += std::pow(kKept, std::abs(f - g)) * A[i] * sigma * A[j].transpose();
+  StateMatrix P = 4.0 * StateMatrix::Identity(d, d);
+  std::vector<PoseNoiseTerm> terms;    // M of the recursion's P
+  std::vector<Eigen::MatrixXd> worth;  // de / ds of each frame
+  CorrelatedPoseNoise recursive{d, kCorrelation_s};
+  CorrelatedPoseNoise white{d, 0.0};
+
+  explicit CorrelatedSightings(double process_variance) {
+    std::mt19937 generator(8);
+    std::normal_distribution<double> normal;
+    const auto random = [&](int rows, int columns) {
+      return Eigen::MatrixXd(Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(generator); }));
+    };
+    for (int f = 0; f < kFrames; ++f) {
+      PoseNoiseTerm term{basis_at(layout, 0.9 * f),       {},           random(2, 3),
+                         Vector2d(1.0, 2.0).asDiagonal(), random(2, 6), sigma};
+      Eigen::MatrixXd B = Eigen::MatrixXd::Zero(3, d);
+      for (int axis = 0; axis < 3; ++axis) B.block(axis, axis * layout.size(), 1, layout.size()) = term.b.transpose();
+      const Eigen::MatrixXd H = term.dz_dp * B;
+      P += process_variance * StateMatrix::Identity(d, d);
+      const Eigen::MatrixXd K = P * H.transpose() * Matrix2d(H * P * H.transpose() + term.R).inverse();
+      const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(d, d) - K * H;
+      P = left * Eigen::MatrixXd(P);
+      for (Eigen::MatrixXd& earlier : worth) earlier = left * earlier;
+      worth.emplace_back(K * term.dz_ds);
+      term.M = position_gain(P, term.b);
+      recursive.pass(kPeriod_s);
+      recursive.add(term);
+      white.pass(kPeriod_s);
+      white.add(term);
+      terms.push_back(term);
     }
   }
-  const Eigen::MatrixXd root = random(d, d);
-  const StateMatrix P = root * root.transpose();
-  const Eigen::MatrixXd expected = P + P * V * P;
-  EXPECT_LT((noise.enlarged(P) - expected).norm(), 1e-9 * expected.norm());
-  EXPECT_EQ(white.enlarged(P), P);
+
+  [[nodiscard]] Eigen::MatrixXd expected() const {
+    Eigen::MatrixXd C = Eigen::MatrixXd::Zero(d, d);
+    for (std::size_t f = 0; f < worth.size(); ++f) {
+      for (std::size_t g = 0; g < worth.size(); ++g) {
+        const double apart_s = kPeriod_s * std::abs(static_cast<double>(f) - static_cast<double>(g));
+        if (f != g) C += std::exp(-apart_s / kCorrelation_s) * worth[f] * sigma * worth[g].transpose();
+      }
+    }
+    return C;
+  }
+};
+
+TEST(CorrelatedPoseNoise, IsWhatThePoseErrorsOfDifferentFramesHaveInCommonInTheEstimate) {
+  for (const double process_variance : {0.0, 0.05}) {
+    const CorrelatedSightings sightings(process_variance);
+    const Eigen::MatrixXd expected = sightings.expected();
+    EXPECT_GT(expected.norm(), 0.1 * sightings.P.norm());
+    EXPECT_LT((sightings.recursive.covariance() - expected).norm(), 1e-9 * expected.norm());
+  }
+}
+
+TEST(CorrelatedPoseNoise, OfABatchIsThatOfTheRecursion) {
+  const CorrelatedSightings sightings(0.0);
+  CorrelatedPoseNoise batch(sightings.d, CorrelatedSightings::kCorrelation_s);
+  for (PoseNoiseTerm term : sightings.terms) {
+    term.M = position_gain(sightings.P, term.b);
+    batch.pass(CorrelatedSightings::kPeriod_s);
+    batch.add_of_batch(term);
+  }
+  const Eigen::MatrixXd expected = sightings.expected();
+  EXPECT_LT((batch.covariance() - expected).norm(), 1e-9 * expected.norm());
+}
+
+TEST(CorrelatedPoseNoise, IsNothingWhereTheErrorIsWhite) {
+  EXPECT_EQ(CorrelatedSightings(0.0).white.covariance().norm(), 0.0);
 }
 
 }  // namespace

@@ -4,8 +4,10 @@
 
 #include <memory>
 #include <random>
+#include <thread>
 #include <vector>
 
+#include "core/pipeline/batch_starter.hpp"
 #include "core/pipeline/feature_life.hpp"
 
 namespace perimap {
@@ -28,6 +30,8 @@ struct Stages : ::testing::Test {
   FrameJob job;
   int next_beat_ms = 1000;
   int beats_known_ahead_ms = 2000;
+  double pose_variance_mm2 = 0.0;
+  FrameRecord* current = nullptr;
 
   Stages() {
     settings.camera = {640, 480, 500, 500, 320, 240, 0, 0, 0, 0, 0};
@@ -55,8 +59,9 @@ struct Stages : ::testing::Test {
     history->refresh_phases(clock.clock());
     FrameRecord& frame = history->append({static_cast<std::uint64_t>(n), capture, capture + milliseconds(12)});
     frame.pose.state = CameraPose::State::kInterpolated;
+    frame.pose.position_variance_mm2 = pose_variance_mm2;
     history->set_phase(frame, clock.clock());
-    job.frame = &frame;
+    job.frame = current = &frame;
     job.about_capture = bases_about(settings.estimator.layout, frame.phase);
     job.history = history.get();
     for (ReleaseBasis& release : job.releases) release.b = basis_at(settings.estimator.layout, 1.0);
@@ -93,7 +98,7 @@ struct Stages : ::testing::Test {
   std::vector<FeatureSnapshot> shown() {
     ShardSnapshot publisher;
     ShardSnapshot model_view;
-    group->evaluate(publisher, model_view);
+    group->evaluate(job, publisher, model_view);
     EXPECT_EQ(publisher.features.size(), model_view.features.size());
     return publisher.features;
   }
@@ -356,6 +361,67 @@ TEST_F(Stages, WhatIsPredictedAndShownIsWhatTheBankHolds) {
   for (const Matrix3d& covariance : snapshots[0].covariances_W_mm2) {
     EXPECT_LT((covariance - estimate.position_covariance(job.releases[0].b)).norm(), 1e-12);
   }
+}
+
+// Sideways variance shown after 300 frames with a pose that is off by 1 mm, and after as many again.
+struct SlowPoseError : Stages {
+  SlowPoseError() { pose_variance_mm2 = 1.0; }
+
+  double shown_variance_mm2() {
+    for (int i = 0; i < 300; ++i) {
+      next_frame();
+      found_at({320, 240});
+      EXPECT_EQ(learn_frame(), LifeEvent::kNone);
+    }
+    next_frame();
+    return shown().at(0).covariances_W_mm2[0](0, 0);
+  }
+};
+
+TEST_F(SlowPoseError, StaysInWhatIsShown) {
+  for (FeatureSlot& s : slots) s.slow_error = std::make_unique<CorrelatedPoseNoise>(bank->layout().state_size(), 1e4);
+  FeatureEstimate estimate = still_feature();
+  estimate.P *= 1e4;
+  map_feature();
+  bank->set(0, estimate);
+  EXPECT_NEAR(shown_variance_mm2(), 1.0, 0.1);
+  EXPECT_NEAR(shown_variance_mm2(), 1.0, 0.1);
+}
+
+TEST_F(SlowPoseError, AveragesOutWhereItIsTakenForWhite) {
+  map_feature();
+  EXPECT_LT(shown_variance_mm2(), 0.05);
+}
+
+TEST_F(SlowPoseError, OfTheBatchStartIsCountedToo) {
+  slot->slow_error = std::make_unique<CorrelatedPoseNoise>(bank->layout().state_size(), 1e4);
+  slot->state = SlotState::kTracked;
+  std::mt19937 generator(3);
+  std::normal_distribution<double> normal(0.0, 0.3);
+  settings.workers = 1;
+  BatchStarter starter(settings, slots);
+  std::thread housekeeping([&] { starter.serve(); });
+  for (int i = 0; slot->state != SlotState::kMapped && i < 200; ++i) {
+    next_frame();
+    // The camera moves, so that there is a depth.
+    FrameRecord& frame = *current;
+    frame.pose.X_WC.t.x() = 20.0 * std::sin(0.1 * i);
+    frame.X_CW = frame.pose.X_WC.inverse();
+    const Vector3d q = frame.X_CW * Vector3d(0.0, 0.0, 100.0);
+    found_at({320 + 500 * q.x() / q.z() + normal(generator), 240 + normal(generator)});
+    if (learn_frame() == LifeEvent::kStartRequested) {
+      starter.request(0, 0);
+      starter.wait_until_done();
+    }
+  }
+  starter.dismiss();
+  housekeeping.join();
+  ASSERT_EQ(slot->state, SlotState::kMapped);
+  next_frame();
+  FeatureEstimate estimate;
+  bank->get(0, estimate);
+  EXPECT_LT(estimate.position_covariance(job.releases[0].b)(1, 1), 0.2) << "what the recursion believes";
+  EXPECT_GT(shown().at(0).covariances_W_mm2[0](1, 1), 0.8);
 }
 
 }  // namespace

@@ -111,5 +111,14 @@ TEST(PoseHistory, HalfWayBetweenTwoReadingsHasHalfTheirVariance) {
   EXPECT_NEAR(history.at(at_ms(5)).position_variance_mm2, 0.5, 0.001);
 }
 
+TEST(PoseHistory, ASlowErrorDoesNotAverageOutBetweenTwoReadings) {
+  PoseHistorySettings settings = noisy();
+  settings.error_correlation = std::chrono::seconds(5);
+  PoseHistory history(settings);
+  ASSERT_TRUE(history.add(reading(0, 0.0)));
+  ASSERT_TRUE(history.add(reading(10, 10.0)));
+  EXPECT_NEAR(history.at(at_ms(5)).position_variance_mm2, 0.5 + 0.5 * std::exp(-0.002), 0.001);
+}
+
 }  // namespace
 }  // namespace perimap

@@ -95,6 +95,27 @@ TEST(Simulation, TrackerNoiseHasTheStatedNormInThreeDimensions) {
   EXPECT_LT(std::abs(lag_product / position2), 0.03) << "the noise is not white";
 }
 
+TEST(Simulation, ASlowTrackerErrorKeepsItsNormAndFallsToOneEthInItsTime) {
+  SimulationSettings settings = small();
+  settings.duration = std::chrono::seconds(600);
+  settings.tracker_dropouts_per_min = 0.0;
+  settings.tracker_correlation = std::chrono::milliseconds(500);
+  const Simulation simulation = simulate(settings);
+  std::vector<Vector3d> errors;
+  double square = 0.0;
+  for (std::size_t i = 0; i < simulation.tracker_sample_count(); ++i) {
+    errors.push_back(simulation.tracker_sample(i, {1.4, 0.0}).X_WS.t - simulation.tracker_sample(i, {}).X_WS.t);
+    square += errors.back().squaredNorm();
+  }
+  const auto count = static_cast<double>(errors.size());
+  const std::size_t lag = 50;  // 0.5 s
+  double product = 0.0;
+  for (std::size_t i = lag; i < errors.size(); ++i) product += errors[i].dot(errors[i - lag]);
+  // 600 s hold about 600 independent errors of three axes.
+  EXPECT_NEAR(std::sqrt(square / count), 1.4, 0.12);
+  EXPECT_NEAR(product / square, std::exp(-1.0), 0.12);
+}
+
 TEST(Simulation, ExactTrackerAndHandEyeGiveTheCamera) {
   SimulationSettings settings = small();
   settings.tracker_dropouts_per_min = 0.0;
