@@ -29,13 +29,17 @@ Matrix3d position_covariance(const StateMatrix& P, const Basis& b) noexcept {
   return S;
 }
 
-double largest_deviation_mm(const FeatureEstimate& estimate, const BasisLayout& layout, int phases) noexcept {
+double largest_deviation_mm(const FeatureEstimate& estimate, const BasisLayout& layout, int phases,
+                            bool breath) noexcept {
   const double step = 2.0 * std::numbers::pi / phases;
-  const int respiratory_phases = layout.respiratory_harmonics > 0 ? phases : 1;
+  // Four steps find the extremes of one harmonic, and lie within 8 % of those of two.
+  const int breath_phases = breath && layout.respiratory_harmonics > 0 ? 4 * layout.respiratory_harmonics : 1;
+  const double breath_step = 2.0 * std::numbers::pi / breath_phases;
   double largest = 0.0;
-  for (int m = 0; m < respiratory_phases; ++m) {
+  for (int m = 0; m < breath_phases; ++m) {
     for (int n = 0; n < phases; ++n) {
-      const Matrix3d S = estimate.position_covariance(basis_at(layout, n * step, m * step));
+      const Basis b = breath ? basis_at(layout, n * step, m * breath_step) : basis_without_breath(layout, n * step);
+      const Matrix3d S = estimate.position_covariance(b);
       Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
       solver.computeDirect(S, Eigen::EigenvaluesOnly);
       largest = std::max(largest, solver.eigenvalues()(2));

@@ -37,9 +37,10 @@ void diffuse(FeatureEstimate& estimate, const BasisLayout& layout, double deviat
 [[nodiscard]] Basis diffusion_shape(const BasisLayout& layout) noexcept;
 
 // The largest standard deviation of the position in any direction (mm) over `phases` equal steps of the cardiac cycle
-// and, where the layout has respiration, as many of the respiratory one. The layout must be the estimate's.
-[[nodiscard]] double largest_deviation_mm(const FeatureEstimate& estimate, const BasisLayout& layout,
-                                          int phases = 16) noexcept;
+// and, where the layout has respiration, as many of the respiratory one as its harmonics can tell apart; without
+// `breath`, of the position that breathing displaces. The layout must be the estimate's.
+[[nodiscard]] double largest_deviation_mm(const FeatureEstimate& estimate, const BasisLayout& layout, int phases = 16,
+                                          bool breath = true) noexcept;
 
 // Standard deviations before any measurement, independent and equal on the three axes: harmonic k of either series has
 // deviation_k = harmonic_mm / k^decay for both of its coefficients. A steep decay makes many harmonics nearly free.

@@ -41,6 +41,23 @@ Basis basis_at(const BasisLayout& layout, double cardiac_phase_rad, double respi
   return b;
 }
 
+Basis basis_without_breath(const BasisLayout& layout, double cardiac_phase_rad) noexcept {
+  Basis b = basis_at(layout, cardiac_phase_rad);
+  b.tail(2 * layout.respiratory_harmonics).setZero();
+  return b;
+}
+
+Basis breath_rate(const BasisLayout& layout, double respiratory_phase_rad) noexcept {
+  Basis b = Basis::Zero(layout.size());
+  const int first = 2 * layout.cardiac_harmonics;
+  const int H_r = layout.respiratory_harmonics;
+  for_each_harmonic(H_r, respiratory_phase_rad, [&](int k, double c, double s) {
+    b(first + k) = -k * s;
+    b(first + H_r + k) = -k * c;
+  });
+  return b;
+}
+
 Basis basis_rate(const BasisLayout& layout, double cardiac_phase_rad) noexcept {
   Basis b = Basis::Zero(layout.size());
   const int H = layout.cardiac_harmonics;

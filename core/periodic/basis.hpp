@@ -37,7 +37,12 @@ using Basis = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxBasis, 1>;
 [[nodiscard]] Basis basis_at(const BasisLayout& layout, double cardiac_phase_rad,
                              double respiratory_phase_rad = 0.0) noexcept;
 
+// The same where the respiratory phase is not known: its part is zero, so that nothing is said or learnt of it.
+[[nodiscard]] Basis basis_without_breath(const BasisLayout& layout, double cardiac_phase_rad) noexcept;
+
 // db/dphi (1/rad), phi the cardiac phase; zero for the respiratory part.
 [[nodiscard]] Basis basis_rate(const BasisLayout& layout, double cardiac_phase_rad) noexcept;
+// db/dpsi (1/rad), psi the respiratory phase; zero for the rest.
+[[nodiscard]] Basis breath_rate(const BasisLayout& layout, double respiratory_phase_rad) noexcept;
 
 }  // namespace perimap

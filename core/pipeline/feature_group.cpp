@@ -13,6 +13,11 @@ namespace {
 
 constexpr double kInflation_mm = 1.0;
 constexpr int kRefusalsBeforeRelock = 10;
+// How much a feature's breathing differs from the common one, first harmonic, and by how much its mean is off that was
+// learnt while the phase was not known.
+constexpr double kBreathDeviation_mm = 2.0;
+constexpr double kBreathMeanDeviation_mm = 1.5;
+static_assert(kBreathHarmonics == kMaxRespiratoryHarmonics);
 constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::max();
 
 // The oldest frame after `after` (or the oldest of all) that a mapped slot holds a match of.
@@ -97,22 +102,52 @@ MapPrediction FeatureGroup::prediction(std::size_t lane) const noexcept {
   return {true, p, at_capture_.covariance_of(l) + phase_spread(p, earlier_.position_of(l), later_.position_of(l))};
 }
 
-void FeatureGroup::collect(const SweepPhase<double>& at, double pixel_deviation_px,
-                           std::vector<CommonMatch>& matches) noexcept {
+void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double>* breath, bool converged,
+                           double pixel_deviation_px, std::vector<CommonMatch>& matches) noexcept {
   if (plan_.capture < 0) return;
   LaneMotions<double> motions;
+  LaneMotions<double> breathing;
   bank_.motion_near(index_, plan_.phases, plan_.capture, at, motions);
+  if (breath != nullptr) bank_.motion_near(index_, plan_.phases, plan_.capture, *breath, breathing);
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
     const FeatureSlot& slot = slots_[lane];
-    if (slot.state != SlotState::kMapped || !slot.converged || slot.match.state != MatchState::kFound) continue;
+    if (slot.state != SlotState::kMapped || slot.match.state != MatchState::kFound) continue;
+    if (converged && !slot.converged) continue;
     const auto l = static_cast<int>(lane);
     CommonMatch match;
     match.z = slot.match.px;
     match.R = match_covariance(slot.match.covariance_px2, pixel_deviation_px);
     match.p_WF = motions.position_of(l);
     match.S = motions.covariance_of(l);
-    match.D = motions.velocity_of(l);
+    match.D.resize(3, breath != nullptr ? 2 : 1);
+    match.D.col(0) = motions.velocity_of(l);
+    if (breath != nullptr) match.D.col(1) = breathing.velocity_of(l);
     matches.push_back(match);
+  }
+}
+
+void FeatureGroup::begin_breath(const BreathWave& wave) noexcept {
+  const BasisLayout& layout = bank_.layout();
+  const int n = layout.size();
+  const int first = 1 + 2 * layout.cardiac_harmonics;
+  for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
+    if (slots_[lane].state != SlotState::kMapped) continue;
+    FeatureEstimate estimate;
+    bank_.get(feature(lane), estimate);
+    for (int axis = 0; axis < 3; ++axis) {
+      estimate.P(axis * n, axis * n) += kBreathMeanDeviation_mm * kBreathMeanDeviation_mm;
+      for (int k = 0; k < layout.respiratory_harmonics; ++k) {
+        const double deviation_mm = kBreathDeviation_mm / ((k + 1) * (k + 1));
+        for (const int i : {axis * n + first + k, axis * n + first + layout.respiratory_harmonics + k}) {
+          estimate.P.row(i).setZero();
+          estimate.P.col(i).setZero();
+          estimate.P(i, i) = deviation_mm * deviation_mm;
+        }
+        estimate.x(axis * n + first + k) = wave.a[k](axis);
+        estimate.x(axis * n + first + layout.respiratory_harmonics + k) = wave.b[k](axis);
+      }
+    }
+    bank_.set(feature(lane), estimate);
   }
 }
 

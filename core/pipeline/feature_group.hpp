@@ -8,6 +8,7 @@
 #include "core/bank/feature_bank.hpp"
 #include "core/estimation/measurement_model.hpp"
 #include "core/estimation/shared_pose.hpp"
+#include "core/phase/respiration_search.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/feature_stages.hpp"
 #include "core/pipeline/frame_job.hpp"
@@ -43,9 +44,13 @@ class FeatureGroup {
   // After sweep().
   [[nodiscard]] MapPrediction prediction(std::size_t lane) const noexcept;
 
-  // B: appends what the converged features that were found say of the frame's pose and of its phase near `at`, whose
-  // velocity (mm/s) is the appended motion.
-  void collect(const SweepPhase<double>& at, double pixel_deviation_px, std::vector<CommonMatch>& matches) noexcept;
+  // B: appends what the features that were found say of the frame's pose, and of its phases near `at`: the velocity
+  // (mm/s) there, and that of breathing at `breath` unless it is null, are the appended motions. Only converged
+  // features are asked when `converged`.
+  void collect(const SweepPhase<double>& at, const SweepPhase<double>* breath, bool converged,
+               double pixel_deviation_px, std::vector<CommonMatch>& matches) noexcept;
+  // The breathing's phase has become known: all mapped features take the motion that they have in common with it.
+  void begin_breath(const BreathWave& wave) noexcept;
 
   // C: appends the snapshots of the mapped features to both.
   void evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept;

@@ -9,6 +9,9 @@ namespace {
 
 constexpr int kRefusalsBeforeLost = 90;
 constexpr std::uint64_t kUnobservedFramesBeforeLost = 900;
+// Of a feature whose estimate is so uncertain the map can not tell where to search: its slot serves better.
+constexpr double kVagueDeviations = 3.0;  // of a converged feature's largest
+constexpr std::uint64_t kUnobservedVagueFramesBeforeLost = 30;
 constexpr int kFailedStartsBeforeLost = 3;
 constexpr std::uint64_t kConvergenceCheckFrames = 15;
 constexpr int kUpdatesBeforeConverged = 30;  // beyond the start, so that the innovation statistic means something
@@ -101,7 +104,9 @@ class Step {
   LifeEvent mapped() noexcept {
     // Refusals come up to a cycle late; what the map and this frame's match say of each other is newer.
     const bool refused = slot_.refused_in_a_row >= kRefusalsBeforeLost && !slot_.match_agrees;
-    if (refused || now() - slot_.last_found_frame > kUnobservedFramesBeforeLost) {
+    const bool vague = slot_.largest_deviation_mm > kVagueDeviations * settings_.estimator.converged_deviation_mm;
+    const std::uint64_t allowed = vague ? kUnobservedVagueFramesBeforeLost : kUnobservedFramesBeforeLost;
+    if (refused || now() - slot_.last_found_frame > allowed) {
       return give_up();
     }
     if (slot_.follows_something_else) {
@@ -143,7 +148,8 @@ class Step {
     FeatureEstimate estimate;
     bank_.get(feature_, estimate);
     if (slot_.slow_error != nullptr) estimate.P += slot_.slow_error->covariance();
-    slot_.largest_deviation_mm = largest_deviation_mm(estimate, settings_.estimator.layout);
+    slot_.largest_deviation_mm =
+        largest_deviation_mm(estimate, settings_.estimator.layout, 16, job_.frame->respiration.known);
     slot_.converged = slot_.largest_deviation_mm <= settings_.estimator.converged_deviation_mm &&
                       slot_.updates >= kUpdatesBeforeConverged && slot_.health.monitor().consistent();
   }

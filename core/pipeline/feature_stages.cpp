@@ -19,11 +19,15 @@ PixelPrediction predict_from_map(const MapPrediction& map, const FrameRecord& fr
   if (!map.valid || !frame.measurable) return {};
   PixelPrediction prediction;
   Matrix23d J_C;
-  if (model.camera.project(frame.X_CW * map.p_WF, prediction.px, &J_C) != ProjectionStatus::kOk) return {};
+  const Vector3d p_WF = map.p_WF + frame.displacement_mm;
+  if (model.camera.project(frame.X_CW * p_WF, prediction.px, &J_C) != ProjectionStatus::kOk) return {};
   const Matrix23d J_p = J_C * frame.X_CW.R;
   // One pixel more on each axis: what the model does not know about the tissue.
-  prediction.covariance_px2 = J_p * map.covariance_W * J_p.transpose() +
-                              pose_noise_covariance(frame.pose, map.p_WF, J_p) + Matrix2d::Identity();
+  CameraPose pose = frame.pose;
+  pose.position_variance_mm2 =
+      frame.tracker_variance_mm2 + frame.displacement_deviation_mm * frame.displacement_deviation_mm;
+  prediction.covariance_px2 =
+      J_p * map.covariance_W * J_p.transpose() + pose_noise_covariance(pose, p_WF, J_p) + Matrix2d::Identity();
   prediction.valid = prediction.covariance_px2.allFinite();
   return prediction;
 }

@@ -1,4 +1,4 @@
-// What all features share about each of the last frames: pose, phase and basis at capture.
+// What all features share about each of the last frames: pose, phases and basis at capture.
 #pragma once
 
 #include <array>
@@ -6,6 +6,7 @@
 
 #include "core/periodic/basis.hpp"
 #include "core/phase/cardiac_clock.hpp"
+#include "core/pipeline/phase_basis.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/sensors/frame_stamp.hpp"
 
@@ -15,9 +16,14 @@ struct FrameRecord {
   std::uint64_t index = 0;  // the mapper's own count, without gaps
   FrameStamp stamp;
   bool measurable = false;  // pose and phase are there, so its matches can be learnt from
-  CameraPose pose;
+  CameraPose pose;  // what is not known of the breathing counts as noise of its position: either moves all alike
   Pose X_CW;
-  PhaseEstimate phase;  // at capture, as known at the last refresh
+  double tracker_variance_mm2 = 0.0;  // of the position, per axis, the tracker's part alone
+  RespiratoryPhase respiration;       // at capture, as known at the last refresh
+  // How the whole surface is displaced from where the map has it, going by the frames before; for the search alone.
+  Vector3d displacement_mm = Vector3d::Zero();
+  double displacement_deviation_mm = 0.0;  // per axis
+  PhaseEstimate phase;                     // at capture, as known at the last refresh
   Basis b;
   Basis b_rate;
 };
@@ -45,22 +51,31 @@ class FrameHistory {
     return &records_[index % kCapacity];
   }
 
-  // Fills phase and basis of a record from the clock. The basis is computed here, once a frame.
-  void set_phase(FrameRecord& record, const CardiacClock& clock) noexcept {
+  static void set_pose(FrameRecord& record, const CameraPose& pose) noexcept {
+    record.pose = pose;
+    record.tracker_variance_mm2 = pose.position_variance_mm2;
+    if (pose.valid()) record.X_CW = pose.X_WC.inverse();
+  }
+
+  // Fills phases and basis of a record, whose pose is set, from the clocks. The basis is computed here, once a frame.
+  void set_phase(FrameRecord& record, const CardiacClock& clock, const RespiratoryClock& respiration) noexcept {
     record.phase = clock.at(record.stamp.capture);
     const bool usable = record.phase.state == PhaseState::kLocked || record.phase.state == PhaseState::kFreeRunning;
     record.measurable = record.pose.valid() && usable;
-    record.b = basis_at(layout_, record.phase.phase_rad);
+    record.respiration = respiration.at(record.stamp.capture);
+    record.pose.position_variance_mm2 =
+        record.tracker_variance_mm2 + record.respiration.deviation_mm * record.respiration.deviation_mm;
+    record.b = basis_at(layout_, record.phase.phase_rad, record.respiration);
     record.b_rate = basis_rate(layout_, record.phase.phase_rad);
   }
 
   // After a beat: the frames whose cycle was still open get what is known now. At most a cycle or two of frames.
-  void refresh_phases(const CardiacClock& clock) noexcept {
+  void refresh_phases(const CardiacClock& clock, const RespiratoryClock& respiration) noexcept {
     const std::uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
     for (std::uint64_t i = count_; i > oldest; --i) {
       FrameRecord& record = records_[(i - 1) % kCapacity];
       if (record.phase.exact) return;
-      set_phase(record, clock);
+      set_phase(record, clock, respiration);
     }
   }
 

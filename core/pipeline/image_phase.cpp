@@ -15,6 +15,11 @@ constexpr double kPriorDeviation_s = 0.1;
 constexpr double kCommonDeviation_s = 1.5e-3;
 constexpr double kLargestDeviation_s = 0.03;
 constexpr double kLargestShift_s = 0.15;
+// The same for breathing, of which the phase is looked for within this.
+constexpr double kBreathPriorDeviation_rad = 0.5;
+constexpr double kLargestBreathShift = 2.0;  // prior deviations
+// Breathing displaces the heart by up to 2 cm.
+constexpr double kDisplacementDeviation_mm = 15.0;
 
 }  // namespace
 
@@ -32,44 +37,95 @@ CommonInformation pose_prior(const CameraPose& pose) noexcept {
   return prior;
 }
 
-ImagePhaseOutcome ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
-                                      const EstimatorSettings& settings, ObservedPhase& observed) noexcept {
-  if (!frame.measurable || groups.empty()) return ImagePhaseOutcome::kCanNotTell;
-  constexpr double kPriorVariance_s2 = kPriorDeviation_s * kPriorDeviation_s;
-  constexpr Eigen::Index kShift = kPoseUnknowns;  // the appended unknown, s
-  CommonInformation prior = with_appended(pose_prior(frame.pose), kPriorVariance_s2);
+void ImagePhase::collect(std::span<FeatureGroup> groups, const FrameRecord& frame, const EstimatorSettings& settings,
+                         double shift_s, double breath_shift_s, bool converged) noexcept {
+  const BasisLayout& layout = settings.layout;
+  const double phase_rad = frame.phase.phase_rad + shift_s * frame.phase.rate_rad_per_s;
+  RespiratoryPhase respiration = frame.respiration;
+  respiration.phase_rad += breath_shift_s * respiration.rate_rad_per_s;
+  const Basis b = basis_at(layout, phase_rad, respiration);
+  SweepPhase<double> at;
+  at.set(b, basis_rate(layout, phase_rad), frame.phase.rate_rad_per_s, 0.0);
+  SweepPhase<double> breath;
+  if (respiration.known) breath.set(b, breath_rate(layout, respiration.phase_rad), respiration.rate_rad_per_s, 0.0);
+  matches_.clear();
   const std::size_t stride = (groups.size() + kMostGroups - 1) / kMostGroups;
+  for (std::size_t g = frame.index % stride; g < groups.size(); g += stride) {
+    groups[g].collect(at, respiration.known ? &breath : nullptr, converged, settings.pixel_deviation_px, matches_);
+  }
+  used_.assign(matches_.size(), 0);
+}
+
+ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
+                                const EstimatorSettings& settings) noexcept {
+  const ImagePhases can_not_tell;
+  const ImagePhases contradicts{{ImagePhaseOutcome::kContradicts, {}}, {ImagePhaseOutcome::kContradicts, {}}};
+  if (!frame.measurable || groups.empty()) return can_not_tell;
+  // The appended unknowns: shift of the cardiac phase and of the respiratory one, s.
+  constexpr Eigen::Index kShift = kPoseUnknowns;
+  constexpr Eigen::Index kBreathShift = kPoseUnknowns + 1;
+  constexpr double kPriorVariance_s2 = kPriorDeviation_s * kPriorDeviation_s;
+  const double breath_deviation_s =
+      frame.respiration.known ? kBreathPriorDeviation_rad / frame.respiration.rate_rad_per_s : 0.0;
+  const double breath_prior_s2 = breath_deviation_s * breath_deviation_s;
+  CommonInformation prior = with_appended(pose_prior(frame.pose), kPriorVariance_s2);
+  if (frame.respiration.known) prior = with_appended(prior, breath_prior_s2);
   double shift_s = 0.0;
-  double variance_s2 = 0.0;
+  double breath_shift_s = 0.0;
+  CommonEstimate solved;
   for (int pass = 0; pass < kPasses; ++pass) {
-    matches_.clear();
-    const double phase_rad = frame.phase.phase_rad + shift_s * frame.phase.rate_rad_per_s;
-    SweepPhase<double> at;
-    at.set(basis_at(settings.layout, phase_rad), basis_rate(settings.layout, phase_rad), frame.phase.rate_rad_per_s,
-           0.0);
-    for (std::size_t g = frame.index % stride; g < groups.size(); g += stride) {
-      groups[g].collect(at, settings.pixel_deviation_px, matches_);
-    }
-    if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return ImagePhaseOutcome::kCanNotTell;
-    used_.assign(matches_.size(), 0);
+    collect(groups, frame, settings, shift_s, breath_shift_s, true);
+    if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return can_not_tell;
     prior.eta(kShift) = -shift_s / kPriorVariance_s2;
+    if (frame.respiration.known) prior.eta(kBreathShift) = -breath_shift_s / breath_prior_s2;
     const SharedPose shared =
         estimate_shared_pose(model, frame.X_CW, prior, std::span<const CommonMatch>(matches_), std::span(used_));
-    if (!shared.estimate.ok) return ImagePhaseOutcome::kCanNotTell;
-    if (2 * static_cast<std::size_t>(shared.used) < matches_.size()) return ImagePhaseOutcome::kContradicts;
-    if (shared.used < kFewestMatches) return ImagePhaseOutcome::kCanNotTell;
-    shift_s += shared.estimate.s(kShift);
-    variance_s2 = shared.estimate.covariance(kShift, kShift);
-    if (!(std::abs(shift_s) < kLargestShift_s)) return ImagePhaseOutcome::kContradicts;
+    if (!shared.estimate.ok) return can_not_tell;
+    if (2 * static_cast<std::size_t>(shared.used) < matches_.size()) return contradicts;
+    if (shared.used < kFewestMatches) return can_not_tell;
+    solved = shared.estimate;
+    shift_s += solved.s(kShift);
+    if (frame.respiration.known) breath_shift_s += solved.s(kBreathShift);
+    if (!(std::abs(shift_s) < kLargestShift_s)) return contradicts;
+    if (!(std::abs(breath_shift_s) <= kLargestBreathShift * breath_deviation_s)) return contradicts;
   }
-  // Without what the prior said.
-  const double precision = 1.0 / variance_s2 - 1.0 / kPriorVariance_s2;
-  if (!(precision > 1.0 / (kLargestDeviation_s * kLargestDeviation_s))) return ImagePhaseOutcome::kCanNotTell;
-  shift_s /= variance_s2 * precision;
-  const double rate = frame.phase.rate_rad_per_s;
-  observed = {frame.stamp.capture, frame.phase.phase_rad + rate * shift_s,
-              rate * std::sqrt(1.0 / precision + kCommonDeviation_s * kCommonDeviation_s)};
-  return ImagePhaseOutcome::kObserved;
+  const auto answer = [&](Eigen::Index unknown, double shift, double prior_s2, double phase_rad, double rate_rad_per_s,
+                          double largest_deviation_s, double common_deviation_s) {
+    ImagePhaseAnswer result;
+    // Without what the prior said.
+    const double variance_s2 = solved.covariance(unknown, unknown);
+    const double precision = 1.0 / variance_s2 - 1.0 / prior_s2;
+    if (!(precision > 1.0 / (largest_deviation_s * largest_deviation_s))) return result;
+    result.outcome = ImagePhaseOutcome::kObserved;
+    result.observed = {frame.stamp.capture, phase_rad + rate_rad_per_s * shift / (variance_s2 * precision),
+                       rate_rad_per_s * std::sqrt(1.0 / precision + common_deviation_s * common_deviation_s)};
+    return result;
+  };
+  ImagePhases phases;
+  phases.cardiac = answer(kShift, shift_s, kPriorVariance_s2, frame.phase.phase_rad, frame.phase.rate_rad_per_s,
+                          kLargestDeviation_s, kCommonDeviation_s);
+  if (frame.respiration.known) {
+    phases.respiratory = answer(kBreathShift, breath_shift_s, breath_prior_s2, frame.respiration.phase_rad,
+                                frame.respiration.rate_rad_per_s, breath_deviation_s, kCommonDeviation_s);
+  }
+  return phases;
+}
+
+bool ImagePhase::displacement(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
+                              const EstimatorSettings& settings, Vector3d& displacement_mm) noexcept {
+  if (!frame.measurable || groups.empty()) return false;
+  CameraPose pose = frame.pose;
+  pose.position_variance_mm2 += kDisplacementDeviation_mm * kDisplacementDeviation_mm;
+  collect(groups, frame, settings, 0.0, 0.0, false);
+  // The features' own motions are not asked.
+  for (CommonMatch& match : matches_) match.D.resize(3, 0);
+  if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return false;
+  const SharedPose shared = estimate_shared_pose(model, frame.X_CW, pose_prior(pose),
+                                                 std::span<const CommonMatch>(matches_), std::span(used_));
+  if (!shared.estimate.ok || shared.used < kFewestMatches) return false;
+  // The camera stands where the surface would have to stand the other way.
+  displacement_mm = -shared.estimate.s.segment<3>(3);
+  return true;
 }
 
 }  // namespace perimap

@@ -1,4 +1,4 @@
-// Stage B: the cardiac phase and the camera pose that all matches of a frame agree on.
+// Stage B: the phases and the camera pose that all matches of a frame agree on.
 #pragma once
 
 #include <cstddef>
@@ -16,6 +16,17 @@
 namespace perimap {
 
 enum class ImagePhaseOutcome : std::uint8_t { kObserved, kCanNotTell, kContradicts };
+
+// What a frame's matches tell of one phase.
+struct ImagePhaseAnswer {
+  ImagePhaseOutcome outcome = ImagePhaseOutcome::kCanNotTell;
+  ObservedPhase observed;  // when kObserved
+};
+
+struct ImagePhases {
+  ImagePhaseAnswer cardiac;
+  ImagePhaseAnswer respiratory;  // kCanNotTell too where breathing is not known
+};
 
 // An error of the phase moves every feature along its velocity, one of the pose moves them all alike; both explain the
 // same innovations, so they are estimated together, the tracker being the pose's prior. Each match weighs by how well
@@ -38,11 +49,18 @@ class ImagePhase {
   }
 
   // After stage A. frame.phase need not be right by more than some tens of milliseconds.
-  [[nodiscard]] ImagePhaseOutcome observe(std::span<FeatureGroup> groups, const FrameRecord& frame,
-                                          const PixelModel& model, const EstimatorSettings& settings,
-                                          ObservedPhase& observed) noexcept;
+  [[nodiscard]] ImagePhases observe(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
+                                    const EstimatorSettings& settings) noexcept;
+
+  // By how much the whole surface is displaced from where the map has it (mm, frame W), which may be much more than the
+  // tracker's error. False when the matches can not tell.
+  [[nodiscard]] bool displacement(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
+                                  const EstimatorSettings& settings, Vector3d& displacement_mm) noexcept;
 
  private:
+  void collect(std::span<FeatureGroup> groups, const FrameRecord& frame, const EstimatorSettings& settings,
+               double shift_s, double breath_shift_s, bool converged) noexcept;
+
   std::vector<CommonMatch> matches_;
   std::vector<std::uint8_t> used_;
 };

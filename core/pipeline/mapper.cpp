@@ -7,9 +7,20 @@
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
+namespace {
+
+// Frames from one search for breathing to the next, and, where it is not asked for, from one look at the common
+// displacement to the next.
+constexpr std::uint64_t kSearchInterval = 32;
+constexpr std::uint64_t kDisplacementInterval = 3;
+// How well a frame tells the common displacement while the map is young, and how fast breathing changes it.
+constexpr double kDisplacementDeviation_mm = 1.0;
+constexpr double kDisplacementRate_mm_per_s = 15.0;
+
+}  // namespace
 
 Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells,
-               WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter, CorrectionCells& corrections,
+               WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter, PhaseCells& phase_cells,
                PipelineCounters& counters)
     : settings_(settings),
       model_{settings.camera},
@@ -18,9 +29,10 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       team_(team),
       finder_(finder),
       starter_(starter),
-      corrections_(corrections),
+      phase_cells_(phase_cells),
       counters_(counters),
       poses_(settings.pose),
+      respiration_(settings.respiration),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       pyramid_(settings.camera.width, settings.camera.height, kPyramidLevels),
       bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())}),
@@ -42,29 +54,33 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   finish_learning();
   const Instant begun = MonotonicClock::now();
 
+  if (respiration_.locks() == 1 && !breath_begun_) {
+    breath_begun_ = true;
+    for (FeatureGroup& group : groups_) group.begin_breath(respiration_.wave());
+  }
   if (ecg_clock.beats() != beats_) {
-    history_->refresh_phases(ecg_clock);
+    history_->refresh_phases(ecg_clock, respiration_.clock());
     beats_ = ecg_clock.beats();
   }
   cycle_.follow(ecg_clock, stamp.capture);
   const CardiacClock clock = ecg_clock.corrected(cycle_.correction());
   FrameRecord& frame = history_->append(stamp);
-  frame.pose = poses_.at(stamp.capture);
-  if (frame.pose.valid()) frame.X_CW = frame.pose.X_WC.inverse();
-  history_->set_phase(frame, clock);
+  FrameHistory::set_pose(frame, poses_.at(stamp.capture));
+  history_->set_phase(frame, clock, respiration_.clock());
+  expect_displacement(frame);
   // Only the ECG completes a cycle. A corrected beginning may lie after a frame of the running one.
   frame.phase.exact = frame.phase.exact && stamp.capture < ecg_clock.anchor();
   job_.frame = &frame;
   job_.history = history_.get();
   job_.pyramid = &pyramid_;
-  job_.about_capture = bases_about(settings_.estimator.layout, frame.phase);
+  job_.about_capture = bases_about(settings_.estimator.layout, frame.phase, frame.respiration);
   predict_releases(frame, clock);
   adopt_found_features(frame.index);
 
   pyramid_.build(image);
   team_.run(&run_stage<&Mapper::predict_and_find_shard>, this);
   const Instant found = MonotonicClock::now();
-  if (settings_.phase_from_image) settle_phase(frame);
+  settle_phases(frame);
   const Instant joined = MonotonicClock::now();
   team_.run(&run_stage<&Mapper::evaluate_shard>, this);
   const Instant evaluated = MonotonicClock::now();
@@ -81,12 +97,46 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   if (frame.pose.valid() && !frame.measurable) counters_.frames_without_phase.add();
 }
 
+// While breathing is not known the surface is expected displaced as it was seen last.
+void Mapper::expect_displacement(FrameRecord& frame) const noexcept {
+  frame.displacement_deviation_mm = frame.respiration.deviation_mm;
+  if (frame.respiration.known || !displacement_seen_) return;
+  const double age_s = to_seconds(frame.stamp.capture - displacement_time_);
+  const double deviation_mm = kDisplacementDeviation_mm + kDisplacementRate_mm_per_s * age_s;
+  if (!(deviation_mm < frame.displacement_deviation_mm)) return;
+  frame.displacement_mm = displacement_mm_;
+  frame.displacement_deviation_mm = deviation_mm;
+}
+
 // B. What the correction changes is the time to come: the publisher evaluates with it, and so does the next frame's A.
-void Mapper::settle_phase(const FrameRecord& frame) noexcept {
-  ObservedPhase observed;
-  switch (image_phase_.observe(groups_, frame, model_, settings_.estimator, observed)) {
+void Mapper::settle_phases(const FrameRecord& frame) noexcept {
+  const bool breath_known = frame.respiration.known;
+  bool breath_told = false;
+  if (settings_.phase_from_image || breath_known) {
+    const ImagePhases seen = image_phase_.observe(groups_, frame, model_, settings_.estimator);
+    if (settings_.phase_from_image) settle_cardiac_phase(seen.cardiac);
+    if (breath_known && seen.respiratory.outcome == ImagePhaseOutcome::kObserved) {
+      const ObservedPhase& breath = seen.respiratory.observed;
+      respiration_.add_phase(breath.time, breath.phase_rad, breath.deviation_rad);
+      breath_told = true;
+    } else if (breath_known && seen.respiratory.outcome == ImagePhaseOutcome::kContradicts) {
+      respiration_.add_contradiction(frame.stamp.capture);
+    }
+  }
+  const bool asked = settings_.respiration.enabled ? !breath_told : frame.index % kDisplacementInterval == 0;
+  if (asked && image_phase_.displacement(groups_, frame, model_, settings_.estimator, displacement_mm_)) {
+    displacement_seen_ = true;
+    displacement_time_ = frame.stamp.capture;
+    respiration_.add_displacement(frame.stamp.capture, displacement_mm_, frame.phase.phase_rad);
+  }
+  phase_cells_.publisher_respiration.write(respiration_.clock());
+  phase_cells_.status_respiration.write(respiration_.clock());
+}
+
+void Mapper::settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept {
+  switch (seen.outcome) {
     case ImagePhaseOutcome::kObserved:
-      cycle_.add(observed);
+      cycle_.add(seen.observed);
       counters_.phases_from_image.add();
       break;
     case ImagePhaseOutcome::kContradicts:
@@ -96,8 +146,8 @@ void Mapper::settle_phase(const FrameRecord& frame) noexcept {
       break;
   }
   const CycleCorrection correction = cycle_.correction();
-  corrections_.publisher.write(correction);
-  corrections_.status.write(correction);
+  phase_cells_.publisher_correction.write(correction);
+  phase_cells_.status_correction.write(correction);
 }
 
 void Mapper::learn() noexcept {
@@ -109,6 +159,7 @@ void Mapper::learn() noexcept {
   last_capture_ = capture;
   learn_started_ = MonotonicClock::now();
   team_.start(&run_stage<&Mapper::learn_shard>, this);
+  if (job_.frame->index % kSearchInterval == 0) respiration_.search(capture);
   if (settings_.lockstep) {
     team_.join();
     starter_.wait_until_done();
@@ -168,7 +219,8 @@ void Mapper::predict_releases(const FrameRecord& frame, const CardiacClock& cloc
   for (std::size_t i = 0; i < job_.releases.size(); ++i) {
     const FrameRecord* earlier = history_->find(frame.index - std::min<std::uint64_t>(frame.index, i));
     const PhaseEstimate at_release = clock.at(earlier->stamp.capture + settings_.latency);
-    job_.releases[i] = {earlier->stamp.sequence, basis_at(settings_.estimator.layout, at_release.phase_rad)};
+    const RespiratoryPhase breath = respiration_.clock().at(earlier->stamp.capture + settings_.latency);
+    job_.releases[i] = {earlier->stamp.sequence, basis_at(settings_.estimator.layout, at_release.phase_rad, breath)};
   }
 }
 

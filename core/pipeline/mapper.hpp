@@ -8,14 +8,15 @@
 #include "core/bank/feature_bank.hpp"
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cycle_posterior.hpp"
+#include "core/phase/respiratory_tracker.hpp"
 #include "core/pipeline/batch_starter.hpp"
-#include "core/pipeline/correction_cells.hpp"
 #include "core/pipeline/feature_finder.hpp"
 #include "core/pipeline/feature_group.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/frame_job.hpp"
 #include "core/pipeline/image_phase.hpp"
+#include "core/pipeline/phase_cells.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
@@ -35,7 +36,7 @@ namespace perimap {
 class Mapper {
  public:
   Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells, WorkerTeam& team,
-         FeatureFinder& finder, BatchStarter& starter, CorrectionCells& corrections, PipelineCounters& counters);
+         FeatureFinder& finder, BatchStarter& starter, PhaseCells& phase_cells, PipelineCounters& counters);
 
   void add_pose(const TrackerSample& sample) noexcept;
 
@@ -60,7 +61,9 @@ class Mapper {
   void learn_shard(int worker) noexcept;
   void advance_slot(FeatureGroup& group, std::size_t lane, int worker) noexcept;
   void finish_learning() noexcept;
-  void settle_phase(const FrameRecord& frame) noexcept;
+  void expect_displacement(FrameRecord& frame) const noexcept;
+  void settle_phases(const FrameRecord& frame) noexcept;
+  void settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept;
   void adopt_found_features(std::uint64_t frame_index) noexcept;
   void offer_to_finder(const FrameRecord& frame, const GreyImage& image) noexcept;
 
@@ -79,10 +82,15 @@ class Mapper {
   WorkerTeam& team_;
   FeatureFinder& finder_;
   BatchStarter& starter_;
-  CorrectionCells& corrections_;
+  PhaseCells& phase_cells_;
   PipelineCounters& counters_;
 
   PoseHistory poses_;
+  RespiratoryTracker respiration_;
+  bool displacement_seen_ = false;
+  Vector3d displacement_mm_ = Vector3d::Zero();  // of the surface from the map, as seen last
+  Instant displacement_time_;
+  bool breath_begun_ = false;  // the features that were mapped when it was first found have it
   std::unique_ptr<FrameHistory> history_;
   ImagePyramid pyramid_;
   FeatureBank<double> bank_;

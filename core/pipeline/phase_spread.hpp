@@ -9,6 +9,7 @@
 #include "core/geometry/pose.hpp"
 #include "core/periodic/basis.hpp"
 #include "core/phase/cardiac_clock.hpp"
+#include "core/pipeline/phase_basis.hpp"
 
 namespace perimap {
 
@@ -18,10 +19,12 @@ struct BasesAbout {
   Basis later;
 };
 
-[[nodiscard]] inline BasesAbout bases_about(const BasisLayout& layout, const PhaseEstimate& phase) noexcept {
+[[nodiscard]] inline BasesAbout bases_about(const BasisLayout& layout, const PhaseEstimate& phase,
+                                            const RespiratoryPhase& respiration) noexcept {
   // Half a cycle is as wrong as a phase can be.
   const double deviation_rad = std::min(phase.deviation_s * phase.rate_rad_per_s, std::numbers::pi);
-  return {basis_at(layout, phase.phase_rad - deviation_rad), basis_at(layout, phase.phase_rad + deviation_rad)};
+  return {basis_at(layout, phase.phase_rad - deviation_rad, respiration),
+          basis_at(layout, phase.phase_rad + deviation_rad, respiration)};
 }
 
 // mm^2, from the positions (mm) at the phase itself and at the two bases.

@@ -23,7 +23,7 @@ Pipeline::Pipeline(const PipelineSettings& settings)
       team_(settings.workers),
       finder_(settings, counters_),
       starter_(settings, slots_),
-      mapper_(settings, slots_, cells_, team_, finder_, starter_, corrections_, counters_),
+      mapper_(settings, slots_, cells_, team_, finder_, starter_, phase_cells_, counters_),
       schedule_(settings.latency),
       composer_(composer_settings(settings)),
       publisher_view_(cells_.size()),
@@ -77,9 +77,11 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
     cells_[i].publisher.update();
     publisher_view_[i] = &cells_[i].publisher.front();
   }
-  corrections_.publisher.update();
-  const CardiacClock corrected = clock.front().corrected(corrections_.publisher.front());
-  const SurfaceSample& sample = composer_.compose(release, corrected, publisher_view_);
+  phase_cells_.publisher_correction.update();
+  phase_cells_.publisher_respiration.update();
+  const CardiacClock corrected = clock.front().corrected(phase_cells_.publisher_correction.front());
+  const SurfaceSample& sample =
+      composer_.compose(release, corrected, phase_cells_.publisher_respiration.front(), publisher_view_);
   counters_.samples.add();
   if (release.frame_missing) counters_.samples_without_frame.add();
   if (sample.update_late) counters_.samples_from_late_update.add();
@@ -89,8 +91,13 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
 CardiacClock Pipeline::status_clock() noexcept {
   TripleBuffer<CardiacClock>& clock = entrance_.clocks().status;
   clock.update();
-  corrections_.status.update();
-  return clock.front().corrected(corrections_.status.front());
+  phase_cells_.status_correction.update();
+  return clock.front().corrected(phase_cells_.status_correction.front());
+}
+
+RespiratoryClock Pipeline::status_respiration() noexcept {
+  phase_cells_.status_respiration.update();
+  return phase_cells_.status_respiration.front();
 }
 
 std::span<const ShardSnapshot* const> Pipeline::model_snapshots() noexcept {

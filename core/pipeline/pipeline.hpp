@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "core/pipeline/batch_starter.hpp"
-#include "core/pipeline/correction_cells.hpp"
 #include "core/pipeline/feature_finder.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/mapper.hpp"
+#include "core/pipeline/phase_cells.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/release_schedule.hpp"
@@ -45,6 +45,8 @@ class Pipeline {
 
   // Status thread: the clock with what the image makes of the running cycle.
   [[nodiscard]] CardiacClock status_clock() noexcept;
+  // Status thread.
+  [[nodiscard]] RespiratoryClock status_respiration() noexcept;
   // Status thread: each worker's newest snapshot, in order of shard; valid until the next call.
   [[nodiscard]] std::span<const ShardSnapshot* const> model_snapshots() noexcept;
 
@@ -57,7 +59,7 @@ class Pipeline {
   WorkerTeam team_;
   FeatureFinder finder_;
   BatchStarter starter_;
-  CorrectionCells corrections_;
+  PhaseCells phase_cells_;
   Mapper mapper_;
   ReleaseSchedule schedule_;
   SurfaceComposer composer_;

@@ -6,6 +6,7 @@
 #include "core/geometry/camera_model.hpp"
 #include "core/periodic/basis.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
+#include "core/phase/respiratory_tracker.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/time/instant.hpp"
 
@@ -31,6 +32,7 @@ struct PipelineSettings {
   CameraModel camera;
   PoseHistorySettings pose;
   CardiacClockSettings clock;
+  RespirationSettings respiration;
   FeatureSettings features;
   EstimatorSettings estimator;
   int workers = 2;

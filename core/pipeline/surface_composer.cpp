@@ -11,11 +11,12 @@ namespace perimap {
 namespace {
 
 // The first thing that is wrong, worst first.
-SurfaceReason reason_of(const PhaseEstimate& phase, bool mapped, bool frame_missing, bool late,
+SurfaceReason reason_of(const PhaseEstimate& phase, bool breath_unknown, bool mapped, bool frame_missing, bool late,
                         bool pose_missing) noexcept {
   if (phase.state == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;
   if (phase.state == PhaseState::kLost) return SurfaceReason::kPhaseLost;
   if (!mapped) return SurfaceReason::kNothingMapped;
+  if (breath_unknown) return SurfaceReason::kRespirationUnknown;
   if (phase.state == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
   if (phase.contradicted) return SurfaceReason::kPhaseContradicted;
   if (frame_missing) return SurfaceReason::kFrameMissing;
@@ -45,6 +46,7 @@ SurfaceComposer::SurfaceComposer(const ComposerSettings& settings) : settings_(s
 }
 
 const SurfaceSample& SurfaceComposer::compose(const Release& release, const CardiacClock& clock,
+                                              const RespiratoryClock& respiration,
                                               std::span<const ShardSnapshot* const> snapshots) noexcept {
   const RealtimeScope realtime;
   ++sample_.sample_sequence;
@@ -73,19 +75,24 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   sample_.cardiac_phase_rate_rad_per_s = phase.rate_rad_per_s;
   const bool late = oldest < release.frame_sequence && !release.frame_missing;
   sample_.update_late = late;
-  sample_.reason = reason_of(phase, !order_.empty(), release.frame_missing, late, pose_missing);
+  const bool breath_unknown = respiration.state == RespirationState::kSearching || respiration.suspected;
+  sample_.reason = reason_of(phase, breath_unknown, !order_.empty(), release.frame_missing, late, pose_missing);
   sample_.state = state_of(sample_.reason);
 
   const bool phase_usable = phase.state == PhaseState::kLocked || phase.state == PhaseState::kFreeRunning;
-  const Basis b = basis_at(settings_.layout, phase.phase_rad);
-  const BasesAbout about = bases_about(settings_.layout, phase);
+  const RespiratoryPhase breath = respiration.at(sample_.valid_time);
+  const Basis b = basis_at(settings_.layout, phase.phase_rad, breath);
+  const BasesAbout about = bases_about(settings_.layout, phase, breath);
+  const Basis b_breath_rate = breath_rate(settings_.layout, breath.phase_rad);
+  const Matrix3d of_breath = breath.deviation_mm * breath.deviation_mm * Matrix3d::Identity();
   const Basis b_rate = basis_rate(settings_.layout, phase.phase_rad);
   sample_.features.clear();
   for (const auto& [snapshot, covered] : order_) {
     SurfaceFeature feature;
     feature.id = snapshot->id;
     feature.p_WF_mm = position_of(snapshot->x, b);
-    feature.velocity_W_mm_per_s = velocity_of(snapshot->x, b_rate, phase.rate_rad_per_s);
+    feature.velocity_W_mm_per_s = velocity_of(snapshot->x, b_rate, phase.rate_rad_per_s) +
+                                  velocity_of(snapshot->x, b_breath_rate, breath.rate_rad_per_s);
     // Where the snapshot was not evaluated at this release (the update is late, or there is no frame), the largest
     // deviation over the cycle bounds the covariance.
     feature.covariance_W_mm2 =
@@ -94,9 +101,14 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
         covered < kReleasesCovered && !release.frame_missing
             ? snapshot->covariances_W_mm2[covered]
             : Matrix3d(Matrix3d::Identity() * snapshot->largest_deviation_mm * snapshot->largest_deviation_mm);
+    feature.covariance_W_mm2 += of_breath;
     feature.last_observed = snapshot->last_observed;
     feature.state = phase_usable ? snapshot->state : FeatureState::kInvalid;
     feature.reason = phase_usable ? snapshot->reason : FeatureReason::kPhaseLost;
+    if (breath_unknown && feature.state == FeatureState::kConverged) {
+      feature.state = FeatureState::kConverging;
+      feature.reason = FeatureReason::kDeviationLarge;
+    }
     if (feature.reason == FeatureReason::kNone && (release.frame_missing || late)) {
       feature.reason = FeatureReason::kNotObserved;
     }

@@ -7,6 +7,7 @@
 
 #include "core/periodic/basis.hpp"
 #include "core/phase/cardiac_clock.hpp"
+#include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/surface_sample.hpp"
 
@@ -26,6 +27,7 @@ class SurfaceComposer {
 
   // `snapshots` in order of shard, none null. The sample stays valid until the next call.
   [[nodiscard]] const SurfaceSample& compose(const Release& release, const CardiacClock& clock,
+                                             const RespiratoryClock& respiration,
                                              std::span<const ShardSnapshot* const> snapshots) noexcept;
 
  private:

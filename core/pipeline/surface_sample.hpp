@@ -21,7 +21,8 @@ enum class SurfaceReason : std::uint8_t {
   kFrameMissing,
   kUpdateLate,
   kPoseMissing,
-  kPhaseContradicted
+  kPhaseContradicted,
+  kRespirationUnknown
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost };

@@ -138,6 +138,19 @@ nlohmann::json counts(const PipelineCounters& c) {
           {"features_started_anew", c.features_started_anew.get()}};
 }
 
+// A line, or nothing where there is nothing to say.
+std::string breath_text(const RespiratoryClock& clock) {
+  switch (clock.state) {
+    case RespirationState::kSearching:
+      return "breathing   not found: positions leave it out\n";
+    case RespirationState::kLocked:
+      return fmt::format("breathing   {:.2f} s a breath\n", to_seconds(clock.period()));
+    case RespirationState::kOff:
+      break;
+  }
+  return clock.suspected ? "breathing   suspected, and positions leave it out: set respiration.enabled = true\n" : "";
+}
+
 int refuse(const Error& error, int code) {
   fmt::print(stderr, "perimap replay: {}\n", error.message);
   return code;
@@ -223,6 +236,7 @@ int replay(const Options& options) {
              stopped ? "stopped early: " : "", counters.frames.get(), counters.samples.get(),
              counters.samples_without_frame.get(), counters.samples_from_late_update.get(),
              counters.frames_without_pose.get(), stage_table(counters, options.lockstep));
+  fmt::print("{}", breath_text(pipeline.status_respiration()));
   if (report) {
     fmt::print("{}\n", to_text(*report));
   } else {
@@ -233,6 +247,9 @@ int replay(const Options& options) {
                            {"lockstep", options.lockstep},
                            {"workers", setup->pipeline.workers},
                            {"counts", counts(counters)}};
+    const RespiratoryClock breath = pipeline.status_respiration();
+    json["breath_s"] = to_seconds(breath.period());
+    json["breath_suspected"] = breath.suspected;
     for (const Stage& stage : stages(counters, options.lockstep)) {
       json["stages"][stage.name] = to_json(stage.histogram->summary());
     }

@@ -54,10 +54,12 @@ std::string configuration_toml(const Simulation& simulation, const TrackerNoise&
       "hand_eye_translation_SC_mm = [{:#}, {:#}, {:#}]\n"
       "hand_eye_rotation_SC_wxyz = [{:#}, {:#}, {:#}, {:#}]\n\n"
       "[phase]\n"
-      "law = \"{}\"\n",
+      "law = \"{}\"\n"
+      "{}",
       noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
       correlation_s > 0.0 ? fmt::format("error_correlation_s = {:#}\n", correlation_s) : "", X_SC.t.x(), X_SC.t.y(),
-      X_SC.t.z(), q[0], q[1], q[2], q[3], law_name(simulation.settings().law));
+      X_SC.t.z(), q[0], q[1], q[2], q[3], law_name(simulation.settings().law),
+      simulation.settings().respiration_mm > 0.0 ? "\n[respiration]\nenabled = true\n" : "");
 }
 
 std::string description(const Simulation& simulation, const TrackerNoise& noise) {

@@ -51,6 +51,15 @@ struct PhaseConfiguration {
   bool operator==(const PhaseConfiguration&) const = default;
 };
 
+struct RespirationConfiguration {
+  bool enabled = false;
+  Duration shortest_period = std::chrono::milliseconds(1500);
+  Duration longest_period = std::chrono::seconds(10);
+  double displacement_deviation_mm = 5.0;  // per axis, reckoned with while the phase is not known
+
+  bool operator==(const RespirationConfiguration&) const = default;
+};
+
 struct PipelineConfiguration {
   enum class Release { kFrame, kClock };
 
@@ -123,6 +132,7 @@ struct Configuration {
   CameraConfiguration camera;
   TrackerConfiguration tracker;
   PhaseConfiguration phase;
+  RespirationConfiguration respiration;
   PipelineConfiguration pipeline;
   FeaturesConfiguration features;
   EstimationConfiguration estimation;

@@ -319,6 +319,13 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
                 "without an R peak for so long the phase is lost")
       .flag("from_image", PERIMAP_MEMBER(phase.from_image),
             "corrects the running cycle by what the features' motion in the image tells");
+  Section("respiration", keys)
+      .flag("enabled", PERIMAP_MEMBER(respiration.enabled),
+            "breathing is part of the motion model; its phase comes from the images")
+      .duration("shortest_period_s", s, 0.5, 60, PERIMAP_MEMBER(respiration.shortest_period), "no breath is shorter")
+      .duration("longest_period_s", s, 0.5, 60, PERIMAP_MEMBER(respiration.longest_period), "no breath is longer")
+      .number("displacement_deviation_mm", 0.1, 100, PERIMAP_MEMBER(respiration.displacement_deviation_mm),
+              "displacement by breathing to reckon with until its phase is known, standard deviation of an axis");
   // No pipeline serves Release::kClock, so a file that asks for it is refused.
   using Release = PipelineConfiguration::Release;
   const std::array<std::pair<std::string_view, Release>, 1> releases{{{"frame", Release::kFrame}}};

@@ -48,6 +48,28 @@ perimap_PhaseClock to_wire(const CardiacClock& clock, Instant now) noexcept {
   return wire;
 }
 
+perimap_RespirationState to_wire(RespirationState state) noexcept {
+  switch (state) {
+    case RespirationState::kSearching:
+      return perimap_RESPIRATION_SEARCHING;
+    case RespirationState::kLocked:
+      return perimap_RESPIRATION_LOCKED;
+    case RespirationState::kOff:
+      break;
+  }
+  return perimap_RESPIRATION_OFF;
+}
+
+perimap_RespiratoryClock to_wire(const RespiratoryClock& clock, Instant now) noexcept {
+  const RespiratoryPhase phase = clock.at(now);
+  perimap_RespiratoryClock wire{};
+  wire.state = to_wire(clock.state);
+  wire.length_ns = clock.period().count();
+  if (phase.known) wire.anchor_time_ns = to_ns(now - from_seconds(phase.phase_rad / phase.rate_rad_per_s));
+  wire.deviation_mm = phase.deviation_mm;
+  return wire;
+}
+
 template <class Message>
 void name(Message& message, const Identity& identity) noexcept {
   copy_text(identity.source, message.source);
@@ -91,7 +113,8 @@ WireModel::WireModel(const Identity& identity) {
 }
 
 const perimap_SurfaceModel& WireModel::fill(std::span<const ShardSnapshot* const> snapshots, const BasisLayout& layout,
-                                            const CardiacClock& clock, Instant now) {
+                                            const CardiacClock& clock, const RespiratoryClock& respiration,
+                                            Instant now) {
   std::vector<const FeatureSnapshot*> order;
   for (const ShardSnapshot* snapshot : snapshots) {
     for (const FeatureSnapshot& feature : snapshot->features) order.push_back(&feature);
@@ -119,6 +142,7 @@ const perimap_SurfaceModel& WireModel::fill(std::span<const ShardSnapshot* const
   wire_.cardiac_harmonics = static_cast<std::uint32_t>(layout.cardiac_harmonics);
   wire_.respiratory_harmonics = static_cast<std::uint32_t>(layout.respiratory_harmonics);
   wire_.cardiac_clock = to_wire(clock, now);
+  wire_.respiratory_clock = to_wire(respiration, now);
   const auto n = static_cast<std::uint32_t>(features_.size());
   wire_.features = {n, n, features_.data(), false};
   return wire_;
@@ -168,6 +192,8 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.features_converged = static_cast<std::uint32_t>(c.features_converged.get());
   wire_.features_inconsistent = static_cast<std::uint32_t>(c.features_inconsistent.get());
   wire_.features_lost = c.features_lost.get();
+  wire_.respiration = to_wire(facts.respiration);
+  wire_.respiration_suspected = facts.respiration_suspected;
   wire_.features_started_anew = c.features_started_anew.get();
 
   sources_[0] = source_status(perimap_SOURCE_CAMERA, facts, now, c.frames_received.get(), c.frames_dropped.get(), 0,

@@ -9,6 +9,7 @@
 
 #include "core/periodic/basis.hpp"
 #include "core/phase/cardiac_clock.hpp"
+#include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "daemon/publishing/identity.hpp"
@@ -22,7 +23,8 @@ class WireModel {
 
   // Valid until the next call. `snapshots` in order of shard.
   [[nodiscard]] const perimap_SurfaceModel& fill(std::span<const ShardSnapshot* const> snapshots,
-                                                 const BasisLayout& layout, const CardiacClock& clock, Instant now);
+                                                 const BasisLayout& layout, const CardiacClock& clock,
+                                                 const RespiratoryClock& respiration, Instant now);
 
  private:
   std::vector<perimap_ModelFeature> features_;
@@ -46,6 +48,8 @@ struct StatusFacts {
   Duration latency{0};
   Duration stalled_after{0};  // a source that is silent for longer counts as stalled
   bool sources_ended = false;
+  RespirationState respiration = RespirationState::kOff;
+  bool respiration_suspected = false;
 };
 
 class WireStatus {

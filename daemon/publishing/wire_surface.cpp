@@ -40,6 +40,8 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_POSE_MISSING;
     case SurfaceReason::kPhaseContradicted:
       return perimap_SURFACE_REASON_PHASE_CONTRADICTED;
+    case SurfaceReason::kRespirationUnknown:
+      return perimap_SURFACE_REASON_RESPIRATION_UNKNOWN;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }

@@ -153,14 +153,18 @@ void LiveRuntime::run_status() {
     const bool last = stopping_.load(std::memory_order_relaxed);
     const Instant now = MonotonicClock::now();
     const CardiacClock clock = pipeline_.status_clock();
+    const RespiratoryClock respiration = pipeline_.status_respiration();
     publication_.phase(wire_phase_.fill(clock, now));
     if (last || now >= next_model) {
-      publication_.surface_model(
-          wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout, clock, now));
+      publication_.surface_model(wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout,
+                                                  clock, respiration, now));
       next_model = now + settings_.model_interval;
     }
     if (last || now >= next_status) {
-      publication_.status(wire_status_.fill(pipeline_.counters(), facts(), now));
+      StatusFacts told = facts();
+      told.respiration = respiration.state;
+      told.respiration_suspected = respiration.suspected;
+      publication_.status(wire_status_.fill(pipeline_.counters(), told, now));
       next_status = now + settings_.status_interval;
     }
     if (on_status_tick_) on_status_tick_();

@@ -97,10 +97,13 @@ void LockstepRuntime::release() {
 void LockstepRuntime::publish_reports(Instant now) {
   const CardiacClock clock = pipeline_.status_clock();
   publication_.phase(wire_phase_.fill(clock, now));
+  const RespiratoryClock respiration = pipeline_.status_respiration();
   publication_.surface_model(
-      wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout, clock, now));
+      wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout, clock, respiration, now));
   StatusFacts facts;
   facts.latency = pipeline_.settings().latency;
+  facts.respiration = respiration.state;
+  facts.respiration_suspected = respiration.suspected;
   facts.stalled_after = std::chrono::milliseconds(500);
   publication_.status(wire_status_.fill(pipeline_.counters(), facts, now));
 }

@@ -67,6 +67,13 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.pose.maximum_extrapolation = c.tracker.maximum_extrapolation;
   s.clock.law.law = c.phase.law;
   s.clock.lost_after = c.phase.lost_after;
+  s.respiration.enabled = c.respiration.enabled;
+  s.respiration.search.shortest_period = c.respiration.shortest_period;
+  s.respiration.search.longest_period = c.respiration.longest_period;
+  s.respiration.displacement_mm = c.respiration.displacement_deviation_mm;
+  // The tracker's noise moves the whole surface too.
+  s.respiration.suspected_rms_mm = std::max(0.5, 2.0 * c.tracker.position_deviation_mm);
+  if (c.respiration.enabled) s.estimator.layout.respiratory_harmonics = kBreathHarmonics;
   s.phase_from_image = c.phase.from_image;
   s.features.maximum = c.features.maximum;
   s.features.detection_interval_frames = c.features.detection_interval_frames;

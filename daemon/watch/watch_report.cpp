@@ -29,9 +29,9 @@ std::string_view name_of(perimap_SurfaceState state) {
 }
 
 std::string_view name_of(perimap_SurfaceReason reason) {
-  return name_in<9>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
-                     "update_late", "pose_missing", "phase_contradicted"},
-                    static_cast<int>(reason));
+  return name_in<10>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
+                      "update_late", "pose_missing", "phase_contradicted", "respiration_unknown"},
+                     static_cast<int>(reason));
 }
 
 std::string_view name_of(perimap_FeatureState state) { return name_in(kFeatureStates, static_cast<int>(state)); }
@@ -45,6 +45,10 @@ std::string_view name_of(perimap_StageKind kind) {
   return name_in<7>({"predict_and_find", "phase_and_pose", "evaluate", "learn", "capture_to_update",
                      "release_tardiness", "dds_write"},
                     static_cast<int>(kind));
+}
+
+std::string_view name_of(perimap_RespirationState state) {
+  return name_in<3>({"off", "searching", "locked"}, static_cast<int>(state));
 }
 
 std::string_view name_of(perimap_Privilege privilege) {
@@ -102,6 +106,8 @@ Json status_json(const StatusDigest& digest) {
                {"frames_without_pose", status.frames_without_pose},
                {"frames_without_phase", status.frames_without_phase},
                {"phases_from_image", status.phases_from_image},
+               {"respiration", name_of(status.respiration)},
+               {"respiration_suspected", status.respiration_suspected},
                {"samples", status.samples},
                {"samples_without_frame", status.samples_without_frame},
                {"samples_from_late_update", status.samples_from_late_update},

@@ -56,13 +56,15 @@ struct Stages : ::testing::Test {
     const auto n = static_cast<int>(history->count());
     const Instant capture(milliseconds(5000 + 33 * n));
     beat_until(5000 + 33 * n + beats_known_ahead_ms);
-    history->refresh_phases(clock.clock());
+    history->refresh_phases(clock.clock(), RespiratoryClock{});
     FrameRecord& frame = history->append({static_cast<std::uint64_t>(n), capture, capture + milliseconds(12)});
-    frame.pose.state = CameraPose::State::kInterpolated;
-    frame.pose.position_variance_mm2 = pose_variance_mm2;
-    history->set_phase(frame, clock.clock());
+    CameraPose pose;
+    pose.state = CameraPose::State::kInterpolated;
+    pose.position_variance_mm2 = pose_variance_mm2;
+    FrameHistory::set_pose(frame, pose);
+    history->set_phase(frame, clock.clock(), RespiratoryClock{});
     job.frame = current = &frame;
-    job.about_capture = bases_about(settings.estimator.layout, frame.phase);
+    job.about_capture = bases_about(settings.estimator.layout, frame.phase, frame.respiration);
     job.history = history.get();
     for (ReleaseBasis& release : job.releases) release.b = basis_at(settings.estimator.layout, 1.0);
     for (FeatureSlot& s : slots) s.match = PatchMatch{};
@@ -238,7 +240,7 @@ TEST_F(Stages, AMatchWhoseFrameLostItsPhaseIsNotLearnt) {
   // No beat for ten seconds, then beats again: the frame lay in a gap that was no cycle.
   next_beat_ms = 15'000;
   beat_until(18'000);
-  history->refresh_phases(clock.clock());
+  history->refresh_phases(clock.clock(), RespiratoryClock{});
   ASSERT_FALSE(lost->measurable);
   next_frame();
   ASSERT_EQ(learn_frame(), LifeEvent::kNone);

@@ -61,7 +61,7 @@ struct Surface : ::testing::Test {
     frame.b = basis_at(settings.layout, kPhase);
     frame.b_rate = basis_rate(settings.layout, kPhase);
     job.frame = &frame;
-    job.about_capture = bases_about(settings.layout, frame.phase);
+    job.about_capture = bases_about(settings.layout, frame.phase, frame.respiration);
     job.history = &history;
     for (ReleaseBasis& release : job.releases) release.b = frame.b;
     for (FeatureGroup& group : groups) group.sweep(job);
@@ -83,7 +83,9 @@ struct Surface : ::testing::Test {
   }
 
   ImagePhaseOutcome observe(ObservedPhase& observed) {
-    return image_phase.observe(groups, *job.frame, model, settings, observed);
+    const ImagePhaseAnswer answer = image_phase.observe(groups, *job.frame, model, settings).cardiac;
+    observed = answer.observed;
+    return answer.outcome;
   }
 };
 
@@ -104,7 +106,9 @@ TEST_F(Surface, APoseThatIsWrongByAsMuchAsTheTrackerMayBeIsNotTakenForPhase) {
   frame.pose.position_variance_mm2 = 1.4 * 1.4 / 3.0;
   see(0.0, Vector3d(-1.0, 0.4, 0.0));
   ObservedPhase observed;
-  ASSERT_EQ(image_phase.observe(groups, frame, model, settings, observed), ImagePhaseOutcome::kObserved);
+  const ImagePhaseAnswer answer = image_phase.observe(groups, frame, model, settings).cardiac;
+  ASSERT_EQ(answer.outcome, ImagePhaseOutcome::kObserved);
+  observed = answer.observed;
   const double error_s = (observed.phase_rad - kPhase) / kRate;
   EXPECT_LT(std::abs(error_s), 4.0 * observed.deviation_rad / kRate);
   EXPECT_GT(observed.deviation_rad / kRate, 0.003) << "motion along the axis is all that tells them apart";

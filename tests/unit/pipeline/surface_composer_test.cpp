@@ -54,12 +54,57 @@ ComposerSettings settings() {
 
 constexpr Release kRelease{100, Instant(milliseconds(9150)), Instant(milliseconds(9200)), false};
 
+TEST(SurfaceComposer, BreathingIsPartOfPositionVelocityAndCovariance) {
+  ComposerSettings with_breath = settings();
+  with_breath.layout.respiratory_harmonics = 1;
+  SurfaceComposer composer(with_breath);
+  FeatureSnapshot breathing = feature(1, 0.0);
+  breathing.x = StateVector::Zero(3 * with_breath.layout.size());
+  breathing.x(0) = 10.0;
+  breathing.x(1 + 2 * kHarmonics) = 5.0;  // a_1 of x
+  const ShardSnapshot snapshot = shard(100, {breathing});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  RespiratoryClock clock;
+  clock.state = RespirationState::kLocked;
+  clock.time = kRelease.deadline - milliseconds(500);
+  clock.phase_rad = 0.2;
+  clock.rate_rad_per_s = 1.5;
+  clock.phase_variance_rad2 = 0.01;
+  clock.slope_mm_per_rad = 2.0;
+  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), clock, view);
+  const double psi = 0.2 + 1.5 * 0.5;
+  ASSERT_EQ(sample.features.size(), 1U);
+  EXPECT_EQ(sample.state, SurfaceState::kGood);
+  EXPECT_NEAR(sample.features[0].p_WF_mm.x(), 10.0 + 5.0 * std::cos(psi), 1e-9);
+  EXPECT_NEAR(sample.features[0].velocity_W_mm_per_s.x(), -5.0 * std::sin(psi) * 1.5, 1e-9);
+  EXPECT_NEAR(sample.features[0].covariance_W_mm2(1, 1), 0.04 + 0.2 * 0.2, 1e-9);
+}
+
+TEST(SurfaceComposer, WhileTheBreathIsNotKnownNothingIsCalledGood) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  RespiratoryClock searching;
+  searching.state = RespirationState::kSearching;
+  RespiratoryClock suspected;
+  suspected.suspected = true;
+  for (RespiratoryClock clock : {searching, suspected}) {
+    clock.unknown_displacement_mm = 5.0;
+    const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), clock, view);
+    EXPECT_EQ(sample.state, SurfaceState::kDegraded);
+    EXPECT_EQ(sample.reason, SurfaceReason::kRespirationUnknown);
+    ASSERT_EQ(sample.features.size(), 1U);
+    EXPECT_EQ(sample.features[0].state, FeatureState::kConverging);
+    EXPECT_GT(sample.features[0].covariance_W_mm2(2, 2), 25.0);
+  }
+}
+
 TEST(SurfaceComposer, EvaluatesPositionAndVelocityAtTheValidTimesPhase) {
   SurfaceComposer composer(settings());
   const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
   const CardiacClock clock = steady_clock();
-  const SurfaceSample& sample = composer.compose(kRelease, clock, view);
+  const SurfaceSample& sample = composer.compose(kRelease, clock, RespiratoryClock{}, view);
   // 200 ms after the R peak of a cycle of 800 ms: a quarter of it, where the cosine is zero and falls fastest.
   ASSERT_EQ(sample.features.size(), 1U);
   EXPECT_NEAR(sample.features[0].p_WF_mm.x(), 10.0, 0.2);
@@ -73,7 +118,7 @@ TEST(SurfaceComposer, AddsWhatThePhaseDeviationMakesOfTheMotion) {
   const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
   const CardiacClock clock = steady_clock();
-  const SurfaceSample& sample = composer.compose(kRelease, clock, view);
+  const SurfaceSample& sample = composer.compose(kRelease, clock, RespiratoryClock{}, view);
   const double deviation_s = clock.at(kRelease.deadline).deviation_s;
   const double v = sample.features[0].velocity_W_mm_per_s.x();
   EXPECT_NEAR(sample.features[0].covariance_W_mm2(0, 0), 0.04 + v * v * deviation_s * deviation_s,
@@ -91,7 +136,8 @@ TEST(SurfaceComposer, APhaseThatTheImagesContradictDegradesTheSurface) {
   correction.begin = at_ms(9000);
   correction.length = milliseconds(800);
   correction.contradicted = true;
-  const SurfaceSample& sample = composer.compose(kRelease, steady_clock().corrected(correction), view);
+  const SurfaceSample& sample =
+      composer.compose(kRelease, steady_clock().corrected(correction), RespiratoryClock{}, view);
   EXPECT_EQ(sample.state, SurfaceState::kDegraded);
   EXPECT_EQ(sample.reason, SurfaceReason::kPhaseContradicted);
 }
@@ -107,7 +153,8 @@ TEST(SurfaceComposer, ALargePhaseDeviationIsFeltWhereTheMotionTurns) {
   correction.begin = at_ms(9000);
   correction.begin_deviation = milliseconds(160);
   correction.length = milliseconds(800);
-  const SurfaceSample& sample = composer.compose(at_peak, steady_clock().corrected(correction), view);
+  const SurfaceSample& sample =
+      composer.compose(at_peak, steady_clock().corrected(correction), RespiratoryClock{}, view);
   EXPECT_EQ(sample.state, SurfaceState::kGood);
   EXPECT_NEAR(sample.features[0].velocity_W_mm_per_s.x(), 0.0, 0.5);
   EXPECT_GT(sample.features[0].covariance_W_mm2(0, 0), 5.0);
@@ -118,7 +165,7 @@ TEST(SurfaceComposer, OrdersFeaturesOfAllShardsById) {
   const ShardSnapshot a = shard(100, {feature(5, 1.0), feature(2, 1.0)});
   const ShardSnapshot b = shard(100, {feature(3, 1.0)});
   const std::array<const ShardSnapshot*, 2> view = {&a, &b};
-  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), view);
+  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view);
   ASSERT_EQ(sample.features.size(), 3U);
   EXPECT_EQ(sample.features[0].id, 2U);
   EXPECT_EQ(sample.features[1].id, 3U);
@@ -130,7 +177,7 @@ TEST(SurfaceComposer, NamesTheOldestShardAndSaysThatTheUpdateIsLate) {
   const ShardSnapshot a = shard(100, {feature(1, 1.0)});
   const ShardSnapshot b = shard(98, {feature(2, 1.0)});
   const std::array<const ShardSnapshot*, 2> view = {&a, &b};
-  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), view);
+  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view);
   EXPECT_EQ(sample.oldest_shard_frame_sequence, 98U);
   EXPECT_EQ(sample.state, SurfaceState::kDegraded);
   EXPECT_EQ(sample.reason, SurfaceReason::kUpdateLate);
@@ -143,23 +190,23 @@ TEST(SurfaceComposer, SaysThatTheFrameOrThePoseIsMissing) {
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
   Release missing = kRelease;
   missing.frame_missing = true;
-  EXPECT_EQ(composer.compose(missing, steady_clock(), view).reason, SurfaceReason::kFrameMissing);
+  EXPECT_EQ(composer.compose(missing, steady_clock(), RespiratoryClock{}, view).reason, SurfaceReason::kFrameMissing);
   snapshot.frame_sequence = 100;
   snapshot.pose_missing = true;
-  EXPECT_EQ(composer.compose(kRelease, steady_clock(), view).reason, SurfaceReason::kPoseMissing);
+  EXPECT_EQ(composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view).reason, SurfaceReason::kPoseMissing);
 }
 
 TEST(SurfaceComposer, MarksEveryPositionInvalidWhenThePhaseIsUnknownOrLost) {
   SurfaceComposer composer(settings());
   const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
-  const SurfaceSample& unknown = composer.compose(kRelease, CardiacClock{}, view);
+  const SurfaceSample& unknown = composer.compose(kRelease, CardiacClock{}, RespiratoryClock{}, view);
   EXPECT_EQ(unknown.state, SurfaceState::kInvalid);
   EXPECT_EQ(unknown.reason, SurfaceReason::kPhaseUnknown);
   EXPECT_EQ(unknown.features[0].state, FeatureState::kInvalid);
   Release late = kRelease;
   late.deadline = at_ms(30'000);
-  const SurfaceSample& lost = composer.compose(late, steady_clock(), view);
+  const SurfaceSample& lost = composer.compose(late, steady_clock(), RespiratoryClock{}, view);
   EXPECT_EQ(lost.reason, SurfaceReason::kPhaseLost);
   EXPECT_EQ(lost.state, SurfaceState::kInvalid);
   EXPECT_EQ(lost.features[0].state, FeatureState::kInvalid);
@@ -170,7 +217,7 @@ TEST(SurfaceComposer, SaysThatNothingIsMappedYet) {
   SurfaceComposer composer(settings());
   const ShardSnapshot snapshot = shard(100, {});
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
-  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), view);
+  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view);
   EXPECT_EQ(sample.state, SurfaceState::kInvalid);
   EXPECT_EQ(sample.reason, SurfaceReason::kNothingMapped);
 }
@@ -180,7 +227,7 @@ TEST(SurfaceComposer, CountsSamplesWithoutGaps) {
   const ShardSnapshot snapshot = shard(100, {});
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
   for (std::uint64_t i = 1; i <= 5; ++i) {
-    EXPECT_EQ(composer.compose(kRelease, steady_clock(), view).sample_sequence, i);
+    EXPECT_EQ(composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view).sample_sequence, i);
   }
 }
 

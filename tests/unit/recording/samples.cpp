@@ -129,6 +129,13 @@ void fill(Filler& next, perimap_PhaseClock& s) {
   next(s.systole_fraction);
 }
 
+void fill(Filler& next, perimap_RespiratoryClock& s) {
+  next(s.state);
+  next(s.anchor_time_ns);
+  next(s.length_ns);
+  next(s.deviation_mm);
+}
+
 void fill(Filler& next, perimap_ModelFeature& s) {
   next(s.id);
   next(s.state);
@@ -149,6 +156,7 @@ void fill(Filler& next, perimap_SurfaceModel& s) {
   next(s.respiratory_harmonics);
   fill(next, s.cardiac_clock);
   next.sequence(s.features, 2, [&](auto& feature) { fill(next, feature); });
+  fill(next, s.respiratory_clock);
 }
 
 void fill(Filler& next, perimap_Phase& s) {
@@ -213,6 +221,8 @@ void fill(Filler& next, perimap_Status& s) {
   next.sequence(s.stages, 2, [&](auto& stage) { fill(next, stage); });
   next(s.features_started_anew);
   next(s.phases_from_image);
+  next(s.respiration);
+  next(s.respiration_suspected);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -344,6 +354,10 @@ json to_json(const perimap_PhaseClock& s) {
           MEMBER(systole_ns),     MEMBER(systole_fraction)};
 }
 template <>
+json to_json(const perimap_RespiratoryClock& s) {
+  return {MEMBER(state), MEMBER(anchor_time_ns), MEMBER(length_ns), MEMBER(deviation_mm)};
+}
+template <>
 json to_json(const perimap_ModelFeature& s) {
   return {MEMBER(id),
           MEMBER(state),
@@ -363,7 +377,8 @@ json to_json(const perimap_SurfaceModel& s) {
           MEMBER(cardiac_harmonics),
           MEMBER(respiratory_harmonics),
           MEMBER(cardiac_clock),
-          MEMBER(features)};
+          MEMBER(features),
+          MEMBER(respiratory_clock)};
 }
 template <>
 json to_json(const perimap_Phase& s) {
@@ -418,7 +433,9 @@ json to_json(const perimap_Status& s) {
           MEMBER(sources),
           MEMBER(stages),
           MEMBER(features_started_anew),
-          MEMBER(phases_from_image)};
+          MEMBER(phases_from_image),
+          MEMBER(respiration),
+          MEMBER(respiration_suspected)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {

@@ -1,0 +1,200 @@
+#include "core/phase/respiration_search.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace perimap {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr int kBreathColumns = 2 * kBreathHarmonics;  // cosines, -sines
+// Neighbouring tenths of a second err alike (the map is the same), so they count for less than as many independent
+// ones.
+constexpr double kErrorsInCommon = 5.0;
+// A fit of a longer period holds the shorter one as its second harmonic: the shorter wins unless this much better.
+constexpr double kClearlyBetter = 0.8;
+constexpr int kRefinements = 24;
+// Slower candidates than may be found are tried too, so that what is found is no slower one's nearest neighbour.
+constexpr double kLeastBreaths = 1.5;
+
+}  // namespace
+
+Vector3d BreathWave::at(double phase_rad) const noexcept {
+  Vector3d p = Vector3d::Zero();
+  for (int k = 0; k < kBreathHarmonics; ++k) {
+    p += std::cos((k + 1) * phase_rad) * a[k] - std::sin((k + 1) * phase_rad) * b[k];
+  }
+  return p;
+}
+
+Vector3d BreathWave::slope_at(double phase_rad) const noexcept {
+  Vector3d slope = Vector3d::Zero();
+  for (int k = 0; k < kBreathHarmonics; ++k) {
+    slope -= (k + 1) * (std::sin((k + 1) * phase_rad) * a[k] + std::cos((k + 1) * phase_rad) * b[k]);
+  }
+  return slope;
+}
+
+double BreathWave::slope_mm_per_rad() const noexcept {
+  double square = 0.0;
+  for (int k = 0; k < kBreathHarmonics; ++k) {
+    square += 0.5 * (k + 1) * (k + 1) * (a[k].squaredNorm() + b[k].squaredNorm());
+  }
+  return std::sqrt(square);
+}
+
+double BreathWave::rms_mm() const noexcept {
+  double square = 0.0;
+  for (int k = 0; k < kBreathHarmonics; ++k) square += 0.5 * (a[k].squaredNorm() + b[k].squaredNorm());
+  return std::sqrt(square);
+}
+
+BreathWave BreathWave::shifted(double phase_rad) const noexcept {
+  BreathWave wave;
+  for (int k = 0; k < kBreathHarmonics; ++k) {
+    const double c = std::cos((k + 1) * phase_rad);
+    const double s = std::sin((k + 1) * phase_rad);
+    wave.a[k] = c * a[k] - s * b[k];
+    wave.b[k] = s * a[k] + c * b[k];
+  }
+  return wave;
+}
+
+double alignment(const BreathWave& wave, const BreathWave& other) noexcept {
+  const auto likeness = [&](double phase_rad) {
+    const BreathWave turned = wave.shifted(phase_rad);
+    double sum = 0.0;
+    for (int k = 0; k < kBreathHarmonics; ++k) sum += turned.a[k].dot(other.a[k]) + turned.b[k].dot(other.b[k]);
+    return sum;
+  };
+  constexpr int kSteps = 64;
+  double best = 0.0;
+  for (int i = 1; i < kSteps; ++i) {
+    if (likeness(kTwoPi * i / kSteps) > likeness(best)) best = kTwoPi * i / kSteps;
+  }
+  double step = kTwoPi / kSteps;
+  for (int i = 0; i < kRefinements; ++i, step *= 0.6) {
+    if (likeness(best + step) > likeness(best)) best += step;
+    if (likeness(best - step) > likeness(best)) best -= step;
+  }
+  return best;
+}
+
+void RespirationSearch::add(Instant t, const Vector3d& displacement_mm, double cardiac_phase_rad) noexcept {
+  if (count_ == 0 || t - bin(count_ - 1).begin >= kBin) {
+    bins_[static_cast<std::size_t>(count_ % kBins)] = Bin{.begin = t};
+    ++count_;
+  }
+  Bin& newest = bins_[static_cast<std::size_t>((count_ - 1) % kBins)];
+  newest.time_sum_s += to_seconds(t - newest.begin);
+  newest.sum_mm += displacement_mm;
+  for (int k = 0; k < kCardiacHarmonics; ++k) {
+    newest.cardiac_sum[static_cast<std::size_t>(2 * k)] += std::cos((k + 1) * cardiac_phase_rad);
+    newest.cardiac_sum[static_cast<std::size_t>(2 * k + 1)] += std::sin((k + 1) * cardiac_phase_rad);
+  }
+  ++newest.count;
+}
+
+struct RespirationSearch::Fit {
+  static constexpr int kColumns = kOther + kBreathColumns;
+  double residual = 0.0;  // sum of squares, mm^2
+  double without = 0.0;   // the same without breathing
+  int count = 0;
+  Eigen::Matrix<double, kColumns, 3> coefficients = Eigen::Matrix<double, kColumns, 3>::Zero();
+};
+
+RespirationSearch::Fit RespirationSearch::fit(double rate_rad_per_s) const noexcept {
+  constexpr int kColumns = Fit::kColumns;
+  const std::uint64_t oldest = count_ > kBins ? count_ - kBins : 0;
+  const Instant reference = bin(count_ - 1).begin;
+  const double span_s = to_seconds(reference - bin(oldest).begin);
+  Eigen::Matrix<double, kColumns, kColumns> A = Eigen::Matrix<double, kColumns, kColumns>::Zero();
+  Eigen::Matrix<double, kColumns, 3> B = Eigen::Matrix<double, kColumns, 3>::Zero();
+  double square = 0.0;
+  Fit result;
+  for (std::uint64_t i = oldest; i < count_; ++i) {
+    const Bin& at = bin(i);
+    const double n = at.count;
+    const double t_s = to_seconds(at.begin - reference) + at.time_sum_s / n;
+    const Vector3d y = at.sum_mm / n;
+    Eigen::Matrix<double, kColumns, 1> row;
+    row(0) = 1.0;
+    row(1) = t_s / span_s;
+    for (std::size_t k = 0; k < at.cardiac_sum.size(); ++k) row(2 + static_cast<int>(k)) = at.cardiac_sum[k] / n;
+    const double c = std::cos(rate_rad_per_s * t_s);
+    const double s = std::sin(rate_rad_per_s * t_s);
+    row(kOther) = c;
+    row(kOther + 1) = c * c - s * s;
+    row(kOther + 2) = -s;
+    row(kOther + 3) = -2.0 * s * c;
+    A.noalias() += row * row.transpose();
+    B.noalias() += row * y.transpose();
+    square += y.squaredNorm();
+    ++result.count;
+  }
+  const Eigen::Matrix<double, kOther, kOther> A_0 = A.topLeftCorner<kOther, kOther>();
+  const Eigen::Matrix<double, kOther, 3> B_0 = B.topRows<kOther>();
+  result.without = square - A_0.ldlt().solve(B_0).cwiseProduct(B_0).sum();
+  result.coefficients = A.ldlt().solve(B);
+  result.residual = std::max(0.0, square - result.coefficients.cwiseProduct(B).sum());
+  return result;
+}
+
+bool RespirationSearch::find(FoundBreath& found) const noexcept {
+  const std::uint64_t oldest = count_ > kBins ? count_ - kBins : 0;
+  if (count_ - oldest < 4 * Fit::kColumns) return false;
+  const Instant newest = bin(count_ - 1).begin;
+  const double span_s = to_seconds(newest - bin(oldest).begin);
+  const double longest_s = std::min(to_seconds(settings_.longest_period), span_s / kLeastBreaths);
+  const double fastest = kTwoPi / to_seconds(settings_.shortest_period);
+  const double slowest = kTwoPi / longest_s;
+  if (!(slowest < fastest)) return false;
+
+  const double step = kTwoPi / (6.0 * span_s);
+  double best = fastest;
+  double best_residual = fit(fastest).residual;
+  for (double rate = fastest - step; rate >= slowest; rate -= step) {
+    const double residual = fit(rate).residual;
+    // Against the neighbouring rates the least counts; against a faster one that is already good, a clear gain does.
+    const bool near = best - rate < 2.5 * step;
+    if (residual < (near ? 1.0 : kClearlyBetter) * best_residual) {
+      best = rate;
+      best_residual = residual;
+    }
+  }
+  double width = 0.5 * step;
+  for (int i = 0; i < kRefinements && width > 1e-6; ++i, width *= 0.6) {
+    for (const double rate : {best - width, best + width}) {
+      const double residual = fit(rate).residual;
+      if (residual < best_residual) {
+        best = rate;
+        best_residual = residual;
+      }
+    }
+  }
+  if (kTwoPi / best * settings_.breaths > span_s) return false;
+  const Fit fitted = fit(best);
+  found.time = newest;
+  found.rate_rad_per_s = best;
+  found.explained = fitted.without > 0.0 ? 1.0 - fitted.residual / fitted.without : 0.0;
+  for (int k = 0; k < kBreathHarmonics; ++k) {
+    found.wave.a[k] = fitted.coefficients.row(kOther + k).transpose();
+    found.wave.b[k] = fitted.coefficients.row(kOther + kBreathHarmonics + k).transpose();
+  }
+  if (!(found.explained >= settings_.explained) || !(found.wave.rms_mm() >= settings_.least_rms_mm)) return false;
+  // Cramer-Rao for phase and frequency of a known wave in white noise (Rife & Boorstyn, IEEE Trans. IT 20, 1974), taken
+  // to the newest instant.
+  const double slope = found.wave.slope_mm_per_rad();
+  const double variance_mm2 = fitted.residual / (3.0 * std::max(1, fitted.count - Fit::kColumns));
+  const double centre = kErrorsInCommon * variance_mm2 / (fitted.count * slope * slope);
+  found.rate_variance_rad2_per_s2 = 12.0 * centre / (span_s * span_s);
+  found.covariance_rad2_per_s = 0.5 * span_s * found.rate_variance_rad2_per_s2;
+  found.phase_variance_rad2 = centre + 0.25 * span_s * span_s * found.rate_variance_rad2_per_s2;
+  return std::sqrt(found.phase_variance_rad2) <= settings_.phase_deviation_rad;
+}
+
+}  // namespace perimap

@@ -1,0 +1,130 @@
+#include "core/phase/respiratory_tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace perimap {
+namespace {
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+// Random walks, per second: phase 0.02 rad (0.3 % of a breath), rate 0.003 rad/s.
+constexpr double kPhaseWalk_rad2_per_s = 0.02 * 0.02;
+constexpr double kRateWalk_rad2_per_s3 = 0.003 * 0.003;
+// Of a displacement that a map tells that is not good yet.
+constexpr double kDisplacementDeviation_mm = 2.0;
+constexpr double kGate = 13.8;  // chi-squared, 1 degree: 99.98 %
+// Shares of the displacement that breathing explains.
+constexpr double kSuspected = 0.2;
+constexpr double kConfirmed = 0.5;
+constexpr Duration kSuspicionLasts = std::chrono::seconds(15);
+constexpr Duration kContradictedBeforeSearch = std::chrono::milliseconds(1500);
+constexpr Duration kSilentBeforeSearch = std::chrono::seconds(15);
+
+}  // namespace
+
+RespiratoryTracker::RespiratoryTracker(const RespirationSettings& settings) noexcept
+    : settings_(settings), search_(settings.search) {
+  clock_.state = settings.enabled ? RespirationState::kSearching : RespirationState::kOff;
+  clock_.unknown_displacement_mm = settings.displacement_mm;
+}
+
+void RespiratoryTracker::add_displacement(Instant t, const Eigen::Vector3d& displacement_mm,
+                                          double cardiac_phase_rad) noexcept {
+  if (!displacement_mm.allFinite()) return;
+  if (clock_.state != RespirationState::kLocked) {
+    search_.add(t, displacement_mm, cardiac_phase_rad);
+    return;
+  }
+  // Where the surface is displaced along the wave, the phase is.
+  const double phase_rad = clock_.at(t).phase_rad;
+  const Eigen::Vector3d slope = wave_.slope_at(phase_rad);
+  const double square = slope.squaredNorm();
+  if (!(square > 0.0)) return;
+  add_phase(t, phase_rad + std::clamp(displacement_mm.dot(slope) / square, -1.0, 1.0),
+            kDisplacementDeviation_mm / std::sqrt(square));
+}
+
+void RespiratoryTracker::search(Instant now) noexcept {
+  if (clock_.state == RespirationState::kLocked) {
+    if (now - last_told_ > kSilentBeforeSearch) lose();
+    return;
+  }
+  FoundBreath found;
+  const bool there = search_.find(found);
+  if (clock_.state == RespirationState::kOff) {
+    suspect(found, now);
+    return;
+  }
+  if (!there) return;
+  // The coefficients that the map has learnt count from where the phase was zero then.
+  const double turn_rad = locks_ > 0 ? alignment(found.wave, wave_) : 0.0;
+  wave_ = found.wave.shifted(turn_rad);
+  clock_.state = RespirationState::kLocked;
+  clock_.time = found.time;
+  clock_.phase_rad = -turn_rad;
+  clock_.rate_rad_per_s = found.rate_rad_per_s;
+  clock_.phase_variance_rad2 = found.phase_variance_rad2;
+  clock_.covariance_rad2_per_s = found.covariance_rad2_per_s;
+  clock_.rate_variance_rad2_per_s2 = found.rate_variance_rad2_per_s2;
+  clock_.slope_mm_per_rad = wave_.slope_mm_per_rad() / std::numbers::sqrt3;
+  last_agreed_ = last_told_ = now;
+  ++locks_;
+  search_.clear();
+}
+
+// A map without breathing follows it in part, which leaves a weak trace of it. That is enough to reckon with its
+// displacement; the map then stands still, and breathing shows clearly or not at all.
+void RespiratoryTracker::suspect(const FoundBreath& found, Instant now) noexcept {
+  const bool large = found.wave.rms_mm() >= settings_.suspected_rms_mm;
+  if (large && found.explained >= (clock_.suspected ? kConfirmed : kSuspected)) {
+    clock_.suspected = true;
+    last_agreed_ = now;
+  }
+  if (now - last_agreed_ > kSuspicionLasts) clock_.suspected = false;
+}
+
+void RespiratoryTracker::predict(Instant t) noexcept {
+  const double dt = to_seconds(t - clock_.time);
+  if (!(dt > 0.0)) return;
+  clock_.time = t;
+  clock_.phase_rad = std::remainder(clock_.phase_rad + clock_.rate_rad_per_s * dt, kTwoPi);
+  clock_.phase_variance_rad2 +=
+      dt * (2.0 * clock_.covariance_rad2_per_s + dt * clock_.rate_variance_rad2_per_s2) + dt * kPhaseWalk_rad2_per_s;
+  clock_.covariance_rad2_per_s += dt * clock_.rate_variance_rad2_per_s2;
+  clock_.rate_variance_rad2_per_s2 += dt * kRateWalk_rad2_per_s3;
+}
+
+void RespiratoryTracker::add_phase(Instant t, double phase_rad, double deviation_rad) noexcept {
+  if (clock_.state != RespirationState::kLocked) return;
+  predict(t);
+  last_told_ = t;
+  const double innovation = std::remainder(phase_rad - clock_.phase_rad, kTwoPi);
+  const double variance = clock_.phase_variance_rad2 + deviation_rad * deviation_rad;
+  if (innovation * innovation > kGate * variance) {
+    add_contradiction(t);
+    return;
+  }
+  last_agreed_ = t;
+  const double K_phase = clock_.phase_variance_rad2 / variance;
+  const double K_rate = clock_.covariance_rad2_per_s / variance;
+  clock_.phase_rad += K_phase * innovation;
+  clock_.rate_rad_per_s += K_rate * innovation;
+  clock_.rate_variance_rad2_per_s2 -= K_rate * clock_.covariance_rad2_per_s;
+  clock_.covariance_rad2_per_s *= 1.0 - K_phase;
+  clock_.phase_variance_rad2 *= 1.0 - K_phase;
+  const double fastest = kTwoPi / to_seconds(settings_.search.shortest_period);
+  const double slowest = kTwoPi / to_seconds(settings_.search.longest_period);
+  if (!(clock_.rate_rad_per_s < 1.5 * fastest && clock_.rate_rad_per_s > slowest / 1.5)) lose();
+}
+
+void RespiratoryTracker::add_contradiction(Instant t) noexcept {
+  if (clock_.state == RespirationState::kLocked && t - last_agreed_ > kContradictedBeforeSearch) lose();
+}
+
+void RespiratoryTracker::lose() noexcept {
+  clock_.state = RespirationState::kSearching;
+  search_.clear();
+}
+
+}  // namespace perimap

@@ -1,0 +1,56 @@
+// Keeps the respiratory clock: searches for breathing in the images' common displacement, then follows its phase.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/phase/respiration_search.hpp"
+#include "core/phase/respiratory_clock.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+struct RespirationSettings {
+  bool enabled = false;
+  RespirationSearchSettings search;
+  double displacement_mm = 5.0;   // standard deviation per axis that is reckoned with while the phase is not known
+  double suspected_rms_mm = 0.5;  // least displacement that is suspected to be breathing where it is off
+};
+
+// Once locked, the clock is a Kalman filter of phase and rate. Both may wander: a ventilator's rate hardly does, a
+// patient's own breath by some percent. When the images contradict it for kContradictedBeforeSearch, or tell nothing
+// for kSilentBeforeSearch, the search begins again; the phase found then is counted as before, by the wave's shape.
+class RespiratoryTracker {
+ public:
+  explicit RespiratoryTracker(const RespirationSettings& settings) noexcept;
+
+  // The common displacement of the surface, mm, frame W, from where the map has it: without breathing while the clock
+  // is not locked, with it when it is. In order of time; the cardiac phase is that of the same instant.
+  void add_displacement(Instant t, const Eigen::Vector3d& displacement_mm, double cardiac_phase_rad) noexcept;
+  // The phase that a frame showed, for a locked clock. In order of time.
+  void add_phase(Instant t, double phase_rad, double deviation_rad) noexcept;
+  // A frame that showed no phase near the predicted one.
+  void add_contradiction(Instant t) noexcept;
+
+  // Looks for breathing in what was added; takes some milliseconds.
+  void search(Instant now) noexcept;
+
+  [[nodiscard]] const RespiratoryClock& clock() const noexcept { return clock_; }
+  // Of the lock: the common displacement in the clock's phase.
+  [[nodiscard]] const BreathWave& wave() const noexcept { return wave_; }
+  [[nodiscard]] int locks() const noexcept { return locks_; }
+
+ private:
+  void predict(Instant t) noexcept;
+  void suspect(const FoundBreath& found, Instant now) noexcept;
+  void lose() noexcept;
+
+  RespirationSettings settings_;
+  RespirationSearch search_;
+  RespiratoryClock clock_;
+  BreathWave wave_;
+  Instant last_agreed_;
+  Instant last_told_;
+  int locks_ = 0;
+};
+
+}  // namespace perimap

@@ -1,0 +1,186 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "core/phase/respiration_search.hpp"
+#include "core/phase/respiratory_tracker.hpp"
+
+namespace perimap {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+
+Instant at_s(double seconds) { return Instant(from_seconds(seconds)); }
+
+// Breathing of 10 mm, at rest most of the time (sin^4), with a map's errors: white, a drift, and one in each heart
+// beat.
+struct Patient {
+  double period_s = 4.0;
+  double begin_s = 0.3;
+  double amplitude_mm = 10.0;
+  double noise_mm = 0.8;
+  std::mt19937 generator{4};
+  std::normal_distribution<double> normal{};
+
+  [[nodiscard]] double breath(double t_s) const {
+    const double sine = std::sin(std::numbers::pi * (t_s - begin_s) / period_s);
+    return amplitude_mm * sine * sine * sine * sine;
+  }
+  [[nodiscard]] static double cardiac_rad(double t_s) { return std::fmod(kTwoPi * t_s / 0.83, kTwoPi); }
+
+  Vector3d displacement(double t_s) {
+    const Vector3d noise(normal(generator), normal(generator), normal(generator));
+    return breath(t_s) * Vector3d(0.1, -0.35, -0.93) + noise_mm * noise + Vector3d(0.5, 0.02 * t_s, 0.0) +
+           2.0 * std::cos(cardiac_rad(t_s)) * Vector3d(1.0, 0.0, 0.0);
+  }
+};
+
+template <class Searching>
+void watch(Searching& searching, Patient& patient, double from_s, double to_s) {
+  for (double t = from_s; t < to_s; t += 1.0 / 30.0) {
+    if constexpr (requires { searching.add(at_s(t), Vector3d(), 0.0); }) {
+      searching.add(at_s(t), patient.displacement(t), Patient::cardiac_rad(t));
+    } else {
+      searching.add_displacement(at_s(t), patient.displacement(t), Patient::cardiac_rad(t));
+    }
+  }
+}
+
+TEST(RespirationSearch, FindsPeriodPhaseAndWaveWithinItsDeviations) {
+  for (const double period_s : {2.0, 3.1, 4.0, 5.5}) {
+    Patient patient;
+    patient.period_s = period_s;
+    RespirationSearch search;
+    watch(search, patient, 0.0, 25.0);
+    FoundBreath found;
+    ASSERT_TRUE(search.find(found)) << period_s;
+    const double rate = kTwoPi / period_s;
+    EXPECT_LT(std::abs(found.rate_rad_per_s - rate), 4.0 * std::sqrt(found.rate_variance_rad2_per_s2)) << period_s;
+    EXPECT_NEAR(found.rate_rad_per_s, rate, 0.005 * rate);
+    // The wave lacks its mean, which is 3/8 of the amplitude.
+    for (double ahead_s = 0.0; ahead_s < period_s; ahead_s += 0.1) {
+      const double t = to_seconds(found.time.time_since_epoch()) + ahead_s;
+      const Vector3d truth = (patient.breath(t) - 3.75) * Vector3d(0.1, -0.35, -0.93);
+      EXPECT_LT((found.wave.at(found.rate_rad_per_s * ahead_s) - truth).norm(), 0.5) << period_s << " " << ahead_s;
+    }
+  }
+}
+
+TEST(RespirationSearch, FindsNothingInNoiseOrInTheHeartBeatOrBeforeTwoBreaths) {
+  Patient still;
+  still.amplitude_mm = 0.0;
+  RespirationSearch search;
+  watch(search, still, 0.0, 30.0);
+  FoundBreath found;
+  EXPECT_FALSE(search.find(found));
+  search.clear();
+  Patient patient;
+  watch(search, patient, 0.0, 7.5);
+  EXPECT_FALSE(search.find(found));
+}
+
+TEST(RespirationSearch, AWaveIsAlignedWithItselfWhereverItsPhaseIsCountedFrom) {
+  Patient patient;
+  RespirationSearch search;
+  watch(search, patient, 0.0, 25.0);
+  FoundBreath found;
+  ASSERT_TRUE(search.find(found));
+  for (const double turn : {0.0, 0.7, 2.5, 4.4}) {
+    EXPECT_NEAR(std::remainder(alignment(found.wave, found.wave.shifted(turn)) - turn, kTwoPi), 0.0, 1e-3);
+  }
+}
+
+struct Tracking : ::testing::Test {
+  RespirationSettings settings;
+  Patient patient;
+  double now_s = 0.0;
+
+  Tracking() { settings.enabled = true; }
+
+  // Until locked; false when it does not within a minute.
+  bool lock(RespiratoryTracker& tracker) {
+    const double begun_s = now_s;
+    while (tracker.clock().state != RespirationState::kLocked && now_s < begun_s + 60.0) {
+      watch(tracker, patient, now_s, now_s + 1.0);
+      now_s += 1.0;
+      tracker.search(at_s(now_s));
+    }
+    return tracker.clock().state == RespirationState::kLocked;
+  }
+  // What the clock's phase says of the displacement, without the mean.
+  static Vector3d predicted(const RespiratoryTracker& tracker, double t_s) {
+    return tracker.wave().at(tracker.clock().at(at_s(t_s)).phase_rad);
+  }
+  [[nodiscard]] Vector3d truth(double t_s) const {
+    return (patient.breath(t_s) - 0.375 * patient.amplitude_mm) * Vector3d(0.1, -0.35, -0.93);
+  }
+};
+
+TEST_F(Tracking, UntilTheBreathIsKnownItsDisplacementIsReckonedWith) {
+  RespiratoryTracker tracker(settings);
+  EXPECT_EQ(tracker.clock().state, RespirationState::kSearching);
+  EXPECT_FALSE(tracker.clock().at(at_s(1.0)).known);
+  EXPECT_EQ(tracker.clock().at(at_s(1.0)).deviation_mm, settings.displacement_mm);
+  ASSERT_TRUE(lock(tracker));
+  EXPECT_LT(now_s, 20.0);
+  EXPECT_TRUE(tracker.clock().at(at_s(now_s)).known);
+  EXPECT_LT(tracker.clock().at(at_s(now_s)).deviation_mm, 0.5);
+  EXPECT_NEAR(to_seconds(tracker.clock().period()), 4.0, 0.1);
+  for (double t = now_s; t < now_s + 4.0; t += 0.2) EXPECT_LT((predicted(tracker, t) - truth(t)).norm(), 1.0) << t;
+}
+
+TEST_F(Tracking, ThePhaseIsFollowedWhenTheRateDrifts) {
+  RespiratoryTracker tracker(settings);
+  ASSERT_TRUE(lock(tracker));
+  // From now on slower, by 5 % within a minute.
+  double phase = tracker.clock().at(at_s(now_s)).phase_rad;
+  const double start_s = now_s;
+  for (; now_s < start_s + 60.0; now_s += 1.0 / 30.0) {
+    phase += kTwoPi / 4.0 * (1.0 - 0.05 * (now_s - start_s) / 60.0) / 30.0;
+    tracker.add_phase(at_s(now_s + 1.0 / 30.0), phase + 0.05 * patient.normal(patient.generator), 0.05);
+  }
+  ASSERT_EQ(tracker.clock().state, RespirationState::kLocked);
+  EXPECT_NEAR(std::remainder(tracker.clock().at(at_s(now_s)).phase_rad - phase, kTwoPi), 0.0, 0.1);
+  EXPECT_NEAR(tracker.clock().rate_rad_per_s, kTwoPi / 4.0 * 0.95, 0.02);
+}
+
+TEST_F(Tracking, AContradictedPhaseIsSearchedForAgainAndCountedAsBefore) {
+  RespiratoryTracker tracker(settings);
+  ASSERT_TRUE(lock(tracker));
+  const BreathWave before = tracker.wave();
+  for (int i = 0; i < 90; ++i) tracker.add_contradiction(at_s(now_s += 1.0 / 30.0));
+  EXPECT_EQ(tracker.clock().state, RespirationState::kSearching);
+  patient.period_s = 3.3;  // the ventilator was set anew
+  patient.begin_s = now_s + 1.0;
+  ASSERT_TRUE(lock(tracker));
+  EXPECT_EQ(tracker.locks(), 2);
+  EXPECT_NEAR(to_seconds(tracker.clock().period()), 3.3, 0.1);
+  // What the map has learnt at a phase still holds there.
+  for (double t = now_s; t < now_s + 3.3; t += 0.2) {
+    EXPECT_LT((before.at(tracker.clock().at(at_s(t)).phase_rad) - truth(t)).norm(), 1.0) << t;
+  }
+}
+
+TEST_F(Tracking, WhileOffBreathingIsSuspectedWhereThereIsSome) {
+  settings.enabled = false;
+  RespiratoryTracker tracker(settings);
+  watch(tracker, patient, 0.0, 20.0);
+  tracker.search(at_s(20.0));
+  EXPECT_TRUE(tracker.clock().suspected);
+  EXPECT_EQ(tracker.clock().state, RespirationState::kOff);
+  EXPECT_EQ(tracker.clock().at(at_s(20.0)).deviation_mm, settings.displacement_mm);
+  Patient still;
+  still.amplitude_mm = 0.0;
+  RespiratoryTracker calm(settings);
+  watch(calm, still, 0.0, 20.0);
+  calm.search(at_s(20.0));
+  EXPECT_FALSE(calm.clock().suspected);
+  EXPECT_EQ(calm.clock().at(at_s(20.0)).deviation_mm, 0.0);
+}
+
+}  // namespace
+}  // namespace perimap
