@@ -7,19 +7,34 @@ namespace perimap {
 namespace {
 
 using std::chrono::milliseconds;
+using std::chrono::seconds;
 
-constexpr Duration kShortestPeriod = std::chrono::microseconds(950);  // 1000 Hz and some tolerance
-constexpr Duration kLongestPeriod = std::chrono::microseconds(10500);
-constexpr int kRateSamples = 17;
 constexpr int kGapPeriods = 4;  // a longer step between stamps is a gap
+constexpr Duration kPadding = milliseconds(200);
+constexpr Duration kFlatAfter = seconds(1);
+constexpr Duration kForgetAfter = seconds(30);  // of interruption
 
-constexpr Duration kSmooth = milliseconds(20);   // a whole period of 50 Hz
-constexpr Duration kEnergy = milliseconds(80);   // about a normal QRS complex
 constexpr Duration kConfirm = milliseconds(50);  // a maximum of the energy is one when nothing exceeded it for so long,
 constexpr double kConfirmFall = 0.75;            // or when the energy has fallen to this share of it
 constexpr double kRiseAgain = 1.5;               // the next one begins when the energy has risen by this factor
 
+constexpr Duration kShapeStep = milliseconds(5);
+constexpr Duration kShapeBefore = milliseconds(90);
+constexpr Duration kShapeAfter = milliseconds(50);
+constexpr Duration kFitReach = milliseconds(60);   // a maximum of the energy and a fit so far apart are one complex
+constexpr Duration kFitAwait = milliseconds(30);   // how long a maximum of the energy waits for a fit after its middle
+constexpr int kFitConfirm = 3;                     // steps after which a maximum of the correlation is one
+constexpr double kFamiliar = 0.8;                  // correlation
+constexpr double kAlike = 0.6;  // enough for a candidate in noise
+constexpr double kSurelyFamiliar = 0.85;
+constexpr double kLeastGain = 0.4;  // of a familiar beat, to its template
+constexpr double kSureGain = 0.6;  // a smaller one must be the more alike
+constexpr double kSureCorrelation = 0.9;
+constexpr double kMostGain = 3.0;
+constexpr double kSameGain = 0.3;  // logarithm: two beats in a row so much alike tell that the gain has changed
+
 constexpr Duration kPeakWindow = milliseconds(80);  // each side of the complex's middle
+constexpr Duration kFitPeakWindow = milliseconds(15);
 constexpr Duration kBaselineBefore = milliseconds(200);
 constexpr Duration kParabola = milliseconds(10);  // each side of the peak
 constexpr double kOpposite = 2.0;  // a beat points the other way when its other excursion is larger by this factor
@@ -32,20 +47,42 @@ constexpr Duration kQuietStep = milliseconds(20);
 constexpr int kQuietRecompute = 5;  // steps
 constexpr double kQuietQuantile = 0.3;
 constexpr double kStandOut = 3.5;  // times the quiet level; bare noise reaches it about once a minute
-
+constexpr double kFamiliarStandOut = 1.5;
 constexpr double kQuanta = 2.0;  // times the converter's resolution; a single step of it reaches 0.75
 
-constexpr Duration kLearning = std::chrono::seconds(2);
+constexpr Duration kLearning = seconds(2);
+constexpr Duration kRelearnAfter = seconds(3);  // without a beat,
+constexpr double kRelearnCycles = 3.0;         // and usual cycles
 constexpr Duration kRefractory = milliseconds(200);
-constexpr double kTWave = 0.45;               // s / sqrt(cycle in s), the end of the T wave (Bazett 1920): before it,
-constexpr double kTWaveSlope = 0.5;           // what has less than this share of the last beat's slope is its T wave
-constexpr double kThreshold = 0.3;            // of the way from noise level to beat level
-constexpr double kNoiseMemory = 8.0;          // candidates
+constexpr Duration kAfterUnfamiliar = milliseconds(100);  // a familiar beat so soon after an unfamiliar one counts
+constexpr double kOutshines = 3.0;  // or after one of less than a third of its energy: that was a P wave
+constexpr double kTWave = 0.45;     // s / sqrt(cycle in s), the end of the T wave (Bazett 1920): before it, what has
+constexpr double kTWaveSlope = 0.5;  // less than this share of the last beat's slope is its T wave
+constexpr double kThreshold = 0.3;   // of the way from noise level to beat level
+constexpr double kNoiseMemory = 8.0;  // candidates
+
+constexpr double kUnfamiliarStrength = 0.5;
+constexpr double kDoubtfulStrength = 0.4;
+constexpr Duration kDoubt = milliseconds(250);
+constexpr double kUnfamiliarMost = 6.0;
+constexpr double kDisturbance = 0.4;
+constexpr Duration kNoisyFor = seconds(2);
+constexpr double kMissed = 1.45;         // usual cycles between two familiar beats: there was one in between
+constexpr double kLearnt = 0.7;
+constexpr double kInRhythm = 0.15;
+
+constexpr double kHeldOverdue = 1.5;
+constexpr double kSearchBackLike = 0.7;  // where the beats' shape is known: with this correlation and size,
+constexpr double kSearchBackSize = 0.35;
+constexpr double kSearchBackVeryLike = 0.88;  // or with these
+constexpr double kSearchBackLeastSize = 0.2;
+constexpr double kTimely = 0.2;  // of the usual cycle: standard deviation within which a held candidate is in time
 constexpr double kSearchBack = 1.66;          // mean cycles without a beat after which a weaker candidate is taken,
 constexpr double kSearchBackThreshold = 0.5;  // above this share of the threshold
 constexpr Duration kSearchBackWait = milliseconds(300);
 constexpr double kRhythmAtStart_s = 1.2;  // until an interval is known
-constexpr double kDeafness_s = 1.0;       // that threshold falls by e in this time: the gain may have changed
+constexpr double kSlowestRhythm_s = 2.0;
+constexpr double kDeafness_s = 1.0;  // that threshold falls by e in this time: the gain may have changed
 
 }  // namespace
 
@@ -55,6 +92,10 @@ void RPeakDetector::Recent::push(double value) noexcept {
   if (count_ >= 2 * kLevels) count_ -= kLevels;  // bounded, same slot and same fill
 }
 
+void RPeakDetector::Recent::scale(double factor) noexcept {
+  for (double& value : values_) value *= factor;
+}
+
 double RPeakDetector::Recent::median() const noexcept {
   auto sorted = values_;
   const auto middle = sorted.begin() + count() / 2;
@@ -62,69 +103,128 @@ double RPeakDetector::Recent::median() const noexcept {
   return *middle;
 }
 
-double RPeakDetector::Recent::mean() const noexcept {
-  double sum = 0.0;
-  for (int i = 0; i < count(); ++i) sum += values_[static_cast<std::size_t>(i)];
-  return sum / count();
+RPeakDetector::RPeakDetector(Duration sample_period) noexcept : given_period_(sample_period) {
+  forget();
+  restart_signal();
 }
 
-RPeakDetector::RPeakDetector(Duration sample_period) noexcept : given_period_(sample_period) { restart(); }
-
-void RPeakDetector::restart() noexcept {
-  now_ = -1;
+void RPeakDetector::forget() noexcept {
   period_ = Duration::zero();
-  rising_ = true;
-  crest_ = 0.0;
-  crest_at_ = 0;
-  trough_ = 0.0;
-  quiet_count_ = 0;
   quiet_level_ = 0.0;
   quantum_mV_ = 0.0;
   noise_level_ = 0.0;
   beat_energy_.clear();
+  beat_slope_.clear();
   rr_s_.clear();
+  templates_.clear();
   learning_ = true;
+  upward_ = 0.0;
+  downward_ = 0.0;
+}
+
+void RPeakDetector::restart_signal() noexcept {
+  filter_.restart(period_);
+  started_ = false;
+  first_count_ = 0;
+  rising_ = true;
+  crest_ = 0.0;
+  crest_at_ = 0;
+  trough_ = 0.0;
+  crest_count_ = 0;
+  fit_count_ = 0;
+  best_fit_.of = -1;
+  quiet_count_ = 0;
   learnt_count_ = 0;
   has_last_ = false;
   has_passed_over_ = false;
+  has_held_ = false;
 }
 
-void RPeakDetector::lead_off(Instant /*t*/) noexcept { restart(); }
+void RPeakDetector::interrupt(Instant t, EcgSignal reason) noexcept {
+  interruption_ = reason;
+  if (interrupted_) return;
+  interrupted_ = true;
+  interrupted_at_ = t;
+  restart_signal();
+}
+
+void RPeakDetector::lead_off(Instant t) noexcept {
+  newest_ = t;
+  interrupt(t, EcgSignal::kLeadOff);
+}
+
+EcgSignal RPeakDetector::signal() const noexcept {
+  if (interrupted_) return interruption_;
+  if (learning_) return EcgSignal::kLearning;
+  return newest_ < noisy_until_ ? EcgSignal::kNoisy : EcgSignal::kGood;
+}
 
 std::optional<RPeak> RPeakDetector::push(Instant t, float mV) noexcept {
   if (!std::isfinite(mV)) {
-    restart();
+    lead_off(t);
     return pop();
   }
-  if (now_ >= 0) {
-    const Duration step = t - at(now_).time;
-    if (step <= Duration::zero()) return pop();
-    if (period_ > Duration::zero() && step > kGapPeriods * period_) restart();
+  const bool first = !started_ && !interrupted_ && first_count_ == 0;
+  if (!first && t <= newest_) return pop();
+  if (!first && !interrupted_ && period_ > Duration::zero() && t - newest_ > kGapPeriods * period_) {
+    interrupt(newest_, EcgSignal::kLeadOff);
   }
-  ++now_;
-  if (now_ == 0) start_ = t;
-  at(now_) = Sample{};
-  at(now_).time = t;
-  at(now_).mV = static_cast<double>(mV);
-  if (period_ == Duration::zero()) {
-    learn_rate();
-    if (period_ == Duration::zero()) return pop();
-    for (std::int64_t i = 0; i < now_; ++i) filter(i);
+  const bool changed = mV != newest_mV_ || first || (interrupted_ && interruption_ != EcgSignal::kFlat);
+  newest_ = t;
+  newest_mV_ = mV;
+  if (changed) {
+    changed_at_ = t;
+  } else if (t - changed_at_ >= kFlatAfter) {
+    interrupt(changed_at_, EcgSignal::kFlat);
+    return pop();
   }
-  if (period_ < kShortestPeriod || period_ > kLongestPeriod) return pop();
+  if (interrupted_) {
+    interrupted_ = false;
+    if (t - interrupted_at_ > kForgetAfter) forget();
+  }
 
-  filter(now_);
-  watch_quiet_level();
-  if (follow_energy(false)) take(measure(crest_at_));
-  if (learning_ && t - start_ > kLearning) finish_learning();
-  search_back();
+  if (period_ > Duration::zero()) {
+    take_sample(t, mV);
+    return pop();
+  }
+  const Duration period = learn_rate(t, mV);
+  if (period > Duration::zero()) {
+    set_rate(period);
+    for (int i = 0; i < first_count_; ++i) {
+      take_sample(first_times_[static_cast<std::size_t>(i)], first_values_[static_cast<std::size_t>(i)]);
+    }
+  }
   return pop();
 }
 
+void RPeakDetector::take_sample(Instant t, float mV) noexcept {
+  if (period_ < EcgFilter::kShortestPeriod || period_ > EcgFilter::kLongestPeriod) return;
+  if (!started_) {
+    start_ = t;
+    started_ = true;
+  }
+  const double step = std::abs(static_cast<double>(mV) - filter_.at(filter_.now()).mV);
+  if (filter_.now() >= 0 && step > 0.0 && (quantum_mV_ == 0.0 || step < quantum_mV_)) quantum_mV_ = step;
+  filter_.push(t, static_cast<double>(mV));
+  watch_quiet_level();
+  if (follow_energy() && crest_count_ < kPending) crests_[static_cast<std::size_t>(crest_count_++)] = crest_at_;
+  if (filter_.now() % step_ == 0) follow_templates();
+  decide_crests();
+  if (learning_ && t - start_ > kLearning) finish_learning();
+  resolve_overdue();
+}
+
+// The signal is taken to stand still after its end, so that what is on its way through the filters comes out.
 std::optional<RPeak> RPeakDetector::flush() noexcept {
-  if (now_ >= 0 && period_ >= kShortestPeriod && period_ <= kLongestPeriod) {
-    if (follow_energy(true)) take(measure(crest_at_));
+  if (started_) {
+    const Instant end = newest_;
+    const float value = newest_mV_;
+    const int padding = filter_.samples_in(kPadding);
+    ending_ = true;
+    for (int i = 1; i <= padding; ++i) take_sample(end + i * period_, value);
+    ending_ = false;
     if (learning_) finish_learning();
+    restart_signal();
   }
   return pop();
 }
@@ -137,47 +237,30 @@ std::optional<RPeak> RPeakDetector::pop() noexcept {
   return peak;
 }
 
-void RPeakDetector::learn_rate() noexcept {
-  if (given_period_ > Duration::zero()) {
-    set_rate(given_period_);
-  } else if (now_ + 1 == kRateSamples) {
-    std::array<Duration, kRateSamples - 1> steps{};
-    for (int i = 0; i + 1 < kRateSamples; ++i) steps[static_cast<std::size_t>(i)] = at(i + 1).time - at(i).time;
-    std::nth_element(steps.begin(), steps.begin() + steps.size() / 2, steps.end());
-    set_rate(steps[steps.size() / 2]);
-  }
+Duration RPeakDetector::learn_rate(Instant t, float mV) noexcept {
+  first_times_[static_cast<std::size_t>(first_count_)] = t;
+  first_values_[static_cast<std::size_t>(first_count_)] = mV;
+  ++first_count_;
+  if (given_period_ > Duration::zero()) return given_period_;
+  if (first_count_ < static_cast<int>(first_times_.size())) return Duration::zero();
+  std::array<Duration, std::tuple_size_v<decltype(first_times_)> - 1> steps{};
+  for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = first_times_[i + 1] - first_times_[i];
+  std::nth_element(steps.begin(), steps.begin() + steps.size() / 2, steps.end());
+  return steps[steps.size() / 2];
 }
 
 void RPeakDetector::set_rate(Duration sample_period) noexcept {
   period_ = sample_period;
-  smooth_width_ = samples_in(kSmooth);
-  energy_width_ = samples_in(kEnergy);
-}
-
-int RPeakDetector::samples_in(Duration d) const noexcept {
-  return std::max(1, static_cast<int>((d + period_ / 2) / period_));
-}
-
-// Before its first sample the signal is taken to have stood still. Sums are formed anew each time: they are short, and
-// a running sum would leave rounding errors that look like a signal on a flat line.
-void RPeakDetector::filter(std::int64_t i) noexcept {
-  Sample& sample = at(i);
-  const auto mean = [&](int width, double Sample::*of) {
-    double sum = 0.0;
-    for (int k = 0; k < width; ++k) sum += at(std::max<std::int64_t>(i - k, 0)).*of;
-    return sum / width;
-  };
-  sample.smooth = mean(smooth_width_, &Sample::mV);
-  sample.smoother = mean(smooth_width_, &Sample::smooth);
-  sample.slope = std::abs(sample.smoother - at(std::max<std::int64_t>(i - smooth_width_, 0)).smoother);
-  sample.energy = mean(energy_width_, &Sample::slope);
-  const double step = std::abs(sample.mV - at(std::max<std::int64_t>(i - 1, 0)).mV);
-  if (step > 0.0 && (quantum_mV_ == 0.0 || step < quantum_mV_)) quantum_mV_ = step;
+  filter_.restart(period_);
+  if (period_ < EcgFilter::kShortestPeriod || period_ > EcgFilter::kLongestPeriod) return;
+  step_ = filter_.samples_in(kShapeStep);
+  points_before_ = static_cast<int>(kShapeBefore / (step_ * period_));
+  points_ = points_before_ + static_cast<int>(kShapeAfter / (step_ * period_)) + 1;
 }
 
 void RPeakDetector::watch_quiet_level() noexcept {
-  if (now_ % samples_in(kQuietStep) != 0) return;
-  quiet_[static_cast<std::size_t>(quiet_count_ % kQuietHistory)] = at(now_).energy;
+  if (filter_.now() % filter_.samples_in(kQuietStep) != 0) return;
+  quiet_[static_cast<std::size_t>(quiet_count_ % kQuietHistory)] = filter_.at(filter_.now()).energy;
   ++quiet_count_;
   if (quiet_count_ % kQuietRecompute != 0) return;
   auto sorted = quiet_;
@@ -188,81 +271,181 @@ void RPeakDetector::watch_quiet_level() noexcept {
 }
 
 // True when a local maximum of the energy, at crest_at_, has just been confirmed.
-bool RPeakDetector::follow_energy(bool ending) noexcept {
-  const double energy = at(now_).energy;
+bool RPeakDetector::follow_energy() noexcept {
+  const double energy = filter_.at(filter_.now()).energy;
   if (!rising_) {
     trough_ = std::min(trough_, energy);
     if (energy <= kRiseAgain * trough_) return false;
     rising_ = true;
     crest_ = energy;
-    crest_at_ = now_;
+    crest_at_ = filter_.now();
     return false;
   }
   if (energy > crest_) {
     crest_ = energy;
-    crest_at_ = now_;
+    crest_at_ = filter_.now();
   }
-  const bool confirmed = energy < kConfirmFall * crest_ || now_ - crest_at_ >= samples_in(kConfirm) || ending;
+  const bool confirmed = energy < kConfirmFall * crest_ || filter_.now() - crest_at_ >= filter_.samples_in(kConfirm);
   if (!confirmed || !(crest_ > 0.0)) return false;
   rising_ = false;
   trough_ = energy;
   return true;
 }
 
+// Of no points while its end is not known.
+QrsShape RPeakDetector::shape_at(std::int64_t centre) const noexcept {
+  QrsShape shape;
+  const std::int64_t first = centre + filter_.slope_delay() - points_before_ * step_;
+  if (first + (points_ - 1) * step_ > filter_.now()) return shape;
+  shape.points = points_;
+  for (int i = 0; i < points_; ++i) {
+    shape.slope[static_cast<std::size_t>(i)] = static_cast<float>(filter_.at(first + i * step_).slope);
+  }
+  return shape;
+}
+
+// The matched filter at the newest instant whose surroundings are known.
+void RPeakDetector::follow_templates() noexcept {
+  Fit fit;
+  fit.at = filter_.now() - filter_.slope_delay() - (points_ - 1 - points_before_) * step_;
+  if (fit.at < 0) return;
+  const QrsShape shape = shape_at(fit.at);
+  for (int i = 0; i < ShapeTemplates::kTemplates; ++i) {
+    if (!templates_.usable(i)) continue;
+    const ShapeMatch m = match(shape, templates_[i].shape);
+    if (m.correlation <= fit.correlation) continue;
+    fit.correlation = m.correlation;
+    fit.gain = m.gain;
+    fit.of = i;
+  }
+  fits_[static_cast<std::size_t>(fit_count_ % kFits)] = fit;
+  ++fit_count_;
+  if (fit.correlation >= kAlike && (best_fit_.of < 0 || fit.correlation > best_fit_.correlation)) {
+    best_fit_ = fit;
+  } else if (best_fit_.of >= 0 && fit.at - best_fit_.at >= kFitConfirm * step_) {
+    decide_familiar(best_fit_);
+    best_fit_.of = -1;
+  }
+}
+
+void RPeakDetector::decide_crests() noexcept {
+  const int await = filter_.slope_delay() + (points_ - 1 - points_before_) * step_ + filter_.samples_in(kFitAwait);
+  while (crest_count_ > 0) {
+    const std::int64_t crest = crests_[0];
+    if (filter_.now() < crest - filter_.energy_delay() + await) return;
+    std::copy(crests_.begin() + 1, crests_.begin() + crest_count_, crests_.begin());
+    --crest_count_;
+    const Candidate candidate = measure(crest);
+    if (learnt_count_ == kLearningCapacity) {
+      std::copy(learnt_.begin() + 1, learnt_.end(), learnt_.begin());
+      --learnt_count_;
+    }
+    learnt_[static_cast<std::size_t>(learnt_count_++)] = candidate;
+    if (!learning_) decide(candidate);
+  }
+}
+
 RPeakDetector::Candidate RPeakDetector::measure(std::int64_t energy_peak) const noexcept {
   Candidate candidate;
-  candidate.energy = at(energy_peak).energy;
-  for (int k = 0; k < energy_width_; ++k) {
-    candidate.slope = std::max(candidate.slope, at(std::max<std::int64_t>(energy_peak - k, 0)).slope);
+  candidate.energy = filter_.at(energy_peak).energy;
+  for (int k = 0; k < filter_.energy_width(); ++k) {
+    candidate.slope = std::max(candidate.slope, std::abs(filter_.at(energy_peak - k).slope));
   }
-  const int filter_delay = (3 * smooth_width_ - 2 + energy_width_ - 1) / 2;
-  locate_peak(std::max<std::int64_t>(energy_peak - filter_delay, 0), candidate);
+  const std::int64_t centre = std::max<std::int64_t>(energy_peak - filter_.energy_delay(), 0);
+  std::int64_t top = 0;
+  std::int64_t bottom = 0;
+  measure_excursions(centre, candidate, top, bottom);
+  candidate.points_up = candidate.upward >= candidate.downward;
+  if (upward_ > 0.0 || downward_ > 0.0) {
+    candidate.points_up = points_up_ ? candidate.downward < kOpposite * candidate.upward
+                                     : candidate.upward >= kOpposite * candidate.downward;
+  }
+  const std::int64_t peak = candidate.points_up ? top : bottom;
+  refine_peak(peak, candidate);
+  candidate.peak.shape = shape_at(peak);
+  const int reach = filter_.samples_in(kFitReach);
+  for (std::int64_t i = std::max<std::int64_t>(fit_count_ - kFits, 0); i < fit_count_; ++i) {
+    const Fit& fit = fits_[static_cast<std::size_t>(i % kFits)];
+    if (std::abs(fit.at - peak) > reach || fit.correlation <= candidate.correlation) continue;
+    candidate.correlation = fit.correlation;
+    candidate.gain = fit.gain;
+    candidate.of = fit.of;
+  }
   return candidate;
 }
 
-// Finds the peak of the complex whose middle is at sample `centre`.
-void RPeakDetector::locate_peak(std::int64_t centre, Candidate& candidate) const noexcept {
-  const int half_smooth = smooth_width_ / 2;
-  const std::int64_t first = std::max<std::int64_t>(centre - samples_in(kPeakWindow), 0);
-  const std::int64_t last = std::max(std::min(centre + samples_in(kPeakWindow), now_ - half_smooth), first);
+RPeakDetector::Candidate RPeakDetector::measure_fit(const Fit& fit) const noexcept {
+  Candidate candidate;
+  candidate.correlation = fit.correlation;
+  candidate.gain = fit.gain;
+  candidate.of = fit.of;
+  candidate.points_up = templates_[fit.of].upward;
+  const std::int64_t middle = fit.at + filter_.energy_delay();
+  const int reach = filter_.energy_width() / 2;
+  for (std::int64_t i = std::max<std::int64_t>(middle - reach, 0); i <= std::min(middle + reach, filter_.now()); ++i) {
+    candidate.energy = std::max(candidate.energy, filter_.at(i).energy);
+  }
+  candidate.peak.shape = shape_at(fit.at);
+  for (int i = 0; i < candidate.peak.shape.points; ++i) {
+    candidate.slope =
+        std::max(candidate.slope, std::abs(static_cast<double>(candidate.peak.shape.slope[static_cast<std::size_t>(i)])));
+  }
+  std::int64_t top = 0;
+  std::int64_t bottom = 0;
+  measure_excursions(fit.at, candidate, top, bottom);
+  const auto value = [&](std::int64_t i) {
+    return filter_.at(std::min(i + filter_.despiked_delay(), filter_.now())).despiked;
+  };
+  std::int64_t peak = fit.at;
+  const int window = filter_.samples_in(kFitPeakWindow);
+  for (std::int64_t i = std::max<std::int64_t>(fit.at - window, 0); i <= fit.at + window; ++i) {
+    if (candidate.points_up ? value(i) > value(peak) : value(i) < value(peak)) peak = i;
+  }
+  refine_peak(peak, candidate);
+  return candidate;
+}
+
+// The largest excursions from the baseline around sample `centre`, and where they are.
+void RPeakDetector::measure_excursions(std::int64_t centre, Candidate& candidate, std::int64_t& top,
+                                       std::int64_t& bottom) const noexcept {
+  const int delay = filter_.smooth_delay();
+  const std::int64_t first = std::max<std::int64_t>(centre - filter_.samples_in(kPeakWindow), 0);
+  const std::int64_t last = std::max(std::min(centre + filter_.samples_in(kPeakWindow), filter_.now() - delay), first);
 
   // The baseline is the median of a stretch of which the complex is the smaller part.
-  std::array<double, kHistory / 2> stretch{};
+  std::array<double, EcgFilter::kHistory / 2> stretch{};
   auto end = stretch.begin();
-  for (std::int64_t i = std::max<std::int64_t>(centre - samples_in(kBaselineBefore), 0); i <= last; ++i) {
-    *end++ = at(i).mV;
+  for (std::int64_t i = std::max<std::int64_t>(centre - filter_.samples_in(kBaselineBefore), 0); i <= last; ++i) {
+    *end++ = filter_.at(i).mV;
   }
   const auto middle = stretch.begin() + (end - stretch.begin()) / 2;
   std::nth_element(stretch.begin(), middle, end);
   const double baseline = *middle;
 
-  std::int64_t top = first;
-  std::int64_t bottom = first;
-  const auto smooth_at = [&](std::int64_t i) { return at(std::min(i + half_smooth, now_)).smooth; };
+  top = first;
+  bottom = first;
+  const auto smooth_at = [&](std::int64_t i) { return filter_.at(std::min(i + delay, filter_.now())).smooth; };
   for (std::int64_t i = first; i <= last; ++i) {
     if (smooth_at(i) > smooth_at(top)) top = i;
     if (smooth_at(i) < smooth_at(bottom)) bottom = i;
   }
   candidate.upward = std::max(smooth_at(top) - baseline, 0.0);
   candidate.downward = std::max(baseline - smooth_at(bottom), 0.0);
+}
 
-  bool up = candidate.upward >= candidate.downward;
-  if (has_last_) {
-    up = points_up_ ? candidate.downward < kOpposite * candidate.upward
-                    : candidate.upward >= kOpposite * candidate.downward;
-  }
-
-  // Parabola a + b u + c u^2 by least squares, fitted again around its own vertex once.
-  std::int64_t peak = up ? top : bottom;
+// Parabola a + b u + c u^2 by least squares, fitted again around its own vertex once.
+void RPeakDetector::refine_peak(std::int64_t peak, Candidate& candidate) const noexcept {
   const double step_s = to_seconds(period_);
-  const int reach = std::max(1, samples_in(kParabola));
+  const int reach = filter_.samples_in(kParabola);
+  const int delay = filter_.despiked_delay();
   double vertex_s = 0.0;
   double deviation_s = kDeviationCap_s;
   for (int pass = 0; pass < 2; ++pass) {
     const std::int64_t from = std::max<std::int64_t>(peak - reach, 0);
-    const std::int64_t to = std::min(peak + reach, now_);
+    const std::int64_t to = std::min(peak + reach, filter_.now() - delay);
     if (peak - from != to - peak) break;  // too close to an end of the signal
     // Centred and evenly spaced, so that b separates from a and c.
+    const double offset = filter_.at(peak + delay).despiked;
     double n = 0.0;
     double sum_y = 0.0;
     double sum_uy = 0.0;
@@ -271,7 +454,7 @@ void RPeakDetector::locate_peak(std::int64_t centre, Candidate& candidate) const
     double sum_u4 = 0.0;
     for (std::int64_t i = from; i <= to; ++i) {
       const double u = static_cast<double>(i - peak) * step_s;
-      const double y = at(i).mV - baseline;
+      const double y = filter_.at(i + delay).despiked - offset;
       n += 1.0;
       sum_y += y;
       sum_uy += u * y;
@@ -282,13 +465,13 @@ void RPeakDetector::locate_peak(std::int64_t centre, Candidate& candidate) const
     const double b = sum_uy / sum_u2;
     const double c = (n * sum_u2y - sum_u2 * sum_y) / (n * sum_u4 - sum_u2 * sum_u2);
     const double a = (sum_y - c * sum_u2) / n;
-    if (up ? c >= 0.0 : c <= 0.0) break;
+    if (candidate.points_up ? c >= 0.0 : c <= 0.0) break;
     const double limit = static_cast<double>(reach) * step_s;
     vertex_s = std::clamp(-b / (2.0 * c), -limit, limit);
     double squares = 0.0;
     for (std::int64_t i = from; i <= to; ++i) {
       const double u = static_cast<double>(i - peak) * step_s;
-      const double residual = at(i).mV - baseline - (a + b * u + c * u * u);
+      const double residual = filter_.at(i + delay).despiked - offset - (a + b * u + c * u * u);
       squares += residual * residual;
     }
     const double noise = std::max(std::sqrt(squares / n), quiet_level_);
@@ -301,100 +484,261 @@ void RPeakDetector::locate_peak(std::int64_t centre, Candidate& candidate) const
       break;
     }
   }
-  candidate.peak.time = at(peak).time + from_seconds(vertex_s);
+  candidate.peak.time = filter_.at(peak).time + from_seconds(vertex_s);
   candidate.peak.deviation = from_seconds(std::min(std::hypot(deviation_s, kDeviationFloor_s), kDeviationCap_s));
-}
-
-void RPeakDetector::take(const Candidate& candidate) noexcept {
-  if (!learning_) {
-    decide(candidate);
-    return;
-  }
-  if (learnt_count_ == kLearningCapacity) {
-    std::copy(learnt_.begin() + 1, learnt_.end(), learnt_.begin());
-    --learnt_count_;
-  }
-  learnt_[static_cast<std::size_t>(learnt_count_++)] = candidate;
 }
 
 // Learning lasts until something stands out; only the last seconds count.
 void RPeakDetector::finish_learning() noexcept {
-  const Instant oldest = at(now_).time - kLearning;
+  const Instant oldest = newest_ - std::max(kLearning, kRelearnAfter);
   const auto end = std::remove_if(learnt_.begin(), learnt_.begin() + learnt_count_,
                                   [&](const Candidate& c) { return c.peak.time < oldest; });
   learnt_count_ = static_cast<int>(end - learnt_.begin());
   const auto strongest = std::max_element(learnt_.begin(), end,
                                           [](const Candidate& a, const Candidate& b) { return a.energy < b.energy; });
-  if (strongest == end || !stands_out(*strongest)) return;
+  if (strongest == end || !stands_out(*strongest, kStandOut)) return;
   learning_ = false;
   noise_level_ = quiet_level_;
+  beat_energy_.clear();
+  beat_slope_.clear();
   beat_energy_.push(strongest->energy);
-  for (int i = 0; i < learnt_count_; ++i) decide(learnt_[static_cast<std::size_t>(i)]);
+  beat_slope_.push(strongest->slope);
+  if (strongest->correlation >= kSurelyFamiliar) {
+    templates_.scale(strongest->gain);
+  } else {
+    templates_.clear();
+  }
+  for (int i = 0; i < learnt_count_; ++i) {
+    const Candidate& candidate = learnt_[static_cast<std::size_t>(i)];
+    if (!has_last_ || candidate.peak.time > last_.peak.time) decide_new(candidate);
+  }
 }
 
+// A maximum of the energy.
 void RPeakDetector::decide(const Candidate& candidate) noexcept {
   const Instant t = candidate.peak.time;
-  bool t_wave = false;
-  if (has_last_) {
-    const Duration since = t - last_.peak.time;
-    if (since < kRefractory) return;
-    t_wave = to_seconds(since) < kTWave * std::sqrt(rhythm_s()) && candidate.slope < kTWaveSlope * last_.slope;
+  if (has_last_ && t - last_.peak.time < kRefractory) return;
+  if (templates_.any_trusted()) {
+    decide_unfamiliar(candidate);
+  } else {
+    decide_new(candidate);
   }
-  if (!t_wave && stands_out(candidate) && candidate.energy > beat_threshold()) {
-    accept(candidate, false);
+}
+
+// While the beats' shape is not known.
+void RPeakDetector::decide_new(const Candidate& candidate) noexcept {
+  const Instant t = candidate.peak.time;
+  if (has_last_ && t - last_.peak.time < kRefractory) return;
+  const bool t_wave = is_t_wave(candidate);
+  if (!t_wave && stands_out(candidate, kStandOut) && candidate.energy > beat_threshold()) {
+    accept(candidate, 0.8);
     return;
   }
   noise_level_ += (candidate.energy - noise_level_) / kNoiseMemory;
-  if (!t_wave && (!has_passed_over_ || candidate.energy > passed_over_.energy)) {
-    passed_over_ = candidate;
-    has_passed_over_ = true;
+  if (!t_wave) pass_over(candidate);
+}
+
+void RPeakDetector::decide_unfamiliar(const Candidate& candidate) noexcept {
+#ifdef ECG_DEBUG
+  fprintf(stderr, "%.2f unfam c %.2f gain %.2f of %d e %.2f g %.2f noisy %d\n", to_seconds(candidate.peak.time.time_since_epoch()), candidate.correlation, candidate.gain, candidate.of, beat_energy_.count()?candidate.energy/beat_energy_.median():0., beat_slope_.count()?candidate.slope/beat_slope_.median():0., newest_<noisy_until_);
+#endif
+  if (candidate.correlation >= kFamiliar && candidate.gain >= kLeastGain) return;  // the matched filter decides on it
+  if (is_t_wave(candidate)) return;
+  const double size = strength(candidate);
+  const Instant t = candidate.peak.time;
+  if (size < kUnfamiliarStrength || candidate.energy > kUnfamiliarMost * beat_energy_.median() ||
+      !stands_out(candidate, kStandOut)) {
+    noise_level_ += (candidate.energy - noise_level_) / kNoiseMemory;
+    if (size > kDisturbance) noisy_until_ = t + kNoisyFor;
+    pass_over(candidate);
+    return;
   }
+  if (t >= noisy_until_) {
+    accept(candidate, 0.7);
+    return;
+  }
+  noisy_until_ = t + kNoisyFor;
+  hold(candidate);
+}
+
+void RPeakDetector::hold(const Candidate& candidate) noexcept {
+#ifdef ECG_DEBUG
+  fprintf(stderr, "%.2f hold c %.2f gain %.2f of %d e %.2f g %.2f noisy %d\n", to_seconds(candidate.peak.time.time_since_epoch()), candidate.correlation, candidate.gain, candidate.of, beat_energy_.count()?candidate.energy/beat_energy_.median():0., beat_slope_.count()?candidate.slope/beat_slope_.median():0., newest_<noisy_until_);
+#endif
+  if (has_held_ && likelihood(candidate) <= likelihood(held_)) return;
+  held_ = candidate;
+  held_until_ = Instant::max();
+  has_held_ = true;
+}
+
+// How likely a candidate in noise is a beat, against others: by shape, and by how near it is to where one is due.
+double RPeakDetector::likelihood(const Candidate& candidate) const noexcept {
+  const double shape = std::max(candidate.correlation, 0.2);
+  if (!has_last_) return shape;
+  const double off = (to_seconds(candidate.peak.time - last_.peak.time) / rhythm_s() - 1.0) / kTimely;
+  return shape * (0.1 + std::exp(-0.5 * off * off));
+}
+
+void RPeakDetector::decide_familiar(const Fit& fit) noexcept {
+  if (learning_) return;
+  const Candidate candidate = measure_fit(fit);
+  const Instant t = candidate.peak.time;
+  const Duration since = has_last_ ? t - last_.peak.time : Duration::max();
+  const bool outshines = has_last_ && candidate.energy > kOutshines * last_.energy;
+  if (since < (last_familiar_ && !outshines ? kRefractory : kAfterUnfamiliar)) return;
+  if (!stands_out(candidate, kFamiliarStandOut) || is_t_wave(candidate)) return;
+  if (candidate.gain < kLeastGain || (candidate.gain > kMostGain && candidate.correlation < kSurelyFamiliar)) {
+    pass_over(candidate);
+    return;
+  }
+  const bool noisy = t < noisy_until_;
+  const bool sure = candidate.correlation >= kSureCorrelation;
+  if (ending_ && !sure) return;
+  if (candidate.correlation < kFamiliar || (noisy && !templates_.established(candidate.of))) {
+    if (noisy) hold(candidate);
+    return;
+  }
+  if (candidate.gain < kSureGain && !sure) {
+    hold(candidate);
+    if (!noisy && strength(candidate) > kDoubtfulStrength) held_until_ = t + kDoubt;
+    return;
+  }
+  const double rhythm = rhythm_s();
+  if (has_held_) {
+    has_held_ = false;
+    const bool apart = t - held_.peak.time > kRefractory && (!has_last_ || held_.peak.time - last_.peak.time > kRefractory);
+    if (apart && has_last_ && to_seconds(since) > kMissed * rhythm) {
+      accept(held_, 0.5);
+    } else {
+      noisy_until_ = t + kNoisyFor;
+    }
+  } else if (has_passed_over_ && has_last_ && to_seconds(since) > kMissed * rhythm &&
+             t - passed_over_.peak.time > kRefractory && sizeable(passed_over_)) {
+    accept(passed_over_, 0.5);
+  }
+  const bool after_unfamiliar = has_last_ && !last_familiar_;
+  if (after_unfamiliar && std::abs(to_seconds(t - before_last_) - rhythm) < kInRhythm * rhythm) {
+    noisy_until_ = t + kNoisyFor;
+  }
+  accept(candidate, 1.0);
+}
+
+// Where the shape of the beats is known, what is much smaller than they are must be the more like them.
+bool RPeakDetector::sizeable(const Candidate& candidate) const noexcept {
+  const double size = strength(candidate);
+  return (candidate.correlation >= kSearchBackLike && size > kSearchBackSize) ||
+         (candidate.correlation >= kSearchBackVeryLike && size > kSearchBackLeastSize);
+}
+
+void RPeakDetector::pass_over(const Candidate& candidate) noexcept {
+  if (has_passed_over_ && candidate.energy <= passed_over_.energy) return;
+  passed_over_ = candidate;
+  has_passed_over_ = true;
 }
 
 // When a beat is overdue, the strongest candidate since the last one is taken, above a threshold that falls as time
 // goes on. It has to wait a little, for a P wave is no beat when its QRS complex follows.
-void RPeakDetector::search_back() noexcept {
-  if (learning_ || !has_passed_over_) return;
-  const Instant t = at(now_).time;
-  const Duration late = overdue_by(t);
-  if (late <= Duration::zero() || t - passed_over_.peak.time < kSearchBackWait) return;
-  const double threshold = kSearchBackThreshold * beat_threshold() * std::exp(-to_seconds(late) / kDeafness_s);
-  if (passed_over_.energy > threshold && stands_out(passed_over_)) accept(passed_over_, true);
+void RPeakDetector::resolve_overdue() noexcept {
+  if (learning_) return;
+  const Instant t = newest_;
+  const double since_s = to_seconds(t - (has_last_ ? last_.peak.time : start_));
+  const double rhythm = rhythm_s();
+  if (has_held_ && has_last_ && held_.peak.time - last_.peak.time < kRefractory) has_held_ = false;
+  if (has_held_ && (since_s > kHeldOverdue * rhythm || t >= held_until_)) {
+    has_held_ = false;
+    accept(held_, 0.4);
+    return;
+  }
+  if (since_s > to_seconds(kRelearnAfter) && since_s > kRelearnCycles * rhythm) {
+    learning_ = true;
+    return;
+  }
+  if (!has_passed_over_ || t - passed_over_.peak.time < kSearchBackWait) return;
+  const double late_s = since_s - kSearchBack * rhythm;
+  if (late_s <= 0.0) return;
+  if (templates_.any_trusted() && !sizeable(passed_over_)) return;
+  const double threshold = kSearchBackThreshold * beat_threshold() * std::exp(-late_s / kDeafness_s);
+  if (passed_over_.energy > threshold && stands_out(passed_over_, kStandOut)) accept(passed_over_, 0.5);
 }
 
-void RPeakDetector::accept(const Candidate& candidate, bool searched_back) noexcept {
-  const double beat_level = beat_energy_.median();
-  const double margin = std::max(beat_level - noise_level_, 0.1 * beat_level);
-  RPeak peak = candidate.peak;
-  peak.detected_at = at(now_).time;
-  peak.confidence = std::clamp((candidate.energy - noise_level_) / margin, 0.0, 1.0) *
-                    (1.0 - std::min(quiet_level_ / candidate.energy, 1.0)) * (searched_back ? 0.5 : 1.0);
-  if (queue_count_ < kQueue) {
-    queue_[static_cast<std::size_t>((queue_begin_ + queue_count_) % kQueue)] = peak;
-    ++queue_count_;
+void RPeakDetector::accept(const Candidate& candidate, double trust) noexcept {
+  const bool familiar = candidate.correlation >= kFamiliar;
+#ifdef ECG_DEBUG
+  fprintf(stderr, "%.2f at %.2f c %.2f gain %.2f of %d w %.1f trust %.1f e %.2f g %.2f noisy %d\n", to_seconds(candidate.peak.time.time_since_epoch()), to_seconds(newest_.time_since_epoch()), candidate.correlation, candidate.gain, candidate.of, candidate.of>=0?templates_[candidate.of].weight:0., trust, beat_energy_.count()?candidate.energy/beat_energy_.median():0., beat_slope_.count()?candidate.slope/beat_slope_.median():0., newest_<noisy_until_);
+#endif
+  const bool other_gain =
+      candidate.correlation >= kSurelyFamiliar && (candidate.gain > kMostGain || candidate.gain < kLeastGain);
+  if (other_gain && other_gain_ > 0.0 && std::abs(std::log(candidate.gain / other_gain_)) < kSameGain) {
+    rescale(candidate.gain);
+    other_gain_ = 0.0;
+  } else {
+    other_gain_ = other_gain ? candidate.gain : 0.0;
   }
-
-  if (candidate.energy < kThreshold * beat_level) {  // taken by a threshold that had fallen: the gain has changed
+  if (!templates_.any_trusted() && candidate.energy < kThreshold * beat_energy_.median()) {
+    // Taken by a threshold that had fallen: the gain has changed.
     beat_energy_.clear();
+    beat_slope_.clear();
     noise_level_ = quiet_level_;
   }
-  beat_energy_.push(candidate.energy);
+  if ((familiar && !other_gain) || beat_energy_.count() == 0 || !templates_.any_trusted()) {
+    beat_energy_.push(candidate.energy);
+    beat_slope_.push(candidate.slope);
+  }
+  RPeak peak = candidate.peak;
+  const double resemblance = familiar ? std::clamp((candidate.correlation - 0.5) / 0.4, 0.0, 1.0) : 0.7;
+  const double quiet = candidate.energy > 0.0 ? std::min(quiet_level_ / candidate.energy, 1.0) : 1.0;
+  peak.confidence = trust * resemblance * (1.0 - quiet);
+  emit(peak);
 
-  const double keep = has_last_ ? 1.0 - 1.0 / kPolarityMemory : 0.0;
+  const double keep = upward_ > 0.0 || downward_ > 0.0 ? 1.0 - 1.0 / kPolarityMemory : 0.0;
+  const double hysteresis = keep > 0.0 ? kPolarityHysteresis : 1.0;
   upward_ = keep * upward_ + (1.0 - keep) * candidate.upward;
   downward_ = keep * downward_ + (1.0 - keep) * candidate.downward;
-  const double hysteresis = has_last_ ? kPolarityHysteresis : 1.0;
   if (points_up_ ? downward_ > hysteresis * upward_ : upward_ >= hysteresis * downward_) points_up_ = !points_up_;
+  if (trust >= kLearnt && newest_ >= noisy_until_ || templates_.established(candidate.of)) {
+    templates_.learn(candidate.peak.shape, candidate.points_up);
+  }
 
-  if (has_last_) rr_s_.push(to_seconds(candidate.peak.time - last_.peak.time));
+  if (has_last_) {
+    if (trust >= kLearnt) rr_s_.push(to_seconds(candidate.peak.time - last_.peak.time));
+    before_last_ = last_.peak.time;
+  } else {
+    before_last_ = candidate.peak.time;
+  }
   last_ = candidate;
+  last_familiar_ = familiar;
   has_last_ = true;
   has_passed_over_ = false;
 }
 
+void RPeakDetector::emit(RPeak peak) noexcept {
+  if (peak.time > newest_ || queue_count_ == kQueue) return;
+  peak.detected_at = newest_;
+  queue_[static_cast<std::size_t>((queue_begin_ + queue_count_) % kQueue)] = peak;
+  ++queue_count_;
+}
+
+void RPeakDetector::rescale(double factor) noexcept {
+  templates_.scale(factor);
+  beat_energy_.scale(factor);
+  beat_slope_.scale(factor);
+  noise_level_ *= factor;
+}
+
+bool RPeakDetector::is_t_wave(const Candidate& candidate) const noexcept {
+  if (!has_last_) return false;
+  return to_seconds(candidate.peak.time - last_.peak.time) < kTWave * std::sqrt(rhythm_s()) &&
+         candidate.slope < kTWaveSlope * last_.slope;
+}
+
+// Size as energy and slope, 1 for the usual beat. A wide slow wave has the energy of a beat but not its slope.
+double RPeakDetector::strength(const Candidate& candidate) const noexcept {
+  return std::sqrt(candidate.energy / beat_energy_.median() * candidate.slope / beat_slope_.median());
+}
+
 // Far above the quiet part of the signal and above the converter's own steps.
-bool RPeakDetector::stands_out(const Candidate& candidate) const noexcept {
-  return candidate.energy > kStandOut * quiet_level_ && candidate.energy > kQuanta * quantum_mV_;
+bool RPeakDetector::stands_out(const Candidate& candidate, double times) const noexcept {
+  return candidate.energy > times * quiet_level_ && candidate.energy > kQuanta * quantum_mV_;
 }
 
 double RPeakDetector::beat_threshold() const noexcept {
@@ -402,12 +746,8 @@ double RPeakDetector::beat_threshold() const noexcept {
   return noise + kThreshold * (beat_energy_.median() - noise);
 }
 
-Duration RPeakDetector::overdue_by(Instant t) const noexcept {
-  return has_last_ ? t - last_.peak.time - from_seconds(kSearchBack * rhythm_s()) : t - start_ - kLearning;
-}
-
 double RPeakDetector::rhythm_s() const noexcept {
-  return rr_s_.count() > 0 ? std::min(rr_s_.mean(), kRhythmAtStart_s) : kRhythmAtStart_s;
+  return rr_s_.count() > 0 ? std::min(rr_s_.median(), kSlowestRhythm_s) : kRhythmAtStart_s;
 }
 
 }  // namespace perimap
