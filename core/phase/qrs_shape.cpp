@@ -6,11 +6,13 @@
 namespace perimap {
 namespace {
 
-constexpr double kKeep = 0.99;         // of a template's weight from beat to beat: some 100 beats count
-constexpr double kSmallest = 0.25;     // of the largest template's amplitude
-constexpr double kEstablished = 0.12;
+constexpr double kKeep = 0.99;           // of a template's weight from beat to beat: some 100 beats count
+constexpr double kSame = 0.85;           // correlation from which on a beat is of a template's kind
+constexpr double kTrusted = 2.5;         // weight
+constexpr double kEstablished = 0.12;    // of the weight of all
+constexpr double kSmallest = 0.25;       // of the largest template's size
 constexpr double kSlowestLearning = 1.0 / 8.0;
-constexpr int kDisplaced = 3;          // steps, 15 ms
+constexpr int kDisplaced = 3;  // steps, 15 ms
 
 ShapeMatch match_displaced(const QrsShape& shape, const QrsShape& reference, int displaced) noexcept {
   double xx = 0.0;
@@ -29,7 +31,7 @@ ShapeMatch match_displaced(const QrsShape& shape, const QrsShape& reference, int
   return {xy / std::sqrt(xx * yy), xy / yy};
 }
 
-double amplitude(const QrsShape& shape) noexcept {
+double root_mean_square(const QrsShape& shape) noexcept {
   double sum = 0.0;
   for (int i = 0; i < shape.points; ++i) {
     const double slope = static_cast<double>(shape.slope[static_cast<std::size_t>(i)]);
@@ -56,69 +58,89 @@ ShapeMatch best_match(const QrsShape& shape, const QrsShape& reference, int most
   return best;
 }
 
-void ShapeTemplates::clear() noexcept { templates_.fill({}); }
-
-int ShapeTemplates::learn(const QrsShape& shape, bool upward) noexcept {
-  if (shape.points == 0) return -1;
-  for (Template& t : templates_) t.weight *= kKeep;
-  int best = -1;
-  double correlation = kSame;
-  for (int i = 0; i < kTemplates; ++i) {
-    const Template& t = (*this)[i];
-    if (t.weight == 0.0) continue;
-    const double c = best_match(shape, t.shape, kDisplaced).correlation;
-    if (c >= correlation) {
-      correlation = c;
-      best = i;
-    }
-  }
-  if (best < 0) {
-    const auto rarest = std::min_element(templates_.begin(), templates_.end(),
-                                         [](const Template& a, const Template& b) { return a.weight < b.weight; });
-    *rarest = {shape, 1.0, amplitude(shape), upward};
-    return static_cast<int>(rarest - templates_.begin());
-  }
-  Template& t = templates_[static_cast<std::size_t>(best)];
-  t.weight += 1.0;
-  const auto rate = static_cast<float>(std::max(1.0 / t.weight, kSlowestLearning));
-  for (int i = 0; i < shape.points; ++i) {
-    float& mean = t.shape.slope[static_cast<std::size_t>(i)];
-    mean += rate * (shape.slope[static_cast<std::size_t>(i)] - mean);
-  }
-  t.amplitude = amplitude(t.shape);
-  return best;
-}
-
-void ShapeTemplates::scale(double factor) noexcept {
-  for (Template& t : templates_) {
-    for (float& slope : t.shape.slope) slope *= static_cast<float>(factor);
-    t.amplitude *= factor;
-  }
-}
-
-bool ShapeTemplates::any_trusted() const noexcept {
-  return std::any_of(templates_.begin(), templates_.end(), [](const Template& t) { return t.trusted(); });
-}
-
 bool ShapeTemplates::usable(int i) const noexcept {
   double largest = 0.0;
   for (const Template& t : templates_) {
-    if (t.trusted()) largest = std::max(largest, t.amplitude);
+    if (t.weight >= kTrusted) largest = std::max(largest, t.size);
   }
-  return (*this)[i].trusted() && (*this)[i].amplitude > kSmallest * largest;
+  return of(i).weight >= kTrusted && of(i).size > kSmallest * largest;
 }
 
 bool ShapeTemplates::established(int i) const noexcept {
   if (i < 0 || !usable(i)) return false;
   double total = 0.0;
   for (const Template& t : templates_) total += t.weight;
-  return (*this)[i].weight >= kEstablished * total;
+  return of(i).weight >= kEstablished * total;
+}
+
+bool ShapeTemplates::any_usable() const noexcept {
+  return std::any_of(templates_.begin(), templates_.end(), [](const Template& t) { return t.weight >= kTrusted; });
 }
 
 int ShapeTemplates::heaviest() const noexcept {
   const auto heaviest = std::max_element(templates_.begin(), templates_.end(),
                                          [](const Template& a, const Template& b) { return a.weight < b.weight; });
   return heaviest->weight > 0.0 ? static_cast<int>(heaviest - templates_.begin()) : -1;
+}
+
+ShapeMatch ShapeTemplates::match_with(int i, const QrsShape& shape) const noexcept {
+  ShapeMatch m = match(shape, of(i).shape);
+  m.gain /= of(i).size;
+  return m;
+}
+
+int ShapeTemplates::learn(const QrsShape& shape, bool upward) noexcept {
+  const double size = root_mean_square(shape);
+  if (!(size > 0.0)) return -1;
+  for (Template& t : templates_) t.weight *= kKeep;
+  int best = -1;
+  double correlation = kSame;
+  for (int i = 0; i < kTemplates; ++i) {
+    if (of(i).weight == 0.0) continue;
+    const double c = best_match(shape, of(i).shape, kDisplaced).correlation;
+    if (c < correlation) continue;
+    correlation = c;
+    best = i;
+  }
+  if (best < 0) {
+    const auto rarest = std::min_element(templates_.begin(), templates_.end(),
+                                         [](const Template& a, const Template& b) { return a.weight < b.weight; });
+    *rarest = {};
+    rarest->shape.points = shape.points;
+    rarest->upward = upward;
+    best = static_cast<int>(rarest - templates_.begin());
+  }
+  Template& t = templates_[static_cast<std::size_t>(best)];
+  t.weight += 1.0;
+  const auto rate = static_cast<float>(std::max(1.0 / t.weight, kSlowestLearning));
+  for (int i = 0; i < shape.points; ++i) {
+    float& mean = t.shape.slope[static_cast<std::size_t>(i)];
+    mean += rate * (shape.slope[static_cast<std::size_t>(i)] / static_cast<float>(size) - mean);
+  }
+  const auto norm = static_cast<float>(root_mean_square(t.shape));
+  for (float& slope : t.shape.slope) slope /= norm;
+
+  t.sizes[static_cast<std::size_t>(t.beats % kSizes)] = size;
+  t.beats = t.beats + 1 < 2 * kSizes ? t.beats + 1 : kSizes;  // bounded, same slot and same fill
+  auto sorted = t.sizes;
+  const auto end = sorted.begin() + std::min(t.beats, kSizes);
+  const auto middle = sorted.begin() + (end - sorted.begin()) / 2;
+  std::nth_element(sorted.begin(), middle, end);
+  t.size = *middle;
+  return best;
+}
+
+void ShapeTemplates::clear() noexcept { templates_.fill({}); }
+
+void ShapeTemplates::distrust() noexcept {
+  for (Template& t : templates_) t.weight = std::min(t.weight, 1.0);
+}
+
+void ShapeTemplates::scale(double factor) noexcept {
+  for (Template& t : templates_) {
+    for (double& size : t.sizes) size *= factor;
+    t.size *= factor;
+  }
 }
 
 }  // namespace perimap

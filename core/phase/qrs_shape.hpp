@@ -29,33 +29,41 @@ struct ShapeMatch {
 class ShapeTemplates {
  public:
   static constexpr int kTemplates = 5;
-  static constexpr double kSame = 0.85;     // correlation from which on a beat is of a template's kind
-  static constexpr double kTrusted = 2.5;   // beats, older ones fading, from which on a template is to be believed
 
-  struct Template {
-    QrsShape shape;
-    double weight = 0.0;  // beats, older ones fading; 0: free
-    double amplitude = 0.0;  // root mean square of the shape
-    bool upward = true;      // which way its R peak points
+  // Whether a template is to be believed: it has recurred, and is not far smaller than another that has (that would be
+  // a P or T wave).
+  [[nodiscard]] bool usable(int i) const noexcept;
+  // Usable, and a good part of the beats are of it.
+  [[nodiscard]] bool established(int i) const noexcept;
+  [[nodiscard]] bool any_usable() const noexcept;
+  [[nodiscard]] int heaviest() const noexcept;  // -1 when there is none
 
-    [[nodiscard]] bool trusted() const noexcept { return weight >= kTrusted; }
-  };
+  // How much a shape is like template i; the gain is to the size that its beats have had lately.
+  [[nodiscard]] ShapeMatch match_with(int i, const QrsShape& shape) const noexcept;
+  [[nodiscard]] bool upward(int i) const noexcept { return of(i).upward; }  // which way its R peak points
 
-  void clear() noexcept;
-  // A beat of this shape was found. Gives the template that it now belongs to.
+  // A beat of this shape was found. Gives the template that it now belongs to, -1 for a shape of no points.
   int learn(const QrsShape& shape, bool upward) noexcept;
+  void clear() noexcept;
+  // Other beats have come: each template has to prove itself anew.
+  void distrust() noexcept;
   // The gain of the signal has changed.
   void scale(double factor) noexcept;
 
-  [[nodiscard]] const Template& operator[](int i) const noexcept { return templates_[static_cast<std::size_t>(i)]; }
-  [[nodiscard]] bool any_trusted() const noexcept;
-  // To be believed, and not far smaller than another that is: that would be a P or T wave.
-  [[nodiscard]] bool usable(int i) const noexcept;
-  // A good part of the beats are of it.
-  [[nodiscard]] bool established(int i) const noexcept;
-  [[nodiscard]] int heaviest() const noexcept;  // -1 when there is none
-
  private:
+  static constexpr int kSizes = 8;
+
+  struct Template {
+    QrsShape shape;                      // root mean square 1
+    std::array<double, kSizes> sizes{};  // root mean squares of the last beats, in turn
+    int beats = 0;
+    double weight = 0.0;  // beats, older ones fading; 0: free
+    double size = 0.0;    // median of `sizes`
+    bool upward = true;
+  };
+
+  [[nodiscard]] const Template& of(int i) const noexcept { return templates_[static_cast<std::size_t>(i)]; }
+
   std::array<Template, kTemplates> templates_{};
 };
 

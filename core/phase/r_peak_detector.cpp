@@ -51,6 +51,11 @@ constexpr double kFamiliarStandOut = 1.5;
 constexpr double kQuanta = 2.0;  // times the converter's resolution; a single step of it reaches 0.75
 
 constexpr Duration kLearning = seconds(2);
+constexpr Duration kLearningWindow = milliseconds(3500);
+constexpr Duration kLearningAtMost = seconds(6);
+constexpr double kRecurringEnergy = 0.4;
+constexpr int kRecurringDisplaced = 3;
+constexpr double kRecurringShare = 0.4;
 constexpr Duration kRelearnAfter = seconds(3);  // without a beat,
 constexpr double kRelearnCycles = 3.0;         // and usual cycles
 constexpr Duration kRefractory = milliseconds(200);
@@ -58,10 +63,13 @@ constexpr Duration kAfterUnfamiliar = milliseconds(100);  // a familiar beat so 
 constexpr double kOutshines = 3.0;  // or after one of less than a third of its energy: that was a P wave
 constexpr double kTWave = 0.45;     // s / sqrt(cycle in s), the end of the T wave (Bazett 1920): before it, what has
 constexpr double kTWaveSlope = 0.5;  // less than this share of the last beat's slope is its T wave
+constexpr double kTWaveLevel = 0.8;
 constexpr double kThreshold = 0.3;   // of the way from noise level to beat level
 constexpr double kNoiseMemory = 8.0;  // candidates
 
 constexpr double kUnfamiliarStrength = 0.5;
+constexpr double kStep = 0.7;
+constexpr Duration kStepReach = milliseconds(100);
 constexpr double kDoubtfulStrength = 0.4;
 constexpr Duration kDoubt = milliseconds(250);
 constexpr double kUnfamiliarMost = 6.0;
@@ -312,7 +320,7 @@ void RPeakDetector::follow_templates() noexcept {
   const QrsShape shape = shape_at(fit.at);
   for (int i = 0; i < ShapeTemplates::kTemplates; ++i) {
     if (!templates_.usable(i)) continue;
-    const ShapeMatch m = match(shape, templates_[i].shape);
+    const ShapeMatch m = templates_.match_with(i, shape);
     if (m.correlation <= fit.correlation) continue;
     fit.correlation = m.correlation;
     fit.gain = m.gain;
@@ -363,6 +371,12 @@ RPeakDetector::Candidate RPeakDetector::measure(std::int64_t energy_peak) const 
   const std::int64_t peak = candidate.points_up ? top : bottom;
   refine_peak(peak, candidate);
   candidate.peak.shape = shape_at(peak);
+  const auto level = [&](std::int64_t i) {
+    return filter_.at(std::clamp<std::int64_t>(i + filter_.smooth_delay(), 0, filter_.now())).smooth;
+  };
+  const int step_reach = filter_.samples_in(kStepReach);
+  candidate.step = std::abs(level(peak + step_reach) - level(peak - step_reach)) /
+                   std::max(candidate.upward + candidate.downward, quantum_mV_);
   const int reach = filter_.samples_in(kFitReach);
   for (std::int64_t i = std::max<std::int64_t>(fit_count_ - kFits, 0); i < fit_count_; ++i) {
     const Fit& fit = fits_[static_cast<std::size_t>(i % kFits)];
@@ -379,7 +393,7 @@ RPeakDetector::Candidate RPeakDetector::measure_fit(const Fit& fit) const noexce
   candidate.correlation = fit.correlation;
   candidate.gain = fit.gain;
   candidate.of = fit.of;
-  candidate.points_up = templates_[fit.of].upward;
+  candidate.points_up = templates_.upward(fit.of);
   const std::int64_t middle = fit.at + filter_.energy_delay();
   const int reach = filter_.energy_width() / 2;
   for (std::int64_t i = std::max<std::int64_t>(middle - reach, 0); i <= std::min(middle + reach, filter_.now()); ++i) {
@@ -488,16 +502,15 @@ void RPeakDetector::refine_peak(std::int64_t peak, Candidate& candidate) const n
   candidate.peak.deviation = from_seconds(std::min(std::hypot(deviation_s, kDeviationFloor_s), kDeviationCap_s));
 }
 
-// Learning lasts until something stands out; only the last seconds count.
+// Learning lasts until something stands out and comes again; only the last seconds count.
 void RPeakDetector::finish_learning() noexcept {
-  const Instant oldest = newest_ - std::max(kLearning, kRelearnAfter);
-  const auto end = std::remove_if(learnt_.begin(), learnt_.begin() + learnt_count_,
-                                  [&](const Candidate& c) { return c.peak.time < oldest; });
-  learnt_count_ = static_cast<int>(end - learnt_.begin());
-  const auto strongest = std::max_element(learnt_.begin(), end,
-                                          [](const Candidate& a, const Candidate& b) { return a.energy < b.energy; });
-  if (strongest == end || !stands_out(*strongest, kStandOut)) return;
+  const Candidate* const strongest = strongest_recurring();
+  if (strongest == nullptr) return;
   learning_ = false;
+#ifdef ECG_DEBUG
+  fprintf(stderr, "%.2f LEARNT energy %.3f quiet %.3f n %d c %.2f gain %.2f\n", to_seconds(newest_.time_since_epoch()), strongest->energy, quiet_level_, learnt_count_, strongest->correlation, strongest->gain);
+#endif
+  searching_since_ = newest_;
   noise_level_ = quiet_level_;
   beat_energy_.clear();
   beat_slope_.clear();
@@ -506,7 +519,7 @@ void RPeakDetector::finish_learning() noexcept {
   if (strongest->correlation >= kSurelyFamiliar) {
     templates_.scale(strongest->gain);
   } else {
-    templates_.clear();
+    templates_.distrust();
   }
   for (int i = 0; i < learnt_count_; ++i) {
     const Candidate& candidate = learnt_[static_cast<std::size_t>(i)];
@@ -514,11 +527,32 @@ void RPeakDetector::finish_learning() noexcept {
   }
 }
 
+// Of the last seconds' candidates the strongest, when it stands out and a good part of those of its size are like it;
+// after some time without such, when it stands out.
+const RPeakDetector::Candidate* RPeakDetector::strongest_recurring() noexcept {
+  const Instant oldest = newest_ - kLearningWindow;
+  const auto end = std::remove_if(learnt_.begin(), learnt_.begin() + learnt_count_,
+                                  [&](const Candidate& c) { return c.peak.time < oldest; });
+  learnt_count_ = static_cast<int>(end - learnt_.begin());
+  const auto strongest = std::max_element(learnt_.begin(), end,
+                                          [](const Candidate& a, const Candidate& b) { return a.energy < b.energy; });
+  if (strongest == end || !stands_out(*strongest, kStandOut)) return nullptr;
+  if (newest_ - std::max(start_, searching_since_) > kLearningAtMost) return &*strongest;
+  int large = 0;
+  int alike = 0;
+  for (auto c = learnt_.begin(); c != end; ++c) {
+    if (c->energy < kRecurringEnergy * strongest->energy) continue;
+    ++large;
+    if (best_match(c->peak.shape, strongest->peak.shape, kRecurringDisplaced).correlation > kFamiliar) ++alike;
+  }
+  return alike >= 2 && alike >= kRecurringShare * large ? &*strongest : nullptr;
+}
+
 // A maximum of the energy.
 void RPeakDetector::decide(const Candidate& candidate) noexcept {
   const Instant t = candidate.peak.time;
   if (has_last_ && t - last_.peak.time < kRefractory) return;
-  if (templates_.any_trusted()) {
+  if (templates_.any_usable()) {
     decide_unfamiliar(candidate);
   } else {
     decide_new(candidate);
@@ -550,7 +584,16 @@ void RPeakDetector::decide_unfamiliar(const Candidate& candidate) noexcept {
       !stands_out(candidate, kStandOut)) {
     noise_level_ += (candidate.energy - noise_level_) / kNoiseMemory;
     if (size > kDisturbance) noisy_until_ = t + kNoisyFor;
+    if (candidate.energy > kUnfamiliarMost * beat_energy_.median() && large_recur(candidate)) {
+      learning_ = true;
+      searching_since_ = newest_;
+      return;
+    }
     pass_over(candidate);
+    return;
+  }
+  if (candidate.step > kStep) {
+    noisy_until_ = t + kNoisyFor;
     return;
   }
   if (t >= noisy_until_) {
@@ -577,6 +620,19 @@ double RPeakDetector::likelihood(const Candidate& candidate) const noexcept {
   if (!has_last_) return shape;
   const double off = (to_seconds(candidate.peak.time - last_.peak.time) / rhythm_s() - 1.0) / kTimely;
   return shape * (0.1 + std::exp(-0.5 * off * off));
+}
+
+// A candidate far larger than the beats is like another one of the last seconds: the gain has risen.
+bool RPeakDetector::large_recur(const Candidate& candidate) const noexcept {
+  for (int i = 0; i < learnt_count_; ++i) {
+    const Candidate& other = learnt_[static_cast<std::size_t>(i)];
+    if (candidate.peak.time - other.peak.time < kRefractory || newest_ - other.peak.time > kLearningWindow) continue;
+    if (other.energy > 0.5 * candidate.energy && other.energy < 2.0 * candidate.energy &&
+        best_match(candidate.peak.shape, other.peak.shape, kRecurringDisplaced).correlation > kSurelyFamiliar) {
+      return true;
+    }
+  }
+  return false;
 }
 
 void RPeakDetector::decide_familiar(const Fit& fit) noexcept {
@@ -651,12 +707,13 @@ void RPeakDetector::resolve_overdue() noexcept {
   }
   if (since_s > to_seconds(kRelearnAfter) && since_s > kRelearnCycles * rhythm) {
     learning_ = true;
+    searching_since_ = t;
     return;
   }
   if (!has_passed_over_ || t - passed_over_.peak.time < kSearchBackWait) return;
   const double late_s = since_s - kSearchBack * rhythm;
   if (late_s <= 0.0) return;
-  if (templates_.any_trusted() && !sizeable(passed_over_)) return;
+  if (templates_.any_usable() && !sizeable(passed_over_)) return;
   const double threshold = kSearchBackThreshold * beat_threshold() * std::exp(-late_s / kDeafness_s);
   if (passed_over_.energy > threshold && stands_out(passed_over_, kStandOut)) accept(passed_over_, 0.5);
 }
@@ -664,7 +721,7 @@ void RPeakDetector::resolve_overdue() noexcept {
 void RPeakDetector::accept(const Candidate& candidate, double trust) noexcept {
   const bool familiar = candidate.correlation >= kFamiliar;
 #ifdef ECG_DEBUG
-  fprintf(stderr, "%.2f at %.2f c %.2f gain %.2f of %d w %.1f trust %.1f e %.2f g %.2f noisy %d\n", to_seconds(candidate.peak.time.time_since_epoch()), to_seconds(newest_.time_since_epoch()), candidate.correlation, candidate.gain, candidate.of, candidate.of>=0?templates_[candidate.of].weight:0., trust, beat_energy_.count()?candidate.energy/beat_energy_.median():0., beat_slope_.count()?candidate.slope/beat_slope_.median():0., newest_<noisy_until_);
+  fprintf(stderr, "%.2f at %.2f c %.2f gain %.2f of %d w %.1f trust %.1f e %.2f g %.2f noisy %d\n", to_seconds(candidate.peak.time.time_since_epoch()), to_seconds(newest_.time_since_epoch()), candidate.correlation, candidate.gain, candidate.of, candidate.of>=0?0.0:0., trust, beat_energy_.count()?candidate.energy/beat_energy_.median():0., beat_slope_.count()?candidate.slope/beat_slope_.median():0., newest_<noisy_until_);
 #endif
   const bool other_gain =
       candidate.correlation >= kSurelyFamiliar && (candidate.gain > kMostGain || candidate.gain < kLeastGain);
@@ -674,13 +731,13 @@ void RPeakDetector::accept(const Candidate& candidate, double trust) noexcept {
   } else {
     other_gain_ = other_gain ? candidate.gain : 0.0;
   }
-  if (!templates_.any_trusted() && candidate.energy < kThreshold * beat_energy_.median()) {
+  if (!templates_.any_usable() && candidate.energy < kThreshold * beat_energy_.median()) {
     // Taken by a threshold that had fallen: the gain has changed.
     beat_energy_.clear();
     beat_slope_.clear();
     noise_level_ = quiet_level_;
   }
-  if ((familiar && !other_gain) || beat_energy_.count() == 0 || !templates_.any_trusted()) {
+  if ((familiar && !other_gain) || beat_energy_.count() == 0 || !templates_.any_usable()) {
     beat_energy_.push(candidate.energy);
     beat_slope_.push(candidate.slope);
   }
@@ -695,7 +752,7 @@ void RPeakDetector::accept(const Candidate& candidate, double trust) noexcept {
   upward_ = keep * upward_ + (1.0 - keep) * candidate.upward;
   downward_ = keep * downward_ + (1.0 - keep) * candidate.downward;
   if (points_up_ ? downward_ > hysteresis * upward_ : upward_ >= hysteresis * downward_) points_up_ = !points_up_;
-  if (trust >= kLearnt && newest_ >= noisy_until_ || templates_.established(candidate.of)) {
+  if ((trust >= kLearnt && newest_ >= noisy_until_) || (familiar && candidate.of == templates_.heaviest())) {
     templates_.learn(candidate.peak.shape, candidate.points_up);
   }
 
@@ -728,7 +785,7 @@ void RPeakDetector::rescale(double factor) noexcept {
 bool RPeakDetector::is_t_wave(const Candidate& candidate) const noexcept {
   if (!has_last_) return false;
   return to_seconds(candidate.peak.time - last_.peak.time) < kTWave * std::sqrt(rhythm_s()) &&
-         candidate.slope < kTWaveSlope * last_.slope;
+         candidate.slope < kTWaveSlope * std::max(last_.slope, kTWaveLevel * beat_slope_.median());
 }
 
 // Size as energy and slope, 1 for the usual beat. A wide slow wave has the energy of a beat but not its slope.

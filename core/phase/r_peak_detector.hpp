@@ -65,6 +65,7 @@ class RPeakDetector {
     RPeak peak;
     double energy = 0.0;
     double slope = 0.0;   // largest magnitude
+    double step = 0.0;    // change of level from before to after, to the excursions
     double upward = 0.0;  // largest excursions from the baseline, >= 0
     double downward = 0.0;
     bool points_up = true;
@@ -111,6 +112,8 @@ class RPeakDetector {
                           std::int64_t& bottom) const noexcept;
   void refine_peak(std::int64_t peak, Candidate& candidate) const noexcept;
   void finish_learning() noexcept;
+  [[nodiscard]] const Candidate* strongest_recurring() noexcept;
+  [[nodiscard]] bool large_recur(const Candidate& candidate) const noexcept;
   void decide(const Candidate& candidate) noexcept;
   void decide_new(const Candidate& candidate) noexcept;
   void decide_unfamiliar(const Candidate& candidate) noexcept;
@@ -178,6 +181,7 @@ class RPeakDetector {
   double other_gain_ = 0.0;  // of the last beat to its template, when it was far from 1
 
   bool learning_ = true;
+  Instant searching_since_;
   std::array<Candidate, kLearningCapacity> learnt_{};
   int learnt_count_ = 0;
   bool has_last_ = false;
