@@ -18,8 +18,10 @@ struct EcgSample {
   double despiked = 0.0;  // median over a few samples
   double smooth = 0.0;    // mean of that over 20 ms
   double smoother = 0.0;  // mean of that over 20 ms
+  double residue = 0.0;   // |mV - smooth|
   double slope = 0.0;     // mV a 20 ms: difference of `smoother` over 20 ms
   double energy = 0.0;    // mean of |slope| over 80 ms
+  double rough = 0.0;     // mV, mean of |mV - smooth| over 80 ms: what is too fast for a QRS complex
 };
 
 class EcgFilter {

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kKeep = 0.99;           // of a template's weight from beat to beat: some 100 beats count
 constexpr double kSame = 0.85;           // correlation from which on a beat is of a template's kind
-constexpr double kTrusted = 2.5;         // weight
+constexpr double kTrusted = 3.5;         // weight
 constexpr double kEstablished = 0.12;    // of the weight of all
 constexpr double kSmallest = 0.25;       // of the largest template's size
 constexpr double kSlowestLearning = 1.0 / 8.0;

@@ -30,6 +30,7 @@ constexpr double kSurelyFamiliar = 0.85;
 constexpr double kLeastGain = 0.4;  // of a familiar beat, to its template
 constexpr double kSureGain = 0.6;  // a smaller one must be the more alike
 constexpr double kSureCorrelation = 0.9;
+constexpr double kCutOffCorrelation = 0.95;  // of a complex that the end of the signal cuts off
 constexpr double kMostGain = 3.0;
 constexpr double kSameGain = 0.3;  // logarithm: two beats in a row so much alike tell that the gain has changed
 
@@ -50,6 +51,14 @@ constexpr double kStandOut = 3.5;  // times the quiet level; bare noise reaches 
 constexpr double kFamiliarStandOut = 1.5;
 constexpr double kQuanta = 2.0;  // times the converter's resolution; a single step of it reaches 0.75
 
+constexpr double kRough = 4.0;         // times the usual roughness,
+constexpr double kRoughToBeats = 0.5;  // and this share of the beats' slope over 20 ms: nothing can be seen
+constexpr double kRoughHysteresis = 0.5;
+constexpr double kRoughRise_s = 30.0;
+constexpr Duration kRoughAtLeast = milliseconds(200);  // a QRS complex is rough for less
+constexpr Duration kRoughBefore = milliseconds(100);
+constexpr Duration kRoughAfter = milliseconds(150);
+
 constexpr Duration kLearning = seconds(2);
 constexpr Duration kLearningWindow = milliseconds(3500);
 constexpr Duration kLearningAtMost = seconds(6);
@@ -68,12 +77,16 @@ constexpr double kThreshold = 0.3;   // of the way from noise level to beat leve
 constexpr double kNoiseMemory = 8.0;  // candidates
 
 constexpr double kUnfamiliarStrength = 0.5;
-constexpr double kStep = 0.7;
+constexpr double kStep = 0.85;
+constexpr double kStepUnlike = 0.82;
+constexpr double kVeryLike = 0.93;
 constexpr Duration kStepReach = milliseconds(100);
+constexpr double kOtherStrength = 0.45;
+constexpr double kEstablishedStrength = 0.3;
 constexpr double kDoubtfulStrength = 0.4;
 constexpr Duration kDoubt = milliseconds(250);
 constexpr double kUnfamiliarMost = 6.0;
-constexpr double kDisturbance = 0.4;
+constexpr double kDisturbance = 0.33;
 constexpr Duration kNoisyFor = seconds(2);
 constexpr double kMissed = 1.45;         // usual cycles between two familiar beats: there was one in between
 constexpr double kLearnt = 0.7;
@@ -215,10 +228,11 @@ void RPeakDetector::take_sample(Instant t, float mV) noexcept {
   if (filter_.now() >= 0 && step > 0.0 && (quantum_mV_ == 0.0 || step < quantum_mV_)) quantum_mV_ = step;
   filter_.push(t, static_cast<double>(mV));
   watch_quiet_level();
+  watch_roughness();
   if (follow_energy() && crest_count_ < kPending) crests_[static_cast<std::size_t>(crest_count_++)] = crest_at_;
   if (filter_.now() % step_ == 0) follow_templates();
   decide_crests();
-  if (learning_ && t - start_ > kLearning) finish_learning();
+  if (learning_ && t - start_ > kLearning && t > rough_until_) finish_learning();
   resolve_overdue();
 }
 
@@ -276,6 +290,23 @@ void RPeakDetector::watch_quiet_level() noexcept {
   const auto quantile = sorted.begin() + static_cast<std::int64_t>(kQuietQuantile * static_cast<double>(count));
   std::nth_element(sorted.begin(), quantile, sorted.begin() + count);
   quiet_level_ = *quantile;
+}
+
+// Electrosurgery, chewing, a loose cable: as strong as the beats and too fast to be any. The usual roughness (mains hum)
+// is followed slowly upward, so that a burst does not become the usual.
+void RPeakDetector::watch_roughness() noexcept {
+  const double rough = filter_.at(filter_.now()).rough;
+  const double risen = rough_level_ * (1.0 + to_seconds(period_) / kRoughRise_s);
+  rough_level_ = rough_level_ > 0.0 ? std::min(rough, risen) : rough;
+  if (beat_slope_.count() == 0) return;
+  const double limit = std::max(kRough * rough_level_, kRoughToBeats * beat_slope_.median());
+  if (rough < (newest_ < rough_until_ ? kRoughHysteresis * limit : limit)) smooth_at_ = newest_;
+  if (newest_ - smooth_at_ < kRoughAtLeast) return;
+  if (newest_ > rough_until_) rough_since_ = smooth_at_ - kRoughBefore;
+  rough_until_ = newest_ + kRoughAfter;
+  noisy_until_ = std::max(noisy_until_, newest_ + kNoisyFor);
+  has_held_ = false;
+  has_passed_over_ = false;
 }
 
 // True when a local maximum of the energy, at crest_at_, has just been confirmed.
@@ -344,6 +375,7 @@ void RPeakDetector::decide_crests() noexcept {
     std::copy(crests_.begin() + 1, crests_.begin() + crest_count_, crests_.begin());
     --crest_count_;
     const Candidate candidate = measure(crest);
+    if (candidate.peak.time < rough_until_ && candidate.peak.time > rough_since_) continue;
     if (learnt_count_ == kLearningCapacity) {
       std::copy(learnt_.begin() + 1, learnt_.end(), learnt_.begin());
       --learnt_count_;
@@ -371,12 +403,7 @@ RPeakDetector::Candidate RPeakDetector::measure(std::int64_t energy_peak) const 
   const std::int64_t peak = candidate.points_up ? top : bottom;
   refine_peak(peak, candidate);
   candidate.peak.shape = shape_at(peak);
-  const auto level = [&](std::int64_t i) {
-    return filter_.at(std::clamp<std::int64_t>(i + filter_.smooth_delay(), 0, filter_.now())).smooth;
-  };
-  const int step_reach = filter_.samples_in(kStepReach);
-  candidate.step = std::abs(level(peak + step_reach) - level(peak - step_reach)) /
-                   std::max(candidate.upward + candidate.downward, quantum_mV_);
+  measure_step(peak, candidate);
   const int reach = filter_.samples_in(kFitReach);
   for (std::int64_t i = std::max<std::int64_t>(fit_count_ - kFits, 0); i < fit_count_; ++i) {
     const Fit& fit = fits_[static_cast<std::size_t>(i % kFits)];
@@ -415,8 +442,19 @@ RPeakDetector::Candidate RPeakDetector::measure_fit(const Fit& fit) const noexce
   for (std::int64_t i = std::max<std::int64_t>(fit.at - window, 0); i <= fit.at + window; ++i) {
     if (candidate.points_up ? value(i) > value(peak) : value(i) < value(peak)) peak = i;
   }
+  measure_step(peak, candidate);
   refine_peak(peak, candidate);
   return candidate;
+}
+
+// Whether the signal comes back after the complex; when the lead comes off it goes to another level and stays there.
+void RPeakDetector::measure_step(std::int64_t peak, Candidate& candidate) const noexcept {
+  const auto level = [&](std::int64_t i) {
+    return filter_.at(std::clamp<std::int64_t>(i + filter_.smooth_delay(), 0, filter_.now())).smooth;
+  };
+  const int reach = filter_.samples_in(kStepReach);
+  const double excursions = std::max(candidate.upward + candidate.downward, quantum_mV_);
+  candidate.step = std::abs(level(peak + reach) - level(peak - reach)) / excursions;
 }
 
 // The largest excursions from the baseline around sample `centre`, and where they are.
@@ -608,7 +646,7 @@ void RPeakDetector::hold(const Candidate& candidate) noexcept {
 #ifdef ECG_DEBUG
   fprintf(stderr, "%.2f hold c %.2f gain %.2f of %d e %.2f g %.2f noisy %d\n", to_seconds(candidate.peak.time.time_since_epoch()), candidate.correlation, candidate.gain, candidate.of, beat_energy_.count()?candidate.energy/beat_energy_.median():0., beat_slope_.count()?candidate.slope/beat_slope_.median():0., newest_<noisy_until_);
 #endif
-  if (has_held_ && likelihood(candidate) <= likelihood(held_)) return;
+  if ((candidate.step > kStep && candidate.correlation < kStepUnlike) || (has_held_ && likelihood(candidate) <= likelihood(held_))) return;
   held_ = candidate;
   held_until_ = Instant::max();
   has_held_ = true;
@@ -636,7 +674,6 @@ bool RPeakDetector::large_recur(const Candidate& candidate) const noexcept {
 }
 
 void RPeakDetector::decide_familiar(const Fit& fit) noexcept {
-  if (learning_) return;
   const Candidate candidate = measure_fit(fit);
   const Instant t = candidate.peak.time;
   const Duration since = has_last_ ? t - last_.peak.time : Duration::max();
@@ -647,11 +684,20 @@ void RPeakDetector::decide_familiar(const Fit& fit) noexcept {
     pass_over(candidate);
     return;
   }
-  const bool noisy = t < noisy_until_;
   const bool sure = candidate.correlation >= kSureCorrelation;
-  if (ending_ && !sure) return;
+  if ((ending_ && candidate.correlation < kCutOffCorrelation) || (t < rough_until_ && !sure)) return;
+  if (learning_) {
+    if (!sure || candidate.gain < kSureGain) return;
+    learning_ = false;
+  }
+  const bool noisy = t < noisy_until_;
   if (candidate.correlation < kFamiliar || (noisy && !templates_.established(candidate.of))) {
     if (noisy) hold(candidate);
+    return;
+  }
+  if (candidate.of != templates_.heaviest() &&
+      strength(candidate) < (templates_.established(candidate.of) ? kEstablishedStrength : kOtherStrength)) {
+    pass_over(candidate);
     return;
   }
   if (candidate.gain < kSureGain && !sure) {
@@ -663,7 +709,9 @@ void RPeakDetector::decide_familiar(const Fit& fit) noexcept {
   if (has_held_) {
     has_held_ = false;
     const bool apart = t - held_.peak.time > kRefractory && (!has_last_ || held_.peak.time - last_.peak.time > kRefractory);
-    if (apart && has_last_ && to_seconds(since) > kMissed * rhythm) {
+    const bool very_like = held_.correlation > kVeryLike && held_.gain > kSureGain && held_.gain < 1.0 / kSureGain &&
+                           strength(held_) > kUnfamiliarStrength;
+    if (apart && has_last_ && (very_like || to_seconds(since) > kMissed * rhythm)) {
       accept(held_, 0.5);
     } else {
       noisy_until_ = t + kNoisyFor;
@@ -695,7 +743,7 @@ void RPeakDetector::pass_over(const Candidate& candidate) noexcept {
 // When a beat is overdue, the strongest candidate since the last one is taken, above a threshold that falls as time
 // goes on. It has to wait a little, for a P wave is no beat when its QRS complex follows.
 void RPeakDetector::resolve_overdue() noexcept {
-  if (learning_) return;
+  if (learning_ || newest_ < rough_until_) return;
   const Instant t = newest_;
   const double since_s = to_seconds(t - (has_last_ ? last_.peak.time : start_));
   const double rhythm = rhythm_s();

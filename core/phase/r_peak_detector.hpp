@@ -102,6 +102,7 @@ class RPeakDetector {
   void set_rate(Duration sample_period) noexcept;
   void take_sample(Instant t, float mV) noexcept;
   void watch_quiet_level() noexcept;
+  void watch_roughness() noexcept;
   [[nodiscard]] bool follow_energy() noexcept;
   void follow_templates() noexcept;
   void decide_crests() noexcept;
@@ -110,6 +111,7 @@ class RPeakDetector {
   [[nodiscard]] Candidate measure_fit(const Fit& fit) const noexcept;
   void measure_excursions(std::int64_t centre, Candidate& candidate, std::int64_t& top,
                           std::int64_t& bottom) const noexcept;
+  void measure_step(std::int64_t peak, Candidate& candidate) const noexcept;
   void refine_peak(std::int64_t peak, Candidate& candidate) const noexcept;
   void finish_learning() noexcept;
   [[nodiscard]] const Candidate* strongest_recurring() noexcept;
@@ -173,6 +175,10 @@ class RPeakDetector {
   double quiet_level_ = 0.0;
   double quantum_mV_ = 0.0;  // smallest step between samples: the converter's resolution
   double noise_level_ = 0.0;
+  double rough_level_ = 0.0;  // the lowest of late
+  Instant smooth_at_;         // the last instant that was not rough
+  Instant rough_since_;       // nothing can be seen from then
+  Instant rough_until_;       // to then
   Recent beat_energy_;
   Recent beat_slope_;
   Recent rr_s_;
