@@ -10,6 +10,8 @@
 
 #include "core/phase/cycle_correction.hpp"
 #include "core/phase/phase_law.hpp"
+#include "core/phase/r_peak.hpp"
+#include "core/phase/rhythm_monitor.hpp"
 #include "core/phase/seconds.hpp"
 #include "core/time/instant.hpp"
 
@@ -39,6 +41,7 @@ struct CardiacCycle {
   Duration length_deviation{0};
   Duration previous_length{0};  // the warped law depends on it
   Duration systole{0};          // under the warped law's rule
+  bool teaches = false;         // completed, from a normal beat to a normal beat: what was seen in it may be learnt
 };
 
 class CardiacClock {
@@ -69,6 +72,9 @@ class CardiacClock {
   // means nothing.
   [[nodiscard]] CardiacCycle cycle_at(Instant t) const noexcept;
 
+  // Whether the coming cycles can be predicted. In atrial fibrillation the deviations are honest, but large.
+  [[nodiscard]] Rhythm rhythm() const noexcept { return rhythm_; }
+
   [[nodiscard]] const PhaseLawSettings& law() const noexcept { return law_; }
   [[nodiscard]] std::uint64_t beats() const noexcept { return beats_; }  // R peaks taken since the start
 
@@ -79,7 +85,8 @@ class CardiacClock {
     Instant time;
     Duration deviation{0};
     std::uint32_t index_in_run = 0;  // 0 for the first beat and for the first after a gap
-    Duration irregularity{0};        // by how much the interval before it missed its prediction, 0 when in rhythm
+    BeatClass beat_class = BeatClass::kNormal;
+    Duration irregularity{0};  // by how much the interval before it missed its prediction, 0 when in rhythm
   };
 
   struct Located {
@@ -105,6 +112,7 @@ class CardiacClock {
   Seconds running_deviation_{0.0};  // of the running cycle's length
   Seconds next_deviation_{0.0};     // of the length of the cycle after it
   bool contradicted_ = false;
+  Rhythm rhythm_ = Rhythm::kUnknown;
 };
 
 static_assert(std::is_trivially_copyable_v<CardiacClock>);

@@ -17,21 +17,25 @@ constexpr double kRhythmTolerance = 0.2;
 }  // namespace
 
 CardiacClockTracker::CardiacClockTracker(const CardiacClockSettings& settings) noexcept
-    : predictor_(settings.predictor) {
+    : predictor_(settings.predictor, settings.autoregression) {
   clock_.law_ = settings.law;
   clock_.detector_delay_ = settings.detector_delay;
   clock_.lost_after_ = settings.lost_after;
 }
 
 void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
+  if (peak.beat_class == BeatClass::kNoise) return;
   CardiacClock::Beat beat;
+  beat.beat_class = peak.beat_class;
   beat.time = peak.time;
   beat.deviation = peak.deviation;
   if (clock_.held_ > 0) {
     const Duration rr = peak.time - clock_.anchor();
     if (rr < kShortestRr) return;
     const bool gap = rr > clock_.predicted_length() + clock_.lost_after_;
-    if (!gap) {
+    if (gap) {
+      rhythm_.clear();
+    } else {
       beat.index_in_run = clock_.beat(0).index_in_run + 1;
       Seconds learnt = rr;
       if (predictor_.count() > 0) {
@@ -39,7 +43,13 @@ void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
         learnt = std::clamp(learnt, (1.0 - kRhythmTolerance) * predicted, (1.0 + kRhythmTolerance) * predicted);
         if (learnt != Seconds(rr)) beat.irregularity = from_seconds(std::abs((Seconds(rr) - predicted).count()));
       }
-      predictor_.push(rr, learnt);
+      const bool teaches = clock_.beat(0).beat_class != BeatClass::kPremature && peak.beat_class == BeatClass::kNormal;
+      if (teaches) {
+        predictor_.push(rr, learnt);
+      } else {
+        predictor_.score(rr);
+      }
+      if (!peak.unusual_shape && !last_unusual_) rhythm_.push(rr);
     }
   }
 
@@ -48,6 +58,8 @@ void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
   clock_.held_ = std::min(clock_.held_ + 1, static_cast<int>(clock_.history_.size()));
   ++clock_.beats_;
   predictor_.predict(clock_.predicted_);
+  last_unusual_ = peak.unusual_shape;
+  clock_.rhythm_ = rhythm_.rhythm();
   clock_.length_deviation_ = predictor_.deviation();
   clock_.running_deviation_ = clock_.length_deviation_;
   clock_.next_deviation_ = clock_.length_deviation_;

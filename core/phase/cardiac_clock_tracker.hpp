@@ -6,6 +6,7 @@
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/phase/r_peak.hpp"
+#include "core/phase/rhythm_monitor.hpp"
 #include "core/phase/rr_predictor.hpp"
 #include "core/time/instant.hpp"
 
@@ -14,6 +15,7 @@ namespace perimap {
 struct CardiacClockSettings {
   PhaseLawSettings law;
   RrMethod predictor = RrMethod::kAutoregressive;
+  AutoregressionSettings autoregression;
   // A beat is missed only when it could have been known: due time + 3 deviations + this.
   Duration detector_delay = std::chrono::milliseconds(150);
   // After the due beat. Four missed beats at rest; by then the free-running deviation is a good part of a cycle.
@@ -24,14 +26,17 @@ class CardiacClockTracker {
  public:
   explicit CardiacClockTracker(const CardiacClockSettings& settings) noexcept;
 
-  // In order of time. A peak less than 250 ms after the last (or before it) is refused.
+  // In order of time. A peak less than 250 ms after the last (or before it) is refused, and so is one classed as noise.
+  // Only cycles from a normal beat to a normal beat teach the rhythm.
   void on_r_peak(const RPeak& peak) noexcept;
 
   [[nodiscard]] const CardiacClock& clock() const noexcept { return clock_; }
 
  private:
   RrPredictor predictor_;
+  RhythmMonitor rhythm_;
   CardiacClock clock_;
+  bool last_unusual_ = false;  // the last beat's shape
 };
 
 }  // namespace perimap

@@ -8,10 +8,10 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr Duration kSpike = milliseconds(4);              // a pacing spike behind a monitor's own filter
-constexpr Duration kDespikedPeriod = milliseconds(5);     // slower signals are left as they are
-constexpr Duration kSmooth = milliseconds(20);            // a whole period of 50 Hz
-constexpr Duration kEnergy = milliseconds(80);            // about a normal QRS complex
+constexpr Duration kSpike = milliseconds(4);           // a pacing spike behind a monitor's own filter
+constexpr Duration kDespikedPeriod = milliseconds(5);  // slower signals are left as they are
+constexpr Duration kSmooth = milliseconds(20);         // a whole period of 50 Hz
+constexpr Duration kEnergy = milliseconds(80);         // about a normal QRS complex
 
 }  // namespace
 

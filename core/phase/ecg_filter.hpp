@@ -35,7 +35,8 @@ class EcgFilter {
   void push(Instant t, double mV) noexcept;
 
   [[nodiscard]] std::int64_t now() const noexcept { return now_; }  // index of the newest sample, -1 before the first
-  [[nodiscard]] const EcgSample& at(std::int64_t i) const noexcept {  // one of the last kHistory, or clamped to the first
+  [[nodiscard]] const EcgSample& at(
+      std::int64_t i) const noexcept {  // one of the last kHistory, or clamped to the first
     return samples_[static_cast<std::size_t>((i < 0 ? 0 : i) & (kHistory - 1))];
   }
   [[nodiscard]] Duration period() const noexcept { return period_; }

@@ -6,11 +6,11 @@
 namespace perimap {
 namespace {
 
-constexpr double kKeep = 0.99;           // of a template's weight from beat to beat: some 100 beats count
-constexpr double kSame = 0.85;           // correlation from which on a beat is of a template's kind
-constexpr double kTrusted = 3.5;         // weight
-constexpr double kEstablished = 0.12;    // of the weight of all
-constexpr double kSmallest = 0.25;       // of the largest template's size
+constexpr double kKeep = 0.99;         // of a template's weight from beat to beat: some 100 beats count
+constexpr double kSame = 0.85;         // correlation from which on a beat is of a template's kind
+constexpr double kTrusted = 3.5;       // weight
+constexpr double kEstablished = 0.12;  // of the weight of all
+constexpr double kSmallest = 0.25;     // of the largest template's size
 constexpr double kSlowestLearning = 1.0 / 8.0;
 constexpr int kDisplaced = 3;  // steps, 15 ms
 
@@ -42,9 +42,7 @@ double root_mean_square(const QrsShape& shape) noexcept {
 
 }  // namespace
 
-ShapeMatch match(const QrsShape& shape, const QrsShape& reference) noexcept {
-  return best_match(shape, reference, 0);
-}
+ShapeMatch match(const QrsShape& shape, const QrsShape& reference) noexcept { return best_match(shape, reference, 0); }
 
 ShapeMatch best_match(const QrsShape& shape, const QrsShape& reference, int most_displaced) noexcept {
   if (shape.points == 0 || shape.points != reference.points) return {};
@@ -84,8 +82,12 @@ int ShapeTemplates::heaviest() const noexcept {
 }
 
 ShapeMatch ShapeTemplates::match_with(int i, const QrsShape& shape) const noexcept {
-  ShapeMatch m = match(shape, of(i).shape);
-  m.gain /= of(i).size;
+  return best_match_with(i, shape, 0);
+}
+
+ShapeMatch ShapeTemplates::best_match_with(int i, const QrsShape& shape, int most_displaced) const noexcept {
+  ShapeMatch m = best_match(shape, of(i).shape, most_displaced);
+  if (of(i).size > 0.0) m.gain /= of(i).size;
   return m;
 }
 

@@ -40,6 +40,7 @@ class ShapeTemplates {
 
   // How much a shape is like template i; the gain is to the size that its beats have had lately.
   [[nodiscard]] ShapeMatch match_with(int i, const QrsShape& shape) const noexcept;
+  [[nodiscard]] ShapeMatch best_match_with(int i, const QrsShape& shape, int most_displaced) const noexcept;
   [[nodiscard]] bool upward(int i) const noexcept { return of(i).upward; }  // which way its R peak points
 
   // A beat of this shape was found. Gives the template that it now belongs to, -1 for a shape of no points.

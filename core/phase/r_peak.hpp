@@ -21,6 +21,7 @@ struct RPeak {
   double confidence = 0.0;  // 0 to 1: how far it stands out from noise and how much it resembles the beats before
   Duration deviation{0};    // standard deviation of `time`
   BeatClass beat_class = BeatClass::kNormal;  // as the beat classer says; the detector and hardware triggers leave it
+  bool unusual_shape = false;                 // as the beat classer says: not the patient's usual QRS complex
   QrsShape shape{};                           // of no points where there is no ECG around the beat
 };
 

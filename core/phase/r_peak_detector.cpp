@@ -21,14 +21,14 @@ constexpr double kRiseAgain = 1.5;               // the next one begins when the
 constexpr Duration kShapeStep = milliseconds(5);
 constexpr Duration kShapeBefore = milliseconds(90);
 constexpr Duration kShapeAfter = milliseconds(50);
-constexpr Duration kFitReach = milliseconds(60);   // a maximum of the energy and a fit so far apart are one complex
-constexpr Duration kFitAwait = milliseconds(30);   // how long a maximum of the energy waits for a fit after its middle
-constexpr int kFitConfirm = 3;                     // steps after which a maximum of the correlation is one
-constexpr double kFamiliar = 0.8;                  // correlation
-constexpr double kAlike = 0.6;  // enough for a candidate in noise
+constexpr Duration kFitReach = milliseconds(60);  // a maximum of the energy and a fit so far apart are one complex
+constexpr Duration kFitAwait = milliseconds(30);  // how long a maximum of the energy waits for a fit after its middle
+constexpr int kFitConfirm = 3;                    // steps after which a maximum of the correlation is one
+constexpr double kFamiliar = 0.8;                 // correlation
+constexpr double kAlike = 0.6;                    // enough for a candidate in noise
 constexpr double kSurelyFamiliar = 0.85;
 constexpr double kLeastGain = 0.4;  // of a familiar beat, to its template
-constexpr double kSureGain = 0.6;  // a smaller one must be the more alike
+constexpr double kSureGain = 0.6;   // a smaller one must be the more alike
 constexpr double kSureCorrelation = 0.9;
 constexpr double kCutOffCorrelation = 0.95;  // of a complex that the end of the signal cuts off
 constexpr double kMostGain = 3.0;
@@ -66,14 +66,14 @@ constexpr double kRecurringEnergy = 0.4;
 constexpr int kRecurringDisplaced = 3;
 constexpr double kRecurringShare = 0.4;
 constexpr Duration kRelearnAfter = seconds(3);  // without a beat,
-constexpr double kRelearnCycles = 3.0;         // and usual cycles
+constexpr double kRelearnCycles = 3.0;          // and usual cycles
 constexpr Duration kRefractory = milliseconds(200);
 constexpr Duration kAfterUnfamiliar = milliseconds(100);  // a familiar beat so soon after an unfamiliar one counts
-constexpr double kOutshines = 3.0;  // or after one of less than a third of its energy: that was a P wave
-constexpr double kTWave = 0.45;     // s / sqrt(cycle in s), the end of the T wave (Bazett 1920): before it, what has
+constexpr double kOutshines = 3.0;   // or after one of less than a third of its energy: that was a P wave
+constexpr double kTWave = 0.45;      // s / sqrt(cycle in s), the end of the T wave (Bazett 1920): before it, what has
 constexpr double kTWaveSlope = 0.5;  // less than this share of the last beat's slope is its T wave
 constexpr double kTWaveLevel = 0.8;
-constexpr double kThreshold = 0.3;   // of the way from noise level to beat level
+constexpr double kThreshold = 0.3;    // of the way from noise level to beat level
 constexpr double kNoiseMemory = 8.0;  // candidates
 
 constexpr double kUnfamiliarStrength = 0.5;
@@ -88,7 +88,7 @@ constexpr Duration kDoubt = milliseconds(250);
 constexpr double kUnfamiliarMost = 6.0;
 constexpr double kDisturbance = 0.33;
 constexpr Duration kNoisyFor = seconds(2);
-constexpr double kMissed = 1.45;         // usual cycles between two familiar beats: there was one in between
+constexpr double kMissed = 1.45;  // usual cycles between two familiar beats: there was one in between
 constexpr double kLearnt = 0.7;
 constexpr double kInRhythm = 0.15;
 
@@ -97,8 +97,8 @@ constexpr double kSearchBackLike = 0.7;  // where the beats' shape is known: wit
 constexpr double kSearchBackSize = 0.35;
 constexpr double kSearchBackVeryLike = 0.88;  // or with these
 constexpr double kSearchBackLeastSize = 0.2;
-constexpr double kTimely = 0.2;  // of the usual cycle: standard deviation within which a held candidate is in time
-constexpr double kSearchBack = 1.66;          // mean cycles without a beat after which a weaker candidate is taken,
+constexpr double kTimely = 0.2;       // of the usual cycle: standard deviation within which a held candidate is in time
+constexpr double kSearchBack = 1.66;  // mean cycles without a beat after which a weaker candidate is taken,
 constexpr double kSearchBackThreshold = 0.5;  // above this share of the threshold
 constexpr Duration kSearchBackWait = milliseconds(300);
 constexpr double kRhythmAtStart_s = 1.2;  // until an interval is known
@@ -106,23 +106,6 @@ constexpr double kSlowestRhythm_s = 2.0;
 constexpr double kDeafness_s = 1.0;  // that threshold falls by e in this time: the gain may have changed
 
 }  // namespace
-
-void RPeakDetector::Recent::push(double value) noexcept {
-  values_[static_cast<std::size_t>(count_ % kLevels)] = value;
-  ++count_;
-  if (count_ >= 2 * kLevels) count_ -= kLevels;  // bounded, same slot and same fill
-}
-
-void RPeakDetector::Recent::scale(double factor) noexcept {
-  for (double& value : values_) value *= factor;
-}
-
-double RPeakDetector::Recent::median() const noexcept {
-  auto sorted = values_;
-  const auto middle = sorted.begin() + count() / 2;
-  std::nth_element(sorted.begin(), middle, sorted.begin() + count());
-  return *middle;
-}
 
 RPeakDetector::RPeakDetector(Duration sample_period) noexcept : given_period_(sample_period) {
   forget();
@@ -292,8 +275,8 @@ void RPeakDetector::watch_quiet_level() noexcept {
   quiet_level_ = *quantile;
 }
 
-// Electrosurgery, chewing, a loose cable: as strong as the beats and too fast to be any. The usual roughness (mains hum)
-// is followed slowly upward, so that a burst does not become the usual.
+// Electrosurgery, chewing, a loose cable: as strong as the beats and too fast to be any. The usual roughness (mains
+// hum) is followed slowly upward, so that a burst does not become the usual.
 void RPeakDetector::watch_roughness() noexcept {
   const double rough = filter_.at(filter_.now()).rough;
   const double risen = rough_level_ * (1.0 + to_seconds(period_) / kRoughRise_s);
@@ -428,8 +411,8 @@ RPeakDetector::Candidate RPeakDetector::measure_fit(const Fit& fit) const noexce
   }
   candidate.peak.shape = shape_at(fit.at);
   for (int i = 0; i < candidate.peak.shape.points; ++i) {
-    candidate.slope =
-        std::max(candidate.slope, std::abs(static_cast<double>(candidate.peak.shape.slope[static_cast<std::size_t>(i)])));
+    candidate.slope = std::max(candidate.slope,
+                               std::abs(static_cast<double>(candidate.peak.shape.slope[static_cast<std::size_t>(i)])));
   }
   std::int64_t top = 0;
   std::int64_t bottom = 0;
@@ -545,9 +528,6 @@ void RPeakDetector::finish_learning() noexcept {
   const Candidate* const strongest = strongest_recurring();
   if (strongest == nullptr) return;
   learning_ = false;
-#ifdef ECG_DEBUG
-  fprintf(stderr, "%.2f LEARNT energy %.3f quiet %.3f n %d c %.2f gain %.2f\n", to_seconds(newest_.time_since_epoch()), strongest->energy, quiet_level_, learnt_count_, strongest->correlation, strongest->gain);
-#endif
   searching_since_ = newest_;
   noise_level_ = quiet_level_;
   beat_energy_.clear();
@@ -611,9 +591,6 @@ void RPeakDetector::decide_new(const Candidate& candidate) noexcept {
 }
 
 void RPeakDetector::decide_unfamiliar(const Candidate& candidate) noexcept {
-#ifdef ECG_DEBUG
-  fprintf(stderr, "%.2f unfam c %.2f gain %.2f of %d e %.2f g %.2f noisy %d\n", to_seconds(candidate.peak.time.time_since_epoch()), candidate.correlation, candidate.gain, candidate.of, beat_energy_.count()?candidate.energy/beat_energy_.median():0., beat_slope_.count()?candidate.slope/beat_slope_.median():0., newest_<noisy_until_);
-#endif
   if (candidate.correlation >= kFamiliar && candidate.gain >= kLeastGain) return;  // the matched filter decides on it
   if (is_t_wave(candidate)) return;
   const double size = strength(candidate);
@@ -643,10 +620,9 @@ void RPeakDetector::decide_unfamiliar(const Candidate& candidate) noexcept {
 }
 
 void RPeakDetector::hold(const Candidate& candidate) noexcept {
-#ifdef ECG_DEBUG
-  fprintf(stderr, "%.2f hold c %.2f gain %.2f of %d e %.2f g %.2f noisy %d\n", to_seconds(candidate.peak.time.time_since_epoch()), candidate.correlation, candidate.gain, candidate.of, beat_energy_.count()?candidate.energy/beat_energy_.median():0., beat_slope_.count()?candidate.slope/beat_slope_.median():0., newest_<noisy_until_);
-#endif
-  if ((candidate.step > kStep && candidate.correlation < kStepUnlike) || (has_held_ && likelihood(candidate) <= likelihood(held_))) return;
+  if ((candidate.step > kStep && candidate.correlation < kStepUnlike) ||
+      (has_held_ && likelihood(candidate) <= likelihood(held_)))
+    return;
   held_ = candidate;
   held_until_ = Instant::max();
   has_held_ = true;
@@ -708,7 +684,8 @@ void RPeakDetector::decide_familiar(const Fit& fit) noexcept {
   const double rhythm = rhythm_s();
   if (has_held_) {
     has_held_ = false;
-    const bool apart = t - held_.peak.time > kRefractory && (!has_last_ || held_.peak.time - last_.peak.time > kRefractory);
+    const bool apart =
+        t - held_.peak.time > kRefractory && (!has_last_ || held_.peak.time - last_.peak.time > kRefractory);
     const bool very_like = held_.correlation > kVeryLike && held_.gain > kSureGain && held_.gain < 1.0 / kSureGain &&
                            strength(held_) > kUnfamiliarStrength;
     if (apart && has_last_ && (very_like || to_seconds(since) > kMissed * rhythm)) {
@@ -768,9 +745,6 @@ void RPeakDetector::resolve_overdue() noexcept {
 
 void RPeakDetector::accept(const Candidate& candidate, double trust) noexcept {
   const bool familiar = candidate.correlation >= kFamiliar;
-#ifdef ECG_DEBUG
-  fprintf(stderr, "%.2f at %.2f c %.2f gain %.2f of %d w %.1f trust %.1f e %.2f g %.2f noisy %d\n", to_seconds(candidate.peak.time.time_since_epoch()), to_seconds(newest_.time_since_epoch()), candidate.correlation, candidate.gain, candidate.of, candidate.of>=0?0.0:0., trust, beat_energy_.count()?candidate.energy/beat_energy_.median():0., beat_slope_.count()?candidate.slope/beat_slope_.median():0., newest_<noisy_until_);
-#endif
   const bool other_gain =
       candidate.correlation >= kSurelyFamiliar && (candidate.gain > kMostGain || candidate.gain < kLeastGain);
   if (other_gain && other_gain_ > 0.0 && std::abs(std::log(candidate.gain / other_gain_)) < kSameGain) {

@@ -23,6 +23,7 @@
 #include "core/phase/ecg_filter.hpp"
 #include "core/phase/qrs_shape.hpp"
 #include "core/phase/r_peak.hpp"
+#include "core/phase/recent_values.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
@@ -80,19 +81,6 @@ class RPeakDetector {
     double correlation = 0.0;
     double gain = 0.0;
     int of = -1;
-  };
-
-  class Recent {  // the last values; at least one must be held
-   public:
-    void push(double value) noexcept;
-    void clear() noexcept { count_ = 0; }
-    void scale(double factor) noexcept;
-    [[nodiscard]] int count() const noexcept { return count_ < kLevels ? count_ : kLevels; }
-    [[nodiscard]] double median() const noexcept;
-
-   private:
-    std::array<double, kLevels> values_{};
-    int count_ = 0;
   };
 
   void forget() noexcept;
@@ -179,9 +167,9 @@ class RPeakDetector {
   Instant smooth_at_;         // the last instant that was not rough
   Instant rough_since_;       // nothing can be seen from then
   Instant rough_until_;       // to then
-  Recent beat_energy_;
-  Recent beat_slope_;
-  Recent rr_s_;
+  RecentValues<kLevels> beat_energy_;
+  RecentValues<kLevels> beat_slope_;
+  RecentValues<kLevels> rr_s_;
 
   // Decisions.
   double other_gain_ = 0.0;  // of the last beat to its template, when it was far from 1
@@ -193,7 +181,7 @@ class RPeakDetector {
   bool has_last_ = false;
   Candidate last_;  // the last beat
   bool last_familiar_ = false;
-  Instant before_last_;         // the beat before it
+  Instant before_last_;  // the beat before it
   bool has_passed_over_ = false;
   Candidate passed_over_;  // the strongest candidate since then that was not taken for a beat
   bool has_held_ = false;

@@ -8,7 +8,8 @@
 namespace perimap {
 namespace {
 
-constexpr double kRidge = 1e-2;          // times the window's sum of squares
+constexpr int kPulled = 4;  // coefficients
+constexpr double kLeastDeviation_s = 0.004;
 constexpr double kShortestOfMean = 0.7;  // predictions stay within these shares of the window's mean
 constexpr double kLongestOfMean = 1.3;
 
@@ -17,17 +18,33 @@ constexpr double kPriorWeight = 4.0;         // beats that the starting value co
 constexpr double kPriorDeviation = 0.05;     // of the interval: resting sinus rhythm
 constexpr double kLargestScoredError = 0.5;  // of the prediction: a missed beat must not count as a whole cycle's error
 
+constexpr double kNormalDeviation = 1.4826;  // a normal distribution's deviation, in median absolute deviations
+
+// Of a copy, for the order is lost.
+double median_of(const double* values, int count) noexcept {
+  std::array<double, RrPredictor::kWindow> sorted{};
+  std::copy(values, values + count, sorted.begin());
+  const auto middle = sorted.begin() + count / 2;
+  std::nth_element(sorted.begin(), middle, sorted.begin() + count);
+  return *middle;
+}
+
 }  // namespace
+
+void RrPredictor::score(Seconds rr) noexcept {
+  if (count_ == 0) return;
+  std::array<Seconds, 1> predicted{};
+  predict(predicted);
+  const double bound = kLargestScoredError * predicted[0].count();
+  const double error = std::clamp(rr.count() - predicted[0].count(), -bound, bound);
+  const double keep = 1.0 - 1.0 / kErrorMemory;
+  squared_error_sum_s2_ = keep * squared_error_sum_s2_ + error * error;
+  error_weight_ = keep * error_weight_ + 1.0;
+}
 
 void RrPredictor::push(Seconds rr, Seconds learnt) noexcept {
   if (count_ > 0) {
-    std::array<Seconds, 1> predicted{};
-    predict(predicted);
-    const double bound = kLargestScoredError * predicted[0].count();
-    const double error = std::clamp(rr.count() - predicted[0].count(), -bound, bound);
-    const double keep = 1.0 - 1.0 / kErrorMemory;
-    squared_error_sum_s2_ = keep * squared_error_sum_s2_ + error * error;
-    error_weight_ = keep * error_weight_ + 1.0;
+    score(rr);
   } else {
     const double prior = kPriorDeviation * learnt.count();
     squared_error_sum_s2_ = kPriorWeight * prior * prior;
@@ -62,7 +79,14 @@ void RrPredictor::predict(std::span<Seconds> next) const noexcept {
 
 void RrPredictor::predict_autoregressive(std::span<Seconds> next) const noexcept {
   using Window = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kWindow, 1>;
-  const Window y = Eigen::Map<const Eigen::VectorXd>(rr_s_.data(), count_);
+  Window y = Eigen::Map<const Eigen::VectorXd>(rr_s_.data(), count_);
+  if (std::isfinite(autoregression_.clip)) {
+    const double median = median_of(y.data(), count_);
+    Window distance = (y.array() - median).abs();
+    const double reach =
+        autoregression_.clip * (kNormalDeviation * median_of(distance.data(), count_) + kLeastDeviation_s);
+    y = y.array().max(median - reach).min(median + reach);
+  }
   const double mean = y.mean();
   const Window z = y.array() - mean;
   const double sum_of_squares = z.squaredNorm();
@@ -71,10 +95,12 @@ void RrPredictor::predict_autoregressive(std::span<Seconds> next) const noexcept
     return;
   }
 
-  // Normal equations of z_i = sum_k c_k z_{i-1-k}; ridge * var(y) * len(y) is ridge * sum of squares.
+  // Normal equations of z_i = sum_k c_k z_{i-1-k}, with ridge * sum of squares * |c - pull|^2 added.
   Eigen::Matrix<double, kOrder, kOrder> normal = Eigen::Matrix<double, kOrder, kOrder>::Identity();
-  normal *= kRidge * sum_of_squares;
+  const double ridge = autoregression_.ridge * sum_of_squares;
+  normal *= ridge;
   Eigen::Matrix<double, kOrder, 1> right = Eigen::Matrix<double, kOrder, 1>::Zero();
+  right.head<kPulled>().setConstant(ridge * autoregression_.pull / kPulled);
   for (int i = kOrder; i < count_; ++i) {
     const Eigen::Matrix<double, kOrder, 1> past = z.segment<kOrder>(i - kOrder).reverse();
     normal += past * past.transpose();

@@ -20,18 +20,32 @@ enum class RrMethod : std::uint8_t {
   kPrevious  // assumption A3 of Tully, Kantor & Choset (ICRA 2013)
 };
 
+// What keeps the fit sound: when the rhythm is nearly constant, and when intervals are wrong (noise shifts R peaks).
+struct AutoregressionSettings {
+  double ridge = 0.1;  // times the window's sum of squares
+  // Where the ridge pulls the coefficients: their sum over the first four intervals, in equal parts. A rhythm that
+  // wanders slowly has it near 1.
+  double pull = 0.8;
+  double clip =
+      3.0;  // times the intervals' robust deviation (1.48 median absolute deviations + 4 ms) from their median
+};
+
 class RrPredictor {
  public:
   static constexpr int kOrder = 8;
   static constexpr int kWindow = 60;
 
-  explicit RrPredictor(RrMethod method = RrMethod::kAutoregressive) noexcept : method_(method) {}
+  explicit RrPredictor(RrMethod method = RrMethod::kAutoregressive,
+                       const AutoregressionSettings& autoregression = {}) noexcept
+      : method_(method), autoregression_(autoregression) {}
 
   // Takes the interval that has just ended (> 0) and scores the prediction that stood for it. When the true interval is
   // no guide to the coming ones (an ectopic beat, a missed one), give the rhythm a bounded value as `learnt`; the score
   // still tells the truth.
   void push(Seconds rr) noexcept { push(rr, rr); }
   void push(Seconds rr, Seconds learnt) noexcept;
+  // The same for an interval that is to teach nothing: scored only.
+  void score(Seconds rr) noexcept;
 
   // The next intervals in order, each predicted from those before it. Zero before the first push.
   void predict(std::span<Seconds> next) const noexcept;
@@ -46,6 +60,7 @@ class RrPredictor {
   void predict_autoregressive(std::span<Seconds> next) const noexcept;
 
   RrMethod method_;
+  AutoregressionSettings autoregression_;
   int count_ = 0;
   std::array<double, kWindow> rr_s_{};  // oldest first
   double squared_error_sum_s2_ = 0.0;

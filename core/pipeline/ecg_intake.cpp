@@ -22,18 +22,25 @@ void EcgIntake::push(const EcgBlock& block) noexcept {
   if (block.lead_off) {
     counters_.ecg_lead_off.add(block.count);
     detector_.lead_off(block.first_sample_time);
+    classer_.interrupt();
     return;
   }
   bool changed = false;
+  std::uint64_t flat = 0;
   Instant t = block.first_sample_time;
   for (const float mV : block.samples()) {
     if (const std::optional<RPeak> peak = detector_.push(t, mV)) {
-      tracker_.on_r_peak(*peak);
+      tracker_.on_r_peak(classer_.classify(*peak));
       changed = true;
     }
+    if (detector_.signal() == EcgSignal::kFlat) ++flat;
     t += block.sample_period;
   }
-  if (!changed) return;
+  if (flat > 0) counters_.ecg_lead_off.add(flat);
+  if (changed) publish();
+}
+
+void EcgIntake::publish() noexcept {
   cells_.mapper.write(tracker_.clock());
   cells_.publisher.write(tracker_.clock());
   cells_.status.write(tracker_.clock());

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "core/phase/beat_classer.hpp"
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
 #include "core/phase/r_peak_detector.hpp"
@@ -27,7 +28,10 @@ class EcgIntake {
   void push(const EcgBlock& block) noexcept;
 
  private:
+  void publish() noexcept;
+
   RPeakDetector detector_;
+  BeatClasser classer_;
   CardiacClockTracker tracker_;
   ClockCells& cells_;
   PipelineCounters& counters_;

@@ -21,7 +21,7 @@ struct PipelineCounters {
   Counter last_pose_ns;
   // ECG thread
   Counter ecg_samples;
-  Counter ecg_lead_off;  // samples
+  Counter ecg_lead_off;  // samples that mean nothing: the device said so, or the line was flat for a second
   Counter ecg_dropped;   // gaps in the device's sequence
   LatencyHistogram ecg_delay;
   Counter last_ecg_ns;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
@@ -17,6 +18,9 @@ namespace perimap {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
+
+// The autoregression of the vectors, before it was made to survive outliers.
+const AutoregressionSettings kVectors{.ridge = 1e-2, .pull = 0.0, .clip = std::numeric_limits<double>::infinity()};
 
 class PhaseGolden : public testing::Test {
  protected:
@@ -39,7 +43,7 @@ class PhaseGolden : public testing::Test {
   Seconds rr(std::size_t beat) const { return Seconds(r_s_[beat + 1] - r_s_[beat]); }
 
   Seconds predicted(RrMethod method, std::size_t after_intervals) const {
-    RrPredictor predictor(method);
+    RrPredictor predictor(method, kVectors);
     for (std::size_t i = 0; i < after_intervals; ++i) predictor.push(rr(i));
     std::array<Seconds, 1> next;
     predictor.predict(next);
@@ -110,6 +114,7 @@ TEST_F(PhaseGolden, ClockGivesCausalThenExactPhase) {
   const auto exact_warped = golden_.at("exact_warp").get<std::vector<double>>();
   const auto instant = [](double t_s) { return Instant(from_seconds(t_s + 100.0)); };
   CardiacClockSettings settings;
+  settings.autoregression = kVectors;
   CardiacClockTracker tracker(settings);
   settings.law = warped_;
   CardiacClockTracker warped(settings);

@@ -1,0 +1,95 @@
+#include "core/phase/beat_classer.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace perimap {
+namespace {
+
+constexpr double kUsual = 0.9;     // correlation with the usual shape from which on a beat is of it
+constexpr double kStranger = 1.5;  // times the usual beats' strangeness: a premature beat is ventricular
+constexpr double kSlight = 0.01;
+constexpr double kStrangenessMemory = 16.0;  // beats
+constexpr int kDisplaced = 4;                // steps, 20 ms
+constexpr double kDoubtful = 0.3;            // confidence below which an unusual shape is thought noise
+constexpr double kEarly = 0.9;               // of the rhythm's cycle, in an unusual shape
+constexpr double kMuchTooEarly = 0.8;        // in the usual one
+constexpr double kInRhythm = 0.15;           // of the rhythm's cycle, either way
+constexpr double kPause = 1.5;               // rhythm's cycles
+constexpr double kGap = 4.0;                 // beyond, beats were missed
+constexpr double kLongest = 1.35;            // cycles
+
+}  // namespace
+
+// 1 - correlation with the usual shape; 0 while there is none.
+double BeatClasser::strangeness(const QrsShape& shape) const noexcept {
+  const int usual = templates_.heaviest();
+  if (usual < 0 || !templates_.usable(usual) || shape.points == 0) return 0.0;
+  return 1.0 - templates_.best_match_with(usual, shape, kDisplaced).correlation;
+}
+
+BeatClass BeatClasser::by_interval(const RPeak& peak, bool unusual) const noexcept {
+  if (!has_last_ || normal_rr_s_.count() == 0) return BeatClass::kNormal;
+  const double cycle_s = normal_rr_s_.median();
+  const double rr_s = to_seconds(peak.time - last_);
+  if (unusual && rr_s < kEarly * cycle_s) return BeatClass::kPremature;
+  // Breathing shortens cycles too, but not from one to the next.
+  const double usual_s = last_rr_s_ > 0.0 ? std::min(cycle_s, last_rr_s_) : cycle_s;
+  if (!unusual && rr_s < kMuchTooEarly * usual_s && !is_due(peak)) return BeatClass::kPremature;
+  if (rr_s > kPause * cycle_s && last_class_ != BeatClass::kPremature) return BeatClass::kPause;
+  return BeatClass::kNormal;
+}
+
+// One cycle after the last normal beat: after an interpolated beat the next normal one is where it would have been
+// without.
+bool BeatClasser::is_due(const RPeak& peak) const noexcept {
+  if (!has_normal_ || normal_rr_s_.count() == 0) return false;
+  const double cycle_s = normal_rr_s_.median();
+  return std::abs(to_seconds(peak.time - last_normal_) - cycle_s) < kInRhythm * cycle_s;
+}
+
+RPeak BeatClasser::classify(RPeak peak) noexcept {
+  const bool gap =
+      has_last_ && normal_rr_s_.count() > 0 && to_seconds(peak.time - last_) > kGap * normal_rr_s_.median();
+  if (gap) interrupt();
+  const double strange = strangeness(peak.shape);
+  const bool unusual = strange > 1.0 - kUsual;
+  peak.beat_class = by_interval(peak, unusual);
+  if (unusual && peak.confidence < kDoubtful && !is_due(peak)) peak.beat_class = BeatClass::kNoise;
+  peak.unusual_shape =
+      unusual || (peak.beat_class == BeatClass::kPremature && strange > kStranger * strangeness_ + kSlight);
+  if (peak.beat_class == BeatClass::kNoise) return peak;  // as if it had not been
+
+  templates_.learn(peak.shape, true);
+  if (has_last_) learn(peak, unusual);
+  last_unusual_ = peak.unusual_shape;
+  if (peak.beat_class == BeatClass::kNormal) strangeness_ += (strange - strangeness_) / kStrangenessMemory;
+  last_ = peak.time;
+  last_class_ = peak.beat_class;
+  has_last_ = true;
+  if (peak.beat_class != BeatClass::kPremature) {
+    last_normal_ = peak.time;
+    has_normal_ = true;
+  }
+  return peak;
+}
+
+// The rhythm's cycle: intervals between beats in rhythm; from one over a premature beat, as it tells when every second
+// beat is one, half. Bounded, so that a pause hardly counts but a new rhythm does after some beats.
+void BeatClasser::learn(const RPeak& peak, bool unusual) noexcept {
+  last_rr_s_ = 0.0;
+  if (peak.beat_class == BeatClass::kPremature || unusual) return;
+  const double rr_s = to_seconds(peak.time - last_);
+  if (last_class_ != BeatClass::kPremature) {
+    if (last_unusual_) return;
+    last_rr_s_ = rr_s;
+    normal_rr_s_.push(normal_rr_s_.count() == 0 ? rr_s : std::min(rr_s, kLongest * normal_rr_s_.median()));
+    return;
+  }
+  if (!has_normal_ || normal_rr_s_.count() == 0) return;
+  const double half_s = 0.5 * to_seconds(peak.time - last_normal_);
+  const double cycle_s = normal_rr_s_.median();
+  if (std::abs(half_s - cycle_s) < kInRhythm * cycle_s) normal_rr_s_.push(half_s);
+}
+
+}  // namespace perimap

@@ -1,0 +1,40 @@
+// The last N values of something, and their median.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+namespace perimap {
+
+template <int N>
+class RecentValues {
+ public:
+  void push(double value) noexcept {
+    values_[static_cast<std::size_t>(next_)] = value;
+    next_ = (next_ + 1) % N;
+    count_ = std::min(count_ + 1, N);
+  }
+  void clear() noexcept {
+    next_ = 0;
+    count_ = 0;
+  }
+  void scale(double factor) noexcept {
+    for (double& value : values_) value *= factor;
+  }
+  [[nodiscard]] int count() const noexcept { return count_; }
+  // Of an even number of values the upper of the middle two. At least one must be held.
+  [[nodiscard]] double median() const noexcept {
+    auto sorted = values_;
+    const auto middle = sorted.begin() + count_ / 2;
+    std::nth_element(sorted.begin(), middle, sorted.begin() + count_);
+    return *middle;
+  }
+
+ private:
+  std::array<double, N> values_{};
+  int next_ = 0;
+  int count_ = 0;
+};
+
+}  // namespace perimap
