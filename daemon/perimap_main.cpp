@@ -4,6 +4,7 @@
 #include <exception>
 
 #include "daemon/commands/check.hpp"
+#include "daemon/commands/ecg.hpp"
 #include "daemon/commands/experiment.hpp"
 #include "daemon/commands/replay.hpp"
 #include "daemon/commands/report.hpp"
@@ -24,6 +25,7 @@ int run(int argc, char** argv) {
   perimap::add_replay_command(app, exit_code);
   perimap::add_watch_command(app, exit_code);
   perimap::add_report_command(app, exit_code);
+  perimap::add_ecg_command(app, exit_code);
   perimap::add_experiment_command(app, exit_code);
   perimap::add_check_command(app, exit_code);
   try {

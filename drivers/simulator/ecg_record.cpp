@@ -5,7 +5,7 @@
 #include <array>
 #include <span>
 
-#include "drivers/simulator/csv.hpp"
+#include "drivers/text_file/csv.hpp"
 #include "drivers/simulator/embedded_data.hpp"
 
 namespace perimap {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "drivers/simulator/csv.hpp"
+#include "drivers/text_file/csv.hpp"
 
 namespace perimap {
 

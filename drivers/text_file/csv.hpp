@@ -1,4 +1,4 @@
-// Reading of the simulator's own comma-separated tables.
+// Reading of comma-separated tables.
 #pragma once
 
 #include <charconv>
@@ -8,10 +8,11 @@
 #include <utility>
 
 #include "core/error/expected.hpp"
+#include "core/error/one_line.hpp"
 
 namespace perimap {
 
-// Walks the lines of a table and the fields of each line; knows where it is, for errors.
+// Walks the lines of a table and the fields of each line; knows where it is, for errors: "NAME:LINE:COLUMN: what".
 class CsvCursor {
  public:
   CsvCursor(std::string name, std::string_view text) : name_(std::move(name)), rest_(text) {}
@@ -23,6 +24,8 @@ class CsvCursor {
       line_ = rest_.substr(0, end);
       rest_ = end == std::string_view::npos ? std::string_view{} : rest_.substr(end + 1);
       ++line_number_;
+      line_begin_ = line_.data();
+      field_begin_ = line_begin_;
       if (!line_.empty() && line_.back() == '\r') line_.remove_suffix(1);
       if (!line_.empty()) return true;
     }
@@ -32,10 +35,15 @@ class CsvCursor {
   // The next field of the line; empty when there are no more.
   [[nodiscard]] std::string_view field() noexcept {
     const std::size_t end = line_.find(',');
+    if (line_.data() != nullptr) field_begin_ = line_.data();
     const std::string_view value = line_.substr(0, end);
     line_ = end == std::string_view::npos ? std::string_view{} : line_.substr(end + 1);
     return value;
   }
+
+  // What is left of the line.
+  [[nodiscard]] std::string_view rest_of_line() const noexcept { return line_; }
+  [[nodiscard]] std::size_t line_number() const noexcept { return line_number_; }
 
   template <class Number>
   [[nodiscard]] Expected<Number> number() {
@@ -47,15 +55,20 @@ class CsvCursor {
   }
 
   [[nodiscard]] tl::unexpected<Error> wrong(std::string_view what, std::string_view value = {}) const {
-    std::string message = name_ + ":" + std::to_string(line_number_) + ": " + std::string(what);
-    if (!value.empty()) message += ", found '" + std::string(value) + "'";
-    return fail(std::move(message));
+    std::string message = name_ + ":" + std::to_string(line_number_) + ":" +
+                          std::to_string(field_begin_ - line_begin_ + 1) + ": " + std::string(what);
+    if (!value.empty()) message += ", found '" + std::string(value.substr(0, kShown)) + "'";
+    return fail(on_one_line(std::move(message)));
   }
 
  private:
+  static constexpr std::size_t kShown = 40;  // of a wrong value
+
   std::string name_;
   std::string_view rest_;
   std::string_view line_;
+  const char* line_begin_ = nullptr;  // for messages
+  const char* field_begin_ = nullptr;
   std::size_t line_number_ = 0;
 };
 

@@ -1,0 +1,303 @@
+#include "daemon/commands/ecg.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "daemon/commands/progress.hpp"
+#include "daemon/ecg/beat_score.hpp"
+#include "daemon/ecg/ecg_analysis.hpp"
+#include "daemon/process/stop_signal.hpp"
+#include "drivers/ecg_file/beat_table.hpp"
+#include "drivers/ecg_file/ecg_csv.hpp"
+#include "drivers/ecg_file/wfdb.hpp"
+#include "drivers/recording/channels.hpp"
+#include "drivers/recording/recording_reader.hpp"
+#include "drivers/text_file/text_file.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr std::size_t kLargestTable = std::size_t{1} << 32;
+constexpr std::size_t kLongWithoutProgress = 1'000'000;  // samples
+
+struct Options {
+  std::string input;
+  std::string beats;
+  std::string reference;
+  std::optional<double> rate_hz;
+  std::optional<int> column;
+  double gain = 1.0;
+  bool json = false;
+};
+
+Expected<std::string> read_whole(const std::string& file, std::string_view what) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file, error);
+  if (!error && size > kLargestTable) return fail(file + ": is too large");
+  return read_text_file(file, error ? 0 : static_cast<std::size_t>(size), what);
+}
+
+// The ECG channel of a recording; samples while the lead was off have no value.
+Expected<EcgTrace> read_recorded(const std::string& file, double gain) {
+  auto reader = RecordingReader::open(file);
+  if (!reader) return tl::unexpected(reader.error());
+  const std::array wanted{channels::kEcgSamples};
+  if (const auto selected = reader->select(wanted); !selected) return tl::unexpected(selected.error());
+  EcgTrace trace;
+  std::optional<std::int64_t> begin_ns;
+  for (;;) {
+    const auto message = reader->next();
+    if (!message) return tl::unexpected(message.error());
+    if (!*message) break;
+    const auto samples = reader->decode<perimap_EcgSamples>(**message);
+    if (!samples) return tl::unexpected(samples.error());
+    const auto& block = **samples;
+    if (!begin_ns) begin_ns = block.first_sample_time_ns;
+    for (std::uint32_t i = 0; i < block.ecg_mV._length; ++i) {
+      const double t = 1e-9 * static_cast<double>(block.first_sample_time_ns - *begin_ns) +
+                       1e-9 * static_cast<double>(block.sample_period_ns) * i;
+      if (!trace.time_s.empty() && t <= trace.time_s.back()) continue;  // sent twice
+      const double mV = block.lead_off ? std::numeric_limits<double>::quiet_NaN()
+                                       : gain * static_cast<double>(block.ecg_mV._buffer[i]);
+      trace.time_s.push_back(t);
+      trace.mV.push_back(static_cast<float>(mV));
+    }
+  }
+  if (trace.mV.empty()) return fail(file + ": there are no ECG samples in it");
+  return trace;
+}
+
+Expected<EcgTrace> read_trace(const Options& options) {
+  const std::filesystem::path path(options.input);
+  const std::string extension = path.extension().string();
+  if (extension == ".mcap") {
+    if (options.rate_hz || options.column)
+      return fail("a recording knows its rate and channel: leave out --rate and --column");
+    return read_recorded(options.input, options.gain);
+  }
+  std::filesystem::path header = path;
+  header.replace_extension(".hea");
+  if (extension == ".hea" || extension == ".dat" || (extension.empty() && std::filesystem::exists(header))) {
+    if (options.rate_hz) return fail("a WFDB record knows its rate: leave out --rate");
+    auto trace = read_wfdb(header.string(), options.column.value_or(1));
+    if (trace) {
+      for (float& mV : trace->mV) mV *= static_cast<float>(options.gain);
+    }
+    return trace;
+  }
+  const auto text = read_whole(options.input, "ECG table");
+  if (!text) return tl::unexpected(text.error());
+  return parse_ecg_csv(*text, options.input, {options.rate_hz, options.column, options.gain});
+}
+
+std::string_view name_of(BeatClass beat_class) {
+  switch (beat_class) {
+    case BeatClass::kNormal:
+      return "normal";
+    case BeatClass::kPremature:
+      return "premature";
+    case BeatClass::kPause:
+      return "pause";
+    case BeatClass::kNoise:
+      return "noise";
+  }
+  return "";
+}
+
+std::string_view name_of(RrMethod method) {
+  switch (method) {
+    case RrMethod::kPrevious:
+      return "previous";
+    case RrMethod::kMeanOf8:
+      return "mean_of_8";
+    case RrMethod::kAutoregressive:
+      return "autoregressive";
+  }
+  return "";
+}
+
+double seconds(Instant t) { return to_seconds(t.time_since_epoch()); }
+
+std::string beat_rows(const EcgAnalysis& analysis) {
+  std::string rows = "time_s,class,confidence,detected_at_s\n";
+  for (const AnalysedBeat& beat : analysis.beats) {
+    rows += fmt::format("{:.5f},{},{:.3f},{:.5f}\n", seconds(beat.peak.time), name_of(beat.peak.beat_class),
+                        beat.peak.confidence, seconds(beat.peak.detected_at));
+  }
+  return rows;
+}
+
+nlohmann::json to_json(const EcgAnalysis& analysis, const PredictionErrors& errors) {
+  const DelayFigures delay = delay_figures(analysis);
+  std::array<int, 4> classes{};
+  for (const AnalysedBeat& beat : analysis.beats) ++classes[static_cast<std::size_t>(beat.peak.beat_class)];
+  nlohmann::json json = {
+      {"duration_s", analysis.duration_s},
+      {"beats", analysis.beats.size()},
+      {"classes", {{"normal", classes[0]}, {"premature", classes[1]}, {"pause", classes[2]}, {"noise", classes[3]}}},
+      {"delay_ms", {{"median", 1e3 * delay.median_s}, {"p95", 1e3 * delay.p95_s}}},
+      {"unusable_s", analysis.unusable_s},
+      {"noisy_s", analysis.noisy_s},
+      {"unpredictable_s", analysis.unpredictable_s},
+      {"prediction", {{"cycles", errors.cycles}}}};
+  for (std::size_t i = 0; i < errors.rms_s.size(); ++i) {
+    json["prediction"][std::string(name_of(kPredictionMethods[i])) + "_rms_ms"] = 1e3 * errors.rms_s[i];
+  }
+  return json;
+}
+
+nlohmann::json to_json(const Rate& rate) {
+  return {{"percent", rate.percent()}, {"hits", rate.hits}, {"of", rate.all}};
+}
+
+nlohmann::json to_json(const BeatScore& score) {
+  nlohmann::json json = {{"sensitivity", to_json(score.sensitivity)},
+                         {"positive_predictivity", to_json(score.positive_predictivity)},
+                         {"f1_percent", score.f1_percent},
+                         {"missed_s", score.missed_s},
+                         {"extra_s", score.extra_s},
+                         {"timing_ms", {{"median", 1e3 * score.timing_median_s}, {"rms", 1e3 * score.timing_rms_s}}}};
+  if (score.peak_rms_s) json["timing_ms"]["to_local_peak_rms"] = 1e3 * *score.peak_rms_s;
+  if (!score.has_kinds) return json;
+  json["premature"] = {{"sensitivity", to_json(score.premature_sensitivity)},
+                       {"precision", to_json(score.premature_precision)}};
+  for (const auto& [symbol, counts] : score.symbols) {
+    json["symbols"][symbol] = {{"normal", counts[0]},
+                               {"premature", counts[1]},
+                               {"pause", counts[2]},
+                               {"noise", counts[3]},
+                               {"missed", counts[4]}};
+  }
+  return json;
+}
+
+std::string to_text(const EcgAnalysis& analysis, const PredictionErrors& errors) {
+  const DelayFigures delay = delay_figures(analysis);
+  std::array<int, 4> classes{};
+  for (const AnalysedBeat& beat : analysis.beats) ++classes[static_cast<std::size_t>(beat.peak.beat_class)];
+  return fmt::format(
+      "beats       {} in {:.1f} s: {} normal, {} premature, {} after a pause, {} thought noise\n"
+      "delay       R peak to detection, median / 95 %: {:.0f} / {:.0f} ms\n"
+      "signal      unusable for {:.1f} s, noisy for {:.1f} s; rhythm unpredictable for {:.1f} s\n"
+      "prediction  next cycle, RMS over {} normal cycles: previous {:.1f}, mean of 8 {:.1f}, autoregressive {:.1f} "
+      "ms\n",
+      analysis.beats.size(), analysis.duration_s, classes[0], classes[1], classes[2], classes[3], 1e3 * delay.median_s,
+      1e3 * delay.p95_s, analysis.unusable_s, analysis.noisy_s, analysis.unpredictable_s, errors.cycles,
+      1e3 * errors.rms_s[0], 1e3 * errors.rms_s[1], 1e3 * errors.rms_s[2]);
+}
+
+std::string to_text(const BeatScore& score) {
+  std::string text = fmt::format(
+      "reference   sensitivity {:.2f} % ({} of {}), positive predictivity {:.2f} % ({} of {}), F1 {:.3f} %\n"
+      "timing      normal beats to the reference: median {:+.1f} ms, RMS about it {:.1f} ms",
+      score.sensitivity.percent(), score.sensitivity.hits, score.sensitivity.all, score.positive_predictivity.percent(),
+      score.positive_predictivity.hits, score.positive_predictivity.all, score.f1_percent, 1e3 * score.timing_median_s,
+      1e3 * score.timing_rms_s);
+  if (score.peak_rms_s) text += fmt::format("; to the local peak: RMS {:.1f} ms", 1e3 * *score.peak_rms_s);
+  text += '\n';
+  if (!score.has_kinds) return text;
+  text += fmt::format("premature   sensitivity {:.2f} % ({} of {}), precision {:.2f} % ({} of {})\n",
+                      score.premature_sensitivity.percent(), score.premature_sensitivity.hits,
+                      score.premature_sensitivity.all, score.premature_precision.percent(),
+                      score.premature_precision.hits, score.premature_precision.all);
+  for (const auto& [symbol, counts] : score.symbols) {
+    text += fmt::format("  {:<9} normal {}, premature {}, pause {}, noise {}, missed {}\n", symbol, counts[0],
+                        counts[1], counts[2], counts[3], counts[4]);
+  }
+  return text;
+}
+
+Expected<void> run(const Options& options) {
+  auto stop = StopSignal::install();
+  if (!stop) return tl::unexpected(stop.error());
+  const auto trace = read_trace(options);
+  if (!trace) return tl::unexpected(trace.error());
+  std::vector<ReferenceBeat> reference;
+  if (!options.reference.empty()) {
+    const auto text = read_whole(options.reference, "table of reference beats");
+    if (!text) return tl::unexpected(text.error());
+    auto beats = parse_beat_table(*text, options.reference);
+    if (!beats) return tl::unexpected(beats.error());
+    reference = std::move(*beats);
+  }
+
+  std::optional<Progress> progress;
+  if (trace->mV.size() > kLongWithoutProgress) progress.emplace("samples", trace->mV.size());
+  bool stopped = false;
+  const EcgAnalysis analysis = analyse(*trace, [&](std::size_t done) {
+    if (progress) progress->update(done);
+    stopped = stopped || stop->requested();
+    return !stopped;
+  });
+  progress.reset();
+  if (stopped) return fail("stopped by a signal; nothing was written");
+
+  if (!options.beats.empty()) {
+    const auto written = write_text_file(options.beats, beat_rows(analysis));
+    if (!written) return tl::unexpected(written.error());
+  }
+  const PredictionErrors errors = prediction_errors(analysis, reference);
+  std::optional<BeatScore> score;
+  if (!reference.empty()) score = score_beats(reference, analysis, *trace);
+  if (options.json) {
+    nlohmann::json json = to_json(analysis, errors);
+    json["input"] = options.input;
+    if (score) json["score"] = to_json(*score);
+    fmt::print("{}\n", json.dump(2));
+  } else {
+    fmt::print("{}", to_text(analysis, errors));
+    if (score) fmt::print("{}", to_text(*score));
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_ecg_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "ecg", "Find and class the beats of an ECG as the daemon would, and score them against a reference");
+  command
+      ->add_option("INPUT", options->input,
+                   "A table of time_s,mV a line or of values alone with --rate (CSV), a WFDB record (.hea, formats "
+                   "212 and 16), or a recording (.mcap)")
+      ->required();
+  command->add_option(
+      "--beats", options->beats,
+      "Write the beats to this table: time_s,class,confidence,detected_at_s; classes normal, premature, "
+      "pause, noise");
+  command->add_option("--rate", options->rate_hz, "Samples a second of a table without times")
+      ->check(CLI::Range(1.0, 100000.0));
+  command
+      ->add_option("--column", options->column,
+                   "Column of the table, or signal of the WFDB record, that holds the ECG, from 1 [2 beside times, "
+                   "else 1]")
+      ->check(CLI::Range(1, 10000));
+  command->add_option("--gain", options->gain, "mV a unit of the input; the beats do not depend on it [1]");
+  command->add_option("--reference", options->reference,
+                      "Score against these beats: a table of time_s or time_s,symbol with MIT-BIH symbols or classes; "
+                      "a beat counts as found within 150 ms");
+  command->add_flag("--json", options->json, "Print the figures as JSON");
+  command->callback([options, &exit_code] {
+    if (!std::isfinite(options->gain) || options->gain == 0.0) {
+      fmt::print(stderr, "perimap ecg: --gain must be a number other than 0\n");
+      exit_code = 2;
+      return;
+    }
+    const auto done = run(*options);
+    if (!done) fmt::print(stderr, "perimap ecg: {}\n", done.error().message);
+    exit_code = done ? 0 : 1;
+  });
+}
+
+}  // namespace perimap

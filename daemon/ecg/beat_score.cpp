@@ -1,0 +1,175 @@
+#include "daemon/ecg/beat_score.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace perimap {
+namespace {
+
+constexpr double kPeakWithin_s = 0.060;
+
+double seconds(Instant t) { return to_seconds(t.time_since_epoch()); }
+
+// For each reference beat the detection that is it, or -1.
+std::vector<int> match(const std::vector<ReferenceBeat>& reference, const EcgAnalysis& analysis) {
+  struct Pair {
+    double apart_s;
+    int reference;
+    int detected;
+  };
+  std::vector<Pair> pairs;
+  const auto& beats = analysis.beats;
+  std::size_t from = 0;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    const double t = reference[i].time_s;
+    while (from < beats.size() && seconds(beats[from].peak.time) < t - BeatScore::kWindow_s) ++from;
+    for (std::size_t j = from; j < beats.size(); ++j) {
+      const double apart = seconds(beats[j].peak.time) - t;
+      if (apart > BeatScore::kWindow_s) break;
+      if (apart < -BeatScore::kWindow_s) continue;
+      pairs.push_back({std::abs(apart), static_cast<int>(i), static_cast<int>(j)});
+    }
+  }
+  std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.apart_s < b.apart_s; });
+  std::vector<int> matched(reference.size(), -1);
+  std::vector<bool> used(beats.size(), false);
+  for (const Pair& pair : pairs) {
+    const auto i = static_cast<std::size_t>(pair.reference);
+    const auto j = static_cast<std::size_t>(pair.detected);
+    if (matched[i] >= 0 || used[j]) continue;
+    matched[i] = pair.detected;
+    used[j] = true;
+  }
+  return matched;
+}
+
+// Where the signal is farthest from its median within 60 ms of t.
+std::optional<double> peak_near(const EcgTrace& trace, double t) {
+  const auto begin = std::lower_bound(trace.time_s.begin(), trace.time_s.end(), t - kPeakWithin_s);
+  const auto end = std::upper_bound(begin, trace.time_s.end(), t + kPeakWithin_s);
+  if (begin == end) return std::nullopt;
+  const auto first = static_cast<std::size_t>(begin - trace.time_s.begin());
+  std::vector<float> values(trace.mV.begin() + (begin - trace.time_s.begin()),
+                            trace.mV.begin() + (end - trace.time_s.begin()));
+  if (std::any_of(values.begin(), values.end(), [](float v) { return !std::isfinite(v); })) return std::nullopt;
+  auto sorted = values;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const float median = *middle;
+  const auto peak = std::max_element(values.begin(), values.end(),
+                                     [&](float a, float b) { return std::abs(a - median) < std::abs(b - median); });
+  return trace.time_s[first + static_cast<std::size_t>(peak - values.begin())];
+}
+
+double root_mean(double squares, std::size_t count) {
+  return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
+}
+
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnalysis& analysis, const EcgTrace& trace) {
+  const auto& beats = analysis.beats;
+  const std::vector<int> matched = match(reference, analysis);
+  BeatScore score;
+  std::vector<bool> used(beats.size(), false);
+  std::vector<double> apart_s;
+  std::vector<double> from_peak_s;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    const ReferenceBeat& beat = reference[i];
+    score.has_kinds = score.has_kinds || beat.kind != ReferenceBeat::Kind::kUnknown;
+    const bool premature = beat.kind == ReferenceBeat::Kind::kPremature;
+    if (premature) ++score.premature_sensitivity.all;
+    auto& counts = score.symbols[beat.symbol];
+    if (matched[i] < 0) {
+      score.missed_s.push_back(beat.time_s);
+      ++counts[4];
+      continue;
+    }
+    used[static_cast<std::size_t>(matched[i])] = true;
+    const RPeak& peak = beats[static_cast<std::size_t>(matched[i])].peak;
+    ++counts[static_cast<std::size_t>(peak.beat_class)];
+    if (premature && peak.beat_class == BeatClass::kPremature) {
+      ++score.premature_sensitivity.hits;
+      ++score.premature_precision.hits;
+    }
+    if (premature) continue;
+    apart_s.push_back(seconds(peak.time) - beat.time_s);
+    if (const auto t = peak_near(trace, beat.time_s)) from_peak_s.push_back(seconds(peak.time) - *t);
+  }
+  for (std::size_t j = 0; j < beats.size(); ++j) {
+    if (beats[j].peak.beat_class == BeatClass::kPremature) ++score.premature_precision.all;
+    if (!used[j]) score.extra_s.push_back(seconds(beats[j].peak.time));
+  }
+  const int found = static_cast<int>(reference.size() - score.missed_s.size());
+  score.sensitivity = {found, static_cast<int>(reference.size())};
+  score.positive_predictivity = {found, static_cast<int>(beats.size())};
+  const int both = static_cast<int>(reference.size() + beats.size());
+  score.f1_percent = both > 0 ? 200.0 * found / both : 0.0;
+
+  score.timing_median_s = median_of(apart_s);
+  double squares = 0.0;
+  for (const double apart : apart_s) squares += (apart - score.timing_median_s) * (apart - score.timing_median_s);
+  score.timing_rms_s = root_mean(squares, apart_s.size());
+  squares = 0.0;
+  for (const double apart : from_peak_s) squares += apart * apart;
+  if (!from_peak_s.empty()) score.peak_rms_s = root_mean(squares, from_peak_s.size());
+  return score;
+}
+
+PredictionErrors prediction_errors(const EcgAnalysis& analysis, const std::vector<ReferenceBeat>& reference) {
+  PredictionErrors errors;
+  std::array<double, 3> squares{};
+  const auto take = [&](const AnalysedBeat& begin, const AnalysedBeat& end) {
+    if (begin.predicted_rr_s[0] <= 0.0 || begin.predicted_rr_s[2] <= 0.0) return;
+    const double rr_s = to_seconds(end.peak.time - begin.peak.time);
+    for (std::size_t i = 0; i < squares.size(); ++i) {
+      squares[i] += (begin.predicted_rr_s[i] - rr_s) * (begin.predicted_rr_s[i] - rr_s);
+    }
+    ++errors.cycles;
+  };
+  if (reference.empty()) {
+    const AnalysedBeat* last = nullptr;
+    for (const AnalysedBeat& beat : analysis.beats) {
+      if (beat.peak.beat_class == BeatClass::kNoise) continue;
+      const bool normal = beat.peak.beat_class == BeatClass::kNormal;
+      if (normal && last != nullptr && last->peak.beat_class == BeatClass::kNormal) take(*last, beat);
+      last = &beat;
+    }
+  } else {
+    const std::vector<int> matched = match(reference, analysis);
+    const auto excluded = [&](std::size_t i) {
+      return matched[i] < 0 || (reference[i].kind != ReferenceBeat::Kind::kNormal && !reference[i].symbol.empty());
+    };
+    for (std::size_t i = 1; i < reference.size(); ++i) {
+      if (excluded(i - 1) || excluded(i)) continue;
+      take(analysis.beats[static_cast<std::size_t>(matched[i - 1])],
+           analysis.beats[static_cast<std::size_t>(matched[i])]);
+    }
+  }
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    errors.rms_s[i] = root_mean(squares[i], static_cast<std::size_t>(errors.cycles));
+  }
+  return errors;
+}
+
+DelayFigures delay_figures(const EcgAnalysis& analysis) {
+  std::vector<double> delays_s;
+  for (const AnalysedBeat& beat : analysis.beats) {
+    delays_s.push_back(to_seconds(beat.peak.detected_at - beat.peak.time));
+  }
+  if (delays_s.empty()) return {};
+  std::sort(delays_s.begin(), delays_s.end());
+  const auto at = [&](double q) {
+    return delays_s[static_cast<std::size_t>(q * static_cast<double>(delays_s.size() - 1))];
+  };
+  return {at(0.5), at(0.95)};
+}
+
+}  // namespace perimap
