@@ -35,6 +35,10 @@ BeatClass BeatClasser::by_interval(const RPeak& peak, bool unusual) const noexce
   if (unusual && rr_s < kEarly * cycle_s) return BeatClass::kPremature;
   // Breathing shortens cycles too, but not from one to the next.
   const double usual_s = last_rr_s_ > 0.0 ? std::min(cycle_s, last_rr_s_) : cycle_s;
+  // A second cycle as short as the last, in the usual shape, is a new rhythm.
+  const bool again = last_class_ == BeatClass::kPremature && !last_unusual_ && raw_rr_s_ > 0.0 &&
+                     std::abs(rr_s - raw_rr_s_) < kInRhythm * raw_rr_s_;
+  if (!unusual && again) return BeatClass::kNormal;
   if (!unusual && rr_s < kMuchTooEarly * usual_s && !is_due(peak)) return BeatClass::kPremature;
   if (rr_s > kPause * cycle_s && last_class_ != BeatClass::kPremature) return BeatClass::kPause;
   return BeatClass::kNormal;
@@ -78,9 +82,12 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
 // beat is one, half. Bounded, so that a pause hardly counts but a new rhythm does after some beats.
 void BeatClasser::learn(const RPeak& peak, bool unusual) noexcept {
   last_rr_s_ = 0.0;
+  const double before_s = raw_rr_s_;
+  raw_rr_s_ = to_seconds(peak.time - last_);
   if (peak.beat_class == BeatClass::kPremature || unusual) return;
-  const double rr_s = to_seconds(peak.time - last_);
-  if (last_class_ != BeatClass::kPremature) {
+  const double rr_s = raw_rr_s_;
+  const bool again = !last_unusual_ && std::abs(rr_s - before_s) < kInRhythm * before_s;
+  if (last_class_ != BeatClass::kPremature || again) {
     if (last_unusual_) return;
     last_rr_s_ = rr_s;
     normal_rr_s_.push(normal_rr_s_.count() == 0 ? rr_s : std::min(rr_s, kLongest * normal_rr_s_.median()));

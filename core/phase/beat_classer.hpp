@@ -22,6 +22,7 @@ class BeatClasser {
   void interrupt() noexcept {
     has_last_ = false;
     has_normal_ = false;
+    raw_rr_s_ = 0.0;
   }
 
  private:
@@ -40,6 +41,7 @@ class BeatClasser {
   BeatClass last_class_ = BeatClass::kNormal;
   Instant last_;
   double strangeness_ = 0.05;  // of normal beats, fading mean
+  double raw_rr_s_ = 0.0;      // the last interval, between whatever beats
   double last_rr_s_ = 0.0;     // when both its beats were normal, else 0
   Instant last_normal_;
 };

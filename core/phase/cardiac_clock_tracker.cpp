@@ -37,15 +37,14 @@ void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
       rhythm_.clear();
     } else {
       beat.index_in_run = clock_.beat(0).index_in_run + 1;
-      Seconds learnt = rr;
       if (predictor_.count() > 0) {
         const Seconds predicted = clock_.predicted_[0];
-        learnt = std::clamp(learnt, (1.0 - kRhythmTolerance) * predicted, (1.0 + kRhythmTolerance) * predicted);
-        if (learnt != Seconds(rr)) beat.irregularity = from_seconds(std::abs((Seconds(rr) - predicted).count()));
+        const Duration missed = from_seconds(std::abs((Seconds(rr) - predicted).count()));
+        if (Seconds(missed) > kRhythmTolerance * predicted) beat.irregularity = missed;
       }
       const bool teaches = clock_.beat(0).beat_class != BeatClass::kPremature && peak.beat_class == BeatClass::kNormal;
       if (teaches) {
-        predictor_.push(rr, learnt);
+        predictor_.push(rr);
       } else {
         predictor_.score(rr);
       }

@@ -42,11 +42,11 @@ void RrPredictor::score(Seconds rr) noexcept {
   error_weight_ = keep * error_weight_ + 1.0;
 }
 
-void RrPredictor::push(Seconds rr, Seconds learnt) noexcept {
+void RrPredictor::push(Seconds rr) noexcept {
   if (count_ > 0) {
     score(rr);
   } else {
-    const double prior = kPriorDeviation * learnt.count();
+    const double prior = kPriorDeviation * rr.count();
     squared_error_sum_s2_ = kPriorWeight * prior * prior;
     error_weight_ = kPriorWeight;
   }
@@ -54,7 +54,7 @@ void RrPredictor::push(Seconds rr, Seconds learnt) noexcept {
     std::copy(rr_s_.begin() + 1, rr_s_.end(), rr_s_.begin());
     --count_;
   }
-  rr_s_[static_cast<std::size_t>(count_)] = learnt.count();
+  rr_s_[static_cast<std::size_t>(count_)] = rr.count();
   ++count_;
 }
 

@@ -39,12 +39,9 @@ class RrPredictor {
                        const AutoregressionSettings& autoregression = {}) noexcept
       : method_(method), autoregression_(autoregression) {}
 
-  // Takes the interval that has just ended (> 0) and scores the prediction that stood for it. When the true interval is
-  // no guide to the coming ones (an ectopic beat, a missed one), give the rhythm a bounded value as `learnt`; the score
-  // still tells the truth.
-  void push(Seconds rr) noexcept { push(rr, rr); }
-  void push(Seconds rr, Seconds learnt) noexcept;
-  // The same for an interval that is to teach nothing: scored only.
+  // Takes the interval that has just ended (> 0) and scores the prediction that stood for it.
+  void push(Seconds rr) noexcept;
+  // Scores only: for an interval that is no guide to the coming ones (an ectopic beat, a missed one).
   void score(Seconds rr) noexcept;
 
   // The next intervals in order, each predicted from those before it. Zero before the first push.

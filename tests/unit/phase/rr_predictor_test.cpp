@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
 
@@ -73,17 +74,39 @@ TEST(RrPredictor, FurtherIntervalsAreThoseOfItsOwnForecast) {
   }
 }
 
-TEST(RrPredictor, LearningABoundedValueStillScoresTheTrueOne) {
+TEST(RrPredictor, ScoringTeachesNothingButTellsInTheDeviation) {
   RrPredictor told;
   RrPredictor spared;
   for (int i = 0; i < 30; ++i) {
     told.push(Seconds(0.8));
     spared.push(Seconds(0.8));
   }
-  told.push(Seconds(0.5), Seconds(0.64));
+  told.score(Seconds(0.5));
   spared.push(Seconds(0.8));
   EXPECT_GT(told.deviation().count(), 1.5 * spared.deviation().count());
-  EXPECT_NEAR(next_of(told).count(), 0.8, 0.08);
+  EXPECT_NEAR(next_of(told).count(), 0.8, 1e-9);
+}
+
+// A missed beat and a false one in every twenty intervals: without clipping and a strong ridge the fit follows them.
+TEST(RrPredictor, SurvivesOutliers) {
+  std::mt19937 generator(4);
+  std::normal_distribution<double> noise(0.0, 0.008);
+  RrPredictor robust;
+  RrPredictor plain(RrMethod::kAutoregressive,
+                    {.ridge = 1e-2, .pull = 0.0, .clip = std::numeric_limits<double>::infinity()});
+  double robust_squares = 0.0;
+  double plain_squares = 0.0;
+  for (int i = 0; i < 600; ++i) {
+    const double rr = 0.85 + 0.05 * std::sin(2.0 * std::numbers::pi * i / 5.3) + noise(generator);
+    if (i > 80) {
+      robust_squares += std::pow(next_of(robust).count() - rr, 2);
+      plain_squares += std::pow(next_of(plain).count() - rr, 2);
+    }
+    const Seconds seen(i % 20 == 0 ? 2.0 * rr : i % 20 == 10 ? 0.4 * rr : rr);
+    robust.push(seen);
+    plain.push(seen);
+  }
+  EXPECT_LT(std::sqrt(robust_squares), 0.5 * std::sqrt(plain_squares));
 }
 
 }  // namespace

@@ -1,0 +1,175 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "daemon/ecg/beat_score.hpp"
+#include "daemon/ecg/ecg_analysis.hpp"
+#include "drivers/ecg_file/beat_table.hpp"
+#include "drivers/ecg_file/ecg_csv.hpp"
+#include "drivers/ecg_file/wfdb.hpp"
+#include "drivers/simulator/ecg_record.hpp"
+#include "drivers/simulator/embedded_data.hpp"
+
+namespace perimap {
+namespace {
+
+std::string error_of(const std::string& text, const EcgCsvOptions& options = {}) {
+  const auto trace = parse_ecg_csv(text, "ecg.csv", options);
+  return trace ? "" : trace.error().message;
+}
+
+TEST(EcgCsv, ReadsTimesAndValues) {
+  const auto trace = parse_ecg_csv("time_s,mV\r\n0.0,0.5\n\n# a remark\n0.01,\n0.02,nan\n0.03,-1e-1\n", "e", {});
+  ASSERT_TRUE(trace) << trace.error().message;
+  EXPECT_EQ(trace->time_s, (std::vector<double>{0.0, 0.01, 0.02, 0.03}));
+  EXPECT_FLOAT_EQ(trace->mV[0], 0.5F);
+  EXPECT_TRUE(std::isnan(trace->mV[1]) && std::isnan(trace->mV[2]));
+  EXPECT_FLOAT_EQ(trace->mV[3], -0.1F);
+}
+
+TEST(EcgCsv, ReadsValuesAloneAtARateAndAnyColumnWithGain) {
+  const auto alone = parse_ecg_csv("1\n2\n3\n", "e", {.rate_hz = 250.0, .column = {}, .gain = 0.005});
+  ASSERT_TRUE(alone) << alone.error().message;
+  EXPECT_DOUBLE_EQ(alone->time_s[2], 0.008);
+  EXPECT_FLOAT_EQ(alone->mV[2], 0.015F);
+  const auto third = parse_ecg_csv("time_s,I,II\n0,1,2\n1,3,4\n", "e", {.rate_hz = {}, .column = 3, .gain = 1.0});
+  ASSERT_TRUE(third) << third.error().message;
+  EXPECT_EQ(third->mV, (std::vector<float>{2.0F, 4.0F}));
+}
+
+TEST(EcgCsv, NamesLineAndColumnOfWhatIsWrong) {
+  EXPECT_EQ(error_of(""), "ecg.csv: there are no samples in it");
+  EXPECT_EQ(error_of("time_s,mV\n"), "ecg.csv: there are no samples in it");
+  EXPECT_EQ(error_of("time_s,mV\n0,1\n0.1,x\n"), "ecg.csv:3:5: expected a number, found 'x'");
+  EXPECT_EQ(error_of("0,1\nx,1\n"), "ecg.csv:2:1: expected a number, found 'x'");
+  EXPECT_EQ(error_of("0,1\n0,1\n"), "ecg.csv:2:1: the times do not ascend");
+  EXPECT_EQ(error_of("0,1\n1\n"), "ecg.csv:2:1: the line has no column 2");
+  EXPECT_NE(error_of("1\n2\n").find("say --rate"), std::string::npos);
+  EXPECT_NE(error_of("0,1\n", {.rate_hz = {}, .column = 5, .gain = 1.0}).find("there is no column 5"),
+            std::string::npos);
+  for (const char* garbled : {"nan,1\n", "inf,1\n", "1e99,1\n", "0,1e99\n", "0,inf\n", "0;1\n", "\x01\x02,\n1\n"}) {
+    const std::string message = error_of(garbled);
+    EXPECT_FALSE(message.empty()) << garbled;
+    EXPECT_EQ(message.find('\n'), std::string::npos);
+  }
+}
+
+TEST(BeatTable, ReadsTimesWithAndWithoutKinds) {
+  const auto beats = parse_beat_table("time_s,symbol,sample\n0.5,N,180\n1.2,V,432\n2.0,Q,1\n", "r.csv");
+  ASSERT_TRUE(beats) << beats.error().message;
+  EXPECT_EQ((*beats)[0].kind, ReferenceBeat::Kind::kNormal);
+  EXPECT_EQ((*beats)[1].kind, ReferenceBeat::Kind::kPremature);
+  EXPECT_EQ((*beats)[2].kind, ReferenceBeat::Kind::kUnknown);
+  EXPECT_TRUE(parse_beat_table("0.5\n1.5\n", "r.csv"));
+  EXPECT_FALSE(parse_beat_table("", "r.csv"));
+  EXPECT_EQ(parse_beat_table("1\n0.5\n", "r.csv").error().message, "r.csv:2:1: the beats do not ascend");
+}
+
+constexpr const char* kHeader = "x 2 360 3\nx.dat 212 200 11 1024 995 2 0 MLII\nx.dat 212 200 11 1024 1011 0 0 V5\n";
+
+TEST(Wfdb, ReadsFormat212) {
+  const auto header = parse_wfdb_header(kHeader, "x.hea");
+  ASSERT_TRUE(header) << header.error().message;
+  EXPECT_EQ(header->rate_hz, 360.0);
+  EXPECT_EQ(header->signals[0].description, "MLII");
+  // Frames (1024, 1), (-2048, 2), (1026, 3): twelve bits each, two samples in three bytes.
+  const std::vector<std::uint8_t> bytes{0x00, 0x04, 0x01, 0x00, 0x08, 0x02, 0x02, 0x04, 0x03};
+  const auto first = decode_wfdb_signal(*header, 0, bytes, "x.dat");
+  ASSERT_TRUE(first) << first.error().message;
+  EXPECT_FLOAT_EQ(first->mV[0], 0.0F);
+  EXPECT_TRUE(std::isnan(first->mV[1]));  // the format's "no value"
+  EXPECT_FLOAT_EQ(first->mV[2], 0.01F);
+  EXPECT_NE(decode_wfdb_signal(*header, 1, bytes, "x.dat").error().message.find("checksum"), std::string::npos);
+  const std::span<const std::uint8_t> cut(bytes.data(), 8);
+  EXPECT_NE(decode_wfdb_signal(*header, 0, cut, "x.dat").error().message.find("byte 8"), std::string::npos);
+}
+
+TEST(Wfdb, ReadsFormat16) {
+  const auto header = parse_wfdb_header("y 1 500\ny.dat 16+2 100(-5)/mV\n", "y.hea");
+  ASSERT_TRUE(header) << header.error().message;
+  const std::vector<std::uint8_t> bytes{0xFF, 0xFF, 0x5F, 0x00, 0x00, 0x80};
+  const auto trace = decode_wfdb_signal(*header, 0, bytes, "y.dat");
+  ASSERT_TRUE(trace) << trace.error().message;
+  ASSERT_EQ(trace->mV.size(), 2U);
+  EXPECT_FLOAT_EQ(trace->mV[0], 1.0F);
+  EXPECT_TRUE(std::isnan(trace->mV[1]));
+}
+
+TEST(Wfdb, RefusesGarbledHeaders) {
+  for (const char* text : {"",
+                           "# only\n",
+                           "x\n",
+                           "x 0\n",
+                           "x 99999\n",
+                           "x -1\n",
+                           "x/3 1 360\n",
+                           "x 1 0\n",
+                           "x 1 -5\n",
+                           "x 1 nan\n",
+                           "x 1 360 -3\n",
+                           "x 2 360\nx.dat 212\n",
+                           "x 1 360\nx.dat\n",
+                           "x 1 360\nx.dat 80\n",
+                           "x 1 360\nx.dat 212x4\n",
+                           "x 1 360\nx.dat 212 inf\n",
+                           "x 1 360\nx.dat 212 200(\n",
+                           "x 1 360\nx.dat 212 200/mmHg\n",
+                           "x 1 360\nx.dat 212 200 11 zero\n",
+                           "x 1 360\nx.dat 212 200 11 0 0 sum\n"}) {
+    const auto header = parse_wfdb_header(text, "x.hea");
+    ASSERT_FALSE(header) << text;
+    EXPECT_EQ(header.error().message.rfind("x.hea", 0), 0U) << header.error().message;
+  }
+}
+
+// ---- the whole way over real records, 30 minutes each, one set of parameters
+
+struct Goal {
+  const char* record;
+  double f1_percent;
+  double premature_percent;  // sensitivity and precision; 0: the record has no such figure to hold
+};
+
+class WholeRecord : public testing::TestWithParam<Goal> {};
+
+TEST_P(WholeRecord, MeetsItsFigures) {
+  const Goal& goal = GetParam();
+  const auto record = load_ecg_record(goal.record);
+  ASSERT_TRUE(record);
+  EcgTrace trace;
+  for (std::size_t i = 0; i < record->samples.size(); ++i) {
+    trace.time_s.push_back(static_cast<double>(i) / EcgRecord::kSampleRate_hz);
+    trace.mV.push_back(static_cast<float>(record->samples[i] / EcgRecord::kCounts_per_mV));
+  }
+  std::vector<ReferenceBeat> reference;
+  for (const EmbeddedEcgRecord& embedded : embedded_ecg_records()) {
+    if (embedded.name != goal.record) continue;
+    const auto beats = parse_beat_table(embedded.beats_csv, "beats");
+    ASSERT_TRUE(beats) << beats.error().message;
+    reference = *beats;
+  }
+  const EcgAnalysis analysis = analyse(trace, [](std::size_t) { return true; });
+  const BeatScore score = score_beats(reference, analysis, trace);
+  EXPECT_GE(score.f1_percent, goal.f1_percent);
+  const DelayFigures delay = delay_figures(analysis);
+  EXPECT_LE(delay.median_s, 0.120);
+  EXPECT_LE(delay.p95_s, 0.200);
+  if (std::string(goal.record) != "105") EXPECT_LE(*score.peak_rms_s, 0.006);
+  if (goal.premature_percent > 0.0) {
+    EXPECT_GE(score.premature_sensitivity.percent(), goal.premature_percent);
+    EXPECT_GE(score.premature_precision.percent(), goal.premature_percent);
+  }
+  const PredictionErrors errors = prediction_errors(analysis, reference);
+  EXPECT_LE(errors.rms_s[2], 1.02 * std::min(errors.rms_s[0], errors.rms_s[1]));
+  if (goal.record[2] == '0' || goal.record[2] == '3') EXPECT_LE(errors.rms_s[2], 0.85 * errors.rms_s[0]);
+}
+
+INSTANTIATE_TEST_SUITE_P(MitBih, WholeRecord,
+                         testing::Values(Goal{"100", 100.0, 0.0}, Goal{"105", 99.4, 0.0}, Goal{"106", 99.8, 95.0},
+                                         Goal{"119", 100.0, 95.0}, Goal{"123", 99.965, 0.0}),
+                         [](const auto& info) { return std::string(info.param.record); });
+
+}  // namespace
+}  // namespace perimap

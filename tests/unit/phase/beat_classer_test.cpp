@@ -1,0 +1,191 @@
+#include "core/phase/beat_classer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "core/phase/cardiac_clock_tracker.hpp"
+#include "core/phase/r_trigger.hpp"
+#include "core/phase/rhythm_monitor.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+// One period of a sine, fast for a normal complex and slow for a ventricular one.
+QrsShape shape(double cycles) {
+  QrsShape s;
+  s.points = 29;
+  for (int i = 0; i < s.points; ++i)
+    s.slope[static_cast<std::size_t>(i)] = static_cast<float>(std::sin(cycles * 0.22 * i));
+  return s;
+}
+
+class Classed : public testing::Test {
+ protected:
+  BeatClass beat(int after_ms, double cycles = 1.0, double confidence = 0.9) {
+    t_ += milliseconds(after_ms);
+    RPeak peak{t_, t_ + milliseconds(95), confidence, milliseconds(1)};
+    peak.shape = shape(cycles);
+    last_ = classer_.classify(peak);
+    return last_.beat_class;
+  }
+  void settle() {
+    for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(800 + 10 * (i % 3)), BeatClass::kNormal);
+  }
+
+  Instant t_ = from_ns(1'000'000'000);
+  BeatClasser classer_;
+  RPeak last_;
+};
+
+TEST_F(Classed, VentricularBeatIsPrematureAndTheBeatAfterItsPauseIsNormal) {
+  settle();
+  EXPECT_EQ(beat(550, 0.4), BeatClass::kPremature);
+  EXPECT_TRUE(last_.unusual_shape);
+  EXPECT_EQ(beat(1050), BeatClass::kNormal);
+  EXPECT_FALSE(last_.unusual_shape);
+}
+
+TEST_F(Classed, BigeminyStaysBigeminy) {
+  settle();
+  for (int i = 0; i < 200; ++i) {
+    EXPECT_EQ(beat(550, 0.4), BeatClass::kPremature) << i;
+    EXPECT_EQ(beat(1050), BeatClass::kNormal) << i;
+  }
+}
+
+TEST_F(Classed, InterpolatedBeatDoesNotMakeTheNextPremature) {
+  settle();
+  EXPECT_EQ(beat(400, 0.4), BeatClass::kPremature);
+  EXPECT_EQ(beat(410), BeatClass::kNormal);
+}
+
+TEST_F(Classed, AtrialBeatIsPrematureInTheUsualShape) {
+  settle();
+  EXPECT_EQ(beat(520), BeatClass::kPremature);
+  EXPECT_FALSE(last_.unusual_shape);
+  EXPECT_EQ(beat(900), BeatClass::kNormal);
+}
+
+TEST_F(Classed, ASuddenFasterRhythmIsNormalFromItsSecondBeat) {
+  settle();
+  EXPECT_EQ(beat(500), BeatClass::kPremature);
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(500 + 5 * (i % 2)), BeatClass::kNormal) << i;
+}
+
+TEST_F(Classed, LateBeatEndsAPause) {
+  settle();
+  EXPECT_EQ(beat(1500), BeatClass::kPause);
+  EXPECT_EQ(beat(810), BeatClass::kNormal);
+}
+
+TEST_F(Classed, DoubtfulStrangeShapeOutOfRhythmIsNoise) {
+  settle();
+  EXPECT_EQ(beat(450, 0.4, 0.2), BeatClass::kNoise);
+  EXPECT_EQ(beat(360), BeatClass::kNormal);
+}
+
+TEST_F(Classed, OnlyNormalCyclesTeach) {
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  const auto take = [&](int after_ms, double cycles = 1.0) {
+    beat(after_ms, cycles);
+    tracker.on_r_peak(last_);
+  };
+  for (int i = 0; i < 30; ++i) take(800);
+  take(500, 0.4);
+  const Instant premature = t_;
+  EXPECT_NEAR(to_seconds(tracker.clock().predicted_length()), 0.8, 1e-6);  // the short cycle taught nothing
+  take(1100);
+  take(800);
+  const CardiacClock& clock = tracker.clock();
+  EXPECT_TRUE(clock.cycle_at(premature - milliseconds(700)).teaches);
+  EXPECT_FALSE(clock.cycle_at(premature - milliseconds(100)).teaches);
+  EXPECT_FALSE(clock.cycle_at(premature + milliseconds(100)).teaches);
+  EXPECT_TRUE(clock.cycle_at(premature + milliseconds(1200)).teaches);
+  EXPECT_FALSE(clock.cycle_at(t_ + milliseconds(100)).teaches);  // not completed
+  EXPECT_NEAR(to_seconds(clock.predicted_length()), 0.8, 1e-6);
+}
+
+TEST_F(Classed, NoiseIsNoBeatOfTheClock) {
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  RPeak peak{t_, t_, 0.2, milliseconds(1), BeatClass::kNoise};
+  tracker.on_r_peak(peak);
+  EXPECT_EQ(tracker.clock().beats(), 0U);
+}
+
+// ---- rhythm
+
+// Share of the time that a rhythm is called unpredictable, from the fortieth interval on.
+template <class Interval>
+double unpredictable(Interval&& interval) {
+  int called = 0;
+  int all = 0;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    std::mt19937 generator(seed);
+    RhythmMonitor monitor;
+    for (int i = 0; i < 200; ++i) {
+      monitor.push(Seconds(interval(i, generator)));
+      if (i < 40) continue;
+      ++all;
+      called += monitor.rhythm() == Rhythm::kUnpredictable ? 1 : 0;
+    }
+  }
+  return static_cast<double>(called) / all;
+}
+
+double normal(std::mt19937& generator, double deviation) {
+  return std::normal_distribution<double>(0.0, deviation)(generator);
+}
+
+TEST(RhythmMonitor, AtrialFibrillationIsUnpredictable) {
+  for (const double mean : {0.45, 0.6, 0.8, 1.0}) {
+    for (const double variation : {0.15, 0.2, 0.25}) {
+      const double share = unpredictable([&](int, std::mt19937& generator) {
+        const double shape = 1.0 / (variation * variation);
+        return std::max(0.25, std::gamma_distribution<double>(shape, mean / shape)(generator));
+      });
+      EXPECT_GT(share, 0.97) << mean << " " << variation;
+    }
+  }
+}
+
+TEST(RhythmMonitor, PatternsAndBreathingAreNot) {
+  EXPECT_EQ(unpredictable([](int, std::mt19937& g) { return 0.8 + normal(g, 0.02); }), 0.0);
+  EXPECT_LT(unpredictable([](int i, std::mt19937& g) { return (i % 2 == 0 ? 0.55 : 1.05) + normal(g, 0.02); }), 0.01);
+  const double three[] = {0.8, 0.5, 1.1};
+  EXPECT_LT(unpredictable([&](int i, std::mt19937& g) { return three[i % 3] + normal(g, 0.02); }), 0.01);
+  for (const double depth : {0.05, 0.1, 0.15, 0.2}) {
+    const double share = unpredictable(
+        [&](int i, std::mt19937& g) { return 0.9 * (1.0 + depth * std::sin(1.35 * i)) + normal(g, 0.015); });
+    EXPECT_LT(share, 0.02) << depth;
+  }
+}
+
+TEST(RhythmMonitor, KnowsNothingAtFirst) {
+  RhythmMonitor monitor;
+  for (int i = 0; i < 20; ++i) monitor.push(Seconds(0.8));
+  EXPECT_EQ(monitor.rhythm(), Rhythm::kUnknown);
+}
+
+// ---- hardware triggers
+
+TEST(RTrigger, PulseBecomesAnRPeakEarlierByTheDelay) {
+  RTrigger trigger({.delay = milliseconds(35), .deviation = milliseconds(3)});
+  const Instant t = from_ns(5'000'000'000);
+  const auto peak = trigger.push(t, t + milliseconds(2));
+  ASSERT_TRUE(peak);
+  EXPECT_EQ(peak->time, t - milliseconds(35));
+  EXPECT_EQ(peak->detected_at, t + milliseconds(2));
+  EXPECT_EQ(peak->deviation, milliseconds(3));
+  EXPECT_FALSE(trigger.push(t + milliseconds(20), t + milliseconds(22)));  // a bounce
+  EXPECT_FALSE(trigger.push(t - milliseconds(20), t + milliseconds(30)));
+  EXPECT_TRUE(trigger.push(t + milliseconds(800), t + milliseconds(802)));
+}
+
+}  // namespace
+}  // namespace perimap
