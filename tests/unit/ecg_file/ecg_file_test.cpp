@@ -173,7 +173,7 @@ TEST_P(WholeRecord, MeetsItsFigures) {
 INSTANTIATE_TEST_SUITE_P(MitBih, WholeRecord,
                          testing::Values(Goal{"100", 100.0, 0.0}, Goal{"105", 99.4, 0.0}, Goal{"106", 99.8, 95.0},
                                          Goal{"119", 100.0, 95.0}, Goal{"123", 99.965, 0.0}),
-                         [](const auto& info) { return std::string(info.param.record); });
+                         [](const auto& goal) { return std::string(goal.param.record); });
 
 }  // namespace
 }  // namespace perimap
