@@ -5,8 +5,8 @@
 #include <array>
 #include <span>
 
-#include "drivers/text_file/csv.hpp"
 #include "drivers/simulator/embedded_data.hpp"
+#include "drivers/text_file/csv.hpp"
 
 namespace perimap {
 namespace {
