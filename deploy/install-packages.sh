@@ -38,6 +38,7 @@ full=(
   clang-16 libclang-rt-16-dev                # fuzzing
   clang-tidy clang-format
   libceres-dev                               # tests/bench: the batch alternative
+  libopencv-video-dev                        # tests/bench: Lucas-Kanade as others have it
 )
 
 wanted=test

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/bank/target_choice.hpp"
+#include "core/simd/target_choice.hpp"
 
 #undef HWY_TARGET_INCLUDE
 // Highway reads its name and compiles it once for each target.

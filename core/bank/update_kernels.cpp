@@ -1,6 +1,6 @@
 #include "core/bank/update_kernels.hpp"
 
-#include "core/bank/target_choice.hpp"
+#include "core/simd/target_choice.hpp"
 
 #undef HWY_TARGET_INCLUDE
 // Highway reads its name and compiles it once for each target.

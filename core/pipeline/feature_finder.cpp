@@ -17,8 +17,7 @@ FeatureFinder::FeatureFinder(const PipelineSettings& settings, PipelineCounters&
       interval_(std::max(settings.features.detection_interval_frames, kFinderDelayFrames + 1)),
       lockstep_(settings.lockstep),
       counters_(counters),
-      steps_(kFinderDelayFrames),
-      pyramid_(settings.camera.width, settings.camera.height, kPyramidLevels) {
+      steps_(kFinderDelayFrames) {
   detector_.min_distance_px = settings.features.minimum_distance_px;
   for (Frame& frame : frames_) {
     frame.pixels.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
@@ -79,12 +78,10 @@ void FeatureFinder::dismiss() noexcept {
 
 void FeatureFinder::work(int step) noexcept {
   const Frame& frame = frames_[static_cast<std::size_t>(step)];
-  const GreyImage image{frame.pixels.data(), width_, height_, width_};
-  pyramid_.build(image);
   if (step == 0) {
     find(frame);
   } else {
-    follow();
+    follow(frame);
   }
   if (step + 1 < kFinderDelayFrames) return;
   // Release: found_ is complete before the mapper can see the flag.
@@ -103,7 +100,7 @@ void FeatureFinder::find(const Frame& frame) noexcept {
   for (const Vector2d& px : *corners) {
     if (found_.size() == kMaximumPerRound) break;
     FoundFeature feature;
-    if (make_patch_template(pyramid_, px, template_, feature.patch) != TemplateVerdict::kGood) continue;
+    if (make_patch_template(image, px, template_, tracker_.kernels(), feature.patch) != TemplateVerdict::kGood) continue;
     feature.first_observed = frame.stamp.capture;
     feature.first_observed_px = px;
     feature.patch_state.px = px;
@@ -111,12 +108,13 @@ void FeatureFinder::find(const Frame& frame) noexcept {
   }
 }
 
-void FeatureFinder::follow() noexcept {
+void FeatureFinder::follow(const Frame& frame) noexcept {
+  const GreyImage image{frame.pixels.data(), width_, height_, width_};
   const Matrix2d covariance = kMotionDeviation_px * kMotionDeviation_px * Matrix2d::Identity();
   std::erase_if(found_, [&](FoundFeature& feature) {
     const Vector2d last = feature.patch_state.px;
     const PatchMatch match =
-        track(pyramid_, feature.patch, feature.patch_state, last + feature.velocity_px, covariance);
+        tracker_.track(image, feature.patch, feature.patch_state, last + feature.velocity_px, covariance);
     if (match.state != MatchState::kFound) return true;
     feature.velocity_px = match.px - last;
     return false;

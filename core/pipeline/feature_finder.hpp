@@ -15,7 +15,6 @@
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/vision/feature_detector.hpp"
-#include "core/vision/image_pyramid.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 
@@ -60,7 +59,7 @@ class FeatureFinder {
 
   void work(int step) noexcept;
   void find(const Frame& frame) noexcept;
-  void follow() noexcept;
+  void follow(const Frame& frame) noexcept;
 
   int width_;
   int height_;
@@ -68,6 +67,7 @@ class FeatureFinder {
   bool lockstep_;
   DetectorSettings detector_;
   TemplateSettings template_;
+  PatchTracker tracker_;
   PipelineCounters& counters_;
 
   // The mapper's own.
@@ -83,7 +83,6 @@ class FeatureFinder {
 
   // Housekeeping's own until done_ is set; the mapper's until the next round begins.
   std::vector<FoundFeature> found_;
-  ImagePyramid pyramid_;
   std::atomic<bool> done_{false};
   Wakeup finished_;
 

@@ -55,9 +55,12 @@ bool agrees(const PatchMatch& match, const PixelPrediction& from_map, double gat
 
 // The view has turned so far that the first template fits badly: a fresh one at the place just found. Where none can be
 // made there the old one stays.
-void renew_template(FeatureSlot& slot, const ImagePyramid& pyramid) noexcept {
+void renew_template(FeatureSlot& slot, const FrameJob& job) noexcept {
   PatchTemplate renewed;
-  if (make_patch_template(pyramid, slot.match.px, TemplateSettings{}, renewed) != TemplateVerdict::kGood) return;
+  if (make_patch_template(job.image, slot.match.px, TemplateSettings{}, job.tracker->kernels(), renewed) !=
+      TemplateVerdict::kGood) {
+    return;
+  }
   slot.patch = renewed;
   slot.patch_state = PatchState{};
   slot.patch_state.px = slot.match.px;
@@ -77,11 +80,11 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   const PixelPrediction& prediction = use_map ? from_map : from_image;
   if (!prediction.valid || !settings.camera.contains(prediction.px)) return;
   const Vector2d last_px = slot.patch_state.px;
-  slot.match = track(*job.pyramid, slot.patch, slot.patch_state, prediction.px, prediction.covariance_px2);
+  slot.match = job.tracker->track(job.image, slot.patch, slot.patch_state, prediction.px, prediction.covariance_px2);
   if (slot.match.state != MatchState::kFound) return;
   slot.match_agrees = from_map.valid && agrees(slot.match, from_map, settings.estimator.update.gate);
   const bool in_a_row = slot.last_found_frame + 1 == job.frame->index;
-  if (template_is_stale(slot.patch_state)) renew_template(slot, *job.pyramid);
+  if (template_is_stale(slot.patch_state)) renew_template(slot, job);
   slot.velocity_px = in_a_row ? Vector2d(slot.match.px - last_px) : Vector2d::Zero();
   slot.last_found_frame = job.frame->index;
 }

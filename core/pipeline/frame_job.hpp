@@ -8,8 +8,9 @@
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/phase_spread.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
+#include "core/sensors/grey_image.hpp"
 #include "core/time/instant.hpp"
-#include "core/vision/image_pyramid.hpp"
+#include "core/vision/patch_tracker.hpp"
 
 namespace perimap {
 
@@ -23,7 +24,8 @@ struct ReleaseBasis {
 struct FrameJob {
   const FrameRecord* frame = nullptr;
   const FrameHistory* history = nullptr;
-  const ImagePyramid* pyramid = nullptr;
+  GreyImage image;  // during stage A alone
+  const PatchTracker* tracker = nullptr;
   BasesAbout about_capture;
   std::array<ReleaseBasis, kReleasesCovered> releases;
   Instant learn_until;  // learning that has not begun by then is put off; never in lockstep

@@ -34,7 +34,6 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       poses_(settings.pose),
       respiration_(settings.respiration),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
-      pyramid_(settings.camera.width, settings.camera.height, kPyramidLevels),
       bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())}),
       tallies_(static_cast<std::size_t>(team.size())) {
   occupied_.reserve(slots.size());
@@ -72,12 +71,12 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   frame.phase.exact = frame.phase.exact && stamp.capture < ecg_clock.anchor();
   job_.frame = &frame;
   job_.history = history_.get();
-  job_.pyramid = &pyramid_;
+  job_.image = image;
+  job_.tracker = &tracker_;
   job_.about_capture = bases_about(settings_.estimator.layout, frame.phase, frame.respiration);
   predict_releases(frame, clock);
   adopt_found_features(frame.index);
 
-  pyramid_.build(image);
   team_.run(&run_stage<&Mapper::predict_and_find_shard>, this);
   const Instant found = MonotonicClock::now();
   settle_phases(frame);

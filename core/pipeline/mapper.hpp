@@ -25,7 +25,7 @@
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/sensors/tracker_sample.hpp"
-#include "core/vision/image_pyramid.hpp"
+#include "core/vision/patch_tracker.hpp"
 
 namespace perimap {
 
@@ -92,7 +92,7 @@ class Mapper {
   Instant displacement_time_;
   bool breath_begun_ = false;  // the features that were mapped when it was first found have it
   std::unique_ptr<FrameHistory> history_;
-  ImagePyramid pyramid_;
+  PatchTracker tracker_;
   FeatureBank<double> bank_;
   std::vector<FeatureGroup> groups_;
   ImagePhase image_phase_;

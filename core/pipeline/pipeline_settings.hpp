@@ -46,8 +46,6 @@ struct PipelineSettings {
   bool lockstep = false;
 };
 
-// Level 0 to 2: a search of +-40 px at 640x480.
-inline constexpr int kPyramidLevels = 3;
 inline constexpr int kMaxStartObservations = 96;
 // Frames from a search for new features to their adoption: the finder follows them through these frames.
 inline constexpr int kFinderDelayFrames = 5;

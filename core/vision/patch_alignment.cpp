@@ -10,113 +10,37 @@ namespace perimap {
 namespace {
 
 constexpr int kParameters = PatchTemplate::kParameters;
-constexpr int kLanes = 8;  // independent partial sums, a fixed order that the compiler may still vectorise
 using Vector6 = Eigen::Matrix<double, kParameters, 1>;
 using Matrix6 = Eigen::Matrix<double, kParameters, kParameters>;
-using Samples = std::array<float, PatchTemplate::kMaxSamples>;
 
-// Positions inside a window are followed in 1/65536 px, which is exact and quicker than floor() for each pixel.
-constexpr int kFractionBits = 16;
-constexpr float kFraction = 1.0F / (1 << kFractionBits);
-constexpr int to_fixed(double x) noexcept { return static_cast<int>(std::floor(x * (1 << kFractionBits) + 0.5)); }
-
-// The image at the warped window, bilinear, less kGreyOrigin; the padding of each row stays 0. The window must fit.
+// The image at the warped window. The window must fit.
 void sample_window(const GreyImage& image, const PatchTemplate::Level& level, const PatchWarp& warp,
-                   Samples& out) noexcept {
-  const int base_u = static_cast<int>(std::floor(warp.centre.x()));
-  const int base_v = static_cast<int>(std::floor(warp.centre.y()));
-  const double first = -level.half();
-  const Vector2d start =
-      warp.centre - Vector2d(base_u, base_v) + warp.A * Vector2d(first - level.offset_x, first - level.offset_y);
-  const std::ptrdiff_t stride = image.stride;
-  const std::uint8_t* const base = image.row(base_v) + base_u;
-
+                   const PatchKernels& kernels, PatchSamples& samples) noexcept {
+  const Vector2d to_first(-level.half() - level.offset_x, -level.half() - level.offset_y);
   if (warp.A.isIdentity(0)) {
-    const int u0 = to_fixed(start.x()), v0 = to_fixed(start.y());
-    const float fu = static_cast<float>(u0 & ((1 << kFractionBits) - 1)) * kFraction;
-    const float fv = static_cast<float>(v0 & ((1 << kFractionBits) - 1)) * kFraction;
-    const float w00 = (1 - fu) * (1 - fv), w01 = fu * (1 - fv), w10 = (1 - fu) * fv, w11 = fu * fv;
-    for (int y = 0; y < level.side; ++y) {
-      const std::uint8_t* p = base + ((v0 >> kFractionBits) + y) * stride + (u0 >> kFractionBits);
-      const std::uint8_t* q = p + stride;
-      float* row = out.data() + y * level.stride;
-      for (int x = 0; x < level.side; ++x) {
-        row[x] = w00 * p[x] + w01 * p[x + 1] + w10 * q[x] + w11 * q[x + 1] - PatchTemplate::kGreyOrigin;
-      }
-    }
-    return;
-  }
-
-  const int du_dx = to_fixed(warp.A(0, 0)), dv_dx = to_fixed(warp.A(1, 0));
-  for (int y = 0; y < level.side; ++y) {
-    int u = to_fixed(start.x() + warp.A(0, 1) * y), v = to_fixed(start.y() + warp.A(1, 1) * y);
-    float* row = out.data() + y * level.stride;
-    for (int x = 0; x < level.side; ++x, u += du_dx, v += dv_dx) {
-      const std::uint8_t* p = base + (v >> kFractionBits) * stride + (u >> kFractionBits);
-      const float fu = static_cast<float>(u & ((1 << kFractionBits) - 1)) * kFraction;
-      const float fv = static_cast<float>(v & ((1 << kFractionBits) - 1)) * kFraction;
-      const float p0 = p[0], q0 = p[stride];
-      const float top = p0 + fu * (static_cast<float>(p[1]) - p0);
-      const float bottom = q0 + fu * (static_cast<float>(p[stride + 1]) - q0);
-      row[x] = top + fv * (bottom - top) - PatchTemplate::kGreyOrigin;
-    }
+    kernels.sample_shifted(image, level.side, warp.centre + to_first, samples);
+  } else {
+    kernels.sample_warped(image, level.side, {warp.centre + warp.A * to_first, warp.A.col(0), warp.A.col(1)}, samples);
   }
 }
 
 struct Sums {
-  double grey = 0, grey_squared = 0, with_template = 0;  // of I, I^2, T I
+  double grey = 0, grey_squared = 0, with_template = 0;  // of I, I^2, T I, I less kGreyOrigin
   Vector6 with_sd = Vector6::Zero();                     // of SD_k I; the last four only when asked for
 };
 
-double total(const std::array<float, kLanes>& lanes) noexcept {
-  return ((static_cast<double>(lanes[0]) + lanes[1]) + (static_cast<double>(lanes[2]) + lanes[3])) +
-         ((static_cast<double>(lanes[4]) + lanes[5]) + (static_cast<double>(lanes[6]) + lanes[7]));
-}
-
-template <bool kAffine>
-Sums accumulate(const PatchTemplate::Level& level, const Samples& samples) noexcept {
-  std::array<float, kLanes> s_i{}, s_ii{}, s_ti{}, s_gx{}, s_gy{}, s_gx_x{}, s_gx_y{}, s_gy_x{}, s_gy_y{};
-  for (int y = 0; y < level.side; ++y) {
-    const float dy = static_cast<float>(y - level.half());
-    for (int block = 0; block < level.stride; block += kLanes) {
-      const std::size_t start = static_cast<std::size_t>(y * level.stride + block);
-      const float* const grey = samples.data() + start;
-      const std::int16_t* const value = level.value.data() + start;
-      const std::int16_t* const gradient_x = level.gradient_x.data() + start;
-      const std::int16_t* const gradient_y = level.gradient_y.data() + start;
-      for (int k = 0; k < kLanes; ++k) {
-        const std::size_t lane = static_cast<std::size_t>(k);
-        const float i = grey[k];
-        const float gx = gradient_x[k] * i, gy = gradient_y[k] * i;
-        s_i[lane] += i;
-        s_ii[lane] += i * i;
-        s_ti[lane] += value[k] * i;
-        s_gx[lane] += gx;
-        s_gy[lane] += gy;
-        if constexpr (kAffine) {
-          const float dx = static_cast<float>(block + k - level.half());
-          s_gx_x[lane] += gx * dx;
-          s_gx_y[lane] += gx * dy;
-          s_gy_x[lane] += gy * dx;
-          s_gy_y[lane] += gy * dy;
-        }
-      }
-    }
-  }
+Sums in_grey_levels(const PatchTemplate::Level& level, const PatchSums& raw) noexcept {
+  constexpr double kGrey = 1.0 / kGreyScale;
+  constexpr double kGradient = kGrey / PatchTemplate::kGradientScale;
+  constexpr double kMoment = kGradient * PatchTemplate::kMomentDivisor;
   Sums sums;
-  sums.grey = total(s_i);
-  sums.grey_squared = total(s_ii);
-  sums.with_template = total(s_ti);
-  constexpr double kUnit = 1 / PatchTemplate::kGradientScale;
-  const double gx = kUnit * total(s_gx), gy = kUnit * total(s_gy);
-  sums.with_sd[0] = gx;
-  sums.with_sd[1] = gy;
-  if constexpr (kAffine) {
-    sums.with_sd[2] = kUnit * total(s_gx_x) - level.offset_x * gx;
-    sums.with_sd[3] = kUnit * total(s_gx_y) - level.offset_y * gx;
-    sums.with_sd[4] = kUnit * total(s_gy_x) - level.offset_x * gy;
-    sums.with_sd[5] = kUnit * total(s_gy_y) - level.offset_y * gy;
-  }
+  sums.grey = kGrey * raw.grey;
+  sums.grey_squared = kGrey * kGrey * raw.grey_squared;
+  sums.with_template = kGrey * raw.with_template;
+  const double gx = kGradient * raw.with_gradient_x, gy = kGradient * raw.with_gradient_y;
+  sums.with_sd << gx, gy, kMoment * raw.with_moments[0] - level.offset_x * gx,
+      kMoment * raw.with_moments[1] - level.offset_y * gx, kMoment * raw.with_moments[2] - level.offset_x * gy,
+      kMoment * raw.with_moments[3] - level.offset_y * gy;
   return sums;
 }
 
@@ -133,30 +57,35 @@ AlignmentResult compare(const PatchTemplate::Level& level, const Sums& sums) noe
   return result;
 }
 
-// See AlignmentResult::residual_variance. free_parameters are those of the warp.
-double residual_variance(const PatchTemplate::Level& level, const Samples& samples, const AlignmentResult& fit,
+// See AlignmentResult::residual_variance; of level 0. free_parameters are those of the warp.
+double residual_variance(const PatchTemplate::Level& level, const PatchSamples& samples, const AlignmentResult& fit,
                          int free_parameters) noexcept {
   constexpr int kBlock = 3;
-  const int across = level.side / kBlock;
-  const float gain = static_cast<float>(fit.gain);
-  const float bias = static_cast<float>(fit.bias + (fit.gain - 1) * PatchTemplate::kGreyOrigin);
+  constexpr int kSide = PatchTemplate::kSide[0];
+  constexpr int kAcross = kSide / kBlock;
+  // Of a block: its samples' sum less scaled_gain times its template pixels' and less scaled_bias.
+  const double scaled_gain = kGreyScale * fit.gain;
+  const double scaled_bias =
+      kGreyScale * kBlock * kBlock * (fit.bias + (fit.gain - 1) * PatchTemplate::kGreyOrigin);
   double sum_squares = 0;
-  for (int by = 0; by < across; ++by) {
-    std::array<float, PatchTemplate::kMaxStride> column{};  // sums over the block's rows
-    for (int y = kBlock * by; y < kBlock * (by + 1); ++y) {
-      const float* const grey = samples.data() + y * level.stride;
-      const std::int16_t* const value = level.value.data() + y * level.stride;
-      for (int x = 0; x < level.stride; ++x) column[static_cast<std::size_t>(x)] += grey[x] - gain * value[x] - bias;
+  for (int by = 0; by < kAcross; ++by) {
+    std::array<int, kSide> seen, expected;  // sums over the block's rows
+    const std::int16_t* const grey = samples.grey.data() + kBlock * by * kSide;
+    const std::int16_t* const value = level.value.data() + kBlock * by * kSide;
+    for (int x = 0; x < kSide; ++x) {
+      seen[static_cast<std::size_t>(x)] = grey[x] + grey[x + kSide] + grey[x + 2 * kSide];
+      expected[static_cast<std::size_t>(x)] = value[x] + value[x + kSide] + value[x + 2 * kSide];
     }
-    for (int bx = 0; bx < across; ++bx) {
-      const std::size_t x = static_cast<std::size_t>(kBlock * bx);
-      const double sum = static_cast<double>(column[x]) + column[x + 1] + column[x + 2];
-      sum_squares += sum * sum;
+    for (int bx = 0; bx < kAcross; ++bx) {
+      const auto x = static_cast<std::size_t>(kBlock * bx);
+      const double residual = (seen[x] + seen[x + 1] + seen[x + 2]) -
+                              scaled_gain * (expected[x] + expected[x + 1] + expected[x + 2]) - scaled_bias;
+      sum_squares += residual * residual;
     }
   }
   // Gain, bias and warp have taken their share of the low frequencies.
-  const double free_blocks = across * across - 2 - free_parameters;
-  return sum_squares / (kBlock * kBlock * free_blocks);
+  const double free_blocks = kAcross * kAcross - 2 - free_parameters;
+  return sum_squares / (kGreyScale * kGreyScale * kBlock * kBlock * free_blocks);
 }
 
 // The projected steepest-descent images times the image, divided by the gain: the right-hand side of the normal
@@ -175,8 +104,8 @@ struct TranslationStep {
   static constexpr int kFree = 2;
   const PatchTemplate::Level& level;
 
-  static Sums sums(const PatchTemplate::Level& level, const Samples& samples) noexcept {
-    return accumulate<false>(level, samples);
+  void sum(const PatchKernels& kernels, const PatchSamples& samples, PatchSums& sums) const noexcept {
+    kernels.sum(level, samples, sums);
   }
   // Returns the largest displacement in the window, level pixels.
   double apply(const Vector6& b, PatchWarp& warp) const noexcept {
@@ -193,8 +122,8 @@ struct AffineStep {
   static constexpr int kFree = kParameters;
   const PatchTemplate& patch;
 
-  static Sums sums(const PatchTemplate::Level& level, const Samples& samples) noexcept {
-    return accumulate<true>(level, samples);
+  void sum(const PatchKernels& kernels, const PatchSamples& samples, PatchSums& sums) const noexcept {
+    kernels.sum_affine(patch, samples, sums);
   }
   double apply(const Vector6& b, PatchWarp& warp) const noexcept {
     Vector6 step = Matrix6::Map(patch.affine_inverse.data()) * b;
@@ -212,9 +141,8 @@ struct AffineStep {
 
 template <class Step>
 AlignmentResult iterate(const GreyImage& image, const PatchTemplate::Level& level, const Step& step,
-                        const AlignmentLimits& limits, PatchWarp& warp) noexcept {
-  Samples samples;
-  std::fill_n(samples.begin(), level.side * level.stride, 0.0F);
+                        const AlignmentLimits& limits, const PatchKernels& kernels, PatchWarp& warp) noexcept {
+  PatchSamples samples;
   const Vector2d start = warp.centre;
   AlignmentResult result;
   bool at_rest = false;
@@ -223,8 +151,10 @@ AlignmentResult iterate(const GreyImage& image, const PatchTemplate::Level& leve
       result.outcome = Alignment::kOutOfView;
       return result;
     }
-    sample_window(image, level, warp, samples);
-    const Sums sums = Step::sums(level, samples);
+    sample_window(image, level, warp, kernels, samples);
+    PatchSums raw;
+    step.sum(kernels, samples, raw);
+    const Sums sums = in_grey_levels(level, raw);
     result = compare(level, sums);
     if (!(result.gain > kMinGain)) return result;
     const double moved = step.apply(right_hand_side(level, sums, result.gain), warp);
@@ -236,32 +166,36 @@ AlignmentResult iterate(const GreyImage& image, const PatchTemplate::Level& leve
   }
   if (!at_rest) return result;
   result.outcome = Alignment::kConverged;
-  result.residual_variance = residual_variance(level, samples, result, Step::kFree);
+  if (limits.wants_residual && level.side == PatchTemplate::kSide[0]) {
+    result.residual_variance = residual_variance(level, samples, result, Step::kFree);
+  }
   return result;
 }
 
 }  // namespace
 
 bool warped_window_fits(const GreyImage& image, const PatchTemplate::Level& level, const PatchWarp& warp) noexcept {
-  // Of a window this wide every position is then within the fixed-point range of sample_window as well.
   const double reach_u = std::abs(warp.A(0, 0)) + std::abs(warp.A(0, 1));
   const double reach_v = std::abs(warp.A(1, 0)) + std::abs(warp.A(1, 1));
-  const double half = level.half() + 0.01;  // the fixed-point positions round
+  const double half = level.half() + 0.01;  // the kernels' positions round
   const double u = warp.centre.x() - warp.A(0, 0) * level.offset_x - warp.A(0, 1) * level.offset_y;
   const double v = warp.centre.y() - warp.A(1, 0) * level.offset_x - warp.A(1, 1) * level.offset_y;
-  constexpr double kMaxReach = 8;
+  constexpr double kMaxReach = 8;               // so that offsets within the window fit 32 bits,
+  constexpr std::ptrdiff_t kMaxStride = 1 << 22;  // with this
+  if (image.stride > kMaxStride) return false;
   return reach_u < kMaxReach && reach_v < kMaxReach && u - half * reach_u >= 0 && v - half * reach_v >= 0 &&
          u + half * reach_u < image.width - 1 && v + half * reach_v < image.height - 1;
 }
 
 AlignmentResult align_translation(const GreyImage& image, const PatchTemplate::Level& level,
-                                  const AlignmentLimits& limits, PatchWarp& warp) noexcept {
-  return iterate(image, level, TranslationStep{level}, limits, warp);
+                                  const AlignmentLimits& limits, const PatchKernels& kernels,
+                                  PatchWarp& warp) noexcept {
+  return iterate(image, level, TranslationStep{level}, limits, kernels, warp);
 }
 
 AlignmentResult align_affine(const GreyImage& image, const PatchTemplate& patch, const AlignmentLimits& limits,
-                             PatchWarp& warp) noexcept {
-  return iterate(image, patch.levels[0], AffineStep{patch}, limits, warp);
+                             const PatchKernels& kernels, PatchWarp& warp) noexcept {
+  return iterate(image, patch.levels[0], AffineStep{patch}, limits, kernels, warp);
 }
 
 }  // namespace perimap

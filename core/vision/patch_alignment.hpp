@@ -5,6 +5,7 @@
 
 #include "core/geometry/pose.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "core/vision/patch_kernels.hpp"
 #include "core/vision/patch_template.hpp"
 
 namespace perimap {
@@ -28,7 +29,7 @@ struct AlignmentResult {
   double bias = 0;
   // Of I - gain * T - bias, grey levels^2 per pixel, as it acts on a patch: from sums over blocks of 3 x 3 pixels,
   // which keep what neighbouring pixels have in common (shading, a highlight's edge) and what interpolation takes off
-  // single pixels. Where the alignment has ended; 0 otherwise.
+  // single pixels. Where the alignment has ended at level 0 and it was asked for; 0 otherwise.
   double residual_variance = 0;
 };
 
@@ -40,14 +41,17 @@ struct AlignmentLimits {
   int max_iterations = 10;
   double at_rest = 0.01;  // level pixels: a step below this ends the iteration
   double max_travel = 4;  // level pixels from the start of the iteration
+  bool wants_residual = false;
 };
 
 // Moves warp.centre only. level must be usable.
 [[nodiscard]] AlignmentResult align_translation(const GreyImage& image, const PatchTemplate::Level& level,
-                                                const AlignmentLimits& limits, PatchWarp& warp) noexcept;
+                                                const AlignmentLimits& limits, const PatchKernels& kernels,
+                                                PatchWarp& warp) noexcept;
 
 // Moves all six parameters at level 0; needs patch.affine_usable.
 [[nodiscard]] AlignmentResult align_affine(const GreyImage& image, const PatchTemplate& patch,
-                                           const AlignmentLimits& limits, PatchWarp& warp) noexcept;
+                                           const AlignmentLimits& limits, const PatchKernels& kernels,
+                                           PatchWarp& warp) noexcept;
 
 }  // namespace perimap

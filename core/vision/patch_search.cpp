@@ -8,30 +8,26 @@
 namespace perimap {
 namespace {
 
-constexpr int kWidth = 2 * kMaxSearchRadius + 1;  // positions across
-constexpr int kMaxSide = 21;
-constexpr int kStride = 24;                                   // of the warped template
-constexpr int kRegionSide = kMaxSide + 2 * kMaxSearchRadius;  // pixels the windows of all positions cover
-constexpr int kRegionStride = kRegionSide + kStride - kMaxSide + 4;
+constexpr int kWidth = 2 * kMaxSearchRadius + 1;                             // positions across
+constexpr int kRegionSide = SearchPattern::kMaxSide + 2 * kMaxSearchRadius;  // pixels the windows of all cover
+constexpr int kRegionStride = 2 * kMaxSearchRadius + SearchPattern::kStride + 4;
 
-// The template as it would look in the image, on whole image pixels about the feature's nearest one. Where the warp
-// reaches outside the template the weight is 0, and so is the value.
+// The template as it would look in the image, on whole image pixels about the feature's nearest one, 16 (T - mean over
+// the weighted pixels), rounded. Where the warp reaches outside the template the weight is 0, and so is the value.
 struct WarpedTemplate {
-  int side = 0;
-  int stride = 0;
-  double sum_squares = 0;  // of value
+  double sum_squares = 0;  // of the values
+  double value_sum = 0;    // 0 but for rounding
   double weight_sum = 0;
-  std::array<std::int16_t, kMaxSide * kStride> value{};   // 16 (T - mean over the weighted pixels), rounded
-  std::array<std::int16_t, kMaxSide * kStride> weight{};  // 0 or 1
+  SearchPattern pattern;
 };
 
 WarpedTemplate warp_template(const PatchTemplate::Level& level, const Matrix2d& A) noexcept {
   WarpedTemplate warped;
-  warped.side = level.side;
-  warped.stride = level.stride;
+  SearchPattern& pattern = warped.pattern;
+  pattern.side = level.side;
   const Matrix2d back = A.inverse();
   const int half = level.half();
-  std::array<double, kMaxSide * kStride> grey{};
+  std::array<double, PatchTemplate::kMaxSamples> grey{};
   double sum = 0;
   for (int y = 0; y < level.side; ++y) {
     for (int x = 0; x < level.side; ++x) {
@@ -45,13 +41,13 @@ WarpedTemplate warp_template(const PatchTemplate::Level& level, const Matrix2d& 
       const int u0 = std::min(static_cast<int>(uc), level.side - 2),
                 v0 = std::min(static_cast<int>(vc), level.side - 2);
       const double fu = uc - u0, fv = vc - v0;
-      const std::int16_t* const p = level.value.data() + v0 * level.stride + u0;
-      const std::int16_t* const q = p + level.stride;
-      const std::size_t i = static_cast<std::size_t>(y * level.stride + x);
-      grey[i] = (1 - fv) * ((1 - fu) * p[0] + fu * p[1]) + fv * ((1 - fu) * q[0] + fu * q[1]);
-      warped.weight[i] = 1;
+      const std::int16_t* const p = level.value.data() + v0 * level.side + u0;
+      const std::int16_t* const q = p + level.side;
+      const double g = (1 - fv) * ((1 - fu) * p[0] + fu * p[1]) + fv * ((1 - fu) * q[0] + fu * q[1]);
+      grey[static_cast<std::size_t>(y * level.side + x)] = g;
+      pattern.mask[static_cast<std::size_t>(y * SearchPattern::kStride + x)] = -1;
       warped.weight_sum += 1;
-      sum += grey[i];
+      sum += g;
     }
   }
   if (warped.weight_sum == 0) return warped;
@@ -59,38 +55,22 @@ WarpedTemplate warp_template(const PatchTemplate::Level& level, const Matrix2d& 
   constexpr double kScale = 16;
   for (int y = 0; y < level.side; ++y) {
     for (int x = 0; x < level.side; ++x) {
-      const std::size_t i = static_cast<std::size_t>(y * level.stride + x);
-      if (warped.weight[i] == 0) continue;
-      warped.value[i] = static_cast<std::int16_t>(std::lround(kScale * (grey[i] - mean)));
-      warped.sum_squares += static_cast<double>(warped.value[i]) * warped.value[i];
+      const auto i = static_cast<std::size_t>(y * SearchPattern::kStride + x);
+      if (pattern.mask[i] == 0) continue;
+      const double centred = grey[static_cast<std::size_t>(y * level.side + x)] - mean;
+      pattern.value[i] = static_cast<std::int16_t>(std::lround(kScale * centred));
+      warped.value_sum += pattern.value[i];
+      warped.sum_squares += static_cast<double>(pattern.value[i]) * pattern.value[i];
     }
   }
   return warped;
 }
 
-// The correlation of the warped template with the window whose first pixel is first. Sums fit 32 bits: 441 pixels of
-// at most 255 * 16 * 255.
-double correlate(const WarpedTemplate& warped, const std::int16_t* first) noexcept {
-  int sum = 0, sum_squares = 0, with_template = 0, value_sum = 0;
-  for (int y = 0; y < warped.side; ++y) {
-    const std::int16_t* const image = first + y * kRegionStride;
-    const std::int16_t* const value = warped.value.data() + y * warped.stride;
-    const std::int16_t* const weight = warped.weight.data() + y * warped.stride;
-    for (int block = 0; block < warped.stride; block += 8) {
-      for (int k = 0; k < 8; ++k) {
-        const int x = block + k;
-        const std::int16_t seen = static_cast<std::int16_t>(image[x] * weight[x]);
-        sum += seen;
-        sum_squares += seen * seen;
-        with_template += seen * value[x];
-        value_sum += value[x];
-      }
-    }
-  }
-  // value_sum is 0 but for rounding.
-  const double mean = sum / warped.weight_sum;
-  const double variance_sum = sum_squares - sum * mean;
-  const double covariance_sum = with_template - mean * value_sum;
+// Of the warped template with a window of the image. The sums fit 32 bits: 441 pixels of at most 255 * 16 * 255.
+double correlation_of(const WarpedTemplate& warped, const SearchSums& sums) noexcept {
+  const double mean = sums.grey / warped.weight_sum;
+  const double variance_sum = sums.grey_squared - sums.grey * mean;
+  const double covariance_sum = sums.with_value - mean * warped.value_sum;
   constexpr double kFlat = 0.5;  // grey levels^2 in all: a single pixel that differs by one gives more
   if (!(variance_sum > kFlat) || !(warped.sum_squares > 0)) return 0;
   return covariance_sum / std::sqrt(variance_sum * warped.sum_squares);
@@ -114,7 +94,7 @@ void insert_peak(const SearchPeak& peak, double score, std::array<double, Search
 
 SearchResult search_peaks(const GreyImage& image, const PatchTemplate::Level& level, const Matrix2d& A,
                           const Vector2d& predicted, const Matrix2d& information, double gate,
-                          double min_correlation) noexcept {
+                          double min_correlation, const PatchKernels& kernels) noexcept {
   SearchResult result;
   if (!(predicted.x() > -kMaxSearchRadius && predicted.y() > -kMaxSearchRadius &&
         predicted.x() < image.width + kMaxSearchRadius && predicted.y() < image.height + kMaxSearchRadius)) {
@@ -133,7 +113,7 @@ SearchResult search_peaks(const GreyImage& image, const PatchTemplate::Level& le
   const int radius_u = extent(covariance(0, 0)), radius_v = extent(covariance(1, 1));
 
   // The pixels that all windows cover, widened once. Beyond the image they are never used: see in_image below.
-  alignas(32) std::array<std::int16_t, kRegionSide * kRegionStride> region{};
+  alignas(64) std::array<std::int16_t, (kRegionSide + 1) * kRegionStride> region{};
   const int half = level.half();
   const int left = centre_u - radius_u - half, top = centre_v - radius_v - half;
   for (int y = 0; y < level.side + 2 * radius_v; ++y) {
@@ -163,7 +143,9 @@ SearchResult search_peaks(const GreyImage& image, const PatchTemplate::Level& le
       const bool nearest = du == 0 && dv == 0;
       if (!(distance_squared <= gate) && !nearest) continue;
       const std::int16_t* const first = region.data() + (dv + radius_v) * kRegionStride + du + radius_u;
-      correlation[index(du, dv)] = correlate(warped, first);
+      SearchSums sums;
+      kernels.correlate(warped.pattern, first, kRegionStride, sums);
+      correlation[index(du, dv)] = correlation_of(warped, sums);
       price[index(du, dv)] = distance_squared;
     }
   }

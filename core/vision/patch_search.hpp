@@ -5,6 +5,7 @@
 
 #include "core/geometry/pose.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "core/vision/patch_kernels.hpp"
 #include "core/vision/patch_template.hpp"
 
 namespace perimap {
@@ -29,6 +30,6 @@ inline constexpr int kMaxSearchRadius = 10;  // level pixels
 // 1/level px^2, positive definite. level must be usable, A invertible, everything finite.
 [[nodiscard]] SearchResult search_peaks(const GreyImage& image, const PatchTemplate::Level& level, const Matrix2d& A,
                                         const Vector2d& predicted, const Matrix2d& information, double gate,
-                                        double min_correlation) noexcept;
+                                        double min_correlation, const PatchKernels& kernels) noexcept;
 
 }  // namespace perimap

@@ -4,6 +4,9 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "core/vision/patch_kernels.hpp"
+#include "core/vision/reduced_window.hpp"
+
 namespace perimap {
 namespace {
 
@@ -35,15 +38,14 @@ bool cut_window(const GreyImage& image, double u, double v, int side, PatchTempl
   const int column = static_cast<int>(std::lround(u));
   const int row = static_cast<int>(std::lround(v));
   level.side = side;
-  level.stride = (side + 7) / 8 * 8;
   level.offset_x = u - column;
   level.offset_y = v - row;
   for (int y = 0; y < side; ++y) {
     const std::uint8_t* above = image.row(row - half + y - 1) + column - half;
     const std::uint8_t* here = image.row(row - half + y) + column - half;
     const std::uint8_t* below = image.row(row - half + y + 1) + column - half;
-    const std::size_t start = static_cast<std::size_t>(y) * static_cast<std::size_t>(level.stride);
-    for (int x = 0; x < side; ++x) {  // the padding is 0 from the start
+    const std::size_t start = static_cast<std::size_t>(y) * static_cast<std::size_t>(side);
+    for (int x = 0; x < side; ++x) {  // what follows is 0 from the start
       const std::size_t i = start + static_cast<std::size_t>(x);
       level.value[i] = static_cast<std::int16_t>(here[x] - PatchTemplate::kGreyOrigin);
       level.gradient_x[i] = static_cast<std::int16_t>(above[x + 1] - above[x - 1] + 2 * (here[x + 1] - here[x - 1]) +
@@ -55,27 +57,49 @@ bool cut_window(const GreyImage& image, double u, double v, int side, PatchTempl
   return true;
 }
 
-// The projected Hessian, and the level's sums that projection needs.
-Matrix6 project(PatchTemplate::Level& level) noexcept {
+void form_moments(PatchTemplate& patch) noexcept {
+  const PatchTemplate::Level& level = patch.levels[0];
+  for (int y = 0; y < level.side; ++y) {
+    for (int x = 0; x < level.side; ++x) {
+      const auto i = static_cast<std::size_t>(y * level.side + x);
+      const auto moment = [](int gradient, int distance) {
+        const double exact = static_cast<double>(gradient) * distance / PatchTemplate::kMomentDivisor;
+        return static_cast<std::int16_t>(std::lround(exact));
+      };
+      const int column = x - level.half(), row = y - level.half();
+      patch.gradient_moments[0][i] = moment(level.gradient_x[i], column);
+      patch.gradient_moments[1][i] = moment(level.gradient_x[i], row);
+      patch.gradient_moments[2][i] = moment(level.gradient_y[i], column);
+      patch.gradient_moments[3][i] = moment(level.gradient_y[i], row);
+    }
+  }
+}
+
+// The projected Hessian, and the level's sums that projection needs. Level 0 takes its moments as they are rounded, so
+// that the projection is exact.
+Matrix6 project(PatchTemplate& patch, int l) noexcept {
+  PatchTemplate::Level& level = patch.levels[static_cast<std::size_t>(l)];
   const int n = level.side * level.side;
   double sum = 0, sum_squares = 0;
   Vector6 sd_sum = Vector6::Zero(), sd_grey = Vector6::Zero();
   Matrix6 H = Matrix6::Zero();
-  for (int y = 0; y < level.side; ++y) {
-    for (int x = 0; x < level.side; ++x) {
-      const std::size_t i = static_cast<std::size_t>(y * level.stride + x);
-      const double t = level.value[i];
-      const double gx = level.gradient_x[i] / PatchTemplate::kGradientScale;
-      const double gy = level.gradient_y[i] / PatchTemplate::kGradientScale;
-      const double dx = x - level.half() - level.offset_x, dy = y - level.half() - level.offset_y;
-      Vector6 sd;
-      sd << gx, gy, gx * dx, gx * dy, gy * dx, gy * dy;
-      sum += t;
-      sum_squares += t * t;
-      sd_sum += sd;
-      sd_grey += t * sd;
-      H.noalias() += sd * sd.transpose();
+  constexpr double kMoment = PatchTemplate::kMomentDivisor / PatchTemplate::kGradientScale;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
+    const double t = level.value[i];
+    const double gx = level.gradient_x[i] / PatchTemplate::kGradientScale;
+    const double gy = level.gradient_y[i] / PatchTemplate::kGradientScale;
+    Vector6 sd = Vector6::Zero();
+    sd.head<2>() << gx, gy;
+    if (l == 0) {
+      const auto& moments = patch.gradient_moments;
+      sd.tail<4>() << kMoment * moments[0][i] - gx * level.offset_x, kMoment * moments[1][i] - gx * level.offset_y,
+          kMoment * moments[2][i] - gy * level.offset_x, kMoment * moments[3][i] - gy * level.offset_y;
     }
+    sum += t;
+    sum_squares += t * t;
+    sd_sum += sd;
+    sd_grey += t * sd;
+    H.noalias() += sd * sd.transpose();
   }
   level.mean = sum / n;
   level.sum_squares = sum_squares - sum * level.mean;
@@ -90,32 +114,36 @@ Matrix6 project(PatchTemplate::Level& level) noexcept {
 
 double saturated_share(const PatchTemplate::Level& level, int saturated_grey) noexcept {
   int count = 0;
-  for (int y = 0; y < level.side; ++y) {
-    for (int x = 0; x < level.side; ++x) {
-      const int grey = level.value[static_cast<std::size_t>(y * level.stride + x)] + PatchTemplate::kGreyOrigin;
-      count += grey >= saturated_grey ? 1 : 0;
-    }
+  const int n = level.side * level.side;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
+    count += level.value[i] + PatchTemplate::kGreyOrigin >= saturated_grey ? 1 : 0;
   }
-  return static_cast<double>(count) / (level.side * level.side);
+  return static_cast<double>(count) / n;
 }
 
 }  // namespace
 
-TemplateVerdict make_patch_template(const ImagePyramid& pyramid, const Vector2d& px, const TemplateSettings& settings,
-                                    PatchTemplate& out) noexcept {
+TemplateVerdict make_patch_template(const GreyImage& image, const Vector2d& px, const TemplateSettings& settings,
+                                    const PatchKernels& kernels, PatchTemplate& out) noexcept {
   out = PatchTemplate{};
-  for (int l = 0; l < pyramid.levels(); ++l) {
+  for (int l = 0; l < PatchTemplate::kLevels; ++l) {
     PatchTemplate::Level& level = out.levels[static_cast<std::size_t>(l)];
-    const double scale = 1.0 / (1 << l);
     const int side = PatchTemplate::kSide[static_cast<std::size_t>(l)];
-    if (!cut_window(pyramid.level(l), scale * px.x(), scale * px.y(), side, level)) {
-      if (l == 0) return TemplateVerdict::kTooNearBorder;
-      continue;
+    if (l == 0) {
+      if (image.data == nullptr || !cut_window(image, px.x(), px.y(), side, level)) {
+        return TemplateVerdict::kTooNearBorder;
+      }
+      if (saturated_share(level, settings.saturated_grey) > settings.max_saturated_share) {
+        return TemplateVerdict::kSaturated;
+      }
+      form_moments(out);
+    } else {
+      const Vector2d centre = to_level(px, l);
+      const ReducedWindow window(image, l, centre, side / 2 + 2, kernels);
+      const Vector2d inside = centre - window.origin();
+      if (!cut_window(window.image(), inside.x(), inside.y(), side, level)) continue;
     }
-    if (l == 0 && saturated_share(level, settings.saturated_grey) > settings.max_saturated_share) {
-      return TemplateVerdict::kSaturated;
-    }
-    const Matrix6 H = project(level);
+    const Matrix6 H = project(out, l);
     const Matrix2d H_t = H.topLeftCorner<2, 2>();
     const double min_texture = l == 0 ? settings.min_texture : settings.min_texture_coarse;
     if (!(smaller_eigenvalue(H_t) > min_texture * level.side * level.side)) {

@@ -7,6 +7,7 @@
 
 #include "core/vision/patch_alignment.hpp"
 #include "core/vision/patch_search.hpp"
+#include "core/vision/reduced_window.hpp"
 
 namespace perimap {
 namespace {
@@ -63,51 +64,75 @@ struct Attempt {
 
 class Attempts {
  public:
-  Attempts(const ImagePyramid& pyramid, const PatchTemplate& patch, const PatchTrackerSettings& settings) noexcept
-      : pyramid_(pyramid), patch_(patch), settings_(settings) {}
+  Attempts(const GreyImage& image, const PatchTemplate& patch, const PatchTrackerSettings& settings,
+           const PatchKernels& kernels) noexcept
+      : image_(image), patch_(patch), settings_(settings), kernels_(kernels) {}
 
   // Translation from start_level down to level 0, then affine. start in level-0 pixels.
   [[nodiscard]] Attempt align_from(int start_level, const PatchWarp& start) const noexcept {
     Attempt attempt;
     attempt.warp = start;
-    for (int l = start_level; l > 0; --l) {
-      const PatchTemplate::Level& level = patch_.levels[static_cast<std::size_t>(l)];
-      if (!level.usable) continue;
-      const double scale = 1 << l;
-      PatchWarp warp{attempt.warp.centre / scale, attempt.warp.A};
-      AlignmentLimits limits;
-      limits.at_rest = 0.05;
-      // A coarse level that fails is passed over: the finer ones decide.
-      if (align_translation(pyramid_.level(l), level, limits, warp).outcome == Alignment::kConverged) {
-        attempt.warp.centre = warp.centre * scale;
-      }
-    }
+    for (int l = start_level; l > 0; --l) align_coarse(l, attempt.warp);
     align_finest(attempt);
     return attempt;
   }
 
  private:
+  // A coarse level that fails is passed over: the finer ones decide.
+  void align_coarse(int l, PatchWarp& warp) const noexcept {
+    const PatchTemplate::Level& level = patch_.levels[static_cast<std::size_t>(l)];
+    if (!level.usable) return;
+    AlignmentLimits limits;
+    limits.at_rest = 0.1;
+    const Vector2d centre = to_level(warp.centre, l);
+    const double reach = (level.half() + 1) * warp.A.cwiseAbs().rowwise().sum().maxCoeff() + limits.max_travel + 3;
+    const ReducedWindow window(image_, l, centre, reach, kernels_);
+    PatchWarp inside{centre - window.origin(), warp.A};
+    if (align_translation(window.image(), level, limits, kernels_, inside).outcome != Alignment::kConverged) return;
+    warp.centre = from_level(inside.centre + window.origin(), l);
+  }
+
   void align_finest(Attempt& attempt) const noexcept {
-    const GreyImage image = pyramid_.level(0);
     const PatchTemplate::Level& level = patch_.levels[0];
     AlignmentLimits limits;
-    if (patch_.affine_usable) limits.at_rest = 0.3;  // affine alignment finishes the work
-    attempt.fit = align_translation(image, level, limits, attempt.warp);
-    Matrix2d covariance_template = inverse_hessian_translation();
-    if (attempt.fit.outcome == Alignment::kConverged && patch_.affine_usable) {
+    limits.wants_residual = true;
+    if (patch_.affine_usable && approach(attempt)) {
       PatchWarp warp = attempt.warp;
-      limits.at_rest = 0.02;
-      const AlignmentResult fit = align_affine(image, patch_, limits, warp);
-      // Six parameters fit at least as well as two unless they ran away; then the two stand.
-      if (fit.outcome == Alignment::kConverged && fit.correlation > attempt.fit.correlation - 0.01 &&
-          is_plausible(warp.A, settings_.max_stretch)) {
-        attempt.fit = fit;
+      limits.at_rest = 0.05;
+      attempt.fit = align_affine(image_, patch_, limits, kernels_, warp);
+      if (attempt.fit.outcome == Alignment::kConverged && is_plausible(warp.A, settings_.max_stretch)) {
         attempt.warp = warp;
-        covariance_template = inverse_hessian_affine();
+        conclude(inverse_hessian_affine(), attempt);
+        if (attempt.state == MatchState::kFound) return;
       }
     }
+    // Six parameters ran away, or the template does not determine them: two.
+    limits.at_rest = 0.01;
+    attempt.fit = align_translation(image_, level, limits, kernels_, attempt.warp);
+    conclude(inverse_hessian_translation(), attempt);
+  }
+
+  // Translation to within what affine alignment finishes. While the shape is near the template's own, the image's own
+  // grid will do, which is several times quicker than a warped one.
+  [[nodiscard]] bool approach(Attempt& attempt) const noexcept {
+    AlignmentLimits limits;
+    limits.at_rest = 0.3;
+    constexpr double kNear = 0.06;  // moves the window's rim by about half a pixel
+    const Matrix2d shape = attempt.warp.A;
+    const bool is_near = (shape - Matrix2d::Identity()).cwiseAbs().maxCoeff() < kNear;
+    PatchWarp warp = attempt.warp;
+    if (is_near) warp.A.setIdentity();
+    attempt.fit = align_translation(image_, patch_.levels[0], limits, kernels_, warp);
+    if (attempt.fit.outcome != Alignment::kConverged) return false;
+    attempt.warp.centre = warp.centre;
+    return true;
+  }
+
+  void conclude(const Matrix2d& inverse_hessian, Attempt& attempt) const noexcept {
     attempt.state = judge(attempt.fit);
-    const Matrix2d spread = match_covariance(covariance_template, level.side * level.side, attempt.fit);
+    if (attempt.state != MatchState::kFound) return;
+    const int pixels = patch_.levels[0].side * patch_.levels[0].side;
+    const Matrix2d spread = match_covariance(inverse_hessian, pixels, attempt.fit);
     attempt.covariance_px2 = attempt.warp.A * spread * attempt.warp.A.transpose();
     attempt.covariance_px2 += settings_.sigma_floor_px * settings_.sigma_floor_px * Matrix2d::Identity();
   }
@@ -131,17 +156,21 @@ class Attempts {
     return C;
   }
 
-  const ImagePyramid& pyramid_;
+  const GreyImage& image_;
   const PatchTemplate& patch_;
   const PatchTrackerSettings& settings_;
+  const PatchKernels& kernels_;
 };
 
-// The finest level that covers the gate in few enough positions, else the coarsest.
-constexpr int kQuickSearchRadius = 5;  // level pixels
+// What alignment alone mostly reaches from its start at levels 0 and 1. When it does not, the next level is tried.
+constexpr double kReachOfLevel0_px = 4;
+constexpr double kReachOfLevel1_px = 8;
 
-int search_level(const ImagePyramid& pyramid, const PatchTemplate& patch, double radius_px) noexcept {
+// The finest usable level that covers the gate in few enough positions, else the coarsest usable one.
+int search_level(const PatchTemplate& patch, double radius_px) noexcept {
+  constexpr int kQuickSearchRadius = 5;  // level pixels
   int chosen = 0;
-  for (int l = 0; l < pyramid.levels(); ++l) {
+  for (int l = 0; l < PatchTemplate::kLevels; ++l) {
     if (!patch.levels[static_cast<std::size_t>(l)].usable) continue;
     chosen = l;
     if (radius_px <= kQuickSearchRadius * (1 << l)) break;
@@ -149,46 +178,81 @@ int search_level(const ImagePyramid& pyramid, const PatchTemplate& patch, double
   return chosen;
 }
 
+// The image in which level l is searched, and where its first pixel lies.
+SearchResult search(const GreyImage& image, const PatchTemplate& patch, int l, const Matrix2d& A,
+                    const Vector2d& predicted_px, const Matrix2d& covariance_px2, double gate,
+                    const PatchKernels& kernels) noexcept {
+  constexpr double kWorthAligning = 0.4;  // correlation on whole pixels before alignment
+  const PatchTemplate::Level& level = patch.levels[static_cast<std::size_t>(l)];
+  const double scale = 1 << l;
+  // At least one pixel of the level to either side, so that a peak can be told.
+  Matrix2d covariance = covariance_px2 / (scale * scale) + Matrix2d::Identity() / gate;
+  covariance(0, 1) = covariance(1, 0) = 0.5 * (covariance(0, 1) + covariance(1, 0));
+  const Matrix2d information = covariance.inverse();
+  if (l == 0) return search_peaks(image, level, A, predicted_px, information, gate, kWorthAligning, kernels);
+  const Vector2d predicted = to_level(predicted_px, l);
+  const ReducedWindow window(image, l, predicted, level.half() + kMaxSearchRadius + 2, kernels);
+  SearchResult result = search_peaks(window.image(), level, A, predicted - window.origin(), information, gate,
+                                     kWorthAligning, kernels);
+  for (int i = 0; i < result.count; ++i) {
+    Vector2d& centre = result.peaks[static_cast<std::size_t>(i)].centre;
+    centre = from_level(centre + window.origin(), l);
+  }
+  return result;
+}
+
 }  // namespace
 
-PatchMatch track(const ImagePyramid& pyramid, const PatchTemplate& patch, PatchState& state,
-                 const Vector2d& predicted_px, const Matrix2d& prediction_covariance_px2,
-                 const PatchTrackerSettings& settings) noexcept {
+void PatchTracker::prefetch(const GreyImage& image, const Vector2d& predicted_px) const noexcept {
+  constexpr int kReach = PatchTemplate::kSide[0] / 2 + 2;
+  // Written so that a coordinate that is not a number fails too.
+  if (!(predicted_px.x() >= kReach && predicted_px.y() >= kReach && predicted_px.x() < image.width - kReach &&
+        predicted_px.y() < image.height - kReach)) {
+    return;
+  }
+  const int u = static_cast<int>(predicted_px.x()), v = static_cast<int>(predicted_px.y());
+  for (int row = v - kReach; row <= v + kReach; ++row) {
+    // A window is narrower than a cache line of 64 bytes: it lies in one or two.
+    __builtin_prefetch(image.row(row) + u - kReach);
+    __builtin_prefetch(image.row(row) + u + kReach);
+  }
+}
+
+PatchMatch PatchTracker::track(const GreyImage& image, const PatchTemplate& patch, PatchState& state,
+                               const Vector2d& predicted_px,
+                               const Matrix2d& prediction_covariance_px2) const noexcept {
   PatchMatch match;
   match.px = predicted_px;
   if (!predicted_px.allFinite() || !is_positive_definite(prediction_covariance_px2) || !state.A.allFinite() ||
-      !is_plausible(state.A, 2 * settings.max_stretch) || !patch.levels[0].usable || pyramid.level(0).data == nullptr) {
+      !is_plausible(state.A, 2 * settings_.max_stretch) || !patch.levels[0].usable || image.data == nullptr) {
     return match;
   }
 
-  const Attempts attempts(pyramid, patch, settings);
-  const double radius_px = std::sqrt(settings.gate * larger_eigenvalue(prediction_covariance_px2));
-  // What alignment alone reaches from its start at levels 0 and 1, measured on smooth texture.
-  constexpr double kReachOfLevel0_px = 2.5;
-  constexpr double kReachOfLevel1_px = 6;
-  Attempt best;
-  if (radius_px <= kReachOfLevel1_px) {
-    best = attempts.align_from(radius_px <= kReachOfLevel0_px ? 0 : 1, {predicted_px, state.A});
+  const Attempts attempts(image, patch, settings_, *kernels_);
+  const double radius_px = std::sqrt(settings_.gate * larger_eigenvalue(prediction_covariance_px2));
+  const int start_level = radius_px <= kReachOfLevel0_px ? 0 : radius_px <= kReachOfLevel1_px ? 1 : 2;
+  constexpr double kBeyondDoubt = 0.95;
+  Attempt best = attempts.align_from(start_level, {predicted_px, state.A});
+  if (start_level == 0 && best.state != MatchState::kFound && best.state != MatchState::kOutOfView) {
+    best = attempts.align_from(1, {predicted_px, state.A});
   }
-  if (best.state != MatchState::kFound) {
-    const int l = search_level(pyramid, patch, radius_px);
-    const double scale = 1 << l;
-    // At least one pixel of the level to either side, so that a peak can be told.
-    Matrix2d covariance = prediction_covariance_px2 / (scale * scale) + Matrix2d::Identity() / settings.gate;
-    covariance(0, 1) = covariance(1, 0) = 0.5 * (covariance(0, 1) + covariance(1, 0));
-    constexpr double kWorthAligning = 0.4;  // correlation on whole pixels before alignment
-    const SearchResult found = search_peaks(pyramid.level(l), patch.levels[static_cast<std::size_t>(l)], state.A,
-                                            predicted_px / scale, covariance.inverse(), settings.gate, kWorthAligning);
+  const bool is_settled =
+      best.state == MatchState::kFound &&
+      (start_level < 2 || (best.fit.correlation > kBeyondDoubt &&
+                           (best.warp.centre - predicted_px).norm() < std::max(0.4 * radius_px, kReachOfLevel1_px)));
+  if (!is_settled) {
+    const int l = search_level(patch, radius_px);
+    const SearchResult found = search(image, patch, l, state.A, predicted_px, prediction_covariance_px2,
+                                      settings_.gate, *kernels_);
     MatchState why = found.any_in_view ? MatchState::kLowCorrelation : MatchState::kOutOfView;
     for (int i = 0; i < found.count; ++i) {
-      const PatchWarp start{found.peaks[static_cast<std::size_t>(i)].centre * scale, state.A};
+      const PatchWarp start{found.peaks[static_cast<std::size_t>(i)].centre, state.A};
       const Attempt attempt = attempts.align_from(l, start);
       if (attempt.state != MatchState::kFound) {
         if (i == 0) why = attempt.state;
         continue;
       }
       if (best.state != MatchState::kFound || attempt.fit.correlation > best.fit.correlation) best = attempt;
-      constexpr double kBeyondDoubt = 0.95;
       if (best.fit.correlation > kBeyondDoubt) break;
     }
     if (best.state != MatchState::kFound) {
@@ -203,7 +267,7 @@ PatchMatch track(const ImagePyramid& pyramid, const PatchTemplate& patch, PatchS
   match.covariance_px2 = best.covariance_px2;
   const Vector2d e = match.px - predicted_px;
   const Matrix2d S = prediction_covariance_px2 + match.covariance_px2;
-  if (!(e.dot(S.inverse() * e) <= settings.gate)) {
+  if (!(e.dot(S.inverse() * e) <= settings_.gate)) {
     match.state = MatchState::kTooFar;
     return match;
   }

@@ -4,7 +4,9 @@
 #include <cstdint>
 
 #include "core/geometry/pose.hpp"
-#include "core/vision/image_pyramid.hpp"
+#include "core/sensors/grey_image.hpp"
+#include "core/simd/simd_target.hpp"
+#include "core/vision/patch_kernels.hpp"
 #include "core/vision/patch_template.hpp"
 
 namespace perimap {
@@ -23,7 +25,7 @@ enum class MatchState : std::uint8_t {
   kLowCorrelation,  // nothing there looks like the template: occluded, or a highlight on it
   kDiverged,        // alignment did not come to rest, or came to rest in a shape that tissue does not take
   kTooFar,          // found, but further from the prediction than its covariance allows
-  kInvalidInput,    // not finite, a covariance that is not positive definite, a singular A, an empty pyramid
+  kInvalidInput,    // not finite, a covariance that is not positive definite, a singular A, no image
 };
 
 struct PatchMatch {
@@ -41,17 +43,37 @@ struct PatchTrackerSettings {
 };
 
 // Aligns the patch, translation first and coarse to fine, then affine, by inverse composition (Baker & Matthews,
-// "Lucas-Kanade 20 Years On: A Unifying Framework", IJCV 56(3), 2004) with gain and bias. When the prediction's gate
-// is wider than alignment reaches, or alignment fails, every place in the gate is searched by normalised
-// cross-correlation at the level whose pixels make its radius at most 5 (at the coarsest level up to 10, and it is cut
-// there: ±40 px with three levels), and the best peaks are aligned.
+// "Lucas-Kanade 20 Years On: A Unifying Framework", IJCV 56(3), 2004) with gain and bias, from the predicted pixel on:
+// from level 0, 1 or 2 as the gate is wide. When alignment fails, or ends far from where it began in a wide gate, every
+// place in the gate is searched by normalised cross-correlation at the level whose pixels make its radius at most 5 (at
+// the coarsest level up to 10, and it is cut there: +-40 px), and the best peaks are aligned.
 //
-// prediction_covariance_px2 is the search region and the gate: chi^2 of the found place under the sum of it and the
-// match's own covariance. The match's covariance comes from the residual's variance and the Hessian, plus the floor.
-// state is read for A alone and written with kFound alone. Any number of threads may share the pyramid.
-[[nodiscard]] PatchMatch track(const ImagePyramid& pyramid, const PatchTemplate& patch, PatchState& state,
-                               const Vector2d& predicted_px, const Matrix2d& prediction_covariance_px2,
-                               const PatchTrackerSettings& settings = {}) noexcept;
+// Reads the windows it looks at and nothing else of the image. A match is judged by its residual, that is by its
+// normalised correlation with the template and by the gate, not by tracking it back: the template does not change from
+// frame to frame, so nothing drifts that a way back could reveal, and the way back costs as much as the way there.
+//
+// Any number of threads may share a tracker. Results are the same on every instruction set.
+class PatchTracker {
+ public:
+  explicit PatchTracker(const PatchTrackerSettings& settings = {}, SimdTarget target = best_simd_target())
+      : settings_(settings), kernels_(&patch_kernels(target)) {}
+
+  [[nodiscard]] const PatchKernels& kernels() const noexcept { return *kernels_; }
+
+  // prediction_covariance_px2 is the search region and the gate: chi^2 of the found place under the sum of it and the
+  // match's own covariance. The match's covariance comes from the residual's variance and the Hessian, plus the floor.
+  // state is read for A alone and written with kFound alone.
+  [[nodiscard]] PatchMatch track(const GreyImage& image, const PatchTemplate& patch, PatchState& state,
+                                 const Vector2d& predicted_px,
+                                 const Matrix2d& prediction_covariance_px2) const noexcept;
+
+  // Has the memory around predicted_px fetched for a track() that is to follow shortly; changes nothing else.
+  void prefetch(const GreyImage& image, const Vector2d& predicted_px) const noexcept;
+
+ private:
+  PatchTrackerSettings settings_;
+  const PatchKernels* kernels_;
+};
 
 // True when the view has changed so much (scale or foreshortening beyond 2) that a fresh template at the found pixel
 // would serve better. Each renewal moves the followed point by about the match's standard deviation, and a heart's own

@@ -1,8 +1,15 @@
 #!/bin/bash
-# Builds the benchmark of the feature update with the release preset and runs it. The row of Ceres needs libceres-dev,
-# which deploy/install-packages.sh --full installs; without it the program says that the row is left out.
+# Builds the benchmarks of the feature update and of the patch tracker with the release preset and runs them. The row of
+# Ceres needs libceres-dev and the tracker's comparison libopencv-video-dev, which deploy/install-packages.sh --full
+# installs; without them the row, or the comparison, is left out.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 cmake --preset release > /dev/null
 cmake --build --preset release --target update_bench -j "${1:-$(nproc)}"
 build/release/tests/bench/update_bench
+if ninja -C build/release -t query vision_bench > /dev/null 2>&1; then
+  cmake --build --preset release --target vision_bench -j "${1:-$(nproc)}"
+  build/release/tests/bench/vision_bench
+else
+  echo "libopencv-video-dev was not found at configure time: the patch tracker's comparison is left out."
+fi

@@ -1,11 +1,8 @@
 // Time of one feature's update, ours and others', in one run. See run.sh.
-#include <sys/utsname.h>
-
 #include <barrier>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <memory>
 #include <random>
 #include <thread>
@@ -15,6 +12,7 @@
 #include "dense_baselines.hpp"
 #include "interleaved_timing.hpp"
 #include "machine_bounds.hpp"
+#include "machine_text.hpp"
 #include "simulated_feature.hpp"
 
 namespace perimap::bench {
@@ -291,34 +289,12 @@ void bench_frame(const char* name, int features) {
               candidates[0].quantile(0.0) / candidates[1].quantile(0.0));
 }
 
-std::string line_after(const char* path, const std::string& key) {
-  std::ifstream file(path);
-  for (std::string line; std::getline(file, line);) {
-    if (line.rfind(key, 0) == 0) return line.substr(line.find(':') + 1);
-  }
-  return " unknown";
-}
-
-void print_machine() {
-  utsname system{};
-  uname(&system);
-  std::string governor;
-  std::ifstream("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor") >> governor;
-  std::string load;
-  std::getline(std::ifstream("/proc/loadavg"), load);
-  std::printf("machine:%s, %u processors, governor %s, %s %s\n", line_after("/proc/cpuinfo", "model name").c_str(),
-              std::thread::hardware_concurrency(), governor.empty() ? "unknown" : governor.c_str(), system.sysname,
-              system.release);
-  std::printf("built: GCC-compatible %s, revision %s; bank on %s; load %s\n", __VERSION__, PERIMAP_REVISION,
-              simd_target_name(best_simd_target()), load.c_str());
-}
-
 }  // namespace
 }  // namespace perimap::bench
 
 int main() {
   using namespace perimap::bench;
-  print_machine();
+  print_machine(PERIMAP_REVISION);
 #ifndef PERIMAP_BENCH_CERES
   std::printf("Ceres was not found at configure time (libceres-dev): its row is left out.\n");
 #endif

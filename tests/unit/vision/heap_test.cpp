@@ -3,7 +3,6 @@
 
 #include <cstdlib>
 
-#include "core/vision/image_pyramid.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 #include "counted_allocations.hpp"
@@ -12,10 +11,10 @@
 namespace perimap {
 namespace {
 
-TEST(Heap, IsNotTouchedByPyramidTemplateOrTracker) {
+TEST(Heap, IsNotTouchedByTemplateOrTracker) {
   std::mt19937 random(1);
   const test::ImageBuffer image = test::render(test::Texture(5), test::View{}, 161, 123, 2, random);
-  ImagePyramid pyramid(161, 123, 3);
+  const PatchTracker tracker;
   PatchTemplate patch;
   PatchState state;
 
@@ -28,11 +27,10 @@ TEST(Heap, IsNotTouchedByPyramidTemplateOrTracker) {
   ASSERT_EQ(probes, 2) << "the count does not work";
 
   const long before = test::allocations;
-  pyramid.build(image.view());
-  const TemplateVerdict verdict = make_patch_template(pyramid, {80.3, 61.2}, TemplateSettings{}, patch);
-  const PatchMatch near = track(pyramid, patch, state, {80.9, 61}, test::isotropic(0.5));
-  const PatchMatch far = track(pyramid, patch, state, {95, 51}, test::isotropic(8));
-  const PatchMatch absent = track(pyramid, patch, state, {40, 100}, test::isotropic(1));
+  const TemplateVerdict verdict = make_patch_template(image.view(), {80.3, 61.2}, TemplateSettings{}, tracker.kernels(), patch);
+  const PatchMatch near = tracker.track(image.view(), patch, state, {80.9, 61}, test::isotropic(0.5));
+  const PatchMatch far = tracker.track(image.view(), patch, state, {95, 51}, test::isotropic(8));
+  const PatchMatch absent = tracker.track(image.view(), patch, state, {40, 100}, test::isotropic(1));
   EXPECT_EQ(test::allocations, before);
 
   EXPECT_EQ(verdict, TemplateVerdict::kGood);

@@ -5,6 +5,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "core/vision/patch_kernels.hpp"
 #include "tests/unit/vision/synthetic_scene.hpp"
 
 namespace perimap {
@@ -20,9 +21,7 @@ static_assert(std::is_trivially_copyable_v<PatchTemplate>);
 class PatchTemplateTest : public testing::Test {
  protected:
   TemplateVerdict make(const ImageBuffer& image, const Vector2d& px) {
-    ImagePyramid pyramid(image.width, image.height, 3);
-    pyramid.build(image.view());
-    return make_patch_template(pyramid, px, TemplateSettings{}, patch_);
+    return make_patch_template(image.view(), px, TemplateSettings{}, patch_kernels(best_simd_target()), patch_);
   }
 
   std::mt19937 random_{1};
@@ -33,8 +32,7 @@ TEST_F(PatchTemplateTest, IsGoodOnTextureAwayFromTheBorder) {
   const ImageBuffer image = render(Texture(1), View{}, 160, 120, 2, random_);
   EXPECT_EQ(make(image, {80, 60}), TemplateVerdict::kGood);
   EXPECT_TRUE(patch_.affine_usable);
-  for (int l = 0; l < 3; ++l) EXPECT_TRUE(patch_.levels[static_cast<std::size_t>(l)].usable) << l;
-  EXPECT_FALSE(patch_.levels[3].usable);
+  for (const PatchTemplate::Level& level : patch_.levels) EXPECT_TRUE(level.usable);
 }
 
 TEST_F(PatchTemplateTest, NeedsTheWindowAndOnePixelAroundItInTheFrame) {
@@ -82,9 +80,9 @@ TEST_F(PatchTemplateTest, RefusesAHighlight) {
   EXPECT_EQ(make(image, {80, 60}), TemplateVerdict::kSaturated);
 }
 
-TEST_F(PatchTemplateTest, RefusesAnEmptyPyramid) {
-  const ImagePyramid pyramid(160, 120, 3);
-  EXPECT_EQ(make_patch_template(pyramid, {80, 60}, TemplateSettings{}, patch_), TemplateVerdict::kTooNearBorder);
+TEST_F(PatchTemplateTest, RefusesWhatIsNoImage) {
+  EXPECT_EQ(make_patch_template(GreyImage{}, {80, 60}, TemplateSettings{}, patch_kernels(best_simd_target()), patch_),
+            TemplateVerdict::kTooNearBorder);
 }
 
 }  // namespace

@@ -30,13 +30,13 @@ class Trial {
  public:
   explicit Trial(unsigned seed, double noise = kNoise, Texture texture = Texture(5),
                  const Vector2d& anchor = Vector2d(80.3, 61.8))
-      : random_(seed), noise_(noise), texture_(std::move(texture)), anchor_(anchor), pyramid_(kWidth, kHeight, 3) {
+      : random_(seed), noise_(noise), texture_(std::move(texture)), anchor_(anchor) {
     std::uniform_real_distribution<double> place(-500, 500);
     point_ = Vector2d(place(random_), place(random_));
     View first;
     first.t = anchor - point_;
     show(first);
-    verdict = make_patch_template(pyramid_, anchor, TemplateSettings{}, patch);
+    verdict = make_patch_template(image_.view(), anchor, TemplateSettings{}, PatchTracker().kernels(), patch);
   }
 
   // The view in which the feature appears at px under the warp A.
@@ -49,15 +49,13 @@ class Trial {
 
   void show(const View& view) {
     image_ = render(texture_, view, kWidth, kHeight, noise_, random_, 3);
-    pyramid_.build(image_.view());
   }
   void show_other_texture(const Texture& other, const View& view) {
     image_ = render(other, view, kWidth, kHeight, noise_, random_, 3);
-    pyramid_.build(image_.view());
   }
 
   PatchMatch track(const Vector2d& predicted, const Matrix2d& covariance, const PatchTrackerSettings& settings = {}) {
-    return perimap::track(pyramid_, patch, state, predicted, covariance, settings);
+    return PatchTracker(settings).track(image_.view(), patch, state, predicted, covariance);
   }
   double uniform(double from, double to) { return std::uniform_real_distribution<double>(from, to)(random_); }
   ImageBuffer& image() { return image_; }
@@ -72,7 +70,6 @@ class Trial {
   Texture texture_;
   Vector2d anchor_, point_;
   ImageBuffer image_{1, 1};
-  ImagePyramid pyramid_;
 };
 
 TEST(PatchTracker, FindsTheFeatureToATenthOfAPixelUnderNoiseLightChangeAndWarp) {
@@ -288,6 +285,32 @@ TEST(PatchTracker, GivesTheSameBitsEachTime) {
   EXPECT_EQ(first.px, second.px);
   EXPECT_EQ(first.covariance_px2, second.covariance_px2);
   EXPECT_EQ(after.A, trial.state.A);
+}
+
+TEST(PatchTracker, GivesTheSameBitsOnEveryInstructionSet) {
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    Trial trial(seed);
+    if (trial.verdict != TemplateVerdict::kGood) continue;
+    trial.show(trial.view_with({84.3, 58.8}, affine(1.05, 0.02, 0.01, 0.97)));
+    std::vector<PatchMatch> matches;
+    std::vector<PatchState> states;
+    for (const SimdTarget target : simd_targets()) {
+      for (const double sigma_px : {0.5, 1.2, 6.0}) {
+        PatchState state;
+        state.A = affine(1.01, 0, 0.02, 0.99);
+        const Vector2d predicted = Vector2d(84.3, 58.8) + Vector2d(sigma_px, -0.5 * sigma_px);
+        const PatchTracker tracker(PatchTrackerSettings{}, target);
+        matches.push_back(tracker.track(trial.image().view(), trial.patch, state, predicted, isotropic(sigma_px)));
+        states.push_back(state);
+      }
+    }
+    for (std::size_t i = 3; i < matches.size(); ++i) {
+      EXPECT_EQ(matches[i].state, matches[i % 3].state);
+      EXPECT_EQ(matches[i].px, matches[i % 3].px);
+      EXPECT_EQ(matches[i].covariance_px2, matches[i % 3].covariance_px2);
+      EXPECT_EQ(states[i].A, states[i % 3].A);
+    }
+  }
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Which of Highway's targets are compiled, and how one of them is chosen for a bank. For the kernels alone; include it
+// Which of Highway's targets are compiled, and how one of them is chosen. For the kernels alone; include it
 // before Highway.
 #pragma once
 
@@ -10,12 +10,12 @@
 
 #include <mutex>
 
-#include "core/bank/simd_target.hpp"
+#include "core/simd/simd_target.hpp"
 
 namespace perimap {
 
 // Calls choose() while Highway's dynamic dispatch points to `target`. Highway keeps its choice for the whole process,
-// so the lock keeps two banks that are made at once from taking each other's.
+// so the lock keeps two that choose at once from taking each other's.
 template <class Choose>
 auto with_target(SimdTarget target, Choose choose) {
   static std::mutex mutex;

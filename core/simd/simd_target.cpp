@@ -1,6 +1,6 @@
-#include "core/bank/simd_target.hpp"
+#include "core/simd/simd_target.hpp"
 
-#include "core/bank/target_choice.hpp"
+#include "core/simd/target_choice.hpp"
 
 namespace perimap {
 

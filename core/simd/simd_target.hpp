@@ -1,5 +1,5 @@
-// Which instruction set the bank's kernels run on. They are compiled for several (Highway's dynamic dispatch); a bank
-// takes the best that the machine has, or the one it is told to.
+// Which instruction set kernels run on. They are compiled for several (Highway's dynamic dispatch); who uses them takes
+// the best that the machine has, or the one it is told to.
 #pragma once
 
 #include <cstdint>

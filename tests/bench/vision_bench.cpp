@@ -1,0 +1,267 @@
+// Following features from frame to frame: OpenCV's pyramidal Lucas-Kanade and the patch tracker, side by side, in time
+// and in pixels from the truth. See run.sh.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <opencv2/video/tracking.hpp>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/vision/patch_template.hpp"
+#include "core/vision/patch_tracker.hpp"
+#include "footage.hpp"
+#include "machine_text.hpp"
+
+namespace perimap::bench {
+namespace {
+
+constexpr int kFrames = 9;
+constexpr int kRounds = 14;
+constexpr double kPrediction_px = 1.0;  // standard deviation of where a feature is predicted, per axis
+
+// Where each feature was found in one frame; not a number where it was not.
+using Places = std::vector<Vector2d>;
+
+const Vector2d kLost = Vector2d::Constant(std::nan(""));
+
+class Method {
+ public:
+  explicit Method(std::string name_of) : name(std::move(name_of)) {}
+  virtual ~Method() = default;
+  Method(const Method&) = delete;
+  Method& operator=(const Method&) = delete;
+
+  virtual void begin(const Footage& /*footage*/) {}
+  // Not timed: what the frame before has left.
+  virtual void prepare(const Footage& /*footage*/, std::size_t /*frame*/) {}
+  virtual void follow(const Footage& footage, std::size_t frame, const Places& predicted, Places& found) = 0;
+
+  std::string name;
+  std::vector<double> ms;
+  std::vector<double> errors_px;
+  std::vector<double> normalised;  // squared error under the method's own covariance, over 2
+  int lost = 0;
+};
+
+double quantile(std::vector<double> values, double fraction) {
+  if (values.empty()) return std::nan("");
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1) + 0.5)];
+}
+
+cv::Mat borrow(const Footage& footage, std::size_t frame) {
+  const GreyImage image = footage.image(frame);
+  return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data),
+          static_cast<std::size_t>(image.stride)};
+}
+
+// From the feature's true place in the frame before.
+class LucasKanade final : public Method {
+ public:
+  LucasKanade(std::string name_of, int levels, bool is_predicted, int threads, bool is_pyramid_ready)
+      : Method(std::move(name_of)),
+        levels_(levels),
+        is_predicted_(is_predicted),
+        threads_(threads),
+        is_pyramid_ready_(is_pyramid_ready) {}
+
+  void prepare(const Footage& footage, std::size_t frame) override {
+    cv::setNumThreads(threads_);
+    cv::buildOpticalFlowPyramid(borrow(footage, frame - 1), before_, kWindow, levels_);
+    if (is_pyramid_ready_) cv::buildOpticalFlowPyramid(borrow(footage, frame), now_, kWindow, levels_);
+    from_.clear();
+    for (const Vector2d& px : footage.px[frame - 1]) {
+      from_.emplace_back(static_cast<float>(px.x()), static_cast<float>(px.y()));
+    }
+  }
+
+  void follow(const Footage& footage, std::size_t frame, const Places& predicted, Places& found) override {
+    if (!is_pyramid_ready_) cv::buildOpticalFlowPyramid(borrow(footage, frame), now_, kWindow, levels_);
+    to_.clear();
+    for (const Vector2d& px : predicted) to_.emplace_back(static_cast<float>(px.x()), static_cast<float>(px.y()));
+    cv::calcOpticalFlowPyrLK(before_, now_, from_, to_, status_, residual_, kWindow, levels_,
+                             {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 30, 0.01},
+                             is_predicted_ ? cv::OPTFLOW_USE_INITIAL_FLOW : 0);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      found[i] = status_[i] != 0 ? Vector2d(to_[i].x, to_[i].y) : kLost;
+    }
+  }
+
+ private:
+  static inline const cv::Size kWindow{21, 21};
+  int levels_;
+  bool is_predicted_;
+  int threads_;
+  bool is_pyramid_ready_;
+  std::vector<cv::Mat> before_, now_;
+  std::vector<cv::Point2f> from_, to_;
+  std::vector<std::uint8_t> status_;
+  std::vector<float> residual_;
+};
+
+// From the template of the first frame.
+class Patches final : public Method {
+ public:
+  explicit Patches(double deviation_px, SimdTarget target = best_simd_target())
+      : Method(std::string("this tracker, ") + simd_target_name(target)),
+        tracker_(PatchTrackerSettings{}, target),
+        covariance_(deviation_px * deviation_px * Matrix2d::Identity()) {}
+
+  void begin(const Footage& footage) override {
+    patches_.resize(footage.px[0].size());
+    usable_.clear();
+    for (std::size_t i = 0; i < patches_.size(); ++i) {
+      usable_.push_back(make_patch_template(footage.image(0), footage.px[0][i], TemplateSettings{}, tracker_.kernels(),
+                                            patches_[i]) == TemplateVerdict::kGood);
+    }
+    states_.assign(patches_.size(), PatchState{});
+    matches_.resize(patches_.size());
+  }
+
+  void follow(const Footage& footage, std::size_t frame, const Places& predicted, Places& found) override {
+    const GreyImage image = footage.image(frame);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      if (i + 1 < found.size()) tracker_.prefetch(image, predicted[i + 1]);
+      matches_[i] = tracker_.track(image, patches_[i], states_[i], predicted[i], covariance_);
+      found[i] = matches_[i].state == MatchState::kFound ? matches_[i].px : kLost;
+    }
+  }
+
+  [[nodiscard]] const std::vector<PatchMatch>& matches() const { return matches_; }
+  [[nodiscard]] bool is_usable(std::size_t i) const { return usable_[i]; }
+
+ private:
+  PatchTracker tracker_;
+  Matrix2d covariance_;
+  std::vector<PatchTemplate> patches_;
+  std::vector<PatchState> states_;
+  std::vector<PatchMatch> matches_;
+  std::vector<bool> usable_;
+};
+
+// Every method follows every frame in turn; the frames between have taken its place in the caches.
+void run(const Footage& footage, std::vector<Method*> methods, double start_error_px, int rounds) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal(0, 1);
+  std::uniform_real_distribution<double> angle(0, 2 * M_PI);
+  const std::size_t features = footage.px[0].size();
+  Places predicted(features), found(features);
+  for (int round = 0; round < rounds; ++round) {
+    for (Method* method : methods) method->begin(footage);
+    for (std::size_t frame = 1; frame < footage.frames.size(); ++frame) {
+      for (std::size_t i = 0; i < features; ++i) {
+        const double a = angle(random);
+        const Vector2d error = start_error_px > 0
+                                   ? Vector2d(start_error_px * std::cos(a), start_error_px * std::sin(a))
+                                   : Vector2d(kPrediction_px * normal(random), kPrediction_px * normal(random));
+        predicted[i] = footage.px[frame][i] + error;
+      }
+      for (Method* method : methods) {
+        method->prepare(footage, frame);
+        const auto begin = std::chrono::steady_clock::now();
+        method->follow(footage, frame, predicted, found);
+        const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - begin;
+        method->ms.push_back(taken.count());
+        const auto* patches = dynamic_cast<const Patches*>(method);
+        for (std::size_t i = 0; i < features; ++i) {
+          if (patches != nullptr && !patches->is_usable(i)) continue;
+          if (!found[i].allFinite()) {
+            ++method->lost;
+            continue;
+          }
+          const Vector2d e = found[i] - footage.px[frame][i];
+          method->errors_px.push_back(e.norm());
+          if (patches != nullptr) {
+            method->normalised.push_back(0.5 * e.dot(patches->matches()[i].covariance_px2.inverse() * e));
+          }
+        }
+      }
+    }
+  }
+}
+
+void compare(const Footage& footage, const char* light) {
+  LucasKanade one_thread("OpenCV LK, 4 levels, one thread", 3, false, 1, false);
+  LucasKanade threads("OpenCV LK, 4 levels, default threads", 3, false, -1, false);
+  LucasKanade predicted("OpenCV LK, predicted start, 1 level, one thread", 0, true, 1, false);
+  LucasKanade bare("  the same, its derivatives made before", 0, true, 1, true);
+  Patches patches(kPrediction_px);
+  std::vector<Method*> methods = {&one_thread, &threads, &predicted, &bare, &patches};
+  run(footage, methods, 0, kRounds);
+  std::printf("\n%s, %dx%d, %zu features, %s light\n", footage.name.c_str(), footage.width, footage.height,
+              footage.px[0].size(), light);
+  std::printf("  %-48s %8s %8s %8s %9s %9s %7s %8s\n", "", "p50 ms", "p99 ms", "x LK", "median px", "p95 px", "lost %",
+              "e2/sigma2");
+  for (const Method* method : methods) {
+    const double share = 100.0 * method->lost / (method->lost + static_cast<double>(method->errors_px.size()));
+    double mean = 0;
+    for (const double n : method->normalised) mean += n / static_cast<double>(method->normalised.size());
+    std::printf("  %-48s %8.3f %8.3f %8.1f %9.3f %9.3f %7.2f", method->name.c_str(), quantile(method->ms, 0.5),
+                quantile(method->ms, 0.99), quantile(predicted.ms, 0.5) / quantile(method->ms, 0.5),
+                quantile(method->errors_px, 0.5), quantile(method->errors_px, 0.95), share);
+    if (method->normalised.empty()) {
+      std::printf(" %8s\n", "-");
+    } else {
+      std::printf(" %8.2f\n", mean);
+    }
+  }
+}
+
+void capture(const Footage& footage, double distance_px) {
+  LucasKanade predicted("OpenCV LK, predicted start, 1 level", 0, true, 1, false);
+  Patches patches(1.5);
+  std::vector<Method*> methods = {&predicted, &patches};
+  run(footage, methods, distance_px, 3);
+  for (const Method* method : methods) {
+    const auto total = static_cast<double>(method->errors_px.size()) + method->lost;
+    const auto near = std::count_if(method->errors_px.begin(), method->errors_px.end(),
+                                    [](double e) { return e < 0.5; });
+    std::printf("  %-10s %dx%d from %.0f px: %-40s %6.2f %% within 0.5 px\n", footage.name.c_str(), footage.width,
+                footage.height, distance_px, method->name.c_str(), 100.0 * static_cast<double>(near) / total);
+  }
+}
+
+void compare_targets(const Footage& footage) {
+  std::vector<Method*> methods;
+  std::vector<std::unique_ptr<Patches>> owned;
+  for (const SimdTarget target : simd_targets()) owned.push_back(std::make_unique<Patches>(kPrediction_px, target));
+  for (const auto& one : owned) methods.push_back(one.get());
+  run(footage, methods, 0, kRounds);
+  std::printf("\n%s, %dx%d, %zu features, by instruction set\n", footage.name.c_str(), footage.width, footage.height,
+              footage.px[0].size());
+  for (const Method* method : methods) {
+    std::printf("  %-48s %8.3f %8.3f\n", method->name.c_str(), quantile(method->ms, 0.5), quantile(method->ms, 0.99));
+  }
+}
+
+}  // namespace
+}  // namespace perimap::bench
+
+int main() {
+  using namespace perimap::bench;
+  print_machine(PERIMAP_REVISION);
+  std::printf("Templates of the first frame, predictions off by %.0f px an axis; LK starts from the true place in the frame\n"
+              "before and builds the new frame's pyramid with derivatives, as it must each frame. 'x LK': against LK with\n"
+              "predicted start. 'e2/sigma2': mean squared error under the match's own covariance, 1 is calibrated.\n",
+              kPrediction_px);
+  for (const auto& [width, height] : {std::pair{1280, 720}, std::pair{1920, 1080}}) {
+    for (const int features : {50, 200, 500}) {
+      for (const Footage& footage :
+           {rendered_footage(width, height, kFrames, features), textured_footage(width, height, kFrames, features)}) {
+        const Footage lit = under_changing_light(footage);
+        compare(footage, "steady");
+        compare(lit, "changing");
+        if (features == 200) {
+          compare_targets(footage);
+          for (const double distance_px : {2.0, 4.0}) capture(lit, distance_px);
+        }
+        std::fflush(stdout);
+      }
+    }
+  }
+  return 0;
+}
