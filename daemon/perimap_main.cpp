@@ -9,6 +9,7 @@
 #include "daemon/commands/replay.hpp"
 #include "daemon/commands/report.hpp"
 #include "daemon/commands/simulate.hpp"
+#include "daemon/commands/track.hpp"
 #include "daemon/commands/watch.hpp"
 
 namespace {
@@ -27,6 +28,7 @@ int run(int argc, char** argv) {
   perimap::add_report_command(app, exit_code);
   perimap::add_ecg_command(app, exit_code);
   perimap::add_experiment_command(app, exit_code);
+  perimap::add_track_command(app, exit_code);
   perimap::add_check_command(app, exit_code);
   try {
     app.parse(argc, argv);

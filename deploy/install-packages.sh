@@ -22,6 +22,7 @@ build=(
   libboost-dev                               # core/realtime: lock-free rings
   libhwy-dev                                 # core/bank: portable SIMD with a choice at run time
   libopencv-core-dev libopencv-imgproc-dev   # core/vision
+  libopencv-videoio-dev                      # drivers/video: video files
   cyclonedds-dev cyclonedds-tools            # idl, daemon: DDS and its IDL compiler
   libfmt-dev
   libzstd-dev zlib1g-dev                     # drivers: recordings, simulator data

@@ -1,8 +1,10 @@
 #include "core/vision/feature_detector.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -100,10 +102,17 @@ Tile* neediest(std::vector<Tile>& tiles) {
   return chosen;
 }
 
+// OpenCV takes no const data; what is borrowed here is only read.
+cv::Mat borrow(const GreyImage& image) {
+  return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data),
+          static_cast<std::size_t>(image.stride)};
+}
+
 std::vector<Vector2d> find(const cv::Mat& image, std::span<const Vector2d> occupied, const DetectorSettings& settings,
-                           std::size_t how_many) {
+                           std::size_t how_many, const GreyImage& barred) {
   const cv::Mat strength = corner_strength(image);
-  const cv::Mat mask = forbidden(image, settings);
+  cv::Mat mask = forbidden(image, settings);
+  if (barred.data != nullptr && barred.width == image.cols && barred.height == image.rows) mask |= borrow(barred);
   const int columns = (image.cols + settings.tile_px - 1) / settings.tile_px;
   const int rows = (image.rows + settings.tile_px - 1) / settings.tile_px;
   std::vector<Tile> tiles(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
@@ -144,8 +153,47 @@ std::vector<Vector2d> find(const cv::Mat& image, std::span<const Vector2d> occup
 
 }  // namespace
 
+double estimate_noise(const GreyImage& image) {
+  constexpr int kDark = 25, kClipped = 245;
+  constexpr int kStep = 2;  // a quarter of the pixels will do
+  // The sum below is an integer of at most 8 * 255.
+  std::array<int, 8 * 255 + 1> counts{};
+  long total = 0;
+  for (int y = 1; y + 1 < image.height; y += kStep) {
+    const std::uint8_t* const above = image.row(y - 1);
+    const std::uint8_t* const here = image.row(y);
+    const std::uint8_t* const below = image.row(y + 1);
+    for (int x = 1; x + 1 < image.width; x += kStep) {
+      if (here[x] < kDark || here[x] > kClipped) continue;
+      const int off = above[x - 1] - 2 * above[x] + above[x + 1] - 2 * here[x - 1] + 4 * here[x] - 2 * here[x + 1] +
+                      below[x - 1] - 2 * below[x] + below[x + 1];
+      ++counts[static_cast<std::size_t>(std::abs(off))];
+      ++total;
+    }
+  }
+  if (total == 0) return 0;
+  long below_it = 0;
+  std::size_t median = 0;
+  while (below_it + counts[median] < total / 2) below_it += counts[median++];
+  // Within the median's own bin, evenly.
+  const double within =
+      counts[median] > 0 ? (0.5 * static_cast<double>(total) - static_cast<double>(below_it)) / counts[median] : 0.5;
+  constexpr double kMedianOfNormal = 0.6745, kGain = 6;  // of the sum: the root of its squared weights
+  return (static_cast<double>(median) - 0.5 + within) / (kMedianOfNormal * kGain);
+}
+
+DetectorSettings detector_settings_for(int width, int height, double noise, int how_many) noexcept {
+  DetectorSettings settings;
+  // Noise of sigma alone gives a corner 0.19 sigma^2 (patch_template.hpp).
+  settings.min_corner = std::clamp(1.2 * noise * noise, 0.5, DetectorSettings{}.min_corner);
+  const double spacing = std::sqrt(static_cast<double>(width) * height / std::max(how_many, 1));
+  settings.tile_px = std::clamp(static_cast<int>(0.6 * spacing), 16, 400);
+  settings.min_distance_px = std::clamp(0.4 * spacing, 10.0, 60.0);
+  return settings;
+}
+
 Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<const Vector2d> occupied,
-                                              const DetectorSettings& settings, int how_many) {
+                                              const DetectorSettings& settings, int how_many, const GreyImage& barred) {
   if (image.data == nullptr || image.width < 1 || image.height < 1 || image.stride < image.width) {
     return fail("feature detector: image of " + std::to_string(image.width) + "x" + std::to_string(image.height) +
                 " with stride " + std::to_string(image.stride) + " cannot be read");
@@ -156,10 +204,7 @@ Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<
   if (how_many <= 0) return std::vector<Vector2d>{};
   try {
     cv::setNumThreads(1);  // the process has the threads it made itself, and no others
-    // OpenCV takes no const data; find() only reads it.
-    const cv::Mat view(image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data),
-                       static_cast<std::size_t>(image.stride));
-    return find(view, occupied, settings, static_cast<std::size_t>(how_many));
+    return find(borrow(image), occupied, settings, static_cast<std::size_t>(how_many), barred);
   } catch (const std::exception& error) {
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');

@@ -22,10 +22,21 @@ struct DetectorSettings {
   double background_clearance_px = 16;  // silhouettes slide over the tissue
 };
 
+// Standard deviation of the noise of single pixels, grey levels, from how far a pixel lies off the bilinear surface
+// through its neighbours (Immerkaer, "Fast Noise Variance Estimation", CVIU 64(2), 1996; here by the median, because
+// texture has long tails). Only what is neither dark nor clipped counts; 0 when nothing does.
+[[nodiscard]] double estimate_noise(const GreyImage& image);
+
+// For how_many features spread over an image of this size and this noise, whatever they are. A corner must stand out of
+// the noise, and no more: tissue without vessels has little texture.
+[[nodiscard]] DetectorSettings detector_settings_for(int width, int height, double noise, int how_many) noexcept;
+
 // Up to how_many new features, level-0 pixels (whole ones), none within min_distance_px of another or of occupied.
+// `barred`, when it has the image's size, is not 0 where no feature may be (instruments); an empty one bars nothing.
 // The same input gives the same output in the same order, best tiles' corners first. Allocates; meant for a thread
 // without a deadline. An empty list when there is nothing to be found; an error for an unusable image or setting.
 [[nodiscard]] Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<const Vector2d> occupied,
-                                                            const DetectorSettings& settings, int how_many);
+                                                            const DetectorSettings& settings, int how_many,
+                                                            const GreyImage& barred = {});
 
 }  // namespace perimap

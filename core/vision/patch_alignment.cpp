@@ -65,8 +65,7 @@ double residual_variance(const PatchTemplate::Level& level, const PatchSamples& 
   constexpr int kAcross = kSide / kBlock;
   // Of a block: its samples' sum less scaled_gain times its template pixels' and less scaled_bias.
   const double scaled_gain = kGreyScale * fit.gain;
-  const double scaled_bias =
-      kGreyScale * kBlock * kBlock * (fit.bias + (fit.gain - 1) * PatchTemplate::kGreyOrigin);
+  const double scaled_bias = kGreyScale * kBlock * kBlock * (fit.bias + (fit.gain - 1) * PatchTemplate::kGreyOrigin);
   double sum_squares = 0;
   for (int by = 0; by < kAcross; ++by) {
     std::array<int, kSide> seen, expected;  // sums over the block's rows
@@ -180,7 +179,7 @@ bool warped_window_fits(const GreyImage& image, const PatchTemplate::Level& leve
   const double half = level.half() + 0.01;  // the kernels' positions round
   const double u = warp.centre.x() - warp.A(0, 0) * level.offset_x - warp.A(0, 1) * level.offset_y;
   const double v = warp.centre.y() - warp.A(1, 0) * level.offset_x - warp.A(1, 1) * level.offset_y;
-  constexpr double kMaxReach = 8;               // so that offsets within the window fit 32 bits,
+  constexpr double kMaxReach = 8;                 // so that offsets within the window fit 32 bits,
   constexpr std::ptrdiff_t kMaxStride = 1 << 22;  // with this
   if (image.stride > kMaxStride) return false;
   return reach_u < kMaxReach && reach_v < kMaxReach && u - half * reach_u >= 0 && v - half * reach_v >= 0 &&

@@ -185,9 +185,8 @@ void sample_warped(const GreyImage& image, int side, const WindowGrid& grid, Pat
 
   const hn::RebindToUnsigned<TagI> du;
   const auto byte = hn::Set(du, 255U);
-  const auto grey_of = [&](hn::Vec<decltype(du)> low_byte) HWY_ATTR {
-    return hn::ConvertTo(df, hn::BitCast(di, low_byte));
-  };
+  const auto grey_of = [&](hn::Vec<decltype(du)> low_byte)
+                           HWY_ATTR { return hn::ConvertTo(df, hn::BitCast(di, low_byte)); };
   for (int i = 0; i < pixels; i += kLanesF) {
     const auto four = hn::Load(du, neighbours.data() + i);
     const VectorF fu = hn::Load(df, fractions_u.data() + i), fv = hn::Load(df, fractions_v.data() + i);

@@ -93,8 +93,8 @@ void insert_peak(const SearchPeak& peak, double score, std::array<double, Search
 }  // namespace
 
 SearchResult search_peaks(const GreyImage& image, const PatchTemplate::Level& level, const Matrix2d& A,
-                          const Vector2d& predicted, const Matrix2d& information, double gate,
-                          double min_correlation, const PatchKernels& kernels) noexcept {
+                          const Vector2d& predicted, const Matrix2d& information, double gate, double min_correlation,
+                          const PatchKernels& kernels) noexcept {
   SearchResult result;
   if (!(predicted.x() > -kMaxSearchRadius && predicted.y() > -kMaxSearchRadius &&
         predicted.x() < image.width + kMaxSearchRadius && predicted.y() < image.height + kMaxSearchRadius)) {

@@ -19,8 +19,8 @@ struct PatchKernels;
 struct PatchTemplate {
   // Level l has a 2^l-th of the frame's resolution (reduced_window.hpp).
   static constexpr int kLevels = 3;
-  // Window sides in pixels of their own level: 3 mm of tissue at level 0 in a common view; the coarse windows span up to
-  // twice that.
+  // Window sides in pixels of their own level: 3 mm of tissue at level 0 in a common view; the coarse windows span up
+  // to twice that.
   static constexpr std::array<int, kLevels> kSide = {21, 15, 11};
   static constexpr std::size_t kMaxSamples = 448;  // 21 x 21, row after row, then zeros up to a multiple of 32
   using Pixels = std::array<std::int16_t, kMaxSamples>;
@@ -39,11 +39,11 @@ struct PatchTemplate {
     double offset_x = 0, offset_y = 0;  // of the feature from the window's middle pixel, level pixels, |.| <= 0.5
     double mean = 0;                    // of T - kGreyOrigin
     double sum_squares = 0;             // sum of (T - its mean)^2
-    std::array<double, kParameters> sd_mean{};                       // mean of SD_k
-    std::array<double, kParameters> sd_on_grey{};                    // sum of SD_k (T - mean) / sum_squares
-    std::array<double, 4> translation_inverse{};                     // inverse of the projected 2x2 Hessian, row by row
-    alignas(64) Pixels value{};                                      // T - kGreyOrigin
-    alignas(64) Pixels gradient_x{};                                 // kGradientScale times it, by Sobel's operator
+    std::array<double, kParameters> sd_mean{};     // mean of SD_k
+    std::array<double, kParameters> sd_on_grey{};  // sum of SD_k (T - mean) / sum_squares
+    std::array<double, 4> translation_inverse{};   // inverse of the projected 2x2 Hessian, row by row
+    alignas(64) Pixels value{};                    // T - kGreyOrigin
+    alignas(64) Pixels gradient_x{};               // kGradientScale times it, by Sobel's operator
     alignas(64) Pixels gradient_y{};
 
     [[nodiscard]] int half() const noexcept { return side / 2; }
@@ -74,6 +74,14 @@ struct TemplateSettings {
   int saturated_grey = 250;         // at or above this a pixel is clipped
   double max_saturated_share = 0.03;
 };
+
+// For corners that were asked for at least min_corner (DetectorSettings).
+[[nodiscard]] inline TemplateSettings template_settings_for(double min_corner) noexcept {
+  TemplateSettings settings;
+  settings.min_texture = 0.8 * min_corner;
+  settings.min_texture_coarse = 0.3 * min_corner;
+  return settings;
+}
 
 // Makes the template of the feature at px (level-0 pixels, need not be whole: windows stay on the pixel grid and carry
 // the offset, so nothing is interpolated). out is meaningful with kGood only.

@@ -192,8 +192,8 @@ SearchResult search(const GreyImage& image, const PatchTemplate& patch, int l, c
   if (l == 0) return search_peaks(image, level, A, predicted_px, information, gate, kWorthAligning, kernels);
   const Vector2d predicted = to_level(predicted_px, l);
   const ReducedWindow window(image, l, predicted, level.half() + kMaxSearchRadius + 2, kernels);
-  SearchResult result = search_peaks(window.image(), level, A, predicted - window.origin(), information, gate,
-                                     kWorthAligning, kernels);
+  SearchResult result =
+      search_peaks(window.image(), level, A, predicted - window.origin(), information, gate, kWorthAligning, kernels);
   for (int i = 0; i < result.count; ++i) {
     Vector2d& centre = result.peaks[static_cast<std::size_t>(i)].centre;
     centre = from_level(centre + window.origin(), l);
@@ -219,8 +219,7 @@ void PatchTracker::prefetch(const GreyImage& image, const Vector2d& predicted_px
 }
 
 PatchMatch PatchTracker::track(const GreyImage& image, const PatchTemplate& patch, PatchState& state,
-                               const Vector2d& predicted_px,
-                               const Matrix2d& prediction_covariance_px2) const noexcept {
+                               const Vector2d& predicted_px, const Matrix2d& prediction_covariance_px2) const noexcept {
   PatchMatch match;
   match.px = predicted_px;
   if (!predicted_px.allFinite() || !is_positive_definite(prediction_covariance_px2) || !state.A.allFinite() ||
@@ -242,8 +241,8 @@ PatchMatch PatchTracker::track(const GreyImage& image, const PatchTemplate& patc
                            (best.warp.centre - predicted_px).norm() < std::max(0.4 * radius_px, kReachOfLevel1_px)));
   if (!is_settled) {
     const int l = search_level(patch, radius_px);
-    const SearchResult found = search(image, patch, l, state.A, predicted_px, prediction_covariance_px2,
-                                      settings_.gate, *kernels_);
+    const SearchResult found =
+        search(image, patch, l, state.A, predicted_px, prediction_covariance_px2, settings_.gate, *kernels_);
     MatchState why = found.any_in_view ? MatchState::kLowCorrelation : MatchState::kOutOfView;
     for (int i = 0; i < found.count; ++i) {
       const PatchWarp start{found.peaks[static_cast<std::size_t>(i)].centre, state.A};

@@ -25,8 +25,8 @@ class ReducedWindow {
  public:
   static constexpr int kMaxReach = 40;  // level pixels
 
-  // The pixels of level 1 or 2 within `reach` of `centre` (level pixels) along each axis, as far as the frame goes; none
-  // when that is nowhere.
+  // The pixels of level 1 or 2 within `reach` of `centre` (level pixels) along each axis, as far as the frame goes;
+  // none when that is nowhere.
   ReducedWindow(const GreyImage& frame, int level, const Vector2d& centre, double reach,
                 const PatchKernels& kernels) noexcept;
 

@@ -110,9 +110,10 @@ Footage textured_footage(int width, int height, int frames, int features) {
     for (int piece = 0; piece < 12; ++piece) {
       direction += random.uniform(-0.5, 0.5);
       const cv::Point2d next = at + 12.0 * cv::Point2d(std::cos(direction), std::sin(direction));
-      cv::line(tissue, at, next, cv::Scalar(tissue.at<float>(std::clamp(static_cast<int>(at.y), 0, tissue.rows - 1),
-                                                             std::clamp(static_cast<int>(at.x), 0, tissue.cols - 1)) -
-                                            darkness),
+      cv::line(tissue, at, next,
+               cv::Scalar(tissue.at<float>(std::clamp(static_cast<int>(at.y), 0, tissue.rows - 1),
+                                           std::clamp(static_cast<int>(at.x), 0, tissue.cols - 1)) -
+                          darkness),
                thickness, cv::LINE_8);
       at = next;
     }
@@ -125,7 +126,8 @@ Footage textured_footage(int width, int height, int frames, int features) {
     const Vector2d centre(0.5 * width, 0.5 * height), d = p - centre;
     const Vector2d turned(std::cos(angle) * d.x() - std::sin(angle) * d.y(),
                           std::sin(angle) * d.x() + std::cos(angle) * d.y());
-    const Vector2d bent(1.2 * std::sin(0.9 * k) * std::sin(p.y() / 90), 1.2 * std::sin(0.7 * k) * std::cos(p.x() / 110));
+    const Vector2d bent(1.2 * std::sin(0.9 * k) * std::sin(p.y() / 90),
+                        1.2 * std::sin(0.7 * k) * std::cos(p.x() / 110));
     return Vector2d(centre + scale * turned + Vector2d(1.7 * k, -1.1 * k) + bent);
   };
   Footage footage{"textured", width, height, {}, {}};

@@ -218,8 +218,8 @@ void capture(const Footage& footage, double distance_px) {
   run(footage, methods, distance_px, 3);
   for (const Method* method : methods) {
     const auto total = static_cast<double>(method->errors_px.size()) + method->lost;
-    const auto near = std::count_if(method->errors_px.begin(), method->errors_px.end(),
-                                    [](double e) { return e < 0.5; });
+    const auto near =
+        std::count_if(method->errors_px.begin(), method->errors_px.end(), [](double e) { return e < 0.5; });
     std::printf("  %-10s %dx%d from %.0f px: %-40s %6.2f %% within 0.5 px\n", footage.name.c_str(), footage.width,
                 footage.height, distance_px, method->name.c_str(), 100.0 * static_cast<double>(near) / total);
   }
@@ -244,10 +244,11 @@ void compare_targets(const Footage& footage) {
 int main() {
   using namespace perimap::bench;
   print_machine(PERIMAP_REVISION);
-  std::printf("Templates of the first frame, predictions off by %.0f px an axis; LK starts from the true place in the frame\n"
-              "before and builds the new frame's pyramid with derivatives, as it must each frame. 'x LK': against LK with\n"
-              "predicted start. 'e2/sigma2': mean squared error under the match's own covariance, 1 is calibrated.\n",
-              kPrediction_px);
+  std::printf(
+      "Templates of the first frame, predictions off by %.0f px an axis; LK starts from the true place in the frame\n"
+      "before and builds the new frame's pyramid with derivatives, as it must each frame. 'x LK': against LK with\n"
+      "predicted start. 'e2/sigma2': mean squared error under the match's own covariance, 1 is calibrated.\n",
+      kPrediction_px);
   for (const auto& [width, height] : {std::pair{1280, 720}, std::pair{1920, 1080}}) {
     for (const int features : {50, 200, 500}) {
       for (const Footage& footage :

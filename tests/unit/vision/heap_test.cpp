@@ -27,7 +27,8 @@ TEST(Heap, IsNotTouchedByTemplateOrTracker) {
   ASSERT_EQ(probes, 2) << "the count does not work";
 
   const long before = test::allocations;
-  const TemplateVerdict verdict = make_patch_template(image.view(), {80.3, 61.2}, TemplateSettings{}, tracker.kernels(), patch);
+  const TemplateVerdict verdict =
+      make_patch_template(image.view(), {80.3, 61.2}, TemplateSettings{}, tracker.kernels(), patch);
   const PatchMatch near = tracker.track(image.view(), patch, state, {80.9, 61}, test::isotropic(0.5));
   const PatchMatch far = tracker.track(image.view(), patch, state, {95, 51}, test::isotropic(8));
   const PatchMatch absent = tracker.track(image.view(), patch, state, {40, 100}, test::isotropic(1));

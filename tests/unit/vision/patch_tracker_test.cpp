@@ -47,9 +47,7 @@ class Trial {
     return view;
   }
 
-  void show(const View& view) {
-    image_ = render(texture_, view, kWidth, kHeight, noise_, random_, 3);
-  }
+  void show(const View& view) { image_ = render(texture_, view, kWidth, kHeight, noise_, random_, 3); }
   void show_other_texture(const Texture& other, const View& view) {
     image_ = render(other, view, kWidth, kHeight, noise_, random_, 3);
   }

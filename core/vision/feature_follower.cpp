@@ -1,0 +1,254 @@
+#include "core/vision/feature_follower.hpp"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace perimap {
+namespace {
+
+constexpr double kFirstDeviation_px = 6.0;
+constexpr std::size_t kNeighbours = 6;
+constexpr std::size_t kEnoughDisplacements = 4;
+
+// The middle value; reorders. 0 of none.
+double median_of(std::vector<double>& values) noexcept {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+bool is_sought(const FollowedFeature& feature) noexcept {
+  return feature.state == FollowState::kCandidate || feature.state == FollowState::kTracked;
+}
+
+}  // namespace
+
+FeatureFollower::FeatureFollower(const FollowerSettings& settings)
+    : settings_(settings),
+      features_(static_cast<std::size_t>(std::max(settings.maximum, 0))),
+      deviation_px_(kFirstDeviation_px) {
+  displacements_.reserve(features_.size());
+  scratch_.reserve(features_.size());
+}
+
+int FeatureFollower::free() const noexcept {
+  return static_cast<int>(std::count_if(features_.begin(), features_.end(), [](const FollowedFeature& feature) {
+    return feature.state == FollowState::kEmpty;
+  }));
+}
+
+bool FeatureFollower::seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
+                           double deviation_px, double min_correlation) const noexcept {
+  PatchState state = feature.patch_state;
+  const Matrix2d covariance = deviation_px * deviation_px * Matrix2d::Identity();
+  feature.match = tracker_.track(image, feature.patch, state, predicted, covariance);
+  feature.found = feature.match.state == MatchState::kFound && feature.match.correlation >= min_correlation;
+  if (!feature.found) return false;
+  feature.patch_state = state;
+  feature.px = feature.match.px;
+  return true;
+}
+
+void FeatureFollower::note_displacements() noexcept {
+  displacements_.clear();
+  for (const FollowedFeature& feature : features_) {
+    if (feature.found) displacements_.push_back({feature.last_px, feature.px - feature.last_px});
+  }
+}
+
+// The middle displacement, along each axis, of the nearest features found; of the velocity of `but` itself when there
+// are too few.
+Vector2d FeatureFollower::displacement_around(const Vector2d& px, const FollowedFeature* but) const noexcept {
+  struct Near {
+    double distance_squared = 0;
+    Vector2d by = Vector2d::Zero();
+  };
+  std::array<Near, kNeighbours> nearest;
+  std::size_t count = 0;
+  for (const Displacement& displacement : displacements_) {
+    if (but != nullptr && displacement.from == but->last_px) continue;
+    const double distance_squared = (displacement.from - px).squaredNorm();
+    if (count == kNeighbours && distance_squared >= nearest[count - 1].distance_squared) continue;
+    std::size_t place = count < kNeighbours ? count++ : count - 1;
+    for (; place > 0 && nearest[place - 1].distance_squared > distance_squared; --place) {
+      nearest[place] = nearest[place - 1];
+    }
+    nearest[place] = {distance_squared, displacement.by};
+  }
+  if (count < kEnoughDisplacements) return but != nullptr ? but->velocity_px : Vector2d::Zero();
+  Vector2d middle;
+  std::array<double, kNeighbours> along;
+  for (int axis = 0; axis < 2; ++axis) {
+    for (std::size_t i = 0; i < count; ++i) along[i] = nearest[i].by[axis];
+    std::nth_element(along.begin(), along.begin() + count / 2, along.begin() + count);
+    middle[axis] = along[count / 2];
+  }
+  return middle;
+}
+
+void FeatureFollower::follow(const GreyImage& image) noexcept {
+  std::size_t sought = 0, found = 0;
+  for (FollowedFeature& feature : features_) {
+    feature.found = false;
+    feature.last_px = feature.px;
+  }
+  for (FollowedFeature& feature : features_) {
+    if (!is_sought(feature)) continue;
+    ++sought;
+    const double deviation_px = feature.frames < 2 ? std::max(deviation_px_, kFirstDeviation_px) : deviation_px_;
+    found += seek(image, feature, feature.last_px + feature.velocity_px, deviation_px, 0) ? 1 : 0;
+  }
+  note_displacements();
+
+  const bool has_jerked = 2 * found < sought;
+  if (has_jerked) {
+    for (FollowedFeature& feature : features_) {
+      if (!is_sought(feature) || feature.found) continue;
+      (void)seek(image, feature, feature.last_px + displacement_around(feature.last_px, &feature),
+                 settings_.widest_deviation_px, settings_.recovered_correlation);
+    }
+    note_displacements();
+  }
+
+  scratch_.clear();
+  for (const FollowedFeature& feature : features_) {
+    if (!is_sought(feature) || !feature.found || feature.frames < 2) continue;
+    const Vector2d off = feature.px - feature.last_px - feature.velocity_px;
+    scratch_.push_back(off.norm());
+  }
+  if (scratch_.size() >= kEnoughDisplacements) {
+    // A normal error along each axis has a median norm of 1.18 deviations; tissue errs with longer tails.
+    constexpr double kDeviationsPerMedian = 2.0, kShareOfNew = 0.4;
+    const double lately = std::clamp(kDeviationsPerMedian * median_of(scratch_), settings_.least_deviation_px,
+                                     settings_.widest_deviation_px);
+    deviation_px_ += (lately > deviation_px_ ? 1.0 : kShareOfNew) * (lately - deviation_px_);
+  }
+  find_again(image);
+  judge(image);
+  drop_doubles();
+}
+
+// What its own velocity did not find, and what was occluded: with the displacement of what is around it.
+void FeatureFollower::find_again(const GreyImage& image) noexcept {
+  for (FollowedFeature& feature : features_) {
+    if (feature.state == FollowState::kEmpty || feature.found) continue;
+    const Vector2d expected = feature.last_px + displacement_around(feature.last_px, &feature);
+    const bool is_occluded = feature.state == FollowState::kOccluded;
+    // Unseen for long, the place has been carried along without a measurement.
+    const double deviation_px = std::min(2 * deviation_px_ + 0.15 * feature.misses, settings_.widest_deviation_px);
+    if (!seek(image, feature, expected, deviation_px, is_occluded ? settings_.recovered_correlation : 0)) {
+      feature.px = expected;
+    }
+  }
+}
+
+void FeatureFollower::judge(const GreyImage& image) noexcept {
+  note_displacements();
+  scratch_.clear();
+  for (FollowedFeature& feature : features_) {
+    if (feature.state == FollowState::kEmpty) continue;
+    if (!feature.found) {
+      ++feature.misses;
+      feature.velocity_px = feature.px - feature.last_px;
+      const bool is_outside = feature.px.x() < 0 || feature.px.y() < 0 || feature.px.x() > image.width - 1 ||
+                              feature.px.y() > image.height - 1;
+      if (feature.state == FollowState::kCandidate || feature.misses > settings_.occluded_frames ||
+          (is_outside && feature.misses > settings_.occluded_frames / 4)) {
+        feature.state = FollowState::kEmpty;
+      } else {
+        feature.state = FollowState::kOccluded;
+      }
+      continue;
+    }
+    feature.velocity_px =
+        feature.misses == 0 ? Vector2d(feature.px - feature.last_px) : displacement_around(feature.px, &feature);
+    feature.misses = 0;
+    ++feature.frames;
+    if (feature.state == FollowState::kOccluded) feature.state = FollowState::kTracked;
+
+    const Vector2d around = displacement_around(feature.last_px, &feature);
+    const double strangeness_px = (feature.px - feature.last_px - around).norm();
+    scratch_.push_back(strangeness_px);
+    const double most_px = 4 * strangeness_px_ + 0.25 * around.norm();
+    feature.strange = std::max(0, feature.strange + (strangeness_px > most_px ? 2 : -1));
+    constexpr int kMostStrangeCandidate = 3, kMostStrange = 20;
+    const bool is_candidate = feature.state == FollowState::kCandidate;
+    if (feature.strange > (is_candidate ? kMostStrangeCandidate : kMostStrange)) {
+      feature.state = FollowState::kEmpty;
+      continue;
+    }
+    if (is_candidate && feature.frames >= settings_.candidate_frames) feature.state = FollowState::kTracked;
+    renew_worn_template(image, feature);
+  }
+  if (scratch_.size() >= kEnoughDisplacements) {
+    constexpr double kShareOfNew = 0.2, kLeast_px = 0.4;
+    strangeness_px_ += kShareOfNew * (std::max(kLeast_px, median_of(scratch_)) - strangeness_px_);
+  }
+}
+
+void FeatureFollower::renew_worn_template(const GreyImage& image, FollowedFeature& feature) const noexcept {
+  constexpr double kSmoothing = 1.0 / 15, kSteady = 0.02, kWorn = 0.93;
+  constexpr int kWornFrames = 10;
+  const double correlation = feature.match.correlation;
+  const bool is_steady = std::abs(correlation - feature.usual_correlation) < kSteady;
+  feature.usual_correlation += kSmoothing * (correlation - feature.usual_correlation);
+  const bool is_worn = (correlation < kWorn && is_steady) || template_is_stale(feature.patch_state);
+  feature.worn = is_worn ? feature.worn + 1 : 0;
+  if (feature.worn < kWornFrames) return;
+  feature.worn = 0;
+  PatchTemplate renewed;
+  if (make_patch_template(image, feature.px, template_settings_, tracker_.kernels(), renewed) !=
+      TemplateVerdict::kGood) {
+    return;
+  }
+  feature.patch = renewed;
+  feature.patch_state = PatchState{};
+  feature.patch_state.px = feature.px;
+  feature.usual_correlation = 1;
+}
+
+// Two features at one place follow the same tissue, one of them wrongly: the older one stays.
+void FeatureFollower::drop_doubles() noexcept {
+  constexpr double kApart_px = 3.0;
+  for (std::size_t i = 0; i < features_.size(); ++i) {
+    if (!features_[i].found) continue;
+    for (std::size_t k = i + 1; k < features_.size(); ++k) {
+      if (!features_[k].found || (features_[i].px - features_[k].px).squaredNorm() > kApart_px * kApart_px) continue;
+      FollowedFeature& younger = features_[i].frames < features_[k].frames ? features_[i] : features_[k];
+      younger.state = FollowState::kEmpty;
+      younger.found = false;
+    }
+  }
+}
+
+void FeatureFollower::add(const GreyImage& image, std::span<const Vector2d> corners,
+                          const TemplateSettings& settings) noexcept {
+  template_settings_ = settings;
+  auto place = features_.begin();
+  PatchTemplate patch;
+  for (const Vector2d& px : corners) {
+    if (make_patch_template(image, px, template_settings_, tracker_.kernels(), patch) != TemplateVerdict::kGood) {
+      continue;
+    }
+    place = std::find_if(place, features_.end(),
+                         [](const FollowedFeature& feature) { return feature.state == FollowState::kEmpty; });
+    if (place == features_.end()) return;
+    *place = FollowedFeature{};
+    place->state = FollowState::kCandidate;
+    place->id = next_id_++;
+    place->found = true;
+    place->px = place->last_px = px;
+    place->velocity_px = displacement_around(px, nullptr);
+    place->patch = patch;
+    place->patch_state.px = px;
+    place->match.state = MatchState::kFound;
+    place->match.px = px;
+    place->match.correlation = 1;
+    place->frames = 1;
+  }
+}
+
+}  // namespace perimap

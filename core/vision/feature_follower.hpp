@@ -1,0 +1,95 @@
+// Follows features through video of which nothing else is known: no map, no camera pose, no phase. For a recording with
+// those, the pipeline predicts each feature from its map instead.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/geometry/pose.hpp"
+#include "core/sensors/grey_image.hpp"
+#include "core/vision/patch_template.hpp"
+#include "core/vision/patch_tracker.hpp"
+
+namespace perimap {
+
+struct FollowerSettings {
+  int maximum = 200;
+  int candidate_frames = 8;             // found so often, and moving as its neighbours do, a candidate is tracked
+  int occluded_frames = 120;            // unseen so long, a feature is lost; a candidate at its first miss
+  double least_deviation_px = 1.0;      // of a prediction, per axis
+  double widest_deviation_px = 11.0;    // the search reaches +-40 px
+  double recovered_correlation = 0.92;  // asked of a feature that comes back
+};
+
+enum class FollowState : std::uint8_t {
+  kEmpty,
+  kCandidate,  // new: may be a highlight, an instrument or the rim of the view
+  kTracked,
+  kOccluded,  // was tracked and is not found at present; its place is carried along with its neighbours
+};
+
+struct FollowedFeature {
+  FollowState state = FollowState::kEmpty;
+  std::uint32_t id = 0;
+  bool found = false;                       // in the last frame
+  Vector2d px = Vector2d::Zero();           // where it was found, else where it is expected
+  Vector2d velocity_px = Vector2d::Zero();  // per frame
+  PatchTemplate patch;
+  PatchState patch_state;
+  PatchMatch match;                     // of the last frame
+  Vector2d last_px = Vector2d::Zero();  // in the frame before
+  int frames = 0;                       // found in
+  int misses = 0;                       // in a row
+  int strange = 0;                 // frames in which it moved otherwise than its neighbours, less those in which not
+  int worn = 0;                    // frames in a row in which the template fitted badly, but steadily
+  double usual_correlation = 1.0;  // smoothed over some 15 frames
+};
+
+// How a feature is predicted: by its own last displacement (constant velocity); where that fails, by the displacement
+// of the features around it in this very frame; where most fail at once, the camera has jerked, and all are sought
+// widely. The deviation of a prediction is what predictions have lately been off by.
+//
+// A template is renewed when it has fitted badly but steadily for some time, or when the view has changed by a factor
+// of two: a worn template, not an occluded feature, which stops fitting within a few frames. Each renewal moves the
+// followed point by about the match's deviation, so there are few.
+class FeatureFollower {
+ public:
+  explicit FeatureFollower(const FollowerSettings& settings);
+
+  // Finds every feature in the next frame, or notes that it is not there. Takes nothing from the heap.
+  void follow(const GreyImage& image) noexcept;
+
+  // New candidates at these pixels of the image followed last. Those that make no good template are left out. Templates
+  // that are renewed later are judged likewise.
+  void add(const GreyImage& image, std::span<const Vector2d> corners, const TemplateSettings& settings) noexcept;
+
+  [[nodiscard]] std::span<const FollowedFeature> features() const noexcept { return features_; }
+  [[nodiscard]] int free() const noexcept;
+
+ private:
+  struct Displacement {
+    Vector2d from;
+    Vector2d by;
+  };
+  [[nodiscard]] bool seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
+                          double deviation_px, double min_correlation) const noexcept;
+  [[nodiscard]] Vector2d displacement_around(const Vector2d& px, const FollowedFeature* but) const noexcept;
+  void note_displacements() noexcept;
+  void find_again(const GreyImage& image) noexcept;
+  void judge(const GreyImage& image) noexcept;
+  void drop_doubles() noexcept;
+  void renew_worn_template(const GreyImage& image, FollowedFeature& feature) const noexcept;
+
+  FollowerSettings settings_;
+  TemplateSettings template_settings_;
+  PatchTracker tracker_;
+  std::vector<FollowedFeature> features_;
+  std::vector<Displacement> displacements_;  // of this frame
+  std::vector<double> scratch_;
+  double deviation_px_;
+  double strangeness_px_ = 1.0;  // how far a displacement usually is from that of the neighbours
+  std::uint32_t next_id_ = 1;
+};
+
+}  // namespace perimap

@@ -1,0 +1,313 @@
+#include "daemon/commands/track.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/vision/feature_detector.hpp"
+#include "core/vision/feature_follower.hpp"
+#include "core/vision/instrument_mask.hpp"
+#include "daemon/commands/progress.hpp"
+#include "daemon/process/stop_signal.hpp"
+#include "drivers/recording/channels.hpp"
+#include "drivers/recording/foxglove_image.hpp"
+#include "drivers/recording/recording_reader.hpp"
+#include "drivers/video/video_file.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr int kOk = 0;
+constexpr int kFailure = 1;
+
+struct Options {
+  std::string input;
+  std::string csv;
+  std::string video;
+  int features = 200;
+  bool no_new_features = false;
+};
+
+// Frames one by one, from a video or a recording.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  // Null at the end; valid until the next call.
+  [[nodiscard]] virtual Expected<const VideoFrame*> next() = 0;
+  [[nodiscard]] virtual std::uint64_t announced_frames() const = 0;
+  [[nodiscard]] virtual double frames_per_s() const = 0;
+};
+
+class VideoSource final : public FrameSource {
+ public:
+  explicit VideoSource(VideoReader reader) : reader_(std::move(reader)) {}
+  Expected<const VideoFrame*> next() override { return reader_.next(); }
+  [[nodiscard]] std::uint64_t announced_frames() const override { return reader_.announced_frames(); }
+  [[nodiscard]] double frames_per_s() const override { return reader_.frames_per_s(); }
+
+ private:
+  VideoReader reader_;
+};
+
+class RecordingSource final : public FrameSource {
+ public:
+  RecordingSource(RecordingReader reader, std::string path) : reader_(std::move(reader)), path_(std::move(path)) {}
+
+  Expected<const VideoFrame*> next() override {
+    auto message = reader_.next();
+    if (!message) return tl::unexpected(message.error());
+    if (!*message) return nullptr;
+    auto sample = reader_.decode<foxglove_RawImage>(**message);
+    if (!sample) return tl::unexpected(sample.error());
+    sample_.emplace(*std::move(sample));
+    const auto image = borrow_grey_image(**sample_);
+    if (!image) return fail(fmt::format("{}: byte {}: {}", path_, (*message)->file_offset, image.error().message));
+    if (frame_.grey.data != nullptr && (image->width != frame_.grey.width || image->height != frame_.grey.height)) {
+      return fail(fmt::format("{}: byte {}: a frame of another size than the first", path_, (*message)->file_offset));
+    }
+    frame_.grey = *image;
+    return &frame_;
+  }
+  [[nodiscard]] std::uint64_t announced_frames() const override { return 0; }
+  [[nodiscard]] double frames_per_s() const override { return 0; }
+
+ private:
+  RecordingReader reader_;
+  std::string path_;
+  std::optional<Sample<foxglove_RawImage>> sample_;
+  VideoFrame frame_;
+};
+
+bool is_recording(const std::string& path) {
+  constexpr std::string_view kMagic = "\x89MCAP";
+  char start[kMagic.size()] = {};
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
+  return file != nullptr && std::fread(start, 1, sizeof start, file.get()) == sizeof start &&
+         std::string_view(start, sizeof start) == kMagic;
+}
+
+Expected<std::unique_ptr<FrameSource>> open_source(const std::string& path) {
+  if (!is_recording(path)) {
+    auto video = VideoReader::open(path);
+    if (!video) return tl::unexpected(video.error());
+    return std::make_unique<VideoSource>(*std::move(video));
+  }
+  auto recording = RecordingReader::open(path);
+  if (!recording) return tl::unexpected(recording.error());
+  const std::string_view channels[] = {channels::kCameraImage};
+  if (const auto selected = recording->select(channels); !selected) return tl::unexpected(selected.error());
+  return std::make_unique<RecordingSource>(*std::move(recording), path);
+}
+
+// The tracks as text, in a file beside the one it will become.
+class TrackTable {
+ public:
+  static Expected<TrackTable> create(const std::string& path) {
+    TrackTable table(path);
+    table.file_.reset(std::fopen(table.partial_.c_str(), "w"));
+    if (table.file_ == nullptr) return fail(path + ": can not be written");
+    fmt::print(table.file_.get(), "frame,id,x,y,state\n");
+    return table;
+  }
+
+  void write(std::uint64_t frame, const FollowedFeature& feature) {
+    const char* state = feature.state == FollowState::kCandidate ? "candidate" : "tracked";
+    fmt::print(file_.get(), "{},{},{:.3f},{:.3f},{}\n", frame, feature.id, feature.px.x(), feature.px.y(), state);
+  }
+
+  Expected<void> finish() {
+    const bool good = std::ferror(file_.get()) == 0 && std::fflush(file_.get()) == 0;
+    file_.reset();
+    std::error_code error;
+    if (good) std::filesystem::rename(partial_, path_, error);
+    if (!good || error) return fail(path_ + ": could not be written whole");
+    return {};
+  }
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const noexcept { (void)std::fclose(file); }
+  };
+  explicit TrackTable(const std::string& path) : path_(path), partial_(path + ".part") {}
+  std::string path_, partial_;
+  std::unique_ptr<std::FILE, Close> file_;
+};
+
+VideoMark mark_of(const FollowedFeature& feature) noexcept {
+  VideoMark mark{feature.px.x(), feature.px.y()};
+  switch (feature.state) {
+    case FollowState::kTracked:
+      mark.green = 255;
+      break;
+    case FollowState::kCandidate:
+      mark.green = mark.red = 255;
+      break;
+    case FollowState::kOccluded:
+    case FollowState::kEmpty:
+      mark.red = 255;
+      mark.blue = 160;
+      break;
+  }
+  return mark;
+}
+
+struct Summary {
+  std::uint64_t frames = 0;
+  std::uint64_t rows = 0;
+  double follow_s = 0;
+};
+
+class Tracking {
+ public:
+  explicit Tracking(const Options& options) : options_(options), follower_(settings(options)) {}
+
+  // Follows every feature in the frame and fills up their number every kFindInterval frames.
+  Expected<void> take(const VideoFrame& frame) {
+    const auto begin = std::chrono::steady_clock::now();
+    follower_.follow(frame.grey);
+    summary_.follow_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    constexpr std::uint64_t kFindInterval = 5;
+    const bool may_find = options_.no_new_features ? !has_found_ : summary_.frames % kFindInterval == 0;
+    ++summary_.frames;
+    return may_find && follower_.free() > 0 ? find(frame) : Expected<void>();
+  }
+
+  void write(TrackTable& table) {
+    for (const FollowedFeature& feature : follower_.features()) {
+      if (!feature.found) continue;
+      table.write(summary_.frames - 1, feature);
+      ++summary_.rows;
+    }
+  }
+
+  [[nodiscard]] std::vector<VideoMark> marks() const {
+    std::vector<VideoMark> marks;
+    for (const FollowedFeature& feature : follower_.features()) {
+      if (feature.state != FollowState::kEmpty) marks.push_back(mark_of(feature));
+    }
+    return marks;
+  }
+
+  [[nodiscard]] const Summary& summary() const noexcept { return summary_; }
+
+ private:
+  static FollowerSettings settings(const Options& options) {
+    FollowerSettings settings;
+    settings.maximum = options.features;
+    return settings;
+  }
+
+  Expected<void> find(const VideoFrame& frame) {
+    std::vector<Vector2d> occupied;
+    for (const FollowedFeature& feature : follower_.features()) {
+      if (feature.state != FollowState::kEmpty) occupied.push_back(feature.px);
+    }
+    GreyImage barred;
+    std::vector<std::uint8_t> mask;
+    if (frame.bgr != nullptr) {
+      auto instruments = find_instruments({frame.bgr, frame.grey.width, frame.grey.height, frame.bgr_stride});
+      if (!instruments) return tl::unexpected(instruments.error());
+      mask = *std::move(instruments);
+      barred = {mask.data(), frame.grey.width, frame.grey.height, frame.grey.width};
+    }
+    const GreyImage& image = frame.grey;
+    const DetectorSettings detector =
+        detector_settings_for(image.width, image.height, estimate_noise(image), options_.features);
+    const auto corners = find_features(image, occupied, detector, follower_.free(), barred);
+    if (!corners) return tl::unexpected(corners.error());
+    follower_.add(image, *corners, template_settings_for(detector.min_corner));
+    has_found_ = has_found_ || !corners->empty();
+    return {};
+  }
+
+  const Options& options_;
+  FeatureFollower follower_;
+  bool has_found_ = false;
+  Summary summary_;
+};
+
+int refuse(const Error& error, int code) {
+  fmt::print(stderr, "perimap track: {}\n", error.message);
+  return code;
+}
+
+int track(const Options& options) {
+  auto stop = StopSignal::install();
+  if (!stop) return refuse(stop.error(), kFailure);
+  auto source = open_source(options.input);
+  if (!source) return refuse(source.error(), kFailure);
+  auto table = TrackTable::create(options.csv);
+  if (!table) return refuse(table.error(), kFailure);
+  std::optional<VideoWriter> video;
+  Tracking tracking(options);
+  {
+    Progress progress("frames", (*source)->announced_frames());
+    while (!stop->requested()) {
+      const auto frame = (*source)->next();
+      if (!frame) return refuse(frame.error(), kFailure);
+      if (*frame == nullptr) break;
+      if (const auto taken = tracking.take(**frame); !taken) return refuse(taken.error(), kFailure);
+      tracking.write(*table);
+      if (!options.video.empty()) {
+        if (!video) {
+          const GreyImage& grey = (*frame)->grey;
+          auto created = VideoWriter::create(options.video, grey.width, grey.height, (*source)->frames_per_s());
+          if (!created) return refuse(created.error(), kFailure);
+          video.emplace(*std::move(created));
+        }
+        if (const auto written = video->write(**frame, tracking.marks()); !written) {
+          return refuse(written.error(), kFailure);
+        }
+      }
+      if ((*source)->announced_frames() > 0) progress.update(tracking.summary().frames);
+    }
+  }
+  if (const auto finished = table->finish(); !finished) return refuse(finished.error(), kFailure);
+  if (video) {
+    if (const auto finished = video->finish(); !finished) return refuse(finished.error(), kFailure);
+  }
+  const Summary& summary = tracking.summary();
+  const double frames = static_cast<double>(std::max<std::uint64_t>(summary.frames, 1));
+  fmt::print("{}{} frames, {:.1f} features a frame, {:.2f} ms a frame to follow them: {}\n",
+             stop->requested() ? "stopped early: " : "", summary.frames, static_cast<double>(summary.rows) / frames,
+             1e3 * summary.follow_s / frames, options.csv);
+  return kOk;
+}
+
+}  // namespace
+
+void add_track_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "track",
+      "Follow features through a video or the frames of a recording by their looks alone, without map or pose");
+  auto options = std::make_shared<Options>();
+  command->add_option("INPUT", options->input, "A video file, or a recording (MCAP)")->required();
+  command
+      ->add_option(
+          "--csv", options->csv,
+          "Where to write the tracks: frame,id,x,y,state; a row a feature a frame in which it is found. Frames\n"
+          "count from 0, pixels from the centre of the first; states are candidate and tracked")
+      ->required();
+  command->add_option("--video", options->video, "Where to write the frames with their features marked (.mkv, .avi)");
+  command->add_option("--features", options->features, "How many are kept followed")
+      ->check(CLI::Range(1, 5000))
+      ->capture_default_str();
+  command->add_flag("--no-new-features", options->no_new_features,
+                    "Only those found in the first frame that shows any");
+  command->footer(
+      "Prediction: each feature by its own velocity; where that fails by the motion of the features around it; where\n"
+      "most fail at once, a wide search. A recording's tracker and ECG are not used.\n"
+      "Exit codes: 0 done, 1 failed, 2 wrong usage.");
+  command->callback([options, &exit_code] { exit_code = track(*options); });
+}
+
+}  // namespace perimap

@@ -1,0 +1,151 @@
+#include "drivers/video/video_file.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <utility>
+
+namespace perimap {
+namespace {
+
+// What OpenCV throws has several lines.
+tl::unexpected<Error> failed(const std::string& path, const std::exception& error) {
+  std::string what = error.what();
+  std::replace(what.begin(), what.end(), '\n', ' ');
+  return fail(path + ": " + what);
+}
+
+bool is_plausible_rate(double frames_per_s) noexcept { return frames_per_s > 0.1 && frames_per_s < 2000; }
+
+}  // namespace
+
+struct VideoReader::Impl {
+  std::string path;
+  cv::VideoCapture capture;
+  cv::Mat colour, grey;
+  cv::Size size;
+  bool first_is_waiting = true;
+  VideoFrame frame;
+};
+
+VideoReader::VideoReader(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
+VideoReader::VideoReader(VideoReader&&) noexcept = default;
+VideoReader::~VideoReader() = default;
+
+Expected<VideoReader> VideoReader::open(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return fail(path + ": there is no such file");
+  try {
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said here
+    auto impl = std::make_unique<Impl>();
+    impl->path = path;
+    if (!impl->capture.open(path, cv::CAP_FFMPEG)) return fail(path + ": not a video that can be read");
+    if (!impl->capture.read(impl->colour) || impl->colour.empty()) {
+      return fail(path + ": the first frame can not be decoded");
+    }
+    impl->size = impl->colour.size();
+    return VideoReader(std::move(impl));
+  } catch (const std::exception& thrown) {
+    return failed(path, thrown);
+  }
+}
+
+std::uint64_t VideoReader::announced_frames() const noexcept {
+  const double count = impl_->capture.get(cv::CAP_PROP_FRAME_COUNT);
+  return count > 0 && count < 1e12 ? static_cast<std::uint64_t>(count) : 0;
+}
+
+double VideoReader::frames_per_s() const noexcept {
+  const double rate = impl_->capture.get(cv::CAP_PROP_FPS);
+  return is_plausible_rate(rate) ? rate : 0;
+}
+
+Expected<const VideoFrame*> VideoReader::next() {
+  try {
+    if (!std::exchange(impl_->first_is_waiting, false)) {
+      if (!impl_->capture.read(impl_->colour) || impl_->colour.empty()) return nullptr;
+    }
+    cv::Mat& colour = impl_->colour;
+    if (colour.size() != impl_->size || colour.depth() != CV_8U || (colour.channels() != 3 && colour.channels() != 1)) {
+      return fail(impl_->path + ": a frame of another size or kind than the first");
+    }
+    if (colour.channels() == 1) cv::cvtColor(colour, colour, cv::COLOR_GRAY2BGR);
+    cv::extractChannel(colour, impl_->grey, 1);
+    const cv::Mat& grey = impl_->grey;
+    impl_->frame = {colour.data,
+                    static_cast<std::ptrdiff_t>(colour.step),
+                    {grey.data, grey.cols, grey.rows, static_cast<std::ptrdiff_t>(grey.step)}};
+    return &impl_->frame;
+  } catch (const std::exception& thrown) {
+    return failed(impl_->path, thrown);
+  }
+}
+
+struct VideoWriter::Impl {
+  std::string path;
+  cv::VideoWriter writer;
+  cv::Mat drawn;
+};
+
+VideoWriter::VideoWriter(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
+VideoWriter::VideoWriter(VideoWriter&&) noexcept = default;
+VideoWriter::~VideoWriter() = default;
+
+Expected<VideoWriter> VideoWriter::create(const std::string& path, int width, int height, double frames_per_s) {
+  try {
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    auto impl = std::make_unique<Impl>();
+    impl->path = path;
+    constexpr double kUsualRate = 30.0;
+    const double rate = is_plausible_rate(frames_per_s) ? frames_per_s : kUsualRate;
+    if (!impl->writer.open(path, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), rate, {width, height})) {
+      return fail(path + ": can not be written; is the folder there, and does the name end in .mkv, .avi or .mov?");
+    }
+    return VideoWriter(std::move(impl));
+  } catch (const std::exception& thrown) {
+    return failed(path, thrown);
+  }
+}
+
+Expected<void> VideoWriter::write(const VideoFrame& frame, const std::vector<VideoMark>& marks) {
+  try {
+    // OpenCV takes no const data; what is borrowed here is only read.
+    if (frame.bgr != nullptr) {
+      cv::Mat(frame.grey.height, frame.grey.width, CV_8UC3, const_cast<std::uint8_t*>(frame.bgr),
+              static_cast<std::size_t>(frame.bgr_stride))
+          .copyTo(impl_->drawn);
+    } else {
+      const cv::Mat grey(frame.grey.height, frame.grey.width, CV_8UC1, const_cast<std::uint8_t*>(frame.grey.data),
+                         static_cast<std::size_t>(frame.grey.stride));
+      cv::cvtColor(grey, impl_->drawn, cv::COLOR_GRAY2BGR);
+    }
+    for (const VideoMark& mark : marks) {
+      const cv::Scalar colour(mark.blue, mark.green, mark.red);
+      constexpr int kFractionBits = 4;
+      constexpr int kUnit = 1 << kFractionBits;
+      const cv::Point at(static_cast<int>(std::lround(mark.u * kUnit)), static_cast<int>(std::lround(mark.v * kUnit)));
+      cv::circle(impl_->drawn, at, 5 * kUnit, colour, 1, cv::LINE_AA, kFractionBits);
+      for (const cv::Point& arm : {cv::Point(2 * kUnit, 0), cv::Point(0, 2 * kUnit)}) {
+        cv::line(impl_->drawn, at - arm, at + arm, colour, 1, cv::LINE_AA, kFractionBits);
+      }
+    }
+    impl_->writer.write(impl_->drawn);
+    return {};
+  } catch (const std::exception& thrown) {
+    return failed(impl_->path, thrown);
+  }
+}
+
+Expected<void> VideoWriter::finish() {
+  impl_->writer.release();
+  std::error_code error;
+  if (std::filesystem::file_size(impl_->path, error) == 0 || error) return fail(impl_->path + ": nothing was written");
+  return {};
+}
+
+}  // namespace perimap
