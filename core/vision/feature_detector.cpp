@@ -49,7 +49,7 @@ cv::Mat forbidden(const cv::Mat& image, const DetectorSettings& settings) {
 
 // The smaller eigenvalue of the gradient product's mean over a patch, (grey levels / px)^2 (Shi & Tomasi, "Good
 // Features to Track", CVPR 1994).
-cv::Mat corner_strength(const cv::Mat& image) {
+cv::Mat corner_strength(const cv::Mat& image, double min_roundness) {
   constexpr int kPatch = 15;
   constexpr double kSobelGain = 8;
   cv::Mat smooth, gx, gy;
@@ -65,7 +65,10 @@ cv::Mat corner_strength(const cv::Mat& image) {
     const float* const c = yy.ptr<float>(y);
     float* const out = strength.ptr<float>(y);
     for (int x = 0; x < strength.cols; ++x) {
-      out[x] = 0.5F * (a[x] + c[x]) - std::sqrt(0.25F * (a[x] - c[x]) * (a[x] - c[x]) + b[x] * b[x]);
+      const float mean = 0.5F * (a[x] + c[x]);
+      const float spread = std::sqrt(0.25F * (a[x] - c[x]) * (a[x] - c[x]) + b[x] * b[x]);
+      const bool is_edge = mean - spread < static_cast<float>(min_roundness) * (mean + spread);
+      out[x] = is_edge ? 0.0F : mean - spread;
     }
   }
   return strength;
@@ -110,7 +113,7 @@ cv::Mat borrow(const GreyImage& image) {
 
 std::vector<Vector2d> find(const cv::Mat& image, std::span<const Vector2d> occupied, const DetectorSettings& settings,
                            std::size_t how_many, const GreyImage& barred) {
-  const cv::Mat strength = corner_strength(image);
+  const cv::Mat strength = corner_strength(image, settings.min_roundness);
   cv::Mat mask = forbidden(image, settings);
   if (barred.data != nullptr && barred.width == image.cols && barred.height == image.rows) mask |= borrow(barred);
   const int columns = (image.cols + settings.tile_px - 1) / settings.tile_px;
@@ -187,6 +190,8 @@ DetectorSettings detector_settings_for(int width, int height, double noise, int 
   // Noise of sigma alone gives a corner 0.19 sigma^2 (patch_template.hpp).
   settings.min_corner = std::clamp(1.2 * noise * noise, 0.5, DetectorSettings{}.min_corner);
   const double spacing = std::sqrt(static_cast<double>(width) * height / std::max(how_many, 1));
+  constexpr double kRoundness = 0.1;
+  settings.min_roundness = kRoundness;
   settings.tile_px = std::clamp(static_cast<int>(0.6 * spacing), 16, 400);
   settings.min_distance_px = std::clamp(0.4 * spacing, 10.0, 60.0);
   return settings;

@@ -15,6 +15,7 @@ struct DetectorSettings {
   double min_distance_px = 14;  // between features, occupied ones included
   int border_px = 24;           // kept clear along the frame, so that coarse windows fit too
   double min_corner = 6.0;      // smaller eigenvalue of the mean gradient product, (grey levels / px)^2
+  double min_roundness = 0;     // smaller over larger eigenvalue: an edge slides along itself
   int highlight_grey = 245;     // at or above: a specular highlight
   double highlight_clearance_px = 12;
   int background_grey = 18;  // mean over background_size_px below: no tissue, or none that is lit

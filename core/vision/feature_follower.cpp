@@ -24,10 +24,15 @@ bool is_sought(const FollowedFeature& feature) noexcept {
   return feature.state == FollowState::kCandidate || feature.state == FollowState::kTracked;
 }
 
+double largest_deviation(const Matrix2d& C) noexcept {
+  return std::sqrt(0.5 * (C(0, 0) + C(1, 1)) + std::hypot(0.5 * (C(0, 0) - C(1, 1)), C(0, 1)));
+}
+
 }  // namespace
 
 FeatureFollower::FeatureFollower(const FollowerSettings& settings)
     : settings_(settings),
+      tracker_({.min_correlation = settings.min_correlation}),
       features_(static_cast<std::size_t>(std::max(settings.maximum, 0))),
       deviation_px_(kFirstDeviation_px) {
   displacements_.reserve(features_.size());
@@ -45,7 +50,8 @@ bool FeatureFollower::seek(const GreyImage& image, FollowedFeature& feature, con
   PatchState state = feature.patch_state;
   const Matrix2d covariance = deviation_px * deviation_px * Matrix2d::Identity();
   feature.match = tracker_.track(image, feature.patch, state, predicted, covariance);
-  feature.found = feature.match.state == MatchState::kFound && feature.match.correlation >= min_correlation;
+  feature.found = feature.match.state == MatchState::kFound && feature.match.correlation >= min_correlation &&
+                  largest_deviation(feature.match.covariance_px2) <= settings_.largest_deviation_px;
   if (!feature.found) return false;
   feature.patch_state = state;
   feature.px = feature.match.px;
@@ -138,8 +144,11 @@ void FeatureFollower::find_again(const GreyImage& image) noexcept {
     const Vector2d expected = feature.last_px + displacement_around(feature.last_px, &feature);
     const bool is_occluded = feature.state == FollowState::kOccluded;
     // Unseen for long, the place has been carried along without a measurement.
-    const double deviation_px = std::min(2 * deviation_px_ + 0.15 * feature.misses, settings_.widest_deviation_px);
-    if (!seek(image, feature, expected, deviation_px, is_occluded ? settings_.recovered_correlation : 0)) {
+    const double deviation_px = std::min(2 * deviation_px_ + 0.1 * feature.misses, settings_.widest_deviation_px);
+    constexpr double kLessThanUsual = 0.03;
+    const double min_correlation =
+        std::max(settings_.recovered_correlation, feature.usual_correlation - kLessThanUsual);
+    if (!seek(image, feature, expected, deviation_px, is_occluded ? min_correlation : 0)) {
       feature.px = expected;
     }
   }
@@ -155,7 +164,10 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
       feature.velocity_px = feature.px - feature.last_px;
       const bool is_outside = feature.px.x() < 0 || feature.px.y() < 0 || feature.px.x() > image.width - 1 ||
                               feature.px.y() > image.height - 1;
-      if (feature.state == FollowState::kCandidate || feature.misses > settings_.occluded_frames ||
+      constexpr int kMissesOfCandidate = 2;
+      const bool is_candidate = feature.state == FollowState::kCandidate;
+      if (is_candidate && feature.misses <= kMissesOfCandidate) continue;
+      if (is_candidate || feature.misses > settings_.occluded_frames ||
           (is_outside && feature.misses > settings_.occluded_frames / 4)) {
         feature.state = FollowState::kEmpty;
       } else {
@@ -165,18 +177,13 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
     }
     feature.velocity_px =
         feature.misses == 0 ? Vector2d(feature.px - feature.last_px) : displacement_around(feature.px, &feature);
+    const bool is_back = feature.misses > 0;
     feature.misses = 0;
     ++feature.frames;
     if (feature.state == FollowState::kOccluded) feature.state = FollowState::kTracked;
 
-    const Vector2d around = displacement_around(feature.last_px, &feature);
-    const double strangeness_px = (feature.px - feature.last_px - around).norm();
-    scratch_.push_back(strangeness_px);
-    const double most_px = 4 * strangeness_px_ + 0.25 * around.norm();
-    feature.strange = std::max(0, feature.strange + (strangeness_px > most_px ? 2 : -1));
-    constexpr int kMostStrangeCandidate = 3, kMostStrange = 20;
     const bool is_candidate = feature.state == FollowState::kCandidate;
-    if (feature.strange > (is_candidate ? kMostStrangeCandidate : kMostStrange)) {
+    if (!moves_with_neighbours(feature, is_back)) {
       feature.state = FollowState::kEmpty;
       continue;
     }
@@ -187,6 +194,23 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
     constexpr double kShareOfNew = 0.2, kLeast_px = 0.4;
     strangeness_px_ += kShareOfNew * (std::max(kLeast_px, median_of(scratch_)) - strangeness_px_);
   }
+}
+
+// Jumps and steady sliding: along an edge, on an instrument, with a highlight. Tissue strains, so neighbours differ
+// within bounds.
+bool FeatureFollower::moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept {
+  const Vector2d around = displacement_around(feature.last_px, &feature);
+  const Vector2d own = feature.px - feature.last_px;
+  const double strangeness_px = (own - around).norm();
+  scratch_.push_back(strangeness_px);
+  const bool is_strange = strangeness_px > 4 * strangeness_px_ + 0.25 * around.norm();
+  feature.strange = std::max(0, feature.strange + (is_strange ? 2 : -1));
+  constexpr int kMostStrangeCandidate = 3, kMostStrange = 20;
+  if (feature.strange > (feature.state == FollowState::kCandidate ? kMostStrangeCandidate : kMostStrange)) return false;
+  // What comes back makes up for a place that was only guessed.
+  constexpr double kForgetting = 0.03, kMostAstray_px = 4, kMostAstrayOfStrangeness = 6;
+  feature.astray_px = is_back ? Vector2d::Zero() : Vector2d((1 - kForgetting) * feature.astray_px + own - around);
+  return feature.astray_px.norm() <= kMostAstray_px + kMostAstrayOfStrangeness * strangeness_px_;
 }
 
 void FeatureFollower::renew_worn_template(const GreyImage& image, FollowedFeature& feature) const noexcept {

@@ -15,11 +15,14 @@ namespace perimap {
 
 struct FollowerSettings {
   int maximum = 200;
-  int candidate_frames = 8;             // found so often, and moving as its neighbours do, a candidate is tracked
-  int occluded_frames = 120;            // unseen so long, a feature is lost; a candidate at its first miss
-  double least_deviation_px = 1.0;      // of a prediction, per axis
-  double widest_deviation_px = 11.0;    // the search reaches +-40 px
+  int candidate_frames = 8;           // found so often, and moving as its neighbours do, a candidate is tracked
+  int occluded_frames = 120;          // unseen so long, a feature is lost; a candidate much sooner
+  double least_deviation_px = 1.0;    // of a prediction, per axis
+  double widest_deviation_px = 11.0;  // the search reaches +-40 px
+  // Compressed video loses what little texture tissue has: more is asked for only where a wrong place may be found.
+  double min_correlation = 0.84;
   double recovered_correlation = 0.92;  // asked of a feature that comes back
+  double largest_deviation_px = 0.6;    // of a match: one less sure tells too little of where the tissue is
 };
 
 enum class FollowState : std::uint8_t {
@@ -41,9 +44,10 @@ struct FollowedFeature {
   Vector2d last_px = Vector2d::Zero();  // in the frame before
   int frames = 0;                       // found in
   int misses = 0;                       // in a row
-  int strange = 0;                 // frames in which it moved otherwise than its neighbours, less those in which not
-  int worn = 0;                    // frames in a row in which the template fitted badly, but steadily
-  double usual_correlation = 1.0;  // smoothed over some 15 frames
+  int strange = 0;  // frames in which it moved otherwise than its neighbours, less those in which not
+  Vector2d astray_px = Vector2d::Zero();  // how far it has lately gone another way than its neighbours
+  int worn = 0;                           // frames in a row in which the template fitted badly, but steadily
+  double usual_correlation = 1.0;         // smoothed over some 15 frames
 };
 
 // How a feature is predicted: by its own last displacement (constant velocity); where that fails, by the displacement
@@ -78,6 +82,7 @@ class FeatureFollower {
   void note_displacements() noexcept;
   void find_again(const GreyImage& image) noexcept;
   void judge(const GreyImage& image) noexcept;
+  [[nodiscard]] bool moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept;
   void drop_doubles() noexcept;
   void renew_worn_template(const GreyImage& image, FollowedFeature& feature) const noexcept;
 
