@@ -81,6 +81,7 @@ struct FeatureSlot {
   PatchState patch_state;
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   std::uint64_t last_found_frame = 0;
+  int stale_matches = 0;                // in a row, of a template that fits the view badly
   int refused_in_a_row = 0;             // found, but at learning the estimate's gate said no
   bool follows_something_else = false;  // refused so often that the patch must be let go
   PatchMatch match;                     // of this frame

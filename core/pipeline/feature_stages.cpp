@@ -53,9 +53,16 @@ bool agrees(const PatchMatch& match, const PixelPrediction& from_map, double gat
   return r.dot(C.inverse() * r) <= gate;
 }
 
-// The view has turned so far that the first template fits badly: a fresh one at the place just found. Where none can be
+// Longer than a heart's beat, which stretches the picture of its surface and lets it go again.
+constexpr int kStaleBeforeRenewal = 60;
+
+// The view has turned so far, and for so long, that the template fits badly: a fresh one at the place just found. Each
+// renewal moves the followed point by about the match's deviation, which no later match makes up for. Where none can be
 // made there the old one stays.
-void renew_template(FeatureSlot& slot, const FrameJob& job) noexcept {
+void renew_stale_template(FeatureSlot& slot, const FrameJob& job) noexcept {
+  slot.stale_matches = template_is_stale(slot.patch_state) ? slot.stale_matches + 1 : 0;
+  if (slot.stale_matches < kStaleBeforeRenewal) return;
+  slot.stale_matches = 0;
   PatchTemplate renewed;
   if (make_patch_template(job.image, slot.match.px, TemplateSettings{}, job.tracker->kernels(), renewed) !=
       TemplateVerdict::kGood) {
@@ -84,7 +91,7 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   if (slot.match.state != MatchState::kFound) return;
   slot.match_agrees = from_map.valid && agrees(slot.match, from_map, settings.estimator.update.gate);
   const bool in_a_row = slot.last_found_frame + 1 == job.frame->index;
-  if (template_is_stale(slot.patch_state)) renew_template(slot, job);
+  renew_stale_template(slot, job);
   slot.velocity_px = in_a_row ? Vector2d(slot.match.px - last_px) : Vector2d::Zero();
   slot.last_found_frame = job.frame->index;
 }

@@ -299,6 +299,7 @@ void Mapper::adopt_found_features(std::uint64_t frame_index) noexcept {
     slot->patch_state = found.patch_state;
     slot->velocity_px = found.velocity_px;
     slot->last_found_frame = frame_index - 1;
+    slot->stale_matches = 0;
     slot->refused_in_a_row = 0;
     slot->held.clear();
     slot->failed_starts = 0;

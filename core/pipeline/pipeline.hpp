@@ -31,6 +31,8 @@ class Pipeline {
   [[nodiscard]] FeatureFinder& finder() noexcept { return finder_; }
   [[nodiscard]] BatchStarter& starter() noexcept { return starter_; }
   [[nodiscard]] ReleaseSchedule& schedule() noexcept { return schedule_; }
+  // Every feature with its match of the last frame. For tests, in lockstep: between frames nothing changes them.
+  [[nodiscard]] std::span<const FeatureSlot> slots() const noexcept { return slots_; }
 
   // Mapper thread: takes over what the tracker has sent.
   void drain_poses() noexcept;

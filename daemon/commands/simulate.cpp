@@ -352,6 +352,14 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--respiration-period", options->respiration_period_s, "Breathing period, s")
       ->capture_default_str();
+  command->add_option("--scope-sweep", settings.scope_sweep,
+                      "How far from its target the scope looks, times the usual: at 5 what lies off it leaves the view")
+      ->capture_default_str();
+  command->add_option("--exposure", settings.exposure_share, "Motion blur: exposure as a share of the frame period")
+      ->capture_default_str();
+  command->add_flag("--instrument", settings.instrument, "An instrument comes into view for 3 s every 6 s");
+  command->add_option("--glints", settings.glints, "Highlights that wander over the tissue, besides its own")
+      ->capture_default_str();
   CLI::Option* noise =
       command
           ->add_option("--tracker-noise", options->tracker_noise_mm, "Tracker position noise, RMS of the 3-D norm, mm")

@@ -9,7 +9,7 @@ namespace perimap {
 namespace {
 
 // Distorted normalised coordinates and, where asked for, their Jacobian.
-Vector2d distort(const Lens& lens, const Vector2d& n, Matrix2d* jacobian) noexcept {
+Vector2d distort(const ScopeLens& lens, const Vector2d& n, Matrix2d* jacobian) noexcept {
   const double x = n.x();
   const double y = n.y();
   const double r2 = x * x + y * y;
@@ -26,12 +26,12 @@ Vector2d distort(const Lens& lens, const Vector2d& n, Matrix2d* jacobian) noexce
 
 }  // namespace
 
-Vector2d Lens::project(const Vector3d& p_C) const noexcept {
+Vector2d ScopeLens::project(const Vector3d& p_C) const noexcept {
   const Vector2d d = distort(*this, p_C.head<2>() / p_C.z(), nullptr);
   return {fx * d.x() + cx, fy * d.y() + cy};
 }
 
-Vector3d Lens::ray(const Vector2d& pixel) const noexcept {
+Vector3d ScopeLens::ray(const Vector2d& pixel) const noexcept {
   const Vector2d distorted((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
   Vector2d n = distorted;
   for (int iteration = 0; iteration < 8; ++iteration) {
@@ -42,7 +42,7 @@ Vector3d Lens::ray(const Vector2d& pixel) const noexcept {
   return {n.x(), n.y(), 1.0};
 }
 
-std::string Lens::opencv_yaml() const {
+std::string ScopeLens::opencv_yaml() const {
   return fmt::format(
       "%YAML:1.0\n---\n"
       "image_width: {}\nimage_height: {}\n"
@@ -53,9 +53,9 @@ std::string Lens::opencv_yaml() const {
       width, height, fx, cx, fy, cy, k1, k2, p1, p2, k3);
 }
 
-Lens scope_lens(int width_px, int height_px) noexcept {
+ScopeLens scope_lens(int width_px, int height_px) noexcept {
   const double focal = 1.25 * std::max(width_px, height_px);
-  Lens lens;
+  ScopeLens lens;
   lens.width = width_px;
   lens.height = height_px;
   lens.fx = focal;

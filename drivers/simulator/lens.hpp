@@ -8,7 +8,7 @@
 namespace perimap {
 
 // Pixel centres lie at integer coordinates.
-struct Lens {
+struct ScopeLens {
   int width = 0;                                  // px
   int height = 0;                                 // px
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  // px
@@ -25,6 +25,6 @@ struct Lens {
 };
 
 // A rigid scope's view, 44 degrees wide, for an image of this size.
-[[nodiscard]] Lens scope_lens(int width_px, int height_px) noexcept;
+[[nodiscard]] ScopeLens scope_lens(int width_px, int height_px) noexcept;
 
 }  // namespace perimap

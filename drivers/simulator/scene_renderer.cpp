@@ -44,7 +44,8 @@ RenderWorkspace::Plane4 plane(const Eigen::Matrix<float, 4, 3>& rows) noexcept {
 
 }  // namespace
 
-SceneRenderer::SceneRenderer(const Lens& lens, std::span<const std::uint32_t> triangles, const TissueTexture& texture)
+SceneRenderer::SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_t> triangles,
+                             const TissueTexture& texture)
     : lens_(lens), triangles_(triangles), texture_(texture), stride_((kSubsamples * lens.width + 3) / 4 * 4) {
   const std::size_t subsamples = static_cast<std::size_t>(stride_) * kSubsamples * lens.height;
   ray_x_.resize(subsamples, 0.0F);
@@ -318,11 +319,16 @@ void SceneRenderer::expose(std::uint64_t noise_seed, RenderWorkspace& workspace,
   }
 }
 
-void SceneRenderer::render(const Pose& X_WC, std::span<const Vector3d> vertices_W, double subject_distance_mm,
-                           std::uint64_t noise_seed, RenderWorkspace& workspace, std::span<std::uint8_t> image) const {
+void SceneRenderer::light(const Pose& X_WC, std::span<const Vector3d> vertices_W, double subject_distance_mm,
+                          RenderWorkspace& workspace) const {
   project(X_WC, vertices_W, workspace);
   find_visible(workspace);
   shade(X_WC, subject_distance_mm, workspace);
+}
+
+void SceneRenderer::render(const Pose& X_WC, std::span<const Vector3d> vertices_W, double subject_distance_mm,
+                           std::uint64_t noise_seed, RenderWorkspace& workspace, std::span<std::uint8_t> image) const {
+  light(X_WC, vertices_W, subject_distance_mm, workspace);
   expose(noise_seed, workspace, image);
 }
 

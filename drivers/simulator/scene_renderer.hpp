@@ -36,21 +36,28 @@ struct RenderWorkspace {
   std::vector<float> farthest;              // per tile of subsamples: the least inverse depth
   std::vector<float> radiance;              // per pixel, grey levels
   std::vector<float> blurred;               // per pixel, after the rows' pass
+  std::vector<float> exposure;              // per pixel, radiance summed over a long exposure
 };
 
 // Rays are exact: every subsample carries the undistorted ray of its place in the distorted image and is tested against
 // each triangle in three dimensions (triangle_rays.hpp), so there is no residual of the distortion beyond that of
-// Lens::ray. Light and camera move together: diffuse with fall-off, two highlight lobes, vignetting; then the lens's
-// blur, shot and read noise, 8 bits.
+// ScopeLens::ray. Light and camera move together: diffuse with fall-off, two highlight lobes, vignetting; then the
+// lens's blur, shot and read noise, 8 bits.
 class SceneRenderer {
  public:
   // `triangles` and `texture` belong to one mesh and outlive the renderer.
-  SceneRenderer(const Lens& lens, std::span<const std::uint32_t> triangles, const TissueTexture& texture);
+  SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_t> triangles, const TissueTexture& texture);
 
   // One frame. `vertices_W`: the mesh at the frame's instant. `subject_distance_mm`: where exposure is right.
   // `noise_seed`: one value per frame. `image`: width * height places, row by row. A function of its arguments alone.
   void render(const Pose& X_WC, std::span<const Vector3d> vertices_W, double subject_distance_mm,
               std::uint64_t noise_seed, RenderWorkspace& workspace, std::span<std::uint8_t> image) const;
+
+  // The two halves of render(): the light that falls on the sensor into workspace.radiance, and the image made of it.
+  // Between them the radiance may be changed, or averaged over the exposure.
+  void light(const Pose& X_WC, std::span<const Vector3d> vertices_W, double subject_distance_mm,
+             RenderWorkspace& workspace) const;
+  void expose(std::uint64_t noise_seed, RenderWorkspace& workspace, std::span<std::uint8_t> image) const;
 
  private:
   void project(const Pose& X_WC, std::span<const Vector3d> vertices_W, RenderWorkspace& workspace) const;
@@ -65,9 +72,8 @@ class SceneRenderer {
   [[nodiscard]] float light_at(const Eigen::Matrix3f& R_CW, float subject_distance2, float ray_x, float ray_y,
                                const RenderWorkspace::Triangle& triangle) const noexcept;
   void shade(const Pose& X_WC, double subject_distance_mm, RenderWorkspace& workspace) const;
-  void expose(std::uint64_t noise_seed, RenderWorkspace& workspace, std::span<std::uint8_t> image) const;
 
-  Lens lens_;
+  ScopeLens lens_;
   std::span<const std::uint32_t> triangles_;
   const TissueTexture& texture_;
   int stride_ = 0;            // subsamples a row, a multiple of 4

@@ -26,8 +26,8 @@ double ScopePath::Sway::at(double t_s) const noexcept {
          amplitude_2 * std::sin(kTwoPi * frequency_2_hz * t_s + phase_2_rad);
 }
 
-ScopePath::ScopePath(std::uint64_t seed, const Vector3d& rest_W, const Vector3d& target_W,
-                     const Vector3d& up_W) noexcept
+ScopePath::ScopePath(std::uint64_t seed, const Vector3d& rest_W, const Vector3d& target_W, const Vector3d& up_W,
+                     double sweep) noexcept
     : X_WR_{looking(target_W - rest_W, up_W), rest_W}, distance_mm_((target_W - rest_W).norm()) {
   constexpr std::uint64_t kStream = 0x70617468;
   const CounterNoise noise(seed, kStream);
@@ -44,8 +44,8 @@ ScopePath::ScopePath(std::uint64_t seed, const Vector3d& rest_W, const Vector3d&
   position_mm_[0] = sway(22.0, 0.127, 11.0, 0.0713);
   position_mm_[1] = sway(19.0, 0.0971, 10.0, 0.1637);
   position_mm_[2] = sway(9.0, 0.0617, 4.0, 0.1109);
-  target_mm_[0] = sway(4.0, 0.0831, 2.0, 0.211);
-  target_mm_[1] = sway(4.0, 0.0719, 2.0, 0.187);
+  target_mm_[0] = sway(sweep * 4.0, 0.0831, sweep * 2.0, 0.211);
+  target_mm_[1] = sway(sweep * 4.0, 0.0719, sweep * 2.0, 0.187);
   roll_rad_ = sway(0.06, 0.0533, 0.03, 0.139);
   // Physiological tremor of the hand, 8-10 Hz.
   for (Sway& axis : tremor_mm_) axis = sway(0.10, 8.4, 0.06, 9.7);

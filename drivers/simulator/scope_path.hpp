@@ -11,8 +11,10 @@ namespace perimap {
 // Smooth in time; a function of the seed alone.
 class ScopePath {
  public:
-  // Sweeps about `rest_W`, looking near `target_W`; the image's upper side points along `up_W` on the whole.
-  ScopePath(std::uint64_t seed, const Vector3d& rest_W, const Vector3d& target_W, const Vector3d& up_W) noexcept;
+  // Sweeps about `rest_W`, looking near `target_W`; the image's upper side points along `up_W` on the whole. `sweep`
+  // scales how far from the target the scope looks: at 5, what lies off the target leaves the view and comes back.
+  ScopePath(std::uint64_t seed, const Vector3d& rest_W, const Vector3d& target_W, const Vector3d& up_W,
+            double sweep = 1.0) noexcept;
 
   // Pose of the camera, time since the path's start.
   [[nodiscard]] Pose X_WC(Duration since_start) const noexcept;

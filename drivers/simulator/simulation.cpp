@@ -101,7 +101,10 @@ Expected<void> check(const SimulationSettings& s) {
         outside("respiration period", to_seconds(s.respiration_period), 0.5, 60.0, "s"),
         outside("tracker rate", s.tracker_rate_hz, 1.0, 1000.0, "Hz"),
         outside("tracker correlation", to_seconds(s.tracker_correlation), 0.0, 1000.0, "s"),
-        outside("tracker dropouts", s.tracker_dropouts_per_min, 0.0, 60.0, "a minute")})
+        outside("tracker dropouts", s.tracker_dropouts_per_min, 0.0, 60.0, "a minute"),
+        outside("scope sweep", s.scope_sweep, 0.0, 20.0, "times the usual"),
+        outside("exposure", s.exposure_share, 0.0, 1.0, "of the frame period"),
+        outside("glints", s.glints, 0, 1000, "")})
     if (!result) return result;
   return {};
 }
@@ -123,13 +126,16 @@ Expected<std::uint32_t> start_sample(const SimulationSettings& s, const EcgRecor
 
 }  // namespace
 
-Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth truth, Lens lens, Vector3d surface_W)
+Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeLens lens,
+                       Vector3d surface_W, const ScopePath& path)
     : settings_(std::move(settings)),
       start_(start),
       truth_(std::move(truth)),
       lens_(lens),
       // The sensor sits beside the lens, some way up the shaft, turned about the shaft's axis.
       X_SC_{so3_exp(Vector3d(0.15, -0.1, 1.2)), Vector3d(4.2, -6.8, 14.5)},
+      path_(path),
+      obstacles_(settings_.seed, lens.width, lens.height, settings_.instrument, settings_.glints),
       surface_W_(std::move(surface_W)) {}
 
 std::int64_t Simulation::utc_minus_monotonic_ns() const noexcept { return 1'750'000'000'000'000'000; }
@@ -168,7 +174,7 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   Vector3d centre_W = Vector3d::Zero();
   for (const Vector3d& p : material_W) centre_W += p / static_cast<double>(material_W.size());
   const Vector3d axis_W = X_WH().R * view_axis_H();
-  const Lens lens = scope_lens(settings.width, settings.height);
+  const ScopeLens lens = scope_lens(settings.width, settings.height);
 
   auto still = GroundTruth::create(mesh_W, motion);
   if (!still) return tl::unexpected(still.error());
@@ -177,7 +183,8 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   const auto facing = still->first_hit(far, Vector3d::UnitZ(), motion.r_peaks.front());
   if (!facing) return fail("heart mesh: the scope's axis misses it");
   const Vector3d surface_W = still->position(*facing, motion.r_peaks.front());
-  const ScopePath path(settings.seed, surface_W + kScopeDistance_mm * axis_W, centre_W, X_WH().R * up_H());
+  const ScopePath path(settings.seed, surface_W + kScopeDistance_mm * axis_W, centre_W, X_WH().R * up_H(),
+                       settings.scope_sweep);
 
   // Camera. Frame times of a free-running sensor, with the jitter of its stamps' quantisation.
   std::vector<Frame> frames;
@@ -193,7 +200,7 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
 
   auto truth = GroundTruth::create(mesh_W, motion, std::move(cameras));
   if (!truth) return tl::unexpected(truth.error());
-  Simulation simulation(settings, start, *std::move(truth), lens, surface_W);
+  Simulation simulation(settings, start, *std::move(truth), lens, surface_W, path);
   simulation.frames_ = std::move(frames);
 
   // Tracker: its own period wavers a little.
@@ -288,9 +295,24 @@ TrackerSample Simulation::tracker_sample(std::size_t index, const TrackerNoise& 
 void Simulation::render(std::size_t index, RenderWorkspace& workspace, std::span<std::uint8_t> image) const {
   const Frame& frame = frames_[index];
   std::vector<Vector3d> vertices_W(truth_.mesh().vertex_count);
-  truth_.vertices_at(frame.stamp.capture, vertices_W);
-  renderer_->render(frame.X_WC, vertices_W, (frame.X_WC.t - surface_W_).norm(),
-                    CounterNoise(settings_.seed, kImage).bits(index), workspace, image);
+  // Instants spread evenly over the exposure; its middle alone when it is short.
+  constexpr int kInstants = 5;
+  const int instants = settings_.exposure_share > 0.0 ? kInstants : 1;
+  const double exposure_s = settings_.exposure_share / settings_.frames_per_s;
+  for (int k = 0; k < instants; ++k) {
+    const Instant t = frame.stamp.capture + from_seconds(exposure_s * ((k + 0.5) / instants - 0.5));
+    const Pose X_WC = instants == 1 ? frame.X_WC : path_.X_WC(t - start_);
+    truth_.vertices_at(t, vertices_W);
+    renderer_->light(X_WC, vertices_W, (frame.X_WC.t - surface_W_).norm(), workspace);
+    obstacles_.draw(t - start_, workspace.radiance);
+    if (instants == 1) break;
+    if (k == 0) workspace.exposure.assign(workspace.radiance.size(), 0.0F);
+    for (std::size_t i = 0; i < workspace.radiance.size(); ++i) {
+      workspace.exposure[i] += workspace.radiance[i] / static_cast<float>(instants);
+    }
+  }
+  if (instants > 1) workspace.radiance.swap(workspace.exposure);
+  renderer_->expose(CounterNoise(settings_.seed, kImage).bits(index), workspace, image);
 }
 
 }  // namespace perimap

@@ -19,7 +19,9 @@
 #include "drivers/simulator/lens.hpp"
 #include "drivers/simulator/parallel_for.hpp"
 #include "drivers/simulator/scene_renderer.hpp"
+#include "drivers/simulator/scope_path.hpp"
 #include "drivers/simulator/tissue_texture.hpp"
+#include "drivers/simulator/view_obstacles.hpp"
 
 namespace perimap {
 
@@ -38,6 +40,11 @@ struct SimulationSettings {
   // Time in which the tracker's error falls to 1/e of what it was (Gauss-Markov); 0: new at each reading.
   Duration tracker_correlation{0};
   double tracker_dropouts_per_min = 3.0;
+  // What makes seeing hard.
+  double scope_sweep = 1.0;     // see ScopePath
+  double exposure_share = 0.0;  // of the frame period, about the capture: motion blur
+  bool instrument = false;      // see ViewObstacles
+  int glints = 0;
 };
 
 // Norms in three dimensions: the standard deviation of one axis is 1 / sqrt(3) of them.
@@ -74,10 +81,11 @@ class Simulation {
   [[nodiscard]] Instant start() const noexcept { return start_; }
   // Stands for the recording's fixed epoch; the same for every recording, since nothing may depend on today.
   [[nodiscard]] std::int64_t utc_minus_monotonic_ns() const noexcept;
-  [[nodiscard]] const Lens& lens() const noexcept { return lens_; }
+  [[nodiscard]] const ScopeLens& lens() const noexcept { return lens_; }
   // Camera frame C in the tracked sensor's frame S.
   [[nodiscard]] const Pose& hand_eye_X_SC() const noexcept { return X_SC_; }
   [[nodiscard]] const GroundTruth& truth() const noexcept { return truth_; }
+  [[nodiscard]] const ViewObstacles& obstacles() const noexcept { return obstacles_; }
 
   // Everything that arrives, in order of arrival; the order within a source is the order of its own stamps.
   [[nodiscard]] std::span<const Arrival> arrivals() const noexcept { return arrivals_; }
@@ -101,13 +109,16 @@ class Simulation {
     Vector3d rotation_error = Vector3d::Zero();
   };
 
-  Simulation(SimulationSettings settings, Instant start, GroundTruth truth, Lens lens, Vector3d surface_W);
+  Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeLens lens, Vector3d surface_W,
+             const ScopePath& path);
 
   SimulationSettings settings_;
   Instant start_;
   GroundTruth truth_;
-  Lens lens_;
+  ScopeLens lens_;
   Pose X_SC_;
+  ScopePath path_;
+  ViewObstacles obstacles_;
   Vector3d surface_W_;  // the point about which the scope moves; exposure is right there
   std::unique_ptr<const TissueTexture> texture_;
   std::unique_ptr<const SceneRenderer> renderer_;

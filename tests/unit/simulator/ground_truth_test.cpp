@@ -70,8 +70,8 @@ TEST(GroundTruth, KnowsTheCameraOfEachCaptureAndOfNoOther) {
   EXPECT_FALSE(truth.camera_pose(from_ns(8)).has_value());
 }
 
-TEST(Lens, RaysComeBackToTheirPixels) {
-  const Lens lens = scope_lens(640, 480);
+TEST(ScopeLens, RaysComeBackToTheirPixels) {
+  const ScopeLens lens = scope_lens(640, 480);
   for (const double u : {0.0, 17.3, 320.0, 639.0})
     for (const double v : {0.0, 111.9, 240.0, 479.0}) {
       const Vector3d ray = lens.ray({u, v});
@@ -79,8 +79,8 @@ TEST(Lens, RaysComeBackToTheirPixels) {
     }
 }
 
-TEST(Lens, DistortsByBrownConradyInOpenCvsOrder) {
-  Lens lens{640, 480, 100.0, 100.0, 0.0, 0.0, 0.1, 0.01, 0.002, 0.003, 0.001};
+TEST(ScopeLens, DistortsByBrownConradyInOpenCvsOrder) {
+  ScopeLens lens{640, 480, 100.0, 100.0, 0.0, 0.0, 0.1, 0.01, 0.002, 0.003, 0.001};
   // x = 0.5, y = 0.25, r^2 = 0.3125: radial 1.032257080078125; tangential x 2 p1 x y + p2 (r^2 + 2 x^2) = 0.0029375,
   // y p1 (r^2 + 2 y^2) + 2 p2 x y = 0.001625.
   const Vector2d pixel = lens.project({5.0, 2.5, 10.0});

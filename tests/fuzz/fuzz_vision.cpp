@@ -1,0 +1,89 @@
+// Any bytes as an image of odd size and stride, with features sought anywhere in any shape: nothing outside the image
+// is read (the buffer ends with the last pixel), and what is said to be found is a place in it.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "core/vision/feature_detector.hpp"
+#include "core/vision/feature_follower.hpp"
+#include "core/vision/instrument_mask.hpp"
+#include "core/vision/patch_template.hpp"
+#include "core/vision/patch_tracker.hpp"
+
+namespace {
+
+// Takes the input from its front; zeros when it is used up.
+class Input {
+ public:
+  Input(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
+  template <class T>
+  T take() {
+    T value{};
+    const std::size_t n = std::min(sizeof value, size_);
+    std::memcpy(&value, data_, n);
+    data_ += n;
+    size_ -= n;
+    return value;
+  }
+  int below(int limit) { return take<std::uint16_t>() % limit; }
+  // The rest over and over, so that a short input too makes texture.
+  std::vector<std::uint8_t> pixels(std::size_t count) const {
+    std::vector<std::uint8_t> filled(count);
+    for (std::size_t i = 0; i < count; ++i) filled[i] = size_ == 0 ? 0 : data_[(i * 7 + i / 31) % size_];
+    return filled;
+  }
+
+ private:
+  const std::uint8_t* data_;
+  std::size_t size_;
+};
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace perimap;
+  Input input(data, size);
+  const int width = 1 + input.below(130), height = 1 + input.below(130), padding = input.below(9);
+  const std::ptrdiff_t stride = width + padding;
+  const Vector2d at(input.take<float>(), input.take<float>());
+  const Vector2d predicted(input.take<float>(), input.take<float>());
+  const Vector2d inside(input.below(4 * width) / 4.0, input.below(4 * height) / 4.0);
+  const double deviation = std::abs(static_cast<double>(input.take<float>()));
+  PatchState state;
+  for (int i = 0; i < 4; ++i) state.A(i / 2, i % 2) += input.take<std::int8_t>() / 40.0;
+  const std::vector<std::uint8_t> pixels = input.pixels(static_cast<std::size_t>((height - 1) * stride + width));
+  const GreyImage image{pixels.data(), width, height, stride};
+
+  const std::vector<SimdTarget> targets = simd_targets();
+  const PatchTracker tracker(PatchTrackerSettings{}, targets[static_cast<std::size_t>(width) % targets.size()]);
+  TemplateSettings easy;
+  easy.min_texture = easy.min_texture_coarse = 1e-3;
+  easy.max_saturated_share = 1;
+  PatchTemplate patch;
+  for (const Vector2d& px : {at, inside}) {
+    if (make_patch_template(image, px, easy, tracker.kernels(), patch) != TemplateVerdict::kGood) continue;
+    for (const Vector2d& sought : {predicted, inside, px}) {
+      PatchState now = state;
+      tracker.prefetch(image, sought);
+      const PatchMatch match = tracker.track(image, patch, now, sought, deviation * deviation * Matrix2d::Identity());
+      if (match.state != MatchState::kFound) continue;
+      const bool is_inside =
+          match.px.x() >= 0 && match.px.y() >= 0 && match.px.x() <= width - 1 && match.px.y() <= height - 1;
+      if (!is_inside || !match.covariance_px2.allFinite() || !(match.covariance_px2.determinant() > 0)) std::abort();
+    }
+  }
+
+  const auto corners = find_features(image, {}, detector_settings_for(width, height, estimate_noise(image), 20), 20);
+  if (!corners) std::abort();
+  FollowerSettings settings;
+  settings.maximum = 20;
+  FeatureFollower follower(settings);
+  follower.add(image, *corners, easy);
+  for (int i = 0; i < 3; ++i) follower.follow(image);
+  if (width >= 3 && !find_instruments({pixels.data(), width / 3, height, stride})) std::abort();
+  return 0;
+}

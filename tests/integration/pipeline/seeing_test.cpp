@@ -1,0 +1,232 @@
+// What the pipeline sees of a heart at 1280x720 while an instrument comes and goes, highlights wander, the picture is
+// blurred by motion and the scope sweeps about: do converged features that return to view come back, and is what passes
+// the gate where the feature is?
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <thread>
+
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/commands/frame_renderer.hpp"
+#include "daemon/commands/simulate.hpp"
+#include "daemon/publishing/publication.hpp"
+#include "daemon/runtime/lockstep_runtime.hpp"
+#include "daemon/runtime/replay_setup.hpp"
+#include "drivers/simulator/simulation.hpp"
+
+namespace perimap {
+namespace {
+
+struct Silent final : Publication {
+  void surface(const perimap_Surface& /*sample*/) override {}
+  void surface_model(const perimap_SurfaceModel& /*model*/) override {}
+  void phase(const perimap_Phase& /*phase*/) override {}
+  void status(const perimap_Status& /*status*/) override {}
+};
+
+constexpr double kPatch_px = 14;  // a patch with its margin must be in view
+constexpr int kAwayFrames = 5;    // out of view so long, a feature has left
+constexpr int kBackFrames = 15;   // 0.5 s
+constexpr double kOff_px = 3;
+
+SimulationSettings hard_to_see() {
+  SimulationSettings settings;
+  settings.width = 1280;
+  settings.height = 720;
+  settings.duration = std::chrono::seconds(36);
+  settings.scope_sweep = 4;
+  settings.exposure_share = 0.5;
+  settings.instrument = true;
+  settings.glints = 12;
+  return settings;
+}
+
+// A feature by the material point that it was first seen on.
+struct Watched {
+  SurfacePoint point;
+  bool converged = false;
+  int away = 0;             // frames out of view in a row
+  int back = 0;             // frames since it returned; 0 when it is not being waited for
+  bool seen_again = false;  // since it returned
+};
+
+struct Figures {
+  int returned = 0, reacquired = 0;
+  int gated = 0, off = 0;
+  int frames = 0, frames_short_of_features = 0;
+  int least_live = 1 << 30;
+};
+
+class Watch {
+ public:
+  Watch(const Simulation& simulation, const Pipeline& pipeline) : simulation_(simulation), pipeline_(pipeline) {}
+
+  void look(std::size_t frame) {
+    const Simulation::Frame& now = simulation_.frames()[frame];
+    std::map<std::uint32_t, const FeatureSlot*> slots;
+    int live = 0;
+    for (const FeatureSlot& slot : pipeline_.slots()) {
+      if (slot.state == SlotState::kEmpty) continue;
+      ++live;
+      slots[slot.id] = &slot;
+      if (!watched_.contains(slot.id)) begin(slot);
+    }
+    constexpr std::size_t kSettled = 150;
+    if (frame >= kSettled) {
+      ++figures.frames;
+      figures.least_live = std::min(figures.least_live, live);
+      figures.frames_short_of_features += 10 * live < 9 * static_cast<int>(pipeline_.slots().size()) ? 1 : 0;
+    }
+    for (auto& [id, feature] : watched_) {
+      const auto slot = slots.find(id);
+      look(feature, slot == slots.end() ? nullptr : slot->second, now);
+    }
+  }
+
+  Figures figures;
+
+ private:
+  void begin(const FeatureSlot& slot) {
+    const auto X_WC = simulation_.truth().camera_pose(slot.first_observed);
+    if (!X_WC) return;
+    const auto point =
+        simulation_.truth().first_hit(*X_WC, simulation_.lens().ray(slot.first_observed_px), slot.first_observed);
+    if (point) watched_[slot.id].point = *point;
+  }
+
+  void look(Watched& feature, const FeatureSlot* slot, const Simulation::Frame& now) {
+    const Instant t = now.stamp.capture;
+    const Vector3d p_W = simulation_.truth().position(feature.point, t);
+    const Vector3d p_C = now.X_WC.inverse() * p_W;
+    const Vector2d px = p_C.z() > 1 ? simulation_.lens().project(p_C) : Vector2d::Constant(-1e6);
+    const bool found = slot != nullptr && slot->match_agrees && slot->state == SlotState::kMapped;
+    const bool near = found && (slot->match.px - px).norm() <= kOff_px;
+    if (found) {
+      ++figures.gated;
+      figures.off += near ? 0 : 1;
+    }
+    if (slot != nullptr && slot->state == SlotState::kMapped && slot->converged && near) feature.converged = true;
+    if (!feature.converged) return;
+
+    if (!is_visible(px, p_W, now)) {
+      ++feature.away;
+      feature.back = 0;
+      return;
+    }
+    if (feature.away >= kAwayFrames) {
+      feature.back = 1;
+      feature.seen_again = false;
+    }
+    feature.away = 0;
+    if (feature.back == 0) return;
+    feature.seen_again = feature.seen_again || near;
+    if (feature.back++ < kBackFrames) return;
+    ++figures.returned;
+    figures.reacquired += feature.seen_again ? 1 : 0;
+    if (!feature.seen_again && std::getenv("PERIMAP_SEEING_VERBOSE") != nullptr) {
+      std::printf("not back: %s at %.0f, %.0f\n", slot == nullptr ? "given up" : "there", px.x(), px.y());
+    }
+    feature.back = 0;
+    // Given up, it is counted once.
+    if (slot == nullptr) feature.converged = false;
+  }
+
+  [[nodiscard]] bool is_visible(const Vector2d& px, const Vector3d& p_W, const Simulation::Frame& now) const {
+    const SimulationSettings& settings = simulation_.settings();
+    if (px.x() < kPatch_px || px.y() < kPatch_px || px.x() > settings.width - kPatch_px ||
+        px.y() > settings.height - kPatch_px) {
+      return false;
+    }
+    const Duration since_start = now.stamp.capture - simulation_.start();
+    if (simulation_.obstacles().instrument_covers(px, since_start, kPatch_px)) return false;
+    const auto hit = simulation_.truth().first_hit(now.X_WC, simulation_.lens().ray(px), now.stamp.capture);
+    constexpr double kSamePlace_mm = 1;
+    return hit && (simulation_.truth().position(*hit, now.stamp.capture) - p_W).norm() < kSamePlace_mm;
+  }
+
+  const Simulation& simulation_;
+  const Pipeline& pipeline_;
+  std::map<std::uint32_t, Watched> watched_;
+};
+
+// Settings for this camera and tracker: those of a recording of its first second.
+PipelineSettings settings_for(const SimulationSettings& wanted, const TrackerNoise& noise) {
+  SimulationSettings brief = wanted;
+  brief.duration = std::chrono::seconds(1);
+  brief.exposure_share = 0;
+  const auto simulation = Simulation::create(brief, threaded_for(std::thread::hardware_concurrency()));
+  if (!simulation) throw std::runtime_error(simulation.error().message);
+  const std::filesystem::path path = std::filesystem::temp_directory_path() / "perimap_seeing_test.mcap";
+  const auto written = write_simulation(*simulation, {{path, noise}}, 2, [](std::uint64_t) {});
+  if (!written) throw std::runtime_error(written.error().message);
+  auto setup = prepare_replay(path.string(), std::nullopt, ReadMode::kStrict);
+  std::filesystem::remove(path);
+  if (!setup) throw std::runtime_error(setup.error().error.message);
+  setup->pipeline.lockstep = true;
+  return setup->pipeline;
+}
+
+void run(const TrackerNoise& noise, Figures& figures) {
+  const SimulationSettings settings = hard_to_see();
+  Pipeline pipeline(settings_for(settings, noise));
+  const auto simulation = Simulation::create(settings, threaded_for(std::thread::hardware_concurrency()));
+  ASSERT_TRUE(simulation.has_value()) << simulation.error().message;
+  Silent publication;
+  LockstepRuntime runtime(pipeline, Identity{}, Duration(0), publication);
+  Watch watch(*simulation, pipeline);
+  FrameRenderer frames(*simulation, std::max(1U, std::thread::hardware_concurrency()));
+  std::uint64_t mapped = 0;
+  for (const Simulation::Arrival& arrival : simulation->arrivals()) {
+    switch (arrival.source) {
+      case Simulation::Source::kCamera: {
+        const auto pixels = frames.next();
+        FrameEvent event{simulation->frames()[arrival.index].stamp, settings.width, settings.height, {}};
+        event.pixels.assign(pixels.begin(), pixels.end());
+        runtime.deliver(event);
+        break;
+      }
+      case Simulation::Source::kTracker:
+        runtime.deliver(simulation->tracker_sample(arrival.index, noise));
+        break;
+      case Simulation::Source::kEcg:
+        runtime.deliver(simulation->ecg()[arrival.index]);
+        break;
+    }
+    if (pipeline.counters().frames.get() > mapped) watch.look(mapped++);
+  }
+  figures = watch.figures;
+  const auto percent = [](int part, int whole) { return 100.0 * part / std::max(whole, 1); };
+  std::printf(
+      "tracker %.1f mm: %d of %d returns re-acquired within 0.5 s (%.1f %%); %d of %d gated matches off by more than 3 "
+      "px "
+      "(%.2f %%); least %d live features of %zu, below 90 %% in %d of %d frames\n",
+      noise.position_rms_mm, figures.reacquired, figures.returned, percent(figures.reacquired, figures.returned),
+      figures.off, figures.gated, percent(figures.off, figures.gated), figures.least_live, pipeline.slots().size(),
+      figures.frames_short_of_features, figures.frames);
+}
+
+void expect_the_promised(const Figures& figures) {
+  EXPECT_GE(figures.returned, 50);
+  EXPECT_GE(figures.reacquired, 0.95 * figures.returned);
+  EXPECT_GE(figures.gated, 10'000);
+  EXPECT_LT(figures.off, 0.005 * figures.gated);
+  EXPECT_EQ(figures.frames_short_of_features, 0);
+}
+
+TEST(Seeing, FeaturesThatReturnToViewComeBackWithAnExactTracker) {
+  Figures figures;
+  run({}, figures);
+  expect_the_promised(figures);
+}
+
+TEST(Seeing, FeaturesThatReturnToViewComeBackWithANoisyTracker) {
+  Figures figures;
+  run({1.4, 0.5 * 3.14159265 / 180}, figures);
+  expect_the_promised(figures);
+}
+
+}  // namespace
+}  // namespace perimap
