@@ -312,7 +312,10 @@ void Mapper::offer_to_finder(const FrameRecord& frame, const GreyImage& image) n
   int free = 0;
   for (const FeatureSlot& slot : slots_) {
     if (slot.state == SlotState::kEmpty) ++free;
-    if (slot.match.state == MatchState::kFound) occupied_.push_back(slot.match.px);
+    // Where it is predicted too: what hides a feature is no place for a new one.
+    if (slot.state != SlotState::kEmpty && slot.match.state != MatchState::kInvalidInput) {
+      occupied_.push_back(slot.match.px);
+    }
   }
   finder_.offer(frame.index, frame.stamp, image, occupied_, free);
 }

@@ -67,7 +67,7 @@ void FeatureFollower::note_displacements() noexcept {
 
 // The middle displacement, along each axis, of the nearest features found; of the velocity of `but` itself when there
 // are too few.
-Vector2d FeatureFollower::displacement_around(const Vector2d& px, const FollowedFeature* but) const noexcept {
+FeatureFollower::Around FeatureFollower::around(const Vector2d& px, const FollowedFeature* but) const noexcept {
   struct Near {
     double distance_squared = 0;
     Vector2d by = Vector2d::Zero();
@@ -84,15 +84,18 @@ Vector2d FeatureFollower::displacement_around(const Vector2d& px, const Followed
     }
     nearest[place] = {distance_squared, displacement.by};
   }
-  if (count < kEnoughDisplacements) return but != nullptr ? but->velocity_px : Vector2d::Zero();
-  Vector2d middle;
+  if (count < kEnoughDisplacements) return {but != nullptr ? but->velocity_px : Vector2d(Vector2d::Zero()), 0.0};
+  Around result;
+  for (std::size_t i = 0; i < count; ++i) {
+    result.distance_px += std::sqrt(nearest[i].distance_squared) / static_cast<double>(count);
+  }
   std::array<double, kNeighbours> along;
   for (int axis = 0; axis < 2; ++axis) {
     for (std::size_t i = 0; i < count; ++i) along[i] = nearest[i].by[axis];
     std::nth_element(along.begin(), along.begin() + count / 2, along.begin() + count);
-    middle[axis] = along[count / 2];
+    result.by[axis] = along[count / 2];
   }
-  return middle;
+  return result;
 }
 
 void FeatureFollower::follow(const GreyImage& image) noexcept {
@@ -199,18 +202,21 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
 // Jumps and steady sliding: along an edge, on an instrument, with a highlight. Tissue strains, so neighbours differ
 // within bounds.
 bool FeatureFollower::moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept {
-  const Vector2d around = displacement_around(feature.last_px, &feature);
-  const Vector2d own = feature.px - feature.last_px;
-  const double strangeness_px = (own - around).norm();
-  scratch_.push_back(strangeness_px);
-  const bool is_strange = strangeness_px > 4 * strangeness_px_ + 0.25 * around.norm();
+  const Around neighbours = around(feature.last_px, &feature);
+  const Vector2d astray = feature.px - feature.last_px - neighbours.by;
+  scratch_.push_back(astray.norm());
+  // Of the distance to the neighbours: what a beat strains the tissue by, in a frame and in all.
+  constexpr double kStrainOfFrame = 0.06, kStrain = 0.35;
+  const bool is_strange =
+      astray.norm() > 4 * strangeness_px_ + 0.25 * neighbours.by.norm() + kStrainOfFrame * neighbours.distance_px;
   feature.strange = std::max(0, feature.strange + (is_strange ? 2 : -1));
-  constexpr int kMostStrangeCandidate = 3, kMostStrange = 20;
+  constexpr int kMostStrangeCandidate = 5, kMostStrange = 20;
   if (feature.strange > (feature.state == FollowState::kCandidate ? kMostStrangeCandidate : kMostStrange)) return false;
   // What comes back makes up for a place that was only guessed.
   constexpr double kForgetting = 0.03, kMostAstray_px = 4, kMostAstrayOfStrangeness = 6;
-  feature.astray_px = is_back ? Vector2d::Zero() : Vector2d((1 - kForgetting) * feature.astray_px + own - around);
-  return feature.astray_px.norm() <= kMostAstray_px + kMostAstrayOfStrangeness * strangeness_px_;
+  feature.astray_px = is_back ? Vector2d::Zero() : Vector2d((1 - kForgetting) * feature.astray_px + astray);
+  return feature.astray_px.norm() <=
+         kMostAstray_px + kMostAstrayOfStrangeness * strangeness_px_ + kStrain * neighbours.distance_px;
 }
 
 void FeatureFollower::renew_worn_template(const GreyImage& image, FollowedFeature& feature) const noexcept {

@@ -78,7 +78,14 @@ class FeatureFollower {
   };
   [[nodiscard]] bool seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
                           double deviation_px, double min_correlation) const noexcept;
-  [[nodiscard]] Vector2d displacement_around(const Vector2d& px, const FollowedFeature* but) const noexcept;
+  struct Around {
+    Vector2d by = Vector2d::Zero();  // displacement
+    double distance_px = 0;          // of those it is taken from, in the mean; 0 when there are too few
+  };
+  [[nodiscard]] Around around(const Vector2d& px, const FollowedFeature* but) const noexcept;
+  [[nodiscard]] Vector2d displacement_around(const Vector2d& px, const FollowedFeature* but) const noexcept {
+    return around(px, but).by;
+  }
   void note_displacements() noexcept;
   void find_again(const GreyImage& image) noexcept;
   void judge(const GreyImage& image) noexcept;

@@ -119,17 +119,30 @@ class TrackTable {
     return table;
   }
 
+  TrackTable(TrackTable&&) = default;
+  TrackTable& operator=(TrackTable&&) = delete;
+  TrackTable(const TrackTable&) = delete;
+  TrackTable& operator=(const TrackTable&) = delete;
+  ~TrackTable() {
+    if (file_ == nullptr) return;
+    file_.reset();
+    std::error_code ignored;
+    std::filesystem::remove(partial_, ignored);
+  }
+
   void write(std::uint64_t frame, const FollowedFeature& feature) {
     const char* state = feature.state == FollowState::kCandidate ? "candidate" : "tracked";
     fmt::print(file_.get(), "{},{},{:.3f},{:.3f},{}\n", frame, feature.id, feature.px.x(), feature.px.y(), state);
   }
 
   Expected<void> finish() {
-    const bool good = std::ferror(file_.get()) == 0 && std::fflush(file_.get()) == 0;
-    file_.reset();
     std::error_code error;
-    if (good) std::filesystem::rename(partial_, path_, error);
-    if (!good || error) return fail(path_ + ": could not be written whole");
+    if (std::ferror(file_.get()) != 0 || std::fflush(file_.get()) != 0) {
+      return fail(path_ + ": could not be written whole");
+    }
+    std::filesystem::rename(partial_, path_, error);
+    if (error) return fail(path_ + ": " + error.message());
+    file_.reset();
     return {};
   }
 

@@ -296,7 +296,7 @@ void Simulation::render(std::size_t index, RenderWorkspace& workspace, std::span
   const Frame& frame = frames_[index];
   std::vector<Vector3d> vertices_W(truth_.mesh().vertex_count);
   // Instants spread evenly over the exposure; its middle alone when it is short.
-  constexpr int kInstants = 5;
+  constexpr int kInstants = 3;
   const int instants = settings_.exposure_share > 0.0 ? kInstants : 1;
   const double exposure_s = settings_.exposure_share / settings_.frames_per_s;
   for (int k = 0; k < instants; ++k) {

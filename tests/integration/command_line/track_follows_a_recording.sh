@@ -1,0 +1,57 @@
+#!/bin/bash
+# perimap track writes rows of the promised form over a recording's frames and over the video that it wrote itself, keeps
+# most features with --no-new-features, and says in one line what is wrong.
+# track_follows_a_recording.sh PERIMAP RECORDING WORK_FOLDER
+set -uo pipefail
+perimap=$1 recording=$2 work=$3
+rm -rf "$work"
+mkdir -p "$work"
+
+fail() {
+  echo "FAILED: $1"
+  exit 1
+}
+
+"$perimap" track "$recording" --csv "$work/a.csv" --video "$work/a.mkv" --features 60 > "$work/out" 2> "$work/error" ||
+  fail "ended with $?: $(cat "$work/error")"
+[ "$(head -n 1 "$work/a.csv")" = frame,id,x,y,state ] || fail "header: $(head -n 1 "$work/a.csv")"
+wrong=$(tail -n +2 "$work/a.csv" | grep -Evc '^[0-9]+,[0-9]+,[0-9]+\.[0-9]{3},[0-9]+\.[0-9]{3},(candidate|tracked)$')
+[ "$wrong" -eq 0 ] || fail "$wrong rows of another form"
+[ "$(tail -n +2 "$work/a.csv" | cut -d, -f1,2 | sort | uniq -d | wc -l)" -eq 0 ] || fail "two rows of one feature in a frame"
+[ "$(wc -l < "$work/a.csv")" -gt 3000 ] || fail "only $(wc -l < "$work/a.csv") rows"
+
+"$perimap" track "$recording" --csv "$work/again.csv" --features 60 > /dev/null 2>&1
+cmp "$work/a.csv" "$work/again.csv" || fail "another result the second time"
+
+"$perimap" track "$work/a.mkv" --csv "$work/video.csv" --features 60 > "$work/out" 2> "$work/error" ||
+  fail "on a video: ended with $?: $(cat "$work/error")"
+[ "$(tail -n 1 "$work/a.csv" | cut -d, -f1)" -eq "$(tail -n 1 "$work/video.csv" | cut -d, -f1)" ] ||
+  fail "the video has not the recording's frames"
+
+"$perimap" track "$recording" --csv "$work/b.csv" --features 60 --no-new-features > /dev/null 2> "$work/error" ||
+  fail "without new features: ended with $?: $(cat "$work/error")"
+first=$(grep -c '^0,' "$work/b.csv")
+last=$(tail -n +2 "$work/b.csv" | tail -n 1 | cut -d, -f1)
+kept=$(grep -c "^$last," "$work/b.csv")
+[ "$last" -ge 170 ] || fail "the last row is of frame $last"
+[ $((3 * kept)) -ge "$first" ] || fail "$kept of $first features kept to the end"
+[ "$(tail -n +2 "$work/b.csv" | cut -d, -f2 | sort -u | wc -l)" -eq "$first" ] ||
+  fail "new features in spite of --no-new-features"
+
+# exits WHAT CODE PATTERN COMMAND...
+exits() {
+  local what=$1 code=$2 pattern=$3
+  shift 3
+  "$@" > /dev/null 2> "$work/error"
+  local status=$?
+  [ $status -eq $code ] || fail "$what: ended with $status, not $code: $(cat "$work/error")"
+  grep -Eq "$pattern" "$work/error" || fail "$what: $(cat "$work/error")"
+}
+exits "no such file" 1 "none.mp4: there is no such file" "$perimap" track "$work/none.mp4" --csv "$work/c.csv"
+exits "not a video" 1 "a.csv: not a video" "$perimap" track "$work/a.csv" --csv "$work/c.csv"
+exits "unwritable table" 1 "c.csv: can not be written" "$perimap" track "$work/a.mkv" --csv "$work/none/c.csv"
+exits "unwritable video" 1 "c.mkv: can not be written" "$perimap" track "$work/a.mkv" --csv "$work/c.csv" --video "$work/none/c.mkv"
+exits "no table" 2 "--csv" "$perimap" track "$work/a.mkv"
+exits "no features" 2 "--features" "$perimap" track "$work/a.mkv" --csv "$work/c.csv" --features 0
+rm -f "$work"/*.mkv
+echo "as promised: $kept of $first features kept over $last frames"
