@@ -45,7 +45,7 @@ exits() {
   "$@" > /dev/null 2> "$work/error"
   local status=$?
   [ $status -eq $code ] || fail "$what: ended with $status, not $code: $(cat "$work/error")"
-  grep -Eq "$pattern" "$work/error" || fail "$what: $(cat "$work/error")"
+  grep -Eq -- "$pattern" "$work/error" || fail "$what: $(cat "$work/error")"
 }
 exits "no such file" 1 "none.mp4: there is no such file" "$perimap" track "$work/none.mp4" --csv "$work/c.csv"
 exits "not a video" 1 "a.csv: not a video" "$perimap" track "$work/a.csv" --csv "$work/c.csv"
