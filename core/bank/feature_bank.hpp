@@ -19,11 +19,11 @@
 
 #include "core/bank/group_view.hpp"
 #include "core/bank/lanes.hpp"
-#include "core/simd/simd_target.hpp"
 #include "core/bank/sweep_kernels.hpp"
 #include "core/bank/sweep_phases.hpp"
 #include "core/bank/update_kernels.hpp"
 #include "core/estimation/feature_estimate.hpp"
+#include "core/simd/simd_target.hpp"
 
 namespace perimap {
 

@@ -4,8 +4,8 @@
 #include "core/bank/group_view.hpp"
 #include "core/bank/lanes.hpp"
 #include "core/bank/pinhole_lens.hpp"
-#include "core/simd/simd_target.hpp"
 #include "core/bank/sweep_phases.hpp"
+#include "core/simd/simd_target.hpp"
 
 namespace perimap {
 

@@ -100,7 +100,8 @@ void FeatureFinder::find(const Frame& frame) noexcept {
   for (const Vector2d& px : *corners) {
     if (found_.size() == kMaximumPerRound) break;
     FoundFeature feature;
-    if (make_patch_template(image, px, template_, tracker_.kernels(), feature.patch) != TemplateVerdict::kGood) continue;
+    if (make_patch_template(image, px, template_, tracker_.kernels(), feature.patch) != TemplateVerdict::kGood)
+      continue;
     feature.first_observed = frame.stamp.capture;
     feature.first_observed_px = px;
     feature.patch_state.px = px;

@@ -1,6 +1,7 @@
 // Where a colour image shows something grey: steel and plastic, not tissue.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 

@@ -352,8 +352,9 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--respiration-period", options->respiration_period_s, "Breathing period, s")
       ->capture_default_str();
-  command->add_option("--scope-sweep", settings.scope_sweep,
-                      "How far from its target the scope looks, times the usual: at 5 what lies off it leaves the view")
+  command
+      ->add_option("--scope-sweep", settings.scope_sweep,
+                   "How far from its target the scope looks, times the usual: at 5 what lies off it leaves the view")
       ->capture_default_str();
   command->add_option("--exposure", settings.exposure_share, "Motion blur: exposure as a share of the frame period")
       ->capture_default_str();

@@ -3,14 +3,16 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
-#include <variant>
+#include <string_view>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include "core/vision/feature_detector.hpp"

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "core/geometry/pose.hpp"
 #include "core/time/instant.hpp"

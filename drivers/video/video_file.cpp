@@ -4,11 +4,15 @@
 #include <cmath>
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <string>
+#include <system_error>
 #include <utility>
+#include <vector>
 
 namespace perimap {
 namespace {

@@ -1,6 +1,7 @@
 // Video files of any kind that OpenCV's videoio (FFmpeg) reads and writes.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>

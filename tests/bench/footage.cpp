@@ -14,6 +14,8 @@
 namespace perimap::bench {
 namespace {
 
+constexpr double kSensorNoise = 1.2;  // grey levels, as the simulator's sensor has at a middling grey
+
 std::vector<Vector2d> corners(const Footage& footage, int features) {
   DetectorSettings settings;
   settings.tile_px = 32;
@@ -105,8 +107,6 @@ Footage textured_footage(int width, int height, int frames, int features) {
     double direction = random.uniform(0.0, 6.28);
     const double darkness = random.uniform(8.0, 25.0);
     const int thickness = random.uniform(1, 4);
-    cv::Mat drawn(tissue.size(), CV_32F, cv::Scalar(0));
-    cv::Rect around(tissue.cols, tissue.rows, 0, 0);
     for (int piece = 0; piece < 12; ++piece) {
       direction += random.uniform(-0.5, 0.5);
       const cv::Point2d next = at + 12.0 * cv::Point2d(std::cos(direction), std::sin(direction));
@@ -145,7 +145,7 @@ Footage textured_footage(int width, int height, int frames, int features) {
     cv::Mat seen;
     cv::remap(tissue, seen, map_x, map_y, cv::INTER_CUBIC, cv::BORDER_REFLECT);
     cv::Mat noise(height, width, CV_32F);
-    random.fill(noise, cv::RNG::NORMAL, 0.0, 2.0);
+    random.fill(noise, cv::RNG::NORMAL, 0.0, kSensorNoise);
     std::vector<std::uint8_t> frame(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {

@@ -24,7 +24,7 @@ struct Footage {
 [[nodiscard]] Footage rendered_footage(int width, int height, int frames, int features);
 
 // A tissue-like texture (1/f, with sharp vessels) under a smooth deformation and a moving view, bicubic, with
-// vignetting and noise of 2 grey levels.
+// vignetting and the noise of the simulator's sensor, 1.2 grey levels.
 [[nodiscard]] Footage textured_footage(int width, int height, int frames, int features);
 
 // The same with a light that changes from frame to frame: gain within +-6 %, bias within +-4 grey levels.

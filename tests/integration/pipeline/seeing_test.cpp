@@ -3,11 +3,15 @@
 // the gate where the feature is?
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <numbers>
-#include <optional>
+#include <stdexcept>
+#include <string>
 #include <thread>
 
 #include "core/pipeline/pipeline.hpp"
