@@ -1,0 +1,50 @@
+// How a device is doing: written by the thread that reads it, read by status, probe and log.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+#include "core/realtime/counter.hpp"
+#include "core/realtime/latency_histogram.hpp"
+
+namespace perimap {
+
+enum class DeviceState : std::uint8_t {
+  kClosed,     // not reachable; reason() says why
+  kStarting,   // open, not yet delivering
+  kStreaming,  // samples come
+  kSilent,     // open, but samples have stopped coming
+};
+
+[[nodiscard]] const char* device_state_name(DeviceState state) noexcept;
+
+class DeviceHealth {
+ public:
+  Counter samples;          // delivered
+  Counter lost;             // by the device's own count
+  Counter damaged;          // messages that failed their check, or bytes that fit nowhere
+  Counter dropped;          // by the kernel's own count, before we could read them
+  Counter bus_errors;       // CAN error frames
+  Counter openings;         // times that the link was opened
+  LatencyHistogram jitter;  // arrival of a sample later than the earliest it could have come
+
+  // Relaxed: the state is a message by itself; who needs the reason with it takes the lock.
+  void set_state(DeviceState state) noexcept { state_.store(state, std::memory_order_relaxed); }
+  [[nodiscard]] DeviceState state() const noexcept { return state_.load(std::memory_order_relaxed); }
+
+  // What happened last, one line; `identity` is what the device says that it is.
+  void set_reason(std::string reason);
+  [[nodiscard]] std::string reason() const;
+  void set_identity(std::string identity);
+  [[nodiscard]] std::string identity() const;
+
+ private:
+  std::atomic<DeviceState> state_{DeviceState::kClosed};
+  mutable std::mutex mutex_;  // of the texts, which change when a link opens or closes
+  std::string reason_;
+  std::string identity_;
+};
+
+}  // namespace perimap

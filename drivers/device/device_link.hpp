@@ -1,0 +1,46 @@
+// Keeps a protocol connected to its device: opens, carries bytes both ways, closes, opens again.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "core/error/expected.hpp"
+#include "core/time/instant.hpp"
+#include "drivers/device/device_health.hpp"
+#include "drivers/device/device_protocol.hpp"
+#include "drivers/transport/byte_stream.hpp"
+#include "drivers/transport/endpoint.hpp"
+#include "drivers/transport/interrupt.hpp"
+
+namespace perimap {
+
+// After a failure the link is opened again after 50 ms, then after twice that, up to half a second. A conversation that
+// delivered samples starts the row anew.
+class ReopenDelay {
+ public:
+  [[nodiscard]] Duration next() noexcept;
+  void restart() noexcept { delay_ = kShortest; }
+
+ private:
+  static constexpr Duration kShortest = std::chrono::milliseconds(50);
+  static constexpr Duration kLongest = std::chrono::milliseconds(500);
+  Duration delay_ = kShortest;
+};
+
+// Sleeps; false when interrupted.
+bool wait_unless_interrupted(Duration longest, const Interrupt& interrupt);
+
+// One conversation over an open stream, until the protocol or the stream fails (the reason is returned) or the
+// interrupt is requested (the text is then empty).
+[[nodiscard]] std::string converse(ByteStream& stream, DeviceProtocol& protocol, const Interrupt& interrupt);
+
+using StreamOpener = std::function<Expected<std::unique_ptr<ByteStream>>(const Interrupt&)>;
+
+// A serial port at this rate, or a TCP connection; a CAN endpoint is an error, since it carries frames.
+[[nodiscard]] StreamOpener opener_of(const Endpoint& endpoint, int baud);
+
+// Runs on the calling thread until interrupted. `health` tells the state and, when there is no link, the reason.
+void serve_device(const StreamOpener& open, DeviceProtocol& protocol, DeviceHealth& health, const Interrupt& interrupt);
+
+}  // namespace perimap
