@@ -1,0 +1,48 @@
+// BITalino (PLUX): frame and commands as in the public "BITalino (r)evolution Board Data Sheet" and its open API.
+//
+// 115200 8N1. Commands are a byte: 0x00 idle; 0x03 0x43 0x83 0xC3 sample at 1, 10, 100, 1000 Hz; (mask << 2) | 1 starts
+// live acquisition of the channels in the mask. One analogue channel makes frames of three bytes:
+//
+//   vvvvvv00  IIIIVVVV  ssssCCCC    v, V: low six and high four bits of a 10-bit sample; I: digital lines
+//                                   s: sequence modulo 16; C: CRC-4 over all but itself (polynomial x^4 + x + 1)
+//
+// A check of four bits lets one in sixteen garbled frames pass. So synchronisation needs four frames in a row that
+// follow each other, and a frame counts only when the next agrees with it; that costs a millisecond.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "drivers/ecg/counted_framer.hpp"
+#include "drivers/ecg/ecg_protocol.hpp"
+#include "drivers/ecg/rail_watch.hpp"
+
+namespace perimap {
+
+struct BitalinoSettings {
+  int channel = 2;  // A1 to A4; the kits have the ECG on A2
+};
+
+// CRC-4 of a frame whose last nibble, the check itself, is left out.
+[[nodiscard]] std::uint8_t bitalino_crc(std::span<const std::byte> frame) noexcept;
+
+class BitalinoProtocol final : public EcgProtocol {
+ public:
+  static constexpr int kBaud = 115200;
+  static constexpr double kSampleRate_hz = 1000.0;
+  static constexpr std::size_t kFrameBytes = 3;
+
+  BitalinoProtocol(const BitalinoSettings& settings, EcgSink sink, DeviceHealth& health);
+
+ protected:
+  void start(LinkControl& link) override;
+  void decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
+
+ private:
+  BitalinoSettings settings_;
+  CountedFramer framer_;
+  RailWatch rail_{kSampleRate_hz};
+};
+
+}  // namespace perimap

@@ -1,0 +1,114 @@
+#include "drivers/ecg/can_ecg.hpp"
+
+#include <poll.h>
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "drivers/device/device_link.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr unsigned kCountModulus = 256;
+// Eight bytes of data in a standard frame are 111 bits before stuffing, at the usual 500 kbit/s.
+constexpr Duration kFrameTime = std::chrono::microseconds(222);
+constexpr Duration kSilentAfter = std::chrono::milliseconds(300);
+
+}  // namespace
+
+CanEcgDecoder::CanEcgDecoder(const CanEcgSettings& settings, EcgSink sink, DeviceHealth& health)
+    : settings_(settings),
+      samples_({.period_ns = 1e9 / settings.sample_rate_hz, .transport_delay = kFrameTime}, std::move(sink), health),
+      health_(health) {}
+
+void CanEcgDecoder::restart() noexcept {
+  samples_.restart();
+  last_.reset();
+  dropped_ = 0;
+}
+
+std::uint64_t CanEcgDecoder::lost_before(const CanEcgFrame& ecg, Instant arrival) const noexcept {
+  if (!last_) return 0;
+  const auto frames = static_cast<std::uint8_t>(ecg.count - last_->count - 1);
+  const auto passed_ms = static_cast<std::uint16_t>(ecg.device_time_ms - last_->device_time_ms);
+  const double samples = passed_ms * 1e-3 * settings_.sample_rate_hz - last_->samples;
+  // The device's time decides how often the count went round while it is not ambiguous itself.
+  constexpr Duration kTimeWraps = std::chrono::seconds(60);
+  if (arrival - samples_.last_arrival() < kTimeWraps) {
+    const double rounds = std::round((samples / 2.0 - frames) / kCountModulus);
+    return 2 * (frames + kCountModulus * static_cast<std::uint64_t>(std::max(0.0, rounds)));
+  }
+  return samples_.lost_samples(2ULL * frames, 2ULL * kCountModulus, 0, arrival);
+}
+
+void CanEcgDecoder::take(const CanFrame& frame) {
+  health_.dropped.add(frame.dropped_before - dropped_);
+  dropped_ = frame.dropped_before;
+  if (frame.error) {
+    health_.bus_errors.add();
+    return;
+  }
+  const auto ecg = decode_can_ecg(frame, settings_.identifier, settings_.extended);
+  if (!ecg) {
+    health_.damaged.add();
+    return;
+  }
+  // The same frame again, as a bridge may send it.
+  if (last_ && ecg->count == last_->count && ecg->device_time_ms == last_->device_time_ms) {
+    health_.damaged.add();
+    return;
+  }
+  const std::uint64_t lost = lost_before(*ecg, frame.arrival);
+  for (int i = 0; i < ecg->samples; ++i) {
+    const auto value = ecg->values[static_cast<std::size_t>(i)];
+    samples_.add(static_cast<float>(value * settings_.mV_per_count), ecg->lead_off, i == 0 ? lost : 0);
+  }
+  samples_.end_chunk(frame.arrival);
+  last_ = ecg;
+}
+
+void serve_can_ecg(const std::string& interface_name, const CanEcgSettings& settings, const EcgSink& sink,
+                   DeviceHealth& health, const Interrupt& interrupt) {
+  CanEcgDecoder decoder(settings, sink, health);
+  ReopenDelay delay;
+  while (!interrupt.requested()) {
+    health.set_state(DeviceState::kClosed);
+    auto socket = CanSocket::open(interface_name, settings.identifier, settings.extended);
+    if (!socket) {
+      health.set_reason(std::move(socket.error().message));
+      wait_unless_interrupted(delay.next(), interrupt);
+      continue;
+    }
+    health.openings.add();
+    health.set_state(DeviceState::kStarting);
+    decoder.restart();
+    Instant last = MonotonicClock::now();
+    for (;;) {
+      std::array<pollfd, 2> waited{{{socket->descriptor(), POLLIN, 0}, {interrupt.descriptor(), POLLIN, 0}}};
+      constexpr int kSilent_ms = 300;
+      (void)::poll(waited.data(), waited.size(), kSilent_ms);
+      if (waited[1].revents != 0) break;
+      auto frame = socket->receive();
+      if (!frame) {
+        health.set_reason(std::move(frame.error().message));
+        break;
+      }
+      if (*frame) {
+        const std::uint64_t before = health.samples.get();
+        decoder.take(**frame);
+        if (health.samples.get() == before) continue;
+        last = (*frame)->arrival;
+        delay.restart();
+        health.set_state(DeviceState::kStreaming);
+      } else if (health.state() == DeviceState::kStreaming && MonotonicClock::now() - last > kSilentAfter) {
+        health.set_state(DeviceState::kSilent);
+      }
+    }
+    wait_unless_interrupted(delay.next(), interrupt);
+  }
+  health.set_state(DeviceState::kClosed);
+}
+
+}  // namespace perimap

@@ -1,0 +1,43 @@
+// ECG from SocketCAN: frames of can_ecg_frame.hpp with the kernel's receive stamps.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "drivers/ecg/can_ecg_frame.hpp"
+#include "drivers/ecg/ecg_assembler.hpp"
+#include "drivers/transport/interrupt.hpp"
+
+namespace perimap {
+
+struct CanEcgSettings {
+  std::uint32_t identifier = 0x2E0;
+  bool extended = false;
+  double sample_rate_hz = 360.0;
+  double mV_per_count = 0.005;
+};
+
+// What a frame does; no socket. Frame counts tell lost frames modulo 256; the device's own time says how often that
+// went round (a minute, then again the host's clock).
+class CanEcgDecoder {
+ public:
+  CanEcgDecoder(const CanEcgSettings& settings, EcgSink sink, DeviceHealth& health);
+
+  void restart() noexcept;
+  void take(const CanFrame& frame);
+
+ private:
+  [[nodiscard]] std::uint64_t lost_before(const CanEcgFrame& ecg, Instant arrival) const noexcept;
+
+  CanEcgSettings settings_;
+  EcgAssembler samples_;
+  DeviceHealth& health_;
+  std::optional<CanEcgFrame> last_;
+  std::uint32_t dropped_ = 0;
+};
+
+// Reads until interrupted; reopens when the interface went down or away.
+void serve_can_ecg(const std::string& interface_name, const CanEcgSettings& settings, const EcgSink& sink,
+                   DeviceHealth& health, const Interrupt& interrupt);
+
+}  // namespace perimap

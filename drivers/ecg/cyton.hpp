@@ -1,0 +1,49 @@
+// OpenBCI Cyton: "Cyton Data Format" and "Cyton Board SDK" in OpenBCI's public documentation.
+//
+// 115200 8N1. `v` resets the board, which answers with a text that ends in "$$$"; `b` starts, `s` stops. 250 packets/s:
+//
+//   A0 n aaa aaa aaa aaa aaa aaa aaa aaa xxxxxx Cn    n: count modulo 256; a: 24-bit two's complement, big-endian, of
+//                                                     channels 1 to 8; x: accelerometer or clock; C0 to C6 closes
+//
+// There is no check sum, so shape and count stand for it: synchronisation needs three packets in a row, and a packet
+// whose number does not follow counts only when the next agrees with it.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "drivers/ecg/counted_framer.hpp"
+#include "drivers/ecg/ecg_protocol.hpp"
+#include "drivers/ecg/rail_watch.hpp"
+
+namespace perimap {
+
+struct CytonSettings {
+  int channel = 1;     // 1 to 8
+  double gain = 24.0;  // of the board's amplifier
+};
+
+class CytonProtocol final : public EcgProtocol {
+ public:
+  static constexpr int kBaud = 115200;
+  static constexpr double kSampleRate_hz = 250.0;
+  static constexpr std::size_t kPacketBytes = 33;
+
+  CytonProtocol(const CytonSettings& settings, EcgSink sink, DeviceHealth& health);
+
+ protected:
+  void start(LinkControl& link) override;
+  void decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
+
+ private:
+  void await_prompt(LinkControl& link, std::span<const std::byte> bytes);
+
+  CytonSettings settings_;
+  bool prompted_ = false;
+  std::string greeting_;
+  CountedFramer framer_;
+  RailWatch rail_{kSampleRate_hz};
+};
+
+}  // namespace perimap

@@ -1,0 +1,191 @@
+// Drivers and emulators together over real pseudo-terminals, in real time.
+#include "drivers/emulator/ecg_emulator.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+
+#include "drivers/device/device_link.hpp"
+#include "drivers/ecg/bitalino.hpp"
+#include "drivers/ecg/cyton.hpp"
+#include "drivers/ecg/medlab.hpp"
+#include "drivers/emulator/emulator_server.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+struct Case {
+  const char* name;
+  int baud;
+  double rate_hz;
+  float resolution_mV;
+  std::unique_ptr<EcgEmulator> (*emulate)(EcgWaveform, const EmulatorFaults&);
+  std::function<std::unique_ptr<EcgProtocol>(EcgSink, DeviceHealth&)> drive;
+};
+
+const Case kCases[] = {
+    {"medlab", MedlabProtocol::kBaud, 300.0, 0.02F, &emulate_medlab,
+     [](EcgSink sink, DeviceHealth& health) {
+       return std::make_unique<MedlabProtocol>(MedlabSettings{}, std::move(sink), health);
+     }},
+    {"bitalino", BitalinoProtocol::kBaud, 1000.0, 0.003F, &emulate_bitalino,
+     [](EcgSink sink, DeviceHealth& health) {
+       return std::make_unique<BitalinoProtocol>(BitalinoSettings{}, std::move(sink), health);
+     }},
+    {"cyton", CytonProtocol::kBaud, 250.0, 0.0001F, &emulate_cyton,
+     [](EcgSink sink, DeviceHealth& health) {
+       return std::make_unique<CytonProtocol>(CytonSettings{}, std::move(sink), health);
+     }},
+};
+
+// A driver and an emulated device, each on its thread.
+class Session {
+ public:
+  Session(const Case& c, const EmulatorFaults& faults)
+      : link_(
+            (std::filesystem::temp_directory_path() / ("perimap-" + std::to_string(getpid()) + "-" + c.name)).string()),
+        // A straight rise of 1 mV/s to 2 mV and again: a sample tells when it was measured.
+        waveform_(MonotonicClock::now(), 1000.0, ramp(), true),
+        device_(c.emulate(waveform_, faults)),
+        protocol_(c.drive(
+            [this](const EcgBlock& block) {
+              const std::lock_guard lock(mutex_);
+              blocks_.push_back(block);
+            },
+            health)) {
+    emulating_ = std::jthread([this, faults] {
+      const auto done = emulate_on_terminal(
+          link_, *device_, faults, [](const std::string&) {}, interrupt_);
+      EXPECT_TRUE(done) << done.error().message;
+    });
+    driving_ = std::jthread([this, baud = c.baud] {
+      serve_device(opener_of(SerialEndpoint{link_}, baud), *protocol_, health, interrupt_);
+    });
+  }
+  ~Session() { interrupt_.request(); }
+
+  bool wait_until(const std::function<bool()>& met, Duration longest = seconds(20)) {
+    const Instant deadline = MonotonicClock::now() + longest;
+    while (!met()) {
+      if (MonotonicClock::now() > deadline) return false;
+      std::this_thread::sleep_for(milliseconds(5));
+    }
+    return true;
+  }
+  std::vector<EcgBlock> blocks() const {
+    const std::lock_guard lock(mutex_);
+    return blocks_;
+  }
+  const EcgWaveform& waveform() const { return waveform_; }
+
+  DeviceHealth health;
+
+ private:
+  static std::vector<float> ramp() {
+    std::vector<float> mV;
+    for (int i = 0; i < 2000; ++i) mV.push_back(-1.0F + 0.001F * static_cast<float>(i));
+    return mV;
+  }
+
+  std::string link_;
+  EcgWaveform waveform_;
+  std::unique_ptr<EcgEmulator> device_;
+  std::unique_ptr<EcgProtocol> protocol_;
+  mutable std::mutex mutex_;
+  std::vector<EcgBlock> blocks_;
+  Interrupt interrupt_;
+  std::jthread emulating_;
+  std::jthread driving_;
+};
+
+class OverATerminal : public ::testing::TestWithParam<Case> {};
+
+TEST_P(OverATerminal, SamplesArriveInOrderWithTheTimeAtWhichTheyWereMeasured) {
+  Session session(GetParam(), {});
+  const auto wanted = static_cast<std::uint64_t>(1.5 * GetParam().rate_hz);
+  ASSERT_TRUE(session.wait_until([&] { return session.health.samples.get() >= wanted; })) << session.health.reason();
+  std::vector<double> errors_ms;
+  std::uint32_t next = 0;
+  for (const EcgBlock& block : session.blocks()) {
+    ASSERT_EQ(block.device_sequence, next);
+    next += block.count;
+    ASSERT_FALSE(block.lead_off);
+    if (block.device_sequence < wanted / 3) continue;
+    const float mV = block.mV[0];
+    if (std::abs(mV) > 0.9F) continue;  // near the ramp's jump
+    const auto true_mV = session.waveform().at(block.first_sample_time);
+    ASSERT_TRUE(true_mV);
+    errors_ms.push_back(static_cast<double>(mV - *true_mV) * 1000.0);
+  }
+  ASSERT_GT(errors_ms.size(), 20U);
+  std::nth_element(errors_ms.begin(), errors_ms.begin() + static_cast<std::ptrdiff_t>(errors_ms.size() / 2),
+                   errors_ms.end());
+  // The line of a pseudo-terminal takes no time: the stamp is early by what the real line would have taken, plus the
+  // resolution. A busy machine delays the emulator itself, so the bound is wide.
+  EXPECT_NEAR(errors_ms[errors_ms.size() / 2], 0.0, 25.0);
+  EXPECT_EQ(session.health.damaged.get(), 0U);
+  EXPECT_EQ(session.health.lost.get(), 0U);
+}
+
+TEST_P(OverATerminal, UnpluggedAndPluggedInAgainItGoesOn) {
+  EmulatorFaults faults;
+  faults.unplug_every = milliseconds(300);
+  faults.unplug_for = milliseconds(100);
+  Session session(GetParam(), faults);
+  ASSERT_TRUE(session.wait_until([&] { return session.health.openings.get() >= 3; })) << session.health.reason();
+  const std::uint64_t before = session.health.samples.get();
+  ASSERT_TRUE(session.wait_until([&] { return session.health.samples.get() > before + 20; }))
+      << session.health.reason();
+  Instant last{};
+  for (const EcgBlock& block : session.blocks()) {
+    EXPECT_GT(block.first_sample_time, last);
+    EXPECT_LE(block.first_sample_time, block.arrival);
+    last = block.first_sample_time;
+  }
+}
+
+TEST_P(OverATerminal, LeadOffIsAStateOfItsOwn) {
+  EmulatorFaults faults;
+  faults.missing_every = milliseconds(1300);
+  faults.missing_for = milliseconds(700);
+  Session session(GetParam(), faults);
+  const auto changes = [&] {
+    int count = 0;
+    bool off = false;
+    for (const EcgBlock& block : session.blocks()) count += std::exchange(off, block.lead_off) != off ? 1 : 0;
+    return count;
+  };
+  ASSERT_TRUE(session.wait_until([&] { return changes() >= 2; })) << session.health.reason();
+}
+
+INSTANTIATE_TEST_SUITE_P(Ecg, OverATerminal, ::testing::ValuesIn(kCases),
+                         [](const auto& tested) { return std::string(tested.param.name); });
+
+TEST(EcgOverATerminal, FaultsAreCountedAndDamagedFramesGiveNoSample) {
+  EmulatorFaults faults;
+  faults.bad_check = 0.01;
+  faults.truncated = 0.01;
+  faults.lost = 0.02;
+  Session session(kCases[1], faults);
+  ASSERT_TRUE(session.wait_until([&] { return session.health.samples.get() >= 2000; })) << session.health.reason();
+  EXPECT_GT(session.health.damaged.get(), 0U);
+  EXPECT_GT(session.health.lost.get(), 30U);
+  // On a ramp of 1 mV/s two samples of a block differ by the resolution at most.
+  for (const EcgBlock& block : session.blocks()) {
+    for (std::uint32_t i = 1; i < block.count; ++i) {
+      const float step = block.mV[i] - block.mV[i - 1];
+      EXPECT_TRUE(std::abs(step) < 0.01F || step < -1.9F) << step;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace perimap
