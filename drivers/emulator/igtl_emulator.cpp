@@ -1,0 +1,57 @@
+#include "drivers/emulator/igtl_emulator.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "drivers/tracker/igtl_message.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr std::size_t kLastCrcByte = 57;
+
+}  // namespace
+
+IgtlEmulator::IgtlEmulator(PoseTrack track, IgtlEmulatorSettings settings, const EmulatorFaults& faults)
+    : track_(std::move(track)), settings_(std::move(settings)), faults_(faults), sender_(faults) {}
+
+Instant IgtlEmulator::due(std::int64_t frame) const noexcept {
+  if (track_.over(frame)) return kNever;
+  const double period_ns = 1e9 / track_.rate_hz() / (1.0 + 1e-6 * faults_.drift_ppm);
+  return track_.start() + Duration(std::llround(static_cast<double>(frame) * period_ns));
+}
+
+void IgtlEmulator::on_open(LinkControl& /*link*/, Instant now) {
+  next_ = std::max<std::int64_t>(0, static_cast<std::int64_t>(to_seconds(now - track_.start()) * track_.rate_hz()));
+}
+
+void IgtlEmulator::on_time(LinkControl& link, Instant now) {
+  using Message = IgtlEmulatorSettings::Message;
+  for (; !track_.over(next_) && due(next_) <= now; ++next_) {
+    const Duration since = from_seconds(static_cast<double>(next_) / track_.rate_hz());
+    const ToolReading reading = faults_.missing(since) ? ToolReading{} : track_.at(next_);
+    const bool seen = reading.state == ToolState::kOk;
+    IgtlMessage message;
+    message.version = settings_.version;
+    message.device = settings_.tool;
+    // The server's own clock began with the track; 0 would be no stamp.
+    const Duration stamp = since + std::chrono::seconds(1);
+    message.time_stamp = static_cast<std::uint64_t>(std::llround(to_seconds(stamp) * 4294967296.0));
+    if (settings_.message == Message::kTdata) {
+      const std::array<IgtlTool, 1> tools{IgtlTool{settings_.tool, reading.X_TO}};
+      message.type = "TDATA";
+      message.content = encode_igtl_tdata(std::span(tools).first(seen ? 1 : 0));
+    } else {
+      if (!seen && settings_.version == 1) continue;
+      const bool transform = settings_.message == Message::kTransform;
+      message.type = transform ? "TRANSFORM" : "POSITION";
+      message.content = transform ? encode_igtl_transform(reading.X_TO) : encode_igtl_position(reading.X_TO);
+      if (settings_.version == 2) message.metadata = {{"TransformStatus", seen ? "OK" : "MISSING"}};
+    }
+    sender_.send(link, encode_igtl(message), kLastCrcByte);
+  }
+}
+
+}  // namespace perimap

@@ -1,0 +1,68 @@
+// An emulated NDI tracker: the far end of drivers/tracker/ndi_session.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/device/device_protocol.hpp"
+#include "drivers/emulator/emulator_faults.hpp"
+#include "drivers/emulator/pose_track.hpp"
+
+namespace perimap {
+
+struct NdiEmulatorSettings {
+  enum class Newest : std::uint8_t { kBx2, kBx, kTx };  // the newest way of asking for poses that it knows
+
+  Newest newest = Newest::kBx2;
+  int wired_tools = 0;                           // in its ports from the start, port handles 0A, 0B ...
+  std::optional<Pose> reference = std::nullopt;  // where the second tool is, constant; the first follows the track
+};
+
+class NdiEmulator final : public DeviceProtocol {
+ public:
+  NdiEmulator(PoseTrack track, const NdiEmulatorSettings& settings, const EmulatorFaults& faults);
+
+  void on_open(LinkControl& link, Instant now) override;
+  void on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
+  void on_time(LinkControl& /*link*/, Instant /*now*/) override {}
+  [[nodiscard]] Instant next_time() const noexcept override { return kNever; }
+
+  // The definition uploaded to a port handle, for tests.
+  [[nodiscard]] const std::vector<std::byte>& definition(std::uint16_t handle) const {
+    return ports_.at(handle).definition;
+  }
+
+ private:
+  struct Port {
+    std::vector<std::byte> definition;
+    bool wired = false;
+    bool initialised = false;
+    bool enabled = false;
+  };
+
+  void restart();
+  void on_command(LinkControl& link, const std::string& command, Instant now);
+  void reply(LinkControl& link, std::string_view text);
+  void reply_binary(LinkControl& link, std::span<const std::byte> body);
+  [[nodiscard]] std::string search(std::string_view option) const;
+  [[nodiscard]] Port* port_of(std::string_view digits);
+  [[nodiscard]] std::int64_t frame_at(Instant now) const noexcept;
+  [[nodiscard]] ToolReading reading(std::size_t tool, std::int64_t frame) const noexcept;
+  void send_bx(LinkControl& link, std::int64_t frame);
+  void send_bx2(LinkControl& link, std::int64_t frame);
+  void send_tx(LinkControl& link, std::int64_t frame);
+
+  PoseTrack track_;
+  NdiEmulatorSettings settings_;
+  EmulatorFaults faults_;
+  FaultySender sender_;
+  std::string line_;
+  std::map<std::uint16_t, Port> ports_;
+  bool initialised_ = false;
+  bool tracking_ = false;
+};
+
+}  // namespace perimap

@@ -1,0 +1,55 @@
+// An OpenIGTLink client: poses of named tools from a tracker server, such as PLUS or 3D Slicer.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "drivers/device/arrival_clock.hpp"
+#include "drivers/device/device_health.hpp"
+#include "drivers/device/device_protocol.hpp"
+#include "drivers/tracker/igtl_message.hpp"
+#include "drivers/tracker/tool_reading.hpp"
+
+namespace perimap {
+
+struct IgtlSettings {
+  std::string sensor;                    // device name, or name of a tool in TDATA; empty: whatever comes
+  std::optional<std::string> reference;  // W is its frame
+  WorldSettings world;
+};
+
+// TRANSFORM and POSITION of the sensor's name give its pose; so does TDATA with a tool of that name, which is asked for
+// at the start (STT_TDATA, every 10 ms) and where a tool that is left out is missing. A message with metadata
+// "TransformStatus" (PLUS, 3D Slicer) other than OK says that the tool is missing. A STATUS that is not OK is told.
+//
+// The protocol has no common clock: stamps are the sender's, fitted to the host's by their arrival; a message without a
+// stamp is stamped by its arrival.
+class IgtlSession final : public DeviceProtocol {
+ public:
+  IgtlSession(IgtlSettings settings, TrackerSink sink, DeviceHealth& health);
+
+  void on_open(LinkControl& link, Instant now) override;
+  void on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
+  void on_time(LinkControl& link, Instant now) override;
+  [[nodiscard]] Instant next_time() const noexcept override;
+
+ private:
+  void on_message(const IgtlMessage& message, Instant arrival);
+  void on_pose(const IgtlMessage& message, const Expected<Pose>& pose, Instant arrival);
+  void on_tdata(const IgtlMessage& message, Instant arrival);
+  void deliver(std::uint64_t time_stamp, std::int64_t time_ns, const ToolReading& sensor, Instant arrival);
+
+  IgtlSettings settings_;
+  TrackerSink sink_;
+  DeviceHealth& health_;
+  IgtlFramer framer_;
+  ArrivalClock clock_{{.period_ns = 1.0}};
+  ToolReading reference_;
+  Instant reference_arrival_{};
+  std::uint64_t last_stamp_ = 0;
+  std::uint32_t count_ = 0;
+  Instant last_{};  // reading, or the opening
+  bool any_ = false;
+};
+
+}  // namespace perimap

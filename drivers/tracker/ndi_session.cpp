@@ -1,0 +1,434 @@
+#include "drivers/tracker/ndi_session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <utility>
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr int kFastBaud = 115200;
+constexpr Duration kReplyTime = seconds(1);
+constexpr Duration kLongReplyTime = seconds(6);  // INIT over TCP, TSTART, PINIT
+constexpr Duration kResetTime = seconds(1);
+constexpr Duration kSettleTime = milliseconds(100);
+constexpr Duration kStreamReplyTime = milliseconds(300);
+constexpr Duration kSilentAfter = milliseconds(300);
+constexpr Duration kReopenAfter = seconds(2);
+constexpr Duration kQuietTime = milliseconds(20);
+constexpr int kMostRetries = 3;
+constexpr std::size_t kBlock = 64;
+constexpr std::uint16_t kHardwareFailure = 0x0010;
+
+// "ERROR0C" as the guide explains it, for those that tell a user something.
+std::string explain(const std::string& reply) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kMeanings{{
+      {"ERROR01", "invalid command"},
+      {"ERROR04", "the command's CRC was wrong: a noisy line or the wrong baud rate"},
+      {"ERROR05", "time-out in the device"},
+      {"ERROR08", "invalid port handle"},
+      {"ERROR0C", "not possible in the device's present mode"},
+      {"ERROR0D", "no tool is assigned to the port handle"},
+      {"ERROR0E", "the port handle is not initialised"},
+      {"ERROR10", "the device is not initialised"},
+      {"ERROR12", "tracking cannot be started"},
+      {"ERROR13", "the port handle cannot be initialised: is the tool definition right?"},
+  }};
+  for (const auto& [code, meaning] : kMeanings) {
+    if (reply.starts_with(code)) return fmt::format("{} ({})", code, meaning);
+  }
+  return reply.substr(0, 40);
+}
+
+std::optional<std::uint16_t> hex(std::string_view digits) {
+  std::uint16_t value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
+  if (digits.empty() || error != std::errc{} || end != digits.data() + digits.size()) return std::nullopt;
+  return value;
+}
+
+// Handles of a PHSR reply: count, then per handle two digits and three of status.
+std::optional<std::vector<std::string>> handles_of(std::string_view reply) {
+  constexpr std::size_t kCount = 2;
+  constexpr std::size_t kEach = 5;
+  if (reply.size() < kCount) return std::nullopt;
+  const auto count = hex(reply.substr(0, kCount));
+  if (!count || reply.size() != kCount + *count * kEach) return std::nullopt;
+  std::vector<std::string> handles;
+  for (std::size_t i = 0; i < *count; ++i) {
+    const std::string_view handle = reply.substr(kCount + i * kEach, 2);
+    if (!hex(handle)) return std::nullopt;
+    handles.emplace_back(handle);
+  }
+  return handles;
+}
+
+}  // namespace
+
+NdiSession::NdiSession(NdiSettings settings, TrackerSink sink, DeviceHealth& health)
+    : settings_(std::move(settings)),
+      sink_(std::move(sink)),
+      health_(health),
+      clock_({.period_ns = 1e9 / settings_.frame_rate_hz}) {
+  settings_.world.relative_to_reference = settings_.reference.has_value();
+}
+
+void NdiSession::on_open(LinkControl& link, Instant now) {
+  framer_.restart();
+  clock_.reset();
+  last_frame_.reset();
+  stride_ = 0;
+  query_ = Query::kBx2;
+  answered_ = false;
+  retries_ = 0;
+  if (link.serial()) {
+    link.send_break();
+    step_ = Step::kReset;
+    command_ = "a serial break";
+    due_ = now + kResetTime;
+  } else {
+    enter(link, Step::kStop, now);
+  }
+}
+
+void NdiSession::command(LinkControl& link, const std::string& text, Duration longest, Instant now) {
+  command_ = text;
+  link.send(ndi_with_crc(text));
+  due_ = now + longest;
+}
+
+void NdiSession::enter(LinkControl& link, Step step, Instant now) {
+  step_ = step;
+  switch (step) {
+    case Step::kStop:
+      return command(link, "TSTOP:", kReplyTime, now);
+    case Step::kInitialise:
+      return command(link, "INIT:", kLongReplyTime, now);
+    case Step::kSetRate:
+      return command(link, "COMM:50000", kReplyTime, now);
+    case Step::kSettle:
+      due_ = now + kSettleTime;
+      return;
+    case Step::kVersion:
+      return command(link, "VER:4", kReplyTime, now);
+    case Step::kFindToFree:
+      return command(link, "PHSR:01", kReplyTime, now);
+    case Step::kRequestPort:
+      return command(link, "PHRQ:*********1****", kReplyTime, now);
+    case Step::kFindToInitialise:
+      return command(link, "PHSR:02", kReplyTime, now);
+    case Step::kFindToEnable:
+      return command(link, "PHSR:03", kReplyTime, now);
+    case Step::kStart:
+      return command(link, "TSTART:80", kLongReplyTime, now);
+    case Step::kQuiet:
+      due_ = now + kQuietTime;
+      return;
+    case Step::kStream:
+      return ask(link, now);
+    case Step::kReset:
+    case Step::kFree:
+    case Step::kUpload:
+    case Step::kInitialisePort:
+    case Step::kEnablePort:
+      return;  // entered with what they are about
+  }
+}
+
+void NdiSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) {
+  if (step_ == Step::kQuiet) {
+    due_ = arrival + kQuietTime;
+    return;
+  }
+  if (step_ == Step::kSettle) return;
+  framer_.feed(bytes);
+  while (const auto reply = framer_.next()) {
+    on_reply(link, *reply, arrival);
+    if (step_ == Step::kQuiet) return;
+  }
+}
+
+void NdiSession::on_reply(LinkControl& link, const NdiReply& reply, Instant arrival) {
+  if (std::holds_alternative<NdiDamaged>(reply)) return on_damage(link, arrival);
+  if (const auto* binary = std::get_if<NdiBinary>(&reply)) {
+    if (step_ == Step::kStream && query_ == Query::kBx2) return on_tracking(link, decode_bx2(binary->body), arrival);
+    if (step_ == Step::kStream && query_ == Query::kBx) return on_tracking(link, decode_bx(binary->body), arrival);
+    return on_damage(link, arrival);
+  }
+  on_text(link, std::get<NdiText>(reply).text, arrival);
+}
+
+// Nothing of a damaged reply is used. In the stream the next query will do; before it, the command is given again.
+void NdiSession::on_damage(LinkControl& link, Instant now) {
+  health_.damaged.add();
+  framer_.restart();
+  if (step_ == Step::kStream) return enter(link, Step::kQuiet, now);
+  if (step_ == Step::kReset) return;  // bytes of the old rate
+  // A port that was given and not taken would stay behind, so that is not asked for twice.
+  if (step_ == Step::kRequestPort || ++retries_ > kMostRetries) {
+    return link.fail(
+        fmt::format("replies to {} come damaged; wrong baud rate, a bad line, or another device?", command_));
+  }
+  command(link, command_, kReplyTime, now);
+}
+
+void NdiSession::on_error(LinkControl& link, const std::string& text, Instant now) {
+  switch (step_) {
+    case Step::kStop:  // it was not tracking
+      return enter(link, Step::kInitialise, now);
+    case Step::kVersion:
+      return enter(link, Step::kFindToFree, now);
+    case Step::kStream:
+      if (!answered_ && query_ != Query::kTx && !text.starts_with("ERROR04")) {
+        query_ = query_ == Query::kBx2 ? Query::kBx : Query::kTx;
+        return ask(link, now);
+      }
+      break;
+    default:
+      break;
+  }
+  if (text.starts_with("ERROR04") && ++retries_ <= kMostRetries) return command(link, command_, kReplyTime, now);
+  link.fail(fmt::format("{} answered with {}", command_, explain(text)));
+}
+
+void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now) {
+  if (text.starts_with("ERROR")) return on_error(link, text, now);
+  if (text == "RESET" && step_ != Step::kReset) return link.fail("the device has restarted");
+  const bool okay = text == "OKAY" || text.starts_with("WARNING");
+  switch (step_) {
+    case Step::kReset:
+      if (text == "RESET") enter(link, Step::kInitialise, now);
+      return;
+    case Step::kStop:
+      return enter(link, Step::kInitialise, now);
+    case Step::kInitialise:
+      if (!okay) break;
+      return enter(link, link.serial() ? Step::kSetRate : Step::kVersion, now);
+    case Step::kSetRate:
+      if (!okay) break;
+      link.set_line_rate(kFastBaud);
+      return enter(link, Step::kSettle, now);
+    case Step::kVersion:
+      health_.set_identity(text.substr(0, text.find('\n')));
+      return enter(link, Step::kFindToFree, now);
+    case Step::kFindToFree:
+    case Step::kFindToInitialise:
+    case Step::kFindToEnable: {
+      auto handles = handles_of(text);
+      if (!handles) break;
+      ports_.assign(handles->rbegin(), handles->rend());  // taken from the end
+      return next_port(link, step_, now);
+    }
+    case Step::kFree:
+      if (!okay) break;
+      return next_port(link, Step::kFindToFree, now);
+    case Step::kRequestPort: {
+      const auto handle = hex(text);
+      if (!handle || text.size() != 2) break;
+      (tool_ == 0 ? sensor_handle_ : reference_handle_) = *handle;
+      port_requested_ = true;
+      return next_upload(link, now);
+    }
+    case Step::kUpload:
+      if (!okay) break;
+      ++block_;
+      return next_upload(link, now);
+    case Step::kInitialisePort:
+      if (!okay) break;
+      return next_port(link, Step::kFindToInitialise, now);
+    case Step::kEnablePort:
+      if (!okay) break;
+      return next_port(link, Step::kFindToEnable, now);
+    case Step::kStart:
+      if (!okay) break;
+      last_reading_ = now;
+      return enter(link, Step::kStream, now);
+    case Step::kStream:
+      if (query_ != Query::kTx) return on_damage(link, now);
+      return on_tracking(link, decode_tx(text), now);
+    case Step::kSettle:
+    case Step::kQuiet:
+      return;
+  }
+  link.fail(fmt::format("{} answered with '{}'", command_, text.substr(0, 40)));
+}
+
+// The next port of this search, or the next step.
+void NdiSession::next_port(LinkControl& link, Step search, Instant now) {
+  if (!ports_.empty()) {
+    const std::string handle = std::move(ports_.back());
+    ports_.pop_back();
+    if (search == Step::kFindToFree) {
+      step_ = Step::kFree;
+      return command(link, "PHF:" + handle, kReplyTime, now);
+    }
+    if (search == Step::kFindToInitialise) {
+      step_ = Step::kInitialisePort;
+      return command(link, "PINIT:" + handle, kLongReplyTime, now);
+    }
+    step_ = Step::kEnablePort;
+    enabled_.push_back(*hex(handle));
+    return command(link, fmt::format("PENA:{}D", handle), kReplyTime, now);
+  }
+  if (search == Step::kFindToFree) {
+    tool_ = 0;
+    block_ = 0;
+    port_requested_ = false;
+    return next_upload(link, now);
+  }
+  if (search == Step::kFindToInitialise) {
+    enabled_.clear();
+    return enter(link, Step::kFindToEnable, now);
+  }
+  if (choose_tools(link)) enter(link, Step::kStart, now);
+}
+
+// The next block of a definition, the next definition, or on to the initialisation of all ports.
+void NdiSession::next_upload(LinkControl& link, Instant now) {
+  for (; tool_ < 2; ++tool_, block_ = 0, port_requested_ = false) {
+    const NdiTool* tool = tool_ == 0 ? &settings_.sensor : settings_.reference ? &*settings_.reference : nullptr;
+    if (tool == nullptr || block_ * kBlock >= tool->definition.size()) {
+      if (tool != nullptr && tool->definition.empty() && tool->handle) {
+        (tool_ == 0 ? sensor_handle_ : reference_handle_) = *tool->handle;
+      }
+      continue;
+    }
+    if (!port_requested_) return enter(link, Step::kRequestPort, now);
+    std::string text =
+        fmt::format("PVWR:{:02X}{:04X}", tool_ == 0 ? sensor_handle_ : reference_handle_, block_ * kBlock);
+    for (std::size_t i = block_ * kBlock; i < (block_ + 1) * kBlock; ++i) {
+      const auto value = i < tool->definition.size() ? std::to_integer<unsigned>(tool->definition[i]) : 0U;
+      text += fmt::format("{:02X}", value);
+    }
+    step_ = Step::kUpload;
+    return command(link, text, kReplyTime, now);
+  }
+  enter(link, Step::kFindToInitialise, now);
+}
+
+bool NdiSession::choose_tools(LinkControl& link) {
+  const auto present = [this](std::uint16_t handle) {
+    return std::find(enabled_.begin(), enabled_.end(), handle) != enabled_.end();
+  };
+  std::string list;
+  for (const std::uint16_t handle : enabled_) list += fmt::format("{}{:02X}", list.empty() ? "" : ", ", handle);
+  if (settings_.sensor.definition.empty() && !settings_.sensor.handle) {
+    if (enabled_.size() != 1) {
+      link.fail(enabled_.empty() ? std::string("the tracker knows no tool: name a tool definition or plug one in")
+                                 : fmt::format("several tools ({}): say which one is the sensor", list));
+      return false;
+    }
+    sensor_handle_ = enabled_.front();
+  }
+  if (!present(sensor_handle_)) {
+    link.fail(fmt::format("no such tool: port handle {:02X}; there are: {}", sensor_handle_, list));
+    return false;
+  }
+  if (settings_.reference && !present(reference_handle_)) {
+    link.fail(fmt::format("no such reference tool: port handle {:02X}; there are: {}", reference_handle_, list));
+    return false;
+  }
+  return true;
+}
+
+void NdiSession::ask(LinkControl& link, Instant now) {
+  asked_ = now;
+  switch (query_) {
+    case Query::kBx2:
+      return command(link, "BX2:--6d=tools", kStreamReplyTime, now);
+    case Query::kBx:
+      return command(link, "BX:0801", kStreamReplyTime, now);
+    case Query::kTx:
+      return command(link, "TX:0801", kStreamReplyTime, now);
+  }
+}
+
+void NdiSession::on_tracking(LinkControl& link, const Expected<NdiTracking>& tracking, Instant arrival) {
+  if (!tracking) return on_damage(link, arrival);
+  answered_ = true;
+  retries_ = 0;
+  if ((tracking->system_status & kHardwareFailure) != 0) return link.fail("the tracker reports a hardware failure");
+  // In a BX2 reply the frames come one after the other, each with its tools.
+  for (const NdiToolReading& sensor : tracking->tools) {
+    if (sensor.handle != sensor_handle_) continue;
+    ToolReading reference;
+    for (const NdiToolReading& tool : tracking->tools) {
+      if (settings_.reference && tool.handle == reference_handle_ && tool.frame == sensor.frame)
+        reference = tool.reading;
+    }
+    deliver(sensor, reference, arrival);
+  }
+  // Five questions a frame: a frame is seen at most a fifth of its period after it is there.
+  due_ = std::max(arrival, asked_ + from_seconds(0.2 / settings_.frame_rate_hz));
+  command_.clear();
+}
+
+void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& reference, Instant arrival) {
+  TrackerSample sample;
+  sample.arrival = arrival;
+  if (sensor.reading.state == ToolState::kDisabled && sensor.frame == 0) {
+    // It has no frame and so no instant; it is told once, then again when it changes.
+    if (last_frame_ == 0U) return;
+    last_frame_ = 0U;
+    sample.source_time = arrival;
+  } else {
+    if (last_frame_ == sensor.frame) return;  // asked before the next frame was there
+    const std::uint32_t step = last_frame_ && *last_frame_ != 0 ? sensor.frame - *last_frame_ : 0;
+    constexpr std::uint32_t kBackwards = 0x80000000U;
+    if (step > 0 && step < kBackwards) {
+      stride_ = stride_ == 0 ? step : std::min(stride_, step);
+      health_.lost.add(step / stride_ - 1);
+    }
+    last_frame_ = sensor.frame;
+    clock_.observe(sensor.frame, arrival);
+    health_.jitter.add(clock_.lateness(sensor.frame, arrival));
+    sample.source_time = clock_.stamp(sensor.frame);
+  }
+  sample.device_frame = sensor.frame;
+  const ToolReading reading = in_world(sensor.reading, reference, settings_.world);
+  sample.state = reading.state;
+  sample.X_WS = reading.X_TO;
+  last_reading_ = arrival;
+  health_.samples.add();
+  health_.set_state(DeviceState::kStreaming);
+  sink_(sample);
+}
+
+void NdiSession::on_time(LinkControl& link, Instant now) {
+  switch (step_) {
+    case Step::kReset:
+      // No answer to the break: it may not have got through (some adapters send none), so it is tried without.
+      return enter(link, Step::kInitialise, now);
+    case Step::kSettle:
+      return enter(link, Step::kVersion, now);
+    case Step::kStop:
+      return enter(link, Step::kInitialise, now);
+    case Step::kQuiet:
+      framer_.restart();
+      step_ = Step::kStream;
+      return ask(link, now);
+    case Step::kStream: {
+      if (now - last_reading_ >= kReopenAfter) {
+        return link.fail(command_.empty() ? std::string("no reading of the sensor's tool for 2 s")
+                                          : fmt::format("no answer to {} for 2 s", command_));
+      }
+      if (now - last_reading_ >= kSilentAfter && health_.state() == DeviceState::kStreaming) {
+        health_.set_state(DeviceState::kSilent);
+      }
+      framer_.restart();
+      return ask(link, now);
+    }
+    default:
+      link.fail(fmt::format("no answer to {}; is it an NDI tracker, switched on, and at this port?",
+                            command_.substr(0, command_.find(':') + 1)));
+  }
+}
+
+}  // namespace perimap

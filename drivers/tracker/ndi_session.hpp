@@ -1,0 +1,104 @@
+// An NDI tracker (Polaris, Vega, Aurora) by its Combined API: from the bare link to poses (guides as in ndi_reply.hpp).
+//
+// Start: serial break, INIT, COMM to 115200 baud (serial); TSTOP, INIT (TCP). Then ports that are to be freed are
+// freed, tool definitions uploaded (PHRQ, PVWR), ports initialised (PHSR 02, PINIT) and enabled (PHSR 03, PENA),
+// TSTART. Then BX2 is asked for again and again; where a device has no BX2, BX; where it has neither, TX.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/device/arrival_clock.hpp"
+#include "drivers/device/device_health.hpp"
+#include "drivers/device/device_protocol.hpp"
+#include "drivers/tracker/ndi_reply.hpp"
+#include "drivers/tracker/ndi_tracking.hpp"
+#include "drivers/tracker/tool_reading.hpp"
+
+namespace perimap {
+
+struct NdiTool {
+  std::vector<std::byte> definition;    // a .rom file, uploaded; empty for a tool that describes itself
+  std::optional<std::uint16_t> handle;  // without a definition: which port handle; none: the only one there is
+};
+
+struct NdiSettings {
+  static constexpr int kFirstBaud = 9600;
+
+  NdiTool sensor;
+  std::optional<NdiTool> reference;
+  WorldSettings world;
+  double frame_rate_hz = 60.0;  // of the device's frame numbers
+};
+
+class NdiSession final : public DeviceProtocol {
+ public:
+  NdiSession(NdiSettings settings, TrackerSink sink, DeviceHealth& health);
+
+  void on_open(LinkControl& link, Instant now) override;
+  void on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
+  void on_time(LinkControl& link, Instant now) override;
+  [[nodiscard]] Instant next_time() const noexcept override { return due_; }
+
+ private:
+  enum class Step : std::uint8_t {
+    kReset,  // break sent, RESET awaited
+    kStop,   // tracking may run from an earlier session
+    kInitialise,
+    kSetRate,  // COMM sent
+    kSettle,   // the line runs at another rate; the device needs a moment
+    kVersion,
+    kFindToFree,
+    kFree,
+    kRequestPort,
+    kUpload,
+    kFindToInitialise,
+    kInitialisePort,
+    kFindToEnable,
+    kEnablePort,
+    kStart,
+    kStream,
+    kQuiet,  // a damaged reply: what is still coming belongs to it
+  };
+  enum class Query : std::uint8_t { kBx2, kBx, kTx };
+
+  void enter(LinkControl& link, Step step, Instant now);
+  void command(LinkControl& link, const std::string& text, Duration longest, Instant now);
+  void on_reply(LinkControl& link, const NdiReply& reply, Instant arrival);
+  void on_text(LinkControl& link, const std::string& text, Instant arrival);
+  void on_damage(LinkControl& link, Instant now);
+  void on_error(LinkControl& link, const std::string& text, Instant now);
+  void next_port(LinkControl& link, Step step, Instant now);
+  void next_upload(LinkControl& link, Instant now);
+  bool choose_tools(LinkControl& link);
+  void ask(LinkControl& link, Instant now);
+  void on_tracking(LinkControl& link, const Expected<NdiTracking>& tracking, Instant arrival);
+  void deliver(const NdiToolReading& sensor, const ToolReading& reference, Instant arrival);
+
+  NdiSettings settings_;
+  TrackerSink sink_;
+  DeviceHealth& health_;
+  ArrivalClock clock_;
+  NdiReplyFramer framer_;
+  Step step_ = Step::kReset;
+  Instant due_ = kNever;            // of the reply, or of what comes next
+  std::string command_;             // the one under way, for messages
+  std::vector<std::string> ports_;  // handles that the step still has to see to
+  std::vector<std::uint16_t> enabled_;
+  std::size_t tool_ = 0;  // of uploads: 0 sensor, 1 reference
+  std::size_t block_ = 0;
+  bool port_requested_ = false;
+  std::uint16_t sensor_handle_ = 0;
+  std::uint16_t reference_handle_ = 0;
+  Query query_ = Query::kBx2;
+  bool answered_ = false;  // to this kind of query, at least once
+  Instant asked_{};
+  Instant last_reading_{};
+  std::optional<std::uint32_t> last_frame_;
+  std::uint32_t stride_ = 0;  // device frames from one reading to the next, the least seen
+  int retries_ = 0;
+};
+
+}  // namespace perimap
