@@ -33,6 +33,7 @@ build=(
 tests=(
   libgtest-dev libgmock-dev
   libopencv-calib3d-dev                      # the camera model is held against OpenCV
+  libopenigtlink-dev                         # the peer of the OpenIGTLink client
   nodejs=node npm=npm ca-certificates        # recordings are read back by the official npm packages
 )
 full=(
