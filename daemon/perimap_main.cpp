@@ -5,6 +5,7 @@
 
 #include "daemon/commands/check.hpp"
 #include "daemon/commands/ecg.hpp"
+#include "daemon/commands/emulate.hpp"
 #include "daemon/commands/experiment.hpp"
 #include "daemon/commands/replay.hpp"
 #include "daemon/commands/report.hpp"
@@ -29,6 +30,7 @@ int run(int argc, char** argv) {
   perimap::add_ecg_command(app, exit_code);
   perimap::add_experiment_command(app, exit_code);
   perimap::add_track_command(app, exit_code);
+  perimap::add_emulate_command(app, exit_code);
   perimap::add_check_command(app, exit_code);
   try {
     app.parse(argc, argv);

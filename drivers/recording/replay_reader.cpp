@@ -114,9 +114,14 @@ void shift(ReplayEvent& event, Duration offset) noexcept {
 }
 
 Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode) {
+  return open(path, mode, kSensorChannels);
+}
+
+Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode,
+                                          std::span<const std::string_view> channels) {
   auto reader = RecordingReader::open(path, mode);
   if (!reader) return tl::unexpected(reader.error());
-  if (auto selected = reader->select(kSensorChannels); !selected) return tl::unexpected(selected.error());
+  if (auto selected = reader->select(channels); !selected) return tl::unexpected(selected.error());
   return ReplayReader(std::move(*reader), path);
 }
 

@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -38,6 +40,9 @@ class ReplayReader {
  public:
   // Fails when the recording has no camera, tracker or ECG channel.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode);
+  // Of these of the sensors' channels alone; fails when one of them is not there.
+  [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode,
+                                                   std::span<const std::string_view> channels);
 
   // The next event; nullopt at the end. Channels other than the sensors' are passed over.
   [[nodiscard]] Expected<std::optional<ReplayEvent>> next();

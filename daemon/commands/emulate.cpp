@@ -1,0 +1,217 @@
+#include "daemon/commands/emulate.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/process/stop_signal.hpp"
+#include "drivers/emulator/can_ecg_emulator.hpp"
+#include "drivers/emulator/ecg_emulator.hpp"
+#include "drivers/emulator/emulator_server.hpp"
+#include "drivers/emulator/igtl_emulator.hpp"
+#include "drivers/emulator/ndi_emulator.hpp"
+#include "drivers/emulator/played_recording.hpp"
+#include "drivers/transport/endpoint.hpp"
+
+namespace perimap {
+namespace {
+
+using NdiNewest = NdiEmulatorSettings::Newest;
+using IgtlKind = IgtlEmulatorSettings::Message;
+
+const std::map<std::string, std::string> kUsualPlaces{
+    {"ndi", "tcp:127.0.0.1:8765"},         {"igtl", "tcp:127.0.0.1:18944"}, {"medlab", "/tmp/perimap-medlab"},
+    {"bitalino", "/tmp/perimap-bitalino"}, {"cyton", "/tmp/perimap-cyton"}, {"can-ecg", "can:vcan0"}};
+
+struct Options {
+  std::vector<std::string> devices;  // NAME or NAME=WHERE
+  std::string recording;
+  std::string ecg_record = "100";
+  std::optional<double> start_s;
+  std::vector<double> missing_s;
+  std::vector<double> unplug_s;
+  EmulatorFaults faults;
+  NdiEmulatorSettings ndi{.wired_tools = 1};
+  IgtlEmulatorSettings igtl;
+  CanEcgSettings can;
+};
+
+struct Device {
+  std::string name;
+  Endpoint where;
+};
+
+int complain(const Error& error, int exit_code) {
+  fmt::print(stderr, "perimap emulate: {}\n", error.message);
+  return exit_code;
+}
+
+Expected<Device> parse_device(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const std::string name = text.substr(0, equals);
+  const auto usual = kUsualPlaces.find(name);
+  if (usual == kUsualPlaces.end()) {
+    return fail(fmt::format("device '{}': expected ndi, igtl, medlab, bitalino, cyton or can-ecg, then =WHERE", name));
+  }
+  auto where = parse_endpoint(equals == std::string::npos ? usual->second : text.substr(equals + 1));
+  if (!where) return fail(fmt::format("device '{}': {}", name, where.error().message));
+  if (std::holds_alternative<CanEndpoint>(*where) != (name == "can-ecg")) {
+    return fail(fmt::format("device '{}': cannot be at {}", name, format_endpoint(*where)));
+  }
+  return Device{name, std::move(*where)};
+}
+
+// Where the data of the emulated devices comes from.
+struct Theatre {
+  std::optional<PlayedRecording> recording;
+  Instant start;
+  const Options& options;
+
+  [[nodiscard]] PoseTrack poses() const {
+    constexpr double kRate_hz = 60.0;
+    return recording ? recording->poses(start) : PoseTrack::swaying(start, kRate_hz);
+  }
+  [[nodiscard]] Expected<EcgWaveform> ecg() const {
+    if (recording) return recording->ecg(start);
+    return EcgWaveform::of_record(options.ecg_record, start);
+  }
+};
+
+Expected<std::unique_ptr<DeviceProtocol>> make(const Device& device, const Theatre& theatre) {
+  const Options& o = theatre.options;
+  if (device.name == "ndi") return std::make_unique<NdiEmulator>(theatre.poses(), o.ndi, o.faults);
+  if (device.name == "igtl") return std::make_unique<IgtlEmulator>(theatre.poses(), o.igtl, o.faults);
+  auto ecg = theatre.ecg();
+  if (!ecg) return tl::unexpected(std::move(ecg.error()));
+  if (device.name == "medlab") return emulate_medlab(std::move(*ecg), o.faults);
+  if (device.name == "bitalino") return emulate_bitalino(std::move(*ecg), o.faults);
+  return emulate_cyton(std::move(*ecg), o.faults);
+}
+
+Expected<void> serve(const Device& device, const Theatre& theatre, const Interrupt& interrupt) {
+  const auto ready = [&device](const std::string& where) {
+    fmt::print("{} at {}\n", device.name, where);
+    (void)std::fflush(stdout);
+  };
+  if (const auto* can = std::get_if<CanEndpoint>(&device.where)) {
+    const auto ecg = theatre.ecg();
+    if (!ecg) return tl::unexpected(ecg.error());
+    ready(format_endpoint(device.where));
+    return emulate_can_ecg(can->interface_name, *ecg, theatre.options.can, theatre.options.faults, interrupt);
+  }
+  const auto protocol = make(device, theatre);
+  if (!protocol) return tl::unexpected(protocol.error());
+  if (const auto* tcp = std::get_if<TcpEndpoint>(&device.where)) {
+    return emulate_on_tcp(tcp->port, **protocol, theatre.options.faults, ready, interrupt);
+  }
+  return emulate_on_terminal(std::get<SerialEndpoint>(device.where).path, **protocol, theatre.options.faults, ready,
+                             interrupt);
+}
+
+int run(Options& options) {
+  std::vector<Device> devices;
+  for (const std::string& text : options.devices) {
+    auto device = parse_device(text);
+    if (!device) return complain(device.error(), 2);
+    devices.push_back(std::move(*device));
+  }
+  const auto spans = [](const std::vector<double>& given, Duration& every, Duration& lasting) {
+    if (given.size() != 2) return;
+    every = from_seconds(given[0]);
+    lasting = from_seconds(given[1]);
+  };
+  spans(options.missing_s, options.faults.missing_every, options.faults.missing_for);
+  spans(options.unplug_s, options.faults.unplug_every, options.faults.unplug_for);
+
+  auto stop = StopSignal::install();
+  if (!stop) return complain(stop.error(), 1);
+  Theatre theatre{std::nullopt, MonotonicClock::now(), options};
+  if (!options.recording.empty()) {
+    auto recording = PlayedRecording::read(options.recording);
+    if (!recording) return complain(recording.error(), 1);
+    theatre.recording = std::move(*recording);
+    theatre.start = MonotonicClock::now();
+  }
+  if (options.start_s) theatre.start = Instant(from_seconds(*options.start_s));
+
+  Interrupt interrupt;
+  std::atomic<bool> failed{false};
+  std::mutex messages;
+  std::vector<std::jthread> threads;
+  for (const Device& device : devices) {
+    threads.emplace_back([&, device] {
+      const auto served = serve(device, theatre, interrupt);
+      if (served) return;
+      const std::lock_guard lock(messages);
+      (void)complain({fmt::format("{}: {}", device.name, served.error().message)}, 1);
+      failed = true;
+    });
+  }
+  constexpr Duration kTick = std::chrono::milliseconds(100);
+  while (!failed && !stop->wait_for(kTick)) {
+  }
+  interrupt.request();
+  threads.clear();
+  return failed ? 1 : 0;
+}
+
+}  // namespace
+
+void add_emulate_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "emulate", "Stand in for devices: the real protocols on pseudo-terminals, TCP ports and CAN, until stopped");
+  command
+      ->add_option("DEVICE", options->devices,
+                   "ndi, igtl (trackers), medlab, bitalino, cyton, can-ecg; NAME=WHERE puts one elsewhere than at its "
+                   "usual place: a link to a pseudo-terminal (absolute path), tcp:127.0.0.1:PORT or can:INTERFACE")
+      ->required();
+  command->add_option("--recording", options->recording, "Play this recording, once [a simulated heart and scope]");
+  command->add_option("--start", options->start_s,
+                      "When the recording begins, s on CLOCK_MONOTONIC, so that several play in step [now]");
+  command->add_option("--ecg", options->ecg_record, "MIT-BIH record of the simulated heart")->capture_default_str();
+  EmulatorFaults& faults = options->faults;
+  const auto probability = CLI::Range(0.0, 1.0);
+  command->add_option("--bad-check", faults.bad_check, "Part of the messages with a wrong check sum")
+      ->check(probability);
+  command->add_option("--garbled", faults.garbled, "Part of the messages with a wrong byte")->check(probability);
+  command->add_option("--truncated", faults.truncated, "Part of the messages without their end")->check(probability);
+  command->add_option("--lost", faults.lost, "Part of the messages that are left out")->check(probability);
+  command->add_option("--drift", faults.drift_ppm, "How much the device's clock runs fast, ppm")
+      ->check(CLI::Range(-5000.0, 5000.0));
+  const auto seconds = CLI::Range(0.01, 86400.0);
+  command->add_option("--missing", options->missing_s, "EVERY FOR, s: the tool is out of sight, the lead is off")
+      ->expected(2)
+      ->check(seconds);
+  command->add_option("--unplug", options->unplug_s, "EVERY FOR, s: the device is unplugged")
+      ->expected(2)
+      ->check(seconds);
+  command->add_option("--seed", faults.seed, "Of the faults' dice")->capture_default_str();
+  const std::map<std::string, NdiNewest> newest{
+      {"bx2", NdiNewest::kBx2}, {"bx", NdiNewest::kBx}, {"tx", NdiNewest::kTx}};
+  command->add_option("--ndi-newest", options->ndi.newest, "Newest query that the NDI tracker knows: bx2, bx, tx [bx2]")
+      ->transform(CLI::Transformer(newest));
+  command->add_option("--ndi-tools", options->ndi.wired_tools, "Tools in its ports; 0: all are uploaded")
+      ->check(CLI::Range(0, 8))
+      ->capture_default_str();
+  const std::map<std::string, IgtlKind> kinds{
+      {"transform", IgtlKind::kTransform}, {"tdata", IgtlKind::kTdata}, {"position", IgtlKind::kPosition}};
+  command->add_option("--igtl-message", options->igtl.message, "transform, tdata or position [transform]")
+      ->transform(CLI::Transformer(kinds));
+  command->add_option("--igtl-version", options->igtl.version, "OpenIGTLink header version")
+      ->check(CLI::Range(1U, 2U))
+      ->capture_default_str();
+  command->add_option("--igtl-tool", options->igtl.tool, "Name of the tool")->capture_default_str();
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace perimap
