@@ -13,7 +13,10 @@
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/dds_publication.hpp"
+#include "daemon/runtime/device_feeder.hpp"
+#include "daemon/runtime/device_setup.hpp"
 #include "daemon/runtime/live_session.hpp"
+#include "daemon/runtime/replay_feeder.hpp"
 #include "daemon/runtime/replay_setup.hpp"
 
 namespace perimap {
@@ -28,50 +31,66 @@ int refuse(const Error& error, int code) {
   return code;
 }
 
-int run(const std::string& configuration_file) {
-  auto stop = StopSignal::install();
-  if (!stop) return refuse(stop.error(), kFailure);
-  const auto given = load_configuration(configuration_file);
-  if (!given) return refuse(given.error(), kWrongConfiguration);
-  if (!given->replay.recording) {
-    return refuse(
-        {fmt::format("{}: key 'replay.recording': expected the recording to replay, got nothing", configuration_file)},
-        kWrongConfiguration);
-  }
-  auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
-  if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
-  const Configuration& configuration = setup->configuration;
-
+// A session over whatever `make_feeder` gives for the pipeline's entrance and the priority of its sources.
+template <class MakeFeeder>
+int run_session(const std::string& configuration_file, const Configuration& configuration,
+                const PipelineSettings& settings, const Identity& identity, StopSignal& stop,
+                const MakeFeeder& make_feeder) {
   const Logging logging(configuration.log.level);
-  std::unique_ptr<DdsPublication> publication;
-  if (configuration.dds.enabled) {
-    auto dds = DdsPublication::create(
-        {configuration.dds.domain, configuration.dds.surface_deadline, configuration.dds.surface_lifespan});
-    if (!dds) return refuse(dds.error(), kFailure);
-    publication = std::move(*dds);
-  } else {
+  if (!configuration.dds.enabled) {
     return refuse(
         {fmt::format("{}: key 'dds.enabled': expected true, since nothing else publishes", configuration_file)},
         kWrongConfiguration);
   }
+  auto publication = DdsPublication::create(
+      {configuration.dds.domain, configuration.dds.surface_deadline, configuration.dds.surface_lifespan});
+  if (!publication) return refuse(publication.error(), kFailure);
 
-  Pipeline pipeline(setup->pipeline);
-  LiveSession session(pipeline, runtime_settings(configuration, setup->identity), *publication,
-                      std::move(setup->reader));
+  Pipeline pipeline(settings);
+  const RuntimeSettings runtime = runtime_settings(configuration, identity);
+  LiveSession session(pipeline, runtime, **publication, make_feeder(pipeline.entrance(), source_priority(runtime)));
   spdlog::info("perimapd {}: publishing '{}' on DDS domain {}, latency {} ms, {} workers", PERIMAP_VERSION,
                configuration.source.name, configuration.dds.domain,
                std::chrono::duration_cast<std::chrono::milliseconds>(configuration.pipeline.latency).count(),
                configuration.pipeline.workers);
-  const Expected<void> ended = session.run(*stop);
+  const Expected<void> ended = session.run(stop);
   const PipelineCounters& counters = pipeline.counters();
-  spdlog::info("{}: {} frames, {} surfaces, {} features converged", stop->requested() ? "stopped" : "recording ended",
+  spdlog::info("{}: {} frames, {} surfaces, {} features converged", stop.requested() ? "stopped" : "recording ended",
                counters.frames.get(), counters.samples.get(), counters.features_converged.get());
-  if (publication->failures() > 0) spdlog::error("{} DDS writes failed", publication->failures());
+  if ((*publication)->failures() > 0) spdlog::error("{} DDS writes failed", (*publication)->failures());
   if (!ended) {
     spdlog::error("{}", ended.error().message);
     return kFailure;
   }
   return kOk;
+}
+
+int run(const std::string& configuration_file) {
+  auto stop = StopSignal::install();
+  if (!stop) return refuse(stop.error(), kFailure);
+  const auto given = load_configuration(configuration_file);
+  if (!given) return refuse(given.error(), kWrongConfiguration);
+  if (!given->replay.recording && names_devices(*given)) {
+    auto setup = prepare_devices(configuration_file, *given);
+    if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
+    return run_session(configuration_file, setup->configuration, setup->pipeline, setup->identity, *stop,
+                       [&setup](SensorEntrance& entrance, int priority) {
+                         return std::make_unique<DeviceFeeder>(std::move(setup->tracker), std::move(setup->ecg),
+                                                               std::move(setup->camera), entrance, priority);
+                       });
+  }
+  if (!given->replay.recording) {
+    return refuse({fmt::format("{}: key 'replay.recording': expected the recording to replay, or devices in [camera], "
+                               "[tracker] and [ecg], got nothing",
+                               configuration_file)},
+                  kWrongConfiguration);
+  }
+  auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
+  if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
+  return run_session(configuration_file, setup->configuration, setup->pipeline, setup->identity, *stop,
+                     [&setup](SensorEntrance& entrance, int priority) {
+                       return std::make_unique<ReplayFeeder>(std::move(setup->reader), entrance, priority);
+                     });
 }
 
 int parse_and_run(int argc, char** argv) {

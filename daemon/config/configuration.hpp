@@ -27,20 +27,47 @@ struct ReplayConfiguration {
 
 struct CameraConfiguration {
   std::optional<std::filesystem::path> calibration;  // none: the recording's own attachment
+  std::optional<std::filesystem::path> playback;     // a recording whose frames stand in for a camera
+  double playback_start_s = 0.0;                     // CLOCK_MONOTONIC; 0: when the daemon starts
 
   bool operator==(const CameraConfiguration&) const = default;
 };
 
 struct TrackerConfiguration {
-  double position_deviation_mm = 0.0;   // RMS of the 3-D norm
-  double rotation_deviation_rad = 0.0;  // RMS of the 3-D norm
-  Duration error_correlation{0};        // in which the error falls to 1/e; 0: white
-  Duration time_offset{0};              // added to the tracker's stamps to get the camera's time
+  enum class Protocol { kNone, kNdi, kIgtl };
+
+  Protocol protocol = Protocol::kNone;
+  std::optional<std::string> port;                            // as parse_endpoint() takes it
+  std::optional<std::string> sensor;                          // NDI: port handle; OpenIGTLink: name
+  std::optional<std::string> reference;                       // likewise
+  std::optional<std::filesystem::path> sensor_definition;     // NDI, uploaded
+  std::optional<std::filesystem::path> reference_definition;  // NDI, uploaded
+  double frame_rate_hz = 60.0;                                // of NDI's frame numbers
+  double translation_IW_mm[3] = {0.0, 0.0, 0.0};              // registration X_IW
+  double rotation_IW_wxyz[4] = {1.0, 0.0, 0.0, 0.0};          // registration X_IW, unit quaternion
+  double position_deviation_mm = 0.0;                         // RMS of the 3-D norm
+  double rotation_deviation_rad = 0.0;                        // RMS of the 3-D norm
+  Duration error_correlation{0};                              // in which the error falls to 1/e; 0: white
+  Duration time_offset{0};                                    // added to the tracker's stamps to get the camera's time
   Duration maximum_extrapolation = std::chrono::milliseconds(20);
   double translation_SC_mm[3] = {0.0, 0.0, 0.0};      // hand-eye X_SC
   double rotation_SC_wxyz[4] = {1.0, 0.0, 0.0, 0.0};  // hand-eye X_SC, unit quaternion
 
   bool operator==(const TrackerConfiguration&) const = default;
+};
+
+struct EcgConfiguration {
+  enum class Protocol { kNone, kMedlab, kBitalino, kCyton, kCan };
+
+  Protocol protocol = Protocol::kNone;
+  std::optional<std::string> port;  // as parse_endpoint() takes it
+  int channel = 0;                  // of BITalino and Cyton; 0: the protocol's usual one
+  double mV_per_count = 0.0;        // of Medlab and CAN; 0: the protocol's usual scale
+  double can_sample_rate_hz = 360.0;
+  int can_identifier = 0x2E0;
+  bool can_extended = false;
+
+  bool operator==(const EcgConfiguration&) const = default;
 };
 
 struct PhaseConfiguration {
@@ -131,6 +158,7 @@ struct Configuration {
   ReplayConfiguration replay;
   CameraConfiguration camera;
   TrackerConfiguration tracker;
+  EcgConfiguration ecg;
   PhaseConfiguration phase;
   RespirationConfiguration respiration;
   PipelineConfiguration pipeline;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -9,6 +10,8 @@
 #include <numbers>
 #include <string_view>
 #include <utility>
+
+#include "drivers/transport/endpoint.hpp"
 
 namespace perimap {
 namespace {
@@ -156,6 +159,65 @@ class Section {
         });
   }
 
+  // A text that may be left open. `valid` says whether it is one of those expected.
+  template <class Member>
+  Section& optional_text(const std::string& name, const std::string& expected, bool (*valid)(const std::string&),
+                         Member member, const std::string& meaning) {
+    return add(
+        name, meaning, expected,
+        [member, valid](const ConfigurationValue& value, Configuration& configuration) {
+          const auto* text = std::get_if<std::string>(&value);
+          const bool good = text != nullptr && valid(*text);
+          if (good) {
+            member(configuration) = *text;
+          }
+          return good;
+        },
+        [member](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          const std::optional<std::string>& text = member(configuration);
+          return text ? std::optional<ConfigurationValue>(*text) : std::nullopt;
+        });
+  }
+
+  // A pose in two keys, PREFIX_translation_FRAMES_mm and PREFIX_rotation_FRAMES_wxyz.
+  template <class Translation, class Rotation>
+  Section& pose(const std::string& prefix, const std::string& frames, Translation translation, Rotation rotation,
+                const std::string& place, const std::string& orientation) {
+    numbers(
+        prefix + "_translation_" + frames + "_mm", "three numbers from -10000 to 10000",
+        [translation](const std::vector<double>& v, Configuration& configuration) {
+          bool good = v.size() == 3;
+          for (std::size_t i = 0; good && i < 3; ++i) {
+            good = within(v[i], -10000, 10000);
+          }
+          for (std::size_t i = 0; good && i < 3; ++i) {
+            translation(configuration)[i] = v[i];
+          }
+          return good;
+        },
+        [translation](const Configuration& configuration) {
+          const auto& t = translation(configuration);
+          return std::vector<double>{t[0], t[1], t[2]};
+        },
+        place);
+    return numbers(
+        prefix + "_rotation_" + frames + "_wxyz", "four numbers of norm 1 within 1e-3",
+        [rotation](const std::vector<double>& v, Configuration& configuration) {
+          if (v.size() != 4 || !within(std::hypot(std::hypot(v[0], v[1]), std::hypot(v[2], v[3])), 0.999, 1.001)) {
+            return false;
+          }
+          for (std::size_t i = 0; i < 4; ++i) {
+            rotation(configuration)[i] = v[i];
+          }
+          return true;
+        },
+        [rotation](const Configuration& configuration) {
+          const auto& q = rotation(configuration);
+          return std::vector<double>{q[0], q[1], q[2], q[3]};
+        },
+        orientation);
+  }
+
   template <class Member>
   Section& file(const std::string& name, Member member, const std::string& meaning) {
     add(
@@ -252,8 +314,6 @@ void add_version(std::vector<ConfigurationKey>& keys) {
 }
 
 void add_sources(std::vector<ConfigurationKey>& keys) {
-  const auto ms = std::chrono::milliseconds(1);
-  const auto s = std::chrono::seconds(1);
   Section("source", keys)
       .text("name", 63, PERIMAP_MEMBER(source.name), "key `source` of every published sample")
       .text("world_frame", 63, PERIMAP_MEMBER(source.world_frame), "name of the frame W, published as frame_id");
@@ -261,8 +321,44 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
       .file("recording", PERIMAP_MEMBER(replay.recording), "the recording to replay, from this file's folder");
   Section("camera", keys)
       .file("calibration", PERIMAP_MEMBER(camera.calibration),
-            "calibration as OpenCV writes it, from this file's folder; none: the recording's own");
+            "calibration as OpenCV writes it, from this file's folder; none: the recording's own")
+      .file("playback", PERIMAP_MEMBER(camera.playback), "a recording whose frames stand in for a camera")
+      .number("playback_start_s", 0, 1e9, PERIMAP_MEMBER(camera.playback_start_s),
+              "when that recording begins, CLOCK_MONOTONIC; 0: when perimapd starts");
+}
+
+// Where a device is, as a text; none: nowhere.
+constexpr std::string_view kPort = "an absolute path of a serial port, \"tcp:HOST:PORT\" or \"can:INTERFACE\"";
+bool is_endpoint(const std::string& text) { return parse_endpoint(text).has_value(); }
+
+bool is_tool_name(const std::string& text) {
+  constexpr std::size_t kLongest = 20;  // of OpenIGTLink's names
+  return !text.empty() && text.size() <= kLongest &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c < 0x7F; });
+}
+
+void add_tracker(std::vector<ConfigurationKey>& keys) {
+  const auto ms = std::chrono::milliseconds(1);
+  const auto s = std::chrono::seconds(1);
+  const std::string tool = "a text of 1 to 20 printable characters";
+  using Protocol = TrackerConfiguration::Protocol;
+  const std::array<std::pair<std::string_view, Protocol>, 3> protocols{
+      {{"none", Protocol::kNone}, {"ndi", Protocol::kNdi}, {"igtl", Protocol::kIgtl}}};
   Section("tracker", keys)
+      .choice("protocol", protocols, PERIMAP_MEMBER(tracker.protocol), "what the tracker speaks")
+      .optional_text("port", std::string(kPort), &is_endpoint, PERIMAP_MEMBER(tracker.port), "where the tracker is")
+      .optional_text("sensor", tool, &is_tool_name, PERIMAP_MEMBER(tracker.sensor),
+                     "the sensor's port handle (ndi, hexadecimal) or name (igtl); none: the only one there is")
+      .optional_text("reference", tool, &is_tool_name, PERIMAP_MEMBER(tracker.reference),
+                     "the patient's reference tool, likewise; W is its frame; none: W is the tracker's")
+      .file("sensor_definition", PERIMAP_MEMBER(tracker.sensor_definition),
+            "the sensor's tool definition (.rom), uploaded to an ndi tracker")
+      .file("reference_definition", PERIMAP_MEMBER(tracker.reference_definition),
+            "the reference's tool definition, likewise")
+      .number("frame_rate_hz", 1, 1000, PERIMAP_MEMBER(tracker.frame_rate_hz), "of the ndi tracker's frame numbers")
+      .pose("registration", "IW", PERIMAP_MEMBER(tracker.translation_IW_mm), PERIMAP_MEMBER(tracker.rotation_IW_wxyz),
+            "registration X_IW: the place of W in the frame I, which is then published as source.world_frame",
+            "registration X_IW: the orientation of W in the frame I")
       .number("position_deviation_mm", 0, 100, PERIMAP_MEMBER(tracker.position_deviation_mm),
               "position noise of the tracker, RMS of the 3-D norm")
       .angle("rotation_deviation_deg", 0, 45, PERIMAP_MEMBER(tracker.rotation_deviation_rad),
@@ -273,39 +369,29 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
                 "added to the tracker's stamps to get the camera's time")
       .duration("maximum_extrapolation_ms", ms, 0, 1000, PERIMAP_MEMBER(tracker.maximum_extrapolation),
                 "a pose is extrapolated at most this far; beyond, a frame gives no measurement")
-      .numbers(
-          "hand_eye_translation_SC_mm", "three numbers from -10000 to 10000",
-          [](const std::vector<double>& v, Configuration& configuration) {
-            bool good = v.size() == 3;
-            for (std::size_t i = 0; good && i < 3; ++i) {
-              good = within(v[i], -10000, 10000);
-            }
-            for (std::size_t i = 0; good && i < 3; ++i) {
-              configuration.tracker.translation_SC_mm[i] = v[i];
-            }
-            return good;
-          },
-          [](const Configuration& configuration) {
-            const auto& t = configuration.tracker.translation_SC_mm;
-            return std::vector<double>{t[0], t[1], t[2]};
-          },
-          "hand-eye X_SC: the camera's place in the sensor's frame")
-      .numbers(
-          "hand_eye_rotation_SC_wxyz", "four numbers of norm 1 within 1e-3",
-          [](const std::vector<double>& v, Configuration& configuration) {
-            if (v.size() != 4 || !within(std::hypot(std::hypot(v[0], v[1]), std::hypot(v[2], v[3])), 0.999, 1.001)) {
-              return false;
-            }
-            for (std::size_t i = 0; i < 4; ++i) {
-              configuration.tracker.rotation_SC_wxyz[i] = v[i];
-            }
-            return true;
-          },
-          [](const Configuration& configuration) {
-            const auto& q = configuration.tracker.rotation_SC_wxyz;
-            return std::vector<double>{q[0], q[1], q[2], q[3]};
-          },
-          "hand-eye X_SC: the camera's orientation in the sensor's frame");
+      .pose("hand_eye", "SC", PERIMAP_MEMBER(tracker.translation_SC_mm), PERIMAP_MEMBER(tracker.rotation_SC_wxyz),
+            "hand-eye X_SC: the camera's place in the sensor's frame",
+            "hand-eye X_SC: the camera's orientation in the sensor's frame");
+}
+
+void add_ecg(std::vector<ConfigurationKey>& keys) {
+  using Protocol = EcgConfiguration::Protocol;
+  const std::array<std::pair<std::string_view, Protocol>, 5> protocols{{{"none", Protocol::kNone},
+                                                                        {"medlab", Protocol::kMedlab},
+                                                                        {"bitalino", Protocol::kBitalino},
+                                                                        {"cyton", Protocol::kCyton},
+                                                                        {"can", Protocol::kCan}}};
+  Section("ecg", keys)
+      .choice("protocol", protocols, PERIMAP_MEMBER(ecg.protocol), "what the ECG device speaks")
+      .optional_text("port", std::string(kPort), &is_endpoint, PERIMAP_MEMBER(ecg.port), "where the ECG device is")
+      .integer("channel", 0, 8, PERIMAP_MEMBER(ecg.channel),
+               "input of a bitalino (1 to 4) or cyton (1 to 8) that carries the ECG; 0: the usual one, 2 and 1")
+      .number("mV_per_count", 0, 1000, PERIMAP_MEMBER(ecg.mV_per_count),
+              "scale of medlab and can; 0: the usual one, 0.02 and 0.005")
+      .number("can_sample_rate_hz", 50, 4000, PERIMAP_MEMBER(ecg.can_sample_rate_hz), "samples a second over can")
+      .integer("can_identifier", 0, 0x1FFFFFFF, PERIMAP_MEMBER(ecg.can_identifier),
+               "identifier of the frames of config/perimap_ecg.dbc")
+      .flag("can_extended", PERIMAP_MEMBER(ecg.can_extended), "the identifier has 29 bits");
 }
 
 void add_estimation(std::vector<ConfigurationKey>& keys) {
@@ -434,6 +520,8 @@ std::span<const ConfigurationKey> configuration_keys() {
     std::vector<ConfigurationKey> all;
     add_version(all);
     add_sources(all);
+    add_tracker(all);
+    add_ecg(all);
     add_estimation(all);
     add_running(all);
     return all;

@@ -27,6 +27,11 @@ struct RuntimeSettings {
   Duration stalled_after = std::chrono::milliseconds(500);
 };
 
+// Of the threads that push into the entrance: one below the publisher's.
+[[nodiscard]] inline int source_priority(const RuntimeSettings& settings) noexcept {
+  return settings.priority > 1 ? settings.priority - 1 : settings.priority;
+}
+
 // Threads: mapper, workers, publisher (real-time when permitted), finder, starter, status. Sources are threads of their
 // owner's and push into pipeline.entrance().
 class LiveRuntime {

@@ -5,6 +5,8 @@
 #include <chrono>
 #include <utility>
 
+#include "daemon/runtime/replay_feeder.hpp"
+
 namespace perimap {
 namespace {
 
@@ -17,34 +19,40 @@ double milliseconds(Duration d) { return std::chrono::duration<double, std::mill
 
 LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication,
                          ReplayReader reader, std::function<void()> on_tick)
+    : LiveSession(pipeline, settings, publication,
+                  std::make_unique<ReplayFeeder>(std::move(reader), pipeline.entrance(), source_priority(settings)),
+                  std::move(on_tick)) {}
+
+LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication,
+                         std::unique_ptr<SensorFeeder> feeder, std::function<void()> on_tick)
     : pipeline_(pipeline),
       runtime_(pipeline, settings, publication),
-      feeder_(std::move(reader), pipeline.entrance(),
-              settings.priority > 1 ? settings.priority - 1 : settings.priority),
+      feeder_(std::move(feeder)),
       on_tick_(std::move(on_tick)) {}
 
 Expected<void> LiveSession::run(StopSignal& stop) {
   runtime_.start();
-  feeder_.start();
+  feeder_->start();
   bool told_end = false;
   while (!stop.wait_for(kTick)) {
     if (on_tick_) on_tick_();
+    feeder_->tick();
     warn_of_refused_privileges();
     warn_of_short_latency();
-    if (!told_end && feeder_.ended()) {
+    if (!told_end && feeder_->ended()) {
       runtime_.end_of_sources();
       told_end = true;
     }
     if (told_end && runtime_.all_released()) break;
   }
-  feeder_.stop();
+  feeder_->stop();
   runtime_.stop();
   if (const auto failed = pipeline_.counters().searches_failed.get(); failed > 0) {
     spdlog::warn("{} searches for new features failed", failed);
   }
-  if (!feeder_.ended()) return {};
-  for (const Error& damage : feeder_.damage()) spdlog::warn("{}", damage.message);
-  if (feeder_.error()) return tl::unexpected(*feeder_.error());
+  if (!feeder_->ended()) return {};
+  for (const Error& damage : feeder_->damage()) spdlog::warn("{}", damage.message);
+  if (feeder_->error()) return tl::unexpected(*feeder_->error());
   return {};
 }
 

@@ -16,8 +16,8 @@ constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
 
 }  // namespace
 
-ReplayFeeder::ReplayFeeder(ReplayReader reader, SensorEntrance& entrance, int priority)
-    : reader_(std::move(reader)), entrance_(entrance), priority_(priority) {}
+ReplayFeeder::ReplayFeeder(ReplayReader reader, SensorEntrance& entrance, int priority, std::optional<Duration> offset)
+    : reader_(std::move(reader)), entrance_(entrance), priority_(priority), offset_(offset) {}
 
 void ReplayFeeder::start() {
   reading_ = std::thread([this] {
@@ -68,7 +68,7 @@ std::optional<ReplayEvent> ReplayFeeder::take() {
 }
 
 void ReplayFeeder::deliver() {
-  std::optional<Duration> offset;
+  std::optional<Duration> offset = offset_;
   while (auto event = take()) {
     if (!offset) offset = MonotonicClock::now() + kLead - arrival_of(*event);
     shift(*event, *offset);

@@ -10,28 +10,30 @@
 
 #include "core/error/expected.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "daemon/runtime/sensor_feeder.hpp"
 #include "drivers/recording/replay_reader.hpp"
 
 namespace perimap {
 
 // One thread reads ahead from the disk, one sleeps to each arrival and pushes. All instants are moved by one offset,
-// which brings the first arrival to shortly after start().
-class ReplayFeeder {
+// which brings the first arrival to shortly after start() when it is not given.
+class ReplayFeeder final : public SensorFeeder {
  public:
-  ReplayFeeder(ReplayReader reader, SensorEntrance& entrance, int priority);
+  ReplayFeeder(ReplayReader reader, SensorEntrance& entrance, int priority,
+               std::optional<Duration> offset = std::nullopt);
   ReplayFeeder(const ReplayFeeder&) = delete;
   ReplayFeeder& operator=(const ReplayFeeder&) = delete;
-  ~ReplayFeeder() { stop(); }
+  ~ReplayFeeder() override { stop(); }
 
-  void start();
-  void stop();
+  void start() override;
+  void stop() override;
 
   // All events are delivered, or reading failed.
-  [[nodiscard]] bool ended() const noexcept { return ended_.load(std::memory_order_acquire); }
+  [[nodiscard]] bool ended() const noexcept override { return ended_.load(std::memory_order_acquire); }
   // Why reading failed; to be asked after ended().
-  [[nodiscard]] const std::optional<Error>& error() const noexcept { return error_; }
+  [[nodiscard]] const std::optional<Error>& error() const noexcept override { return error_; }
   // What was damaged in the recording; to be asked after ended().
-  [[nodiscard]] std::vector<Error> damage() const { return reader_.damage(); }
+  [[nodiscard]] std::vector<Error> damage() const override { return reader_.damage(); }
 
  private:
   void read_ahead();
@@ -41,6 +43,7 @@ class ReplayFeeder {
   ReplayReader reader_;
   SensorEntrance& entrance_;
   int priority_;
+  std::optional<Duration> offset_;
   std::thread reading_;
   std::thread delivering_;
 

@@ -55,6 +55,8 @@ Expected<RecordingFacts> read_facts(const std::string& path, ReadMode mode) {
   return facts;
 }
 
+}  // namespace
+
 PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& camera) {
   PipelineSettings s;
   s.camera = camera;
@@ -97,17 +99,17 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   return s;
 }
 
-}  // namespace
-
-tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recording,
-                                                     const std::optional<std::filesystem::path>& configuration_file,
-                                                     ReadMode mode) {
+tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& recording,
+                                                       const std::optional<std::filesystem::path>& configuration_file,
+                                                       ReadMode mode) {
   const auto wrong_recording = [](Error error) { return tl::unexpected(SetupError{std::move(error), false}); };
   const auto wrong_configuration = [](Error error) { return tl::unexpected(SetupError{std::move(error), true}); };
 
   auto facts = read_facts(recording, mode);
   if (!facts) return wrong_recording(std::move(facts.error()));
-  Configuration configuration;
+  RecordedBasis basis;
+  basis.utc_minus_monotonic = facts->utc_minus_monotonic;
+  Configuration& configuration = basis.configuration;
   if (facts->world_frame) configuration.source.world_frame = *facts->world_frame;
   if (facts->configuration) {
     const std::string name = fmt::format("{}:{}", recording, attachments::kConfiguration);
@@ -132,13 +134,22 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
     return wrong_configuration(Error{fmt::format(
         "{}: no camera calibration is attached; expected key 'camera.calibration' to name one", recording)});
   }
+  basis.camera = *camera;
+  return basis;
+}
 
+tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recording,
+                                                     const std::optional<std::filesystem::path>& configuration_file,
+                                                     ReadMode mode) {
+  auto basis = recorded_basis(recording, configuration_file, mode);
+  if (!basis) return tl::unexpected(std::move(basis.error()));
   auto reader = ReplayReader::open(recording, mode);
-  if (!reader) return wrong_recording(std::move(reader.error()));
-  reader->require_frame_size(camera->width, camera->height);
-  const PipelineSettings pipeline = pipeline_settings(configuration, *camera);
-  const Identity identity{configuration.source.name, "frame", configuration.source.world_frame};
-  return ReplaySetup{std::move(configuration), pipeline, identity, facts->utc_minus_monotonic, std::move(*reader)};
+  if (!reader) return tl::unexpected(SetupError{std::move(reader.error()), false});
+  reader->require_frame_size(basis->camera.width, basis->camera.height);
+  const PipelineSettings pipeline = pipeline_settings(basis->configuration, basis->camera);
+  const Identity identity{basis->configuration.source.name, "frame", basis->configuration.source.world_frame};
+  return ReplaySetup{std::move(basis->configuration), pipeline, identity, basis->utc_minus_monotonic,
+                     std::move(*reader)};
 }
 
 RuntimeSettings runtime_settings(const Configuration& configuration, const Identity& identity) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/error/expected.hpp"
+#include "core/geometry/camera_model.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "daemon/config/configuration.hpp"
 #include "daemon/publishing/identity.hpp"
@@ -28,10 +29,20 @@ struct SetupError {
   bool configuration = false;
 };
 
+// What a recording and a configuration file over it come to.
+struct RecordedBasis {
+  Configuration configuration;  // effective: defaults, then the recording's own, then the file's
+  CameraModel camera;           // of the file's calibration, or the recording's own
+  Duration utc_minus_monotonic{0};
+};
+[[nodiscard]] tl::expected<RecordedBasis, SetupError> recorded_basis(
+    const std::string& recording, const std::optional<std::filesystem::path>& configuration_file, ReadMode mode);
+
 // `configuration_file`: none for the recording's own configuration over the defaults.
 [[nodiscard]] tl::expected<ReplaySetup, SetupError> prepare_replay(
     const std::string& recording, const std::optional<std::filesystem::path>& configuration_file, ReadMode mode);
 
+[[nodiscard]] PipelineSettings pipeline_settings(const Configuration& configuration, const CameraModel& camera);
 [[nodiscard]] RuntimeSettings runtime_settings(const Configuration& configuration, const Identity& identity);
 
 }  // namespace perimap

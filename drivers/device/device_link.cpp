@@ -125,7 +125,8 @@ void serve_device(const StreamOpener& open, DeviceProtocol& protocol, DeviceHeal
       std::string reason = converse(**stream, protocol, interrupt);
       stream->reset();
       if (health.samples.get() > samples_before) delay.restart();
-      health.set_reason(reason.empty() ? "closed by ourselves" : std::move(reason));
+      // Empty when we were interrupted: what went wrong before stays the news.
+      if (!reason.empty()) health.set_reason(std::move(reason));
     } else {
       health.set_reason(std::move(stream.error().message));
     }

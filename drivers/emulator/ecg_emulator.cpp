@@ -15,7 +15,8 @@ namespace {
 class MedlabEmulator final : public EcgEmulator {
  public:
   MedlabEmulator(EcgWaveform waveform, const EmulatorFaults& faults)
-      : EcgEmulator(std::move(waveform), MedlabProtocol::kSampleRate_hz, faults) {}
+      : EcgEmulator(std::move(waveform), MedlabProtocol::kSampleRate_hz, time_on_line(1, MedlabProtocol::kBaud),
+                    faults) {}
 
  protected:
   // The module streams from power-up; its commands change what it already does.
@@ -52,7 +53,8 @@ class MedlabEmulator final : public EcgEmulator {
 class BitalinoEmulator final : public EcgEmulator {
  public:
   BitalinoEmulator(EcgWaveform waveform, const EmulatorFaults& faults)
-      : EcgEmulator(std::move(waveform), BitalinoProtocol::kSampleRate_hz, faults) {}
+      : EcgEmulator(std::move(waveform), BitalinoProtocol::kSampleRate_hz,
+                    time_on_line(BitalinoProtocol::kFrameBytes, BitalinoProtocol::kBaud), faults) {}
 
  protected:
   void command(LinkControl& /*link*/, std::uint8_t byte) override {
@@ -78,7 +80,8 @@ class BitalinoEmulator final : public EcgEmulator {
 class CytonEmulator final : public EcgEmulator {
  public:
   CytonEmulator(EcgWaveform waveform, const EmulatorFaults& faults)
-      : EcgEmulator(std::move(waveform), CytonProtocol::kSampleRate_hz, faults) {}
+      : EcgEmulator(std::move(waveform), CytonProtocol::kSampleRate_hz,
+                    time_on_line(CytonProtocol::kPacketBytes, CytonProtocol::kBaud), faults) {}
 
  protected:
   void command(LinkControl& link, std::uint8_t byte) override {
@@ -108,9 +111,10 @@ class CytonEmulator final : public EcgEmulator {
 
 }  // namespace
 
-EcgEmulator::EcgEmulator(EcgWaveform waveform, double sample_rate_hz, const EmulatorFaults& faults)
+EcgEmulator::EcgEmulator(EcgWaveform waveform, double sample_rate_hz, Duration line_time, const EmulatorFaults& faults)
     : waveform_(std::move(waveform)),
       period_ns_(1e9 / sample_rate_hz / (1.0 + 1e-6 * faults.drift_ppm)),
+      line_time_(line_time),
       faults_(faults),
       sender_(faults) {}
 
@@ -139,7 +143,7 @@ void EcgEmulator::on_bytes(LinkControl& link, std::span<const std::byte> bytes, 
 
 void EcgEmulator::on_time(LinkControl& link, Instant now) {
   now_ = now;
-  for (; running_ && due(next_) <= now; ++next_) {
+  for (; running_ && due(next_) + line_time_ <= now; ++next_) {
     const Instant t = due(next_);
     const auto mV = waveform_.at(t);
     if (!mV) {
@@ -150,7 +154,7 @@ void EcgEmulator::on_time(LinkControl& link, Instant now) {
   }
 }
 
-Instant EcgEmulator::next_time() const noexcept { return running_ ? due(next_) : kNever; }
+Instant EcgEmulator::next_time() const noexcept { return running_ ? due(next_) + line_time_ : kNever; }
 
 std::unique_ptr<EcgEmulator> emulate_medlab(EcgWaveform waveform, const EmulatorFaults& faults) {
   return std::make_unique<MedlabEmulator>(std::move(waveform), faults);

@@ -13,7 +13,9 @@ namespace perimap {
 // What they share: a clock of their own, which makes a sample due when the waveform has come to it.
 class EcgEmulator : public DeviceProtocol {
  public:
-  EcgEmulator(EcgWaveform waveform, double sample_rate_hz, const EmulatorFaults& faults);
+  // `line_time`: what a sample takes on the device's own line. A pseudo-terminal takes none, so the device waits for
+  // it.
+  EcgEmulator(EcgWaveform waveform, double sample_rate_hz, Duration line_time, const EmulatorFaults& faults);
 
   void on_open(LinkControl& link, Instant now) final;
   void on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) final;
@@ -36,6 +38,7 @@ class EcgEmulator : public DeviceProtocol {
  private:
   EcgWaveform waveform_;
   double period_ns_;
+  Duration line_time_;
   EmulatorFaults faults_;
   FaultySender sender_;
   bool running_ = false;

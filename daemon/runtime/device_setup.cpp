@@ -1,0 +1,157 @@
+#include "daemon/runtime/device_setup.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <utility>
+
+#include "drivers/recording/channels.hpp"
+#include "drivers/text_file/text_file.hpp"
+
+namespace perimap {
+namespace {
+
+tl::unexpected<Error> wrong(std::string_view key, std::string_view expected, std::string_view got) {
+  return fail(fmt::format("key '{}': expected {}, got {}", key, expected, got));
+}
+
+Expected<Endpoint> endpoint_of(std::string_view key, const std::optional<std::string>& text) {
+  if (!text) return wrong(key, "where the device is", "nothing");
+  return parse_endpoint(*text);
+}
+
+// A file is a few hundred bytes; NDI gives it 1024, rounded up here for later formats.
+Expected<std::vector<std::byte>> read_definition(const std::filesystem::path& file) {
+  constexpr std::size_t kLargest = 16 * 1024;
+  const auto text = read_text_file(file, kLargest, "tool definition");
+  if (!text) return tl::unexpected(text.error());
+  if (text->empty() || text->size() > kLargest) {
+    return fail(fmt::format("{}: expected a tool definition of 1 to {} bytes", file.string(), kLargest));
+  }
+  const auto bytes = std::as_bytes(std::span(text->data(), text->size()));
+  return std::vector<std::byte>(bytes.begin(), bytes.end());
+}
+
+Expected<NdiTool> ndi_tool(std::string_view key, const std::optional<std::string>& handle,
+                           const std::optional<std::filesystem::path>& definition) {
+  NdiTool tool;
+  if (definition) {
+    auto bytes = read_definition(*definition);
+    if (!bytes) return tl::unexpected(std::move(bytes.error()));
+    tool.definition = std::move(*bytes);
+  }
+  if (handle) {
+    std::uint16_t value = 0;
+    const auto [end, error] = std::from_chars(handle->data(), handle->data() + handle->size(), value, 16);
+    if (error != std::errc{} || end != handle->data() + handle->size() || handle->size() > 2) {
+      return wrong(key, "a port handle of two hexadecimal digits", fmt::format("\"{}\"", *handle));
+    }
+    tool.handle = value;
+  }
+  return tool;
+}
+
+Expected<NdiSettings> ndi_settings(const TrackerConfiguration& c) {
+  NdiSettings settings;
+  auto sensor = ndi_tool("tracker.sensor", c.sensor, c.sensor_definition);
+  if (!sensor) return tl::unexpected(std::move(sensor.error()));
+  settings.sensor = std::move(*sensor);
+  if (c.reference || c.reference_definition) {
+    auto reference = ndi_tool("tracker.reference", c.reference, c.reference_definition);
+    if (!reference) return tl::unexpected(std::move(reference.error()));
+    settings.reference = std::move(*reference);
+  }
+  settings.frame_rate_hz = c.frame_rate_hz;
+  return settings;
+}
+
+Expected<CameraPlayback> camera_playback(const std::string& recording, double start_s) {
+  std::optional<Duration> offset;
+  if (start_s > 0.0) {
+    auto whole = ReplayReader::open(recording, ReadMode::kStrict);
+    if (!whole) return tl::unexpected(std::move(whole.error()));
+    const auto first = whole->next();
+    if (!first) return tl::unexpected(first.error());
+    if (*first) offset = Instant(from_seconds(start_s)) - arrival_of(**first);
+  }
+  constexpr std::array<std::string_view, 1> kFrames{channels::kCameraImage};
+  auto reader = ReplayReader::open(recording, ReadMode::kStrict, kFrames);
+  if (!reader) return tl::unexpected(std::move(reader.error()));
+  return CameraPlayback{std::move(*reader), offset};
+}
+
+}  // namespace
+
+bool names_devices(const Configuration& configuration) noexcept {
+  return configuration.tracker.protocol != TrackerConfiguration::Protocol::kNone ||
+         configuration.ecg.protocol != EcgConfiguration::Protocol::kNone || configuration.camera.playback.has_value();
+}
+
+Expected<TrackerDevice> tracker_device(const TrackerConfiguration& c) {
+  if (c.protocol == TrackerConfiguration::Protocol::kNone)
+    return wrong("tracker.protocol", "\"ndi\" or \"igtl\"", "\"none\"");
+  auto endpoint = endpoint_of("tracker.port", c.port);
+  if (!endpoint) return tl::unexpected(std::move(endpoint.error()));
+  if (std::holds_alternative<CanEndpoint>(*endpoint)) {
+    return wrong("tracker.port", "a serial port or tcp:HOST:PORT", format_endpoint(*endpoint));
+  }
+  const double(&t)[3] = c.translation_IW_mm;
+  WorldSettings world;
+  world.X_IW = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), c.rotation_IW_wxyz);
+  if (c.protocol == TrackerConfiguration::Protocol::kIgtl) {
+    return TrackerDevice{std::move(*endpoint), IgtlSettings{c.sensor.value_or(""), c.reference, world}};
+  }
+  auto settings = ndi_settings(c);
+  if (!settings) return tl::unexpected(std::move(settings.error()));
+  settings->world = world;
+  return TrackerDevice{std::move(*endpoint), std::move(*settings)};
+}
+
+Expected<EcgDevice> ecg_device(const EcgConfiguration& c) {
+  using Protocol = EcgConfiguration::Protocol;
+  if (c.protocol == Protocol::kNone) return wrong("ecg.protocol", "an ECG device", "\"none\"");
+  auto endpoint = endpoint_of("ecg.port", c.port);
+  if (!endpoint) return tl::unexpected(std::move(endpoint.error()));
+  if (std::holds_alternative<CanEndpoint>(*endpoint) != (c.protocol == Protocol::kCan)) {
+    return wrong("ecg.port", c.protocol == Protocol::kCan ? "can:INTERFACE" : "a serial port or tcp:HOST:PORT",
+                 format_endpoint(*endpoint));
+  }
+  if (c.protocol == Protocol::kBitalino && c.channel > 4) {
+    return wrong("ecg.channel", "1 to 4 of a bitalino", fmt::format("{}", c.channel));
+  }
+  if (!c.can_extended && c.can_identifier > 0x7FF) {
+    return wrong("ecg.can_identifier", "at most 2047 with 11 bits", fmt::format("{}", c.can_identifier));
+  }
+  return EcgDevice{std::move(*endpoint), c};
+}
+
+tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::path& configuration_file,
+                                                      const Configuration& given) {
+  const auto wrong_configuration = [&configuration_file](const Error& error) {
+    return tl::unexpected(SetupError{{fmt::format("{}: {}", configuration_file.string(), error.message)}, true});
+  };
+  if (!given.camera.playback) {
+    return wrong_configuration(
+        {"key 'camera.playback': expected a recording whose frames stand in for a camera, got "
+         "nothing"});
+  }
+  // The recording brings its camera's calibration and hand-eye along.
+  const std::string recording = given.camera.playback->string();
+  auto basis = recorded_basis(recording, configuration_file, ReadMode::kStrict);
+  if (!basis) return tl::unexpected(std::move(basis.error()));
+  Configuration& configuration = basis->configuration;
+  auto tracker = tracker_device(configuration.tracker);
+  if (!tracker) return wrong_configuration(tracker.error());
+  auto ecg = ecg_device(configuration.ecg);
+  if (!ecg) return wrong_configuration(ecg.error());
+  auto playback = camera_playback(recording, configuration.camera.playback_start_s);
+  if (!playback) return tl::unexpected(SetupError{std::move(playback.error()), false});
+  playback->reader.require_frame_size(basis->camera.width, basis->camera.height);
+  const PipelineSettings pipeline = pipeline_settings(configuration, basis->camera);
+  const Identity identity{configuration.source.name, "frame", configuration.source.world_frame};
+  return DeviceSetup{std::move(configuration), pipeline,        identity,
+                     std::move(*tracker),      std::move(*ecg), std::move(*playback)};
+}
+
+}  // namespace perimap

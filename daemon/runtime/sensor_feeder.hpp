@@ -1,0 +1,28 @@
+// What pushes sensor data into the pipeline's entrance: devices, or a recording.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/error/expected.hpp"
+
+namespace perimap {
+
+class SensorFeeder {
+ public:
+  virtual ~SensorFeeder() = default;
+
+  virtual void start() = 0;
+  // Ends and joins its threads; called twice it does nothing.
+  virtual void stop() = 0;
+  // About ten times a second, on the thread that waits for the session's end.
+  virtual void tick() {}
+
+  // Nothing more will come. Devices never end.
+  [[nodiscard]] virtual bool ended() const noexcept = 0;
+  // Why it ended early, and what was damaged in a recording; to be asked after ended().
+  [[nodiscard]] virtual const std::optional<Error>& error() const noexcept = 0;
+  [[nodiscard]] virtual std::vector<Error> damage() const = 0;
+};
+
+}  // namespace perimap
