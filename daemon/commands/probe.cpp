@@ -31,17 +31,22 @@ struct Seen {
   std::array<std::uint64_t, 4> tools{};  // by ToolState
   LatencyHistogram delay;
   std::uint64_t count = 0;
+  std::uint64_t first_count = 0;  // of them with the first stamp
   Instant first{}, last{};
 
+  // `t`: of the last of these samples.
   void add(Instant t, std::uint64_t samples) {
-    if (count == 0) first = t;
+    if (count == 0) {
+      first = t;
+      first_count = samples;
+    }
     last = t;
     count += samples;
   }
   // Of the samples' own stamps; 0 until there are some.
   [[nodiscard]] double rate_hz() const {
     const double span_s = to_seconds(last - first);
-    return span_s > 0.0 ? static_cast<double>(count) / span_s : 0.0;
+    return span_s > 0.0 ? static_cast<double>(count - first_count) / span_s : 0.0;
   }
 };
 

@@ -1,0 +1,117 @@
+#!/bin/bash
+# perimapd over devices instead of a recording: an emulated NDI tracker on a TCP port, an emulated Cyton on a
+# pseudo-terminal, the camera's frames from the recording that both play.
+# devices_live.sh accuracy|unplugged PERIMAPD PERIMAP RECORDING WORK_FOLDER CYCLONEDDS_XML
+#   accuracy   what a subscriber receives is as good as with a replay of the recording, within 10 %
+#   unplugged  both devices are unplugged again and again: it publishes on, says so, recovers each time, leaks nothing
+set -uo pipefail
+mode=$1 perimapd=$2 perimap=$3 recording=$4 work=$5
+export CYCLONEDDS_URI=file://$6
+domain=$((40 + $$ % 150))
+port=$((20000 + $$ % 20000))
+rm -rf "$work"
+mkdir -p "$work"
+# The link must be short enough for anyone, and the work folder may lie deep.
+line=$(mktemp -u "${TMPDIR:-/tmp}/perimap-ecg-XXXXXX")
+started=()
+trap 'kill "${started[@]}" 2> /dev/null' EXIT
+
+fail() {
+  echo "FAILED: $1"
+  exit 1
+}
+
+# run CONFIGURATION RECEIVED: perimapd until the recording's end, with a subscriber
+run() {
+  "$perimap" watch --domain $domain --wait 60 --record "$2" > "$work/watch" 2>&1 &
+  local watch=$!
+  started+=($watch)
+  "$perimapd" -c "$1" 2> "$work/log" &
+  daemon=$!
+  started+=($daemon)
+  if [ "$mode" = unplugged ]; then watch_for_leaks; fi
+  wait $daemon || fail "perimapd ended with $?: $(tail -n 5 "$work/log")"
+  sleep 0.5
+  kill -INT $watch
+  wait $watch || fail "watch ended with $?: $(tail -n 5 "$work/watch")"
+}
+
+# After both devices have come and gone a few times, descriptors and memory stay what they are.
+watch_for_leaks() {
+  local fds_before fds_after rss_before rss_after
+  sleep 5
+  fds_before=$(find /proc/$daemon/fd 2> /dev/null | wc -l)
+  rss_before=$(awk '/VmRSS/ {print $2}' /proc/$daemon/status)
+  while [ "$(grep -c 'tracker: streaming' "$work/log")" -lt "$unplugs" ] && kill -0 $daemon 2> /dev/null; do sleep 0.1; done
+  fds_after=$(find /proc/$daemon/fd 2> /dev/null | wc -l)
+  rss_after=$(awk '/VmRSS/ {print $2}' /proc/$daemon/status 2> /dev/null || echo 0)
+  echo "descriptors $fds_before then $fds_after, memory $rss_before then $rss_after kB"
+  # Either link may be open or closed at the moment of counting.
+  [ $((fds_after - fds_before)) -le 2 ] || fail "descriptors leak: $fds_before, then $fds_after"
+  [ $((rss_after - rss_before)) -le 4096 ] || fail "memory leaks: $rss_before, then $rss_after kB"
+}
+
+faults=()
+unplugs=4
+if [ "$mode" = unplugged ]; then
+  faults=(--unplug 1 0.25)
+  [ "${7:-}" = "" ] || unplugs=$7
+fi
+# Both ends must be ready before the recording begins.
+start=$(awk '{printf "%.3f", $1 + 4}' /proc/uptime)
+"$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$line" --recording "$recording" --start "$start" "${faults[@]}" \
+  > "$work/emulators" 2>&1 &
+emulators=$!
+started+=($emulators)
+cat > "$work/devices.toml" << END
+version = 1
+[camera]
+playback = "$recording"
+playback_start_s = $start
+[tracker]
+protocol = "ndi"
+port = "tcp:127.0.0.1:$port"
+frame_rate_hz = 100
+[ecg]
+protocol = "cyton"
+port = "$line"
+[dds]
+domain = $domain
+END
+run "$work/devices.toml" "$work/devices.mcap"
+kill -INT $emulators
+wait $emulators || fail "the emulators ended with $?: $(cat "$work/emulators")"
+grep -q 'tracker: streaming: perimap emulated tracker' "$work/log" || fail "no tracker: $(cat "$work/log")"
+grep -q 'ECG: streaming' "$work/log" || fail "no ECG: $(cat "$work/log")"
+grep -Eq ' 0 lost' "$work/watch" || fail "surfaces were lost: $(tail -n 6 "$work/watch")"
+sent=$(grep -oE '[0-9]+ surfaces' "$work/log" | tail -n 1)
+frames=$(grep -oE '[0-9]+ frames' "$work/log" | tail -n 1)
+[ "${sent%% *}" -ge "${frames%% *}" ] || fail "it did not publish on: $frames, $sent"
+
+if [ "$mode" = unplugged ]; then
+  for device in tracker ECG; do
+    times=$(grep -c "$device: streaming" "$work/log")
+    [ "$times" -ge "$unplugs" ] || fail "$device recovered $times times only: $(tail -n 20 "$work/log")"
+    grep -q "$device: .*gone" "$work/log" || fail "$device: the log does not say that it went: $(cat "$work/log")"
+  done
+  echo "as promised: $sent, $unplugs recoveries and more"
+  exit 0
+fi
+
+printf 'version = 1\n[replay]\nrecording = "%s"\n[dds]\ndomain = %d\n' "$recording" $domain > "$work/replay.toml"
+run "$work/replay.toml" "$work/replay.mcap"
+for way in devices replay; do
+  "$perimap" report "$recording" --samples "$work/$way.mcap" --json "$work/$way.json" > "$work/report-$way" 2>&1 ||
+    fail "report ended with $?: $(cat "$work/report-$way")"
+done
+node - "$work/devices.json" "$work/replay.json" << 'END' || fail "worse than replay"
+const [devices, replay] = process.argv.slice(2).map(f => JSON.parse(require("fs").readFileSync(f)).accuracy);
+let failed = false;
+for (const key of ["median_mm", "p95_mm"]) {
+  const live = devices.settled_error[key], replayed = replay.settled_error[key];
+  const ok = live <= 1.1 * replayed;
+  console.log(`${ok ? "ok  " : "FAIL"} ${key}: ${live} over devices, ${replayed} replayed`);
+  failed ||= !ok;
+}
+process.exit(failed ? 1 : 0);
+END
