@@ -76,15 +76,17 @@ void name(Message& message, const Identity& identity) noexcept {
   copy_text(identity.stream, message.stream);
 }
 
-perimap_SourceStatus source_status(perimap_SourceKind kind, const StatusFacts& facts, Instant now,
-                                   std::uint64_t received, std::uint64_t dropped, std::uint64_t invalid,
+perimap_SourceStatus source_status(perimap_SourceKind kind, const StatusFacts& facts, const SourceLink& link,
+                                   Instant now, std::uint64_t received, std::uint64_t dropped, std::uint64_t invalid,
                                    const Counter& last_ns, const LatencyHistogram& delay) noexcept {
   const LatencyHistogram::Summary summary = delay.summary();
   const auto last = static_cast<std::int64_t>(last_ns.get());
   perimap_SourceStatus wire{};
   wire.kind = kind;
   wire.state = perimap_SOURCE_OK;
-  if (received == 0) {
+  if (link.closed) {
+    wire.state = perimap_SOURCE_CLOSED;
+  } else if (received == 0) {
     wire.state = perimap_SOURCE_STARTING;
   } else if (facts.sources_ended) {
     wire.state = perimap_SOURCE_ENDED;
@@ -97,6 +99,8 @@ perimap_SourceStatus source_status(perimap_SourceKind kind, const StatusFacts& f
   wire.last_source_time_ns = last;
   wire.delay_p50_ns = summary.p50.count();
   wire.delay_max_ns = summary.max.count();
+  wire.jitter_p50_ns = link.jitter_p50.count();
+  wire.jitter_p99_ns = link.jitter_p99.count();
   return wire;
 }
 
@@ -196,12 +200,12 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.respiration_suspected = facts.respiration_suspected;
   wire_.features_started_anew = c.features_started_anew.get();
 
-  sources_[0] = source_status(perimap_SOURCE_CAMERA, facts, now, c.frames_received.get(), c.frames_dropped.get(), 0,
-                              c.last_frame_ns, c.camera_delay);
-  sources_[1] = source_status(perimap_SOURCE_TRACKER, facts, now, c.poses_received.get(),
+  sources_[0] = source_status(perimap_SOURCE_CAMERA, facts, facts.camera, now, c.frames_received.get(),
+                              c.frames_dropped.get(), 0, c.last_frame_ns, c.camera_delay);
+  sources_[1] = source_status(perimap_SOURCE_TRACKER, facts, facts.tracker, now, c.poses_received.get(),
                               c.poses_dropped.get() + c.poses_refused.get(), c.poses_invalid.get(), c.last_pose_ns,
                               c.tracker_delay);
-  sources_[2] = source_status(perimap_SOURCE_ECG, facts, now, c.ecg_samples.get(), c.ecg_dropped.get(),
+  sources_[2] = source_status(perimap_SOURCE_ECG, facts, facts.ecg, now, c.ecg_samples.get(), c.ecg_dropped.get(),
                               c.ecg_lead_off.get(), c.last_ecg_ns, c.ecg_delay);
   wire_.sources = {kSources, kSources, sources_, false};
 

@@ -41,6 +41,13 @@ class WirePhase {
   perimap_Phase wire_{};
 };
 
+// What the driver of a device knows beside the counters.
+struct SourceLink {
+  bool closed = false;
+  Duration jitter_p50{0};
+  Duration jitter_p99{0};
+};
+
 // What the status says beside the counters.
 struct StatusFacts {
   perimap_Privilege realtime_priority = perimap_PRIVILEGE_NOT_REQUESTED;
@@ -50,6 +57,7 @@ struct StatusFacts {
   bool sources_ended = false;
   RespirationState respiration = RespirationState::kOff;
   bool respiration_suspected = false;
+  SourceLink camera, tracker, ecg;  // as they are without a device: open, and without jitter
 };
 
 class WireStatus {

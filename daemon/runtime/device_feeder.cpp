@@ -112,6 +112,15 @@ void DeviceFeeder::tell(const char* name, const DeviceHealth& health, Told& told
   }
 }
 
+void DeviceFeeder::describe(StatusFacts& facts) const {
+  const auto link = [](const DeviceHealth& health) {
+    const LatencyHistogram::Summary jitter = health.jitter.summary();
+    return SourceLink{health.state() == DeviceState::kClosed, jitter.p50, jitter.p99};
+  };
+  facts.tracker = link(tracker_health_);
+  facts.ecg = link(ecg_health_);
+}
+
 void DeviceFeeder::tick() {
   tell("tracker", tracker_health_, tracker_told_);
   tell("ECG", ecg_health_, ecg_told_);

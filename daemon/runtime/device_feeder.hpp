@@ -34,6 +34,7 @@ class DeviceFeeder final : public SensorFeeder {
   void start() override;
   void stop() override;
   void tick() override;
+  void describe(StatusFacts& facts) const override;
 
   [[nodiscard]] bool ended() const noexcept override { return camera_.ended(); }
   [[nodiscard]] const std::optional<Error>& error() const noexcept override { return camera_.error(); }

@@ -149,6 +149,7 @@ void LiveRuntime::run_status() {
   Instant tick = MonotonicClock::now();
   Instant next_model = tick;
   Instant next_status = tick;
+  int closed_before = 0;
   for (;;) {
     const bool last = stopping_.load(std::memory_order_relaxed);
     const Instant now = MonotonicClock::now();
@@ -160,12 +161,16 @@ void LiveRuntime::run_status() {
                                                   clock, respiration, now));
       next_model = now + settings_.model_interval;
     }
-    if (last || now >= next_status) {
-      StatusFacts told = facts();
-      told.respiration = respiration.state;
-      told.respiration_suspected = respiration.suspected;
+    StatusFacts told = facts();
+    told.respiration = respiration.state;
+    told.respiration_suspected = respiration.suspected;
+    if (describe_sources_) describe_sources_(told);
+    // A device that goes or comes is told at once.
+    const int closed = (told.camera.closed ? 1 : 0) | (told.tracker.closed ? 2 : 0) | (told.ecg.closed ? 4 : 0);
+    if (last || now >= next_status || closed != closed_before) {
       publication_.status(wire_status_.fill(pipeline_.counters(), told, now));
       next_status = now + settings_.status_interval;
+      closed_before = closed;
     }
     if (on_status_tick_) on_status_tick_();
     if (last) return;

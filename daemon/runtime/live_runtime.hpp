@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
@@ -44,6 +45,8 @@ class LiveRuntime {
   LiveRuntime& operator=(const LiveRuntime&) = delete;
   ~LiveRuntime() { stop(); }
 
+  // Before start(): called by the status thread for what it does not know itself.
+  void describe_sources_by(std::function<void(StatusFacts&)> describe) { describe_sources_ = std::move(describe); }
   void start();
 
   // Tells that no more frames will come: the surfaces of those that came are still released.
@@ -67,6 +70,7 @@ class LiveRuntime {
   RuntimeSettings settings_;
   Publication& publication_;
   std::function<void()> on_status_tick_;
+  std::function<void(StatusFacts&)> describe_sources_;
   WireSurface wire_surface_;
   WireModel wire_model_;
   WirePhase wire_phase_;

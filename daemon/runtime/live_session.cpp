@@ -31,6 +31,7 @@ LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Pu
       on_tick_(std::move(on_tick)) {}
 
 Expected<void> LiveSession::run(StopSignal& stop) {
+  runtime_.describe_sources_by([this](StatusFacts& facts) { feeder_->describe(facts); });
   runtime_.start();
   feeder_->start();
   bool told_end = false;

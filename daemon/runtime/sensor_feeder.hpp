@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "daemon/publishing/wire_reports.hpp"
 
 namespace perimap {
 
@@ -17,6 +18,9 @@ class SensorFeeder {
   virtual void stop() = 0;
   // About ten times a second, on the thread that waits for the session's end.
   virtual void tick() {}
+
+  // On the status thread: what the devices' drivers know, into the status.
+  virtual void describe(StatusFacts& /*facts*/) const {}
 
   // Nothing more will come. Devices never end.
   [[nodiscard]] virtual bool ended() const noexcept = 0;

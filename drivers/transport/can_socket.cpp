@@ -48,6 +48,8 @@ std::string reason(int error) {
 
 }  // namespace
 
+// NOLINTBEGIN(cppcoreguidelines-pro-type-union-access): the kernel's own types
+
 Expected<CanSocket> CanSocket::open(const std::string& interface_name, std::uint32_t identifier, bool extended) {
   const auto refuse = [&interface_name](int error) {
     return fail(fmt::format("can:{}: {}", interface_name, reason(error)));
@@ -128,5 +130,7 @@ Expected<bool> CanSocket::send(const CanFrame& frame) {
   if (errno == EAGAIN || errno == ENOBUFS || errno == EINTR) return false;
   return fail(fmt::format("can:{}: {}", name_, reason(errno)));
 }
+
+// NOLINTEND(cppcoreguidelines-pro-type-union-access)
 
 }  // namespace perimap

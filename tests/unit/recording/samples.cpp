@@ -183,6 +183,8 @@ void fill(Filler& next, perimap_SourceStatus& s) {
   next(s.last_source_time_ns);
   next(s.delay_p50_ns);
   next(s.delay_max_ns);
+  next(s.jitter_p50_ns);
+  next(s.jitter_p99_ns);
 }
 
 void fill(Filler& next, perimap_StageLatency& s) {
@@ -397,9 +399,10 @@ json to_json(const perimap_Phase& s) {
 }
 template <>
 json to_json(const perimap_SourceStatus& s) {
-  return {MEMBER(kind),         MEMBER(state),       MEMBER(received),
-          MEMBER(dropped),      MEMBER(invalid),     MEMBER(last_source_time_ns),
-          MEMBER(delay_p50_ns), MEMBER(delay_max_ns)};
+  return {MEMBER(kind),         MEMBER(state),        MEMBER(received),
+          MEMBER(dropped),      MEMBER(invalid),      MEMBER(last_source_time_ns),
+          MEMBER(delay_p50_ns), MEMBER(delay_max_ns), MEMBER(jitter_p50_ns),
+          MEMBER(jitter_p99_ns)};
 }
 template <>
 json to_json(const perimap_StageLatency& s) {
