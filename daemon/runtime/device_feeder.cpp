@@ -27,7 +27,7 @@ std::unique_ptr<EcgProtocol> ecg_protocol(const EcgConfiguration& c, EcgSink sin
     return std::make_unique<CytonProtocol>(settings, std::move(sink), health);
   }
   MedlabSettings settings;
-  if (c.mV_per_count > 0.0) settings.mV_per_count = c.mV_per_count;
+  if (c.count_mV > 0.0) settings.count_mV = c.count_mV;
   return std::make_unique<MedlabProtocol>(settings, std::move(sink), health);
 }
 
@@ -59,7 +59,7 @@ void serve_ecg(const EcgDevice& device, const EcgSink& sink, DeviceHealth& healt
     settings.identifier = static_cast<std::uint32_t>(c.can_identifier);
     settings.extended = c.can_extended;
     settings.sample_rate_hz = c.can_sample_rate_hz;
-    if (c.mV_per_count > 0.0) settings.mV_per_count = c.mV_per_count;
+    if (c.count_mV > 0.0) settings.count_mV = c.count_mV;
     serve_can_ecg(can->interface_name, settings, sink, health, interrupt);
     return;
   }

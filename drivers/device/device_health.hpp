@@ -20,8 +20,7 @@ enum class DeviceState : std::uint8_t {
 
 [[nodiscard]] const char* device_state_name(DeviceState state) noexcept;
 
-class DeviceHealth {
- public:
+struct DeviceCounters {
   Counter samples;          // delivered
   Counter lost;             // by the device's own count
   Counter damaged;          // messages that failed their check, or bytes that fit nowhere
@@ -29,7 +28,10 @@ class DeviceHealth {
   Counter bus_errors;       // CAN error frames
   Counter openings;         // times that the link was opened
   LatencyHistogram jitter;  // arrival of a sample later than the earliest it could have come
+};
 
+class DeviceHealth : public DeviceCounters {
+ public:
   // Relaxed: the state is a message by itself; who needs the reason with it takes the lock.
   void set_state(DeviceState state) noexcept { state_.store(state, std::memory_order_relaxed); }
   [[nodiscard]] DeviceState state() const noexcept { return state_.load(std::memory_order_relaxed); }

@@ -72,7 +72,7 @@ bool wait_unless_interrupted(Duration longest, const Interrupt& interrupt) {
 
 std::string converse(ByteStream& stream, DeviceProtocol& protocol, const Interrupt& interrupt) {
   StreamControl control(stream);
-  std::array<std::byte, 4096> buffer;
+  std::array<std::byte, 4096> buffer{};
   protocol.on_open(control, MonotonicClock::now());
   while (!control.failure()) {
     if (control.pending()) {

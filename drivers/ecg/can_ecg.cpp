@@ -63,7 +63,7 @@ void CanEcgDecoder::take(const CanFrame& frame) {
   const std::uint64_t lost = lost_before(*ecg, frame.arrival);
   for (int i = 0; i < ecg->samples; ++i) {
     const auto value = ecg->values[static_cast<std::size_t>(i)];
-    samples_.add(static_cast<float>(value * settings_.mV_per_count), ecg->lead_off, i == 0 ? lost : 0);
+    samples_.add(static_cast<float>(value * settings_.count_mV), ecg->lead_off, i == 0 ? lost : 0);
   }
   samples_.end_chunk(frame.arrival);
   last_ = ecg;

@@ -14,7 +14,7 @@ struct CanEcgSettings {
   std::uint32_t identifier = 0x2E0;
   bool extended = false;
   double sample_rate_hz = 360.0;
-  double mV_per_count = 0.005;
+  double count_mV = 0.005;
 };
 
 // What a frame does; no socket. Frame counts tell lost frames modulo 256; the device's own time says how often that

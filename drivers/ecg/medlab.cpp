@@ -51,7 +51,7 @@ void MedlabProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> by
     }
     switch (std::exchange(follows_, follows_ == Follows::kWave ? Follows::kWave : Follows::kNothing)) {
       case Follows::kWave:
-        samples().add(static_cast<float>((value - kNeutral) * settings_.mV_per_count), lead_off_);
+        samples().add(static_cast<float>((value - kNeutral) * settings_.count_mV), lead_off_);
         break;
       case Follows::kPulse:
         // The module has no word for leads that are on again, but it finds a pulse on no other.

@@ -18,8 +18,8 @@
 namespace perimap {
 
 struct MedlabSettings {
-  char lead = '1';             // 'G' command: 0 III, 1 II, 2 I
-  double mV_per_count = 0.02;  // depends on the amplification; no estimate needs it
+  char lead = '1';         // 'G' command: 0 III, 1 II, 2 I
+  double count_mV = 0.02;  // depends on the amplification; no estimate needs it
 };
 
 class MedlabProtocol final : public EcgProtocol {

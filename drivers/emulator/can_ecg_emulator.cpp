@@ -33,7 +33,7 @@ Expected<void> emulate_can_ecg(const std::string& interface_name, const EcgWavef
         faults.unplug_every > Duration(0) && since % (faults.unplug_every + faults.unplug_for) >= faults.unplug_every;
     if (silent || dice(random) < faults.lost) continue;
     const auto counts = [&](float mV) {
-      return static_cast<std::int16_t>(std::lround(std::clamp(mV / settings.mV_per_count, -32768.0, 32767.0)));
+      return static_cast<std::int16_t>(std::lround(std::clamp(mV / settings.count_mV, -32768.0, 32767.0)));
     };
     CanEcgFrame ecg;
     ecg.count = count;

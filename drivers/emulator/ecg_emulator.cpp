@@ -35,7 +35,7 @@ class MedlabEmulator final : public EcgEmulator {
     if (due) since_marker_ = 0;
     off_ = off;
     ++since_marker_;
-    const double counts = 128.0 + mV.value_or(0.0F) / MedlabSettings{}.mV_per_count;
+    const double counts = 128.0 + mV.value_or(0.0F) / MedlabSettings{}.count_mV;
     const std::array<std::byte, 1> value{static_cast<std::byte>(std::lround(std::clamp(counts, 0.0, 246.0)))};
     sender().send(link, value, 0);
   }

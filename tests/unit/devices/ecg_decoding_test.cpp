@@ -36,10 +36,10 @@ struct Received {
     return [this](const EcgBlock& block) { blocks.push_back(block); };
   }
   // Of all samples, in order: whole counts of the converter.
-  std::vector<int> counts(double mV_per_count) const {
+  std::vector<int> counts(double count_mV) const {
     std::vector<int> all;
     for (const EcgBlock& block : blocks) {
-      for (const float mV : block.samples()) all.push_back(static_cast<int>(std::lround(mV / mV_per_count)));
+      for (const float mV : block.samples()) all.push_back(static_cast<int>(std::lround(mV / count_mV)));
     }
     return all;
   }
@@ -183,7 +183,7 @@ struct Counted {
   const char* name;
   std::vector<std::byte> (*frame)(unsigned count, int value);
   std::function<std::unique_ptr<EcgProtocol>(Received&)> protocol;
-  double mV_per_count;
+  double count_mV;
   double offset;
   unsigned modulus;
   Duration period;
@@ -192,7 +192,7 @@ struct Counted {
   std::vector<int> values(const Received& received) const {
     std::vector<int> all;
     for (const EcgBlock& block : received.blocks) {
-      for (const float mV : block.samples()) all.push_back(static_cast<int>(std::lround(mV / mV_per_count + offset)));
+      for (const float mV : block.samples()) all.push_back(static_cast<int>(std::lround(mV / count_mV + offset)));
     }
     return all;
   }
