@@ -87,9 +87,9 @@ TEST(HeartMesh, NamesFileAndLineOfABadTable) {
     return mesh ? std::string("no error") : mesh.error().message;
   };
   const std::string vertex = "0,x,1,2,3,4,5,6,7,8,9\n0,y,1,2,3,4,5,6,7,8,9\n0,z,1,2,3,4,5,6,7,8,9\n";
-  EXPECT_EQ(error("0,x,1,2,oops,4,5,6,7,8,9\n", ""), "epi_fourier_H4.csv:2: expected a number, found 'oops'");
+  EXPECT_EQ(error("0,x,1,2,oops,4,5,6,7,8,9\n", ""), "epi_fourier_H4.csv:2:9: expected a number, found 'oops'");
   EXPECT_EQ(error("0,y,1,2,3,4,5,6,7,8,9\n", ""),
-            "epi_fourier_H4.csv:2: expected the vertices in order, axes x, y, z of each");
+            "epi_fourier_H4.csv:2:3: expected the vertices in order, axes x, y, z of each");
   EXPECT_EQ(error(vertex, "v0,v1,v2\n0,0,1\n"), "heart mesh: triangle index 1 is not below the vertex count 1");
   EXPECT_EQ(error(vertex, "v0,v1,v2\n"), "heart mesh: 0 triangle indices, expected a multiple of 3");
 }
