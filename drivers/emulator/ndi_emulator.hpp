@@ -44,7 +44,7 @@ class NdiEmulator final : public DeviceProtocol {
   };
 
   void restart();
-  void on_command(LinkControl& link, const std::string& command, Instant now);
+  void on_command(LinkControl& link, const std::string& line, Instant now);
   void reply(LinkControl& link, std::string_view text);
   void reply_binary(LinkControl& link, std::span<const std::byte> body);
   [[nodiscard]] std::string search(std::string_view option) const;

@@ -14,7 +14,7 @@ PoseTrack PoseTrack::of_samples(Instant start, const std::vector<TrackerSample>&
     rate_hz =
         static_cast<double>(samples.size() - 1) / to_seconds(samples.back().source_time - samples.front().source_time);
   }
-  return PoseTrack(start, rate_hz, std::move(readings));
+  return {start, rate_hz, std::move(readings)};
 }
 
 PoseTrack PoseTrack::swaying(Instant start, double rate_hz) {
@@ -29,7 +29,7 @@ PoseTrack PoseTrack::swaying(Instant start, double rate_hz) {
                     Vector3d(20.0 * std::cos(phase), 20.0 * std::sin(phase), -500.0)};
     readings.push_back({ToolState::kOk, X_TO});
   }
-  return PoseTrack(start, rate_hz, std::move(readings));
+  return {start, rate_hz, std::move(readings)};
 }
 
 }  // namespace perimap

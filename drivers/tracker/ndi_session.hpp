@@ -67,10 +67,10 @@ class NdiSession final : public DeviceProtocol {
   void enter(LinkControl& link, Step step, Instant now);
   void command(LinkControl& link, const std::string& text, Duration longest, Instant now);
   void on_reply(LinkControl& link, const NdiReply& reply, Instant arrival);
-  void on_text(LinkControl& link, const std::string& text, Instant arrival);
+  void on_text(LinkControl& link, const std::string& text, Instant now);
   void on_damage(LinkControl& link, Instant now);
   void on_error(LinkControl& link, const std::string& text, Instant now);
-  void next_port(LinkControl& link, Step step, Instant now);
+  void next_port(LinkControl& link, Step search, Instant now);
   void next_upload(LinkControl& link, Instant now);
   bool choose_tools(LinkControl& link);
   void ask(LinkControl& link, Instant now);
