@@ -176,7 +176,8 @@ bool RespirationSearch::find(FoundBreath& found) const noexcept {
       }
     }
   }
-  if (kTwoPi / best * settings_.breaths > span_s) return false;
+  // At the end of the range the best candidate may be any faster motion's neighbour.
+  if (kTwoPi / best * settings_.breaths > span_s || best > fastest - 0.5 * step) return false;
   const Fit fitted = fit(best);
   found.time = newest;
   found.rate_rad_per_s = best;

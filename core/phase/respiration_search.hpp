@@ -47,7 +47,7 @@ struct FoundBreath {
 };
 
 struct RespirationSearchSettings {
-  Duration shortest_period = std::chrono::milliseconds(1500);
+  Duration shortest_period = std::chrono::seconds(2);
   Duration longest_period = std::chrono::seconds(10);
   double breaths = 2.2;              // that must have been seen
   double explained = 0.8;            // least share

@@ -17,6 +17,7 @@ constexpr double kGate = 13.8;  // chi-squared, 1 degree: 99.98 %
 // Shares of the displacement that breathing explains.
 constexpr double kSuspected = 0.2;
 constexpr double kConfirmed = 0.5;
+constexpr int kSuspectedInARow = 2;  // searches: what a young map gets wrong comes and goes
 constexpr Duration kSuspicionLasts = std::chrono::seconds(15);
 constexpr Duration kContradictedBeforeSearch = std::chrono::milliseconds(1500);
 constexpr Duration kSilentBeforeSearch = std::chrono::seconds(15);
@@ -77,7 +78,9 @@ void RespiratoryTracker::search(Instant now) noexcept {
 // displacement; the map then stands still, and breathing shows clearly or not at all.
 void RespiratoryTracker::suspect(const FoundBreath& found, Instant now) noexcept {
   const bool large = found.wave.rms_mm() >= settings_.suspected_rms_mm;
-  if (large && found.explained >= (clock_.suspected ? kConfirmed : kSuspected)) {
+  const bool there = large && found.explained >= (clock_.suspected ? kConfirmed : kSuspected);
+  in_a_row_ = there ? in_a_row_ + 1 : 0;
+  if (in_a_row_ >= kSuspectedInARow) {
     clock_.suspected = true;
     last_agreed_ = now;
   }

@@ -51,6 +51,7 @@ class RespiratoryTracker {
   Instant last_agreed_;
   Instant last_told_;
   int locks_ = 0;
+  int in_a_row_ = 0;  // searches that found what looks like breathing, while off
 };
 
 }  // namespace perimap

@@ -51,7 +51,7 @@ void watch(Searching& searching, Patient& patient, double from_s, double to_s) {
 }
 
 TEST(RespirationSearch, FindsPeriodPhaseAndWaveWithinItsDeviations) {
-  for (const double period_s : {2.0, 3.1, 4.0, 5.5}) {
+  for (const double period_s : {2.3, 3.1, 4.0, 5.5}) {
     Patient patient;
     patient.period_s = period_s;
     RespirationSearch search;
@@ -168,16 +168,20 @@ TEST_F(Tracking, AContradictedPhaseIsSearchedForAgainAndCountedAsBefore) {
 TEST_F(Tracking, WhileOffBreathingIsSuspectedWhereThereIsSome) {
   settings.enabled = false;
   RespiratoryTracker tracker(settings);
-  watch(tracker, patient, 0.0, 20.0);
-  tracker.search(at_s(20.0));
+  for (int i = 0; i < 20; ++i) {
+    watch(tracker, patient, i, i + 1.0);
+    tracker.search(at_s(i + 1.0));
+  }
   EXPECT_TRUE(tracker.clock().suspected);
   EXPECT_EQ(tracker.clock().state, RespirationState::kOff);
   EXPECT_EQ(tracker.clock().at(at_s(20.0)).deviation_mm, settings.displacement_mm);
   Patient still;
   still.amplitude_mm = 0.0;
   RespiratoryTracker calm(settings);
-  watch(calm, still, 0.0, 20.0);
-  calm.search(at_s(20.0));
+  for (int i = 0; i < 20; ++i) {
+    watch(calm, still, i, i + 1.0);
+    calm.search(at_s(i + 1.0));
+  }
   EXPECT_FALSE(calm.clock().suspected);
   EXPECT_EQ(calm.clock().at(at_s(20.0)).deviation_mm, 0.0);
 }
