@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 namespace perimap::test {
 
@@ -30,6 +31,24 @@ class GoalReport {
   // A goal that the bound forbids, or none at all: shown, not judged.
   void shown(const std::string& what, const std::string& goal, double reached, double bound = NAN) {
     line(what, goal, reached, bound, "");
+  }
+
+  // A table: a heading over its columns, then a row a case, whose values are all to be within the limits.
+  static void heading(const std::string& what, const std::vector<std::string>& columns) {
+    fmt::print("\n{:<50}", what);
+    for (const std::string& column : columns) fmt::print("{:>9}", column);
+    fmt::print("\n");
+  }
+  void row(const std::string& what, const std::vector<double>& values, double low, double high) {
+    fmt::print("{:<50}", what);
+    bool good = true;
+    for (const double value : values) {
+      fmt::print("{:>9.2f}", value);
+      good = good && value >= low && value <= high;
+    }
+    fmt::print("{}\n", good ? "" : fmt::format("  FAILED: {:g}..{:g}", low, high));
+    std::fflush(stdout);
+    failed_ += good ? 0 : 1;
   }
 
   [[nodiscard]] int failed() const noexcept { return failed_; }

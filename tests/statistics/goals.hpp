@@ -1,4 +1,5 @@
-// The estimator's goals that can be tried with known phase and association; docs/experiments.md has what is reached.
+// The estimator's goals that can be tried with known phase and association (docs/experiments.md has what is reached),
+// and those of the ECG side (docs/ecg.md).
 #pragma once
 
 #include <cstdint>
@@ -19,5 +20,7 @@ void no_feature_is_lost(const Extent& extent, const HeartMesh& heart, GoalReport
 void as_exact_as_the_data_allow(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Path error and covariance with errors of the camera pose, white and slow, without and with the shared pose.
 void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& report);
+// Beats found in real ECG records with disturbances added, and which rhythms are called unpredictable; docs/ecg.md.
+void beats_under_disturbances(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 
 }  // namespace perimap::test
