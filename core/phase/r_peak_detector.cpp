@@ -9,101 +9,139 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr int kGapPeriods = 4;  // a longer step between stamps is a gap
-constexpr Duration kPadding = milliseconds(200);
-constexpr Duration kFlatAfter = seconds(1);
-constexpr Duration kForgetAfter = seconds(30);  // of interruption
+// Where no other reason stands beside it, a number was chosen so that the five records of docs/ecg.md, plain and with
+// the disturbances tabled there, lose the fewest beats by one set of numbers.
 
-constexpr Duration kConfirm = milliseconds(50);  // a maximum of the energy is one when nothing exceeded it for so long,
+// ---- the signal
+
+constexpr int kGapPeriods = 4;                    // a longer step between stamps is a gap; stamps jitter by less
+constexpr Duration kPadding = milliseconds(200);  // more than the filters' delay and the stretch behind a QRS complex
+constexpr Duration kFlatAfter = seconds(1);       // a converter repeats itself for a fraction of that in diastole
+constexpr Duration kForgetAfter = seconds(30);    // of interruption: by then the electrode sits elsewhere
+
+// ---- maxima of the energy
+
+constexpr Duration kConfirm = milliseconds(50);  // a maximum is one when nothing exceeded it for so long,
 constexpr double kConfirmFall = 0.75;            // or when the energy has fallen to this share of it
-constexpr double kRiseAgain = 1.5;               // the next one begins when the energy has risen by this factor
+constexpr double kRiseAgain = 1.5;               // the next one begins when the energy has risen by this factor: ripple
 
-constexpr Duration kShapeStep = milliseconds(5);
-constexpr Duration kShapeBefore = milliseconds(90);
-constexpr Duration kShapeAfter = milliseconds(50);
-constexpr Duration kFitReach = milliseconds(60);  // a maximum of the energy and a fit so far apart are one complex
+// ---- the matched filter
+
+constexpr Duration kShapeStep = milliseconds(5);     // averages of 20 ms pass little above 50 Hz: four points a period
+constexpr Duration kShapeBefore = milliseconds(90);  // half of a wide (ventricular) QRS complex and its onset,
+constexpr Duration kShapeAfter = milliseconds(50);   // and no more after the peak than the delay allows
+constexpr Duration kFitReach = milliseconds(60);     // a maximum of the energy and a fit so far apart are one complex
 constexpr Duration kFitAwait = milliseconds(30);  // how long a maximum of the energy waits for a fit after its middle
 constexpr int kFitConfirm = 3;                    // steps after which a maximum of the correlation is one
-constexpr double kFamiliar = 0.8;                 // correlation
-constexpr double kAlike = 0.6;                    // enough for a candidate in noise
-constexpr double kSurelyFamiliar = 0.85;
-constexpr double kLeastGain = 0.4;  // of a familiar beat, to its template
-constexpr double kSureGain = 0.6;   // a smaller one must be the more alike
-constexpr double kSureCorrelation = 0.9;
-constexpr double kCutOffCorrelation = 0.95;  // of a complex that the end of the signal cuts off
-constexpr double kMostGain = 3.0;
+constexpr double kFamiliar = 0.8;                 // correlation of a beat in the noise that the averages let through
+constexpr double kAlike = 0.6;                    // enough to be a candidate in noise, which the rhythm then decides
+constexpr double kSurelyFamiliar = 0.85;          // as alike as beats are that share a template
+constexpr double kLeastGain = 0.4;                // of a familiar beat, to its template: P and T waves are smaller
+constexpr double kSureGain = 0.6;                 // a smaller one must be the more alike:
+constexpr double kSureCorrelation = 0.9;          // so much
+constexpr double kCutOffCorrelation = 0.95;       // of a complex that the end of the signal cuts off: half is made up
+constexpr double kMostGain = 3.0;                 // ectopic beats exceed the usual ones by less
 constexpr double kSameGain = 0.3;  // logarithm: two beats in a row so much alike tell that the gain has changed
 
-constexpr Duration kPeakWindow = milliseconds(80);  // each side of the complex's middle
-constexpr Duration kFitPeakWindow = milliseconds(15);
-constexpr Duration kBaselineBefore = milliseconds(200);
-constexpr Duration kParabola = milliseconds(10);  // each side of the peak
+// ---- the peak and its time
+
+constexpr Duration kPeakWindow = milliseconds(80);     // each side of the complex's middle: wide complexes take 160 ms
+constexpr Duration kFitPeakWindow = milliseconds(15);  // as far as peaks of one shape are displaced (qrs_shape)
+constexpr Duration kBaselineBefore = milliseconds(200);  // so that the complex is the smaller part of the stretch
+constexpr Duration kParabola = milliseconds(10);         // each side of the peak: an R wave is a parabola so far
 constexpr double kOpposite = 2.0;  // a beat points the other way when its other excursion is larger by this factor
-constexpr double kPolarityHysteresis = 1.3;
-constexpr double kPolarityMemory = 8.0;  // beats
-constexpr double kDeviationFloor_s = 0.001;
-constexpr double kDeviationCap_s = 0.020;
+constexpr double kPolarityHysteresis = 1.3;  // an RS complex of equal parts must not change sides with each beat
+constexpr double kPolarityMemory = 8.0;      // beats, as the levels
+constexpr double kDeviationFloor_s = 0.001;  // clean beats scatter by that about their peaks (docs/ecg.md)
+constexpr double kDeviationCap_s = 0.020;    // where there is no vertex: uniform over the complex's top
+// Of an unfamiliar beat in noise that is taken because one is due: it may be noise beside the true one, anywhere within
+// the 150 ms of a match. Uniform over that makes 87 ms; twelve such beats of the records have 85 ms RMS.
+constexpr double kDoubtfulDeviation_s = 0.087;
 
-constexpr Duration kQuietStep = milliseconds(20);
-constexpr int kQuietRecompute = 5;  // steps
-constexpr double kQuietQuantile = 0.3;
-constexpr double kStandOut = 3.5;  // times the quiet level; bare noise reaches it about once a minute
-constexpr double kFamiliarStandOut = 1.5;
-constexpr double kQuanta = 2.0;  // times the converter's resolution; a single step of it reaches 0.75
+// ---- the quiet level
 
-constexpr double kRough = 4.0;         // times the usual roughness,
-constexpr double kRoughToBeats = 0.5;  // and this share of the beats' slope over 20 ms: nothing can be seen
-constexpr double kRoughHysteresis = 0.5;
-constexpr double kRoughRise_s = 30.0;
+constexpr Duration kQuietStep = milliseconds(20);  // the energy is a mean of 80 ms: nothing is missed
+constexpr int kQuietRecompute = 5;                 // steps: each 0.1 s; it does not change faster
+constexpr double kQuietQuantile = 0.3;             // of the last 2.5 s: diastole even at 180 beats a minute
+constexpr double kStandOut = 3.5;                  // times the quiet level; bare noise reaches it about once a minute
+constexpr double kFamiliarStandOut = 1.5;          // a known shape needs less, but noise alone may resemble it
+constexpr double kQuanta = 2.0;                    // times the converter's resolution; a single step of it reaches 0.75
+
+// ---- roughness
+
+constexpr double kRough = 4.0;            // times the usual roughness,
+constexpr double kRoughToBeats = 0.5;     // and this share of the beats' slope over 20 ms: nothing can be seen
+constexpr double kRoughHysteresis = 0.5;  // a burst fluctuates about its limit
+constexpr double kRoughRise_s = 30.0;     // longer than a burst lasts, shorter than hum that comes to stay
 constexpr Duration kRoughAtLeast = milliseconds(200);  // a QRS complex is rough for less
-constexpr Duration kRoughBefore = milliseconds(100);
-constexpr Duration kRoughAfter = milliseconds(150);
+constexpr Duration kRoughBefore = milliseconds(100);   // the burst begins before its mean is rough,
+constexpr Duration kRoughAfter = milliseconds(150);    // and the filters ring after it
 
-constexpr Duration kLearning = seconds(2);
-constexpr Duration kLearningWindow = milliseconds(3500);
-constexpr Duration kLearningAtMost = seconds(6);
-constexpr double kRecurringEnergy = 0.4;
-constexpr int kRecurringDisplaced = 3;
-constexpr double kRecurringShare = 0.4;
-constexpr Duration kRelearnAfter = seconds(3);  // without a beat,
+// ---- learning
+
+constexpr Duration kLearning = seconds(2);                // holds two beats at 60 a minute,
+constexpr Duration kLearningWindow = milliseconds(3500);  // and this at 35
+constexpr Duration kLearningAtMost = seconds(6);          // then what stands out will do, recurring or not
+constexpr double kRecurringEnergy = 0.4;        // of the strongest: T waves and most ectopic beats' neighbours are out,
+constexpr int kRecurringDisplaced = 3;          // steps; the peaks of unknown shapes are found so far apart,
+constexpr double kRecurringShare = 0.4;         // of those of its size: in bigeminy every other one is like it
+constexpr Duration kRelearnAfter = seconds(3);  // without a beat: longer than a compensatory pause,
 constexpr double kRelearnCycles = 3.0;          // and usual cycles
-constexpr Duration kRefractory = milliseconds(200);
+constexpr double kSameEnergy = 2.0;             // factor within which two disturbing candidates are of one size
+constexpr double kThreshold = 0.3;              // of the way from noise level to beat level
+constexpr double kNoiseMemory = 8.0;            // candidates; as Pan & Tompkins
+
+// ---- which candidate is a beat
+
+constexpr Duration kRefractory = milliseconds(200);       // of the ventricles (Pan & Tompkins)
 constexpr Duration kAfterUnfamiliar = milliseconds(100);  // a familiar beat so soon after an unfamiliar one counts
 constexpr double kOutshines = 3.0;   // or after one of less than a third of its energy: that was a P wave
 constexpr double kTWave = 0.45;      // s / sqrt(cycle in s), the end of the T wave (Bazett 1920): before it, what has
-constexpr double kTWaveSlope = 0.5;  // less than this share of the last beat's slope is its T wave
-constexpr double kTWaveLevel = 0.8;
-constexpr double kThreshold = 0.3;    // of the way from noise level to beat level
-constexpr double kNoiseMemory = 8.0;  // candidates
+constexpr double kTWaveSlope = 0.5;  // less than this share of the last beat's slope is its T wave;
+constexpr double kTWaveLevel = 0.8;  // the last one may have been small: at least this share of the usual slope
+constexpr double kUnfamiliarStrength = 0.5;         // an ectopic beat is rarely smaller; P and T waves are
+constexpr double kUnfamiliarMost = 6.0;             // times the usual energy: a disturbance, or another gain
+constexpr double kDisturbance = 0.33;               // size from which on what is no beat says that there is noise
+constexpr Duration kNoisyFor = seconds(2);          // after a disturbance: they come in trains
+constexpr Duration kStepReach = milliseconds(100);  // each side, outside the complex
+constexpr double kStep = 0.85;           // change of level to the excursions, from which on the electrode has moved,
+constexpr double kStepUnlike = 0.82;     // unless the shape is more alike than this: a beat on a step
+constexpr double kVeryLike = 0.93;       // a held candidate so much alike is a beat whatever the rhythm
+constexpr double kOtherStrength = 0.45;  // of a beat that is of a rare template: such as the P wave's,
+constexpr double kEstablishedStrength = 0.3;    // and of a frequent one
+constexpr double kDoubtfulStrength = 0.4;       // in quiet, a small beat of this size is decided
+constexpr Duration kDoubt = milliseconds(250);  // after so long, when a P wave's own QRS complex would have come
+constexpr double kMissed = 1.45;                // usual cycles between two familiar beats: there was one in between
+constexpr double kInRhythm = 0.15;  // of the cycle: a beat in time after an unfamiliar one shows that as noise
 
-constexpr double kUnfamiliarStrength = 0.5;
-constexpr double kStep = 0.85;
-constexpr double kStepUnlike = 0.82;
-constexpr double kVeryLike = 0.93;
-constexpr Duration kStepReach = milliseconds(100);
-constexpr double kOtherStrength = 0.45;
-constexpr double kEstablishedStrength = 0.3;
-constexpr double kDoubtfulStrength = 0.4;
-constexpr Duration kDoubt = milliseconds(250);
-constexpr double kUnfamiliarMost = 6.0;
-constexpr double kDisturbance = 0.33;
-constexpr Duration kNoisyFor = seconds(2);
-constexpr double kMissed = 1.45;  // usual cycles between two familiar beats: there was one in between
-constexpr double kLearnt = 0.7;
-constexpr double kInRhythm = 0.15;
+// ---- search back
 
-constexpr double kHeldOverdue = 1.5;
+constexpr double kHeldOverdue = 1.5;     // usual cycles after which the held candidate is taken
 constexpr double kSearchBackLike = 0.7;  // where the beats' shape is known: with this correlation and size,
 constexpr double kSearchBackSize = 0.35;
 constexpr double kSearchBackVeryLike = 0.88;  // or with these
 constexpr double kSearchBackLeastSize = 0.2;
 constexpr double kTimely = 0.2;       // of the usual cycle: standard deviation within which a held candidate is in time
-constexpr double kSearchBack = 1.66;  // mean cycles without a beat after which a weaker candidate is taken,
-constexpr double kSearchBackThreshold = 0.5;  // above this share of the threshold
-constexpr Duration kSearchBackWait = milliseconds(300);
-constexpr double kRhythmAtStart_s = 1.2;  // until an interval is known
-constexpr double kSlowestRhythm_s = 2.0;
-constexpr double kDeafness_s = 1.0;  // that threshold falls by e in this time: the gain may have changed
+constexpr double kUntimely = 0.1;     // weight of one at any other time,
+constexpr double kLeastLike = 0.2;    // and correlation that an unlike one counts with: neither excludes a beat
+constexpr double kSearchBack = 1.66;  // cycles without a beat after which a weaker candidate is taken (Pan & Tompkins),
+constexpr double kSearchBackThreshold = 0.5;             // above this share of the threshold (likewise)
+constexpr Duration kSearchBackWait = milliseconds(300);  // longer than a PR interval: a P wave's QRS complex has come
+constexpr double kRhythmAtStart_s = 1.2;  // until an interval is known: slow, so that nothing is sought too early
+constexpr double kSlowestRhythm_s = 2.0;  // a block must not make the search back wait for ever
+constexpr double kDeafness_s = 1.0;       // that threshold falls by e in this time: the gain may have changed
+
+// ---- trust: how sure each way to a beat is, before resemblance and noise lower the confidence
+
+constexpr double kTrustFamiliar = 1.0;
+constexpr double kTrustNew = 0.8;            // while no shape is known
+constexpr double kTrustUnfamiliar = 0.7;     // in quiet
+constexpr double kTrustBetween = 0.5;        // in noise or weak, but the rhythm has a gap there
+constexpr double kTrustOverdue = 0.4;        // in noise, because one is due
+constexpr double kLearnt = 0.7;              // from this trust on a beat teaches rhythm and shapes
+constexpr double kUnlike = 0.5;              // correlation at which a familiar beat's confidence would be 0,
+constexpr double kAsAlikeAsAny = 0.4;        // and what above it makes it 1
+constexpr double kUnknownResemblance = 0.7;  // of a shape that has not been seen: that alone is no reason to disbelieve
 
 }  // namespace
 
@@ -117,6 +155,8 @@ void RPeakDetector::forget() noexcept {
   quiet_level_ = 0.0;
   quantum_mV_ = 0.0;
   noise_level_ = 0.0;
+  rough_level_ = 0.0;
+  other_gain_ = 0.0;
   beat_energy_.clear();
   beat_slope_.clear();
   rr_s_.clear();
@@ -153,8 +193,8 @@ void RPeakDetector::interrupt(Instant t, EcgSignal reason) noexcept {
 }
 
 void RPeakDetector::lead_off(Instant t) noexcept {
-  newest_ = t;
-  interrupt(t, EcgSignal::kLeadOff);
+  newest_ = std::max(newest_, t);
+  interrupt(newest_, EcgSignal::kLeadOff);
 }
 
 EcgSignal RPeakDetector::signal() const noexcept {
@@ -281,7 +321,10 @@ void RPeakDetector::watch_roughness() noexcept {
   const double rough = filter_.at(filter_.now()).rough;
   const double risen = rough_level_ * (1.0 + to_seconds(period_) / kRoughRise_s);
   rough_level_ = rough_level_ > 0.0 ? std::min(rough, risen) : rough;
-  if (beat_slope_.count() == 0) return;
+  if (beat_slope_.count() == 0) {
+    smooth_at_ = newest_;
+    return;
+  }
   const double limit = std::max(kRough * rough_level_, kRoughToBeats * beat_slope_.median());
   if (rough < (newest_ < rough_until_ ? kRoughHysteresis * limit : limit)) smooth_at_ = newest_;
   if (newest_ - smooth_at_ < kRoughAtLeast) return;
@@ -509,7 +552,7 @@ void RPeakDetector::refine_peak(std::int64_t peak, Candidate& candidate) const n
       const double residual = filter_.at(i + delay).despiked - offset - (a + b * u + c * u * u);
       squares += residual * residual;
     }
-    const double noise = std::max(std::sqrt(squares / n), quiet_level_);
+    const double noise = std::max(std::sqrt(squares / std::max(n - 3.0, 1.0)), quiet_level_);
     deviation_s = noise / (2.0 * std::abs(c) * std::sqrt(sum_u2));
     const auto shift = static_cast<std::int64_t>(std::lround(vertex_s / step_s));
     if (pass == 0 && shift != 0) {
@@ -541,7 +584,7 @@ void RPeakDetector::finish_learning() noexcept {
   }
   for (int i = 0; i < learnt_count_; ++i) {
     const Candidate& candidate = learnt_[static_cast<std::size_t>(i)];
-    if (!has_last_ || candidate.peak.time > last_.peak.time) decide_new(candidate);
+    if (!too_soon(candidate)) decide_new(candidate);
   }
 }
 
@@ -566,10 +609,14 @@ const RPeakDetector::Candidate* RPeakDetector::strongest_recurring() noexcept {
   return alike >= 2 && alike >= kRecurringShare * large ? &*strongest : nullptr;
 }
 
+// Before the last beat, or while the ventricles cannot contract again.
+bool RPeakDetector::too_soon(const Candidate& candidate) const noexcept {
+  return has_last_ && candidate.peak.time - last_.peak.time < kRefractory;
+}
+
 // A maximum of the energy.
 void RPeakDetector::decide(const Candidate& candidate) noexcept {
-  const Instant t = candidate.peak.time;
-  if (has_last_ && t - last_.peak.time < kRefractory) return;
+  if (too_soon(candidate)) return;
   if (templates_.any_usable()) {
     decide_unfamiliar(candidate);
   } else {
@@ -579,11 +626,9 @@ void RPeakDetector::decide(const Candidate& candidate) noexcept {
 
 // While the beats' shape is not known.
 void RPeakDetector::decide_new(const Candidate& candidate) noexcept {
-  const Instant t = candidate.peak.time;
-  if (has_last_ && t - last_.peak.time < kRefractory) return;
   const bool t_wave = is_t_wave(candidate);
   if (!t_wave && stands_out(candidate, kStandOut) && candidate.energy > beat_threshold()) {
-    accept(candidate, 0.8);
+    accept(candidate, kTrustNew);
     return;
   }
   noise_level_ += (candidate.energy - noise_level_) / kNoiseMemory;
@@ -612,7 +657,7 @@ void RPeakDetector::decide_unfamiliar(const Candidate& candidate) noexcept {
     return;
   }
   if (t >= noisy_until_) {
-    accept(candidate, 0.7);
+    accept(candidate, kTrustUnfamiliar);
     return;
   }
   noisy_until_ = t + kNoisyFor;
@@ -630,10 +675,10 @@ void RPeakDetector::hold(const Candidate& candidate) noexcept {
 
 // How likely a candidate in noise is a beat, against others: by shape, and by how near it is to where one is due.
 double RPeakDetector::likelihood(const Candidate& candidate) const noexcept {
-  const double shape = std::max(candidate.correlation, 0.2);
+  const double shape = std::max(candidate.correlation, kLeastLike);
   if (!has_last_) return shape;
   const double off = (to_seconds(candidate.peak.time - last_.peak.time) / rhythm_s() - 1.0) / kTimely;
-  return shape * (0.1 + std::exp(-0.5 * off * off));
+  return shape * (kUntimely + std::exp(-0.5 * off * off));
 }
 
 // A candidate far larger than the beats is like another one of the last seconds: the gain has risen.
@@ -641,7 +686,7 @@ bool RPeakDetector::large_recur(const Candidate& candidate) const noexcept {
   for (int i = 0; i < learnt_count_; ++i) {
     const Candidate& other = learnt_[static_cast<std::size_t>(i)];
     if (candidate.peak.time - other.peak.time < kRefractory || newest_ - other.peak.time > kLearningWindow) continue;
-    if (other.energy > 0.5 * candidate.energy && other.energy < 2.0 * candidate.energy &&
+    if (other.energy * kSameEnergy > candidate.energy && other.energy < kSameEnergy * candidate.energy &&
         best_match(candidate.peak.shape, other.peak.shape, kRecurringDisplaced).correlation > kSurelyFamiliar) {
       return true;
     }
@@ -684,24 +729,23 @@ void RPeakDetector::decide_familiar(const Fit& fit) noexcept {
   const double rhythm = rhythm_s();
   if (has_held_) {
     has_held_ = false;
-    const bool apart =
-        t - held_.peak.time > kRefractory && (!has_last_ || held_.peak.time - last_.peak.time > kRefractory);
+    const bool apart = t - held_.peak.time > kRefractory && !too_soon(held_);
     const bool very_like = held_.correlation > kVeryLike && held_.gain > kSureGain && held_.gain < 1.0 / kSureGain &&
                            strength(held_) > kUnfamiliarStrength;
     if (apart && has_last_ && (very_like || to_seconds(since) > kMissed * rhythm)) {
-      accept(held_, 0.5);
+      accept(held_, kTrustBetween);
     } else {
       noisy_until_ = t + kNoisyFor;
     }
   } else if (has_passed_over_ && has_last_ && to_seconds(since) > kMissed * rhythm &&
              t - passed_over_.peak.time > kRefractory && sizeable(passed_over_)) {
-    accept(passed_over_, 0.5);
+    accept(passed_over_, kTrustBetween);
   }
   const bool after_unfamiliar = has_last_ && !last_familiar_;
   if (after_unfamiliar && std::abs(to_seconds(t - before_last_) - rhythm) < kInRhythm * rhythm) {
     noisy_until_ = t + kNoisyFor;
   }
-  accept(candidate, 1.0);
+  accept(candidate, kTrustFamiliar);
 }
 
 // Where the shape of the beats is known, what is much smaller than they are must be the more like them.
@@ -724,10 +768,10 @@ void RPeakDetector::resolve_overdue() noexcept {
   const Instant t = newest_;
   const double since_s = to_seconds(t - (has_last_ ? last_.peak.time : start_));
   const double rhythm = rhythm_s();
-  if (has_held_ && has_last_ && held_.peak.time - last_.peak.time < kRefractory) has_held_ = false;
+  if (has_held_ && too_soon(held_)) has_held_ = false;
   if (has_held_ && (since_s > kHeldOverdue * rhythm || t >= held_until_)) {
     has_held_ = false;
-    accept(held_, 0.4);
+    accept(held_, kTrustOverdue);
     return;
   }
   if (since_s > to_seconds(kRelearnAfter) && since_s > kRelearnCycles * rhythm) {
@@ -740,7 +784,7 @@ void RPeakDetector::resolve_overdue() noexcept {
   if (late_s <= 0.0) return;
   if (templates_.any_usable() && !sizeable(passed_over_)) return;
   const double threshold = kSearchBackThreshold * beat_threshold() * std::exp(-late_s / kDeafness_s);
-  if (passed_over_.energy > threshold && stands_out(passed_over_, kStandOut)) accept(passed_over_, 0.5);
+  if (passed_over_.energy > threshold && stands_out(passed_over_, kStandOut)) accept(passed_over_, kTrustBetween);
 }
 
 void RPeakDetector::accept(const Candidate& candidate, double trust) noexcept {
@@ -764,9 +808,11 @@ void RPeakDetector::accept(const Candidate& candidate, double trust) noexcept {
     beat_slope_.push(candidate.slope);
   }
   RPeak peak = candidate.peak;
-  const double resemblance = familiar ? std::clamp((candidate.correlation - 0.5) / 0.4, 0.0, 1.0) : 0.7;
+  const double resemblance =
+      familiar ? std::clamp((candidate.correlation - kUnlike) / kAsAlikeAsAny, 0.0, 1.0) : kUnknownResemblance;
   const double quiet = candidate.energy > 0.0 ? std::min(quiet_level_ / candidate.energy, 1.0) : 1.0;
   peak.confidence = trust * resemblance * (1.0 - quiet);
+  if (!familiar && trust <= kTrustBetween) peak.deviation = from_seconds(kDoubtfulDeviation_s);
   emit(peak);
 
   const double keep = upward_ > 0.0 || downward_ > 0.0 ? 1.0 - 1.0 / kPolarityMemory : 0.0;

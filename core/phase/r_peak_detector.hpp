@@ -104,6 +104,7 @@ class RPeakDetector {
   void finish_learning() noexcept;
   [[nodiscard]] const Candidate* strongest_recurring() noexcept;
   [[nodiscard]] bool large_recur(const Candidate& candidate) const noexcept;
+  [[nodiscard]] bool too_soon(const Candidate& candidate) const noexcept;
   void decide(const Candidate& candidate) noexcept;
   void decide_new(const Candidate& candidate) noexcept;
   void decide_unfamiliar(const Candidate& candidate) noexcept;

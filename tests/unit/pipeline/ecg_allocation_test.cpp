@@ -1,0 +1,98 @@
+// What the ECG thread runs, once made, takes nothing from the heap. A program of its own, because it counts the calls
+// of the allocator.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/pipeline/ecg_intake.hpp"
+#include "counted_allocations.hpp"
+
+namespace perimap {
+namespace {
+
+using test::allocations_of;
+
+constexpr double kRate_hz = 360.0;
+
+// A minute of a real record with all that leads the detector off its usual way: a burst, a gain that changes, a flat
+// line, a lead that is off, a gap.
+std::vector<EcgBlock> eventful_minute() {
+  std::ifstream file(PERIMAP_TEST_DATA "/mitbih/105_60s.csv");
+  std::string line;
+  std::getline(file, line);
+  std::vector<EcgBlock> blocks;
+  std::mt19937 generator(3);
+  std::normal_distribution<double> noise(0.0, 5.0);
+  std::uint32_t i = 0;
+  while (std::getline(file, line)) {
+    const double t = i / kRate_hz;
+    double mV = std::stod(line.substr(line.find(',') + 1));
+    if (t > 12.0 && t < 14.0) mV = std::clamp(mV + noise(generator), -5.0, 5.0);
+    if (t > 22.0 && t < 30.0) mV *= 10.0;
+    if (t > 33.0 && t < 36.0) mV = 5.12;
+    const bool off = t > 40.0 && t < 41.0;
+    const bool missing = t > 48.0 && t < 49.0;
+    if (!missing) {
+      if (blocks.empty() || blocks.back().count == 32 || blocks.back().lead_off != off) {
+        EcgBlock block;
+        block.first_sample_time = Instant(from_seconds(t));
+        block.sample_period = from_seconds(1.0 / kRate_hz);
+        block.device_sequence = i;
+        block.lead_off = off;
+        blocks.push_back(block);
+      }
+      EcgBlock& block = blocks.back();
+      block.mV[block.count++] = static_cast<float>(mV);
+      block.arrival = Instant(from_seconds(t + 0.01));
+    }
+    ++i;
+  }
+  return blocks;
+}
+
+TEST(Allocation, TheEcgThreadTakesNothingFromTheHeap) {
+  const std::vector<EcgBlock> blocks = eventful_minute();
+  ASSERT_GT(blocks.size(), 600U);
+  const auto cells = std::make_unique<ClockCells>();
+  const auto counters = std::make_unique<PipelineCounters>();
+  for (const RrMethod method : {RrMethod::kPrevious, RrMethod::kMeanOf8, RrMethod::kAutoregressive}) {
+    CardiacClockSettings settings;
+    settings.predictor = method;
+    const auto intake = std::make_unique<EcgIntake>(settings, *cells, *counters);
+    const long count = allocations_of([&] {
+      for (const EcgBlock& block : blocks) intake->push(block);
+    });
+    EXPECT_EQ(count, 0);
+  }
+  // The way went through all that it was to go through.
+  EXPECT_GT(counters->ecg_dropped.get(), 0U);
+  EXPECT_GT(counters->ecg_lead_off.get(), 2U * 360U);
+  EXPECT_TRUE(cells->mapper.update());
+}
+
+TEST(Allocation, TheEndOfASignalTakesNothingFromTheHeap) {
+  const std::vector<EcgBlock> blocks = eventful_minute();
+  const auto detector = std::make_unique<RPeakDetector>();
+  int beats = 0;
+  const long count = allocations_of([&] {
+    for (std::size_t b = 0; b < 100; ++b) {
+      Instant t = blocks[b].first_sample_time;
+      for (const float mV : blocks[b].samples()) {
+        beats += detector->push(t, mV) ? 1 : 0;
+        t += blocks[b].sample_period;
+      }
+    }
+    while (detector->flush()) ++beats;
+  });
+  EXPECT_EQ(count, 0);
+  EXPECT_GT(beats, 8);
+}
+
+}  // namespace
+}  // namespace perimap
