@@ -77,18 +77,30 @@ Expected<EcgTrace> read_recorded(const std::string& file, double gain) {
   return trace;
 }
 
+bool is_wfdb(const std::filesystem::path& path) {
+  std::filesystem::path header = path;
+  header.replace_extension(".hea");
+  return path.extension() == ".hea" || path.extension() == ".dat" ||
+         (path.extension().empty() && std::filesystem::exists(header));
+}
+
+// What is wrong with the options; empty when nothing is.
+std::string misuse(const Options& options) {
+  if (!std::isfinite(options.gain) || options.gain == 0.0) return "--gain must be a number other than 0";
+  const std::filesystem::path path(options.input);
+  if (path.extension() == ".mcap" && (options.rate_hz || options.column))
+    return "a recording knows its rate and channel: leave out --rate and --column";
+  if (is_wfdb(path) && options.rate_hz) return "a WFDB record knows its rate: leave out --rate";
+  return {};
+}
+
 Expected<EcgTrace> read_trace(const Options& options) {
   const std::filesystem::path path(options.input);
   const std::string extension = path.extension().string();
-  if (extension == ".mcap") {
-    if (options.rate_hz || options.column)
-      return fail("a recording knows its rate and channel: leave out --rate and --column");
-    return read_recorded(options.input, options.gain);
-  }
-  std::filesystem::path header = path;
-  header.replace_extension(".hea");
-  if (extension == ".hea" || extension == ".dat" || (extension.empty() && std::filesystem::exists(header))) {
-    if (options.rate_hz) return fail("a WFDB record knows its rate: leave out --rate");
+  if (extension == ".mcap") return read_recorded(options.input, options.gain);
+  if (is_wfdb(path)) {
+    std::filesystem::path header = path;
+    header.replace_extension(".hea");
     auto trace = read_wfdb(header.string(), options.column.value_or(1));
     if (trace) {
       for (float& mV : trace->mV) mV *= static_cast<float>(options.gain);
@@ -275,7 +287,7 @@ void add_ecg_command(CLI::App& app, int& exit_code) {
   command->add_option(
       "--beats", options->beats,
       "Write the beats to this table: time_s,class,confidence,detected_at_s; classes normal, premature, "
-      "pause, noise");
+      "pause, noise; times of a recording count from its first ECG sample");
   command->add_option("--rate", options->rate_hz, "Samples a second of a table without times")
       ->check(CLI::Range(1.0, 100000.0));
   command
@@ -289,8 +301,8 @@ void add_ecg_command(CLI::App& app, int& exit_code) {
                       "a beat counts as found within 150 ms");
   command->add_flag("--json", options->json, "Print the figures as JSON");
   command->callback([options, &exit_code] {
-    if (!std::isfinite(options->gain) || options->gain == 0.0) {
-      fmt::print(stderr, "perimap ecg: --gain must be a number other than 0\n");
+    if (const std::string wrong = misuse(*options); !wrong.empty()) {
+      fmt::print(stderr, "perimap ecg: {}\n", wrong);
       exit_code = 2;
       return;
     }

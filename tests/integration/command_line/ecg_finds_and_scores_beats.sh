@@ -1,8 +1,9 @@
 #!/bin/sh
-# perimap ecg: beats of a table found and scored; what is wrong is named, with the right exit code.
+# perimap ecg: beats of a table and of a recording found and scored; what is wrong is named, with the right exit code.
 set -eu
 perimap=$1
 data=$2
+recording=$3
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
@@ -16,6 +17,12 @@ cut -d, -f2 "$data/100_60s.csv" > "$work/alone.csv"
 "$perimap" ecg "$work/alone.csv" --rate 360 --gain 0.001 --beats "$work/alone_beats.csv" > /dev/null
 [ "$(wc -l < "$work/alone_beats.csv")" -eq "$(wc -l < "$work/beats.csv")" ]
 
+# The ECG of a recording: 6 s of a regular heart.
+"$perimap" ecg "$recording" --beats "$work/recorded.csv" --json > "$work/recorded.json"
+beats=$(tail -n +2 "$work/recorded.csv" | wc -l)
+[ "$beats" -ge 5 ] && [ "$beats" -le 9 ] || { echo "$beats beats in 6 s"; exit 1; }
+grep -q '"unusable_s": 0.0' "$work/recorded.json"
+
 expect() {  # EXIT_CODE PATTERN ARGUMENT...
   code=$1 pattern=$2
   shift 2
@@ -28,6 +35,11 @@ expect 1 'garbled.csv:3:5: expected a number' "$work/garbled.csv"
 expect 1 'nothing.csv' "$work/nothing.csv"
 expect 1 'say --rate' "$work/alone.csv"
 expect 1 'no WFDB\|nothing.hea' "$work/nothing.hea"
+head -c 100000 "$recording" > "$work/cut.mcap"
+expect 1 'cut.mcap: byte 100000: .*cut off' "$work/cut.mcap"
+expect 1 'nothing.mcap' "$work/nothing.mcap"
+expect 2 'knows its rate' "$recording" --rate 360
+expect 2 'knows its rate' "$work/record.hea" --rate 360
 expect 1 'reference' "$data/100_60s.csv" --reference "$work/nothing.csv"
 expect 2 'rate' "$data/100_60s.csv" --rate fast
 expect 2 'gain' "$data/100_60s.csv" --gain 0
