@@ -42,16 +42,29 @@ function(perimap_prelude NAME)
   endif()
 endfunction()
 
-# perimap_test(NAME SOURCES f... DEPENDS target... [LABELS l...])
+# perimap_test(NAME [PLAIN] [ALWAYS] SOURCES f... DEPENDS target... [LABELS l...])
 #
 # A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA.
+#
+# tests/run.sh builds most programs once, under AddressSanitizer, and those marked PLAIN (counting allocations, or very
+# long to compile with a sanitizer) once without; ALWAYS: in both. PERIMAP_TESTS chooses; `all` holds everywhere else.
+set(PERIMAP_TESTS all CACHE STRING "Unit tests to build: all, plain (those marked so), other (the rest)")
 function(perimap_test NAME)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "PLAIN;ALWAYS" "" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  set(wanted ON)
+  if(NOT ARG_ALWAYS AND ((PERIMAP_TESTS STREQUAL plain AND NOT ARG_PLAIN) OR (PERIMAP_TESTS STREQUAL other AND ARG_PLAIN)))
+    set(wanted OFF)
+  endif()
   add_executable(${NAME} ${ARG_SOURCES})
+  if(NOT wanted)
+    set_target_properties(${NAME} PROPERTIES EXCLUDE_FROM_ALL ON)
+  endif()
   target_link_libraries(${NAME} PRIVATE ${ARG_DEPENDS} GTest::gtest GTest::gmock GTest::gtest_main perimap_warnings)
   if(TARGET test_prelude)
     target_precompile_headers(${NAME} REUSE_FROM test_prelude)
   endif()
   target_compile_definitions(${NAME} PRIVATE PERIMAP_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
-  gtest_discover_tests(${NAME} TEST_PREFIX "${NAME}." DISCOVERY_TIMEOUT 60 PROPERTIES LABELS "${ARG_LABELS}")
+  if(wanted)
+    gtest_discover_tests(${NAME} TEST_PREFIX "${NAME}." DISCOVERY_TIMEOUT 60 PROPERTIES LABELS "${ARG_LABELS}")
+  endif()
 endfunction()
