@@ -26,7 +26,9 @@ run() {
   "$perimap" watch --domain $domain --wait 60 --record "$2" > "$work/watch" 2>&1 &
   local watch=$!
   started+=($watch)
-  "$perimapd" -c "$1" 2> "$work/log" &
+  # It is read at once; the daemon may take a while to begin.
+  : > "$work/log"
+  "$perimapd" -c "$1" 2>> "$work/log" &
   daemon=$!
   started+=($daemon)
   if [ "$mode" = unplugged ]; then watch_for_leaks; fi
