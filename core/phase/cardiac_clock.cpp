@@ -81,7 +81,7 @@ CardiacClock::Located CardiacClock::locate_completed(int newer) const noexcept {
   located.state = PhaseState::kLocked;
   located.exact = true;
   located.irregularity = end.irregularity;
-  located.cycle.teaches = begin.beat_class != BeatClass::kPremature && end.beat_class == BeatClass::kNormal;
+  located.cycle.teaches = cycle_teaches(begin.beat_class, end.beat_class);
   located.cycle.begin = begin.time;
   located.cycle.begin_deviation = begin.deviation;
   located.cycle.length = end.time - begin.time;

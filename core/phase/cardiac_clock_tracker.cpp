@@ -42,7 +42,7 @@ void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
         const Duration missed = from_seconds(std::abs((Seconds(rr) - predicted).count()));
         if (Seconds(missed) > kRhythmTolerance * predicted) beat.irregularity = missed;
       }
-      const bool teaches = clock_.beat(0).beat_class != BeatClass::kPremature && peak.beat_class == BeatClass::kNormal;
+      const bool teaches = cycle_teaches(clock_.beat(0).beat_class, peak.beat_class);
       if (teaches) {
         predictor_.push(rr);
       } else {

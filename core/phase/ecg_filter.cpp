@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics/upper_median.hpp"
+
 namespace perimap {
 namespace {
 
@@ -40,8 +42,7 @@ void EcgFilter::push(Instant t, double mV) noexcept {
   std::array<double, 2 * kMaxSpikeHalf + 1> around{};
   const int width = 2 * spike_half_ + 1;
   for (int k = 0; k < width; ++k) around[static_cast<std::size_t>(k)] = at(now_ - k).mV;
-  std::nth_element(around.begin(), around.begin() + spike_half_, around.begin() + width);
-  sample.despiked = around[static_cast<std::size_t>(spike_half_)];
+  sample.despiked = upper_median(around.begin(), around.begin() + width);
   const auto mean = [&](int over, auto&& of) {
     double sum = 0.0;
     for (int k = 0; k < over; ++k) sum += of(at(now_ - k));

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics/upper_median.hpp"
+
 namespace perimap {
 namespace {
 
@@ -125,10 +127,7 @@ int ShapeTemplates::learn(const QrsShape& shape, bool upward) noexcept {
   t.sizes[static_cast<std::size_t>(t.beats % kSizes)] = size;
   t.beats = t.beats + 1 < 2 * kSizes ? t.beats + 1 : kSizes;  // bounded, same slot and same fill
   auto sorted = t.sizes;
-  const auto end = sorted.begin() + std::min(t.beats, kSizes);
-  const auto middle = sorted.begin() + (end - sorted.begin()) / 2;
-  std::nth_element(sorted.begin(), middle, end);
-  t.size = *middle;
+  t.size = upper_median(sorted.begin(), sorted.begin() + std::min(t.beats, kSizes));
   return best;
 }
 

@@ -15,6 +15,12 @@ enum class BeatClass : std::uint8_t {
   kNoise       // the detection is thought false: no beat
 };
 
+// Whether the cycle between two such beats is a guide to others: not one that begins with a premature beat, and not one
+// that ends with anything but a normal one.
+[[nodiscard]] constexpr bool cycle_teaches(BeatClass begin, BeatClass end) noexcept {
+  return begin != BeatClass::kPremature && end == BeatClass::kNormal;
+}
+
 struct RPeak {
   Instant time;             // of the peak itself, finer than the sample period
   Instant detected_at;      // stamp of the sample that made it known; later than `time` by the detector's delay

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics/upper_median.hpp"
+
 namespace perimap {
 namespace {
 
@@ -290,8 +292,7 @@ Duration RPeakDetector::learn_rate(Instant t, float mV) noexcept {
   if (first_count_ < static_cast<int>(first_times_.size())) return Duration::zero();
   std::array<Duration, std::tuple_size_v<decltype(first_times_)> - 1> steps{};
   for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = first_times_[i + 1] - first_times_[i];
-  std::nth_element(steps.begin(), steps.begin() + steps.size() / 2, steps.end());
-  return steps[steps.size() / 2];
+  return upper_median(steps.begin(), steps.end());
 }
 
 void RPeakDetector::set_rate(Duration sample_period) noexcept {
@@ -496,9 +497,7 @@ void RPeakDetector::measure_excursions(std::int64_t centre, Candidate& candidate
   for (std::int64_t i = std::max<std::int64_t>(centre - filter_.samples_in(kBaselineBefore), 0); i <= last; ++i) {
     *end++ = filter_.at(i).mV;
   }
-  const auto middle = stretch.begin() + (end - stretch.begin()) / 2;
-  std::nth_element(stretch.begin(), middle, end);
-  const double baseline = *middle;
+  const double baseline = upper_median(stretch.begin(), end);
 
   top = first;
   bottom = first;

@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 
+#include "core/statistics/upper_median.hpp"
+
 namespace perimap {
 
 template <int N>
@@ -26,9 +28,7 @@ class RecentValues {
   // Of an even number of values the upper of the middle two. At least one must be held.
   [[nodiscard]] double median() const noexcept {
     auto sorted = values_;
-    const auto middle = sorted.begin() + count_ / 2;
-    std::nth_element(sorted.begin(), middle, sorted.begin() + count_);
-    return *middle;
+    return upper_median(sorted.begin(), sorted.begin() + count_);
   }
 
  private:

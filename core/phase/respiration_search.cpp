@@ -99,29 +99,33 @@ void RespirationSearch::add(Instant t, const Vector3d& displacement_mm, double c
   ++newest.count;
 }
 
+// The normal equations at one candidate rate, and their solution.
 struct RespirationSearch::Fit {
   static constexpr int kColumns = kOther + kBreathColumns;
+  Eigen::Matrix<double, kColumns, kColumns> A = Eigen::Matrix<double, kColumns, kColumns>::Zero();
+  Eigen::Matrix<double, kColumns, 3> B = Eigen::Matrix<double, kColumns, 3>::Zero();
+  double square = 0.0;  // of the displacements, mm^2
+  Eigen::Matrix<double, kColumns, 3> coefficients;
   double residual = 0.0;  // sum of squares, mm^2
-  double without = 0.0;   // the same without breathing
-  int count = 0;
-  Eigen::Matrix<double, kColumns, 3> coefficients = Eigen::Matrix<double, kColumns, 3>::Zero();
+
+  // The residual of all the rest alone.
+  [[nodiscard]] double residual_without_breath() const noexcept {
+    const Eigen::Matrix<double, kOther, kOther> A_0 = A.topLeftCorner<kOther, kOther>();
+    const Eigen::Matrix<double, kOther, 3> B_0 = B.topRows<kOther>();
+    return square - A_0.ldlt().solve(B_0).cwiseProduct(B_0).sum();
+  }
 };
 
 RespirationSearch::Fit RespirationSearch::fit(double rate_rad_per_s) const noexcept {
-  constexpr int kColumns = Fit::kColumns;
-  const std::uint64_t oldest = count_ > kBins ? count_ - kBins : 0;
   const Instant reference = bin(count_ - 1).begin;
-  const double span_s = to_seconds(reference - bin(oldest).begin);
-  Eigen::Matrix<double, kColumns, kColumns> A = Eigen::Matrix<double, kColumns, kColumns>::Zero();
-  Eigen::Matrix<double, kColumns, 3> B = Eigen::Matrix<double, kColumns, 3>::Zero();
-  double square = 0.0;
+  const double span_s = to_seconds(reference - bin(oldest()).begin);
   Fit result;
-  for (std::uint64_t i = oldest; i < count_; ++i) {
+  for (std::uint64_t i = oldest(); i < count_; ++i) {
     const Bin& at = bin(i);
     const double n = at.count;
     const double t_s = to_seconds(at.begin - reference) + at.time_sum_s / n;
     const Vector3d y = at.sum_mm / n;
-    Eigen::Matrix<double, kColumns, 1> row;
+    Eigen::Matrix<double, Fit::kColumns, 1> row;
     row(0) = 1.0;
     row(1) = t_s / span_s;
     for (std::size_t k = 0; k < at.cardiac_sum.size(); ++k) row(2 + static_cast<int>(k)) = at.cardiac_sum[k] / n;
@@ -131,24 +135,20 @@ RespirationSearch::Fit RespirationSearch::fit(double rate_rad_per_s) const noexc
     row(kOther + 1) = c * c - s * s;
     row(kOther + 2) = -s;
     row(kOther + 3) = -2.0 * s * c;
-    A.noalias() += row * row.transpose();
-    B.noalias() += row * y.transpose();
-    square += y.squaredNorm();
-    ++result.count;
+    result.A.noalias() += row * row.transpose();
+    result.B.noalias() += row * y.transpose();
+    result.square += y.squaredNorm();
   }
-  const Eigen::Matrix<double, kOther, kOther> A_0 = A.topLeftCorner<kOther, kOther>();
-  const Eigen::Matrix<double, kOther, 3> B_0 = B.topRows<kOther>();
-  result.without = square - A_0.ldlt().solve(B_0).cwiseProduct(B_0).sum();
-  result.coefficients = A.ldlt().solve(B);
-  result.residual = std::max(0.0, square - result.coefficients.cwiseProduct(B).sum());
+  result.coefficients = result.A.ldlt().solve(result.B);
+  result.residual = std::max(0.0, result.square - result.coefficients.cwiseProduct(result.B).sum());
   return result;
 }
 
 bool RespirationSearch::find(FoundBreath& found) const noexcept {
-  const std::uint64_t oldest = count_ > kBins ? count_ - kBins : 0;
-  if (count_ - oldest < 4 * Fit::kColumns) return false;
+  const auto bins = static_cast<int>(count_ - oldest());
+  if (bins < 4 * Fit::kColumns) return false;
   const Instant newest = bin(count_ - 1).begin;
-  const double span_s = to_seconds(newest - bin(oldest).begin);
+  const double span_s = to_seconds(newest - bin(oldest()).begin);
   const double longest_s = std::min(to_seconds(settings_.longest_period), span_s / kLeastBreaths);
   const double fastest = kTwoPi / to_seconds(settings_.shortest_period);
   const double slowest = kTwoPi / longest_s;
@@ -181,7 +181,8 @@ bool RespirationSearch::find(FoundBreath& found) const noexcept {
   const Fit fitted = fit(best);
   found.time = newest;
   found.rate_rad_per_s = best;
-  found.explained = fitted.without > 0.0 ? 1.0 - fitted.residual / fitted.without : 0.0;
+  const double without = fitted.residual_without_breath();
+  found.explained = without > 0.0 ? 1.0 - fitted.residual / without : 0.0;
   for (int k = 0; k < kBreathHarmonics; ++k) {
     found.wave.a[k] = fitted.coefficients.row(kOther + k).transpose();
     found.wave.b[k] = fitted.coefficients.row(kOther + kBreathHarmonics + k).transpose();
@@ -190,8 +191,8 @@ bool RespirationSearch::find(FoundBreath& found) const noexcept {
   // Cramer-Rao for phase and frequency of a known wave in white noise (Rife & Boorstyn, IEEE Trans. IT 20, 1974), taken
   // to the newest instant.
   const double slope = found.wave.slope_mm_per_rad();
-  const double variance_mm2 = fitted.residual / (3.0 * std::max(1, fitted.count - Fit::kColumns));
-  const double centre = kErrorsInCommon * variance_mm2 / (fitted.count * slope * slope);
+  const double variance_mm2 = fitted.residual / (3.0 * (bins - Fit::kColumns));
+  const double centre = kErrorsInCommon * variance_mm2 / (bins * slope * slope);
   found.rate_variance_rad2_per_s2 = 12.0 * centre / (span_s * span_s);
   found.covariance_rad2_per_s = 0.5 * span_s * found.rate_variance_rad2_per_s2;
   found.phase_variance_rad2 = centre + 0.25 * span_s * span_s * found.rate_variance_rad2_per_s2;

@@ -86,6 +86,7 @@ class RespirationSearch {
   [[nodiscard]] const Bin& bin(std::uint64_t index) const noexcept {
     return bins_[static_cast<std::size_t>(index % kBins)];
   }
+  [[nodiscard]] std::uint64_t oldest() const noexcept { return count_ > kBins ? count_ - kBins : 0; }
   [[nodiscard]] Fit fit(double rate_rad_per_s) const noexcept;
 
   RespirationSearchSettings settings_;

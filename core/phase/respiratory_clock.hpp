@@ -37,9 +37,12 @@ class RespiratoryClock {
   double unknown_displacement_mm = 0.0;  // per axis, while searching or suspected
   bool suspected = false;                // while off: the surface moves as by breathing
 
+  // There is breathing, or may be, and its phase is not known.
+  [[nodiscard]] bool unknown() const noexcept { return state == RespirationState::kSearching || suspected; }
+
   [[nodiscard]] RespiratoryPhase at(Instant t) const noexcept {
     RespiratoryPhase phase;
-    if (state == RespirationState::kSearching || suspected) phase.deviation_mm = unknown_displacement_mm;
+    if (unknown()) phase.deviation_mm = unknown_displacement_mm;
     if (state != RespirationState::kLocked) return phase;
     const double dt = to_seconds(t - time);
     phase.known = true;

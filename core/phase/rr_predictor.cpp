@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics/upper_median.hpp"
+
 namespace perimap {
 namespace {
 
@@ -24,9 +26,7 @@ constexpr double kNormalDeviation = 1.4826;  // a normal distribution's deviatio
 double median_of(const double* values, int count) noexcept {
   std::array<double, RrPredictor::kWindow> sorted{};
   std::copy(values, values + count, sorted.begin());
-  const auto middle = sorted.begin() + count / 2;
-  std::nth_element(sorted.begin(), middle, sorted.begin() + count);
-  return *middle;
+  return upper_median(sorted.begin(), sorted.begin() + count);
 }
 
 }  // namespace

@@ -75,8 +75,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   sample_.cardiac_phase_rate_rad_per_s = phase.rate_rad_per_s;
   const bool late = oldest < release.frame_sequence && !release.frame_missing;
   sample_.update_late = late;
-  const bool breath_unknown = respiration.state == RespirationState::kSearching || respiration.suspected;
-  sample_.reason = reason_of(phase, breath_unknown, !order_.empty(), release.frame_missing, late, pose_missing);
+  sample_.reason = reason_of(phase, respiration.unknown(), !order_.empty(), release.frame_missing, late, pose_missing);
   sample_.state = state_of(sample_.reason);
 
   const bool phase_usable = phase.state == PhaseState::kLocked || phase.state == PhaseState::kFreeRunning;
@@ -105,7 +104,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
     feature.last_observed = snapshot->last_observed;
     feature.state = phase_usable ? snapshot->state : FeatureState::kInvalid;
     feature.reason = phase_usable ? snapshot->reason : FeatureReason::kPhaseLost;
-    if (breath_unknown && feature.state == FeatureState::kConverged) {
+    if (respiration.unknown() && feature.state == FeatureState::kConverged) {
       feature.state = FeatureState::kConverging;
       feature.reason = FeatureReason::kDeviationLarge;
     }

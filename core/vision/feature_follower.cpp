@@ -5,20 +5,14 @@
 #include <array>
 #include <cmath>
 
+#include "core/statistics/upper_median.hpp"
+
 namespace perimap {
 namespace {
 
 constexpr double kFirstDeviation_px = 6.0;
 constexpr std::size_t kNeighbours = 6;
 constexpr std::size_t kEnoughDisplacements = 4;
-
-// The middle value; reorders. 0 of none.
-double median_of(std::vector<double>& values) noexcept {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 bool is_sought(const FollowedFeature& feature) noexcept {
   return feature.state == FollowState::kCandidate || feature.state == FollowState::kTracked;
@@ -92,8 +86,7 @@ FeatureFollower::Around FeatureFollower::around(const Vector2d& px, const Follow
   std::array<double, kNeighbours> along;
   for (int axis = 0; axis < 2; ++axis) {
     for (std::size_t i = 0; i < count; ++i) along[i] = nearest[i].by[axis];
-    std::nth_element(along.begin(), along.begin() + count / 2, along.begin() + count);
-    result.by[axis] = along[count / 2];
+    result.by[axis] = upper_median(along.begin(), along.begin() + count);
   }
   return result;
 }
@@ -131,8 +124,8 @@ void FeatureFollower::follow(const GreyImage& image) noexcept {
   if (scratch_.size() >= kEnoughDisplacements) {
     // A normal error along each axis has a median norm of 1.18 deviations; tissue errs with longer tails.
     constexpr double kDeviationsPerMedian = 2.0, kShareOfNew = 0.4;
-    const double lately = std::clamp(kDeviationsPerMedian * median_of(scratch_), settings_.least_deviation_px,
-                                     settings_.widest_deviation_px);
+    const double lately = std::clamp(kDeviationsPerMedian * upper_median(scratch_.begin(), scratch_.end()),
+                                     settings_.least_deviation_px, settings_.widest_deviation_px);
     deviation_px_ += (lately > deviation_px_ ? 1.0 : kShareOfNew) * (lately - deviation_px_);
   }
   find_again(image);
@@ -195,7 +188,8 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
   }
   if (scratch_.size() >= kEnoughDisplacements) {
     constexpr double kShareOfNew = 0.2, kLeast_px = 0.4;
-    strangeness_px_ += kShareOfNew * (std::max(kLeast_px, median_of(scratch_)) - strangeness_px_);
+    strangeness_px_ +=
+        kShareOfNew * (std::max(kLeast_px, upper_median(scratch_.begin(), scratch_.end())) - strangeness_px_);
   }
 }
 

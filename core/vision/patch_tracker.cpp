@@ -203,21 +203,6 @@ SearchResult search(const GreyImage& image, const PatchTemplate& patch, int l, c
 
 }  // namespace
 
-void PatchTracker::prefetch(const GreyImage& image, const Vector2d& predicted_px) const noexcept {
-  constexpr int kReach = PatchTemplate::kSide[0] / 2 + 2;
-  // Written so that a coordinate that is not a number fails too.
-  if (!(predicted_px.x() >= kReach && predicted_px.y() >= kReach && predicted_px.x() < image.width - kReach &&
-        predicted_px.y() < image.height - kReach)) {
-    return;
-  }
-  const int u = static_cast<int>(predicted_px.x()), v = static_cast<int>(predicted_px.y());
-  for (int row = v - kReach; row <= v + kReach; ++row) {
-    // A window is narrower than a cache line of 64 bytes: it lies in one or two.
-    __builtin_prefetch(image.row(row) + u - kReach);
-    __builtin_prefetch(image.row(row) + u + kReach);
-  }
-}
-
 PatchMatch PatchTracker::track(const GreyImage& image, const PatchTemplate& patch, PatchState& state,
                                const Vector2d& predicted_px, const Matrix2d& prediction_covariance_px2) const noexcept {
   PatchMatch match;

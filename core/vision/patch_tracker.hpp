@@ -67,9 +67,6 @@ class PatchTracker {
                                  const Vector2d& predicted_px,
                                  const Matrix2d& prediction_covariance_px2) const noexcept;
 
-  // Has the memory around predicted_px fetched for a track() that is to follow shortly; changes nothing else.
-  void prefetch(const GreyImage& image, const Vector2d& predicted_px) const noexcept;
-
  private:
   PatchTrackerSettings settings_;
   const PatchKernels* kernels_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics/upper_median.hpp"
+
 namespace perimap {
 namespace {
 
@@ -53,9 +55,7 @@ std::optional<double> peak_near(const EcgTrace& trace, double t) {
                             trace.mV.begin() + (end - trace.time_s.begin()));
   if (std::any_of(values.begin(), values.end(), [](float v) { return !std::isfinite(v); })) return std::nullopt;
   auto sorted = values;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  const float median = *middle;
+  const float median = upper_median(sorted.begin(), sorted.end());
   const auto peak = std::max_element(values.begin(), values.end(),
                                      [&](float a, float b) { return std::abs(a - median) < std::abs(b - median); });
   return trace.time_s[first + static_cast<std::size_t>(peak - values.begin())];
@@ -66,10 +66,7 @@ double root_mean(double squares, std::size_t count) {
 }
 
 double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return values.empty() ? 0.0 : upper_median(values.begin(), values.end());
 }
 
 }  // namespace

@@ -14,28 +14,26 @@
 namespace perimap {
 namespace {
 
-std::unique_ptr<EcgProtocol> ecg_protocol(const EcgConfiguration& c, EcgSink sink, DeviceHealth& health) {
+struct SerialEcg {
+  std::unique_ptr<EcgProtocol> protocol;
+  int baud;
+};
+
+SerialEcg serial_ecg(const EcgConfiguration& c, EcgSink sink, DeviceHealth& health) {
   using Protocol = EcgConfiguration::Protocol;
   if (c.protocol == Protocol::kBitalino) {
     BitalinoSettings settings;
     if (c.channel > 0) settings.channel = c.channel;
-    return std::make_unique<BitalinoProtocol>(settings, std::move(sink), health);
+    return {std::make_unique<BitalinoProtocol>(settings, std::move(sink), health), BitalinoProtocol::kBaud};
   }
   if (c.protocol == Protocol::kCyton) {
     CytonSettings settings;
     if (c.channel > 0) settings.channel = c.channel;
-    return std::make_unique<CytonProtocol>(settings, std::move(sink), health);
+    return {std::make_unique<CytonProtocol>(settings, std::move(sink), health), CytonProtocol::kBaud};
   }
   MedlabSettings settings;
   if (c.count_mV > 0.0) settings.count_mV = c.count_mV;
-  return std::make_unique<MedlabProtocol>(settings, std::move(sink), health);
-}
-
-int baud_of(EcgConfiguration::Protocol protocol) {
-  using Protocol = EcgConfiguration::Protocol;
-  return protocol == Protocol::kBitalino ? BitalinoProtocol::kBaud
-         : protocol == Protocol::kCyton  ? CytonProtocol::kBaud
-                                         : MedlabProtocol::kBaud;
+  return {std::make_unique<MedlabProtocol>(settings, std::move(sink), health), MedlabProtocol::kBaud};
 }
 
 }  // namespace
@@ -63,8 +61,8 @@ void serve_ecg(const EcgDevice& device, const EcgSink& sink, DeviceHealth& healt
     serve_can_ecg(can->interface_name, settings, sink, health, interrupt);
     return;
   }
-  const auto protocol = ecg_protocol(c, sink, health);
-  serve_device(opener_of(device.endpoint, baud_of(c.protocol)), *protocol, health, interrupt);
+  const SerialEcg ecg = serial_ecg(c, sink, health);
+  serve_device(opener_of(device.endpoint, ecg.baud), *ecg.protocol, health, interrupt);
 }
 
 DeviceFeeder::DeviceFeeder(TrackerDevice tracker, EcgDevice ecg, CameraPlayback camera, SensorEntrance& entrance,

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics/upper_median.hpp"
+
 namespace perimap {
 namespace {
 
@@ -37,9 +39,7 @@ SurfaceDigest digest(const perimap_Surface& surface) {
     }
   }
   if (!deviations_mm.empty()) {
-    const auto middle = deviations_mm.begin() + static_cast<std::ptrdiff_t>(deviations_mm.size() / 2);
-    std::nth_element(deviations_mm.begin(), middle, deviations_mm.end());
-    digest.median_deviation_mm = *middle;
+    digest.median_deviation_mm = upper_median(deviations_mm.begin(), deviations_mm.end());
   }
   return digest;
 }

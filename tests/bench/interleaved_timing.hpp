@@ -3,11 +3,19 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
 
 namespace perimap::bench {
+
+// The value that a fraction of the values does not exceed; not a number when there are none.
+[[nodiscard]] inline double quantile(std::vector<double> values, double fraction) {
+  if (values.empty()) return std::nan("");
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1) + 0.5)];
+}
 
 struct Candidate {
   std::string name;
@@ -18,12 +26,8 @@ struct Candidate {
   Candidate(std::string name_of, double updates_of, std::function<void()> call_of)
       : name(std::move(name_of)), updates(updates_of), call(std::move(call_of)) {}
 
-  // The value that a fraction of the rounds does not exceed.
-  [[nodiscard]] double quantile(double fraction) const {
-    std::vector<double> sorted = ns_per_update;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted[static_cast<std::size_t>(fraction * static_cast<double>(sorted.size() - 1) + 0.5)];
-  }
+  // Over the rounds.
+  [[nodiscard]] double quantile(double fraction) const { return bench::quantile(ns_per_update, fraction); }
   [[nodiscard]] double median() const { return quantile(0.5); }
 };
 

@@ -47,12 +47,6 @@ class Method {
   int lost = 0;
 };
 
-double quantile(std::vector<double> values, double fraction) {
-  if (values.empty()) return std::nan("");
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1) + 0.5)];
-}
-
 cv::Mat borrow(const Footage& footage, std::size_t frame) {
   const GreyImage image = footage.image(frame);
   return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data),
@@ -125,7 +119,6 @@ class Patches final : public Method {
   void follow(const Footage& footage, std::size_t frame, const Places& predicted, Places& found) override {
     const GreyImage image = footage.image(frame);
     for (std::size_t i = 0; i < found.size(); ++i) {
-      if (i + 1 < found.size()) tracker_.prefetch(image, predicted[i + 1]);
       matches_[i] = tracker_.track(image, patches_[i], states_[i], predicted[i], covariance_);
       found[i] = matches_[i].state == MatchState::kFound ? matches_[i].px : kLost;
     }

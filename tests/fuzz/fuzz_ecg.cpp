@@ -4,11 +4,11 @@
 #include <cstdlib>
 #include <memory>
 
+#include "device_bytes.hpp"
 #include "drivers/ecg/bitalino.hpp"
 #include "drivers/ecg/can_ecg.hpp"
 #include "drivers/ecg/cyton.hpp"
 #include "drivers/ecg/medlab.hpp"
-#include "scripted_link.hpp"
 
 namespace perimap {
 namespace {
@@ -74,14 +74,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       return 0;
   }
   ScriptedLink link;
-  Instant now(std::chrono::seconds(1));
+  const Instant now(std::chrono::seconds(1));
   protocol->on_open(link, now);
-  const std::size_t chunk = 1 + data[1] % 64U;
-  for (std::size_t at = 0; at < input.size(); at += chunk) {
-    now += std::chrono::milliseconds(data[1] >> 6U);
-    protocol->on_bytes(link, input.subspan(at, std::min(chunk, input.size() - at)), now);
-    if (now >= protocol->next_time()) protocol->on_time(link, now);
-  }
+  feed_in_chunks(*protocol, link, now, input, 1 + data[1] % 64U, std::chrono::milliseconds(data[1] >> 6U));
   if (checked.samples > input.size()) std::abort();
   return 0;
 }

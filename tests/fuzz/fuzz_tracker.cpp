@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <memory>
 
+#include "device_bytes.hpp"
 #include "drivers/tracker/igtl_session.hpp"
 #include "drivers/tracker/ndi_session.hpp"
-#include "scripted_link.hpp"
 
 namespace perimap {
 namespace {
@@ -43,7 +43,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const TrackerSink sink = [](const TrackerSample& sample) { check(sample); };
   std::unique_ptr<DeviceProtocol> protocol;
   ScriptedLink link;
-  Instant now(std::chrono::seconds(1));
+  const Instant now(std::chrono::seconds(1));
   std::vector<std::byte> stream(input.begin(), input.end());
   switch (data[0] % 6) {
     case 0:
@@ -90,11 +90,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         if (data[1] % 4 == 3) stream[1] = std::byte{2};
       }
   }
-  const std::size_t chunk = 1 + data[1] % 64U;
-  for (std::size_t at = 0; at < stream.size(); at += chunk) {
-    now += std::chrono::milliseconds(data[1] >> 5U);
-    protocol->on_bytes(link, std::span(stream).subspan(at, std::min(chunk, stream.size() - at)), now);
-    if (now >= protocol->next_time()) protocol->on_time(link, now);
-  }
+  feed_in_chunks(*protocol, link, now, stream, 1 + data[1] % 64U, std::chrono::milliseconds(data[1] >> 5U));
   return 0;
 }

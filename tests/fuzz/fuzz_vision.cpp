@@ -68,7 +68,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (make_patch_template(image, px, easy, tracker.kernels(), patch) != TemplateVerdict::kGood) continue;
     for (const Vector2d& sought : {predicted, inside, px}) {
       PatchState now = state;
-      tracker.prefetch(image, sought);
       const PatchMatch match = tracker.track(image, patch, now, sought, deviation * deviation * Matrix2d::Identity());
       if (match.state != MatchState::kFound) continue;
       const bool is_inside =

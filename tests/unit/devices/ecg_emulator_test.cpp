@@ -15,6 +15,7 @@
 #include "drivers/ecg/cyton.hpp"
 #include "drivers/ecg/medlab.hpp"
 #include "drivers/emulator/emulator_server.hpp"
+#include "wait_until.hpp"
 
 namespace perimap {
 namespace {
@@ -72,14 +73,6 @@ class Session {
   }
   ~Session() { interrupt_.request(); }
 
-  bool wait_until(const std::function<bool()>& met, Duration longest = seconds(20)) {
-    const Instant deadline = MonotonicClock::now() + longest;
-    while (!met()) {
-      if (MonotonicClock::now() > deadline) return false;
-      std::this_thread::sleep_for(milliseconds(5));
-    }
-    return true;
-  }
   std::vector<EcgBlock> blocks() const {
     const std::lock_guard lock(mutex_);
     return blocks_;
@@ -111,7 +104,7 @@ class OverATerminal : public ::testing::TestWithParam<Case> {};
 TEST_P(OverATerminal, SamplesArriveInOrderWithTheTimeAtWhichTheyWereMeasured) {
   Session session(GetParam(), {});
   const auto wanted = static_cast<std::uint64_t>(1.5 * GetParam().rate_hz);
-  ASSERT_TRUE(session.wait_until([&] { return session.health.samples.get() >= wanted; })) << session.health.reason();
+  ASSERT_TRUE(wait_until([&] { return session.health.samples.get() >= wanted; })) << session.health.reason();
   std::vector<double> errors_ms;
   std::uint32_t next = 0;
   for (const EcgBlock& block : session.blocks()) {
@@ -139,10 +132,9 @@ TEST_P(OverATerminal, UnpluggedAndPluggedInAgainItGoesOn) {
   faults.unplug_every = milliseconds(300);
   faults.unplug_for = milliseconds(100);
   Session session(GetParam(), faults);
-  ASSERT_TRUE(session.wait_until([&] { return session.health.openings.get() >= 3; })) << session.health.reason();
+  ASSERT_TRUE(wait_until([&] { return session.health.openings.get() >= 3; })) << session.health.reason();
   const std::uint64_t before = session.health.samples.get();
-  ASSERT_TRUE(session.wait_until([&] { return session.health.samples.get() > before + 20; }))
-      << session.health.reason();
+  ASSERT_TRUE(wait_until([&] { return session.health.samples.get() > before + 20; })) << session.health.reason();
   Instant last{};
   for (const EcgBlock& block : session.blocks()) {
     EXPECT_GT(block.first_sample_time, last);
@@ -162,7 +154,7 @@ TEST_P(OverATerminal, LeadOffIsAStateOfItsOwn) {
     for (const EcgBlock& block : session.blocks()) count += std::exchange(off, block.lead_off) != off ? 1 : 0;
     return count;
   };
-  ASSERT_TRUE(session.wait_until([&] { return changes() >= 2; })) << session.health.reason();
+  ASSERT_TRUE(wait_until([&] { return changes() >= 2; })) << session.health.reason();
 }
 
 INSTANTIATE_TEST_SUITE_P(Ecg, OverATerminal, ::testing::ValuesIn(kCases),
@@ -174,7 +166,7 @@ TEST(EcgOverATerminal, FaultsAreCountedAndDamagedFramesGiveNoSample) {
   faults.truncated = 0.01;
   faults.lost = 0.02;
   Session session(kCases[1], faults);
-  ASSERT_TRUE(session.wait_until([&] { return session.health.samples.get() >= 2000; })) << session.health.reason();
+  ASSERT_TRUE(wait_until([&] { return session.health.samples.get() >= 2000; })) << session.health.reason();
   EXPECT_GT(session.health.damaged.get(), 0U);
   EXPECT_GT(session.health.lost.get(), 30U);
   // On a ramp of 1 mV/s two samples of a block differ by the resolution at most.

@@ -14,6 +14,7 @@
 #include "drivers/emulator/ndi_emulator.hpp"
 #include "drivers/tracker/igtl_session.hpp"
 #include "drivers/tracker/ndi_session.hpp"
+#include "wait_until.hpp"
 
 namespace perimap {
 namespace {
@@ -52,7 +53,7 @@ class Session {
                             : emulate_on_terminal(link, *device_, faults, ready, interrupt_);
       EXPECT_TRUE(done) << done.error().message;
     });
-    EXPECT_TRUE(wait_until([this] { return !where().empty(); }));
+    EXPECT_TRUE(wait_until([this] { return !where().empty(); }, seconds(30)));
     driving_ = std::jthread([this] {
       const auto endpoint = parse_endpoint(where());
       ASSERT_TRUE(endpoint) << endpoint.error().message;
@@ -61,14 +62,6 @@ class Session {
   }
   ~Session() { interrupt_.request(); }
 
-  bool wait_until(const std::function<bool()>& met) {
-    const Instant deadline = MonotonicClock::now() + seconds(30);
-    while (!met()) {
-      if (MonotonicClock::now() > deadline) return false;
-      std::this_thread::sleep_for(milliseconds(2));
-    }
-    return true;
-  }
   std::vector<TrackerSample> samples() const {
     const std::lock_guard lock(mutex_);
     return samples_;
@@ -97,7 +90,7 @@ class OverALine : public ::testing::TestWithParam<Setup> {};
 
 TEST_P(OverALine, PosesAreThoseOfTheInstantThatTheyAreStampedWith) {
   Session session(GetParam(), {});
-  ASSERT_TRUE(session.wait_until([&] { return session.health.samples.get() >= 150; })) << session.health.reason();
+  ASSERT_TRUE(wait_until([&] { return session.health.samples.get() >= 150; }, seconds(30))) << session.health.reason();
   std::vector<double> errors_mm;
   for (const TrackerSample& sample : session.samples()) {
     ASSERT_EQ(sample.state, ToolState::kOk);
@@ -118,10 +111,11 @@ TEST_P(OverALine, UnpluggedAndPluggedInAgainItGoesOn) {
   faults.unplug_every = milliseconds(GetParam() == Setup::kNdiOverATerminal ? 1700 : 300);
   faults.unplug_for = milliseconds(100);
   Session session(GetParam(), faults);
-  ASSERT_TRUE(session.wait_until([&] { return session.health.openings.get() >= 3; })) << session.health.reason();
+  ASSERT_TRUE(wait_until([&] { return session.health.openings.get() >= 3; }, seconds(30))) << session.health.reason();
   const std::uint64_t before = session.health.samples.get();
   EXPECT_GT(before, 0U);
-  ASSERT_TRUE(session.wait_until([&] { return session.health.samples.get() > before + 5; })) << session.health.reason();
+  ASSERT_TRUE(wait_until([&] { return session.health.samples.get() > before + 5; }, seconds(30)))
+      << session.health.reason();
 }
 
 INSTANTIATE_TEST_SUITE_P(Tracker, OverALine,
