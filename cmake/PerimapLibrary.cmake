@@ -46,9 +46,10 @@ endfunction()
 #
 # A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA.
 #
-# tests/run.sh builds most programs once, under AddressSanitizer, and those marked PLAIN (counting allocations, or very
-# long to compile with a sanitizer) once without; ALWAYS: in both. PERIMAP_TESTS chooses; `all` holds everywhere else.
-set(PERIMAP_TESTS all CACHE STRING "Unit tests to build: all, plain (those marked so), other (the rest)")
+# A quick tests/run.sh makes two builds. `plain`: the programs, the tests of whole programs, and the unit tests marked
+# PLAIN (counting allocations, very long to compile with a sanitizer, or of much that no other unit test needs).
+# `other`, under AddressSanitizer: the rest of the unit tests. ALWAYS: in both. Everywhere else PERIMAP_TESTS is `all`.
+set(PERIMAP_TESTS all CACHE STRING "Tests to build: all, plain, other, or OFF")
 function(perimap_test NAME)
   cmake_parse_arguments(ARG "PLAIN;ALWAYS" "" "SOURCES;DEPENDS;LABELS" ${ARGN})
   set(wanted ON)

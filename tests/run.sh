@@ -7,7 +7,7 @@ usage() {
   cat << 'END'
 tests/run.sh [--full] [--jobs N]
   Installs the packages, builds the presets dev and asan, runs their tests. 15 minutes on two cores at most.
-  A unit test runs in one of the two, mostly under AddressSanitizer.
+  Whole programs are tested without sanitizers, a unit test in one of the two, mostly under AddressSanitizer.
   --full    every test in both; also ThreadSanitizer, all of UndefinedBehaviorSanitizer, a release build, the tests
             labelled `long`, a minute of each fuzz target, format and clang-tidy
   --jobs N  parallel compilations; all processors when not given
