@@ -178,9 +178,8 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
 
   auto still = GroundTruth::create(mesh_W, motion);
   if (!still) return tl::unexpected(still.error());
-  const Pose far{Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), -axis_W).toRotationMatrix(),
-                 centre_W + 300.0 * axis_W};
-  const auto facing = still->first_hit(far, Vector3d::UnitZ(), motion.r_peaks.front());
+  const Pose far{Matrix3d::Identity(), centre_W + 300.0 * axis_W};
+  const auto facing = still->first_hit(far, -axis_W, motion.r_peaks.front());
   if (!facing) return fail("heart mesh: the scope's axis misses it");
   const Vector3d surface_W = still->position(*facing, motion.r_peaks.front());
   const ScopePath path(settings.seed, surface_W + kScopeDistance_mm * axis_W, centre_W, X_WH().R * up_H(),
