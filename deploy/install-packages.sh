@@ -23,6 +23,7 @@ build=(
   libhwy-dev                                 # core/bank: portable SIMD with a choice at run time
   libopencv-core-dev libopencv-imgproc-dev   # core/vision
   libopencv-videoio-dev                      # drivers/video: video files
+  libjpeg62-turbo-dev                        # drivers/image: MJPG cameras
   cyclonedds-dev cyclonedds-tools            # idl, daemon: DDS and its IDL compiler
   libfmt-dev
   libzstd-dev zlib1g-dev                     # drivers: recordings, simulator data

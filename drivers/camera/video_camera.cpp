@@ -1,0 +1,90 @@
+#include "drivers/camera/video_camera.hpp"
+
+#include <utility>
+
+#include "drivers/device/device_link.hpp"
+#include "drivers/video/video_file.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr double kUsualRate_hz = 30.0;
+
+class Playing {
+ public:
+  Playing(const VideoCameraSettings& settings, const CameraSink& sink, DeviceHealth& health, const Interrupt& interrupt)
+      : settings_(settings), sink_(sink), health_(health), interrupt_(interrupt) {}
+
+  Expected<void> run() {
+    for (bool again = true; again && !interrupt_.requested(); again = settings_.loop) {
+      auto reader = VideoReader::open(settings_.file);
+      if (!reader) return tl::unexpected(std::move(reader.error()));
+      begin(*reader);
+      if (auto played = play(*reader); !played) return played;
+    }
+    return {};
+  }
+
+ private:
+  void begin(const VideoReader& reader) {
+    if (period_ > Duration(0)) return;
+    double rate_hz = settings_.frame_rate_hz > 0.0 ? settings_.frame_rate_hz : reader.frames_per_s();
+    if (rate_hz <= 0.0) rate_hz = kUsualRate_hz;
+    period_ = from_seconds(1.0 / rate_hz);
+    capture_ = MonotonicClock::now();
+    health_.openings.add();
+    health_.set_identity(settings_.file);
+  }
+
+  Expected<void> play(VideoReader& reader) {
+    while (!interrupt_.requested()) {
+      auto decoded = reader.next();
+      if (!decoded) return tl::unexpected(std::move(decoded.error()));
+      if (*decoded == nullptr) return {};
+      ++sequence_;
+      capture_ += period_;
+      const Duration ahead = capture_ - MonotonicClock::now();
+      if (ahead < -period_) {
+        health_.lost.add();
+        continue;
+      }
+      if (ahead > Duration(0) && !wait_unless_interrupted(ahead, interrupt_)) return {};
+      deliver((*decoded)->grey);
+    }
+    return {};
+  }
+
+  void deliver(const GreyImage& grey) {
+    CameraFrame frame;
+    frame.stamp = {sequence_, capture_, std::max(capture_, MonotonicClock::now())};
+    frame.width = grey.width;
+    frame.height = grey.height;
+    frame.stride = static_cast<std::size_t>(grey.stride);
+    frame.bytes = std::as_bytes(std::span(grey.data, frame.stride * static_cast<std::size_t>(grey.height)));
+    health_.samples.add();
+    health_.jitter.add(frame.stamp.arrival - capture_);
+    sink_(frame);
+    health_.set_state(DeviceState::kStreaming);
+  }
+
+  const VideoCameraSettings& settings_;
+  const CameraSink& sink_;
+  DeviceHealth& health_;
+  const Interrupt& interrupt_;
+  Duration period_{0};
+  Instant capture_{};
+  std::uint64_t sequence_ = 0;
+};
+
+}  // namespace
+
+Expected<void> serve_video_camera(const VideoCameraSettings& settings, const CameraSink& sink, DeviceHealth& health,
+                                  const Interrupt& interrupt) {
+  health.set_state(DeviceState::kStarting);
+  auto played = Playing(settings, sink, health, interrupt).run();
+  health.set_reason(played ? "the video has ended" : played.error().message);
+  health.set_state(DeviceState::kClosed);
+  return played;
+}
+
+}  // namespace perimap

@@ -1,0 +1,24 @@
+// A video file in place of a camera, for development: its frames at its own pace, stamped as if just exposed.
+#pragma once
+
+#include <string>
+
+#include "core/error/expected.hpp"
+#include "drivers/device/device_health.hpp"
+#include "drivers/image/camera_frame.hpp"
+#include "drivers/transport/interrupt.hpp"
+
+namespace perimap {
+
+struct VideoCameraSettings {
+  std::string file;
+  double frame_rate_hz = 0.0;  // 0: the file's own, or 30 when it tells none
+  bool loop = true;            // begins anew at its end
+};
+
+// Runs on the calling thread until interrupted, or to the end without `loop`. Frames that cannot be decoded in time are
+// passed over, as a camera would, and counted in health.lost. Fails when the file cannot be read, or changes its size.
+[[nodiscard]] Expected<void> serve_video_camera(const VideoCameraSettings& settings, const CameraSink& sink,
+                                                DeviceHealth& health, const Interrupt& interrupt);
+
+}  // namespace perimap

@@ -1,0 +1,33 @@
+// A JPEG's luma, by libjpeg.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "core/error/expected.hpp"
+
+namespace perimap {
+
+class JpegDecoder {
+ public:
+  JpegDecoder();
+  JpegDecoder(JpegDecoder&&) noexcept;
+  JpegDecoder& operator=(JpegDecoder&&) noexcept;
+  JpegDecoder(const JpegDecoder&) = delete;
+  JpegDecoder& operator=(const JpegDecoder&) = delete;
+  ~JpegDecoder();
+
+  // Into rows of `width` bytes without gaps; `grey` holds width * height. Fails when the picture has another size, has
+  // no luma (RGB, CMYK), or is damaged or cut short, where libjpeg would make pixels up; `grey` then means nothing.
+  // Bytes between the picture's end and the JPEG's are let pass: cameras pad.
+  [[nodiscard]] Expected<void> decode(std::span<const std::byte> jpeg, int width, int height,
+                                      std::span<std::uint8_t> grey);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace perimap
