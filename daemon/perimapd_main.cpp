@@ -18,6 +18,8 @@
 #include "daemon/runtime/live_session.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
 #include "daemon/runtime/replay_setup.hpp"
+#include "daemon/runtime/session_recorder.hpp"
+#include "daemon/runtime/session_recording.hpp"
 
 namespace perimap {
 namespace {
@@ -65,6 +67,23 @@ int run_session(const std::string& configuration_file, const Configuration& conf
   return kOk;
 }
 
+// Guidance does not wait for a disk: without a recording the session goes on, and says so.
+AskedRecording begin_recording(const std::string& configuration_file, const DeviceSetup& setup) {
+  const RecordingConfiguration& c = setup.configuration.recording;
+  if (!c.record) return {};
+  const std::filesystem::path folder = std::filesystem::path(configuration_file).parent_path() / c.folder;
+  auto recorder =
+      SessionRecorder::create(recording_path(folder, std::chrono::system_clock::now()),
+                              recording_facts(setup.configuration, setup.pipeline.camera, "perimapd " PERIMAP_VERSION),
+                              static_cast<std::size_t>(c.memory_MB) << 20U);
+  if (!recorder) {
+    spdlog::error("not recording: {}; all else goes on", recorder.error().message);
+    return {true, nullptr};
+  }
+  spdlog::info("recording to {}", (*recorder)->file().string());
+  return {true, std::move(*recorder)};
+}
+
 int run(const std::string& configuration_file) {
   auto stop = StopSignal::install();
   if (!stop) return refuse(stop.error(), kFailure);
@@ -74,9 +93,9 @@ int run(const std::string& configuration_file) {
     auto setup = prepare_devices(configuration_file, *given);
     if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
     return run_session(configuration_file, setup->configuration, setup->pipeline, setup->identity, *stop,
-                       [&setup](SensorEntrance& entrance, int priority) {
-                         return std::make_unique<DeviceFeeder>(std::move(setup->tracker), std::move(setup->ecg),
-                                                               std::move(setup->camera), entrance, priority);
+                       [&setup, &configuration_file](SensorEntrance& entrance, int priority) {
+                         return std::make_unique<DeviceFeeder>(std::move(setup->devices), &entrance,
+                                                               begin_recording(configuration_file, *setup), priority);
                        });
   }
   if (!given->replay.recording) {
@@ -89,7 +108,8 @@ int run(const std::string& configuration_file) {
   if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
   return run_session(configuration_file, setup->configuration, setup->pipeline, setup->identity, *stop,
                      [&setup](SensorEntrance& entrance, int priority) {
-                       return std::make_unique<ReplayFeeder>(std::move(setup->reader), entrance, priority);
+                       return std::make_unique<ReplayFeeder>(std::move(setup->reader), SensorIntake{&entrance},
+                                                             priority);
                      });
 }
 

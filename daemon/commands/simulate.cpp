@@ -20,6 +20,7 @@
 #include "drivers/recording/foxglove_image.hpp"
 #include "drivers/recording/foxglove_pose.hpp"
 #include "drivers/recording/recording_writer.hpp"
+#include "drivers/recording/sensor_messages.hpp"
 #include "drivers/simulator/ecg_record.hpp"
 
 namespace perimap {
@@ -108,16 +109,7 @@ class SessionWriter {
   }
 
   Expected<void> write_tracker(const TrackerSample& sample) {
-    perimap_TrackerPose message{};
-    message.source_time_ns = to_ns(sample.source_time);
-    message.device_frame = sample.device_frame;
-    message.state = sample.state == ToolState::kOk ? perimap_TOOL_OK : perimap_TOOL_MISSING;
-    for (int axis = 0; axis < 3; ++axis) message.translation_WS_mm[axis] = sample.X_WS.t[axis];
-    if (sample.state == ToolState::kOk) {
-      rotation_to_wxyz(sample.X_WS.R, message.rotation_WS_wxyz);
-    } else {
-      for (double& component : message.rotation_WS_wxyz) component = std::numeric_limits<double>::quiet_NaN();
-    }
+    const perimap_TrackerPose message = to_tracker_pose(sample);
     auto written = writer_.write(tracker_, message, sample.arrival, sample.source_time, sample.device_frame);
     if (!written || sample.state != ToolState::kOk) return written;
     const auto viewer = borrow_pose_in_frame(sample.X_WS, sample.source_time, kWorldFrame);
@@ -125,15 +117,7 @@ class SessionWriter {
   }
 
   Expected<void> write_ecg(const EcgBlock& block) {
-    perimap_EcgSamples message{};
-    message.first_sample_time_ns = to_ns(block.first_sample_time);
-    message.sample_period_ns = block.sample_period.count();
-    message.device_sequence = block.device_sequence;
-    message.lead_off = block.lead_off;
-    // The C type has no const; the serialiser does not write.
-    message.ecg_mV._buffer = const_cast<float*>(block.mV.data());
-    message.ecg_mV._length = block.count;
-    message.ecg_mV._maximum = block.count;
+    const perimap_EcgSamples message = borrow_ecg_samples(block);
     return writer_.write(ecg_, message, block.arrival, block.first_sample_time, block.device_sequence);
   }
 

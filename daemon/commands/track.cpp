@@ -21,7 +21,7 @@
 #include "daemon/commands/progress.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "drivers/recording/channels.hpp"
-#include "drivers/recording/foxglove_image.hpp"
+#include "drivers/recording/recorded_frame.hpp"
 #include "drivers/recording/recording_reader.hpp"
 #include "drivers/video/video_file.hpp"
 
@@ -68,11 +68,8 @@ class RecordingSource final : public FrameSource {
     auto message = reader_.next();
     if (!message) return tl::unexpected(message.error());
     if (!*message) return nullptr;
-    auto sample = reader_.decode<foxglove_RawImage>(**message);
-    if (!sample) return tl::unexpected(sample.error());
-    sample_.emplace(*std::move(sample));
-    const auto image = borrow_grey_image(**sample_);
-    if (!image) return fail(fmt::format("{}: byte {}: {}", path_, (*message)->file_offset, image.error().message));
+    const auto image = recorded_.read(reader_, **message);
+    if (!image) return tl::unexpected(image.error());
     if (frame_.grey.data != nullptr && (image->width != frame_.grey.width || image->height != frame_.grey.height)) {
       return fail(fmt::format("{}: byte {}: a frame of another size than the first", path_, (*message)->file_offset));
     }
@@ -85,7 +82,7 @@ class RecordingSource final : public FrameSource {
  private:
   RecordingReader reader_;
   std::string path_;
-  std::optional<Sample<foxglove_RawImage>> sample_;
+  RecordedFrame recorded_;
   VideoFrame frame_;
 };
 

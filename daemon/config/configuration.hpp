@@ -9,6 +9,7 @@
 
 #include "core/phase/phase_law.hpp"
 #include "core/time/instant.hpp"
+#include "drivers/image/pixel_format.hpp"
 
 namespace perimap {
 
@@ -26,6 +27,16 @@ struct ReplayConfiguration {
 };
 
 struct CameraConfiguration {
+  std::optional<std::string> device;                 // as parse_camera_endpoint() takes it
+  std::optional<PixelFormat> format;                 // none: the camera's best
+  int width = 0;                                     // 0: the calibration's
+  int height = 0;                                    // likewise
+  int input = -1;                                    // of a capture card; -1: as it is
+  double frame_rate_hz = 0.0;                        // 0: the camera's
+  double exposure_ms = 0.0;                          // 0: as it is
+  double gain = -1.0;                                // -1: as it is
+  Duration delay{0};                                 // of the picture when it is stamped
+  bool loop = true;                                  // a video begins anew at its end
   std::optional<std::filesystem::path> calibration;  // none: the recording's own attachment
   std::optional<std::filesystem::path> playback;     // a recording whose frames stand in for a camera
   double playback_start_s = 0.0;                     // CLOCK_MONOTONIC; 0: when the daemon starts
@@ -139,6 +150,14 @@ struct DdsConfiguration {
   bool operator==(const DdsConfiguration&) const = default;
 };
 
+struct RecordingConfiguration {
+  bool record = false;
+  std::string folder = ".";  // from the configuration's folder
+  int memory_MB = 256;       // for frames on their way to the disk
+
+  bool operator==(const RecordingConfiguration&) const = default;
+};
+
 struct StatusConfiguration {
   Duration interval = std::chrono::seconds(1);
 
@@ -166,6 +185,7 @@ struct Configuration {
   EstimationConfiguration estimation;
   RealtimeConfiguration realtime;
   DdsConfiguration dds;
+  RecordingConfiguration recording;
   StatusConfiguration status;
   LogConfiguration log;
 

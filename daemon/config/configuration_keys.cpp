@@ -11,6 +11,7 @@
 #include <string_view>
 #include <utility>
 
+#include "drivers/camera/camera_endpoint.hpp"
 #include "drivers/transport/endpoint.hpp"
 
 namespace perimap {
@@ -313,13 +314,41 @@ void add_version(std::vector<ConfigurationKey>& keys) {
       [](const Configuration&) -> std::optional<ConfigurationValue> { return std::int64_t{kVersion}; });
 }
 
+bool is_camera(const std::string& text) { return parse_camera_endpoint(text).has_value(); }
+
 void add_sources(std::vector<ConfigurationKey>& keys) {
   Section("source", keys)
       .text("name", 63, PERIMAP_MEMBER(source.name), "key `source` of every published sample")
       .text("world_frame", 63, PERIMAP_MEMBER(source.world_frame), "name of the frame W, published as frame_id");
   Section("replay", keys)
       .file("recording", PERIMAP_MEMBER(replay.recording), "the recording to replay, from this file's folder");
-  Section("camera", keys)
+  Section camera("camera", keys);
+  camera
+      .optional_text("device", "\"v4l2:/dev/videoN\" or \"video:FILE\"", &is_camera, PERIMAP_MEMBER(camera.device),
+                     "where the camera is: a V4L2 device, or a video file in its place")
+      .add(
+          "format", "what the camera is to give; any: the first of these that it has",
+          "\"any\" or \"mono8\" or \"nv12\" or \"yuyv\" or \"uyvy\" or \"jpeg\"",
+          [](const ConfigurationValue& value, Configuration& configuration) {
+            const auto* name = std::get_if<std::string>(&value);
+            if (name == nullptr) return false;
+            configuration.camera.format = pixel_format_of_name(*name);
+            return configuration.camera.format || *name == "any";
+          },
+          [](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+            const auto& format = configuration.camera.format;
+            return format ? std::string(pixel_format_name(*format)) : "any";
+          })
+      .integer("width", 0, 16384, PERIMAP_MEMBER(camera.width), "of the frames; 0: the calibration's")
+      .integer("height", 0, 16384, PERIMAP_MEMBER(camera.height), "of the frames; 0: the calibration's")
+      .integer("input", -1, 63, PERIMAP_MEMBER(camera.input), "of a capture card with several; -1: as it is set")
+      .number("frame_rate_hz", 0, 2000, PERIMAP_MEMBER(camera.frame_rate_hz), "0: as the camera or video has it")
+      .number("exposure_ms", 0, 1000, PERIMAP_MEMBER(camera.exposure_ms),
+              "0: as it is set; an automatic exposure is not known, so stamps are then off by half of it")
+      .number("gain", -1, 1e6, PERIMAP_MEMBER(camera.gain), "in the camera's own steps; -1: as it is set")
+      .duration("delay_ms", std::chrono::milliseconds(1), -100, 1000, PERIMAP_MEMBER(camera.delay),
+                "how old the picture is when the camera's driver stamps it: scope processor, capture card")
+      .flag("loop", PERIMAP_MEMBER(camera.loop), "a video begins anew at its end")
       .file("calibration", PERIMAP_MEMBER(camera.calibration),
             "calibration as OpenCV writes it, from this file's folder; none: the recording's own")
       .file("playback", PERIMAP_MEMBER(camera.playback), "a recording whose frames stand in for a camera")
@@ -500,6 +529,11 @@ void add_running(std::vector<ConfigurationKey>& keys) {
                 "an undelivered surface is dropped after this; 0: never")
       .duration("surface_model_interval_ms", ms, 1, 60000, PERIMAP_MEMBER(dds.surface_model_interval),
                 "from one surface_model to the next");
+  Section("recording", keys)
+      .flag("record", PERIMAP_MEMBER(recording.record),
+            "what the devices give is recorded as it came, to perimap-DATE-TIME.mcap")
+      .text("folder", 4096, PERIMAP_MEMBER(recording.folder), "where to, from this file's folder")
+      .integer("memory_MB", 1, 65536, PERIMAP_MEMBER(recording.memory_MB), "for frames on their way to the disk");
   Section("status", keys)
       .duration("interval_s", s, 0.1, 3600, PERIMAP_MEMBER(status.interval), "from one status to the next");
   using Level = LogConfiguration::Level;

@@ -199,6 +199,10 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.respiration = to_wire(facts.respiration);
   wire_.respiration_suspected = facts.respiration_suspected;
   wire_.features_started_anew = c.features_started_anew.get();
+  wire_.recording = facts.recording.state;
+  wire_.messages_recorded = facts.recording.recorded;
+  wire_.frames_not_recorded = facts.recording.frames_not_recorded;
+  wire_.other_not_recorded = facts.recording.other_not_recorded;
 
   sources_[0] = source_status(perimap_SOURCE_CAMERA, facts, facts.camera, now, c.frames_received.get(),
                               c.frames_dropped.get(), 0, c.last_frame_ns, c.camera_delay);

@@ -48,6 +48,13 @@ struct SourceLink {
   Duration jitter_p99{0};
 };
 
+struct RecordingFacts {
+  perimap_RecordingState state = perimap_RECORDING_OFF;
+  std::uint64_t recorded = 0;
+  std::uint64_t frames_not_recorded = 0;
+  std::uint64_t other_not_recorded = 0;
+};
+
 // What the status says beside the counters.
 struct StatusFacts {
   perimap_Privilege realtime_priority = perimap_PRIVILEGE_NOT_REQUESTED;
@@ -57,6 +64,7 @@ struct StatusFacts {
   bool sources_ended = false;
   RespirationState respiration = RespirationState::kOff;
   bool respiration_suspected = false;
+  RecordingFacts recording;
   SourceLink camera, tracker, ecg;  // as they are without a device: open, and without jitter
 };
 

@@ -5,11 +5,13 @@
 #include <utility>
 
 #include "daemon/runtime/privileges.hpp"
+#include "drivers/camera/v4l2_camera.hpp"
 #include "drivers/device/device_link.hpp"
 #include "drivers/ecg/bitalino.hpp"
 #include "drivers/ecg/can_ecg.hpp"
 #include "drivers/ecg/cyton.hpp"
 #include "drivers/ecg/medlab.hpp"
+#include "drivers/image/grey_converter.hpp"
 
 namespace perimap {
 namespace {
@@ -65,34 +67,87 @@ void serve_ecg(const EcgDevice& device, const EcgSink& sink, DeviceHealth& healt
   serve_device(opener_of(device.endpoint, ecg.baud), *ecg.protocol, health, interrupt);
 }
 
-DeviceFeeder::DeviceFeeder(TrackerDevice tracker, EcgDevice ecg, CameraPlayback camera, SensorEntrance& entrance,
-                           int priority)
-    : tracker_(std::move(tracker)),
-      ecg_(std::move(ecg)),
-      entrance_(entrance),
-      priority_(priority),
-      camera_(std::move(camera.reader), entrance, priority, camera.offset) {}
+Expected<void> serve_camera(const CameraDevice& device, const CameraSink& sink, DeviceHealth& health,
+                            const Interrupt& interrupt) {
+  if (const auto* video = std::get_if<VideoCameraSettings>(&device)) {
+    return serve_video_camera(*video, sink, health, interrupt);
+  }
+  serve_v4l2_camera(std::get<V4l2Settings>(device), sink, health, interrupt);
+  return {};
+}
+
+DeviceFeeder::DeviceFeeder(Devices devices, SensorEntrance* entrance, AskedRecording recording, int priority)
+    : devices_(std::move(devices)),
+      recording_(std::move(recording)),
+      intake_{entrance, recording_.recorder.get()},
+      priority_(priority) {
+  if (!devices_.camera) return;
+  if (auto* playback = std::get_if<CameraPlayback>(&*devices_.camera)) {
+    playback_ = std::make_unique<ReplayFeeder>(std::move(playback->reader), intake_, priority, playback->offset);
+  }
+}
 
 void DeviceFeeder::start() {
-  threads_.emplace_back([this] {
-    static_cast<void>(apply({"tracker", priority_, {}}));
-    serve_tracker(
-        tracker_, [this](const TrackerSample& sample) { entrance_.push_pose(sample); }, tracker_health_, interrupt_);
-  });
-  threads_.emplace_back([this] {
-    static_cast<void>(apply({"ecg", priority_, {}}));
-    serve_ecg(
-        ecg_, [this](const EcgBlock& block) { entrance_.push_ecg(block); }, ecg_health_, interrupt_);
-  });
-  camera_.start();
+  if (recording_.recorder) recording_.recorder->start();
+  if (devices_.tracker) {
+    threads_.emplace_back([this] {
+      static_cast<void>(apply({"tracker", priority_, {}}));
+      const TrackerSink sink = [this](const TrackerSample& sample) { intake_.pose(sample); };
+      serve_tracker(*devices_.tracker, sink, tracker_health_, interrupt_);
+    });
+  }
+  if (devices_.ecg) {
+    threads_.emplace_back([this] {
+      static_cast<void>(apply({"ecg", priority_, {}}));
+      const EcgSink sink = [this](const EcgBlock& block) { intake_.ecg(block); };
+      serve_ecg(*devices_.ecg, sink, ecg_health_, interrupt_);
+    });
+  }
+  if (playback_) {
+    playback_->start();
+  } else if (devices_.camera) {
+    threads_.emplace_back([this] {
+      static_cast<void>(apply({"camera", priority_, {}}));
+      run_camera(*devices_.camera);
+    });
+  }
+}
+
+void DeviceFeeder::run_camera(const CameraDevice& device) {
+  GreyConverter converter;
+  if (const auto* v4l2 = std::get_if<V4l2Settings>(&device)) converter.reserve(v4l2->width, v4l2->height);
+  const CameraSink sink = [this, &converter](const CameraFrame& frame) {
+    // Without a pipeline nobody needs it in grey.
+    if (intake_.entrance == nullptr) return intake_.frame(frame, {});
+    const auto grey = converter.convert(frame);
+    if (grey) return intake_.frame(frame, *grey);
+    // A damaged JPEG is recorded as it came; to the pipeline it is a gap in the count.
+    camera_health_.damaged.add();
+    SensorIntake{nullptr, intake_.recorder}.frame(frame, {});
+  };
+  auto served = serve_camera(device, sink, camera_health_, interrupt_);
+  if (!served) camera_error_ = std::move(served.error());
+  // A camera never ends, it was interrupted.
+  camera_ended_.store(!interrupt_.requested(), std::memory_order_release);
 }
 
 void DeviceFeeder::stop() {
   interrupt_.request();
   for (std::thread& thread : threads_) thread.join();
   threads_.clear();
-  camera_.stop();
+  if (playback_) playback_->stop();
+  if (recording_.recorder) recording_.recorder->stop();
 }
+
+bool DeviceFeeder::ended() const noexcept {
+  return playback_ ? playback_->ended() : camera_ended_.load(std::memory_order_acquire);
+}
+
+const std::optional<Error>& DeviceFeeder::error() const noexcept {
+  return playback_ ? playback_->error() : camera_error_;
+}
+
+std::vector<Error> DeviceFeeder::damage() const { return playback_ ? playback_->damage() : std::vector<Error>(); }
 
 void DeviceFeeder::tell(const char* name, const DeviceHealth& health, Told& told) {
   const DeviceState state = health.state();
@@ -115,13 +170,26 @@ void DeviceFeeder::describe(StatusFacts& facts) const {
     const LatencyHistogram::Summary jitter = health.jitter.summary();
     return SourceLink{health.state() == DeviceState::kClosed, jitter.p50, jitter.p99};
   };
+  if (devices_.camera && !playback_) facts.camera = link(camera_health_);
   facts.tracker = link(tracker_health_);
   facts.ecg = link(ecg_health_);
+  if (!recording_.asked) return;
+  facts.recording.state = perimap_RECORDING_STOPPED;
+  if (!recording_.recorder) return;
+  const SessionRecorder::Summary recorded = recording_.recorder->summary();
+  if (!recorded.stopped) facts.recording.state = perimap_RECORDING_ON;
+  facts.recording.recorded = recorded.recorded;
+  facts.recording.frames_not_recorded = recorded.frames_not_recorded;
+  facts.recording.other_not_recorded = recorded.other_not_recorded;
 }
 
 void DeviceFeeder::tick() {
-  tell("tracker", tracker_health_, tracker_told_);
-  tell("ECG", ecg_health_, ecg_told_);
+  if (devices_.camera && !playback_) tell("camera", camera_health_, camera_told_);
+  if (devices_.tracker) tell("tracker", tracker_health_, tracker_told_);
+  if (devices_.ecg) tell("ECG", ecg_health_, ecg_told_);
+  if (!recording_.recorder || recording_end_told_ || !recording_.recorder->summary().stopped) return;
+  recording_end_told_ = true;
+  spdlog::error("recording stopped: {}; all else goes on", recording_.recorder->reason());
 }
 
 }  // namespace perimap

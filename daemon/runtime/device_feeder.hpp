@@ -1,19 +1,22 @@
 // The threads that read the devices, each pushing into the pipeline's entrance.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/runtime/device_setup.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
 #include "daemon/runtime/sensor_feeder.hpp"
+#include "daemon/runtime/sensor_intake.hpp"
+#include "daemon/runtime/session_recorder.hpp"
 #include "drivers/device/device_health.hpp"
 #include "drivers/device/device_protocol.hpp"
 #include "drivers/ecg/ecg_assembler.hpp"
+#include "drivers/image/camera_frame.hpp"
 #include "drivers/transport/interrupt.hpp"
 
 namespace perimap {
@@ -23,10 +26,23 @@ void serve_tracker(const TrackerDevice& device, const TrackerSink& sink, DeviceH
                    const Interrupt& interrupt);
 void serve_ecg(const EcgDevice& device, const EcgSink& sink, DeviceHealth& health, const Interrupt& interrupt);
 
-// Tells in the log whenever a device comes, goes or falls silent, and why. Ends when the camera's playback ends.
+// The frames come as the camera gives them. Not for a playback. Returns when a video has ended, too; otherwise an error
+// says why it could not be read.
+[[nodiscard]] Expected<void> serve_camera(const CameraDevice& device, const CameraSink& sink, DeviceHealth& health,
+                                          const Interrupt& interrupt);
+
+// A recording that was asked for; without a recorder it could not be begun.
+struct AskedRecording {
+  bool asked = false;
+  std::unique_ptr<SessionRecorder> recorder;
+};
+
+// Tells in the log whenever a device comes, goes or falls silent, and why, and when the recording stops. Ends when the
+// camera's playback or video ends.
 class DeviceFeeder final : public SensorFeeder {
  public:
-  DeviceFeeder(TrackerDevice tracker, EcgDevice ecg, CameraPlayback camera, SensorEntrance& entrance, int priority);
+  // `entrance`: none to record alone.
+  DeviceFeeder(Devices devices, SensorEntrance* entrance, AskedRecording recording, int priority);
   DeviceFeeder(const DeviceFeeder&) = delete;
   DeviceFeeder& operator=(const DeviceFeeder&) = delete;
   ~DeviceFeeder() override { stop(); }
@@ -36,26 +52,39 @@ class DeviceFeeder final : public SensorFeeder {
   void tick() override;
   void describe(StatusFacts& facts) const override;
 
-  [[nodiscard]] bool ended() const noexcept override { return camera_.ended(); }
-  [[nodiscard]] const std::optional<Error>& error() const noexcept override { return camera_.error(); }
-  [[nodiscard]] std::vector<Error> damage() const override { return camera_.damage(); }
+  [[nodiscard]] bool ended() const noexcept override;
+  [[nodiscard]] const std::optional<Error>& error() const noexcept override;
+  [[nodiscard]] std::vector<Error> damage() const override;
+
+  [[nodiscard]] const DeviceHealth& tracker_health() const noexcept { return tracker_health_; }
+  [[nodiscard]] const DeviceHealth& ecg_health() const noexcept { return ecg_health_; }
+  [[nodiscard]] const DeviceHealth& camera_health() const noexcept { return camera_health_; }
+  // Null when nothing is recorded.
+  [[nodiscard]] const SessionRecorder* recorder() const noexcept { return recording_.recorder.get(); }
 
  private:
+  void run_camera(const CameraDevice& device);
   struct Told {
     DeviceState state = DeviceState::kClosed;
     std::string reason;
   };
   static void tell(const char* name, const DeviceHealth& health, Told& told);
 
-  TrackerDevice tracker_;
-  EcgDevice ecg_;
-  SensorEntrance& entrance_;
+  Devices devices_;
+  AskedRecording recording_;
+  SensorIntake intake_;
   int priority_;
-  ReplayFeeder camera_;
+  std::unique_ptr<ReplayFeeder> playback_;
   DeviceHealth tracker_health_;
   DeviceHealth ecg_health_;
+  DeviceHealth camera_health_;
   Told tracker_told_;
   Told ecg_told_;
+  Told camera_told_;
+  bool recording_end_told_ = false;
+  std::optional<Error> camera_error_;
+  // Release by the camera's thread when its video has ended, acquire in ended(): camera_error_ is then visible.
+  std::atomic<bool> camera_ended_{false};
   Interrupt interrupt_;
   std::vector<std::thread> threads_;
 };

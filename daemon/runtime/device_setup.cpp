@@ -6,6 +6,8 @@
 #include <charconv>
 #include <utility>
 
+#include "drivers/calibration/calibration_file.hpp"
+#include "drivers/camera/camera_endpoint.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/text_file/text_file.hpp"
 
@@ -66,6 +68,32 @@ Expected<NdiSettings> ndi_settings(const TrackerConfiguration& c) {
   return settings;
 }
 
+Expected<V4l2Settings> v4l2_settings(const CameraConfiguration& c, const std::string& path) {
+  V4l2Settings settings;
+  settings.path = path;
+  settings.format = c.format;
+  settings.input = c.input;
+  settings.frame_rate_hz = c.frame_rate_hz;
+  settings.exposure_ms = c.exposure_ms;
+  settings.gain = c.gain;
+  settings.delay = c.delay;
+  if ((c.width > 0) != (c.height > 0)) {
+    return wrong(c.width > 0 ? "camera.height" : "camera.width", "one, since the other is given", "0");
+  }
+  settings.width = c.width;
+  settings.height = c.height;
+  if (!c.calibration) return settings;
+  const auto calibration = read_calibration(*c.calibration);
+  if (!calibration) return tl::unexpected(calibration.error());
+  if (c.width > 0 && (c.width != calibration->width || c.height != calibration->height)) {
+    return wrong("camera.width", fmt::format("the calibration's {}x{}", calibration->width, calibration->height),
+                 fmt::format("{}x{}", c.width, c.height));
+  }
+  settings.width = calibration->width;
+  settings.height = calibration->height;
+  return settings;
+}
+
 Expected<CameraPlayback> camera_playback(const std::string& recording, double start_s) {
   std::optional<Duration> offset;
   if (start_s > 0.0) {
@@ -85,7 +113,8 @@ Expected<CameraPlayback> camera_playback(const std::string& recording, double st
 
 bool names_devices(const Configuration& configuration) noexcept {
   return configuration.tracker.protocol != TrackerConfiguration::Protocol::kNone ||
-         configuration.ecg.protocol != EcgConfiguration::Protocol::kNone || configuration.camera.playback.has_value();
+         configuration.ecg.protocol != EcgConfiguration::Protocol::kNone || configuration.camera.playback.has_value() ||
+         configuration.camera.device.has_value();
 }
 
 Expected<TrackerDevice> tracker_device(const TrackerConfiguration& c) {
@@ -126,32 +155,82 @@ Expected<EcgDevice> ecg_device(const EcgConfiguration& c) {
   return EcgDevice{std::move(*endpoint), c};
 }
 
+Expected<CameraDevice> camera_device(const CameraConfiguration& c, const std::filesystem::path& configuration_file) {
+  if (c.device && c.playback) return wrong("camera.playback", "nothing beside 'camera.device'", c.playback->string());
+  if (c.playback)
+    return camera_playback(c.playback->string(), c.playback_start_s).map([](CameraPlayback playback) {
+      return CameraDevice(std::move(playback));
+    });
+  if (!c.device) return wrong("camera.device", "a camera, or a recording in 'camera.playback'", "nothing");
+  const auto endpoint = parse_camera_endpoint(*c.device);
+  if (!endpoint) return tl::unexpected(endpoint.error());
+  if (const auto* video = std::get_if<VideoEndpoint>(&*endpoint)) {
+    const std::filesystem::path file = (configuration_file.parent_path() / video->file).lexically_normal();
+    std::error_code code;
+    if (!std::filesystem::is_regular_file(file, code)) {
+      return wrong("camera.device", "a video file", fmt::format("{}, which is not there", file.string()));
+    }
+    return VideoCameraSettings{file.string(), c.frame_rate_hz, c.loop};
+  }
+  return v4l2_settings(c, std::get<V4l2Endpoint>(*endpoint).path).map([](const V4l2Settings& settings) {
+    return CameraDevice(settings);
+  });
+}
+
+Expected<Devices> named_devices(const Configuration& configuration, const std::filesystem::path& configuration_file) {
+  Devices devices;
+  const auto keep = [](auto& place) { return [&place](auto device) { place.emplace(std::move(device)); }; };
+  Expected<void> named;
+  if (configuration.tracker.protocol != TrackerConfiguration::Protocol::kNone) {
+    named = tracker_device(configuration.tracker).map(keep(devices.tracker));
+  }
+  if (named && configuration.ecg.protocol != EcgConfiguration::Protocol::kNone) {
+    named = ecg_device(configuration.ecg).map(keep(devices.ecg));
+  }
+  if (named && (configuration.camera.device || configuration.camera.playback)) {
+    named = camera_device(configuration.camera, configuration_file).map(keep(devices.camera));
+  }
+  if (!named) return tl::unexpected(std::move(named.error()));
+  return devices;
+}
+
 tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::path& configuration_file,
                                                       const Configuration& given) {
   const auto wrong_configuration = [&configuration_file](const Error& error) {
     return tl::unexpected(SetupError{{fmt::format("{}: {}", configuration_file.string(), error.message)}, true});
   };
-  if (!given.camera.playback) {
-    return wrong_configuration(
-        {"key 'camera.playback': expected a recording whose frames stand in for a camera, got "
-         "nothing"});
+  RecordedBasis basis;
+  if (given.camera.playback) {
+    // The recording brings its camera's calibration and hand-eye along.
+    auto recorded = recorded_basis(given.camera.playback->string(), configuration_file, ReadMode::kStrict);
+    if (!recorded) return tl::unexpected(std::move(recorded.error()));
+    basis = std::move(*recorded);
+  } else {
+    basis.configuration = given;
+    if (given.camera.device && !given.camera.calibration) {
+      return wrong_configuration({"key 'camera.calibration': expected the camera's calibration, got nothing"});
+    }
+    if (given.camera.calibration) {
+      const auto calibration = read_calibration(*given.camera.calibration);
+      if (!calibration) return tl::unexpected(SetupError{calibration.error(), true});
+      basis.camera = *calibration;
+    }
   }
-  // The recording brings its camera's calibration and hand-eye along.
-  const std::string recording = given.camera.playback->string();
-  auto basis = recorded_basis(recording, configuration_file, ReadMode::kStrict);
-  if (!basis) return tl::unexpected(std::move(basis.error()));
-  Configuration& configuration = basis->configuration;
+  Configuration& configuration = basis.configuration;
+  // All are needed: what is not named is asked for here.
   auto tracker = tracker_device(configuration.tracker);
   if (!tracker) return wrong_configuration(tracker.error());
   auto ecg = ecg_device(configuration.ecg);
   if (!ecg) return wrong_configuration(ecg.error());
-  auto playback = camera_playback(recording, configuration.camera.playback_start_s);
-  if (!playback) return tl::unexpected(SetupError{std::move(playback.error()), false});
-  playback->reader.require_frame_size(basis->camera.width, basis->camera.height);
-  const PipelineSettings pipeline = pipeline_settings(configuration, basis->camera);
+  auto camera = camera_device(configuration.camera, configuration_file);
+  if (!camera) return wrong_configuration(camera.error());
+  if (auto* playback = std::get_if<CameraPlayback>(&*camera)) {
+    playback->reader.require_frame_size(basis.camera.width, basis.camera.height);
+  }
+  const PipelineSettings pipeline = pipeline_settings(configuration, basis.camera);
   const Identity identity{configuration.source.name, "frame", configuration.source.world_frame};
-  return DeviceSetup{std::move(configuration), pipeline,        identity,
-                     std::move(*tracker),      std::move(*ecg), std::move(*playback)};
+  return DeviceSetup{std::move(configuration), pipeline, identity,
+                     Devices{std::move(*tracker), std::move(*ecg), std::move(*camera)}};
 }
 
 }  // namespace perimap

@@ -11,6 +11,8 @@
 #include "daemon/config/configuration.hpp"
 #include "daemon/publishing/identity.hpp"
 #include "daemon/runtime/replay_setup.hpp"
+#include "drivers/camera/v4l2_stream.hpp"
+#include "drivers/camera/video_camera.hpp"
 #include "drivers/recording/replay_reader.hpp"
 #include "drivers/tracker/igtl_session.hpp"
 #include "drivers/tracker/ndi_session.hpp"
@@ -33,13 +35,20 @@ struct CameraPlayback {
   std::optional<Duration> offset;  // from the recording's time to ours; none: begins when it is started
 };
 
+using CameraDevice = std::variant<CameraPlayback, V4l2Settings, VideoCameraSettings>;
+
+// Those that there are.
+struct Devices {
+  std::optional<TrackerDevice> tracker;
+  std::optional<EcgDevice> ecg;
+  std::optional<CameraDevice> camera;
+};
+
 struct DeviceSetup {
   Configuration configuration;
   PipelineSettings pipeline;
   Identity identity;
-  TrackerDevice tracker;
-  EcgDevice ecg;
-  CameraPlayback camera;
+  Devices devices;  // all of them
 };
 
 // Whether the configuration names devices; otherwise it is for a replay.
@@ -48,6 +57,13 @@ struct DeviceSetup {
 // Errors name the key and what it should be. Devices are not opened yet: they may come later.
 [[nodiscard]] Expected<TrackerDevice> tracker_device(const TrackerConfiguration& configuration);
 [[nodiscard]] Expected<EcgDevice> ecg_device(const EcgConfiguration& configuration);
+// Of `device`, or of `playback` and its start. The size of a V4L2 camera's frames is that of the keys, or of the
+// calibration, or none.
+[[nodiscard]] Expected<CameraDevice> camera_device(const CameraConfiguration& configuration,
+                                                   const std::filesystem::path& configuration_file);
+// Those that the configuration names.
+[[nodiscard]] Expected<Devices> named_devices(const Configuration& configuration,
+                                              const std::filesystem::path& configuration_file);
 // `given`: the file as loaded by itself.
 [[nodiscard]] tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::path& configuration_file,
                                                                     const Configuration& given);

@@ -1,23 +1,12 @@
 #include "daemon/runtime/live_runtime.hpp"
 
 #include <algorithm>
-#include <ctime>
 #include <utility>
 
 #include "core/realtime/deadline.hpp"
+#include "daemon/runtime/utc_offset.hpp"
 
 namespace perimap {
-namespace {
-
-Duration utc_minus_monotonic() noexcept {
-  std::timespec utc{};
-  clock_gettime(CLOCK_REALTIME, &utc);
-  return std::chrono::seconds(utc.tv_sec) + std::chrono::nanoseconds(utc.tv_nsec) -
-         MonotonicClock::now().time_since_epoch();
-}
-
-}  // namespace
-
 LiveRuntime::LiveRuntime(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication,
                          std::function<void()> on_status_tick)
     : pipeline_(pipeline),

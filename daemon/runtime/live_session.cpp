@@ -20,7 +20,8 @@ double milliseconds(Duration d) { return std::chrono::duration<double, std::mill
 LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication,
                          ReplayReader reader, std::function<void()> on_tick)
     : LiveSession(pipeline, settings, publication,
-                  std::make_unique<ReplayFeeder>(std::move(reader), pipeline.entrance(), source_priority(settings)),
+                  std::make_unique<ReplayFeeder>(std::move(reader), SensorIntake{&pipeline.entrance()},
+                                                 source_priority(settings)),
                   std::move(on_tick)) {}
 
 LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication,

@@ -16,8 +16,9 @@ constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
 
 }  // namespace
 
-ReplayFeeder::ReplayFeeder(ReplayReader reader, SensorEntrance& entrance, int priority, std::optional<Duration> offset)
-    : reader_(std::move(reader)), entrance_(entrance), priority_(priority), offset_(offset) {}
+ReplayFeeder::ReplayFeeder(ReplayReader reader, const SensorIntake& intake, int priority,
+                           std::optional<Duration> offset)
+    : reader_(std::move(reader)), intake_(intake), priority_(priority), offset_(offset) {}
 
 void ReplayFeeder::start() {
   reading_ = std::thread([this] {
@@ -79,11 +80,18 @@ void ReplayFeeder::deliver() {
       if (stopping_) return;
     }
     if (const auto* frame = std::get_if<FrameEvent>(&*event)) {
-      static_cast<void>(entrance_.push_frame(frame->stamp, frame->image()));
+      const GreyImage grey = frame->image();
+      CameraFrame as_it_came;
+      as_it_came.stamp = frame->stamp;
+      as_it_came.width = grey.width;
+      as_it_came.height = grey.height;
+      as_it_came.stride = static_cast<std::size_t>(grey.stride);
+      as_it_came.bytes = std::as_bytes(std::span(frame->pixels));
+      intake_.frame(as_it_came, grey);
     } else if (const auto* pose = std::get_if<TrackerSample>(&*event)) {
-      entrance_.push_pose(*pose);
+      intake_.pose(*pose);
     } else {
-      entrance_.push_ecg(std::get<EcgBlock>(*event));
+      intake_.ecg(std::get<EcgBlock>(*event));
     }
   }
   ended_.store(true, std::memory_order_release);

@@ -9,8 +9,8 @@
 #include <thread>
 
 #include "core/error/expected.hpp"
-#include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/runtime/sensor_feeder.hpp"
+#include "daemon/runtime/sensor_intake.hpp"
 #include "drivers/recording/replay_reader.hpp"
 
 namespace perimap {
@@ -19,7 +19,7 @@ namespace perimap {
 // which brings the first arrival to shortly after start() when it is not given.
 class ReplayFeeder final : public SensorFeeder {
  public:
-  ReplayFeeder(ReplayReader reader, SensorEntrance& entrance, int priority,
+  ReplayFeeder(ReplayReader reader, const SensorIntake& intake, int priority,
                std::optional<Duration> offset = std::nullopt);
   ReplayFeeder(const ReplayFeeder&) = delete;
   ReplayFeeder& operator=(const ReplayFeeder&) = delete;
@@ -41,7 +41,7 @@ class ReplayFeeder final : public SensorFeeder {
   [[nodiscard]] std::optional<ReplayEvent> take();
 
   ReplayReader reader_;
-  SensorEntrance& entrance_;
+  SensorIntake intake_;
   int priority_;
   std::optional<Duration> offset_;
   std::thread reading_;

@@ -46,16 +46,32 @@ struct JpegDecoder::Impl {
 
   static Impl& of(j_common_ptr common) { return *static_cast<Impl*>(common->client_data); }
 
+  // Null when it is done; otherwise what is wrong.
+  const char* read_size(std::span<const std::byte> bytes, JpegSize& size) {
+    if (setjmp(on_error) != 0) {
+      jpeg_abort_decompress(&jpeg);
+      return message.data();
+    }
+    read_header(bytes);
+    size = {static_cast<int>(jpeg.image_width), static_cast<int>(jpeg.image_height)};
+    jpeg_abort_decompress(&jpeg);
+    return nullptr;
+  }
+
+  void read_header(std::span<const std::byte> bytes) {
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): libjpeg 6's type lacks the const; it only reads
+    auto* data = const_cast<unsigned char*>(reinterpret_cast<const unsigned char*>(bytes.data()));
+    jpeg_mem_src(&jpeg, data, bytes.size());
+    (void)jpeg_read_header(&jpeg, TRUE);
+  }
+
   // Null when it is done; otherwise what is wrong. Its locals are trivial, since a longjmp runs no destructors.
   const char* decode(std::span<const std::byte> bytes, int width, int height, std::uint8_t* grey) {
     if (setjmp(on_error) != 0) {
       jpeg_abort_decompress(&jpeg);
       return message.data();
     }
-    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): libjpeg 6's type lacks the const; it only reads
-    auto* data = const_cast<unsigned char*>(reinterpret_cast<const unsigned char*>(bytes.data()));
-    jpeg_mem_src(&jpeg, data, bytes.size());
-    (void)jpeg_read_header(&jpeg, TRUE);
+    read_header(bytes);
     const bool luma = jpeg.jpeg_color_space == JCS_YCbCr || jpeg.jpeg_color_space == JCS_GRAYSCALE;
     if (!luma || jpeg.image_width != static_cast<JDIMENSION>(width) ||
         jpeg.image_height != static_cast<JDIMENSION>(height)) {
@@ -79,6 +95,15 @@ struct JpegDecoder::Impl {
   }
 };
 // NOLINTEND(cert-err52-cpp)
+
+Expected<JpegSize> read_jpeg_size(std::span<const std::byte> jpeg) {
+  if (jpeg.empty()) return fail("JPEG: empty");
+  // Its structure is of some hundred bytes: nothing beside what a frame costs.
+  JpegDecoder::Impl decoder;
+  JpegSize size;
+  if (const char* wrong = decoder.read_size(jpeg, size); wrong != nullptr) return fail(fmt::format("JPEG: {}", wrong));
+  return size;
+}
 
 JpegDecoder::JpegDecoder() : impl_(std::make_unique<Impl>()) {}
 JpegDecoder::JpegDecoder(JpegDecoder&&) noexcept = default;

@@ -10,6 +10,13 @@
 
 namespace perimap {
 
+struct JpegSize {
+  int width = 0;
+  int height = 0;
+};
+// What its header says; the pixels are not looked at.
+[[nodiscard]] Expected<JpegSize> read_jpeg_size(std::span<const std::byte> jpeg);
+
 class JpegDecoder {
  public:
   JpegDecoder();
@@ -25,8 +32,9 @@ class JpegDecoder {
   [[nodiscard]] Expected<void> decode(std::span<const std::byte> jpeg, int width, int height,
                                       std::span<std::uint8_t> grey);
 
+  struct Impl;  // libjpeg's own
+
  private:
-  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -6,7 +6,7 @@
 namespace perimap::channels {
 
 // What the devices gave. Log time is the arrival, publish time the source's own stamp.
-inline constexpr std::string_view kCameraImage = "camera/image";      // foxglove::RawImage, "mono8"
+inline constexpr std::string_view kCameraImage = "camera/image";      // foxglove::RawImage or CompressedImage
 inline constexpr std::string_view kTrackerPose = "tracker/pose";      // perimap::TrackerPose
 inline constexpr std::string_view kTrackerViewer = "tracker/viewer";  // foxglove::PoseInFrame, metres, valid poses only
 inline constexpr std::string_view kEcgSamples = "ecg/samples";        // perimap::EcgSamples

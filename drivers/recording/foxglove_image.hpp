@@ -1,4 +1,4 @@
-// Camera frames as foxglove::RawImage, and back.
+// Camera frames as foxglove::RawImage or CompressedImage, and back.
 #pragma once
 
 #include <foxglove.h>
@@ -10,6 +10,7 @@
 #include "core/error/expected.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/time/instant.hpp"
+#include "drivers/image/camera_frame.hpp"
 
 namespace perimap {
 
@@ -21,7 +22,14 @@ namespace perimap {
 [[nodiscard]] foxglove_RawImage borrow_raw_image(const GreyImage& image, Instant time, const std::string& frame_id,
                                                  std::vector<std::uint8_t>& packed);
 
-// The pixels of a "mono8" message, borrowed from it. Fails when it is not "mono8" or its sizes do not fit together.
-[[nodiscard]] Expected<GreyImage> borrow_grey_image(const foxglove_RawImage& message);
+// A frame as the camera gave it: rows as far apart as they were, bytes behind the picture left out. The first takes all
+// formats but kMjpg, the second kMjpg alone. The messages borrow as above.
+[[nodiscard]] foxglove_RawImage borrow_raw_image(const CameraFrame& frame, const std::string& frame_id);
+[[nodiscard]] foxglove_CompressedImage borrow_compressed_image(const CameraFrame& frame, const std::string& frame_id);
+
+// The frame in a message, borrowed from it and without its stamp. Fails when the encoding is none that a camera of ours
+// gives, or the sizes do not fit together; whether a JPEG is whole shows when it is decoded.
+[[nodiscard]] Expected<CameraFrame> borrow_camera_frame(const foxglove_RawImage& message);
+[[nodiscard]] Expected<CameraFrame> borrow_camera_frame(const foxglove_CompressedImage& message);
 
 }  // namespace perimap

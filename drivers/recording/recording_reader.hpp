@@ -62,11 +62,13 @@ class RecordingReader {
                               message.channel, message.type, topic_type<T>().schema_name()));
     }
     auto sample = deserialize<T>(message.bytes);
-    if (!sample) {
-      return fail(fmt::format("{}: byte {}: channel {}: {}", name_, message.file_offset, message.channel,
-                              sample.error().message));
-    }
+    if (!sample) return wrong(message, sample.error().message);
     return sample;
+  }
+
+  // An error about what the message says.
+  [[nodiscard]] tl::unexpected<Error> wrong(const RecordedMessage& message, const std::string& what) const {
+    return fail(fmt::format("{}: byte {}: channel {}: {}", name_, message.file_offset, message.channel, what));
   }
 
   [[nodiscard]] std::vector<std::string> attachment_names() const { return mcap_.attachment_names(); }

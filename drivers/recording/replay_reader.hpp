@@ -15,6 +15,7 @@
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/sensors/tracker_sample.hpp"
+#include "drivers/recording/recorded_frame.hpp"
 #include "drivers/recording/recording_reader.hpp"
 
 namespace perimap {
@@ -56,10 +57,12 @@ class ReplayReader {
   [[nodiscard]] std::vector<Error> damage() const { return reader_.damage(); }
 
  private:
-  ReplayReader(RecordingReader reader, std::string path) : reader_(std::move(reader)), path_(std::move(path)) {}
+  explicit ReplayReader(RecordingReader reader) : reader_(std::move(reader)) {}
+
+  [[nodiscard]] Expected<ReplayEvent> frame_event(const RecordedMessage& message);
 
   RecordingReader reader_;
-  std::string path_;  // for messages
+  RecordedFrame frame_;
   Instant last_arrival_;
   int frame_width_ = 0;
   int frame_height_ = 0;

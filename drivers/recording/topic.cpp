@@ -49,6 +49,10 @@ TopicType topic_type<foxglove_RawImage>() noexcept {
   return {&foxglove_RawImage_desc, kFoxgloveSchemaText};
 }
 template <>
+TopicType topic_type<foxglove_CompressedImage>() noexcept {
+  return {&foxglove_CompressedImage_desc, kFoxgloveSchemaText};
+}
+template <>
 TopicType topic_type<foxglove_PoseInFrame>() noexcept {
   return {&foxglove_PoseInFrame_desc, kFoxgloveSchemaText};
 }

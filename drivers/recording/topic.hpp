@@ -47,6 +47,8 @@ template <>
 template <>
 [[nodiscard]] TopicType topic_type<foxglove_RawImage>() noexcept;
 template <>
+[[nodiscard]] TopicType topic_type<foxglove_CompressedImage>() noexcept;
+template <>
 [[nodiscard]] TopicType topic_type<foxglove_PoseInFrame>() noexcept;
 
 }  // namespace perimap

@@ -129,7 +129,7 @@ TEST(RealtimePath, MakesNoHeapCallLiveWithAllThreads) {
   LiveRuntime runtime(pipeline, settings, publication);
   heap_calls_in_scope = 0;
   runtime.start();
-  ReplayFeeder feeder(std::move(s.reader), pipeline.entrance(), 0);
+  ReplayFeeder feeder(std::move(s.reader), SensorIntake{&pipeline.entrance()}, 0);
   feeder.start();
   while (!feeder.ended()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   runtime.end_of_sources();

@@ -80,6 +80,7 @@ class ExpectingWriter {
 void run(const std::string& recording_path, const std::string& json_path) {
   ExpectingWriter writer(recording_path);
   writer.write_channel<foxglove_RawImage>(channels::kCameraImage);
+  writer.write_channel<foxglove_CompressedImage>("camera/jpeg");
   writer.write_channel<perimap_TrackerPose>(channels::kTrackerPose);
   writer.write_channel<foxglove_PoseInFrame>(channels::kTrackerViewer);
   writer.write_channel<perimap_EcgSamples>(channels::kEcgSamples);

@@ -225,6 +225,10 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.phases_from_image);
   next(s.respiration);
   next(s.respiration_suspected);
+  next(s.recording);
+  next(s.messages_recorded);
+  next(s.frames_not_recorded);
+  next(s.other_not_recorded);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -303,6 +307,13 @@ void fill(Filler& next, foxglove_RawImage& s) {
   next(s.encoding);
   next(s.step);
   next.sequence(s.data, 11);
+}
+
+void fill(Filler& next, foxglove_CompressedImage& s) {
+  fill(next, s.timestamp);
+  next(s.frame_id);
+  next.sequence(s.data, 11);
+  next(s.format);
 }
 
 }  // namespace
@@ -438,7 +449,11 @@ json to_json(const perimap_Status& s) {
           MEMBER(features_started_anew),
           MEMBER(phases_from_image),
           MEMBER(respiration),
-          MEMBER(respiration_suspected)};
+          MEMBER(respiration_suspected),
+          MEMBER(recording),
+          MEMBER(messages_recorded),
+          MEMBER(frames_not_recorded),
+          MEMBER(other_not_recorded)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {
@@ -501,6 +516,10 @@ json to_json(const foxglove_RawImage& s) {
   return {MEMBER(timestamp), MEMBER(frame_id), MEMBER(width), MEMBER(height),
           MEMBER(encoding),  MEMBER(step),     MEMBER(data)};
 }
+template <>
+json to_json(const foxglove_CompressedImage& s) {
+  return {MEMBER(timestamp), MEMBER(frame_id), MEMBER(data), MEMBER(format)};
+}
 
 #undef MEMBER
 
@@ -515,6 +534,7 @@ template Sample<perimap_TruthMesh> make_sample(unsigned);
 template Sample<perimap_TruthMotion> make_sample(unsigned);
 template Sample<perimap_TruthCamera> make_sample(unsigned);
 template Sample<foxglove_RawImage> make_sample(unsigned);
+template Sample<foxglove_CompressedImage> make_sample(unsigned);
 template Sample<foxglove_PoseInFrame> make_sample(unsigned);
 
 }  // namespace perimap::test

@@ -1,0 +1,30 @@
+// Where the sources' threads put what they have got: the pipeline, a recording, or both.
+#pragma once
+
+#include "core/pipeline/sensor_entrance.hpp"
+#include "daemon/runtime/session_recorder.hpp"
+#include "drivers/image/camera_frame.hpp"
+
+namespace perimap {
+
+// Either may be null. Each call belongs to one thread.
+struct SensorIntake {
+  SensorEntrance* entrance = nullptr;
+  SessionRecorder* recorder = nullptr;
+
+  // To the pipeline first: it is the one in a hurry.
+  void frame(const CameraFrame& as_it_came, const GreyImage& grey) const noexcept {
+    if (entrance != nullptr) static_cast<void>(entrance->push_frame(as_it_came.stamp, grey));
+    if (recorder != nullptr) recorder->frame(as_it_came);
+  }
+  void pose(const TrackerSample& sample) const noexcept {
+    if (entrance != nullptr) entrance->push_pose(sample);
+    if (recorder != nullptr) recorder->pose(sample);
+  }
+  void ecg(const EcgBlock& block) const noexcept {
+    if (entrance != nullptr) entrance->push_ecg(block);
+    if (recorder != nullptr) recorder->ecg(block);
+  }
+};
+
+}  // namespace perimap

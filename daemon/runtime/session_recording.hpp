@@ -1,0 +1,24 @@
+// What a recording of a live session says of itself, and where it goes.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "core/geometry/camera_model.hpp"
+#include "daemon/config/configuration.hpp"
+#include "drivers/recording/sensor_writer.hpp"
+
+namespace perimap {
+
+// FOLDER/perimap-20261121-234501.mcap, UTC.
+[[nodiscard]] std::filesystem::path recording_path(const std::filesystem::path& folder,
+                                                   std::chrono::system_clock::time_point now);
+
+// The configuration goes along as a replay needs it: without the devices, and without what their drivers have applied
+// to the samples already (the registration, the camera's delay).
+[[nodiscard]] SensorRecordingFacts recording_facts(const Configuration& configuration,
+                                                   const std::optional<CameraModel>& camera, std::string generator);
+
+}  // namespace perimap

@@ -1,0 +1,82 @@
+#include "drivers/recording/sensor_messages.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace perimap {
+namespace {
+
+constexpr std::array<std::pair<ToolState, perimap_ToolState>, 4> kStates{
+    {{ToolState::kOk, perimap_TOOL_OK},
+     {ToolState::kMissing, perimap_TOOL_MISSING},
+     {ToolState::kOutOfVolume, perimap_TOOL_OUT_OF_VOLUME},
+     {ToolState::kDisabled, perimap_TOOL_DISABLED}}};
+
+}  // namespace
+
+perimap_TrackerPose to_tracker_pose(const TrackerSample& sample) noexcept {
+  perimap_TrackerPose message{};
+  message.source_time_ns = to_ns(sample.source_time);
+  message.device_frame = sample.device_frame;
+  for (const auto& [state, wire] : kStates) {
+    if (state == sample.state) message.state = wire;
+  }
+  for (int axis = 0; axis < 3; ++axis) message.translation_WS_mm[axis] = sample.X_WS.t[axis];
+  if (sample.state == ToolState::kOk) {
+    rotation_to_wxyz(sample.X_WS.R, message.rotation_WS_wxyz);
+  } else {
+    for (double& component : message.rotation_WS_wxyz) component = std::numeric_limits<double>::quiet_NaN();
+  }
+  return message;
+}
+
+perimap_EcgSamples borrow_ecg_samples(const EcgBlock& block) noexcept {
+  perimap_EcgSamples message{};
+  message.first_sample_time_ns = to_ns(block.first_sample_time);
+  message.sample_period_ns = block.sample_period.count();
+  message.device_sequence = block.device_sequence;
+  message.lead_off = block.lead_off;
+  // The C type has no const; the serialiser does not write.
+  message.ecg_mV._buffer = const_cast<float*>(block.mV.data());
+  message.ecg_mV._length = block.count;
+  message.ecg_mV._maximum = block.count;
+  return message;
+}
+
+Expected<TrackerSample> to_tracker_sample(const perimap_TrackerPose& message) {
+  TrackerSample sample;
+  sample.source_time = from_ns(message.source_time_ns);
+  sample.device_frame = message.device_frame;
+  for (const auto& [state, wire] : kStates) {
+    if (wire == message.state) sample.state = state;
+  }
+  if (sample.state != ToolState::kOk) return sample;
+  const double(&t)[3] = message.translation_WS_mm;
+  const double(&q)[4] = message.rotation_WS_wxyz;
+  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (!(std::abs(norm - 1.0) < 1e-3)) return fail("rotation is not a unit quaternion");
+  sample.X_WS = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), q);
+  return sample;
+}
+
+Expected<EcgBlock> to_ecg_block(const perimap_EcgSamples& message) {
+  const auto& samples = message.ecg_mV;
+  if (samples._length > EcgBlock::kCapacity) {
+    return fail(fmt::format("{} samples in a block, at most {} can be taken", samples._length, EcgBlock::kCapacity));
+  }
+  EcgBlock block;
+  block.first_sample_time = from_ns(message.first_sample_time_ns);
+  block.sample_period = Duration(message.sample_period_ns);
+  block.device_sequence = message.device_sequence;
+  block.lead_off = message.lead_off;
+  block.count = samples._length;
+  std::copy_n(samples._buffer, samples._length, block.mV.begin());
+  return block;
+}
+
+}  // namespace perimap

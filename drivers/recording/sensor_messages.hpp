@@ -1,0 +1,21 @@
+// What trackers and ECG devices gave, as messages of a recording, and back.
+#pragma once
+
+#include <perimap.h>
+
+#include "core/error/expected.hpp"
+#include "core/sensors/ecg_block.hpp"
+#include "core/sensors/tracker_sample.hpp"
+
+namespace perimap {
+
+// A sample without a valid pose has NaN in the place of its rotation.
+[[nodiscard]] perimap_TrackerPose to_tracker_pose(const TrackerSample& sample) noexcept;
+// Borrows the samples: it must not outlive the block, and must not be freed.
+[[nodiscard]] perimap_EcgSamples borrow_ecg_samples(const EcgBlock& block) noexcept;
+
+// Without the arrival, which the message itself does not hold. Fail when the rotation is none, or the block too long.
+[[nodiscard]] Expected<TrackerSample> to_tracker_sample(const perimap_TrackerPose& message);
+[[nodiscard]] Expected<EcgBlock> to_ecg_block(const perimap_EcgSamples& message);
+
+}  // namespace perimap

@@ -1,0 +1,58 @@
+// What the devices gave, as it came, into a recording that replays.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/error/expected.hpp"
+#include "core/sensors/ecg_block.hpp"
+#include "core/sensors/tracker_sample.hpp"
+#include "core/time/instant.hpp"
+#include "drivers/image/camera_frame.hpp"
+#include "drivers/recording/recording_writer.hpp"
+
+namespace perimap {
+
+// What holds for a whole recording.
+struct SensorRecordingFacts {
+  std::string generator;    // program and version
+  std::string description;  // where it comes from
+  std::string world_frame;
+  Duration utc_minus_monotonic{0};
+  std::optional<std::string> calibration;    // the camera's, as OpenCV writes it
+  std::optional<std::string> configuration;  // of perimapd, TOML
+};
+
+// Not for the real-time path. Messages must be written in order of `arrival`, which a replay keeps to; it is not before
+// a sample's own. Errors name the file; after one nothing more is written.
+class SensorWriter {
+ public:
+  [[nodiscard]] static Expected<SensorWriter> create(const std::string& path, const SensorRecordingFacts& facts,
+                                                     Instant begin);
+
+  // In the camera's own format: as foxglove::RawImage, or as CompressedImage when it is a JPEG.
+  [[nodiscard]] Expected<void> write(const CameraFrame& frame, Instant arrival);
+  // Valid poses also for viewers.
+  [[nodiscard]] Expected<void> write(const TrackerSample& sample, Instant arrival);
+  [[nodiscard]] Expected<void> write(const EcgBlock& block, Instant arrival);
+
+  // What was written so far survives a crash of the process.
+  [[nodiscard]] Expected<void> flush() { return writer_.flush(); }
+  [[nodiscard]] Expected<void> finish() { return writer_.finish(); }
+
+ private:
+  SensorWriter(RecordingWriter writer, std::string world_frame)
+      : writer_(std::move(writer)), world_frame_(std::move(world_frame)) {}
+
+  [[nodiscard]] Expected<void> begin(const SensorRecordingFacts& facts, Instant begin);
+  [[nodiscard]] Expected<ChannelId> camera_channel(bool compressed);
+
+  RecordingWriter writer_;
+  std::string camera_frame_ = "camera";
+  std::string world_frame_;
+  std::optional<ChannelId> camera_;  // its type is known with the first frame
+  bool compressed_ = false;
+  ChannelId tracker_, viewer_, ecg_;
+};
+
+}  // namespace perimap
