@@ -8,6 +8,7 @@
 #include "daemon/commands/emulate.hpp"
 #include "daemon/commands/experiment.hpp"
 #include "daemon/commands/probe.hpp"
+#include "daemon/commands/record.hpp"
 #include "daemon/commands/replay.hpp"
 #include "daemon/commands/report.hpp"
 #include "daemon/commands/simulate.hpp"
@@ -33,6 +34,7 @@ int run(int argc, char** argv) {
   perimap::add_track_command(app, exit_code);
   perimap::add_emulate_command(app, exit_code);
   perimap::add_probe_command(app, exit_code);
+  perimap::add_record_command(app, exit_code);
   perimap::add_check_command(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -4,17 +4,20 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
-#include <atomic>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <vector>
 
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/device_setup.hpp"
+#include "drivers/image/grey_converter.hpp"
 
 namespace perimap {
 namespace {
@@ -52,10 +55,11 @@ struct Seen {
 
 double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
 
-// What the tool or the lead says, when it is not well.
-std::string complaint(const char* kind, const Seen& seen) {
+// What the tool, the lead or the picture says, when it is not well.
+std::string complaint(std::string_view kind, const Seen& seen) {
   if (seen.invalid == 0) return "";
-  if (std::string_view(kind) == "ecg") return fmt::format("lead off in {} of {} samples", seen.invalid, seen.count);
+  if (kind == "camera") return fmt::format("{} of {} frames cannot be decoded", seen.invalid, seen.count);
+  if (kind == "ecg") return fmt::format("lead off in {} of {} samples", seen.invalid, seen.count);
   return fmt::format("tool missing in {}, out of volume in {}, disabled in {} of {} readings", seen.tools[1],
                      seen.tools[2], seen.tools[3], seen.count);
 }
@@ -100,75 +104,94 @@ int complain(const Error& error, int exit_code) {
   return exit_code;
 }
 
+// One device while it is listened to.
+struct Probed {
+  const char* kind;
+  std::string where;
+  std::function<void(const Interrupt&)> serve;
+  DeviceHealth health;
+  Seen seen;
+  DeviceState state{};  // while the probe still ran: its own end closes the devices
+};
+
+void listen_to(const TrackerDevice& device, Probed& probed, const Interrupt& interrupt) {
+  const TrackerSink sink = [&seen = probed.seen](const TrackerSample& sample) {
+    seen.add(sample.source_time, 1);
+    seen.delay.add(sample.arrival - sample.source_time);
+    ++seen.tools[static_cast<std::size_t>(sample.state)];
+    if (sample.state != ToolState::kOk) ++seen.invalid;
+  };
+  serve_tracker(device, sink, probed.health, interrupt);
+}
+
+void listen_to(const EcgDevice& device, Probed& probed, const Interrupt& interrupt) {
+  const EcgSink sink = [&seen = probed.seen](const EcgBlock& block) {
+    const Instant last = block.first_sample_time + (block.count - 1) * block.sample_period;
+    seen.add(last, block.count);
+    seen.delay.add(block.arrival - last);
+    if (block.lead_off) seen.invalid += block.count;
+  };
+  serve_ecg(device, sink, probed.health, interrupt);
+}
+
+void listen_to(const CameraDevice& device, Probed& probed, const Interrupt& interrupt) {
+  GreyConverter converter;
+  const CameraSink sink = [&seen = probed.seen, &converter](const CameraFrame& frame) {
+    seen.add(frame.stamp.capture, 1);
+    seen.delay.add(frame.stamp.arrival - frame.stamp.capture);
+    if (!converter.convert(frame)) ++seen.invalid;
+  };
+  const auto served = serve_camera(device, sink, probed.health, interrupt);
+  // A video that cannot be read says so in its health's reason.
+  static_cast<void>(served);
+}
+
+template <class Device>
+void add(std::vector<std::unique_ptr<Probed>>& all, const char* kind, const std::string& where, const Device& device) {
+  all.push_back(std::make_unique<Probed>());
+  Probed& probed = *all.back();
+  probed.kind = kind;
+  probed.where = where;
+  probed.serve = [&device, &probed](const Interrupt& interrupt) { listen_to(device, probed, interrupt); };
+}
+
 int run(const Options& options) {
   auto stop = StopSignal::install();
   if (!stop) return complain(stop.error(), 1);
-  const auto configuration = load_configuration(options.file, {}, NamedFiles::kMayBeMissing);
+  auto configuration = load_configuration(options.file, {}, NamedFiles::kMayBeMissing);
   if (!configuration) return complain(configuration.error(), 2);
-  const bool has_tracker = configuration->tracker.protocol != TrackerConfiguration::Protocol::kNone;
-  const bool has_ecg = configuration->ecg.protocol != EcgConfiguration::Protocol::kNone;
-  if (!has_tracker && !has_ecg) {
-    return complain({options.file + ": names no device; expected keys 'tracker.protocol' or 'ecg.protocol'"}, 2);
+  // A playback is no device.
+  configuration->camera.playback.reset();
+  const auto devices = named_devices(*configuration, options.file);
+  if (!devices) return complain({options.file + ": " + devices.error().message}, 2);
+  std::vector<std::unique_ptr<Probed>> all;
+  if (devices->camera) add(all, "camera", *configuration->camera.device, *devices->camera);
+  if (devices->tracker) add(all, "tracker", format_endpoint(devices->tracker->endpoint), *devices->tracker);
+  if (devices->ecg) add(all, "ecg", format_endpoint(devices->ecg->endpoint), *devices->ecg);
+  if (all.empty()) {
+    return complain(
+        {options.file + ": names no device; expected keys 'camera.device', 'tracker.protocol' or 'ecg.protocol'"}, 2);
   }
-  Expected<TrackerDevice> tracker = fail("");
-  Expected<EcgDevice> ecg = fail("");
-  if (has_tracker) tracker = tracker_device(configuration->tracker);
-  if (has_tracker && !tracker) return complain({options.file + ": " + tracker.error().message}, 2);
-  if (has_ecg) ecg = ecg_device(configuration->ecg);
-  if (has_ecg && !ecg) return complain({options.file + ": " + ecg.error().message}, 2);
 
-  Interrupt interrupt;
-  DeviceHealth tracker_health;
-  DeviceHealth ecg_health;
-  Seen tracker_seen;
-  Seen ecg_seen;
-  // The state while the probe still ran: its own end closes the devices.
-  DeviceState tracker_state{};
-  DeviceState ecg_state{};
   {
-    std::jthread reading_tracker;
-    std::jthread reading_ecg;
-    if (has_tracker) {
-      reading_tracker = std::jthread([&] {
-        const TrackerSink sink = [&](const TrackerSample& sample) {
-          tracker_seen.add(sample.source_time, 1);
-          tracker_seen.delay.add(sample.arrival - sample.source_time);
-          ++tracker_seen.tools[static_cast<std::size_t>(sample.state)];
-          if (sample.state != ToolState::kOk) ++tracker_seen.invalid;
-        };
-        serve_tracker(*tracker, sink, tracker_health, interrupt);
-      });
-    }
-    if (has_ecg) {
-      reading_ecg = std::jthread([&] {
-        const EcgSink sink = [&](const EcgBlock& block) {
-          const Instant last = block.first_sample_time + (block.count - 1) * block.sample_period;
-          ecg_seen.add(last, block.count);
-          ecg_seen.delay.add(block.arrival - last);
-          if (block.lead_off) ecg_seen.invalid += block.count;
-        };
-        serve_ecg(*ecg, sink, ecg_health, interrupt);
-      });
+    Interrupt interrupt;
+    std::vector<std::jthread> threads;
+    for (const auto& probed : all) {
+      threads.emplace_back([&probed = *probed, &interrupt] { probed.serve(interrupt); });
     }
     if (stop->wait_for(from_seconds(options.seconds))) fmt::print(stderr, "perimap probe: stopped early\n");
-    tracker_state = tracker_health.state();
-    ecg_state = ecg_health.state();
+    for (const auto& probed : all) probed->state = probed->health.state();
     interrupt.request();
   }
-  tracker_health.set_state(tracker_state);
-  ecg_health.set_state(ecg_state);
-
-  nlohmann::json all;
-  if (has_tracker) all["tracker"] = as_json(tracker_health, tracker_seen, format_endpoint(tracker->endpoint));
-  if (has_ecg) all["ecg"] = as_json(ecg_health, ecg_seen, format_endpoint(ecg->endpoint));
-  if (options.json) {
-    fmt::print("{}\n", all.dump(2));
-  } else {
-    if (has_tracker) print("tracker", all["tracker"], complaint("tracker", tracker_seen));
-    if (has_ecg) print("ecg", all["ecg"], complaint("ecg", ecg_seen));
+  nlohmann::json json;
+  bool well = true;
+  for (const auto& probed : all) {
+    probed->health.set_state(probed->state);
+    well = well && probed->state == DeviceState::kStreaming;
+    json[probed->kind] = as_json(probed->health, probed->seen, probed->where);
+    if (!options.json) print(probed->kind, json[probed->kind], complaint(probed->kind, probed->seen));
   }
-  const bool well =
-      (!has_tracker || tracker_state == DeviceState::kStreaming) && (!has_ecg || ecg_state == DeviceState::kStreaming);
+  if (options.json) fmt::print("{}\n", json.dump(2));
   return well ? 0 : 1;
 }
 

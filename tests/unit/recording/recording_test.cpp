@@ -166,11 +166,31 @@ TEST(FoxgloveImage, BorrowsContiguousPixelsAndPacksOthers) {
   const auto borrowed = borrow_raw_image({pixels.data(), 4, 2, 4}, time, frame_id, packed);
   EXPECT_EQ(borrowed.data._buffer, pixels.data());
 
-  const auto image = borrow_grey_image(message);
-  ASSERT_TRUE(image) << image.error().message;
-  EXPECT_EQ(image->width, 3);
-  EXPECT_EQ(image->height, 2);
-  EXPECT_EQ(image->row(1)[2], 6);
+  const auto frame = borrow_camera_frame(message);
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_EQ(frame->width, 3);
+  EXPECT_EQ(frame->height, 2);
+  EXPECT_EQ(frame->format, PixelFormat::kGrey);
+  EXPECT_EQ(frame->bytes[5], std::byte{6});
+}
+
+TEST(FoxgloveImage, KeepsTheRowsOfACameraAndNothingBehindThem) {
+  const std::vector<std::byte> bytes(100, std::byte{1});
+  const std::string frame_id = "camera";
+  CameraFrame frame;
+  frame.format = PixelFormat::kYuyv;
+  frame.width = 4;
+  frame.height = 3;
+  frame.stride = 10;
+  frame.bytes = bytes;
+  const auto message = borrow_raw_image(frame, frame_id);
+  EXPECT_STREQ(message.encoding, "yuyv");
+  EXPECT_EQ(message.step, 10U);
+  EXPECT_EQ(message.data._length, 30U);
+  const auto back = borrow_camera_frame(message);
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->format, PixelFormat::kYuyv);
+  EXPECT_EQ(back->stride, 10U);
 }
 
 TEST(FoxgloveImage, RefusesSizesThatDoNotFitAndOtherEncodings) {
@@ -178,22 +198,22 @@ TEST(FoxgloveImage, RefusesSizesThatDoNotFitAndOtherEncodings) {
   std::vector<std::uint8_t> packed;
   const std::string frame_id = "camera";
   const auto whole = borrow_raw_image({pixels.data(), 3, 2, 3}, from_ns(0), frame_id, packed);
-  ASSERT_TRUE(borrow_grey_image(whole));
+  ASSERT_TRUE(borrow_camera_frame(whole));
   auto image = whole;
   image.height = 3;
-  EXPECT_FALSE(borrow_grey_image(image));
+  EXPECT_FALSE(borrow_camera_frame(image));
   image = whole;
   image.height = image.step = 0xffffffffU;
-  EXPECT_FALSE(borrow_grey_image(image));
+  EXPECT_FALSE(borrow_camera_frame(image));
   image = whole;
   image.step = 2;
-  EXPECT_FALSE(borrow_grey_image(image));
+  EXPECT_FALSE(borrow_camera_frame(image));
   image = whole;
   std::string other = "rgb8";
   image.encoding = other.data();
-  EXPECT_THAT(borrow_grey_image(image).error().message, HasSubstr("\"rgb8\""));
+  EXPECT_THAT(borrow_camera_frame(image).error().message, HasSubstr("\"rgb8\""));
   image.encoding = nullptr;
-  EXPECT_FALSE(borrow_grey_image(image));
+  EXPECT_FALSE(borrow_camera_frame(image));
 }
 
 TEST(FoxglovePose, IsInMetresWithTheScalarPartLast) {

@@ -1,0 +1,128 @@
+#include "daemon/commands/record.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "daemon/config/configuration_loader.hpp"
+#include "daemon/logging/logging.hpp"
+#include "daemon/process/stop_signal.hpp"
+#include "daemon/runtime/device_feeder.hpp"
+#include "daemon/runtime/device_setup.hpp"
+#include "daemon/runtime/replay_setup.hpp"
+#include "daemon/runtime/session_recorder.hpp"
+#include "daemon/runtime/session_recording.hpp"
+#include "drivers/calibration/calibration_file.hpp"
+
+namespace perimap {
+namespace {
+
+struct Options {
+  std::string configuration;
+  std::filesystem::path out;
+  double seconds = 0.0;  // 0: until stopped
+};
+
+int complain(const Error& error, int exit_code) {
+  fmt::print(stderr, "perimap record: {}\n", error.message);
+  return exit_code;
+}
+
+std::string progress_line(const SessionRecorder& recorder, double elapsed_s) {
+  const SessionRecorder::Summary summary = recorder.summary();
+  std::error_code ignored;
+  const double megabytes = static_cast<double>(std::filesystem::file_size(recorder.file(), ignored)) / 1e6;
+  return fmt::format("{:.0f} s: {} messages recorded, {:.0f} MB; not recorded: {} frames, {} others", elapsed_s,
+                     summary.recorded, megabytes, summary.frames_not_recorded, summary.other_not_recorded);
+}
+
+// The configuration that holds, with what a played recording brings along, and its camera.
+struct Basis {
+  Configuration configuration;
+  std::optional<CameraModel> camera;
+};
+
+tl::expected<Basis, SetupError> basis_of(const Options& options) {
+  auto given = load_configuration(options.configuration);
+  if (!given) return tl::unexpected(SetupError{std::move(given.error()), true});
+  if (given->camera.playback) {
+    auto recorded = recorded_basis(given->camera.playback->string(), options.configuration, ReadMode::kStrict);
+    if (!recorded) return tl::unexpected(std::move(recorded.error()));
+    return Basis{std::move(recorded->configuration), recorded->camera};
+  }
+  Basis basis{std::move(*given), std::nullopt};
+  if (basis.configuration.camera.calibration) {
+    auto camera = read_calibration(*basis.configuration.camera.calibration);
+    if (!camera) return tl::unexpected(SetupError{std::move(camera.error()), true});
+    basis.camera = *camera;
+  }
+  return basis;
+}
+
+// Until the signal, the end of what is played, the limit or an error of the disk.
+void watch(const Options& options, StopSignal& stop, DeviceFeeder& feeder) {
+  constexpr Duration kTick = std::chrono::milliseconds(100);
+  constexpr Duration kReport = std::chrono::seconds(5);
+  const Instant start = MonotonicClock::now();
+  Instant reported = start;
+  while (!stop.wait_for(kTick) && !feeder.ended()) {
+    feeder.tick();
+    const Instant now = MonotonicClock::now();
+    if (feeder.recorder()->summary().stopped) return;
+    if (options.seconds > 0.0 && now - start >= from_seconds(options.seconds)) return;
+    if (now - reported < kReport) continue;
+    reported = now;
+    fmt::print(stderr, "{}\n", progress_line(*feeder.recorder(), to_seconds(now - start)));
+  }
+}
+
+int run(const Options& options) {
+  auto stop = StopSignal::install();
+  if (!stop) return complain(stop.error(), 1);
+  auto basis = basis_of(options);
+  if (!basis) return complain(basis.error().error, basis.error().configuration ? 2 : 1);
+  auto devices = named_devices(basis->configuration, options.configuration);
+  if (!devices) return complain({options.configuration + ": " + devices.error().message}, 2);
+  if (!devices->tracker && !devices->ecg && !devices->camera) {
+    return complain({options.configuration + ": names no device; expected [camera], [tracker] or [ecg]"}, 2);
+  }
+  auto recorder = SessionRecorder::create(
+      options.out, recording_facts(basis->configuration, basis->camera, "perimap record " PERIMAP_VERSION),
+      static_cast<std::size_t>(basis->configuration.recording.memory_MB) << 20U);
+  if (!recorder) return complain(recorder.error(), 1);
+
+  const Logging logging(basis->configuration.log.level);
+  const Instant start = MonotonicClock::now();
+  DeviceFeeder feeder(std::move(*devices), nullptr, {true, std::move(*recorder)}, 0);
+  feeder.start();
+  watch(options, *stop, feeder);
+  feeder.stop();
+
+  const SessionRecorder& ended = *feeder.recorder();
+  fmt::print("{}: {}\n", ended.file().string(), progress_line(ended, to_seconds(MonotonicClock::now() - start)));
+  if (feeder.error()) return complain(*feeder.error(), 1);
+  const SessionRecorder::Summary summary = ended.summary();
+  if (summary.stopped) return complain({ended.reason()}, 1);
+  const std::uint64_t lost = summary.frames_not_recorded + summary.other_not_recorded;
+  if (lost > 0) return complain({fmt::format("{} messages found no room: the disk did not keep up", lost)}, 1);
+  return 0;
+}
+
+}  // namespace
+
+void add_record_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("record", "Record what the devices of a configuration give, as it comes, until stopped");
+  command->add_option("-c,--config", options->configuration, "Configuration of perimapd (TOML)")->required();
+  command->add_option("OUT", options->out, "The recording to write (.mcap); it must not be there yet")->required();
+  command->add_option("--seconds", options->seconds, "How long, s [until stopped]")->check(CLI::Range(0.1, 1e6));
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace perimap

@@ -1,0 +1,40 @@
+// Any bytes as a camera's frame, in any of its formats and sizes: a picture of that size, or an error.
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+
+#include "drivers/image/grey_converter.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace perimap;
+  constexpr std::size_t kHead = 4;
+  if (size < kHead) return 0;
+  // One converter over all inputs: nothing of an input may be left in it.
+  static GreyConverter converter;
+  CameraFrame frame;
+  frame.bytes = std::as_bytes(std::span(data, size).subspan(kHead));
+  frame.format = static_cast<PixelFormat>(data[0] % 5);
+  frame.width = data[1];
+  frame.height = data[2];
+  frame.stride = row_bytes(frame.format, frame.width) + data[3] % 8U - (data[3] > 250 ? 1 : 0);
+  if (frame.format == PixelFormat::kMjpg) {
+    const auto announced = read_jpeg_size(frame.bytes);
+    // As a replay takes it; but for what would only take long.
+    if (announced && data[3] % 2 == 0 && announced->width * announced->height < 1 << 16) {
+      frame.width = announced->width;
+      frame.height = announced->height;
+    }
+  }
+  const auto image = converter.convert(frame);
+  if (!image) return 0;
+  if (image->width != frame.width || image->height != frame.height || image->stride < image->width) std::abort();
+  unsigned sum = 0;
+  for (int y = 0; y < image->height; ++y) {
+    for (int x = 0; x < image->width; ++x) sum += image->row(y)[x];
+  }
+  // So that the reading is not left out.
+  static volatile unsigned seen;
+  seen = sum;
+  return 0;
+}

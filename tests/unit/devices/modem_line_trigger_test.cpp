@@ -1,0 +1,146 @@
+#include "drivers/ecg/modem_line_trigger.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <vector>
+
+#include "drivers/transport/pseudo_terminal.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using ::testing::HasSubstr;
+
+constexpr Instant kStart{seconds(10)};
+
+struct Edges : ::testing::Test {
+  // The line changes so many times and is then on or off.
+  std::optional<RTrigger> change(std::uint32_t times, bool on, Duration at, bool woken = true) {
+    line.changes += times;
+    line.on = on;
+    return edges.take(line, woken, kStart + at);
+  }
+
+  DeviceHealth health;
+  ModemTriggerSettings settings{.path = "", .delay = milliseconds(4)};
+  TriggerEdges edges{settings, health};
+  ModemPort::Line line{0xFFFFFFFEU, false};  // soon over its end
+  void SetUp() override { edges.restart(line); }
+};
+
+TEST_F(Edges, APulseIsOneRPeakAtItsFirstEdgeLessTheDelay) {
+  const auto first = change(1, true, milliseconds(0));
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->r_peak, kStart - milliseconds(4));
+  EXPECT_EQ(first->arrival, kStart);
+  EXPECT_FALSE(change(1, false, milliseconds(100)));
+  const auto second = change(1, true, milliseconds(800));
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->count, first->count + 1);
+  EXPECT_EQ(health.samples.get(), 2U);
+  EXPECT_EQ(health.lost.get(), 0U);
+}
+
+TEST_F(Edges, ABounceIsNoBeat) {
+  EXPECT_TRUE(change(1, true, milliseconds(0)));
+  EXPECT_FALSE(change(1, false, milliseconds(1)));
+  EXPECT_FALSE(change(1, true, milliseconds(2)));
+  EXPECT_EQ(health.damaged.get(), 1U);
+}
+
+TEST_F(Edges, AnEdgeWithoutAKnownInstantGivesNoRPeak) {
+  EXPECT_FALSE(change(2, false, milliseconds(0)));  // a whole pulse at once
+  EXPECT_EQ(health.lost.get(), 1U);
+  EXPECT_FALSE(change(1, true, milliseconds(900), false));  // it came while nobody waited
+  EXPECT_EQ(health.lost.get(), 2U);
+  EXPECT_FALSE(change(3, false, milliseconds(2000)));  // off, on, off
+  EXPECT_EQ(health.lost.get(), 3U);
+  EXPECT_FALSE(change(3, true, milliseconds(3000)));  // on, off, on
+  EXPECT_EQ(health.lost.get(), 5U);
+  EXPECT_EQ(health.samples.get(), 0U);
+}
+
+TEST_F(Edges, NoChangeIsNothing) {
+  EXPECT_FALSE(change(0, false, milliseconds(0), false));
+  EXPECT_EQ(health.lost.get(), 0U);
+}
+
+TEST(FallingEdges, AreRPeaksWhenTheMonitorIsThatWay) {
+  DeviceHealth health;
+  TriggerEdges edges({.path = "", .rising = false}, health);
+  edges.restart({5, true});
+  EXPECT_TRUE(edges.take({6, false}, true, kStart));
+  EXPECT_FALSE(edges.take({7, true}, true, kStart + milliseconds(100)));
+}
+
+// A port whose line does as it is told.
+class FakePort final : public ModemPort {
+ public:
+  struct Step {
+    bool woken = true;
+    std::uint32_t changes = 1;
+    bool on = true;
+    std::string error = {};
+  };
+  FakePort(std::deque<Step>& steps, Interrupt& interrupt) : steps_(steps), interrupt_(interrupt) {}
+
+  Expected<bool> wait_for_change() override {
+    if (steps_.empty()) {
+      interrupt_.request();
+      return false;
+    }
+    const Step step = steps_.front();
+    steps_.pop_front();
+    if (!step.error.empty()) return fail(step.error);
+    line_.changes += step.changes;
+    line_.on = step.on;
+    return step.woken;
+  }
+  Expected<Line> read() override { return line_; }
+
+ private:
+  std::deque<Step>& steps_;
+  Interrupt& interrupt_;
+  Line line_;
+};
+
+TEST(ModemLineTrigger, GivesRPeaksAndOpensAnUnpluggedPortAgain) {
+  Interrupt interrupt;
+  DeviceHealth health;
+  std::deque<FakePort::Step> steps{{}, {.on = false}, {.error = "unplugged"}, {}, {.on = false}};
+  std::vector<std::uint64_t> counts;
+  int openings = 0;
+  const ModemPortOpener open = [&](const std::string&, ModemLine) -> Expected<std::unique_ptr<ModemPort>> {
+    if (++openings == 2) return fail("no such device");
+    return std::make_unique<FakePort>(steps, interrupt);
+  };
+  serve_modem_line_trigger(
+      {.path = "/dev/ttyS9", .shortest_interval = Duration(0)},
+      [&](const RTrigger& trigger) {
+        counts.push_back(trigger.count);
+        EXPECT_LE(trigger.r_peak, trigger.arrival);
+      },
+      health, interrupt, open);
+  EXPECT_THAT(counts, ::testing::ElementsAre(1, 2));
+  EXPECT_EQ(openings, 3);
+  EXPECT_EQ(health.reason(), "no such device");
+  EXPECT_EQ(health.state(), DeviceState::kClosed);
+}
+
+TEST(ModemPort, SaysThatATerminalWithoutModemLinesHasNone) {
+  auto device = PseudoTerminal::open("");
+  ASSERT_TRUE(device) << device.error().message;
+  const auto port = open_modem_port((*device)->path(), ModemLine::kCarrierDetect);
+  ASSERT_FALSE(port);
+  EXPECT_THAT(port.error().message, HasSubstr("cannot watch modem lines"));
+  const auto none = open_modem_port("/dev/no-such-port", ModemLine::kClearToSend);
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().message, HasSubstr("no such device"));
+}
+
+}  // namespace
+}  // namespace perimap

@@ -1,0 +1,291 @@
+#include "daemon/runtime/session_recorder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <numeric>
+
+#include "counted_allocations.hpp"
+#include "daemon/runtime/session_recording.hpp"
+#include "drivers/recording/replay_reader.hpp"
+#include "tests/unit/camera/made_jpeg.hpp"
+#include "wait_until.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+using ::testing::HasSubstr;
+
+constexpr int kWidth = 64, kHeight = 48;
+constexpr std::size_t kMemory = std::size_t{1} << 20U;
+
+class SessionRecording : public ::testing::Test {
+ protected:
+  SessionRecording() {
+    std::string name = (std::filesystem::temp_directory_path() / "perimap-record-XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+    file_ = folder_ / "session.mcap";
+    // Random, so that they stay as large on the disk as they are.
+    std::srand(1);
+    for (std::byte& b : pixels_) b = static_cast<std::byte>(std::rand());
+  }
+  ~SessionRecording() override { std::filesystem::remove_all(folder_); }
+  SessionRecording(const SessionRecording&) = delete;
+  SessionRecording& operator=(const SessionRecording&) = delete;
+
+  std::unique_ptr<SessionRecorder> recorder(std::size_t memory = kMemory) const {
+    auto created =
+        SessionRecorder::create(file_, {"test", "test", "tracker", {}, "camera_matrix", "version = 1\n"}, memory);
+    EXPECT_TRUE(created) << created.error().message;
+    return std::move(*created);
+  }
+
+  CameraFrame frame(std::uint64_t sequence, Instant arrival, PixelFormat format = PixelFormat::kYuyv) const {
+    CameraFrame f;
+    f.stamp = {sequence, arrival - milliseconds(20), arrival};
+    f.format = format;
+    f.width = kWidth;
+    f.height = kHeight;
+    f.stride = format == PixelFormat::kMjpg ? 0 : 2 * kWidth;
+    f.bytes = pixels_;
+    return f;
+  }
+  static TrackerSample pose(std::uint32_t count, Instant arrival) {
+    TrackerSample s;
+    s.device_frame = count;
+    s.source_time = arrival - milliseconds(5);
+    s.arrival = arrival;
+    s.state = count % 2 == 0 ? ToolState::kOk : ToolState::kOutOfVolume;
+    return s;
+  }
+  static EcgBlock block(std::uint32_t count, Instant arrival) {
+    EcgBlock b;
+    b.device_sequence = count;
+    b.first_sample_time = arrival - milliseconds(4);
+    b.arrival = arrival;
+    b.sample_period = milliseconds(4);
+    b.count = 1;
+    b.mV[0] = 0.25F;
+    return b;
+  }
+
+  std::filesystem::path folder_;
+  std::filesystem::path file_;
+  std::array<std::byte, std::size_t{2} * kWidth * kHeight> pixels_;
+};
+
+struct Counts {
+  int frames = 0, poses = 0, valid_poses = 0, blocks = 0;
+  std::uint64_t last_frame = 0;
+  std::vector<Error> damage;
+};
+
+Counts read(const std::filesystem::path& file, ReadMode mode = ReadMode::kStrict) {
+  Counts counts;
+  auto reader = ReplayReader::open(file.string(), mode);
+  EXPECT_TRUE(reader) << reader.error().message;
+  if (!reader) return counts;
+  for (;;) {
+    const auto event = reader->next();
+    EXPECT_TRUE(event) << event.error().message;
+    if (!event || !*event) break;
+    if (const auto* frame = std::get_if<FrameEvent>(&**event)) {
+      ++counts.frames;
+      EXPECT_EQ(frame->stamp.sequence, counts.last_frame + 1);
+      counts.last_frame = frame->stamp.sequence;
+    } else if (const auto* pose = std::get_if<TrackerSample>(&**event)) {
+      ++counts.poses;
+      if (pose->state == ToolState::kOk) ++counts.valid_poses;
+    } else {
+      ++counts.blocks;
+    }
+  }
+  counts.damage = reader->damage();
+  return counts;
+}
+
+TEST_F(SessionRecording, OfThreeThreadsReplaysInOrderOfArrival) {
+  const auto session = recorder();
+  session->start();
+  constexpr int kEach = 60;
+  std::thread camera([&] {
+    for (int i = 1; i <= kEach; ++i) {
+      session->frame(frame(static_cast<std::uint64_t>(i), MonotonicClock::now()));
+      std::this_thread::sleep_for(milliseconds(3));
+    }
+  });
+  std::thread tracker([&] {
+    for (int i = 1; i <= kEach; ++i) {
+      session->pose(pose(static_cast<std::uint32_t>(i), MonotonicClock::now()));
+      std::this_thread::sleep_for(milliseconds(2));
+    }
+  });
+  for (int i = 1; i <= kEach; ++i) {
+    session->ecg(block(static_cast<std::uint32_t>(i), MonotonicClock::now()));
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  camera.join();
+  tracker.join();
+  session->stop();
+  EXPECT_EQ(session->reason(), "");
+  const auto summary = session->summary();
+  EXPECT_FALSE(summary.stopped);
+  EXPECT_EQ(summary.recorded, 3U * kEach);
+  EXPECT_EQ(summary.frames_not_recorded + summary.other_not_recorded, 0U);
+  const Counts counts = read(file_);
+  EXPECT_EQ(counts.frames, kEach);
+  EXPECT_EQ(counts.poses, kEach);
+  EXPECT_EQ(counts.valid_poses, kEach / 2);
+  EXPECT_EQ(counts.blocks, kEach);
+}
+
+TEST_F(SessionRecording, KeepsFramesInTheCamerasOwnFormat) {
+  const auto jpeg = test::make_jpeg(kWidth, kHeight, [](int x, int) { return static_cast<std::uint8_t>(100 + x); });
+  const Instant now = MonotonicClock::now();
+  auto session = recorder();
+  session->start();
+  CameraFrame compressed = frame(1, now, PixelFormat::kMjpg);
+  compressed.bytes = jpeg;
+  session->frame(compressed);
+  session->pose(pose(2, now));
+  session->ecg(block(1, now));
+  session->stop();
+  auto reader = RecordingReader::open(file_.string()).value();
+  bool seen = false;
+  for (auto message = reader.next().value(); message; message = reader.next().value()) {
+    if (message->type != "foxglove::CompressedImage") continue;
+    const auto image = reader.decode<foxglove_CompressedImage>(*message).value();
+    const auto bytes = std::as_bytes(std::span(image->data._buffer, image->data._length));
+    EXPECT_TRUE(std::equal(bytes.begin(), bytes.end(), jpeg.begin(), jpeg.end()));
+    seen = true;
+  }
+  EXPECT_TRUE(seen);
+  // And a replay sees its luma.
+  auto replay = ReplayReader::open(file_.string(), ReadMode::kStrict).value();
+  for (auto event = replay.next().value(); event; event = replay.next().value()) {
+    const auto* shown = std::get_if<FrameEvent>(&*event);
+    if (shown != nullptr) {
+      EXPECT_NEAR(shown->pixels[10], 110, 4);
+    }
+  }
+}
+
+TEST_F(SessionRecording, CountsFramesThatFindNoRoomAndTakesNothingFromTheHeap) {
+  const auto session = recorder(3 * pixels_.size());
+  const Instant now = MonotonicClock::now();
+  // Nobody writes yet.
+  const long allocations = test::allocations_of([&] {
+    for (std::uint64_t i = 1; i <= 10; ++i) session->frame(frame(i, now));
+    session->pose(pose(2, now));
+    session->ecg(block(1, now));
+  });
+  EXPECT_EQ(allocations, 0);
+  EXPECT_EQ(session->summary().frames_not_recorded, 7U);
+  session->start();
+  session->stop();
+  EXPECT_EQ(session->summary().recorded, 5U);
+  EXPECT_EQ(read(file_).frames, 3);
+}
+
+TEST_F(SessionRecording, OneThatComesAfterLaterOnesKeepsTheOrder) {
+  const auto session = recorder();
+  session->start();
+  const Instant now = MonotonicClock::now();
+  session->frame(frame(1, now));
+  session->ecg(block(1, now));
+  ASSERT_TRUE(wait_until([&] { return session->summary().recorded == 2; }));
+  session->pose(pose(2, now - milliseconds(100)));
+  session->stop();
+  const Counts counts = read(file_);
+  EXPECT_EQ(counts.frames + counts.poses + counts.blocks, 3);
+}
+
+TEST_F(SessionRecording, AFullDiskStopsItAndNothingElse) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit small{200'000, before.rlim_max};
+  const auto session = recorder();
+  session->start();
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  std::uint64_t given = 0;
+  const bool stopped = wait_until([&] {
+    session->frame(frame(++given, MonotonicClock::now()));
+    session->pose(pose(2, MonotonicClock::now()));
+    session->ecg(block(1, MonotonicClock::now()));
+    return session->summary().stopped;
+  });
+  session->frame(frame(++given, MonotonicClock::now()));
+  session->stop();
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  ASSERT_TRUE(stopped);
+  EXPECT_THAT(session->reason(), HasSubstr("session.mcap: cannot write: File too large"));
+  const auto summary = session->summary();
+  EXPECT_EQ(summary.recorded + summary.frames_not_recorded + summary.other_not_recorded, 3 * given - 2);
+  EXPECT_GE(summary.frames_not_recorded, 1U);
+}
+
+// What was pushed into the recorder is not lost with the process, but for the last second or so.
+TEST_F(SessionRecording, ACrashLeavesWhatWasWrittenReadable) {
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const auto session = recorder();
+    session->start();
+    for (std::uint64_t i = 1;; ++i) {
+      session->frame(frame(i, MonotonicClock::now()));
+      session->pose(pose(2, MonotonicClock::now()));
+      session->ecg(block(1, MonotonicClock::now()));
+      std::this_thread::sleep_for(milliseconds(4));
+    }
+  }
+  std::error_code ignored;
+  const bool grew = wait_until([&] { return std::filesystem::file_size(file_, ignored) > 500'000 && !ignored; });
+  kill(child, SIGKILL);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  ASSERT_TRUE(grew);
+  const Counts counts = read(file_, ReadMode::kWhole);
+  EXPECT_GT(counts.frames, 30);
+  EXPECT_GT(counts.poses, 30);
+  EXPECT_FALSE(counts.damage.empty());
+}
+
+TEST_F(SessionRecording, OverwritesNothing) {
+  { const auto session = recorder(); }
+  const auto again = SessionRecorder::create(file_, {}, kMemory);
+  ASSERT_FALSE(again);
+  EXPECT_THAT(again.error().message, HasSubstr("is there already"));
+}
+
+TEST(RecordingFacts, LeaveOutWhatTheDriversHaveDoneAlready) {
+  Configuration configuration;
+  configuration.camera.device = "v4l2:/dev/video0";
+  configuration.tracker.protocol = TrackerConfiguration::Protocol::kNdi;
+  configuration.tracker.port = "/dev/ttyUSB0";
+  configuration.tracker.translation_IW_mm[0] = 5.0;
+  configuration.tracker.position_deviation_mm = 1.4;
+  const auto facts = recording_facts(configuration, std::nullopt, "test");
+  ASSERT_TRUE(facts.configuration);
+  EXPECT_THAT(*facts.configuration, HasSubstr("position_deviation_mm = 1.4"));
+  EXPECT_THAT(*facts.configuration, ::testing::Not(HasSubstr("video0")));
+  EXPECT_THAT(*facts.configuration, ::testing::Not(HasSubstr("ttyUSB0")));
+  EXPECT_THAT(*facts.configuration, HasSubstr("registration_translation_IW_mm = [0.0, 0.0, 0.0]"));
+  EXPECT_FALSE(facts.calibration);
+}
+
+TEST(RecordingPath, TellsWhenItBegan) {
+  const std::chrono::system_clock::time_point at(std::chrono::seconds(1'795'304'701));
+  EXPECT_EQ(recording_path("/data", at), "/data/perimap-20261121-234501.mcap");
+}
+
+}  // namespace
+}  // namespace perimap
