@@ -113,11 +113,15 @@ void FeatureFinder::follow(const Frame& frame) noexcept {
   const GreyImage image{frame.pixels.data(), width_, height_, width_};
   const Matrix2d covariance = kMotionDeviation_px * kMotionDeviation_px * Matrix2d::Identity();
   std::erase_if(found_, [&](FoundFeature& feature) {
-    const Vector2d last = feature.patch_state.px;
+    const PatchState last = feature.patch_state;
     const PatchMatch match =
-        tracker_.track(image, feature.patch, feature.patch_state, last + feature.velocity_px, covariance);
-    if (match.state != MatchState::kFound) return true;
-    feature.velocity_px = match.px - last;
+        tracker_.track(image, feature.patch, feature.patch_state, last.px + feature.velocity_px, covariance);
+    if (match.state != MatchState::kFound ||
+        !feature.looks.is_plausible(last, feature.patch_state, match.correlation, 1)) {
+      return true;
+    }
+    feature.looks.add(match.correlation);
+    feature.velocity_px = match.px - last.px;
     return false;
   });
 }

@@ -15,6 +15,7 @@
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/vision/feature_detector.hpp"
+#include "core/vision/patch_continuity.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 
@@ -26,6 +27,7 @@ struct FoundFeature {
   Vector2d first_observed_px = Vector2d::Zero();
   PatchTemplate patch;
   PatchState patch_state;                   // in the round's last frame
+  PatchContinuity looks;
   Vector2d velocity_px = Vector2d::Zero();  // per frame
 };
 

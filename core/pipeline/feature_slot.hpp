@@ -14,6 +14,7 @@
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/time/instant.hpp"
+#include "core/vision/patch_continuity.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 
@@ -79,6 +80,7 @@ struct FeatureSlot {
   // following
   PatchTemplate patch;
   PatchState patch_state;
+  PatchContinuity looks;
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   std::uint64_t last_found_frame = 0;
   int stale_matches = 0;                // in a row, of a template that fits the view badly

@@ -45,6 +45,12 @@ PixelPrediction predict_from_image(const FeatureSlot& slot, const FrameRecord& f
   return prediction;
 }
 
+// Whether a look-alike may well lie within the search region.
+bool is_wide(const PixelPrediction& prediction) noexcept {
+  constexpr double kNarrow_px = 3;
+  return prediction.covariance_px2.trace() > 2 * kNarrow_px * kNarrow_px;
+}
+
 // Whether the match can be the feature, as far as the map and the causal phase tell. What is learnt from it is judged
 // again when its phase is known.
 bool agrees(const PatchMatch& match, const PixelPrediction& from_map, double gate) noexcept {
@@ -69,6 +75,7 @@ void renew_stale_template(FeatureSlot& slot, const FrameJob& job) noexcept {
     return;
   }
   slot.patch = renewed;
+  slot.looks.reset();
   slot.patch_state = PatchState{};
   slot.patch_state.px = slot.match.px;
 }
@@ -87,8 +94,16 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   const PixelPrediction& prediction = use_map ? from_map : from_image;
   if (!prediction.valid || !settings.camera.contains(prediction.px)) return;
   const Vector2d last_px = slot.patch_state.px;
-  slot.match = job.tracker->track(job.image, slot.patch, slot.patch_state, prediction.px, prediction.covariance_px2);
+  PatchState seen = slot.patch_state;
+  slot.match = job.tracker->track(job.image, slot.patch, seen, prediction.px, prediction.covariance_px2);
   if (slot.match.state != MatchState::kFound) return;
+  if (is_wide(prediction) && !slot.looks.is_plausible(slot.patch_state, seen, slot.match.correlation,
+                                                      job.frame->index - slot.last_found_frame)) {
+    slot.match.state = MatchState::kLowCorrelation;
+    return;
+  }
+  slot.patch_state = seen;
+  slot.looks.add(slot.match.correlation);
   slot.match_agrees = from_map.valid && agrees(slot.match, from_map, settings.estimator.update.gate);
   const bool in_a_row = slot.last_found_frame + 1 == job.frame->index;
   renew_stale_template(slot, job);

@@ -297,6 +297,7 @@ void Mapper::adopt_found_features(std::uint64_t frame_index) noexcept {
     slot->first_observed_px = found.first_observed_px;
     slot->patch = found.patch;
     slot->patch_state = found.patch_state;
+    slot->looks = found.looks;
     slot->velocity_px = found.velocity_px;
     slot->last_found_frame = frame_index - 1;
     slot->stale_matches = 0;

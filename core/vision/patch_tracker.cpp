@@ -12,21 +12,9 @@
 namespace perimap {
 namespace {
 
-struct StretchRange {
-  double smallest;
-  double largest;
-};
-
-// The singular values of A, in closed form.
-StretchRange stretch(const Matrix2d& A) noexcept {
-  const double sum = std::hypot(A(0, 0) + A(1, 1), A(1, 0) - A(0, 1));
-  const double difference = std::hypot(A(0, 0) - A(1, 1), A(1, 0) + A(0, 1));
-  return {0.5 * std::abs(sum - difference), 0.5 * (sum + difference)};
-}
-
 // Tissue stretches within bounds and is not seen from behind.
 bool is_plausible(const Matrix2d& A, double max_stretch) noexcept {
-  const StretchRange range = stretch(A);
+  const StretchRange range = stretch_of(A);
   return A.determinant() > 0 && range.smallest * max_stretch >= 1 && range.largest <= max_stretch;
 }
 
@@ -260,9 +248,15 @@ PatchMatch PatchTracker::track(const GreyImage& image, const PatchTemplate& patc
   return match;
 }
 
+StretchRange stretch_of(const Matrix2d& A) noexcept {
+  const double sum = std::hypot(A(0, 0) + A(1, 1), A(1, 0) - A(0, 1));
+  const double difference = std::hypot(A(0, 0) - A(1, 1), A(1, 0) + A(0, 1));
+  return {0.5 * std::abs(sum - difference), 0.5 * (sum + difference)};
+}
+
 bool template_is_stale(const PatchState& state) noexcept {
   constexpr double kWorn = 2.0;
-  const StretchRange range = stretch(state.A);
+  const StretchRange range = stretch_of(state.A);
   return !(range.largest < kWorn && range.smallest > 1 / kWorn);
 }
 

@@ -19,6 +19,14 @@ struct PatchState {
   double bias = 0;
 };
 
+struct StretchRange {
+  double smallest;
+  double largest;
+};
+
+// The singular values of A: by how much a shape is compressed and stretched.
+[[nodiscard]] StretchRange stretch_of(const Matrix2d& A) noexcept;
+
 enum class MatchState : std::uint8_t {
   kFound,
   kOutOfView,       // the patch is not wholly inside the frame

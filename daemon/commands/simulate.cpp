@@ -40,29 +40,6 @@ const char* law_name(MotionLaw law) noexcept {
   return "linear";
 }
 
-// What perimapd needs to know about this session.
-std::string configuration_toml(const Simulation& simulation, const TrackerNoise& noise) {
-  const Pose& X_SC = simulation.hand_eye_X_SC();
-  double q[4];
-  rotation_to_wxyz(X_SC.R, q);
-  const double correlation_s = to_seconds(simulation.settings().tracker_correlation);
-  return fmt::format(
-      "version = 1\n\n"
-      "[tracker]\n"
-      "position_deviation_mm = {:#}\n"
-      "rotation_deviation_deg = {:#}\n"
-      "{}"
-      "hand_eye_translation_SC_mm = [{:#}, {:#}, {:#}]\n"
-      "hand_eye_rotation_SC_wxyz = [{:#}, {:#}, {:#}, {:#}]\n\n"
-      "[phase]\n"
-      "law = \"{}\"\n"
-      "{}",
-      noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
-      correlation_s > 0.0 ? fmt::format("error_correlation_s = {:#}\n", correlation_s) : "", X_SC.t.x(), X_SC.t.y(),
-      X_SC.t.z(), q[0], q[1], q[2], q[3], law_name(simulation.settings().law),
-      simulation.settings().respiration_mm > 0.0 ? "\n[respiration]\nenabled = true\n" : "");
-}
-
 std::string description(const Simulation& simulation, const TrackerNoise& noise) {
   const SimulationSettings& s = simulation.settings();
   const double correlation_s = to_seconds(s.tracker_correlation);
@@ -168,7 +145,7 @@ class SessionWriter {
     return attach(attachments::kCalibration, "application/yaml", simulation_.lens().opencv_yaml())
         .and_then([&] {
           return attach(attachments::kConfiguration, "application/toml",
-                        configuration_toml(simulation_, recording_.noise));
+                        simulated_configuration(simulation_, recording_.noise));
         })
         .and_then([&] { return writer_.write(*info, facts, start, start, 0); })
         .and_then([&] { return writer_.write(*mesh, truth_mesh, start, start, 0); })
@@ -272,6 +249,28 @@ int run(Options options) {
 
 }  // namespace
 
+std::string simulated_configuration(const Simulation& simulation, const TrackerNoise& noise) {
+  const Pose& X_SC = simulation.hand_eye_X_SC();
+  double q[4];
+  rotation_to_wxyz(X_SC.R, q);
+  const double correlation_s = to_seconds(simulation.settings().tracker_correlation);
+  return fmt::format(
+      "version = 1\n\n"
+      "[tracker]\n"
+      "position_deviation_mm = {:#}\n"
+      "rotation_deviation_deg = {:#}\n"
+      "{}"
+      "hand_eye_translation_SC_mm = [{:#}, {:#}, {:#}]\n"
+      "hand_eye_rotation_SC_wxyz = [{:#}, {:#}, {:#}, {:#}]\n\n"
+      "[phase]\n"
+      "law = \"{}\"\n"
+      "{}",
+      noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
+      correlation_s > 0.0 ? fmt::format("error_correlation_s = {:#}\n", correlation_s) : "", X_SC.t.x(), X_SC.t.y(),
+      X_SC.t.z(), q[0], q[1], q[2], q[3], law_name(simulation.settings().law),
+      simulation.settings().respiration_mm > 0.0 ? "\n[respiration]\nenabled = true\n" : "");
+}
+
 Expected<void> write_simulation(const Simulation& simulation, const std::vector<SimulatedRecording>& recordings,
                                 unsigned threads, const std::function<void(std::uint64_t frames)>& progress) {
   std::vector<std::unique_ptr<SessionWriter>> writers;
@@ -343,6 +342,10 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
   command->add_option("--exposure", settings.exposure_share, "Motion blur: exposure as a share of the frame period")
       ->capture_default_str();
   command->add_flag("--instrument", settings.instrument, "An instrument comes into view for 3 s every 6 s");
+  command
+      ->add_option("--smoke", settings.smoke,
+                   "Clouds that come for 5 s every 8 s: optical depth of the thickest, 1 leaves 37 % of the contrast")
+      ->capture_default_str();
   command->add_option("--glints", settings.glints, "Highlights that wander over the tissue, besides its own")
       ->capture_default_str();
   CLI::Option* noise =

@@ -21,6 +21,9 @@ struct SimulatedRecording {
   TrackerNoise noise;
 };
 
+// What perimapd needs to know about this session, as a configuration file.
+[[nodiscard]] std::string simulated_configuration(const Simulation& simulation, const TrackerNoise& noise);
+
 // Renders the simulation once, on so many threads, and writes one recording for each tracker noise. Equal simulations
 // give equal bytes, whatever the number of threads. Each file gets its name only when it is whole. `progress` hears of
 // every frame.

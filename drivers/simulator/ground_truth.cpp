@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "drivers/simulator/triangle_rays.hpp"
-
 namespace perimap {
 
 Expected<GroundTruth> GroundTruth::create(HeartMesh mesh_W, HeartMotion motion, std::vector<CameraTruth> cameras) {
@@ -29,27 +27,16 @@ void GroundTruth::vertices_at(Instant t, std::span<Vector3d> out) const {
   for (Vector3d& p : out) p += breathing;
 }
 
-std::optional<SurfacePoint> GroundTruth::first_hit(const Pose& X_WC, const Vector3d& ray_C, Instant t) const {
+SurfaceView GroundTruth::view(const Pose& X_WC, Instant t) const {
   std::vector<Vector3d> p_C(mesh_.vertex_count);
   vertices_at(t, p_C);
   const Pose X_CW = X_WC.inverse();
   for (Vector3d& p : p_C) p = X_CW * p;
+  return {p_C, mesh_.triangles};
+}
 
-  std::optional<SurfacePoint> hit;
-  double nearest = 0.0;  // largest sum(w) = 1 / z so far
-  for (std::uint32_t triangle = 0; triangle < mesh_.triangle_count(); ++triangle) {
-    const std::uint32_t* corners = mesh_.triangles.data() + 3 * std::size_t{triangle};
-    const TriangleRays rays(p_C[corners[0]], p_C[corners[1]], p_C[corners[2]]);
-    if (!rays.valid) continue;
-    const Vector3d w = rays.inverse * ray_C;
-    const double sum = w.sum();
-    // A ray through an edge must meet one of the two triangles, whatever the rounding.
-    if (sum <= nearest || w.minCoeff() < -1e-9 * sum) continue;
-    nearest = sum;
-    const Vector3d weights = w.cwiseMax(0.0) / w.cwiseMax(0.0).sum();
-    hit = SurfacePoint{triangle, {weights[0], weights[1], weights[2]}};
-  }
-  return hit;
+std::optional<SurfacePoint> GroundTruth::first_hit(const Pose& X_WC, const Vector3d& ray_C, Instant t) const {
+  return view(X_WC, t).first_hit(ray_C);
 }
 
 Vector3d GroundTruth::position(const SurfacePoint& point, Instant t) const {

@@ -1,7 +1,6 @@
 // Where any point of a simulated heart really is: the same surface and motion from which the images are rendered.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -12,14 +11,9 @@
 #include "core/time/instant.hpp"
 #include "drivers/simulator/heart_mesh.hpp"
 #include "drivers/simulator/heart_motion.hpp"
+#include "drivers/simulator/surface_view.hpp"
 
 namespace perimap {
-
-// A point fixed to the material: it moves with its triangle's corners.
-struct SurfacePoint {
-  std::uint32_t triangle = 0;
-  std::array<double, 3> barycentric{};  // weights of the triangle's three vertices, not negative, sum 1
-};
 
 struct CameraTruth {
   Instant capture;
@@ -43,8 +37,10 @@ class GroundTruth {
   // Positions of all vertices at t, W, mm; `out` has mesh().vertex_count places.
   void vertices_at(Instant t, std::span<Vector3d> out) const;
 
-  // The material point that the ray of a camera at X_WC meets first at t: the front-most triangle, whichever side it
-  // shows. `ray_C` points from the projection centre, in any length. Nothing when the ray misses the heart.
+  // The surface as a camera at X_WC has it before it at t.
+  [[nodiscard]] SurfaceView view(const Pose& X_WC, Instant t) const;
+
+  // view(X_WC, t).first_hit(ray_C), for a single ray.
   [[nodiscard]] std::optional<SurfacePoint> first_hit(const Pose& X_WC, const Vector3d& ray_C, Instant t) const;
 
   // Position of a material point at t, W, mm.

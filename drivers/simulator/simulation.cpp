@@ -104,7 +104,7 @@ Expected<void> check(const SimulationSettings& s) {
         outside("tracker dropouts", s.tracker_dropouts_per_min, 0.0, 60.0, "a minute"),
         outside("scope sweep", s.scope_sweep, 0.0, 20.0, "times the usual"),
         outside("exposure", s.exposure_share, 0.0, 1.0, "of the frame period"),
-        outside("glints", s.glints, 0, 1000, "")})
+        outside("glints", s.glints, 0, 1000, ""), outside("smoke", s.smoke, 0.0, 10.0, "")})
     if (!result) return result;
   return {};
 }
@@ -135,7 +135,8 @@ Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth t
       // The sensor sits beside the lens, some way up the shaft, turned about the shaft's axis.
       X_SC_{so3_exp(Vector3d(0.15, -0.1, 1.2)), Vector3d(4.2, -6.8, 14.5)},
       path_(path),
-      obstacles_(settings_.seed, lens.width, lens.height, settings_.instrument, settings_.glints),
+      obstacles_(settings_.seed, lens.width, lens.height, settings_.instrument, settings_.glints,
+                 settings_.smoke),
       surface_W_(std::move(surface_W)) {}
 
 std::int64_t Simulation::utc_minus_monotonic_ns() const noexcept { return 1'750'000'000'000'000'000; }

@@ -45,6 +45,7 @@ struct SimulationSettings {
   double exposure_share = 0.0;  // of the frame period, about the capture: motion blur
   bool instrument = false;      // see ViewObstacles
   int glints = 0;
+  double smoke = 0.0;
 };
 
 // Norms in three dimensions: the standard deviation of one axis is 1 / sqrt(3) of them.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <vector>
 
 #include "drivers/simulator/counter_noise.hpp"
 
@@ -30,12 +31,13 @@ OnShaft on_shaft(const Vector2d& from, const Vector2d& tip, const Vector2d& px) 
 
 }  // namespace
 
-ViewObstacles::ViewObstacles(std::uint64_t seed, int width, int height, bool instrument, int glints)
+ViewObstacles::ViewObstacles(std::uint64_t seed, int width, int height, bool instrument, int glints, double smoke)
     : seed_(seed),
       width_(width),
       height_(height),
       instrument_(instrument),
       glints_(glints),
+      smoke_(smoke),
       half_width_px_(0.04 * width) {}
 
 ViewObstacles::Shaft ViewObstacles::shaft(double t_s) const noexcept {
@@ -73,6 +75,7 @@ void ViewObstacles::draw(Duration since_start, std::span<float> radiance) const 
   const double t_s = to_seconds(since_start);
   draw_glints(t_s, radiance);
   draw_shaft(t_s, radiance);
+  draw_smoke(t_s, radiance);
 }
 
 // A cylinder of brushed steel: bright along a line, darker towards its sides.
@@ -114,6 +117,53 @@ void ViewObstacles::draw_glints(double t_s, std::span<float> radiance) const {
         radiance[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)] +=
             static_cast<float>(500.0 * light * std::exp(-1.5 * (x * x + y * y)));
       }
+    }
+  }
+}
+
+// Scatters the scope's own light back, and dims what lies behind (Koschmieder's law). Clouds are a sum of drifting waves,
+// smooth enough to be worked out on a coarse grid.
+void ViewObstacles::draw_smoke(double t_s, std::span<float> radiance) const {
+  constexpr double kSmokePeriod_s = 8.0, kSmoke_s = 5.0;
+  const double within = t_s - std::floor(t_s / kSmokePeriod_s) * kSmokePeriod_s;
+  if (!(smoke_ > 0.0) || t_s < 0.0 || within > kSmoke_s) return;
+  const double strength = smoke_ * std::pow(std::sin(std::numbers::pi * within / kSmoke_s), 2.0);
+  const CounterNoise noise(seed_, kStream + 2);
+  const auto depth_at = [&](double x, double y) {
+    constexpr int kWaves = 6;
+    double sum = 0.0;
+    for (int wave = 0; wave < kWaves; ++wave) {
+      const auto index = 4 * static_cast<std::uint64_t>(wave);
+      const double direction = noise.uniform(index, 0.0, kTwoPi);
+      const double length_px = noise.uniform(index + 1, 0.2, 0.8) * width_;
+      const double rate_hz = noise.uniform(index + 2, 0.1, 0.5);
+      sum += std::sin(kTwoPi * ((std::cos(direction) * x + std::sin(direction) * y) / length_px + rate_hz * t_s) +
+                      noise.uniform(index + 3, 0.0, kTwoPi));
+    }
+    return strength * std::clamp(0.5 + sum / kWaves, 0.0, 1.0);
+  };
+  constexpr int kGrid_px = 16;
+  const int columns = (width_ + kGrid_px - 1) / kGrid_px + 1, rows = (height_ + kGrid_px - 1) / kGrid_px + 1;
+  std::vector<float> transmission;
+  transmission.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      transmission.push_back(static_cast<float>(std::exp(-depth_at(column * kGrid_px, row * kGrid_px))));
+    }
+  }
+  constexpr float kScattered = 190.0F;  // grey levels, of smoke that nothing shines through
+  for (int row = 0; row < height_; ++row) {
+    const float* const above = transmission.data() + static_cast<std::size_t>(row / kGrid_px) * columns;
+    const float* const below = above + columns;
+    const float down = static_cast<float>(row % kGrid_px) / kGrid_px;
+    for (int column = 0; column < width_; ++column) {
+      const int c = column / kGrid_px;
+      const float right = static_cast<float>(column % kGrid_px) / kGrid_px;
+      const float share = (1 - down) * ((1 - right) * above[c] + right * above[c + 1]) +
+                          down * ((1 - right) * below[c] + right * below[c + 1]);
+      float& seen = radiance[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
+                             static_cast<std::size_t>(column)];
+      seen = share * seen + (1 - share) * kScattered;
     }
   }
 }

@@ -14,6 +14,7 @@
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 #include "footage.hpp"
+#include "interleaved_timing.hpp"
 #include "machine_text.hpp"
 
 namespace perimap::bench {
