@@ -18,6 +18,7 @@
 #include "daemon/publishing/publication_recorder.hpp"
 #include "daemon/report/accuracy.hpp"
 #include "daemon/report/accuracy_text.hpp"
+#include "daemon/report/recorded_beats.hpp"
 #include "daemon/report/recorded_truth.hpp"
 #include "daemon/runtime/live_session.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
@@ -45,9 +46,12 @@ struct Options {
 // Takes what is published to the accuracy report, to the file of samples and to DDS, whichever are there.
 class ReplayPublication final : public Publication {
  public:
-  ReplayPublication(const RecordedTruth* truth, PublicationRecorder* recorder, Publication* dds) noexcept
+  ReplayPublication(const RecordedTruth* truth, const std::vector<RPeak>& beats, PublicationRecorder* recorder,
+                    Publication* dds)
       : recorder_(recorder), dds_(dds), truth_(truth) {
-    if (truth != nullptr) accuracy_.emplace(truth->truth, truth->camera, truth->captures.begin()->second);
+    if (truth == nullptr) return;
+    accuracy_.emplace(truth->truth, truth->camera, truth->captures.begin()->second);
+    accuracy_->set_beats(beats);
   }
 
   void surface(const perimap_Surface& sample) override {
@@ -192,6 +196,9 @@ int replay(const Options& options) {
   if (options.workers > 0) setup->pipeline.workers = options.workers;
   const auto truth = load_truth(options.recording, mode);
   if (!truth) return refuse(truth.error(), kFailure);
+  Expected<std::vector<RPeak>> beats;
+  if (*truth) beats = load_beats(options.recording, mode);
+  if (!beats) return refuse(beats.error(), kFailure);
 
   const Logging logging(setup->configuration.log.level);
   std::unique_ptr<PublicationRecorder> recorder;
@@ -208,7 +215,7 @@ int replay(const Options& options) {
     if (!created) return refuse(created.error(), kFailure);
     dds = std::move(*created);
   }
-  ReplayPublication publication(*truth ? &**truth : nullptr, recorder.get(), dds.get());
+  ReplayPublication publication(*truth ? &**truth : nullptr, *beats, recorder.get(), dds.get());
 
   Pipeline pipeline(setup->pipeline);
   bool stopped = false;

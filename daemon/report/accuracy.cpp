@@ -10,6 +10,8 @@ namespace {
 
 constexpr double kSettledAfter_s = 15.0;
 constexpr double kPathLength_s = 1.0;
+constexpr double kOff_mm = 3.0;
+constexpr Duration kFrame = std::chrono::milliseconds(34);  // at 30 frames a second
 
 ErrorFigures figures_of(std::vector<double> errors) {
   ErrorFigures figures;
@@ -20,6 +22,9 @@ ErrorFigures figures_of(std::vector<double> errors) {
     const auto rank = static_cast<std::size_t>(std::ceil(q * static_cast<double>(errors.size())));
     return errors[std::max<std::size_t>(rank, 1) - 1];
   };
+  double squares = 0.0;
+  for (const double error : errors) squares += error * error;
+  figures.rms_mm = std::sqrt(squares / static_cast<double>(errors.size()));
   figures.median_mm = quantile(0.5);
   figures.p95_mm = quantile(0.95);
   figures.max_mm = errors.back();
@@ -79,7 +84,8 @@ void Accuracy::add(const perimap_Surface& sample) {
     published.P_mm2 << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
     published_.push_back(published);
   }
-  samples_.push_back({from_ns(sample.valid_time_ns), begin, published_.size()});
+  samples_.push_back(
+      {from_ns(sample.valid_time_ns), from_ns(sample.release_time_ns), sample.state, begin, published_.size()});
 }
 
 void Accuracy::add(const perimap_SurfaceModel& model) {
@@ -100,6 +106,14 @@ std::map<std::uint32_t, SurfacePoint> Accuracy::resolve_origins(Duration to_reco
     if (const auto point = truth_.first_hit(*X_WC, ray_C, first_observed)) points.emplace(id, *point);
   }
   return points;
+}
+
+bool Accuracy::before_premature_beat_is_known(Instant released) const {
+  for (std::size_t i = 1; i < beats_.size(); ++i) {
+    if (beats_[i].beat_class != BeatClass::kPremature) continue;
+    if (released >= beats_[i - 1].time && released <= beats_[i].detected_at + kFrame) return true;
+  }
+  return false;
 }
 
 AccuracyReport Accuracy::report(Duration to_recording) const {
@@ -124,11 +138,20 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
   std::map<std::uint32_t, std::vector<double>> feature_errors;
   std::map<std::uint32_t, FeaturePath> paths;
   std::set<std::uint32_t> without_truth;
+  std::set<std::uint32_t> off;
   std::vector<double> settled;
   double nees_sum = 0.0;
+  report.good.premature_beats = static_cast<std::size_t>(std::count_if(
+      beats_.begin(), beats_.end(), [](const RPeak& beat) { return beat.beat_class == BeatClass::kPremature; }));
   for (const SampleRange& sample : samples_) {
     const Instant valid_time = sample.valid_time + to_recording;
     const double t = since_start(valid_time);
+    const bool early = before_premature_beat_is_known(sample.released + to_recording);
+    if (t >= kSettledAfter_s) {
+      ++report.settled_samples;
+      report.degraded += sample.state == perimap_SURFACE_DEGRADED ? 1 : 0;
+      report.invalid += sample.state == perimap_SURFACE_INVALID ? 1 : 0;
+    }
     std::size_t converged = 0;
     for (std::size_t i = sample.begin; i < sample.end; ++i) {
       const Published& feature = published_[i];
@@ -149,6 +172,15 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
       seconds.add_error(t, error);
       cycles.add_error(t, error);
       feature_errors[feature.id].push_back(error);
+      if (feature.converged && sample.state == perimap_SURFACE_GOOD) {
+        ++report.good.count;
+        double& largest = early ? report.good.largest_before_known_mm : report.good.largest_mm;
+        largest = std::max(largest, error);
+        if (error > kOff_mm) {
+          ++(early ? report.good.off_before_known : report.good.off);
+          if (!early) off.insert(feature.id);
+        }
+      }
       if (t >= kSettledAfter_s) {
         settled.push_back(error);
         nees_sum += e.dot(feature.P_mm2.ldlt().solve(e)) / 3.0;
@@ -168,10 +200,11 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
   report.converged_by_15_s = static_cast<std::size_t>(std::count_if(
       converged_at.begin(), converged_at.end(), [](const auto& c) { return c.second <= kSettledAfter_s; }));
   report.features_without_truth = without_truth.size();
+  report.good.features_off = off.size();
   report.settled = figures_of(settled);
   if (!settled.empty()) {
     report.mean_nees = nees_sum / static_cast<double>(settled.size());
-    const auto above = std::count_if(settled.begin(), settled.end(), [](double e) { return e > 3.0; });
+    const auto above = std::count_if(settled.begin(), settled.end(), [](double e) { return e > kOff_mm; });
     report.share_above_3_mm = static_cast<double>(above) / static_cast<double>(settled.size());
   }
   report.seconds = seconds.figures();

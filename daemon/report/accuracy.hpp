@@ -6,9 +6,11 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/geometry/camera_model.hpp"
+#include "core/phase/r_peak.hpp"
 #include "core/time/instant.hpp"
 #include "drivers/simulator/ground_truth.hpp"
 
@@ -17,6 +19,7 @@ namespace perimap {
 // Distribution of errors, mm. Zeros when there are none.
 struct ErrorFigures {
   std::size_t count = 0;
+  double rms_mm = 0.0;
   double median_mm = 0.0;
   double p95_mm = 0.0;
   double max_mm = 0.0;
@@ -37,6 +40,19 @@ struct FeaturePath {
   std::vector<Vector3d> truth;      // at the same instants
 };
 
+// Positions of converged features in surfaces of state good, and those of them that are off by more than 3 mm. An
+// ectopic beat moves the heart before it can be known: those released from the beginning of the cycle that a premature
+// beat ends until a frame after that beat was known are counted apart.
+struct GoodPositions {
+  std::size_t count = 0;
+  std::size_t premature_beats = 0;
+  std::size_t off_before_known = 0;
+  std::size_t off = 0;  // all others
+  std::size_t features_off = 0;
+  double largest_before_known_mm = 0.0;
+  double largest_mm = 0.0;
+};
+
 struct AccuracyReport {
   std::size_t samples = 0;
   std::size_t features_published = 0;
@@ -47,6 +63,10 @@ struct AccuracyReport {
   ErrorFigures settled;                    // 15 s to the end, every feature from its first converged sample on
   double mean_nees = 0.0;                  // e' P^-1 e / 3 over the same; 1 is consistent
   double share_above_3_mm = 0.0;
+  std::size_t degraded = 0;  // surfaces of that state, and of state invalid, from 15 s on; and of any
+  std::size_t invalid = 0;
+  std::size_t settled_samples = 0;
+  GoodPositions good;
   std::vector<ErrorSpan> seconds;
   std::vector<ErrorSpan> cycles;   // from R peak to R peak
   std::vector<FeaturePath> paths;  // in order of id
@@ -64,6 +84,10 @@ class Accuracy {
   void add(const perimap_Surface& sample);
   void add(const perimap_SurfaceModel& model);
 
+  // The beats that the pipeline could know of, on the recording's clock, in order of time; without them no release
+  // counts as one before an ectopic beat was known.
+  void set_beats(std::vector<RPeak> beats) { beats_ = std::move(beats); }
+
   // Published instants are brought to the recording's clock by adding `to_recording`.
   [[nodiscard]] AccuracyReport report(Duration to_recording) const;
 
@@ -76,6 +100,8 @@ class Accuracy {
   };
   struct SampleRange {
     Instant valid_time;
+    Instant released;
+    perimap_SurfaceState state = perimap_SURFACE_INVALID;
     std::size_t begin = 0;  // in published_
     std::size_t end = 0;
   };
@@ -85,10 +111,13 @@ class Accuracy {
   };
 
   [[nodiscard]] std::map<std::uint32_t, SurfacePoint> resolve_origins(Duration to_recording) const;
+  // Whether what was released then (on the recording's clock) came before a premature beat could be known.
+  [[nodiscard]] bool before_premature_beat_is_known(Instant released) const;
 
   const GroundTruth& truth_;
   CameraModel camera_;
   Instant first_frame_;
+  std::vector<RPeak> beats_;
   std::vector<SampleRange> samples_;  // with published_, touched by add(Surface) alone
   std::vector<Published> published_;
   std::map<std::uint32_t, Origin> origins_;  // touched by add(SurfaceModel) alone

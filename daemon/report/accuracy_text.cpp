@@ -8,7 +8,11 @@ namespace perimap {
 namespace {
 
 nlohmann::json to_json(const ErrorFigures& error) {
-  return {{"count", error.count}, {"median_mm", error.median_mm}, {"p95_mm", error.p95_mm}, {"max_mm", error.max_mm}};
+  return {{"count", error.count},
+          {"rms_mm", error.rms_mm},
+          {"median_mm", error.median_mm},
+          {"p95_mm", error.p95_mm},
+          {"max_mm", error.max_mm}};
 }
 
 nlohmann::json to_json(const std::vector<ErrorSpan>& spans) {
@@ -32,12 +36,19 @@ std::string to_text(const AccuracyReport& report) {
   }
   return fmt::format(
       "features    {} mapped, {} converged, {} of them within 15 s ({} at 15 s), {} without truth\n"
-      "error       median {:.2f} mm, 95th percentile {:.2f} mm, largest {:.2f} mm, above 3 mm {:.1f} %\n"
+      "error       RMS {:.3f} mm, median {:.2f} mm, 95th percentile {:.2f} mm, largest {:.2f} mm, above 3 mm {:.1f} %\n"
       "            ({} positions at their valid time, 15 s to the end, every feature once called converged)\n"
-      "consistency mean NEES/3 {:.2f} (1 is consistent, below is cautious)",
+      "consistency mean NEES/3 {:.2f} (1 is consistent, below is cautious)\n"
+      "states      {} of {} surfaces degraded, {} invalid, from 15 s on\n"
+      "good        {} of {} positions of state good off by more than 3 mm, largest {:.2f} mm, of {} features\n"
+      "            {} more, largest {:.2f} mm, before the ECG could tell of the premature beat that ended their cycle "
+      "({} such beats)",
       report.features_published, report.features_converged, report.converged_by_15_s, report.converged_at_15_s,
-      report.features_without_truth, report.settled.median_mm, report.settled.p95_mm, report.settled.max_mm,
-      100.0 * report.share_above_3_mm, report.settled.count, report.mean_nees);
+      report.features_without_truth, report.settled.rms_mm, report.settled.median_mm, report.settled.p95_mm,
+      report.settled.max_mm, 100.0 * report.share_above_3_mm, report.settled.count, report.mean_nees, report.degraded,
+      report.settled_samples, report.invalid, report.good.off, report.good.count, report.good.largest_mm,
+      report.good.features_off, report.good.off_before_known, report.good.largest_before_known_mm,
+      report.good.premature_beats);
 }
 
 nlohmann::json to_json(const AccuracyReport& report) {
@@ -52,6 +63,13 @@ nlohmann::json to_json(const AccuracyReport& report) {
           {"settled_error", to_json(report.settled)},
           {"settled_mean_nees", report.mean_nees},
           {"settled_share_above_3_mm", report.share_above_3_mm},
+          {"surfaces_settled", report.settled_samples},
+          {"surfaces_degraded", report.degraded},
+          {"surfaces_invalid", report.invalid},
+          {"good_positions", report.good.count},
+          {"good_positions_off", report.good.off},
+          {"good_positions_off_before_known", report.good.off_before_known},
+          {"premature_beats", report.good.premature_beats},
           {"seconds", to_json(report.seconds)},
           {"cycles", to_json(report.cycles)},
           {"features", features}};
