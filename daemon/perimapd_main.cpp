@@ -11,6 +11,7 @@
 #include "core/pipeline/pipeline.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/logging/logging.hpp"
+#include "daemon/process/service_manager.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/dds_publication.hpp"
 #include "daemon/runtime/device_feeder.hpp"
@@ -33,7 +34,7 @@ int refuse(const Error& error, int code) {
   return code;
 }
 
-// A session over whatever `make_feeder` gives for the pipeline's entrance and the priority of its sources.
+// A session over whatever `make_feeder` gives for the pipeline's entrance.
 template <class MakeFeeder>
 int run_session(const std::string& configuration_file, const Configuration& configuration,
                 const PipelineSettings& settings, const Identity& identity, StopSignal& stop,
@@ -50,7 +51,9 @@ int run_session(const std::string& configuration_file, const Configuration& conf
 
   Pipeline pipeline(settings);
   const RuntimeSettings runtime = runtime_settings(configuration, identity);
-  LiveSession session(pipeline, runtime, **publication, make_feeder(pipeline.entrance(), source_priority(runtime)));
+  LiveSession session(pipeline, runtime, **publication, make_feeder(pipeline.entrance()));
+  ServiceManager service;
+  session.report_to(service);
   spdlog::info("perimapd {}: publishing '{}' on DDS domain {}, latency {} ms, {} workers", PERIMAP_VERSION,
                configuration.source.name, configuration.dds.domain,
                std::chrono::duration_cast<std::chrono::milliseconds>(configuration.pipeline.latency).count(),
@@ -93,9 +96,9 @@ int run(const std::string& configuration_file) {
     auto setup = prepare_devices(configuration_file, *given);
     if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
     return run_session(configuration_file, setup->configuration, setup->pipeline, setup->identity, *stop,
-                       [&setup, &configuration_file](SensorEntrance& entrance, int priority) {
+                       [&setup, &configuration_file](SensorEntrance& entrance) {
                          return std::make_unique<DeviceFeeder>(std::move(setup->devices), &entrance,
-                                                               begin_recording(configuration_file, *setup), priority);
+                                                               begin_recording(configuration_file, *setup));
                        });
   }
   if (!given->replay.recording) {
@@ -107,9 +110,8 @@ int run(const std::string& configuration_file) {
   auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
   if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
   return run_session(configuration_file, setup->configuration, setup->pipeline, setup->identity, *stop,
-                     [&setup](SensorEntrance& entrance, int priority) {
-                       return std::make_unique<ReplayFeeder>(std::move(setup->reader), SensorIntake{&entrance},
-                                                             priority);
+                     [&setup](SensorEntrance& entrance) {
+                       return std::make_unique<ReplayFeeder>(std::move(setup->reader), SensorIntake{&entrance});
                      });
 }
 

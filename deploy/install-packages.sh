@@ -29,6 +29,7 @@ build=(
   libzstd-dev zlib1g-dev                     # drivers: recordings, simulator data
   libyaml-cpp-dev                            # drivers: calibration files
   libtomlplusplus-dev libcli11-dev libspdlog-dev nlohmann-json3-dev  # daemon
+  libsystemd-dev                             # daemon/process: readiness, watchdog
   librsvg2-dev fonts-dejavu-core             # daemon/report: figures as PNG
 )
 tests=(
@@ -42,6 +43,7 @@ full=(
   clang-tidy clang-format
   libceres-dev                               # tests/bench: the batch alternative
   libopencv-video-dev                        # tests/bench: Lucas-Kanade as others have it
+  dpkg-dev lintian systemd man-db            # the Debian package and its service, checked
 )
 
 wanted=test

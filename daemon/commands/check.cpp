@@ -8,8 +8,29 @@
 #include <string>
 
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/runtime/thread_launcher.hpp"
 
 namespace perimap {
+namespace {
+
+// What perimapd would ask of this machine and this user would not be given, on standard error: the configuration is
+// sound all the same, and the service has limits of its own.
+void tell_refused_privileges(const RealtimeConfiguration& realtime) {
+  if (realtime.lock_memory && !memory_may_be_locked()) {
+    fmt::print(stderr, "note: this user may not lock memory (realtime.lock_memory); perimapd would run on without\n");
+  }
+  ThreadLauncher threads({realtime.priority, realtime.cpus});
+  threads.launch("privileges", ThreadRole::kPublisher, [] {}).join();
+  threads.launch("privileges", ThreadRole::kSource, [] {}).join();
+  if (threads.priority() == perimap_PRIVILEGE_REFUSED) {
+    fmt::print(stderr,
+               "note: this user is not given SCHED_FIFO priority {} on the processors asked for (realtime.priority, "
+               "realtime.cpus); perimapd would run on without\n",
+               realtime.priority);
+  }
+}
+
+}  // namespace
 
 void add_check_command(CLI::App& app, int& exit_code) {
   const auto file = std::make_shared<std::string>();
@@ -20,6 +41,7 @@ void add_check_command(CLI::App& app, int& exit_code) {
     const Expected<Configuration> configuration = load_configuration(*file);
     if (configuration) {
       fmt::print("{}", to_toml(*configuration));
+      tell_refused_privileges(configuration->realtime);
     } else {
       fmt::print(stderr, "{}\n", configuration.error().message);
     }

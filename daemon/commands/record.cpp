@@ -98,8 +98,9 @@ int run(const Options& options) {
 
   const Logging logging(basis->configuration.log.level);
   const Instant start = MonotonicClock::now();
-  DeviceFeeder feeder(std::move(*devices), nullptr, {true, std::move(*recorder)}, 0);
-  feeder.start();
+  DeviceFeeder feeder(std::move(*devices), nullptr, {true, std::move(*recorder)});
+  ThreadLauncher threads({});
+  feeder.start(threads);
   watch(options, *stop, feeder);
   feeder.stop();
 

@@ -4,7 +4,6 @@
 
 #include <utility>
 
-#include "daemon/runtime/privileges.hpp"
 #include "drivers/camera/v4l2_camera.hpp"
 #include "drivers/device/device_link.hpp"
 #include "drivers/ecg/bitalino.hpp"
@@ -76,40 +75,32 @@ Expected<void> serve_camera(const CameraDevice& device, const CameraSink& sink, 
   return {};
 }
 
-DeviceFeeder::DeviceFeeder(Devices devices, SensorEntrance* entrance, AskedRecording recording, int priority)
-    : devices_(std::move(devices)),
-      recording_(std::move(recording)),
-      intake_{entrance, recording_.recorder.get()},
-      priority_(priority) {
+DeviceFeeder::DeviceFeeder(Devices devices, SensorEntrance* entrance, AskedRecording recording)
+    : devices_(std::move(devices)), recording_(std::move(recording)), intake_{entrance, recording_.recorder.get()} {
   if (!devices_.camera) return;
   if (auto* playback = std::get_if<CameraPlayback>(&*devices_.camera)) {
-    playback_ = std::make_unique<ReplayFeeder>(std::move(playback->reader), intake_, priority, playback->offset);
+    playback_ = std::make_unique<ReplayFeeder>(std::move(playback->reader), intake_, playback->offset);
   }
 }
 
-void DeviceFeeder::start() {
-  if (recording_.recorder) recording_.recorder->start();
+void DeviceFeeder::start(ThreadLauncher& threads) {
+  if (recording_.recorder) recording_.recorder->start(threads);
   if (devices_.tracker) {
-    threads_.emplace_back([this] {
-      static_cast<void>(apply({"tracker", priority_, {}}));
+    threads_.push_back(threads.launch("tracker", ThreadRole::kSource, [this] {
       const TrackerSink sink = [this](const TrackerSample& sample) { intake_.pose(sample); };
       serve_tracker(*devices_.tracker, sink, tracker_health_, interrupt_);
-    });
+    }));
   }
   if (devices_.ecg) {
-    threads_.emplace_back([this] {
-      static_cast<void>(apply({"ecg", priority_, {}}));
+    threads_.push_back(threads.launch("ecg", ThreadRole::kSource, [this] {
       const EcgSink sink = [this](const EcgBlock& block) { intake_.ecg(block); };
       serve_ecg(*devices_.ecg, sink, ecg_health_, interrupt_);
-    });
+    }));
   }
   if (playback_) {
-    playback_->start();
+    playback_->start(threads);
   } else if (devices_.camera) {
-    threads_.emplace_back([this] {
-      static_cast<void>(apply({"camera", priority_, {}}));
-      run_camera(*devices_.camera);
-    });
+    threads_.push_back(threads.launch("camera", ThreadRole::kSource, [this] { run_camera(*devices_.camera); }));
   }
 }
 

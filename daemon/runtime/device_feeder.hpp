@@ -42,12 +42,12 @@ struct AskedRecording {
 class DeviceFeeder final : public SensorFeeder {
  public:
   // `entrance`: none to record alone.
-  DeviceFeeder(Devices devices, SensorEntrance* entrance, AskedRecording recording, int priority);
+  DeviceFeeder(Devices devices, SensorEntrance* entrance, AskedRecording recording);
   DeviceFeeder(const DeviceFeeder&) = delete;
   DeviceFeeder& operator=(const DeviceFeeder&) = delete;
   ~DeviceFeeder() override { stop(); }
 
-  void start() override;
+  void start(ThreadLauncher& threads) override;
   void stop() override;
   void tick() override;
   void describe(StatusFacts& facts) const override;
@@ -73,7 +73,6 @@ class DeviceFeeder final : public SensorFeeder {
   Devices devices_;
   AskedRecording recording_;
   SensorIntake intake_;
-  int priority_;
   std::unique_ptr<ReplayFeeder> playback_;
   DeviceHealth tracker_health_;
   DeviceHealth ecg_health_;

@@ -11,6 +11,7 @@ LiveRuntime::LiveRuntime(Pipeline& pipeline, const RuntimeSettings& settings, Pu
                          std::function<void()> on_status_tick)
     : pipeline_(pipeline),
       settings_(settings),
+      threads_(settings.scheduling),
       publication_(publication),
       on_status_tick_(std::move(on_status_tick)),
       wire_surface_(settings.identity, static_cast<std::size_t>(pipeline.settings().features.maximum)),
@@ -18,27 +19,18 @@ LiveRuntime::LiveRuntime(Pipeline& pipeline, const RuntimeSettings& settings, Pu
       wire_phase_(settings.identity),
       wire_status_(settings.identity) {}
 
-std::thread LiveRuntime::launch(std::string name, int priority, std::function<void()> body) {
-  ThreadRequest request{std::move(name), priority, priority > 0 ? settings_.cpus : std::vector<int>{}};
-  return std::thread([this, request = std::move(request), body = std::move(body)] {
-    if (!apply(request)) priority_refused_.store(true, std::memory_order_relaxed);
-    body();
-  });
-}
-
 void LiveRuntime::start() {
   memory_locked_ = lock_memory(settings_.lock_memory);
-  const int publisher = settings_.priority;
-  const int mapper = publisher > 0 ? std::max(1, publisher - 1) : 0;
-  const int worker = publisher > 0 ? std::max(1, publisher - 2) : 0;
   for (int i = 0; i < pipeline_.team().size(); ++i) {
-    workers_.push_back(launch("worker-" + std::to_string(i), worker, [this, i] { pipeline_.team().serve(i); }));
+    workers_.push_back(threads_.launch(
+        "worker-" + std::to_string(i), ThreadRole::kWorker, [this, i] { pipeline_.team().serve(i); }, i));
   }
-  housekeepers_.push_back(launch("finder", 0, [this] { pipeline_.finder().serve(); }));
-  housekeepers_.push_back(launch("starter", 0, [this] { pipeline_.starter().serve(); }));
-  mapper_ = launch("mapper", mapper, [this] { run_mapper(); });
-  publisher_ = launch("publisher", publisher, [this] { run_publisher(); });
-  status_ = launch("status", 0, [this] { run_status(); });
+  const auto housekeeping = ThreadRole::kHousekeeping;
+  housekeepers_.push_back(threads_.launch("finder", housekeeping, [this] { pipeline_.finder().serve(); }));
+  housekeepers_.push_back(threads_.launch("starter", housekeeping, [this] { pipeline_.starter().serve(); }));
+  mapper_ = threads_.launch("mapper", ThreadRole::kMapper, [this] { run_mapper(); });
+  publisher_ = threads_.launch("publisher", ThreadRole::kPublisher, [this] { run_publisher(); });
+  status_ = threads_.launch("status", housekeeping, [this] { run_status(); });
   started_ = true;
 }
 
@@ -67,10 +59,7 @@ void LiveRuntime::stop() {
 StatusFacts LiveRuntime::facts() const noexcept {
   StatusFacts facts;
   facts.memory_locked = memory_locked_;
-  if (settings_.priority > 0) {
-    facts.realtime_priority =
-        priority_refused_.load(std::memory_order_relaxed) ? perimap_PRIVILEGE_REFUSED : perimap_PRIVILEGE_GRANTED;
-  }
+  facts.realtime_priority = threads_.priority();
   facts.latency = pipeline_.settings().latency;
   facts.stalled_after = settings_.stalled_after;
   facts.sources_ended = sources_ended_.load(std::memory_order_relaxed);
@@ -106,25 +95,21 @@ void LiveRuntime::run_publisher() {
   PipelineCounters& counters = pipeline_.counters();
   for (;;) {
     wakeup.clear();  // before looking, as in run_mapper()
+    publisher_beats_.add();
     if (stopping_.load(std::memory_order_relaxed)) return;
-    pipeline_.drain_stamps(MonotonicClock::now());
+    const Instant now = MonotonicClock::now();
+    pipeline_.drain_stamps(now);
     const auto next = pipeline_.schedule().next();
-    const bool ended = sources_ended_.load(std::memory_order_relaxed);
-    if (ended && !pipeline_.schedule().pending()) {
-      all_released_.store(true, std::memory_order_relaxed);
-      wakeup.wait();
+    const bool done = sources_ended_.load(std::memory_order_relaxed) && !pipeline_.schedule().pending();
+    if (done) all_released_.store(true, std::memory_order_relaxed);
+    const Instant round_ends = now + kLongestPublisherRound;
+    if (done || !next || next->deadline - kSpin > round_ends) {
+      static_cast<void>(wakeup.wait_until(round_ends));
       continue;
     }
-    if (!next) {
-      wakeup.wait();
-      continue;
-    }
-    if (next->frame_missing) {
-      // Provisional: a frame that still comes takes its place.
-      if (wakeup.wait_until(next->deadline)) continue;
-    } else {
-      sleep_until(next->deadline);
-    }
+    // A missing frame's release is provisional: a frame that still comes takes its place.
+    if (next->frame_missing && wakeup.wait_until(next->deadline - kSpin)) continue;
+    wait_until_exactly(next->deadline);
     const Release release = pipeline_.schedule().take();
     const perimap_Surface& sample = wire_surface_.fill(pipeline_.compose(release), utc_minus_monotonic());
     const Instant ready = MonotonicClock::now();

@@ -1,4 +1,4 @@
-// The daemon's threads over a pipeline: they are created, named, prioritised, started and joined here and nowhere else.
+// The daemon's threads over a pipeline: what they run, how they start and how they end.
 #pragma once
 
 #include <atomic>
@@ -9,18 +9,18 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/realtime/counter.hpp"
 #include "daemon/publishing/identity.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/publishing/wire_reports.hpp"
 #include "daemon/publishing/wire_surface.hpp"
-#include "daemon/runtime/privileges.hpp"
+#include "daemon/runtime/thread_launcher.hpp"
 
 namespace perimap {
 
 struct RuntimeSettings {
   Identity identity;
-  int priority = 0;       // of the publisher; sources and mapper run one below, workers two. 0: not requested
-  std::vector<int> cpus;  // of the real-time threads
+  SchedulingSettings scheduling;
   bool lock_memory = true;
   Duration phase_interval = std::chrono::milliseconds(100);
   Duration model_interval = std::chrono::milliseconds(500);
@@ -28,13 +28,10 @@ struct RuntimeSettings {
   Duration stalled_after = std::chrono::milliseconds(500);
 };
 
-// Of the threads that push into the entrance: one below the publisher's.
-[[nodiscard]] inline int source_priority(const RuntimeSettings& settings) noexcept {
-  return settings.priority > 1 ? settings.priority - 1 : settings.priority;
-}
+inline constexpr Duration kLongestPublisherRound = std::chrono::milliseconds(100);
 
-// Threads: mapper, workers, publisher (real-time when permitted), finder, starter, status. Sources are threads of their
-// owner's and push into pipeline.entrance().
+// Threads: mapper, workers, publisher (real-time when permitted), finder, starter, status. Sources are launched by
+// their owner, with threads(), and push into pipeline.entrance().
 class LiveRuntime {
  public:
   // `pipeline` and `publication` must outlive it. `on_status_tick` is called by the status thread every
@@ -48,11 +45,17 @@ class LiveRuntime {
   // Before start(): called by the status thread for what it does not know itself.
   void describe_sources_by(std::function<void(StatusFacts&)> describe) { describe_sources_ = std::move(describe); }
   void start();
+  // For sources and others that are not the runtime's own. Joined before this ends.
+  [[nodiscard]] ThreadLauncher& threads() noexcept { return threads_; }
 
   // Tells that no more frames will come: the surfaces of those that came are still released.
   void end_of_sources() noexcept;
   // After end_of_sources(): the last surface has been released.
   [[nodiscard]] bool all_released() const noexcept { return all_released_.load(std::memory_order_relaxed); }
+
+  // Raised by the publisher each time round its loop, at least every kLongestPublisherRound, whether or not frames
+  // come; by nothing else. It stands still when that thread hangs.
+  [[nodiscard]] std::uint64_t publisher_beats() const noexcept { return publisher_beats_.get(); }
 
   // Ends and joins every thread. Called twice it does nothing.
   void stop();
@@ -64,10 +67,10 @@ class LiveRuntime {
   void run_mapper() noexcept;
   void run_publisher();
   void run_status();
-  [[nodiscard]] std::thread launch(std::string name, int priority, std::function<void()> body);
 
   Pipeline& pipeline_;
   RuntimeSettings settings_;
+  ThreadLauncher threads_;
   Publication& publication_;
   std::function<void()> on_status_tick_;
   std::function<void(StatusFacts&)> describe_sources_;
@@ -82,9 +85,9 @@ class LiveRuntime {
   std::thread publisher_;
   std::thread status_;
   bool started_ = false;
+  Counter publisher_beats_;
   perimap_Privilege memory_locked_ = perimap_PRIVILEGE_NOT_REQUESTED;
   // Relaxed throughout: each flag is a message by itself; the posts of the wake-ups that follow order what matters.
-  std::atomic<bool> priority_refused_{false};
   std::atomic<bool> stopping_{false};
   std::atomic<bool> sources_ended_{false};
   std::atomic<bool> all_released_{false};

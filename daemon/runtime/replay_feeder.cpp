@@ -4,7 +4,6 @@
 #include <variant>
 
 #include "core/realtime/deadline.hpp"
-#include "daemon/runtime/privileges.hpp"
 
 namespace perimap {
 namespace {
@@ -16,19 +15,12 @@ constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
 
 }  // namespace
 
-ReplayFeeder::ReplayFeeder(ReplayReader reader, const SensorIntake& intake, int priority,
-                           std::optional<Duration> offset)
-    : reader_(std::move(reader)), intake_(intake), priority_(priority), offset_(offset) {}
+ReplayFeeder::ReplayFeeder(ReplayReader reader, const SensorIntake& intake, std::optional<Duration> offset)
+    : reader_(std::move(reader)), intake_(intake), offset_(offset) {}
 
-void ReplayFeeder::start() {
-  reading_ = std::thread([this] {
-    static_cast<void>(apply({"replay-read", 0, {}}));
-    read_ahead();
-  });
-  delivering_ = std::thread([this] {
-    static_cast<void>(apply({"replay-feed", priority_, {}}));
-    deliver();
-  });
+void ReplayFeeder::start(ThreadLauncher& threads) {
+  reading_ = threads.launch("replay-read", ThreadRole::kHousekeeping, [this] { read_ahead(); });
+  delivering_ = threads.launch("replay-feed", ThreadRole::kSource, [this] { deliver(); });
 }
 
 void ReplayFeeder::stop() {

@@ -19,13 +19,12 @@ namespace perimap {
 // which brings the first arrival to shortly after start() when it is not given.
 class ReplayFeeder final : public SensorFeeder {
  public:
-  ReplayFeeder(ReplayReader reader, const SensorIntake& intake, int priority,
-               std::optional<Duration> offset = std::nullopt);
+  ReplayFeeder(ReplayReader reader, const SensorIntake& intake, std::optional<Duration> offset = std::nullopt);
   ReplayFeeder(const ReplayFeeder&) = delete;
   ReplayFeeder& operator=(const ReplayFeeder&) = delete;
   ~ReplayFeeder() override { stop(); }
 
-  void start() override;
+  void start(ThreadLauncher& threads) override;
   void stop() override;
 
   // All events are delivered, or reading failed.
@@ -42,7 +41,6 @@ class ReplayFeeder final : public SensorFeeder {
 
   ReplayReader reader_;
   SensorIntake intake_;
-  int priority_;
   std::optional<Duration> offset_;
   std::thread reading_;
   std::thread delivering_;

@@ -155,8 +155,7 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
 RuntimeSettings runtime_settings(const Configuration& configuration, const Identity& identity) {
   RuntimeSettings settings;
   settings.identity = identity;
-  settings.priority = configuration.realtime.priority;
-  settings.cpus = configuration.realtime.cpus;
+  settings.scheduling = {configuration.realtime.priority, configuration.realtime.cpus};
   settings.lock_memory = configuration.realtime.lock_memory;
   settings.model_interval = configuration.dds.surface_model_interval;
   settings.status_interval = configuration.status.interval;

@@ -6,6 +6,7 @@
 
 #include "core/error/expected.hpp"
 #include "daemon/publishing/wire_reports.hpp"
+#include "daemon/runtime/thread_launcher.hpp"
 
 namespace perimap {
 
@@ -13,7 +14,8 @@ class SensorFeeder {
  public:
   virtual ~SensorFeeder() = default;
 
-  virtual void start() = 0;
+  // `threads` must outlive stop().
+  virtual void start(ThreadLauncher& threads) = 0;
   // Ends and joins its threads; called twice it does nothing.
   virtual void stop() = 0;
   // About ten times a second, on the thread that waits for the session's end.

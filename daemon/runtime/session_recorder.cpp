@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/realtime/realtime_scope.hpp"
-#include "daemon/runtime/privileges.hpp"
 
 namespace perimap {
 namespace {
@@ -39,11 +38,8 @@ SessionRecorder::SessionRecorder(std::filesystem::path file, SensorWriter writer
       poses_(kSampleRing),
       blocks_(kSampleRing) {}
 
-void SessionRecorder::start() {
-  thread_ = std::thread([this] {
-    static_cast<void>(apply({"recorder", 0, {}}));
-    run();
-  });
+void SessionRecorder::start(ThreadLauncher& threads) {
+  thread_ = threads.launch("recorder", ThreadRole::kHousekeeping, [this] { run(); });
 }
 
 void SessionRecorder::stop() {

@@ -18,6 +18,7 @@
 #include "core/realtime/wakeup.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/tracker_sample.hpp"
+#include "daemon/runtime/thread_launcher.hpp"
 #include "drivers/image/camera_frame.hpp"
 #include "drivers/recording/sensor_writer.hpp"
 
@@ -37,7 +38,7 @@ class SessionRecorder {
   SessionRecorder& operator=(const SessionRecorder&) = delete;
   ~SessionRecorder() { stop(); }
 
-  void start();
+  void start(ThreadLauncher& threads);
   // After the devices' threads have ended: writes what is left and ends the file. Called twice it does nothing.
   void stop();
 

@@ -129,8 +129,8 @@ TEST(RealtimePath, MakesNoHeapCallLiveWithAllThreads) {
   LiveRuntime runtime(pipeline, settings, publication);
   heap_calls_in_scope = 0;
   runtime.start();
-  ReplayFeeder feeder(std::move(s.reader), SensorIntake{&pipeline.entrance()}, 0);
-  feeder.start();
+  ReplayFeeder feeder(std::move(s.reader), SensorIntake{&pipeline.entrance()});
+  feeder.start(runtime.threads());
   while (!feeder.ended()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   runtime.end_of_sources();
   while (!runtime.all_released()) std::this_thread::sleep_for(std::chrono::milliseconds(10));

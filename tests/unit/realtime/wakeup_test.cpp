@@ -41,5 +41,14 @@ TEST(SleepUntil, NeverReturnsEarly) {
   sleep_until(deadline);  // an instant in the past returns at once
 }
 
+TEST(WaitUntilExactly, NeverReturnsBeforeTheDeadlineAndAtOnceAfterIt) {
+  for (const Duration ahead : {Duration(0), kSpin / 2, 3 * kSpin, Duration(std::chrono::milliseconds(5))}) {
+    const Instant deadline = MonotonicClock::now() + ahead;
+    wait_until_exactly(deadline);
+    EXPECT_GE(MonotonicClock::now(), deadline) << ahead.count();
+    wait_until_exactly(deadline);
+  }
+}
+
 }  // namespace
 }  // namespace perimap

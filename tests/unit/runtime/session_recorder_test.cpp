@@ -77,6 +77,7 @@ class SessionRecording : public ::testing::Test {
     return b;
   }
 
+  ThreadLauncher threads{SchedulingSettings{}};
   std::filesystem::path folder_;
   std::filesystem::path file_;
   std::array<std::byte, std::size_t{2} * kWidth * kHeight> pixels_;
@@ -114,7 +115,7 @@ Counts read(const std::filesystem::path& file, ReadMode mode = ReadMode::kStrict
 
 TEST_F(SessionRecording, OfThreeThreadsReplaysInOrderOfArrival) {
   const auto session = recorder();
-  session->start();
+  session->start(threads);
   constexpr int kEach = 60;
   std::thread camera([&] {
     for (int i = 1; i <= kEach; ++i) {
@@ -151,7 +152,7 @@ TEST_F(SessionRecording, KeepsFramesInTheCamerasOwnFormat) {
   const auto jpeg = test::make_jpeg(kWidth, kHeight, [](int x, int) { return static_cast<std::uint8_t>(100 + x); });
   const Instant now = MonotonicClock::now();
   auto session = recorder();
-  session->start();
+  session->start(threads);
   CameraFrame compressed = frame(1, now, PixelFormat::kMjpg);
   compressed.bytes = jpeg;
   session->frame(compressed);
@@ -189,7 +190,7 @@ TEST_F(SessionRecording, CountsFramesThatFindNoRoomAndTakesNothingFromTheHeap) {
   });
   EXPECT_EQ(allocations, 0);
   EXPECT_EQ(session->summary().frames_not_recorded, 7U);
-  session->start();
+  session->start(threads);
   session->stop();
   EXPECT_EQ(session->summary().recorded, 5U);
   EXPECT_EQ(read(file_).frames, 3);
@@ -197,7 +198,7 @@ TEST_F(SessionRecording, CountsFramesThatFindNoRoomAndTakesNothingFromTheHeap) {
 
 TEST_F(SessionRecording, OneThatComesAfterLaterOnesKeepsTheOrder) {
   const auto session = recorder();
-  session->start();
+  session->start(threads);
   const Instant now = MonotonicClock::now();
   session->frame(frame(1, now));
   session->ecg(block(1, now));
@@ -213,7 +214,7 @@ TEST_F(SessionRecording, AFullDiskStopsItAndNothingElse) {
   ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
   const rlimit small{200'000, before.rlim_max};
   const auto session = recorder();
-  session->start();
+  session->start(threads);
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
   std::uint64_t given = 0;
   const bool stopped = wait_until([&] {
@@ -238,7 +239,7 @@ TEST_F(SessionRecording, ACrashLeavesWhatWasWrittenReadable) {
   ASSERT_GE(child, 0);
   if (child == 0) {
     const auto session = recorder();
-    session->start();
+    session->start(threads);
     for (std::uint64_t i = 1;; ++i) {
       session->frame(frame(i, MonotonicClock::now()));
       session->pose(pose(2, MonotonicClock::now()));

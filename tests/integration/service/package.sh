@@ -1,0 +1,60 @@
+#!/bin/bash
+# The Debian package is sound, installs, runs as the service's user, and leaves nothing behind but the configuration.
+# package.sh BUILD_FOLDER RECORDING WORK_FOLDER
+# The installation happens in an overlay over this system's files, which stay as they are; that needs root.
+set -uo pipefail
+build=$1 recording=$2 work=$3
+[ "$(id -u)" -eq 0 ] || exit 77
+command -v lintian > /dev/null || { echo "lintian is not there: deploy/install-packages.sh --full"; exit 77; }
+if [ "${IN_NAMESPACE:-}" != yes ]; then IN_NAMESPACE=yes exec unshare --mount --pid --fork --propagation private "$0" "$@"; fi
+
+fail() {
+  echo "FAILED: $1"
+  exit 1
+}
+
+rm -rf "$work"
+mkdir -p "$work"
+cpack --config "$build/CPackConfig.cmake" -B "$work/package" > "$work/cpack" 2>&1 || fail "$(tail "$work/cpack")"
+package=$(echo "$work"/package/*.deb)
+lintian --allow-root --fail-on error "$package" || fail "lintian found errors"
+
+unit=$build/deploy/perimapd.service
+score=$(systemd-analyze security --offline=yes --threshold=20 --no-pager "$unit" | tail -n 1) || fail "the sandbox leaks: $score"
+echo "${score#* }"
+
+root=$work/root
+mkdir -p "$root"
+mount -t tmpfs tmpfs "$root"
+mkdir "$root"/{upper,overlay,system}
+mount -t overlay overlay -o "lowerdir=/,upperdir=$root/upper,workdir=$root/overlay" "$root/system" || fail "no overlay"
+mount -t proc proc "$root/system/proc"
+mount --rbind /dev "$root/system/dev"
+mount -t tmpfs tmpfs "$root/system/tmp"
+chmod 1777 "$root/system/tmp"
+cp "$package" "$recording" "$root/system/tmp"
+inside() { chroot "$root/system" "$@"; }
+# What there is of perimap, dpkg's own notes left out.
+left() { (cd "$root/upper" && find . -path ./tmp -prune -o \( -path '*perimap*' ! -type c \) -print | grep -v -e var/lib/dpkg/ -e var/log/); }
+
+inside dpkg -i "/tmp/$(basename "$package")" > "$work/dpkg" 2>&1 || fail "installation: $(cat "$work/dpkg")"
+[ -e "$root/system/lib/systemd/system/multi-user.target.wants/perimapd.service" ] ||
+  [ -L "$root/system/etc/systemd/system/multi-user.target.wants/perimapd.service" ] || fail "the service is not enabled"
+inside systemd-analyze verify --man=no /lib/systemd/system/perimapd.service > "$work/verify" 2>&1
+[ ! -s "$work/verify" ] || fail "the unit: $(cat "$work/verify")"
+
+printf 'version = 1\n[replay]\nrecording = "/tmp/%s"\n[dds]\ndomain = %d\n' "$(basename "$recording")" $((40 + RANDOM % 150)) \
+  > "$root/system/etc/perimap/perimapd.toml"
+inside setpriv --reuid perimap --regid perimap --init-groups perimap check /etc/perimap/perimapd.toml > /dev/null || fail "check"
+inside env CYCLONEDDS_URI=file:///etc/perimap/cyclonedds-loopback.xml setpriv --reuid perimap --regid perimap --init-groups \
+  perimapd -c /etc/perimap/perimapd.toml 2> "$work/log" || fail "perimapd: $(cat "$work/log")"
+grep -Eq '[1-9][0-9]* surfaces' "$work/log" || fail "it did not publish: $(cat "$work/log")"
+
+inside dpkg -r perimap > "$work/dpkg" 2>&1 || fail "removal: $(cat "$work/dpkg")"
+# Whether the service is enabled is configuration too.
+remaining=$(left | grep -v -e '^./etc/perimap' -e '^./etc/systemd/system/' -e '^./var/lib/systemd/deb-systemd-helper')
+[ -z "$remaining" ] || fail "removal leaves: $remaining"
+inside dpkg -P perimap > "$work/dpkg" 2>&1 || fail "purge: $(cat "$work/dpkg")"
+remaining=$(left)
+[ -z "$remaining" ] || fail "purge leaves: $remaining"
+echo "as promised"
