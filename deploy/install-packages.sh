@@ -41,6 +41,7 @@ tests=(
 full=(
   clang-16 libclang-rt-16-dev                # fuzzing
   clang-tidy clang-format
+  qemu-system-x86 busybox-static cpio zstd kmod udev iproute2 v4l-utils  # tests/vm: CAN, V4L2 and systemd on Debian's own kernels
   libceres-dev                               # tests/bench: the batch alternative
   libopencv-video-dev                        # tests/bench: Lucas-Kanade as others have it
   dpkg-dev lintian systemd man-db            # the Debian package and its service, checked

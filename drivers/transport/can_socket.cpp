@@ -127,7 +127,7 @@ Expected<bool> CanSocket::send(const CanFrame& frame) {
   raw.can_dlc = std::min<std::uint8_t>(frame.length, CAN_MAX_DLEN);
   std::copy_n(frame.data.begin(), raw.can_dlc, raw.data);
   if (::write(socket_.get(), &raw, sizeof raw) == static_cast<ssize_t>(sizeof raw)) return true;
-  if (errno == EAGAIN || errno == ENOBUFS || errno == EINTR) return false;
+  if (errno == EAGAIN || errno == ENOBUFS || errno == EINTR || errno == ENETDOWN) return false;
   return fail(fmt::format("can:{}: {}", name_, reason(errno)));
 }
 

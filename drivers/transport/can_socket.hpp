@@ -34,7 +34,7 @@ class CanSocket {
   [[nodiscard]] int descriptor() const noexcept { return socket_.get(); }
   // The next frame, none when there is none now. An error when the interface went down or away.
   [[nodiscard]] Expected<std::optional<CanFrame>> receive();
-  // False when the kernel's queue is full.
+  // False when the kernel's queue is full, or the interface down for now.
   [[nodiscard]] Expected<bool> send(const CanFrame& frame);
 
  private:

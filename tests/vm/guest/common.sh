@@ -1,0 +1,96 @@
+# For the guest's scripts: the installed package, devices, what a subscriber receives.
+. /vm/settings
+cd /tmp || exit 1
+mkdir -m 755 /run/emulated
+
+fail() {
+  echo "FAILED: $1"
+  perimap probe /etc/perimap/perimapd.toml
+  journalctl -u perimapd --no-pager -o cat -n 40
+  exit 1
+}
+
+# What the package holds, in its place. dpkg's own installation takes minutes in here, most of them for reading about a
+# thousand other packages.
+unpacked() {
+  dpkg-deb -x /vm/package/*.deb / && systemd-sysusers /usr/lib/sysusers.d/perimap.conf && systemctl daemon-reload ||
+    fail "the package can not be unpacked"
+  service_ready
+}
+
+installed() {
+  dpkg --force-unsafe-io -i /vm/package/*.deb > /tmp/dpkg 2>&1 || fail "installation: $(cat /tmp/dpkg)"
+  service_ready
+}
+
+service_ready() {
+  export CYCLONEDDS_URI=file:///etc/perimap/cyclonedds-loopback.xml
+}
+
+# vcan0 and /dev/video0, a camera without a heart before it: vivid draws a moving pattern.
+device_nodes() {
+  ip link set lo up
+  modprobe vcan && ip link add vcan0 type vcan && ip link set vcan0 up || fail "no vcan"
+  modprobe vivid n_devs=1 node_types=0x1 || fail "no vivid"
+  udevadm settle
+  [ -e /dev/video0 ] || fail "no /dev/video0"
+  # At first it stamps a frame with the end that its exposure would have, which is still to come when it hands it over.
+  v4l2-ctl -d /dev/video0 --set-ctrl timestamp_source=1 || fail "vivid does not take another source of stamps"
+}
+
+# Tracker and ECG of a simulated heart. The pseudo-terminal belongs to the service's group, as udev would have it.
+devices_emulated() {
+  perimap emulate ndi=/run/emulated/tracker can-ecg=can:vcan0 "$@" > /tmp/emulators 2>&1 &
+  emulators=$!
+  for _ in $(seq 300); do
+    [ ! -e /run/emulated/tracker ] || break
+    sleep 0.1
+  done
+  chgrp perimap "$(readlink -f /run/emulated/tracker)" && chmod 660 "$(readlink -f /run/emulated/tracker)" ||
+    fail "no emulated tracker: $(cat /tmp/emulators)"
+}
+
+configured() {
+  cp /vm/camera.yaml /etc/perimap/camera.yaml
+  cat > /etc/perimap/perimapd.toml << 'END'
+version = 1
+[camera]
+device = "v4l2:/dev/video0"
+calibration = "camera.yaml"
+frame_rate_hz = 15
+[tracker]
+protocol = "ndi"
+port = "/run/emulated/tracker"
+[ecg]
+protocol = "can"
+port = "can:vcan0"
+END
+  chgrp perimap /etc/perimap/perimapd.toml /etc/perimap/camera.yaml
+  perimap check /etc/perimap/perimapd.toml > /dev/null || fail "the configuration is refused"
+}
+
+# received SECONDS FILE: what a subscriber sees, a JSON object a line
+received() {
+  timeout 120 perimap watch --json --wait 60 --duration "$1" > "$2" || fail "nothing was received: $(tail -n 1 "$2")"
+}
+
+# holds FILE DESCRIPTION EXPRESSION: of the last line, as `x`, in JavaScript
+holds() {
+  if node -e '
+    const x = JSON.parse(require("fs").readFileSync(process.argv[1], "utf8").trim().split("\n").pop());
+    process.exit(eval(process.argv[2]) ? 0 : 1)' "$1" "$3"; then
+    echo "ok: $2"
+  else
+    fail "$2: $3 does not hold of $(tail -n 1 "$1")"
+  fi
+}
+
+# until_true SECONDS COMMAND...
+until_true() {
+  local limit=$((SECONDS + $1))
+  shift
+  until "$@" > /dev/null 2>&1; do
+    [ $SECONDS -lt $limit ] || return 1
+    sleep 0.2
+  done
+}

@@ -1,0 +1,38 @@
+# The Debian package under real systemd: it installs, becomes active, a hung publisher is killed by the watchdog and is
+# back and publishing; removal leaves nothing but configuration.
+set -uo pipefail
+. /vm/common.sh
+uname -rv
+device_nodes
+find / -xdev -name '*perimap*' -not -path '/proc/*' 2> /dev/null | sort > /tmp/before
+installed
+devices_emulated
+configured
+systemctl restart perimapd || fail "the service does not start"
+systemctl is-active perimapd || fail "the service is not active"
+systemctl is-enabled perimapd || fail "the service is not enabled"
+[ "$(ps -o user= -p "$(systemctl show -P MainPID perimapd)")" = perimap ] || fail "it does not run as perimap"
+systemctl show -P StatusText perimapd
+received 5 /tmp/first
+holds /tmp/first "it publishes" "x.received > 5"
+
+# One thread is held, as if it hung; the others go on.
+before=$(systemctl show -P MainPID perimapd)
+"$build/tests/vm/hold_thread" "$before" publisher &
+until_true 60 bash -c "[ \"\$(systemctl show -P MainPID perimapd)\" != $before ] && systemctl is-active perimapd" ||
+  fail "the watchdog did not bring it back"
+journalctl -u perimapd -o cat | grep -q 'Watchdog timeout' || fail "it was not the watchdog"
+[ "$(systemctl show -P NRestarts perimapd)" -ge 1 ] || fail "it was not restarted"
+echo "ok: a hung publisher is killed and restarted"
+received 5 /tmp/second
+holds /tmp/second "it publishes again" "x.received > 5"
+
+kill -9 "$(systemctl show -P MainPID perimapd)"
+received 5 /tmp/third
+holds /tmp/third "it publishes after kill -9" "x.received > 5"
+
+dpkg -r perimap > /tmp/dpkg 2>&1 || fail "removal: $(cat /tmp/dpkg)"
+[ -z "$(pgrep perimapd)" ] || fail "removal leaves it running"
+find / -xdev -name '*perimap*' -not -path '/proc/*' 2> /dev/null | sort > /tmp/after
+comm -13 /tmp/before /tmp/after | grep -v -e '^/etc/perimap' -e '^/var/lib/dpkg/' -e '^/var/lib/systemd/deb-systemd-helper' -e '^/etc/systemd/system' -e '^/var/log/' -e '^/tmp/' > /tmp/left
+cat /tmp/left
