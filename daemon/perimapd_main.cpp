@@ -107,6 +107,13 @@ int run(const std::string& configuration_file) {
                                configuration_file)},
                   kWrongConfiguration);
   }
+  if (given->recording.record) {
+    return refuse(
+        {fmt::format("{}: key 'recording.record': expected false with 'replay.recording', which is a recording "
+                     "already, got true",
+                     configuration_file)},
+        kWrongConfiguration);
+  }
   auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
   if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
   return run_session(configuration_file, setup->configuration, setup->pipeline, setup->identity, *stop,

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <utility>
 
-#include "drivers/camera/camera_endpoint.hpp"
+#include "drivers/transport/camera_endpoint.hpp"
 #include "drivers/transport/endpoint.hpp"
 
 namespace perimap {

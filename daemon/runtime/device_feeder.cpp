@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "drivers/camera/v4l2_camera.hpp"
@@ -127,7 +128,10 @@ void DeviceFeeder::stop() {
   for (std::thread& thread : threads_) thread.join();
   threads_.clear();
   if (playback_) playback_->stop();
-  if (recording_.recorder) recording_.recorder->stop();
+  if (!recording_.recorder || recording_ended_) return;
+  recording_ended_ = true;
+  recording_.recorder->stop();
+  tell_recording();
 }
 
 bool DeviceFeeder::ended() const noexcept {
@@ -178,9 +182,26 @@ void DeviceFeeder::tick() {
   if (devices_.camera && !playback_) tell("camera", camera_health_, camera_told_);
   if (devices_.tracker) tell("tracker", tracker_health_, tracker_told_);
   if (devices_.ecg) tell("ECG", ecg_health_, ecg_told_);
-  if (!recording_.recorder || recording_end_told_ || !recording_.recorder->summary().stopped) return;
-  recording_end_told_ = true;
-  spdlog::error("recording stopped: {}; all else goes on", recording_.recorder->reason());
+  if (recording_.recorder) tell_recording();
+}
+
+void DeviceFeeder::tell_recording() {
+  const SessionRecorder::Summary recorded = recording_.recorder->summary();
+  if (recorded.stopped && !recording_stop_told_) {
+    recording_stop_told_ = true;
+    spdlog::error("recording stopped: {}; all else goes on", recording_.recorder->reason());
+  }
+  const std::uint64_t lost = recorded.frames_not_recorded + recorded.other_not_recorded;
+  // At the first and then when they have doubled; the topic has every one.
+  if (!recorded.stopped && lost >= std::max<std::uint64_t>(1, 2 * not_recorded_told_)) {
+    not_recorded_told_ = lost;
+    spdlog::warn("the disk does not keep up: {} frames and {} other messages not recorded",
+                 recorded.frames_not_recorded, recorded.other_not_recorded);
+  }
+  if (recording_ended_) {
+    spdlog::info("recorded {} messages to {}; not recorded: {} frames, {} others", recorded.recorded,
+                 recording_.recorder->file().string(), recorded.frames_not_recorded, recorded.other_not_recorded);
+  }
 }
 
 }  // namespace perimap

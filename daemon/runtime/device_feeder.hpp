@@ -64,6 +64,7 @@ class DeviceFeeder final : public SensorFeeder {
 
  private:
   void run_camera(const CameraDevice& device);
+  void tell_recording();
   struct Told {
     DeviceState state = DeviceState::kClosed;
     std::string reason;
@@ -80,7 +81,9 @@ class DeviceFeeder final : public SensorFeeder {
   Told tracker_told_;
   Told ecg_told_;
   Told camera_told_;
-  bool recording_end_told_ = false;
+  bool recording_ended_ = false;
+  bool recording_stop_told_ = false;
+  std::uint64_t not_recorded_told_ = 0;
   std::optional<Error> camera_error_;
   // Release by the camera's thread when its video has ended, acquire in ended(): camera_error_ is then visible.
   std::atomic<bool> camera_ended_{false};

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "drivers/calibration/calibration_file.hpp"
-#include "drivers/camera/camera_endpoint.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/text_file/text_file.hpp"
+#include "drivers/transport/camera_endpoint.hpp"
 
 namespace perimap {
 namespace {
@@ -68,29 +68,37 @@ Expected<NdiSettings> ndi_settings(const TrackerConfiguration& c) {
   return settings;
 }
 
-Expected<V4l2Settings> v4l2_settings(const CameraConfiguration& c, const std::string& path) {
-  V4l2Settings settings;
-  settings.path = path;
-  settings.format = c.format;
-  settings.input = c.input;
-  settings.frame_rate_hz = c.frame_rate_hz;
-  settings.exposure_ms = c.exposure_ms;
-  settings.gain = c.gain;
-  settings.delay = c.delay;
+struct FrameSize {
+  int width = 0;
+  int height = 0;
+};
+
+// Of the keys or of the calibration, which must agree; zeros when neither says.
+Expected<FrameSize> frame_size(const CameraConfiguration& c) {
   if ((c.width > 0) != (c.height > 0)) {
     return wrong(c.width > 0 ? "camera.height" : "camera.width", "one, since the other is given", "0");
   }
-  settings.width = c.width;
-  settings.height = c.height;
-  if (!c.calibration) return settings;
+  if (!c.calibration) return FrameSize{c.width, c.height};
   const auto calibration = read_calibration(*c.calibration);
   if (!calibration) return tl::unexpected(calibration.error());
   if (c.width > 0 && (c.width != calibration->width || c.height != calibration->height)) {
     return wrong("camera.width", fmt::format("the calibration's {}x{}", calibration->width, calibration->height),
                  fmt::format("{}x{}", c.width, c.height));
   }
-  settings.width = calibration->width;
-  settings.height = calibration->height;
+  return FrameSize{calibration->width, calibration->height};
+}
+
+V4l2Settings v4l2_settings(const CameraConfiguration& c, const std::string& path, const FrameSize& size) {
+  V4l2Settings settings;
+  settings.path = path;
+  settings.format = c.format;
+  settings.width = size.width;
+  settings.height = size.height;
+  settings.input = c.input;
+  settings.frame_rate_hz = c.frame_rate_hz;
+  settings.exposure_ms = c.exposure_ms;
+  settings.gain = c.gain;
+  settings.delay = c.delay;
   return settings;
 }
 
@@ -164,17 +172,16 @@ Expected<CameraDevice> camera_device(const CameraConfiguration& c, const std::fi
   if (!c.device) return wrong("camera.device", "a camera, or a recording in 'camera.playback'", "nothing");
   const auto endpoint = parse_camera_endpoint(*c.device);
   if (!endpoint) return tl::unexpected(endpoint.error());
-  if (const auto* video = std::get_if<VideoEndpoint>(&*endpoint)) {
-    const std::filesystem::path file = (configuration_file.parent_path() / video->file).lexically_normal();
-    std::error_code code;
-    if (!std::filesystem::is_regular_file(file, code)) {
-      return wrong("camera.device", "a video file", fmt::format("{}, which is not there", file.string()));
-    }
-    return VideoCameraSettings{file.string(), c.frame_rate_hz, c.loop};
+  const auto size = frame_size(c);
+  if (!size) return tl::unexpected(size.error());
+  if (const auto* v4l2 = std::get_if<V4l2Endpoint>(&*endpoint)) return v4l2_settings(c, v4l2->path, *size);
+  const std::filesystem::path file =
+      (configuration_file.parent_path() / std::get<VideoEndpoint>(*endpoint).file).lexically_normal();
+  std::error_code code;
+  if (!std::filesystem::is_regular_file(file, code)) {
+    return wrong("camera.device", "a video file", fmt::format("{}, which is not there", file.string()));
   }
-  return v4l2_settings(c, std::get<V4l2Endpoint>(*endpoint).path).map([](const V4l2Settings& settings) {
-    return CameraDevice(settings);
-  });
+  return VideoCameraSettings{file.string(), c.frame_rate_hz, c.loop, size->width, size->height};
 }
 
 Expected<Devices> named_devices(const Configuration& configuration, const std::filesystem::path& configuration_file) {

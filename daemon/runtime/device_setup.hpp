@@ -57,8 +57,7 @@ struct DeviceSetup {
 // Errors name the key and what it should be. Devices are not opened yet: they may come later.
 [[nodiscard]] Expected<TrackerDevice> tracker_device(const TrackerConfiguration& configuration);
 [[nodiscard]] Expected<EcgDevice> ecg_device(const EcgConfiguration& configuration);
-// Of `device`, or of `playback` and its start. The size of a V4L2 camera's frames is that of the keys, or of the
-// calibration, or none.
+// Of `device`, or of `playback` and its start. The frames' size is that of the keys or of the calibration, or any.
 [[nodiscard]] Expected<CameraDevice> camera_device(const CameraConfiguration& configuration,
                                                    const std::filesystem::path& configuration_file);
 // Those that the configuration names.

@@ -51,6 +51,10 @@ std::string_view name_of(perimap_RespirationState state) {
   return name_in<3>({"off", "searching", "locked"}, static_cast<int>(state));
 }
 
+std::string_view name_of(perimap_RecordingState state) {
+  return name_in<3>({"off", "on", "stopped"}, static_cast<int>(state));
+}
+
 std::string_view name_of(perimap_Privilege privilege) {
   return name_in<3>({"not_requested", "granted", "refused"}, static_cast<int>(privilege));
 }
@@ -108,6 +112,10 @@ Json status_json(const StatusDigest& digest) {
                {"phases_from_image", status.phases_from_image},
                {"respiration", name_of(status.respiration)},
                {"respiration_suspected", status.respiration_suspected},
+               {"recording", name_of(status.recording)},
+               {"messages_recorded", status.messages_recorded},
+               {"frames_not_recorded", status.frames_not_recorded},
+               {"other_not_recorded", status.other_not_recorded},
                {"samples", status.samples},
                {"samples_without_frame", status.samples_without_frame},
                {"samples_from_late_update", status.samples_from_late_update},
@@ -151,6 +159,7 @@ std::string report_line(const StreamReport& report) {
                     last.cardiac_phase_deviation_rad * kDegreesPerRadian,
                     last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian, features_text(last), state_text(last));
   }
+  if (report.status && report.status->status.recording == perimap_RECORDING_STOPPED) line += " | RECORDING STOPPED";
   return line;
 }
 

@@ -41,8 +41,8 @@ class KernelNode final : public V4l2Node {
     const std::timespec timeout{longest.count() / 1'000'000'000, longest.count() % 1'000'000'000};
     if (::ppoll(waited.data(), waited.size(), &timeout, nullptr) <= 0) return Ready::kNothing;
     if (waited[1].revents != 0) return Ready::kInterrupted;
-    // An unplugged device polls as an error; taking a buffer then says which.
-    return (waited[0].revents & (POLLIN | POLLERR | POLLHUP | POLLNVAL)) != 0 ? Ready::kBuffer : Ready::kEvent;
+    if ((waited[0].revents & POLLIN) != 0) return Ready::kBuffer;
+    return (waited[0].revents & (POLLERR | POLLHUP | POLLNVAL)) != 0 ? Ready::kError : Ready::kEvent;
   }
 
  private:

@@ -18,7 +18,8 @@ class V4l2Node {
  public:
   enum class Ready : std::uint8_t {
     kNothing,      // the time is over
-    kBuffer,       // a buffer may be taken, or the error that the node is in
+    kBuffer,       // a buffer may be taken
+    kError,        // the node has stopped; taking a buffer says why
     kEvent,        // an event waits
     kInterrupted,  // by the interrupt
   };

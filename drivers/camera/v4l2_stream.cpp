@@ -350,6 +350,12 @@ Expected<V4l2Stream::Grab> V4l2Stream::next(Duration longest, const Interrupt& i
       return Grab::kInterrupted;
     case V4l2Node::Ready::kBuffer:
       return take();
+    case V4l2Node::Ready::kError: {
+      // Without a reason of its own it would be asked again at once, for ever.
+      auto taken = take();
+      if (taken && *taken == Grab::kNothing) return refuse("its driver has stopped");
+      return taken;
+    }
     case V4l2Node::Ready::kEvent: {
       v4l2_event event{};
       if (node_->control(VIDIOC_DQEVENT, &event) == 0 && event.type == V4L2_EVENT_SOURCE_CHANGE) {

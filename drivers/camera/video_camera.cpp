@@ -1,5 +1,9 @@
 #include "drivers/camera/video_camera.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
 #include <utility>
 
 #include "drivers/device/device_link.hpp"
@@ -41,6 +45,11 @@ class Playing {
       auto decoded = reader.next();
       if (!decoded) return tl::unexpected(std::move(decoded.error()));
       if (*decoded == nullptr) return {};
+      const GreyImage& grey = (*decoded)->grey;
+      if (settings_.width > 0 && (grey.width != settings_.width || grey.height != settings_.height)) {
+        return fail(fmt::format("{}: frames of {}x{}, the calibration is for {}x{}", settings_.file, grey.width,
+                                grey.height, settings_.width, settings_.height));
+      }
       ++sequence_;
       capture_ += period_;
       const Duration ahead = capture_ - MonotonicClock::now();
@@ -49,7 +58,7 @@ class Playing {
         continue;
       }
       if (ahead > Duration(0) && !wait_unless_interrupted(ahead, interrupt_)) return {};
-      deliver((*decoded)->grey);
+      deliver(grey);
     }
     return {};
   }

@@ -14,10 +14,13 @@ struct VideoCameraSettings {
   std::string file;
   double frame_rate_hz = 0.0;  // 0: the file's own, or 30 when it tells none
   bool loop = true;            // begins anew at its end
+  int width = 0;               // that the frames must have, with height; 0: any
+  int height = 0;
 };
 
 // Runs on the calling thread until interrupted, or to the end without `loop`. Frames that cannot be decoded in time are
-// passed over, as a camera would, and counted in health.lost. Fails when the file cannot be read, or changes its size.
+// passed over, as a camera would, and counted in health.lost. Fails when the file cannot be read, or its frames have
+// another size.
 [[nodiscard]] Expected<void> serve_video_camera(const VideoCameraSettings& settings, const CameraSink& sink,
                                                 DeviceHealth& health, const Interrupt& interrupt);
 

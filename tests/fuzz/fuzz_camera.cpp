@@ -33,8 +33,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (int y = 0; y < image->height; ++y) {
     for (int x = 0; x < image->width; ++x) sum += image->row(y)[x];
   }
-  // So that the reading is not left out.
-  static volatile unsigned seen;
-  seen = sum;
+  // More than white everywhere can only come from beside the picture; without the question nothing would be read.
+  if (sum > 255U * static_cast<unsigned>(image->width * image->height)) std::abort();
   return 0;
 }

@@ -193,7 +193,7 @@ class FakeV4l2Node final : public V4l2Node {
       return wait_out(longest, interrupt);
     }
     const Ready ready = camera_.frames.front().ready;
-    if (ready != Ready::kBuffer) camera_.frames.pop_front();
+    if (ready != Ready::kBuffer && ready != Ready::kError) camera_.frames.pop_front();
     return ready;
   }
 

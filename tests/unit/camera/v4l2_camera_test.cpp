@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/camera/camera_endpoint.hpp"
+#include "drivers/transport/camera_endpoint.hpp"
 #include "tests/unit/camera/fake_v4l2_node.hpp"
 
 namespace perimap {
@@ -164,6 +164,8 @@ TEST(V4l2Stream, EndsWhenTheDeviceGoesOrItsSignalChanges) {
     const char* reason;
   };
   for (const Case& c : {Case{{.error = ENODEV}, "the device has gone"}, Case{{.error = EIO}, "no more frames"},
+                        Case{{.error = EAGAIN, .ready = V4l2Node::Ready::kError}, "its driver has stopped"},
+                        Case{{.error = ENODEV, .ready = V4l2Node::Ready::kError}, "the device has gone"},
                         Case{{.ready = V4l2Node::Ready::kEvent}, "signal at its input changed"}}) {
     FakeCamera camera;
     camera.frames = {c.frame};

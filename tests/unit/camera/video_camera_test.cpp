@@ -63,6 +63,13 @@ TEST_F(VideoCamera, BeginsAnewWithOneCount) {
   EXPECT_EQ(stamps_.back().sequence, stamps_.size() + health_.lost.get());
 }
 
+TEST_F(VideoCamera, RefusesFramesOfAnotherSizeThanTheCalibrations) {
+  const auto played = serve_video_camera(
+      {file_, 0.0, true, 64, 32}, [](const CameraFrame&) {}, health_, interrupt_);
+  ASSERT_FALSE(played);
+  EXPECT_THAT(played.error().message, ::testing::HasSubstr("frames of 64x48, the calibration is for 64x32"));
+}
+
 TEST_F(VideoCamera, SaysWhichFileItCannotRead) {
   const auto played = serve_video_camera(
       {"none.avi", 0.0, true}, [](const CameraFrame&) {}, health_, interrupt_);

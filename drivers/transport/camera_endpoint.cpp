@@ -1,4 +1,4 @@
-#include "drivers/camera/camera_endpoint.hpp"
+#include "drivers/transport/camera_endpoint.hpp"
 
 #include <fmt/format.h>
 
