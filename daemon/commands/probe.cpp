@@ -64,11 +64,25 @@ std::string complaint(std::string_view kind, const Seen& seen) {
                      seen.tools[2], seen.tools[3], seen.count);
 }
 
+// What went wrong last, or what the state alone tells.
+std::string reason(const DeviceHealth& health) {
+  std::string told = health.reason();
+  if (!told.empty()) return told;
+  switch (health.state()) {
+    case DeviceState::kSilent:
+      return "samples came and have stopped: switched off, cable out, or a device of another kind?";
+    case DeviceState::kStarting:
+      return "open, but nothing has come yet: listen for longer (--seconds)";
+    default:
+      return "";
+  }
+}
+
 nlohmann::json as_json(const DeviceHealth& health, const Seen& seen, const std::string& where) {
   const auto jitter = health.jitter.summary();
   return {{"where", where},
           {"state", device_state_name(health.state())},
-          {"reason", health.reason()},
+          {"reason", reason(health)},
           {"identity", health.identity()},
           {"openings", health.openings.get()},
           {"samples", health.samples.get()},

@@ -7,6 +7,7 @@ port=$((20000 + $$ % 20000))
 rm -rf "$work"
 mkdir -p "$work"
 line=$(mktemp -u "${TMPDIR:-/tmp}/perimap-ecg-XXXXXX")
+emulators=
 trap 'kill $emulators 2> /dev/null' EXIT
 
 fail() {
@@ -14,7 +15,7 @@ fail() {
   exit 1
 }
 
-"$perimap" track "$recording" --video "$work/camera.avi" > "$work/track" 2>&1 || fail "no video: $(cat "$work/track")"
+"$perimap" track "$recording" --csv "$work/tracks.csv" --video "$work/camera.avi" > "$work/track" 2>&1 || fail "no video: $(cat "$work/track")"
 "$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$line" > "$work/emulators" 2>&1 &
 emulators=$!
 for _ in $(seq 100); do
@@ -44,7 +45,7 @@ device = "v4l2:/dev/video-that-is-not-there"
 protocol = "igtl"
 port = "tcp:127.0.0.1:$((port + 1))"
 [ecg]
-protocol = "medlab"
+protocol = "bitalino"
 port = "$line"
 TOML
 "$perimap" probe "$work/gone.toml" --seconds 4 --json > "$work/gone.json" 2> "$work/errors"
@@ -60,7 +61,7 @@ for (const [device, rate] of [["camera", 25], ["tracker", 60], ["ecg", 250]]) {
 assert.match(there.tracker.identity, /emulated tracker/);
 assert.match(gone.camera.reason, /no such device/);
 assert.match(gone.tracker.reason, /refused/);
-assert.match(gone.ecg.reason, /wrong baud rate or another device/);
+assert.match(gone.ecg.reason, /wrong baud rate or another device|not a byte/);
 for (const device of ["camera", "tracker", "ecg"]) assert.notEqual(gone[device].state, "streaming", device);
 END_OF_JS
 

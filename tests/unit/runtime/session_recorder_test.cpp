@@ -10,7 +10,9 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <numeric>
+#include <random>
+#include <thread>
+#include <vector>
 
 #include "counted_allocations.hpp"
 #include "daemon/runtime/session_recording.hpp"
@@ -33,9 +35,6 @@ class SessionRecording : public ::testing::Test {
     std::string name = (std::filesystem::temp_directory_path() / "perimap-record-XXXXXX").string();
     folder_ = mkdtemp(name.data());
     file_ = folder_ / "session.mcap";
-    // Random, so that they stay as large on the disk as they are.
-    std::srand(1);
-    for (std::byte& b : pixels_) b = static_cast<std::byte>(std::rand());
   }
   ~SessionRecording() override { std::filesystem::remove_all(folder_); }
   SessionRecording(const SessionRecording&) = delete;
@@ -48,7 +47,9 @@ class SessionRecording : public ::testing::Test {
     return std::move(*created);
   }
 
-  CameraFrame frame(std::uint64_t sequence, Instant arrival, PixelFormat format = PixelFormat::kYuyv) const {
+  CameraFrame frame(std::uint64_t sequence, Instant arrival, PixelFormat format = PixelFormat::kYuyv) {
+    // Random, so that frames stay as large on the disk as they are.
+    for (std::byte& b : pixels_) b = static_cast<std::byte>(random_());
     CameraFrame f;
     f.stamp = {sequence, arrival - milliseconds(20), arrival};
     f.format = format;
@@ -80,6 +81,7 @@ class SessionRecording : public ::testing::Test {
   ThreadLauncher threads{SchedulingSettings{}};
   std::filesystem::path folder_;
   std::filesystem::path file_;
+  std::minstd_rand random_{1};
   std::array<std::byte, std::size_t{2} * kWidth * kHeight> pixels_;
 };
 
