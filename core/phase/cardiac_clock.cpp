@@ -26,6 +26,8 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   estimate.rate_rad_per_s = phase.rate_rad_per_s;
   estimate.exact = located.exact;
   estimate.contradicted = contradicted_ && !located.exact;
+  estimate.teaches = cycle.teaches;
+  estimate.ectopic = located.ectopic;
 
   const double w = phase.length_sensitivity;
   const double begin = to_seconds(cycle.begin_deviation);
@@ -41,9 +43,34 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   return estimate;
 }
 
+CardiacClock CardiacClock::with_law(const PhaseLawSettings& law) const noexcept {
+  CardiacClock clock = *this;
+  clock.law_ = law;
+  return clock;
+}
+
+CardiacClock CardiacClock::as_of(Instant now) const noexcept {
+  CardiacClock clock = *this;
+  clock.now_ = now;
+  if (samples_ && now - heard_until_ > kSilence) clock.interrupted_ = true;
+  return clock;
+}
+
 CardiacClock CardiacClock::corrected(const CycleCorrection& correction) const noexcept {
   CardiacClock clock = *this;
-  if (correction.beats == 0 || correction.beats != beats_) return clock;
+  if (correction.law) clock.law_ = *correction.law;
+  if (correction.beats == 0) return clock;
+  if (correction.carried) {
+    if (at(now_).state == PhaseState::kLocked) return clock;
+    std::copy_backward(clock.history_.begin(), clock.history_.end() - 1, clock.history_.end());
+    clock.history_[0] = Beat{};
+    clock.history_[0].index_in_run = kBeatsToLock;
+    clock.held_ = std::min(held_ + 1, static_cast<int>(history_.size()));
+    clock.carried_ = true;
+    clock.seen_ = correction.seen;
+  } else if (correction.beats != beats_) {
+    return clock;
+  }
   clock.history_[0].time = correction.begin;
   clock.history_[0].deviation = correction.begin_deviation;
   clock.predicted_[0] = Seconds(to_seconds(correction.length));
@@ -81,7 +108,7 @@ CardiacClock::Located CardiacClock::locate_completed(int newer) const noexcept {
   located.state = PhaseState::kLocked;
   located.exact = true;
   located.irregularity = end.irregularity;
-  located.cycle.teaches = cycle_teaches(begin.beat_class, end.beat_class);
+  located.cycle.teaches = end.teaches;
   located.cycle.begin = begin.time;
   located.cycle.begin_deviation = begin.deviation;
   located.cycle.length = end.time - begin.time;
@@ -95,7 +122,7 @@ CardiacClock::Located CardiacClock::locate_completed(int newer) const noexcept {
 
 CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   Located located;
-  if (beat(0).index_in_run + 1 < kBeatsToLock) return located;
+  if (beat(0).index_in_run + 1 < kBeatsToLock || predicted_length() <= Duration::zero()) return located;
 
   const Instant due = predicted_r_peak();
   const Duration slack = std::min(rounded(kOverdueDeviations * running_deviation_), predicted_length());
@@ -103,7 +130,11 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
     located.state = PhaseState::kLost;
     return located;
   }
-  located.state = t > due + slack + detector_delay_ ? PhaseState::kFreeRunning : PhaseState::kLocked;
+  const bool overdue = t > due + slack + detector_delay_;
+  located.state = carried_ && seen_ && !overdue         ? PhaseState::kFromImage
+                  : carried_ || interrupted_ || overdue ? PhaseState::kFreeRunning
+                                                        : PhaseState::kLocked;
+  located.ectopic = beat(0).beat_class == BeatClass::kPremature;
 
   CardiacCycle& cycle = located.cycle;
   cycle.begin = beat(0).time;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <type_traits>
 
@@ -20,9 +21,15 @@ namespace perimap {
 enum class PhaseState : std::uint8_t {
   kUnknown,      // fewer than three beats in a row yet, or before the history held: the phase means nothing
   kLocked,       // between known beats, or within the cycle that follows one
-  kFreeRunning,  // a beat was due and has not come; the phase goes on from predicted lengths
+  kFreeRunning,  // a beat was due and has not come, or the ECG is gone; the phase goes on from predicted lengths
+  kFromImage,    // the same, but the images tell the phase
   kLost          // no beat for so long that the phase means nothing
 };
+
+// Whether there is a phase to predict with.
+[[nodiscard]] constexpr bool usable(PhaseState state) noexcept {
+  return state == PhaseState::kLocked || state == PhaseState::kFreeRunning || state == PhaseState::kFromImage;
+}
 
 struct PhaseEstimate {
   double phase_rad = 0.0;       // [0, 2 pi), 0 = R peak
@@ -31,6 +38,8 @@ struct PhaseEstimate {
   PhaseState state = PhaseState::kUnknown;
   bool exact = false;         // the cycle is completed: both its R peaks are known
   bool contradicted = false;  // the images show another phase
+  bool teaches = false;       // exact, and what was seen in the cycle may be learnt
+  bool ectopic = false;       // the running cycle began with a premature beat: the heart may move otherwise than usual
 };
 
 // One cycle, completed or predicted.
@@ -41,7 +50,7 @@ struct CardiacCycle {
   Duration length_deviation{0};
   Duration previous_length{0};  // the warped law depends on it
   Duration systole{0};          // under the warped law's rule
-  bool teaches = false;         // completed, from a normal beat to a normal beat: what was seen in it may be learnt
+  bool teaches = false;         // completed, and what was seen in it may be learnt, see CardiacClockTracker
 };
 
 class CardiacClock {
@@ -49,8 +58,13 @@ class CardiacClock {
   static constexpr int kCompletedCycles = 32;
   static constexpr int kPredictedCycles = 4;  // further ones repeat the last
   static constexpr int kBeatsToLock = 3;
+  static constexpr Duration kSilence = std::chrono::milliseconds(250);  // longer than any device takes to deliver
 
-  // The same with the running cycle as corrected; unchanged when the correction is of another cycle.
+  [[nodiscard]] CardiacClock with_law(const PhaseLawSettings& law) const noexcept;
+  // The same as it stands at `now`: an ECG of which nothing has been heard for kSilence is gone.
+  [[nodiscard]] CardiacClock as_of(Instant now) const noexcept;
+  // The same with the running cycle as corrected; unchanged when the correction is of another cycle, or carries the
+  // phase on although as_of() its instant the ECG tells it.
   [[nodiscard]] CardiacClock corrected(const CycleCorrection& correction) const noexcept;
 
   // Any instant. Instants before the history, and those in gaps too long to be cycles, are kUnknown or kLost with rate
@@ -74,6 +88,8 @@ class CardiacClock {
 
   // Whether the coming cycles can be predicted. In atrial fibrillation the deviations are honest, but large.
   [[nodiscard]] Rhythm rhythm() const noexcept { return rhythm_; }
+  // The last sample of a connected lead that has been looked through.
+  [[nodiscard]] Instant heard_until() const noexcept { return heard_until_; }
 
   [[nodiscard]] const PhaseLawSettings& law() const noexcept { return law_; }
   [[nodiscard]] std::uint64_t beats() const noexcept { return beats_; }  // R peaks taken since the start
@@ -87,6 +103,7 @@ class CardiacClock {
     std::uint32_t index_in_run = 0;  // 0 for the first beat and for the first after a gap
     BeatClass beat_class = BeatClass::kNormal;
     Duration irregularity{0};  // by how much the interval before it missed its prediction, 0 when in rhythm
+    bool teaches = false;      // the cycle before it does
   };
 
   struct Located {
@@ -94,6 +111,7 @@ class CardiacClock {
     Duration irregularity{0};
     PhaseState state = PhaseState::kUnknown;
     bool exact = false;
+    bool ectopic = false;
   };
 
   [[nodiscard]] Located locate(Instant t) const noexcept;
@@ -112,6 +130,12 @@ class CardiacClock {
   Seconds running_deviation_{0.0};  // of the running cycle's length
   Seconds next_deviation_{0.0};     // of the length of the cycle after it
   bool contradicted_ = false;
+  bool samples_ = false;      // there are samples to be heard, not pulses alone
+  bool interrupted_ = false;  // the lead is off, or nothing comes
+  bool carried_ = false;      // see CycleCorrection
+  bool seen_ = false;
+  Instant heard_until_;
+  Instant now_;  // of as_of()
   Rhythm rhythm_ = Rhythm::kUnknown;
 };
 

@@ -32,36 +32,66 @@ void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
   if (clock_.held_ > 0) {
     const Duration rr = peak.time - clock_.anchor();
     if (rr < kShortestRr) return;
+    const Seconds predicted = clock_.predicted_[0];
+    const Duration missed = from_seconds(std::abs((Seconds(rr) - predicted).count()));
+    const bool in_rhythm = predictor_.count() > 0 && Seconds(missed) <= kRhythmTolerance * predicted;
     const bool gap = rr > clock_.predicted_length() + clock_.lost_after_;
-    if (gap) {
-      rhythm_.clear();
-    } else {
+    if (gap) rhythm_.clear();
+    // Over an interruption beats may have been missed: the interval is one when it is as long as it should be.
+    if (!gap && (in_rhythm || !unheard_)) {
       beat.index_in_run = clock_.beat(0).index_in_run + 1;
-      if (predictor_.count() > 0) {
-        const Seconds predicted = clock_.predicted_[0];
-        const Duration missed = from_seconds(std::abs((Seconds(rr) - predicted).count()));
-        if (Seconds(missed) > kRhythmTolerance * predicted) beat.irregularity = missed;
-      }
-      const bool teaches = cycle_teaches(clock_.beat(0).beat_class, peak.beat_class);
-      if (teaches) {
+      if (predictor_.count() > 0 && !in_rhythm) beat.irregularity = missed;
+      const BeatClass begin = clock_.beat(0).beat_class;
+      const bool normal = cycle_teaches(begin, peak.beat_class) && !unheard_;
+      if (normal) {
         predictor_.push(rr);
-      } else {
+      } else if (begin != BeatClass::kPremature) {
         predictor_.score(rr);
       }
       if (!peak.unusual_shape && !last_unusual_) rhythm_.push(rr);
+      ectopic_.push(rr, begin, peak.beat_class);
+      beat.teaches = normal || (ectopic_.prevails() && begin != BeatClass::kPremature && !unheard_);
     }
   }
+  unheard_ = false;
 
   std::copy_backward(clock_.history_.begin(), clock_.history_.end() - 1, clock_.history_.end());
   clock_.history_[0] = beat;
   clock_.held_ = std::min(clock_.held_ + 1, static_cast<int>(clock_.history_.size()));
   ++clock_.beats_;
-  predictor_.predict(clock_.predicted_);
   last_unusual_ = peak.unusual_shape;
-  clock_.rhythm_ = rhythm_.rhythm();
+  const bool ectopic = ectopic_.prevails() && rhythm_.rhythm() != Rhythm::kUnpredictable;
+  clock_.rhythm_ = ectopic ? Rhythm::kEctopic : rhythm_.rhythm();
+  predict();
+}
+
+// The normal rhythm, with the running cycle and the next as the ectopic beats have it.
+void CardiacClockTracker::predict() noexcept {
+  predictor_.predict(clock_.predicted_);
   clock_.length_deviation_ = predictor_.deviation();
-  clock_.running_deviation_ = clock_.length_deviation_;
+  const BeatClass begin = clock_.beat(0).beat_class;
+  const PredictedLength normal{clock_.predicted_[0], clock_.length_deviation_};
+  const PredictedLength running = ectopic_.predict(begin, Seconds(clock_.last_rr()), normal);
+  clock_.predicted_[0] = running.length;
+  clock_.running_deviation_ = running.deviation;
   clock_.next_deviation_ = clock_.length_deviation_;
+  // What is shorter than normal after a normal beat ends with a premature one.
+  if (begin == BeatClass::kPremature || running.length == normal.length) return;
+  const PredictedLength pause =
+      ectopic_.predict(BeatClass::kPremature, running.length, {clock_.predicted_[1], clock_.length_deviation_});
+  clock_.predicted_[1] = pause.length;
+  clock_.next_deviation_ = pause.deviation;
+}
+
+void CardiacClockTracker::heard(Instant until) noexcept {
+  clock_.samples_ = true;
+  clock_.interrupted_ = false;
+  clock_.heard_until_ = until;
+}
+
+void CardiacClockTracker::interrupt() noexcept {
+  clock_.interrupted_ = true;
+  unheard_ = true;
 }
 
 }  // namespace perimap

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "core/phase/cardiac_clock.hpp"
+#include "core/phase/ectopic_rhythm.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/phase/r_peak.hpp"
 #include "core/phase/rhythm_monitor.hpp"
@@ -27,16 +28,28 @@ class CardiacClockTracker {
   explicit CardiacClockTracker(const CardiacClockSettings& settings) noexcept;
 
   // In order of time. A peak less than 250 ms after the last (or before it) is refused, and so is one classed as noise.
-  // Only cycles from a normal beat to a normal beat teach the rhythm.
+  //
+  // What teaches: a cycle from a normal beat to a normal beat, with the lead on all the while. Where there are hardly
+  // any (ectopic beats prevail), the rhythm is called so, and then the cycles that begin with a normal beat teach the
+  // map, though not the rhythm, however they end: until the premature beat the heart moves as after any normal one.
   void on_r_peak(const RPeak& peak) noexcept;
+
+  // The signal has been looked through up to here.
+  void heard(Instant until) noexcept;
+  // From here on it means nothing (lead off, a flat line, samples missing) until it is heard again.
+  void interrupt() noexcept;
 
   [[nodiscard]] const CardiacClock& clock() const noexcept { return clock_; }
 
  private:
+  void predict() noexcept;
+
   RrPredictor predictor_;
   RhythmMonitor rhythm_;
   CardiacClock clock_;
+  EctopicRhythm ectopic_;
   bool last_unusual_ = false;  // the last beat's shape
+  bool unheard_ = false;       // since the last beat the signal was interrupted
 };
 
 }  // namespace perimap

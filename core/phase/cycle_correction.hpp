@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
+#include "core/phase/phase_law.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
@@ -16,6 +18,11 @@ struct CycleCorrection {
   Duration next_length{0};  // of the cycle after it; 0: nothing is known
   Duration next_length_deviation{0};
   bool contradicted = false;  // the images show another phase than this; the deviation has been widened
+  // The ECG tells nothing: the images carry the phase on, and this cycle begins with an R peak that nobody has seen.
+  // Then `beats` counts those known before.
+  bool carried = false;
+  bool seen = false;                    // carried, and the images have told the phase lately
+  std::optional<PhaseLawSettings> law;  // the one that the images show; none: as configured
 };
 
 }  // namespace perimap

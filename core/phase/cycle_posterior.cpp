@@ -22,6 +22,11 @@ constexpr double kContradicted_s = 0.15;
 constexpr double kWorthSaying_s = 0.02;
 // Below this many observations the misfit says little.
 constexpr int kEnoughForMisfit = 5;
+// A carried cycle ends for good when the next has run so far: by then the images have shown its beginning.
+constexpr double kRolled = 0.3;
+constexpr double kCarriedDeviation = 1.5;         // of a carried cycle's length, to that of one after a known beat
+constexpr double kLargestBeginDeviation = 0.125;  // of the length
+constexpr Duration kSeen = std::chrono::milliseconds(500);
 
 // Where the i-th of n even steps from -span to span lies.
 double step_of(int i, int n, double span) noexcept { return span * (2.0 * i / (n - 1) - 1.0); }
@@ -48,24 +53,63 @@ double CyclePosterior::length_s(int j) const noexcept {
 
 void CyclePosterior::follow(const CardiacClock& clock, Instant now) noexcept {
   now_ = now;
-  locked_ = clock.at(now).state == PhaseState::kLocked;
-  if (clock.beats() == beats_) return;
+  if (clock.at(now).state != PhaseState::kLocked) {
+    carry_on(clock);
+    return;
+  }
+  const bool anew = !locked_ || carried_ || clock.beats() != beats_;
+  locked_ = true;
+  carried_ = false;
+  if (!anew) return;
   beats_ = clock.beats();
   begin_cycle(clock);
+}
+
+void CyclePosterior::carry_on(const CardiacClock& clock) noexcept {
+  if (!locked_) return;
+  if (!carried_) {
+    carried_ = true;
+    carried_since_ = now_;
+    ahead_ = 0;
+  }
+  if (!any_observed_ || now_ - last_observed_ > kBlind || now_ - carried_since_ > carry_) {
+    locked_ = false;
+    return;
+  }
+  const CycleCorrection cycle = correction();
+  const Instant end = cycle.begin + cycle.length;
+  if (to_seconds(now_ - end) < kRolled * next_length_s_) return;
+  // As long as was predicted before the ECG went, or as the last was: rhythms wander.
+  const double predicted_s = to_seconds(clock.predicted_length(std::min(++ahead_, CardiacClock::kPredictedCycles - 1)));
+  r_peak_ = end;
+  previous_length_s_ = to_seconds(cycle.length);
+  length_mean_s_ = 0.5 * (predicted_s + previous_length_s_);
+  next_length_s_ = length_mean_s_;
+  length_deviation_s_ = kCarriedDeviation * to_seconds(clock.length_deviation());
+  begin_deviation_s_ = std::min(std::hypot(to_seconds(cycle.begin_deviation), to_seconds(cycle.length_deviation)),
+                                kLargestBeginDeviation * length_mean_s_);
+  begin_grid();
 }
 
 void CyclePosterior::begin_cycle(const CardiacClock& clock) noexcept {
   law_ = clock.law();
   r_peak_ = clock.anchor();
   detector_delay_ = clock.detector_delay();
-  begin_deviation_s_ = std::max(to_seconds(clock.anchor_deviation()), kLeastBeginDeviation_s);
+  begin_deviation_s_ = to_seconds(clock.anchor_deviation());
   length_mean_s_ = to_seconds(clock.predicted_length());
-  length_deviation_s_ = std::max(to_seconds(clock.length_deviation()), kLeastLengthDeviation * length_mean_s_);
-  // A length must stay one.
-  length_deviation_s_ = std::min(length_deviation_s_, 0.5 * length_mean_s_ / kLengthSpan);
+  length_deviation_s_ = to_seconds(clock.length_deviation());
   previous_length_s_ = to_seconds(clock.last_rr());
   if (previous_length_s_ <= 0.0) previous_length_s_ = length_mean_s_;
   next_length_s_ = to_seconds(clock.predicted_length(1));
+  begin_grid();
+}
+
+// The prior on the grid, and what was observed since the beginning.
+void CyclePosterior::begin_grid() noexcept {
+  begin_deviation_s_ = std::max(begin_deviation_s_, kLeastBeginDeviation_s);
+  length_deviation_s_ = std::max(length_deviation_s_, kLeastLengthDeviation * length_mean_s_);
+  // A length must stay one.
+  length_deviation_s_ = std::min(length_deviation_s_, 0.5 * length_mean_s_ / kLengthSpan);
   contradicted_ = false;
   observed_ = 0;
   for (int i = 0; i < kBeginnings; ++i) {
@@ -82,6 +126,8 @@ void CyclePosterior::begin_cycle(const CardiacClock& clock) noexcept {
 
 void CyclePosterior::add(const ObservedPhase& observed) noexcept {
   kept_[kept_count_++ % kKept] = observed;
+  any_observed_ = true;
+  last_observed_ = observed.time;
   contradicted_ = false;
   if (locked_ && observed.time >= r_peak_) weigh(observed);
 }
@@ -113,6 +159,7 @@ CyclePhase CyclePosterior::phase_of(Instant t, double begin_s, double length_s, 
 double CyclePosterior::contradiction_s(double begin_s, double length_s,
                                        const CycleCorrection& correction) const noexcept {
   if (contradicted_) return kContradicted_s;
+  if (kept_count_ == 0) return 0.0;
   const ObservedPhase& newest = kept_[(kept_count_ - 1) % kKept];
   if (newest.time < r_peak_) return 0.0;
   const double next_s = correction.next_length > Duration::zero() ? to_seconds(correction.next_length) : next_length_s_;
@@ -123,7 +170,7 @@ double CyclePosterior::contradiction_s(double begin_s, double length_s,
 
 CycleCorrection CyclePosterior::correction() const noexcept {
   CycleCorrection correction;
-  if (!locked_ || (observed_ == 0 && !contradicted_)) return correction;
+  if (!locked_ || (observed_ == 0 && !contradicted_ && !carried_)) return correction;
   const double known_until_s = to_seconds(now_ - detector_delay_ - r_peak_);
   std::array<double, kLengths * kBeginnings> log_weights{};
   double best = -std::numeric_limits<double>::infinity();
@@ -131,7 +178,9 @@ CycleCorrection CyclePosterior::correction() const noexcept {
   for (int i = 0; i < kBeginnings; ++i) {
     for (int j = 0; j < kLengths; ++j) {
       const auto k = static_cast<std::size_t>(i * kLengths + j);
-      const double overdue = std::max(0.0, known_until_s - begin_s(i) - length_s(j)) / kMissedBeatDeviation_s;
+      // Where the ECG tells nothing, a beat that it does not tell says nothing.
+      const double overdue =
+          carried_ ? 0.0 : std::max(0.0, known_until_s - begin_s(i) - length_s(j)) / kMissedBeatDeviation_s;
       log_weights[k] = grid_[k].log_likelihood - 0.5 * overdue * overdue;
       if (log_weights[k] <= best) continue;
       best = log_weights[k];
@@ -169,6 +218,8 @@ CycleCorrection CyclePosterior::correction() const noexcept {
     length_variance *= worse;
   }
   correction.beats = beats_;
+  correction.carried = carried_;
+  correction.seen = carried_ && now_ - last_observed_ <= kSeen;
   correction.begin = r_peak_ + from_seconds(begin);
   correction.length = from_seconds(length_mean_s_ + length);
   correction.length_deviation = from_seconds(std::sqrt(length_variance));

@@ -7,28 +7,34 @@
 // heart before its R peak is known. A beat may be known only some frames after it: the observations since then are
 // kept, and taken again for the new cycle.
 //
+// When the ECG tells nothing (the lead is off, or no beat comes), the images carry the phase on: a cycle that has ended
+// by what they show is followed by one whose beginning is that end, for so long as is allowed, and not when they too
+// have told nothing for kBlind.
+//
 // No heap, no locks.
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cycle_correction.hpp"
+#include "core/phase/observed_phase.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
 
-struct ObservedPhase {
-  Instant time;
-  double phase_rad = 0.0;  // any multiple of 2 pi added
-  double deviation_rad = 0.0;
-};
-
 class CyclePosterior {
  public:
-  // Before each frame: the clock as the ECG has it. A beat more begins a new cycle.
+  static constexpr Duration kBlind = std::chrono::seconds(3);
+
+  // `carry` is how long the images may carry the phase on.
+  explicit CyclePosterior(Duration carry = std::chrono::seconds(10)) noexcept : carry_(carry) {}
+
+  // Before each frame: the clock as the ECG has it. A beat more begins a new cycle; while it is not locked, so does the
+  // end of the last as the images show it.
   void follow(const CardiacClock& clock, Instant now) noexcept;
 
   // In order of time. Ignored before the clock is locked.
@@ -50,6 +56,8 @@ class CyclePosterior {
   };
 
   void begin_cycle(const CardiacClock& clock) noexcept;
+  void carry_on(const CardiacClock& clock) noexcept;
+  void begin_grid() noexcept;
   void weigh(const ObservedPhase& observed) noexcept;
   // Phase and rate at an instant if the cycle began then and lasted so long, and the next one too.
   [[nodiscard]] CyclePhase phase_of(Instant t, double begin_s, double length_s, double next_s) const noexcept;
@@ -65,7 +73,13 @@ class CyclePosterior {
     return grid_[static_cast<std::size_t>(i * kLengths + j)];
   }
 
-  bool locked_ = false;
+  Duration carry_;
+  bool locked_ = false;   // there is a running cycle
+  bool carried_ = false;  // the ECG tells nothing
+  Instant carried_since_;
+  int ahead_ = 0;  // cycles since the last known R peak, carried
+  bool any_observed_ = false;
+  Instant last_observed_;
   std::uint64_t beats_ = 0;
   PhaseLawSettings law_;
   Instant now_;

@@ -11,9 +11,6 @@ constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kLongestSystole = 0.75;
 constexpr double kShortestSystole = 0.05;
 
-// Diastasis keeps at least this share of the cycle under the time-locked law, so that the rate stays finite.
-constexpr double kShortestDiastasis = 0.05;
-
 CyclePhase linear(double s, double rr) noexcept { return {kTwoPi * s / rr, kTwoPi / rr, s / rr}; }
 
 CyclePhase warped(const PhaseLawSettings& settings, double s, double rr, double rr_previous) noexcept {
@@ -33,15 +30,9 @@ CyclePhase warped(const PhaseLawSettings& settings, double s, double rr, double 
 }
 
 CyclePhase time_locked(const PhaseLawSettings& settings, double s, double rr) noexcept {
-  double systole = settings.locked_systole.count();
-  double filling = settings.locked_filling.count();
-  const double room = (1.0 - kShortestDiastasis) * rr;
-  const bool stretches = systole + filling > room;
-  if (stretches) {
-    const double scale = room / (systole + filling);
-    systole *= scale;
-    filling *= scale;
-  }
+  const LockedParts parts = locked_parts(settings, Seconds(rr));
+  const double systole = parts.systole.count();
+  const double filling = parts.filling.count();
   const double at_systole = settings.locked_systole_phase_rad;
   const double at_filling = settings.locked_filling_phase_rad;
   const double filling_begins = rr - filling;
@@ -56,7 +47,7 @@ CyclePhase time_locked(const PhaseLawSettings& settings, double s, double rr) no
     result = {at_filling + (kTwoPi - at_filling) * (s - filling_begins) / filling, (kTwoPi - at_filling) / filling,
               1.0};
   }
-  if (stretches) result.length_sensitivity = s / rr;
+  if (parts.stretches) result.length_sensitivity = s / rr;
   return result;
 }
 
@@ -65,6 +56,18 @@ CyclePhase time_locked(const PhaseLawSettings& settings, double s, double rr) no
 Seconds systole_duration(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept {
   const double by_rate = settings.systole_offset_s - settings.systole_slope_s_per_bpm * 60.0 / rr_previous.count();
   return std::max(std::min(Seconds(by_rate), kLongestSystole * rr), kShortestSystole * rr);
+}
+
+LockedParts locked_parts(const PhaseLawSettings& settings, Seconds rr) noexcept {
+  LockedParts parts{settings.locked_systole, settings.locked_filling};
+  const Seconds room = kLongestLockedShare * rr;
+  parts.stretches = parts.systole + parts.filling > room;
+  if (parts.stretches) {
+    const double scale = room / (parts.systole + parts.filling);
+    parts.systole *= scale;
+    parts.filling *= scale;
+  }
+  return parts;
 }
 
 CyclePhase phase_in_cycle(const PhaseLawSettings& settings, Seconds since_r, Seconds rr, Seconds rr_previous) noexcept {

@@ -35,6 +35,9 @@ struct PhaseLawSettings {
   double locked_filling_phase_rad = 2.0 * std::numbers::pi * (1.0 - 130.0 / 863.0);
 };
 
+// Systole and filling take at most this share of the cycle under the time-locked law, so that the rate stays finite.
+inline constexpr double kLongestLockedShare = 0.95;
+
 struct CyclePhase {
   double phase_rad = 0.0;       // [0, 2 pi]
   double rate_rad_per_s = 0.0;  // > 0
@@ -45,6 +48,14 @@ struct CyclePhase {
 
 // Duration of systole under the warped law; always within the cycle.
 [[nodiscard]] Seconds systole_duration(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept;
+
+// Under the time-locked law, in a cycle of length `rr`.
+struct LockedParts {
+  Seconds systole{0.0};    // from the R peak
+  Seconds filling{0.0};    // to the next
+  bool stretches = false;  // the cycle is too short for both
+};
+[[nodiscard]] LockedParts locked_parts(const PhaseLawSettings& settings, Seconds rr) noexcept;
 
 // `since_r` below 0 counts as 0 and above `rr` as `rr`: a cycle does not run past its end. `rr` and `rr_previous` must
 // be positive.

@@ -17,9 +17,10 @@
 namespace perimap {
 
 enum class Rhythm : std::uint8_t {
-  kUnknown,       // too few intervals yet
-  kPredictable,   // sinus rhythm, also with ectopic beats
-  kUnpredictable  // the intervals are random, as in atrial fibrillation: the coming phase cannot be predicted
+  kUnknown,        // too few intervals yet
+  kPredictable,    // sinus rhythm, also with ectopic beats
+  kUnpredictable,  // the intervals are random, as in atrial fibrillation: the coming phase cannot be predicted
+  kEctopic         // ectopic beats prevail, as in bigeminy: hardly a cycle lies between normal beats
 };
 
 class RhythmMonitor {

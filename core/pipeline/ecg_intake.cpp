@@ -1,10 +1,17 @@
 #include "core/pipeline/ecg_intake.hpp"
 
+#include <chrono>
 #include <optional>
 
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
+namespace {
+
+// Between two blocks: shorter than this no beat is hidden.
+constexpr Duration kMissing = std::chrono::milliseconds(100);
+
+}  // namespace
 
 void EcgIntake::push(const EcgBlock& block) noexcept {
   const RealtimeScope realtime;
@@ -19,25 +26,56 @@ void EcgIntake::push(const EcgBlock& block) noexcept {
     counters_.ecg_delay.add(block.arrival - last);
     counters_.last_ecg_ns.set(static_cast<std::uint64_t>(to_ns(last)));
   }
+  if (block.lead_off) counters_.ecg_lead_off.add(block.count);
+  if (!trigger_) find_beats(block);
+}
+
+void EcgIntake::find_beats(const EcgBlock& block) noexcept {
   if (block.lead_off) {
-    counters_.ecg_lead_off.add(block.count);
     detector_.lead_off(block.first_sample_time);
-    classer_.interrupt();
+    interrupt();
+    publish();
     return;
   }
-  bool changed = false;
+  if (any_heard_ && block.first_sample_time - heard_until_ > kMissing) interrupt();
   std::uint64_t flat = 0;
   Instant t = block.first_sample_time;
   for (const float mV : block.samples()) {
-    if (const std::optional<RPeak> peak = detector_.push(t, mV)) {
-      tracker_.on_r_peak(classer_.classify(*peak));
-      changed = true;
-    }
+    if (const std::optional<RPeak> peak = detector_.push(t, mV)) tracker_.on_r_peak(classer_.classify(*peak));
     if (detector_.signal() == EcgSignal::kFlat) ++flat;
+    heard_until_ = t;
     t += block.sample_period;
   }
+  any_heard_ = true;
   if (flat > 0) counters_.ecg_lead_off.add(flat);
-  if (changed) publish();
+  const EcgSignal signal = detector_.signal();
+  if (signal == EcgSignal::kFlat || signal == EcgSignal::kLeadOff) {
+    interrupt();
+  } else {
+    tracker_.heard(heard_until_);
+  }
+  publish();
+}
+
+void EcgIntake::push(const RTriggerPulse& pulse) noexcept {
+  const RealtimeScope realtime;
+  const auto step = static_cast<std::int32_t>(pulse.device_count - next_pulse_);
+  if (any_pulse_ && step > 0) counters_.r_triggers_dropped.add(static_cast<std::uint64_t>(step));
+  any_pulse_ = true;
+  next_pulse_ = pulse.device_count + 1;
+  counters_.r_triggers.add();
+  counters_.r_trigger_delay.add(pulse.arrival - pulse.time);
+  counters_.last_r_trigger_ns.set(static_cast<std::uint64_t>(to_ns(pulse.time)));
+  if (!trigger_) return;
+  const std::optional<RPeak> peak = trigger_->push(pulse.time, pulse.arrival);
+  if (!peak) return;
+  tracker_.on_r_peak(classer_.classify(*peak));
+  publish();
+}
+
+void EcgIntake::interrupt() noexcept {
+  classer_.interrupt();
+  tracker_.interrupt();
 }
 
 void EcgIntake::publish() noexcept {

@@ -1,15 +1,18 @@
-// From ECG samples to the phase clock: what the ECG thread does with each block.
+// From ECG samples or R triggers to the phase clock: what the ECG thread does with each block or pulse.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "core/phase/beat_classer.hpp"
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
 #include "core/phase/r_peak_detector.hpp"
+#include "core/phase/r_trigger.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/realtime/triple_buffer.hpp"
 #include "core/sensors/ecg_block.hpp"
+#include "core/sensors/r_trigger_pulse.hpp"
 
 namespace perimap {
 
@@ -20,23 +23,40 @@ struct ClockCells {
   TripleBuffer<CardiacClock> status;
 };
 
+struct EcgIntakeSettings {
+  CardiacClockSettings clock;
+  std::optional<RTriggerSettings> r_trigger;  // none: the beats are found in the samples
+};
+
 class EcgIntake {
  public:
-  EcgIntake(const CardiacClockSettings& settings, ClockCells& cells, PipelineCounters& counters) noexcept
-      : tracker_(settings), cells_(cells), counters_(counters) {}
+  EcgIntake(const EcgIntakeSettings& settings, ClockCells& cells, PipelineCounters& counters) noexcept
+      : tracker_(settings.clock), cells_(cells), counters_(counters) {
+    if (settings.r_trigger) trigger_.emplace(*settings.r_trigger);
+  }
 
+  // With a trigger, samples are counted and told of, no more.
   void push(const EcgBlock& block) noexcept;
+  // Without a trigger configured, pulses are counted, no more. One thread pushes pulses, another may push samples.
+  void push(const RTriggerPulse& pulse) noexcept;
 
  private:
+  void interrupt() noexcept;
+  void find_beats(const EcgBlock& block) noexcept;
   void publish() noexcept;
 
   RPeakDetector detector_;
+  std::optional<RTrigger> trigger_;
   BeatClasser classer_;
   CardiacClockTracker tracker_;
   ClockCells& cells_;
   PipelineCounters& counters_;
   bool started_ = false;
   std::uint32_t next_device_sequence_ = 0;
+  bool any_heard_ = false;
+  Instant heard_until_;
+  bool any_pulse_ = false;
+  std::uint32_t next_pulse_ = 0;
 };
 
 }  // namespace perimap

@@ -35,12 +35,12 @@ std::uint64_t next_held_frame(std::span<const FeatureSlot> slots, std::uint64_t 
   return next;
 }
 
-// A frame that has left the history, or that lost its phase when the next beat showed that its cycle was none, teaches
-// nothing.
+// A frame teaches nothing when it has left the history, when it lost its phase because the next beat showed that its
+// cycle was none, or when its cycle had an ectopic beat.
 void drop_what_can_not_be_learnt(FeatureSlot& slot, const FrameHistory& history) noexcept {
   while (slot.held.size() > 0) {
     const FrameRecord* frame = history.find(slot.held[0].frame_index);
-    if (frame != nullptr && frame->measurable) return;
+    if (frame != nullptr && frame->measurable && (!frame->phase.exact || frame->phase.teaches)) return;
     slot.held.drop(1);
   }
 }
@@ -73,6 +73,7 @@ void FeatureGroup::plan(const FrameJob& job) noexcept {
     const FrameRecord* frame = job.history->find(held);
     if (frame == nullptr || !frame->measurable) continue;
     if (!frame->phase.exact) break;
+    if (!frame->phase.teaches) continue;
     const int k = plan_.phases.add_learnt(frame->b, frame->b_rate, frame->phase.rate_rad_per_s);
     plan_.learnt[static_cast<std::size_t>(k)] = frame;
   }

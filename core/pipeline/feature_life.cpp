@@ -58,7 +58,10 @@ class Step {
 
   LifeEvent tracked() noexcept {
     if (now() - slot_.last_found_frame > kTrackedMissesAllowed) return give_up();
-    while (slot_.held.size() > 0 && job_.history->find(slot_.held[0].frame_index) == nullptr) slot_.held.drop(1);
+    slot_.held.drop_if([this](const HeldMatch& held) {
+      const FrameRecord* frame = job_.history->find(held.frame_index);
+      return frame == nullptr || (frame->phase.exact && !frame->phase.teaches);
+    });
     const auto wanted = static_cast<std::uint32_t>(settings_.estimator.start_observations);
     if (slot_.held.size() < wanted) return LifeEvent::kNone;
     // The start waits for the end of the last observation's cycle, as all learning does. (A frame that has left the
@@ -96,6 +99,7 @@ class Step {
     slot_.updates = 0;
     slot_.refused_in_a_row = 0;
     slot_.follows_something_else = false;
+    slot_.unseen_frames = 0;
     slot_.state = SlotState::kMapped;
     check_convergence();
     return LifeEvent::kNone;
@@ -105,8 +109,13 @@ class Step {
     // Refusals come up to a cycle late; what the map and this frame's match say of each other is newer.
     const bool refused = slot_.refused_in_a_row >= kRefusalsBeforeLost && !slot_.match_agrees;
     const bool vague = slot_.largest_deviation_mm > kVagueDeviations * settings_.estimator.converged_deviation_mm;
+    if (slot_.last_found_frame == now()) {
+      slot_.unseen_frames = 0;
+    } else if (job_.frame->measurable) {
+      ++slot_.unseen_frames;
+    }
     const std::uint64_t allowed = vague ? kUnobservedVagueFramesBeforeLost : kUnobservedFramesBeforeLost;
-    if (refused || now() - slot_.last_found_frame > allowed) {
+    if (refused || slot_.unseen_frames > allowed) {
       return give_up();
     }
     if (slot_.follows_something_else) {

@@ -50,6 +50,14 @@ class HeldMatches {
     matches_[head_++ % kCapacity] = match;
   }
   void drop(std::uint32_t n) noexcept { tail_ += n < size() ? n : size(); }
+  template <class Condition>
+  void drop_if(Condition condition) noexcept {
+    std::uint32_t kept = tail_;
+    for (std::uint32_t i = tail_; i != head_; ++i) {
+      if (!condition(matches_[i % kCapacity])) matches_[kept++ % kCapacity] = matches_[i % kCapacity];
+    }
+    head_ = kept;
+  }
 
  private:
   static constexpr std::uint32_t kCapacity = 256;  // a power of two, so that the indices may wrap
@@ -83,6 +91,7 @@ struct FeatureSlot {
   PatchContinuity looks;
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   std::uint64_t last_found_frame = 0;
+  std::uint64_t unseen_frames = 0;      // since then, in which it could have been searched for where the map has it
   int stale_matches = 0;                // in a row, of a template that fits the view badly
   int refused_in_a_row = 0;             // found, but at learning the estimate's gate said no
   bool follows_something_else = false;  // refused so often that the patch must be let go

@@ -60,8 +60,7 @@ class FrameHistory {
   // Fills phases and basis of a record, whose pose is set, from the clocks. The basis is computed here, once a frame.
   void set_phase(FrameRecord& record, const CardiacClock& clock, const RespiratoryClock& respiration) noexcept {
     record.phase = clock.at(record.stamp.capture);
-    const bool usable = record.phase.state == PhaseState::kLocked || record.phase.state == PhaseState::kFreeRunning;
-    record.measurable = record.pose.valid() && usable;
+    record.measurable = record.pose.valid() && usable(record.phase.state);
     record.respiration = respiration.at(record.stamp.capture);
     record.pose.position_variance_mm2 =
         record.tracker_variance_mm2 + record.respiration.deviation_mm * record.respiration.deviation_mm;

@@ -35,6 +35,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       respiration_(settings.respiration),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())}),
+      cycle_(settings.image_alone),
       tallies_(static_cast<std::size_t>(team.size())) {
   occupied_.reserve(slots.size());
   for (int g = 0; g < bank_.groups(); ++g) {
@@ -48,8 +49,13 @@ void Mapper::add_pose(const TrackerSample& sample) noexcept {
   if (!poses_.add(sample)) counters_.poses_refused.add();
 }
 
-void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& ecg_clock) noexcept {
+void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& newest_clock) noexcept {
   const RealtimeScope realtime;
+  CardiacClock ecg_clock = newest_clock.as_of(stamp.arrival);
+  if (settings_.law_from_image) {
+    if (ecg_clock.beats() != beats_) law_.on_beat(ecg_clock);
+    ecg_clock = ecg_clock.with_law(law_.law());
+  }
   finish_learning();
   const Instant begun = MonotonicClock::now();
 
@@ -136,6 +142,7 @@ void Mapper::settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept {
   switch (seen.outcome) {
     case ImagePhaseOutcome::kObserved:
       cycle_.add(seen.observed);
+      law_.add(seen.observed);
       counters_.phases_from_image.add();
       break;
     case ImagePhaseOutcome::kContradicts:
@@ -144,7 +151,8 @@ void Mapper::settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept {
     case ImagePhaseOutcome::kCanNotTell:
       break;
   }
-  const CycleCorrection correction = cycle_.correction();
+  CycleCorrection correction = cycle_.correction();
+  if (settings_.law_from_image) correction.law = law_.law();
   phase_cells_.publisher_correction.write(correction);
   phase_cells_.status_correction.write(correction);
 }
@@ -217,8 +225,9 @@ void Mapper::predict_and_find_shard(int worker) noexcept {
 void Mapper::predict_releases(const FrameRecord& frame, const CardiacClock& clock) noexcept {
   for (std::size_t i = 0; i < job_.releases.size(); ++i) {
     const FrameRecord* earlier = history_->find(frame.index - std::min<std::uint64_t>(frame.index, i));
-    const PhaseEstimate at_release = clock.at(earlier->stamp.capture + settings_.latency);
-    const RespiratoryPhase breath = respiration_.clock().at(earlier->stamp.capture + settings_.latency);
+    const Instant valid = earlier->stamp.capture + settings_.latency + settings_.lead;
+    const PhaseEstimate at_release = clock.at(valid);
+    const RespiratoryPhase breath = respiration_.clock().at(valid);
     job_.releases[i] = {earlier->stamp.sequence, basis_at(settings_.estimator.layout, at_release.phase_rad, breath)};
   }
 }

@@ -8,6 +8,7 @@
 #include "core/bank/feature_bank.hpp"
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cycle_posterior.hpp"
+#include "core/phase/law_choice.hpp"
 #include "core/phase/respiratory_tracker.hpp"
 #include "core/pipeline/batch_starter.hpp"
 #include "core/pipeline/feature_finder.hpp"
@@ -44,7 +45,7 @@ class Mapper {
   [[nodiscard]] bool pose_reached(Instant t) const noexcept { return poses_.reached(t); }
 
   // Stages A, B and C. `image` is not used after the return.
-  void process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& ecg_clock) noexcept;
+  void process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& newest_clock) noexcept;
 
   // Stage D of the frame just processed; the workers do it while the mapper waits for the next frame. In lockstep it
   // is done on return.
@@ -97,6 +98,7 @@ class Mapper {
   std::vector<FeatureGroup> groups_;
   ImagePhase image_phase_;
   CyclePosterior cycle_;
+  LawChoice law_;
   FrameJob job_;
   std::vector<WorkerTally> tallies_;
   std::vector<Vector2d> occupied_;

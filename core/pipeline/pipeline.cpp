@@ -8,6 +8,7 @@ namespace {
 ComposerSettings composer_settings(const PipelineSettings& settings) {
   ComposerSettings composer;
   composer.layout = settings.estimator.layout;
+  composer.lead = settings.lead;
   composer.validity = settings.validity;
   composer.maximum_features = static_cast<std::size_t>(settings.features.maximum);
   return composer;
@@ -19,7 +20,7 @@ Pipeline::Pipeline(const PipelineSettings& settings)
     : settings_(settings),
       slots_(static_cast<std::size_t>(settings.features.maximum)),
       cells_(static_cast<std::size_t>(settings.workers)),
-      entrance_(settings.camera.width, settings.camera.height, settings.clock, counters_),
+      entrance_(settings.camera.width, settings.camera.height, {settings.clock, settings.r_trigger}, counters_),
       team_(settings.workers),
       finder_(settings, counters_),
       starter_(settings, slots_),
@@ -79,7 +80,8 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
   }
   phase_cells_.publisher_correction.update();
   phase_cells_.publisher_respiration.update();
-  const CardiacClock corrected = clock.front().corrected(phase_cells_.publisher_correction.front());
+  const CardiacClock corrected =
+      clock.front().as_of(release.deadline).corrected(phase_cells_.publisher_correction.front());
   const SurfaceSample& sample =
       composer_.compose(release, corrected, phase_cells_.publisher_respiration.front(), publisher_view_);
   counters_.samples.add();
@@ -88,11 +90,11 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
   return sample;
 }
 
-CardiacClock Pipeline::status_clock() noexcept {
+CardiacClock Pipeline::status_clock(Instant now) noexcept {
   TripleBuffer<CardiacClock>& clock = entrance_.clocks().status;
   clock.update();
   phase_cells_.status_correction.update();
-  return clock.front().corrected(phase_cells_.status_correction.front());
+  return clock.front().as_of(now).corrected(phase_cells_.status_correction.front());
 }
 
 RespiratoryClock Pipeline::status_respiration() noexcept {

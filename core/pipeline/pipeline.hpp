@@ -45,8 +45,8 @@ class Pipeline {
   // Publisher thread: the surface of one release, with all that is known now. Valid until the next call.
   [[nodiscard]] const SurfaceSample& compose(const Release& release) noexcept;
 
-  // Status thread: the clock with what the image makes of the running cycle.
-  [[nodiscard]] CardiacClock status_clock() noexcept;
+  // Status thread: the clock as it stands, with what the image makes of the running cycle.
+  [[nodiscard]] CardiacClock status_clock(Instant now) noexcept;
   // Status thread.
   [[nodiscard]] RespiratoryClock status_respiration() noexcept;
   // Status thread: each worker's newest snapshot, in order of shard; valid until the next call.

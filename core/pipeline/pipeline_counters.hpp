@@ -25,6 +25,11 @@ struct PipelineCounters {
   Counter ecg_dropped;   // gaps in the device's sequence
   LatencyHistogram ecg_delay;
   Counter last_ecg_ns;
+  // R-trigger thread
+  Counter r_triggers;
+  Counter r_triggers_dropped;  // gaps in the device's count
+  LatencyHistogram r_trigger_delay;
+  Counter last_r_trigger_ns;
   // mapper thread
   Counter frames;
   Counter frames_without_pose;

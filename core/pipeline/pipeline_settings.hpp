@@ -1,11 +1,14 @@
 // How the pipeline is set up; plain values, filled by the daemon from its configuration.
 #pragma once
 
+#include <optional>
+
 #include "core/estimation/batch_start.hpp"
 #include "core/estimation/iterated_update.hpp"
 #include "core/geometry/camera_model.hpp"
 #include "core/periodic/basis.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
+#include "core/phase/r_trigger.hpp"
 #include "core/phase/respiratory_tracker.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/time/instant.hpp"
@@ -32,15 +35,19 @@ struct PipelineSettings {
   CameraModel camera;
   PoseHistorySettings pose;
   CardiacClockSettings clock;
+  std::optional<RTriggerSettings> r_trigger;  // R peaks come from a trigger, not from the ECG's samples
   RespirationSettings respiration;
   FeatureSettings features;
   EstimatorSettings estimator;
   int workers = 2;
   Duration latency = std::chrono::milliseconds(50);  // L: release minus capture
+  Duration lead{0};                                  // valid time minus release
   Duration budget = std::chrono::milliseconds(12);   // kept free for A to C before the release
   Duration validity = std::chrono::milliseconds(200);
   bool phase_from_image = true;
-  int adoption_delay_frames = 15;  // D, for batch starts
+  bool law_from_image = false;                      // clock.law holds until the images show another
+  Duration image_alone = std::chrono::seconds(10);  // the images carry the phase on so long without the ECG
+  int adoption_delay_frames = 15;                   // D, for batch starts
   // Lockstep: nothing is shed and every housekeeping result is there at its stated frame, so that a replay gives the
   // same samples every time.
   bool lockstep = false;

@@ -13,13 +13,13 @@ constexpr std::size_t kPoseRing = 256;  // more than a second of a fast tracker
 
 }  // namespace
 
-SensorEntrance::SensorEntrance(int width, int height, const CardiacClockSettings& clock, PipelineCounters& counters)
+SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& ecg, PipelineCounters& counters)
     : counters_(counters),
       pool_(width, height, kFrameBuffers),
       mapper_frames_(kFrameBuffers),
       publisher_stamps_(kStampRing),
       poses_(kPoseRing),
-      ecg_(clock, clocks_, counters) {}
+      ecg_(ecg, clocks_, counters) {}
 
 bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept {
   const RealtimeScope realtime;

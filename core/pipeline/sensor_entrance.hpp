@@ -11,20 +11,23 @@
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "core/sensors/r_trigger_pulse.hpp"
 #include "core/sensors/tracker_sample.hpp"
 
 namespace perimap {
 
-// push_frame() belongs to the camera thread, push_pose() to the tracker thread, push_ecg() to the ECG thread; one
-// thread may be all three. None of them blocks or allocates. What does not fit is counted, never waited for.
+// push_frame() belongs to the camera thread, push_pose() to the tracker thread, push_ecg() to the ECG thread,
+// push_r_trigger() to that of a trigger line; one thread may be all of them. None of them blocks or allocates. What
+// does not fit is counted, never waited for.
 class SensorEntrance {
  public:
-  SensorEntrance(int width, int height, const CardiacClockSettings& clock, PipelineCounters& counters);
+  SensorEntrance(int width, int height, const EcgIntakeSettings& ecg, PipelineCounters& counters);
 
   // Copies the pixels. False when the frame was dropped: no free buffer, or another size than the pipeline's.
   bool push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept;
   void push_pose(const TrackerSample& sample) noexcept;
   void push_ecg(const EcgBlock& block) noexcept { ecg_.push(block); }
+  void push_r_trigger(const RTriggerPulse& pulse) noexcept { ecg_.push(pulse); }
 
   // Mapper side.
   [[nodiscard]] bool pop_frame(FrameHandle& frame) noexcept { return mapper_frames_.pop(frame); }

@@ -11,17 +11,21 @@ namespace perimap {
 namespace {
 
 // The first thing that is wrong, worst first.
-SurfaceReason reason_of(const PhaseEstimate& phase, bool breath_unknown, bool mapped, bool frame_missing, bool late,
-                        bool pose_missing) noexcept {
+SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, bool breath_unknown, bool mapped, bool frame_missing,
+                        bool late, bool pose_missing) noexcept {
   if (phase.state == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;
   if (phase.state == PhaseState::kLost) return SurfaceReason::kPhaseLost;
   if (!mapped) return SurfaceReason::kNothingMapped;
   if (breath_unknown) return SurfaceReason::kRespirationUnknown;
   if (phase.state == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
   if (phase.contradicted) return SurfaceReason::kPhaseContradicted;
+  if (phase.state == PhaseState::kFromImage) return SurfaceReason::kPhaseFromImage;
   if (frame_missing) return SurfaceReason::kFrameMissing;
   if (late) return SurfaceReason::kUpdateLate;
   if (pose_missing) return SurfaceReason::kPoseMissing;
+  if (phase.ectopic) return SurfaceReason::kEctopicBeat;
+  if (rhythm == Rhythm::kUnpredictable) return SurfaceReason::kRhythmUnpredictable;
+  if (rhythm == Rhythm::kEctopic) return SurfaceReason::kRhythmEctopic;
   return SurfaceReason::kNone;
 }
 
@@ -51,7 +55,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   const RealtimeScope realtime;
   ++sample_.sample_sequence;
   sample_.release = release;
-  sample_.valid_time = release.deadline;
+  sample_.valid_time = release.deadline + settings_.lead;
   sample_.valid_until = sample_.valid_time + settings_.validity;
 
   order_.clear();
@@ -75,10 +79,11 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   sample_.cardiac_phase_rate_rad_per_s = phase.rate_rad_per_s;
   const bool late = oldest < release.frame_sequence && !release.frame_missing;
   sample_.update_late = late;
-  sample_.reason = reason_of(phase, respiration.unknown(), !order_.empty(), release.frame_missing, late, pose_missing);
+  sample_.reason = reason_of(phase, clock.rhythm(), respiration.unknown(), !order_.empty(), release.frame_missing, late,
+                             pose_missing);
   sample_.state = state_of(sample_.reason);
 
-  const bool phase_usable = phase.state == PhaseState::kLocked || phase.state == PhaseState::kFreeRunning;
+  const bool phase_usable = usable(phase.state);
   const RespiratoryPhase breath = respiration.at(sample_.valid_time);
   const Basis b = basis_at(settings_.layout, phase.phase_rad, breath);
   const BasesAbout about = bases_about(settings_.layout, phase, breath);

@@ -15,6 +15,7 @@ namespace perimap {
 
 struct ComposerSettings {
   BasisLayout layout;
+  Duration lead{0};                                    // valid time minus release
   Duration validity = std::chrono::milliseconds(200);  // a sample must not be used longer after its valid time
   std::size_t maximum_features = 0;
 };

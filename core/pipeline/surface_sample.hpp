@@ -22,7 +22,11 @@ enum class SurfaceReason : std::uint8_t {
   kUpdateLate,
   kPoseMissing,
   kPhaseContradicted,
-  kRespirationUnknown
+  kRespirationUnknown,
+  kPhaseFromImage,
+  kEctopicBeat,
+  kRhythmUnpredictable,
+  kRhythmEctopic
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost };

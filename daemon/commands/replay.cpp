@@ -58,7 +58,7 @@ class ReplayPublication final : public Publication {
     if (recorder_ != nullptr) recorder_->surface(sample);
     if (dds_ != nullptr) dds_->surface(sample);
     if (!accuracy_) return;
-    if (!to_recording_ && sample.state == perimap_SURFACE_GOOD) {
+    if (!to_recording_ && rests_on_its_frame(sample.reason)) {
       to_recording_ = truth_->to_recording(sample.frame_sequence, from_ns(sample.capture_time_ns));
     }
     accuracy_->add(sample);

@@ -171,6 +171,7 @@ struct Options {
   double duration_s = 60.0;
   std::string size = "640x480";
   std::optional<double> ecg_start_s;
+  std::vector<std::string> ecg_off;
   double respiration_period_s = 4.0;
   double tracker_correlation_s = 0.0;
   double tracker_noise_mm = 1.4;
@@ -179,6 +180,21 @@ struct Options {
   unsigned threads = 0;
   bool force = false;
 };
+
+// "BEGIN:LENGTH", s.
+Expected<SimulationSettings::EcgOff> parse_ecg_off(const std::string& text) {
+  const char* end = text.data() + text.size();
+  double begin_s = 0.0;
+  double length_s = 0.0;
+  const auto begin = std::from_chars(text.data(), end, begin_s);
+  if (begin.ec == std::errc{} && begin.ptr != end && *begin.ptr == ':') {
+    const auto length = std::from_chars(begin.ptr + 1, end, length_s);
+    const bool sound = begin_s >= 0.0 && length_s > 0.0 && begin_s + length_s < 1e6;
+    if (length.ec == std::errc{} && length.ptr == end && sound)
+      return SimulationSettings::EcgOff{from_seconds(begin_s), from_seconds(length_s)};
+  }
+  return fail(fmt::format("ECG off: expected BEGIN:LENGTH in seconds, such as 30:10, found '{}'", text));
+}
 
 Expected<void> parse_size(const std::string& text, SimulationSettings& settings) {
   const char* end = text.data() + text.size();
@@ -219,6 +235,11 @@ int run(Options options) {
   options.settings.duration = from_seconds(options.duration_s);
   options.settings.respiration_period = from_seconds(options.respiration_period_s);
   options.settings.tracker_correlation = from_seconds(options.tracker_correlation_s);
+  for (const std::string& text : options.ecg_off) {
+    const auto off = parse_ecg_off(text);
+    if (!off) return complain(off.error(), 2);
+    options.settings.ecg_off.push_back(*off);
+  }
   if (options.ecg_start_s) options.settings.ecg_start = from_seconds(*options.ecg_start_s);
   const std::vector<SimulatedRecording> recordings = planned(options);
   for (const SimulatedRecording& recording : recordings) {
@@ -262,12 +283,10 @@ std::string simulated_configuration(const Simulation& simulation, const TrackerN
       "{}"
       "hand_eye_translation_SC_mm = [{:#}, {:#}, {:#}]\n"
       "hand_eye_rotation_SC_wxyz = [{:#}, {:#}, {:#}, {:#}]\n\n"
-      "[phase]\n"
-      "law = \"{}\"\n"
       "{}",
       noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
       correlation_s > 0.0 ? fmt::format("error_correlation_s = {:#}\n", correlation_s) : "", X_SC.t.x(), X_SC.t.y(),
-      X_SC.t.z(), q[0], q[1], q[2], q[3], law_name(simulation.settings().law),
+      X_SC.t.z(), q[0], q[1], q[2], q[3],
       simulation.settings().respiration_mm > 0.0 ? "\n[respiration]\nenabled = true\n" : "");
 }
 
@@ -323,6 +342,7 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
                        " (100 nearly regular, 105 noisy, 106 and 119 bigeminy, 123 slow)")
       ->capture_default_str();
   command->add_option("--ecg-start", options->ecg_start_s, "Where in the record to start, s [chosen by the seed]");
+  command->add_option("--ecg-off", options->ecg_off, "The electrode is off, BEGIN:LENGTH in s; may be repeated");
   const std::map<std::string, MotionLaw> laws{
       {"linear", MotionLaw::kLinear}, {"warped", MotionLaw::kWarped}, {"time-locked", MotionLaw::kTimeLocked}};
   command

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/phase/phase_law.hpp"
+#include "core/phase/rr_predictor.hpp"
 #include "core/time/instant.hpp"
 #include "drivers/image/pixel_format.hpp"
 
@@ -77,14 +78,19 @@ struct EcgConfiguration {
   double can_sample_rate_hz = 360.0;
   int can_identifier = 0x2E0;
   bool can_extended = false;
+  bool r_trigger = false;  // R peaks come from a trigger line, not from the samples
+  Duration r_trigger_delay{0};
+  Duration r_trigger_deviation = std::chrono::milliseconds(4);
 
   bool operator==(const EcgConfiguration&) const = default;
 };
 
 struct PhaseConfiguration {
-  PhaseLaw law = PhaseLaw::kLinear;
+  std::optional<PhaseLaw> law;                    // none: by what the images show
   Duration lost_after = std::chrono::seconds(3);  // without an R peak
   bool from_image = true;
+  Duration image_alone = std::chrono::seconds(10);  // without the ECG
+  RrMethod predictor = RrMethod::kAutoregressive;
 
   bool operator==(const PhaseConfiguration&) const = default;
 };
@@ -103,6 +109,7 @@ struct PipelineConfiguration {
 
   Release release = Release::kFrame;
   Duration latency = std::chrono::milliseconds(50);  // L: release minus capture
+  Duration lead{0};                                  // valid time minus release
   Duration budget = std::chrono::milliseconds(12);   // computing time kept free before the release
   int workers = 2;
   int adoption_delay_frames = 15;  // D: from a housekeeping request to the frame that adopts its result

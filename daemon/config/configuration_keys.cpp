@@ -404,6 +404,7 @@ void add_tracker(std::vector<ConfigurationKey>& keys) {
 }
 
 void add_ecg(std::vector<ConfigurationKey>& keys) {
+  const auto ms = std::chrono::milliseconds(1);
   using Protocol = EcgConfiguration::Protocol;
   const std::array<std::pair<std::string_view, Protocol>, 5> protocols{{{"none", Protocol::kNone},
                                                                         {"medlab", Protocol::kMedlab},
@@ -420,20 +421,36 @@ void add_ecg(std::vector<ConfigurationKey>& keys) {
       .number("can_sample_rate_hz", 50, 4000, PERIMAP_MEMBER(ecg.can_sample_rate_hz), "samples a second over can")
       .integer("can_identifier", 0, 0x1FFFFFFF, PERIMAP_MEMBER(ecg.can_identifier),
                "identifier of the frames of config/perimap_ecg.dbc")
-      .flag("can_extended", PERIMAP_MEMBER(ecg.can_extended), "the identifier has 29 bits");
+      .flag("can_extended", PERIMAP_MEMBER(ecg.can_extended), "the identifier has 29 bits")
+      .flag("r_trigger", PERIMAP_MEMBER(ecg.r_trigger),
+            "R peaks come from a monitor's trigger line; samples are then not looked at")
+      .duration("r_trigger_delay_ms", ms, -500, 500, PERIMAP_MEMBER(ecg.r_trigger_delay),
+                "of the trigger after the R peak, as measured for the monitor")
+      .duration("r_trigger_deviation_ms", ms, 0.1, 100, PERIMAP_MEMBER(ecg.r_trigger_deviation),
+                "standard deviation of that delay from beat to beat");
 }
 
 void add_estimation(std::vector<ConfigurationKey>& keys) {
   const auto ms = std::chrono::milliseconds(1);
   const auto s = std::chrono::seconds(1);
-  const std::array<std::pair<std::string_view, PhaseLaw>, 3> laws{
-      {{"linear", PhaseLaw::kLinear}, {"warped", PhaseLaw::kWarped}, {"time-locked", PhaseLaw::kTimeLocked}}};
+  const std::array<std::pair<std::string_view, std::optional<PhaseLaw>>, 4> laws{
+      {{"auto", std::nullopt},
+       {"linear", PhaseLaw::kLinear},
+       {"warped", PhaseLaw::kWarped},
+       {"time-locked", PhaseLaw::kTimeLocked}}};
+  const std::array<std::pair<std::string_view, RrMethod>, 3> predictors{
+      {{"ar", RrMethod::kAutoregressive}, {"mean", RrMethod::kMeanOf8}, {"previous", RrMethod::kPrevious}}};
   Section("phase", keys)
-      .choice("law", laws, PERIMAP_MEMBER(phase.law), "how the phase runs from one R peak to the next")
+      .choice("law", laws, PERIMAP_MEMBER(phase.law),
+              "how the phase runs from one R peak to the next; auto: as the images show")
       .duration("lost_after_s", s, 0.5, 60, PERIMAP_MEMBER(phase.lost_after),
                 "without an R peak for so long the phase is lost")
       .flag("from_image", PERIMAP_MEMBER(phase.from_image),
-            "corrects the running cycle by what the features' motion in the image tells");
+            "corrects the running cycle by what the features' motion in the image tells")
+      .duration("image_alone_s", s, 0, 3600, PERIMAP_MEMBER(phase.image_alone),
+                "without the ECG the images carry the phase on for so long, then it is lost")
+      .choice("predictor", predictors, PERIMAP_MEMBER(phase.predictor),
+              "what the next cycle's length is predicted from: autoregression, the mean of eight, the last");
   Section("respiration", keys)
       .flag("enabled", PERIMAP_MEMBER(respiration.enabled),
             "breathing is part of the motion model; its phase comes from the images")
@@ -448,6 +465,7 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
       .choice("release", releases, PERIMAP_MEMBER(pipeline.release), "what the release follows: each camera frame",
               " (\"clock\" is not available in this version)")
       .duration("latency_ms", ms, 1, 1000, PERIMAP_MEMBER(pipeline.latency), "release minus capture")
+      .duration("lead_ms", ms, 0, 1000, PERIMAP_MEMBER(pipeline.lead), "valid time of a surface minus its release")
       .duration("budget_ms", ms, 0.1, 1000, PERIMAP_MEMBER(pipeline.budget),
                 "computing time kept free before the release; less than latency_ms")
       .integer("workers", 1, 64, PERIMAP_MEMBER(pipeline.workers), "worker threads")

@@ -14,12 +14,28 @@ perimap_PhaseState to_wire(PhaseState state) noexcept {
       return perimap_PHASE_LOCKED;
     case PhaseState::kFreeRunning:
       return perimap_PHASE_FREE_RUNNING;
+    case PhaseState::kFromImage:
+      return perimap_PHASE_FROM_IMAGE;
     case PhaseState::kLost:
       return perimap_PHASE_LOST;
     case PhaseState::kUnknown:
       return perimap_PHASE_UNKNOWN;
   }
   return perimap_PHASE_UNKNOWN;
+}
+
+perimap_Rhythm to_wire(Rhythm rhythm) noexcept {
+  switch (rhythm) {
+    case Rhythm::kPredictable:
+      return perimap_RHYTHM_PREDICTABLE;
+    case Rhythm::kUnpredictable:
+      return perimap_RHYTHM_UNPREDICTABLE;
+    case Rhythm::kEctopic:
+      return perimap_RHYTHM_ECTOPIC;
+    case Rhythm::kUnknown:
+      break;
+  }
+  return perimap_RHYTHM_UNKNOWN;
 }
 
 perimap_PhaseLaw to_wire(PhaseLaw law) noexcept {
@@ -45,6 +61,11 @@ perimap_PhaseClock to_wire(const CardiacClock& clock, Instant now) noexcept {
   wire.length_deviation_ns = cycle.length_deviation.count();
   wire.systole_ns = cycle.systole.count();
   wire.systole_fraction = clock.law().systole_fraction;
+  const LockedParts locked = locked_parts(clock.law(), Seconds(cycle.length));
+  wire.locked_systole_ns = from_seconds(locked.systole.count()).count();
+  wire.locked_filling_ns = from_seconds(locked.filling.count()).count();
+  wire.locked_systole_phase_rad = clock.law().locked_systole_phase_rad;
+  wire.locked_filling_phase_rad = clock.law().locked_filling_phase_rad;
   return wire;
 }
 
@@ -203,6 +224,8 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.messages_recorded = facts.recording.recorded;
   wire_.frames_not_recorded = facts.recording.frames_not_recorded;
   wire_.other_not_recorded = facts.recording.other_not_recorded;
+  wire_.phase_state = to_wire(facts.phase);
+  wire_.rhythm = to_wire(facts.rhythm);
 
   sources_[0] = source_status(perimap_SOURCE_CAMERA, facts, facts.camera, now, c.frames_received.get(),
                               c.frames_dropped.get(), 0, c.last_frame_ns, c.camera_delay);
@@ -211,7 +234,12 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
                               c.tracker_delay);
   sources_[2] = source_status(perimap_SOURCE_ECG, facts, facts.ecg, now, c.ecg_samples.get(), c.ecg_dropped.get(),
                               c.ecg_lead_off.get(), c.last_ecg_ns, c.ecg_delay);
-  wire_.sources = {kSources, kSources, sources_, false};
+  std::uint32_t sources = kSources - 1;
+  if (facts.r_trigger) {
+    sources_[sources++] = source_status(perimap_SOURCE_R_TRIGGER, facts, {}, now, c.r_triggers.get(),
+                                        c.r_triggers_dropped.get(), 0, c.last_r_trigger_ns, c.r_trigger_delay);
+  }
+  wire_.sources = {sources, sources, sources_, false};
 
   stages_[0] = stage_latency(perimap_STAGE_PREDICT_AND_FIND, c.predict_and_find);
   stages_[1] = stage_latency(perimap_STAGE_PHASE_AND_POSE, c.phase_and_pose);

@@ -65,6 +65,9 @@ struct StatusFacts {
   RespirationState respiration = RespirationState::kOff;
   bool respiration_suspected = false;
   RecordingFacts recording;
+  PhaseState phase = PhaseState::kUnknown;
+  Rhythm rhythm = Rhythm::kUnknown;
+  bool r_trigger = false;           // R peaks come from a trigger line
   SourceLink camera, tracker, ecg;  // as they are without a device: open, and without jitter
 };
 
@@ -75,7 +78,7 @@ class WireStatus {
                                            Instant now) noexcept;
 
  private:
-  static constexpr std::size_t kSources = 3;
+  static constexpr std::size_t kSources = 4;
   static constexpr std::size_t kStages = 7;
   perimap_SourceStatus sources_[kSources]{};
   perimap_StageLatency stages_[kStages]{};

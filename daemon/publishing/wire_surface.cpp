@@ -42,6 +42,14 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_PHASE_CONTRADICTED;
     case SurfaceReason::kRespirationUnknown:
       return perimap_SURFACE_REASON_RESPIRATION_UNKNOWN;
+    case SurfaceReason::kPhaseFromImage:
+      return perimap_SURFACE_REASON_PHASE_FROM_IMAGE;
+    case SurfaceReason::kEctopicBeat:
+      return perimap_SURFACE_REASON_ECTOPIC_BEAT;
+    case SurfaceReason::kRhythmUnpredictable:
+      return perimap_SURFACE_REASON_RHYTHM_UNPREDICTABLE;
+    case SurfaceReason::kRhythmEctopic:
+      return perimap_SURFACE_REASON_RHYTHM_ECTOPIC;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }

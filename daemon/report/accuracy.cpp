@@ -34,18 +34,23 @@ ErrorFigures figures_of(std::vector<double> errors) {
 // Collects errors into stretches that follow one another.
 class Spans {
  public:
-  explicit Spans(std::vector<double> edges) : edges_(std::move(edges)), errors_(edges_.size()), last_(edges_.size()) {}
+  explicit Spans(std::vector<double> edges)
+      : edges_(std::move(edges)), errors_(edges_.size()), nees_(edges_.size()), last_(edges_.size()) {}
 
   void add_sample(double t, std::size_t converged) {
     if (const auto i = index(t)) last_[*i] = converged;
   }
-  void add_error(double t, double error) {
-    if (const auto i = index(t)) errors_[*i].push_back(error);
+  void add_error(double t, double error, double nees) {
+    const auto i = index(t);
+    if (!i) return;
+    errors_[*i].push_back(error);
+    nees_[*i] += nees;
   }
   [[nodiscard]] std::vector<ErrorSpan> figures() const {
     std::vector<ErrorSpan> spans;
     for (std::size_t i = 0; i + 1 < edges_.size(); ++i) {
-      spans.push_back({edges_[i], edges_[i + 1], figures_of(errors_[i]), last_[i]});
+      const double nees = errors_[i].empty() ? 0.0 : nees_[i] / static_cast<double>(errors_[i].size());
+      spans.push_back({edges_[i], edges_[i + 1], figures_of(errors_[i]), nees, last_[i]});
     }
     return spans;
   }
@@ -59,6 +64,7 @@ class Spans {
 
   std::vector<double> edges_;
   std::vector<std::vector<double>> errors_;
+  std::vector<double> nees_;  // sums
   std::vector<std::size_t> last_;
 };
 
@@ -169,8 +175,9 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
       const Vector3d p_true = truth_.position(point->second, valid_time);
       const Vector3d e = feature.p_W_mm - p_true;
       const double error = e.norm();
-      seconds.add_error(t, error);
-      cycles.add_error(t, error);
+      const double nees = e.dot(feature.P_mm2.ldlt().solve(e)) / 3.0;
+      seconds.add_error(t, error, nees);
+      cycles.add_error(t, error, nees);
       feature_errors[feature.id].push_back(error);
       if (feature.converged && sample.state == perimap_SURFACE_GOOD) {
         ++report.good.count;
@@ -183,7 +190,7 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
       }
       if (t >= kSettledAfter_s) {
         settled.push_back(error);
-        nees_sum += e.dot(feature.P_mm2.ldlt().solve(e)) / 3.0;
+        nees_sum += nees;
       }
       if (t >= end_s - kPathLength_s) {
         paths[feature.id].published.push_back(feature.p_W_mm);

@@ -30,6 +30,7 @@ struct ErrorSpan {
   double begin_s = 0.0;  // from the first frame
   double end_s = 0.0;
   ErrorFigures error;
+  double mean_nees = 0.0;     // as AccuracyReport::mean_nees
   std::size_t converged = 0;  // features in state converged in the last sample of the stretch
 };
 

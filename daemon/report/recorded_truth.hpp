@@ -1,6 +1,8 @@
 // The ground truth of a simulated recording, and the clock on which it was published.
 #pragma once
 
+#include <perimap.h>
+
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -27,6 +29,12 @@ struct RecordedTruth {
     return capture->second - published_capture;
   }
 };
+
+// The surface says of nothing that hides whether its frame came, so that its capture is the frame's own.
+[[nodiscard]] constexpr bool rests_on_its_frame(perimap_SurfaceReason reason) noexcept {
+  return reason == perimap_SURFACE_REASON_NONE || reason == perimap_SURFACE_REASON_ECTOPIC_BEAT ||
+         reason == perimap_SURFACE_REASON_RHYTHM_UNPREDICTABLE || reason == perimap_SURFACE_REASON_RHYTHM_ECTOPIC;
+}
 
 // Nothing when the recording has no ground truth (it is not a simulated one).
 [[nodiscard]] Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, ReadMode mode);

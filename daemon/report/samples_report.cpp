@@ -66,9 +66,7 @@ Expected<SamplesReport> report_samples(const std::string& recording, const std::
     if (surface.reason == perimap_SURFACE_REASON_FRAME_MISSING) ++report.without_frame;
     const bool behind = surface.oldest_shard_frame_sequence < surface.frame_sequence;
     if (behind && surface.reason != perimap_SURFACE_REASON_FRAME_MISSING) ++report.from_late_update;
-    if (!to_recording && surface.state != perimap_SURFACE_INVALID &&
-        surface.reason != perimap_SURFACE_REASON_FRAME_MISSING &&
-        surface.reason != perimap_SURFACE_REASON_PHASE_FREE_RUNNING) {
+    if (!to_recording && rests_on_its_frame(surface.reason)) {
       to_recording = (*truth)->to_recording(surface.frame_sequence, from_ns(surface.capture_time_ns));
     }
     accuracy.add(surface);

@@ -127,7 +127,7 @@ void LiveRuntime::run_status() {
   for (;;) {
     const bool last = stopping_.load(std::memory_order_relaxed);
     const Instant now = MonotonicClock::now();
-    const CardiacClock clock = pipeline_.status_clock();
+    const CardiacClock clock = pipeline_.status_clock(now);
     const RespiratoryClock respiration = pipeline_.status_respiration();
     publication_.phase(wire_phase_.fill(clock, now));
     if (last || now >= next_model) {
@@ -138,6 +138,9 @@ void LiveRuntime::run_status() {
     StatusFacts told = facts();
     told.respiration = respiration.state;
     told.respiration_suspected = respiration.suspected;
+    told.phase = clock.at(now).state;
+    told.rhythm = clock.rhythm();
+    told.r_trigger = pipeline_.settings().r_trigger.has_value();
     if (describe_sources_) describe_sources_(told);
     // A device that goes or comes is told at once.
     const int closed = (told.camera.closed ? 1 : 0) | (told.tracker.closed ? 2 : 0) | (told.ecg.closed ? 4 : 0);

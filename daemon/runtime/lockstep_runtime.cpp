@@ -95,7 +95,7 @@ void LockstepRuntime::release() {
 }
 
 void LockstepRuntime::publish_reports(Instant now) {
-  const CardiacClock clock = pipeline_.status_clock();
+  const CardiacClock clock = pipeline_.status_clock(now);
   publication_.phase(wire_phase_.fill(clock, now));
   const RespiratoryClock respiration = pipeline_.status_respiration();
   publication_.surface_model(
@@ -104,6 +104,9 @@ void LockstepRuntime::publish_reports(Instant now) {
   facts.latency = pipeline_.settings().latency;
   facts.respiration = respiration.state;
   facts.respiration_suspected = respiration.suspected;
+  facts.phase = clock.at(now).state;
+  facts.rhythm = clock.rhythm();
+  facts.r_trigger = pipeline_.settings().r_trigger.has_value();
   facts.stalled_after = std::chrono::milliseconds(500);
   publication_.status(wire_status_.fill(pipeline_.counters(), facts, now));
 }

@@ -67,8 +67,12 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.pose.error_correlation = c.tracker.error_correlation;
   s.pose.time_offset = c.tracker.time_offset;
   s.pose.maximum_extrapolation = c.tracker.maximum_extrapolation;
-  s.clock.law.law = c.phase.law;
+  s.clock.law.law = c.phase.law.value_or(PhaseLaw::kLinear);
+  s.law_from_image = !c.phase.law && c.phase.from_image;
   s.clock.lost_after = c.phase.lost_after;
+  s.clock.predictor = c.phase.predictor;
+  s.image_alone = c.phase.image_alone;
+  if (c.ecg.r_trigger) s.r_trigger = RTriggerSettings{c.ecg.r_trigger_delay, c.ecg.r_trigger_deviation};
   s.respiration.enabled = c.respiration.enabled;
   s.respiration.search.shortest_period = c.respiration.shortest_period;
   s.respiration.search.longest_period = c.respiration.longest_period;
@@ -93,6 +97,7 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.estimator.converged_deviation_mm = converged_deviation_mm(c);
   s.workers = c.pipeline.workers;
   s.latency = c.pipeline.latency;
+  s.lead = c.pipeline.lead;
   s.budget = c.pipeline.budget;
   s.validity = c.dds.surface_lifespan > Duration(0) ? c.dds.surface_lifespan : s.validity;
   s.adoption_delay_frames = c.pipeline.adoption_delay_frames;

@@ -29,8 +29,9 @@ std::string_view name_of(perimap_SurfaceState state) {
 }
 
 std::string_view name_of(perimap_SurfaceReason reason) {
-  return name_in<10>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
-                      "update_late", "pose_missing", "phase_contradicted", "respiration_unknown"},
+  return name_in<14>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
+                      "update_late", "pose_missing", "phase_contradicted", "respiration_unknown", "phase_from_image",
+                      "ectopic_beat", "rhythm_unpredictable", "rhythm_ectopic"},
                      static_cast<int>(reason));
 }
 
@@ -53,6 +54,14 @@ std::string_view name_of(perimap_RespirationState state) {
 
 std::string_view name_of(perimap_RecordingState state) {
   return name_in<3>({"off", "on", "stopped"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_PhaseState state) {
+  return name_in<5>({"unknown", "locked", "free_running", "lost", "from_image"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_Rhythm rhythm) {
+  return name_in<4>({"unknown", "predictable", "unpredictable", "ectopic"}, static_cast<int>(rhythm));
 }
 
 std::string_view name_of(perimap_Privilege privilege) {
@@ -110,6 +119,8 @@ Json status_json(const StatusDigest& digest) {
                {"frames_without_pose", status.frames_without_pose},
                {"frames_without_phase", status.frames_without_phase},
                {"phases_from_image", status.phases_from_image},
+               {"phase", name_of(status.phase_state)},
+               {"rhythm", name_of(status.rhythm)},
                {"respiration", name_of(status.respiration)},
                {"respiration_suspected", status.respiration_suspected},
                {"recording", name_of(status.recording)},

@@ -152,7 +152,7 @@ Expected<std::unique_ptr<ModemPort>> open_modem_port(const std::string& path, Mo
   return port;
 }
 
-std::optional<RTrigger> TriggerEdges::take(const ModemPort::Line& line, bool woken, Instant now) noexcept {
+std::optional<RTriggerPulse> TriggerEdges::take(const ModemPort::Line& line, bool woken, Instant now) noexcept {
   const std::uint32_t changes = line.changes - changes_;
   changes_ = line.changes;
   if (changes == 0) return std::nullopt;
@@ -168,7 +168,7 @@ std::optional<RTrigger> TriggerEdges::take(const ModemPort::Line& line, bool wok
   }
   last_ = now;
   health_.samples.add();
-  return RTrigger{now - settings_.delay, now, ++count_};
+  return RTriggerPulse{now, now, ++count_};
 }
 
 void serve_modem_line_trigger(const ModemTriggerSettings& settings, const RTriggerSink& sink, DeviceHealth& health,

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "core/error/expected.hpp"
+#include "core/sensors/r_trigger_pulse.hpp"
 #include "core/time/instant.hpp"
 #include "drivers/device/device_health.hpp"
 #include "drivers/transport/interrupt.hpp"
@@ -24,16 +25,11 @@ struct ModemTriggerSettings {
   std::string path;
   ModemLine line = ModemLine::kCarrierDetect;
   bool rising = true;                                           // the line goes on at the R peak; otherwise off
-  Duration delay{0};                                            // of the edge after the R peak
   Duration shortest_interval = std::chrono::milliseconds(200);  // 300 beats a minute; what is closer is a bounce
 };
 
-struct RTrigger {
-  Instant r_peak;
-  Instant arrival;
-  std::uint64_t count = 0;  // rises by one a trigger, over all openings
-};
-using RTriggerSink = std::function<void(const RTrigger&)>;
+// The pulses' count rises by one a trigger, over all openings.
+using RTriggerSink = std::function<void(const RTriggerPulse&)>;
 
 // The few calls by which the line is watched: the seam between what the kernel does and what we make of it.
 class ModemPort {
@@ -61,13 +57,13 @@ class TriggerEdges {
   // The line as it is found at an opening.
   void restart(const ModemPort::Line& line) noexcept { changes_ = line.changes; }
   // As it is at `now`, right after a wait that did or did not end by a change.
-  [[nodiscard]] std::optional<RTrigger> take(const ModemPort::Line& line, bool woken, Instant now) noexcept;
+  [[nodiscard]] std::optional<RTriggerPulse> take(const ModemPort::Line& line, bool woken, Instant now) noexcept;
 
  private:
   ModemTriggerSettings settings_;
   DeviceHealth& health_;
   std::uint32_t changes_ = 0;
-  std::uint64_t count_ = 0;
+  std::uint32_t count_ = 0;
   Instant last_{};
 };
 

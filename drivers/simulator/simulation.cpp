@@ -244,7 +244,10 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
     block.arrival = ecg.arrival(sample_time(from + kEcgSamplesPerBlock - 1), k);
     block.device_sequence = k;
     block.count = kEcgSamplesPerBlock;
-    for (std::uint32_t i = 0; i < block.count; ++i)
+    const Duration since = block.first_sample_time - start;
+    block.lead_off = std::any_of(settings.ecg_off.begin(), settings.ecg_off.end(),
+                                 [&](const auto& off) { return since >= off.begin && since < off.begin + off.length; });
+    for (std::uint32_t i = 0; i < block.count && !block.lead_off; ++i)
       block.mV[i] = static_cast<float>(record->samples[from + i] / EcgRecord::kCounts_per_mV);
     simulation.ecg_.push_back(block);
   }

@@ -40,6 +40,11 @@ struct SimulationSettings {
   // Time in which the tracker's error falls to 1/e of what it was (Gauss-Markov); 0: new at each reading.
   Duration tracker_correlation{0};
   double tracker_dropouts_per_min = 3.0;
+  // The electrode is off, and the device says so: from the session's start to begin, and for how long.
+  struct EcgOff {
+    Duration begin, length;
+  };
+  std::vector<EcgOff> ecg_off;
   // What makes seeing hard.
   double scope_sweep = 1.0;     // see ScopePath
   double exposure_share = 0.0;  // of the frame period, about the capture: motion blur

@@ -22,5 +22,7 @@ void as_exact_as_the_data_allow(const Extent& extent, const HeartMesh& heart, Go
 void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Beats found in real ECG records with disturbances added, and which rhythms are called unpredictable; docs/ecg.md.
 void beats_under_disturbances(const Extent& extent, const HeartMesh& heart, GoalReport& report);
+// Displayed positions some time ahead, by predictor, record and motion law; docs/ecg.md.
+void displayed_ahead(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 
 }  // namespace perimap::test

@@ -201,12 +201,13 @@ INSTANTIATE_TEST_SUITE_P(
               "test.toml:2:2: key 'traker': expected one of version, source, replay, camera, tracker, ecg, phase, "
               "respiration, pipeline, features, estimation, realtime, dds, recording, status, log, got an unknown key"},
         Wrong{"UnknownKey", "version = 1\n[phase]\nlow = 1\n",
-              "test.toml:3:1: key 'phase.low': expected one of law, lost_after_s, from_image, got an unknown key"},
+              "test.toml:3:1: key 'phase.low': expected one of law, lost_after_s, from_image, image_alone_s, predictor, got an unknown key"},
         Wrong{"SectionIsAValue", "version = 1\nphase = 3\n", "test.toml:2:9: key 'phase': expected a table, got 3"},
         Wrong{"SectionIsAnArrayOfTables", "version = 1\n[[phase]]\nlaw = \"linear\"\n",
               "test.toml:2:1: key 'phase': expected a table, got [a table]"},
         Wrong{"KeyIsATable", "version = 1\n[phase.law]\n",
-              "test.toml:2:1: key 'phase.law': expected \"linear\" or \"warped\" or \"time-locked\", got a table"},
+              "test.toml:2:1: key 'phase.law': expected \"auto\" or \"linear\" or \"warped\" or \"time-locked\", got a "
+              "table"},
         Wrong{"WordForNumber", "version = 1\n[pipeline]\nworkers = \"two\"\n",
               "test.toml:3:11: key 'pipeline.workers': expected an integer from 1 to 64, got \"two\""},
         Wrong{"NumberForInteger", "version = 1\n[pipeline]\nworkers = 2.0\n",

@@ -19,14 +19,14 @@ constexpr Instant kStart{seconds(10)};
 
 struct Edges : ::testing::Test {
   // The line changes so many times and is then on or off.
-  std::optional<RTrigger> change(std::uint32_t times, bool on, Duration at, bool woken = true) {
+  std::optional<RTriggerPulse> change(std::uint32_t times, bool on, Duration at, bool woken = true) {
     line.changes += times;
     line.on = on;
     return edges.take(line, woken, kStart + at);
   }
 
   DeviceHealth health;
-  ModemTriggerSettings settings{.path = "", .delay = milliseconds(4)};
+  ModemTriggerSettings settings{.path = ""};
   TriggerEdges edges{settings, health};
   ModemPort::Line line{0xFFFFFFFEU, false};  // soon over its end
   void SetUp() override { edges.restart(line); }
@@ -35,7 +35,7 @@ struct Edges : ::testing::Test {
 TEST_F(Edges, APulseIsOneRPeakAtItsFirstEdgeLessTheDelay) {
   const auto first = change(1, true, milliseconds(0));
   ASSERT_TRUE(first);
-  EXPECT_EQ(first->r_peak, kStart - milliseconds(4));
+  EXPECT_EQ(first->time, kStart);
   EXPECT_EQ(first->arrival, kStart);
   EXPECT_FALSE(change(1, false, milliseconds(100)));
   const auto second = change(1, true, milliseconds(800));
@@ -120,9 +120,9 @@ TEST(ModemLineTrigger, GivesRPeaksAndOpensAnUnpluggedPortAgain) {
   };
   serve_modem_line_trigger(
       {.path = "/dev/ttyS9", .shortest_interval = Duration(0)},
-      [&](const RTrigger& trigger) {
-        counts.push_back(trigger.count);
-        EXPECT_LE(trigger.r_peak, trigger.arrival);
+      [&](const RTriggerPulse& trigger) {
+        counts.push_back(trigger.device_count);
+        EXPECT_LE(trigger.time, trigger.arrival);
       },
       health, interrupt, open);
   EXPECT_THAT(counts, ::testing::ElementsAre(1, 2));

@@ -99,7 +99,7 @@ TEST_F(Classed, OnlyNormalCyclesTeach) {
   for (int i = 0; i < 30; ++i) take(800);
   take(500, 0.4);
   const Instant premature = t_;
-  EXPECT_NEAR(to_seconds(tracker.clock().predicted_length()), 0.8, 1e-6);  // the short cycle taught nothing
+  EXPECT_NEAR(to_seconds(tracker.clock().predicted_length(1)), 0.8, 1e-6);  // the short cycle taught nothing
   take(1100);
   take(800);
   const CardiacClock& clock = tracker.clock();

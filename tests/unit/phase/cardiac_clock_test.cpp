@@ -158,5 +158,93 @@ TEST(CardiacClock, StatesItsOwnPhaseError) {
   EXPECT_NEAR(normalised / scored, 1.0, 0.25);
 }
 
+TEST(CardiacClock, AnEcgThatIsGoneIsSaidAtOnce) {
+  Steady steady(40);
+  const Instant now = steady.last + milliseconds(200);
+  steady.tracker.heard(now);
+  EXPECT_EQ(steady.tracker.clock().as_of(now + milliseconds(50)).at(now).state, PhaseState::kLocked);
+  EXPECT_EQ(steady.tracker.clock().as_of(now + milliseconds(300)).at(now).state, PhaseState::kFreeRunning) << "silence";
+  steady.tracker.interrupt();
+  EXPECT_EQ(steady.tracker.clock().as_of(now).at(now).state, PhaseState::kFreeRunning) << "lead off";
+  steady.tracker.heard(now);
+  EXPECT_EQ(steady.tracker.clock().as_of(now).at(now).state, PhaseState::kLocked);
+}
+
+TEST(CardiacClock, WhatAnInterruptionMayHaveHiddenTeachesNothing) {
+  Steady steady(40);
+  const Duration before = steady.tracker.clock().predicted_length();
+  steady.tracker.interrupt();
+  const Instant back = steady.last + milliseconds(1500);  // a beat was missed
+  for (int i = 0; i < 3; ++i) steady.tracker.on_r_peak(peak_at(back + i * milliseconds(800)));
+  EXPECT_EQ(steady.at(back - milliseconds(100)).state, PhaseState::kLost);
+  EXPECT_FALSE(steady.at(back - milliseconds(100)).teaches);
+  EXPECT_TRUE(steady.at(back + milliseconds(100)).teaches);
+  EXPECT_NEAR(to_seconds(steady.tracker.clock().predicted_length()), to_seconds(before), 0.005);
+}
+
+TEST(CardiacClock, AShortInterruptionWithinACycleKeepsTheRhythmButTeachesNothing) {
+  Steady steady(40);
+  steady.tracker.interrupt();
+  steady.tracker.on_r_peak(peak_at(steady.last + milliseconds(810)));
+  steady.tracker.heard(steady.last + milliseconds(900));
+  EXPECT_EQ(steady.at(steady.last + milliseconds(900)).state, PhaseState::kLocked);
+  EXPECT_TRUE(steady.at(steady.last + milliseconds(400)).exact);
+  EXPECT_FALSE(steady.at(steady.last + milliseconds(400)).teaches);
+}
+
+// Normal and premature beats in turn, or two normal ones to a premature one.
+struct Ectopic {
+  explicit Ectopic(int normal_to_one) {
+    Steady steady(40);
+    tracker = steady.tracker;
+    last = steady.last;
+    for (int i = 0; i < 24; ++i) {
+      const bool premature = i % (normal_to_one + 1) == 0;
+      const bool after = i % (normal_to_one + 1) == 1 % (normal_to_one + 1) && i > 0;
+      before_last = last;
+      last += milliseconds(premature ? 500 : after ? 1100 : 800);
+      RPeak peak = peak_at(last);
+      if (premature) peak.beat_class = BeatClass::kPremature;
+      tracker.on_r_peak(peak);
+    }
+  }
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  Instant last, before_last;
+};
+
+TEST(CardiacClock, CyclesWithEctopicBeatsTeachNothingWhileThereAreOthers) {
+  const Ectopic trigeminy(2);
+  const CardiacClock& clock = trigeminy.tracker.clock();
+  EXPECT_NE(clock.rhythm(), Rhythm::kEctopic);
+  // The last three cycles: to a premature beat, after it, between two normal ones.
+  EXPECT_TRUE(clock.at(trigeminy.last - milliseconds(100)).teaches);
+  EXPECT_FALSE(clock.at(trigeminy.before_last - milliseconds(100)).teaches);
+  EXPECT_FALSE(clock.at(trigeminy.before_last - milliseconds(1200)).teaches);
+}
+
+TEST(CardiacClock, WhereEctopicBeatsPrevailItIsSaidAndCyclesThatBeginNormallyTeach) {
+  const Ectopic bigeminy(1);
+  const CardiacClock& clock = bigeminy.tracker.clock();
+  EXPECT_EQ(clock.rhythm(), Rhythm::kEctopic);
+  EXPECT_FALSE(clock.at(bigeminy.last - milliseconds(100)).teaches);
+  EXPECT_TRUE(clock.at(bigeminy.before_last - milliseconds(100)).teaches);
+  EXPECT_NEAR(to_seconds(clock.predicted_length()), 0.5, 0.05) << "to the next premature beat";
+  EXPECT_NEAR(to_seconds(clock.predicted_length(1)), 1.1, 0.05) << "and the pause after it";
+  EXPECT_NEAR(to_seconds(clock.predicted_length(2)), 0.8, 0.05);
+}
+
+TEST(CardiacClock, AfterAPrematureBeatAPauseIsExpectedAndTheCycleIsCalledEctopic) {
+  Steady steady(40);
+  RPeak premature = peak_at(steady.last + milliseconds(500));
+  premature.beat_class = BeatClass::kPremature;
+  steady.tracker.on_r_peak(premature);
+  const CardiacClock& clock = steady.tracker.clock();
+  EXPECT_NEAR(to_seconds(clock.predicted_length()), 1.1, 0.02);
+  EXPECT_GT(clock.length_deviation(), milliseconds(100));
+  EXPECT_TRUE(clock.at(premature.time + milliseconds(100)).ectopic);
+  steady.tracker.on_r_peak(peak_at(premature.time + milliseconds(1090)));
+  EXPECT_FALSE(clock.at(premature.time + milliseconds(1200)).ectopic);
+}
+
 }  // namespace
 }  // namespace perimap

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <vector>
 
 #include "core/phase/cardiac_clock_tracker.hpp"
 
@@ -186,6 +187,75 @@ TEST_F(Cycle, AFrameFromBeforeTheRPeakThatComesAfterItIsNotOfTheNewCycle) {
   EXPECT_EQ(after.length, before.length);
   EXPECT_EQ(after.begin_deviation, before.begin_deviation);
   EXPECT_FALSE(after.contradicted);
+}
+
+// Three cycles of which the ECG tells nothing any more: the images go on showing them.
+struct Carried : Cycle {
+  Instant gone;
+  std::vector<Duration> lengths{milliseconds(830), milliseconds(790), milliseconds(860), milliseconds(900)};
+
+  // Phase of the heart at t, from `begin` on.
+  [[nodiscard]] double phase_at(Instant t) const {
+    Instant start = begin;
+    std::size_t i = 0;
+    while (t >= start + lengths[i]) start += lengths[i++];
+    return kTwoPi * to_seconds(t - start) / to_seconds(lengths[i]);
+  }
+  CardiacClock ecg(Instant t) {
+    if (t > gone) tracker.interrupt();
+    return tracker.clock().as_of(t);
+  }
+  void watch(Instant from, Instant to) {
+    std::normal_distribution<double> noise(0.0, kDeviation_s);
+    for (Instant t = from; t < to; t += milliseconds(33)) {
+      posterior.follow(ecg(t), t);
+      posterior.add({t, phase_at(t) + 7.5 * noise(generator), 7.5 * kDeviation_s});
+    }
+  }
+};
+
+TEST_F(Carried, TheImagesCarryThePhaseOnWhenTheEcgIsGoneAndSaySo) {
+  gone = begin + milliseconds(300);
+  const Instant now = begin + milliseconds(2900);
+  watch(begin + milliseconds(20), now);
+  const CycleCorrection correction = posterior.correction();
+  EXPECT_TRUE(correction.carried);
+  const PhaseEstimate phase = ecg(now).corrected(correction).at(now + milliseconds(50));
+  EXPECT_EQ(phase.state, PhaseState::kFromImage);
+  const double error_s =
+      std::remainder(phase.phase_rad - phase_at(now + milliseconds(50)), kTwoPi) / phase.rate_rad_per_s;
+  EXPECT_LT(std::abs(error_s), 0.012);
+  EXPECT_LT(std::abs(error_s), 4.0 * phase.deviation_s);
+  EXPECT_EQ(ecg(now).at(now).state, PhaseState::kFreeRunning) << "the ECG alone";
+}
+
+TEST_F(Carried, WithoutImagesTheDeviationGrowsAndThenThereIsNoPhase) {
+  gone = begin + milliseconds(300);
+  const Instant last = begin + milliseconds(1000);
+  watch(begin + milliseconds(20), last);
+  Duration deviation(0);
+  for (int ms = 700; ms < 2900; ms += 100) {
+    const Instant now = last + milliseconds(ms);
+    posterior.follow(ecg(now), now);
+    const PhaseEstimate phase = ecg(now).corrected(posterior.correction()).at(now);
+    EXPECT_EQ(phase.state, PhaseState::kFreeRunning);
+    deviation = std::max(deviation, from_seconds(phase.deviation_s));
+  }
+  EXPECT_GT(deviation, milliseconds(30));
+  posterior.follow(ecg(last + milliseconds(3100)), last + milliseconds(3100));
+  EXPECT_EQ(posterior.correction().beats, 0U);
+}
+
+TEST_F(Carried, TheEcgTakesOverWhenItIsThereAgain) {
+  gone = begin + milliseconds(300);
+  const Instant back = begin + lengths[0] + lengths[1] + lengths[2];
+  watch(begin + milliseconds(20), back + milliseconds(90));
+  for (int i = 0; i < 3; ++i) tracker.on_r_peak({back + i * milliseconds(850), back, 1.0, milliseconds(2)});
+  const Instant now = back + milliseconds(1750);
+  tracker.heard(now);
+  posterior.follow(tracker.clock().as_of(now), now);
+  EXPECT_FALSE(posterior.correction().carried);
+  EXPECT_EQ(tracker.clock().as_of(now).corrected(posterior.correction()).at(now).state, PhaseState::kLocked);
 }
 
 }  // namespace

@@ -2,7 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <cmath>
 #include <numbers>
+#include <random>
+
+#include "core/phase/cardiac_clock_tracker.hpp"
+#include "core/phase/law_choice.hpp"
 
 namespace perimap {
 namespace {
@@ -72,6 +78,67 @@ TEST(PhaseLaw, TimeLockedSystoleAndAtrialFillingDoNotStretch) {
   };
   EXPECT_NEAR(at(0.3, 0.8), at(0.3, 1.2), 1e-12);
   EXPECT_NEAR(at(0.8 - 0.1, 0.8), at(1.2 - 0.1, 1.2), 1e-12);
+}
+
+TEST(PhaseLaw, ScaledLawsRunEvenlyInACycleOfTheUsualLength) {
+  for (const double rr : {0.45, 0.6, 0.8, 1.1}) {
+    for (const PhaseLaw law : {PhaseLaw::kLinear, PhaseLaw::kWarped, PhaseLaw::kTimeLocked}) {
+      const PhaseLawSettings settings = law_even_at(law, Seconds(rr));
+      for (double share = 0.05; share < 1.0; share += 0.1) {
+        EXPECT_NEAR(phase_in_cycle(settings, Seconds(share * rr), Seconds(rr), Seconds(rr)).phase_rad,
+                    2.0 * std::numbers::pi * share, 1e-9);
+      }
+    }
+  }
+}
+
+// A heart that follows one of the laws, seen through a map that was learnt under the linear one and is off in its own
+// way in each part of the cycle.
+class ChosenLaw : public testing::TestWithParam<PhaseLaw> {};
+
+TEST_P(ChosenLaw, IsTheOneThatTheHeartFollows) {
+  std::mt19937 generator(11);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  PhaseLawSettings truth;
+  truth.law = GetParam();
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  LawChoice choice;
+  Instant begin = from_ns(5'000'000'000);
+  double previous_s = 0.85;
+  int beats_to_choose = 0;
+  for (int beat = 1; beat <= 100; ++beat) {
+    tracker.on_r_peak({begin, begin + std::chrono::milliseconds(90), 1.0, std::chrono::milliseconds(2)});
+    choice.on_beat(tracker.clock());
+    if (beats_to_choose == 0 && choice.law().law == GetParam()) beats_to_choose = beat;
+    const double rr = 0.85 + 0.03 * std::sin(0.9 * beat) + 0.015 * noise(generator);
+    for (double s = 0.01; s < rr; s += 1.0 / 30.0) {
+      const double phase = phase_in_cycle(truth, Seconds(s), Seconds(rr), Seconds(previous_s)).phase_rad;
+      const double off = 0.15 * std::sin(phase + 0.5);
+      choice.add({begin + from_seconds(s), phase + off + 0.015 * noise(generator), 0.015});
+    }
+    previous_s = rr;
+    begin += from_seconds(rr);
+  }
+  EXPECT_EQ(choice.law().law, GetParam());
+  EXPECT_LE(beats_to_choose, 60);
+  for (const PhaseLaw other : {PhaseLaw::kLinear, PhaseLaw::kWarped, PhaseLaw::kTimeLocked}) {
+    if (other == GetParam()) continue;
+    EXPECT_GT(choice.scatter(other), 1.3 * choice.scatter(GetParam()));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(PhaseLaw, ChosenLaw,
+                         testing::Values(PhaseLaw::kLinear, PhaseLaw::kWarped, PhaseLaw::kTimeLocked));
+
+TEST(PhaseLaw, StaysLinearWithoutEvidence) {
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  LawChoice choice;
+  for (int i = 0; i < 60; ++i) {
+    const Instant t = from_ns(5'000'000'000) + i * std::chrono::milliseconds(800);
+    tracker.on_r_peak({t, t, 1.0, std::chrono::milliseconds(2)});
+    choice.on_beat(tracker.clock());
+  }
+  EXPECT_EQ(choice.law().law, PhaseLaw::kLinear);
 }
 
 }  // namespace

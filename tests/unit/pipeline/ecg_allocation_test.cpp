@@ -62,8 +62,8 @@ TEST(Allocation, TheEcgThreadTakesNothingFromTheHeap) {
   const auto cells = std::make_unique<ClockCells>();
   const auto counters = std::make_unique<PipelineCounters>();
   for (const RrMethod method : {RrMethod::kPrevious, RrMethod::kMeanOf8, RrMethod::kAutoregressive}) {
-    CardiacClockSettings settings;
-    settings.predictor = method;
+    EcgIntakeSettings settings;
+    settings.clock.predictor = method;
     const auto intake = std::make_unique<EcgIntake>(settings, *cells, *counters);
     const long count = allocations_of([&] {
       for (const EcgBlock& block : blocks) intake->push(block);

@@ -16,7 +16,7 @@ constexpr int kHeight = 24;
 struct Entrance : ::testing::Test {
   PipelineCounters counters;
   std::unique_ptr<SensorEntrance> entrance =
-      std::make_unique<SensorEntrance>(kWidth, kHeight, CardiacClockSettings{}, counters);
+      std::make_unique<SensorEntrance>(kWidth, kHeight, EcgIntakeSettings{}, counters);
   std::vector<std::uint8_t> pixels = std::vector<std::uint8_t>(40 * kHeight, 7);
   GreyImage image{pixels.data(), kWidth, kHeight, 40};
 
@@ -97,7 +97,29 @@ TEST_F(Entrance, LeadOffSamplesReachTheCountersAndNotTheClock) {
   block.lead_off = true;
   entrance->push_ecg(block);
   EXPECT_EQ(counters.ecg_lead_off.get(), 4U);
-  EXPECT_FALSE(entrance->clocks().mapper.update());
+  ASSERT_TRUE(entrance->clocks().mapper.update());
+  EXPECT_EQ(entrance->clocks().mapper.front().beats(), 0U);
+}
+
+TEST_F(Entrance, PulsesOfATriggerLineReplaceTheDetector) {
+  EcgIntakeSettings settings;
+  settings.r_trigger = RTriggerSettings{};
+  settings.r_trigger->delay = milliseconds(30);
+  const auto triggered = std::make_unique<SensorEntrance>(kWidth, kHeight, settings, counters);
+  const Instant first(milliseconds(5030));
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    if (i == 7) continue;  // lost on the way
+    const Instant edge = first + i * milliseconds(800);
+    triggered->push_r_trigger({edge, edge + milliseconds(1), i});
+    entrance->push_r_trigger({edge, edge + milliseconds(1), i});
+  }
+  ASSERT_TRUE(triggered->clocks().mapper.update());
+  const CardiacClock& clock = triggered->clocks().mapper.front();
+  EXPECT_EQ(clock.beats(), 19U);
+  EXPECT_EQ(clock.anchor(), first + 19 * milliseconds(800) - milliseconds(30));
+  EXPECT_EQ(counters.r_triggers.get(), 38U);
+  EXPECT_EQ(counters.r_triggers_dropped.get(), 2U);
+  EXPECT_FALSE(entrance->clocks().mapper.update()) << "without a trigger configured pulses are only counted";
 }
 
 }  // namespace

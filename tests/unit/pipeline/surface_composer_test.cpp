@@ -231,5 +231,46 @@ TEST(SurfaceComposer, CountsSamplesWithoutGaps) {
   }
 }
 
+TEST(SurfaceComposer, ALeadMovesTheValidTimeAndNotTheRelease) {
+  ComposerSettings ahead = settings();
+  ahead.lead = milliseconds(100);
+  SurfaceComposer composer(ahead);
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view);
+  EXPECT_EQ(sample.valid_time, kRelease.deadline + milliseconds(100));
+  EXPECT_NEAR(sample.cardiac_phase_rad, steady_clock().at(sample.valid_time).phase_rad, 1e-12);
+}
+
+TEST(SurfaceComposer, AfterAPrematureBeatUntilTheNextOneNothingIsCalledGood) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  CardiacClockTracker tracker({});
+  for (int ms = 1000; ms <= 8200; ms += 800) tracker.on_r_peak({at_ms(ms), at_ms(ms + 60), 1.0, milliseconds(1)});
+  RPeak premature{at_ms(8700), at_ms(8760), 1.0, milliseconds(1)};
+  premature.beat_class = BeatClass::kPremature;
+  tracker.on_r_peak(premature);
+  const SurfaceSample& sample = composer.compose(kRelease, tracker.clock(), RespiratoryClock{}, view);
+  EXPECT_EQ(sample.state, SurfaceState::kDegraded);
+  EXPECT_EQ(sample.reason, SurfaceReason::kEctopicBeat);
+}
+
+TEST(SurfaceComposer, APhaseThatTheImagesAloneCarryDegradesTheSurface) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  CycleCorrection correction;
+  correction.beats = steady_clock().beats();
+  correction.begin = at_ms(9010);
+  correction.length = milliseconds(800);
+  correction.carried = true;
+  correction.seen = true;
+  const SurfaceSample& sample =
+      composer.compose(kRelease, steady_clock().corrected(correction), RespiratoryClock{}, view);
+  EXPECT_EQ(sample.state, SurfaceState::kDegraded);
+  EXPECT_EQ(sample.reason, SurfaceReason::kPhaseFromImage);
+}
+
 }  // namespace
 }  // namespace perimap

@@ -127,6 +127,10 @@ void fill(Filler& next, perimap_PhaseClock& s) {
   next(s.length_deviation_ns);
   next(s.systole_ns);
   next(s.systole_fraction);
+  next(s.locked_systole_ns);
+  next(s.locked_filling_ns);
+  next(s.locked_systole_phase_rad);
+  next(s.locked_filling_phase_rad);
 }
 
 void fill(Filler& next, perimap_RespiratoryClock& s) {
@@ -229,6 +233,8 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.messages_recorded);
   next(s.frames_not_recorded);
   next(s.other_not_recorded);
+  next(s.phase_state);
+  next(s.rhythm);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -361,10 +367,18 @@ json to_json(const perimap_Surface& s) {
 }
 template <>
 json to_json(const perimap_PhaseClock& s) {
-  return {MEMBER(state),          MEMBER(law),
-          MEMBER(anchor_time_ns), MEMBER(anchor_deviation_ns),
-          MEMBER(length_ns),      MEMBER(length_deviation_ns),
-          MEMBER(systole_ns),     MEMBER(systole_fraction)};
+  return {MEMBER(state),
+          MEMBER(law),
+          MEMBER(anchor_time_ns),
+          MEMBER(anchor_deviation_ns),
+          MEMBER(length_ns),
+          MEMBER(length_deviation_ns),
+          MEMBER(systole_ns),
+          MEMBER(systole_fraction),
+          MEMBER(locked_systole_ns),
+          MEMBER(locked_filling_ns),
+          MEMBER(locked_systole_phase_rad),
+          MEMBER(locked_filling_phase_rad)};
 }
 template <>
 json to_json(const perimap_RespiratoryClock& s) {
@@ -453,7 +467,9 @@ json to_json(const perimap_Status& s) {
           MEMBER(recording),
           MEMBER(messages_recorded),
           MEMBER(frames_not_recorded),
-          MEMBER(other_not_recorded)};
+          MEMBER(other_not_recorded),
+          MEMBER(phase_state),
+          MEMBER(rhythm)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {

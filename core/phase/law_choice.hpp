@@ -1,0 +1,68 @@
+// Which law the heart's motion follows between two R peaks, by what the images show.
+//
+// Under the true law an observed phase differs from the clock's by what the map's own phase is off there: something
+// that depends on the phase alone, whatever law the map was learnt under. Under a wrong law it differs from cycle to
+// cycle as well, as their lengths do. So each law is judged by the scatter of those differences about their mean in
+// each part of the cycle, over cycles whose ends are known.
+//
+// The laws are scaled to be the same in a cycle of the usual length, so that the map stays right when the law changes.
+//
+// No heap, no locks.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/phase/cardiac_clock.hpp"
+#include "core/phase/observed_phase.hpp"
+#include "core/phase/phase_law.hpp"
+#include "core/phase/seconds.hpp"
+
+namespace perimap {
+
+// The law, scaled so that in cycles of length `rr` its phase runs evenly.
+[[nodiscard]] PhaseLawSettings law_even_at(PhaseLaw law, Seconds rr) noexcept;
+
+class LawChoice {
+ public:
+  static constexpr int kLaws = 3;
+
+  // In order of time.
+  void add(const ObservedPhase& observed) noexcept { kept_[kept_count_++ % kKept] = observed; }
+  // A beat has become known: what was seen in the cycle before it is weighed, unless that one teaches nothing.
+  void on_beat(const CardiacClock& clock) noexcept;
+
+  // Linear until there is evidence.
+  [[nodiscard]] const PhaseLawSettings& law() const noexcept { return laws_[static_cast<std::size_t>(chosen_)]; }
+  // Mean square difference of a law about its means, in squares of the observations' deviations; 0: nothing was
+  // weighed.
+  [[nodiscard]] double scatter(PhaseLaw law) const noexcept;
+
+ private:
+  static constexpr int kParts = 24;           // of the cycle
+  static constexpr int kCyclesForScale = 12;  // whose median length is the usual one
+  static constexpr std::uint64_t kKept = 256;
+
+  struct Part {
+    double weight = 0.0;
+    double mean_rad = 0.0;
+    double squares = 0.0;  // weighted, about the mean
+  };
+
+  [[nodiscard]] bool scale(Seconds rr) noexcept;
+  void weigh(const CardiacCycle& cycle) noexcept;
+  void choose() noexcept;
+  [[nodiscard]] double squares(int law) const noexcept;
+
+  std::array<PhaseLawSettings, kLaws> laws_{};
+  std::array<std::array<Part, kParts>, kLaws> parts_{};
+  std::array<double, kCyclesForScale> lengths_s_{};
+  int length_count_ = 0;
+  double cycles_ = 0.0;  // weighed, older ones fading
+  double observations_ = 0.0;
+  int chosen_ = 0;
+  std::array<ObservedPhase, kKept> kept_{};
+  std::uint64_t kept_count_ = 0;
+};
+
+}  // namespace perimap
