@@ -130,10 +130,11 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
     located.state = PhaseState::kLost;
     return located;
   }
-  const bool overdue = t > due + slack + detector_delay_;
-  located.state = carried_ && seen_ && !overdue         ? PhaseState::kFromImage
-                  : carried_ || interrupted_ || overdue ? PhaseState::kFreeRunning
-                                                        : PhaseState::kLocked;
+  // What the images carry on has been seen; what they have not even begun to show a cycle later has not.
+  const bool overdue = t > due + (carried_ ? predicted_length() : slack + detector_delay_);
+  located.state = PhaseState::kLocked;
+  if (overdue || interrupted_ || carried_) located.state = PhaseState::kFreeRunning;
+  if (!overdue && carried_ && seen_) located.state = PhaseState::kFromImage;
   located.ectopic = beat(0).beat_class == BeatClass::kPremature;
 
   CardiacCycle& cycle = located.cycle;

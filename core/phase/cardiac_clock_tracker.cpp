@@ -65,22 +65,16 @@ void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
   predict();
 }
 
-// The normal rhythm, with the running cycle and the next as the ectopic beats have it.
+// The normal rhythm, but for the pause after a premature beat.
 void CardiacClockTracker::predict() noexcept {
   predictor_.predict(clock_.predicted_);
   clock_.length_deviation_ = predictor_.deviation();
-  const BeatClass begin = clock_.beat(0).beat_class;
-  const PredictedLength normal{clock_.predicted_[0], clock_.length_deviation_};
-  const PredictedLength running = ectopic_.predict(begin, Seconds(clock_.last_rr()), normal);
-  clock_.predicted_[0] = running.length;
-  clock_.running_deviation_ = running.deviation;
+  clock_.running_deviation_ = clock_.length_deviation_;
   clock_.next_deviation_ = clock_.length_deviation_;
-  // What is shorter than normal after a normal beat ends with a premature one.
-  if (begin == BeatClass::kPremature || running.length == normal.length) return;
-  const PredictedLength pause =
-      ectopic_.predict(BeatClass::kPremature, running.length, {clock_.predicted_[1], clock_.length_deviation_});
-  clock_.predicted_[1] = pause.length;
-  clock_.next_deviation_ = pause.deviation;
+  if (clock_.beat(0).beat_class != BeatClass::kPremature) return;
+  const PredictedLength pause = ectopic_.predict_pause(Seconds(clock_.last_rr()), clock_.predicted_[0]);
+  clock_.predicted_[0] = pause.length;
+  clock_.running_deviation_ = pause.deviation;
 }
 
 void CardiacClockTracker::heard(Instant until) noexcept {

@@ -7,55 +7,34 @@
 namespace perimap {
 namespace {
 
-constexpr double kMemory = 6.0;           // cycles
-constexpr int kEnough = 2;                // cycles of a kind from which on their mean is a guide
-constexpr double kLeastDeviation = 0.02;  // of the length
-constexpr double kUnseenDeviation = 0.2;  // likewise, of a pause of which none was seen yet
+constexpr double kMemory = 6.0;           // pauses
+constexpr int kEnough = 2;                // pauses from which on their mean is a guide
+constexpr double kLeastDeviation = 0.05;  // of the length
+constexpr double kUnseenDeviation = 0.2;  // likewise, of a pause when too few were seen
 constexpr double kLongestPause = 1.6;     // normal cycles
-constexpr int kAlternates = 4;            // cycles from which on the next one is expected to go on so
-constexpr double kMayStop = 0.2;          // of what it would make: that the alternation stops
 constexpr int kPrevailsBelow = 2;         // cycles of eight between normal beats
 constexpr int kGoneFrom = 4;
 
 }  // namespace
 
-void EctopicRhythm::Fading::add(double value_s) noexcept {
-  ++count;
-  const double weight = 1.0 / std::min<double>(count, kMemory);
-  const double difference = value_s - mean_s;
-  mean_s += weight * difference;
-  // The first says nothing of how they scatter.
-  if (count > 1) variance_s2 = (1.0 - weight) * (variance_s2 + weight * difference * difference);
-}
-
 void EctopicRhythm::push(Seconds rr, BeatClass begin, BeatClass end) noexcept {
-  const bool from_premature = begin == BeatClass::kPremature;
-  const bool to_premature = end == BeatClass::kPremature;
-  if (from_premature && !to_premature) pause_.add(rr.count());
-  if (!from_premature && to_premature) coupling_.add(rr.count());
-  alternating_ = from_premature != to_premature ? alternating_ + 1 : 0;
+  if (begin == BeatClass::kPremature && end != BeatClass::kPremature) {
+    const double weight = 1.0 / std::min<double>(++pauses_, kMemory);
+    const double difference_s = rr.count() - mean_s_;
+    mean_s_ += weight * difference_s;
+    // The first says nothing of how they scatter.
+    if (pauses_ > 1) variance_s2_ = (1.0 - weight) * (variance_s2_ + weight * difference_s * difference_s);
+  }
   taught_ = static_cast<std::uint8_t>(taught_ << 1 | (cycle_teaches(begin, end) ? 1 : 0));
   const int taught = std::popcount(taught_);
   prevails_ = prevails_ ? taught < kGoneFrom : taught < kPrevailsBelow;
 }
 
-PredictedLength EctopicRhythm::predict(BeatClass begin, Seconds previous,
-                                       const PredictedLength& normal) const noexcept {
-  const auto seen = [](const Fading& cycles) {
-    return PredictedLength{Seconds(cycles.mean_s),
-                           Seconds(std::max(std::sqrt(cycles.variance_s2), kLeastDeviation * cycles.mean_s))};
-  };
-  if (begin == BeatClass::kPremature) {
-    if (pause_.count >= kEnough) return seen(pause_);
-    // A full compensatory pause: the sinus node goes on undisturbed.
-    const Seconds full = 2.0 * normal.length - previous;
-    return {std::clamp(full, normal.length, kLongestPause * normal.length), kUnseenDeviation * normal.length};
-  }
-  if (alternating_ < kAlternates || coupling_.count < kEnough) return normal;
-  PredictedLength coupled = seen(coupling_);
-  const double otherwise_s = std::abs((normal.length - coupled.length).count());
-  coupled.deviation = Seconds(std::hypot(coupled.deviation.count(), kMayStop * otherwise_s));
-  return coupled;
+PredictedLength EctopicRhythm::predict_pause(Seconds previous, Seconds normal) const noexcept {
+  if (pauses_ >= kEnough)
+    return {Seconds(mean_s_), Seconds(std::max(std::sqrt(variance_s2_), kLeastDeviation * mean_s_))};
+  // A full compensatory pause: the sinus node goes on undisturbed.
+  return {std::clamp(2.0 * normal - previous, normal, kLongestPause * normal), kUnseenDeviation * normal};
 }
 
 }  // namespace perimap

@@ -1,7 +1,7 @@
-// Ectopic beats as part of the rhythm: how long the cycles beside them last, and whether they prevail.
+// Ectopic beats in the rhythm: how long the pauses after them last, and whether they prevail.
 //
-// A premature beat is followed by a pause, and in bigeminy it comes as regularly as the normal beat before it; the
-// autoregressive prediction, which learns from normal cycles alone, knows of neither.
+// The autoregressive prediction learns from normal cycles alone and knows of no pauses. When the next premature beat
+// comes is not predicted, not even in bigeminy: where the pattern stops, the error would be a third of a cycle.
 #pragma once
 
 #include <cstdint>
@@ -21,28 +21,19 @@ class EctopicRhythm {
  public:
   // The cycle that has just ended.
   void push(Seconds rr, BeatClass begin, BeatClass end) noexcept;
-  void clear() noexcept { *this = EctopicRhythm(); }
 
-  // Of the cycle that begins with a beat of this class, after a cycle of `previous`; `normal` is what is predicted from
-  // cycles between normal beats.
-  [[nodiscard]] PredictedLength predict(BeatClass begin, Seconds previous,
-                                        const PredictedLength& normal) const noexcept;
+  // Of the cycle that begins with a premature beat, after one of `previous`; `normal` is what is predicted from cycles
+  // between normal beats.
+  [[nodiscard]] PredictedLength predict_pause(Seconds previous, Seconds normal) const noexcept;
 
   // Hardly a cycle of the last eight lay between normal beats.
   [[nodiscard]] bool prevails() const noexcept { return prevails_; }
 
  private:
-  // Mean and mean square deviation, fading over some cycles.
-  struct Fading {
-    int count = 0;
-    double mean_s = 0.0;
-    double variance_s2 = 0.0;
-    void add(double value_s) noexcept;
-  };
-
-  Fading coupling_;             // from a normal beat to a premature one
-  Fading pause_;                // from a premature beat to the next
-  int alternating_ = 0;         // cycles in a row that ended with the other class than the one before
+  // Of the pauses: how many, and mean and variance, fading.
+  int pauses_ = 0;
+  double mean_s_ = 0.0;
+  double variance_s2_ = 0.0;
   std::uint8_t taught_ = 0xFF;  // of the last eight, a bit a cycle
   bool prevails_ = false;
 };

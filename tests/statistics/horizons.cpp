@@ -44,6 +44,7 @@ PipelineSettings settings_for(const SimulationSettings& wanted) {
   std::filesystem::remove(path);
   if (!setup) throw std::runtime_error(setup.error().error.message);
   setup->pipeline.lockstep = true;
+  setup->pipeline.features.maximum = 60;
   return setup->pipeline;
 }
 
