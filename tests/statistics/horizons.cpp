@@ -149,8 +149,8 @@ std::vector<Cell> cells_of(const SimulationSettings& scene) {
   previous.clock.predictor = RrMethod::kPrevious;
 
   std::vector<std::unique_ptr<Horizons>> sessions;
-  for (const PipelineSettings* settings : {&previous, &autoregressive, &with_image})
-    sessions.push_back(std::make_unique<Horizons>(*simulation, *settings));
+  for (const PipelineSettings& settings : {previous, autoregressive, with_image})
+    sessions.push_back(std::make_unique<Horizons>(*simulation, settings));
   FrameRenderer frames(*simulation, threads);
   for (const Simulation::Arrival& arrival : simulation->arrivals()) {
     FrameEvent frame;
