@@ -40,7 +40,7 @@ TEST_F(Edges, APulseIsOneRPeakAtItsFirstEdgeLessTheDelay) {
   EXPECT_FALSE(change(1, false, milliseconds(100)));
   const auto second = change(1, true, milliseconds(800));
   ASSERT_TRUE(second);
-  EXPECT_EQ(second->count, first->count + 1);
+  EXPECT_EQ(second->device_count, first->device_count + 1);
   EXPECT_EQ(health.samples.get(), 2U);
   EXPECT_EQ(health.lost.get(), 0U);
 }
