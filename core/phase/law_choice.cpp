@@ -13,7 +13,7 @@ constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr std::array<PhaseLaw, LawChoice::kLaws> kCandidates{PhaseLaw::kLinear, PhaseLaw::kWarped,
                                                              PhaseLaw::kTimeLocked};
 constexpr double kMemory = 100.0;  // cycles; the map learns on, and its phase's errors change
-constexpr double kLeastCycles = 15.0;
+constexpr double kLeastCycles = 8.0;
 // Of the log likelihood, a cycle counting as one difference: those within one share its causes.
 constexpr double kDecisive = 5.0;
 constexpr double kWildest_rad = 0.8;  // no phase but a wrong match
@@ -30,11 +30,11 @@ PhaseLawSettings law_even_at(PhaseLaw law, Seconds rr) noexcept {
   return settings;
 }
 
-void LawChoice::on_beat(const CardiacClock& clock) noexcept {
+bool LawChoice::on_beat(const CardiacClock& clock) noexcept {
   const CardiacCycle cycle = clock.cycle_at(clock.anchor() - Duration(1));
-  if (!cycle.teaches || !scale(Seconds(cycle.length))) return;
+  if (!cycle.teaches || !scale(Seconds(cycle.length))) return false;
   weigh(cycle);
-  choose();
+  return choose();
 }
 
 // True once the laws are scaled.
@@ -94,14 +94,16 @@ double LawChoice::scatter(PhaseLaw law) const noexcept {
   return observations_ > 0.0 ? squares(static_cast<int>(found - kCandidates.begin())) / observations_ : 0.0;
 }
 
-void LawChoice::choose() noexcept {
-  if (cycles_ < kLeastCycles) return;
+bool LawChoice::choose() noexcept {
+  if (cycles_ < kLeastCycles) return false;
   int best = chosen_;
   for (int law = 0; law < kLaws; ++law) {
     if (squares(law) < squares(best)) best = law;
   }
-  if (best == chosen_ || !(squares(best) > 0.0)) return;
-  if (0.5 * cycles_ * std::log(squares(chosen_) / squares(best)) > kDecisive) chosen_ = best;
+  if (best == chosen_ || !(squares(best) > 0.0)) return false;
+  if (!(0.5 * cycles_ * std::log(squares(chosen_) / squares(best)) > kDecisive)) return false;
+  chosen_ = best;
+  return true;
 }
 
 }  // namespace perimap

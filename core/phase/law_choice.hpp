@@ -29,8 +29,9 @@ class LawChoice {
 
   // In order of time.
   void add(const ObservedPhase& observed) noexcept { kept_[kept_count_++ % kKept] = observed; }
-  // A beat has become known: what was seen in the cycle before it is weighed, unless that one teaches nothing.
-  void on_beat(const CardiacClock& clock) noexcept;
+  // A beat has become known: what was seen in the cycle before it is weighed, unless that one teaches nothing. True
+  // when another law is taken.
+  bool on_beat(const CardiacClock& clock) noexcept;
 
   // Linear until there is evidence.
   [[nodiscard]] const PhaseLawSettings& law() const noexcept { return laws_[static_cast<std::size_t>(chosen_)]; }
@@ -39,8 +40,8 @@ class LawChoice {
   [[nodiscard]] double scatter(PhaseLaw law) const noexcept;
 
  private:
-  static constexpr int kParts = 24;           // of the cycle
-  static constexpr int kCyclesForScale = 12;  // whose median length is the usual one
+  static constexpr int kParts = 24;          // of the cycle
+  static constexpr int kCyclesForScale = 6;  // whose median length is the usual one
   static constexpr std::uint64_t kKept = 256;
 
   struct Part {
@@ -51,7 +52,7 @@ class LawChoice {
 
   [[nodiscard]] bool scale(Seconds rr) noexcept;
   void weigh(const CardiacCycle& cycle) noexcept;
-  void choose() noexcept;
+  [[nodiscard]] bool choose() noexcept;
   [[nodiscard]] double squares(int law) const noexcept;
 
   std::array<PhaseLawSettings, kLaws> laws_{};

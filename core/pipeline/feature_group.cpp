@@ -12,6 +12,8 @@ namespace perimap {
 namespace {
 
 constexpr double kInflation_mm = 1.0;
+// About what a linear law makes of a warped heart (0.33 mm).
+constexpr double kDoubt_mm = 0.3;
 constexpr int kRefusalsBeforeRelock = 10;
 // How much a feature's breathing differs from the common one, first harmonic, and by how much its mean is off that was
 // learnt while the phase was not known.
@@ -149,6 +151,12 @@ void FeatureGroup::begin_breath(const BreathWave& wave) noexcept {
       }
     }
     bank_.set(feature(lane), estimate);
+  }
+}
+
+void FeatureGroup::doubt() noexcept {
+  for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
+    if (slots_[lane].state == SlotState::kMapped) bank_.diffuse(feature(lane), kDoubt_mm);
   }
 }
 

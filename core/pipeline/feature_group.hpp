@@ -52,6 +52,9 @@ class FeatureGroup {
   // The breathing's phase has become known: all mapped features take the motion that they have in common with it.
   void begin_breath(const BreathWave& wave) noexcept;
 
+  // The motion law was another one than supposed: what was learnt under it is less certain than it seemed.
+  void doubt() noexcept;
+
   // C: appends the snapshots of the mapped features to both.
   void evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept;
 

@@ -53,7 +53,9 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   const RealtimeScope realtime;
   CardiacClock ecg_clock = newest_clock.as_of(stamp.arrival);
   if (settings_.law_from_image) {
-    if (ecg_clock.beats() != beats_) law_.on_beat(ecg_clock);
+    if (ecg_clock.beats() != beats_ && law_.on_beat(ecg_clock)) {
+      for (FeatureGroup& group : groups_) group.doubt();
+    }
     ecg_clock = ecg_clock.with_law(law_.law());
   }
   finish_learning();

@@ -108,7 +108,7 @@ TEST_P(ChosenLaw, IsTheOneThatTheHeartFollows) {
   int beats_to_choose = 0;
   for (int beat = 1; beat <= 100; ++beat) {
     tracker.on_r_peak({begin, begin + std::chrono::milliseconds(90), 1.0, std::chrono::milliseconds(2)});
-    choice.on_beat(tracker.clock());
+    static_cast<void>(choice.on_beat(tracker.clock()));
     if (beats_to_choose == 0 && choice.law().law == GetParam()) beats_to_choose = beat;
     const double rr = 0.85 + 0.03 * std::sin(0.9 * beat) + 0.015 * noise(generator);
     for (double s = 0.01; s < rr; s += 1.0 / 30.0) {
@@ -136,7 +136,7 @@ TEST(PhaseLaw, StaysLinearWithoutEvidence) {
   for (int i = 0; i < 60; ++i) {
     const Instant t = from_ns(5'000'000'000) + i * std::chrono::milliseconds(800);
     tracker.on_r_peak({t, t, 1.0, std::chrono::milliseconds(2)});
-    choice.on_beat(tracker.clock());
+    static_cast<void>(choice.on_beat(tracker.clock()));
   }
   EXPECT_EQ(choice.law().law, PhaseLaw::kLinear);
 }
