@@ -106,14 +106,15 @@ MapPrediction FeatureGroup::prediction(std::size_t lane) const noexcept {
 }
 
 void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double>* breath, bool converged,
-                           double pixel_deviation_px, std::vector<CommonMatch>& matches) noexcept {
+                           double pixel_deviation_px, std::vector<CommonMatch>& matches,
+                           std::vector<FeatureSlot*>& owners) noexcept {
   if (plan_.capture < 0) return;
   LaneMotions<double> motions;
   LaneMotions<double> breathing;
   bank_.motion_near(index_, plan_.phases, plan_.capture, at, motions);
   if (breath != nullptr) bank_.motion_near(index_, plan_.phases, plan_.capture, *breath, breathing);
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
-    const FeatureSlot& slot = slots_[lane];
+    FeatureSlot& slot = slots_[lane];
     if (slot.state != SlotState::kMapped || slot.match.state != MatchState::kFound) continue;
     if (converged && !slot.converged) continue;
     const auto l = static_cast<int>(lane);
@@ -126,6 +127,7 @@ void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double
     match.D.col(0) = motions.velocity_of(l);
     if (breath != nullptr) match.D.col(1) = breathing.velocity_of(l);
     matches.push_back(match);
+    owners.push_back(&slot);
   }
 }
 

@@ -1,5 +1,7 @@
 #include "core/pipeline/feature_stages.hpp"
 
+#include <algorithm>
+
 #include "core/pipeline/pose_noise.hpp"
 
 namespace perimap {
@@ -45,10 +47,12 @@ PixelPrediction predict_from_image(const FeatureSlot& slot, const FrameRecord& f
   return prediction;
 }
 
-// Whether a look-alike may well lie within the search region.
-bool is_wide(const PixelPrediction& prediction) noexcept {
+// Whether this may be a look-alike: there is room for one in the search region, and the feature was not there in the
+// frame before, or not found about where it was expected.
+bool is_doubtful(const PixelPrediction& prediction, const Vector2d& px, std::uint64_t frames) noexcept {
   constexpr double kNarrow_px = 3;
-  return prediction.covariance_px2.trace() > 2 * kNarrow_px * kNarrow_px;
+  if (prediction.covariance_px2.trace() <= 2 * kNarrow_px * kNarrow_px) return false;
+  return frames > 1 || (px - prediction.px).norm() > kUnmappedMotionDeviation_px;
 }
 
 // Whether the match can be the feature, as far as the map and the causal phase tell. What is learnt from it is judged
@@ -97,8 +101,9 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   PatchState seen = slot.patch_state;
   slot.match = job.tracker->track(job.image, slot.patch, seen, prediction.px, prediction.covariance_px2);
   if (slot.match.state != MatchState::kFound) return;
-  if (is_wide(prediction) && !slot.looks.is_plausible(slot.patch_state, seen, slot.match.correlation,
-                                                      job.frame->index - slot.last_found_frame)) {
+  const std::uint64_t frames = job.frame->index - slot.last_found_frame;
+  if (is_doubtful(prediction, slot.match.px, frames) &&
+      !slot.looks.is_plausible(slot.patch_state, seen, slot.match.correlation, frames)) {
     slot.match.state = MatchState::kLowCorrelation;
     return;
   }
@@ -109,6 +114,13 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   renew_stale_template(slot, job);
   slot.velocity_px = in_a_row ? Vector2d(slot.match.px - last_px) : Vector2d::Zero();
   slot.last_found_frame = job.frame->index;
+}
+
+void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept {
+  slot.match.state = MatchState::kTooFar;
+  slot.match_agrees = false;
+  ++slot.refused_in_a_row;
+  slot.last_found_frame = frame.index - std::min<std::uint64_t>(frame.index, kTrackedMissesAllowed + 1);
 }
 
 void describe(const FeatureSlot& slot, FeatureSnapshot& snapshot) noexcept {

@@ -21,6 +21,9 @@ struct MapPrediction {
 void predict_and_find(FeatureSlot& slot, const MapPrediction& from_map, const FrameJob& job, const PixelModel& model,
                       const PipelineSettings& settings) noexcept;
 
+// B: a match that the frame's other matches contradict is none. The next search begins where the map says.
+void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept;
+
 // C: all of a mapped feature's snapshot but its coefficients and covariances, which the bank has.
 void describe(const FeatureSlot& slot, FeatureSnapshot& snapshot) noexcept;
 

@@ -1,8 +1,10 @@
 #include "core/pipeline/image_phase.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
+#include "core/pipeline/feature_stages.hpp"
 #include "core/pipeline/pose_noise.hpp"
 
 namespace perimap {
@@ -38,20 +40,22 @@ CommonInformation pose_prior(const CameraPose& pose) noexcept {
 }
 
 void ImagePhase::collect(std::span<FeatureGroup> groups, const FrameRecord& frame, const EstimatorSettings& settings,
-                         double shift_s, double breath_shift_s, bool converged) noexcept {
+                         const Shifts& shifts, bool converged) noexcept {
   const BasisLayout& layout = settings.layout;
-  const double phase_rad = frame.phase.phase_rad + shift_s * frame.phase.rate_rad_per_s;
+  const double phase_rad = frame.phase.phase_rad + shifts.cardiac * frame.phase.rate_rad_per_s;
   RespiratoryPhase respiration = frame.respiration;
-  respiration.phase_rad += breath_shift_s * respiration.rate_rad_per_s;
+  respiration.phase_rad += shifts.breath * respiration.rate_rad_per_s;
   const Basis b = basis_at(layout, phase_rad, respiration);
   SweepPhase<double> at;
   at.set(b, basis_rate(layout, phase_rad), frame.phase.rate_rad_per_s, 0.0);
   SweepPhase<double> breath;
   if (respiration.known) breath.set(b, breath_rate(layout, respiration.phase_rad), respiration.rate_rad_per_s, 0.0);
   matches_.clear();
+  owners_.clear();
   const std::size_t stride = (groups.size() + kMostGroups - 1) / kMostGroups;
   for (std::size_t g = frame.index % stride; g < groups.size(); g += stride) {
-    groups[g].collect(at, respiration.known ? &breath : nullptr, converged, settings.pixel_deviation_px, matches_);
+    groups[g].collect(at, respiration.known ? &breath : nullptr, converged, settings.pixel_deviation_px, matches_,
+                      owners_);
   }
   used_.assign(matches_.size(), 0);
 }
@@ -73,8 +77,10 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
   double shift_s = 0.0;
   double breath_shift_s = 0.0;
   CommonEstimate solved;
+  Shifts solved_at;
   for (int pass = 0; pass < kPasses; ++pass) {
-    collect(groups, frame, settings, shift_s, breath_shift_s, true);
+    solved_at = {shift_s, breath_shift_s};
+    collect(groups, frame, settings, solved_at, true);
     if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return can_not_tell;
     prior.eta(kShift) = -shift_s / kPriorVariance_s2;
     if (frame.respiration.known) prior.eta(kBreathShift) = -breath_shift_s / breath_prior_s2;
@@ -89,6 +95,7 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
     if (!(std::abs(shift_s) < kLargestShift_s)) return contradicts;
     if (!(std::abs(breath_shift_s) <= kLargestBreathShift * breath_deviation_s)) return contradicts;
   }
+  refuse_what_disagrees(groups, frame, model, settings, solved_at, solved);
   const auto answer = [&](Eigen::Index unknown, double shift, double prior_s2, double phase_rad, double rate_rad_per_s,
                           double largest_deviation_s, double common_deviation_s) {
     ImagePhaseAnswer result;
@@ -111,12 +118,24 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
   return phases;
 }
 
+void ImagePhase::refuse_what_disagrees(std::span<FeatureGroup> groups, const FrameRecord& frame,
+                                       const PixelModel& model, const EstimatorSettings& settings, const Shifts& shifts,
+                                       const CommonEstimate& solved) noexcept {
+  for (std::size_t first = 0; first < groups.size(); first += kMostGroups) {
+    collect(groups.subspan(first, std::min(kMostGroups, groups.size() - first)), frame, settings, shifts, false);
+    for (std::size_t k = 0; k < matches_.size(); ++k) {
+      const CommonTerm term = linearise(model, solved, matches_[k]);
+      if (!term.visible || term.squared_residual > settings.update.gate) refuse_match(*owners_[k], frame);
+    }
+  }
+}
+
 bool ImagePhase::displacement(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
                               const EstimatorSettings& settings, Vector3d& displacement_mm) noexcept {
   if (!frame.measurable || groups.empty()) return false;
   CameraPose pose = frame.pose;
   pose.position_variance_mm2 += kDisplacementDeviation_mm * kDisplacementDeviation_mm;
-  collect(groups, frame, settings, 0.0, 0.0, false);
+  collect(groups, frame, settings, {}, false);
   // The features' own motions are not asked.
   for (CommonMatch& match : matches_) match.D.resize(3, 0);
   if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return false;

@@ -33,6 +33,9 @@ struct ImagePhases {
 // its feature is known. The surface turns its direction within some 30 ms, so the features are moved to the phase found
 // and the rest is estimated again.
 //
+// Where they agree, a match of any mapped feature that does not is refused: a tracker's noise widens every search
+// region to where look-alikes are, and the pose that all matches have in common is known far better.
+//
 // No answer is better than a wrong one: there is none when fewer than kFewestMatches converged features were found or
 // when the heart stands too still to tell. When fewer than half of the matches agree on a solution near the prediction,
 // that is said: the heart is elsewhere than predicted, or something else moves in the view.
@@ -46,6 +49,7 @@ class ImagePhase {
   ImagePhase() {
     matches_.reserve(kMostGroups * kLanes);
     used_.reserve(kMostGroups * kLanes);
+    owners_.reserve(kMostGroups * kLanes);
   }
 
   // After stage A. frame.phase need not be right by more than some tens of milliseconds.
@@ -58,10 +62,20 @@ class ImagePhase {
                                   const EstimatorSettings& settings, Vector3d& displacement_mm) noexcept;
 
  private:
+  // By how much the phases are taken off those of the frame, s.
+  struct Shifts {
+    double cardiac = 0.0;
+    double breath = 0.0;
+  };
   void collect(std::span<FeatureGroup> groups, const FrameRecord& frame, const EstimatorSettings& settings,
-               double shift_s, double breath_shift_s, bool converged) noexcept;
+               const Shifts& shifts, bool converged) noexcept;
+  // `solved`: of what was collected at `shifts`.
+  void refuse_what_disagrees(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
+                             const EstimatorSettings& settings, const Shifts& shifts,
+                             const CommonEstimate& solved) noexcept;
 
   std::vector<CommonMatch> matches_;
+  std::vector<FeatureSlot*> owners_;  // of matches_
   std::vector<std::uint8_t> used_;
 };
 

@@ -27,7 +27,7 @@ struct EstimatorSettings {
   UpdateSettings update;
   BatchSettings batch;
   int start_observations = 60;          // K, at most kMaxStartObservations
-  double pixel_deviation_px = 0.5;      // floor of a match's standard deviation, per axis
+  double pixel_deviation_px = 0.3;      // floor of a match's standard deviation, per axis
   double converged_deviation_mm = 1.0;  // bound on the largest deviation over the cycle
 };
 

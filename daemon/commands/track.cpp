@@ -288,6 +288,12 @@ int track(const Options& options) {
     if (const auto finished = video->finish(); !finished) return refuse(finished.error(), kFailure);
   }
   const Summary& summary = tracking.summary();
+  // Containers round: one frame less is none that is missing.
+  const std::uint64_t announced = (*source)->announced_frames();
+  if (!stop->requested() && summary.frames + 1 < announced) {
+    fmt::print(stderr, "perimap track: {}: announces {} frames, {} could be read: it may have been cut off\n",
+               options.input, announced, summary.frames);
+  }
   const double frames = static_cast<double>(std::max<std::uint64_t>(summary.frames, 1));
   fmt::print("{}{} frames, {:.1f} features a frame, {:.2f} ms a frame to follow them: {}\n",
              stop->requested() ? "stopped early: " : "", summary.frames, static_cast<double>(summary.rows) / frames,

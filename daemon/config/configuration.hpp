@@ -129,7 +129,7 @@ struct EstimationConfiguration {
   int harmonics = 8;  // H, cardiac
   int start_observations = 60;
   std::vector<double> start_depths_mm = {50.0, 90.0, 160.0};
-  double pixel_deviation_px = 0.5;
+  double pixel_deviation_px = 0.3;
   int iterations = 5;
   double gate_chi2 = 23.0;
   double prior_dc_deviation_mm = 40.0;

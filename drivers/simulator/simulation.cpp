@@ -135,8 +135,7 @@ Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth t
       // The sensor sits beside the lens, some way up the shaft, turned about the shaft's axis.
       X_SC_{so3_exp(Vector3d(0.15, -0.1, 1.2)), Vector3d(4.2, -6.8, 14.5)},
       path_(path),
-      obstacles_(settings_.seed, lens.width, lens.height, settings_.instrument, settings_.glints,
-                 settings_.smoke),
+      obstacles_(settings_.seed, lens.width, lens.height, settings_.instrument, settings_.glints, settings_.smoke),
       surface_W_(std::move(surface_W)) {}
 
 std::int64_t Simulation::utc_minus_monotonic_ns() const noexcept { return 1'750'000'000'000'000'000; }

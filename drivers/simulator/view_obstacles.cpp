@@ -121,8 +121,8 @@ void ViewObstacles::draw_glints(double t_s, std::span<float> radiance) const {
   }
 }
 
-// Scatters the scope's own light back, and dims what lies behind (Koschmieder's law). Clouds are a sum of drifting waves,
-// smooth enough to be worked out on a coarse grid.
+// Scatters the scope's own light back, and dims what lies behind (Koschmieder's law). Clouds are a sum of drifting
+// waves, smooth enough to be worked out on a coarse grid.
 void ViewObstacles::draw_smoke(double t_s, std::span<float> radiance) const {
   constexpr double kSmokePeriod_s = 8.0, kSmoke_s = 5.0;
   const double within = t_s - std::floor(t_s / kSmokePeriod_s) * kSmokePeriod_s;
@@ -161,8 +161,8 @@ void ViewObstacles::draw_smoke(double t_s, std::span<float> radiance) const {
       const float right = static_cast<float>(column % kGrid_px) / kGrid_px;
       const float share = (1 - down) * ((1 - right) * above[c] + right * above[c + 1]) +
                           down * ((1 - right) * below[c] + right * below[c + 1]);
-      float& seen = radiance[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
-                             static_cast<std::size_t>(column)];
+      float& seen =
+          radiance[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)];
       seen = share * seen + (1 - share) * kScattered;
     }
   }

@@ -45,6 +45,7 @@ class Method {
   std::vector<double> ms;
   std::vector<double> errors_px;
   std::vector<double> normalised;  // squared error under the method's own covariance, over 2
+  std::vector<double> noise_px;    // the error that the images' noise alone leaves, by the method's own account
   int lost = 0;
 };
 
@@ -170,7 +171,11 @@ void run(const Footage& footage, std::vector<Method*> methods, double start_erro
           const Vector2d e = found[i] - footage.px[frame][i];
           method->errors_px.push_back(e.norm());
           if (patches != nullptr) {
-            method->normalised.push_back(0.5 * e.dot(patches->matches()[i].covariance_px2.inverse() * e));
+            const Matrix2d& C = patches->matches()[i].covariance_px2;
+            method->normalised.push_back(0.5 * e.dot(C.inverse() * e));
+            const double floor_px = PatchTrackerSettings{}.sigma_floor_px;
+            constexpr double kMedianOfNorm = 1.177;  // of two normal errors of unit variance
+            method->noise_px.push_back(kMedianOfNorm * std::sqrt(std::max(0.0, 0.5 * C.trace() - floor_px * floor_px)));
           }
         }
       }
@@ -188,8 +193,8 @@ void compare(const Footage& footage, const char* light) {
   run(footage, methods, 0, kRounds);
   std::printf("\n%s, %dx%d, %zu features, %s light\n", footage.name.c_str(), footage.width, footage.height,
               footage.px[0].size(), light);
-  std::printf("  %-48s %8s %8s %8s %9s %9s %7s %8s\n", "", "p50 ms", "p99 ms", "x LK", "median px", "p95 px", "lost %",
-              "e2/sigma2");
+  std::printf("  %-48s %8s %8s %8s %9s %9s %7s %9s %8s\n", "", "p50 ms", "p99 ms", "x LK", "median px", "p95 px",
+              "lost %", "e2/sigma2", "noise px");
   for (const Method* method : methods) {
     const double share = 100.0 * method->lost / (method->lost + static_cast<double>(method->errors_px.size()));
     double mean = 0;
@@ -198,9 +203,9 @@ void compare(const Footage& footage, const char* light) {
                 quantile(method->ms, 0.99), quantile(predicted.ms, 0.5) / quantile(method->ms, 0.5),
                 quantile(method->errors_px, 0.5), quantile(method->errors_px, 0.95), share);
     if (method->normalised.empty()) {
-      std::printf(" %8s\n", "-");
+      std::printf(" %9s %8s\n", "-", "-");
     } else {
-      std::printf(" %8.2f\n", mean);
+      std::printf(" %9.2f %8.3f\n", mean, quantile(method->noise_px, 0.5));
     }
   }
 }
@@ -241,7 +246,8 @@ int main() {
   std::printf(
       "Templates of the first frame, predictions off by %.0f px an axis; LK starts from the true place in the frame\n"
       "before and builds the new frame's pyramid with derivatives, as it must each frame. 'x LK': against LK with\n"
-      "predicted start. 'e2/sigma2': mean squared error under the match's own covariance, 1 is calibrated.\n",
+      "predicted start. 'e2/sigma2': mean squared error under the match's own covariance, 1 is calibrated.\n"
+      "'noise px': median error that the noise of image and template alone leaves, by residual and Hessian.\n",
       kPrediction_px);
   for (const auto& [width, height] : {std::pair{1280, 720}, std::pair{1920, 1080}}) {
     for (const int features : {50, 200, 500}) {

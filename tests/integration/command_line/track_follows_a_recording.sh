@@ -53,5 +53,12 @@ exits "unwritable table" 1 "c.csv: can not be written" "$perimap" track "$work/a
 exits "unwritable video" 1 "c.mkv: can not be written" "$perimap" track "$work/a.mkv" --csv "$work/c.csv" --video "$work/none/c.mkv"
 exits "no table" 2 "--csv" "$perimap" track "$work/a.mkv"
 exits "no features" 2 "--features" "$perimap" track "$work/a.mkv" --csv "$work/c.csv" --features 0
+
+# A video that ends in the middle of a frame: what is whole is followed, and it says that something is missing.
+head -c $(($(stat -c %s "$work/a.mkv") * 6 / 10)) "$work/a.mkv" > "$work/cut.mkv"
+"$perimap" track "$work/cut.mkv" --csv "$work/cut.csv" --features 60 > /dev/null 2> "$work/error" ||
+  fail "cut video: ended with $?: $(cat "$work/error")"
+grep -q "cut.mkv: announces .* frames, .* could be read" "$work/error" || fail "nothing is said of the cut: $(cat "$work/error")"
+[ "$(wc -l < "$work/cut.csv")" -gt 1000 ] || fail "only $(wc -l < "$work/cut.csv") rows of a cut video"
 rm -f "$work"/*.mkv
 echo "as promised: $kept of $first features kept over $last frames"
