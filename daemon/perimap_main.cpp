@@ -4,6 +4,7 @@
 #include <exception>
 
 #include "daemon/commands/check.hpp"
+#include "daemon/commands/ctl.hpp"
 #include "daemon/commands/ecg.hpp"
 #include "daemon/commands/emulate.hpp"
 #include "daemon/commands/experiment.hpp"
@@ -36,6 +37,7 @@ int run(int argc, char** argv) {
   perimap::add_probe_command(app, exit_code);
   perimap::add_record_command(app, exit_code);
   perimap::add_check_command(app, exit_code);
+  perimap::add_ctl_command(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -4,11 +4,18 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <exception>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/pipeline/pipeline.hpp"
+#include "daemon/checkpoint/checkpoint_keeper.hpp"
+#include "daemon/checkpoint/warm_restart.hpp"
+#include "daemon/config/configuration_difference.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/service_manager.hpp"
@@ -34,9 +41,49 @@ int refuse(const Error& error, int code) {
   return code;
 }
 
-// A session over whatever `make_feeder` gives for the pipeline's entrance.
+// Where the service keeps `name`, by one of the variables of systemd.exec(5); none when it is not run as a service.
+std::optional<std::string> service_file(const char* variable, const char* name) {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing here writes the environment
+  const char* folder = std::getenv(variable);
+  if (folder == nullptr || *folder != '/' || std::strchr(folder, ':') != nullptr) return std::nullopt;
+  return fmt::format("{}/{}", folder, name);
+}
+
+// Puts into effect what may change while it runs, the log's level; says what needs a restart. `running`: what the
+// file came to when it was read last.
+Expected<std::string> reload(const std::string& configuration_file, Configuration& running) {
+  const auto read = load_configuration(configuration_file);
+  if (!read) return tl::unexpected(read.error());
+  std::string restart;
+  for (const std::string& key : differing_keys(running, *read)) {
+    if (key != "log.level") restart += fmt::format("{}{}", restart.empty() ? "" : ", ", key);
+  }
+  Logging::set_level(read->log.level);
+  running.log.level = read->log.level;
+  return restart.empty() ? std::string("in effect\n")
+                         : fmt::format("in effect but for what needs a restart: {}\n", restart);
+}
+
+// Takes up what an earlier run left in the file, when it may, and keeps the file from then on.
+std::unique_ptr<CheckpointKeeper> go_on_from(const std::string& file, const Configuration& configuration,
+                                             Pipeline& pipeline) {
+  const SetUp set_up = set_up_of(configuration, pipeline.settings());
+  auto keeper = std::make_unique<CheckpointKeeper>(pipeline, file, set_up, configuration.checkpoint.interval);
+  if (!std::filesystem::exists(file)) return keeper;
+  const Expected<MapMemory> memory = load_memory(file, set_up, configuration.checkpoint.maximum_age);
+  if (!memory) {
+    spdlog::warn("the map starts empty: {}", memory.error().message);
+    return keeper;
+  }
+  pipeline.recall(*memory, MonotonicClock::now());
+  keeper->begin_with(*memory);
+  spdlog::info("going on from {}: {} features", file, memory->features.size());
+  return keeper;
+}
+
+// A session over whatever `make_feeder` gives for the pipeline's entrance. `given`: the file as loaded by itself.
 template <class MakeFeeder>
-int run_session(const std::string& configuration_file, const Configuration& configuration,
+int run_session(const std::string& configuration_file, const Configuration& given, const Configuration& configuration,
                 const PipelineSettings& settings, const Identity& identity, StopSignal& stop,
                 const MakeFeeder& make_feeder) {
   const Logging logging(configuration.log.level);
@@ -54,6 +101,15 @@ int run_session(const std::string& configuration_file, const Configuration& conf
   LiveSession session(pipeline, runtime, **publication, make_feeder(pipeline.entrance()));
   ServiceManager service;
   session.report_to(service);
+  if (const auto file = configuration.checkpoint.file ? configuration.checkpoint.file
+                                                      : service_file("STATE_DIRECTORY", "checkpoint")) {
+    session.keep_checkpoints(go_on_from(*file, configuration, pipeline));
+  }
+  Configuration running = given;
+  if (const auto socket =
+          configuration.control.socket ? configuration.control.socket : service_file("RUNTIME_DIRECTORY", "control")) {
+    session.take_commands_at(*socket, [&configuration_file, &running] { return reload(configuration_file, running); });
+  }
   spdlog::info("perimapd {}: publishing '{}' on DDS domain {}, latency {} ms, {} workers", PERIMAP_VERSION,
                configuration.source.name, configuration.dds.domain,
                std::chrono::duration_cast<std::chrono::milliseconds>(configuration.pipeline.latency).count(),
@@ -95,7 +151,7 @@ int run(const std::string& configuration_file) {
   if (!given->replay.recording && names_devices(*given)) {
     auto setup = prepare_devices(configuration_file, *given);
     if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
-    return run_session(configuration_file, setup->configuration, setup->pipeline, setup->identity, *stop,
+    return run_session(configuration_file, *given, setup->configuration, setup->pipeline, setup->identity, *stop,
                        [&setup, &configuration_file](SensorEntrance& entrance) {
                          return std::make_unique<DeviceFeeder>(std::move(setup->devices), &entrance,
                                                                begin_recording(configuration_file, *setup));
@@ -116,7 +172,7 @@ int run(const std::string& configuration_file) {
   }
   auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
   if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
-  return run_session(configuration_file, setup->configuration, setup->pipeline, setup->identity, *stop,
+  return run_session(configuration_file, *given, setup->configuration, setup->pipeline, setup->identity, *stop,
                      [&setup](SensorEntrance& entrance) {
                        return std::make_unique<ReplayFeeder>(std::move(setup->reader), SensorIntake{&entrance});
                      });

@@ -19,12 +19,12 @@ END
 cpus='' action=show root=''
 while [ $# -gt 0 ]; do
   case $1 in
-    --cpus)
-      cpus=${2:-}
-      shift
-      ;;
-    --root)
-      root=${2:-}
+    --cpus | --root)
+      if [ -z "${2:-}" ]; then
+        echo "tune-realtime.sh: $1 needs a value" >&2
+        exit 2
+      fi
+      declare "${1#--}=$2"
       shift
       ;;
     --apply | --undo) action=${1#--} ;;
@@ -38,7 +38,7 @@ while [ $# -gt 0 ]; do
       exit 2
       ;;
   esac
-  shift || break
+  shift
 done
 if [ -n "$cpus" ] && ! [[ $cpus =~ ^[0-9]+(-[0-9]+)?(,[0-9]+(-[0-9]+)?)*$ ]]; then
   echo "tune-realtime.sh: --cpus needs a list of CPUs as 2-3 or 2,5, got '$cpus'" >&2

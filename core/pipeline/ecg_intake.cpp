@@ -15,6 +15,19 @@ constexpr Duration kMissing = std::chrono::milliseconds(100);
 
 void EcgIntake::push(const EcgBlock& block) noexcept {
   const RealtimeScope realtime;
+  if (!trigger_) forget_when_asked();
+  count(block);
+  if (trigger_) return;
+  // What does not fit is missing after a restart alone.
+  static_cast<void>(heard_.push(block));
+  hear(block);
+}
+
+void EcgIntake::recall(const EcgBlock& block) noexcept {
+  if (!trigger_) hear(block);
+}
+
+void EcgIntake::count(const EcgBlock& block) noexcept {
   // The count wraps, and starts over with the device: only a step forward is a loss.
   const auto step = static_cast<std::int32_t>(block.device_sequence - next_device_sequence_);
   if (started_ && step > 0) counters_.ecg_dropped.add(static_cast<std::uint64_t>(step));
@@ -27,10 +40,9 @@ void EcgIntake::push(const EcgBlock& block) noexcept {
     counters_.last_ecg_ns.set(static_cast<std::uint64_t>(to_ns(last)));
   }
   if (block.lead_off) counters_.ecg_lead_off.add(block.count);
-  if (!trigger_) find_beats(block);
 }
 
-void EcgIntake::find_beats(const EcgBlock& block) noexcept {
+void EcgIntake::hear(const EcgBlock& block) noexcept {
   if (block.lead_off) {
     detector_.lead_off(block.first_sample_time);
     interrupt();
@@ -67,6 +79,7 @@ void EcgIntake::push(const RTriggerPulse& pulse) noexcept {
   counters_.r_trigger_delay.add(pulse.arrival - pulse.time);
   counters_.last_r_trigger_ns.set(static_cast<std::uint64_t>(to_ns(pulse.time)));
   if (!trigger_) return;
+  forget_when_asked();
   const std::optional<RPeak> peak = trigger_->push(pulse.time, pulse.arrival);
   if (!peak) return;
   tracker_.on_r_peak(classer_.classify(*peak));
@@ -76,6 +89,16 @@ void EcgIntake::push(const RTriggerPulse& pulse) noexcept {
 void EcgIntake::interrupt() noexcept {
   classer_.interrupt();
   tracker_.interrupt();
+}
+
+void EcgIntake::forget_when_asked() noexcept {
+  if (!forget_asked_.exchange(false, std::memory_order_relaxed)) return;
+  detector_ = RPeakDetector();
+  if (trigger_) trigger_.emplace(*settings_.r_trigger);
+  classer_ = BeatClasser();
+  tracker_ = CardiacClockTracker(settings_.clock);
+  any_heard_ = false;
+  publish();
 }
 
 void EcgIntake::publish() noexcept {

@@ -1,6 +1,7 @@
 // From ECG samples or R triggers to the phase clock: what the ECG thread does with each block or pulse.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <optional>
 
@@ -10,6 +11,7 @@
 #include "core/phase/r_peak_detector.hpp"
 #include "core/phase/r_trigger.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
+#include "core/realtime/spsc_ring.hpp"
 #include "core/realtime/triple_buffer.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/r_trigger_pulse.hpp"
@@ -31,7 +33,7 @@ struct EcgIntakeSettings {
 class EcgIntake {
  public:
   EcgIntake(const EcgIntakeSettings& settings, ClockCells& cells, PipelineCounters& counters) noexcept
-      : tracker_(settings.clock), cells_(cells), counters_(counters) {
+      : settings_(settings), tracker_(settings.clock), cells_(cells), counters_(counters) {
     if (settings.r_trigger) trigger_.emplace(*settings.r_trigger);
   }
 
@@ -40,23 +42,38 @@ class EcgIntake {
   // Without a trigger configured, pulses are counted, no more. One thread pushes pulses, another may push samples.
   void push(const RTriggerPulse& pulse) noexcept;
 
+  // Before the first push(): hears a block of an earlier run again, uncounted.
+  void recall(const EcgBlock& block) noexcept;
+  // One other thread: the blocks as they came, as many as were not taken too late; false when there is none.
+  [[nodiscard]] bool pop_heard(EcgBlock& block) noexcept { return heard_.pop(block); }
+
+  // Any thread: before the next block (with a trigger, the next pulse) everything learnt of this patient's beats and rhythm is forgotten.
+  void ask_to_forget() noexcept { forget_asked_.store(true, std::memory_order_relaxed); }
+
  private:
+  static constexpr std::size_t kHeardBlocks = 256;
+
+  void forget_when_asked() noexcept;
   void interrupt() noexcept;
-  void find_beats(const EcgBlock& block) noexcept;
+  void count(const EcgBlock& block) noexcept;
+  void hear(const EcgBlock& block) noexcept;
   void publish() noexcept;
 
+  EcgIntakeSettings settings_;
   RPeakDetector detector_;
   std::optional<RTrigger> trigger_;
   BeatClasser classer_;
   CardiacClockTracker tracker_;
   ClockCells& cells_;
   PipelineCounters& counters_;
+  SpscRing<EcgBlock> heard_{kHeardBlocks};
   bool started_ = false;
   std::uint32_t next_device_sequence_ = 0;
   bool any_heard_ = false;
   Instant heard_until_;
   bool any_pulse_ = false;
   std::uint32_t next_pulse_ = 0;
+  std::atomic<bool> forget_asked_{false};  // relaxed: a message by itself
 };
 
 }  // namespace perimap

@@ -72,6 +72,7 @@ class Step {
     slot_.start.adopt_at_frame = now() + static_cast<std::uint64_t>(settings_.adoption_delay_frames);
     // Relaxed: housekeeping touches the flag only after it has popped this slot's request, and the ring orders that.
     slot_.start.ready.store(false, std::memory_order_relaxed);
+    slot_.forgotten = false;
     slot_.state = SlotState::kStarting;
     return LifeEvent::kStartRequested;
   }
@@ -82,6 +83,7 @@ class Step {
     if (!slot_.start.ready.load(std::memory_order_acquire)) {
       return now() == slot_.start.adopt_at_frame ? LifeEvent::kAdoptionLate : LifeEvent::kNone;
     }
+    if (slot_.forgotten) return give_up();
     const auto used = static_cast<std::uint32_t>(slot_.start.count);
     if (!slot_.start.outcome.ok()) {
       if (++slot_.failed_starts >= kFailedStartsBeforeLost) return give_up();
@@ -100,6 +102,7 @@ class Step {
     slot_.refused_in_a_row = 0;
     slot_.follows_something_else = false;
     slot_.unseen_frames = 0;
+    slot_.recalled_converged = false;
     slot_.state = SlotState::kMapped;
     check_convergence();
     return LifeEvent::kNone;
@@ -159,8 +162,10 @@ class Step {
     if (slot_.slow_error != nullptr) estimate.P += slot_.slow_error->covariance();
     slot_.largest_deviation_mm =
         largest_deviation_mm(estimate, settings_.estimator.layout, 16, job_.frame->respiration.known);
+    const InnovationMonitor& monitor = slot_.health.monitor();
+    const bool recalled = slot_.recalled_converged && monitor.verdict() == InnovationVerdict::kTooFew;
     slot_.converged = slot_.largest_deviation_mm <= settings_.estimator.converged_deviation_mm &&
-                      slot_.updates >= kUpdatesBeforeConverged && slot_.health.monitor().consistent();
+                      slot_.updates >= kUpdatesBeforeConverged && (monitor.consistent() || recalled);
   }
 
   FeatureSlot& slot_;

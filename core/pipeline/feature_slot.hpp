@@ -101,6 +101,7 @@ struct FeatureSlot {
   // learning
   HeldMatches held;
   int failed_starts = 0;
+  bool forgotten = false;  // while starting: to be emptied when housekeeping has given it back
   BatchStartExchange start;
   FeatureHealth health;
   Instant last_learnt;  // capture time of the last update, for process noise
@@ -110,6 +111,7 @@ struct FeatureSlot {
   std::unique_ptr<CorrelatedPoseNoise> slow_error;
   double largest_deviation_mm = 0.0;
   bool converged = false;
+  bool recalled_converged = false;  // it was before a restart: believed until the innovations tell
   Instant last_observed;
 };
 

@@ -1,6 +1,7 @@
 #include "core/pipeline/mapper.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "core/pipeline/feature_life.hpp"
 #include "core/pipeline/feature_stages.hpp"
@@ -93,6 +94,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   const Instant evaluated = MonotonicClock::now();
 
   offer_to_finder(frame, image);
+  fill_feed();
 
   counters_.predict_and_find.add(found - begun);
   counters_.phase_and_pose.add(joined - found);
@@ -172,6 +174,113 @@ void Mapper::learn() noexcept {
   if (settings_.lockstep) {
     team_.join();
     starter_.wait_until_done();
+  }
+}
+
+void Mapper::forget() noexcept {
+  const RealtimeScope realtime;
+  finish_learning();
+  for (FeatureGroup& group : groups_) {
+    for (std::size_t lane = 0; lane < group.slots().size(); ++lane) {
+      FeatureSlot& slot = group.slots()[lane];
+      if (slot.state == SlotState::kStarting) {
+        slot.forgotten = true;
+      } else if (slot.state != SlotState::kEmpty) {
+        slot.state = SlotState::kEmpty;
+        bank_.clear(group.feature(lane));
+      }
+    }
+  }
+  respiration_ = RespiratoryTracker(settings_.respiration);
+  displacement_seen_ = false;
+  breath_begun_ = false;
+  publish_nothing();
+  counters_.maps_forgotten.add();
+}
+
+void Mapper::recall(const MapMemory& memory) {
+  std::size_t index = 0;
+  for (const FeatureMemory& feature : memory.features) {
+    if (index >= slots_.size()) break;
+    if (feature.estimate.x.size() != bank_.layout().state_size()) continue;
+    FeatureSlot& slot = slots_[index];
+    slot.state = SlotState::kMapped;
+    slot.id = feature.id;
+    slot.first_observed = feature.first_observed;
+    slot.first_observed_px = feature.first_observed_px;
+    slot.last_observed = feature.last_observed;
+    slot.last_learnt = feature.last_observed;
+    slot.patch = feature.patch;
+    slot.patch_state = feature.patch_state;
+    // So long before the first frame that the map alone tells where to look; the difference of the counts is what
+    // matters, and wraps.
+    slot.last_found_frame = std::uint64_t{0} - (kTrackedMissesAllowed + 1);
+    slot.updates = feature.updates;
+    slot.converged = feature.converged;
+    slot.recalled_converged = feature.converged;
+    slot.largest_deviation_mm = feature.largest_deviation_mm;
+    bank_.set(static_cast<int>(index), feature.estimate);
+    next_id_ = std::max(next_id_, feature.id + 1);
+    ++index;
+  }
+  constexpr auto kNoRelease = std::numeric_limits<std::uint64_t>::max();
+  for (ShardCells& cells : cells_) {
+    const auto worker = static_cast<std::size_t>(&cells - cells_.data());
+    for (TripleBuffer<ShardSnapshot>* cell : {&cells.publisher, &cells.model}) {
+      ShardSnapshot& snapshot = cell->back();
+      snapshot.any = true;
+      snapshot.frame_sequence = memory.last_frame_sequence;
+      snapshot.release_sequences.fill(kNoRelease);
+      snapshot.features.clear();
+      for (auto g = worker; g < groups_.size(); g += tallies_.size()) {
+        for (std::size_t lane = 0; lane < groups_[g].slots().size(); ++lane) {
+          if (groups_[g].slots()[lane].state != SlotState::kMapped) continue;
+          FeatureSnapshot& feature = snapshot.features.emplace_back();
+          describe(groups_[g].slots()[lane], feature);
+          bank_.get(groups_[g].feature(lane), feature.x);
+        }
+      }
+      cell->publish();
+    }
+  }
+}
+
+// Before the workers learn from the frame, while they are at rest.
+void Mapper::fill_feed() noexcept {
+  const std::span<MapFeed::Entry> entries = feed_.back();
+  if (entries.empty()) return;
+  for (MapFeed::Entry& entry : entries) {
+    entry.slot = next_fed_slot_;
+    next_fed_slot_ = (next_fed_slot_ + 1) % slots_.size();
+    entry.maps_forgotten = counters_.maps_forgotten.get();
+    const FeatureSlot& slot = slots_[entry.slot];
+    entry.mapped = slot.state == SlotState::kMapped && slot.health.state() != HealthState::kInconsistent;
+    if (!entry.mapped) continue;
+    FeatureMemory& feature = entry.feature;
+    feature.id = slot.id;
+    feature.first_observed = slot.first_observed;
+    feature.first_observed_px = slot.first_observed_px;
+    feature.last_observed = slot.last_observed;
+    feature.patch = slot.patch;
+    feature.patch_state = slot.patch_state;
+    feature.updates = slot.updates;
+    feature.converged = slot.converged;
+    feature.largest_deviation_mm = slot.largest_deviation_mm;
+    bank_.get(static_cast<int>(entry.slot), feature.estimate);
+    if (slot.slow_error != nullptr) feature.estimate.P += slot.slow_error->covariance();
+  }
+  feed_.hand_over();
+}
+
+// The workers are at rest and see by their next start what the mapper writes in their place.
+void Mapper::publish_nothing() noexcept {
+  for (ShardCells& cells : cells_) {
+    for (TripleBuffer<ShardSnapshot>* cell : {&cells.publisher, &cells.model}) {
+      ShardSnapshot& snapshot = cell->back();
+      snapshot.any = false;
+      snapshot.features.clear();
+      cell->publish();
+    }
   }
 }
 

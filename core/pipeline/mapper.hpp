@@ -17,6 +17,8 @@
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/frame_job.hpp"
 #include "core/pipeline/image_phase.hpp"
+#include "core/pipeline/map_feed.hpp"
+#include "core/pipeline/map_memory.hpp"
 #include "core/pipeline/phase_cells.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
@@ -51,6 +53,15 @@ class Mapper {
   // is done on return.
   void learn() noexcept;
 
+  // Forgets every feature and the breathing, and publishes that nothing is mapped, with no frame needed for it.
+  void forget() noexcept;
+
+  // Before the first frame: takes the features of an earlier run, as many as there is room for and whose estimates are
+  // of this layout, and publishes them.
+  void recall(const MapMemory& memory);
+  // The mapped features, for whoever keeps them.
+  [[nodiscard]] MapFeed& feed() noexcept { return feed_; }
+
  private:
   template <void (Mapper::*Stage)(int) noexcept>
   static void run_stage(void* self, int worker) noexcept {
@@ -65,6 +76,8 @@ class Mapper {
   void expect_displacement(FrameRecord& frame) const noexcept;
   void settle_phases(const FrameRecord& frame) noexcept;
   void settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept;
+  void publish_nothing() noexcept;
+  void fill_feed() noexcept;
   void adopt_found_features(std::uint64_t frame_index) noexcept;
   void offer_to_finder(const FrameRecord& frame, const GreyImage& image) noexcept;
 
@@ -106,6 +119,8 @@ class Mapper {
   std::uint32_t next_id_ = 1;
   Instant last_capture_;
   Instant learn_started_;
+  MapFeed feed_;
+  std::size_t next_fed_slot_ = 0;
 };
 
 }  // namespace perimap

@@ -62,6 +62,22 @@ void Pipeline::map(const FrameHandle& frame) noexcept {
   mapper_.learn();
 }
 
+void Pipeline::ask_to_forget() noexcept {
+  entrance_.ask_to_forget_ecg();
+  forget_asked_.store(true, std::memory_order_relaxed);
+  entrance_.mapper_wakeup().post();
+}
+
+void Pipeline::forget_if_asked() noexcept {
+  if (forget_asked_.exchange(false, std::memory_order_relaxed)) mapper_.forget();
+}
+
+void Pipeline::recall(const MapMemory& memory, Instant now) {
+  for (const EcgBlock& block : memory.ecg) entrance_.recall_ecg(block);
+  mapper_.recall(memory);
+  schedule_.resume(memory.last_capture, memory.last_frame_sequence, memory.frame_period, now);
+}
+
 void Pipeline::drain_stamps(Instant now) noexcept {
   const RealtimeScope realtime;
   FrameStamp stamp;
@@ -85,6 +101,9 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
   const SurfaceSample& sample =
       composer_.compose(release, corrected, phase_cells_.publisher_respiration.front(), publisher_view_);
   counters_.samples.add();
+  counters_.last_release_capture_ns.set(static_cast<std::uint64_t>(to_ns(release.capture)));
+  counters_.last_release_sequence.set(release.frame_sequence);
+  counters_.frame_period_ns.set(static_cast<std::uint64_t>(schedule_.period().count()));
   if (release.frame_missing) counters_.samples_without_frame.add();
   if (sample.update_late) counters_.samples_from_late_update.add();
   return sample;

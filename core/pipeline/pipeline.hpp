@@ -1,6 +1,7 @@
 // All parts of the pipeline, built once and joined; the threads that run them are the daemon's.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <span>
 #include <vector>
@@ -40,6 +41,17 @@ class Pipeline {
   // Mapper thread: one frame through A, B and C, its buffer given back, then D begun.
   void map(const FrameHandle& frame) noexcept;
 
+  // Any thread: a new patient. The mapper forgets the map and the ECG thread the rhythm, each when it runs next;
+  // counters().maps_forgotten tells when the map is gone.
+  void ask_to_forget() noexcept;
+  // Mapper thread, between frames.
+  void forget_if_asked() noexcept;
+
+  // Before any thread runs: what an earlier run knew. Publishing goes on from it at once, before any source is back.
+  void recall(const MapMemory& memory, Instant now);
+  // One housekeeping thread: the mapped features, a few at a time.
+  [[nodiscard]] MapFeed& map_feed() noexcept { return mapper_.feed(); }
+
   // Publisher thread: takes over the stamps of the frames that have arrived.
   void drain_stamps(Instant now) noexcept;
   // Publisher thread: the surface of one release, with all that is known now. Valid until the next call.
@@ -65,6 +77,8 @@ class Pipeline {
   Mapper mapper_;
   ReleaseSchedule schedule_;
   SurfaceComposer composer_;
+  // Relaxed: a message by itself; the mapper's wake-up follows it.
+  std::atomic<bool> forget_asked_{false};
   std::vector<const ShardSnapshot*> publisher_view_;
   std::vector<const ShardSnapshot*> model_view_;
 };

@@ -44,6 +44,7 @@ struct PipelineCounters {
   Counter features_converged;
   Counter features_inconsistent;
   Counter features_lost;
+  Counter maps_forgotten;         // by command, for a new patient
   Counter features_started_anew;  // inconsistent, also after inflation
   LatencyHistogram predict_and_find;
   LatencyHistogram phase_and_pose;
@@ -57,6 +58,9 @@ struct PipelineCounters {
   Counter samples;
   Counter samples_without_frame;
   Counter samples_from_late_update;
+  Counter last_release_capture_ns;  // where the frame times go on after a restart
+  Counter last_release_sequence;
+  Counter frame_period_ns;
   LatencyHistogram release_tardiness;
   LatencyHistogram dds_write;
 };

@@ -1,5 +1,7 @@
 #include "core/pipeline/release_schedule.hpp"
 
+#include <algorithm>
+
 namespace perimap {
 
 void ReleaseSchedule::fit(const FrameStamp& stamp) noexcept {
@@ -25,6 +27,15 @@ bool ReleaseSchedule::on_frame(const FrameStamp& stamp, Instant now) noexcept {
   }
   pending_[head_++ % kCapacity] = stamp;
   return true;
+}
+
+void ReleaseSchedule::resume(Instant last_capture, std::uint64_t last_sequence, Duration period, Instant now) noexcept {
+  if (period <= Duration(0)) return;
+  const auto passed = std::max<std::int64_t>(0, (now - latency_ - last_capture) / period);
+  have_last_ = true;
+  last_capture_ = last_capture + passed * period;
+  last_sequence_ = last_sequence + static_cast<std::uint64_t>(passed);
+  period_ = period;
 }
 
 std::optional<Release> ReleaseSchedule::next() const noexcept {

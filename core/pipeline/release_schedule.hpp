@@ -28,6 +28,9 @@ class ReleaseSchedule {
   // (`now` is past it, or a later one was taken); it then only helps to fit the frame times.
   bool on_frame(const FrameStamp& stamp, Instant now) noexcept;
 
+  // Before the first frame: releases go on as after a frame of then, on its frame times, the next one after `now`.
+  void resume(Instant last_capture, std::uint64_t last_sequence, Duration period, Instant now) noexcept;
+
   // The next release; none before the first frame. With frame_missing it is provisional: a frame that arrives before
   // its deadline may replace it.
   [[nodiscard]] std::optional<Release> next() const noexcept;

@@ -29,6 +29,14 @@ class SensorEntrance {
   void push_ecg(const EcgBlock& block) noexcept { ecg_.push(block); }
   void push_r_trigger(const RTriggerPulse& pulse) noexcept { ecg_.push(pulse); }
 
+  // Any thread: the next block is of another patient.
+  void ask_to_forget_ecg() noexcept { ecg_.ask_to_forget(); }
+
+  // Before the first block: one of an earlier run.
+  void recall_ecg(const EcgBlock& block) noexcept { ecg_.recall(block); }
+  // Whoever keeps the ECG for the next run.
+  [[nodiscard]] bool pop_heard_ecg(EcgBlock& block) noexcept { return ecg_.pop_heard(block); }
+
   // Mapper side.
   [[nodiscard]] bool pop_frame(FrameHandle& frame) noexcept { return mapper_frames_.pop(frame); }
   [[nodiscard]] bool pop_pose(TrackerSample& sample) noexcept { return poses_.pop(sample); }

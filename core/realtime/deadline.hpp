@@ -20,8 +20,8 @@ inline void sleep_until(Instant deadline) noexcept {
 // only sleeps, 0.8 us so.
 inline constexpr Duration kSpin = std::chrono::microseconds(60);
 
-// Returns at `deadline`, closer than a sleep alone comes to it; at once when it has passed. Spins for at most kSpin: the
-// kernel stalls a real-time thread that spins for long (sched_rt_runtime_us) for 50 ms.
+// Returns at `deadline`, closer than a sleep alone comes to it; at once when it has passed. Spins for at most kSpin:
+// the kernel stalls a real-time thread that spins for long (sched_rt_runtime_us) for 50 ms.
 inline void wait_until_exactly(Instant deadline) noexcept {
   sleep_until(deadline - kSpin);
   while (MonotonicClock::now() < deadline) {

@@ -179,6 +179,20 @@ struct LogConfiguration {
   bool operator==(const LogConfiguration&) const = default;
 };
 
+struct ControlConfiguration {
+  std::optional<std::string> socket;  // absolute; none: $RUNTIME_DIRECTORY/control of the service
+
+  bool operator==(const ControlConfiguration&) const = default;
+};
+
+struct CheckpointConfiguration {
+  std::optional<std::string> file;  // absolute; none: $STATE_DIRECTORY/checkpoint of the service
+  Duration interval = std::chrono::seconds(2);
+  Duration maximum_age = std::chrono::seconds(120);
+
+  bool operator==(const CheckpointConfiguration&) const = default;
+};
+
 struct Configuration {
   SourceConfiguration source;
   ReplayConfiguration replay;
@@ -195,6 +209,8 @@ struct Configuration {
   RecordingConfiguration recording;
   StatusConfiguration status;
   LogConfiguration log;
+  ControlConfiguration control;
+  CheckpointConfiguration checkpoint;
 
   bool operator==(const Configuration&) const = default;
 };

@@ -510,6 +510,13 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
               "largest deviation over the cycle of a converged feature; 0: 1 mm, or 2 mm with tracker noise");
 }
 
+bool is_socket_path(const std::string& text) {
+  constexpr std::size_t kLongest = 107;  // of unix(7), less the final NUL
+  return text.starts_with('/') && text.size() <= kLongest && text.find('\0') == std::string::npos;
+}
+
+bool is_absolute_path(const std::string& text) { return text.starts_with('/') && text.find('\0') == std::string::npos; }
+
 void add_running(std::vector<ConfigurationKey>& keys) {
   const auto ms = std::chrono::milliseconds(1);
   const auto s = std::chrono::seconds(1);
@@ -561,6 +568,17 @@ void add_running(std::vector<ConfigurationKey>& keys) {
                                                                   {"warning", Level::kWarning},
                                                                   {"error", Level::kError}}};
   Section("log", keys).choice("level", levels, PERIMAP_MEMBER(log.level), "least severity that is logged");
+  Section("control", keys)
+      .optional_text("socket", "an absolute path of at most 107 bytes", is_socket_path, PERIMAP_MEMBER(control.socket),
+                     "where `perimap ctl` reaches perimapd; none: nowhere, or, as a service, in its runtime directory");
+  Section("checkpoint", keys)
+      .optional_text(
+          "file", "an absolute path", is_absolute_path, PERIMAP_MEMBER(checkpoint.file),
+          "where map and rhythm are kept for a restart after a crash; none: nowhere, or, as a service, in its "
+          "state directory")
+      .duration("interval_s", s, 0.1, 3600, PERIMAP_MEMBER(checkpoint.interval), "from one checkpoint to the next")
+      .duration("maximum_age_s", s, 0, 86400, PERIMAP_MEMBER(checkpoint.maximum_age),
+                "an older checkpoint is not gone on with");
 }
 
 #undef PERIMAP_MEMBER

@@ -76,6 +76,8 @@ Logging::Logging(LogConfiguration::Level level) {
 
 Logging::~Logging() { spdlog::shutdown(); }
 
+void Logging::set_level(LogConfiguration::Level level) { spdlog::set_level(to_spdlog(level)); }
+
 std::size_t Logging::overruns() const { return spdlog::thread_pool()->overrun_counter(); }
 
 }  // namespace perimap

@@ -19,6 +19,9 @@ class Logging {
   // Writes what is queued.
   ~Logging();
 
+  // Any thread.
+  static void set_level(LogConfiguration::Level level);
+
   // Lines dropped so far.
   [[nodiscard]] std::size_t overruns() const;
 };

@@ -22,8 +22,8 @@ class ServiceManager {
   // One line for `systemctl status`; sent when it is another than before.
   void tell_status(const std::string& line);
 
-  // `beats`: a count that the watched thread raises at least four times in a watchdog interval. The watchdog is fed only when the
-  // count has moved since it was fed last, so a hung thread is noticed although the caller is well.
+  // `beats`: a count that the watched thread raises at least four times in a watchdog interval. The watchdog is fed
+  // only when the count has moved since it was fed last, so a hung thread is noticed although the caller is well.
   void feed_watchdog(std::uint64_t beats, Instant now);
 
  private:

@@ -1,12 +1,12 @@
 #include "daemon/runtime/live_session.hpp"
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <chrono>
 #include <string>
 #include <utility>
 
+#include "daemon/publishing/status_text.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
 
 namespace perimap {
@@ -31,12 +31,52 @@ LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Pu
     : pipeline_(pipeline),
       runtime_(pipeline, settings, publication),
       feeder_(std::move(feeder)),
-      on_tick_(std::move(on_tick)) {}
+      on_tick_(std::move(on_tick)),
+      identity_(settings.identity),
+      service_status_(settings.identity) {}
+
+void LiveSession::take_commands_at(std::string socket, std::function<Expected<std::string>()> reload) {
+  control_socket_ = std::move(socket);
+  reload_ = std::move(reload);
+}
+
+StatusFacts LiveSession::facts() const {
+  StatusFacts facts = runtime_.facts();
+  feeder_->describe(facts);
+  return facts;
+}
+
+Expected<void> LiveSession::start_control() {
+  if (control_socket_.empty()) return {};
+  commands_ = std::make_unique<SessionCommands>(
+      pipeline_, identity_, [this] { return facts(); }, reload_,
+      [this] {
+        if (keeper_) keeper_->forget();
+      });
+  auto server =
+      ControlServer::create(control_socket_, [this](ControlCommand command) { return commands_->answer(command); });
+  if (!server) return tl::unexpected(std::move(server.error()));
+  control_.emplace(std::move(*server));
+  control_thread_ =
+      runtime_.threads().launch("control", ThreadRole::kHousekeeping, [this] { control_->serve(control_interrupt_); });
+  return {};
+}
+
+void LiveSession::stop_control() {
+  if (!control_thread_.joinable()) return;
+  control_interrupt_.request();
+  control_thread_.join();
+  control_.reset();
+}
 
 Expected<void> LiveSession::run(StopSignal& stop) {
+  if (auto started = start_control(); !started) return started;
   runtime_.describe_sources_by([this](StatusFacts& facts) { feeder_->describe(facts); });
   runtime_.start();
   feeder_->start(runtime_.threads());
+  if (keeper_) {
+    checkpoint_thread_ = runtime_.threads().launch("checkpoint", ThreadRole::kHousekeeping, [this] { keeper_->run(); });
+  }
   // Ready with no device there as well: it publishes what it knows, and its status says what is missing.
   if (service_ != nullptr) service_->ready();
   bool told_end = false;
@@ -53,6 +93,11 @@ Expected<void> LiveSession::run(StopSignal& stop) {
     if (told_end && runtime_.all_released()) break;
   }
   if (service_ != nullptr) service_->stopping();
+  stop_control();
+  if (checkpoint_thread_.joinable()) {
+    keeper_->stop();
+    checkpoint_thread_.join();
+  }
   feeder_->stop();
   runtime_.stop();
   if (const auto failed = pipeline_.counters().searches_failed.get(); failed > 0) {
@@ -70,27 +115,7 @@ void LiveSession::report() {
   if (service_ == nullptr) return;
   service_->feed_watchdog(runtime_.publisher_beats(), MonotonicClock::now());
   if (ticks_++ % kTicksAStatus != 0) return;
-  StatusFacts facts = runtime_.facts();
-  feeder_->describe(facts);
-  const PipelineCounters& counters = pipeline_.counters();
-  std::string line = fmt::format("{} surfaces published, {} features converged", counters.samples.get(),
-                                 counters.features_converged.get());
-  const auto age = [now = to_ns(MonotonicClock::now())](const Counter& last_ns) {
-    return Duration(now - static_cast<std::int64_t>(last_ns.get()));
-  };
-  const auto add = [&](const char* source, const SourceLink& link, const Counter& last_ns) {
-    if (link.closed) {
-      line += fmt::format(", {} closed", source);
-    } else if (last_ns.get() == 0) {
-      line += fmt::format(", nothing from the {} yet", source);
-    } else if (age(last_ns) > facts.stalled_after) {
-      line += fmt::format(", {} silent", source);
-    }
-  };
-  add("camera", facts.camera, counters.last_frame_ns);
-  add("tracker", facts.tracker, counters.last_pose_ns);
-  add("ECG", facts.ecg, counters.last_ecg_ns);
-  service_->tell_status(line);
+  service_->tell_status(status_line(service_status_.fill(pipeline_.counters(), facts(), MonotonicClock::now())));
 }
 
 // On the first tick: by then every thread has asked for what it was to ask for.

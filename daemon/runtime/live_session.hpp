@@ -3,15 +3,23 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
 
 #include "core/error/expected.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "daemon/checkpoint/checkpoint_keeper.hpp"
+#include "daemon/control/control_server.hpp"
 #include "daemon/process/service_manager.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/live_runtime.hpp"
 #include "daemon/runtime/sensor_feeder.hpp"
+#include "daemon/runtime/session_commands.hpp"
 #include "drivers/recording/replay_reader.hpp"
+#include "drivers/transport/interrupt.hpp"
 
 namespace perimap {
 
@@ -28,10 +36,19 @@ class LiveSession {
   // Before run(): `service` is told of readiness, health and end. It must outlive this.
   void report_to(ServiceManager& service) noexcept { service_ = &service; }
 
+  // Before run(): commands are taken at `socket` while it runs, and `reload` is what the command of that name does.
+  void take_commands_at(std::string socket, std::function<Expected<std::string>()> reload);
+
+  // Before run(): `keeper`, over the same pipeline, keeps checkpoints while it runs.
+  void keep_checkpoints(std::unique_ptr<CheckpointKeeper> keeper) { keeper_ = std::move(keeper); }
+
   // Returns when every surface of the recording is released, or on a stop signal; an error when reading failed.
   [[nodiscard]] Expected<void> run(StopSignal& stop);
 
  private:
+  [[nodiscard]] Expected<void> start_control();
+  void stop_control();
+  [[nodiscard]] StatusFacts facts() const;
   void report();
   void warn_of_refused_privileges();
   void warn_of_short_latency();
@@ -41,7 +58,17 @@ class LiveSession {
   std::unique_ptr<SensorFeeder> feeder_;
   std::function<void()> on_tick_;
   ServiceManager* service_ = nullptr;
+  Identity identity_;
+  WireStatus service_status_;
   std::uint64_t ticks_ = 0;
+  std::string control_socket_;
+  std::function<Expected<std::string>()> reload_;
+  std::unique_ptr<SessionCommands> commands_;
+  std::optional<ControlServer> control_;
+  Interrupt control_interrupt_;
+  std::thread control_thread_;
+  std::unique_ptr<CheckpointKeeper> keeper_;
+  std::thread checkpoint_thread_;
   bool privileges_told_ = false;
   bool latency_checked_ = false;
 };

@@ -62,10 +62,13 @@ std::optional<ReplayEvent> ReplayFeeder::take() {
 
 void ReplayFeeder::deliver() {
   std::optional<Duration> offset = offset_;
+  const Instant begun = MonotonicClock::now();
   while (auto event = take()) {
     if (!offset) offset = MonotonicClock::now() + kLead - arrival_of(*event);
     shift(*event, *offset);
     const Instant arrival = arrival_of(*event);
+    // As from a device: what came before there was anyone to take it is gone.
+    if (offset_ && arrival < begun) continue;
     for (Instant now = MonotonicClock::now(); now < arrival; now = MonotonicClock::now()) {
       sleep_until(std::min(arrival, now + kLongestSleep));
       const std::lock_guard lock(mutex_);

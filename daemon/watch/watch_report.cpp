@@ -7,6 +7,8 @@
 #include <numbers>
 #include <string_view>
 
+#include "daemon/publishing/status_text.hpp"
+
 namespace perimap {
 namespace {
 
@@ -40,32 +42,6 @@ std::string_view name_of(perimap_FeatureState state) { return name_in(kFeatureSt
 std::string_view name_of(perimap_FeatureReason reason) {
   return name_in<5>({"none", "not_observed", "deviation_large", "innovations_high", "phase_lost"},
                     static_cast<int>(reason));
-}
-
-std::string_view name_of(perimap_StageKind kind) {
-  return name_in<7>({"predict_and_find", "phase_and_pose", "evaluate", "learn", "capture_to_update",
-                     "release_tardiness", "dds_write"},
-                    static_cast<int>(kind));
-}
-
-std::string_view name_of(perimap_RespirationState state) {
-  return name_in<3>({"off", "searching", "locked"}, static_cast<int>(state));
-}
-
-std::string_view name_of(perimap_RecordingState state) {
-  return name_in<3>({"off", "on", "stopped"}, static_cast<int>(state));
-}
-
-std::string_view name_of(perimap_PhaseState state) {
-  return name_in<5>({"unknown", "locked", "free_running", "lost", "from_image"}, static_cast<int>(state));
-}
-
-std::string_view name_of(perimap_Rhythm rhythm) {
-  return name_in<4>({"unknown", "predictable", "unpredictable", "ectopic"}, static_cast<int>(rhythm));
-}
-
-std::string_view name_of(perimap_Privilege privilege) {
-  return name_in<3>({"not_requested", "granted", "refused"}, static_cast<int>(privilege));
 }
 
 double ms(Duration duration) { return to_seconds(duration) * 1e3; }
@@ -107,45 +83,6 @@ std::string state_text(const SurfaceDigest& last) {
 
 // On one line whatever bytes the publisher put into its names.
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
-
-Json status_json(const StatusDigest& digest) {
-  const perimap_Status& status = digest.status;
-  Json json = {{"version", status.version},
-               {"realtime_priority", name_of(status.realtime_priority)},
-               {"memory_locked", name_of(status.memory_locked)},
-               {"latency_ms", static_cast<double>(status.latency_ns) * 1e-6},
-               {"frames", status.frames},
-               {"frames_too_late", status.frames_too_late},
-               {"frames_without_pose", status.frames_without_pose},
-               {"frames_without_phase", status.frames_without_phase},
-               {"phases_from_image", status.phases_from_image},
-               {"phase", name_of(status.phase_state)},
-               {"rhythm", name_of(status.rhythm)},
-               {"respiration", name_of(status.respiration)},
-               {"respiration_suspected", status.respiration_suspected},
-               {"recording", name_of(status.recording)},
-               {"messages_recorded", status.messages_recorded},
-               {"frames_not_recorded", status.frames_not_recorded},
-               {"other_not_recorded", status.other_not_recorded},
-               {"samples", status.samples},
-               {"samples_without_frame", status.samples_without_frame},
-               {"samples_from_late_update", status.samples_from_late_update},
-               {"learning_put_off", status.learning_put_off},
-               {"adoptions_late", status.adoptions_late},
-               {"features_tracked", status.features_tracked},
-               {"features_starting", status.features_starting},
-               {"features_lost", status.features_lost},
-               {"features_started_anew", status.features_started_anew}};
-  Json stages = Json::object();
-  for (const perimap_StageLatency& stage : digest.stages) {
-    stages[std::string(name_of(stage.kind))] = {{"count", stage.count},
-                                                {"p50", static_cast<double>(stage.p50_ns) * 1e-6},
-                                                {"p99", static_cast<double>(stage.p99_ns) * 1e-6},
-                                                {"max", static_cast<double>(stage.max_ns) * 1e-6}};
-  }
-  json["stages_ms"] = std::move(stages);
-  return json;
-}
 
 }  // namespace
 
@@ -217,7 +154,7 @@ std::string report_json(const StreamReport& report, ReportKind kind) {
     json["median_deviation_mm"] = last.median_deviation_mm ? Json(*last.median_deviation_mm) : Json(nullptr);
   }
   if (report.status) {
-    json["status"] = status_json(*report.status);
+    json["status"] = status_json(report.status->status, report.status->stages);
   }
   return dump(json);
 }

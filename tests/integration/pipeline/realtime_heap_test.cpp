@@ -115,6 +115,9 @@ TEST(RealtimePath, MakesNoHeapCallInLockstepFromFirstFrameToMappedSurface) {
     if (!*event) break;
     runtime.deliver(**event);
   }
+  pipeline.ask_to_forget();
+  pipeline.forget_if_asked();
+  pipeline.entrance().push_ecg({});
   EXPECT_EQ(heap_calls_in_scope, 0);
   EXPECT_GT(publication.surfaces, 100);
   EXPECT_GT(publication.features, 10U) << "the path must have been exercised up to mapped features";

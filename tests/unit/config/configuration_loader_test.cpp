@@ -199,7 +199,8 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"VersionAsText", "version = \"1\"", "test.toml:1:11: key 'version': expected 1, got \"1\""},
         Wrong{"UnknownSection", "version = 1\n[traker]\n",
               "test.toml:2:2: key 'traker': expected one of version, source, replay, camera, tracker, ecg, phase, "
-              "respiration, pipeline, features, estimation, realtime, dds, recording, status, log, got an unknown key"},
+              "respiration, pipeline, features, estimation, realtime, dds, recording, status, log, control, "
+              "checkpoint, got an unknown key"},
         Wrong{"UnknownKey", "version = 1\n[phase]\nlow = 1\n",
               "test.toml:3:1: key 'phase.low': expected one of law, lost_after_s, from_image, image_alone_s, predictor, got an unknown key"},
         Wrong{"SectionIsAValue", "version = 1\nphase = 3\n", "test.toml:2:9: key 'phase': expected a table, got 3"},

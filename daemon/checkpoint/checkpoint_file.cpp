@@ -1,0 +1,306 @@
+#include "daemon/checkpoint/checkpoint_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <system_error>
+#include <type_traits>
+#include <utility>
+
+#include "drivers/device/byte_cursor.hpp"
+#include "drivers/recording/crc32.hpp"
+#include "drivers/transport/descriptor.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr std::string_view kMagic = "PERIMAPC";
+constexpr std::uint32_t kFormat = 1;
+constexpr std::size_t kHeader = 16;
+constexpr std::size_t kLongestText = 4096;
+constexpr std::uint32_t kMostFeatures = 4096;
+constexpr std::uint32_t kMostBlocks = 65536;
+static_assert(std::is_trivially_copyable_v<PatchTemplate>);
+static_assert(std::endian::native == std::endian::little, "a template is kept as it lies in memory");
+
+class Bytes {
+ public:
+  template <class T>
+  Bytes& add(T value) {
+    static_assert(std::is_arithmetic_v<T>);
+    return raw(&value, sizeof value);
+  }
+  Bytes& add(const std::string& text) {
+    add(static_cast<std::uint32_t>(text.size()));
+    return raw(text.data(), text.size());
+  }
+  Bytes& add(Instant t) { return add(to_ns(t)); }
+  Bytes& raw(const void* data, std::size_t size) {
+    bytes_.append(static_cast<const char*>(data), size);
+    return *this;
+  }
+  [[nodiscard]] std::string take() { return std::move(bytes_); }
+
+ private:
+  std::string bytes_;
+};
+
+// Reads what Bytes wrote. The first thing that is wrong stays what is told.
+class Reader {
+ public:
+  explicit Reader(std::string_view bytes)
+      : cursor_(std::as_bytes(std::span(bytes.data(), bytes.size()))), size_(bytes.size()) {}
+
+  [[nodiscard]] bool good() const { return error_.empty(); }
+  [[nodiscard]] tl::unexpected<Error> error() const { return fail(error_); }
+  [[nodiscard]] std::size_t left() const { return cursor_.left(); }
+
+  void expect(bool true_thing, std::string_view what) {
+    if (!good()) return;
+    if (!cursor_.good()) {
+      error_ = fmt::format("byte {}: expected {}, got the end", size_, what);
+    } else if (!true_thing) {
+      error_ = fmt::format("byte {}: expected {}", size_ - cursor_.left(), what);
+    }
+  }
+  template <class T>
+  T number(std::string_view what) {
+    if constexpr (std::is_same_v<T, double>) {
+      const double value = std::bit_cast<double>(cursor_.number<std::uint64_t>());
+      expect(std::isfinite(value), what);
+      return good() ? value : 0.0;
+    } else {
+      const auto value = static_cast<T>(cursor_.number<std::make_unsigned_t<T>>());
+      expect(true, what);
+      return good() ? value : T{0};
+    }
+  }
+  float float32(std::string_view what) {
+    const float value = cursor_.float32();
+    expect(true, what);
+    return value;
+  }
+  Instant instant(std::string_view what) { return from_ns(number<std::int64_t>(what)); }
+  std::uint32_t count(std::uint32_t most, std::size_t least_bytes_each, std::string_view what) {
+    const auto n = number<std::uint32_t>(what);
+    expect(n <= most && n * std::uint64_t{least_bytes_each} <= cursor_.left(), what);
+    return good() ? n : 0;
+  }
+  std::string text(std::string_view what) {
+    const std::uint32_t n = count(kLongestText, 1, what);
+    const auto bytes = cursor_.take(n);
+    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  }
+  void raw(void* data, std::size_t size, std::string_view what) {
+    const auto bytes = cursor_.take(size);
+    expect(bytes.size() == size, what);
+    if (good()) std::memcpy(data, bytes.data(), size);
+  }
+
+ private:
+  ByteCursor<std::endian::little> cursor_;
+  std::size_t size_;
+  std::string error_;
+};
+
+bool is_flag(const bool& flag) {
+  unsigned char byte = 0;
+  std::memcpy(&byte, &flag, 1);
+  return byte <= 1;
+}
+
+// What the search relies on: the sides are its loops' limits, the offsets its places in the image.
+bool is_sound(const PatchTemplate& patch) {
+  if (!is_flag(patch.affine_usable)) return false;
+  for (std::size_t l = 0; l < patch.levels.size(); ++l) {
+    const PatchTemplate::Level& level = patch.levels[l];
+    if (!is_flag(level.usable)) return false;
+    if (!level.usable) continue;
+    const auto small = [](double x) { return std::abs(x) <= 0.5; };
+    const auto finite = [](const auto& values) {
+      return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+    };
+    if (level.side != PatchTemplate::kSide[l] || !small(level.offset_x) || !small(level.offset_y) ||
+        !std::isfinite(level.mean) || !std::isfinite(level.sum_squares) || !finite(level.sd_mean) ||
+        !finite(level.sd_on_grey) || !finite(level.translation_inverse)) {
+      return false;
+    }
+  }
+  return std::all_of(patch.affine_inverse.begin(), patch.affine_inverse.end(),
+                     [](double x) { return std::isfinite(x); });
+}
+
+FeatureMemory read_feature(Reader& in, int state_size) {
+  FeatureMemory feature;
+  feature.id = in.number<std::uint32_t>("a feature's number");
+  feature.first_observed = in.instant("when it was first observed");
+  feature.first_observed_px.x() = in.number<double>("where it was first observed");
+  feature.first_observed_px.y() = in.number<double>("where it was first observed");
+  feature.last_observed = in.instant("when it was last observed");
+  in.raw(&feature.patch, sizeof feature.patch, "a template");
+  if (in.good()) in.expect(is_sound(feature.patch), "a sound template");
+  if (!in.good()) feature.patch = PatchTemplate{};
+  PatchState& state = feature.patch_state;
+  for (double* x : {&state.px.x(), &state.px.y(), &state.A(0, 0), &state.A(0, 1), &state.A(1, 0), &state.A(1, 1),
+                    &state.gain, &state.bias}) {
+    *x = in.number<double>("how it looked when it was last found");
+  }
+  feature.updates = in.number<std::int32_t>("its updates");
+  feature.converged = in.number<std::uint8_t>("whether it has converged") == 1;
+  feature.largest_deviation_mm = in.number<double>("its largest deviation");
+  in.expect(feature.updates >= 0 && feature.largest_deviation_mm >= 0.0 && feature.id > 0, "a feature's figures");
+  feature.estimate.x.resize(state_size);
+  feature.estimate.P.resize(state_size, state_size);
+  for (int i = 0; i < state_size && in.good(); ++i) feature.estimate.x(i) = in.number<double>("a coefficient");
+  for (int i = 0; i < state_size && in.good(); ++i) {
+    for (int k = 0; k <= i && in.good(); ++k) {
+      feature.estimate.P(i, k) = feature.estimate.P(k, i) = in.number<double>("a covariance");
+    }
+    in.expect(feature.estimate.P(i, i) >= 0.0, "a variance");
+  }
+  return feature;
+}
+
+EcgBlock read_block(Reader& in) {
+  EcgBlock block;
+  block.first_sample_time = in.instant("an ECG block's time");
+  block.arrival = block.first_sample_time;
+  block.sample_period = Duration(in.number<std::int64_t>("an ECG block's period"));
+  block.lead_off = in.number<std::uint8_t>("whether the lead was off") == 1;
+  block.count = in.number<std::uint32_t>("an ECG block's samples");
+  in.expect(block.count <= EcgBlock::kCapacity && block.sample_period > Duration(0), "an ECG block");
+  if (!in.good()) return {};
+  for (std::uint32_t i = 0; i < block.count; ++i) block.mV[i] = in.float32("an ECG sample");
+  return block;
+}
+
+std::string system_message() { return std::generic_category().message(errno); }
+
+}  // namespace
+
+std::string serialize_feature(const FeatureMemory& feature) {
+  Bytes out;
+  out.add(feature.id).add(feature.first_observed).add(feature.first_observed_px.x()).add(feature.first_observed_px.y());
+  out.add(feature.last_observed).raw(&feature.patch, sizeof feature.patch);
+  const PatchState& state = feature.patch_state;
+  for (const double x : {state.px.x(), state.px.y(), state.A(0, 0), state.A(0, 1), state.A(1, 0), state.A(1, 1),
+                         state.gain, state.bias}) {
+    out.add(x);
+  }
+  out.add(std::int32_t{feature.updates}).add(std::uint8_t{feature.converged}).add(feature.largest_deviation_mm);
+  const FeatureEstimate& estimate = feature.estimate;
+  for (const double x : estimate.x) out.add(x);
+  for (Eigen::Index i = 0; i < estimate.P.rows(); ++i) {
+    for (Eigen::Index k = 0; k <= i; ++k) out.add(double{estimate.P(i, k)});
+  }
+  return out.take();
+}
+
+std::string serialize(const Checkpoint& checkpoint, std::span<const std::string> features) {
+  Bytes body;
+  body.add(std::string(PERIMAP_VERSION)).add(static_cast<std::uint32_t>(sizeof(PatchTemplate)));
+  const SetUp& set_up = checkpoint.set_up;
+  body.add(set_up.camera).add(set_up.hand_eye).add(set_up.patient_frame).add(set_up.estimator);
+  body.add(checkpoint.boot).add(checkpoint.saved).add(checkpoint.utc_ns);
+  const MapMemory& memory = checkpoint.memory;
+  body.add(memory.last_capture).add(memory.last_frame_sequence).add(std::int64_t{memory.frame_period.count()});
+  body.add(static_cast<std::uint32_t>(memory.ecg.size()));
+  for (const EcgBlock& block : memory.ecg) {
+    body.add(block.first_sample_time).add(std::int64_t{block.sample_period.count()});
+    body.add(std::uint8_t{block.lead_off}).add(block.count);
+    for (const float mV : block.samples()) body.add(mV);
+  }
+  // Each feature is as long as its state asks for.
+  constexpr std::size_t kRest = 4 + 8 + 16 + 8 + sizeof(PatchTemplate) + 64 + 4 + 1 + 8;
+  int state_size = 0;
+  while (!features.empty() && state_size < kMaxState &&
+         kRest + 8 * static_cast<std::size_t>(state_size + state_size * (state_size + 1) / 2) < features[0].size()) {
+    ++state_size;
+  }
+  body.add(std::int32_t{state_size}).add(static_cast<std::uint32_t>(features.size()));
+  for (const std::string& feature : features) body.raw(feature.data(), feature.size());
+  const std::string bytes = body.take();
+  Bytes file;
+  file.raw(kMagic.data(), kMagic.size()).add(kFormat);
+  file.add(crc32_update(0, std::as_bytes(std::span(bytes.data(), bytes.size())))).raw(bytes.data(), bytes.size());
+  return file.take();
+}
+
+Expected<Checkpoint> parse_checkpoint(std::string_view bytes) {
+  Reader in(bytes);
+  std::string magic(kMagic.size(), '\0');
+  in.raw(magic.data(), magic.size(), "a checkpoint");
+  in.expect(magic == kMagic, "a checkpoint");
+  const auto format = in.number<std::uint32_t>("the format");
+  in.expect(format == kFormat, "format 1");
+  const auto crc = in.number<std::uint32_t>("a CRC");
+  if (!in.good()) return in.error();
+  const std::string_view body = bytes.substr(kHeader);
+  in.expect(crc32_update(0, std::as_bytes(std::span(body.data(), body.size()))) == crc,
+            "bytes that agree with the CRC");
+  if (!in.good()) return in.error();
+  return parse_checkpoint_body(body);
+}
+
+Expected<Checkpoint> parse_checkpoint_body(std::string_view body) {
+  Reader in(body);
+  Checkpoint checkpoint;
+  const std::string version = in.text("the version");
+  in.expect(version == PERIMAP_VERSION, "a checkpoint of this version, " PERIMAP_VERSION);
+  const auto template_size = in.number<std::uint32_t>("the size of a template");
+  in.expect(template_size == sizeof(PatchTemplate), "a checkpoint of this build");
+  checkpoint.set_up.camera = in.text("the camera");
+  checkpoint.set_up.hand_eye = in.text("the hand-eye transform");
+  checkpoint.set_up.patient_frame = in.text("the patient's frame");
+  checkpoint.set_up.estimator = in.text("the estimator");
+  checkpoint.boot = in.text("the boot");
+  checkpoint.saved = in.instant("when it was saved");
+  checkpoint.utc_ns = in.number<std::int64_t>("when it was saved");
+  MapMemory& memory = checkpoint.memory;
+  memory.last_capture = in.instant("the last capture");
+  memory.last_frame_sequence = in.number<std::uint64_t>("the last frame's number");
+  memory.frame_period = Duration(in.number<std::int64_t>("the frame period"));
+  in.expect(memory.frame_period >= Duration(0) && memory.frame_period <= std::chrono::seconds(10), "a frame period");
+  const std::uint32_t blocks = in.count(kMostBlocks, 21, "the number of ECG blocks");
+  for (std::uint32_t i = 0; i < blocks && in.good(); ++i) memory.ecg.push_back(read_block(in));
+  const auto state_size = in.number<std::int32_t>("the size of a state");
+  in.expect(state_size >= 0 && state_size <= kMaxState, "the size of a state");
+  const std::uint32_t features = in.count(kMostFeatures, sizeof(PatchTemplate), "the number of features");
+  for (std::uint32_t i = 0; i < features && in.good(); ++i) memory.features.push_back(read_feature(in, state_size));
+  in.expect(in.left() == 0, "the end");
+  if (!in.good()) return in.error();
+  return checkpoint;
+}
+
+Expected<void> replace_file(const std::filesystem::path& file, std::string_view bytes) {
+  const std::filesystem::path part = file.string() + ".part";
+  const auto failed = [&part](std::string_view what) {
+    return fail(fmt::format("{}: cannot {}: {}", part.string(), what, system_message()));
+  };
+  {
+    const Descriptor out(open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, S_IRUSR | S_IWUSR));
+    if (!out) return failed("be created");
+    while (!bytes.empty()) {
+      const ssize_t written = write(out.get(), bytes.data(), bytes.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) return failed("be written");
+      bytes.remove_prefix(static_cast<std::size_t>(written));
+    }
+    // On the disk before its name is: else a power cut could leave an empty file of that name.
+    if (fsync(out.get()) != 0) return failed("be written");
+  }
+  if (rename(part.c_str(), file.c_str()) != 0) return failed("take its place");
+  const Descriptor folder(
+      open(file.has_parent_path() ? file.parent_path().c_str() : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder) static_cast<void>(fsync(folder.get()));
+  return {};
+}
+
+}  // namespace perimap

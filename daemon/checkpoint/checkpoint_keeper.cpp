@@ -1,0 +1,90 @@
+#include "daemon/checkpoint/checkpoint_keeper.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <span>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "daemon/checkpoint/warm_restart.hpp"
+
+namespace perimap {
+namespace {
+
+// From which detector, classes and the autoregression over 60 intervals are learnt again.
+constexpr Duration kKeptEcg = std::chrono::seconds(60);
+constexpr Duration kLongestWait = std::chrono::milliseconds(100);
+
+}  // namespace
+
+CheckpointKeeper::CheckpointKeeper(Pipeline& pipeline, std::filesystem::path file, SetUp set_up, Duration interval)
+    : pipeline_(pipeline), file_(std::move(file)), set_up_(std::move(set_up)), interval_(interval) {}
+
+void CheckpointKeeper::begin_with(const MapMemory& memory) {
+  std::size_t slot = 0;
+  for (const FeatureMemory& feature : memory.features) features_[slot++] = serialize_feature(feature);
+  ecg_.assign(memory.ecg.begin(), memory.ecg.end());
+}
+
+void CheckpointKeeper::run() {
+  Instant next = MonotonicClock::now() + interval_;
+  while (!stopping_.load(std::memory_order_relaxed)) {
+    pipeline_.map_feed().wait_until(std::min(next, MonotonicClock::now() + kLongestWait));
+    const std::lock_guard lock(mutex_);
+    take_features();
+    take_ecg();
+    if (MonotonicClock::now() < next) continue;
+    write();
+    next = MonotonicClock::now() + interval_;
+  }
+}
+
+void CheckpointKeeper::take_features() {
+  const std::span<const MapFeed::Entry> entries = pipeline_.map_feed().front();
+  if (entries.empty()) return;
+  for (const MapFeed::Entry& entry : entries) {
+    if (entry.mapped && entry.maps_forgotten == pipeline_.counters().maps_forgotten.get()) {
+      features_[entry.slot] = serialize_feature(entry.feature);
+    } else {
+      features_.erase(entry.slot);
+    }
+  }
+  pipeline_.map_feed().give_back();
+}
+
+void CheckpointKeeper::take_ecg() {
+  EcgBlock block;
+  while (pipeline_.entrance().pop_heard_ecg(block)) ecg_.push_back(block);
+  while (!ecg_.empty() && ecg_.front().first_sample_time + kKeptEcg < ecg_.back().first_sample_time) ecg_.pop_front();
+}
+
+void CheckpointKeeper::write() {
+  if (features_.empty()) return;
+  const Now now = this_boot_now();
+  Checkpoint checkpoint{set_up_, now.boot, now.monotonic, now.utc_ns, {}};
+  checkpoint.memory.ecg.assign(ecg_.begin(), ecg_.end());
+  const PipelineCounters& counters = pipeline_.counters();
+  checkpoint.memory.last_capture = from_ns(static_cast<std::int64_t>(counters.last_release_capture_ns.get()));
+  checkpoint.memory.last_frame_sequence = counters.last_release_sequence.get();
+  checkpoint.memory.frame_period = Duration(static_cast<std::int64_t>(counters.frame_period_ns.get()));
+  std::vector<std::string> features;
+  features.reserve(features_.size());
+  for (const auto& [slot, bytes] : features_) features.push_back(bytes);
+  const Expected<void> written = replace_file(file_, serialize(checkpoint, features));
+  if (!written && !write_failed_) spdlog::error("no checkpoint: {}", written.error().message);
+  write_failed_ = !written;
+}
+
+void CheckpointKeeper::forget() {
+  const std::lock_guard lock(mutex_);
+  take_ecg();
+  features_.clear();
+  ecg_.clear();
+  std::error_code error;
+  std::filesystem::remove(file_, error);
+  if (error) spdlog::error("{}: the old patient's checkpoint cannot be removed: {}", file_.string(), error.message());
+}
+
+}  // namespace perimap

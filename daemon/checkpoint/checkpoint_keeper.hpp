@@ -1,0 +1,50 @@
+// Keeps what a crash must not take: writes checkpoints while the pipeline runs.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/checkpoint/checkpoint_file.hpp"
+
+namespace perimap {
+
+// run() takes the mapped features from the pipeline as they come, some a frame, and the ECG; every `interval` it
+// replaces the file. None of it is on the real-time path.
+class CheckpointKeeper {
+ public:
+  CheckpointKeeper(Pipeline& pipeline, std::filesystem::path file, SetUp set_up, Duration interval);
+
+  // Before run(): what the pipeline has recalled, so that a crash that follows soon takes nothing either.
+  void begin_with(const MapMemory& memory);
+
+  // On the calling thread until stop(). What can not be written is logged once and tried again.
+  void run();
+  void stop() noexcept { stopping_.store(true, std::memory_order_relaxed); }
+
+  // Any thread, once the pipeline has forgotten the map: the file goes, and nothing of that map is written again.
+  void forget();
+
+ private:
+  void take_features();
+  void take_ecg();
+  void write();
+
+  Pipeline& pipeline_;
+  std::filesystem::path file_;
+  SetUp set_up_;
+  Duration interval_;
+  std::mutex mutex_;                             // of what follows, between run() and forget()
+  std::map<std::size_t, std::string> features_;  // by slot, serialized
+  std::deque<EcgBlock> ecg_;
+  bool write_failed_ = false;
+  // Relaxed: a message by itself.
+  std::atomic<bool> stopping_{false};
+};
+
+}  // namespace perimap

@@ -1,0 +1,121 @@
+#include "daemon/publishing/status_text.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+namespace perimap {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <std::size_t N>
+std::string_view name_in(const std::array<std::string_view, N>& names, int value) {
+  return value >= 0 && static_cast<std::size_t>(value) < N ? names[static_cast<std::size_t>(value)] : "unknown";
+}
+
+std::string_view name_of(perimap_StageKind kind) {
+  return name_in<7>({"predict_and_find", "phase_and_pose", "evaluate", "learn", "capture_to_update",
+                     "release_tardiness", "dds_write"},
+                    static_cast<int>(kind));
+}
+
+std::string_view name_of(perimap_PhaseState state) {
+  return name_in<5>({"unknown", "locked", "free_running", "lost", "from_image"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_Rhythm rhythm) {
+  return name_in<4>({"unknown", "predictable", "unpredictable", "ectopic"}, static_cast<int>(rhythm));
+}
+
+std::string_view name_of(perimap_RespirationState state) {
+  return name_in<3>({"off", "searching", "locked"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_Privilege privilege) {
+  return name_in<3>({"not_requested", "granted", "refused"}, static_cast<int>(privilege));
+}
+
+std::string_view name_of(perimap_RecordingState state) {
+  return name_in<3>({"off", "on", "stopped"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_SourceKind kind) {
+  return name_in<4>({"camera", "tracker", "ecg", "r_trigger"}, static_cast<int>(kind));
+}
+
+std::string_view name_of(perimap_SourceState state) {
+  return name_in<5>({"starting", "ok", "stalled", "ended", "closed"}, static_cast<int>(state));
+}
+
+double ms(std::int64_t ns) { return static_cast<double>(ns) * 1e-6; }
+
+}  // namespace
+
+Json status_json(const perimap_Status& status, std::span<const perimap_StageLatency> stages) {
+  Json json = {{"version", status.version},
+               {"realtime_priority", name_of(status.realtime_priority)},
+               {"memory_locked", name_of(status.memory_locked)},
+               {"latency_ms", ms(status.latency_ns)},
+               {"frames", status.frames},
+               {"frames_too_late", status.frames_too_late},
+               {"frames_without_pose", status.frames_without_pose},
+               {"frames_without_phase", status.frames_without_phase},
+               {"phases_from_image", status.phases_from_image},
+               {"phase", name_of(status.phase_state)},
+               {"rhythm", name_of(status.rhythm)},
+               {"respiration", name_of(status.respiration)},
+               {"respiration_suspected", status.respiration_suspected},
+               {"recording", name_of(status.recording)},
+               {"messages_recorded", status.messages_recorded},
+               {"frames_not_recorded", status.frames_not_recorded},
+               {"other_not_recorded", status.other_not_recorded},
+               {"samples", status.samples},
+               {"samples_without_frame", status.samples_without_frame},
+               {"samples_from_late_update", status.samples_from_late_update},
+               {"learning_put_off", status.learning_put_off},
+               {"adoptions_late", status.adoptions_late},
+               {"features_tracked", status.features_tracked},
+               {"features_starting", status.features_starting},
+               {"features_lost", status.features_lost},
+               {"features_started_anew", status.features_started_anew}};
+  Json by_stage = Json::object();
+  for (const perimap_StageLatency& stage : stages) {
+    by_stage[std::string(name_of(stage.kind))] = {
+        {"count", stage.count}, {"p50", ms(stage.p50_ns)}, {"p99", ms(stage.p99_ns)}, {"max", ms(stage.max_ns)}};
+  }
+  json["stages_ms"] = std::move(by_stage);
+  return json;
+}
+
+Json full_status_json(const perimap_Status& status) {
+  Json json = status_json(status, {status.stages._buffer, status.stages._length});
+  json["features_converging"] = status.features_converging;
+  json["features_converged"] = status.features_converged;
+  json["features_inconsistent"] = status.features_inconsistent;
+  Json sources = Json::object();
+  for (const perimap_SourceStatus& source : std::span(status.sources._buffer, status.sources._length)) {
+    sources[std::string(name_of(source.kind))] = {{"state", name_of(source.state)},
+                                                  {"received", source.received},
+                                                  {"dropped", source.dropped},
+                                                  {"invalid", source.invalid},
+                                                  {"age_ms", ms(status.time_ns - source.last_source_time_ns)},
+                                                  {"delay_p50_ms", ms(source.delay_p50_ns)},
+                                                  {"delay_max_ms", ms(source.delay_max_ns)}};
+  }
+  json["sources"] = std::move(sources);
+  return json;
+}
+
+std::string status_line(const perimap_Status& status) {
+  std::string line =
+      fmt::format("{} surfaces published, {} features converged", status.samples, status.features_converged);
+  for (const perimap_SourceStatus& source : std::span(status.sources._buffer, status.sources._length)) {
+    if (source.state != perimap_SOURCE_OK) line += fmt::format(", {} {}", name_of(source.kind), name_of(source.state));
+  }
+  return line;
+}
+
+}  // namespace perimap

@@ -1,0 +1,23 @@
+// A status in words: for machines, and on one line.
+#pragma once
+
+#include <perimap.h>
+
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+
+namespace perimap {
+
+// Names are those of perimap.idl without their prefix, times in ms. Values may come from outside: none is trusted as an
+// index.
+[[nodiscard]] nlohmann::ordered_json status_json(const perimap_Status& status,
+                                                 std::span<const perimap_StageLatency> stages);
+
+// What it publishes, and which sources are not well. With the sequences that the status itself has.
+[[nodiscard]] std::string status_line(const perimap_Status& status);
+
+// With the sequences that the status itself has: privileges, sources and stages, a line each.
+[[nodiscard]] nlohmann::ordered_json full_status_json(const perimap_Status& status);
+
+}  // namespace perimap

@@ -1,0 +1,35 @@
+// What a running session does when it is told to (perimap ctl).
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "core/error/expected.hpp"
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/control/control_request.hpp"
+#include "daemon/publishing/identity.hpp"
+#include "daemon/publishing/wire_reports.hpp"
+
+namespace perimap {
+
+// Used by the thread that takes the commands.
+class SessionCommands {
+ public:
+  // `pipeline` must outlive it and run. `facts` tells what the status says beside the counters; `reload` reads the
+  // configuration again and says what came of it; `on_forgotten` is called once the old patient's map is gone.
+  SessionCommands(Pipeline& pipeline, const Identity& identity, std::function<StatusFacts()> facts,
+                  std::function<Expected<std::string>()> reload, std::function<void()> on_forgotten);
+
+  [[nodiscard]] Expected<std::string> answer(ControlCommand command);
+
+ private:
+  [[nodiscard]] Expected<std::string> forget_patient();
+
+  Pipeline& pipeline_;
+  WireStatus status_;
+  std::function<StatusFacts()> facts_;
+  std::function<Expected<std::string>()> reload_;
+  std::function<void()> on_forgotten_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,111 @@
+#!/bin/bash
+# perimapd is killed again and again while tracker and ECG, outside it, go on and the camera's frames come at their times:
+# each time it publishes valid positions again from its checkpoint, and what was received is as good as it should be.
+# killed.sh PERIMAPD PERIMAP RECORDING WORK_FOLDER CYCLONEDDS_XML KILLS
+set -uo pipefail
+perimapd=$1 perimap=$2 recording=$3 work=$4 kills=$6
+export CYCLONEDDS_URI=file://$5
+domain=$((40 + $$ % 150))
+port=$((20000 + $$ % 20000))
+rm -rf "$work"
+mkdir -p "$work"
+short=$(mktemp -d "${TMPDIR:-/tmp}/perimap-killed-XXXXXX") # names of sockets and links must be short
+started=()
+trap 'kill -9 "${started[@]}" 2> /dev/null; rm -rf "$short"' EXIT
+
+fail() {
+  echo "FAILED: $1"
+  exit 1
+}
+
+start=$(awk '{printf "%.3f", $1 + 4}' /proc/uptime)
+"$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$short/ecg" --recording "$recording" --start "$start" \
+  > "$work/emulators" 2>&1 &
+started+=($!)
+cat > "$work/devices.toml" << END
+version = 1
+[camera]
+playback = "$recording"
+playback_start_s = $start
+[tracker]
+protocol = "ndi"
+port = "tcp:127.0.0.1:$port"
+frame_rate_hz = 100
+[ecg]
+protocol = "cyton"
+port = "$short/ecg"
+[dds]
+domain = $domain
+[control]
+socket = "$short/control"
+[checkpoint]
+file = "$work/checkpoint"
+interval_s = 0.5
+END
+"$perimap" watch --domain $domain --wait 60 --record "$work/received.mcap" > "$work/watch" 2>&1 &
+watch=$!
+started+=($watch)
+
+: > "$work/log"
+now() { awk '{print $1}' /proc/uptime; }
+# One figure of the daemon's status; 0 while it does not answer.
+status() { "$perimap" ctl --socket "$short/control" status 2> /dev/null | awk -v key="$1:" '$1 == key {v = $2} END {print v + 0}'; }
+begin() {
+  "$perimapd" -c "$work/devices.toml" 2>> "$work/log" &
+  daemon=$!
+  started+=($daemon)
+}
+
+begin
+until [ "$(status features_converged)" -ge 20 ]; do
+  kill -0 $daemon 2> /dev/null || fail "it ended before it had mapped: $(tail -n 3 "$work/log")"
+  sleep 0.3
+done
+sleep 2
+longest=0
+for ((i = 1; i <= kills; i++)); do
+  kill -9 $daemon
+  wait $daemon 2> /dev/null
+  was=$(now)
+  begin
+  until [ "$(status samples)" -gt 0 ]; do
+    kill -0 $daemon 2> /dev/null || fail "after kill $i it did not come back: $(tail -n 3 "$work/log")"
+    sleep 0.02
+  done
+  took=$(awk -v a="$was" -v b="$(now)" 'BEGIN {print b - a}')
+  longest=$(awk -v a="$longest" -v b="$took" 'BEGIN {print (a > b) ? a : b}')
+  sleep "0.$((RANDOM % 9))$((RANDOM % 10))"
+  sleep $((RANDOM % 2))
+done
+converged=$(status features_converged)
+kill -TERM $daemon
+wait $daemon || fail "it ended with $?: $(tail -n 3 "$work/log")"
+sleep 0.5
+kill -INT $watch
+wait $watch || fail "watch: $(tail -n 5 "$work/watch")"
+echo "publishing again after at most $longest s; $converged features converged at the end"
+
+resumed=$(grep -Ec 'going on from .*: [1-9][0-9]+ features' "$work/log")
+[ "$resumed" -eq "$kills" ] || fail "it went on from its checkpoint $resumed times of $kills: $(grep -E 'going on|starts empty' "$work/log")"
+[ "$converged" -ge 20 ] || fail "the map is gone: $(tail -n 20 "$work/log")"
+"$perimap" report "$recording" --samples "$work/received.mcap" --json "$work/report.json" > "$work/report" 2>&1 ||
+  fail "report: $(cat "$work/report")"
+node - "$work/report.json" << 'END' || fail "what was received is wrong"
+const a = JSON.parse(require("fs").readFileSync(process.argv[2])).accuracy;
+const e = a.settled_error;
+console.log(`settled: ${e.count} positions, median ${e.median_mm} mm, 95 % ${e.p95_mm} mm`);
+process.exit(e.count > 1000 && e.median_mm < 1 && e.p95_mm < 3 ? 0 : 1);
+END
+
+# Of another set-up it takes nothing.
+sed -i 's/^\[ecg\]/hand_eye_translation_SC_mm = [1.0, 2.0, 3.0]\n[ecg]/' "$work/devices.toml"
+begin
+until [ "$(status version | wc -l)" -gt 0 ] && grep -q 'another hand-eye' "$work/log"; do
+  kill -0 $daemon 2> /dev/null || fail "with another set-up it ended: $(tail -n 3 "$work/log")"
+  sleep 0.1
+done
+[ "$(status features_converged)" -eq 0 ] || fail "it went on from another set-up"
+kill -TERM $daemon
+wait $daemon
+[ "$(find "$work" -name 'checkpoint*' | wc -l)" -le 2 ] || fail "it leaves files: $(ls "$work")"
+echo "as promised"
