@@ -4,20 +4,17 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <exception>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "core/pipeline/pipeline.hpp"
 #include "daemon/checkpoint/checkpoint_keeper.hpp"
-#include "daemon/checkpoint/warm_restart.hpp"
 #include "daemon/config/configuration_difference.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/logging/logging.hpp"
+#include "daemon/process/service_folder.hpp"
 #include "daemon/process/service_manager.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/dds_publication.hpp"
@@ -41,14 +38,6 @@ int refuse(const Error& error, int code) {
   return code;
 }
 
-// Where the service keeps `name`, by one of the variables of systemd.exec(5); none when it is not run as a service.
-std::optional<std::string> service_file(const char* variable, const char* name) {
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing here writes the environment
-  const char* folder = std::getenv(variable);
-  if (folder == nullptr || *folder != '/' || std::strchr(folder, ':') != nullptr) return std::nullopt;
-  return fmt::format("{}/{}", folder, name);
-}
-
 // Puts into effect what may change while it runs, the log's level; says what needs a restart. `running`: what the
 // file came to when it was read last.
 Expected<std::string> reload(const std::string& configuration_file, Configuration& running) {
@@ -62,23 +51,6 @@ Expected<std::string> reload(const std::string& configuration_file, Configuratio
   running.log.level = read->log.level;
   return restart.empty() ? std::string("in effect\n")
                          : fmt::format("in effect but for what needs a restart: {}\n", restart);
-}
-
-// Takes up what an earlier run left in the file, when it may, and keeps the file from then on.
-std::unique_ptr<CheckpointKeeper> go_on_from(const std::string& file, const Configuration& configuration,
-                                             Pipeline& pipeline) {
-  const SetUp set_up = set_up_of(configuration, pipeline.settings());
-  auto keeper = std::make_unique<CheckpointKeeper>(pipeline, file, set_up, configuration.checkpoint.interval);
-  if (!std::filesystem::exists(file)) return keeper;
-  const Expected<MapMemory> memory = load_memory(file, set_up, configuration.checkpoint.maximum_age);
-  if (!memory) {
-    spdlog::warn("the map starts empty: {}", memory.error().message);
-    return keeper;
-  }
-  pipeline.recall(*memory, MonotonicClock::now());
-  keeper->begin_with(*memory);
-  spdlog::info("going on from {}: {} features", file, memory->features.size());
-  return keeper;
 }
 
 // A session over whatever `make_feeder` gives for the pipeline's entrance. `given`: the file as loaded by itself.
@@ -103,7 +75,7 @@ int run_session(const std::string& configuration_file, const Configuration& give
   session.report_to(service);
   if (const auto file = configuration.checkpoint.file ? configuration.checkpoint.file
                                                       : service_file("STATE_DIRECTORY", "checkpoint")) {
-    session.keep_checkpoints(go_on_from(*file, configuration, pipeline));
+    session.keep_checkpoints(CheckpointKeeper::go_on_from(*file, configuration, pipeline));
   }
   Configuration running = given;
   if (const auto socket =

@@ -22,6 +22,23 @@ constexpr Duration kLongestWait = std::chrono::milliseconds(100);
 CheckpointKeeper::CheckpointKeeper(Pipeline& pipeline, std::filesystem::path file, SetUp set_up, Duration interval)
     : pipeline_(pipeline), file_(std::move(file)), set_up_(std::move(set_up)), interval_(interval) {}
 
+std::unique_ptr<CheckpointKeeper> CheckpointKeeper::go_on_from(const std::filesystem::path& file,
+                                                               const Configuration& configuration, Pipeline& pipeline) {
+  const SetUp set_up = set_up_of(configuration, pipeline.settings());
+  auto keeper = std::make_unique<CheckpointKeeper>(pipeline, file, set_up, configuration.checkpoint.interval);
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return keeper;
+  const Expected<MapMemory> memory = load_memory(file, set_up, configuration.checkpoint.maximum_age);
+  if (!memory) {
+    spdlog::warn("the map starts empty: {}", memory.error().message);
+    return keeper;
+  }
+  pipeline.recall(*memory, MonotonicClock::now());
+  keeper->begin_with(*memory);
+  spdlog::info("going on from {}: {} features", file.string(), memory->features.size());
+  return keeper;
+}
+
 void CheckpointKeeper::begin_with(const MapMemory& memory) {
   std::size_t slot = 0;
   for (const FeatureMemory& feature : memory.features) features_[slot++] = serialize_feature(feature);

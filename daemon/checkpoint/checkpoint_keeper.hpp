@@ -6,11 +6,13 @@
 #include <deque>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 
 #include "core/pipeline/pipeline.hpp"
 #include "daemon/checkpoint/checkpoint_file.hpp"
+#include "daemon/config/configuration.hpp"
 
 namespace perimap {
 
@@ -18,10 +20,12 @@ namespace perimap {
 // replaces the file. None of it is on the real-time path.
 class CheckpointKeeper {
  public:
+  // Before the pipeline runs: it takes up what an earlier run left in the file, when it may; the log says what came of
+  // it.
+  [[nodiscard]] static std::unique_ptr<CheckpointKeeper> go_on_from(const std::filesystem::path& file,
+                                                                    const Configuration& configuration,
+                                                                    Pipeline& pipeline);
   CheckpointKeeper(Pipeline& pipeline, std::filesystem::path file, SetUp set_up, Duration interval);
-
-  // Before run(): what the pipeline has recalled, so that a crash that follows soon takes nothing either.
-  void begin_with(const MapMemory& memory);
 
   // On the calling thread until stop(). What can not be written is logged once and tried again.
   void run();
@@ -31,6 +35,8 @@ class CheckpointKeeper {
   void forget();
 
  private:
+  // What the pipeline has recalled, so that a crash that follows soon takes nothing either.
+  void begin_with(const MapMemory& memory);
   void take_features();
   void take_ecg();
   void write();

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -30,8 +31,8 @@ ReplaySetup setup() {
 }
 
 // A run over the whole recording, and what one who keeps it has got of it.
-struct Run {
-  Run() : s(setup()), pipeline(s.pipeline), runtime(pipeline, s.identity, s.utc_minus_monotonic, unheard) {
+struct EarlierRun {
+  EarlierRun() : s(setup()), pipeline(s.pipeline), runtime(pipeline, s.identity, s.utc_minus_monotonic, unheard) {
     while (auto event = next()) {
       runtime.deliver(*event);
       for (const MapFeed::Entry& entry : pipeline.map_feed().front()) {
@@ -73,7 +74,7 @@ std::map<std::uint32_t, SurfaceFeature> surface_at(Pipeline& pipeline, const Rel
 }
 
 TEST(Recall, PublishesWhatTheEarlierRunWouldHave) {
-  Run earlier;
+  EarlierRun earlier;
   ASSERT_GT(earlier.memory.features.size(), 5U) << "the recording must have mapped some";
   Pipeline later(earlier.s.pipeline);
   const Instant now = earlier.memory.last_capture + earlier.s.pipeline.latency + std::chrono::milliseconds(400);
@@ -103,7 +104,7 @@ TEST(Recall, PublishesWhatTheEarlierRunWouldHave) {
 }
 
 TEST(Recall, ForgettingLeavesNothingOfMapAndRhythm) {
-  Run run;
+  EarlierRun run;
   Release release{1'000'000, run.memory.last_capture, run.memory.last_capture + run.s.pipeline.latency, true};
   ASSERT_FALSE(surface_at(run.pipeline, release).empty());
   run.pipeline.ask_to_forget();
@@ -120,7 +121,7 @@ TEST(Recall, ForgettingLeavesNothingOfMapAndRhythm) {
 }
 
 TEST(Recall, TakesNoMoreFeaturesThanThereIsRoomForAndNoneOfAnotherLayout) {
-  Run run;
+  EarlierRun run;
   ASSERT_GT(run.memory.features.size(), 5U);
   run.memory.features[0].estimate.x.resize(3);
   run.memory.features[0].estimate.P.resize(3, 3);

@@ -112,7 +112,8 @@ TEST(CheckpointFile, AnyPartOfOneIsRefused) {
   const std::string whole = file_of(checkpoint());
   for (std::size_t size = 0; size < whole.size(); size += size < 600 ? 1 : 997) {
     EXPECT_FALSE(parse_checkpoint(whole.substr(0, size))) << size;
-    if (size >= kHeader) EXPECT_FALSE(parse_checkpoint_body(std::string_view(whole).substr(kHeader, size - kHeader)));
+    const std::string_view body = std::string_view(whole).substr(std::min(size, kHeader));
+    EXPECT_FALSE(parse_checkpoint_body(body.substr(0, size - std::min(size, kHeader)))) << size;
   }
   EXPECT_FALSE(parse_checkpoint(whole + "x"));
 }
@@ -185,20 +186,20 @@ TEST(WarmRestart, InAnotherBootTheMapAloneCountsAndItsInstantsMove) {
 
 TEST(WarmRestart, AnotherSetUpIsRefusedWithTheReason) {
   const Now now{"boot", from_ns(9'500'000'000), checkpoint().utc_ns};
-  const auto reason = [&now](std::string SetUp::*part) {
-    SetUp other = checkpoint().set_up;
+  const auto reason = [&now](std::string perimap::SetUp::*part) {
+    perimap::SetUp other = checkpoint().set_up;
     other.*part = "different";
     const auto memory = usable_memory(checkpoint(), other, now, seconds(10));
     return memory ? std::string("accepted") : memory.error().message;
   };
-  EXPECT_THAT(reason(&SetUp::camera), HasSubstr("another camera"));
-  EXPECT_THAT(reason(&SetUp::hand_eye), HasSubstr("another hand-eye"));
-  EXPECT_THAT(reason(&SetUp::patient_frame), HasSubstr("another patient's frame"));
-  EXPECT_THAT(reason(&SetUp::estimator), HasSubstr("another estimator"));
+  EXPECT_THAT(reason(&perimap::SetUp::camera), HasSubstr("another camera"));
+  EXPECT_THAT(reason(&perimap::SetUp::hand_eye), HasSubstr("another hand-eye"));
+  EXPECT_THAT(reason(&perimap::SetUp::patient_frame), HasSubstr("another patient's frame"));
+  EXPECT_THAT(reason(&perimap::SetUp::estimator), HasSubstr("another estimator"));
 }
 
 TEST(WarmRestart, WhatIsTooOldOrOfTheFutureIsRefusedWithTheReason) {
-  const SetUp set_up = checkpoint().set_up;
+  const perimap::SetUp set_up = checkpoint().set_up;
   const std::int64_t utc_ns = checkpoint().utc_ns;
   for (const Now& now : {Now{"boot", from_ns(20'000'000'000), utc_ns}, Now{"boot", from_ns(1), utc_ns},
                          Now{"another", from_ns(1), utc_ns + 11'000'000'000}, Now{"another", from_ns(1), utc_ns - 1},
