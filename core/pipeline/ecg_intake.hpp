@@ -47,7 +47,8 @@ class EcgIntake {
   // One other thread: the blocks as they came, as many as were not taken too late; false when there is none.
   [[nodiscard]] bool pop_heard(EcgBlock& block) noexcept { return heard_.pop(block); }
 
-  // Any thread: before the next block (with a trigger, the next pulse) everything learnt of this patient's beats and rhythm is forgotten.
+  // Any thread: before the next block (with a trigger, the next pulse) everything learnt of this patient's beats and
+  // rhythm is forgotten.
   void ask_to_forget() noexcept { forget_asked_.store(true, std::memory_order_relaxed); }
 
  private:

@@ -26,7 +26,7 @@ struct FoundFeature {
   Instant first_observed;
   Vector2d first_observed_px = Vector2d::Zero();
   PatchTemplate patch;
-  PatchState patch_state;                   // in the round's last frame
+  PatchState patch_state;  // in the round's last frame
   PatchContinuity looks;
   Vector2d velocity_px = Vector2d::Zero();  // per frame
 };

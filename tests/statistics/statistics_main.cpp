@@ -1,5 +1,5 @@
-// The Monte Carlo programme: how good the estimator, the ECG side and the prediction are, beside what was to be reached. Exit code 1
-// when a goal that can be reached is missed.
+// The Monte Carlo programme: how good the estimator, the ECG side and the prediction are, beside what was to be
+// reached. Exit code 1 when a goal that can be reached is missed.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -19,8 +19,9 @@ int main(int argc, char** argv) {
                                           {"pose", perimap::test::pose_errors},
                                           {"ecg", perimap::test::beats_under_disturbances},
                                           {"horizons", perimap::test::displayed_ahead}};
-  CLI::App app("Monte Carlo statistics of the estimator, with known phase and association, of the ECG side, "
-               "and of what the whole pipeline displays");
+  CLI::App app(
+      "Monte Carlo statistics of the estimator, with known phase and association, of the ECG side, "
+      "and of what the whole pipeline displays");
   Extent extent;
   std::vector<std::string> chosen;
   app.add_option("GOALS", chosen, "lost, optimal, pose, ecg, horizons; all when none is named")

@@ -119,7 +119,7 @@ TEST(Recall, ForgettingLeavesNothingOfMapAndRhythm) {
   EcgBlock block = run.memory.ecg.back();
   block.first_sample_time += block.count * block.sample_period;
   run.pipeline.entrance().push_ecg(block);
-  EXPECT_EQ(run.pipeline.status_clock().beats(), 0U);
+  EXPECT_EQ(run.pipeline.status_clock(block.first_sample_time).beats(), 0U);
 }
 
 TEST(Recall, TakesNoMoreFeaturesThanThereIsRoomForAndNoneOfAnotherLayout) {

@@ -202,7 +202,8 @@ INSTANTIATE_TEST_SUITE_P(
               "respiration, pipeline, features, estimation, realtime, dds, recording, status, log, control, "
               "checkpoint, got an unknown key"},
         Wrong{"UnknownKey", "version = 1\n[phase]\nlow = 1\n",
-              "test.toml:3:1: key 'phase.low': expected one of law, lost_after_s, from_image, image_alone_s, predictor, got an unknown key"},
+              "test.toml:3:1: key 'phase.low': expected one of law, lost_after_s, from_image, image_alone_s, "
+              "predictor, got an unknown key"},
         Wrong{"SectionIsAValue", "version = 1\nphase = 3\n", "test.toml:2:9: key 'phase': expected a table, got 3"},
         Wrong{"SectionIsAnArrayOfTables", "version = 1\n[[phase]]\nlaw = \"linear\"\n",
               "test.toml:2:1: key 'phase': expected a table, got [a table]"},
