@@ -22,7 +22,6 @@ holds /tmp/no_ecg "without an ECG it publishes on and says so" "x.received > 10 
 ip link set vcan0 up
 received 15 /tmp/ecg_again
 holds /tmp/ecg_again "the ECG is back" "x.reason !== 'phase_lost'"
-ls -l /proc/"$(systemctl show -P MainPID perimapd)"/fd | grep -c video0 | sed 's/^/video0 is open, descriptors: /'
 systemctl stop perimapd || fail "the service does not stop"
 kill -INT $emulators
 wait $emulators || fail "the emulators: $(cat /tmp/emulators)"
