@@ -122,7 +122,8 @@ CardiacClock::Located CardiacClock::locate_completed(int newer) const noexcept {
 
 CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   Located located;
-  if (beat(0).index_in_run + 1 < kBeatsToLock || predicted_length() <= Duration::zero()) return located;
+  const bool settling = beat(0).index_in_run + 1 < kBeatsToLock;
+  if ((settling && !beat(0).resumed) || predicted_length() <= Duration::zero()) return located;
 
   const Instant due = predicted_r_peak();
   const Duration slack = std::min(rounded(kOverdueDeviations * running_deviation_), predicted_length());
@@ -133,7 +134,7 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   // What the images carry on has been seen; what they have not even begun to show a cycle later has not.
   const bool overdue = t > due + (carried_ ? predicted_length() : slack + detector_delay_);
   located.state = PhaseState::kLocked;
-  if (overdue || interrupted_ || carried_) located.state = PhaseState::kFreeRunning;
+  if (overdue || interrupted_ || carried_ || settling) located.state = PhaseState::kFreeRunning;
   if (!overdue && carried_ && seen_) located.state = PhaseState::kFromImage;
   located.ectopic = beat(0).beat_class == BeatClass::kPremature;
 

@@ -104,6 +104,7 @@ class CardiacClock {
     BeatClass beat_class = BeatClass::kNormal;
     Duration irregularity{0};  // by how much the interval before it missed its prediction, 0 when in rhythm
     bool teaches = false;      // the cycle before it does
+    bool resumed = false;  // its run began after an interruption shorter than a loss: the rhythm is known from before
   };
 
   struct Located {

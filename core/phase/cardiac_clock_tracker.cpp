@@ -40,6 +40,7 @@ void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
     // Over an interruption beats may have been missed: the interval is one when it is as long as it should be.
     if (!gap && (in_rhythm || !unheard_)) {
       beat.index_in_run = clock_.beat(0).index_in_run + 1;
+      beat.resumed = clock_.beat(0).resumed;
       if (predictor_.count() > 0 && !in_rhythm) beat.irregularity = missed;
       const BeatClass begin = clock_.beat(0).beat_class;
       const bool normal = cycle_teaches(begin, peak.beat_class) && !unheard_;
@@ -51,6 +52,8 @@ void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
       if (!peak.unusual_shape && !last_unusual_) rhythm_.push(rr);
       ectopic_.push(rr, begin, peak.beat_class);
       beat.teaches = normal || (ectopic_.prevails() && begin != BeatClass::kPremature && !unheard_);
+    } else {
+      beat.resumed = !gap && predictor_.count() > 0;
     }
   }
   unheard_ = false;

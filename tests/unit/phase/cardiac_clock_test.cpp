@@ -182,6 +182,22 @@ TEST(CardiacClock, WhatAnInterruptionMayHaveHiddenTeachesNothing) {
   EXPECT_NEAR(to_seconds(steady.tracker.clock().predicted_length()), to_seconds(before), 0.005);
 }
 
+TEST(CardiacClock, AfterAnInterruptionTheFirstBeatGivesThePhaseAndTheThirdLocksIt) {
+  Steady steady(40);
+  steady.tracker.interrupt();
+  const Instant back = steady.last + milliseconds(1500);
+  for (int i = 0; i < 3; ++i) {
+    const Instant beat = back + i * milliseconds(800);
+    steady.tracker.on_r_peak(peak_at(beat));
+    steady.tracker.heard(beat + milliseconds(100));
+    EXPECT_EQ(steady.at(beat + milliseconds(100)).state, i < 2 ? PhaseState::kFreeRunning : PhaseState::kLocked) << i;
+  }
+  steady.tracker.interrupt();
+  steady.tracker.on_r_peak(peak_at(back + std::chrono::seconds(20)));
+  steady.tracker.heard(back + std::chrono::seconds(20));
+  EXPECT_EQ(steady.at(back + std::chrono::seconds(20)).state, PhaseState::kUnknown) << "after a loss";
+}
+
 TEST(CardiacClock, AShortInterruptionWithinACycleKeepsTheRhythmButTeachesNothing) {
   Steady steady(40);
   steady.tracker.interrupt();
