@@ -2,53 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <cstddef>
-#include <string_view>
+#include <string>
+
+#include "daemon/publishing/wire_names.hpp"
 
 namespace perimap {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-template <std::size_t N>
-std::string_view name_in(const std::array<std::string_view, N>& names, int value) {
-  return value >= 0 && static_cast<std::size_t>(value) < N ? names[static_cast<std::size_t>(value)] : "unknown";
-}
-
-std::string_view name_of(perimap_StageKind kind) {
-  return name_in<7>({"predict_and_find", "phase_and_pose", "evaluate", "learn", "capture_to_update",
-                     "release_tardiness", "dds_write"},
-                    static_cast<int>(kind));
-}
-
-std::string_view name_of(perimap_PhaseState state) {
-  return name_in<5>({"unknown", "locked", "free_running", "lost", "from_image"}, static_cast<int>(state));
-}
-
-std::string_view name_of(perimap_Rhythm rhythm) {
-  return name_in<4>({"unknown", "predictable", "unpredictable", "ectopic"}, static_cast<int>(rhythm));
-}
-
-std::string_view name_of(perimap_RespirationState state) {
-  return name_in<3>({"off", "searching", "locked"}, static_cast<int>(state));
-}
-
-std::string_view name_of(perimap_Privilege privilege) {
-  return name_in<3>({"not_requested", "granted", "refused"}, static_cast<int>(privilege));
-}
-
-std::string_view name_of(perimap_RecordingState state) {
-  return name_in<3>({"off", "on", "stopped"}, static_cast<int>(state));
-}
-
-std::string_view name_of(perimap_SourceKind kind) {
-  return name_in<4>({"camera", "tracker", "ecg", "r_trigger"}, static_cast<int>(kind));
-}
-
-std::string_view name_of(perimap_SourceState state) {
-  return name_in<5>({"starting", "ok", "stalled", "ended", "closed"}, static_cast<int>(state));
-}
 
 double ms(std::int64_t ns) { return static_cast<double>(ns) * 1e-6; }
 

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <string_view>
+#include <string>
 
 #include "daemon/publishing/status_text.hpp"
+#include "daemon/publishing/wire_names.hpp"
 
 namespace perimap {
 namespace {
@@ -16,33 +16,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 constexpr double kPerMinutePerRadian = 60.0 / (2.0 * std::numbers::pi);  // rad/s to cycles a minute
-
-// The names are those of perimap.idl, without their prefix. The values came from outside, so none is trusted as an
-// index.
-template <std::size_t N>
-std::string_view name_in(const std::array<std::string_view, N>& names, int value) {
-  return value >= 0 && static_cast<std::size_t>(value) < N ? names[static_cast<std::size_t>(value)] : "unknown";
-}
-
-constexpr std::array<std::string_view, 4> kFeatureStates{"invalid", "converging", "converged", "inconsistent"};
-
-std::string_view name_of(perimap_SurfaceState state) {
-  return name_in<3>({"invalid", "degraded", "good"}, static_cast<int>(state));
-}
-
-std::string_view name_of(perimap_SurfaceReason reason) {
-  return name_in<14>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
-                      "update_late", "pose_missing", "phase_contradicted", "respiration_unknown", "phase_from_image",
-                      "ectopic_beat", "rhythm_unpredictable", "rhythm_ectopic"},
-                     static_cast<int>(reason));
-}
-
-std::string_view name_of(perimap_FeatureState state) { return name_in(kFeatureStates, static_cast<int>(state)); }
-
-std::string_view name_of(perimap_FeatureReason reason) {
-  return name_in<5>({"none", "not_observed", "deviation_large", "innovations_high", "phase_lost"},
-                    static_cast<int>(reason));
-}
 
 double ms(Duration duration) { return to_seconds(duration) * 1e3; }
 
@@ -147,8 +120,8 @@ std::string report_json(const StreamReport& report, ReportKind kind) {
     json["cardiac_phase_deviation_rad"] = last.cardiac_phase_deviation_rad;
     json["cardiac_rate_per_min"] = last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian;
     Json features = Json::object();
-    for (std::size_t state = 0; state < kFeatureStates.size(); ++state) {
-      features[std::string(kFeatureStates[state])] = last.features[state];
+    for (std::size_t state = 0; state < last.features.size(); ++state) {
+      features[std::string(name_of(static_cast<perimap_FeatureState>(state)))] = last.features[state];
     }
     json["features"] = std::move(features);
     json["median_deviation_mm"] = last.median_deviation_mm ? Json(*last.median_deviation_mm) : Json(nullptr);

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "drivers/device/arrival_clock.hpp"
-#include "drivers/device/device_link.hpp"
+#include "drivers/device/reopening.hpp"
 
 namespace perimap {
 namespace {
@@ -81,26 +81,16 @@ std::uint64_t FrameCount::next(std::uint32_t sequence) noexcept {
 void serve_v4l2_camera(const V4l2Settings& settings, const CameraSink& sink, DeviceHealth& health,
                        const Interrupt& interrupt, const V4l2Opener& open) {
   FrameCount count;
-  ReopenDelay delay;
-  while (!interrupt.requested()) {
-    auto stream = open(settings.path).and_then([&settings](std::unique_ptr<V4l2Node> node) {
+  const auto open_stream = [&] {
+    return open(settings.path).and_then([&settings](std::unique_ptr<V4l2Node> node) {
       return V4l2Stream::open(std::move(node), settings);
     });
-    if (stream) {
-      health.openings.add();
-      health.set_identity((*stream)->identity());
-      health.set_state(DeviceState::kStarting);
-      const std::uint64_t before = health.samples.get();
-      std::string reason = stream_frames(**stream, count, sink, health, interrupt);
-      stream->reset();
-      if (health.samples.get() > before) delay.restart();
-      if (!reason.empty()) health.set_reason(std::move(reason));
-    } else {
-      health.set_reason(std::move(stream.error().message));
-    }
-    health.set_state(DeviceState::kClosed);
-    if (!wait_unless_interrupted(delay.next(), interrupt)) return;
-  }
+  };
+  const auto use_stream = [&](std::unique_ptr<V4l2Stream>& stream) {
+    health.set_identity(stream->identity());
+    return stream_frames(*stream, count, sink, health, interrupt);
+  };
+  serve_reopening(open_stream, use_stream, health, interrupt);
 }
 
 }  // namespace perimap

@@ -6,7 +6,6 @@
 #include <span>
 #include <utility>
 
-#include "drivers/device/device_link.hpp"
 #include "drivers/video/video_file.hpp"
 
 namespace perimap {

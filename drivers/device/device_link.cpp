@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/device/reopening.hpp"
 #include "drivers/transport/serial_port.hpp"
 #include "drivers/transport/tcp_stream.hpp"
 
@@ -61,15 +62,6 @@ class StreamControl final : public LinkControl {
 
 }  // namespace
 
-Duration ReopenDelay::next() noexcept { return std::exchange(delay_, std::min(2 * delay_, Duration(kLongest))); }
-
-bool wait_unless_interrupted(Duration longest, const Interrupt& interrupt) {
-  const std::timespec timeout = timeout_until(MonotonicClock::now() + longest);
-  pollfd waited{interrupt.descriptor(), POLLIN, 0};
-  (void)::ppoll(&waited, 1, &timeout, nullptr);
-  return !interrupt.requested();
-}
-
 std::string converse(ByteStream& stream, DeviceProtocol& protocol, const Interrupt& interrupt) {
   StreamControl control(stream);
   std::array<std::byte, 4096> buffer{};
@@ -115,24 +107,9 @@ StreamOpener opener_of(const Endpoint& endpoint, int baud) {
 
 void serve_device(const StreamOpener& open, DeviceProtocol& protocol, DeviceHealth& health,
                   const Interrupt& interrupt) {
-  ReopenDelay delay;
-  while (!interrupt.requested()) {
-    auto stream = open(interrupt);
-    if (stream) {
-      health.openings.add();
-      health.set_state(DeviceState::kStarting);
-      const std::uint64_t samples_before = health.samples.get();
-      std::string reason = converse(**stream, protocol, interrupt);
-      stream->reset();
-      if (health.samples.get() > samples_before) delay.restart();
-      // Empty when we were interrupted: what went wrong before stays the news.
-      if (!reason.empty()) health.set_reason(std::move(reason));
-    } else {
-      health.set_reason(std::move(stream.error().message));
-    }
-    health.set_state(DeviceState::kClosed);
-    if (!wait_unless_interrupted(delay.next(), interrupt)) return;
-  }
+  serve_reopening([&] { return open(interrupt); },
+                  [&](std::unique_ptr<ByteStream>& stream) { return converse(*stream, protocol, interrupt); }, health,
+                  interrupt);
 }
 
 }  // namespace perimap

@@ -15,22 +15,6 @@
 
 namespace perimap {
 
-// After a failure the link is opened again after 50 ms, then after twice that, up to half a second. A conversation that
-// delivered samples starts the row anew.
-class ReopenDelay {
- public:
-  [[nodiscard]] Duration next() noexcept;
-  void restart() noexcept { delay_ = kShortest; }
-
- private:
-  static constexpr Duration kShortest = std::chrono::milliseconds(50);
-  static constexpr Duration kLongest = std::chrono::milliseconds(500);
-  Duration delay_ = kShortest;
-};
-
-// Sleeps; false when interrupted.
-bool wait_unless_interrupted(Duration longest, const Interrupt& interrupt);
-
 // One conversation over an open stream, until the protocol or the stream fails (the reason is returned) or the
 // interrupt is requested (the text is then empty).
 [[nodiscard]] std::string converse(ByteStream& stream, DeviceProtocol& protocol, const Interrupt& interrupt);

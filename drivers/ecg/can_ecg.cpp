@@ -4,9 +4,9 @@
 
 #include <array>
 #include <cmath>
-#include <utility>
+#include <string>
 
-#include "drivers/device/device_link.hpp"
+#include "drivers/device/reopening.hpp"
 
 namespace perimap {
 namespace {
@@ -15,6 +15,28 @@ constexpr unsigned kCountModulus = 256;
 // Eight bytes of data in a standard frame are 111 bits before stuffing, at the usual 500 kbit/s.
 constexpr Duration kFrameTime = std::chrono::microseconds(222);
 constexpr Duration kSilentAfter = std::chrono::milliseconds(300);
+
+// Until the socket fails (the reason is returned) or the interrupt is requested (empty then).
+std::string read_frames(CanSocket& socket, CanEcgDecoder& decoder, DeviceHealth& health, const Interrupt& interrupt) {
+  Instant last = MonotonicClock::now();
+  for (;;) {
+    std::array<pollfd, 2> waited{{{socket.descriptor(), POLLIN, 0}, {interrupt.descriptor(), POLLIN, 0}}};
+    constexpr int kSilent_ms = 300;
+    (void)::poll(waited.data(), waited.size(), kSilent_ms);
+    if (waited[1].revents != 0) return "";
+    const auto frame = socket.receive();
+    if (!frame) return frame.error().message;
+    if (*frame) {
+      const std::uint64_t before = health.samples.get();
+      decoder.take(**frame);
+      if (health.samples.get() == before) continue;
+      last = (*frame)->arrival;
+      health.set_state(DeviceState::kStreaming);
+    } else if (health.state() == DeviceState::kStreaming && MonotonicClock::now() - last > kSilentAfter) {
+      health.set_state(DeviceState::kSilent);
+    }
+  }
+}
 
 }  // namespace
 
@@ -72,43 +94,12 @@ void CanEcgDecoder::take(const CanFrame& frame) {
 void serve_can_ecg(const std::string& interface_name, const CanEcgSettings& settings, const EcgSink& sink,
                    DeviceHealth& health, const Interrupt& interrupt) {
   CanEcgDecoder decoder(settings, sink, health);
-  ReopenDelay delay;
-  while (!interrupt.requested()) {
-    health.set_state(DeviceState::kClosed);
-    auto socket = CanSocket::open(interface_name, settings.identifier, settings.extended);
-    if (!socket) {
-      health.set_reason(std::move(socket.error().message));
-      wait_unless_interrupted(delay.next(), interrupt);
-      continue;
-    }
-    health.openings.add();
-    health.set_state(DeviceState::kStarting);
+  const auto open = [&] { return CanSocket::open(interface_name, settings.identifier, settings.extended); };
+  const auto use = [&](CanSocket& socket) {
     decoder.restart();
-    Instant last = MonotonicClock::now();
-    for (;;) {
-      std::array<pollfd, 2> waited{{{socket->descriptor(), POLLIN, 0}, {interrupt.descriptor(), POLLIN, 0}}};
-      constexpr int kSilent_ms = 300;
-      (void)::poll(waited.data(), waited.size(), kSilent_ms);
-      if (waited[1].revents != 0) break;
-      auto frame = socket->receive();
-      if (!frame) {
-        health.set_reason(std::move(frame.error().message));
-        break;
-      }
-      if (*frame) {
-        const std::uint64_t before = health.samples.get();
-        decoder.take(**frame);
-        if (health.samples.get() == before) continue;
-        last = (*frame)->arrival;
-        delay.restart();
-        health.set_state(DeviceState::kStreaming);
-      } else if (health.state() == DeviceState::kStreaming && MonotonicClock::now() - last > kSilentAfter) {
-        health.set_state(DeviceState::kSilent);
-      }
-    }
-    wait_unless_interrupted(delay.next(), interrupt);
-  }
-  health.set_state(DeviceState::kClosed);
+    return read_frames(socket, decoder, health, interrupt);
+  };
+  serve_reopening(open, use, health, interrupt);
 }
 
 }  // namespace perimap

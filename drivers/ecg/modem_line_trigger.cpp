@@ -12,7 +12,7 @@
 #include <system_error>
 #include <utility>
 
-#include "drivers/device/device_link.hpp"
+#include "drivers/device/reopening.hpp"
 #include "drivers/transport/descriptor.hpp"
 
 namespace perimap {
@@ -174,24 +174,9 @@ std::optional<RTriggerPulse> TriggerEdges::take(const ModemPort::Line& line, boo
 void serve_modem_line_trigger(const ModemTriggerSettings& settings, const RTriggerSink& sink, DeviceHealth& health,
                               const Interrupt& interrupt, const ModemPortOpener& open) {
   TriggerEdges edges(settings, health);
-  ReopenDelay delay;
-  while (!interrupt.requested()) {
-    auto port = open(settings.path, settings.line);
-    std::string reason;
-    if (port) {
-      health.openings.add();
-      health.set_state(DeviceState::kStarting);
-      const std::uint64_t before = health.samples.get();
-      reason = watch_line(**port, edges, sink, health, interrupt);
-      port->reset();
-      if (health.samples.get() > before) delay.restart();
-    } else {
-      reason = std::move(port.error().message);
-    }
-    if (!reason.empty()) health.set_reason(std::move(reason));
-    health.set_state(DeviceState::kClosed);
-    if (!wait_unless_interrupted(delay.next(), interrupt)) return;
-  }
+  serve_reopening([&] { return open(settings.path, settings.line); },
+                  [&](std::unique_ptr<ModemPort>& port) { return watch_line(*port, edges, sink, health, interrupt); },
+                  health, interrupt);
 }
 
 }  // namespace perimap

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <random>
 
-#include "drivers/device/device_link.hpp"
 #include "drivers/transport/can_socket.hpp"
 
 namespace perimap {

@@ -3,8 +3,10 @@
 #include <poll.h>
 #include <sys/eventfd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <ctime>
 #include <system_error>
 
 namespace perimap {
@@ -22,6 +24,14 @@ void Interrupt::request() noexcept {
 bool Interrupt::requested() const noexcept {
   pollfd waited{event_.get(), POLLIN, 0};
   return ::poll(&waited, 1, 0) > 0;
+}
+
+bool wait_unless_interrupted(Duration longest, const Interrupt& interrupt) {
+  const auto left_ns = std::max(longest, Duration(0)).count();
+  const std::timespec timeout{left_ns / 1'000'000'000, left_ns % 1'000'000'000};
+  pollfd waited{interrupt.descriptor(), POLLIN, 0};
+  (void)::ppoll(&waited, 1, &timeout, nullptr);
+  return !interrupt.requested();
 }
 
 }  // namespace perimap

@@ -1,6 +1,7 @@
 // Ends another thread's wait for a device.
 #pragma once
 
+#include "core/time/instant.hpp"
 #include "drivers/transport/descriptor.hpp"
 
 namespace perimap {
@@ -17,5 +18,8 @@ class Interrupt {
  private:
   Descriptor event_;
 };
+
+// Sleeps; false when interrupted.
+bool wait_unless_interrupted(Duration longest, const Interrupt& interrupt);
 
 }  // namespace perimap

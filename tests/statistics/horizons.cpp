@@ -3,24 +3,19 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <filesystem>
 #include <memory>
-#include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
 #include "core/pipeline/surface_composer.hpp"
-#include "daemon/commands/frame_renderer.hpp"
-#include "daemon/commands/simulate.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/publishing/wire_surface.hpp"
 #include "daemon/report/accuracy.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
-#include "daemon/runtime/replay_setup.hpp"
 #include "drivers/simulator/simulation.hpp"
 #include "goals.hpp"
+#include "tests/simulated/simulated_session.hpp"
 
 namespace perimap::test {
 namespace {
@@ -29,24 +24,6 @@ using std::chrono::milliseconds;
 
 constexpr std::array<Duration, 3> kHorizons{milliseconds(0), milliseconds(100), milliseconds(300)};
 using Errors = std::array<double, kHorizons.size()>;  // RMS, mm
-
-// Settings for this camera and an exact tracker: those of a recording of its first second.
-PipelineSettings settings_for(const SimulationSettings& wanted) {
-  SimulationSettings brief = wanted;
-  brief.duration = std::chrono::seconds(1);
-  const auto simulation = Simulation::create(brief, threaded_for(std::thread::hardware_concurrency()));
-  if (!simulation) throw std::runtime_error(simulation.error().message);
-  const std::filesystem::path path =
-      std::filesystem::temp_directory_path() / fmt::format("perimap_horizons_{}.mcap", wanted.seed);
-  const auto written = write_simulation(*simulation, {{path, {}}}, 2, [](std::uint64_t) {});
-  if (!written) throw std::runtime_error(written.error().message);
-  auto setup = prepare_replay(path.string(), std::nullopt, ReadMode::kStrict);
-  std::filesystem::remove(path);
-  if (!setup) throw std::runtime_error(setup.error().error.message);
-  setup->pipeline.lockstep = true;
-  setup->pipeline.features.maximum = 60;
-  return setup->pipeline;
-}
 
 // Composes every release anew for each horizon, with all that is known at the release, and compares with the truth.
 class Horizons final : public Publication {
@@ -137,10 +114,9 @@ PhaseLaw law_of(MotionLaw law) {
 
 // The predictors that go by the ECG alone are told the law; with the images it has to be found.
 std::vector<Cell> cells_of(const SimulationSettings& scene) {
-  const unsigned threads = std::max(1U, std::thread::hardware_concurrency());
-  const auto simulation = Simulation::create(scene, threaded_for(threads));
-  if (!simulation) throw std::runtime_error(simulation.error().message);
-  const PipelineSettings with_image = settings_for(scene);
+  const Simulation simulation = simulation_of(scene);
+  PipelineSettings with_image = settings_for(simulation, {});
+  with_image.features.maximum = 60;
   PipelineSettings autoregressive = with_image;
   autoregressive.phase_from_image = false;
   autoregressive.law_from_image = false;
@@ -150,29 +126,10 @@ std::vector<Cell> cells_of(const SimulationSettings& scene) {
 
   std::vector<std::unique_ptr<Horizons>> sessions;
   for (const PipelineSettings& settings : {previous, autoregressive, with_image})
-    sessions.push_back(std::make_unique<Horizons>(*simulation, settings));
-  FrameRenderer frames(*simulation, threads);
-  for (const Simulation::Arrival& arrival : simulation->arrivals()) {
-    FrameEvent frame;
-    if (arrival.source == Simulation::Source::kCamera) {
-      const auto pixels = frames.next();
-      frame = {simulation->frames()[arrival.index].stamp, scene.width, scene.height, {}};
-      frame.pixels.assign(pixels.begin(), pixels.end());
-    }
-    for (const auto& session : sessions) {
-      switch (arrival.source) {
-        case Simulation::Source::kCamera:
-          session->runtime().deliver(frame);
-          break;
-        case Simulation::Source::kTracker:
-          session->runtime().deliver(simulation->tracker_sample(arrival.index, {}));
-          break;
-        case Simulation::Source::kEcg:
-          session->runtime().deliver(simulation->ecg()[arrival.index]);
-          break;
-      }
-    }
-  }
+    sessions.push_back(std::make_unique<Horizons>(simulation, settings));
+  for_each_arrival(simulation, [&](const Simulation::Arrival& arrival, const FrameEvent& frame) {
+    for (const auto& session : sessions) deliver(session->runtime(), simulation, arrival, frame, {});
+  });
   std::vector<Cell> cells;
   const std::array<std::string, 3> names{"previous cycle", "AR", "AR + image"};
   for (std::size_t i = 0; i < sessions.size(); ++i) {

@@ -86,7 +86,7 @@ for kernel in "${kernels[@]}"; do
     rm -rf "$exchange"
     mkdir -p "$exchange"
     cp "$vm_guest"/{common.sh,camera.yaml} "$exchange/"
-    printf 'build=%q\nproject=%q\n' "$build" "$PWD" > "$exchange/settings"
+    printf 'build=%q\n' "$build" > "$exchange/settings"
     cp -r "$package" "$exchange/package"
     say "$test, $vm_release ..."
     if vm_run "$vm_guest/$test.sh" "$exchange" 600; then

@@ -7,19 +7,7 @@
 set -uo pipefail
 mode=$1 perimapd=$2 perimap=$3 recording=$4 work=$5
 export CYCLONEDDS_URI=file://$6
-domain=$((40 + $$ % 150))
-port=$((20000 + $$ % 20000))
-rm -rf "$work"
-mkdir -p "$work"
-# The link must be short enough for anyone, and the work folder may lie deep.
-line=$(mktemp -u "${TMPDIR:-/tmp}/perimap-ecg-XXXXXX")
-started=()
-trap 'kill "${started[@]}" 2> /dev/null' EXIT
-
-fail() {
-  echo "FAILED: $1"
-  exit 1
-}
+source "$(dirname "$0")/../emulated_devices.sh"
 
 # run CONFIGURATION RECEIVED: perimapd until the recording's end, with a subscriber
 run() {
@@ -66,27 +54,8 @@ if [ "$mode" = unplugged ]; then
   faults=(--unplug 1 0.25)
   [ "${7:-}" = "" ] || unplugs=$7
 fi
-# Both ends must be ready before the recording begins.
-start=$(awk '{printf "%.3f", $1 + 4}' /proc/uptime)
-"$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$line" --recording "$recording" --start "$start" "${faults[@]}" \
-  > "$work/emulators" 2>&1 &
-emulators=$!
-started+=($emulators)
-cat > "$work/devices.toml" << END
-version = 1
-[camera]
-playback = "$recording"
-playback_start_s = $start
-[tracker]
-protocol = "ndi"
-port = "tcp:127.0.0.1:$port"
-frame_rate_hz = 100
-[ecg]
-protocol = "cyton"
-port = "$line"
-[dds]
-domain = $domain
-END
+emulate "$recording" "${faults[@]}"
+devices_toml "$recording" > "$work/devices.toml"
 run "$work/devices.toml" "$work/devices.mcap"
 kill -INT $emulators
 wait $emulators || fail "the emulators ended with $?: $(cat "$work/emulators")"

@@ -6,48 +6,18 @@
 set -uo pipefail
 perimapd=$1 perimap=$2 recording=$3 work=$4
 export CYCLONEDDS_URI=file://$5
-domain=$((40 + $$ % 150))
-port=$((20000 + $$ % 20000))
-rm -rf "$work"
-mkdir -p "$work"
-line=$(mktemp -u "${TMPDIR:-/tmp}/perimap-ecg-XXXXXX")
-started=()
-trap 'kill "${started[@]}" 2> /dev/null' EXIT
-
-fail() {
-  echo "FAILED: $1"
-  exit 1
-}
+source "$(dirname "$0")/../emulated_devices.sh"
 
 # session NAME COMMAND...: emulated devices that play the recording, $work/NAME.toml for them, and the command
 session() {
-  local name=$1 start
+  local name=$1
   shift
   mkdir -p "$work/$name"
-  # Both ends must be ready before the recording begins.
-  start=$(awk '{printf "%.3f", $1 + 3}' /proc/uptime)
-  "$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$line" --recording "$recording" --start "$start" \
-    > "$work/emulators" 2>&1 &
-  local emulators=$!
-  started+=($emulators)
-  cat > "$work/$name.toml" << TOML
-version = 1
-[camera]
-playback = "$recording"
-playback_start_s = $start
-[tracker]
-protocol = "ndi"
-port = "tcp:127.0.0.1:$port"
-frame_rate_hz = 100
-[ecg]
-protocol = "cyton"
-port = "$line"
-[dds]
-domain = $domain
-[recording]
-record = true
-folder = "$name"
-TOML
+  emulate "$recording"
+  {
+    devices_toml "$recording"
+    printf '[recording]\nrecord = true\nfolder = "%s"\n' "$name"
+  } > "$work/$name.toml"
   "$@" > "$work/$name.log" 2>&1 || fail "$name: ended with $?: $(tail -n 5 "$work/$name.log")"
   kill -INT $emulators
   wait $emulators || fail "the emulators ended with $?: $(cat "$work/emulators")"

@@ -6,21 +6,16 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
-#include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
-#include "daemon/commands/frame_renderer.hpp"
-#include "daemon/commands/simulate.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/report/accuracy.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
-#include "daemon/runtime/replay_setup.hpp"
 #include "drivers/simulator/simulation.hpp"
+#include "tests/simulated/simulated_session.hpp"
 
 namespace perimap {
 namespace {
@@ -35,23 +30,6 @@ SimulationSettings scene() {
   settings.height = 300;
   settings.duration = std::chrono::seconds(115);
   return settings;
-}
-
-// Settings for this camera and an exact tracker: those of a recording of its first second.
-PipelineSettings settings_for(const SimulationSettings& wanted) {
-  SimulationSettings brief = wanted;
-  brief.duration = std::chrono::seconds(1);
-  const auto simulation = Simulation::create(brief, threaded_for(std::thread::hardware_concurrency()));
-  if (!simulation) throw std::runtime_error(simulation.error().message);
-  const std::filesystem::path path = std::filesystem::temp_directory_path() / "perimap_ecg_lost_test.mcap";
-  const auto written = write_simulation(*simulation, {{path, {}}}, 2, [](std::uint64_t) {});
-  if (!written) throw std::runtime_error(written.error().message);
-  auto setup = prepare_replay(path.string(), std::nullopt, ReadMode::kStrict);
-  std::filesystem::remove(path);
-  if (!setup) throw std::runtime_error(setup.error().error.message);
-  setup->pipeline.lockstep = true;
-  setup->pipeline.features.maximum = 60;
-  return setup->pipeline;
 }
 
 // What a surface said of itself.
@@ -102,20 +80,13 @@ class Session {
         runtime_(*pipeline_, Identity{}, Duration(0), notes_) {}
 
   void deliver(const Simulation::Arrival& arrival, const FrameEvent& frame) {
-    switch (arrival.source) {
-      case Simulation::Source::kCamera:
-        runtime_.deliver(frame);
-        break;
-      case Simulation::Source::kTracker:
-        runtime_.deliver(simulation_.tracker_sample(arrival.index, {}));
-        break;
-      case Simulation::Source::kEcg: {
-        EcgBlock block = simulation_.ecg()[arrival.index];
-        const double since_s = to_seconds(block.first_sample_time - simulation_.start());
-        block.lead_off = since_s >= kOff_s && since_s < back_s();
-        runtime_.deliver(block);
-        break;
-      }
+    if (arrival.source == Simulation::Source::kEcg) {
+      EcgBlock block = simulation_.ecg()[arrival.index];
+      const double since_s = to_seconds(block.first_sample_time - simulation_.start());
+      block.lead_off = since_s >= kOff_s && since_s < back_s();
+      runtime_.deliver(block);
+    } else {
+      test::deliver(runtime_, simulation_, arrival, frame, {});
     }
     if (pipeline_->settings().r_trigger) deliver_triggers(arrival.arrival);
   }
@@ -206,11 +177,9 @@ class Session {
 };
 
 TEST(EcgLost, IsSaidAtOnceIsCarriedByTheImagesAndLeavesNothingWrongBehind) {
-  const unsigned threads = std::max(1U, std::thread::hardware_concurrency());
-  const SimulationSettings settings = scene();
-  const auto simulation = Simulation::create(settings, threaded_for(threads));
-  ASSERT_TRUE(simulation.has_value()) << simulation.error().message;
-  const PipelineSettings usual = settings_for(settings);
+  const Simulation simulation = test::simulation_of(scene());
+  PipelineSettings usual = test::settings_for(simulation, {});
+  usual.features.maximum = 60;
   PipelineSettings blind = usual;
   blind.phase_from_image = false;
   PipelineSettings triggered = usual;
@@ -219,7 +188,7 @@ TEST(EcgLost, IsSaidAtOnceIsCarriedByTheImagesAndLeavesNothingWrongBehind) {
 
   std::vector<std::unique_ptr<Session>> sessions;
   const auto add = [&](const PipelineSettings& with, const std::string& name, double off_s) {
-    sessions.push_back(std::make_unique<Session>(*simulation, with, name, off_s));
+    sessions.push_back(std::make_unique<Session>(simulation, with, name, off_s));
   };
   add(usual, "never off", 0);
   add(usual, "off 3 s", 3);
@@ -228,16 +197,9 @@ TEST(EcgLost, IsSaidAtOnceIsCarriedByTheImagesAndLeavesNothingWrongBehind) {
   add(blind, "off 3 s, no image", 3);
   add(triggered, "R trigger", 0);
 
-  FrameRenderer frames(*simulation, threads);
-  for (const Simulation::Arrival& arrival : simulation->arrivals()) {
-    FrameEvent frame;
-    if (arrival.source == Simulation::Source::kCamera) {
-      const auto pixels = frames.next();
-      frame = {simulation->frames()[arrival.index].stamp, settings.width, settings.height, {}};
-      frame.pixels.assign(pixels.begin(), pixels.end());
-    }
+  test::for_each_arrival(simulation, [&](const Simulation::Arrival& arrival, const FrameEvent& frame) {
     for (const auto& session : sessions) session->deliver(arrival, frame);
-  }
+  });
   for (const auto& session : sessions) session->finish();
 
   const Session& never = *sessions[0];

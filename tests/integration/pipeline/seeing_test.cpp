@@ -9,20 +9,14 @@
 #include <cstdlib>
 #include <map>
 #include <numbers>
-#include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
-#include "daemon/commands/frame_renderer.hpp"
-#include "daemon/commands/simulate.hpp"
-#include "daemon/config/configuration_loader.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
-#include "daemon/runtime/replay_setup.hpp"
-#include "drivers/calibration/calibration_file.hpp"
 #include "drivers/simulator/simulation.hpp"
+#include "tests/simulated/simulated_session.hpp"
 
 namespace perimap {
 namespace {
@@ -192,40 +186,19 @@ double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
-// As a recording of this session would set the pipeline up.
-PipelineSettings settings_for(const Simulation& simulation, const TrackerNoise& noise) {
-  const auto configuration = parse_configuration(simulated_configuration(simulation, noise), "simulated.toml");
-  if (!configuration) throw std::runtime_error(configuration.error().message);
-  const auto camera = parse_calibration(simulation.lens().opencv_yaml(), "simulated.yaml");
-  if (!camera) throw std::runtime_error(camera.error().message);
-  PipelineSettings settings = pipeline_settings(*configuration, *camera);
-  settings.lockstep = true;
-  return settings;
-}
-
 // A pipeline with a tracker of this noise, and what it sees.
 class Session {
  public:
   Session(const Simulation& simulation, const TrackerNoise& noise)
       : simulation_(simulation),
         noise_(noise),
-        pipeline_(settings_for(simulation, noise)),
+        pipeline_(test::settings_for(simulation, noise)),
         runtime_(pipeline_, Identity{}, Duration(0), publication_),
         watch_(simulation, pipeline_) {}
 
   // truth: of the frames that wait to be mapped, by their number.
   void deliver(const Simulation::Arrival& arrival, const FrameEvent& frame, std::map<std::uint64_t, TrueFrame>& truth) {
-    switch (arrival.source) {
-      case Simulation::Source::kCamera:
-        runtime_.deliver(frame);
-        break;
-      case Simulation::Source::kTracker:
-        runtime_.deliver(simulation_.tracker_sample(arrival.index, noise_));
-        break;
-      case Simulation::Source::kEcg:
-        runtime_.deliver(simulation_.ecg()[arrival.index]);
-        break;
-    }
+    test::deliver(runtime_, simulation_, arrival, frame, noise_);
     if (pipeline_.counters().frames.get() == mapped_) return;
     const auto now = truth.try_emplace(mapped_, simulation_, mapped_).first;
     watch_.look(now->second);
@@ -265,27 +238,17 @@ class Session {
 };
 
 TEST(Seeing, FeaturesThatReturnToViewComeBackAndWhatPassesTheGateIsThere) {
-  const unsigned threads = std::max(1U, std::thread::hardware_concurrency());
-  const SimulationSettings settings = hard_to_see();
-  const auto simulation = Simulation::create(settings, threaded_for(threads));
-  ASSERT_TRUE(simulation.has_value()) << simulation.error().message;
+  const Simulation simulation = test::simulation_of(hard_to_see());
   constexpr double kHalfDegree = 0.5 * std::numbers::pi / 180;
-  Session exact(*simulation, {});
-  Session noisy(*simulation, {1.4, kHalfDegree});
+  Session exact(simulation, {});
+  Session noisy(simulation, {1.4, kHalfDegree});
   // The pictures are rendered once for both.
-  FrameRenderer frames(*simulation, threads);
   std::map<std::uint64_t, TrueFrame> truth;
-  for (const Simulation::Arrival& arrival : simulation->arrivals()) {
-    FrameEvent frame;
+  test::for_each_arrival(simulation, [&](const Simulation::Arrival& arrival, const FrameEvent& frame) {
     while (truth.size() > 8) truth.erase(truth.begin());
-    if (arrival.source == Simulation::Source::kCamera) {
-      const auto pixels = frames.next();
-      frame = {simulation->frames()[arrival.index].stamp, settings.width, settings.height, {}};
-      frame.pixels.assign(pixels.begin(), pixels.end());
-    }
     exact.deliver(arrival, frame, truth);
     noisy.deliver(arrival, frame, truth);
-  }
+  });
   exact.check();
   noisy.check();
 }

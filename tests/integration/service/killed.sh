@@ -5,43 +5,13 @@
 set -uo pipefail
 perimapd=$1 perimap=$2 recording=$3 work=$4 kills=$6
 export CYCLONEDDS_URI=file://$5
-domain=$((40 + $$ % 150))
-port=$((20000 + $$ % 20000))
-rm -rf "$work"
-mkdir -p "$work"
-short=$(mktemp -d "${TMPDIR:-/tmp}/perimap-killed-XXXXXX") # names of sockets and links must be short
-started=()
-trap 'kill -9 "${started[@]}" 2> /dev/null; rm -rf "$short"' EXIT
+source "$(dirname "$0")/../emulated_devices.sh"
 
-fail() {
-  echo "FAILED: $1"
-  exit 1
-}
-
-start=$(awk '{printf "%.3f", $1 + 4}' /proc/uptime)
-"$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$short/ecg" --recording "$recording" --start "$start" \
-  > "$work/emulators" 2>&1 &
-started+=($!)
-cat > "$work/devices.toml" << END
-version = 1
-[camera]
-playback = "$recording"
-playback_start_s = $start
-[tracker]
-protocol = "ndi"
-port = "tcp:127.0.0.1:$port"
-frame_rate_hz = 100
-[ecg]
-protocol = "cyton"
-port = "$short/ecg"
-[dds]
-domain = $domain
-[control]
-socket = "$short/control"
-[checkpoint]
-file = "$work/checkpoint"
-interval_s = 0.5
-END
+emulate "$recording"
+{
+  devices_toml "$recording"
+  printf '[control]\nsocket = "%s"\n[checkpoint]\nfile = "%s"\ninterval_s = 0.5\n' "$short/control" "$work/checkpoint"
+} > "$work/devices.toml"
 "$perimap" watch --domain $domain --wait 60 --record "$work/received.mcap" > "$work/watch" 2>&1 &
 watch=$!
 started+=($watch)

@@ -1,0 +1,71 @@
+#include "daemon/publishing/wire_names.hpp"
+
+#include <array>
+#include <cstddef>
+
+namespace perimap {
+namespace {
+
+// The values came from outside, so none is trusted as an index.
+template <std::size_t N>
+std::string_view name_in(const std::array<std::string_view, N>& names, int value) noexcept {
+  return value >= 0 && static_cast<std::size_t>(value) < N ? names[static_cast<std::size_t>(value)] : "unknown";
+}
+
+}  // namespace
+
+std::string_view name_of(perimap_SurfaceState state) noexcept {
+  return name_in<3>({"invalid", "degraded", "good"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_SurfaceReason reason) noexcept {
+  return name_in<14>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
+                      "update_late", "pose_missing", "phase_contradicted", "respiration_unknown", "phase_from_image",
+                      "ectopic_beat", "rhythm_unpredictable", "rhythm_ectopic"},
+                     static_cast<int>(reason));
+}
+
+std::string_view name_of(perimap_FeatureState state) noexcept {
+  return name_in<4>({"invalid", "converging", "converged", "inconsistent"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_FeatureReason reason) noexcept {
+  return name_in<5>({"none", "not_observed", "deviation_large", "innovations_high", "phase_lost"},
+                    static_cast<int>(reason));
+}
+
+std::string_view name_of(perimap_StageKind kind) noexcept {
+  return name_in<7>({"predict_and_find", "phase_and_pose", "evaluate", "learn", "capture_to_update",
+                     "release_tardiness", "dds_write"},
+                    static_cast<int>(kind));
+}
+
+std::string_view name_of(perimap_PhaseState state) noexcept {
+  return name_in<5>({"unknown", "locked", "free_running", "lost", "from_image"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_Rhythm rhythm) noexcept {
+  return name_in<4>({"unknown", "predictable", "unpredictable", "ectopic"}, static_cast<int>(rhythm));
+}
+
+std::string_view name_of(perimap_RespirationState state) noexcept {
+  return name_in<3>({"off", "searching", "locked"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_Privilege privilege) noexcept {
+  return name_in<3>({"not_requested", "granted", "refused"}, static_cast<int>(privilege));
+}
+
+std::string_view name_of(perimap_RecordingState state) noexcept {
+  return name_in<3>({"off", "on", "stopped"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_SourceKind kind) noexcept {
+  return name_in<4>({"camera", "tracker", "ecg", "r_trigger"}, static_cast<int>(kind));
+}
+
+std::string_view name_of(perimap_SourceState state) noexcept {
+  return name_in<5>({"starting", "ok", "stalled", "ended", "closed"}, static_cast<int>(state));
+}
+
+}  // namespace perimap

@@ -1,0 +1,47 @@
+# What tests of perimapd over emulated devices begin with; sourced. $work is emptied. They speak DDS on $domain; the
+# emulated tracker listens on $port, the ECG's pseudo-terminal is $line. What is in `started` ends with the test.
+domain=$((40 + $$ % 150))
+port=$((20000 + $$ % 20000))
+rm -rf "$work"
+mkdir -p "$work"
+# Names of links and sockets must be short, and the work folder may lie deep.
+short=$(mktemp -d "${TMPDIR:-/tmp}/perimap-devices-XXXXXX")
+line=$short/ecg
+started=()
+trap 'kill -9 "${started[@]}" 2> /dev/null; rm -rf "$short"' EXIT
+
+fail() {
+  echo "FAILED: $1"
+  exit 1
+}
+
+# emulate RECORDING OPTION...: a tracker and an ECG that play the recording from $start on, soon; $emulators is theirs
+emulate() {
+  local recording=$1
+  shift
+  # Both ends must be ready before the recording begins.
+  start=$(awk '{printf "%.3f", $1 + 4}' /proc/uptime)
+  "$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$line" --recording "$recording" --start "$start" "$@" \
+    > "$work/emulators" 2>&1 &
+  emulators=$!
+  started+=($emulators)
+}
+
+# devices_toml RECORDING: a configuration for them, with the recording's frames for a camera
+devices_toml() {
+  cat << END
+version = 1
+[camera]
+playback = "$1"
+playback_start_s = $start
+[tracker]
+protocol = "ndi"
+port = "tcp:127.0.0.1:$port"
+frame_rate_hz = 100
+[ecg]
+protocol = "cyton"
+port = "$line"
+[dds]
+domain = $domain
+END
+}

@@ -1,0 +1,69 @@
+#include "tests/simulated/simulated_session.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "daemon/commands/frame_renderer.hpp"
+#include "daemon/commands/simulate.hpp"
+#include "daemon/config/configuration_loader.hpp"
+#include "daemon/runtime/replay_setup.hpp"
+#include "drivers/calibration/calibration_file.hpp"
+
+namespace perimap::test {
+namespace {
+
+template <typename T>
+T value_of(Expected<T> made) {
+  if (!made) throw std::runtime_error(made.error().message);
+  return std::move(*made);
+}
+
+}  // namespace
+
+unsigned all_processors() { return std::max(1U, std::thread::hardware_concurrency()); }
+
+Simulation simulation_of(const SimulationSettings& settings) {
+  return value_of(Simulation::create(settings, threaded_for(all_processors())));
+}
+
+PipelineSettings settings_for(const Simulation& simulation, const TrackerNoise& noise) {
+  const auto configuration =
+      value_of(parse_configuration(simulated_configuration(simulation, noise), "simulated.toml"));
+  const auto camera = value_of(parse_calibration(simulation.lens().opencv_yaml(), "simulated.yaml"));
+  PipelineSettings settings = pipeline_settings(configuration, camera);
+  settings.lockstep = true;
+  return settings;
+}
+
+void for_each_arrival(const Simulation& simulation,
+                      const std::function<void(const Simulation::Arrival&, const FrameEvent&)>& take) {
+  FrameRenderer frames(simulation, all_processors());
+  for (const Simulation::Arrival& arrival : simulation.arrivals()) {
+    FrameEvent frame;
+    if (arrival.source == Simulation::Source::kCamera) {
+      const auto pixels = frames.next();
+      frame = {simulation.frames()[arrival.index].stamp, simulation.settings().width, simulation.settings().height, {}};
+      frame.pixels.assign(pixels.begin(), pixels.end());
+    }
+    take(arrival, frame);
+  }
+}
+
+void deliver(LockstepRuntime& runtime, const Simulation& simulation, const Simulation::Arrival& arrival,
+             const FrameEvent& frame, const TrackerNoise& noise) {
+  switch (arrival.source) {
+    case Simulation::Source::kCamera:
+      runtime.deliver(frame);
+      break;
+    case Simulation::Source::kTracker:
+      runtime.deliver(simulation.tracker_sample(arrival.index, noise));
+      break;
+    case Simulation::Source::kEcg:
+      runtime.deliver(simulation.ecg()[arrival.index]);
+      break;
+  }
+}
+
+}  // namespace perimap::test
