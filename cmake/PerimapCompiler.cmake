@@ -23,8 +23,9 @@ if(PERIMAP_SANITIZE)
   add_compile_options(-fsanitize=${PERIMAP_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${PERIMAP_SANITIZE})
 endif()
-if(PERIMAP_SANITIZE STREQUAL "address,undefined")
-  # A third of the build time for what AddressSanitizer mostly traps as well; the preset ubsan has all checks.
+set(PERIMAP_UNDEFINED all CACHE STRING "Checks of UndefinedBehaviorSanitizer: all, or some")
+if(PERIMAP_SANITIZE STREQUAL "address,undefined" AND PERIMAP_UNDEFINED STREQUAL some)
+  # A third of the build time for what AddressSanitizer mostly traps as well.
   add_compile_options(-fno-sanitize=null,alignment,object-size,pointer-overflow,vptr)
 endif()
 if(PERIMAP_FUZZ)

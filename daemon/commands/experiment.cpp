@@ -86,6 +86,14 @@ void add_experiment_command(CLI::App& app, int& exit_code) {
   command->add_option("--trials", options->settings.trials, "How many trials of 5 (1) or 8 (2) features")
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str();
+  command
+      ->add_option("--step-factor", options->settings.methods.paper_step,
+                   "Gamma of the paper's update: the share of each Gauss-Newton step that is taken")
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str();
+  command->add_option("--iterations", options->settings.methods.paper_iterations, "Iterations of the paper's update")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   command->add_flag("--json", options->json, "Print JSON in place of the table");
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }

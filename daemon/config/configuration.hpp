@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/estimation/update_settings.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/phase/rr_predictor.hpp"
 #include "core/time/instant.hpp"
@@ -130,7 +131,10 @@ struct EstimationConfiguration {
   int start_observations = 60;
   std::vector<double> start_depths_mm = {50.0, 90.0, 160.0};
   double pixel_deviation_px = 0.3;
+  UpdateMethod update = UpdateMethod::kLevenbergMarquardt;
+  double step_factor = 1.0;  // the paper's gamma, for Gauss-Newton
   int iterations = 5;
+  double tolerance = 1e-2;
   double gate_chi2 = 23.0;
   double prior_dc_deviation_mm = 40.0;
   double prior_harmonic_deviation_mm = 4.0;      // of harmonic 1; harmonic k has this / k^2

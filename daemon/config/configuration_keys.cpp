@@ -477,6 +477,8 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
                "frames from one search for new features to the next")
       .number("minimum_distance_px", 1, 1000, PERIMAP_MEMBER(features.minimum_distance_px),
               "a new feature keeps this distance from all others");
+  const std::array<std::pair<std::string_view, UpdateMethod>, 2> updates{
+      {{"levenberg-marquardt", UpdateMethod::kLevenbergMarquardt}, {"gauss-newton", UpdateMethod::kGaussNewton}}};
   Section("estimation", keys)
       .integer("harmonics", 1, 12, PERIMAP_MEMBER(estimation.harmonics), "cardiac harmonics of each feature's motion")
       .integer("start_observations", 10, 96, PERIMAP_MEMBER(estimation.start_observations),
@@ -499,7 +501,13 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
           "depths from which the batch start tries")
       .number("pixel_deviation_px", 0.01, 100, PERIMAP_MEMBER(estimation.pixel_deviation_px),
               "standard deviation of a match, an axis")
-      .integer("iterations", 1, 20, PERIMAP_MEMBER(estimation.iterations), "most iterations of one update")
+      .choice("update", updates, PERIMAP_MEMBER(estimation.update),
+              "how an update iterates; gauss-newton: as the paper")
+      .number("step_factor", 0.01, 1, PERIMAP_MEMBER(estimation.step_factor),
+              "share of a Gauss-Newton step that is taken")
+      .integer("iterations", 1, 100, PERIMAP_MEMBER(estimation.iterations), "most iterations of one update")
+      .number("tolerance", 0, 1, PERIMAP_MEMBER(estimation.tolerance),
+              "an update has converged with a step this short, in standard deviations; 0: always all iterations")
       .number("gate_chi2", 0.1, 1000, PERIMAP_MEMBER(estimation.gate_chi2),
               "a match of higher cost at the optimum is refused; 23: 99.999 % of chi-square, 2 degrees")
       .number("prior_dc_deviation_mm", 0.1, 10000, PERIMAP_MEMBER(estimation.prior_dc_deviation_mm),

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
 
 #include "daemon/experiment/method.hpp"
 
@@ -41,6 +42,23 @@ double path_deviation_mm(const FeatureEstimate& estimate, const BasisLayout& lay
   double sum = 0.0;
   for (int i = 0; i < kPhases; ++i) sum += estimate.position_covariance(basis_at(layout, phase_of(i))).trace();
   return std::sqrt(sum / kPhases);
+}
+
+std::vector<double> drawn_path_errors_mm(const FeatureEstimate& estimate, const BasisLayout& layout, int draws,
+                                         std::uint64_t seed) {
+  const Eigen::MatrixXd L = Eigen::MatrixXd(estimate.P).llt().matrixL();
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> errors;
+  for (int draw = 0; draw < draws; ++draw) {
+    Eigen::VectorXd unit(L.rows());
+    for (double& value : unit) value = normal(generator);
+    const StateVector error = L * unit;
+    double sum = 0.0;
+    for (int i = 0; i < kPhases; ++i) sum += position_of(error, basis_at(layout, phase_of(i))).squaredNorm();
+    errors.push_back(std::sqrt(sum / kPhases));
+  }
+  return errors;
 }
 
 FeatureEstimate cramer_rao_bound(const Scene& scene, const SceneFeature& feature, const BasisLayout& layout,

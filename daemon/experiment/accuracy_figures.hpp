@@ -1,6 +1,7 @@
 // How far an estimated motion is from the true one, and what the data allow at best.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "core/estimation/feature_estimate.hpp"
@@ -18,6 +19,11 @@ namespace perimap {
 
 // RMS over a cycle of the error that the covariance promises, mm.
 [[nodiscard]] double path_deviation_mm(const FeatureEstimate& estimate, const BasisLayout& layout);
+
+// The path errors (mm) of `draws` estimates whose errors are normal with the covariance: what is compared with the
+// errors reached, quantile by quantile, where path_deviation_mm compares with their RMS. The same for the same seed.
+[[nodiscard]] std::vector<double> drawn_path_errors_mm(const FeatureEstimate& estimate, const BasisLayout& layout,
+                                                       int draws, std::uint64_t seed);
 
 // Posterior Cramer-Rao bound of one feature from its sightings in frames before `end_frame`, outliers left out, pose
 // noise white and of this feature alone: the truth with the bound as its covariance. `layout` must hold the truth's

@@ -1,5 +1,7 @@
 #include "daemon/experiment/experiment.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -60,8 +62,8 @@ SceneSettings scene_settings(const ExperimentSettings& settings, int trial) {
 
 // Depth along the optical axis of the rest pose over the cycle, with two standard deviations on either side.
 Plot cycle_plot(const Scene& scene, const SceneFeature& feature, MethodKind kind, const MethodSetting& setting,
-                int sightings) {
-  const auto method = make_method(kind, setting);
+                const MethodOptions& options, int sightings) {
+  const auto method = make_method(kind, setting, options);
   for (int k = 0; k < sightings; ++k) method->take(feature.sightings[static_cast<std::size_t>(k)]);
   Plot plot;
   plot.title = method_name(kind) + ", after " + std::to_string(sightings) + " sightings";
@@ -89,15 +91,14 @@ Plot cycle_plot(const Scene& scene, const SceneFeature& feature, MethodKind kind
   return plot;
 }
 
-ExperimentFigure cycle_figure(const Scene& scene, const MethodSetting& setting) {
+ExperimentFigure cycle_figure(const Scene& scene, const MethodSetting& setting, const MethodOptions& options) {
   const SceneFeature& feature = scene.features.front();
   const int all = static_cast<int>(feature.sightings.size());
-  const MethodOptions options;
   return {"cycle",
           "One feature's cycle at the start and after convergence",
-          {cycle_plot(scene, feature, MethodKind::kIterated, setting, 10),
-           cycle_plot(scene, feature, MethodKind::kDelayed, setting, options.buffered),
-           cycle_plot(scene, feature, MethodKind::kDelayed, setting, all)}};
+          {cycle_plot(scene, feature, MethodKind::kIterated, setting, options, 10),
+           cycle_plot(scene, feature, MethodKind::kDelayed, setting, options, options.buffered),
+           cycle_plot(scene, feature, MethodKind::kDelayed, setting, options, all)}};
 }
 
 Plot error_plot(const Comparison& comparison, const std::vector<MethodKind>& kinds, const std::string& title) {
@@ -128,7 +129,7 @@ ExperimentFigure error_figure(const Comparison& comparison) {
 }
 
 // Seen from above the viewing axis: along it (y) and across it (x).
-ExperimentFigure paths_figure(const Scene& scene, const MethodSetting& setting) {
+ExperimentFigure paths_figure(const Scene& scene, const MethodSetting& setting, const MethodOptions& options) {
   Plot plot;
   plot.title = "Motion of the features over one cycle";
   plot.x_label = "x_W (mm)";
@@ -140,7 +141,7 @@ ExperimentFigure paths_figure(const Scene& scene, const MethodSetting& setting) 
   };
   bool first = true;
   for (const SceneFeature& feature : scene.features) {
-    if (static_cast<int>(feature.sightings.size()) < MethodOptions{}.buffered) continue;
+    if (static_cast<int>(feature.sightings.size()) < options.buffered) continue;
     PlotLine truth{{}, kTruthColor, 4.0, first ? "truth" : ""};
     constexpr int kSteps = 60;
     for (int i = 0; i <= kSteps; ++i) {
@@ -150,7 +151,7 @@ ExperimentFigure paths_figure(const Scene& scene, const MethodSetting& setting) 
     plot.lines.push_back(truth);
     for (const Drawn drawn :
          {Drawn{MethodKind::kStaticEkf, 6.0}, Drawn{MethodKind::kIterated, 1.0}, Drawn{MethodKind::kDelayed, 1.6}}) {
-      const auto method = make_method(drawn.kind, setting);
+      const auto method = make_method(drawn.kind, setting, options);
       for (const Sighting& sighting : feature.sightings) method->take(sighting);
       PlotLine line{{}, color_of(drawn.kind), drawn.width_px, first ? method_name(drawn.kind) : ""};
       const FeatureEstimate* estimate = method->estimate();
@@ -236,7 +237,7 @@ Expected<Experiment> run_experiment(const ExperimentSettings& settings,
   if (!heart) return tl::unexpected(heart.error());
   constexpr double kInterval_s = 0.5;
   const BasisLayout layout;
-  Comparison comparison(kEveryMethod, layout, Prior{}, kFirstDepth_mm, kInterval_s);
+  Comparison comparison(kEveryMethod, layout, Prior{}, kFirstDepth_mm, kInterval_s, settings.methods);
   Experiment experiment;
   experiment.number = settings.number;
   experiment.seed = settings.seed;
@@ -252,14 +253,16 @@ Expected<Experiment> run_experiment(const ExperimentSettings& settings,
         "patch moving 13 mm along the optical axis, 8 features a trial followed for 60 to 480 frames, pixels with 0.7 "
         "px at f = 700 px, tracker 1.4 mm and 0.5 degrees RMS, phase and association known";
   }
+  experiment.setting += fmt::format("; the paper's update with gamma {:g} and {} iterations",
+                                    settings.methods.paper_step, settings.methods.paper_iterations);
   for (int trial = 0; trial < settings.trials; ++trial) {
     const auto scene = make_scene(scene_settings(settings, trial), *heart);
     if (!scene) return tl::unexpected(scene.error());
     comparison.add(*scene);
     if (trial == 0) {
       const MethodSetting setting{&*scene, layout, Prior{}, kFirstDepth_mm};
-      if (settings.number == 1) experiment.figures.push_back(cycle_figure(*scene, setting));
-      if (settings.number == 2) experiment.figures.push_back(paths_figure(*scene, setting));
+      if (settings.number == 1) experiment.figures.push_back(cycle_figure(*scene, setting, settings.methods));
+      if (settings.number == 2) experiment.figures.push_back(paths_figure(*scene, setting, settings.methods));
     }
     progress(trial + 1);
   }

@@ -37,6 +37,7 @@ struct ExperimentSettings {
   int number = 1;  // 1 or 2
   std::uint64_t seed = 1;
   int trials = 100;
+  MethodOptions methods;
 };
 
 // Calls `progress` with the number of trials done. Deterministic but for the times.

@@ -70,19 +70,15 @@ BatchSettings batch_settings(double first_depth_mm, bool robust) {
   return settings;
 }
 
-// The batch needs R beforehand, and pose noise enters it at the feature: a second solution has it from the first.
-BatchOutcome batch_of(const MethodSetting& setting, std::span<const Sighting> sightings, bool robust) {
+// The batch needs R beforehand, and pose noise enters it at the feature: supposed at the first depth, as perimapd's
+// start does. `observations` are left for another solution.
+BatchOutcome batch_of(const MethodSetting& setting, std::span<const Sighting> sightings, const BatchSettings& settings,
+                      std::vector<Observation>& observations) {
   const Scene& scene = *setting.scene;
-  const BatchSettings settings = batch_settings(setting.first_depth_mm, robust);
-  std::vector<Observation> observations;
   const Vector3d guess = on_ray(scene, sightings.front(), setting.first_depth_mm);
+  observations.clear();
   for (const Sighting& sighting : sightings)
     observations.push_back(observation_of(scene, setting.layout, sighting, guess));
-  BatchOutcome outcome = batch(scene, observations, setting, settings);
-  const PoseError& error = scene.settings.pose_error;
-  if (!outcome.ok() || (error.position_rms_mm == 0.0 && error.rotation_rms_rad == 0.0)) return outcome;
-  for (std::size_t k = 0; k < observations.size(); ++k)
-    observations[k] = observation_of(scene, setting.layout, sightings[k], outcome.estimate.position(observations[k].b));
   return batch(scene, observations, setting, settings);
 }
 
@@ -96,7 +92,8 @@ class DelayedMethod final : public Method {
     if (!estimate_) {
       waiting_.push_back(sighting);
       if (waiting_.size() < wanted_) return;
-      BatchOutcome outcome = batch_of(setting_, waiting_, true);
+      std::vector<Observation> observations;
+      BatchOutcome outcome = batch_of(setting_, waiting_, batch_settings(setting_.first_depth_mm, true), observations);
       if (outcome.ok()) {
         estimate_ = std::move(outcome.estimate);
         waiting_.clear();
@@ -135,7 +132,7 @@ class BatchMethod final : public Method {
   const FeatureEstimate* estimate() override {
     if (!solved_ && !sightings_.empty()) {
       solved_ = true;
-      outcome_ = batch_of(setting_, sightings_, !only_good_);
+      solve();
     }
     return outcome_.ok() ? &outcome_.estimate : nullptr;
   }
@@ -143,6 +140,21 @@ class BatchMethod final : public Method {
   [[nodiscard]] double last_innovation() const override { return kNoNumber; }
 
  private:
+  // With pose noise twice: the first solution tells where the noise enters.
+  void solve() {
+    const BatchSettings settings = batch_settings(setting_.first_depth_mm, !only_good_);
+    std::vector<Observation> observations;
+    outcome_ = batch_of(setting_, sightings_, settings, observations);
+    const Scene& scene = *setting_.scene;
+    const PoseError& error = scene.settings.pose_error;
+    if (!outcome_.ok() || (error.position_rms_mm == 0.0 && error.rotation_rms_rad == 0.0)) return;
+    for (std::size_t k = 0; k < observations.size(); ++k) {
+      observations[k] =
+          observation_of(scene, setting_.layout, sightings_[k], outcome_.estimate.position(observations[k].b));
+    }
+    outcome_ = batch(scene, observations, setting_, settings);
+  }
+
   MethodSetting setting_;
   bool only_good_;
   std::vector<Sighting> sightings_;

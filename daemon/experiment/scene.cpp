@@ -209,6 +209,13 @@ std::vector<SceneFrame> make_frames(const SceneSettings& settings, const Stage& 
   return frames;
 }
 
+// All but the mean of each axis grows.
+StateVector drifted_motion(StateVector x, const BasisLayout& layout, double drift_per_min, double time_s) {
+  const double factor = 1.0 + drift_per_min * time_s / 60.0;
+  for (int axis = 0; axis < 3; ++axis) x.segment(axis * layout.size() + 1, layout.size() - 1) *= factor;
+  return x;
+}
+
 template <class Model>
 std::vector<Sighting> sightings_of(const SceneSettings& settings, const Model& model, const Stage& stage,
                                    const std::vector<SceneFrame>& frames, std::size_t index) {
@@ -222,7 +229,8 @@ std::vector<Sighting> sightings_of(const SceneSettings& settings, const Model& m
   }
   std::vector<Sighting> sightings;
   for (std::size_t f = 0; f < std::min(seen_frames, frames.size()); ++f) {
-    const Vector3d p = position_of(stage.points[index], basis_at(stage.layout, frames[f].phase_rad));
+    const StateVector x = drifted_motion(stage.points[index], stage.layout, settings.drift_per_min, frames[f].time_s);
+    const Vector3d p = position_of(x, basis_at(stage.layout, frames[f].phase_rad));
     Sighting sighting;
     sighting.frame = static_cast<int>(f);
     if (model.predict(frames[f].X_CW_true * p, sighting.z) != ProjectionStatus::kOk) continue;
@@ -242,6 +250,11 @@ std::vector<Sighting> sightings_of(const SceneSettings& settings, const Model& m
 }
 
 }  // namespace
+
+SceneFeature Scene::drifted(SceneFeature feature, double time_s) const {
+  feature.x = drifted_motion(feature.x, layout, settings.drift_per_min, time_s);
+  return feature;
+}
 
 Expected<HeartMesh> load_heart() {
   return parse_heart_mesh(embedded_epicardium_fourier_csv(), embedded_epicardium_faces_csv());

@@ -46,6 +46,7 @@ struct SceneSettings {
   double outliers = 0.0;      // fraction of matches that are 15 to 150 deviations off
   std::string ecg_record;     // rhythm of this MIT-BIH record; empty: 70/min, 3.9 % standard deviation
   PoseError pose_error;
+  double drift_per_min = 0.0;  // the motion's amplitude grows by this share of the first one a minute
   std::uint64_t seed = 1;
 };
 
@@ -63,7 +64,7 @@ struct Sighting {
 };
 
 struct SceneFeature {
-  StateVector x;  // of the truth's layout
+  StateVector x;  // of the truth's layout, at the beginning
   std::vector<Sighting> sightings;
 };
 
@@ -78,6 +79,8 @@ struct Scene {
   [[nodiscard]] Vector3d true_position(const SceneFeature& feature, double phase_rad) const noexcept {
     return position_of(feature.x, basis_at(layout, phase_rad));
   }
+  // The feature as the drift of its amplitude leaves it at this time.
+  [[nodiscard]] SceneFeature drifted(SceneFeature feature, double time_s) const;
   // Covariance of a match without pose noise.
   [[nodiscard]] Matrix2d match_covariance() const noexcept {
     return settings.deviation * settings.deviation * Matrix2d::Identity();

@@ -14,6 +14,7 @@ constexpr double kMarginLeft = 62.0;
 constexpr double kMarginRight = 16.0;
 constexpr double kMarginTop = 34.0;
 constexpr double kMarginBottom = 46.0;
+constexpr double kLegendRow = 17.0;
 constexpr double kPlotWidth = 560.0;
 constexpr double kPlotHeight = 480.0;
 constexpr double kTitleHeight = 34.0;
@@ -102,7 +103,11 @@ std::string plot_group(const Plot& plot, double x_px, double y_px, double width_
   y = padded(y);
   if (plot.y_from_zero) y.low = 0.0;
   const double inner_width = width_px - kMarginLeft - kMarginRight;
-  const double inner_height = height_px - kMarginTop - kMarginBottom;
+  const auto labels =
+      std::count_if(plot.lines.begin(), plot.lines.end(), [](const PlotLine& line) { return !line.label.empty(); });
+  // The legend stands below the axes, two labels a row, where it covers no curve.
+  const double inner_height =
+      height_px - kMarginTop - kMarginBottom - kLegendRow * std::ceil(static_cast<double>(labels) / 2);
   if (plot.equal_aspect) {
     const double unit = std::max(x.length() / inner_width, y.length() / inner_height);
     const auto widen = [](Range& r, double length) {
@@ -130,11 +135,12 @@ std::string plot_group(const Plot& plot, double x_px, double y_px, double width_
   out += fmt::format(
       "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"#555\"/>\n",
       kMarginLeft, kMarginTop, inner_width, inner_height);
-  out += text_at(kMarginLeft + inner_width / 2, height_px - 10, "middle", plot.x_label);
+  const double axis_y = kMarginTop + inner_height + 36;
+  out += text_at(kMarginLeft + inner_width / 2, axis_y, "middle", plot.x_label);
   out += fmt::format("<text transform=\"translate(16,{:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
                      kMarginTop + inner_height / 2, escaped(plot.y_label));
 
-  double legend_y = kMarginTop + 18;
+  int labelled = 0;
   for (const PlotLine& line : plot.lines) {
     std::string path;
     bool drawing = false;
@@ -151,10 +157,12 @@ std::string plot_group(const Plot& plot, double x_px, double y_px, double width_
                          escaped(line.color), line.width_px);
     }
     if (line.label.empty()) continue;
-    out += fmt::format("<path d=\"M{:.1f} {:.1f}h22\" stroke=\"{}\" stroke-width=\"3\"/>\n", kMarginLeft + 10,
-                       legend_y - 4, escaped(line.color));
-    out += text_at(kMarginLeft + 38, legend_y, "start", line.label);
-    legend_y += 17;
+    const double x_legend = kMarginLeft + (labelled % 2) * inner_width / 2;
+    const double y_legend = axis_y + kLegendRow * (1 + labelled / 2);
+    out += fmt::format("<path d=\"M{:.1f} {:.1f}h22\" stroke=\"{}\" stroke-width=\"3\"/>\n", x_legend, y_legend - 4,
+                       escaped(line.color));
+    out += text_at(x_legend + 28, y_legend, "start", line.label);
+    ++labelled;
   }
   return out + "</g>\n";
 }

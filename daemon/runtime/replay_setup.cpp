@@ -87,7 +87,10 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.estimator.layout.cardiac_harmonics = c.estimation.harmonics;
   s.estimator.prior.dc_mm = c.estimation.prior_dc_deviation_mm;
   s.estimator.prior.cardiac_mm = c.estimation.prior_harmonic_deviation_mm;
+  s.estimator.update.method = c.estimation.update;
+  s.estimator.update.step_factor = c.estimation.step_factor;
   s.estimator.update.max_iterations = c.estimation.iterations;
+  s.estimator.update.tolerance = c.estimation.tolerance;
   s.estimator.update.gate = c.estimation.gate_chi2;
   s.estimator.batch.gate = c.estimation.gate_chi2;
   s.estimator.batch.start_depths_mm = c.estimation.start_depths_mm;

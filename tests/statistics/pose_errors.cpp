@@ -1,5 +1,5 @@
 // Goals with errors of the camera pose, which all matches of a frame share.
-#include <cmath>
+#include <algorithm>
 #include <numbers>
 #include <stdexcept>
 #include <vector>
@@ -11,11 +11,18 @@
 namespace perimap::test {
 namespace {
 
+// Errors are compared by their medians, so bounds are too: by the median of errors that have the bound as covariance.
+void draw_errors(std::vector<double>& errors_mm, const FeatureEstimate& bound) {
+  constexpr int kDraws = 20;
+  const auto drawn = drawn_path_errors_mm(bound, BasisLayout{}, kDraws, errors_mm.size());
+  errors_mm.insert(errors_mm.end(), drawn.begin(), drawn.end());
+}
+
 struct Sums {
   std::vector<double> errors_mm;
   double nees = 0.0;
   double published_nees = 0.0;
-  double squared_bound = 0.0;  // of each feature alone
+  std::vector<double> bounds_mm;  // path errors of an estimator of each feature alone that reaches its bound
 
   void add(const Scene& scene, const SharedMap& map, int end_frame, bool tracker_alone) {
     const BasisLayout layout;
@@ -26,8 +33,7 @@ struct Sums {
       nees += normalised_squared_error(*map.estimate(i), layout, scene, feature);
       if (!tracker_alone) continue;
       published_nees += normalised_squared_error(map.published(i), layout, scene, feature);
-      squared_bound +=
-          std::pow(path_deviation_mm(cramer_rao_bound(scene, feature, layout, Prior{}, end_frame), layout), 2);
+      draw_errors(bounds_mm, cramer_rao_bound(scene, feature, layout, Prior{}, end_frame));
     }
   }
   [[nodiscard]] double count() const { return static_cast<double>(errors_mm.size()); }
@@ -77,9 +83,8 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
     Sums alone[kChecks];
     Sums naive[kChecks];
     Sums others[kChecks];
-    double joint_squared_bound[kChecks] = {};
-    double in_common_squared_bound[kChecks] = {};
-    double bounded = 0.0;
+    std::vector<double> joint_bounds_mm[kChecks];
+    std::vector<double> in_common_bounds_mm[kChecks];
     for (int trial = 0; trial < trials; ++trial) {
       const Scene scene = scene_of(extent, heart, trial, correlation_s, frame_at(kSeconds[checks - 1]));
       const auto follow = [&](PoseUse use, Sums* sums) {
@@ -97,24 +102,26 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
       if (trial >= bound_trials) continue;
       for (int at = 0; at < checks; ++at) {
         for (const FeatureEstimate& one : joint_cramer_rao_bound(scene, BasisLayout{}, Prior{}, frame_at(kSeconds[at])))
-          joint_squared_bound[at] += std::pow(path_deviation_mm(one, BasisLayout{}), 2);
+          draw_errors(joint_bounds_mm[at], one);
         for (const FeatureEstimate& one :
              joint_cramer_rao_bound(scene, BasisLayout{}, in_common_prior(scene), frame_at(kSeconds[at])))
-          in_common_squared_bound[at] += std::pow(path_deviation_mm(one, BasisLayout{}), 2);
+          draw_errors(in_common_bounds_mm[at], one);
       }
-      bounded += static_cast<double>(scene.features.size());
     }
     const bool white = correlation_s == 0.0;
     for (int at = 0; at < checks; ++at) {
-      const double joint_bound = std::sqrt(joint_squared_bound[at] / bounded);
+      const double joint_bound = quantile(joint_bounds_mm[at], 0.5);
       const double reached = quantile(alone[at].errors_mm, 0.5);
-      const double own_bound = std::sqrt(alone[at].squared_bound / alone[at].count());
-      const std::string goal = white ? fmt::format("<= {:g}", kLimits_mm[at]) : "";
-      // The bound of features taken one by one stands beside it: where it is above the goal, the goal can't be asked.
-      if (white && own_bound < kLimits_mm[at]) {
-        report.at_most(title(correlation_s, "tracker alone", at), kLimits_mm[at], reached, own_bound);
+      const double own_bound = quantile(alone[at].bounds_mm, 0.5);
+      // Where the bound of features taken one by one is above the goal, no estimator of such features can meet it; what
+      // it can be asked then is to be at the bound.
+      if (white) {
+        report.shown(title(correlation_s, "tracker alone", at), fmt::format("<= {:g}", kLimits_mm[at]), reached,
+                     own_bound);
+        report.at_most("  over the goal, or where that is less the bound of each alone", extent.whole ? 1.05 : 1.2,
+                       reached / std::max(kLimits_mm[at], own_bound));
       } else {
-        report.shown(title(correlation_s, "tracker alone", at), goal, reached, white ? own_bound : joint_bound);
+        report.shown(title(correlation_s, "tracker alone", at), "", reached, joint_bound);
       }
       report.shown("  NEES/3", "", alone[at].nees / alone[at].count());
       report.at_most("  NEES/3 of the published covariance, common part counted in", 1.5,
@@ -124,7 +131,7 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
         report.shown(title(correlation_s, name, at), half, quantile(sums[at].errors_mm, 0.5), joint_bound);
         report.shown("  NEES/3", "", sums[at].nees / sums[at].count());
       }
-      report.shown("  joint bound where the mean motion is free", "", std::sqrt(in_common_squared_bound[at] / bounded));
+      report.shown("  joint bound where the mean motion is free", "", quantile(in_common_bounds_mm[at], 0.5));
     }
   }
 }

@@ -48,23 +48,30 @@ void expect_run(FeatureBank<double> bank, const json& run, const json& expected)
   settings.method = lm ? UpdateMethod::kLevenbergMarquardt : UpdateMethod::kGaussNewton;
   settings.max_iterations =
       expected["iterations"].is_string() ? golden::kUntilConverged : expected["iterations"].get<int>();
-  // The minimum of one update is the camera's centre, where a bearing is undefined: see golden_test.cpp.
+  // The minimum of one update is the camera's centre, where a bearing is undefined: the next vector is met loosely, the
+  // rest from that vector itself; see golden_test.cpp.
   const bool singular = lm && run["model"] == "bearing";
   constexpr std::size_t kSingularUpdate = 21;
   constexpr int kFeature = 3;
   bank.set(kFeature, {vector_of(run["x0"]), Eigen::MatrixXd(vector_of(run["P0_diag"]).asDiagonal())});
   const std::vector<Observation> observations = golden::observations_of(run, bank.layout());
   int checked = 0;
+  bool past_singular = false;
   golden::with_model(run["model"].get<std::string>(), [&](const auto& model) {
     for (std::size_t k = 0; k < observations.size(); ++k) {
       ASSERT_NE(test::learn(bank, kFeature, observations[k], model, settings).accepted, 0) << k;
       const std::string after = std::to_string(k + 1);
       if (!expected["after"].contains(after)) continue;
       SCOPED_TRACE("after " + after);
-      const double tolerance = singular && k >= kSingularUpdate ? 1e-5 : golden::kTolerance;
+      const bool loose = singular && !past_singular && k >= kSingularUpdate;
+      const double tolerance = loose ? 1e-5 : golden::kTolerance;
+      const FeatureEstimate vector{vector_of(expected["after"][after]["x"]),
+                                   golden::matrix_of(expected["after"][after]["P"])};
       const FeatureEstimate estimate = test::estimate_of(bank, kFeature);
-      EXPECT_TRUE(matches(estimate.x, vector_of(expected["after"][after]["x"]), tolerance));
-      EXPECT_TRUE(matches(estimate.P, golden::matrix_of(expected["after"][after]["P"]), tolerance));
+      EXPECT_TRUE(matches(estimate.x, vector.x, tolerance));
+      EXPECT_TRUE(matches(estimate.P, vector.P, tolerance));
+      if (loose) bank.set(kFeature, vector);
+      past_singular = past_singular || loose;
       ++checked;
     }
   });
