@@ -125,14 +125,11 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   const bool settling = beat(0).index_in_run + 1 < kBeatsToLock;
   if ((settling && !beat(0).resumed) || predicted_length() <= Duration::zero()) return located;
 
-  const Instant due = predicted_r_peak();
-  const Duration slack = std::min(rounded(kOverdueDeviations * running_deviation_), predicted_length());
-  if (t > due + lost_after_) {
+  if (t > lost_from()) {
     located.state = PhaseState::kLost;
     return located;
   }
-  // What the images carry on has been seen; what they have not even begun to show a cycle later has not.
-  const bool overdue = t > due + (carried_ ? predicted_length() : slack + detector_delay_);
+  const bool overdue = t > expected_until();
   located.state = PhaseState::kLocked;
   if (overdue || interrupted_ || carried_ || settling) located.state = PhaseState::kFreeRunning;
   if (!overdue && carried_ && seen_) located.state = PhaseState::kFromImage;
@@ -155,8 +152,18 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   }
 }
 
+Instant CardiacClock::expected_until() const noexcept {
+  // What the images carry on has been seen; what they have not even begun to show a cycle later has not.
+  if (carried_) return predicted_r_peak() + predicted_length();
+  const Duration slack = std::min(rounded(kOverdueDeviations * running_deviation_), predicted_length());
+  return predicted_r_peak() + slack + detector_delay_;
+}
+
 CardiacCycle CardiacClock::cycle_at(Instant t) const noexcept {
-  CardiacCycle cycle = locate(t).cycle;
+  const Located located = locate(t);
+  CardiacCycle cycle = located.cycle;
+  cycle.completed = located.exact;
+  cycle.irregularity = located.irregularity;
   if (cycle.length > Duration::zero()) {
     cycle.systole = rounded(systole_duration(law_, cycle.length, cycle.previous_length));
   }

@@ -50,6 +50,8 @@ struct CardiacCycle {
   Duration length_deviation{0};
   Duration previous_length{0};  // the warped law depends on it
   Duration systole{0};          // under the warped law's rule
+  Duration irregularity{0};     // completed: by how much its end missed the prediction, 0 when in rhythm
+  bool completed = false;       // both its R peaks are known
   bool teaches = false;         // completed, and what was seen in it may be learnt, see CardiacClockTracker
 };
 
@@ -79,6 +81,11 @@ class CardiacClock {
   [[nodiscard]] Duration last_rr() const noexcept;  // zero before the second beat of a run
   [[nodiscard]] Instant predicted_r_peak() const noexcept { return anchor() + predicted_length(); }
   [[nodiscard]] Duration predicted_r_peak_deviation() const noexcept;
+  // A later instant counts as free-running: the beat that is due should be known by then. With the ECG gone that holds
+  // for earlier ones as well.
+  [[nodiscard]] Instant expected_until() const noexcept;
+  // From here on the phase is lost unless a beat comes.
+  [[nodiscard]] Instant lost_from() const noexcept { return predicted_r_peak() + lost_after_; }
   // An R peak is usually known so long after it.
   [[nodiscard]] Duration detector_delay() const noexcept { return detector_delay_; }
 

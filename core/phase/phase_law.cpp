@@ -11,11 +11,14 @@ constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kLongestSystole = 0.75;
 constexpr double kShortestSystole = 0.05;
 
+bool warped_stretches(double systole, double rr) noexcept {
+  return systole >= kLongestSystole * rr || systole <= kShortestSystole * rr;
+}
+
 CyclePhase linear(double s, double rr) noexcept { return {kTwoPi * s / rr, kTwoPi / rr, s / rr}; }
 
 CyclePhase warped(const PhaseLawSettings& settings, double s, double rr, double rr_previous) noexcept {
   const double systole = systole_duration(settings, Seconds(rr), Seconds(rr_previous)).count();
-  const bool stretches = systole >= kLongestSystole * rr || systole <= kShortestSystole * rr;
   const double fraction = settings.systole_fraction;
   CyclePhase result;
   if (s < systole) {
@@ -25,7 +28,7 @@ CyclePhase warped(const PhaseLawSettings& settings, double s, double rr, double 
     const double share = (s - systole) / diastole;
     result = {kTwoPi * (fraction + (1.0 - fraction) * share), kTwoPi * (1.0 - fraction) / diastole, share};
   }
-  if (stretches) result.length_sensitivity = s / rr;
+  if (warped_stretches(systole, rr)) result.length_sensitivity = s / rr;
   return result;
 }
 
@@ -68,6 +71,18 @@ LockedParts locked_parts(const PhaseLawSettings& settings, Seconds rr) noexcept 
     parts.filling *= scale;
   }
   return parts;
+}
+
+bool stretches(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept {
+  switch (settings.law) {
+    case PhaseLaw::kWarped:
+      return warped_stretches(systole_duration(settings, rr, rr_previous).count(), rr.count());
+    case PhaseLaw::kTimeLocked:
+      return locked_parts(settings, rr).stretches;
+    case PhaseLaw::kLinear:
+      break;
+  }
+  return false;
 }
 
 CyclePhase phase_in_cycle(const PhaseLawSettings& settings, Seconds since_r, Seconds rr, Seconds rr_previous) noexcept {

@@ -38,6 +38,10 @@ struct PhaseLawSettings {
 // Systole and filling take at most this share of the cycle under the time-locked law, so that the rate stays finite.
 inline constexpr double kLongestLockedShare = 0.95;
 
+// The cycle is too short, or too long, for the law's own lengths: the whole of it stretches with its length. Never
+// under the linear law, which has none.
+[[nodiscard]] bool stretches(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept;
+
 struct CyclePhase {
   double phase_rad = 0.0;       // [0, 2 pi]
   double rate_rad_per_s = 0.0;  // > 0

@@ -129,4 +129,19 @@ std::span<const ShardSnapshot* const> Pipeline::model_snapshots() noexcept {
   return model_view_;
 }
 
+SurfaceFooting Pipeline::model_footing(const RespiratoryClock& respiration, Instant now) const noexcept {
+  SurfaceFooting footing;
+  footing.breath_unknown = respiration.unknown();
+  for (const ShardSnapshot* snapshot : model_view_) {
+    if (snapshot == nullptr) continue;
+    footing.mapped = footing.mapped || !snapshot->features.empty();
+    footing.pose_missing = footing.pose_missing || snapshot->pose_missing;
+  }
+  // As the schedule has it: the frame after the last one, half a period late, has passed its release.
+  const auto last = from_ns(static_cast<std::int64_t>(counters_.last_frame_ns.get()));
+  const Duration period(static_cast<std::int64_t>(counters_.frame_period_ns.get()));
+  footing.frame_missing = now > last + period + period / 2 + settings_.latency;
+  return footing;
+}
+
 }  // namespace perimap

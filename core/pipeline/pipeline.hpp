@@ -17,6 +17,7 @@
 #include "core/pipeline/sensor_entrance.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/surface_composer.hpp"
+#include "core/pipeline/surface_state.hpp"
 #include "core/realtime/worker_team.hpp"
 
 namespace perimap {
@@ -63,6 +64,8 @@ class Pipeline {
   [[nodiscard]] RespiratoryClock status_respiration() noexcept;
   // Status thread: each worker's newest snapshot, in order of shard; valid until the next call.
   [[nodiscard]] std::span<const ShardSnapshot* const> model_snapshots() noexcept;
+  // Status thread: what a surface that is made at `now` of those snapshots and these clocks has to say of itself.
+  [[nodiscard]] SurfaceFooting model_footing(const RespiratoryClock& respiration, Instant now) const noexcept;
 
  private:
   PipelineSettings settings_;

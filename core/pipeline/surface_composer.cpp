@@ -5,45 +5,10 @@
 
 #include "core/periodic/periodic_motion.hpp"
 #include "core/pipeline/phase_spread.hpp"
+#include "core/pipeline/surface_state.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
-namespace {
-
-// The first thing that is wrong, worst first.
-SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, bool breath_unknown, bool mapped, bool frame_missing,
-                        bool late, bool pose_missing) noexcept {
-  if (phase.state == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;
-  if (phase.state == PhaseState::kLost) return SurfaceReason::kPhaseLost;
-  if (!mapped) return SurfaceReason::kNothingMapped;
-  if (breath_unknown) return SurfaceReason::kRespirationUnknown;
-  if (phase.state == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
-  if (phase.contradicted) return SurfaceReason::kPhaseContradicted;
-  if (phase.state == PhaseState::kFromImage) return SurfaceReason::kPhaseFromImage;
-  if (frame_missing) return SurfaceReason::kFrameMissing;
-  if (late) return SurfaceReason::kUpdateLate;
-  if (pose_missing) return SurfaceReason::kPoseMissing;
-  if (phase.ectopic) return SurfaceReason::kEctopicBeat;
-  if (rhythm == Rhythm::kUnpredictable) return SurfaceReason::kRhythmUnpredictable;
-  if (rhythm == Rhythm::kEctopic) return SurfaceReason::kRhythmEctopic;
-  return SurfaceReason::kNone;
-}
-
-SurfaceState state_of(SurfaceReason reason) noexcept {
-  switch (reason) {
-    case SurfaceReason::kNone:
-      return SurfaceState::kGood;
-    case SurfaceReason::kPhaseUnknown:
-    case SurfaceReason::kPhaseLost:
-    case SurfaceReason::kNothingMapped:
-      return SurfaceState::kInvalid;
-    default:
-      return SurfaceState::kDegraded;
-  }
-}
-
-}  // namespace
-
 SurfaceComposer::SurfaceComposer(const ComposerSettings& settings) : settings_(settings) {
   sample_.features.reserve(settings.maximum_features);
   order_.reserve(settings.maximum_features);
@@ -79,11 +44,14 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   sample_.cardiac_phase_rate_rad_per_s = phase.rate_rad_per_s;
   const bool late = oldest < release.frame_sequence && !release.frame_missing;
   sample_.update_late = late;
-  sample_.reason = reason_of(phase, clock.rhythm(), respiration.unknown(), !order_.empty(), release.frame_missing, late,
-                             pose_missing);
+  const SurfaceFooting footing{.breath_unknown = respiration.unknown(),
+                               .mapped = !order_.empty(),
+                               .frame_missing = release.frame_missing,
+                               .update_late = late,
+                               .pose_missing = pose_missing};
+  sample_.reason = reason_of(phase, clock.rhythm(), footing);
   sample_.state = state_of(sample_.reason);
 
-  const bool phase_usable = usable(phase.state);
   const RespiratoryPhase breath = respiration.at(sample_.valid_time);
   const Basis b = basis_at(settings_.layout, phase.phase_rad, breath);
   const BasesAbout about = bases_about(settings_.layout, phase, breath);
@@ -107,15 +75,9 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
             : Matrix3d(Matrix3d::Identity() * snapshot->largest_deviation_mm * snapshot->largest_deviation_mm);
     feature.covariance_W_mm2 += of_breath;
     feature.last_observed = snapshot->last_observed;
-    feature.state = phase_usable ? snapshot->state : FeatureState::kInvalid;
-    feature.reason = phase_usable ? snapshot->reason : FeatureReason::kPhaseLost;
-    if (respiration.unknown() && feature.state == FeatureState::kConverged) {
-      feature.state = FeatureState::kConverging;
-      feature.reason = FeatureReason::kDeviationLarge;
-    }
-    if (feature.reason == FeatureReason::kNone && (release.frame_missing || late)) {
-      feature.reason = FeatureReason::kNotObserved;
-    }
+    const FeatureVerdict verdict = verdict_of({snapshot->state, snapshot->reason}, phase.state, footing);
+    feature.state = verdict.state;
+    feature.reason = verdict.reason;
     sample_.features.push_back(feature);
   }
   return sample_;

@@ -12,23 +12,38 @@
 #include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
+#include "core/pipeline/surface_state.hpp"
 #include "daemon/publishing/identity.hpp"
 
 namespace perimap {
+
+// One moment of the map and its clocks.
+struct ModelMoment {
+  std::span<const ShardSnapshot* const> snapshots;  // in order of shard
+  BasisLayout layout;
+  CardiacClock clock;
+  RespiratoryClock respiration;
+  SurfaceFooting footing;
+  Instant now;
+  Duration utc_minus_monotonic{0};
+  Duration validity{0};  // nothing is said of instants further ahead
+};
 
 // Owns the buffers that its message points to.
 class WireModel {
  public:
   explicit WireModel(const Identity& identity);
 
-  // Valid until the next call. `snapshots` in order of shard.
-  [[nodiscard]] const perimap_SurfaceModel& fill(std::span<const ShardSnapshot* const> snapshots,
-                                                 const BasisLayout& layout, const CardiacClock& clock,
-                                                 const RespiratoryClock& respiration, Instant now);
+  // Valid until the next call.
+  [[nodiscard]] const perimap_SurfaceModel& fill(const ModelMoment& moment);
 
  private:
+  void fill_features(const ModelMoment& moment);
+  void fill_cycles(const ModelMoment& moment);
+
   std::vector<perimap_ModelFeature> features_;
   std::vector<std::vector<double>> coefficients_;
+  std::vector<perimap_CardiacCycle> cycles_;
   perimap_SurfaceModel wire_{};
 };
 

@@ -6,7 +6,6 @@
 #include "daemon/publishing/wire_text.hpp"
 
 namespace perimap {
-namespace {
 
 perimap_SurfaceState to_wire(SurfaceState state) noexcept {
   switch (state) {
@@ -53,8 +52,6 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }
-
-}  // namespace
 
 perimap_FeatureState to_wire(FeatureState state) noexcept {
   switch (state) {

@@ -22,6 +22,8 @@ class WireSurface {
   perimap_Surface wire_{};
 };
 
+[[nodiscard]] perimap_SurfaceState to_wire(SurfaceState state) noexcept;
+[[nodiscard]] perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept;
 [[nodiscard]] perimap_FeatureState to_wire(FeatureState state) noexcept;
 [[nodiscard]] perimap_FeatureReason to_wire(FeatureReason reason) noexcept;
 

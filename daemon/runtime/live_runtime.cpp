@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/realtime/deadline.hpp"
+#include "daemon/runtime/model_moment.hpp"
 #include "daemon/runtime/utc_offset.hpp"
 
 namespace perimap {
@@ -125,16 +126,22 @@ void LiveRuntime::run_status() {
   Instant next_model = tick;
   Instant next_status = tick;
   int closed_before = 0;
+  std::pair<std::uint64_t, SurfaceReason> turn_before;
   for (;;) {
     const bool last = stopping_.load(std::memory_order_relaxed);
     const Instant now = MonotonicClock::now();
     const CardiacClock clock = pipeline_.status_clock(now);
     const RespiratoryClock respiration = pipeline_.status_respiration();
     publication_.phase(wire_phase_.fill(clock, now));
-    if (last || now >= next_model) {
-      publication_.surface_model(wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout,
-                                                  clock, respiration, now));
+    ModelMoment moment = model_moment(pipeline_, clock, respiration, now);
+    // A subscriber that predicts with the model must not go on from a beat before the last, nor from a state that was.
+    const auto turn = std::pair(clock.beats(), reason_of(clock.at(now), clock.rhythm(), moment.footing));
+    if (last || now >= next_model || turn != turn_before) {
+      moment.utc_minus_monotonic = utc_minus_monotonic();
+      moment.validity += settings_.model_interval;
+      publication_.surface_model(wire_model_.fill(moment));
       next_model = now + settings_.model_interval;
+      turn_before = turn;
     }
     StatusFacts told = facts();
     told.respiration = respiration.state;

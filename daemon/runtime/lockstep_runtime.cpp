@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <variant>
 
+#include "daemon/runtime/model_moment.hpp"
+
 namespace perimap {
 namespace {
 
@@ -98,8 +100,10 @@ void LockstepRuntime::publish_reports(Instant now) {
   const CardiacClock clock = pipeline_.status_clock(now);
   publication_.phase(wire_phase_.fill(clock, now));
   const RespiratoryClock respiration = pipeline_.status_respiration();
-  publication_.surface_model(
-      wire_model_.fill(pipeline_.model_snapshots(), pipeline_.settings().estimator.layout, clock, respiration, now));
+  ModelMoment moment = model_moment(pipeline_, clock, respiration, now);
+  moment.utc_minus_monotonic = utc_minus_monotonic_;
+  moment.validity += kReportInterval;
+  publication_.surface_model(wire_model_.fill(moment));
   StatusFacts facts;
   facts.latency = pipeline_.settings().latency;
   facts.respiration = respiration.state;

@@ -138,6 +138,23 @@ void fill(Filler& next, perimap_RespiratoryClock& s) {
   next(s.anchor_time_ns);
   next(s.length_ns);
   next(s.deviation_mm);
+  next(s.slope_mm_per_rad);
+  next(s.phase_variance_rad2);
+  next(s.phase_rate_covariance_rad2_per_s);
+  next(s.rate_variance_rad2_per_s2);
+}
+
+void fill(Filler& next, perimap_CardiacCycle& s) {
+  next(s.measured);
+  next(s.stretches);
+  next(s.begin_time_ns);
+  next(s.begin_deviation_ns);
+  next(s.length_ns);
+  next(s.length_deviation_ns);
+  next(s.irregularity_ns);
+  next(s.systole_ns);
+  next(s.locked_systole_ns);
+  next(s.locked_filling_ns);
 }
 
 void fill(Filler& next, perimap_ModelFeature& s) {
@@ -148,6 +165,7 @@ void fill(Filler& next, perimap_ModelFeature& s) {
   next(s.first_observed_px);
   next(s.largest_deviation_mm);
   next.sequence(s.coefficients_W_mm, 5);
+  next(s.last_observed_time_ns);
 }
 
 void fill(Filler& next, perimap_SurfaceModel& s) {
@@ -161,6 +179,13 @@ void fill(Filler& next, perimap_SurfaceModel& s) {
   fill(next, s.cardiac_clock);
   next.sequence(s.features, 2, [&](auto& feature) { fill(next, feature); });
   fill(next, s.respiratory_clock);
+  next(s.state);
+  next(s.reason);
+  next(s.time_utc_ns);
+  next(s.valid_from_ns);
+  next(s.expected_until_ns);
+  next(s.valid_until_ns);
+  next.sequence(s.cardiac_cycles, 2, [&](auto& cycle) { fill(next, cycle); });
 }
 
 void fill(Filler& next, perimap_Phase& s) {
@@ -382,7 +407,20 @@ json to_json(const perimap_PhaseClock& s) {
 }
 template <>
 json to_json(const perimap_RespiratoryClock& s) {
-  return {MEMBER(state), MEMBER(anchor_time_ns), MEMBER(length_ns), MEMBER(deviation_mm)};
+  return {MEMBER(state),
+          MEMBER(anchor_time_ns),
+          MEMBER(length_ns),
+          MEMBER(deviation_mm),
+          MEMBER(slope_mm_per_rad),
+          MEMBER(phase_variance_rad2),
+          MEMBER(phase_rate_covariance_rad2_per_s),
+          MEMBER(rate_variance_rad2_per_s2)};
+}
+template <>
+json to_json(const perimap_CardiacCycle& s) {
+  return {MEMBER(measured),          MEMBER(stretches),           MEMBER(begin_time_ns),   MEMBER(begin_deviation_ns),
+          MEMBER(length_ns),         MEMBER(length_deviation_ns), MEMBER(irregularity_ns), MEMBER(systole_ns),
+          MEMBER(locked_systole_ns), MEMBER(locked_filling_ns)};
 }
 template <>
 json to_json(const perimap_ModelFeature& s) {
@@ -392,7 +430,8 @@ json to_json(const perimap_ModelFeature& s) {
           MEMBER(first_observed_time_ns),
           MEMBER(first_observed_px),
           MEMBER(largest_deviation_mm),
-          MEMBER(coefficients_W_mm)};
+          MEMBER(coefficients_W_mm),
+          MEMBER(last_observed_time_ns)};
 }
 template <>
 json to_json(const perimap_SurfaceModel& s) {
@@ -405,7 +444,14 @@ json to_json(const perimap_SurfaceModel& s) {
           MEMBER(respiratory_harmonics),
           MEMBER(cardiac_clock),
           MEMBER(features),
-          MEMBER(respiratory_clock)};
+          MEMBER(respiratory_clock),
+          MEMBER(state),
+          MEMBER(reason),
+          MEMBER(time_utc_ns),
+          MEMBER(valid_from_ns),
+          MEMBER(expected_until_ns),
+          MEMBER(valid_until_ns),
+          MEMBER(cardiac_cycles)};
 }
 template <>
 json to_json(const perimap_Phase& s) {

@@ -1,0 +1,47 @@
+#include "core/pipeline/surface_state.hpp"
+
+namespace perimap {
+
+SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const SurfaceFooting& footing) noexcept {
+  if (phase.state == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;
+  if (phase.state == PhaseState::kLost) return SurfaceReason::kPhaseLost;
+  if (!footing.mapped) return SurfaceReason::kNothingMapped;
+  if (footing.breath_unknown) return SurfaceReason::kRespirationUnknown;
+  if (phase.state == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
+  if (phase.contradicted) return SurfaceReason::kPhaseContradicted;
+  if (phase.state == PhaseState::kFromImage) return SurfaceReason::kPhaseFromImage;
+  if (footing.frame_missing) return SurfaceReason::kFrameMissing;
+  if (footing.update_late) return SurfaceReason::kUpdateLate;
+  if (footing.pose_missing) return SurfaceReason::kPoseMissing;
+  if (phase.ectopic) return SurfaceReason::kEctopicBeat;
+  if (rhythm == Rhythm::kUnpredictable) return SurfaceReason::kRhythmUnpredictable;
+  if (rhythm == Rhythm::kEctopic) return SurfaceReason::kRhythmEctopic;
+  return SurfaceReason::kNone;
+}
+
+SurfaceState state_of(SurfaceReason reason) noexcept {
+  switch (reason) {
+    case SurfaceReason::kNone:
+      return SurfaceState::kGood;
+    case SurfaceReason::kPhaseUnknown:
+    case SurfaceReason::kPhaseLost:
+    case SurfaceReason::kNothingMapped:
+      return SurfaceState::kInvalid;
+    default:
+      return SurfaceState::kDegraded;
+  }
+}
+
+FeatureVerdict verdict_of(const FeatureVerdict& own, PhaseState phase, const SurfaceFooting& footing) noexcept {
+  if (!usable(phase)) return {FeatureState::kInvalid, FeatureReason::kPhaseLost};
+  FeatureVerdict verdict = own;
+  if (footing.breath_unknown && verdict.state == FeatureState::kConverged) {
+    verdict = {FeatureState::kConverging, FeatureReason::kDeviationLarge};
+  }
+  if (verdict.reason == FeatureReason::kNone && (footing.frame_missing || footing.update_late)) {
+    verdict.reason = FeatureReason::kNotObserved;
+  }
+  return verdict;
+}
+
+}  // namespace perimap

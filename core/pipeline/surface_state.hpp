@@ -1,0 +1,33 @@
+// What is wrong with a surface, and how far it may be used all the same.
+#pragma once
+
+#include "core/phase/cardiac_clock.hpp"
+#include "core/pipeline/surface_sample.hpp"
+
+namespace perimap {
+
+// What a surface rests on beside the phase.
+struct SurfaceFooting {
+  bool breath_unknown = false;
+  bool mapped = false;  // there are features
+  bool frame_missing = false;
+  bool update_late = false;
+  bool pose_missing = false;
+};
+
+// The first thing that is wrong, worst first.
+[[nodiscard]] SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm,
+                                      const SurfaceFooting& footing) noexcept;
+
+[[nodiscard]] SurfaceState state_of(SurfaceReason reason) noexcept;
+
+struct FeatureVerdict {
+  FeatureState state = FeatureState::kInvalid;
+  FeatureReason reason = FeatureReason::kNone;
+};
+
+// What is to be said of a feature whose filter says `own`, in a surface with this phase and footing.
+[[nodiscard]] FeatureVerdict verdict_of(const FeatureVerdict& own, PhaseState phase,
+                                        const SurfaceFooting& footing) noexcept;
+
+}  // namespace perimap
