@@ -34,7 +34,8 @@ build=(
 )
 tests=(
   libgtest-dev libgmock-dev
-  libopencv-calib3d-dev                      # the camera model is held against OpenCV
+  libopencv-calib3d-dev                      # the camera model is held against OpenCV; the example subscriber
+  libopencv-imgcodecs-dev                    # the example subscriber
   libopenigtlink-dev                         # the peer of the OpenIGTLink client
   nodejs=node npm=npm ca-certificates        # recordings are read back by the official npm packages
 )

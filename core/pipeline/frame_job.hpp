@@ -18,6 +18,7 @@ namespace perimap {
 struct ReleaseBasis {
   std::uint64_t frame_sequence = 0;
   Basis b;
+  CameraPlace camera;  // at that frame's capture
 };
 
 // Written by the mapper before a stage, read by all workers during it.

@@ -339,7 +339,9 @@ void Mapper::predict_releases(const FrameRecord& frame, const CardiacClock& cloc
     const Instant valid = earlier->stamp.capture + settings_.latency + settings_.lead;
     const PhaseEstimate at_release = clock.at(valid);
     const RespiratoryPhase breath = respiration_.clock().at(valid);
-    job_.releases[i] = {earlier->stamp.sequence, basis_at(settings_.estimator.layout, at_release.phase_rad, breath)};
+    job_.releases[i] = {earlier->stamp.sequence,
+                        basis_at(settings_.estimator.layout, at_release.phase_rad, breath),
+                        {earlier->pose.valid(), earlier->pose.X_WC}};
   }
 }
 
@@ -353,6 +355,7 @@ void Mapper::evaluate_shard(int worker) noexcept {
     snapshot.pose_missing = !job_.frame->pose.valid();
     for (std::size_t i = 0; i < job_.releases.size(); ++i) {
       snapshot.release_sequences[i] = job_.releases[i].frame_sequence;
+      snapshot.cameras[i] = job_.releases[i].camera;
     }
     snapshot.features.clear();
   }

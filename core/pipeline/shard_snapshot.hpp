@@ -31,6 +31,7 @@ struct FeatureSnapshot {
 
 struct ShardSnapshot {
   std::array<std::uint64_t, kReleasesCovered> release_sequences{};  // frames at whose releases covariances are given
+  std::array<CameraPlace, kReleasesCovered> cameras{};              // at their captures
   bool any = false;                                                 // false until the first frame
   std::uint64_t frame_sequence = 0;                                 // of the frame whose update this is
   bool pose_missing = false;                                        // that frame gave no measurement for want of a pose

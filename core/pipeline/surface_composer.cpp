@@ -25,6 +25,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
 
   order_.clear();
   bool pose_missing = false;
+  sample_.camera = {};
   std::uint64_t oldest = std::numeric_limits<std::uint64_t>::max();
   for (const ShardSnapshot* snapshot : snapshots) {
     oldest = std::min(oldest, snapshot->any ? snapshot->frame_sequence : 0);
@@ -32,6 +33,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
     const auto covered =
         std::find(snapshot->release_sequences.begin(), snapshot->release_sequences.end(), release.frame_sequence);
     const auto i = static_cast<std::size_t>(covered - snapshot->release_sequences.begin());
+    if (i < kReleasesCovered && snapshot->any && !release.frame_missing) sample_.camera = snapshot->cameras[i];
     for (const FeatureSnapshot& feature : snapshot->features) order_.push_back({&feature, i});
   }
   std::sort(order_.begin(), order_.end(),

@@ -41,6 +41,12 @@ struct SurfaceFeature {
   Instant last_observed;                            // capture of the last match that agreed with the map
 };
 
+// Where the camera was, when that is known.
+struct CameraPlace {
+  bool known = false;
+  Pose X_WC;
+};
+
 struct SurfaceSample {
   std::uint64_t sample_sequence = 0;
   Release release;
@@ -53,6 +59,7 @@ struct SurfaceSample {
   double cardiac_phase_rad = 0.0;
   double cardiac_phase_deviation_rad = 0.0;
   double cardiac_phase_rate_rad_per_s = 0.0;
+  CameraPlace camera;                    // at the release's capture
   std::vector<SurfaceFeature> features;  // in order of id; capacity reserved at start
 };
 

@@ -107,6 +107,9 @@ const perimap_Surface& WireSurface::fill(const SurfaceSample& sample, Duration u
   wire_.cardiac_phase_rad = sample.cardiac_phase_rad;
   wire_.cardiac_phase_deviation_rad = sample.cardiac_phase_deviation_rad;
   wire_.cardiac_phase_rate_rad_per_s = sample.cardiac_phase_rate_rad_per_s;
+  wire_.camera_pose_known = sample.camera.known;
+  std::copy_n(sample.camera.X_WC.t.data(), 3, wire_.translation_WC_mm);
+  rotation_to_wxyz(sample.camera.X_WC.R, wire_.rotation_WC_wxyz);
   const std::size_t count = std::min(sample.features.size(), features_.size());
   wire_.features._length = static_cast<std::uint32_t>(count);
   for (std::size_t i = 0; i < count; ++i) {

@@ -151,6 +151,10 @@ std::string surface_json(const perimap_Surface& surface, Instant receipt) {
                {"cardiac_phase_rad", surface.cardiac_phase_rad},
                {"cardiac_phase_deviation_rad", surface.cardiac_phase_deviation_rad},
                {"cardiac_phase_rate_rad_per_s", surface.cardiac_phase_rate_rad_per_s}};
+  if (surface.camera_pose_known) {
+    json["translation_WC_mm"] = surface.translation_WC_mm;
+    json["rotation_WC_wxyz"] = surface.rotation_WC_wxyz;
+  }
   Json features = Json::array();
   for (std::uint32_t i = 0; i < surface.features._length; ++i) {
     const perimap_SurfaceFeature& feature = surface.features._buffer[i];

@@ -113,6 +113,24 @@ TEST(SurfaceComposer, EvaluatesPositionAndVelocityAtTheValidTimesPhase) {
   EXPECT_EQ(sample.valid_time, kRelease.deadline);
 }
 
+TEST(SurfaceComposer, SaysWhereTheCameraWasAtTheReleasesOwnCaptureOrThatItIsNotKnown) {
+  SurfaceComposer composer(settings());
+  ShardSnapshot snapshot = shard(101, {feature(1, 4.0)});
+  snapshot.cameras[0] = {true, {Matrix3d::Identity(), Vector3d(1, 2, 3)}};
+  snapshot.cameras[1] = {true, {Matrix3d::Identity(), Vector3d(4, 5, 6)}};  // of frame 100, which is released
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  const CardiacClock clock = steady_clock();
+  const CameraPlace known = composer.compose(kRelease, clock, RespiratoryClock{}, view).camera;
+  EXPECT_TRUE(known.known);
+  EXPECT_EQ(known.X_WC.t, Vector3d(4, 5, 6));
+  Release missing = kRelease;
+  missing.frame_missing = true;
+  EXPECT_FALSE(composer.compose(missing, clock, RespiratoryClock{}, view).camera.known);
+  Release later = kRelease;
+  later.frame_sequence = 102;
+  EXPECT_FALSE(composer.compose(later, clock, RespiratoryClock{}, view).camera.known);
+}
+
 TEST(SurfaceComposer, AddsWhatThePhaseDeviationMakesOfTheMotion) {
   SurfaceComposer composer(settings());
   const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});

@@ -116,6 +116,9 @@ void fill(Filler& next, perimap_Surface& s) {
   next(s.cardiac_phase_deviation_rad);
   next(s.cardiac_phase_rate_rad_per_s);
   next.sequence(s.features, 3, [&](auto& feature) { fill(next, feature); });
+  next(s.camera_pose_known);
+  next(s.translation_WC_mm);
+  next(s.rotation_WC_wxyz);
 }
 
 void fill(Filler& next, perimap_PhaseClock& s) {
@@ -388,7 +391,10 @@ json to_json(const perimap_Surface& s) {
           MEMBER(cardiac_phase_rad),
           MEMBER(cardiac_phase_deviation_rad),
           MEMBER(cardiac_phase_rate_rad_per_s),
-          MEMBER(features)};
+          MEMBER(features),
+          MEMBER(camera_pose_known),
+          MEMBER(translation_WC_mm),
+          MEMBER(rotation_WC_wxyz)};
 }
 template <>
 json to_json(const perimap_PhaseClock& s) {

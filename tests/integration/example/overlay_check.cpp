@@ -1,0 +1,193 @@
+// What the example subscriber needs to run beside perimapd on a recording, and whether it drew the surface where it
+// was.
+//
+//   overlay_check prepare RECORDING VIDEO CALIBRATION     writes the recording's frames and its camera
+//   overlay_check judge RECORDING SAMPLES LINES PICTURE   LINES, PICTURE: what the example printed, and drew last
+//
+// The judge knows the simulated heart: a feature is the material point that the ray of its first detection meets, and
+// where that was in each frame is the truth. SAMPLES (perimap watch --record) tell the first detections.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "daemon/report/recorded_truth.hpp"
+#include "drivers/calibration/calibration_file.hpp"
+#include "drivers/recording/channels.hpp"
+#include "drivers/recording/replay_reader.hpp"
+#include "drivers/video/video_file.hpp"
+
+namespace perimap {
+namespace {
+
+template <class T>
+T value_of(Expected<T> made) {
+  if (!made) throw std::runtime_error(made.error().message);
+  return std::move(*made);
+}
+
+RecordedTruth truth_of(const std::string& recording) {
+  auto truth = value_of(load_truth(recording, ReadMode::kStrict));
+  if (!truth) throw std::runtime_error(recording + ": has no ground truth");
+  return std::move(*truth);
+}
+
+int prepare(const std::string& recording, const std::string& video, const std::string& calibration) {
+  const RecordedTruth truth = truth_of(recording);
+  std::ofstream(calibration) << format_calibration(truth.camera);
+  auto writer = value_of(VideoWriter::create(video, truth.camera.width, truth.camera.height, 30.0));
+  auto reader = value_of(ReplayReader::open(recording, ReadMode::kStrict));
+  std::uint64_t expected = truth.captures.begin()->first;
+  while (const auto event = value_of(reader.next())) {
+    const auto* frame = std::get_if<FrameEvent>(&*event);
+    if (frame == nullptr) continue;
+    if (frame->stamp.sequence != expected++) throw std::runtime_error("a frame is missing in the recording");
+    VideoFrame picture;
+    picture.grey = frame->image();
+    if (auto written = writer.write(picture, {}); !written) throw std::runtime_error(written.error().message);
+  }
+  if (auto finished = writer.finish(); !finished) throw std::runtime_error(finished.error().message);
+  fmt::print("{}\n", truth.captures.begin()->first);
+  return 0;
+}
+
+struct Samples {
+  std::map<std::uint32_t, std::pair<Instant, Vector2d>> first_views;  // by id
+  std::map<std::uint64_t, Pose> cameras;                              // by frame sequence
+  std::optional<Duration> to_recording;
+};
+
+Samples read_samples(const std::string& file, const RecordedTruth& truth) {
+  auto reader = value_of(RecordingReader::open(file, ReadMode::kStrict));
+  constexpr std::array<std::string_view, 2> kPublished = {channels::kSurface, channels::kSurfaceModel};
+  if (auto selected = reader.select(kPublished); !selected) throw std::runtime_error(selected.error().message);
+  Samples samples;
+  while (const auto message = value_of(reader.next())) {
+    if (message->channel == channels::kSurfaceModel) {
+      const auto model = value_of(reader.decode<perimap_SurfaceModel>(*message));
+      for (std::uint32_t i = 0; i < model->features._length; ++i) {
+        const perimap_ModelFeature& feature = model->features._buffer[i];
+        samples.first_views[feature.id] = {from_ns(feature.first_observed_time_ns),
+                                           {feature.first_observed_px[0], feature.first_observed_px[1]}};
+      }
+    } else {
+      const auto surface = value_of(reader.decode<perimap_Surface>(*message));
+      if (surface->camera_pose_known) {
+        const double* t = surface->translation_WC_mm;
+        samples.cameras[surface->frame_sequence] = pose_from_wxyz({t[0], t[1], t[2]}, surface->rotation_WC_wxyz);
+      }
+      if (!samples.to_recording && rests_on_its_frame(surface->reason)) {
+        samples.to_recording = truth.to_recording(surface->frame_sequence, from_ns(surface->capture_time_ns));
+      }
+    }
+  }
+  return samples;
+}
+
+// How far from the truth each position of a printed frame is, in px.
+struct Off {
+  std::vector<double> px;
+  double camera_mm = 0.0;  // the largest
+};
+
+void judge_frame(const nlohmann::json& frame, const RecordedTruth& truth, const Samples& samples, Off& off) {
+  const auto sequence = frame["frame_sequence"].get<std::uint64_t>();
+  const Instant capture = truth.captures.at(sequence);
+  const auto true_X_WC = truth.truth.camera_pose(capture);
+  if (!true_X_WC) throw std::runtime_error("no true pose of a frame");
+  const Pose X_WC = samples.cameras.at(sequence);
+  off.camera_mm = std::max(off.camera_mm, (X_WC.t - true_X_WC->t).norm());
+  for (const auto& feature : frame["features"]) {
+    const auto first = samples.first_views.find(feature["id"].get<std::uint32_t>());
+    if (first == samples.first_views.end()) throw std::runtime_error("a feature was drawn that no model had");
+    const Instant seen = first->second.first + *samples.to_recording;
+    const auto seen_from = truth.truth.camera_pose(seen);
+    Vector3d ray_C;
+    if (!seen_from || !truth.camera.unproject(first->second.second, ray_C)) continue;
+    const auto point = truth.truth.first_hit(*seen_from, ray_C, seen);
+    if (!point) continue;
+    Vector2d px;
+    if (truth.camera.project(X_WC.inverse() * truth.truth.position(*point, capture), px) != ProjectionStatus::kOk)
+      continue;
+    off.px.push_back((px - Vector2d(feature["u"].get<double>(), feature["v"].get<double>())).norm());
+  }
+}
+
+// The frames are grey: what has a colour was drawn.
+int circles_missing(const nlohmann::json& frame, const cv::Mat& picture) {
+  int missing = 0;
+  for (const auto& feature : frame["features"]) {
+    const int u = static_cast<int>(std::lround(feature["u"].get<double>()));
+    const int v = static_cast<int>(std::lround(feature["v"].get<double>()));
+    if (u < 6 || v < 6 || u >= picture.cols - 6 || v >= picture.rows - 6) continue;
+    const auto& pixel = picture.at<cv::Vec3b>(v, u + 4);
+    const auto [least, most] = std::minmax({pixel[0], pixel[1], pixel[2]});
+    missing += most - least < 40 ? 1 : 0;
+  }
+  return missing;
+}
+
+int judge(const std::string& recording, const std::string& samples_file, const std::string& lines,
+          const std::string& drawn) {
+  const RecordedTruth truth = truth_of(recording);
+  const Samples samples = read_samples(samples_file, truth);
+  if (!samples.to_recording) throw std::runtime_error(samples_file + ": no surface of a frame");
+  std::ifstream file(lines);
+  Off off;
+  nlohmann::json last;
+  int frames = 0;
+  int refused = 0;
+  for (std::string line; std::getline(file, line); ++frames) {
+    last = nlohmann::json::parse(line);
+    if (last.contains("refused")) {
+      ++refused;
+    } else {
+      judge_frame(last, truth, samples, off);
+    }
+  }
+  std::sort(off.px.begin(), off.px.end());
+  if (off.px.size() < 200)
+    throw std::runtime_error(fmt::format("only {} positions were drawn in {} frames", off.px.size(), frames));
+  const double median = off.px[off.px.size() / 2];
+  const double most = off.px[off.px.size() * 95 / 100];
+  fmt::print(
+      "{} frames, {} refused, {} positions, off by {:.2f} px (median), {:.2f} px (95 %), camera by {:.1f} mm at most\n",
+      frames, refused, off.px.size(), median, most, off.camera_mm);
+  if (refused == 0 || refused == frames)
+    throw std::runtime_error("it must refuse until there is a map, and draw from then on");
+  if (!(median < 1.0) || !(most < 4.0)) throw std::runtime_error("that is too far");
+  if (last.contains("refused")) throw std::runtime_error("the last frame was refused");
+  const cv::Mat picture = cv::imread(drawn);
+  if (picture.empty()) throw std::runtime_error(drawn + ": no picture");
+  const int missing = circles_missing(last, picture);
+  if (last["features"].empty() || missing > 0)
+    throw std::runtime_error(fmt::format("{} circles are not drawn", missing));
+  return 0;
+}
+
+}  // namespace
+}  // namespace perimap
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> arguments(argv + 1, argv + argc);
+  try {
+    if (arguments.size() == 4 && arguments[0] == "prepare")
+      return perimap::prepare(arguments[1], arguments[2], arguments[3]);
+    if (arguments.size() == 5 && arguments[0] == "judge") {
+      return perimap::judge(arguments[1], arguments[2], arguments[3], arguments[4]);
+    }
+    std::fprintf(stderr, "overlay_check prepare RECORDING VIDEO CALIBRATION | judge RECORDING SAMPLES LINES PICTURE\n");
+    return 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "overlay_check: %s\n", error.what());
+    return 1;
+  }
+}
