@@ -20,6 +20,7 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
                {"realtime_priority", name_of(status.realtime_priority)},
                {"memory_locked", name_of(status.memory_locked)},
                {"latency_ms", ms(status.latency_ns)},
+               {"latency_short", status.latency_short},
                {"frames", status.frames},
                {"frames_too_late", status.frames_too_late},
                {"frames_without_pose", status.frames_without_pose},

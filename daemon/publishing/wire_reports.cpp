@@ -289,6 +289,7 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.other_not_recorded = facts.recording.other_not_recorded;
   wire_.phase_state = to_wire(facts.phase);
   wire_.rhythm = to_wire(facts.rhythm);
+  wire_.latency_short = facts.latency_short;
 
   sources_[0] = source_status(perimap_SOURCE_CAMERA, facts, facts.camera, now, c.frames_received.get(),
                               c.frames_dropped.get(), 0, c.last_frame_ns, c.camera_delay);

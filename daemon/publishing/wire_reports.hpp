@@ -82,6 +82,7 @@ struct StatusFacts {
   RecordingFacts recording;
   PhaseState phase = PhaseState::kUnknown;
   Rhythm rhythm = Rhythm::kUnknown;
+  bool latency_short = false;       // see idl/perimap.idl
   bool r_trigger = false;           // R peaks come from a trigger line
   SourceLink camera, tracker, ecg;  // as they are without a device: open, and without jitter
 };

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/realtime/deadline.hpp"
+#include "daemon/runtime/latency_check.hpp"
 #include "daemon/runtime/model_moment.hpp"
 #include "daemon/runtime/utc_offset.hpp"
 
@@ -62,6 +63,7 @@ StatusFacts LiveRuntime::facts() const noexcept {
   facts.memory_locked = memory_locked_;
   facts.realtime_priority = threads_.priority();
   facts.latency = pipeline_.settings().latency;
+  facts.latency_short = check_latency(pipeline_.settings(), pipeline_.counters()).too_short;
   facts.stalled_after = settings_.stalled_after;
   facts.sources_ended = sources_ended_.load(std::memory_order_relaxed);
   return facts;

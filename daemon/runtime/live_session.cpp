@@ -7,13 +7,13 @@
 #include <utility>
 
 #include "daemon/publishing/status_text.hpp"
+#include "daemon/runtime/latency_check.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
 
 namespace perimap {
 namespace {
 
 constexpr Duration kTick = std::chrono::milliseconds(100);
-constexpr std::uint64_t kFramesForLatencyCheck = 60;
 constexpr std::uint64_t kTicksAStatus = 10;
 
 double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
@@ -133,14 +133,14 @@ void LiveSession::warn_of_refused_privileges() {
 
 // L must leave room for what a frame takes to arrive and for the budget; otherwise every update would be late.
 void LiveSession::warn_of_short_latency() {
-  const LatencyHistogram::Summary delay = pipeline_.counters().camera_delay.summary();
-  if (latency_checked_ || delay.count < kFramesForLatencyCheck) return;
-  latency_checked_ = true;
+  if (latency_checked_) return;
   const PipelineSettings& settings = pipeline_.settings();
-  if (delay.p99 + settings.budget <= settings.latency) return;
+  const LatencyCheck check = check_latency(settings, pipeline_.counters());
+  latency_checked_ = check.told;
+  if (!check.too_short) return;
   spdlog::warn(
       "latency {:.1f} ms is too short: frames arrive up to {:.1f} ms after capture and the budget is {:.1f} ms",
-      milliseconds(settings.latency), milliseconds(delay.p99), milliseconds(settings.budget));
+      milliseconds(settings.latency), milliseconds(check.arrival), milliseconds(settings.budget));
 }
 
 }  // namespace perimap

@@ -263,6 +263,7 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.other_not_recorded);
   next(s.phase_state);
   next(s.rhythm);
+  next(s.latency_short);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -521,7 +522,8 @@ json to_json(const perimap_Status& s) {
           MEMBER(frames_not_recorded),
           MEMBER(other_not_recorded),
           MEMBER(phase_state),
-          MEMBER(rhythm)};
+          MEMBER(rhythm),
+          MEMBER(latency_short)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {
