@@ -99,20 +99,23 @@ int run_session(const std::string& configuration_file, const Configuration& give
 }
 
 // Guidance does not wait for a disk: without a recording the session goes on, and says so.
-AskedRecording begin_recording(const std::string& configuration_file, const DeviceSetup& setup) {
+DeviceRecording prepare_recording(const std::string& configuration_file, const DeviceSetup& setup) {
   const RecordingConfiguration& c = setup.configuration.recording;
-  if (!c.record) return {};
-  const std::filesystem::path folder = std::filesystem::path(configuration_file).parent_path() / c.folder;
-  auto recorder =
-      SessionRecorder::create(recording_path(folder, std::chrono::system_clock::now()),
-                              recording_facts(setup.configuration, setup.pipeline.camera, "perimapd " PERIMAP_VERSION),
-                              static_cast<std::size_t>(c.memory_MB) << 20U);
-  if (!recorder) {
-    spdlog::error("not recording: {}; all else goes on", recorder.error().message);
-    return {true, nullptr};
+  DeviceRecording recording;
+  recording.recorder = std::make_unique<SessionRecorder>(static_cast<std::size_t>(c.memory_MB) << 20U);
+  recording.next = [folder = std::filesystem::path(configuration_file).parent_path() / c.folder,
+                    configuration = setup.configuration, camera = setup.pipeline.camera]() -> DeviceRecording::Next {
+    return {recording_path(folder, std::chrono::system_clock::now()),
+            recording_facts(configuration, camera, "perimapd " PERIMAP_VERSION)};
+  };
+  if (!c.record) return recording;
+  const DeviceRecording::Next next = recording.next();
+  if (const auto opened = recording.recorder->open(next.file, next.facts)) {
+    spdlog::info("recording to {}", next.file.string());
+  } else {
+    spdlog::error("not recording: {}; all else goes on", opened.error().message);
   }
-  spdlog::info("recording to {}", (*recorder)->file().string());
-  return {true, std::move(*recorder)};
+  return recording;
 }
 
 int run(const std::string& configuration_file) {
@@ -126,7 +129,7 @@ int run(const std::string& configuration_file) {
     return run_session(configuration_file, *given, setup->configuration, setup->pipeline, setup->identity, *stop,
                        [&setup, &configuration_file](SensorEntrance& entrance) {
                          return std::make_unique<DeviceFeeder>(std::move(setup->devices), &entrance,
-                                                               begin_recording(configuration_file, *setup));
+                                                               prepare_recording(configuration_file, *setup));
                        });
   }
   if (!given->replay.recording) {

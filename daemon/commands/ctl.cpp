@@ -58,6 +58,14 @@ void add_ctl_command(CLI::App& app, int& exit_code) {
   status->callback([options, &exit_code] { exit_code = tell(*options, "status"); });
   command->add_subcommand("new-patient", "Clears the map, and what is known of the heart's rhythm")
       ->callback([options, &exit_code] { exit_code = tell(*options, "new-patient"); });
+  CLI::App* record = command->add_subcommand("record", "Begins to record what the devices give, or ends the recording");
+  record->require_subcommand(1);
+  record->add_subcommand("on", "Into a new file of recording.folder")->callback([options, &exit_code] {
+    exit_code = tell(*options, "record on");
+  });
+  record->add_subcommand("off", "Once all that has come is in the file")->callback([options, &exit_code] {
+    exit_code = tell(*options, "record off");
+  });
   command->add_subcommand("reload", "Reads the configuration again; says what needs a restart")
       ->callback([options, &exit_code] { exit_code = tell(*options, "reload"); });
 }

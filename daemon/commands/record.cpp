@@ -98,7 +98,7 @@ int run(const Options& options) {
 
   const Logging logging(basis->configuration.log.level);
   const Instant start = MonotonicClock::now();
-  DeviceFeeder feeder(std::move(*devices), nullptr, {true, std::move(*recorder)});
+  DeviceFeeder feeder(std::move(*devices), nullptr, {std::move(*recorder), {}});
   ThreadLauncher threads({});
   feeder.start(threads);
   watch(options, *stop, feeder);

@@ -1,6 +1,6 @@
 // What a running perimapd can be told: one line, and its answer.
 //
-// Request:  COMMAND "\n", at most kLongestRequest bytes.   Examples: "status\n", "new-patient\n", "reload\n"
+// Request:  COMMAND "\n", at most kLongestRequest bytes.   Examples: "status\n", "new-patient\n", "record on\n"
 // Answer:   "ok\n" or "error\n", then text up to the connection's end.
 #pragma once
 
@@ -15,7 +15,7 @@ namespace perimap {
 
 inline constexpr std::size_t kLongestRequest = 64;
 
-enum class ControlCommand : std::uint8_t { kStatus, kNewPatient, kReload };
+enum class ControlCommand : std::uint8_t { kStatus, kNewPatient, kRecordOn, kRecordOff, kReload };
 
 [[nodiscard]] std::string_view name_of(ControlCommand command) noexcept;
 

@@ -1,5 +1,6 @@
 #include "daemon/runtime/device_feeder.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -76,7 +77,7 @@ Expected<void> serve_camera(const CameraDevice& device, const CameraSink& sink, 
   return {};
 }
 
-DeviceFeeder::DeviceFeeder(Devices devices, SensorEntrance* entrance, AskedRecording recording)
+DeviceFeeder::DeviceFeeder(Devices devices, SensorEntrance* entrance, DeviceRecording recording)
     : devices_(std::move(devices)), recording_(std::move(recording)), intake_{entrance, recording_.recorder.get()} {
   if (!devices_.camera) return;
   if (auto* playback = std::get_if<CameraPlayback>(&*devices_.camera)) {
@@ -168,14 +169,33 @@ void DeviceFeeder::describe(StatusFacts& facts) const {
   if (devices_.camera && !playback_) facts.camera = link(camera_health_);
   facts.tracker = link(tracker_health_);
   facts.ecg = link(ecg_health_);
-  if (!recording_.asked) return;
-  facts.recording.state = perimap_RECORDING_STOPPED;
   if (!recording_.recorder) return;
   const SessionRecorder::Summary recorded = recording_.recorder->summary();
-  if (!recorded.stopped) facts.recording.state = perimap_RECORDING_ON;
+  if (recorded.asked) facts.recording.state = recorded.stopped ? perimap_RECORDING_STOPPED : perimap_RECORDING_ON;
   facts.recording.recorded = recorded.recorded;
   facts.recording.frames_not_recorded = recorded.frames_not_recorded;
   facts.recording.other_not_recorded = recorded.other_not_recorded;
+}
+
+Expected<std::string> DeviceFeeder::record(bool on) {
+  if (!recording_.recorder || !recording_.next) return fail("nothing can be recorded");
+  SessionRecorder& recorder = *recording_.recorder;
+  const bool recording = recorder.summary().asked && !recorder.summary().stopped;
+  if (on == recording) {
+    return fail(on ? fmt::format("{}: is recorded to already", recorder.file().string()) : "nothing is recorded");
+  }
+  if (!on) {
+    const std::string file = recorder.file().string();
+    if (auto closed = recorder.close(); !closed) return tl::unexpected(std::move(closed.error()));
+    spdlog::info("{}: closed, {} messages recorded since the start", file, recorder.summary().recorded);
+    return fmt::format("recorded to {}\n", file);
+  }
+  // One that has stopped, on a full disk say, is put away first; why it did was told then.
+  if (recorder.summary().files > 0 && recorder.summary().asked) static_cast<void>(recorder.close());
+  const DeviceRecording::Next next = recording_.next();
+  if (auto opened = recorder.open(next.file, next.facts); !opened) return tl::unexpected(std::move(opened.error()));
+  spdlog::info("recording to {}", next.file.string());
+  return fmt::format("recording to {}\n", next.file.string());
 }
 
 void DeviceFeeder::tick() {
@@ -187,6 +207,10 @@ void DeviceFeeder::tick() {
 
 void DeviceFeeder::tell_recording() {
   const SessionRecorder::Summary recorded = recording_.recorder->summary();
+  if (recorded.files != recording_told_) {
+    recording_told_ = recorded.files;
+    recording_stop_told_ = false;
+  }
   if (recorded.stopped && !recording_stop_told_) {
     recording_stop_told_ = true;
     spdlog::error("recording stopped: {}; all else goes on", recording_.recorder->reason());
@@ -198,7 +222,7 @@ void DeviceFeeder::tell_recording() {
     spdlog::warn("the disk does not keep up: {} frames and {} other messages not recorded",
                  recorded.frames_not_recorded, recorded.other_not_recorded);
   }
-  if (recording_ended_) {
+  if (recording_ended_ && recorded.files > 0) {
     spdlog::info("recorded {} messages to {}; not recorded: {} frames, {} others", recorded.recorded,
                  recording_.recorder->file().string(), recorded.frames_not_recorded, recorded.other_not_recorded);
   }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <atomic>
+#include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,10 +33,16 @@ void serve_ecg(const EcgDevice& device, const EcgSink& sink, DeviceHealth& healt
 [[nodiscard]] Expected<void> serve_camera(const CameraDevice& device, const CameraSink& sink, DeviceHealth& health,
                                           const Interrupt& interrupt);
 
-// A recording that was asked for; without a recorder it could not be begun.
-struct AskedRecording {
-  bool asked = false;
+// A recording that may be asked for.
+struct DeviceRecording {
+  // Null: what the devices give is not to be recorded at all.
   std::unique_ptr<SessionRecorder> recorder;
+  // Where the next one goes, and what it says of itself. Without it none can be begun at run time.
+  struct Next {
+    std::filesystem::path file;
+    SensorRecordingFacts facts;
+  };
+  std::function<Next()> next;
 };
 
 // Tells in the log whenever a device comes, goes or falls silent, and why, and when the recording stops. Ends when the
@@ -42,7 +50,7 @@ struct AskedRecording {
 class DeviceFeeder final : public SensorFeeder {
  public:
   // `entrance`: none to record alone.
-  DeviceFeeder(Devices devices, SensorEntrance* entrance, AskedRecording recording);
+  DeviceFeeder(Devices devices, SensorEntrance* entrance, DeviceRecording recording);
   DeviceFeeder(const DeviceFeeder&) = delete;
   DeviceFeeder& operator=(const DeviceFeeder&) = delete;
   ~DeviceFeeder() override { stop(); }
@@ -51,6 +59,7 @@ class DeviceFeeder final : public SensorFeeder {
   void stop() override;
   void tick() override;
   void describe(StatusFacts& facts) const override;
+  [[nodiscard]] Expected<std::string> record(bool on) override;
 
   [[nodiscard]] bool ended() const noexcept override;
   [[nodiscard]] const std::optional<Error>& error() const noexcept override;
@@ -72,7 +81,7 @@ class DeviceFeeder final : public SensorFeeder {
   static void tell(const char* name, const DeviceHealth& health, Told& told);
 
   Devices devices_;
-  AskedRecording recording_;
+  DeviceRecording recording_;
   SensorIntake intake_;
   std::unique_ptr<ReplayFeeder> playback_;
   DeviceHealth tracker_health_;
@@ -82,6 +91,7 @@ class DeviceFeeder final : public SensorFeeder {
   Told ecg_told_;
   Told camera_told_;
   bool recording_ended_ = false;
+  std::uint64_t recording_told_ = 0;  // the count of the file that was told of last
   bool recording_stop_told_ = false;
   std::uint64_t not_recorded_told_ = 0;
   std::optional<Error> camera_error_;

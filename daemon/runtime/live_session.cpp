@@ -49,7 +49,7 @@ StatusFacts LiveSession::facts() const {
 Expected<void> LiveSession::start_control() {
   if (control_socket_.empty()) return {};
   commands_ = std::make_unique<SessionCommands>(
-      pipeline_, identity_, [this] { return facts(); }, reload_,
+      pipeline_, identity_, [this] { return facts(); }, reload_, [this](bool on) { return feeder_->record(on); },
       [this] {
         if (keeper_) keeper_->forget();
       });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/error/expected.hpp"
@@ -23,6 +24,11 @@ class SensorFeeder {
 
   // On the status thread: what the devices' drivers know, into the status.
   virtual void describe(StatusFacts& /*facts*/) const {}
+
+  // On the control thread: begins to record what the devices give, or ends the recording; what came of it, in words.
+  [[nodiscard]] virtual Expected<std::string> record(bool /*on*/) {
+    return fail("there are no devices to record: what runs is a recording");
+  }
 
   // Nothing more will come. Devices never end.
   [[nodiscard]] virtual bool ended() const noexcept = 0;

@@ -13,11 +13,13 @@ constexpr Duration kMapperPatience = std::chrono::seconds(2);
 }  // namespace
 
 SessionCommands::SessionCommands(Pipeline& pipeline, const Identity& identity, std::function<StatusFacts()> facts,
-                                 std::function<Expected<std::string>()> reload, std::function<void()> on_forgotten)
+                                 std::function<Expected<std::string>()> reload,
+                                 std::function<Expected<std::string>(bool)> record, std::function<void()> on_forgotten)
     : pipeline_(pipeline),
       status_(identity),
       facts_(std::move(facts)),
       reload_(std::move(reload)),
+      record_(std::move(record)),
       on_forgotten_(std::move(on_forgotten)) {}
 
 Expected<std::string> SessionCommands::answer(ControlCommand command) {
@@ -26,6 +28,9 @@ Expected<std::string> SessionCommands::answer(ControlCommand command) {
       return full_status_json(status_.fill(pipeline_.counters(), facts_(), MonotonicClock::now())).dump() + "\n";
     case ControlCommand::kNewPatient:
       return forget_patient();
+    case ControlCommand::kRecordOn:
+    case ControlCommand::kRecordOff:
+      return record_(command == ControlCommand::kRecordOn);
     case ControlCommand::kReload:
       return reload_();
   }

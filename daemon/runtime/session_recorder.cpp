@@ -22,23 +22,67 @@ constexpr std::size_t kSampleRing = 2048;
 Expected<std::unique_ptr<SessionRecorder>> SessionRecorder::create(const std::filesystem::path& file,
                                                                    const SensorRecordingFacts& facts,
                                                                    std::size_t memory_bytes) {
-  std::error_code ignored;
-  if (std::filesystem::exists(file, ignored)) return fail(fmt::format("{}: is there already", file.string()));
-  (void)std::signal(SIGXFSZ, SIG_IGN);
-  auto writer = SensorWriter::create(file.string(), facts, MonotonicClock::now());
-  if (!writer) return tl::unexpected(std::move(writer.error()));
-  return std::unique_ptr<SessionRecorder>(new SessionRecorder(file, std::move(*writer), memory_bytes));
+  auto recorder = std::make_unique<SessionRecorder>(memory_bytes);
+  if (auto opened = recorder->open(file, facts); !opened) return tl::unexpected(std::move(opened.error()));
+  return recorder;
 }
 
-SessionRecorder::SessionRecorder(std::filesystem::path file, SensorWriter writer, std::size_t memory_bytes)
-    : file_(std::move(file)),
-      writer_(std::move(writer)),
-      bytes_(memory_bytes),
-      frames_(kFrameHeads),
-      poses_(kSampleRing),
-      blocks_(kSampleRing) {}
+SessionRecorder::SessionRecorder(std::size_t memory_bytes)
+    : memory_bytes_(memory_bytes), frames_(kFrameHeads), poses_(kSampleRing), blocks_(kSampleRing) {}
+
+Expected<void> SessionRecorder::open(const std::filesystem::path& file, const SensorRecordingFacts& facts) {
+  if (accepting_.load(std::memory_order_relaxed))
+    return fail(fmt::format("{}: is recorded to already", this->file().string()));
+  const auto refuse = [this](Error error) -> Expected<void> {
+    asked_.store(true, std::memory_order_relaxed);
+    give_up(error);
+    return tl::unexpected(std::move(error));
+  };
+  std::error_code ignored;
+  if (std::filesystem::exists(file, ignored)) return refuse({fmt::format("{}: is there already", file.string())});
+  (void)std::signal(SIGXFSZ, SIG_IGN);
+  auto writer = SensorWriter::create(file.string(), facts, MonotonicClock::now());
+  if (!writer) return refuse(std::move(writer.error()));
+  if (!bytes_) bytes_.emplace(memory_bytes_);
+  {
+    std::unique_lock lock(mutex_);
+    file_ = file;
+    reason_.clear();
+    next_writer_.emplace(std::move(*writer));
+    if (files_.get() > 0) next_opened_ = MonotonicClock::now();
+    wakeup_.post();
+    if (running_.load(std::memory_order_relaxed)) answered_.wait(lock, [this] { return !next_writer_; });
+  }
+  stopped_.store(false, std::memory_order_relaxed);
+  asked_.store(true, std::memory_order_relaxed);
+  files_.add();
+  accepting_.store(true, std::memory_order_release);
+  return {};
+}
+
+Expected<void> SessionRecorder::close() {
+  if (!asked_.load(std::memory_order_relaxed)) return fail("nothing is recorded");
+  accepting_.store(false, std::memory_order_relaxed);
+  std::string reason;
+  {
+    std::unique_lock lock(mutex_);
+    closing_ = true;
+    wakeup_.post();
+    answered_.wait(lock, [this] { return !closing_; });
+    reason = reason_;
+  }
+  asked_.store(false, std::memory_order_relaxed);
+  if (stopped_.exchange(false, std::memory_order_relaxed)) return fail(std::move(reason));
+  return {};
+}
+
+std::filesystem::path SessionRecorder::file() const {
+  const std::lock_guard lock(mutex_);
+  return file_;
+}
 
 void SessionRecorder::start(ThreadLauncher& threads) {
+  running_.store(true, std::memory_order_relaxed);
   thread_ = threads.launch("recorder", ThreadRole::kHousekeeping, [this] { run(); });
 }
 
@@ -47,17 +91,19 @@ void SessionRecorder::stop() {
   ending_.store(true, std::memory_order_relaxed);
   wakeup_.post();
   thread_.join();
+  running_.store(false, std::memory_order_relaxed);
 }
 
 void SessionRecorder::frame(const CameraFrame& frame) noexcept {
   const RealtimeScope realtime;
+  if (!accepting_.load(std::memory_order_acquire)) return;
   // A capture after the arrival is a broken stamp: the pipeline drops such a frame, and no replay could deliver it.
   if (stopped_.load(std::memory_order_relaxed) || frame.stamp.capture > frame.stamp.arrival) {
     return frames_refused_.add();
   }
   // The bytes first: once the head is seen they are there. So room for the head is made sure of before; what the other
   // thread has taken meanwhile only makes more.
-  if (frames_put_ - frames_taken_.get() >= kFrameHeads || !bytes_.push(frame.bytes)) return frames_refused_.add();
+  if (frames_put_ - frames_taken_.get() >= kFrameHeads || !bytes_->push(frame.bytes)) return frames_refused_.add();
   FrameHead head{frame, frame.bytes.size()};
   head.frame.bytes = {};
   static_cast<void>(frames_.push(head));
@@ -66,16 +112,22 @@ void SessionRecorder::frame(const CameraFrame& frame) noexcept {
 
 void SessionRecorder::pose(const TrackerSample& sample) noexcept {
   const RealtimeScope realtime;
+  if (!accepting_.load(std::memory_order_acquire)) return;
   if (stopped_.load(std::memory_order_relaxed) || !poses_.push(sample)) poses_refused_.add();
 }
 
 void SessionRecorder::ecg(const EcgBlock& block) noexcept {
   const RealtimeScope realtime;
+  if (!accepting_.load(std::memory_order_acquire)) return;
   if (stopped_.load(std::memory_order_relaxed) || !blocks_.push(block)) blocks_refused_.add();
 }
 
 SessionRecorder::Summary SessionRecorder::summary() const noexcept {
-  return {stopped_.load(std::memory_order_relaxed), recorded_.get(), frames_refused_.get() + frames_unwritten_.get(),
+  return {asked_.load(std::memory_order_relaxed),
+          stopped_.load(std::memory_order_relaxed),
+          files_.get(),
+          recorded_.get(),
+          frames_refused_.get() + frames_unwritten_.get(),
           poses_refused_.get() + blocks_refused_.get() + other_unwritten_.get()};
 }
 
@@ -85,21 +137,46 @@ std::string SessionRecorder::reason() const {
 }
 
 void SessionRecorder::run() {
-  Instant flushed = MonotonicClock::now();
   for (;;) {
-    // Asked before draining: what the devices gave before stop() is then drained after it.
+    wakeup_.clear();  // before looking at what is asked
+    // Asked before draining: what the devices gave before stop() or close() is then drained after it.
     const bool ending = ending_.load(std::memory_order_relaxed);
+    bool closing = false;
+    {
+      const std::lock_guard lock(mutex_);
+      closing = closing_;
+      if (next_writer_) {
+        writer_.emplace(std::move(*next_writer_));
+        next_writer_.reset();
+        flushed_ = MonotonicClock::now();
+        opened_ = next_opened_;
+        last_arrival_ = std::max(last_arrival_, opened_);
+        answered_.notify_all();
+      }
+    }
     const Instant now = MonotonicClock::now();
-    drain(ending ? Instant::max() : now - kBehind);
-    if (ending) break;
-    if (now - flushed >= kFlushAfter && !stopped_.load(std::memory_order_relaxed)) {
-      if (const auto done = writer_.flush(); !done) give_up(done.error());
-      flushed = now;
+    drain(ending || closing ? Instant::max() : now - kBehind);
+    if (ending || closing) finish_file();
+    if (closing) {
+      const std::lock_guard lock(mutex_);
+      closing_ = false;
+      answered_.notify_all();
+    }
+    if (ending) return;
+    if (writer_ && now - flushed_ >= kFlushAfter && !stopped_.load(std::memory_order_relaxed)) {
+      if (const auto done = writer_->flush(); !done) give_up(done.error());
+      flushed_ = now;
     }
     static_cast<void>(wakeup_.wait_until(now + kTick));
   }
-  if (stopped_.load(std::memory_order_relaxed)) return;
-  if (const auto done = writer_.finish(); !done) give_up(done.error());
+}
+
+void SessionRecorder::finish_file() {
+  if (!writer_) return;
+  if (!stopped_.load(std::memory_order_relaxed)) {
+    if (const auto done = writer_->finish(); !done) give_up(done.error());
+  }
+  writer_.reset();
 }
 
 template <class Front, class Ring>
@@ -127,26 +204,30 @@ void SessionRecorder::drain(Instant until) {
 
 // One that comes after later ones were written, its thread having slept for longer than we are behind, is written as
 // arrived with them: a replay keeps to the order.
+// What came before the file was opened, of a thread that was slow to hear that the last one was closed, belongs to
+// neither.
 void SessionRecorder::write_front(Instant arrival) {
-  last_arrival_ = std::max(last_arrival_, arrival);
-  const bool stopped = stopped_.load(std::memory_order_relaxed);
+  const bool asked_for = writer_ && arrival >= opened_;
+  if (asked_for) last_arrival_ = std::max(last_arrival_, arrival);
+  const bool stopped = stopped_.load(std::memory_order_relaxed) || !asked_for;
   Expected<void> written;
   Counter* unwritten = &other_unwritten_;
   if (front_frame_ && front_frame_->frame.stamp.arrival == arrival) {
     unwritten = &frames_unwritten_;
     frame_bytes_.resize(front_frame_->size);
-    bytes_.pop(frame_bytes_);
+    bytes_->pop(frame_bytes_);
     front_frame_->frame.bytes = frame_bytes_;
-    if (!stopped) written = writer_.write(front_frame_->frame, last_arrival_);
+    if (!stopped) written = writer_->write(front_frame_->frame, last_arrival_);
     front_frame_.reset();
   } else if (front_pose_ && front_pose_->arrival == arrival) {
-    if (!stopped) written = writer_.write(*front_pose_, last_arrival_);
+    if (!stopped) written = writer_->write(*front_pose_, last_arrival_);
     front_pose_.reset();
   } else {
-    if (!stopped) written = writer_.write(*front_block_, last_arrival_);
+    if (!stopped) written = writer_->write(*front_block_, last_arrival_);
     front_block_.reset();
   }
   if (!written) give_up(written.error());
+  if (!asked_for) return;
   if (stopped || !written) {
     unwritten->add();
   } else {

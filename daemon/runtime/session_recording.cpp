@@ -3,6 +3,8 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <string>
+#include <system_error>
 #include <utility>
 
 #include "daemon/config/configuration_loader.hpp"
@@ -12,7 +14,12 @@
 namespace perimap {
 
 std::filesystem::path recording_path(const std::filesystem::path& folder, std::chrono::system_clock::time_point now) {
-  return folder / fmt::format("perimap-{:%Y%m%d-%H%M%S}.mcap", fmt::gmtime(std::chrono::system_clock::to_time_t(now)));
+  const std::string name =
+      fmt::format("perimap-{:%Y%m%d-%H%M%S}", fmt::gmtime(std::chrono::system_clock::to_time_t(now)));
+  std::filesystem::path path = folder / (name + ".mcap");
+  std::error_code ignored;
+  for (int n = 2; std::filesystem::exists(path, ignored); ++n) path = folder / fmt::format("{}-{}.mcap", name, n);
+  return path;
 }
 
 SensorRecordingFacts recording_facts(const Configuration& configuration, const std::optional<CameraModel>& camera,

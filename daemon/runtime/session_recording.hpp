@@ -12,7 +12,7 @@
 
 namespace perimap {
 
-// FOLDER/perimap-20261121-234501.mcap, UTC.
+// FOLDER/perimap-20261121-234501.mcap, UTC; with -2, -3 and so on where that is there already.
 [[nodiscard]] std::filesystem::path recording_path(const std::filesystem::path& folder,
                                                    std::chrono::system_clock::time_point now);
 

@@ -63,6 +63,8 @@ struct Samples {
   std::map<std::uint32_t, std::pair<Instant, Vector2d>> first_views;  // by id
   std::map<std::uint64_t, Pose> cameras;                              // by frame sequence
   std::optional<Duration> to_recording;
+  int models_for_a_turn =
+      0;  // that came before it was time for the next: a beat has become known, or the state is another
 };
 
 Samples read_samples(const std::string& file, const RecordedTruth& truth) {
@@ -70,9 +72,13 @@ Samples read_samples(const std::string& file, const RecordedTruth& truth) {
   constexpr std::array<std::string_view, 2> kPublished = {channels::kSurface, channels::kSurfaceModel};
   if (auto selected = reader.select(kPublished); !selected) throw std::runtime_error(selected.error().message);
   Samples samples;
+  Instant last_model;
   while (const auto message = value_of(reader.next())) {
     if (message->channel == channels::kSurfaceModel) {
       const auto model = value_of(reader.decode<perimap_SurfaceModel>(*message));
+      const Instant made = from_ns(model->time_ns);
+      samples.models_for_a_turn += made - last_model < std::chrono::milliseconds(450) ? 1 : 0;
+      last_model = made;
       for (std::uint32_t i = 0; i < model->features._length; ++i) {
         const perimap_ModelFeature& feature = model->features._buffer[i];
         samples.first_views[feature.id] = {from_ns(feature.first_observed_time_ns),
@@ -164,6 +170,7 @@ int judge(const std::string& recording, const std::string& samples_file, const s
   if (refused == 0 || refused == frames)
     throw std::runtime_error("it must refuse until there is a map, and draw from then on");
   if (!(median < 1.0) || !(most < 4.0)) throw std::runtime_error("that is too far");
+  if (samples.models_for_a_turn < 5) throw std::runtime_error("no model was made for a beat that had become known");
   if (last.contains("refused")) throw std::runtime_error("the last frame was refused");
   const cv::Mat picture = cv::imread(drawn);
   if (picture.empty()) throw std::runtime_error(drawn + ": no picture");

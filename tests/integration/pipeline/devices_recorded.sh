@@ -1,8 +1,9 @@
 #!/bin/bash
 # perimapd over emulated devices with recording on: the recording holds every frame and replays; a disk that takes no
-# more stops the recording and nothing else; `perimap record` does the same without a pipeline.
-# devices_recorded.sh PERIMAPD PERIMAP RECORDING WORK_FOLDER CYCLONEDDS_XML [all]
-# Without `all` only the first of these.
+# more stops the recording and nothing else; `perimap record` does the same without a pipeline. `perimap ctl record` begins
+# and ends a recording while perimapd runs.
+# devices_recorded.sh PERIMAPD PERIMAP RECORDING WORK_FOLDER CYCLONEDDS_XML [all|switched]
+# Without `all` only the first of these; with `switched` only the last.
 set -uo pipefail
 perimapd=$1 perimap=$2 recording=$3 work=$4
 export CYCLONEDDS_URI=file://$5
@@ -16,7 +17,8 @@ session() {
   emulate "$recording"
   {
     devices_toml "$recording"
-    printf '[recording]\nrecord = true\nfolder = "%s"\n' "$name"
+    printf '[recording]\nrecord = %s\nfolder = "%s"\n' "${record:-true}" "$name"
+    printf '[control]\nsocket = "%s"\n' "$short/control"
   } > "$work/$name.toml"
   "$@" > "$work/$name.log" 2>&1 || fail "$name: ended with $?: $(tail -n 5 "$work/$name.log")"
   kill -INT $emulators
@@ -29,6 +31,40 @@ frames_of() {
   node -e 'console.log(JSON.parse(require("fs").readFileSync(process.argv[1])).counts.frames)' "$work/replay.json"
 }
 played=$(frames_of "$recording")
+
+# perimapd that records nothing until it is told to, twice.
+switched() {
+  local told=(timeout 20 "$perimap" ctl --socket "$short/control")
+  "$perimapd" -c "$work/switched.toml" &
+  local daemon=$!
+  for _ in $(seq 100); do [ ! -S "$short/control" ] || break; sleep 0.05; done
+  "${told[@]}" status | grep -q '^recording: off$' || fail "it records unasked"
+  "${told[@]}" record off && fail "what is not recorded was ended"
+  # From when the emulated recording has begun.
+  until [ "$(awk -v s="$start" '{print ($1 > s + 0.5)}' /proc/uptime)" = 1 ]; do sleep 0.1; done
+  for _ in 1 2; do
+    "${told[@]}" record on | grep -q "^recording to .*switched/perimap-.*mcap$" || fail "it does not say where it records"
+    "${told[@]}" record on && fail "two recordings at once"
+    "${told[@]}" status | grep -q '^recording: on$' || fail "the status does not say that it records"
+    sleep 1.5
+    "${told[@]}" record off | grep -q '^recorded to ' || fail "it does not say what it recorded"
+    "${told[@]}" status | grep -q '^recording: off$' || fail "the status says that it still records"
+  done
+  wait $daemon
+}
+if [ "${6:-}" = switched ]; then
+  record=false session switched switched
+  recorded=("$work"/switched/*.mcap)
+  [ ${#recorded[@]} -eq 2 ] || fail "expected two recordings: $(ls "$work/switched")"
+  for file in "${recorded[@]}"; do
+    frames=$(frames_of "$file")
+    [ "$frames" -ge 30 ] && [ "$frames" -le 75 ] || fail "$frames frames in 1.5 s of $file"
+  done
+  [ "$(grep -cE 'command record (on|off) from user [0-9]+ \(.*\), group [0-9]+, process [0-9]+: done' "$work/switched.log")" -eq 4 ] ||
+    fail "the commands are not in the log: $(cat "$work/switched.log")"
+  echo "as promised: two recordings, begun and ended at run time"
+  exit 0
+fi
 
 session live "$perimapd" -c "$work/live.toml"
 recorded=("$work"/live/*.mcap)

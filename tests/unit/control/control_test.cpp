@@ -22,7 +22,8 @@ using namespace std::string_literals;
 using testing::HasSubstr;
 
 TEST(ControlRequest, EachCommandIsReadBackByItsName) {
-  for (const auto command : {ControlCommand::kStatus, ControlCommand::kNewPatient, ControlCommand::kReload}) {
+  for (const auto command : {ControlCommand::kStatus, ControlCommand::kNewPatient, ControlCommand::kRecordOn,
+                             ControlCommand::kRecordOff, ControlCommand::kReload}) {
     const auto read = parse_control_request(std::string(name_of(command)) + "\n");
     ASSERT_TRUE(read) << read.error().message;
     EXPECT_EQ(*read, command);
@@ -44,17 +45,16 @@ TEST_P(GarbledRequest, IsRefusedInOnePrintableLine) {
   EXPECT_TRUE(std::all_of(message.begin(), message.end(), [](char c) { return c >= ' ' && c <= '~'; })) << message;
 }
 
-INSTANTIATE_TEST_SUITE_P(Control, GarbledRequest,
-                         testing::Values(Garbled{"Nothing", ""}, Garbled{"Newline", "\n"},
-                                         Garbled{"NoNewline", "status"}, Garbled{"TwoLines", "status\nreload\n"},
-                                         Garbled{"Longer", "status now\n"}, Garbled{"Shorter", "statu\n"},
-                                         Garbled{"Case", "Status\n"}, Garbled{"CarriageReturn", "status\r\n"},
-                                         Garbled{"Nul", "status\0\n"s}, Garbled{"Space", " status\n"},
-                                         Garbled{"Bytes", "\xFF\xFE\x01\n"}, Garbled{"Escape", "\x1B[2Jstatus\n"},
-                                         Garbled{"NotThere", "record on\n"},
-                                         Garbled{"TooLong", std::string(kLongestRequest, 'a') + "\n"},
-                                         Garbled{"Endless", std::string(100'000, '\n')}),
-                         [](const auto& param) { return param.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Control, GarbledRequest,
+    testing::Values(Garbled{"Nothing", ""}, Garbled{"Newline", "\n"}, Garbled{"NoNewline", "status"},
+                    Garbled{"TwoLines", "status\nreload\n"}, Garbled{"Longer", "status now\n"},
+                    Garbled{"Shorter", "statu\n"}, Garbled{"Case", "Status\n"}, Garbled{"CarriageReturn", "status\r\n"},
+                    Garbled{"Nul", "status\0\n"s}, Garbled{"Space", " status\n"}, Garbled{"Bytes", "\xFF\xFE\x01\n"},
+                    Garbled{"Escape", "\x1B[2Jstatus\n"}, Garbled{"NotThere", "stop\n"}, Garbled{"Half", "record\n"},
+                    Garbled{"TwoSpaces", "record  on\n"}, Garbled{"TooLong", std::string(kLongestRequest, 'a') + "\n"},
+                    Garbled{"Endless", std::string(100'000, '\n')}),
+    [](const auto& param) { return param.param.name; });
 
 class ControlSocket : public testing::Test {
  protected:

@@ -264,6 +264,61 @@ TEST_F(SessionRecording, ACrashLeavesWhatWasWrittenReadable) {
   EXPECT_FALSE(counts.damage.empty());
 }
 
+TEST_F(SessionRecording, IsEndedWholeAndBegunAnewInAnotherFileWhileTheDevicesGoOn) {
+  const SensorRecordingFacts facts{"test", "test", "tracker", {}, "camera_matrix", "version = 1\n"};
+  SessionRecorder session(kMemory);
+  session.start(threads);
+  EXPECT_FALSE(session.summary().asked);
+  EXPECT_FALSE(session.close()) << "there is nothing to end";
+  std::uint64_t sequence = 0;
+  const auto give = [&](int n) {
+    for (int i = 0; i < n; ++i) {
+      const Instant now = MonotonicClock::now();
+      session.frame(frame(++sequence, now));
+      session.pose(pose(2, now));
+      session.ecg(block(1, now));
+      std::this_thread::sleep_for(milliseconds(2));
+    }
+  };
+  give(5);  // nobody asks for these
+  const std::filesystem::path second = folder_ / "second.mcap";
+  for (const std::filesystem::path& file : {file_, second}) {
+    ASSERT_TRUE(session.open(file, facts));
+    EXPECT_FALSE(session.open(folder_ / "third.mcap", facts)) << "one is open";
+    EXPECT_EQ(session.file(), file);
+    EXPECT_TRUE(session.summary().asked);
+    sequence = 0;
+    give(20);
+    ASSERT_TRUE(session.close());
+    EXPECT_FALSE(session.summary().asked);
+    // Whole as soon as close() has returned.
+    const Counts counts = read(file);
+    EXPECT_EQ(counts.frames, 20);
+    EXPECT_EQ(counts.poses, 20);
+    EXPECT_EQ(counts.blocks, 20);
+    give(7);
+  }
+  session.stop();
+  const auto summary = session.summary();
+  EXPECT_EQ(summary.files, 2U);
+  EXPECT_EQ(summary.recorded, 120U);
+  EXPECT_EQ(summary.frames_not_recorded + summary.other_not_recorded, 0U) << "what was not asked for is not missing";
+}
+
+TEST_F(SessionRecording, ThatCouldNotBeBegunCountsAsStoppedUntilItIsAskedForNoMore) {
+  SessionRecorder session(kMemory);
+  session.start(threads);
+  EXPECT_FALSE(session.open(folder_ / "not there" / "session.mcap", {}));
+  EXPECT_TRUE(session.summary().asked);
+  EXPECT_TRUE(session.summary().stopped);
+  EXPECT_NE(session.reason(), "");
+  const auto closed = session.close();
+  ASSERT_FALSE(closed);
+  EXPECT_THAT(closed.error().message, HasSubstr("not there"));
+  EXPECT_FALSE(session.summary().asked);
+  EXPECT_FALSE(session.summary().stopped);
+}
+
 TEST_F(SessionRecording, OverwritesNothing) {
   { const auto session = recorder(); }
   const auto again = SessionRecorder::create(file_, {}, kMemory);
