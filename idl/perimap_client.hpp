@@ -9,7 +9,7 @@
 // pure: they keep nothing, call nothing, and may be used on any thread.
 //
 // Positions and velocities are those that perimapd itself would publish for that instant, knowing what it knew when it
-// made the model: the same but for the rounding of the wire's times to 1 ns, less than 1e-6 mm at any speed of a heart.
+// made the model: the same but for the rounding of the wire's times to 1 ns, which is 1e-6 mm for each metre a second.
 // A covariance is the bound that perimapd gives when a frame is missing: the largest deviation over the cycle, and what
 // the deviations of the phases at that instant make of the motion.
 #pragma once
