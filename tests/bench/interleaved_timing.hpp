@@ -1,6 +1,8 @@
 // Times several ways of doing the same work in turn, round by round, so that what disturbs the machine disturbs all.
 #pragma once
 
+#include <time.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -21,7 +23,8 @@ struct Candidate {
   std::string name;
   double updates = 1.0;  // that one call makes
   std::function<void()> call;
-  std::vector<double> ns_per_update;  // of each round
+  std::vector<double> ns_per_update;      // of each round, by the clock on the wall
+  std::vector<double> cpu_ns_per_update;  // of each round, of the calling thread
 
   Candidate(std::string name_of, double updates_of, std::function<void()> call_of)
       : name(std::move(name_of)), updates(updates_of), call(std::move(call_of)) {}
@@ -29,7 +32,16 @@ struct Candidate {
   // Over the rounds.
   [[nodiscard]] double quantile(double fraction) const { return bench::quantile(ns_per_update, fraction); }
   [[nodiscard]] double median() const { return quantile(0.5); }
+  [[nodiscard]] double cpu_quantile(double fraction) const { return bench::quantile(cpu_ns_per_update, fraction); }
+  [[nodiscard]] double cpu_median() const { return cpu_quantile(0.5); }
 };
+
+// What the calling thread has used of a processor: time in which others had it does not count.
+inline double thread_seconds() {
+  timespec now{};
+  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 inline double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -42,7 +54,9 @@ inline void time_interleaved(std::vector<Candidate>& candidates, int rounds) {
     for (Candidate& candidate : candidates) {
       candidate.call();
       const auto start = std::chrono::steady_clock::now();
+      const double cpu_start = thread_seconds();
       candidate.call();
+      candidate.cpu_ns_per_update.push_back(1e9 * (thread_seconds() - cpu_start) / candidate.updates);
       candidate.ns_per_update.push_back(1e9 * seconds_since(start) / candidate.updates);
     }
   }
