@@ -62,7 +62,9 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
                            int lane) noexcept {
   using V = Vector<Real>;
   const Tag<Real> tag;
+  // A store of a vector may change anything, as far as the compiler knows: what stays the same is kept outside.
   const int n = group.n;
+  const int d = group.d;
   const int a = tile.axis;
   const int i_0 = tile.first_row;
   const int k_0 = i_0 - a * n;  // the first row's coefficient
@@ -74,7 +76,7 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
   const Real* U[kU];
   V U_i[kU][kRows][2];
   for (int m = 0; m < kPairs; ++m) {
-    U[m] = at(work.U, m * group.d * 2, lane);
+    U[m] = at(work.U, m * d * 2, lane);
     for (int r = 0; r < kRows; ++r) {
       U_i[m][r][0] = hn::Load(tag, U[m] + 2 * (i_0 + r) * kLanes);
       U_i[m][r][1] = hn::Load(tag, U[m] + (2 * (i_0 + r) + 1) * kLanes);
@@ -85,7 +87,7 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
   V b_i[kL][kRows];
   for (int q = 0; q < kLearnt; ++q) {
     b[q] = work.learnt[q].b.data();
-    M[q] = at(work.gain, q * 3 * group.d, lane);
+    M[q] = at(work.gain, q * 3 * d, lane);
     for (int r = 0; r < kRows; ++r) b_i[q][r] = hn::Set(tag, b[q][k_0 + r]);
   }
   const Real* b_predicted[kQ];
@@ -102,15 +104,23 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
       for (int r = 0; r < kRows; ++r) Pb_i[q][r] = hn::Zero(tag);
     }
     const int columns = c < a ? n : k_0;
+    const Real* U_column[kU];
+    for (int m = 0; m < kPairs; ++m) U_column[m] = U[m] + 2 * c * n * kLanes;
+    Real* M_column[kL];
+    for (int q = 0; q < kLearnt; ++q) M_column[q] = M[q] + (a * d + c * n) * kLanes;
     for (int k = 0; k < columns; ++k) {
-      const int j = c * n + k;
       V U_j[kU][2];
       for (int m = 0; m < kPairs; ++m) {
-        U_j[m][0] = hn::Load(tag, U[m] + 2 * j * kLanes);
-        U_j[m][1] = hn::Load(tag, U[m] + (2 * j + 1) * kLanes);
+        U_j[m][0] = hn::Load(tag, U_column[m]);
+        U_j[m][1] = hn::Load(tag, U_column[m] + kLanes);
+        U_column[m] += 2 * kLanes;
       }
       V M_j[kL];
-      for (int q = 0; q < kLearnt; ++q) M_j[q] = hn::Load(tag, M[q] + (a * group.d + j) * kLanes);
+      for (int q = 0; q < kLearnt; ++q) M_j[q] = hn::Load(tag, M_column[q]);
+      V b_k[kL];
+      for (int q = 0; q < kLearnt; ++q) b_k[q] = hn::Set(tag, b[q][k]);
+      V b_predicted_k[kQ];
+      for (int q = 0; q < kPredicted; ++q) b_predicted_k[q] = hn::Set(tag, b_predicted[q][k]);
       for (int r = 0; r < kRows; ++r) {
         V p = hn::Load(tag, P + r * kLanes);
         for (int m = 0; m < kPairs; ++m) {
@@ -119,14 +129,17 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
         }
         if constexpr (kPairs > 0) hn::Store(p, tag, P + r * kLanes);
         for (int q = 0; q < kLearnt; ++q) {
-          M_i[q][r] = hn::MulAdd(p, hn::Set(tag, b[q][k]), M_i[q][r]);
+          M_i[q][r] = hn::MulAdd(p, b_k[q], M_i[q][r]);
           M_j[q] = hn::MulAdd(p, b_i[q][r], M_j[q]);
         }
         for (int q = 0; q < kPredicted; ++q) {
-          Pb_i[q][r] = hn::MulAdd(p, hn::Set(tag, b_predicted[q][k]), Pb_i[q][r]);
+          Pb_i[q][r] = hn::MulAdd(p, b_predicted_k[q], Pb_i[q][r]);
         }
       }
-      for (int q = 0; q < kLearnt; ++q) hn::Store(M_j[q], tag, M[q] + (a * group.d + j) * kLanes);
+      for (int q = 0; q < kLearnt; ++q) {
+        hn::Store(M_j[q], tag, M_column[q]);
+        M_column[q] += kLanes;
+      }
       P += kRows * kLanes;
     }
     if (c == a) {
@@ -158,7 +171,7 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
       }
     }
     for (int q = 0; q < kLearnt; ++q) {
-      for (int r = 0; r < kRows; ++r) hn::Store(M_i[q][r], tag, M[q] + (c * group.d + i_0 + r) * kLanes);
+      for (int r = 0; r < kRows; ++r) hn::Store(M_i[q][r], tag, M[q] + (c * d + i_0 + r) * kLanes);
     }
     for (int q = 0; q < kPredicted; ++q) {
       V sum = hn::Zero(tag);
@@ -170,7 +183,7 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
   }
   for (int q = 0; q < kLearnt; ++q) {
     for (int c = a + 1; c < 3; ++c) {
-      for (int r = 0; r < kRows; ++r) hn::Store(hn::Zero(tag), tag, M[q] + (c * group.d + i_0 + r) * kLanes);
+      for (int r = 0; r < kRows; ++r) hn::Store(hn::Zero(tag), tag, M[q] + (c * d + i_0 + r) * kLanes);
     }
   }
 }
