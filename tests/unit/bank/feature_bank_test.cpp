@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iostream>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -84,28 +85,38 @@ const UglyCase kUglyCases[] = {
     {"just one axis off", {10, -5, 90}, {200, 0}, 3.0, 5.0},
 };
 
+struct UglyUpdate {
+  FeatureEstimate before;
+  Observation observation;
+};
+
 template <class Model>
-void expect_scalar_update(const Model& model, FeatureBank<double> bank, const UglyCase& ugly,
-                          const UpdateSettings& settings, std::mt19937& generator) {
-  SCOPED_TRACE(ugly.name);
+UglyUpdate ugly_update(const Model& model, const BasisLayout& layout, const UglyCase& ugly, std::mt19937& generator) {
   constexpr bool kBearing = std::is_same_v<Model, BearingModel>;
-  constexpr int kFeature = kLanes + 5;
-  const BasisLayout layout = bank.layout();
   const Pose X_CW = test::camera_pose(0.3, kBearing, 0.4);
   // In the bearing's frame x is ahead.
   const Vector3d p_C = kBearing ? Vector3d(ugly.p_C.z(), -ugly.p_C.x(), -ugly.p_C.y()) : ugly.p_C;
-  FeatureEstimate scalar = correlated(X_CW.inverse() * p_C, layout, ugly.deviation_mm, generator);
-  const FeatureEstimate before = scalar;
-  Observation observation;
+  UglyUpdate update{correlated(X_CW.inverse() * p_C, layout, ugly.deviation_mm, generator), {}};
+  Observation& observation = update.observation;
   observation.b = basis_at(layout, 0.7, 0.2);
   observation.X_CW = X_CW;
   const double unit = kBearing ? 1.0 / 600.0 : 1.0;
   const double variance = std::pow(unit * ugly.noise_px, 2);
   observation.R << variance, 0.2 * variance, 0.2 * variance, 1.5 * variance;
-  if (model.predict(X_CW * position_of(scalar.x, observation.b), observation.z) != ProjectionStatus::kOk) {
+  if (model.predict(X_CW * position_of(update.before.x, observation.b), observation.z) != ProjectionStatus::kOk) {
     observation.z.setZero();
   }
   observation.z += unit * ugly.offset_px;
+  return update;
+}
+
+template <class Model>
+void expect_scalar_update(const Model& model, FeatureBank<double> bank, const UglyCase& ugly,
+                          const UpdateSettings& settings, std::mt19937& generator) {
+  SCOPED_TRACE(ugly.name);
+  constexpr int kFeature = kLanes + 5;
+  const auto [before, observation] = ugly_update(model, bank.layout(), ugly, generator);
+  FeatureEstimate scalar = before;
 
   bank.set(kFeature, before);
   const LaneOutcomes<double> lanes = learn(bank, kFeature, observation, model, settings);
@@ -116,7 +127,7 @@ void expect_scalar_update(const Model& model, FeatureBank<double> bank, const Ug
   EXPECT_EQ(lanes.status[kLane], expected.status);
   EXPECT_EQ(lanes.iterations[kLane], expected.iterations);
   const double z_error = 1e-12 * (1.0 + observation.z.norm());
-  const double deviation = unit * ugly.noise_px;
+  const double deviation = std::sqrt(observation.R(0, 0));
   EXPECT_NEAR(lanes.innovation[0][kLane], expected.innovation.x(), z_error);
   EXPECT_NEAR(lanes.innovation[1][kLane], expected.innovation.y(), z_error);
   // An error e of a residual of s deviations is one of 2 s e of its square.
@@ -151,6 +162,55 @@ TEST_P(Bank, UpdatesAsTheScalarUpdateAtUglyPoints) {
       }
     }
   }
+}
+
+// An instruction set whose kernels were built but which this machine lacks is not tested here: said, not passed over.
+TEST(BankPaths, EveryInstructionSetIsTested) {
+  std::string tested;
+  for (const SimdTarget target : simd_targets()) tested += std::string(" ") + simd_target_name(target);
+  std::string missing;
+  for (const char* name : {"AVX3", "AVX2", "SSE4"}) {
+    if (tested.find(name) == std::string::npos) missing += std::string(" ") + name;
+  }
+  if (!missing.empty()) {
+    GTEST_SKIP() << "not on this machine, or not compiled in:" << missing
+                 << "; the tests of the bank ran on:" << tested;
+  }
+  std::cout << "the tests of the bank run on:" << tested << '\n';
+  EXPECT_GE(simd_targets().size(), 3U);
+}
+
+TEST(BankPaths, AgreeOnASingleUpdate) {
+  const std::vector<SimdTarget> targets = simd_targets();
+  if (targets.size() < 2) GTEST_SKIP() << "only " << simd_target_name(targets.front()) << " is on this machine";
+  std::mt19937 generator(33);
+  constexpr int kFeature = 3;
+  int accepted = 0;
+  for (const BasisLayout layout : {BasisLayout{1, 0}, BasisLayout{5, 0}, BasisLayout{8, 0}, BasisLayout{12, 2}}) {
+    for (const UglyCase& ugly : kUglyCases) {
+      const auto [before, observation] = ugly_update(kDistorted, layout, ugly, generator);
+      const auto learnt_on = [&](SimdTarget target, FeatureEstimate& estimate) {
+        FeatureBank<double> bank({.layout = layout, .features = kLanes, .target = target});
+        bank.set(kFeature, before);
+        const LaneOutcomes<double> outcomes = learn(bank, kFeature, observation, kDistorted);
+        estimate = estimate_of(bank, kFeature);
+        return outcomes;
+      };
+      FeatureEstimate best;
+      const LaneOutcomes<double> expected = learnt_on(targets.front(), best);
+      accepted += expected.accepted != 0 ? 1 : 0;
+      for (std::size_t t = 1; t < targets.size(); ++t) {
+        SCOPED_TRACE(std::string(ugly.name) + " on " + simd_target_name(targets[t]));
+        FeatureEstimate other;
+        const LaneOutcomes<double> outcomes = learnt_on(targets[t], other);
+        EXPECT_EQ(outcomes.accepted, expected.accepted);
+        EXPECT_EQ(outcomes.status[kFeature], expected.status[kFeature]);
+        EXPECT_EQ(outcomes.iterations[kFeature], expected.iterations[kFeature]);
+        expect_close(other, best, 1e-12);
+      }
+    }
+  }
+  EXPECT_GT(accepted, 20);
 }
 
 TEST_P(Bank, RefusesBadNumbersAsTheScalarUpdate) {
@@ -383,6 +443,73 @@ TEST_P(Bank, MotionFollowsPendingUpdatesWithoutAnotherSweep) {
   }
 }
 
+// Position and velocity are those of the phase asked for, the covariance that of the phase it is near: off by no more
+// than 2 |B| |P| |dB/dphi| times the distance, to first order.
+TEST_P(Bank, MotionNearAPhaseIsTheExactMotionWithTheCovarianceOfThePhase) {
+  const Group group(kLanes, 1, 52);
+  FeatureBank<double> bank = this->bank(group.layout, kLanes);
+  fill(bank, group);
+  const double rate = 7.0;
+  const double phase = 2.0;
+  const auto sweep_phase = [&](double at_rad) {
+    SweepPhase<double> at;
+    at.set(basis_at(group.layout, at_rad), basis_rate(group.layout, at_rad), rate, 0.0);
+    return at;
+  };
+  SweepPhases<double> phases;
+  phases.add_learnt(group.frames[0].b, Basis());
+  const int k = phases.add_predicted(basis_at(group.layout, phase), basis_rate(group.layout, phase), rate, 0.0);
+  bank.sweep(0, phases);
+  const auto near = [&](double at_rad) {
+    LaneMotions<double> motions;
+    bank.motion_near(0, phases, k, sweep_phase(at_rad), motions);
+    EXPECT_EQ(motions.valid, 0xff);
+    return motions;
+  };
+  const auto expect_motions = [&] {
+    LaneMotions<double> at_phase;
+    bank.motion(0, phases, k, at_phase);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const FeatureEstimate estimate = estimate_of(bank, lane);
+      const Matrix3d S = estimate.position_covariance(basis_at(group.layout, phase));
+      double last_error = 0.0;
+      for (const double distance : {0.0, 0.04, 0.02, 0.01}) {
+        const double at_rad = phase + distance;
+        const Basis b = basis_at(group.layout, at_rad);
+        const Basis b_rate = basis_rate(group.layout, at_rad);
+        const LaneMotions<double> motions = near(at_rad);
+        EXPECT_LT(largest_difference(motions.position_of(lane), position_of(estimate.x, b)), 1e-12);
+        EXPECT_LT(largest_difference(motions.velocity_of(lane), velocity_of(estimate.x, b_rate, rate)), 1e-11);
+        EXPECT_EQ(motions.covariance_of(lane), at_phase.covariance_of(lane));
+        EXPECT_LT(largest_difference(motions.covariance_of(lane), S), 1e-12 * S.norm());
+        const double error = (estimate.position_covariance(b) - motions.covariance_of(lane)).norm();
+        const double bound = 2.0 * b.norm() * b_rate.norm() * estimate.P.norm() * distance;
+        EXPECT_LE(error, 1.1 * bound + 1e-12 * S.norm());
+        if (last_error > 0.0) {
+          EXPECT_NEAR(error / last_error, 0.5, 0.1);
+        }
+        if (distance > 0.0) last_error = error;
+        constexpr double kStep_rad = 1e-4;
+        const Vector3d slope =
+            (near(at_rad + kStep_rad).position_of(lane) - near(at_rad - kStep_rad).position_of(lane)) /
+            (2.0 * kStep_rad);
+        // The central difference is off by a sixth of the third derivative times the step squared.
+        EXPECT_LT((motions.velocity_of(lane) - rate * slope).norm(), 1e-5);
+      }
+    }
+  };
+  expect_motions();
+  LaneObservations<double> measured;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    const Observation observation = group.observation(0, lane);
+    measured.set(lane, observation.z, observation.R);
+  }
+  LaneOutcomes<double> outcomes;
+  bank.update(0, phases, 0, group.frames[0].X_CW, kDistorted, measured, {}, outcomes);
+  EXPECT_NE(outcomes.accepted, 0);
+  expect_motions();
+}
+
 TEST_P(Bank, PredictsTheSameWithAndWithoutASweep) {
   const Group group(2 * kLanes, 1, 46);
   FeatureBank<double> bank = this->bank(group.layout, 2 * kLanes);
@@ -508,8 +635,23 @@ TEST_P(Bank, SinglePrecisionKeepsPositionsToMicrometres) {
   EXPECT_LT(largest_single_precision_error(bank<double>(layout, kLanes), bank<float>(layout, kLanes)), 5e-4);
 }
 
-// `updates` for each lane, on all of them at once; then the smallest eigenvalue of the correlations.
-void expect_positive_definite(FeatureBank<double> bank, int updates) {
+// The smallest eigenvalue of the correlations of P; negative infinity when a variance is not positive.
+template <class Real>
+double least_eigenvalue(const FeatureBank<Real>& bank, int feature) {
+  const MatrixXd P = estimate_of(bank, feature).P;
+  if (!(P.diagonal().array() > 0.0).all()) return -std::numeric_limits<double>::infinity();
+  const VectorXd scale = P.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(MatrixXd(scale.asDiagonal() * P * scale.asDiagonal()),
+                                                       Eigen::EigenvaluesOnly);
+  return solver.eigenvalues()(0);
+}
+
+// `updates` of each feature, on all of them at once, from the wide prior on. Without a gate: some features lose their
+// depth to a start on the first ray and would learn no more, but P must stay sound for them as well. Lanes 0, 3 and 6
+// of each group also take process noise with each update. The eigenvalues are looked at often while there is little
+// data, which leaves P worst conditioned, then ten times on the way. Returns the least of them.
+template <class Real>
+double least_eigenvalue_over(FeatureBank<Real> bank, int updates) {
   std::mt19937 generator(61);
   std::normal_distribution<double> normal;
   const BasisLayout layout = bank.layout();
@@ -517,53 +659,68 @@ void expect_positive_definite(FeatureBank<double> bank, int updates) {
   for (int f = 0; f < bank.features(); ++f) {
     FeatureEstimate start = prior_estimate(layout, Prior{}, Vector3d(f % 5, f % 3, 0.0));
     truths.push_back(start.x);
-    start.P *= 1e-2;
     bank.set(f, start);
   }
+  UpdateSettings open;
+  open.gate = std::numeric_limits<double>::infinity();
+  constexpr double kNoise_mm = 0.01 * 0.18;  // of the process in 1/30 s, at 0.01 mm per square root of a second
   double phase = 0.0;
-  int accepted = 0;
+  double least = std::numeric_limits<double>::infinity();
+  long accepted = 0;
   for (int k = 0; k < updates; ++k) {
     phase += 0.25 + 1e-3 * normal(generator);
     const Pose X_CW = test::camera_pose(k / 30.0, false, 0.0);
-    SweepPhases<double> phases;
+    SweepPhases<Real> phases;
     const Basis b = basis_at(layout, phase);
     phases.add_learnt(b, Basis());
     for (int g = 0; g < bank.groups(); ++g) {
-      LaneObservations<double> measured;
+      LaneObservations<Real> measured;
       for (int lane = 0; lane < kLanes; ++lane) {
-        Vector2d z;
+        Vector2d z = Vector2d::Zero();
         const StateVector& truth = truths[static_cast<std::size_t>(g * kLanes + lane)];
-        ASSERT_EQ(test::kPixelModel.predict(X_CW * position_of(truth, b), z), ProjectionStatus::kOk);
+        EXPECT_EQ(test::kPixelModel.predict(X_CW * position_of(truth, b), z), ProjectionStatus::kOk);
         measured.set(lane, z + 0.7 * Vector2d(normal(generator), normal(generator)), 0.49 * Matrix2d::Identity());
+        if (lane % 3 == 0) bank.diffuse(g * kLanes + lane, kNoise_mm);
       }
-      LaneOutcomes<double> outcomes;
+      LaneOutcomes<Real> outcomes;
       bank.sweep(g, phases);
-      bank.update(g, phases, 0, X_CW, test::kPixelModel, measured, {}, outcomes);
+      bank.update(g, phases, 0, X_CW, test::kPixelModel, measured, open, outcomes);
       accepted += std::popcount(outcomes.accepted);
     }
+    const int learnt = k + 1;
+    if (learnt != 3 && learnt != 10 && learnt != 30 && learnt != 100 && learnt % (updates / 10) != 0) continue;
+    for (int f = 0; f < bank.features(); ++f) least = std::min(least, least_eigenvalue(bank, f));
   }
-  EXPECT_GT(accepted, 0.99 * updates * bank.features());
-  for (int f = 0; f < bank.features(); ++f) {
-    const MatrixXd P = estimate_of(bank, f).P;
-    ASSERT_TRUE((P.diagonal().array() > 0.0).all());
-    const VectorXd scale = P.diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(MatrixXd(scale.asDiagonal() * P * scale.asDiagonal()));
-    EXPECT_GT(solver.eigenvalues()(0), 1e-9) << f;
-  }
+  EXPECT_GT(static_cast<double>(accepted), 0.99 * updates * bank.features());
+  return least;
 }
 
-// 10^6 updates in all and 62 500 of each feature on the best path; a short form on the others.
-TEST_P(Bank, CovarianceStaysPositiveDefiniteOverAMillionUpdates) {
+constexpr BasisLayout kShipped{.cardiac_harmonics = 8};
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  constexpr int kUpdates = 2'000;
+constexpr int kShortRun = 500;
+constexpr int kMillionRun = 500;
 #else
-  const int kUpdates = GetParam() == best_simd_target() ? 62'500 : 2'000;
+constexpr int kShortRun = 2'000;
+constexpr int kMillionRun = 62'500;  // of each of 16 features
 #endif
-  expect_positive_definite(bank({1, 0}, 2 * kLanes), kUpdates);
+
+// 10^6 updates in all on the best path; a short run on the others.
+TEST_P(Bank, CovarianceStaysPositiveDefiniteOverAMillionUpdates) {
+  const double least = least_eigenvalue_over(bank<double>(kShipped, 2 * kLanes),
+                                             GetParam() == best_simd_target() ? kMillionRun : kShortRun);
+  std::cout << "least eigenvalue of the correlations: " << least << std::endl;
+  EXPECT_GT(least, 1e-9);
 }
 
-TEST_P(Bank, CovarianceStaysPositiveDefiniteWithManyHarmonics) {
-  expect_positive_definite(bank({8, 0}, kLanes), 2'000);
+TEST_P(Bank, CovarianceStaysPositiveDefiniteInSinglePrecision) {
+  const double least = least_eigenvalue_over(bank<float>(kShipped, 2 * kLanes),
+                                             GetParam() == best_simd_target() ? kMillionRun : kShortRun);
+  std::cout << "least eigenvalue of the correlations: " << least << std::endl;
+  EXPECT_GT(least, 0.0);
+}
+
+TEST_P(Bank, CovarianceStaysPositiveDefiniteWithFewHarmonics) {
+  EXPECT_GT(least_eigenvalue_over(bank<double>({1, 0}, 2 * kLanes), kShortRun), 1e-9);
 }
 
 }  // namespace
