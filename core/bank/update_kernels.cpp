@@ -283,11 +283,18 @@ HWY_INLINE void commit(const GroupView<Real>& group, const UpdateTask<Real>& tas
   // Stays zero as long as every term is finite: one infinity or NaN makes it NaN.
   V finite = hn::Zero(tag);
   Mask<Real> positive = progress.alive;
-  for (int i = 0; i < group.d; ++i) {
-    Real* x = at(group.x, i, lane);
-    Real* variance = at(group.diagonal, i, lane);
-    const V M[3] = {hn::Load(tag, at(task.gain, i, lane)), hn::Load(tag, at(task.gain, group.d + i, lane)),
-                    hn::Load(tag, at(task.gain, 2 * group.d + i, lane))};
+  // A store of a vector may change anything, as far as the compiler knows: what stays the same is kept outside.
+  const int d = group.d;
+  Real* const x_first = at(group.x, 0, lane);
+  Real* const variance_first = at(group.diagonal, 0, lane);
+  Real* const U_first = at(task.U, 0, lane);
+  const Real* const M_0 = at(task.gain, 0, lane);
+  const Real* const M_1 = at(task.gain, d, lane);
+  const Real* const M_2 = at(task.gain, 2 * d, lane);
+  for (int i = 0; i < d; ++i) {
+    Real* x = x_first + i * kLanes;
+    Real* variance = variance_first + i * kLanes;
+    const V M[3] = {hn::Load(tag, M_0 + i * kLanes), hn::Load(tag, M_1 + i * kLanes), hn::Load(tag, M_2 + i * kLanes)};
     const V x_old = hn::Load(tag, x);
     const V variance_old = hn::Load(tag, variance);
     const V x_new = hn::Add(x_old, dot3(M, l));
@@ -296,8 +303,8 @@ HWY_INLINE void commit(const GroupView<Real>& group, const UpdateTask<Real>& tas
     const V variance_new = hn::NegMulAdd(U_1, U_1, hn::NegMulAdd(U_0, U_0, variance_old));
     finite = hn::MulAdd(x_new, hn::Zero(tag), finite);
     positive = hn::And(positive, hn::Gt(variance_new, hn::Zero(tag)));
-    hn::Store(U_0, tag, at(task.U, 2 * i, lane));
-    hn::Store(U_1, tag, at(task.U, 2 * i + 1, lane));
+    hn::Store(U_0, tag, U_first + 2 * i * kLanes);
+    hn::Store(U_1, tag, U_first + (2 * i + 1) * kLanes);
     hn::Store(x_old, tag, x_before + i * kLanes);
     hn::Store(variance_old, tag, diagonal_before + i * kLanes);
     hn::Store(x_new, tag, x);
@@ -338,14 +345,15 @@ HWY_INLINE void update_lanes(const GroupView<Real>& group, const UpdateTask<Real
   for (int i = 0; i < 3; ++i) R[i] = hn::LoadU(tag, observations.R[i] + lane);
   for (int i = 0; i < 6; ++i) problem.S[i] = hn::Load(tag, at(task.S, i, lane));
   const V* S = problem.S;
-  for (int a = 0; a < 3; ++a) {
-    V p = zero;
-    for (int k = 0; k < group.n; ++k) {
-      const V b = hn::Set(tag, task.phase->b[static_cast<std::size_t>(k)]);
-      p = hn::MulAdd(hn::Load(tag, at(group.x, a * group.n + k, lane)), b, p);
-    }
-    problem.p_hat[a] = p;
+  // The axes side by side: each sum is one chain.
+  V p_hat[3] = {zero, zero, zero};
+  const int n = group.n;
+  const Real* x = at(group.x, 0, lane);
+  for (int k = 0; k < n; ++k) {
+    const V b = hn::Set(tag, task.phase->b[static_cast<std::size_t>(k)]);
+    for (int a = 0; a < 3; ++a) p_hat[a] = hn::MulAdd(hn::Load(tag, x + (a * n + k) * kLanes), b, p_hat[a]);
   }
+  for (int a = 0; a < 3; ++a) problem.p_hat[a] = p_hat[a];
 
   Progress<Real> progress{considered_lanes<Real>(task.considered, lane), accepted};
   V sum = zero;
