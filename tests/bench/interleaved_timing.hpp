@@ -23,6 +23,8 @@ struct Candidate {
   std::string name;
   double updates = 1.0;  // that one call makes
   std::function<void()> call;
+  std::function<void()> prepare;          // before the call that is timed; may be empty
+  int calls = 1;                          // on end, timed together
   std::vector<double> ns_per_update;      // of each round, by the clock on the wall
   std::vector<double> cpu_ns_per_update;  // of each round, of the calling thread
 
@@ -47,17 +49,38 @@ inline double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+// What reading the thread's clock adds to what lies between two readings.
+inline double thread_clock_seconds() {
+  std::vector<double> readings;
+  for (int i = 0; i < 301; ++i) {
+    const double start = thread_seconds();
+    readings.push_back(thread_seconds() - start);
+  }
+  return quantile(readings, 0.5);
+}
+
 // Every candidate runs once before it is timed in each round, because the ones between have taken its place in the
-// caches.
+// caches. Short ones without preparation run several times on end, and what reading the clock takes is subtracted.
 inline void time_interleaved(std::vector<Candidate>& candidates, int rounds) {
+  constexpr double kLongEnough_s = 100e-6;
+  constexpr int kMostCalls = 16;
+  const double clock_s = thread_clock_seconds();
   for (int round = 0; round < rounds; ++round) {
     for (Candidate& candidate : candidates) {
+      const double warm_start = thread_seconds();
       candidate.call();
+      const double warm_s = thread_seconds() - warm_start;
+      if (round == 0 && !candidate.prepare) {
+        candidate.calls = static_cast<int>(std::clamp(kLongEnough_s / warm_s, 1.0, double{kMostCalls}));
+      }
+      if (candidate.prepare) candidate.prepare();
       const auto start = std::chrono::steady_clock::now();
       const double cpu_start = thread_seconds();
-      candidate.call();
-      candidate.cpu_ns_per_update.push_back(1e9 * (thread_seconds() - cpu_start) / candidate.updates);
-      candidate.ns_per_update.push_back(1e9 * seconds_since(start) / candidate.updates);
+      for (int i = 0; i < candidate.calls; ++i) candidate.call();
+      const double cpu_s = thread_seconds() - cpu_start - clock_s;
+      const double updates = candidate.updates * candidate.calls;
+      candidate.cpu_ns_per_update.push_back(1e9 * cpu_s / updates);
+      candidate.ns_per_update.push_back(1e9 * seconds_since(start) / updates);
     }
   }
 }

@@ -147,6 +147,13 @@ class Fed {
       learn_phase(group, frame, i);
     }
   }
+  // The two halves of learn_group().
+  void sweep_frame() {
+    for (int g = 0; g < bank_.groups(); ++g) sweep_group(g, frame_);
+  }
+  void update_frame() {
+    for (int g = 0; g < bank_.groups(); ++g) learn_phase(g, frame_, 0);
+  }
   void learn_frame() {
     for (int g = 0; g < bank_.groups(); ++g) learn_group(g, frame_);
     ++frame_;
@@ -252,6 +259,16 @@ void bench_updates(int harmonics) {
       native_kalman->kalman_update(plain(o), kIterations);
     }
   });
+  // The same numbers by either build, or the comparison is void.
+  {
+    FeatureEstimate plain_result = scene.estimates[0];
+    const std::unique_ptr<NativeFeature> native_result = native();
+    const Observation o = scene.observation(0, 0);
+    paper_update(plain_result, o, test::kPixelModel, kIterations);
+    native_result->paper_update(plain(o), kIterations);
+    const Eigen::Map<const Eigen::VectorXd> x(native_result->x(), plain_result.x.size());
+    if (!((plain_result.x - x).norm() < 1e-9 * x.norm())) std::abort();
+  }
   FeatureEstimate scalar = scene.estimates[0];
   candidates.emplace_back("core/estimation/iterated_update, -O2, SSE2", 16.0, [&] {
     for (int i = 0; i < 16; ++i) {
@@ -288,6 +305,17 @@ void bench_updates(int harmonics) {
     ++swept;
   });
   candidates.emplace_back("bank, double, motion by a reading pass", features, [&] { pass.pass_frame(); });
+  Fed<double> swept_alone(scene, 1, 0);
+  candidates.emplace_back("part: sweep, one update pending, 1 phase (double)", features,
+                          [&] { swept_alone.sweep_frame(); });
+  candidates.back().prepare = [&] { swept_alone.update_frame(); };
+  Fed<double> updated_alone(scene, 1, 0);
+  Fed<double> updated_once(scene, 1, 0);
+  updated_once.settings.max_iterations = 1;
+  candidates.emplace_back("part: update, 1 iteration (double)", features, [&] { updated_once.update_frame(); });
+  candidates.back().prepare = [&] { updated_once.sweep_frame(); };
+  candidates.emplace_back("part: update, 3 iterations (double)", features, [&] { updated_alone.update_frame(); });
+  candidates.back().prepare = [&] { updated_alone.sweep_frame(); };
   candidates.emplace_back("bank, float, 1 phase, 3 iterations", features, [&] { one_single.learn_frame(); });
   candidates.emplace_back("bank, float, 1 learnt + 2 predicted phases, 3 it.", features,
                           [&] { learn_and_predict_single.learn_frame(); });
