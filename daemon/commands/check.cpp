@@ -8,6 +8,7 @@
 #include <string>
 
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/runtime/device_setup.hpp"
 #include "daemon/runtime/thread_launcher.hpp"
 
 namespace perimap {
@@ -30,6 +31,16 @@ void tell_refused_privileges(const RealtimeConfiguration& realtime) {
   }
 }
 
+// The devices that it names, each with all its keys.
+Expected<Configuration> load_whole(const std::string& file) {
+  auto configuration = load_configuration(file);
+  if (!configuration || configuration->replay.recording || !names_devices(*configuration)) return configuration;
+  if (const auto devices = named_devices(*configuration, file); !devices) {
+    return fail(file + ": " + devices.error().message);
+  }
+  return configuration;
+}
+
 }  // namespace
 
 void add_check_command(CLI::App& app, int& exit_code) {
@@ -38,7 +49,7 @@ void add_check_command(CLI::App& app, int& exit_code) {
       "check", "Checks a configuration file and prints the effective configuration, all keys with their meaning");
   command->add_option("FILE", *file, "Configuration of perimapd (TOML)")->required();
   command->callback([file, &exit_code] {
-    const Expected<Configuration> configuration = load_configuration(*file);
+    const Expected<Configuration> configuration = load_whole(*file);
     if (configuration) {
       fmt::print("{}", to_toml(*configuration));
       tell_refused_privileges(configuration->realtime);

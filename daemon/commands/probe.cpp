@@ -60,29 +60,33 @@ std::string complaint(std::string_view kind, const Seen& seen) {
   if (seen.invalid == 0) return "";
   if (kind == "camera") return fmt::format("{} of {} frames cannot be decoded", seen.invalid, seen.count);
   if (kind == "ecg") return fmt::format("lead off in {} of {} samples", seen.invalid, seen.count);
+  if (kind == "r_trigger") return "";
   return fmt::format("tool missing in {}, out of volume in {}, disabled in {} of {} readings", seen.tools[1],
                      seen.tools[2], seen.tools[3], seen.count);
 }
 
 // What went wrong last, or what the state alone tells.
-std::string reason(const DeviceHealth& health) {
+std::string reason(std::string_view kind, const DeviceHealth& health) {
   std::string told = health.reason();
   if (!told.empty()) return told;
   switch (health.state()) {
     case DeviceState::kSilent:
       return "samples came and have stopped: switched off, cable out, or a device of another kind?";
     case DeviceState::kStarting:
+      if (kind == "r_trigger") {
+        return "open, but the line has not changed: is the monitor's output on, and wired to ecg.r_trigger_line?";
+      }
       return "open, but nothing has come yet: listen for longer (--seconds)";
     default:
       return "";
   }
 }
 
-nlohmann::json as_json(const DeviceHealth& health, const Seen& seen, const std::string& where) {
+nlohmann::json as_json(std::string_view kind, const DeviceHealth& health, const Seen& seen, const std::string& where) {
   const auto jitter = health.jitter.summary();
   return {{"where", where},
           {"state", device_state_name(health.state())},
-          {"reason", reason(health)},
+          {"reason", reason(kind, health)},
           {"identity", health.identity()},
           {"openings", health.openings.get()},
           {"samples", health.samples.get()},
@@ -148,6 +152,14 @@ void listen_to(const EcgDevice& device, Probed& probed, const Interrupt& interru
   serve_ecg(device, sink, probed.health, interrupt);
 }
 
+void listen_to(const RTriggerDevice& device, Probed& probed, const Interrupt& interrupt) {
+  const RTriggerSink sink = [&seen = probed.seen](const RTriggerPulse& pulse) {
+    seen.add(pulse.time, 1);
+    seen.delay.add(pulse.arrival - pulse.time);
+  };
+  serve_r_trigger(device, sink, probed.health, interrupt);
+}
+
 void listen_to(const CameraDevice& device, Probed& probed, const Interrupt& interrupt) {
   GreyConverter converter;
   const CameraSink sink = [&seen = probed.seen, &converter](const CameraFrame& frame) {
@@ -182,6 +194,7 @@ int run(const Options& options) {
   if (devices->camera) add(all, "camera", *configuration->camera.device, *devices->camera);
   if (devices->tracker) add(all, "tracker", format_endpoint(devices->tracker->endpoint), *devices->tracker);
   if (devices->ecg) add(all, "ecg", format_endpoint(devices->ecg->endpoint), *devices->ecg);
+  if (devices->r_trigger) add(all, "r_trigger", devices->r_trigger->settings.path, *devices->r_trigger);
   if (all.empty()) {
     return complain(
         {options.file + ": names no device; expected keys 'camera.device', 'tracker.protocol' or 'ecg.protocol'"}, 2);
@@ -202,7 +215,7 @@ int run(const Options& options) {
   for (const auto& probed : all) {
     probed->health.set_state(probed->state);
     well = well && probed->state == DeviceState::kStreaming;
-    json[probed->kind] = as_json(probed->health, probed->seen, probed->where);
+    json[probed->kind] = as_json(probed->kind, probed->health, probed->seen, probed->where);
     if (!options.json) print(probed->kind, json[probed->kind], complaint(probed->kind, probed->seen));
   }
   if (options.json) fmt::print("{}\n", json.dump(2));

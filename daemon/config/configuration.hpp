@@ -11,6 +11,7 @@
 #include "core/phase/phase_law.hpp"
 #include "core/phase/rr_predictor.hpp"
 #include "core/time/instant.hpp"
+#include "drivers/ecg/modem_line.hpp"
 #include "drivers/image/pixel_format.hpp"
 
 namespace perimap {
@@ -79,7 +80,10 @@ struct EcgConfiguration {
   double can_sample_rate_hz = 360.0;
   int can_identifier = 0x2E0;
   bool can_extended = false;
-  bool r_trigger = false;  // R peaks come from a trigger line, not from the samples
+  bool r_trigger = false;                     // R peaks come from a trigger line, not from the samples
+  std::optional<std::string> r_trigger_port;  // path of the serial port with that line
+  ModemLine r_trigger_line = ModemLine::kCarrierDetect;
+  bool r_trigger_rising = true;  // the line goes on at the R peak; otherwise off
   Duration r_trigger_delay{0};
   Duration r_trigger_deviation = std::chrono::milliseconds(4);
 

@@ -360,6 +360,8 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
 constexpr std::string_view kPort = "an absolute path of a serial port, \"tcp:HOST:PORT\" or \"can:INTERFACE\"";
 bool is_endpoint(const std::string& text) { return parse_endpoint(text).has_value(); }
 
+bool is_path(const std::string& text) { return text.starts_with('/') && text.find('\0') == std::string::npos; }
+
 bool is_tool_name(const std::string& text) {
   constexpr std::size_t kLongest = 20;  // of OpenIGTLink's names
   return !text.empty() && text.size() <= kLongest &&
@@ -411,6 +413,11 @@ void add_ecg(std::vector<ConfigurationKey>& keys) {
                                                                         {"bitalino", Protocol::kBitalino},
                                                                         {"cyton", Protocol::kCyton},
                                                                         {"can", Protocol::kCan}}};
+  const std::array<std::pair<std::string_view, ModemLine>, 4> lines{{{"dcd", ModemLine::kCarrierDetect},
+                                                                     {"cts", ModemLine::kClearToSend},
+                                                                     {"dsr", ModemLine::kDataSetReady},
+                                                                     {"ri", ModemLine::kRingIndicator}}};
+  const std::array<std::pair<std::string_view, bool>, 2> edges{{{"rising", true}, {"falling", false}}};
   Section("ecg", keys)
       .choice("protocol", protocols, PERIMAP_MEMBER(ecg.protocol), "what the ECG device speaks")
       .optional_text("port", std::string(kPort), &is_endpoint, PERIMAP_MEMBER(ecg.port), "where the ECG device is")
@@ -424,6 +431,11 @@ void add_ecg(std::vector<ConfigurationKey>& keys) {
       .flag("can_extended", PERIMAP_MEMBER(ecg.can_extended), "the identifier has 29 bits")
       .flag("r_trigger", PERIMAP_MEMBER(ecg.r_trigger),
             "R peaks come from a monitor's trigger line; samples are then not looked at")
+      .optional_text("r_trigger_port", "an absolute path of a serial port", &is_path,
+                     PERIMAP_MEMBER(ecg.r_trigger_port), "the serial port that the trigger is wired to")
+      .choice("r_trigger_line", lines, PERIMAP_MEMBER(ecg.r_trigger_line),
+              "its input with the trigger: carrier detect, clear to send, data set ready, ring indicator")
+      .choice("r_trigger_edge", edges, PERIMAP_MEMBER(ecg.r_trigger_rising), "the edge that is the R peak")
       .duration("r_trigger_delay_ms", ms, -500, 500, PERIMAP_MEMBER(ecg.r_trigger_delay),
                 "of the trigger after the R peak, as measured for the monitor")
       .duration("r_trigger_deviation_ms", ms, 0.1, 100, PERIMAP_MEMBER(ecg.r_trigger_deviation),

@@ -124,6 +124,9 @@ void name(Message& message, const Identity& identity) noexcept {
   copy_text(identity.stream, message.stream);
 }
 
+// A trigger gives one pulse a beat.
+constexpr Duration kLongestBeat = std::chrono::seconds(3);
+
 perimap_SourceStatus source_status(perimap_SourceKind kind, const StatusFacts& facts, const SourceLink& link,
                                    Instant now, std::uint64_t received, std::uint64_t dropped, std::uint64_t invalid,
                                    const Counter& last_ns, const LatencyHistogram& delay) noexcept {
@@ -291,16 +294,20 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.rhythm = to_wire(facts.rhythm);
   wire_.latency_short = facts.latency_short;
 
-  sources_[0] = source_status(perimap_SOURCE_CAMERA, facts, facts.camera, now, c.frames_received.get(),
-                              c.frames_dropped.get(), 0, c.last_frame_ns, c.camera_delay);
-  sources_[1] = source_status(perimap_SOURCE_TRACKER, facts, facts.tracker, now, c.poses_received.get(),
-                              c.poses_dropped.get() + c.poses_refused.get(), c.poses_invalid.get(), c.last_pose_ns,
-                              c.tracker_delay);
-  sources_[2] = source_status(perimap_SOURCE_ECG, facts, facts.ecg, now, c.ecg_samples.get(), c.ecg_dropped.get(),
-                              c.ecg_lead_off.get(), c.last_ecg_ns, c.ecg_delay);
-  std::uint32_t sources = kSources - 1;
+  std::uint32_t sources = 0;
+  sources_[sources++] = source_status(perimap_SOURCE_CAMERA, facts, facts.camera, now, c.frames_received.get(),
+                                      c.frames_dropped.get(), 0, c.last_frame_ns, c.camera_delay);
+  sources_[sources++] = source_status(perimap_SOURCE_TRACKER, facts, facts.tracker, now, c.poses_received.get(),
+                                      c.poses_dropped.get() + c.poses_refused.get(), c.poses_invalid.get(),
+                                      c.last_pose_ns, c.tracker_delay);
+  if (facts.ecg_device) {
+    sources_[sources++] = source_status(perimap_SOURCE_ECG, facts, facts.ecg, now, c.ecg_samples.get(),
+                                        c.ecg_dropped.get(), c.ecg_lead_off.get(), c.last_ecg_ns, c.ecg_delay);
+  }
   if (facts.r_trigger) {
-    sources_[sources++] = source_status(perimap_SOURCE_R_TRIGGER, facts, {}, now, c.r_triggers.get(),
+    StatusFacts beats = facts;
+    beats.stalled_after = std::max(facts.stalled_after, kLongestBeat);
+    sources_[sources++] = source_status(perimap_SOURCE_R_TRIGGER, beats, facts.r_trigger_line, now, c.r_triggers.get(),
                                         c.r_triggers_dropped.get(), 0, c.last_r_trigger_ns, c.r_trigger_delay);
   }
   wire_.sources = {sources, sources, sources_, false};

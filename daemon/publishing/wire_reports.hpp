@@ -82,9 +82,10 @@ struct StatusFacts {
   RecordingFacts recording;
   PhaseState phase = PhaseState::kUnknown;
   Rhythm rhythm = Rhythm::kUnknown;
-  bool latency_short = false;       // see idl/perimap.idl
-  bool r_trigger = false;           // R peaks come from a trigger line
-  SourceLink camera, tracker, ecg;  // as they are without a device: open, and without jitter
+  bool latency_short = false;                       // see idl/perimap.idl
+  bool r_trigger = false;                           // R peaks come from a trigger line
+  bool ecg_device = true;                           // beside the trigger there need be none
+  SourceLink camera, tracker, ecg, r_trigger_line;  // as they are without a device: open, and without jitter
 };
 
 class WireStatus {

@@ -68,6 +68,11 @@ void serve_ecg(const EcgDevice& device, const EcgSink& sink, DeviceHealth& healt
   serve_device(opener_of(device.endpoint, ecg.baud), *ecg.protocol, health, interrupt);
 }
 
+void serve_r_trigger(const RTriggerDevice& device, const RTriggerSink& sink, DeviceHealth& health,
+                     const Interrupt& interrupt) {
+  serve_modem_line_trigger(device.settings, sink, health, interrupt, device.open);
+}
+
 Expected<void> serve_camera(const CameraDevice& device, const CameraSink& sink, DeviceHealth& health,
                             const Interrupt& interrupt) {
   if (const auto* video = std::get_if<VideoCameraSettings>(&device)) {
@@ -97,6 +102,12 @@ void DeviceFeeder::start(ThreadLauncher& threads) {
     threads_.push_back(threads.launch("ecg", ThreadRole::kSource, [this] {
       const EcgSink sink = [this](const EcgBlock& block) { intake_.ecg(block); };
       serve_ecg(*devices_.ecg, sink, ecg_health_, interrupt_);
+    }));
+  }
+  if (devices_.r_trigger) {
+    threads_.push_back(threads.launch("r-trigger", ThreadRole::kSource, [this] {
+      const RTriggerSink sink = [this](const RTriggerPulse& pulse) { intake_.r_trigger(pulse); };
+      serve_r_trigger(*devices_.r_trigger, sink, r_trigger_health_, interrupt_);
     }));
   }
   if (playback_) {
@@ -169,6 +180,8 @@ void DeviceFeeder::describe(StatusFacts& facts) const {
   if (devices_.camera && !playback_) facts.camera = link(camera_health_);
   facts.tracker = link(tracker_health_);
   facts.ecg = link(ecg_health_);
+  facts.ecg_device = devices_.ecg.has_value();
+  if (devices_.r_trigger) facts.r_trigger_line = link(r_trigger_health_);
   if (!recording_.recorder) return;
   const SessionRecorder::Summary recorded = recording_.recorder->summary();
   if (recorded.asked) facts.recording.state = recorded.stopped ? perimap_RECORDING_STOPPED : perimap_RECORDING_ON;
@@ -202,6 +215,7 @@ void DeviceFeeder::tick() {
   if (devices_.camera && !playback_) tell("camera", camera_health_, camera_told_);
   if (devices_.tracker) tell("tracker", tracker_health_, tracker_told_);
   if (devices_.ecg) tell("ECG", ecg_health_, ecg_told_);
+  if (devices_.r_trigger) tell("R trigger", r_trigger_health_, r_trigger_told_);
   if (recording_.recorder) tell_recording();
 }
 

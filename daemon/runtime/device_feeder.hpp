@@ -27,6 +27,8 @@ namespace perimap {
 void serve_tracker(const TrackerDevice& device, const TrackerSink& sink, DeviceHealth& health,
                    const Interrupt& interrupt);
 void serve_ecg(const EcgDevice& device, const EcgSink& sink, DeviceHealth& health, const Interrupt& interrupt);
+void serve_r_trigger(const RTriggerDevice& device, const RTriggerSink& sink, DeviceHealth& health,
+                     const Interrupt& interrupt);
 
 // The frames come as the camera gives them. Not for a playback. Returns when a video has ended, too; otherwise an error
 // says why it could not be read.
@@ -86,9 +88,11 @@ class DeviceFeeder final : public SensorFeeder {
   std::unique_ptr<ReplayFeeder> playback_;
   DeviceHealth tracker_health_;
   DeviceHealth ecg_health_;
+  DeviceHealth r_trigger_health_;
   DeviceHealth camera_health_;
   Told tracker_told_;
   Told ecg_told_;
+  Told r_trigger_told_;
   Told camera_told_;
   bool recording_ended_ = false;
   std::uint64_t recording_told_ = 0;  // the count of the file that was told of last

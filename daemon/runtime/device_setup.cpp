@@ -122,7 +122,7 @@ Expected<CameraPlayback> camera_playback(const std::string& recording, double st
 bool names_devices(const Configuration& configuration) noexcept {
   return configuration.tracker.protocol != TrackerConfiguration::Protocol::kNone ||
          configuration.ecg.protocol != EcgConfiguration::Protocol::kNone || configuration.camera.playback.has_value() ||
-         configuration.camera.device.has_value();
+         configuration.camera.device.has_value() || configuration.ecg.r_trigger_port.has_value();
 }
 
 Expected<TrackerDevice> tracker_device(const TrackerConfiguration& c) {
@@ -163,6 +163,15 @@ Expected<EcgDevice> ecg_device(const EcgConfiguration& c) {
   return EcgDevice{std::move(*endpoint), c};
 }
 
+Expected<RTriggerDevice> r_trigger_device(const EcgConfiguration& c) {
+  if (!c.r_trigger_port) return wrong("ecg.r_trigger_port", "the serial port with the trigger's line", "nothing");
+  RTriggerDevice device;
+  device.settings.path = *c.r_trigger_port;
+  device.settings.line = c.r_trigger_line;
+  device.settings.rising = c.r_trigger_rising;
+  return device;
+}
+
 Expected<CameraDevice> camera_device(const CameraConfiguration& c, const std::filesystem::path& configuration_file) {
   if (c.device && c.playback) return wrong("camera.playback", "nothing beside 'camera.device'", c.playback->string());
   if (c.playback)
@@ -194,6 +203,9 @@ Expected<Devices> named_devices(const Configuration& configuration, const std::f
   if (named && configuration.ecg.protocol != EcgConfiguration::Protocol::kNone) {
     named = ecg_device(configuration.ecg).map(keep(devices.ecg));
   }
+  if (named && configuration.ecg.r_trigger) {
+    named = r_trigger_device(configuration.ecg).map(keep(devices.r_trigger));
+  }
   if (named && (configuration.camera.device || configuration.camera.playback)) {
     named = camera_device(configuration.camera, configuration_file).map(keep(devices.camera));
   }
@@ -224,20 +236,20 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
     }
   }
   Configuration& configuration = basis.configuration;
-  // All are needed: what is not named is asked for here.
-  auto tracker = tracker_device(configuration.tracker);
-  if (!tracker) return wrong_configuration(tracker.error());
-  auto ecg = ecg_device(configuration.ecg);
-  if (!ecg) return wrong_configuration(ecg.error());
-  auto camera = camera_device(configuration.camera, configuration_file);
-  if (!camera) return wrong_configuration(camera.error());
-  if (auto* playback = std::get_if<CameraPlayback>(&*camera)) {
+  auto devices = named_devices(configuration, configuration_file);
+  // A map takes camera, tracker and R peaks: one that is not named is asked for as it would be.
+  if (devices && !devices->tracker) devices = tl::unexpected(tracker_device(configuration.tracker).error());
+  if (devices && !devices->ecg && !devices->r_trigger) devices = tl::unexpected(ecg_device(configuration.ecg).error());
+  if (devices && !devices->camera) {
+    devices = tl::unexpected(camera_device(configuration.camera, configuration_file).error());
+  }
+  if (!devices) return wrong_configuration(devices.error());
+  if (auto* playback = std::get_if<CameraPlayback>(&*devices->camera)) {
     playback->reader.require_frame_size(basis.camera.width, basis.camera.height);
   }
   const PipelineSettings pipeline = pipeline_settings(configuration, basis.camera);
   const Identity identity{configuration.source.name, "frame", configuration.source.world_frame};
-  return DeviceSetup{std::move(configuration), pipeline, identity,
-                     Devices{std::move(*tracker), std::move(*ecg), std::move(*camera)}};
+  return DeviceSetup{std::move(configuration), pipeline, identity, std::move(*devices)};
 }
 
 }  // namespace perimap

@@ -13,6 +13,7 @@
 #include "daemon/runtime/replay_setup.hpp"
 #include "drivers/camera/v4l2_stream.hpp"
 #include "drivers/camera/video_camera.hpp"
+#include "drivers/ecg/modem_line_trigger.hpp"
 #include "drivers/recording/replay_reader.hpp"
 #include "drivers/tracker/igtl_session.hpp"
 #include "drivers/tracker/ndi_session.hpp"
@@ -30,6 +31,11 @@ struct EcgDevice {
   EcgConfiguration settings;
 };
 
+struct RTriggerDevice {
+  ModemTriggerSettings settings;
+  ModemPortOpener open = &open_modem_port;
+};
+
 struct CameraPlayback {
   ReplayReader reader;             // of the frames alone
   std::optional<Duration> offset;  // from the recording's time to ours; none: begins when it is started
@@ -41,6 +47,7 @@ using CameraDevice = std::variant<CameraPlayback, V4l2Settings, VideoCameraSetti
 struct Devices {
   std::optional<TrackerDevice> tracker;
   std::optional<EcgDevice> ecg;
+  std::optional<RTriggerDevice> r_trigger;
   std::optional<CameraDevice> camera;
 };
 
@@ -48,7 +55,7 @@ struct DeviceSetup {
   Configuration configuration;
   PipelineSettings pipeline;
   Identity identity;
-  Devices devices;  // all of them
+  Devices devices;  // all that a map takes: of ECG and R trigger one may be missing
 };
 
 // Whether the configuration names devices; otherwise it is for a replay.
@@ -57,6 +64,7 @@ struct DeviceSetup {
 // Errors name the key and what it should be. Devices are not opened yet: they may come later.
 [[nodiscard]] Expected<TrackerDevice> tracker_device(const TrackerConfiguration& configuration);
 [[nodiscard]] Expected<EcgDevice> ecg_device(const EcgConfiguration& configuration);
+[[nodiscard]] Expected<RTriggerDevice> r_trigger_device(const EcgConfiguration& configuration);
 // Of `device`, or of `playback` and its start. The frames' size is that of the keys or of the calibration, or any.
 [[nodiscard]] Expected<CameraDevice> camera_device(const CameraConfiguration& configuration,
                                                    const std::filesystem::path& configuration_file);

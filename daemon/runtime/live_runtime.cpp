@@ -153,7 +153,8 @@ void LiveRuntime::run_status() {
     told.r_trigger = pipeline_.settings().r_trigger.has_value();
     if (describe_sources_) describe_sources_(told);
     // A device that goes or comes is told at once.
-    const int closed = (told.camera.closed ? 1 : 0) | (told.tracker.closed ? 2 : 0) | (told.ecg.closed ? 4 : 0);
+    const int closed = (told.camera.closed ? 1 : 0) | (told.tracker.closed ? 2 : 0) | (told.ecg.closed ? 4 : 0) |
+                       (told.r_trigger_line.closed ? 8 : 0);
     if (last || now >= next_status || closed != closed_before) {
       publication_.status(wire_status_.fill(pipeline_.counters(), told, now));
       next_status = now + settings_.status_interval;

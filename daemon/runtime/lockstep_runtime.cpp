@@ -51,6 +51,8 @@ void LockstepRuntime::deliver(const ReplayEvent& event) {
     pipeline_.drain_poses();
   } else if (const auto* ecg = std::get_if<EcgBlock>(&event)) {
     entrance.push_ecg(*ecg);
+  } else {
+    entrance.push_r_trigger(std::get<RTriggerPulse>(event));
   }
   if (frame_waits_ && pipeline_.pose_reached(frame_.stamp.capture)) map_ready_frame();
 }

@@ -85,8 +85,10 @@ void ReplayFeeder::deliver() {
       intake_.frame(as_it_came, grey);
     } else if (const auto* pose = std::get_if<TrackerSample>(&*event)) {
       intake_.pose(*pose);
+    } else if (const auto* ecg = std::get_if<EcgBlock>(&*event)) {
+      intake_.ecg(*ecg);
     } else {
-      intake_.ecg(std::get<EcgBlock>(*event));
+      intake_.r_trigger(std::get<RTriggerPulse>(*event));
     }
   }
   ended_.store(true, std::memory_order_release);

@@ -153,6 +153,13 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
   if (!basis) return tl::unexpected(std::move(basis.error()));
   auto reader = ReplayReader::open(recording, mode);
   if (!reader) return tl::unexpected(SetupError{std::move(reader.error()), false});
+  if (basis->configuration.ecg.r_trigger && !reader->has_r_trigger()) {
+    const std::string where = configuration_file ? configuration_file->string() : recording;
+    return tl::unexpected(
+        SetupError{{fmt::format("{}: key 'ecg.r_trigger': expected false, since {} holds no channel {}, got true",
+                                where, recording, channels::kRTrigger)},
+                   true});
+  }
   reader->require_frame_size(basis->camera.width, basis->camera.height);
   const PipelineSettings pipeline = pipeline_settings(basis->configuration, basis->camera);
   const Identity identity{basis->configuration.source.name, "frame", basis->configuration.source.world_frame};

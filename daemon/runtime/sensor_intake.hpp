@@ -25,6 +25,10 @@ struct SensorIntake {
     if (entrance != nullptr) entrance->push_ecg(block);
     if (recorder != nullptr) recorder->ecg(block);
   }
+  void r_trigger(const RTriggerPulse& pulse) const noexcept {
+    if (entrance != nullptr) entrance->push_r_trigger(pulse);
+    if (recorder != nullptr) recorder->r_trigger(pulse);
+  }
 };
 
 }  // namespace perimap

@@ -28,7 +28,11 @@ Expected<std::unique_ptr<SessionRecorder>> SessionRecorder::create(const std::fi
 }
 
 SessionRecorder::SessionRecorder(std::size_t memory_bytes)
-    : memory_bytes_(memory_bytes), frames_(kFrameHeads), poses_(kSampleRing), blocks_(kSampleRing) {}
+    : memory_bytes_(memory_bytes),
+      frames_(kFrameHeads),
+      poses_(kSampleRing),
+      blocks_(kSampleRing),
+      pulses_(kSampleRing) {}
 
 Expected<void> SessionRecorder::open(const std::filesystem::path& file, const SensorRecordingFacts& facts) {
   if (accepting_.load(std::memory_order_relaxed))
@@ -122,13 +126,19 @@ void SessionRecorder::ecg(const EcgBlock& block) noexcept {
   if (stopped_.load(std::memory_order_relaxed) || !blocks_.push(block)) blocks_refused_.add();
 }
 
+void SessionRecorder::r_trigger(const RTriggerPulse& pulse) noexcept {
+  const RealtimeScope realtime;
+  if (!accepting_.load(std::memory_order_acquire)) return;
+  if (stopped_.load(std::memory_order_relaxed) || !pulses_.push(pulse)) pulses_refused_.add();
+}
+
 SessionRecorder::Summary SessionRecorder::summary() const noexcept {
   return {asked_.load(std::memory_order_relaxed),
           stopped_.load(std::memory_order_relaxed),
           files_.get(),
           recorded_.get(),
           frames_refused_.get() + frames_unwritten_.get(),
-          poses_refused_.get() + blocks_refused_.get() + other_unwritten_.get()};
+          poses_refused_.get() + blocks_refused_.get() + pulses_refused_.get() + other_unwritten_.get()};
 }
 
 std::string SessionRecorder::reason() const {
@@ -193,10 +203,12 @@ void SessionRecorder::drain(Instant until) {
     }
     refill(front_pose_, poses_);
     refill(front_block_, blocks_);
+    refill(front_pulse_, pulses_);
     Instant first = Instant::max();
     if (front_frame_) first = std::min(first, front_frame_->frame.stamp.arrival);
     if (front_pose_) first = std::min(first, front_pose_->arrival);
     if (front_block_) first = std::min(first, front_block_->arrival);
+    if (front_pulse_) first = std::min(first, front_pulse_->arrival);
     if (first == Instant::max() || first > until) return;
     write_front(first);
   }
@@ -222,9 +234,12 @@ void SessionRecorder::write_front(Instant arrival) {
   } else if (front_pose_ && front_pose_->arrival == arrival) {
     if (!stopped) written = writer_->write(*front_pose_, last_arrival_);
     front_pose_.reset();
-  } else {
+  } else if (front_block_ && front_block_->arrival == arrival) {
     if (!stopped) written = writer_->write(*front_block_, last_arrival_);
     front_block_.reset();
+  } else {
+    if (!stopped) written = writer_->write(*front_pulse_, last_arrival_);
+    front_pulse_.reset();
   }
   if (!written) give_up(written.error());
   if (!asked_for) return;

@@ -18,6 +18,7 @@
 #include "core/realtime/spsc_ring.hpp"
 #include "core/realtime/wakeup.hpp"
 #include "core/sensors/ecg_block.hpp"
+#include "core/sensors/r_trigger_pulse.hpp"
 #include "core/sensors/tracker_sample.hpp"
 #include "daemon/runtime/thread_launcher.hpp"
 #include "drivers/image/camera_frame.hpp"
@@ -57,6 +58,7 @@ class SessionRecorder {
   void frame(const CameraFrame& frame) noexcept;
   void pose(const TrackerSample& sample) noexcept;
   void ecg(const EcgBlock& block) noexcept;
+  void r_trigger(const RTriggerPulse& pulse) noexcept;
 
   struct Summary {
     bool asked = false;       // it is to record
@@ -93,6 +95,7 @@ class SessionRecorder {
   SpscRing<FrameHead> frames_;
   SpscRing<TrackerSample> poses_;
   SpscRing<EcgBlock> blocks_;
+  SpscRing<RTriggerPulse> pulses_;
 
   // Of the writing thread: where it writes, none between two files; taken from the rings, not written yet.
   std::optional<SensorWriter> writer_;
@@ -100,6 +103,7 @@ class SessionRecorder {
   std::optional<FrameHead> front_frame_;
   std::optional<TrackerSample> front_pose_;
   std::optional<EcgBlock> front_block_;
+  std::optional<RTriggerPulse> front_pulse_;
   std::vector<std::byte> frame_bytes_;
   Instant last_arrival_{};
   Instant flushed_;
@@ -107,8 +111,8 @@ class SessionRecorder {
   std::uint64_t frames_put_ = 0;  // of the camera's thread
   Counter frames_taken_;          // by the writing thread
   Counter recorded_;
-  Counter frames_refused_, poses_refused_, blocks_refused_;  // each by its device's thread
-  Counter frames_unwritten_, other_unwritten_;               // by the writing thread
+  Counter frames_refused_, poses_refused_, blocks_refused_, pulses_refused_;  // each by its device's thread
+  Counter frames_unwritten_, other_unwritten_;                                // by the writing thread
   // Release by open() when all is there that a device's thread touches, acquire by those threads.
   std::atomic<bool> accepting_{false};
   // Relaxed: each is a message by itself.

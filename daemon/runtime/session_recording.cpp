@@ -27,6 +27,9 @@ SensorRecordingFacts recording_facts(const Configuration& configuration, const s
   Configuration for_replay = configuration;
   for_replay.camera = {};
   for_replay.ecg = {};
+  for_replay.ecg.r_trigger = configuration.ecg.r_trigger;
+  for_replay.ecg.r_trigger_delay = configuration.ecg.r_trigger_delay;
+  for_replay.ecg.r_trigger_deviation = configuration.ecg.r_trigger_deviation;
   for_replay.replay = {};
   for_replay.recording = {};
   TrackerConfiguration& tracker = for_replay.tracker;
@@ -47,6 +50,7 @@ SensorRecordingFacts recording_facts(const Configuration& configuration, const s
   facts.utc_minus_monotonic = utc_minus_monotonic();
   if (camera) facts.calibration = format_calibration(*camera);
   facts.configuration = to_toml(for_replay);
+  facts.r_trigger = configuration.ecg.r_trigger;
   return facts;
 }
 

@@ -142,10 +142,15 @@ std::string watch_line(ModemPort& port, TriggerEdges& edges, const RTriggerSink&
 Expected<std::unique_ptr<ModemPort>> open_modem_port(const std::string& path, ModemLine line) {
   Descriptor descriptor(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!descriptor) {
-    const bool permission = errno == EACCES || errno == EPERM;
-    return fail(fmt::format("{}: {}", path,
-                            permission ? "permission denied; add the user to the device's group (often dialout)"
-                                       : "no such device; is it plugged in?"));
+    switch (errno) {
+      case EACCES:
+      case EPERM:
+        return fail(path + ": permission denied; add the user to the device's group (often dialout)");
+      case EBUSY:
+        return fail(path + ": in use; a trigger needs a serial port of its own");
+      default:
+        return fail(path + ": no such device; is it plugged in?");
+    }
   }
   auto port = std::make_unique<KernelPort>(std::move(descriptor), path, line);
   if (const auto read = port->read(); !read) return tl::unexpected(read.error());

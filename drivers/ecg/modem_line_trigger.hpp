@@ -15,11 +15,10 @@
 #include "core/sensors/r_trigger_pulse.hpp"
 #include "core/time/instant.hpp"
 #include "drivers/device/device_health.hpp"
+#include "drivers/ecg/modem_line.hpp"
 #include "drivers/transport/interrupt.hpp"
 
 namespace perimap {
-
-enum class ModemLine : std::uint8_t { kCarrierDetect, kClearToSend, kDataSetReady, kRingIndicator };
 
 struct ModemTriggerSettings {
   std::string path;

@@ -10,6 +10,7 @@ inline constexpr std::string_view kCameraImage = "camera/image";      // foxglov
 inline constexpr std::string_view kTrackerPose = "tracker/pose";      // perimap::TrackerPose
 inline constexpr std::string_view kTrackerViewer = "tracker/viewer";  // foxglove::PoseInFrame, metres, valid poses only
 inline constexpr std::string_view kEcgSamples = "ecg/samples";        // perimap::EcgSamples
+inline constexpr std::string_view kRTrigger = "ecg/r_trigger";  // perimap::RTriggerPulse, where there is a trigger
 
 // Facts of the whole recording.
 inline constexpr std::string_view kRecordingInfo = "recording/info";  // perimap::RecordingInfo

@@ -33,12 +33,21 @@ Expected<ReplayEvent> ecg_event(const RecordingReader& reader, const RecordedMes
   return *block;
 }
 
+Expected<ReplayEvent> r_trigger_event(const RecordingReader& reader, const RecordedMessage& message) {
+  const auto recorded = reader.decode<perimap_RTriggerPulse>(message);
+  if (!recorded) return tl::unexpected(recorded.error());
+  RTriggerPulse pulse = to_r_trigger_pulse(**recorded);
+  pulse.arrival = message.arrival;
+  return pulse;
+}
+
 }  // namespace
 
 Instant arrival_of(const ReplayEvent& event) noexcept {
   if (const auto* frame = std::get_if<FrameEvent>(&event)) return frame->stamp.arrival;
   if (const auto* pose = std::get_if<TrackerSample>(&event)) return pose->arrival;
-  return std::get<EcgBlock>(event).arrival;
+  if (const auto* ecg = std::get_if<EcgBlock>(&event)) return ecg->arrival;
+  return std::get<RTriggerPulse>(event).arrival;
 }
 
 void shift(ReplayEvent& event, Duration offset) noexcept {
@@ -51,11 +60,19 @@ void shift(ReplayEvent& event, Duration offset) noexcept {
   } else if (auto* ecg = std::get_if<EcgBlock>(&event)) {
     ecg->first_sample_time += offset;
     ecg->arrival += offset;
+  } else if (auto* pulse = std::get_if<RTriggerPulse>(&event)) {
+    pulse->time += offset;
+    pulse->arrival += offset;
   }
 }
 
 Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode) {
-  return open(path, mode, kSensorChannels);
+  auto replay = open(path, mode, kSensorChannels);
+  if (!replay || !replay->has_r_trigger()) return replay;
+  constexpr std::array<std::string_view, 4> kWithTrigger = {channels::kCameraImage, channels::kTrackerPose,
+                                                            channels::kEcgSamples, channels::kRTrigger};
+  if (auto selected = replay->reader_.select(kWithTrigger); !selected) return tl::unexpected(selected.error());
+  return replay;
 }
 
 Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode,
@@ -64,6 +81,11 @@ Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode
   if (!reader) return tl::unexpected(reader.error());
   if (auto selected = reader->select(channels); !selected) return tl::unexpected(selected.error());
   return ReplayReader(std::move(*reader));
+}
+
+bool ReplayReader::has_r_trigger() const {
+  const auto all = reader_.channels();
+  return std::any_of(all.begin(), all.end(), [](const RecordedChannel& c) { return c.name == channels::kRTrigger; });
 }
 
 Expected<ReplayEvent> ReplayReader::frame_event(const RecordedMessage& message) {
@@ -96,6 +118,7 @@ Expected<std::optional<ReplayEvent>> ReplayReader::next() {
   last_arrival_ = m.arrival;
   auto event = m.channel == channels::kCameraImage   ? frame_event(m)
                : m.channel == channels::kTrackerPose ? pose_event(reader_, m)
+               : m.channel == channels::kRTrigger    ? r_trigger_event(reader_, m)
                                                      : ecg_event(reader_, m);
   if (!event) return tl::unexpected(event.error());
   if (const auto* frame = std::get_if<FrameEvent>(&*event);

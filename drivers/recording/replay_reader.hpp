@@ -14,6 +14,7 @@
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "core/sensors/r_trigger_pulse.hpp"
 #include "core/sensors/tracker_sample.hpp"
 #include "drivers/recording/recorded_frame.hpp"
 #include "drivers/recording/recording_reader.hpp"
@@ -29,7 +30,7 @@ struct FrameEvent {
   [[nodiscard]] GreyImage image() const noexcept { return {pixels.data(), width, height, width}; }
 };
 
-using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock>;
+using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock, RTriggerPulse>;
 
 [[nodiscard]] Instant arrival_of(const ReplayEvent& event) noexcept;
 // The same event with all its instants moved by `offset`.
@@ -39,11 +40,14 @@ void shift(ReplayEvent& event, Duration offset) noexcept;
 // that goes back, or that arrives before it was measured, is an error: replay could not deliver it at its time.
 class ReplayReader {
  public:
-  // Fails when the recording has no camera, tracker or ECG channel.
+  // Fails when the recording has no camera, tracker or ECG channel. Triggers are given where there are any.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode);
   // Of these of the sensors' channels alone; fails when one of them is not there.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode,
                                                    std::span<const std::string_view> channels);
+
+  // Whether a trigger was recorded, were it without a pulse.
+  [[nodiscard]] bool has_r_trigger() const;
 
   // The next event; nullopt at the end. Channels other than the sensors' are passed over.
   [[nodiscard]] Expected<std::optional<ReplayEvent>> next();

@@ -48,6 +48,10 @@ perimap_EcgSamples borrow_ecg_samples(const EcgBlock& block) noexcept {
   return message;
 }
 
+perimap_RTriggerPulse to_r_trigger_message(const RTriggerPulse& pulse) noexcept {
+  return {to_ns(pulse.time), pulse.device_count};
+}
+
 Expected<TrackerSample> to_tracker_sample(const perimap_TrackerPose& message) {
   TrackerSample sample;
   sample.source_time = from_ns(message.source_time_ns);
@@ -77,6 +81,13 @@ Expected<EcgBlock> to_ecg_block(const perimap_EcgSamples& message) {
   block.count = samples._length;
   std::copy_n(samples._buffer, samples._length, block.mV.begin());
   return block;
+}
+
+RTriggerPulse to_r_trigger_pulse(const perimap_RTriggerPulse& message) noexcept {
+  RTriggerPulse pulse;
+  pulse.time = from_ns(message.edge_time_ns);
+  pulse.device_count = message.device_count;
+  return pulse;
 }
 
 }  // namespace perimap

@@ -5,6 +5,7 @@
 
 #include "core/error/expected.hpp"
 #include "core/sensors/ecg_block.hpp"
+#include "core/sensors/r_trigger_pulse.hpp"
 #include "core/sensors/tracker_sample.hpp"
 
 namespace perimap {
@@ -13,9 +14,11 @@ namespace perimap {
 [[nodiscard]] perimap_TrackerPose to_tracker_pose(const TrackerSample& sample) noexcept;
 // Borrows the samples: it must not outlive the block, and must not be freed.
 [[nodiscard]] perimap_EcgSamples borrow_ecg_samples(const EcgBlock& block) noexcept;
+[[nodiscard]] perimap_RTriggerPulse to_r_trigger_message(const RTriggerPulse& pulse) noexcept;
 
 // Without the arrival, which the message itself does not hold. Fail when the rotation is none, or the block too long.
 [[nodiscard]] Expected<TrackerSample> to_tracker_sample(const perimap_TrackerPose& message);
 [[nodiscard]] Expected<EcgBlock> to_ecg_block(const perimap_EcgSamples& message);
+[[nodiscard]] RTriggerPulse to_r_trigger_pulse(const perimap_RTriggerPulse& message) noexcept;
 
 }  // namespace perimap

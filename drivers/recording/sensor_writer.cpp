@@ -38,11 +38,16 @@ Expected<void> SensorWriter::begin(const SensorRecordingFacts& facts, Instant be
           .map(keep(viewer_))
           .and_then([&] { return writer_.add_channel<perimap_EcgSamples>(channels::kEcgSamples); })
           .map(keep(ecg_))
+          .and_then([&] { return facts.r_trigger ? add_r_trigger() : Expected<void>(); })
           .and_then([&] { return attach(attachments::kCalibration, "application/yaml", facts.calibration); })
           .and_then([&] { return attach(attachments::kConfiguration, "application/toml", facts.configuration); })
           .and_then([&] { return writer_.write(info_channel, info, begin, begin, 0); });
   // On the disk at once: a crash must not lose what the rest is read by.
   return begun.and_then([this] { return flush(); });
+}
+
+Expected<void> SensorWriter::add_r_trigger() {
+  return writer_.add_channel<perimap_RTriggerPulse>(channels::kRTrigger).map([this](ChannelId id) { r_trigger_ = id; });
 }
 
 Expected<ChannelId> SensorWriter::camera_channel(bool compressed) {
@@ -77,6 +82,11 @@ Expected<void> SensorWriter::write(const TrackerSample& sample, Instant arrival)
 
 Expected<void> SensorWriter::write(const EcgBlock& block, Instant arrival) {
   return writer_.write(ecg_, borrow_ecg_samples(block), arrival, block.first_sample_time, block.device_sequence);
+}
+
+Expected<void> SensorWriter::write(const RTriggerPulse& pulse, Instant arrival) {
+  if (!r_trigger_) return fail("an R trigger came, and the recording has no channel for one");
+  return writer_.write(*r_trigger_, to_r_trigger_message(pulse), arrival, pulse.time, pulse.device_count);
 }
 
 }  // namespace perimap

@@ -6,6 +6,7 @@
 
 #include "core/error/expected.hpp"
 #include "core/sensors/ecg_block.hpp"
+#include "core/sensors/r_trigger_pulse.hpp"
 #include "core/sensors/tracker_sample.hpp"
 #include "core/time/instant.hpp"
 #include "drivers/image/camera_frame.hpp"
@@ -21,6 +22,7 @@ struct SensorRecordingFacts {
   Duration utc_minus_monotonic{0};
   std::optional<std::string> calibration;    // the camera's, as OpenCV writes it
   std::optional<std::string> configuration;  // of perimapd, TOML
+  bool r_trigger = false;                    // there is a trigger whose pulses may come
 };
 
 // Not for the real-time path. Messages must be written in order of `arrival`, which a replay keeps to; it is not before
@@ -35,6 +37,8 @@ class SensorWriter {
   // Valid poses also for viewers.
   [[nodiscard]] Expected<void> write(const TrackerSample& sample, Instant arrival);
   [[nodiscard]] Expected<void> write(const EcgBlock& block, Instant arrival);
+  // Only of a trigger that the facts named.
+  [[nodiscard]] Expected<void> write(const RTriggerPulse& pulse, Instant arrival);
 
   // What was written so far survives a crash of the process.
   [[nodiscard]] Expected<void> flush() { return writer_.flush(); }
@@ -45,6 +49,7 @@ class SensorWriter {
       : writer_(std::move(writer)), world_frame_(std::move(world_frame)) {}
 
   [[nodiscard]] Expected<void> begin(const SensorRecordingFacts& facts, Instant begin);
+  [[nodiscard]] Expected<void> add_r_trigger();
   [[nodiscard]] Expected<ChannelId> camera_channel(bool compressed);
 
   RecordingWriter writer_;
@@ -53,6 +58,7 @@ class SensorWriter {
   std::optional<ChannelId> camera_;  // its type is known with the first frame
   bool compressed_ = false;
   ChannelId tracker_, viewer_, ecg_;
+  std::optional<ChannelId> r_trigger_;
 };
 
 }  // namespace perimap

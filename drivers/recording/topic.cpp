@@ -29,6 +29,10 @@ TopicType topic_type<perimap_EcgSamples>() noexcept {
   return {&perimap_EcgSamples_desc, kPerimapSchemaText};
 }
 template <>
+TopicType topic_type<perimap_RTriggerPulse>() noexcept {
+  return {&perimap_RTriggerPulse_desc, kPerimapSchemaText};
+}
+template <>
 TopicType topic_type<perimap_RecordingInfo>() noexcept {
   return {&perimap_RecordingInfo_desc, kPerimapSchemaText};
 }

@@ -37,6 +37,8 @@ template <>
 template <>
 [[nodiscard]] TopicType topic_type<perimap_EcgSamples>() noexcept;
 template <>
+[[nodiscard]] TopicType topic_type<perimap_RTriggerPulse>() noexcept;
+template <>
 [[nodiscard]] TopicType topic_type<perimap_RecordingInfo>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<perimap_TruthMesh>() noexcept;

@@ -24,6 +24,12 @@ printf 'version = 1\n[phase]\nlaw = 3\n' >"$scratch/wrong.toml"
 [ ! -s "$scratch/out" ] || fail "a wrong configuration was printed"
 [ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line: $(cat "$scratch/error")"
 grep -q "^$scratch/wrong.toml:3:7: key 'phase.law': expected " "$scratch/error" || fail "$(cat "$scratch/error")"
+printf 'version = 1\n[ecg]\nr_trigger = true\nprotocol = "cyton"\nport = "/dev/ttyUSB0"\n' >"$scratch/trigger.toml"
+"$perimap" check "$scratch/trigger.toml" >"$scratch/out" 2>"$scratch/error"
+[ $? -eq 2 ] || fail "a trigger without a port must end with 2"
+grep -q "trigger.toml: key 'ecg.r_trigger_port': expected the serial port" "$scratch/error" || fail "$(cat "$scratch/error")"
+echo 'r_trigger_port = "/dev/ttyS0"' >>"$scratch/trigger.toml"
+"$perimap" check "$scratch/trigger.toml" 2>"$scratch/error" | grep -q '^r_trigger_line = "dcd"' || fail "a trigger's line: $(cat "$scratch/error")"
 "$perimap" check /nowhere/x.toml 2>/dev/null
 [ $? -eq 2 ] || fail "a missing configuration must end with 2"
 "$perimap" check 2>/dev/null

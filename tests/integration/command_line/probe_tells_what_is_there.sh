@@ -47,6 +47,8 @@ port = "tcp:127.0.0.1:$((port + 1))"
 [ecg]
 protocol = "bitalino"
 port = "$line"
+r_trigger = true
+r_trigger_port = "$line"
 TOML
 "$perimap" probe "$work/gone.toml" --seconds 4 --json > "$work/gone.json" 2> "$work/errors"
 [ $? -eq 1 ] || fail "what is not there is well: $(cat "$work/gone.json")"
@@ -61,8 +63,9 @@ for (const [device, rate] of [["camera", 25], ["tracker", 60], ["ecg", 250]]) {
 assert.match(there.tracker.identity, /emulated tracker/);
 assert.match(gone.camera.reason, /no such device/);
 assert.match(gone.tracker.reason, /refused/);
+assert.match(gone.r_trigger.reason, /cannot watch modem lines/);
 assert.match(gone.ecg.reason, /wrong baud rate or another device|not a byte/);
-for (const device of ["camera", "tracker", "ecg"]) assert.notEqual(gone[device].state, "streaming", device);
+for (const device of ["camera", "tracker", "ecg", "r_trigger"]) assert.notEqual(gone[device].state, "streaming", device);
 END_OF_JS
 
 printf 'version = 1\n[camera]\ndevice = "video:none.avi"\n' > "$work/wrong.toml"

@@ -84,6 +84,7 @@ void run(const std::string& recording_path, const std::string& json_path) {
   writer.write_channel<perimap_TrackerPose>(channels::kTrackerPose);
   writer.write_channel<foxglove_PoseInFrame>(channels::kTrackerViewer);
   writer.write_channel<perimap_EcgSamples>(channels::kEcgSamples);
+  writer.write_channel<perimap_RTriggerPulse>(channels::kRTrigger);
   writer.write_channel<perimap_RecordingInfo>(channels::kRecordingInfo);
   writer.write_channel<perimap_TruthMesh>(channels::kTruthMesh);
   writer.write_channel<perimap_TruthMotion>(channels::kTruthMotion);

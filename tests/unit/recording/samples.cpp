@@ -283,6 +283,11 @@ void fill(Filler& next, perimap_EcgSamples& s) {
   next.sequence(s.ecg_mV, 7);
 }
 
+void fill(Filler& next, perimap_RTriggerPulse& s) {
+  next(s.edge_time_ns);
+  next(s.device_count);
+}
+
 void fill(Filler& next, perimap_RecordingInfo& s) {
   next(s.generator);
   next(s.description);
@@ -536,6 +541,10 @@ json to_json(const perimap_EcgSamples& s) {
           MEMBER(ecg_mV)};
 }
 template <>
+json to_json(const perimap_RTriggerPulse& s) {
+  return {MEMBER(edge_time_ns), MEMBER(device_count)};
+}
+template <>
 json to_json(const perimap_RecordingInfo& s) {
   return {MEMBER(generator), MEMBER(description), MEMBER(utc_minus_monotonic_ns), MEMBER(world_frame_id)};
 }
@@ -599,6 +608,7 @@ template Sample<perimap_Phase> make_sample(unsigned);
 template Sample<perimap_Status> make_sample(unsigned);
 template Sample<perimap_TrackerPose> make_sample(unsigned);
 template Sample<perimap_EcgSamples> make_sample(unsigned);
+template Sample<perimap_RTriggerPulse> make_sample(unsigned);
 template Sample<perimap_RecordingInfo> make_sample(unsigned);
 template Sample<perimap_TruthMesh> make_sample(unsigned);
 template Sample<perimap_TruthMotion> make_sample(unsigned);
