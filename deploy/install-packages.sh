@@ -26,7 +26,8 @@ build=(
   libjpeg62-turbo-dev                        # drivers/image: MJPG cameras
   cyclonedds-dev cyclonedds-tools            # idl, daemon: DDS and its IDL compiler
   libfmt-dev
-  libzstd-dev zlib1g-dev                     # drivers: recordings, simulator data
+  libzstd-dev libdeflate-dev                 # drivers/recording: compression, check sums
+  zlib1g-dev                                 # drivers/simulator: its data
   libyaml-cpp-dev                            # drivers: calibration files
   libtomlplusplus-dev libcli11-dev libspdlog-dev nlohmann-json3-dev  # daemon
   libsystemd-dev                             # daemon/process: readiness, watchdog

@@ -30,8 +30,9 @@ class FileSink final : public ByteSink {
         return fail(fmt::format("{}: cannot write: {}", path_, errno_text(errno)));
       }
       bytes = bytes.subspan(static_cast<std::size_t>(written));
+      written_ += written;
     }
-    return {};
+    return written_ - begun_ < kWindow ? Expected<void>() : hand_on();
   }
 
   Expected<void> close() override {
@@ -41,8 +42,30 @@ class FileSink final : public ByteSink {
   }
 
  private:
+  // The kernel would keep what is written, gigabytes of it, then write it all at once and make us wait; and what it
+  // keeps takes the place of what others need. So it begins with each window at once, and forgets the one before.
+  Expected<void> hand_on() {
+    constexpr unsigned kDone = SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER;
+    bool on_disk = ::sync_file_range(fd_, begun_, written_ - begun_, SYNC_FILE_RANGE_WRITE) == 0;
+    if (begun_ > forgotten_) {
+      on_disk = on_disk && ::sync_file_range(fd_, forgotten_, begun_ - forgotten_, kDone) == 0;
+      if (on_disk) (void)::posix_fadvise(fd_, forgotten_, begun_ - forgotten_, POSIX_FADV_DONTNEED);
+    }
+    // What is no file on a disk (a pipe) has nothing to hand on.
+    if (!on_disk && (errno == EIO || errno == ENOSPC || errno == EDQUOT)) {
+      return fail(fmt::format("{}: cannot write: {}", path_, errno_text(errno)));
+    }
+    forgotten_ = begun_;
+    begun_ = written_;
+    return {};
+  }
+
+  static constexpr off_t kWindow = off_t{8} << 20;
   int fd_;
   std::string path_;
+  off_t written_ = 0;    // bytes in all
+  off_t begun_ = 0;      // until here they are on their way to the disk
+  off_t forgotten_ = 0;  // until here they are there
 };
 
 }  // namespace

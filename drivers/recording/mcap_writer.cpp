@@ -253,23 +253,17 @@ class McapWriter::Impl {
     put(out_, entry.uncompressed_size);
     put(out_, crc32_update(0, chunk_));
     put(out_, options_.zstd_level ? mcap::kZstd : std::string_view());
-    put(out_, std::uint64_t{0});
-    const std::size_t records_at = out_.size();
-    if (options_.zstd_level) {
-      out_.resize(records_at + ZSTD_compressBound(chunk_.size()));
-      const std::size_t size = ZSTD_compress2(compressor_.get(), out_.data() + records_at, out_.size() - records_at,
-                                              chunk_.data(), chunk_.size());
-      if (ZSTD_isError(size) != 0) return stick(fmt::format("zstd cannot compress: {}", ZSTD_getErrorName(size)));
-      out_.resize(records_at + size);
-    } else {
-      put(out_, chunk_);
-    }
-    entry.compressed_size = out_.size() - records_at;
-    entry.length = out_.size();
-    put_at(out_, records_at - 8, entry.compressed_size);
-    put_at(out_, 1, static_cast<std::uint64_t>(out_.size() - mcap::kRecordHeaderBytes));
+    const auto records = pack(chunk_);
+    if (!records) return stick(records.error().message);
+    entry.compressed_size = records->size();
+    put(out_, entry.compressed_size);
+    entry.length = out_.size() + records->size();
+    put_at(out_, 1, entry.length - mcap::kRecordHeaderBytes);
+    // In two writes: the records themselves are copied nowhere else.
+    if (auto written = emit(); !written) return written;
+    if (auto written = emit(*records); !written) return written;
 
-    const std::size_t indexes_at = out_.size();
+    out_.clear();
     for (std::size_t i = 0; i < index_.size(); ++i) {
       if (index_[i].empty()) continue;
       const auto channel_id = static_cast<std::uint16_t>(i + 1);
@@ -285,7 +279,7 @@ class McapWriter::Impl {
       });
       index_[i].clear();
     }
-    entry.message_index_length = out_.size() - indexes_at;
+    entry.message_index_length = out_.size();
     all_times_.add(chunk_times_.first_ns);
     all_times_.add(chunk_times_.last_ns);
     chunk_times_ = {};
@@ -326,11 +320,22 @@ class McapWriter::Impl {
     return tl::unexpected(*error_);
   }
 
-  Expected<void> emit() {
-    if (auto written = sink_->write(out_); !written) return stick(written.error().message);
-    crc_ = crc32_update(crc_, out_);
-    offset_ += out_.size();
+  Expected<void> emit() { return emit(out_); }
+  Expected<void> emit(std::span<const std::byte> bytes) {
+    if (auto written = sink_->write(bytes); !written) return stick(written.error().message);
+    crc_ = crc32_update(crc_, bytes);
+    offset_ += bytes.size();
     return {};
+  }
+
+  // The records as they stand in the file, in memory that is filled with nothing else first.
+  Expected<std::span<const std::byte>> pack(std::span<const std::byte> records) {
+    if (!options_.zstd_level) return records;
+    if (packed_.size() < ZSTD_compressBound(records.size())) packed_.resize(ZSTD_compressBound(records.size()));
+    const std::size_t size =
+        ZSTD_compress2(compressor_.get(), packed_.data(), packed_.size(), records.data(), records.size());
+    if (ZSTD_isError(size) != 0) return fail(fmt::format("zstd cannot compress: {}", ZSTD_getErrorName(size)));
+    return std::span<const std::byte>(packed_).first(size);
   }
 
   // Records of one kind stand together, so that a summary offset can name them (spec: "Summary Offset").
@@ -446,7 +451,8 @@ class McapWriter::Impl {
   std::uint32_t crc_ = 0;     // of those bytes
   Buffer out_;                // the record being built
 
-  Buffer chunk_;  // message records of the open chunk
+  Buffer chunk_;   // message records of the open chunk
+  Buffer packed_;  // as large as the largest chunk may become
   MessageTimes chunk_times_;
   std::vector<std::vector<IndexEntry>> index_;  // per channel, of the open chunk
 

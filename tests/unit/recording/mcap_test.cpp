@@ -230,10 +230,10 @@ TEST(McapWriter, KeepsTheFirstErrorOfTheSinkAndWritesNothingMore) {
   std::mt19937 random(1);
   const Bytes data = random_bytes(random, 2000);
   ASSERT_TRUE(writer.write_message({channel, 0, 0, 0, data}));
-  const std::size_t before = bytes.size();
   const auto flushed = writer.flush();
   ASSERT_FALSE(flushed);
   EXPECT_EQ(flushed.error().message, "no space left on device");
+  const std::size_t before = bytes.size();
   EXPECT_EQ(writer.write_message({channel, 1, 1, 1, {}}).error().message, "no space left on device");
   EXPECT_EQ(writer.finish().error().message, "no space left on device");
   EXPECT_EQ(bytes.size(), before);

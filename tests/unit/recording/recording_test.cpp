@@ -1,11 +1,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
 #include "drivers/recording/channels.hpp"
+#include "drivers/recording/crc32.hpp"
 #include "drivers/recording/foxglove_image.hpp"
 #include "drivers/recording/foxglove_pose.hpp"
 #include "drivers/recording/recording_reader.hpp"
@@ -114,6 +118,42 @@ TEST(Recording, RefusesToWriteAnotherTypeOrATimeBeforeTheEpoch) {
   EXPECT_THAT(wrong.error().message, AllOf(HasSubstr("perimap::EcgSamples"), HasSubstr("perimap::TrackerPose")));
   EXPECT_FALSE(writer.write(ecg, perimap_EcgSamples{}, from_ns(0), from_ns(-1), 0));
   EXPECT_TRUE(writer.write(ecg, perimap_EcgSamples{}, from_ns(0), from_ns(0), 0));
+}
+
+TEST(Crc32, IsThatOfTheStandardAndGoesOn) {
+  const std::string text = "123456789";
+  const auto bytes = std::as_bytes(std::span(text));
+  EXPECT_EQ(crc32_update(0, bytes), 0xCBF43926U);
+  EXPECT_EQ(crc32_update(crc32_update(0, bytes.first(4)), bytes.subspan(4)), 0xCBF43926U);
+  EXPECT_EQ(crc32_update(0x1234U, {}), 0x1234U);
+}
+
+// More than is on its way to the disk at a time.
+TEST(FileSink, WritesEveryByteOfALargeFile) {
+  const TemporaryFile file;
+  constexpr std::size_t kPiece = 3'000'001, kPieces = 9;
+  Bytes all(kPiece * kPieces);
+  std::uint32_t value = 1;
+  for (std::byte& b : all) b = static_cast<std::byte>((value = value * 1664525U + 1013904223U) >> 24U);
+  const auto sink = create_file(file.path()).value();
+  for (std::size_t i = 0; i < kPieces; ++i) ASSERT_TRUE(sink->write(std::span(all).subspan(i * kPiece, kPiece)));
+  ASSERT_TRUE(sink->close());
+  std::ifstream in(file.path(), std::ios::binary);
+  const std::string read((std::istreambuf_iterator<char>(in)), {});
+  EXPECT_TRUE(std::ranges::equal(std::as_bytes(std::span(read)), std::span<const std::byte>(all)));
+}
+
+TEST(FileSink, WritesToWhatIsNoFileOnADisk) {
+  const auto sink = create_file("/dev/null").value();
+  const Bytes piece(std::size_t{20} << 20U);
+  EXPECT_TRUE(sink->write(piece));
+  EXPECT_TRUE(sink->write(piece));
+  EXPECT_TRUE(sink->close());
+}
+
+TEST(FileSink, SaysThatTheDiskIsFull) {
+  const auto sink = create_file("/dev/full").value();
+  EXPECT_EQ(sink->write(Bytes(1)).error().message, "/dev/full: cannot write: No space left on device");
 }
 
 TEST(Recording, GoesThroughAFile) {
