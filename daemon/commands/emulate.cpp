@@ -14,12 +14,14 @@
 #include <vector>
 
 #include "daemon/process/stop_signal.hpp"
+#include "drivers/emulator/camera_emulator.hpp"
 #include "drivers/emulator/can_ecg_emulator.hpp"
 #include "drivers/emulator/ecg_emulator.hpp"
 #include "drivers/emulator/emulator_server.hpp"
 #include "drivers/emulator/igtl_emulator.hpp"
 #include "drivers/emulator/ndi_emulator.hpp"
 #include "drivers/emulator/played_recording.hpp"
+#include "drivers/transport/camera_endpoint.hpp"
 #include "drivers/transport/endpoint.hpp"
 
 namespace perimap {
@@ -48,6 +50,7 @@ struct Options {
 struct Device {
   std::string name;
   Endpoint where;
+  std::string video_output = {};  // of a camera, in its place
 };
 
 int complain(const Error& error, int exit_code) {
@@ -55,12 +58,23 @@ int complain(const Error& error, int exit_code) {
   return exit_code;
 }
 
+Expected<Device> parse_camera(const std::string& where) {
+  const auto endpoint = parse_camera_endpoint(where);
+  const auto* output = endpoint ? std::get_if<V4l2Endpoint>(&*endpoint) : nullptr;
+  if (output == nullptr) {
+    return fail(fmt::format("device 'camera': expected camera=v4l2:/dev/videoN of a video output, got '{}'", where));
+  }
+  return Device{"camera", {}, output->path};
+}
+
 Expected<Device> parse_device(const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string name = text.substr(0, equals);
+  if (name == "camera") return parse_camera(equals == std::string::npos ? "" : text.substr(equals + 1));
   const auto usual = kUsualPlaces.find(name);
   if (usual == kUsualPlaces.end()) {
-    return fail(fmt::format("device '{}': expected ndi, igtl, medlab, bitalino, cyton or can-ecg, then =WHERE", name));
+    return fail(
+        fmt::format("device '{}': expected ndi, igtl, medlab, bitalino, cyton, can-ecg or camera, then =WHERE", name));
   }
   auto where = parse_endpoint(equals == std::string::npos ? usual->second : text.substr(equals + 1));
   if (!where) return fail(fmt::format("device '{}': {}", name, where.error().message));
@@ -102,6 +116,15 @@ Expected<void> serve(const Device& device, const Theatre& theatre, const Interru
     fmt::print("{} at {}\n", device.name, where);
     (void)std::fflush(stdout);
   };
+  if (!device.video_output.empty()) {
+    const auto played = emulate_camera(device.video_output, theatre.options.recording, theatre.start,
+                                       theatre.options.faults, ready, interrupt);
+    if (!played) return tl::unexpected(played.error());
+    fmt::print("camera: {} frames shown, {} of them cut; {} left out, {} found the output busy\n", played->shown,
+               played->faulty, played->lost, played->refused);
+    (void)std::fflush(stdout);
+    return {};
+  }
   if (const auto* can = std::get_if<CanEndpoint>(&device.where)) {
     const auto ecg = theatre.ecg();
     if (!ecg) return tl::unexpected(ecg.error());
@@ -122,6 +145,9 @@ int run(Options& options) {
   for (const std::string& text : options.devices) {
     auto device = parse_device(text);
     if (!device) return complain(device.error(), 2);
+    if (!device->video_output.empty() && options.recording.empty()) {
+      return complain({"device 'camera': plays a recording; name one with --recording"}, 2);
+    }
     devices.push_back(std::move(*device));
   }
   const auto spans = [](const std::vector<double>& given, Duration& every, Duration& lasting) {
@@ -169,11 +195,13 @@ int run(Options& options) {
 void add_emulate_command(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
-      "emulate", "Stand in for devices: the real protocols on pseudo-terminals, TCP ports and CAN, until stopped");
+      "emulate",
+      "Stand in for devices: the real protocols on pseudo-terminals, TCP ports, CAN and video outputs, until stopped");
   command
       ->add_option("DEVICE", options->devices,
                    "ndi, igtl (trackers), medlab, bitalino, cyton, can-ecg; NAME=WHERE puts one elsewhere than at its "
-                   "usual place: a link to a pseudo-terminal (absolute path), tcp:127.0.0.1:PORT or can:INTERFACE")
+                   "usual place: a link to a pseudo-terminal (absolute path), tcp:127.0.0.1:PORT or can:INTERFACE; "
+                   "camera=v4l2:/dev/videoN plays the recording's frames out of that video output")
       ->required();
   command->add_option("--recording", options->recording, "Play this recording, once [a simulated heart and scope]");
   command->add_option("--start", options->start_s,
