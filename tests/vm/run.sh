@@ -8,9 +8,10 @@ usage() {
   cat << 'END'
 tests/vm/run.sh [--kernel amd64|rt-amd64]... [--build FOLDER] [TEST...]
   TEST      devices: ECG over CAN, frames from a V4L2 node, the tracker over a pseudo-terminal, under systemd
+            drivers: an R trigger on a modem line, own frames out of a video output and in by a camera
             service: the Debian package, its service, the watchdog
             all of them when none is named
-  --kernel  Debian's stock kernel or its PREEMPT_RT kernel; both when not given, `service` with the stock kernel only
+  --kernel  Debian's stock kernel or its PREEMPT_RT kernel; both when not given, `devices` alone with the latter
   --build   whose programs run (build/release, which is built when it is missing)
 Needs QEMU and 250 MB of kernels, which are downloaded once; no KVM. A run takes a few minutes. It only shows that things
 work: an emulated processor says nothing about time.
@@ -31,7 +32,7 @@ while [ $# -gt 0 ]; do
       build=${2:-}
       shift
       ;;
-    devices | service) tests+=("$1") ;;
+    devices | drivers | service) tests+=("$1") ;;
     -h | --help)
       usage
       exit 0
@@ -45,7 +46,7 @@ while [ $# -gt 0 ]; do
   shift
 done
 [ ${#kernels[@]} -gt 0 ] || kernels=(amd64 rt-amd64)
-[ ${#tests[@]} -gt 0 ] || tests=(devices service)
+[ ${#tests[@]} -gt 0 ] || tests=(devices drivers service)
 
 vm_guest=$PWD/tests/vm/guest
 . tests/vm/machine.sh
@@ -81,13 +82,19 @@ for kernel in "${kernels[@]}"; do
     continue
   fi
   for test in "${tests[@]}"; do
-    if [ "$test" = service ] && [ "$kernel" != amd64 ]; then continue; fi
+    if [ "$test" != devices ] && [ "$kernel" != amd64 ]; then continue; fi
     exchange=$folder/$test-$kernel
     rm -rf "$exchange"
     mkdir -p "$exchange"
     cp "$vm_guest"/{common.sh,camera.yaml} "$exchange/"
     printf 'build=%q\n' "$build" > "$exchange/settings"
     cp -r "$package" "$exchange/package"
+    if [ "$test" = drivers ] && ! "$build/daemon/perimap" simulate "$exchange/played.mcap" --size 640x480 --fps 10 \
+      --duration 20 --tracker-noise 0 > "$exchange/simulated" 2>&1; then
+      cat "$exchange/simulated"
+      failures+=("$test on $kernel")
+      continue
+    fi
     say "$test, $vm_release ..."
     if vm_run "$vm_guest/$test.sh" "$exchange" 600; then
       say "$test, $vm_release: passed"
