@@ -19,8 +19,8 @@ fail() {
 emulate() {
   local recording=$1
   shift
-  # Both ends must be ready before the recording begins.
-  start=$(awk '{printf "%.3f", $1 + 4}' /proc/uptime)
+  # Both ends must be ready before the recording begins, on a machine that is busy with other things as well.
+  start=$(awk '{printf "%.3f", $1 + 8}' /proc/uptime)
   "$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$line" --recording "$recording" --start "$start" "$@" \
     > "$work/emulators" 2>&1 &
   emulators=$!
