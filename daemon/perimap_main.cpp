@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <exception>
 
+#include "daemon/commands/bench.hpp"
 #include "daemon/commands/check.hpp"
 #include "daemon/commands/ctl.hpp"
 #include "daemon/commands/ecg.hpp"
@@ -31,6 +32,7 @@ int run(int argc, char** argv) {
   perimap::add_watch_command(app, exit_code);
   perimap::add_report_command(app, exit_code);
   perimap::add_ecg_command(app, exit_code);
+  perimap::add_bench_command(app, exit_code);
   perimap::add_experiment_command(app, exit_code);
   perimap::add_track_command(app, exit_code);
   perimap::add_emulate_command(app, exit_code);

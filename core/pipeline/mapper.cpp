@@ -99,6 +99,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   counters_.predict_and_find.add(found - begun);
   counters_.phase_and_pose.add(joined - found);
   counters_.evaluate.add(evaluated - joined);
+  computed_before_learning_ = evaluated - begun;
   // In lockstep the capture lies on the recording's clock, not on this machine's.
   if (!settings_.lockstep) counters_.capture_to_update.add(evaluated - stamp.capture);
   counters_.frames.add();
@@ -297,7 +298,10 @@ void Mapper::finish_learning() noexcept {
     tally = WorkerTally{};
   }
   if (put_off) counters_.learning_put_off.add();
-  if (ended > learn_started_) counters_.learn.add(ended - learn_started_);
+  if (ended > learn_started_) {
+    counters_.learn.add(ended - learn_started_);
+    counters_.frame_compute.add(computed_before_learning_ + (ended - learn_started_));
+  }
   std::uint64_t tracked = 0;
   std::uint64_t starting = 0;
   std::uint64_t converging = 0;

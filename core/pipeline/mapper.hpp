@@ -119,6 +119,7 @@ class Mapper {
   std::uint32_t next_id_ = 1;
   Instant last_capture_;
   Instant learn_started_;
+  Duration computed_before_learning_{0};  // A to C of the frame that is being learnt from
   MapFeed feed_;
   std::size_t next_fed_slot_ = 0;
 };

@@ -50,6 +50,7 @@ struct PipelineCounters {
   LatencyHistogram phase_and_pose;
   LatencyHistogram evaluate;
   LatencyHistogram learn;
+  LatencyHistogram frame_compute;  // A, B, C and D of one frame together
   LatencyHistogram capture_to_update;
   // finder thread
   Counter searches_failed;

@@ -19,8 +19,18 @@ class LatencyHistogram {
     std::uint64_t count = 0;
     Duration p50{0};
     Duration p99{0};
+    Duration p999{0};
     Duration max{0};
   };
+
+ private:
+  static constexpr unsigned kSteps = 16;
+  static constexpr unsigned kPowers = 40;
+  static constexpr std::size_t kBuckets = kSteps * (kPowers - 3);
+
+ public:
+  // How many durations each bucket had at some moment.
+  using Counts = std::array<std::uint64_t, kBuckets>;
 
   // Writer only. Wait-free.
   void add(Duration duration) noexcept {
@@ -31,26 +41,30 @@ class LatencyHistogram {
     if (ns > max_.load(std::memory_order_relaxed)) max_.store(ns, std::memory_order_relaxed);
   }
 
+  // Any thread.
+  [[nodiscard]] Counts counts() const noexcept {
+    Counts counts;
+    for (std::size_t i = 0; i < kBuckets; ++i) counts[i] = buckets_[i].load(std::memory_order_relaxed);
+    return counts;
+  }
+
+  // Of all since the beginning; the maximum is exact.
   [[nodiscard]] Summary summary() const noexcept {
-    std::array<std::uint64_t, kBuckets> counts{};
-    std::uint64_t total = 0;
+    return summarize(counts(), Duration(max_.load(std::memory_order_relaxed)));
+  }
+
+  // Of what came between two moments; the maximum too is right to 1/16 only. `before` must be older than `after`.
+  [[nodiscard]] static Summary between(const Counts& before, const Counts& after) noexcept {
+    Counts came;
+    Duration max{0};
     for (std::size_t i = 0; i < kBuckets; ++i) {
-      counts[i] = buckets_[i].load(std::memory_order_relaxed);
-      total += counts[i];
+      came[i] = after[i] - before[i];
+      if (came[i] > 0) max = Duration(static_cast<std::int64_t>(upper_edge(i)));
     }
-    Summary s;
-    s.count = total;
-    s.max = Duration(max_.load(std::memory_order_relaxed));
-    s.p50 = std::min(quantile(counts, total, 0.50), s.max);
-    s.p99 = std::min(quantile(counts, total, 0.99), s.max);
-    return s;
+    return summarize(came, max);
   }
 
  private:
-  static constexpr unsigned kSteps = 16;
-  static constexpr unsigned kPowers = 40;
-  static constexpr std::size_t kBuckets = kSteps * (kPowers - 3);
-
   static void bump(std::atomic<std::uint64_t>& count) noexcept {
     count.store(count.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
@@ -68,7 +82,17 @@ class LatencyHistogram {
     return ((kSteps + bucket % kSteps + 1) << power) - 1;
   }
 
-  static Duration quantile(const std::array<std::uint64_t, kBuckets>& counts, std::uint64_t total, double q) noexcept {
+  static Summary summarize(const Counts& counts, Duration max) noexcept {
+    Summary s;
+    for (const std::uint64_t count : counts) s.count += count;
+    s.max = max;
+    s.p50 = std::min(quantile(counts, s.count, 0.50), max);
+    s.p99 = std::min(quantile(counts, s.count, 0.99), max);
+    s.p999 = std::min(quantile(counts, s.count, 0.999), max);
+    return s;
+  }
+
+  static Duration quantile(const Counts& counts, std::uint64_t total, double q) noexcept {
     const double rank = q * static_cast<double>(total);
     std::uint64_t sum = 0;
     for (std::size_t i = 0; i < kBuckets; ++i) {

@@ -15,8 +15,9 @@ constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
 
 }  // namespace
 
-ReplayFeeder::ReplayFeeder(ReplayReader reader, const SensorIntake& intake, std::optional<Duration> offset)
-    : reader_(std::move(reader)), intake_(intake), offset_(offset) {}
+ReplayFeeder::ReplayFeeder(ReplayReader reader, const SensorIntake& intake, std::optional<Duration> offset,
+                           ReplayEdit edit)
+    : reader_(std::move(reader)), intake_(intake), offset_(offset), edit_(std::move(edit)) {}
 
 void ReplayFeeder::start(ThreadLauncher& threads) {
   reading_ = threads.launch("replay-read", ThreadRole::kHousekeeping, [this] { read_ahead(); });
@@ -36,8 +37,11 @@ void ReplayFeeder::stop() {
 void ReplayFeeder::read_ahead() {
   for (;;) {
     auto event = reader_.next();
+    const bool read = event && *event;
+    const ReplayStep step = read && edit_ ? edit_(**event) : ReplayStep::kDeliver;
+    if (step == ReplayStep::kSkip) continue;
     std::unique_lock lock(mutex_);
-    if (!event || !*event) {
+    if (!read || step == ReplayStep::kEnd) {
       if (!event) error_ = std::move(event.error());
       read_all_ = true;
       changed_.notify_all();

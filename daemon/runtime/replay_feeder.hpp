@@ -4,6 +4,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -15,11 +16,17 @@
 
 namespace perimap {
 
+// What becomes of an event that was read.
+enum class ReplayStep { kDeliver, kSkip, kEnd };
+// May change it. Called in the recording's order by the thread that reads ahead.
+using ReplayEdit = std::function<ReplayStep(ReplayEvent&)>;
+
 // One thread reads ahead from the disk, one sleeps to each arrival and pushes. All instants are moved by one offset,
 // which brings the first arrival to shortly after start() when it is not given.
 class ReplayFeeder final : public SensorFeeder {
  public:
-  ReplayFeeder(ReplayReader reader, const SensorIntake& intake, std::optional<Duration> offset = std::nullopt);
+  ReplayFeeder(ReplayReader reader, const SensorIntake& intake, std::optional<Duration> offset = std::nullopt,
+               ReplayEdit edit = {});
   ReplayFeeder(const ReplayFeeder&) = delete;
   ReplayFeeder& operator=(const ReplayFeeder&) = delete;
   ~ReplayFeeder() override { stop(); }
@@ -42,6 +49,7 @@ class ReplayFeeder final : public SensorFeeder {
   ReplayReader reader_;
   SensorIntake intake_;
   std::optional<Duration> offset_;
+  ReplayEdit edit_;
   std::thread reading_;
   std::thread delivering_;
 

@@ -24,7 +24,22 @@ TEST(LatencyHistogram, QuantilesAreWithinOneSixteenthAndTheMaximumIsExact) {
   EXPECT_EQ(s.count, 1001U);
   EXPECT_NEAR(static_cast<double>(s.p50.count()), 501e3, 501e3 / 16);
   EXPECT_NEAR(static_cast<double>(s.p99.count()), 991e3, 991e3 / 16);
+  EXPECT_NEAR(static_cast<double>(s.p999.count()), 1000e3, 1000e3 / 16);
   EXPECT_EQ(s.max, milliseconds(77));
+}
+
+TEST(LatencyHistogram, WhatCameBetweenTwoMomentsIsSummedUpByItself) {
+  LatencyHistogram h;
+  for (int i = 0; i < 1000; ++i) h.add(milliseconds(50));
+  const auto before = h.counts();
+  for (int i = 0; i < 99; ++i) h.add(microseconds(10));
+  h.add(microseconds(300));
+  const auto s = LatencyHistogram::between(before, h.counts());
+  EXPECT_EQ(s.count, 100U);
+  EXPECT_NEAR(static_cast<double>(s.p99.count()), 10e3, 10e3 / 16);
+  EXPECT_NEAR(static_cast<double>(s.p999.count()), 300e3, 300e3 / 16);
+  EXPECT_NEAR(static_cast<double>(s.max.count()), 300e3, 300e3 / 16);
+  EXPECT_EQ(LatencyHistogram::between(before, before).count, 0U);
 }
 
 TEST(LatencyHistogram, HoldsTheExtremes) {

@@ -1,0 +1,73 @@
+#include "daemon/bench/bench.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <chrono>
+
+namespace perimap::bench {
+
+std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_realtime) {
+  std::vector<LiveCase> cases;
+  const auto add = [&](const std::string& part, const std::string& name, int priority, const auto& change) {
+    if (!settings.parts.contains(part) || (priority > 0 && !may_be_realtime)) return;
+    LiveCase one;
+    one.part = part;
+    one.name = priority > 0 ? name + ", FIFO" : name;
+    one.features = settings.features;
+    one.workers = settings.workers;
+    one.priority = priority;
+    if (priority > 0) one.cpus = settings.cpus;
+    change(one);
+    cases.push_back(one);
+  };
+  const auto nothing = [](LiveCase&) {};
+  // Both kinds in turn, so that what disturbs the machine disturbs both.
+  for (int run = 1; run <= settings.runs; ++run) {
+    for (const int priority : {0, settings.priority}) add("live", fmt::format("run {}", run), priority, nothing);
+  }
+  const int best = may_be_realtime ? settings.priority : 0;
+  for (const int subscribers : {5, 20}) {
+    add("subscribers", fmt::format("{} subscribers", subscribers), best,
+        [&](LiveCase& one) { one.subscribers = subscribers; });
+  }
+  add("subscribers", "one more, slow", best, [](LiveCase& one) { one.slow_subscriber = true; });
+  add("recording", "recording", best, [](LiveCase& one) { one.recording = true; });
+  for (const int priority : {0, settings.priority}) {
+    add("load", "under load", priority, [](LiveCase& one) { one.stress = true; });
+  }
+  for (const int workers : {1, 2, 4}) {
+    add("workers", fmt::format("{} workers", workers), best, [&](LiveCase& one) { one.workers = workers; });
+  }
+  for (const int every : {4, 2, 1}) {
+    add("rate", every == 1 ? "every frame" : fmt::format("every {}th frame", every), best,
+        [&](LiveCase& one) { one.every_frame = every; });
+  }
+  add("rate", "twice as fast", best, [](LiveCase& one) { one.speed = 2.0; });
+  for (const int features : {50, 100, 200, 400, 1000}) {
+    add("features", fmt::format("{} features", features), best, [&](LiveCase& one) { one.features = features; });
+  }
+  return cases;
+}
+
+Expected<BenchReport> run_bench(const BenchSettings& settings, StopSignal& stop,
+                                const std::function<void(int, int, const std::string&)>& on_run) {
+  BenchReport report;
+  report.settings = settings;
+  report.machine = this_machine();
+  report.begun_utc = fmt::format("{:%Y-%m-%d %H:%M:%S}", fmt::gmtime(std::chrono::system_clock::now()));
+  const std::vector<LiveCase> cases = live_cases(settings, report.machine.realtime_permitted);
+  const auto all = static_cast<int>(cases.size());
+  int number = 0;
+  for (const LiveCase& one : cases) {
+    on_run(++number, all, one.part + ": " + one.name);
+    auto result = run_live(settings.input, one, stop);
+    if (!result) return tl::unexpected(result.error());
+    report.live.push_back(std::move(*result));
+    report.stopped = stop.requested();
+    if (report.stopped) break;
+  }
+  return report;
+}
+
+}  // namespace perimap::bench

@@ -1,0 +1,301 @@
+#include "daemon/bench/bench_text.hpp"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+namespace perimap::bench {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double us(Duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
+
+Json json_of(const Figures& f) {
+  return {
+      {"count", f.count}, {"p50_us", us(f.p50)}, {"p99_us", us(f.p99)}, {"p999_us", us(f.p999)}, {"max_us", us(f.max)}};
+}
+
+Json json_of(const LatencyHistogram::Summary& s) {
+  return {
+      {"count", s.count}, {"p50_us", us(s.p50)}, {"p99_us", us(s.p99)}, {"p999_us", us(s.p999)}, {"max_us", us(s.max)}};
+}
+
+Json with_share(const Figures& f) {
+  Json json = json_of(f);
+  json["share_within_500_us"] = f.on_time;
+  return json;
+}
+
+Json json_of(const LiveResult& result) {
+  const LiveCase& c = result.live_case;
+  Json json = {{"part", c.part},
+               {"name", c.name},
+               {"features_asked", c.features},
+               {"workers", c.workers},
+               {"priority", c.priority},
+               {"cpus", c.cpus},
+               {"every_frame", c.every_frame},
+               {"speed", c.speed},
+               {"subscribers", c.subscribers},
+               {"slow_subscriber", c.slow_subscriber},
+               {"recording", c.recording},
+               {"stress", c.stress}};
+  if (!result.not_run.empty()) json["not_run"] = result.not_run;
+  const LiveFigures& f = result.figures;
+  if (f.sent == 0) return json;
+  json["load_before"] = f.load_before;
+  json["priority_granted"] = f.priority_granted;
+  json["sent"] = f.sent;
+  json["rate_hz"] = f.rate_hz;
+  json["features"] = f.features;
+  json["surface_bytes"] = f.surface_bytes;
+  json["missing"] = f.missing;
+  if (c.slow_subscriber) json["missing_at_slow"] = f.missing_at_slow;
+  json["release_tardiness"] = with_share(f.tardiness);
+  json["bare_loop"] = with_share(f.bare);
+  json["dds_write"] = json_of(f.dds_write);
+  json["capture_to_release"] = json_of(f.capture_to_release);
+  json["capture_to_receipt"] = json_of(f.capture_to_receipt);
+  json["write_to_receipt"] = json_of(f.write_to_receipt);
+  for (const StageFigures& stage : f.stages) json["stages"][stage.name] = json_of(stage.summary);
+  json["frames_dropped"] = f.frames_dropped;
+  json["frames_too_late"] = f.frames_too_late;
+  json["without_frame"] = f.without_frame;
+  json["from_late_update"] = f.from_late_update;
+  json["learning_put_off"] = f.learning_put_off;
+  json["frames_not_recorded"] = f.frames_not_recorded;
+  return json;
+}
+
+// A table: its heading and its rows, all of as many cells.
+struct Table {
+  std::string title;
+  std::string note;
+  std::vector<std::string> head;
+  std::vector<std::vector<std::string>> rows;
+};
+
+std::string share(double value) { return fmt::format("{:.2f} %", 100.0 * value); }
+std::string in_us(Duration d) { return fmt::format("{:.1f}", us(d)); }
+std::string in_ms(Duration d) { return fmt::format("{:.2f}", us(d) / 1e3); }
+
+std::vector<std::string> cells(std::string name, const LatencyHistogram::Summary& s) {
+  return {std::move(name), std::to_string(s.count), in_us(s.p50), in_us(s.p99), in_us(s.p999), in_us(s.max)};
+}
+
+std::vector<std::string> cells(std::string name, const Figures& f) {
+  return {std::move(name), std::to_string(f.count), in_us(f.p50), in_us(f.p99), in_us(f.p999), in_us(f.max)};
+}
+
+Table releases_table(const BenchReport& report) {
+  Table table;
+  table.title = "Releases";
+  table.note =
+      "release: from the deadline to just before the write, composing included; bare: of a loop with the same wait, "
+      "priority and processor, 2 ms beside the releases; late by more than 0.5 ms counts as not on time.";
+  table.head = {"run",   "features", "rate Hz", "release us: p50", "p99",
+                "p99.9", "max",      "on time", "bare us: p50",    "p99",
+                "p99.9", "on time",  "missing", "late updates",    "load before"};
+  for (const LiveResult& result : report.live) {
+    const LiveFigures& f = result.figures;
+    const std::string name = result.live_case.part + ": " + result.live_case.name;
+    if (f.sent == 0) {
+      std::vector<std::string> row(table.head.size(), "-");
+      row[0] = name + " (" + (result.not_run.empty() ? "nothing was released" : result.not_run) + ")";
+      table.rows.push_back(std::move(row));
+      continue;
+    }
+    table.rows.push_back(
+        {name + (result.live_case.priority > 0 && !f.priority_granted ? " (refused)" : "") +
+             (result.not_run.empty() ? "" : " (" + result.not_run + ")"),
+         fmt::format("{:.0f}", f.features), fmt::format("{:.1f}", f.rate_hz), in_us(f.tardiness.p50),
+         in_us(f.tardiness.p99), in_us(f.tardiness.p999), in_us(f.tardiness.max), share(f.tardiness.on_time),
+         in_us(f.bare.p50), in_us(f.bare.p99), in_us(f.bare.p999), share(f.bare.on_time),
+         result.live_case.slow_subscriber ? fmt::format("{} ({} at the slow)", f.missing, f.missing_at_slow)
+                                          : std::to_string(f.missing),
+         std::to_string(f.from_late_update), fmt::format("{:.1f}", f.load_before)});
+  }
+  return table;
+}
+
+Table receipt_table(const BenchReport& report) {
+  Table table;
+  table.title = "Receipt in another process";
+  table.head = {"run",
+                "bytes",
+                "capture to release ms: p50",
+                "p99",
+                "capture to receipt ms: p50",
+                "p99",
+                "max",
+                "write to receipt us: p50",
+                "p99",
+                "p99.9",
+                "max",
+                "dds_write us: p50",
+                "p99",
+                "max"};
+  for (const LiveResult& result : report.live) {
+    const LiveFigures& f = result.figures;
+    if (f.sent == 0) continue;
+    table.rows.push_back({result.live_case.part + ": " + result.live_case.name, std::to_string(f.surface_bytes),
+                          in_ms(f.capture_to_release.p50), in_ms(f.capture_to_release.p99),
+                          in_ms(f.capture_to_receipt.p50), in_ms(f.capture_to_receipt.p99),
+                          in_ms(f.capture_to_receipt.max), in_us(f.write_to_receipt.p50), in_us(f.write_to_receipt.p99),
+                          in_us(f.write_to_receipt.p999), in_us(f.write_to_receipt.max), in_us(f.dds_write.p50),
+                          in_us(f.dds_write.p99), in_us(f.dds_write.max)});
+  }
+  return table;
+}
+
+Table stages_table(const BenchReport& report) {
+  Table table;
+  table.title = "Stage by stage, us";
+  table.note = "Figures of the pipeline's own stages are right to 1/16.";
+  table.head = {"run and stage", "count", "p50", "p99", "p99.9", "max"};
+  for (const LiveResult& result : report.live) {
+    const LiveFigures& f = result.figures;
+    if (f.sent == 0) continue;
+    const std::string run = result.live_case.part + ": " + result.live_case.name + ", ";
+    for (const StageFigures& stage : f.stages) table.rows.push_back(cells(run + stage.name, stage.summary));
+    table.rows.push_back(cells(run + "release", f.tardiness));
+    table.rows.push_back(cells(run + "dds_write", f.dds_write));
+    table.rows.push_back(cells(run + "write to receipt", f.write_to_receipt));
+  }
+  return table;
+}
+
+std::vector<Table> tables(const BenchReport& report) {
+  return {releases_table(report), receipt_table(report), stages_table(report)};
+}
+
+std::string machine_line(const Machine& m) {
+  return fmt::format("{} x {}{}; {}; governor {}; load {:.2f} at the beginning; SCHED_FIFO {}, locked memory {}; {}",
+                     m.processors, m.processor, m.virtual_machine ? " (virtual)" : "", m.kernel, m.governor,
+                     m.load_1_min, m.realtime_permitted ? "permitted" : "refused",
+                     m.memory_lock_permitted ? "permitted" : "refused", m.build);
+}
+
+std::string setting_line(const BenchReport& r) {
+  return fmt::format("{}; {} UTC; {:.0f} s to settle, {:.0f} s measured a run; {} features asked for, {} workers{}",
+                     r.settings.input.recording, r.begun_utc, to_seconds(r.settings.input.settle),
+                     to_seconds(r.settings.input.measure), r.settings.features, r.settings.workers,
+                     r.stopped ? "; STOPPED EARLY" : "");
+}
+
+// What a reader might take the figures for, and must not.
+const std::vector<std::string>& not_proven() {
+  static const std::vector<std::string> lines = {
+      "A recording stands in for the devices: what drivers, buses and exposure add before a frame arrives is as it was "
+      "when recorded, and reading and unpacking it costs processor time that devices do not.",
+      "Capture is the recording's own stamp; an error of that stamp is in no figure.",
+      "Loopback on one host: a network between publisher and subscriber adds its own.",
+      "Some seconds a run: what comes once an hour, and a maximum, are not shown by them.",
+      "What else ran on the machine is known by its load alone.",
+      "Nothing here is about how accurate the positions are."};
+  return lines;
+}
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '&':
+        out += "&amp;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+std::string text_of(const Table& table) {
+  std::vector<std::size_t> widths;
+  for (const std::string& cell : table.head) widths.push_back(cell.size());
+  for (const auto& row : table.rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  std::string out = table.title + "\n";
+  const auto line = [&](const std::vector<std::string>& row) {
+    out += fmt::format("{:<{}}", row[0], widths[0]);
+    for (std::size_t i = 1; i < row.size(); ++i) out += fmt::format("  {:>{}}", row[i], widths[i]);
+    out += '\n';
+  };
+  line(table.head);
+  for (const auto& row : table.rows) line(row);
+  if (!table.note.empty()) out += table.note + "\n";
+  return out + "\n";
+}
+
+std::string html_of(const Table& table) {
+  std::string out = "<h2>" + escaped(table.title) + "</h2>\n<table><tr>";
+  for (const std::string& cell : table.head) out += "<th>" + escaped(cell) + "</th>";
+  out += "</tr>\n";
+  for (const auto& row : table.rows) {
+    out += "<tr>";
+    for (const std::string& cell : row) out += "<td>" + escaped(cell) + "</td>";
+    out += "</tr>\n";
+  }
+  return out + "</table>\n<p>" + escaped(table.note) + "</p>\n";
+}
+
+}  // namespace
+
+std::string to_table(const BenchReport& report) {
+  std::string out = machine_line(report.machine) + "\n" + setting_line(report) + "\n\n";
+  for (const Table& table : tables(report)) {
+    if (!table.rows.empty()) out += text_of(table);
+  }
+  out += "What these figures do not prove:\n";
+  for (const std::string& line : not_proven()) out += "- " + line + "\n";
+  return out;
+}
+
+Json to_json(const BenchReport& report) {
+  const Machine& m = report.machine;
+  Json json = {{"recording", report.settings.input.recording},
+               {"begun_utc", report.begun_utc},
+               {"stopped_early", report.stopped},
+               {"settle_s", to_seconds(report.settings.input.settle)},
+               {"measure_s", to_seconds(report.settings.input.measure)},
+               {"machine",
+                {{"processor", m.processor},
+                 {"processors", m.processors},
+                 {"virtual", m.virtual_machine},
+                 {"kernel", m.kernel},
+                 {"governor", m.governor},
+                 {"load_1_min", m.load_1_min},
+                 {"realtime_permitted", m.realtime_permitted},
+                 {"memory_lock_permitted", m.memory_lock_permitted},
+                 {"build", m.build}}},
+               {"not_proven", not_proven()}};
+  json["live"] = Json::array();
+  for (const LiveResult& result : report.live) json["live"].push_back(json_of(result));
+  return json;
+}
+
+std::string to_html(const BenchReport& report) {
+  std::string out = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>perimap bench</title>\n"
+      "<style>body{{font-family:sans-serif;margin:2em;max-width:1700px}}table{{border-collapse:collapse}}"
+      "td,th{{padding:.3em .7em;border-bottom:1px solid #ddd;text-align:right}}td:first-child,th:first-child"
+      "{{text-align:left}}svg{{max-width:100%;height:auto}}</style></head>\n<body><h1>perimap bench</h1>\n<p>{}</p>\n"
+      "<p>{}</p>\n",
+      escaped(machine_line(report.machine)), escaped(setting_line(report)));
+  for (const Table& table : tables(report)) {
+    if (!table.rows.empty()) out += html_of(table);
+  }
+  out += "<h2>What these figures do not prove</h2>\n<ul>\n";
+  for (const std::string& line : not_proven()) out += "<li>" + escaped(line) + "</li>\n";
+  return out + "</ul>\n</body></html>\n";
+}
+
+}  // namespace perimap::bench
