@@ -9,6 +9,14 @@
 #include "daemon/runtime/utc_offset.hpp"
 
 namespace perimap {
+namespace {
+
+// How long before its deadline a surface is composed, so that the deadline is for the write alone; what an update
+// brings later than this is late. Measured: 200 features take 0.05 ms.
+constexpr Duration kComposing = std::chrono::microseconds(500);
+
+}  // namespace
+
 LiveRuntime::LiveRuntime(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication,
                          std::function<void()> on_status_tick)
     : pipeline_(pipeline),
@@ -107,15 +115,16 @@ void LiveRuntime::run_publisher() {
     const bool done = sources_ended_.load(std::memory_order_relaxed) && !pipeline_.schedule().pending();
     if (done) all_released_.store(true, std::memory_order_relaxed);
     const Instant round_ends = now + kLongestPublisherRound;
-    if (done || !next || next->deadline - kSpin > round_ends) {
+    if (done || !next || next->deadline - kComposing > round_ends) {
       static_cast<void>(wakeup.wait_until(round_ends));
       continue;
     }
     // A missing frame's release is provisional: a frame that still comes takes its place.
-    if (next->frame_missing && wakeup.wait_until(next->deadline - kSpin)) continue;
-    wait_until_exactly(next->deadline);
+    if (next->frame_missing && wakeup.wait_until(next->deadline - kComposing)) continue;
+    sleep_until(next->deadline - kComposing);
     const Release release = pipeline_.schedule().take();
     const perimap_Surface& sample = wire_surface_.fill(pipeline_.compose(release), utc_minus_monotonic());
+    wait_until_exactly(release.deadline);
     const Instant ready = MonotonicClock::now();
     publication_.surface(sample);
     counters.dds_write.add(MonotonicClock::now() - ready);
