@@ -46,6 +46,7 @@ full=(
   qemu-system-x86 busybox-static cpio zstd kmod udev iproute2 v4l-utils  # tests/vm: CAN, V4L2 and systemd on Debian's own kernels
   libceres-dev                               # tests/bench: the batch alternative
   libopencv-video-dev                        # tests/bench: Lucas-Kanade as others have it
+  stress-ng                                  # perimap bench: latencies under load
   dpkg-dev lintian systemd man-db            # the Debian package and its service, checked
 )
 

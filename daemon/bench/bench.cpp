@@ -3,9 +3,16 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 
 namespace perimap::bench {
+namespace {
+
+constexpr Duration kLongestDdsperf = std::chrono::seconds(10);
+const std::vector<int> kCosts = {50, 100, 200, 500, 1000, 2000, 5000};
+
+}  // namespace
 
 std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_realtime) {
   std::vector<LiveCase> cases;
@@ -56,16 +63,40 @@ Expected<BenchReport> run_bench(const BenchSettings& settings, StopSignal& stop,
   report.settings = settings;
   report.machine = this_machine();
   report.begun_utc = fmt::format("{:%Y-%m-%d %H:%M:%S}", fmt::gmtime(std::chrono::system_clock::now()));
+  const bool beside_ddsperf = settings.parts.contains("ddsperf");
   const std::vector<LiveCase> cases = live_cases(settings, report.machine.realtime_permitted);
-  const auto all = static_cast<int>(cases.size());
+  const std::vector<int> costs = settings.parts.contains("cost") ? kCosts : std::vector<int>();
+  const bool memory = settings.parts.contains("memory");
+  const int all = static_cast<int>(cases.size() + costs.size()) + (memory ? 1 : 0);
   int number = 0;
   for (const LiveCase& one : cases) {
     on_run(++number, all, one.part + ": " + one.name);
     auto result = run_live(settings.input, one, stop);
     if (!result) return tl::unexpected(result.error());
     report.live.push_back(std::move(*result));
+    const LiveFigures& figures = report.live.back().figures;
+    // In turn with the runs that it is the measure of, at their size and rate.
+    if (beside_ddsperf && one.part == "live" && figures.sent > 0 && !stop.requested()) {
+      report.ddsperf.push_back(run_ddsperf(settings.input.domain, figures.surface_bytes, figures.rate_hz,
+                                           std::min(settings.input.measure, kLongestDdsperf), one.name));
+    }
     report.stopped = stop.requested();
-    if (report.stopped) break;
+    if (report.stopped) return report;
+  }
+  for (const int features : costs) {
+    on_run(++number, all, fmt::format("cost: {} features, in lockstep", features));
+    auto result = run_cost(settings.input, features, stop);
+    if (!result) return tl::unexpected(result.error());
+    report.cost.push_back(*result);
+    report.stopped = stop.requested();
+    if (report.stopped) return report;
+  }
+  if (memory) {
+    on_run(++number, all, fmt::format("memory: {} frames, in lockstep", settings.frames));
+    auto result = run_memory(settings.input, settings.features, settings.workers, settings.frames, stop);
+    if (!result) return tl::unexpected(result.error());
+    report.memory = std::move(*result);
+    report.stopped = stop.requested();
   }
   return report;
 }

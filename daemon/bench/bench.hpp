@@ -1,25 +1,30 @@
 // The replay-driven latency benchmark: which runs it makes, and in what order.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "daemon/bench/ddsperf_run.hpp"
 #include "daemon/bench/live_run.hpp"
+#include "daemon/bench/lockstep_run.hpp"
 #include "daemon/bench/machine.hpp"
 
 namespace perimap::bench {
 
 // The parts, in the order in which they are run.
-inline const std::vector<std::string> kParts = {"live",    "subscribers", "recording", "load",
-                                                "workers", "rate",        "features"};
+inline const std::vector<std::string> kParts = {"live",    "ddsperf", "subscribers", "recording", "load",
+                                                "workers", "rate",    "features",    "cost",      "memory"};
 
 struct BenchSettings {
   BenchInput input;
   std::set<std::string> parts;  // of kParts
   int runs = 3;                 // of the part `live`
+  std::uint64_t frames = 6000;  // of the part `memory`
   int features = 200;
   int workers = 2;
   int priority = 80;  // of the runs with SCHED_FIFO
@@ -31,6 +36,9 @@ struct BenchReport {
   Machine machine;
   std::string begun_utc;
   std::vector<LiveResult> live;
+  std::vector<DdsperfResult> ddsperf;
+  std::vector<CostResult> cost;
+  std::optional<MemoryResult> memory;
   bool stopped = false;  // before its end
 };
 

@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <utility>
 #include <vector>
+
+#include "daemon/report/svg_plot.hpp"
 
 namespace perimap::bench {
 namespace {
@@ -80,6 +84,8 @@ std::string share(double value) { return fmt::format("{:.2f} %", 100.0 * value);
 std::string in_us(Duration d) { return fmt::format("{:.1f}", us(d)); }
 std::string in_ms(Duration d) { return fmt::format("{:.2f}", us(d) / 1e3); }
 
+std::string ratio(double a, double b) { return b > 0.0 ? fmt::format("{:.1f}", a / b) : "-"; }
+
 std::vector<std::string> cells(std::string name, const LatencyHistogram::Summary& s) {
   return {std::move(name), std::to_string(s.count), in_us(s.p50), in_us(s.p99), in_us(s.p999), in_us(s.max)};
 }
@@ -92,7 +98,7 @@ Table releases_table(const BenchReport& report) {
   Table table;
   table.title = "Releases";
   table.note =
-      "release: from the deadline to just before the write, composing included; bare: of a loop with the same wait, "
+      "release: from the deadline to just before the write; bare: of a loop with the same wait, "
       "priority and processor, 2 ms beside the releases; late by more than 0.5 ms counts as not on time.";
   table.head = {"run",   "features", "rate Hz", "release us: p50", "p99",
                 "p99.9", "max",      "on time", "bare us: p50",    "p99",
@@ -166,8 +172,92 @@ Table stages_table(const BenchReport& report) {
   return table;
 }
 
+Table ddsperf_table(const BenchReport& report) {
+  Table table;
+  table.title = "ddsperf, one way, us";
+  table.note =
+      "Half of the way there and back, best effort, on wait sets, normal scheduling, after the run that it is named "
+      "after; ours: write to receipt of that run, median. Percentiles are medians of those of each second.";
+  table.head = {"after", "bytes", "count", "p50", "p99", "max", "ours / ddsperf's p50"};
+  for (const DdsperfResult& one : report.ddsperf) {
+    if (!one.not_run.empty()) {
+      table.rows.push_back({one.beside + " (" + one.not_run + ")", std::to_string(one.bytes), "-", "-", "-", "-", "-"});
+      continue;
+    }
+    const auto run = std::find_if(report.live.begin(), report.live.end(), [&](const LiveResult& result) {
+      return result.live_case.part == "live" && result.live_case.name == one.beside;
+    });
+    table.rows.push_back({one.beside, std::to_string(one.bytes), std::to_string(one.count),
+                          fmt::format("{:.1f}", one.p50_us), fmt::format("{:.1f}", one.p99_us),
+                          fmt::format("{:.1f}", one.max_us),
+                          run == report.live.end() ? "-" : ratio(us(run->figures.write_to_receipt.p50), one.p50_us)});
+  }
+  return table;
+}
+
+Table cost_table(const BenchReport& report) {
+  Table table;
+  table.title = "Computing of a frame in lockstep, one worker, ms";
+  table.note =
+      "A to D as long as it took, others' use of the processor included; processor: time of all threads, finding and "
+      "starting features included. More than the configuration's features stand closer together.";
+  table.head = {"features asked for", "mapped", "frames", "A to D: p50",      "p99", "A: p50", "p99",
+                "processor: p50",     "p99",    "max",    "p50, us a feature"};
+  for (const CostResult& one : report.cost) {
+    table.rows.push_back({std::to_string(one.features_asked), fmt::format("{:.0f}", one.features),
+                          std::to_string(one.frames), in_ms(one.compute.p50), in_ms(one.compute.p99),
+                          in_ms(one.find.p50), in_ms(one.find.p99), in_ms(one.processor.p50), in_ms(one.processor.p99),
+                          in_ms(one.processor.max), ratio(us(one.processor.p50), one.features)});
+  }
+  return table;
+}
+
+Table memory_table(const BenchReport& report) {
+  Table table;
+  if (!report.memory) return table;
+  const MemoryResult& m = *report.memory;
+  table.title = "Resident memory in lockstep";
+  table.note = fmt::format(
+      "{} frames, {} rounds of the recording. At the seam all sources are silent for a second, which their counts "
+      "show; "
+      "all clocks go on and the map is kept.",
+      m.frames, m.rounds);
+  table.head = {"frames", "kB"};
+  for (const MemoryReading& reading : m.readings) {
+    table.rows.push_back({std::to_string(reading.frames), std::to_string(reading.resident_kB)});
+  }
+  return table;
+}
+
 std::vector<Table> tables(const BenchReport& report) {
-  return {releases_table(report), receipt_table(report), stages_table(report)};
+  return {releases_table(report), receipt_table(report), ddsperf_table(report),
+          cost_table(report),     memory_table(report),  stages_table(report)};
+}
+
+// What grows with the number of features, and what must not grow with time.
+std::vector<Plot> plots(const BenchReport& report) {
+  std::vector<Plot> all;
+  if (!report.cost.empty()) {
+    Plot plot{"computing of a frame", "features mapped", "ms", {}, false, true};
+    PlotLine median{{}, "#1f6f8b", 1.5, "A to D, median"};
+    PlotLine processor{{}, "#b5541c", 1.5, "processor, all threads, median"};
+    for (const CostResult& one : report.cost) {
+      median.points.push_back({one.features, us(one.compute.p50) / 1e3});
+      processor.points.push_back({one.features, us(one.processor.p50) / 1e3});
+    }
+    plot.lines = {median, processor};
+    all.push_back(plot);
+  }
+  if (report.memory) {
+    Plot plot{"resident memory", "frames", "MB", {}, false, true};
+    PlotLine line;
+    for (const MemoryReading& reading : report.memory->readings) {
+      line.points.push_back({static_cast<double>(reading.frames), static_cast<double>(reading.resident_kB) / 1024.0});
+    }
+    plot.lines = {line};
+    all.push_back(plot);
+  }
+  return all;
 }
 
 std::string machine_line(const Machine& m) {
@@ -279,6 +369,34 @@ Json to_json(const BenchReport& report) {
                {"not_proven", not_proven()}};
   json["live"] = Json::array();
   for (const LiveResult& result : report.live) json["live"].push_back(json_of(result));
+  json["ddsperf"] = Json::array();
+  for (const DdsperfResult& one : report.ddsperf) {
+    Json entry = {{"beside", one.beside}, {"bytes", one.bytes}};
+    if (one.not_run.empty()) {
+      entry.update(Json{{"count", one.count}, {"p50_us", one.p50_us}, {"p99_us", one.p99_us}, {"max_us", one.max_us}});
+    } else {
+      entry["not_run"] = one.not_run;
+    }
+    json["ddsperf"].push_back(std::move(entry));
+  }
+  json["cost"] = Json::array();
+  for (const CostResult& one : report.cost) {
+    json["cost"].push_back({{"features_asked", one.features_asked},
+                            {"features", one.features},
+                            {"frames", one.frames},
+                            {"processor", json_of(one.processor)},
+                            {"compute", json_of(one.compute)},
+                            {"find", json_of(one.find)}});
+  }
+  if (report.memory) {
+    Json& memory = json["memory"];
+    memory = {{"features_asked", report.memory->features_asked},
+              {"frames", report.memory->frames},
+              {"rounds", report.memory->rounds}};
+    for (const MemoryReading& reading : report.memory->readings) {
+      memory["readings"].push_back({{"frames", reading.frames}, {"resident_kB", reading.resident_kB}});
+    }
+  }
   return json;
 }
 
@@ -293,6 +411,7 @@ std::string to_html(const BenchReport& report) {
   for (const Table& table : tables(report)) {
     if (!table.rows.empty()) out += html_of(table);
   }
+  if (!report.cost.empty() || report.memory) out += svg_document(plots(report), "");
   out += "<h2>What these figures do not prove</h2>\n<ul>\n";
   for (const std::string& line : not_proven()) out += "<li>" + escaped(line) + "</li>\n";
   return out + "</ul>\n</body></html>\n";

@@ -1,6 +1,7 @@
 #include "daemon/bench/live_run.hpp"
 
 #include <fmt/format.h>
+#include <sys/mman.h>
 
 #include <algorithm>
 #include <array>
@@ -232,6 +233,7 @@ Expected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case
                         tick);
     ended = session.run(stop);
     bare.stop();
+    munlockall();  // the session locked what it could; the next run begins as this one did
     figures.priority_granted = threads.priority() == perimap_PRIVILEGE_GRANTED;
     const std::vector<LoggedRelease> releases = those_that_count(log.releases(), input.settle);
     add_releases(releases, figures);

@@ -34,7 +34,7 @@ struct StageFigures {
 
 // Of the time that counts, but for the counts, which are of the whole run.
 struct LiveFigures {
-  Figures tardiness;           // deadline to just before the write, composing included
+  Figures tardiness;           // deadline to just before the write
   Figures bare;                // deadline to wake-up of the loop beside it
   Figures dds_write;           // by itself
   Figures capture_to_release;  // capture to just before the write

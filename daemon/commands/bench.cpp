@@ -88,6 +88,7 @@ int run(const Options& options) {
   bench::BenchSettings settings = options.settings;
   const std::vector<std::string>& chosen = options.only.empty() ? bench::kParts : options.only;
   settings.parts.insert(chosen.begin(), chosen.end());
+  if (settings.parts.contains("ddsperf")) settings.parts.insert("live");  // it is held beside those
   if (!options.configuration.empty()) settings.input.configuration = options.configuration;
   settings.input.domain = kDomain;
   settings.input.settle = from_seconds(options.settle);
@@ -138,7 +139,7 @@ void add_bench_command(CLI::App& app, int& exit_code) {
                       "Configuration file; without it the recording's own configuration over the defaults");
   command->add_option("--json", options->json, "Write the figures as JSON to this file");
   command->add_option("--html", options->html, "Write one self-contained page to this file");
-  command->add_option("--only", options->only, "These parts alone")
+  command->add_option("--only", options->only, "These parts alone; ddsperf runs after each run of 'live'")
       ->check(CLI::IsMember(bench::kParts))
       ->delimiter(',');
   command->add_option("--seconds", options->seconds, "Measured a run")
@@ -149,6 +150,9 @@ void add_bench_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--runs", settings.runs, "How often the part 'live' is run")
       ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--frames", settings.frames, "Frames of the part 'memory'")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40))
       ->capture_default_str();
   command->add_option("--features", settings.features, "Features at a time")
       ->check(CLI::Range(1, 5000))

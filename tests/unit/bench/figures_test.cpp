@@ -4,6 +4,8 @@
 
 #include "daemon/bench/bare_loop.hpp"
 #include "daemon/bench/bench.hpp"
+#include "daemon/bench/ddsperf_run.hpp"
+#include "daemon/bench/lockstep_run.hpp"
 #include "daemon/bench/subscriber.hpp"
 
 namespace perimap::bench {
@@ -80,6 +82,103 @@ TEST(LiveCases, WithoutThePrivilegeNoneAsksForPriorityAndOnlyTheLoadAndTheLiveRu
   const auto refused = live_cases(settings, false);
   for (const LiveCase& one : refused) EXPECT_EQ(one.priority, 0) << one.name;
   EXPECT_EQ(permitted.size() - refused.size(), static_cast<std::size_t>(settings.runs) + 1);
+}
+
+TEST(Ddsperf, ItsLinesOfASecondAreRead) {
+  const auto second = parse_ddsperf_line(
+      "[27320] 2.000  vm:27318 size 30000 mean 73.489us min 37.781us 50% 75.342us 90% 95.557us 99% 112.166us max "
+      "113.5us cnt 60");
+  ASSERT_TRUE(second);
+  EXPECT_DOUBLE_EQ(second->p50_us, 75.342);
+  EXPECT_DOUBLE_EQ(second->p99_us, 112.166);
+  EXPECT_DOUBLE_EQ(second->max_us, 113.5);
+  EXPECT_EQ(second->count, 60);
+}
+
+TEST(Ddsperf, ItsOtherLinesAreNotTakenForFigures) {
+  for (const char* line : {"", "[27320] participant vm:27318: new", "[27320] 2.000  rss:7.6MB vcsw:135 ivcsw:7",
+                           "size 30000 mean 73.489us min 37.781us 50% 75.342us"}) {
+    EXPECT_FALSE(parse_ddsperf_line(line)) << line;
+  }
+}
+
+FrameEvent frame(std::uint64_t sequence, Duration capture) {
+  FrameEvent event;
+  event.stamp.sequence = sequence;
+  event.stamp.capture = from_ns(0) + capture;
+  event.stamp.arrival = event.stamp.capture + milliseconds(10);
+  return event;
+}
+
+EcgBlock block(std::uint32_t sequence, Duration first) {
+  EcgBlock ecg;
+  ecg.device_sequence = sequence;
+  ecg.count = 10;
+  ecg.sample_period = milliseconds(4);
+  ecg.first_sample_time = from_ns(0) + first;
+  ecg.arrival = ecg.first_sample_time + milliseconds(45);
+  return ecg;
+}
+
+// A recording of 2 s: frames 5 to 24 every 100 ms, ECG samples from 700 on.
+std::vector<ReplayEvent> recording() {
+  std::vector<ReplayEvent> events;
+  for (int i = 0; i < 20; ++i) {
+    events.emplace_back(frame(5U + static_cast<unsigned>(i), milliseconds(1000 + 100 * i)));
+    events.emplace_back(block(700U + 25U * static_cast<unsigned>(i), milliseconds(1000 + 100 * i)));
+  }
+  return events;
+}
+
+TEST(Rounds, GoOnAfterASecondOfSilenceThatTheCountsShow) {
+  Rounds rounds;
+  std::vector<FrameStamp> frames;
+  std::vector<EcgBlock> blocks;
+  for (int round = 0; round < 3; ++round) {
+    for (ReplayEvent& event : recording()) {
+      rounds.move(event);
+      if (const auto* f = std::get_if<FrameEvent>(&event)) frames.push_back(f->stamp);
+      if (const auto* e = std::get_if<EcgBlock>(&event)) blocks.push_back(*e);
+    }
+    rounds.next_round();
+  }
+  ASSERT_EQ(frames.size(), 60U);
+  EXPECT_EQ(frames.front().sequence, 5U);
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    const bool seam = i % 20 == 0;
+    // The last arrival is that of the last block, 35 ms after the last frame's.
+    EXPECT_EQ(frames[i].capture - frames[i - 1].capture, seam ? milliseconds(1035) : milliseconds(100)) << i;
+    EXPECT_EQ(frames[i].arrival - frames[i].capture, milliseconds(10)) << i;
+    EXPECT_EQ(frames[i].sequence - frames[i - 1].sequence, seam ? 10U : 1U) << i;
+  }
+  for (std::size_t i = 1; i < blocks.size(); ++i) {
+    const auto samples = static_cast<std::int64_t>(blocks[i].device_sequence - blocks[i - 1].device_sequence);
+    const Duration passed = blocks[i].first_sample_time - blocks[i - 1].first_sample_time;
+    EXPECT_NEAR(to_seconds(samples * milliseconds(4)), to_seconds(passed), 0.0041) << i;
+  }
+}
+
+TEST(Paced, PlaysEveryNthFrameFasterAndEndsAfterItsLength) {
+  const ReplayEdit edit = paced(2, 2.0, milliseconds(500));
+  std::vector<FrameStamp> frames;
+  bool ended = false;
+  for (ReplayEvent& event : recording()) {
+    const ReplayStep step = edit(event);
+    ended = ended || step == ReplayStep::kEnd;
+    if (ended) break;
+    const auto* f = std::get_if<FrameEvent>(&event);
+    if (f != nullptr && step == ReplayStep::kDeliver) frames.push_back(f->stamp);
+    if (const auto* e = std::get_if<EcgBlock>(&event)) {
+      EXPECT_EQ(e->sample_period, milliseconds(2));
+    }
+  }
+  EXPECT_TRUE(ended);
+  // 6, 8, 10, ... were 200 ms apart; the first arrival is at 1010 ms.
+  ASSERT_EQ(frames.size(), 5U);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(frames[i].sequence, 3U + i);
+    EXPECT_EQ(frames[i].arrival, from_ns(0) + milliseconds(1010 + 50 + 100 * static_cast<int>(i)));
+  }
 }
 
 }  // namespace
