@@ -65,6 +65,7 @@ void EcgIntake::hear(const EcgBlock& block) noexcept {
     interrupt();
   } else {
     tracker_.heard(heard_until_);
+    counters_.last_good_ecg_ns.set(static_cast<std::uint64_t>(to_ns(heard_until_)));
   }
   publish();
 }

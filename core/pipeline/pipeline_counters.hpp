@@ -19,12 +19,14 @@ struct PipelineCounters {
   Counter poses_dropped;  // full ring
   LatencyHistogram tracker_delay;
   Counter last_pose_ns;
+  Counter last_good_pose_ns;
   // ECG thread
   Counter ecg_samples;
   Counter ecg_lead_off;  // samples that mean nothing: the device said so, or the line was flat for a second
   Counter ecg_dropped;   // gaps in the device's sequence
   LatencyHistogram ecg_delay;
   Counter last_ecg_ns;
+  Counter last_good_ecg_ns;
   // R-trigger thread
   Counter r_triggers;
   Counter r_triggers_dropped;  // gaps in the device's count

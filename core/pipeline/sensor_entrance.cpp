@@ -61,7 +61,11 @@ void SensorEntrance::push_pose(const TrackerSample& sample) noexcept {
   counters_.poses_received.add();
   counters_.tracker_delay.add(sample.arrival - sample.source_time);
   counters_.last_pose_ns.set(static_cast<std::uint64_t>(to_ns(sample.source_time)));
-  if (sample.state != ToolState::kOk) counters_.poses_invalid.add();
+  if (sample.state == ToolState::kOk) {
+    counters_.last_good_pose_ns.set(static_cast<std::uint64_t>(to_ns(sample.source_time)));
+  } else {
+    counters_.poses_invalid.add();
+  }
   if (!poses_.push(sample)) {
     counters_.poses_dropped.add();
     return;

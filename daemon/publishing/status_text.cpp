@@ -13,9 +13,31 @@ using Json = nlohmann::ordered_json;
 
 double ms(std::int64_t ns) { return static_cast<double>(ns) * 1e-6; }
 
+Json sources_json(const perimap_Status& status, std::span<const perimap_SourceStatus> sources) {
+  Json json = Json::object();
+  for (const perimap_SourceStatus& source : sources) {
+    const bool any_good = source.last_good_time_ns != 0;
+    json[std::string(name_of(source.kind))] = {
+        {"state", name_of(source.state)},
+        {"received", source.received},
+        {"rate_hz", source.rate_hz},
+        {"dropped", source.dropped},
+        {"invalid", source.invalid},
+        {"age_ms", ms(status.time_ns - source.last_source_time_ns)},
+        {"last_good_age_ms", any_good ? Json(ms(status.time_ns - source.last_good_time_ns)) : Json(nullptr)},
+        {"delay_p50_ms", ms(source.delay_p50_ns)},
+        {"delay_p99_ms", ms(source.delay_p99_ns)},
+        {"delay_max_ms", ms(source.delay_max_ns)},
+        {"jitter_p50_ms", ms(source.jitter_p50_ns)},
+        {"jitter_p99_ms", ms(source.jitter_p99_ns)}};
+  }
+  return json;
+}
+
 }  // namespace
 
-Json status_json(const perimap_Status& status, std::span<const perimap_StageLatency> stages) {
+Json status_json(const perimap_Status& status, std::span<const perimap_StageLatency> stages,
+                 std::span<const perimap_SourceStatus> sources) {
   Json json = {{"version", status.version},
                {"realtime_priority", name_of(status.realtime_priority)},
                {"memory_locked", name_of(status.memory_locked)},
@@ -45,29 +67,30 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
                {"features_started_anew", status.features_started_anew}};
   Json by_stage = Json::object();
   for (const perimap_StageLatency& stage : stages) {
-    by_stage[std::string(name_of(stage.kind))] = {
-        {"count", stage.count}, {"p50", ms(stage.p50_ns)}, {"p99", ms(stage.p99_ns)}, {"max", ms(stage.max_ns)}};
+    by_stage[std::string(name_of(stage.kind))] = {{"count", stage.count},
+                                                  {"p50", ms(stage.p50_ns)},
+                                                  {"p99", ms(stage.p99_ns)},
+                                                  {"p999", ms(stage.p999_ns)},
+                                                  {"max", ms(stage.max_ns)},
+                                                  {"recent",
+                                                   {{"count", stage.recent_count},
+                                                    {"p50", ms(stage.recent_p50_ns)},
+                                                    {"p99", ms(stage.recent_p99_ns)},
+                                                    {"p999", ms(stage.recent_p999_ns)},
+                                                    {"max", ms(stage.recent_max_ns)}}}};
   }
+  json["recent_s"] = ms(status.recent_ns) * 1e-3;
   json["stages_ms"] = std::move(by_stage);
+  json["sources"] = sources_json(status, sources);
   return json;
 }
 
 Json full_status_json(const perimap_Status& status) {
-  Json json = status_json(status, {status.stages._buffer, status.stages._length});
+  Json json = status_json(status, {status.stages._buffer, status.stages._length},
+                          {status.sources._buffer, status.sources._length});
   json["features_converging"] = status.features_converging;
   json["features_converged"] = status.features_converged;
   json["features_inconsistent"] = status.features_inconsistent;
-  Json sources = Json::object();
-  for (const perimap_SourceStatus& source : std::span(status.sources._buffer, status.sources._length)) {
-    sources[std::string(name_of(source.kind))] = {{"state", name_of(source.state)},
-                                                  {"received", source.received},
-                                                  {"dropped", source.dropped},
-                                                  {"invalid", source.invalid},
-                                                  {"age_ms", ms(status.time_ns - source.last_source_time_ns)},
-                                                  {"delay_p50_ms", ms(source.delay_p50_ns)},
-                                                  {"delay_max_ms", ms(source.delay_max_ns)}};
-  }
-  json["sources"] = std::move(sources);
   return json;
 }
 

@@ -12,7 +12,8 @@ namespace perimap {
 // Names are those of perimap.idl without their prefix, times in ms. Values may come from outside: none is trusted as an
 // index.
 [[nodiscard]] nlohmann::ordered_json status_json(const perimap_Status& status,
-                                                 std::span<const perimap_StageLatency> stages);
+                                                 std::span<const perimap_StageLatency> stages,
+                                                 std::span<const perimap_SourceStatus> sources);
 
 // What it publishes, and which sources are not well. With the sequences that the status itself has.
 [[nodiscard]] std::string status_line(const perimap_Status& status);

@@ -35,8 +35,8 @@ std::string_view name_of(perimap_FeatureReason reason) noexcept {
 }
 
 std::string_view name_of(perimap_StageKind kind) noexcept {
-  return name_in<7>({"predict_and_find", "phase_and_pose", "evaluate", "learn", "capture_to_update",
-                     "release_tardiness", "dds_write"},
+  return name_in<8>({"predict_and_find", "phase_and_pose", "evaluate", "learn", "capture_to_update",
+                     "release_tardiness", "dds_write", "frame"},
                     static_cast<int>(kind));
 }
 

@@ -1,6 +1,7 @@
 #include "daemon/publishing/wire_reports.hpp"
 
 #include <algorithm>
+#include <optional>
 
 #include "daemon/publishing/wire_surface.hpp"
 #include "daemon/publishing/wire_text.hpp"
@@ -129,7 +130,8 @@ constexpr Duration kLongestBeat = std::chrono::seconds(3);
 
 perimap_SourceStatus source_status(perimap_SourceKind kind, const StatusFacts& facts, const SourceLink& link,
                                    Instant now, std::uint64_t received, std::uint64_t dropped, std::uint64_t invalid,
-                                   const Counter& last_ns, const LatencyHistogram& delay) noexcept {
+                                   const Counter& last_ns, const Counter& last_good_ns,
+                                   const LatencyHistogram& delay) noexcept {
   const LatencyHistogram::Summary summary = delay.summary();
   const auto last = static_cast<std::int64_t>(last_ns.get());
   perimap_SourceStatus wire{};
@@ -148,16 +150,34 @@ perimap_SourceStatus source_status(perimap_SourceKind kind, const StatusFacts& f
   wire.dropped = dropped;
   wire.invalid = invalid;
   wire.last_source_time_ns = last;
+  wire.last_good_time_ns = static_cast<std::int64_t>(last_good_ns.get());
   wire.delay_p50_ns = summary.p50.count();
+  wire.delay_p99_ns = summary.p99.count();
   wire.delay_max_ns = summary.max.count();
   wire.jitter_p50_ns = link.jitter_p50.count();
   wire.jitter_p99_ns = link.jitter_p99.count();
   return wire;
 }
 
-perimap_StageLatency stage_latency(perimap_StageKind kind, const LatencyHistogram& histogram) noexcept {
-  const LatencyHistogram::Summary summary = histogram.summary();
-  return {kind, summary.count, summary.p50.count(), summary.p99.count(), summary.max.count()};
+// `then`: the counts of some seconds ago; null when they are not known.
+perimap_StageLatency stage_latency(perimap_StageKind kind, const LatencyHistogram& histogram,
+                                   const LatencyHistogram::Counts* then) noexcept {
+  const LatencyHistogram::Summary all = histogram.summary();
+  perimap_StageLatency wire{};
+  wire.kind = kind;
+  wire.count = all.count;
+  wire.p50_ns = all.p50.count();
+  wire.p99_ns = all.p99.count();
+  wire.p999_ns = all.p999.count();
+  wire.max_ns = all.max.count();
+  if (then == nullptr) return wire;
+  const LatencyHistogram::Summary recent = LatencyHistogram::between(*then, histogram.counts());
+  wire.recent_count = recent.count;
+  wire.recent_p50_ns = recent.p50.count();
+  wire.recent_p99_ns = recent.p99.count();
+  wire.recent_p999_ns = recent.p999.count();
+  wire.recent_max_ns = recent.max.count();
+  return wire;
 }
 
 }  // namespace
@@ -296,29 +316,35 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
 
   std::uint32_t sources = 0;
   sources_[sources++] = source_status(perimap_SOURCE_CAMERA, facts, facts.camera, now, c.frames_received.get(),
-                                      c.frames_dropped.get(), 0, c.last_frame_ns, c.camera_delay);
+                                      c.frames_dropped.get(), 0, c.last_frame_ns, c.last_frame_ns, c.camera_delay);
   sources_[sources++] = source_status(perimap_SOURCE_TRACKER, facts, facts.tracker, now, c.poses_received.get(),
                                       c.poses_dropped.get() + c.poses_refused.get(), c.poses_invalid.get(),
-                                      c.last_pose_ns, c.tracker_delay);
+                                      c.last_pose_ns, c.last_good_pose_ns, c.tracker_delay);
   if (facts.ecg_device) {
-    sources_[sources++] = source_status(perimap_SOURCE_ECG, facts, facts.ecg, now, c.ecg_samples.get(),
-                                        c.ecg_dropped.get(), c.ecg_lead_off.get(), c.last_ecg_ns, c.ecg_delay);
+    sources_[sources++] =
+        source_status(perimap_SOURCE_ECG, facts, facts.ecg, now, c.ecg_samples.get(), c.ecg_dropped.get(),
+                      c.ecg_lead_off.get(), c.last_ecg_ns, c.last_good_ecg_ns, c.ecg_delay);
   }
   if (facts.r_trigger) {
     StatusFacts beats = facts;
     beats.stalled_after = std::max(facts.stalled_after, kLongestBeat);
-    sources_[sources++] = source_status(perimap_SOURCE_R_TRIGGER, beats, facts.r_trigger_line, now, c.r_triggers.get(),
-                                        c.r_triggers_dropped.get(), 0, c.last_r_trigger_ns, c.r_trigger_delay);
+    sources_[sources++] =
+        source_status(perimap_SOURCE_R_TRIGGER, beats, facts.r_trigger_line, now, c.r_triggers.get(),
+                      c.r_triggers_dropped.get(), 0, c.last_r_trigger_ns, c.last_r_trigger_ns, c.r_trigger_delay);
   }
   wire_.sources = {sources, sources, sources_, false};
 
-  stages_[0] = stage_latency(perimap_STAGE_PREDICT_AND_FIND, c.predict_and_find);
-  stages_[1] = stage_latency(perimap_STAGE_PHASE_AND_POSE, c.phase_and_pose);
-  stages_[2] = stage_latency(perimap_STAGE_EVALUATE, c.evaluate);
-  stages_[3] = stage_latency(perimap_STAGE_LEARN, c.learn);
-  stages_[4] = stage_latency(perimap_STAGE_CAPTURE_TO_UPDATE, c.capture_to_update);
-  stages_[5] = stage_latency(perimap_STAGE_RELEASE_TARDINESS, c.release_tardiness);
-  stages_[6] = stage_latency(perimap_STAGE_DDS_WRITE, c.dds_write);
+  const std::optional<CountsThen> then = facts.recent != nullptr ? facts.recent->then() : std::nullopt;
+  wire_.recent_ns = then ? (now - then->time).count() : 0;
+  for (std::uint32_t i = 0; i < sources; ++i) {
+    sources_[i].rate_hz = then && now > then->time ? static_cast<double>(sources_[i].received - then->received[i]) /
+                                                         to_seconds(now - then->time)
+                                                   : 0.0;
+  }
+  for (std::size_t i = 0; i < kStatusStages.size(); ++i) {
+    stages_[i] = stage_latency(kStatusStages[i].kind, c.*kStatusStages[i].histogram, then ? &then->stages[i] : nullptr);
+  }
+  constexpr auto kStages = static_cast<std::uint32_t>(kStatusStages.size());
   wire_.stages = {kStages, kStages, stages_, false};
   return wire_;
 }

@@ -14,6 +14,7 @@
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/surface_state.hpp"
 #include "daemon/publishing/identity.hpp"
+#include "daemon/publishing/recent_counts.hpp"
 
 namespace perimap {
 
@@ -86,6 +87,7 @@ struct StatusFacts {
   bool r_trigger = false;                           // R peaks come from a trigger line
   bool ecg_device = true;                           // beside the trigger there need be none
   SourceLink camera, tracker, ecg, r_trigger_line;  // as they are without a device: open, and without jitter
+  const RecentCounts* recent = nullptr;             // none: nothing is told of the last seconds
 };
 
 class WireStatus {
@@ -95,10 +97,8 @@ class WireStatus {
                                            Instant now) noexcept;
 
  private:
-  static constexpr std::size_t kSources = 4;
-  static constexpr std::size_t kStages = 7;
-  perimap_SourceStatus sources_[kSources]{};
-  perimap_StageLatency stages_[kStages]{};
+  perimap_SourceStatus sources_[kStatusSources.size()]{};
+  perimap_StageLatency stages_[kStatusStages.size()]{};
   perimap_Status wire_{};
 };
 

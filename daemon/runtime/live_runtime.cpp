@@ -73,6 +73,7 @@ StatusFacts LiveRuntime::facts() const noexcept {
   facts.latency = pipeline_.settings().latency;
   facts.latency_short = check_latency(pipeline_.settings(), pipeline_.counters()).too_short;
   facts.stalled_after = settings_.stalled_after;
+  facts.recent = &recent_;
   facts.sources_ended = sources_ended_.load(std::memory_order_relaxed);
   return facts;
 }
@@ -141,6 +142,7 @@ void LiveRuntime::run_status() {
   for (;;) {
     const bool last = stopping_.load(std::memory_order_relaxed);
     const Instant now = MonotonicClock::now();
+    recent_.note(pipeline_.counters(), now);
     const CardiacClock clock = pipeline_.status_clock(now);
     const RespiratoryClock respiration = pipeline_.status_respiration();
     publication_.phase(wire_phase_.fill(clock, now));

@@ -78,6 +78,7 @@ class LiveRuntime {
   WireModel wire_model_;
   WirePhase wire_phase_;
   WireStatus wire_status_;
+  RecentCounts recent_;
   Wakeup status_wakeup_;
   std::vector<std::thread> workers_;
   std::vector<std::thread> housekeepers_;

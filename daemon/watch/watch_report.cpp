@@ -54,6 +54,35 @@ std::string state_text(const SurfaceDigest& last) {
                                                     : fmt::format("{} ({})", name_of(last.state), name_of(last.reason));
 }
 
+// What a release was late, and what a frame cost, over the last seconds; nothing when the publisher does not tell.
+std::string stages_text(const StatusDigest& status) {
+  std::string text;
+  for (const perimap_StageLatency& stage : status.stages) {
+    if (stage.recent_count == 0 || (stage.kind != perimap_STAGE_RELEASE_TARDINESS && stage.kind != perimap_STAGE_FRAME))
+      continue;
+    text += fmt::format(" | {} {:.2f} (p99 {:.2f}, p99.9 {:.2f}, max {:.2f}) ms",
+                        stage.kind == perimap_STAGE_FRAME ? "frame" : "release", ms(Duration(stage.recent_p50_ns)),
+                        ms(Duration(stage.recent_p99_ns)), ms(Duration(stage.recent_p999_ns)),
+                        ms(Duration(stage.recent_max_ns)));
+  }
+  return text;
+}
+
+// Every stage, since the publisher's start and over its last seconds.
+std::string stage_table(const StatusDigest& status) {
+  std::string text = fmt::format("  {:<20}{:>10}{:>9}{:>9}{:>9}{:>9}   last {:>4.0f} s:{:>9}{:>9}{:>9}{:>9}  (ms)\n",
+                                 "publisher's stages", "count", "p50", "p99", "p99.9", "max",
+                                 to_seconds(Duration(status.status.recent_ns)), "p50", "p99", "p99.9", "max");
+  for (const perimap_StageLatency& s : status.stages) {
+    const auto in_ms = [](std::int64_t ns) { return ms(Duration(ns)); };
+    text +=
+        fmt::format("  {:<20}{:>10}{:>9.3f}{:>9.3f}{:>9.3f}{:>9.3f}{:>14}{:>9.3f}{:>9.3f}{:>9.3f}{:>9.3f}\n",
+                    name_of(s.kind), s.count, in_ms(s.p50_ns), in_ms(s.p99_ns), in_ms(s.p999_ns), in_ms(s.max_ns), "",
+                    in_ms(s.recent_p50_ns), in_ms(s.recent_p99_ns), in_ms(s.recent_p999_ns), in_ms(s.recent_max_ns));
+  }
+  return text;
+}
+
 // On one line whatever bytes the publisher put into its names.
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
@@ -80,6 +109,7 @@ std::string report_line(const StreamReport& report) {
                     last.cardiac_phase_deviation_rad * kDegreesPerRadian,
                     last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian, features_text(last), state_text(last));
   }
+  if (report.status) line += stages_text(*report.status);
   if (report.status && report.status->status.recording == perimap_RECORDING_STOPPED) line += " | RECORDING STOPPED";
   return line;
 }
@@ -95,6 +125,7 @@ std::string summary_text(const StreamReport& report) {
   if (report.last) {
     text += fmt::format("  last surface: {}; {}\n", state_text(*report.last), features_text(*report.last));
   }
+  if (report.status && !report.status->stages.empty()) text += stage_table(*report.status);
   return text;
 }
 
@@ -127,7 +158,7 @@ std::string report_json(const StreamReport& report, ReportKind kind) {
     json["median_deviation_mm"] = last.median_deviation_mm ? Json(*last.median_deviation_mm) : Json(nullptr);
   }
   if (report.status) {
-    json["status"] = status_json(report.status->status, report.status->stages);
+    json["status"] = status_json(report.status->status, report.status->stages, report.status->sources);
   }
   return dump(json);
 }

@@ -75,6 +75,7 @@ void WatchStatistics::add(const perimap_Surface& surface, Instant receipt) {
 void WatchStatistics::add(const perimap_Status& status) {
   StatusDigest digest;
   digest.stages.assign(status.stages._buffer, status.stages._buffer + status.stages._length);
+  digest.sources.assign(status.sources._buffer, status.sources._buffer + status.sources._length);
   digest.status = status;
   digest.status.sources = {};
   digest.status.stages = {};

@@ -29,10 +29,11 @@ struct SurfaceDigest {
   std::optional<double> median_deviation_mm;
 };
 
-// The last status of a stream, without its lists of sources.
+// The last status of a stream.
 struct StatusDigest {
   perimap_Status status{};  // its sequences are empty
   std::vector<perimap_StageLatency> stages;
+  std::vector<perimap_SourceStatus> sources;
 };
 
 // What one stream of one source did over some time.

@@ -70,9 +70,12 @@ TEST_F(Entrance, RefusesAFrameOfAnotherSize) {
 
 TEST_F(Entrance, CountsInvalidPosesAndKeepsThem) {
   TrackerSample sample;
+  sample.source_time = sample.arrival = from_ns(1'000'000);
   sample.state = ToolState::kMissing;
   entrance->push_pose(sample);
   EXPECT_EQ(counters.poses_invalid.get(), 1U);
+  EXPECT_EQ(counters.last_pose_ns.get(), 1'000'000U);
+  EXPECT_EQ(counters.last_good_pose_ns.get(), 0U);
   TrackerSample popped;
   ASSERT_TRUE(entrance->pop_pose(popped));
   EXPECT_EQ(popped.state, ToolState::kMissing);

@@ -217,6 +217,9 @@ void fill(Filler& next, perimap_SourceStatus& s) {
   next(s.delay_max_ns);
   next(s.jitter_p50_ns);
   next(s.jitter_p99_ns);
+  next(s.rate_hz);
+  next(s.delay_p99_ns);
+  next(s.last_good_time_ns);
 }
 
 void fill(Filler& next, perimap_StageLatency& s) {
@@ -225,6 +228,12 @@ void fill(Filler& next, perimap_StageLatency& s) {
   next(s.p50_ns);
   next(s.p99_ns);
   next(s.max_ns);
+  next(s.p999_ns);
+  next(s.recent_count);
+  next(s.recent_p50_ns);
+  next(s.recent_p99_ns);
+  next(s.recent_p999_ns);
+  next(s.recent_max_ns);
 }
 
 void fill(Filler& next, perimap_Status& s) {
@@ -264,6 +273,7 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.phase_state);
   next(s.rhythm);
   next(s.latency_short);
+  next(s.recent_ns);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -482,14 +492,25 @@ json to_json(const perimap_Phase& s) {
 }
 template <>
 json to_json(const perimap_SourceStatus& s) {
-  return {MEMBER(kind),         MEMBER(state),        MEMBER(received),
-          MEMBER(dropped),      MEMBER(invalid),      MEMBER(last_source_time_ns),
-          MEMBER(delay_p50_ns), MEMBER(delay_max_ns), MEMBER(jitter_p50_ns),
-          MEMBER(jitter_p99_ns)};
+  return {MEMBER(kind),
+          MEMBER(state),
+          MEMBER(received),
+          MEMBER(dropped),
+          MEMBER(invalid),
+          MEMBER(last_source_time_ns),
+          MEMBER(delay_p50_ns),
+          MEMBER(delay_max_ns),
+          MEMBER(jitter_p50_ns),
+          MEMBER(jitter_p99_ns),
+          MEMBER(rate_hz),
+          MEMBER(delay_p99_ns),
+          MEMBER(last_good_time_ns)};
 }
 template <>
 json to_json(const perimap_StageLatency& s) {
-  return {MEMBER(kind), MEMBER(count), MEMBER(p50_ns), MEMBER(p99_ns), MEMBER(max_ns)};
+  return {MEMBER(kind),          MEMBER(count),          MEMBER(p50_ns),       MEMBER(p99_ns),
+          MEMBER(max_ns),        MEMBER(p999_ns),        MEMBER(recent_count), MEMBER(recent_p50_ns),
+          MEMBER(recent_p99_ns), MEMBER(recent_p999_ns), MEMBER(recent_max_ns)};
 }
 template <>
 json to_json(const perimap_Status& s) {
@@ -528,7 +549,8 @@ json to_json(const perimap_Status& s) {
           MEMBER(other_not_recorded),
           MEMBER(phase_state),
           MEMBER(rhythm),
-          MEMBER(latency_short)};
+          MEMBER(latency_short),
+          MEMBER(recent_ns)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {

@@ -1,0 +1,66 @@
+// What the pipeline had counted some seconds ago, so that the status can tell of the last seconds by themselves.
+#pragma once
+
+#include <perimap.h>
+
+#include <array>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+// In the order in which the status has them.
+struct StatusStage {
+  perimap_StageKind kind;
+  LatencyHistogram PipelineCounters::*histogram;
+};
+inline constexpr std::array<StatusStage, 8> kStatusStages = {
+    {{perimap_STAGE_PREDICT_AND_FIND, &PipelineCounters::predict_and_find},
+     {perimap_STAGE_PHASE_AND_POSE, &PipelineCounters::phase_and_pose},
+     {perimap_STAGE_EVALUATE, &PipelineCounters::evaluate},
+     {perimap_STAGE_LEARN, &PipelineCounters::learn},
+     {perimap_STAGE_CAPTURE_TO_UPDATE, &PipelineCounters::capture_to_update},
+     {perimap_STAGE_RELEASE_TARDINESS, &PipelineCounters::release_tardiness},
+     {perimap_STAGE_DDS_WRITE, &PipelineCounters::dds_write},
+     {perimap_STAGE_FRAME, &PipelineCounters::frame_compute}}};
+
+struct StatusSource {
+  perimap_SourceKind kind;
+  Counter PipelineCounters::*received;
+};
+inline constexpr std::array<StatusSource, 4> kStatusSources = {
+    {{perimap_SOURCE_CAMERA, &PipelineCounters::frames_received},
+     {perimap_SOURCE_TRACKER, &PipelineCounters::poses_received},
+     {perimap_SOURCE_ECG, &PipelineCounters::ecg_samples},
+     {perimap_SOURCE_R_TRIGGER, &PipelineCounters::r_triggers}}};
+
+// The counts at one moment.
+struct CountsThen {
+  Instant time;
+  std::array<LatencyHistogram::Counts, kStatusStages.size()> stages{};
+  std::array<std::uint64_t, kStatusSources.size()> received{};
+};
+
+// Not for the real-time path: it locks. The threads that count know nothing of it.
+class RecentCounts {
+ public:
+  static constexpr Duration kWindow = std::chrono::seconds(10);
+
+  RecentCounts();
+
+  // At least once a second. Any thread.
+  void note(const PipelineCounters& counters, Instant now);
+  // The counts of kWindow ago, to a second; of the first note, when that is not so long ago. Any thread.
+  [[nodiscard]] std::optional<CountsThen> then() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<CountsThen> moments_;  // a second apart, the oldest first
+};
+
+}  // namespace perimap

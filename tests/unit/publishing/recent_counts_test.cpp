@@ -1,0 +1,103 @@
+#include "daemon/publishing/recent_counts.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "daemon/publishing/status_text.hpp"
+#include "daemon/publishing/wire_reports.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+const Instant kStart = from_ns(0) + seconds(1000);
+
+class RecentCountsTest : public ::testing::Test {
+ protected:
+  // A second in which every release was so late and the tracker gave 100 poses, noted at its end.
+  void pass_second(Duration tardiness) {
+    now_ += seconds(1);
+    for (int i = 0; i < 60; ++i) counters_->release_tardiness.add(tardiness);
+    counters_->poses_received.add(100);
+    counters_->last_pose_ns.set(static_cast<std::uint64_t>(to_ns(now_)));
+    recent_.note(*counters_, now_);
+  }
+  perimap_StageLatency tardiness(const perimap_Status& status) {
+    const perimap_StageLatency* begin = status.stages._buffer;
+    return *std::find_if(begin, begin + status.stages._length,
+                         [](const auto& stage) { return stage.kind == perimap_STAGE_RELEASE_TARDINESS; });
+  }
+  const perimap_Status& status() {
+    StatusFacts facts;
+    facts.recent = &recent_;
+    return wire_.fill(*counters_, facts, now_);
+  }
+
+  std::unique_ptr<PipelineCounters> counters_ = std::make_unique<PipelineCounters>();
+  RecentCounts recent_;
+  WireStatus wire_{Identity{"a", "frame", "tracker"}};
+  Instant now_ = kStart;
+};
+
+TEST_F(RecentCountsTest, WhatIsLongAgoCountsSinceTheStartAlone) {
+  recent_.note(*counters_, now_);
+  pass_second(milliseconds(30));
+  for (int i = 0; i < 20; ++i) pass_second(microseconds(10));
+  const perimap_Status& told = status();
+  EXPECT_EQ(told.recent_ns, 10'000'000'000);
+  const perimap_StageLatency stage = tardiness(told);
+  EXPECT_EQ(stage.count, 21U * 60U);
+  EXPECT_EQ(stage.max_ns, 30'000'000);
+  EXPECT_EQ(stage.recent_count, 10U * 60U);
+  EXPECT_NEAR(static_cast<double>(stage.recent_max_ns), 10e3, 10e3 / 16);
+  EXPECT_NEAR(static_cast<double>(stage.recent_p999_ns), 10e3, 10e3 / 16);
+  EXPECT_DOUBLE_EQ(told.sources._buffer[1].rate_hz, 100.0);
+}
+
+TEST_F(RecentCountsTest, OneLateReleaseInTheLastSecondsIsSeenThere) {
+  recent_.note(*counters_, now_);
+  for (int i = 0; i < 20; ++i) pass_second(microseconds(10));
+  counters_->release_tardiness.add(milliseconds(5));
+  const perimap_StageLatency stage = tardiness(status());
+  EXPECT_NEAR(static_cast<double>(stage.recent_max_ns), 5e6, 5e6 / 16);
+  EXPECT_NEAR(static_cast<double>(stage.recent_p50_ns), 10e3, 10e3 / 16);
+}
+
+TEST_F(RecentCountsTest, BeforeTenSecondsHavePassedTheyReachToTheStart) {
+  recent_.note(*counters_, now_);
+  for (int i = 0; i < 3; ++i) pass_second(microseconds(10));
+  EXPECT_EQ(status().recent_ns, 3'000'000'000);
+  EXPECT_EQ(tardiness(status()).recent_count, 180U);
+}
+
+TEST_F(RecentCountsTest, NotesMoreOftenThanOnceASecondDoNotShortenThem) {
+  for (int i = 0; i < 300; ++i) recent_.note(*counters_, now_ + milliseconds(100) * i);
+  now_ += milliseconds(100) * 300;
+  EXPECT_GE(status().recent_ns, 10'000'000'000);
+  EXPECT_LE(status().recent_ns, 11'000'000'000);
+}
+
+TEST_F(RecentCountsTest, WithoutThemTheStatusSaysSo) {
+  pass_second(microseconds(10));
+  const perimap_Status& told = wire_.fill(*counters_, StatusFacts{}, now_);
+  EXPECT_EQ(told.recent_ns, 0);
+  EXPECT_EQ(tardiness(told).recent_count, 0U);
+  EXPECT_EQ(tardiness(told).count, 60U);
+}
+
+TEST_F(RecentCountsTest, TheStatusTellsWhenASourceWasLastGood) {
+  pass_second(microseconds(10));
+  EXPECT_TRUE(full_status_json(status())["sources"]["tracker"]["last_good_age_ms"].is_null());
+  counters_->last_good_pose_ns.set(static_cast<std::uint64_t>(to_ns(now_ - milliseconds(250))));
+  const auto json = full_status_json(status());
+  EXPECT_DOUBLE_EQ(json["sources"]["tracker"]["last_good_age_ms"], 250.0);
+  EXPECT_DOUBLE_EQ(json["sources"]["tracker"]["age_ms"], 0.0);
+}
+
+}  // namespace
+}  // namespace perimap
