@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 namespace perimap::bench {
 namespace {
@@ -46,9 +47,9 @@ std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_real
   for (const int workers : {1, 2, 4}) {
     add("workers", fmt::format("{} workers", workers), best, [&](LiveCase& one) { one.workers = workers; });
   }
-  for (const int every : {4, 2, 1}) {
-    add("rate", every == 1 ? "every frame" : fmt::format("every {}th frame", every), best,
-        [&](LiveCase& one) { one.every_frame = every; });
+  for (const auto& [every, name] :
+       {std::pair{4, "a quarter of the frames"}, std::pair{2, "half of the frames"}, std::pair{1, "all frames"}}) {
+    add("rate", name, best, [every = every](LiveCase& one) { one.every_frame = every; });
   }
   add("rate", "twice as fast", best, [](LiveCase& one) { one.speed = 2.0; });
   for (const int features : {50, 100, 200, 400, 1000}) {

@@ -222,9 +222,10 @@ Table memory_table(const BenchReport& report) {
       "show; "
       "all clocks go on and the map is kept.",
       m.frames, m.rounds);
-  table.head = {"frames", "kB"};
+  table.head = {"frames", "kB", "features mapped"};
   for (const MemoryReading& reading : m.readings) {
-    table.rows.push_back({std::to_string(reading.frames), std::to_string(reading.resident_kB)});
+    table.rows.push_back(
+        {std::to_string(reading.frames), std::to_string(reading.resident_kB), std::to_string(reading.features)});
   }
   return table;
 }
@@ -394,7 +395,8 @@ Json to_json(const BenchReport& report) {
               {"frames", report.memory->frames},
               {"rounds", report.memory->rounds}};
     for (const MemoryReading& reading : report.memory->readings) {
-      memory["readings"].push_back({{"frames", reading.frames}, {"resident_kB", reading.resident_kB}});
+      memory["readings"].push_back(
+          {{"frames", reading.frames}, {"resident_kB", reading.resident_kB}, {"features", reading.features}});
     }
   }
   return json;

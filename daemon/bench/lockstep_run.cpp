@@ -134,7 +134,7 @@ Expected<MemoryResult> run_memory(const BenchInput& input, int features, int wor
   result.features_asked = features;
   Rounds rounds;
   std::optional<ReplayReader> reader(std::move(setup->reader));
-  const auto read = [&] { result.readings.push_back({counters.frames.get(), resident_kB()}); };
+  const auto read = [&] { result.readings.push_back({counters.frames.get(), resident_kB(), mapped(counters)}); };
   for (;;) {
     const std::uint64_t before = counters.frames.get();
     while (!stop.requested() && counters.frames.get() < frames) {

@@ -27,6 +27,7 @@ struct CostResult {
 struct MemoryReading {
   std::uint64_t frames = 0;
   std::uint64_t resident_kB = 0;
+  std::uint64_t features = 0;  // mapped
 };
 struct MemoryResult {
   int features_asked = 0;
