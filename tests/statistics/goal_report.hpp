@@ -51,6 +51,14 @@ class GoalReport {
     failed_ += good ? 0 : 1;
   }
 
+  // Values that are not judged.
+  static void line_of(const std::string& what, const std::vector<double>& values) {
+    fmt::print("{:<50}", what);
+    for (const double value : values) fmt::print("{:>9.3f}", value);
+    fmt::print("\n");
+    std::fflush(stdout);
+  }
+
   [[nodiscard]] int failed() const noexcept { return failed_; }
 
  private:

@@ -3,15 +3,28 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "drivers/simulator/heart_mesh.hpp"
+#include "drivers/simulator/heart_motion.hpp"
 #include "goal_report.hpp"
 
 namespace perimap::test {
 
+// What displayed_ahead() simulates; empty lists and a duration of 0: as much as the extent asks for.
+struct HorizonScenes {
+  std::vector<std::string> records;
+  std::vector<MotionLaw> laws;
+  int width = 400;  // px
+  int height = 300;
+  int duration_s = 0;
+};
+
 struct Extent {
   bool whole = false;  // the long form
   std::uint64_t seed = 1;
+  HorizonScenes horizons;
 };
 
 // No feature is lost, whatever depth it is supposed at and with gross outliers.

@@ -13,6 +13,7 @@
 int main(int argc, char** argv) {
   using perimap::test::Extent;
   using perimap::test::GoalReport;
+  using perimap::test::HorizonScenes;
   using Goal = void (*)(const Extent&, const perimap::HeartMesh&, GoalReport&);
   const std::map<std::string, Goal> goals{
       {"lost", perimap::test::no_feature_is_lost},      {"optimal", perimap::test::as_exact_as_the_data_allow},
@@ -27,7 +28,19 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"lost", "optimal", "drift", "pose", "ecg", "horizons"}));
   app.add_flag("--long", extent.whole, "As many trials as the figures in docs/experiments.md and docs/ecg.md");
   app.add_option("--seed", extent.seed, "Another seed, other trials")->capture_default_str();
+  HorizonScenes& scenes = extent.horizons;
+  const std::map<std::string, perimap::MotionLaw> laws{{"linear", perimap::MotionLaw::kLinear},
+                                                       {"warped", perimap::MotionLaw::kWarped},
+                                                       {"time-locked", perimap::MotionLaw::kTimeLocked}};
+  std::vector<std::string> law_names;
+  app.add_option("--record", scenes.records, "horizons: these ECG records");
+  app.add_option("--law", law_names, "horizons: these motion laws (linear, warped, time-locked)")
+      ->check(CLI::IsMember(laws));
+  app.add_option("--width", scenes.width, "horizons: of the pictures, px")->capture_default_str();
+  app.add_option("--height", scenes.height, "horizons: of the pictures, px")->capture_default_str();
+  app.add_option("--duration", scenes.duration_s, "horizons: s");
   CLI11_PARSE(app, argc, argv);
+  for (const std::string& name : law_names) scenes.laws.push_back(laws.at(name));
   if (chosen.empty()) chosen = {"lost", "optimal", "drift", "pose", "ecg", "horizons"};
   try {
     const auto heart = perimap::load_heart();
