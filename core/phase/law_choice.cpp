@@ -13,9 +13,8 @@ constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr std::array<PhaseLaw, LawChoice::kLaws> kCandidates{PhaseLaw::kLinear, PhaseLaw::kWarped,
                                                              PhaseLaw::kTimeLocked};
 constexpr double kMemory = 100.0;  // cycles; the map learns on, and its phase's errors change
-constexpr double kLeastCycles = 8.0;
-// Of the log likelihood, a cycle counting as one difference: those within one share its causes.
-constexpr double kDecisive = 5.0;
+constexpr double kLeastCycles = 4.0;
+constexpr double kDecisive = 4.0;     // difference of the log likelihoods
 constexpr double kWildest_rad = 0.8;  // no phase but a wrong match
 
 }  // namespace
@@ -49,24 +48,18 @@ bool LawChoice::scale(Seconds rr) noexcept {
 
 void LawChoice::weigh(const CardiacCycle& cycle) noexcept {
   constexpr double kKeep = 1.0 - 1.0 / kMemory;
-  bool any = false;
+  int seen = 0;
+  std::array<double, kLaws> squares{};
   const std::uint64_t oldest = kept_count_ > kKept ? kept_count_ - kKept : 0;
   for (std::uint64_t k = oldest; k < kept_count_; ++k) {
     const ObservedPhase& observed = kept_[k % kKept];
     if (observed.time < cycle.begin || observed.time >= cycle.begin + cycle.length) continue;
     if (!(observed.deviation_rad > 0.0)) continue;
-    if (!any) {
-      any = true;
-      cycles_ = kKeep * cycles_ + 1.0;
-      observations_ *= kKeep;
+    if (seen++ == 0) {
       for (auto& of_law : parts_) {
-        for (Part& part : of_law) {
-          part.weight *= kKeep;
-          part.squares *= kKeep;
-        }
+        for (Part& part : of_law) part.weight *= kKeep;
       }
     }
-    observations_ += 1.0;
     const double weight = 1.0 / (observed.deviation_rad * observed.deviation_rad);
     for (std::size_t law = 0; law < kLaws; ++law) {
       const CyclePhase phase = phase_in_cycle(laws_[law], Seconds(to_seconds(observed.time - cycle.begin)),
@@ -78,30 +71,29 @@ void LawChoice::weigh(const CardiacCycle& cycle) noexcept {
       part.weight += weight;
       const double from_mean = difference - part.mean_rad;
       part.mean_rad += weight / part.weight * from_mean;
-      part.squares += weight * from_mean * (difference - part.mean_rad);
+      squares[law] += weight * from_mean * (difference - part.mean_rad);
     }
   }
-}
-
-double LawChoice::squares(int law) const noexcept {
-  double sum = 0.0;
-  for (const Part& part : parts_[static_cast<std::size_t>(law)]) sum += part.squares;
-  return sum;
+  if (seen == 0) return;
+  cycles_ = kKeep * cycles_ + 1.0;
+  for (std::size_t law = 0; law < kLaws; ++law) {
+    const double square = squares[law] / seen;
+    squares_[law] = kKeep * squares_[law] + square;
+    log_likelihoods_[law] = kKeep * log_likelihoods_[law] - std::log1p(square);
+  }
 }
 
 double LawChoice::scatter(PhaseLaw law) const noexcept {
   const auto found = std::find(kCandidates.begin(), kCandidates.end(), law);
-  return observations_ > 0.0 ? squares(static_cast<int>(found - kCandidates.begin())) / observations_ : 0.0;
+  return cycles_ > 0.0 ? squares_[static_cast<std::size_t>(found - kCandidates.begin())] / cycles_ : 0.0;
 }
 
 bool LawChoice::choose() noexcept {
   if (cycles_ < kLeastCycles) return false;
-  int best = chosen_;
-  for (int law = 0; law < kLaws; ++law) {
-    if (squares(law) < squares(best)) best = law;
-  }
-  if (best == chosen_ || !(squares(best) > 0.0)) return false;
-  if (!(0.5 * cycles_ * std::log(squares(chosen_) / squares(best)) > kDecisive)) return false;
+  const auto best =
+      static_cast<int>(std::max_element(log_likelihoods_.begin(), log_likelihoods_.end()) - log_likelihoods_.begin());
+  const auto likelihood = [this](int law) { return log_likelihoods_[static_cast<std::size_t>(law)]; };
+  if (!(likelihood(best) - likelihood(chosen_) > kDecisive)) return false;
   chosen_ = best;
   return true;
 }

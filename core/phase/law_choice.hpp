@@ -3,7 +3,9 @@
 // Under the true law an observed phase differs from the clock's by what the map's own phase is off there: something
 // that depends on the phase alone, whatever law the map was learnt under. Under a wrong law it differs from cycle to
 // cycle as well, as their lengths do. So each law is judged by the scatter of those differences about their mean in
-// each part of the cycle, over cycles whose ends are known.
+// each part of the cycle, over cycles whose ends are known. The differences within a cycle share their causes, so a
+// cycle counts as one, by Student's likelihood of their mean square (1 degree of freedom): a young map is now and then
+// far off in one cycle, whatever the law.
 //
 // The laws are scaled to be the same in a cycle of the usual length, so that the map stays right when the law changes.
 //
@@ -36,7 +38,7 @@ class LawChoice {
   // Linear until there is evidence.
   [[nodiscard]] const PhaseLawSettings& law() const noexcept { return laws_[static_cast<std::size_t>(chosen_)]; }
   // Mean square difference of a law about its means, in squares of the observations' deviations; 0: nothing was
-  // weighed.
+  // weighed. The mean of the cycles'.
   [[nodiscard]] double scatter(PhaseLaw law) const noexcept;
 
  private:
@@ -47,20 +49,19 @@ class LawChoice {
   struct Part {
     double weight = 0.0;
     double mean_rad = 0.0;
-    double squares = 0.0;  // weighted, about the mean
   };
 
   [[nodiscard]] bool scale(Seconds rr) noexcept;
   void weigh(const CardiacCycle& cycle) noexcept;
   [[nodiscard]] bool choose() noexcept;
-  [[nodiscard]] double squares(int law) const noexcept;
 
   std::array<PhaseLawSettings, kLaws> laws_{};
   std::array<std::array<Part, kParts>, kLaws> parts_{};
   std::array<double, kCyclesForScale> lengths_s_{};
   int length_count_ = 0;
-  double cycles_ = 0.0;  // weighed, older ones fading
-  double observations_ = 0.0;
+  double cycles_ = 0.0;  // weighed, older ones fading, here and below
+  std::array<double, kLaws> squares_{};
+  std::array<double, kLaws> log_likelihoods_{};
   int chosen_ = 0;
   std::array<ObservedPhase, kKept> kept_{};
   std::uint64_t kept_count_ = 0;

@@ -74,28 +74,31 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
   const double breath_prior_s2 = breath_deviation_s * breath_deviation_s;
   CommonInformation prior = with_appended(pose_prior(frame.pose), kPriorVariance_s2);
   if (frame.respiration.known) prior = with_appended(prior, breath_prior_s2);
+  collect(groups, frame, settings, {}, true);
+  const bool converged = matches_.size() >= static_cast<std::size_t>(kFewestMatches);
+  const ImagePhases nothing_near = converged ? contradicts : can_not_tell;
   double shift_s = 0.0;
   double breath_shift_s = 0.0;
   CommonEstimate solved;
   Shifts solved_at;
   for (int pass = 0; pass < kPasses; ++pass) {
     solved_at = {shift_s, breath_shift_s};
-    collect(groups, frame, settings, solved_at, true);
+    collect(groups, frame, settings, solved_at, converged);
     if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return can_not_tell;
     prior.eta(kShift) = -shift_s / kPriorVariance_s2;
     if (frame.respiration.known) prior.eta(kBreathShift) = -breath_shift_s / breath_prior_s2;
     const SharedPose shared =
         estimate_shared_pose(model, frame.X_CW, prior, std::span<const CommonMatch>(matches_), std::span(used_));
     if (!shared.estimate.ok) return can_not_tell;
-    if (2 * static_cast<std::size_t>(shared.used) < matches_.size()) return contradicts;
+    if (2 * static_cast<std::size_t>(shared.used) < matches_.size()) return nothing_near;
     if (shared.used < kFewestMatches) return can_not_tell;
     solved = shared.estimate;
     shift_s += solved.s(kShift);
     if (frame.respiration.known) breath_shift_s += solved.s(kBreathShift);
-    if (!(std::abs(shift_s) < kLargestShift_s)) return contradicts;
-    if (!(std::abs(breath_shift_s) <= kLargestBreathShift * breath_deviation_s)) return contradicts;
+    if (!(std::abs(shift_s) < kLargestShift_s)) return nothing_near;
+    if (!(std::abs(breath_shift_s) <= kLargestBreathShift * breath_deviation_s)) return nothing_near;
   }
-  refuse_what_disagrees(groups, frame, model, settings, solved_at, solved);
+  if (converged) refuse_what_disagrees(groups, frame, model, settings, solved_at, solved);
   const auto answer = [&](Eigen::Index unknown, double shift, double prior_s2, double phase_rad, double rate_rad_per_s,
                           double largest_deviation_s, double common_deviation_s) {
     ImagePhaseAnswer result;
@@ -103,7 +106,7 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
     const double variance_s2 = solved.covariance(unknown, unknown);
     const double precision = 1.0 / variance_s2 - 1.0 / prior_s2;
     if (!(precision > 1.0 / (largest_deviation_s * largest_deviation_s))) return result;
-    result.outcome = ImagePhaseOutcome::kObserved;
+    result.outcome = converged ? ImagePhaseOutcome::kObserved : ImagePhaseOutcome::kTentative;
     result.observed = {frame.stamp.capture, phase_rad + rate_rad_per_s * shift / (variance_s2 * precision),
                        rate_rad_per_s * std::sqrt(1.0 / precision + common_deviation_s * common_deviation_s)};
     return result;

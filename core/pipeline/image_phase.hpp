@@ -15,12 +15,17 @@
 
 namespace perimap {
 
-enum class ImagePhaseOutcome : std::uint8_t { kObserved, kCanNotTell, kContradicts };
+enum class ImagePhaseOutcome : std::uint8_t {
+  kObserved,
+  kTentative,  // observed, but by a map that has not converged: its phase may be off by what the map gets wrong
+  kCanNotTell,
+  kContradicts
+};
 
 // What a frame's matches tell of one phase.
 struct ImagePhaseAnswer {
   ImagePhaseOutcome outcome = ImagePhaseOutcome::kCanNotTell;
-  ObservedPhase observed;  // when kObserved
+  ObservedPhase observed;  // when kObserved or kTentative
 };
 
 struct ImagePhases {
@@ -36,9 +41,10 @@ struct ImagePhases {
 // Where they agree, a match of any mapped feature that does not is refused: a tracker's noise widens every search
 // region to where look-alikes are, and the pose that all matches have in common is known far better.
 //
-// No answer is better than a wrong one: there is none when fewer than kFewestMatches converged features were found or
-// when the heart stands too still to tell. When fewer than half of the matches agree on a solution near the prediction,
-// that is said: the heart is elsewhere than predicted, or something else moves in the view.
+// No answer is better than a wrong one: it is tentative when fewer than kFewestMatches converged features were found,
+// and there is none when fewer mapped ones were or when the heart stands too still to tell. When fewer than half of the
+// matches agree on a solution near the prediction, that is said: the heart is elsewhere than predicted, or something
+// else moves in the view.
 class ImagePhase {
  public:
   static constexpr int kFewestMatches = 8;

@@ -150,6 +150,9 @@ void Mapper::settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept {
       law_.add(seen.observed);
       counters_.phases_from_image.add();
       break;
+    case ImagePhaseOutcome::kTentative:
+      law_.add(seen.observed);
+      break;
     case ImagePhaseOutcome::kContradicts:
       cycle_.add_contradiction();
       break;

@@ -135,9 +135,20 @@ TEST_F(Surface, FewFeaturesSayNothing) {
   EXPECT_EQ(observe(observed), ImagePhaseOutcome::kCanNotTell);
 }
 
-TEST_F(Surface, FeaturesThatAreNotConvergedDoNotCount) {
+TEST_F(Surface, WhatFeaturesThatAreNotConvergedTellIsTentative) {
   see(0.02);
   for (std::size_t f = 0; f < slots.size() - 3; ++f) slots[f].converged = false;
+  ObservedPhase observed;
+  EXPECT_EQ(observe(observed), ImagePhaseOutcome::kTentative);
+}
+
+TEST_F(Surface, ThatFeaturesWhichAreNotConvergedAgreeOnNothingIsNoContradiction) {
+  std::uniform_real_distribution<double> anywhere(-80.0, 80.0);
+  see(0.0);
+  for (FeatureSlot& slot : slots) {
+    slot.converged = false;
+    slot.match.px += Vector2d(anywhere(generator), anywhere(generator));
+  }
   ObservedPhase observed;
   EXPECT_EQ(observe(observed), ImagePhaseOutcome::kCanNotTell);
 }
