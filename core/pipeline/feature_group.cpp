@@ -12,8 +12,8 @@ namespace perimap {
 namespace {
 
 constexpr double kInflation_mm = 1.0;
-// About what a linear law makes of a warped heart (0.33 mm).
-constexpr double kDoubt_mm = 0.3;
+// A linear law makes 0.3 to 1 mm of a warped heart, as the lengths of its cycles vary.
+constexpr double kDoubt_mm = 1.0;
 constexpr int kRefusalsBeforeRelock = 10;
 // How much a feature's breathing differs from the common one, first harmonic, and by how much its mean is off that was
 // learnt while the phase was not known.
