@@ -21,9 +21,10 @@ constexpr double kKeep = 0.7;  // of the variance, at each period
 
 }  // namespace
 
+bool BreathSignal::heard(Instant now) const noexcept { return onsets > 0 && now - heard_until <= kMissing; }
+
 bool BreathSignal::known(Instant now) const noexcept {
-  return period > Duration::zero() && now - heard_until <= kMissing &&
-         Seconds(now - onset) <= kOverdue * Seconds(period);
+  return period > Duration::zero() && heard(now) && Seconds(now - onset) <= kOverdue * Seconds(period);
 }
 
 double BreathSignal::phase_at(Instant t) const noexcept {

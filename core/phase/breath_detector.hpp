@@ -27,6 +27,7 @@ struct BreathSignal {
   Duration deviation{0};     // standard deviation of an onset from where the one before and the period have it
   Instant heard_until;       // the newest sample
 
+  [[nodiscard]] bool heard(Instant now) const noexcept;
   // Whether the phase is known at `now`: the channel is heard, and breathes regularly.
   [[nodiscard]] bool known(Instant now) const noexcept;
   // Where it is known: radians since the onset, not wrapped.

@@ -20,6 +20,7 @@ constexpr double kClearlyBetter = 0.8;
 constexpr int kRefinements = 24;
 // Slower candidates than may be found are tried too, so that what is found is no slower one's nearest neighbour.
 constexpr double kLeastBreaths = 1.5;
+constexpr double kBreathsOfKnownRate = 1.1;
 
 }  // namespace
 
@@ -147,8 +148,7 @@ RespirationSearch::Fit RespirationSearch::fit(double rate_rad_per_s) const noexc
 bool RespirationSearch::find(FoundBreath& found) const noexcept {
   const auto bins = static_cast<int>(count_ - oldest());
   if (bins < 4 * Fit::kColumns) return false;
-  const Instant newest = bin(count_ - 1).begin;
-  const double span_s = to_seconds(newest - bin(oldest()).begin);
+  const double span_s = to_seconds(bin(count_ - 1).begin - bin(oldest()).begin);
   const double longest_s = std::min(to_seconds(settings_.longest_period), span_s / kLeastBreaths);
   const double fastest = kTwoPi / to_seconds(settings_.shortest_period);
   const double slowest = kTwoPi / longest_s;
@@ -178,9 +178,23 @@ bool RespirationSearch::find(FoundBreath& found) const noexcept {
   }
   // At the end of the range the best candidate may be any faster motion's neighbour.
   if (kTwoPi / best * settings_.breaths > span_s || best > fastest - 0.5 * step) return false;
-  const Fit fitted = fit(best);
+  return take(best, found);
+}
+
+bool RespirationSearch::find_at(double rate_rad_per_s, FoundBreath& found) const noexcept {
+  if (count_ - oldest() < std::uint64_t{4} * Fit::kColumns) return false;
+  const double span_s = to_seconds(bin(count_ - 1).begin - bin(oldest()).begin);
+  return rate_rad_per_s * span_s >= kTwoPi * kBreathsOfKnownRate && take(rate_rad_per_s, found);
+}
+
+// The wave of this rate, and whether it is breathing and known well enough.
+bool RespirationSearch::take(double rate_rad_per_s, FoundBreath& found) const noexcept {
+  const auto bins = static_cast<int>(count_ - oldest());
+  const Instant newest = bin(count_ - 1).begin;
+  const double span_s = to_seconds(newest - bin(oldest()).begin);
+  const Fit fitted = fit(rate_rad_per_s);
   found.time = newest;
-  found.rate_rad_per_s = best;
+  found.rate_rad_per_s = rate_rad_per_s;
   const double without = fitted.residual_without_breath();
   found.explained = without > 0.0 ? 1.0 - fitted.residual / without : 0.0;
   for (int k = 0; k < kBreathHarmonics; ++k) {

@@ -66,6 +66,8 @@ class RespirationSearch {
   // Some milliseconds' work: not for the critical path. False when there is no breathing to be seen yet; `found` then
   // tells of the best candidate, if any.
   [[nodiscard]] bool find(FoundBreath& found) const noexcept;
+  // The same where the rate is known: one breath is enough to tell the wave.
+  [[nodiscard]] bool find_at(double rate_rad_per_s, FoundBreath& found) const noexcept;
 
  private:
   static constexpr int kBins = 300;
@@ -88,6 +90,7 @@ class RespirationSearch {
   }
   [[nodiscard]] std::uint64_t oldest() const noexcept { return count_ > kBins ? count_ - kBins : 0; }
   [[nodiscard]] Fit fit(double rate_rad_per_s) const noexcept;
+  [[nodiscard]] bool take(double rate_rad_per_s, FoundBreath& found) const noexcept;
 
   RespirationSearchSettings settings_;
   std::array<Bin, kBins> bins_{};

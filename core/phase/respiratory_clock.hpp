@@ -16,6 +16,9 @@ enum class RespirationState : std::uint8_t {
   kLocked
 };
 
+// What tells the phase of breathing. The images correct what a channel tells.
+enum class RespirationSource : std::uint8_t { kNone, kImage, kChannel };
+
 // Breathing at one instant.
 struct RespiratoryPhase {
   bool known = false;      // false: the rest but deviation_mm means nothing
@@ -27,7 +30,8 @@ struct RespiratoryPhase {
 class RespiratoryClock {
  public:
   RespirationState state = RespirationState::kOff;
-  Instant time;  // of the phase and the rate below
+  RespirationSource source = RespirationSource::kNone;  // none unless locked
+  Instant time;                                         // of the phase and the rate below
   double phase_rad = 0.0;
   double rate_rad_per_s = 0.0;
   double phase_variance_rad2 = 0.0;

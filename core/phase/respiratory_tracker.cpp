@@ -13,6 +13,8 @@ constexpr double kPhaseWalk_rad2_per_s = 0.02 * 0.02;
 constexpr double kRateWalk_rad2_per_s3 = 0.003 * 0.003;
 // Of a displacement that a map tells that is not good yet.
 constexpr double kDisplacementDeviation_mm = 2.0;
+// What a breath may differ from the one before in how the surface goes with the channel.
+constexpr double kLeastChannelDeviation_rad = 0.1;
 constexpr double kGate = 13.8;  // chi-squared, 1 degree: 99.98 %
 // Shares of the displacement that breathing explains.
 constexpr double kSuspected = 0.2;
@@ -52,18 +54,30 @@ void RespiratoryTracker::search(Instant now) noexcept {
     return;
   }
   FoundBreath found;
-  const bool there = search_.find(found);
+  const bool by_channel = channel_known_ && clock_.state == RespirationState::kSearching;
+  const double channel_rate_rad_per_s = by_channel ? kTwoPi / to_seconds(channel_.period) : 0.0;
+  const bool there = by_channel ? search_.find_at(channel_rate_rad_per_s, found) : search_.find(found);
   if (clock_.state == RespirationState::kOff) {
     suspect(found, now);
     return;
   }
   if (!there) return;
   // The coefficients that the map has learnt count from where the phase was zero then.
-  const double turn_rad = locks_ > 0 ? alignment(found.wave, wave_) : 0.0;
+  double turn_rad = locks_ > 0 ? alignment(found.wave, wave_) : 0.0;
+  if (by_channel) {
+    const double channel_rad = channel_.phase_at(found.time);
+    if (!offset_known_) offset_rad_ = locks_ > 0 ? -turn_rad - channel_rad : 0.0;
+    offset_known_ = true;
+    turn_rad = -(channel_rad + offset_rad_);
+    const double rate_deviation = channel_rate_rad_per_s * to_seconds(channel_.deviation) / to_seconds(channel_.period);
+    found.rate_variance_rad2_per_s2 = std::min(found.rate_variance_rad2_per_s2, rate_deviation * rate_deviation);
+    found.covariance_rad2_per_s = 0.0;
+  }
   wave_ = found.wave.shifted(turn_rad);
   clock_.state = RespirationState::kLocked;
+  clock_.source = by_channel ? RespirationSource::kChannel : RespirationSource::kImage;
   clock_.time = found.time;
-  clock_.phase_rad = -turn_rad;
+  clock_.phase_rad = std::remainder(-turn_rad, kTwoPi);
   clock_.rate_rad_per_s = found.rate_rad_per_s;
   clock_.phase_variance_rad2 = found.phase_variance_rad2;
   clock_.covariance_rad2_per_s = found.covariance_rad2_per_s;
@@ -72,6 +86,28 @@ void RespiratoryTracker::search(Instant now) noexcept {
   last_agreed_ = last_told_ = now;
   ++locks_;
   search_.clear();
+}
+
+void RespiratoryTracker::follow(const BreathSignal& signal, Instant now) noexcept {
+  if (!settings_.enabled) return;
+  const bool breathed = channel_known_;
+  const bool another = signal.onsets != channel_.onsets;
+  channel_ = signal;
+  channel_known_ = signal.known(now);
+  if (clock_.state != RespirationState::kLocked) return;
+  clock_.source = channel_known_ && offset_known_ ? RespirationSource::kChannel : RespirationSource::kImage;
+  if (!channel_known_) {
+    if (breathed && signal.heard(now)) lose();
+    return;
+  }
+  if (!another) return;
+  if (!offset_known_) {
+    offset_rad_ = clock_.at(now).phase_rad - signal.phase_at(now);
+    offset_known_ = true;
+    return;
+  }
+  add_phase(now, signal.phase_at(now) + offset_rad_,
+            std::max(kLeastChannelDeviation_rad, kTwoPi * to_seconds(signal.deviation) / to_seconds(signal.period)));
 }
 
 // A map without breathing follows it in part, which leaves a weak trace of it. That is enough to reckon with its
@@ -127,6 +163,7 @@ void RespiratoryTracker::add_contradiction(Instant t) noexcept {
 
 void RespiratoryTracker::lose() noexcept {
   clock_.state = RespirationState::kSearching;
+  clock_.source = RespirationSource::kNone;
   search_.clear();
 }
 

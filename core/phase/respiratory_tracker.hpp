@@ -1,8 +1,10 @@
-// Keeps the respiratory clock: searches for breathing in the images' common displacement, then follows its phase.
+// Keeps the respiratory clock: searches for breathing in the images' common displacement, then follows its phase. A
+// respiration channel, where there is one, tells the period and the phase beforehand.
 #pragma once
 
 #include <Eigen/Core>
 
+#include "core/phase/breath_detector.hpp"
 #include "core/phase/respiration_search.hpp"
 #include "core/phase/respiratory_clock.hpp"
 #include "core/time/instant.hpp"
@@ -11,6 +13,7 @@ namespace perimap {
 
 struct RespirationSettings {
   bool enabled = false;
+  bool channel = true;  // a respiration channel is heard, where there is one
   RespirationSearchSettings search;
   double displacement_mm = 5.0;   // standard deviation per axis that is reckoned with while the phase is not known
   double suspected_rms_mm = 0.5;  // least displacement that is suspected to be breathing where it is off
@@ -19,6 +22,11 @@ struct RespirationSettings {
 // Once locked, the clock is a Kalman filter of phase and rate. Both may wander: a ventilator's rate hardly does, a
 // patient's own breath by some percent. When the images contradict it for kContradictedBeforeSearch, or tell nothing
 // for kSilentBeforeSearch, the search begins again; the phase found then is counted as before, by the wave's shape.
+//
+// With a channel, the search has only to find the displacement that goes with its phase, in one breath instead of more
+// than two; each breath then corrects the clock as the images do. The channel's phase differs from the clock's by a
+// constant that is known from the first lock on, so that a lock after a pause needs no shape. Where breathing stops in
+// the channel, the clock is lost at once; where the channel is gone, the images carry on.
 class RespiratoryTracker {
  public:
   explicit RespiratoryTracker(const RespirationSettings& settings) noexcept;
@@ -30,6 +38,9 @@ class RespiratoryTracker {
   void add_phase(Instant t, double phase_rad, double deviation_rad) noexcept;
   // A frame that showed no phase near the predicted one.
   void add_contradiction(Instant t) noexcept;
+
+  // Before each frame: what the respiration channel told until then.
+  void follow(const BreathSignal& signal, Instant now) noexcept;
 
   // Looks for breathing in what was added; takes some milliseconds.
   void search(Instant now) noexcept;
@@ -48,6 +59,10 @@ class RespiratoryTracker {
   RespirationSearch search_;
   RespiratoryClock clock_;
   BreathWave wave_;
+  BreathSignal channel_;
+  bool channel_known_ = false;
+  bool offset_known_ = false;
+  double offset_rad_ = 0.0;  // the clock's phase minus the channel's
   Instant last_agreed_;
   Instant last_told_;
   int locks_ = 0;

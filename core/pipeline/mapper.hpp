@@ -42,6 +42,8 @@ class Mapper {
          FeatureFinder& finder, BatchStarter& starter, PhaseCells& phase_cells, PipelineCounters& counters);
 
   void add_pose(const TrackerSample& sample) noexcept;
+  // Before process(): what the respiration channel told until that capture, or later.
+  void follow_breath(const BreathSignal& signal, Instant capture) noexcept { respiration_.follow(signal, capture); }
 
   // The tracker has told all about instant t that it will: no need to wait longer.
   [[nodiscard]] bool pose_reached(Instant t) const noexcept { return poses_.reached(t); }

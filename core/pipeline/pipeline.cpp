@@ -20,7 +20,8 @@ Pipeline::Pipeline(const PipelineSettings& settings)
     : settings_(settings),
       slots_(static_cast<std::size_t>(settings.features.maximum)),
       cells_(static_cast<std::size_t>(settings.workers)),
-      entrance_(settings.camera.width, settings.camera.height, {settings.clock, settings.r_trigger}, counters_),
+      entrance_(settings.camera.width, settings.camera.height, {settings.clock, settings.r_trigger},
+                {settings.respiration.search.shortest_period, settings.respiration.search.longest_period}, counters_),
       team_(settings.workers),
       finder_(settings, counters_),
       starter_(settings, slots_),
@@ -57,6 +58,7 @@ void Pipeline::map(const FrameHandle& frame) noexcept {
   const RealtimeScope realtime;
   TripleBuffer<CardiacClock>& clock = entrance_.clocks().mapper;
   clock.update();
+  if (settings_.respiration.channel) mapper_.follow_breath(entrance_.breath(), frame.stamp.capture);
   mapper_.process(frame.stamp, entrance_.image(frame), clock.front());
   entrance_.give_back(frame);
   mapper_.learn();

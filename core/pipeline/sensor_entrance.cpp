@@ -13,13 +13,15 @@ constexpr std::size_t kPoseRing = 256;  // more than a second of a fast tracker
 
 }  // namespace
 
-SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& ecg, PipelineCounters& counters)
+SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& ecg,
+                               const BreathDetectorSettings& breath, PipelineCounters& counters)
     : counters_(counters),
       pool_(width, height, kFrameBuffers),
       mapper_frames_(kFrameBuffers),
       publisher_stamps_(kStampRing),
       poses_(kPoseRing),
-      ecg_(ecg, clocks_, counters) {}
+      ecg_(ecg, clocks_, counters),
+      breath_(breath) {}
 
 bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept {
   const RealtimeScope realtime;
@@ -71,6 +73,20 @@ void SensorEntrance::push_pose(const TrackerSample& sample) noexcept {
     return;
   }
   mapper_wakeup_.post();
+}
+
+void SensorEntrance::push_respiration(const RespirationBlock& block) noexcept {
+  const RealtimeScope realtime;
+  if (block.sensor_off) {
+    breath_.interrupt();
+  } else {
+    Instant t = block.first_sample_time;
+    for (const float value : block.samples()) {
+      breath_.push(t, static_cast<double>(value));
+      t += block.sample_period;
+    }
+  }
+  breath_cell_.write(breath_.signal());
 }
 
 }  // namespace perimap

@@ -3,31 +3,37 @@
 
 #include <cstdint>
 
+#include "core/phase/breath_detector.hpp"
 #include "core/pipeline/ecg_intake.hpp"
 #include "core/pipeline/frame_pool.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/realtime/spsc_ring.hpp"
+#include "core/realtime/triple_buffer.hpp"
 #include "core/realtime/wakeup.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/sensors/r_trigger_pulse.hpp"
+#include "core/sensors/respiration_block.hpp"
 #include "core/sensors/tracker_sample.hpp"
 
 namespace perimap {
 
 // push_frame() belongs to the camera thread, push_pose() to the tracker thread, push_ecg() to the ECG thread,
-// push_r_trigger() to that of a trigger line; one thread may be all of them. None of them blocks or allocates. What
-// does not fit is counted, never waited for.
+// push_r_trigger() to that of a trigger line, push_respiration() to that of a respiration channel; one thread may be
+// all of them. None of them blocks or allocates. What does not fit is counted, never waited for.
 class SensorEntrance {
  public:
-  SensorEntrance(int width, int height, const EcgIntakeSettings& ecg, PipelineCounters& counters);
+  SensorEntrance(int width, int height, const EcgIntakeSettings& ecg, const BreathDetectorSettings& breath,
+                 PipelineCounters& counters);
 
   // Copies the pixels. False when the frame was dropped: no free buffer, or another size than the pipeline's.
   bool push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept;
   void push_pose(const TrackerSample& sample) noexcept;
   void push_ecg(const EcgBlock& block) noexcept { ecg_.push(block); }
   void push_r_trigger(const RTriggerPulse& pulse) noexcept { ecg_.push(pulse); }
+
+  void push_respiration(const RespirationBlock& block) noexcept;
 
   // Any thread: the next block is of another patient.
   void ask_to_forget_ecg() noexcept { ecg_.ask_to_forget(); }
@@ -42,6 +48,11 @@ class SensorEntrance {
   [[nodiscard]] bool pop_pose(TrackerSample& sample) noexcept { return poses_.pop(sample); }
   [[nodiscard]] GreyImage image(const FrameHandle& frame) noexcept { return pool_.image(frame.buffer); }
   void give_back(const FrameHandle& frame) noexcept { pool_.give_back(frame.buffer); }
+  // The newest that the respiration channel told.
+  [[nodiscard]] const BreathSignal& breath() noexcept {
+    breath_cell_.update();
+    return breath_cell_.front();
+  }
   [[nodiscard]] Wakeup& mapper_wakeup() noexcept { return mapper_wakeup_; }
 
   // Publisher side: every frame's stamps as soon as it has arrived, however long the mapper takes.
@@ -60,6 +71,8 @@ class SensorEntrance {
   Wakeup publisher_wakeup_;
   ClockCells clocks_;
   EcgIntake ecg_;
+  BreathDetector breath_;
+  TripleBuffer<BreathSignal> breath_cell_;
   bool any_frame_ = false;
   std::uint64_t last_sequence_ = 0;
 };

@@ -86,7 +86,7 @@ TEST_P(RegularBreath, IsKnownAfterThreeOnsetsAndKeptToItsPeriod) {
 }
 
 INSTANTIATE_TEST_SUITE_P(BreathDetector, RegularBreath,
-                         testing::Values(Case{"sine", sine, 1.0, 0.08}, Case{"sine_inverted", sine, -250.0, 0.08},
+                         testing::Values(Case{"sine", sine, 1.0, 0.1}, Case{"sine_inverted", sine, -250.0, 0.1},
                                          Case{"ventilator", ventilator, 1e-3, 0.03},
                                          Case{"trapezoid", trapezoid, 40.0, 0.035}),
                          [](const auto& tested) { return tested.param.name; });

@@ -165,6 +165,92 @@ TEST_F(Tracking, AContradictedPhaseIsSearchedForAgainAndCountedAsBefore) {
   }
 }
 
+// A channel that shows the patient's breath until `until_s`, then a flat line.
+struct Channel {
+  const Patient& patient;
+  double until_s = 1e9;
+  BreathDetector detector{};
+  double heard_s = 0.0;
+
+  const BreathSignal& at(double now_s) {
+    for (; heard_s < now_s; heard_s += 0.02)
+      detector.push(at_s(heard_s), heard_s < until_s ? patient.breath(heard_s) : 0.0);
+    return detector.signal();
+  }
+};
+
+struct WithChannel : Tracking {
+  Channel channel{patient};
+
+  // The map begins to tell displacements at `from_s`.
+  bool lock_by_channel(RespiratoryTracker& tracker, double from_s) {
+    for (now_s = from_s; tracker.clock().state != RespirationState::kLocked && now_s < from_s + 60.0; now_s += 1.0) {
+      watch(tracker, patient, now_s, now_s + 1.0);
+      tracker.follow(channel.at(now_s + 1.0), at_s(now_s + 1.0));
+      tracker.search(at_s(now_s + 1.0));
+    }
+    return tracker.clock().state == RespirationState::kLocked;
+  }
+};
+
+TEST_F(WithChannel, OneBreathOfTheMapIsEnoughToLock) {
+  RespiratoryTracker with(settings);
+  ASSERT_TRUE(lock_by_channel(with, 12.0));
+  EXPECT_EQ(with.clock().source, RespirationSource::kChannel);
+  EXPECT_LT(now_s, 12.0 + 7.0);
+  EXPECT_NEAR(to_seconds(with.clock().period()), 4.0, 0.05);
+  for (double t = now_s; t < now_s + 4.0; t += 0.2) EXPECT_LT((predicted(with, t) - truth(t)).norm(), 1.5) << t;
+  RespiratoryTracker without(settings);
+  const double with_channel_s = now_s;
+  now_s = 12.0;
+  ASSERT_TRUE(lock(without));
+  EXPECT_EQ(without.clock().source, RespirationSource::kImage);
+  EXPECT_GT(now_s, with_channel_s + 2.0);
+}
+
+TEST_F(WithChannel, AStoppedBreathIsLostWhenTheNextIsOverdueAndCountedAsBeforeWhenItComes) {
+  RespiratoryTracker tracker(settings);
+  ASSERT_TRUE(lock_by_channel(tracker, 12.0));
+  const BreathWave before = tracker.wave();
+  channel.until_s = now_s;
+  double lost_s = 0.0;
+  for (; now_s < channel.until_s + 20.0; now_s += 1.0 / 30.0) {
+    tracker.follow(channel.at(now_s), at_s(now_s));
+    if (lost_s == 0.0 && tracker.clock().state == RespirationState::kSearching) lost_s = now_s;
+  }
+  EXPECT_GT(lost_s, 0.0);
+  EXPECT_LT(lost_s, channel.until_s + 1.5 * 4.0 + 0.2);
+  channel.until_s = 1e9;
+  patient.begin_s += 1.3;  // it goes on at another time than it would have
+  ASSERT_TRUE(lock_by_channel(tracker, now_s));
+  for (double t = now_s; t < now_s + 4.0; t += 0.2) {
+    EXPECT_LT((before.at(tracker.clock().at(at_s(t)).phase_rad) - truth(t)).norm(), 1.5) << t;
+  }
+}
+
+TEST_F(WithChannel, WhereTheChannelIsGoneTheImagesCarryOn) {
+  RespiratoryTracker tracker(settings);
+  ASSERT_TRUE(lock_by_channel(tracker, 12.0));
+  const BreathSignal last = channel.detector.signal();
+  for (int i = 0; i < 300; ++i) {
+    now_s += 1.0 / 30.0;
+    tracker.follow(last, at_s(now_s));
+    tracker.add_phase(at_s(now_s), tracker.clock().at(at_s(now_s)).phase_rad, 0.05);
+  }
+  EXPECT_EQ(tracker.clock().state, RespirationState::kLocked);
+  EXPECT_EQ(tracker.clock().source, RespirationSource::kImage);
+}
+
+TEST_F(WithChannel, WhereNobodyBreathesInTheChannelItTellsNothing) {
+  RespiratoryTracker tracker(settings);
+  channel.until_s = 0.0;
+  for (now_s = 0.0; now_s < 30.0; now_s += 1.0) {
+    tracker.follow(channel.at(now_s), at_s(now_s));
+    tracker.search(at_s(now_s));
+  }
+  EXPECT_EQ(tracker.clock().state, RespirationState::kSearching);
+}
+
 TEST_F(Tracking, WhileOffBreathingIsSuspectedWhereThereIsSome) {
   settings.enabled = false;
   RespiratoryTracker tracker(settings);

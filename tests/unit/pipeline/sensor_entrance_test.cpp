@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -16,7 +17,7 @@ constexpr int kHeight = 24;
 struct Entrance : ::testing::Test {
   PipelineCounters counters;
   std::unique_ptr<SensorEntrance> entrance =
-      std::make_unique<SensorEntrance>(kWidth, kHeight, EcgIntakeSettings{}, counters);
+      std::make_unique<SensorEntrance>(kWidth, kHeight, EcgIntakeSettings{}, BreathDetectorSettings{}, counters);
   std::vector<std::uint8_t> pixels = std::vector<std::uint8_t>(40 * kHeight, 7);
   GreyImage image{pixels.data(), kWidth, kHeight, 40};
 
@@ -108,7 +109,8 @@ TEST_F(Entrance, PulsesOfATriggerLineReplaceTheDetector) {
   EcgIntakeSettings settings;
   settings.r_trigger = RTriggerSettings{};
   settings.r_trigger->delay = milliseconds(30);
-  const auto triggered = std::make_unique<SensorEntrance>(kWidth, kHeight, settings, counters);
+  const auto triggered =
+      std::make_unique<SensorEntrance>(kWidth, kHeight, settings, BreathDetectorSettings{}, counters);
   const Instant first(milliseconds(5030));
   for (std::uint32_t i = 0; i < 20; ++i) {
     if (i == 7) continue;  // lost on the way
@@ -123,6 +125,26 @@ TEST_F(Entrance, PulsesOfATriggerLineReplaceTheDetector) {
   EXPECT_EQ(counters.r_triggers.get(), 38U);
   EXPECT_EQ(counters.r_triggers_dropped.get(), 2U);
   EXPECT_FALSE(entrance->clocks().mapper.update()) << "without a trigger configured pulses are only counted";
+}
+
+TEST_F(Entrance, ARespirationChannelsBreathsAreToldUntilItsSensorIsOff) {
+  RespirationBlock block;
+  block.sample_period = std::chrono::milliseconds(10);
+  block.count = 50;
+  for (int k = 0; k < 60; ++k) {
+    block.first_sample_time = from_ns(0) + k * 50 * block.sample_period;
+    for (std::size_t i = 0; i < block.count; ++i) {
+      const double t = to_seconds(block.first_sample_time.time_since_epoch()) + 0.01 * static_cast<double>(i);
+      block.values[i] = static_cast<float>(-std::cos(2.0 * 3.14159265 * t / 4.0));
+    }
+    entrance->push_respiration(block);
+  }
+  const Instant now = block.first_sample_time + block.count * block.sample_period;
+  EXPECT_TRUE(entrance->breath().known(now));
+  EXPECT_NEAR(to_seconds(entrance->breath().period), 4.0, 0.05);
+  block.sensor_off = true;
+  entrance->push_respiration(block);
+  EXPECT_FALSE(entrance->breath().known(now));
 }
 
 }  // namespace
