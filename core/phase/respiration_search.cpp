@@ -20,7 +20,7 @@ constexpr double kClearlyBetter = 0.8;
 constexpr int kRefinements = 24;
 // Slower candidates than may be found are tried too, so that what is found is no slower one's nearest neighbour.
 constexpr double kLeastBreaths = 1.5;
-constexpr double kBreathsOfKnownRate = 1.1;
+constexpr double kBreathsOfKnownRate = 2.0;
 
 }  // namespace
 

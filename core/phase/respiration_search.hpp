@@ -66,7 +66,7 @@ class RespirationSearch {
   // Some milliseconds' work: not for the critical path. False when there is no breathing to be seen yet; `found` then
   // tells of the best candidate, if any.
   [[nodiscard]] bool find(FoundBreath& found) const noexcept;
-  // The same where the rate is known: one breath is enough to tell the wave.
+  // The same where the rate is known: two breaths are enough. (After one, a young map has taken part of it in.)
   [[nodiscard]] bool find_at(double rate_rad_per_s, FoundBreath& found) const noexcept;
 
  private:

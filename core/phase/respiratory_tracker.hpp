@@ -13,7 +13,7 @@ namespace perimap {
 
 struct RespirationSettings {
   bool enabled = false;
-  bool channel = true;  // a respiration channel is heard, where there is one
+  bool channel = false;  // a respiration channel is heard, where there is one
   RespirationSearchSettings search;
   double displacement_mm = 5.0;   // standard deviation per axis that is reckoned with while the phase is not known
   double suspected_rms_mm = 0.5;  // least displacement that is suspected to be breathing where it is off
@@ -23,10 +23,10 @@ struct RespirationSettings {
 // patient's own breath by some percent. When the images contradict it for kContradictedBeforeSearch, or tell nothing
 // for kSilentBeforeSearch, the search begins again; the phase found then is counted as before, by the wave's shape.
 //
-// With a channel, the search has only to find the displacement that goes with its phase, in one breath instead of more
-// than two; each breath then corrects the clock as the images do. The channel's phase differs from the clock's by a
-// constant that is known from the first lock on, so that a lock after a pause needs no shape. Where breathing stops in
-// the channel, the clock is lost at once; where the channel is gone, the images carry on.
+// With a channel, the search has only to find the displacement that goes with its phase, in two breaths; each breath
+// then corrects the clock as the images do. The channel's phase differs from the clock's by a constant that is known
+// from the first lock on, so that a lock after a pause needs no shape. Where breathing stops in the channel, the clock
+// is lost at once; where the channel is gone, the images carry on.
 class RespiratoryTracker {
  public:
   explicit RespiratoryTracker(const RespirationSettings& settings) noexcept;

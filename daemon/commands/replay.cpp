@@ -148,7 +148,8 @@ std::string breath_text(const RespiratoryClock& clock) {
     case RespirationState::kSearching:
       return "breathing   not found: positions leave it out\n";
     case RespirationState::kLocked:
-      return fmt::format("breathing   {:.2f} s a breath\n", to_seconds(clock.period()));
+      return fmt::format("breathing   {:.2f} s a breath, by the {}\n", to_seconds(clock.period()),
+                         clock.source == RespirationSource::kChannel ? "respiration channel" : "images");
     case RespirationState::kOff:
       break;
   }

@@ -98,6 +98,11 @@ class SessionWriter {
     return writer_.write(ecg_, message, block.arrival, block.first_sample_time, block.device_sequence);
   }
 
+  Expected<void> write_respiration(const RespirationBlock& block) {
+    const perimap_RespirationSamples message = borrow_respiration_samples(block);
+    return writer_.write(respiration_, message, block.arrival, block.first_sample_time, block.device_sequence);
+  }
+
   Expected<void> finish() {
     if (auto done = writer_.finish(); !done) return done;
     std::error_code error;
@@ -132,6 +137,11 @@ class SessionWriter {
     tracker_ = *tracker;
     viewer_ = *viewer;
     ecg_ = *ecg;
+    if (simulation_.settings().respiration_channel) {
+      const auto respiration = writer_.add_channel<perimap_RespirationSamples>(channels::kRespirationSamples);
+      if (!respiration) return tl::unexpected(respiration.error());
+      respiration_ = *respiration;
+    }
 
     std::string generator = fmt::format("perimap simulate {}", PERIMAP_VERSION);
     std::string text = description(simulation_, recording_.noise);
@@ -159,7 +169,7 @@ class SessionWriter {
   SimulatedRecording recording_;
   std::filesystem::path partial_;
   RecordingWriter writer_;
-  ChannelId image_, truth_camera_, tracker_, viewer_, ecg_;
+  ChannelId image_, truth_camera_, tracker_, viewer_, ecg_, respiration_;
   std::vector<std::uint8_t> packed_;
   bool finished_ = false;
 };
@@ -314,6 +324,9 @@ Expected<void> write_simulation(const Simulation& simulation, const std::vector<
         case Simulation::Source::kEcg:
           written = writers[i]->write_ecg(simulation.ecg()[arrival.index]);
           break;
+        case Simulation::Source::kRespiration:
+          written = writers[i]->write_respiration(simulation.respiration()[arrival.index]);
+          break;
       }
       if (!written) return written;
     }
@@ -353,6 +366,8 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember({"linear", "warped", "time-locked"}));
   command->add_option("--respiration", settings.respiration_mm, "Breathing displacement at full inspiration, mm")
       ->capture_default_str();
+  command->add_flag("--respiration-channel", settings.respiration_channel,
+                    "Write a respiration channel, as a ventilator or a monitor has one");
   command->add_option("--respiration-period", options->respiration_period_s, "Breathing period, s")
       ->capture_default_str();
   command

@@ -102,6 +102,7 @@ struct PhaseConfiguration {
 
 struct RespirationConfiguration {
   bool enabled = false;
+  bool channel = false;
   Duration shortest_period = std::chrono::seconds(2);
   Duration longest_period = std::chrono::seconds(10);
   double displacement_deviation_mm = 5.0;  // per axis, reckoned with while the phase is not known

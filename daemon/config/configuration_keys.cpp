@@ -464,8 +464,9 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
       .choice("predictor", predictors, PERIMAP_MEMBER(phase.predictor),
               "what the next cycle's length is predicted from: autoregression, the mean of eight, the last");
   Section("respiration", keys)
-      .flag("enabled", PERIMAP_MEMBER(respiration.enabled),
-            "breathing is part of the motion model; its phase comes from the images")
+      .flag("enabled", PERIMAP_MEMBER(respiration.enabled), "breathing is part of the motion model")
+      .flag("channel", PERIMAP_MEMBER(respiration.channel),
+            "its phase comes from the respiration channel where there is one, else from the images alone")
       .duration("shortest_period_s", s, 0.5, 60, PERIMAP_MEMBER(respiration.shortest_period), "no breath is shorter")
       .duration("longest_period_s", s, 0.5, 60, PERIMAP_MEMBER(respiration.longest_period), "no breath is longer")
       .number("displacement_deviation_mm", 0.1, 100, PERIMAP_MEMBER(respiration.displacement_deviation_mm),

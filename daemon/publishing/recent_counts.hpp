@@ -44,6 +44,13 @@ struct CountsThen {
   Instant time;
   std::array<LatencyHistogram::Counts, kStatusStages.size()> stages{};
   std::array<std::uint64_t, kStatusSources.size()> received{};
+
+  [[nodiscard]] std::uint64_t received_of(perimap_SourceKind kind) const noexcept {
+    for (std::size_t i = 0; i < kStatusSources.size(); ++i) {
+      if (kStatusSources[i].kind == kind) return received[i];
+    }
+    return 0;
+  }
 };
 
 // Not for the real-time path: it locks. The threads that count know nothing of it.

@@ -52,6 +52,7 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
                {"rhythm", name_of(status.rhythm)},
                {"respiration", name_of(status.respiration)},
                {"respiration_suspected", status.respiration_suspected},
+               {"respiration_source", name_of(status.respiration_source)},
                {"recording", name_of(status.recording)},
                {"messages_recorded", status.messages_recorded},
                {"frames_not_recorded", status.frames_not_recorded},

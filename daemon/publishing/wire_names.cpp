@@ -52,6 +52,10 @@ std::string_view name_of(perimap_RespirationState state) noexcept {
   return name_in<3>({"off", "searching", "locked"}, static_cast<int>(state));
 }
 
+std::string_view name_of(perimap_RespirationSource source) noexcept {
+  return name_in<3>({"none", "image", "channel"}, static_cast<int>(source));
+}
+
 std::string_view name_of(perimap_Privilege privilege) noexcept {
   return name_in<3>({"not_requested", "granted", "refused"}, static_cast<int>(privilege));
 }

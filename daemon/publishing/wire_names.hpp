@@ -16,6 +16,7 @@ namespace perimap {
 [[nodiscard]] std::string_view name_of(perimap_PhaseState state) noexcept;
 [[nodiscard]] std::string_view name_of(perimap_Rhythm rhythm) noexcept;
 [[nodiscard]] std::string_view name_of(perimap_RespirationState state) noexcept;
+[[nodiscard]] std::string_view name_of(perimap_RespirationSource source) noexcept;
 [[nodiscard]] std::string_view name_of(perimap_Privilege privilege) noexcept;
 [[nodiscard]] std::string_view name_of(perimap_RecordingState state) noexcept;
 [[nodiscard]] std::string_view name_of(perimap_SourceKind kind) noexcept;

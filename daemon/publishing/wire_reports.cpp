@@ -85,6 +85,18 @@ perimap_RespirationState to_wire(RespirationState state) noexcept {
   return perimap_RESPIRATION_OFF;
 }
 
+perimap_RespirationSource to_wire(RespirationSource source) noexcept {
+  switch (source) {
+    case RespirationSource::kImage:
+      return perimap_RESPIRATION_SOURCE_IMAGE;
+    case RespirationSource::kChannel:
+      return perimap_RESPIRATION_SOURCE_CHANNEL;
+    case RespirationSource::kNone:
+      break;
+  }
+  return perimap_RESPIRATION_SOURCE_NONE;
+}
+
 perimap_RespiratoryClock to_wire(const RespiratoryClock& clock, Instant now) noexcept {
   const RespiratoryPhase phase = clock.at(now);
   perimap_RespiratoryClock wire{};
@@ -305,6 +317,7 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.features_lost = c.features_lost.get();
   wire_.respiration = to_wire(facts.respiration);
   wire_.respiration_suspected = facts.respiration_suspected;
+  wire_.respiration_source = to_wire(facts.respiration_source);
   wire_.features_started_anew = c.features_started_anew.get();
   wire_.recording = facts.recording.state;
   wire_.messages_recorded = facts.recording.recorded;
@@ -337,9 +350,9 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   const std::optional<CountsThen> then = facts.recent != nullptr ? facts.recent->then() : std::nullopt;
   wire_.recent_ns = then ? (now - then->time).count() : 0;
   for (std::uint32_t i = 0; i < sources; ++i) {
-    sources_[i].rate_hz = then && now > then->time ? static_cast<double>(sources_[i].received - then->received[i]) /
-                                                         to_seconds(now - then->time)
-                                                   : 0.0;
+    if (then && now > then->time)
+      sources_[i].rate_hz = static_cast<double>(sources_[i].received - then->received_of(sources_[i].kind)) /
+                            to_seconds(now - then->time);
   }
   for (std::size_t i = 0; i < kStatusStages.size(); ++i) {
     stages_[i] = stage_latency(kStatusStages[i].kind, c.*kStatusStages[i].histogram, then ? &then->stages[i] : nullptr);

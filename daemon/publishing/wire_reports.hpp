@@ -80,6 +80,7 @@ struct StatusFacts {
   bool sources_ended = false;
   RespirationState respiration = RespirationState::kOff;
   bool respiration_suspected = false;
+  RespirationSource respiration_source = RespirationSource::kNone;
   RecordingFacts recording;
   PhaseState phase = PhaseState::kUnknown;
   Rhythm rhythm = Rhythm::kUnknown;

@@ -159,6 +159,7 @@ void LiveRuntime::run_status() {
     StatusFacts told = facts();
     told.respiration = respiration.state;
     told.respiration_suspected = respiration.suspected;
+    told.respiration_source = respiration.source;
     told.phase = clock.at(now).state;
     told.rhythm = clock.rhythm();
     told.r_trigger = pipeline_.settings().r_trigger.has_value();

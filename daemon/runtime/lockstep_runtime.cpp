@@ -51,6 +51,8 @@ void LockstepRuntime::deliver(const ReplayEvent& event) {
     pipeline_.drain_poses();
   } else if (const auto* ecg = std::get_if<EcgBlock>(&event)) {
     entrance.push_ecg(*ecg);
+  } else if (const auto* respiration = std::get_if<RespirationBlock>(&event)) {
+    entrance.push_respiration(*respiration);
   } else {
     entrance.push_r_trigger(std::get<RTriggerPulse>(event));
   }
@@ -110,6 +112,7 @@ void LockstepRuntime::publish_reports(Instant now) {
   facts.latency = pipeline_.settings().latency;
   facts.respiration = respiration.state;
   facts.respiration_suspected = respiration.suspected;
+  facts.respiration_source = respiration.source;
   facts.phase = clock.at(now).state;
   facts.rhythm = clock.rhythm();
   facts.r_trigger = pipeline_.settings().r_trigger.has_value();

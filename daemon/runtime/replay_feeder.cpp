@@ -91,6 +91,8 @@ void ReplayFeeder::deliver() {
       intake_.pose(*pose);
     } else if (const auto* ecg = std::get_if<EcgBlock>(&*event)) {
       intake_.ecg(*ecg);
+    } else if (const auto* respiration = std::get_if<RespirationBlock>(&*event)) {
+      intake_.respiration(*respiration);
     } else {
       intake_.r_trigger(std::get<RTriggerPulse>(*event));
     }

@@ -74,6 +74,7 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.image_alone = c.phase.image_alone;
   if (c.ecg.r_trigger) s.r_trigger = RTriggerSettings{c.ecg.r_trigger_delay, c.ecg.r_trigger_deviation};
   s.respiration.enabled = c.respiration.enabled;
+  s.respiration.channel = c.respiration.channel;
   s.respiration.search.shortest_period = c.respiration.shortest_period;
   s.respiration.search.longest_period = c.respiration.longest_period;
   s.respiration.displacement_mm = c.respiration.displacement_deviation_mm;

@@ -11,6 +11,7 @@ inline constexpr std::string_view kTrackerPose = "tracker/pose";      // perimap
 inline constexpr std::string_view kTrackerViewer = "tracker/viewer";  // foxglove::PoseInFrame, metres, valid poses only
 inline constexpr std::string_view kEcgSamples = "ecg/samples";        // perimap::EcgSamples
 inline constexpr std::string_view kRTrigger = "ecg/r_trigger";  // perimap::RTriggerPulse, where there is a trigger
+inline constexpr std::string_view kRespirationSamples = "respiration/samples";  // perimap::RespirationSamples; optional
 
 // Facts of the whole recording.
 inline constexpr std::string_view kRecordingInfo = "recording/info";  // perimap::RecordingInfo

@@ -41,12 +41,22 @@ Expected<ReplayEvent> r_trigger_event(const RecordingReader& reader, const Recor
   return pulse;
 }
 
+Expected<ReplayEvent> respiration_event(const RecordingReader& reader, const RecordedMessage& message) {
+  const auto respiration = reader.decode<perimap_RespirationSamples>(message);
+  if (!respiration) return tl::unexpected(respiration.error());
+  auto block = to_respiration_block(**respiration);
+  if (!block) return reader.wrong(message, block.error().message);
+  block->arrival = message.arrival;
+  return *block;
+}
+
 }  // namespace
 
 Instant arrival_of(const ReplayEvent& event) noexcept {
   if (const auto* frame = std::get_if<FrameEvent>(&event)) return frame->stamp.arrival;
   if (const auto* pose = std::get_if<TrackerSample>(&event)) return pose->arrival;
   if (const auto* ecg = std::get_if<EcgBlock>(&event)) return ecg->arrival;
+  if (const auto* respiration = std::get_if<RespirationBlock>(&event)) return respiration->arrival;
   return std::get<RTriggerPulse>(event).arrival;
 }
 
@@ -63,24 +73,34 @@ void shift(ReplayEvent& event, Duration offset) noexcept {
   } else if (auto* pulse = std::get_if<RTriggerPulse>(&event)) {
     pulse->time += offset;
     pulse->arrival += offset;
+  } else if (auto* respiration = std::get_if<RespirationBlock>(&event)) {
+    respiration->first_sample_time += offset;
+    respiration->arrival += offset;
   }
 }
 
 Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode) {
-  auto replay = open(path, mode, kSensorChannels);
-  if (!replay || !replay->has_r_trigger()) return replay;
-  constexpr std::array<std::string_view, 4> kWithTrigger = {channels::kCameraImage, channels::kTrackerPose,
-                                                            channels::kEcgSamples, channels::kRTrigger};
-  if (auto selected = replay->reader_.select(kWithTrigger); !selected) return tl::unexpected(selected.error());
-  return replay;
+  auto reader = RecordingReader::open(path, mode);
+  if (!reader) return tl::unexpected(reader.error());
+  std::vector<std::string_view> wanted(kSensorChannels.begin(), kSensorChannels.end());
+  for (const RecordedChannel& channel : reader->channels()) {
+    for (const std::string_view optional : {channels::kRTrigger, channels::kRespirationSamples}) {
+      if (channel.name == optional) wanted.push_back(optional);
+    }
+  }
+  return select(std::move(*reader), wanted);
 }
 
 Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode,
                                           std::span<const std::string_view> channels) {
   auto reader = RecordingReader::open(path, mode);
   if (!reader) return tl::unexpected(reader.error());
-  if (auto selected = reader->select(channels); !selected) return tl::unexpected(selected.error());
-  return ReplayReader(std::move(*reader));
+  return select(std::move(*reader), channels);
+}
+
+Expected<ReplayReader> ReplayReader::select(RecordingReader reader, std::span<const std::string_view> channels) {
+  if (auto selected = reader.select(channels); !selected) return tl::unexpected(selected.error());
+  return ReplayReader(std::move(reader));
 }
 
 bool ReplayReader::has_r_trigger() const {
@@ -118,8 +138,9 @@ Expected<std::optional<ReplayEvent>> ReplayReader::next() {
   last_arrival_ = m.arrival;
   auto event = m.channel == channels::kCameraImage   ? frame_event(m)
                : m.channel == channels::kTrackerPose ? pose_event(reader_, m)
+               : m.channel == channels::kEcgSamples  ? ecg_event(reader_, m)
                : m.channel == channels::kRTrigger    ? r_trigger_event(reader_, m)
-                                                     : ecg_event(reader_, m);
+                                                     : respiration_event(reader_, m);
   if (!event) return tl::unexpected(event.error());
   if (const auto* frame = std::get_if<FrameEvent>(&*event);
       frame != nullptr && frame_width_ > 0 && (frame->width != frame_width_ || frame->height != frame_height_)) {

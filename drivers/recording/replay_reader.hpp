@@ -15,6 +15,7 @@
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/sensors/r_trigger_pulse.hpp"
+#include "core/sensors/respiration_block.hpp"
 #include "core/sensors/tracker_sample.hpp"
 #include "drivers/recording/recorded_frame.hpp"
 #include "drivers/recording/recording_reader.hpp"
@@ -30,7 +31,7 @@ struct FrameEvent {
   [[nodiscard]] GreyImage image() const noexcept { return {pixels.data(), width, height, width}; }
 };
 
-using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock, RTriggerPulse>;
+using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock, RTriggerPulse, RespirationBlock>;
 
 [[nodiscard]] Instant arrival_of(const ReplayEvent& event) noexcept;
 // The same event with all its instants moved by `offset`.
@@ -40,7 +41,7 @@ void shift(ReplayEvent& event, Duration offset) noexcept;
 // that goes back, or that arrives before it was measured, is an error: replay could not deliver it at its time.
 class ReplayReader {
  public:
-  // Fails when the recording has no camera, tracker or ECG channel. Triggers are given where there are any.
+  // Fails when the recording has no camera, tracker or ECG channel. Triggers and breaths are given where there are any.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode);
   // Of these of the sensors' channels alone; fails when one of them is not there.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode,
@@ -63,6 +64,8 @@ class ReplayReader {
  private:
   explicit ReplayReader(RecordingReader reader) : reader_(std::move(reader)) {}
 
+  [[nodiscard]] static Expected<ReplayReader> select(RecordingReader reader,
+                                                     std::span<const std::string_view> channels);
   [[nodiscard]] Expected<ReplayEvent> frame_event(const RecordedMessage& message);
 
   RecordingReader reader_;

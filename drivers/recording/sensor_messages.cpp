@@ -52,6 +52,19 @@ perimap_RTriggerPulse to_r_trigger_message(const RTriggerPulse& pulse) noexcept 
   return {to_ns(pulse.time), pulse.device_count};
 }
 
+perimap_RespirationSamples borrow_respiration_samples(const RespirationBlock& block) noexcept {
+  perimap_RespirationSamples message{};
+  message.first_sample_time_ns = to_ns(block.first_sample_time);
+  message.sample_period_ns = block.sample_period.count();
+  message.device_sequence = block.device_sequence;
+  message.sensor_off = block.sensor_off;
+  // The C type has no const; the serialiser does not write.
+  message.values._buffer = const_cast<float*>(block.values.data());
+  message.values._length = block.count;
+  message.values._maximum = block.count;
+  return message;
+}
+
 Expected<TrackerSample> to_tracker_sample(const perimap_TrackerPose& message) {
   TrackerSample sample;
   sample.source_time = from_ns(message.source_time_ns);
@@ -88,6 +101,22 @@ RTriggerPulse to_r_trigger_pulse(const perimap_RTriggerPulse& message) noexcept 
   pulse.time = from_ns(message.edge_time_ns);
   pulse.device_count = message.device_count;
   return pulse;
+}
+
+Expected<RespirationBlock> to_respiration_block(const perimap_RespirationSamples& message) {
+  const auto& samples = message.values;
+  if (samples._length > RespirationBlock::kCapacity) {
+    return fail(
+        fmt::format("{} samples in a block, at most {} can be taken", samples._length, RespirationBlock::kCapacity));
+  }
+  RespirationBlock block;
+  block.first_sample_time = from_ns(message.first_sample_time_ns);
+  block.sample_period = Duration(message.sample_period_ns);
+  block.device_sequence = message.device_sequence;
+  block.sensor_off = message.sensor_off;
+  block.count = samples._length;
+  std::copy_n(samples._buffer, samples._length, block.values.begin());
+  return block;
 }
 
 }  // namespace perimap

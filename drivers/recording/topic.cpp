@@ -33,6 +33,10 @@ TopicType topic_type<perimap_RTriggerPulse>() noexcept {
   return {&perimap_RTriggerPulse_desc, kPerimapSchemaText};
 }
 template <>
+TopicType topic_type<perimap_RespirationSamples>() noexcept {
+  return {&perimap_RespirationSamples_desc, kPerimapSchemaText};
+}
+template <>
 TopicType topic_type<perimap_RecordingInfo>() noexcept {
   return {&perimap_RecordingInfo_desc, kPerimapSchemaText};
 }

@@ -39,6 +39,8 @@ template <>
 template <>
 [[nodiscard]] TopicType topic_type<perimap_RTriggerPulse>() noexcept;
 template <>
+[[nodiscard]] TopicType topic_type<perimap_RespirationSamples>() noexcept;
+template <>
 [[nodiscard]] TopicType topic_type<perimap_RecordingInfo>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<perimap_TruthMesh>() noexcept;

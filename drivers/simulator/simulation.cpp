@@ -251,6 +251,26 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
     simulation.ecg_.push_back(block);
   }
 
+  // The lung's volume goes with the displacement; the monitor's figure in litres, say.
+  constexpr Duration kRespirationPeriod = milliseconds(8);
+  constexpr std::uint32_t kRespirationSamplesPerBlock = 4;
+  const HeartMotion& heart = simulation.truth_.motion();
+  const double full_mm = heart.respiration_mm.norm();
+  for (std::uint32_t k = 0; settings.respiration_channel && k * kRespirationPeriod < settings.duration;
+       k += kRespirationSamplesPerBlock) {
+    RespirationBlock block;
+    block.first_sample_time = start + k * kRespirationPeriod;
+    block.sample_period = kRespirationPeriod;
+    block.arrival = block.first_sample_time + kRespirationSamplesPerBlock * kRespirationPeriod;
+    block.device_sequence = k;
+    block.count = kRespirationSamplesPerBlock;
+    for (std::uint32_t i = 0; i < block.count && full_mm > 0.0; ++i) {
+      const Instant t = block.first_sample_time + i * kRespirationPeriod;
+      block.values[i] = static_cast<float>(0.5 * respiration_displacement(heart, t).norm() / full_mm);
+    }
+    simulation.respiration_.push_back(block);
+  }
+
   auto& arrivals = simulation.arrivals_;
   const auto add = [&](Instant arrival, Source source, std::size_t index) {
     arrivals.push_back({arrival, source, static_cast<std::uint32_t>(index)});
@@ -260,6 +280,8 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   for (std::size_t i = 0; i < simulation.tracker_stamps_.size(); ++i)
     add(simulation.tracker_stamps_[i].arrival, Source::kTracker, i);
   for (std::size_t i = 0; i < simulation.ecg_.size(); ++i) add(simulation.ecg_[i].arrival, Source::kEcg, i);
+  for (std::size_t i = 0; i < simulation.respiration_.size(); ++i)
+    add(simulation.respiration_[i].arrival, Source::kRespiration, i);
   // Stable: what arrives in the same nanosecond keeps the order above.
   std::stable_sort(arrivals.begin(), arrivals.end(),
                    [](const Arrival& a, const Arrival& b) { return a.arrival < b.arrival; });

@@ -13,6 +13,7 @@
 #include "core/error/expected.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/frame_stamp.hpp"
+#include "core/sensors/respiration_block.hpp"
 #include "core/sensors/tracker_sample.hpp"
 #include "core/time/instant.hpp"
 #include "drivers/simulator/ground_truth.hpp"
@@ -36,6 +37,7 @@ struct SimulationSettings {
   MotionLaw law = MotionLaw::kLinear;
   double respiration_mm = 0.0;
   Duration respiration_period = std::chrono::seconds(4);
+  bool respiration_channel = false;  // a volume channel tells of the breathing
   double tracker_rate_hz = 100.0;
   // Time in which the tracker's error falls to 1/e of what it was (Gauss-Markov); 0: new at each reading.
   Duration tracker_correlation{0};
@@ -66,11 +68,11 @@ class Simulation {
     Pose X_WC;
   };
 
-  enum class Source : std::uint8_t { kCamera, kTracker, kEcg };
+  enum class Source : std::uint8_t { kCamera, kTracker, kEcg, kRespiration };
   struct Arrival {
     Instant arrival;
     Source source = Source::kCamera;
-    std::uint32_t index = 0;  // into frames(), of tracker_sample(), into ecg()
+    std::uint32_t index = 0;  // into frames(), of tracker_sample(), into ecg(), respiration()
   };
 
   // Errors name the setting that is out of range, in words of the command line.
@@ -97,6 +99,7 @@ class Simulation {
   [[nodiscard]] std::span<const Arrival> arrivals() const noexcept { return arrivals_; }
   [[nodiscard]] std::span<const Frame> frames() const noexcept { return frames_; }
   [[nodiscard]] std::span<const EcgBlock> ecg() const noexcept { return ecg_; }
+  [[nodiscard]] std::span<const RespirationBlock> respiration() const noexcept { return respiration_; }
   [[nodiscard]] std::size_t tracker_sample_count() const noexcept { return tracker_stamps_.size(); }
   // A reading with this much noise; the same draw for any amount, so recordings of one rendering differ in scale alone.
   // While the tool is missing the pose is not a number.
@@ -131,6 +134,7 @@ class Simulation {
   std::vector<Frame> frames_;
   std::vector<TrackerStamp> tracker_stamps_;
   std::vector<EcgBlock> ecg_;
+  std::vector<RespirationBlock> respiration_;
   std::vector<Arrival> arrivals_;
 };
 

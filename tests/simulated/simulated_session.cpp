@@ -63,6 +63,9 @@ void deliver(LockstepRuntime& runtime, const Simulation& simulation, const Simul
     case Simulation::Source::kEcg:
       runtime.deliver(simulation.ecg()[arrival.index]);
       break;
+    case Simulation::Source::kRespiration:
+      runtime.deliver(simulation.respiration()[arrival.index]);
+      break;
   }
 }
 

@@ -7,10 +7,10 @@
 
 namespace perimap::test {
 
-using EveryType =
-    std::tuple<perimap_Surface, perimap_SurfaceModel, perimap_Phase, perimap_Status, perimap_TrackerPose,
-               perimap_EcgSamples, perimap_RTriggerPulse, perimap_RecordingInfo, perimap_TruthMesh, perimap_TruthMotion,
-               perimap_TruthCamera, foxglove_RawImage, foxglove_CompressedImage, foxglove_PoseInFrame>;
+using EveryType = std::tuple<perimap_Surface, perimap_SurfaceModel, perimap_Phase, perimap_Status, perimap_TrackerPose,
+                             perimap_EcgSamples, perimap_RTriggerPulse, perimap_RespirationSamples,
+                             perimap_RecordingInfo, perimap_TruthMesh, perimap_TruthMotion, perimap_TruthCamera,
+                             foxglove_RawImage, foxglove_CompressedImage, foxglove_PoseInFrame>;
 
 // Calls visit.operator()<T>() for every one.
 template <class Visit>

@@ -274,6 +274,7 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.rhythm);
   next(s.latency_short);
   next(s.recent_ns);
+  next(s.respiration_source);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -296,6 +297,14 @@ void fill(Filler& next, perimap_EcgSamples& s) {
 void fill(Filler& next, perimap_RTriggerPulse& s) {
   next(s.edge_time_ns);
   next(s.device_count);
+}
+
+void fill(Filler& next, perimap_RespirationSamples& s) {
+  next(s.first_sample_time_ns);
+  next(s.sample_period_ns);
+  next(s.device_sequence);
+  next(s.sensor_off);
+  next.sequence(s.values, 5);
 }
 
 void fill(Filler& next, perimap_RecordingInfo& s) {
@@ -550,7 +559,8 @@ json to_json(const perimap_Status& s) {
           MEMBER(phase_state),
           MEMBER(rhythm),
           MEMBER(latency_short),
-          MEMBER(recent_ns)};
+          MEMBER(recent_ns),
+          MEMBER(respiration_source)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {
@@ -565,6 +575,11 @@ json to_json(const perimap_EcgSamples& s) {
 template <>
 json to_json(const perimap_RTriggerPulse& s) {
   return {MEMBER(edge_time_ns), MEMBER(device_count)};
+}
+template <>
+json to_json(const perimap_RespirationSamples& s) {
+  return {MEMBER(first_sample_time_ns), MEMBER(sample_period_ns), MEMBER(device_sequence), MEMBER(sensor_off),
+          MEMBER(values)};
 }
 template <>
 json to_json(const perimap_RecordingInfo& s) {
@@ -631,6 +646,7 @@ template Sample<perimap_Status> make_sample(unsigned);
 template Sample<perimap_TrackerPose> make_sample(unsigned);
 template Sample<perimap_EcgSamples> make_sample(unsigned);
 template Sample<perimap_RTriggerPulse> make_sample(unsigned);
+template Sample<perimap_RespirationSamples> make_sample(unsigned);
 template Sample<perimap_RecordingInfo> make_sample(unsigned);
 template Sample<perimap_TruthMesh> make_sample(unsigned);
 template Sample<perimap_TruthMotion> make_sample(unsigned);

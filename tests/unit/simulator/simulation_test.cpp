@@ -45,6 +45,9 @@ TEST(Simulation, EverythingArrivesAfterItsOwnStampAndInOrder) {
         EXPECT_GT(arrival.arrival, block.first_sample_time + (block.count - 1) * block.sample_period);
         break;
       }
+      case Simulation::Source::kRespiration:
+        ADD_FAILURE() << "nobody asked for a respiration channel";
+        break;
     }
   }
   EXPECT_EQ(next[0], 900U);
