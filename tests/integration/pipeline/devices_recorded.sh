@@ -34,21 +34,22 @@ played=$(frames_of "$recording")
 
 # perimapd that records nothing until it is told to, twice.
 switched() {
+  # grep without -q: it would close the pipe on what ctl still writes.
   local told=(timeout 20 "$perimap" ctl --socket "$short/control")
   "$perimapd" -c "$work/switched.toml" &
   local daemon=$!
   for _ in $(seq 100); do [ ! -S "$short/control" ] || break; sleep 0.05; done
-  "${told[@]}" status | grep -q '^recording: off$' || fail "it records unasked"
+  "${told[@]}" status | grep '^recording: off$' > /dev/null || fail "it records unasked"
   "${told[@]}" record off && fail "what is not recorded was ended"
   # From when the emulated recording has begun.
   until [ "$(awk -v s="$start" '{print ($1 > s + 0.5)}' /proc/uptime)" = 1 ]; do sleep 0.1; done
   for _ in 1 2; do
-    "${told[@]}" record on | grep -q "^recording to .*switched/perimap-.*mcap$" || fail "it does not say where it records"
+    "${told[@]}" record on | grep "^recording to .*switched/perimap-.*mcap$" > /dev/null || fail "it does not say where it records"
     "${told[@]}" record on && fail "two recordings at once"
-    "${told[@]}" status | grep -q '^recording: on$' || fail "the status does not say that it records"
+    "${told[@]}" status | grep '^recording: on$' > /dev/null || fail "the status does not say that it records"
     sleep 1.5
-    "${told[@]}" record off | grep -q '^recorded to ' || fail "it does not say what it recorded"
-    "${told[@]}" status | grep -q '^recording: off$' || fail "the status says that it still records"
+    "${told[@]}" record off | grep '^recorded to ' > /dev/null || fail "it does not say what it recorded"
+    "${told[@]}" status | grep '^recording: off$' > /dev/null || fail "the status says that it still records"
   done
   wait $daemon
 }

@@ -105,9 +105,9 @@ TEST(RTriggerFeeder, GivesThePulsesToPipelineStatusAndRecording) {
     return std::make_unique<BeatingPort>(plugged);
   };
   PipelineCounters counters;
-  const auto entrance =
-      std::make_unique<SensorEntrance>(4, 4, EcgIntakeSettings{{}, RTriggerSettings{milliseconds(35)}}, counters);
-  DeviceFeeder feeder(std::move(devices), entrance.get(), {true, std::move(*recorder)});
+  const auto entrance = std::make_unique<SensorEntrance>(
+      4, 4, EcgIntakeSettings{{}, RTriggerSettings{milliseconds(35)}}, BreathDetectorSettings{}, counters);
+  DeviceFeeder feeder(std::move(devices), entrance.get(), {std::move(*recorder), nullptr});
   ThreadLauncher threads{SchedulingSettings{}};
   feeder.start(threads);
   const auto closed = [&feeder] {
