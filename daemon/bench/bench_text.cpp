@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/report/html_page.hpp"
 #include "daemon/report/svg_plot.hpp"
 
 namespace perimap::bench {
@@ -288,26 +289,6 @@ const std::vector<std::string>& not_proven() {
   return lines;
 }
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '&':
-        out += "&amp;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
 std::string text_of(const Table& table) {
   std::vector<std::size_t> widths;
   for (const std::string& cell : table.head) widths.push_back(cell.size());
@@ -403,20 +384,15 @@ Json to_json(const BenchReport& report) {
 }
 
 std::string to_html(const BenchReport& report) {
-  std::string out = fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>perimap bench</title>\n"
-      "<style>body{{font-family:sans-serif;margin:2em;max-width:1700px}}table{{border-collapse:collapse}}"
-      "td,th{{padding:.3em .7em;border-bottom:1px solid #ddd;text-align:right}}td:first-child,th:first-child"
-      "{{text-align:left}}svg{{max-width:100%;height:auto}}</style></head>\n<body><h1>perimap bench</h1>\n<p>{}</p>\n"
-      "<p>{}</p>\n",
-      escaped(machine_line(report.machine)), escaped(setting_line(report)));
+  std::string out =
+      fmt::format("<p>{}</p>\n<p>{}</p>\n", escaped(machine_line(report.machine)), escaped(setting_line(report)));
   for (const Table& table : tables(report)) {
     if (!table.rows.empty()) out += html_of(table);
   }
   if (!report.cost.empty() || report.memory) out += svg_document(plots(report), "");
   out += "<h2>What these figures do not prove</h2>\n<ul>\n";
   for (const std::string& line : not_proven()) out += "<li>" + escaped(line) + "</li>\n";
-  return out + "</ul>\n</body></html>\n";
+  return html_page("perimap bench", out + "</ul>\n");
 }
 
 }  // namespace perimap::bench

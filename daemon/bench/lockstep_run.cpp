@@ -25,6 +25,20 @@ class NoPublication final : public Publication {
   void status(const perimap_Status& /*status*/) override {}
 };
 
+struct LockstepSession {
+  explicit LockstepSession(const ReplaySetup& setup)
+      : pipeline(in_lockstep(setup.pipeline)), runtime(pipeline, setup.identity, setup.utc_minus_monotonic, nowhere) {}
+
+  static PipelineSettings in_lockstep(PipelineSettings settings) {
+    settings.lockstep = true;
+    return settings;
+  }
+
+  Pipeline pipeline;
+  NoPublication nowhere;
+  LockstepRuntime runtime;
+};
+
 // That all threads have had of the processors.
 Duration processor_time() {
   std::timespec t{};
@@ -48,11 +62,9 @@ std::uint64_t mapped(const PipelineCounters& c) {
 Expected<CostResult> run_cost(const BenchInput& input, int features, StopSignal& stop) {
   auto setup = prepare_run(input, features, 1);
   if (!setup) return tl::unexpected(setup.error());
-  setup->pipeline.lockstep = true;
-  Pipeline pipeline(setup->pipeline);
-  NoPublication nowhere;
-  LockstepRuntime runtime(pipeline, setup->identity, setup->utc_minus_monotonic, nowhere);
-  const PipelineCounters& counters = pipeline.counters();
+  LockstepSession session(*setup);
+  LockstepRuntime& runtime = session.runtime;
+  const PipelineCounters& counters = session.pipeline.counters();
 
   CostResult result;
   result.features_asked = features;
@@ -124,11 +136,9 @@ Expected<MemoryResult> run_memory(const BenchInput& input, int features, int wor
                                   StopSignal& stop) {
   auto setup = prepare_run(input, features, workers);
   if (!setup) return tl::unexpected(setup.error());
-  setup->pipeline.lockstep = true;
-  Pipeline pipeline(setup->pipeline);
-  NoPublication nowhere;
-  LockstepRuntime runtime(pipeline, setup->identity, setup->utc_minus_monotonic, nowhere);
-  const PipelineCounters& counters = pipeline.counters();
+  LockstepSession session(*setup);
+  LockstepRuntime& runtime = session.runtime;
+  const PipelineCounters& counters = session.pipeline.counters();
 
   MemoryResult result;
   result.features_asked = features;

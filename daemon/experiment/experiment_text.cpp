@@ -5,6 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/report/html_page.hpp"
+
 namespace perimap {
 namespace {
 
@@ -78,13 +80,9 @@ std::string to_csv(const ExperimentFigure& figure) {
 
 std::string to_html(const Experiment& experiment) {
   std::string out = fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n"
-      "<style>body{{font-family:sans-serif;margin:2em;max-width:1700px}}table{{border-collapse:collapse}}"
-      "td,th{{padding:.3em .9em;border-bottom:1px solid #ddd;text-align:right}}td:first-child,th:first-child"
-      "{{text-align:left}}svg{{max-width:100%;height:auto}}</style></head>\n<body><h1>{0}</h1>\n<p>{1}; {2} trials, "
-      "seed {3}.</p>\n<table><tr><th>path error (mm)</th><th>features</th><th>median</th><th>95 %</th><th>worst</th>"
-      "<th>&gt; 2 mm</th><th>NEES/3</th><th>&micro;s an update</th></tr>\n",
-      experiment.title, experiment.setting, experiment.trials, experiment.seed);
+      "<p>{}; {} trials, seed {}.</p>\n<table><tr><th>path error (mm)</th><th>features</th><th>median</th><th>95 %</th>"
+      "<th>worst</th><th>&gt; 2 mm</th><th>NEES/3</th><th>&micro;s an update</th></tr>\n",
+      escaped(experiment.setting), experiment.trials, experiment.seed);
   for (const MethodRow& row : experiment.rows) {
     out += fmt::format(
         "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
@@ -94,7 +92,7 @@ std::string to_html(const Experiment& experiment) {
   out += "</table>\n";
   for (const ExperimentFigure& one : experiment.figures)
     out += "<h2>" + one.title + "</h2>\n" + svg_document(one.plots, one.title);
-  return out + "</body></html>\n";
+  return html_page(experiment.title, out);
 }
 
 }  // namespace perimap

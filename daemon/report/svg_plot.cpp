@@ -7,6 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "daemon/report/html_page.hpp"
+
 namespace perimap {
 namespace {
 
@@ -57,29 +59,6 @@ std::vector<double> ticks(const Range& range) {
   if (!(std::abs(first) < 1e12 && count <= 20.0)) return values;
   for (int k = 0; k < static_cast<int>(count); ++k) values.push_back((first + k) * step);
   return values;
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
 }
 
 std::string text_at(double x, double y, const char* anchor, const std::string& text, const char* more = "") {
