@@ -17,7 +17,7 @@ session() {
   emulate "$recording"
   {
     devices_toml "$recording"
-    printf '[recording]\nrecord = %s\nfolder = "%s"\n' "${record:-true}" "$name"
+    printf '[recording]\nrecord = %s\nfolder = "%s"\nmemory_MB = 32\n' "${record:-true}" "$name"
     printf '[control]\nsocket = "%s"\n' "$short/control"
   } > "$work/$name.toml"
   "$@" > "$work/$name.log" 2>&1 || fail "$name: ended with $?: $(tail -n 5 "$work/$name.log")"
