@@ -17,6 +17,32 @@ constexpr std::array<std::pair<ToolState, perimap_ToolState>, 4> kStates{
      {ToolState::kOutOfVolume, perimap_TOOL_OUT_OF_VOLUME},
      {ToolState::kDisabled, perimap_TOOL_DISABLED}}};
 
+// What blocks of evenly spaced samples have in common.
+template <class Block, class Message, class Sequence>
+void lend_samples(const Block& block, Message& message, Sequence& samples) noexcept {
+  message.first_sample_time_ns = to_ns(block.first_sample_time);
+  message.sample_period_ns = block.sample_period.count();
+  message.device_sequence = block.device_sequence;
+  // The C type has no const; the serialiser does not write.
+  samples._buffer = const_cast<float*>(block.samples().data());
+  samples._length = block.count;
+  samples._maximum = block.count;
+}
+
+template <class Message, class Sequence, class Block>
+Expected<void> take_samples(const Message& message, const Sequence& samples, Block& block,
+                            std::array<float, Block::kCapacity>& values) {
+  if (samples._length > Block::kCapacity) {
+    return fail(fmt::format("{} samples in a block, at most {} can be taken", samples._length, Block::kCapacity));
+  }
+  block.first_sample_time = from_ns(message.first_sample_time_ns);
+  block.sample_period = Duration(message.sample_period_ns);
+  block.device_sequence = message.device_sequence;
+  block.count = samples._length;
+  std::copy_n(samples._buffer, samples._length, values.begin());
+  return {};
+}
+
 }  // namespace
 
 perimap_TrackerPose to_tracker_pose(const TrackerSample& sample) noexcept {
@@ -37,14 +63,8 @@ perimap_TrackerPose to_tracker_pose(const TrackerSample& sample) noexcept {
 
 perimap_EcgSamples borrow_ecg_samples(const EcgBlock& block) noexcept {
   perimap_EcgSamples message{};
-  message.first_sample_time_ns = to_ns(block.first_sample_time);
-  message.sample_period_ns = block.sample_period.count();
-  message.device_sequence = block.device_sequence;
+  lend_samples(block, message, message.ecg_mV);
   message.lead_off = block.lead_off;
-  // The C type has no const; the serialiser does not write.
-  message.ecg_mV._buffer = const_cast<float*>(block.mV.data());
-  message.ecg_mV._length = block.count;
-  message.ecg_mV._maximum = block.count;
   return message;
 }
 
@@ -54,14 +74,8 @@ perimap_RTriggerPulse to_r_trigger_message(const RTriggerPulse& pulse) noexcept 
 
 perimap_RespirationSamples borrow_respiration_samples(const RespirationBlock& block) noexcept {
   perimap_RespirationSamples message{};
-  message.first_sample_time_ns = to_ns(block.first_sample_time);
-  message.sample_period_ns = block.sample_period.count();
-  message.device_sequence = block.device_sequence;
+  lend_samples(block, message, message.values);
   message.sensor_off = block.sensor_off;
-  // The C type has no const; the serialiser does not write.
-  message.values._buffer = const_cast<float*>(block.values.data());
-  message.values._length = block.count;
-  message.values._maximum = block.count;
   return message;
 }
 
@@ -82,17 +96,9 @@ Expected<TrackerSample> to_tracker_sample(const perimap_TrackerPose& message) {
 }
 
 Expected<EcgBlock> to_ecg_block(const perimap_EcgSamples& message) {
-  const auto& samples = message.ecg_mV;
-  if (samples._length > EcgBlock::kCapacity) {
-    return fail(fmt::format("{} samples in a block, at most {} can be taken", samples._length, EcgBlock::kCapacity));
-  }
   EcgBlock block;
-  block.first_sample_time = from_ns(message.first_sample_time_ns);
-  block.sample_period = Duration(message.sample_period_ns);
-  block.device_sequence = message.device_sequence;
+  if (auto taken = take_samples(message, message.ecg_mV, block, block.mV); !taken) return tl::unexpected(taken.error());
   block.lead_off = message.lead_off;
-  block.count = samples._length;
-  std::copy_n(samples._buffer, samples._length, block.mV.begin());
   return block;
 }
 
@@ -104,18 +110,10 @@ RTriggerPulse to_r_trigger_pulse(const perimap_RTriggerPulse& message) noexcept 
 }
 
 Expected<RespirationBlock> to_respiration_block(const perimap_RespirationSamples& message) {
-  const auto& samples = message.values;
-  if (samples._length > RespirationBlock::kCapacity) {
-    return fail(
-        fmt::format("{} samples in a block, at most {} can be taken", samples._length, RespirationBlock::kCapacity));
-  }
   RespirationBlock block;
-  block.first_sample_time = from_ns(message.first_sample_time_ns);
-  block.sample_period = Duration(message.sample_period_ns);
-  block.device_sequence = message.device_sequence;
+  if (auto taken = take_samples(message, message.values, block, block.values); !taken)
+    return tl::unexpected(taken.error());
   block.sensor_off = message.sensor_off;
-  block.count = samples._length;
-  std::copy_n(samples._buffer, samples._length, block.values.begin());
   return block;
 }
 
