@@ -55,6 +55,7 @@ class BatchProblem {
         prior_mean_(prior_mean),
         huber_deviations_(huber_deviations),
         n_(deviations.size()),
+        deviations_(deviations),
         scaled_basis_(n_, static_cast<Index>(observations.size())),
         used_(observations.size(), 1),
         residual2_(observations.size(), 0.0),
@@ -72,6 +73,22 @@ class BatchProblem {
   [[nodiscard]] Index count() const noexcept { return scaled_basis_.cols(); }
   [[nodiscard]] Index dimension() const noexcept { return 3 * n_; }
 
+  // What the phases' deviations make of each observation of the feature that moves as at y comes to its R.
+  void widen(const VectorXd& y) {
+    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>> coefficients(y.data(), n_, 3);
+    for (Index k = 0; k < count(); ++k) {
+      const auto index = static_cast<std::size_t>(k);
+      const Observation& observation = observations_[index];
+      if (observation.b_deviation.size() != n_) continue;
+      Vector2d z;
+      Matrix23d dz_dq;
+      const Vector3d p = prior_mean_ + coefficients.transpose() * scaled_basis_.col(k);
+      if (model_.predict(observation.X_CW * p, z, &dz_dq) != ProjectionStatus::kOk) continue;
+      const Vector3d displaced = coefficients.transpose() * deviations_.cwiseProduct(observation.b_deviation);
+      const Vector2d spread = dz_dq * (observation.X_CW.R * displaced);
+      R_inverse_[index] = (observation.R + spread * spread.transpose()).inverse();
+    }
+  }
   // Every R times this; 1 at first.
   void set_variance_scale(double scale) noexcept { variance_scale_ = scale; }
   // Which observations count, 1 or 0; the caller decides.
@@ -149,6 +166,7 @@ class BatchProblem {
   Vector3d prior_mean_;
   double huber_deviations_;
   Index n_;
+  Basis deviations_;
   MatrixXd scaled_basis_;  // n x K: sigma o b of each observation
   std::vector<Matrix2d> R_inverse_;
   Eigen::Matrix<double, Eigen::Dynamic, 3> g_;  // J^T R^-1 r w
@@ -240,6 +258,8 @@ template <class Model>
 bool usable(const Observation& observation, const Model&, int n) noexcept {
   return observation.b.size() == n && observation.b.allFinite() && observation.z.allFinite() &&
          observation.R.allFinite() && observation.R(0, 0) > 0.0 && observation.R.determinant() > 0.0 &&
+         (observation.b_deviation.size() == 0 ||
+          (observation.b_deviation.size() == n && observation.b_deviation.allFinite())) &&
          observation.X_CW.R.allFinite() && observation.X_CW.t.allFinite();
 }
 
@@ -317,6 +337,7 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
       std::max(settings.min_observations,
                static_cast<int>(std::ceil(settings.min_inlier_fraction * static_cast<double>(observations.size()))));
   Solution solution = std::move(*best);
+  problem.widen(solution.y);
   if (settings.robust) {
     problem.evaluate(solution.y, Loss::kStudentT);
     outcome.weights = problem.weight();

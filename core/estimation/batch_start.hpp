@@ -4,7 +4,8 @@
 // depth; a batch over two seconds or so of motion, solved from several start depths, does not suffer from it. The loss
 // is Huber's first (wide basin), then Student's t with 3 degrees of freedom (rejects gross outliers; where it finds
 // any, once more by way of enlarged covariances, and the lower cost counts), then the plain quadratic on what lies
-// within the gate, which is what the recursion goes on from.
+// within the gate, which is what the recursion goes on from. There each observation is as uncertain as the phase makes
+// it, by the motion that the robust solution found.
 //
 // Not for the real-time path: it allocates. Deterministic.
 #pragma once

@@ -11,6 +11,7 @@ struct Observation {
   Matrix2d R = Matrix2d::Identity();  // covariance of z, pose noise included; symmetric positive definite
   Basis b;                            // basis at the sighting's phase
   Pose X_CW;                          // W into the camera's frame at capture
+  Basis b_deviation{};  // by how much b changes with one deviation of the phase; empty: the phase is exact
 };
 
 }  // namespace perimap

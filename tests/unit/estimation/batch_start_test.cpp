@@ -206,6 +206,39 @@ TEST(RecursionAfterBatchStart, IsEfficientAndConsistentForBearings) {
   expect_efficient_and_consistent(BearingModel{}, kBearingDeviation, 7);
 }
 
+// Mean NEES/3 of starts from observations whose phases are off at random, told or not told how much.
+double nees_with_uncertain_phases(bool told) {
+  constexpr double kPhaseDeviation_rad = 0.04;
+  constexpr int kFeatures = 30;
+  constexpr int kObservations = 150;
+  std::mt19937 generator(12);
+  std::normal_distribution<double> normal;
+  double nees = 0.0;
+  for (int i = 0; i < kFeatures; ++i) {
+    SimulatedFeature feature =
+        simulate_feature(kPixelModel, kLayout, Prior{}, kObservations, kPixelDeviation, 0.0, generator);
+    for (Observation& o : feature.observations) {
+      const double phase_rad =
+          std::atan2(-o.b(1 + kLayout.cardiac_harmonics), o.b(1)) + kPhaseDeviation_rad * normal(generator);
+      o.b = basis_at(kLayout, phase_rad);
+      if (told) o.b_deviation = basis_rate(kLayout, phase_rad) * kPhaseDeviation_rad;
+    }
+    const BatchOutcome start = batch_start(feature.observations, kPixelModel, kLayout, Prior{});
+    if (!start.ok()) return NAN;
+    for (int phase = 0; phase < 8; ++phase) {
+      const Basis b = basis_at(kLayout, 0.785 * phase);
+      const Vector3d error = start.estimate.position(b) - position_of(feature.x_true, b);
+      nees += error.dot(start.estimate.position_covariance(b).llt().solve(error)) / (3.0 * 8.0 * kFeatures);
+    }
+  }
+  return nees;
+}
+
+TEST(BatchStart, IsAsUncertainAsThePhasesOfItsObservations) {
+  EXPECT_NEAR(nees_with_uncertain_phases(true), 1.0, 0.3);
+  EXPECT_GT(nees_with_uncertain_phases(false), 2.0);
+}
+
 TEST(BatchStart, IsRepeatableBitByBit) {
   std::mt19937 generator(8);
   const SimulatedFeature feature =
