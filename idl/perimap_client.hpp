@@ -81,14 +81,20 @@ struct Part {
   double begin_s, end_s, begin_rad, end_rad, begin_bound, end_bound;
 };
 
+// Under one law. `bound` is w of perimap.idl.
+struct LawPhase {
+  double phase_rad = 0.0;
+  double rate_rad_per_s = 0.0;
+  double bound = 0.0;
+};
+
 // False: the law is not known, or its numbers make no cycle.
-inline bool phase_at(const perimap_PhaseClock& clock, const perimap_CardiacCycle& cycle, std::int64_t t_ns,
-                     Phase& phase) noexcept {
+inline bool law_phase_at(const perimap_PhaseClock& clock, const perimap_CardiacCycle& cycle, perimap_PhaseLaw law,
+                         double s, LawPhase& phase) noexcept {
   const double length = seconds(cycle.length_ns);
-  const double s = seconds(t_ns - cycle.begin_time_ns);
   std::array<Part, 3> parts{};
   std::size_t count = 1;
-  switch (clock.law) {
+  switch (law) {
     case perimap_PHASE_LAW_LINEAR:
       parts[0] = {0.0, length, 0.0, kTwoPi, 0.0, 1.0};
       break;
@@ -121,13 +127,35 @@ inline bool phase_at(const perimap_PhaseClock& clock, const perimap_CardiacCycle
   const double share = (s - part.begin_s) / (part.end_s - part.begin_s);
   phase.rate_rad_per_s = (part.end_rad - part.begin_rad) / (part.end_s - part.begin_s);
   phase.phase_rad = part.begin_rad + share * (part.end_rad - part.begin_rad);
-  const double w = cycle.stretches ? s / length : part.begin_bound + share * (part.end_bound - part.begin_bound);
+  phase.bound = cycle.stretches ? s / length : part.begin_bound + share * (part.end_bound - part.begin_bound);
+  return true;
+}
+
+// False as above.
+inline bool phase_at(const perimap_PhaseClock& clock, const perimap_CardiacCycle& cycle, std::int64_t t_ns,
+                     Phase& phase) noexcept {
+  const double s = seconds(t_ns - cycle.begin_time_ns);
+  LawPhase told;
+  if (!law_phase_at(clock, cycle, clock.law, s, told)) return false;
+  double law_variance_rad2 = 0.0;
+  constexpr std::array<perimap_PhaseLaw, 3> kLaws{perimap_PHASE_LAW_LINEAR, perimap_PHASE_LAW_WARPED,
+                                                  perimap_PHASE_LAW_TIME_LOCKED};
+  for (std::size_t i = 0; i < kLaws.size(); ++i) {
+    const double probability = clock.law_probabilities[i];
+    if (probability == 0.0) continue;
+    LawPhase other;
+    if (!law_phase_at(clock, cycle, kLaws[i], s, other)) return false;
+    const double difference = other.phase_rad - told.phase_rad;
+    law_variance_rad2 += probability * difference * difference;
+  }
+  phase.phase_rad = told.phase_rad;
+  phase.rate_rad_per_s = told.rate_rad_per_s;
   const double begin = seconds(cycle.begin_deviation_ns);
-  const double end = w * seconds(cycle.length_deviation_ns);
-  const double deviation_s = cycle.measured
-                                 ? std::hypot(std::hypot((1.0 - w) * begin, end), w * seconds(cycle.irregularity_ns))
-                                 : std::hypot(begin, end);
-  phase.deviation_rad = phase.rate_rad_per_s * deviation_s;
+  const double end = told.bound * seconds(cycle.length_deviation_ns);
+  const double irregular = told.bound * seconds(cycle.irregularity_ns);
+  const double deviation_s =
+      cycle.measured ? std::hypot(std::hypot((1.0 - told.bound) * begin, end), irregular) : std::hypot(begin, end);
+  phase.deviation_rad = std::hypot(phase.rate_rad_per_s * deviation_s, std::sqrt(law_variance_rad2));
   return std::isfinite(phase.phase_rad) && std::isfinite(phase.deviation_rad);
 }
 

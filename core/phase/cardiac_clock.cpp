@@ -21,7 +21,7 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   if (located.cycle.length <= Duration::zero()) return estimate;
 
   const CardiacCycle& cycle = located.cycle;
-  const CyclePhase phase = phase_in_cycle(law_, t - cycle.begin, cycle.length, cycle.previous_length);
+  const CyclePhase phase = phase_in_cycle(law_.settings, t - cycle.begin, cycle.length, cycle.previous_length);
   estimate.phase_rad = phase.phase_rad < kTwoPi ? phase.phase_rad : 0.0;
   estimate.rate_rad_per_s = phase.rate_rad_per_s;
   estimate.exact = located.exact;
@@ -40,10 +40,12 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   } else {
     estimate.deviation_s = std::hypot(begin, w * length);
   }
+  const double law_rad = law_deviation_rad(law_, t - cycle.begin, cycle.length, cycle.previous_length);
+  estimate.deviation_s = std::hypot(estimate.deviation_s, law_rad / phase.rate_rad_per_s);
   return estimate;
 }
 
-CardiacClock CardiacClock::with_law(const PhaseLawSettings& law) const noexcept {
+CardiacClock CardiacClock::with_law(const LawBelief& law) const noexcept {
   CardiacClock clock = *this;
   clock.law_ = law;
   return clock;
@@ -165,7 +167,7 @@ CardiacCycle CardiacClock::cycle_at(Instant t) const noexcept {
   cycle.completed = located.exact;
   cycle.irregularity = located.irregularity;
   if (cycle.length > Duration::zero()) {
-    cycle.systole = rounded(systole_duration(law_, cycle.length, cycle.previous_length));
+    cycle.systole = rounded(systole_duration(law_.settings, cycle.length, cycle.previous_length));
   }
   return cycle;
 }

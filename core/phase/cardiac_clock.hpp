@@ -62,7 +62,7 @@ class CardiacClock {
   static constexpr int kBeatsToLock = 3;
   static constexpr Duration kSilence = std::chrono::milliseconds(250);  // longer than any device takes to deliver
 
-  [[nodiscard]] CardiacClock with_law(const PhaseLawSettings& law) const noexcept;
+  [[nodiscard]] CardiacClock with_law(const LawBelief& law) const noexcept;
   // The same as it stands at `now`: an ECG of which nothing has been heard for kSilence is gone.
   [[nodiscard]] CardiacClock as_of(Instant now) const noexcept;
   // The same with the running cycle as corrected; unchanged when the correction is of another cycle, or carries the
@@ -98,7 +98,8 @@ class CardiacClock {
   // The last sample of a connected lead that has been looked through.
   [[nodiscard]] Instant heard_until() const noexcept { return heard_until_; }
 
-  [[nodiscard]] const PhaseLawSettings& law() const noexcept { return law_; }
+  [[nodiscard]] const PhaseLawSettings& law() const noexcept { return law_.settings; }
+  [[nodiscard]] const LawBelief& law_belief() const noexcept { return law_; }
   [[nodiscard]] std::uint64_t beats() const noexcept { return beats_; }  // R peaks taken since the start
 
  private:
@@ -127,7 +128,7 @@ class CardiacClock {
   [[nodiscard]] Located locate_predicted(Instant t) const noexcept;
   [[nodiscard]] const Beat& beat(int i) const noexcept { return history_[static_cast<std::size_t>(i)]; }
 
-  PhaseLawSettings law_;
+  LawBelief law_;
   Duration lost_after_{0};
   Duration detector_delay_{0};
   std::uint64_t beats_ = 0;

@@ -18,7 +18,7 @@ constexpr double kRhythmTolerance = 0.2;
 
 CardiacClockTracker::CardiacClockTracker(const CardiacClockSettings& settings) noexcept
     : predictor_(settings.predictor, settings.autoregression) {
-  clock_.law_ = settings.law;
+  clock_.law_.settings = settings.law;
   clock_.detector_delay_ = settings.detector_delay;
   clock_.lost_after_ = settings.lost_after;
 }

@@ -21,8 +21,8 @@ struct CycleCorrection {
   // The ECG tells nothing: the images carry the phase on, and this cycle begins with an R peak that nobody has seen.
   // Then `beats` counts those known before.
   bool carried = false;
-  bool seen = false;                    // carried, and the images have told the phase lately
-  std::optional<PhaseLawSettings> law;  // the one that the images show; none: as configured
+  bool seen = false;             // carried, and the images have told the phase lately
+  std::optional<LawBelief> law;  // what the images show of it; none: as configured
 };
 
 }  // namespace perimap

@@ -4,18 +4,16 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/statistics/upper_median.hpp"
-
 namespace perimap {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-constexpr std::array<PhaseLaw, LawChoice::kLaws> kCandidates{PhaseLaw::kLinear, PhaseLaw::kWarped,
-                                                             PhaseLaw::kTimeLocked};
 constexpr double kMemory = 100.0;  // cycles; the map learns on, and its phase's errors change
 constexpr double kLeastCycles = 4.0;
 constexpr double kDecisive = 4.0;     // difference of the log likelihoods
 constexpr double kWildest_rad = 0.8;  // no phase but a wrong match
+constexpr double kSameScale = 0.1;    // of the usual length
+constexpr double kRuledOut = 1e-3;    // probability of a law that is not asked any more
 
 }  // namespace
 
@@ -31,19 +29,54 @@ PhaseLawSettings law_even_at(PhaseLaw law, Seconds rr) noexcept {
 
 bool LawChoice::on_beat(const CardiacClock& clock) noexcept {
   const CardiacCycle cycle = clock.cycle_at(clock.anchor() - Duration(1));
-  if (!cycle.teaches || !scale(Seconds(cycle.length))) return false;
-  weigh(cycle);
-  return choose();
+  if (!cycle.teaches) return false;
+  if (usual_changes(Seconds(cycle.length))) {
+    weigh_again(clock);
+  } else if (length_count_ >= kCyclesForScale) {
+    weigh(cycle);
+  }
+  const bool another = choose();
+  believe();
+  return another;
 }
 
-// True once the laws are scaled.
-bool LawChoice::scale(Seconds rr) noexcept {
-  if (length_count_ == kCyclesForScale) return true;
-  lengths_s_[static_cast<std::size_t>(length_count_++)] = rr.count();
-  if (length_count_ < kCyclesForScale) return false;
-  const Seconds usual(upper_median(lengths_s_.begin(), lengths_s_.end()));
-  for (std::size_t i = 0; i < kLaws; ++i) laws_[i] = law_even_at(kCandidates[i], usual);
-  return true;
+// A heart may begin with a run of ectopic beats: as long as phases are told by the linear law, which has no scale, the
+// usual length may turn out another one.
+bool LawChoice::usual_changes(Seconds rr) noexcept {
+  if (chosen_ != 0) return false;
+  lengths_s_[length_count_++ % kLengths] = rr.count();
+  const auto held = std::min(length_count_, kLengths);
+  double sum_s = 0.0;
+  for (std::size_t i = 0; i < held; ++i) sum_s += lengths_s_[i];
+  const Seconds usual(sum_s / static_cast<double>(held));
+  if (length_count_ > kCyclesForScale && std::abs(usual / scale_ - 1.0) < kSameScale) return false;
+  scale(usual);
+  return length_count_ >= kCyclesForScale;
+}
+
+// Under laws of a new scale what is still kept says something else.
+void LawChoice::weigh_again(const CardiacClock& clock) noexcept {
+  parts_ = {};
+  cycles_ = 0.0;
+  squares_ = {};
+  log_likelihoods_ = {};
+  std::array<Instant, CardiacClock::kCompletedCycles> ends{};
+  int count = 0;
+  for (Instant end = clock.anchor(); count < CardiacClock::kCompletedCycles; ++count) {
+    const CardiacCycle cycle = clock.cycle_at(end - Duration(1));
+    if (cycle.length <= Duration::zero()) break;
+    ends[static_cast<std::size_t>(count)] = end;
+    end = cycle.begin;
+  }
+  while (count-- > 0) {
+    const CardiacCycle cycle = clock.cycle_at(ends[static_cast<std::size_t>(count)] - Duration(1));
+    if (cycle.teaches) weigh(cycle);
+  }
+}
+
+void LawChoice::scale(Seconds usual) noexcept {
+  scale_ = usual;
+  belief_.settings = law_even_at(belief_.settings.law, usual);
 }
 
 void LawChoice::weigh(const CardiacCycle& cycle) noexcept {
@@ -62,8 +95,9 @@ void LawChoice::weigh(const CardiacCycle& cycle) noexcept {
     }
     const double weight = 1.0 / (observed.deviation_rad * observed.deviation_rad);
     for (std::size_t law = 0; law < kLaws; ++law) {
-      const CyclePhase phase = phase_in_cycle(laws_[law], Seconds(to_seconds(observed.time - cycle.begin)),
-                                              Seconds(cycle.length), Seconds(cycle.previous_length));
+      const CyclePhase phase =
+          phase_in_cycle(belief_.with(kPhaseLaws[law]), Seconds(to_seconds(observed.time - cycle.begin)),
+                         Seconds(cycle.length), Seconds(cycle.previous_length));
       const double difference = std::remainder(observed.phase_rad - phase.phase_rad, kTwoPi);
       if (std::abs(difference) > kWildest_rad) continue;
       const int part_of = std::min(static_cast<int>(phase.phase_rad / kTwoPi * kParts), kParts - 1);
@@ -84,18 +118,30 @@ void LawChoice::weigh(const CardiacCycle& cycle) noexcept {
 }
 
 double LawChoice::scatter(PhaseLaw law) const noexcept {
-  const auto found = std::find(kCandidates.begin(), kCandidates.end(), law);
-  return cycles_ > 0.0 ? squares_[static_cast<std::size_t>(found - kCandidates.begin())] / cycles_ : 0.0;
+  const auto found = std::find(kPhaseLaws.begin(), kPhaseLaws.end(), law);
+  return cycles_ > 0.0 ? squares_[static_cast<std::size_t>(found - kPhaseLaws.begin())] / cycles_ : 0.0;
 }
 
 bool LawChoice::choose() noexcept {
   if (cycles_ < kLeastCycles) return false;
-  const auto best =
-      static_cast<int>(std::max_element(log_likelihoods_.begin(), log_likelihoods_.end()) - log_likelihoods_.begin());
-  const auto likelihood = [this](int law) { return log_likelihoods_[static_cast<std::size_t>(law)]; };
-  if (!(likelihood(best) - likelihood(chosen_) > kDecisive)) return false;
+  const auto best = static_cast<std::size_t>(std::max_element(log_likelihoods_.begin(), log_likelihoods_.end()) -
+                                             log_likelihoods_.begin());
+  if (!(log_likelihoods_[best] - log_likelihoods_[chosen_] > kDecisive)) return false;
   chosen_ = best;
   return true;
+}
+
+// Any law is as likely as another beforehand, and until as many cycles have been weighed as a choice takes.
+void LawChoice::believe() noexcept {
+  belief_.settings.law = kPhaseLaws[chosen_];
+  const double largest = *std::max_element(log_likelihoods_.begin(), log_likelihoods_.end());
+  double sum = 0.0;
+  for (std::size_t i = 0; i < kLaws; ++i) {
+    const double likelihood = cycles_ < kLeastCycles ? 1.0 : std::exp(log_likelihoods_[i] - largest);
+    belief_.probabilities[i] = likelihood < kRuledOut ? 0.0 : likelihood;
+    sum += belief_.probabilities[i];
+  }
+  for (double& probability : belief_.probabilities) probability /= sum;
 }
 
 }  // namespace perimap

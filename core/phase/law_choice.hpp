@@ -27,7 +27,7 @@ namespace perimap {
 
 class LawChoice {
  public:
-  static constexpr int kLaws = 3;
+  static constexpr std::size_t kLaws = kPhaseLaws.size();
 
   // In order of time.
   void add(const ObservedPhase& observed) noexcept { kept_[kept_count_++ % kKept] = observed; }
@@ -35,15 +35,17 @@ class LawChoice {
   // when another law is taken.
   bool on_beat(const CardiacClock& clock) noexcept;
 
-  // Linear until there is evidence.
-  [[nodiscard]] const PhaseLawSettings& law() const noexcept { return laws_[static_cast<std::size_t>(chosen_)]; }
+  // Linear until there is evidence. Where cycles differ in length the candidates do too, so that what is learnt and
+  // told before the law is known is as uncertain as it is.
+  [[nodiscard]] const LawBelief& belief() const noexcept { return belief_; }
   // Mean square difference of a law about its means, in squares of the observations' deviations; 0: nothing was
   // weighed. The mean of the cycles'.
   [[nodiscard]] double scatter(PhaseLaw law) const noexcept;
 
  private:
-  static constexpr int kParts = 24;          // of the cycle
-  static constexpr int kCyclesForScale = 6;  // whose median length is the usual one
+  static constexpr int kParts = 24;  // of the cycle
+  static constexpr std::uint64_t kCyclesForScale = 6;
+  static constexpr std::uint64_t kLengths = 12;  // the last ones, whose mean is the usual one
   static constexpr std::uint64_t kKept = 256;
 
   struct Part {
@@ -51,18 +53,22 @@ class LawChoice {
     double mean_rad = 0.0;
   };
 
-  [[nodiscard]] bool scale(Seconds rr) noexcept;
+  [[nodiscard]] bool usual_changes(Seconds rr) noexcept;
+  void weigh_again(const CardiacClock& clock) noexcept;
+  void scale(Seconds usual) noexcept;
   void weigh(const CardiacCycle& cycle) noexcept;
   [[nodiscard]] bool choose() noexcept;
+  void believe() noexcept;
 
-  std::array<PhaseLawSettings, kLaws> laws_{};
+  LawBelief belief_;
   std::array<std::array<Part, kParts>, kLaws> parts_{};
-  std::array<double, kCyclesForScale> lengths_s_{};
-  int length_count_ = 0;
+  std::array<double, kLengths> lengths_s_{};
+  std::uint64_t length_count_ = 0;
+  Seconds scale_{0.0};
   double cycles_ = 0.0;  // weighed, older ones fading, here and below
   std::array<double, kLaws> squares_{};
   std::array<double, kLaws> log_likelihoods_{};
-  int chosen_ = 0;
+  std::size_t chosen_ = 0;
   std::array<ObservedPhase, kKept> kept_{};
   std::uint64_t kept_count_ = 0;
 };

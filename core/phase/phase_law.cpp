@@ -1,6 +1,7 @@
 #include "core/phase/phase_law.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace perimap {
 namespace {
@@ -96,6 +97,18 @@ CyclePhase phase_in_cycle(const PhaseLawSettings& settings, Seconds since_r, Sec
       break;
   }
   return linear(s, rr.count());
+}
+
+double law_deviation_rad(const LawBelief& belief, Seconds since_r, Seconds rr, Seconds rr_previous) noexcept {
+  double square = 0.0;
+  const double phase_rad = phase_in_cycle(belief.settings, since_r, rr, rr_previous).phase_rad;
+  for (std::size_t i = 0; i < kPhaseLaws.size(); ++i) {
+    if (!(belief.probabilities[i] > 0.0)) continue;
+    const double difference =
+        phase_in_cycle(belief.with(kPhaseLaws[i]), since_r, rr, rr_previous).phase_rad - phase_rad;
+    square += belief.probabilities[i] * difference * difference;
+  }
+  return std::sqrt(square);
 }
 
 }  // namespace perimap

@@ -5,6 +5,7 @@
 // Schoenfeld, "Systolic time intervals in heart failure in man", Circulation 37, 1968). The other two laws say so.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <numbers>
 
@@ -42,6 +43,21 @@ inline constexpr double kLongestLockedShare = 0.95;
 // under the linear law, which has none.
 [[nodiscard]] bool stretches(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept;
 
+inline constexpr std::array<PhaseLaw, 3> kPhaseLaws{PhaseLaw::kLinear, PhaseLaw::kWarped, PhaseLaw::kTimeLocked};
+
+// The law that phases are told by, and how sure that is.
+struct LawBelief {
+  PhaseLawSettings settings;
+  std::array<double, kPhaseLaws.size()> probabilities{};  // of kPhaseLaws; all 0: the law is known
+
+  // Another law of the same numbers.
+  [[nodiscard]] PhaseLawSettings with(PhaseLaw law) const noexcept {
+    PhaseLawSettings other = settings;
+    other.law = law;
+    return other;
+  }
+};
+
 struct CyclePhase {
   double phase_rad = 0.0;       // [0, 2 pi]
   double rate_rad_per_s = 0.0;  // > 0
@@ -65,5 +81,10 @@ struct LockedParts {
 // be positive.
 [[nodiscard]] CyclePhase phase_in_cycle(const PhaseLawSettings& settings, Seconds since_r, Seconds rr,
                                         Seconds rr_previous) noexcept;
+
+// By how much the phase may be off because the law is another one, rad: root mean square difference of the laws' phases
+// from the one told. It vanishes in cycles of the length at which the laws are even, whatever is believed.
+[[nodiscard]] double law_deviation_rad(const LawBelief& belief, Seconds since_r, Seconds rr,
+                                       Seconds rr_previous) noexcept;
 
 }  // namespace perimap

@@ -65,7 +65,7 @@ std::string_view name_of(perimap_RecordingState state) noexcept {
 }
 
 std::string_view name_of(perimap_SourceKind kind) noexcept {
-  return name_in<4>({"camera", "tracker", "ecg", "r_trigger"}, static_cast<int>(kind));
+  return name_in<5>({"camera", "tracker", "ecg", "r_trigger", "respiration"}, static_cast<int>(kind));
 }
 
 std::string_view name_of(perimap_SourceState state) noexcept {

@@ -92,6 +92,53 @@ TEST(PhaseLaw, ScaledLawsRunEvenlyInACycleOfTheUsualLength) {
   }
 }
 
+LawBelief undecided(Seconds usual) { return {law_even_at(PhaseLaw::kLinear, usual), {0.5, 0.5, 0.0}}; }
+
+TEST(PhaseLaw, IsNoDoubtInACycleOfTheUsualLength) {
+  const Seconds usual(0.85);
+  for (double s = 0.05; s < 0.85; s += 0.1) {
+    EXPECT_NEAR(law_deviation_rad(undecided(usual), Seconds(s), usual, usual), 0.0, 1e-9);
+  }
+}
+
+TEST(PhaseLaw, IsInDoubtByWhatTheCandidatesDisagree) {
+  const LawBelief belief = undecided(Seconds(0.85));
+  const Seconds rr(1.1);
+  const auto phase = [&](std::size_t i, Seconds s) {
+    return phase_in_cycle(belief.with(kPhaseLaws[i]), s, rr, rr).phase_rad;
+  };
+  for (double s = 0.05; s < rr.count(); s += 0.1) {
+    const double apart = std::abs(phase(1, Seconds(s)) - phase(0, Seconds(s)));
+    EXPECT_NEAR(law_deviation_rad(belief, Seconds(s), rr, rr), std::sqrt(0.5) * apart, 1e-12);
+  }
+  EXPECT_GT(law_deviation_rad(belief, Seconds(0.35), rr, rr), 0.1);
+  EXPECT_EQ(law_deviation_rad(LawBelief{belief.settings}, Seconds(0.35), rr, rr), 0.0);
+}
+
+TEST(PhaseLaw, InDoubtWidensThePhaseOfTheClock) {
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  Instant t = from_ns(5'000'000'000);
+  Instant long_cycle = t;
+  for (int i = 0; i < 12; ++i) {
+    tracker.on_r_peak({t, t, 1.0, std::chrono::milliseconds(2)});
+    if (i == 10) long_cycle = t;
+    t += std::chrono::milliseconds(i == 10 ? 950 : 850);
+  }
+  const LawBelief belief = undecided(Seconds(0.85));
+  const CardiacClock known = tracker.clock().with_law(LawBelief{belief.settings});
+  const CardiacClock doubted = tracker.clock().with_law(belief);
+  const auto check = [&](Instant at, Duration begun, double length_s) {
+    const PhaseEstimate phase = doubted.at(at);
+    const double doubt_rad = law_deviation_rad(belief, Seconds(begun), Seconds(length_s), Seconds(0.85));
+    EXPECT_NEAR(phase.deviation_s, std::hypot(known.at(at).deviation_s, doubt_rad / phase.rate_rad_per_s), 1e-9);
+    EXPECT_EQ(phase.phase_rad, known.at(at).phase_rad);
+  };
+  const Duration into = std::chrono::milliseconds(350);
+  ASSERT_TRUE(doubted.at(long_cycle + into).exact);
+  check(long_cycle + into, into, 0.95);
+  EXPECT_GT(doubted.at(long_cycle + into).deviation_s, 3.0 * known.at(long_cycle + into).deviation_s);
+}
+
 // A heart that follows one of the laws, seen through a map that was learnt under the linear one and is off in its own
 // way in each part of the cycle.
 class ChosenLaw : public testing::TestWithParam<PhaseLaw> {};
@@ -109,7 +156,7 @@ TEST_P(ChosenLaw, IsTheOneThatTheHeartFollows) {
   for (int beat = 1; beat <= 100; ++beat) {
     tracker.on_r_peak({begin, begin + std::chrono::milliseconds(90), 1.0, std::chrono::milliseconds(2)});
     static_cast<void>(choice.on_beat(tracker.clock()));
-    if (beats_to_choose == 0 && choice.law().law == GetParam()) beats_to_choose = beat;
+    if (beats_to_choose == 0 && choice.belief().settings.law == GetParam()) beats_to_choose = beat;
     const double rr = 0.85 + 0.03 * std::sin(0.9 * beat) + 0.015 * noise(generator);
     for (double s = 0.01; s < rr; s += 1.0 / 30.0) {
       const double phase = phase_in_cycle(truth, Seconds(s), Seconds(rr), Seconds(previous_s)).phase_rad;
@@ -119,8 +166,12 @@ TEST_P(ChosenLaw, IsTheOneThatTheHeartFollows) {
     previous_s = rr;
     begin += from_seconds(rr);
   }
-  EXPECT_EQ(choice.law().law, GetParam());
+  EXPECT_EQ(choice.belief().settings.law, GetParam());
   EXPECT_LE(beats_to_choose, 60);
+  const LawBelief& belief = choice.belief();
+  for (std::size_t i = 0; i < LawChoice::kLaws; ++i) {
+    EXPECT_NEAR(belief.probabilities[i], kPhaseLaws[i] == GetParam() ? 1.0 : 0.0, 0.01);
+  }
   for (const PhaseLaw other : {PhaseLaw::kLinear, PhaseLaw::kWarped, PhaseLaw::kTimeLocked}) {
     if (other == GetParam()) continue;
     EXPECT_GT(choice.scatter(other), 1.3 * choice.scatter(GetParam()));
@@ -130,6 +181,20 @@ TEST_P(ChosenLaw, IsTheOneThatTheHeartFollows) {
 INSTANTIATE_TEST_SUITE_P(PhaseLaw, ChosenLaw,
                          testing::Values(PhaseLaw::kLinear, PhaseLaw::kWarped, PhaseLaw::kTimeLocked));
 
+TEST(PhaseLaw, IsInDoubtUntilThereIsEvidence) {
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  LawChoice choice;
+  Instant t = from_ns(5'000'000'000);
+  for (int i = 0; i < 20; ++i) {
+    tracker.on_r_peak({t, t, 1.0, std::chrono::milliseconds(2)});
+    static_cast<void>(choice.on_beat(tracker.clock()));
+    t += std::chrono::milliseconds(i % 2 == 0 ? 800 : 860);
+    for (const double probability : choice.belief().probabilities) {
+      EXPECT_NEAR(probability, i < 2 ? 0.0 : 1.0 / 3.0, 1e-12) << "after beat " << i;
+    }
+  }
+}
+
 TEST(PhaseLaw, StaysLinearWithoutEvidence) {
   CardiacClockTracker tracker{CardiacClockSettings{}};
   LawChoice choice;
@@ -138,7 +203,7 @@ TEST(PhaseLaw, StaysLinearWithoutEvidence) {
     tracker.on_r_peak({t, t, 1.0, std::chrono::milliseconds(2)});
     static_cast<void>(choice.on_beat(tracker.clock()));
   }
-  EXPECT_EQ(choice.law().law, PhaseLaw::kLinear);
+  EXPECT_EQ(choice.belief().settings.law, PhaseLaw::kLinear);
 }
 
 }  // namespace

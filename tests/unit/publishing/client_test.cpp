@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/phase/cardiac_clock_tracker.hpp"
+#include "core/phase/law_choice.hpp"
 #include "core/pipeline/surface_composer.hpp"
 #include "daemon/publishing/wire_reports.hpp"
 #include "perimap_client.hpp"
@@ -172,6 +173,17 @@ TEST(Client, KnowsACycleThatIsTooShortForItsLaw) {
     ASSERT_GT(before->irregularity_ns, 0);
     // What is left of this cycle for diastole is passed through at metres a second.
     expect_equal_at_all_horizons(moment, 3e-6);
+  }
+}
+
+TEST(Client, KnowsHowMuchTheLawIsInDoubt) {
+  for (const PhaseLaw law : kPhaseLaws) {
+    const CardiacClock clock = clock_with(law);
+    Moment doubted(clock.with_law({law_even_at(law, Seconds(0.9)), {0.2, 0.5, 0.3}}));
+    Moment known(clock.with_law({law_even_at(law, Seconds(0.9))}));
+    expect_equal_at_all_horizons(doubted, 1e-6);
+    EXPECT_GT(predicted(doubted.model(), doubted.now()).cardiac_phase_deviation_rad,
+              predicted(known.model(), known.now()).cardiac_phase_deviation_rad + 1e-3);
   }
 }
 
