@@ -132,28 +132,31 @@ void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double
 }
 
 void FeatureGroup::begin_breath(const BreathWave& wave) noexcept {
+  for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
+    if (slots_[lane].state == SlotState::kMapped) begin_breath(lane, wave);
+  }
+}
+
+void FeatureGroup::begin_breath(std::size_t lane, const BreathWave& wave) noexcept {
   const BasisLayout& layout = bank_.layout();
   const int n = layout.size();
   const int first = 1 + 2 * layout.cardiac_harmonics;
-  for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
-    if (slots_[lane].state != SlotState::kMapped) continue;
-    FeatureEstimate estimate;
-    bank_.get(feature(lane), estimate);
-    for (int axis = 0; axis < 3; ++axis) {
-      estimate.P(axis * n, axis * n) += kBreathMeanDeviation_mm * kBreathMeanDeviation_mm;
-      for (int k = 0; k < layout.respiratory_harmonics; ++k) {
-        const double deviation_mm = kBreathDeviation_mm / ((k + 1) * (k + 1));
-        for (const int i : {axis * n + first + k, axis * n + first + layout.respiratory_harmonics + k}) {
-          estimate.P.row(i).setZero();
-          estimate.P.col(i).setZero();
-          estimate.P(i, i) = deviation_mm * deviation_mm;
-        }
-        estimate.x(axis * n + first + k) = wave.a[k](axis);
-        estimate.x(axis * n + first + layout.respiratory_harmonics + k) = wave.b[k](axis);
+  FeatureEstimate estimate;
+  bank_.get(feature(lane), estimate);
+  for (int axis = 0; axis < 3; ++axis) {
+    estimate.P(axis * n, axis * n) += kBreathMeanDeviation_mm * kBreathMeanDeviation_mm;
+    for (int k = 0; k < layout.respiratory_harmonics; ++k) {
+      const double deviation_mm = kBreathDeviation_mm / ((k + 1) * (k + 1));
+      for (const int i : {axis * n + first + k, axis * n + first + layout.respiratory_harmonics + k}) {
+        estimate.P.row(i).setZero();
+        estimate.P.col(i).setZero();
+        estimate.P(i, i) = deviation_mm * deviation_mm;
       }
+      estimate.x(axis * n + first + k) = wave.a[k](axis);
+      estimate.x(axis * n + first + layout.respiratory_harmonics + k) = wave.b[k](axis);
     }
-    bank_.set(feature(lane), estimate);
   }
+  bank_.set(feature(lane), estimate);
 }
 
 void FeatureGroup::doubt() noexcept {

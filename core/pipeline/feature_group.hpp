@@ -52,6 +52,8 @@ class FeatureGroup {
                std::vector<FeatureSlot*>& owners) noexcept;
   // The breathing's phase has become known: all mapped features take the motion that they have in common with it.
   void begin_breath(const BreathWave& wave) noexcept;
+  // The same for one lane, whose feature is mapped.
+  void begin_breath(std::size_t lane, const BreathWave& wave) noexcept;
 
   // The motion law was another one than supposed: what was learnt under it is less certain than it seemed.
   void doubt() noexcept;

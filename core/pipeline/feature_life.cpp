@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/pipeline/feature_stages.hpp"
 #include "core/pipeline/match_covariance.hpp"
 
 namespace perimap {
@@ -40,6 +41,7 @@ bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& mod
     observation.z = held.px;
     observation.X_CW = frame->X_CW;
     observation.b = frame->b;
+    observation.b_deviation = frame->b_rate * (frame->phase.rate_rad_per_s * frame->phase.deviation_s);
     observation.R = match_covariance(held, *frame, frame->pose.X_WC * (depth_mm * ray_C), J_C * frame->X_CW.R,
                                      settings.pixel_deviation_px);
     slot.start.captures[k] = frame->stamp.capture;
@@ -57,7 +59,7 @@ class Step {
       : slot_(slot), bank_(bank), feature_(feature), job_(job), model_(model), settings_(settings) {}
 
   LifeEvent tracked() noexcept {
-    if (now() - slot_.last_found_frame > kTrackedMissesAllowed) return give_up();
+    if (now() - slot_.last_found_frame > kCarriedMissesAllowed) return give_up();
     slot_.held.drop_if([this](const HeldMatch& held) {
       const FrameRecord* frame = job_.history->find(held.frame_index);
       return frame == nullptr || (frame->phase.exact && !frame->phase.teaches);
@@ -123,11 +125,7 @@ class Step {
     }
     if (slot_.follows_something_else) {
       slot_.follows_something_else = false;
-      if (!slot_.match_agrees) {
-        // Let go of the patch, so that the next search starts where the map says.
-        slot_.last_found_frame =
-            std::min(slot_.last_found_frame, now() - std::min<std::uint64_t>(now(), kTrackedMissesAllowed + 1));
-      }
+      if (!slot_.match_agrees) let_go(slot_, *job_.frame);
     }
     // Spread over the frames by id, so that no frame pays for all features.
     if ((now() + slot_.id) % kConvergenceCheckFrames == 0) check_convergence();

@@ -20,8 +20,10 @@
 
 namespace perimap {
 
-// Frames without a match after which the image alone no longer tells where a feature is.
+// Frames without a match after which the image alone no longer tells where a feature is: by its last place, and carried
+// along with the features around it.
 inline constexpr std::uint64_t kTrackedMissesAllowed = 5;
+inline constexpr std::uint64_t kCarriedMissesAllowed = 15;
 
 enum class SlotState : std::uint8_t {
   kEmpty,
@@ -87,7 +89,9 @@ struct FeatureSlot {
 
   // following
   PatchTemplate patch;
-  PatchState patch_state;
+  PatchState patch_state;                  // when it was found last
+  PatchState seen;                         // of this frame's match, until that is believed
+  Vector2d carried_px = Vector2d::Zero();  // patch_state.px, moved since then with the features around it
   PatchContinuity looks;
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   std::uint64_t last_found_frame = 0;

@@ -1,6 +1,7 @@
 #include "core/pipeline/feature_stages.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/pipeline/pose_noise.hpp"
 
@@ -17,6 +18,9 @@ struct PixelPrediction {
   Matrix2d covariance_px2 = Matrix2d::Identity();
 };
 
+// One pixel more on each axis: what the model does not know about the tissue.
+Matrix2d of_the_model() noexcept { return Matrix2d::Identity(); }
+
 PixelPrediction predict_from_map(const MapPrediction& map, const FrameRecord& frame, const PixelModel& model) noexcept {
   if (!map.valid || !frame.measurable) return {};
   PixelPrediction prediction;
@@ -24,27 +28,72 @@ PixelPrediction predict_from_map(const MapPrediction& map, const FrameRecord& fr
   const Vector3d p_WF = map.p_WF + frame.displacement_mm;
   if (model.camera.project(frame.X_CW * p_WF, prediction.px, &J_C) != ProjectionStatus::kOk) return {};
   const Matrix23d J_p = J_C * frame.X_CW.R;
-  // One pixel more on each axis: what the model does not know about the tissue.
   CameraPose pose = frame.pose;
   pose.position_variance_mm2 =
       frame.tracker_variance_mm2 + frame.displacement_deviation_mm * frame.displacement_deviation_mm;
   prediction.covariance_px2 =
-      J_p * map.covariance_W * J_p.transpose() + pose_noise_covariance(pose, p_WF, J_p) + Matrix2d::Identity();
+      J_p * map.covariance_W * J_p.transpose() + pose_noise_covariance(pose, p_WF, J_p) + of_the_model();
   prediction.valid = prediction.covariance_px2.allFinite();
   return prediction;
 }
 
-PixelPrediction predict_from_image(const FeatureSlot& slot, const FrameRecord& frame) noexcept {
-  const std::uint64_t frames = frame.index - slot.last_found_frame;
-  if (frames > kTrackedMissesAllowed) return {};
-  const auto n = static_cast<double>(frames);
+// From the pose that the frame's matches agree on: far narrower than the tracker's where that is noisy.
+PixelPrediction predict_from_shared_pose(const MapPrediction& map, const CommonEstimate& shared,
+                                         const PixelModel& model) noexcept {
   PixelPrediction prediction;
-  prediction.valid = true;
-  // A velocity that is older than a frame misleads more than it helps: the motion turns within a few frames.
-  prediction.px = frames == 1 ? Vector2d(slot.patch_state.px + slot.velocity_px) : slot.patch_state.px;
-  const double deviation = kUnmappedMotionDeviation_px * n;
-  prediction.covariance_px2 = deviation * deviation * Matrix2d::Identity();
+  MeasurementJacobians J;
+  if (measure(model, shared.X_CW, map.p_WF, prediction.px, &J) != ProjectionStatus::kOk) return {};
+  CommonJacobian J_s(2, kPoseUnknowns);
+  J_s << J.dz_dtheta, J.dz_dc;
+  prediction.covariance_px2 = J.dz_dp * map.covariance_W * J.dz_dp.transpose() +
+                              common_noise(J_s, shared.covariance.topLeftCorner(kPoseUnknowns, kPoseUnknowns)) +
+                              of_the_model();
+  prediction.valid = prediction.covariance_px2.allFinite();
   return prediction;
+}
+
+std::uint64_t frames_since_found(const FeatureSlot& slot, const FrameJob& job) noexcept {
+  return job.frame->index - slot.last_found_frame;
+}
+
+// By its own motion, while it is fresh: an older velocity misleads more than it helps, the motion turns within a few
+// frames.
+PixelPrediction predict_from_velocity(const FeatureSlot& slot, const FrameJob& job) noexcept {
+  PixelPrediction prediction;
+  prediction.valid = frames_since_found(slot, job) == 1;
+  prediction.px = slot.patch_state.px + slot.velocity_px;
+  prediction.covariance_px2 = kUnmappedMotionDeviation_px * kUnmappedMotionDeviation_px * Matrix2d::Identity();
+  return prediction;
+}
+
+// From where it was found last some frames ago, whatever has moved since.
+PixelPrediction predict_from_last_place(const FeatureSlot& slot, const FrameJob& job) noexcept {
+  const std::uint64_t frames = frames_since_found(slot, job);
+  PixelPrediction prediction;
+  prediction.valid = frames > 1 && frames <= kTrackedMissesAllowed;
+  prediction.px = slot.patch_state.px;
+  const double deviation_px = kUnmappedMotionDeviation_px * static_cast<double>(frames);
+  prediction.covariance_px2 = deviation_px * deviation_px * Matrix2d::Identity();
+  return prediction;
+}
+
+// Where the features around it say that it has moved to; each frame since it was found has added to the doubt.
+PixelPrediction predict_from_neighbours(const FeatureSlot& slot, const NeighbourMotion::Around& neighbours,
+                                        const FrameJob& job) noexcept {
+  constexpr double kStrain_px = 1.5, kDoubtPerFrame_px = 0.5;
+  const std::uint64_t frames = frames_since_found(slot, job);
+  PixelPrediction prediction;
+  prediction.valid = neighbours.known && frames <= kCarriedMissesAllowed;
+  prediction.px = slot.carried_px + neighbours.by;
+  const double deviation_px =
+      kStrain_px + neighbours.disagreement_px + kDoubtPerFrame_px * static_cast<double>(frames - 1);
+  prediction.covariance_px2 = deviation_px * deviation_px * Matrix2d::Identity();
+  return prediction;
+}
+
+const PixelPrediction& surer(const PixelPrediction& a, const PixelPrediction& b) noexcept {
+  if (!a.valid || !b.valid) return a.valid ? a : b;
+  return a.covariance_px2.trace() < b.covariance_px2.trace() ? a : b;
 }
 
 // Whether this may be a look-alike: there is room for one in the search region, and the feature was not there in the
@@ -55,12 +104,21 @@ bool is_doubtful(const PixelPrediction& prediction, const Vector2d& px, std::uin
   return frames > 1 || (px - prediction.px).norm() > kUnmappedMotionDeviation_px;
 }
 
-// Whether the match can be the feature, as far as the map and the causal phase tell. What is learnt from it is judged
-// again when its phase is known.
-bool agrees(const PatchMatch& match, const PixelPrediction& from_map, double gate) noexcept {
-  const Vector2d r = match.px - from_map.px;
-  const Matrix2d C = from_map.covariance_px2 + match.covariance_px2;
+// Whether the match can be the feature, as far as the prediction tells. What is learnt from it is judged again when its
+// phase is known.
+bool agrees(const PatchMatch& match, const PixelPrediction& prediction, double gate) noexcept {
+  const Vector2d r = match.px - prediction.px;
+  const Matrix2d C = prediction.covariance_px2 + match.covariance_px2;
   return r.dot(C.inverse() * r) <= gate;
+}
+
+// Blur, smoke or a weak texture have left so little that the place is hardly told; as one of many alike (see
+// match_covariance) it would count for nothing, and it leads the next searches astray.
+bool is_vague(const PatchMatch& match) noexcept {
+  constexpr double kLargestDeviation_px = 1.0;
+  const Matrix2d& C = match.covariance_px2;
+  const double largest = 0.5 * C.trace() + std::hypot(0.5 * (C(0, 0) - C(1, 1)), C(0, 1));
+  return !(largest <= kLargestDeviation_px * kLargestDeviation_px);
 }
 
 // Longer than a heart's beat, which stretches the picture of its surface and lets it go again.
@@ -84,6 +142,41 @@ void renew_stale_template(FeatureSlot& slot, const FrameJob& job) noexcept {
   slot.patch_state.px = slot.match.px;
 }
 
+// Whether a match may be believed without looking like the feature.
+enum class Looks : std::uint8_t { kAskedInDoubt, kAskedAlways };
+
+void seek(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks, const FrameJob& job,
+          const PipelineSettings& settings) noexcept {
+  slot.match = PatchMatch{};
+  if (!prediction.valid || !settings.camera.contains(prediction.px)) return;
+  slot.seen = slot.patch_state;
+  slot.match = job.tracker->track(job.image, slot.patch, slot.seen, prediction.px, prediction.covariance_px2);
+  if (slot.match.state != MatchState::kFound) return;
+  const std::uint64_t frames = frames_since_found(slot, job);
+  const bool is_asked = looks == Looks::kAskedAlways || is_doubtful(prediction, slot.match.px, frames);
+  const bool is_other =
+      is_asked && !slot.looks.is_plausible(slot.patch_state, slot.seen, slot.match.correlation, frames);
+  if (is_other || is_vague(slot.match)) slot.match.state = MatchState::kLowCorrelation;
+}
+
+// What was found is believed: the next search builds on it.
+void believe(FeatureSlot& slot, const FrameJob& job) noexcept {
+  slot.velocity_px =
+      frames_since_found(slot, job) == 1 ? Vector2d(slot.match.px - slot.patch_state.px) : Vector2d::Zero();
+  slot.patch_state = slot.seen;
+  slot.carried_px = slot.match.px;
+  slot.looks.add(slot.match.correlation);
+  renew_stale_template(slot, job);
+  slot.last_found_frame = job.frame->index;
+}
+
+// A jump that what is around it did not make. What the map knows well needs no neighbours: the frame's other matches
+// have judged it.
+bool moves_otherwise(const FeatureSlot& slot, const PixelPrediction& from_neighbours, double gate) noexcept {
+  if (slot.converged || !from_neighbours.valid) return false;
+  return !agrees(slot.match, from_neighbours, gate);
+}
+
 }  // namespace
 
 void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJob& job, const PixelModel& model,
@@ -92,35 +185,47 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   slot.match_agrees = false;
   if (slot.state == SlotState::kEmpty) return;
   const PixelPrediction from_map = predict_from_map(map, *job.frame, model);
-  const PixelPrediction from_image = predict_from_image(slot, *job.frame);
-  const bool use_map =
-      from_map.valid && (!from_image.valid || from_map.covariance_px2.trace() < from_image.covariance_px2.trace());
-  const PixelPrediction& prediction = use_map ? from_map : from_image;
-  if (!prediction.valid || !settings.camera.contains(prediction.px)) return;
-  const Vector2d last_px = slot.patch_state.px;
-  PatchState seen = slot.patch_state;
-  slot.match = job.tracker->track(job.image, slot.patch, seen, prediction.px, prediction.covariance_px2);
+  seek(slot, surer(from_map, predict_from_velocity(slot, job)), Looks::kAskedInDoubt, job, settings);
   if (slot.match.state != MatchState::kFound) return;
-  const std::uint64_t frames = job.frame->index - slot.last_found_frame;
-  if (is_doubtful(prediction, slot.match.px, frames) &&
-      !slot.looks.is_plausible(slot.patch_state, seen, slot.match.correlation, frames)) {
-    slot.match.state = MatchState::kLowCorrelation;
-    return;
-  }
-  slot.patch_state = seen;
-  slot.looks.add(slot.match.correlation);
   slot.match_agrees = from_map.valid && agrees(slot.match, from_map, settings.estimator.update.gate);
-  const bool in_a_row = slot.last_found_frame + 1 == job.frame->index;
-  renew_stale_template(slot, job);
-  slot.velocity_px = in_a_row ? Vector2d(slot.match.px - last_px) : Vector2d::Zero();
-  slot.last_found_frame = job.frame->index;
+}
+
+void follow(FeatureSlot& slot, const MapPrediction& map, const FrameJob& job, const PixelModel& model,
+            const PipelineSettings& settings) noexcept {
+  if (slot.state == SlotState::kEmpty) return;
+  const double gate = settings.estimator.update.gate;
+  const NeighbourMotion::Around neighbours = job.motion->around(slot.carried_px, &slot.patch_state.px);
+  const PixelPrediction from_neighbours = predict_from_neighbours(slot, neighbours, job);
+  if (slot.match.state != MatchState::kFound || moves_otherwise(slot, from_neighbours, gate)) {
+    const bool pose_is_shared = map.valid && job.shared_pose != nullptr;
+    const PixelPrediction from_map = pose_is_shared ? predict_from_shared_pose(map, *job.shared_pose, model)
+                                                    : predict_from_map(map, *job.frame, model);
+    slot.match_agrees = false;
+    seek(slot, surer(from_map, from_neighbours.valid ? from_neighbours : predict_from_last_place(slot, job)),
+         Looks::kAskedAlways, job, settings);
+    if (slot.match.state == MatchState::kFound) {
+      slot.match_agrees = from_map.valid && agrees(slot.match, from_map, gate);
+    }
+  }
+  if (slot.match.state == MatchState::kFound) {
+    believe(slot, job);
+  } else {
+    slot.carried_px += neighbours.by;
+  }
+}
+
+void let_go(FeatureSlot& slot, const FrameRecord& frame) noexcept {
+  // The difference of the counts is what matters, and wraps.
+  if (frame.index - slot.last_found_frame <= kCarriedMissesAllowed) {
+    slot.last_found_frame = frame.index - (kCarriedMissesAllowed + 1);
+  }
 }
 
 void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept {
   slot.match.state = MatchState::kTooFar;
   slot.match_agrees = false;
   ++slot.refused_in_a_row;
-  slot.last_found_frame = frame.index - std::min<std::uint64_t>(frame.index, kTrackedMissesAllowed + 1);
+  let_go(slot, frame);
 }
 
 void describe(const FeatureSlot& slot, FeatureSnapshot& snapshot) noexcept {

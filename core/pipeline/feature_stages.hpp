@@ -16,13 +16,21 @@ struct MapPrediction {
   Matrix3d covariance_W = Matrix3d::Zero();  // mm^2
 };
 
-// A: predicts the feature's pixel with its covariance (map and pose, or the image alone), searches there, leaves
-// slot.match.
+// A: predicts the feature's pixel with its covariance (map and pose, or its own motion in the image), searches there,
+// leaves slot.match.
 void predict_and_find(FeatureSlot& slot, const MapPrediction& from_map, const FrameJob& job, const PixelModel& model,
                       const PipelineSettings& settings) noexcept;
 
-// B: a match that the frame's other matches contradict is none. The next search begins where the map says.
+// The patch follows something else: the next search begins where the map says.
+void let_go(FeatureSlot& slot, const FrameRecord& frame) noexcept;
+
+// B: a match that the frame's other matches contradict is none.
 void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept;
+
+// After the hand-over: what was not found, or went another way than what is around it, is searched for again where the
+// pose that the frame's matches agree on has it, or where its neighbours have moved. Then what was found is believed.
+void follow(FeatureSlot& slot, const MapPrediction& from_map, const FrameJob& job, const PixelModel& model,
+            const PipelineSettings& settings) noexcept;
 
 // C: all of a mapped feature's snapshot but its coefficients and covariances, which the bank has.
 void describe(const FeatureSlot& slot, FeatureSnapshot& snapshot) noexcept;

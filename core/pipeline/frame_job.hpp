@@ -4,12 +4,14 @@
 #include <array>
 #include <cstdint>
 
+#include "core/estimation/shared_pose.hpp"
 #include "core/periodic/basis.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/phase_spread.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/time/instant.hpp"
+#include "core/vision/neighbour_motion.hpp"
 #include "core/vision/patch_tracker.hpp"
 
 namespace perimap {
@@ -25,10 +27,13 @@ struct ReleaseBasis {
 struct FrameJob {
   const FrameRecord* frame = nullptr;
   const FrameHistory* history = nullptr;
-  GreyImage image;  // during stage A alone
+  GreyImage image;  // while features are searched for
   const PatchTracker* tracker = nullptr;
   BasesAbout about_capture;
   std::array<ReleaseBasis, kReleasesCovered> releases;
+  // After B: how the features found have moved, and the pose that they agree on; null when they do not tell it.
+  const NeighbourMotion* motion = nullptr;
+  const CommonEstimate* shared_pose = nullptr;
   Instant learn_until;  // learning that has not begun by then is put off; never in lockstep
 };
 

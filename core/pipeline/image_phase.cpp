@@ -62,6 +62,7 @@ void ImagePhase::collect(std::span<FeatureGroup> groups, const FrameRecord& fram
 
 ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
                                 const EstimatorSettings& settings) noexcept {
+  agreed_ = CommonEstimate();
   const ImagePhases can_not_tell;
   const ImagePhases contradicts{{ImagePhaseOutcome::kContradicts, {}}, {ImagePhaseOutcome::kContradicts, {}}};
   if (!frame.measurable || groups.empty()) return can_not_tell;
@@ -98,7 +99,10 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
     if (!(std::abs(shift_s) < kLargestShift_s)) return nothing_near;
     if (!(std::abs(breath_shift_s) <= kLargestBreathShift * breath_deviation_s)) return nothing_near;
   }
-  if (converged) refuse_what_disagrees(groups, frame, model, settings, solved_at, solved);
+  if (converged) {
+    agreed_ = solved;
+    refuse_what_disagrees(groups, frame, model, settings, solved_at, solved);
+  }
   const auto answer = [&](Eigen::Index unknown, double shift, double prior_s2, double phase_rad, double rate_rad_per_s,
                           double largest_deviation_s, double common_deviation_s) {
     ImagePhaseAnswer result;

@@ -62,6 +62,9 @@ class ImagePhase {
   [[nodiscard]] ImagePhases observe(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
                                     const EstimatorSettings& settings) noexcept;
 
+  // The pose that the converged features' matches of the frame observed last agree on; null when they did not tell it.
+  [[nodiscard]] const CommonEstimate* shared_pose() const noexcept { return agreed_.ok ? &agreed_ : nullptr; }
+
   // By how much the whole surface is displaced from where the map has it (mm, frame W), which may be much more than the
   // tracker's error. False when the matches can not tell.
   [[nodiscard]] bool displacement(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
@@ -80,6 +83,7 @@ class ImagePhase {
                              const EstimatorSettings& settings, const Shifts& shifts,
                              const CommonEstimate& solved) noexcept;
 
+  CommonEstimate agreed_;
   std::vector<CommonMatch> matches_;
   std::vector<FeatureSlot*> owners_;  // of matches_
   std::vector<std::uint8_t> used_;

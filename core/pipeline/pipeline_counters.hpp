@@ -27,6 +27,13 @@ struct PipelineCounters {
   LatencyHistogram ecg_delay;
   Counter last_ecg_ns;
   Counter last_good_ecg_ns;
+  // respiration thread
+  Counter respiration_samples;
+  Counter respiration_off;      // samples that mean nothing: the sensor is off
+  Counter respiration_dropped;  // gaps in the device's sequence
+  LatencyHistogram respiration_delay;
+  Counter last_respiration_ns;
+  Counter last_good_respiration_ns;
   // R-trigger thread
   Counter r_triggers;
   Counter r_triggers_dropped;  // gaps in the device's count

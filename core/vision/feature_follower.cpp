@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "core/statistics/upper_median.hpp"
@@ -11,7 +10,6 @@ namespace perimap {
 namespace {
 
 constexpr double kFirstDeviation_px = 6.0;
-constexpr std::size_t kNeighbours = 6;
 constexpr std::size_t kEnoughDisplacements = 4;
 
 bool is_sought(const FollowedFeature& feature) noexcept {
@@ -28,8 +26,8 @@ FeatureFollower::FeatureFollower(const FollowerSettings& settings)
     : settings_(settings),
       tracker_({.min_correlation = settings.min_correlation}),
       features_(static_cast<std::size_t>(std::max(settings.maximum, 0))),
+      motion_(features_.size()),
       deviation_px_(kFirstDeviation_px) {
-  displacements_.reserve(features_.size());
   scratch_.reserve(features_.size());
 }
 
@@ -53,41 +51,15 @@ bool FeatureFollower::seek(const GreyImage& image, FollowedFeature& feature, con
 }
 
 void FeatureFollower::note_displacements() noexcept {
-  displacements_.clear();
+  motion_.clear();
   for (const FollowedFeature& feature : features_) {
-    if (feature.found) displacements_.push_back({feature.last_px, feature.px - feature.last_px});
+    if (feature.found) motion_.add(feature.last_px, feature.px);
   }
 }
 
-// The middle displacement, along each axis, of the nearest features found; of the velocity of `but` itself when there
-// are too few.
-FeatureFollower::Around FeatureFollower::around(const Vector2d& px, const FollowedFeature* but) const noexcept {
-  struct Near {
-    double distance_squared = 0;
-    Vector2d by = Vector2d::Zero();
-  };
-  std::array<Near, kNeighbours> nearest;
-  std::size_t count = 0;
-  for (const Displacement& displacement : displacements_) {
-    if (but != nullptr && displacement.from == but->last_px) continue;
-    const double distance_squared = (displacement.from - px).squaredNorm();
-    if (count == kNeighbours && distance_squared >= nearest[count - 1].distance_squared) continue;
-    std::size_t place = count < kNeighbours ? count++ : count - 1;
-    for (; place > 0 && nearest[place - 1].distance_squared > distance_squared; --place) {
-      nearest[place] = nearest[place - 1];
-    }
-    nearest[place] = {distance_squared, displacement.by};
-  }
-  if (count < kEnoughDisplacements) return {but != nullptr ? but->velocity_px : Vector2d(Vector2d::Zero()), 0.0};
-  Around result;
-  for (std::size_t i = 0; i < count; ++i) {
-    result.distance_px += std::sqrt(nearest[i].distance_squared) / static_cast<double>(count);
-  }
-  std::array<double, kNeighbours> along;
-  for (int axis = 0; axis < 2; ++axis) {
-    for (std::size_t i = 0; i < count; ++i) along[i] = nearest[i].by[axis];
-    result.by[axis] = upper_median(along.begin(), along.begin() + count);
-  }
+NeighbourMotion::Around FeatureFollower::around(const Vector2d& px, const FollowedFeature* but) const noexcept {
+  NeighbourMotion::Around result = motion_.around(px, but != nullptr ? &but->last_px : nullptr);
+  if (!result.known && but != nullptr) result.by = but->velocity_px;
   return result;
 }
 
@@ -196,7 +168,7 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
 // Jumps and steady sliding: along an edge, on an instrument, with a highlight. Tissue strains, so neighbours differ
 // within bounds.
 bool FeatureFollower::moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept {
-  const Around neighbours = around(feature.last_px, &feature);
+  const NeighbourMotion::Around neighbours = around(feature.last_px, &feature);
   const Vector2d astray = feature.px - feature.last_px - neighbours.by;
   scratch_.push_back(astray.norm());
   // Of the distance to the neighbours: what a beat strains the tissue by, in a frame and in all.

@@ -8,6 +8,7 @@
 
 #include "core/geometry/pose.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "core/vision/neighbour_motion.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 
@@ -72,17 +73,10 @@ class FeatureFollower {
   [[nodiscard]] int free() const noexcept;
 
  private:
-  struct Displacement {
-    Vector2d from;
-    Vector2d by;
-  };
   [[nodiscard]] bool seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
                           double deviation_px, double min_correlation) const noexcept;
-  struct Around {
-    Vector2d by = Vector2d::Zero();  // displacement
-    double distance_px = 0;          // of those it is taken from, in the mean; 0 when there are too few
-  };
-  [[nodiscard]] Around around(const Vector2d& px, const FollowedFeature* but) const noexcept;
+  // Of the features around `px`, without `but`; its own velocity where there are too few.
+  [[nodiscard]] NeighbourMotion::Around around(const Vector2d& px, const FollowedFeature* but) const noexcept;
   [[nodiscard]] Vector2d displacement_around(const Vector2d& px, const FollowedFeature* but) const noexcept {
     return around(px, but).by;
   }
@@ -97,7 +91,7 @@ class FeatureFollower {
   TemplateSettings template_settings_;
   PatchTracker tracker_;
   std::vector<FollowedFeature> features_;
-  std::vector<Displacement> displacements_;  // of this frame
+  NeighbourMotion motion_;  // of this frame
   std::vector<double> scratch_;
   double deviation_px_;
   double strangeness_px_ = 1.0;  // how far a displacement usually is from that of the neighbours

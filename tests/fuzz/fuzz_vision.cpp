@@ -1,5 +1,6 @@
 // Any bytes as an image of odd size and stride, with features sought anywhere in any shape: nothing outside the image
-// is read (the buffer ends with the last pixel), and what is said to be found is a place in it.
+// is read (the buffer ends with the last pixel), and what is said to be found is a place in it. What a match is judged
+// by beyond that (its looks, the motion around it) takes any numbers.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -11,6 +12,8 @@
 #include "core/vision/feature_detector.hpp"
 #include "core/vision/feature_follower.hpp"
 #include "core/vision/instrument_mask.hpp"
+#include "core/vision/neighbour_motion.hpp"
+#include "core/vision/patch_continuity.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 
@@ -55,6 +58,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const double deviation = std::abs(static_cast<double>(input.take<float>()));
   PatchState state;
   for (int i = 0; i < 4; ++i) state.A(i / 2, i % 2) += input.take<std::int8_t>() / 40.0;
+  PatchContinuity looks;
+  const int believed = input.below(8);
+  for (int i = 0; i < believed; ++i) looks.add(input.take<float>());
+  const auto frames = input.take<std::uint64_t>();
   const std::vector<std::uint8_t> pixels = input.pixels(static_cast<std::size_t>((height - 1) * stride + width));
   const GreyImage image{pixels.data(), width, height, stride};
 
@@ -73,8 +80,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const bool is_inside =
           match.px.x() >= 0 && match.px.y() >= 0 && match.px.x() <= width - 1 && match.px.y() <= height - 1;
       if (!is_inside || !match.covariance_px2.allFinite() || !(match.covariance_px2.determinant() > 0)) std::abort();
+      // Whatever it has been taken for before: what looks the same and fits perfectly is never something else.
+      (void)looks.is_plausible(state, now, match.correlation, frames);
+      PatchContinuity usual;
+      usual.add(match.correlation);
+      if (!usual.is_plausible(now, now, 1, 1)) std::abort();
     }
   }
+
+  NeighbourMotion motion(10);
+  for (int i = 0; i < 12; ++i) motion.add(inside + i * predicted, at - i * inside);
+  const NeighbourMotion::Around around = motion.around(at, &inside);
+  if (around.known && at.allFinite() && predicted.allFinite() && !(around.disagreement_px >= 0)) std::abort();
 
   const auto corners = find_features(image, {}, detector_settings_for(width, height, estimate_noise(image), 20), 20);
   if (!corners) std::abort();

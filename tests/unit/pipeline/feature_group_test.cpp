@@ -113,7 +113,7 @@ TEST_F(Stages, ATrackedFeatureWithoutMatchesIsGivenUpSoon) {
   int frames = 0;
   while (learn_frame() != LifeEvent::kLost) {
     next_frame();
-    ASSERT_LT(++frames, 10);
+    ASSERT_LT(++frames, 20);
   }
   EXPECT_EQ(slot->state, SlotState::kEmpty);
 }
@@ -311,7 +311,8 @@ TEST_F(Stages, AFeatureRefusedTenTimesLetsGoOfItsPatchAndIsStillGivenUpWhenUnsee
     found_at({420.0, 240.0});
     ASSERT_EQ(learn_frame(), LifeEvent::kNone);
   }
-  EXPECT_LT(slot->last_found_frame + 5, job.frame->index) << "the next search starts where the map says";
+  EXPECT_GT(job.frame->index - slot->last_found_frame, kCarriedMissesAllowed)
+      << "the next search starts where the map says";
   int frames = 0;
   do {
     next_frame();

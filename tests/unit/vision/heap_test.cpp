@@ -3,6 +3,8 @@
 
 #include <cstdlib>
 
+#include "core/vision/neighbour_motion.hpp"
+#include "core/vision/patch_continuity.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 #include "counted_allocations.hpp"
@@ -38,6 +40,30 @@ TEST(Heap, IsNotTouchedByTemplateOrTracker) {
   EXPECT_EQ(near.state, MatchState::kFound);
   EXPECT_EQ(far.state, MatchState::kFound);
   EXPECT_NE(absent.state, MatchState::kFound);
+}
+
+TEST(Heap, IsNotTouchedByTheTestOfLooksOrByTheMotionAround) {
+  PatchContinuity looks;
+  PatchState before, turned;
+  turned.A << 0.4, -0.42, 0.34, 1.04;
+  constexpr std::size_t kMost = 10;
+  NeighbourMotion motion(kMost);
+
+  const long allocations = test::allocations;
+  for (int i = 0; i < 20; ++i) looks.add(0.998);
+  const bool same = looks.is_plausible(before, before, 0.997, 1);
+  const bool other = looks.is_plausible(before, turned, 0.995, 2);
+  looks.reset();
+  // More than were announced are left out.
+  for (std::size_t i = 0; i < 3 * kMost; ++i) motion.add(Vector2d(i, 0), Vector2d(i, 1));
+  const NeighbourMotion::Around around = motion.around(Vector2d(5, 5), nullptr);
+  motion.clear();
+  EXPECT_EQ(test::allocations, allocations);
+
+  EXPECT_TRUE(same);
+  EXPECT_FALSE(other);
+  EXPECT_TRUE(around.known);
+  EXPECT_EQ(around.by, Vector2d(0, 1));
 }
 
 }  // namespace
