@@ -50,6 +50,8 @@ Expected<EcgRecord> load_ecg_record(std::string_view name) {
     if (embedded.name != name) continue;
     EcgRecord record;
     record.name = name;
+    record.sample_rate_hz = embedded.sample_rate_hz;
+    record.counts_per_mV = embedded.counts_per_mV;
     const auto bytes = gunzip(name, embedded.samples_gz);
     if (!bytes) return tl::unexpected(bytes.error());
     if (bytes->size() % 2 != 0) return fail("ECG record " + record.name + ": its last sample is cut");

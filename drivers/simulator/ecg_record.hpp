@@ -11,12 +11,13 @@
 namespace perimap {
 
 struct EcgRecord {
-  static constexpr double kSampleRate_hz = 360.0;
-  static constexpr double kCounts_per_mV = 200.0;
-
   std::string name;
+  double sample_rate_hz = 0.0;
+  double counts_per_mV = 0.0;
   std::vector<std::int16_t> samples;        // counts
   std::vector<std::uint32_t> beat_samples;  // index of each R peak, ascending
+
+  [[nodiscard]] float mV(std::size_t sample) const { return static_cast<float>(samples[sample] / counts_per_mV); }
 };
 
 // "100, 105, ...": what load_ecg_record takes.

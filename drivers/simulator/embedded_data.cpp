@@ -28,6 +28,8 @@ PERIMAP_EMBED(perimap_beats_105, "105_beats.csv");
 PERIMAP_EMBED(perimap_beats_106, "106_beats.csv");
 PERIMAP_EMBED(perimap_beats_119, "119_beats.csv");
 PERIMAP_EMBED(perimap_beats_123, "123_beats.csv");
+PERIMAP_EMBED(perimap_ecg_03700181, "03700181_ch0_10000perMV_500Hz.i16.gz");
+PERIMAP_EMBED(perimap_beats_03700181, "03700181_beats.csv");
 // clang-format on
 
 namespace perimap {
@@ -52,12 +54,20 @@ std::string_view embedded_epicardium_faces_csv() noexcept {
 }
 
 std::span<const EmbeddedEcgRecord> embedded_ecg_records() noexcept {
-  static const std::array<EmbeddedEcgRecord, 5> records{{
-      {"100", bytes(perimap_ecg_100_begin, perimap_ecg_100_end), text(perimap_beats_100_begin, perimap_beats_100_end)},
-      {"105", bytes(perimap_ecg_105_begin, perimap_ecg_105_end), text(perimap_beats_105_begin, perimap_beats_105_end)},
-      {"106", bytes(perimap_ecg_106_begin, perimap_ecg_106_end), text(perimap_beats_106_begin, perimap_beats_106_end)},
-      {"119", bytes(perimap_ecg_119_begin, perimap_ecg_119_end), text(perimap_beats_119_begin, perimap_beats_119_end)},
-      {"123", bytes(perimap_ecg_123_begin, perimap_ecg_123_end), text(perimap_beats_123_begin, perimap_beats_123_end)},
+  // MIT-BIH Arrhythmia Database: 360 Hz, 200 counts a mV. The bedside monitor: 500 Hz.
+  static const std::array<EmbeddedEcgRecord, 6> records{{
+      {"100", 360.0, 200.0, bytes(perimap_ecg_100_begin, perimap_ecg_100_end),
+       text(perimap_beats_100_begin, perimap_beats_100_end)},
+      {"105", 360.0, 200.0, bytes(perimap_ecg_105_begin, perimap_ecg_105_end),
+       text(perimap_beats_105_begin, perimap_beats_105_end)},
+      {"106", 360.0, 200.0, bytes(perimap_ecg_106_begin, perimap_ecg_106_end),
+       text(perimap_beats_106_begin, perimap_beats_106_end)},
+      {"119", 360.0, 200.0, bytes(perimap_ecg_119_begin, perimap_ecg_119_end),
+       text(perimap_beats_119_begin, perimap_beats_119_end)},
+      {"123", 360.0, 200.0, bytes(perimap_ecg_123_begin, perimap_ecg_123_end),
+       text(perimap_beats_123_begin, perimap_beats_123_end)},
+      {"03700181", 500.0, 10000.0, bytes(perimap_ecg_03700181_begin, perimap_ecg_03700181_end),
+       text(perimap_beats_03700181_begin, perimap_beats_03700181_end)},
   }};
   return records;
 }

@@ -7,8 +7,10 @@
 namespace perimap {
 
 struct EmbeddedEcgRecord {
-  std::string_view name;                      // MIT-BIH record, such as "100"
-  std::span<const unsigned char> samples_gz;  // gzip of int16 little-endian, 200 a mV, 360 Hz
+  std::string_view name;  // of the record in its database, such as "100"
+  double sample_rate_hz;
+  double counts_per_mV;
+  std::span<const unsigned char> samples_gz;  // gzip of int16 little-endian
   std::string_view beats_csv;                 // time_s,symbol,sample
 };
 

@@ -111,7 +111,7 @@ Expected<void> check(const SimulationSettings& s) {
 
 // The record's sample at which the session starts.
 Expected<std::uint32_t> start_sample(const SimulationSettings& s, const EcgRecord& record) {
-  const auto samples = [](Duration d) { return to_seconds(d) * EcgRecord::kSampleRate_hz; };
+  const auto samples = [&](Duration d) { return to_seconds(d) * record.sample_rate_hz; };
   const double first = record.beat_samples[kBeatsBefore];
   const double last = record.beat_samples[record.beat_samples.size() - 1 - kBeatsAfter] - samples(s.duration);
   if (last < first)
@@ -120,7 +120,7 @@ Expected<std::uint32_t> start_sample(const SimulationSettings& s, const EcgRecor
   const double asked = samples(*s.ecg_start);
   if (asked < first || asked > last)
     return fail(fmt::format("ECG start: {} s is outside {:.1f} to {:.1f} s of record {}", to_seconds(*s.ecg_start),
-                            first / EcgRecord::kSampleRate_hz, last / EcgRecord::kSampleRate_hz, record.name));
+                            first / record.sample_rate_hz, last / record.sample_rate_hz, record.name));
   return static_cast<std::uint32_t>(asked);
 }
 
@@ -152,7 +152,7 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   // A host that has been up for an hour or two.
   const Instant start{from_seconds(CounterNoise(settings.seed, kSession).uniform(1, 3600.0, 7200.0))};
   const auto sample_time = [&](std::int64_t sample) {
-    return start + from_seconds(static_cast<double>(sample - *first_sample) / EcgRecord::kSampleRate_hz);
+    return start + from_seconds(static_cast<double>(sample - *first_sample) / record->sample_rate_hz);
   };
 
   HeartMotion motion;
@@ -234,20 +234,19 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
 
   // ECG: small blocks, sent when their last sample is there.
   Transport ecg(CounterNoise(settings.seed, kEcgDelay), milliseconds(4), microseconds(800));
-  const auto sample_count = static_cast<std::uint32_t>(to_seconds(settings.duration) * EcgRecord::kSampleRate_hz);
+  const auto sample_count = static_cast<std::uint32_t>(to_seconds(settings.duration) * record->sample_rate_hz);
   for (std::uint32_t k = 0; k + kEcgSamplesPerBlock <= sample_count; k += kEcgSamplesPerBlock) {
     EcgBlock block;
     const std::uint32_t from = *first_sample + k;
     block.first_sample_time = sample_time(from);
-    block.sample_period = from_seconds(1.0 / EcgRecord::kSampleRate_hz);
+    block.sample_period = from_seconds(1.0 / record->sample_rate_hz);
     block.arrival = ecg.arrival(sample_time(from + kEcgSamplesPerBlock - 1), k);
     block.device_sequence = k;
     block.count = kEcgSamplesPerBlock;
     const Duration since = block.first_sample_time - start;
     block.lead_off = std::any_of(settings.ecg_off.begin(), settings.ecg_off.end(),
                                  [&](const auto& off) { return since >= off.begin && since < off.begin + off.length; });
-    for (std::uint32_t i = 0; i < block.count && !block.lead_off; ++i)
-      block.mV[i] = static_cast<float>(record->samples[from + i] / EcgRecord::kCounts_per_mV);
+    for (std::uint32_t i = 0; i < block.count && !block.lead_off; ++i) block.mV[i] = record->mV(from + i);
     simulation.ecg_.push_back(block);
   }
 

@@ -140,8 +140,8 @@ TEST_P(WholeRecord, MeetsItsFigures) {
   ASSERT_TRUE(record);
   EcgTrace trace;
   for (std::size_t i = 0; i < record->samples.size(); ++i) {
-    trace.time_s.push_back(static_cast<double>(i) / EcgRecord::kSampleRate_hz);
-    trace.mV.push_back(static_cast<float>(record->samples[i] / EcgRecord::kCounts_per_mV));
+    trace.time_s.push_back(static_cast<double>(i) / record->sample_rate_hz);
+    trace.mV.push_back(record->mV(i));
   }
   std::vector<ReferenceBeat> reference;
   for (const EmbeddedEcgRecord& embedded : embedded_ecg_records()) {
@@ -170,9 +170,10 @@ TEST_P(WholeRecord, MeetsItsFigures) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(MitBih, WholeRecord,
+INSTANTIATE_TEST_SUITE_P(Embedded, WholeRecord,
                          testing::Values(Goal{"100", 100.0, 0.0}, Goal{"105", 99.4, 0.0}, Goal{"106", 99.8, 95.0},
-                                         Goal{"119", 100.0, 95.0}, Goal{"123", 99.965, 0.0}),
+                                         Goal{"119", 100.0, 95.0}, Goal{"123", 99.965, 0.0},
+                                         Goal{"03700181", 100.0, 0.0}),
                          [](const auto& goal) { return std::string(goal.param.record); });
 
 }  // namespace

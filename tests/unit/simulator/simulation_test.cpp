@@ -168,6 +168,7 @@ TEST(Simulation, TrackerLosesTheToolAsOftenAsAskedAndSaysSo) {
 TEST(Simulation, TheHeartBeatsToTheEcgItSends) {
   const Simulation simulation = simulate(small());
   // At each R peak of the motion the ECG stream stands higher than most of it (record 100: upright QRS).
+  constexpr double kSampleRate_hz = 360.0;
   std::vector<float> all;
   for (const EcgBlock& block : simulation.ecg())
     for (const float mV : block.samples()) all.push_back(mV);
@@ -177,7 +178,7 @@ TEST(Simulation, TheHeartBeatsToTheEcgItSends) {
   const float high = sorted[sorted.size() * 95 / 100];
   int beats = 0;
   for (const Instant r_peak : simulation.truth().motion().r_peaks) {
-    const auto sample = std::llround(to_seconds(r_peak - simulation.start()) * EcgRecord::kSampleRate_hz);
+    const auto sample = std::llround(to_seconds(r_peak - simulation.start()) * kSampleRate_hz);
     if (sample < 0 || sample >= static_cast<long long>(all.size())) continue;
     EXPECT_GT(all[static_cast<std::size_t>(sample)], high);
     ++beats;
@@ -222,7 +223,7 @@ TEST(Simulation, SaysWhichSettingIsOutOfRange) {
   EXPECT_EQ(error([](auto& s) { s.width = 641; }), "size: 641x64 is not even in both directions");
   EXPECT_EQ(error([](auto& s) { s.frames_per_s = 0.0; }), "fps: 0 is outside 1 to 1000 Hz");
   EXPECT_EQ(error([](auto& s) { s.ecg_record = "99"; }),
-            "there is no ECG record '99'; choose one of 100, 105, 106, 119, 123");
+            "there is no ECG record '99'; choose one of 100, 105, 106, 119, 123, 03700181");
   EXPECT_EQ(error([](auto& s) { s.frames_per_s = std::nan(""); }), "fps: nan is outside 1 to 1000 Hz");
   EXPECT_NE(error([](auto& s) { s.ecg_start = std::chrono::seconds(1); }).find("ECG start: 1 s is outside"),
             std::string::npos);
