@@ -58,6 +58,18 @@ std::uint32_t port_status(const ToolReading& reading) {
   return 0x31U | (reading.state == ToolState::kOutOfVolume ? 0x40U : 0U);
 }
 
+// Keeps what is sent.
+class Collected final : public LinkControl {
+ public:
+  using LinkControl::send;
+  void send(std::span<const std::byte> bytes) override { all.insert(all.end(), bytes.begin(), bytes.end()); }
+  void set_line_rate(int /*baud*/) override {}
+  void send_break() override {}
+  void fail(std::string /*reason*/) override {}
+
+  std::vector<std::byte> all;
+};
+
 std::optional<unsigned> hex(std::string_view digits) {
   unsigned value = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
@@ -72,6 +84,7 @@ NdiEmulator::NdiEmulator(PoseTrack track, const NdiEmulatorSettings& settings, c
 
 void NdiEmulator::on_open(LinkControl& /*link*/, Instant /*now*/) {
   line_.clear();
+  held_.clear();
   restart();
   initialised_ = false;
 }
@@ -85,6 +98,7 @@ void NdiEmulator::restart() {
 }
 
 void NdiEmulator::on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) {
+  now_ = arrival;
   for (const std::byte b : bytes) {
     if (b == std::byte{'\r'}) {
       on_command(link, std::exchange(line_, {}), arrival);
@@ -94,9 +108,22 @@ void NdiEmulator::on_bytes(LinkControl& link, std::span<const std::byte> bytes, 
   }
 }
 
+void NdiEmulator::on_time(LinkControl& link, Instant now) {
+  for (; !held_.empty() && held_.front().due <= now; held_.pop_front()) link.send(held_.front().reply);
+}
+
+void NdiEmulator::send(LinkControl& link, std::span<const std::byte> bytes, std::size_t check) {
+  if (!link.serial()) return sender_.send(link, bytes, check);
+  Collected reply;
+  sender_.send(reply, bytes, check);
+  const Instant begin = held_.empty() ? now_ : std::max(now_, held_.back().due);
+  const auto on_line = std::llround(static_cast<double>(reply.all.size()) * link.byte_time_ns());
+  held_.push_back({begin + Duration(on_line), std::move(reply.all)});
+}
+
 void NdiEmulator::reply(LinkControl& link, std::string_view text) {
   const std::string framed = ndi_with_crc(text);
-  sender_.send(link, std::as_bytes(std::span(framed.data(), framed.size())), framed.size() - 2);
+  send(link, std::as_bytes(std::span(framed.data(), framed.size())), framed.size() - 2);
 }
 
 void NdiEmulator::reply_binary(LinkControl& link, std::span<const std::byte> body) {
@@ -105,7 +132,7 @@ void NdiEmulator::reply_binary(LinkControl& link, std::span<const std::byte> bod
   framed.u16(ndi_crc(framed.all));
   framed.all.insert(framed.all.end(), body.begin(), body.end());
   framed.u16(ndi_crc(body));
-  sender_.send(link, framed.all, framed.all.size() - 1);
+  send(link, framed.all, framed.all.size() - 1);
 }
 
 NdiEmulator::Port* NdiEmulator::port_of(std::string_view digits) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -27,9 +28,11 @@ class NdiEmulator final : public DeviceProtocol {
 
   void on_open(LinkControl& link, Instant now) override;
   void on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
-  void on_time(LinkControl& /*link*/, Instant /*now*/) override {}
-  [[nodiscard]] Instant next_time() const noexcept override { return kNever; }
+  void on_time(LinkControl& link, Instant now) override;
+  [[nodiscard]] Instant next_time() const noexcept override { return held_.empty() ? kNever : held_.front().due; }
 
+  // A wired tool is taken out of its port: the device tells it as disabled.
+  void unplug(std::uint16_t handle) { ports_.at(handle).enabled = false; }
   // The definition uploaded to a port handle, for tests.
   [[nodiscard]] const std::vector<std::byte>& definition(std::uint16_t handle) const {
     return ports_.at(handle).definition;
@@ -43,7 +46,14 @@ class NdiEmulator final : public DeviceProtocol {
     bool enabled = false;
   };
 
+  // A pseudo-terminal takes no time for what a serial line takes its time for, so the reply waits for it.
+  struct Held {
+    Instant due;
+    std::vector<std::byte> reply;
+  };
+
   void restart();
+  void send(LinkControl& link, std::span<const std::byte> bytes, std::size_t check);
   void on_command(LinkControl& link, const std::string& line, Instant now);
   void reply(LinkControl& link, std::string_view text);
   void reply_binary(LinkControl& link, std::span<const std::byte> body);
@@ -60,6 +70,8 @@ class NdiEmulator final : public DeviceProtocol {
   EmulatorFaults faults_;
   FaultySender sender_;
   std::string line_;
+  std::deque<Held> held_;
+  Instant now_{};
   std::map<std::uint16_t, Port> ports_;
   bool initialised_ = false;
   bool tracking_ = false;

@@ -35,6 +35,7 @@ void IgtlSession::on_open(LinkControl& link, Instant now) {
   last_stamp_ = 0;
   last_ = now;
   any_ = false;
+  server_fault_.clear();
   link.send(start_tdata());
 }
 
@@ -56,10 +57,10 @@ void IgtlSession::on_message(const IgtlMessage& message, Instant arrival) {
   if (message.type == "TDATA") return on_tdata(message, arrival);
   const auto status = decode_igtl_status(message.content);
   if (!status) return health_.damaged.add();
-  if (status->code != kStatusOk) {
-    health_.set_reason(
-        fmt::format("{} reports status {} {} {}", message.device, status->code, status->name, status->text));
-  }
+  server_fault_.clear();
+  if (status->code == kStatusOk) return;
+  server_fault_ = fmt::format("{} reports status {} {} {}", message.device, status->code, status->name, status->text);
+  health_.set_reason(server_fault_);
 }
 
 void IgtlSession::on_pose(const IgtlMessage& message, const Expected<Pose>& pose, Instant arrival) {
@@ -123,9 +124,12 @@ Instant IgtlSession::next_time() const noexcept {
 void IgtlSession::on_time(LinkControl& link, Instant now) {
   if (health_.state() == DeviceState::kStreaming) health_.set_state(DeviceState::kSilent);
   if (now - last_ < kReopenAfter) return;
-  link.fail(any_ ? std::string("no pose of the sensor for 2 s")
-                 : fmt::format("connected, but no pose of '{}' in 2 s; is it the name that the server sends?",
-                               settings_.sensor));
+  // What the server itself complains of is the likelier reason.
+  const std::string why =
+      any_ ? "no pose of the sensor for 2 s" : fmt::format("connected, but no pose of '{}' in 2 s", settings_.sensor);
+  link.fail(!server_fault_.empty() ? fmt::format("{}: {}", why, server_fault_)
+            : any_                 ? why
+                                   : why + "; is it the name that the server sends?");
 }
 
 }  // namespace perimap

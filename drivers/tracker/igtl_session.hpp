@@ -50,6 +50,7 @@ class IgtlSession final : public DeviceProtocol {
   std::uint32_t count_ = 0;
   Instant last_{};  // reading, or the opening
   bool any_ = false;
+  std::string server_fault_;  // the last STATUS that was not OK, in this connection
 };
 
 }  // namespace perimap

@@ -70,6 +70,19 @@ std::optional<std::vector<std::string>> handles_of(std::string_view reply) {
   return handles;
 }
 
+// From the reply's first byte to its last.
+Duration time_on_line(const NdiReply& reply, const LinkControl& link) {
+  constexpr std::size_t kTextFrame = 5;          // CRC, CR
+  constexpr std::size_t kBinaryFrame = 8;        // start, length, two CRCs
+  constexpr std::size_t kLongestShort = 0xFFFF;  // beyond it the length takes two bytes more
+  std::size_t bytes = 0;
+  if (const auto* text = std::get_if<NdiText>(&reply)) bytes = text->text.size() + kTextFrame;
+  if (const auto* binary = std::get_if<NdiBinary>(&reply)) {
+    bytes = binary->body.size() + kBinaryFrame + (binary->body.size() > kLongestShort ? 2 : 0);
+  }
+  return Duration(std::llround(static_cast<double>(bytes) * link.byte_time_ns()));
+}
+
 }  // namespace
 
 NdiSession::NdiSession(NdiSettings settings, TrackerSink sink, DeviceHealth& health)
@@ -157,6 +170,7 @@ void NdiSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, I
 
 void NdiSession::on_reply(LinkControl& link, const NdiReply& reply, Instant arrival) {
   if (std::holds_alternative<NdiDamaged>(reply)) return on_damage(link, arrival);
+  on_line_ = time_on_line(reply, link);
   if (const auto* binary = std::get_if<NdiBinary>(&reply)) {
     if (step_ == Step::kStream && query_ == Query::kBx2) return on_tracking(link, decode_bx2(binary->body), arrival);
     if (step_ == Step::kStream && query_ == Query::kBx) return on_tracking(link, decode_bx(binary->body), arrival);
@@ -360,8 +374,9 @@ void NdiSession::on_tracking(LinkControl& link, const Expected<NdiTracking>& tra
     if (sensor.handle != sensor_handle_) continue;
     ToolReading reference;
     for (const NdiToolReading& tool : tracking->tools) {
-      if (settings_.reference && tool.handle == reference_handle_ && tool.frame == sensor.frame)
-        reference = tool.reading;
+      // A disabled tool has no frame; a pose of another frame is none of this one.
+      const bool of_frame = tool.frame == sensor.frame || tool.reading.state == ToolState::kDisabled;
+      if (settings_.reference && tool.handle == reference_handle_ && of_frame) reference = tool.reading;
     }
     deliver(sensor, reference, arrival);
   }
@@ -387,8 +402,8 @@ void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& refere
       health_.lost.add(step / stride_ - 1);
     }
     last_frame_ = sensor.frame;
-    clock_.observe(sensor.frame, arrival);
-    health_.jitter.add(clock_.lateness(sensor.frame, arrival));
+    clock_.observe(sensor.frame, arrival - on_line_);
+    health_.jitter.add(clock_.lateness(sensor.frame, arrival - on_line_));
     sample.source_time = clock_.stamp(sensor.frame);
   }
   sample.device_frame = sensor.frame;
@@ -399,6 +414,12 @@ void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& refere
   health_.samples.add();
   health_.set_state(DeviceState::kStreaming);
   sink_(sample);
+}
+
+std::string NdiSession::why_no_reading() const {
+  if (!command_.empty()) return fmt::format("no answer to {} for 2 s", command_);
+  if (last_frame_ == 0U) return "the sensor's tool has been disabled for 2 s: is it unplugged?";
+  return "no reading of the sensor's tool for 2 s";
 }
 
 void NdiSession::on_time(LinkControl& link, Instant now) {
@@ -416,8 +437,7 @@ void NdiSession::on_time(LinkControl& link, Instant now) {
       return ask(link, now);
     case Step::kStream: {
       if (now - last_reading_ >= kReopenAfter) {
-        return link.fail(command_.empty() ? std::string("no reading of the sensor's tool for 2 s")
-                                          : fmt::format("no answer to {} for 2 s", command_));
+        return link.fail(why_no_reading());
       }
       if (now - last_reading_ >= kSilentAfter && health_.state() == DeviceState::kStreaming) {
         health_.set_state(DeviceState::kSilent);

@@ -74,6 +74,11 @@ Expected<std::size_t> PseudoTerminal::write(std::span<const std::byte> bytes) {
   return put;
 }
 
+double PseudoTerminal::byte_time_ns() const noexcept {
+  const int rate = line_rate();
+  return rate > 0 ? 10.0e9 / rate : 0.0;
+}
+
 int PseudoTerminal::line_rate() const noexcept {
   struct termios2 settings {};
   return ::ioctl(slave_.get(), TCGETS2, &settings) == 0 ? static_cast<int>(settings.c_ospeed) : 0;

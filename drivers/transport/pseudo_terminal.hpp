@@ -28,6 +28,8 @@ class PseudoTerminal final : public ByteStream {
   int descriptor() const noexcept override { return master_.get(); }
   // The rate that the other side has set, baud; 0 when it cannot be told.
   [[nodiscard]] int line_rate() const noexcept;
+  // What a byte would take at that rate; a pseudo-terminal itself takes no time.
+  double byte_time_ns() const noexcept override;
 
  private:
   PseudoTerminal(Descriptor master, Descriptor slave, std::string device, std::string link)

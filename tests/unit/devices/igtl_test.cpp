@@ -6,6 +6,7 @@
 #include <igtlTrackingDataMessage.h>
 #include <igtlTransformMessage.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -306,6 +307,29 @@ TEST(IgtlSession, OtherToolsAreNotTheSensor) {
   theatre.run(seconds(5));
   EXPECT_TRUE(theatre.samples.empty());
   EXPECT_THAT(theatre.host.failure, HasSubstr("no pose of 'Probe'"));
+}
+
+TEST(IgtlSession, WhatTheServerComplainsOfIsTheReasonWhenNoPoseComes) {
+  for (const bool recovered : {false, true}) {
+    DeviceHealth health;
+    IgtlSession session(
+        {.sensor = "Scope", .reference = std::nullopt, .world = {}}, [](const TrackerSample&) { FAIL(); }, health);
+    ScriptedLink link;
+    session.on_open(link, kStart);
+    const auto status = [&](std::uint8_t code) {
+      std::vector<std::byte> content(30);
+      content[1] = static_cast<std::byte>(code);
+      const std::string_view name = "no camera";
+      std::transform(name.begin(), name.end(), content.begin() + 10, [](char c) { return static_cast<std::byte>(c); });
+      session.on_bytes(link, encode_igtl({1, "STATUS", "Server", 0, content, {}}), kStart + milliseconds(10));
+    };
+    status(13);
+    if (recovered) status(1);
+    session.on_time(link, session.next_time());
+    EXPECT_THAT(link.failure, HasSubstr("no pose of 'Scope'"));
+    EXPECT_EQ(link.failure.find("Server reports status 13 no camera") != std::string::npos, !recovered);
+    EXPECT_EQ(link.failure.find("is it the name") != std::string::npos, recovered);
+  }
 }
 
 TEST(IgtlSession, MeasuresRelativeToTheReferenceWhileThatIsFresh) {

@@ -232,11 +232,12 @@ Pose swaying_at(std::uint32_t frame) { return track().at(frame).X_TO; }
 // Session and emulated device, connected without a transport; time is made.
 struct Theatre {
   Theatre(NdiSettings settings, const NdiEmulatorSettings& device_settings, bool serial = false,
-          const EmulatorFaults& faults = {})
-      : device(track(), device_settings, faults),
+          const EmulatorFaults& faults = {}, int baud = 0)
+      : far(serial, baud),
+        device(track(), device_settings, faults),
         session(
             std::move(settings), [this](const TrackerSample& sample) { samples.push_back(sample); }, health),
-        host(serial) {
+        host(serial, baud) {
     device.on_open(far, now);
     session.on_open(host, now);
   }
@@ -247,6 +248,7 @@ struct Theatre {
       const auto to_device = bytes_of(host.take_sent());
       sent.append(reinterpret_cast<const char*>(to_device.data()), to_device.size());
       device.on_bytes(far, to_device, now);
+      device.on_time(far, now);
       const auto to_host = bytes_of(far.take_sent());
       if (!to_host.empty()) session.on_bytes(host, to_host, now);
       if (now >= session.next_time()) session.on_time(host, now);
@@ -304,6 +306,44 @@ TEST(NdiSession, OverASerialLineItSendsABreakAndChangesTheRate) {
   EXPECT_THAT(theatre.host.rates, ::testing::ElementsAre(115200));
   EXPECT_THAT(theatre.sent, ::testing::StartsWith("INIT:E3A5\rCOMM:500000048\r"));
   EXPECT_GT(theatre.samples.size(), 50U);
+}
+
+// A reply of some 90 bytes takes 8 ms at this rate.
+TEST(NdiSession, WhatAReplyTakesOnTheLineIsNoPartOfItsInstant) {
+  for (const auto newest : {NdiEmulatorSettings::Newest::kBx2, NdiEmulatorSettings::Newest::kTx}) {
+    Theatre theatre(wired(), {.newest = newest, .wired_tools = 1}, true, {}, 115200);
+    const auto reset = bytes_of("RESETBE6F\r");
+    theatre.session.on_bytes(theatre.host, reset, theatre.now);
+    theatre.run(seconds(4));
+    ASSERT_EQ(theatre.host.failure, "");
+    ASSERT_GT(theatre.samples.size(), 200U);
+    std::vector<double> late_ms;
+    for (std::size_t i = theatre.samples.size() / 2; i < theatre.samples.size(); ++i) {
+      const TrackerSample& sample = theatre.samples[i];
+      const Instant measured = kStart + sample.device_frame * milliseconds(10);
+      late_ms.push_back(to_seconds(sample.source_time - measured) * 1e3);
+      EXPECT_GT(sample.arrival - sample.source_time, milliseconds(4));
+    }
+    std::nth_element(late_ms.begin(), late_ms.begin() + static_cast<std::ptrdiff_t>(late_ms.size() / 2), late_ms.end());
+    // The test's clock goes by milliseconds, and a frame is seen when it is asked for.
+    EXPECT_NEAR(late_ms[late_ms.size() / 2], 0.0, 3.0);
+  }
+}
+
+TEST(NdiSession, ADisabledReferenceIsDisabledAndNotMissing) {
+  NdiSettings settings = wired();
+  settings.sensor.handle = 0x0A;
+  settings.reference = NdiTool{{}, 0x0B};
+  Theatre theatre(settings, {.newest = NdiEmulatorSettings::Newest::kBx, .wired_tools = 2});
+  theatre.run(milliseconds(200));
+  ASSERT_FALSE(theatre.samples.empty());
+  EXPECT_EQ(theatre.samples.back().state, ToolState::kMissing);
+  theatre.device.unplug(0x0B);
+  theatre.run(milliseconds(200));
+  EXPECT_EQ(theatre.samples.back().state, ToolState::kDisabled);
+  theatre.device.unplug(0x0A);
+  theatre.run(seconds(3));
+  EXPECT_THAT(theatre.host.failure, HasSubstr("the sensor's tool has been disabled for 2 s"));
 }
 
 TEST(NdiSession, UploadsToolDefinitionsAndMeasuresRelativeToTheReference) {

@@ -11,7 +11,8 @@ namespace perimap {
 
 class ScriptedLink final : public LinkControl {
  public:
-  explicit ScriptedLink(bool is_serial = false) : serial_(is_serial) {}
+  // `baud`: of a serial line whose bytes take their time; 0: they take none.
+  explicit ScriptedLink(bool is_serial = false, int baud = 0) : serial_(is_serial), baud_(baud) {}
 
   using LinkControl::send;
   void send(std::span<const std::byte> bytes) override {
@@ -23,6 +24,7 @@ class ScriptedLink final : public LinkControl {
     if (failure.empty()) failure = std::move(reason);
   }
   bool serial() const noexcept override { return serial_; }
+  double byte_time_ns() const noexcept override { return baud_ > 0 ? 10.0e9 / baud_ : 0.0; }
 
   [[nodiscard]] std::string take_sent() { return std::exchange(sent, {}); }
 
@@ -33,6 +35,7 @@ class ScriptedLink final : public LinkControl {
 
  private:
   bool serial_;
+  int baud_;
 };
 
 }  // namespace perimap
