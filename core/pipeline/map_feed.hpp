@@ -1,11 +1,10 @@
-// The mapped features, a few at a time, from the mapper to whoever keeps them.
+// The mapped features, a few at a time, and what is known of breathing, from the mapper to whoever keeps them.
 #pragma once
 
 #include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "core/pipeline/map_memory.hpp"
 #include "core/realtime/wakeup.hpp"
@@ -20,28 +19,30 @@ class MapFeed {
 
   struct Entry {
     std::size_t slot = 0;
-    bool mapped = false;               // false: there is nothing in this slot, and `feature` means nothing
-    std::uint64_t maps_forgotten = 0;  // the count of then: an entry of a map that was forgotten since is void
+    bool mapped = false;  // false: there is nothing in this slot, and `feature` means nothing
     FeatureMemory feature;
   };
+  struct Batch {
+    std::uint64_t maps_forgotten = 0;  // the count of then: what is of a map that was forgotten since is void
+    std::array<Entry, kSlotsABatch> entries{};
+    RespirationMemory respiration;
+  };
 
-  // Mapper: the entries to fill; none while the reader has them.
-  [[nodiscard]] std::span<Entry> back() noexcept {
-    // Acquire: the reader's reads of the entries happen before they are filled again.
-    if (full_.load(std::memory_order_acquire)) return {};
-    return entries_;
+  // Mapper: the batch to fill; null while the reader has it.
+  [[nodiscard]] Batch* back() noexcept {
+    // Acquire: the reader's reads of the batch happen before it is filled again.
+    return full_.load(std::memory_order_acquire) ? nullptr : &batch_;
   }
   void hand_over() noexcept {
-    // Release: the entries are filled before the reader sees that they are there.
+    // Release: the batch is filled before the reader sees that it is there.
     full_.store(true, std::memory_order_release);
     filled_.post();
   }
 
-  // Reader: the entries that were handed over; none when there are none.
-  [[nodiscard]] std::span<const Entry> front() const noexcept {
+  // Reader: the batch that was handed over; null when there is none.
+  [[nodiscard]] const Batch* front() const noexcept {
     // Acquire: pairs with hand_over().
-    if (!full_.load(std::memory_order_acquire)) return {};
-    return entries_;
+    return full_.load(std::memory_order_acquire) ? &batch_ : nullptr;
   }
   void give_back() noexcept {
     // Release: pairs with back().
@@ -51,7 +52,7 @@ class MapFeed {
   void wait_until(Instant deadline) noexcept { static_cast<void>(filled_.wait_until(deadline)); }
 
  private:
-  std::array<Entry, kSlotsABatch> entries_{};
+  Batch batch_;
   std::atomic<bool> full_{false};
   Wakeup filled_;
 };

@@ -76,7 +76,7 @@ void Pipeline::forget_if_asked() noexcept {
 
 void Pipeline::recall(const MapMemory& memory, Instant now) {
   for (const EcgBlock& block : memory.ecg) entrance_.recall_ecg(block);
-  mapper_.recall(memory);
+  mapper_.recall(memory, now);
   schedule_.resume(memory.last_capture, memory.last_frame_sequence, memory.frame_period, now);
 }
 

@@ -50,7 +50,7 @@ class Pipeline {
 
   // Before any thread runs: what an earlier run knew. Publishing goes on from it at once, before any source is back.
   void recall(const MapMemory& memory, Instant now);
-  // One housekeeping thread: the mapped features, a few at a time.
+  // One housekeeping thread: the mapped features, a few at a time, and the breathing.
   [[nodiscard]] MapFeed& map_feed() noexcept { return mapper_.feed(); }
 
   // Publisher thread: takes over the stamps of the frames that have arrived.

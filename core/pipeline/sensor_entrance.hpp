@@ -62,6 +62,8 @@ class SensorEntrance {
   [[nodiscard]] ClockCells& clocks() noexcept { return clocks_; }
 
  private:
+  void count(const RespirationBlock& block) noexcept;
+
   PipelineCounters& counters_;
   FramePool pool_;
   SpscRing<FrameHandle> mapper_frames_;
@@ -75,6 +77,8 @@ class SensorEntrance {
   TripleBuffer<BreathSignal> breath_cell_;
   bool any_frame_ = false;
   std::uint64_t last_sequence_ = 0;
+  bool any_respiration_ = false;
+  std::uint32_t next_respiration_ = 0;
 };
 
 }  // namespace perimap

@@ -3,16 +3,22 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "daemon/commands/frame_renderer.hpp"
+#include "daemon/commands/simulate.hpp"
+#include "daemon/commands/simulation_options.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "drivers/emulator/camera_emulator.hpp"
 #include "drivers/emulator/can_ecg_emulator.hpp"
@@ -20,7 +26,10 @@
 #include "drivers/emulator/emulator_server.hpp"
 #include "drivers/emulator/igtl_emulator.hpp"
 #include "drivers/emulator/ndi_emulator.hpp"
-#include "drivers/emulator/played_recording.hpp"
+#include "drivers/emulator/played_session.hpp"
+#include "drivers/emulator/recorded_frames.hpp"
+#include "drivers/emulator/simulated_frames.hpp"
+#include "drivers/text_file/text_file.hpp"
 #include "drivers/transport/camera_endpoint.hpp"
 #include "drivers/transport/endpoint.hpp"
 
@@ -37,7 +46,8 @@ const std::map<std::string, std::string> kUsualPlaces{
 struct Options {
   std::vector<std::string> devices;  // NAME or NAME=WHERE
   std::string recording;
-  std::string ecg_record = "100";
+  std::string setup;  // folder
+  SimulationOptions simulation{600.0};
   std::optional<double> start_s;
   std::vector<double> missing_s;
   std::vector<double> unplug_s;
@@ -86,17 +96,30 @@ Expected<Device> parse_device(const std::string& text) {
 
 // Where the data of the emulated devices comes from.
 struct Theatre {
-  std::optional<PlayedRecording> recording;
-  Instant start;
   const Options& options;
+  Instant start;
+  std::optional<Simulation> simulation = {};  // the heart that an emulated camera sees, where no recording is played
+  std::optional<PlayedSession> session = {};  // that, or the recording; none: a scope and a heart without an end
 
   [[nodiscard]] PoseTrack poses() const {
     constexpr double kRate_hz = 60.0;
-    return recording ? recording->poses(start) : PoseTrack::swaying(start, kRate_hz);
+    return session ? session->poses(start) : PoseTrack::swaying(start, kRate_hz);
   }
-  [[nodiscard]] Expected<EcgWaveform> ecg() const {
-    if (recording) return recording->ecg(start);
-    return EcgWaveform::of_record(options.ecg_record, start);
+  [[nodiscard]] Expected<EcgDeviceSignals> ecg_device() const {
+    if (session) return session->ecg_device(start);
+    auto ecg = SampledWaveform::ecg_of_record(options.simulation.ecg_record(), start);
+    if (!ecg) return tl::unexpected(std::move(ecg.error()));
+    EcgDeviceSignals signals{std::move(*ecg)};
+    if (const auto breath = options.simulation.breath()) {
+      signals.respiration = SampledWaveform::breathing(*breath, start);
+    }
+    return signals;
+  }
+  [[nodiscard]] Expected<std::unique_ptr<PlayedFrames>> frames() const {
+    if (simulation) return std::make_unique<SimulatedFrames>(*simulation);
+    return RecordedFrames::open(options.recording).map([](RecordedFrames frames) -> std::unique_ptr<PlayedFrames> {
+      return std::make_unique<RecordedFrames>(std::move(frames));
+    });
   }
 };
 
@@ -104,7 +127,7 @@ Expected<std::unique_ptr<DeviceProtocol>> make(const Device& device, const Theat
   const Options& o = theatre.options;
   if (device.name == "ndi") return std::make_unique<NdiEmulator>(theatre.poses(), o.ndi, o.faults);
   if (device.name == "igtl") return std::make_unique<IgtlEmulator>(theatre.poses(), o.igtl, o.faults);
-  auto ecg = theatre.ecg();
+  auto ecg = theatre.ecg_device();
   if (!ecg) return tl::unexpected(std::move(ecg.error()));
   if (device.name == "medlab") return emulate_medlab(std::move(*ecg), o.faults);
   if (device.name == "bitalino") return emulate_bitalino(std::move(*ecg), o.faults);
@@ -117,16 +140,19 @@ Expected<void> serve(const Device& device, const Theatre& theatre, const Interru
     (void)std::fflush(stdout);
   };
   if (!device.video_output.empty()) {
-    const auto played = emulate_camera(device.video_output, theatre.options.recording, theatre.start,
-                                       theatre.options.faults, ready, interrupt);
+    const auto frames = theatre.frames();
+    if (!frames) return tl::unexpected(frames.error());
+    const auto played =
+        emulate_camera(device.video_output, **frames, theatre.start, theatre.options.faults, ready, interrupt);
     if (!played) return tl::unexpected(played.error());
-    fmt::print("camera: {} frames shown, {} of them cut; {} left out, {} found the output busy\n", played->shown,
-               played->faulty, played->lost, played->refused);
+    fmt::print(
+        "camera: {} frames shown, {} of them cut; {} left out, {} found the output busy, {} not rendered in time\n",
+        played->shown, played->faulty, played->lost, played->refused, played->too_slow);
     (void)std::fflush(stdout);
     return {};
   }
   if (const auto* can = std::get_if<CanEndpoint>(&device.where)) {
-    const auto ecg = theatre.ecg();
+    const auto ecg = theatre.ecg_device();
     if (!ecg) return tl::unexpected(ecg.error());
     ready(format_endpoint(device.where));
     return emulate_can_ecg(can->interface_name, *ecg, theatre.options.can, theatre.options.faults, interrupt);
@@ -140,14 +166,46 @@ Expected<void> serve(const Device& device, const Theatre& theatre, const Interru
                              interrupt);
 }
 
+// What perimapd needs to know of the simulated scope: its calibration, its place in the tracked sensor.
+Expected<void> write_setup(const std::filesystem::path& folder, const Simulation& simulation,
+                           const TrackerNoise& noise) {
+  const std::string toml = simulated_configuration(simulation, noise) + "\n[camera]\ncalibration = \"camera.yaml\"\n";
+  return write_text_file(folder / "camera.yaml", simulation.lens().opencv_yaml()).and_then([&] {
+    return write_text_file(folder / "scene.toml", toml);
+  });
+}
+
+// Otherwise the error and the exit code.
+tl::expected<void, std::pair<Error, int>> set_up(Theatre& theatre, bool camera) {
+  const Options& options = theatre.options;
+  const auto wrong = [](Error error, int code) { return tl::unexpected(std::pair(std::move(error), code)); };
+  if (!options.recording.empty()) {
+    auto session = PlayedSession::read(options.recording);
+    if (!session) return wrong(std::move(session.error()), 1);
+    theatre.session = std::move(*session);
+  } else if (camera) {
+    const auto settings = options.simulation.settings();
+    if (!settings) return wrong(settings.error(), 2);
+    auto simulation = Simulation::create(*settings, threaded_for(std::max(1U, std::thread::hardware_concurrency())));
+    if (!simulation) return wrong(std::move(simulation.error()), 2);
+    theatre.simulation.emplace(std::move(*simulation));
+    theatre.session = PlayedSession::of(*theatre.simulation, options.simulation.noise());
+  }
+  if (!options.setup.empty()) {
+    if (!theatre.simulation) return wrong({"--setup: expected the device 'camera', and no --recording"}, 2);
+    const auto written = write_setup(options.setup, *theatre.simulation, options.simulation.noise());
+    if (!written) return wrong(written.error(), 1);
+  }
+  return {};
+}
+
 int run(Options& options) {
   std::vector<Device> devices;
+  bool camera = false;
   for (const std::string& text : options.devices) {
     auto device = parse_device(text);
     if (!device) return complain(device.error(), 2);
-    if (!device->video_output.empty() && options.recording.empty()) {
-      return complain({"device 'camera': plays a recording; name one with --recording"}, 2);
-    }
+    camera = camera || !device->video_output.empty();
     devices.push_back(std::move(*device));
   }
   const auto spans = [](const std::vector<double>& given, Duration& every, Duration& lasting) {
@@ -157,17 +215,13 @@ int run(Options& options) {
   };
   spans(options.missing_s, options.faults.missing_every, options.faults.missing_for);
   spans(options.unplug_s, options.faults.unplug_every, options.faults.unplug_for);
+  options.faults.seed = options.simulation.seed();
 
   auto stop = StopSignal::install();
   if (!stop) return complain(stop.error(), 1);
-  Theatre theatre{std::nullopt, MonotonicClock::now(), options};
-  if (!options.recording.empty()) {
-    auto recording = PlayedRecording::read(options.recording);
-    if (!recording) return complain(recording.error(), 1);
-    theatre.recording = std::move(*recording);
-    theatre.start = MonotonicClock::now();
-  }
-  if (options.start_s) theatre.start = Instant(from_seconds(*options.start_s));
+  Theatre theatre{options, {}};
+  if (const auto ready = set_up(theatre, camera); !ready) return complain(ready.error().first, ready.error().second);
+  theatre.start = options.start_s ? Instant(from_seconds(*options.start_s)) : MonotonicClock::now();
 
   Interrupt interrupt;
   std::atomic<bool> failed{false};
@@ -201,12 +255,16 @@ void add_emulate_command(CLI::App& app, int& exit_code) {
       ->add_option("DEVICE", options->devices,
                    "ndi, igtl (trackers), medlab, bitalino, cyton, can-ecg; NAME=WHERE puts one elsewhere than at its "
                    "usual place: a link to a pseudo-terminal (absolute path), tcp:127.0.0.1:PORT or can:INTERFACE; "
-                   "camera=v4l2:/dev/videoN plays the recording's frames out of that video output")
+                   "camera=v4l2:/dev/videoN plays frames out of that video output")
       ->required();
   command->add_option("--recording", options->recording, "Play this recording, once [a simulated heart and scope]");
-  command->add_option("--start", options->start_s,
-                      "When the recording begins, s on CLOCK_MONOTONIC, so that several play in step [now]");
-  command->add_option("--ecg", options->ecg_record, "MIT-BIH record of the simulated heart")->capture_default_str();
+  command->add_option(
+      "--start", options->start_s,
+      "When the recording or the simulated heart begins, s on CLOCK_MONOTONIC, so that several play in step "
+      "[now]");
+  command->add_option("--setup", options->setup,
+                      "Write the calibration of the simulated camera, and what else perimapd is to know of it, to "
+                      "camera.yaml and scene.toml in this folder");
   EmulatorFaults& faults = options->faults;
   const auto probability = CLI::Range(0.0, 1.0);
   command->add_option("--bad-check", faults.bad_check, "Part of the messages with a wrong check sum")
@@ -223,7 +281,6 @@ void add_emulate_command(CLI::App& app, int& exit_code) {
   command->add_option("--unplug", options->unplug_s, "EVERY FOR, s: the device is unplugged")
       ->expected(2)
       ->check(seconds);
-  command->add_option("--seed", faults.seed, "Of the faults' dice")->capture_default_str();
   const std::map<std::string, NdiNewest> newest{
       {"bx2", NdiNewest::kBx2}, {"bx", NdiNewest::kBx}, {"tx", NdiNewest::kTx}};
   command->add_option("--ndi-newest", options->ndi.newest, "Newest query that the NDI tracker knows: bx2, bx, tx [bx2]")
@@ -239,6 +296,8 @@ void add_emulate_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1U, 2U))
       ->capture_default_str();
   command->add_option("--igtl-tool", options->igtl.tool, "Name of the tool")->capture_default_str();
+  // One heart for all devices; where a camera is to see it, for so long as --duration says.
+  options->simulation.add_to(*command->add_option_group("Simulated heart"));
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }
 

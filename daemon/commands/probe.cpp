@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -13,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/phase/breath_detector.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/runtime/device_feeder.hpp"
@@ -50,6 +53,31 @@ struct Seen {
   [[nodiscard]] double rate_hz() const {
     const double span_s = to_seconds(last - first);
     return span_s > 0.0 ? static_cast<double>(count - first_count) / span_s : 0.0;
+  }
+};
+
+// What a respiration channel says while it is listened to.
+struct SeenBreathing {
+  Seen samples;
+  float lowest = std::numeric_limits<float>::infinity();
+  float highest = -std::numeric_limits<float>::infinity();
+  BreathDetector detector;
+
+  void add(const RespirationBlock& block) {
+    const Instant last = block.first_sample_time + (block.count - 1) * block.sample_period;
+    samples.add(last, block.count);
+    samples.delay.add(block.arrival - last);
+    if (block.sensor_off) {
+      samples.invalid += block.count;
+      return detector.interrupt();
+    }
+    Instant t = block.first_sample_time;
+    for (const float value : block.samples()) {
+      lowest = std::min(lowest, value);
+      highest = std::max(highest, value);
+      detector.push(t, static_cast<double>(value));
+      t += block.sample_period;
+    }
   }
 };
 
@@ -101,6 +129,29 @@ nlohmann::json as_json(std::string_view kind, const DeviceHealth& health, const 
           {"delay_p50_ms", milliseconds(seen.delay.summary().p50)}};
 }
 
+nlohmann::json as_json(const SeenBreathing& seen, int channel) {
+  const bool any = seen.highest >= seen.lowest;
+  return {{"channel", channel},
+          {"samples", seen.samples.count},
+          {"rate_hz", seen.samples.rate_hz()},
+          {"sensor_off", seen.samples.invalid},
+          {"lowest", any ? nlohmann::json(seen.lowest) : nlohmann::json(nullptr)},
+          {"highest", any ? nlohmann::json(seen.highest) : nlohmann::json(nullptr)},
+          {"breaths", seen.detector.signal().onsets},
+          {"breath_s", to_seconds(seen.detector.signal().period)}};
+}
+
+void print_breathing(const nlohmann::json& j) {
+  const auto samples = j["samples"].get<std::uint64_t>();
+  fmt::print("  breathing  input {}: {} samples", j["channel"].get<int>(), samples);
+  const auto off = j["sensor_off"].get<std::uint64_t>();
+  if (off > 0) fmt::print(", the sensor off in {}", off);
+  if (samples > off) fmt::print(", from {:.4g} to {:.4g}", j["lowest"].get<float>(), j["highest"].get<float>());
+  const auto breath_s = j["breath_s"].get<double>();
+  if (breath_s > 0.0) fmt::print(", {:.2f} s a breath", breath_s);
+  fmt::print("\n");
+}
+
 void print(const char* kind, const nlohmann::json& j, const std::string& invalid) {
   const auto text = [&j](const char* key) { return j[key].get<std::string>(); };
   fmt::print("{} at {}: {}\n", kind, text("where"), text("state"));
@@ -129,6 +180,8 @@ struct Probed {
   std::function<void(const Interrupt&)> serve;
   DeviceHealth health;
   Seen seen;
+  int respiration_channel = 0;  // of an ECG device; 0: none
+  SeenBreathing breathing;
   DeviceState state{};  // while the probe still ran: its own end closes the devices
 };
 
@@ -143,13 +196,14 @@ void listen_to(const TrackerDevice& device, Probed& probed, const Interrupt& int
 }
 
 void listen_to(const EcgDevice& device, Probed& probed, const Interrupt& interrupt) {
-  const EcgSink sink = [&seen = probed.seen](const EcgBlock& block) {
+  const EcgSink ecg = [&seen = probed.seen](const EcgBlock& block) {
     const Instant last = block.first_sample_time + (block.count - 1) * block.sample_period;
     seen.add(last, block.count);
     seen.delay.add(block.arrival - last);
     if (block.lead_off) seen.invalid += block.count;
   };
-  serve_ecg(device, sink, probed.health, interrupt);
+  const RespirationSink respiration = [&probed](const RespirationBlock& block) { probed.breathing.add(block); };
+  serve_ecg(device, {ecg, respiration}, probed.health, interrupt);
 }
 
 void listen_to(const RTriggerDevice& device, Probed& probed, const Interrupt& interrupt) {
@@ -193,7 +247,10 @@ int run(const Options& options) {
   std::vector<std::unique_ptr<Probed>> all;
   if (devices->camera) add(all, "camera", *configuration->camera.device, *devices->camera);
   if (devices->tracker) add(all, "tracker", format_endpoint(devices->tracker->endpoint), *devices->tracker);
-  if (devices->ecg) add(all, "ecg", format_endpoint(devices->ecg->endpoint), *devices->ecg);
+  if (devices->ecg) {
+    add(all, "ecg", format_endpoint(devices->ecg->endpoint), *devices->ecg);
+    all.back()->respiration_channel = devices->ecg->respiration_channel;
+  }
   if (devices->r_trigger) add(all, "r_trigger", devices->r_trigger->settings.path, *devices->r_trigger);
   if (all.empty()) {
     return complain(
@@ -217,6 +274,10 @@ int run(const Options& options) {
     well = well && probed->state == DeviceState::kStreaming;
     json[probed->kind] = as_json(probed->kind, probed->health, probed->seen, probed->where);
     if (!options.json) print(probed->kind, json[probed->kind], complaint(probed->kind, probed->seen));
+    if (probed->respiration_channel == 0) continue;
+    nlohmann::json& breathing = json[probed->kind]["respiration"];
+    breathing = as_json(probed->breathing, probed->respiration_channel);
+    if (!options.json) print_breathing(breathing);
   }
   if (options.json) fmt::print("{}\n", json.dump(2));
   return well ? 0 : 1;

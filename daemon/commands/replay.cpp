@@ -16,6 +16,8 @@
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/dds_publication.hpp"
 #include "daemon/publishing/publication_recorder.hpp"
+#include "daemon/publishing/wire_names.hpp"
+#include "daemon/publishing/wire_reports.hpp"
 #include "daemon/report/accuracy.hpp"
 #include "daemon/report/accuracy_text.hpp"
 #include "daemon/report/recorded_beats.hpp"
@@ -139,7 +141,10 @@ nlohmann::json counts(const PipelineCounters& c) {
           {"adoptions_late", c.adoptions_late.get()},
           {"features_converged", c.features_converged.get()},
           {"features_lost", c.features_lost.get()},
-          {"features_started_anew", c.features_started_anew.get()}};
+          {"features_started_anew", c.features_started_anew.get()},
+          {"respiration_samples", c.respiration_samples.get()},
+          {"respiration_dropped", c.respiration_dropped.get()},
+          {"respiration_off", c.respiration_off.get()}};
 }
 
 // A line, or nothing where there is nothing to say.
@@ -258,6 +263,8 @@ int replay(const Options& options) {
     const RespiratoryClock breath = pipeline.status_respiration();
     json["breath_s"] = to_seconds(breath.period());
     json["breath_suspected"] = breath.suspected;
+    json["breath_state"] = name_of(to_wire(breath.state));
+    json["breath_source"] = name_of(to_wire(breath.source));
     for (const Stage& stage : stages(counters, options.lockstep)) {
       json["stages"][stage.name] = to_json(stage.histogram->summary());
     }

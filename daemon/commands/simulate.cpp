@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -15,6 +13,7 @@
 
 #include "daemon/commands/frame_renderer.hpp"
 #include "daemon/commands/progress.hpp"
+#include "daemon/commands/simulation_options.hpp"
 #include "daemon/report/truth_messages.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/foxglove_image.hpp"
@@ -177,59 +176,20 @@ class SessionWriter {
 // What the command line gave.
 struct Options {
   std::filesystem::path out;
-  SimulationSettings settings;
-  double duration_s = 60.0;
-  std::string size = "640x480";
-  std::optional<double> ecg_start_s;
-  std::vector<std::string> ecg_off;
-  double respiration_period_s = 4.0;
-  double tracker_correlation_s = 0.0;
-  double tracker_noise_mm = 1.4;
+  SimulationOptions simulation;
   std::vector<double> tracker_noises_mm;
-  std::optional<double> tracker_rotation_noise_deg;
   unsigned threads = 0;
   bool force = false;
 };
 
-// "BEGIN:LENGTH", s.
-Expected<SimulationSettings::EcgOff> parse_ecg_off(const std::string& text) {
-  const char* end = text.data() + text.size();
-  double begin_s = 0.0;
-  double length_s = 0.0;
-  const auto begin = std::from_chars(text.data(), end, begin_s);
-  if (begin.ec == std::errc{} && begin.ptr != end && *begin.ptr == ':') {
-    const auto length = std::from_chars(begin.ptr + 1, end, length_s);
-    const bool sound = begin_s >= 0.0 && length_s > 0.0 && begin_s + length_s < 1e6;
-    if (length.ec == std::errc{} && length.ptr == end && sound)
-      return SimulationSettings::EcgOff{from_seconds(begin_s), from_seconds(length_s)};
-  }
-  return fail(fmt::format("ECG off: expected BEGIN:LENGTH in seconds, such as 30:10, found '{}'", text));
-}
-
-Expected<void> parse_size(const std::string& text, SimulationSettings& settings) {
-  const char* end = text.data() + text.size();
-  const auto width = std::from_chars(text.data(), end, settings.width);
-  if (width.ec == std::errc{} && width.ptr != end && *width.ptr == 'x') {
-    const auto height = std::from_chars(width.ptr + 1, end, settings.height);
-    if (height.ec == std::errc{} && height.ptr == end) return {};
-  }
-  return fail(fmt::format("size: expected WIDTHxHEIGHT in pixels, such as 640x480, found '{}'", text));
-}
-
-TrackerNoise tracker_noise(const Options& options, double position_mm) {
-  constexpr double kUsual_deg = 0.5;
-  const double rotation_deg = options.tracker_rotation_noise_deg.value_or(position_mm > 0.0 ? kUsual_deg : 0.0);
-  return {position_mm, rotation_deg * kRadians_per_degree};
-}
-
 std::vector<SimulatedRecording> planned(const Options& options) {
-  if (options.tracker_noises_mm.empty()) return {{options.out, tracker_noise(options, options.tracker_noise_mm)}};
+  if (options.tracker_noises_mm.empty()) return {{options.out, options.simulation.noise()}};
   std::vector<SimulatedRecording> recordings;
   for (const double noise_mm : options.tracker_noises_mm) {
     std::filesystem::path path = options.out;
     path.replace_filename(
         fmt::format("{}-{}mm{}", options.out.stem().string(), noise_mm, options.out.extension().string()));
-    recordings.push_back({path, tracker_noise(options, noise_mm)});
+    recordings.push_back({path, options.simulation.noise(noise_mm)});
   }
   return recordings;
 }
@@ -239,18 +199,10 @@ int complain(const Error& error, int exit_code) {
   return exit_code;
 }
 
-int run(Options options) {
+int run(const Options& options) {
   const auto begin = std::chrono::steady_clock::now();
-  if (const auto size = parse_size(options.size, options.settings); !size) return complain(size.error(), 2);
-  options.settings.duration = from_seconds(options.duration_s);
-  options.settings.respiration_period = from_seconds(options.respiration_period_s);
-  options.settings.tracker_correlation = from_seconds(options.tracker_correlation_s);
-  for (const std::string& text : options.ecg_off) {
-    const auto off = parse_ecg_off(text);
-    if (!off) return complain(off.error(), 2);
-    options.settings.ecg_off.push_back(*off);
-  }
-  if (options.ecg_start_s) options.settings.ecg_start = from_seconds(*options.ecg_start_s);
+  const auto settings = options.simulation.settings();
+  if (!settings) return complain(settings.error(), 2);
   const std::vector<SimulatedRecording> recordings = planned(options);
   for (const SimulatedRecording& recording : recordings) {
     if (!options.force && std::filesystem::exists(recording.path)) {
@@ -259,7 +211,7 @@ int run(Options options) {
   }
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
 
-  const auto simulation = Simulation::create(options.settings, threaded_for(threads));
+  const auto simulation = Simulation::create(*settings, threaded_for(threads));
   if (!simulation) return complain(simulation.error(), 2);
   {
     Progress progress("frames", simulation->frames().size());
@@ -341,72 +293,14 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
       "simulate", "Write a recording of a beating heart with its ground truth: real motion, real ECG, rendered images");
-  SimulationSettings& settings = options->settings;
   command->add_option("OUT", options->out, "The recording to write (.mcap)")->required();
-  command
-      ->add_option("--seed", settings.seed, "Chooses texture, path, noise and part of the ECG; same seed, same bytes")
-      ->capture_default_str();
-  command->add_option("--duration", options->duration_s, "Length, s")->capture_default_str();
-  command->add_option("--size", options->size, "Image size WIDTHxHEIGHT, px")->capture_default_str();
-  command->add_option("--fps", settings.frames_per_s, "Camera frame rate, Hz")->capture_default_str();
-  command
-      ->add_option("--ecg", settings.ecg_record,
-                   "MIT-BIH record that drives the heart: " + ecg_record_names() +
-                       " (100 nearly regular, 105 noisy, 106 and 119 bigeminy, 123 slow)")
-      ->capture_default_str();
-  command->add_option("--ecg-start", options->ecg_start_s, "Where in the record to start, s [chosen by the seed]");
-  command->add_option("--ecg-off", options->ecg_off, "The electrode is off, BEGIN:LENGTH in s; may be repeated");
-  const std::map<std::string, MotionLaw> laws{
-      {"linear", MotionLaw::kLinear}, {"warped", MotionLaw::kWarped}, {"time-locked", MotionLaw::kTimeLocked}};
-  command
-      ->add_option_function<std::string>(
-          "--motion", [&settings, laws](const std::string& name) { settings.law = laws.at(name); },
-          "How motion runs between R peaks: linear, warped (systole keeps its length), time-locked (diastasis "
-          "stretches) [linear]")
-      ->check(CLI::IsMember({"linear", "warped", "time-locked"}));
-  command->add_option("--respiration", settings.respiration_mm, "Breathing displacement at full inspiration, mm")
-      ->capture_default_str();
-  command->add_flag("--respiration-channel", settings.respiration_channel,
-                    "Write a respiration channel, as a ventilator or a monitor has one");
-  command->add_option("--respiration-period", options->respiration_period_s, "Breathing period, s")
-      ->capture_default_str();
-  command
-      ->add_option("--scope-sweep", settings.scope_sweep,
-                   "How far from its target the scope looks, times the usual: at 5 what lies off it leaves the view")
-      ->capture_default_str();
-  command->add_option("--exposure", settings.exposure_share, "Motion blur: exposure as a share of the frame period")
-      ->capture_default_str();
-  command->add_flag("--instrument", settings.instrument, "An instrument comes into view for 3 s every 6 s");
-  command
-      ->add_option("--smoke", settings.smoke,
-                   "Clouds that come for 5 s every 8 s: optical depth of the thickest, 1 leaves 37 % of the contrast")
-      ->capture_default_str();
-  command->add_option("--glints", settings.glints, "Highlights that wander over the tissue, besides its own")
-      ->capture_default_str();
-  CLI::Option* noise =
-      command
-          ->add_option("--tracker-noise", options->tracker_noise_mm, "Tracker position noise, RMS of the 3-D norm, mm")
-          ->check(CLI::Range(0.0, 100.0))
-          ->capture_default_str();
+  CLI::Option* noise = options->simulation.add_to(*command);
   command
       ->add_option("--tracker-noises", options->tracker_noises_mm,
                    "Several position noises, mm, from one rendering: OUT-0mm.mcap, OUT-1.4mm.mcap for 0,1.4")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 100.0))
       ->excludes(noise);
-  command
-      ->add_option("--tracker-rotation-noise", options->tracker_rotation_noise_deg,
-                   "Tracker rotation noise, RMS of the 3-D norm, degrees [0.5, or 0 without position noise]")
-      ->check(CLI::Range(0.0, 45.0));
-  command
-      ->add_option("--tracker-correlation", options->tracker_correlation_s,
-                   "Time in which the tracker's error falls to 1/e of what it was, s; 0: it is new at each reading")
-      ->capture_default_str();
-  command->add_option("--tracker-rate", settings.tracker_rate_hz, "Tracker readings, Hz")->capture_default_str();
-  command
-      ->add_option("--tracker-dropouts", settings.tracker_dropouts_per_min,
-                   "Times a minute that the tracker loses the tool, for 50 to 300 ms")
-      ->capture_default_str();
   command->add_option("--threads", options->threads, "Rendering threads; the result is the same [all processors]")
       ->check(CLI::Range(1U, 256U));
   command->add_flag("--force", options->force, "Overwrite OUT");

@@ -103,6 +103,7 @@ struct PhaseConfiguration {
 struct RespirationConfiguration {
   bool enabled = false;
   bool channel = false;
+  int device_channel = 0;  // input of the ECG device; 0: none
   Duration shortest_period = std::chrono::seconds(2);
   Duration longest_period = std::chrono::seconds(10);
   double displacement_deviation_mm = 5.0;  // per axis, reckoned with while the phase is not known

@@ -422,7 +422,7 @@ void add_ecg(std::vector<ConfigurationKey>& keys) {
       .choice("protocol", protocols, PERIMAP_MEMBER(ecg.protocol), "what the ECG device speaks")
       .optional_text("port", std::string(kPort), &is_endpoint, PERIMAP_MEMBER(ecg.port), "where the ECG device is")
       .integer("channel", 0, 8, PERIMAP_MEMBER(ecg.channel),
-               "input of a bitalino (1 to 4) or cyton (1 to 8) that carries the ECG; 0: the usual one, 2 and 1")
+               "input of a bitalino (1 to 6) or cyton (1 to 8) that carries the ECG; 0: the usual one, 2 and 1")
       .number("count_mV", 0, 1000, PERIMAP_MEMBER(ecg.count_mV),
               "mV of one count of medlab and can; 0: the usual, 0.02 and 0.005")
       .number("can_sample_rate_hz", 50, 4000, PERIMAP_MEMBER(ecg.can_sample_rate_hz), "samples a second over can")
@@ -467,6 +467,8 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
       .flag("enabled", PERIMAP_MEMBER(respiration.enabled), "breathing is part of the motion model")
       .flag("channel", PERIMAP_MEMBER(respiration.channel),
             "its phase comes from the respiration channel where there is one, else from the images alone")
+      .integer("device_channel", 0, 8, PERIMAP_MEMBER(respiration.device_channel),
+               "input of the ECG device with respiration: bitalino 1 to 6, cyton 1 to 8, can 2; 0: none")
       .duration("shortest_period_s", s, 0.5, 60, PERIMAP_MEMBER(respiration.shortest_period), "no breath is shorter")
       .duration("longest_period_s", s, 0.5, 60, PERIMAP_MEMBER(respiration.longest_period), "no breath is longer")
       .number("displacement_deviation_mm", 0.1, 100, PERIMAP_MEMBER(respiration.displacement_deviation_mm),

@@ -15,6 +15,7 @@
 
 #include "core/error/one_line.hpp"
 #include "daemon/config/configuration_keys.hpp"
+#include "daemon/config/ecg_inputs.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -184,6 +185,7 @@ class Overlay {
       refuse({1, 1}, "version", find("", "version")->expected, "nothing");
     }
     check_budget(root);
+    check_inputs(root);
     if (!error_.empty()) {
       return fail(error_);
     }
@@ -248,7 +250,7 @@ class Overlay {
     refuse(name.source().begin, full_name(section, name.str()), fmt::format("one of {}", known), "an unknown key");
   }
 
-  // The one rule between two keys: without a latency longer than the budget no release can be on time.
+  // Without a latency longer than the budget no release can be on time.
   void check_budget(const toml::table& root) {
     const PipelineConfiguration& pipeline = configuration_.pipeline;
     if (pipeline.budget < pipeline.latency) {
@@ -263,6 +265,17 @@ class Overlay {
     refuse(where, "pipeline.budget_ms",
            fmt::format("less than latency_ms ({:.6g})", to_seconds(pipeline.latency) * 1e3),
            fmt::format("{:.6g}", to_seconds(pipeline.budget) * 1e3));
+  }
+
+  // What an ECG device has no input for is refused where it is asked for, or else where the device is named.
+  void check_inputs(const toml::table& root) {
+    const std::optional<WrongInput> wrong = wrong_input(configuration_);
+    if (!wrong) return;
+    toml::source_position where{1, 1};
+    for (const toml::node* node : {root["ecg"]["protocol"].node(), root[wrong->section][wrong->key].node()}) {
+      if (node != nullptr) where = node->source().begin;
+    }
+    refuse(where, full_name(wrong->section, wrong->key), wrong->expected, wrong->got);
   }
 
   void refuse(toml::source_position where, std::string_view key, std::string_view expected, std::string_view got) {

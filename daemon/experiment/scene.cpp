@@ -38,7 +38,7 @@ Expected<std::vector<Instant>> r_peaks(const SceneSettings& settings) {
   const auto record = load_ecg_record(settings.ecg_record);
   if (!record) return tl::unexpected(record.error());
   const auto& beats = record->beat_samples;
-  const auto seconds = [](std::uint32_t sample) { return sample / EcgRecord::kSampleRate_hz; };
+  const auto seconds = [&](std::uint32_t sample) { return sample / record->sample_rate_hz; };
   const double last_start = seconds(beats.back()) - duration_s - 3.0;
   if (last_start < seconds(beats.front())) {
     return fail("ECG record " + settings.ecg_record + " is too short for " + std::to_string(settings.frames) +

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/config/ecg_inputs.hpp"
 #include "drivers/camera/v4l2_camera.hpp"
 #include "drivers/device/device_link.hpp"
 #include "drivers/ecg/bitalino.hpp"
@@ -22,21 +23,20 @@ struct SerialEcg {
   int baud;
 };
 
-SerialEcg serial_ecg(const EcgConfiguration& c, EcgSink sink, DeviceHealth& health) {
+SerialEcg serial_ecg(const EcgDevice& device, EcgSinks sinks, DeviceHealth& health) {
+  const EcgConfiguration& c = device.settings;
   using Protocol = EcgConfiguration::Protocol;
   if (c.protocol == Protocol::kBitalino) {
-    BitalinoSettings settings;
-    if (c.channel > 0) settings.channel = c.channel;
-    return {std::make_unique<BitalinoProtocol>(settings, std::move(sink), health), BitalinoProtocol::kBaud};
+    const BitalinoSettings settings{.channel = ecg_input(c), .respiration_channel = device.respiration_channel};
+    return {std::make_unique<BitalinoProtocol>(settings, std::move(sinks), health), BitalinoProtocol::kBaud};
   }
   if (c.protocol == Protocol::kCyton) {
-    CytonSettings settings;
-    if (c.channel > 0) settings.channel = c.channel;
-    return {std::make_unique<CytonProtocol>(settings, std::move(sink), health), CytonProtocol::kBaud};
+    const CytonSettings settings{.channel = ecg_input(c), .respiration_channel = device.respiration_channel};
+    return {std::make_unique<CytonProtocol>(settings, std::move(sinks), health), CytonProtocol::kBaud};
   }
   MedlabSettings settings;
   if (c.count_mV > 0.0) settings.count_mV = c.count_mV;
-  return {std::make_unique<MedlabProtocol>(settings, std::move(sink), health), MedlabProtocol::kBaud};
+  return {std::make_unique<MedlabProtocol>(settings, std::move(sinks), health), MedlabProtocol::kBaud};
 }
 
 }  // namespace
@@ -53,7 +53,7 @@ void serve_tracker(const TrackerDevice& device, const TrackerSink& sink, DeviceH
   }
 }
 
-void serve_ecg(const EcgDevice& device, const EcgSink& sink, DeviceHealth& health, const Interrupt& interrupt) {
+void serve_ecg(const EcgDevice& device, const EcgSinks& sinks, DeviceHealth& health, const Interrupt& interrupt) {
   const EcgConfiguration& c = device.settings;
   if (const auto* can = std::get_if<CanEndpoint>(&device.endpoint)) {
     CanEcgSettings settings;
@@ -61,10 +61,13 @@ void serve_ecg(const EcgDevice& device, const EcgSink& sink, DeviceHealth& healt
     settings.extended = c.can_extended;
     settings.sample_rate_hz = c.can_sample_rate_hz;
     if (c.count_mV > 0.0) settings.count_mV = c.count_mV;
-    serve_can_ecg(can->interface_name, settings, sink, health, interrupt);
+    // Frames with respiration say so themselves; who does not want it passes it over.
+    EcgSinks wanted = sinks;
+    if (device.respiration_channel == 0) wanted.respiration = {};
+    serve_can_ecg(can->interface_name, settings, wanted, health, interrupt);
     return;
   }
-  const SerialEcg ecg = serial_ecg(c, sink, health);
+  const SerialEcg ecg = serial_ecg(device, sinks, health);
   serve_device(opener_of(device.endpoint, ecg.baud), *ecg.protocol, health, interrupt);
 }
 
@@ -100,8 +103,9 @@ void DeviceFeeder::start(ThreadLauncher& threads) {
   }
   if (devices_.ecg) {
     threads_.push_back(threads.launch("ecg", ThreadRole::kSource, [this] {
-      const EcgSink sink = [this](const EcgBlock& block) { intake_.ecg(block); };
-      serve_ecg(*devices_.ecg, sink, ecg_health_, interrupt_);
+      const EcgSinks sinks([this](const EcgBlock& block) { intake_.ecg(block); },
+                           [this](const RespirationBlock& block) { intake_.respiration(block); });
+      serve_ecg(*devices_.ecg, sinks, ecg_health_, interrupt_);
     }));
   }
   if (devices_.r_trigger) {
@@ -181,6 +185,10 @@ void DeviceFeeder::describe(StatusFacts& facts) const {
   facts.tracker = link(tracker_health_);
   facts.ecg = link(ecg_health_);
   facts.ecg_device = devices_.ecg.has_value();
+  if (devices_.ecg && devices_.ecg->respiration_channel > 0) {
+    facts.respiration_channel = true;
+    facts.respiration_link = facts.ecg;
+  }
   if (devices_.r_trigger) facts.r_trigger_line = link(r_trigger_health_);
   if (!recording_.recorder) return;
   const SessionRecorder::Summary recorded = recording_.recorder->summary();

@@ -26,7 +26,7 @@ namespace perimap {
 // Reads the device on the calling thread until interrupted; reopens it when it fails.
 void serve_tracker(const TrackerDevice& device, const TrackerSink& sink, DeviceHealth& health,
                    const Interrupt& interrupt);
-void serve_ecg(const EcgDevice& device, const EcgSink& sink, DeviceHealth& health, const Interrupt& interrupt);
+void serve_ecg(const EcgDevice& device, const EcgSinks& sinks, DeviceHealth& health, const Interrupt& interrupt);
 void serve_r_trigger(const RTriggerDevice& device, const RTriggerSink& sink, DeviceHealth& health,
                      const Interrupt& interrupt);
 

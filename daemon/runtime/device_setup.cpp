@@ -6,6 +6,7 @@
 #include <charconv>
 #include <utility>
 
+#include "daemon/config/ecg_inputs.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/text_file/text_file.hpp"
@@ -145,7 +146,8 @@ Expected<TrackerDevice> tracker_device(const TrackerConfiguration& c) {
   return TrackerDevice{std::move(*endpoint), std::move(*settings)};
 }
 
-Expected<EcgDevice> ecg_device(const EcgConfiguration& c) {
+Expected<EcgDevice> ecg_device(const Configuration& configuration) {
+  const EcgConfiguration& c = configuration.ecg;
   using Protocol = EcgConfiguration::Protocol;
   if (c.protocol == Protocol::kNone) return wrong("ecg.protocol", "an ECG device", "\"none\"");
   auto endpoint = endpoint_of("ecg.port", c.port);
@@ -154,13 +156,13 @@ Expected<EcgDevice> ecg_device(const EcgConfiguration& c) {
     return wrong("ecg.port", c.protocol == Protocol::kCan ? "can:INTERFACE" : "a serial port or tcp:HOST:PORT",
                  format_endpoint(*endpoint));
   }
-  if (c.protocol == Protocol::kBitalino && c.channel > 4) {
-    return wrong("ecg.channel", "1 to 4 of a bitalino", fmt::format("{}", c.channel));
+  if (const auto input = wrong_input(configuration)) {
+    return wrong(fmt::format("{}.{}", input->section, input->key), input->expected, input->got);
   }
   if (!c.can_extended && c.can_identifier > 0x7FF) {
     return wrong("ecg.can_identifier", "at most 2047 with 11 bits", fmt::format("{}", c.can_identifier));
   }
-  return EcgDevice{std::move(*endpoint), c};
+  return EcgDevice{std::move(*endpoint), c, configuration.respiration.device_channel};
 }
 
 Expected<RTriggerDevice> r_trigger_device(const EcgConfiguration& c) {
@@ -201,7 +203,7 @@ Expected<Devices> named_devices(const Configuration& configuration, const std::f
     named = tracker_device(configuration.tracker).map(keep(devices.tracker));
   }
   if (named && configuration.ecg.protocol != EcgConfiguration::Protocol::kNone) {
-    named = ecg_device(configuration.ecg).map(keep(devices.ecg));
+    named = ecg_device(configuration).map(keep(devices.ecg));
   }
   if (named && configuration.ecg.r_trigger) {
     named = r_trigger_device(configuration.ecg).map(keep(devices.r_trigger));
@@ -239,7 +241,7 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
   auto devices = named_devices(configuration, configuration_file);
   // A map takes camera, tracker and R peaks: one that is not named is asked for as it would be.
   if (devices && !devices->tracker) devices = tl::unexpected(tracker_device(configuration.tracker).error());
-  if (devices && !devices->ecg && !devices->r_trigger) devices = tl::unexpected(ecg_device(configuration.ecg).error());
+  if (devices && !devices->ecg && !devices->r_trigger) devices = tl::unexpected(ecg_device(configuration).error());
   if (devices && !devices->camera) {
     devices = tl::unexpected(camera_device(configuration.camera, configuration_file).error());
   }

@@ -29,6 +29,7 @@ struct TrackerDevice {
 struct EcgDevice {
   Endpoint endpoint;
   EcgConfiguration settings;
+  int respiration_channel = 0;  // of its inputs; 0: none
 };
 
 struct RTriggerDevice {
@@ -63,7 +64,7 @@ struct DeviceSetup {
 
 // Errors name the key and what it should be. Devices are not opened yet: they may come later.
 [[nodiscard]] Expected<TrackerDevice> tracker_device(const TrackerConfiguration& configuration);
-[[nodiscard]] Expected<EcgDevice> ecg_device(const EcgConfiguration& configuration);
+[[nodiscard]] Expected<EcgDevice> ecg_device(const Configuration& configuration);
 [[nodiscard]] Expected<RTriggerDevice> r_trigger_device(const EcgConfiguration& configuration);
 // Of `device`, or of `playback` and its start. The frames' size is that of the keys or of the calibration, or any.
 [[nodiscard]] Expected<CameraDevice> camera_device(const CameraConfiguration& configuration,

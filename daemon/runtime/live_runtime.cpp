@@ -163,6 +163,7 @@ void LiveRuntime::run_status() {
     told.phase = clock.at(now).state;
     told.rhythm = clock.rhythm();
     told.r_trigger = pipeline_.settings().r_trigger.has_value();
+    told.respiration_channel = pipeline_.settings().respiration.channel;
     if (describe_sources_) describe_sources_(told);
     // A device that goes or comes is told at once.
     const int closed = (told.camera.closed ? 1 : 0) | (told.tracker.closed ? 2 : 0) | (told.ecg.closed ? 4 : 0) |

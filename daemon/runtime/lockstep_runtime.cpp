@@ -116,6 +116,7 @@ void LockstepRuntime::publish_reports(Instant now) {
   facts.phase = clock.at(now).state;
   facts.rhythm = clock.rhythm();
   facts.r_trigger = pipeline_.settings().r_trigger.has_value();
+  facts.respiration_channel = pipeline_.settings().respiration.channel;
   facts.stalled_after = std::chrono::milliseconds(500);
   publication_.status(wire_status_.fill(pipeline_.counters(), facts, now));
 }

@@ -21,13 +21,13 @@ struct SensorIntake {
     if (entrance != nullptr) entrance->push_pose(sample);
     if (recorder != nullptr) recorder->pose(sample);
   }
-  // Only from a recording, so that it is not recorded again.
-  void respiration(const RespirationBlock& block) const noexcept {
-    if (entrance != nullptr) entrance->push_respiration(block);
-  }
   void ecg(const EcgBlock& block) const noexcept {
     if (entrance != nullptr) entrance->push_ecg(block);
     if (recorder != nullptr) recorder->ecg(block);
+  }
+  void respiration(const RespirationBlock& block) const noexcept {
+    if (entrance != nullptr) entrance->push_respiration(block);
+    if (recorder != nullptr) recorder->respiration(block);
   }
   void r_trigger(const RTriggerPulse& pulse) const noexcept {
     if (entrance != nullptr) entrance->push_r_trigger(pulse);

@@ -28,11 +28,7 @@ Expected<std::unique_ptr<SessionRecorder>> SessionRecorder::create(const std::fi
 }
 
 SessionRecorder::SessionRecorder(std::size_t memory_bytes)
-    : memory_bytes_(memory_bytes),
-      frames_(kFrameHeads),
-      poses_(kSampleRing),
-      blocks_(kSampleRing),
-      pulses_(kSampleRing) {}
+    : memory_bytes_(memory_bytes), frames_(kFrameHeads), others_(kSampleRing, kSampleRing, kSampleRing, kSampleRing) {}
 
 Expected<void> SessionRecorder::open(const std::filesystem::path& file, const SensorRecordingFacts& facts) {
   if (accepting_.load(std::memory_order_relaxed))
@@ -103,33 +99,33 @@ void SessionRecorder::frame(const CameraFrame& frame) noexcept {
   if (!accepting_.load(std::memory_order_acquire)) return;
   // A capture after the arrival is a broken stamp: the pipeline drops such a frame, and no replay could deliver it.
   if (stopped_.load(std::memory_order_relaxed) || frame.stamp.capture > frame.stamp.arrival) {
-    return frames_refused_.add();
+    return frames_.refused.add();
   }
   // The bytes first: once the head is seen they are there. So room for the head is made sure of before; what the other
   // thread has taken meanwhile only makes more.
-  if (frames_put_ - frames_taken_.get() >= kFrameHeads || !bytes_->push(frame.bytes)) return frames_refused_.add();
+  if (frames_put_ - frames_taken_.get() >= kFrameHeads || !bytes_->push(frame.bytes)) return frames_.refused.add();
   FrameHead head{frame, frame.bytes.size()};
   head.frame.bytes = {};
-  static_cast<void>(frames_.push(head));
+  static_cast<void>(frames_.ring.push(head));
   ++frames_put_;
 }
 
+template <class Sample>
+void SessionRecorder::take(Lane<Sample>& lane, const Sample& sample) noexcept {
+  const RealtimeScope realtime;
+  if (!accepting_.load(std::memory_order_acquire)) return;
+  if (stopped_.load(std::memory_order_relaxed) || !lane.ring.push(sample)) lane.refused.add();
+}
+
 void SessionRecorder::pose(const TrackerSample& sample) noexcept {
-  const RealtimeScope realtime;
-  if (!accepting_.load(std::memory_order_acquire)) return;
-  if (stopped_.load(std::memory_order_relaxed) || !poses_.push(sample)) poses_refused_.add();
+  take(std::get<Lane<TrackerSample>>(others_), sample);
 }
-
-void SessionRecorder::ecg(const EcgBlock& block) noexcept {
-  const RealtimeScope realtime;
-  if (!accepting_.load(std::memory_order_acquire)) return;
-  if (stopped_.load(std::memory_order_relaxed) || !blocks_.push(block)) blocks_refused_.add();
-}
-
+void SessionRecorder::ecg(const EcgBlock& block) noexcept { take(std::get<Lane<EcgBlock>>(others_), block); }
 void SessionRecorder::r_trigger(const RTriggerPulse& pulse) noexcept {
-  const RealtimeScope realtime;
-  if (!accepting_.load(std::memory_order_acquire)) return;
-  if (stopped_.load(std::memory_order_relaxed) || !pulses_.push(pulse)) pulses_refused_.add();
+  take(std::get<Lane<RTriggerPulse>>(others_), pulse);
+}
+void SessionRecorder::respiration(const RespirationBlock& block) noexcept {
+  take(std::get<Lane<RespirationBlock>>(others_), block);
 }
 
 SessionRecorder::Summary SessionRecorder::summary() const noexcept {
@@ -137,8 +133,8 @@ SessionRecorder::Summary SessionRecorder::summary() const noexcept {
           stopped_.load(std::memory_order_relaxed),
           files_.get(),
           recorded_.get(),
-          frames_refused_.get() + frames_unwritten_.get(),
-          poses_refused_.get() + blocks_refused_.get() + pulses_refused_.get() + other_unwritten_.get()};
+          frames_.refused.get() + frames_unwritten_.get(),
+          std::apply([](const auto&... lane) { return (lane.refused.get() + ...); }, others_) + other_unwritten_.get()};
 }
 
 std::string SessionRecorder::reason() const {
@@ -189,29 +185,31 @@ void SessionRecorder::finish_file() {
   writer_.reset();
 }
 
-template <class Front, class Ring>
-void SessionRecorder::refill(std::optional<Front>& front, Ring& ring) {
-  Front next;
-  if (!front && ring.pop(next)) front = next;
-}
-
 void SessionRecorder::drain(Instant until) {
+  const auto refill = [](auto& lane) {
+    if (!lane.front && !lane.ring.pop(lane.front.emplace())) lane.front.reset();
+    return lane.front.has_value();
+  };
   for (;;) {
-    if (!front_frame_) {
-      refill(front_frame_, frames_);
-      if (front_frame_) frames_taken_.add();
-    }
-    refill(front_pose_, poses_);
-    refill(front_block_, blocks_);
-    refill(front_pulse_, pulses_);
-    Instant first = Instant::max();
-    if (front_frame_) first = std::min(first, front_frame_->frame.stamp.arrival);
-    if (front_pose_) first = std::min(first, front_pose_->arrival);
-    if (front_block_) first = std::min(first, front_block_->arrival);
-    if (front_pulse_) first = std::min(first, front_pulse_->arrival);
+    if (!frames_.front && refill(frames_)) frames_taken_.add();
+    Instant first = frames_.front ? frames_.front->frame.stamp.arrival : Instant::max();
+    const auto look = [&](auto& lane) {
+      if (refill(lane)) first = std::min(first, lane.front->arrival);
+    };
+    std::apply([&](auto&... lane) { (look(lane), ...); }, others_);
     if (first == Instant::max() || first > until) return;
     write_front(first);
   }
+}
+
+Expected<void> SessionRecorder::write_frame(bool wanted) {
+  frame_bytes_.resize(frames_.front->size);
+  bytes_->pop(frame_bytes_);
+  frames_.front->frame.bytes = frame_bytes_;
+  Expected<void> written;
+  if (wanted) written = writer_->write(frames_.front->frame, last_arrival_);
+  frames_.front.reset();
+  return written;
 }
 
 // One that comes after later ones were written, its thread having slept for longer than we are behind, is written as
@@ -221,32 +219,28 @@ void SessionRecorder::drain(Instant until) {
 void SessionRecorder::write_front(Instant arrival) {
   const bool asked_for = writer_ && arrival >= opened_;
   if (asked_for) last_arrival_ = std::max(last_arrival_, arrival);
-  const bool stopped = stopped_.load(std::memory_order_relaxed) || !asked_for;
+  const bool wanted = asked_for && !stopped_.load(std::memory_order_relaxed);
   Expected<void> written;
   Counter* unwritten = &other_unwritten_;
-  if (front_frame_ && front_frame_->frame.stamp.arrival == arrival) {
+  if (frames_.front && frames_.front->frame.stamp.arrival == arrival) {
     unwritten = &frames_unwritten_;
-    frame_bytes_.resize(front_frame_->size);
-    bytes_->pop(frame_bytes_);
-    front_frame_->frame.bytes = frame_bytes_;
-    if (!stopped) written = writer_->write(front_frame_->frame, last_arrival_);
-    front_frame_.reset();
-  } else if (front_pose_ && front_pose_->arrival == arrival) {
-    if (!stopped) written = writer_->write(*front_pose_, last_arrival_);
-    front_pose_.reset();
-  } else if (front_block_ && front_block_->arrival == arrival) {
-    if (!stopped) written = writer_->write(*front_block_, last_arrival_);
-    front_block_.reset();
+    written = write_frame(wanted);
   } else {
-    if (!stopped) written = writer_->write(*front_pulse_, last_arrival_);
-    front_pulse_.reset();
+    // The first of them that arrived then.
+    const auto write = [&](auto& lane) {
+      if (!lane.front || lane.front->arrival != arrival) return false;
+      if (wanted) written = writer_->write(*lane.front, last_arrival_);
+      lane.front.reset();
+      return true;
+    };
+    std::apply([&](auto&... lane) { static_cast<void>((write(lane) || ...)); }, others_);
   }
   if (!written) give_up(written.error());
   if (!asked_for) return;
-  if (stopped || !written) {
-    unwritten->add();
-  } else {
+  if (wanted && written) {
     recorded_.add();
+  } else {
+    unwritten->add();
   }
 }
 

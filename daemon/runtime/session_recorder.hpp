@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "core/error/expected.hpp"
@@ -19,6 +20,7 @@
 #include "core/realtime/wakeup.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/r_trigger_pulse.hpp"
+#include "core/sensors/respiration_block.hpp"
 #include "core/sensors/tracker_sample.hpp"
 #include "daemon/runtime/thread_launcher.hpp"
 #include "drivers/image/camera_frame.hpp"
@@ -59,6 +61,7 @@ class SessionRecorder {
   void pose(const TrackerSample& sample) noexcept;
   void ecg(const EcgBlock& block) noexcept;
   void r_trigger(const RTriggerPulse& pulse) noexcept;
+  void respiration(const RespirationBlock& block) noexcept;
 
   struct Summary {
     bool asked = false;       // it is to record
@@ -81,29 +84,34 @@ class SessionRecorder {
     std::size_t size = 0;
   };
 
+  // What one device's thread gives, on its way to the writing thread.
+  template <class Sample>
+  struct Lane {
+    explicit Lane(std::size_t capacity) : ring(capacity) {}
+
+    SpscRing<Sample> ring;
+    Counter refused;              // by the device's thread
+    std::optional<Sample> front;  // of the writing thread: taken from the ring, not written yet
+  };
+
+  template <class Sample>
+  void take(Lane<Sample>& lane, const Sample& sample) noexcept;
   void run();
   void finish_file();
   // Writes what arrived until then.
   void drain(Instant until);
   void write_front(Instant arrival);
+  [[nodiscard]] Expected<void> write_frame(bool wanted);
   void give_up(const Error& error);
-  template <class Front, class Ring>
-  static void refill(std::optional<Front>& front, Ring& ring);
 
   std::size_t memory_bytes_;
   std::optional<SpscByteRing> bytes_;  // there before a frame is accepted
-  SpscRing<FrameHead> frames_;
-  SpscRing<TrackerSample> poses_;
-  SpscRing<EcgBlock> blocks_;
-  SpscRing<RTriggerPulse> pulses_;
+  Lane<FrameHead> frames_;
+  std::tuple<Lane<TrackerSample>, Lane<EcgBlock>, Lane<RTriggerPulse>, Lane<RespirationBlock>> others_;
 
-  // Of the writing thread: where it writes, none between two files; taken from the rings, not written yet.
+  // Of the writing thread: where it writes, none between two files.
   std::optional<SensorWriter> writer_;
   Instant opened_;
-  std::optional<FrameHead> front_frame_;
-  std::optional<TrackerSample> front_pose_;
-  std::optional<EcgBlock> front_block_;
-  std::optional<RTriggerPulse> front_pulse_;
   std::vector<std::byte> frame_bytes_;
   Instant last_arrival_{};
   Instant flushed_;
@@ -111,8 +119,7 @@ class SessionRecorder {
   std::uint64_t frames_put_ = 0;  // of the camera's thread
   Counter frames_taken_;          // by the writing thread
   Counter recorded_;
-  Counter frames_refused_, poses_refused_, blocks_refused_, pulses_refused_;  // each by its device's thread
-  Counter frames_unwritten_, other_unwritten_;                                // by the writing thread
+  Counter frames_unwritten_, other_unwritten_;  // by the writing thread
   // Release by open() when all is there that a device's thread touches, acquire by those threads.
   std::atomic<bool> accepting_{false};
   // Relaxed: each is a message by itself.

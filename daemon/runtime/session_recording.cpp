@@ -30,6 +30,7 @@ SensorRecordingFacts recording_facts(const Configuration& configuration, const s
   for_replay.ecg.r_trigger = configuration.ecg.r_trigger;
   for_replay.ecg.r_trigger_delay = configuration.ecg.r_trigger_delay;
   for_replay.ecg.r_trigger_deviation = configuration.ecg.r_trigger_deviation;
+  for_replay.respiration.device_channel = 0;
   for_replay.replay = {};
   for_replay.recording = {};
   TrackerConfiguration& tracker = for_replay.tracker;
@@ -51,6 +52,7 @@ SensorRecordingFacts recording_facts(const Configuration& configuration, const s
   if (camera) facts.calibration = format_calibration(*camera);
   facts.configuration = to_toml(for_replay);
   facts.r_trigger = configuration.ecg.r_trigger;
+  facts.respiration = configuration.respiration.device_channel > 0;
   return facts;
 }
 

@@ -16,6 +16,12 @@ namespace {
 constexpr Duration kShortestSilence = std::chrono::milliseconds(500);
 constexpr Duration kReopenAfter = std::chrono::seconds(3);
 
+std::string why_none(V4l2Stream& stream, bool damaged) {
+  std::string fault = stream.input_fault();
+  if (!fault.empty()) return fault;
+  return damaged ? stream.damage() : "is another program using it?";
+}
+
 // Frames of one opening, until the camera fails (the reason is returned) or the interrupt is requested (empty then).
 std::string stream_frames(V4l2Stream& stream, FrameCount& count, const CameraSink& sink, DeviceHealth& health,
                           const Interrupt& interrupt) {
@@ -31,27 +37,20 @@ std::string stream_frames(V4l2Stream& stream, FrameCount& count, const CameraSin
     auto got = stream.next(silent_after, interrupt);
     if (!got) return std::move(got.error().message);
     if (*got == V4l2Stream::Grab::kInterrupted) return "";
-    if (*got == V4l2Stream::Grab::kNothing) {
+    const bool damaged = *got == V4l2Stream::Grab::kDamaged;
+    CameraFrame frame = stream.frame();
+    if (damaged || *got == V4l2Stream::Grab::kFrame) {
+      frame.stamp.sequence = count.next(static_cast<std::uint32_t>(frame.stamp.sequence));
+      health.lost.add(count.gap());
+    }
+    if (damaged) health.damaged.add();
+    if (*got != V4l2Stream::Grab::kFrame) {
       const Duration silence = MonotonicClock::now() - last;
       if (silence >= kReopenAfter) {
-        const std::string fault = stream.input_fault();
-        return fmt::format("no good frame for 3 s: {}", !fault.empty() ? fault
-                                                        : health.damaged.get() > damaged_before
-                                                            ? stream.damage()
-                                                            : "is another program using it?");
+        return fmt::format("no good frame for 3 s: {}", why_none(stream, health.damaged.get() > damaged_before));
       }
-      if (silence >= silent_after && health.state() == DeviceState::kStreaming) {
-        health.set_state(DeviceState::kSilent);
-      }
-      continue;
-    }
-    CameraFrame frame = stream.frame();
-    frame.stamp.sequence = count.next(static_cast<std::uint32_t>(frame.stamp.sequence));
-    health.lost.add(count.gap());
-    if (*got == V4l2Stream::Grab::kDamaged) {
-      health.damaged.add();
-      if (MonotonicClock::now() - last >= kReopenAfter)
-        return fmt::format("no good frame for 3 s: {}", stream.damage());
+      // Frames that are none are silence too.
+      if (silence >= silent_after && health.state() == DeviceState::kStreaming) health.set_state(DeviceState::kSilent);
       continue;
     }
     last = frame.stamp.arrival;

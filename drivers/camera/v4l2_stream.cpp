@@ -393,6 +393,10 @@ Expected<V4l2Stream::Grab> V4l2Stream::take() {
   const bool at_start = (buffer.flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
   frame_.stamp.capture = mid_exposure(stamp, at_start ? StampSource::kStartOfExposure : StampSource::kEndOfFrame,
                                       exposure_, period_, settings_.delay);
+  // No frame comes before its exposure was half over: releases fitted to such stamps would be wrong all alike.
+  if (frame_.stamp.capture > arrival) {
+    return damaged("by its stamp it came before it was exposed; is camera.delay_ms too small?");
+  }
   frame_.stamp.arrival = arrival;
   frame_.bytes = memory.first(buffer.bytesused);
   return Grab::kFrame;

@@ -14,19 +14,29 @@ constexpr int kFullScale = 1023;
 constexpr double kSupply_mV = 3300.0;
 constexpr double kSensorGain = 1100.0;
 
-unsigned sequence_of(std::span<const std::byte> frame) { return std::to_integer<unsigned>(frame[2]) >> 4U; }
+constexpr double kCount_mV = kSupply_mV / 1024.0;
+
+unsigned sequence_of(std::span<const std::byte> frame) { return std::to_integer<unsigned>(frame.back()) >> 4U; }
 bool passes_check(std::span<const std::byte> frame) {
-  return (std::to_integer<unsigned>(frame[2]) & 0xFU) == bitalino_crc(frame);
+  return (std::to_integer<unsigned>(frame.back()) & 0xFU) == bitalino_crc(frame);
+}
+bool at_rail(int value) { return value == 0 || value == kFullScale; }
+
+std::size_t frame_bytes(const BitalinoSettings& settings) {
+  return bitalino_frame_bytes(settings.respiration_channel > 0 ? 2 : 1);
 }
 
-constexpr FrameShape kShape{
-    .bytes = BitalinoProtocol::kFrameBytes,
-    .modulus = kSequenceModulus,
-    .to_synchronise = kFramesToSynchronise,
-    .to_believe = kFramesToBelieve,
-    .well_formed = &passes_check,
-    .count = &sequence_of,
-};
+FrameShape shape(const BitalinoSettings& settings) {
+  return {.bytes = frame_bytes(settings),
+          .modulus = kSequenceModulus,
+          .to_synchronise = kFramesToSynchronise,
+          .to_believe = kFramesToBelieve,
+          .well_formed = &passes_check,
+          .count = &sequence_of};
+}
+
+// Of the channel, from 1.
+unsigned mask(int channel) { return channel > 0 ? 1U << static_cast<unsigned>(channel - 1) : 0U; }
 
 }  // namespace
 
@@ -42,28 +52,42 @@ std::uint8_t bitalino_crc(std::span<const std::byte> frame) noexcept {
   return kTable[crc];
 }
 
-BitalinoProtocol::BitalinoProtocol(const BitalinoSettings& settings, EcgSink sink, DeviceHealth& health)
-    : EcgProtocol(kSampleRate_hz, time_on_line(kFrameBytes, kBaud) + from_seconds(1.0 / kSampleRate_hz),
-                  std::move(sink), health),
+std::array<int, 2> bitalino_samples(std::span<const std::byte> frame) noexcept {
+  const auto byte = [&frame](std::size_t from_end) { return std::to_integer<int>(frame[frame.size() - 1 - from_end]); };
+  const int first = (byte(1) & 0xF) << 6 | byte(2) >> 2;
+  return {first, frame.size() == bitalino_frame_bytes(2) ? (byte(2) & 0x3) << 8 | byte(3) : 0};
+}
+
+// A frame waits for the next to agree with it.
+BitalinoProtocol::BitalinoProtocol(const BitalinoSettings& settings, EcgSinks sinks, DeviceHealth& health)
+    : EcgProtocol(kSampleRate_hz, time_on_line(frame_bytes(settings), kBaud) + from_seconds(1.0 / kSampleRate_hz),
+                  std::move(sinks), health),
       settings_(settings),
-      framer_(kShape) {}
+      framer_(shape(settings)) {}
 
 void BitalinoProtocol::start(LinkControl& link) {
   framer_.restart();
-  rail_.restart();
-  const auto channels = static_cast<std::uint8_t>(1U << static_cast<unsigned>(settings_.channel - 1));
+  lead_.restart();
+  breath_sensor_.restart();
+  const unsigned channels = mask(settings_.channel) | mask(settings_.respiration_channel);
   const std::array<std::byte, 3> commands{std::byte{0x00}, std::byte{0xC3},
-                                          static_cast<std::byte>((channels << 2U) | 0x01U)};
+                                          static_cast<std::byte>(channels << 2U | 0x01U)};
   link.send(commands);
 }
 
 void BitalinoProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> bytes, Instant arrival) {
+  const bool breathes = settings_.respiration_channel > 0;
+  const bool ecg_second = breathes && settings_.respiration_channel < settings_.channel;
   const auto take = [&](std::span<const std::byte> frame, std::optional<unsigned> lost, std::size_t behind) {
-    const int value = static_cast<int>((std::to_integer<unsigned>(frame[1]) & 0xFU) << 6U) |
-                      static_cast<int>(std::to_integer<unsigned>(frame[0]) >> 2U);
-    const bool off = rail_.lead_off(value == 0 || value == kFullScale);
-    samples().add(static_cast<float>((value / 1024.0 - 0.5) * kSupply_mV / kSensorGain), off,
-                  lost ? samples().lost_samples(*lost, kSequenceModulus, behind, arrival) : 0);
+    const std::array<int, 2> values = bitalino_samples(frame);
+    const int ecg = values[ecg_second ? 1 : 0];
+    std::optional<RespirationReading> respiration;
+    if (breathes) {
+      const int value = values[ecg_second ? 0 : 1];
+      respiration = {static_cast<float>((value - 512) * kCount_mV), breath_sensor_.off(at_rail(value))};
+    }
+    samples().add(static_cast<float>((ecg - 512) * kCount_mV / kSensorGain), lead_.off(at_rail(ecg)),
+                  lost ? samples().lost_samples(*lost, kSequenceModulus, behind, arrival) : 0, respiration);
   };
   health().damaged.add(framer_.feed(bytes, take));
 }

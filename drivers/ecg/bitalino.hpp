@@ -1,15 +1,18 @@
 // BITalino (PLUX): frame and commands as in the public "BITalino (r)evolution Board Data Sheet" and its open API.
 //
 // 115200 8N1. Commands are a byte: 0x00 idle; 0x03 0x43 0x83 0xC3 sample at 1, 10, 100, 1000 Hz; (mask << 2) | 1 starts
-// live acquisition of the channels in the mask. One analogue channel makes frames of three bytes:
+// live acquisition of the channels in the mask. One or two analogue channels make frames of three or four bytes:
 //
-//   vvvvvv00  IIIIVVVV  ssssCCCC    v, V: low six and high four bits of a 10-bit sample; I: digital lines
-//                                   s: sequence modulo 16; C: CRC-4 over all but itself (polynomial x^4 + x + 1)
+//             vvvvvv00  IIIIVVVV  ssssCCCC    v, V: low six and high four bits of a 10-bit sample; I: digital lines
+//   wwwwwwww  vvvvvvWW  IIIIVVVV  ssssCCCC    w, W: likewise eight and two bits of the channel with the higher number
+//                                             s: sequence modulo 16
+//                                             C: CRC-4 over all but itself (polynomial x^4 + x + 1)
 //
 // A check of four bits lets one in sixteen garbled frames pass. So synchronisation needs four frames in a row that
 // follow each other, and a frame counts only when the next agrees with it; that costs a millisecond.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -21,19 +24,25 @@
 namespace perimap {
 
 struct BitalinoSettings {
-  int channel = 2;  // A1 to A4; the kits have the ECG on A2
+  int channel = 2;              // A1 to A6; the kits have the ECG on A2
+  int respiration_channel = 0;  // A1 to A6, another; 0: none
 };
 
 // CRC-4 of a frame whose last nibble, the check itself, is left out.
 [[nodiscard]] std::uint8_t bitalino_crc(std::span<const std::byte> frame) noexcept;
 
+// Of one or two channels.
+[[nodiscard]] constexpr std::size_t bitalino_frame_bytes(std::size_t channels) noexcept { return channels + 2; }
+// The 10-bit samples of a frame, in order of channel; the second is 0 in a frame of one.
+[[nodiscard]] std::array<int, 2> bitalino_samples(std::span<const std::byte> frame) noexcept;
+
 class BitalinoProtocol final : public EcgProtocol {
  public:
   static constexpr int kBaud = 115200;
   static constexpr double kSampleRate_hz = 1000.0;
-  static constexpr std::size_t kFrameBytes = 3;
+  static constexpr int kChannels = 6;
 
-  BitalinoProtocol(const BitalinoSettings& settings, EcgSink sink, DeviceHealth& health);
+  BitalinoProtocol(const BitalinoSettings& settings, EcgSinks sinks, DeviceHealth& health);
 
  protected:
   void start(LinkControl& link) override;
@@ -42,7 +51,8 @@ class BitalinoProtocol final : public EcgProtocol {
  private:
   BitalinoSettings settings_;
   CountedFramer framer_;
-  RailWatch rail_{kSampleRate_hz};
+  RailWatch lead_{kSampleRate_hz, RailWatch::kLeadOff_s};
+  RailWatch breath_sensor_{kSampleRate_hz, RailWatch::kSensorOff_s};
 };
 
 }  // namespace perimap

@@ -1,5 +1,6 @@
 #include "drivers/ecg/can_ecg.hpp"
 
+#include <linux/can/error.h>
 #include <poll.h>
 
 #include <array>
@@ -40,9 +41,9 @@ std::string read_frames(CanSocket& socket, CanEcgDecoder& decoder, DeviceHealth&
 
 }  // namespace
 
-CanEcgDecoder::CanEcgDecoder(const CanEcgSettings& settings, EcgSink sink, DeviceHealth& health)
+CanEcgDecoder::CanEcgDecoder(const CanEcgSettings& settings, EcgSinks sinks, DeviceHealth& health)
     : settings_(settings),
-      samples_({.period_ns = 1e9 / settings.sample_rate_hz, .transport_delay = kFrameTime}, std::move(sink), health),
+      samples_({.period_ns = 1e9 / settings.sample_rate_hz, .transport_delay = kFrameTime}, std::move(sinks), health),
       health_(health) {}
 
 void CanEcgDecoder::restart() noexcept {
@@ -55,14 +56,18 @@ std::uint64_t CanEcgDecoder::lost_before(const CanEcgFrame& ecg, Instant arrival
   if (!last_) return 0;
   const auto frames = static_cast<std::uint8_t>(ecg.count - last_->count - 1);
   const auto passed_ms = static_cast<std::uint16_t>(ecg.device_time_ms - last_->device_time_ms);
-  const double samples = passed_ms * 1e-3 * settings_.sample_rate_hz - last_->samples;
+  // Those that were lost are taken to hold as many samples as the last.
+  const int each = last_->samples;
+  const double samples = passed_ms * 1e-3 * settings_.sample_rate_hz - each;
   // The device's time decides how often the count went round while it is not ambiguous itself.
   constexpr Duration kTimeWraps = std::chrono::seconds(60);
   if (arrival - samples_.last_arrival() < kTimeWraps) {
-    const double rounds = std::round((samples / 2.0 - frames) / kCountModulus);
-    return 2 * (frames + kCountModulus * static_cast<std::uint64_t>(std::max(0.0, rounds)));
+    const double rounds = std::round((samples / each - frames) / kCountModulus);
+    return static_cast<std::uint64_t>(each) *
+           (frames + kCountModulus * static_cast<std::uint64_t>(std::max(0.0, rounds)));
   }
-  return samples_.lost_samples(2ULL * frames, 2ULL * kCountModulus, 0, arrival);
+  return samples_.lost_samples(static_cast<std::uint64_t>(each) * frames,
+                               static_cast<std::uint64_t>(each) * kCountModulus, 0, arrival);
 }
 
 void CanEcgDecoder::take(const CanFrame& frame) {
@@ -70,6 +75,10 @@ void CanEcgDecoder::take(const CanFrame& frame) {
   dropped_ = frame.dropped_before;
   if (frame.error) {
     health_.bus_errors.add();
+    if ((frame.identifier & CAN_ERR_BUSOFF) != 0) {
+      health_.set_reason(
+          "the CAN controller has gone off the bus: is its bit rate right, its line closed at both ends?");
+    }
     return;
   }
   const auto ecg = decode_can_ecg(frame, settings_.identifier, settings_.extended);
@@ -83,17 +92,19 @@ void CanEcgDecoder::take(const CanFrame& frame) {
     return;
   }
   const std::uint64_t lost = lost_before(*ecg, frame.arrival);
+  std::optional<RespirationReading> respiration;
+  if (ecg->respiration) respiration = {static_cast<float>(ecg->values[1]), ecg->respiration_off};
   for (int i = 0; i < ecg->samples; ++i) {
     const auto value = ecg->values[static_cast<std::size_t>(i)];
-    samples_.add(static_cast<float>(value * settings_.count_mV), ecg->lead_off, i == 0 ? lost : 0);
+    samples_.add(static_cast<float>(value * settings_.count_mV), ecg->lead_off, i == 0 ? lost : 0, respiration);
   }
   samples_.end_chunk(frame.arrival);
   last_ = ecg;
 }
 
-void serve_can_ecg(const std::string& interface_name, const CanEcgSettings& settings, const EcgSink& sink,
+void serve_can_ecg(const std::string& interface_name, const CanEcgSettings& settings, const EcgSinks& sinks,
                    DeviceHealth& health, const Interrupt& interrupt) {
-  CanEcgDecoder decoder(settings, sink, health);
+  CanEcgDecoder decoder(settings, sinks, health);
   const auto open = [&] { return CanSocket::open(interface_name, settings.identifier, settings.extended); };
   const auto use = [&](CanSocket& socket) {
     decoder.restart();

@@ -17,11 +17,14 @@ struct CanEcgSettings {
   double count_mV = 0.005;
 };
 
+// The input that a frame's second word carries when it is of respiration; the first is the ECG.
+inline constexpr int kCanRespirationChannel = 2;
+
 // What a frame does; no socket. Frame counts tell lost frames modulo 256; the device's own time says how often that
 // went round (a minute, then again the host's clock).
 class CanEcgDecoder {
  public:
-  CanEcgDecoder(const CanEcgSettings& settings, EcgSink sink, DeviceHealth& health);
+  CanEcgDecoder(const CanEcgSettings& settings, EcgSinks sinks, DeviceHealth& health);
 
   void restart() noexcept;
   void take(const CanFrame& frame);
@@ -37,7 +40,7 @@ class CanEcgDecoder {
 };
 
 // Reads until interrupted; reopens when the interface went down or away.
-void serve_can_ecg(const std::string& interface_name, const CanEcgSettings& settings, const EcgSink& sink,
+void serve_can_ecg(const std::string& interface_name, const CanEcgSettings& settings, const EcgSinks& sinks,
                    DeviceHealth& health, const Interrupt& interrupt);
 
 }  // namespace perimap

@@ -6,6 +6,8 @@ namespace {
 constexpr std::uint8_t kLength = 8;
 constexpr unsigned kLeadOff = 0x01;
 constexpr unsigned kRPeak = 0x02;
+constexpr unsigned kRespiration = 0x04;
+constexpr unsigned kRespirationOff = 0x08;
 constexpr unsigned kOneSample = 0x80;
 
 }  // namespace
@@ -21,7 +23,9 @@ std::optional<CanEcgFrame> decode_can_ecg(const CanFrame& frame, std::uint32_t i
   ecg.count = frame.data[0];
   ecg.lead_off = (frame.data[1] & kLeadOff) != 0;
   ecg.r_peak = (frame.data[1] & kRPeak) != 0;
-  ecg.samples = (frame.data[1] & kOneSample) != 0 ? 1 : 2;
+  ecg.respiration = (frame.data[1] & kRespiration) != 0;
+  ecg.respiration_off = (frame.data[1] & kRespirationOff) != 0;
+  ecg.samples = (frame.data[1] & kOneSample) != 0 || ecg.respiration ? 1 : 2;
   ecg.device_time_ms = word(2);
   ecg.values = {static_cast<std::int16_t>(word(4)), static_cast<std::int16_t>(word(6))};
   return ecg;
@@ -33,8 +37,9 @@ CanFrame encode_can_ecg(const CanEcgFrame& ecg, std::uint32_t identifier, bool e
   frame.extended = extended;
   frame.length = kLength;
   frame.data[0] = ecg.count;
-  frame.data[1] = static_cast<std::uint8_t>((ecg.lead_off ? kLeadOff : 0U) | (ecg.r_peak ? kRPeak : 0U) |
-                                            (ecg.samples == 1 ? kOneSample : 0U));
+  frame.data[1] = static_cast<std::uint8_t>(
+      (ecg.lead_off ? kLeadOff : 0U) | (ecg.r_peak ? kRPeak : 0U) | (ecg.respiration ? kRespiration : 0U) |
+      (ecg.respiration_off ? kRespirationOff : 0U) | (ecg.samples == 1 && !ecg.respiration ? kOneSample : 0U));
   const auto put = [&frame](std::size_t at, std::uint16_t value) {
     frame.data[at] = static_cast<std::uint8_t>(value & 0xFFU);
     frame.data[at + 1] = static_cast<std::uint8_t>(value >> 8U);

@@ -21,6 +21,16 @@ bool closed(std::span<const std::byte> packet) {
 }
 unsigned count_of(std::span<const std::byte> packet) { return std::to_integer<unsigned>(packet[1]); }
 
+// `channel`: from 1.
+std::int32_t counts_of(std::span<const std::byte> packet, int channel) {
+  const auto value = packet.subspan(2 + 3 * static_cast<std::size_t>(channel - 1), 3);
+  const std::uint32_t bits = std::to_integer<std::uint32_t>(value[0]) << 24U |
+                             std::to_integer<std::uint32_t>(value[1]) << 16U |
+                             std::to_integer<std::uint32_t>(value[2]) << 8U;
+  return static_cast<std::int32_t>(bits) / 256;
+}
+bool at_rail(std::int32_t counts) { return counts >= kFullScale || counts <= -kFullScale; }
+
 constexpr FrameShape kShape{
     .bytes = CytonProtocol::kPacketBytes,
     .modulus = kCountModulus,
@@ -31,8 +41,8 @@ constexpr FrameShape kShape{
 
 }  // namespace
 
-CytonProtocol::CytonProtocol(const CytonSettings& settings, EcgSink sink, DeviceHealth& health)
-    : EcgProtocol(kSampleRate_hz, time_on_line(kPacketBytes, kBaud), std::move(sink), health),
+CytonProtocol::CytonProtocol(const CytonSettings& settings, EcgSinks sinks, DeviceHealth& health)
+    : EcgProtocol(kSampleRate_hz, time_on_line(kPacketBytes, kBaud), std::move(sinks), health),
       settings_(settings),
       framer_(kShape) {}
 
@@ -40,7 +50,8 @@ void CytonProtocol::start(LinkControl& link) {
   prompted_ = false;
   greeting_.clear();
   framer_.restart();
-  rail_.restart();
+  lead_.restart();
+  breath_sensor_.restart();
   // The board may be streaming still, from a session that ended without a word.
   link.send("sv");
 }
@@ -61,15 +72,16 @@ void CytonProtocol::await_prompt(LinkControl& link, std::span<const std::byte> b
 
 void CytonProtocol::decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) {
   if (!prompted_) return await_prompt(link, bytes);
+  const double count_mV = kReference_mV / settings_.gain / kFullScale;
   const auto take = [&](std::span<const std::byte> packet, std::optional<unsigned> lost, std::size_t behind) {
-    const auto value = packet.subspan(2 + 3 * static_cast<std::size_t>(settings_.channel - 1), 3);
-    const std::uint32_t bits = std::to_integer<std::uint32_t>(value[0]) << 24U |
-                               std::to_integer<std::uint32_t>(value[1]) << 16U |
-                               std::to_integer<std::uint32_t>(value[2]) << 8U;
-    const std::int32_t counts = static_cast<std::int32_t>(bits) / 256;
-    const bool off = rail_.lead_off(counts >= kFullScale || counts <= -kFullScale);
-    samples().add(static_cast<float>(counts * (kReference_mV / settings_.gain / kFullScale)), off,
-                  lost ? samples().lost_samples(*lost, kCountModulus, behind, arrival) : 0);
+    std::optional<RespirationReading> respiration;
+    if (settings_.respiration_channel > 0) {
+      const std::int32_t counts = counts_of(packet, settings_.respiration_channel);
+      respiration = {static_cast<float>(counts * count_mV), breath_sensor_.off(at_rail(counts))};
+    }
+    const std::int32_t counts = counts_of(packet, settings_.channel);
+    samples().add(static_cast<float>(counts * count_mV), lead_.off(at_rail(counts)),
+                  lost ? samples().lost_samples(*lost, kCountModulus, behind, arrival) : 0, respiration);
   };
   health().damaged.add(framer_.feed(bytes, take));
 }

@@ -20,8 +20,9 @@
 namespace perimap {
 
 struct CytonSettings {
-  int channel = 1;     // 1 to 8
-  double gain = 24.0;  // of the board's amplifier
+  int channel = 1;              // 1 to 8
+  int respiration_channel = 0;  // 1 to 8, another; 0: none
+  double gain = 24.0;           // of the board's amplifier
 };
 
 class CytonProtocol final : public EcgProtocol {
@@ -29,8 +30,9 @@ class CytonProtocol final : public EcgProtocol {
   static constexpr int kBaud = 115200;
   static constexpr double kSampleRate_hz = 250.0;
   static constexpr std::size_t kPacketBytes = 33;
+  static constexpr int kChannels = 8;
 
-  CytonProtocol(const CytonSettings& settings, EcgSink sink, DeviceHealth& health);
+  CytonProtocol(const CytonSettings& settings, EcgSinks sinks, DeviceHealth& health);
 
  protected:
   void start(LinkControl& link) override;
@@ -43,7 +45,8 @@ class CytonProtocol final : public EcgProtocol {
   bool prompted_ = false;
   std::string greeting_;
   CountedFramer framer_;
-  RailWatch rail_{kSampleRate_hz};
+  RailWatch lead_{kSampleRate_hz, RailWatch::kLeadOff_s};
+  RailWatch breath_sensor_{kSampleRate_hz, RailWatch::kSensorOff_s};
 };
 
 }  // namespace perimap

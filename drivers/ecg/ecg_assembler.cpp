@@ -6,19 +6,24 @@
 
 namespace perimap {
 
-EcgAssembler::EcgAssembler(const ArrivalClockSettings& clock, EcgSink sink, DeviceHealth& health)
-    : clock_(clock), sink_(std::move(sink)), health_(health) {}
+EcgAssembler::EcgAssembler(const ArrivalClockSettings& clock, EcgSinks sinks, DeviceHealth& health)
+    : clock_(clock), sinks_(std::move(sinks)), health_(health) {}
 
 void EcgAssembler::restart() noexcept {
   clock_.reset();
-  chunk_.clear();
+  ecg_.chunk.clear();
+  respiration_.chunk.clear();
   any_ = false;
 }
 
-void EcgAssembler::add(float mV, bool lead_off, std::uint64_t lost) {
+void EcgAssembler::add(float mV, bool lead_off, std::uint64_t lost, std::optional<RespirationReading> respiration) {
   next_count_ += static_cast<std::int64_t>(lost);
   health_.lost.add(lost);
-  chunk_.push_back({next_count_++, mV, lead_off});
+  ecg_.chunk.push_back({next_count_, mV, lead_off});
+  if (respiration && sinks_.respiration) {
+    respiration_.chunk.push_back({next_count_, respiration->value, respiration->sensor_off});
+  }
+  ++next_count_;
 }
 
 std::uint64_t EcgAssembler::lost_samples(std::uint64_t lost_modulo, std::uint64_t modulus, std::size_t behind,
@@ -30,34 +35,42 @@ std::uint64_t EcgAssembler::lost_samples(std::uint64_t lost_modulo, std::uint64_
   return lost_modulo + modulus * static_cast<std::uint64_t>(std::clamp(rounds, 0.0, 1e6));
 }
 
-void EcgAssembler::end_chunk(Instant arrival) {
-  if (chunk_.empty()) return;
-  clock_.observe(chunk_.back().count, arrival);
-  health_.jitter.add(clock_.lateness(chunk_.back().count, arrival));
-  last_arrival_ = arrival;
-  any_ = true;
-  EcgBlock block;
+template <class Block>
+void EcgAssembler::give(Lane& lane, Instant arrival, std::array<float, Block::kCapacity> Block::*values,
+                        bool Block::*off, const std::function<void(const Block&)>& sink) {
+  Block block;
   block.arrival = arrival;
   block.sample_period = Duration(std::llround(clock_.period_ns()));
-  for (std::size_t i = 0; i < chunk_.size(); ++i) {
-    const Sample& sample = chunk_[i];
+  for (std::size_t i = 0; i < lane.chunk.size(); ++i) {
+    const Sample& sample = lane.chunk[i];
     if (block.count == 0) {
       // The edge moves back when an earlier arrival is seen; samples do not change their order for it.
-      block.first_sample_time = std::min(std::max(clock_.stamp(sample.count), last_stamp_ + Duration(1)), arrival);
+      block.first_sample_time = std::min(std::max(clock_.stamp(sample.count), lane.last_stamp + Duration(1)), arrival);
       block.device_sequence = static_cast<std::uint32_t>(sample.count);
-      block.lead_off = sample.lead_off;
+      block.*off = sample.off;
     }
-    block.mV[block.count++] = sample.mV;
-    const bool last = i + 1 == chunk_.size();
-    if (last || block.count == EcgBlock::kCapacity || chunk_[i + 1].count != sample.count + 1 ||
-        chunk_[i + 1].lead_off != sample.lead_off) {
-      last_stamp_ = block.first_sample_time + (block.count - 1) * block.sample_period;
-      health_.samples.add(block.count);
-      sink_(block);
+    (block.*values)[block.count++] = sample.value;
+    const bool last = i + 1 == lane.chunk.size();
+    if (last || block.count == Block::kCapacity || lane.chunk[i + 1].count != sample.count + 1 ||
+        lane.chunk[i + 1].off != sample.off) {
+      lane.last_stamp = block.first_sample_time + (block.count - 1) * block.sample_period;
+      sink(block);
       block.count = 0;
     }
   }
-  chunk_.clear();
+  lane.chunk.clear();
+}
+
+void EcgAssembler::end_chunk(Instant arrival) {
+  if (ecg_.chunk.empty()) return;
+  const std::int64_t newest = ecg_.chunk.back().count;
+  clock_.observe(newest, arrival);
+  health_.jitter.add(clock_.lateness(newest, arrival));
+  last_arrival_ = arrival;
+  any_ = true;
+  health_.samples.add(ecg_.chunk.size());
+  give(ecg_, arrival, &EcgBlock::mV, &EcgBlock::lead_off, sinks_.ecg);
+  give(respiration_, arrival, &RespirationBlock::values, &RespirationBlock::sensor_off, sinks_.respiration);
 }
 
 }  // namespace perimap

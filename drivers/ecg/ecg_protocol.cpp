@@ -13,8 +13,8 @@ constexpr Duration kReopenAfter = std::chrono::seconds(2);
 
 }  // namespace
 
-EcgProtocol::EcgProtocol(double sample_rate_hz, Duration transport_delay, EcgSink sink, DeviceHealth& health)
-    : samples_({.period_ns = 1e9 / sample_rate_hz, .transport_delay = transport_delay}, std::move(sink), health),
+EcgProtocol::EcgProtocol(double sample_rate_hz, Duration transport_delay, EcgSinks sinks, DeviceHealth& health)
+    : samples_({.period_ns = 1e9 / sample_rate_hz, .transport_delay = transport_delay}, std::move(sinks), health),
       health_(health) {}
 
 void EcgProtocol::on_open(LinkControl& link, Instant now) {

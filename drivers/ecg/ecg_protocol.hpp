@@ -20,7 +20,7 @@ namespace perimap {
 class EcgProtocol : public DeviceProtocol {
  public:
   // `transport_delay`: from a sample's measurement to the earliest that it can be here.
-  EcgProtocol(double sample_rate_hz, Duration transport_delay, EcgSink sink, DeviceHealth& health);
+  EcgProtocol(double sample_rate_hz, Duration transport_delay, EcgSinks sinks, DeviceHealth& health);
 
   void on_open(LinkControl& link, Instant now) final;
   void on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) final;

@@ -16,8 +16,8 @@ constexpr int kNeutral = 128;
 
 }  // namespace
 
-MedlabProtocol::MedlabProtocol(const MedlabSettings& settings, EcgSink sink, DeviceHealth& health)
-    : EcgProtocol(kSampleRate_hz, time_on_line(1, kBaud), std::move(sink), health), settings_(settings) {}
+MedlabProtocol::MedlabProtocol(const MedlabSettings& settings, EcgSinks sinks, DeviceHealth& health)
+    : EcgProtocol(kSampleRate_hz, time_on_line(1, kBaud), std::move(sinks), health), settings_(settings) {}
 
 void MedlabProtocol::start(LinkControl& link) {
   follows_ = Follows::kNothing;

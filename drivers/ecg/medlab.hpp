@@ -10,7 +10,8 @@
 //   N normal operation   S0 S1 S2  300, 100, 50 samples/s   G0 G1 G2  lead III, II, I   A0 A1 A2 amplification
 //
 // There is no check sum and no count: a byte that was garbled into another sample cannot be told from one, and a lost
-// sample shows only as a step of the clock. Bytes before the first marker are passed over.
+// sample shows only as a step of the clock. Bytes before the first marker are passed over. Of respiration there is the
+// rate alone, from which nobody knows where in a breath the patient is.
 #pragma once
 
 #include "drivers/ecg/ecg_protocol.hpp"
@@ -27,7 +28,7 @@ class MedlabProtocol final : public EcgProtocol {
   static constexpr int kBaud = 9600;
   static constexpr double kSampleRate_hz = 300.0;
 
-  MedlabProtocol(const MedlabSettings& settings, EcgSink sink, DeviceHealth& health);
+  MedlabProtocol(const MedlabSettings& settings, EcgSinks sinks, DeviceHealth& health);
 
  protected:
   void start(LinkControl& link) override;

@@ -3,19 +3,24 @@
 
 namespace perimap {
 
-// Lead-off after 100 ms at a rail, on again after 500 ms away from it: the amplifier needs some of that to settle.
+// Off after some time at a rail, on again after 500 ms away from it: the amplifier needs some of that to settle.
 class RailWatch {
  public:
-  explicit RailWatch(double sample_rate_hz) noexcept
-      : off_after_(static_cast<int>(0.1 * sample_rate_hz)), on_after_(static_cast<int>(0.5 * sample_rate_hz)) {}
+  // No part of a heartbeat is cut off for so long.
+  static constexpr double kLeadOff_s = 0.1;
+  // A belt that is too tight cuts the top off every breath, and its onset can still be told.
+  static constexpr double kSensorOff_s = 5.0;
+
+  RailWatch(double sample_rate_hz, double off_after_s) noexcept
+      : off_after_(static_cast<int>(off_after_s * sample_rate_hz)), on_after_(static_cast<int>(0.5 * sample_rate_hz)) {}
 
   void restart() noexcept {
     run_ = 0;
     off_ = false;
   }
 
-  // The next sample; true while the lead is off.
-  bool lead_off(bool at_rail) noexcept {
+  // The next sample; true while the input is off.
+  bool off(bool at_rail) noexcept {
     run_ = at_rail == off_ ? 0 : run_ + 1;
     if (run_ >= (off_ ? on_after_ : off_after_)) {
       off_ = !off_;

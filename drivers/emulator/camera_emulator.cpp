@@ -2,45 +2,26 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <memory>
 #include <random>
 #include <utility>
-#include <variant>
 
 #include "drivers/emulator/video_output.hpp"
-#include "drivers/recording/channels.hpp"
-#include "drivers/recording/replay_reader.hpp"
 
 namespace perimap {
-namespace {
 
-Expected<Instant> first_arrival_of(const std::string& recording) {
-  auto all = ReplayReader::open(recording, ReadMode::kStrict);
-  if (!all) return tl::unexpected(std::move(all.error()));
-  const auto first = all->next();
-  if (!first) return tl::unexpected(first.error());
-  if (!*first) return fail(recording + ": the recording is empty");
-  return arrival_of(**first);
-}
-
-}  // namespace
-
-Expected<ShownFrames> emulate_camera(const std::string& device, const std::string& recording, Instant start,
+Expected<ShownFrames> emulate_camera(const std::string& device, PlayedFrames& frames, Instant start,
                                      const EmulatorFaults& faults, const EmulatorReady& ready,
                                      const Interrupt& interrupt, const V4l2Opener& open) {
-  const auto first_arrival = first_arrival_of(recording);
-  if (!first_arrival) return tl::unexpected(first_arrival.error());
-  constexpr std::array<std::string_view, 1> kFrames{channels::kCameraImage};
-  auto frames = ReplayReader::open(recording, ReadMode::kStrict, kFrames);
-  if (!frames) return tl::unexpected(std::move(frames.error()));
-
   std::mt19937_64 random(faults.seed);
   std::uniform_real_distribution<> dice(0.0, 1.0);
-  const auto played_at = [&](Instant recorded) {
-    const double since_ns = static_cast<double>((recorded - *first_arrival).count());
-    return start + Duration(std::llround(since_ns / (1.0 + 1e-6 * faults.drift_ppm)));
+  const double rate = 1.0 + 1e-6 * faults.drift_ppm;
+  const auto played_at = [&](Instant of_session) {
+    return start + Duration(std::llround(static_cast<double>((of_session - frames.first_arrival()).count()) / rate));
+  };
+  const auto session_time = [&](Instant t) {
+    return frames.first_arrival() + Duration(std::llround(static_cast<double>((t - start).count()) * rate));
   };
   const auto unplugged = [&faults](Duration since) {
     return faults.unplug_every > Duration(0) &&
@@ -50,11 +31,12 @@ Expected<ShownFrames> emulate_camera(const std::string& device, const std::strin
   const Instant begun = MonotonicClock::now();
   ShownFrames count;
   for (;;) {
-    const auto event = frames->next();
-    if (!event) return tl::unexpected(event.error());
-    if (!*event) return count;
-    const auto& frame = std::get<FrameEvent>(**event);
-    const Instant due = played_at(frame.stamp.arrival);
+    const auto frame = frames.next(session_time(MonotonicClock::now()));
+    if (!frame) return tl::unexpected(frame.error());
+    count.too_slow = frames.left_out();
+    if (!*frame) return count;
+    const GreyImage& image = (*frame)->image;
+    const Instant due = played_at((*frame)->arrival);
     if (due < begun) continue;
     if (!wait_unless_interrupted(due - MonotonicClock::now(), interrupt)) return count;
     if (unplugged(due - start)) {
@@ -63,18 +45,18 @@ Expected<ShownFrames> emulate_camera(const std::string& device, const std::strin
     }
     if (!output) {
       auto opened = open(device).and_then([&](std::unique_ptr<V4l2Node> node) {
-        return VideoOutput::open(std::move(node), device, frame.width, frame.height);
+        return VideoOutput::open(std::move(node), device, image.width, image.height);
       });
       if (!opened) return tl::unexpected(std::move(opened.error()));
       output = std::move(*opened);
-      ready(fmt::format("v4l2:{}, {} {}x{}", device, pixel_format_name(output->format()), frame.width, frame.height));
+      ready(fmt::format("v4l2:{}, {} {}x{}", device, pixel_format_name(output->format()), image.width, image.height));
     }
     if (dice(random) < faults.lost) {
       ++count.lost;
       continue;
     }
     const bool truncated = dice(random) < faults.truncated;
-    const auto shown = output->show(frame.image(), played_at(frame.stamp.capture), truncated ? dice(random) : 1.0);
+    const auto shown = output->show(image, played_at((*frame)->capture), truncated ? dice(random) : 1.0);
     if (!shown) return tl::unexpected(shown.error());
     ++(*shown ? count.shown : count.refused);
     if (*shown && truncated) ++count.faulty;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "drivers/device/device_protocol.hpp"
-#include "drivers/emulator/ecg_waveform.hpp"
+#include "drivers/emulator/ecg_device_signals.hpp"
 #include "drivers/emulator/emulator_faults.hpp"
 
 namespace perimap {
@@ -15,7 +15,7 @@ class EcgEmulator : public DeviceProtocol {
  public:
   // `line_time`: what a sample takes on the device's own line. A pseudo-terminal takes none, so the device waits for
   // it.
-  EcgEmulator(EcgWaveform waveform, double sample_rate_hz, Duration line_time, const EmulatorFaults& faults);
+  EcgEmulator(EcgDeviceSignals signals, double sample_rate_hz, Duration line_time, const EmulatorFaults& faults);
 
   void on_open(LinkControl& link, Instant now) final;
   void on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) final;
@@ -28,15 +28,16 @@ class EcgEmulator : public DeviceProtocol {
  protected:
   // A byte from the host.
   virtual void command(LinkControl& link, std::uint8_t byte) = 0;
-  // A sample is due; `none` while the lead is off.
-  virtual void sample(LinkControl& link, std::optional<float> mV) = 0;
+  // A sample is due; not a number while the lead or the sensor is off. Respiration is from -1 to 1.
+  virtual void sample(LinkControl& link, float mV, float respiration) = 0;
 
   void run(bool running, Instant now) noexcept;
+  void set_line_time(Duration line_time) noexcept { line_time_ = line_time; }
   [[nodiscard]] FaultySender& sender() noexcept { return sender_; }
   [[nodiscard]] Instant now() const noexcept { return now_; }
 
  private:
-  EcgWaveform waveform_;
+  EcgDeviceSignals signals_;
   double period_ns_;
   Duration line_time_;
   EmulatorFaults faults_;
@@ -46,8 +47,9 @@ class EcgEmulator : public DeviceProtocol {
   Instant now_{};
 };
 
-[[nodiscard]] std::unique_ptr<EcgEmulator> emulate_medlab(EcgWaveform waveform, const EmulatorFaults& faults);
-[[nodiscard]] std::unique_ptr<EcgEmulator> emulate_bitalino(EcgWaveform waveform, const EmulatorFaults& faults);
-[[nodiscard]] std::unique_ptr<EcgEmulator> emulate_cyton(EcgWaveform waveform, const EmulatorFaults& faults);
+// The ECG is on the input that the drivers take by default; respiration, which a Medlab does not send, on all others.
+[[nodiscard]] std::unique_ptr<EcgEmulator> emulate_medlab(EcgDeviceSignals signals, const EmulatorFaults& faults);
+[[nodiscard]] std::unique_ptr<EcgEmulator> emulate_bitalino(EcgDeviceSignals signals, const EmulatorFaults& faults);
+[[nodiscard]] std::unique_ptr<EcgEmulator> emulate_cyton(EcgDeviceSignals signals, const EmulatorFaults& faults);
 
 }  // namespace perimap

@@ -81,7 +81,7 @@ Expected<void> VideoOutput::settle(int width, int height) {
     // The driver puts what it can do in place of what it cannot.
     if (error != 0 || pix.pixelformat != fourcc) continue;
     if (pix.width != static_cast<std::uint32_t>(width) || pix.height != static_cast<std::uint32_t>(height)) {
-      return refuse(fmt::format("takes {}x{} instead of the recording's {}x{}", pix.width, pix.height, width, height));
+      return refuse(fmt::format("takes {}x{} instead of the frames' {}x{}", pix.width, pix.height, width, height));
     }
     format_ = pixels;
     width_ = width;

@@ -103,9 +103,9 @@ Expected<ReplayReader> ReplayReader::select(RecordingReader reader, std::span<co
   return ReplayReader(std::move(reader));
 }
 
-bool ReplayReader::has_r_trigger() const {
+bool ReplayReader::has(std::string_view channel) const {
   const auto all = reader_.channels();
-  return std::any_of(all.begin(), all.end(), [](const RecordedChannel& c) { return c.name == channels::kRTrigger; });
+  return std::any_of(all.begin(), all.end(), [&](const RecordedChannel& c) { return c.name == channel; });
 }
 
 Expected<ReplayEvent> ReplayReader::frame_event(const RecordedMessage& message) {

@@ -17,6 +17,7 @@
 #include "core/sensors/r_trigger_pulse.hpp"
 #include "core/sensors/respiration_block.hpp"
 #include "core/sensors/tracker_sample.hpp"
+#include "drivers/recording/channels.hpp"
 #include "drivers/recording/recorded_frame.hpp"
 #include "drivers/recording/recording_reader.hpp"
 
@@ -47,8 +48,9 @@ class ReplayReader {
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode,
                                                    std::span<const std::string_view> channels);
 
-  // Whether a trigger was recorded, were it without a pulse.
-  [[nodiscard]] bool has_r_trigger() const;
+  // Whether a trigger was recorded, were it without a pulse; a respiration channel, likewise.
+  [[nodiscard]] bool has_r_trigger() const { return has(channels::kRTrigger); }
+  [[nodiscard]] bool has_respiration() const { return has(channels::kRespirationSamples); }
 
   // The next event; nullopt at the end. Channels other than the sensors' are passed over.
   [[nodiscard]] Expected<std::optional<ReplayEvent>> next();
@@ -64,6 +66,7 @@ class ReplayReader {
  private:
   explicit ReplayReader(RecordingReader reader) : reader_(std::move(reader)) {}
 
+  [[nodiscard]] bool has(std::string_view channel) const;
   [[nodiscard]] static Expected<ReplayReader> select(RecordingReader reader,
                                                      std::span<const std::string_view> channels);
   [[nodiscard]] Expected<ReplayEvent> frame_event(const RecordedMessage& message);

@@ -18,6 +18,12 @@ Expected<SensorWriter> SensorWriter::create(const std::string& path, const Senso
   return sensors;
 }
 
+template <class Message>
+Expected<void> SensorWriter::add_optional(bool wanted, std::string_view name, std::optional<ChannelId>& place) {
+  if (!wanted) return {};
+  return writer_.add_channel<Message>(name).map([&place](ChannelId id) { place = id; });
+}
+
 Expected<void> SensorWriter::begin(const SensorRecordingFacts& facts, Instant begin) {
   const auto keep = [](ChannelId& place) { return [&place](ChannelId id) { place = id; }; };
   const auto attach = [this](std::string_view name, std::string_view type, const std::optional<std::string>& text) {
@@ -38,16 +44,17 @@ Expected<void> SensorWriter::begin(const SensorRecordingFacts& facts, Instant be
           .map(keep(viewer_))
           .and_then([&] { return writer_.add_channel<perimap_EcgSamples>(channels::kEcgSamples); })
           .map(keep(ecg_))
-          .and_then([&] { return facts.r_trigger ? add_r_trigger() : Expected<void>(); })
+          .and_then(
+              [&] { return add_optional<perimap_RTriggerPulse>(facts.r_trigger, channels::kRTrigger, r_trigger_); })
+          .and_then([&] {
+            return add_optional<perimap_RespirationSamples>(facts.respiration, channels::kRespirationSamples,
+                                                            respiration_);
+          })
           .and_then([&] { return attach(attachments::kCalibration, "application/yaml", facts.calibration); })
           .and_then([&] { return attach(attachments::kConfiguration, "application/toml", facts.configuration); })
           .and_then([&] { return writer_.write(info_channel, info, begin, begin, 0); });
   // On the disk at once: a crash must not lose what the rest is read by.
   return begun.and_then([this] { return flush(); });
-}
-
-Expected<void> SensorWriter::add_r_trigger() {
-  return writer_.add_channel<perimap_RTriggerPulse>(channels::kRTrigger).map([this](ChannelId id) { r_trigger_ = id; });
 }
 
 Expected<ChannelId> SensorWriter::camera_channel(bool compressed) {
@@ -87,6 +94,12 @@ Expected<void> SensorWriter::write(const EcgBlock& block, Instant arrival) {
 Expected<void> SensorWriter::write(const RTriggerPulse& pulse, Instant arrival) {
   if (!r_trigger_) return fail("an R trigger came, and the recording has no channel for one");
   return writer_.write(*r_trigger_, to_r_trigger_message(pulse), arrival, pulse.time, pulse.device_count);
+}
+
+Expected<void> SensorWriter::write(const RespirationBlock& block, Instant arrival) {
+  if (!respiration_) return fail("respiration came, and the recording has no channel for it");
+  return writer_.write(*respiration_, borrow_respiration_samples(block), arrival, block.first_sample_time,
+                       block.device_sequence);
 }
 
 }  // namespace perimap

@@ -3,10 +3,12 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "core/error/expected.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/r_trigger_pulse.hpp"
+#include "core/sensors/respiration_block.hpp"
 #include "core/sensors/tracker_sample.hpp"
 #include "core/time/instant.hpp"
 #include "drivers/image/camera_frame.hpp"
@@ -23,6 +25,7 @@ struct SensorRecordingFacts {
   std::optional<std::string> calibration;    // the camera's, as OpenCV writes it
   std::optional<std::string> configuration;  // of perimapd, TOML
   bool r_trigger = false;                    // there is a trigger whose pulses may come
+  bool respiration = false;                  // there is a respiration channel
 };
 
 // Not for the real-time path. Messages must be written in order of `arrival`, which a replay keeps to; it is not before
@@ -39,6 +42,8 @@ class SensorWriter {
   [[nodiscard]] Expected<void> write(const EcgBlock& block, Instant arrival);
   // Only of a trigger that the facts named.
   [[nodiscard]] Expected<void> write(const RTriggerPulse& pulse, Instant arrival);
+  // Only of a channel that the facts named.
+  [[nodiscard]] Expected<void> write(const RespirationBlock& block, Instant arrival);
 
   // What was written so far survives a crash of the process.
   [[nodiscard]] Expected<void> flush() { return writer_.flush(); }
@@ -49,7 +54,8 @@ class SensorWriter {
       : writer_(std::move(writer)), world_frame_(std::move(world_frame)) {}
 
   [[nodiscard]] Expected<void> begin(const SensorRecordingFacts& facts, Instant begin);
-  [[nodiscard]] Expected<void> add_r_trigger();
+  template <class Message>
+  [[nodiscard]] Expected<void> add_optional(bool wanted, std::string_view name, std::optional<ChannelId>& place);
   [[nodiscard]] Expected<ChannelId> camera_channel(bool compressed);
 
   RecordingWriter writer_;
@@ -58,7 +64,7 @@ class SensorWriter {
   std::optional<ChannelId> camera_;  // its type is known with the first frame
   bool compressed_ = false;
   ChannelId tracker_, viewer_, ecg_;
-  std::optional<ChannelId> r_trigger_;
+  std::optional<ChannelId> r_trigger_, respiration_;
 };
 
 }  // namespace perimap

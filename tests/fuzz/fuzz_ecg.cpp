@@ -16,20 +16,27 @@ namespace {
 // Counts go on and never repeat; a lead-off block is one all through by its type.
 class Checked {
  public:
-  EcgSink sink() {
-    return [this](const EcgBlock& block) {
-      if (block.count == 0 || block.count > EcgBlock::kCapacity) std::abort();
-      if (block.device_sequence < next_) std::abort();
-      if (block.first_sample_time > block.arrival) std::abort();
-      next_ = block.device_sequence + block.count;
-      samples += block.count;
-    };
+  EcgSinks sink() {
+    return {[this](const EcgBlock& block) {
+              check(block, next_);
+              samples += block.count;
+            },
+            [this](const RespirationBlock& block) { check(block, next_breath_); }};
   }
   std::uint64_t samples = 0;
   DeviceHealth health;
 
  private:
+  template <class Block>
+  static void check(const Block& block, std::uint32_t& next) {
+    if (block.count == 0 || block.count > Block::kCapacity) std::abort();
+    if (block.device_sequence < next) std::abort();
+    if (block.first_sample_time > block.arrival) std::abort();
+    next = block.device_sequence + block.count;
+  }
+
   std::uint32_t next_ = 0;
+  std::uint32_t next_breath_ = 0;
 };
 
 void feed_can(std::span<const std::byte> input) {
@@ -59,15 +66,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto input = std::as_bytes(std::span(data, size)).subspan(2);
   Checked checked;
   std::unique_ptr<EcgProtocol> protocol;
+  // In half of the trials the device has a respiration channel.
+  const int breathes = data[0] % 8 < 4 ? 0 : 1;
   switch (data[0] % 4) {
     case 0:
       protocol = std::make_unique<MedlabProtocol>(MedlabSettings{}, checked.sink(), checked.health);
       break;
     case 1:
-      protocol = std::make_unique<BitalinoProtocol>(BitalinoSettings{}, checked.sink(), checked.health);
+      protocol = std::make_unique<BitalinoProtocol>(BitalinoSettings{.respiration_channel = breathes * 3},
+                                                    checked.sink(), checked.health);
       break;
     case 2:
-      protocol = std::make_unique<CytonProtocol>(CytonSettings{}, checked.sink(), checked.health);
+      protocol = std::make_unique<CytonProtocol>(CytonSettings{.respiration_channel = breathes * 8}, checked.sink(),
+                                                 checked.health);
       break;
     default:
       feed_can(input);

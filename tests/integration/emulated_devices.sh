@@ -10,6 +10,13 @@ line=$short/ecg
 started=()
 trap 'kill -9 "${started[@]}" 2> /dev/null; rm -rf "$short"' EXIT
 
+# ended PID: it was waited for; its number may be another's by now
+ended() {
+  local pid left=()
+  for pid in "${started[@]}"; do [ "$pid" = "$1" ] || left+=("$pid"); done
+  started=("${left[@]}")
+}
+
 fail() {
   echo "FAILED: $1"
   exit 1

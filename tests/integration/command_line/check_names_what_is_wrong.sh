@@ -30,6 +30,10 @@ printf 'version = 1\n[ecg]\nr_trigger = true\nprotocol = "cyton"\nport = "/dev/t
 grep -q "trigger.toml: key 'ecg.r_trigger_port': expected the serial port" "$scratch/error" || fail "$(cat "$scratch/error")"
 echo 'r_trigger_port = "/dev/ttyS0"' >>"$scratch/trigger.toml"
 "$perimap" check "$scratch/trigger.toml" 2>"$scratch/error" | grep -q '^r_trigger_line = "dcd"' || fail "a trigger's line: $(cat "$scratch/error")"
+printf 'version = 1\n[ecg]\nprotocol = "bitalino"\nport = "/dev/ttyUSB0"\n[respiration]\ndevice_channel = 7\n' >"$scratch/breath.toml"
+"$perimap" check "$scratch/breath.toml" >"$scratch/out" 2>"$scratch/error"
+[ $? -eq 2 ] || fail "an input that the device has not must end with 2"
+grep -q "^$scratch/breath.toml:6:18: key 'respiration.device_channel': expected 1 to 6 of a bitalino" "$scratch/error" || fail "$(cat "$scratch/error")"
 "$perimap" check /nowhere/x.toml 2>/dev/null
 [ $? -eq 2 ] || fail "a missing configuration must end with 2"
 "$perimap" check 2>/dev/null

@@ -16,7 +16,7 @@ fail() {
 }
 
 "$perimap" track "$recording" --csv "$work/tracks.csv" --video "$work/camera.avi" > "$work/track" 2>&1 || fail "no video: $(cat "$work/track")"
-"$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$line" > "$work/emulators" 2>&1 &
+"$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$line" --respiration-channel --respiration-period 2 > "$work/emulators" 2>&1 &
 emulators=$!
 for _ in $(seq 100); do
   [ "$(grep -c ' at ' "$work/emulators")" -eq 2 ] && break
@@ -33,6 +33,8 @@ port = "tcp:127.0.0.1:$port"
 [ecg]
 protocol = "cyton"
 port = "$line"
+[respiration]
+device_channel = 4
 TOML
 "$perimap" probe "$work/there.toml" --seconds 6 --json > "$work/there.json" 2> "$work/errors" ||
   fail "what is there is not well: $(cat "$work/there.json" "$work/errors")"
@@ -60,6 +62,11 @@ for (const [device, rate] of [["camera", 25], ["tracker", 60], ["ecg", 250]]) {
   assert.ok(Math.abs(there[device].rate_hz - rate) < 0.1 * rate, `${device} at ${there[device].rate_hz} Hz`);
   assert.equal(there[device].invalid, 0, device);
 }
+const breathing = there.ecg.respiration;
+assert.ok(Math.abs(breathing.rate_hz - 250) < 25, `respiration at ${breathing.rate_hz} Hz`);
+assert.equal(breathing.channel, 4);
+assert.equal(breathing.sensor_off, 0);
+assert.ok(Math.abs(breathing.lowest + 1) < 0.1 && Math.abs(breathing.highest - 1) < 0.1, JSON.stringify(breathing));
 assert.match(there.tracker.identity, /emulated tracker/);
 assert.match(gone.camera.reason, /no such device/);
 assert.match(gone.tracker.reason, /refused/);

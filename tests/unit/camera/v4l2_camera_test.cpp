@@ -148,6 +148,17 @@ TEST(V4l2Stream, CallsDamagedWhatIsNoPicture) {
   }
 }
 
+TEST(V4l2Stream, AFrameThatCameBeforeItWasExposedIsNoneAndTheDelayIsDoubted) {
+  FakeCamera camera;
+  camera.frames = {{.age = milliseconds(3)}};
+  auto wanted = settings();
+  wanted.delay = -milliseconds(100);
+  auto stream = open(camera, wanted).value();
+  const Interrupt interrupt;
+  EXPECT_EQ(stream->next(seconds(1), interrupt).value(), Grab::kDamaged);
+  EXPECT_THAT(stream->damage(), HasSubstr("camera.delay_ms"));
+}
+
 TEST(V4l2Stream, WaitsOnWhenABufferWasNotThereAfterAll) {
   FakeCamera camera;
   camera.frames = {{.error = EAGAIN}, {}};

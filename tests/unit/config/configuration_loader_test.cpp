@@ -204,6 +204,29 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"UnknownKey", "version = 1\n[phase]\nlow = 1\n",
               "test.toml:3:1: key 'phase.low': expected one of law, lost_after_s, from_image, image_alone_s, "
               "predictor, got an unknown key"},
+        Wrong{"InputThatABitalinoHasNot",
+              "version = 1\n[ecg]\nprotocol = \"bitalino\"\n[respiration]\ndevice_channel = 7\n",
+              "test.toml:5:18: key 'respiration.device_channel': expected 1 to 6 of a bitalino, but for 2, which "
+              "carries the ECG, got 7"},
+        Wrong{"InputThatCarriesTheEcg",
+              "version = 1\n[ecg]\nprotocol = \"cyton\"\nchannel = 3\n[respiration]\ndevice_channel = 3\n",
+              "test.toml:6:18: key 'respiration.device_channel': expected 1 to 8 of a cyton, but for 3, which carries "
+              "the ECG, got 3"},
+        Wrong{"UsualInputOfTheEcg", "version = 1\n[ecg]\nprotocol = \"cyton\"\n[respiration]\ndevice_channel = 1\n",
+              "test.toml:5:18: key 'respiration.device_channel': expected 1 to 8 of a cyton, but for 1, which carries "
+              "the ECG, got 1"},
+        Wrong{
+            "InputOfAMedlab", "version = 1\n[ecg]\nprotocol = \"medlab\"\n[respiration]\ndevice_channel = 2\n",
+            "test.toml:5:18: key 'respiration.device_channel': expected 0, since a medlab tells the rate of breathing "
+            "alone, got 2"},
+        Wrong{"OtherInputOfCan", "version = 1\n[ecg]\nprotocol = \"can\"\n[respiration]\ndevice_channel = 1\n",
+              "test.toml:5:18: key 'respiration.device_channel': expected 2, the second word of "
+              "config/perimap_ecg.dbc, got 1"},
+        Wrong{"InputOfNoDevice", "version = 1\n[respiration]\ndevice_channel = 1\n",
+              "test.toml:3:18: key 'respiration.device_channel': expected 0 without an ECG device in 'ecg.protocol', "
+              "got 1"},
+        Wrong{"EcgInputThatABitalinoHasNot", "version = 1\n[ecg]\nchannel = 8\nprotocol = \"bitalino\"\n",
+              "test.toml:3:11: key 'ecg.channel': expected 1 to 6 of a bitalino, got 8"},
         Wrong{"SectionIsAValue", "version = 1\nphase = 3\n", "test.toml:2:9: key 'phase': expected a table, got 3"},
         Wrong{"SectionIsAnArrayOfTables", "version = 1\n[[phase]]\nlaw = \"linear\"\n",
               "test.toml:2:1: key 'phase': expected a table, got [a table]"},

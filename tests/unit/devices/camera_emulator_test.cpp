@@ -9,8 +9,12 @@
 #include <cstring>
 #include <deque>
 #include <filesystem>
+#include <thread>
 #include <vector>
 
+#include "drivers/emulator/played_session.hpp"
+#include "drivers/emulator/recorded_frames.hpp"
+#include "drivers/emulator/simulated_frames.hpp"
 #include "drivers/emulator/video_output.hpp"
 #include "drivers/recording/sensor_writer.hpp"
 
@@ -167,7 +171,7 @@ TEST(VideoOutput, RefusesWhatIsNoOutputOrTakesOtherFrames) {
   FakeOutput camera;
   camera.capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
   EXPECT_EQ(refusal(camera), "/dev/video9: not a video output; v4l2loopback makes one");
-  EXPECT_EQ(refusal({}), "/dev/video9: takes 64x48 instead of the recording's 80x48");
+  EXPECT_EQ(refusal({}), "/dev/video9: takes 64x48 instead of the frames' 80x48");
   FakeOutput coloured;
   coloured.formats = {V4L2_PIX_FMT_RGB24};
   EXPECT_EQ(refusal(coloured), "/dev/video9: takes neither GREY nor YUYV");
@@ -202,6 +206,11 @@ class CameraEmulator : public ::testing::Test {
 
   // Long enough ahead that all is ready by then.
   Expected<ShownFrames> play(const EmulatorFaults& faults = {}, Duration from_now = milliseconds(700)) {
+    auto frames = RecordedFrames::open(recording_);
+    if (!frames) return tl::unexpected(std::move(frames.error()));
+    return show(*frames, faults, from_now);
+  }
+  Expected<ShownFrames> show(PlayedFrames& frames, const EmulatorFaults& faults, Duration from_now) {
     start_ = MonotonicClock::now() + from_now;
     Interrupt interrupt;
     const V4l2Opener open = [this](const std::string& path) -> Expected<std::unique_ptr<V4l2Node>> {
@@ -209,8 +218,7 @@ class CameraEmulator : public ::testing::Test {
       return std::make_unique<FakeOutputNode>(fake_);
     };
     return emulate_camera(
-        "/dev/video9", recording_, start_, faults, [this](const std::string& where) { where_ = where; }, interrupt,
-        open);
+        "/dev/video9", frames, start_, faults, [this](const std::string& where) { where_ = where; }, interrupt, open);
   }
   [[nodiscard]] std::vector<int> numbers() const {
     std::vector<int> all;
@@ -285,6 +293,82 @@ TEST_F(CameraEmulator, SaysWhyTheOutputTakesNoFrame) {
   const auto played = play();
   ASSERT_FALSE(played);
   EXPECT_EQ(played.error().message, "/dev/video9: the device has gone");
+}
+
+// Frames that take their time to be made, as rendered ones do.
+class SlowFrames final : public PlayedFrames {
+ public:
+  SlowFrames(Duration period, Duration making) : period_(period), making_(making) {}
+  [[nodiscard]] Instant first_arrival() const noexcept override { return Instant(); }
+  Expected<std::optional<PlayedFrame>> next(Instant now) override {
+    while (number_ < kFrames && arrival() < now + making_) {
+      ++number_;
+      ++left_out_;
+    }
+    if (number_ == kFrames) return std::optional<PlayedFrame>();
+    std::this_thread::sleep_for(making_);
+    pixels_.assign(pixels_.size(), static_cast<std::uint8_t>(number_));
+    const Instant t = arrival();
+    ++number_;
+    return PlayedFrame{t, t, {pixels_.data(), 8, 6, 8}};
+  }
+  [[nodiscard]] std::uint64_t left_out() const noexcept override { return left_out_; }
+  static constexpr int kFrames = 40;
+
+ private:
+  [[nodiscard]] Instant arrival() const { return Instant() + number_ * period_; }
+
+  Duration period_, making_;
+  int number_ = 0;
+  std::uint64_t left_out_ = 0;
+  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(48);
+};
+
+TEST_F(CameraEmulator, FramesThatAreMadeTooSlowlyAreLeftOutAndCountedAndTheOthersComeInTime) {
+  SlowFrames frames(milliseconds(10), milliseconds(25));
+  const auto played = show(frames, {}, milliseconds(100));
+  ASSERT_TRUE(played) << played.error().message;
+  EXPECT_GT(played->shown, 0U);
+  EXPECT_GE(played->too_slow, played->shown) << "25 ms are more than two periods";
+  EXPECT_EQ(played->shown + played->too_slow, static_cast<std::uint64_t>(SlowFrames::kFrames));
+  for (const Shown& frame : fake_.shown) EXPECT_GE(frame.when, start_ + frame.bytes.at(0) * milliseconds(10));
+}
+
+// The simulated heart as `perimap emulate camera` shows it, and the tracker and ECG that go with it.
+TEST_F(CameraEmulator, ShowsASimulatedHeartFrameByFrameInStepWithItsSensors) {
+  SimulationSettings settings;
+  settings.width = settings.height = 64;
+  settings.frames_per_s = 10.0;
+  settings.duration = std::chrono::seconds(1);
+  settings.respiration_channel = true;
+  const auto simulation = Simulation::create(settings);
+  ASSERT_TRUE(simulation) << simulation.error().message;
+  SimulatedFrames frames(*simulation);
+  fake_.widest = 64;
+  const auto played = show(frames, {}, milliseconds(500));
+  ASSERT_TRUE(played) << played.error().message;
+  ASSERT_EQ(played->shown + played->too_slow, 10U);
+  ASSERT_GT(played->shown, 0U);
+  RenderWorkspace workspace;
+  std::vector<std::uint8_t> expected(std::size_t{64} * 64);
+  const Duration offset = start_ - simulation->arrivals().front().arrival;
+  for (const Shown& shown : fake_.shown) {
+    // A buffer's stamp holds microseconds.
+    const auto frame = std::find_if(simulation->frames().begin(), simulation->frames().end(), [&](const auto& f) {
+      return std::chrono::abs(f.stamp.capture + offset - shown.stamp) <= std::chrono::microseconds(1);
+    });
+    ASSERT_NE(frame, simulation->frames().end()) << "a stamp that no frame has";
+    EXPECT_GE(shown.when, frame->stamp.arrival + offset);
+    simulation->render(static_cast<std::size_t>(frame - simulation->frames().begin()), workspace, expected);
+    EXPECT_EQ(shown.bytes, expected);
+  }
+  const PlayedSession session = PlayedSession::of(*simulation, {});
+  const PoseTrack poses = session.poses(start_);
+  EXPECT_EQ(poses.start(), simulation->tracker_sample(0, {}).source_time + offset);
+  const EcgDeviceSignals signals = session.ecg_device(start_);
+  const EcgBlock& block = simulation->ecg().front();
+  EXPECT_FLOAT_EQ(signals.ecg_mV.at(block.first_sample_time + offset).value(), block.mV[0]);
+  EXPECT_TRUE(signals.respiration);
 }
 
 TEST_F(CameraEmulator, NamesARecordingThatIsNone) {

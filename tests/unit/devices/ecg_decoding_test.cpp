@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <map>
 #include <numeric>
 #include <random>
 #include <regex>
@@ -31,9 +32,11 @@ std::vector<std::byte> bytes_of(std::initializer_list<int> values) {
 
 struct Received {
   std::vector<EcgBlock> blocks;
+  std::vector<RespirationBlock> breaths;
   DeviceHealth health;
-  EcgSink sink() {
-    return [this](const EcgBlock& block) { blocks.push_back(block); };
+  EcgSinks sink() {
+    return {[this](const EcgBlock& block) { blocks.push_back(block); },
+            [this](const RespirationBlock& block) { breaths.push_back(block); }};
   }
   // Of all samples, in order: whole counts of the converter.
   std::vector<int> counts(double count_mV) const {
@@ -164,12 +167,22 @@ std::vector<std::byte> bitalino_frame(unsigned sequence, unsigned value) {
   return frame;
 }
 
-std::vector<std::byte> cyton_packet(unsigned count, int value) {
+// As a board with two inputs taken sends it; `low` is of the one with the lower number.
+std::vector<std::byte> bitalino_frame_of_two(unsigned sequence, unsigned low, unsigned high) {
+  auto frame = bytes_of({static_cast<int>(high & 0xFFU), static_cast<int>((low << 2U | high >> 8U) & 0xFFU),
+                         static_cast<int>(low >> 6U), static_cast<int>(sequence % 16 << 4U)});
+  frame[3] |= static_cast<std::byte>(bitalino_crc(frame));
+  return frame;
+}
+
+std::vector<std::byte> cyton_packet(unsigned count, int value, int channel_5 = 0) {
   std::vector<std::byte> packet(CytonProtocol::kPacketBytes);
   packet[0] = std::byte{0xA0};
   packet[1] = static_cast<std::byte>(count % 256);
-  for (unsigned i = 0; i < 3; ++i)
+  for (unsigned i = 0; i < 3; ++i) {
     packet[2 + i] = static_cast<std::byte>(static_cast<unsigned>(value) >> (16U - 8U * i) & 0xFFU);
+    packet[14 + i] = static_cast<std::byte>(static_cast<unsigned>(channel_5) >> (16U - 8U * i) & 0xFFU);
+  }
   packet[32] = std::byte{0xC0};
   return packet;
 }
@@ -187,7 +200,36 @@ struct Counted {
   double offset;
   unsigned modulus;
   Duration period;
-  unsigned held_back;  // frames that wait for the next to agree
+  unsigned held_back;                  // frames that wait for the next to agree
+  double breath_count = 0.0;           // of the respiration channel; 0: it has none
+  int (*breath)(int value) = nullptr;  // what that channel measures together with this sample of the ECG
+
+  [[nodiscard]] bool cyton() const { return std::string_view(name).starts_with("Cyton"); }
+  // Every sample of respiration stands beside the sample of the ECG that was measured with it, at the same instant.
+  void expect_breaths_beside_the_ecg(const Received& received) const {
+    if (breath == nullptr) {
+      EXPECT_TRUE(received.breaths.empty());
+      return;
+    }
+    std::map<std::uint32_t, std::pair<int, Instant>> ecg;
+    std::size_t at = 0;
+    const std::vector<int> counts = values(received);
+    for (const EcgBlock& block : received.blocks) {
+      for (std::uint32_t i = 0; i < block.count; ++i) {
+        ecg[block.device_sequence + i] = {counts[at++], block.first_sample_time + i * block.sample_period};
+      }
+    }
+    std::size_t breaths = 0;
+    for (const RespirationBlock& block : received.breaths) {
+      for (std::uint32_t i = 0; i < block.count; ++i, ++breaths) {
+        const auto& [value, time] = ecg.at(block.device_sequence + i);
+        EXPECT_EQ(std::lround(static_cast<double>(block.values[i]) / breath_count), breath(value));
+        EXPECT_LE(std::chrono::abs(block.first_sample_time + i * block.sample_period - time), milliseconds(1));
+      }
+      EXPECT_LE(block.first_sample_time, block.arrival);
+    }
+    EXPECT_EQ(breaths, counts.size());
+  }
 
   std::vector<int> values(const Received& received) const {
     std::vector<int> all;
@@ -198,7 +240,7 @@ struct Counted {
   }
   void open(EcgProtocol& protocol_, ScriptedLink& link) const {
     protocol_.on_open(link, kStart);
-    if (std::string_view(name) == "Cyton") {
+    if (cyton()) {
       const std::string_view greeting = "OpenBCI V3\n$$$";
       protocol_.on_bytes(link, std::as_bytes(std::span(greeting.data(), greeting.size())), kStart);
     }
@@ -209,9 +251,33 @@ const Counted kCounted[] = {
     {"BITalino", [](unsigned count, int value) { return bitalino_frame(count, static_cast<unsigned>(value)); },
      [](Received& r) { return std::make_unique<BitalinoProtocol>(BitalinoSettings{}, r.sink(), r.health); },
      3000.0 / 1024 / 1000, 512, 16, milliseconds(1), 1},
-    {"Cyton", &cyton_packet,
+    {"Cyton", [](unsigned count, int value) { return cyton_packet(count, value); },
      [](Received& r) { return std::make_unique<CytonProtocol>(CytonSettings{}, r.sink(), r.health); },
      4500.0 / 24 / 0x7FFFFF, 0, 256, milliseconds(4), 0},
+    {"BITalino, breathing on A3",
+     [](unsigned count, int value) {
+       return bitalino_frame_of_two(count, static_cast<unsigned>(value), static_cast<unsigned>(1000 - value / 2));
+     },
+     [](Received& r) {
+       return std::make_unique<BitalinoProtocol>(BitalinoSettings{.channel = 2, .respiration_channel = 3}, r.sink(),
+                                                 r.health);
+     },
+     3000.0 / 1024 / 1000, 512, 16, milliseconds(1), 1, 3300.0 / 1024, [](int value) { return 488 - value / 2; }},
+    {"BITalino, breathing on A1",
+     [](unsigned count, int value) {
+       return bitalino_frame_of_two(count, static_cast<unsigned>(1000 - value / 2), static_cast<unsigned>(value));
+     },
+     [](Received& r) {
+       return std::make_unique<BitalinoProtocol>(BitalinoSettings{.channel = 2, .respiration_channel = 1}, r.sink(),
+                                                 r.health);
+     },
+     3000.0 / 1024 / 1000, 512, 16, milliseconds(1), 1, 3300.0 / 1024, [](int value) { return 488 - value / 2; }},
+    {"Cyton, breathing on 5", [](unsigned count, int value) { return cyton_packet(count, value, 3 - 7 * value); },
+     [](Received& r) {
+       return std::make_unique<CytonProtocol>(CytonSettings{.respiration_channel = 5}, r.sink(), r.health);
+     },
+     4500.0 / 24 / 0x7FFFFF, 0, 256, milliseconds(4), 0, 4500.0 / 24 / 0x7FFFFF,
+     [](int value) { return 3 - 7 * value; }},
 };
 
 TEST(CountedProtocols, DecodeTheSameHoweverTheBytesAreCut) {
@@ -232,6 +298,7 @@ TEST(CountedProtocols, DecodeTheSameHoweverTheBytesAreCut) {
                            kStart + at * std::chrono::microseconds(50));
       }
       EXPECT_EQ(device.values(received), std::vector<int>(sent.begin(), sent.end() - device.held_back));
+      device.expect_breaths_beside_the_ecg(received);
       EXPECT_EQ(received.health.damaged.get(), 0U);
       EXPECT_EQ(received.health.lost.get(), 0U);
     }
@@ -251,6 +318,7 @@ TEST(CountedProtocols, StartInTheMiddleOfAFrame) {
     std::vector<int> sent(49 - device.held_back);
     std::iota(sent.begin(), sent.end(), 201);
     EXPECT_EQ(device.values(received), sent);
+    device.expect_breaths_beside_the_ecg(received);
   }
 }
 
@@ -297,7 +365,7 @@ TEST(CountedProtocols, GarbledStreamsGiveNoSampleThatWasNotSent) {
       if (dice == 1) frame.insert(frame.begin(), std::byte{0xA0});  // a byte too many
       if (dice == 2) frame.clear();                                 // lost
       // The frame's shape or check is hit; a Cyton has no check that would notice its samples changed.
-      if (dice == 3) frame[std::string_view(device.name) == "Cyton" ? 32 : 0] ^= std::byte{0x10};
+      if (dice == 3) frame[device.cyton() ? 32 : 0] ^= std::byte{0x10};
       whole += dice > 3 || dice == 1 ? 1 : 0;
       protocol->on_bytes(link, frame, kStart + i * device.period);
     }
@@ -305,6 +373,7 @@ TEST(CountedProtocols, GarbledStreamsGiveNoSampleThatWasNotSent) {
     std::size_t strange = 0;
     for (const int value : values) strange += value < 500 || value > 506 ? 1 : 0;
     EXPECT_EQ(strange, 0U);
+    device.expect_breaths_beside_the_ecg(received);
     EXPECT_LE(values.size(), whole);
     EXPECT_GT(values.size(), whole * 85 / 100);
     // Delivered and lost together are what the device sent, to the last frames still held back.
@@ -325,13 +394,14 @@ TEST(CountedProtocols, RandomBytesGiveNothing) {
     protocol->on_bytes(link, noise, kStart);
     // BITalino: four frames in a row pass CRC-4 and sequence by chance once in 16^7 places.
     EXPECT_TRUE(received.blocks.empty());
+    EXPECT_TRUE(received.breaths.empty());
   }
 }
 
 TEST(CountedProtocols, ARailIsLeadOffAfterATenthOfASecond) {
   for (const Counted& device : kCounted) {
     SCOPED_TRACE(device.name);
-    const int rail = std::string_view(device.name) == "Cyton" ? 0x7FFFFF : 1023;
+    const int rail = device.cyton() ? 0x7FFFFF : 1023;
     Received received;
     const auto protocol = device.protocol(received);
     ScriptedLink link;
@@ -389,6 +459,34 @@ TEST(Bitalino, StartsLiveAcquisitionOfItsChannel) {
   EXPECT_EQ(link.sent, std::string("\x00\xC3\x09", 3));
 }
 
+TEST(Bitalino, StartsLiveAcquisitionOfRespirationToo) {
+  Received received;
+  BitalinoProtocol protocol({.channel = 2, .respiration_channel = 6}, received.sink(), received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  EXPECT_EQ(link.sent, std::string("\x00\xC3\x89", 3));
+}
+
+// A belt that is too tight cuts the top off every breath; one that is not connected stays there.
+TEST(Bitalino, ABreathSensorIsOffAfterFiveSecondsAtARailAndTheLeadIsOn) {
+  Received received;
+  BitalinoProtocol protocol({.channel = 2, .respiration_channel = 3}, received.sink(), received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  for (unsigned i = 0; i < 12000; ++i) {
+    const bool cut_top = i < 3000;
+    const bool open = i >= 4000 && i < 11000;
+    protocol.on_bytes(link, bitalino_frame_of_two(i, 512, cut_top || open ? 1023 : 300), kStart + i * milliseconds(1));
+  }
+  std::vector<unsigned> changes;
+  for (std::size_t i = 1; i < received.breaths.size(); ++i) {
+    if (received.breaths[i].sensor_off != received.breaths[i - 1].sensor_off)
+      changes.push_back(received.breaths[i].device_sequence);
+  }
+  EXPECT_THAT(changes, ElementsAre(8999, 11499));
+  for (const EcgBlock& block : received.blocks) EXPECT_FALSE(block.lead_off);
+}
+
 // ---- CAN
 
 CanFrame can_frame(std::uint8_t count, std::uint16_t ms, std::int16_t first, std::int16_t second) {
@@ -396,8 +494,12 @@ CanFrame can_frame(std::uint8_t count, std::uint16_t ms, std::int16_t first, std
 }
 
 TEST(CanEcg, EveryFieldSurvivesTheFrame) {
-  const CanEcgFrame ecg{255, true, true, 1, 65535, {-32768, 32767}};
-  EXPECT_EQ(decode_can_ecg(encode_can_ecg(ecg, 0x1ABCDEF, true), 0x1ABCDEF, true), ecg);
+  for (const CanEcgFrame& ecg :
+       {CanEcgFrame{255, true, true, 1, 65535, {-32768, 32767}},
+        CanEcgFrame{254, false, false, 1, 65534, {-32767, 32766}, true, false},
+        CanEcgFrame{1, true, false, 1, 0, {1, -1}, true, true}, CanEcgFrame{0, false, false, 2, 7, {0, 0}}}) {
+    EXPECT_EQ(decode_can_ecg(encode_can_ecg(ecg, 0x1ABCDEF, true), 0x1ABCDEF, true), ecg);
+  }
 }
 
 TEST(CanEcg, OtherFramesAreNone) {
@@ -423,23 +525,36 @@ TEST(CanEcg, TheDatabaseFileSaysWhatTheCodeDoes) {
   const std::string text((std::istreambuf_iterator<char>(file)), {});
   EXPECT_THAT(text, HasSubstr("BO_ 736 PerimapEcg: 8"));  // 0x2E0
   EXPECT_EQ(CanEcgSettings{}.identifier, 736U);
-  const CanEcgFrame ecg{17, false, true, 1, 40000, {-2, 1234}};
-  const CanFrame frame = encode_can_ecg(ecg, 736, false);
-  const std::map<std::string, double> expected{{"FrameCount", 17},       {"LeadOff", 0},        {"RPeak", 1},
-                                               {"OneSample", 1},         {"DeviceTime", 40000}, {"Sample0", -2 * 0.005},
-                                               {"Sample1", 1234 * 0.005}};
-  const std::regex signal(R"(SG_ (\w+) : (\d+)\|(\d+)@1([+-]) \(([\d.]+),0\))");
-  std::size_t found = 0;
-  for (std::sregex_iterator it(text.begin(), text.end(), signal), end; it != end; ++it, ++found) {
-    std::uint64_t raw = 0;
-    for (std::size_t i = 0; i < 8; ++i) raw |= static_cast<std::uint64_t>(frame.data[i]) << (8 * i);
-    const unsigned length = static_cast<unsigned>(std::stoi((*it)[3]));
-    std::uint64_t bits = raw >> static_cast<unsigned>(std::stoi((*it)[2])) & ((std::uint64_t{1} << length) - 1);
-    double value = static_cast<double>(bits);
-    if ((*it)[4] == "-" && (bits >> (length - 1) & 1U) != 0) value -= std::pow(2.0, length);
-    EXPECT_NEAR(value * std::stod((*it)[5]), expected.at((*it)[1]), 1e-9) << (*it)[1];
+  // Respiration stands in the second sample's place: m0 and m1 are told apart by the signal M.
+  for (const bool breathes : {false, true}) {
+    SCOPED_TRACE(breathes);
+    const CanEcgFrame ecg{17, false, true, 1, 40000, {-2, 1234}, breathes, breathes};
+    const CanFrame frame = encode_can_ecg(ecg, 736, false);
+    const std::map<std::string, double> expected{
+        {"FrameCount", 17},
+        {"LeadOff", 0},
+        {"RPeak", 1},
+        {"SecondIsRespiration", breathes ? 1 : 0},
+        {"RespirationOff", breathes ? 1 : 0},
+        {"OneSample", breathes ? 0 : 1},
+        {"DeviceTime", 40000},
+        {"Sample0", -2 * 0.005},
+        {breathes ? "Respiration" : "Sample1", breathes ? 1234 : 1234 * 0.005}};
+    const std::regex signal(R"(SG_ (\w+) (M |m[01] )?: (\d+)\|(\d+)@1([+-]) \(([\d.]+),0\))");
+    std::size_t found = 0;
+    for (std::sregex_iterator it(text.begin(), text.end(), signal), end; it != end; ++it) {
+      if ((*it)[2] == (breathes ? "m0 " : "m1 ")) continue;
+      std::uint64_t raw = 0;
+      for (std::size_t i = 0; i < 8; ++i) raw |= static_cast<std::uint64_t>(frame.data[i]) << (8 * i);
+      const unsigned length = static_cast<unsigned>(std::stoi((*it)[4]));
+      std::uint64_t bits = raw >> static_cast<unsigned>(std::stoi((*it)[3])) & ((std::uint64_t{1} << length) - 1);
+      double value = static_cast<double>(bits);
+      if ((*it)[5] == "-" && (bits >> (length - 1) & 1U) != 0) value -= std::pow(2.0, length);
+      EXPECT_NEAR(value * std::stod((*it)[6]), expected.at((*it)[1]), 1e-9) << (*it)[1];
+      ++found;
+    }
+    EXPECT_EQ(found, expected.size());
   }
-  EXPECT_EQ(found, expected.size());
 }
 
 TEST(CanEcg, GapsErrorsAndOverflowsAreCounted) {
@@ -462,13 +577,64 @@ TEST(CanEcg, GapsErrorsAndOverflowsAreCounted) {
   EXPECT_EQ(received.health.lost.get(), 6U + 2 * 256 * 3);
   CanFrame error = frame(0);
   error.error = true;
+  error.identifier = 0x04;  // CAN_ERR_CRTL
   decoder.take(error);
   EXPECT_EQ(received.health.bus_errors.get(), 1U);
+  EXPECT_EQ(received.health.reason(), "");
+  error.identifier = 0x40;  // CAN_ERR_BUSOFF
+  decoder.take(error);
+  EXPECT_EQ(received.health.bus_errors.get(), 2U);
+  EXPECT_THAT(received.health.reason(), HasSubstr("off the bus"));
   CanFrame after_overflow = frame(105 + 256 * 3);
   after_overflow.dropped_before = 7;
   decoder.take(after_overflow);
   EXPECT_EQ(received.health.dropped.get(), 7U);
   EXPECT_EQ(received.health.samples.get(), 206U);
+}
+
+// Frames of one sample and one of respiration, at 360 Hz.
+TEST(CanEcg, RespirationComesWithTheSampleThatItWasTakenWith) {
+  Received received;
+  CanEcgDecoder decoder({}, received.sink(), received.health);
+  const auto frame = [&](int i, bool off) {
+    const auto ms = static_cast<std::uint16_t>(i * 25 / 9);
+    CanFrame f = encode_can_ecg({static_cast<std::uint8_t>(i),
+                                 false,
+                                 false,
+                                 1,
+                                 ms,
+                                 {static_cast<std::int16_t>(i), static_cast<std::int16_t>(-3 * i)},
+                                 true,
+                                 off},
+                                0x2E0, false);
+    f.arrival = kStart + i * std::chrono::microseconds(2778);
+    return f;
+  };
+  for (int i = 0; i < 100; ++i) decoder.take(frame(i, i >= 60 && i < 80));
+  decoder.take(frame(110, false));
+  EXPECT_EQ(received.health.lost.get(), 10U) << "a lost frame held one sample of the ECG";
+  ASSERT_EQ(received.breaths.size(), 101U);
+  ASSERT_EQ(received.blocks.size(), 101U);
+  for (std::size_t i = 0; i < 101; ++i) {
+    const RespirationBlock& breath = received.breaths[i];
+    ASSERT_EQ(breath.count, 1U);
+    const int sent = i == 100 ? 110 : static_cast<int>(i);
+    EXPECT_EQ(breath.device_sequence, static_cast<std::uint32_t>(sent));
+    EXPECT_EQ(breath.values[0], static_cast<float>(-3 * sent));
+    EXPECT_EQ(breath.sensor_off, sent >= 60 && sent < 80);
+    EXPECT_EQ(breath.first_sample_time, received.blocks[i].first_sample_time);
+    EXPECT_EQ(std::lround(received.blocks[i].mV[0] / 0.005F), sent);
+  }
+}
+
+TEST(CanEcg, RespirationThatNobodyAskedForIsNoSampleOfTheEcg) {
+  Received received;
+  CanEcgDecoder decoder({}, EcgSinks(received.sink().ecg), received.health);
+  CanFrame frame = encode_can_ecg({0, false, false, 1, 0, {7, 30000}, true, false}, 0x2E0, false);
+  frame.arrival = kStart;
+  decoder.take(frame);
+  EXPECT_EQ(received.counts(0.005), std::vector<int>{7});
+  EXPECT_TRUE(received.breaths.empty());
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <mutex>
 #include <thread>
 
@@ -28,23 +29,26 @@ struct Case {
   int baud;
   double rate_hz;
   float resolution_mV;
-  std::unique_ptr<EcgEmulator> (*emulate)(EcgWaveform, const EmulatorFaults&);
-  std::function<std::unique_ptr<EcgProtocol>(EcgSink, DeviceHealth&)> drive;
+  std::unique_ptr<EcgEmulator> (*emulate)(EcgDeviceSignals, const EmulatorFaults&);
+  std::function<std::unique_ptr<EcgProtocol>(EcgSinks, DeviceHealth&)> drive;
+  float full_breath = 0.0F;  // what the driver makes of a signal of 1; 0: it has no channel for it
 };
 
 const Case kCases[] = {
     {"medlab", MedlabProtocol::kBaud, 300.0, 0.02F, &emulate_medlab,
-     [](EcgSink sink, DeviceHealth& health) {
-       return std::make_unique<MedlabProtocol>(MedlabSettings{}, std::move(sink), health);
+     [](EcgSinks sinks, DeviceHealth& health) {
+       return std::make_unique<MedlabProtocol>(MedlabSettings{}, std::move(sinks), health);
      }},
     {"bitalino", BitalinoProtocol::kBaud, 1000.0, 0.003F, &emulate_bitalino,
-     [](EcgSink sink, DeviceHealth& health) {
-       return std::make_unique<BitalinoProtocol>(BitalinoSettings{}, std::move(sink), health);
-     }},
+     [](EcgSinks sinks, DeviceHealth& health) {
+       return std::make_unique<BitalinoProtocol>(BitalinoSettings{.respiration_channel = 1}, std::move(sinks), health);
+     },
+     400.0F * 3300.0F / 1024.0F},
     {"cyton", CytonProtocol::kBaud, 250.0, 0.0001F, &emulate_cyton,
-     [](EcgSink sink, DeviceHealth& health) {
-       return std::make_unique<CytonProtocol>(CytonSettings{}, std::move(sink), health);
-     }},
+     [](EcgSinks sinks, DeviceHealth& health) {
+       return std::make_unique<CytonProtocol>(CytonSettings{.respiration_channel = 8}, std::move(sinks), health);
+     },
+     1.0F},
 };
 
 // A driver and an emulated device, each on its thread.
@@ -55,13 +59,17 @@ class Session {
             (std::filesystem::temp_directory_path() / ("perimap-" + std::to_string(getpid()) + "-" + c.name)).string()),
         // A straight rise of 1 mV/s to 2 mV and again: a sample tells when it was measured.
         waveform_(MonotonicClock::now(), 1000.0, ramp(), true),
-        device_(c.emulate(waveform_, faults)),
-        protocol_(c.drive(
-            [this](const EcgBlock& block) {
-              const std::lock_guard lock(mutex_);
-              blocks_.push_back(block);
-            },
-            health)) {
+        // The same signal for respiration: either tells when it was measured.
+        device_(c.emulate({waveform_, waveform_}, faults)),
+        protocol_(c.drive({[this](const EcgBlock& block) {
+                             const std::lock_guard lock(mutex_);
+                             blocks_.push_back(block);
+                           },
+                           [this](const RespirationBlock& block) {
+                             const std::lock_guard lock(mutex_);
+                             breaths_.push_back(block);
+                           }},
+                          health)) {
     emulating_ = std::jthread([this, faults] {
       const auto done = emulate_on_terminal(
           link_, *device_, faults, [](const std::string&) {}, interrupt_);
@@ -77,7 +85,11 @@ class Session {
     const std::lock_guard lock(mutex_);
     return blocks_;
   }
-  const EcgWaveform& waveform() const { return waveform_; }
+  std::vector<RespirationBlock> breaths() const {
+    const std::lock_guard lock(mutex_);
+    return breaths_;
+  }
+  const SampledWaveform& waveform() const { return waveform_; }
 
   DeviceHealth health;
 
@@ -89,11 +101,12 @@ class Session {
   }
 
   std::string link_;
-  EcgWaveform waveform_;
+  SampledWaveform waveform_;
   std::unique_ptr<EcgEmulator> device_;
   std::unique_ptr<EcgProtocol> protocol_;
   mutable std::mutex mutex_;
   std::vector<EcgBlock> blocks_;
+  std::vector<RespirationBlock> breaths_;
   Interrupt interrupt_;
   std::jthread emulating_;
   std::jthread driving_;
@@ -112,19 +125,48 @@ TEST_P(OverATerminal, SamplesArriveInOrderWithTheTimeAtWhichTheyWereMeasured) {
     next += block.count;
     ASSERT_FALSE(block.lead_off);
     if (block.device_sequence < wanted / 3) continue;
-    const float mV = block.mV[0];
-    if (std::abs(mV) > 0.9F) continue;  // near the ramp's jump
-    const auto true_mV = session.waveform().at(block.first_sample_time);
-    ASSERT_TRUE(true_mV);
-    errors_ms.push_back(static_cast<double>(mV - *true_mV) * 1000.0);
+    for (std::uint32_t i = 0; i < block.count; ++i) {
+      const float mV = block.mV[i];
+      if (std::abs(mV) > 0.9F) continue;  // near the ramp's jump
+      const auto true_mV = session.waveform().at(block.first_sample_time + i * block.sample_period);
+      ASSERT_TRUE(true_mV);
+      errors_ms.push_back(static_cast<double>(mV - *true_mV) * 1000.0);
+    }
   }
-  ASSERT_GT(errors_ms.size(), 20U);
+  ASSERT_GT(errors_ms.size(), wanted / 3);
   std::nth_element(errors_ms.begin(), errors_ms.begin() + static_cast<std::ptrdiff_t>(errors_ms.size() / 2),
                    errors_ms.end());
   // Resolution of the samples, and a busy machine that delays device and driver.
   EXPECT_NEAR(errors_ms[errors_ms.size() / 2], 0.0, 22.0);
   EXPECT_EQ(session.health.damaged.get(), 0U);
   EXPECT_EQ(session.health.lost.get(), 0U);
+}
+
+TEST_P(OverATerminal, RespirationComesSampleForSampleWithTheEcg) {
+  Session session(GetParam(), {});
+  const auto wanted = static_cast<std::uint64_t>(GetParam().rate_hz);
+  ASSERT_TRUE(wait_until([&] { return session.health.samples.get() >= wanted; })) << session.health.reason();
+  std::map<std::uint32_t, std::pair<float, Instant>> breaths;
+  for (const RespirationBlock& block : session.breaths()) {
+    for (std::uint32_t i = 0; i < block.count; ++i) {
+      breaths[block.device_sequence + i] = {block.values[i], block.first_sample_time + i * block.sample_period};
+    }
+  }
+  if (GetParam().full_breath == 0.0F) {
+    EXPECT_TRUE(breaths.empty());
+    return;
+  }
+  std::size_t compared = 0;
+  for (const EcgBlock& block : session.blocks()) {
+    for (std::uint32_t i = 0; i < block.count; ++i) {
+      const auto breath = breaths.find(block.device_sequence + i);
+      if (breath == breaths.end()) continue;  // given after the others were asked for
+      ++compared;
+      EXPECT_EQ(block.first_sample_time + i * block.sample_period, breath->second.second);
+      EXPECT_NEAR(breath->second.first / GetParam().full_breath, block.mV[i], 0.005);
+    }
+  }
+  EXPECT_GE(compared, wanted);
 }
 
 TEST_P(OverATerminal, UnpluggedAndPluggedInAgainItGoesOn) {

@@ -134,6 +134,7 @@ void fill(Filler& next, perimap_PhaseClock& s) {
   next(s.locked_filling_ns);
   next(s.locked_systole_phase_rad);
   next(s.locked_filling_phase_rad);
+  next(s.law_probabilities);
 }
 
 void fill(Filler& next, perimap_RespiratoryClock& s) {
@@ -434,7 +435,8 @@ json to_json(const perimap_PhaseClock& s) {
           MEMBER(locked_systole_ns),
           MEMBER(locked_filling_ns),
           MEMBER(locked_systole_phase_rad),
-          MEMBER(locked_filling_phase_rad)};
+          MEMBER(locked_filling_phase_rad),
+          MEMBER(law_probabilities)};
 }
 template <>
 json to_json(const perimap_RespiratoryClock& s) {
