@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/bench/table.hpp"
 #include "daemon/report/html_page.hpp"
 #include "daemon/report/svg_plot.hpp"
 
@@ -16,14 +17,11 @@ using Json = nlohmann::ordered_json;
 
 double us(Duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
 
-Json json_of(const Figures& f) {
+// Of Figures, and of a LatencyHistogram's Summary.
+template <class F>
+Json json_of(const F& f) {
   return {
       {"count", f.count}, {"p50_us", us(f.p50)}, {"p99_us", us(f.p99)}, {"p999_us", us(f.p999)}, {"max_us", us(f.max)}};
-}
-
-Json json_of(const LatencyHistogram::Summary& s) {
-  return {
-      {"count", s.count}, {"p50_us", us(s.p50)}, {"p99_us", us(s.p99)}, {"p999_us", us(s.p999)}, {"max_us", us(s.max)}};
 }
 
 Json with_share(const Figures& f) {
@@ -32,7 +30,7 @@ Json with_share(const Figures& f) {
   return json;
 }
 
-Json json_of(const LiveResult& result) {
+Json json_of_run(const LiveResult& result) {
   const LiveCase& c = result.live_case;
   Json json = {{"part", c.part},
                {"name", c.name},
@@ -73,25 +71,15 @@ Json json_of(const LiveResult& result) {
   return json;
 }
 
-// A table: its heading and its rows, all of as many cells.
-struct Table {
-  std::string title;
-  std::string note;
-  std::vector<std::string> head;
-  std::vector<std::vector<std::string>> rows;
-};
-
+std::string name_of(const LiveCase& c) { return c.part + ": " + c.name; }
 std::string share(double value) { return fmt::format("{:.2f} %", 100.0 * value); }
 std::string in_us(Duration d) { return fmt::format("{:.1f}", us(d)); }
 std::string in_ms(Duration d) { return fmt::format("{:.2f}", us(d) / 1e3); }
 
 std::string ratio(double a, double b) { return b > 0.0 ? fmt::format("{:.1f}", a / b) : "-"; }
 
-std::vector<std::string> cells(std::string name, const LatencyHistogram::Summary& s) {
-  return {std::move(name), std::to_string(s.count), in_us(s.p50), in_us(s.p99), in_us(s.p999), in_us(s.max)};
-}
-
-std::vector<std::string> cells(std::string name, const Figures& f) {
+template <class F>
+std::vector<std::string> cells(std::string name, const F& f) {
   return {std::move(name), std::to_string(f.count), in_us(f.p50), in_us(f.p99), in_us(f.p999), in_us(f.max)};
 }
 
@@ -106,7 +94,7 @@ Table releases_table(const BenchReport& report) {
                 "p99.9", "on time",  "missing", "late updates",    "load before"};
   for (const LiveResult& result : report.live) {
     const LiveFigures& f = result.figures;
-    const std::string name = result.live_case.part + ": " + result.live_case.name;
+    const std::string name = name_of(result.live_case);
     if (f.sent == 0) {
       std::vector<std::string> row(table.head.size(), "-");
       row[0] = name + " (" + (result.not_run.empty() ? "nothing was released" : result.not_run) + ")";
@@ -146,12 +134,12 @@ Table receipt_table(const BenchReport& report) {
   for (const LiveResult& result : report.live) {
     const LiveFigures& f = result.figures;
     if (f.sent == 0) continue;
-    table.rows.push_back({result.live_case.part + ": " + result.live_case.name, std::to_string(f.surface_bytes),
-                          in_ms(f.capture_to_release.p50), in_ms(f.capture_to_release.p99),
-                          in_ms(f.capture_to_receipt.p50), in_ms(f.capture_to_receipt.p99),
-                          in_ms(f.capture_to_receipt.max), in_us(f.write_to_receipt.p50), in_us(f.write_to_receipt.p99),
-                          in_us(f.write_to_receipt.p999), in_us(f.write_to_receipt.max), in_us(f.dds_write.p50),
-                          in_us(f.dds_write.p99), in_us(f.dds_write.max)});
+    table.rows.push_back({name_of(result.live_case), std::to_string(f.surface_bytes), in_ms(f.capture_to_release.p50),
+                          in_ms(f.capture_to_release.p99), in_ms(f.capture_to_receipt.p50),
+                          in_ms(f.capture_to_receipt.p99), in_ms(f.capture_to_receipt.max),
+                          in_us(f.write_to_receipt.p50), in_us(f.write_to_receipt.p99), in_us(f.write_to_receipt.p999),
+                          in_us(f.write_to_receipt.max), in_us(f.dds_write.p50), in_us(f.dds_write.p99),
+                          in_us(f.dds_write.max)});
   }
   return table;
 }
@@ -164,7 +152,7 @@ Table stages_table(const BenchReport& report) {
   for (const LiveResult& result : report.live) {
     const LiveFigures& f = result.figures;
     if (f.sent == 0) continue;
-    const std::string run = result.live_case.part + ": " + result.live_case.name + ", ";
+    const std::string run = name_of(result.live_case) + ", ";
     for (const StageFigures& stage : f.stages) table.rows.push_back(cells(run + stage.name, stage.summary));
     table.rows.push_back(cells(run + "release", f.tardiness));
     table.rows.push_back(cells(run + "dds_write", f.dds_write));
@@ -289,43 +277,11 @@ const std::vector<std::string>& not_proven() {
   return lines;
 }
 
-std::string text_of(const Table& table) {
-  std::vector<std::size_t> widths;
-  for (const std::string& cell : table.head) widths.push_back(cell.size());
-  for (const auto& row : table.rows) {
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  }
-  std::string out = table.title + "\n";
-  const auto line = [&](const std::vector<std::string>& row) {
-    out += fmt::format("{:<{}}", row[0], widths[0]);
-    for (std::size_t i = 1; i < row.size(); ++i) out += fmt::format("  {:>{}}", row[i], widths[i]);
-    out += '\n';
-  };
-  line(table.head);
-  for (const auto& row : table.rows) line(row);
-  if (!table.note.empty()) out += table.note + "\n";
-  return out + "\n";
-}
-
-std::string html_of(const Table& table) {
-  std::string out = "<h2>" + escaped(table.title) + "</h2>\n<table><tr>";
-  for (const std::string& cell : table.head) out += "<th>" + escaped(cell) + "</th>";
-  out += "</tr>\n";
-  for (const auto& row : table.rows) {
-    out += "<tr>";
-    for (const std::string& cell : row) out += "<td>" + escaped(cell) + "</td>";
-    out += "</tr>\n";
-  }
-  return out + "</table>\n<p>" + escaped(table.note) + "</p>\n";
-}
-
 }  // namespace
 
 std::string to_table(const BenchReport& report) {
   std::string out = machine_line(report.machine) + "\n" + setting_line(report) + "\n\n";
-  for (const Table& table : tables(report)) {
-    if (!table.rows.empty()) out += text_of(table);
-  }
+  for (const Table& table : tables(report)) out += text_of(table);
   out += "What these figures do not prove:\n";
   for (const std::string& line : not_proven()) out += "- " + line + "\n";
   return out;
@@ -350,7 +306,7 @@ Json to_json(const BenchReport& report) {
                  {"build", m.build}}},
                {"not_proven", not_proven()}};
   json["live"] = Json::array();
-  for (const LiveResult& result : report.live) json["live"].push_back(json_of(result));
+  for (const LiveResult& result : report.live) json["live"].push_back(json_of_run(result));
   json["ddsperf"] = Json::array();
   for (const DdsperfResult& one : report.ddsperf) {
     Json entry = {{"beside", one.beside}, {"bytes", one.bytes}};
@@ -386,9 +342,7 @@ Json to_json(const BenchReport& report) {
 std::string to_html(const BenchReport& report) {
   std::string out =
       fmt::format("<p>{}</p>\n<p>{}</p>\n", escaped(machine_line(report.machine)), escaped(setting_line(report)));
-  for (const Table& table : tables(report)) {
-    if (!table.rows.empty()) out += html_of(table);
-  }
+  for (const Table& table : tables(report)) out += html_of(table);
   if (!report.cost.empty() || report.memory) out += svg_document(plots(report), "");
   out += "<h2>What these figures do not prove</h2>\n<ul>\n";
   for (const std::string& line : not_proven()) out += "<li>" + escaped(line) + "</li>\n";

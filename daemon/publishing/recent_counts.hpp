@@ -33,11 +33,12 @@ struct StatusSource {
   perimap_SourceKind kind;
   Counter PipelineCounters::*received;
 };
-inline constexpr std::array<StatusSource, 4> kStatusSources = {
+inline constexpr std::array<StatusSource, 5> kStatusSources = {
     {{perimap_SOURCE_CAMERA, &PipelineCounters::frames_received},
      {perimap_SOURCE_TRACKER, &PipelineCounters::poses_received},
      {perimap_SOURCE_ECG, &PipelineCounters::ecg_samples},
-     {perimap_SOURCE_R_TRIGGER, &PipelineCounters::r_triggers}}};
+     {perimap_SOURCE_R_TRIGGER, &PipelineCounters::r_triggers},
+     {perimap_SOURCE_RESPIRATION, &PipelineCounters::respiration_samples}}};
 
 // The counts at one moment.
 struct CountsThen {

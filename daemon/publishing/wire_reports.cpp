@@ -70,31 +70,9 @@ perimap_PhaseClock to_wire(const CardiacClock& clock, Instant now) noexcept {
   wire.locked_filling_ns = from_seconds(locked.filling.count()).count();
   wire.locked_systole_phase_rad = clock.law().locked_systole_phase_rad;
   wire.locked_filling_phase_rad = clock.law().locked_filling_phase_rad;
+  const LawBelief& belief = clock.law_belief();
+  std::copy(belief.probabilities.begin(), belief.probabilities.end(), wire.law_probabilities);
   return wire;
-}
-
-perimap_RespirationState to_wire(RespirationState state) noexcept {
-  switch (state) {
-    case RespirationState::kSearching:
-      return perimap_RESPIRATION_SEARCHING;
-    case RespirationState::kLocked:
-      return perimap_RESPIRATION_LOCKED;
-    case RespirationState::kOff:
-      break;
-  }
-  return perimap_RESPIRATION_OFF;
-}
-
-perimap_RespirationSource to_wire(RespirationSource source) noexcept {
-  switch (source) {
-    case RespirationSource::kImage:
-      return perimap_RESPIRATION_SOURCE_IMAGE;
-    case RespirationSource::kChannel:
-      return perimap_RESPIRATION_SOURCE_CHANNEL;
-    case RespirationSource::kNone:
-      break;
-  }
-  return perimap_RESPIRATION_SOURCE_NONE;
 }
 
 perimap_RespiratoryClock to_wire(const RespiratoryClock& clock, Instant now) noexcept {
@@ -140,29 +118,38 @@ void name(Message& message, const Identity& identity) noexcept {
 // A trigger gives one pulse a beat.
 constexpr Duration kLongestBeat = std::chrono::seconds(3);
 
-perimap_SourceStatus source_status(perimap_SourceKind kind, const StatusFacts& facts, const SourceLink& link,
-                                   Instant now, std::uint64_t received, std::uint64_t dropped, std::uint64_t invalid,
-                                   const Counter& last_ns, const Counter& last_good_ns,
-                                   const LatencyHistogram& delay) noexcept {
-  const LatencyHistogram::Summary summary = delay.summary();
-  const auto last = static_cast<std::int64_t>(last_ns.get());
+// What the pipeline has counted of one source.
+struct SourceCounts {
+  std::uint64_t received = 0;
+  std::uint64_t dropped = 0;
+  std::uint64_t invalid = 0;
+  const Counter& last_ns;
+  const Counter& last_good_ns;
+  const LatencyHistogram& delay;
+};
+
+// `ended`: of a recording. `stalled_after`: silent for longer, it counts as stalled.
+perimap_SourceStatus source_status(perimap_SourceKind kind, const SourceCounts& counts, const SourceLink& link,
+                                   Instant now, bool ended, Duration stalled_after) noexcept {
+  const LatencyHistogram::Summary summary = counts.delay.summary();
+  const auto last = static_cast<std::int64_t>(counts.last_ns.get());
   perimap_SourceStatus wire{};
   wire.kind = kind;
   wire.state = perimap_SOURCE_OK;
   if (link.closed) {
     wire.state = perimap_SOURCE_CLOSED;
-  } else if (received == 0) {
+  } else if (counts.received == 0) {
     wire.state = perimap_SOURCE_STARTING;
-  } else if (facts.sources_ended) {
+  } else if (ended) {
     wire.state = perimap_SOURCE_ENDED;
-  } else if (now - from_ns(last) > facts.stalled_after) {
+  } else if (now - from_ns(last) > stalled_after) {
     wire.state = perimap_SOURCE_STALLED;
   }
-  wire.received = received;
-  wire.dropped = dropped;
-  wire.invalid = invalid;
+  wire.received = counts.received;
+  wire.dropped = counts.dropped;
+  wire.invalid = counts.invalid;
   wire.last_source_time_ns = last;
-  wire.last_good_time_ns = static_cast<std::int64_t>(last_good_ns.get());
+  wire.last_good_time_ns = static_cast<std::int64_t>(counts.last_good_ns.get());
   wire.delay_p50_ns = summary.p50.count();
   wire.delay_p99_ns = summary.p99.count();
   wire.delay_max_ns = summary.max.count();
@@ -193,6 +180,30 @@ perimap_StageLatency stage_latency(perimap_StageKind kind, const LatencyHistogra
 }
 
 }  // namespace
+
+perimap_RespirationState to_wire(RespirationState state) noexcept {
+  switch (state) {
+    case RespirationState::kSearching:
+      return perimap_RESPIRATION_SEARCHING;
+    case RespirationState::kLocked:
+      return perimap_RESPIRATION_LOCKED;
+    case RespirationState::kOff:
+      break;
+  }
+  return perimap_RESPIRATION_OFF;
+}
+
+perimap_RespirationSource to_wire(RespirationSource source) noexcept {
+  switch (source) {
+    case RespirationSource::kImage:
+      return perimap_RESPIRATION_SOURCE_IMAGE;
+    case RespirationSource::kChannel:
+      return perimap_RESPIRATION_SOURCE_CHANNEL;
+    case RespirationSource::kNone:
+      break;
+  }
+  return perimap_RESPIRATION_SOURCE_NONE;
+}
 
 WireModel::WireModel(const Identity& identity) {
   name(wire_, identity);
@@ -328,22 +339,34 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.latency_short = facts.latency_short;
 
   std::uint32_t sources = 0;
-  sources_[sources++] = source_status(perimap_SOURCE_CAMERA, facts, facts.camera, now, c.frames_received.get(),
-                                      c.frames_dropped.get(), 0, c.last_frame_ns, c.last_frame_ns, c.camera_delay);
-  sources_[sources++] = source_status(perimap_SOURCE_TRACKER, facts, facts.tracker, now, c.poses_received.get(),
-                                      c.poses_dropped.get() + c.poses_refused.get(), c.poses_invalid.get(),
-                                      c.last_pose_ns, c.last_good_pose_ns, c.tracker_delay);
+  const auto tell = [&](perimap_SourceKind kind, const SourceLink& link, const SourceCounts& counts,
+                        Duration stalled_after) {
+    sources_[sources++] = source_status(kind, counts, link, now, facts.sources_ended, stalled_after);
+  };
+  const Duration stalled = facts.stalled_after;
+  tell(perimap_SOURCE_CAMERA, facts.camera,
+       {c.frames_received.get(), c.frames_dropped.get(), 0, c.last_frame_ns, c.last_frame_ns, c.camera_delay}, stalled);
+  tell(perimap_SOURCE_TRACKER, facts.tracker,
+       {c.poses_received.get(), c.poses_dropped.get() + c.poses_refused.get(), c.poses_invalid.get(), c.last_pose_ns,
+        c.last_good_pose_ns, c.tracker_delay},
+       stalled);
   if (facts.ecg_device) {
-    sources_[sources++] =
-        source_status(perimap_SOURCE_ECG, facts, facts.ecg, now, c.ecg_samples.get(), c.ecg_dropped.get(),
-                      c.ecg_lead_off.get(), c.last_ecg_ns, c.last_good_ecg_ns, c.ecg_delay);
+    tell(perimap_SOURCE_ECG, facts.ecg,
+         {c.ecg_samples.get(), c.ecg_dropped.get(), c.ecg_lead_off.get(), c.last_ecg_ns, c.last_good_ecg_ns,
+          c.ecg_delay},
+         stalled);
   }
   if (facts.r_trigger) {
-    StatusFacts beats = facts;
-    beats.stalled_after = std::max(facts.stalled_after, kLongestBeat);
-    sources_[sources++] =
-        source_status(perimap_SOURCE_R_TRIGGER, beats, facts.r_trigger_line, now, c.r_triggers.get(),
-                      c.r_triggers_dropped.get(), 0, c.last_r_trigger_ns, c.last_r_trigger_ns, c.r_trigger_delay);
+    tell(perimap_SOURCE_R_TRIGGER, facts.r_trigger_line,
+         {c.r_triggers.get(), c.r_triggers_dropped.get(), 0, c.last_r_trigger_ns, c.last_r_trigger_ns,
+          c.r_trigger_delay},
+         std::max(stalled, kLongestBeat));
+  }
+  if (facts.respiration_channel) {
+    tell(perimap_SOURCE_RESPIRATION, facts.respiration_link,
+         {c.respiration_samples.get(), c.respiration_dropped.get(), c.respiration_off.get(), c.last_respiration_ns,
+          c.last_good_respiration_ns, c.respiration_delay},
+         stalled);
   }
   wire_.sources = {sources, sources, sources_, false};
 

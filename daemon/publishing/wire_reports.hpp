@@ -30,6 +30,9 @@ struct ModelMoment {
   Duration validity{0};  // nothing is said of instants further ahead
 };
 
+[[nodiscard]] perimap_RespirationState to_wire(RespirationState state) noexcept;
+[[nodiscard]] perimap_RespirationSource to_wire(RespirationSource source) noexcept;
+
 // Owns the buffers that its message points to.
 class WireModel {
  public:
@@ -84,11 +87,13 @@ struct StatusFacts {
   RecordingFacts recording;
   PhaseState phase = PhaseState::kUnknown;
   Rhythm rhythm = Rhythm::kUnknown;
-  bool latency_short = false;                       // see idl/perimap.idl
-  bool r_trigger = false;                           // R peaks come from a trigger line
-  bool ecg_device = true;                           // beside the trigger there need be none
-  SourceLink camera, tracker, ecg, r_trigger_line;  // as they are without a device: open, and without jitter
-  const RecentCounts* recent = nullptr;             // none: nothing is told of the last seconds
+  bool latency_short = false;        // see idl/perimap.idl
+  bool r_trigger = false;            // R peaks come from a trigger line
+  bool ecg_device = true;            // beside the trigger there need be none
+  bool respiration_channel = false;  // one is listened to, or a device has one
+  // As they are without a device: open, and without jitter.
+  SourceLink camera, tracker, ecg, r_trigger_line, respiration_link;
+  const RecentCounts* recent = nullptr;  // none: nothing is told of the last seconds
 };
 
 class WireStatus {
