@@ -23,6 +23,8 @@ constexpr int kSuspectedInARow = 2;  // searches: what a young map gets wrong co
 constexpr Duration kSuspicionLasts = std::chrono::seconds(15);
 constexpr Duration kContradictedBeforeSearch = std::chrono::milliseconds(1500);
 constexpr Duration kSilentBeforeSearch = std::chrono::seconds(15);
+// Of a phase to go on from: beyond it the wave is no straight line, and the images may agree with a wrong phase.
+constexpr double kLargestRecalledDeviation_rad = 0.5;
 
 }  // namespace
 
@@ -128,10 +130,42 @@ void RespiratoryTracker::predict(Instant t) noexcept {
   if (!(dt > 0.0)) return;
   clock_.time = t;
   clock_.phase_rad = std::remainder(clock_.phase_rad + clock_.rate_rad_per_s * dt, kTwoPi);
+  // The rate's walk, once and twice integrated, matters after a restart, when dt is seconds.
+  const double rate_walk = dt * kRateWalk_rad2_per_s3;
   clock_.phase_variance_rad2 +=
-      dt * (2.0 * clock_.covariance_rad2_per_s + dt * clock_.rate_variance_rad2_per_s2) + dt * kPhaseWalk_rad2_per_s;
-  clock_.covariance_rad2_per_s += dt * clock_.rate_variance_rad2_per_s2;
-  clock_.rate_variance_rad2_per_s2 += dt * kRateWalk_rad2_per_s3;
+      dt * (2.0 * clock_.covariance_rad2_per_s + dt * (clock_.rate_variance_rad2_per_s2 + rate_walk / 3.0) +
+            kPhaseWalk_rad2_per_s);
+  clock_.covariance_rad2_per_s += dt * (clock_.rate_variance_rad2_per_s2 + rate_walk / 2.0);
+  clock_.rate_variance_rad2_per_s2 += rate_walk;
+}
+
+bool RespiratoryTracker::rate_is_possible() const noexcept {
+  const double fastest = kTwoPi / to_seconds(settings_.search.shortest_period);
+  const double slowest = kTwoPi / to_seconds(settings_.search.longest_period);
+  return clock_.rate_rad_per_s < 1.5 * fastest && clock_.rate_rad_per_s > slowest / 1.5;
+}
+
+void RespiratoryTracker::recall(const RespirationMemory& memory, Instant now) noexcept {
+  last_agreed_ = last_told_ = now;
+  if (!settings_.enabled) {
+    clock_.suspected = memory.clock.suspected;
+    return;
+  }
+  if (!memory.found) return;
+  locks_ = 1;
+  wave_ = memory.wave;
+  offset_known_ = memory.offset_known;
+  offset_rad_ = memory.offset_rad;
+  if (memory.clock.state != RespirationState::kLocked) return;
+  const double unknown_displacement_mm = clock_.unknown_displacement_mm;
+  clock_ = memory.clock;
+  clock_.source = RespirationSource::kImage;
+  clock_.slope_mm_per_rad = wave_.slope_mm_per_rad() / std::numbers::sqrt3;
+  clock_.unknown_displacement_mm = unknown_displacement_mm;
+  clock_.suspected = false;
+  predict(now);
+  constexpr double kLargestVariance_rad2 = kLargestRecalledDeviation_rad * kLargestRecalledDeviation_rad;
+  if (!(clock_.phase_variance_rad2 < kLargestVariance_rad2) || !rate_is_possible()) lose();
 }
 
 void RespiratoryTracker::add_phase(Instant t, double phase_rad, double deviation_rad) noexcept {
@@ -152,9 +186,7 @@ void RespiratoryTracker::add_phase(Instant t, double phase_rad, double deviation
   clock_.rate_variance_rad2_per_s2 -= K_rate * clock_.covariance_rad2_per_s;
   clock_.covariance_rad2_per_s *= 1.0 - K_phase;
   clock_.phase_variance_rad2 *= 1.0 - K_phase;
-  const double fastest = kTwoPi / to_seconds(settings_.search.shortest_period);
-  const double slowest = kTwoPi / to_seconds(settings_.search.longest_period);
-  if (!(clock_.rate_rad_per_s < 1.5 * fastest && clock_.rate_rad_per_s > slowest / 1.5)) lose();
+  if (!rate_is_possible()) lose();
 }
 
 void RespiratoryTracker::add_contradiction(Instant t) noexcept {

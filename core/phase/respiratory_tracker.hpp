@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include "core/phase/breath_detector.hpp"
+#include "core/phase/respiration_memory.hpp"
 #include "core/phase/respiration_search.hpp"
 #include "core/phase/respiratory_clock.hpp"
 #include "core/time/instant.hpp"
@@ -45,6 +46,15 @@ class RespiratoryTracker {
   // Looks for breathing in what was added; takes some milliseconds.
   void search(Instant now) noexcept;
 
+  // What another tracker goes on from.
+  [[nodiscard]] RespirationMemory memory() const noexcept {
+    return {locks_ > 0, wave_, clock_, offset_known_, offset_rad_};
+  }
+  // Before anything was added: goes on from what an earlier run knew, its phase carried on to `now` with the deviation
+  // that it has got by then. Where that is too large, or the rate is none that is looked for, the phase is searched for
+  // and counted as then; a suspicion stands, for as long as any.
+  void recall(const RespirationMemory& memory, Instant now) noexcept;
+
   [[nodiscard]] const RespiratoryClock& clock() const noexcept { return clock_; }
   // Of the lock: the common displacement in the clock's phase.
   [[nodiscard]] const BreathWave& wave() const noexcept { return wave_; }
@@ -52,6 +62,7 @@ class RespiratoryTracker {
 
  private:
   void predict(Instant t) noexcept;
+  [[nodiscard]] bool rate_is_possible() const noexcept;
   void suspect(const FoundBreath& found, Instant now) noexcept;
   void lose() noexcept;
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/estimation/feature_estimate.hpp"
+#include "core/phase/respiration_memory.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/time/instant.hpp"
 #include "core/vision/patch_template.hpp"
@@ -24,10 +25,12 @@ struct FeatureMemory {
   bool converged = false;
   double largest_deviation_mm = 0.0;
   FeatureEstimate estimate;  // with what a slow error of the tracker adds to its covariance
+  bool breathing = false;    // breathing had begun: it is in the estimate, in the phase of RespirationMemory
 };
 
 struct MapMemory {
   std::vector<FeatureMemory> features;
+  RespirationMemory respiration;
   // The last seconds of the ECG. Heard again they teach detector, classes and clock what they knew.
   std::vector<EcgBlock> ecg;
   // Of the last release, from which the frame times go on.

@@ -17,6 +17,8 @@ constexpr std::uint64_t kDisplacementInterval = 3;
 // How well a frame tells the common displacement while the map is young, and how fast breathing changes it.
 constexpr double kDisplacementDeviation_mm = 1.0;
 constexpr double kDisplacementRate_mm_per_s = 15.0;
+// What an earlier run found after it was last kept was published by ids that are not known: they are not given again.
+constexpr std::uint32_t kIdsLeftOut = 10'000;
 
 }  // namespace
 
@@ -36,6 +38,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       respiration_(settings.respiration),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())}),
+      motion_(slots.size()),
       cycle_(settings.image_alone),
       tallies_(static_cast<std::size_t>(team.size())) {
   occupied_.reserve(slots.size());
@@ -57,7 +60,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
     if (ecg_clock.beats() != beats_ && law_.on_beat(ecg_clock)) {
       for (FeatureGroup& group : groups_) group.doubt();
     }
-    ecg_clock = ecg_clock.with_law(law_.law());
+    ecg_clock = ecg_clock.with_law(law_.belief());
   }
   finish_learning();
   const Instant begun = MonotonicClock::now();
@@ -92,6 +95,9 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   const Instant joined = MonotonicClock::now();
   team_.run(&run_stage<&Mapper::evaluate_shard>, this);
   const Instant evaluated = MonotonicClock::now();
+  note_motion(frame);
+  team_.run(&run_stage<&Mapper::follow_shard>, this);
+  const Instant followed = MonotonicClock::now();
 
   offer_to_finder(frame, image);
   fill_feed();
@@ -99,7 +105,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   counters_.predict_and_find.add(found - begun);
   counters_.phase_and_pose.add(joined - found);
   counters_.evaluate.add(evaluated - joined);
-  computed_before_learning_ = evaluated - begun;
+  computed_before_learning_ = followed - begun;
   // In lockstep the capture lies on the recording's clock, not on this machine's.
   if (!settings_.lockstep) counters_.capture_to_update.add(evaluated - stamp.capture);
   counters_.frames.add();
@@ -118,12 +124,24 @@ void Mapper::expect_displacement(FrameRecord& frame) const noexcept {
   frame.displacement_deviation_mm = deviation_mm;
 }
 
+// Where the features that are believed so far were in the frame before, and are now.
+void Mapper::note_motion(const FrameRecord& frame) noexcept {
+  motion_.clear();
+  for (const FeatureSlot& slot : slots_) {
+    const bool in_both = slot.match.state == MatchState::kFound && slot.last_found_frame + 1 == frame.index;
+    if (slot.state != SlotState::kEmpty && in_both) motion_.add(slot.patch_state.px, slot.match.px);
+  }
+  job_.motion = &motion_;
+}
+
 // B. What the correction changes is the time to come: the publisher evaluates with it, and so does the next frame's A.
 void Mapper::settle_phases(const FrameRecord& frame) noexcept {
   const bool breath_known = frame.respiration.known;
   bool breath_told = false;
+  job_.shared_pose = nullptr;
   if (settings_.phase_from_image || breath_known) {
     const ImagePhases seen = image_phase_.observe(groups_, frame, model_, settings_.estimator);
+    job_.shared_pose = image_phase_.shared_pose();
     if (settings_.phase_from_image) settle_cardiac_phase(seen.cardiac);
     if (breath_known && seen.respiratory.outcome == ImagePhaseOutcome::kObserved) {
       const ObservedPhase& breath = seen.respiratory.observed;
@@ -160,7 +178,7 @@ void Mapper::settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept {
       break;
   }
   CycleCorrection correction = cycle_.correction();
-  if (settings_.law_from_image) correction.law = law_.law();
+  if (settings_.law_from_image) correction.law = law_.belief();
   phase_cells_.publisher_correction.write(correction);
   phase_cells_.status_correction.write(correction);
 }
@@ -202,7 +220,9 @@ void Mapper::forget() noexcept {
   counters_.maps_forgotten.add();
 }
 
-void Mapper::recall(const MapMemory& memory) {
+void Mapper::recall(const MapMemory& memory, Instant now) {
+  respiration_.recall(memory.respiration, now);
+  breath_begun_ = respiration_.locks() > 0;
   std::size_t index = 0;
   for (const FeatureMemory& feature : memory.features) {
     if (index >= slots_.size()) break;
@@ -216,15 +236,18 @@ void Mapper::recall(const MapMemory& memory) {
     slot.last_learnt = feature.last_observed;
     slot.patch = feature.patch;
     slot.patch_state = feature.patch_state;
+    slot.carried_px = feature.patch_state.px;
     // So long before the first frame that the map alone tells where to look; the difference of the counts is what
     // matters, and wraps.
-    slot.last_found_frame = std::uint64_t{0} - (kTrackedMissesAllowed + 1);
+    slot.last_found_frame = std::uint64_t{0} - (kCarriedMissesAllowed + 1);
     slot.updates = feature.updates;
     slot.converged = feature.converged;
     slot.recalled_converged = feature.converged;
     slot.largest_deviation_mm = feature.largest_deviation_mm;
     bank_.set(static_cast<int>(index), feature.estimate);
-    next_id_ = std::max(next_id_, feature.id + 1);
+    // Taken before breathing was found, and not again since.
+    if (breath_begun_ && !feature.breathing) groups_[index / kLanes].begin_breath(index % kLanes, respiration_.wave());
+    next_id_ = std::max(next_id_, feature.id + kIdsLeftOut);
     ++index;
   }
   constexpr auto kNoRelease = std::numeric_limits<std::uint64_t>::max();
@@ -247,16 +270,19 @@ void Mapper::recall(const MapMemory& memory) {
       cell->publish();
     }
   }
+  phase_cells_.publisher_respiration.write(respiration_.clock());
+  phase_cells_.status_respiration.write(respiration_.clock());
 }
 
 // Before the workers learn from the frame, while they are at rest.
 void Mapper::fill_feed() noexcept {
-  const std::span<MapFeed::Entry> entries = feed_.back();
-  if (entries.empty()) return;
-  for (MapFeed::Entry& entry : entries) {
+  MapFeed::Batch* batch = feed_.back();
+  if (batch == nullptr) return;
+  batch->maps_forgotten = counters_.maps_forgotten.get();
+  batch->respiration = respiration_.memory();
+  for (MapFeed::Entry& entry : batch->entries) {
     entry.slot = next_fed_slot_;
     next_fed_slot_ = (next_fed_slot_ + 1) % slots_.size();
-    entry.maps_forgotten = counters_.maps_forgotten.get();
     const FeatureSlot& slot = slots_[entry.slot];
     entry.mapped = slot.state == SlotState::kMapped && slot.health.state() != HealthState::kInconsistent;
     if (!entry.mapped) continue;
@@ -272,6 +298,7 @@ void Mapper::fill_feed() noexcept {
     feature.largest_deviation_mm = slot.largest_deviation_mm;
     bank_.get(static_cast<int>(entry.slot), feature.estimate);
     if (slot.slow_error != nullptr) feature.estimate.P += slot.slow_error->covariance();
+    feature.breathing = breath_begun_;
   }
   feed_.hand_over();
 }
@@ -373,6 +400,16 @@ void Mapper::evaluate_shard(int worker) noexcept {
   cells.model.publish();
 }
 
+void Mapper::follow_shard(int worker) noexcept {
+  const RealtimeScope realtime;
+  for (auto g = static_cast<std::size_t>(worker); g < groups_.size(); g += tallies_.size()) {
+    FeatureGroup& group = groups_[g];
+    for (std::size_t lane = 0; lane < group.slots().size(); ++lane) {
+      follow(group.slots()[lane], group.prediction(lane), job_, model_, settings_);
+    }
+  }
+}
+
 void Mapper::learn_shard(int worker) noexcept {
   const RealtimeScope realtime;
   WorkerTally& tally = tallies_[static_cast<std::size_t>(worker)];
@@ -427,6 +464,7 @@ void Mapper::adopt_found_features(std::uint64_t frame_index) noexcept {
     slot->first_observed_px = found.first_observed_px;
     slot->patch = found.patch;
     slot->patch_state = found.patch_state;
+    slot->carried_px = found.patch_state.px;
     slot->looks = found.looks;
     slot->velocity_px = found.velocity_px;
     slot->last_found_frame = frame_index - 1;

@@ -28,6 +28,7 @@
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/sensors/tracker_sample.hpp"
+#include "core/vision/neighbour_motion.hpp"
 #include "core/vision/patch_tracker.hpp"
 
 namespace perimap {
@@ -59,9 +60,9 @@ class Mapper {
   void forget() noexcept;
 
   // Before the first frame: takes the features of an earlier run, as many as there is room for and whose estimates are
-  // of this layout, and publishes them.
-  void recall(const MapMemory& memory);
-  // The mapped features, for whoever keeps them.
+  // of this layout, and what it knew of breathing, carried on to `now`; and publishes them.
+  void recall(const MapMemory& memory, Instant now);
+  // The mapped features and the breathing, for whoever keeps them.
   [[nodiscard]] MapFeed& feed() noexcept { return feed_; }
 
  private:
@@ -72,12 +73,14 @@ class Mapper {
   void predict_and_find_shard(int worker) noexcept;
   void predict_releases(const FrameRecord& frame, const CardiacClock& clock) noexcept;
   void evaluate_shard(int worker) noexcept;
+  void follow_shard(int worker) noexcept;
   void learn_shard(int worker) noexcept;
   void advance_slot(FeatureGroup& group, std::size_t lane, int worker) noexcept;
   void finish_learning() noexcept;
   void expect_displacement(FrameRecord& frame) const noexcept;
   void settle_phases(const FrameRecord& frame) noexcept;
   void settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept;
+  void note_motion(const FrameRecord& frame) noexcept;
   void publish_nothing() noexcept;
   void fill_feed() noexcept;
   void adopt_found_features(std::uint64_t frame_index) noexcept;
@@ -112,6 +115,7 @@ class Mapper {
   FeatureBank<double> bank_;
   std::vector<FeatureGroup> groups_;
   ImagePhase image_phase_;
+  NeighbourMotion motion_;
   CyclePosterior cycle_;
   LawChoice law_;
   FrameJob job_;
@@ -121,7 +125,7 @@ class Mapper {
   std::uint32_t next_id_ = 1;
   Instant last_capture_;
   Instant learn_started_;
-  Duration computed_before_learning_{0};  // A to C of the frame that is being learnt from
+  Duration computed_before_learning_{0};  // A to C and the rest of the search, of the frame that is being learnt from
   MapFeed feed_;
   std::size_t next_fed_slot_ = 0;
 };

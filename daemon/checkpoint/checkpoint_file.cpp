@@ -22,7 +22,8 @@ namespace perimap {
 namespace {
 
 constexpr std::string_view kMagic = "PERIMAPC";
-constexpr std::uint32_t kFormat = 1;
+// 2: with breathing.
+constexpr std::uint32_t kFormat = 2;
 constexpr std::size_t kHeader = 16;
 constexpr std::size_t kLongestText = 4096;
 constexpr std::uint32_t kMostFeatures = 4096;
@@ -87,7 +88,18 @@ class Reader {
     expect(true, what);
     return value;
   }
-  Instant instant(std::string_view what) { return from_ns(number<std::int64_t>(what)); }
+  // So bounded that sums and differences of two are instants too.
+  Instant instant(std::string_view what) {
+    constexpr std::int64_t kFurthest = std::int64_t{1} << 61;
+    const auto ns = number<std::int64_t>(what);
+    expect(ns >= -kFurthest && ns <= kFurthest, what);
+    return from_ns(good() ? ns : 0);
+  }
+  bool flag(std::string_view what) {
+    const auto byte = number<std::uint8_t>(what);
+    expect(byte <= 1, what);
+    return good() && byte == 1;
+  }
   std::uint32_t count(std::uint32_t most, std::size_t least_bytes_each, std::string_view what) {
     const auto n = number<std::uint32_t>(what);
     expect(n <= most && n * std::uint64_t{least_bytes_each} <= cursor_.left(), what);
@@ -153,7 +165,8 @@ FeatureMemory read_feature(Reader& in, int state_size) {
     *x = in.number<double>("how it looked when it was last found");
   }
   feature.updates = in.number<std::int32_t>("its updates");
-  feature.converged = in.number<std::uint8_t>("whether it has converged") == 1;
+  feature.converged = in.flag("whether it has converged");
+  feature.breathing = in.flag("whether breathing is in it");
   feature.largest_deviation_mm = in.number<double>("its largest deviation");
   in.expect(feature.updates >= 0 && feature.largest_deviation_mm >= 0.0 && feature.id > 0, "a feature's figures");
   feature.estimate.x.resize(state_size);
@@ -173,12 +186,58 @@ EcgBlock read_block(Reader& in) {
   block.first_sample_time = in.instant("an ECG block's time");
   block.arrival = block.first_sample_time;
   block.sample_period = Duration(in.number<std::int64_t>("an ECG block's period"));
-  block.lead_off = in.number<std::uint8_t>("whether the lead was off") == 1;
+  block.lead_off = in.flag("whether the lead was off");
   block.count = in.number<std::uint32_t>("an ECG block's samples");
   in.expect(block.count <= EcgBlock::kCapacity && block.sample_period > Duration(0), "an ECG block");
   if (!in.good()) return {};
   for (std::uint32_t i = 0; i < block.count; ++i) block.mV[i] = in.float32("an ECG sample");
   return block;
+}
+
+void add_respiration(Bytes& out, const RespirationMemory& respiration) {
+  out.add(std::uint8_t{respiration.found});
+  for (const auto& coefficients : {respiration.wave.a, respiration.wave.b}) {
+    for (int k = 0; k < kBreathHarmonics; ++k) {
+      for (const double x : coefficients[k]) out.add(x);
+    }
+  }
+  const RespiratoryClock& clock = respiration.clock;
+  out.add(static_cast<std::uint8_t>(clock.state)).add(std::uint8_t{clock.suspected}).add(clock.time);
+  for (const double x : {clock.phase_rad, clock.rate_rad_per_s, clock.phase_variance_rad2, clock.covariance_rad2_per_s,
+                         clock.rate_variance_rad2_per_s2}) {
+    out.add(x);
+  }
+  out.add(std::uint8_t{respiration.offset_known}).add(respiration.offset_rad);
+}
+
+// What is not kept is the new run's own: its settings, and what follows from the wave.
+RespirationMemory read_respiration(Reader& in) {
+  RespirationMemory respiration;
+  respiration.found = in.flag("whether breathing was found");
+  for (auto* coefficients : {respiration.wave.a, respiration.wave.b}) {
+    for (int k = 0; k < kBreathHarmonics; ++k) {
+      for (double& x : coefficients[k]) x = in.number<double>("how breathing displaces the surface");
+    }
+  }
+  RespiratoryClock& clock = respiration.clock;
+  const auto state = in.number<std::uint8_t>("what is known of breathing");
+  in.expect(state <= static_cast<std::uint8_t>(RespirationState::kLocked), "what is known of breathing");
+  if (in.good()) clock.state = static_cast<RespirationState>(state);
+  in.expect(respiration.found || clock.state != RespirationState::kLocked, "what is known of breathing");
+  clock.suspected = in.flag("whether breathing is suspected");
+  clock.time = in.instant("when the breath's phase was known");
+  for (double* x : {&clock.phase_rad, &clock.rate_rad_per_s, &clock.phase_variance_rad2, &clock.covariance_rad2_per_s,
+                    &clock.rate_variance_rad2_per_s2}) {
+    *x = in.number<double>("the breath's phase and rate");
+  }
+  // Rounding may leave a filter's covariance a little beyond.
+  const double square = clock.covariance_rad2_per_s * clock.covariance_rad2_per_s;
+  in.expect(clock.phase_variance_rad2 >= 0.0 && clock.rate_variance_rad2_per_s2 >= 0.0 &&
+                square <= 1.000001 * clock.phase_variance_rad2 * clock.rate_variance_rad2_per_s2,
+            "a covariance of the breath's phase and rate");
+  respiration.offset_known = in.flag("whether the respiration channel was heard");
+  respiration.offset_rad = in.number<double>("where the respiration channel's phase begins");
+  return respiration;
 }
 
 std::string system_message() { return std::generic_category().message(errno); }
@@ -194,7 +253,8 @@ std::string serialize_feature(const FeatureMemory& feature) {
                          state.gain, state.bias}) {
     out.add(x);
   }
-  out.add(std::int32_t{feature.updates}).add(std::uint8_t{feature.converged}).add(feature.largest_deviation_mm);
+  out.add(std::int32_t{feature.updates}).add(std::uint8_t{feature.converged}).add(std::uint8_t{feature.breathing});
+  out.add(feature.largest_deviation_mm);
   const FeatureEstimate& estimate = feature.estimate;
   for (const double x : estimate.x) out.add(x);
   for (Eigen::Index i = 0; i < estimate.P.rows(); ++i) {
@@ -217,8 +277,9 @@ std::string serialize(const Checkpoint& checkpoint, std::span<const std::string>
     body.add(std::uint8_t{block.lead_off}).add(block.count);
     for (const float mV : block.samples()) body.add(mV);
   }
+  add_respiration(body, memory.respiration);
   // Each feature is as long as its state asks for.
-  constexpr std::size_t kRest = 4 + 8 + 16 + 8 + sizeof(PatchTemplate) + 64 + 4 + 1 + 8;
+  constexpr std::size_t kRest = 4 + 8 + 16 + 8 + sizeof(PatchTemplate) + 64 + 4 + 1 + 1 + 8;
   int state_size = 0;
   while (!features.empty() && state_size < kMaxState &&
          kRest + 8 * static_cast<std::size_t>(state_size + state_size * (state_size + 1) / 2) < features[0].size()) {
@@ -239,7 +300,7 @@ Expected<Checkpoint> parse_checkpoint(std::string_view bytes) {
   in.raw(magic.data(), magic.size(), "a checkpoint");
   in.expect(magic == kMagic, "a checkpoint");
   const auto format = in.number<std::uint32_t>("the format");
-  in.expect(format == kFormat, "format 1");
+  in.expect(format == kFormat, fmt::format("format {}; it is of format {}", kFormat, format));
   const auto crc = in.number<std::uint32_t>("a CRC");
   if (!in.good()) return in.error();
   const std::string_view body = bytes.substr(kHeader);
@@ -263,6 +324,7 @@ Expected<Checkpoint> parse_checkpoint_body(std::string_view body) {
   checkpoint.boot = in.text("the boot");
   checkpoint.saved = in.instant("when it was saved");
   checkpoint.utc_ns = in.number<std::int64_t>("when it was saved");
+  in.expect(checkpoint.utc_ns >= 0 && checkpoint.utc_ns <= std::int64_t{1} << 62, "when it was saved");
   MapMemory& memory = checkpoint.memory;
   memory.last_capture = in.instant("the last capture");
   memory.last_frame_sequence = in.number<std::uint64_t>("the last frame's number");
@@ -270,10 +332,15 @@ Expected<Checkpoint> parse_checkpoint_body(std::string_view body) {
   in.expect(memory.frame_period >= Duration(0) && memory.frame_period <= std::chrono::seconds(10), "a frame period");
   const std::uint32_t blocks = in.count(kMostBlocks, 21, "the number of ECG blocks");
   for (std::uint32_t i = 0; i < blocks && in.good(); ++i) memory.ecg.push_back(read_block(in));
+  memory.respiration = read_respiration(in);
+  in.expect(memory.respiration.clock.time <= checkpoint.saved, "a breath's phase of before it was saved");
   const auto state_size = in.number<std::int32_t>("the size of a state");
   in.expect(state_size >= 0 && state_size <= kMaxState, "the size of a state");
   const std::uint32_t features = in.count(kMostFeatures, sizeof(PatchTemplate), "the number of features");
-  for (std::uint32_t i = 0; i < features && in.good(); ++i) memory.features.push_back(read_feature(in, state_size));
+  for (std::uint32_t i = 0; i < features && in.good(); ++i) {
+    const FeatureMemory& feature = memory.features.emplace_back(read_feature(in, state_size));
+    in.expect(memory.respiration.found || !feature.breathing, "no breathing in a feature, as it was not found");
+  }
   in.expect(in.left() == 0, "the end");
   if (!in.good()) return in.error();
   return checkpoint;

@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <span>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -42,6 +41,7 @@ std::unique_ptr<CheckpointKeeper> CheckpointKeeper::go_on_from(const std::filesy
 void CheckpointKeeper::begin_with(const MapMemory& memory) {
   std::size_t slot = 0;
   for (const FeatureMemory& feature : memory.features) features_[slot++] = serialize_feature(feature);
+  respiration_ = memory.respiration;
   ecg_.assign(memory.ecg.begin(), memory.ecg.end());
 }
 
@@ -50,7 +50,7 @@ void CheckpointKeeper::run() {
   while (!stopping_.load(std::memory_order_relaxed)) {
     pipeline_.map_feed().wait_until(std::min(next, MonotonicClock::now() + kLongestWait));
     const std::lock_guard lock(mutex_);
-    take_features();
+    take_map();
     take_ecg();
     if (MonotonicClock::now() < next) continue;
     write();
@@ -58,11 +58,13 @@ void CheckpointKeeper::run() {
   }
 }
 
-void CheckpointKeeper::take_features() {
-  const std::span<const MapFeed::Entry> entries = pipeline_.map_feed().front();
-  if (entries.empty()) return;
-  for (const MapFeed::Entry& entry : entries) {
-    if (entry.mapped && entry.maps_forgotten == pipeline_.counters().maps_forgotten.get()) {
+void CheckpointKeeper::take_map() {
+  const MapFeed::Batch* batch = pipeline_.map_feed().front();
+  if (batch == nullptr) return;
+  const bool of_this_map = batch->maps_forgotten == pipeline_.counters().maps_forgotten.get();
+  respiration_ = of_this_map ? batch->respiration : RespirationMemory{};
+  for (const MapFeed::Entry& entry : batch->entries) {
+    if (entry.mapped && of_this_map) {
       features_[entry.slot] = serialize_feature(entry.feature);
     } else {
       features_.erase(entry.slot);
@@ -82,6 +84,7 @@ void CheckpointKeeper::write() {
   const Now now = this_boot_now();
   Checkpoint checkpoint{set_up_, now.boot, now.monotonic, now.utc_ns, {}};
   checkpoint.memory.ecg.assign(ecg_.begin(), ecg_.end());
+  checkpoint.memory.respiration = respiration_;
   const PipelineCounters& counters = pipeline_.counters();
   checkpoint.memory.last_capture = from_ns(static_cast<std::int64_t>(counters.last_release_capture_ns.get()));
   checkpoint.memory.last_frame_sequence = counters.last_release_sequence.get();
@@ -98,6 +101,7 @@ void CheckpointKeeper::forget() {
   const std::lock_guard lock(mutex_);
   take_ecg();
   features_.clear();
+  respiration_ = {};
   ecg_.clear();
   std::error_code error;
   std::filesystem::remove(file_, error);

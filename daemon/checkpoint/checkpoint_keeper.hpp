@@ -16,8 +16,8 @@
 
 namespace perimap {
 
-// run() takes the mapped features from the pipeline as they come, some a frame, and the ECG; every `interval` it
-// replaces the file. None of it is on the real-time path.
+// run() takes the mapped features from the pipeline as they come, some a frame, breathing, and the ECG; every
+// `interval` it replaces the file. None of it is on the real-time path.
 class CheckpointKeeper {
  public:
   // Before the pipeline runs: it takes up what an earlier run left in the file, when it may; the log says what came of
@@ -37,7 +37,7 @@ class CheckpointKeeper {
  private:
   // What the pipeline has recalled, so that a crash that follows soon takes nothing either.
   void begin_with(const MapMemory& memory);
-  void take_features();
+  void take_map();
   void take_ecg();
   void write();
 
@@ -47,6 +47,7 @@ class CheckpointKeeper {
   Duration interval_;
   std::mutex mutex_;                             // of what follows, between run() and forget()
   std::map<std::size_t, std::string> features_;  // by slot, serialized
+  RespirationMemory respiration_;
   std::deque<EcgBlock> ecg_;
   bool write_failed_ = false;
   // Relaxed: a message by itself.

@@ -70,6 +70,9 @@ Expected<MapMemory> usable_memory(Checkpoint checkpoint, const SetUp& set_up, co
       feature.first_observed += shift;
       feature.last_observed += shift;
     }
+    // What the coefficients count from still holds; where breathing is now is found again.
+    RespiratoryClock& breath = checkpoint.memory.respiration.clock;
+    if (breath.state == RespirationState::kLocked) breath.state = RespirationState::kSearching;
     checkpoint.memory.ecg.clear();
     checkpoint.memory.frame_period = Duration(0);
   }

@@ -21,8 +21,8 @@ struct Now {
 
 [[nodiscard]] SetUp set_up_of(const Configuration& configuration, const PipelineSettings& pipeline);
 
-// What may be used of it: everything in the same boot; in another the map without ECG and frame times. An error says
-// why nothing may: another camera, hand-eye transform, patient's frame or estimator, or too old.
+// What may be used of it: everything in the same boot; in another the map without ECG, frame times and the breath's
+// phase. An error says why nothing may: another camera, hand-eye transform, patient's frame or estimator, or too old.
 [[nodiscard]] Expected<MapMemory> usable_memory(Checkpoint checkpoint, const SetUp& set_up, const Now& now,
                                                 Duration maximum_age);
 

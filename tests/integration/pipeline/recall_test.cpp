@@ -8,13 +8,15 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
-#include "daemon/checkpoint/checkpoint_file.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/replay_setup.hpp"
+#include "tests/integration/pipeline/kept_map.hpp"
 
 namespace perimap {
 namespace {
+
+using test::KeptMap;
 
 struct Unheard final : Publication {
   void surface(const perimap_Surface& /*sample*/) override {}
@@ -32,27 +34,15 @@ ReplaySetup setup() {
   return std::move(*made);
 }
 
-// A run over the whole recording, and what one who keeps it has got of it.
+// A run over the whole recording.
 struct EarlierRun {
   EarlierRun() : s(setup()), pipeline(s.pipeline), runtime(pipeline, s.identity, s.utc_minus_monotonic, unheard) {
+    KeptMap kept;
     while (auto event = next()) {
       runtime.deliver(*event);
-      for (const MapFeed::Entry& entry : pipeline.map_feed().front()) {
-        if (entry.mapped) {
-          features[entry.slot] = entry.feature;
-        } else {
-          features.erase(entry.slot);
-        }
-      }
-      if (!pipeline.map_feed().front().empty()) pipeline.map_feed().give_back();
-      EcgBlock block;
-      while (pipeline.entrance().pop_heard_ecg(block)) memory.ecg.push_back(block);
+      kept.take(pipeline);
     }
-    for (auto& [slot, feature] : features) memory.features.push_back(feature);
-    const PipelineCounters& counters = pipeline.counters();
-    memory.last_capture = from_ns(static_cast<std::int64_t>(counters.last_release_capture_ns.get()));
-    memory.last_frame_sequence = counters.last_release_sequence.get();
-    memory.frame_period = Duration(static_cast<std::int64_t>(counters.frame_period_ns.get()));
+    memory = kept.memory(pipeline.counters());
   }
   std::optional<ReplayEvent> next() {
     auto event = s.reader.next();
@@ -64,7 +54,6 @@ struct EarlierRun {
   Unheard unheard;
   Pipeline pipeline;
   LockstepRuntime runtime;
-  std::map<std::size_t, FeatureMemory> features;
   MapMemory memory;
 };
 
@@ -138,6 +127,88 @@ TEST(Recall, TakesNoMoreFeaturesThanThereIsRoomForAndNoneOfAnotherLayout) {
     EXPECT_NE(slot.id, run.memory.features[0].id);
   }
   EXPECT_EQ(mapped, 4);
+}
+
+// Two features as of before a crash, over the recording's ECG: one with breathing, one kept before it was found.
+struct BreathingMemory {
+  BreathingMemory() : settings(earlier.s.pipeline), memory(earlier.memory) {
+    settings.respiration.enabled = true;
+    settings.estimator.layout.respiratory_harmonics = kBreathHarmonics;
+    const BasisLayout& layout = settings.estimator.layout;
+    FeatureMemory feature = memory.features.front();
+    feature.converged = true;
+    feature.largest_deviation_mm = 0.5;
+    feature.estimate = prior_estimate(layout, {}, {10.0, -20.0, 150.0});
+    feature.estimate.P *= 1e-4;
+    feature.id = 1;
+    memory.features = {feature, feature};
+    memory.features[1].id = 2;
+    memory.features[0].breathing = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int k = 0; k < 2 * kBreathHarmonics; ++k) {
+        const int i = axis * layout.size() + 1 + 2 * layout.cardiac_harmonics + k;
+        memory.features[0].estimate.x(i) = 1.0 + axis - 0.5 * k;
+      }
+    }
+    RespirationMemory& breath = memory.respiration;
+    breath.found = true;
+    breath.wave.a[0] = {0.0, 2.0, -4.0};
+    breath.wave.b[1] = {0.5, 0.0, 1.0};
+    breath.clock.state = RespirationState::kLocked;
+    breath.clock.time = memory.last_capture;
+    breath.clock.phase_rad = 0.5;
+    breath.clock.rate_rad_per_s = 1.5;
+    breath.clock.phase_variance_rad2 = 1e-4;
+    breath.clock.rate_variance_rad2_per_s2 = 1e-5;
+  }
+  [[nodiscard]] Release release(Duration since) const {
+    const Instant capture = memory.last_capture + since;
+    return {1'000'000, capture, capture + settings.latency, true};
+  }
+
+  EarlierRun earlier;
+  PipelineSettings settings;
+  MapMemory memory;
+};
+
+TEST(Recall, BreathingGoesOnInThePhaseThatTheMapCountsFrom) {
+  using std::chrono::milliseconds;
+  const BreathingMemory before;
+  const BasisLayout& layout = before.settings.estimator.layout;
+  Pipeline later(before.settings);
+  later.recall(before.memory, before.memory.last_capture + milliseconds(400));
+  EXPECT_EQ(later.status_respiration().state, RespirationState::kLocked);
+  double last_trace_mm2 = 0.0;
+  for (const Duration since : {milliseconds(450), milliseconds(1450), milliseconds(2450)}) {
+    const SurfaceSample& sample = later.compose(before.release(since));
+    ASSERT_EQ(sample.features.size(), 2U);
+    const double phase_rad = 0.5 + 1.5 * to_seconds(sample.valid_time - before.memory.respiration.clock.time);
+    const SurfaceFeature& breathing = sample.features[0];
+    EXPECT_NE(sample.reason, SurfaceReason::kRespirationUnknown);
+    const Vector3d expected =
+        position_of(before.memory.features[0].estimate.x, basis_at(layout, sample.cardiac_phase_rad, phase_rad));
+    EXPECT_LT((breathing.p_WF_mm - expected).norm(), 1e-9);
+    // What was not there when it was kept is what all have in common.
+    const Vector3d still =
+        position_of(before.memory.features[1].estimate.x, basis_without_breath(layout, sample.cardiac_phase_rad));
+    EXPECT_LT((sample.features[1].p_WF_mm - still - before.memory.respiration.wave.at(phase_rad)).norm(), 1e-9);
+    EXPECT_GT(breathing.covariance_W_mm2.trace(), last_trace_mm2) << "the phase becomes less certain";
+    last_trace_mm2 = breathing.covariance_W_mm2.trace();
+  }
+}
+
+TEST(Recall, WhereTheBreathsPhaseIsNotKnownAnyMoreItIsSaidSo) {
+  BreathingMemory before;
+  before.memory.respiration.clock.state = RespirationState::kSearching;
+  Pipeline later(before.settings);
+  later.recall(before.memory, before.memory.last_capture);
+  const SurfaceSample& sample = later.compose(before.release(std::chrono::milliseconds(40)));
+  EXPECT_EQ(sample.reason, SurfaceReason::kRespirationUnknown);
+  const double displacement_mm = before.settings.respiration.displacement_mm;
+  for (const SurfaceFeature& feature : sample.features) {
+    EXPECT_NE(feature.state, FeatureState::kConverged);
+    EXPECT_GT(feature.covariance_W_mm2.trace(), 3.0 * displacement_mm * displacement_mm);
+  }
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 
 #include "daemon/checkpoint/checkpoint_file.hpp"
 #include "daemon/checkpoint/warm_restart.hpp"
+#include "tests/unit/checkpoint/samples.hpp"
 
 namespace perimap {
 namespace {
@@ -20,61 +21,17 @@ namespace fs = std::filesystem;
 using std::chrono::seconds;
 using testing::HasSubstr;
 
-constexpr int kStateSize = 9;
 constexpr std::size_t kHeader = 16;
 
-FeatureMemory feature(std::uint32_t id) {
-  FeatureMemory f;
-  f.id = id;
-  f.first_observed = from_ns(1'000'000'007);
-  f.first_observed_px = {12.25, -3.5};
-  f.last_observed = from_ns(5'000'000'011);
-  for (std::size_t l = 0; l < f.patch.levels.size(); ++l) {
-    f.patch.levels[l].usable = true;
-    f.patch.levels[l].side = PatchTemplate::kSide[l];
-    f.patch.levels[l].offset_x = 0.25;
-    f.patch.levels[l].value[3] = static_cast<std::int16_t>(-7 - static_cast<int>(l));
-  }
-  f.patch_state.px = {100.5, 200.25};
-  f.patch_state.gain = 1.125;
-  f.updates = 77;
-  f.converged = true;
-  f.largest_deviation_mm = 0.5;
-  f.estimate.x = StateVector::LinSpaced(kStateSize, -1.0, 1.0);
-  f.estimate.P = StateMatrix::Identity(kStateSize, kStateSize);
-  f.estimate.P(2, 1) = f.estimate.P(1, 2) = 0.125;
-  return f;
-}
-
-Checkpoint checkpoint() {
-  Checkpoint c;
-  c.set_up = {"camera", "hand-eye", "frame", "estimator"};
-  c.boot = "boot";
-  c.saved = from_ns(9'000'000'000);
-  c.utc_ns = 1'700'000'000'000'000'000;
-  c.memory.last_capture = from_ns(8'900'000'000);
-  c.memory.last_frame_sequence = 267;
-  c.memory.frame_period = std::chrono::milliseconds(33);
-  EcgBlock block;
-  block.first_sample_time = from_ns(8'000'000'000);
-  block.sample_period = std::chrono::milliseconds(4);
-  block.count = 3;
-  block.mV = {0.5F, -0.25F, 1.5F};
-  c.memory.ecg = {block, block};
-  return c;
-}
-
-std::string file_of(const Checkpoint& c, int features = 2) {
-  std::vector<std::string> serialized;
-  for (int i = 0; i < features; ++i)
-    serialized.push_back(serialize_feature(feature(static_cast<std::uint32_t>(i + 1))));
-  return serialize(c, serialized);
-}
+using test::checkpoint_sample;
+using test::feature_sample;
+using test::file_of;
+using test::respiration_sample;
 
 TEST(CheckpointFile, IsReadBackAsItWasWritten) {
-  const auto read = parse_checkpoint(file_of(checkpoint()));
+  const auto read = parse_checkpoint(file_of(checkpoint_sample()));
   ASSERT_TRUE(read) << read.error().message;
-  const Checkpoint written = checkpoint();
+  const Checkpoint written = checkpoint_sample();
   EXPECT_EQ(read->set_up, written.set_up);
   EXPECT_EQ(read->boot, written.boot);
   EXPECT_EQ(read->saved, written.saved);
@@ -85,9 +42,26 @@ TEST(CheckpointFile, IsReadBackAsItWasWritten) {
   ASSERT_EQ(read->memory.ecg.size(), 2U);
   EXPECT_EQ(read->memory.ecg[1].mV, written.memory.ecg[1].mV);
   EXPECT_EQ(read->memory.ecg[1].first_sample_time, written.memory.ecg[1].first_sample_time);
+  const RespirationMemory& r = read->memory.respiration;
+  const RespirationMemory s = respiration_sample();
+  EXPECT_EQ(r.found, s.found);
+  for (int k = 0; k < kBreathHarmonics; ++k) {
+    EXPECT_EQ(r.wave.a[k], s.wave.a[k]);
+    EXPECT_EQ(r.wave.b[k], s.wave.b[k]);
+  }
+  EXPECT_EQ(r.clock.state, s.clock.state);
+  EXPECT_EQ(r.clock.suspected, s.clock.suspected);
+  EXPECT_EQ(r.clock.time, s.clock.time);
+  EXPECT_EQ(r.clock.phase_rad, s.clock.phase_rad);
+  EXPECT_EQ(r.clock.rate_rad_per_s, s.clock.rate_rad_per_s);
+  EXPECT_EQ(r.clock.phase_variance_rad2, s.clock.phase_variance_rad2);
+  EXPECT_EQ(r.clock.covariance_rad2_per_s, s.clock.covariance_rad2_per_s);
+  EXPECT_EQ(r.clock.rate_variance_rad2_per_s2, s.clock.rate_variance_rad2_per_s2);
+  EXPECT_EQ(r.offset_known, s.offset_known);
+  EXPECT_EQ(r.offset_rad, s.offset_rad);
   ASSERT_EQ(read->memory.features.size(), 2U);
   const FeatureMemory& f = read->memory.features[1];
-  const FeatureMemory g = feature(2);
+  const FeatureMemory g = feature_sample(2);
   EXPECT_EQ(f.id, g.id);
   EXPECT_EQ(f.first_observed, g.first_observed);
   EXPECT_EQ(f.first_observed_px, g.first_observed_px);
@@ -97,19 +71,20 @@ TEST(CheckpointFile, IsReadBackAsItWasWritten) {
   EXPECT_EQ(f.patch_state.gain, g.patch_state.gain);
   EXPECT_EQ(f.updates, g.updates);
   EXPECT_EQ(f.converged, g.converged);
+  EXPECT_EQ(f.breathing, g.breathing);
   EXPECT_EQ(f.largest_deviation_mm, g.largest_deviation_mm);
   EXPECT_EQ(f.estimate.x, g.estimate.x);
   EXPECT_EQ(f.estimate.P, g.estimate.P);
 }
 
 TEST(CheckpointFile, HoldsNoFeatureToo) {
-  const auto read = parse_checkpoint(file_of(checkpoint(), 0));
+  const auto read = parse_checkpoint(file_of(checkpoint_sample(), 0));
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_TRUE(read->memory.features.empty());
 }
 
 TEST(CheckpointFile, AnyPartOfOneIsRefused) {
-  const std::string whole = file_of(checkpoint());
+  const std::string whole = file_of(checkpoint_sample());
   for (std::size_t size = 0; size < whole.size(); size += size < 600 ? 1 : 997) {
     EXPECT_FALSE(parse_checkpoint(whole.substr(0, size))) << size;
     const std::string_view body = std::string_view(whole).substr(std::min(size, kHeader));
@@ -118,8 +93,16 @@ TEST(CheckpointFile, AnyPartOfOneIsRefused) {
   EXPECT_FALSE(parse_checkpoint(whole + "x"));
 }
 
+TEST(CheckpointFile, AnotherFormatIsRefusedByName) {
+  std::string old = file_of(checkpoint_sample());
+  old[8] = 1;  // the least byte of the format
+  const auto read = parse_checkpoint(old);
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().message, HasSubstr("expected format 2; it is of format 1"));
+}
+
 TEST(CheckpointFile, AChangedByteIsNoticed) {
-  const std::string whole = file_of(checkpoint());
+  const std::string whole = file_of(checkpoint_sample());
   for (std::size_t at = 0; at < whole.size(); at += 101) {
     std::string changed = whole;
     changed[at] = static_cast<char>(changed[at] ^ 0x10);
@@ -136,10 +119,10 @@ struct Unsound {
 class UnsoundFeature : public testing::TestWithParam<Unsound> {};
 
 TEST_P(UnsoundFeature, IsRefusedAndNamed) {
-  FeatureMemory f = feature(1);
+  FeatureMemory f = feature_sample(1);
   GetParam().spoil(f);
   const std::vector<std::string> features{serialize_feature(f)};
-  const auto read = parse_checkpoint(serialize(checkpoint(), features));
+  const auto read = parse_checkpoint(serialize(checkpoint_sample(), features));
   ASSERT_FALSE(read);
   EXPECT_THAT(read.error().message, HasSubstr(GetParam().expected));
   EXPECT_THAT(read.error().message, HasSubstr("byte "));
@@ -165,31 +148,73 @@ INSTANTIATE_TEST_SUITE_P(
                     Unsound{"Variance", [](FeatureMemory& f) { f.estimate.P(4, 4) = -1.0; }, "variance"}),
     [](const auto& param) { return param.param.name; });
 
+struct UnsoundBreath {
+  const char* name;
+  void (*spoil)(RespirationMemory&);
+  const char* expected;
+};
+
+class UnsoundRespiration : public testing::TestWithParam<UnsoundBreath> {};
+
+TEST_P(UnsoundRespiration, IsRefusedAndNamed) {
+  Checkpoint c = checkpoint_sample();
+  GetParam().spoil(c.memory.respiration);
+  const auto read = parse_checkpoint(file_of(c));
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().message, HasSubstr(GetParam().expected));
+  EXPECT_THAT(read.error().message, HasSubstr("byte "));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Checkpoint, UnsoundRespiration,
+    testing::Values(
+        UnsoundBreath{"Wave", [](RespirationMemory& r) { r.wave.b[1].y() = kNan; }, "displaces"},
+        UnsoundBreath{"State", [](RespirationMemory& r) { r.clock.state = static_cast<RespirationState>(9); },
+                      "known of breathing"},
+        UnsoundBreath{"LockedOnNothing", [](RespirationMemory& r) { r.found = false; }, "known of breathing"},
+        UnsoundBreath{"InAFeatureAlone",
+                      [](RespirationMemory& r) {
+                        r.found = false;
+                        r.clock.state = RespirationState::kSearching;
+                      },
+                      "no breathing in a feature"},
+        UnsoundBreath{"Future", [](RespirationMemory& r) { r.clock.time = from_ns(9'000'000'001); },
+                      "before it was saved"},
+        UnsoundBreath{"Never", [](RespirationMemory& r) { r.clock.time = Instant::min(); }, "known"},
+        UnsoundBreath{"Phase", [](RespirationMemory& r) { r.clock.phase_rad = kNan; }, "phase and rate"},
+        UnsoundBreath{"Variance", [](RespirationMemory& r) { r.clock.phase_variance_rad2 = -1.0; }, "covariance"},
+        UnsoundBreath{"Covariance", [](RespirationMemory& r) { r.clock.covariance_rad2_per_s = 1e-4; }, "covariance"},
+        UnsoundBreath{"Offset", [](RespirationMemory& r) { r.offset_rad = kNan; }, "channel"}),
+    [](const auto& param) { return param.param.name; });
+
 TEST(WarmRestart, GoesOnFromTheSameSetUpInTheSameBoot) {
-  const auto memory = usable_memory(*parse_checkpoint(file_of(checkpoint())), checkpoint().set_up,
-                                    {"boot", from_ns(12'000'000'000), checkpoint().utc_ns}, seconds(10));
+  const auto memory = usable_memory(*parse_checkpoint(file_of(checkpoint_sample())), checkpoint_sample().set_up,
+                                    {"boot", from_ns(12'000'000'000), checkpoint_sample().utc_ns}, seconds(10));
   ASSERT_TRUE(memory) << memory.error().message;
   EXPECT_EQ(memory->features.size(), 2U);
   EXPECT_EQ(memory->ecg.size(), 2U);
+  EXPECT_EQ(memory->respiration.clock.state, RespirationState::kLocked);
 }
 
 TEST(WarmRestart, InAnotherBootTheMapAloneCountsAndItsInstantsMove) {
-  Checkpoint c = *parse_checkpoint(file_of(checkpoint()));
+  Checkpoint c = *parse_checkpoint(file_of(checkpoint_sample()));
   const Duration since_observed = c.saved - c.memory.features[0].last_observed;
   const Now now{"another", from_ns(2'000'000'000), c.utc_ns + 5'000'000'000};
   const auto memory = usable_memory(c, c.set_up, now, seconds(10));
   ASSERT_TRUE(memory) << memory.error().message;
   EXPECT_TRUE(memory->ecg.empty());
   EXPECT_EQ(memory->frame_period, Duration(0));
+  EXPECT_TRUE(memory->respiration.found);
+  EXPECT_EQ(memory->respiration.clock.state, RespirationState::kSearching);
   EXPECT_EQ(memory->features[0].last_observed, now.monotonic - seconds(5) - since_observed);
 }
 
 TEST(WarmRestart, AnotherSetUpIsRefusedWithTheReason) {
-  const Now now{"boot", from_ns(9'500'000'000), checkpoint().utc_ns};
+  const Now now{"boot", from_ns(9'500'000'000), checkpoint_sample().utc_ns};
   const auto reason = [&now](std::string perimap::SetUp::*part) {
-    perimap::SetUp other = checkpoint().set_up;
+    perimap::SetUp other = checkpoint_sample().set_up;
     other.*part = "different";
-    const auto memory = usable_memory(checkpoint(), other, now, seconds(10));
+    const auto memory = usable_memory(checkpoint_sample(), other, now, seconds(10));
     return memory ? std::string("accepted") : memory.error().message;
   };
   EXPECT_THAT(reason(&perimap::SetUp::camera), HasSubstr("another camera"));
@@ -199,12 +224,12 @@ TEST(WarmRestart, AnotherSetUpIsRefusedWithTheReason) {
 }
 
 TEST(WarmRestart, WhatIsTooOldOrOfTheFutureIsRefusedWithTheReason) {
-  const perimap::SetUp set_up = checkpoint().set_up;
-  const std::int64_t utc_ns = checkpoint().utc_ns;
+  const perimap::SetUp set_up = checkpoint_sample().set_up;
+  const std::int64_t utc_ns = checkpoint_sample().utc_ns;
   for (const Now& now : {Now{"boot", from_ns(20'000'000'000), utc_ns}, Now{"boot", from_ns(1), utc_ns},
                          Now{"another", from_ns(1), utc_ns + 11'000'000'000}, Now{"another", from_ns(1), utc_ns - 1},
                          Now{"", from_ns(1), utc_ns + 11'000'000'000}}) {
-    const auto memory = usable_memory(checkpoint(), set_up, now, seconds(10));
+    const auto memory = usable_memory(checkpoint_sample(), set_up, now, seconds(10));
     ASSERT_FALSE(memory) << now.boot;
     EXPECT_THAT(memory.error().message, HasSubstr("s old"));
   }

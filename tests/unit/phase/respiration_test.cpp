@@ -165,6 +165,90 @@ TEST_F(Tracking, AContradictedPhaseIsSearchedForAgainAndCountedAsBefore) {
   }
 }
 
+// The tracker follows the truth, crashes, and another goes on.
+struct Restarted : Tracking {
+  RespiratoryTracker before{settings};
+
+  void SetUp() override {
+    ASSERT_TRUE(lock(before));
+    follow(before, now_s + 20.0);
+  }
+  void follow(RespiratoryTracker& tracker, double to_s) {
+    for (; now_s < to_s; now_s += 1.0 / 30.0) {
+      const double shift = 0.05 * patient.normal(patient.generator);
+      tracker.add_phase(at_s(now_s), tracker.clock().at(at_s(now_s)).phase_rad + shift, 0.05);
+    }
+  }
+  [[nodiscard]] RespiratoryTracker after(double gap_s) const {
+    RespiratoryTracker tracker(settings);
+    tracker.recall(before.memory(), at_s(now_s + gap_s));
+    return tracker;
+  }
+};
+
+TEST_F(Restarted, ThePhaseGoesOnWhereItWouldHaveBeenAndIsAsMuchLessCertain) {
+  double last_mm = before.clock().at(at_s(now_s)).deviation_mm;
+  for (const double gap_s : {0.0, 0.5, 2.0, 8.0}) {
+    const RespiratoryTracker there = after(gap_s);
+    ASSERT_EQ(there.clock().state, RespirationState::kLocked) << gap_s;
+    const RespiratoryPhase was = before.clock().at(at_s(now_s + gap_s));
+    const RespiratoryPhase is = there.clock().at(at_s(now_s + gap_s));
+    EXPECT_NEAR(std::remainder(is.phase_rad - was.phase_rad, kTwoPi), 0.0, 1e-9) << gap_s;
+    EXPECT_EQ(is.rate_rad_per_s, was.rate_rad_per_s);
+    EXPECT_GE(is.deviation_mm, was.deviation_mm) << "nobody followed the walks meanwhile";
+    EXPECT_GE(is.deviation_mm, last_mm) << gap_s;
+    last_mm = is.deviation_mm;
+    EXPECT_EQ(there.wave().at(1.0), before.wave().at(1.0));
+  }
+  // One step of seconds adds what many small ones do.
+  RespiratoryTracker at_once = after(2.0);
+  RespiratoryTracker step_by_step = after(0.0);
+  for (int i = 1; i <= 20; ++i) {
+    RespiratoryTracker next(settings);
+    next.recall(step_by_step.memory(), at_s(now_s + 0.1 * i));
+    step_by_step = next;
+  }
+  EXPECT_NEAR(step_by_step.clock().phase_variance_rad2 / at_once.clock().phase_variance_rad2, 1.0, 1e-6);
+  EXPECT_NEAR(step_by_step.clock().rate_variance_rad2_per_s2 / at_once.clock().rate_variance_rad2_per_s2, 1.0, 1e-6);
+}
+
+TEST_F(Restarted, APhaseThatIsTooOldIsSearchedForAndCountedAsBefore) {
+  const BreathWave wave = before.wave();
+  RespiratoryTracker there = after(300.0);
+  EXPECT_EQ(there.clock().state, RespirationState::kSearching);
+  EXPECT_EQ(there.clock().at(at_s(now_s + 300.0)).deviation_mm, settings.displacement_mm);
+  now_s += 300.0;
+  patient.begin_s += 1.7;
+  ASSERT_TRUE(lock(there));
+  for (double t = now_s; t < now_s + 4.0; t += 0.2) {
+    EXPECT_LT((wave.at(there.clock().at(at_s(t)).phase_rad) - truth(t)).norm(), 1.0) << t;
+  }
+}
+
+TEST_F(Restarted, ThePhaseIsContradictedAsEver) {
+  RespiratoryTracker there = after(2.0);
+  now_s += 2.0;
+  for (int i = 0; i < 90; ++i) there.add_contradiction(at_s(now_s += 1.0 / 30.0));
+  EXPECT_EQ(there.clock().state, RespirationState::kSearching);
+  EXPECT_GT(there.locks(), 0) << "the map's coefficients count from the phase of then";
+}
+
+TEST_F(Restarted, ARateThatIsNotLookedForIsNotGoneOnWith) {
+  settings.search.shortest_period = std::chrono::seconds(8);
+  EXPECT_EQ(after(0.5).clock().state, RespirationState::kSearching);
+}
+
+TEST_F(Restarted, WhereBreathingIsOffOnlyASuspicionStands) {
+  settings.enabled = false;
+  RespiratoryTracker there = after(0.5);
+  EXPECT_EQ(there.clock().state, RespirationState::kOff);
+  EXPECT_FALSE(there.clock().suspected);
+  RespirationMemory suspected = there.memory();
+  suspected.clock.suspected = true;
+  there.recall(suspected, at_s(now_s));
+  EXPECT_EQ(there.clock().at(at_s(now_s)).deviation_mm, settings.displacement_mm);
+}
+
 // A channel that shows the patient's breath until `until_s`, then a flat line.
 struct Channel {
   const Patient& patient;
@@ -225,6 +309,21 @@ TEST_F(WithChannel, AStoppedBreathIsLostWhenTheNextIsOverdueAndCountedAsBeforeWh
   ASSERT_TRUE(lock_by_channel(tracker, now_s));
   for (double t = now_s; t < now_s + 4.0; t += 0.2) {
     EXPECT_LT((before.at(tracker.clock().at(at_s(t)).phase_rad) - truth(t)).norm(), 1.5) << t;
+  }
+}
+
+TEST_F(WithChannel, AfterARestartTheChannelsPhaseIsCountedAsBefore) {
+  RespiratoryTracker before(settings);
+  ASSERT_TRUE(lock_by_channel(before, 12.0));
+  RespiratoryTracker there(settings);
+  there.recall(before.memory(), at_s(now_s + 60.0));
+  ASSERT_EQ(there.clock().state, RespirationState::kSearching);
+  channel.detector = BreathDetector{};
+  channel.heard_s = now_s + 30.0;
+  ASSERT_TRUE(lock_by_channel(there, now_s + 60.0));
+  EXPECT_EQ(there.clock().source, RespirationSource::kChannel);
+  for (double t = now_s; t < now_s + 4.0; t += 0.2) {
+    EXPECT_LT((before.wave().at(there.clock().at(at_s(t)).phase_rad) - truth(t)).norm(), 1.5) << t;
   }
 }
 
