@@ -13,6 +13,7 @@
 #include "daemon/checkpoint/checkpoint_keeper.hpp"
 #include "daemon/config/configuration_difference.hpp"
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/config/surface_traffic.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/service_folder.hpp"
 #include "daemon/process/service_manager.hpp"
@@ -86,10 +87,13 @@ int run_session(const std::string& configuration_file, const Configuration& give
                configuration.source.name, configuration.dds.domain,
                std::chrono::duration_cast<std::chrono::milliseconds>(configuration.pipeline.latency).count(),
                configuration.pipeline.workers);
+  for (const std::string& line : traffic_lines(configuration)) spdlog::info("{}", line);
   const Expected<void> ended = session.run(stop);
   const PipelineCounters& counters = pipeline.counters();
+  std::uint64_t surfaces = 0;
+  for (const ReleaseStream stream : kReleaseStreams) surfaces += counters.of(stream).samples.get();
   spdlog::info("{}: {} frames, {} surfaces, {} features converged", stop.requested() ? "stopped" : "recording ended",
-               counters.frames.get(), counters.samples.get(), counters.features_converged.get());
+               counters.frames.get(), surfaces, counters.features_converged.get());
   if ((*publication)->failures() > 0) spdlog::error("{} DDS writes failed", (*publication)->failures());
   if (!ended) {
     spdlog::error("{}", ended.error().message);

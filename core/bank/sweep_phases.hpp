@@ -8,7 +8,7 @@
 namespace perimap {
 
 inline constexpr int kMaxLearntPhases = 4;
-inline constexpr int kMaxSweepPhases = 8;  // learnt ones included
+inline constexpr int kMaxSweepPhases = 12;  // learnt ones included
 
 template <class Real>
 struct SweepPhase {

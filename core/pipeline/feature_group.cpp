@@ -81,8 +81,8 @@ void FeatureGroup::plan(const FrameJob& job) noexcept {
   }
   const FrameRecord& now = *job.frame;
   plan_.capture = plan_.phases.add_predicted(now.b, now.b_rate, now.phase.rate_rad_per_s);
-  for (std::size_t i = 0; i < job.releases.size(); ++i) {
-    plan_.releases[i] = plan_.phases.add_predicted(job.releases[i].b, Basis());
+  for (std::size_t i = job.evaluated.begin; i < job.evaluated.end; ++i) {
+    plan_.evaluated[i] = plan_.phases.add_predicted(job.evaluated.b[i], Basis());
   }
 }
 
@@ -167,19 +167,20 @@ void FeatureGroup::doubt() noexcept {
 
 void FeatureGroup::evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept {
   if (plan_.capture < 0) return;
-  std::array<LaneMotions<double>, kReleasesCovered> at_releases;
-  for (std::size_t i = 0; i < kReleasesCovered; ++i) {
-    bank_.motion(index_, plan_.phases, plan_.releases[i], at_releases[i]);
+  const auto [begin, end] = std::pair(job.evaluated.begin, job.evaluated.end);
+  std::array<LaneMotions<double>, kCovariances> evaluated;
+  for (std::size_t i = begin; i < end; ++i) {
+    bank_.motion(index_, plan_.phases, plan_.evaluated[i], evaluated[i]);
   }
   FeatureSnapshot snapshot;
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
     if (slots_[lane].state != SlotState::kMapped) continue;
-    describe(slots_[lane], snapshot);
+    describe(slots_[lane], job.frame->stamp.capture, snapshot);
     bank_.get(feature(lane), snapshot.x);
-    for (std::size_t i = 0; i < kReleasesCovered; ++i) {
-      snapshot.covariances_W_mm2[i] = at_releases[i].covariance_of(static_cast<int>(lane));
+    for (std::size_t i = begin; i < end; ++i) {
+      snapshot.covariances_W_mm2[i] = evaluated[i].covariance_of(static_cast<int>(lane));
       if (const auto& slow_error = slots_[lane].slow_error) {
-        snapshot.covariances_W_mm2[i] += slow_error->position_covariance(job.releases[i].b);
+        snapshot.covariances_W_mm2[i] += slow_error->position_covariance(job.evaluated.b[i]);
       }
     }
     publisher.features.push_back(snapshot);

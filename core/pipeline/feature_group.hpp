@@ -20,14 +20,14 @@ namespace perimap {
 // frames, without a burst.
 inline constexpr int kLearnPerFrame = 3;
 static_assert(kLearnPerFrame <= kMaxLearntPhases && kLearnPerFrame <= kMaxPendingUpdates);
-static_assert(kLearnPerFrame + 1 + static_cast<int>(kReleasesCovered) <= kMaxSweepPhases);
+static_assert(kLearnPerFrame + 1 + static_cast<int>(kCovariances) <= kMaxSweepPhases);
 
-// What one sweep serves: held frames to learn from, this frame's capture, the releases.
+// What one sweep serves: held frames to learn from, this frame's capture, the releases to come.
 struct SweepPlan {
   SweepPhases<double> phases;
   std::array<const FrameRecord*, kLearnPerFrame> learnt{};  // the frames of the learnt phases, oldest first
   int capture = -1;                                         // the phases' numbers; -1: the group has no estimate
-  std::array<int, kReleasesCovered> releases{};
+  std::array<int, kCovariances> evaluated{};
 };
 
 class FeatureGroup {

@@ -116,7 +116,7 @@ class Step {
     const bool vague = slot_.largest_deviation_mm > kVagueDeviations * settings_.estimator.converged_deviation_mm;
     if (slot_.last_found_frame == now()) {
       slot_.unseen_frames = 0;
-    } else if (job_.frame->measurable) {
+    } else if (job_.frame->measurable && !slot_.shed) {
       ++slot_.unseen_frames;
     }
     const std::uint64_t allowed = vague ? kUnobservedVagueFramesBeforeLost : kUnobservedFramesBeforeLost;

@@ -87,6 +87,8 @@ struct FeatureSlot {
   Instant first_observed;
   Vector2d first_observed_px = Vector2d::Zero();
 
+  bool shed = false;  // not looked for, so that the frame's time suffices for the others; see LoadShedding
+
   // following
   PatchTemplate patch;
   PatchState patch_state;                  // when it was found last

@@ -183,7 +183,7 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
                       const PipelineSettings& settings) noexcept {
   slot.match = PatchMatch{};
   slot.match_agrees = false;
-  if (slot.state == SlotState::kEmpty) return;
+  if (slot.state == SlotState::kEmpty || slot.shed) return;
   const PixelPrediction from_map = predict_from_map(map, *job.frame, model);
   seek(slot, surer(from_map, predict_from_velocity(slot, job)), Looks::kAskedInDoubt, job, settings);
   if (slot.match.state != MatchState::kFound) return;
@@ -192,7 +192,7 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
 
 void follow(FeatureSlot& slot, const MapPrediction& map, const FrameJob& job, const PixelModel& model,
             const PipelineSettings& settings) noexcept {
-  if (slot.state == SlotState::kEmpty) return;
+  if (slot.state == SlotState::kEmpty || slot.shed) return;
   const double gate = settings.estimator.update.gate;
   const NeighbourMotion::Around neighbours = job.motion->around(slot.carried_px, &slot.patch_state.px);
   const PixelPrediction from_neighbours = predict_from_neighbours(slot, neighbours, job);
@@ -228,7 +228,7 @@ void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept {
   let_go(slot, frame);
 }
 
-void describe(const FeatureSlot& slot, FeatureSnapshot& snapshot) noexcept {
+void describe(const FeatureSlot& slot, Instant now, FeatureSnapshot& snapshot) noexcept {
   snapshot.id = slot.id;
   snapshot.last_observed = slot.last_observed;
   snapshot.first_observed = slot.first_observed;
@@ -237,6 +237,10 @@ void describe(const FeatureSlot& slot, FeatureSnapshot& snapshot) noexcept {
   if (slot.health.state() == HealthState::kInconsistent) {
     snapshot.state = FeatureState::kInconsistent;
     snapshot.reason = FeatureReason::kInnovationsHigh;
+  } else if (slot.shed) {
+    const bool believed = slot.converged && now - slot.last_observed <= kBelievedUnseen;
+    snapshot.state = believed ? FeatureState::kConverged : FeatureState::kConverging;
+    snapshot.reason = FeatureReason::kShed;
   } else if (!slot.converged) {
     snapshot.state = FeatureState::kConverging;
     snapshot.reason = FeatureReason::kDeviationLarge;

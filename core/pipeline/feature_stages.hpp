@@ -32,8 +32,12 @@ void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept;
 void follow(FeatureSlot& slot, const MapPrediction& from_map, const FrameJob& job, const PixelModel& model,
             const PipelineSettings& settings) noexcept;
 
-// C: all of a mapped feature's snapshot but its coefficients and covariances, which the bank has.
-void describe(const FeatureSlot& slot, FeatureSnapshot& snapshot) noexcept;
+// So long a feature that is shed is still called converged after it was last observed. That of one that is looked for
+// ends with its life, see kUnobservedFramesBeforeLost.
+inline constexpr Duration kBelievedUnseen = std::chrono::seconds(30);
+
+// C: all of a mapped feature's snapshot but its coefficients and covariances, which the bank has. `now`: the capture.
+void describe(const FeatureSlot& slot, Instant now, FeatureSnapshot& snapshot) noexcept;
 
 // D, first part, never put off: takes this frame's match into the queue of what is to be learnt.
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept;

@@ -16,11 +16,18 @@
 
 namespace perimap {
 
-// The basis at a frame's release time, with the phase as known now.
-struct ReleaseBasis {
+// A frame that this job's snapshot serves the release of.
+struct CoveredRelease {
   std::uint64_t frame_sequence = 0;
-  Basis b;
   CameraPlace camera;  // at that frame's capture
+};
+
+// The bases at which covariances are evaluated, with the phase as known now: those of the shard's releases, then those
+// of its instants. Only [begin, end) are asked for: a stream that is not published costs nothing.
+struct EvaluatedBases {
+  std::array<Basis, kCovariances> b;
+  std::size_t begin = 0;
+  std::size_t end = 0;
 };
 
 // Written by the mapper before a stage, read by all workers during it.
@@ -30,7 +37,9 @@ struct FrameJob {
   GreyImage image;  // while features are searched for
   const PatchTracker* tracker = nullptr;
   BasesAbout about_capture;
-  std::array<ReleaseBasis, kReleasesCovered> releases;
+  std::array<CoveredRelease, kReleasesCovered> releases;
+  std::array<Instant, kInstantsCovered> instants{};
+  EvaluatedBases evaluated;
   // After B: how the features found have moved, and the pose that they agree on; null when they do not tell it.
   const NeighbourMotion* motion = nullptr;
   const CommonEstimate* shared_pose = nullptr;

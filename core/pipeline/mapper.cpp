@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "core/pipeline/feature_life.hpp"
 #include "core/pipeline/feature_stages.hpp"
@@ -19,6 +20,10 @@ constexpr double kDisplacementDeviation_mm = 1.0;
 constexpr double kDisplacementRate_mm_per_s = 15.0;
 // What an earlier run found after it was last kept was published by ids that are not known: they are not given again.
 constexpr std::uint32_t kIdsLeftOut = 10'000;
+// A snapshot's instants (see kInstantsCovered) reach over a period of the frames, at most so long, and so far beyond.
+// At that they are 23 ms apart, and a covariance with 8 harmonics of the heart is still near its chord between them.
+constexpr Duration kLongestCoveredPeriod = std::chrono::milliseconds(50);
+constexpr Duration kCoveredBeyond = std::chrono::milliseconds(20);
 
 }  // namespace
 
@@ -38,6 +43,8 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       respiration_(settings.respiration),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())}),
+      shedding_decision_(static_cast<int>(slots.size()), settings.budget),
+      shedding_(slots),
       motion_(slots.size()),
       cycle_(settings.image_alone),
       tallies_(static_cast<std::size_t>(team.size())) {
@@ -51,6 +58,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
 void Mapper::add_pose(const TrackerSample& sample) noexcept {
   const RealtimeScope realtime;
   if (!poses_.add(sample)) counters_.poses_refused.add();
+  last_pose_arrival_ = std::max(last_pose_arrival_, sample.arrival);
 }
 
 void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& newest_clock) noexcept {
@@ -86,7 +94,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   job_.image = image;
   job_.tracker = &tracker_;
   job_.about_capture = bases_about(settings_.estimator.layout, frame.phase, frame.respiration);
-  predict_releases(frame, clock);
+  plan_evaluation(frame, clock);
   adopt_found_features(frame.index);
 
   team_.run(&run_stage<&Mapper::predict_and_find_shard>, this);
@@ -191,6 +199,7 @@ void Mapper::learn() noexcept {
   job_.learn_until = capture + std::min(period, settings_.latency) + settings_.latency - settings_.budget;
   last_capture_ = capture;
   learn_started_ = MonotonicClock::now();
+  learning_ = true;
   team_.start(&run_stage<&Mapper::learn_shard>, this);
   if (job_.frame->index % kSearchInterval == 0) respiration_.search(capture);
   if (settings_.lockstep) {
@@ -257,13 +266,14 @@ void Mapper::recall(const MapMemory& memory, Instant now) {
       ShardSnapshot& snapshot = cell->back();
       snapshot.any = true;
       snapshot.frame_sequence = memory.last_frame_sequence;
+      snapshot.capture = memory.last_capture;
       snapshot.release_sequences.fill(kNoRelease);
       snapshot.features.clear();
       for (auto g = worker; g < groups_.size(); g += tallies_.size()) {
         for (std::size_t lane = 0; lane < groups_[g].slots().size(); ++lane) {
           if (groups_[g].slots()[lane].state != SlotState::kMapped) continue;
           FeatureSnapshot& feature = snapshot.features.emplace_back();
-          describe(groups_[g].slots()[lane], feature);
+          describe(groups_[g].slots()[lane], memory.last_capture, feature);
           bank_.get(groups_[g].feature(lane), feature.x);
         }
       }
@@ -328,6 +338,7 @@ void Mapper::finish_learning() noexcept {
     tally = WorkerTally{};
   }
   if (put_off) counters_.learning_put_off.add();
+  if (std::exchange(learning_, false)) shed_load(put_off);
   if (ended > learn_started_) {
     counters_.learn.add(ended - learn_started_);
     counters_.frame_compute.add(computed_before_learning_ + (ended - learn_started_));
@@ -356,6 +367,13 @@ void Mapper::finish_learning() noexcept {
   counters_.features_inconsistent.set(inconsistent);
 }
 
+// By the time that the last frame took. What a machine takes differs from run to run, so never in lockstep.
+void Mapper::shed_load(bool put_off) noexcept {
+  if (!settings_.shedding || settings_.lockstep) return;
+  if (shedding_decision_.add({computed_before_learning_, put_off}, shedding_.followed())) counters_.times_shed.add();
+  counters_.features_shed.set(shedding_.apply(shedding_decision_.limit()));
+}
+
 void Mapper::predict_and_find_shard(int worker) noexcept {
   const RealtimeScope realtime;
   for (auto g = static_cast<std::size_t>(worker); g < groups_.size(); g += tallies_.size()) {
@@ -367,16 +385,34 @@ void Mapper::predict_and_find_shard(int worker) noexcept {
   }
 }
 
-void Mapper::predict_releases(const FrameRecord& frame, const CardiacClock& clock) noexcept {
+void Mapper::plan_evaluation(const FrameRecord& frame, const CardiacClock& clock) noexcept {
+  const bool on_clock = settings_.clock_period > Duration(0);
+  job_.evaluated.begin = settings_.frame_stream ? 0 : kReleasesCovered;
+  job_.evaluated.end = on_clock ? kCovariances : kReleasesCovered;
+  const auto evaluate_at = [&](std::size_t i, Instant valid) {
+    if (i < job_.evaluated.begin || i >= job_.evaluated.end) return;
+    job_.evaluated.b[i] =
+        basis_at(settings_.estimator.layout, clock.at(valid).phase_rad, respiration_.clock().at(valid));
+  };
   for (std::size_t i = 0; i < job_.releases.size(); ++i) {
     const FrameRecord* earlier = history_->find(frame.index - std::min<std::uint64_t>(frame.index, i));
-    const Instant valid = earlier->stamp.capture + settings_.latency + settings_.lead;
-    const PhaseEstimate at_release = clock.at(valid);
-    const RespiratoryPhase breath = respiration_.clock().at(valid);
-    job_.releases[i] = {earlier->stamp.sequence,
-                        basis_at(settings_.estimator.layout, at_release.phase_rad, breath),
-                        {earlier->pose.valid(), earlier->pose.X_WC}};
+    job_.releases[i] = {earlier->stamp.sequence, {earlier->pose.valid(), earlier->pose.X_WC}};
+    evaluate_at(i, earlier->stamp.capture + settings_.latency + settings_.lead);
   }
+  if (!on_clock) return;
+  plan_instants(frame);
+  for (std::size_t i = 0; i < job_.instants.size(); ++i) evaluate_at(kReleasesCovered + i, job_.instants[i]);
+}
+
+// From when this frame can be mapped until the next one should have been: a frame later, and some time for what comes
+// unevenly. Told by the stamps alone, so that a replay has the same instants every time.
+void Mapper::plan_instants(const FrameRecord& frame) noexcept {
+  const FrameRecord* before = history_->find(frame.index - std::min<std::uint64_t>(frame.index, 1));
+  const Duration since = frame.stamp.capture - before->stamp.capture;
+  const Duration period = since > Duration(0) ? std::min(since, kLongestCoveredPeriod) : kLongestCoveredPeriod;
+  const Instant begin = std::max(frame.stamp.arrival, last_pose_arrival_) + settings_.lead;
+  const Duration step = (period + kCoveredBeyond) / static_cast<int>(kInstantsCovered - 1);
+  for (std::size_t i = 0; i < job_.instants.size(); ++i) job_.instants[i] = begin + static_cast<int>(i) * step;
 }
 
 void Mapper::evaluate_shard(int worker) noexcept {
@@ -386,6 +422,8 @@ void Mapper::evaluate_shard(int worker) noexcept {
     ShardSnapshot& snapshot = cell->back();
     snapshot.any = true;
     snapshot.frame_sequence = job_.frame->stamp.sequence;
+    snapshot.capture = job_.frame->stamp.capture;
+    snapshot.instants = job_.instants;
     snapshot.pose_missing = !job_.frame->pose.valid();
     for (std::size_t i = 0; i < job_.releases.size(); ++i) {
       snapshot.release_sequences[i] = job_.releases[i].frame_sequence;
@@ -455,9 +493,10 @@ void Mapper::advance_slot(FeatureGroup& group, std::size_t lane, int worker) noe
 
 void Mapper::adopt_found_features(std::uint64_t frame_index) noexcept {
   auto slot = slots_.begin();
+  int room = shedding_decision_.limit() - shedding_.followed();
   for (const FoundFeature& found : finder_.adopt(frame_index)) {
     slot = std::find_if(slot, slots_.end(), [](const FeatureSlot& s) { return s.state == SlotState::kEmpty; });
-    if (slot == slots_.end()) return;
+    if (slot == slots_.end() || room-- <= 0) return;
     slot->state = SlotState::kTracked;
     slot->id = next_id_++;
     slot->first_observed = found.first_observed;
@@ -473,6 +512,7 @@ void Mapper::adopt_found_features(std::uint64_t frame_index) noexcept {
     slot->held.clear();
     slot->failed_starts = 0;
     slot->converged = false;
+    slot->shed = false;
   }
 }
 
@@ -486,6 +526,8 @@ void Mapper::offer_to_finder(const FrameRecord& frame, const GreyImage& image) n
       occupied_.push_back(slot.match.px);
     }
   }
+  // Where there is no time for those that are there, no more are looked for.
+  free = std::min(free, shedding_decision_.limit() - shedding_.followed());
   finder_.offer(frame.index, frame.stamp, image, occupied_, free);
 }
 

@@ -17,6 +17,7 @@
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/frame_job.hpp"
 #include "core/pipeline/image_phase.hpp"
+#include "core/pipeline/load_shedding.hpp"
 #include "core/pipeline/map_feed.hpp"
 #include "core/pipeline/map_memory.hpp"
 #include "core/pipeline/phase_cells.hpp"
@@ -71,12 +72,14 @@ class Mapper {
     (static_cast<Mapper*>(self)->*Stage)(worker);
   }
   void predict_and_find_shard(int worker) noexcept;
-  void predict_releases(const FrameRecord& frame, const CardiacClock& clock) noexcept;
+  void plan_evaluation(const FrameRecord& frame, const CardiacClock& clock) noexcept;
+  void plan_instants(const FrameRecord& frame) noexcept;
   void evaluate_shard(int worker) noexcept;
   void follow_shard(int worker) noexcept;
   void learn_shard(int worker) noexcept;
   void advance_slot(FeatureGroup& group, std::size_t lane, int worker) noexcept;
   void finish_learning() noexcept;
+  void shed_load(bool put_off) noexcept;
   void expect_displacement(FrameRecord& frame) const noexcept;
   void settle_phases(const FrameRecord& frame) noexcept;
   void settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept;
@@ -114,6 +117,8 @@ class Mapper {
   PatchTracker tracker_;
   FeatureBank<double> bank_;
   std::vector<FeatureGroup> groups_;
+  LoadSheddingDecision shedding_decision_;
+  LoadShedding shedding_;
   ImagePhase image_phase_;
   NeighbourMotion motion_;
   CyclePosterior cycle_;
@@ -124,7 +129,9 @@ class Mapper {
   std::uint64_t beats_ = 0;
   std::uint32_t next_id_ = 1;
   Instant last_capture_;
+  Instant last_pose_arrival_;
   Instant learn_started_;
+  bool learning_ = false;                 // a frame's D was begun and has not been joined
   Duration computed_before_learning_{0};  // A to C and the rest of the search, of the frame that is being learnt from
   MapFeed feed_;
   std::size_t next_fed_slot_ = 0;

@@ -26,8 +26,8 @@ Pipeline::Pipeline(const PipelineSettings& settings)
       finder_(settings, counters_),
       starter_(settings, slots_),
       mapper_(settings, slots_, cells_, team_, finder_, starter_, phase_cells_, counters_),
-      schedule_(settings.latency),
-      composer_(composer_settings(settings)),
+      plan_({settings.latency, settings.frame_stream, settings.clock_period}),
+      composers_{SurfaceComposer(composer_settings(settings)), SurfaceComposer(composer_settings(settings))},
       publisher_view_(cells_.size()),
       model_view_(cells_.size()) {
   if (settings.pose.error_correlation > Duration(0)) {
@@ -77,15 +77,21 @@ void Pipeline::forget_if_asked() noexcept {
 void Pipeline::recall(const MapMemory& memory, Instant now) {
   for (const EcgBlock& block : memory.ecg) entrance_.recall_ecg(block);
   mapper_.recall(memory, now);
-  schedule_.resume(memory.last_capture, memory.last_frame_sequence, memory.frame_period, now);
+  plan_.resume(memory.last_capture, memory.last_frame_sequence, memory.frame_period, now);
 }
 
 void Pipeline::drain_stamps(Instant now) noexcept {
   const RealtimeScope realtime;
   FrameStamp stamp;
   while (entrance_.pop_stamp(stamp)) {
-    if (!schedule_.on_frame(stamp, now)) counters_.frames_too_late.add();
+    if (!plan_.on_frame(stamp, now)) counters_.frames_too_late.add();
   }
+}
+
+void Pipeline::leave_out_missed(Instant now) noexcept {
+  const RealtimeScope realtime;
+  const std::uint64_t missed = plan_.leave_out_missed(now);
+  if (missed > 0) counters_.of(ReleaseStream::kClock).releases_missed.add(missed);
 }
 
 const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
@@ -100,14 +106,16 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
   phase_cells_.publisher_respiration.update();
   const CardiacClock corrected =
       clock.front().as_of(release.deadline).corrected(phase_cells_.publisher_correction.front());
-  const SurfaceSample& sample =
-      composer_.compose(release, corrected, phase_cells_.publisher_respiration.front(), publisher_view_);
-  counters_.samples.add();
-  counters_.last_release_capture_ns.set(static_cast<std::uint64_t>(to_ns(release.capture)));
-  counters_.last_release_sequence.set(release.frame_sequence);
-  counters_.frame_period_ns.set(static_cast<std::uint64_t>(schedule_.period().count()));
-  if (release.frame_missing) counters_.samples_without_frame.add();
-  if (sample.update_late) counters_.samples_from_late_update.add();
+  const SurfaceSample& sample = composers_[index_of(release.stream)].compose(
+      release, corrected, phase_cells_.publisher_respiration.front(), publisher_view_);
+  StreamCounters& stream = counters_.of(release.stream);
+  stream.samples.add();
+  if (sample.release.frame_missing) stream.samples_without_frame.add();
+  if (sample.update_late) stream.samples_from_late_update.add();
+  const Release& due = plan_.last_due();
+  counters_.last_release_capture_ns.set(static_cast<std::uint64_t>(to_ns(due.capture)));
+  counters_.last_release_sequence.set(due.frame_sequence);
+  counters_.frame_period_ns.set(static_cast<std::uint64_t>(plan_.frame_period().count()));
   return sample;
 }
 

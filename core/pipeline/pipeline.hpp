@@ -1,6 +1,7 @@
 // All parts of the pipeline, built once and joined; the threads that run them are the daemon's.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <memory>
 #include <span>
@@ -13,7 +14,7 @@
 #include "core/pipeline/phase_cells.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
-#include "core/pipeline/release_schedule.hpp"
+#include "core/pipeline/release_plan.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/surface_composer.hpp"
@@ -32,7 +33,7 @@ class Pipeline {
   [[nodiscard]] WorkerTeam& team() noexcept { return team_; }
   [[nodiscard]] FeatureFinder& finder() noexcept { return finder_; }
   [[nodiscard]] BatchStarter& starter() noexcept { return starter_; }
-  [[nodiscard]] ReleaseSchedule& schedule() noexcept { return schedule_; }
+  [[nodiscard]] ReleasePlan& plan() noexcept { return plan_; }
   // Every feature with its match of the last frame. For tests, in lockstep: between frames nothing changes them.
   [[nodiscard]] std::span<const FeatureSlot> slots() const noexcept { return slots_; }
 
@@ -55,7 +56,9 @@ class Pipeline {
 
   // Publisher thread: takes over the stamps of the frames that have arrived.
   void drain_stamps(Instant now) noexcept;
-  // Publisher thread: the surface of one release, with all that is known now. Valid until the next call.
+  // Publisher thread: the plan's releases that it is too late for, counted.
+  void leave_out_missed(Instant now) noexcept;
+  // Publisher thread: the surface of one release, with all that is known now. Valid until the next call for its stream.
   [[nodiscard]] const SurfaceSample& compose(const Release& release) noexcept;
 
   // Status thread: the clock as it stands, with what the image makes of the running cycle.
@@ -78,8 +81,8 @@ class Pipeline {
   BatchStarter starter_;
   PhaseCells phase_cells_;
   Mapper mapper_;
-  ReleaseSchedule schedule_;
-  SurfaceComposer composer_;
+  ReleasePlan plan_;
+  std::array<SurfaceComposer, kReleaseStreams.size()> composers_;  // one a stream
   // Relaxed: a message by itself; the mapper's wake-up follows it.
   std::atomic<bool> forget_asked_{false};
   std::vector<const ShardSnapshot*> publisher_view_;

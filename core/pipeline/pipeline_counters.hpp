@@ -1,10 +1,23 @@
 // What the pipeline counts for the status topic.
 #pragma once
 
+#include <array>
+
+#include "core/pipeline/release_stream.hpp"
 #include "core/realtime/counter.hpp"
 #include "core/realtime/latency_histogram.hpp"
 
 namespace perimap {
+
+// Of one stream of surfaces. Written by the publisher thread.
+struct StreamCounters {
+  Counter samples;
+  Counter samples_without_frame;
+  Counter samples_from_late_update;
+  Counter releases_missed;  // left out, because the one after was due as well
+  LatencyHistogram release_tardiness;
+  LatencyHistogram dds_write;
+};
 
 // Each member is written by one thread, named here, and read by the status thread.
 struct PipelineCounters {
@@ -52,6 +65,8 @@ struct PipelineCounters {
   Counter features_converging;
   Counter features_converged;
   Counter features_inconsistent;
+  Counter features_shed;  // not looked for now, see LoadShedding
+  Counter times_shed;
   Counter features_lost;
   Counter maps_forgotten;         // by command, for a new patient
   Counter features_started_anew;  // inconsistent, also after inflation
@@ -65,14 +80,13 @@ struct PipelineCounters {
   Counter searches_failed;
   // publisher thread
   Counter frames_too_late;
-  Counter samples;
-  Counter samples_without_frame;
-  Counter samples_from_late_update;
   Counter last_release_capture_ns;  // where the frame times go on after a restart
   Counter last_release_sequence;
   Counter frame_period_ns;
-  LatencyHistogram release_tardiness;
-  LatencyHistogram dds_write;
+  std::array<StreamCounters, kReleaseStreams.size()> streams;
+
+  [[nodiscard]] StreamCounters& of(ReleaseStream stream) noexcept { return streams[index_of(stream)]; }
+  [[nodiscard]] const StreamCounters& of(ReleaseStream stream) const noexcept { return streams[index_of(stream)]; }
 };
 
 }  // namespace perimap

@@ -11,6 +11,7 @@
 #include "core/phase/r_trigger.hpp"
 #include "core/phase/respiratory_tracker.hpp"
 #include "core/pipeline/pose_history.hpp"
+#include "core/pipeline/release_stream.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
@@ -42,7 +43,10 @@ struct PipelineSettings {
   int workers = 2;
   Duration latency = std::chrono::milliseconds(50);  // L: release minus capture
   Duration lead{0};                                  // valid time minus release
+  bool frame_stream = true;                          // a surface for each frame, at capture + L
+  Duration clock_period{0};                          // a surface at each multiple of it, too; 0: none
   Duration budget = std::chrono::milliseconds(12);   // kept free for A to C before the release
+  bool shedding = true;  // of features that the budget does not suffice for; not in lockstep
   Duration validity = std::chrono::milliseconds(200);
   bool phase_from_image = true;
   bool law_from_image = false;                      // clock.law holds until the images show another
@@ -52,6 +56,14 @@ struct PipelineSettings {
   // same samples every time.
   bool lockstep = false;
 };
+
+[[nodiscard]] inline bool publishes(const PipelineSettings& settings, ReleaseStream stream) noexcept {
+  return stream == ReleaseStream::kFrame ? settings.frame_stream : settings.clock_period > Duration(0);
+}
+// That which stands for all where there is but one message.
+[[nodiscard]] inline ReleaseStream first_stream(const PipelineSettings& settings) noexcept {
+  return settings.frame_stream ? ReleaseStream::kFrame : ReleaseStream::kClock;
+}
 
 inline constexpr int kMaxStartObservations = 96;
 // Frames from a search for new features to their adoption: the finder follows them through these frames.

@@ -1,10 +1,11 @@
-// When each surface of the `frame` mode is due, whether or not its frame comes.
+// When each frame's surface is due, whether or not the frame comes.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <optional>
 
+#include "core/pipeline/release_stream.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/time/instant.hpp"
 
@@ -14,8 +15,9 @@ namespace perimap {
 struct Release {
   std::uint64_t frame_sequence = 0;
   Instant capture;             // of the frame, or where the fitted frame rate puts it
-  Instant deadline;            // capture + L
+  Instant deadline;            // capture + L; of the clock's stream an instant of its grid
   bool frame_missing = false;  // no frame has come for this release
+  ReleaseStream stream = ReleaseStream::kFrame;
 };
 
 // Every frame is released at capture + L. Where a frame is missing (dropped, or the camera has stopped) the release

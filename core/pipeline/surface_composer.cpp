@@ -14,41 +14,86 @@ SurfaceComposer::SurfaceComposer(const ComposerSettings& settings) : settings_(s
   order_.reserve(settings.maximum_features);
 }
 
+SurfaceComposer::Covered SurfaceComposer::covered_by(const ShardSnapshot& snapshot, const Release& release,
+                                                     Instant valid) noexcept {
+  if (release.stream == ReleaseStream::kFrame) {
+    const auto& sequences = snapshot.release_sequences;
+    const auto found = std::find(sequences.begin(), sequences.end(), release.frame_sequence);
+    if (found == sequences.end() || release.frame_missing) return {};
+    const auto i = static_cast<std::size_t>(found - sequences.begin());
+    return {true, i, i, 0.0};
+  }
+  for (std::size_t i = 1; i < snapshot.instants.size(); ++i) {
+    const Instant before = snapshot.instants[i - 1];
+    const Instant after = snapshot.instants[i];
+    if (before > valid || valid > after || before == after) continue;
+    const std::size_t first = kReleasesCovered + i - 1;
+    return {true, first, first + 1, to_seconds(valid - before) / to_seconds(after - before)};
+  }
+  return {};
+}
+
+// Where the snapshot was not evaluated (the update is late, or there is no frame), the largest deviation over the cycle
+// bounds it.
+Matrix3d SurfaceComposer::map_covariance(const FeatureSnapshot& feature, const Covered& covered) noexcept {
+  if (!covered.any) return Matrix3d::Identity() * feature.largest_deviation_mm * feature.largest_deviation_mm;
+  if (covered.before == covered.after) return feature.covariances_W_mm2[covered.before];
+  return (1.0 - covered.share) * feature.covariances_W_mm2[covered.before] +
+         covered.share * feature.covariances_W_mm2[covered.after];
+}
+
+// Which frame the sample belongs to, which update is its oldest, and where the camera was.
+void SurfaceComposer::rest_on(const Release& release, std::span<const ShardSnapshot* const> snapshots) noexcept {
+  sample_.release = release;
+  sample_.camera = {};
+  sample_.oldest_shard_frame_sequence = std::numeric_limits<std::uint64_t>::max();
+  const ShardSnapshot* oldest = nullptr;
+  for (const ShardSnapshot* snapshot : snapshots) {
+    const std::uint64_t sequence = snapshot->any ? snapshot->frame_sequence : 0;
+    if (sequence < sample_.oldest_shard_frame_sequence) {
+      sample_.oldest_shard_frame_sequence = sequence;
+      oldest = snapshot;
+    }
+    if (release.stream == ReleaseStream::kClock || !snapshot->any || release.frame_missing) continue;
+    const Covered covered = covered_by(*snapshot, release, sample_.valid_time);
+    if (covered.any) sample_.camera = snapshot->cameras[covered.before];
+  }
+  if (release.stream != ReleaseStream::kClock || oldest == nullptr || !oldest->any) return;
+  sample_.release.frame_sequence = oldest->frame_sequence;
+  sample_.release.capture = oldest->capture;
+  sample_.release.frame_missing = release.frame_missing && oldest->frame_sequence < release.frame_sequence;
+  sample_.camera = oldest->cameras[0];
+}
+
 const SurfaceSample& SurfaceComposer::compose(const Release& release, const CardiacClock& clock,
                                               const RespiratoryClock& respiration,
                                               std::span<const ShardSnapshot* const> snapshots) noexcept {
   const RealtimeScope realtime;
   ++sample_.sample_sequence;
-  sample_.release = release;
   sample_.valid_time = release.deadline + settings_.lead;
   sample_.valid_until = sample_.valid_time + settings_.validity;
+  rest_on(release, snapshots);
 
   order_.clear();
   bool pose_missing = false;
-  sample_.camera = {};
-  std::uint64_t oldest = std::numeric_limits<std::uint64_t>::max();
   for (const ShardSnapshot* snapshot : snapshots) {
-    oldest = std::min(oldest, snapshot->any ? snapshot->frame_sequence : 0);
     pose_missing = pose_missing || snapshot->pose_missing;
-    const auto covered =
-        std::find(snapshot->release_sequences.begin(), snapshot->release_sequences.end(), release.frame_sequence);
-    const auto i = static_cast<std::size_t>(covered - snapshot->release_sequences.begin());
-    if (i < kReleasesCovered && snapshot->any && !release.frame_missing) sample_.camera = snapshot->cameras[i];
-    for (const FeatureSnapshot& feature : snapshot->features) order_.push_back({&feature, i});
+    const Covered covered = covered_by(*snapshot, release, sample_.valid_time);
+    for (const FeatureSnapshot& feature : snapshot->features) order_.push_back({&feature, covered});
   }
   std::sort(order_.begin(), order_.end(),
             [](const Ordered& a, const Ordered& b) { return a.feature->id < b.feature->id; });
 
   const PhaseEstimate phase = clock.at(sample_.valid_time);
-  sample_.oldest_shard_frame_sequence = oldest;
   sample_.cardiac_phase_rad = phase.phase_rad;
   sample_.cardiac_phase_deviation_rad = phase.deviation_s * phase.rate_rad_per_s;
   sample_.cardiac_phase_rate_rad_per_s = phase.rate_rad_per_s;
-  const bool late = oldest < release.frame_sequence && !release.frame_missing;
+  const bool missing = sample_.release.frame_missing;
+  const bool late = sample_.oldest_shard_frame_sequence < release.frame_sequence && !missing;
   sample_.update_late = late;
   const SurfaceFooting footing{.breath_unknown = respiration.unknown(),
                                .mapped = !order_.empty(),
-                               .frame_missing = release.frame_missing,
+                               .frame_missing = missing,
                                .update_late = late,
                                .pose_missing = pose_missing};
   sample_.reason = reason_of(phase, clock.rhythm(), footing);
@@ -67,14 +112,9 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
     feature.p_WF_mm = position_of(snapshot->x, b);
     feature.velocity_W_mm_per_s = velocity_of(snapshot->x, b_rate, phase.rate_rad_per_s) +
                                   velocity_of(snapshot->x, b_breath_rate, breath.rate_rad_per_s);
-    // Where the snapshot was not evaluated at this release (the update is late, or there is no frame), the largest
-    // deviation over the cycle bounds the covariance.
     feature.covariance_W_mm2 =
         phase_spread(feature.p_WF_mm, position_of(snapshot->x, about.earlier), position_of(snapshot->x, about.later));
-    feature.covariance_W_mm2 +=
-        covered < kReleasesCovered && !release.frame_missing
-            ? snapshot->covariances_W_mm2[covered]
-            : Matrix3d(Matrix3d::Identity() * snapshot->largest_deviation_mm * snapshot->largest_deviation_mm);
+    feature.covariance_W_mm2 += map_covariance(*snapshot, covered);
     feature.covariance_W_mm2 += of_breath;
     feature.last_observed = snapshot->last_observed;
     const FeatureVerdict verdict = verdict_of({snapshot->state, snapshot->reason}, phase.state, footing);

@@ -20,8 +20,12 @@ struct ComposerSettings {
   std::size_t maximum_features = 0;
 };
 
-// Belongs to the publisher. Positions and velocities are evaluated anew from the coefficients with the phase as it is
-// known now. To the covariance of the map comes phase_spread(), what the phase's deviation makes of the motion.
+// Belongs to the publisher; one for each stream, whose samples it counts. Positions and velocities are evaluated anew
+// from the coefficients with the phase as it is known now. To the covariance of the map comes phase_spread(), what the
+// phase's deviation makes of the motion.
+//
+// A frame's surface belongs to that frame. One of the clock's belongs to the newest frame that all shards have mapped,
+// which may be newer than the one that is owed by then.
 class SurfaceComposer {
  public:
   explicit SurfaceComposer(const ComposerSettings& settings);
@@ -34,10 +38,22 @@ class SurfaceComposer {
  private:
   ComposerSettings settings_;
   SurfaceSample sample_;
+  // Which of a shard's covariances are of the instant that is asked for: between two of them, so far from the first.
+  struct Covered {
+    bool any = false;
+    std::size_t before = 0;
+    std::size_t after = 0;
+    double share = 0.0;
+  };
   struct Ordered {
     const FeatureSnapshot* feature;
-    std::size_t covered;  // which of its covariances is of this release; kReleasesCovered: none
+    Covered covered;
   };
+  [[nodiscard]] static Covered covered_by(const ShardSnapshot& snapshot, const Release& release,
+                                          Instant valid) noexcept;
+  [[nodiscard]] static Matrix3d map_covariance(const FeatureSnapshot& feature, const Covered& covered) noexcept;
+  void rest_on(const Release& release, std::span<const ShardSnapshot* const> snapshots) noexcept;
+
   std::vector<Ordered> order_;
 };
 

@@ -29,7 +29,7 @@ enum class SurfaceReason : std::uint8_t {
   kRhythmEctopic
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
-enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost };
+enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost, kShed };
 
 struct SurfaceFeature {
   std::uint32_t id = 0;
@@ -49,7 +49,7 @@ struct CameraPlace {
 
 struct SurfaceSample {
   std::uint64_t sample_sequence = 0;
-  Release release;
+  Release release;  // its frame and capture are those that the sample belongs to, whichever its stream
   Instant valid_time;
   Instant valid_until;
   SurfaceState state = SurfaceState::kInvalid;

@@ -52,6 +52,15 @@ std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_real
     add("rate", name, best, [every = every](LiveCase& one) { one.every_frame = every; });
   }
   add("rate", "twice as fast", best, [](LiveCase& one) { one.speed = 2.0; });
+  // The clock's releases beside the frames', and what these are then.
+  for (const double rate_hz : {100.0, 250.0, 1000.0}) {
+    for (const ReleaseStream stream : {ReleaseStream::kClock, ReleaseStream::kFrame}) {
+      add("clock", fmt::format("clock at {:.0f}/s: stream {}", rate_hz, name_of(stream)), best, [&](LiveCase& one) {
+        one.stream = stream;
+        one.clock_rate_hz = rate_hz;
+      });
+    }
+  }
   for (const int features : {50, 100, 200, 400, 1000}) {
     add("features", fmt::format("{} features", features), best, [&](LiveCase& one) { one.features = features; });
   }

@@ -17,8 +17,8 @@
 namespace perimap::bench {
 
 // The parts, in the order in which they are run.
-inline const std::vector<std::string> kParts = {"live",    "ddsperf", "subscribers", "recording", "load",
-                                                "workers", "rate",    "features",    "cost",      "memory"};
+inline const std::vector<std::string> kParts = {"live", "ddsperf", "subscribers", "recording", "load",  "workers",
+                                                "rate", "clock",   "features",    "cost",      "memory"};
 
 struct BenchSettings {
   BenchInput input;

@@ -18,6 +18,7 @@ Expected<ReplaySetup> prepare_run(const BenchInput& input, int features, int wor
   pipeline.features.minimum_distance_px =
       std::clamp(std::sqrt(pixels / (2.0 * features)), 1.0, pipeline.features.minimum_distance_px);
   pipeline.workers = workers;
+  pipeline.shedding = false;  // what is asked for is what is measured
   setup->identity.source = "perimap-bench";
   return std::move(*setup);
 }

@@ -92,7 +92,7 @@ Expected<ChildProcess> begin_stress(const std::filesystem::path& scratch) {
 Expected<std::vector<Subscriber>> begin_subscribers(int domain, const LiveCase& live_case) {
   std::vector<Subscriber> subscribers;
   for (int i = 0; i < live_case.subscribers + (live_case.slow_subscriber ? 1 : 0); ++i) {
-    auto subscriber = Subscriber::start(domain, i < live_case.subscribers ? Duration(0) : kSlowPause);
+    auto subscriber = Subscriber::start(domain, live_case.stream, i < live_case.subscribers ? Duration(0) : kSlowPause);
     if (!subscriber) return tl::unexpected(subscriber.error());
     subscribers.push_back(std::move(*subscriber));
   }
@@ -183,6 +183,9 @@ Expected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case
   auto setup = prepare_run(input, live_case.features, live_case.workers);
   if (!setup) return tl::unexpected(setup.error());
   setup->configuration.dds.domain = input.domain;
+  setup->pipeline.frame_stream = true;
+  setup->pipeline.clock_period =
+      live_case.clock_rate_hz > 0.0 ? from_seconds(1.0 / live_case.clock_rate_hz) : Duration(0);
 
   std::optional<ChildProcess> stress;
   if (live_case.stress) {
@@ -209,7 +212,7 @@ Expected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case
   Pipeline pipeline(setup->pipeline);
   RuntimeSettings runtime = runtime_settings(setup->configuration, setup->identity);
   runtime.scheduling = {live_case.priority, live_case.cpus};
-  ReleaseLog log(**publication, kMostReleases);
+  ReleaseLog log(**publication, live_case.stream, kMostReleases);
   StageCounts before{};
   bool settled = false;
   Expected<void> ended;
@@ -219,7 +222,7 @@ Expected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case
     const PipelineCounters& counters = pipeline.counters();
     std::optional<Instant> first;
     const auto tick = [&] {
-      if (settled || counters.samples.get() == 0) return;
+      if (settled || counters.of(live_case.stream).samples.get() == 0) return;
       const Instant now = MonotonicClock::now();
       if (!first) first = now;
       if (now - *first < input.settle) return;
@@ -250,8 +253,10 @@ Expected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case
   }
   figures.frames_dropped = counters.frames_dropped.get();
   figures.frames_too_late = counters.frames_too_late.get();
-  figures.without_frame = counters.samples_without_frame.get();
-  figures.from_late_update = counters.samples_from_late_update.get();
+  const StreamCounters& stream = counters.of(live_case.stream);
+  figures.without_frame = stream.samples_without_frame.get();
+  figures.from_late_update = stream.samples_from_late_update.get();
+  figures.releases_missed = stream.releases_missed.get();
   figures.learning_put_off = counters.learning_put_off.get();
   if (recorder) {
     const SessionRecorder::Summary summary = recorder->summary();

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "core/pipeline/release_stream.hpp"
 #include "core/realtime/latency_histogram.hpp"
 #include "daemon/bench/bench_input.hpp"
 #include "daemon/bench/figures.hpp"
@@ -21,6 +22,9 @@ struct LiveCase {
   std::vector<int> cpus;
   int every_frame = 1;  // every n-th frame of the recording is played
   double speed = 1.0;   // all its clocks run so much faster
+  // The releases that are measured; the frames' are published beside the clock's.
+  ReleaseStream stream = ReleaseStream::kFrame;
+  double clock_rate_hz = 0.0;  // 0: without the clock's
   int subscribers = 1;
   bool slow_subscriber = false;  // one more, which does something else for 200 ms after each take
   bool recording = false;        // while it publishes
@@ -51,6 +55,7 @@ struct LiveFigures {
   std::uint64_t frames_too_late = 0;
   std::uint64_t without_frame = 0;
   std::uint64_t from_late_update = 0;
+  std::uint64_t releases_missed = 0;
   std::uint64_t learning_put_off = 0;
   std::uint64_t frames_not_recorded = 0;
   bool priority_granted = false;

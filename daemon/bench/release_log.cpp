@@ -2,12 +2,16 @@
 
 namespace perimap::bench {
 
-ReleaseLog::ReleaseLog(Publication& next, std::size_t capacity) : next_(next) { releases_.reserve(capacity); }
+ReleaseLog::ReleaseLog(Publication& next, ReleaseStream stream, std::size_t capacity)
+    : next_(next), stream_(name_of(stream)) {
+  releases_.reserve(capacity);
+}
 
 void ReleaseLog::surface(const perimap_Surface& sample) {
   const Instant ready = MonotonicClock::now();
   next_.surface(sample);
   const Instant written = MonotonicClock::now();
+  if (sample.stream != stream_) return;
   const std::int64_t before = newest_deadline_ns();
   if (before != 0) period_ns_.store(sample.release_time_ns - before, std::memory_order_relaxed);
   deadline_ns_.store(sample.release_time_ns, std::memory_order_relaxed);

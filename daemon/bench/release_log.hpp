@@ -4,8 +4,10 @@
 #include <atomic>
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <vector>
 
+#include "core/pipeline/release_stream.hpp"
 #include "daemon/publishing/publication.hpp"
 
 namespace perimap::bench {
@@ -19,10 +21,11 @@ struct LoggedRelease {
   std::uint32_t features = 0;
 };
 
-// Hands everything on to `next`, which must outlive it. Nothing is allocated while it logs.
+// Hands everything on to `next`, which must outlive it, and logs one stream's surfaces. Nothing is allocated while it
+// logs.
 class ReleaseLog final : public Publication {
  public:
-  ReleaseLog(Publication& next, std::size_t capacity);
+  ReleaseLog(Publication& next, ReleaseStream stream, std::size_t capacity);
 
   void surface(const perimap_Surface& sample) override;
   void surface_model(const perimap_SurfaceModel& model) override { next_.surface_model(model); }
@@ -40,6 +43,7 @@ class ReleaseLog final : public Publication {
 
  private:
   Publication& next_;
+  std::string_view stream_;
   std::vector<LoggedRelease> releases_;
   // Relaxed: a reader needs either as a hint of where the next release is, nothing else with it.
   std::atomic<std::int64_t> deadline_ns_{0};

@@ -29,7 +29,7 @@ void wait_for_the_end_of_input() {
 
 }  // namespace
 
-Expected<void> subscribe_until_input_ends(int domain, Duration pause) {
+Expected<void> subscribe_until_input_ends(int domain, const std::string& stream, Duration pause) {
   auto participant = dds::Participant::create(domain);
   if (!participant) return tl::unexpected(participant.error());
   auto reader = dds::Reader<perimap_Surface>::create(*participant);
@@ -52,7 +52,8 @@ Expected<void> subscribe_until_input_ends(int domain, Duration pause) {
           return;
         }
         for (std::size_t i = 0; i < loan->size(); ++i) {
-          if (loan->sample(i) != nullptr) receipts.push_back({loan->sample(i)->sample_sequence, now});
+          const perimap_Surface* sample = loan->sample(i);
+          if (sample != nullptr && sample->stream == stream) receipts.push_back({sample->sample_sequence, now});
         }
         if (pause > Duration(0)) std::this_thread::sleep_for(pause);
       }
@@ -83,13 +84,14 @@ Expected<Receipt> parse_receipt(const std::string& line) {
   return fail(fmt::format("subscriber: expected a sequence number and a time, got '{}'", line));
 }
 
-Expected<Subscriber> Subscriber::start(int domain, Duration pause) {
+Expected<Subscriber> Subscriber::start(int domain, ReleaseStream stream, Duration pause) {
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
   if (error) return fail("/proc/self/exe: " + error.message());
   auto child = ChildProcess::start(
-      program.string(), {kSubscriberCommand, "--domain", std::to_string(domain), "--pause-ms",
-                         std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(pause).count())});
+      program.string(),
+      {kSubscriberCommand, "--domain", std::to_string(domain), "--stream", std::string(name_of(stream)), "--pause-ms",
+       std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(pause).count())});
   if (!child) return tl::unexpected(child.error());
   const auto line = child->read_line();
   if (!line || *line != kReady) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "core/pipeline/release_stream.hpp"
 #include "core/time/instant.hpp"
 #include "daemon/bench/child_process.hpp"
 
@@ -16,15 +17,15 @@ struct Receipt {
   Instant time;
 };
 
-// The child's side: receives surfaces until its standard input ends, then prints them. `pause`: how long it does
-// something else after each time it has taken samples.
-[[nodiscard]] Expected<void> subscribe_until_input_ends(int domain, Duration pause);
+// The child's side: receives a stream's surfaces until its standard input ends, then prints them. `pause`: how long it
+// does something else after each time it has taken samples.
+[[nodiscard]] Expected<void> subscribe_until_input_ends(int domain, const std::string& stream, Duration pause);
 
 // The parent's side. The program is this one, run again with the arguments that lead to subscribe_until_input_ends().
 class Subscriber {
  public:
   // Returns when its reader is there.
-  [[nodiscard]] static Expected<Subscriber> start(int domain, Duration pause);
+  [[nodiscard]] static Expected<Subscriber> start(int domain, ReleaseStream stream, Duration pause);
   // Ends it; what it received, in order.
   [[nodiscard]] Expected<std::vector<Receipt>> finish();
 

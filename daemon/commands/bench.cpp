@@ -113,15 +113,18 @@ int run(const Options& options) {
 void add_subscriber_command(CLI::App& app, int& exit_code) {
   struct SubscriberOptions {
     int domain = 0;
+    std::string stream = "frame";
     int pause_ms = 0;
   };
   const auto options = std::make_shared<SubscriberOptions>();
   CLI::App* command = app.add_subcommand(bench::kSubscriberCommand, "What perimap bench runs in another process");
   command->group("");
   command->add_option("--domain", options->domain)->check(CLI::Range(0, 230));
+  command->add_option("--stream", options->stream);
   command->add_option("--pause-ms", options->pause_ms)->check(CLI::Range(0, 10'000));
   command->callback([options, &exit_code] {
-    const auto done = bench::subscribe_until_input_ends(options->domain, std::chrono::milliseconds(options->pause_ms));
+    const auto done = bench::subscribe_until_input_ends(options->domain, options->stream,
+                                                        std::chrono::milliseconds(options->pause_ms));
     exit_code = done ? 0 : complain(done.error());
   });
 }

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/config/surface_traffic.hpp"
 #include "daemon/runtime/device_setup.hpp"
 #include "daemon/runtime/thread_launcher.hpp"
 
@@ -51,7 +52,8 @@ void add_check_command(CLI::App& app, int& exit_code) {
   command->callback([file, &exit_code] {
     const Expected<Configuration> configuration = load_whole(*file);
     if (configuration) {
-      fmt::print("{}", to_toml(*configuration));
+      fmt::print("{}\n", to_toml(*configuration));
+      for (const std::string& line : traffic_lines(*configuration)) fmt::print("# {}\n", line);
       tell_refused_privileges(configuration->realtime);
     } else {
       fmt::print(stderr, "{}\n", configuration.error().message);

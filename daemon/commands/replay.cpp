@@ -52,23 +52,26 @@ class ReplayPublication final : public Publication {
                     Publication* dds)
       : recorder_(recorder), dds_(dds), truth_(truth) {
     if (truth == nullptr) return;
-    accuracy_.emplace(truth->truth, truth->camera, truth->captures.begin()->second);
-    accuracy_->set_beats(beats);
+    for (std::size_t i = 0; i < kReleaseStreams.size(); ++i) {
+      accuracies_.emplace_back(truth->truth, truth->camera, truth->captures.begin()->second).set_beats(beats);
+    }
   }
 
   void surface(const perimap_Surface& sample) override {
     if (recorder_ != nullptr) recorder_->surface(sample);
     if (dds_ != nullptr) dds_->surface(sample);
-    if (!accuracy_) return;
+    if (accuracies_.empty()) return;
     if (!to_recording_ && rests_on_its_frame(sample.reason)) {
       to_recording_ = truth_->to_recording(sample.frame_sequence, from_ns(sample.capture_time_ns));
     }
-    accuracy_->add(sample);
+    accuracies_[index_of(sample.stream == name_of(ReleaseStream::kClock) ? ReleaseStream::kClock
+                                                                         : ReleaseStream::kFrame)]
+        .add(sample);
   }
   void surface_model(const perimap_SurfaceModel& model) override {
     if (recorder_ != nullptr) recorder_->surface_model(model);
     if (dds_ != nullptr) dds_->surface_model(model);
-    if (accuracy_) accuracy_->add(model);
+    for (Accuracy& accuracy : accuracies_) accuracy.add(model);
   }
   void phase(const perimap_Phase& phase) override {
     if (recorder_ != nullptr) recorder_->phase(phase);
@@ -80,16 +83,16 @@ class ReplayPublication final : public Publication {
   }
 
   // After every thread that publishes has ended.
-  [[nodiscard]] std::optional<AccuracyReport> report() {
-    if (!accuracy_ || !to_recording_) return std::nullopt;
-    return accuracy_->report(*to_recording_);
+  [[nodiscard]] std::optional<AccuracyReport> report(ReleaseStream stream) {
+    if (accuracies_.empty() || !to_recording_) return std::nullopt;
+    return accuracies_[index_of(stream)].report(*to_recording_);
   }
 
  private:
   PublicationRecorder* recorder_;
   Publication* dds_;
   const RecordedTruth* truth_;
-  std::optional<Accuracy> accuracy_;
+  std::vector<Accuracy> accuracies_;  // by ReleaseStream; none without a truth
   std::optional<Duration> to_recording_;
 };
 
@@ -103,28 +106,38 @@ struct Stage {
   const LatencyHistogram* histogram;
 };
 
-std::vector<Stage> stages(const PipelineCounters& c, bool lockstep) {
+std::vector<Stage> stages(const PipelineCounters& c, const PipelineSettings& settings) {
   std::vector<Stage> all = {{"predict and find", &c.predict_and_find},
                             {"phase and pose", &c.phase_and_pose},
                             {"evaluate", &c.evaluate},
                             {"learn", &c.learn}};
   // Deadlines are virtual in lockstep: nothing is early or late.
-  if (!lockstep) {
+  if (!settings.lockstep) {
     all.push_back({"capture to update", &c.capture_to_update});
-    all.push_back({"release tardiness", &c.release_tardiness});
+    if (settings.frame_stream) all.push_back({"release tardiness", &c.of(ReleaseStream::kFrame).release_tardiness});
+    if (publishes(settings, ReleaseStream::kClock)) {
+      all.push_back({"clock tardiness", &c.of(ReleaseStream::kClock).release_tardiness});
+    }
   }
   return all;
 }
 
-std::string stage_table(const PipelineCounters& counters, bool lockstep) {
+std::string stage_table(const PipelineCounters& counters, const PipelineSettings& settings) {
   std::string table = fmt::format("{:<18} {:>8} {:>10} {:>10} {:>10}  (us)\n", "stage", "count", "p50", "p99", "max");
-  for (const Stage& stage : stages(counters, lockstep)) {
+  for (const Stage& stage : stages(counters, settings)) {
     const auto s = stage.histogram->summary();
     const auto us = [](Duration d) { return std::chrono::duration<double, std::micro>(d).count(); };
     table += fmt::format("{:<18} {:>8} {:>10.1f} {:>10.1f} {:>10.1f}\n", stage.name, s.count, us(s.p50), us(s.p99),
                          us(s.max));
   }
   return table;
+}
+
+nlohmann::json stream_counts(const StreamCounters& c) {
+  return {{"samples", c.samples.get()},
+          {"samples_without_frame", c.samples_without_frame.get()},
+          {"samples_from_late_update", c.samples_from_late_update.get()},
+          {"releases_missed", c.releases_missed.get()}};
 }
 
 nlohmann::json counts(const PipelineCounters& c) {
@@ -134,12 +147,11 @@ nlohmann::json counts(const PipelineCounters& c) {
           {"frames_without_pose", c.frames_without_pose.get()},
           {"frames_without_phase", c.frames_without_phase.get()},
           {"phases_from_image", c.phases_from_image.get()},
-          {"samples", c.samples.get()},
-          {"samples_without_frame", c.samples_without_frame.get()},
-          {"samples_from_late_update", c.samples_from_late_update.get()},
           {"learning_put_off", c.learning_put_off.get()},
           {"adoptions_late", c.adoptions_late.get()},
           {"features_converged", c.features_converged.get()},
+          {"features_shed", c.features_shed.get()},
+          {"times_shed", c.times_shed.get()},
           {"features_lost", c.features_lost.get()},
           {"features_started_anew", c.features_started_anew.get()},
           {"respiration_samples", c.respiration_samples.get()},
@@ -223,6 +235,10 @@ int replay(const Options& options) {
   }
   ReplayPublication publication(*truth ? &**truth : nullptr, *beats, recorder.get(), dds.get());
 
+  std::vector<ReleaseStream> streams;
+  for (const ReleaseStream stream : kReleaseStreams) {
+    if (publishes(setup->pipeline, stream)) streams.push_back(stream);
+  }
   Pipeline pipeline(setup->pipeline);
   bool stopped = false;
   {
@@ -243,32 +259,46 @@ int replay(const Options& options) {
     if (const auto finished = recorder->finish(); !finished) return refuse(finished.error(), kFailure);
   }
 
-  const auto report = publication.report();
   const PipelineCounters& counters = pipeline.counters();
-  fmt::print("{}{} frames, {} samples ({} without frame, {} from a late update), {} frames without pose\n\n{}\n",
-             stopped ? "stopped early: " : "", counters.frames.get(), counters.samples.get(),
-             counters.samples_without_frame.get(), counters.samples_from_late_update.get(),
-             counters.frames_without_pose.get(), stage_table(counters, options.lockstep));
-  fmt::print("{}", breath_text(pipeline.status_respiration()));
-  if (report) {
+  fmt::print("{}{} frames, {} of them without pose\n", stopped ? "stopped early: " : "", counters.frames.get(),
+             counters.frames_without_pose.get());
+  for (const ReleaseStream stream : streams) {
+    const StreamCounters& c = counters.of(stream);
+    fmt::print("stream {}: {} samples ({} without frame, {} from a late update), {} releases missed\n", name_of(stream),
+               c.samples.get(), c.samples_without_frame.get(), c.samples_from_late_update.get(),
+               c.releases_missed.get());
+  }
+  fmt::print("\n{}\n{}", stage_table(counters, pipeline.settings()), breath_text(pipeline.status_respiration()));
+  // The first stream's in its old place, for who knows of no other.
+  nlohmann::json accuracy;
+  nlohmann::json told_of_streams;
+  for (const ReleaseStream stream : streams) {
+    nlohmann::json& told = told_of_streams[std::string(name_of(stream))] = stream_counts(counters.of(stream));
+    const auto report = publication.report(stream);
+    if (!report) continue;
+    if (streams.size() > 1) fmt::print("stream {}\n", name_of(stream));
     fmt::print("{}\n", to_text(*report));
-  } else {
+    (stream == streams.front() ? accuracy : told["accuracy"]) = to_json(*report);
+  }
+  if (!*truth) {
     fmt::print("no ground truth in this recording: {} features converged\n", counters.features_converged.get());
   }
   if (!options.json.empty()) {
     nlohmann::json json = {{"recording", options.recording},
                            {"lockstep", options.lockstep},
                            {"workers", setup->pipeline.workers},
-                           {"counts", counts(counters)}};
+                           {"counts", counts(counters)},
+                           {"streams", told_of_streams}};
+    json["counts"].update(stream_counts(counters.of(streams.front())));
+    if (!accuracy.is_null()) json["accuracy"] = accuracy;
     const RespiratoryClock breath = pipeline.status_respiration();
     json["breath_s"] = to_seconds(breath.period());
     json["breath_suspected"] = breath.suspected;
     json["breath_state"] = name_of(to_wire(breath.state));
     json["breath_source"] = name_of(to_wire(breath.source));
-    for (const Stage& stage : stages(counters, options.lockstep)) {
+    for (const Stage& stage : stages(counters, pipeline.settings())) {
       json["stages"][stage.name] = to_json(stage.histogram->summary());
     }
-    if (report) json["accuracy"] = to_json(*report);
     const auto written = write_text_file(options.json, json.dump(2) + "\n");
     if (!written) return refuse(written.error(), kFailure);
   }

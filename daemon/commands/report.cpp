@@ -20,6 +20,7 @@ namespace {
 struct Options {
   std::string recording;
   std::string samples;
+  std::string stream;
   std::string picture;
   std::string json;
   bool whole = false;
@@ -44,8 +45,8 @@ int refuse(const std::string& message) {
 }
 
 int report(const Options& options) {
-  const auto result =
-      report_samples(options.recording, options.samples, options.whole ? ReadMode::kWhole : ReadMode::kStrict);
+  const auto result = report_samples(options.recording, options.samples, options.stream,
+                                     options.whole ? ReadMode::kWhole : ReadMode::kStrict);
   if (!result) return refuse(result.error().message);
   fmt::print("samples     {} received, {} missed, {} without frame, {} from a late update\n", result->samples,
              result->missed, result->without_frame, result->from_late_update);
@@ -90,6 +91,7 @@ void add_report_command(CLI::App& app, int& exit_code) {
   command->add_option("RECORDING", options->recording, "The simulated recording (MCAP)")->required();
   command->add_option("--samples", options->samples, "What was received (perimap watch --record, replay --samples)")
       ->required();
+  command->add_option("--stream", options->stream, "The stream to report on, where there are several: frame or clock");
   command->add_option("--picture", options->picture, "Write motion paths and error over time to this SVG file");
   command->add_option("--json", options->json, "Write the report as JSON to this file");
   command->add_flag("--whole", options->whole, "Use what is whole of damaged files");

@@ -2,6 +2,7 @@
 // configuration_keys.cpp. Members of a file that is loaded over a base replace the base's, key by key.
 #pragma once
 
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -112,12 +113,14 @@ struct RespirationConfiguration {
 };
 
 struct PipelineConfiguration {
-  enum class Release { kFrame, kClock };
+  enum class Release { kFrame, kClock, kBoth };
 
   Release release = Release::kFrame;
+  double clock_rate_hz = 100.0;                      // of the clock's releases
   Duration latency = std::chrono::milliseconds(50);  // L: release minus capture
   Duration lead{0};                                  // valid time minus release
   Duration budget = std::chrono::milliseconds(12);   // computing time kept free before the release
+  bool shedding = true;
   int workers = 2;
   int adoption_delay_frames = 15;  // D: from a housekeeping request to the frame that adopts its result
 
@@ -163,6 +166,7 @@ struct DdsConfiguration {
   Duration surface_deadline = std::chrono::milliseconds(200);  // offered period of `surface`; 0: none
   Duration surface_lifespan = std::chrono::milliseconds(200);  // 0: none
   Duration surface_model_interval = std::chrono::milliseconds(500);
+  double maximum_MB_per_s = 50.0;  // of surfaces, 1e6 bytes
 
   bool operator==(const DdsConfiguration&) const = default;
 };
@@ -224,6 +228,11 @@ struct Configuration {
 
   bool operator==(const Configuration&) const = default;
 };
+
+// From one of the clock's releases to the next, whether or not it releases.
+[[nodiscard]] inline Duration clock_period(const PipelineConfiguration& pipeline) noexcept {
+  return Duration(std::llround(1e9 / pipeline.clock_rate_hz));
+}
 
 // The bound below which a feature counts as converged: the configured one, or 1 mm with an exact tracker and 2 mm with
 // a noisy one.

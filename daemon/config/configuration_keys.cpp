@@ -242,12 +242,11 @@ class Section {
 
   template <class Enum, std::size_t N, class Member>
   Section& choice(const std::string& name, const std::array<std::pair<std::string_view, Enum>, N>& choices,
-                  Member member, const std::string& meaning, std::string_view note = "") {
+                  Member member, const std::string& meaning) {
     std::string expected;
     for (const auto& [text, value] : choices) {
       expected += fmt::format("{}\"{}\"", expected.empty() ? "" : " or ", text);
     }
-    expected += note;
     return add(
         name, meaning, expected,
         [member, choices](const ConfigurationValue& value, Configuration& configuration) {
@@ -473,16 +472,21 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
       .duration("longest_period_s", s, 0.5, 60, PERIMAP_MEMBER(respiration.longest_period), "no breath is longer")
       .number("displacement_deviation_mm", 0.1, 100, PERIMAP_MEMBER(respiration.displacement_deviation_mm),
               "displacement by breathing to reckon with until its phase is known, standard deviation of an axis");
-  // No pipeline serves Release::kClock, so a file that asks for it is refused.
   using Release = PipelineConfiguration::Release;
-  const std::array<std::pair<std::string_view, Release>, 1> releases{{{"frame", Release::kFrame}}};
+  const std::array<std::pair<std::string_view, Release>, 3> releases{
+      {{"frame", Release::kFrame}, {"clock", Release::kClock}, {"both", Release::kBoth}}};
   Section("pipeline", keys)
-      .choice("release", releases, PERIMAP_MEMBER(pipeline.release), "what the release follows: each camera frame",
-              " (\"clock\" is not available in this version)")
-      .duration("latency_ms", ms, 1, 1000, PERIMAP_MEMBER(pipeline.latency), "release minus capture")
+      .choice("release", releases, PERIMAP_MEMBER(pipeline.release),
+              "what releases surfaces: each camera frame, a fixed grid of the monotonic clock, or each its own stream")
+      .number("clock_rate_hz", 1, 1000, PERIMAP_MEMBER(pipeline.clock_rate_hz),
+              "of that grid; see dds.maximum_MB_per_s")
+      .duration("latency_ms", ms, 1, 1000, PERIMAP_MEMBER(pipeline.latency),
+                "a frame's release minus its capture; to the clock a frame that is not mapped by then is late")
       .duration("lead_ms", ms, 0, 1000, PERIMAP_MEMBER(pipeline.lead), "valid time of a surface minus its release")
       .duration("budget_ms", ms, 0.1, 1000, PERIMAP_MEMBER(pipeline.budget),
                 "computing time kept free before the release; less than latency_ms")
+      .flag("shedding", PERIMAP_MEMBER(pipeline.shedding),
+            "while frames take longer than that, the least useful features are not looked for; never in lockstep")
       .integer("workers", 1, 64, PERIMAP_MEMBER(pipeline.workers), "worker threads")
       .integer("adoption_delay_frames", 1, 120, PERIMAP_MEMBER(pipeline.adoption_delay_frames),
                "frames from the request of a batch start to the frame that adopts it");
@@ -576,7 +580,9 @@ void add_running(std::vector<ConfigurationKey>& keys) {
       .duration("surface_lifespan_ms", ms, 0, 60000, PERIMAP_MEMBER(dds.surface_lifespan),
                 "an undelivered surface is dropped after this; 0: never")
       .duration("surface_model_interval_ms", ms, 1, 60000, PERIMAP_MEMBER(dds.surface_model_interval),
-                "from one surface_model to the next");
+                "from one surface_model to the next")
+      .number("maximum_MB_per_s", 0.1, 10000, PERIMAP_MEMBER(dds.maximum_MB_per_s),
+              "of surfaces with features.maximum features; rates that come to more are refused");
   Section("recording", keys)
       .flag("record", PERIMAP_MEMBER(recording.record),
             "what the devices give is recorded as it came, to perimap-DATE-TIME.mcap")

@@ -10,12 +10,14 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include <initializer_list>
 #include <system_error>
 #include <utility>
 
 #include "core/error/one_line.hpp"
 #include "daemon/config/configuration_keys.hpp"
 #include "daemon/config/ecg_inputs.hpp"
+#include "daemon/config/surface_traffic.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -186,6 +188,7 @@ class Overlay {
     }
     check_budget(root);
     check_inputs(root);
+    check_traffic(root);
     if (!error_.empty()) {
       return fail(error_);
     }
@@ -250,19 +253,21 @@ class Overlay {
     refuse(name.source().begin, full_name(section, name.str()), fmt::format("one of {}", known), "an unknown key");
   }
 
+  // Where the file has the first of these keys, as "section.name"; its beginning when it has none.
+  static toml::source_position place_of(const toml::table& root, std::initializer_list<std::string_view> keys) {
+    for (const std::string_view key : keys) {
+      if (const toml::node* node = toml::at_path(root, key).node()) return node->source().begin;
+    }
+    return {1, 1};
+  }
+
   // Without a latency longer than the budget no release can be on time.
   void check_budget(const toml::table& root) {
     const PipelineConfiguration& pipeline = configuration_.pipeline;
     if (pipeline.budget < pipeline.latency) {
       return;
     }
-    toml::source_position where{1, 1};
-    for (const char* name : {"latency_ms", "budget_ms"}) {
-      if (const toml::node* node = root["pipeline"][name].node()) {
-        where = node->source().begin;
-      }
-    }
-    refuse(where, "pipeline.budget_ms",
+    refuse(place_of(root, {"pipeline.budget_ms", "pipeline.latency_ms"}), "pipeline.budget_ms",
            fmt::format("less than latency_ms ({:.6g})", to_seconds(pipeline.latency) * 1e3),
            fmt::format("{:.6g}", to_seconds(pipeline.budget) * 1e3));
   }
@@ -276,6 +281,26 @@ class Overlay {
       if (node != nullptr) where = node->source().begin;
     }
     refuse(where, full_name(wrong->section, wrong->key), wrong->expected, wrong->got);
+  }
+
+  // What is to be published must fit: a network that is flooded loses samples of all streams, and nobody chose which.
+  void check_traffic(const toml::table& root) {
+    const SurfaceTraffic traffic = surface_traffic(configuration_);
+    const double most_MB_per_s = configuration_.dds.maximum_MB_per_s;
+    if (traffic.MB_per_s() <= most_MB_per_s) return;
+    const bool clock = traffic.clock_rate_hz > 0.0;
+    const int features = most_features(configuration_);
+    std::string fits = fmt::format("features.maximum of at most {}", features);
+    if (const double rate_hz = highest_clock_rate_hz(configuration_); clock && rate_hz >= 1.0) {
+      fits = fmt::format("at most {:.6g}, or {}", rate_hz, fits);
+    }
+    const std::string got =
+        fmt::format("{:.6g} MB/s of surfaces with {} features, {:.6g} of them a second", traffic.MB_per_s(),
+                    configuration_.features.maximum, traffic.clock_rate_hz + traffic.frame_rate_hz);
+    const std::string_view key = clock ? "pipeline.clock_rate_hz" : "features.maximum";
+    refuse(
+        place_of(root, {key, "pipeline.release", "features.maximum", "camera.frame_rate_hz", "dds.maximum_MB_per_s"}),
+        key, fmt::format("what dds.maximum_MB_per_s = {:.6g} allows ({})", most_MB_per_s, fits), got);
   }
 
   void refuse(toml::source_position where, std::string_view key, std::string_view expected, std::string_view got) {

@@ -3,12 +3,16 @@
 
 #include <string>
 
+#include "core/pipeline/release_stream.hpp"
+
 namespace perimap {
 
 struct Identity {
-  std::string source;            // which perimapd, at most 63 bytes
-  std::string stream = "frame";  // which release mode, at most 31 bytes
-  std::string frame_id;          // the world frame's name, at most 63 bytes
+  std::string source;                            // which perimapd, at most 63 bytes
+  ReleaseStream stream = ReleaseStream::kFrame;  // of what is not of one stream alone: the first that is published
+  std::string frame_id;                          // the world frame's name, at most 63 bytes
+
+  [[nodiscard]] Identity of(ReleaseStream other) const { return {source, other, frame_id}; }
 };
 
 }  // namespace perimap

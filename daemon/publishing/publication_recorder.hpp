@@ -14,8 +14,8 @@
 namespace perimap {
 
 // surface() copies into a free one of a fixed set of buffers; the other topics and drain() belong to the status thread
-// and write. Status messages are not recorded: they tell of the machine, not of the heart, and would differ from run to
-// run of the same recording.
+// and write. In virtual time one thread calls all, and surface() writes what was before. Status messages are not
+// recorded: they tell of the machine, not of the heart, and would differ from run to run of the same recording.
 class PublicationRecorder final : public Publication {
  public:
   // `generator` names the program and its version in the recording. In virtual time the receipt is the release itself;

@@ -10,6 +10,29 @@ constexpr auto kMoments = static_cast<std::size_t>(RecentCounts::kWindow / kStep
 
 }  // namespace
 
+const LatencyHistogram& stage_histogram(const PipelineCounters& counters, ReleaseStream stream,
+                                        perimap_StageKind kind) noexcept {
+  switch (kind) {
+    case perimap_STAGE_PREDICT_AND_FIND:
+      return counters.predict_and_find;
+    case perimap_STAGE_PHASE_AND_POSE:
+      return counters.phase_and_pose;
+    case perimap_STAGE_EVALUATE:
+      return counters.evaluate;
+    case perimap_STAGE_LEARN:
+      return counters.learn;
+    case perimap_STAGE_CAPTURE_TO_UPDATE:
+      return counters.capture_to_update;
+    case perimap_STAGE_RELEASE_TARDINESS:
+      return counters.of(stream).release_tardiness;
+    case perimap_STAGE_DDS_WRITE:
+      return counters.of(stream).dds_write;
+    case perimap_STAGE_FRAME:
+      break;
+  }
+  return counters.frame_compute;
+}
+
 RecentCounts::RecentCounts() { moments_.reserve(kMoments); }
 
 void RecentCounts::note(const PipelineCounters& counters, Instant now) {
@@ -22,8 +45,10 @@ void RecentCounts::note(const PipelineCounters& counters, Instant now) {
   }
   CountsThen& moment = moments_.back();
   moment.time = now;
-  for (std::size_t i = 0; i < kStatusStages.size(); ++i) {
-    moment.stages[i] = (counters.*kStatusStages[i].histogram).counts();
+  for (const ReleaseStream stream : kReleaseStreams) {
+    for (std::size_t i = 0; i < kStatusStages.size(); ++i) {
+      moment.stages[index_of(stream)][i] = stage_histogram(counters, stream, kStatusStages[i]).counts();
+    }
   }
   for (std::size_t i = 0; i < kStatusSources.size(); ++i) {
     moment.received[i] = (counters.*kStatusSources[i].received).get();

@@ -15,19 +15,13 @@
 namespace perimap {
 
 // In the order in which the status has them.
-struct StatusStage {
-  perimap_StageKind kind;
-  LatencyHistogram PipelineCounters::*histogram;
-};
-inline constexpr std::array<StatusStage, 8> kStatusStages = {
-    {{perimap_STAGE_PREDICT_AND_FIND, &PipelineCounters::predict_and_find},
-     {perimap_STAGE_PHASE_AND_POSE, &PipelineCounters::phase_and_pose},
-     {perimap_STAGE_EVALUATE, &PipelineCounters::evaluate},
-     {perimap_STAGE_LEARN, &PipelineCounters::learn},
-     {perimap_STAGE_CAPTURE_TO_UPDATE, &PipelineCounters::capture_to_update},
-     {perimap_STAGE_RELEASE_TARDINESS, &PipelineCounters::release_tardiness},
-     {perimap_STAGE_DDS_WRITE, &PipelineCounters::dds_write},
-     {perimap_STAGE_FRAME, &PipelineCounters::frame_compute}}};
+inline constexpr std::array<perimap_StageKind, 8> kStatusStages = {
+    perimap_STAGE_PREDICT_AND_FIND,  perimap_STAGE_PHASE_AND_POSE,    perimap_STAGE_EVALUATE,  perimap_STAGE_LEARN,
+    perimap_STAGE_CAPTURE_TO_UPDATE, perimap_STAGE_RELEASE_TARDINESS, perimap_STAGE_DDS_WRITE, perimap_STAGE_FRAME};
+
+// What the status of a stream says of a stage.
+[[nodiscard]] const LatencyHistogram& stage_histogram(const PipelineCounters& counters, ReleaseStream stream,
+                                                      perimap_StageKind kind) noexcept;
 
 struct StatusSource {
   perimap_SourceKind kind;
@@ -43,7 +37,7 @@ inline constexpr std::array<StatusSource, 5> kStatusSources = {
 // The counts at one moment.
 struct CountsThen {
   Instant time;
-  std::array<LatencyHistogram::Counts, kStatusStages.size()> stages{};
+  std::array<std::array<LatencyHistogram::Counts, kStatusStages.size()>, kReleaseStreams.size()> stages{};
   std::array<std::uint64_t, kStatusSources.size()> received{};
 
   [[nodiscard]] std::uint64_t received_of(perimap_SourceKind kind) const noexcept {

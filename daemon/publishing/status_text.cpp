@@ -34,6 +34,20 @@ Json sources_json(const perimap_Status& status, std::span<const perimap_SourceSt
   return json;
 }
 
+Json stage_json(const perimap_StageLatency& stage) {
+  return {{"count", stage.count},
+          {"p50", ms(stage.p50_ns)},
+          {"p99", ms(stage.p99_ns)},
+          {"p999", ms(stage.p999_ns)},
+          {"max", ms(stage.max_ns)},
+          {"recent",
+           {{"count", stage.recent_count},
+            {"p50", ms(stage.recent_p50_ns)},
+            {"p99", ms(stage.recent_p99_ns)},
+            {"p999", ms(stage.recent_p999_ns)},
+            {"max", ms(stage.recent_max_ns)}}}};
+}
+
 }  // namespace
 
 Json status_json(const perimap_Status& status, std::span<const perimap_StageLatency> stages,
@@ -60,26 +74,17 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
                {"samples", status.samples},
                {"samples_without_frame", status.samples_without_frame},
                {"samples_from_late_update", status.samples_from_late_update},
+               {"releases_missed", status.releases_missed},
                {"learning_put_off", status.learning_put_off},
                {"adoptions_late", status.adoptions_late},
                {"features_tracked", status.features_tracked},
                {"features_starting", status.features_starting},
+               {"features_shed", status.features_shed},
+               {"times_shed", status.times_shed},
                {"features_lost", status.features_lost},
                {"features_started_anew", status.features_started_anew}};
   Json by_stage = Json::object();
-  for (const perimap_StageLatency& stage : stages) {
-    by_stage[std::string(name_of(stage.kind))] = {{"count", stage.count},
-                                                  {"p50", ms(stage.p50_ns)},
-                                                  {"p99", ms(stage.p99_ns)},
-                                                  {"p999", ms(stage.p999_ns)},
-                                                  {"max", ms(stage.max_ns)},
-                                                  {"recent",
-                                                   {{"count", stage.recent_count},
-                                                    {"p50", ms(stage.recent_p50_ns)},
-                                                    {"p99", ms(stage.recent_p99_ns)},
-                                                    {"p999", ms(stage.recent_p999_ns)},
-                                                    {"max", ms(stage.recent_max_ns)}}}};
-  }
+  for (const perimap_StageLatency& stage : stages) by_stage[std::string(name_of(stage.kind))] = stage_json(stage);
   json["recent_s"] = ms(status.recent_ns) * 1e-3;
   json["stages_ms"] = std::move(by_stage);
   json["sources"] = sources_json(status, sources);
@@ -92,6 +97,18 @@ Json full_status_json(const perimap_Status& status) {
   json["features_converging"] = status.features_converging;
   json["features_converged"] = status.features_converged;
   json["features_inconsistent"] = status.features_inconsistent;
+  return json;
+}
+
+Json stream_status_json(const perimap_Status& status) {
+  Json json = {{"samples", status.samples},
+               {"samples_without_frame", status.samples_without_frame},
+               {"samples_from_late_update", status.samples_from_late_update},
+               {"releases_missed", status.releases_missed}};
+  for (const perimap_StageLatency& stage : std::span(status.stages._buffer, status.stages._length)) {
+    if (stage.kind != perimap_STAGE_RELEASE_TARDINESS && stage.kind != perimap_STAGE_DDS_WRITE) continue;
+    json["stages_ms"][std::string(name_of(stage.kind))] = stage_json(stage);
+  }
   return json;
 }
 

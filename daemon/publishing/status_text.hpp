@@ -21,4 +21,7 @@ namespace perimap {
 // With the sequences that the status itself has: privileges, sources and stages, a line each.
 [[nodiscard]] nlohmann::ordered_json full_status_json(const perimap_Status& status);
 
+// What it says of its own stream alone.
+[[nodiscard]] nlohmann::ordered_json stream_status_json(const perimap_Status& status);
+
 }  // namespace perimap

@@ -30,7 +30,7 @@ std::string_view name_of(perimap_FeatureState state) noexcept {
 }
 
 std::string_view name_of(perimap_FeatureReason reason) noexcept {
-  return name_in<5>({"none", "not_observed", "deviation_large", "innovations_high", "phase_lost"},
+  return name_in<6>({"none", "not_observed", "deviation_large", "innovations_high", "phase_lost", "shed"},
                     static_cast<int>(reason));
 }
 

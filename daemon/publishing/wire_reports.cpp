@@ -112,7 +112,7 @@ perimap_CardiacCycle to_wire(const CardiacCycle& cycle, const PhaseLawSettings& 
 template <class Message>
 void name(Message& message, const Identity& identity) noexcept {
   copy_text(identity.source, message.source);
-  copy_text(identity.stream, message.stream);
+  copy_text(name_of(identity.stream), message.stream);
 }
 
 // A trigger gives one pulse a beat.
@@ -299,7 +299,7 @@ const perimap_Phase& WirePhase::fill(const CardiacClock& clock, Instant now) noe
   return wire_;
 }
 
-WireStatus::WireStatus(const Identity& identity) {
+WireStatus::WireStatus(const Identity& identity) : stream_(identity.stream) {
   name(wire_, identity);
   copy_text(PERIMAP_VERSION, wire_.version);
 }
@@ -315,9 +315,11 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.frames_without_pose = c.frames_without_pose.get();
   wire_.frames_without_phase = c.frames_without_phase.get();
   wire_.phases_from_image = c.phases_from_image.get();
-  wire_.samples = c.samples.get();
-  wire_.samples_without_frame = c.samples_without_frame.get();
-  wire_.samples_from_late_update = c.samples_from_late_update.get();
+  const StreamCounters& stream = c.of(stream_);
+  wire_.samples = stream.samples.get();
+  wire_.samples_without_frame = stream.samples_without_frame.get();
+  wire_.samples_from_late_update = stream.samples_from_late_update.get();
+  wire_.releases_missed = stream.releases_missed.get();
   wire_.learning_put_off = c.learning_put_off.get();
   wire_.adoptions_late = c.adoptions_late.get();
   wire_.features_tracked = static_cast<std::uint32_t>(c.features_tracked.get());
@@ -325,6 +327,8 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.features_converging = static_cast<std::uint32_t>(c.features_converging.get());
   wire_.features_converged = static_cast<std::uint32_t>(c.features_converged.get());
   wire_.features_inconsistent = static_cast<std::uint32_t>(c.features_inconsistent.get());
+  wire_.features_shed = static_cast<std::uint32_t>(c.features_shed.get());
+  wire_.times_shed = c.times_shed.get();
   wire_.features_lost = c.features_lost.get();
   wire_.respiration = to_wire(facts.respiration);
   wire_.respiration_suspected = facts.respiration_suspected;
@@ -378,11 +382,20 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
                             to_seconds(now - then->time);
   }
   for (std::size_t i = 0; i < kStatusStages.size(); ++i) {
-    stages_[i] = stage_latency(kStatusStages[i].kind, c.*kStatusStages[i].histogram, then ? &then->stages[i] : nullptr);
+    stages_[i] = stage_latency(kStatusStages[i], stage_histogram(c, stream_, kStatusStages[i]),
+                               then ? &then->stages[index_of(stream_)][i] : nullptr);
   }
   constexpr auto kStages = static_cast<std::uint32_t>(kStatusStages.size());
   wire_.stages = {kStages, kStages, stages_, false};
   return wire_;
+}
+
+std::vector<WireStatus> wire_statuses(const Identity& identity, const PipelineSettings& settings) {
+  std::vector<WireStatus> statuses;
+  for (const ReleaseStream stream : kReleaseStreams) {
+    if (publishes(settings, stream)) statuses.emplace_back(identity.of(stream));
+  }
+  return statuses;
 }
 
 }  // namespace perimap

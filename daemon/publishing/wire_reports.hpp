@@ -11,6 +11,7 @@
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/surface_state.hpp"
 #include "daemon/publishing/identity.hpp"
@@ -98,14 +99,19 @@ struct StatusFacts {
 
 class WireStatus {
  public:
+  // Of the identity's stream; but for its releases, what is told is the same of all streams.
   explicit WireStatus(const Identity& identity);
   [[nodiscard]] const perimap_Status& fill(const PipelineCounters& counters, const StatusFacts& facts,
                                            Instant now) noexcept;
 
  private:
+  ReleaseStream stream_;
   perimap_SourceStatus sources_[kStatusSources.size()]{};
   perimap_StageLatency stages_[kStatusStages.size()]{};
   perimap_Status wire_{};
 };
+
+// One for each stream that is published.
+[[nodiscard]] std::vector<WireStatus> wire_statuses(const Identity& identity, const PipelineSettings& settings);
 
 }  // namespace perimap

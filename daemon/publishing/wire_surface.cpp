@@ -79,17 +79,28 @@ perimap_FeatureReason to_wire(FeatureReason reason) noexcept {
       return perimap_FEATURE_REASON_INNOVATIONS_HIGH;
     case FeatureReason::kPhaseLost:
       return perimap_FEATURE_REASON_PHASE_LOST;
+    case FeatureReason::kShed:
+      return perimap_FEATURE_REASON_SHED;
   }
   return perimap_FEATURE_REASON_PHASE_LOST;
 }
 
 WireSurface::WireSurface(const Identity& identity, std::size_t maximum_features) : features_(maximum_features) {
   copy_text(identity.source, wire_.source);
-  copy_text(identity.stream, wire_.stream);
+  copy_text(name_of(identity.stream), wire_.stream);
   copy_text(identity.frame_id, wire_.frame_id);
   wire_.features._buffer = features_.data();
   wire_.features._maximum = static_cast<std::uint32_t>(features_.size());
   wire_.features._release = false;
+}
+
+std::vector<WireSurface> wire_surfaces(const Identity& identity, const PipelineSettings& settings) {
+  std::vector<WireSurface> surfaces;
+  surfaces.reserve(kReleaseStreams.size());
+  for (const ReleaseStream stream : kReleaseStreams) {
+    surfaces.emplace_back(identity.of(stream), static_cast<std::size_t>(settings.features.maximum));
+  }
+  return surfaces;
 }
 
 const perimap_Surface& WireSurface::fill(const SurfaceSample& sample, Duration utc_minus_monotonic) noexcept {

@@ -27,7 +27,8 @@ DurationFigures figures_of(std::vector<Duration> durations) {
 
 }  // namespace
 
-Expected<SamplesReport> report_samples(const std::string& recording, const std::string& samples, ReadMode mode) {
+Expected<SamplesReport> report_samples(const std::string& recording, const std::string& samples,
+                                       const std::string& stream, ReadMode mode) {
   const auto truth = load_truth(recording, mode);
   if (!truth) return tl::unexpected(truth.error());
   if (!*truth) return fail(fmt::format("{}: has no ground truth to compare with", recording));
@@ -38,6 +39,7 @@ Expected<SamplesReport> report_samples(const std::string& recording, const std::
 
   Accuracy accuracy((*truth)->truth, (*truth)->camera, (*truth)->captures.begin()->second);
   SamplesReport report;
+  std::string wanted = stream;
   std::optional<Duration> to_recording;
   std::optional<std::uint64_t> last_sequence;
   std::vector<Duration> from_capture;
@@ -55,6 +57,12 @@ Expected<SamplesReport> report_samples(const std::string& recording, const std::
     const auto sample = reader->decode<perimap_Surface>(**message);
     if (!sample) return tl::unexpected(sample.error());
     const perimap_Surface& surface = **sample;
+    if (wanted.empty()) wanted = surface.stream;
+    if (wanted != surface.stream) {
+      if (!stream.empty()) continue;
+      return fail(fmt::format("{}: holds the streams '{}' and '{}': --stream tells which is meant", samples, wanted,
+                              surface.stream));
+    }
     const Instant receipt = (*message)->arrival;
     ++report.samples;
     if (last_sequence && surface.sample_sequence > *last_sequence + 1) {
@@ -64,8 +72,10 @@ Expected<SamplesReport> report_samples(const std::string& recording, const std::
     from_capture.push_back(receipt - from_ns(surface.capture_time_ns));
     from_release.push_back(receipt - from_ns(surface.release_time_ns));
     if (surface.reason == perimap_SURFACE_REASON_FRAME_MISSING) ++report.without_frame;
+    // A sample of the clock's belongs to the frame that it rests on, so that only its reason tells.
     const bool behind = surface.oldest_shard_frame_sequence < surface.frame_sequence;
-    if (behind && surface.reason != perimap_SURFACE_REASON_FRAME_MISSING) ++report.from_late_update;
+    const bool late = behind && surface.reason != perimap_SURFACE_REASON_FRAME_MISSING;
+    if (late || surface.reason == perimap_SURFACE_REASON_UPDATE_LATE) ++report.from_late_update;
     if (!to_recording && rests_on_its_frame(surface.reason)) {
       to_recording = (*truth)->to_recording(surface.frame_sequence, from_ns(surface.capture_time_ns));
     }

@@ -29,8 +29,9 @@ struct SamplesReport {
   DurationFigures jitter;              // |receipt minus deadline - its median|
 };
 
-// Fails when the recording has no ground truth or the samples are not of this recording.
+// Of one stream; with an empty name of the only one there is. Fails when the recording has no ground truth, the samples
+// are not of this recording, or which stream is meant is not told.
 [[nodiscard]] Expected<SamplesReport> report_samples(const std::string& recording, const std::string& samples,
-                                                     ReadMode mode);
+                                                     const std::string& stream, ReadMode mode);
 
 }  // namespace perimap

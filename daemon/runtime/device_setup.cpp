@@ -250,7 +250,7 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
     playback->reader.require_frame_size(basis.camera.width, basis.camera.height);
   }
   const PipelineSettings pipeline = pipeline_settings(configuration, basis.camera);
-  const Identity identity{configuration.source.name, "frame", configuration.source.world_frame};
+  const Identity identity{configuration.source.name, first_stream(pipeline), configuration.source.world_frame};
   return DeviceSetup{std::move(configuration), pipeline, identity, std::move(*devices)};
 }
 

@@ -24,10 +24,10 @@ LiveRuntime::LiveRuntime(Pipeline& pipeline, const RuntimeSettings& settings, Pu
       threads_(settings.scheduling),
       publication_(publication),
       on_status_tick_(std::move(on_status_tick)),
-      wire_surface_(settings.identity, static_cast<std::size_t>(pipeline.settings().features.maximum)),
+      wire_surfaces_(wire_surfaces(settings.identity, pipeline.settings())),
       wire_model_(settings.identity),
       wire_phase_(settings.identity),
-      wire_status_(settings.identity) {}
+      wire_statuses_(wire_statuses(settings.identity, pipeline.settings())) {}
 
 void LiveRuntime::start() {
   memory_locked_ = lock_memory(settings_.lock_memory);
@@ -112,24 +112,27 @@ void LiveRuntime::run_publisher() {
     if (stopping_.load(std::memory_order_relaxed)) return;
     const Instant now = MonotonicClock::now();
     pipeline_.drain_stamps(now);
-    const auto next = pipeline_.schedule().next();
-    const bool done = sources_ended_.load(std::memory_order_relaxed) && !pipeline_.schedule().pending();
+    pipeline_.leave_out_missed(now);
+    const auto next = pipeline_.plan().next();
+    const bool done = sources_ended_.load(std::memory_order_relaxed) && !pipeline_.plan().pending();
     if (done) all_released_.store(true, std::memory_order_relaxed);
     const Instant round_ends = now + kLongestPublisherRound;
     if (done || !next || next->deadline - kComposing > round_ends) {
       static_cast<void>(wakeup.wait_until(round_ends));
       continue;
     }
-    // A missing frame's release is provisional: a frame that still comes takes its place.
-    if (next->frame_missing && wakeup.wait_until(next->deadline - kComposing)) continue;
+    // What is provisional waits for a frame that still comes and takes its place, or has a release before it.
+    if (ReleasePlan::provisional(*next) && wakeup.wait_until(next->deadline - kComposing)) continue;
     sleep_until(next->deadline - kComposing);
-    const Release release = pipeline_.schedule().take();
-    const perimap_Surface& sample = wire_surface_.fill(pipeline_.compose(release), utc_minus_monotonic());
+    const Release release = pipeline_.plan().take();
+    WireSurface& wire = wire_surfaces_[index_of(release.stream)];
+    const perimap_Surface& sample = wire.fill(pipeline_.compose(release), utc_minus_monotonic());
     wait_until_exactly(release.deadline);
     const Instant ready = MonotonicClock::now();
     publication_.surface(sample);
-    counters.dds_write.add(MonotonicClock::now() - ready);
-    counters.release_tardiness.add(ready - release.deadline);
+    StreamCounters& stream = counters.of(release.stream);
+    stream.dds_write.add(MonotonicClock::now() - ready);
+    stream.release_tardiness.add(ready - release.deadline);
   }
 }
 
@@ -169,7 +172,7 @@ void LiveRuntime::run_status() {
     const int closed = (told.camera.closed ? 1 : 0) | (told.tracker.closed ? 2 : 0) | (told.ecg.closed ? 4 : 0) |
                        (told.r_trigger_line.closed ? 8 : 0);
     if (last || now >= next_status || closed != closed_before) {
-      publication_.status(wire_status_.fill(pipeline_.counters(), told, now));
+      for (WireStatus& wire : wire_statuses_) publication_.status(wire.fill(pipeline_.counters(), told, now));
       next_status = now + settings_.status_interval;
       closed_before = closed;
     }

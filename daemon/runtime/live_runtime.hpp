@@ -74,10 +74,10 @@ class LiveRuntime {
   Publication& publication_;
   std::function<void()> on_status_tick_;
   std::function<void(StatusFacts&)> describe_sources_;
-  WireSurface wire_surface_;
+  std::vector<WireSurface> wire_surfaces_;  // by ReleaseStream
   WireModel wire_model_;
   WirePhase wire_phase_;
-  WireStatus wire_status_;
+  std::vector<WireStatus> wire_statuses_;  // of the streams that are published
   RecentCounts recent_;
   Wakeup status_wakeup_;
   std::vector<std::thread> workers_;

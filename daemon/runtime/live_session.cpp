@@ -86,6 +86,7 @@ Expected<void> LiveSession::run(StopSignal& stop) {
     report();
     warn_of_refused_privileges();
     warn_of_short_latency();
+    tell_of_shedding();
     if (!told_end && feeder_->ended()) {
       runtime_.end_of_sources();
       told_end = true;
@@ -141,6 +142,19 @@ void LiveSession::warn_of_short_latency() {
   spdlog::warn(
       "latency {:.1f} ms is too short: frames arrive up to {:.1f} ms after capture and the budget is {:.1f} ms",
       milliseconds(settings.latency), milliseconds(check.arrival), milliseconds(settings.budget));
+}
+
+// How often and how far it goes on is in the status.
+void LiveSession::tell_of_shedding() {
+  const std::uint64_t shed = pipeline_.counters().features_shed.get();
+  if ((shed > 0) == shedding_told_) return;
+  shedding_told_ = shed > 0;
+  if (shed > 0) {
+    spdlog::warn("frames take longer than the budget of {:.1f} ms: {} of the least useful features are shed",
+                 milliseconds(pipeline_.settings().budget), shed);
+  } else {
+    spdlog::info("all features are looked for again");
+  }
 }
 
 }  // namespace perimap

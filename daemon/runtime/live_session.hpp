@@ -52,6 +52,7 @@ class LiveSession {
   void report();
   void warn_of_refused_privileges();
   void warn_of_short_latency();
+  void tell_of_shedding();
 
   Pipeline& pipeline_;
   LiveRuntime runtime_;
@@ -71,6 +72,7 @@ class LiveSession {
   std::thread checkpoint_thread_;
   bool privileges_told_ = false;
   bool latency_checked_ = false;
+  bool shedding_told_ = false;
 };
 
 }  // namespace perimap

@@ -17,10 +17,10 @@ LockstepRuntime::LockstepRuntime(Pipeline& pipeline, const Identity& identity, D
     : pipeline_(pipeline),
       utc_minus_monotonic_(utc_minus_monotonic),
       publication_(publication),
-      wire_surface_(identity, static_cast<std::size_t>(pipeline.settings().features.maximum)),
+      wire_surfaces_(wire_surfaces(identity, pipeline.settings())),
       wire_model_(identity),
       wire_phase_(identity),
-      wire_status_(identity) {
+      wire_statuses_(wire_statuses(identity, pipeline.settings())) {
   for (int i = 0; i < pipeline_.team().size(); ++i) {
     threads_.emplace_back([this, i] { pipeline_.team().serve(i); });
   }
@@ -61,8 +61,8 @@ void LockstepRuntime::deliver(const ReplayEvent& event) {
 
 void LockstepRuntime::finish() {
   if (frame_waits_) map_ready_frame();
-  while (pipeline_.schedule().pending()) {
-    now_ = std::max(now_, pipeline_.schedule().next()->deadline);
+  while (pipeline_.plan().pending()) {
+    now_ = std::max(now_, pipeline_.plan().next()->deadline);
     release();
   }
   publish_reports(now_);
@@ -72,7 +72,7 @@ void LockstepRuntime::finish() {
 void LockstepRuntime::advance_to(Instant t) {
   const PipelineSettings& settings = pipeline_.settings();
   for (;;) {
-    const auto next = pipeline_.schedule().next();
+    const auto next = pipeline_.plan().next();
     const Instant release_at = next ? next->deadline : Instant::max();
     const Instant map_at = frame_waits_ ? frame_.stamp.capture + settings.latency - settings.budget : Instant::max();
     const Instant first = std::min(release_at, map_at);
@@ -92,8 +92,9 @@ void LockstepRuntime::map_ready_frame() {
 }
 
 void LockstepRuntime::release() {
-  const Release release = pipeline_.schedule().take();
-  publication_.surface(wire_surface_.fill(pipeline_.compose(release), utc_minus_monotonic_));
+  const Release release = pipeline_.plan().take();
+  WireSurface& wire = wire_surfaces_[index_of(release.stream)];
+  publication_.surface(wire.fill(pipeline_.compose(release), utc_minus_monotonic_));
   if (now_ >= next_reports_) {
     publish_reports(now_);
     next_reports_ = now_ + kReportInterval;
@@ -118,7 +119,7 @@ void LockstepRuntime::publish_reports(Instant now) {
   facts.r_trigger = pipeline_.settings().r_trigger.has_value();
   facts.respiration_channel = pipeline_.settings().respiration.channel;
   facts.stalled_after = std::chrono::milliseconds(500);
-  publication_.status(wire_status_.fill(pipeline_.counters(), facts, now));
+  for (WireStatus& wire : wire_statuses_) publication_.status(wire.fill(pipeline_.counters(), facts, now));
 }
 
 }  // namespace perimap

@@ -38,10 +38,10 @@ class LockstepRuntime {
   Pipeline& pipeline_;
   Duration utc_minus_monotonic_;
   Publication& publication_;
-  WireSurface wire_surface_;
+  std::vector<WireSurface> wire_surfaces_;  // by ReleaseStream
   WireModel wire_model_;
   WirePhase wire_phase_;
-  WireStatus wire_status_;
+  std::vector<WireStatus> wire_statuses_;  // of the streams that are published
   std::vector<std::thread> threads_;
   bool frame_waits_ = false;
   FrameHandle frame_;

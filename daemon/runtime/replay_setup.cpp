@@ -102,7 +102,10 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.workers = c.pipeline.workers;
   s.latency = c.pipeline.latency;
   s.lead = c.pipeline.lead;
+  s.frame_stream = c.pipeline.release != PipelineConfiguration::Release::kClock;
+  if (c.pipeline.release != PipelineConfiguration::Release::kFrame) s.clock_period = clock_period(c.pipeline);
   s.budget = c.pipeline.budget;
+  s.shedding = c.pipeline.shedding;
   s.validity = c.dds.surface_lifespan > Duration(0) ? c.dds.surface_lifespan : s.validity;
   s.adoption_delay_frames = c.pipeline.adoption_delay_frames;
   return s;
@@ -163,7 +166,8 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
   }
   reader->require_frame_size(basis->camera.width, basis->camera.height);
   const PipelineSettings pipeline = pipeline_settings(basis->configuration, basis->camera);
-  const Identity identity{basis->configuration.source.name, "frame", basis->configuration.source.world_frame};
+  const Identity identity{basis->configuration.source.name, first_stream(pipeline),
+                          basis->configuration.source.world_frame};
   return ReplaySetup{std::move(basis->configuration), pipeline, identity, basis->utc_minus_monotonic,
                      std::move(*reader)};
 }

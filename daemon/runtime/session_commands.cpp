@@ -16,7 +16,7 @@ SessionCommands::SessionCommands(Pipeline& pipeline, const Identity& identity, s
                                  std::function<Expected<std::string>()> reload,
                                  std::function<Expected<std::string>(bool)> record, std::function<void()> on_forgotten)
     : pipeline_(pipeline),
-      status_(identity),
+      statuses_(wire_statuses(identity, pipeline.settings())),
       facts_(std::move(facts)),
       reload_(std::move(reload)),
       record_(std::move(record)),
@@ -25,7 +25,7 @@ SessionCommands::SessionCommands(Pipeline& pipeline, const Identity& identity, s
 Expected<std::string> SessionCommands::answer(ControlCommand command) {
   switch (command) {
     case ControlCommand::kStatus:
-      return full_status_json(status_.fill(pipeline_.counters(), facts_(), MonotonicClock::now())).dump() + "\n";
+      return tell_status();
     case ControlCommand::kNewPatient:
       return forget_patient();
     case ControlCommand::kRecordOn:
@@ -35,6 +35,18 @@ Expected<std::string> SessionCommands::answer(ControlCommand command) {
       return reload_();
   }
   return fail("an unknown command");
+}
+
+// The first stream's status, and what the others have of their own.
+std::string SessionCommands::tell_status() {
+  const StatusFacts facts = facts_();
+  const Instant now = MonotonicClock::now();
+  nlohmann::ordered_json told = full_status_json(statuses_.front().fill(pipeline_.counters(), facts, now));
+  for (WireStatus& status : statuses_) {
+    const perimap_Status& wire = status.fill(pipeline_.counters(), facts, now);
+    told["streams"][wire.stream] = stream_status_json(wire);
+  }
+  return told.dump() + "\n";
 }
 
 // Said to be done only when it is: until then the old patient's surface is published.

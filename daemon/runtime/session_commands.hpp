@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "core/error/expected.hpp"
 #include "core/pipeline/pipeline.hpp"
@@ -25,10 +26,11 @@ class SessionCommands {
   [[nodiscard]] Expected<std::string> answer(ControlCommand command);
 
  private:
+  [[nodiscard]] std::string tell_status();
   [[nodiscard]] Expected<std::string> forget_patient();
 
   Pipeline& pipeline_;
-  WireStatus status_;
+  std::vector<WireStatus> statuses_;  // of the streams that are published
   std::function<StatusFacts()> facts_;
   std::function<Expected<std::string>()> reload_;
   std::function<Expected<std::string>(bool)> record_;

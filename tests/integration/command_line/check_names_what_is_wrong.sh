@@ -18,6 +18,18 @@ touch "$scratch/x.mcap"
 "$perimap" check "$scratch/effective.toml" >"$scratch/again.toml" || fail "the effective configuration ended with $?"
 cmp "$scratch/effective.toml" "$scratch/again.toml" || fail "the effective configuration is not its own"
 
+grep -q '^# stream "frame": ' "$scratch/effective.toml" || fail "what is published is not told"
+grep -q 'stream "clock"' "$scratch/effective.toml" && fail "a stream is told that is not published"
+printf 'version = 1\n[pipeline]\nrelease = "both"\nclock_rate_hz = 1000\n' >"$scratch/both.toml"
+"$perimap" check "$scratch/both.toml" >"$scratch/out" || fail "both streams ended with $?"
+grep -q '^# stream "clock": 1000 surfaces/s' "$scratch/out" || fail "the clock's stream is not told"
+grep -q '^# surfaces of at most .* of 50 MB/s' "$scratch/out" || fail "the bytes a second are not told"
+printf '[dds]\nmaximum_MB_per_s = 1\n' >>"$scratch/both.toml"
+"$perimap" check "$scratch/both.toml" >"$scratch/out" 2>"$scratch/error"
+[ $? -eq 2 ] || fail "more than may be published must end with 2"
+grep -q "both.toml:4:17: key 'pipeline.clock_rate_hz': expected what dds.maximum_MB_per_s = 1 allows" "$scratch/error" ||
+  fail "$(cat "$scratch/error")"
+
 printf 'version = 1\n[phase]\nlaw = 3\n' >"$scratch/wrong.toml"
 "$perimap" check "$scratch/wrong.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "a wrong configuration must end with 2"

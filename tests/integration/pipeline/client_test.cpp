@@ -99,7 +99,7 @@ class Comparison final : public Publication {
   }
 
   Pipeline& pipeline_;
-  WireModel wire_{{"theatre 3", "frame", "tracker"}};
+  WireModel wire_{{"theatre 3", ReleaseStream::kFrame, "tracker"}};
   CdrSerializer serializer_;
 };
 
@@ -145,7 +145,7 @@ TEST(Client, PredictsABreathingHeartAsThePipelineDoes) {
   ASSERT_TRUE(pipeline_settings.respiration.enabled);
   Pipeline pipeline(pipeline_settings);
   Comparison comparison(pipeline);
-  LockstepRuntime runtime(pipeline, {"theatre 3", "frame", "tracker"}, Duration(0), comparison);
+  LockstepRuntime runtime(pipeline, {"theatre 3", ReleaseStream::kFrame, "tracker"}, Duration(0), comparison);
   test::for_each_arrival(simulation, [&](const Simulation::Arrival& arrival, const FrameEvent& frame) {
     test::deliver(runtime, simulation, arrival, frame, {});
   });

@@ -1,15 +1,17 @@
 #!/bin/bash
 # Lockstep replay gives the same bytes with 1, 2 and 4 workers, twice each, and those bytes hold mapped features.
-# lockstep_identical.sh PERIMAP RECORDING WORK_FOLDER MINIMUM_FEATURES
+# lockstep_identical.sh PERIMAP RECORDING WORK_FOLDER MINIMUM_FEATURES [CONFIGURATION]
+# CONFIGURATION: what the file holds beside its version, as printf takes it.
 set -euo pipefail
 perimap=$1 recording=$2 work=$3 minimum=$4
 rm -rf "$work"
 mkdir -p "$work"
+printf 'version = 1\n'"${5:-}" > "$work/configuration.toml"
 first=
 for workers in 1 2 4; do
   for run in a b; do
     samples=$work/$workers$run.mcap
-    "$perimap" replay "$recording" --lockstep --workers $workers --samples "$samples" --json "$work/$workers$run.json" \
+    "$perimap" replay "$recording" -c "$work/configuration.toml" --lockstep --workers $workers --samples "$samples" --json "$work/$workers$run.json" \
       > /dev/null 2> "$work/stderr" || { cat "$work/stderr"; exit 1; }
     if [ -z "$first" ]; then
       first=$samples
@@ -19,6 +21,6 @@ for workers in 1 2 4; do
     fi
   done
 done
-mapped=$(sed -n 's/.*"features_mapped": \([0-9]*\).*/\1/p' "$work/1a.json")
+mapped=$(sed -n 's/.*"features_mapped": \([0-9]*\).*/\1/p' "$work/1a.json" | head -n 1)
 echo "identical; $mapped features mapped"
 [ "$mapped" -ge "$minimum" ]

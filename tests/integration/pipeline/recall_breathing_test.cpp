@@ -105,7 +105,7 @@ TEST(RecallBreathing, WhatIsPublishedGoesOnAsIfTheRunHadNotBeenCutOff) {
   Surfaces after;
   test::KeptMap kept;
   Pipeline uninterrupted(pipeline_settings);
-  LockstepRuntime runtime(uninterrupted, {"theatre 3", "frame", "tracker"}, Duration(0), whole);
+  LockstepRuntime runtime(uninterrupted, {"theatre 3", ReleaseStream::kFrame, "tracker"}, Duration(0), whole);
   std::unique_ptr<Pipeline> recalled;
   std::unique_ptr<LockstepRuntime> recalled_runtime;
   test::for_each_arrival(simulation, [&](const Simulation::Arrival& arrival, const FrameEvent& frame) {
@@ -113,8 +113,8 @@ TEST(RecallBreathing, WhatIsPublishedGoesOnAsIfTheRunHadNotBeenCutOff) {
       ASSERT_EQ(uninterrupted.status_respiration().state, RespirationState::kLocked);
       recalled = std::make_unique<Pipeline>(pipeline_settings);
       recalled->recall(kept_as_bytes(kept.memory(uninterrupted.counters()), cut_off), executed);
-      recalled_runtime =
-          std::make_unique<LockstepRuntime>(*recalled, Identity{"theatre 3", "frame", "tracker"}, Duration(0), after);
+      recalled_runtime = std::make_unique<LockstepRuntime>(
+          *recalled, Identity{"theatre 3", ReleaseStream::kFrame, "tracker"}, Duration(0), after);
     }
     test::deliver(runtime, simulation, arrival, frame, {});
     if (!recalled) kept.take(uninterrupted);

@@ -70,7 +70,7 @@ TEST(Recall, PublishesWhatTheEarlierRunWouldHave) {
   Pipeline later(earlier.s.pipeline);
   const Instant now = earlier.memory.last_capture + earlier.s.pipeline.latency + std::chrono::milliseconds(400);
   later.recall(earlier.memory, now);
-  const auto release = later.schedule().next();
+  const auto release = later.plan().next();
   ASSERT_TRUE(release);
   EXPECT_TRUE(release->frame_missing);
   EXPECT_GT(release->deadline, now) << "the releases that were missed are not made up for";

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "daemon/config/configuration_keys.hpp"
+#include "daemon/config/surface_traffic.hpp"
 
 namespace perimap {
 namespace {
@@ -129,6 +130,9 @@ TEST(ConfigurationLoader, WhatIsPrintedLoadsBackToTheSame) {
   configuration.tracker.translation_SC_mm[1] = 1.0 / 3.0;
   configuration.phase.law = PhaseLaw::kWarped;
   configuration.pipeline.latency = Duration(33333333);
+  configuration.pipeline.release = PipelineConfiguration::Release::kBoth;
+  configuration.pipeline.clock_rate_hz = 250.0;
+  configuration.pipeline.shedding = false;
   configuration.estimation.start_depths_mm = {40, 80.25, 1e4};
   configuration.estimation.gate_chi2 = 0.1 + 0.2;
   configuration.realtime.cpus = {1, 3};
@@ -169,6 +173,39 @@ TEST(ConfigurationLoader, AMissingOrUnreadableConfigurationFileIsNamed) {
   const Expected<Configuration> a_folder = load_configuration(std::filesystem::temp_directory_path());
   ASSERT_FALSE(a_folder);
   EXPECT_THAT(a_folder.error().message, HasSubstr("expected a readable configuration file, got: Is a directory"));
+}
+
+TEST(ConfigurationLoader, WhatARefusalOfTooMuchTrafficSaysWouldFitIsAccepted) {
+  const std::string all = "version = 1\n[pipeline]\nrelease = \"both\"\n";
+  EXPECT_THAT(error_of(all + "clock_rate_hz = 1000\n[features]\nmaximum = 1000\n"),
+              HasSubstr("(at most 341.67, or features.maximum of at most 376)"));
+  EXPECT_TRUE(parse(all + "clock_rate_hz = 341.67\n[features]\nmaximum = 1000\n"));
+  EXPECT_TRUE(parse(all + "clock_rate_hz = 1000\n[features]\nmaximum = 376\n"));
+  EXPECT_FALSE(parse(all + "clock_rate_hz = 341.68\n[features]\nmaximum = 1000\n"));
+  EXPECT_FALSE(parse(all + "clock_rate_hz = 1000\n[features]\nmaximum = 377\n"));
+  EXPECT_TRUE(parse(all + "clock_rate_hz = 1000\n[features]\nmaximum = 1000\n[dds]\nmaximum_MB_per_s = 132\n"));
+}
+
+TEST(ConfigurationLoader, AClockOfAnyRateFitsTheDefaults) {
+  EXPECT_TRUE(parse("version = 1\n[pipeline]\nrelease = \"both\"\nclock_rate_hz = 1000\n"));
+}
+
+TEST(SurfaceTraffic, CountsTheStreamsThatArePublished) {
+  Configuration configuration;
+  configuration.features.maximum = 100;
+  configuration.camera.frame_rate_hz = 25.0;
+  configuration.pipeline.clock_rate_hz = 200.0;
+  const auto mega_bytes = static_cast<double>(kSurfaceBytes + 100 * kSurfaceFeatureBytes) * 1e-6;
+  EXPECT_NEAR(surface_traffic(configuration).MB_per_s(), 25.0 * mega_bytes, 1e-9);
+  configuration.pipeline.release = PipelineConfiguration::Release::kClock;
+  EXPECT_NEAR(surface_traffic(configuration).MB_per_s(), 200.0 * mega_bytes, 1e-9);
+  configuration.pipeline.release = PipelineConfiguration::Release::kBoth;
+  EXPECT_NEAR(surface_traffic(configuration).MB_per_s(), 225.0 * mega_bytes, 1e-9);
+  const std::vector<std::string> lines = traffic_lines(configuration);
+  ASSERT_EQ(lines.size(), 3U);
+  EXPECT_THAT(lines[0], HasSubstr("stream \"frame\""));
+  EXPECT_THAT(lines[1], HasSubstr("200 surfaces/s, at the multiples of 5000000 ns"));
+  EXPECT_THAT(lines[2], HasSubstr("together at most 2.9 of 50 MB/s"));
 }
 
 TEST(ConfigurationLoader, OfSeveralErrorsTheFirstInTheFileIsTold) {
@@ -249,10 +286,20 @@ INSTANTIATE_TEST_SUITE_P(
               "test.toml:3:11: key 'dds.enabled': expected true or false, got 1"},
         Wrong{"Date", "version = 1\n[dds]\nenabled = 1979-05-27\n",
               "test.toml:3:11: key 'dds.enabled': expected true or false, got a date or time"},
-        Wrong{
-            "ClockRelease", "version = 1\n[pipeline]\nrelease = \"clock\"\n",
-            "test.toml:3:11: key 'pipeline.release': expected \"frame\" (\"clock\" is not available in this version), "
-            "got \"clock\""},
+        Wrong{"UnknownRelease", "version = 1\n[pipeline]\nrelease = \"none\"\n",
+              "test.toml:3:11: key 'pipeline.release': expected \"frame\" or \"clock\" or \"both\", got \"none\""},
+        Wrong{"ClockTooFast", "version = 1\n[pipeline]\nrelease = \"clock\"\nclock_rate_hz = 1001\n",
+              "test.toml:4:17: key 'pipeline.clock_rate_hz': expected a number from 1 to 1000, got 1001"},
+        Wrong{"MoreThanMayBePublished",
+              "version = 1\n[pipeline]\nrelease = \"both\"\nclock_rate_hz = 1000\n[features]\nmaximum = 1000\n",
+              "test.toml:4:17: key 'pipeline.clock_rate_hz': expected what dds.maximum_MB_per_s = 50 allows (at most "
+              "341.67, or features.maximum of at most 376), got 131.949 MB/s of surfaces with 1000 features, 1060 of "
+              "them a second"},
+        Wrong{"MoreFramesThanMayBePublished",
+              "version = 1\n[camera]\nframe_rate_hz = 2000\n[features]\nmaximum = 1000\n",
+              "test.toml:5:11: key 'features.maximum': expected what dds.maximum_MB_per_s = 50 allows "
+              "(features.maximum of at "
+              "most 197), got 248.96 MB/s of surfaces with 1000 features, 2000 of them a second"},
         Wrong{"BudgetBeyondLatency", "version = 1\n[pipeline]\nbudget_ms = 50\n",
               "test.toml:3:13: key 'pipeline.budget_ms': expected less than latency_ms (50), got 50"},
         Wrong{"QuaternionNotUnit", "version = 1\n[tracker]\nhand_eye_rotation_SC_wxyz = [1, 1, 0, 0]\n",

@@ -66,7 +66,8 @@ struct Stages : ::testing::Test {
     job.frame = current = &frame;
     job.about_capture = bases_about(settings.estimator.layout, frame.phase, frame.respiration);
     job.history = history.get();
-    for (ReleaseBasis& release : job.releases) release.b = basis_at(settings.estimator.layout, 1.0);
+    job.evaluated.b.fill(basis_at(settings.estimator.layout, 1.0));
+    job.evaluated.end = kCovariances;
     for (FeatureSlot& s : slots) s.match = PatchMatch{};
     group->sweep(job);
   }
@@ -362,7 +363,7 @@ TEST_F(Stages, WhatIsPredictedAndShownIsWhatTheBankHolds) {
   ASSERT_EQ(snapshots.size(), 1U);
   EXPECT_EQ(snapshots[0].x, estimate.x);
   for (const Matrix3d& covariance : snapshots[0].covariances_W_mm2) {
-    EXPECT_LT((covariance - estimate.position_covariance(job.releases[0].b)).norm(), 1e-12);
+    EXPECT_LT((covariance - estimate.position_covariance(job.evaluated.b[0])).norm(), 1e-12);
   }
 }
 
@@ -423,7 +424,7 @@ TEST_F(SlowPoseError, OfTheBatchStartIsCountedToo) {
   next_frame();
   FeatureEstimate estimate;
   bank->get(0, estimate);
-  EXPECT_LT(estimate.position_covariance(job.releases[0].b)(1, 1), 0.2) << "what the recursion believes";
+  EXPECT_LT(estimate.position_covariance(job.evaluated.b[0])(1, 1), 0.2) << "what the recursion believes";
   EXPECT_GT(shown().at(0).covariances_W_mm2[0](1, 1), 0.8);
 }
 

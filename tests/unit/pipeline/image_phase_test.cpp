@@ -63,7 +63,8 @@ struct Surface : ::testing::Test {
     job.frame = &frame;
     job.about_capture = bases_about(settings.layout, frame.phase, frame.respiration);
     job.history = &history;
-    for (ReleaseBasis& release : job.releases) release.b = frame.b;
+    job.evaluated.b.fill(frame.b);
+    job.evaluated.end = kReleasesCovered;
     for (FeatureGroup& group : groups) group.sweep(job);
   }
 

@@ -109,7 +109,7 @@ class Moment {
   std::array<ShardSnapshot, 2> shards_;
   std::array<const ShardSnapshot*, 2> view_;
   ModelMoment moment_;
-  WireModel wire_{{"theatre 3", "frame", "tracker"}};
+  WireModel wire_{{"theatre 3", ReleaseStream::kFrame, "tracker"}};
 };
 
 PredictedSurface predicted(const perimap_SurfaceModel& model, Instant t, client::Acceptance acceptance = {}) {

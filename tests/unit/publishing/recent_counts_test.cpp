@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <vector>
 
 #include "daemon/publishing/status_text.hpp"
 #include "daemon/publishing/wire_reports.hpp"
@@ -22,7 +23,7 @@ class RecentCountsTest : public ::testing::Test {
   // A second in which every release was so late and the tracker gave 100 poses, noted at its end.
   void pass_second(Duration tardiness) {
     now_ += seconds(1);
-    for (int i = 0; i < 60; ++i) counters_->release_tardiness.add(tardiness);
+    for (int i = 0; i < 60; ++i) counters_->of(ReleaseStream::kFrame).release_tardiness.add(tardiness);
     counters_->poses_received.add(100);
     counters_->last_pose_ns.set(static_cast<std::uint64_t>(to_ns(now_)));
     recent_.note(*counters_, now_);
@@ -40,7 +41,7 @@ class RecentCountsTest : public ::testing::Test {
 
   std::unique_ptr<PipelineCounters> counters_ = std::make_unique<PipelineCounters>();
   RecentCounts recent_;
-  WireStatus wire_{Identity{"a", "frame", "tracker"}};
+  WireStatus wire_{Identity{"a", ReleaseStream::kFrame, "tracker"}};
   Instant now_ = kStart;
 };
 
@@ -62,7 +63,7 @@ TEST_F(RecentCountsTest, WhatIsLongAgoCountsSinceTheStartAlone) {
 TEST_F(RecentCountsTest, OneLateReleaseInTheLastSecondsIsSeenThere) {
   recent_.note(*counters_, now_);
   for (int i = 0; i < 20; ++i) pass_second(microseconds(10));
-  counters_->release_tardiness.add(milliseconds(5));
+  counters_->of(ReleaseStream::kFrame).release_tardiness.add(milliseconds(5));
   const perimap_StageLatency stage = tardiness(status());
   EXPECT_NEAR(static_cast<double>(stage.recent_max_ns), 5e6, 5e6 / 16);
   EXPECT_NEAR(static_cast<double>(stage.recent_p50_ns), 10e3, 10e3 / 16);
@@ -97,6 +98,45 @@ TEST_F(RecentCountsTest, TheStatusTellsWhenASourceWasLastGood) {
   const auto json = full_status_json(status());
   EXPECT_DOUBLE_EQ(json["sources"]["tracker"]["last_good_age_ms"], 250.0);
   EXPECT_DOUBLE_EQ(json["sources"]["tracker"]["age_ms"], 0.0);
+}
+
+TEST_F(RecentCountsTest, EachStreamHasAStatusWithItsOwnReleases) {
+  PipelineSettings settings;
+  settings.clock_period = milliseconds(1);
+  std::vector<WireStatus> statuses = wire_statuses({"a", ReleaseStream::kFrame, "tracker"}, settings);
+  ASSERT_EQ(statuses.size(), 2U);
+  recent_.note(*counters_, now_);
+  counters_->frames.add(9);
+  counters_->of(ReleaseStream::kFrame).samples.add(5);
+  StreamCounters& clock = counters_->of(ReleaseStream::kClock);
+  clock.samples.add(70);
+  clock.releases_missed.add(3);
+  clock.release_tardiness.add(milliseconds(2));
+  StatusFacts facts;
+  facts.recent = &recent_;
+  const perimap_Status& of_frames = statuses[0].fill(*counters_, facts, now_ + seconds(1));
+  const perimap_Status& of_clock = statuses[1].fill(*counters_, facts, now_ + seconds(1));
+  EXPECT_STREQ(of_frames.stream, "frame");
+  EXPECT_STREQ(of_clock.stream, "clock");
+  EXPECT_EQ(of_frames.frames, 9U);
+  EXPECT_EQ(of_clock.frames, 9U);
+  EXPECT_EQ(of_frames.samples, 5U);
+  EXPECT_EQ(of_clock.samples, 70U);
+  EXPECT_EQ(of_frames.releases_missed, 0U);
+  EXPECT_EQ(of_clock.releases_missed, 3U);
+  EXPECT_EQ(tardiness(of_frames).count, 0U);
+  EXPECT_EQ(tardiness(of_clock).recent_count, 1U);
+}
+
+TEST(WireStatuses, OnlyStreamsThatArePublishedHaveOne) {
+  PipelineSettings settings;
+  EXPECT_EQ(wire_statuses({}, settings).size(), 1U);
+  settings.frame_stream = false;
+  settings.clock_period = milliseconds(10);
+  std::vector<WireStatus> statuses = wire_statuses({}, settings);
+  ASSERT_EQ(statuses.size(), 1U);
+  PipelineCounters counters;
+  EXPECT_STREQ(statuses[0].fill(counters, {}, kStart).stream, "clock");
 }
 
 }  // namespace

@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
+
+#include "daemon/config/surface_traffic.hpp"
+#include "drivers/recording/cdr.hpp"
 
 namespace perimap {
 namespace {
@@ -32,7 +36,7 @@ TEST(WireSurface, CarriesEveryFieldOfTheSample) {
   feature.last_observed = Instant(milliseconds(90));
   sample.features = {feature};
 
-  WireSurface wire({"theatre 3", "frame", "tracker"}, 4);
+  WireSurface wire({"theatre 3", ReleaseStream::kFrame, "tracker"}, 4);
   const perimap_Surface& out = wire.fill(sample, std::chrono::seconds(1000));
   EXPECT_STREQ(out.source, "theatre 3");
   EXPECT_STREQ(out.stream, "frame");
@@ -65,8 +69,31 @@ TEST(WireSurface, CarriesEveryFieldOfTheSample) {
 }
 
 TEST(WireSurface, CutsNamesThatAreTooLong) {
-  WireSurface wire({std::string(200, 'x'), "frame", "tracker"}, 1);
+  WireSurface wire({std::string(200, 'x'), ReleaseStream::kFrame, "tracker"}, 1);
   EXPECT_EQ(std::string(wire.fill(SurfaceSample{}, Duration(0)).source), std::string(63, 'x'));
+}
+
+TEST(WireSurface, TakesNoMoreBytesThanItsTrafficIsReckonedWith) {
+  constexpr std::size_t kFeatures = 200;
+  WireSurface wire({std::string(63, 's'), ReleaseStream::kClock, std::string(63, 'f')}, kFeatures);
+  SurfaceSample sample;
+  CdrSerializer serializer;
+  const auto bytes = [&] { return serializer.serialize(wire.fill(sample, Duration(0))).value().size(); };
+  const std::size_t without = bytes();
+  EXPECT_LE(without, kSurfaceBytes);
+  EXPECT_GT(without, kSurfaceBytes / 2) << "or far less would be refused than has to be";
+  sample.features.resize(kFeatures);
+  EXPECT_LE(bytes(), kSurfaceBytes + kFeatures * kSurfaceFeatureBytes);
+  EXPECT_GT(bytes() - without, kFeatures * (kSurfaceFeatureBytes - 8));
+}
+
+TEST(WireSurface, EachStreamHasItsOwnName) {
+  PipelineSettings settings;
+  settings.clock_period = milliseconds(10);
+  std::vector<WireSurface> wires = wire_surfaces({"a", ReleaseStream::kFrame, "tracker"}, settings);
+  ASSERT_EQ(wires.size(), 2U);
+  EXPECT_STREQ(wires[index_of(ReleaseStream::kFrame)].fill({}, Duration(0)).stream, "frame");
+  EXPECT_STREQ(wires[index_of(ReleaseStream::kClock)].fill({}, Duration(0)).stream, "clock");
 }
 
 }  // namespace

@@ -276,6 +276,9 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.latency_short);
   next(s.recent_ns);
   next(s.respiration_source);
+  next(s.releases_missed);
+  next(s.features_shed);
+  next(s.times_shed);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -562,7 +565,10 @@ json to_json(const perimap_Status& s) {
           MEMBER(rhythm),
           MEMBER(latency_short),
           MEMBER(recent_ns),
-          MEMBER(respiration_source)};
+          MEMBER(respiration_source),
+          MEMBER(releases_missed),
+          MEMBER(features_shed),
+          MEMBER(times_shed)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {

@@ -94,7 +94,7 @@ TEST(RespirationFeeder, GivesTheChannelToPipelineStatusAndRecording) {
   EXPECT_EQ(counters.respiration_samples.get(), counters.ecg_samples.get());
   EXPECT_EQ(counters.respiration_off.get(), 0U);
   EXPECT_EQ(counters.last_respiration_ns.get(), counters.last_good_respiration_ns.get());
-  WireStatus status(Identity{"test", "frame", "tracker"});
+  WireStatus status(Identity{"test", ReleaseStream::kFrame, "tracker"});
   const perimap_Status& wire = status.fill(counters, told, MonotonicClock::now());
   const perimap_SourceStatus& source = wire.sources._buffer[wire.sources._length - 1];
   EXPECT_EQ(source.kind, perimap_SOURCE_RESPIRATION);

@@ -1,0 +1,56 @@
+#include "core/pipeline/release_plan.hpp"
+
+namespace perimap {
+
+bool ReleasePlan::on_frame(const FrameStamp& stamp, Instant now) noexcept {
+  // What nobody takes off the schedule would fill it between two releases of a slow clock.
+  if (!settings_.frame_stream) let_frames_come_due(now);
+  return frames_.on_frame(stamp, now);
+}
+
+std::optional<Release> ReleasePlan::next() const noexcept {
+  const std::optional<Release> frame = settings_.frame_stream ? frames_.next() : std::nullopt;
+  const std::optional<Instant> grid = next_on_grid();
+  if (frame && (!grid || frame->deadline <= *grid)) return frame;
+  if (!grid) return std::nullopt;
+  return Release{due_.frame_sequence, due_.capture, *grid, due_.frame_missing, ReleaseStream::kClock};
+}
+
+Release ReleasePlan::take() noexcept {
+  Release release = *next();
+  if (release.stream == ReleaseStream::kFrame) {
+    any_due_ = true;
+    due_ = frames_.take();
+    return due_;
+  }
+  let_frames_come_due(release.deadline);
+  grid_begun_ = true;
+  last_on_grid_ = release.deadline;
+  return {due_.frame_sequence, due_.capture, release.deadline, due_.frame_missing, ReleaseStream::kClock};
+}
+
+std::uint64_t ReleasePlan::leave_out_missed(Instant now) noexcept {
+  const std::optional<Instant> grid = next_on_grid();
+  if (!grid || !grid_begun_ || now < *grid + settings_.clock_period) return 0;
+  const auto missed = (now - *grid) / settings_.clock_period;
+  last_on_grid_ += missed * settings_.clock_period;
+  return static_cast<std::uint64_t>(missed);
+}
+
+std::optional<Instant> ReleasePlan::next_on_grid() const noexcept {
+  const Duration period = settings_.clock_period;
+  if (period <= Duration(0)) return std::nullopt;
+  if (grid_begun_) return last_on_grid_ + period;
+  const std::optional<Release> first = any_due_ ? due_ : frames_.next();
+  if (!first) return std::nullopt;
+  return Instant((first->deadline.time_since_epoch() + period - Duration(1)) / period * period);
+}
+
+void ReleasePlan::let_frames_come_due(Instant until) noexcept {
+  for (auto frame = frames_.next(); frame && frame->deadline <= until; frame = frames_.next()) {
+    any_due_ = true;
+    due_ = frames_.take();
+  }
+}
+
+}  // namespace perimap

@@ -1,0 +1,63 @@
+// Which surface is due next, of the frames' and of the clock's.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/pipeline/release_schedule.hpp"
+#include "core/sensors/frame_stamp.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+struct ReleasePlanSettings {
+  Duration latency{0};       // L of the frames' releases
+  bool frame_stream = true;  // these are published
+  Duration clock_period{0};  // the clock's releases fall on the multiples of it; 0: there are none
+};
+
+// The frames' releases, as ReleaseSchedule has them, and those on the clock's grid, in order of time; of two at the
+// same instant the frame's comes first. A release of the clock tells which frame's surface ought to be known by then:
+// the last whose capture + L has come, whether or not the frames' own releases are published. The grid begins with the
+// first such frame. Used by one thread.
+class ReleasePlan {
+ public:
+  explicit ReleasePlan(const ReleasePlanSettings& settings) noexcept : settings_(settings), frames_(settings.latency) {}
+
+  // As ReleaseSchedule::on_frame().
+  bool on_frame(const FrameStamp& stamp, Instant now) noexcept;
+  // As ReleaseSchedule::resume().
+  void resume(Instant last_capture, std::uint64_t last_sequence, Duration period, Instant now) noexcept {
+    frames_.resume(last_capture, last_sequence, period, now);
+  }
+
+  // The next release; none before the first frame. While it is provisional, a frame that comes may change it.
+  [[nodiscard]] std::optional<Release> next() const noexcept;
+  [[nodiscard]] static bool provisional(const Release& release) noexcept {
+    return release.frame_missing || release.stream == ReleaseStream::kClock;
+  }
+  // Takes it off the plan. Requires next().
+  Release take() noexcept;
+
+  // Leaves out the clock's releases after which another one has come due as well. Returns how many those are.
+  std::uint64_t leave_out_missed(Instant now) noexcept;
+
+  // Frames that have come are still to be released, or to be told of by the clock.
+  [[nodiscard]] bool pending() const noexcept { return frames_.pending(); }
+  // The frame's release that came due last; the capture is zero when there was none.
+  [[nodiscard]] const Release& last_due() const noexcept { return due_; }
+  [[nodiscard]] Duration frame_period() const noexcept { return frames_.period(); }
+
+ private:
+  [[nodiscard]] std::optional<Instant> next_on_grid() const noexcept;
+  void let_frames_come_due(Instant until) noexcept;
+
+  ReleasePlanSettings settings_;
+  ReleaseSchedule frames_;
+  bool any_due_ = false;
+  Release due_;
+  bool grid_begun_ = false;
+  Instant last_on_grid_;
+};
+
+}  // namespace perimap

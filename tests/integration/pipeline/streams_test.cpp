@@ -1,0 +1,207 @@
+// Surfaces by the clock, alone and beside those of the frames.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/runtime/live_runtime.hpp"
+#include "daemon/runtime/lockstep_runtime.hpp"
+#include "daemon/runtime/replay_feeder.hpp"
+#include "daemon/runtime/replay_setup.hpp"
+#include "tests/integration/pipeline/collected_surfaces.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+using test::CollectedSurface;
+using test::CollectedSurfaces;
+
+constexpr Duration kPeriod = milliseconds(4);
+
+ReplaySetup setup() {
+  auto made = prepare_replay(PERIMAP_TEST_RECORDING, std::nullopt, ReadMode::kStrict);
+  if (!made) throw std::runtime_error(made.error().error.message);
+  return std::move(*made);
+}
+
+struct Streams {
+  bool frames = true;
+  Duration clock_period{0};
+  Duration lead{0};
+};
+
+struct Published {
+  std::vector<CollectedSurface> frames;
+  std::vector<CollectedSurface> clock;
+};
+
+// The recording in lockstep; after `frames_for` since its first event the camera gives no more.
+Published lockstep(const Streams& streams, Duration frames_for = Duration::max()) {
+  ReplaySetup s = setup();
+  s.pipeline.lockstep = true;
+  s.pipeline.frame_stream = streams.frames;
+  s.pipeline.clock_period = streams.clock_period;
+  s.pipeline.lead = streams.lead;
+  Pipeline pipeline(s.pipeline);
+  CollectedSurfaces collected;
+  LockstepRuntime runtime(pipeline, s.identity, s.utc_minus_monotonic, collected);
+  std::optional<Instant> first;
+  for (;;) {
+    auto event = s.reader.next();
+    if (!event) throw std::runtime_error(event.error().message);
+    if (!*event) break;
+    if (!first) first = arrival_of(**event);
+    if (std::holds_alternative<FrameEvent>(**event) && arrival_of(**event) - *first > frames_for) continue;
+    runtime.deliver(**event);
+  }
+  runtime.finish();
+  return {collected.of(ReleaseStream::kFrame), collected.of(ReleaseStream::kClock)};
+}
+
+double distance_mm(const perimap_SurfaceFeature& a, const perimap_SurfaceFeature& b) {
+  return std::hypot(a.position_W_mm[0] - b.position_W_mm[0], a.position_W_mm[1] - b.position_W_mm[1],
+                    a.position_W_mm[2] - b.position_W_mm[2]);
+}
+
+double trace_mm2(const perimap_SurfaceFeature& f) {
+  return f.covariance_W_mm2[0] + f.covariance_W_mm2[3] + f.covariance_W_mm2[5];
+}
+
+double speed_mm_per_s(const perimap_SurfaceFeature& f) {
+  return std::hypot(f.velocity_W_mm_per_s[0], f.velocity_W_mm_per_s[1], f.velocity_W_mm_per_s[2]);
+}
+
+TEST(ReleaseStreams, TheClockReleasesOnItsGridWithoutAGap) {
+  const Duration lead = milliseconds(30);
+  const std::vector<CollectedSurface> clock = lockstep({false, kPeriod, lead}).clock;
+  ASSERT_GT(clock.size(), 1000U);
+  int good = 0;
+  for (std::size_t i = 0; i < clock.size(); ++i) {
+    const perimap_Surface& s = clock[i].head;
+    EXPECT_EQ(s.release_time_ns % kPeriod.count(), 0);
+    EXPECT_EQ(s.valid_time_ns, s.release_time_ns + lead.count());
+    EXPECT_EQ(s.sample_sequence, i + 1);
+    EXPECT_LT(s.capture_time_ns, s.release_time_ns);
+    if (i > 0) {
+      EXPECT_EQ(s.release_time_ns - clock[i - 1].head.release_time_ns, kPeriod.count());
+      EXPECT_GE(s.frame_sequence, clock[i - 1].head.frame_sequence);
+    }
+    good += s.state == perimap_SURFACE_GOOD ? 1 : 0;
+  }
+  EXPECT_GT(good, 100);
+}
+
+TEST(ReleaseStreams, TheClockBesideThemChangesNothingOfTheFramesSurfaces) {
+  const std::vector<CollectedSurface> alone = lockstep({}).frames;
+  const Published both = lockstep({true, kPeriod, Duration(0)});
+  const std::vector<CollectedSurface>& beside = both.frames;
+  EXPECT_GT(both.clock.size(), 1000U);
+  ASSERT_EQ(alone.size(), beside.size());
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    EXPECT_EQ(alone[i].head.sample_sequence, beside[i].head.sample_sequence);
+    EXPECT_EQ(alone[i].head.release_time_ns, beside[i].head.release_time_ns);
+    EXPECT_EQ(alone[i].head.reason, beside[i].head.reason);
+    ASSERT_EQ(alone[i].features.size(), beside[i].features.size());
+    for (std::size_t k = 0; k < alone[i].features.size(); ++k) {
+      const perimap_SurfaceFeature& a = alone[i].features[k];
+      const perimap_SurfaceFeature& b = beside[i].features[k];
+      EXPECT_EQ(a.id, b.id);
+      for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(a.position_W_mm[axis], b.position_W_mm[axis]);
+      for (int element = 0; element < 6; ++element) EXPECT_EQ(a.covariance_W_mm2[element], b.covariance_W_mm2[element]);
+    }
+  }
+}
+
+// The clock's surface of nearly the same instant: the same motion, and hardly another covariance, though that is
+// interpolated.
+TEST(ReleaseStreams, BothStreamsTellTheSameSurface) {
+  const Published both = lockstep({true, kPeriod, Duration(0)});
+  const std::vector<CollectedSurface>& clock = both.clock;
+  int compared = 0;
+  int alike = 0;
+  for (const CollectedSurface& frame : both.frames) {
+    if (frame.head.state != perimap_SURFACE_GOOD || clock.empty()) continue;
+    const auto i = (frame.head.release_time_ns - clock.front().head.release_time_ns) / kPeriod.count();
+    if (i < 0 || i >= static_cast<std::int64_t>(clock.size())) continue;
+    const CollectedSurface& tick = clock[static_cast<std::size_t>(i)];
+    if (tick.head.state != perimap_SURFACE_GOOD) continue;
+    const double dt_s = static_cast<double>(frame.head.valid_time_ns - tick.head.valid_time_ns) * 1e-9;
+    std::map<std::uint32_t, perimap_SurfaceFeature> of_frame;
+    for (const perimap_SurfaceFeature& f : frame.features) of_frame[f.id] = f;
+    for (const perimap_SurfaceFeature& f : tick.features) {
+      const auto other = of_frame.find(f.id);
+      if (other == of_frame.end()) continue;
+      ++compared;
+      const double ratio = trace_mm2(f) / trace_mm2(other->second);
+      const bool near = distance_mm(f, other->second) < 1.5 * std::abs(dt_s) * speed_mm_per_s(f) + 0.5;
+      alike += near && ratio > 0.5 && ratio < 2.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(compared, 100);
+  EXPECT_GT(alike, 0.9 * compared);
+}
+
+TEST(ReleaseStreams, WhenFramesStopTheClockSaysSoAndItsSurfacesKeepTheirAge) {
+  const std::vector<CollectedSurface> clock = lockstep({true, kPeriod, Duration(0)}, milliseconds(5750)).clock;
+  ASSERT_FALSE(clock.empty());
+  const std::int64_t last_capture_ns = clock.back().head.capture_time_ns;
+  // The first frame that has not come is owed a period (33 ms) and L after the last, with some jitter.
+  const std::int64_t owed_ns = last_capture_ns + 34'000'000 + 50'000'000 + 4'000'000;
+  int before = 0;
+  int after = 0;
+  for (const CollectedSurface& s : clock) {
+    if (s.head.release_time_ns < last_capture_ns) before += s.head.state == perimap_SURFACE_GOOD ? 1 : 0;
+    if (s.head.release_time_ns < owed_ns) continue;
+    ++after;
+    EXPECT_NE(s.head.state, perimap_SURFACE_GOOD);
+    EXPECT_EQ(s.head.capture_time_ns, last_capture_ns) << "no frame is made up";
+    for (const perimap_SurfaceFeature& f : s.features) EXPECT_LE(f.last_observed_time_ns, last_capture_ns);
+  }
+  EXPECT_GT(before, 10);
+  EXPECT_GT(after, 20);
+}
+
+TEST(ReleaseStreams, LiveEveryReleaseOfTheGridIsPublishedOrCountedAsMissed) {
+  ReplaySetup s = setup();
+  s.pipeline.frame_stream = false;
+  s.pipeline.clock_period = milliseconds(2);
+  Pipeline pipeline(s.pipeline);
+  CollectedSurfaces collected;
+  RuntimeSettings settings;
+  settings.lock_memory = false;
+  LiveRuntime runtime(pipeline, settings, collected);
+  runtime.start();
+  ReplayFeeder feeder(std::move(s.reader), SensorIntake{&pipeline.entrance()});
+  feeder.start(runtime.threads());
+  while (!feeder.ended()) std::this_thread::sleep_for(milliseconds(50));
+  runtime.end_of_sources();
+  while (!runtime.all_released()) std::this_thread::sleep_for(milliseconds(10));
+  feeder.stop();
+  runtime.stop();
+  EXPECT_TRUE(collected.of(ReleaseStream::kFrame).empty());
+  const std::vector<CollectedSurface> clock = collected.of(ReleaseStream::kClock);
+  ASSERT_GT(clock.size(), 10U);
+  const StreamCounters& counters = pipeline.counters().of(ReleaseStream::kClock);
+  const auto grid = (clock.back().head.release_time_ns - clock.front().head.release_time_ns) / 2'000'000 + 1;
+  // What was left out after the last one is counted too.
+  EXPECT_GE(clock.size() + counters.releases_missed.get(), static_cast<std::size_t>(grid));
+  EXPECT_EQ(counters.samples.get(), clock.size());
+  EXPECT_EQ(clock.back().head.sample_sequence, clock.size());
+  EXPECT_EQ(pipeline.counters().frames_too_late.get() + pipeline.counters().frames_dropped.get() +
+                    pipeline.counters().frames.get() >=
+                pipeline.counters().frames_received.get(),
+            true)
+      << "frames are mapped as with their own releases";
+}
+
+}  // namespace
+}  // namespace perimap

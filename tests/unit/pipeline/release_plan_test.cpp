@@ -1,0 +1,140 @@
+#include "core/pipeline/release_plan.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr Duration kLatency = milliseconds(50);
+
+Instant at_ms(int ms) { return Instant(milliseconds(10'000 + ms)); }
+
+FrameStamp frame(std::uint64_t sequence, int capture_ms) {
+  return {sequence, at_ms(capture_ms), at_ms(capture_ms + 12)};
+}
+
+// Frames 30 ms apart, each told of when it arrives; everything that is due by `until_ms` is taken at its instant.
+std::vector<Release> run(ReleasePlan& plan, int frames, int until_ms) {
+  std::vector<Release> taken;
+  const auto take_until = [&](Instant t) {
+    for (auto next = plan.next(); next && next->deadline <= t; next = plan.next()) taken.push_back(plan.take());
+  };
+  for (int i = 0; i < frames; ++i) {
+    take_until(at_ms(30 * i + 12));
+    EXPECT_TRUE(plan.on_frame(frame(static_cast<std::uint64_t>(i), 30 * i), at_ms(30 * i + 12)));
+  }
+  take_until(at_ms(until_ms));
+  return taken;
+}
+
+std::vector<Release> of(ReleaseStream stream, const std::vector<Release>& all) {
+  std::vector<Release> some;
+  for (const Release& release : all) {
+    if (release.stream == stream) some.push_back(release);
+  }
+  return some;
+}
+
+TEST(ReleasePlan, WithoutAClockIsTheFramesSchedule) {
+  ReleasePlan plan({kLatency, true, Duration(0)});
+  EXPECT_FALSE(plan.next().has_value());
+  const std::vector<Release> taken = run(plan, 10, 30 * 9 + 50);
+  ASSERT_EQ(taken.size(), 10U);
+  for (std::size_t i = 0; i < taken.size(); ++i) {
+    EXPECT_EQ(taken[i].stream, ReleaseStream::kFrame);
+    EXPECT_EQ(taken[i].deadline, at_ms(30 * static_cast<int>(i) + 50));
+  }
+}
+
+TEST(ReleasePlan, TheClockReleasesAtTheMultiplesOfItsPeriodFromTheFirstFramesReleaseOn) {
+  ReleasePlan plan({kLatency, false, milliseconds(7)});
+  EXPECT_FALSE(plan.next().has_value()) << "before the first frame there is nothing to tell of";
+  const std::vector<Release> taken = run(plan, 10, 400);
+  ASSERT_GT(taken.size(), 40U);
+  EXPECT_EQ(taken.front().deadline, Instant(milliseconds(10'052))) << "1436 * 7, the first at 10'050 or after";
+  for (std::size_t i = 0; i < taken.size(); ++i) {
+    EXPECT_EQ(taken[i].stream, ReleaseStream::kClock);
+    EXPECT_EQ(taken[i].deadline.time_since_epoch() % milliseconds(7), Duration(0));
+    if (i == 0) continue;
+    EXPECT_EQ(taken[i].deadline - taken[i - 1].deadline, milliseconds(7));
+  }
+}
+
+TEST(ReleasePlan, AReleaseOfTheClockTellsWhichFrameIsOwedByThen) {
+  ReleasePlan plan({kLatency, false, milliseconds(10)});
+  for (const Release& release : run(plan, 10, 30 * 9 + 50)) {
+    const auto owed = static_cast<std::uint64_t>((release.deadline - at_ms(50)) / milliseconds(30));
+    EXPECT_EQ(release.frame_sequence, owed);
+    EXPECT_EQ(release.capture, at_ms(30 * static_cast<int>(owed)));
+    EXPECT_FALSE(release.frame_missing);
+  }
+}
+
+TEST(ReleasePlan, WhenFramesStopTheClockGoesOnAndSaysSo) {
+  ReleasePlan plan({kLatency, false, milliseconds(10)});
+  run(plan, 10, 30 * 9 + 50);
+  for (int ms = 330; ms < 400; ms += 10) {
+    const Release release = plan.take();
+    EXPECT_EQ(release.deadline, at_ms(ms));
+    EXPECT_EQ(release.frame_missing, ms >= 350) << ms << ": the next would have been due at 350";
+  }
+}
+
+TEST(ReleasePlan, BothStreamsComeInOrderOfTimeAndNeitherChangesTheOther) {
+  ReleasePlan both({kLatency, true, milliseconds(10)});
+  ReleasePlan frames({kLatency, true, Duration(0)});
+  ReleasePlan clock({kLatency, false, milliseconds(10)});
+  const std::vector<Release> taken = run(both, 10, 500);
+  for (std::size_t i = 1; i < taken.size(); ++i) {
+    EXPECT_GE(taken[i].deadline, taken[i - 1].deadline);
+    if (taken[i].deadline == taken[i - 1].deadline) {
+      EXPECT_EQ(taken[i - 1].stream, ReleaseStream::kFrame) << "so that the clock knows of it";
+    }
+  }
+  const auto same = [](const std::vector<Release>& a, const std::vector<Release>& b) {
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_EQ(a[i].deadline, b[i].deadline);
+      EXPECT_EQ(a[i].frame_sequence, b[i].frame_sequence);
+      EXPECT_EQ(a[i].frame_missing, b[i].frame_missing);
+    }
+  };
+  same(of(ReleaseStream::kFrame, taken), run(frames, 10, 500));
+  same(of(ReleaseStream::kClock, taken), run(clock, 10, 500));
+}
+
+TEST(ReleasePlan, AClockSlowerThanTheFramesLosesNoneOfThem) {
+  ReleasePlan plan({kLatency, false, std::chrono::seconds(5)});
+  for (int i = 0; i < 300; ++i) {
+    EXPECT_TRUE(plan.on_frame(frame(static_cast<std::uint64_t>(i), 10 * i), at_ms(10 * i + 12))) << i;
+  }
+  EXPECT_EQ(plan.last_due().frame_sequence, 295U);
+}
+
+TEST(ReleasePlan, ReleasesThatAnotherHasCaughtUpWithAreLeftOutAndCounted) {
+  ReleasePlan plan({kLatency, false, milliseconds(10)});
+  run(plan, 10, 320);
+  EXPECT_EQ(plan.next()->deadline, at_ms(330));
+  EXPECT_EQ(plan.leave_out_missed(at_ms(339)), 0U) << "late, but its turn still";
+  EXPECT_EQ(plan.leave_out_missed(at_ms(340)), 1U);
+  EXPECT_EQ(plan.leave_out_missed(at_ms(340)), 0U) << "counted once";
+  EXPECT_EQ(plan.next()->deadline, at_ms(340));
+  EXPECT_EQ(plan.leave_out_missed(at_ms(395)), 5U);
+  EXPECT_EQ(plan.take().deadline, at_ms(390)) << "on the grid as before";
+}
+
+TEST(ReleasePlan, AfterARestartTheClockBeginsWithTheNextReleaseThatIsExpected) {
+  ReleasePlan plan({kLatency, false, milliseconds(10)});
+  plan.resume(at_ms(0), 7, milliseconds(30), at_ms(105));
+  const auto next = plan.next();
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->deadline, at_ms(110)) << "30 ms after the release at 80";
+  EXPECT_TRUE(plan.take().frame_missing);
+}
+
+}  // namespace
+}  // namespace perimap
