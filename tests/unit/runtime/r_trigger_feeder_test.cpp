@@ -3,12 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <cstdlib>
-#include <filesystem>
 #include <memory>
 #include <thread>
 #include <vector>
 
+#include "begun_recording.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/session_recording.hpp"
 #include "drivers/recording/replay_reader.hpp"
@@ -72,9 +71,7 @@ TEST(RTriggerDevice, WithoutAPortSaysWhichKeyIsMissing) {
 
 // Plugged in, unplugged and plugged in again.
 TEST(RTriggerFeeder, GivesThePulsesToPipelineStatusAndRecording) {
-  std::string folder = (std::filesystem::temp_directory_path() / "perimap-trigger-XXXXXX").string();
-  ASSERT_NE(mkdtemp(folder.data()), nullptr);
-  const std::filesystem::path file = std::filesystem::path(folder) / "session.mcap";
+  const BegunRecording recording;
   Configuration configuration;
   configuration.ecg = triggered();
   configuration.ecg.r_trigger_delay = milliseconds(35);
@@ -82,16 +79,8 @@ TEST(RTriggerFeeder, GivesThePulsesToPipelineStatusAndRecording) {
   EXPECT_THAT(*facts.configuration, HasSubstr("\nr_trigger = true"));
   EXPECT_THAT(*facts.configuration, HasSubstr("\nr_trigger_delay_ms = 35.0"));
   EXPECT_THAT(*facts.configuration, ::testing::Not(HasSubstr("ttyS4"))) << "a replay has no port";
-  auto recorder = SessionRecorder::create(file, facts, std::size_t{1} << 20U);
-  ASSERT_TRUE(recorder) << recorder.error().message;
-  // A recording replays when it holds frames too.
-  constexpr std::array<std::byte, 16> kPixels{};
-  CameraFrame frame;
-  frame.stamp = {1, MonotonicClock::now(), MonotonicClock::now()};
-  frame.width = frame.height = 4;
-  frame.stride = 4;
-  frame.bytes = kPixels;
-  (*recorder)->frame(frame);
+  auto recorder = recording.begin(facts);
+  ASSERT_TRUE(recorder);
 
   std::atomic<bool> plugged{true};
   Devices devices;
@@ -107,7 +96,7 @@ TEST(RTriggerFeeder, GivesThePulsesToPipelineStatusAndRecording) {
   PipelineCounters counters;
   const auto entrance = std::make_unique<SensorEntrance>(
       4, 4, EcgIntakeSettings{{}, RTriggerSettings{milliseconds(35)}}, BreathDetectorSettings{}, counters);
-  DeviceFeeder feeder(std::move(devices), entrance.get(), {std::move(*recorder), nullptr});
+  DeviceFeeder feeder(std::move(devices), entrance.get(), {std::move(recorder), nullptr});
   ThreadLauncher threads{SchedulingSettings{}};
   feeder.start(threads);
   const auto closed = [&feeder] {
@@ -126,7 +115,7 @@ TEST(RTriggerFeeder, GivesThePulsesToPipelineStatusAndRecording) {
   feeder.stop();
 
   EXPECT_EQ(counters.r_triggers_dropped.get(), 0U);
-  auto reader = ReplayReader::open(file.string(), ReadMode::kStrict);
+  auto reader = ReplayReader::open(recording.file(), ReadMode::kStrict);
   ASSERT_TRUE(reader) << reader.error().message;
   EXPECT_TRUE(reader->has_r_trigger());
   std::vector<RTriggerPulse> pulses;
@@ -142,7 +131,6 @@ TEST(RTriggerFeeder, GivesThePulsesToPipelineStatusAndRecording) {
     }
   }
   EXPECT_EQ(static_cast<std::uint64_t>(to_ns(pulses.back().time)), counters.last_r_trigger_ns.get());
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

@@ -2,12 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <array>
-#include <cstdlib>
-#include <filesystem>
 #include <thread>
 #include <vector>
 
+#include "begun_recording.hpp"
 #include "daemon/publishing/wire_reports.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/session_recording.hpp"
@@ -43,24 +41,14 @@ TEST(RespirationDevice, AChannelThatTheDeviceHasNotIsRefused) {
 }
 
 TEST(RespirationFeeder, GivesTheChannelToPipelineStatusAndRecording) {
-  std::string folder = (std::filesystem::temp_directory_path() / "perimap-breath-XXXXXX").string();
-  ASSERT_NE(mkdtemp(folder.data()), nullptr);
-  const std::string port = folder + "/ecg";
-  const std::filesystem::path file = std::filesystem::path(folder) / "session.mcap";
+  const BegunRecording recording;
+  const std::string port = recording.folder() + "/ecg";
   const Configuration configuration = breathing_bitalino(port);
   const SensorRecordingFacts facts = recording_facts(configuration, std::nullopt, "test");
   EXPECT_THAT(*facts.configuration, HasSubstr("\nchannel = true")) << "a replay listens to it too";
   EXPECT_THAT(*facts.configuration, HasSubstr("\ndevice_channel = 0")) << "a replay has no device";
-  auto recorder = SessionRecorder::create(file, facts, std::size_t{1} << 20U);
-  ASSERT_TRUE(recorder) << recorder.error().message;
-  // A recording replays when it holds frames too.
-  constexpr std::array<std::byte, 16> kPixels{};
-  CameraFrame frame;
-  frame.stamp = {1, MonotonicClock::now(), MonotonicClock::now()};
-  frame.width = frame.height = 4;
-  frame.stride = 4;
-  frame.bytes = kPixels;
-  (*recorder)->frame(frame);
+  auto recorder = recording.begin(facts);
+  ASSERT_TRUE(recorder);
 
   const Instant start = MonotonicClock::now();
   const auto emulated = emulate_bitalino(
@@ -75,7 +63,7 @@ TEST(RespirationFeeder, GivesTheChannelToPipelineStatusAndRecording) {
   ASSERT_TRUE(devices) << devices.error().message;
   PipelineCounters counters;
   const auto entrance = std::make_unique<SensorEntrance>(4, 4, EcgIntakeSettings{}, BreathDetectorSettings{}, counters);
-  DeviceFeeder feeder(std::move(*devices), entrance.get(), {std::move(*recorder), nullptr});
+  DeviceFeeder feeder(std::move(*devices), entrance.get(), {std::move(recorder), nullptr});
   ThreadLauncher threads{SchedulingSettings{}};
   feeder.start(threads);
   // Three onsets agree on a period.
@@ -100,7 +88,7 @@ TEST(RespirationFeeder, GivesTheChannelToPipelineStatusAndRecording) {
   EXPECT_EQ(source.kind, perimap_SOURCE_RESPIRATION);
   EXPECT_EQ(source.received, counters.respiration_samples.get());
 
-  auto reader = ReplayReader::open(file.string(), ReadMode::kStrict);
+  auto reader = ReplayReader::open(recording.file(), ReadMode::kStrict);
   ASSERT_TRUE(reader) << reader.error().message;
   EXPECT_TRUE(reader->has_respiration());
   std::uint64_t samples = 0;
@@ -108,7 +96,6 @@ TEST(RespirationFeeder, GivesTheChannelToPipelineStatusAndRecording) {
     if (const auto* block = std::get_if<RespirationBlock>(&*event)) samples += block->count;
   }
   EXPECT_EQ(samples, counters.respiration_samples.get()) << "none is lost, none is added";
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
