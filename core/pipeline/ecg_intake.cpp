@@ -28,14 +28,11 @@ void EcgIntake::recall(const EcgBlock& block) noexcept {
 }
 
 void EcgIntake::count(const EcgBlock& block) noexcept {
-  // The count wraps, and starts over with the device: only a step forward is a loss.
-  const auto step = static_cast<std::int32_t>(block.device_sequence - next_device_sequence_);
-  if (started_ && step > 0) counters_.ecg_dropped.add(static_cast<std::uint64_t>(step));
-  started_ = true;
-  next_device_sequence_ = block.device_sequence + block.count;
+  const std::uint64_t lost = sample_count_.lost_before(block.device_sequence, block.count);
+  if (lost > 0) counters_.ecg_dropped.add(lost);
   counters_.ecg_samples.add(block.count);
   if (block.count > 0) {
-    const Instant last = block.first_sample_time + (block.count - 1) * block.sample_period;
+    const Instant last = block.last_sample_time();
     counters_.ecg_delay.add(block.arrival - last);
     counters_.last_ecg_ns.set(static_cast<std::uint64_t>(to_ns(last)));
   }
@@ -72,10 +69,8 @@ void EcgIntake::hear(const EcgBlock& block) noexcept {
 
 void EcgIntake::push(const RTriggerPulse& pulse) noexcept {
   const RealtimeScope realtime;
-  const auto step = static_cast<std::int32_t>(pulse.device_count - next_pulse_);
-  if (any_pulse_ && step > 0) counters_.r_triggers_dropped.add(static_cast<std::uint64_t>(step));
-  any_pulse_ = true;
-  next_pulse_ = pulse.device_count + 1;
+  const std::uint64_t lost = pulse_count_.lost_before(pulse.device_count, 1);
+  if (lost > 0) counters_.r_triggers_dropped.add(lost);
   counters_.r_triggers.add();
   counters_.r_trigger_delay.add(pulse.arrival - pulse.time);
   counters_.last_r_trigger_ns.set(static_cast<std::uint64_t>(to_ns(pulse.time)));

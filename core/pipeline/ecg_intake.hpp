@@ -13,6 +13,7 @@
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/realtime/spsc_ring.hpp"
 #include "core/realtime/triple_buffer.hpp"
+#include "core/sensors/device_count.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/r_trigger_pulse.hpp"
 
@@ -68,12 +69,10 @@ class EcgIntake {
   ClockCells& cells_;
   PipelineCounters& counters_;
   SpscRing<EcgBlock> heard_{kHeardBlocks};
-  bool started_ = false;
-  std::uint32_t next_device_sequence_ = 0;
+  DeviceCount sample_count_;
   bool any_heard_ = false;
   Instant heard_until_;
-  bool any_pulse_ = false;
-  std::uint32_t next_pulse_ = 0;
+  DeviceCount pulse_count_;
   std::atomic<bool> forget_asked_{false};  // relaxed: a message by itself
 };
 

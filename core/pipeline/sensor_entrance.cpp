@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "core/pipeline/hear_breath.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
@@ -76,15 +77,12 @@ void SensorEntrance::push_pose(const TrackerSample& sample) noexcept {
 }
 
 void SensorEntrance::count(const RespirationBlock& block) noexcept {
-  // The count wraps, and starts over with the device: only a step forward is a loss.
-  const auto step = static_cast<std::int32_t>(block.device_sequence - next_respiration_);
-  if (any_respiration_ && step > 0) counters_.respiration_dropped.add(static_cast<std::uint64_t>(step));
-  any_respiration_ = true;
-  next_respiration_ = block.device_sequence + block.count;
+  const std::uint64_t lost = respiration_count_.lost_before(block.device_sequence, block.count);
+  if (lost > 0) counters_.respiration_dropped.add(lost);
   counters_.respiration_samples.add(block.count);
   if (block.sensor_off) counters_.respiration_off.add(block.count);
   if (block.count == 0) return;
-  const Instant last = block.first_sample_time + (block.count - 1) * block.sample_period;
+  const Instant last = block.last_sample_time();
   counters_.respiration_delay.add(block.arrival - last);
   counters_.last_respiration_ns.set(static_cast<std::uint64_t>(to_ns(last)));
   if (!block.sensor_off) counters_.last_good_respiration_ns.set(static_cast<std::uint64_t>(to_ns(last)));
@@ -93,15 +91,7 @@ void SensorEntrance::count(const RespirationBlock& block) noexcept {
 void SensorEntrance::push_respiration(const RespirationBlock& block) noexcept {
   const RealtimeScope realtime;
   count(block);
-  if (block.sensor_off) {
-    breath_.interrupt();
-  } else {
-    Instant t = block.first_sample_time;
-    for (const float value : block.samples()) {
-      breath_.push(t, static_cast<double>(value));
-      t += block.sample_period;
-    }
-  }
+  hear_breath(block, breath_);
   breath_cell_.write(breath_.signal());
 }
 

@@ -10,6 +10,7 @@
 #include "core/realtime/spsc_ring.hpp"
 #include "core/realtime/triple_buffer.hpp"
 #include "core/realtime/wakeup.hpp"
+#include "core/sensors/device_count.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
@@ -77,8 +78,7 @@ class SensorEntrance {
   TripleBuffer<BreathSignal> breath_cell_;
   bool any_frame_ = false;
   std::uint64_t last_sequence_ = 0;
-  bool any_respiration_ = false;
-  std::uint32_t next_respiration_ = 0;
+  DeviceCount respiration_count_;
 };
 
 }  // namespace perimap

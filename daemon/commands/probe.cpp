@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/phase/breath_detector.hpp"
+#include "core/pipeline/hear_breath.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/runtime/device_feeder.hpp"
@@ -64,19 +65,16 @@ struct SeenBreathing {
   BreathDetector detector;
 
   void add(const RespirationBlock& block) {
-    const Instant last = block.first_sample_time + (block.count - 1) * block.sample_period;
-    samples.add(last, block.count);
-    samples.delay.add(block.arrival - last);
+    samples.add(block.last_sample_time(), block.count);
+    samples.delay.add(block.arrival - block.last_sample_time());
+    hear_breath(block, detector);
     if (block.sensor_off) {
       samples.invalid += block.count;
-      return detector.interrupt();
+      return;
     }
-    Instant t = block.first_sample_time;
     for (const float value : block.samples()) {
       lowest = std::min(lowest, value);
       highest = std::max(highest, value);
-      detector.push(t, static_cast<double>(value));
-      t += block.sample_period;
     }
   }
 };
@@ -197,9 +195,8 @@ void listen_to(const TrackerDevice& device, Probed& probed, const Interrupt& int
 
 void listen_to(const EcgDevice& device, Probed& probed, const Interrupt& interrupt) {
   const EcgSink ecg = [&seen = probed.seen](const EcgBlock& block) {
-    const Instant last = block.first_sample_time + (block.count - 1) * block.sample_period;
-    seen.add(last, block.count);
-    seen.delay.add(block.arrival - last);
+    seen.add(block.last_sample_time(), block.count);
+    seen.delay.add(block.arrival - block.last_sample_time());
     if (block.lead_off) seen.invalid += block.count;
   };
   const RespirationSink respiration = [&probed](const RespirationBlock& block) { probed.breathing.add(block); };

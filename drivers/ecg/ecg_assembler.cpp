@@ -53,7 +53,7 @@ void EcgAssembler::give(Lane& lane, Instant arrival, std::array<float, Block::kC
     const bool last = i + 1 == lane.chunk.size();
     if (last || block.count == Block::kCapacity || lane.chunk[i + 1].count != sample.count + 1 ||
         lane.chunk[i + 1].off != sample.off) {
-      lane.last_stamp = block.first_sample_time + (block.count - 1) * block.sample_period;
+      lane.last_stamp = block.last_sample_time();
       sink(block);
       block.count = 0;
     }

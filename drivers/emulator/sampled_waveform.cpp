@@ -34,7 +34,7 @@ SampledWaveform::SampledWaveform(std::span<const EcgBlock> blocks, Duration offs
   for (const EcgBlock& block : blocks) {
     longest_step_ns_ = std::max(longest_step_ns_, kPeriodsMissing * block.sample_period.count());
     for (std::uint32_t i = 0; i < block.count; ++i) {
-      const Instant t = block.first_sample_time + offset + i * block.sample_period;
+      const Instant t = block.time_of(i) + offset;
       add({(t - start_).count(), block.lead_off ? kOff : block.mV[i]});
     }
   }
@@ -47,7 +47,7 @@ SampledWaveform::SampledWaveform(std::span<const RespirationBlock> blocks, Durat
   for (const RespirationBlock& block : blocks) {
     longest_step_ns_ = std::max(longest_step_ns_, kPeriodsMissing * block.sample_period.count());
     for (std::uint32_t i = 0; i < block.count; ++i) {
-      const Instant t = block.first_sample_time + offset + i * block.sample_period;
+      const Instant t = block.time_of(i) + offset;
       const bool off = block.sensor_off || !std::isfinite(block.values[i]);
       add({(t - start_).count(), off ? kOff : block.values[i]});
       if (off) continue;

@@ -124,7 +124,7 @@ TEST(EcgProtocol, ALongChunkIsCutIntoBlocksInOrder) {
     EXPECT_EQ(block.device_sequence, next);
     EXPECT_GT(block.first_sample_time, last);
     next += block.count;
-    last = block.first_sample_time + (block.count - 1) * block.sample_period;
+    last = block.last_sample_time();
     EXPECT_LE(last, block.arrival);
   }
   EXPECT_EQ(next, 200U);

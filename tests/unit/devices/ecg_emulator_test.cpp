@@ -128,7 +128,7 @@ TEST_P(OverATerminal, SamplesArriveInOrderWithTheTimeAtWhichTheyWereMeasured) {
     for (std::uint32_t i = 0; i < block.count; ++i) {
       const float mV = block.mV[i];
       if (std::abs(mV) > 0.9F) continue;  // near the ramp's jump
-      const auto true_mV = session.waveform().at(block.first_sample_time + i * block.sample_period);
+      const auto true_mV = session.waveform().at(block.time_of(i));
       ASSERT_TRUE(true_mV);
       errors_ms.push_back(static_cast<double>(mV - *true_mV) * 1000.0);
     }
@@ -149,7 +149,7 @@ TEST_P(OverATerminal, RespirationComesSampleForSampleWithTheEcg) {
   std::map<std::uint32_t, std::pair<float, Instant>> breaths;
   for (const RespirationBlock& block : session.breaths()) {
     for (std::uint32_t i = 0; i < block.count; ++i) {
-      breaths[block.device_sequence + i] = {block.values[i], block.first_sample_time + i * block.sample_period};
+      breaths[block.device_sequence + i] = {block.values[i], block.time_of(i)};
     }
   }
   if (GetParam().full_breath == 0.0F) {
@@ -162,7 +162,7 @@ TEST_P(OverATerminal, RespirationComesSampleForSampleWithTheEcg) {
       const auto breath = breaths.find(block.device_sequence + i);
       if (breath == breaths.end()) continue;  // given after the others were asked for
       ++compared;
-      EXPECT_EQ(block.first_sample_time + i * block.sample_period, breath->second.second);
+      EXPECT_EQ(block.time_of(i), breath->second.second);
       EXPECT_NEAR(breath->second.first / GetParam().full_breath, block.mV[i], 0.005);
     }
   }
