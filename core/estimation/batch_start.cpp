@@ -89,6 +89,7 @@ class BatchProblem {
       R_inverse_[index] = (observation.R + spread * spread.transpose()).inverse();
     }
   }
+
   // Every R times this; 1 at first.
   void set_variance_scale(double scale) noexcept { variance_scale_ = scale; }
   // Which observations count, 1 or 0; the caller decides.

@@ -40,7 +40,7 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   } else {
     estimate.deviation_s = std::hypot(begin, w * length);
   }
-  const double law_rad = law_deviation_rad(law_, t - cycle.begin, cycle.length, cycle.previous_length);
+  const double law_rad = law_deviation_rad(law_, phase.phase_rad, t - cycle.begin, cycle.length, cycle.previous_length);
   estimate.deviation_s = std::hypot(estimate.deviation_s, law_rad / phase.rate_rad_per_s);
   return estimate;
 }

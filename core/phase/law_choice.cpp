@@ -43,7 +43,7 @@ bool LawChoice::on_beat(const CardiacClock& clock) noexcept {
 // A heart may begin with a run of ectopic beats: as long as phases are told by the linear law, which has no scale, the
 // usual length may turn out another one.
 bool LawChoice::usual_changes(Seconds rr) noexcept {
-  if (chosen_ != 0) return false;
+  if (belief_.settings.law != PhaseLaw::kLinear) return false;
   lengths_s_[length_count_++ % kLengths] = rr.count();
   const auto held = std::min(length_count_, kLengths);
   double sum_s = 0.0;
@@ -60,17 +60,14 @@ void LawChoice::weigh_again(const CardiacClock& clock) noexcept {
   cycles_ = 0.0;
   squares_ = {};
   log_likelihoods_ = {};
-  std::array<Instant, CardiacClock::kCompletedCycles> ends{};
-  int count = 0;
-  for (Instant end = clock.anchor(); count < CardiacClock::kCompletedCycles; ++count) {
-    const CardiacCycle cycle = clock.cycle_at(end - Duration(1));
-    if (cycle.length <= Duration::zero()) break;
-    ends[static_cast<std::size_t>(count)] = end;
-    end = cycle.begin;
+  std::array<CardiacCycle, CardiacClock::kCompletedCycles> cycles{};  // the newest first
+  std::size_t count = 0;
+  for (Instant end = clock.anchor(); count < cycles.size(); end = cycles[count++].begin) {
+    cycles[count] = clock.cycle_at(end - Duration(1));
+    if (cycles[count].length <= Duration::zero()) break;
   }
   while (count-- > 0) {
-    const CardiacCycle cycle = clock.cycle_at(ends[static_cast<std::size_t>(count)] - Duration(1));
-    if (cycle.teaches) weigh(cycle);
+    if (cycles[count].teaches) weigh(cycles[count]);
   }
 }
 
@@ -118,22 +115,20 @@ void LawChoice::weigh(const CardiacCycle& cycle) noexcept {
 }
 
 double LawChoice::scatter(PhaseLaw law) const noexcept {
-  const auto found = std::find(kPhaseLaws.begin(), kPhaseLaws.end(), law);
-  return cycles_ > 0.0 ? squares_[static_cast<std::size_t>(found - kPhaseLaws.begin())] / cycles_ : 0.0;
+  return cycles_ > 0.0 ? squares_[index_of(law)] / cycles_ : 0.0;
 }
 
 bool LawChoice::choose() noexcept {
   if (cycles_ < kLeastCycles) return false;
   const auto best = static_cast<std::size_t>(std::max_element(log_likelihoods_.begin(), log_likelihoods_.end()) -
                                              log_likelihoods_.begin());
-  if (!(log_likelihoods_[best] - log_likelihoods_[chosen_] > kDecisive)) return false;
-  chosen_ = best;
+  if (!(log_likelihoods_[best] - log_likelihoods_[index_of(belief_.settings.law)] > kDecisive)) return false;
+  belief_.settings.law = kPhaseLaws[best];
   return true;
 }
 
 // Any law is as likely as another beforehand, and until as many cycles have been weighed as a choice takes.
 void LawChoice::believe() noexcept {
-  belief_.settings.law = kPhaseLaws[chosen_];
   const double largest = *std::max_element(log_likelihoods_.begin(), log_likelihoods_.end());
   double sum = 0.0;
   for (std::size_t i = 0; i < kLaws; ++i) {

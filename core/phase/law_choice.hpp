@@ -68,7 +68,6 @@ class LawChoice {
   double cycles_ = 0.0;  // weighed, older ones fading, here and below
   std::array<double, kLaws> squares_{};
   std::array<double, kLaws> log_likelihoods_{};
-  std::size_t chosen_ = 0;
   std::array<ObservedPhase, kKept> kept_{};
   std::uint64_t kept_count_ = 0;
 };

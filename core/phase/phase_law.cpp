@@ -99,13 +99,12 @@ CyclePhase phase_in_cycle(const PhaseLawSettings& settings, Seconds since_r, Sec
   return linear(s, rr.count());
 }
 
-double law_deviation_rad(const LawBelief& belief, Seconds since_r, Seconds rr, Seconds rr_previous) noexcept {
+double law_deviation_rad(const LawBelief& belief, double told_rad, Seconds since_r, Seconds rr,
+                         Seconds rr_previous) noexcept {
   double square = 0.0;
-  const double phase_rad = phase_in_cycle(belief.settings, since_r, rr, rr_previous).phase_rad;
   for (std::size_t i = 0; i < kPhaseLaws.size(); ++i) {
-    if (!(belief.probabilities[i] > 0.0)) continue;
-    const double difference =
-        phase_in_cycle(belief.with(kPhaseLaws[i]), since_r, rr, rr_previous).phase_rad - phase_rad;
+    if (!(belief.probabilities[i] > 0.0) || kPhaseLaws[i] == belief.settings.law) continue;
+    const double difference = phase_in_cycle(belief.with(kPhaseLaws[i]), since_r, rr, rr_previous).phase_rad - told_rad;
     square += belief.probabilities[i] * difference * difference;
   }
   return std::sqrt(square);

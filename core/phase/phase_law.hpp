@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <numbers>
 
@@ -44,6 +45,8 @@ inline constexpr double kLongestLockedShare = 0.95;
 [[nodiscard]] bool stretches(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept;
 
 inline constexpr std::array<PhaseLaw, 3> kPhaseLaws{PhaseLaw::kLinear, PhaseLaw::kWarped, PhaseLaw::kTimeLocked};
+// Where in kPhaseLaws it stands.
+[[nodiscard]] constexpr std::size_t index_of(PhaseLaw law) noexcept { return static_cast<std::size_t>(law); }
 
 // The law that phases are told by, and how sure that is.
 struct LawBelief {
@@ -82,9 +85,10 @@ struct LockedParts {
 [[nodiscard]] CyclePhase phase_in_cycle(const PhaseLawSettings& settings, Seconds since_r, Seconds rr,
                                         Seconds rr_previous) noexcept;
 
-// By how much the phase may be off because the law is another one, rad: root mean square difference of the laws' phases
-// from the one told. It vanishes in cycles of the length at which the laws are even, whatever is believed.
-[[nodiscard]] double law_deviation_rad(const LawBelief& belief, Seconds since_r, Seconds rr,
+// By how much the phase told, that of belief.settings, may be off because the law is another one, rad: root mean square
+// difference of the laws' phases from it. It vanishes in cycles of the length at which the laws are even, whatever is
+// believed.
+[[nodiscard]] double law_deviation_rad(const LawBelief& belief, double told_rad, Seconds since_r, Seconds rr,
                                        Seconds rr_previous) noexcept;
 
 }  // namespace perimap

@@ -92,12 +92,17 @@ TEST(PhaseLaw, ScaledLawsRunEvenlyInACycleOfTheUsualLength) {
   }
 }
 
+double doubt_rad(const LawBelief& belief, Seconds since_r, Seconds rr, Seconds rr_previous) {
+  const double told_rad = phase_in_cycle(belief.settings, since_r, rr, rr_previous).phase_rad;
+  return law_deviation_rad(belief, told_rad, since_r, rr, rr_previous);
+}
+
 LawBelief undecided(Seconds usual) { return {law_even_at(PhaseLaw::kLinear, usual), {0.5, 0.5, 0.0}}; }
 
 TEST(PhaseLaw, IsNoDoubtInACycleOfTheUsualLength) {
   const Seconds usual(0.85);
   for (double s = 0.05; s < 0.85; s += 0.1) {
-    EXPECT_NEAR(law_deviation_rad(undecided(usual), Seconds(s), usual, usual), 0.0, 1e-9);
+    EXPECT_NEAR(doubt_rad(undecided(usual), Seconds(s), usual, usual), 0.0, 1e-9);
   }
 }
 
@@ -109,10 +114,10 @@ TEST(PhaseLaw, IsInDoubtByWhatTheCandidatesDisagree) {
   };
   for (double s = 0.05; s < rr.count(); s += 0.1) {
     const double apart = std::abs(phase(1, Seconds(s)) - phase(0, Seconds(s)));
-    EXPECT_NEAR(law_deviation_rad(belief, Seconds(s), rr, rr), std::sqrt(0.5) * apart, 1e-12);
+    EXPECT_NEAR(doubt_rad(belief, Seconds(s), rr, rr), std::sqrt(0.5) * apart, 1e-12);
   }
-  EXPECT_GT(law_deviation_rad(belief, Seconds(0.35), rr, rr), 0.1);
-  EXPECT_EQ(law_deviation_rad(LawBelief{belief.settings}, Seconds(0.35), rr, rr), 0.0);
+  EXPECT_GT(doubt_rad(belief, Seconds(0.35), rr, rr), 0.1);
+  EXPECT_EQ(doubt_rad(LawBelief{belief.settings}, Seconds(0.35), rr, rr), 0.0);
 }
 
 TEST(PhaseLaw, InDoubtWidensThePhaseOfTheClock) {
@@ -129,8 +134,8 @@ TEST(PhaseLaw, InDoubtWidensThePhaseOfTheClock) {
   const CardiacClock doubted = tracker.clock().with_law(belief);
   const auto check = [&](Instant at, Duration begun, double length_s) {
     const PhaseEstimate phase = doubted.at(at);
-    const double doubt_rad = law_deviation_rad(belief, Seconds(begun), Seconds(length_s), Seconds(0.85));
-    EXPECT_NEAR(phase.deviation_s, std::hypot(known.at(at).deviation_s, doubt_rad / phase.rate_rad_per_s), 1e-9);
+    const double off_rad = doubt_rad(belief, Seconds(begun), Seconds(length_s), Seconds(0.85));
+    EXPECT_NEAR(phase.deviation_s, std::hypot(known.at(at).deviation_s, off_rad / phase.rate_rad_per_s), 1e-9);
     EXPECT_EQ(phase.phase_rad, known.at(at).phase_rad);
   };
   const Duration into = std::chrono::milliseconds(350);
