@@ -42,18 +42,21 @@ function(perimap_prelude NAME)
   endif()
 endfunction()
 
-# perimap_test(NAME [PLAIN] [ALWAYS] SOURCES f... DEPENDS target... [LABELS l...])
+# perimap_test(NAME [PLAIN] [ALWAYS] [THREADS] SOURCES f... DEPENDS target... [LABELS l...])
 #
 # A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA.
 #
 # A quick tests/run.sh makes two builds. `plain`: the programs, the tests of whole programs, and the unit tests marked
 # PLAIN (counting allocations, very long to compile with a sanitizer, or of much that no other unit test needs).
-# `other`, under AddressSanitizer: the rest of the unit tests. ALWAYS: in both. Everywhere else PERIMAP_TESTS is `all`.
-set(PERIMAP_TESTS all CACHE STRING "Tests to build: all, plain, other, or OFF")
+# `other`, under AddressSanitizer: the rest of the unit tests. ALWAYS: in both. `threads`, for ThreadSanitizer: the tests
+# of whole programs, and the unit tests marked THREADS, in which more than one runs. Elsewhere PERIMAP_TESTS is `all`.
+set(PERIMAP_TESTS all CACHE STRING "Tests to build: all, plain, other, threads, or OFF")
 function(perimap_test NAME)
-  cmake_parse_arguments(ARG "PLAIN;ALWAYS" "" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "PLAIN;ALWAYS;THREADS" "" "SOURCES;DEPENDS;LABELS" ${ARGN})
   set(wanted ON)
   if(NOT ARG_ALWAYS AND ((PERIMAP_TESTS STREQUAL plain AND NOT ARG_PLAIN) OR (PERIMAP_TESTS STREQUAL other AND ARG_PLAIN)))
+    set(wanted OFF)
+  elseif(PERIMAP_TESTS STREQUAL threads AND NOT ARG_THREADS)
     set(wanted OFF)
   endif()
   add_executable(${NAME} ${ARG_SOURCES})

@@ -5,11 +5,16 @@ cd "$(dirname "$0")/.."
 
 usage() {
   cat << 'END'
-tests/run.sh [--full] [--jobs N]
+tests/run.sh [--full [PART...]] [--jobs N]
   Installs the packages, builds the presets dev and asan, runs their tests. 15 minutes on two cores at most.
   Whole programs are tested without sanitizers, a unit test in one of the two, mostly under AddressSanitizer.
-  --full    every test in both, with all of UndefinedBehaviorSanitizer; also ThreadSanitizer, a release build, the
-            tests labelled `long`, a minute of each fuzz target, format and clang-tidy
+  --full    everything, or the parts named. About three hours on two cores that do nothing else.
+              dev    whole programs, and unit tests that count allocations or compute much, without sanitizers
+              asan   every test under AddressSanitizer and all of UndefinedBehaviorSanitizer
+              tsan   whole programs, and unit tests with threads, under ThreadSanitizer
+              long   the tests labelled `long`, without sanitizers
+              fuzz   a minute of each fuzz target
+              lint   a release build, which has no precompiled headers; format; clang-tidy
   --jobs N  parallel compilations; all processors when not given
 A test that fails is run once more, alone; the end names those that needed it.
 Exit code 0 when everything passed, 1 when something failed, 2 for a wrong command line. Logs: build/logs/.
@@ -17,10 +22,12 @@ END
 }
 
 full=no
+parts=()
 jobs=$(nproc)
 while [ $# -gt 0 ]; do
   case $1 in
     --full) full=yes ;;
+    dev | asan | tsan | long | fuzz | lint) parts+=("$1") ;;
     --jobs)
       jobs=${2:-}
       shift
@@ -38,6 +45,10 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
+if [ ${#parts[@]} -gt 0 ] && [ $full = no ]; then
+  echo "run.sh: parts are parts of --full" >&2
+  exit 2
+fi
 if ! [[ $jobs =~ ^[1-9][0-9]*$ ]]; then
   echo "run.sh: --jobs needs a positive number" >&2
   exit 2
@@ -100,16 +111,17 @@ fi
 build() { # PRESET BUILD_OPTION...
   local preset=$1 tests=all undefined=all
   shift
-  # A unit test once is enough for a quick run; see perimap_test in cmake/PerimapLibrary.cmake.
-  if [ $full = no ]; then
-    case $preset in
-      dev) tests=plain ;;
-      asan)
+  # Which tests: see perimap_test in cmake/PerimapLibrary.cmake. A unit test once is enough for a quick run.
+  case $preset in
+    dev) tests=plain ;;
+    tsan) tests=threads ;;
+    asan)
+      if [ $full = no ]; then
         tests=other
         undefined=some
-        ;;
-    esac
-  fi
+      fi
+      ;;
+  esac
   step "$preset configure" 5m cmake --preset "$preset" -DPERIMAP_TESTS=$tests -DPERIMAP_UNDEFINED=$undefined "${launcher[@]}" &&
     step "$preset build" 40m cmake --build --preset "$preset" -j "$jobs" "$@"
 }
@@ -120,7 +132,7 @@ run_tests() { # NAME PRESET CTEST_OPTION...
   local name=$1 preset=$2
   shift 2
   local log=$logs/${name//[^a-zA-Z0-9]/-}.log
-  if ! step "$name" 90m ctest --preset "$preset" -j "$jobs" --timeout 300 --no-tests=error "$@"; then
+  if ! step "$name" 120m ctest --preset "$preset" -j "$jobs" --timeout 300 --no-tests=error "$@"; then
     local failed
     failed=$(sed -n '/^The following tests FAILED/,$p' "$log" | grep -aoE '[0-9]+ - [^ ]+' | cut -d ' ' -f 3)
     printf '%s\n' "$failed"
@@ -150,6 +162,8 @@ fuzz_smoke() {
 }
 
 lint() {
+  # Only release builds have no precompiled headers: there each file must include what it uses.
+  build release || return
   step "format" 5m bash -c \
     "find core drivers daemon tests -name '*.cpp' -o -name '*.hpp' -o -name '*.c' | xargs clang-format --dry-run -Werror"
   # By the release preset: GCC's precompiled headers are none for clang.
@@ -160,16 +174,18 @@ packages=--test
 if [ $full = yes ]; then packages=--full; fi
 deploy/install-packages.sh $packages || exit 1
 
-if build dev; then run_tests "dev tests" dev -LE long; fi
-if build asan; then run_tests "asan tests" asan -LE long; fi
-if [ $full = yes ]; then
-  if build tsan; then run_tests "tsan tests" tsan -LE long; fi
-  # Only release builds have no precompiled headers: there each file must include what it uses.
-  build release
-  run_tests "long tests" dev -L long
-  if build fuzz --target fuzzers; then fuzz_smoke; fi
-  lint
+if [ ${#parts[@]} -eq 0 ]; then
+  parts=(dev asan)
+  if [ $full = yes ]; then parts+=(tsan long fuzz lint); fi
 fi
+for part in "${parts[@]}"; do
+  case $part in
+    dev | asan | tsan) if build "$part"; then run_tests "$part tests" "$part" -LE long; fi ;;
+    long) if build dev; then run_tests "long tests" dev -L long; fi ;;
+    fuzz) if build fuzz --target fuzzers; then fuzz_smoke; fi ;;
+    lint) lint ;;
+  esac
+done
 
 echo
 if [ ${#second_try[@]} -gt 0 ]; then
