@@ -1,22 +1,28 @@
 #!/bin/bash
-# perimapd is killed again and again while tracker and ECG, outside it, go on and the camera's frames come at their times:
-# each time it publishes valid positions again from its checkpoint, and what was received is as good as it should be.
-# killed.sh PERIMAPD PERIMAP RECORDING WORK_FOLDER CYCLONEDDS_XML KILLS
+# perimapd is killed again and again while tracker and ECG, outside it, go on, the camera's frames come at their times,
+# and all of it is recorded: each time it publishes valid positions again from its checkpoint, what was received is as good
+# as it should be, and what was recorded is readable.
+# killed.sh PERIMAPD PERIMAP CHECK RECORDING WORK_FOLDER CYCLONEDDS_XML KILLS
 set -uo pipefail
-perimapd=$1 perimap=$2 recording=$3 work=$4 kills=$6
-export CYCLONEDDS_URI=file://$5
+perimapd=$1 perimap=$2 check=$3 recording=$4 work=$5 kills=$7
+export CYCLONEDDS_URI=file://$6
 source "$(dirname "$0")/../emulated_devices.sh"
 
 emulate "$recording"
+mkdir "$work/recorded"
 {
   devices_toml "$recording"
   printf '[control]\nsocket = "%s"\n[checkpoint]\nfile = "%s"\ninterval_s = 0.5\n' "$short/control" "$work/checkpoint"
+  printf '[recording]\nrecord = true\nfolder = "recorded"\nmemory_MB = 32\n'
 } > "$work/devices.toml"
 "$perimap" watch --domain $domain --wait 60 --record "$work/received.mcap" > "$work/watch" 2>&1 &
 watch=$!
 started+=($watch)
 
 : > "$work/log"
+: > "$work/kills"
+# What the runs so far have recorded; of those that are over nobody may touch it any more.
+recorded() { find "$work/recorded" -type f -printf '%f %s %T@\n' | sort; }
 now() { awk '{print $1}' /proc/uptime; }
 # One figure of the daemon's status; 0 while it does not answer.
 status() { "$perimap" ctl --socket "$short/control" status 2> /dev/null | awk -v key="$1:" '$1 == key {v = $2} END {print v + 0}'; }
@@ -32,18 +38,17 @@ until [ "$(status features_converged)" -ge 20 ]; do
   sleep 0.3
 done
 sleep 2
-longest=0
 for ((i = 1; i <= kills; i++)); do
   kill -9 $daemon
   wait $daemon 2> /dev/null
   was=$(now)
+  recorded > "$work/left-$i"
+  echo "$was $(now)" >> "$work/kills"
   begin
   until [ "$(status samples)" -gt 0 ]; do
     kill -0 $daemon 2> /dev/null || fail "after kill $i it did not come back: $(tail -n 3 "$work/log")"
     sleep 0.02
   done
-  took=$(awk -v a="$was" -v b="$(now)" 'BEGIN {print b - a}')
-  longest=$(awk -v a="$longest" -v b="$took" 'BEGIN {print (a > b) ? a : b}')
   sleep "0.$((RANDOM % 9))$((RANDOM % 10))"
   sleep $((RANDOM % 2))
 done
@@ -53,7 +58,12 @@ wait $daemon || fail "it ended with $?: $(tail -n 3 "$work/log")"
 sleep 0.5
 kill -INT $watch
 wait $watch || fail "watch: $(tail -n 5 "$work/watch")"
-echo "publishing again after at most $longest s; $converged features converged at the end"
+echo "$kills kills; $converged features converged at the end"
+recorded > "$work/left-at-the-end"
+for ((i = 1; i <= kills; i++)); do
+  [ -z "$(comm -23 "$work/left-$i" "$work/left-at-the-end")" ] || fail "what was recorded before kill $i has changed"
+done
+"$check" "$work/received.mcap" "$work/kills" "$work/recorded" || fail "what was published or recorded is wrong"
 
 resumed=$(grep -Ec 'going on from .*: [1-9][0-9]+ features' "$work/log")
 [ "$resumed" -eq "$kills" ] || fail "it went on from its checkpoint $resumed times of $kills: $(grep -E 'going on|starts empty' "$work/log")"
