@@ -25,6 +25,17 @@ struct SweepPhase {
     rate_rad_per_s = static_cast<Real>(phase_rate_rad_per_s);
     deviation_s = static_cast<Real>(phase_deviation_s);
   }
+
+  // The same phase in this precision.
+  template <class Other>
+  void assign(const SweepPhase<Other>& other) noexcept {
+    for (std::size_t i = 0; i < b.size(); ++i) {
+      b[i] = static_cast<Real>(other.b[i]);
+      b_rate[i] = static_cast<Real>(other.b_rate[i]);
+    }
+    rate_rad_per_s = static_cast<Real>(other.rate_rad_per_s);
+    deviation_s = static_cast<Real>(other.deviation_s);
+  }
 };
 
 // Phases to learn at come first: for these a sweep forms M = P B^T (d x 3), which the update needs; for those that are
@@ -43,6 +54,14 @@ class SweepPhases {
   int add_predicted(const Basis& b, const Basis& b_rate, double rate_rad_per_s = 0.0,
                     double deviation_s = 0.0) noexcept {
     return count_ == kMaxSweepPhases ? -1 : add(b, b_rate, rate_rad_per_s, deviation_s);
+  }
+
+  // The same phases in this precision.
+  template <class Other>
+  void assign(const SweepPhases<Other>& other) noexcept {
+    for (int k = 0; k < other.count(); ++k) phases_[static_cast<std::size_t>(k)].assign(other[k]);
+    count_ = other.count();
+    learnt_ = other.learnt();
   }
 
   [[nodiscard]] int count() const noexcept { return count_; }

@@ -5,13 +5,13 @@
 #include <span>
 #include <vector>
 
-#include "core/bank/feature_bank.hpp"
 #include "core/estimation/measurement_model.hpp"
 #include "core/estimation/shared_pose.hpp"
 #include "core/phase/respiration_search.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/feature_stages.hpp"
 #include "core/pipeline/frame_job.hpp"
+#include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 
 namespace perimap {
@@ -33,7 +33,7 @@ struct SweepPlan {
 class FeatureGroup {
  public:
   // Slot l of at most kLanes is lane l of the bank's group `index`. Both must outlive this.
-  FeatureGroup(FeatureBank<double>& bank, int index, std::span<FeatureSlot> slots) noexcept
+  FeatureGroup(MapBank& bank, int index, std::span<FeatureSlot> slots) noexcept
       : bank_(bank), index_(index), slots_(slots) {}
 
   [[nodiscard]] std::span<FeatureSlot> slots() const noexcept { return slots_; }
@@ -71,7 +71,7 @@ class FeatureGroup {
   void follow_slow_errors(const PixelModel& model, int k, const LaneOutcomes<double>& outcomes,
                           const std::array<Matrix2d, kLanes>& R) noexcept;
 
-  FeatureBank<double>& bank_;
+  MapBank& bank_;
   int index_;
   std::span<FeatureSlot> slots_;
   SweepPlan plan_;

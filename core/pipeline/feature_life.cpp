@@ -54,7 +54,7 @@ bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& mod
 // The life of one slot in one frame.
 class Step {
  public:
-  Step(FeatureSlot& slot, FeatureBank<double>& bank, int feature, const FrameJob& job, const PixelModel& model,
+  Step(FeatureSlot& slot, MapBank& bank, int feature, const FrameJob& job, const PixelModel& model,
        const PipelineSettings& settings) noexcept
       : slot_(slot), bank_(bank), feature_(feature), job_(job), model_(model), settings_(settings) {}
 
@@ -167,7 +167,7 @@ class Step {
   }
 
   FeatureSlot& slot_;
-  FeatureBank<double>& bank_;
+  MapBank& bank_;
   int feature_;
   const FrameJob& job_;
   const PixelModel& model_;
@@ -176,8 +176,8 @@ class Step {
 
 }  // namespace
 
-LifeEvent advance(FeatureSlot& slot, FeatureBank<double>& bank, int feature, const FrameJob& job,
-                  const PixelModel& model, const PipelineSettings& settings) noexcept {
+LifeEvent advance(FeatureSlot& slot, MapBank& bank, int feature, const FrameJob& job, const PixelModel& model,
+                  const PipelineSettings& settings) noexcept {
   Step step(slot, bank, feature, job, model, settings);
   switch (slot.state) {
     case SlotState::kEmpty:

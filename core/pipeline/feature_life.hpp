@@ -3,10 +3,10 @@
 
 #include <cstdint>
 
-#include "core/bank/feature_bank.hpp"
 #include "core/estimation/measurement_model.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/frame_job.hpp"
+#include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 
 namespace perimap {
@@ -20,7 +20,7 @@ enum class LifeEvent : std::uint8_t {
 };
 
 // D, last part, after the frame's learning. `bank` holds the estimate of the slot as that of `feature`.
-[[nodiscard]] LifeEvent advance(FeatureSlot& slot, FeatureBank<double>& bank, int feature, const FrameJob& job,
+[[nodiscard]] LifeEvent advance(FeatureSlot& slot, MapBank& bank, int feature, const FrameJob& job,
                                 const PixelModel& model, const PipelineSettings& settings) noexcept;
 
 }  // namespace perimap

@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "core/bank/feature_bank.hpp"
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cycle_posterior.hpp"
 #include "core/phase/law_choice.hpp"
@@ -18,6 +17,7 @@
 #include "core/pipeline/frame_job.hpp"
 #include "core/pipeline/image_phase.hpp"
 #include "core/pipeline/load_shedding.hpp"
+#include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/map_feed.hpp"
 #include "core/pipeline/map_memory.hpp"
 #include "core/pipeline/phase_cells.hpp"
@@ -115,7 +115,7 @@ class Mapper {
   bool breath_begun_ = false;  // the features that were mapped when it was first found have it
   std::unique_ptr<FrameHistory> history_;
   PatchTracker tracker_;
-  FeatureBank<double> bank_;
+  MapBank bank_;
   std::vector<FeatureGroup> groups_;
   LoadSheddingDecision shedding_decision_;
   LoadShedding shedding_;

@@ -5,6 +5,7 @@
 
 #include "core/estimation/batch_start.hpp"
 #include "core/estimation/iterated_update.hpp"
+#include "core/estimation/precision.hpp"
 #include "core/geometry/camera_model.hpp"
 #include "core/periodic/basis.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
@@ -24,6 +25,7 @@ struct FeatureSettings {
 
 struct EstimatorSettings {
   BasisLayout layout;
+  Precision precision = Precision::kDouble;  // of the mapped features; batch starts are always double
   Prior prior;
   UpdateSettings update;
   BatchSettings batch;

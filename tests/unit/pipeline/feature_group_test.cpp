@@ -25,7 +25,7 @@ struct Stages : ::testing::Test {
   std::unique_ptr<FrameHistory> history;
   std::vector<FeatureSlot> slots{2};
   FeatureSlot* slot = slots.data();
-  std::unique_ptr<FeatureBank<double>> bank;
+  std::unique_ptr<MapBank> bank;
   std::unique_ptr<FeatureGroup> group;
   FrameJob job;
   int next_beat_ms = 1000;
@@ -38,7 +38,8 @@ struct Stages : ::testing::Test {
     settings.estimator.layout.cardiac_harmonics = 2;
     model.camera = settings.camera;
     history = std::make_unique<FrameHistory>(settings.estimator.layout);
-    bank = std::make_unique<FeatureBank<double>>(BankSettings{.layout = settings.estimator.layout, .features = 2});
+    bank =
+        std::make_unique<MapBank>(BankSettings{.layout = settings.estimator.layout, .features = 2}, Precision::kDouble);
     group = std::make_unique<FeatureGroup>(*bank, 0, slots);
     beat_until(5000);
     slots[0].id = 1;

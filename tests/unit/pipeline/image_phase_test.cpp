@@ -22,7 +22,7 @@ struct Surface : ::testing::Test {
   PixelModel model;
   FrameHistory history{BasisLayout{2, 0}};
   std::vector<FeatureSlot> slots{kFeatures};
-  FeatureBank<double> bank{{.layout = {2, 0}, .features = kFeatures}};
+  MapBank bank{{.layout = {2, 0}, .features = kFeatures}, Precision::kDouble};
   std::vector<FeatureGroup> groups;
   std::vector<FeatureEstimate> estimates;
   FrameJob job;
