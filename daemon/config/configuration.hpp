@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/estimation/precision.hpp"
 #include "core/estimation/update_settings.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/phase/rr_predictor.hpp"
@@ -137,6 +138,7 @@ struct FeaturesConfiguration {
 
 struct EstimationConfiguration {
   int harmonics = 8;  // H, cardiac
+  Precision precision = Precision::kDouble;
   int start_observations = 60;
   std::vector<double> start_depths_mm = {50.0, 90.0, 160.0};
   double pixel_deviation_px = 0.3;

@@ -498,8 +498,12 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
               "a new feature keeps this distance from all others");
   const std::array<std::pair<std::string_view, UpdateMethod>, 2> updates{
       {{"levenberg-marquardt", UpdateMethod::kLevenbergMarquardt}, {"gauss-newton", UpdateMethod::kGaussNewton}}};
+  const std::array<std::pair<std::string_view, Precision>, 2> precisions{
+      {{"double", Precision::kDouble}, {"single", Precision::kSingle}}};
   Section("estimation", keys)
       .integer("harmonics", 1, 12, PERIMAP_MEMBER(estimation.harmonics), "cardiac harmonics of each feature's motion")
+      .choice("precision", precisions, PERIMAP_MEMBER(estimation.precision),
+              "of the map's numbers; single: half the memory, and less computing")
       .integer("start_observations", 10, 96, PERIMAP_MEMBER(estimation.start_observations),
                "observations that the batch start of a feature takes")
       .numbers(

@@ -86,6 +86,7 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.features.detection_interval_frames = c.features.detection_interval_frames;
   s.features.minimum_distance_px = c.features.minimum_distance_px;
   s.estimator.layout.cardiac_harmonics = c.estimation.harmonics;
+  s.estimator.precision = c.estimation.precision;
   s.estimator.prior.dc_mm = c.estimation.prior_dc_deviation_mm;
   s.estimator.prior.cardiac_mm = c.estimation.prior_harmonic_deviation_mm;
   s.estimator.update.method = c.estimation.update;
