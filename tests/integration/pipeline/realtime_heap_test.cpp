@@ -107,8 +107,11 @@ TEST(RealtimePath, TheCounterSeesAHeapCallInsideTheScopeAndOnlyThere) {
   EXPECT_GT(heap_calls_in_scope, 0);
 }
 
-TEST(RealtimePath, MakesNoHeapCallInLockstepFromFirstFrameToMappedSurface) {
+struct RealtimePathIn : testing::TestWithParam<Precision> {};
+
+TEST_P(RealtimePathIn, MakesNoHeapCallInLockstepFromFirstFrameToMappedSurface) {
   ReplaySetup s = setup();
+  s.pipeline.estimator.precision = GetParam();
   s.pipeline.lockstep = true;
   s.pipeline.clock_period = std::chrono::milliseconds(2);
   Pipeline pipeline(s.pipeline);
@@ -129,6 +132,9 @@ TEST(RealtimePath, MakesNoHeapCallInLockstepFromFirstFrameToMappedSurface) {
   EXPECT_GT(publication.clock_surfaces, 2000);
   EXPECT_GT(publication.features, 10U) << "the path must have been exercised up to mapped features";
 }
+
+INSTANTIATE_TEST_SUITE_P(EachPrecision, RealtimePathIn, testing::Values(Precision::kDouble, Precision::kSingle),
+                         [](const auto& param) { return param.param == Precision::kDouble ? "Double" : "Single"; });
 
 // With the shortest of budgets, so that features are shed.
 TEST(RealtimePath, MakesNoHeapCallLiveWithAllThreads) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
@@ -25,18 +26,20 @@ struct Unheard final : Publication {
   void status(const perimap_Status& /*status*/) override {}
 };
 
-ReplaySetup setup() {
+ReplaySetup setup(Precision precision) {
   auto made = prepare_replay(PERIMAP_TEST_RECORDING, std::nullopt, ReadMode::kStrict);
   if (!made) throw std::runtime_error(made.error().error.message);
   made->pipeline.lockstep = true;
   // Few enough that every slot is kept once a second: the recording ends soon after the first are mapped.
   made->pipeline.features.maximum = 40;
+  made->pipeline.estimator.precision = precision;
   return std::move(*made);
 }
 
 // A run over the whole recording.
 struct EarlierRun {
-  EarlierRun() : s(setup()), pipeline(s.pipeline), runtime(pipeline, s.identity, s.utc_minus_monotonic, unheard) {
+  explicit EarlierRun(Precision precision = Precision::kDouble)
+      : s(setup(precision)), pipeline(s.pipeline), runtime(pipeline, s.identity, s.utc_minus_monotonic, unheard) {
     KeptMap kept;
     while (auto event = next()) {
       runtime.deliver(*event);
@@ -92,6 +95,33 @@ TEST(Recall, PublishesWhatTheEarlierRunWouldHave) {
     ++compared;
   }
   EXPECT_GT(compared, 5);
+}
+
+// The numbers that are kept are double in either.
+TEST(Recall, AMapOfOnePrecisionIsGoneOnWithInTheOther) {
+  for (const auto [then, now] :
+       {std::pair(Precision::kDouble, Precision::kSingle), std::pair(Precision::kSingle, Precision::kDouble)}) {
+    EarlierRun earlier(then);
+    ASSERT_GT(earlier.memory.features.size(), 5U);
+    const Release release{1'000'000, earlier.memory.last_capture,
+                          earlier.memory.last_capture + earlier.s.pipeline.latency, true};
+    PipelineSettings settings = earlier.s.pipeline;
+    const auto surface = [&](Precision precision) {
+      settings.estimator.precision = precision;
+      Pipeline later(settings);
+      later.recall(earlier.memory, earlier.memory.last_capture);
+      return surface_at(later, release);
+    };
+    const auto same = surface(then);
+    const auto other = surface(now);
+    ASSERT_EQ(same.size(), earlier.memory.features.size());
+    ASSERT_EQ(other.size(), same.size());
+    for (const auto& [id, feature] : same) {
+      ASSERT_TRUE(other.contains(id));
+      EXPECT_EQ(other.at(id).state, feature.state);
+      EXPECT_LT((other.at(id).p_WF_mm - feature.p_WF_mm).norm(), 1e-3);
+    }
+  }
 }
 
 TEST(Recall, ForgettingLeavesNothingOfMapAndRhythm) {

@@ -223,6 +223,15 @@ TEST(WarmRestart, AnotherSetUpIsRefusedWithTheReason) {
   EXPECT_THAT(reason(&perimap::SetUp::estimator), HasSubstr("another estimator"));
 }
 
+TEST(WarmRestart, InAnotherPrecisionTheSetUpIsTheSame) {
+  PipelineSettings pipeline;
+  const perimap::SetUp in_double = set_up_of(Configuration{}, pipeline);
+  pipeline.estimator.precision = Precision::kSingle;
+  EXPECT_EQ(set_up_of(Configuration{}, pipeline), in_double);
+  pipeline.estimator.layout.cardiac_harmonics += 1;
+  EXPECT_NE(set_up_of(Configuration{}, pipeline), in_double);
+}
+
 TEST(WarmRestart, WhatIsTooOldOrOfTheFutureIsRefusedWithTheReason) {
   const perimap::SetUp set_up = checkpoint_sample().set_up;
   const std::int64_t utc_ns = checkpoint_sample().utc_ns;
