@@ -6,42 +6,82 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <stdexcept>
 
 #include "daemon/experiment/method.hpp"
 
 namespace perimap {
 namespace {
 
-constexpr int kPhases = 24;
+// So many equal steps make the mean of a square exact for any motion of the largest layout.
+constexpr int kPhases = 2 * kMaxHarmonics + 1;
+constexpr int kBreathPhases = 2 * kMaxRespiratoryHarmonics + 1;
 
-double phase_of(int i) { return 2.0 * std::numbers::pi * i / kPhases; }
+struct CyclePhases {
+  double cardiac_rad = 0.0;
+  double breath_rad = 0.0;
+};
+
+// The mean of visit(phases) over the cardiac cycle, and over the respiratory one too when `breath`.
+template <class Visit>
+double mean_over_cycles(bool breath, Visit&& visit) {
+  const auto step_rad = [](int i, int steps) { return 2.0 * std::numbers::pi * i / steps; };
+  const int breath_phases = breath ? kBreathPhases : 1;
+  double sum = 0.0;
+  for (int j = 0; j < breath_phases; ++j) {
+    for (int i = 0; i < kPhases; ++i) sum += visit({step_rad(i, kPhases), step_rad(j, breath_phases)});
+  }
+  return sum / (kPhases * breath_phases);
+}
+
+Basis basis_of(const BasisLayout& layout, const CyclePhases& at) {
+  return basis_at(layout, at.cardiac_rad, at.breath_rad);
+}
+
+bool breathes(const BasisLayout& layout) { return layout.respiratory_harmonics > 0; }
+
+// The coefficients in a layout that holds all of them.
+StateVector widened(const StateVector& x, const BasisLayout& from, const BasisLayout& to) {
+  if (to.cardiac_harmonics < from.cardiac_harmonics || to.respiratory_harmonics < from.respiratory_harmonics)
+    throw std::invalid_argument("the layout lacks harmonics of the truth");
+  const int H = from.cardiac_harmonics;
+  const int H_r = from.respiratory_harmonics;
+  StateVector wide = StateVector::Zero(to.state_size());
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto source = x.segment(axis * from.size(), from.size());
+    auto target = wide.segment(axis * to.size(), to.size());
+    target(0) = source(0);
+    for (const int part : {0, 1}) {
+      target.segment(1 + part * to.cardiac_harmonics, H) = source.segment(1 + part * H, H);
+      target.segment(1 + 2 * to.cardiac_harmonics + part * to.respiratory_harmonics, H_r) =
+          source.segment(1 + 2 * H + part * H_r, H_r);
+    }
+  }
+  return wide;
+}
 
 }  // namespace
 
 double path_error_mm(const FeatureEstimate& estimate, const BasisLayout& layout, const Scene& scene,
                      const SceneFeature& feature) {
-  double sum = 0.0;
-  for (int i = 0; i < kPhases; ++i) {
-    sum += (estimate.position(basis_at(layout, phase_of(i))) - scene.true_position(feature, phase_of(i))).squaredNorm();
-  }
-  return std::sqrt(sum / kPhases);
+  return std::sqrt(mean_over_cycles(breathes(layout) || breathes(scene.layout), [&](const CyclePhases& at) {
+    return (estimate.position(basis_of(layout, at)) - position_of(feature.x, basis_of(scene.layout, at))).squaredNorm();
+  }));
 }
 
 double normalised_squared_error(const FeatureEstimate& estimate, const BasisLayout& layout, const Scene& scene,
                                 const SceneFeature& feature) {
-  double sum = 0.0;
-  for (int i = 0; i < kPhases; ++i) {
-    const Basis b = basis_at(layout, phase_of(i));
-    const Vector3d error = estimate.position(b) - scene.true_position(feature, phase_of(i));
-    sum += error.dot(estimate.position_covariance(b).llt().solve(error));
-  }
-  return sum / (3.0 * kPhases);
+  return mean_over_cycles(breathes(layout) || breathes(scene.layout), [&](const CyclePhases& at) {
+    const Basis b = basis_of(layout, at);
+    const Vector3d error = estimate.position(b) - position_of(feature.x, basis_of(scene.layout, at));
+    return error.dot(estimate.position_covariance(b).llt().solve(error)) / 3.0;
+  });
 }
 
 double path_deviation_mm(const FeatureEstimate& estimate, const BasisLayout& layout) {
-  double sum = 0.0;
-  for (int i = 0; i < kPhases; ++i) sum += estimate.position_covariance(basis_at(layout, phase_of(i))).trace();
-  return std::sqrt(sum / kPhases);
+  return std::sqrt(mean_over_cycles(breathes(layout), [&](const CyclePhases& at) {
+    return estimate.position_covariance(basis_of(layout, at)).trace();
+  }));
 }
 
 std::vector<double> drawn_path_errors_mm(const FeatureEstimate& estimate, const BasisLayout& layout, int draws,
@@ -54,9 +94,9 @@ std::vector<double> drawn_path_errors_mm(const FeatureEstimate& estimate, const 
     Eigen::VectorXd unit(L.rows());
     for (double& value : unit) value = normal(generator);
     const StateVector error = L * unit;
-    double sum = 0.0;
-    for (int i = 0; i < kPhases; ++i) sum += position_of(error, basis_at(layout, phase_of(i))).squaredNorm();
-    errors.push_back(std::sqrt(sum / kPhases));
+    errors.push_back(std::sqrt(mean_over_cycles(breathes(layout), [&](const CyclePhases& at) {
+      return position_of(error, basis_of(layout, at)).squaredNorm();
+    })));
   }
   return errors;
 }
@@ -64,22 +104,13 @@ std::vector<double> drawn_path_errors_mm(const FeatureEstimate& estimate, const 
 FeatureEstimate cramer_rao_bound(const Scene& scene, const SceneFeature& feature, const BasisLayout& layout,
                                  const Prior& prior, int end_frame) {
   const Eigen::Index n = layout.size();
-  const Eigen::Index n_true = scene.layout.size();
-  const int H = layout.cardiac_harmonics;
-  const int H_true = scene.layout.cardiac_harmonics;
   FeatureEstimate bound = prior_estimate(layout, prior, Vector3d::Zero());
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    bound.x(axis * n) = feature.x(axis * n_true);
-    for (int k = 1; k <= H_true; ++k) {
-      bound.x(axis * n + k) = feature.x(axis * n_true + k);
-      bound.x(axis * n + H + k) = feature.x(axis * n_true + H_true + k);
-    }
-  }
+  bound.x = widened(feature.x, scene.layout, layout);
   Eigen::MatrixXd information = Eigen::MatrixXd(bound.P.diagonal().cwiseInverse().asDiagonal());
   for (const Sighting& sighting : feature.sightings) {
     if (sighting.frame >= end_frame || sighting.outlier) continue;
     const SceneFrame& frame = scene.frames[static_cast<std::size_t>(sighting.frame)];
-    const Vector3d p = scene.true_position(feature, frame.phase_rad);
+    const Vector3d p = scene.true_position(feature, frame);
     const Observation o = observation_of(scene, layout, sighting, p);
     Vector2d z;
     MeasurementJacobians J;

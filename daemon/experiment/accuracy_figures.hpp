@@ -1,4 +1,5 @@
-// How far an estimated motion is from the true one, and what the data allow at best.
+// How far an estimated motion is from the true one, and what the data allow at best. "Over a cycle" is over the cardiac
+// cycle and, where truth or estimate have a respiratory series, over every respiratory phase with every cardiac one.
 #pragma once
 
 #include <cstdint>
@@ -26,8 +27,9 @@ namespace perimap {
                                                        int draws, std::uint64_t seed);
 
 // Posterior Cramer-Rao bound of one feature from its sightings in frames before `end_frame`, outliers left out, pose
-// noise white and of this feature alone: the truth with the bound as its covariance. `layout` must hold the truth's
-// harmonics (Tichavsky, Muravchik & Nehorai, IEEE Trans. Signal Processing 46, 1998, for a state that stands still).
+// noise white and of this feature alone: the truth with the bound as its covariance (Tichavsky, Muravchik & Nehorai,
+// IEEE Trans. Signal Processing 46, 1998, for a state that stands still). Throws std::invalid_argument when `layout`
+// lacks harmonics of the truth: no such estimator is free of bias.
 [[nodiscard]] FeatureEstimate cramer_rao_bound(const Scene& scene, const SceneFeature& feature,
                                                const BasisLayout& layout, const Prior& prior, int end_frame);
 

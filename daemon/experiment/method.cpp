@@ -46,7 +46,7 @@ class RecursiveMethod final : public Method {
     const Scene& scene = *setting_.scene;
     if (!estimate_)
       estimate_ = prior_estimate(layout_, setting_.prior, on_ray(scene, sighting, setting_.first_depth_mm));
-    const Basis b = basis_at(layout_, frame_of(scene, sighting).phase_rad);
+    const Basis b = frame_of(scene, sighting).basis(layout_);
     const Observation observation = observation_of(scene, layout_, sighting, estimate_->position(b));
     last_innovation_ = update(scene, *estimate_, observation, settings_).innovation.norm();
   }
@@ -103,7 +103,7 @@ class DelayedMethod final : public Method {
       }
       return;
     }
-    const Basis b = basis_at(setting_.layout, frame_of(scene, sighting).phase_rad);
+    const Basis b = frame_of(scene, sighting).basis(setting_.layout);
     const Observation observation = observation_of(scene, setting_.layout, sighting, estimate_->position(b));
     last_innovation_ = update(scene, *estimate_, observation, {}).innovation.norm();
   }
@@ -215,7 +215,7 @@ Observation observation_of(const Scene& scene, const BasisLayout& layout, const 
   Observation observation;
   observation.z = sighting.z;
   observation.R = scene.match_covariance();
-  observation.b = basis_at(layout, frame.phase_rad);
+  observation.b = frame.basis(layout);
   observation.X_CW = frame.X_CW;
   const PoseError& error = scene.settings.pose_error;
   if (error.position_rms_mm == 0.0 && error.rotation_rms_rad == 0.0) return observation;
@@ -232,7 +232,7 @@ Observation observation_of(const Scene& scene, const BasisLayout& layout, const 
 
 double true_first_depth_mm(const Scene& scene, const SceneFeature& feature) {
   const SceneFrame& frame = frame_of(scene, feature.sightings.front());
-  return (frame.X_CW_true * scene.true_position(feature, frame.phase_rad)).norm();
+  return (frame.X_CW_true * scene.true_position(feature, frame)).norm();
 }
 
 }  // namespace perimap

@@ -16,7 +16,16 @@ namespace {
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // Independent sequences of random numbers; those of features come after the last, four each.
-enum Stream : std::uint64_t { kRhythm = 1, kMotion, kPoseRotation, kPosePosition, kChoice, kFeature = 16 };
+enum Stream : std::uint64_t {
+  kRhythm = 1,
+  kMotion,
+  kPoseRotation,
+  kPosePosition,
+  kChoice,
+  kBreathLength,
+  kBreathMotion,
+  kFeature = 16
+};
 
 Vector3d normal3(const CounterNoise& noise, std::uint64_t index) noexcept {
   return {noise.normal(3 * index), noise.normal(3 * index + 1), noise.normal(3 * index + 2)};
@@ -50,6 +59,28 @@ Expected<std::vector<Instant>> r_peaks(const SceneSettings& settings) {
     if (t > -3.0 && t < duration_s + 3.0) peaks.emplace_back(from_seconds(t));
   }
   return peaks;
+}
+
+// The respiratory phase of each frame: linear in each breath, whose lengths are drawn. Zero without breathing.
+std::vector<double> breath_phases(const SceneSettings& settings) {
+  std::vector<double> phases(static_cast<std::size_t>(settings.frames), 0.0);
+  const SceneBreathing& breathing = settings.breathing;
+  if (breathing.depth_mm == 0.0) return phases;
+  const CounterNoise noise(settings.seed, kBreathLength);
+  double begin_s = -breathing.period_s * noise.uniform(0);
+  std::uint64_t breath = 1;
+  const auto length_s = [&] {
+    return breathing.period_s * (1.0 + breathing.deviation * std::clamp(noise.normal(breath), -4.0, 4.0));
+  };
+  for (std::size_t f = 0; f < phases.size(); ++f) {
+    const double time_s = static_cast<double>(f) / settings.frames_per_s;
+    while (time_s >= begin_s + length_s()) {
+      begin_s += length_s();
+      ++breath;
+    }
+    phases[f] = kTwoPi * (time_s - begin_s) / length_s();
+  }
+  return phases;
 }
 
 // Where the camera looks from, and what moves before it.
@@ -161,7 +192,34 @@ Stage plate_stage(const SceneSettings& settings) {
   return stage;
 }
 
-Stage make_stage(const SceneSettings& settings, const HeartMesh& heart) {
+// Appends the respiratory series to every point: sin^4(psi / 2) = 3/8 - 1/2 cos psi + 1/8 cos 2 psi, its zero shifted.
+void breathe(const SceneSettings& settings, Stage& stage) {
+  constexpr double kMean = 0.375;
+  constexpr double kHarmonics[] = {-0.5, 0.125};
+  const CounterNoise noise(settings.seed, kBreathMotion);
+  const Vector3d displacement_mm = settings.breathing.depth_mm * normal3(noise, 0).normalized();
+  const double shift_rad = noise.uniform(3, 0.0, kTwoPi);
+  const BasisLayout still = stage.layout;
+  stage.layout.respiratory_harmonics = static_cast<int>(std::size(kHarmonics));
+  const int n = stage.layout.size();
+  for (StateVector& point : stage.points) {
+    StateVector x = StateVector::Zero(3 * n);
+    for (int axis = 0; axis < 3; ++axis) {
+      x.segment(axis * n, still.size()) = point.segment(axis * still.size(), still.size());
+      x(axis * n) += kMean * displacement_mm(axis);
+      for (int k = 1; k <= stage.layout.respiratory_harmonics; ++k) {
+        // cos k (psi + shift) in the basis [cos k psi, -sin k psi].
+        const double amplitude_mm = kHarmonics[k - 1] * displacement_mm(axis);
+        const int cosine = axis * n + still.size() - 1 + k;
+        x(cosine) = amplitude_mm * std::cos(k * shift_rad);
+        x(cosine + stage.layout.respiratory_harmonics) = amplitude_mm * std::sin(k * shift_rad);
+      }
+    }
+    point = x;
+  }
+}
+
+Stage stage_of(const SceneSettings& settings, const HeartMesh& heart) {
   switch (settings.surface) {
     case SceneSurface::kHeart:
       return heart_stage(settings, heart);
@@ -171,6 +229,12 @@ Stage make_stage(const SceneSettings& settings, const HeartMesh& heart) {
       break;
   }
   return ellipsoid_stage(settings);
+}
+
+Stage make_stage(const SceneSettings& settings, const HeartMesh& heart) {
+  Stage stage = stage_of(settings, heart);
+  if (settings.breathing.depth_mm > 0.0) breathe(settings, stage);
+  return stage;
 }
 
 // C as everywhere into the camera frame of bearings: x forward, y left, z up.
@@ -190,12 +254,14 @@ std::vector<SceneFrame> make_frames(const SceneSettings& settings, const Stage& 
   const double keep = error.correlation_s > 0.0 ? std::exp(-1.0 / (settings.frames_per_s * error.correlation_s)) : 0.0;
   Vector3d theta = Vector3d::Zero();
   Vector3d delta_c = Vector3d::Zero();
+  const std::vector<double> breaths = breath_phases(settings);
   std::vector<SceneFrame> frames(static_cast<std::size_t>(settings.frames));
   for (std::size_t f = 0; f < frames.size(); ++f) {
     SceneFrame& frame = frames[f];
     frame.time_s = static_cast<double>(f) / settings.frames_per_s;
     const Duration t = from_seconds(frame.time_s);
     frame.phase_rad = motion_phase(motion, Instant(t)).phase_rad;
+    frame.breath_rad = breaths[f];
     frame.X_CW_true = path.X_WC(t).inverse();
     if (settings.bearings) frame.X_CW_true = forward_first() * frame.X_CW_true;
     // Stationary from the first frame on.
@@ -230,7 +296,7 @@ std::vector<Sighting> sightings_of(const SceneSettings& settings, const Model& m
   std::vector<Sighting> sightings;
   for (std::size_t f = 0; f < std::min(seen_frames, frames.size()); ++f) {
     const StateVector x = drifted_motion(stage.points[index], stage.layout, settings.drift_per_min, frames[f].time_s);
-    const Vector3d p = position_of(x, basis_at(stage.layout, frames[f].phase_rad));
+    const Vector3d p = position_of(x, frames[f].basis(stage.layout));
     Sighting sighting;
     sighting.frame = static_cast<int>(f);
     if (model.predict(frames[f].X_CW_true * p, sighting.z) != ProjectionStatus::kOk) continue;

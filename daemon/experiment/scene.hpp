@@ -34,6 +34,15 @@ struct PoseError {
   [[nodiscard]] double rotation_variance_rad2() const noexcept { return rotation_rms_rad * rotation_rms_rad / 3.0; }
 };
 
+// Breathing moves all points alike by depth_mm sin^4(psi / 2) in a direction that is drawn for the trial, which is two
+// harmonics of the respiratory phase psi (Lujan, Larsen, Balter & Ten Haken, Med. Phys. 26:715-720, 1999, n = 2). The
+// zero of psi is drawn too: no sensor marks the end of the expiration.
+struct SceneBreathing {
+  double depth_mm = 0.0;   // from end to end; 0: the truth has no respiratory series
+  double period_s = 4.0;   // mean length of a breath
+  double deviation = 0.1;  // standard deviation of a breath's length as a share of the mean
+};
+
 struct SceneSettings {
   SceneSurface surface = SceneSurface::kEllipsoid;
   bool bearings = false;  // else pixels, f = 700 px, 1280 x 720
@@ -46,6 +55,7 @@ struct SceneSettings {
   double outliers = 0.0;      // fraction of matches that are 15 to 150 deviations off
   std::string ecg_record;     // rhythm of this MIT-BIH record; empty: 70/min, 3.9 % standard deviation
   PoseError pose_error;
+  SceneBreathing breathing;
   double drift_per_min = 0.0;  // the motion's amplitude grows by this share of the first one a minute
   std::uint64_t seed = 1;
 };
@@ -53,8 +63,13 @@ struct SceneSettings {
 struct SceneFrame {
   double time_s = 0.0;
   double phase_rad = 0.0;
-  Pose X_CW_true;  // into the model's camera frame: x forward for bearings
-  Pose X_CW;       // as the tracker gives it
+  double breath_rad = 0.0;  // respiratory phase; 0 without breathing
+  Pose X_CW_true;           // into the model's camera frame: x forward for bearings
+  Pose X_CW;                // as the tracker gives it
+
+  [[nodiscard]] Basis basis(const BasisLayout& layout) const noexcept {
+    return basis_at(layout, phase_rad, breath_rad);
+  }
 };
 
 struct Sighting {
@@ -76,8 +91,12 @@ struct Scene {
   std::vector<SceneFeature> features;
   Vector3d axis_W = Vector3d::UnitZ();  // from the camera's rest to the surface
 
-  [[nodiscard]] Vector3d true_position(const SceneFeature& feature, double phase_rad) const noexcept {
-    return position_of(feature.x, basis_at(layout, phase_rad));
+  [[nodiscard]] Vector3d true_position(const SceneFeature& feature, double phase_rad,
+                                       double breath_rad = 0.0) const noexcept {
+    return position_of(feature.x, basis_at(layout, phase_rad, breath_rad));
+  }
+  [[nodiscard]] Vector3d true_position(const SceneFeature& feature, const SceneFrame& frame) const noexcept {
+    return position_of(feature.x, frame.basis(layout));
   }
   // The feature as the drift of its amplitude leaves it at this time.
   [[nodiscard]] SceneFeature drifted(SceneFeature feature, double time_s) const;

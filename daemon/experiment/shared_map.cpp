@@ -47,7 +47,7 @@ void SharedMap::count_pose_noise(std::size_t i, const Sighting& sighting, Learnt
   if (use_ != PoseUse::kTrackerAlone) return;
   const PoseError& error = scene_.settings.pose_error;
   const SceneFrame& frame = scene_.frames[static_cast<std::size_t>(sighting.frame)];
-  const Basis b = basis_at(layout_, frame.phase_rad);
+  const Basis b = frame.basis(layout_);
   const Vector3d p = estimates_[i]->position(b);
   Vector2d z;
   MeasurementJacobians J;
@@ -79,7 +79,7 @@ FeatureEstimate SharedMap::published(std::size_t i) const {
 
 void SharedMap::take_frame(int frame) {
   const SceneFrame& scene_frame = scene_.frames[static_cast<std::size_t>(frame)];
-  const Basis b = basis_at(layout_, scene_frame.phase_rad);
+  const Basis b = scene_frame.basis(layout_);
   std::vector<std::size_t> seen;
   std::vector<CommonMatch> matches;
   std::vector<std::size_t> waiting;
@@ -158,7 +158,7 @@ std::vector<FeatureEstimate> joint_cramer_rao_bound(const Scene& scene, const Ba
   std::vector<std::size_t> next(scene.features.size(), 0);
   for (int frame = 0; frame < end_frame; ++frame) {
     const SceneFrame& at = scene.frames[static_cast<std::size_t>(frame)];
-    const Basis b = basis_at(layout, at.phase_rad);
+    const Basis b = at.basis(layout);
     const MatrixXd bb = b * b.transpose();
     const bool first = frame == 0;
     const bool final = frame == end_frame - 1;
@@ -172,7 +172,7 @@ std::vector<FeatureEstimate> joint_cramer_rao_bound(const Scene& scene, const Ba
       const bool outlier = feature.sightings[k++].outlier;
       Vector2d z;
       MeasurementJacobians J;
-      const Vector3d p = scene.true_position(feature, at.phase_rad);
+      const Vector3d p = scene.true_position(feature, at);
       if (outlier || std::visit([&](const auto& model) { return measure(model, at.X_CW_true, p, z, &J); },
                                 scene.model) != ProjectionStatus::kOk)
         continue;

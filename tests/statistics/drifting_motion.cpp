@@ -38,7 +38,7 @@ void follow(const Scene& scene, const SceneFeature& feature, ProcessNoise noise,
   for (; next < feature.sightings.size(); ++next) {
     const Sighting& sighting = feature.sightings[next];
     const SceneFrame& frame = scene.frames[static_cast<std::size_t>(sighting.frame)];
-    const Basis b = basis_at(layout, frame.phase_rad);
+    const Basis b = frame.basis(layout);
     const UpdateOutcome update =
         iterated_update(estimate, observation_of(scene, layout, sighting, estimate.position(b)), model, {});
     static_cast<void>(health.add(update.normalised_innovation_squared, update.accepted));

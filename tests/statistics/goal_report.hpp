@@ -23,6 +23,15 @@ class GoalReport {
     line(what, fmt::format("<= {:g}", limit), reached, bound, good ? "" : "  FAILED");
     failed_ += good ? 0 : 1;
   }
+  // The plain goal; only where the bound itself is above it, `margin` times the bound.
+  void at_most_unless_forbidden(const std::string& what, double goal, double reached, double bound, double margin) {
+    const bool forbidden = bound > goal;
+    const bool good = reached <= (forbidden ? margin * bound : goal);
+    line(fmt::format("{} (goal {:g})", what, goal),
+         forbidden ? fmt::format("<={:g} bound", margin) : fmt::format("<= {:g}", goal), reached, bound,
+         good ? "" : "  FAILED");
+    failed_ += good ? 0 : 1;
+  }
   void within(const std::string& what, double low, double high, double reached) {
     const bool good = reached >= low && reached <= high;
     line(what, fmt::format("{:g}..{:g}", low, high), reached, NAN, good ? "" : "  FAILED");
