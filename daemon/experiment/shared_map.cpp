@@ -130,7 +130,7 @@ void SharedMap::take_frame(int frame) {
 }
 
 std::vector<FeatureEstimate> joint_cramer_rao_bound(const Scene& scene, const BasisLayout& layout, const Prior& prior,
-                                                    int end_frame) {
+                                                    JointPrior joint, int end_frame) {
   const Index n = layout.size();
   const auto features = static_cast<Index>(scene.features.size());
   const Index d = 3 * n;
@@ -139,6 +139,16 @@ std::vector<FeatureEstimate> joint_cramer_rao_bound(const Scene& scene, const Ba
   for (Index i = 0; i < features; ++i) {
     bounds.push_back(cramer_rao_bound(scene, scene.features[static_cast<std::size_t>(i)], layout, prior, 0));
     information.diagonal().segment(i * d, d) = bounds.back().P.diagonal().cwiseInverse();
+  }
+  if (joint == JointPrior::kCommonPart) {
+    // Covariance sigma^2 (I + 1 1^T) over the features, so information (I - 1 1^T / (1 + features)) / sigma^2.
+    for (Index coefficient = 0; coefficient < d; ++coefficient) {
+      const double shared = information(coefficient, coefficient) / static_cast<double>(1 + features);
+      for (Index row = 0; row < features; ++row) {
+        for (Index column = 0; column < features; ++column)
+          information(row * d + coefficient, column * d + coefficient) -= shared;
+      }
+    }
   }
   const PoseError& error = scene.settings.pose_error;
   const double keep =

@@ -50,9 +50,19 @@ class SharedMap {
   std::vector<int> last_counted_frame_;
 };
 
+// How the features' states x_i are supposed to belong together before any sighting.
+enum class JointPrior : std::uint8_t {
+  // Independent, each with the prior's covariance: the mean of N features is then supposed to move by the N-th part of
+  // one feature's variance, which no heart does.
+  kIndependent,
+  // x_i = c + d_i, where c and every d_i are independent and have the prior's covariance each: the mean is as free as
+  // one feature's state, the differences between features are as kIndependent has them.
+  kCommonPart
+};
+
 // Posterior Cramer-Rao bound of all features together when the pose errors are unknowns too, with their true
 // statistics: covariance of feature i's state, mm^2. Sightings before `end_frame`, outliers left out.
 [[nodiscard]] std::vector<FeatureEstimate> joint_cramer_rao_bound(const Scene& scene, const BasisLayout& layout,
-                                                                  const Prior& prior, int end_frame);
+                                                                  const Prior& prior, JointPrior joint, int end_frame);
 
 }  // namespace perimap

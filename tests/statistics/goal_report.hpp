@@ -32,6 +32,11 @@ class GoalReport {
          good ? "" : "  FAILED");
     failed_ += good ? 0 : 1;
   }
+  void at_least(const std::string& what, double limit, double reached) {
+    const bool good = reached >= limit;
+    line(what, fmt::format(">= {:g}", limit), reached, NAN, good ? "" : "  FAILED");
+    failed_ += good ? 0 : 1;
+  }
   void within(const std::string& what, double low, double high, double reached) {
     const bool good = reached >= low && reached <= high;
     line(what, fmt::format("{:g}..{:g}", low, high), reached, NAN, good ? "" : "  FAILED");

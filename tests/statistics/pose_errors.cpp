@@ -39,6 +39,17 @@ struct Sums {
   [[nodiscard]] double count() const { return static_cast<double>(errors_mm.size()); }
 };
 
+// Of NEES/3 over all features. Features of a trial share its poses' errors, so few trials say little; those of the
+// short form leave room for another seed, whose medians too may miss what seed 1 meets.
+struct CovarianceLimits {
+  double white_low;
+  double white_high;
+  double published_low;
+  double published_high;
+};
+constexpr CovarianceLimits kLongLimits{0.9, 1.1, 0.7, 1.5};
+constexpr CovarianceLimits kShortLimits{0.8, 1.25, 0.5, 1.5};
+
 constexpr int kChecks = 3;
 constexpr double kSeconds[kChecks] = {5.0, 20.0, 40.0};
 constexpr double kLimits_mm[kChecks] = {1.05, 0.50, 0.35};
@@ -56,16 +67,6 @@ Scene scene_of(const Extent& extent, const HeartMesh& heart, int trial, double c
   return *std::move(scene);
 }
 
-// Independent priors of many features say that their mean motion is small, which no heart's is. With this one the mean
-// is as free as each feature is with the plain prior.
-Prior in_common_prior(const Scene& scene) {
-  Prior prior;
-  const double wider = std::sqrt(static_cast<double>(scene.features.size()));
-  prior.dc_mm *= wider;
-  prior.cardiac_mm *= wider;
-  return prior;
-}
-
 std::string title(double correlation_s, const char* name, int at) {
   const std::string kind = correlation_s == 0.0 ? "white" : fmt::format("{} s", correlation_s);
   return fmt::format("pose error {}, {}, {} s: median (mm)", kind, name, kSeconds[at]);
@@ -79,12 +80,13 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
   const int shared_trials = extent.whole ? 10 : 1;
   const int bound_trials = extent.whole ? 3 : 1;
   const int checks = extent.whole ? kChecks : 2;
+  const CovarianceLimits& limits = extent.whole ? kLongLimits : kShortLimits;
   for (const double correlation_s : {0.0, 0.5, 5.0}) {
     Sums alone[kChecks];
     Sums naive[kChecks];
     Sums others[kChecks];
     std::vector<double> joint_bounds_mm[kChecks];
-    std::vector<double> in_common_bounds_mm[kChecks];
+    std::vector<double> common_bounds_mm[kChecks];
     for (int trial = 0; trial < trials; ++trial) {
       const Scene scene = scene_of(extent, heart, trial, correlation_s, frame_at(kSeconds[checks - 1]));
       const auto follow = [&](PoseUse use, Sums* sums) {
@@ -101,11 +103,12 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
       }
       if (trial >= bound_trials) continue;
       for (int at = 0; at < checks; ++at) {
-        for (const FeatureEstimate& one : joint_cramer_rao_bound(scene, BasisLayout{}, Prior{}, frame_at(kSeconds[at])))
-          draw_errors(joint_bounds_mm[at], one);
-        for (const FeatureEstimate& one :
-             joint_cramer_rao_bound(scene, BasisLayout{}, in_common_prior(scene), frame_at(kSeconds[at])))
-          draw_errors(in_common_bounds_mm[at], one);
+        const int end_frame = frame_at(kSeconds[at]);
+        for (auto& [joint, errors_mm] : {std::pair{JointPrior::kIndependent, &joint_bounds_mm[at]},
+                                         {JointPrior::kCommonPart, &common_bounds_mm[at]}}) {
+          for (const FeatureEstimate& one : joint_cramer_rao_bound(scene, BasisLayout{}, Prior{}, joint, end_frame))
+            draw_errors(*errors_mm, one);
+        }
       }
     }
     const bool white = correlation_s == 0.0;
@@ -113,25 +116,35 @@ void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& repor
       const double joint_bound = quantile(joint_bounds_mm[at], 0.5);
       const double reached = quantile(alone[at].errors_mm, 0.5);
       const double own_bound = quantile(alone[at].bounds_mm, 0.5);
-      // Where the bound of features taken one by one is above the goal, no estimator of such features can meet it; what
-      // it can be asked then is to be at the bound.
+      // The bound of features taken one by one: no estimator of such features is below it.
       if (white) {
-        report.shown(title(correlation_s, "tracker alone", at), fmt::format("<= {:g}", kLimits_mm[at]), reached,
-                     own_bound);
-        report.at_most("  over the goal, or where that is less the bound of each alone", extent.whole ? 1.1 : 1.2,
-                       reached / std::max(kLimits_mm[at], own_bound));
+        report.at_most_unless_forbidden(title(correlation_s, "tracker alone", at), kLimits_mm[at], reached, own_bound,
+                                        1.1);
       } else {
         report.shown(title(correlation_s, "tracker alone", at), "", reached, joint_bound);
       }
-      report.shown("  NEES/3", "", alone[at].nees / alone[at].count());
-      report.at_most("  NEES/3 of the published covariance, common part counted in", 1.5,
-                     alone[at].published_nees / alone[at].count());
-      const std::string half = white ? fmt::format("<= {:g}", 0.5 * kLimits_mm[at]) : "";
-      for (const auto& [name, sums] : {std::pair{"shared, counted twice", naive}, {"shared, from others", others}}) {
-        report.shown(title(correlation_s, name, at), half, quantile(sums[at].errors_mm, 0.5), joint_bound);
-        report.shown("  NEES/3", "", sums[at].nees / sums[at].count());
+      const double nees = alone[at].nees / alone[at].count();
+      if (white) {
+        report.within("  NEES/3", limits.white_low, limits.white_high, nees);
+      } else {
+        report.shown("  NEES/3", "", nees);
       }
-      report.shown("  joint bound where the mean motion is free", "", quantile(in_common_bounds_mm[at], 0.5));
+      report.within("  NEES/3 of the published covariance, common part counted in", limits.published_low,
+                    limits.published_high, alone[at].published_nees / alone[at].count());
+      for (const auto& [name, sums] : {std::pair{"shared, counted twice", naive}, {"shared, from others", others}}) {
+        const double shared = quantile(sums[at].errors_mm, 0.5);
+        report.shown(title(correlation_s, name, at), "", shared, joint_bound);
+        report.shown("  NEES/3", "", sums[at].nees / sums[at].count());
+        // Why nothing is learnt with it. Below 1 it would be worth another trial.
+        report.at_least("  over the tracker alone", 1.0, shared / reached);
+      }
+      const double common_bound = quantile(common_bounds_mm[at], 0.5);
+      if (white) {
+        const double half = 0.5 * kLimits_mm[at];
+        report.at_least(fmt::format("  joint bound over half of the goal, {:g} mm", half), 1.0, joint_bound / half);
+      }
+      report.shown("  joint bound of independent features", "", joint_bound);
+      report.shown("  joint bound where the mean motion is free", "", common_bound);
     }
   }
 }
