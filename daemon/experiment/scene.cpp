@@ -128,8 +128,8 @@ Stage heart_stage(const SceneSettings& settings, const HeartMesh& heart) {
 
 Stage ellipsoid_stage(const SceneSettings& settings) {
   Stage stage;
-  constexpr int kHarmonics = 6;
-  stage.layout = {kHarmonics, 0};
+  const int H = settings.ellipsoid_harmonics;
+  stage.layout = {H, 0};
   const Vector3d axes_mm(45.0, 35.0, 35.0);
   stage.target_W = Vector3d(0.0, 0.0, -axes_mm.z());
   // Harmonic k moves p by Q p + t; half of the variance (4 / k^2 mm)^2 of each coefficient comes from either term.
@@ -148,12 +148,12 @@ Stage ellipsoid_stage(const SceneSettings& settings) {
     for (int axis = 0; axis < 3; ++axis) x(axis * n) = p(axis);
     std::uint64_t index = 0;
     for (int part = 0; part < 2; ++part) {
-      for (int k = 1; k <= kHarmonics; ++k) {
+      for (int k = 1; k <= H; ++k) {
         const Vector3d t = normal3(motion, index++);
         Matrix3d Q;
         for (int row = 0; row < 3; ++row) Q.row(row) = normal3(motion, index++).transpose();
         const Vector3d a = kFirst_mm / (k * k) * (t + Q * p / mean_radius_mm);
-        for (int axis = 0; axis < 3; ++axis) x(axis * n + part * kHarmonics + k) = a(axis);
+        for (int axis = 0; axis < 3; ++axis) x(axis * n + part * H + k) = a(axis);
       }
     }
     stage.points.push_back(std::move(x));

@@ -19,7 +19,7 @@ using AnyModel = std::variant<BearingModel, PixelModel>;
 
 enum class SceneSurface : std::uint8_t {
   kHeart,      // the epicardium from MRI; its motion has 4 harmonics
-  kEllipsoid,  // beats by an affine map whose 6 harmonics are drawn at random, falling with 1/k^2
+  kEllipsoid,  // beats by an affine map whose harmonics are drawn at random, falling with 1/k^2
   kPlate       // a patch before the camera that moves along the optical axis, 13 mm from end to end, 3 harmonics
 };
 
@@ -45,7 +45,8 @@ struct SceneBreathing {
 
 struct SceneSettings {
   SceneSurface surface = SceneSurface::kEllipsoid;
-  bool bearings = false;  // else pixels, f = 700 px, 1280 x 720
+  int ellipsoid_harmonics = 6;  // at most kMaxHarmonics
+  bool bearings = false;        // else pixels, f = 700 px, 1280 x 720
   int features = 5;
   int frames = 600;
   int min_frames = 0;  // when > 0, each feature is seen in its first min_frames..frames frames only

@@ -33,6 +33,8 @@ void no_feature_is_lost(const Extent& extent, const HeartMesh& heart, GoalReport
 void as_exact_as_the_data_allow(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Process noise by evidence: a motion that drifts is followed, one that does not is none the worse.
 void motion_that_drifts(const Extent& extent, const HeartMesh& heart, GoalReport& report);
+// A truth with more harmonics than the state: what each more of them brings.
+void motion_with_many_harmonics(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Path error and covariance of a heart that breathing moves, both phases known.
 void motion_that_breathes(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Path error and covariance with errors of the camera pose, white and slow, without and with the shared pose.
