@@ -4,25 +4,58 @@
 
 namespace perimap {
 
+namespace {
+
+bool alike(Duration a, Duration b) noexcept { return 4 * std::max(a, b) <= 5 * std::min(a, b); }
+
+// One period is so much longer than the other that frames were missing without a gap in their numbers: a camera that
+// is opened again counts on by one, however long it was away.
+bool far_apart(Duration a, Duration b) noexcept { return 2 * std::max(a, b) > 5 * std::min(a, b); }
+
+}  // namespace
+
 void ReleaseSchedule::fit(const FrameStamp& stamp) noexcept {
   if (have_fit_ && stamp.sequence > fitted_.sequence && stamp.capture > fitted_.capture) {
     const auto frames = static_cast<std::int64_t>(stamp.sequence - fitted_.sequence);
-    const Duration period = (stamp.capture - fitted_.capture) / frames;
-    // A slow average: stamps jitter by a fraction of a millisecond, the true period hardly changes.
-    period_ = period_ == Duration(0) ? period : period_ + (period - period_) / 16;
+    fit((stamp.capture - fitted_.capture) / frames);
   }
   if (!have_fit_ || stamp.capture > fitted_.capture) fitted_ = stamp;
   have_fit_ = true;
 }
 
+void ReleaseSchedule::fit(Duration period) noexcept {
+  constexpr int kAnotherRate = 4;
+  if (period_ == Duration(0)) {
+    period_ = period;
+    return;
+  }
+  // Some alike in a row that are not as before: the rate is another one, or the first period was an outage.
+  if (alike(period, period_)) {
+    others_ = 0;
+  } else {
+    others_ = others_ > 0 && alike(period, other_period_) ? others_ + 1 : 1;
+    other_period_ = period;
+  }
+  if (others_ == kAnotherRate) {
+    others_ = 0;
+    period_ = period;
+  } else if (!far_apart(period, period_)) {
+    // A slow average: stamps jitter by a fraction of a millisecond, the true period hardly changes.
+    period_ += (period - period_) / 16;
+  }
+}
+
 bool ReleaseSchedule::on_frame(const FrameStamp& stamp, Instant now) noexcept {
   const bool backwards = have_fit_ && stamp.capture <= fitted_.capture;
+  // Judged by the period that the release was taken by. That of a frame was taken for no other frame.
+  const Duration around = last_missing_ ? period_ / 2 : Duration(0);
+  const bool taken = have_last_ && stamp.capture <= last_capture_ + around;
+  const bool near_taken = taken && stamp.capture > last_capture_ - around;
   fit(stamp);
   const Instant deadline = stamp.capture + latency_;
-  const bool taken = have_last_ && stamp.capture <= last_capture_ + period_ / 2;
   if (backwards || taken || now > deadline || head_ - tail_ == kCapacity) {
     // Predictions go on from the true frame times, not from the ones fitted before this frame was known.
-    if (taken && stamp.capture > last_capture_ - period_ / 2) last_capture_ = stamp.capture;
+    if (near_taken) last_capture_ = stamp.capture;
     return false;
   }
   pending_[head_++ % kCapacity] = stamp;
@@ -33,6 +66,7 @@ void ReleaseSchedule::resume(Instant last_capture, std::uint64_t last_sequence, 
   if (period <= Duration(0)) return;
   const auto passed = std::max<std::int64_t>(0, (now - latency_ - last_capture) / period);
   have_last_ = true;
+  last_missing_ = true;
   last_capture_ = last_capture + passed * period;
   last_sequence_ = last_sequence + static_cast<std::uint64_t>(passed);
   period_ = period;
@@ -55,6 +89,7 @@ Release ReleaseSchedule::take() noexcept {
   const Release release = *next();
   if (!release.frame_missing) ++tail_;
   have_last_ = true;
+  last_missing_ = release.frame_missing;
   last_capture_ = release.capture;
   last_sequence_ = release.frame_sequence;
   return release;

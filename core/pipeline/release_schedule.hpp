@@ -49,17 +49,22 @@ class ReleaseSchedule {
   static constexpr std::uint64_t kCapacity = 64;
 
   void fit(const FrameStamp& stamp) noexcept;
+  void fit(Duration period) noexcept;
 
   Duration latency_;
   std::array<FrameStamp, kCapacity> pending_{};
   std::uint64_t head_ = 0;
   std::uint64_t tail_ = 0;
   bool have_last_ = false;
-  Instant last_capture_;  // of the last release taken
+  bool last_missing_ = false;  // the last release taken was of no frame
+  Instant last_capture_;       // of the last release taken
   std::uint64_t last_sequence_ = 0;
   bool have_fit_ = false;
   FrameStamp fitted_;   // newest stamp that went into the fit
   Duration period_{0};  // 0: not known yet
+  // The newest period that was not like `period_`, and how many like it have come in a row.
+  Duration other_period_{0};
+  int others_ = 0;
 };
 
 }  // namespace perimap

@@ -97,5 +97,58 @@ TEST(ReleaseSchedule, AFrameBehindAMissingOneIsStillPending) {
   EXPECT_FALSE(schedule.pending());
 }
 
+// The camera is away for 5 s and counts on by one when it is back, as one that is opened again does.
+TEST(ReleaseSchedule, AfterAnOutageEveryFrameIsReleasedThoughTheNumbersHaveNoGap) {
+  ReleaseSchedule schedule = running(10);
+  const auto take_until = [&](Instant t) {
+    while (schedule.next()->deadline <= t) EXPECT_TRUE(schedule.take().frame_missing);
+  };
+  for (int i = 0; i < 60; ++i) {
+    const int capture_ms = 5277 + 30 * i;
+    if (i == 0) take_until(at_ms(capture_ms + 12));
+    ASSERT_TRUE(schedule.on_frame(frame(static_cast<std::uint64_t>(10 + i), capture_ms), at_ms(capture_ms + 12))) << i;
+    EXPECT_EQ(schedule.period(), milliseconds(30));
+    Release release = schedule.take();
+    // Up to the first one what is released may still be the last of the outage.
+    while (i == 0 && release.frame_missing) release = schedule.take();
+    EXPECT_FALSE(release.frame_missing) << i;
+    EXPECT_EQ(release.deadline, at_ms(capture_ms + 50));
+  }
+}
+
+TEST(ReleaseSchedule, AnOutageAfterTheVeryFirstFrameIsNotTakenForThePeriodForLong) {
+  ReleaseSchedule schedule = running(1);
+  for (int i = 0; i < 20; ++i) {
+    const int capture_ms = 5000 + 30 * i;
+    ASSERT_TRUE(schedule.on_frame(frame(static_cast<std::uint64_t>(1 + i), capture_ms), at_ms(capture_ms + 12))) << i;
+    EXPECT_EQ(schedule.take().deadline, at_ms(capture_ms + 50));
+  }
+  EXPECT_EQ(schedule.period(), milliseconds(30));
+}
+
+TEST(ReleaseSchedule, FollowsAnotherFrameRateWithinSomeFramesAndRefusesNone) {
+  for (const int period_ms : {15, 60}) {
+    ReleaseSchedule schedule = running(10);
+    int missing = 0;
+    for (int i = 1; i <= 30; ++i) {
+      const int capture_ms = 270 + period_ms * i;
+      ASSERT_TRUE(schedule.on_frame(frame(static_cast<std::uint64_t>(9 + i), capture_ms), at_ms(capture_ms + 12))) << i;
+      while (schedule.next()->deadline <= at_ms(capture_ms + 50)) missing += schedule.take().frame_missing ? 1 : 0;
+    }
+    EXPECT_EQ(schedule.period(), milliseconds(period_ms));
+    EXPECT_LE(missing, 8);
+  }
+}
+
+TEST(ReleaseSchedule, FitsThePeriodThroughJitter) {
+  ReleaseSchedule schedule(kLatency);
+  for (int i = 0; i < 200; ++i) {
+    const int capture_ms = 30 * i + (i % 3) * 2;
+    ASSERT_TRUE(schedule.on_frame(frame(static_cast<std::uint64_t>(i), capture_ms), at_ms(capture_ms + 12)));
+    EXPECT_FALSE(schedule.take().frame_missing);
+  }
+  EXPECT_NEAR(to_seconds(schedule.period()), 0.030, 0.001);
+}
+
 }  // namespace
 }  // namespace perimap
