@@ -16,14 +16,8 @@
 
 namespace perimap {
 
-// A frame that this job's snapshot serves the release of.
-struct CoveredRelease {
-  std::uint64_t frame_sequence = 0;
-  CameraPlace camera;  // at that frame's capture
-};
-
-// The bases at which covariances are evaluated, with the phase as known now: those of the shard's releases, then those
-// of its instants. Only [begin, end) are asked for: a stream that is not published costs nothing.
+// The bases at the snapshot's instants, with the phase as known now. Only [begin, end) are asked for: a stream that is
+// not published costs nothing.
 struct EvaluatedBases {
   std::array<Basis, kCovariances> b;
   std::size_t begin = 0;
@@ -37,8 +31,8 @@ struct FrameJob {
   GreyImage image;  // while features are searched for
   const PatchTracker* tracker = nullptr;
   BasesAbout about_capture;
-  std::array<CoveredRelease, kReleasesCovered> releases;
-  std::array<Instant, kInstantsCovered> instants{};
+  std::array<FrameCamera, kCamerasKept> cameras;
+  std::array<Instant, kCovariances> instants{};
   EvaluatedBases evaluated;
   // After B: how the features found have moved, and the pose that they agree on; null when they do not tell it.
   const NeighbourMotion* motion = nullptr;

@@ -1,7 +1,6 @@
 #include "core/pipeline/mapper.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "core/pipeline/feature_life.hpp"
@@ -24,6 +23,8 @@ constexpr std::uint32_t kIdsLeftOut = 10'000;
 // At that they are 23 ms apart, and a covariance with 8 harmonics of the heart is still near its chord between them.
 constexpr Duration kLongestCoveredPeriod = std::chrono::milliseconds(50);
 constexpr Duration kCoveredBeyond = std::chrono::milliseconds(20);
+constexpr Duration kReleasesBeyond = std::chrono::milliseconds(10);
+static_assert(kMostFramesUnderway + kCamerasBefore < FrameHistory::kCapacity);
 
 }  // namespace
 
@@ -260,15 +261,15 @@ void Mapper::recall(const MapMemory& memory, Instant now) {
     next_id_ = std::max(next_id_, feature.id + kIdsLeftOut);
     ++index;
   }
-  constexpr auto kNoRelease = std::numeric_limits<std::uint64_t>::max();
   for (ShardCells& cells : cells_) {
     const auto worker = static_cast<std::size_t>(&cells - cells_.data());
     for (TripleBuffer<ShardSnapshot>* cell : {&cells.publisher, &cells.model}) {
       ShardSnapshot& snapshot = cell->back();
       snapshot.any = true;
+      snapshot.recalled = true;
       snapshot.frame_sequence = memory.last_frame_sequence;
       snapshot.capture = memory.last_capture;
-      snapshot.release_sequences.fill(kNoRelease);
+      snapshot.instants.fill(Instant{});
       snapshot.features.clear();
       for (auto g = worker; g < groups_.size(); g += tallies_.size()) {
         for (std::size_t lane = 0; lane < groups_[g].slots().size(); ++lane) {
@@ -390,30 +391,62 @@ void Mapper::plan_evaluation(const FrameRecord& frame, const CardiacClock& clock
   const bool on_clock = settings_.clock_period > Duration(0);
   job_.evaluated.begin = settings_.frame_stream ? 0 : kReleasesCovered;
   job_.evaluated.end = on_clock ? kCovariances : kReleasesCovered;
-  const auto evaluate_at = [&](std::size_t i, Instant valid) {
-    if (i < job_.evaluated.begin || i >= job_.evaluated.end) return;
+  job_.instants.fill(Instant{});
+  if (settings_.frame_stream) plan_releases(frame);
+  if (on_clock) plan_instants(frame);
+  for (std::size_t i = job_.evaluated.begin; i < job_.evaluated.end; ++i) {
+    const Instant valid = job_.instants[i];
     job_.evaluated.b[i] =
         basis_at(settings_.estimator.layout, clock.at(valid).phase_rad, respiration_.clock().at(valid));
-  };
-  for (std::size_t i = 0; i < job_.releases.size(); ++i) {
-    const FrameRecord* earlier = history_->find(frame.index - std::min<std::uint64_t>(frame.index, i));
-    job_.releases[i] = {earlier->stamp.sequence, {earlier->pose.valid(), earlier->pose.X_WC}};
-    evaluate_at(i, earlier->stamp.capture + settings_.latency + settings_.lead);
   }
-  if (!on_clock) return;
-  plan_instants(frame);
-  for (std::size_t i = 0; i < job_.instants.size(); ++i) evaluate_at(kReleasesCovered + i, job_.instants[i]);
+}
+
+// From frame to frame, as the last two were.
+Duration Mapper::period_before(const FrameRecord& frame) const noexcept {
+  const FrameRecord* before = history_->find(frame.index - std::min<std::uint64_t>(frame.index, 1));
+  const Duration since = frame.stamp.capture - before->stamp.capture;
+  return since > Duration(0) ? std::min(since, kLongestCoveredPeriod) : kLongestCoveredPeriod;
+}
+
+// The releases that come while this frame's snapshot is the newest. Where L is some periods they are of frames before
+// it, where L is less than one also of frames to come, which are expected a period apart. Told by the stamps alone, as
+// below.
+void Mapper::plan_releases(const FrameRecord& frame) noexcept {
+  const Instant known = std::max(frame.stamp.arrival, last_pose_arrival_);
+  std::uint64_t oldest = frame.index;
+  while (oldest > 0) {
+    const FrameRecord* before = history_->find(oldest - 1);
+    if (before == nullptr || before->stamp.capture + settings_.latency < known) break;
+    --oldest;
+  }
+  const Duration period = period_before(frame);
+  // So many frames from one to the next that they reach over a period and some time for what comes unevenly.
+  constexpr auto kSteps = static_cast<Duration::rep>(kReleasesCovered - 1);
+  const auto stride =
+      static_cast<std::uint64_t>((period + kReleasesBeyond + kSteps * period - Duration(1)) / (kSteps * period));
+  for (std::size_t i = 0; i < kReleasesCovered; ++i) {
+    const std::uint64_t index = oldest + i * stride;
+    const FrameRecord* record = history_->find(std::min(index, frame.index));
+    const auto to_come = static_cast<Duration::rep>(index - record->index);
+    job_.instants[i] = record->stamp.capture + to_come * period + settings_.latency + settings_.lead;
+  }
+  job_.cameras.fill(FrameCamera{});
+  const std::uint64_t first = oldest - std::min<std::uint64_t>(oldest, kCamerasBefore);
+  for (std::size_t i = 0; i < kCamerasKept && first + i <= frame.index; ++i) {
+    const FrameRecord* record = history_->find(first + i);
+    if (record == nullptr) continue;
+    job_.cameras[i] = {record->stamp.sequence, {record->pose.valid(), record->pose.X_WC}};
+  }
 }
 
 // From when this frame can be mapped until the next one should have been: a frame later, and some time for what comes
 // unevenly. Told by the stamps alone, so that a replay has the same instants every time.
 void Mapper::plan_instants(const FrameRecord& frame) noexcept {
-  const FrameRecord* before = history_->find(frame.index - std::min<std::uint64_t>(frame.index, 1));
-  const Duration since = frame.stamp.capture - before->stamp.capture;
-  const Duration period = since > Duration(0) ? std::min(since, kLongestCoveredPeriod) : kLongestCoveredPeriod;
   const Instant begin = std::max(frame.stamp.arrival, last_pose_arrival_) + settings_.lead;
-  const Duration step = (period + kCoveredBeyond) / static_cast<int>(kInstantsCovered - 1);
-  for (std::size_t i = 0; i < job_.instants.size(); ++i) job_.instants[i] = begin + static_cast<int>(i) * step;
+  const Duration step = (period_before(frame) + kCoveredBeyond) / static_cast<int>(kInstantsCovered - 1);
+  for (std::size_t i = 0; i < kInstantsCovered; ++i) {
+    job_.instants[kReleasesCovered + i] = begin + static_cast<int>(i) * step;
+  }
 }
 
 void Mapper::evaluate_shard(int worker) noexcept {
@@ -422,14 +455,13 @@ void Mapper::evaluate_shard(int worker) noexcept {
   for (TripleBuffer<ShardSnapshot>* cell : {&cells.publisher, &cells.model}) {
     ShardSnapshot& snapshot = cell->back();
     snapshot.any = true;
+    snapshot.recalled = false;
     snapshot.frame_sequence = job_.frame->stamp.sequence;
     snapshot.capture = job_.frame->stamp.capture;
     snapshot.instants = job_.instants;
+    snapshot.cameras = job_.cameras;
+    snapshot.camera = {job_.frame->pose.valid(), job_.frame->pose.X_WC};
     snapshot.pose_missing = !job_.frame->pose.valid();
-    for (std::size_t i = 0; i < job_.releases.size(); ++i) {
-      snapshot.release_sequences[i] = job_.releases[i].frame_sequence;
-      snapshot.cameras[i] = job_.releases[i].camera;
-    }
     snapshot.features.clear();
   }
   for (auto g = static_cast<std::size_t>(worker); g < groups_.size(); g += tallies_.size()) {

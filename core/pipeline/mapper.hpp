@@ -73,7 +73,9 @@ class Mapper {
   }
   void predict_and_find_shard(int worker) noexcept;
   void plan_evaluation(const FrameRecord& frame, const CardiacClock& clock) noexcept;
+  void plan_releases(const FrameRecord& frame) noexcept;
   void plan_instants(const FrameRecord& frame) noexcept;
+  [[nodiscard]] Duration period_before(const FrameRecord& frame) const noexcept;
   void evaluate_shard(int worker) noexcept;
   void follow_shard(int worker) noexcept;
   void learn_shard(int worker) noexcept;

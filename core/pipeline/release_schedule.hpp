@@ -20,6 +20,9 @@ struct Release {
   ReleaseStream stream = ReleaseStream::kFrame;
 };
 
+// As many frames at most are between their capture and their release: L x the frame rate must not exceed it.
+inline constexpr int kMostFramesUnderway = 240;
+
 // Every frame is released at capture + L. Where a frame is missing (dropped, or the camera has stopped) the release
 // happens all the same, at the time that the fitted frame period gives. Used by one thread.
 class ReleaseSchedule {
@@ -46,7 +49,8 @@ class ReleaseSchedule {
   [[nodiscard]] Duration period() const noexcept { return period_; }
 
  private:
-  static constexpr std::uint64_t kCapacity = 64;
+  // Some more than are underway, for what a publisher that was held up has yet to release.
+  static constexpr std::uint64_t kCapacity = kMostFramesUnderway + 16;
 
   void fit(const FrameStamp& stamp) noexcept;
   void fit(Duration period) noexcept;

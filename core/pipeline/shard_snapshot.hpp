@@ -12,13 +12,21 @@
 
 namespace perimap {
 
-// A snapshot serves the release of its own frame and of the two before it: with L longer than the time from frame to
-// frame, the next frames are mapped before a release is due.
+// A snapshot holds covariances at instants from when it becomes known until the next one should be; between two of them
+// it is interpolated. To the frames' stream these are releases: that of the oldest frame that is still to come, however
+// long L is, and two later ones, at usual rates the next two. The clock's fall anywhere.
 inline constexpr std::size_t kReleasesCovered = 3;
-// Between two frames the clock's releases fall anywhere. For them a snapshot holds covariances at so many instants,
-// from when it becomes known until the next one should be; between two of them it is interpolated.
 inline constexpr std::size_t kInstantsCovered = 4;
 inline constexpr std::size_t kCovariances = kReleasesCovered + kInstantsCovered;
+
+// Where the camera was is told for the frames whose releases come while the snapshot is the newest, and for some
+// before, of a publisher that was held up.
+inline constexpr std::size_t kCamerasBefore = 8;
+inline constexpr std::size_t kCamerasKept = 24;
+struct FrameCamera {
+  std::uint64_t frame_sequence = 0;
+  CameraPlace place;  // at that frame's capture
+};
 
 // One started feature: enough to evaluate it at any instant near the release.
 struct FeatureSnapshot {
@@ -26,7 +34,7 @@ struct FeatureSnapshot {
   FeatureState state = FeatureState::kInvalid;
   FeatureReason reason = FeatureReason::kNone;
   StateVector x;  // mm, see core/periodic
-  // B P B^T at the releases that the shard names, then at its instants. Of a stream that is not published: anything.
+  // B P B^T at the shard's instants. Of a stream that is not published: anything.
   std::array<Matrix3d, kCovariances> covariances_W_mm2;
   Instant last_observed;
   Instant first_observed;
@@ -35,14 +43,16 @@ struct FeatureSnapshot {
 };
 
 struct ShardSnapshot {
-  std::array<std::uint64_t, kReleasesCovered> release_sequences{};  // frames at whose releases covariances are given
-  std::array<CameraPlace, kReleasesCovered> cameras{};              // at their captures
-  std::array<Instant, kInstantsCovered> instants{};                 // valid times, rising; all the same: none
-  bool any = false;                                                 // false until the first frame
-  std::uint64_t frame_sequence = 0;                                 // of the frame whose update this is
-  Instant capture;                                                  // of that frame
-  bool pose_missing = false;                                        // that frame gave no measurement for want of a pose
-  std::vector<FeatureSnapshot> features;                            // capacity reserved at start
+  // Valid times: kReleasesCovered of the frames' stream, rising, then those of the clock's; all the same: none.
+  std::array<Instant, kCovariances> instants{};
+  std::array<FrameCamera, kCamerasKept> cameras{};
+  bool any = false;                       // false until the first frame
+  bool recalled = false;                  // of an earlier run: older than any frame of this one, which counts its own
+  std::uint64_t frame_sequence = 0;       // of the frame whose update this is
+  Instant capture;                        // of that frame
+  CameraPlace camera;                     // at that capture
+  bool pose_missing = false;              // that frame gave no measurement for want of a pose
+  std::vector<FeatureSnapshot> features;  // capacity reserved at start
 };
 
 // The worker is the one writer; the publisher and the model publisher read a cell each.

@@ -1,7 +1,6 @@
 #include "core/pipeline/surface_composer.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "core/periodic/periodic_motion.hpp"
 #include "core/pipeline/phase_spread.hpp"
@@ -16,19 +15,15 @@ SurfaceComposer::SurfaceComposer(const ComposerSettings& settings) : settings_(s
 
 SurfaceComposer::Covered SurfaceComposer::covered_by(const ShardSnapshot& snapshot, const Release& release,
                                                      Instant valid) noexcept {
-  if (release.stream == ReleaseStream::kFrame) {
-    const auto& sequences = snapshot.release_sequences;
-    const auto found = std::find(sequences.begin(), sequences.end(), release.frame_sequence);
-    if (found == sequences.end() || release.frame_missing) return {};
-    const auto i = static_cast<std::size_t>(found - sequences.begin());
-    return {true, i, i, 0.0};
-  }
-  for (std::size_t i = 1; i < snapshot.instants.size(); ++i) {
+  const bool of_frames = release.stream == ReleaseStream::kFrame;
+  if (of_frames && release.frame_missing) return {};
+  const std::size_t begin = of_frames ? 0 : kReleasesCovered;
+  const std::size_t end = of_frames ? kReleasesCovered : kCovariances;
+  for (std::size_t i = begin + 1; i < end; ++i) {
     const Instant before = snapshot.instants[i - 1];
     const Instant after = snapshot.instants[i];
     if (before > valid || valid > after || before == after) continue;
-    const std::size_t first = kReleasesCovered + i - 1;
-    return {true, first, first + 1, to_seconds(valid - before) / to_seconds(after - before)};
+    return {true, i - 1, i, to_seconds(valid - before) / to_seconds(after - before)};
   }
   return {};
 }
@@ -37,32 +32,35 @@ SurfaceComposer::Covered SurfaceComposer::covered_by(const ShardSnapshot& snapsh
 // bounds it.
 Matrix3d SurfaceComposer::map_covariance(const FeatureSnapshot& feature, const Covered& covered) noexcept {
   if (!covered.any) return Matrix3d::Identity() * feature.largest_deviation_mm * feature.largest_deviation_mm;
-  if (covered.before == covered.after) return feature.covariances_W_mm2[covered.before];
   return (1.0 - covered.share) * feature.covariances_W_mm2[covered.before] +
          covered.share * feature.covariances_W_mm2[covered.after];
 }
 
-// Which frame the sample belongs to, which update is its oldest, and where the camera was.
-void SurfaceComposer::rest_on(const Release& release, std::span<const ShardSnapshot* const> snapshots) noexcept {
+// Which frame the sample belongs to, which update is its oldest, and where the camera was. Whether that update is of a
+// frame before the release's.
+bool SurfaceComposer::rest_on(const Release& release, std::span<const ShardSnapshot* const> snapshots) noexcept {
   sample_.release = release;
   sample_.camera = {};
-  sample_.oldest_shard_frame_sequence = std::numeric_limits<std::uint64_t>::max();
+  const auto of_this_run = [](const ShardSnapshot& s) { return s.any && !s.recalled; };
   const ShardSnapshot* oldest = nullptr;
   for (const ShardSnapshot* snapshot : snapshots) {
-    const std::uint64_t sequence = snapshot->any ? snapshot->frame_sequence : 0;
-    if (sequence < sample_.oldest_shard_frame_sequence) {
-      sample_.oldest_shard_frame_sequence = sequence;
-      oldest = snapshot;
-    }
-    if (release.stream == ReleaseStream::kClock || !snapshot->any || release.frame_missing) continue;
-    const Covered covered = covered_by(*snapshot, release, sample_.valid_time);
-    if (covered.any) sample_.camera = snapshot->cameras[covered.before];
+    const bool older =
+        oldest == nullptr || !of_this_run(*snapshot) || snapshot->frame_sequence < oldest->frame_sequence;
+    if (older && (oldest == nullptr || of_this_run(*oldest))) oldest = snapshot;
+    if (release.stream == ReleaseStream::kClock || !of_this_run(*snapshot) || release.frame_missing) continue;
+    const auto has_it = [&](const FrameCamera& camera) { return camera.frame_sequence == release.frame_sequence; };
+    const auto found = std::find_if(snapshot->cameras.begin(), snapshot->cameras.end(), has_it);
+    if (found != snapshot->cameras.end() && found->place.known) sample_.camera = found->place;
   }
-  if (release.stream != ReleaseStream::kClock || oldest == nullptr || !oldest->any) return;
+  const bool mapped = oldest != nullptr && of_this_run(*oldest);
+  sample_.oldest_shard_frame_sequence = mapped ? oldest->frame_sequence : 0;
+  const bool behind = !mapped || oldest->frame_sequence < release.frame_sequence;
+  if (release.stream != ReleaseStream::kClock || oldest == nullptr || !oldest->any) return behind;
   sample_.release.frame_sequence = oldest->frame_sequence;
   sample_.release.capture = oldest->capture;
-  sample_.release.frame_missing = release.frame_missing && oldest->frame_sequence < release.frame_sequence;
-  sample_.camera = oldest->cameras[0];
+  sample_.release.frame_missing = release.frame_missing && behind;
+  sample_.camera = oldest->camera;
+  return behind;
 }
 
 const SurfaceSample& SurfaceComposer::compose(const Release& release, const CardiacClock& clock,
@@ -72,7 +70,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   ++sample_.sample_sequence;
   sample_.valid_time = release.deadline + settings_.lead;
   sample_.valid_until = sample_.valid_time + settings_.validity;
-  rest_on(release, snapshots);
+  const bool behind = rest_on(release, snapshots);
 
   order_.clear();
   bool pose_missing = false;
@@ -89,7 +87,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   sample_.cardiac_phase_deviation_rad = phase.deviation_s * phase.rate_rad_per_s;
   sample_.cardiac_phase_rate_rad_per_s = phase.rate_rad_per_s;
   const bool missing = sample_.release.frame_missing;
-  const bool late = sample_.oldest_shard_frame_sequence < release.frame_sequence && !missing;
+  const bool late = behind && !missing;
   sample_.update_late = late;
   const SurfaceFooting footing{.breath_unknown = respiration.unknown(),
                                .mapped = !order_.empty(),

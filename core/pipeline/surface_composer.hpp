@@ -35,10 +35,13 @@ class SurfaceComposer {
                                              const RespiratoryClock& respiration,
                                              std::span<const ShardSnapshot* const> snapshots) noexcept;
 
+  // The last sample is not sent: the next one takes its number.
+  void take_back() noexcept { --sample_.sample_sequence; }
+
  private:
   ComposerSettings settings_;
   SurfaceSample sample_;
-  // Which of a shard's covariances are of the instant that is asked for: between two of them, so far from the first.
+  // Between which of a shard's covariances the instant that is asked for lies, and how far from the first.
   struct Covered {
     bool any = false;
     std::size_t before = 0;
@@ -52,7 +55,7 @@ class SurfaceComposer {
   [[nodiscard]] static Covered covered_by(const ShardSnapshot& snapshot, const Release& release,
                                           Instant valid) noexcept;
   [[nodiscard]] static Matrix3d map_covariance(const FeatureSnapshot& feature, const Covered& covered) noexcept;
-  void rest_on(const Release& release, std::span<const ShardSnapshot* const> snapshots) noexcept;
+  [[nodiscard]] bool rest_on(const Release& release, std::span<const ShardSnapshot* const> snapshots) noexcept;
 
   std::vector<Ordered> order_;
 };

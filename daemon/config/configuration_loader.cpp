@@ -10,11 +10,13 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include <cmath>
 #include <initializer_list>
 #include <system_error>
 #include <utility>
 
 #include "core/error/one_line.hpp"
+#include "core/pipeline/release_schedule.hpp"
 #include "daemon/config/configuration_keys.hpp"
 #include "daemon/config/ecg_inputs.hpp"
 #include "daemon/config/surface_traffic.hpp"
@@ -187,6 +189,7 @@ class Overlay {
       refuse({1, 1}, "version", find("", "version")->expected, "nothing");
     }
     check_budget(root);
+    check_frames_underway(root);
     check_inputs(root);
     check_traffic(root);
     if (!error_.empty()) {
@@ -270,6 +273,17 @@ class Overlay {
     refuse(place_of(root, {"pipeline.budget_ms", "pipeline.latency_ms"}), "pipeline.budget_ms",
            fmt::format("less than latency_ms ({:.6g})", to_seconds(pipeline.latency) * 1e3),
            fmt::format("{:.6g}", to_seconds(pipeline.budget) * 1e3));
+  }
+
+  // What is between capture and release is kept for so many frames.
+  void check_frames_underway(const toml::table& root) {
+    const double rate_hz = configuration_.camera.frame_rate_hz;
+    const double latency_s = to_seconds(configuration_.pipeline.latency);
+    if (latency_s * rate_hz <= kMostFramesUnderway) return;
+    refuse(place_of(root, {"pipeline.latency_ms", "camera.frame_rate_hz"}), "pipeline.latency_ms",
+           fmt::format("at most {:.6g} at camera.frame_rate_hz = {:.6g} ({} frames between capture and release)",
+                       std::floor(kMostFramesUnderway * 1e4 / rate_hz) / 10, rate_hz, kMostFramesUnderway),
+           fmt::format("{:.6g}", latency_s * 1e3));
   }
 
   // What an ECG device has no input for is refused where it is asked for, or else where the device is named.

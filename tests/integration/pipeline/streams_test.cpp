@@ -37,6 +37,7 @@ struct Streams {
   bool frames = true;
   Duration clock_period{0};
   Duration lead{0};
+  Duration latency = milliseconds(50);
 };
 
 struct Published {
@@ -51,6 +52,7 @@ Published lockstep(const Streams& streams, Duration frames_for = Duration::max()
   s.pipeline.frame_stream = streams.frames;
   s.pipeline.clock_period = streams.clock_period;
   s.pipeline.lead = streams.lead;
+  s.pipeline.latency = streams.latency;
   Pipeline pipeline(s.pipeline);
   CollectedSurfaces collected;
   LockstepRuntime runtime(pipeline, s.identity, s.utc_minus_monotonic, collected);
@@ -123,8 +125,8 @@ TEST(ReleaseStreams, TheClockBesideThemChangesNothingOfTheFramesSurfaces) {
 
 // The clock's surface of nearly the same instant: the same motion, and hardly another covariance, though that is
 // interpolated.
-TEST(ReleaseStreams, BothStreamsTellTheSameSurface) {
-  const Published both = lockstep({true, kPeriod, Duration(0)});
+void expect_the_same_surface(Duration latency) {
+  const Published both = lockstep({true, kPeriod, Duration(0), latency});
   const std::vector<CollectedSurface>& clock = both.clock;
   int compared = 0;
   int alike = 0;
@@ -148,6 +150,26 @@ TEST(ReleaseStreams, BothStreamsTellTheSameSurface) {
   }
   EXPECT_GT(compared, 100);
   EXPECT_GT(alike, 0.9 * compared);
+}
+
+TEST(ReleaseStreams, BothStreamsTellTheSameSurface) { expect_the_same_surface(milliseconds(50)); }
+
+// When a frame is released the next five have been mapped.
+TEST(ReleaseStreams, BothStreamsTellTheSameSurfaceWhenTheLatencyIsManyFrames) {
+  expect_the_same_surface(milliseconds(200));
+}
+
+TEST(ReleaseStreams, WhereTheCameraWasIsToldWhateverTheLatency) {
+  const auto known = [](Duration latency) {
+    int count = 0;
+    for (const CollectedSurface& s : lockstep({true, Duration(0), Duration(0), latency}).frames) {
+      count += s.head.camera_pose_known ? 1 : 0;
+    }
+    return count;
+  };
+  const int usual = known(milliseconds(50));
+  EXPECT_GT(usual, 100);
+  EXPECT_GE(known(milliseconds(200)), usual);
 }
 
 TEST(ReleaseStreams, WhenFramesStopTheClockSaysSoAndItsSurfacesKeepTheirAge) {

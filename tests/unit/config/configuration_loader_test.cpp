@@ -300,6 +300,11 @@ INSTANTIATE_TEST_SUITE_P(
               "test.toml:5:11: key 'features.maximum': expected what dds.maximum_MB_per_s = 50 allows "
               "(features.maximum of at "
               "most 197), got 248.96 MB/s of surfaces with 1000 features, 2000 of them a second"},
+        Wrong{
+            "MoreFramesUnderwayThanAreKept",
+            "version = 1\n[pipeline]\nlatency_ms = 1000\n[camera]\nframe_rate_hz = 300\n",
+            "test.toml:3:14: key 'pipeline.latency_ms': expected at most 800 at camera.frame_rate_hz = 300 (240 frames "
+            "between capture and release), got 1000"},
         Wrong{"BudgetBeyondLatency", "version = 1\n[pipeline]\nbudget_ms = 50\n",
               "test.toml:3:13: key 'pipeline.budget_ms': expected less than latency_ms (50), got 50"},
         Wrong{"QuaternionNotUnit", "version = 1\n[tracker]\nhand_eye_rotation_SC_wxyz = [1, 1, 0, 0]\n",

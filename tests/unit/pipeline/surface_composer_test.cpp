@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <utility>
 
 #include "core/phase/cardiac_clock_tracker.hpp"
 
@@ -36,11 +37,17 @@ FeatureSnapshot feature(std::uint32_t id, double amplitude_mm) {
   return snapshot;
 }
 
+constexpr Release kRelease{100, Instant(milliseconds(9150)), Instant(milliseconds(9200)), false};
+
+// Evaluated at the release of its own frame and at those of the two before it, 30 ms apart.
 ShardSnapshot shard(std::uint64_t frame_sequence, std::initializer_list<FeatureSnapshot> features) {
   ShardSnapshot snapshot;
   snapshot.any = true;
   snapshot.frame_sequence = frame_sequence;
-  snapshot.release_sequences = {frame_sequence, frame_sequence - 1, frame_sequence - 2};
+  for (std::size_t i = 0; i < kReleasesCovered; ++i) {
+    const auto frames = static_cast<int>(frame_sequence + i) - static_cast<int>(kRelease.frame_sequence) - 2;
+    snapshot.instants[i] = kRelease.deadline + milliseconds(30 * frames);
+  }
   snapshot.features = features;
   return snapshot;
 }
@@ -51,8 +58,6 @@ ComposerSettings settings() {
   s.maximum_features = 8;
   return s;
 }
-
-constexpr Release kRelease{100, Instant(milliseconds(9150)), Instant(milliseconds(9200)), false};
 
 TEST(SurfaceComposer, BreathingIsPartOfPositionVelocityAndCovariance) {
   ComposerSettings with_breath = settings();
@@ -116,8 +121,8 @@ TEST(SurfaceComposer, EvaluatesPositionAndVelocityAtTheValidTimesPhase) {
 TEST(SurfaceComposer, SaysWhereTheCameraWasAtTheReleasesOwnCaptureOrThatItIsNotKnown) {
   SurfaceComposer composer(settings());
   ShardSnapshot snapshot = shard(101, {feature(1, 4.0)});
-  snapshot.cameras[0] = {true, {Matrix3d::Identity(), Vector3d(1, 2, 3)}};
-  snapshot.cameras[1] = {true, {Matrix3d::Identity(), Vector3d(4, 5, 6)}};  // of frame 100, which is released
+  snapshot.cameras[0] = {101, {true, {Matrix3d::Identity(), Vector3d(1, 2, 3)}}};
+  snapshot.cameras[1] = {100, {true, {Matrix3d::Identity(), Vector3d(4, 5, 6)}}};  // of what is released
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
   const CardiacClock clock = steady_clock();
   const CameraPlace known = composer.compose(kRelease, clock, RespiratoryClock{}, view).camera;
@@ -290,6 +295,74 @@ TEST(SurfaceComposer, APhaseThatTheImagesAloneCarryDegradesTheSurface) {
   EXPECT_EQ(sample.reason, SurfaceReason::kPhaseFromImage);
 }
 
+// The frames of this run are counted from one again, those of the run before were many.
+TEST(SurfaceComposer, AReleaseBetweenThoseThatWereEvaluatedGetsTheCovarianceBetween) {
+  SurfaceComposer composer(settings());
+  FeatureSnapshot shown = feature(1, 0.0);
+  for (std::size_t i = 0; i < kReleasesCovered; ++i) {
+    shown.covariances_W_mm2[i] = 0.01 * static_cast<double>(i + 1) * Matrix3d::Identity();
+  }
+  const ShardSnapshot snapshot = shard(102, {shown});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  const auto variance_at = [&](int ms, bool missing = false) {
+    Release release = kRelease;
+    release.deadline = at_ms(ms);
+    release.frame_missing = missing;
+    return composer.compose(release, steady_clock(), RespiratoryClock{}, view).features[0].covariance_W_mm2(2, 2);
+  };
+  EXPECT_NEAR(variance_at(9200), 0.01, 1e-12);
+  EXPECT_NEAR(variance_at(9215), 0.015, 1e-12);
+  EXPECT_NEAR(variance_at(9260), 0.03, 1e-12);
+  EXPECT_NEAR(variance_at(9261), 0.25, 1e-12);
+  EXPECT_NEAR(variance_at(9230, true), 0.25, 1e-12) << "no frame: the largest deviation over the cycle";
+}
+
+TEST(SurfaceComposer, AnEarlierRunsMapIsALateUpdateHoweverItsFramesWereCounted) {
+  for (const ReleaseStream stream : kReleaseStreams) {
+    SurfaceComposer composer(settings());
+    ShardSnapshot snapshot = shard(5000, {feature(1, 4.0)});
+    snapshot.recalled = true;
+    snapshot.capture = at_ms(3000);
+    const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+    Release release = kRelease;
+    release.frame_sequence = 3;
+    release.stream = stream;
+    const SurfaceSample& sample = composer.compose(release, steady_clock(), RespiratoryClock{}, view);
+    EXPECT_EQ(sample.reason, SurfaceReason::kUpdateLate);
+    EXPECT_TRUE(sample.update_late);
+    EXPECT_EQ(sample.features[0].reason, FeatureReason::kNotObserved);
+    if (stream == ReleaseStream::kClock) {
+      EXPECT_EQ(sample.release.capture, at_ms(3000)) << "its age shows";
+    }
+  }
+}
+
+TEST(SurfaceComposer, OneShardWithAnEarlierRunsMapMakesTheWholeLate) {
+  const ShardSnapshot mapped = shard(3, {feature(1, 4.0)});
+  ShardSnapshot recalled = shard(5000, {feature(2, 4.0)});
+  recalled.recalled = true;
+  Release release = kRelease;
+  release.frame_sequence = 3;
+  for (const auto& view :
+       {std::array{&mapped, &std::as_const(recalled)}, std::array{&std::as_const(recalled), &mapped}}) {
+    SurfaceComposer composer(settings());
+    EXPECT_TRUE(composer.compose(release, steady_clock(), RespiratoryClock{}, view).update_late);
+  }
+}
+
+TEST(SurfaceComposer, ASampleThatIsNotSentLeavesNoGapInTheNumbers) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  const auto number = [&] {
+    return composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view).sample_sequence;
+  };
+  EXPECT_EQ(number(), 1U);
+  EXPECT_EQ(number(), 2U);
+  composer.take_back();
+  EXPECT_EQ(number(), 2U);
+}
+
 // Stream "clock": what is told by then is frame 100, and a grid's release at 9210 ms.
 constexpr Release kTick{100, Instant(milliseconds(9150)), Instant(milliseconds(9210)), false, ReleaseStream::kClock};
 
@@ -303,7 +376,7 @@ ShardSnapshot clock_shard(std::uint64_t frame_sequence) {
   ShardSnapshot snapshot = shard(frame_sequence, {shown});
   snapshot.capture = at_ms(9150 + 30 * (static_cast<int>(frame_sequence) - 100));
   for (int i = 0; i < static_cast<int>(kInstantsCovered); ++i) {
-    snapshot.instants[static_cast<std::size_t>(i)] = at_ms(9200 + 20 * i);
+    snapshot.instants[kReleasesCovered + static_cast<std::size_t>(i)] = at_ms(9200 + 20 * i);
   }
   return snapshot;
 }
@@ -328,8 +401,8 @@ TEST(SurfaceComposerClock, TakesTheCovarianceBetweenTheInstantsThatWereEvaluated
 TEST(SurfaceComposerClock, BelongsToTheNewestFrameThatItRestsOn) {
   SurfaceComposer composer(settings());
   ShardSnapshot snapshot = clock_shard(101);
-  snapshot.cameras[0] = {true, {Matrix3d::Identity(), Vector3d(1, 2, 3)}};
-  snapshot.cameras[1] = {true, {Matrix3d::Identity(), Vector3d(4, 5, 6)}};
+  snapshot.camera = {true, {Matrix3d::Identity(), Vector3d(1, 2, 3)}};
+  snapshot.cameras[0] = {100, {true, {Matrix3d::Identity(), Vector3d(4, 5, 6)}}};
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
   const SurfaceSample& sample = composer.compose(kTick, steady_clock(), RespiratoryClock{}, view);
   EXPECT_EQ(sample.state, SurfaceState::kGood);
