@@ -26,7 +26,7 @@ Pipeline::Pipeline(const PipelineSettings& settings)
       finder_(settings, counters_),
       starter_(settings, slots_),
       mapper_(settings, slots_, cells_, team_, finder_, starter_, phase_cells_, counters_),
-      plan_({settings.latency, settings.frame_stream, settings.clock_period}),
+      plan_({settings.latency, settings.frame_stream, settings.clock_period, settings.lead + settings.validity}),
       composers_{SurfaceComposer(composer_settings(settings)), SurfaceComposer(composer_settings(settings))},
       publisher_view_(cells_.size()),
       model_view_(cells_.size()) {
@@ -90,8 +90,21 @@ void Pipeline::drain_stamps(Instant now) noexcept {
 
 void Pipeline::leave_out_missed(Instant now) noexcept {
   const RealtimeScope realtime;
-  const std::uint64_t missed = plan_.leave_out_missed(now);
-  if (missed > 0) counters_.of(ReleaseStream::kClock).releases_missed.add(missed);
+  const MissedReleases missed = plan_.leave_out_missed(now);
+  for (const ReleaseStream stream : kReleaseStreams) {
+    if (missed[index_of(stream)] > 0) counters_.of(stream).releases_missed.add(missed[index_of(stream)]);
+  }
+}
+
+void Pipeline::take_back(const SurfaceSample& sample) noexcept {
+  const RealtimeScope realtime;
+  StreamCounters& stream = counters_.of(sample.release.stream);
+  const auto one_less = [](Counter& counter) { counter.set(counter.get() - 1); };
+  one_less(stream.samples);
+  if (sample.release.frame_missing) one_less(stream.samples_without_frame);
+  if (sample.update_late) one_less(stream.samples_from_late_update);
+  stream.releases_missed.add();
+  composers_[index_of(sample.release.stream)].take_back();
 }
 
 const SurfaceSample& Pipeline::compose(const Release& release) noexcept {

@@ -60,6 +60,9 @@ class Pipeline {
   void leave_out_missed(Instant now) noexcept;
   // Publisher thread: the surface of one release, with all that is known now. Valid until the next call for its stream.
   [[nodiscard]] const SurfaceSample& compose(const Release& release) noexcept;
+  // Publisher thread: what was composed last for its stream is not sent, its time has passed. It counts as missed, and
+  // its number is given again.
+  void take_back(const SurfaceSample& sample) noexcept;
 
   // Status thread: the clock as it stands, with what the image makes of the running cycle.
   [[nodiscard]] CardiacClock status_clock(Instant now) noexcept;

@@ -14,7 +14,7 @@ struct StreamCounters {
   Counter samples;
   Counter samples_without_frame;
   Counter samples_from_late_update;
-  Counter releases_missed;  // left out, because the one after was due as well
+  Counter releases_missed;  // left out, because it was too late for them, see ReleasePlan
   LatencyHistogram release_tardiness;
   LatencyHistogram dds_write;
 };

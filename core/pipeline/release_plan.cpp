@@ -1,11 +1,18 @@
 #include "core/pipeline/release_plan.hpp"
 
+#include <utility>
+
 namespace perimap {
 
 bool ReleasePlan::on_frame(const FrameStamp& stamp, Instant now) noexcept {
-  // What nobody takes off the schedule would fill it between two releases of a slow clock.
-  if (!settings_.frame_stream) let_frames_come_due(now);
-  return frames_.on_frame(stamp, now);
+  if (settings_.frame_stream) {
+    // Up to the last frame that is known: what comes after it may be told by the stamps to come.
+    while (frames_.pending() && missed(frames_.next(), now)) leave_out_frame();
+  } else {
+    // What nobody takes off the schedule would fill it between two releases of a slow clock.
+    let_frames_come_due(stamp.arrival);
+  }
+  return frames_.on_frame(stamp);
 }
 
 std::optional<Release> ReleasePlan::next() const noexcept {
@@ -29,12 +36,27 @@ Release ReleasePlan::take() noexcept {
   return {due_.frame_sequence, due_.capture, release.deadline, due_.frame_missing, ReleaseStream::kClock};
 }
 
-std::uint64_t ReleasePlan::leave_out_missed(Instant now) noexcept {
+MissedReleases ReleasePlan::leave_out_missed(Instant now) noexcept {
+  while (settings_.frame_stream && missed(frames_.next(), now)) leave_out_frame();
   const std::optional<Instant> grid = next_on_grid();
-  if (!grid || !grid_begun_ || now < *grid + settings_.clock_period) return 0;
-  const auto missed = (now - *grid) / settings_.clock_period;
-  last_on_grid_ += missed * settings_.clock_period;
-  return static_cast<std::uint64_t>(missed);
+  if (grid && grid_begun_ && now >= *grid + settings_.clock_period) {
+    const auto passed = (now - *grid) / settings_.clock_period;
+    last_on_grid_ += passed * settings_.clock_period;
+    missed_[index_of(ReleaseStream::kClock)] += static_cast<std::uint64_t>(passed);
+  }
+  return std::exchange(missed_, {});
+}
+
+bool ReleasePlan::missed(const std::optional<Release>& frame, Instant now) const noexcept {
+  if (!frame) return false;
+  const Duration period = frames_.period();
+  return stale(*frame, now) || (period > Duration(0) && now - frame->deadline >= kMostTogether * period);
+}
+
+void ReleasePlan::leave_out_frame() noexcept {
+  any_due_ = true;
+  due_ = frames_.take();
+  ++missed_[index_of(ReleaseStream::kFrame)];
 }
 
 std::optional<Instant> ReleasePlan::next_on_grid() const noexcept {

@@ -1,20 +1,26 @@
 // Which surface is due next, of the frames' and of the clock's.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
 #include "core/pipeline/release_schedule.hpp"
+#include "core/pipeline/release_stream.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
 
 struct ReleasePlanSettings {
-  Duration latency{0};       // L of the frames' releases
-  bool frame_stream = true;  // these are published
-  Duration clock_period{0};  // the clock's releases fall on the multiples of it; 0: there are none
+  Duration latency{0};                // L of the frames' releases
+  bool frame_stream = true;           // these are published
+  Duration clock_period{0};           // the clock's releases fall on the multiples of it; 0: there are none
+  Duration usable = Duration::max();  // a surface serves nobody longer after its release: lead and validity
 };
+
+// How many releases of each stream are left out.
+using MissedReleases = std::array<std::uint64_t, kReleaseStreams.size()>;
 
 // The frames' releases, as ReleaseSchedule has them, and those on the clock's grid, in order of time; of two at the
 // same instant the frame's comes first. A release of the clock tells which frame's surface ought to be known by then:
@@ -24,7 +30,7 @@ class ReleasePlan {
  public:
   explicit ReleasePlan(const ReleasePlanSettings& settings) noexcept : settings_(settings), frames_(settings.latency) {}
 
-  // As ReleaseSchedule::on_frame().
+  // As ReleaseSchedule::on_frame(). `now` may be long after the arrival, when the publisher was held up.
   bool on_frame(const FrameStamp& stamp, Instant now) noexcept;
   // As ReleaseSchedule::resume().
   void resume(Instant last_capture, std::uint64_t last_sequence, Duration period, Instant now) noexcept {
@@ -39,8 +45,13 @@ class ReleasePlan {
   // Takes it off the plan. Requires next().
   Release take() noexcept;
 
-  // Leaves out the clock's releases after which another one has come due as well. Returns how many those are.
-  std::uint64_t leave_out_missed(Instant now) noexcept;
+  // Nobody can use this release's surface any more.
+  [[nodiscard]] bool stale(const Release& release, Instant now) const noexcept {
+    return now - release.deadline > settings_.usable;
+  }
+  // Leaves out what it is too late for: the clock's releases after which another one has come due as well; of the
+  // frames' those that are stale, and the oldest of more than kMostTogether. Returns how many since the last call.
+  MissedReleases leave_out_missed(Instant now) noexcept;
 
   // Frames that have come are still to be released, or to be told of by the clock.
   [[nodiscard]] bool pending() const noexcept { return frames_.pending(); }
@@ -48,7 +59,12 @@ class ReleasePlan {
   [[nodiscard]] const Release& last_due() const noexcept { return due_; }
   [[nodiscard]] Duration frame_period() const noexcept { return frames_.period(); }
 
+  // Frames' releases that have come due meanwhile follow one upon the other: half of what readers keep.
+  static constexpr int kMostTogether = 8;
+
  private:
+  [[nodiscard]] bool missed(const std::optional<Release>& frame, Instant now) const noexcept;
+  void leave_out_frame() noexcept;
   [[nodiscard]] std::optional<Instant> next_on_grid() const noexcept;
   void let_frames_come_due(Instant until) noexcept;
 
@@ -58,6 +74,7 @@ class ReleasePlan {
   Release due_;
   bool grid_begun_ = false;
   Instant last_on_grid_;
+  MissedReleases missed_{};  // not told yet
 };
 
 }  // namespace perimap

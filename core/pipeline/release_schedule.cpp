@@ -45,7 +45,7 @@ void ReleaseSchedule::fit(Duration period) noexcept {
   }
 }
 
-bool ReleaseSchedule::on_frame(const FrameStamp& stamp, Instant now) noexcept {
+bool ReleaseSchedule::on_frame(const FrameStamp& stamp) noexcept {
   const bool backwards = have_fit_ && stamp.capture <= fitted_.capture;
   // Judged by the period that the release was taken by. That of a frame was taken for no other frame.
   const Duration around = last_missing_ ? period_ / 2 : Duration(0);
@@ -53,7 +53,7 @@ bool ReleaseSchedule::on_frame(const FrameStamp& stamp, Instant now) noexcept {
   const bool near_taken = taken && stamp.capture > last_capture_ - around;
   fit(stamp);
   const Instant deadline = stamp.capture + latency_;
-  if (backwards || taken || now > deadline || head_ - tail_ == kCapacity) {
+  if (backwards || taken || stamp.arrival > deadline || head_ - tail_ == kCapacity) {
     // Predictions go on from the true frame times, not from the ones fitted before this frame was known.
     if (near_taken) last_capture_ = stamp.capture;
     return false;

@@ -29,9 +29,10 @@ class ReleaseSchedule {
  public:
   explicit ReleaseSchedule(Duration latency) noexcept : latency_(latency) {}
 
-  // A frame's stamps, as soon as the frame has arrived. False when it comes too late: its release time has passed
-  // (`now` is past it, or a later one was taken); it then only helps to fit the frame times.
-  bool on_frame(const FrameStamp& stamp, Instant now) noexcept;
+  // A frame's stamps, in order of arrival. False when it comes too late: it arrived after its release time, or a later
+  // release was taken; it then only helps to fit the frame times. One that arrived in time is released as that frame
+  // however late this is called.
+  bool on_frame(const FrameStamp& stamp) noexcept;
 
   // Before the first frame: releases go on as after a frame of then, on its frame times, the next one after `now`.
   void resume(Instant last_capture, std::uint64_t last_sequence, Duration period, Instant now) noexcept;

@@ -126,9 +126,14 @@ void LiveRuntime::run_publisher() {
     sleep_until(next->deadline - kComposing);
     const Release release = pipeline_.plan().take();
     WireSurface& wire = wire_surfaces_[index_of(release.stream)];
-    const perimap_Surface& sample = wire.fill(pipeline_.compose(release), utc_minus_monotonic());
+    const SurfaceSample& surface = pipeline_.compose(release);
+    const perimap_Surface& sample = wire.fill(surface, utc_minus_monotonic());
     wait_until_exactly(release.deadline);
     const Instant ready = MonotonicClock::now();
+    if (pipeline_.plan().stale(release, ready)) {
+      pipeline_.take_back(surface);
+      continue;
+    }
     publication_.surface(sample);
     StreamCounters& stream = counters.of(release.stream);
     stream.dds_write.add(MonotonicClock::now() - ready);

@@ -225,5 +225,51 @@ TEST(ReleaseStreams, LiveEveryReleaseOfTheGridIsPublishedOrCountedAsMissed) {
       << "frames are mapped as with their own releases";
 }
 
+// Publication that is held up once, as a process that was stopped.
+class HeldUpOnce final : public Publication {
+ public:
+  explicit HeldUpOnce(Duration by) : by_(by) {}
+  void surface(const perimap_Surface& sample) override {
+    if (++count_ == 30) std::this_thread::sleep_for(by_);
+    collected_.surface(sample);
+  }
+  void surface_model(const perimap_SurfaceModel& /*model*/) override {}
+  void phase(const perimap_Phase& /*phase*/) override {}
+  void status(const perimap_Status& /*status*/) override {}
+  [[nodiscard]] std::vector<CollectedSurface> frames() const { return collected_.of(ReleaseStream::kFrame); }
+
+ private:
+  Duration by_;
+  int count_ = 0;
+  CollectedSurfaces collected_;
+};
+
+TEST(ReleaseStreams, LiveAPublisherThatWasHeldUpLeavesOutWhatIsStaleAndCountsIt) {
+  constexpr Duration kHeldUp = milliseconds(1500);
+  ReplaySetup s = setup();
+  const Duration usable = s.pipeline.lead + s.pipeline.validity;
+  Pipeline pipeline(s.pipeline);
+  HeldUpOnce publication(kHeldUp);
+  RuntimeSettings settings;
+  settings.lock_memory = false;
+  LiveRuntime runtime(pipeline, settings, publication);
+  runtime.start();
+  ReplayFeeder feeder(std::move(s.reader), SensorIntake{&pipeline.entrance()});
+  feeder.start(runtime.threads());
+  while (!feeder.ended()) std::this_thread::sleep_for(milliseconds(50));
+  runtime.end_of_sources();
+  while (!runtime.all_released()) std::this_thread::sleep_for(milliseconds(10));
+  feeder.stop();
+  runtime.stop();
+  const std::vector<CollectedSurface> frames = publication.frames();
+  const StreamCounters& counters = pipeline.counters().of(ReleaseStream::kFrame);
+  ASSERT_GT(frames.size(), 31U);
+  const std::int64_t gap = frames[30].head.release_time_ns - frames[29].head.release_time_ns;
+  EXPECT_GE(gap, (kHeldUp - usable).count()) << "nothing is sent of which the validity has passed";
+  EXPECT_GT(counters.releases_missed.get(), 30U) << "at 30 frames/s";
+  EXPECT_EQ(counters.samples.get(), frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i].head.sample_sequence, i + 1);
+}
+
 }  // namespace
 }  // namespace perimap

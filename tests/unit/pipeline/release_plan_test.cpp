@@ -117,14 +117,77 @@ TEST(ReleasePlan, AClockSlowerThanTheFramesLosesNoneOfThem) {
 
 TEST(ReleasePlan, ReleasesThatAnotherHasCaughtUpWithAreLeftOutAndCounted) {
   ReleasePlan plan({kLatency, false, milliseconds(10)});
+  const auto left_out = [&](int ms) { return plan.leave_out_missed(at_ms(ms))[index_of(ReleaseStream::kClock)]; };
   run(plan, 10, 320);
   EXPECT_EQ(plan.next()->deadline, at_ms(330));
-  EXPECT_EQ(plan.leave_out_missed(at_ms(339)), 0U) << "late, but its turn still";
-  EXPECT_EQ(plan.leave_out_missed(at_ms(340)), 1U);
-  EXPECT_EQ(plan.leave_out_missed(at_ms(340)), 0U) << "counted once";
+  EXPECT_EQ(left_out(339), 0U) << "late, but its turn still";
+  EXPECT_EQ(left_out(340), 1U);
+  EXPECT_EQ(left_out(340), 0U) << "counted once";
   EXPECT_EQ(plan.next()->deadline, at_ms(340));
-  EXPECT_EQ(plan.leave_out_missed(at_ms(395)), 5U);
+  EXPECT_EQ(left_out(395), 5U);
   EXPECT_EQ(plan.take().deadline, at_ms(390)) << "on the grid as before";
+}
+
+// Ten frames in time, then the publisher is held up: what arrives until `now_ms` is told of at that instant, at once.
+ReleasePlan held_up(const ReleasePlanSettings& settings, int now_ms) {
+  ReleasePlan plan(settings);
+  run(plan, 10, 30 * 9 + 50);
+  for (int i = 10; 30 * i + 12 <= now_ms; ++i) {
+    EXPECT_TRUE(plan.on_frame(frame(static_cast<std::uint64_t>(i), 30 * i), at_ms(now_ms))) << i;
+  }
+  return plan;
+}
+
+TEST(ReleasePlan, FramesThatArrivedWhileThePublisherWasHeldUpAreReleasedAsTheFramesTheyAre) {
+  ReleasePlan plan = held_up({kLatency, true, Duration(0), milliseconds(200)}, 470);
+  EXPECT_EQ(plan.leave_out_missed(at_ms(470)), MissedReleases{});
+  for (std::uint64_t i = 10; i <= 15; ++i) {
+    const Release release = plan.take();
+    EXPECT_FALSE(release.frame_missing) << i;
+    EXPECT_EQ(release.frame_sequence, i);
+  }
+}
+
+TEST(ReleasePlan, TheClockTellsOfTheFramesThatArrivedWhileThePublisherWasHeldUp) {
+  for (const int now_ms : {470, 5000}) {
+    ReleasePlan plan = held_up({kLatency, false, milliseconds(10), milliseconds(200)}, now_ms);
+    EXPECT_GT(plan.leave_out_missed(at_ms(now_ms))[index_of(ReleaseStream::kClock)], 0U);
+    const Release release = plan.take();
+    EXPECT_FALSE(release.frame_missing);
+    EXPECT_EQ(release.frame_sequence, static_cast<std::uint64_t>((release.deadline - at_ms(50)) / milliseconds(30)));
+  }
+}
+
+TEST(ReleasePlan, FramesReleasesThatNobodyCanUseAnyMoreAreLeftOutAndCounted) {
+  ReleasePlan plan = held_up({kLatency, true, Duration(0), milliseconds(200)}, 10'270);
+  const auto left_out = plan.leave_out_missed(at_ms(10'270))[index_of(ReleaseStream::kFrame)];
+  ASSERT_EQ(plan.next()->deadline, at_ms(10'070)) << "its surface may be used until now";
+  EXPECT_EQ(left_out, (10'070 - 350) / 30U);
+  EXPECT_EQ(plan.leave_out_missed(at_ms(10'270)), MissedReleases{}) << "counted once";
+  int sent = 0;
+  for (; plan.next()->deadline <= at_ms(10'270); ++sent) EXPECT_FALSE(plan.take().frame_missing);
+  EXPECT_EQ(sent, 7);
+}
+
+TEST(ReleasePlan, WhenNoFrameHasComeEitherTheReleasesWithoutOneAreLeftOutAsWell) {
+  ReleasePlan plan({kLatency, true, milliseconds(10), milliseconds(200)});
+  run(plan, 10, 30 * 9 + 50);
+  const MissedReleases missed = plan.leave_out_missed(at_ms(10'270));
+  EXPECT_EQ(missed[index_of(ReleaseStream::kFrame)], 324U);
+  EXPECT_GT(missed[index_of(ReleaseStream::kClock)], 900U);
+  EXPECT_TRUE(plan.next()->frame_missing);
+}
+
+// However long a surface may be used: more at once than a reader keeps would be lost to it.
+TEST(ReleasePlan, NoMoreReleasesThanAReaderKeepsFollowOneUponTheOther) {
+  ReleasePlan plan = held_up({kLatency, true, Duration(0), std::chrono::seconds(5)}, 2000);
+  EXPECT_GT(plan.leave_out_missed(at_ms(2000))[index_of(ReleaseStream::kFrame)], 40U);
+  int sent = 0;
+  while (plan.next()->deadline <= at_ms(2000)) {
+    plan.take();
+    ++sent;
+  }
+  EXPECT_EQ(sent, ReleasePlan::kMostTogether);
 }
 
 TEST(ReleasePlan, AfterARestartTheClockBeginsWithTheNextReleaseThatIsExpected) {

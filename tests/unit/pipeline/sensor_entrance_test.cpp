@@ -36,6 +36,15 @@ TEST_F(Entrance, CopiesTheRowsOfAPaddedImage) {
   EXPECT_EQ(entrance->image(frame).row(4)[5], 7);
 }
 
+TEST_F(Entrance, KeepsAMinutesStampsForAPublisherThatIsHeldUp) {
+  for (std::uint64_t i = 0; i < 3600; ++i) static_cast<void>(entrance->push_frame(stamp(i), image));
+  FrameStamp told;
+  for (std::uint64_t i = 0; i < 3600; ++i) {
+    ASSERT_TRUE(entrance->pop_stamp(told));
+    ASSERT_EQ(told.sequence, i);
+  }
+}
+
 TEST_F(Entrance, DropsAndCountsWhenTheMapperGivesNoBufferBackButStillAnnouncesTheFrame) {
   int taken = 0;
   for (std::uint64_t i = 0; i < 20; ++i) taken += entrance->push_frame(stamp(i), image) ? 1 : 0;
