@@ -57,13 +57,15 @@ class BatchProblem {
         n_(deviations.size()),
         deviations_(deviations),
         scaled_basis_(n_, static_cast<Index>(observations.size())),
+        R_(observations.size()),
+        R_inverse_(observations.size()),
         used_(observations.size(), 1),
         residual2_(observations.size(), 0.0),
         weight_(observations.size(), 0.0) {
     for (Index k = 0; k < count(); ++k) {
       const Observation& observation = observations_[static_cast<std::size_t>(k)];
       scaled_basis_.col(k) = deviations.cwiseProduct(observation.b);
-      R_inverse_.emplace_back(observation.R.inverse());
+      set_covariance(k, observation.R);
     }
     g_.resize(count(), 3);
     G_.resize(count(), 6);
@@ -77,8 +79,7 @@ class BatchProblem {
   void widen(const VectorXd& y) {
     const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>> coefficients(y.data(), n_, 3);
     for (Index k = 0; k < count(); ++k) {
-      const auto index = static_cast<std::size_t>(k);
-      const Observation& observation = observations_[index];
+      const Observation& observation = observations_[static_cast<std::size_t>(k)];
       if (observation.b_deviation.size() != n_) continue;
       Vector2d z;
       Matrix23d dz_dq;
@@ -86,10 +87,12 @@ class BatchProblem {
       if (model_.predict(observation.X_CW * p, z, &dz_dq) != ProjectionStatus::kOk) continue;
       const Vector3d displaced = coefficients.transpose() * deviations_.cwiseProduct(observation.b_deviation);
       const Vector2d spread = dz_dq * (observation.X_CW.R * displaced);
-      R_inverse_[index] = (observation.R + spread * spread.transpose()).inverse();
+      set_covariance(k, observation.R + spread * spread.transpose());
     }
   }
 
+  // What each observation counts with, without the variance scale.
+  [[nodiscard]] const std::vector<Matrix2d>& R() const noexcept { return R_; }
   // Every R times this; 1 at first.
   void set_variance_scale(double scale) noexcept { variance_scale_ = scale; }
   // Which observations count, 1 or 0; the caller decides.
@@ -162,6 +165,12 @@ class BatchProblem {
   }
 
  private:
+  void set_covariance(Index k, const Matrix2d& R) {
+    const auto index = static_cast<std::size_t>(k);
+    R_[index] = R;
+    R_inverse_[index] = R.inverse();
+  }
+
   std::span<const Observation> observations_;
   const Model& model_;
   Vector3d prior_mean_;
@@ -169,6 +178,7 @@ class BatchProblem {
   Index n_;
   Basis deviations_;
   MatrixXd scaled_basis_;  // n x K: sigma o b of each observation
+  std::vector<Matrix2d> R_;
   std::vector<Matrix2d> R_inverse_;
   Eigen::Matrix<double, Eigen::Dynamic, 3> g_;  // J^T R^-1 r w
   Eigen::Matrix<double, Eigen::Dynamic, 6> G_;  // xx, yx, zx, yy, zy, zz of J^T R^-1 J w
@@ -388,6 +398,7 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
   if (!estimate.x.allFinite() || !estimate.P.allFinite()) return refuse(BatchStatus::kDiverged);
   outcome.inlier = problem.used();
   outcome.inliers = count_inliers();
+  outcome.R = problem.R();
   outcome.status = BatchStatus::kOk;
   return outcome;
 }

@@ -49,6 +49,7 @@ struct BatchOutcome {
   double robust_cost = 0.0;          // with the Student-t loss, of the start that won; map_cost when not robust
   std::vector<double> weights;       // per observation: the Student-t weight at its solution, about 1 for a good one
   std::vector<std::uint8_t> inlier;  // per observation: 1 when used in the estimate
+  std::vector<Matrix2d> R;           // per observation: what it counted with there, the phase's deviation included
   int inliers = 0;
   int iterations = 0;  // over all starts and losses
 

@@ -70,7 +70,7 @@ void BatchStarter::begin_slow_error(FeatureSlot& slot) const noexcept {
       continue;
     }
     term.b = observation.b;
-    term.R = observation.R;
+    term.R = start.outcome.R[i];
     term.M = position_gain(estimate.P, observation.b);
     slot.slow_error->add_of_batch(term);
   }
