@@ -39,6 +39,9 @@ enum class HealthState : std::uint8_t {
 
 enum class HealthAction : std::uint8_t { kNone, kInflate, kStartAnew };
 
+// What kInflate asks for: diffusion of this deviation.
+inline constexpr double kInflation_mm = 1.0;
+
 class FeatureHealth {
  public:
   explicit FeatureHealth(const FeatureHealthSettings& settings = {}) noexcept;

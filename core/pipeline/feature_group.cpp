@@ -11,7 +11,6 @@
 namespace perimap {
 namespace {
 
-constexpr double kInflation_mm = 1.0;
 // A linear law makes 0.3 to 1 mm of a warped heart, as the lengths of its cycles vary.
 constexpr double kDoubt_mm = 1.0;
 constexpr int kRefusalsBeforeRelock = 10;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <random>
 #include <thread>
@@ -9,6 +11,7 @@
 
 #include "core/pipeline/batch_starter.hpp"
 #include "core/pipeline/feature_life.hpp"
+#include "core/pipeline/match_covariance.hpp"
 
 namespace perimap {
 namespace {
@@ -365,6 +368,69 @@ TEST_F(Stages, WhatIsPredictedAndShownIsWhatTheBankHolds) {
   EXPECT_EQ(snapshots[0].x, estimate.x);
   for (const Matrix3d& covariance : snapshots[0].covariances_W_mm2) {
     EXPECT_LT((covariance - estimate.position_covariance(job.evaluated.b[0])).norm(), 1e-12);
+  }
+}
+
+// Two mapped features whose matches scatter by as much as they are said to; the first can be made to drift.
+struct Evidence : Stages {
+  Evidence() {
+    map_feature(0);
+    map_feature(1);
+  }
+
+  // Sideways, at a fixed phase.
+  double variance_mm2(int lane) const {
+    FeatureEstimate estimate;
+    bank->get(lane, estimate);
+    return estimate.position_covariance(basis_at(settings.estimator.layout, 1.0))(0, 0);
+  }
+
+  void learn(double drift_px_per_s) {
+    const Matrix2d R = match_covariance(0.05 * Matrix2d::Identity(), settings.estimator.pixel_deviation_px);
+    std::normal_distribution<double> scatter_px(0.0, std::sqrt(R(0, 0)));
+    next_frame();
+    drift_px += drift_px_per_s * 0.033;
+    found_at({320 + drift_px + scatter_px(generator), 240 + scatter_px(generator)}, 0);
+    found_at({320 + scatter_px(generator), 240 + scatter_px(generator)}, 1);
+    ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+  }
+
+  std::mt19937 generator{5};
+  double drift_px = 0.0;
+};
+
+TEST_F(Evidence, ThatNothingFitsInflatesTheCovarianceOnce) {
+  std::normal_distribution<double> anywhere_px(0.0, 3.0);
+  int inflations = 0;
+  for (LifeEvent event = LifeEvent::kNone; event == LifeEvent::kNone;) {
+    const double before_mm2 = variance_mm2(0);
+    next_frame();
+    found_at({320 + anywhere_px(generator), 240 + anywhere_px(generator)});
+    event = learn_frame();
+    ASSERT_LT(job.frame->index, 600U);
+    inflations += event == LifeEvent::kNone && variance_mm2(0) > before_mm2 + kInflation_mm * kInflation_mm ? 1 : 0;
+  }
+  EXPECT_EQ(inflations, 1);
+}
+
+TEST_F(Evidence, OfADriftSwitchesProcessNoiseOnSoThatTheFilterFollows) {
+  int drifting = 0;
+  for (int i = 0; i < 900; ++i) {
+    learn(0.3);
+    drifting += slots[0].health.state() == HealthState::kDrifting ? 1 : 0;
+  }
+  EXPECT_GT(drifting, 100);
+  EXPECT_GT(slots[0].health.process_noise(), 0.0);
+  EXPECT_GT(variance_mm2(0), 2.0 * variance_mm2(1));
+}
+
+TEST_F(Evidence, ThatTheEstimateIsRightLeavesProcessNoiseOff) {
+  double before_mm2 = variance_mm2(0);
+  for (int i = 0; i < 900; ++i) {
+    learn(0.0);
+    ASSERT_EQ(slots[0].health.process_noise(), 0.0);
+    ASSERT_LE(variance_mm2(0), before_mm2);
+    before_mm2 = variance_mm2(0);
   }
 }
 
