@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "core/estimation/batch_status.hpp"
 #include "core/estimation/feature_estimate.hpp"
 #include "core/estimation/measurement_model.hpp"
 #include "core/estimation/observation.hpp"
@@ -31,15 +32,6 @@ struct BatchSettings {
   int max_iterations = 60;  // of Levenberg-Marquardt, for each loss
   // Ends the last solution: squared length of the step in standard deviations of the posterior.
   double tolerance = 1e-8;
-};
-
-enum class BatchStatus : std::uint8_t {
-  kOk,
-  kTooFewObservations,
-  kBadObservation,   // not finite, R not positive definite, a basis of another size, or the first has no ray
-  kBehindCamera,     // from no start depth is the feature visible in any observation
-  kDiverged,         // no start converged, or the solution is not finite
-  kTooManyOutliers,  // fewer inliers than min_inlier_fraction or min_observations
 };
 
 struct BatchOutcome {

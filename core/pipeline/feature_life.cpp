@@ -59,7 +59,7 @@ class Step {
       : slot_(slot), bank_(bank), feature_(feature), job_(job), model_(model), settings_(settings) {}
 
   LifeEvent tracked() noexcept {
-    if (now() - slot_.last_found_frame > kCarriedMissesAllowed) return give_up();
+    if (now() - slot_.last_found_frame > kCarriedMissesAllowed) return give_up(LifeEvent::kLostUnseen);
     slot_.held.drop_if([this](const HeldMatch& held) {
       const FrameRecord* frame = job_.history->find(held.frame_index);
       return frame == nullptr || (frame->phase.exact && !frame->phase.teaches);
@@ -85,13 +85,13 @@ class Step {
     if (!slot_.start.ready.load(std::memory_order_acquire)) {
       return now() == slot_.start.adopt_at_frame ? LifeEvent::kAdoptionLate : LifeEvent::kNone;
     }
-    if (slot_.forgotten) return give_up();
+    if (slot_.forgotten) return give_up(LifeEvent::kNone);
     const auto used = static_cast<std::uint32_t>(slot_.start.count);
     if (!slot_.start.outcome.ok()) {
-      if (++slot_.failed_starts >= kFailedStartsBeforeLost) return give_up();
+      if (++slot_.failed_starts >= kFailedStartsBeforeLost) return give_up(LifeEvent::kLostUnstarted);
       slot_.held.drop(used / 2);
       slot_.state = SlotState::kTracked;
-      return LifeEvent::kNone;
+      return LifeEvent::kStartFailed;
     }
     if (const FrameRecord* last = job_.history->find(slot_.held[used - 1].frame_index)) {
       slot_.last_observed = last->stamp.capture;
@@ -120,9 +120,8 @@ class Step {
       ++slot_.unseen_frames;
     }
     const std::uint64_t allowed = vague ? kUnobservedVagueFramesBeforeLost : kUnobservedFramesBeforeLost;
-    if (refused || slot_.unseen_frames > allowed) {
-      return give_up();
-    }
+    if (refused) return give_up(LifeEvent::kLostRefused);
+    if (slot_.unseen_frames > allowed) return give_up(LifeEvent::kLostUnseen);
     if (slot_.follows_something_else) {
       slot_.follows_something_else = false;
       if (!slot_.match_agrees) let_go(slot_, *job_.frame);
@@ -137,10 +136,10 @@ class Step {
  private:
   [[nodiscard]] std::uint64_t now() const noexcept { return job_.frame->index; }
 
-  LifeEvent give_up() noexcept {
+  LifeEvent give_up(LifeEvent why) noexcept {
     slot_.state = SlotState::kEmpty;
     bank_.clear(feature_);
-    return LifeEvent::kLost;
+    return why;
   }
 
   // The estimate explains nothing any more: gather the observations of a new start. The feature keeps its patch and its

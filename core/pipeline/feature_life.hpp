@@ -15,8 +15,12 @@ enum class LifeEvent : std::uint8_t {
   kNone,
   kStartRequested,  // slot.start is filled: hand it to housekeeping
   kAdoptionLate,    // the batch start was due at this frame and is not there
+  kStartFailed,     // slot.start.outcome says why; it is tried again with newer observations
   kStartedAnew,     // innovations stayed high: the observations of a new start are being gathered
-  kLost             // the feature was given up; the slot is empty
+  // The feature was given up; the slot is empty.
+  kLostUnseen,    // not found for too long
+  kLostRefused,   // found, but its estimate's gate refused match after match
+  kLostUnstarted  // one more start failed, too many
 };
 
 // D, last part, after the frame's learning. `bank` holds the estimate of the slot as that of `feature`.

@@ -5,6 +5,7 @@
 
 #include "core/pipeline/feature_life.hpp"
 #include "core/pipeline/feature_stages.hpp"
+#include "core/pipeline/start_progress.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
@@ -51,6 +52,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       cycle_(settings.image_alone),
       tallies_(static_cast<std::size_t>(team.size())) {
   occupied_.reserve(slots.size());
+  counters_.start_matches_needed.set(static_cast<std::uint64_t>(settings.estimator.start_observations));
   for (int g = 0; g < bank_.groups(); ++g) {
     const auto first = static_cast<std::size_t>(g) * kLanes;
     groups_.emplace_back(bank_, g, slots.subspan(first, std::min<std::size_t>(kLanes, slots.size() - first)));
@@ -332,7 +334,10 @@ void Mapper::finish_learning() noexcept {
   bool put_off = false;
   Instant ended = learn_started_;
   for (WorkerTally& tally : tallies_) {
-    counters_.features_lost.add(tally.lost);
+    counters_.features_lost_unseen.add(tally.lost_unseen);
+    counters_.features_lost_refused.add(tally.lost_refused);
+    counters_.features_lost_unstarted.add(tally.lost_unstarted);
+    for (std::size_t i = 0; i < kBatchStatuses; ++i) counters_.starts_failed[i].add(tally.starts_failed[i]);
     counters_.features_started_anew.add(tally.started_anew);
     counters_.adoptions_late.add(tally.adoptions_late);
     put_off = put_off || tally.put_off;
@@ -345,13 +350,11 @@ void Mapper::finish_learning() noexcept {
     counters_.learn.add(ended - learn_started_);
     counters_.frame_compute.add(computed_before_learning_ + (ended - learn_started_));
   }
-  std::uint64_t tracked = 0;
   std::uint64_t starting = 0;
   std::uint64_t converging = 0;
   std::uint64_t converged = 0;
   std::uint64_t inconsistent = 0;
   for (const FeatureSlot& slot : slots_) {
-    if (slot.state == SlotState::kTracked) ++tracked;
     if (slot.state == SlotState::kStarting) ++starting;
     if (slot.state != SlotState::kMapped) continue;
     if (slot.health.state() == HealthState::kInconsistent) {
@@ -362,7 +365,10 @@ void Mapper::finish_learning() noexcept {
       ++converging;
     }
   }
-  counters_.features_tracked.set(tracked);
+  const StartProgress progress = start_progress(slots_, settings_.estimator.start_observations);
+  counters_.features_tracked.set(progress.features);
+  counters_.start_matches_most.set(progress.most_matches);
+  counters_.start_matches_mean.set(progress.mean_matches);
   counters_.features_starting.set(starting);
   counters_.features_converging.set(converging);
   counters_.features_converged.set(converged);
@@ -506,7 +512,9 @@ void Mapper::learn_shard(int worker) noexcept {
 void Mapper::advance_slot(FeatureGroup& group, std::size_t lane, int worker) noexcept {
   WorkerTally& tally = tallies_[static_cast<std::size_t>(worker)];
   const int feature = group.feature(lane);
-  switch (advance(group.slots()[lane], bank_, feature, job_, model_, settings_)) {
+  FeatureSlot& slot = group.slots()[lane];
+  const auto count_failed_start = [&] { ++tally.starts_failed[static_cast<std::size_t>(slot.start.outcome.status)]; };
+  switch (advance(slot, bank_, feature, job_, model_, settings_)) {
     case LifeEvent::kNone:
       break;
     case LifeEvent::kStartRequested:
@@ -518,8 +526,18 @@ void Mapper::advance_slot(FeatureGroup& group, std::size_t lane, int worker) noe
     case LifeEvent::kStartedAnew:
       ++tally.started_anew;
       break;
-    case LifeEvent::kLost:
-      ++tally.lost;
+    case LifeEvent::kStartFailed:
+      count_failed_start();
+      break;
+    case LifeEvent::kLostUnseen:
+      ++tally.lost_unseen;
+      break;
+    case LifeEvent::kLostRefused:
+      ++tally.lost_refused;
+      break;
+    case LifeEvent::kLostUnstarted:
+      count_failed_start();
+      ++tally.lost_unstarted;
       break;
   }
 }

@@ -92,7 +92,10 @@ class Mapper {
   void offer_to_finder(const FrameRecord& frame, const GreyImage& image) noexcept;
 
   struct alignas(64) WorkerTally {
-    std::uint64_t lost = 0;
+    std::uint64_t lost_unseen = 0;
+    std::uint64_t lost_refused = 0;
+    std::uint64_t lost_unstarted = 0;
+    std::array<std::uint64_t, kBatchStatuses> starts_failed{};
     std::uint64_t started_anew = 0;
     std::uint64_t adoptions_late = 0;
     bool put_off = false;

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
+#include "core/estimation/batch_status.hpp"
 #include "core/pipeline/release_stream.hpp"
 #include "core/realtime/counter.hpp"
 #include "core/realtime/latency_histogram.hpp"
@@ -67,7 +69,13 @@ struct PipelineCounters {
   Counter features_inconsistent;
   Counter features_shed;  // not looked for now, see LoadShedding
   Counter times_shed;
-  Counter features_lost;
+  Counter features_lost_unseen;
+  Counter features_lost_refused;
+  Counter features_lost_unstarted;                    // too many failed starts
+  std::array<Counter, kBatchStatuses> starts_failed;  // by BatchStatus
+  Counter start_matches_needed;                       // K
+  Counter start_matches_most;                         // see StartProgress
+  Counter start_matches_mean;
   Counter maps_forgotten;         // by command, for a new patient
   Counter features_started_anew;  // inconsistent, also after inflation
   LatencyHistogram predict_and_find;
@@ -85,6 +93,12 @@ struct PipelineCounters {
   Counter frame_period_ns;
   std::array<StreamCounters, kReleaseStreams.size()> streams;
 
+  [[nodiscard]] std::uint64_t features_lost() const noexcept {
+    return features_lost_unseen.get() + features_lost_refused.get() + features_lost_unstarted.get();
+  }
+  [[nodiscard]] std::uint64_t starts_failed_by(BatchStatus status) const noexcept {
+    return starts_failed[static_cast<std::size_t>(status)].get();
+  }
   [[nodiscard]] StreamCounters& of(ReleaseStream stream) noexcept { return streams[index_of(stream)]; }
   [[nodiscard]] const StreamCounters& of(ReleaseStream stream) const noexcept { return streams[index_of(stream)]; }
 };

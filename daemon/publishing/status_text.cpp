@@ -82,6 +82,16 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
                {"features_shed", status.features_shed},
                {"times_shed", status.times_shed},
                {"features_lost", status.features_lost},
+               {"features_lost_unseen", status.features_lost_unseen},
+               {"features_lost_refused", status.features_lost_refused},
+               {"features_lost_unstarted", status.features_lost_unstarted},
+               {"starts_failed_unusable", status.starts_failed_unusable},
+               {"starts_failed_behind", status.starts_failed_behind},
+               {"starts_failed_diverged", status.starts_failed_diverged},
+               {"starts_failed_outliers", status.starts_failed_outliers},
+               {"start_matches_needed", status.start_matches_needed},
+               {"start_matches_most", status.start_matches_most},
+               {"start_matches_mean", status.start_matches_mean},
                {"features_started_anew", status.features_started_anew}};
   Json by_stage = Json::object();
   for (const perimap_StageLatency& stage : stages) by_stage[std::string(name_of(stage.kind))] = stage_json(stage);
@@ -115,6 +125,10 @@ Json stream_status_json(const perimap_Status& status) {
 std::string status_line(const perimap_Status& status) {
   std::string line =
       fmt::format("{} surfaces published, {} features converged", status.samples, status.features_converged);
+  if (status.features_converged == 0 && status.features_tracked > 0) {
+    line += fmt::format(", {} followed with {} of the {} matches of a start", status.features_tracked,
+                        status.start_matches_mean, status.start_matches_needed);
+  }
   for (const perimap_SourceStatus& source : std::span(status.sources._buffer, status.sources._length)) {
     if (source.state != perimap_SOURCE_OK) line += fmt::format(", {} {}", name_of(source.kind), name_of(source.state));
   }

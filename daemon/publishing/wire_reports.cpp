@@ -329,7 +329,18 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.features_inconsistent = static_cast<std::uint32_t>(c.features_inconsistent.get());
   wire_.features_shed = static_cast<std::uint32_t>(c.features_shed.get());
   wire_.times_shed = c.times_shed.get();
-  wire_.features_lost = c.features_lost.get();
+  wire_.features_lost = c.features_lost();
+  wire_.features_lost_unseen = c.features_lost_unseen.get();
+  wire_.features_lost_refused = c.features_lost_refused.get();
+  wire_.features_lost_unstarted = c.features_lost_unstarted.get();
+  wire_.starts_failed_unusable =
+      c.starts_failed_by(BatchStatus::kTooFewObservations) + c.starts_failed_by(BatchStatus::kBadObservation);
+  wire_.starts_failed_behind = c.starts_failed_by(BatchStatus::kBehindCamera);
+  wire_.starts_failed_diverged = c.starts_failed_by(BatchStatus::kDiverged);
+  wire_.starts_failed_outliers = c.starts_failed_by(BatchStatus::kTooManyOutliers);
+  wire_.start_matches_needed = static_cast<std::uint32_t>(c.start_matches_needed.get());
+  wire_.start_matches_most = static_cast<std::uint32_t>(c.start_matches_most.get());
+  wire_.start_matches_mean = static_cast<std::uint32_t>(c.start_matches_mean.get());
   wire_.respiration = to_wire(facts.respiration);
   wire_.respiration_suspected = facts.respiration_suspected;
   wire_.respiration_source = to_wire(facts.respiration_source);

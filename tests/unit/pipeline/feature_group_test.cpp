@@ -12,6 +12,7 @@
 #include "core/pipeline/batch_starter.hpp"
 #include "core/pipeline/feature_life.hpp"
 #include "core/pipeline/match_covariance.hpp"
+#include "core/pipeline/start_progress.hpp"
 
 namespace perimap {
 namespace {
@@ -116,7 +117,7 @@ TEST_F(Stages, ATrackedFeatureWithoutMatchesIsGivenUpSoon) {
   next_frame();
   found_at({320, 240});
   int frames = 0;
-  while (learn_frame() != LifeEvent::kLost) {
+  while (learn_frame() != LifeEvent::kLostUnseen) {
     next_frame();
     ASSERT_LT(++frames, 20);
   }
@@ -193,8 +194,66 @@ TEST_F(Stages, ALateStartIsToldOnceAndAdoptedWhenItComes) {
   EXPECT_EQ(learn_frame(), LifeEvent::kNone);
   slot->start.ready.store(true);
   next_frame();
-  EXPECT_EQ(learn_frame(), LifeEvent::kNone);
+  EXPECT_EQ(learn_frame(), LifeEvent::kStartFailed);
   EXPECT_EQ(slot->state, SlotState::kTracked) << "a failed start tries again";
+}
+
+TEST_F(Stages, AFeatureWhoseStartsFailIsGivenUpForThat) {
+  int failed = 0;
+  for (LifeEvent event = LifeEvent::kNone; event != LifeEvent::kLostUnstarted; ++failed) {
+    slot->state = SlotState::kStarting;
+    slot->start.adopt_at_frame = 0;
+    slot->start.count = 0;
+    slot->start.outcome.status = BatchStatus::kTooManyOutliers;
+    slot->start.ready.store(true);
+    next_frame();
+    event = learn_frame();
+    ASSERT_TRUE(event == LifeEvent::kStartFailed || event == LifeEvent::kLostUnstarted);
+    ASSERT_LT(failed, 10);
+  }
+  EXPECT_GT(failed, 1);
+  EXPECT_EQ(slot->state, SlotState::kEmpty);
+}
+
+TEST_F(Stages, AFeatureThatIsForgottenWhileItStartsIsNotLost) {
+  slot->state = SlotState::kStarting;
+  slot->forgotten = true;
+  slot->start.adopt_at_frame = 0;
+  slot->start.ready.store(true);
+  next_frame();
+  EXPECT_EQ(learn_frame(), LifeEvent::kNone);
+  EXPECT_EQ(slot->state, SlotState::kEmpty);
+}
+
+TEST_F(Stages, AFeatureThatIsAlwaysFoundWhereItsEstimateRefusesItIsGivenUpForThat) {
+  map_feature();
+  LifeEvent event = LifeEvent::kNone;
+  for (int i = 0; event == LifeEvent::kNone; ++i) {
+    next_frame();
+    found_at({420.0, 240.0});
+    event = learn_frame();
+    ASSERT_LT(i, 200);
+  }
+  EXPECT_EQ(event, LifeEvent::kLostRefused);
+  EXPECT_EQ(slot->state, SlotState::kEmpty);
+}
+
+TEST_F(Stages, TheProgressOfStartsIsThatOfTrackedFeatures) {
+  EXPECT_EQ(start_progress(slots, 60).features, 0U);
+  EXPECT_EQ(start_progress(slots, 60).mean_matches, 0U);
+  slots[0].state = slots[1].state = SlotState::kTracked;
+  for (int i = 0; i < 70; ++i) {
+    next_frame();
+    found_at({320, 240}, 0);
+    if (i < 10) found_at({320, 240}, 1);
+  }
+  const StartProgress progress = start_progress(slots, 60);
+  EXPECT_EQ(progress.features, 2U);
+  EXPECT_EQ(progress.most_matches, 60U);
+  EXPECT_EQ(progress.mean_matches, 35U);
+  slots[0].state = SlotState::kMapped;
+  EXPECT_EQ(start_progress(slots, 60).features, 1U);
+  EXPECT_EQ(start_progress(slots, 60).most_matches, 10U);
 }
 
 TEST_F(Stages, AMatchThatFitsIsLearntAndOneThatDoesNotIsRefused) {
@@ -322,7 +381,7 @@ TEST_F(Stages, AFeatureRefusedTenTimesLetsGoOfItsPatchAndIsStillGivenUpWhenUnsee
   do {
     next_frame();
     ASSERT_LT(++frames, 1000);
-  } while (learn_frame() != LifeEvent::kLost);
+  } while (learn_frame() != LifeEvent::kLostUnseen);
   EXPECT_EQ(slot->state, SlotState::kEmpty);
 }
 

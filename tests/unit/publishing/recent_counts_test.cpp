@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "daemon/publishing/status_text.hpp"
@@ -126,6 +127,35 @@ TEST_F(RecentCountsTest, EachStreamHasAStatusWithItsOwnReleases) {
   EXPECT_EQ(of_clock.releases_missed, 3U);
   EXPECT_EQ(tardiness(of_frames).count, 0U);
   EXPECT_EQ(tardiness(of_clock).recent_count, 1U);
+}
+
+TEST(WireStatusTest, TellsWhyFeaturesAreNotInTheMap) {
+  PipelineCounters counters;
+  counters.features_lost_unseen.add(1);
+  counters.features_lost_refused.add(2);
+  counters.features_lost_unstarted.add(4);
+  for (std::size_t i = 0; i < kBatchStatuses; ++i) counters.starts_failed[i].add(1U << i);
+  counters.features_tracked.set(30);
+  counters.start_matches_needed.set(60);
+  counters.start_matches_most.set(45);
+  counters.start_matches_mean.set(20);
+  WireStatus wire(Identity{"a", ReleaseStream::kFrame, "tracker"});
+  const perimap_Status& told = wire.fill(counters, {}, kStart);
+  const auto json = full_status_json(told);
+  EXPECT_EQ(json["features_lost"], 7);
+  EXPECT_EQ(json["features_lost_unseen"], 1);
+  EXPECT_EQ(json["features_lost_refused"], 2);
+  EXPECT_EQ(json["features_lost_unstarted"], 4);
+  EXPECT_EQ(json["starts_failed_unusable"], 2 + 4);
+  EXPECT_EQ(json["starts_failed_behind"], 8);
+  EXPECT_EQ(json["starts_failed_diverged"], 16);
+  EXPECT_EQ(json["starts_failed_outliers"], 32);
+  EXPECT_EQ(json["start_matches_needed"], 60);
+  EXPECT_EQ(json["start_matches_most"], 45);
+  EXPECT_EQ(json["start_matches_mean"], 20);
+  EXPECT_NE(status_line(told).find("30 followed with 20 of the 60 matches"), std::string::npos);
+  counters.features_converged.set(1);
+  EXPECT_EQ(status_line(wire.fill(counters, {}, kStart)).find("followed"), std::string::npos);
 }
 
 TEST(WireStatuses, OnlyStreamsThatArePublishedHaveOne) {

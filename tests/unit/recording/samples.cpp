@@ -279,6 +279,16 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.releases_missed);
   next(s.features_shed);
   next(s.times_shed);
+  next(s.features_lost_unseen);
+  next(s.features_lost_refused);
+  next(s.features_lost_unstarted);
+  next(s.starts_failed_unusable);
+  next(s.starts_failed_behind);
+  next(s.starts_failed_diverged);
+  next(s.starts_failed_outliers);
+  next(s.start_matches_needed);
+  next(s.start_matches_most);
+  next(s.start_matches_mean);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -568,7 +578,17 @@ json to_json(const perimap_Status& s) {
           MEMBER(respiration_source),
           MEMBER(releases_missed),
           MEMBER(features_shed),
-          MEMBER(times_shed)};
+          MEMBER(times_shed),
+          MEMBER(features_lost_unseen),
+          MEMBER(features_lost_refused),
+          MEMBER(features_lost_unstarted),
+          MEMBER(starts_failed_unusable),
+          MEMBER(starts_failed_behind),
+          MEMBER(starts_failed_diverged),
+          MEMBER(starts_failed_outliers),
+          MEMBER(start_matches_needed),
+          MEMBER(start_matches_most),
+          MEMBER(start_matches_mean)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {
