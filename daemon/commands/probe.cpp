@@ -158,10 +158,10 @@ void print(const char* kind, const nlohmann::json& j, const std::string& invalid
     fmt::print("  rate       {:.2f} Hz, {} samples\n", j["rate_hz"].get<double>(), j["samples"].get<std::uint64_t>());
     fmt::print("  stamps     {:.2f} ms before arrival; jitter p50 {:.2f}, p99 {:.2f} ms\n",
                j["delay_p50_ms"].get<double>(), j["jitter_p50_ms"].get<double>(), j["jitter_p99_ms"].get<double>());
-    fmt::print("  faults     {} lost, {} damaged, {} dropped by the kernel, {} bus errors\n",
-               j["lost"].get<std::uint64_t>(), j["damaged"].get<std::uint64_t>(), j["dropped"].get<std::uint64_t>(),
-               j["bus_errors"].get<std::uint64_t>());
   }
+  fmt::print("  faults     {} lost, {} damaged, {} dropped by the kernel, {} bus errors\n",
+             j["lost"].get<std::uint64_t>(), j["damaged"].get<std::uint64_t>(), j["dropped"].get<std::uint64_t>(),
+             j["bus_errors"].get<std::uint64_t>());
   if (!invalid.empty()) fmt::print("  validity   {}\n", invalid);
   if (!text("reason").empty() && text("state") != "streaming") fmt::print("  why        {}\n", text("reason"));
 }

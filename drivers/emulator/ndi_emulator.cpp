@@ -284,7 +284,8 @@ void NdiEmulator::send_bx2(LinkControl& link, std::int64_t frame) {
   item.u32(static_cast<std::uint32_t>(device_time.count() / 1'000'000'000));
   item.u32(static_cast<std::uint32_t>(device_time.count() % 1'000'000'000));
   item.u16(1).u16(1).append(component(2, count, tools));
-  const Bytes body = Bytes().u16(1).u16(1).append(component(1, 1, item));
+  const unsigned components = settings_.malformed_bx2 ? 2 : 1;
+  const Bytes body = Bytes().u16(1).u16(components).append(component(1, 1, item));
   reply_binary(link, body.all);
 }
 

@@ -20,6 +20,7 @@ struct NdiEmulatorSettings {
   Newest newest = Newest::kBx2;
   int wired_tools = 0;                           // in its ports from the start, port handles 0A, 0B ...
   std::optional<Pose> reference = std::nullopt;  // where the second tool is, constant; the first follows the track
+  bool malformed_bx2 = false;                    // its BX2 replies are whole, but their bodies are not as in the guide
 };
 
 class NdiEmulator final : public DeviceProtocol {

@@ -142,7 +142,8 @@ void NdiSession::enter(LinkControl& link, Step step, Instant now) {
     case Step::kStart:
       return command(link, "TSTART:80", kLongReplyTime, now);
     case Step::kQuiet:
-      due_ = now + kQuietTime;
+      quiet_until_ = now + kQuietTime;
+      due_ = std::min(quiet_until_, next_expectation());
       return;
     case Step::kStream:
       return ask(link, now);
@@ -157,7 +158,9 @@ void NdiSession::enter(LinkControl& link, Step step, Instant now) {
 
 void NdiSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) {
   if (step_ == Step::kQuiet) {
-    due_ = arrival + kQuietTime;
+    // Unbroken noise does not put off what is due when no reading comes.
+    quiet_until_ = arrival + kQuietTime;
+    due_ = std::min(quiet_until_, next_expectation());
     return;
   }
   if (step_ == Step::kSettle) return;
@@ -169,21 +172,30 @@ void NdiSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, I
 }
 
 void NdiSession::on_reply(LinkControl& link, const NdiReply& reply, Instant arrival) {
-  if (std::holds_alternative<NdiDamaged>(reply)) return on_damage(link, arrival);
+  if (const auto* damaged = std::get_if<NdiDamaged>(&reply)) return on_damage(link, damaged->what, arrival);
   on_line_ = time_on_line(reply, link);
   if (const auto* binary = std::get_if<NdiBinary>(&reply)) {
     if (step_ == Step::kStream && query_ == Query::kBx2) return on_tracking(link, decode_bx2(binary->body), arrival);
     if (step_ == Step::kStream && query_ == Query::kBx) return on_tracking(link, decode_bx(binary->body), arrival);
-    return on_damage(link, arrival);
+    return on_damage(link, "a binary reply to a command in text", arrival);
   }
   on_text(link, std::get<NdiText>(reply).text, arrival);
 }
 
 // Nothing of a damaged reply is used. In the stream the next query will do; before it, the command is given again.
-void NdiSession::on_damage(LinkControl& link, Instant now) {
+void NdiSession::on_damage(LinkControl& link, const std::string& what, Instant now) {
   health_.damaged.add();
   framer_.restart();
-  if (step_ == Step::kStream) return enter(link, Step::kQuiet, now);
+  if (step_ == Step::kStream) {
+    ++damaged_;
+    damage_ = what;
+    // A device may send what it means by BX2 and not what the guide says: the older queries are then worth a try.
+    if (!answered_ && query_ != Query::kTx && ++retries_ > kMostRetries) {
+      query_ = query_ == Query::kBx2 ? Query::kBx : Query::kTx;
+      retries_ = 0;
+    }
+    return enter(link, Step::kQuiet, now);
+  }
   if (step_ == Step::kReset) return;  // bytes of the old rate
   // A port that was given and not taken would stay behind, so that is not asked for twice.
   if (step_ == Step::kRequestPort || ++retries_ > kMostRetries) {
@@ -263,9 +275,11 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
     case Step::kStart:
       if (!okay) break;
       last_reading_ = now;
+      damaged_ = 0;
+      retries_ = 0;
       return enter(link, Step::kStream, now);
     case Step::kStream:
-      if (query_ != Query::kTx) return on_damage(link, now);
+      if (query_ != Query::kTx) return on_damage(link, "a text in place of a binary reply", now);
       return on_tracking(link, decode_tx(text), now);
     case Step::kSettle:
     case Step::kQuiet:
@@ -365,9 +379,10 @@ void NdiSession::ask(LinkControl& link, Instant now) {
 }
 
 void NdiSession::on_tracking(LinkControl& link, const Expected<NdiTracking>& tracking, Instant arrival) {
-  if (!tracking) return on_damage(link, arrival);
+  if (!tracking) return on_damage(link, tracking.error().message, arrival);
   answered_ = true;
   retries_ = 0;
+  damaged_ = 0;
   if ((tracking->system_status & kHardwareFailure) != 0) return link.fail("the tracker reports a hardware failure");
   // In a BX2 reply the frames come one after the other, each with its tools.
   for (const NdiToolReading& sensor : tracking->tools) {
@@ -416,7 +431,26 @@ void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& refere
   sink_(sample);
 }
 
+Instant NdiSession::next_expectation() const noexcept {
+  return last_reading_ + (health_.state() == DeviceState::kStreaming ? kSilentAfter : kReopenAfter);
+}
+
+bool NdiSession::expect_readings(LinkControl& link, Instant now) {
+  if (now - last_reading_ >= kReopenAfter) {
+    link.fail(why_no_reading());
+    return false;
+  }
+  if (now - last_reading_ >= kSilentAfter && health_.state() == DeviceState::kStreaming) {
+    health_.set_state(DeviceState::kSilent);
+  }
+  return true;
+}
+
 std::string NdiSession::why_no_reading() const {
+  if (damaged_ > 0) {
+    return fmt::format("no whole reply to {} for 2 s, {} came damaged (the last: {}); a bad line, or another device?",
+                       command_, damaged_, damage_);
+  }
   if (!command_.empty()) return fmt::format("no answer to {} for 2 s", command_);
   if (last_frame_ == 0U) return "the sensor's tool has been disabled for 2 s: is it unplugged?";
   return "no reading of the sensor's tool for 2 s";
@@ -432,19 +466,18 @@ void NdiSession::on_time(LinkControl& link, Instant now) {
     case Step::kStop:
       return enter(link, Step::kInitialise, now);
     case Step::kQuiet:
+      if (!expect_readings(link, now)) return;
+      if (now < quiet_until_) {
+        due_ = std::min(quiet_until_, next_expectation());
+        return;
+      }
       framer_.restart();
       step_ = Step::kStream;
       return ask(link, now);
-    case Step::kStream: {
-      if (now - last_reading_ >= kReopenAfter) {
-        return link.fail(why_no_reading());
-      }
-      if (now - last_reading_ >= kSilentAfter && health_.state() == DeviceState::kStreaming) {
-        health_.set_state(DeviceState::kSilent);
-      }
+    case Step::kStream:
+      if (!expect_readings(link, now)) return;
       framer_.restart();
       return ask(link, now);
-    }
     default:
       link.fail(fmt::format("no answer to {}; is it an NDI tracker, switched on, and at this port?",
                             command_.substr(0, command_.find(':') + 1)));

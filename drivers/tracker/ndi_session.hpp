@@ -2,7 +2,8 @@
 //
 // Start: serial break, INIT, COMM to 115200 baud (serial); TSTOP, INIT (TCP). Then ports that are to be freed are
 // freed, tool definitions uploaded (PHRQ, PVWR), ports initialised (PHSR 02, PINIT) and enabled (PHSR 03, PENA),
-// TSTART. Then BX2 is asked for again and again; where a device has no BX2, BX; where it has neither, TX.
+// TSTART. Then BX2 is asked for again and again; where a device has no BX2, BX; where it has neither, TX. A kind
+// of reply that comes damaged four times and never whole is given up in the same way.
 //
 // What a reply takes on a serial line is taken off its arrival: at 115200 baud some eight milliseconds of a frame.
 #pragma once
@@ -70,7 +71,7 @@ class NdiSession final : public DeviceProtocol {
   void command(LinkControl& link, const std::string& text, Duration longest, Instant now);
   void on_reply(LinkControl& link, const NdiReply& reply, Instant arrival);
   void on_text(LinkControl& link, const std::string& text, Instant now);
-  void on_damage(LinkControl& link, Instant now);
+  void on_damage(LinkControl& link, const std::string& what, Instant now);
   void on_error(LinkControl& link, const std::string& text, Instant now);
   void next_port(LinkControl& link, Step search, Instant now);
   void next_upload(LinkControl& link, Instant now);
@@ -78,6 +79,9 @@ class NdiSession final : public DeviceProtocol {
   void ask(LinkControl& link, Instant now);
   void on_tracking(LinkControl& link, const Expected<NdiTracking>& tracking, Instant arrival);
   void deliver(const NdiToolReading& sensor, const ToolReading& reference, Instant arrival);
+  // Whether the session goes on: says that readings have stopped coming, and fails when they stay away.
+  bool expect_readings(LinkControl& link, Instant now);
+  [[nodiscard]] Instant next_expectation() const noexcept;
   [[nodiscard]] std::string why_no_reading() const;
 
   NdiSettings settings_;
@@ -100,6 +104,9 @@ class NdiSession final : public DeviceProtocol {
   Instant asked_{};
   Duration on_line_{0};  // the reply under way
   Instant last_reading_{};
+  Instant quiet_until_{};
+  std::uint64_t damaged_ = 0;  // replies since the last whole one
+  std::string damage_;         // of the last of them
   std::optional<std::uint32_t> last_frame_;
   std::uint32_t stride_ = 0;  // device frames from one reading to the next, the least seen
   int retries_ = 0;

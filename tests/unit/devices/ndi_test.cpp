@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include "drivers/emulator/ndi_emulator.hpp"
@@ -406,6 +407,59 @@ TEST(NdiSession, DamagedRepliesGiveNoPoseAndDoNotStopTheStream) {
     ASSERT_EQ(sample.state, ToolState::kOk);
     ASSERT_LT((sample.X_WS.t - swaying_at(sample.device_frame).t).norm(), 1e-3);
   }
+}
+
+// An answering link whose replies in the stream are the test's own.
+struct DamagedStream : Theatre {
+  DamagedStream() : Theatre(wired(), {.wired_tools = 1}) {
+    run(seconds(1));
+    EXPECT_EQ(health.state(), DeviceState::kStreaming);
+  }
+  void damage_for(Duration longest, const std::function<std::vector<std::byte>()>& reply) {
+    for (const Instant end = now + longest; now < end && host.failure.empty(); now += milliseconds(1)) {
+      const std::string asked = host.take_sent();
+      sent += asked;
+      const auto bytes = reply();
+      if (!bytes.empty()) session.on_bytes(host, bytes, now);
+      if (now >= session.next_time()) session.on_time(host, now);
+    }
+  }
+};
+
+TEST(NdiSession, AStreamOfDamagedRepliesIsSilentAndThenOpenedAnewWithAReason) {
+  DamagedStream theatre;
+  const std::uint64_t before = theatre.health.damaged.get();
+  int round = 0;
+  // A reply every 50 ms, each with a wrong CRC.
+  const auto damaged = [&round] { return ++round % 50 == 0 ? bytes_of("OKAYA897\r") : std::vector<std::byte>(); };
+  theatre.damage_for(milliseconds(500), damaged);
+  EXPECT_EQ(theatre.health.state(), DeviceState::kSilent);
+  EXPECT_EQ(theatre.host.failure, "");
+  theatre.damage_for(seconds(3), damaged);
+  EXPECT_THAT(theatre.host.failure, HasSubstr("came damaged (the last: text CRC)"));
+  EXPECT_GT(theatre.health.damaged.get(), before + 10);
+}
+
+TEST(NdiSession, UnbrokenNoiseDoesNotPutOffSilenceAndFailure) {
+  DamagedStream theatre;
+  std::mt19937 random(3);
+  const auto noise = [&random] {
+    std::vector<std::byte> bytes(10);
+    for (std::byte& b : bytes) b = static_cast<std::byte>(random() % 256);
+    return bytes;
+  };
+  theatre.damage_for(milliseconds(500), noise);
+  EXPECT_EQ(theatre.health.state(), DeviceState::kSilent);
+  theatre.damage_for(seconds(3), noise);
+  EXPECT_THAT(theatre.host.failure, HasSubstr("damaged"));
+}
+
+TEST(NdiSession, ABx2ThatIsNeverUnderstoodIsGivenUpForBx) {
+  Theatre theatre(wired(), {.wired_tools = 1, .malformed_bx2 = true});
+  theatre.run(seconds(1));
+  EXPECT_EQ(theatre.host.failure, "");
+  EXPECT_GT(theatre.samples.size(), 50U);
+  EXPECT_THAT(theatre.sent, HasSubstr("BX:0801"));
 }
 
 TEST(NdiSession, SaysWhatIsWrongWithTheTools) {
