@@ -1,7 +1,6 @@
 #include "drivers/transport/tcp_stream.hpp"
 
 #include <fmt/format.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -12,6 +11,8 @@
 #include <cerrno>
 #include <system_error>
 #include <utility>
+
+#include "drivers/transport/host_lookup.hpp"
 
 namespace perimap {
 namespace {
@@ -88,17 +89,10 @@ int finish_connecting(int socket, Duration longest, const Interrupt& interrupt) 
 Expected<std::unique_ptr<ByteStream>> connect_tcp(const std::string& host, std::uint16_t port, Duration longest,
                                                   const Interrupt& interrupt) {
   const std::string name = fmt::format("{}:{}", host, port);
-  addrinfo hints{};
-  hints.ai_family = AF_UNSPEC;
-  hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = AI_ADDRCONFIG | AI_NUMERICSERV;
-  addrinfo* found = nullptr;
-  if (const int error = ::getaddrinfo(host.c_str(), fmt::format("{}", port).c_str(), &hints, &found); error != 0) {
-    return fail(fmt::format("{}: unknown host: {}", name, ::gai_strerror(error)));
-  }
-  const std::unique_ptr<addrinfo, void (*)(addrinfo*)> addresses(found, &::freeaddrinfo);
+  const auto addresses = look_up_host(host, port, longest, interrupt);
+  if (!addresses) return tl::unexpected(addresses.error());
   int error = EHOSTUNREACH;
-  for (const addrinfo* address = found; address != nullptr; address = address->ai_next) {
+  for (const addrinfo* address = addresses->get(); address != nullptr; address = address->ai_next) {
     Descriptor socket(::socket(address->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     if (!socket) {
       error = errno;

@@ -12,10 +12,11 @@
 
 namespace perimap {
 
-// Waits at most `longest` for the connection, less when interrupted. No Nagle delay; keep-alive probes after 1 s of
-// silence, so that a peer that vanished without a word is noticed in about 3 s.
+// Waits at most `longest` for the name server and then for the connection, less when interrupted. No Nagle delay;
+// keep-alive probes after 1 s of silence, so that a peer that vanished without a word is noticed in about 3 s.
 //
-// Errors name host, port and reason: unknown host, refused (nothing listens there), unreachable, no answer.
+// Errors name host, port and reason: unknown host, no name server, refused (nothing listens there), unreachable, no
+// answer.
 [[nodiscard]] Expected<std::unique_ptr<ByteStream>> connect_tcp(const std::string& host, std::uint16_t port,
                                                                 Duration longest, const Interrupt& interrupt);
 

@@ -1,16 +1,20 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <thread>
 
 #include "drivers/device/device_link.hpp"
 #include "drivers/transport/can_socket.hpp"
 #include "drivers/transport/endpoint.hpp"
+#include "drivers/transport/host_lookup.hpp"
 #include "drivers/transport/pseudo_terminal.hpp"
 #include "drivers/transport/serial_port.hpp"
 #include "drivers/transport/tcp_stream.hpp"
@@ -147,6 +151,48 @@ TEST(Tcp, SaysWhyItCannotConnect) {
   }
   EXPECT_THAT(error_of(connect_tcp("127.0.0.1", free_port, seconds(2), interrupt)), HasSubstr("refused"));
   EXPECT_THAT(error_of(connect_tcp("no-such-host.invalid", 80, seconds(2), interrupt)), HasSubstr("unknown host"));
+}
+
+// A name server that never answers, as one behind a cut cable.
+struct DeafNameServer {
+  std::atomic<int> asked{0};
+  std::atomic<int> done{0};
+  Interrupt release;
+
+  int operator()(const char* /*host*/, const char* /*port*/, const addrinfo* /*hints*/, addrinfo** /*found*/) {
+    ++asked;
+    wait_unless_interrupted(seconds(60), release);
+    ++done;
+    return EAI_AGAIN;
+  }
+};
+
+TEST(HostLookup, ANameServerThatDoesNotAnswerHoldsUpNeitherStopNorStart) {
+  const auto server = std::make_shared<DeafNameServer>();
+  const HostLookup lookup = [server](auto... arguments) { return (*server)(arguments...); };
+  const Interrupt none;
+  EXPECT_THAT(error_of(look_up_host("tracker.local", 8765, milliseconds(50), none, lookup)),
+              HasSubstr("no answer from the name server"));
+  Interrupt stop;
+  std::jthread stopping([&] {
+    while (server->asked < 2) std::this_thread::sleep_for(milliseconds(1));
+    stop.request();
+  });
+  EXPECT_THAT(error_of(look_up_host("tracker.local", 8765, seconds(3600), stop, lookup)), HasSubstr("interrupted"));
+  EXPECT_EQ(server->done, 0) << "the name server had answered";
+  server->release.request();
+  while (server->done < 2) std::this_thread::sleep_for(milliseconds(1));
+}
+
+TEST(HostLookup, AnAddressInDigitsNeedsNoNameServer) {
+  const Interrupt none;
+  const HostLookup lookup = [](auto...) { return EAI_FAIL; };
+  for (const std::string host : {"127.0.0.1", "::1"}) {
+    const auto addresses = look_up_host(host, 8765, seconds(2), none, lookup);
+    ASSERT_TRUE(addresses) << addresses.error().message;
+    EXPECT_EQ((*addresses)->ai_socktype, SOCK_STREAM);
+  }
+  EXPECT_THAT(error_of(look_up_host("tracker.local", 8765, seconds(2), none, lookup)), HasSubstr("unknown host"));
 }
 
 TEST(CanSocket, OpensOrSaysWhyNot) {
