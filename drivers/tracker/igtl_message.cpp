@@ -222,14 +222,24 @@ Expected<Pose> decode_igtl_transform(std::span<const std::byte> content) {
 
 Expected<Pose> decode_igtl_position(std::span<const std::byte> content) {
   constexpr std::size_t kFull = 28;
-  // Shorter forms leave the orientation out; without it there is no pose.
-  if (content.size() != kFull)
-    return fail(fmt::format("POSITION: {} bytes, expected {} with quaternion", content.size(), kFull));
+  constexpr std::size_t kThreeComponents = 24;
+  // The shortest form, 12 bytes, leaves the orientation out; without it there is no pose.
+  if (content.size() != kFull && content.size() != kThreeComponents) {
+    return fail(
+        fmt::format("POSITION: {} bytes, expected {} or {} with quaternion", content.size(), kThreeComponents, kFull));
+  }
   Cursor cursor(content);
   Vector3d t;
   for (int axis = 0; axis < 3; ++axis) t[axis] = cursor.float32();
   double wxyz[4];
-  for (const int component : {1, 2, 3, 0}) wxyz[component] = cursor.float32();
+  for (const int component : {1, 2, 3}) wxyz[component] = cursor.float32();
+  if (content.size() == kFull) {
+    wxyz[0] = cursor.float32();
+  } else {
+    // Rounded components may be longer than 1 by a little; what is far too long fails as a pose does.
+    const double left = 1.0 - wxyz[1] * wxyz[1] - wxyz[2] * wxyz[2] - wxyz[3] * wxyz[3];
+    wxyz[0] = left > 0.0 ? std::sqrt(left) : 0.0;
+  }
   const auto pose = pose_of_device(t, wxyz);
   if (!pose) return fail("POSITION: position and quaternion are no pose");
   return *pose;

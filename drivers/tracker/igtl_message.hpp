@@ -58,7 +58,8 @@ class IgtlFramer {
 
 // Bodies. A malformed one is an error; none gives a pose that it does not hold.
 [[nodiscard]] Expected<Pose> decode_igtl_transform(std::span<const std::byte> content);  // 12 f32, columns, mm
-// 3 f32 position, mm; then nothing, or quaternion x y z w.
+// 3 f32 position, mm; then quaternion x y z w, or its x y z, where w is what a unit quaternion lacks and not negative.
+// The form without a quaternion holds no pose.
 [[nodiscard]] Expected<Pose> decode_igtl_position(std::span<const std::byte> content);
 struct IgtlTool {
   std::string name;

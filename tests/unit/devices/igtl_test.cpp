@@ -97,6 +97,10 @@ TEST(IgtlLibrary, WhatItSendsIsUnderstood) {
   position->SetQuaternion(static_cast<float>(q[1]), static_cast<float>(q[2]), static_cast<float>(q[3]),
                           static_cast<float>(q[0]));
   expect_pose(decode_igtl_position(framed_of(*position).content));
+  position->SetPackType(igtl::PositionMessage::WITH_QUATERNION3);
+  const IgtlMessage shorter = framed_of(*position);
+  EXPECT_EQ(shorter.content.size(), 24U);
+  expect_pose(decode_igtl_position(shorter.content));
 
   auto status = igtl::StatusMessage::New();
   status->SetCode(igtl::StatusMessage::STATUS_NOT_READY);
@@ -223,8 +227,18 @@ TEST(IgtlDecoding, MalformedBodiesGiveNoPose) {
   scaled.R *= 1.2;
   EXPECT_FALSE(decode_igtl_transform(encode_igtl_transform(scaled)));
   const auto position = encode_igtl_position(kPose);
-  for (std::size_t size = 0; size < position.size(); ++size)
-    EXPECT_FALSE(decode_igtl_position(std::span(position).first(size)));
+  for (std::size_t size = 0; size < position.size(); ++size) {
+    if (size == 24) continue;  // the form with three components of the quaternion
+    EXPECT_FALSE(decode_igtl_position(std::span(position).first(size))) << size;
+  }
+  EXPECT_FALSE(decode_igtl_position(std::vector<std::byte>(24, std::byte{0xFF})));
+  // Three components that are longer than a unit quaternion: 0x3F66 is 0.9.
+  std::vector<std::byte> too_long(24);
+  for (const std::size_t at : {12U, 16U}) {
+    too_long[at] = std::byte{0x3F};
+    too_long[at + 1] = std::byte{0x66};
+  }
+  EXPECT_FALSE(decode_igtl_position(too_long));
   EXPECT_FALSE(decode_igtl_position(std::vector<std::byte>(28)));
   EXPECT_FALSE(decode_igtl_tdata(std::vector<std::byte>(69)));
   EXPECT_FALSE(decode_igtl_tdata(std::vector<std::byte>(70)));
