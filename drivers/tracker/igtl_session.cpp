@@ -10,6 +10,7 @@ namespace {
 
 constexpr Duration kSilentAfter = std::chrono::milliseconds(300);
 constexpr Duration kReopenAfter = std::chrono::seconds(2);
+constexpr Duration kListenForOthers = std::chrono::seconds(1);
 constexpr unsigned kStatusOk = 1;
 // TRANSFORM messages of one instant come one by one; a reference that is older than this is none.
 constexpr Duration kReferenceAge = std::chrono::milliseconds(100);
@@ -35,6 +36,8 @@ void IgtlSession::on_open(LinkControl& link, Instant now) {
   last_stamp_ = 0;
   last_ = now;
   any_ = false;
+  only_tool_.clear();
+  listen_until_ = several_ ? now + kListenForOthers : now;
   server_fault_.clear();
   link.send(start_tdata());
 }
@@ -46,15 +49,15 @@ void IgtlSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, 
       health_.damaged.add();
       if (damaged->lost_track) return link.fail(fmt::format("{}; is it an OpenIGTLink server?", damaged->what));
     } else {
-      on_message(std::get<IgtlMessage>(*next), arrival);
+      on_message(link, std::get<IgtlMessage>(*next), arrival);
     }
   }
 }
 
-void IgtlSession::on_message(const IgtlMessage& message, Instant arrival) {
-  if (message.type == "TRANSFORM") return on_pose(message, decode_igtl_transform(message.content), arrival);
-  if (message.type == "POSITION") return on_pose(message, decode_igtl_position(message.content), arrival);
-  if (message.type == "TDATA") return on_tdata(message, arrival);
+void IgtlSession::on_message(LinkControl& link, const IgtlMessage& message, Instant arrival) {
+  if (message.type == "TRANSFORM") return on_pose(link, message, decode_igtl_transform(message.content), arrival);
+  if (message.type == "POSITION") return on_pose(link, message, decode_igtl_position(message.content), arrival);
+  if (message.type == "TDATA") return on_tdata(link, message, arrival);
   const auto status = decode_igtl_status(message.content);
   if (!status) return health_.damaged.add();
   server_fault_.clear();
@@ -63,9 +66,24 @@ void IgtlSession::on_message(const IgtlMessage& message, Instant arrival) {
   health_.set_reason(server_fault_);
 }
 
-void IgtlSession::on_pose(const IgtlMessage& message, const Expected<Pose>& pose, Instant arrival) {
+bool IgtlSession::is_sensor(LinkControl& link, const std::string& name, Instant arrival) {
+  if (!settings_.sensor.empty()) return name == settings_.sensor;
+  if (settings_.reference && name == *settings_.reference) return false;
+  if (only_tool_.empty()) only_tool_ = name;
+  if (name != only_tool_) {
+    several_ = true;
+    listen_until_ = kNever;  // what else was read with it is no pose either
+    link.fail(fmt::format("several tools ('{}', '{}'): say which one is the sensor", only_tool_, name));
+    return false;
+  }
+  if (arrival < listen_until_) return false;
+  several_ = false;
+  return true;
+}
+
+void IgtlSession::on_pose(LinkControl& link, const IgtlMessage& message, const Expected<Pose>& pose, Instant arrival) {
   const bool is_reference = settings_.reference && message.device == *settings_.reference;
-  if (!is_reference && !settings_.sensor.empty() && message.device != settings_.sensor) return;
+  if (!is_reference && !is_sensor(link, message.device, arrival)) return;
   if (!pose) return health_.damaged.add();
   ToolReading reading{ToolState::kOk, *pose};
   for (const auto& [key, value] : message.metadata) {
@@ -80,17 +98,17 @@ void IgtlSession::on_pose(const IgtlMessage& message, const Expected<Pose>& pose
   deliver(message.time_stamp, message.time_ns(), reading, arrival);
 }
 
-void IgtlSession::on_tdata(const IgtlMessage& message, Instant arrival) {
+void IgtlSession::on_tdata(LinkControl& link, const IgtlMessage& message, Instant arrival) {
   const auto tools = decode_igtl_tdata(message.content);
   if (!tools) return health_.damaged.add();
-  const auto named = [&tools](const std::string& name) {
-    const auto found =
-        std::find_if(tools->begin(), tools->end(), [&](const IgtlTool& tool) { return tool.name == name; });
-    return found == tools->end() ? ToolReading{} : ToolReading{ToolState::kOk, found->X_TO};
-  };
-  ToolReading sensor = named(settings_.sensor);
-  if (settings_.sensor.empty() && tools->size() == 1) sensor = {ToolState::kOk, tools->front().X_TO};
-  if (settings_.reference) reference_ = named(*settings_.reference);
+  ToolReading sensor;
+  ToolReading reference;
+  for (const IgtlTool& tool : *tools) {
+    if (settings_.reference && tool.name == *settings_.reference) reference = {ToolState::kOk, tool.X_TO};
+    if (is_sensor(link, tool.name, arrival)) sensor = {ToolState::kOk, tool.X_TO};
+  }
+  if (several_) return;
+  reference_ = reference;
   reference_arrival_ = arrival;
   deliver(message.time_stamp, message.time_ns(), sensor, arrival);
 }
@@ -125,11 +143,13 @@ void IgtlSession::on_time(LinkControl& link, Instant now) {
   if (health_.state() == DeviceState::kStreaming) health_.set_state(DeviceState::kSilent);
   if (now - last_ < kReopenAfter) return;
   // What the server itself complains of is the likelier reason.
-  const std::string why =
-      any_ ? "no pose of the sensor for 2 s" : fmt::format("connected, but no pose of '{}' in 2 s", settings_.sensor);
-  link.fail(!server_fault_.empty() ? fmt::format("{}: {}", why, server_fault_)
-            : any_                 ? why
-                                   : why + "; is it the name that the server sends?");
+  const std::string why = any_ ? std::string("no pose of the sensor for 2 s")
+                          : settings_.sensor.empty()
+                              ? std::string("connected, but no pose of any tool in 2 s")
+                              : fmt::format("connected, but no pose of '{}' in 2 s", settings_.sensor);
+  link.fail(!server_fault_.empty()             ? fmt::format("{}: {}", why, server_fault_)
+            : any_ || settings_.sensor.empty() ? why
+                                               : why + "; is it the name that the server sends?");
 }
 
 }  // namespace perimap

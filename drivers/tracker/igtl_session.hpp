@@ -13,7 +13,7 @@
 namespace perimap {
 
 struct IgtlSettings {
-  std::string sensor;                    // device name, or name of a tool in TDATA; empty: whatever comes
+  std::string sensor;                    // device name, or name of a tool in TDATA; empty: the only one that comes
   std::optional<std::string> reference;  // W is its frame
   WorldSettings world;
 };
@@ -21,6 +21,9 @@ struct IgtlSettings {
 // TRANSFORM and POSITION of the sensor's name give its pose; so does TDATA with a tool of that name, which is asked for
 // at the start (STT_TDATA, every 10 ms) and where a tool that is left out is missing. A message with metadata
 // "TransformStatus" (PLUS, 3D Slicer) other than OK says that the tool is missing. A STATUS that is not OK is told.
+//
+// Without a sensor's name the server must send one tool alone, beside the reference: a second one fails the link, and
+// after that the server is listened to for a second before one tool counts as the only one.
 //
 // The protocol has no common clock: stamps are the sender's, fitted to the host's by their arrival; a message without a
 // stamp is stamped by its arrival.
@@ -34,9 +37,11 @@ class IgtlSession final : public DeviceProtocol {
   [[nodiscard]] Instant next_time() const noexcept override;
 
  private:
-  void on_message(const IgtlMessage& message, Instant arrival);
-  void on_pose(const IgtlMessage& message, const Expected<Pose>& pose, Instant arrival);
-  void on_tdata(const IgtlMessage& message, Instant arrival);
+  void on_message(LinkControl& link, const IgtlMessage& message, Instant arrival);
+  void on_pose(LinkControl& link, const IgtlMessage& message, const Expected<Pose>& pose, Instant arrival);
+  void on_tdata(LinkControl& link, const IgtlMessage& message, Instant arrival);
+  // Whether this is the sensor's name. Without a name from the settings, a second tool fails the link.
+  [[nodiscard]] bool is_sensor(LinkControl& link, const std::string& name, Instant arrival);
   void deliver(std::uint64_t time_stamp, std::int64_t time_ns, const ToolReading& sensor, Instant arrival);
 
   IgtlSettings settings_;
@@ -50,6 +55,9 @@ class IgtlSession final : public DeviceProtocol {
   std::uint32_t count_ = 0;
   Instant last_{};  // reading, or the opening
   bool any_ = false;
+  std::string only_tool_;     // that came in this connection, when the settings name no sensor
+  bool several_ = false;      // tools have come; of earlier connections too
+  Instant listen_until_{};    // for a second tool
   std::string server_fault_;  // the last STATUS that was not OK, in this connection
 };
 

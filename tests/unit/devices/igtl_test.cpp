@@ -369,6 +369,67 @@ TEST(IgtlSession, MeasuresRelativeToTheReferenceWhileThatIsFresh) {
   EXPECT_EQ(samples[2].state, ToolState::kMissing);
 }
 
+// A session without a transport that is sent message by message.
+struct Listener {
+  explicit Listener(IgtlSettings settings)
+      : session(
+            std::move(settings), [this](const TrackerSample& sample) { samples.push_back(sample); }, health) {
+    session.on_open(link, kStart);
+  }
+  void send(const std::string& type, const std::string& name, const std::vector<std::byte>& content, Duration at,
+            std::uint64_t stamp = 0) {
+    session.on_bytes(link, encode_igtl({1, type, name, stamp, content, {}}), kStart + at);
+  }
+  void transform(const std::string& name, Duration at, const Pose& X = kPose, std::uint64_t stamp = 0) {
+    send("TRANSFORM", name, encode_igtl_transform(X), at, stamp);
+  }
+
+  std::vector<TrackerSample> samples;
+  DeviceHealth health;
+  ScriptedLink link;
+  IgtlSession session;
+};
+
+TEST(IgtlSession, WithoutANameASecondToolIsRefusedAndNotTakenForTheFirst) {
+  Listener listener({.sensor = "", .reference = std::nullopt, .world = {}});
+  listener.transform("Scope", milliseconds(10));
+  EXPECT_EQ(listener.samples.size(), 1U);
+  auto together = encode_igtl({1, "TRANSFORM", "Patient", 0, encode_igtl_transform(kPose), {}});
+  const auto behind = encode_igtl({1, "TRANSFORM", "Scope", 0, encode_igtl_transform(kPose), {}});
+  together.insert(together.end(), behind.begin(), behind.end());
+  listener.session.on_bytes(listener.link, together, kStart + milliseconds(11));
+  EXPECT_EQ(listener.samples.size(), 1U);
+  EXPECT_THAT(listener.link.failure, HasSubstr("several tools ('Scope', 'Patient'): say which one"));
+  // Opened anew, whichever comes first is no sooner the sensor.
+  listener.link.failure.clear();
+  listener.session.on_open(listener.link, kStart + seconds(1));
+  listener.transform("Patient", milliseconds(1010));
+  listener.transform("Scope", milliseconds(1011));
+  EXPECT_EQ(listener.samples.size(), 1U);
+  EXPECT_THAT(listener.link.failure, HasSubstr("several tools"));
+  // The server has been told to send one alone.
+  listener.link.failure.clear();
+  listener.session.on_open(listener.link, kStart + seconds(2));
+  for (int i = 0; i <= 10; ++i) listener.transform("Scope", milliseconds(2000 + 110 * i));
+  EXPECT_EQ(listener.link.failure, "");
+  EXPECT_EQ(listener.samples.size(), 2U);
+}
+
+TEST(IgtlSession, WithoutANameTdataMustHoldOneToolBesideTheReference) {
+  const Pose X_TR{so3_exp(Vector3d(0, 0.2, 0)), Vector3d(1, 2, 3)};
+  const auto tdata = [](std::vector<IgtlTool> tools) { return encode_igtl_tdata(tools); };
+  Listener listener({.sensor = "", .reference = "Patient", .world = {}});
+  listener.send("TDATA", "Tracker", tdata({{"Patient", X_TR}}), milliseconds(10));
+  ASSERT_EQ(listener.samples.size(), 1U);
+  EXPECT_EQ(listener.samples[0].state, ToolState::kMissing) << "the reference is not the sensor";
+  listener.send("TDATA", "Tracker", tdata({{"Patient", X_TR}, {"Scope", kPose}}), milliseconds(20));
+  ASSERT_EQ(listener.samples.size(), 2U);
+  EXPECT_LT((listener.samples[1].X_WS.t - (X_TR.inverse() * kPose).t).norm(), 1e-5);
+  listener.send("TDATA", "Tracker", tdata({{"Scope", kPose}, {"Pointer", X_TR}}), milliseconds(30));
+  EXPECT_EQ(listener.samples.size(), 2U);
+  EXPECT_THAT(listener.link.failure, HasSubstr("several tools ('Scope', 'Pointer')"));
+}
+
 TEST(IgtlSession, DamagedMessagesGiveNoPose) {
   EmulatorFaults faults;
   faults.bad_check = 0.05;
