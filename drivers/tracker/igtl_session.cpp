@@ -12,8 +12,12 @@ constexpr Duration kSilentAfter = std::chrono::milliseconds(300);
 constexpr Duration kReopenAfter = std::chrono::seconds(2);
 constexpr Duration kListenForOthers = std::chrono::seconds(1);
 constexpr unsigned kStatusOk = 1;
-// TRANSFORM messages of one instant come one by one; a reference that is older than this is none.
+// TRANSFORM messages of one instant come one by one. A reference that is farther away than this is none.
 constexpr Duration kReferenceAge = std::chrono::milliseconds(100);
+// Stamps that a server gives to tools of one instant.
+constexpr Duration kOneInstant = std::chrono::milliseconds(1);
+// For a reference that is sent after the sensor.
+constexpr Duration kLongestHold = std::chrono::milliseconds(20);
 
 // Resolution ms, coordinate system name char[32].
 std::vector<std::byte> start_tdata() {
@@ -33,7 +37,9 @@ void IgtlSession::on_open(LinkControl& link, Instant now) {
   framer_.restart();
   clock_.reset();
   reference_ = {};
-  last_stamp_ = 0;
+  reference_follows_ = false;
+  held_.reset();
+  delivered_ = {};
   last_ = now;
   any_ = false;
   only_tool_.clear();
@@ -89,13 +95,44 @@ void IgtlSession::on_pose(LinkControl& link, const IgtlMessage& message, const E
   for (const auto& [key, value] : message.metadata) {
     if (key == "TransformStatus" && value != "OK") reading = {};
   }
-  if (is_reference) {
-    reference_ = reading;
-    reference_arrival_ = arrival;
+  const Told told{reading, message.time_stamp, message.time_ns(), arrival};
+  return is_reference ? on_reference(told) : on_sensor(told);
+}
+
+Duration IgtlSession::apart(const Told& a, const Told& b) noexcept {
+  if (a.stamp == 0 || b.stamp == 0) return std::chrono::abs(a.arrival - b.arrival);
+  // Stamps are any numbers: their difference need not fit.
+  const auto [earlier, later] = std::minmax(a.time_ns, b.time_ns);
+  return Duration(static_cast<std::int64_t>(std::min<std::uint64_t>(
+      static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier), Duration::max().count())));
+}
+
+void IgtlSession::on_sensor(const Told& sensor) {
+  const Told& last = held_ ? *held_ : delivered_;
+  if (sensor.stamp != 0 && sensor.stamp == last.stamp) return;  // the same reading again
+  if (held_) {
+    reference_follows_ = false;
+    deliver(*std::exchange(held_, std::nullopt), reference_);
+  }
+  if (reference_follows_ && sensor.stamp != 0 && apart(sensor, reference_) > kOneInstant) {
+    held_ = sensor;
+  } else {
+    deliver(sensor, reference_);
+  }
+}
+
+void IgtlSession::on_reference(const Told& reference) {
+  const Told before = std::exchange(reference_, reference);
+  if (reference.stamp == 0) return;
+  if (!held_) {
+    reference_follows_ = reference_follows_ || (delivered_.stamp != 0 && apart(reference, delivered_) <= kOneInstant &&
+                                                apart(before, delivered_) > kOneInstant);
     return;
   }
-  if (arrival - reference_arrival_ > kReferenceAge) reference_ = {};
-  deliver(message.time_stamp, message.time_ns(), reading, arrival);
+  const bool of_this_instant = apart(reference, *held_) <= kOneInstant;
+  if (!of_this_instant && reference.time_ns < held_->time_ns) return;
+  const Told sensor = *std::exchange(held_, std::nullopt);
+  deliver(sensor, apart(reference, sensor) <= apart(before, sensor) ? reference : before);
 }
 
 void IgtlSession::on_tdata(LinkControl& link, const IgtlMessage& message, Instant arrival) {
@@ -108,27 +145,28 @@ void IgtlSession::on_tdata(LinkControl& link, const IgtlMessage& message, Instan
     if (is_sensor(link, tool.name, arrival)) sensor = {ToolState::kOk, tool.X_TO};
   }
   if (several_) return;
-  reference_ = reference;
-  reference_arrival_ = arrival;
-  deliver(message.time_stamp, message.time_ns(), sensor, arrival);
+  const Told told{sensor, message.time_stamp, message.time_ns(), arrival};
+  if (told.stamp != 0 && told.stamp == delivered_.stamp) return;  // the same reading again
+  reference_ = {reference, told.stamp, told.time_ns, arrival};
+  deliver(told, reference_);
 }
 
-void IgtlSession::deliver(std::uint64_t time_stamp, std::int64_t time_ns, const ToolReading& sensor, Instant arrival) {
-  if (time_stamp != 0 && time_stamp == last_stamp_) return;  // the same reading again
-  last_stamp_ = time_stamp;
+void IgtlSession::deliver(const Told& sensor, const Told& reference) {
+  delivered_ = sensor;
   TrackerSample sample;
-  sample.arrival = arrival;
-  sample.source_time = arrival;
-  if (time_stamp != 0) {
-    clock_.observe(time_ns, arrival);
-    health_.jitter.add(clock_.lateness(time_ns, arrival));
-    sample.source_time = clock_.stamp(time_ns);
+  sample.arrival = sensor.arrival;
+  sample.source_time = sensor.arrival;
+  if (sensor.stamp != 0) {
+    clock_.observe(sensor.time_ns, sensor.arrival);
+    health_.jitter.add(clock_.lateness(sensor.time_ns, sensor.arrival));
+    sample.source_time = clock_.stamp(sensor.time_ns);
   }
   sample.device_frame = count_++;
-  const ToolReading reading = in_world(sensor, reference_, settings_.world);
+  const bool near = apart(sensor, reference) <= kReferenceAge;
+  const ToolReading reading = in_world(sensor.reading, near ? reference.reading : ToolReading{}, settings_.world);
   sample.state = reading.state;
   sample.X_WS = reading.X_TO;
-  last_ = arrival;
+  last_ = sensor.arrival;
   any_ = true;
   health_.samples.add();
   health_.set_state(DeviceState::kStreaming);
@@ -136,11 +174,18 @@ void IgtlSession::deliver(std::uint64_t time_stamp, std::int64_t time_ns, const 
 }
 
 Instant IgtlSession::next_time() const noexcept {
-  return last_ + (health_.state() == DeviceState::kStreaming ? kSilentAfter : kReopenAfter);
+  const Instant expected = last_ + (health_.state() == DeviceState::kStreaming ? kSilentAfter : kReopenAfter);
+  return held_ ? std::min(expected, held_->arrival + kLongestHold) : expected;
 }
 
 void IgtlSession::on_time(LinkControl& link, Instant now) {
-  if (health_.state() == DeviceState::kStreaming) health_.set_state(DeviceState::kSilent);
+  if (held_ && now - held_->arrival >= kLongestHold) {
+    reference_follows_ = false;
+    deliver(*std::exchange(held_, std::nullopt), reference_);
+  }
+  if (now - last_ >= kSilentAfter && health_.state() == DeviceState::kStreaming) {
+    health_.set_state(DeviceState::kSilent);
+  }
   if (now - last_ < kReopenAfter) return;
   // What the server itself complains of is the likelier reason.
   const std::string why = any_ ? std::string("no pose of the sensor for 2 s")

@@ -22,6 +22,9 @@ struct IgtlSettings {
 // at the start (STT_TDATA, every 10 ms) and where a tool that is left out is missing. A message with metadata
 // "TransformStatus" (PLUS, 3D Slicer) other than OK says that the tool is missing. A STATUS that is not OK is told.
 //
+// A reference is of the sensor's instant by the server's stamps, whichever is sent first; where no reference has the
+// sensor's own stamp, the nearest within 100 ms counts. Without stamps arrivals count in their place.
+//
 // Without a sensor's name the server must send one tool alone, beside the reference: a second one fails the link, and
 // after that the server is listened to for a second before one tool counts as the only one.
 //
@@ -42,16 +45,29 @@ class IgtlSession final : public DeviceProtocol {
   void on_tdata(LinkControl& link, const IgtlMessage& message, Instant arrival);
   // Whether this is the sensor's name. Without a name from the settings, a second tool fails the link.
   [[nodiscard]] bool is_sensor(LinkControl& link, const std::string& name, Instant arrival);
-  void deliver(std::uint64_t time_stamp, std::int64_t time_ns, const ToolReading& sensor, Instant arrival);
+  // What a message says of one tool.
+  struct Told {
+    ToolReading reading;
+    std::uint64_t stamp = 0;  // 32.32 fixed point, s; 0: none
+    std::int64_t time_ns = 0;
+    Instant arrival;
+  };
+  // From the earlier to the later of the two, by their stamps where both have one.
+  [[nodiscard]] static Duration apart(const Told& a, const Told& b) noexcept;
+  void on_sensor(const Told& sensor);
+  void on_reference(const Told& reference);
+  void deliver(const Told& sensor, const Told& reference);
 
   IgtlSettings settings_;
   TrackerSink sink_;
   DeviceHealth& health_;
   IgtlFramer framer_;
   ArrivalClock clock_{{.period_ns = 1.0}};
-  ToolReading reference_;
-  Instant reference_arrival_{};
-  std::uint64_t last_stamp_ = 0;
+  Told reference_;
+  // Servers that send the sensor before the reference of the same instant: the sensor then waits for it.
+  bool reference_follows_ = false;
+  std::optional<Told> held_;
+  Told delivered_;  // of the sensor, the last
   std::uint32_t count_ = 0;
   Instant last_{};  // reading, or the opening
   bool any_ = false;

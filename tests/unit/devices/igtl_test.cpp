@@ -390,6 +390,56 @@ struct Listener {
   IgtlSession session;
 };
 
+// A patient that moves by 10 mm a cycle, sent after the scope and before it, with stamps alike or almost.
+TEST(IgtlSession, APoseIsRelativeToTheReferenceOfItsOwnInstantWhicheverIsSentFirst) {
+  for (const bool scope_first : {true, false}) {
+    for (const std::uint64_t between : {0U, 1000000U}) {  // 0.23 ms
+      SCOPED_TRACE(scope_first);
+      Listener listener({.sensor = "Scope", .reference = "Patient", .world = {}});
+      for (int i = 0; i < 50; ++i) {
+        const std::uint64_t stamp = (1ULL << 32U) + static_cast<std::uint64_t>(i) * 85899346U;  // 20 ms
+        const Pose X_TR{Matrix3d::Identity(), Vector3d(10.0 * i, 0, 0)};
+        const Duration at = milliseconds(20 * i);
+        const std::size_t given = listener.samples.size();
+        if (scope_first) listener.transform("Scope", at, kPose, stamp);
+        listener.transform("Patient", at + milliseconds(1), X_TR, stamp + between);
+        if (!scope_first) listener.transform("Scope", at + milliseconds(2), kPose, stamp);
+        ASSERT_EQ(listener.samples.size(), given + 1);
+        const TrackerSample& sample = listener.samples.back();
+        if (i == 0 && scope_first) {
+          EXPECT_EQ(sample.state, ToolState::kMissing) << "before any reference";
+          continue;
+        }
+        ASSERT_EQ(sample.state, ToolState::kOk);
+        EXPECT_NEAR(sample.X_WS.t[0], kPose.t[0] - 10.0 * i, 1e-3);
+        EXPECT_EQ(sample.arrival, kStart + at + milliseconds(scope_first ? 0 : 2));
+      }
+    }
+  }
+}
+
+TEST(IgtlSession, AReferenceThatStaysAwayHoldsUpOnePoseForTwentyMilliseconds) {
+  Listener listener({.sensor = "Scope", .reference = "Patient", .world = {}});
+  const auto stamp = [](int i) { return (1ULL << 32U) + static_cast<std::uint64_t>(i) * 85899346U; };
+  for (int i = 0; i < 10; ++i) {
+    listener.transform("Scope", milliseconds(20 * i), kPose, stamp(i));
+    listener.transform("Patient", milliseconds(20 * i + 1), Pose{}, stamp(i));
+  }
+  ASSERT_EQ(listener.samples.size(), 10U);
+  listener.transform("Scope", milliseconds(200), kPose, stamp(10));
+  EXPECT_EQ(listener.samples.size(), 10U);
+  EXPECT_EQ(listener.session.next_time(), kStart + milliseconds(220));
+  listener.session.on_time(listener.link, kStart + milliseconds(220));
+  ASSERT_EQ(listener.samples.size(), 11U);
+  EXPECT_EQ(listener.samples.back().state, ToolState::kOk) << "the last reference is 20 ms old";
+  EXPECT_EQ(listener.health.state(), DeviceState::kStreaming);
+  for (int i = 11; i < 20; ++i) {
+    listener.transform("Scope", milliseconds(20 * i), kPose, stamp(i));
+    ASSERT_EQ(listener.samples.size(), static_cast<std::size_t>(i + 1));
+    EXPECT_EQ(listener.samples.back().state, i < 15 ? ToolState::kOk : ToolState::kMissing) << i;
+  }
+}
+
 TEST(IgtlSession, WithoutANameASecondToolIsRefusedAndNotTakenForTheFirst) {
   Listener listener({.sensor = "", .reference = std::nullopt, .world = {}});
   listener.transform("Scope", milliseconds(10));
