@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::uint16_t kFirstWiredPort = 0x0A;
 constexpr std::size_t kLongestCommand = 512;
+constexpr Duration kDeafAfterInit = std::chrono::milliseconds(100);
 
 class Bytes {
  public:
@@ -87,6 +88,7 @@ void NdiEmulator::on_open(LinkControl& /*link*/, Instant /*now*/) {
   held_.clear();
   restart();
   initialised_ = false;
+  deaf_until_ = {};
 }
 
 void NdiEmulator::restart() {
@@ -99,6 +101,7 @@ void NdiEmulator::restart() {
 
 void NdiEmulator::on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) {
   now_ = arrival;
+  if (arrival < deaf_until_) return;
   for (const std::byte b : bytes) {
     if (b == std::byte{'\r'}) {
       on_command(link, std::exchange(line_, {}), arrival);
@@ -172,6 +175,7 @@ void NdiEmulator::on_command(LinkControl& link, const std::string& line, Instant
   if (name == "INIT") {
     restart();
     initialised_ = true;
+    deaf_until_ = now + kDeafAfterInit;
     return reply(link, "OKAY");
   }
   if (name == "COMM") return reply(link, "OKAY");
@@ -218,6 +222,9 @@ void NdiEmulator::on_command(LinkControl& link, const std::string& line, Instant
   } else if (name == "PINIT") {
     if (!port->wired && port->definition.empty()) return reply(link, "ERROR0D");
     port->initialised = true;
+    if (settings_.second_channel && port == &ports_.at(kFirstWiredPort)) {
+      ports_[static_cast<std::uint16_t>(kFirstWiredPort + settings_.wired_tools)].wired = true;
+    }
   } else if (name == "PENA") {
     if (!port->initialised) return reply(link, "ERROR0E");
     port->enabled = true;

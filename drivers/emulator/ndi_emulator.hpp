@@ -20,9 +20,11 @@ struct NdiEmulatorSettings {
   Newest newest = Newest::kBx2;
   int wired_tools = 0;                           // in its ports from the start, port handles 0A, 0B ...
   std::optional<Pose> reference = std::nullopt;  // where the second tool is, constant; the first follows the track
+  bool second_channel = false;                   // of the first wired tool: shows when that has been initialised
   bool malformed_bx2 = false;                    // its BX2 replies are whole, but their bodies are not as in the guide
 };
 
+// For 100 ms after INIT it hears nothing, as the guide allows it.
 class NdiEmulator final : public DeviceProtocol {
  public:
   NdiEmulator(PoseTrack track, const NdiEmulatorSettings& settings, const EmulatorFaults& faults);
@@ -73,6 +75,7 @@ class NdiEmulator final : public DeviceProtocol {
   std::string line_;
   std::deque<Held> held_;
   Instant now_{};
+  Instant deaf_until_{};
   std::map<std::uint16_t, Port> ports_;
   bool initialised_ = false;
   bool tracking_ = false;

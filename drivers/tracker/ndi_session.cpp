@@ -24,6 +24,7 @@ constexpr Duration kSilentAfter = milliseconds(300);
 constexpr Duration kReopenAfter = seconds(2);
 constexpr Duration kQuietTime = milliseconds(20);
 constexpr int kMostRetries = 3;
+constexpr int kMostSearches = 16;  // a device that always finds a port to initialise does not hold up the start
 constexpr std::size_t kBlock = 64;
 constexpr std::uint16_t kHardwareFailure = 0x0010;
 
@@ -101,6 +102,7 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
   query_ = Query::kBx2;
   answered_ = false;
   retries_ = 0;
+  searches_ = 0;
   if (link.serial()) {
     link.send_break();
     step_ = Step::kReset;
@@ -126,6 +128,7 @@ void NdiSession::enter(LinkControl& link, Step step, Instant now) {
       return command(link, "INIT:", kLongReplyTime, now);
     case Step::kSetRate:
       return command(link, "COMM:50000", kReplyTime, now);
+    case Step::kPause:
     case Step::kSettle:
       due_ = now + kSettleTime;
       return;
@@ -163,7 +166,7 @@ void NdiSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, I
     due_ = std::min(quiet_until_, next_expectation());
     return;
   }
-  if (step_ == Step::kSettle) return;
+  if (step_ == Step::kSettle || step_ == Step::kPause) return;
   framer_.feed(bytes);
   while (const auto reply = framer_.next()) {
     on_reply(link, *reply, arrival);
@@ -236,7 +239,7 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
       return enter(link, Step::kInitialise, now);
     case Step::kInitialise:
       if (!okay) break;
-      return enter(link, link.serial() ? Step::kSetRate : Step::kVersion, now);
+      return enter(link, Step::kPause, now);
     case Step::kSetRate:
       if (!okay) break;
       link.set_line_rate(kFastBaud);
@@ -250,6 +253,7 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
       auto handles = handles_of(text);
       if (!handles) break;
       ports_.assign(handles->rbegin(), handles->rend());  // taken from the end
+      search_again_ = step_ == Step::kFindToInitialise && !ports_.empty() && ++searches_ < kMostSearches;
       return next_port(link, step_, now);
     }
     case Step::kFree:
@@ -281,6 +285,7 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
     case Step::kStream:
       if (query_ != Query::kTx) return on_damage(link, "a text in place of a binary reply", now);
       return on_tracking(link, decode_tx(text), now);
+    case Step::kPause:
     case Step::kSettle:
     case Step::kQuiet:
       return;
@@ -312,6 +317,7 @@ void NdiSession::next_port(LinkControl& link, Step search, Instant now) {
     return next_upload(link, now);
   }
   if (search == Step::kFindToInitialise) {
+    if (search_again_) return enter(link, Step::kFindToInitialise, now);
     enabled_.clear();
     return enter(link, Step::kFindToEnable, now);
   }
@@ -461,6 +467,8 @@ void NdiSession::on_time(LinkControl& link, Instant now) {
     case Step::kReset:
       // No answer to the break: it may not have got through (some adapters send none), so it is tried without.
       return enter(link, Step::kInitialise, now);
+    case Step::kPause:
+      return enter(link, link.serial() ? Step::kSetRate : Step::kVersion, now);
     case Step::kSettle:
       return enter(link, Step::kVersion, now);
     case Step::kStop:

@@ -1,7 +1,8 @@
 // An NDI tracker (Polaris, Vega, Aurora) by its Combined API: from the bare link to poses (guides as in ndi_reply.hpp).
 //
 // Start: serial break, INIT, COMM to 115200 baud (serial); TSTOP, INIT (TCP). Then ports that are to be freed are
-// freed, tool definitions uploaded (PHRQ, PVWR), ports initialised (PHSR 02, PINIT) and enabled (PHSR 03, PENA),
+// freed, tool definitions uploaded (PHRQ, PVWR), ports initialised (PHSR 02, PINIT; again until there is none: a tool
+// of several channels shows its others only then) and enabled (PHSR 03, PENA),
 // TSTART. Then BX2 is asked for again and again; where a device has no BX2, BX; where it has neither, TX. A kind
 // of reply that comes damaged four times and never whole is given up in the same way.
 //
@@ -50,6 +51,7 @@ class NdiSession final : public DeviceProtocol {
     kReset,  // break sent, RESET awaited
     kStop,   // tracking may run from an earlier session
     kInitialise,
+    kPause,    // initialised; the device needs a moment
     kSetRate,  // COMM sent
     kSettle,   // the line runs at another rate; the device needs a moment
     kVersion,
@@ -97,6 +99,8 @@ class NdiSession final : public DeviceProtocol {
   std::size_t tool_ = 0;  // of uploads: 0 sensor, 1 reference
   std::size_t block_ = 0;
   bool port_requested_ = false;
+  int searches_ = 0;           // for ports to be initialised
+  bool search_again_ = false;  // the last found some
   std::uint16_t sensor_handle_ = 0;
   std::uint16_t reference_handle_ = 0;
   Query query_ = Query::kBx2;

@@ -29,7 +29,8 @@ void check(const Expected<NdiTracking>& tracking) {
 }
 
 // Answers of an NDI device that bring a session to its stream; then the input.
-constexpr std::string_view kAnswers[] = {"OKAY", "OKAY", "device", "00", "010A001", "OKAY", "010A011", "OKAY", "OKAY"};
+constexpr std::string_view kAnswers[] = {"OKAY", "OKAY", "device",  "00",   "010A001",
+                                         "OKAY", "00",   "010A011", "OKAY", "OKAY"};
 
 }  // namespace
 }  // namespace perimap
@@ -61,6 +62,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       protocol->on_open(link, now);
       if (data[0] % 6 == 4) break;
       for (const std::string_view answer : kAnswers) {
+        // After INIT it pauses.
+        if (answer == "device") protocol->on_time(link, protocol->next_time());
         const std::string framed = ndi_with_crc(answer);
         protocol->on_bytes(link, std::as_bytes(std::span(framed.data(), framed.size())), now);
       }

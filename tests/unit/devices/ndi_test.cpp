@@ -462,6 +462,40 @@ TEST(NdiSession, ABx2ThatIsNeverUnderstoodIsGivenUpForBx) {
   EXPECT_THAT(theatre.sent, HasSubstr("BX:0801"));
 }
 
+TEST(NdiSession, AHandleThatShowsAfterTheFirstIsInitialisedIsInitialisedToo) {
+  NdiSettings settings = wired();
+  settings.sensor.handle = 0x0B;
+  Theatre theatre(settings, {.wired_tools = 1, .second_channel = true});
+  theatre.run(seconds(1));
+  EXPECT_EQ(theatre.host.failure, "");
+  EXPECT_GT(theatre.samples.size(), 50U);
+}
+
+TEST(NdiSession, ADeviceThatAlwaysFindsAPortToInitialiseDoesNotHoldUpTheStart) {
+  DeviceHealth health;
+  NdiSession session(
+      wired(), [](const TrackerSample&) {}, health);
+  ScriptedLink link;
+  Instant now = kStart;
+  session.on_open(link, now);
+  bool started = false;
+  for (int i = 0; i < 200 && !started && link.failure.empty(); ++i, now += milliseconds(150)) {
+    const std::string asked = link.take_sent();
+    started = asked.starts_with("TSTART");
+    if (asked.empty()) {
+      session.on_time(link, now);
+    } else if (asked.starts_with("PHSR:01")) {
+      session.on_bytes(link, bytes_of(ndi_with_crc("00")), now);
+    } else if (asked.starts_with("PHSR")) {
+      session.on_bytes(link, bytes_of(ndi_with_crc("010A001")), now);
+    } else {
+      session.on_bytes(link, bytes_of(ndi_with_crc("OKAY")), now);
+    }
+  }
+  EXPECT_EQ(link.failure, "");
+  EXPECT_TRUE(started);
+}
+
 TEST(NdiSession, SaysWhatIsWrongWithTheTools) {
   NdiSettings none = wired();
   Theatre without(none, {});
