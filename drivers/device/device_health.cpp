@@ -40,4 +40,14 @@ std::string DeviceHealth::identity() const {
   return identity_;
 }
 
+void DeviceHealth::set_awaited(std::string awaited) {
+  const std::lock_guard lock(mutex_);
+  awaited_ = on_one_line(std::move(awaited));
+}
+
+std::string DeviceHealth::awaited() const {
+  const std::lock_guard lock(mutex_);
+  return awaited_;
+}
+
 }  // namespace perimap

@@ -41,12 +41,16 @@ class DeviceHealth : public DeviceCounters {
   [[nodiscard]] std::string reason() const;
   void set_identity(std::string identity);
   [[nodiscard]] std::string identity() const;
+  // What a device that is starting has been asked and has not answered yet.
+  void set_awaited(std::string awaited);
+  [[nodiscard]] std::string awaited() const;
 
  private:
   std::atomic<DeviceState> state_{DeviceState::kClosed};
-  mutable std::mutex mutex_;  // of the texts, which change when a link opens or closes
+  mutable std::mutex mutex_;  // of the texts, which change when a link opens, starts or closes
   std::string reason_;
   std::string identity_;
+  std::string awaited_;
 };
 
 }  // namespace perimap

@@ -107,6 +107,7 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
     link.send_break();
     step_ = Step::kReset;
     command_ = "a serial break";
+    health_.set_awaited(command_);
     due_ = now + kResetTime;
   } else {
     enter(link, Step::kStop, now);
@@ -115,9 +116,12 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
 
 void NdiSession::command(LinkControl& link, const std::string& text, Duration longest, Instant now) {
   command_ = text;
+  if (step_ != Step::kStream) health_.set_awaited(command_name());
   link.send(ndi_with_crc(text));
   due_ = now + longest;
 }
+
+std::string NdiSession::command_name() const { return command_.substr(0, command_.find(':') + 1); }
 
 void NdiSession::enter(LinkControl& link, Step step, Instant now) {
   step_ = step;
@@ -487,8 +491,7 @@ void NdiSession::on_time(LinkControl& link, Instant now) {
       framer_.restart();
       return ask(link, now);
     default:
-      link.fail(fmt::format("no answer to {}; is it an NDI tracker, switched on, and at this port?",
-                            command_.substr(0, command_.find(':') + 1)));
+      link.fail(fmt::format("no answer to {}; is it an NDI tracker, switched on, and at this port?", command_name()));
   }
 }
 

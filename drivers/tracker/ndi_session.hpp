@@ -70,6 +70,7 @@ class NdiSession final : public DeviceProtocol {
   enum class Query : std::uint8_t { kBx2, kBx, kTx };
 
   void enter(LinkControl& link, Step step, Instant now);
+  [[nodiscard]] std::string command_name() const;  // of the command under way, without its arguments
   void command(LinkControl& link, const std::string& text, Duration longest, Instant now);
   void on_reply(LinkControl& link, const NdiReply& reply, Instant arrival);
   void on_text(LinkControl& link, const std::string& text, Instant now);

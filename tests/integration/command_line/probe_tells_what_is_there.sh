@@ -75,6 +75,18 @@ assert.match(gone.ecg.reason, /wrong baud rate or another device|not a byte/);
 for (const device of ["camera", "tracker", "ecg", "r_trigger"]) assert.notEqual(gone[device].state, "streaming", device);
 END_OF_JS
 
+# A tracker that takes the connection and says nothing; a session gives it up later than this probe ends.
+node -e 'require("net").createServer(() => {}).listen(process.argv[1], "127.0.0.1")' $((port + 2)) &
+emulators="$emulators $!"
+for _ in $(seq 100); do
+  (: < "/dev/tcp/127.0.0.1/$((port + 2))") 2> /dev/null && break
+  sleep 0.1
+done
+printf 'version = 1\n[tracker]\nprotocol = "ndi"\nport = "tcp:127.0.0.1:%d"\n' $((port + 2)) > "$work/deaf.toml"
+"$perimap" probe "$work/deaf.toml" --seconds 3 > "$work/deaf" 2>&1
+[ $? -eq 1 ] && grep -q "why .*no answer yet to INIT:" "$work/deaf" && grep -q "faults .*0 damaged" "$work/deaf" ||
+  fail "a tracker that says nothing: $(cat "$work/deaf")"
+
 printf 'version = 1\n[camera]\ndevice = "video:none.avi"\n' > "$work/wrong.toml"
 "$perimap" probe "$work/wrong.toml" > "$work/out" 2>&1
 [ $? -eq 2 ] && grep -q "none.avi, which is not there" "$work/out" || fail "a missing video: $(cat "$work/out")"

@@ -518,7 +518,9 @@ TEST(NdiSession, SilenceAndStrangersAreTold) {
       wired(), [](const TrackerSample&) { FAIL(); }, health);
   ScriptedLink link;
   session.on_open(link, kStart);
+  EXPECT_EQ(health.awaited(), "TSTOP:");
   session.on_time(link, session.next_time());  // no answer to TSTOP is none to INIT either
+  EXPECT_EQ(health.awaited(), "INIT:");
   session.on_time(link, session.next_time());
   EXPECT_THAT(link.failure, HasSubstr("no answer to INIT:"));
   ScriptedLink noisy;
