@@ -21,6 +21,7 @@ class LinkControl {
   void send(std::string_view text) { send(std::as_bytes(std::span(text.data(), text.size()))); }
   // Of a serial line; nothing on another link.
   virtual void set_line_rate(int baud) = 0;
+  // A line that cannot send one goes on without: the device's silence tells it, as that of one that did not hear it.
   virtual void send_break() = 0;
   // Closes the link, tells why, and has it opened anew. The first reason counts.
   virtual void fail(std::string reason) = 0;

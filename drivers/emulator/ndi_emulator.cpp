@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -14,6 +15,10 @@ namespace perimap {
 namespace {
 
 constexpr std::uint16_t kFirstWiredPort = 0x0A;
+constexpr int kFirstBaud = 9600;
+// By COMM's first digit.
+constexpr std::array<int, 8> kBauds{9600, 14400, 19200, 38400, 57600, 115200, 921600, 1228739};
+constexpr char kNonsense = 'x';  // what a byte of another rate is heard as
 constexpr std::size_t kLongestCommand = 512;
 constexpr Duration kDeafAfterInit = std::chrono::milliseconds(100);
 
@@ -86,6 +91,7 @@ NdiEmulator::NdiEmulator(PoseTrack track, const NdiEmulatorSettings& settings, c
 void NdiEmulator::on_open(LinkControl& /*link*/, Instant /*now*/) {
   line_.clear();
   held_.clear();
+  baud_ = kFirstBaud;
   restart();
   initialised_ = false;
   deaf_until_ = {};
@@ -99,20 +105,32 @@ void NdiEmulator::restart() {
   tracking_ = false;
 }
 
+bool NdiEmulator::rates_agree(const LinkControl& link) const noexcept {
+  if (!link.serial() || link.byte_time_ns() <= 0.0) return true;
+  constexpr double kTolerance = 0.03;  // of UARTs
+  return std::abs(10.0e9 / link.byte_time_ns() - baud_) < kTolerance * baud_;
+}
+
 void NdiEmulator::on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) {
   now_ = arrival;
   if (arrival < deaf_until_) return;
+  const bool heard = rates_agree(link);
   for (const std::byte b : bytes) {
-    if (b == std::byte{'\r'}) {
+    if (heard && b == std::byte{'\r'}) {
       on_command(link, std::exchange(line_, {}), arrival);
     } else if (line_.size() < kLongestCommand) {
-      line_.push_back(static_cast<char>(b));
+      line_.push_back(heard ? static_cast<char>(b) : kNonsense);
     }
   }
 }
 
 void NdiEmulator::on_time(LinkControl& link, Instant now) {
-  for (; !held_.empty() && held_.front().due <= now; held_.pop_front()) link.send(held_.front().reply);
+  for (; !held_.empty() && held_.front().due <= now; held_.pop_front()) {
+    Held& next = held_.front();
+    if (!rates_agree(link)) std::fill(next.reply.begin(), next.reply.end(), static_cast<std::byte>(kNonsense));
+    link.send(next.reply);
+    if (next.baud_after > 0) baud_ = next.baud_after;
+  }
 }
 
 void NdiEmulator::send(LinkControl& link, std::span<const std::byte> bytes, std::size_t check) {
@@ -173,12 +191,19 @@ void NdiEmulator::on_command(LinkControl& link, const std::string& line, Instant
   }
   if (name == "RESET") return reply(link, "RESET");
   if (name == "INIT") {
+    if (tracking_) return reply(link, "ERROR0C");
     restart();
     initialised_ = true;
     deaf_until_ = now + kDeafAfterInit;
     return reply(link, "OKAY");
   }
-  if (name == "COMM") return reply(link, "OKAY");
+  if (name == "COMM") {
+    const auto rate = hex(std::string_view(arguments).substr(0, 1));
+    if (arguments.size() != 5 || !rate || *rate >= kBauds.size()) return reply(link, "ERROR01");
+    reply(link, "OKAY");
+    if (link.serial() && !held_.empty()) held_.back().baud_after = kBauds[*rate];
+    return;
+  }
   if (!initialised_) return reply(link, name == "TSTOP" ? "ERROR0C" : "ERROR10");
   if (name == "VER") return reply(link, "perimap emulated tracker\nFreeze Tag: 1.0");
   if (name == "TSTOP") {

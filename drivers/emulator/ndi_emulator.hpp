@@ -24,7 +24,9 @@ struct NdiEmulatorSettings {
   bool malformed_bx2 = false;                    // its BX2 replies are whole, but their bodies are not as in the guide
 };
 
-// For 100 ms after INIT it hears nothing, as the guide allows it.
+// On a serial line it begins at 9600 baud and goes on at what COMM says, until it is plugged in anew; while the other
+// end has set another rate it hears and sends nonsense. It hears no break. For 100 ms after INIT it hears nothing, as
+// the guide allows it.
 class NdiEmulator final : public DeviceProtocol {
  public:
   NdiEmulator(PoseTrack track, const NdiEmulatorSettings& settings, const EmulatorFaults& faults);
@@ -53,9 +55,12 @@ class NdiEmulator final : public DeviceProtocol {
   struct Held {
     Instant due;
     std::vector<std::byte> reply;
+    int baud_after = 0;  // of the line, once this has gone; 0: as it is
   };
 
   void restart();
+  // Whether the other end of the line has the device's rate.
+  [[nodiscard]] bool rates_agree(const LinkControl& link) const noexcept;
   void send(LinkControl& link, std::span<const std::byte> bytes, std::size_t check);
   void on_command(LinkControl& link, const std::string& line, Instant now);
   void reply(LinkControl& link, std::string_view text);
@@ -75,6 +80,7 @@ class NdiEmulator final : public DeviceProtocol {
   std::string line_;
   std::deque<Held> held_;
   Instant now_{};
+  int baud_ = 0;
   Instant deaf_until_{};
   std::map<std::uint16_t, Port> ports_;
   bool initialised_ = false;

@@ -103,6 +103,7 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
   answered_ = false;
   retries_ = 0;
   searches_ = 0;
+  baud_ = NdiSettings::kFirstBaud;
   if (link.serial()) {
     link.send_break();
     step_ = Step::kReset;
@@ -119,6 +120,11 @@ void NdiSession::command(LinkControl& link, const std::string& text, Duration lo
   if (step_ != Step::kStream) health_.set_awaited(command_name());
   link.send(ndi_with_crc(text));
   due_ = now + longest;
+}
+
+void NdiSession::set_rate(LinkControl& link, int baud) {
+  baud_ = baud;
+  link.set_line_rate(baud);
 }
 
 std::string NdiSession::command_name() const { return command_.substr(0, command_.find(':') + 1); }
@@ -203,7 +209,8 @@ void NdiSession::on_damage(LinkControl& link, const std::string& what, Instant n
     }
     return enter(link, Step::kQuiet, now);
   }
-  if (step_ == Step::kReset) return;  // bytes of the old rate
+  // Bytes of another rate. Of TSTOP only a whole answer says that the rate is right.
+  if (step_ == Step::kReset || (step_ == Step::kStop && link.serial())) return;
   // A port that was given and not taken would stay behind, so that is not asked for twice.
   if (step_ == Step::kRequestPort || ++retries_ > kMostRetries) {
     return link.fail(
@@ -214,8 +221,12 @@ void NdiSession::on_damage(LinkControl& link, const std::string& what, Instant n
 
 void NdiSession::on_error(LinkControl& link, const std::string& text, Instant now) {
   switch (step_) {
-    case Step::kStop:  // it was not tracking
-      return enter(link, Step::kInitialise, now);
+    case Step::kStop:
+      // What it heard at another rate stood before the command, which was then not understood.
+      if ((text.starts_with("ERROR04") || text.starts_with("ERROR01")) && ++retries_ <= kMostRetries) {
+        return command(link, command_, kReplyTime, now);
+      }
+      return enter(link, Step::kInitialise, now);  // it was not tracking
     case Step::kVersion:
       return enter(link, Step::kFindToFree, now);
     case Step::kStream:
@@ -246,7 +257,7 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
       return enter(link, Step::kPause, now);
     case Step::kSetRate:
       if (!okay) break;
-      link.set_line_rate(kFastBaud);
+      set_rate(link, kFastBaud);
       return enter(link, Step::kSettle, now);
     case Step::kVersion:
       health_.set_identity(text.substr(0, text.find('\n')));
@@ -470,13 +481,22 @@ void NdiSession::on_time(LinkControl& link, Instant now) {
   switch (step_) {
     case Step::kReset:
       // No answer to the break: it may not have got through (some adapters send none), so it is tried without.
-      return enter(link, Step::kInitialise, now);
+      framer_.restart();
+      return enter(link, Step::kStop, now);
     case Step::kPause:
-      return enter(link, link.serial() ? Step::kSetRate : Step::kVersion, now);
+      return enter(link, link.serial() && baud_ != kFastBaud ? Step::kSetRate : Step::kVersion, now);
     case Step::kSettle:
       return enter(link, Step::kVersion, now);
     case Step::kStop:
-      return enter(link, Step::kInitialise, now);
+      if (!link.serial()) return enter(link, Step::kInitialise, now);
+      if (baud_ == kFastBaud) {
+        return link.fail(
+            fmt::format("no answer at {} nor at {} baud; is it an NDI tracker, switched on, and at this port?",
+                        NdiSettings::kFirstBaud, kFastBaud));
+      }
+      framer_.restart();
+      set_rate(link, kFastBaud);
+      return enter(link, Step::kStop, now);
     case Step::kQuiet:
       if (!expect_readings(link, now)) return;
       if (now < quiet_until_) {

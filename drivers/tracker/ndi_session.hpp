@@ -1,6 +1,8 @@
 // An NDI tracker (Polaris, Vega, Aurora) by its Combined API: from the bare link to poses (guides as in ndi_reply.hpp).
 //
-// Start: serial break, INIT, COMM to 115200 baud (serial); TSTOP, INIT (TCP). Then ports that are to be freed are
+// Start: serial break, INIT, COMM to 115200 baud (serial); TSTOP, INIT (TCP). A device that does not answer a break, or
+// an adapter that sends none, leaves the line at the rate of the last session: TSTOP then finds which, 9600 or 115200
+// baud. Then ports that are to be freed are
 // freed, tool definitions uploaded (PHRQ, PVWR), ports initialised (PHSR 02, PINIT; again until there is none: a tool
 // of several channels shows its others only then) and enabled (PHSR 03, PENA),
 // TSTART. Then BX2 is asked for again and again; where a device has no BX2, BX; where it has neither, TX. A kind
@@ -71,6 +73,7 @@ class NdiSession final : public DeviceProtocol {
 
   void enter(LinkControl& link, Step step, Instant now);
   [[nodiscard]] std::string command_name() const;  // of the command under way, without its arguments
+  void set_rate(LinkControl& link, int baud);
   void command(LinkControl& link, const std::string& text, Duration longest, Instant now);
   void on_reply(LinkControl& link, const NdiReply& reply, Instant arrival);
   void on_text(LinkControl& link, const std::string& text, Instant now);
@@ -93,9 +96,10 @@ class NdiSession final : public DeviceProtocol {
   ArrivalClock clock_;
   NdiReplyFramer framer_;
   Step step_ = Step::kReset;
-  Instant due_ = kNever;            // of the reply, or of what comes next
-  std::string command_;             // the one under way, for messages
-  std::vector<std::string> ports_;  // handles that the step still has to see to
+  int baud_ = NdiSettings::kFirstBaud;  // of a serial line
+  Instant due_ = kNever;                // of the reply, or of what comes next
+  std::string command_;                 // the one under way, for messages
+  std::vector<std::string> ports_;      // handles that the step still has to see to
   std::vector<std::uint16_t> enabled_;
   std::size_t tool_ = 0;  // of uploads: 0 sensor, 1 reference
   std::size_t block_ = 0;

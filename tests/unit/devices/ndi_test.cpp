@@ -248,6 +248,7 @@ struct Theatre {
     for (const Instant end = now + longest; now < end && host.failure.empty(); now += milliseconds(1)) {
       const auto to_device = bytes_of(host.take_sent());
       sent.append(reinterpret_cast<const char*>(to_device.data()), to_device.size());
+      if (far.baud() != host.baud()) far.set_line_rate(host.baud());  // both ends of one line
       device.on_bytes(far, to_device, now);
       device.on_time(far, now);
       const auto to_host = bytes_of(far.take_sent());
@@ -309,10 +310,38 @@ TEST(NdiSession, OverASerialLineItSendsABreakAndChangesTheRate) {
   EXPECT_GT(theatre.samples.size(), 50U);
 }
 
+// An adapter that sends no break, and a device that was left at the rate of the session before.
+TEST(NdiSession, WithoutABreakItFindsTheRateThatTheLastSessionLeft) {
+  Theatre theatre(wired(), {.wired_tools = 1}, true, {}, 9600);
+  theatre.run(seconds(4));
+  ASSERT_EQ(theatre.host.failure, "");
+  EXPECT_THAT(theatre.host.rates, ::testing::ElementsAre(115200));
+  const std::size_t before = theatre.samples.size();
+  EXPECT_GT(before, 100U);
+  theatre.host.set_line_rate(9600);
+  theatre.session.on_open(theatre.host, theatre.now);
+  theatre.run(seconds(6));
+  EXPECT_EQ(theatre.host.failure, "");
+  EXPECT_GT(theatre.samples.size(), before + 100);
+}
+
+TEST(NdiSession, ASilentLineIsTriedAtBothRatesAndThenGivenUp) {
+  DeviceHealth health;
+  NdiSession session(
+      wired(), [](const TrackerSample&) { FAIL(); }, health);
+  ScriptedLink link(true);
+  session.on_open(link, kStart);
+  while (link.failure.empty() && session.next_time() < kStart + seconds(10)) {
+    session.on_time(link, session.next_time());
+  }
+  EXPECT_THAT(link.failure, HasSubstr("no answer at 9600 nor at 115200 baud"));
+  EXPECT_LT(session.next_time(), kStart + seconds(5));
+}
+
 // A reply of some 90 bytes takes 8 ms at this rate.
 TEST(NdiSession, WhatAReplyTakesOnTheLineIsNoPartOfItsInstant) {
   for (const auto newest : {NdiEmulatorSettings::Newest::kBx2, NdiEmulatorSettings::Newest::kTx}) {
-    Theatre theatre(wired(), {.newest = newest, .wired_tools = 1}, true, {}, 115200);
+    Theatre theatre(wired(), {.newest = newest, .wired_tools = 1}, true, {}, 9600);
     const auto reset = bytes_of("RESETBE6F\r");
     theatre.session.on_bytes(theatre.host, reset, theatre.now);
     theatre.run(seconds(4));

@@ -18,7 +18,10 @@ class ScriptedLink final : public LinkControl {
   void send(std::span<const std::byte> bytes) override {
     for (const std::byte b : bytes) sent.push_back(static_cast<char>(b));
   }
-  void set_line_rate(int baud) override { rates.push_back(baud); }
+  void set_line_rate(int baud) override {
+    rates.push_back(baud);
+    if (baud_ > 0) baud_ = baud;
+  }
   void send_break() override { ++breaks; }
   void fail(std::string reason) override {
     if (failure.empty()) failure = std::move(reason);
@@ -26,6 +29,7 @@ class ScriptedLink final : public LinkControl {
   bool serial() const noexcept override { return serial_; }
   double byte_time_ns() const noexcept override { return baud_ > 0 ? 10.0e9 / baud_ : 0.0; }
 
+  [[nodiscard]] int baud() const noexcept { return baud_; }
   [[nodiscard]] std::string take_sent() { return std::exchange(sent, {}); }
 
   std::string sent;

@@ -218,6 +218,45 @@ class Successor final : public DeviceProtocol {
   std::atomic<int> opened{0};
 };
 
+// A line whose driver knows no break.
+class WithoutBreak final : public ByteStream {
+ public:
+  explicit WithoutBreak(std::unique_ptr<ByteStream> stream) : stream_(std::move(stream)) {}
+  Expected<std::size_t> read(std::span<std::byte> buffer) override { return stream_->read(buffer); }
+  Expected<std::size_t> write(std::span<const std::byte> bytes) override { return stream_->write(bytes); }
+  int descriptor() const noexcept override { return stream_->descriptor(); }
+  Expected<void> send_break() override { return fail("cannot send a break"); }
+
+ private:
+  std::unique_ptr<ByteStream> stream_;
+};
+
+// Ends by itself at its first instant.
+class BreaksAtTheStart final : public DeviceProtocol {
+ public:
+  void on_open(LinkControl& link, Instant now) override {
+    link.send_break();
+    due_ = now;
+  }
+  void on_bytes(LinkControl& /*link*/, std::span<const std::byte> /*bytes*/, Instant /*arrival*/) override {}
+  void on_time(LinkControl& link, Instant /*now*/) override { link.fail("went on"); }
+  Instant next_time() const noexcept override { return due_; }
+
+ private:
+  Instant due_{};
+};
+
+TEST(DeviceLink, ALineWithoutABreakGoesOnWithout) {
+  auto device = PseudoTerminal::open("");
+  ASSERT_TRUE(device) << device.error().message;
+  auto port = open_serial_port((*device)->path(), kBaud);
+  ASSERT_TRUE(port) << port.error().message;
+  WithoutBreak stream(std::move(*port));
+  BreaksAtTheStart protocol;
+  const Interrupt interrupt;
+  EXPECT_EQ(converse(stream, protocol, interrupt), "went on");
+}
+
 TEST(DeviceLink, OpensAgainAfterEveryFailureAndEndsWhenInterrupted) {
   auto listener = TcpListener::open(0);
   ASSERT_TRUE(listener);
