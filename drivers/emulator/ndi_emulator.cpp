@@ -295,11 +295,21 @@ void NdiEmulator::send_bx(LinkControl& link, std::int64_t frame) {
 }
 
 void NdiEmulator::send_bx2(LinkControl& link, std::int64_t frame) {
+  Bytes items;
+  std::uint32_t frames = 0;
   Bytes tools;
   std::uint32_t count = 0;
+  const auto end_frame = [&](std::int64_t number) {
+    const Duration device_time = from_seconds(static_cast<double>(number) / track_.rate_hz());
+    items.u8(1).u8(static_cast<unsigned>(number) & 0xFFU).u16(0).u32(static_cast<std::uint32_t>(number));
+    items.u32(static_cast<std::uint32_t>(device_time.count() / 1'000'000'000));
+    items.u32(static_cast<std::uint32_t>(device_time.count() % 1'000'000'000));
+    items.u16(1).u16(1).append(component(2, std::exchange(count, 0), std::exchange(tools, {})));
+    ++frames;
+  };
   std::size_t tool = 0;
   for (const auto& [handle, port] : ports_) {
-    const ToolReading r = reading(tool++, frame);
+    const ToolReading r = reading(tool, frame);
     ++count;
     tools.u16(handle);
     if (!port.enabled || r.state == ToolState::kDisabled) {
@@ -309,15 +319,12 @@ void NdiEmulator::send_bx2(LinkControl& link, std::int64_t frame) {
     } else {
       tools.u16(r.state == ToolState::kOutOfVolume ? 0x0109U : 0x011FU);
     }
+    if (settings_.frame_a_tool) end_frame(frame + static_cast<std::int64_t>(tool));
+    ++tool;
   }
-  Bytes item;
-  const Duration device_time = from_seconds(static_cast<double>(frame) / track_.rate_hz());
-  item.u8(1).u8(static_cast<unsigned>(frame) & 0xFFU).u16(0).u32(static_cast<std::uint32_t>(frame));
-  item.u32(static_cast<std::uint32_t>(device_time.count() / 1'000'000'000));
-  item.u32(static_cast<std::uint32_t>(device_time.count() % 1'000'000'000));
-  item.u16(1).u16(1).append(component(2, count, tools));
+  if (!settings_.frame_a_tool) end_frame(frame);
   const unsigned components = settings_.malformed_bx2 ? 2 : 1;
-  const Bytes body = Bytes().u16(1).u16(components).append(component(1, 1, item));
+  const Bytes body = Bytes().u16(1).u16(components).append(component(1, frames, items));
   reply_binary(link, body.all);
 }
 

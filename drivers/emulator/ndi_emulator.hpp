@@ -21,6 +21,7 @@ struct NdiEmulatorSettings {
   int wired_tools = 0;                           // in its ports from the start, port handles 0A, 0B ...
   std::optional<Pose> reference = std::nullopt;  // where the second tool is, constant; the first follows the track
   bool second_channel = false;                   // of the first wired tool: shows when that has been initialised
+  bool frame_a_tool = false;                     // BX2: each tool has a frame of its own, one number after the other's
   bool malformed_bx2 = false;                    // its BX2 replies are whole, but their bodies are not as in the guide
 };
 
@@ -38,6 +39,8 @@ class NdiEmulator final : public DeviceProtocol {
 
   // A wired tool is taken out of its port: the device tells it as disabled.
   void unplug(std::uint16_t handle) { ports_.at(handle).enabled = false; }
+  // It is plugged in again, and has to be initialised anew.
+  void plug_in(std::uint16_t handle) { ports_.at(handle).initialised = false; }
   // The definition uploaded to a port handle, for tests.
   [[nodiscard]] const std::vector<std::byte>& definition(std::uint16_t handle) const {
     return ports_.at(handle).definition;

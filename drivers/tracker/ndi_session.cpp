@@ -22,6 +22,8 @@ constexpr Duration kSettleTime = milliseconds(100);
 constexpr Duration kStreamReplyTime = milliseconds(300);
 constexpr Duration kSilentAfter = milliseconds(300);
 constexpr Duration kReopenAfter = seconds(2);
+// A pose of the reference that is farther away than this is none of the sensor's frame.
+constexpr double kReferenceAge_s = 0.05;
 constexpr Duration kQuietTime = milliseconds(20);
 constexpr int kMostRetries = 3;
 constexpr int kMostSearches = 16;  // a device that always finds a port to initialise does not hold up the start
@@ -294,6 +296,8 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
     case Step::kStart:
       if (!okay) break;
       last_reading_ = now;
+      reference_ = {};
+      reference_there_ = now;
       damaged_ = 0;
       retries_ = 0;
       return enter(link, Step::kStream, now);
@@ -408,17 +412,40 @@ void NdiSession::on_tracking(LinkControl& link, const Expected<NdiTracking>& tra
   // In a BX2 reply the frames come one after the other, each with its tools.
   for (const NdiToolReading& sensor : tracking->tools) {
     if (sensor.handle != sensor_handle_) continue;
-    ToolReading reference;
-    for (const NdiToolReading& tool : tracking->tools) {
-      // A disabled tool has no frame; a pose of another frame is none of this one.
-      const bool of_frame = tool.frame == sensor.frame || tool.reading.state == ToolState::kDisabled;
-      if (settings_.reference && tool.handle == reference_handle_ && of_frame) reference = tool.reading;
-    }
-    deliver(sensor, reference, arrival);
+    deliver(sensor, settings_.reference ? reference_at(*tracking, sensor.frame) : ToolReading{}, arrival);
   }
+  if (settings_.reference) hear_reference(*tracking, arrival);
   // Five questions a frame: a frame is seen at most a fifth of its period after it is there.
   due_ = std::max(arrival, asked_ + from_seconds(0.2 / settings_.frame_rate_hz));
   command_.clear();
+}
+
+void NdiSession::hear_reference(const NdiTracking& tracking, Instant arrival) {
+  for (const NdiToolReading& tool : tracking.tools) {
+    if (tool.handle != reference_handle_) continue;
+    reference_ = tool;
+    if (tool.reading.state != ToolState::kDisabled) reference_there_ = arrival;
+  }
+}
+
+// Some devices tell tools of different kinds in frames, or even replies, of their own.
+ToolReading NdiSession::reference_at(const NdiTracking& tracking, std::uint32_t frame) const noexcept {
+  const auto apart = [frame](const NdiToolReading& tool) {
+    return std::min(tool.frame - frame, frame - tool.frame);  // over the count's end, too
+  };
+  std::optional<NdiToolReading> nearest;
+  const auto consider = [&](const NdiToolReading& tool) {
+    if (!nearest || apart(tool) < apart(*nearest)) nearest = tool;
+  };
+  for (const NdiToolReading& tool : tracking.tools) {
+    if (tool.handle != reference_handle_) continue;
+    // A disabled tool has no frame, and no earlier reading stands for it.
+    if (tool.reading.state == ToolState::kDisabled) return tool.reading;
+    consider(tool);
+  }
+  if (reference_.handle == reference_handle_ && reference_.reading.state != ToolState::kDisabled) consider(reference_);
+  const bool near = nearest && apart(*nearest) <= kReferenceAge_s * settings_.frame_rate_hz;
+  return near ? nearest->reading : ToolReading{};
 }
 
 void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& reference, Instant arrival) {
@@ -459,6 +486,11 @@ Instant NdiSession::next_expectation() const noexcept {
 bool NdiSession::expect_readings(LinkControl& link, Instant now) {
   if (now - last_reading_ >= kReopenAfter) {
     link.fail(why_no_reading());
+    return false;
+  }
+  // Plugged in again it must be initialised again, which only a new start does.
+  if (settings_.reference && now - reference_there_ >= kReopenAfter) {
+    link.fail("no reading of the reference tool for 2 s, or it is disabled: is it unplugged?");
     return false;
   }
   if (now - last_reading_ >= kSilentAfter && health_.state() == DeviceState::kStreaming) {

@@ -87,6 +87,9 @@ class NdiSession final : public DeviceProtocol {
   void deliver(const NdiToolReading& sensor, const ToolReading& reference, Instant arrival);
   // Whether the session goes on: says that readings have stopped coming, and fails when they stay away.
   bool expect_readings(LinkControl& link, Instant now);
+  void hear_reference(const NdiTracking& tracking, Instant arrival);
+  // The reference's reading of the frame, or of the nearest within 50 ms.
+  [[nodiscard]] ToolReading reference_at(const NdiTracking& tracking, std::uint32_t frame) const noexcept;
   [[nodiscard]] Instant next_expectation() const noexcept;
   [[nodiscard]] std::string why_no_reading() const;
 
@@ -113,6 +116,8 @@ class NdiSession final : public DeviceProtocol {
   Instant asked_{};
   Duration on_line_{0};  // the reply under way
   Instant last_reading_{};
+  NdiToolReading reference_;   // the last
+  Instant reference_there_{};  // not disabled
   Instant quiet_until_{};
   std::uint64_t damaged_ = 0;  // replies since the last whole one
   std::string damage_;         // of the last of them

@@ -371,9 +371,55 @@ TEST(NdiSession, ADisabledReferenceIsDisabledAndNotMissing) {
   theatre.device.unplug(0x0B);
   theatre.run(milliseconds(200));
   EXPECT_EQ(theatre.samples.back().state, ToolState::kDisabled);
+}
+
+TEST(NdiSession, AnUnpluggedSensorOpensTheLinkAnew) {
+  NdiSettings settings = wired();
+  settings.sensor.handle = 0x0A;
+  Theatre theatre(settings, {.newest = NdiEmulatorSettings::Newest::kBx, .wired_tools = 2});
+  theatre.run(milliseconds(500));
   theatre.device.unplug(0x0A);
   theatre.run(seconds(3));
   EXPECT_THAT(theatre.host.failure, HasSubstr("the sensor's tool has been disabled for 2 s"));
+}
+
+TEST(NdiSession, AReferencePluggedInAgainIsInitialisedAgain) {
+  using Newest = NdiEmulatorSettings::Newest;
+  for (const Newest newest : {Newest::kBx2, Newest::kBx, Newest::kTx}) {
+    NdiSettings settings = wired();
+    settings.sensor.handle = 0x0A;
+    settings.reference = NdiTool{{}, 0x0B};
+    Theatre theatre(settings, {.newest = newest, .wired_tools = 2, .reference = Pose{}});
+    theatre.run(milliseconds(500));
+    ASSERT_FALSE(theatre.samples.empty());
+    EXPECT_EQ(theatre.samples.back().state, ToolState::kOk);
+    theatre.device.unplug(0x0B);
+    theatre.device.plug_in(0x0B);
+    theatre.run(seconds(1));
+    EXPECT_EQ(theatre.samples.back().state, ToolState::kDisabled);
+    theatre.run(seconds(2));
+    EXPECT_THAT(theatre.host.failure, HasSubstr("no reading of the reference tool for 2 s, or it is disabled"));
+    theatre.host.failure.clear();
+    theatre.session.on_open(theatre.host, theatre.now);
+    theatre.run(seconds(1));
+    EXPECT_EQ(theatre.samples.back().state, ToolState::kOk);
+  }
+}
+
+TEST(NdiSession, AReferenceInAFrameOfItsOwnCountsWhileItIsNear) {
+  NdiSettings settings = wired();
+  settings.sensor.handle = 0x0A;
+  settings.reference = NdiTool{{}, 0x0B};
+  for (const bool near : {true, false}) {
+    settings.frame_rate_hz = near ? 100.0 : 10.0;  // 50 ms are five frames or none
+    Theatre theatre(settings, {.wired_tools = 2, .reference = Pose{}, .frame_a_tool = true});
+    theatre.run(seconds(1));
+    ASSERT_EQ(theatre.host.failure, "");
+    ASSERT_FALSE(theatre.samples.empty());
+    for (const TrackerSample& sample : theatre.samples) {
+      EXPECT_EQ(sample.state, near ? ToolState::kOk : ToolState::kMissing);
+    }
+  }
 }
 
 TEST(NdiSession, UploadsToolDefinitionsAndMeasuresRelativeToTheReference) {
