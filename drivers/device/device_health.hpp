@@ -15,7 +15,7 @@ enum class DeviceState : std::uint8_t {
   kClosed,     // not reachable; reason() says why
   kStarting,   // open, not yet delivering
   kStreaming,  // samples come
-  kSilent,     // open, but samples have stopped coming
+  kSilent,     // open, but samples have stopped coming, or none can be stamped
 };
 
 [[nodiscard]] const char* device_state_name(DeviceState state) noexcept;

@@ -1,5 +1,6 @@
 #include "drivers/ecg/can_ecg.hpp"
 
+#include <fmt/format.h>
 #include <linux/can/error.h>
 #include <poll.h>
 
@@ -44,10 +45,12 @@ std::string read_frames(CanSocket& socket, CanEcgDecoder& decoder, DeviceHealth&
 CanEcgDecoder::CanEcgDecoder(const CanEcgSettings& settings, EcgSinks sinks, DeviceHealth& health)
     : settings_(settings),
       samples_({.period_ns = 1e9 / settings.sample_rate_hz, .transport_delay = kFrameTime}, std::move(sinks), health),
-      health_(health) {}
+      health_(health),
+      rate_(settings.sample_rate_hz) {}
 
 void CanEcgDecoder::restart() noexcept {
   samples_.restart();
+  rate_.restart();
   last_.reset();
   dropped_ = 0;
 }
@@ -61,13 +64,25 @@ std::uint64_t CanEcgDecoder::lost_before(const CanEcgFrame& ecg, Instant arrival
   const double samples = passed_ms * 1e-3 * settings_.sample_rate_hz - each;
   // The device's time decides how often the count went round while it is not ambiguous itself.
   constexpr Duration kTimeWraps = std::chrono::seconds(60);
-  if (arrival - samples_.last_arrival() < kTimeWraps) {
+  if (arrival - last_arrival_ < kTimeWraps) {
     const double rounds = std::round((samples / each - frames) / kCountModulus);
     return static_cast<std::uint64_t>(each) *
            (frames + kCountModulus * static_cast<std::uint64_t>(std::max(0.0, rounds)));
   }
   return samples_.lost_samples(static_cast<std::uint64_t>(each) * frames,
                                static_cast<std::uint64_t>(each) * kCountModulus, 0, arrival);
+}
+
+bool CanEcgDecoder::expect_rate(Instant arrival) {
+  rate_.observe(device_count_, arrival);
+  if (rate_.wrong() == rate_refused_) return !rate_refused_;
+  rate_refused_ = rate_.wrong();
+  samples_.restart();
+  health_.set_reason(rate_refused_ ? fmt::format("{:.1f} samples come a second, and can_sample_rate_hz says {:.1f}: "
+                                                 "none can be stamped",
+                                                 rate_.seen_hz(), settings_.sample_rate_hz)
+                                   : "");
+  return !rate_refused_;
 }
 
 void CanEcgDecoder::take(const CanFrame& frame) {
@@ -92,6 +107,10 @@ void CanEcgDecoder::take(const CanFrame& frame) {
     return;
   }
   const std::uint64_t lost = lost_before(*ecg, frame.arrival);
+  last_ = ecg;
+  last_arrival_ = frame.arrival;
+  device_count_ += static_cast<std::int64_t>(lost) + ecg->samples;
+  if (!expect_rate(frame.arrival)) return;
   std::optional<RespirationReading> respiration;
   if (ecg->respiration) respiration = {static_cast<float>(ecg->values[1]), ecg->respiration_off};
   for (int i = 0; i < ecg->samples; ++i) {
@@ -99,7 +118,6 @@ void CanEcgDecoder::take(const CanFrame& frame) {
     samples_.add(static_cast<float>(value * settings_.count_mV), ecg->lead_off, i == 0 ? lost : 0, respiration);
   }
   samples_.end_chunk(frame.arrival);
-  last_ = ecg;
 }
 
 void serve_can_ecg(const std::string& interface_name, const CanEcgSettings& settings, const EcgSinks& sinks,

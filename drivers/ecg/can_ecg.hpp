@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "drivers/device/rate_check.hpp"
 #include "drivers/ecg/can_ecg_frame.hpp"
 #include "drivers/ecg/ecg_assembler.hpp"
 #include "drivers/transport/interrupt.hpp"
@@ -21,7 +22,8 @@ struct CanEcgSettings {
 inline constexpr int kCanRespirationChannel = 2;
 
 // What a frame does; no socket. Frame counts tell lost frames modulo 256; the device's own time says how often that
-// went round (a minute, then again the host's clock).
+// went round (a minute, then again the host's clock). Samples that come at another rate than the settings say are not
+// taken, since their stamps would be wrong.
 class CanEcgDecoder {
  public:
   CanEcgDecoder(const CanEcgSettings& settings, EcgSinks sinks, DeviceHealth& health);
@@ -30,12 +32,18 @@ class CanEcgDecoder {
   void take(const CanFrame& frame);
 
  private:
+  // Whether samples come at the rate that the stamps are made by; tells when that changes.
+  bool expect_rate(Instant arrival);
   [[nodiscard]] std::uint64_t lost_before(const CanEcgFrame& ecg, Instant arrival) const noexcept;
 
   CanEcgSettings settings_;
   EcgAssembler samples_;
   DeviceHealth& health_;
+  RateCheck rate_;
+  bool rate_refused_ = false;
+  std::int64_t device_count_ = 0;  // samples, by the device's own count
   std::optional<CanEcgFrame> last_;
+  Instant last_arrival_{};
   std::uint32_t dropped_ = 0;
 };
 

@@ -92,13 +92,15 @@ NdiSession::NdiSession(NdiSettings settings, TrackerSink sink, DeviceHealth& hea
     : settings_(std::move(settings)),
       sink_(std::move(sink)),
       health_(health),
-      clock_({.period_ns = 1e9 / settings_.frame_rate_hz}) {
+      clock_({.period_ns = 1e9 / settings_.frame_rate_hz}),
+      rate_(settings_.frame_rate_hz) {
   settings_.world.relative_to_reference = settings_.reference.has_value();
 }
 
 void NdiSession::on_open(LinkControl& link, Instant now) {
   framer_.restart();
   clock_.reset();
+  rate_.restart();
   last_frame_.reset();
   stride_ = 0;
   query_ = Query::kBx2;
@@ -448,6 +450,21 @@ ToolReading NdiSession::reference_at(const NdiTracking& tracking, std::uint32_t 
   return near ? nearest->reading : ToolReading{};
 }
 
+bool NdiSession::expect_rate(std::uint32_t frame, Instant arrival) {
+  rate_.observe(frame, arrival);
+  if (rate_.wrong() == rate_refused_) return !rate_refused_;
+  rate_refused_ = rate_.wrong();
+  clock_.reset();
+  if (!rate_refused_) {
+    health_.set_reason("");
+    return true;
+  }
+  health_.set_reason(fmt::format("{:.1f} frames come a second, and frame_rate_hz says {:.1f}: no pose can be stamped",
+                                 rate_.seen_hz(), settings_.frame_rate_hz));
+  health_.set_state(DeviceState::kSilent);
+  return false;
+}
+
 void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& reference, Instant arrival) {
   TrackerSample sample;
   sample.arrival = arrival;
@@ -465,6 +482,10 @@ void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& refere
       health_.lost.add(step / stride_ - 1);
     }
     last_frame_ = sensor.frame;
+    if (!expect_rate(sensor.frame, arrival)) {
+      last_reading_ = arrival;  // the device is there, and a new start would help nobody
+      return;
+    }
     clock_.observe(sensor.frame, arrival - on_line_);
     health_.jitter.add(clock_.lateness(sensor.frame, arrival - on_line_));
     sample.source_time = clock_.stamp(sensor.frame);

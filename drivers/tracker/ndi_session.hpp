@@ -8,6 +8,8 @@
 // TSTART. Then BX2 is asked for again and again; where a device has no BX2, BX; where it has neither, TX. A kind
 // of reply that comes damaged four times and never whole is given up in the same way.
 //
+// Frames that come at another rate than the settings say give no sample, since their stamps would be wrong.
+//
 // What a reply takes on a serial line is taken off its arrival: at 115200 baud some eight milliseconds of a frame.
 #pragma once
 
@@ -19,6 +21,7 @@
 #include "drivers/device/arrival_clock.hpp"
 #include "drivers/device/device_health.hpp"
 #include "drivers/device/device_protocol.hpp"
+#include "drivers/device/rate_check.hpp"
 #include "drivers/tracker/ndi_reply.hpp"
 #include "drivers/tracker/ndi_tracking.hpp"
 #include "drivers/tracker/tool_reading.hpp"
@@ -91,12 +94,16 @@ class NdiSession final : public DeviceProtocol {
   // The reference's reading of the frame, or of the nearest within 50 ms.
   [[nodiscard]] ToolReading reference_at(const NdiTracking& tracking, std::uint32_t frame) const noexcept;
   [[nodiscard]] Instant next_expectation() const noexcept;
+  // Whether the frames come at the rate that the stamps are made by; tells when that changes.
+  bool expect_rate(std::uint32_t frame, Instant arrival);
   [[nodiscard]] std::string why_no_reading() const;
 
   NdiSettings settings_;
   TrackerSink sink_;
   DeviceHealth& health_;
   ArrivalClock clock_;
+  RateCheck rate_;
+  bool rate_refused_ = false;
   NdiReplyFramer framer_;
   Step step_ = Step::kReset;
   int baud_ = NdiSettings::kFirstBaud;  // of a serial line

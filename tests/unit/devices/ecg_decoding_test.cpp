@@ -627,6 +627,28 @@ TEST(CanEcg, RespirationComesWithTheSampleThatItWasTakenWith) {
   }
 }
 
+TEST(CanEcg, SamplesAtAnotherRateThanConfiguredAreNotTakenAndTold) {
+  Received received;
+  CanEcgDecoder decoder({.sample_rate_hz = 250.0}, received.sink(), received.health);
+  const auto run = [&decoder](int from, int to, Duration period, Instant begin) {
+    for (int i = from; i < to; ++i) {
+      const Duration since = (i - from) * period;
+      CanFrame f = can_frame(static_cast<std::uint8_t>(i), static_cast<std::uint16_t>(since / milliseconds(1)), 0, 0);
+      f.arrival = begin + since;
+      decoder.take(f);
+    }
+  };
+  // 360 Hz, two samples a frame, for ten seconds.
+  run(0, 1800, std::chrono::microseconds(5556), kStart);
+  const std::uint64_t taken = received.health.samples.get();
+  EXPECT_LT(taken, 7U * 360U);
+  EXPECT_THAT(received.health.reason(), HasSubstr("360.0 samples come a second, and can_sample_rate_hz says 250.0"));
+  // The module has been set to 250 Hz.
+  run(1800, 3050, milliseconds(8), kStart + seconds(11));
+  EXPECT_GT(received.health.samples.get(), taken + 6U * 250U);
+  EXPECT_EQ(received.health.reason(), "");
+}
+
 TEST(CanEcg, RespirationThatNobodyAskedForIsNoSampleOfTheEcg) {
   Received received;
   CanEcgDecoder decoder({}, EcgSinks(received.sink().ecg), received.health);

@@ -571,6 +571,24 @@ TEST(NdiSession, ADeviceThatAlwaysFindsAPortToInitialiseDoesNotHoldUpTheStart) {
   EXPECT_TRUE(started);
 }
 
+TEST(NdiSession, FramesAtAnotherRateThanConfiguredGiveNoPoseAndAReason) {
+  NdiSettings settings = wired();
+  settings.frame_rate_hz = 60.0;  // the device has 100
+  Theatre theatre(settings, {.wired_tools = 1});
+  theatre.run(seconds(8));
+  const std::size_t before = theatre.samples.size();
+  theatre.run(seconds(10));
+  EXPECT_EQ(theatre.samples.size(), before);
+  EXPECT_EQ(theatre.host.failure, "");
+  EXPECT_EQ(theatre.health.state(), DeviceState::kSilent);
+  EXPECT_THAT(theatre.health.reason(), HasSubstr("100.0 frames come a second, and frame_rate_hz says 60.0"));
+  // Opened anew, it does not begin with some seconds of wrong stamps.
+  theatre.session.on_open(theatre.host, theatre.now);
+  theatre.device.on_open(theatre.far, theatre.now);
+  theatre.run(seconds(4));
+  EXPECT_EQ(theatre.samples.size(), before);
+}
+
 TEST(NdiSession, SaysWhatIsWrongWithTheTools) {
   NdiSettings none = wired();
   Theatre without(none, {});
