@@ -18,9 +18,27 @@ constexpr unsigned kCountModulus = 256;
 constexpr Duration kFrameTime = std::chrono::microseconds(222);
 constexpr Duration kSilentAfter = std::chrono::milliseconds(300);
 
+// What a controller's error frame tells a user (linux/can/error.h); empty when the count alone says enough.
+std::string explain_error(const CanFrame& frame) {
+  constexpr unsigned kOverflow = CAN_ERR_CRTL_RX_OVERFLOW | CAN_ERR_CRTL_TX_OVERFLOW;
+  constexpr unsigned kPassive = CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE;
+  if ((frame.identifier & CAN_ERR_BUSOFF) != 0) {
+    return "the CAN controller has gone off the bus: is its bit rate right, its line closed at both ends?";
+  }
+  if ((frame.identifier & CAN_ERR_CRTL) == 0 || frame.length < 2) return "";
+  const unsigned controller = frame.data[1];
+  if ((controller & kOverflow) != 0) {
+    return "the CAN controller's buffer has run over: frames were lost before the kernel had them";
+  }
+  if ((controller & kPassive) != 0) {
+    return "the CAN controller is error-passive: many frames on the bus are damaged; cable, closing resistors, bit "
+           "rate?";
+  }
+  return "";
+}
+
 // Until the socket fails (the reason is returned) or the interrupt is requested (empty then).
-std::string read_frames(CanSocket& socket, CanEcgDecoder& decoder, DeviceHealth& health, const Interrupt& interrupt) {
-  Instant last = MonotonicClock::now();
+std::string read_frames(CanSocket& socket, CanEcgDecoder& decoder, const Interrupt& interrupt) {
   for (;;) {
     std::array<pollfd, 2> waited{{{socket.descriptor(), POLLIN, 0}, {interrupt.descriptor(), POLLIN, 0}}};
     constexpr int kSilent_ms = 300;
@@ -28,15 +46,8 @@ std::string read_frames(CanSocket& socket, CanEcgDecoder& decoder, DeviceHealth&
     if (waited[1].revents != 0) return "";
     const auto frame = socket.receive();
     if (!frame) return frame.error().message;
-    if (*frame) {
-      const std::uint64_t before = health.samples.get();
-      decoder.take(**frame);
-      if (health.samples.get() == before) continue;
-      last = (*frame)->arrival;
-      health.set_state(DeviceState::kStreaming);
-    } else if (health.state() == DeviceState::kStreaming && MonotonicClock::now() - last > kSilentAfter) {
-      health.set_state(DeviceState::kSilent);
-    }
+    if (*frame) decoder.take(**frame);
+    decoder.watch(MonotonicClock::now());
   }
 }
 
@@ -53,6 +64,16 @@ void CanEcgDecoder::restart() noexcept {
   rate_.restart();
   last_.reset();
   dropped_ = 0;
+}
+
+void CanEcgDecoder::watch(Instant now) noexcept {
+  const std::uint64_t samples = health_.samples.get();
+  if (samples != watched_samples_) {
+    watched_samples_ = samples;
+    health_.set_state(DeviceState::kStreaming);
+  } else if (health_.state() == DeviceState::kStreaming && now - samples_.last_arrival() > kSilentAfter) {
+    health_.set_state(DeviceState::kSilent);
+  }
 }
 
 std::uint64_t CanEcgDecoder::lost_before(const CanEcgFrame& ecg, Instant arrival) const noexcept {
@@ -90,10 +111,8 @@ void CanEcgDecoder::take(const CanFrame& frame) {
   dropped_ = frame.dropped_before;
   if (frame.error) {
     health_.bus_errors.add();
-    if ((frame.identifier & CAN_ERR_BUSOFF) != 0) {
-      health_.set_reason(
-          "the CAN controller has gone off the bus: is its bit rate right, its line closed at both ends?");
-    }
+    const std::string what = explain_error(frame);
+    if (!what.empty()) health_.set_reason(what);
     return;
   }
   const auto ecg = decode_can_ecg(frame, settings_.identifier, settings_.extended);
@@ -126,7 +145,7 @@ void serve_can_ecg(const std::string& interface_name, const CanEcgSettings& sett
   const auto open = [&] { return CanSocket::open(interface_name, settings.identifier, settings.extended); };
   const auto use = [&](CanSocket& socket) {
     decoder.restart();
-    return read_frames(socket, decoder, health, interrupt);
+    return read_frames(socket, decoder, interrupt);
   };
   serve_reopening(open, use, health, interrupt);
 }

@@ -30,6 +30,8 @@ class CanEcgDecoder {
 
   void restart() noexcept;
   void take(const CanFrame& frame);
+  // After every wait and every frame of whatever kind: whether samples come still.
+  void watch(Instant now) noexcept;
 
  private:
   // Whether samples come at the rate that the stamps are made by; tells when that changes.
@@ -45,6 +47,7 @@ class CanEcgDecoder {
   std::optional<CanEcgFrame> last_;
   Instant last_arrival_{};
   std::uint32_t dropped_ = 0;
+  std::uint64_t watched_samples_ = 0;
 };
 
 // Reads until interrupted; reopens when the interface went down or away.

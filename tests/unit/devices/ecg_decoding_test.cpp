@@ -627,6 +627,48 @@ TEST(CanEcg, RespirationComesWithTheSampleThatItWasTakenWith) {
   }
 }
 
+TEST(CanEcg, AFloodOfErrorsAndOfStrangersIsSilenceOfTheDevice) {
+  for (const bool errors : {true, false}) {
+    Received received;
+    CanEcgDecoder decoder({}, received.sink(), received.health);
+    CanFrame good = can_frame(1, 2, 3, 4);
+    good.arrival = kStart;
+    decoder.take(good);
+    decoder.watch(kStart);
+    EXPECT_EQ(received.health.state(), DeviceState::kStreaming);
+    for (int i = 1; i < 400; ++i) {
+      EXPECT_EQ(received.health.state(), i <= 301 ? DeviceState::kStreaming : DeviceState::kSilent) << i;
+      CanFrame frame = good;
+      frame.error = errors;
+      frame.length = errors ? 8 : 3;
+      frame.identifier = errors ? 0x80 : 0x2E0;  // CAN_ERR_BUSERROR
+      frame.arrival = kStart + milliseconds(i);
+      decoder.take(frame);
+      decoder.watch(frame.arrival);
+    }
+  }
+}
+
+TEST(CanEcg, TheControllersWordsAreTold) {
+  Received received;
+  CanEcgDecoder decoder({}, received.sink(), received.health);
+  CanFrame error;
+  error.error = true;
+  error.length = 8;
+  error.identifier = 0x04;  // CAN_ERR_CRTL
+  struct Case {
+    std::uint8_t controller;
+    const char* reason;
+  };
+  for (const Case& c : {Case{0x04, ""}, Case{0x01, "has run over"}, Case{0x10, "error-passive"},
+                        Case{0x02, "has run over"}, Case{0x20, "error-passive"}}) {
+    error.data[1] = c.controller;
+    decoder.take(error);
+    EXPECT_THAT(received.health.reason(), HasSubstr(c.reason));
+  }
+  EXPECT_EQ(received.health.bus_errors.get(), 5U);
+}
+
 TEST(CanEcg, SamplesAtAnotherRateThanConfiguredAreNotTakenAndTold) {
   Received received;
   CanEcgDecoder decoder({.sample_rate_hz = 250.0}, received.sink(), received.health);
