@@ -1,6 +1,5 @@
 #include "drivers/ecg/modem_line_trigger.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/serial.h>
 #include <sys/ioctl.h>
@@ -14,6 +13,7 @@
 
 #include "drivers/device/reopening.hpp"
 #include "drivers/transport/descriptor.hpp"
+#include "drivers/transport/serial_port.hpp"
 
 namespace perimap {
 namespace {
@@ -74,6 +74,9 @@ class KernelPort final : public ModemPort {
  public:
   KernelPort(Descriptor descriptor, std::string path, ModemLine line)
       : descriptor_(std::move(descriptor)), path_(std::move(path)), bits_(bits_of(line)) {}
+  KernelPort(const KernelPort&) = delete;
+  KernelPort& operator=(const KernelPort&) = delete;
+  ~KernelPort() override { release_serial_line(descriptor_); }
 
   Expected<bool> wait_for_change() override {
     if (!limit_.armed()) return fail(path_ + ": no timer for waiting");
@@ -140,19 +143,14 @@ std::string watch_line(ModemPort& port, TriggerEdges& edges, const RTriggerSink&
 }  // namespace
 
 Expected<std::unique_ptr<ModemPort>> open_modem_port(const std::string& path, ModemLine line) {
-  Descriptor descriptor(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  if (!descriptor) {
-    switch (errno) {
-      case EACCES:
-      case EPERM:
-        return fail(path + ": permission denied; add the user to the device's group (often dialout)");
-      case EBUSY:
-        return fail(path + ": in use; a trigger needs a serial port of its own");
-      default:
-        return fail(path + ": no such device; is it plugged in?");
-    }
+  auto claimed = claim_serial_line(path);
+  if (!claimed) return tl::unexpected(std::move(claimed.error()));
+  // A monitor that pulls carrier detect off after each beat does not hang up.
+  if (auto set = ignore_carrier(*claimed, path); !set) {
+    release_serial_line(*claimed);
+    return tl::unexpected(std::move(set.error()));
   }
-  auto port = std::make_unique<KernelPort>(std::move(descriptor), path, line);
+  auto port = std::make_unique<KernelPort>(std::move(*claimed), path, line);
   if (const auto read = port->read(); !read) return tl::unexpected(read.error());
   return port;
 }

@@ -44,7 +44,8 @@ class ModemPort {
   [[nodiscard]] virtual Expected<Line> read() = 0;
 };
 
-// For the calling thread alone. Errors name the path and what to do, also of a port without modem lines.
+// For the calling thread alone, and the port for it alone among programs. Errors name the path and what to do, also of
+// a port without modem lines.
 [[nodiscard]] Expected<std::unique_ptr<ModemPort>> open_modem_port(const std::string& path, ModemLine line);
 
 // Which changes of the line are R peaks. A change whose instant is not known, because more than one came at once or

@@ -24,8 +24,7 @@ class SerialPort final : public ByteStream {
   SerialPort(Descriptor descriptor, std::string path) : descriptor_(std::move(descriptor)), path_(std::move(path)) {}
   SerialPort(const SerialPort&) = delete;
   SerialPort& operator=(const SerialPort&) = delete;
-  // The mark outlives the descriptor while another program has the line open, and would lock us out ourselves.
-  ~SerialPort() override { (void)::ioctl(descriptor_.get(), TIOCNXCL); }
+  ~SerialPort() override { release_serial_line(descriptor_); }
 
   Expected<std::size_t> read(std::span<std::byte> buffer) override {
     return read_available(descriptor_.get(), buffer, path_.c_str());
@@ -102,7 +101,7 @@ std::string reason_not_opened(const std::string& path, int error) {
 
 }  // namespace
 
-Expected<std::unique_ptr<ByteStream>> open_serial_port(const std::string& path, int baud) {
+Expected<Descriptor> claim_serial_line(const std::string& path) {
   // Non-blocking also while opening: a line without carrier would wait for it.
   Descriptor descriptor(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!descriptor) return fail(reason_not_opened(path, errno));
@@ -111,7 +110,25 @@ Expected<std::unique_ptr<ByteStream>> open_serial_port(const std::string& path, 
   // TIOCEXCL does not keep root out, a lock does not keep out programs that take none: both together.
   if (::flock(descriptor.get(), LOCK_EX | LOCK_NB) != 0) return fail(reason_not_opened(path, EBUSY));
   (void)::ioctl(descriptor.get(), TIOCEXCL);
-  auto port = std::make_unique<SerialPort>(std::move(descriptor), path);
+  return descriptor;
+}
+
+void release_serial_line(const Descriptor& line) noexcept { (void)::ioctl(line.get(), TIOCNXCL); }
+
+Expected<void> ignore_carrier(const Descriptor& line, const std::string& path) {
+  struct termios2 settings {};
+  if (::ioctl(line.get(), TCGETS2, &settings) != 0) return fail(fmt::format("{}: not a serial line", path));
+  settings.c_cflag |= CLOCAL;
+  if (::ioctl(line.get(), TCSETS2, &settings) != 0) {
+    return fail(fmt::format("{}: cannot be set up: {}", path, std::generic_category().message(errno)));
+  }
+  return {};
+}
+
+Expected<std::unique_ptr<ByteStream>> open_serial_port(const std::string& path, int baud) {
+  auto descriptor = claim_serial_line(path);
+  if (!descriptor) return tl::unexpected(std::move(descriptor.error()));
+  auto port = std::make_unique<SerialPort>(std::move(*descriptor), path);
   if (auto set = port->set_line_rate(baud); !set) return tl::unexpected(std::move(set.error()));
   port->request_low_latency();
   // What came before the line was set up was read at another rate.

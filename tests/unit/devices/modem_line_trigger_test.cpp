@@ -1,12 +1,15 @@
 #include "drivers/ecg/modem_line_trigger.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <termios.h>
 
 #include <deque>
 #include <vector>
 
 #include "drivers/transport/pseudo_terminal.hpp"
+#include "drivers/transport/serial_port.hpp"
 
 namespace perimap {
 namespace {
@@ -129,6 +132,36 @@ TEST(ModemLineTrigger, GivesRPeaksAndOpensAnUnpluggedPortAgain) {
   EXPECT_EQ(openings, 3);
   EXPECT_EQ(health.reason(), "no such device");
   EXPECT_EQ(health.state(), DeviceState::kClosed);
+}
+
+// A terminal has no modem lines, which is found out last: what comes before can be seen on one.
+TEST(ModemPort, IsItsOwnersAloneAndNoCarrierHangsItUp) {
+  auto device = PseudoTerminal::open("");
+  ASSERT_TRUE(device) << device.error().message;
+  const std::string path = (*device)->path();
+  {
+    const auto taken = open_serial_port(path, 9600);
+    ASSERT_TRUE(taken) << taken.error().message;
+    const auto refused = open_modem_port(path, ModemLine::kCarrierDetect);
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, HasSubstr("in use by another program"));
+  }
+  const auto settings_of = [&path] {
+    const Descriptor line(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK));
+    termios settings{};
+    EXPECT_EQ(::tcgetattr(line.get(), &settings), 0);
+    return settings;
+  };
+  termios settings = settings_of();
+  settings.c_cflag &= ~static_cast<tcflag_t>(CLOCAL);
+  {
+    const Descriptor line(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK));
+    ASSERT_EQ(::tcsetattr(line.get(), TCSANOW, &settings), 0);
+  }
+  ASSERT_EQ(settings_of().c_cflag & CLOCAL, 0U);
+  EXPECT_FALSE(open_modem_port(path, ModemLine::kCarrierDetect));
+  EXPECT_NE(settings_of().c_cflag & CLOCAL, 0U);
+  EXPECT_TRUE(open_serial_port(path, 9600)) << "it is given back";
 }
 
 TEST(ModemPort, SaysThatATerminalWithoutModemLinesHasNone) {
