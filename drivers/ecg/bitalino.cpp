@@ -10,6 +10,8 @@ constexpr std::size_t kFramesToSynchronise = 4;
 constexpr std::size_t kFramesToBelieve = 2;
 constexpr unsigned kSequenceModulus = 16;
 constexpr int kFullScale = 1023;
+// The open API waits so long after each; a board takes no second one sooner.
+constexpr Duration kBetweenCommands = std::chrono::milliseconds(150);
 // ECG sensor: (sample / 2^10 - 1/2) * 3.3 V / 1100.
 constexpr double kSupply_mV = 3300.0;
 constexpr double kSensorGain = 1100.0;
@@ -65,14 +67,16 @@ BitalinoProtocol::BitalinoProtocol(const BitalinoSettings& settings, EcgSinks si
       settings_(settings),
       framer_(shape(settings)) {}
 
-void BitalinoProtocol::start(LinkControl& link) {
+void BitalinoProtocol::start() {
   framer_.restart();
   lead_.restart();
   breath_sensor_.restart();
   const unsigned channels = mask(settings_.channel) | mask(settings_.respiration_channel);
   const std::array<std::byte, 3> commands{std::byte{0x00}, std::byte{0xC3},
                                           static_cast<std::byte>(channels << 2U | 0x01U)};
-  link.send(commands);
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    send_in(i == 0 ? Duration(0) : kBetweenCommands, std::span(commands).subspan(i, 1));
+  }
 }
 
 void BitalinoProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> bytes, Instant arrival) {

@@ -45,7 +45,7 @@ class BitalinoProtocol final : public EcgProtocol {
   BitalinoProtocol(const BitalinoSettings& settings, EcgSinks sinks, DeviceHealth& health);
 
  protected:
-  void start(LinkControl& link) override;
+  void start() override;
   void decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
 
  private:

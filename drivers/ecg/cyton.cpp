@@ -11,6 +11,10 @@ constexpr std::byte kBegin{0xA0};
 constexpr unsigned kFirstEnd = 0xC0;
 constexpr unsigned kLastEnd = 0xC6;
 constexpr std::string_view kPrompt = "$$$";
+constexpr Duration kDongleReset = std::chrono::milliseconds(250);
+constexpr Duration kBetweenCommands = std::chrono::milliseconds(100);
+constexpr Duration kPromptTime = std::chrono::milliseconds(1500);
+constexpr int kMostResets = 2;
 constexpr std::size_t kLongestGreeting = 2048;
 constexpr double kReference_mV = 4500.0;
 constexpr std::int32_t kFullScale = 0x7FFFFF;
@@ -46,17 +50,23 @@ CytonProtocol::CytonProtocol(const CytonSettings& settings, EcgSinks sinks, Devi
       settings_(settings),
       framer_(kShape) {}
 
-void CytonProtocol::start(LinkControl& link) {
+void CytonProtocol::start() {
   prompted_ = false;
   greeting_.clear();
   framer_.restart();
   lead_.restart();
   breath_sensor_.restart();
-  // The board may be streaming still, from a session that ended without a word.
-  link.send("sv");
+  // The board may be streaming still, from a session that ended without a word. Opening the port resets its dongle,
+  // which then hears nothing for a while: who is not answered asks again.
+  send_in(kDongleReset, "s");
+  send_in(kBetweenCommands, "v");
+  for (int again = 0; again < kMostResets; ++again) {
+    send_in(kPromptTime, "s");
+    send_in(kBetweenCommands, "v");
+  }
 }
 
-void CytonProtocol::await_prompt(LinkControl& link, std::span<const std::byte> bytes) {
+void CytonProtocol::await_prompt(std::span<const std::byte> bytes) {
   for (const std::byte b : bytes) greeting_.push_back(static_cast<char>(b));
   const std::size_t prompt = greeting_.find(kPrompt);
   if (prompt == std::string::npos) {
@@ -67,11 +77,12 @@ void CytonProtocol::await_prompt(LinkControl& link, std::span<const std::byte> b
   const std::size_t name = greeting_.find("OpenBCI");
   if (name < prompt) health().set_identity(greeting_.substr(name, prompt - name));
   prompted_ = true;
-  link.send("b");
+  drop_commands();
+  send_in(kBetweenCommands, "b");
 }
 
-void CytonProtocol::decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) {
-  if (!prompted_) return await_prompt(link, bytes);
+void CytonProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> bytes, Instant arrival) {
+  if (!prompted_) return await_prompt(bytes);
   const double count_mV = kReference_mV / settings_.gain / kFullScale;
   const auto take = [&](std::span<const std::byte> packet, std::optional<unsigned> lost, std::size_t behind) {
     std::optional<RespirationReading> respiration;

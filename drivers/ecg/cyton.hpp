@@ -35,11 +35,11 @@ class CytonProtocol final : public EcgProtocol {
   CytonProtocol(const CytonSettings& settings, EcgSinks sinks, DeviceHealth& health);
 
  protected:
-  void start(LinkControl& link) override;
+  void start() override;
   void decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
 
  private:
-  void await_prompt(LinkControl& link, std::span<const std::byte> bytes);
+  void await_prompt(std::span<const std::byte> bytes);
 
   CytonSettings settings_;
   bool prompted_ = false;

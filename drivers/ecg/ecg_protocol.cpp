@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -20,11 +21,25 @@ EcgProtocol::EcgProtocol(double sample_rate_hz, Duration transport_delay, EcgSin
 void EcgProtocol::on_open(LinkControl& link, Instant now) {
   samples_.restart();
   opened_ = now;
+  now_ = now;
   bytes_ = 0;
-  start(link);
+  commands_.clear();
+  start();
+  started_ = commands_.empty() ? now : commands_.back().due;
+  send_due(link, now);
+}
+
+void EcgProtocol::send_in(Duration pause, std::span<const std::byte> command) {
+  const Instant from = commands_.empty() ? now_ : commands_.back().due;
+  commands_.push_back({from + pause, {command.begin(), command.end()}});
+}
+
+void EcgProtocol::send_due(LinkControl& link, Instant now) {
+  for (; !commands_.empty() && commands_.front().due <= now; commands_.pop_front()) link.send(commands_.front().bytes);
 }
 
 void EcgProtocol::on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) {
+  now_ = arrival;
   bytes_ += bytes.size();
   const std::uint64_t before = health_.samples.get();
   decode(link, bytes, arrival);
@@ -33,21 +48,27 @@ void EcgProtocol::on_bytes(LinkControl& link, std::span<const std::byte> bytes, 
 }
 
 Instant EcgProtocol::next_time() const noexcept {
-  if (!samples_.any()) return opened_ + kReopenAfter;
-  return samples_.last_arrival() + (health_.state() == DeviceState::kStreaming ? kSilentAfter : kReopenAfter);
+  const Instant command = commands_.empty() ? kNever : commands_.front().due;
+  if (!samples_.any()) return std::min(command, started_ + kReopenAfter);
+  return std::min(command,
+                  samples_.last_arrival() + (health_.state() == DeviceState::kStreaming ? kSilentAfter : kReopenAfter));
 }
 
 void EcgProtocol::on_time(LinkControl& link, Instant now) {
+  now_ = now;
+  send_due(link, now);
   if (samples_.any()) {
+    if (now - samples_.last_arrival() < kSilentAfter) return;
     health_.set_state(DeviceState::kSilent);
     if (now - samples_.last_arrival() >= kReopenAfter) link.fail("no sample for 2 s; switched off or cable out?");
     return;
   }
-  if (now - opened_ < kReopenAfter) return;
-  link.fail(
-      bytes_ == 0
-          ? std::string("open, but not a byte in 2 s; switched off, or the wrong port?")
-          : fmt::format("{} bytes in 2 s and not one sample among them; wrong baud rate or another device?", bytes_));
+  if (now < started_ + kReopenAfter) return;
+  const double seconds = to_seconds(now - opened_);
+  link.fail(bytes_ == 0
+                ? fmt::format("open, but not a byte in {:.1f} s; switched off, or the wrong port?", seconds)
+                : fmt::format("{} bytes in {:.1f} s and not one sample among them; wrong baud rate or another device?",
+                              bytes_, seconds));
 }
 
 }  // namespace perimap

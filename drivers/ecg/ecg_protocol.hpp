@@ -3,7 +3,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <span>
+#include <string_view>
+#include <vector>
 
 #include "drivers/device/device_protocol.hpp"
 #include "drivers/ecg/ecg_assembler.hpp"
@@ -15,8 +18,8 @@ namespace perimap {
   return from_seconds(static_cast<double>(bytes) * 10.0 / baud);
 }
 
-// A device that says nothing for 300 ms is silent; after 2 s, which is longer than any start takes, the link is opened
-// anew, because a device that was switched off has to be started again.
+// A device that says nothing for 300 ms is silent; after 2 s, and at the start after 2 s more than the start takes, the
+// link is opened anew, because a device that was switched off has to be started again.
 class EcgProtocol : public DeviceProtocol {
  public:
   // `transport_delay`: from a sample's measurement to the earliest that it can be here.
@@ -28,7 +31,15 @@ class EcgProtocol : public DeviceProtocol {
   [[nodiscard]] Instant next_time() const noexcept final;
 
  protected:
-  virtual void start(LinkControl& link) = 0;
+  // By send_in() alone.
+  virtual void start() = 0;
+  // Some devices take one command at a time: this one goes out so long after the last, or after now if that has gone.
+  void send_in(Duration pause, std::span<const std::byte> command);
+  void send_in(Duration pause, std::string_view command) {
+    send_in(pause, std::as_bytes(std::span(command.data(), command.size())));
+  }
+  // Commands that have not gone out yet do not.
+  void drop_commands() noexcept { commands_.clear(); }
   // Gives what the bytes hold to samples(). Bytes that fit nowhere are counted as damaged.
   virtual void decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) = 0;
 
@@ -38,7 +49,16 @@ class EcgProtocol : public DeviceProtocol {
  private:
   EcgAssembler samples_;
   DeviceHealth& health_;
+  struct Command {
+    Instant due;
+    std::vector<std::byte> bytes;
+  };
+  void send_due(LinkControl& link, Instant now);
+
+  std::deque<Command> commands_;
+  Instant now_{};
   Instant opened_{};
+  Instant started_{};  // the last of the start's commands has gone
   std::uint64_t bytes_ = 0;
 };
 

@@ -19,11 +19,11 @@ constexpr int kNeutral = 128;
 MedlabProtocol::MedlabProtocol(const MedlabSettings& settings, EcgSinks sinks, DeviceHealth& health)
     : EcgProtocol(kSampleRate_hz, time_on_line(1, kBaud), std::move(sinks), health), settings_(settings) {}
 
-void MedlabProtocol::start(LinkControl& link) {
+void MedlabProtocol::start() {
   follows_ = Follows::kNothing;
   lead_off_ = false;
   const std::array<char, 5> commands{'N', 'S', '0', 'G', settings_.lead};
-  link.send(std::string_view(commands.data(), commands.size()));
+  send_in(Duration(0), std::string_view(commands.data(), commands.size()));
 }
 
 void MedlabProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> bytes, Instant /*arrival*/) {

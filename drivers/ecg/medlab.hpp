@@ -31,7 +31,7 @@ class MedlabProtocol final : public EcgProtocol {
   MedlabProtocol(const MedlabSettings& settings, EcgSinks sinks, DeviceHealth& health);
 
  protected:
-  void start(LinkControl& link) override;
+  void start() override;
   void decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
 
  private:

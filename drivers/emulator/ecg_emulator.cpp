@@ -59,6 +59,8 @@ class BitalinoEmulator final : public EcgEmulator {
 
  protected:
   void command(LinkControl& /*link*/, std::uint8_t byte) override {
+    // One at a time: what follows too soon is not heard.
+    if (now() - std::exchange(last_command_, now()) < kBetweenCommands) return;
     if (byte == 0x00) run(false, now());
     if ((byte & 0x03U) != 0x01U) return;
     const unsigned mask = byte >> 2U;
@@ -99,6 +101,9 @@ class BitalinoEmulator final : public EcgEmulator {
     return static_cast<unsigned>(std::lround(std::isnan(value) ? 1023.0 : std::clamp(value, 0.0, 1023.0)));
   }
 
+  static constexpr Duration kBetweenCommands = std::chrono::milliseconds(50);
+
+  Instant last_command_{};
   unsigned sequence_ = 0;
   bool ecg_asked_ = false;
   bool respiration_asked_ = false;

@@ -21,6 +21,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Pair;
 
 const Instant kStart(seconds(100));
 
@@ -28,6 +29,17 @@ std::vector<std::byte> bytes_of(std::initializer_list<int> values) {
   std::vector<std::byte> bytes;
   for (const int value : values) bytes.push_back(static_cast<std::byte>(value));
   return bytes;
+}
+
+// What the protocol sends by its own clock, each with its instant since the start.
+std::vector<std::pair<Duration, std::string>> commands_until(EcgProtocol& protocol, ScriptedLink& link, Instant end) {
+  std::vector<std::pair<Duration, std::string>> commands;
+  (void)link.take_sent();
+  for (Instant t = protocol.next_time(); t < end; t = protocol.next_time()) {
+    protocol.on_time(link, t);
+    commands.emplace_back(t - kStart, link.take_sent());
+  }
+  return commands;
 }
 
 struct Received {
@@ -152,7 +164,8 @@ TEST(EcgProtocol, BytesWithoutSenseSuggestTheWrongRateAndNoBytesThatItIsOff) {
     ScriptedLink link;
     protocol.on_open(link, kStart);
     if (bytes) protocol.on_bytes(link, std::vector<std::byte>(500, std::byte{0x55}), kStart + milliseconds(100));
-    protocol.on_time(link, protocol.next_time());
+    while (link.failure.empty()) protocol.on_time(link, protocol.next_time());
+    EXPECT_LT(protocol.next_time(), kStart + seconds(6));
     EXPECT_THAT(link.failure, HasSubstr(bytes ? "wrong baud rate" : "not a byte"));
     EXPECT_TRUE(received.blocks.empty());
   }
@@ -424,16 +437,30 @@ TEST(Cyton, WaitsForThePromptAndTakesTheBoardsName) {
   CytonProtocol protocol({}, received.sink(), received.health);
   ScriptedLink link;
   protocol.on_open(link, kStart);
-  EXPECT_EQ(link.take_sent(), "sv");
+  EXPECT_THAT(commands_until(protocol, link, kStart + seconds(1)),
+              ElementsAre(Pair(milliseconds(250), "s"), Pair(milliseconds(350), "v")));
   const auto say = [&](std::string_view text) {
-    protocol.on_bytes(link, std::as_bytes(std::span(text.data(), text.size())), kStart);
+    protocol.on_bytes(link, std::as_bytes(std::span(text.data(), text.size())), kStart + seconds(1));
   };
   say(std::string(5000, '\xA0'));
   say("OpenBCI V3 8-16 channel\nFirmware: v3.1.2\n$");
   EXPECT_EQ(link.take_sent(), "");
   say("$$");
-  EXPECT_EQ(link.take_sent(), "b");
+  EXPECT_THAT(commands_until(protocol, link, kStart + seconds(3)), ElementsAre(Pair(milliseconds(1100), "b")));
   EXPECT_THAT(received.health.identity(), HasSubstr("Firmware: v3.1.2"));
+}
+
+TEST(Cyton, AsksAgainWhileItsDongleHearsNothing) {
+  Received received;
+  CytonProtocol protocol({}, received.sink(), received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  std::string sent;
+  while (link.failure.empty()) {
+    protocol.on_time(link, protocol.next_time());
+    sent += link.take_sent();
+  }
+  EXPECT_EQ(sent, "svsvsv");
 }
 
 TEST(Cyton, ReadsNegativeSamplesAndTheChosenChannel) {
@@ -456,7 +483,10 @@ TEST(Bitalino, StartsLiveAcquisitionOfItsChannel) {
   BitalinoProtocol protocol({.channel = 2}, received.sink(), received.health);
   ScriptedLink link;
   protocol.on_open(link, kStart);
-  EXPECT_EQ(link.sent, std::string("\x00\xC3\x09", 3));
+  const std::string idle(1, '\0');
+  EXPECT_EQ(link.take_sent(), idle);
+  EXPECT_THAT(commands_until(protocol, link, kStart + seconds(1)),
+              ElementsAre(Pair(milliseconds(150), "\xC3"), Pair(milliseconds(300), "\x09")));
 }
 
 TEST(Bitalino, StartsLiveAcquisitionOfRespirationToo) {
@@ -464,7 +494,8 @@ TEST(Bitalino, StartsLiveAcquisitionOfRespirationToo) {
   BitalinoProtocol protocol({.channel = 2, .respiration_channel = 6}, received.sink(), received.health);
   ScriptedLink link;
   protocol.on_open(link, kStart);
-  EXPECT_EQ(link.sent, std::string("\x00\xC3\x89", 3));
+  EXPECT_THAT(commands_until(protocol, link, kStart + seconds(1)),
+              ElementsAre(Pair(milliseconds(150), ::testing::_), Pair(milliseconds(300), "\x89")));
 }
 
 // A belt that is too tight cuts the top off every breath; one that is not connected stays there.

@@ -171,7 +171,7 @@ TEST_P(OverATerminal, RespirationComesSampleForSampleWithTheEcg) {
 
 TEST_P(OverATerminal, UnpluggedAndPluggedInAgainItGoesOn) {
   EmulatorFaults faults;
-  faults.unplug_every = milliseconds(300);
+  faults.unplug_every = milliseconds(1000);  // the slowest start takes half of it
   faults.unplug_for = milliseconds(100);
   Session session(GetParam(), faults);
   ASSERT_TRUE(wait_until([&] { return session.health.openings.get() >= 3; })) << session.health.reason();
