@@ -163,16 +163,22 @@ std::vector<Error> DeviceFeeder::damage() const { return playback_ ? playback_->
 void DeviceFeeder::tell(const char* name, const DeviceHealth& health, Told& told) {
   const DeviceState state = health.state();
   std::string reason = health.reason();
-  if (state == told.state && (reason == told.reason || state != DeviceState::kClosed)) return;
+  const bool same_state = state == told.state;
+  const bool same_reason = reason == told.reason;
+  if (same_state && same_reason) return;
   told.state = state;
   told.reason = reason;
-  if (state == DeviceState::kStreaming) {
+  if (same_state && state != DeviceState::kClosed) {
+    // What the device tells while it is open, such as a controller off its bus.
+    if (!reason.empty()) spdlog::warn("{}: {}", name, reason);
+  } else if (state == DeviceState::kStreaming) {
     const std::string identity = health.identity();
     spdlog::info("{}: streaming{}{}", name, identity.empty() ? "" : ": ", identity);
   } else if (state == DeviceState::kClosed) {
     spdlog::warn("{}: {}", name, reason.empty() ? "closed" : reason);
   } else {
-    spdlog::info("{}: {}", name, device_state_name(state));
+    const bool news = !same_reason && !reason.empty();
+    spdlog::info("{}: {}{}", name, device_state_name(state), news ? ": " + reason : "");
   }
 }
 

@@ -47,8 +47,8 @@ struct DeviceRecording {
   std::function<Next()> next;
 };
 
-// Tells in the log whenever a device comes, goes or falls silent, and why, and when the recording stops. Ends when the
-// camera's playback or video ends.
+// Tells in the log whenever a device comes, goes, falls silent or has something to say of itself, and why, and when the
+// recording stops. Ends when the camera's playback or video ends.
 class DeviceFeeder final : public SensorFeeder {
  public:
   // `entrance`: none to record alone.
