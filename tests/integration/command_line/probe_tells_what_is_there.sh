@@ -16,10 +16,10 @@ fail() {
 }
 
 "$perimap" track "$recording" --csv "$work/tracks.csv" --video "$work/camera.avi" > "$work/track" 2>&1 || fail "no video: $(cat "$work/track")"
-"$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$line" --respiration-channel --respiration-period 2 > "$work/emulators" 2>&1 &
+"$perimap" emulate ndi=tcp:127.0.0.1:$port cyton="$line" medlab="$line-medlab" --respiration-channel --respiration-period 2 > "$work/emulators" 2>&1 &
 emulators=$!
 for _ in $(seq 100); do
-  [ "$(grep -c ' at ' "$work/emulators")" -eq 2 ] && break
+  [ "$(grep -c ' at ' "$work/emulators")" -eq 3 ] && break
   sleep 0.1
 done
 cat > "$work/there.toml" << TOML
@@ -38,7 +38,7 @@ device_channel = 4
 TOML
 "$perimap" probe "$work/there.toml" --seconds 6 --json > "$work/there.json" 2> "$work/errors" ||
   fail "what is there is not well: $(cat "$work/there.json" "$work/errors")"
-# A device of another kind on the port, and two that are not there.
+# A device of another kind on the port, two that are not there, and a port without modem lines.
 cat > "$work/gone.toml" << TOML
 version = 1
 [camera]
@@ -50,7 +50,7 @@ port = "tcp:127.0.0.1:$((port + 1))"
 protocol = "bitalino"
 port = "$line"
 r_trigger = true
-r_trigger_port = "$line"
+r_trigger_port = "$line-medlab"
 TOML
 "$perimap" probe "$work/gone.toml" --seconds 4 --json > "$work/gone.json" 2> "$work/errors"
 [ $? -eq 1 ] || fail "what is not there is well: $(cat "$work/gone.json")"
