@@ -128,6 +128,7 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
   const Release& due = plan_.last_due();
   counters_.last_release_capture_ns.set(static_cast<std::uint64_t>(to_ns(due.capture)));
   counters_.last_release_sequence.set(due.frame_sequence);
+  if (!due.frame_missing) counters_.last_owed_sequence.set(due.frame_sequence);
   counters_.frame_period_ns.set(static_cast<std::uint64_t>(plan_.frame_period().count()));
   return sample;
 }
@@ -145,6 +146,8 @@ RespiratoryClock Pipeline::status_respiration() noexcept {
 }
 
 std::span<const ShardSnapshot* const> Pipeline::model_snapshots() noexcept {
+  // Before they are taken: a release that falls due afterwards asks nothing of them.
+  model_owes_ = counters_.last_owed_sequence.get();
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     cells_[i].model.update();
     model_view_[i] = &cells_[i].model.front();
@@ -159,6 +162,7 @@ SurfaceFooting Pipeline::model_footing(const RespiratoryClock& respiration, Inst
     if (snapshot == nullptr) continue;
     footing.mapped = footing.mapped || !snapshot->features.empty();
     footing.pose_missing = footing.pose_missing || snapshot->pose_missing;
+    footing.update_late = footing.update_late || !snapshot->any || snapshot->frame_sequence < model_owes_;
   }
   // As the schedule has it: the frame after the last one, half a period late, has passed its release.
   const auto last = from_ns(static_cast<std::int64_t>(counters_.last_frame_ns.get()));

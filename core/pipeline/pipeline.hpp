@@ -90,6 +90,7 @@ class Pipeline {
   std::atomic<bool> forget_asked_{false};
   std::vector<const ShardSnapshot*> publisher_view_;
   std::vector<const ShardSnapshot*> model_view_;
+  std::uint64_t model_owes_ = 0;  // the frame whose update the snapshots of model_view_ ought to have
 };
 
 }  // namespace perimap

@@ -14,6 +14,7 @@
 #include "core/pipeline/pipeline.hpp"
 #include "daemon/runtime/live_runtime.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
+#include "daemon/runtime/model_moment.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
 #include "daemon/runtime/replay_setup.hpp"
 #include "tests/integration/pipeline/collected_surfaces.hpp"
@@ -190,6 +191,58 @@ TEST(ReleaseStreams, WhenFramesStopTheClockSaysSoAndItsSurfacesKeepTheirAge) {
   }
   EXPECT_GT(before, 10);
   EXPECT_GT(after, 20);
+}
+
+// A frame, a pose or a block of ECG comes in, and nobody maps what came.
+void let_in(const ReplayEvent& event, Pipeline& pipeline) {
+  SensorEntrance& entrance = pipeline.entrance();
+  if (const auto* frame = std::get_if<FrameEvent>(&event)) {
+    static_cast<void>(entrance.push_frame(frame->stamp, frame->image()));
+    pipeline.drain_stamps(frame->stamp.arrival);
+  } else if (const auto* pose = std::get_if<TrackerSample>(&event)) {
+    entrance.push_pose(*pose);
+  } else if (const auto* ecg = std::get_if<EcgBlock>(&event)) {
+    entrance.push_ecg(*ecg);
+  }
+}
+
+SurfaceReason model_reason(Pipeline& pipeline, Instant now) {
+  const CardiacClock clock = pipeline.status_clock(now);
+  const ModelMoment moment = model_moment(pipeline, clock, pipeline.status_respiration(), now);
+  return reason_of(clock.at(now), clock.rhythm(), moment.footing);
+}
+
+TEST(ReleaseStreams, WhileTheMapperHangsTheModelSaysSoAsTheSurfacesDo) {
+  ReplaySetup s = setup();
+  s.pipeline.lockstep = true;
+  Pipeline pipeline(s.pipeline);
+  CollectedSurfaces collected;
+  LockstepRuntime runtime(pipeline, s.identity, s.utc_minus_monotonic, collected);
+  std::optional<Instant> first;
+  bool hangs = false;
+  int good_before = 0;
+  int late = 0;
+  for (auto event = s.reader.next(); event && *event; event = s.reader.next()) {
+    const Instant now = arrival_of(**event);
+    if (!first) first = now;
+    if (now - *first <= milliseconds(5500)) {
+      runtime.deliver(**event);
+      good_before += model_reason(pipeline, now) == SurfaceReason::kNone ? 1 : 0;
+      continue;
+    }
+    hangs = true;
+    for (auto next = pipeline.plan().next(); next && next->deadline <= now; next = pipeline.plan().next()) {
+      const Instant deadline = next->deadline;
+      const SurfaceReason surface = pipeline.compose(pipeline.plan().take()).reason;
+      if (surface != SurfaceReason::kUpdateLate) continue;
+      EXPECT_EQ(model_reason(pipeline, deadline), SurfaceReason::kUpdateLate);
+      ++late;
+    }
+    let_in(**event, pipeline);
+  }
+  EXPECT_TRUE(hangs);
+  EXPECT_GT(good_before, 5) << "while frames are mapped it is good";
+  EXPECT_GT(late, 5);
 }
 
 TEST(ReleaseStreams, LiveEveryReleaseOfTheGridIsPublishedOrCountedAsMissed) {
