@@ -189,6 +189,10 @@ void Mapper::settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept {
     case ImagePhaseOutcome::kCanNotTell:
       break;
   }
+  publish_correction();
+}
+
+void Mapper::publish_correction() noexcept {
   CycleCorrection correction = cycle_.correction();
   if (settings_.law_from_image) correction.law = law_.belief();
   phase_cells_.publisher_correction.write(correction);
@@ -229,6 +233,8 @@ void Mapper::forget() noexcept {
   respiration_ = RespiratoryTracker(settings_.respiration);
   displacement_seen_ = false;
   breath_begun_ = false;
+  cycle_ = CyclePosterior(settings_.image_alone);
+  law_ = LawChoice();
   publish_nothing();
   counters_.maps_forgotten.add();
 }
@@ -327,6 +333,9 @@ void Mapper::publish_nothing() noexcept {
       cell->publish();
     }
   }
+  publish_correction();
+  phase_cells_.publisher_respiration.write(respiration_.clock());
+  phase_cells_.status_respiration.write(respiration_.clock());
 }
 
 void Mapper::finish_learning() noexcept {

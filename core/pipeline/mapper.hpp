@@ -57,7 +57,8 @@ class Mapper {
   // is done on return.
   void learn() noexcept;
 
-  // Forgets every feature and the breathing, and publishes that nothing is mapped, with no frame needed for it.
+  // Forgets every feature, the breathing, and what the images told of the running cycle and of the heart's law, and
+  // publishes that nothing of it is known, with no frame needed for it.
   void forget() noexcept;
 
   // Before the first frame: takes the features of an earlier run, as many as there is room for and whose estimates are
@@ -85,6 +86,7 @@ class Mapper {
   void expect_displacement(FrameRecord& frame) const noexcept;
   void settle_phases(const FrameRecord& frame) noexcept;
   void settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept;
+  void publish_correction() noexcept;
   void note_motion(const FrameRecord& frame) noexcept;
   void publish_nothing() noexcept;
   void fill_feed() noexcept;

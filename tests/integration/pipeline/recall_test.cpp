@@ -1,6 +1,7 @@
 // A map that was kept is gone on with, and one that was to be forgotten is gone.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -139,6 +140,17 @@ TEST(Recall, ForgettingLeavesNothingOfMapAndRhythm) {
   block.first_sample_time += block.count * block.sample_period;
   run.pipeline.entrance().push_ecg(block);
   EXPECT_EQ(run.pipeline.status_clock(block.first_sample_time).beats(), 0U);
+}
+
+// What was made of the law that the old patient's heart moves by goes with the map.
+TEST(Recall, ForgettingLeavesNothingOfTheLaw) {
+  EarlierRun run;
+  const Instant now = run.memory.last_capture;
+  const std::array<double, kPhaseLaws.size()> unknown = LawChoice().belief().probabilities;
+  ASSERT_NE(run.pipeline.status_clock(now).law_belief().probabilities, unknown) << "beats must have been weighed";
+  run.pipeline.ask_to_forget();
+  run.pipeline.forget_if_asked();
+  EXPECT_EQ(run.pipeline.status_clock(now).law_belief().probabilities, unknown);
 }
 
 TEST(Recall, TakesNoMoreFeaturesThanThereIsRoomForAndNoneOfAnotherLayout) {
