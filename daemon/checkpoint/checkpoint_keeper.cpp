@@ -50,6 +50,7 @@ void CheckpointKeeper::run() {
   while (!stopping_.load(std::memory_order_relaxed)) {
     pipeline_.map_feed().wait_until(std::min(next, MonotonicClock::now() + kLongestWait));
     const std::lock_guard lock(mutex_);
+    notice_forgotten_map();
     take_map();
     take_ecg();
     if (MonotonicClock::now() < next) continue;
@@ -58,10 +59,18 @@ void CheckpointKeeper::run() {
   }
 }
 
+void CheckpointKeeper::notice_forgotten_map() {
+  const std::uint64_t forgotten = pipeline_.counters().maps_forgotten.get();
+  if (forgotten == maps_forgotten_) return;
+  maps_forgotten_ = forgotten;
+  forgetting_ = false;
+  let_go();
+}
+
 void CheckpointKeeper::take_map() {
   const MapFeed::Batch* batch = pipeline_.map_feed().front();
   if (batch == nullptr) return;
-  const bool of_this_map = batch->maps_forgotten == pipeline_.counters().maps_forgotten.get();
+  const bool of_this_map = !forgetting_ && batch->maps_forgotten == pipeline_.counters().maps_forgotten.get();
   respiration_ = of_this_map ? batch->respiration : RespirationMemory{};
   for (const MapFeed::Entry& entry : batch->entries) {
     if (entry.mapped && of_this_map) {
@@ -99,6 +108,13 @@ void CheckpointKeeper::write() {
 
 void CheckpointKeeper::forget() {
   const std::lock_guard lock(mutex_);
+  const std::uint64_t forgotten = pipeline_.counters().maps_forgotten.get();
+  forgetting_ = forgotten == maps_forgotten_;
+  maps_forgotten_ = forgotten;
+  let_go();
+}
+
+void CheckpointKeeper::let_go() {
   take_ecg();
   features_.clear();
   respiration_ = {};

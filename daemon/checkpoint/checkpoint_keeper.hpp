@@ -31,12 +31,15 @@ class CheckpointKeeper {
   void run();
   void stop() noexcept { stopping_.store(true, std::memory_order_relaxed); }
 
-  // Any thread, once the pipeline has forgotten the map: the file goes, and nothing of that map is written again.
+  // Any thread, once the pipeline has been asked to forget the map: the file goes, and nothing of that map is written
+  // again, however long the pipeline takes. (That it has forgotten without a word of this, run() notices.)
   void forget();
 
  private:
   // What the pipeline has recalled, so that a crash that follows soon takes nothing either.
   void begin_with(const MapMemory& memory);
+  void notice_forgotten_map();
+  void let_go();
   void take_map();
   void take_ecg();
   void write();
@@ -49,6 +52,8 @@ class CheckpointKeeper {
   std::map<std::size_t, std::string> features_;  // by slot, serialized
   RespirationMemory respiration_;
   std::deque<EcgBlock> ecg_;
+  std::uint64_t maps_forgotten_ = 0;  // before the map that is kept
+  bool forgetting_ = false;           // that map is to go, and the pipeline still has it: nothing is kept
   bool write_failed_ = false;
   // Relaxed: a message by itself.
   std::atomic<bool> stopping_{false};

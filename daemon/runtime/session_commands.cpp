@@ -14,13 +14,14 @@ constexpr Duration kMapperPatience = std::chrono::seconds(2);
 
 SessionCommands::SessionCommands(Pipeline& pipeline, const Identity& identity, std::function<StatusFacts()> facts,
                                  std::function<Expected<std::string>()> reload,
-                                 std::function<Expected<std::string>(bool)> record, std::function<void()> on_forgotten)
+                                 std::function<Expected<std::string>(bool)> record,
+                                 std::function<void()> on_new_patient)
     : pipeline_(pipeline),
       statuses_(wire_statuses(identity, pipeline.settings())),
       facts_(std::move(facts)),
       reload_(std::move(reload)),
       record_(std::move(record)),
-      on_forgotten_(std::move(on_forgotten)) {}
+      on_new_patient_(std::move(on_new_patient)) {}
 
 Expected<std::string> SessionCommands::answer(ControlCommand command) {
   switch (command) {
@@ -53,12 +54,12 @@ std::string SessionCommands::tell_status() {
 Expected<std::string> SessionCommands::forget_patient() {
   const std::uint64_t before = pipeline_.counters().maps_forgotten.get();
   pipeline_.ask_to_forget();
+  on_new_patient_();
   const Instant until = MonotonicClock::now() + kMapperPatience;
   while (pipeline_.counters().maps_forgotten.get() == before) {
     if (MonotonicClock::now() > until) return fail("the mapper does not answer: the map is not cleared yet");
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  on_forgotten_();
   return "the map is cleared\n";
 }
 

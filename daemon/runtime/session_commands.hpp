@@ -17,11 +17,11 @@ namespace perimap {
 class SessionCommands {
  public:
   // `pipeline` must outlive it and run. `facts` tells what the status says beside the counters; `reload` reads the
-  // configuration again and says what came of it; `record` begins or ends a recording; `on_forgotten` is called once
-  // the old patient's map is gone.
+  // configuration again and says what came of it; `record` begins or ends a recording; `on_new_patient` is called when
+  // the old patient's map is to go, which may take the pipeline a while.
   SessionCommands(Pipeline& pipeline, const Identity& identity, std::function<StatusFacts()> facts,
                   std::function<Expected<std::string>()> reload, std::function<Expected<std::string>(bool)> record,
-                  std::function<void()> on_forgotten);
+                  std::function<void()> on_new_patient);
 
   [[nodiscard]] Expected<std::string> answer(ControlCommand command);
 
@@ -34,7 +34,7 @@ class SessionCommands {
   std::function<StatusFacts()> facts_;
   std::function<Expected<std::string>()> reload_;
   std::function<Expected<std::string>(bool)> record_;
-  std::function<void()> on_forgotten_;
+  std::function<void()> on_new_patient_;
 };
 
 }  // namespace perimap

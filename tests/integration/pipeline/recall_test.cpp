@@ -1,18 +1,24 @@
 // A map that was kept is gone on with, and one that was to be forgotten is gone.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <array>
+#include <chrono>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "daemon/checkpoint/checkpoint_keeper.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/replay_setup.hpp"
+#include "daemon/runtime/session_commands.hpp"
 #include "tests/integration/pipeline/kept_map.hpp"
 
 namespace perimap {
@@ -151,6 +157,66 @@ TEST(Recall, ForgettingLeavesNothingOfTheLaw) {
   run.pipeline.ask_to_forget();
   run.pipeline.forget_if_asked();
   EXPECT_EQ(run.pipeline.status_clock(now).law_belief().probabilities, unknown);
+}
+
+// A run that is over, whose checkpoint is still kept by a thread that runs.
+class KeptRun : public ::testing::Test {
+ protected:
+  KeptRun() {
+    keeping_ = std::thread([this] { keeper.run(); });
+    while (auto event = run_.reader.next()) {
+      if (!*event) break;
+      runtime_.deliver(**event);
+    }
+  }
+  ~KeptRun() override {
+    keeper.stop();
+    keeping_.join();
+    std::filesystem::remove(file);
+  }
+  // What has to become so does so before long, or never.
+  template <class Condition>
+  [[nodiscard]] static bool comes_true(Condition condition) {
+    for (int i = 0; i < 1000 && !condition(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return condition();
+  }
+  [[nodiscard]] bool kept() const { return std::filesystem::exists(file); }
+
+ private:
+  ReplaySetup run_ = setup();
+  Unheard unheard_;
+  std::thread keeping_;
+
+ protected:
+  static constexpr Duration kInterval = std::chrono::milliseconds(20);
+
+  std::filesystem::path file = testing::TempDir() + "/perimap_kept_run_" + std::to_string(::getpid());
+  Pipeline pipeline{run_.pipeline};
+  CheckpointKeeper keeper{pipeline, file, perimap::SetUp{}, kInterval};
+
+ private:
+  LockstepRuntime runtime_{pipeline, run_.identity, run_.utc_minus_monotonic, unheard_};
+};
+
+TEST_F(KeptRun, WhenTheMapIsForgottenItsCheckpointGoesToo) {
+  ASSERT_TRUE(comes_true([this] { return kept(); }));
+  pipeline.ask_to_forget();
+  pipeline.forget_if_asked();
+  EXPECT_TRUE(comes_true([this] { return !kept(); }));
+}
+
+TEST_F(KeptRun, TheCheckpointGoesThoughTheMapperDoesNotAnswerTheCommand) {
+  ASSERT_TRUE(comes_true([this] { return kept(); }));
+  SessionCommands commands(
+      pipeline, {}, [] { return StatusFacts{}; }, [] { return std::string(); }, [](bool) { return std::string(); },
+      [this] { keeper.forget(); });
+  EXPECT_FALSE(commands.answer(ControlCommand::kNewPatient)) << "nothing maps here";
+  EXPECT_FALSE(kept());
+  std::this_thread::sleep_for(10 * kInterval);
+  EXPECT_FALSE(kept()) << "nothing of the old map is written again";
+  pipeline.forget_if_asked();
+  std::this_thread::sleep_for(10 * kInterval);
+  EXPECT_FALSE(kept());
 }
 
 TEST(Recall, TakesNoMoreFeaturesThanThereIsRoomForAndNoneOfAnotherLayout) {
