@@ -19,14 +19,6 @@ Expected<UntypedWriter> UntypedWriter::create(const Participant& participant, co
   return UntypedWriter(std::move(topic), std::move(writer));
 }
 
-Expected<void> UntypedWriter::write(const void* sample) {
-  const dds_return_t result = dds_write(writer_.get(), sample);
-  if (result < 0) {
-    return fail(fmt::format("DDS write: {}", dds_strretcode(result)));
-  }
-  return {};
-}
-
 int UntypedWriter::matched_readers() const noexcept {
   dds_publication_matched_status_t status{};
   return dds_get_publication_matched_status(writer_.get(), &status) < 0 ? 0 : static_cast<int>(status.current_count);

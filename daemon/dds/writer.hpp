@@ -15,8 +15,10 @@ class UntypedWriter {
                                                       const TopicDescription& description,
                                                       const WriterPromise& promise);
 
-  // Copies the sample to the network and to readers in this process. Allocates, locks and calls the kernel.
-  [[nodiscard]] Expected<void> write(const void* sample);
+  // Copies the sample to the network and to readers in this process. Allocates, locks and calls the kernel. Returns
+  // DDS_RETCODE_OK or a negative code, which dds_strretcode() names: a sentence about it would be made on the publisher
+  // thread.
+  [[nodiscard]] dds_return_t write(const void* sample) noexcept { return dds_write(writer_.get(), sample); }
   // Readers that are connected now.
   [[nodiscard]] int matched_readers() const noexcept;
 
@@ -37,7 +39,7 @@ class Writer {
     });
   }
 
-  [[nodiscard]] Expected<void> write(const T& sample) { return writer_.write(&sample); }
+  [[nodiscard]] dds_return_t write(const T& sample) noexcept { return writer_.write(&sample); }
   [[nodiscard]] int matched_readers() const noexcept { return writer_.matched_readers(); }
 
  private:

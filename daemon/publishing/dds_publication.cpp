@@ -16,14 +16,35 @@ Expected<std::unique_ptr<DdsPublication>> DdsPublication::create(const DdsSettin
   if (!phase) return tl::unexpected(phase.error());
   auto status = dds::Writer<perimap_Status>::create(*participant);
   if (!status) return tl::unexpected(status.error());
-  return std::unique_ptr<DdsPublication>(new DdsPublication(std::move(*participant), std::move(*surface),
+  return std::unique_ptr<DdsPublication>(new DdsPublication(settings, std::move(*participant), std::move(*surface),
                                                             std::move(*model), std::move(*phase), std::move(*status)));
 }
 
-void DdsPublication::count(const Expected<void>& written) {
-  if (written) return;
-  if (failures_.fetch_add(1, std::memory_order_relaxed) == 0) {
-    spdlog::error("DDS write failed (further ones are counted): {}", written.error().message);
+void DdsPublication::status(const perimap_Status& status) {
+  count(status_.write(status));
+  tell_failures();
+}
+
+void DdsPublication::count(dds_return_t written) noexcept {
+  if (written >= 0) return;
+  last_error_.store(written, std::memory_order_relaxed);
+  failures_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void DdsPublication::tell_failures() {
+  const Instant now = MonotonicClock::now();
+  const std::uint64_t failures = this->failures();
+  if (failures > failures_seen_) {
+    if (!failing_) {
+      spdlog::error("DDS writes fail: {}", dds_strretcode(last_error_.load(std::memory_order_relaxed)));
+      failures_before_ = failures_seen_;
+    }
+    failing_ = true;
+    last_seen_ = now;
+    failures_seen_ = failures;
+  } else if (failing_ && now - last_seen_ >= settings_.writes_well_after) {
+    spdlog::warn("DDS writes succeed again; {} failed", failures - failures_before_);
+    failing_ = false;
   }
 }
 

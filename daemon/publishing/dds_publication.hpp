@@ -2,11 +2,13 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <utility>
 
 #include "core/error/expected.hpp"
+#include "core/time/instant.hpp"
 #include "daemon/dds/participant.hpp"
 #include "daemon/dds/writer.hpp"
 #include "daemon/publishing/publication.hpp"
@@ -17,9 +19,12 @@ struct DdsSettings {
   int domain = 0;
   Duration surface_deadline{0};  // offered period of `surface`; 0: none
   Duration surface_lifespan{0};  // 0: none
+  // So long without a failure: writes succeed again, for the log.
+  Duration writes_well_after = std::chrono::seconds(5);
 };
 
-// A write that fails is counted, and the first one is logged: the next sample is a new chance.
+// A write that fails is counted: the next sample is a new chance. The log has a line when it begins and when it ends,
+// from the thread that publishes the status.
 class DdsPublication final : public Publication {
  public:
   [[nodiscard]] static Expected<std::unique_ptr<DdsPublication>> create(const DdsSettings& settings);
@@ -27,23 +32,26 @@ class DdsPublication final : public Publication {
   void surface(const perimap_Surface& sample) override { count(surface_.write(sample)); }
   void surface_model(const perimap_SurfaceModel& model) override { count(model_.write(model)); }
   void phase(const perimap_Phase& phase) override { count(phase_.write(phase)); }
-  void status(const perimap_Status& status) override { count(status_.write(status)); }
+  void status(const perimap_Status& status) override;
 
   // Samples that could not be written.
   [[nodiscard]] std::uint64_t failures() const noexcept { return failures_.load(std::memory_order_relaxed); }
 
  private:
-  DdsPublication(dds::Participant participant, dds::Writer<perimap_Surface> surface,
+  DdsPublication(const DdsSettings& settings, dds::Participant participant, dds::Writer<perimap_Surface> surface,
                  dds::Writer<perimap_SurfaceModel> model, dds::Writer<perimap_Phase> phase,
                  dds::Writer<perimap_Status> status)
-      : participant_(std::move(participant)),
+      : settings_(settings),
+        participant_(std::move(participant)),
         surface_(std::move(surface)),
         model_(std::move(model)),
         phase_(std::move(phase)),
         status_(std::move(status)) {}
 
-  void count(const Expected<void>& written);
+  void count(dds_return_t written) noexcept;
+  void tell_failures();
 
+  DdsSettings settings_;
   dds::Participant participant_;
   dds::Writer<perimap_Surface> surface_;
   dds::Writer<perimap_SurfaceModel> model_;
@@ -51,6 +59,12 @@ class DdsPublication final : public Publication {
   dds::Writer<perimap_Status> status_;
   // Relaxed: a statistic that orders nothing. Two threads publish, so it is added to atomically.
   std::atomic<std::uint64_t> failures_{0};
+  std::atomic<dds_return_t> last_error_{DDS_RETCODE_OK};
+  // The status thread's own.
+  bool failing_ = false;
+  Instant last_seen_;  // that one had failed
+  std::uint64_t failures_seen_ = 0;
+  std::uint64_t failures_before_ = 0;  // when it began
 };
 
 }  // namespace perimap

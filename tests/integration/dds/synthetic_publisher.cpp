@@ -141,7 +141,7 @@ int publish(int domain, int readers, std::uint64_t samples, int rate, std::size_
     const Instant release = start + Duration(static_cast<std::int64_t>(i) * 1'000'000'000 / rate);
     const perimap_Surface& surface = heart.surface_at(release, i);
     sleep_until(release);
-    bool good = surfaces->write(surface).has_value() && phases->write(Heart::phase_sample_at(release, i)).has_value();
+    bool good = surfaces->write(surface) >= 0 && phases->write(Heart::phase_sample_at(release, i)) >= 0;
     if (i % 30 == 0) {
       perimap_Status status{};
       name_stream(status);
@@ -149,7 +149,7 @@ int publish(int domain, int readers, std::uint64_t samples, int rate, std::size_
       status.sample_sequence = i / 30;
       status.time_ns = to_ns(release);
       status.samples = i;
-      good = good && models->write(heart.model_at(release, i / 30)).has_value() && statuses->write(status).has_value();
+      good = good && models->write(heart.model_at(release, i / 30)) >= 0 && statuses->write(status) >= 0;
     }
     if (!good) {
       std::fprintf(stderr, "synthetic_publisher: a write failed\n");
