@@ -1,6 +1,7 @@
 #include "core/pipeline/batch_starter.hpp"
 
 #include "core/pipeline/pose_noise.hpp"
+#include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
 
@@ -40,6 +41,7 @@ void BatchStarter::dismiss() noexcept {
 }
 
 void BatchStarter::wait_until_done() noexcept {
+  const NamedWait wait;
   std::uint64_t requested = 0;
   for (const auto& lane : lanes_) requested += lane->requested;
   for (; waited_for_ < requested; ++waited_for_) solved_.wait();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "core/realtime/realtime_scope.hpp"
+
 namespace perimap {
 namespace {
 
@@ -50,7 +52,10 @@ void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, co
 
 std::span<const FoundFeature> FeatureFinder::adopt(std::uint64_t frame_index) noexcept {
   if (!active_ || frame_index < begun_at_ + frames_.size()) return {};
-  if (lockstep_) finished_.wait();
+  if (lockstep_) {
+    const NamedWait wait;
+    finished_.wait();
+  }
   const bool due = frame_index == begun_at_ + frames_.size();
   // Acquire: what housekeeping found is visible once the flag is (pairs with the release in work()).
   if (!done_.load(std::memory_order_acquire)) {

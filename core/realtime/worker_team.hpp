@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "core/realtime/realtime_scope.hpp"
 #include "core/realtime/wakeup.hpp"
 
 namespace perimap {
@@ -30,6 +31,7 @@ class WorkerTeam {
 
   // Leader. Returns when every worker has finished; at once when nothing was started.
   void join() noexcept {
+    const NamedWait wait;
     for (; pending_ > 0; --pending_) done_.wait();
   }
 

@@ -1,76 +1,44 @@
-// The real-time path makes no heap call: the allocator is interposed for the whole process, and every call inside a
-// RealtimeScope is counted. Not built with sanitizers, which bring their own allocator.
+// The real-time path makes no heap call, takes no lock, waits for nothing but at its named waits, and does no input or
+// output: all such calls are interposed for the whole process, and those inside a RealtimeScope are counted. Not built
+// with sanitizers, which bring their own allocator.
 #include <gtest/gtest.h>
+#include <linux/futex.h>
+#include <poll.h>
+#include <pthread.h>
+#include <semaphore.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <atomic>
-#include <cerrno>
-#include <cstdlib>
+#include <chrono>
+#include <cstddef>
+#include <ctime>
+#include <functional>
 #include <memory>
-#include <new>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
 #include "core/realtime/realtime_scope.hpp"
+#include "core/realtime/wakeup.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/live_runtime.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
 #include "daemon/runtime/replay_setup.hpp"
-
-namespace {
-
-std::atomic<int> heap_calls_in_scope{0};
-
-void count() noexcept {
-  if (perimap::RealtimeScope::depth() > 0) heap_calls_in_scope.fetch_add(1);
-}
-
-}  // namespace
-
-// glibc's own allocator under its other names (malloc.h, "Replacing malloc", glibc manual).
-extern "C" {
-void* __libc_malloc(std::size_t);
-void* __libc_calloc(std::size_t, std::size_t);
-void* __libc_realloc(void*, std::size_t);
-void* __libc_memalign(std::size_t, std::size_t);
-void __libc_free(void*);
-
-void* malloc(std::size_t n) {
-  count();
-  return __libc_malloc(n);
-}
-void* calloc(std::size_t n, std::size_t size) {
-  count();
-  return __libc_calloc(n, size);
-}
-void* realloc(void* p, std::size_t n) {
-  count();
-  return __libc_realloc(p, n);
-}
-void* memalign(std::size_t alignment, std::size_t n) {
-  count();
-  return __libc_memalign(alignment, n);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t n) {
-  count();
-  return __libc_memalign(alignment, n);
-}
-int posix_memalign(void** out, std::size_t alignment, std::size_t n) {
-  count();
-  *out = __libc_memalign(alignment, n);
-  return *out == nullptr ? ENOMEM : 0;
-}
-void free(void* p) {
-  if (p != nullptr) count();
-  __libc_free(p);
-}
-}
+#include "tests/integration/pipeline/forbidden_calls.hpp"
 
 namespace perimap {
 namespace {
+
+using test::forbidden_calls;
+using test::ForbiddenCalls;
+using test::forget_forbidden_calls;
 
 struct LastSurface final : Publication {
   void surface(const perimap_Surface& sample) override {
@@ -90,6 +58,12 @@ struct LastSurface final : Publication {
   std::uint32_t features = 0;
 };
 
+void expect_none() {
+  const ForbiddenCalls calls = forbidden_calls();
+  EXPECT_EQ(calls.heap, 0);
+  EXPECT_EQ(calls.blocking, 0) << calls.first_blocking;
+}
+
 ReplaySetup setup() {
   auto made = prepare_replay(PERIMAP_TEST_RECORDING, std::nullopt, ReadMode::kStrict);
   if (!made) throw std::runtime_error(made.error().error.message);
@@ -97,19 +71,80 @@ ReplaySetup setup() {
 }
 
 TEST(RealtimePath, TheCounterSeesAHeapCallInsideTheScopeAndOnlyThere) {
-  heap_calls_in_scope = 0;
+  forget_forbidden_calls();
   std::unique_ptr<std::vector<int>> outside = std::make_unique<std::vector<int>>(1000);
-  EXPECT_EQ(heap_calls_in_scope, 0);
+  EXPECT_EQ(forbidden_calls().heap, 0);
   {
     const RealtimeScope realtime;
     outside->resize(100'000);
   }
-  EXPECT_GT(heap_calls_in_scope, 0);
+  EXPECT_GT(forbidden_calls().heap, 0);
+}
+
+struct BlockingCall {
+  std::string name;  // as it is counted
+  std::function<void()> call;
+};
+
+// None of them waits for long.
+std::vector<BlockingCall> blocking_calls() {
+  static std::mutex mutex;
+  static std::mutex held;
+  [[maybe_unused]] static const bool is_held = (held.lock(), true);
+  static pthread_cond_t condition = PTHREAD_COND_INITIALIZER;
+  static const std::timespec long_ago{1, 0};
+  static const std::timespec at_once{0, 1};
+  static Wakeup wakeup;
+  static std::atomic<int> word{0};
+  static std::byte byte{};
+  return {
+      {"pthread_mutex_lock", [] { const std::lock_guard lock(mutex); }},
+      {"pthread_cond_timedwait",
+       [] { static_cast<void>(pthread_cond_timedwait(&condition, held.native_handle(), &long_ago)); }},
+      {"sem_wait",
+       [] {
+         wakeup.post();
+         wakeup.wait();
+       }},
+      {"sem_clockwait", [] { static_cast<void>(wakeup.wait_until(Instant{})); }},
+      {"nanosleep", [] { static_cast<void>(nanosleep(&at_once, nullptr)); }},
+      {"clock_nanosleep", [] { static_cast<void>(clock_nanosleep(CLOCK_MONOTONIC, 0, &at_once, nullptr)); }},
+      {"syscall", [] { static_cast<void>(::syscall(SYS_futex, &word, FUTEX_WAIT, 1, nullptr, nullptr, 0)); }},
+      {"read", [] { static_cast<void>(::read(-1, &byte, 1) + 0); }},
+      {"write", [] { static_cast<void>(::write(-1, &byte, 1) + 0); }},
+      {"poll", [] { static_cast<void>(::poll(nullptr, 0, 0)); }},
+  };
+}
+
+TEST(RealtimePath, TheCounterSeesEachBlockingCallInsideTheScopeAndOnlyThere) {
+  for (const BlockingCall& blocking : blocking_calls()) {
+    forget_forbidden_calls();
+    blocking.call();
+    EXPECT_EQ(forbidden_calls().blocking, 0) << blocking.name;
+    {
+      const RealtimeScope realtime;
+      blocking.call();
+    }
+    EXPECT_EQ(forbidden_calls().blocking, 1) << blocking.name;
+    EXPECT_EQ(forbidden_calls().first_blocking, blocking.name);
+  }
+}
+
+TEST(RealtimePath, ANamedWaitIsNoneOfTheScopeAroundIt) {
+  forget_forbidden_calls();
+  const RealtimeScope realtime;
+  {
+    const NamedWait wait;
+    std::this_thread::sleep_for(std::chrono::microseconds(1));
+  }
+  EXPECT_EQ(forbidden_calls().blocking, 0);
+  std::this_thread::sleep_for(std::chrono::microseconds(1));
+  EXPECT_EQ(forbidden_calls().blocking, 1);
 }
 
 struct RealtimePathIn : testing::TestWithParam<Precision> {};
 
-TEST_P(RealtimePathIn, MakesNoHeapCallInLockstepFromFirstFrameToMappedSurface) {
+TEST_P(RealtimePathIn, NeitherAllocatesNorBlocksInLockstepFromFirstFrameToMappedSurface) {
   ReplaySetup s = setup();
   s.pipeline.estimator.precision = GetParam();
   s.pipeline.lockstep = true;
@@ -117,7 +152,7 @@ TEST_P(RealtimePathIn, MakesNoHeapCallInLockstepFromFirstFrameToMappedSurface) {
   Pipeline pipeline(s.pipeline);
   LastSurface publication;
   LockstepRuntime runtime(pipeline, s.identity, s.utc_minus_monotonic, publication);
-  heap_calls_in_scope = 0;
+  forget_forbidden_calls();
   for (;;) {
     auto event = s.reader.next();
     ASSERT_TRUE(event.has_value()) << event.error().message;
@@ -127,7 +162,7 @@ TEST_P(RealtimePathIn, MakesNoHeapCallInLockstepFromFirstFrameToMappedSurface) {
   pipeline.ask_to_forget();
   pipeline.forget_if_asked();
   pipeline.entrance().push_ecg({});
-  EXPECT_EQ(heap_calls_in_scope, 0);
+  expect_none();
   EXPECT_GT(publication.surfaces, 100);
   EXPECT_GT(publication.clock_surfaces, 2000);
   EXPECT_GT(publication.features, 10U) << "the path must have been exercised up to mapped features";
@@ -137,7 +172,7 @@ INSTANTIATE_TEST_SUITE_P(EachPrecision, RealtimePathIn, testing::Values(Precisio
                          [](const auto& param) { return param.param == Precision::kDouble ? "Double" : "Single"; });
 
 // With the shortest of budgets, so that features are shed.
-TEST(RealtimePath, MakesNoHeapCallLiveWithAllThreads) {
+TEST(RealtimePath, NeitherAllocatesNorBlocksLiveWithAllThreads) {
   ReplaySetup s = setup();
   s.pipeline.clock_period = std::chrono::milliseconds(2);
   s.pipeline.budget = std::chrono::microseconds(100);
@@ -146,7 +181,7 @@ TEST(RealtimePath, MakesNoHeapCallLiveWithAllThreads) {
   RuntimeSettings settings;
   settings.lock_memory = false;
   LiveRuntime runtime(pipeline, settings, publication);
-  heap_calls_in_scope = 0;
+  forget_forbidden_calls();
   runtime.start();
   ReplayFeeder feeder(std::move(s.reader), SensorIntake{&pipeline.entrance()});
   feeder.start(runtime.threads());
@@ -156,7 +191,7 @@ TEST(RealtimePath, MakesNoHeapCallLiveWithAllThreads) {
   feeder.stop();
   runtime.stop();
   EXPECT_FALSE(feeder.error().has_value());
-  EXPECT_EQ(heap_calls_in_scope, 0);
+  expect_none();
   EXPECT_GT(publication.surfaces, 100);
   EXPECT_GT(publication.clock_surfaces, 100);
   EXPECT_GT(publication.features + pipeline.counters().features_shed.get(), 0U)
