@@ -87,7 +87,8 @@ struct FeatureSlot {
   Instant first_observed;
   Vector2d first_observed_px = Vector2d::Zero();
 
-  bool shed = false;  // not looked for, so that the frame's time suffices for the others; see LoadShedding
+  bool shed = false;    // not looked for, so that the frame's time suffices for the others; see LoadShedding
+  bool in_view = true;  // the map has it in the image, when it could tell last
 
   // following
   PatchTemplate patch;

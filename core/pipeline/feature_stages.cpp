@@ -183,8 +183,10 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
                       const PipelineSettings& settings) noexcept {
   slot.match = PatchMatch{};
   slot.match_agrees = false;
-  if (slot.state == SlotState::kEmpty || slot.shed) return;
+  if (slot.state == SlotState::kEmpty) return;
   const PixelPrediction from_map = predict_from_map(map, *job.frame, model);
+  if (map.valid && job.frame->measurable) slot.in_view = from_map.valid && settings.camera.contains(from_map.px);
+  if (slot.shed) return;
   seek(slot, surer(from_map, predict_from_velocity(slot, job)), Looks::kAskedInDoubt, job, settings);
   if (slot.match.state != MatchState::kFound) return;
   slot.match_agrees = from_map.valid && agrees(slot.match, from_map, settings.estimator.update.gate);
@@ -237,17 +239,21 @@ void describe(const FeatureSlot& slot, Instant now, FeatureSnapshot& snapshot) n
   if (slot.health.state() == HealthState::kInconsistent) {
     snapshot.state = FeatureState::kInconsistent;
     snapshot.reason = FeatureReason::kInnovationsHigh;
-  } else if (slot.shed) {
-    const bool believed = slot.converged && now - slot.last_observed <= kBelievedUnseen;
-    snapshot.state = believed ? FeatureState::kConverged : FeatureState::kConverging;
+    return;
+  }
+  snapshot.state = is_called_converged(slot, now) ? FeatureState::kConverged : FeatureState::kConverging;
+  if (slot.shed) {
     snapshot.reason = FeatureReason::kShed;
   } else if (!slot.converged) {
-    snapshot.state = FeatureState::kConverging;
     snapshot.reason = FeatureReason::kDeviationLarge;
   } else {
-    snapshot.state = FeatureState::kConverged;
     snapshot.reason = slot.match_agrees ? FeatureReason::kNone : FeatureReason::kNotObserved;
   }
+}
+
+bool is_called_converged(const FeatureSlot& slot, Instant now) noexcept {
+  if (!slot.converged || slot.health.state() == HealthState::kInconsistent) return false;
+  return slot.match_agrees || now - slot.last_observed <= kBelievedUnseen;
 }
 
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept {

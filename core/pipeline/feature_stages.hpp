@@ -32,9 +32,11 @@ void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept;
 void follow(FeatureSlot& slot, const MapPrediction& from_map, const FrameJob& job, const PixelModel& model,
             const PipelineSettings& settings) noexcept;
 
-// So long a feature that is shed is still called converged after it was last observed. That of one that is looked for
-// ends with its life, see kUnobservedFramesBeforeLost.
+// So long a feature is still called converged after it was last observed. One that is looked for is mostly given up
+// before, see kUnobservedFramesBeforeLost; one that is shed is not.
 inline constexpr Duration kBelievedUnseen = std::chrono::seconds(30);
+// What surfaces and the status say of a mapped feature. `now`: the capture.
+[[nodiscard]] bool is_called_converged(const FeatureSlot& slot, Instant now) noexcept;
 
 // C: all of a mapped feature's snapshot but its coefficients and covariances, which the bank has. `now`: the capture.
 void describe(const FeatureSlot& slot, Instant now, FeatureSnapshot& snapshot) noexcept;

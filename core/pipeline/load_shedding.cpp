@@ -6,19 +6,15 @@
 namespace perimap {
 namespace {
 
+// Whether a feature can be seen, the higher the likelier.
+constexpr int kUnseen = 0;
+constexpr int kPerhapsSeen = 1;
+constexpr int kSeen = 2;
+
 // The higher, the more useful.
 int usefulness(const FeatureSlot& slot) noexcept {
   if (slot.state != SlotState::kMapped) return 0;
   return slot.converged ? 2 : 1;
-}
-
-bool more_useful(const FeatureSlot* a, const FeatureSlot* b) noexcept {
-  if (usefulness(*a) != usefulness(*b)) return usefulness(*a) > usefulness(*b);
-  // Without a map there is no deviation yet.
-  if (a->state == SlotState::kMapped && a->largest_deviation_mm != b->largest_deviation_mm) {
-    return a->largest_deviation_mm < b->largest_deviation_mm;
-  }
-  return a->id < b->id;
 }
 
 }  // namespace
@@ -54,7 +50,9 @@ void LoadSheddingDecision::take_back() noexcept {
   if (limit_ == maximum_) patience_ = 1;
 }
 
-LoadShedding::LoadShedding(std::span<FeatureSlot> slots) : slots_(slots) { order_.reserve(slots.size()); }
+LoadShedding::LoadShedding(std::span<FeatureSlot> slots) : slots_(slots), watches_(slots.size()) {
+  order_.reserve(slots.size());
+}
 
 int LoadShedding::followed() const noexcept {
   return static_cast<int>(std::count_if(slots_.begin(), slots_.end(), [](const FeatureSlot& slot) {
@@ -62,22 +60,77 @@ int LoadShedding::followed() const noexcept {
   }));
 }
 
+int LoadShedding::in_sight() const noexcept {
+  int seen = 0;
+  for (std::size_t i = 0; i < slots_.size(); ++i) {
+    if (slots_[i].state != SlotState::kEmpty && sight_of(slots_[i], watches_[i]) == kSeen) ++seen;
+  }
+  return seen;
+}
+
+int LoadShedding::sight_of(const FeatureSlot& slot, const Watch& watch) noexcept {
+  if (!slot.shed) {
+    if (watch.misses <= kMissesAllowed) return kSeen;
+    return slot.in_view ? kPerhapsSeen : kUnseen;
+  }
+  if (slot.state != SlotState::kMapped || !slot.in_view) return kUnseen;
+  return watch.set_aside > 0 ? kPerhapsSeen : kSeen;
+}
+
+bool LoadShedding::more_useful(const Ranked& a, const Ranked& b) noexcept {
+  if (a.sight != b.sight) return a.sight > b.sight;
+  if (usefulness(*a.slot) != usefulness(*b.slot)) return usefulness(*a.slot) > usefulness(*b.slot);
+  if (a.slot->shed != b.slot->shed) return b.slot->shed;
+  // Without a map there is no deviation yet.
+  if (a.slot->state == SlotState::kMapped && a.slot->largest_deviation_mm != b.slot->largest_deviation_mm) {
+    return a.slot->largest_deviation_mm < b.slot->largest_deviation_mm;
+  }
+  return a.slot->id < b.slot->id;
+}
+
+void LoadShedding::note(std::uint64_t frame_index, bool measurable) noexcept {
+  ++since_ranked_;
+  for (std::size_t i = 0; i < slots_.size(); ++i) {
+    const FeatureSlot& slot = slots_[i];
+    Watch& watch = watches_[i];
+    if (slot.state == SlotState::kEmpty) {
+      watch = {};
+      continue;
+    }
+    watch.set_aside = slot.shed && !slot.in_view ? 0 : std::max(0, watch.set_aside - 1);
+    if (slot.shed) continue;
+    if (slot.last_found_frame == frame_index) {
+      watch.misses = 0;
+    } else if (measurable) {
+      ++watch.misses;
+    }
+  }
+}
+
 std::size_t LoadShedding::apply(int limit) noexcept {
   order_.clear();
   std::size_t shed = 0;
-  for (FeatureSlot& slot : slots_) {
+  for (std::size_t i = 0; i < slots_.size(); ++i) {
+    FeatureSlot& slot = slots_[i];
     if (slot.state == SlotState::kEmpty) {
       slot.shed = false;
       continue;
     }
-    order_.push_back(&slot);
+    order_.push_back({&slot, &watches_[i], sight_of(slot, watches_[i])});
     shed += slot.shed ? 1 : 0;
   }
   const std::size_t keep = std::min(order_.size(), static_cast<std::size_t>(std::max(0, limit)));
-  // As before, unless the number changes: two alike must not take turns.
-  if (order_.size() - shed == keep) return shed;
-  std::nth_element(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(keep), order_.end(), more_useful);
-  for (std::size_t i = 0; i < order_.size(); ++i) order_[i]->shed = i >= keep;
+  const bool as_many = order_.size() - shed == keep;
+  if (as_many && (shed == 0 || since_ranked_ < kReviewFrames)) return shed;
+  since_ranked_ = 0;
+  std::nth_element(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(keep), order_.end(), &more_useful);
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    const auto [slot, watch, sight] = order_[i];
+    const bool sheds = i >= keep;
+    if (sheds && !slot->shed && sight != kSeen) watch->set_aside = kSetAsideFrames;
+    if (!sheds && slot->shed) watch->misses = 0;
+    slot->shed = sheds;
+  }
   return order_.size() - keep;
 }
 

@@ -54,24 +54,55 @@ class LoadSheddingDecision {
   int since_taken_back_ = kTooSoonFrames;
 };
 
-// Marks the slots that are shed. Shed first are features that have no map yet, then those that have not converged, then
-// the others; within each the most uncertain, and of two alike the younger. A shed feature that has a map goes on being
-// predicted and published from it, and says so; one that has none is soon given up, as any that is not found.
+// Marks the slots that are shed. Those that can be seen are kept before those that can not: a feature that is followed
+// counts as seen while it is found, but for some frames; one that is shed while the map has it in the image, unless it
+// has been followed in vain lately. Of those that count alike, shed first are features that have no map yet, then those
+// that have not converged, then the others; within each those that are shed already, then the most uncertain, and of
+// two alike the younger. They are ranked anew when the number changes and every kReviewFrames frames, so that two alike
+// do not take turns.
+//
+// A shed feature that has a map goes on being predicted and published from it, and says so; one that has none is soon
+// given up, as any that is not found.
 // Used by the mapper thread while the workers rest. Nothing is allocated after construction.
 class LoadShedding {
  public:
-  // Both must outlive it.
+  static constexpr int kReviewFrames = 32;
+  // Frames that it is not found in, of those that could have shown it.
+  static constexpr int kMissesAllowed = 15;
+  // So long one that was followed in vain is no better than one that is not found.
+  static constexpr int kSetAsideFrames = 300;
+
+  // The slots must outlive it.
   explicit LoadShedding(std::span<FeatureSlot> slots);
+
+  // After each frame, by its index: which features were found in it. `measurable`: the map could tell where to look.
+  void note(std::uint64_t frame_index, bool measurable) noexcept;
 
   // Sheds and takes back, so that `limit` features are followed, or all if they are fewer. Returns how many are shed.
   std::size_t apply(int limit) noexcept;
 
   // Features that are followed.
   [[nodiscard]] int followed() const noexcept;
+  // Those that can be seen, shed or not.
+  [[nodiscard]] int in_sight() const noexcept;
 
  private:
+  struct Watch {
+    int misses = 0;     // in a row, while it is followed
+    int set_aside = 0;  // frames left
+  };
+  struct Ranked {
+    FeatureSlot* slot;
+    Watch* watch;
+    int sight;
+  };
+  [[nodiscard]] static int sight_of(const FeatureSlot& slot, const Watch& watch) noexcept;
+  [[nodiscard]] static bool more_useful(const Ranked& a, const Ranked& b) noexcept;
+
   std::span<FeatureSlot> slots_;
-  std::vector<FeatureSlot*> order_;
+  std::vector<Watch> watches_;
+  std::vector<Ranked> order_;
+  int since_ranked_ = 0;  // frames
 };
 
 }  // namespace perimap

@@ -359,6 +359,7 @@ void Mapper::finish_learning() noexcept {
     counters_.learn.add(ended - learn_started_);
     counters_.frame_compute.add(computed_before_learning_ + (ended - learn_started_));
   }
+  const Instant seen = job_.frame != nullptr ? job_.frame->stamp.capture : Instant{};
   std::uint64_t starting = 0;
   std::uint64_t converging = 0;
   std::uint64_t converged = 0;
@@ -368,7 +369,7 @@ void Mapper::finish_learning() noexcept {
     if (slot.state != SlotState::kMapped) continue;
     if (slot.health.state() == HealthState::kInconsistent) {
       ++inconsistent;
-    } else if (slot.converged) {
+    } else if (is_called_converged(slot, seen)) {
       ++converged;
     } else {
       ++converging;
@@ -388,6 +389,7 @@ void Mapper::finish_learning() noexcept {
 void Mapper::shed_load(bool put_off) noexcept {
   if (!settings_.shedding || settings_.lockstep) return;
   if (shedding_decision_.add({computed_before_learning_, put_off}, shedding_.followed())) counters_.times_shed.add();
+  shedding_.note(job_.frame->index, job_.frame->measurable);
   counters_.features_shed.set(shedding_.apply(shedding_decision_.limit()));
 }
 
@@ -553,7 +555,7 @@ void Mapper::advance_slot(FeatureGroup& group, std::size_t lane, int worker) noe
 
 void Mapper::adopt_found_features(std::uint64_t frame_index) noexcept {
   auto slot = slots_.begin();
-  int room = shedding_decision_.limit() - shedding_.followed();
+  int room = shedding_decision_.limit() - shedding_.in_sight();
   for (const FoundFeature& found : finder_.adopt(frame_index)) {
     slot = std::find_if(slot, slots_.end(), [](const FeatureSlot& s) { return s.state == SlotState::kEmpty; });
     if (slot == slots_.end() || room-- <= 0) return;
@@ -573,6 +575,7 @@ void Mapper::adopt_found_features(std::uint64_t frame_index) noexcept {
     slot->failed_starts = 0;
     slot->converged = false;
     slot->shed = false;
+    slot->in_view = true;
   }
 }
 
@@ -586,8 +589,8 @@ void Mapper::offer_to_finder(const FrameRecord& frame, const GreyImage& image) n
       occupied_.push_back(slot.match.px);
     }
   }
-  // Where there is no time for those that are there, no more are looked for.
-  free = std::min(free, shedding_decision_.limit() - shedding_.followed());
+  // Where there is no time for those that can be seen, no more are looked for.
+  free = std::min(free, shedding_decision_.limit() - shedding_.in_sight());
   finder_.offer(frame.index, frame.stamp, image, occupied_, free);
 }
 

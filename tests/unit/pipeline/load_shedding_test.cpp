@@ -197,6 +197,94 @@ TEST_F(Shedding, OneThatIsLostMakesRoomForOneThatWasShed) {
   EXPECT_FALSE(b.shed);
 }
 
+// Frames in which the features named are found, with as many followed as `limit` says.
+class SheddingInView : public Shedding {
+ protected:
+  SheddingInView() {
+    for (std::uint32_t id = 1; id <= 6; ++id) add(id, SlotState::kMapped, true, 0.1 * id);
+  }
+  void frames(int n, int limit, const std::vector<std::uint32_t>& seen, bool measurable = true) {
+    for (int i = 0; i < n; ++i) {
+      ++frame;
+      for (FeatureSlot& slot : slots) {
+        const bool found = std::find(seen.begin(), seen.end(), slot.id) != seen.end();
+        if (found && !slot.shed && slot.state != SlotState::kEmpty) slot.last_found_frame = frame;
+      }
+      shedding.note(frame, measurable);
+      shedding.apply(limit);
+    }
+  }
+  std::vector<std::uint32_t> followed() const {
+    std::vector<std::uint32_t> ids;
+    for (const FeatureSlot& slot : slots) {
+      if (slot.state != SlotState::kEmpty && !slot.shed) ids.push_back(slot.id);
+    }
+    return ids;
+  }
+  static constexpr int kLong = LoadShedding::kReviewFrames + LoadShedding::kMissesAllowed;
+  using Ids = std::vector<std::uint32_t>;
+
+  LoadShedding shedding{slots};
+  std::uint64_t frame = 100;
+};
+
+TEST_F(SheddingInView, ThoseThatTheScopeHasLeftMakeRoomForThoseThatItShows) {
+  frames(1, 2, {1, 2, 3, 4, 5, 6});
+  ASSERT_EQ(followed(), (Ids{1, 2}));
+  for (const std::size_t left : {0U, 1U, 2U, 3U}) slots[left].in_view = false;
+  frames(kLong, 2, {5, 6});
+  EXPECT_EQ(followed(), (Ids{5, 6}));
+  EXPECT_EQ(shedding.in_sight(), 2);
+}
+
+TEST_F(SheddingInView, WhereNoneOfThemIsToBeSeenThereIsRoomForNewOnes) {
+  frames(1, 2, {1, 2, 3, 4, 5, 6});
+  EXPECT_EQ(shedding.in_sight(), 6);
+  for (FeatureSlot& slot : slots) slot.in_view = false;
+  frames(kLong, 2, {});
+  EXPECT_EQ(shedding.in_sight(), 0);
+  FeatureSlot& young = add(7, SlotState::kTracked);
+  frames(1, 2, {7});
+  EXPECT_FALSE(young.shed) << "it is seen";
+  EXPECT_EQ(followed().size(), 2U);
+}
+
+// Something hides three of them where the map has them in the image.
+TEST_F(SheddingInView, HiddenOnesDoNotTakeTurnsAndThoseThatAreSeenAreKept) {
+  const Ids seen = {4, 6};
+  frames(20 * kLong, 2, seen);
+  EXPECT_EQ(followed(), seen);
+  int changes = 0;
+  for (int i = 0; i < 20; ++i) {
+    const Ids before = followed();
+    frames(kLong, 2, seen);
+    changes += followed() != before ? 1 : 0;
+  }
+  EXPECT_EQ(changes, 0);
+}
+
+TEST_F(SheddingInView, OneThatWasHiddenIsTriedAgainAfterAWhile) {
+  frames(4 * kLong, 1, {6});
+  ASSERT_EQ(followed(), (Ids{6}));
+  frames(LoadShedding::kSetAsideFrames + 6 * kLong, 1, {1});
+  EXPECT_EQ(followed(), (Ids{1}));
+}
+
+TEST_F(SheddingInView, FramesThatCanNotTellWhereToLookCountAgainstNone) {
+  frames(1, 2, {1, 2});
+  frames(10 * kLong, 2, {}, false);
+  EXPECT_EQ(followed(), (Ids{1, 2}));
+}
+
+TEST_F(SheddingInView, BetterOnesThatWereShedDoNotReturnWhileTheOthersAreSeen) {
+  for (const std::size_t left : {0U, 1U}) slots[left].in_view = false;
+  frames(2 * kLong, 2, {3, 4, 5, 6});
+  ASSERT_EQ(followed(), (Ids{3, 4}));
+  for (const std::size_t left : {0U, 1U}) slots[left].in_view = true;
+  frames(10 * kLong, 2, {1, 2, 3, 4, 5, 6});
+  EXPECT_EQ(followed(), (Ids{3, 4}));
+}
+
 TEST_F(Shedding, AShedFeatureSaysSoAndIsNotCalledConvergedForEver) {
   FeatureSlot& slot = add(1, SlotState::kMapped, true, 0.5);
   slot.last_observed = Instant(std::chrono::seconds(100));
@@ -208,6 +296,20 @@ TEST_F(Shedding, AShedFeatureSaysSoAndIsNotCalledConvergedForEver) {
   describe(slot, slot.last_observed + kBelievedUnseen + milliseconds(1), snapshot);
   EXPECT_EQ(snapshot.state, FeatureState::kConverging);
   EXPECT_EQ(snapshot.reason, FeatureReason::kShed);
+}
+
+TEST_F(Shedding, TakenBackAFeatureIsCalledConvergedOnlyWhenItHasBeenObserved) {
+  FeatureSlot& slot = add(1, SlotState::kMapped, true, 0.5);
+  slot.last_observed = Instant(std::chrono::seconds(100));
+  FeatureSnapshot snapshot;
+  const Instant now = slot.last_observed + 2 * kBelievedUnseen;
+  describe(slot, now, snapshot);
+  EXPECT_EQ(snapshot.state, FeatureState::kConverging);
+  EXPECT_EQ(snapshot.reason, FeatureReason::kNotObserved);
+  slot.match_agrees = true;
+  describe(slot, now, snapshot);
+  EXPECT_EQ(snapshot.state, FeatureState::kConverged);
+  EXPECT_EQ(snapshot.reason, FeatureReason::kNone);
 }
 
 }  // namespace
