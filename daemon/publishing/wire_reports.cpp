@@ -118,43 +118,67 @@ void name(Message& message, const Identity& identity) noexcept {
 // A trigger gives one pulse a beat.
 constexpr Duration kLongestBeat = std::chrono::seconds(3);
 
-// What the pipeline has counted of one source.
-struct SourceCounts {
+// What is known of one source.
+struct SourceFacts {
+  perimap_SourceKind kind;
+  const SourceLink& link;
   std::uint64_t received = 0;
   std::uint64_t dropped = 0;
   std::uint64_t invalid = 0;
   const Counter& last_ns;
   const Counter& last_good_ns;
   const LatencyHistogram& delay;
+  Duration stalled_after;  // silent for longer, it counts as stalled
 };
 
-// `ended`: of a recording. `stalled_after`: silent for longer, it counts as stalled.
-perimap_SourceStatus source_status(perimap_SourceKind kind, const SourceCounts& counts, const SourceLink& link,
-                                   Instant now, bool ended, Duration stalled_after) noexcept {
-  const LatencyHistogram::Summary summary = counts.delay.summary();
-  const auto last = static_cast<std::int64_t>(counts.last_ns.get());
-  perimap_SourceStatus wire{};
-  wire.kind = kind;
-  wire.state = perimap_SOURCE_OK;
-  if (link.closed) {
-    wire.state = perimap_SOURCE_CLOSED;
-  } else if (counts.received == 0) {
-    wire.state = perimap_SOURCE_STARTING;
-  } else if (ended) {
-    wire.state = perimap_SOURCE_ENDED;
-  } else if (now - from_ns(last) > stalled_after) {
-    wire.state = perimap_SOURCE_STALLED;
+// Calls `tell(SourceFacts)` for each source that there is, in the order of kStatusSources.
+template <class Tell>
+void for_each_source(const PipelineCounters& c, const StatusFacts& facts, Tell tell) noexcept {
+  const Duration stalled = facts.stalled_after;
+  tell(SourceFacts{perimap_SOURCE_CAMERA, facts.camera, c.frames_received.get(), c.frames_dropped.get(), 0,
+                   c.last_frame_ns, c.last_frame_ns, c.camera_delay, stalled});
+  tell(SourceFacts{perimap_SOURCE_TRACKER, facts.tracker, c.poses_received.get(),
+                   c.poses_dropped.get() + c.poses_refused.get(), c.poses_invalid.get(), c.last_pose_ns,
+                   c.last_good_pose_ns, c.tracker_delay, stalled});
+  if (facts.ecg_device) {
+    tell(SourceFacts{perimap_SOURCE_ECG, facts.ecg, c.ecg_samples.get(), c.ecg_dropped.get(), c.ecg_lead_off.get(),
+                     c.last_ecg_ns, c.last_good_ecg_ns, c.ecg_delay, stalled});
   }
-  wire.received = counts.received;
-  wire.dropped = counts.dropped;
-  wire.invalid = counts.invalid;
-  wire.last_source_time_ns = last;
-  wire.last_good_time_ns = static_cast<std::int64_t>(counts.last_good_ns.get());
+  if (facts.r_trigger) {
+    tell(SourceFacts{perimap_SOURCE_R_TRIGGER, facts.r_trigger_line, c.r_triggers.get(), c.r_triggers_dropped.get(), 0,
+                     c.last_r_trigger_ns, c.last_r_trigger_ns, c.r_trigger_delay, std::max(stalled, kLongestBeat)});
+  }
+  if (facts.respiration_channel) {
+    tell(SourceFacts{perimap_SOURCE_RESPIRATION, facts.respiration_link, c.respiration_samples.get(),
+                     c.respiration_dropped.get(), c.respiration_off.get(), c.last_respiration_ns,
+                     c.last_good_respiration_ns, c.respiration_delay, stalled});
+  }
+}
+
+// `ended`: of a recording.
+perimap_SourceState state_of(const SourceFacts& source, bool ended, Instant now) noexcept {
+  if (source.link.closed) return perimap_SOURCE_CLOSED;
+  if (source.received == 0) return perimap_SOURCE_STARTING;
+  if (ended) return perimap_SOURCE_ENDED;
+  const Instant last = from_ns(static_cast<std::int64_t>(source.last_ns.get()));
+  return now - last > source.stalled_after ? perimap_SOURCE_STALLED : perimap_SOURCE_OK;
+}
+
+perimap_SourceStatus source_status(const SourceFacts& source, bool ended, Instant now) noexcept {
+  const LatencyHistogram::Summary summary = source.delay.summary();
+  perimap_SourceStatus wire{};
+  wire.kind = source.kind;
+  wire.state = state_of(source, ended, now);
+  wire.received = source.received;
+  wire.dropped = source.dropped;
+  wire.invalid = source.invalid;
+  wire.last_source_time_ns = static_cast<std::int64_t>(source.last_ns.get());
+  wire.last_good_time_ns = static_cast<std::int64_t>(source.last_good_ns.get());
   wire.delay_p50_ns = summary.p50.count();
   wire.delay_p99_ns = summary.p99.count();
   wire.delay_max_ns = summary.max.count();
-  wire.jitter_p50_ns = link.jitter_p50.count();
-  wire.jitter_p99_ns = link.jitter_p99.count();
+  wire.jitter_p50_ns = source.link.jitter_p50.count();
+  wire.jitter_p99_ns = source.link.jitter_p99.count();
   return wire;
 }
 
@@ -299,6 +323,17 @@ const perimap_Phase& WirePhase::fill(const CardiacClock& clock, Instant now) noe
   return wire_;
 }
 
+SourceStates source_states(const PipelineCounters& counters, const StatusFacts& facts, Instant now) noexcept {
+  SourceStates states;
+  states.fill(perimap_SOURCE_STARTING);
+  for_each_source(counters, facts, [&](const SourceFacts& source) noexcept {
+    for (std::size_t i = 0; i < kStatusSources.size(); ++i) {
+      if (kStatusSources[i].kind == source.kind) states[i] = state_of(source, facts.sources_ended, now);
+    }
+  });
+  return states;
+}
+
 WireStatus::WireStatus(const Identity& identity) : stream_(identity.stream) {
   name(wire_, identity);
   copy_text(PERIMAP_VERSION, wire_.version);
@@ -354,35 +389,9 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.latency_short = facts.latency_short;
 
   std::uint32_t sources = 0;
-  const auto tell = [&](perimap_SourceKind kind, const SourceLink& link, const SourceCounts& counts,
-                        Duration stalled_after) {
-    sources_[sources++] = source_status(kind, counts, link, now, facts.sources_ended, stalled_after);
-  };
-  const Duration stalled = facts.stalled_after;
-  tell(perimap_SOURCE_CAMERA, facts.camera,
-       {c.frames_received.get(), c.frames_dropped.get(), 0, c.last_frame_ns, c.last_frame_ns, c.camera_delay}, stalled);
-  tell(perimap_SOURCE_TRACKER, facts.tracker,
-       {c.poses_received.get(), c.poses_dropped.get() + c.poses_refused.get(), c.poses_invalid.get(), c.last_pose_ns,
-        c.last_good_pose_ns, c.tracker_delay},
-       stalled);
-  if (facts.ecg_device) {
-    tell(perimap_SOURCE_ECG, facts.ecg,
-         {c.ecg_samples.get(), c.ecg_dropped.get(), c.ecg_lead_off.get(), c.last_ecg_ns, c.last_good_ecg_ns,
-          c.ecg_delay},
-         stalled);
-  }
-  if (facts.r_trigger) {
-    tell(perimap_SOURCE_R_TRIGGER, facts.r_trigger_line,
-         {c.r_triggers.get(), c.r_triggers_dropped.get(), 0, c.last_r_trigger_ns, c.last_r_trigger_ns,
-          c.r_trigger_delay},
-         std::max(stalled, kLongestBeat));
-  }
-  if (facts.respiration_channel) {
-    tell(perimap_SOURCE_RESPIRATION, facts.respiration_link,
-         {c.respiration_samples.get(), c.respiration_dropped.get(), c.respiration_off.get(), c.last_respiration_ns,
-          c.last_good_respiration_ns, c.respiration_delay},
-         stalled);
-  }
+  for_each_source(c, facts, [&](const SourceFacts& source) noexcept {
+    sources_[sources++] = source_status(source, facts.sources_ended, now);
+  });
   wire_.sources = {sources, sources, sources_, false};
 
   const std::optional<CountsThen> then = facts.recent != nullptr ? facts.recent->then() : std::nullopt;

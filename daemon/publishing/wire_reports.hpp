@@ -3,6 +3,7 @@
 
 #include <perimap.h>
 
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -96,6 +97,11 @@ struct StatusFacts {
   SourceLink camera, tracker, ecg, r_trigger_line, respiration_link;
   const RecentCounts* recent = nullptr;  // none: nothing is told of the last seconds
 };
+
+// By the places of kStatusSources; a source that is not told of is starting.
+using SourceStates = std::array<perimap_SourceState, kStatusSources.size()>;
+[[nodiscard]] SourceStates source_states(const PipelineCounters& counters, const StatusFacts& facts,
+                                         Instant now) noexcept;
 
 class WireStatus {
  public:

@@ -147,7 +147,7 @@ void LiveRuntime::run_status() {
   Instant tick = MonotonicClock::now();
   Instant next_model = tick;
   Instant next_status = tick;
-  int closed_before = 0;
+  SourceStates states_before{};
   std::pair<std::uint64_t, SurfaceReason> turn_before;
   for (;;) {
     const bool last = stopping_.load(std::memory_order_relaxed);
@@ -175,13 +175,12 @@ void LiveRuntime::run_status() {
     told.r_trigger = pipeline_.settings().r_trigger.has_value();
     told.respiration_channel = pipeline_.settings().respiration.channel;
     if (describe_sources_) describe_sources_(told);
-    // A device that goes or comes is told at once.
-    const int closed = (told.camera.closed ? 1 : 0) | (told.tracker.closed ? 2 : 0) | (told.ecg.closed ? 4 : 0) |
-                       (told.r_trigger_line.closed ? 8 : 0);
-    if (last || now >= next_status || closed != closed_before) {
+    // A device that goes, comes or falls silent is told at once.
+    const SourceStates states = source_states(pipeline_.counters(), told, now);
+    if (last || now >= next_status || states != states_before) {
       for (WireStatus& wire : wire_statuses_) publication_.status(wire.fill(pipeline_.counters(), told, now));
       next_status = now + settings_.status_interval;
-      closed_before = closed;
+      states_before = states;
     }
     if (on_status_tick_) on_status_tick_();
     if (last) return;
