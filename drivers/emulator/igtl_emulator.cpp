@@ -1,6 +1,5 @@
 #include "drivers/emulator/igtl_emulator.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -17,21 +16,19 @@ constexpr std::size_t kLastCrcByte = 57;
 IgtlEmulator::IgtlEmulator(PoseTrack track, IgtlEmulatorSettings settings, const EmulatorFaults& faults)
     : track_(std::move(track)), settings_(std::move(settings)), faults_(faults), sender_(faults) {}
 
-Instant IgtlEmulator::due(std::int64_t frame) const noexcept {
-  if (track_.over(frame)) return kNever;
-  const double period_ns = 1e9 / track_.rate_hz() / (1.0 + 1e-6 * faults_.drift_ppm);
-  return track_.start() + Duration(std::llround(static_cast<double>(frame) * period_ns));
+Instant IgtlEmulator::due(std::size_t reading) const noexcept {
+  if (reading >= track_.size()) return kNever;
+  const auto since_ns = static_cast<double>(track_.since_start(reading).count());
+  return track_.start() + Duration(std::llround(since_ns / (1.0 + 1e-6 * faults_.drift_ppm)));
 }
 
-void IgtlEmulator::on_open(LinkControl& /*link*/, Instant now) {
-  next_ = std::max<std::int64_t>(0, static_cast<std::int64_t>(to_seconds(now - track_.start()) * track_.rate_hz()));
-}
+void IgtlEmulator::on_open(LinkControl& /*link*/, Instant now) { next_ = track_.index_at(now - track_.start()); }
 
 void IgtlEmulator::on_time(LinkControl& link, Instant now) {
   using Message = IgtlEmulatorSettings::Message;
-  for (; !track_.over(next_) && due(next_) <= now; ++next_) {
-    const Duration since = from_seconds(static_cast<double>(next_) / track_.rate_hz());
-    const ToolReading reading = faults_.missing(since) ? ToolReading{} : track_.at(next_);
+  for (; next_ < track_.size() && due(next_) <= now; ++next_) {
+    const Duration since = track_.since_start(next_);
+    const ToolReading reading = faults_.missing(since) ? ToolReading{} : track_.reading(next_);
     const bool seen = reading.state == ToolState::kOk;
     IgtlMessage message;
     message.version = settings_.version;

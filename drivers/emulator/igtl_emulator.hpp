@@ -1,6 +1,7 @@
 // An emulated OpenIGTLink tracker server: the far end of drivers/tracker/igtl_session.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -30,13 +31,13 @@ class IgtlEmulator final : public DeviceProtocol {
   [[nodiscard]] Instant next_time() const noexcept override { return due(next_); }
 
  private:
-  [[nodiscard]] Instant due(std::int64_t frame) const noexcept;
+  [[nodiscard]] Instant due(std::size_t reading) const noexcept;
 
   PoseTrack track_;
   IgtlEmulatorSettings settings_;
   EmulatorFaults faults_;
   FaultySender sender_;
-  std::int64_t next_ = 0;
+  std::size_t next_ = 0;
 };
 
 }  // namespace perimap

@@ -1,6 +1,8 @@
 // Where the tools are that an emulated tracker sees.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "core/sensors/tracker_sample.hpp"
@@ -9,32 +11,41 @@
 
 namespace perimap {
 
-// A reading at every period from an instant on; after the last one the tool is missing.
+// Readings, each at its own time from an instant on; before the first and after the last the tool is missing.
 class PoseTrack {
  public:
-  PoseTrack(Instant start, double rate_hz, std::vector<ToolReading> readings)
-      : start_(start), rate_hz_(rate_hz), readings_(std::move(readings)) {}
-
-  // The tracker samples of a recording as they lie, an even period apart; the first of them at `start`. None are left
-  // out.
+  // The tracker samples of a recording at their own times, gaps and jitter included; the first of them at `start`.
+  // They are in order of time.
   [[nodiscard]] static PoseTrack of_samples(Instant start, const std::vector<TrackerSample>& samples);
   // A scope held half a metre in front of the tracker that sways by 20 mm and 0.1 rad within four seconds, for an hour.
   [[nodiscard]] static PoseTrack swaying(Instant start, double rate_hz);
 
   [[nodiscard]] Instant start() const noexcept { return start_; }
+  // Of a device that would have given these readings: gaps do not count.
   [[nodiscard]] double rate_hz() const noexcept { return rate_hz_; }
-  [[nodiscard]] bool over(std::int64_t frame) const noexcept {
-    return frame >= static_cast<std::int64_t>(readings_.size());
-  }
-  // Missing before the first and after the last.
-  [[nodiscard]] ToolReading at(std::int64_t frame) const noexcept {
-    return frame < 0 || over(frame) ? ToolReading{} : readings_[static_cast<std::size_t>(frame)];
-  }
+
+  // For a device that tells each reading when it was measured.
+  [[nodiscard]] std::size_t size() const noexcept { return readings_.size(); }
+  [[nodiscard]] Duration since_start(std::size_t i) const noexcept { return readings_[i].since; }
+  [[nodiscard]] const ToolReading& reading(std::size_t i) const noexcept { return readings_[i].reading; }
+  // The last reading that is not after that time; the first when there is none.
+  [[nodiscard]] std::size_t index_at(Duration since) const noexcept;
+
+  // For a device that measures at even frames, rate_hz() a second: where the tool is at that frame, between the two
+  // readings around it. Next to a gap, where there is but one, that one when it is nearer than half a period.
+  [[nodiscard]] ToolReading at(std::int64_t frame) const noexcept;
 
  private:
+  struct Timed {
+    Duration since;
+    ToolReading reading;
+  };
+
+  PoseTrack(Instant start, double rate_hz, std::vector<Timed> readings);
+
   Instant start_;
   double rate_hz_;
-  std::vector<ToolReading> readings_;
+  std::vector<Timed> readings_;
 };
 
 }  // namespace perimap
