@@ -1,6 +1,9 @@
 #include "drivers/ecg/bitalino.hpp"
 
+#include <algorithm>
 #include <array>
+#include <string>
+#include <string_view>
 #include <utility>
 
 namespace perimap {
@@ -9,6 +12,8 @@ namespace {
 constexpr std::size_t kFramesToSynchronise = 4;
 constexpr std::size_t kFramesToBelieve = 2;
 constexpr unsigned kSequenceModulus = 16;
+constexpr std::string_view kName = "BITalino";
+constexpr std::size_t kLongestName = 40;
 constexpr int kFullScale = 1023;
 // The open API waits so long after each; a board takes no second one sooner.
 constexpr Duration kBetweenCommands = std::chrono::milliseconds(150);
@@ -71,12 +76,29 @@ void BitalinoProtocol::start() {
   framer_.restart();
   lead_.restart();
   breath_sensor_.restart();
+  named_ = false;
+  begun_.clear();
   const unsigned channels = mask(settings_.channel) | mask(settings_.respiration_channel);
-  const std::array<std::byte, 3> commands{std::byte{0x00}, std::byte{0xC3},
+  const std::array<std::byte, 4> commands{std::byte{0x00}, std::byte{0x07}, std::byte{0xC3},
                                           static_cast<std::byte>(channels << 2U | 0x01U)};
   for (std::size_t i = 0; i < commands.size(); ++i) {
     send_in(i == 0 ? Duration(0) : kBetweenCommands, std::span(commands).subspan(i, 1));
   }
+}
+
+// A board that does not tell its name begins with frames, and so does one that was streaming still.
+std::span<const std::byte> BitalinoProtocol::after_name(std::span<const std::byte> bytes) {
+  if (named_) return bytes;
+  begun_.insert(begun_.end(), bytes.begin(), bytes.end());
+  const std::string_view text(reinterpret_cast<const char*>(begun_.data()), begun_.size());
+  const std::size_t common = std::min(text.size(), kName.size());
+  const bool may_be_name = text.substr(0, common) == kName.substr(0, common);
+  const std::size_t end = may_be_name ? text.find('\n') : std::string_view::npos;
+  if (may_be_name && end == std::string_view::npos && text.size() < kLongestName) return {};
+  named_ = true;
+  if (end == std::string_view::npos || end >= kLongestName) return begun_;
+  health().set_identity(std::string(text.substr(0, end)));
+  return std::span(begun_).subspan(end + 1);
 }
 
 void BitalinoProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> bytes, Instant arrival) {
@@ -93,7 +115,7 @@ void BitalinoProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> 
     samples().add(static_cast<float>((ecg - 512) * kCount_mV / kSensorGain), lead_.off(at_rail(ecg)),
                   lost ? samples().lost_samples(*lost, kSequenceModulus, behind, arrival) : 0, respiration);
   };
-  health().damaged.add(framer_.feed(bytes, take));
+  health().damaged.add(framer_.feed(after_name(bytes), take));
 }
 
 }  // namespace perimap

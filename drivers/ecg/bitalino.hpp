@@ -1,7 +1,8 @@
 // BITalino (PLUX): frame and commands as in the public "BITalino (r)evolution Board Data Sheet" and its open API.
 //
-// 115200 8N1. Commands are a byte: 0x00 idle; 0x03 0x43 0x83 0xC3 sample at 1, 10, 100, 1000 Hz; (mask << 2) | 1 starts
-// live acquisition of the channels in the mask. One or two analogue channels make frames of three or four bytes:
+// 115200 8N1. Commands are a byte: 0x00 idle; 0x07 in idle: the firmware's name ("BITalino_v5.2") and a line feed;
+// 0x03 0x43 0x83 0xC3 sample at 1, 10, 100, 1000 Hz; (mask << 2) | 1 starts live acquisition of the channels in the
+// mask. One or two analogue channels make frames of three or four bytes:
 //
 //             vvvvvv00  IIIIVVVV  ssssCCCC    v, V: low six and high four bits of a 10-bit sample; I: digital lines
 //   wwwwwwww  vvvvvvWW  IIIIVVVV  ssssCCCC    w, W: likewise eight and two bits of the channel with the higher number
@@ -16,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "drivers/ecg/counted_framer.hpp"
 #include "drivers/ecg/ecg_protocol.hpp"
@@ -49,8 +51,13 @@ class BitalinoProtocol final : public EcgProtocol {
   void decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
 
  private:
+  // What is left of the bytes that begin a session when the firmware's name has been taken off.
+  [[nodiscard]] std::span<const std::byte> after_name(std::span<const std::byte> bytes);
+
   BitalinoSettings settings_;
   CountedFramer framer_;
+  bool named_ = false;            // the name has come, or what came is none
+  std::vector<std::byte> begun_;  // until then
   RailWatch lead_{kSampleRate_hz, RailWatch::kLeadOff_s};
   RailWatch breath_sensor_{kSampleRate_hz, RailWatch::kSensorOff_s};
 };

@@ -58,10 +58,11 @@ class BitalinoEmulator final : public EcgEmulator {
       : EcgEmulator(std::move(signals), BitalinoProtocol::kSampleRate_hz, line_time(1), faults) {}
 
  protected:
-  void command(LinkControl& /*link*/, std::uint8_t byte) override {
+  void command(LinkControl& link, std::uint8_t byte) override {
     // One at a time: what follows too soon is not heard.
     if (now() - std::exchange(last_command_, now()) < kBetweenCommands) return;
     if (byte == 0x00) run(false, now());
+    if (byte == 0x07) link.send(std::string_view("BITalino_v5.2\n"));
     if ((byte & 0x03U) != 0x01U) return;
     const unsigned mask = byte >> 2U;
     ecg_asked_ = (mask & kEcgInput) != 0;

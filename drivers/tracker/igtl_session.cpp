@@ -12,6 +12,7 @@ constexpr Duration kSilentAfter = std::chrono::milliseconds(300);
 constexpr Duration kReopenAfter = std::chrono::seconds(2);
 constexpr Duration kListenForOthers = std::chrono::seconds(1);
 constexpr unsigned kStatusOk = 1;
+constexpr std::size_t kMostNames = 8;  // that are told
 // TRANSFORM messages of one instant come one by one. A reference that is farther away than this is none.
 constexpr Duration kReferenceAge = std::chrono::milliseconds(100);
 // Stamps that a server gives to tools of one instant.
@@ -45,6 +46,7 @@ void IgtlSession::on_open(LinkControl& link, Instant now) {
   only_tool_.clear();
   listen_until_ = several_ ? now + kListenForOthers : now;
   server_fault_.clear();
+  names_.clear();
   link.send(start_tdata());
 }
 
@@ -61,6 +63,7 @@ void IgtlSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, 
 }
 
 void IgtlSession::on_message(LinkControl& link, const IgtlMessage& message, Instant arrival) {
+  if (message.type == "TRANSFORM" || message.type == "POSITION") note_name(message.device);
   if (message.type == "TRANSFORM") return on_pose(link, message, decode_igtl_transform(message.content), arrival);
   if (message.type == "POSITION") return on_pose(link, message, decode_igtl_position(message.content), arrival);
   if (message.type == "TDATA") return on_tdata(link, message, arrival);
@@ -70,6 +73,13 @@ void IgtlSession::on_message(LinkControl& link, const IgtlMessage& message, Inst
   if (status->code == kStatusOk) return;
   server_fault_ = fmt::format("{} reports status {} {} {}", message.device, status->code, status->name, status->text);
   health_.set_reason(server_fault_);
+}
+
+// The protocol has no name of the server itself.
+void IgtlSession::note_name(const std::string& name) {
+  if (names_.size() >= kMostNames || std::find(names_.begin(), names_.end(), name) != names_.end()) return;
+  names_.push_back(name);
+  health_.set_identity(fmt::format("sends poses of {}", fmt::join(names_, ", ")));
 }
 
 bool IgtlSession::is_sensor(LinkControl& link, const std::string& name, Instant arrival) {
@@ -141,6 +151,7 @@ void IgtlSession::on_tdata(LinkControl& link, const IgtlMessage& message, Instan
   ToolReading sensor;
   ToolReading reference;
   for (const IgtlTool& tool : *tools) {
+    note_name(tool.name);
     if (settings_.reference && tool.name == *settings_.reference) reference = {ToolState::kOk, tool.X_TO};
     if (is_sensor(link, tool.name, arrival)) sensor = {ToolState::kOk, tool.X_TO};
   }

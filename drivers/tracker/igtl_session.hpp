@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "drivers/device/arrival_clock.hpp"
 #include "drivers/device/device_health.hpp"
@@ -43,6 +44,7 @@ class IgtlSession final : public DeviceProtocol {
   void on_message(LinkControl& link, const IgtlMessage& message, Instant arrival);
   void on_pose(LinkControl& link, const IgtlMessage& message, const Expected<Pose>& pose, Instant arrival);
   void on_tdata(LinkControl& link, const IgtlMessage& message, Instant arrival);
+  void note_name(const std::string& name);
   // Whether this is the sensor's name. Without a name from the settings, a second tool fails the link.
   [[nodiscard]] bool is_sensor(LinkControl& link, const std::string& name, Instant arrival);
   // What a message says of one tool.
@@ -71,10 +73,11 @@ class IgtlSession final : public DeviceProtocol {
   std::uint32_t count_ = 0;
   Instant last_{};  // reading, or the opening
   bool any_ = false;
-  std::string only_tool_;     // that came in this connection, when the settings name no sensor
-  bool several_ = false;      // tools have come; of earlier connections too
-  Instant listen_until_{};    // for a second tool
-  std::string server_fault_;  // the last STATUS that was not OK, in this connection
+  std::vector<std::string> names_;  // of what poses came of, in this connection
+  std::string only_tool_;           // that came in this connection, when the settings name no sensor
+  bool several_ = false;            // tools have come; of earlier connections too
+  Instant listen_until_{};          // for a second tool
+  std::string server_fault_;        // the last STATUS that was not OK, in this connection
 };
 
 }  // namespace perimap

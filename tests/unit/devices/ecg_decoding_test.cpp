@@ -485,8 +485,45 @@ TEST(Bitalino, StartsLiveAcquisitionOfItsChannel) {
   protocol.on_open(link, kStart);
   const std::string idle(1, '\0');
   EXPECT_EQ(link.take_sent(), idle);
-  EXPECT_THAT(commands_until(protocol, link, kStart + seconds(1)),
-              ElementsAre(Pair(milliseconds(150), "\xC3"), Pair(milliseconds(300), "\x09")));
+  EXPECT_THAT(
+      commands_until(protocol, link, kStart + seconds(1)),
+      ElementsAre(Pair(milliseconds(150), "\x07"), Pair(milliseconds(300), "\xC3"), Pair(milliseconds(450), "\x09")));
+}
+
+// In any chunks; a board that does not tell its name loses no frame.
+TEST(Bitalino, TellsItsFirmwareAndLosesNoSampleOverIt) {
+  for (const std::string name : {"BITalino_v5.2\n", ""}) {
+    std::vector<std::byte> bytes;
+    for (const char c : name) bytes.push_back(static_cast<std::byte>(c));
+    for (unsigned i = 0; i < 12; ++i) {
+      const auto frame = bitalino_frame_of_two(i, 512, 300);
+      bytes.insert(bytes.end(), frame.begin(), frame.end());
+    }
+    for (const std::size_t chunk : {std::size_t{1}, std::size_t{5}, bytes.size()}) {
+      Received received;
+      BitalinoProtocol protocol({.channel = 2, .respiration_channel = 3}, received.sink(), received.health);
+      ScriptedLink link;
+      protocol.on_open(link, kStart);
+      for (std::size_t at = 0; at < bytes.size(); at += chunk) {
+        protocol.on_bytes(link, std::span(bytes).subspan(at, std::min(chunk, bytes.size() - at)), kStart);
+      }
+      EXPECT_EQ(received.health.identity(), name.substr(0, name.find('\n'))) << chunk;
+      EXPECT_EQ(received.health.samples.get(), 11U) << chunk;
+      EXPECT_EQ(received.health.damaged.get(), 0U) << chunk;
+    }
+  }
+}
+
+// A text of another device, without an end, is not waited for.
+TEST(Bitalino, WhatOnlyBeginsLikeANameIsNoIdentity) {
+  Received received;
+  BitalinoProtocol protocol({}, received.sink(), received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  const std::string text = "BITalino" + std::string(100, 'x') + "\n";
+  protocol.on_bytes(link, std::as_bytes(std::span(text.data(), text.size())), kStart);
+  EXPECT_EQ(received.health.identity(), "");
+  EXPECT_GT(received.health.damaged.get(), 0U);
 }
 
 TEST(Bitalino, StartsLiveAcquisitionOfRespirationToo) {
@@ -495,7 +532,8 @@ TEST(Bitalino, StartsLiveAcquisitionOfRespirationToo) {
   ScriptedLink link;
   protocol.on_open(link, kStart);
   EXPECT_THAT(commands_until(protocol, link, kStart + seconds(1)),
-              ElementsAre(Pair(milliseconds(150), ::testing::_), Pair(milliseconds(300), "\x89")));
+              ElementsAre(Pair(milliseconds(150), ::testing::_), Pair(milliseconds(300), ::testing::_),
+                          Pair(milliseconds(450), "\x89")));
 }
 
 // A belt that is too tight cuts the top off every breath; one that is not connected stays there.

@@ -301,6 +301,19 @@ TEST(IgtlSession, GivesEveryPoseByTransformTdataAndPosition) {
   }
 }
 
+TEST(IgtlSession, TellsWhosePosesTheServerSends) {
+  DeviceHealth health;
+  IgtlSession session(
+      {.sensor = "Scope", .reference = std::nullopt, .world = {}}, [](const TrackerSample&) {}, health);
+  ScriptedLink link;
+  session.on_open(link, kStart);
+  EXPECT_EQ(health.identity(), "");
+  for (const char* name : {"Probe", "Scope", "Probe"}) {
+    session.on_bytes(link, encode_igtl({1, "TRANSFORM", name, 1ULL << 32U, encode_igtl_transform(kPose), {}}), kStart);
+  }
+  EXPECT_EQ(health.identity(), "sends poses of Probe, Scope");
+}
+
 TEST(IgtlSession, AToolLeftOutOfTdataOrMarkedSoIsMissing) {
   using Message = IgtlEmulatorSettings::Message;
   EmulatorFaults faults;
