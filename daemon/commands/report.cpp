@@ -48,9 +48,11 @@ int report(const Options& options) {
   const auto result = report_samples(options.recording, options.samples, options.stream,
                                      options.whole ? ReadMode::kWhole : ReadMode::kStrict);
   if (!result) return refuse(result.error().message);
+  // In lockstep nothing takes time.
+  const bool timed = result->release_to_receipt.max != Duration(0);
   fmt::print("samples     {} received, {} missed, {} without frame, {} from a late update\n", result->samples,
              result->missed, result->without_frame, result->from_late_update);
-  if (result->release_to_receipt.max == Duration(0)) {
+  if (!timed) {
     fmt::print("latency     not measured: these samples are of a lockstep replay\n");
   } else {
     fmt::print(
@@ -66,15 +68,18 @@ int report(const Options& options) {
     fmt::print("picture     {}\n", options.picture);
   }
   if (!options.json.empty()) {
+    const auto figures = [timed](const DurationFigures& measured) {
+      return timed ? figures_json(measured) : nlohmann::json(nullptr);
+    };
     const nlohmann::json json = {{"recording", options.recording},
                                  {"samples",
                                   {{"received", result->samples},
                                    {"missed", result->missed},
                                    {"without_frame", result->without_frame},
                                    {"from_late_update", result->from_late_update}}},
-                                 {"capture_to_receipt", figures_json(result->capture_to_receipt)},
-                                 {"release_to_receipt", figures_json(result->release_to_receipt)},
-                                 {"jitter", figures_json(result->jitter)},
+                                 {"capture_to_receipt", figures(result->capture_to_receipt)},
+                                 {"release_to_receipt", figures(result->release_to_receipt)},
+                                 {"jitter", figures(result->jitter)},
                                  {"accuracy", to_json(result->accuracy)}};
     const auto written = write_text_file(options.json, json.dump(2) + "\n");
     if (!written) return refuse(written.error().message);

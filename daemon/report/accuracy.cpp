@@ -49,7 +49,7 @@ class Spans {
   [[nodiscard]] std::vector<ErrorSpan> figures() const {
     std::vector<ErrorSpan> spans;
     for (std::size_t i = 0; i + 1 < edges_.size(); ++i) {
-      const double nees = errors_[i].empty() ? 0.0 : nees_[i] / static_cast<double>(errors_[i].size());
+      const double nees = errors_[i].empty() ? kNoFigure : nees_[i] / static_cast<double>(errors_[i].size());
       spans.push_back({edges_[i], edges_[i + 1], figures_of(errors_[i]), nees, last_[i]});
     }
     return spans;
@@ -182,7 +182,7 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
       if (feature.converged && sample.state == perimap_SURFACE_GOOD) {
         ++report.good.count;
         double& largest = early ? report.good.largest_before_known_mm : report.good.largest_mm;
-        largest = std::max(largest, error);
+        largest = std::fmax(largest, error);
         if (error > kOff_mm) {
           ++(early ? report.good.off_before_known : report.good.off);
           if (!early) off.insert(feature.id);

@@ -4,6 +4,7 @@
 #include <perimap.h>
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -16,13 +17,16 @@
 
 namespace perimap {
 
-// Distribution of errors, mm. Zeros when there are none.
+// A figure of nothing: it is within no limit.
+inline constexpr double kNoFigure = std::numeric_limits<double>::quiet_NaN();
+
+// Distribution of errors, mm. No figures when there are no errors.
 struct ErrorFigures {
   std::size_t count = 0;
-  double rms_mm = 0.0;
-  double median_mm = 0.0;
-  double p95_mm = 0.0;
-  double max_mm = 0.0;
+  double rms_mm = kNoFigure;
+  double median_mm = kNoFigure;
+  double p95_mm = kNoFigure;
+  double max_mm = kNoFigure;
 };
 
 // Of a stretch of the recording.
@@ -30,8 +34,8 @@ struct ErrorSpan {
   double begin_s = 0.0;  // from the first frame
   double end_s = 0.0;
   ErrorFigures error;
-  double mean_nees = 0.0;     // as AccuracyReport::mean_nees
-  std::size_t converged = 0;  // features in state converged in the last sample of the stretch
+  double mean_nees = kNoFigure;  // as AccuracyReport::mean_nees
+  std::size_t converged = 0;     // features in state converged in the last sample of the stretch
 };
 
 struct FeaturePath {
@@ -50,8 +54,8 @@ struct GoodPositions {
   std::size_t off_before_known = 0;
   std::size_t off = 0;  // all others
   std::size_t features_off = 0;
-  double largest_before_known_mm = 0.0;
-  double largest_mm = 0.0;
+  double largest_before_known_mm = kNoFigure;
+  double largest_mm = kNoFigure;
 };
 
 struct AccuracyReport {
@@ -62,8 +66,8 @@ struct AccuracyReport {
   std::size_t converged_at_15_s = 0;       // in state converged in the last sample of the first 15 s
   std::size_t features_without_truth = 0;  // converged, but the ray of their first view misses the true surface
   ErrorFigures settled;                    // 15 s to the end, every feature from its first converged sample on
-  double mean_nees = 0.0;                  // e' P^-1 e / 3 over the same; 1 is consistent
-  double share_above_3_mm = 0.0;
+  double mean_nees = kNoFigure;            // e' P^-1 e / 3 over the same; 1 is consistent
+  double share_above_3_mm = kNoFigure;
   std::size_t degraded = 0;  // surfaces of that state, and of state invalid, from 15 s on; and of any
   std::size_t invalid = 0;
   std::size_t settled_samples = 0;

@@ -2,17 +2,23 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace perimap {
 namespace {
 
+// A figure of nothing is not zero.
+nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+
+std::string in_mm(double value) { return std::isfinite(value) ? fmt::format("{:.2f} mm", value) : "none"; }
+
 nlohmann::json to_json(const ErrorFigures& error) {
   return {{"count", error.count},
-          {"rms_mm", error.rms_mm},
-          {"median_mm", error.median_mm},
-          {"p95_mm", error.p95_mm},
-          {"max_mm", error.max_mm}};
+          {"rms_mm", number(error.rms_mm)},
+          {"median_mm", number(error.median_mm)},
+          {"p95_mm", number(error.p95_mm)},
+          {"max_mm", number(error.max_mm)}};
 }
 
 nlohmann::json to_json(const std::vector<ErrorSpan>& spans) {
@@ -40,14 +46,14 @@ std::string to_text(const AccuracyReport& report) {
       "            ({} positions at their valid time, 15 s to the end, every feature once called converged)\n"
       "consistency mean NEES/3 {:.2f} (1 is consistent, below is cautious)\n"
       "states      {} of {} surfaces degraded, {} invalid, from 15 s on\n"
-      "good        {} of {} positions of state good off by more than 3 mm, largest {:.2f} mm, of {} features\n"
-      "            {} more, largest {:.2f} mm, before the ECG could tell of the premature beat that ended their cycle "
+      "good        {} of {} positions of state good off by more than 3 mm, largest {}, of {} features\n"
+      "            {} more, largest {}, before the ECG could tell of the premature beat that ended their cycle "
       "({} such beats)",
       report.features_published, report.features_converged, report.converged_by_15_s, report.converged_at_15_s,
       report.features_without_truth, report.settled.rms_mm, report.settled.median_mm, report.settled.p95_mm,
       report.settled.max_mm, 100.0 * report.share_above_3_mm, report.settled.count, report.mean_nees, report.degraded,
-      report.settled_samples, report.invalid, report.good.off, report.good.count, report.good.largest_mm,
-      report.good.features_off, report.good.off_before_known, report.good.largest_before_known_mm,
+      report.settled_samples, report.invalid, report.good.off, report.good.count, in_mm(report.good.largest_mm),
+      report.good.features_off, report.good.off_before_known, in_mm(report.good.largest_before_known_mm),
       report.good.premature_beats);
 }
 
@@ -61,8 +67,8 @@ nlohmann::json to_json(const AccuracyReport& report) {
           {"features_converged_at_15_s", report.converged_at_15_s},
           {"features_without_truth", report.features_without_truth},
           {"settled_error", to_json(report.settled)},
-          {"settled_mean_nees", report.mean_nees},
-          {"settled_share_above_3_mm", report.share_above_3_mm},
+          {"settled_mean_nees", number(report.mean_nees)},
+          {"settled_share_above_3_mm", number(report.share_above_3_mm)},
           {"surfaces_settled", report.settled_samples},
           {"surfaces_degraded", report.degraded},
           {"surfaces_invalid", report.invalid},

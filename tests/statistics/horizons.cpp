@@ -105,6 +105,7 @@ class Horizons final : public Publication {
         const auto at = static_cast<std::size_t>(second.begin_s / kSpan_s);
         if (at >= cell.spans.size()) cell.spans.resize(at + 1);
         const auto positions = static_cast<double>(second.error.count);
+        if (second.error.count == 0) continue;
         cell.spans[at].positions += positions;
         cell.spans[at].square_sum_mm2 += positions * second.error.rms_mm * second.error.rms_mm;
       }

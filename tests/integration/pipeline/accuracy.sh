@@ -23,7 +23,8 @@ for (let i = 3; i < process.argv.length; i += 2) {
   const lower = process.argv[i].startsWith("-");
   const key = process.argv[i].replace(/^-/, "");
   const limit = Number(process.argv[i + 1]);
-  const ok = lower ? values[key] >= limit : values[key] <= limit;
+  // null, the figure of nothing, would count as 0.
+  const ok = typeof values[key] === "number" && (lower ? values[key] >= limit : values[key] <= limit);
   console.log(`${ok ? "ok  " : "FAIL"} ${key} = ${values[key]}, ${lower ? "at least" : "at most"} ${limit}`);
   failed ||= !ok;
 }

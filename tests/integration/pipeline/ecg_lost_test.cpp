@@ -100,7 +100,7 @@ class Session {
     Window window;
     double count = 0.0;
     for (const ErrorSpan& second : report_.seconds) {
-      if (second.begin_s < begin_s || second.end_s > end_s) continue;
+      if (second.begin_s < begin_s || second.end_s > end_s || second.error.count == 0) continue;
       const auto n = static_cast<double>(second.error.count);
       window.rms_mm += n * second.error.rms_mm * second.error.rms_mm;
       window.nees += n * second.mean_nees;

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
+
+#include "daemon/report/accuracy_text.hpp"
 
 namespace perimap {
 namespace {
@@ -131,6 +135,34 @@ TEST(Accuracy, BringsPublishedInstantsToTheRecordingsClock) {
 TEST(Accuracy, NothingPublishedIsNotAnError) {
   const GroundTruth truth = still_triangle();
   EXPECT_EQ(Accuracy(truth, camera(), kFirstFrame).report(Duration(0)).settled.count, 0U);
+}
+
+// Zero would be the best figure of all, and within every limit.
+TEST(Accuracy, GivesNoFigureOfNothing) {
+  const GroundTruth truth = still_triangle();
+  Accuracy accuracy(truth, camera(), kFirstFrame);
+  tell_origin(accuracy, 1);
+  publish(accuracy, 16.0, {feature(1, perimap_FEATURE_CONVERGING, 50.0)});
+  const AccuracyReport report = accuracy.report(Duration(0));
+  EXPECT_FALSE(report.settled.median_mm <= 1e9);
+  const nlohmann::json json = nlohmann::json::parse(to_json(report).dump());
+  for (const char* key : {"rms_mm", "median_mm", "p95_mm", "max_mm"}) EXPECT_TRUE(json["settled_error"][key].is_null());
+  for (const char* key : {"settled_mean_nees", "settled_share_above_3_mm"}) EXPECT_TRUE(json[key].is_null()) << key;
+  EXPECT_TRUE(json["seconds"][16]["error"]["median_mm"].is_null());
+  EXPECT_EQ(json["settled_error"]["count"], 0);
+  EXPECT_NE(to_text(report).find("error       none"), std::string::npos);
+}
+
+TEST(Accuracy, TellsTheLargestErrorOfNoGoodPositionAsNone) {
+  const GroundTruth truth = still_triangle();
+  Accuracy accuracy(truth, camera(), kFirstFrame);
+  tell_origin(accuracy, 1);
+  // publish() leaves the state at zero, which is not good.
+  publish(accuracy, 16.0, {feature(1, perimap_FEATURE_CONVERGED, 1.0)});
+  const std::string text = to_text(accuracy.report(Duration(0)));
+  EXPECT_NE(text.find("good        0 of 0 positions of state good off by more than 3 mm, largest none"),
+            std::string::npos)
+      << text;
 }
 
 }  // namespace
