@@ -116,7 +116,7 @@ nlohmann::json as_json(std::string_view kind, const DeviceHealth& health, const 
   return {{"where", where},
           {"state", device_state_name(health.state())},
           {"reason", reason(kind, health)},
-          {"identity", health.identity()},
+          {"identity", health.identity().empty() ? nlohmann::json(nullptr) : nlohmann::json(health.identity())},
           {"openings", health.openings.get()},
           {"samples", health.samples.get()},
           {"rate_hz", seen.rate_hz()},
@@ -156,7 +156,12 @@ void print_breathing(const nlohmann::json& j) {
 void print(const char* kind, const nlohmann::json& j, const std::string& invalid) {
   const auto text = [&j](const char* key) { return j[key].get<std::string>(); };
   fmt::print("{} at {}: {}\n", kind, text("where"), text("state"));
-  if (!text("identity").empty()) fmt::print("  identity   {}\n", text("identity"));
+  // What streams has told what it can: a Medlab, a CAN module and a trigger line have no words for it.
+  if (!j["identity"].is_null()) {
+    fmt::print("  identity   {}\n", text("identity"));
+  } else if (text("state") == "streaming") {
+    fmt::print("  identity   not told by this protocol\n");
+  }
   if (j["samples"].get<std::uint64_t>() > 0) {
     fmt::print("  rate       {:.2f} Hz, {} samples\n", j["rate_hz"].get<double>(), j["samples"].get<std::uint64_t>());
     fmt::print("  stamps     {:.2f} ms before arrival; jitter p50 {:.2f}, p99 {:.2f} ms\n",
