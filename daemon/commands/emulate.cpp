@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -16,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/geometry/pose.hpp"
 #include "daemon/commands/frame_renderer.hpp"
 #include "daemon/commands/simulate.hpp"
 #include "daemon/commands/simulation_options.hpp"
@@ -51,6 +53,7 @@ struct Options {
   std::optional<double> start_s;
   std::vector<double> missing_s;
   std::vector<double> unplug_s;
+  std::vector<double> ndi_reference;  // translation, then rotation wxyz
   EmulatorFaults faults;
   NdiEmulatorSettings ndi{.wired_tools = 1};
   IgtlEmulatorSettings igtl;
@@ -92,6 +95,32 @@ Expected<Device> parse_device(const std::string& text) {
     return fail(fmt::format("device '{}': cannot be at {}", name, format_endpoint(*where)));
   }
   return Device{name, std::move(*where)};
+}
+
+// Over CAN, and out of a video output, there are no bytes to damage.
+Expected<void> check_faults(const Device& device, const EmulatorFaults& faults) {
+  const bool can = device.name == "can-ecg";
+  const bool camera = !device.video_output.empty();
+  const auto refuse = [&device](const char* option, const char* why) {
+    return fail(fmt::format("device '{}': cannot do {}: {}", device.name, option, why));
+  };
+  constexpr const char* kWholeFrames = "CAN controllers pass on whole, undamaged frames only";
+  constexpr const char* kPictures = "frames of a video output have no check sums and no protocol";
+  if (faults.bad_check > 0.0 && (can || camera)) return refuse("--bad-check", can ? kWholeFrames : kPictures);
+  if (faults.garbled > 0.0 && (can || camera)) return refuse("--garbled", can ? kWholeFrames : kPictures);
+  if (faults.truncated > 0.0 && can) return refuse("--truncated", kWholeFrames);
+  return {};
+}
+
+// The second tool's place, as given on the command line.
+Expected<Pose> reference_of(const std::vector<double>& given) {
+  const Vector3d t_mm(given[0], given[1], given[2]);
+  const double wxyz[4] = {given[3], given[4], given[5], given[6]};
+  const double norm = std::sqrt(wxyz[0] * wxyz[0] + wxyz[1] * wxyz[1] + wxyz[2] * wxyz[2] + wxyz[3] * wxyz[3]);
+  if (!(std::abs(norm - 1.0) < 1e-3)) {
+    return fail(fmt::format("--ndi-reference: expected a rotation W X Y Z of norm 1 within 1e-3, got norm {:g}", norm));
+  }
+  return pose_from_wxyz(t_mm, wxyz);
 }
 
 // Where the data of the emulated devices comes from.
@@ -205,6 +234,7 @@ int run(Options& options) {
   for (const std::string& text : options.devices) {
     auto device = parse_device(text);
     if (!device) return complain(device.error(), 2);
+    if (const auto able = check_faults(*device, options.faults); !able) return complain(able.error(), 2);
     camera = camera || !device->video_output.empty();
     devices.push_back(std::move(*device));
   }
@@ -216,6 +246,14 @@ int run(Options& options) {
   spans(options.missing_s, options.faults.missing_every, options.faults.missing_for);
   spans(options.unplug_s, options.faults.unplug_every, options.faults.unplug_for);
   options.faults.seed = options.simulation.seed();
+
+  if (!options.ndi_reference.empty()) {
+    const auto reference = reference_of(options.ndi_reference);
+    if (!reference) return complain(reference.error(), 2);
+    options.ndi.reference = *reference;
+    // Where tools are wired the reference is, too.
+    if (options.ndi.wired_tools == 1) options.ndi.wired_tools = 2;
+  }
 
   auto stop = StopSignal::install();
   if (!stop) return complain(stop.error(), 1);
@@ -288,6 +326,11 @@ void add_emulate_command(CLI::App& app, int& exit_code) {
   command->add_option("--ndi-tools", options->ndi.wired_tools, "Tools in its ports; 0: all are uploaded")
       ->check(CLI::Range(0, 8))
       ->capture_default_str();
+  command
+      ->add_option("--ndi-reference", options->ndi_reference,
+                   "TX TY TZ W X Y Z, mm and unit quaternion: where the second tool of the NDI tracker is, the "
+                   "patient's reference; it stays there [missing]")
+      ->expected(7);
   const std::map<std::string, IgtlKind> kinds{
       {"transform", IgtlKind::kTransform}, {"tdata", IgtlKind::kTdata}, {"position", IgtlKind::kPosition}};
   command->add_option("--igtl-message", options->igtl.message, "transform, tdata or position [transform]")

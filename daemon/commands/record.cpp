@@ -88,7 +88,7 @@ int run(const Options& options) {
   if (!basis) return complain(basis.error().error, basis.error().configuration ? 2 : 1);
   auto devices = named_devices(basis->configuration, options.configuration);
   if (!devices) return complain({options.configuration + ": " + devices.error().message}, 2);
-  if (!devices->tracker && !devices->ecg && !devices->camera) {
+  if (!devices->tracker && !devices->ecg && !devices->r_trigger && !devices->camera) {
     return complain({options.configuration + ": names no device; expected [camera], [tracker] or [ecg]"}, 2);
   }
   auto recorder = SessionRecorder::create(

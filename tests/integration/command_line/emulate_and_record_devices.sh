@@ -1,0 +1,68 @@
+#!/bin/bash
+# perimap emulate refuses what a device cannot do, and has a patient's reference where it is told; perimap record takes any
+# device, be it a trigger line alone.
+# emulate_and_record_devices.sh PERIMAP WORK_FOLDER
+set -uo pipefail
+perimap=$1 work=$2
+port=$((20000 + $$ % 20000))
+rm -rf "$work"
+mkdir -p "$work"
+emulator=
+trap 'kill $emulator 2> /dev/null' EXIT
+
+fail() {
+  echo "FAILED: $1"
+  exit 1
+}
+
+# refused TEXT ARGUMENT...: at once, with exit code 2 and the text on one line
+refused() {
+  local text=$1
+  shift
+  timeout 10 "$perimap" emulate "$@" > "$work/out" 2> "$work/error"
+  [ $? -eq 2 ] || fail "emulate $*: ended otherwise: $(cat "$work/out" "$work/error")"
+  [ "$(wc -l < "$work/error")" -eq 1 ] && grep -qF -e "$text" "$work/error" || fail "emulate $*: $(cat "$work/error")"
+}
+for option in --bad-check --garbled --truncated; do
+  refused "device 'can-ecg': cannot do $option" ndi=tcp:127.0.0.1:$port can-ecg=can:none $option 0.1
+done
+for option in --bad-check --garbled; do
+  refused "device 'camera': cannot do $option" camera=v4l2:/dev/video-that-is-not-there $option 0.1
+done
+refused "--ndi-reference: expected a rotation" ndi=tcp:127.0.0.1:$port --ndi-reference 0 0 -500 1 1 0 0
+
+"$perimap" emulate ndi=tcp:127.0.0.1:$port --ndi-reference 10 0 -520 1 0 0 0 > "$work/emulator" 2>&1 &
+emulator=$!
+for _ in $(seq 100); do
+  grep -q ' at ' "$work/emulator" && break
+  sleep 0.1
+done
+cat > "$work/reference.toml" << TOML
+version = 1
+[tracker]
+protocol = "ndi"
+port = "tcp:127.0.0.1:$port"
+frame_rate_hz = 60
+sensor = "0A"
+reference = "0B"
+TOML
+"$perimap" record -c "$work/reference.toml" "$work/reference.mcap" --seconds 2 > "$work/record" 2>&1 ||
+  fail "a tracker alone: $(cat "$work/record")"
+"$perimap" probe "$work/reference.toml" --seconds 2 --json > "$work/probe.json" 2> "$work/error" ||
+  fail "the reference is not seen: $(cat "$work/probe.json" "$work/error")"
+node - "$work/probe.json" << 'END' || fail "poses relative to the reference: $(cat "$work/probe.json")"
+const assert = require("node:assert/strict");
+const {tracker} = JSON.parse(require("fs").readFileSync(process.argv[2]));
+assert.equal(tracker.state, "streaming");
+assert.equal(tracker.invalid, 0);
+END
+
+# The line need not be there.
+printf 'version = 1\n[ecg]\nr_trigger = true\nr_trigger_port = "/dev/tty-that-is-not-there"\n' > "$work/trigger.toml"
+"$perimap" record -c "$work/trigger.toml" "$work/trigger.mcap" --seconds 0.5 > "$work/record" 2>&1 ||
+  fail "a trigger alone: $(cat "$work/record")"
+[ -s "$work/trigger.mcap" ] || fail "nothing was written: $(cat "$work/record")"
+echo 'version = 1' > "$work/none.toml"
+"$perimap" record -c "$work/none.toml" "$work/none.mcap" --seconds 0.5 > "$work/record" 2>&1
+[ $? -eq 2 ] && grep -q "names no device" "$work/record" || fail "no device: $(cat "$work/record")"
+echo "as promised"
