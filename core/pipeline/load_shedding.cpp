@@ -89,14 +89,13 @@ bool LoadShedding::more_useful(const Ranked& a, const Ranked& b) noexcept {
 }
 
 void LoadShedding::note(std::uint64_t frame_index, bool measurable) noexcept {
-  ++since_ranked_;
+  since_ranked_ = std::min(since_ranked_ + 1, kReviewFrames);
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     const FeatureSlot& slot = slots_[i];
     Watch& watch = watches_[i];
-    if (slot.state == SlotState::kEmpty) {
-      watch = {};
-      continue;
-    }
+    if (slot.state == SlotState::kEmpty || slot.id != watch.id) watch = {};
+    watch.id = slot.id;
+    if (slot.state == SlotState::kEmpty) continue;
     watch.set_aside = slot.shed && !slot.in_view ? 0 : std::max(0, watch.set_aside - 1);
     if (slot.shed) continue;
     if (slot.last_found_frame == frame_index) {

@@ -88,8 +88,9 @@ class LoadShedding {
 
  private:
   struct Watch {
-    int misses = 0;     // in a row, while it is followed
-    int set_aside = 0;  // frames left
+    std::uint32_t id = 0;  // of the feature that the slot had
+    int misses = 0;        // in a row, while it is followed
+    int set_aside = 0;     // frames left
   };
   struct Ranked {
     FeatureSlot* slot;

@@ -162,7 +162,8 @@ SurfaceFooting Pipeline::model_footing(const RespiratoryClock& respiration, Inst
     if (snapshot == nullptr) continue;
     footing.mapped = footing.mapped || !snapshot->features.empty();
     footing.pose_missing = footing.pose_missing || snapshot->pose_missing;
-    footing.update_late = footing.update_late || !snapshot->any || snapshot->frame_sequence < model_owes_;
+    footing.update_late =
+        footing.update_late || !snapshot->any || snapshot->recalled || snapshot->frame_sequence < model_owes_;
   }
   // As the schedule has it: the frame after the last one, half a period late, has passed its release.
   const auto last = from_ns(static_cast<std::int64_t>(counters_.last_frame_ns.get()));

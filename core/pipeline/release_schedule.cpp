@@ -8,9 +8,9 @@ namespace {
 
 bool alike(Duration a, Duration b) noexcept { return 4 * std::max(a, b) <= 5 * std::min(a, b); }
 
-// One period is so much longer than the other that frames were missing without a gap in their numbers: a camera that
-// is opened again counts on by one, however long it was away.
-bool far_apart(Duration a, Duration b) noexcept { return 2 * std::max(a, b) > 5 * std::min(a, b); }
+// So much longer than usual that frames were missing without a gap in their numbers: a camera that is opened again
+// counts on by one, however long it was away.
+bool outage(Duration period, Duration usual) noexcept { return 2 * period > 5 * usual; }
 
 }  // namespace
 
@@ -39,7 +39,7 @@ void ReleaseSchedule::fit(Duration period) noexcept {
   if (others_ == kAnotherRate) {
     others_ = 0;
     period_ = period;
-  } else if (!far_apart(period, period_)) {
+  } else if (!outage(period, period_)) {
     // A slow average: stamps jitter by a fraction of a millisecond, the true period hardly changes.
     period_ += (period - period_) / 16;
   }

@@ -9,7 +9,7 @@ namespace perimap {
 namespace {
 
 constexpr int kFrameBuffers = 8;  // a quarter of a second at 30 frames/s
-// More than a minute at 60 frames/s: a publisher that was held up must know the newest.
+// More than a minute at 60 frames/s: what a publisher that was held up has to know.
 constexpr std::size_t kStampRing = 4096;
 constexpr std::size_t kPoseRing = 256;  // more than a second of a fast tracker
 

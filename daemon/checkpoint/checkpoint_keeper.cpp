@@ -106,11 +106,11 @@ void CheckpointKeeper::write() {
   write_failed_ = !written;
 }
 
-void CheckpointKeeper::forget() {
+void CheckpointKeeper::forget(std::uint64_t forgotten_before) {
   const std::lock_guard lock(mutex_);
-  const std::uint64_t forgotten = pipeline_.counters().maps_forgotten.get();
-  forgetting_ = forgotten == maps_forgotten_;
-  maps_forgotten_ = forgotten;
+  maps_forgotten_ = pipeline_.counters().maps_forgotten.get();
+  // Not against what was last noticed: run() may have noticed this very one already.
+  forgetting_ = maps_forgotten_ == forgotten_before;
   let_go();
 }
 

@@ -32,8 +32,9 @@ class CheckpointKeeper {
   void stop() noexcept { stopping_.store(true, std::memory_order_relaxed); }
 
   // Any thread, once the pipeline has been asked to forget the map: the file goes, and nothing of that map is written
-  // again, however long the pipeline takes. (That it has forgotten without a word of this, run() notices.)
-  void forget();
+  // again, however long the pipeline takes. `forgotten_before`: its count of forgotten maps before it was asked. (That
+  // it has forgotten without a word of this, run() notices.)
+  void forget(std::uint64_t forgotten_before);
 
  private:
   // What the pipeline has recalled, so that a crash that follows soon takes nothing either.

@@ -251,7 +251,7 @@ const perimap_SurfaceModel& WireModel::fill(const ModelMoment& moment) {
   return wire_;
 }
 
-// As SurfaceComposer has them, but for the covariance: the workers evaluate that at the releases alone.
+// As SurfaceComposer has them, but for the covariance, which the workers evaluate for the surfaces alone.
 void WireModel::fill_features(const ModelMoment& moment) {
   std::vector<const FeatureSnapshot*> order;
   for (const ShardSnapshot* snapshot : moment.snapshots) {

@@ -50,8 +50,8 @@ Expected<void> LiveSession::start_control() {
   if (control_socket_.empty()) return {};
   commands_ = std::make_unique<SessionCommands>(
       pipeline_, identity_, [this] { return facts(); }, reload_, [this](bool on) { return feeder_->record(on); },
-      [this] {
-        if (keeper_) keeper_->forget();
+      [this](std::uint64_t forgotten_before) {
+        if (keeper_) keeper_->forget(forgotten_before);
       });
   auto server =
       ControlServer::create(control_socket_, [this](ControlCommand command) { return commands_->answer(command); });

@@ -15,7 +15,7 @@ constexpr Duration kMapperPatience = std::chrono::seconds(2);
 SessionCommands::SessionCommands(Pipeline& pipeline, const Identity& identity, std::function<StatusFacts()> facts,
                                  std::function<Expected<std::string>()> reload,
                                  std::function<Expected<std::string>(bool)> record,
-                                 std::function<void()> on_new_patient)
+                                 std::function<void(std::uint64_t)> on_new_patient)
     : pipeline_(pipeline),
       statuses_(wire_statuses(identity, pipeline.settings())),
       facts_(std::move(facts)),
@@ -54,7 +54,7 @@ std::string SessionCommands::tell_status() {
 Expected<std::string> SessionCommands::forget_patient() {
   const std::uint64_t before = pipeline_.counters().maps_forgotten.get();
   pipeline_.ask_to_forget();
-  on_new_patient_();
+  on_new_patient_(before);
   const Instant until = MonotonicClock::now() + kMapperPatience;
   while (pipeline_.counters().maps_forgotten.get() == before) {
     if (MonotonicClock::now() > until) return fail("the mapper does not answer: the map is not cleared yet");

@@ -1,6 +1,7 @@
 // What a running session does when it is told to (perimap ctl).
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -18,10 +19,10 @@ class SessionCommands {
  public:
   // `pipeline` must outlive it and run. `facts` tells what the status says beside the counters; `reload` reads the
   // configuration again and says what came of it; `record` begins or ends a recording; `on_new_patient` is called when
-  // the old patient's map is to go, which may take the pipeline a while.
+  // the old patient's map is to go, with how many maps were forgotten before: it may take the pipeline a while.
   SessionCommands(Pipeline& pipeline, const Identity& identity, std::function<StatusFacts()> facts,
                   std::function<Expected<std::string>()> reload, std::function<Expected<std::string>(bool)> record,
-                  std::function<void()> on_new_patient);
+                  std::function<void(std::uint64_t)> on_new_patient);
 
   [[nodiscard]] Expected<std::string> answer(ControlCommand command);
 
@@ -34,7 +35,7 @@ class SessionCommands {
   std::function<StatusFacts()> facts_;
   std::function<Expected<std::string>()> reload_;
   std::function<Expected<std::string>(bool)> record_;
-  std::function<void()> on_new_patient_;
+  std::function<void(std::uint64_t)> on_new_patient_;
 };
 
 }  // namespace perimap

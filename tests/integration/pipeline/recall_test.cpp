@@ -183,7 +183,7 @@ class KeptRun : public ::testing::Test {
   [[nodiscard]] bool kept() const { return std::filesystem::exists(file); }
 
  private:
-  ReplaySetup run_ = setup();
+  ReplaySetup run_ = setup(Precision::kDouble);
   Unheard unheard_;
   std::thread keeping_;
 
@@ -209,7 +209,7 @@ TEST_F(KeptRun, TheCheckpointGoesThoughTheMapperDoesNotAnswerTheCommand) {
   ASSERT_TRUE(comes_true([this] { return kept(); }));
   SessionCommands commands(
       pipeline, {}, [] { return StatusFacts{}; }, [] { return std::string(); }, [](bool) { return std::string(); },
-      [this] { keeper.forget(); });
+      [this](std::uint64_t before) { keeper.forget(before); });
   EXPECT_FALSE(commands.answer(ControlCommand::kNewPatient)) << "nothing maps here";
   EXPECT_FALSE(kept());
   std::this_thread::sleep_for(10 * kInterval);
