@@ -51,6 +51,9 @@ std::optional<WrongInput> wrong_input(const Configuration& c) {
     return WrongInput{"ecg", "channel", fmt::format("1 to {} of a bitalino", BitalinoProtocol::kChannels),
                       fmt::format("{}", c.ecg.channel)};
   }
+  if (c.ecg.r_trigger && c.ecg.r_trigger_port && c.ecg.r_trigger_port == c.ecg.port) {
+    return WrongInput{"ecg", "r_trigger_port", "a serial port of its own", *c.ecg.r_trigger_port};
+  }
   return wrong_respiration(c);
 }
 

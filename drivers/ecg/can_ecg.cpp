@@ -62,6 +62,7 @@ CanEcgDecoder::CanEcgDecoder(const CanEcgSettings& settings, EcgSinks sinks, Dev
 void CanEcgDecoder::restart() noexcept {
   samples_.restart();
   rate_.restart();
+  rate_refused_ = false;  // what is still wrong is told again
   last_.reset();
   dropped_ = 0;
 }

@@ -1,6 +1,7 @@
 #include "drivers/emulator/igtl_emulator.hpp"
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +11,7 @@ namespace perimap {
 namespace {
 
 constexpr std::size_t kLastCrcByte = 57;
+constexpr Duration kOldest = std::chrono::milliseconds(50);  // reading that a new connection is given
 
 }  // namespace
 
@@ -22,7 +24,11 @@ Instant IgtlEmulator::due(std::size_t reading) const noexcept {
   return track_.start() + Duration(std::llround(since_ns / (1.0 + 1e-6 * faults_.drift_ppm)));
 }
 
-void IgtlEmulator::on_open(LinkControl& /*link*/, Instant now) { next_ = track_.index_at(now - track_.start()); }
+// A client that comes after the recording, or within one of its gaps, is not given what was before.
+void IgtlEmulator::on_open(LinkControl& /*link*/, Instant now) {
+  next_ = track_.index_at(now - track_.start());
+  if (next_ < track_.size() && now - due(next_) > kOldest) ++next_;
+}
 
 void IgtlEmulator::on_time(LinkControl& link, Instant now) {
   using Message = IgtlEmulatorSettings::Message;

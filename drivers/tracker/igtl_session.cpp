@@ -43,7 +43,6 @@ void IgtlSession::on_open(LinkControl& link, Instant now) {
   delivered_ = {};
   last_ = now;
   any_ = false;
-  only_tool_.clear();
   listen_until_ = several_ ? now + kListenForOthers : now;
   server_fault_.clear();
   names_.clear();
@@ -155,7 +154,7 @@ void IgtlSession::on_tdata(LinkControl& link, const IgtlMessage& message, Instan
     if (settings_.reference && tool.name == *settings_.reference) reference = {ToolState::kOk, tool.X_TO};
     if (is_sensor(link, tool.name, arrival)) sensor = {ToolState::kOk, tool.X_TO};
   }
-  if (several_) return;
+  if (arrival < listen_until_) return;
   const Told told{sensor, message.time_stamp, message.time_ns(), arrival};
   if (told.stamp != 0 && told.stamp == delivered_.stamp) return;  // the same reading again
   reference_ = {reference, told.stamp, told.time_ns, arrival};

@@ -74,7 +74,7 @@ class IgtlSession final : public DeviceProtocol {
   Instant last_{};  // reading, or the opening
   bool any_ = false;
   std::vector<std::string> names_;  // of what poses came of, in this connection
-  std::string only_tool_;           // that came in this connection, when the settings name no sensor
+  std::string only_tool_;           // that came first, when the settings name no sensor; no other takes its place later
   bool several_ = false;            // tools have come; of earlier connections too
   Instant listen_until_{};          // for a second tool
   std::string server_fault_;        // the last STATUS that was not OK, in this connection

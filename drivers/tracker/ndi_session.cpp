@@ -101,6 +101,7 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
   framer_.restart();
   clock_.reset();
   rate_.restart();
+  rate_refused_ = false;  // what is still wrong is told again
   last_frame_.reset();
   stride_ = 0;
   query_ = Query::kBx2;

@@ -2,11 +2,10 @@
 //
 // Start: serial break, INIT, COMM to 115200 baud (serial); TSTOP, INIT (TCP). A device that does not answer a break, or
 // an adapter that sends none, leaves the line at the rate of the last session: TSTOP then finds which, 9600 or 115200
-// baud. Then ports that are to be freed are
-// freed, tool definitions uploaded (PHRQ, PVWR), ports initialised (PHSR 02, PINIT; again until there is none: a tool
-// of several channels shows its others only then) and enabled (PHSR 03, PENA),
-// TSTART. Then BX2 is asked for again and again; where a device has no BX2, BX; where it has neither, TX. A kind
-// of reply that comes damaged four times and never whole is given up in the same way.
+// baud. Then ports that are to be freed are freed, tool definitions uploaded (PHRQ, PVWR), ports initialised (PHSR 02,
+// PINIT; again until there is none: a tool of several channels shows its others only then) and enabled (PHSR 03, PENA),
+// TSTART. Then BX2 is asked for again and again; where a device has no BX2, BX; where it has neither, TX. A kind of
+// reply that comes damaged four times and never whole is given up in the same way.
 //
 // Frames that come at another rate than the settings say give no sample, since their stamps would be wrong.
 //

@@ -75,8 +75,9 @@ class PluggedDevice {
     if (interrupt_) (void)unplug();
   }
 
-  // When it was there.
+  // When it was there, or a little before.
   Instant plug() {
+    const Instant begun = MonotonicClock::now();
     interrupt_.emplace();
     there_ = false;
     thread_ = std::jthread([this] {
@@ -92,7 +93,7 @@ class PluggedDevice {
       ready("");
     });
     there_.wait(false);
-    return MonotonicClock::now();
+    return begun;
   }
   // When its line was cut, or a little before.
   Instant unplug() {

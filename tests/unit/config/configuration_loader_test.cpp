@@ -264,6 +264,10 @@ INSTANTIATE_TEST_SUITE_P(
               "got 1"},
         Wrong{"EcgInputThatABitalinoHasNot", "version = 1\n[ecg]\nchannel = 8\nprotocol = \"bitalino\"\n",
               "test.toml:3:11: key 'ecg.channel': expected 1 to 6 of a bitalino, got 8"},
+        Wrong{"TriggerOnTheEcgsPort",
+              "version = 1\n[ecg]\nprotocol = \"cyton\"\nport = \"/dev/ttyUSB0\"\nr_trigger = true\n"
+              "r_trigger_port = \"/dev/ttyUSB0\"\n",
+              "test.toml:6:18: key 'ecg.r_trigger_port': expected a serial port of its own, got /dev/ttyUSB0"},
         Wrong{"SectionIsAValue", "version = 1\nphase = 3\n", "test.toml:2:9: key 'phase': expected a table, got 3"},
         Wrong{"SectionIsAnArrayOfTables", "version = 1\n[[phase]]\nlaw = \"linear\"\n",
               "test.toml:2:1: key 'phase': expected a table, got [a table]"},

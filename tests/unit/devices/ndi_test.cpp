@@ -587,6 +587,8 @@ TEST(NdiSession, FramesAtAnotherRateThanConfiguredGiveNoPoseAndAReason) {
   theatre.device.on_open(theatre.far, theatre.now);
   theatre.run(seconds(4));
   EXPECT_EQ(theatre.samples.size(), before);
+  EXPECT_EQ(theatre.health.state(), DeviceState::kSilent);
+  EXPECT_THAT(theatre.health.reason(), HasSubstr("frame_rate_hz says 60.0"));
 }
 
 TEST(NdiSession, SaysWhatIsWrongWithTheTools) {
