@@ -66,7 +66,7 @@ void LiveRuntime::stop() {
   for (std::thread& housekeeper : housekeepers_) housekeeper.join();
 }
 
-StatusFacts LiveRuntime::facts() const noexcept {
+StatusFacts LiveRuntime::facts() const {
   StatusFacts facts;
   facts.memory_locked = memory_locked_;
   facts.realtime_priority = threads_.priority();
@@ -74,7 +74,15 @@ StatusFacts LiveRuntime::facts() const noexcept {
   facts.latency_short = check_latency(pipeline_.settings(), pipeline_.counters()).too_short;
   facts.stalled_after = settings_.stalled_after;
   facts.recent = &recent_;
+  facts.r_trigger = pipeline_.settings().r_trigger.has_value();
+  facts.respiration_channel = pipeline_.settings().respiration.channel;
   facts.sources_ended = sources_ended_.load(std::memory_order_relaxed);
+  const std::lock_guard lock(phases_mutex_);
+  facts.phase = phases_.phase;
+  facts.rhythm = phases_.rhythm;
+  facts.respiration = phases_.respiration;
+  facts.respiration_suspected = phases_.respiration_suspected;
+  facts.respiration_source = phases_.respiration_source;
   return facts;
 }
 
@@ -166,14 +174,11 @@ void LiveRuntime::run_status() {
       next_model = now + settings_.model_interval;
       turn_before = turn;
     }
+    {
+      const std::lock_guard lock(phases_mutex_);
+      phases_ = {clock.at(now).state, clock.rhythm(), respiration.state, respiration.suspected, respiration.source};
+    }
     StatusFacts told = facts();
-    told.respiration = respiration.state;
-    told.respiration_suspected = respiration.suspected;
-    told.respiration_source = respiration.source;
-    told.phase = clock.at(now).state;
-    told.rhythm = clock.rhythm();
-    told.r_trigger = pipeline_.settings().r_trigger.has_value();
-    told.respiration_channel = pipeline_.settings().respiration.channel;
     if (describe_sources_) describe_sources_(told);
     // A device that goes, comes or falls silent is told at once.
     const SourceStates states = source_states(pipeline_.counters(), told, now);

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <functional>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <utility>
@@ -60,10 +61,19 @@ class LiveRuntime {
   // Ends and joins every thread. Called twice it does nothing.
   void stop();
 
-  // Whether scheduling priority and memory locking were granted; for the log and the status.
-  [[nodiscard]] StatusFacts facts() const noexcept;
+  // What the status tells beside the counters and the sources. Any thread but the real-time ones.
+  [[nodiscard]] StatusFacts facts() const;
 
  private:
+  // Of heart and breath, as the status thread found them last: the pipeline's cells have one reader.
+  struct Phases {
+    PhaseState phase = PhaseState::kUnknown;
+    Rhythm rhythm = Rhythm::kUnknown;
+    RespirationState respiration = RespirationState::kOff;
+    bool respiration_suspected = false;
+    RespirationSource respiration_source = RespirationSource::kNone;
+  };
+
   void run_mapper() noexcept;
   void run_publisher();
   void run_status();
@@ -79,6 +89,8 @@ class LiveRuntime {
   WirePhase wire_phase_;
   std::vector<WireStatus> wire_statuses_;  // of the streams that are published
   RecentCounts recent_;
+  mutable std::mutex phases_mutex_;
+  Phases phases_;
   Wakeup status_wakeup_;
   std::vector<std::thread> workers_;
   std::vector<std::thread> housekeepers_;

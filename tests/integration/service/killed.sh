@@ -49,8 +49,8 @@ for ((i = 1; i <= kills; i++)); do
     kill -0 $daemon 2> /dev/null || fail "after kill $i it did not come back: $(tail -n 3 "$work/log")"
     sleep 0.02
   done
-  sleep "0.$((RANDOM % 9))$((RANDOM % 10))"
-  sleep $((RANDOM % 2))
+  # What an ECG hides while nobody listens takes some beats to come back.
+  sleep "$((1 + RANDOM % 6)).$((RANDOM % 10))"
 done
 converged=$(status features_converged)
 kill -TERM $daemon
