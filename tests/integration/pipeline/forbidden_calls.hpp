@@ -5,9 +5,10 @@
 
 namespace perimap::test {
 
-// Both interposed for the whole process, the C and C++ libraries included. What glibc calls inside itself is not seen,
-// but every way there is: a lock by pthread_*, a wait by its semaphore, condition or futex, a system call by name or by
-// syscall().
+// Both interposed for the whole process, the C and C++ libraries included: allocation, locks by pthread_*, waits for a
+// semaphore, a condition or a thread, sleeps, read, write, poll, fsync, sendmsg, recvmsg, and what goes by syscall().
+// What glibc calls inside itself is not seen (its own streams, printf among them, but for what they allocate), nor are
+// other system calls by name.
 struct ForbiddenCalls {
   int heap = 0;
   int blocking = 0;

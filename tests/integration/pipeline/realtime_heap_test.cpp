@@ -1,6 +1,6 @@
 // The real-time path makes no heap call, takes no lock, waits for nothing but at its named waits, and does no input or
-// output: all such calls are interposed for the whole process, and those inside a RealtimeScope are counted. Not built
-// with sanitizers, which bring their own allocator.
+// output. The calls of forbidden_calls.hpp are interposed for the whole process, and those inside a RealtimeScope are
+// counted. Not built with sanitizers, which bring their own allocator.
 #include <gtest/gtest.h>
 #include <linux/futex.h>
 #include <poll.h>
