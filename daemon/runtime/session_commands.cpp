@@ -42,9 +42,10 @@ Expected<std::string> SessionCommands::answer(ControlCommand command) {
 std::string SessionCommands::tell_status() {
   const StatusFacts facts = facts_();
   const Instant now = MonotonicClock::now();
-  nlohmann::ordered_json told = full_status_json(statuses_.front().fill(pipeline_.counters(), facts, now));
+  nlohmann::ordered_json told;
   for (WireStatus& status : statuses_) {
     const perimap_Status& wire = status.fill(pipeline_.counters(), facts, now);
+    if (told.is_null()) told = full_status_json(wire);
     told["streams"][wire.stream] = stream_status_json(wire);
   }
   return told.dump() + "\n";

@@ -245,23 +245,28 @@ TEST(ReleaseStreams, WhileTheMapperHangsTheModelSaysSoAsTheSurfacesDo) {
   EXPECT_GT(late, 5);
 }
 
-TEST(ReleaseStreams, LiveEveryReleaseOfTheGridIsPublishedOrCountedAsMissed) {
-  ReplaySetup s = setup();
-  s.pipeline.frame_stream = false;
-  s.pipeline.clock_period = milliseconds(2);
-  Pipeline pipeline(s.pipeline);
-  CollectedSurfaces collected;
+// The recording in real time with all threads, to its last release.
+void play_live(ReplayReader reader, Pipeline& pipeline, Publication& publication) {
   RuntimeSettings settings;
   settings.lock_memory = false;
-  LiveRuntime runtime(pipeline, settings, collected);
+  LiveRuntime runtime(pipeline, settings, publication);
   runtime.start();
-  ReplayFeeder feeder(std::move(s.reader), SensorIntake{&pipeline.entrance()});
+  ReplayFeeder feeder(std::move(reader), SensorIntake{&pipeline.entrance()});
   feeder.start(runtime.threads());
   while (!feeder.ended()) std::this_thread::sleep_for(milliseconds(50));
   runtime.end_of_sources();
   while (!runtime.all_released()) std::this_thread::sleep_for(milliseconds(10));
   feeder.stop();
   runtime.stop();
+}
+
+TEST(ReleaseStreams, LiveEveryReleaseOfTheGridIsPublishedOrCountedAsMissed) {
+  ReplaySetup s = setup();
+  s.pipeline.frame_stream = false;
+  s.pipeline.clock_period = milliseconds(2);
+  Pipeline pipeline(s.pipeline);
+  CollectedSurfaces collected;
+  play_live(std::move(s.reader), pipeline, collected);
   EXPECT_TRUE(collected.of(ReleaseStream::kFrame).empty());
   const std::vector<CollectedSurface> clock = collected.of(ReleaseStream::kClock);
   ASSERT_GT(clock.size(), 10U);
@@ -303,17 +308,7 @@ TEST(ReleaseStreams, LiveAPublisherThatWasHeldUpLeavesOutWhatIsStaleAndCountsIt)
   const Duration usable = s.pipeline.lead + s.pipeline.validity;
   Pipeline pipeline(s.pipeline);
   HeldUpOnce publication(kHeldUp);
-  RuntimeSettings settings;
-  settings.lock_memory = false;
-  LiveRuntime runtime(pipeline, settings, publication);
-  runtime.start();
-  ReplayFeeder feeder(std::move(s.reader), SensorIntake{&pipeline.entrance()});
-  feeder.start(runtime.threads());
-  while (!feeder.ended()) std::this_thread::sleep_for(milliseconds(50));
-  runtime.end_of_sources();
-  while (!runtime.all_released()) std::this_thread::sleep_for(milliseconds(10));
-  feeder.stop();
-  runtime.stop();
+  play_live(std::move(s.reader), pipeline, publication);
   const std::vector<CollectedSurface> frames = publication.frames();
   const StreamCounters& counters = pipeline.counters().of(ReleaseStream::kFrame);
   ASSERT_GT(frames.size(), 31U);

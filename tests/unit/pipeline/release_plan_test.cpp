@@ -4,18 +4,15 @@
 
 #include <vector>
 
+#include "tests/unit/pipeline/stamped_frames.hpp"
+
 namespace perimap {
 namespace {
 
 using std::chrono::milliseconds;
-
-constexpr Duration kLatency = milliseconds(50);
-
-Instant at_ms(int ms) { return Instant(milliseconds(10'000 + ms)); }
-
-FrameStamp frame(std::uint64_t sequence, int capture_ms) {
-  return {sequence, at_ms(capture_ms), at_ms(capture_ms + 12)};
-}
+using test::at_ms;
+using test::frame;
+using test::kLatency;
 
 // Frames 30 ms apart, each told of when it arrives; everything that is due by `until_ms` is taken at its instant.
 std::vector<Release> run(ReleasePlan& plan, int frames, int until_ms) {

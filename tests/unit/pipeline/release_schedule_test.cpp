@@ -2,18 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/unit/pipeline/stamped_frames.hpp"
+
 namespace perimap {
 namespace {
 
 using std::chrono::milliseconds;
-
-constexpr Duration kLatency = milliseconds(50);
-
-Instant at_ms(int ms) { return Instant(milliseconds(10'000 + ms)); }
-
-FrameStamp frame(std::uint64_t sequence, int capture_ms) {
-  return {sequence, at_ms(capture_ms), at_ms(capture_ms + 12)};
-}
+using test::at_ms;
+using test::frame;
+using test::kLatency;
 
 // Frames 0 to n-1, 30 ms apart, each released in time.
 ReleaseSchedule running(int n) {
