@@ -83,15 +83,25 @@ TEST(LoadSheddingLive, IsReportedAndTheSurfacesGoOn) {
 constexpr Duration kHeldUp = milliseconds(150);
 constexpr Duration kBudget = milliseconds(100);
 constexpr int kMostHeldUp = 60;  // frames
-// In which learning is never put off: the frames' time is still to come.
-constexpr Duration kFuture = std::chrono::hours(1);
+// The recording's events, moved so that the first one arrives at `begin`.
+class MovedEvents {
+ public:
+  MovedEvents(ReplayReader& reader, Instant begin) : reader_(reader), begin_(begin) {}
 
-std::optional<ReplayEvent> next(ReplaySetup& s, Duration offset) {
-  auto event = s.reader.next();
-  if (!event) throw std::runtime_error(event.error().message);
-  if (*event) shift(**event, offset);
-  return std::move(*event);
-}
+  std::optional<ReplayEvent> next() {
+    auto event = reader_.next();
+    if (!event) throw std::runtime_error(event.error().message);
+    if (!*event) return std::nullopt;
+    if (!offset_) offset_ = begin_ - arrival_of(**event);
+    shift(**event, *offset_);
+    return std::move(*event);
+  }
+
+ private:
+  ReplayReader& reader_;
+  Instant begin_;
+  std::optional<Duration> offset_;
+};
 
 struct Unheard final : Publication {
   void surface(const perimap_Surface& /*sample*/) override {}
@@ -131,6 +141,8 @@ TEST(LoadSheddingLive, FeaturesAreShedWhileFramesAreHeldUpAndTakenBackAfterwards
   ReplaySetup first = setup(false);
   first.pipeline.lockstep = true;
   first.pipeline.features.maximum = 40;
+  // So far in this machine's future that learning is never put off: the next frame's time is still to come.
+  const Instant begin = MonotonicClock::now() + std::chrono::hours(1);
   test::KeptMap kept;
   Instant ecg_end;
   std::optional<Instant> ecg_begin;
@@ -139,7 +151,8 @@ TEST(LoadSheddingLive, FeaturesAreShedWhileFramesAreHeldUpAndTakenBackAfterwards
     Pipeline pipeline(first.pipeline);
     Unheard unheard;
     LockstepRuntime runtime(pipeline, first.identity, first.utc_minus_monotonic, unheard);
-    while (const auto event = next(first, kFuture)) {
+    MovedEvents events(first.reader, begin);
+    while (const auto event = events.next()) {
       if (const auto* ecg = std::get_if<EcgBlock>(&*event)) {
         if (!ecg_begin) ecg_begin = ecg->first_sample_time;
         ecg_end = ecg->first_sample_time + ecg->count * ecg->sample_period;
@@ -173,7 +186,8 @@ TEST(LoadSheddingLive, FeaturesAreShedWhileFramesAreHeldUpAndTakenBackAfterwards
     const PipelineCounters& counters = pipeline.counters();
     int frames = 0;
     int held_up = 0;
-    while (const auto event = next(s, kFuture + (ecg_end - *ecg_begin))) {
+    MovedEvents events(s.reader, begin + (ecg_end - *ecg_begin));
+    while (const auto event = events.next()) {
       const bool is_frame = std::holds_alternative<FrameEvent>(*event);
       if (is_frame && ++frames <= kMostHeldUp && !any_says_so(collected)) {
         held_up = frames;
