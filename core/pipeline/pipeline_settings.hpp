@@ -48,7 +48,7 @@ struct PipelineSettings {
   bool frame_stream = true;                          // a surface for each frame, at capture + L
   Duration clock_period{0};                          // a surface at each multiple of it, too; 0: none
   Duration budget = std::chrono::milliseconds(12);   // kept free for A to C before the release
-  bool shedding = false;  // of features that the budget does not suffice for; not in lockstep
+  bool shedding = true;  // of features that the budget does not suffice for; not in lockstep
   Duration validity = std::chrono::milliseconds(200);
   bool phase_from_image = true;
   bool law_from_image = false;                      // clock.law holds until the images show another

@@ -121,7 +121,7 @@ struct PipelineConfiguration {
   Duration latency = std::chrono::milliseconds(50);  // L: release minus capture
   Duration lead{0};                                  // valid time minus release
   Duration budget = std::chrono::milliseconds(12);   // computing time kept free before the release
-  bool shedding = false;
+  bool shedding = true;
   int workers = 2;
   int adoption_delay_frames = 15;  // D: from a housekeeping request to the frame that adopts its result
 

@@ -175,7 +175,6 @@ INSTANTIATE_TEST_SUITE_P(EachPrecision, RealtimePathIn, testing::Values(Precisio
 TEST(RealtimePath, NeitherAllocatesNorBlocksLiveWithAllThreads) {
   ReplaySetup s = setup();
   s.pipeline.clock_period = std::chrono::milliseconds(2);
-  s.pipeline.shedding = true;
   s.pipeline.budget = std::chrono::microseconds(100);
   Pipeline pipeline(s.pipeline);
   LastSurface publication;

@@ -132,7 +132,7 @@ TEST(ConfigurationLoader, WhatIsPrintedLoadsBackToTheSame) {
   configuration.pipeline.latency = Duration(33333333);
   configuration.pipeline.release = PipelineConfiguration::Release::kBoth;
   configuration.pipeline.clock_rate_hz = 250.0;
-  configuration.pipeline.shedding = true;
+  configuration.pipeline.shedding = false;
   configuration.estimation.start_depths_mm = {40, 80.25, 1e4};
   configuration.estimation.gate_chi2 = 0.1 + 0.2;
   configuration.realtime.cpus = {1, 3};
