@@ -136,6 +136,8 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   if (overdue || interrupted_ || carried_ || settling) located.state = PhaseState::kFreeRunning;
   if (!overdue && carried_ && seen_) located.state = PhaseState::kFromImage;
   located.ectopic = beat(0).beat_class == BeatClass::kPremature;
+  // What the images carry on, they would have shown.
+  const bool unheard = (overdue || interrupted_) && !carried_;
 
   CardiacCycle& cycle = located.cycle;
   cycle.begin = beat(0).time;
@@ -143,7 +145,8 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   cycle.previous_length = last_rr();
   double variance_s2 = to_seconds(beat(0).deviation) * to_seconds(beat(0).deviation);
   for (int ahead = 0;; ++ahead) {
-    const Seconds deviation = ahead == 0 ? running_deviation_ : ahead == 1 ? next_deviation_ : length_deviation_;
+    const Seconds told = ahead == 0 ? running_deviation_ : ahead == 1 ? next_deviation_ : length_deviation_;
+    const Seconds deviation(unheard ? std::hypot(told.count(), premature_deviation_.count()) : told.count());
     cycle.length = predicted_length(ahead);
     cycle.length_deviation = rounded(deviation);
     if (t < cycle.begin + cycle.length) return located;

@@ -1,7 +1,8 @@
 // The phase of the heart at any instant: a snapshot that can be copied between threads.
 //
 // Between two known R peaks the phase is exact. After the last one it runs on the predicted length of the current
-// cycle, and past that on the predicted lengths of the cycles to come, with a deviation that grows.
+// cycle, and past that on the predicted lengths of the cycles to come, with a deviation that grows: by what the
+// prediction misses of a normal beat, and where no beat can be heard also by what a premature one would shift.
 #pragma once
 
 #include <array>
@@ -135,9 +136,10 @@ class CardiacClock {
   int held_ = 0;
   std::array<Beat, kCompletedCycles + 2> history_{};  // newest first; one more cycle gives the oldest its RR_previous
   std::array<Seconds, kPredictedCycles> predicted_{};
-  Seconds length_deviation_{0.0};   // of the prediction by one cycle
-  Seconds running_deviation_{0.0};  // of the running cycle's length
-  Seconds next_deviation_{0.0};     // of the length of the cycle after it
+  Seconds length_deviation_{0.0};     // of the prediction by one cycle
+  Seconds running_deviation_{0.0};    // of the running cycle's length
+  Seconds next_deviation_{0.0};       // of the length of the cycle after it
+  Seconds premature_deviation_{0.0};  // that a premature beat adds to a cycle which nobody has heard
   bool contradicted_ = false;
   bool samples_ = false;      // there are samples to be heard, not pulses alone
   bool interrupted_ = false;  // the lead is off, or nothing comes

@@ -14,6 +14,9 @@ constexpr Duration kShortestRr = std::chrono::milliseconds(250);
 // it, or a missed beat. Premature beats come 25 % early and more; breathing moves resting rhythm by less than 15 %.
 constexpr double kRhythmTolerance = 0.2;
 
+// By which share of a cycle a premature beat is early, about.
+constexpr double kPrematureBy = 0.3;
+
 }  // namespace
 
 CardiacClockTracker::CardiacClockTracker(const CardiacClockSettings& settings) noexcept
@@ -74,10 +77,20 @@ void CardiacClockTracker::predict() noexcept {
   clock_.length_deviation_ = predictor_.deviation();
   clock_.running_deviation_ = clock_.length_deviation_;
   clock_.next_deviation_ = clock_.length_deviation_;
+  clock_.premature_deviation_ = std::sqrt(premature_share()) * kPrematureBy * clock_.predicted_[0];
   if (clock_.beat(0).beat_class != BeatClass::kPremature) return;
   const PredictedLength pause = ectopic_.predict_pause(Seconds(clock_.last_rr()), clock_.predicted_[0]);
   clock_.predicted_[0] = pause.length;
   clock_.running_deviation_ = pause.deviation;
+}
+
+// Of the beats known. Jeffreys' estimate: none among them does not mean that there is never one.
+double CardiacClockTracker::premature_share() const noexcept {
+  const auto begin = clock_.history_.begin();
+  const auto premature = std::count_if(begin, begin + clock_.held_, [](const CardiacClock::Beat& beat) {
+    return beat.beat_class == BeatClass::kPremature;
+  });
+  return (static_cast<double>(premature) + 0.5) / (clock_.held_ + 1.0);
 }
 
 void CardiacClockTracker::heard(Instant until) noexcept {

@@ -43,6 +43,7 @@ class CardiacClockTracker {
 
  private:
   void predict() noexcept;
+  [[nodiscard]] double premature_share() const noexcept;
 
   RrPredictor predictor_;
   RhythmMonitor rhythm_;

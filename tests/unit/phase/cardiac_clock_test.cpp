@@ -170,6 +170,40 @@ TEST(CardiacClock, AnEcgThatIsGoneIsSaidAtOnce) {
   EXPECT_EQ(steady.tracker.clock().as_of(now).at(now).state, PhaseState::kLocked);
 }
 
+// One beat in thirty comes early, and nobody hears the last three cycles.
+TEST(CardiacClock, TheDeviationOfCyclesThatNobodyHeardCountsPrematureBeats) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0.8, 0.02);
+  std::uniform_real_distribution<double> even(0.0, 1.0);
+  double normalised = 0.0;
+  constexpr int kTrials = 400;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    CardiacClockTracker tracker{CardiacClockSettings{}};
+    Instant t = from_ns(1'000'000'000);
+    const auto next = [&](BeatClass& beat_class) {
+      const bool premature = even(random) < 1.0 / 30.0;
+      beat_class = premature ? BeatClass::kPremature : BeatClass::kNormal;
+      t += from_seconds((premature ? 0.7 : 1.0) * normal(random));
+    };
+    BeatClass beat_class = BeatClass::kNormal;
+    for (int i = 0; i < 80; ++i) {
+      next(beat_class);
+      RPeak peak = peak_at(t);
+      peak.beat_class = i < 79 ? beat_class : BeatClass::kNormal;
+      tracker.on_r_peak(peak);
+    }
+    tracker.heard(t);
+    tracker.interrupt();
+    for (int i = 0; i < 3; ++i) next(beat_class);
+    const PhaseEstimate estimate = tracker.clock().as_of(t).at(t);
+    ASSERT_EQ(estimate.state, PhaseState::kFreeRunning);
+    const double error_s = std::remainder(estimate.phase_rad, kTwoPi) / estimate.rate_rad_per_s;
+    normalised += std::pow(error_s / estimate.deviation_s, 2);
+  }
+  EXPECT_GT(normalised / kTrials, 0.5);
+  EXPECT_LT(normalised / kTrials, 1.5);
+}
+
 TEST(CardiacClock, WhatAnInterruptionMayHaveHiddenTeachesNothing) {
   Steady steady(40);
   const Duration before = steady.tracker.clock().predicted_length();
