@@ -9,6 +9,7 @@ usage() {
 tests/vm/run.sh [--kernel amd64|rt-amd64]... [--build FOLDER] [TEST...]
   TEST      devices: ECG over CAN, frames from a V4L2 node, the tracker over a pseudo-terminal, under systemd
             drivers: an R trigger on a modem line, own frames out of a video output and in by a camera
+            unplugged: the CAN interface and the camera are taken away 20 times
             service: the Debian package, its service, the watchdog
             all of them when none is named
   --kernel  Debian's stock kernel or its PREEMPT_RT kernel; both when not given, `devices` alone with the latter
@@ -32,7 +33,7 @@ while [ $# -gt 0 ]; do
       build=${2:-}
       shift
       ;;
-    devices | drivers | service) tests+=("$1") ;;
+    devices | drivers | unplugged | service) tests+=("$1") ;;
     -h | --help)
       usage
       exit 0
@@ -46,7 +47,7 @@ while [ $# -gt 0 ]; do
   shift
 done
 [ ${#kernels[@]} -gt 0 ] || kernels=(amd64 rt-amd64)
-[ ${#tests[@]} -gt 0 ] || tests=(devices drivers service)
+[ ${#tests[@]} -gt 0 ] || tests=(devices drivers unplugged service)
 
 vm_guest=$PWD/tests/vm/guest
 . tests/vm/machine.sh
@@ -87,7 +88,9 @@ for kernel in "${kernels[@]}"; do
     rm -rf "$exchange"
     mkdir -p "$exchange"
     cp "$vm_guest"/{common.sh,camera.yaml} "$exchange/"
-    printf 'build=%q\n' "$build" > "$exchange/settings"
+    # The guest has a /tmp of its own, and the build may lie in there.
+    mkdir "$exchange/bin"
+    cp "$build"/tests/vm/{hold_thread,same_frames,pulled_device} "$build/daemon/perimap" "$exchange/bin/"
     cp -r "$package" "$exchange/package"
     if [ "$test" = drivers ] && ! "$build/daemon/perimap" simulate "$exchange/played.mcap" --size 640x480 --fps 10 \
       --duration 20 --tracker-noise 0 > "$exchange/simulated" 2>&1; then

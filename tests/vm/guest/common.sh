@@ -1,5 +1,4 @@
 # For the guest's scripts: the installed package, devices, what a subscriber receives.
-. /vm/settings
 cd /tmp || exit 1
 mkdir -m 755 /run/emulated
 

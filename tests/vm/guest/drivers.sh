@@ -1,10 +1,9 @@
 # The kernel's own drivers at the far end: an R trigger on a serial port's modem line, and a recording's frames out of a
 # video output and in by a camera.
 set -uo pipefail
-. /vm/settings
 cd /tmp || exit 1
 uname -rv
-PATH=$build/daemon:$PATH
+PATH=/vm/bin:$PATH
 
 fail() {
   echo "FAILED: $1"
@@ -49,7 +48,7 @@ wait $record || fail "no recording: $(cat record)"
 kill -INT $emulator
 wait $emulator || fail "the emulator: $(cat emulated)"
 cat emulated
-same=$("$build/tests/vm/same_frames" /vm/played.mcap /vm/seen.mcap) || fail "what came cannot be read"
+same=$(/vm/bin/same_frames /vm/played.mcap /vm/seen.mcap) || fail "what came cannot be read"
 echo "frames of the recording among those that came: $same"
 [ "${same%% *}" -ge 20 ] || fail "the frames did not come through"
 echo "ok: own frames out of a video output and in by a camera"

@@ -17,7 +17,7 @@ holds /tmp/first "it publishes" "x.received > 5"
 
 # One thread is held, as if it hung; the others go on.
 before=$(systemctl show -P MainPID perimapd)
-"$build/tests/vm/hold_thread" "$before" publisher &
+/vm/bin/hold_thread "$before" publisher &
 until_true 60 bash -c "[ \"\$(systemctl show -P MainPID perimapd)\" != $before ] && systemctl is-active perimapd" ||
   fail "the watchdog did not bring it back"
 journalctl -u perimapd -o cat | grep -q 'Watchdog timeout' || fail "it was not the watchdog"
