@@ -1,5 +1,7 @@
 #include "drivers/ecg/cyton.hpp"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 namespace perimap {
@@ -15,6 +17,10 @@ constexpr Duration kDongleReset = std::chrono::milliseconds(250);
 constexpr Duration kBetweenCommands = std::chrono::milliseconds(100);
 constexpr Duration kPromptTime = std::chrono::milliseconds(1500);
 constexpr int kMostResets = 2;
+constexpr Duration kSlowGreeting =
+    std::chrono::seconds(3);  // asked again sooner, a slow board would never get that far
+constexpr Duration kBetweenBegins = std::chrono::milliseconds(500);
+constexpr int kMostBegins = 20;
 constexpr std::size_t kLongestGreeting = 2048;
 constexpr double kReference_mV = 4500.0;
 constexpr std::int32_t kFullScale = 0x7FFFFF;
@@ -64,6 +70,8 @@ void CytonProtocol::start() {
     send_in(kPromptTime, "s");
     send_in(kBetweenCommands, "v");
   }
+  wait_longer(kSlowGreeting);
+  health().set_awaited("v, which asks for its name");
 }
 
 void CytonProtocol::await_prompt(std::span<const std::byte> bytes) {
@@ -78,13 +86,21 @@ void CytonProtocol::await_prompt(std::span<const std::byte> bytes) {
   if (name < prompt) health().set_identity(greeting_.substr(name, prompt - name));
   prompted_ = true;
   drop_commands();
-  send_in(kBetweenCommands, "b");
+  // To open the port anew would reset the board, and lose what it measures meanwhile.
+  for (int i = 0; i < kMostBegins; ++i) send_in(i == 0 ? kBetweenCommands : kBetweenBegins, "b");
+  health().set_awaited("b, which starts its samples");
+}
+
+std::string CytonProtocol::why_no_sample(std::uint64_t bytes, double seconds) const {
+  if (!prompted_) return EcgProtocol::why_no_sample(bytes, seconds);
+  return fmt::format("it has told its name, but sends no sample, told to begin again and again for {:.1f} s", seconds);
 }
 
 void CytonProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> bytes, Instant arrival) {
   if (!prompted_) return await_prompt(bytes);
   const double count_mV = kReference_mV / settings_.gain / kFullScale;
   const auto take = [&](std::span<const std::byte> packet, std::optional<unsigned> lost, std::size_t behind) {
+    drop_commands();
     std::optional<RespirationReading> respiration;
     if (settings_.respiration_channel > 0) {
       const std::int32_t counts = counts_of(packet, settings_.respiration_channel);

@@ -5,11 +5,15 @@
 //   A0 n aaa aaa aaa aaa aaa aaa aaa aaa xxxxxx Cn    n: count modulo 256; a: 24-bit two's complement, big-endian, of
 //                                                     channels 1 to 8; x: accelerometer or clock; C0 to C6 closes
 //
+// A board may greet seconds after it was asked, and one that has greeted may have missed its `b`: it is told again
+// every half second until samples come.
+//
 // There is no check sum, so shape and count stand for it: synchronisation needs three packets in a row, and a packet
 // whose number does not follow counts only when the next agrees with it.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 
@@ -37,6 +41,7 @@ class CytonProtocol final : public EcgProtocol {
  protected:
   void start() override;
   void decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
+  [[nodiscard]] std::string why_no_sample(std::uint64_t bytes, double seconds) const override;
 
  private:
   void await_prompt(std::span<const std::byte> bytes);

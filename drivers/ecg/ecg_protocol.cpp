@@ -24,14 +24,15 @@ void EcgProtocol::on_open(LinkControl& link, Instant now) {
   now_ = now;
   bytes_ = 0;
   commands_.clear();
+  started_ = now;
   start();
-  started_ = commands_.empty() ? now : commands_.back().due;
   send_due(link, now);
 }
 
 void EcgProtocol::send_in(Duration pause, std::span<const std::byte> command) {
   const Instant from = commands_.empty() ? now_ : commands_.back().due;
   commands_.push_back({from + pause, {command.begin(), command.end()}});
+  started_ = commands_.back().due;
 }
 
 void EcgProtocol::send_due(LinkControl& link, Instant now) {
@@ -64,11 +65,13 @@ void EcgProtocol::on_time(LinkControl& link, Instant now) {
     return;
   }
   if (now < started_ + kReopenAfter) return;
-  const double seconds = to_seconds(now - opened_);
-  link.fail(bytes_ == 0
-                ? fmt::format("open, but not a byte in {:.1f} s; switched off, or the wrong port?", seconds)
-                : fmt::format("{} bytes in {:.1f} s and not one sample among them; wrong baud rate or another device?",
-                              bytes_, seconds));
+  link.fail(why_no_sample(bytes_, to_seconds(now - opened_)));
+}
+
+std::string EcgProtocol::why_no_sample(std::uint64_t bytes, double seconds) const {
+  if (bytes == 0) return fmt::format("open, but not a byte in {:.1f} s; switched off, or the wrong port?", seconds);
+  return fmt::format("{} bytes in {:.1f} s and not one sample among them; wrong baud rate or another device?", bytes,
+                     seconds);
 }
 
 }  // namespace perimap

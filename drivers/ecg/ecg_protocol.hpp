@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -31,17 +32,22 @@ class EcgProtocol : public DeviceProtocol {
   [[nodiscard]] Instant next_time() const noexcept final;
 
  protected:
-  // By send_in() alone.
+  // By send_in() and wait_longer() alone.
   virtual void start() = 0;
   // Some devices take one command at a time: this one goes out so long after the last, or after now if that has gone.
+  // Until the first sample it is part of the start.
   void send_in(Duration pause, std::span<const std::byte> command);
   void send_in(Duration pause, std::string_view command) {
     send_in(pause, std::as_bytes(std::span(command.data(), command.size())));
   }
+  // The device may take so much longer than others to answer the last of the start's commands.
+  void wait_longer(Duration duration) noexcept { started_ += duration; }
   // Commands that have not gone out yet do not.
   void drop_commands() noexcept { commands_.clear(); }
   // Gives what the bytes hold to samples(). Bytes that fit nowhere are counted as damaged.
   virtual void decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) = 0;
+  // Why the link is given up without a sample: `bytes` have come in `seconds`.
+  [[nodiscard]] virtual std::string why_no_sample(std::uint64_t bytes, double seconds) const;
 
   [[nodiscard]] EcgAssembler& samples() noexcept { return samples_; }
   [[nodiscard]] DeviceHealth& health() noexcept { return health_; }
@@ -58,7 +64,7 @@ class EcgProtocol : public DeviceProtocol {
   std::deque<Command> commands_;
   Instant now_{};
   Instant opened_{};
-  Instant started_{};  // the last of the start's commands has gone
+  Instant started_{};  // the last of the start's commands has gone, and what it takes has passed
   std::uint64_t bytes_ = 0;
 };
 

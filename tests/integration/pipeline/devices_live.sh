@@ -76,6 +76,10 @@ if [ "$mode" = unplugged ]; then
   exit 0
 fi
 
+# The recording begins seconds after both were opened: a device that has nothing to send yet is waited for.
+! grep -Eq 'ECG: .*(not one|sends no) sample' "$work/log" || fail "the ECG was opened again: $(cat "$work/log")"
+mv "$work/log" "$work/log-devices"
+
 printf 'version = 1\n[replay]\nrecording = "%s"\n[dds]\ndomain = %d\n' "$recording" $domain > "$work/replay.toml"
 run "$work/replay.toml" "$work/replay.mcap"
 for way in devices replay; do

@@ -35,7 +35,7 @@ std::vector<std::byte> bytes_of(std::initializer_list<int> values) {
 std::vector<std::pair<Duration, std::string>> commands_until(EcgProtocol& protocol, ScriptedLink& link, Instant end) {
   std::vector<std::pair<Duration, std::string>> commands;
   (void)link.take_sent();
-  for (Instant t = protocol.next_time(); t < end; t = protocol.next_time()) {
+  for (Instant t = protocol.next_time(); t < end && link.failure.empty(); t = protocol.next_time()) {
     protocol.on_time(link, t);
     commands.emplace_back(t - kStart, link.take_sent());
   }
@@ -165,7 +165,7 @@ TEST(EcgProtocol, BytesWithoutSenseSuggestTheWrongRateAndNoBytesThatItIsOff) {
     protocol.on_open(link, kStart);
     if (bytes) protocol.on_bytes(link, std::vector<std::byte>(500, std::byte{0x55}), kStart + milliseconds(100));
     while (link.failure.empty()) protocol.on_time(link, protocol.next_time());
-    EXPECT_LT(protocol.next_time(), kStart + seconds(6));
+    EXPECT_LT(protocol.next_time(), kStart + seconds(9));
     EXPECT_THAT(link.failure, HasSubstr(bytes ? "wrong baud rate" : "not a byte"));
     EXPECT_TRUE(received.blocks.empty());
   }
@@ -446,8 +446,58 @@ TEST(Cyton, WaitsForThePromptAndTakesTheBoardsName) {
   say("OpenBCI V3 8-16 channel\nFirmware: v3.1.2\n$");
   EXPECT_EQ(link.take_sent(), "");
   say("$$");
-  EXPECT_THAT(commands_until(protocol, link, kStart + seconds(3)), ElementsAre(Pair(milliseconds(1100), "b")));
+  EXPECT_THAT(commands_until(protocol, link, kStart + milliseconds(1500)), ElementsAre(Pair(milliseconds(1100), "b")));
   EXPECT_THAT(received.health.identity(), HasSubstr("Firmware: v3.1.2"));
+}
+
+void say(CytonProtocol& protocol, ScriptedLink& link, std::string_view text, Instant arrival) {
+  protocol.on_bytes(link, std::as_bytes(std::span(text.data(), text.size())), arrival);
+}
+
+TEST(Cyton, ABoardThatHasGreetedAndIsSilentYetIsToldToBeginAndNotReset) {
+  Received received;
+  CytonProtocol protocol({}, received.sink(), received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  say(protocol, link, "OpenBCI V3\n$$$", kStart + seconds(1));
+  const Instant first = kStart + seconds(9);
+  const auto commands = commands_until(protocol, link, first);
+  EXPECT_EQ(link.failure, "");
+  ASSERT_EQ(commands.size(), 16U);
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    EXPECT_THAT(commands[i], Pair(milliseconds(1100 + 500 * i), "b"));
+  }
+  for (unsigned i = 0; i < 10; ++i) protocol.on_bytes(link, cyton_packet(i, 77), first + i * milliseconds(4));
+  EXPECT_EQ(received.health.state(), DeviceState::kStreaming);
+  // Told again, a board that streams would begin its count anew.
+  EXPECT_GT(protocol.next_time(), first + milliseconds(300));
+  EXPECT_EQ(link.take_sent(), "");
+}
+
+TEST(Cyton, ABoardThatHasGreetedAndStaysSilentIsGivenUpWithThatReason) {
+  Received received;
+  CytonProtocol protocol({}, received.sink(), received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  say(protocol, link, "OpenBCI V3\n$$$", kStart + seconds(1));
+  while (link.failure.empty()) protocol.on_time(link, protocol.next_time());
+  EXPECT_THAT(link.failure, HasSubstr("sends no sample"));
+}
+
+// However late it greets within five seconds of the last question, it is not asked again before its first sample.
+TEST(Cyton, ASlowGreetingIsAwaited) {
+  for (const Duration late : {milliseconds(100), milliseconds(1900), milliseconds(4900)}) {
+    Received received;
+    CytonProtocol protocol({}, received.sink(), received.health);
+    ScriptedLink link;
+    protocol.on_open(link, kStart);
+    const Instant greeting = kStart + milliseconds(3550) + late;
+    (void)commands_until(protocol, link, greeting);
+    say(protocol, link, "OpenBCI V3\n$$$", greeting);
+    const auto commands = commands_until(protocol, link, greeting + milliseconds(200));
+    EXPECT_THAT(commands, ElementsAre(Pair(greeting - kStart + milliseconds(100), "b")));
+    EXPECT_EQ(link.failure, "");
+  }
 }
 
 TEST(Cyton, AsksAgainWhileItsDongleHearsNothing) {
