@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "drivers/device/reopening.hpp"
+#include "drivers/transport/host_lookup.hpp"
 #include "drivers/transport/serial_port.hpp"
 #include "drivers/transport/tcp_stream.hpp"
 
@@ -95,8 +96,9 @@ StreamOpener opener_of(const Endpoint& endpoint, int baud) {
     return [path = serial->path, baud](const Interrupt&) { return open_serial_port(path, baud); };
   }
   if (const auto* tcp = std::get_if<TcpEndpoint>(&endpoint)) {
-    return
-        [to = *tcp](const Interrupt& interrupt) { return connect_tcp(to.host, to.port, kLongestConnect, interrupt); };
+    return [to = std::make_shared<HostLookup>(tcp->host, tcp->port)](const Interrupt& interrupt) {
+      return connect_tcp(*to, kLongestConnect, interrupt);
+    };
   }
   return [name = format_endpoint(endpoint)](const Interrupt&) -> Expected<std::unique_ptr<ByteStream>> {
     return perimap::fail(name + ": carries CAN frames, expected a serial port or tcp:HOST:PORT");

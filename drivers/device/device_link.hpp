@@ -21,7 +21,8 @@ namespace perimap {
 
 using StreamOpener = std::function<Expected<std::unique_ptr<ByteStream>>(const Interrupt&)>;
 
-// A serial port at this rate, or a TCP connection; a CAN endpoint is an error, since it carries frames.
+// A serial port at this rate, or a TCP connection, whose host is looked up by one thread at a time; a CAN endpoint is
+// an error, since it carries frames.
 [[nodiscard]] StreamOpener opener_of(const Endpoint& endpoint, int baud);
 
 // Runs on the calling thread until interrupted. `health` tells the state and, when there is no link, the reason.

@@ -12,8 +12,6 @@
 #include <system_error>
 #include <utility>
 
-#include "drivers/transport/host_lookup.hpp"
-
 namespace perimap {
 namespace {
 
@@ -86,10 +84,8 @@ int finish_connecting(int socket, Duration longest, const Interrupt& interrupt) 
 
 }  // namespace
 
-Expected<std::unique_ptr<ByteStream>> connect_tcp(const std::string& host, std::uint16_t port, Duration longest,
-                                                  const Interrupt& interrupt) {
-  const std::string name = fmt::format("{}:{}", host, port);
-  const auto addresses = look_up_host(host, port, longest, interrupt);
+Expected<std::unique_ptr<ByteStream>> connect_tcp(HostLookup& host, Duration longest, const Interrupt& interrupt) {
+  const auto addresses = host.addresses(longest, interrupt);
   if (!addresses) return tl::unexpected(addresses.error());
   int error = EHOSTUNREACH;
   for (const addrinfo* address = addresses->get(); address != nullptr; address = address->ai_next) {
@@ -101,10 +97,10 @@ Expected<std::unique_ptr<ByteStream>> connect_tcp(const std::string& host, std::
     prepare(socket.get());
     error = ::connect(socket.get(), address->ai_addr, address->ai_addrlen) == 0 ? 0 : errno;
     if (error == EINPROGRESS) error = finish_connecting(socket.get(), longest, interrupt);
-    if (error == 0) return std::make_unique<TcpStream>(std::move(socket), name);
+    if (error == 0) return std::make_unique<TcpStream>(std::move(socket), host.name());
     if (error == ECANCELED) break;
   }
-  return fail(fmt::format("{}: {}", name, reason(error, longest)));
+  return fail(fmt::format("{}: {}", host.name(), reason(error, longest)));
 }
 
 Expected<TcpListener> TcpListener::open(std::uint16_t port) {

@@ -8,6 +8,7 @@
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
 #include "drivers/transport/byte_stream.hpp"
+#include "drivers/transport/host_lookup.hpp"
 #include "drivers/transport/interrupt.hpp"
 
 namespace perimap {
@@ -17,8 +18,8 @@ namespace perimap {
 //
 // Errors name host, port and reason: unknown host, no name server, refused (nothing listens there), unreachable, no
 // answer.
-[[nodiscard]] Expected<std::unique_ptr<ByteStream>> connect_tcp(const std::string& host, std::uint16_t port,
-                                                                Duration longest, const Interrupt& interrupt);
+[[nodiscard]] Expected<std::unique_ptr<ByteStream>> connect_tcp(HostLookup& host, Duration longest,
+                                                                const Interrupt& interrupt);
 
 class TcpListener {
  public:

@@ -128,7 +128,8 @@ TEST(Tcp, ConnectsAndNoticesThatThePeerHasGone) {
   const Interrupt interrupt;
   auto listener = TcpListener::open(0);
   ASSERT_TRUE(listener) << listener.error().message;
-  auto client = connect_tcp("127.0.0.1", listener->port(), seconds(2), interrupt);
+  HostLookup host("127.0.0.1", listener->port());
+  auto client = connect_tcp(host, seconds(2), interrupt);
   ASSERT_TRUE(client) << client.error().message;
   auto server = listener->accept();
   ASSERT_TRUE(server && *server);
@@ -149,8 +150,10 @@ TEST(Tcp, SaysWhyItCannotConnect) {
     ASSERT_TRUE(listener);
     free_port = listener->port();
   }
-  EXPECT_THAT(error_of(connect_tcp("127.0.0.1", free_port, seconds(2), interrupt)), HasSubstr("refused"));
-  EXPECT_THAT(error_of(connect_tcp("no-such-host.invalid", 80, seconds(2), interrupt)), HasSubstr("unknown host"));
+  HostLookup here("127.0.0.1", free_port);
+  EXPECT_THAT(error_of(connect_tcp(here, seconds(2), interrupt)), HasSubstr("refused"));
+  HostLookup nowhere("no-such-host.invalid", 80);
+  EXPECT_THAT(error_of(connect_tcp(nowhere, seconds(2), interrupt)), HasSubstr("unknown host"));
 }
 
 // A name server that never answers, as one behind a cut cable.
@@ -169,30 +172,66 @@ struct DeafNameServer {
 
 TEST(HostLookup, ANameServerThatDoesNotAnswerHoldsUpNeitherStopNorStart) {
   const auto server = std::make_shared<DeafNameServer>();
-  const HostLookup lookup = [server](auto... arguments) { return (*server)(arguments...); };
-  const Interrupt none;
-  EXPECT_THAT(error_of(look_up_host("tracker.local", 8765, milliseconds(50), none, lookup)),
-              HasSubstr("no answer from the name server"));
-  Interrupt stop;
-  std::jthread stopping([&] {
-    while (server->asked < 2) std::this_thread::sleep_for(milliseconds(1));
-    stop.request();
-  });
-  EXPECT_THAT(error_of(look_up_host("tracker.local", 8765, seconds(3600), stop, lookup)), HasSubstr("interrupted"));
+  {
+    HostLookup lookup("tracker.local", 8765, [server](auto... arguments) { return (*server)(arguments...); });
+    const Interrupt none;
+    EXPECT_THAT(error_of(lookup.addresses(milliseconds(50), none)), HasSubstr("no answer from the name server"));
+    Interrupt stop;
+    std::jthread stopping([&] {
+      while (server->asked < 1) std::this_thread::sleep_for(milliseconds(1));
+      stop.request();
+    });
+    EXPECT_THAT(error_of(lookup.addresses(seconds(3600), stop)), HasSubstr("interrupted"));
+  }
   EXPECT_EQ(server->done, 0) << "the name server had answered";
   server->release.request();
-  while (server->done < 2) std::this_thread::sleep_for(milliseconds(1));
+  while (server->done < 1) std::this_thread::sleep_for(milliseconds(1));
+}
+
+TEST(HostLookup, IsOneAtATimeAndItsLateAnswerIsTaken) {
+  const auto server = std::make_shared<DeafNameServer>();
+  HostLookup lookup("tracker.local", 8765, [server](auto... arguments) { return (*server)(arguments...); });
+  const Interrupt none;
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_THAT(error_of(lookup.addresses(milliseconds(20), none)), HasSubstr("no answer from the name server"));
+  }
+  EXPECT_LE(server->asked, 1);
+  server->release.request();
+  EXPECT_THAT(error_of(lookup.addresses(seconds(60), none)), HasSubstr("unknown host"));
+  EXPECT_EQ(server->asked, 1);
+  // With that answer taken the next question is a new one.
+  EXPECT_THAT(error_of(lookup.addresses(seconds(60), none)), HasSubstr("unknown host"));
+  EXPECT_EQ(server->asked, 2);
+}
+
+// SCHED_BATCH, which anyone may have, stands for the priority that a driver's thread may have.
+TEST(HostLookup, RunsOnTheNormalSchedulerWhoeverAsks) {
+  std::atomic<int> policy{-1};
+  std::jthread([&policy] {
+    const sched_param none{};
+    ASSERT_EQ(pthread_setschedparam(pthread_self(), SCHED_BATCH, &none), 0);
+    HostLookup lookup("tracker.local", 8765, [&policy](auto...) {
+      sched_param parameters{};
+      int mine = -1;
+      (void)pthread_getschedparam(pthread_self(), &mine, &parameters);
+      policy = mine;
+      return EAI_FAIL;
+    });
+    EXPECT_THAT(error_of(lookup.addresses(seconds(60), Interrupt())), HasSubstr("unknown host"));
+  }).join();
+  EXPECT_EQ(policy, SCHED_OTHER);
 }
 
 TEST(HostLookup, AnAddressInDigitsNeedsNoNameServer) {
   const Interrupt none;
-  const HostLookup lookup = [](auto...) { return EAI_FAIL; };
+  const AddressSource source = [](auto...) { return EAI_FAIL; };
   for (const std::string host : {"127.0.0.1", "::1"}) {
-    const auto addresses = look_up_host(host, 8765, seconds(2), none, lookup);
+    const auto addresses = HostLookup(host, 8765, source).addresses(seconds(2), none);
     ASSERT_TRUE(addresses) << addresses.error().message;
     EXPECT_EQ((*addresses)->ai_socktype, SOCK_STREAM);
   }
-  EXPECT_THAT(error_of(look_up_host("tracker.local", 8765, seconds(2), none, lookup)), HasSubstr("unknown host"));
+  EXPECT_THAT(error_of(HostLookup("tracker.local", 8765, source).addresses(seconds(2), none)),
+              HasSubstr("unknown host"));
 }
 
 TEST(CanSocket, OpensOrSaysWhyNot) {
