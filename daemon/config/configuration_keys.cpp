@@ -378,7 +378,7 @@ void add_tracker(std::vector<ConfigurationKey>& keys) {
       .choice("protocol", protocols, PERIMAP_MEMBER(tracker.protocol), "what the tracker speaks")
       .optional_text("port", std::string(kPort), &is_endpoint, PERIMAP_MEMBER(tracker.port), "where the tracker is")
       .optional_text("sensor", tool, &is_tool_name, PERIMAP_MEMBER(tracker.sensor),
-                     "the sensor's port handle (ndi, hexadecimal) or name (igtl); none: the only one there is")
+                     "the sensor's port handle (ndi, hexadecimal) or name (igtl); none: the only one but the reference")
       .optional_text("reference", tool, &is_tool_name, PERIMAP_MEMBER(tracker.reference),
                      "the patient's reference tool, likewise; W is its frame; none: W is the tracker's")
       .file("sensor_definition", PERIMAP_MEMBER(tracker.sensor_definition),

@@ -6,6 +6,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <span>
 #include <utility>
 
 namespace perimap {
@@ -71,6 +72,12 @@ std::optional<std::vector<std::string>> handles_of(std::string_view reply) {
     handles.emplace_back(handle);
   }
   return handles;
+}
+
+std::string list_of(std::span<const std::uint16_t> handles) {
+  std::string list;
+  for (const std::uint16_t handle : handles) list += fmt::format("{}{:02X}", list.empty() ? "" : ", ", handle);
+  return list;
 }
 
 // From the reply's first byte to its last.
@@ -373,24 +380,41 @@ bool NdiSession::choose_tools(LinkControl& link) {
   const auto present = [this](std::uint16_t handle) {
     return std::find(enabled_.begin(), enabled_.end(), handle) != enabled_.end();
   };
-  std::string list;
-  for (const std::uint16_t handle : enabled_) list += fmt::format("{}{:02X}", list.empty() ? "" : ", ", handle);
-  if (settings_.sensor.definition.empty() && !settings_.sensor.handle) {
-    if (enabled_.size() != 1) {
-      link.fail(enabled_.empty() ? std::string("the tracker knows no tool: name a tool definition or plug one in")
-                                 : fmt::format("several tools ({}): say which one is the sensor", list));
-      return false;
-    }
-    sensor_handle_ = enabled_.front();
-  }
-  if (!present(sensor_handle_)) {
-    link.fail(fmt::format("no such tool: port handle {:02X}; there are: {}", sensor_handle_, list));
-    return false;
-  }
   if (settings_.reference && !present(reference_handle_)) {
-    link.fail(fmt::format("no such reference tool: port handle {:02X}; there are: {}", reference_handle_, list));
+    link.fail(
+        fmt::format("no such reference tool: port handle {:02X}; there are: {}", reference_handle_, list_of(enabled_)));
     return false;
   }
+  if (settings_.sensor.definition.empty() && !settings_.sensor.handle && !choose_unnamed_sensor(link)) return false;
+  if (!present(sensor_handle_)) {
+    link.fail(fmt::format("no such tool: port handle {:02X}; there are: {}", sensor_handle_, list_of(enabled_)));
+    return false;
+  }
+  return true;
+}
+
+// The one tool that is not the reference, and no other one when the link was lost meanwhile.
+bool NdiSession::choose_unnamed_sensor(LinkControl& link) {
+  std::vector<std::uint16_t> others = enabled_;
+  if (settings_.reference) std::erase(others, reference_handle_);
+  const std::string beside = settings_.reference ? " beside the reference" : "";
+  if (others.empty()) {
+    link.fail(fmt::format("the tracker knows no tool{}: name a tool definition or plug one in", beside));
+    return false;
+  }
+  if (others.size() > 1) {
+    link.fail(
+        fmt::format("several tools{} ({}): say by tracker.sensor which one is the sensor", beside, list_of(others)));
+    return false;
+  }
+  if (unnamed_sensor_ && *unnamed_sensor_ != others.front()) {
+    link.fail(
+        fmt::format("port handle {:02X} is there, and {:02X} was the sensor: plug that in, or say by "
+                    "tracker.sensor which one it is",
+                    others.front(), *unnamed_sensor_));
+    return false;
+  }
+  unnamed_sensor_ = sensor_handle_ = others.front();
   return true;
 }
 

@@ -28,8 +28,9 @@
 namespace perimap {
 
 struct NdiTool {
-  std::vector<std::byte> definition;    // a .rom file, uploaded; empty for a tool that describes itself
-  std::optional<std::uint16_t> handle;  // without a definition: which port handle; none: the only one there is
+  std::vector<std::byte> definition;  // a .rom file, uploaded; empty for a tool that describes itself
+  std::optional<std::uint16_t>
+      handle;  // without a definition: which port handle; none: the only one, but the reference
 };
 
 struct NdiSettings {
@@ -84,6 +85,7 @@ class NdiSession final : public DeviceProtocol {
   void next_port(LinkControl& link, Step search, Instant now);
   void next_upload(LinkControl& link, Instant now);
   bool choose_tools(LinkControl& link);
+  bool choose_unnamed_sensor(LinkControl& link);
   void ask(LinkControl& link, Instant now);
   void on_tracking(LinkControl& link, const Expected<NdiTracking>& tracking, Instant arrival);
   void deliver(const NdiToolReading& sensor, const ToolReading& reference, Instant arrival);
@@ -117,6 +119,7 @@ class NdiSession final : public DeviceProtocol {
   bool search_again_ = false;  // the last found some
   std::uint16_t sensor_handle_ = 0;
   std::uint16_t reference_handle_ = 0;
+  std::optional<std::uint16_t> unnamed_sensor_;  // as it was found at first
   Query query_ = Query::kBx2;
   bool answered_ = false;  // to this kind of query, at least once
   Instant asked_{};

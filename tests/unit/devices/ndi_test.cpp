@@ -442,6 +442,54 @@ TEST(NdiSession, UploadsToolDefinitionsAndMeasuresRelativeToTheReference) {
   EXPECT_LT((sample.X_WS.t - expected.t).norm(), 1e-3);
 }
 
+TEST(NdiSession, WithoutANameTheOneToolBesideTheReferenceIsTheSensor) {
+  for (const std::uint16_t reference : {std::uint16_t{0x0A}, std::uint16_t{0x0B}}) {
+    const Pose X_TR{so3_exp(Vector3d(0.3, -0.2, 0.1)), Vector3d(100, 0, -600)};
+    NdiSettings settings = wired();
+    settings.reference = NdiTool{{}, reference};
+    Theatre theatre(settings, {.wired_tools = 2, .reference = X_TR});
+    theatre.run(seconds(1));
+    ASSERT_EQ(theatre.host.failure, "");
+    ASSERT_FALSE(theatre.samples.empty());
+    const TrackerSample& sample = theatre.samples.back();
+    const Pose moving = swaying_at(sample.device_frame);
+    const Pose expected = reference == 0x0B ? X_TR.inverse() * moving : moving.inverse() * X_TR;
+    EXPECT_EQ(sample.state, ToolState::kOk);
+    EXPECT_LT((sample.X_WS.t - expected.t).norm(), 1e-3);
+  }
+}
+
+// What the session says against these tools; "" when it would track.
+std::string start_with(NdiSession& session, const std::string& handles_and_states) {
+  ScriptedLink link;
+  Instant now = kStart;
+  session.on_open(link, now);
+  while (link.failure.empty()) {
+    const std::string command = link.take_sent();
+    if (command.starts_with("TSTART")) return "";
+    if (command.empty()) {
+      now = session.next_time();
+      session.on_time(link, now);
+      continue;
+    }
+    const bool enabled = command.starts_with("PHSR:03");
+    const std::string reply = ndi_with_crc(enabled ? handles_and_states : command.starts_with("PHSR") ? "00" : "OKAY");
+    session.on_bytes(link, bytes_of(reply), now);
+  }
+  return link.failure;
+}
+
+TEST(NdiSession, WithoutANameAnotherToolDoesNotTakeTheSensorsPlace) {
+  DeviceHealth health;
+  NdiSettings settings = wired();
+  settings.reference = NdiTool{{}, 0x0B};
+  NdiSession session(
+      settings, [](const TrackerSample&) {}, health);
+  EXPECT_EQ(start_with(session, "020A0010B001"), "");
+  EXPECT_THAT(start_with(session, "020B0010C001"), HasSubstr("0C is there, and 0A was the sensor"));
+  EXPECT_EQ(start_with(session, "020A0010B001"), "") << "it is plugged in again";
+}
+
 TEST(NdiSession, WithoutAValidReferenceThereIsNoPose) {
   NdiSettings settings = wired();
   settings.sensor.handle = 0x0A;
@@ -598,7 +646,15 @@ TEST(NdiSession, SaysWhatIsWrongWithTheTools) {
   EXPECT_THAT(without.host.failure, HasSubstr("knows no tool"));
   Theatre several(none, {.wired_tools = 2});
   several.run(seconds(10));
-  EXPECT_THAT(several.host.failure, HasSubstr("several tools (0A, 0B)"));
+  EXPECT_THAT(several.host.failure, HasSubstr("several tools (0A, 0B): say by tracker.sensor which"));
+  NdiSettings referenced = wired();
+  referenced.reference = NdiTool{{}, 0x0A};
+  Theatre alone(referenced, {.wired_tools = 1});
+  alone.run(seconds(10));
+  EXPECT_THAT(alone.host.failure, HasSubstr("knows no tool beside the reference"));
+  Theatre three(referenced, {.wired_tools = 3});
+  three.run(seconds(10));
+  EXPECT_THAT(three.host.failure, HasSubstr("several tools beside the reference (0B, 0C)"));
   NdiSettings other = wired();
   other.sensor.handle = 0x0C;
   Theatre wrong(other, {.wired_tools = 2});
