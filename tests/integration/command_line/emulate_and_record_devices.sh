@@ -1,9 +1,9 @@
 #!/bin/bash
 # perimap emulate refuses what a device cannot do, and has a patient's reference where it is told; perimap record takes any
 # device, be it a trigger line alone.
-# emulate_and_record_devices.sh PERIMAP WORK_FOLDER
+# emulate_and_record_devices.sh PERIMAP RECORDED_POSES WORK_FOLDER
 set -uo pipefail
-perimap=$1 work=$2
+perimap=$1 recorded_poses=$2 work=$3
 port=$((20000 + $$ % 20000))
 rm -rf "$work"
 mkdir -p "$work"
@@ -31,7 +31,7 @@ for option in --bad-check --garbled; do
 done
 refused "--ndi-reference: expected a rotation" ndi=tcp:127.0.0.1:$port --ndi-reference 0 0 -500 1 1 0 0
 
-"$perimap" emulate ndi=tcp:127.0.0.1:$port --ndi-reference 10 0 -520 1 0 0 0 > "$work/emulator" 2>&1 &
+"$perimap" emulate ndi=tcp:127.0.0.1:$port --ndi-reference 10 0 -520 0.70711 0 0 0.70711 > "$work/emulator" 2>&1 &
 emulator=$!
 for _ in $(seq 100); do
   grep -q ' at ' "$work/emulator" && break
@@ -43,11 +43,17 @@ version = 1
 protocol = "ndi"
 port = "tcp:127.0.0.1:$port"
 frame_rate_hz = 60
-sensor = "0A"
 reference = "0B"
 TOML
 "$perimap" record -c "$work/reference.toml" "$work/reference.mcap" --seconds 2 > "$work/record" 2>&1 ||
   fail "a tracker alone: $(cat "$work/record")"
+# The emulated scope goes round (0, 0, -500) of the tracker, 20 mm off; from the reference, which is turned by 90 degrees
+# about the tracker's z axis, that is a circle about (0, 10, 20).
+"$recorded_poses" "$work/reference.mcap" > "$work/poses" || fail "its poses cannot be read"
+awk '
+  { off = sqrt(($3 - 20) ^ 2 + (sqrt($1 ^ 2 + ($2 - 10) ^ 2) - 20) ^ 2); if (off > most) most = off }
+  END { printf "%d poses, at most %.4f mm off their place\n", NR, most; exit !(NR >= 20 && most < 0.1) }
+' "$work/poses" || fail "the reference is elsewhere: $(head -n 3 "$work/poses")"
 "$perimap" probe "$work/reference.toml" --seconds 2 --json > "$work/probe.json" 2> "$work/error" ||
   fail "the reference is not seen: $(cat "$work/probe.json" "$work/error")"
 node - "$work/probe.json" << 'END' || fail "poses relative to the reference: $(cat "$work/probe.json")"
