@@ -8,9 +8,12 @@
 namespace perimap {
 
 // An ArrivalClock takes the nominal rate as right to half a percent; with a wrong one its stamps are wrong and nothing
-// shows it. So counts are held against their arrivals: off by more than 5 % over 3 s, twice in a row and in the same
-// direction, the rate is wrong, until it has been right for as long. One late arrival at the seam of the two, as from
-// a machine that stood still, makes one of them too slow and the other too fast.
+// shows it. So counts are held against their arrivals, over spans of a quarter second, off by more than 30 %, and of a
+// second, off by more than 5 %: either twice in a row and in the same direction, and the rate is wrong, until a second
+// is right. A count that jumps, or a machine that stood still, makes one span too fast or too slow and not two.
+//
+// A span goes from the earliest arrival, for its count, of one quarter second to that of another, since arrivals are
+// late by a varying amount and never early.
 class RateCheck {
  public:
   explicit RateCheck(double nominal_hz) noexcept : nominal_hz_(nominal_hz) {}
@@ -22,23 +25,40 @@ class RateCheck {
   void restart() noexcept { started_ = false; }
 
   [[nodiscard]] bool wrong() const noexcept { return wrong_; }
-  // Over the last 3 s that were measured; 0 before.
+  // Over the last second, or the quarter that told; 0 before.
   [[nodiscard]] double seen_hz() const noexcept { return seen_hz_; }
 
  private:
-  static constexpr Duration kWindow = std::chrono::seconds(3);
+  static constexpr Duration kQuarter = std::chrono::milliseconds(250);
   static constexpr Duration kLongestGap = std::chrono::milliseconds(500);
-  static constexpr double kTolerance = 0.05;
 
-  void begin(std::int64_t count, Instant arrival) noexcept;
+  struct Point {
+    std::int64_t count = 0;
+    Instant arrival;
+  };
+  struct Span {
+    int quarters;
+    double tolerance;
+    Point from = {};
+    int since = 0;   // quarters
+    int before = 0;  // of the span before: -1 too slow, 0 right or unknown, 1 too fast
+  };
+
+  void begin(const Point& first) noexcept;
+  void end_quarter() noexcept;
+  // Whether the span was the second in a row that is off, and the same way. Ends at `earliest_`.
+  [[nodiscard]] bool off_again(Span& span) noexcept;
+  // How much later for its count `b` is than `a`, s.
+  [[nodiscard]] double later_s(const Point& a, const Point& b) const noexcept;
 
   double nominal_hz_;
   bool started_ = false;
-  std::int64_t begin_count_ = 0;
-  Instant begin_;
-  std::int64_t last_count_ = 0;
-  Instant last_;
-  int before_ = 0;  // of the window before: -1 too slow, 0 right or unknown, 1 too fast
+  Point last_;
+  Instant quarter_begin_;
+  Point earliest_;    // of the quarter
+  bool any_ = false;  // a quarter has ended
+  Span short_{1, 0.3};
+  Span long_{4, 0.05};
   bool wrong_ = false;
   double seen_hz_ = 0.0;
 };
