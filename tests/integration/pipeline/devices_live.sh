@@ -78,7 +78,7 @@ fi
 
 # The recording begins seconds after both were opened: a device that has nothing to send yet is waited for.
 ! grep -Eq 'ECG: .*(not one|sends no) sample' "$work/log" || fail "the ECG was opened again: $(cat "$work/log")"
-mv "$work/log" "$work/log-devices"
+for told in log watch; do mv "$work/$told" "$work/$told-devices"; done
 
 printf 'version = 1\n[replay]\nrecording = "%s"\n[dds]\ndomain = %d\n' "$recording" $domain > "$work/replay.toml"
 run "$work/replay.toml" "$work/replay.mcap"
@@ -86,7 +86,7 @@ for way in devices replay; do
   "$perimap" report "$recording" --samples "$work/$way.mcap" --json "$work/$way.json" > "$work/report-$way" 2>&1 ||
     fail "report ended with $?: $(cat "$work/report-$way")"
 done
-node - "$work/devices.json" "$work/replay.json" << 'END' || fail "worse than replay"
+node - "$work/devices.json" "$work/replay.json" << 'END' || fail "worse than replay: $(cat "$work/log-devices")"
 const [devices, replay] = process.argv.slice(2).map(f => JSON.parse(require("fs").readFileSync(f)).accuracy);
 let failed = false;
 const check = (ok, line) => {
