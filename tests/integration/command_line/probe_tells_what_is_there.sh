@@ -76,7 +76,7 @@ for (const device of ["camera", "tracker", "ecg", "r_trigger"]) assert.notEqual(
 END_OF_JS
 
 # A tracker that takes the connection and says nothing; a session gives it up later than this probe ends.
-node -e 'require("net").createServer(() => {}).listen(process.argv[1], "127.0.0.1")' $((port + 2)) &
+node -e 'require("net").createServer(s => s.on("error", () => {})).listen(process.argv[1], "127.0.0.1")' $((port + 2)) &
 emulators="$emulators $!"
 for _ in $(seq 100); do
   (: < "/dev/tcp/127.0.0.1/$((port + 2))") 2> /dev/null && break
