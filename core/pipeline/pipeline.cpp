@@ -96,14 +96,17 @@ void Pipeline::leave_out_missed(Instant now) noexcept {
   }
 }
 
-void Pipeline::take_back(const SurfaceSample& sample) noexcept {
+void Pipeline::sent(const SurfaceSample& sample) noexcept {
   const RealtimeScope realtime;
   StreamCounters& stream = counters_.of(sample.release.stream);
-  const auto one_less = [](Counter& counter) { counter.set(counter.get() - 1); };
-  one_less(stream.samples);
-  if (sample.release.frame_missing) one_less(stream.samples_without_frame);
-  if (sample.update_late) one_less(stream.samples_from_late_update);
-  stream.releases_missed.add();
+  stream.samples.add();
+  if (sample.release.frame_missing) stream.samples_without_frame.add();
+  if (sample.update_late) stream.samples_from_late_update.add();
+}
+
+void Pipeline::take_back(const SurfaceSample& sample) noexcept {
+  const RealtimeScope realtime;
+  counters_.of(sample.release.stream).releases_missed.add();
   composers_[index_of(sample.release.stream)].take_back();
 }
 
@@ -121,10 +124,6 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
       clock.front().as_of(release.deadline).corrected(phase_cells_.publisher_correction.front());
   const SurfaceSample& sample = composers_[index_of(release.stream)].compose(
       release, corrected, phase_cells_.publisher_respiration.front(), publisher_view_);
-  StreamCounters& stream = counters_.of(release.stream);
-  stream.samples.add();
-  if (sample.release.frame_missing) stream.samples_without_frame.add();
-  if (sample.update_late) stream.samples_from_late_update.add();
   const Release& due = plan_.last_due();
   counters_.last_release_capture_ns.set(static_cast<std::uint64_t>(to_ns(due.capture)));
   counters_.last_release_sequence.set(due.frame_sequence);

@@ -60,6 +60,8 @@ class Pipeline {
   void leave_out_missed(Instant now) noexcept;
   // Publisher thread: the surface of one release, with all that is known now. Valid until the next call for its stream.
   [[nodiscard]] const SurfaceSample& compose(const Release& release) noexcept;
+  // Publisher thread, after compose(): it was sent, and counts from now on.
+  void sent(const SurfaceSample& sample) noexcept;
   // Publisher thread: what was composed last for its stream is not sent, its time has passed. It counts as missed, and
   // its number is given again.
   void take_back(const SurfaceSample& sample) noexcept;

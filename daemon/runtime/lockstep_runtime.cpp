@@ -94,7 +94,9 @@ void LockstepRuntime::map_ready_frame() {
 void LockstepRuntime::release() {
   const Release release = pipeline_.plan().take();
   WireSurface& wire = wire_surfaces_[index_of(release.stream)];
-  publication_.surface(wire.fill(pipeline_.compose(release), utc_minus_monotonic_));
+  const SurfaceSample& surface = pipeline_.compose(release);
+  publication_.surface(wire.fill(surface, utc_minus_monotonic_));
+  pipeline_.sent(surface);
   if (now_ >= next_reports_) {
     publish_reports(now_);
     next_reports_ = now_ + kReportInterval;

@@ -1,0 +1,56 @@
+// What the pipeline counts and tells of its releases, without threads.
+#include "core/pipeline/pipeline.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr Duration kPeriod = milliseconds(30);
+
+PipelineSettings settings() {
+  PipelineSettings s;
+  s.camera.width = 64;
+  s.camera.height = 48;
+  s.camera.fx = s.camera.fy = 50.0;
+  s.features.maximum = 8;
+  s.latency = milliseconds(50);
+  return s;
+}
+
+// Frame i is captured at i * kPeriod and arrives 12 ms later.
+void let_in(Pipeline& pipeline, std::uint64_t frame) {
+  static const std::vector<std::uint8_t> pixels(64 * 48, 100);
+  const Instant capture = Instant(milliseconds(1000)) + static_cast<int>(frame) * kPeriod;
+  const FrameStamp stamp{frame, capture, capture + milliseconds(12)};
+  static_cast<void>(pipeline.entrance().push_frame(stamp, {pixels.data(), 64, 48, 64}));
+  pipeline.drain_stamps(stamp.arrival);
+}
+
+TEST(Pipeline, CountsASurfaceOnceItIsSentSoThatNoCountIsEverLowered) {
+  Pipeline pipeline(settings());
+  const StreamCounters& counters = pipeline.counters().of(ReleaseStream::kFrame);
+  for (std::uint64_t i = 0; i < 2; ++i) let_in(pipeline, i);
+  const SurfaceSample& unsent = pipeline.compose(pipeline.plan().take());
+  EXPECT_TRUE(unsent.update_late) << "nobody maps";
+  EXPECT_EQ(counters.samples.get(), 0U);
+  EXPECT_EQ(counters.samples_from_late_update.get(), 0U);
+  pipeline.take_back(unsent);
+  EXPECT_EQ(counters.samples.get(), 0U);
+  EXPECT_EQ(counters.releases_missed.get(), 1U);
+  pipeline.sent(pipeline.compose(pipeline.plan().take()));
+  EXPECT_EQ(counters.samples.get(), 1U);
+  EXPECT_EQ(counters.samples_from_late_update.get(), 1U);
+  EXPECT_EQ(counters.samples_without_frame.get(), 0U);
+  const SurfaceSample& without_frame = pipeline.compose(pipeline.plan().take());
+  ASSERT_TRUE(without_frame.release.frame_missing);
+  pipeline.sent(without_frame);
+  EXPECT_EQ(counters.samples_without_frame.get(), 1U);
+}
+
+}  // namespace
+}  // namespace perimap
