@@ -35,7 +35,6 @@ struct MapMemory {
   std::vector<EcgBlock> ecg;
   // Of the last release, from which the frame times go on.
   Instant last_capture;
-  std::uint64_t last_frame_sequence = 0;
   Duration frame_period{0};  // 0: no frame had come
 };
 

@@ -275,7 +275,6 @@ void Mapper::recall(const MapMemory& memory, Instant now) {
       ShardSnapshot& snapshot = cell->back();
       snapshot.any = true;
       snapshot.recalled = true;
-      snapshot.frame_sequence = memory.last_frame_sequence;
       snapshot.capture = memory.last_capture;
       snapshot.instants.fill(Instant{});
       snapshot.features.clear();

@@ -77,7 +77,7 @@ void Pipeline::forget_if_asked() noexcept {
 void Pipeline::recall(const MapMemory& memory, Instant now) {
   for (const EcgBlock& block : memory.ecg) entrance_.recall_ecg(block);
   mapper_.recall(memory, now);
-  plan_.resume(memory.last_capture, memory.last_frame_sequence, memory.frame_period, now);
+  plan_.resume(memory.last_capture, memory.frame_period, now);
 }
 
 void Pipeline::drain_stamps(Instant now) noexcept {
@@ -126,7 +126,6 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
       release, corrected, phase_cells_.publisher_respiration.front(), publisher_view_);
   const Release& due = plan_.last_due();
   counters_.last_release_capture_ns.set(static_cast<std::uint64_t>(to_ns(due.capture)));
-  counters_.last_release_sequence.set(due.frame_sequence);
   if (!due.frame_missing) counters_.last_owed_sequence.set(due.frame_sequence);
   counters_.frame_period_ns.set(static_cast<std::uint64_t>(plan_.frame_period().count()));
   return sample;

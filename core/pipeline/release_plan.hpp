@@ -33,8 +33,8 @@ class ReleasePlan {
   // As ReleaseSchedule::on_frame(). `now` may be long after the arrival, when the publisher was held up.
   bool on_frame(const FrameStamp& stamp, Instant now) noexcept;
   // As ReleaseSchedule::resume().
-  void resume(Instant last_capture, std::uint64_t last_sequence, Duration period, Instant now) noexcept {
-    frames_.resume(last_capture, last_sequence, period, now);
+  void resume(Instant last_capture, Duration period, Instant now) noexcept {
+    frames_.resume(last_capture, period, now);
   }
 
   // The next release; none before the first frame. While it is provisional, a frame that comes may change it.

@@ -62,13 +62,12 @@ bool ReleaseSchedule::on_frame(const FrameStamp& stamp) noexcept {
   return true;
 }
 
-void ReleaseSchedule::resume(Instant last_capture, std::uint64_t last_sequence, Duration period, Instant now) noexcept {
+void ReleaseSchedule::resume(Instant last_capture, Duration period, Instant now) noexcept {
   if (period <= Duration(0)) return;
   const auto passed = std::max<std::int64_t>(0, (now - latency_ - last_capture) / period);
   have_last_ = true;
   last_missing_ = true;
   last_capture_ = last_capture + passed * period;
-  last_sequence_ = last_sequence + static_cast<std::uint64_t>(passed);
   period_ = period;
 }
 
@@ -77,7 +76,7 @@ std::optional<Release> ReleaseSchedule::next() const noexcept {
     const Instant expected = last_capture_ + period_;
     // A pending frame stands for the expected one when it is within half a period of it; else one is missing before.
     if (!pending() || pending_[tail_ % kCapacity].capture > expected + period_ / 2) {
-      return Release{last_sequence_ + 1, expected, expected + latency_, true};
+      return Release{numbered_ ? last_sequence_ + 1 : 0, expected, expected + latency_, true};
     }
   }
   if (!pending()) return std::nullopt;
@@ -87,7 +86,10 @@ std::optional<Release> ReleaseSchedule::next() const noexcept {
 
 Release ReleaseSchedule::take() noexcept {
   const Release release = *next();
-  if (!release.frame_missing) ++tail_;
+  if (!release.frame_missing) {
+    ++tail_;
+    numbered_ = true;
+  }
   have_last_ = true;
   last_missing_ = release.frame_missing;
   last_capture_ = release.capture;

@@ -13,8 +13,8 @@ namespace perimap {
 
 // One surface that is due.
 struct Release {
-  std::uint64_t frame_sequence = 0;
-  Instant capture;             // of the frame, or where the fitted frame rate puts it
+  std::uint64_t frame_sequence = 0;  // 0 as well before the first frame of this run
+  Instant capture;                   // of the frame, or where the fitted frame rate puts it
   Instant deadline;            // capture + L; of the clock's stream an instant of its grid
   bool frame_missing = false;  // no frame has come for this release
   ReleaseStream stream = ReleaseStream::kFrame;
@@ -34,8 +34,9 @@ class ReleaseSchedule {
   // however late this is called.
   bool on_frame(const FrameStamp& stamp) noexcept;
 
-  // Before the first frame: releases go on as after a frame of then, on its frame times, the next one after `now`.
-  void resume(Instant last_capture, std::uint64_t last_sequence, Duration period, Instant now) noexcept;
+  // Before the first frame: releases go on as after a frame of then, on its frame times, the next one after `now`. They
+  // have no numbers: this run counts its own frames.
+  void resume(Instant last_capture, Duration period, Instant now) noexcept;
 
   // The next release; none before the first frame. With frame_missing it is provisional: a frame that arrives before
   // its deadline may replace it.
@@ -62,6 +63,7 @@ class ReleaseSchedule {
   std::uint64_t tail_ = 0;
   bool have_last_ = false;
   bool last_missing_ = false;  // the last release taken was of no frame
+  bool numbered_ = false;      // a release of a frame was taken
   Instant last_capture_;       // of the last release taken
   std::uint64_t last_sequence_ = 0;
   bool have_fit_ = false;

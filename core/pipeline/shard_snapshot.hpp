@@ -47,7 +47,7 @@ struct ShardSnapshot {
   std::array<Instant, kCovariances> instants{};
   std::array<FrameCamera, kCamerasKept> cameras{};
   bool any = false;                       // false until the first frame
-  bool recalled = false;                  // of an earlier run: older than any frame of this one, which counts its own
+  bool recalled = false;                  // of an earlier run: older than any frame of this one, without a number
   std::uint64_t frame_sequence = 0;       // of the frame whose update this is
   Instant capture;                        // of that frame
   CameraPlace camera;                     // at that capture

@@ -56,7 +56,7 @@ bool SurfaceComposer::rest_on(const Release& release, std::span<const ShardSnaps
   sample_.oldest_shard_frame_sequence = mapped ? oldest->frame_sequence : 0;
   const bool behind = !mapped || oldest->frame_sequence < release.frame_sequence;
   if (release.stream != ReleaseStream::kClock || oldest == nullptr || !oldest->any) return behind;
-  sample_.release.frame_sequence = oldest->frame_sequence;
+  sample_.release.frame_sequence = sample_.oldest_shard_frame_sequence;
   sample_.release.capture = oldest->capture;
   sample_.release.frame_missing = release.frame_missing && behind;
   sample_.camera = oldest->camera;

@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::string_view kMagic = "PERIMAPC";
 // 2: with breathing.
-constexpr std::uint32_t kFormat = 2;
+constexpr std::uint32_t kFormat = 3;
 constexpr std::size_t kHeader = 16;
 constexpr std::size_t kLongestText = 4096;
 constexpr std::uint32_t kMostFeatures = 4096;
@@ -270,7 +270,7 @@ std::string serialize(const Checkpoint& checkpoint, std::span<const std::string>
   body.add(set_up.camera).add(set_up.hand_eye).add(set_up.patient_frame).add(set_up.estimator);
   body.add(checkpoint.boot).add(checkpoint.saved).add(checkpoint.utc_ns);
   const MapMemory& memory = checkpoint.memory;
-  body.add(memory.last_capture).add(memory.last_frame_sequence).add(std::int64_t{memory.frame_period.count()});
+  body.add(memory.last_capture).add(std::int64_t{memory.frame_period.count()});
   body.add(static_cast<std::uint32_t>(memory.ecg.size()));
   for (const EcgBlock& block : memory.ecg) {
     body.add(block.first_sample_time).add(std::int64_t{block.sample_period.count()});
@@ -327,7 +327,6 @@ Expected<Checkpoint> parse_checkpoint_body(std::string_view body) {
   in.expect(checkpoint.utc_ns >= 0 && checkpoint.utc_ns <= std::int64_t{1} << 62, "when it was saved");
   MapMemory& memory = checkpoint.memory;
   memory.last_capture = in.instant("the last capture");
-  memory.last_frame_sequence = in.number<std::uint64_t>("the last frame's number");
   memory.frame_period = Duration(in.number<std::int64_t>("the frame period"));
   in.expect(memory.frame_period >= Duration(0) && memory.frame_period <= std::chrono::seconds(10), "a frame period");
   const std::uint32_t blocks = in.count(kMostBlocks, 21, "the number of ECG blocks");

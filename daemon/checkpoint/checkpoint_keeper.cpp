@@ -96,7 +96,6 @@ void CheckpointKeeper::write() {
   checkpoint.memory.respiration = respiration_;
   const PipelineCounters& counters = pipeline_.counters();
   checkpoint.memory.last_capture = from_ns(static_cast<std::int64_t>(counters.last_release_capture_ns.get()));
-  checkpoint.memory.last_frame_sequence = counters.last_release_sequence.get();
   checkpoint.memory.frame_period = Duration(static_cast<std::int64_t>(counters.frame_period_ns.get()));
   std::vector<std::string> features;
   features.reserve(features_.size());

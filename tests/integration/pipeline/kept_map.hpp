@@ -33,7 +33,6 @@ class KeptMap {
     memory.respiration = respiration_;
     memory.ecg = ecg_;
     memory.last_capture = from_ns(static_cast<std::int64_t>(counters.last_release_capture_ns.get()));
-    memory.last_frame_sequence = counters.last_release_sequence.get();
     memory.frame_period = Duration(static_cast<std::int64_t>(counters.frame_period_ns.get()));
     return memory;
   }

@@ -59,7 +59,6 @@ Checkpoint checkpoint_sample() {
   c.saved = from_ns(9'000'000'000);
   c.utc_ns = 1'700'000'000'000'000'000;
   c.memory.last_capture = from_ns(8'900'000'000);
-  c.memory.last_frame_sequence = 267;
   c.memory.frame_period = std::chrono::milliseconds(33);
   EcgBlock block;
   block.first_sample_time = from_ns(8'000'000'000);

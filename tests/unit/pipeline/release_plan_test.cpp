@@ -189,11 +189,25 @@ TEST(ReleasePlan, NoMoreReleasesThanAReaderKeepsFollowOneUponTheOther) {
 
 TEST(ReleasePlan, AfterARestartTheClockBeginsWithTheNextReleaseThatIsExpected) {
   ReleasePlan plan({kLatency, false, milliseconds(10)});
-  plan.resume(at_ms(0), 7, milliseconds(30), at_ms(105));
+  plan.resume(at_ms(0), milliseconds(30), at_ms(105));
   const auto next = plan.next();
   ASSERT_TRUE(next);
   EXPECT_EQ(next->deadline, at_ms(110)) << "30 ms after the release at 80";
   EXPECT_TRUE(plan.take().frame_missing);
+}
+
+TEST(ReleasePlan, AfterARestartNoReleaseHasANumberUntilAFrameHasOne) {
+  ReleasePlan plan({kLatency, true, milliseconds(10)});
+  plan.resume(at_ms(0), milliseconds(30), at_ms(105));
+  for (int i = 0; i < 8; ++i) EXPECT_EQ(plan.take().frame_sequence, 0U);
+  while (plan.next()->deadline < at_ms(190)) static_cast<void>(plan.take());
+  ASSERT_TRUE(plan.on_frame(frame(3, 180), at_ms(192)));
+  std::vector<std::uint64_t> of_frames;
+  while (of_frames.size() < 3) {
+    const Release release = plan.take();
+    if (release.stream == ReleaseStream::kFrame) of_frames.push_back(release.frame_sequence);
+  }
+  EXPECT_EQ(of_frames, (std::vector<std::uint64_t>{0, 3, 4})) << "that at 150, the frame, and one that is missing";
 }
 
 }  // namespace

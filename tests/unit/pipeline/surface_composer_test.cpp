@@ -333,6 +333,7 @@ TEST(SurfaceComposer, AnEarlierRunsMapIsALateUpdateHoweverItsFramesWereCounted) 
     EXPECT_EQ(sample.features[0].reason, FeatureReason::kNotObserved);
     if (stream == ReleaseStream::kClock) {
       EXPECT_EQ(sample.release.capture, at_ms(3000)) << "its age shows";
+      EXPECT_EQ(sample.release.frame_sequence, 0U) << "its number is none of this run";
     }
   }
 }
