@@ -94,6 +94,14 @@ void Pipeline::leave_out_missed(Instant now) noexcept {
   for (const ReleaseStream stream : kReleaseStreams) {
     if (missed[index_of(stream)] > 0) counters_.of(stream).releases_missed.add(missed[index_of(stream)]);
   }
+  plan_.let_come_due(now);
+  tell_due();
+}
+
+void Pipeline::tell_due() noexcept {
+  counters_.last_release_capture_ns.set(static_cast<std::uint64_t>(to_ns(plan_.last_due().capture)));
+  counters_.last_owed_sequence.set(plan_.last_owed());
+  counters_.frame_period_ns.set(static_cast<std::uint64_t>(plan_.frame_period().count()));
 }
 
 void Pipeline::sent(const SurfaceSample& sample) noexcept {
@@ -124,10 +132,7 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
       clock.front().as_of(release.deadline).corrected(phase_cells_.publisher_correction.front());
   const SurfaceSample& sample = composers_[index_of(release.stream)].compose(
       release, corrected, phase_cells_.publisher_respiration.front(), publisher_view_);
-  const Release& due = plan_.last_due();
-  counters_.last_release_capture_ns.set(static_cast<std::uint64_t>(to_ns(due.capture)));
-  if (!due.frame_missing) counters_.last_owed_sequence.set(due.frame_sequence);
-  counters_.frame_period_ns.set(static_cast<std::uint64_t>(plan_.frame_period().count()));
+  tell_due();
   return sample;
 }
 

@@ -56,7 +56,7 @@ class Pipeline {
 
   // Publisher thread: takes over the stamps of the frames that have arrived.
   void drain_stamps(Instant now) noexcept;
-  // Publisher thread: the plan's releases that it is too late for, counted.
+  // Publisher thread, each time round: the plan's releases that it is too late for, counted; and what is owed by now.
   void leave_out_missed(Instant now) noexcept;
   // Publisher thread: the surface of one release, with all that is known now. Valid until the next call for its stream.
   [[nodiscard]] const SurfaceSample& compose(const Release& release) noexcept;
@@ -76,6 +76,8 @@ class Pipeline {
   [[nodiscard]] SurfaceFooting model_footing(const RespiratoryClock& respiration, Instant now) const noexcept;
 
  private:
+  void tell_due() noexcept;
+
   PipelineSettings settings_;
   PipelineCounters counters_;
   std::vector<FeatureSlot> slots_;

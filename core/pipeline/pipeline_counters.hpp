@@ -89,7 +89,7 @@ struct PipelineCounters {
   // publisher thread
   Counter frames_too_late;
   Counter last_release_capture_ns;  // where the frame times go on after a restart
-  Counter last_owed_sequence;  // the newest frame that has come and whose update a surface was to rest on
+  Counter last_owed_sequence;       // the newest frame that has come and whose update a surface was to rest on
   Counter frame_period_ns;
   std::array<StreamCounters, kReleaseStreams.size()> streams;
 

@@ -1,5 +1,6 @@
 #include "core/pipeline/release_plan.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace perimap {
@@ -26,8 +27,7 @@ std::optional<Release> ReleasePlan::next() const noexcept {
 Release ReleasePlan::take() noexcept {
   Release release = *next();
   if (release.stream == ReleaseStream::kFrame) {
-    any_due_ = true;
-    due_ = frames_.take();
+    take_frame();
     return due_;
   }
   let_frames_come_due(release.deadline);
@@ -54,9 +54,21 @@ bool ReleasePlan::missed(const std::optional<Release>& frame, Instant now) const
 }
 
 void ReleasePlan::leave_out_frame() noexcept {
+  take_frame();
+  ++missed_[index_of(ReleaseStream::kFrame)];
+}
+
+void ReleasePlan::take_frame() noexcept {
   any_due_ = true;
   due_ = frames_.take();
-  ++missed_[index_of(ReleaseStream::kFrame)];
+  if (!due_.frame_missing) owed_ = due_.frame_sequence;
+}
+
+void ReleasePlan::let_come_due(Instant now) noexcept {
+  if (settings_.frame_stream) return;
+  // Not what comes due after the clock's next release: of a publisher that was held up that one is still to be made.
+  const std::optional<Instant> grid = next_on_grid();
+  if (grid) let_frames_come_due(std::min(now, *grid));
 }
 
 std::optional<Instant> ReleasePlan::next_on_grid() const noexcept {
@@ -70,8 +82,7 @@ std::optional<Instant> ReleasePlan::next_on_grid() const noexcept {
 
 void ReleasePlan::let_frames_come_due(Instant until) noexcept {
   for (auto frame = frames_.next(); frame && frame->deadline <= until; frame = frames_.next()) {
-    any_due_ = true;
-    due_ = frames_.take();
+    take_frame();
   }
 }
 

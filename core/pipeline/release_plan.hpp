@@ -52,11 +52,16 @@ class ReleasePlan {
   // Leaves out what it is too late for: the clock's releases after which another one has come due as well; of the
   // frames' those that are stale, and the oldest of more than kMostTogether. Returns how many since the last call.
   MissedReleases leave_out_missed(Instant now) noexcept;
+  // Where the frames' releases are not published: lets those that have come due by `now` come due, so that last_due()
+  // and last_owed() are no older than this call, however slow the clock is.
+  void let_come_due(Instant now) noexcept;
 
   // Frames that have come are still to be released, or to be told of by the clock.
   [[nodiscard]] bool pending() const noexcept { return frames_.pending(); }
   // The frame's release that came due last; the capture is zero when there was none.
   [[nodiscard]] const Release& last_due() const noexcept { return due_; }
+  // The number of the newest frame among those, whether or not frames were missing since; 0 before the first.
+  [[nodiscard]] std::uint64_t last_owed() const noexcept { return owed_; }
   [[nodiscard]] Duration frame_period() const noexcept { return frames_.period(); }
 
   // Frames' releases that have come due meanwhile follow one upon the other: half of what readers keep.
@@ -65,6 +70,7 @@ class ReleasePlan {
  private:
   [[nodiscard]] bool missed(const std::optional<Release>& frame, Instant now) const noexcept;
   void leave_out_frame() noexcept;
+  void take_frame() noexcept;
   [[nodiscard]] std::optional<Instant> next_on_grid() const noexcept;
   void let_frames_come_due(Instant until) noexcept;
 
@@ -72,6 +78,7 @@ class ReleasePlan {
   ReleaseSchedule frames_;
   bool any_due_ = false;
   Release due_;
+  std::uint64_t owed_ = 0;
   bool grid_begun_ = false;
   Instant last_on_grid_;
   MissedReleases missed_{};  // not told yet

@@ -15,8 +15,8 @@ namespace perimap {
 struct Release {
   std::uint64_t frame_sequence = 0;  // 0 as well before the first frame of this run
   Instant capture;                   // of the frame, or where the fitted frame rate puts it
-  Instant deadline;            // capture + L; of the clock's stream an instant of its grid
-  bool frame_missing = false;  // no frame has come for this release
+  Instant deadline;                  // capture + L; of the clock's stream an instant of its grid
+  bool frame_missing = false;        // no frame has come for this release
   ReleaseStream stream = ReleaseStream::kFrame;
 };
 

@@ -25,8 +25,8 @@ struct ComposerSettings {
 // phase's deviation makes of the motion.
 //
 // A frame's surface belongs to that frame. One of the clock's belongs to the newest frame that all shards have mapped,
-// which may be newer than the one that is owed by then. Where that was mapped by an earlier run it keeps its capture, by
-// which its age is told, and has no number.
+// which may be newer than the one that is owed by then. Where that was mapped by an earlier run it keeps its capture,
+// by which its age is told, and has no number.
 class SurfaceComposer {
  public:
   explicit SurfaceComposer(const ComposerSettings& settings);

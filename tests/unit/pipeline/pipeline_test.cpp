@@ -52,5 +52,27 @@ TEST(Pipeline, CountsASurfaceOnceItIsSentSoThatNoCountIsEverLowered) {
   EXPECT_EQ(counters.samples_without_frame.get(), 1U);
 }
 
+// The surface model is judged by it: see Pipeline::model_footing().
+TEST(Pipeline, WhatIsOwedByNowDoesNotWaitForTheClocksNextRelease) {
+  PipelineSettings s = settings();
+  s.frame_stream = false;
+  s.clock_period = std::chrono::seconds(1);
+  Pipeline pipeline(s);
+  const auto owed_at = [&](Instant now) {
+    pipeline.leave_out_missed(now);
+    return pipeline.counters().last_owed_sequence.get();
+  };
+  const Instant first(milliseconds(1000));
+  for (std::uint64_t i = 0; i < 10; ++i) let_in(pipeline, i);
+  EXPECT_EQ(owed_at(first + 9 * kPeriod + milliseconds(49)), 8U);
+  EXPECT_EQ(owed_at(first + 9 * kPeriod + milliseconds(50)), 9U);
+  EXPECT_EQ(owed_at(first + 30 * kPeriod), 9U) << "those that have not come are owed by nobody";
+  // Of a publisher that was held up: the release at 2 s tells what was due by then.
+  EXPECT_EQ(owed_at(first + milliseconds(1500)), 9U);
+  const Release release = pipeline.plan().take();
+  EXPECT_EQ(release.deadline, Instant(milliseconds(2000)));
+  EXPECT_EQ(release.capture, first + 31 * kPeriod);
+}
+
 }  // namespace
 }  // namespace perimap
