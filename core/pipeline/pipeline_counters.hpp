@@ -25,7 +25,7 @@ struct StreamCounters {
 struct PipelineCounters {
   // camera thread
   Counter frames_received;
-  Counter frames_dropped;  // gaps in the device's sequence, no free buffer, full ring
+  Counter frames_dropped;  // gaps in the device's sequence, no free buffer, full ring of pixels or of stamps
   LatencyHistogram camera_delay;
   Counter last_frame_ns;
   // tracker thread

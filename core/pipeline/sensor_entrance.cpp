@@ -41,19 +41,23 @@ bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image)
   any_frame_ = true;
   last_sequence_ = stamp.sequence;
   // The release is owed even when the pixels find no place, so the stamps go first.
-  if (publisher_stamps_.push(stamp)) publisher_wakeup_.post();
+  const bool told = publisher_stamps_.push(stamp);
+  if (told) publisher_wakeup_.post();
+  const bool stored = store(stamp, image);
+  // One whose stamps find no place is mapped, but released as if it had not come.
+  if (!told || !stored) counters_.frames_dropped.add();
+  return stored;
+}
+
+bool SensorEntrance::store(const FrameStamp& stamp, const GreyImage& image) noexcept {
   const int buffer = image.width == pool_.width() && image.height == pool_.height() ? pool_.acquire() : -1;
-  if (buffer < 0) {
-    counters_.frames_dropped.add();
-    return false;
-  }
+  if (buffer < 0) return false;
   const auto width = static_cast<std::size_t>(image.width);
   for (int y = 0; y < image.height; ++y) {
     std::memcpy(pool_.pixels(buffer) + static_cast<std::size_t>(y) * width, image.row(y), width);
   }
   if (!mapper_frames_.push({buffer, stamp})) {
     pool_.give_back(buffer);
-    counters_.frames_dropped.add();
     return false;
   }
   mapper_wakeup_.post();

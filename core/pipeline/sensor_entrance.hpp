@@ -28,7 +28,8 @@ class SensorEntrance {
   SensorEntrance(int width, int height, const EcgIntakeSettings& ecg, const BreathDetectorSettings& breath,
                  PipelineCounters& counters);
 
-  // Copies the pixels. False when the frame was dropped: no free buffer, or another size than the pipeline's.
+  // Copies the pixels. False when the mapper does not get the frame: no free buffer, or another size than the
+  // pipeline's.
   bool push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept;
   void push_pose(const TrackerSample& sample) noexcept;
   void push_ecg(const EcgBlock& block) noexcept { ecg_.push(block); }
@@ -63,6 +64,7 @@ class SensorEntrance {
   [[nodiscard]] ClockCells& clocks() noexcept { return clocks_; }
 
  private:
+  [[nodiscard]] bool store(const FrameStamp& stamp, const GreyImage& image) noexcept;
   void count(const RespirationBlock& block) noexcept;
 
   PipelineCounters& counters_;

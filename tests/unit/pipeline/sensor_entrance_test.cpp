@@ -45,6 +45,23 @@ TEST_F(Entrance, KeepsAMinutesStampsForAPublisherThatIsHeldUp) {
   }
 }
 
+TEST_F(Entrance, AFrameWhoseStampsFindNoPlaceIsMappedAndCountedOnce) {
+  std::uint64_t pushed = 0;
+  FrameHandle frame;
+  while (counters.frames_dropped.get() < 3 && pushed < 100'000) {
+    ASSERT_TRUE(entrance->push_frame(stamp(pushed++), image));
+    ASSERT_TRUE(entrance->pop_frame(frame));
+    entrance->give_back(frame);
+  }
+  // Neither finds a place.
+  while (entrance->push_frame(stamp(pushed++), image)) {
+  }
+  std::uint64_t told = 0;
+  FrameStamp announced;
+  while (entrance->pop_stamp(announced)) ++told;
+  EXPECT_EQ(told + counters.frames_dropped.get(), pushed);
+}
+
 TEST_F(Entrance, DropsAndCountsWhenTheMapperGivesNoBufferBackButStillAnnouncesTheFrame) {
   int taken = 0;
   for (std::uint64_t i = 0; i < 20; ++i) taken += entrance->push_frame(stamp(i), image) ? 1 : 0;
