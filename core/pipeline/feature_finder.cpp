@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "core/realtime/realtime_scope.hpp"
 
@@ -64,7 +65,8 @@ std::span<const FoundFeature> FeatureFinder::adopt(std::uint64_t frame_index) no
   }
   active_ = false;
   // Late, the features have moved on and nobody followed them: the round is lost, the next one begins.
-  return due ? std::span<const FoundFeature>(found_) : std::span<const FoundFeature>();
+  const bool wanted = due && !std::exchange(discarded_, false);
+  return wanted ? std::span<const FoundFeature>(found_) : std::span<const FoundFeature>();
 }
 
 void FeatureFinder::serve() noexcept {

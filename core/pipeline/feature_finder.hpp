@@ -49,6 +49,9 @@ class FeatureFinder {
   // A result that is not there in time is lost and counted; in lockstep it is waited for.
   [[nodiscard]] std::span<const FoundFeature> adopt(std::uint64_t frame_index) noexcept;
 
+  // Mapper: what the running round finds is not to be adopted. The next one is as ever.
+  void discard_round() noexcept { discarded_ = active_; }
+
   // Until dismiss().
   void serve() noexcept;
   void dismiss() noexcept;
@@ -74,6 +77,7 @@ class FeatureFinder {
 
   // The mapper's own.
   bool active_ = false;
+  bool discarded_ = false;  // the round that is active
   std::uint64_t begun_at_ = 0;
 
   // Filled by the mapper before the step's number goes into the ring, read by housekeeping after it comes out.

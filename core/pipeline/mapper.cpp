@@ -235,6 +235,7 @@ void Mapper::forget() noexcept {
   breath_begun_ = false;
   cycle_ = CyclePosterior(settings_.image_alone);
   law_ = LawChoice();
+  finder_.discard_round();
   publish_nothing();
   counters_.maps_forgotten.add();
 }

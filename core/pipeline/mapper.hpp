@@ -57,8 +57,8 @@ class Mapper {
   // is done on return.
   void learn() noexcept;
 
-  // Forgets every feature, the breathing, and what the images told of the running cycle and of the heart's law, and
-  // publishes that nothing of it is known, with no frame needed for it.
+  // Forgets every feature, those that are being found too, the breathing, and what the images told of the running cycle
+  // and of the heart's law, and publishes that nothing of it is known, with no frame needed for it.
   void forget() noexcept;
 
   // Before the first frame: takes the features of an earlier run, as many as there is room for and whose estimates are

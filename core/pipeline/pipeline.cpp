@@ -65,7 +65,7 @@ void Pipeline::map(const FrameHandle& frame) noexcept {
 }
 
 void Pipeline::ask_to_forget() noexcept {
-  entrance_.ask_to_forget_ecg();
+  entrance_.ask_to_forget();
   forget_asked_.store(true, std::memory_order_relaxed);
   entrance_.mapper_wakeup().post();
 }

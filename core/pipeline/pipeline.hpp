@@ -43,8 +43,8 @@ class Pipeline {
   // Mapper thread: one frame through A, B and C, its buffer given back, then D begun.
   void map(const FrameHandle& frame) noexcept;
 
-  // Any thread: a new patient. The mapper forgets the map and the ECG thread the rhythm, each when it runs next;
-  // counters().maps_forgotten tells when the map is gone.
+  // Any thread: a new patient. The mapper forgets the map, the ECG thread the rhythm and the respiration thread the
+  // breaths, each when it runs next; counters().maps_forgotten tells when the map is gone.
   void ask_to_forget() noexcept;
   // Mapper thread, between frames.
   void forget_if_asked() noexcept;

@@ -23,6 +23,7 @@ SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& e
       publisher_stamps_(kStampRing),
       poses_(kPoseRing),
       ecg_(ecg, clocks_, counters),
+      breath_settings_(breath),
       breath_(breath) {}
 
 bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept {
@@ -95,6 +96,7 @@ void SensorEntrance::count(const RespirationBlock& block) noexcept {
 
 void SensorEntrance::push_respiration(const RespirationBlock& block) noexcept {
   const RealtimeScope realtime;
+  if (forget_breath_asked_.exchange(false, std::memory_order_relaxed)) breath_ = BreathDetector(breath_settings_);
   count(block);
   hear_breath(block, breath_);
   breath_cell_.write(breath_.signal());

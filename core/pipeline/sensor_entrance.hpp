@@ -1,6 +1,7 @@
 // Where sensor data enters the pipeline: the same for devices and for replay.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 
 #include "core/phase/breath_detector.hpp"
@@ -37,8 +38,11 @@ class SensorEntrance {
 
   void push_respiration(const RespirationBlock& block) noexcept;
 
-  // Any thread: the next block is of another patient.
-  void ask_to_forget_ecg() noexcept { ecg_.ask_to_forget(); }
+  // Any thread: the next block of the ECG, and the next of the respiration channel, is of another patient.
+  void ask_to_forget() noexcept {
+    ecg_.ask_to_forget();
+    forget_breath_asked_.store(true, std::memory_order_relaxed);
+  }
 
   // Before the first block: one of an earlier run.
   void recall_ecg(const EcgBlock& block) noexcept { ecg_.recall(block); }
@@ -76,7 +80,9 @@ class SensorEntrance {
   Wakeup publisher_wakeup_;
   ClockCells clocks_;
   EcgIntake ecg_;
+  BreathDetectorSettings breath_settings_;
   BreathDetector breath_;
+  std::atomic<bool> forget_breath_asked_{false};  // relaxed: a message by itself
   TripleBuffer<BreathSignal> breath_cell_;
   bool any_frame_ = false;
   std::uint64_t last_sequence_ = 0;

@@ -153,16 +153,35 @@ TEST_F(Entrance, PulsesOfATriggerLineReplaceTheDetector) {
   EXPECT_FALSE(entrance->clocks().mapper.update()) << "without a trigger configured pulses are only counted";
 }
 
-TEST_F(Entrance, ARespirationChannelsBreathsAreToldUntilItsSensorIsOff) {
+// Half a second of breaths of 4 s.
+RespirationBlock breathing_block(int k) {
   RespirationBlock block;
   block.sample_period = std::chrono::milliseconds(10);
   block.count = 50;
+  block.first_sample_time = from_ns(0) + k * 50 * block.sample_period;
+  for (std::size_t i = 0; i < block.count; ++i) {
+    const double t = to_seconds(block.first_sample_time.time_since_epoch()) + 0.01 * static_cast<double>(i);
+    block.values[i] = static_cast<float>(-std::cos(2.0 * 3.14159265 * t / 4.0));
+  }
+  return block;
+}
+
+TEST_F(Entrance, NothingIsLeftOfTheOldPatientsBreaths) {
+  for (int k = 0; k < 60; ++k) entrance->push_respiration(breathing_block(k));
+  const Instant now = breathing_block(60).first_sample_time;
+  ASSERT_TRUE(entrance->breath().known(now));
+  entrance->ask_to_forget();
+  entrance->push_respiration(breathing_block(60));
+  EXPECT_EQ(entrance->breath().onsets, 0U);
+  EXPECT_FALSE(entrance->breath().known(now));
+  for (int k = 61; k < 121; ++k) entrance->push_respiration(breathing_block(k));
+  EXPECT_TRUE(entrance->breath().known(breathing_block(121).first_sample_time)) << "the new one's are heard";
+}
+
+TEST_F(Entrance, ARespirationChannelsBreathsAreToldUntilItsSensorIsOff) {
+  RespirationBlock block;
   for (int k = 0; k < 60; ++k) {
-    block.first_sample_time = from_ns(0) + k * 50 * block.sample_period;
-    for (std::size_t i = 0; i < block.count; ++i) {
-      const double t = to_seconds(block.first_sample_time.time_since_epoch()) + 0.01 * static_cast<double>(i);
-      block.values[i] = static_cast<float>(-std::cos(2.0 * 3.14159265 * t / 4.0));
-    }
+    block = breathing_block(k);
     entrance->push_respiration(block);
   }
   const Instant now = block.first_sample_time + block.count * block.sample_period;
