@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::string_view kMagic = "PERIMAPC";
 // 2: with breathing.
-constexpr std::uint32_t kFormat = 3;
+constexpr std::uint32_t kFormat = 4;
 constexpr std::size_t kHeader = 16;
 constexpr std::size_t kLongestText = 4096;
 constexpr std::uint32_t kMostFeatures = 4096;
@@ -269,6 +269,7 @@ std::string serialize(const Checkpoint& checkpoint, std::span<const std::string>
   const SetUp& set_up = checkpoint.set_up;
   body.add(set_up.camera).add(set_up.hand_eye).add(set_up.patient_frame).add(set_up.estimator);
   body.add(checkpoint.boot).add(checkpoint.saved).add(checkpoint.utc_ns);
+  body.add(std::int64_t{checkpoint.suspended.count()});
   const MapMemory& memory = checkpoint.memory;
   body.add(memory.last_capture).add(std::int64_t{memory.frame_period.count()});
   body.add(static_cast<std::uint32_t>(memory.ecg.size()));
@@ -325,6 +326,10 @@ Expected<Checkpoint> parse_checkpoint_body(std::string_view body) {
   checkpoint.saved = in.instant("when it was saved");
   checkpoint.utc_ns = in.number<std::int64_t>("when it was saved");
   in.expect(checkpoint.utc_ns >= 0 && checkpoint.utc_ns <= std::int64_t{1} << 62, "when it was saved");
+  checkpoint.suspended = Duration(in.number<std::int64_t>("how long the machine had slept"));
+  constexpr Duration kLongestSleep = std::chrono::hours(24 * 365 * 10);
+  in.expect(checkpoint.suspended >= -kLongestSleep && checkpoint.suspended <= kLongestSleep,
+            "how long the machine had slept");
   MapMemory& memory = checkpoint.memory;
   memory.last_capture = in.instant("the last capture");
   memory.frame_period = Duration(in.number<std::int64_t>("the frame period"));

@@ -34,6 +34,7 @@ struct Checkpoint {
   std::string boot;         // /proc/sys/kernel/random/boot_id: monotonic instants mean nothing in another boot
   Instant saved;            // monotonic
   std::int64_t utc_ns = 0;  // the same instant
+  Duration suspended{0};    // of this boot until then: while the machine slept the monotonic clock stood still
   MapMemory memory;
 };
 

@@ -91,7 +91,7 @@ void CheckpointKeeper::take_ecg() {
 void CheckpointKeeper::write() {
   if (features_.empty()) return;
   const Now now = this_boot_now();
-  Checkpoint checkpoint{set_up_, now.boot, now.monotonic, now.utc_ns, {}};
+  Checkpoint checkpoint{set_up_, now.boot, now.monotonic, now.utc_ns, now.suspended, {}};
   checkpoint.memory.ecg.assign(ecg_.begin(), ecg_.end());
   checkpoint.memory.respiration = respiration_;
   const PipelineCounters& counters = pipeline_.counters();

@@ -12,6 +12,9 @@
 namespace perimap {
 namespace {
 
+// What may lie between the readings of two clocks, at either end. No machine sleeps for so short.
+constexpr Duration kReadApart = std::chrono::milliseconds(100);
+
 std::string pose_text(const double (&t)[3], const double (&q)[4]) {
   return fmt::format("{} {} {} mm, {} {} {} {}", t[0], t[1], t[2], q[0], q[1], q[2], q[3]);
 }
@@ -25,6 +28,10 @@ Now this_boot_now() {
   std::timespec utc{};
   clock_gettime(CLOCK_REALTIME, &utc);
   now.utc_ns = std::int64_t{utc.tv_sec} * 1'000'000'000 + utc.tv_nsec;
+  std::timespec with_sleep{};
+  clock_gettime(CLOCK_BOOTTIME, &with_sleep);
+  now.suspended =
+      std::chrono::seconds(with_sleep.tv_sec) + Duration(with_sleep.tv_nsec) - MonotonicClock::now().time_since_epoch();
   return now;
 }
 
@@ -58,14 +65,16 @@ Expected<MapMemory> usable_memory(Checkpoint checkpoint, const SetUp& set_up, co
   }
   if (then.estimator != set_up.estimator) return other("estimator", then.estimator, set_up.estimator);
   const bool same_boot = !now.boot.empty() && checkpoint.boot == now.boot;
-  const Duration age = same_boot ? now.monotonic - checkpoint.saved : Duration(now.utc_ns - checkpoint.utc_ns);
+  const Duration slept = now.suspended - checkpoint.suspended;
+  const Duration age = same_boot ? now.monotonic - checkpoint.saved + slept : Duration(now.utc_ns - checkpoint.utc_ns);
   if (age < Duration(0) || age > maximum_age) {
     return fail(fmt::format("it is {:.0f} s old; at most {:.0f} s are allowed (checkpoint.maximum_age_s)",
                             to_seconds(age), to_seconds(maximum_age)));
   }
-  if (!same_boot) {
-    // The monotonic clock began anew: what was observed then, was so long before now.
+  if (!same_boot || std::chrono::abs(slept) > kReadApart) {
+    // The monotonic clock began anew, or stood still: what was observed then, was so long before now.
     const Duration shift = now.monotonic - age - checkpoint.saved;
+    checkpoint.memory.last_capture += shift;
     for (FeatureMemory& feature : checkpoint.memory.features) {
       feature.first_observed += shift;
       feature.last_observed += shift;

@@ -16,13 +16,15 @@ struct Now {
   std::string boot;
   Instant monotonic;
   std::int64_t utc_ns = 0;
+  Duration suspended{0};  // as Checkpoint has it
 };
 [[nodiscard]] Now this_boot_now();
 
 [[nodiscard]] SetUp set_up_of(const Configuration& configuration, const PipelineSettings& pipeline);
 
-// What may be used of it: everything in the same boot; in another the map without ECG, frame times and the breath's
-// phase. An error says why nothing may: another camera, hand-eye transform, patient's frame or estimator, or too old.
+// What may be used of it: everything in the same boot, unless the machine has slept since; else the map without ECG,
+// frame times and the breath's phase, its instants moved to where they are by this run's clock. An error says why
+// nothing may: another camera, hand-eye transform, patient's frame or estimator, or too old.
 [[nodiscard]] Expected<MapMemory> usable_memory(Checkpoint checkpoint, const SetUp& set_up, const Now& now,
                                                 Duration maximum_age);
 

@@ -29,7 +29,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   constexpr Duration kAge = std::chrono::seconds(3);
   const Instant later = checkpoint->saved + kAge;
   for (const std::string& boot : {checkpoint->boot, checkpoint->boot + "x"}) {
-    const Now now{boot, later, checkpoint->utc_ns + kAge.count()};
+    const Now now{boot, later, checkpoint->utc_ns + kAge.count(), checkpoint->suspended};
     const auto memory = usable_memory(*checkpoint, checkpoint->set_up, now, 2 * kAge);
     if (!memory) continue;
     RespirationSettings settings;

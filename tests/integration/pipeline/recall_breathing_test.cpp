@@ -51,7 +51,7 @@ struct Surfaces final : Publication {
 
 // Through a checkpoint's bytes.
 MapMemory kept_as_bytes(const MapMemory& memory, Instant saved) {
-  Checkpoint checkpoint{{}, "boot", saved, 0, memory};
+  Checkpoint checkpoint{{}, "boot", saved, 0, Duration(0), memory};
   std::vector<std::string> features;
   for (const FeatureMemory& feature : memory.features) features.push_back(serialize_feature(feature));
   const auto read = parse_checkpoint(serialize(checkpoint, features));

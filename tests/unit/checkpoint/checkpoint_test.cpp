@@ -36,6 +36,7 @@ TEST(CheckpointFile, IsReadBackAsItWasWritten) {
   EXPECT_EQ(read->boot, written.boot);
   EXPECT_EQ(read->saved, written.saved);
   EXPECT_EQ(read->utc_ns, written.utc_ns);
+  EXPECT_EQ(read->suspended, written.suspended);
   EXPECT_EQ(read->memory.last_capture, written.memory.last_capture);
   EXPECT_EQ(read->memory.frame_period, written.memory.frame_period);
   ASSERT_EQ(read->memory.ecg.size(), 2U);
@@ -97,7 +98,7 @@ TEST(CheckpointFile, AnotherFormatIsRefusedByName) {
   old[8] = 1;  // the least byte of the format
   const auto read = parse_checkpoint(old);
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().message, HasSubstr("expected format 3; it is of format 1"));
+  EXPECT_THAT(read.error().message, HasSubstr("expected format 4; it is of format 1"));
 }
 
 TEST(CheckpointFile, AChangedByteIsNoticed) {
@@ -187,8 +188,9 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& param) { return param.param.name; });
 
 TEST(WarmRestart, GoesOnFromTheSameSetUpInTheSameBoot) {
-  const auto memory = usable_memory(*parse_checkpoint(file_of(checkpoint_sample())), checkpoint_sample().set_up,
-                                    {"boot", from_ns(12'000'000'000), checkpoint_sample().utc_ns}, seconds(10));
+  const auto memory = usable_memory(
+      *parse_checkpoint(file_of(checkpoint_sample())), checkpoint_sample().set_up,
+      {"boot", from_ns(12'000'000'000), checkpoint_sample().utc_ns, checkpoint_sample().suspended}, seconds(10));
   ASSERT_TRUE(memory) << memory.error().message;
   EXPECT_EQ(memory->features.size(), 2U);
   EXPECT_EQ(memory->ecg.size(), 2U);
@@ -206,10 +208,32 @@ TEST(WarmRestart, InAnotherBootTheMapAloneCountsAndItsInstantsMove) {
   EXPECT_TRUE(memory->respiration.found);
   EXPECT_EQ(memory->respiration.clock.state, RespirationState::kSearching);
   EXPECT_EQ(memory->features[0].last_observed, now.monotonic - seconds(5) - since_observed);
+  EXPECT_EQ(memory->last_capture, now.monotonic - seconds(5) - (c.saved - c.memory.last_capture));
+}
+
+// The monotonic clock tells of two seconds, in which the heart has beaten for seven.
+TEST(WarmRestart, AfterTheMachineHasSleptTheMapAloneCountsAndItsInstantsMove) {
+  const Checkpoint c = *parse_checkpoint(file_of(checkpoint_sample()));
+  const Now now{"boot", c.saved + seconds(2), c.utc_ns, c.suspended + seconds(5)};
+  const auto memory = usable_memory(c, c.set_up, now, seconds(10));
+  ASSERT_TRUE(memory) << memory.error().message;
+  EXPECT_TRUE(memory->ecg.empty());
+  EXPECT_EQ(memory->frame_period, Duration(0));
+  EXPECT_EQ(memory->respiration.clock.state, RespirationState::kSearching);
+  EXPECT_EQ(memory->features[0].last_observed, c.memory.features[0].last_observed - seconds(5));
+  EXPECT_EQ(memory->last_capture, c.memory.last_capture - seconds(5));
+}
+
+TEST(WarmRestart, AsLongAsTheMachineSleptTheCheckpointAges) {
+  const Checkpoint c = checkpoint_sample();
+  const Now now{"boot", c.saved + seconds(2), c.utc_ns, c.suspended + seconds(9)};
+  const auto memory = usable_memory(c, c.set_up, now, seconds(10));
+  ASSERT_FALSE(memory);
+  EXPECT_THAT(memory.error().message, HasSubstr("11 s old"));
 }
 
 TEST(WarmRestart, AnotherSetUpIsRefusedWithTheReason) {
-  const Now now{"boot", from_ns(9'500'000'000), checkpoint_sample().utc_ns};
+  const Now now{"boot", from_ns(9'500'000'000), checkpoint_sample().utc_ns, checkpoint_sample().suspended};
   const auto reason = [&now](std::string perimap::SetUp::*part) {
     perimap::SetUp other = checkpoint_sample().set_up;
     other.*part = "different";
@@ -234,9 +258,11 @@ TEST(WarmRestart, InAnotherPrecisionTheSetUpIsTheSame) {
 TEST(WarmRestart, WhatIsTooOldOrOfTheFutureIsRefusedWithTheReason) {
   const perimap::SetUp set_up = checkpoint_sample().set_up;
   const std::int64_t utc_ns = checkpoint_sample().utc_ns;
-  for (const Now& now : {Now{"boot", from_ns(20'000'000'000), utc_ns}, Now{"boot", from_ns(1), utc_ns},
-                         Now{"another", from_ns(1), utc_ns + 11'000'000'000}, Now{"another", from_ns(1), utc_ns - 1},
-                         Now{"", from_ns(1), utc_ns + 11'000'000'000}}) {
+  const Duration suspended = checkpoint_sample().suspended;
+  for (const Now& now :
+       {Now{"boot", from_ns(20'000'000'000), utc_ns, suspended}, Now{"boot", from_ns(1), utc_ns, suspended},
+        Now{"another", from_ns(1), utc_ns + 11'000'000'000}, Now{"another", from_ns(1), utc_ns - 1},
+        Now{"", from_ns(1), utc_ns + 11'000'000'000}}) {
     const auto memory = usable_memory(checkpoint_sample(), set_up, now, seconds(10));
     ASSERT_FALSE(memory) << now.boot;
     EXPECT_THAT(memory.error().message, HasSubstr("s old"));

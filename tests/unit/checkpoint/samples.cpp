@@ -58,6 +58,7 @@ Checkpoint checkpoint_sample() {
   c.boot = "boot";
   c.saved = from_ns(9'000'000'000);
   c.utc_ns = 1'700'000'000'000'000'000;
+  c.suspended = std::chrono::minutes(3);
   c.memory.last_capture = from_ns(8'900'000'000);
   c.memory.frame_period = std::chrono::milliseconds(33);
   EcgBlock block;
