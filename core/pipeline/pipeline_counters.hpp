@@ -33,6 +33,7 @@ struct PipelineCounters {
   Counter poses_invalid;  // the device said so: tool missing, out of volume
   Counter poses_dropped;  // full ring
   LatencyHistogram tracker_delay;
+  LatencyHistogram tracker_interval;  // from one reading's stamp to the next one's
   Counter last_pose_ns;
   Counter last_good_pose_ns;
   // ECG thread

@@ -69,6 +69,9 @@ void SensorEntrance::push_pose(const TrackerSample& sample) noexcept {
   const RealtimeScope realtime;
   counters_.poses_received.add();
   counters_.tracker_delay.add(sample.arrival - sample.source_time);
+  if (any_pose_) counters_.tracker_interval.add(sample.source_time - last_pose_time_);
+  any_pose_ = true;
+  last_pose_time_ = sample.source_time;
   counters_.last_pose_ns.set(static_cast<std::uint64_t>(to_ns(sample.source_time)));
   if (sample.state == ToolState::kOk) {
     counters_.last_good_pose_ns.set(static_cast<std::uint64_t>(to_ns(sample.source_time)));

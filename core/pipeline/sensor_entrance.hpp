@@ -86,6 +86,8 @@ class SensorEntrance {
   TripleBuffer<BreathSignal> breath_cell_;
   bool any_frame_ = false;
   std::uint64_t last_sequence_ = 0;
+  bool any_pose_ = false;
+  Instant last_pose_time_;
   DeviceCount respiration_count_;
 };
 

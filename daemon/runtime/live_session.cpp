@@ -132,16 +132,17 @@ void LiveSession::warn_of_refused_privileges() {
   }
 }
 
-// L must leave room for what a frame takes to arrive and for the budget; otherwise every update would be late.
+// L must leave room for what a frame and its pose take to arrive and for the budget; otherwise every update would be
+// late, or without its pose.
 void LiveSession::warn_of_short_latency() {
   if (latency_checked_) return;
   const PipelineSettings& settings = pipeline_.settings();
   const LatencyCheck check = check_latency(settings, pipeline_.counters());
-  latency_checked_ = check.told;
+  latency_checked_ = check.told || check.too_short;
   if (!check.too_short) return;
-  spdlog::warn(
-      "latency {:.1f} ms is too short: frames arrive up to {:.1f} ms after capture and the budget is {:.1f} ms",
-      milliseconds(settings.latency), milliseconds(check.arrival), milliseconds(settings.budget));
+  spdlog::warn("latency {:.1f} ms is too short: {} up to {:.1f} ms after capture and the budget is {:.1f} ms",
+               milliseconds(settings.latency), check.by_pose ? "poses for it arrive" : "frames arrive",
+               milliseconds(check.arrival), milliseconds(settings.budget));
 }
 
 // How often and how far it goes on is in the status.

@@ -108,6 +108,18 @@ TEST_F(Entrance, CountsInvalidPosesAndKeepsThem) {
   EXPECT_EQ(popped.state, ToolState::kMissing);
 }
 
+TEST_F(Entrance, TellsHowFarApartTheTrackersReadingsAre) {
+  for (int i = 0; i < 10; ++i) {
+    TrackerSample sample;
+    sample.source_time = Instant(milliseconds(25 * i));
+    sample.arrival = sample.source_time + milliseconds(5);
+    entrance->push_pose(sample);
+  }
+  const LatencyHistogram::Summary apart = counters.tracker_interval.summary();
+  EXPECT_EQ(apart.count, 9U);
+  EXPECT_NEAR(to_seconds(apart.p50), 0.025, 0.002);
+}
+
 TEST_F(Entrance, CountsEcgSamplesThatTheDeviceLost) {
   EcgBlock block;
   block.sample_period = milliseconds(4);
