@@ -160,26 +160,9 @@ const std::optional<Error>& DeviceFeeder::error() const noexcept {
 
 std::vector<Error> DeviceFeeder::damage() const { return playback_ ? playback_->damage() : std::vector<Error>(); }
 
-void DeviceFeeder::tell(const char* name, const DeviceHealth& health, Told& told) {
-  const DeviceState state = health.state();
-  std::string reason = health.reason();
-  const bool same_state = state == told.state;
-  const bool same_reason = reason == told.reason;
-  if (same_state && same_reason) return;
-  told.state = state;
-  told.reason = reason;
-  if (same_state && state != DeviceState::kClosed) {
-    // What the device tells while it is open, such as a controller off its bus.
-    if (!reason.empty()) spdlog::warn("{}: {}", name, reason);
-  } else if (state == DeviceState::kStreaming) {
-    const std::string identity = health.identity();
-    spdlog::info("{}: streaming{}{}", name, identity.empty() ? "" : ": ", identity);
-  } else if (state == DeviceState::kClosed) {
-    spdlog::warn("{}: {}", name, reason.empty() ? "closed" : reason);
-  } else {
-    const bool news = !same_reason && !reason.empty();
-    spdlog::info("{}: {}{}", name, device_state_name(state), news ? ": " + reason : "");
-  }
+void DeviceFeeder::tell(const DeviceHealth& health, DeviceNews& news) {
+  const auto line = news.next(health.state(), health.reason(), health.identity(), MonotonicClock::now());
+  if (line) spdlog::log(line->warning ? spdlog::level::warn : spdlog::level::info, "{}", line->text);
 }
 
 void DeviceFeeder::describe(StatusFacts& facts) const {
@@ -226,10 +209,10 @@ Expected<std::string> DeviceFeeder::record(bool on) {
 }
 
 void DeviceFeeder::tick() {
-  if (devices_.camera && !playback_) tell("camera", camera_health_, camera_told_);
-  if (devices_.tracker) tell("tracker", tracker_health_, tracker_told_);
-  if (devices_.ecg) tell("ECG", ecg_health_, ecg_told_);
-  if (devices_.r_trigger) tell("R trigger", r_trigger_health_, r_trigger_told_);
+  if (devices_.camera && !playback_) tell(camera_health_, camera_news_);
+  if (devices_.tracker) tell(tracker_health_, tracker_news_);
+  if (devices_.ecg) tell(ecg_health_, ecg_news_);
+  if (devices_.r_trigger) tell(r_trigger_health_, r_trigger_news_);
   if (recording_.recorder) tell_recording();
 }
 

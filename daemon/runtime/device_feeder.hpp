@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/runtime/device_news.hpp"
 #include "daemon/runtime/device_setup.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
 #include "daemon/runtime/sensor_feeder.hpp"
@@ -47,8 +48,9 @@ struct DeviceRecording {
   std::function<Next()> next;
 };
 
-// Tells in the log whenever a device comes, goes, falls silent or has something to say of itself, and why, and when the
-// recording stops. Ends when the camera's playback or video ends.
+// Tells in the log whenever a device comes, goes, falls silent or has something to say of itself, and why (of one that
+// does all the time, now and then: DeviceNews), and when the recording stops. Ends when the camera's playback or video
+// ends.
 class DeviceFeeder final : public SensorFeeder {
  public:
   // `entrance`: none to record alone.
@@ -76,11 +78,7 @@ class DeviceFeeder final : public SensorFeeder {
  private:
   void run_camera(const CameraDevice& device);
   void tell_recording();
-  struct Told {
-    DeviceState state = DeviceState::kClosed;
-    std::string reason;
-  };
-  static void tell(const char* name, const DeviceHealth& health, Told& told);
+  static void tell(const DeviceHealth& health, DeviceNews& news);
 
   Devices devices_;
   DeviceRecording recording_;
@@ -90,10 +88,10 @@ class DeviceFeeder final : public SensorFeeder {
   DeviceHealth ecg_health_;
   DeviceHealth r_trigger_health_;
   DeviceHealth camera_health_;
-  Told tracker_told_;
-  Told ecg_told_;
-  Told r_trigger_told_;
-  Told camera_told_;
+  DeviceNews tracker_news_{"tracker"};
+  DeviceNews ecg_news_{"ECG"};
+  DeviceNews r_trigger_news_{"R trigger"};
+  DeviceNews camera_news_{"camera"};
   bool recording_ended_ = false;
   std::uint64_t recording_told_ = 0;  // the count of the file that was told of last
   bool recording_stop_told_ = false;
