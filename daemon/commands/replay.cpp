@@ -16,6 +16,7 @@
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/dds_publication.hpp"
 #include "daemon/publishing/publication_recorder.hpp"
+#include "daemon/publishing/status_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 #include "daemon/publishing/wire_reports.hpp"
 #include "daemon/report/accuracy.hpp"
@@ -133,33 +134,22 @@ std::string stage_table(const PipelineCounters& counters, const PipelineSettings
   return table;
 }
 
-nlohmann::json stream_counts(const StreamCounters& c) {
-  return {{"samples", c.samples.get()},
-          {"samples_without_frame", c.samples_without_frame.get()},
-          {"samples_from_late_update", c.samples_from_late_update.get()},
-          {"releases_missed", c.releases_missed.get()}};
+// What the status of `stream` counts.
+perimap_Status counted(const Identity& identity, ReleaseStream stream, const PipelineCounters& counters) {
+  perimap_Status status = WireStatus(identity.of(stream)).fill(counters, {}, Instant{});
+  status.sources = {};
+  status.stages = {};
+  return status;
 }
 
-nlohmann::json counts(const PipelineCounters& c) {
-  return {{"frames", c.frames.get()},
-          {"frames_dropped", c.frames_dropped.get()},
-          {"frames_too_late", c.frames_too_late.get()},
-          {"frames_without_pose", c.frames_without_pose.get()},
-          {"frames_without_phase", c.frames_without_phase.get()},
-          {"phases_from_image", c.phases_from_image.get()},
-          {"learning_put_off", c.learning_put_off.get()},
-          {"adoptions_late", c.adoptions_late.get()},
-          {"features_converged", c.features_converged.get()},
-          {"features_shed", c.features_shed.get()},
-          {"times_shed", c.times_shed.get()},
-          {"features_lost", c.features_lost()},
-          {"features_lost_unseen", c.features_lost_unseen.get()},
-          {"features_lost_refused", c.features_lost_refused.get()},
-          {"features_lost_unstarted", c.features_lost_unstarted.get()},
-          {"features_started_anew", c.features_started_anew.get()},
-          {"respiration_samples", c.respiration_samples.get()},
-          {"respiration_dropped", c.respiration_dropped.get()},
-          {"respiration_off", c.respiration_off.get()}};
+// Those, and what the status tells with each source.
+nlohmann::json counts(const perimap_Status& status, const PipelineCounters& c) {
+  nlohmann::json json = counts_json(status);
+  json["frames_dropped"] = c.frames_dropped.get();
+  json["respiration_samples"] = c.respiration_samples.get();
+  json["respiration_dropped"] = c.respiration_dropped.get();
+  json["respiration_off"] = c.respiration_off.get();
+  return json;
 }
 
 // A line, or nothing where there is nothing to say.
@@ -263,6 +253,7 @@ int replay(const Options& options) {
   }
 
   const PipelineCounters& counters = pipeline.counters();
+  const Identity& identity = setup->identity;
   fmt::print("{}{} frames, {} of them without pose\n", stopped ? "stopped early: " : "", counters.frames.get(),
              counters.frames_without_pose.get());
   for (const ReleaseStream stream : streams) {
@@ -276,7 +267,8 @@ int replay(const Options& options) {
   nlohmann::json accuracy;
   nlohmann::json told_of_streams;
   for (const ReleaseStream stream : streams) {
-    nlohmann::json& told = told_of_streams[std::string(name_of(stream))] = stream_counts(counters.of(stream));
+    nlohmann::json& told = told_of_streams[std::string(name_of(stream))] =
+        stream_counts_json(counted(identity, stream, counters));
     const auto report = publication.report(stream);
     if (!report) continue;
     if (streams.size() > 1) fmt::print("stream {}\n", name_of(stream));
@@ -290,9 +282,8 @@ int replay(const Options& options) {
     nlohmann::json json = {{"recording", options.recording},
                            {"lockstep", options.lockstep},
                            {"workers", setup->pipeline.workers},
-                           {"counts", counts(counters)},
+                           {"counts", counts(counted(identity, streams.front(), counters), counters)},
                            {"streams", told_of_streams}};
-    json["counts"].update(stream_counts(counters.of(streams.front())));
     if (!accuracy.is_null()) json["accuracy"] = accuracy;
     const RespiratoryClock breath = pipeline.status_respiration();
     json["breath_s"] = to_seconds(breath.period());

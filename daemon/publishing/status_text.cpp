@@ -50,35 +50,27 @@ Json stage_json(const perimap_StageLatency& stage) {
 
 }  // namespace
 
-Json status_json(const perimap_Status& status, std::span<const perimap_StageLatency> stages,
-                 std::span<const perimap_SourceStatus> sources) {
-  Json json = {{"version", status.version},
-               {"realtime_priority", name_of(status.realtime_priority)},
-               {"memory_locked", name_of(status.memory_locked)},
-               {"latency_ms", ms(status.latency_ns)},
-               {"latency_short", status.latency_short},
-               {"frames", status.frames},
+Json stream_counts_json(const perimap_Status& status) {
+  return {{"samples", status.samples},
+          {"samples_without_frame", status.samples_without_frame},
+          {"samples_from_late_update", status.samples_from_late_update},
+          {"releases_missed", status.releases_missed}};
+}
+
+Json counts_json(const perimap_Status& status) {
+  Json json = {{"frames", status.frames},
                {"frames_too_late", status.frames_too_late},
                {"frames_without_pose", status.frames_without_pose},
                {"frames_without_phase", status.frames_without_phase},
-               {"phases_from_image", status.phases_from_image},
-               {"phase", name_of(status.phase_state)},
-               {"rhythm", name_of(status.rhythm)},
-               {"respiration", name_of(status.respiration)},
-               {"respiration_suspected", status.respiration_suspected},
-               {"respiration_source", name_of(status.respiration_source)},
-               {"recording", name_of(status.recording)},
-               {"messages_recorded", status.messages_recorded},
-               {"frames_not_recorded", status.frames_not_recorded},
-               {"other_not_recorded", status.other_not_recorded},
-               {"samples", status.samples},
-               {"samples_without_frame", status.samples_without_frame},
-               {"samples_from_late_update", status.samples_from_late_update},
-               {"releases_missed", status.releases_missed},
-               {"learning_put_off", status.learning_put_off},
+               {"phases_from_image", status.phases_from_image}};
+  json.update(stream_counts_json(status));
+  json.update({{"learning_put_off", status.learning_put_off},
                {"adoptions_late", status.adoptions_late},
                {"features_tracked", status.features_tracked},
                {"features_starting", status.features_starting},
+               {"features_converging", status.features_converging},
+               {"features_converged", status.features_converged},
+               {"features_inconsistent", status.features_inconsistent},
                {"features_shed", status.features_shed},
                {"times_shed", status.times_shed},
                {"features_lost", status.features_lost},
@@ -92,7 +84,27 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
                {"start_matches_needed", status.start_matches_needed},
                {"start_matches_most", status.start_matches_most},
                {"start_matches_mean", status.start_matches_mean},
-               {"features_started_anew", status.features_started_anew}};
+               {"features_started_anew", status.features_started_anew}});
+  return json;
+}
+
+Json status_json(const perimap_Status& status, std::span<const perimap_StageLatency> stages,
+                 std::span<const perimap_SourceStatus> sources) {
+  Json json = {{"version", status.version},
+               {"realtime_priority", name_of(status.realtime_priority)},
+               {"memory_locked", name_of(status.memory_locked)},
+               {"latency_ms", ms(status.latency_ns)},
+               {"latency_short", status.latency_short},
+               {"phase", name_of(status.phase_state)},
+               {"rhythm", name_of(status.rhythm)},
+               {"respiration", name_of(status.respiration)},
+               {"respiration_suspected", status.respiration_suspected},
+               {"respiration_source", name_of(status.respiration_source)},
+               {"recording", name_of(status.recording)},
+               {"messages_recorded", status.messages_recorded},
+               {"frames_not_recorded", status.frames_not_recorded},
+               {"other_not_recorded", status.other_not_recorded}};
+  json.update(counts_json(status));
   Json by_stage = Json::object();
   for (const perimap_StageLatency& stage : stages) by_stage[std::string(name_of(stage.kind))] = stage_json(stage);
   json["recent_s"] = ms(status.recent_ns) * 1e-3;
@@ -102,19 +114,12 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
 }
 
 Json full_status_json(const perimap_Status& status) {
-  Json json = status_json(status, {status.stages._buffer, status.stages._length},
-                          {status.sources._buffer, status.sources._length});
-  json["features_converging"] = status.features_converging;
-  json["features_converged"] = status.features_converged;
-  json["features_inconsistent"] = status.features_inconsistent;
-  return json;
+  return status_json(status, {status.stages._buffer, status.stages._length},
+                     {status.sources._buffer, status.sources._length});
 }
 
 Json stream_status_json(const perimap_Status& status) {
-  Json json = {{"samples", status.samples},
-               {"samples_without_frame", status.samples_without_frame},
-               {"samples_from_late_update", status.samples_from_late_update},
-               {"releases_missed", status.releases_missed}};
+  Json json = stream_counts_json(status);
   for (const perimap_StageLatency& stage : std::span(status.stages._buffer, status.stages._length)) {
     if (stage.kind != perimap_STAGE_RELEASE_TARDINESS && stage.kind != perimap_STAGE_DDS_WRITE) continue;
     json["stages_ms"][std::string(name_of(stage.kind))] = stage_json(stage);

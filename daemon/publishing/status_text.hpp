@@ -9,6 +9,11 @@
 
 namespace perimap {
 
+// What was counted, of the releases those of its own stream; of the sources and the recording nothing.
+[[nodiscard]] nlohmann::ordered_json counts_json(const perimap_Status& status);
+// Of the releases alone.
+[[nodiscard]] nlohmann::ordered_json stream_counts_json(const perimap_Status& status);
+
 // Names are those of perimap.idl without their prefix, times in ms. Values may come from outside: none is trusted as an
 // index.
 [[nodiscard]] nlohmann::ordered_json status_json(const perimap_Status& status,

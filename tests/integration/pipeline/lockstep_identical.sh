@@ -1,5 +1,6 @@
 #!/bin/bash
-# Lockstep replay gives the same bytes with 1, 2 and 4 workers, twice each, and those bytes hold mapped features.
+# Lockstep replay gives the same bytes with 1, 2 and 4 workers, twice each, those bytes hold mapped features,
+# and the report has the counts that the status has.
 # lockstep_identical.sh PERIMAP RECORDING WORK_FOLDER MINIMUM_FEATURES [CONFIGURATION]
 # CONFIGURATION: what the file holds beside its version, as printf takes it.
 set -euo pipefail
@@ -24,3 +25,5 @@ done
 mapped=$(sed -n 's/.*"features_mapped": \([0-9]*\).*/\1/p' "$work/1a.json" | head -n 1)
 echo "identical; $mapped features mapped"
 [ "$mapped" -ge "$minimum" ]
+# What the status of a live run counts, the report does.
+grep -q '"starts_failed_outliers":' "$work/1a.json"

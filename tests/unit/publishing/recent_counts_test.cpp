@@ -153,6 +153,9 @@ TEST(WireStatusTest, TellsWhyFeaturesAreNotInTheMap) {
   EXPECT_EQ(json["start_matches_needed"], 60);
   EXPECT_EQ(json["start_matches_most"], 45);
   EXPECT_EQ(json["start_matches_mean"], 20);
+  const auto counts = counts_json(told);
+  for (const auto& [name, count] : counts.items()) EXPECT_EQ(json[name], count) << name;
+  EXPECT_TRUE(counts.contains("starts_failed_outliers"));
   EXPECT_NE(status_line(told).find("30 followed with 20 of the 60 matches"), std::string::npos);
   counters.features_converged.set(1);
   EXPECT_EQ(status_line(wire.fill(counters, {}, kStart)).find("followed"), std::string::npos);
