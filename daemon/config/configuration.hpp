@@ -168,7 +168,7 @@ struct DdsConfiguration {
   Duration surface_deadline = std::chrono::milliseconds(200);  // offered period of `surface`; 0: none
   Duration surface_lifespan = std::chrono::milliseconds(200);  // 0: none
   Duration surface_model_interval = std::chrono::milliseconds(500);
-  double maximum_MB_per_s = 50.0;  // of surfaces, 1e6 bytes
+  double maximum_MB_per_s = 50.0;  // of surfaces and surface models to one reader, 1e6 bytes
 
   bool operator==(const DdsConfiguration&) const = default;
 };

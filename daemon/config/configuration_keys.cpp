@@ -585,8 +585,10 @@ void add_running(std::vector<ConfigurationKey>& keys) {
                 "an undelivered surface is dropped after this; 0: never")
       .duration("surface_model_interval_ms", ms, 1, 60000, PERIMAP_MEMBER(dds.surface_model_interval),
                 "from one surface_model to the next")
-      .number("maximum_MB_per_s", 0.1, 10000, PERIMAP_MEMBER(dds.maximum_MB_per_s),
-              "of surfaces with features.maximum features; rates that come to more are refused");
+      .number(
+          "maximum_MB_per_s", 0.1, 10000, PERIMAP_MEMBER(dds.maximum_MB_per_s),
+          "of surfaces and surface models with features.maximum features, to one reader (or any number by multicast); "
+          "rates that come to more are refused");
   Section("recording", keys)
       .flag("record", PERIMAP_MEMBER(recording.record),
             "what the devices give is recorded as it came, to perimap-DATE-TIME.mcap")

@@ -309,8 +309,8 @@ class Overlay {
       fits = fmt::format("at most {:.6g}, or {}", rate_hz, fits);
     }
     const std::string got =
-        fmt::format("{:.6g} MB/s of surfaces with {} features, {:.6g} of them a second", traffic.MB_per_s(),
-                    configuration_.features.maximum, traffic.clock_rate_hz + traffic.frame_rate_hz);
+        fmt::format("{:.6g} MB/s of surfaces with {} features, {:.6g} of them a second, and their models",
+                    traffic.MB_per_s(), configuration_.features.maximum, traffic.clock_rate_hz + traffic.frame_rate_hz);
     const std::string_view key = clock ? "pipeline.clock_rate_hz" : "features.maximum";
     refuse(
         place_of(root, {key, "pipeline.release", "features.maximum", "camera.frame_rate_hz", "dds.maximum_MB_per_s"}),

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/config/surface_traffic.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/recording/channels.hpp"
 
@@ -178,6 +179,7 @@ RuntimeSettings runtime_settings(const Configuration& configuration, const Ident
   settings.identity = identity;
   settings.scheduling = {configuration.realtime.priority, configuration.realtime.cpus};
   settings.lock_memory = configuration.realtime.lock_memory;
+  settings.phase_interval = kModelsApart;  // a model is made with a phase, if at all
   settings.model_interval = configuration.dds.surface_model_interval;
   settings.status_interval = configuration.status.interval;
   return settings;

@@ -178,34 +178,43 @@ TEST(ConfigurationLoader, AMissingOrUnreadableConfigurationFileIsNamed) {
 TEST(ConfigurationLoader, WhatARefusalOfTooMuchTrafficSaysWouldFitIsAccepted) {
   const std::string all = "version = 1\n[pipeline]\nrelease = \"both\"\n";
   EXPECT_THAT(error_of(all + "clock_rate_hz = 1000\n[features]\nmaximum = 1000\n"),
-              HasSubstr("(at most 341.67, or features.maximum of at most 376)"));
-  EXPECT_TRUE(parse(all + "clock_rate_hz = 341.67\n[features]\nmaximum = 1000\n"));
-  EXPECT_TRUE(parse(all + "clock_rate_hz = 1000\n[features]\nmaximum = 376\n"));
-  EXPECT_FALSE(parse(all + "clock_rate_hz = 341.68\n[features]\nmaximum = 1000\n"));
-  EXPECT_FALSE(parse(all + "clock_rate_hz = 1000\n[features]\nmaximum = 377\n"));
-  EXPECT_TRUE(parse(all + "clock_rate_hz = 1000\n[features]\nmaximum = 1000\n[dds]\nmaximum_MB_per_s = 132\n"));
+              HasSubstr("(at most 303.42, or features.maximum of at most 363)"));
+  EXPECT_TRUE(parse(all + "clock_rate_hz = 303.42\n[features]\nmaximum = 1000\n"));
+  EXPECT_TRUE(parse(all + "clock_rate_hz = 1000\n[features]\nmaximum = 363\n"));
+  EXPECT_FALSE(parse(all + "clock_rate_hz = 303.43\n[features]\nmaximum = 1000\n"));
+  EXPECT_FALSE(parse(all + "clock_rate_hz = 1000\n[features]\nmaximum = 364\n"));
+  EXPECT_TRUE(parse(all + "clock_rate_hz = 1000\n[features]\nmaximum = 1000\n[dds]\nmaximum_MB_per_s = 137\n"));
 }
 
 TEST(ConfigurationLoader, AClockOfAnyRateFitsTheDefaults) {
   EXPECT_TRUE(parse("version = 1\n[pipeline]\nrelease = \"both\"\nclock_rate_hz = 1000\n"));
 }
 
-TEST(SurfaceTraffic, CountsTheStreamsThatArePublished) {
+TEST(SurfaceTraffic, CountsTheStreamsThatArePublishedAndTheModels) {
   Configuration configuration;
   configuration.features.maximum = 100;
   configuration.camera.frame_rate_hz = 25.0;
   configuration.pipeline.clock_rate_hz = 200.0;
+  configuration.estimation.harmonics = 8;
   const auto mega_bytes = static_cast<double>(kSurfaceBytes + 100 * kSurfaceFeatureBytes) * 1e-6;
-  EXPECT_NEAR(surface_traffic(configuration).MB_per_s(), 25.0 * mega_bytes, 1e-9);
+  // Ten models a second, of 3 x 17 coefficients a feature, and with breathing of 3 x 21.
+  const auto models = [](std::size_t coefficients) {
+    return 10.0 * static_cast<double>(kModelBytes + 100 * (kModelFeatureBytes + coefficients * 8)) * 1e-6;
+  };
+  EXPECT_NEAR(surface_traffic(configuration).MB_per_s(), 25.0 * mega_bytes + models(51), 1e-9);
   configuration.pipeline.release = PipelineConfiguration::Release::kClock;
-  EXPECT_NEAR(surface_traffic(configuration).MB_per_s(), 200.0 * mega_bytes, 1e-9);
+  EXPECT_NEAR(surface_traffic(configuration).MB_per_s(), 200.0 * mega_bytes + models(51), 1e-9);
   configuration.pipeline.release = PipelineConfiguration::Release::kBoth;
-  EXPECT_NEAR(surface_traffic(configuration).MB_per_s(), 225.0 * mega_bytes, 1e-9);
+  EXPECT_NEAR(surface_traffic(configuration).MB_per_s(), 225.0 * mega_bytes + models(51), 1e-9);
+  configuration.respiration.enabled = true;
+  EXPECT_NEAR(surface_traffic(configuration).MB_per_s(), 225.0 * mega_bytes + models(63), 1e-9);
+  configuration.respiration.enabled = false;
   const std::vector<std::string> lines = traffic_lines(configuration);
-  ASSERT_EQ(lines.size(), 3U);
+  ASSERT_EQ(lines.size(), 4U);
   EXPECT_THAT(lines[0], HasSubstr("stream \"frame\""));
   EXPECT_THAT(lines[1], HasSubstr("200 surfaces/s, at the multiples of 5000000 ns"));
-  EXPECT_THAT(lines[2], HasSubstr("together at most 2.9 of 50 MB/s"));
+  EXPECT_THAT(lines[2], HasSubstr("at most 0.513 MB/s"));
+  EXPECT_THAT(lines[3], HasSubstr("together at most 3.41 of 50 MB/s to one reader"));
 }
 
 TEST(ConfigurationLoader, OfSeveralErrorsTheFirstInTheFileIsTold) {
@@ -297,13 +306,13 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"MoreThanMayBePublished",
               "version = 1\n[pipeline]\nrelease = \"both\"\nclock_rate_hz = 1000\n[features]\nmaximum = 1000\n",
               "test.toml:4:17: key 'pipeline.clock_rate_hz': expected what dds.maximum_MB_per_s = 50 allows (at most "
-              "341.67, or features.maximum of at most 376), got 131.949 MB/s of surfaces with 1000 features, 1060 of "
-              "them a second"},
+              "303.42, or features.maximum of at most 363), got 136.71 MB/s of surfaces with 1000 features, 1060 of "
+              "them a second, and their models"},
         Wrong{"MoreFramesThanMayBePublished",
               "version = 1\n[camera]\nframe_rate_hz = 2000\n[features]\nmaximum = 1000\n",
               "test.toml:5:11: key 'features.maximum': expected what dds.maximum_MB_per_s = 50 allows "
               "(features.maximum of at "
-              "most 197), got 248.96 MB/s of surfaces with 1000 features, 2000 of them a second"},
+              "most 193), got 253.721 MB/s of surfaces with 1000 features, 2000 of them a second, and their models"},
         Wrong{
             "MoreFramesUnderwayThanAreKept",
             "version = 1\n[pipeline]\nlatency_ms = 1000\n[camera]\nframe_rate_hz = 300\n",

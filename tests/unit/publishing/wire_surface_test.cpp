@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "core/phase/cardiac_clock_tracker.hpp"
 #include "daemon/config/surface_traffic.hpp"
+#include "daemon/publishing/wire_reports.hpp"
 #include "drivers/recording/cdr.hpp"
 
 namespace perimap {
@@ -85,6 +87,34 @@ TEST(WireSurface, TakesNoMoreBytesThanItsTrafficIsReckonedWith) {
   sample.features.resize(kFeatures);
   EXPECT_LE(bytes(), kSurfaceBytes + kFeatures * kSurfaceFeatureBytes);
   EXPECT_GT(bytes() - without, kFeatures * (kSurfaceFeatureBytes - 8));
+}
+
+TEST(WireModel, TakesNoMoreBytesThanItsTrafficIsReckonedWith) {
+  constexpr std::size_t kFeatures = 200;
+  WireModel wire({std::string(63, 's'), ReleaseStream::kClock, std::string(63, 'f')});
+  CardiacClockTracker beats({});
+  for (int ms = 1000; ms <= 9000; ms += 400) {
+    const Instant peak{std::chrono::milliseconds(ms)};
+    beats.on_r_peak({peak, peak + std::chrono::milliseconds(60), 1.0, std::chrono::milliseconds(1)});
+  }
+  ShardSnapshot snapshot;
+  const ShardSnapshot* const view = &snapshot;
+  ModelMoment moment;
+  moment.snapshots = {&view, 1};
+  moment.clock = beats.clock();
+  moment.now = Instant{std::chrono::milliseconds(9100)};
+  moment.validity = std::chrono::seconds(10);
+  CdrSerializer serializer;
+  const auto bytes = [&] { return serializer.serialize(wire.fill(moment)).value().size(); };
+  const std::size_t without = bytes();
+  EXPECT_LE(without, kModelBytes);
+  EXPECT_GT(without, kModelBytes / 8);
+  snapshot.features.resize(kFeatures);
+  for (FeatureSnapshot& feature : snapshot.features) feature.x = StateVector::Zero(moment.layout.state_size());
+  const std::size_t feature =
+      kModelFeatureBytes + kModelCoefficientBytes * static_cast<std::size_t>(moment.layout.state_size());
+  EXPECT_LE(bytes(), kModelBytes + kFeatures * feature);
+  EXPECT_GT(bytes() - without, kFeatures * (feature - 16));
 }
 
 TEST(WireSurface, EachStreamHasItsOwnName) {
