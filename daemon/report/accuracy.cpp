@@ -147,6 +147,8 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
   std::set<std::uint32_t> off;
   std::vector<double> settled;
   double nees_sum = 0.0;
+  double good_squares = 0.0;
+  double good_nees_sum = 0.0;
   report.good.premature_beats = static_cast<std::size_t>(std::count_if(
       beats_.begin(), beats_.end(), [](const RPeak& beat) { return beat.beat_class == BeatClass::kPremature; }));
   for (const SampleRange& sample : samples_) {
@@ -181,6 +183,8 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
       feature_errors[feature.id].push_back(error);
       if (feature.converged && sample.state == perimap_SURFACE_GOOD) {
         ++report.good.count;
+        good_squares += error * error;
+        good_nees_sum += nees;
         double& largest = early ? report.good.largest_before_known_mm : report.good.largest_mm;
         largest = std::fmax(largest, error);
         if (error > kOff_mm) {
@@ -208,6 +212,11 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
       converged_at.begin(), converged_at.end(), [](const auto& c) { return c.second <= kSettledAfter_s; }));
   report.features_without_truth = without_truth.size();
   report.good.features_off = off.size();
+  if (report.good.count > 0) {
+    const auto count = static_cast<double>(report.good.count);
+    report.good.rms_mm = std::sqrt(good_squares / count);
+    report.good.mean_nees = good_nees_sum / count;
+  }
   report.settled = figures_of(settled);
   if (!settled.empty()) {
     report.mean_nees = nees_sum / static_cast<double>(settled.size());

@@ -56,6 +56,8 @@ struct GoodPositions {
   std::size_t features_off = 0;
   double largest_before_known_mm = kNoFigure;
   double largest_mm = kNoFigure;
+  double rms_mm = kNoFigure;     // of all
+  double mean_nees = kNoFigure;  // of all, as AccuracyReport::mean_nees
 };
 
 struct AccuracyReport {

@@ -11,6 +11,8 @@ namespace {
 // A figure of nothing is not zero.
 nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
+std::string plain(double value) { return std::isfinite(value) ? fmt::format("{:.2f}", value) : "none"; }
+
 std::string in_mm(double value) { return std::isfinite(value) ? fmt::format("{:.2f} mm", value) : "none"; }
 
 nlohmann::json to_json(const ErrorFigures& error) {
@@ -27,6 +29,7 @@ nlohmann::json to_json(const std::vector<ErrorSpan>& spans) {
     out.push_back({{"begin_s", span.begin_s},
                    {"end_s", span.end_s},
                    {"converged", span.converged},
+                   {"mean_nees", number(span.mean_nees)},
                    {"error", to_json(span.error)}});
   }
   return out;
@@ -47,14 +50,15 @@ std::string to_text(const AccuracyReport& report) {
       "consistency mean NEES/3 {:.2f} (1 is consistent, below is cautious)\n"
       "states      {} of {} surfaces degraded, {} invalid, from 15 s on\n"
       "good        {} of {} positions of state good off by more than 3 mm, largest {}, of {} features\n"
+      "            all of state good: RMS {}, mean NEES/3 {}\n"
       "            {} more, largest {}, before the ECG could tell of the premature beat that ended their cycle "
       "({} such beats)",
       report.features_published, report.features_converged, report.converged_by_15_s, report.converged_at_15_s,
       report.features_without_truth, report.settled.rms_mm, report.settled.median_mm, report.settled.p95_mm,
       report.settled.max_mm, 100.0 * report.share_above_3_mm, report.settled.count, report.mean_nees, report.degraded,
       report.settled_samples, report.invalid, report.good.off, report.good.count, in_mm(report.good.largest_mm),
-      report.good.features_off, report.good.off_before_known, in_mm(report.good.largest_before_known_mm),
-      report.good.premature_beats);
+      report.good.features_off, in_mm(report.good.rms_mm), plain(report.good.mean_nees), report.good.off_before_known,
+      in_mm(report.good.largest_before_known_mm), report.good.premature_beats);
 }
 
 nlohmann::json to_json(const AccuracyReport& report) {
@@ -75,6 +79,8 @@ nlohmann::json to_json(const AccuracyReport& report) {
           {"good_positions", report.good.count},
           {"good_positions_off", report.good.off},
           {"good_positions_off_before_known", report.good.off_before_known},
+          {"good_positions_rms_mm", number(report.good.rms_mm)},
+          {"good_positions_mean_nees", number(report.good.mean_nees)},
           {"premature_beats", report.good.premature_beats},
           {"seconds", to_json(report.seconds)},
           {"cycles", to_json(report.cycles)},
