@@ -870,8 +870,11 @@ double RPeakDetector::beat_threshold() const noexcept {
   return noise + kThreshold * (beat_energy_.median() - noise);
 }
 
+// Where every other beat is premature, of the first few intervals most may be the short ones.
 double RPeakDetector::rhythm_s() const noexcept {
-  return rr_s_.count() > 0 ? std::min(rr_s_.median(), kSlowestRhythm_s) : kRhythmAtStart_s;
+  if (rr_s_.count() == 0) return kRhythmAtStart_s;
+  const double usual_s = rr_s_.count() < kLevels ? std::max(rr_s_.median(), rr_s_.mean_of_last_two()) : rr_s_.median();
+  return std::min(usual_s, kSlowestRhythm_s);
 }
 
 }  // namespace perimap

@@ -30,6 +30,11 @@ class RecentValues {
     auto sorted = values_;
     return upper_median(sorted.begin(), sorted.begin() + count_);
   }
+  // Of the newest two, or the only one.
+  [[nodiscard]] double mean_of_last_two() const noexcept {
+    const double last = values_[static_cast<std::size_t>((next_ + N - 1) % N)];
+    return count_ < 2 ? last : 0.5 * (last + values_[static_cast<std::size_t>((next_ + N - 2) % N)]);
+  }
 
  private:
   std::array<double, N> values_{};
