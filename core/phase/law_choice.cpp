@@ -30,9 +30,9 @@ PhaseLawSettings law_even_at(PhaseLaw law, Seconds rr) noexcept {
 bool LawChoice::on_beat(const CardiacClock& clock) noexcept {
   const CardiacCycle cycle = clock.cycle_at(clock.anchor() - Duration(1));
   if (!cycle.teaches) return false;
-  if (usual_changes(Seconds(cycle.length))) {
+  if (usual_changes(cycle)) {
     weigh_again(clock);
-  } else if (length_count_ >= kCyclesForScale) {
+  } else if (taught_ >= kCyclesForScale) {
     weigh(cycle);
   }
   const bool another = choose();
@@ -41,17 +41,23 @@ bool LawChoice::on_beat(const CardiacClock& clock) noexcept {
 }
 
 // A heart may begin with a run of ectopic beats: as long as phases are told by the linear law, which has no scale, the
-// usual length may turn out another one.
-bool LawChoice::usual_changes(Seconds rr) noexcept {
+// usual length may turn out another one. Cycles that a premature beat cut short tell it only where there are no others.
+bool LawChoice::usual_changes(const CardiacCycle& cycle) noexcept {
   if (belief_.settings.law != PhaseLaw::kLinear) return false;
-  lengths_s_[length_count_++ % kLengths] = rr.count();
+  ++taught_;
+  const bool in_rhythm = cycle.irregularity == Duration::zero();
+  if (in_rhythm && !any_in_rhythm_) {
+    any_in_rhythm_ = true;
+    length_count_ = 0;
+  }
+  if (in_rhythm || !any_in_rhythm_) lengths_s_[length_count_++ % kLengths] = to_seconds(cycle.length);
   const auto held = std::min(length_count_, kLengths);
   double sum_s = 0.0;
   for (std::size_t i = 0; i < held; ++i) sum_s += lengths_s_[i];
   const Seconds usual(sum_s / static_cast<double>(held));
-  if (length_count_ > kCyclesForScale && std::abs(usual / scale_ - 1.0) < kSameScale) return false;
+  if (taught_ > kCyclesForScale && std::abs(usual / scale_ - 1.0) < kSameScale) return false;
   scale(usual);
-  return length_count_ >= kCyclesForScale;
+  return taught_ >= kCyclesForScale;
 }
 
 // Under laws of a new scale what is still kept says something else.

@@ -53,7 +53,7 @@ class LawChoice {
     double mean_rad = 0.0;
   };
 
-  [[nodiscard]] bool usual_changes(Seconds rr) noexcept;
+  [[nodiscard]] bool usual_changes(const CardiacCycle& cycle) noexcept;
   void weigh_again(const CardiacClock& clock) noexcept;
   void scale(Seconds usual) noexcept;
   void weigh(const CardiacCycle& cycle) noexcept;
@@ -64,6 +64,8 @@ class LawChoice {
   std::array<std::array<Part, kParts>, kLaws> parts_{};
   std::array<double, kLengths> lengths_s_{};
   std::uint64_t length_count_ = 0;
+  std::uint64_t taught_ = 0;  // cycles
+  bool any_in_rhythm_ = false;
   Seconds scale_{0.0};
   double cycles_ = 0.0;  // weighed, older ones fading, here and below
   std::array<double, kLaws> squares_{};

@@ -67,6 +67,7 @@ void Mapper::add_pose(const TrackerSample& sample) noexcept {
 
 void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& newest_clock) noexcept {
   const RealtimeScope realtime;
+  finish_learning();
   CardiacClock ecg_clock = newest_clock.as_of(stamp.arrival);
   if (settings_.law_from_image) {
     if (ecg_clock.beats() != beats_ && law_.on_beat(ecg_clock)) {
@@ -74,7 +75,6 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
     }
     ecg_clock = ecg_clock.with_law(law_.belief());
   }
-  finish_learning();
   const Instant begun = MonotonicClock::now();
 
   if (respiration_.locks() == 1 && !breath_begun_) {

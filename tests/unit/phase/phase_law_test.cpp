@@ -200,6 +200,27 @@ TEST(PhaseLaw, IsInDoubtUntilThereIsEvidence) {
   }
 }
 
+TEST(PhaseLaw, IsScaledByTheCyclesThatNoPrematureBeatCutsShort) {
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  LawChoice choice;
+  Instant t = from_ns(5'000'000'000);
+  const auto beat = [&](BeatClass beat_class, Duration after) {
+    t += after;
+    RPeak peak{t, t, 1.0, std::chrono::milliseconds(2)};
+    peak.beat_class = beat_class;
+    tracker.on_r_peak(peak);
+    static_cast<void>(choice.on_beat(tracker.clock()));
+  };
+  for (int i = 0; i < 4; ++i) beat(BeatClass::kNormal, std::chrono::milliseconds(900));
+  for (int i = 0; i < 30; ++i) {
+    beat(BeatClass::kPremature, std::chrono::milliseconds(500));
+    beat(BeatClass::kNormal, std::chrono::milliseconds(1300));
+  }
+  ASSERT_EQ(tracker.clock().rhythm(), Rhythm::kEctopic);
+  const PhaseLawSettings warped = choice.belief().with(PhaseLaw::kWarped);
+  EXPECT_NEAR(phase_in_cycle(warped, Seconds(0.3), Seconds(0.9), Seconds(0.9)).phase_rad, kTwoPi / 3.0, 1e-3);
+}
+
 TEST(PhaseLaw, StaysLinearWithoutEvidence) {
   CardiacClockTracker tracker{CardiacClockSettings{}};
   LawChoice choice;
