@@ -136,8 +136,8 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   if (overdue || interrupted_ || carried_ || settling) located.state = PhaseState::kFreeRunning;
   if (!overdue && carried_ && seen_) located.state = PhaseState::kFromImage;
   located.ectopic = beat(0).beat_class == BeatClass::kPremature;
-  // What the images carry on, they would have shown.
-  const bool unheard = (overdue || interrupted_) && !carried_;
+  // By now, whatever t is. What the images carry on, they would have shown.
+  const bool unheard = (interrupted_ || now_ > expected_until()) && !carried_;
 
   CardiacCycle& cycle = located.cycle;
   cycle.begin = beat(0).time;
