@@ -16,7 +16,7 @@ namespace perimap {
 // kEvery, with the number of the changes between; what it is in the end is always told.
 class DeviceNews {
  public:
-  static constexpr int kAtOnce = 20;
+  static constexpr int kAtOnce = 100;
   static constexpr Duration kEvery = std::chrono::seconds(10);
 
   struct Line {
