@@ -9,6 +9,8 @@ namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kOverdueDeviations = 3.0;
+// A heart moves 48 mm/s RMS: less is within a millimetre.
+constexpr double kLawsDiffer_s = 0.02;
 
 Duration rounded(Seconds s) noexcept { return from_seconds(s.count()); }
 
@@ -42,6 +44,8 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   }
   const double law_rad = law_deviation_rad(law_, phase.phase_rad, t - cycle.begin, cycle.length, cycle.previous_length);
   estimate.deviation_s = std::hypot(estimate.deviation_s, law_rad / phase.rate_rad_per_s);
+  estimate.law_undecided =
+      !located.exact && law_difference_s(law_, cycle.length, cycle.previous_length) > kLawsDiffer_s;
   return estimate;
 }
 

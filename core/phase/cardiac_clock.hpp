@@ -37,10 +37,11 @@ struct PhaseEstimate {
   double rate_rad_per_s = 0.0;  // 0 when the phase means nothing
   double deviation_s = 0.0;     // standard deviation of the phase, as time: phase deviation = rate * this
   PhaseState state = PhaseState::kUnknown;
-  bool exact = false;         // the cycle is completed: both its R peaks are known
-  bool contradicted = false;  // the images show another phase
-  bool teaches = false;       // exact, and what was seen in the cycle may be learnt
-  bool ectopic = false;       // the running cycle began with a premature beat: the heart may move otherwise than usual
+  bool exact = false;          // the cycle is completed: both its R peaks are known
+  bool contradicted = false;   // the images show another phase
+  bool teaches = false;        // exact, and what was seen in the cycle may be learnt
+  bool law_undecided = false;  // laws that are not ruled out differ in the running cycle by what shows on a surface
+  bool ectopic = false;        // the running cycle began with a premature beat: the heart may move otherwise than usual
 };
 
 // One cycle, completed or predicted.

@@ -27,6 +27,25 @@ PhaseLawSettings law_even_at(PhaseLaw law, Seconds rr) noexcept {
   return settings;
 }
 
+LawMemory LawChoice::memory() const noexcept {
+  if (taught_ < kCyclesForScale) return {};
+  return {belief_.settings.law, scale_, cycles_, squares_, log_likelihoods_};
+}
+
+void LawChoice::recall(const LawMemory& memory) noexcept {
+  *this = LawChoice();
+  if (!(memory.usual > Seconds(0.0))) return;
+  any_in_rhythm_ = true;
+  taught_ = length_count_ = kLengths;
+  lengths_s_.fill(memory.usual.count());
+  belief_.settings.law = memory.law;
+  scale(memory.usual);
+  cycles_ = memory.cycles;
+  squares_ = memory.squares;
+  log_likelihoods_ = memory.log_likelihoods;
+  believe();
+}
+
 bool LawChoice::on_beat(const CardiacClock& clock) noexcept {
   const CardiacCycle cycle = clock.cycle_at(clock.anchor() - Duration(1));
   if (!cycle.teaches) return false;

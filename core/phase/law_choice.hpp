@@ -16,6 +16,7 @@
 #include <cstdint>
 
 #include "core/phase/cardiac_clock.hpp"
+#include "core/phase/law_memory.hpp"
 #include "core/phase/observed_phase.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/phase/seconds.hpp"
@@ -34,6 +35,10 @@ class LawChoice {
   // A beat has become known: what was seen in the cycle before it is weighed, unless that one teaches nothing. True
   // when another law is taken.
   bool on_beat(const CardiacClock& clock) noexcept;
+
+  // What an earlier run knew, before the first beat of this one. The means in each part of the cycle are found anew.
+  [[nodiscard]] LawMemory memory() const noexcept;
+  void recall(const LawMemory& memory) noexcept;
 
   // Linear until there is evidence. Where cycles differ in length the candidates do too, so that what is learnt and
   // told before the law is known is as uncertain as it is.

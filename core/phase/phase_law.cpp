@@ -110,4 +110,20 @@ double law_deviation_rad(const LawBelief& belief, double told_rad, Seconds since
   return std::sqrt(square);
 }
 
+double law_difference_s(const LawBelief& belief, Seconds rr, Seconds rr_previous) noexcept {
+  constexpr int kSteps = 16;
+  double largest_s = 0.0;
+  for (std::size_t i = 0; i < kPhaseLaws.size(); ++i) {
+    if (!(belief.probabilities[i] > 0.0) || kPhaseLaws[i] == belief.settings.law) continue;
+    const PhaseLawSettings other = belief.with(kPhaseLaws[i]);
+    for (int step = 1; step < kSteps; ++step) {
+      const Seconds since_r = step * rr / kSteps;
+      const CyclePhase told = phase_in_cycle(belief.settings, since_r, rr, rr_previous);
+      const double difference_rad = phase_in_cycle(other, since_r, rr, rr_previous).phase_rad - told.phase_rad;
+      largest_s = std::max(largest_s, std::abs(difference_rad) / told.rate_rad_per_s);
+    }
+  }
+  return largest_s;
+}
+
 }  // namespace perimap

@@ -90,5 +90,7 @@ struct LockedParts {
 // believed.
 [[nodiscard]] double law_deviation_rad(const LawBelief& belief, double told_rad, Seconds since_r, Seconds rr,
                                        Seconds rr_previous) noexcept;
+// The most that another law which is not ruled out differs from the told one anywhere in such a cycle, as time.
+[[nodiscard]] double law_difference_s(const LawBelief& belief, Seconds rr, Seconds rr_previous) noexcept;
 
 }  // namespace perimap

@@ -1,4 +1,5 @@
-// The mapped features, a few at a time, and what is known of breathing, from the mapper to whoever keeps them.
+// The mapped features, a few at a time, and what is known of breathing and of the motion's law, from the mapper to
+// whoever keeps them.
 #pragma once
 
 #include <array>
@@ -26,6 +27,7 @@ class MapFeed {
     std::uint64_t maps_forgotten = 0;  // the count of then: what is of a map that was forgotten since is void
     std::array<Entry, kSlotsABatch> entries{};
     RespirationMemory respiration;
+    LawMemory law;
   };
 
   // Mapper: the batch to fill; null while the reader has it.

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/estimation/feature_estimate.hpp"
+#include "core/phase/law_memory.hpp"
 #include "core/phase/respiration_memory.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/time/instant.hpp"
@@ -31,6 +32,7 @@ struct FeatureMemory {
 struct MapMemory {
   std::vector<FeatureMemory> features;
   RespirationMemory respiration;
+  LawMemory law;
   // The last seconds of the ECG. Heard again they teach detector, classes and clock what they knew.
   std::vector<EcgBlock> ecg;
   // Of the last release, from which the frame times go on.

@@ -243,6 +243,7 @@ void Mapper::forget() noexcept {
 void Mapper::recall(const MapMemory& memory, Instant now) {
   respiration_.recall(memory.respiration, now);
   breath_begun_ = respiration_.locks() > 0;
+  law_.recall(memory.law);
   std::size_t index = 0;
   for (const FeatureMemory& feature : memory.features) {
     if (index >= slots_.size()) break;
@@ -290,6 +291,7 @@ void Mapper::recall(const MapMemory& memory, Instant now) {
       cell->publish();
     }
   }
+  publish_correction();
   phase_cells_.publisher_respiration.write(respiration_.clock());
   phase_cells_.status_respiration.write(respiration_.clock());
 }
@@ -300,6 +302,7 @@ void Mapper::fill_feed() noexcept {
   if (batch == nullptr) return;
   batch->maps_forgotten = counters_.maps_forgotten.get();
   batch->respiration = respiration_.memory();
+  batch->law = law_.memory();
   for (MapFeed::Entry& entry : batch->entries) {
     entry.slot = next_fed_slot_;
     next_fed_slot_ = (next_fed_slot_ + 1) % slots_.size();

@@ -26,7 +26,8 @@ enum class SurfaceReason : std::uint8_t {
   kPhaseFromImage,
   kEctopicBeat,
   kRhythmUnpredictable,
-  kRhythmEctopic
+  kRhythmEctopic,
+  kLawUndecided
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost, kShed };

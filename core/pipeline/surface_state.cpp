@@ -16,6 +16,7 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (phase.ectopic) return SurfaceReason::kEctopicBeat;
   if (rhythm == Rhythm::kUnpredictable) return SurfaceReason::kRhythmUnpredictable;
   if (rhythm == Rhythm::kEctopic) return SurfaceReason::kRhythmEctopic;
+  if (phase.law_undecided) return SurfaceReason::kLawUndecided;
   return SurfaceReason::kNone;
 }
 

@@ -22,8 +22,7 @@ namespace perimap {
 namespace {
 
 constexpr std::string_view kMagic = "PERIMAPC";
-// 2: with breathing.
-constexpr std::uint32_t kFormat = 4;
+constexpr std::uint32_t kFormat = 5;
 constexpr std::size_t kHeader = 16;
 constexpr std::size_t kLongestText = 4096;
 constexpr std::uint32_t kMostFeatures = 4096;
@@ -240,6 +239,33 @@ RespirationMemory read_respiration(Reader& in) {
   return respiration;
 }
 
+void add_law(Bytes& out, const LawMemory& law) {
+  out.add(static_cast<std::uint8_t>(law.law)).add(law.usual.count()).add(law.cycles);
+  for (const double x : law.squares) out.add(x);
+  for (const double x : law.log_likelihoods) out.add(x);
+}
+
+LawMemory read_law(Reader& in) {
+  constexpr double kLongestCycle_s = 10.0;
+  LawMemory law;
+  const auto index = in.number<std::uint8_t>("the law of the motion");
+  in.expect(index < kPhaseLaws.size(), "the law of the motion");
+  if (in.good()) law.law = kPhaseLaws[index];
+  law.usual = Seconds(in.number<double>("the usual length of a cycle"));
+  in.expect(law.usual.count() >= 0.0 && law.usual.count() <= kLongestCycle_s, "the usual length of a cycle");
+  law.cycles = in.number<double>("the cycles weighed");
+  in.expect(law.cycles >= 0.0, "the cycles weighed");
+  for (double& x : law.squares) {
+    x = in.number<double>("a law's scatter");
+    in.expect(x >= 0.0, "a law's scatter");
+  }
+  for (double& x : law.log_likelihoods) {
+    x = in.number<double>("a law's likelihood");
+    in.expect(x <= 0.0, "a law's likelihood");
+  }
+  return law;
+}
+
 std::string system_message() { return std::generic_category().message(errno); }
 
 }  // namespace
@@ -279,6 +305,7 @@ std::string serialize(const Checkpoint& checkpoint, std::span<const std::string>
     for (const float mV : block.samples()) body.add(mV);
   }
   add_respiration(body, memory.respiration);
+  add_law(body, memory.law);
   // Each feature is as long as its state asks for.
   constexpr std::size_t kRest = 4 + 8 + 16 + 8 + sizeof(PatchTemplate) + 64 + 4 + 1 + 1 + 8;
   int state_size = 0;
@@ -338,6 +365,7 @@ Expected<Checkpoint> parse_checkpoint_body(std::string_view body) {
   for (std::uint32_t i = 0; i < blocks && in.good(); ++i) memory.ecg.push_back(read_block(in));
   memory.respiration = read_respiration(in);
   in.expect(memory.respiration.clock.time <= checkpoint.saved, "a breath's phase of before it was saved");
+  memory.law = read_law(in);
   const auto state_size = in.number<std::int32_t>("the size of a state");
   in.expect(state_size >= 0 && state_size <= kMaxState, "the size of a state");
   const std::uint32_t features = in.count(kMostFeatures, sizeof(PatchTemplate), "the number of features");

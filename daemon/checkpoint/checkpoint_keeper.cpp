@@ -42,6 +42,7 @@ void CheckpointKeeper::begin_with(const MapMemory& memory) {
   std::size_t slot = 0;
   for (const FeatureMemory& feature : memory.features) features_[slot++] = serialize_feature(feature);
   respiration_ = memory.respiration;
+  law_ = memory.law;
   ecg_.assign(memory.ecg.begin(), memory.ecg.end());
 }
 
@@ -72,6 +73,7 @@ void CheckpointKeeper::take_map() {
   if (batch == nullptr) return;
   const bool of_this_map = !forgetting_ && batch->maps_forgotten == pipeline_.counters().maps_forgotten.get();
   respiration_ = of_this_map ? batch->respiration : RespirationMemory{};
+  law_ = of_this_map ? batch->law : LawMemory{};
   for (const MapFeed::Entry& entry : batch->entries) {
     if (entry.mapped && of_this_map) {
       features_[entry.slot] = serialize_feature(entry.feature);
@@ -94,6 +96,7 @@ void CheckpointKeeper::write() {
   Checkpoint checkpoint{set_up_, now.boot, now.monotonic, now.utc_ns, now.suspended, {}};
   checkpoint.memory.ecg.assign(ecg_.begin(), ecg_.end());
   checkpoint.memory.respiration = respiration_;
+  checkpoint.memory.law = law_;
   const PipelineCounters& counters = pipeline_.counters();
   checkpoint.memory.last_capture = from_ns(static_cast<std::int64_t>(counters.last_release_capture_ns.get()));
   checkpoint.memory.frame_period = Duration(static_cast<std::int64_t>(counters.frame_period_ns.get()));
@@ -117,6 +120,7 @@ void CheckpointKeeper::let_go() {
   take_ecg();
   features_.clear();
   respiration_ = {};
+  law_ = {};
   ecg_.clear();
   std::error_code error;
   std::filesystem::remove(file_, error);

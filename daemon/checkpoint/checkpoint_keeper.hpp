@@ -52,6 +52,7 @@ class CheckpointKeeper {
   std::mutex mutex_;                             // of what follows, between run() and forget()
   std::map<std::size_t, std::string> features_;  // by slot, serialized
   RespirationMemory respiration_;
+  LawMemory law_;
   std::deque<EcgBlock> ecg_;
   std::uint64_t maps_forgotten_ = 0;  // before the map that is kept
   bool forgetting_ = false;           // that map is to go, and the pipeline still has it: nothing is kept

@@ -49,6 +49,8 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_RHYTHM_UNPREDICTABLE;
     case SurfaceReason::kRhythmEctopic:
       return perimap_SURFACE_REASON_RHYTHM_ECTOPIC;
+    case SurfaceReason::kLawUndecided:
+      return perimap_SURFACE_REASON_LAW_UNDECIDED;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }

@@ -22,6 +22,7 @@ class KeptMap {
         }
       }
       respiration_ = batch->respiration;
+      law_ = batch->law;
       pipeline.map_feed().give_back();
     }
     EcgBlock block;
@@ -31,6 +32,7 @@ class KeptMap {
     MapMemory memory;
     for (const auto& [slot, feature] : features_) memory.features.push_back(feature);
     memory.respiration = respiration_;
+    memory.law = law_;
     memory.ecg = ecg_;
     memory.last_capture = from_ns(static_cast<std::int64_t>(counters.last_release_capture_ns.get()));
     memory.frame_period = Duration(static_cast<std::int64_t>(counters.frame_period_ns.get()));
@@ -40,6 +42,7 @@ class KeptMap {
  private:
   std::map<std::size_t, FeatureMemory> features_;
   RespirationMemory respiration_;
+  LawMemory law_;
   std::vector<EcgBlock> ecg_;
 };
 

@@ -58,6 +58,12 @@ TEST(CheckpointFile, IsReadBackAsItWasWritten) {
   EXPECT_EQ(r.clock.covariance_rad2_per_s, s.clock.covariance_rad2_per_s);
   EXPECT_EQ(r.clock.rate_variance_rad2_per_s2, s.clock.rate_variance_rad2_per_s2);
   EXPECT_EQ(r.offset_known, s.offset_known);
+  const LawMemory& law = read->memory.law;
+  EXPECT_EQ(law.law, written.memory.law.law);
+  EXPECT_EQ(law.usual, written.memory.law.usual);
+  EXPECT_EQ(law.cycles, written.memory.law.cycles);
+  EXPECT_EQ(law.squares, written.memory.law.squares);
+  EXPECT_EQ(law.log_likelihoods, written.memory.law.log_likelihoods);
   EXPECT_EQ(r.offset_rad, s.offset_rad);
   ASSERT_EQ(read->memory.features.size(), 2U);
   const FeatureMemory& f = read->memory.features[1];
@@ -98,7 +104,7 @@ TEST(CheckpointFile, AnotherFormatIsRefusedByName) {
   old[8] = 1;  // the least byte of the format
   const auto read = parse_checkpoint(old);
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().message, HasSubstr("expected format 4; it is of format 1"));
+  EXPECT_THAT(read.error().message, HasSubstr("expected format 5; it is of format 1"));
 }
 
 TEST(CheckpointFile, AChangedByteIsNoticed) {
@@ -146,6 +152,34 @@ INSTANTIATE_TEST_SUITE_P(
                     Unsound{"Coefficient", [](FeatureMemory& f) { f.estimate.x(3) = kNan; }, "coefficient"},
                     Unsound{"Covariance", [](FeatureMemory& f) { f.estimate.P(4, 1) = kNan; }, "covariance"},
                     Unsound{"Variance", [](FeatureMemory& f) { f.estimate.P(4, 4) = -1.0; }, "variance"}),
+    [](const auto& param) { return param.param.name; });
+
+struct UnsoundLawMemory {
+  const char* name;
+  void (*spoil)(LawMemory&);
+  const char* expected;
+};
+
+class UnsoundLaw : public testing::TestWithParam<UnsoundLawMemory> {};
+
+TEST_P(UnsoundLaw, IsRefusedAndNamed) {
+  Checkpoint c = checkpoint_sample();
+  GetParam().spoil(c.memory.law);
+  const auto read = parse_checkpoint(file_of(c));
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().message, HasSubstr(GetParam().expected));
+  EXPECT_THAT(read.error().message, HasSubstr("byte "));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Checkpoint, UnsoundLaw,
+    testing::Values(UnsoundLawMemory{"Law", [](LawMemory& m) { m.law = static_cast<PhaseLaw>(3); },
+                                     "law of the motion"},
+                    UnsoundLawMemory{"Length", [](LawMemory& m) { m.usual = Seconds(-0.1); }, "usual length"},
+                    UnsoundLawMemory{"LengthNan", [](LawMemory& m) { m.usual = Seconds(kNan); }, "usual length"},
+                    UnsoundLawMemory{"Cycles", [](LawMemory& m) { m.cycles = -1.0; }, "cycles weighed"},
+                    UnsoundLawMemory{"Scatter", [](LawMemory& m) { m.squares[1] = -1.0; }, "scatter"},
+                    UnsoundLawMemory{"Likelihood", [](LawMemory& m) { m.log_likelihoods[2] = kNan; }, "likelihood"}),
     [](const auto& param) { return param.param.name; });
 
 struct UnsoundBreath {

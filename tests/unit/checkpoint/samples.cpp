@@ -68,6 +68,7 @@ Checkpoint checkpoint_sample() {
   block.mV = {0.5F, -0.25F, 1.5F};
   c.memory.ecg = {block, block};
   c.memory.respiration = respiration_sample();
+  c.memory.law = {PhaseLaw::kWarped, Seconds(0.8), 12.5, {40.0, 12.0, 20.0}, {-9.0, -3.0, -6.0}};
   return c;
 }
 

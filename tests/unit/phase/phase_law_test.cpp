@@ -144,6 +144,22 @@ TEST(PhaseLaw, InDoubtWidensThePhaseOfTheClock) {
   EXPECT_GT(doubted.at(long_cycle + into).deviation_s, 3.0 * known.at(long_cycle + into).deviation_s);
 }
 
+TEST(PhaseLaw, IsUndecidedInTheClockWhereLawsThatAreNotRuledOutDiffer) {
+  CardiacClockTracker tracker{CardiacClockSettings{}};
+  Instant t = from_ns(5'000'000'000);
+  for (int i = 0; i < 20; ++i) {
+    tracker.on_r_peak({t, t, 1.0, std::chrono::milliseconds(2)});
+    t += std::chrono::milliseconds(850);
+  }
+  const Instant now = t - std::chrono::milliseconds(500);
+  const auto undecided_with = [&](const LawBelief& belief) {
+    return tracker.clock().with_law(belief).at(now).law_undecided;
+  };
+  EXPECT_FALSE(undecided_with(undecided(Seconds(0.85)))) << "in a cycle of the usual length the laws are one";
+  EXPECT_TRUE(undecided_with(undecided(Seconds(1.05))));
+  EXPECT_FALSE(undecided_with({undecided(Seconds(1.05)).settings, {1.0, 0.0, 0.0}})) << "the others are ruled out";
+}
+
 // A heart that follows one of the laws, seen through a map that was learnt under the linear one and is off in its own
 // way in each part of the cycle.
 class ChosenLaw : public testing::TestWithParam<PhaseLaw> {};
@@ -181,6 +197,15 @@ TEST_P(ChosenLaw, IsTheOneThatTheHeartFollows) {
     if (other == GetParam()) continue;
     EXPECT_GT(choice.scatter(other), 1.3 * choice.scatter(GetParam()));
   }
+
+  LawChoice another_run;
+  another_run.recall(choice.memory());
+  EXPECT_EQ(another_run.belief().settings.law, GetParam());
+  EXPECT_EQ(another_run.belief().probabilities, belief.probabilities);
+  const auto phase = [](const LawBelief& b) {
+    return phase_in_cycle(b.settings, Seconds(0.3), Seconds(1.0), Seconds(0.9)).phase_rad;
+  };
+  EXPECT_NEAR(phase(another_run.belief()), phase(belief), 1e-12);
 }
 
 INSTANTIATE_TEST_SUITE_P(PhaseLaw, ChosenLaw,
@@ -219,6 +244,13 @@ TEST(PhaseLaw, IsScaledByTheCyclesThatNoPrematureBeatCutsShort) {
   ASSERT_EQ(tracker.clock().rhythm(), Rhythm::kEctopic);
   const PhaseLawSettings warped = choice.belief().with(PhaseLaw::kWarped);
   EXPECT_NEAR(phase_in_cycle(warped, Seconds(0.3), Seconds(0.9), Seconds(0.9)).phase_rad, kTwoPi / 3.0, 1e-3);
+}
+
+TEST(PhaseLaw, KnowsNothingFromARunThatKnewNothing) {
+  LawChoice choice;
+  choice.recall(LawChoice().memory());
+  EXPECT_EQ(choice.belief().settings.law, PhaseLaw::kLinear);
+  EXPECT_EQ(choice.belief().probabilities, LawChoice().belief().probabilities);
 }
 
 TEST(PhaseLaw, StaysLinearWithoutEvidence) {

@@ -1,0 +1,40 @@
+#include "core/pipeline/surface_state.hpp"
+
+#include <gtest/gtest.h>
+
+namespace perimap {
+namespace {
+
+constexpr SurfaceFooting kMapped{.mapped = true};
+
+PhaseEstimate locked() {
+  PhaseEstimate phase;
+  phase.state = PhaseState::kLocked;
+  return phase;
+}
+
+TEST(SurfaceState, IsGoodWhenNothingIsWrong) {
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, kMapped), SurfaceReason::kNone);
+  EXPECT_EQ(state_of(SurfaceReason::kNone), SurfaceState::kGood);
+}
+
+TEST(SurfaceState, IsDegradedWhileTheLawOfTheMotionIsUndecided) {
+  PhaseEstimate phase = locked();
+  phase.law_undecided = true;
+  EXPECT_EQ(reason_of(phase, Rhythm::kPredictable, kMapped), SurfaceReason::kLawUndecided);
+  EXPECT_EQ(state_of(SurfaceReason::kLawUndecided), SurfaceState::kDegraded);
+}
+
+TEST(SurfaceState, TellsWhatIsWorseFirst) {
+  PhaseEstimate phase = locked();
+  phase.law_undecided = true;
+  EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, kMapped), SurfaceReason::kRhythmEctopic);
+  EXPECT_EQ(reason_of(phase, Rhythm::kPredictable, {}), SurfaceReason::kNothingMapped);
+  phase.state = PhaseState::kFreeRunning;
+  EXPECT_EQ(reason_of(phase, Rhythm::kPredictable, kMapped), SurfaceReason::kPhaseFreeRunning);
+  phase.state = PhaseState::kLost;
+  EXPECT_EQ(reason_of(phase, Rhythm::kPredictable, kMapped), SurfaceReason::kPhaseLost);
+}
+
+}  // namespace
+}  // namespace perimap
