@@ -163,7 +163,9 @@ void Mapper::settle_phases(const FrameRecord& frame) noexcept {
       respiration_.add_contradiction(frame.stamp.capture);
     }
   }
-  const bool asked = settings_.respiration.enabled ? !breath_told : frame.index % kDisplacementInterval == 0;
+  // Where breathing is only watched for: a phase that is off displaces the surface too.
+  const bool watched = frame.index % kDisplacementInterval == 0 && frame.phase.state == PhaseState::kLocked;
+  const bool asked = settings_.respiration.enabled ? !breath_told : watched;
   if (asked && image_phase_.displacement(groups_, frame, model_, settings_.estimator, displacement_mm_)) {
     displacement_seen_ = true;
     displacement_time_ = frame.stamp.capture;
