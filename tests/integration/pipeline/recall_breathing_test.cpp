@@ -25,24 +25,27 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// The surfaces, by their frame.
+// The surfaces, by when they were released: before the second run has a frame, its surfaces name none.
 struct Surfaces final : Publication {
   struct One {
-    Instant release;
     perimap_SurfaceReason reason;
     std::map<std::uint32_t, Vector3d> p_W_mm;
   };
-  std::map<std::uint64_t, One> of_frame;
+  std::map<Instant, One> released;
 
   void surface(const perimap_Surface& sample) override {
-    One& one = of_frame[sample.frame_sequence];
-    one.release = from_ns(sample.release_time_ns);
+    One& one = released[from_ns(sample.release_time_ns)];
     one.reason = sample.reason;
     for (std::uint32_t i = 0; i < sample.features._length; ++i) {
       const perimap_SurfaceFeature& feature = sample.features._buffer[i];
       if (feature.state != perimap_FEATURE_CONVERGED) continue;
       one.p_W_mm[feature.id] = Vector3d(feature.position_W_mm[0], feature.position_W_mm[1], feature.position_W_mm[2]);
     }
+  }
+  // Frame times that go on from a period are rounded.
+  [[nodiscard]] const One* at(Instant release) const {
+    const auto found = released.lower_bound(release - milliseconds(1));
+    return found != released.end() && found->first <= release + milliseconds(1) ? &found->second : nullptr;
   }
   void surface_model(const perimap_SurfaceModel& /*model*/) override {}
   void phase(const perimap_Phase& /*phase*/) override {}
@@ -74,14 +77,14 @@ struct Difference {
 
 Difference compare(const Surfaces& whole, const Surfaces& after, Instant begin, Instant end) {
   Difference difference;
-  for (const auto& [frame, one] : after.of_frame) {
-    const auto other = whole.of_frame.find(frame);
-    if (one.release < begin || one.release >= end || other == whole.of_frame.end()) continue;
+  for (const auto& [release, one] : after.released) {
+    const Surfaces::One* other = whole.at(release);
+    if (release < begin || release >= end || other == nullptr) continue;
     ++difference.surfaces;
     if (one.reason == perimap_SURFACE_REASON_RESPIRATION_UNKNOWN) ++difference.breath_unknown;
     for (const auto& [id, p_W_mm] : one.p_W_mm) {
-      const auto there = other->second.p_W_mm.find(id);
-      if (there != other->second.p_W_mm.end()) difference.mm.push_back((p_W_mm - there->second).norm());
+      const auto there = other->p_W_mm.find(id);
+      if (there != other->p_W_mm.end()) difference.mm.push_back((p_W_mm - there->second).norm());
     }
   }
   return difference;
