@@ -8,17 +8,15 @@
 // and perimapd's descriptors and memory stay what they were after the first time.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
 #include <vector>
 
+#include "tests/integration/pipeline/process_figures.hpp"
 #include "tests/integration/pipeline/told_states.hpp"
 
 namespace perimap::test {
@@ -29,19 +27,6 @@ constexpr Duration kPatience = std::chrono::seconds(60);
 constexpr Duration kOut = std::chrono::seconds(2);
 constexpr long kMoreMemory_kB = 4096;  // of which the allocator may keep some
 
-long descriptors(const std::string& pid) {
-  const std::filesystem::directory_iterator all("/proc/" + pid + "/fd");
-  return std::distance(begin(all), end(all));
-}
-
-long resident_kB(const std::string& pid) {
-  std::ifstream status("/proc/" + pid + "/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.starts_with("VmRSS:")) return std::strtol(line.c_str() + 6, nullptr, 10);
-  }
-  return 0;
-}
-
 std::optional<Duration> told(const ToldStates& states, perimap_SourceKind kind,
                              const std::vector<perimap_SourceState>& any, Instant since) {
   while (MonotonicClock::now() < since + kPatience) {
@@ -51,18 +36,12 @@ std::optional<Duration> told(const ToldStates& states, perimap_SourceKind kind,
   return std::nullopt;
 }
 
-std::string spread(std::vector<Duration> times) {
-  std::sort(times.begin(), times.end());
-  return fmt::format("{:.0f} ms (median), {:.0f} ms (longest)", 1e3 * to_seconds(times[times.size() / 2]),
-                     1e3 * to_seconds(times.back()));
-}
-
 int fail(const std::string& why) {
   fmt::print(stderr, "pulled_device: {}\n", why);
   return 1;
 }
 
-int run(const std::string& pid, perimap_SourceKind kind, int times, const std::string& pull, const std::string& plug) {
+int run(pid_t pid, perimap_SourceKind kind, int times, const std::string& pull, const std::string& plug) {
   auto readers = SampleReaders::create(0, false);
   if (!readers) return fail(readers.error().message);
   ToldStates states(std::move(*readers));
@@ -77,21 +56,21 @@ int run(const std::string& pid, perimap_SourceKind kind, int times, const std::s
     const std::size_t before = states.surfaces().size();
     std::this_thread::sleep_for(kOut);
     const std::size_t meanwhile = states.surfaces().size() - before;
-    // Without a camera there is no frame to publish for.
-    if (kind != perimap_SOURCE_CAMERA && meanwhile == 0) return fail(fmt::format("time {}: no surfaces", i + 1));
+    if (meanwhile == 0) return fail(fmt::format("time {}: no surfaces", i + 1));
     const Instant plugged = MonotonicClock::now();
     if (std::system(plug.c_str()) != 0) return fail(plug);
     const auto again = told(states, kind, {perimap_SOURCE_OK}, plugged);
     if (!again) return fail(fmt::format("time {}: it does not recover", i + 1));
     back.push_back(*again);
     if (i > 0) continue;
-    descriptors_first = descriptors(pid);
-    resident_first_kB = resident_kB(pid);
+    descriptors_first = descriptors_of(pid);
+    resident_first_kB = resident_kB_of(pid);
   }
   fmt::print("{} times: told after {}; OK again after {}; descriptors {} and {}, memory {} and {} kB\n", times,
-             spread(gone), spread(back), descriptors_first, descriptors(pid), resident_first_kB, resident_kB(pid));
-  if (descriptors(pid) > descriptors_first) return fail("descriptors leak");
-  if (resident_kB(pid) > resident_first_kB + kMoreMemory_kB) return fail("memory leaks");
+             spread(gone), spread(back), descriptors_first, descriptors_of(pid), resident_first_kB,
+             resident_kB_of(pid));
+  if (descriptors_of(pid) > descriptors_first) return fail("descriptors leak");
+  if (resident_kB_of(pid) > resident_first_kB + kMoreMemory_kB) return fail("memory leaks");
   return 0;
 }
 
@@ -103,5 +82,6 @@ int main(int argc, char** argv) {
   const std::string_view source = argc == 6 ? argv[2] : "";
   const int times = argc == 6 ? std::atoi(argv[3]) : 0;
   if ((source != "camera" && source != "ecg") || times < 1) return fail("PID camera|ecg TIMES PULL PLUG");
-  return run(argv[1], source == "camera" ? perimap_SOURCE_CAMERA : perimap_SOURCE_ECG, times, argv[4], argv[5]);
+  return run(std::atoi(argv[1]), source == "camera" ? perimap_SOURCE_CAMERA : perimap_SOURCE_ECG, times, argv[4],
+             argv[5]);
 }

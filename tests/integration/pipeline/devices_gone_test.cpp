@@ -28,6 +28,7 @@
 #include "drivers/emulator/played_session.hpp"
 #include "drivers/transport/tcp_stream.hpp"
 #include "plugged_device.hpp"
+#include "process_figures.hpp"
 #include "told_states.hpp"
 
 namespace perimap::test {
@@ -89,20 +90,10 @@ class Daemon {
     return status;
   }
   [[nodiscard]] bool runs() const { return kill(pid_, 0) == 0 && waitpid(pid_, nullptr, WNOHANG) == 0; }
-  [[nodiscard]] long descriptors() const {
-    return std::distance(fs::directory_iterator(folder() / "fd"), fs::directory_iterator());
-  }
-  [[nodiscard]] long resident_kB() const {
-    std::ifstream status(folder() / "status");
-    for (std::string line; std::getline(status, line);) {
-      if (line.starts_with("VmRSS:")) return std::strtol(line.c_str() + 6, nullptr, 10);
-    }
-    return 0;
-  }
+  [[nodiscard]] long descriptors() const { return descriptors_of(pid_); }
+  [[nodiscard]] long resident_kB() const { return resident_kB_of(pid_); }
 
  private:
-  [[nodiscard]] fs::path folder() const { return fs::path("/proc") / std::to_string(pid_); }
-
   pid_t pid_ = 0;
 };
 
@@ -177,12 +168,6 @@ class Watched {
       states_ += (states_.empty() ? "" : " or ") + state;
     }
     return true;
-  }
-  static std::string spread(std::vector<Duration> times) {
-    if (times.empty()) return "never";
-    std::sort(times.begin(), times.end());
-    return fmt::format("{:.0f} ms (median), {:.0f} ms (longest)", 1e3 * to_seconds(times[times.size() / 2]),
-                       1e3 * to_seconds(times.back()));
   }
 
   std::string name_;

@@ -68,6 +68,24 @@ END
   perimap check /etc/perimap/perimapd.toml > /dev/null || fail "the configuration is refused"
 }
 
+# The unpacked package's service, with all devices there.
+service_over_devices() {
+  uname -rv
+  device_nodes
+  unpacked
+  devices_emulated
+  configured
+  perimap probe /etc/perimap/perimapd.toml || fail "a device is not there"
+  systemctl restart perimapd || fail "the service does not start"
+  systemctl is-active perimapd || fail "the service is not active"
+}
+
+all_stopped() {
+  systemctl stop perimapd || fail "the service does not stop"
+  kill -INT $emulators
+  wait $emulators || fail "the emulators: $(cat /tmp/emulators)"
+}
+
 # received SECONDS FILE: what a subscriber sees, a JSON object a line
 received() {
   timeout 120 perimap watch --json --wait 60 --duration "$1" > "$2" || fail "nothing was received: $(tail -n 1 "$2")"

@@ -2,14 +2,7 @@
 # a DDS subscriber receive, with all of them and while each is gone?
 set -uo pipefail
 . /vm/common.sh
-uname -rv
-device_nodes
-unpacked
-devices_emulated
-configured
-perimap probe /etc/perimap/perimapd.toml || fail "a device is not there"
-systemctl restart perimapd || fail "the service does not start"
-systemctl is-active perimapd || fail "the service is not active"
+service_over_devices
 
 received 15 /tmp/all
 holds /tmp/all "a sample a frame, none lost" "x.received > 20 && x.missing === 0"
@@ -22,6 +15,4 @@ holds /tmp/no_ecg "without an ECG it publishes on and says so" "x.received > 10 
 ip link set vcan0 up
 received 15 /tmp/ecg_again
 holds /tmp/ecg_again "the ECG is back" "x.reason !== 'phase_lost'"
-systemctl stop perimapd || fail "the service does not stop"
-kill -INT $emulators
-wait $emulators || fail "the emulators: $(cat /tmp/emulators)"
+all_stopped

@@ -2,12 +2,8 @@
 # Each time a subscriber is told and the device recovers; nothing leaks.
 set -uo pipefail
 . /vm/common.sh
-uname -rv
-device_nodes
-unpacked
-devices_emulated
-configured
-systemctl restart perimapd || fail "the service does not start"
+service_over_devices
+
 received 15 /tmp/all
 holds /tmp/all "a sample a frame, none lost" "x.received > 20 && x.missing === 0"
 daemon=$(systemctl show -P MainPID perimapd)
@@ -25,6 +21,4 @@ pulled camera "echo vivid.0 > $driver/unbind" \
 received 15 /tmp/again
 holds /tmp/again "afterwards a sample a frame, none lost" "x.received > 20 && x.missing === 0"
 [ "$(systemctl show -P MainPID perimapd)" = "$daemon" ] || fail "it was started again"
-systemctl stop perimapd || fail "the service does not stop"
-kill -INT $emulators
-wait $emulators || fail "the emulators: $(cat /tmp/emulators)"
+all_stopped
