@@ -374,7 +374,7 @@ inline const char* describe(perimap_SurfaceReason reason) noexcept {
     case perimap_SURFACE_REASON_RHYTHM_ECTOPIC:
       return "premature beats prevail";
     case perimap_SURFACE_REASON_LAW_UNDECIDED:
-      return "how the motion goes with the beat is not found yet";
+      return "how the motion goes with the beat is not certain yet";
     default:
       return "a reason that this client does not know";
   }

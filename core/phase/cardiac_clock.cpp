@@ -140,8 +140,7 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   if (overdue || interrupted_ || carried_ || settling) located.state = PhaseState::kFreeRunning;
   if (!overdue && carried_ && seen_) located.state = PhaseState::kFromImage;
   located.ectopic = beat(0).beat_class == BeatClass::kPremature;
-  // By now, whatever t is. What the images carry on, they would have shown.
-  const bool unheard = (interrupted_ || now_ > expected_until()) && !carried_;
+  const bool nobody_heard = unheard();
 
   CardiacCycle& cycle = located.cycle;
   cycle.begin = beat(0).time;
@@ -150,7 +149,7 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   double variance_s2 = to_seconds(beat(0).deviation) * to_seconds(beat(0).deviation);
   for (int ahead = 0;; ++ahead) {
     const Seconds told = ahead == 0 ? running_deviation_ : ahead == 1 ? next_deviation_ : length_deviation_;
-    const Seconds deviation(unheard ? std::hypot(told.count(), premature_deviation_.count()) : told.count());
+    const Seconds deviation(nobody_heard ? std::hypot(told.count(), premature_deviation_.count()) : told.count());
     cycle.length = predicted_length(ahead);
     cycle.length_deviation = rounded(deviation);
     if (t < cycle.begin + cycle.length) return located;
@@ -191,7 +190,8 @@ Duration CardiacClock::last_rr() const noexcept {
 }
 
 Duration CardiacClock::predicted_r_peak_deviation() const noexcept {
-  return from_seconds(std::hypot(to_seconds(anchor_deviation()), running_deviation_.count()));
+  const double premature = unheard() ? premature_deviation_.count() : 0.0;
+  return from_seconds(std::hypot(to_seconds(anchor_deviation()), running_deviation_.count(), premature));
 }
 
 }  // namespace perimap

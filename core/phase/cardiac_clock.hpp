@@ -125,6 +125,8 @@ class CardiacClock {
     bool ectopic = false;
   };
 
+  // No beat can be heard by now, or one that was due has not been. What the images carry on, they would have shown.
+  [[nodiscard]] bool unheard() const noexcept { return (interrupted_ || now_ > expected_until()) && !carried_; }
   [[nodiscard]] Located locate(Instant t) const noexcept;
   [[nodiscard]] Located locate_completed(int newer) const noexcept;
   [[nodiscard]] Located locate_predicted(Instant t) const noexcept;

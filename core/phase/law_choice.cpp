@@ -28,7 +28,8 @@ PhaseLawSettings law_even_at(PhaseLaw law, Seconds rr) noexcept {
 }
 
 LawMemory LawChoice::memory() const noexcept {
-  if (taught_ < kCyclesForScale) return {};
+  // What cut-short cycles alone have told gives way to the first other one.
+  if (taught_ < kCyclesForScale || !any_in_rhythm_) return {};
   return {belief_.settings.law, scale_, cycles_, squares_, log_likelihoods_};
 }
 

@@ -65,7 +65,8 @@ std::span<const FoundFeature> FeatureFinder::adopt(std::uint64_t frame_index) no
   }
   active_ = false;
   // Late, the features have moved on and nobody followed them: the round is lost, the next one begins.
-  const bool wanted = due && !std::exchange(discarded_, false);
+  const bool discarded = std::exchange(discarded_, false);
+  const bool wanted = due && !discarded;
   return wanted ? std::span<const FoundFeature>(found_) : std::span<const FoundFeature>();
 }
 

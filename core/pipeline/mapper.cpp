@@ -245,7 +245,7 @@ void Mapper::forget() noexcept {
 void Mapper::recall(const MapMemory& memory, Instant now) {
   respiration_.recall(memory.respiration, now);
   breath_begun_ = respiration_.locks() > 0;
-  law_.recall(memory.law);
+  if (settings_.law_from_image) law_.recall(memory.law);
   std::size_t index = 0;
   for (const FeatureMemory& feature : memory.features) {
     if (index >= slots_.size()) break;

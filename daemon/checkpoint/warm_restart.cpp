@@ -48,8 +48,9 @@ SetUp set_up_of(const Configuration& configuration, const PipelineSettings& pipe
       fmt::format("{}, reference {}, registered {}", configuration.source.world_frame,
                   tracker.reference.value_or("none"), pose_text(tracker.translation_IW_mm, tracker.rotation_IW_wxyz));
   const BasisLayout& layout = pipeline.estimator.layout;
-  set_up.estimator = fmt::format("{} cardiac, {} respiratory harmonics, phase law {}", layout.cardiac_harmonics,
-                                 layout.respiratory_harmonics, static_cast<int>(pipeline.clock.law.law));
+  set_up.estimator = fmt::format("{} cardiac, {} respiratory harmonics, phase law {}{}", layout.cardiac_harmonics,
+                                 layout.respiratory_harmonics, static_cast<int>(pipeline.clock.law.law),
+                                 pipeline.law_from_image ? " or as found" : "");
   return set_up;
 }
 

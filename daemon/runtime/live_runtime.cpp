@@ -145,9 +145,9 @@ void LiveRuntime::run_publisher() {
     // Cyclone DDS allocates, locks and calls the kernel, so that this alone is in no RealtimeScope; all that the
     // surface is made of was made before.
     publication_.surface(sample);
-    pipeline_.sent(surface);
     StreamCounters& stream = counters.of(release.stream);
     stream.dds_write.add(MonotonicClock::now() - ready);
+    pipeline_.sent(surface);
     stream.release_tardiness.add(ready - release.deadline);
   }
 }

@@ -77,7 +77,7 @@ if [ "$mode" = unplugged ]; then
 fi
 
 # The recording begins seconds after both were opened: a device that has nothing to send yet is waited for.
-! grep -Eq 'ECG: .*(not one|sends no) sample' "$work/log" || fail "the ECG was opened again: $(cat "$work/log")"
+! grep -Eq 'ECG: .*((not one|sends no|no) sample|not a byte)' "$work/log" || fail "the ECG was opened again: $(cat "$work/log")"
 for told in log watch; do mv "$work/$told" "$work/$told-devices"; done
 
 printf 'version = 1\n[replay]\nrecording = "%s"\n[dds]\ndomain = %d\n' "$recording" $domain > "$work/replay.toml"

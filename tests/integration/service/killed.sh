@@ -77,7 +77,7 @@ console.log(`settled: ${e.count} positions, median ${e.median_mm} mm, 95 % ${e.p
 console.log(`good: ${a.good_positions} positions, ${a.good_positions_off} off by more than 3 mm, NEES/3 ${a.good_positions_mean_nees}`);
 // A kill hides beats, some of them premature: until the next ones the phase is uncertain, and no surface good.
 process.exit(e.count > 1000 && e.median_mm < 1 && a.good_positions > 1000 && a.good_positions_mean_nees < 2 &&
-  a.good_positions_off === 0 ? 0 : 1);
+  a.settled_mean_nees < 12 && a.good_positions_off === 0 ? 0 : 1);
 END
 
 # Of another set-up it takes nothing.

@@ -182,8 +182,11 @@ TEST(Client, KnowsHowMuchTheLawIsInDoubt) {
     Moment doubted(clock.with_law({law_even_at(law, Seconds(0.9)), {0.2, 0.5, 0.3}}));
     Moment known(clock.with_law({law_even_at(law, Seconds(0.9))}));
     expect_equal_at_all_horizons(doubted, 1e-6);
-    EXPECT_GT(predicted(doubted.model(), doubted.now()).cardiac_phase_deviation_rad,
+    const PredictedSurface surface = predicted(doubted.model(), doubted.now(), {.degraded = true});
+    EXPECT_GT(surface.cardiac_phase_deviation_rad,
               predicted(known.model(), known.now()).cardiac_phase_deviation_rad + 1e-3);
+    EXPECT_EQ(surface.reason, perimap_SURFACE_REASON_LAW_UNDECIDED);
+    EXPECT_EQ(predicted(doubted.model(), doubted.now()).refusal, Refusal::kDegraded);
   }
 }
 
