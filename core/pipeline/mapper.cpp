@@ -18,8 +18,11 @@ constexpr std::uint64_t kDisplacementInterval = 3;
 // How well a frame tells the common displacement while the map is young, and how fast breathing changes it.
 constexpr double kDisplacementDeviation_mm = 1.0;
 constexpr double kDisplacementRate_mm_per_s = 15.0;
-// What an earlier run found after it was last kept was published by ids that are not known: they are not given again.
+// What earlier runs found after the map was last kept was published by ids that are not known: they are not given
+// again. Several runs may have gone on from the same memory, one after the other, so that some are left out for each
+// second since: more than are ever found in one.
 constexpr std::uint32_t kIdsLeftOut = 10'000;
+constexpr double kIdsLeftOutPerSecond = 1000.0;
 // A snapshot's instants (see kInstantsCovered) reach over a period of the frames, at most so long, and so far beyond.
 // At that they are 23 ms apart, and a covariance with 8 harmonics of the heart is still near its chord between them.
 constexpr Duration kLongestCoveredPeriod = std::chrono::milliseconds(50);
@@ -246,6 +249,8 @@ void Mapper::recall(const MapMemory& memory, Instant now) {
   respiration_.recall(memory.respiration, now);
   breath_begun_ = respiration_.locks() > 0;
   if (settings_.law_from_image) law_.recall(memory.law);
+  const double since_s = std::max(0.0, to_seconds(now - memory.last_capture));
+  const std::uint32_t left_out = kIdsLeftOut + static_cast<std::uint32_t>(kIdsLeftOutPerSecond * since_s);
   std::size_t index = 0;
   for (const FeatureMemory& feature : memory.features) {
     if (index >= slots_.size()) break;
@@ -270,7 +275,7 @@ void Mapper::recall(const MapMemory& memory, Instant now) {
     bank_.set(static_cast<int>(index), feature.estimate);
     // Taken before breathing was found, and not again since.
     if (breath_begun_ && !feature.breathing) groups_[index / kLanes].begin_breath(index % kLanes, respiration_.wave());
-    next_id_ = std::max(next_id_, feature.id + kIdsLeftOut);
+    next_id_ = std::max(next_id_, feature.id + left_out);
     ++index;
   }
   for (ShardCells& cells : cells_) {

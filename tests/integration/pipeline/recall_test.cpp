@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -235,6 +236,40 @@ TEST(Recall, TakesNoMoreFeaturesThanThereIsRoomForAndNoneOfAnotherLayout) {
     EXPECT_NE(slot.id, run.memory.features[0].id);
   }
   EXPECT_EQ(mapped, 4);
+}
+
+// The numbers of what a run finds that goes on from this memory at `now`, with the recording from then on.
+std::set<std::uint32_t> found_from(const MapMemory& memory, Instant now) {
+  ReplaySetup s = setup(Precision::kDouble);
+  Pipeline pipeline(s.pipeline);
+  pipeline.recall(memory, now);
+  Unheard unheard;
+  LockstepRuntime runtime(pipeline, s.identity, s.utc_minus_monotonic, unheard);
+  std::optional<Duration> offset;
+  for (auto event = s.reader.next(); event && *event; event = s.reader.next()) {
+    if (!offset) offset = now - arrival_of(**event);
+    shift(**event, *offset);
+    runtime.deliver(**event);
+  }
+  runtime.finish();
+  std::set<std::uint32_t> ids;
+  for (const FeatureSlot& slot : pipeline.slots()) {
+    if (slot.state != SlotState::kEmpty && slot.id != memory.features[0].id) ids.insert(slot.id);
+  }
+  return ids;
+}
+
+// The first was killed before anything was kept.
+TEST(Recall, TwoRunsThatGoOnFromTheSameMemoryGiveNoNumberTwice) {
+  EarlierRun earlier;
+  ASSERT_GT(earlier.memory.features.size(), 5U);
+  earlier.memory.features.resize(1);
+  const Instant kept = earlier.memory.last_capture;
+  const std::set<std::uint32_t> first = found_from(earlier.memory, kept + std::chrono::seconds(1));
+  const std::set<std::uint32_t> second = found_from(earlier.memory, kept + std::chrono::seconds(9));
+  ASSERT_FALSE(first.empty());
+  ASSERT_FALSE(second.empty());
+  for (const std::uint32_t id : second) EXPECT_FALSE(first.contains(id)) << id;
 }
 
 // Two features as of before a crash, over the recording's ECG: one with breathing, one kept before it was found.
