@@ -103,7 +103,7 @@ std::string reason(std::string_view kind, const DeviceHealth& health) {
         return "open, but the line has not changed: is the monitor's output on, and wired to ecg.r_trigger_line?";
       }
       if (const std::string awaited = health.awaited(); !awaited.empty()) {
-        return fmt::format("open, but no answer yet to {}; is it switched on? Listen for longer (--seconds)", awaited);
+        return fmt::format("open: {} Listen for longer (--seconds)", awaited);
       }
       return "open, but nothing has come yet: listen for longer (--seconds)";
     default:

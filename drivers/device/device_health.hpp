@@ -41,7 +41,7 @@ class DeviceHealth : public DeviceCounters {
   [[nodiscard]] std::string reason() const;
   void set_identity(std::string identity);
   [[nodiscard]] std::string identity() const;
-  // What a device that is starting has been asked and has not answered yet.
+  // How far a device that is starting has come and what is awaited of it: a sentence for the user.
   void set_awaited(std::string awaited);
   [[nodiscard]] std::string awaited() const;
 

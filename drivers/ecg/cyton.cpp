@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <optional>
 #include <utility>
 
 namespace perimap {
@@ -19,6 +20,9 @@ constexpr Duration kPromptTime = std::chrono::milliseconds(1500);
 constexpr int kMostResets = 2;
 constexpr Duration kSlowGreeting =
     std::chrono::seconds(3);  // asked again sooner, a slow board would never get that far
+// What the dongle says in place of a board that does not answer; it ends as a greeting does.
+constexpr std::string_view kNoBoard = "Failure";
+constexpr std::string_view kName = "OpenBCI";
 constexpr Duration kBetweenBegins = std::chrono::milliseconds(500);
 constexpr int kMostBegins = 20;
 constexpr std::size_t kLongestGreeting = 2048;
@@ -58,7 +62,9 @@ CytonProtocol::CytonProtocol(const CytonSettings& settings, EcgSinks sinks, Devi
 
 void CytonProtocol::start() {
   prompted_ = false;
-  greeting_.clear();
+  no_board_ = false;
+  streams_ = false;
+  heard_.clear();
   framer_.restart();
   lead_.restart();
   breath_sensor_.restart();
@@ -71,33 +77,59 @@ void CytonProtocol::start() {
     send_in(kBetweenCommands, "v");
   }
   wait_longer(kSlowGreeting);
-  health().set_awaited("v, which asks for its name");
+  health().set_awaited("no answer yet to v, which asks for its name; is it switched on?");
 }
 
-void CytonProtocol::await_prompt(std::span<const std::byte> bytes) {
-  for (const std::byte b : bytes) greeting_.push_back(static_cast<char>(b));
-  const std::size_t prompt = greeting_.find(kPrompt);
-  if (prompt == std::string::npos) {
-    // Of a stream that is still running only the end can hold the prompt.
-    if (greeting_.size() > kLongestGreeting) greeting_.erase(0, greeting_.size() - kLongestGreeting / 2);
-    return;
+void CytonProtocol::await_greeting(std::span<const std::byte> bytes) {
+  for (const std::byte b : bytes) heard_.push_back(static_cast<char>(b));
+  for (std::size_t end = heard_.find(kPrompt); end != std::string::npos; end = heard_.find(kPrompt)) {
+    const std::string text = heard_.substr(0, end);
+    heard_.erase(0, end + kPrompt.size());
+    const std::size_t name = text.rfind(kName);
+    const std::size_t failure = text.rfind(kNoBoard);
+    if (failure == std::string::npos || (name != std::string::npos && name > failure)) {
+      return begin(name == std::string::npos ? "" : text.substr(name));
+    }
+    no_board_ = true;
+    answers("its dongle answers that it reaches no board: is the board switched on, and on the dongle's channel?");
   }
-  const std::size_t name = greeting_.find("OpenBCI");
-  if (name < prompt) health().set_identity(greeting_.substr(name, prompt - name));
+  // Of a stream that is still running only the end can hold the prompt.
+  if (heard_.size() > kLongestGreeting) heard_.erase(0, heard_.size() - kLongestGreeting / 2);
+  const auto running = [this](std::span<const std::byte>, std::optional<unsigned>, std::size_t) {
+    if (!std::exchange(streams_, true))
+      answers("it sends samples, of an earlier session, and does not answer to v yet.");
+  };
+  (void)framer_.feed(bytes, running);
+}
+
+void CytonProtocol::begin(const std::string& name) {
+  if (!name.empty()) health().set_identity(name);
   prompted_ = true;
+  framer_.restart();
   drop_commands();
   // To open the port anew would reset the board, and lose what it measures meanwhile.
   for (int i = 0; i < kMostBegins; ++i) send_in(i == 0 ? kBetweenCommands : kBetweenBegins, "b");
-  health().set_awaited("b, which starts its samples");
+  answers("it has told its name, and sends no sample yet after b, which starts them.");
+}
+
+// What went wrong at an earlier opening is no more.
+void CytonProtocol::answers(std::string awaited) {
+  health().set_reason("");
+  health().set_awaited(std::move(awaited));
 }
 
 std::string CytonProtocol::why_no_sample(std::uint64_t bytes, double seconds) const {
-  if (!prompted_) return EcgProtocol::why_no_sample(bytes, seconds);
-  return fmt::format("it has told its name, but sends no sample, told to begin again and again for {:.1f} s", seconds);
+  if (prompted_) {
+    return fmt::format("it has told its name, but sends no sample, told to begin again and again for {:.1f} s",
+                       seconds);
+  }
+  if (no_board_) return "the dongle reaches no board: is the board switched on, and on the dongle's channel?";
+  if (streams_) return "it sends samples, of an earlier session, and hears nothing: switch the board off and on again";
+  return EcgProtocol::why_no_sample(bytes, seconds);
 }
 
 void CytonProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> bytes, Instant arrival) {
-  if (!prompted_) return await_prompt(bytes);
+  if (!prompted_) return await_greeting(bytes);
   const double count_mV = kReference_mV / settings_.gain / kFullScale;
   const auto take = [&](std::span<const std::byte> packet, std::optional<unsigned> lost, std::size_t behind) {
     drop_commands();

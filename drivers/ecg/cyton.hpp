@@ -6,7 +6,8 @@
 //                                                     channels 1 to 8; x: accelerometer or clock; C0 to C6 closes
 //
 // A board may greet seconds after it was asked, and one that has greeted may have missed its `b`: it is told again
-// every half second until samples come.
+// every half second until samples come. A dongle that reaches no board says so, "Failure: ...$$$", which is no
+// greeting.
 //
 // There is no check sum, so shape and count stand for it: synchronisation needs three packets in a row, and a packet
 // whose number does not follow counts only when the next agrees with it.
@@ -44,11 +45,15 @@ class CytonProtocol final : public EcgProtocol {
   [[nodiscard]] std::string why_no_sample(std::uint64_t bytes, double seconds) const override;
 
  private:
-  void await_prompt(std::span<const std::byte> bytes);
+  void await_greeting(std::span<const std::byte> bytes);
+  void begin(const std::string& name);
+  void answers(std::string awaited);
 
   CytonSettings settings_;
   bool prompted_ = false;
-  std::string greeting_;
+  bool no_board_ = false;  // says the dongle, since the port was opened
+  bool streams_ = false;   // before it was told to
+  std::string heard_;      // since the last prompt
   CountedFramer framer_;
   RailWatch lead_{kSampleRate_hz, RailWatch::kLeadOff_s};
   RailWatch breath_sensor_{kSampleRate_hz, RailWatch::kSensorOff_s};

@@ -112,6 +112,7 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
   last_frame_.reset();
   stride_ = 0;
   query_ = Query::kBx2;
+  heard_ = false;
   answered_ = false;
   retries_ = 0;
   searches_ = 0;
@@ -120,7 +121,7 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
     link.send_break();
     step_ = Step::kReset;
     command_ = "a serial break";
-    health_.set_awaited(command_);
+    tell_awaited(command_);
     due_ = now + kResetTime;
   } else {
     enter(link, Step::kStop, now);
@@ -129,9 +130,14 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
 
 void NdiSession::command(LinkControl& link, const std::string& text, Duration longest, Instant now) {
   command_ = text;
-  if (step_ != Step::kStream) health_.set_awaited(command_name());
+  if (step_ != Step::kStream) tell_awaited(command_name());
   link.send(ndi_with_crc(text));
   due_ = now + longest;
+}
+
+void NdiSession::tell_awaited(const std::string& question) {
+  health_.set_awaited(heard_ ? fmt::format("it answers, but not yet to {}.", question)
+                             : fmt::format("no answer yet to {}; is it switched on?", question));
 }
 
 void NdiSession::set_rate(LinkControl& link, int baud) {
@@ -198,6 +204,7 @@ void NdiSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, I
 
 void NdiSession::on_reply(LinkControl& link, const NdiReply& reply, Instant arrival) {
   if (const auto* damaged = std::get_if<NdiDamaged>(&reply)) return on_damage(link, damaged->what, arrival);
+  heard_ = true;
   on_line_ = time_on_line(reply, link);
   if (const auto* binary = std::get_if<NdiBinary>(&reply)) {
     if (step_ == Step::kStream && query_ == Query::kBx2) return on_tracking(link, decode_bx2(binary->body), arrival);

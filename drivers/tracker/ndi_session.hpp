@@ -77,6 +77,7 @@ class NdiSession final : public DeviceProtocol {
   void enter(LinkControl& link, Step step, Instant now);
   [[nodiscard]] std::string command_name() const;  // of the command under way, without its arguments
   void set_rate(LinkControl& link, int baud);
+  void tell_awaited(const std::string& question);
   void command(LinkControl& link, const std::string& text, Duration longest, Instant now);
   void on_reply(LinkControl& link, const NdiReply& reply, Instant arrival);
   void on_text(LinkControl& link, const std::string& text, Instant now);
@@ -121,6 +122,7 @@ class NdiSession final : public DeviceProtocol {
   std::uint16_t reference_handle_ = 0;
   std::optional<std::uint16_t> unnamed_sensor_;  // as it was found at first
   Query query_ = Query::kBx2;
+  bool heard_ = false;     // a whole reply, since the link was opened
   bool answered_ = false;  // to this kind of query, at least once
   Instant asked_{};
   Duration on_line_{0};  // the reply under way

@@ -500,6 +500,47 @@ TEST(Cyton, ASlowGreetingIsAwaited) {
   }
 }
 
+// A dongle whose board is off answers in its place, in words that end as a greeting does.
+TEST(Cyton, ADonglesWordThatNoBoardAnswersIsNoGreeting) {
+  constexpr std::string_view kNoBoard = "Failure: Communications timeout - Device failed to poll Host$$$";
+  Received received;
+  CytonProtocol protocol({}, received.sink(), received.health);
+  received.health.set_reason("open, but not a byte");
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  EXPECT_THAT(received.health.awaited(), HasSubstr("no answer yet to v"));
+  say(protocol, link, kNoBoard, kStart + milliseconds(500));
+  EXPECT_THAT(received.health.awaited(), HasSubstr("is the board switched on"));
+  EXPECT_EQ(received.health.reason(), "") << "bytes have come since";
+  say(protocol, link, "Failure: Communications time", kStart + milliseconds(600));
+  EXPECT_THAT(commands_until(protocol, link, kStart + seconds(2)),
+              ElementsAre(Pair(milliseconds(250), "s"), Pair(milliseconds(350), "v"), Pair(milliseconds(1850), "s"),
+                          Pair(milliseconds(1950), "v")));
+  // The board is switched on.
+  say(protocol, link, "OpenBCI V3\n$$$", kStart + seconds(2));
+  EXPECT_THAT(received.health.identity(), ::testing::StartsWith("OpenBCI V3"));
+  EXPECT_THAT(received.health.awaited(), HasSubstr("told its name"));
+  EXPECT_THAT(commands_until(protocol, link, kStart + milliseconds(2200)), ElementsAre(Pair(milliseconds(2100), "b")));
+
+  ScriptedLink off;
+  protocol.on_open(off, kStart);
+  say(protocol, off, kNoBoard, kStart + milliseconds(500));
+  while (off.failure.empty()) protocol.on_time(off, protocol.next_time());
+  EXPECT_THAT(off.failure, HasSubstr("reaches no board"));
+}
+
+TEST(Cyton, OneThatGoesOnSendingAndHearsNothingIsNotTakenForAnotherDevice) {
+  Received received;
+  CytonProtocol protocol({}, received.sink(), received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  for (unsigned i = 0; i < 10; ++i) protocol.on_bytes(link, cyton_packet(i, 77), kStart + i * milliseconds(4));
+  EXPECT_THAT(received.health.awaited(), HasSubstr("sends samples"));
+  while (link.failure.empty()) protocol.on_time(link, protocol.next_time());
+  EXPECT_THAT(link.failure, HasSubstr("switch the board off and on"));
+  EXPECT_TRUE(received.blocks.empty());
+}
+
 TEST(Cyton, AsksAgainWhileItsDongleHearsNothing) {
   Received received;
   CytonProtocol protocol({}, received.sink(), received.health);

@@ -662,6 +662,18 @@ TEST(NdiSession, SaysWhatIsWrongWithTheTools) {
   EXPECT_THAT(wrong.host.failure, HasSubstr("no such tool: port handle 0C"));
 }
 
+TEST(NdiSession, ATrackerThatHasAnsweredIsNotAskedWhetherItIsSwitchedOn) {
+  DeviceHealth health;
+  NdiSession session(
+      wired(), [](const TrackerSample&) { FAIL(); }, health);
+  ScriptedLink link;
+  session.on_open(link, kStart);
+  session.on_bytes(link, bytes_of("OKAYA896\r"), kStart);
+  EXPECT_EQ(health.awaited(), "it answers, but not yet to INIT:.");
+  session.on_open(link, kStart + seconds(1));
+  EXPECT_THAT(health.awaited(), HasSubstr("is it switched on?"));
+}
+
 TEST(NdiSession, SilenceAndStrangersAreTold) {
   Theatre theatre(wired(), {.wired_tools = 1});
   DeviceHealth health;
@@ -669,9 +681,9 @@ TEST(NdiSession, SilenceAndStrangersAreTold) {
       wired(), [](const TrackerSample&) { FAIL(); }, health);
   ScriptedLink link;
   session.on_open(link, kStart);
-  EXPECT_EQ(health.awaited(), "TSTOP:");
+  EXPECT_EQ(health.awaited(), "no answer yet to TSTOP:; is it switched on?");
   session.on_time(link, session.next_time());  // no answer to TSTOP is none to INIT either
-  EXPECT_EQ(health.awaited(), "INIT:");
+  EXPECT_EQ(health.awaited(), "no answer yet to INIT:; is it switched on?");
   session.on_time(link, session.next_time());
   EXPECT_THAT(link.failure, HasSubstr("no answer to INIT:"));
   ScriptedLink noisy;
