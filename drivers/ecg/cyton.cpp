@@ -18,8 +18,6 @@ constexpr Duration kDongleReset = std::chrono::milliseconds(250);
 constexpr Duration kBetweenCommands = std::chrono::milliseconds(100);
 constexpr Duration kPromptTime = std::chrono::milliseconds(1500);
 constexpr int kMostResets = 2;
-constexpr Duration kSlowGreeting =
-    std::chrono::seconds(3);  // asked again sooner, a slow board would never get that far
 // What the dongle says in place of a board that does not answer; it ends as a greeting does.
 constexpr std::string_view kNoBoard = "Failure";
 constexpr std::string_view kName = "OpenBCI";
@@ -76,7 +74,9 @@ void CytonProtocol::start() {
     send_in(kPromptTime, "s");
     send_in(kBetweenCommands, "v");
   }
-  wait_longer(kSlowGreeting);
+  // Asked again sooner, a slow board would never get that far; one that is switched on meanwhile waits to be asked.
+  wait_longer(patience_);
+  patience_ = patience_ < kLongestPatience ? 2 * patience_ : kPatience;
   health().set_awaited("no answer yet to v, which asks for its name; is it switched on?");
 }
 
@@ -91,6 +91,7 @@ void CytonProtocol::await_greeting(std::span<const std::byte> bytes) {
       return begin(name == std::string::npos ? "" : text.substr(name));
     }
     no_board_ = true;
+    patience_ = kPatience;
     answers("its dongle answers that it reaches no board: is the board switched on, and on the dongle's channel?");
   }
   // Of a stream that is still running only the end can hold the prompt.
@@ -105,6 +106,7 @@ void CytonProtocol::await_greeting(std::span<const std::byte> bytes) {
 void CytonProtocol::begin(const std::string& name) {
   if (!name.empty()) health().set_identity(name);
   prompted_ = true;
+  patience_ = kPatience;
   framer_.restart();
   drop_commands();
   // To open the port anew would reset the board, and lose what it measures meanwhile.

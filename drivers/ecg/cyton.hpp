@@ -5,9 +5,9 @@
 //   A0 n aaa aaa aaa aaa aaa aaa aaa aaa xxxxxx Cn    n: count modulo 256; a: 24-bit two's complement, big-endian, of
 //                                                     channels 1 to 8; x: accelerometer or clock; C0 to C6 closes
 //
-// A board may greet seconds after it was asked, and one that has greeted may have missed its `b`: it is told again
-// every half second until samples come. A dongle that reaches no board says so, "Failure: ...$$$", which is no
-// greeting.
+// A board may greet seconds after it was asked, so after three questions it is waited for: 5 s, at the next openings of
+// the port 8 and 14 s, then 5 s again. One that has greeted may have missed its `b`: it is told again every half second
+// until samples come. A dongle that reaches no board says so, "Failure: ...$$$", which is no greeting.
 //
 // There is no check sum, so shape and count stand for it: synchronisation needs three packets in a row, and a packet
 // whose number does not follow counts only when the next agrees with it.
@@ -45,15 +45,20 @@ class CytonProtocol final : public EcgProtocol {
   [[nodiscard]] std::string why_no_sample(std::uint64_t bytes, double seconds) const override;
 
  private:
+  // From the last question on; what comes to 2 s more gives the port up.
+  static constexpr Duration kPatience = std::chrono::seconds(3);
+  static constexpr Duration kLongestPatience = std::chrono::seconds(12);
+
   void await_greeting(std::span<const std::byte> bytes);
   void begin(const std::string& name);
   void answers(std::string awaited);
 
   CytonSettings settings_;
   bool prompted_ = false;
-  bool no_board_ = false;  // says the dongle, since the port was opened
-  bool streams_ = false;   // before it was told to
-  std::string heard_;      // since the last prompt
+  bool no_board_ = false;          // says the dongle, since the port was opened
+  bool streams_ = false;           // before it was told to
+  Duration patience_ = kPatience;  // with the greeting, at the next opening
+  std::string heard_;              // since the last prompt
   CountedFramer framer_;
   RailWatch lead_{kSampleRate_hz, RailWatch::kLeadOff_s};
   RailWatch breath_sensor_{kSampleRate_hz, RailWatch::kSensorOff_s};

@@ -541,6 +541,30 @@ TEST(Cyton, OneThatGoesOnSendingAndHearsNothingIsNotTakenForAnotherDevice) {
   EXPECT_TRUE(received.blocks.empty());
 }
 
+// One that takes longer is waited for longer at the next openings, each of which makes it begin anew; then less again,
+// for a board that was off and has to be asked.
+TEST(Cyton, AnEvenSlowerGreetingIsAwaitedAtALaterOpening) {
+  Received received;
+  CytonProtocol protocol({}, received.sink(), received.health);
+  std::vector<Duration> openings;
+  for (int i = 0; i < 4; ++i) {
+    ScriptedLink link;
+    protocol.on_open(link, kStart);
+    Instant last = kStart;
+    for (; link.failure.empty(); protocol.on_time(link, last)) last = protocol.next_time();
+    openings.push_back(last - kStart);
+  }
+  EXPECT_THAT(openings, ElementsAre(milliseconds(8550), milliseconds(11550), milliseconds(17550), milliseconds(8550)));
+  // Once it has greeted the next opening is as the first.
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  say(protocol, link, "OpenBCI V3\n$$$", kStart + seconds(11));
+  ScriptedLink again;
+  protocol.on_open(again, kStart);
+  while (again.failure.empty()) protocol.on_time(again, protocol.next_time());
+  EXPECT_EQ(protocol.next_time(), kStart + milliseconds(8550));
+}
+
 TEST(Cyton, AsksAgainWhileItsDongleHearsNothing) {
   Received received;
   CytonProtocol protocol({}, received.sink(), received.health);
