@@ -110,6 +110,7 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
   rate_.restart();
   rate_refused_ = false;  // what is still wrong is told again
   last_frame_.reset();
+  disabled_ = false;
   stride_ = 0;
   query_ = Query::kBx2;
   heard_ = false;
@@ -482,8 +483,8 @@ ToolReading NdiSession::reference_at(const NdiTracking& tracking, std::uint32_t 
   return near ? nearest->reading : ToolReading{};
 }
 
-bool NdiSession::expect_rate(std::uint32_t frame, Instant arrival) {
-  rate_.observe(frame, arrival);
+bool NdiSession::expect_rate(std::int64_t count, Instant arrival) {
+  rate_.observe(count, arrival);
   if (rate_.wrong() == rate_refused_) return !rate_refused_;
   rate_refused_ = rate_.wrong();
   clock_.reset();
@@ -502,25 +503,28 @@ void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& refere
   sample.arrival = arrival;
   if (sensor.reading.state == ToolState::kDisabled && sensor.frame == 0) {
     // It has no frame and so no instant; it is told once, then again when it changes.
-    if (last_frame_ == 0U) return;
-    last_frame_ = 0U;
+    if (std::exchange(disabled_, true)) return;
+    last_frame_.reset();
     sample.source_time = arrival;
   } else {
     if (last_frame_ == sensor.frame) return;  // asked before the next frame was there
-    const std::uint32_t step = last_frame_ && *last_frame_ != 0 ? sensor.frame - *last_frame_ : 0;
+    const std::uint32_t step = last_frame_ ? sensor.frame - *last_frame_ : 0;
     constexpr std::uint32_t kBackwards = 0x80000000U;
     if (step > 0 && step < kBackwards) {
       stride_ = stride_ == 0 ? step : std::min(stride_, step);
       health_.lost.add(step / stride_ - 1);
     }
+    disabled_ = false;
     last_frame_ = sensor.frame;
-    if (!expect_rate(sensor.frame, arrival)) {
+    // Over the end of the device's 32 bits the count goes on.
+    count_ += static_cast<std::int32_t>(sensor.frame - static_cast<std::uint32_t>(count_));
+    if (!expect_rate(count_, arrival)) {
       last_reading_ = arrival;  // the device is there, and a new start would help nobody
       return;
     }
-    clock_.observe(sensor.frame, arrival - on_line_);
-    health_.jitter.add(clock_.lateness(sensor.frame, arrival - on_line_));
-    sample.source_time = clock_.stamp(sensor.frame);
+    clock_.observe(count_, arrival - on_line_);
+    health_.jitter.add(clock_.lateness(count_, arrival - on_line_));
+    sample.source_time = clock_.stamp(count_);
   }
   sample.device_frame = sensor.frame;
   const ToolReading reading = in_world(sensor.reading, reference, settings_.world);
@@ -558,7 +562,7 @@ std::string NdiSession::why_no_reading() const {
                        command_, damaged_, damage_);
   }
   if (!command_.empty()) return fmt::format("no answer to {} for 2 s", command_);
-  if (last_frame_ == 0U) return "the sensor's tool has been disabled for 2 s: is it unplugged?";
+  if (disabled_) return "the sensor's tool has been disabled for 2 s: is it unplugged?";
   return "no reading of the sensor's tool for 2 s";
 }
 

@@ -97,7 +97,7 @@ class NdiSession final : public DeviceProtocol {
   [[nodiscard]] ToolReading reference_at(const NdiTracking& tracking, std::uint32_t frame) const noexcept;
   [[nodiscard]] Instant next_expectation() const noexcept;
   // Whether the frames come at the rate that the stamps are made by; tells when that changes.
-  bool expect_rate(std::uint32_t frame, Instant arrival);
+  bool expect_rate(std::int64_t count, Instant arrival);
   [[nodiscard]] std::string why_no_reading() const;
 
   NdiSettings settings_;
@@ -130,10 +130,12 @@ class NdiSession final : public DeviceProtocol {
   NdiToolReading reference_;   // the last
   Instant reference_there_{};  // not disabled
   Instant quiet_until_{};
-  std::uint64_t damaged_ = 0;  // replies since the last whole one
-  std::string damage_;         // of the last of them
-  std::optional<std::uint32_t> last_frame_;
-  std::uint32_t stride_ = 0;  // device frames from one reading to the next, the least seen
+  std::uint64_t damaged_ = 0;                // replies since the last whole one
+  std::string damage_;                       // of the last of them
+  std::optional<std::uint32_t> last_frame_;  // none while the sensor is disabled
+  bool disabled_ = false;                    // was told last of the sensor, without a frame
+  std::int64_t count_ = 0;                   // of frames, without an end
+  std::uint32_t stride_ = 0;                 // device frames from one reading to the next, the least seen
   int retries_ = 0;
 };
 

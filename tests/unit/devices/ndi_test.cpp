@@ -233,9 +233,9 @@ Pose swaying_at(std::uint32_t frame) { return track().at(frame).X_TO; }
 // Session and emulated device, connected without a transport; time is made.
 struct Theatre {
   Theatre(NdiSettings settings, const NdiEmulatorSettings& device_settings, bool serial = false,
-          const EmulatorFaults& faults = {}, int baud = 0)
+          const EmulatorFaults& faults = {}, int baud = 0, const PoseTrack& poses = track())
       : far(serial, baud),
-        device(track(), device_settings, faults),
+        device(poses, device_settings, faults),
         session(
             std::move(settings), [this](const TrackerSample& sample) { samples.push_back(sample); }, health),
         host(serial, baud) {
@@ -296,6 +296,28 @@ TEST(NdiSession, GivesEveryFrameOnceWithItsInstantByBx2BxAndTx) {
         ASSERT_LT(std::abs(to_seconds(sample.source_time - measured)), 3e-3);
       }
     }
+  }
+}
+
+// Over the end of 32 bits; the first frame behind it comes late, which tells a clock that has begun anew.
+TEST(NdiSession, TheFrameNumbersEndIsNoGapAndNoNewBeginningOfTheClock) {
+  const Instant end = kStart + seconds(3);
+  Theatre theatre(wired(), {.wired_tools = 1}, false, {}, 0, PoseTrack::swaying(end, 100.0));
+  theatre.run(end - milliseconds(5) - theatre.now);
+  theatre.now += milliseconds(12);
+  theatre.run(seconds(2));
+  ASSERT_EQ(theatre.host.failure, "");
+  EXPECT_EQ(theatre.health.lost.get(), 0U);
+  ASSERT_GT(theatre.samples.size(), 450U);
+  EXPECT_GT(theatre.samples[0].device_frame, 0xFFFFFE00U);
+  EXPECT_LT(theatre.samples.back().device_frame, 500U);
+  for (std::size_t i = 1; i < theatre.samples.size(); ++i) {
+    const TrackerSample& sample = theatre.samples[i];
+    ASSERT_EQ(sample.device_frame, theatre.samples[i - 1].device_frame + 1);
+    ASSERT_GT(sample.source_time, theatre.samples[i - 1].source_time);
+    const Instant measured = end + static_cast<std::int32_t>(sample.device_frame) * milliseconds(10);
+    if (i < 100) continue;
+    ASSERT_LT(std::abs(to_seconds(sample.source_time - measured)), 4e-3) << sample.device_frame;
   }
 }
 
