@@ -1,15 +1,17 @@
 // A device is taken from a running perimapd and given back again and again: what is a subscriber told, and how soon?
 // pulled_device PID SOURCE TIMES PULL PLUG
 //   PID        of perimapd
-//   SOURCE     camera or ecg
+//   SOURCE     camera, ecg or r_trigger
 //   TIMES      how often
 //   PULL PLUG  shell commands that take the device away and give it back
-// Exit code 0 when each time the source was told not to be OK, was OK again after it was given back, surfaces went on,
-// and perimapd's descriptors and memory stay what they were after the first time.
+// Exit code 0 when the source was OK, each time was told to be gone and was OK again after it was given back, surfaces
+// went on, and perimapd's descriptors and memory stay what they were after the first time. A trigger that is gone must
+// be told as closed: stalled is also one whose monitor counts no beat.
 #include <fmt/format.h>
 
 #include <chrono>
 #include <cstdlib>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,13 +25,14 @@ namespace perimap::test {
 namespace {
 
 // An emulated processor takes its time.
-constexpr Duration kPatience = std::chrono::seconds(60);
+constexpr Duration kPatience = std::chrono::seconds(60);  // with each word: then it was never told
 constexpr Duration kOut = std::chrono::seconds(2);
 constexpr long kMoreMemory_kB = 4096;  // of which the allocator may keep some
 
 std::optional<Duration> told(const ToldStates& states, perimap_SourceKind kind,
                              const std::vector<perimap_SourceState>& any, Instant since) {
-  while (MonotonicClock::now() < since + kPatience) {
+  const Instant deadline = MonotonicClock::now() + kPatience;
+  while (MonotonicClock::now() < deadline) {
     if (const auto change = states.first(kind, any, since)) return change->receipt - since;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
@@ -45,12 +48,15 @@ int run(pid_t pid, perimap_SourceKind kind, int times, const std::string& pull, 
   auto readers = SampleReaders::create(0, false);
   if (!readers) return fail(readers.error().message);
   ToldStates states(std::move(*readers));
+  if (!told(states, kind, {perimap_SOURCE_OK}, Instant())) return fail("it is not there to begin with");
+  std::vector<perimap_SourceState> as_gone{perimap_SOURCE_CLOSED};
+  if (kind != perimap_SOURCE_R_TRIGGER) as_gone.push_back(perimap_SOURCE_STALLED);
   std::vector<Duration> gone, back;
   long descriptors_first = 0, resident_first_kB = 0;
   for (int i = 0; i < times; ++i) {
     const Instant pulled = MonotonicClock::now();
     if (std::system(pull.c_str()) != 0) return fail(pull);
-    const auto word = told(states, kind, {perimap_SOURCE_CLOSED, perimap_SOURCE_STALLED}, pulled);
+    const auto word = told(states, kind, as_gone, pulled);
     if (!word) return fail(fmt::format("time {}: nobody is told that it is gone", i + 1));
     gone.push_back(*word);
     const std::size_t before = states.surfaces().size();
@@ -79,9 +85,10 @@ int run(pid_t pid, perimap_SourceKind kind, int times, const std::string& pull, 
 
 int main(int argc, char** argv) {
   using namespace perimap::test;
-  const std::string_view source = argc == 6 ? argv[2] : "";
+  const std::map<std::string_view, perimap_SourceKind> sources{
+      {"camera", perimap_SOURCE_CAMERA}, {"ecg", perimap_SOURCE_ECG}, {"r_trigger", perimap_SOURCE_R_TRIGGER}};
+  const auto source = argc == 6 ? sources.find(argv[2]) : sources.end();
   const int times = argc == 6 ? std::atoi(argv[3]) : 0;
-  if ((source != "camera" && source != "ecg") || times < 1) return fail("PID camera|ecg TIMES PULL PLUG");
-  return run(std::atoi(argv[1]), source == "camera" ? perimap_SOURCE_CAMERA : perimap_SOURCE_ECG, times, argv[4],
-             argv[5]);
+  if (source == sources.end() || times < 1) return fail("PID camera|ecg|r_trigger TIMES PULL PLUG");
+  return run(std::atoi(argv[1]), source->second, times, argv[4], argv[5]);
 }

@@ -9,7 +9,7 @@ usage() {
 tests/vm/run.sh [--kernel amd64|rt-amd64]... [--build FOLDER] [TEST...]
   TEST      devices: ECG over CAN, frames from a V4L2 node, the tracker over a pseudo-terminal, under systemd
             drivers: an R trigger on a modem line, own frames out of a video output and in by a camera
-            unplugged: the CAN interface and the camera are taken away 20 times
+            unplugged: the CAN interface, the camera and the R trigger's port are taken away 20 times
             service: the Debian package, its service, the watchdog
             all of them when none is named
   --kernel  Debian's stock kernel or its PREEMPT_RT kernel; both when not given, `devices` alone with the latter
@@ -87,7 +87,7 @@ for kernel in "${kernels[@]}"; do
     exchange=$folder/$test-$kernel
     rm -rf "$exchange"
     mkdir -p "$exchange"
-    cp "$vm_guest"/{common.sh,camera.yaml} "$exchange/"
+    cp "$vm_guest"/{common.sh,trigger.sh,camera.yaml} "$exchange/"
     # The guest has a /tmp of its own, and the build may lie in there.
     mkdir "$exchange/bin"
     cp "$build"/tests/vm/{hold_thread,same_frames,pulled_device} "$build/daemon/perimap" "$exchange/bin/"

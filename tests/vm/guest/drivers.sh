@@ -10,19 +10,8 @@ fail() {
   exit 1
 }
 
-# A USB gadget at a bus of the kernel's own: while its end is open, the other end sees carrier.
-modprobe dummy_hcd && modprobe g_serial || fail "no serial gadget"
-udevadm settle
-[ -e /dev/ttyACM0 ] && [ -e /dev/ttyGS0 ] || fail "no serial port of it"
-(
-  while :; do
-    exec 3<> /dev/ttyGS0
-    sleep 0.1
-    exec 3>&-
-    sleep 0.7
-  done
-) &
-beats=$!
+. /vm/trigger.sh
+trigger_line 0.1 0.7
 printf 'version = 1\n[ecg]\nr_trigger = true\nr_trigger_port = "/dev/ttyACM0"\n' > trigger.toml
 perimap probe trigger.toml --seconds 12 --json > trigger.json || fail "the trigger is not there: $(cat trigger.json)"
 kill $beats

@@ -1,7 +1,8 @@
-# perimapd as an installed service: the CAN interface goes down and the camera is taken from its driver, 20 times each.
-# Each time a subscriber is told and the device recovers; nothing leaks.
+# perimapd as an installed service: the CAN interface goes down, the camera is taken from its driver, the R trigger's USB
+# port is taken away, 20 times each. Each time a subscriber is told and the device recovers; nothing leaks.
 set -uo pipefail
 . /vm/common.sh
+. /vm/trigger.sh
 service_over_devices
 
 received 15 /tmp/all
@@ -21,4 +22,14 @@ pulled camera "echo vivid.0 > $driver/unbind" \
 received 15 /tmp/again
 holds /tmp/again "afterwards a sample a frame, none lost" "x.received > 20 && x.missing === 0"
 [ "$(systemctl show -P MainPID perimapd)" = "$daemon" ] || fail "it was started again"
+
+# R peaks from a trigger, and the ECG beside it.
+trigger_line 0.3 0.5
+printf 'r_trigger = true\nr_trigger_port = "/dev/ttyACM0"\n' >> /etc/perimap/perimapd.toml
+systemctl restart perimapd || fail "the service does not start with a trigger"
+daemon=$(systemctl show -P MainPID perimapd)
+received 5 /tmp/trigger
+pulled r_trigger "echo 0 > $trigger_usb/authorized" "echo 1 > $trigger_usb/authorized"
+[ "$(systemctl show -P MainPID perimapd)" = "$daemon" ] || fail "it was started again with a trigger"
+kill $beats
 all_stopped
