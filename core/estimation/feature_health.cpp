@@ -1,6 +1,7 @@
 #include "core/estimation/feature_health.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace perimap {
 
@@ -23,7 +24,7 @@ void FeatureHealth::set_level(std::size_t level) noexcept {
 
 HealthAction FeatureHealth::add(double nis, bool accepted) noexcept {
   constexpr int kCountLimit = 1'000'000;
-  fast_.add(nis);
+  fast_.add(accepted ? nis : std::numeric_limits<double>::infinity());
   if (accepted) slow_.add(nis);
   since_change_ = std::min(since_change_ + 1, kCountLimit);
   if (since_inflation_ >= 0) since_inflation_ = std::min(since_inflation_ + 1, kCountLimit);

@@ -46,7 +46,8 @@ class FeatureHealth {
  public:
   explicit FeatureHealth(const FeatureHealthSettings& settings = {}) noexcept;
 
-  // After each update: its NIS and whether it was accepted. The caller carries the action out; kStartAnew comes once.
+  // After each update: its NIS, which counts only if it was accepted (one refused may have none). The caller carries
+  // the action out; kStartAnew comes once.
   [[nodiscard]] HealthAction add(double nis, bool accepted) noexcept;
   // After a new start.
   void reset() noexcept;

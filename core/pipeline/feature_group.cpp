@@ -208,6 +208,12 @@ void FeatureGroup::follow_slow_errors(const PixelModel& model, int k, const Lane
   }
 }
 
+void FeatureGroup::judge(std::size_t lane, double nis, bool accepted) noexcept {
+  FeatureSlot& slot = slots_[lane];
+  if (slot.health.add(nis, accepted) == HealthAction::kInflate) bank_.diffuse(feature(lane), kInflation_mm);
+  count_update(slot, accepted);
+}
+
 void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& settings) noexcept {
   for (int k = 0; k < plan_.phases.learnt(); ++k) {
     const FrameRecord& frame = *plan_.learnt[static_cast<std::size_t>(k)];
@@ -226,7 +232,7 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
       Vector2d predicted_px;
       Matrix23d J_C;
       if (model.camera.project(frame.X_CW * p_WF, predicted_px, &J_C) != ProjectionStatus::kOk) {
-        count_update(slot, false);
+        judge(lane, 0.0, false);
         continue;
       }
       const Matrix23d J_p = J_C * frame.X_CW.R;
@@ -240,16 +246,13 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
     follow_slow_errors(model, k, outcomes, R);
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
       if ((outcomes.considered >> lane & 1) == 0) continue;
+      judge(lane, outcomes.normalised_innovation_squared[lane], (outcomes.accepted >> lane & 1) != 0);
       FeatureSlot& slot = slots_[lane];
-      const bool accepted = (outcomes.accepted >> lane & 1) != 0;
-      const HealthAction action = slot.health.add(outcomes.normalised_innovation_squared[lane], accepted);
-      if (action == HealthAction::kInflate) bank_.diffuse(feature(lane), kInflation_mm);
       if (slot.health.process_noise() > 0.0 && frame.stamp.capture > slot.last_learnt) {
         const double elapsed_s = to_seconds(frame.stamp.capture - slot.last_learnt);
         bank_.diffuse(feature(lane), slot.health.process_noise() * std::sqrt(elapsed_s));
       }
       slot.last_learnt = std::max(slot.last_learnt, frame.stamp.capture);
-      count_update(slot, accepted);
     }
   }
 }

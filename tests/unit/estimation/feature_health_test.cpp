@@ -103,11 +103,13 @@ TEST(FeatureHealth, InflationThatHelpsIsEnough) {
   EXPECT_EQ(feed(health, innovations, 4.0, 100), HealthAction::kInflate) << "a later jump is met afresh";
 }
 
-TEST(FeatureHealth, ARefusedUpdateThatIsNotANumberCountsAsAnOutlier) {
-  FeatureHealth health;
-  HealthAction strongest = HealthAction::kNone;
-  for (int i = 0; i < 300; ++i) strongest = std::max(strongest, health.add(std::nan(""), false));
-  EXPECT_EQ(strongest, HealthAction::kStartAnew);
+TEST(FeatureHealth, ARefusedUpdateCountsAsAnOutlierWhateverItsInnovation) {
+  for (const double nis : {0.0, 2.0, std::nan("")}) {
+    FeatureHealth health;
+    HealthAction strongest = HealthAction::kNone;
+    for (int i = 0; i < 300; ++i) strongest = std::max(strongest, health.add(nis, false));
+    EXPECT_EQ(strongest, HealthAction::kStartAnew) << nis;
+  }
 }
 
 }  // namespace
