@@ -12,6 +12,9 @@ namespace {
 // As wide as the search for a feature that has no map yet.
 constexpr double kMotionDeviation_px = 10.0;
 
+// Not all that is found lives through the round, least of all where the heart moves fastest; what is over is let go.
+constexpr int with_spare(int wanted) { return wanted + wanted / 2; }
+
 }  // namespace
 
 FeatureFinder::FeatureFinder(const PipelineSettings& settings, PipelineCounters& counters)
@@ -38,7 +41,7 @@ void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, co
     // Relaxed: housekeeping sets it again only after it has popped this round's steps, and the ring orders that.
     done_.store(false, std::memory_order_relaxed);
     occupied_.assign(occupied.begin(), occupied.end());
-    wanted_ = std::min(wanted, static_cast<int>(kMaximumPerRound));
+    wanted_ = std::min(with_spare(wanted), static_cast<int>(kMaximumPerRound));
   }
   const std::uint64_t step = frame_index - begun_at_;
   if (step >= frames_.size()) return;

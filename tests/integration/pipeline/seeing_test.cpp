@@ -90,6 +90,9 @@ class Watch {
     if (now.frame.stamp.sequence >= kSettled) {
       ++figures.frames;
       figures.least_live = std::min(figures.least_live, live);
+      if (verbose() && 10 * live < 9 * static_cast<int>(pipeline_.slots().size())) {
+        std::printf("short: frame %d, %d live\n", static_cast<int>(now.frame.stamp.sequence), live);
+      }
       figures.frames_short_of_features += 10 * live < 9 * static_cast<int>(pipeline_.slots().size()) ? 1 : 0;
     }
     for (auto& [id, feature] : watched_) {
