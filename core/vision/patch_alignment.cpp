@@ -30,13 +30,13 @@ struct Sums {
 };
 
 Sums in_grey_levels(const PatchTemplate::Level& level, const PatchSums& raw) noexcept {
-  constexpr double kGrey = 1.0 / kGreyScale;
+  constexpr double kGrey = 1.0 / PatchTemplate::kGreyScale;
   constexpr double kGradient = kGrey / PatchTemplate::kGradientScale;
   constexpr double kMoment = kGradient * PatchTemplate::kMomentDivisor;
   Sums sums;
   sums.grey = kGrey * raw.grey;
   sums.grey_squared = kGrey * kGrey * raw.grey_squared;
-  sums.with_template = kGrey * raw.with_template;
+  sums.with_template = kGrey * kGrey * raw.with_template;
   const double gx = kGradient * raw.with_gradient_x, gy = kGradient * raw.with_gradient_y;
   sums.with_sd << gx, gy, kMoment * raw.with_moments[0] - level.offset_x * gx,
       kMoment * raw.with_moments[1] - level.offset_y * gx, kMoment * raw.with_moments[2] - level.offset_x * gy,
@@ -63,8 +63,8 @@ double residual_variance(const PatchTemplate::Level& level, const PatchSamples& 
   constexpr int kBlock = 3;
   constexpr int kSide = PatchTemplate::kSide[0];
   constexpr int kAcross = kSide / kBlock;
-  // Of a block: its samples' sum less scaled_gain times its template pixels' and less scaled_bias.
-  const double scaled_gain = kGreyScale * fit.gain;
+  // Of a block: its samples' sum less the gain times its template pixels' and less scaled_bias.
+  constexpr int kGreyScale = PatchTemplate::kGreyScale;
   const double scaled_bias = kGreyScale * kBlock * kBlock * (fit.bias + (fit.gain - 1) * PatchTemplate::kGreyOrigin);
   double sum_squares = 0;
   for (int by = 0; by < kAcross; ++by) {
@@ -78,13 +78,15 @@ double residual_variance(const PatchTemplate::Level& level, const PatchSamples& 
     for (int bx = 0; bx < kAcross; ++bx) {
       const auto x = static_cast<std::size_t>(kBlock * bx);
       const double residual = (seen[x] + seen[x + 1] + seen[x + 2]) -
-                              scaled_gain * (expected[x] + expected[x + 1] + expected[x + 2]) - scaled_bias;
+                              fit.gain * (expected[x] + expected[x + 1] + expected[x + 2]) - scaled_bias;
       sum_squares += residual * residual;
     }
   }
   // Gain, bias and warp have taken their share of the low frequencies.
   const double free_blocks = kAcross * kAcross - 2 - free_parameters;
-  return sum_squares / (kGreyScale * kGreyScale * kBlock * kBlock * free_blocks);
+  // Of a pixel's noise a block of smoothed pixels keeps this, averaged over where between pixels they are sampled.
+  constexpr double kKept = 0.73;
+  return sum_squares / (kKept * kGreyScale * kGreyScale * kBlock * kBlock * free_blocks);
 }
 
 // The projected steepest-descent images times the image, divided by the gain: the right-hand side of the normal
@@ -182,8 +184,9 @@ bool warped_window_fits(const GreyImage& image, const PatchTemplate::Level& leve
   constexpr double kMaxReach = 8;                 // so that offsets within the window fit 32 bits,
   constexpr std::ptrdiff_t kMaxStride = 1 << 22;  // with this
   if (image.stride > kMaxStride) return false;
-  return reach_u < kMaxReach && reach_v < kMaxReach && u - half * reach_u >= 0 && v - half * reach_v >= 0 &&
-         u + half * reach_u < image.width - 1 && v + half * reach_v < image.height - 1;
+  constexpr int kBefore = PatchKernels::kBefore, kBehind = PatchKernels::kBehind;
+  return reach_u < kMaxReach && reach_v < kMaxReach && u - half * reach_u >= kBefore && v - half * reach_v >= kBefore &&
+         u + half * reach_u < image.width - kBehind && v + half * reach_v < image.height - kBehind;
 }
 
 AlignmentResult align_translation(const GreyImage& image, const PatchTemplate::Level& level,

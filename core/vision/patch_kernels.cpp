@@ -76,53 +76,76 @@ HWY_INLINE void clear_tail(int side, PatchSamples& samples) noexcept {
   for (int i = side * side; i < side * side + 32; i += kLanes16) hn::StoreU(hn::Zero(d), d, samples.grey.data() + i);
 }
 
-// kGreyScale times the grey values, interpolated along the row.
-HWY_INLINE Vector16 sample_row(const std::uint8_t* p, Vector16 fraction) noexcept {
+static_assert(PatchTemplate::kGreyScale == 16, "sample_row shifts by 4");
+
+// Weights of the pixels before and behind the nearest one, which is `from_nearest` away, [-1/2, 1/2).
+struct SplineWeights {
+  double before, behind;
+};
+HWY_INLINE SplineWeights spline_weights(double from_nearest) noexcept {
+  const auto half_square = [](double x) { return 0.5 * x * x; };
+  return {half_square(0.5 - from_nearest), half_square(0.5 + from_nearest)};
+}
+
+HWY_INLINE Vector16 blend(Vector16 before, Vector16 nearest, Vector16 behind, Vector16 weight_before,
+                          Vector16 weight_behind) noexcept {
+  return hn::Add(nearest, hn::Add(hn::MulFixedPoint15(hn::Sub(before, nearest), weight_before),
+                                  hn::MulFixedPoint15(hn::Sub(behind, nearest), weight_behind)));
+}
+
+// kGreyScale times the grey values along the row, from the pixel before the nearest one on.
+HWY_INLINE Vector16 sample_row(const std::uint8_t* p, Vector16 weight_before, Vector16 weight_behind) noexcept {
   const Tag16 d;
   const hn::Rebind<std::uint8_t, Tag16> d8;
-  const Vector16 a = hn::ShiftLeft<4>(hn::PromoteTo(d, hn::LoadU(d8, p)));
-  const Vector16 b = hn::ShiftLeft<4>(hn::PromoteTo(d, hn::LoadU(d8, p + 1)));
-  return hn::Add(a, hn::MulFixedPoint15(hn::Sub(b, a), fraction));
+  const auto grey = [&](const std::uint8_t* at)
+                        HWY_ATTR { return hn::ShiftLeft<4>(hn::PromoteTo(d, hn::LoadU(d8, at))); };
+  return blend(grey(p), grey(p + 1), grey(p + 2), weight_before, weight_behind);
 }
 
 void sample_shifted(const GreyImage& image, int side, const Vector2d& first, PatchSamples& samples) noexcept {
   constexpr int kVectors = (PatchTemplate::kSide[0] + kLanes16 - 1) / kLanes16;
-  constexpr int kReach = kVectors * kLanes16 + 1;
+  constexpr int kReach = kVectors * kLanes16 + 2;
   constexpr int kLocalStride = 72;
-  constexpr int kLocalRows = PatchTemplate::kSide[0] + 1;
+  constexpr int kLocalRows = PatchTemplate::kSide[0] + 2;
   const Tag16 d;
-  const int u = static_cast<int>(std::floor(first.x())), v = static_cast<int>(std::floor(first.y()));
-  const auto fixed = [](double fraction) {
-    return static_cast<std::int16_t>(std::min(32767.0, std::floor(32768.0 * fraction + 0.5)));
-  };
-  const Vector16 fu = hn::Set(d, fixed(first.x() - u)), fv = hn::Set(d, fixed(first.y() - v));
+  const int u = static_cast<int>(std::floor(first.x() + 0.5)), v = static_cast<int>(std::floor(first.y() + 0.5));
+  const auto fixed = [d](double weight)
+                         HWY_ATTR { return hn::Set(d, static_cast<std::int16_t>(std::floor(32768.0 * weight + 0.5))); };
+  const SplineWeights across = spline_weights(first.x() - u), down = spline_weights(first.y() - v);
+  const Vector16 left = fixed(across.before), right = fixed(across.behind);
+  const Vector16 upper = fixed(down.before), lower = fixed(down.behind);
 
-  const std::uint8_t* p = image.row(v) + u;
+  const std::uint8_t* p = image.row(v - 1) + u - 1;
   std::ptrdiff_t stride = image.stride;
   // Whole vectors would reach beyond the last pixel: sample a copy.
   std::array<std::uint8_t, static_cast<std::size_t>(kLocalStride) * kLocalRows> local;
-  if ((v + side) * image.stride + u + kReach > (image.height - 1) * image.stride + image.width) {
+  if ((v + side) * image.stride + u - 1 + kReach > (image.height - 1) * image.stride + image.width) {
     local.fill(0);
-    for (int y = 0; y <= side; ++y) {
-      std::memcpy(local.data() + y * kLocalStride, p + y * stride, static_cast<std::size_t>(side) + 1);
+    for (int y = 0; y < side + 2; ++y) {
+      std::memcpy(local.data() + y * kLocalStride, p + y * stride, static_cast<std::size_t>(side) + 2);
     }
     p = local.data();
     stride = kLocalStride;
   }
 
   const int vectors = (side + kLanes16 - 1) / kLanes16;
-  Vector16 above[kVectors];
-  for (int k = 0; k < vectors; ++k) above[k] = sample_row(p + k * kLanes16, fu);
-  const Vector16 origin = hn::Set(d, static_cast<std::int16_t>(kGreyScale * PatchTemplate::kGreyOrigin));
+  Vector16 above[kVectors], here[kVectors];
+  for (int k = 0; k < vectors; ++k) {
+    above[k] = sample_row(p + k * kLanes16, left, right);
+    here[k] = sample_row(p + stride + k * kLanes16, left, right);
+  }
+  p += stride;
+  const Vector16 origin = hn::Set(d, static_cast<std::int16_t>(PatchTemplate::kGreyScale * PatchTemplate::kGreyOrigin));
   std::int16_t* out = samples.grey.data();
   for (int y = 0; y < side; ++y) {
     p += stride;
     for (int k = 0; k < vectors; ++k) {
-      const Vector16 below = sample_row(p + k * kLanes16, fu);
-      const Vector16 grey = hn::Add(above[k], hn::MulFixedPoint15(hn::Sub(below, above[k]), fv));
+      const Vector16 below = sample_row(p + k * kLanes16, left, right);
+      const Vector16 grey = blend(above[k], here[k], below, upper, lower);
       // What is stored beyond the row is overwritten by the next.
       hn::StoreU(hn::Sub(grey, origin), d, out + k * kLanes16);
-      above[k] = below;
+      above[k] = here[k];
+      here[k] = below;
     }
     out += side;
   }
@@ -139,14 +162,15 @@ void sample_warped(const GreyImage& image, int side, const WindowGrid& grid, Pat
   const TagI di;
   const hn::Rebind<std::int16_t, TagF> d16;
   constexpr int kLanesF = static_cast<int>(hn::MaxLanes(TagF()));
-  // Positions relative to a pixel left of and above the whole window are small enough for float.
+  // Positions relative to a pixel left of and above the whole window are small enough for float; its own neighbours are
+  // in the image.
   const double last = side - 1;
   const auto least = [last](double first, double a, double b) {
     return std::floor(first + std::min(0.0, last * a) + std::min(0.0, last * b));
   };
-  const double base_u = std::max(0.0, least(grid.first.x(), grid.per_column.x(), grid.per_row.x()));
-  const double base_v = std::max(0.0, least(grid.first.y(), grid.per_column.y(), grid.per_row.y()));
-  const std::uint8_t* const base = image.row(static_cast<int>(base_v)) + static_cast<int>(base_u);
+  const double base_u = std::max(1.0, least(grid.first.x(), grid.per_column.x(), grid.per_row.x()));
+  const double base_v = std::max(1.0, least(grid.first.y(), grid.per_column.y(), grid.per_row.y()));
+  const std::uint8_t* const base = image.row(static_cast<int>(base_v) - 1) + static_cast<int>(base_u) - 1;
   const VectorF first_u = hn::Set(df, static_cast<float>(grid.first.x() - base_u));
   const VectorF first_v = hn::Set(df, static_cast<float>(grid.first.y() - base_v));
   const VectorF u_x = hn::Set(df, static_cast<float>(grid.per_column.x()));
@@ -159,46 +183,54 @@ void sample_warped(const GreyImage& image, int side, const WindowGrid& grid, Pat
 
   // In three passes, so that no vector is read right after its elements were written one by one, which stalls.
   constexpr std::size_t kRoom = PatchTemplate::kMaxSamples;
-  HWY_ALIGN std::array<float, kRoom> fractions_u, fractions_v;
+  HWY_ALIGN std::array<float, kRoom> from_nearest_u, from_nearest_v;
   HWY_ALIGN std::array<std::int32_t, kRoom> offsets;
+  const VectorF half = hn::Set(df, 0.5F);
   for (int i = 0; i < pixels; i += kLanesF) {
     const VectorF x = hn::Load(df, places.column.data() + i);
     const VectorF y = hn::Load(df, places.row.data() + i);
     // Not fused: the same values on every target.
     const VectorF u = hn::Max(hn::Zero(df), hn::Add(first_u, hn::Add(hn::Mul(u_x, x), hn::Mul(u_y, y))));
     const VectorF v = hn::Max(hn::Zero(df), hn::Add(first_v, hn::Add(hn::Mul(v_x, x), hn::Mul(v_y, y))));
-    const VectorI u_0 = hn::ConvertTo(di, u), v_0 = hn::ConvertTo(di, v);
-    hn::Store(hn::Sub(u, hn::ConvertTo(df, u_0)), df, fractions_u.data() + i);
-    hn::Store(hn::Sub(v, hn::ConvertTo(df, v_0)), df, fractions_v.data() + i);
+    const VectorI u_0 = hn::ConvertTo(di, hn::Add(u, half)), v_0 = hn::ConvertTo(di, hn::Add(v, half));
+    hn::Store(hn::Sub(u, hn::ConvertTo(df, u_0)), df, from_nearest_u.data() + i);
+    hn::Store(hn::Sub(v, hn::ConvertTo(df, v_0)), df, from_nearest_v.data() + i);
     hn::Store(hn::Add(hn::Mul(v_0, stride), u_0), di, offsets.data() + i);
   }
 
-  // The four neighbours of each, upper left lowest. Scalar loads: gathers take longer on the machines measured.
-  HWY_ALIGN std::array<std::uint32_t, kRoom> neighbours;
+  // The nine around each, in three rows, the left one lowest; the fourth byte is not used. Scalar loads: gathers take
+  // longer on the machines measured.
+  HWY_ALIGN std::array<std::uint32_t, kRoom> above, here, below;
   for (int i = 0; i < (pixels + kLanesF - 1) / kLanesF * kLanesF; ++i) {
-    const std::uint8_t* const p = base + offsets[static_cast<std::size_t>(i)];
-    std::uint16_t above, below;
-    std::memcpy(&above, p, sizeof above);
-    std::memcpy(&below, p + image.stride, sizeof below);
-    neighbours[static_cast<std::size_t>(i)] = above | static_cast<std::uint32_t>(below) << 16;
+    const auto at = static_cast<std::size_t>(i);
+    const std::uint8_t* const p = base + offsets[at];
+    std::memcpy(&above[at], p, sizeof above[at]);
+    std::memcpy(&here[at], p + image.stride, sizeof here[at]);
+    std::memcpy(&below[at], p + 2 * static_cast<std::ptrdiff_t>(image.stride), sizeof below[at]);
   }
 
   const hn::RebindToUnsigned<TagI> du;
   const auto byte = hn::Set(du, 255U);
   const auto grey_of = [&](hn::Vec<decltype(du)> low_byte)
                            HWY_ATTR { return hn::ConvertTo(df, hn::BitCast(di, low_byte)); };
+  const auto blend = [&](VectorF before, VectorF nearest, VectorF behind, VectorF weight_before, VectorF weight_behind)
+                         HWY_ATTR {
+                           return hn::Add(nearest, hn::Add(hn::Mul(hn::Sub(before, nearest), weight_before),
+                                                           hn::Mul(hn::Sub(behind, nearest), weight_behind)));
+                         };
   for (int i = 0; i < pixels; i += kLanesF) {
-    const auto four = hn::Load(du, neighbours.data() + i);
-    const VectorF fu = hn::Load(df, fractions_u.data() + i), fv = hn::Load(df, fractions_v.data() + i);
-    const VectorF a_0 = grey_of(hn::And(four, byte));
-    const VectorF a_1 = grey_of(hn::And(hn::ShiftRight<8>(four), byte));
-    const VectorF b_0 = grey_of(hn::And(hn::ShiftRight<16>(four), byte));
-    const VectorF b_1 = grey_of(hn::ShiftRight<24>(four));
-    const VectorF a = hn::Add(a_0, hn::Mul(fu, hn::Sub(a_1, a_0)));
-    const VectorF b = hn::Add(b_0, hn::Mul(fu, hn::Sub(b_1, b_0)));
-    const VectorF grey = hn::Add(a, hn::Mul(fv, hn::Sub(b, a)));
+    const auto weight_of = [&](VectorF distance) HWY_ATTR { return hn::Mul(half, hn::Mul(distance, distance)); };
+    const VectorF u = hn::Load(df, from_nearest_u.data() + i), v = hn::Load(df, from_nearest_v.data() + i);
+    const VectorF left = weight_of(hn::Sub(half, u)), right = weight_of(hn::Add(half, u));
+    const auto across = [&](const std::uint32_t* row) HWY_ATTR {
+      const auto three = hn::Load(du, row + i);
+      return blend(grey_of(hn::And(three, byte)), grey_of(hn::And(hn::ShiftRight<8>(three), byte)),
+                   grey_of(hn::And(hn::ShiftRight<16>(three), byte)), left, right);
+    };
+    const VectorF grey = blend(across(above.data()), across(here.data()), across(below.data()),
+                               weight_of(hn::Sub(half, v)), weight_of(hn::Add(half, v)));
     const VectorF scaled = hn::Mul(hn::Sub(grey, hn::Set(df, static_cast<float>(PatchTemplate::kGreyOrigin))),
-                                   hn::Set(df, static_cast<float>(kGreyScale)));
+                                   hn::Set(df, static_cast<float>(PatchTemplate::kGreyScale)));
     hn::StoreU(hn::DemoteTo(d16, hn::NearestInt(scaled)), d16, samples.grey.data() + i);
   }
   clear_tail(side, samples);

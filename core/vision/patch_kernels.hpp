@@ -12,9 +12,13 @@
 
 namespace perimap {
 
-// A window seen in the image: kGreyScale (I - PatchTemplate::kGreyOrigin) in 16 bits, rounded, row after row as in the
-// template, zeros behind.
-inline constexpr int kGreyScale = 16;
+// A window seen in the image, as a template's values are: PatchTemplate::kGreyScale (I - PatchTemplate::kGreyOrigin) in
+// 16 bits, rounded, row after row, zeros behind.
+//
+// Between pixels I is the quadratic B-spline of the nearest three in each direction. It smooths alike wherever it is
+// sampled (its variance is 1/4 px^2 everywhere; M. Unser, "Splines: a perfect fit", IEEE Signal Processing Magazine
+// 16(6), 1999). Bilinear interpolation smooths by 0 to 1/4, and a template that is sharper than what it is held against
+// looks the larger the sharper it is.
 struct PatchSamples {
   static constexpr std::size_t kRoom = PatchTemplate::kMaxSamples + 32;  // whole vectors are stored
   alignas(64) std::array<std::int16_t, kRoom> grey;
@@ -55,10 +59,11 @@ struct SearchSums {
 // The same results on every instruction set. None of them reads outside the image's rows (of width pixels, stride
 // apart, counted as one block of memory from the first to the last pixel).
 struct PatchKernels {
-  // Bilinear, on a grid of the image's own orientation: first + (column, row). Every pixel of it and its right and
-  // lower neighbour must be in the image.
+  // On a grid of the image's own orientation: first + (column, row). Every place of it must be at least kBefore from
+  // the image's left and upper edge pixels and kBehind from the others.
+  static constexpr int kBefore = 1, kBehind = 3;  // four bytes are read where three pixels are needed
   void (*sample_shifted)(const GreyImage& image, int side, const Vector2d& first, PatchSamples& samples) noexcept;
-  // Bilinear. Every pixel of the grid and its right and lower neighbour must be in the image.
+  // On any grid; the same holds.
   void (*sample_warped)(const GreyImage& image, int side, const WindowGrid& grid, PatchSamples& samples) noexcept;
   void (*sum)(const PatchTemplate::Level& level, const PatchSamples& samples, PatchSums& sums) noexcept;
   void (*sum_affine)(const PatchTemplate& patch, const PatchSamples& samples, PatchSums& sums) noexcept;

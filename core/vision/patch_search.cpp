@@ -12,8 +12,9 @@ constexpr int kWidth = 2 * kMaxSearchRadius + 1;                             // 
 constexpr int kRegionSide = SearchPattern::kMaxSide + 2 * kMaxSearchRadius;  // pixels the windows of all cover
 constexpr int kRegionStride = 2 * kMaxSearchRadius + SearchPattern::kStride + 4;
 
-// The template as it would look in the image, on whole image pixels about the feature's nearest one, 16 (T - mean over
-// the weighted pixels), rounded. Where the warp reaches outside the template the weight is 0, and so is the value.
+// The template as it would look in the image, on whole image pixels about the feature's nearest one,
+// PatchTemplate::kGreyScale (T - mean over the weighted pixels), rounded. Where the warp reaches outside the template
+// the weight is 0, and so is the value.
 struct WarpedTemplate {
   double sum_squares = 0;  // of the values
   double value_sum = 0;    // 0 but for rounding
@@ -52,13 +53,12 @@ WarpedTemplate warp_template(const PatchTemplate::Level& level, const Matrix2d& 
   }
   if (warped.weight_sum == 0) return warped;
   const double mean = sum / warped.weight_sum;
-  constexpr double kScale = 16;
   for (int y = 0; y < level.side; ++y) {
     for (int x = 0; x < level.side; ++x) {
       const auto i = static_cast<std::size_t>(y * SearchPattern::kStride + x);
       if (pattern.mask[i] == 0) continue;
       const double centred = grey[static_cast<std::size_t>(y * level.side + x)] - mean;
-      pattern.value[i] = static_cast<std::int16_t>(std::lround(kScale * centred));
+      pattern.value[i] = static_cast<std::int16_t>(std::lround(centred));
       warped.value_sum += pattern.value[i];
       warped.sum_squares += static_cast<double>(pattern.value[i]) * pattern.value[i];
     }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 
 #include "core/vision/patch_kernels.hpp"
@@ -29,6 +30,13 @@ bool is_well_conditioned(const Matrix6& H, double half) noexcept {
   return ldlt.vectorD().minCoeff() > kSmallestPivot * ldlt.vectorD().maxCoeff();
 }
 
+// The quadratic B-spline in the middle of a pixel: 1/8, 3/4, 1/8 along rows and columns.
+std::int16_t smoothed(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below) noexcept {
+  const auto across = [](const std::uint8_t* p) { return p[-1] + 6 * p[0] + p[1]; };
+  const double grey = (across(above) + 6 * across(here) + across(below)) / 64.0 - PatchTemplate::kGreyOrigin;
+  return static_cast<std::int16_t>(std::lround(PatchTemplate::kGreyScale * grey));
+}
+
 // Fills the level around the whole pixel nearest to the feature. False if it does not fit.
 bool cut_window(const GreyImage& image, double u, double v, int side, PatchTemplate::Level& level) noexcept {
   const int half = side / 2;
@@ -47,7 +55,7 @@ bool cut_window(const GreyImage& image, double u, double v, int side, PatchTempl
     const std::size_t start = static_cast<std::size_t>(y) * static_cast<std::size_t>(side);
     for (int x = 0; x < side; ++x) {  // what follows is 0 from the start
       const std::size_t i = start + static_cast<std::size_t>(x);
-      level.value[i] = static_cast<std::int16_t>(here[x] - PatchTemplate::kGreyOrigin);
+      level.value[i] = smoothed(above + x, here + x, below + x);
       level.gradient_x[i] = static_cast<std::int16_t>(above[x + 1] - above[x - 1] + 2 * (here[x + 1] - here[x - 1]) +
                                                       below[x + 1] - below[x - 1]);
       level.gradient_y[i] = static_cast<std::int16_t>(below[x - 1] - above[x - 1] + 2 * (below[x] - above[x]) +
@@ -85,7 +93,7 @@ Matrix6 project(PatchTemplate& patch, int l) noexcept {
   Matrix6 H = Matrix6::Zero();
   constexpr double kMoment = PatchTemplate::kMomentDivisor / PatchTemplate::kGradientScale;
   for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
-    const double t = level.value[i];
+    const double t = static_cast<double>(level.value[i]) / PatchTemplate::kGreyScale;
     const double gx = level.gradient_x[i] / PatchTemplate::kGradientScale;
     const double gy = level.gradient_y[i] / PatchTemplate::kGradientScale;
     Vector6 sd = Vector6::Zero();
@@ -112,13 +120,15 @@ Matrix6 project(PatchTemplate& patch, int l) noexcept {
   return H;
 }
 
-double saturated_share(const PatchTemplate::Level& level, int saturated_grey) noexcept {
-  int count = 0;
-  const int n = level.side * level.side;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
-    count += level.value[i] + PatchTemplate::kGreyOrigin >= saturated_grey ? 1 : 0;
+// Of the window that was cut around px.
+double saturated_share(const GreyImage& image, const Vector2d& px, int side, int saturated_grey) noexcept {
+  const auto left = std::lround(px.x()) - side / 2, top = std::lround(px.y()) - side / 2;
+  long count = 0;
+  for (int y = 0; y < side; ++y) {
+    const std::uint8_t* const row = image.row(static_cast<int>(top) + y) + left;
+    count += std::count_if(row, row + side, [=](std::uint8_t grey) { return grey >= saturated_grey; });
   }
-  return static_cast<double>(count) / n;
+  return static_cast<double>(count) / (side * side);
 }
 
 }  // namespace
@@ -133,7 +143,7 @@ TemplateVerdict make_patch_template(const GreyImage& image, const Vector2d& px, 
       if (image.data == nullptr || !cut_window(image, px.x(), px.y(), side, level)) {
         return TemplateVerdict::kTooNearBorder;
       }
-      if (saturated_share(level, settings.saturated_grey) > settings.max_saturated_share) {
+      if (saturated_share(image, px, side, settings.saturated_grey) > settings.max_saturated_share) {
         return TemplateVerdict::kSaturated;
       }
       form_moments(out);

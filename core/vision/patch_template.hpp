@@ -24,8 +24,9 @@ struct PatchTemplate {
   static constexpr std::array<int, kLevels> kSide = {21, 15, 11};
   static constexpr std::size_t kMaxSamples = 448;  // 21 x 21, row after row, then zeros up to a multiple of 32
   using Pixels = std::array<std::int16_t, kMaxSamples>;
-  // Grey values are kept less this one, so that float sums over a window stay exact enough.
+  // Grey values are kept less this one, so that sums over a window are small, and times the other.
   static constexpr int kGreyOrigin = 128;
+  static constexpr int kGreyScale = 16;
 
   // Sobel's operator smooths across the derivative: image noise makes the Hessian of plain differences too large.
   static constexpr double kGradientScale = 8;
@@ -37,13 +38,16 @@ struct PatchTemplate {
     bool usable = false;  // false: too near the border or without texture at this level
     int side = 0;
     double offset_x = 0, offset_y = 0;  // of the feature from the window's middle pixel, level pixels, |.| <= 0.5
-    double mean = 0;                    // of T - kGreyOrigin
+    double mean = 0;                    // of T - kGreyOrigin, grey levels
     double sum_squares = 0;             // sum of (T - its mean)^2
     std::array<double, kParameters> sd_mean{};     // mean of SD_k
     std::array<double, kParameters> sd_on_grey{};  // sum of SD_k (T - mean) / sum_squares
     std::array<double, 4> translation_inverse{};   // inverse of the projected 2x2 Hessian, row by row
-    alignas(64) Pixels value{};                    // T - kGreyOrigin
-    alignas(64) Pixels gradient_x{};               // kGradientScale times it, by Sobel's operator
+    // kGreyScale (T - kGreyOrigin), rounded. T is smoothed as the image is where it is sampled (patch_kernels.hpp):
+    // else each match would see it blurred and take it for larger, and what lies beside the feature would pull it
+    // along.
+    alignas(64) Pixels value{};
+    alignas(64) Pixels gradient_x{};  // kGradientScale times it, by Sobel's operator
     alignas(64) Pixels gradient_y{};
 
     [[nodiscard]] int half() const noexcept { return side / 2; }

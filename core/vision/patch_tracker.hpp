@@ -46,7 +46,7 @@ struct PatchMatch {
 struct PatchTrackerSettings {
   double min_correlation = 0.88;
   double gate = 13.8;            // chi^2, 2 degrees of freedom, 99.9 %
-  double sigma_floor_px = 0.06;  // what interpolation, shading and surface curvature leave on a good match
+  double sigma_floor_px = 0.05;  // what interpolation, shading and surface curvature leave on a good match
   double max_stretch = 2.5;      // singular values of A lie in [1/max_stretch, max_stretch]
 };
 

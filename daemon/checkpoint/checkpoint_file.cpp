@@ -22,7 +22,7 @@ namespace perimap {
 namespace {
 
 constexpr std::string_view kMagic = "PERIMAPC";
-constexpr std::uint32_t kFormat = 5;
+constexpr std::uint32_t kFormat = 6;
 constexpr std::size_t kHeader = 16;
 constexpr std::size_t kLongestText = 4096;
 constexpr std::uint32_t kMostFeatures = 4096;

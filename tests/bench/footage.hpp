@@ -23,8 +23,8 @@ struct Footage {
 // The simulator's beating heart from a hand-held scope at 30 frames/s, with its sensor noise.
 [[nodiscard]] Footage rendered_footage(int width, int height, int frames, int features);
 
-// A tissue-like texture (1/f, with sharp vessels) under a smooth deformation and a moving view, bicubic, with
-// vignetting and the noise of the simulator's sensor, 1.2 grey levels.
+// A tissue-like texture (1/f, with sharp vessels) under a smooth deformation and a moving view, drawn three
+// times as fine as the pixels, with vignetting and the noise of the simulator's sensor, 1.2 grey levels.
 [[nodiscard]] Footage textured_footage(int width, int height, int frames, int features);
 
 // The same with a light that changes from frame to frame: gain within +-6 %, bias within +-4 grey levels.

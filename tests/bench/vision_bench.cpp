@@ -46,6 +46,7 @@ class Method {
   std::vector<double> errors_px;
   std::vector<double> normalised;  // squared error under the method's own covariance, over 2
   std::vector<double> noise_px;    // the error that the images' noise alone leaves, by the method's own account
+  std::vector<bool> near;          // within half a pixel of the truth
   int lost = 0;
 };
 
@@ -138,23 +139,22 @@ class Patches final : public Method {
   std::vector<bool> usable_;
 };
 
+Vector2d as_predicted(std::mt19937& random) {
+  std::normal_distribution<double> normal(0, kPrediction_px);
+  const double u = normal(random);
+  return {u, normal(random)};
+}
+
 // Every method follows every frame in turn; the frames between have taken its place in the caches.
-void run(const Footage& footage, std::vector<Method*> methods, double start_error_px, int rounds) {
+template <class StartError>
+void run(const Footage& footage, std::vector<Method*> methods, const StartError& start_error, int rounds) {
   std::mt19937 random(5);
-  std::normal_distribution<double> normal(0, 1);
-  std::uniform_real_distribution<double> angle(0, 2 * M_PI);
   const std::size_t features = footage.px[0].size();
   Places predicted(features), found(features);
   for (int round = 0; round < rounds; ++round) {
     for (Method* method : methods) method->begin(footage);
     for (std::size_t frame = 1; frame < footage.frames.size(); ++frame) {
-      for (std::size_t i = 0; i < features; ++i) {
-        const double a = angle(random);
-        const Vector2d error = start_error_px > 0
-                                   ? Vector2d(start_error_px * std::cos(a), start_error_px * std::sin(a))
-                                   : Vector2d(kPrediction_px * normal(random), kPrediction_px * normal(random));
-        predicted[i] = footage.px[frame][i] + error;
-      }
+      for (std::size_t i = 0; i < features; ++i) predicted[i] = footage.px[frame][i] + start_error(random);
       for (Method* method : methods) {
         method->prepare(footage, frame);
         const auto begin = std::chrono::steady_clock::now();
@@ -164,6 +164,8 @@ void run(const Footage& footage, std::vector<Method*> methods, double start_erro
         const auto* patches = dynamic_cast<const Patches*>(method);
         for (std::size_t i = 0; i < features; ++i) {
           if (patches != nullptr && !patches->is_usable(i)) continue;
+          constexpr double kNear_px = 0.5;
+          method->near.push_back((found[i] - footage.px[frame][i]).norm() < kNear_px);
           if (!found[i].allFinite()) {
             ++method->lost;
             continue;
@@ -190,7 +192,7 @@ void compare(const Footage& footage, const char* light) {
   LucasKanade bare("  the same, its derivatives made before", 0, true, 1, true);
   Patches patches(kPrediction_px);
   std::vector<Method*> methods = {&one_thread, &threads, &predicted, &bare, &patches};
-  run(footage, methods, 0, kRounds);
+  run(footage, methods, as_predicted, kRounds);
   std::printf("\n%s, %dx%d, %zu features, %s light\n", footage.name.c_str(), footage.width, footage.height,
               footage.px[0].size(), light);
   std::printf("  %-48s %8s %8s %8s %9s %9s %7s %9s %8s\n", "", "p50 ms", "p99 ms", "x LK", "median px", "p95 px",
@@ -210,17 +212,34 @@ void compare(const Footage& footage, const char* light) {
   }
 }
 
-void capture(const Footage& footage, double distance_px) {
+// How many are found within half a pixel of the truth, and of those that are from the true place itself.
+void capture(const Footage& footage) {
   LucasKanade predicted("OpenCV LK, predicted start, 1 level", 0, true, 1, false);
   Patches patches(1.5);
   std::vector<Method*> methods = {&predicted, &patches};
-  run(footage, methods, distance_px, 3);
-  for (const Method* method : methods) {
-    const auto total = static_cast<double>(method->errors_px.size()) + method->lost;
-    const auto near =
-        std::count_if(method->errors_px.begin(), method->errors_px.end(), [](double e) { return e < 0.5; });
-    std::printf("  %-10s %dx%d from %.0f px: %-40s %6.2f %% within 0.5 px\n", footage.name.c_str(), footage.width,
-                footage.height, distance_px, method->name.c_str(), 100.0 * static_cast<double>(near) / total);
+  std::vector<std::vector<bool>> at_home(methods.size());
+  for (const double distance_px : {0.0, 2.0, 4.0}) {
+    for (Method* method : methods) method->near.clear();
+    run(
+        footage, methods,
+        [distance_px](std::mt19937& random) {
+          const double angle = std::uniform_real_distribution<double>(0, 2 * M_PI)(random);
+          return Vector2d(distance_px * std::cos(angle), distance_px * std::sin(angle));
+        },
+        3);
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+      const std::vector<bool>& near = methods[m]->near;
+      if (distance_px == 0) at_home[m] = near;
+      int all = 0, held = 0, homely = 0;
+      for (std::size_t i = 0; i < near.size(); ++i) {
+        all += near[i] ? 1 : 0;
+        homely += at_home[m][i] ? 1 : 0;
+        held += near[i] && at_home[m][i] ? 1 : 0;
+      }
+      std::printf("  %-10s %dx%d from %.0f px: %-36s %6.2f %% within 0.5 px, %6.2f %% of those that are from 0 px\n",
+                  footage.name.c_str(), footage.width, footage.height, distance_px, methods[m]->name.c_str(),
+                  100.0 * all / static_cast<double>(near.size()), 100.0 * held / std::max(homely, 1));
+    }
   }
 }
 
@@ -229,7 +248,7 @@ void compare_targets(const Footage& footage) {
   std::vector<std::unique_ptr<Patches>> owned;
   for (const SimdTarget target : simd_targets()) owned.push_back(std::make_unique<Patches>(kPrediction_px, target));
   for (const auto& one : owned) methods.push_back(one.get());
-  run(footage, methods, 0, kRounds);
+  run(footage, methods, as_predicted, kRounds);
   std::printf("\n%s, %dx%d, %zu features, by instruction set\n", footage.name.c_str(), footage.width, footage.height,
               footage.px[0].size());
   for (const Method* method : methods) {
@@ -258,7 +277,7 @@ int main() {
         compare(lit, "changing");
         if (features == 200) {
           compare_targets(footage);
-          for (const double distance_px : {2.0, 4.0}) capture(lit, distance_px);
+          capture(lit);
         }
         std::fflush(stdout);
       }
