@@ -235,7 +235,7 @@ void FeatureBank<Real>::run(UpdateTask<Real>& task, int group_index, const Sweep
   const GroupView<Real>& view = group.view;
   outcomes.considered = outcomes.accepted = 0;
   task.considered = group.swept & observations.measured;
-  if (task.considered == 0 || group.pending == kMaxPendingUpdates || k >= phases.learnt()) return;
+  if (task.considered == 0 || group.pending == kMaxPendingUpdates || k < 0 || k >= phases.learnt()) return;
   correct(group, phases, k);
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) task.R_CW[3 * i + j] = static_cast<Real>(X_CW.R(i, j));

@@ -237,8 +237,9 @@ Solution minimise(BatchProblem<Model>& problem, VectorXd y, Loss loss, int max_i
       }
     } else {
       if (expected < tolerance) {
-        // No further descent: y is the minimum to rounding.
-        solution.converged = true;
+        // No further descent: y is the minimum to rounding, unless damping alone has made the step so short.
+        const Eigen::LLT<MatrixXd> undamped(A);
+        solution.converged = undamped.info() == Eigen::Success && descent.dot(undamped.solve(descent)) < tolerance;
         break;
       }
       mu *= growth;

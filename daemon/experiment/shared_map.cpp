@@ -150,6 +150,26 @@ std::vector<FeatureEstimate> joint_cramer_rao_bound(const Scene& scene, const Ba
       }
     }
   }
+  if (joint == JointPrior::kAffine) {
+    constexpr double kRadius_mm = 40.0, kOwn = 0.01;
+    Eigen::Matrix3Xd rest(3, features);
+    for (Index i = 0; i < features; ++i) {
+      const StateVector& x = scene.features[static_cast<std::size_t>(i)].x;
+      for (Index axis = 0; axis < 3; ++axis) rest(axis, i) = x(axis * scene.layout.size()) / kRadius_mm;
+    }
+    MatrixXd together = 0.5 * (rest.transpose() * rest);
+    together.array() += 0.5;
+    together.diagonal().array() += kOwn;
+    const MatrixXd inverse = together.inverse();
+    for (Index coefficient = 0; coefficient < d; ++coefficient) {
+      if (coefficient % n == 0) continue;
+      const double own = information(coefficient, coefficient);
+      for (Index row = 0; row < features; ++row) {
+        for (Index column = 0; column < features; ++column)
+          information(row * d + coefficient, column * d + coefficient) = own * inverse(row, column);
+      }
+    }
+  }
   const PoseError& error = scene.settings.pose_error;
   const double keep =
       error.correlation_s > 0.0 ? std::exp(-1.0 / (scene.settings.frames_per_s * error.correlation_s)) : 0.0;

@@ -57,7 +57,11 @@ enum class JointPrior : std::uint8_t {
   kIndependent,
   // x_i = c + d_i, where c and every d_i are independent and have the prior's covariance each: the mean is as free as
   // one feature's state, the differences between features are as kIndependent has them.
-  kCommonPart
+  kCommonPart,
+  // Each coefficient of the motion is an affine function of the place at rest, as the ellipsoid's truth is (scene.cpp):
+  // half of its variance is common to all, half goes with the place over 40 mm. A hundredth is each feature's own. Rest
+  // positions are independent.
+  kAffine
 };
 
 // Posterior Cramer-Rao bound of all features together when the pose errors are unknowns too, with their true
