@@ -13,7 +13,7 @@ namespace {
 constexpr double kMotionDeviation_px = 10.0;
 
 // Not all that is found lives through the round, least of all where the heart moves fastest; what is over is let go.
-constexpr int with_spare(int wanted) { return wanted + wanted / 2; }
+constexpr int with_spare(int wanted) { return 2 * wanted; }
 
 }  // namespace
 

@@ -222,12 +222,12 @@ class Session {
         quantile(f.errors_px, 0.5), quantile(f.errors_px, 0.95), quantile(f.normalised, 0.5));
     EXPECT_GE(f.returned, 50);
     EXPECT_GE(f.gated, 10'000);
-    // The goals are 95 %, 0.5 % and none (docs/vision.md has what is reached); the bound of those that are off leaves
-    // room for a feature that follows another point for the whole session, 0.7 % of all matches.
+    // The goals, 95 %, 0.5 % and nine tenths, are met (docs/vision.md); the bounds of the latter two leave room for one
+    // feature that follows another point for the whole session, 0.7 % of all matches, and for a frame of bad luck.
     EXPECT_GE(f.reacquired, 0.95 * f.returned);
     EXPECT_LT(f.off, 0.01 * f.gated);
-    EXPECT_LT(f.frames_short_of_features, 0.05 * f.frames);
-    EXPECT_GE(f.least_live, 0.8 * static_cast<double>(pipeline_.slots().size()));
+    EXPECT_LT(f.frames_short_of_features, 0.02 * f.frames);
+    EXPECT_GE(f.least_live, 0.85 * static_cast<double>(pipeline_.slots().size()));
   }
 
  private:
