@@ -26,11 +26,25 @@ struct DetectorSettings {
 // Standard deviation of the noise of single pixels, grey levels, from how far a pixel lies off the bilinear surface
 // through its neighbours (Immerkaer, "Fast Noise Variance Estimation", CVIU 64(2), 1996; here by the median, because
 // texture has long tails). Only what is neither dark nor clipped counts; 0 when nothing does.
-[[nodiscard]] double estimate_noise(const GreyImage& image);
+inline constexpr int kDark_grey = 25;
+[[nodiscard]] double estimate_noise(const GreyImage& image, int dark_grey = kDark_grey);
 
-// For how_many features spread over an image of this size and this noise, whatever they are. A corner must stand out of
-// the noise, and no more: tissue without vessels has little texture.
-[[nodiscard]] DetectorSettings detector_settings_for(int width, int height, double noise, int how_many) noexcept;
+// How bright a picture is, whatever camera took it.
+struct PictureLight {
+  static constexpr double kUsual_grey = 90;
+
+  double lit_grey = kUsual_grey;  // the median of what is lit; 0 when nothing is
+  double surround_grey = 0;       // of the even frame about a view that does not fill the picture; 0 without one
+};
+
+// The surround is told by corners of the picture that are flat, of one grey, and far darker than what is lit.
+[[nodiscard]] PictureLight estimate_light(const GreyImage& image);
+
+// For how_many features spread over an image of this size, this noise and this light, whatever they are. A corner must
+// stand out of the noise, and no more: tissue without vessels has little texture. What a dim picture shows has less
+// contrast, and less light is no background there.
+[[nodiscard]] DetectorSettings detector_settings_for(int width, int height, double noise, int how_many,
+                                                     const PictureLight& light = {}) noexcept;
 
 // Up to how_many new features, level-0 pixels (whole ones), none within min_distance_px of another or of occupied.
 // `barred`, when it has the image's size, is not 0 where no feature may be (instruments); an empty one bars nothing.

@@ -1,8 +1,11 @@
 #include "core/vision/feature_follower.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "core/statistics/upper_median.hpp"
 
@@ -11,30 +14,74 @@ namespace {
 
 constexpr double kFirstDeviation_px = 6.0;
 constexpr std::size_t kEnoughDisplacements = 4;
+constexpr std::size_t kMostOverlays = 512;
+constexpr std::size_t kOverlayWindow = FollowedFeature::kTrail - 1;  // frames
+constexpr std::size_t kCandidateWindow = 6;
 
 bool is_sought(const FollowedFeature& feature) noexcept {
   return feature.state == FollowState::kCandidate || feature.state == FollowState::kTracked;
+}
+
+void let_go(FollowedFeature& feature) noexcept {
+  feature.state = FollowState::kEmpty;
+  feature.found = feature.swept = false;
 }
 
 double largest_deviation(const Matrix2d& C) noexcept {
   return std::sqrt(0.5 * (C(0, 0) + C(1, 1)) + std::hypot(0.5 * (C(0, 0) - C(1, 1)), C(0, 1)));
 }
 
+// False for a picture without contrast, but for the noise: black, faded, one colour.
+bool shows_anything(const GreyImage& image) noexcept {
+  constexpr int kStep = 8, kLeastContrast_grey = 8;
+  constexpr double kTail = 0.05;
+  std::array<int, 256> counts{};
+  int total = 0;
+  for (int y = kStep / 2; y < image.height; y += kStep) {
+    for (int x = kStep / 2; x < image.width; x += kStep, ++total) ++counts[image.row(y)[x]];
+  }
+  const auto quantile = [&](double share) {
+    int grey = 0;
+    for (int below = counts[0]; grey < 255 && below <= share * total; below += counts[static_cast<std::size_t>(grey)]) {
+      ++grey;
+    }
+    return grey;
+  };
+  return total == 0 || quantile(1 - kTail) - quantile(kTail) >= kLeastContrast_grey;
+}
+
 }  // namespace
+
+bool FollowedFeature::fills_place() const noexcept {
+  constexpr int kBriefly_frames = 3;
+  return state == FollowState::kCandidate || state == FollowState::kTracked ||
+         (state == FollowState::kOccluded && !swept && misses <= kBriefly_frames);
+}
 
 FeatureFollower::FeatureFollower(const FollowerSettings& settings)
     : settings_(settings),
       tracker_({.min_correlation = settings.min_correlation}),
-      features_(static_cast<std::size_t>(std::max(settings.maximum, 0))),
+      // As many again may be away.
+      features_(2 * static_cast<std::size_t>(std::max(settings.maximum, 0))),
       motion_(features_.size()),
       deviation_px_(kFirstDeviation_px) {
   scratch_.reserve(features_.size());
+  overlays_.reserve(kMostOverlays);
 }
 
 int FeatureFollower::free() const noexcept {
-  return static_cast<int>(std::count_if(features_.begin(), features_.end(), [](const FollowedFeature& feature) {
-    return feature.state == FollowState::kEmpty;
-  }));
+  const auto filled = std::count_if(features_.begin(), features_.end(),
+                                    [](const FollowedFeature& feature) { return feature.fills_place(); });
+  return std::max(0, settings_.maximum - static_cast<int>(filled));
+}
+
+std::vector<Vector2d> FeatureFollower::occupied() const {
+  std::vector<Vector2d> places;
+  for (const FollowedFeature& feature : features_) {
+    if (feature.fills_place()) places.push_back(feature.px);
+  }
+  for (const Overlay& overlay : overlays_) places.push_back(overlay.px);
+  return places;
 }
 
 bool FeatureFollower::seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
@@ -66,8 +113,19 @@ NeighbourMotion::Around FeatureFollower::around(const Vector2d& px, const Follow
 void FeatureFollower::follow(const GreyImage& image) noexcept {
   std::size_t sought = 0, found = 0;
   for (FollowedFeature& feature : features_) {
-    feature.found = false;
+    feature.found = feature.is_overlay = false;
     feature.last_px = feature.px;
+  }
+  if (!shows_anything(image)) {
+    ++blind_frames_;
+    for (FollowedFeature& feature : features_) feature.velocity_px.setZero();
+    return;
+  }
+  ++frame_;
+  if (blind_frames_ > 0) {
+    constexpr double kDriftOfFrame_px = 0.5;
+    deviation_px_ = std::min(std::max(deviation_px_, kFirstDeviation_px) + kDriftOfFrame_px * blind_frames_,
+                             settings_.widest_deviation_px);
   }
   for (FollowedFeature& feature : features_) {
     if (!is_sought(feature)) continue;
@@ -81,10 +139,19 @@ void FeatureFollower::follow(const GreyImage& image) noexcept {
   if (has_jerked) {
     for (FollowedFeature& feature : features_) {
       if (!is_sought(feature) || feature.found) continue;
-      (void)seek(image, feature, feature.last_px + displacement_around(feature.last_px, &feature),
-                 settings_.widest_deviation_px, settings_.recovered_correlation);
+      found += seek(image, feature, feature.last_px + displacement_around(feature.last_px, &feature),
+                    settings_.widest_deviation_px, settings_.recovered_correlation)
+                   ? 1
+                   : 0;
     }
     note_displacements();
+  }
+  constexpr std::size_t kEnoughToTell = 8, kNearlyAll = 5;  // one in so many is left at most
+  if (sought >= kEnoughToTell && kNearlyAll * found < sought) {
+    sweep();
+    note_displacements();
+  } else {
+    recall_swept(image);
   }
 
   scratch_.clear();
@@ -103,13 +170,83 @@ void FeatureFollower::follow(const GreyImage& image) noexcept {
   find_again(image);
   judge(image);
   drop_doubles();
+  keep_to_maximum();
+  let_overlays_go();
+  blind_frames_ = 0;
+}
+
+void FeatureFollower::sweep() noexcept {
+  for (FollowedFeature& feature : features_) {
+    if (feature.state == FollowState::kCandidate) let_go(feature);
+    if (feature.state != FollowState::kTracked) continue;
+    feature.found = false;
+    feature.px = feature.last_px;
+    feature.velocity_px.setZero();
+    feature.swept = true;
+  }
+}
+
+// By how much those found of the swept have moved, if a good share of them has moved alike.
+std::optional<Vector2d> FeatureFollower::displacement_of_swept() noexcept {
+  std::size_t found = 0, alike = 0;
+  Vector2d middle = Vector2d::Zero();
+  for (int axis = 0; axis < 2; ++axis) {
+    scratch_.clear();
+    for (const FollowedFeature& feature : features_) {
+      if (feature.swept && feature.found) scratch_.push_back((feature.px - feature.last_px)[axis]);
+    }
+    found = scratch_.size();
+    if (found < kEnoughDisplacements) return std::nullopt;
+    middle[axis] = upper_median(scratch_.begin(), scratch_.end());
+  }
+  const double tolerance_px = 4 + 0.3 * middle.norm();
+  for (FollowedFeature& feature : features_) {
+    if (!feature.swept || !feature.found) continue;
+    feature.found = (feature.px - feature.last_px - middle).norm() <= tolerance_px;
+    alike += feature.found ? 1 : 0;
+  }
+  if (alike < kEnoughDisplacements || 2 * alike < found) return std::nullopt;
+  return middle;
+}
+
+// A share of them is sought widely; only when those are there, the rest is sought near.
+void FeatureFollower::recall_swept(const GreyImage& image) noexcept {
+  constexpr std::size_t kProbes = 40, kShareAlike = 4;  // one in so many at least
+  const auto swept = static_cast<std::size_t>(
+      std::count_if(features_.begin(), features_.end(), [](const FollowedFeature& feature) { return feature.swept; }));
+  if (swept == 0) return;
+  const std::size_t stride = (swept + kProbes - 1) / kProbes;
+  std::size_t nth = frame_ % stride, probed = 0;
+  for (FollowedFeature& feature : features_) {
+    if (!feature.swept || nth++ % stride != 0) continue;
+    ++probed;
+    (void)seek(image, feature, feature.last_px, settings_.widest_deviation_px, settings_.recovered_correlation);
+  }
+  const std::optional<Vector2d> displacement = displacement_of_swept();
+  const auto found =
+      static_cast<std::size_t>(std::count_if(features_.begin(), features_.end(), [](const FollowedFeature& feature) {
+        return feature.swept && feature.found;
+      }));
+  const bool are_back = displacement && kShareAlike * found >= probed;
+  for (FollowedFeature& feature : features_) {
+    if (!feature.swept) continue;
+    feature.found = feature.found && are_back;
+    feature.swept = !are_back;
+    if (are_back && !feature.found) {
+      (void)seek(image, feature, feature.last_px + *displacement, kFirstDeviation_px, settings_.recovered_correlation);
+    }
+    if (!feature.found) feature.px = feature.last_px;
+  }
+  if (are_back) note_displacements();
 }
 
 // What its own velocity did not find, and what was occluded: with the displacement of what is around it.
 void FeatureFollower::find_again(const GreyImage& image) noexcept {
   for (FollowedFeature& feature : features_) {
-    if (feature.state == FollowState::kEmpty || feature.found) continue;
-    const Vector2d expected = feature.last_px + displacement_around(feature.last_px, &feature);
+    if (feature.state == FollowState::kEmpty || feature.found || feature.swept) continue;
+    const NeighbourMotion::Around neighbours = around(feature.last_px, &feature);
+    constexpr double kShareKept = 0.5;  // of a velocity that nothing confirms
+    const Vector2d expected = feature.last_px + (neighbours.known ? 1.0 : kShareKept) * neighbours.by;
     const bool is_occluded = feature.state == FollowState::kOccluded;
     // Unseen for long, the place has been carried along without a measurement.
     const double deviation_px = std::min(2 * deviation_px_ + 0.1 * feature.misses, settings_.widest_deviation_px);
@@ -137,7 +274,7 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
       if (is_candidate && feature.misses <= kMissesOfCandidate) continue;
       if (is_candidate || feature.misses > settings_.occluded_frames ||
           (is_outside && feature.misses > settings_.occluded_frames / 4)) {
-        feature.state = FollowState::kEmpty;
+        let_go(feature);
       } else {
         feature.state = FollowState::kOccluded;
       }
@@ -145,17 +282,24 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
     }
     feature.velocity_px =
         feature.misses == 0 ? Vector2d(feature.px - feature.last_px) : displacement_around(feature.px, &feature);
-    const bool is_back = feature.misses > 0;
+    const bool is_back = feature.misses > 0 || blind_frames_ > 0;
     feature.misses = 0;
+    feature.swept = false;
     ++feature.frames;
     if (feature.state == FollowState::kOccluded) feature.state = FollowState::kTracked;
 
     const bool is_candidate = feature.state == FollowState::kCandidate;
     if (!moves_with_neighbours(feature, is_back)) {
-      feature.state = FollowState::kEmpty;
+      let_go(feature);
       continue;
     }
-    if (is_candidate && feature.frames >= settings_.candidate_frames) feature.state = FollowState::kTracked;
+    // One that stands still while the camera moves has to wait for the proof that it is an overlay, or none.
+    constexpr double kMoved_px = 1.5;
+    const bool may_be_overlay =
+        camera_lately_.at(feature.px).norm() > kMoved_px && has_stood_still(feature, kCandidateWindow);
+    if (is_candidate && feature.frames >= settings_.candidate_frames && !may_be_overlay) {
+      feature.state = FollowState::kTracked;
+    }
     renew_worn_template(image, feature);
   }
   if (scratch_.size() >= kEnoughDisplacements) {
@@ -213,25 +357,151 @@ void FeatureFollower::drop_doubles() noexcept {
     if (!features_[i].found) continue;
     for (std::size_t k = i + 1; k < features_.size(); ++k) {
       if (!features_[k].found || (features_[i].px - features_[k].px).squaredNorm() > kApart_px * kApart_px) continue;
-      FollowedFeature& younger = features_[i].frames < features_[k].frames ? features_[i] : features_[k];
-      younger.state = FollowState::kEmpty;
-      younger.found = false;
+      let_go(features_[i].frames < features_[k].frames ? features_[i] : features_[k]);
+      if (!features_[i].found) break;
     }
   }
+}
+
+// The youngest give way to those that came back.
+void FeatureFollower::keep_to_maximum() noexcept {
+  auto filled = std::count_if(features_.begin(), features_.end(),
+                              [](const FollowedFeature& feature) { return feature.fills_place(); });
+  for (; filled > settings_.maximum; --filled) {
+    FollowedFeature* youngest = nullptr;
+    for (FollowedFeature& feature : features_) {
+      if (feature.fills_place() && (youngest == nullptr || feature.frames < youngest->frames)) youngest = &feature;
+    }
+    let_go(*youngest);
+  }
+}
+
+const Vector2d& FeatureFollower::trailed(const FollowedFeature& feature, std::size_t frames_ago) const noexcept {
+  return feature.trail[(frame_ - frames_ago) % FollowedFeature::kTrail];
+}
+
+// Up to the frame before this one's place is noted, from `frames` frames before it on.
+bool FeatureFollower::has_stood_still(const FollowedFeature& feature, std::size_t frames) const noexcept {
+  constexpr double kStill_px = 0.4;
+  if (feature.trail_length < frames) return false;
+  for (std::size_t ago = 1; ago <= frames; ++ago) {
+    if ((feature.px - trailed(feature, ago)).squaredNorm() > kStill_px * kStill_px) return false;
+  }
+  return true;
+}
+
+// By what moves; known where that is most of all there is and nearly all of it goes together. Then it is the camera
+// that has moved; a beating part moves beside what stands still, by more and less.
+std::optional<FeatureFollower::CameraMotion> FeatureFollower::camera_motion(std::size_t frames) noexcept {
+  constexpr std::size_t kEnoughToTell = 8;
+  constexpr double kMost = 0.6, kAlike = 0.3, kAlike_px = 1.0, kOutlier = 2.5;
+  std::size_t trailing = 0;
+  CameraMotion camera;
+  double most_px = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < 2; ++round) {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
+    std::size_t moving = 0;
+    trailing = 0;
+    for_each_trail(frames, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
+      ++trailing;
+      const Vector2d by = feature.px - from;
+      if (stood_still || (round > 0 && (by - camera.at(from)).norm() > most_px)) return;
+      ++moving;
+      const Eigen::Vector3d terms = CameraMotion::terms(from);
+      normal += terms * terms.transpose();
+      right += terms * by.transpose();
+    });
+    if (moving < kEnoughToTell || static_cast<double>(moving) < kMost * static_cast<double>(trailing)) {
+      return std::nullopt;
+    }
+    camera.coefficients = normal.ldlt().solve(right);
+    scratch_.clear();
+    for_each_trail(frames, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
+      if (!stood_still) scratch_.push_back((feature.px - from - camera.at(from)).norm());
+    });
+    most_px = kOutlier * upper_median(scratch_.begin(), scratch_.end());
+  }
+  std::size_t alike = 0;
+  for_each_trail(frames, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
+    const Vector2d by = camera.at(from);
+    const bool is_alike = (feature.px - from - by).norm() <= kAlike * by.norm() + kAlike_px;
+    alike += !stood_still && is_alike ? 1 : 0;
+  });
+  if (!camera.coefficients.allFinite() || static_cast<double>(alike) < kMost * static_cast<double>(trailing)) {
+    return std::nullopt;
+  }
+  return camera;
+}
+
+// Tissue that stands still is joined to what moves: what is next to it moves little.
+bool FeatureFollower::is_overlay(const FollowedFeature& feature, const CameraMotion& camera) const noexcept {
+  constexpr double kMoved_px = 3.0;
+  const Vector2d by = camera.at(feature.px);
+  if (!feature.found || by.norm() < kMoved_px || !has_stood_still(feature, kOverlayWindow)) return false;
+  double nearest = std::numeric_limits<double>::infinity();
+  Vector2d beside = Vector2d::Zero();
+  for_each_trail(kOverlayWindow, [&](const FollowedFeature& other, const Vector2d& from, bool stood_still) {
+    const double distance = (other.px - feature.px).squaredNorm();
+    if (stood_still || distance >= nearest) return;
+    nearest = distance;
+    beside = other.px - from;
+  });
+  return (beside - by).norm() < 0.5 * by.norm();
+}
+
+void FeatureFollower::let_overlays_go() noexcept {
+  std::erase_if(overlays_, [&](const Overlay& overlay) { return overlay.until_frame <= frame_; });
+  const auto lately = camera_motion(kCandidateWindow);
+  camera_lately_ = lately.value_or(CameraMotion{});
+  if (const auto camera = camera_motion(kOverlayWindow)) {
+    for (FollowedFeature& feature : features_) {
+      if (!is_overlay(feature, *camera)) continue;
+      bar(feature.px);
+      let_go(feature);
+      feature.is_overlay = true;
+    }
+  }
+  for (FollowedFeature& feature : features_) {
+    feature.trail[frame_ % FollowedFeature::kTrail] = feature.px;
+    feature.trail_length = std::min(feature.trail_length + 1, FollowedFeature::kTrail);
+  }
+}
+
+void FeatureFollower::bar(const Vector2d& px) noexcept {
+  const Overlay overlay{px, frame_ + static_cast<std::uint64_t>(settings_.overlay_frames)};
+  if (overlays_.size() < kMostOverlays) {
+    overlays_.push_back(overlay);
+    return;
+  }
+  *std::min_element(overlays_.begin(), overlays_.end(),
+                    [](const Overlay& a, const Overlay& b) { return a.until_frame < b.until_frame; }) = overlay;
+}
+
+// An empty place, or that of what has been away longest.
+FollowedFeature* FeatureFollower::place_for_new() noexcept {
+  FollowedFeature* longest_away = nullptr;
+  for (FollowedFeature& feature : features_) {
+    if (feature.is_overlay || feature.fills_place()) continue;
+    if (feature.state == FollowState::kEmpty) return &feature;
+    if (longest_away == nullptr || feature.misses > longest_away->misses) longest_away = &feature;
+  }
+  return longest_away;
 }
 
 void FeatureFollower::add(const GreyImage& image, std::span<const Vector2d> corners,
                           const TemplateSettings& settings) noexcept {
   template_settings_ = settings;
-  auto place = features_.begin();
   PatchTemplate patch;
+  int wanted = free();
   for (const Vector2d& px : corners) {
+    if (wanted <= 0) return;
     if (make_patch_template(image, px, template_settings_, tracker_.kernels(), patch) != TemplateVerdict::kGood) {
       continue;
     }
-    place = std::find_if(place, features_.end(),
-                         [](const FollowedFeature& feature) { return feature.state == FollowState::kEmpty; });
-    if (place == features_.end()) return;
+    FollowedFeature* const place = place_for_new();
+    if (place == nullptr) return;
+    --wanted;
     *place = FollowedFeature{};
     place->state = FollowState::kCandidate;
     place->id = next_id_++;
@@ -244,6 +514,8 @@ void FeatureFollower::add(const GreyImage& image, std::span<const Vector2d> corn
     place->match.px = px;
     place->match.correlation = 1;
     place->frames = 1;
+    place->trail[frame_ % FollowedFeature::kTrail] = px;
+    place->trail_length = 1;
   }
 }
 

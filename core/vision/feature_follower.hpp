@@ -2,7 +2,11 @@
 // those, the pipeline predicts each feature from its map instead.
 #pragma once
 
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,23 +21,26 @@ namespace perimap {
 struct FollowerSettings {
   int maximum = 200;
   int candidate_frames = 8;           // found so often, and moving as its neighbours do, a candidate is tracked
-  int occluded_frames = 120;          // unseen so long, a feature is lost; a candidate much sooner
+  int occluded_frames = 15;           // of those that show anything: unseen so long, a feature is lost
   double least_deviation_px = 1.0;    // of a prediction, per axis
   double widest_deviation_px = 11.0;  // the search reaches +-40 px
   // Compressed video loses what little texture tissue has: more is asked for only where a wrong place may be found.
   double min_correlation = 0.84;
   double recovered_correlation = 0.92;  // asked of a feature that comes back
+  int overlay_frames = 900;             // a place that shows what was laid over the picture takes no feature so long
   double largest_deviation_px = 0.6;    // of a match: one less sure tells too little of where the tissue is
 };
 
 enum class FollowState : std::uint8_t {
   kEmpty,
-  kCandidate,  // new: may be a highlight, an instrument or the rim of the view
+  kCandidate,  // new: may be a highlight, an instrument, the rim of the view or what is laid over the picture
   kTracked,
   kOccluded,  // was tracked and is not found at present; its place is carried along with its neighbours
 };
 
 struct FollowedFeature {
+  static constexpr std::size_t kTrail = 16;  // frames, the last one included
+
   FollowState state = FollowState::kEmpty;
   std::uint32_t id = 0;
   bool found = false;                       // in the last frame
@@ -49,11 +56,25 @@ struct FollowedFeature {
   Vector2d astray_px = Vector2d::Zero();  // how far it has lately gone another way than its neighbours
   int worn = 0;                           // frames in a row in which the template fitted badly, but steadily
   double usual_correlation = 1.0;         // smoothed over some 15 frames
+  bool is_overlay = false;                // let go in the last frame because it is laid over the picture
+  bool swept = false;                     // it vanished together with nearly all others
+  std::array<Vector2d, kTrail> trail{};   // where it was, by the frame's number
+  std::size_t trail_length = 0;
+
+  // False for what has been away for more than a moment: another may take its place then.
+  [[nodiscard]] bool fills_place() const noexcept;
 };
 
 // How a feature is predicted: by its own last displacement (constant velocity); where that fails, by the displacement
 // of the features around it in this very frame; where most fail at once, the camera has jerked, and all are sought
 // widely. The deviation of a prediction is what predictions have lately been off by.
+//
+// Where nearly all fail even so, the picture is another one: a cut, smoke, a leap. The few that something was found for
+// are not believed. All are kept where they were, and taken back only together, when a good share of them is found
+// moved alike. A frame without contrast (black, faded) is no look at anything: nothing is sought and nothing is missed.
+//
+// What stands still to a few tenths of a pixel while the whole picture moves beside it is no tissue but laid over the
+// picture: text, a logo. It is let go, and its place is not taken again for long.
 //
 // A template is renewed when it has fitted badly but steadily for some time, or when the view has changed by a factor
 // of two: a worn template, not an occluded feature, which stops fitting within a few frames. Each renewal moves the
@@ -71,8 +92,18 @@ class FeatureFollower {
 
   [[nodiscard]] std::span<const FollowedFeature> features() const noexcept { return features_; }
   [[nodiscard]] int free() const noexcept;
+  // Where no new feature is wanted: at those that fill a place, and at what is laid over the picture.
+  [[nodiscard]] std::vector<Vector2d> occupied() const;
 
  private:
+  // What the whole picture has gone by over some frames, as an affine function of the place.
+  struct CameraMotion {
+    Eigen::Matrix<double, 3, 2> coefficients = Eigen::Matrix<double, 3, 2>::Zero();
+    static Eigen::Vector3d terms(const Vector2d& px) noexcept { return {1.0, kScale * px.x(), kScale * px.y()}; }
+    [[nodiscard]] Vector2d at(const Vector2d& px) const noexcept { return coefficients.transpose() * terms(px); }
+    static constexpr double kScale = 1e-3;  // so that all terms are of one size
+  };
+
   [[nodiscard]] bool seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
                           double deviation_px, double min_correlation) const noexcept;
   // Of the features around `px`, without `but`; its own velocity where there are too few.
@@ -82,9 +113,28 @@ class FeatureFollower {
   }
   void note_displacements() noexcept;
   void find_again(const GreyImage& image) noexcept;
+  void sweep() noexcept;
+  void recall_swept(const GreyImage& image) noexcept;
+  [[nodiscard]] std::optional<Vector2d> displacement_of_swept() noexcept;
   void judge(const GreyImage& image) noexcept;
   [[nodiscard]] bool moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept;
   void drop_doubles() noexcept;
+  void keep_to_maximum() noexcept;
+  [[nodiscard]] const Vector2d& trailed(const FollowedFeature& feature, std::size_t frames_ago) const noexcept;
+  [[nodiscard]] bool has_stood_still(const FollowedFeature& feature, std::size_t frames) const noexcept;
+  // Of those found that have been followed for so many frames: feature, where it was then, whether it has stayed there.
+  template <class Function>
+  void for_each_trail(std::size_t frames, Function&& function) const {
+    for (const FollowedFeature& feature : features_) {
+      if (!feature.found || feature.trail_length < frames) continue;
+      function(feature, trailed(feature, frames), has_stood_still(feature, frames));
+    }
+  }
+  [[nodiscard]] std::optional<CameraMotion> camera_motion(std::size_t frames) noexcept;
+  [[nodiscard]] bool is_overlay(const FollowedFeature& feature, const CameraMotion& camera) const noexcept;
+  void let_overlays_go() noexcept;
+  void bar(const Vector2d& px) noexcept;
+  [[nodiscard]] FollowedFeature* place_for_new() noexcept;
   void renew_worn_template(const GreyImage& image, FollowedFeature& feature) const noexcept;
 
   FollowerSettings settings_;
@@ -96,6 +146,14 @@ class FeatureFollower {
   double deviation_px_;
   double strangeness_px_ = 1.0;  // how far a displacement usually is from that of the neighbours
   std::uint32_t next_id_ = 1;
+  std::uint64_t frame_ = 0;  // of those that show anything
+  int blind_frames_ = 0;     // in a row
+  CameraMotion camera_lately_;
+  struct Overlay {
+    Vector2d px;
+    std::uint64_t until_frame;
+  };
+  std::vector<Overlay> overlays_;
 };
 
 }  // namespace perimap

@@ -9,12 +9,14 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "core/vision/confirmed_tracks.hpp"
 #include "core/vision/feature_detector.hpp"
 #include "core/vision/feature_follower.hpp"
 #include "core/vision/instrument_mask.hpp"
@@ -73,6 +75,7 @@ class RecordingSource final : public FrameSource {
     if (frame_.grey.data != nullptr && (image->width != frame_.grey.width || image->height != frame_.grey.height)) {
       return fail(fmt::format("{}: byte {}: a frame of another size than the first", path_, (*message)->file_offset));
     }
+    if (frame_.grey.data != nullptr) ++frame_.number;
     frame_.grey = *image;
     return &frame_;
   }
@@ -129,10 +132,14 @@ class TrackTable {
     std::filesystem::remove(partial_, ignored);
   }
 
-  void write(std::uint64_t frame, const FollowedFeature& feature) {
-    const char* state = feature.state == FollowState::kCandidate ? "candidate" : "tracked";
-    fmt::print(file_.get(), "{},{},{:.3f},{:.3f},{}\n", frame, feature.id, feature.px.x(), feature.px.y(), state);
+  void write(std::span<const TrackRow> rows) {
+    for (const TrackRow& row : rows) {
+      fmt::print(file_.get(), "{},{},{:.3f},{:.3f},{}\n", row.frame, row.id, row.px.x(), row.px.y(),
+                 row.is_candidate ? "candidate" : "tracked");
+    }
+    rows_ += rows.size();
   }
+  [[nodiscard]] std::size_t rows() const noexcept { return rows_; }
 
   Expected<void> finish() {
     std::error_code error;
@@ -152,6 +159,7 @@ class TrackTable {
   explicit TrackTable(const std::string& path) : path_(path), partial_(path + ".part") {}
   std::string path_, partial_;
   std::unique_ptr<std::FILE, Close> file_;
+  std::size_t rows_ = 0;
 };
 
 VideoMark mark_of(const FollowedFeature& feature) noexcept {
@@ -174,13 +182,14 @@ VideoMark mark_of(const FollowedFeature& feature) noexcept {
 
 struct Summary {
   std::uint64_t frames = 0;
-  std::uint64_t rows = 0;
+  std::uint64_t poor_frames = 0;  // in which fewer than a tenth of the features wanted were found
   double follow_s = 0;
 };
 
 class Tracking {
  public:
-  explicit Tracking(const Options& options) : options_(options), follower_(settings(options)) {}
+  Tracking(const Options& options, double frames_per_s)
+      : options_(options), follower_(settings(options, frames_per_s)) {}
 
   // Follows every feature in the frame and fills up their number every kFindInterval frames.
   Expected<void> take(const VideoFrame& frame) {
@@ -190,16 +199,17 @@ class Tracking {
     constexpr std::uint64_t kFindInterval = 5;
     const bool may_find = options_.no_new_features ? !has_found_ : summary_.frames % kFindInterval == 0;
     ++summary_.frames;
-    return may_find && follower_.free() > 0 ? find(frame) : Expected<void>();
+    if (may_find && follower_.free() > 0) {
+      if (auto done = find(frame); !done) return done;
+    }
+    constexpr int kPoor = 10;  // one in so many
+    const auto found = std::count_if(follower_.features().begin(), follower_.features().end(),
+                                     [](const FollowedFeature& feature) { return feature.found; });
+    summary_.poor_frames += kPoor * found < options_.features ? 1 : 0;
+    return {};
   }
 
-  void write(TrackTable& table) {
-    for (const FollowedFeature& feature : follower_.features()) {
-      if (!feature.found) continue;
-      table.write(summary_.frames - 1, feature);
-      ++summary_.rows;
-    }
-  }
+  [[nodiscard]] std::span<const FollowedFeature> features() const noexcept { return follower_.features(); }
 
   [[nodiscard]] std::vector<VideoMark> marks() const {
     std::vector<VideoMark> marks;
@@ -212,17 +222,17 @@ class Tracking {
   [[nodiscard]] const Summary& summary() const noexcept { return summary_; }
 
  private:
-  static FollowerSettings settings(const Options& options) {
+  static FollowerSettings settings(const Options& options, double frames_per_s) {
     FollowerSettings settings;
     settings.maximum = options.features;
+    constexpr double kOccluded_s = 0.5, kMostOccluded = 60;
+    const double least = settings.occluded_frames;
+    settings.occluded_frames = static_cast<int>(std::clamp(kOccluded_s * frames_per_s, least, kMostOccluded));
     return settings;
   }
 
   Expected<void> find(const VideoFrame& frame) {
-    std::vector<Vector2d> occupied;
-    for (const FollowedFeature& feature : follower_.features()) {
-      if (feature.state != FollowState::kEmpty) occupied.push_back(feature.px);
-    }
+    const std::vector<Vector2d> occupied = follower_.occupied();
     GreyImage barred;
     std::vector<std::uint8_t> mask;
     if (frame.bgr != nullptr) {
@@ -232,8 +242,11 @@ class Tracking {
       barred = {mask.data(), frame.grey.width, frame.grey.height, frame.grey.width};
     }
     const GreyImage& image = frame.grey;
+    const PictureLight light = estimate_light(image);
+    // In a dim picture hardly anything is above the grey that counts as dark elsewhere.
+    const int dark_grey = std::min(kDark_grey, static_cast<int>(0.5 * light.lit_grey));
     const DetectorSettings detector =
-        detector_settings_for(image.width, image.height, estimate_noise(image), options_.features);
+        detector_settings_for(image.width, image.height, estimate_noise(image, dark_grey), options_.features, light);
     const auto corners = find_features(image, occupied, detector, follower_.free(), barred);
     if (!corners) return tl::unexpected(corners.error());
     follower_.add(image, *corners, template_settings_for(detector.min_corner));
@@ -260,7 +273,8 @@ int track(const Options& options) {
   auto table = TrackTable::create(options.csv);
   if (!table) return refuse(table.error(), kFailure);
   std::optional<VideoWriter> video;
-  Tracking tracking(options);
+  Tracking tracking(options, (*source)->frames_per_s());
+  ConfirmedTracks tracks(FollowedFeature::kTrail);
   {
     Progress progress("frames", (*source)->announced_frames());
     while (!stop->requested()) {
@@ -268,7 +282,7 @@ int track(const Options& options) {
       if (!frame) return refuse(frame.error(), kFailure);
       if (*frame == nullptr) break;
       if (const auto taken = tracking.take(**frame); !taken) return refuse(taken.error(), kFailure);
-      tracking.write(*table);
+      table->write(tracks.add((*frame)->number, tracking.features()));
       if (!options.video.empty()) {
         if (!video) {
           const GreyImage& grey = (*frame)->grey;
@@ -283,6 +297,7 @@ int track(const Options& options) {
       if ((*source)->announced_frames() > 0) progress.update(tracking.summary().frames);
     }
   }
+  table->write(tracks.finish());
   if (const auto finished = table->finish(); !finished) return refuse(finished.error(), kFailure);
   if (video) {
     if (const auto finished = video->finish(); !finished) return refuse(finished.error(), kFailure);
@@ -294,9 +309,18 @@ int track(const Options& options) {
     fmt::print(stderr, "perimap track: {}: announces {} frames, {} could be read: it may have been cut off\n",
                options.input, announced, summary.frames);
   }
+  if (2 * summary.poor_frames > summary.frames || table->rows() == 0) {
+    fmt::print(stderr,
+               "perimap track: {}: hardly any features could be found: too dark, too blurred or without texture?\n",
+               options.input);
+  }
+  if (summary.poor_frames > 0) {
+    fmt::print(stderr, "perimap track: {}: in {} of {} frames fewer than a tenth of {} features were found\n",
+               options.input, summary.poor_frames, summary.frames, options.features);
+  }
   const double frames = static_cast<double>(std::max<std::uint64_t>(summary.frames, 1));
   fmt::print("{}{} frames, {:.1f} features a frame, {:.2f} ms a frame to follow them: {}\n",
-             stop->requested() ? "stopped early: " : "", summary.frames, static_cast<double>(summary.rows) / frames,
+             stop->requested() ? "stopped early: " : "", summary.frames, static_cast<double>(table->rows()) / frames,
              1e3 * summary.follow_s / frames, options.csv);
   return kOk;
 }

@@ -34,8 +34,28 @@ struct VideoReader::Impl {
   cv::Mat colour, grey;
   cv::Size size;
   bool first_is_waiting = true;
+  std::uint64_t number = 0;
+  double time_ms = 0;  // of the last frame
   VideoFrame frame;
+
+  [[nodiscard]] bool read() { return capture.read(colour) && !colour.empty(); }
+  [[nodiscard]] bool read_next(std::uint64_t announced, double frames_per_s);
 };
+
+bool VideoReader::Impl::read_next(std::uint64_t announced, double frames_per_s) {
+  constexpr int kMostFailures = 300;  // in a row
+  int failures = 0;
+  while (!read()) {
+    if (number + 1 >= announced || ++failures > kMostFailures) return false;
+  }
+  const double before_ms = std::exchange(time_ms, capture.get(cv::CAP_PROP_POS_MSEC));
+  ++number;
+  if (failures > 0 && number < announced) {
+    const double missing = std::round(1e-3 * (time_ms - before_ms) * frames_per_s) - 1;
+    number += static_cast<std::uint64_t>(std::clamp(missing, 0.0, static_cast<double>(announced - number)));
+  }
+  return true;
+}
 
 VideoReader::VideoReader(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
 VideoReader::VideoReader(VideoReader&&) noexcept = default;
@@ -43,13 +63,14 @@ VideoReader::~VideoReader() = default;
 
 Expected<VideoReader> VideoReader::open(const std::string& path) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return fail(path + ": there is no such file");
+  if (!std::filesystem::exists(path, error)) return fail(path + ": there is no such file");
+  if (!std::filesystem::is_regular_file(path, error)) return fail(path + ": a folder or a device, not a video file");
   try {
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said here
     auto impl = std::make_unique<Impl>();
     impl->path = path;
     if (!impl->capture.open(path, cv::CAP_FFMPEG)) return fail(path + ": not a video that can be read");
-    if (!impl->capture.read(impl->colour) || impl->colour.empty()) {
+    if (!impl->read()) {
       return fail(path + ": the first frame can not be decoded");
     }
     impl->size = impl->colour.size();
@@ -71,8 +92,8 @@ double VideoReader::frames_per_s() const noexcept {
 
 Expected<const VideoFrame*> VideoReader::next() {
   try {
-    if (!std::exchange(impl_->first_is_waiting, false)) {
-      if (!impl_->capture.read(impl_->colour) || impl_->colour.empty()) return nullptr;
+    if (!std::exchange(impl_->first_is_waiting, false) && !impl_->read_next(announced_frames(), frames_per_s())) {
+      return nullptr;
     }
     cv::Mat& colour = impl_->colour;
     if (colour.size() != impl_->size || colour.depth() != CV_8U || (colour.channels() != 3 && colour.channels() != 1)) {
@@ -81,7 +102,8 @@ Expected<const VideoFrame*> VideoReader::next() {
     if (colour.channels() == 1) cv::cvtColor(colour, colour, cv::COLOR_GRAY2BGR);
     cv::extractChannel(colour, impl_->grey, 1);
     const cv::Mat& grey = impl_->grey;
-    impl_->frame = {colour.data,
+    impl_->frame = {impl_->number,
+                    colour.data,
                     static_cast<std::ptrdiff_t>(colour.step),
                     {grey.data, grey.cols, grey.rows, static_cast<std::ptrdiff_t>(grey.step)}};
     return &impl_->frame;

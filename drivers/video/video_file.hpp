@@ -15,6 +15,8 @@ namespace perimap {
 // One frame, in colour and in grey: its green channel, in which blood absorbs most, so that vessels stand out, and
 // which clips last. Valid until the next one is read.
 struct VideoFrame {
+  // Counted from 0. Where frames could not be decoded it goes on by the video's times.
+  std::uint64_t number = 0;
   const std::uint8_t* bgr = nullptr;  // 3 bytes a pixel, blue first, bgr_stride bytes from row to row
   std::ptrdiff_t bgr_stride = 0;
   GreyImage grey;
@@ -34,7 +36,8 @@ class VideoReader {
   [[nodiscard]] std::uint64_t announced_frames() const noexcept;
   [[nodiscard]] double frames_per_s() const noexcept;
 
-  // Null at the end. A frame of another size than the first ends the reading with an error.
+  // Null at the end. Frames that cannot be decoded are passed over while fewer have come than the container announces.
+  // A frame of another size than the first ends the reading with an error.
   [[nodiscard]] Expected<const VideoFrame*> next();
 
  private:

@@ -93,7 +93,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const NeighbourMotion::Around around = motion.around(at, &inside);
   if (around.known && at.allFinite() && predicted.allFinite() && !(around.disagreement_px >= 0)) std::abort();
 
-  const auto corners = find_features(image, {}, detector_settings_for(width, height, estimate_noise(image), 20), 20);
+  const auto corners = find_features(
+      image, {}, detector_settings_for(width, height, estimate_noise(image), 20, estimate_light(image)), 20);
   if (!corners) std::abort();
   FollowerSettings settings;
   settings.maximum = 20;

@@ -20,7 +20,7 @@ class VideoCamera : public ::testing::Test {
     const std::vector<std::uint8_t> pixels(std::size_t{64} * 48, 100);
     auto writer = VideoWriter::create(file_, 64, 48, 200.0).value();
     for (int i = 0; i < kFrames; ++i) {
-      EXPECT_TRUE(writer.write({nullptr, 0, {pixels.data(), 64, 48, 64}}, {}));
+      EXPECT_TRUE(writer.write({0, nullptr, 0, {pixels.data(), 64, 48, 64}}, {}));
     }
     EXPECT_TRUE(writer.finish());
   }

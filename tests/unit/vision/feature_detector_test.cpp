@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/unit/vision/synthetic_scene.hpp"
 
 namespace perimap {
@@ -110,6 +112,64 @@ TEST(FeatureDetector, SaysWhatItCannotUse) {
   const auto refused = find_features(image.view(), {}, settings, 5);
   ASSERT_FALSE(refused.has_value());
   EXPECT_NE(refused.error().message.find("tile_px"), std::string::npos);
+}
+
+TEST(PictureLight, IsTheMedianOfWhatIsLitAndTheGreyOfAnEvenSurround) {
+  std::mt19937 random(2);
+  ImageBuffer image = textured();
+  EXPECT_NEAR(estimate_light(image.view()).lit_grey, 120, 10);
+  EXPECT_EQ(estimate_light(image.view()).surround_grey, 0);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      if (std::hypot(x - 160, y - 120) > 110) image.at(x, y) = static_cast<std::uint8_t>(23 + random() % 4);
+    }
+  }
+  EXPECT_NEAR(estimate_light(image.view()).surround_grey, 24.5, 1);
+  EXPECT_NEAR(estimate_light(image.view()).lit_grey, 120, 10);
+  EXPECT_EQ(estimate_light(ImageBuffer(40, 30).view()).lit_grey, 0);
+}
+
+// As `perimap track` asks for them.
+std::vector<Vector2d> found_by_light(const ImageBuffer& image, int how_many) {
+  const PictureLight light = estimate_light(image.view());
+  const double noise = estimate_noise(image.view(), static_cast<int>(0.5 * light.lit_grey));
+  const auto found =
+      find_features(image.view(), {}, detector_settings_for(kWidth, kHeight, noise, how_many, light), how_many);
+  EXPECT_TRUE(found.has_value());
+  return found.value_or(std::vector<Vector2d>{});
+}
+
+TEST(FeatureDetector, FindsAsManyInADimPicture) {
+  std::mt19937 random(2);
+  View view;
+  const std::size_t bright = found_by_light(render(Texture(3), view, kWidth, kHeight, 1, random), 40).size();
+  ASSERT_GE(bright, 25U);
+  view.gain = 0.15;  // contrast and light alike
+  EXPECT_GE(10 * found_by_light(render(Texture(3), view, kWidth, kHeight, 0.3, random), 40).size(), 8 * bright);
+}
+
+TEST(FeatureDetector, AsksNoLessOfABrightPictureThanItsNoiseDemands) {
+  for (const double lit : {90.0, 120.0, 200.0}) {
+    const DetectorSettings settings = detector_settings_for(1280, 720, 0.1, 200, {lit, 0});
+    EXPECT_EQ(settings.min_corner, 0.5);
+    EXPECT_EQ(settings.background_grey, DetectorSettings{}.background_grey);
+  }
+}
+
+TEST(FeatureDetector, KeepsClearOfTheRimOfAViewWhoseSurroundIsNotBlack) {
+  constexpr double kRadius = 100;
+  ImageBuffer image = textured();
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      // Rough enough for corners along the rim.
+      const double angle = std::atan2(y - 120, x - 160);
+      if (std::hypot(x - 160, y - 120) > kRadius + 3 * std::sin(17 * angle))
+        image.at(x, y) = static_cast<std::uint8_t>(24 + (x * 7 + y * 3) % 5);
+    }
+  }
+  const std::vector<Vector2d> found = found_by_light(image, 60);
+  EXPECT_GE(found.size(), 20U);
+  for (const Vector2d& px : found) EXPECT_LT((px - Vector2d(160, 120)).norm(), kRadius - 8);
 }
 
 }  // namespace

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <map>
+#include <set>
+#include <vector>
 
 #include "core/vision/feature_detector.hpp"
 #include "core/vision/instrument_mask.hpp"
@@ -44,10 +48,7 @@ class FeatureFollowerTest : public testing::Test {
   }
 
   void find() {
-    std::vector<Vector2d> occupied;
-    for (const FollowedFeature& feature : follower_.features()) {
-      if (feature.state != FollowState::kEmpty) occupied.push_back(feature.px);
-    }
+    const std::vector<Vector2d> occupied = follower_.occupied();
     const double noise = estimate_noise(image_.view());
     const DetectorSettings detector = detector_settings_for(kWidth, kHeight, noise, kFeatures);
     const auto corners = find_features(image_.view(), occupied, detector, follower_.free());
@@ -155,18 +156,153 @@ TEST_F(FeatureFollowerTest, FindsTheSameFeaturesAgainAfterAnOcclusion) {
 TEST_F(FeatureFollowerTest, GivesUpWhatStaysAway) {
   show({0, 0});
   find();
-  follow();
-  image_ = ImageBuffer(kWidth, kHeight);
-  for (int k = 0; k < 40; ++k) follow();
-  EXPECT_EQ(follower_.free(), kFeatures);
+  for (int k = 0; k < 10; ++k) follow();
+  ASSERT_GE(count(FollowState::kTracked), 20);
+  for (int k = 0; k < 40; ++k) {
+    image_ = render(Texture(8), View{}, kWidth, kHeight, 1, random_, 5);
+    follow();
+  }
+  EXPECT_EQ(count(FollowState::kEmpty), static_cast<int>(follower_.features().size()));
+}
+
+TEST_F(FeatureFollowerTest, FillsUpAtOnceAfterACutAndKeepsNothingOfTheScenesBefore) {
+  show({0, 0});
+  find();
+  for (int k = 1; k <= 10; ++k) {
+    show({2.0 * k, 0});
+    follow();
+  }
+  std::set<std::uint32_t> before;
+  for (const FollowedFeature& feature : follower_.features()) before.insert(feature.id);
+  for (int k = 1; k <= 20; ++k) {
+    image_ = render(Texture(8), view_at({2.0 * k, 0}), kWidth, kHeight, 1, random_, 5);
+    follower_.follow(image_.view());
+    for (const FollowedFeature& feature : follower_.features()) {
+      EXPECT_FALSE(feature.found && before.contains(feature.id)) << feature.id << " in frame " << k;
+    }
+    if (k % 5 == 0) find();
+  }
+  EXPECT_GE(count(FollowState::kTracked), 25);
+}
+
+TEST_F(FeatureFollowerTest, WhatIsAwayForMoreThanAMomentNeitherFillsAPlaceNorKeepsOthersAway) {
+  show({0, 0});
+  find();
+  for (int k = 0; k < 10; ++k) follow();
+  const int free_before = follower_.free();
+  for (int k = 0; k < 6; ++k) {
+    show({0, 0});
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth / 2; ++u) image_.at(u, v) = static_cast<std::uint8_t>(100 + (u + v) % 3);
+    }
+    follow();
+  }
+  const int away = count(FollowState::kOccluded);
+  ASSERT_GE(away, 8);
+  EXPECT_GE(follower_.free(), free_before + away - 2);
+  for (const Vector2d& px : follower_.occupied()) EXPECT_GT(px.x(), kWidth / 2 - 12);
+}
+
+TEST_F(FeatureFollowerTest, FindsItsFeaturesAgainAfterABlackoutInWhichTheCameraMoved) {
+  show({0, 0});
+  find();
+  for (int k = 1; k <= 10; ++k) {
+    show({2.0 * k, 0});
+    follow();
+  }
+  const int before = count(FollowState::kTracked);
+  for (int k = 0; k < 60; ++k) {
+    image_ = ImageBuffer(kWidth, kHeight);
+    for (std::uint8_t& pixel : image_.pixels) pixel = static_cast<std::uint8_t>(random_() % 4);
+    follower_.follow(image_.view());
+    for (const FollowedFeature& feature : follower_.features()) EXPECT_FALSE(feature.found);
+  }
+  for (int k = 0; k < 3; ++k) {
+    show({28, -6});
+    follow();
+  }
+  EXPECT_GE(count(FollowState::kTracked), before * 7 / 10);
+  EXPECT_LT(worst_px(), 0.5);
+}
+
+// A chequered sign over the picture.
+void lay_sign_over(ImageBuffer& image, int left, int top) {
+  constexpr int kSide = 72, kField = 9;
+  for (int v = 0; v < kSide; ++v) {
+    for (int u = 0; u < kSide; ++u) {
+      image.at(left + u, top + v) = (u / kField * 5 + v / kField * 3) % 7 < 3 ? 220 : 60;
+    }
+  }
+}
+
+TEST_F(FeatureFollowerTest, LetsGoOfWhatIsLaidOverThePictureAndTakesItNoMore) {
+  constexpr int kLeft = 60, kTop = 40, kSide = 72;
+  const auto on_sign = [&](const Vector2d& px) {
+    return px.x() >= kLeft && px.x() < kLeft + kSide && px.y() >= kTop && px.y() < kTop + kSide;
+  };
+  int at_first = 0, tracked = 0;
+  for (int k = 0; k <= 60; ++k) {
+    image_ =
+        render(Texture(3), view_at({25 * std::sin(0.08 * k), 10 * std::sin(0.06 * k)}), kWidth, kHeight, 1, random_, 5);
+    lay_sign_over(image_, kLeft, kTop);
+    follower_.follow(image_.view());
+    if (k % 5 == 0) find();
+    for (const FollowedFeature& feature : follower_.features()) {
+      if (!feature.found || !on_sign(feature.px)) continue;
+      at_first += k == 0 ? 1 : 0;
+      tracked += k > 20 && feature.state == FollowState::kTracked ? 1 : 0;
+    }
+  }
+  EXPECT_GE(at_first, 3);
+  EXPECT_EQ(tracked, 0);
+  EXPECT_GE(count(FollowState::kTracked), 20);
+}
+
+// The left half is held; the right one is stretched, by 8 px and more at its end.
+TEST_F(FeatureFollowerTest, KeepsTissueThatStandsStillBesideABeatingPart) {
+  std::set<std::uint32_t> still;
+  for (int k = 0; k <= 60; ++k) {
+    View view;
+    const double stretch = 0.05 * std::sin(0.25 * k);
+    view.A(1, 0) = stretch;
+    view.A(0, 0) = 1 + stretch;
+    view.t = kWidth / 2 * (Vector2d(1, 0) - view.A.col(0));
+    const ImageBuffer rest = render(Texture(3), View{}, kWidth, kHeight, 1, random_, 5);
+    image_ = render(Texture(3), view, kWidth, kHeight, 1, random_, 5);
+    for (int v = 0; v < kHeight; ++v) {
+      std::copy_n(rest.pixels.begin() + v * rest.stride, kWidth / 2, image_.pixels.begin() + v * image_.stride);
+    }
+    follower_.follow(image_.view());
+    if (k == 0) find();
+    if (k == 10) {
+      for (const FollowedFeature& feature : follower_.features()) {
+        if (feature.state == FollowState::kTracked && feature.px.x() < kWidth / 2 - 15) still.insert(feature.id);
+      }
+    }
+  }
+  ASSERT_GE(still.size(), 8U);
+  std::size_t kept = 0;
+  for (const FollowedFeature& feature : follower_.features()) kept += feature.found ? still.count(feature.id) : 0;
+  EXPECT_EQ(kept, still.size());
 }
 
 TEST_F(FeatureFollowerTest, TakesNothingFromTheHeapToFollow) {
   show({0, 0});
   find();
-  show({3, 1});
+  ImageBuffer cut = render(Texture(8), View{}, kWidth, kHeight, 1, random_, 5);
+  lay_sign_over(cut, 60, 40);
+  const ImageBuffer black(kWidth, kHeight);
+  std::vector<ImageBuffer> frames;
+  for (int k = 0; k < 25; ++k) {
+    show({1.0 * k, 0.5 * k});
+    lay_sign_over(image_, 60, 40);
+    frames.push_back(image_);
+    if (k == 0) find();
+  }
   const long before = test::allocations;
-  follower_.follow(image_.view());
+  for (const ImageBuffer& frame : frames) follower_.follow(frame.view());
+  for (const ImageBuffer* frame : std::initializer_list<const ImageBuffer*>{&cut, &black, &frames.back()})
+    follower_.follow(frame->view());
   EXPECT_EQ(test::allocations, before);
 }
 
