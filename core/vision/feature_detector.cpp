@@ -264,7 +264,7 @@ DetectorSettings detector_settings_for(int width, int height, double noise, int 
   DetectorSettings settings;
   const double brightness = std::min(light.lit_grey / PictureLight::kUsual_grey, 1.0);
   // Noise of sigma alone gives a corner 0.19 sigma^2 (patch_template.hpp); rounding to whole grey levels is noise too.
-  constexpr double kLeastCorner = 0.5, kLeastCornerOfRounding = 0.05;
+  constexpr double kLeastCorner = 0.5, kLeastCornerOfRounding = 0.12;
   const double least = std::max(kLeastCorner * brightness * brightness, kLeastCornerOfRounding);
   settings.min_corner = std::clamp(1.2 * noise * noise, least, DetectorSettings{}.min_corner);
   constexpr double kLeastBackground_grey = 2, kSurroundMargin_grey = 5;

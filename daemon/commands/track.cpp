@@ -337,7 +337,8 @@ void add_track_command(CLI::App& app, int& exit_code) {
       ->add_option(
           "--csv", options->csv,
           "Where to write the tracks: frame,id,x,y,state; a row a feature a frame in which it is found. Frames\n"
-          "count from 0, pixels from the centre of the first; states are candidate and tracked")
+          "count from 0, pixels from the centre of the first; states are candidate and tracked. A candidate that is\n"
+          "never tracked has no rows")
       ->required();
   command->add_option("--video", options->video, "Where to write the frames with their features marked (.mkv, .avi)");
   command->add_option("--features", options->features, "How many are kept followed")
@@ -347,7 +348,8 @@ void add_track_command(CLI::App& app, int& exit_code) {
                     "Only those found in the first frame that shows any");
   command->footer(
       "Prediction: each feature by its own velocity; where that fails by the motion of the features around it; where\n"
-      "most fail at once, a wide search. A recording's tracker and ECG are not used.\n"
+      "most fail at once, a wide search. A recording's tracker and ECG are not used. What stands still while the\n"
+      "camera moves (text, a logo) is let go.\n"
       "Exit codes: 0 done, 1 failed, 2 wrong usage.");
   command->callback([options, &exit_code] { exit_code = track(*options); });
 }

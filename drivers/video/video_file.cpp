@@ -36,6 +36,7 @@ struct VideoReader::Impl {
   bool first_is_waiting = true;
   std::uint64_t number = 0;
   double time_ms = 0;  // of the last frame
+  bool is_broken = false;
   VideoFrame frame;
 
   [[nodiscard]] bool read() { return capture.read(colour) && !colour.empty(); }
@@ -48,11 +49,13 @@ bool VideoReader::Impl::read_next(std::uint64_t announced, double frames_per_s) 
   while (!read()) {
     if (number + 1 >= announced || ++failures > kMostFailures) return false;
   }
+  is_broken = is_broken || failures > 0;
   const double before_ms = std::exchange(time_ms, capture.get(cv::CAP_PROP_POS_MSEC));
   ++number;
-  if (failures > 0 && number < announced) {
+  // Beyond a broken spot decoders leave out more frames without a word. The last ones they give have no time.
+  if (is_broken && number < announced) {
     const double missing = std::round(1e-3 * (time_ms - before_ms) * frames_per_s) - 1;
-    number += static_cast<std::uint64_t>(std::clamp(missing, 0.0, static_cast<double>(announced - number)));
+    number += static_cast<std::uint64_t>(std::clamp(missing, 0.0, static_cast<double>(announced - 1 - number)));
   }
   return true;
 }

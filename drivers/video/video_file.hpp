@@ -15,7 +15,7 @@ namespace perimap {
 // One frame, in colour and in grey: its green channel, in which blood absorbs most, so that vessels stand out, and
 // which clips last. Valid until the next one is read.
 struct VideoFrame {
-  // Counted from 0. Where frames could not be decoded it goes on by the video's times.
+  // Counted from 0; from the first frame that could not be decoded on, by the video's times at its usual rate.
   std::uint64_t number = 0;
   const std::uint8_t* bgr = nullptr;  // 3 bytes a pixel, blue first, bgr_stride bytes from row to row
   std::ptrdiff_t bgr_stride = 0;

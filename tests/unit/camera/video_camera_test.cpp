@@ -3,7 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <functional>
+#include <random>
+#include <string>
 #include <vector>
 
 #include "drivers/video/video_file.hpp"
@@ -76,6 +81,43 @@ TEST_F(VideoCamera, SaysWhichFileItCannotRead) {
   ASSERT_FALSE(played);
   EXPECT_THAT(played.error().message, ::testing::HasSubstr("none.avi"));
   EXPECT_EQ(health_.state(), DeviceState::kClosed);
+}
+
+TEST(VideoReader, ReadsOnBehindABrokenSpotAndKeepsTheFramesNumbers) {
+  constexpr std::uint64_t kMany = 12;
+  const std::string file = "broken.mov";
+  auto writer = VideoWriter::create(file, 64, 48, 30.0).value();
+  std::mt19937 random(1);
+  std::vector<std::uint8_t> pixels(std::size_t{64} * 48);
+  for (std::uint64_t i = 0; i < kMany; ++i) {
+    for (std::uint8_t& pixel : pixels) pixel = static_cast<std::uint8_t>(random() % 256);
+    ASSERT_TRUE(writer.write({i, nullptr, 0, {pixels.data(), 64, 48, 64}}, {}));
+  }
+  ASSERT_TRUE(writer.finish());
+  const auto bytes = static_cast<std::streamoff>(std::filesystem::file_size(file));
+  std::fstream(file, std::ios::in | std::ios::out | std::ios::binary).seekp(bytes * 3 / 10)
+      << std::string(static_cast<std::size_t>(bytes / 5), '\0');
+
+  auto reader = VideoReader::open(file).value();
+  std::vector<std::uint64_t> numbers;
+  for (auto frame = reader.next(); frame.has_value() && *frame != nullptr; frame = reader.next()) {
+    numbers.push_back((*frame)->number);
+  }
+  std::filesystem::remove(file);
+  ASSERT_GE(numbers.size(), 6U);
+  EXPECT_LT(numbers.size(), kMany);
+  EXPECT_EQ(numbers.front(), 0U);
+  EXPECT_EQ(numbers.back(), kMany - 1);
+  EXPECT_TRUE(std::is_sorted(numbers.begin(), numbers.end(), std::less_equal<>()));
+}
+
+TEST(VideoReader, TellsAFolderFromAFileThatIsNotThere) {
+  const auto folder = VideoReader::open(".");
+  ASSERT_FALSE(folder);
+  EXPECT_THAT(folder.error().message, ::testing::HasSubstr("a folder"));
+  const auto none = VideoReader::open("none.avi");
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().message, ::testing::HasSubstr("there is no such file"));
 }
 
 }  // namespace
