@@ -113,8 +113,9 @@ NeighbourMotion::Around FeatureFollower::around(const Vector2d& px, const Follow
 void FeatureFollower::follow(const GreyImage& image) noexcept {
   std::size_t sought = 0, found = 0;
   for (FollowedFeature& feature : features_) {
-    feature.found = feature.is_overlay = false;
+    feature.found = feature.is_overlay = feature.is_recalled = false;
     feature.last_px = feature.px;
+    feature.last_state = feature.patch_state;
   }
   if (!shows_anything(image)) {
     ++blind_frames_;
@@ -139,15 +140,12 @@ void FeatureFollower::follow(const GreyImage& image) noexcept {
   if (has_jerked) {
     for (FollowedFeature& feature : features_) {
       if (!is_sought(feature) || feature.found) continue;
-      found += seek(image, feature, feature.last_px + displacement_around(feature.last_px, &feature),
-                    settings_.widest_deviation_px, settings_.recovered_correlation)
-                   ? 1
-                   : 0;
+      (void)seek(image, feature, feature.last_px + displacement_around(feature.last_px, &feature),
+                 settings_.widest_deviation_px, settings_.recovered_correlation);
     }
     note_displacements();
   }
-  constexpr std::size_t kEnoughToTell = 8, kNearlyAll = 5;  // one in so many is left at most
-  if (sought >= kEnoughToTell && kNearlyAll * found < sought) {
+  if (has_vanished()) {
     sweep();
     note_displacements();
   } else {
@@ -175,12 +173,29 @@ void FeatureFollower::follow(const GreyImage& image) noexcept {
   blind_frames_ = 0;
 }
 
+// Nearly all of what is tracked. Candidates tell nothing: many of them are none from the beginning.
+bool FeatureFollower::has_vanished() const noexcept {
+  constexpr std::size_t kEnoughToTell = 8, kNearlyAll = 5;  // one in so many is left at most
+  std::size_t tracked = 0, found = 0;
+  for (const FollowedFeature& feature : features_) {
+    if (feature.state != FollowState::kTracked) continue;
+    ++tracked;
+    found += feature.found ? 1 : 0;
+  }
+  return tracked >= kEnoughToTell && kNearlyAll * found < tracked;
+}
+
+void FeatureFollower::disbelieve(FollowedFeature& feature) const noexcept {
+  feature.found = false;
+  feature.px = feature.last_px;
+  feature.patch_state = feature.last_state;
+}
+
 void FeatureFollower::sweep() noexcept {
   for (FollowedFeature& feature : features_) {
     if (feature.state == FollowState::kCandidate) let_go(feature);
     if (feature.state != FollowState::kTracked) continue;
-    feature.found = false;
-    feature.px = feature.last_px;
+    disbelieve(feature);
     feature.velocity_px.setZero();
     feature.swept = true;
   }
@@ -202,8 +217,11 @@ std::optional<Vector2d> FeatureFollower::displacement_of_swept() noexcept {
   const double tolerance_px = 4 + 0.3 * middle.norm();
   for (FollowedFeature& feature : features_) {
     if (!feature.swept || !feature.found) continue;
-    feature.found = (feature.px - feature.last_px - middle).norm() <= tolerance_px;
-    alike += feature.found ? 1 : 0;
+    if ((feature.px - feature.last_px - middle).norm() <= tolerance_px) {
+      ++alike;
+    } else {
+      disbelieve(feature);
+    }
   }
   if (alike < kEnoughDisplacements || 2 * alike < found) return std::nullopt;
   return middle;
@@ -230,12 +248,12 @@ void FeatureFollower::recall_swept(const GreyImage& image) noexcept {
   const bool are_back = displacement && kShareAlike * found >= probed;
   for (FollowedFeature& feature : features_) {
     if (!feature.swept) continue;
-    feature.found = feature.found && are_back;
+    if (!are_back || !feature.found) disbelieve(feature);
     feature.swept = !are_back;
+    feature.is_recalled = are_back;
     if (are_back && !feature.found) {
       (void)seek(image, feature, feature.last_px + *displacement, kFirstDeviation_px, settings_.recovered_correlation);
     }
-    if (!feature.found) feature.px = feature.last_px;
   }
   if (are_back) note_displacements();
 }
@@ -280,8 +298,13 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
       }
       continue;
     }
-    feature.velocity_px =
-        feature.misses == 0 ? Vector2d(feature.px - feature.last_px) : displacement_around(feature.px, &feature);
+    // Over a gap of unknown length nothing is known of how fast it goes.
+    if (blind_frames_ > 0 || feature.is_recalled) {
+      feature.velocity_px.setZero();
+    } else {
+      feature.velocity_px =
+          feature.misses == 0 ? Vector2d(feature.px - feature.last_px) : displacement_around(feature.px, &feature);
+    }
     const bool is_back = feature.misses > 0 || blind_frames_ > 0;
     feature.misses = 0;
     feature.swept = false;

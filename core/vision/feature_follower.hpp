@@ -58,6 +58,8 @@ struct FollowedFeature {
   double usual_correlation = 1.0;         // smoothed over some 15 frames
   bool is_overlay = false;                // let go in the last frame because it is laid over the picture
   bool swept = false;                     // it vanished together with nearly all others
+  bool is_recalled = false;               // it has come back with them in the last frame
+  PatchState last_state;                  // in the frame before: what is not believed is taken back
   std::array<Vector2d, kTrail> trail{};   // where it was, by the frame's number
   std::size_t trail_length = 0;
 
@@ -91,6 +93,8 @@ class FeatureFollower {
   void add(const GreyImage& image, std::span<const Vector2d> corners, const TemplateSettings& settings) noexcept;
 
   [[nodiscard]] std::span<const FollowedFeature> features() const noexcept { return features_; }
+  // False when the last frame had no contrast.
+  [[nodiscard]] bool saw_anything() const noexcept { return blind_frames_ == 0; }
   [[nodiscard]] int free() const noexcept;
   // Where no new feature is wanted: at those that fill a place, and at what is laid over the picture.
   [[nodiscard]] std::vector<Vector2d> occupied() const;
@@ -113,6 +117,8 @@ class FeatureFollower {
   }
   void note_displacements() noexcept;
   void find_again(const GreyImage& image) noexcept;
+  [[nodiscard]] bool has_vanished() const noexcept;
+  void disbelieve(FollowedFeature& feature) const noexcept;
   void sweep() noexcept;
   void recall_swept(const GreyImage& image) noexcept;
   [[nodiscard]] std::optional<Vector2d> displacement_of_swept() noexcept;

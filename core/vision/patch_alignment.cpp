@@ -84,7 +84,7 @@ double residual_variance(const PatchTemplate::Level& level, const PatchSamples& 
   }
   // Gain, bias and warp have taken their share of the low frequencies.
   const double free_blocks = kAcross * kAcross - 2 - free_parameters;
-  // Of a pixel's noise a block of smoothed pixels keeps this, averaged over where between pixels they are sampled.
+  // What a block of smoothed pixels keeps of its pixels' noise, sampled at whole pixels; 0.69 half-way between.
   constexpr double kKept = 0.73;
   return sum_squares / (kKept * kGreyScale * kGreyScale * kBlock * kBlock * free_blocks);
 }

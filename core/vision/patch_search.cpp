@@ -12,9 +12,9 @@ constexpr int kWidth = 2 * kMaxSearchRadius + 1;                             // 
 constexpr int kRegionSide = SearchPattern::kMaxSide + 2 * kMaxSearchRadius;  // pixels the windows of all cover
 constexpr int kRegionStride = 2 * kMaxSearchRadius + SearchPattern::kStride + 4;
 
-// The template as it would look in the image, on whole image pixels about the feature's nearest one,
-// PatchTemplate::kGreyScale (T - mean over the weighted pixels), rounded. Where the warp reaches outside the template
-// the weight is 0, and so is the value.
+// The template, smoothed as templates are, as it would look in the image, on whole image pixels about the feature's
+// nearest one, PatchTemplate::kGreyScale (T - mean over the weighted pixels), rounded. Where the warp reaches outside
+// the template the weight is 0, and so is the value.
 struct WarpedTemplate {
   double sum_squares = 0;  // of the values
   double value_sum = 0;    // 0 but for rounding

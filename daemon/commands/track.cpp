@@ -197,7 +197,8 @@ class Tracking {
     follower_.follow(frame.grey);
     summary_.follow_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     constexpr std::uint64_t kFindInterval = 5;
-    const bool may_find = options_.no_new_features ? !has_found_ : summary_.frames % kFindInterval == 0;
+    const bool may_find =
+        follower_.saw_anything() && (options_.no_new_features ? !has_found_ : summary_.frames % kFindInterval == 0);
     ++summary_.frames;
     if (may_find && follower_.free() > 0) {
       if (auto done = find(frame); !done) return done;

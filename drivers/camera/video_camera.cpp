@@ -40,6 +40,7 @@ class Playing {
   }
 
   Expected<void> play(VideoReader& reader) {
+    std::uint64_t expected = 0;
     while (!interrupt_.requested()) {
       auto decoded = reader.next();
       if (!decoded) return tl::unexpected(std::move(decoded.error()));
@@ -49,8 +50,11 @@ class Playing {
         return fail(fmt::format("{}: frames of {}x{}, the calibration is for {}x{}", settings_.file, grey.width,
                                 grey.height, settings_.width, settings_.height));
       }
-      ++sequence_;
-      capture_ += period_;
+      const std::uint64_t undecoded = (*decoded)->number - expected;
+      expected = (*decoded)->number + 1;
+      sequence_ += undecoded + 1;
+      capture_ += static_cast<std::int64_t>(undecoded + 1) * period_;
+      if (undecoded > 0) health_.lost.add(undecoded);
       const Duration ahead = capture_ - MonotonicClock::now();
       if (ahead < -period_) {
         health_.lost.add();

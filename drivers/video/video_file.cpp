@@ -35,7 +35,8 @@ struct VideoReader::Impl {
   cv::Size size;
   bool first_is_waiting = true;
   std::uint64_t number = 0;
-  double time_ms = 0;  // of the last frame
+  double time_ms = 0;                // of the last frame that had one
+  std::uint64_t frames_untimed = 0;  // since
   bool is_broken = false;
   VideoFrame frame;
 
@@ -50,11 +51,15 @@ bool VideoReader::Impl::read_next(std::uint64_t announced, double frames_per_s) 
     if (number + 1 >= announced || ++failures > kMostFailures) return false;
   }
   is_broken = is_broken || failures > 0;
-  const double before_ms = std::exchange(time_ms, capture.get(cv::CAP_PROP_POS_MSEC));
   ++number;
-  // Beyond a broken spot decoders leave out more frames without a word. The last ones they give have no time.
-  if (is_broken && number < announced) {
-    const double missing = std::round(1e-3 * (time_ms - before_ms) * frames_per_s) - 1;
+  // Beyond a broken spot decoders leave out more frames without a word. Some that they give have no time: 0.
+  const double now_ms = capture.get(cv::CAP_PROP_POS_MSEC);
+  const bool is_timed = now_ms > 0 && time_ms > 0;
+  const double before_ms = time_ms;
+  const std::uint64_t untimed = std::exchange(frames_untimed, now_ms > 0 ? 0 : frames_untimed + 1);
+  if (now_ms > 0) time_ms = now_ms;
+  if (is_broken && is_timed && number < announced) {
+    const double missing = std::round(1e-3 * (now_ms - before_ms) * frames_per_s) - 1 - static_cast<double>(untimed);
     number += static_cast<std::uint64_t>(std::clamp(missing, 0.0, static_cast<double>(announced - 1 - number)));
   }
   return true;
