@@ -6,6 +6,8 @@
 # gadget's own `soft_connect` does not bring it back on this bus.)
 trigger_line() {
   modprobe dummy_hcd && modprobe g_serial || fail "no serial gadget"
+  # The bus takes its time to find the gadget, and nothing says when it has.
+  until_true 30 test -e /dev/ttyACM0 || fail "the serial gadget is not found"
   udevadm settle
   [ -e /dev/ttyACM0 ] && [ -e /dev/ttyGS0 ] || fail "no serial port of it"
   trigger_usb=$(dirname "$(realpath /sys/class/tty/ttyACM0/device)")
