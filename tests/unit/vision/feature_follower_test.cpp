@@ -68,6 +68,16 @@ class FeatureFollowerTest : public testing::Test {
     note_places();
   }
 
+  // From the first frame on, which slides so far a frame: candidates are tracked then.
+  void track_ten_frames(double step_px) {
+    show({0, 0});
+    find();
+    for (int k = 1; k <= 10; ++k) {
+      show({step_px * k, 0});
+      follow();
+    }
+  }
+
   [[nodiscard]] int count(FollowState state) const {
     int n = 0;
     for (const FollowedFeature& feature : follower_.features()) n += feature.state == state ? 1 : 0;
@@ -104,12 +114,7 @@ TEST_F(FeatureFollowerTest, FollowsSteadyMotionAndPromotesItsCandidates) {
 }
 
 TEST_F(FeatureFollowerTest, KeepsItsFeaturesWhenTheCameraJerks) {
-  show({0, 0});
-  find();
-  for (int k = 1; k <= 10; ++k) {
-    show({0.5 * k, 0});
-    follow();
-  }
+  track_ten_frames(0.5);
   const int before = count(FollowState::kTracked);
   show({5 + 22, -14});
   follow();
@@ -120,12 +125,7 @@ TEST_F(FeatureFollowerTest, KeepsItsFeaturesWhenTheCameraJerks) {
 }
 
 TEST_F(FeatureFollowerTest, FindsTheSameFeaturesAgainAfterAnOcclusion) {
-  show({0, 0});
-  find();
-  for (int k = 1; k <= 10; ++k) {
-    show({0.5 * k, 0});
-    follow();
-  }
+  track_ten_frames(0.5);
   std::vector<std::uint32_t> hidden;
   for (int k = 11; k <= 25; ++k) {
     show({0.5 * k, 0});
@@ -166,12 +166,7 @@ TEST_F(FeatureFollowerTest, GivesUpWhatStaysAway) {
 }
 
 TEST_F(FeatureFollowerTest, FillsUpAtOnceAfterACutAndKeepsNothingOfTheScenesBefore) {
-  show({0, 0});
-  find();
-  for (int k = 1; k <= 10; ++k) {
-    show({2.0 * k, 0});
-    follow();
-  }
+  track_ten_frames(2.0);
   std::set<std::uint32_t> before;
   for (const FollowedFeature& feature : follower_.features()) before.insert(feature.id);
   for (int k = 1; k <= 20; ++k) {
@@ -204,12 +199,7 @@ TEST_F(FeatureFollowerTest, WhatIsAwayForMoreThanAMomentNeitherFillsAPlaceNorKee
 }
 
 TEST_F(FeatureFollowerTest, FindsItsFeaturesAgainAfterABlackoutInWhichTheCameraMoved) {
-  show({0, 0});
-  find();
-  for (int k = 1; k <= 10; ++k) {
-    show({2.0 * k, 0});
-    follow();
-  }
+  track_ten_frames(2.0);
   const int before = count(FollowState::kTracked);
   for (int k = 0; k < 60; ++k) {
     image_ = ImageBuffer(kWidth, kHeight);
