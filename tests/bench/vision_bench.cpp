@@ -104,7 +104,10 @@ class LucasKanade final : public Method {
 class Patches final : public Method {
  public:
   explicit Patches(double deviation_px, SimdTarget target = best_simd_target())
-      : Method(std::string("this tracker, ") + simd_target_name(target)),
+      : Patches(std::string("this tracker, ") + simd_target_name(target), deviation_px, target, true) {}
+  Patches(std::string name_of, double deviation_px, SimdTarget target, bool affine)
+      : Method(std::move(name_of)),
+        affine_(affine),
         tracker_(PatchTrackerSettings{}, target),
         covariance_(deviation_px * deviation_px * Matrix2d::Identity()) {}
 
@@ -114,6 +117,7 @@ class Patches final : public Method {
     for (std::size_t i = 0; i < patches_.size(); ++i) {
       usable_.push_back(make_patch_template(footage.image(0), footage.px[0][i], TemplateSettings{}, tracker_.kernels(),
                                             patches_[i]) == TemplateVerdict::kGood);
+      patches_[i].affine_usable = patches_[i].affine_usable && affine_;
     }
     states_.assign(patches_.size(), PatchState{});
     matches_.resize(patches_.size());
@@ -131,6 +135,7 @@ class Patches final : public Method {
   [[nodiscard]] bool is_usable(std::size_t i) const { return usable_[i]; }
 
  private:
+  bool affine_;
   PatchTracker tracker_;
   Matrix2d covariance_;
   std::vector<PatchTemplate> patches_;
@@ -191,7 +196,9 @@ void compare(const Footage& footage, const char* light) {
   LucasKanade predicted("OpenCV LK, predicted start, 1 level, one thread", 0, true, 1, false);
   LucasKanade bare("  the same, its derivatives made before", 0, true, 1, true);
   Patches patches(kPrediction_px);
-  std::vector<Method*> methods = {&one_thread, &threads, &predicted, &bare, &patches};
+  // What LK does: shapes are as they were in the template.
+  Patches translation("  the same, translation alone", kPrediction_px, best_simd_target(), false);
+  std::vector<Method*> methods = {&one_thread, &threads, &predicted, &bare, &patches, &translation};
   run(footage, methods, as_predicted, kRounds);
   std::printf("\n%s, %dx%d, %zu features, %s light\n", footage.name.c_str(), footage.width, footage.height,
               footage.px[0].size(), light);
