@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/symmetric_matrix2.hpp"
 #include "core/pipeline/pose_noise.hpp"
 
 namespace perimap {
@@ -116,9 +117,7 @@ bool agrees(const PatchMatch& match, const PixelPrediction& prediction, double g
 // match_covariance) it would count for nothing, and it leads the next searches astray.
 bool is_vague(const PatchMatch& match) noexcept {
   constexpr double kLargestDeviation_px = 1.0;
-  const Matrix2d& C = match.covariance_px2;
-  const double largest = 0.5 * C.trace() + std::hypot(0.5 * (C(0, 0) - C(1, 1)), C(0, 1));
-  return !(largest <= kLargestDeviation_px * kLargestDeviation_px);
+  return !(larger_eigenvalue(match.covariance_px2) <= kLargestDeviation_px * kLargestDeviation_px);
 }
 
 // Longer than a heart's beat, which stretches the picture of its surface and lets it go again.

@@ -1,14 +1,10 @@
 #include "core/vision/feature_detector.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
-#include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 #include <string>
 #include <tuple>
 
@@ -156,108 +152,7 @@ std::vector<Vector2d> find(const cv::Mat& image, std::span<const Vector2d> occup
   return found;
 }
 
-using Histogram = std::array<int, 256>;
-
-// The grey that so large a share of what is counted from `least` on is below; 0 when nothing is counted.
-int quantile(const Histogram& counts, int least, double share) {
-  const auto begin = counts.begin() + least;
-  const double wanted = share * std::accumulate(begin, counts.end(), 0.0);
-  double below = 0;
-  for (auto count = begin; count != counts.end(); ++count) {
-    below += *count;
-    if (*count > 0 && below >= wanted) return static_cast<int>(count - counts.begin());
-  }
-  return 0;
-}
-
-// The mean of a corner of the picture, when it is flat but for noise.
-std::optional<double> flat_corner(const GreyImage& image, bool right, bool bottom) {
-  constexpr double kFlat_grey = 3;
-  const int side = std::max(1, std::min(image.width, image.height) / 20);
-  double sum = 0, squares = 0;
-  for (int y = 0; y < side; ++y) {
-    const std::uint8_t* const row = image.row(bottom ? image.height - 1 - y : y) + (right ? image.width - side : 0);
-    for (int x = 0; x < side; ++x) {
-      sum += row[x];
-      squares += row[x] * row[x];
-    }
-  }
-  const double count = static_cast<double>(side) * side, mean = sum / count;
-  if (squares / count - mean * mean > kFlat_grey * kFlat_grey) return std::nullopt;
-  return mean;
-}
-
-// What at least two flat corners agree upon; 0 when there is no such thing.
-double surround_of(const GreyImage& image) {
-  constexpr double kAlike_grey = 5;
-  std::vector<double> corners;
-  for (const bool right : {false, true}) {
-    for (const bool bottom : {false, true}) {
-      if (const auto corner = flat_corner(image, right, bottom)) corners.push_back(*corner);
-    }
-  }
-  std::sort(corners.begin(), corners.end());
-  for (std::size_t i = 0; i + 1 < corners.size(); ++i) {
-    if (corners[i + 1] - corners[i] <= kAlike_grey) return corners[i + 1];
-  }
-  return 0;
-}
-
 }  // namespace
-
-PictureLight estimate_light(const GreyImage& image) {
-  constexpr int kStep = 2;
-  constexpr double kBrightShare = 0.95, kLitOfBright = 0.25, kSurroundOfLit = 0.5;
-  Histogram counts{};
-  for (int y = 0; y < image.height; y += kStep) {
-    const std::uint8_t* const row = image.row(y);
-    for (int x = 0; x < image.width; x += kStep) ++counts[row[x]];
-  }
-  const auto lit_above = [&](double surround) {
-    constexpr double kMargin_grey = 6;
-    const double bright = quantile(counts, 0, kBrightShare);
-    const int least = static_cast<int>(std::max({1.0, surround + kMargin_grey, kLitOfBright * bright}));
-    return static_cast<double>(least < 256 ? quantile(counts, least, 0.5) : 0);
-  };
-  PictureLight light;
-  if (image.width < 1 || image.height < 1) return light;
-  light.surround_grey = surround_of(image);
-  light.lit_grey = lit_above(light.surround_grey);
-  if (light.surround_grey > kSurroundOfLit * light.lit_grey) {
-    light.surround_grey = 0;
-    light.lit_grey = lit_above(0);
-  }
-  return light;
-}
-
-double estimate_noise(const GreyImage& image, int dark_grey) {
-  constexpr int kClipped = 245;
-  constexpr int kStep = 2;  // a quarter of the pixels will do
-  // The sum below is an integer of at most 8 * 255.
-  std::array<int, 8 * 255 + 1> counts{};
-  long total = 0;
-  for (int y = 1; y + 1 < image.height; y += kStep) {
-    const std::uint8_t* const above = image.row(y - 1);
-    const std::uint8_t* const here = image.row(y);
-    const std::uint8_t* const below = image.row(y + 1);
-    for (int x = 1; x + 1 < image.width; x += kStep) {
-      if (here[x] < dark_grey || here[x] > kClipped) continue;
-      const int off = above[x - 1] - 2 * above[x] + above[x + 1] - 2 * here[x - 1] + 4 * here[x] - 2 * here[x + 1] +
-                      below[x - 1] - 2 * below[x] + below[x + 1];
-      ++counts[static_cast<std::size_t>(std::abs(off))];
-      ++total;
-    }
-  }
-  if (total == 0) return 0;
-  long below_it = 0;
-  std::size_t median = 0;
-  while (below_it + counts[median] < total / 2) below_it += counts[median++];
-  // Within the median's own bin, evenly.
-  const double within =
-      counts[median] > 0 ? (0.5 * static_cast<double>(total) - static_cast<double>(below_it)) / counts[median] : 0.5;
-  constexpr double kMedianOfNormal = 0.6745, kGain = 6;  // of the sum: the root of its squared weights
-  return (static_cast<double>(median) - 0.5 + within) / (kMedianOfNormal * kGain);
-}
 
 DetectorSettings detector_settings_for(int width, int height, double noise, int how_many,
                                        const PictureLight& light) noexcept {

@@ -7,6 +7,7 @@
 #include "core/error/expected.hpp"
 #include "core/geometry/pose.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "core/vision/picture_light.hpp"
 
 namespace perimap {
 
@@ -22,23 +23,6 @@ struct DetectorSettings {
   int background_size_px = 13;
   double background_clearance_px = 16;  // silhouettes slide over the tissue
 };
-
-// Standard deviation of the noise of single pixels, grey levels, from how far a pixel lies off the bilinear surface
-// through its neighbours (Immerkaer, "Fast Noise Variance Estimation", CVIU 64(2), 1996; here by the median, because
-// texture has long tails). Only what is neither dark nor clipped counts; 0 when nothing does.
-inline constexpr int kDark_grey = 25;
-[[nodiscard]] double estimate_noise(const GreyImage& image, int dark_grey = kDark_grey);
-
-// How bright a picture is, whatever camera took it.
-struct PictureLight {
-  static constexpr double kUsual_grey = 90;
-
-  double lit_grey = kUsual_grey;  // the median of what is lit; 0 when nothing is
-  double surround_grey = 0;       // of the even frame about a view that does not fill the picture; 0 without one
-};
-
-// The surround is told by corners of the picture that are flat, of one grey, and far darker than what is lit.
-[[nodiscard]] PictureLight estimate_light(const GreyImage& image);
 
 // For how_many features spread over an image of this size, this noise and this light, whatever they are. A corner must
 // stand out of the noise, and no more: tissue without vessels has little texture. What a dim picture shows has less

@@ -3,11 +3,12 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
+#include "core/geometry/symmetric_matrix2.hpp"
 #include "core/statistics/upper_median.hpp"
+#include "core/vision/grey_histogram.hpp"
 
 namespace perimap {
 namespace {
@@ -27,27 +28,15 @@ void let_go(FollowedFeature& feature) noexcept {
   feature.found = feature.swept = false;
 }
 
-double largest_deviation(const Matrix2d& C) noexcept {
-  return std::sqrt(0.5 * (C(0, 0) + C(1, 1)) + std::hypot(0.5 * (C(0, 0) - C(1, 1)), C(0, 1)));
-}
+double largest_deviation(const Matrix2d& C) noexcept { return std::sqrt(larger_eigenvalue(C)); }
 
 // False for a picture without contrast, but for the noise: black, faded, one colour.
 bool shows_anything(const GreyImage& image) noexcept {
   constexpr int kStep = 8, kLeastContrast_grey = 8;
   constexpr double kTail = 0.05;
-  std::array<int, 256> counts{};
-  int total = 0;
-  for (int y = kStep / 2; y < image.height; y += kStep) {
-    for (int x = kStep / 2; x < image.width; x += kStep, ++total) ++counts[image.row(y)[x]];
-  }
-  const auto quantile = [&](double share) {
-    int grey = 0;
-    for (int below = counts[0]; grey < 255 && below <= share * total; below += counts[static_cast<std::size_t>(grey)]) {
-      ++grey;
-    }
-    return grey;
-  };
-  return total == 0 || quantile(1 - kTail) - quantile(kTail) >= kLeastContrast_grey;
+  const GreyHistogram counts(image, kStep);
+  return image.height <= kStep / 2 || image.width <= kStep / 2 ||
+         counts.quantile(1 - kTail) - counts.quantile(kTail) >= kLeastContrast_grey;
 }
 
 }  // namespace

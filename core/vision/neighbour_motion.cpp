@@ -34,7 +34,7 @@ NeighbourMotion::Around NeighbourMotion::around(const Vector2d& px, const Vector
   for (std::size_t i = 0; i < count; ++i) {
     result.distance_px += std::sqrt(nearest[i].distance_squared) / static_cast<double>(count);
   }
-  std::array<double, kNeighbours> values;
+  std::array<double, kNeighbours> values{};
   for (int axis = 0; axis < 2; ++axis) {
     for (std::size_t i = 0; i < count; ++i) values[i] = nearest[i].by[axis];
     result.by[axis] = upper_median(values.begin(), values.begin() + count);

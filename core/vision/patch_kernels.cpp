@@ -118,13 +118,13 @@ void sample_shifted(const GreyImage& image, int side, const Vector2d& first, Pat
   const std::uint8_t* p = image.row(v - 1) + u - 1;
   std::ptrdiff_t stride = image.stride;
   // Whole vectors would reach beyond the last pixel: sample a copy.
-  std::array<std::uint8_t, static_cast<std::size_t>(kLocalStride) * kLocalRows> local;
+  std::uint8_t local[static_cast<std::size_t>(kLocalStride) * kLocalRows];
   if ((v + side) * image.stride + u - 1 + kReach > (image.height - 1) * image.stride + image.width) {
-    local.fill(0);
+    std::memset(local, 0, sizeof local);
     for (int y = 0; y < side + 2; ++y) {
-      std::memcpy(local.data() + y * kLocalStride, p + y * stride, static_cast<std::size_t>(side) + 2);
+      std::memcpy(local + y * kLocalStride, p + y * stride, static_cast<std::size_t>(side) + 2);
     }
-    p = local.data();
+    p = local;
     stride = kLocalStride;
   }
 
@@ -183,8 +183,8 @@ void sample_warped(const GreyImage& image, int side, const WindowGrid& grid, Pat
 
   // In three passes, so that no vector is read right after its elements were written one by one, which stalls.
   constexpr std::size_t kRoom = PatchTemplate::kMaxSamples;
-  HWY_ALIGN std::array<float, kRoom> from_nearest_u, from_nearest_v;
-  HWY_ALIGN std::array<std::int32_t, kRoom> offsets;
+  HWY_ALIGN float from_nearest_u[kRoom], from_nearest_v[kRoom];
+  HWY_ALIGN std::int32_t offsets[kRoom];
   const VectorF half = hn::Set(df, 0.5F);
   for (int i = 0; i < pixels; i += kLanesF) {
     const VectorF x = hn::Load(df, places.column.data() + i);
@@ -193,14 +193,14 @@ void sample_warped(const GreyImage& image, int side, const WindowGrid& grid, Pat
     const VectorF u = hn::Max(hn::Zero(df), hn::Add(first_u, hn::Add(hn::Mul(u_x, x), hn::Mul(u_y, y))));
     const VectorF v = hn::Max(hn::Zero(df), hn::Add(first_v, hn::Add(hn::Mul(v_x, x), hn::Mul(v_y, y))));
     const VectorI u_0 = hn::ConvertTo(di, hn::Add(u, half)), v_0 = hn::ConvertTo(di, hn::Add(v, half));
-    hn::Store(hn::Sub(u, hn::ConvertTo(df, u_0)), df, from_nearest_u.data() + i);
-    hn::Store(hn::Sub(v, hn::ConvertTo(df, v_0)), df, from_nearest_v.data() + i);
-    hn::Store(hn::Add(hn::Mul(v_0, stride), u_0), di, offsets.data() + i);
+    hn::Store(hn::Sub(u, hn::ConvertTo(df, u_0)), df, from_nearest_u + i);
+    hn::Store(hn::Sub(v, hn::ConvertTo(df, v_0)), df, from_nearest_v + i);
+    hn::Store(hn::Add(hn::Mul(v_0, stride), u_0), di, offsets + i);
   }
 
   // The nine around each, in three rows, the left one lowest; the fourth byte is not used. Scalar loads: gathers take
   // longer on the machines measured.
-  HWY_ALIGN std::array<std::uint32_t, kRoom> above, here, below;
+  HWY_ALIGN std::uint32_t above[kRoom], here[kRoom], below[kRoom];
   for (int i = 0; i < (pixels + kLanesF - 1) / kLanesF * kLanesF; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const std::uint8_t* const p = base + offsets[at];
@@ -220,15 +220,15 @@ void sample_warped(const GreyImage& image, int side, const WindowGrid& grid, Pat
                          };
   for (int i = 0; i < pixels; i += kLanesF) {
     const auto weight_of = [&](VectorF distance) HWY_ATTR { return hn::Mul(half, hn::Mul(distance, distance)); };
-    const VectorF u = hn::Load(df, from_nearest_u.data() + i), v = hn::Load(df, from_nearest_v.data() + i);
+    const VectorF u = hn::Load(df, from_nearest_u + i), v = hn::Load(df, from_nearest_v + i);
     const VectorF left = weight_of(hn::Sub(half, u)), right = weight_of(hn::Add(half, u));
     const auto across = [&](const std::uint32_t* row) HWY_ATTR {
       const auto three = hn::Load(du, row + i);
       return blend(grey_of(hn::And(three, byte)), grey_of(hn::And(hn::ShiftRight<8>(three), byte)),
                    grey_of(hn::And(hn::ShiftRight<16>(three), byte)), left, right);
     };
-    const VectorF grey = blend(across(above.data()), across(here.data()), across(below.data()),
-                               weight_of(hn::Sub(half, v)), weight_of(hn::Add(half, v)));
+    const VectorF grey =
+        blend(across(above), across(here), across(below), weight_of(hn::Sub(half, v)), weight_of(hn::Add(half, v)));
     const VectorF scaled = hn::Mul(hn::Sub(grey, hn::Set(df, static_cast<float>(PatchTemplate::kGreyOrigin))),
                                    hn::Set(df, static_cast<float>(PatchTemplate::kGreyScale)));
     hn::StoreU(hn::DemoteTo(d16, hn::NearestInt(scaled)), d16, samples.grey.data() + i);

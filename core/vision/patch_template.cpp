@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/symmetric_matrix2.hpp"
 #include "core/vision/patch_kernels.hpp"
 #include "core/vision/reduced_window.hpp"
 
@@ -13,11 +14,6 @@ namespace {
 
 using Vector6 = Eigen::Matrix<double, PatchTemplate::kParameters, 1>;
 using Matrix6 = Eigen::Matrix<double, PatchTemplate::kParameters, PatchTemplate::kParameters>;
-
-double smaller_eigenvalue(const Matrix2d& H) noexcept {
-  const double half_trace = 0.5 * (H(0, 0) + H(1, 1));
-  return half_trace - std::hypot(0.5 * (H(0, 0) - H(1, 1)), H(0, 1));
-}
 
 // Whether the affine parameters are determined: every pivot of the Hessian, in units in which m moves the rim of the
 // window by about a pixel, must be a fair part of the strongest.
@@ -149,7 +145,8 @@ TemplateVerdict make_patch_template(const GreyImage& image, const Vector2d& px, 
       form_moments(out);
     } else {
       const Vector2d centre = to_level(px, l);
-      const ReducedWindow window(image, l, centre, side / 2 + 2, kernels);
+      const int half = side / 2;
+      const ReducedWindow window(image, l, centre, half + 2, kernels);
       const Vector2d inside = centre - window.origin();
       if (!cut_window(window.image(), inside.x(), inside.y(), side, level)) continue;
     }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/symmetric_matrix2.hpp"
 #include "core/vision/patch_alignment.hpp"
 #include "core/vision/patch_search.hpp"
 #include "core/vision/reduced_window.hpp"
@@ -16,10 +17,6 @@ namespace {
 bool is_plausible(const Matrix2d& A, double max_stretch) noexcept {
   const StretchRange range = stretch_of(A);
   return A.determinant() > 0 && range.smallest * max_stretch >= 1 && range.largest <= max_stretch;
-}
-
-double larger_eigenvalue(const Matrix2d& C) noexcept {
-  return 0.5 * (C(0, 0) + C(1, 1)) + std::hypot(0.5 * (C(0, 0) - C(1, 1)), 0.5 * (C(0, 1) + C(1, 0)));
 }
 
 bool is_positive_definite(const Matrix2d& C) noexcept {
@@ -35,9 +32,8 @@ Matrix2d match_covariance(const Matrix2d& inverse_hessian, int pixels, const Ali
   const double variance = fit.residual_variance / (fit.gain * fit.gain);
   constexpr double kSobelNoise = 12.0 / 64;  // its squared weights, over 8 squared
   const Matrix2d H = inverse_hessian.inverse();
-  const double smaller = 0.5 * H.trace() - std::hypot(0.5 * (H(0, 0) - H(1, 1)), H(0, 1));
   // More than half cannot be told from structure that does not fit, which is in the residual too.
-  const double b = std::min(pixels * kSobelNoise * 0.5 * variance, 0.5 * smaller);
+  const double b = std::min(pixels * kSobelNoise * 0.5 * variance, 0.5 * smaller_eigenvalue(H));
   const Matrix2d informed = (H - b * Matrix2d::Identity()).inverse();
   return variance * informed * H * informed;
 }

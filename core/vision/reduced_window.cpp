@@ -18,7 +18,7 @@ ReducedWindow::ReducedWindow(const GreyImage& frame, int level, const Vector2d& 
   width_ = std::min(static_cast<int>(right - left), kMaxSide);
   height_ = std::min(static_cast<int>(bottom - top), kMaxSide);
   origin_ = {left, top};
-  kernels.reduce(frame, level, static_cast<int>(left), static_cast<int>(top), width_, height_, pixels_.data());
+  kernels.reduce(frame, level, static_cast<int>(left), static_cast<int>(top), width_, height_, pixels_);
 }
 
 }  // namespace perimap

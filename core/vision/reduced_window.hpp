@@ -1,7 +1,7 @@
 // A part of the frame at a half or a quarter of its resolution, made where it is looked at and nowhere else.
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/geometry/pose.hpp"
@@ -31,7 +31,7 @@ class ReducedWindow {
                 const PatchKernels& kernels) noexcept;
 
   // In coordinates of its own; add origin() for those of the level.
-  [[nodiscard]] GreyImage image() const noexcept { return {pixels_.data(), width_, height_, width_}; }
+  [[nodiscard]] GreyImage image() const noexcept { return {pixels_, width_, height_, width_}; }
   [[nodiscard]] const Vector2d& origin() const noexcept { return origin_; }
 
  private:
@@ -39,7 +39,7 @@ class ReducedWindow {
   int width_ = 0;
   int height_ = 0;
   Vector2d origin_ = Vector2d::Zero();
-  std::array<std::uint8_t, static_cast<std::size_t>(kMaxSide) * kMaxSide> pixels_;
+  std::uint8_t pixels_[static_cast<std::size_t>(kMaxSide) * kMaxSide];
 };
 
 }  // namespace perimap

@@ -19,6 +19,7 @@
 #include "core/vision/confirmed_tracks.hpp"
 #include "core/vision/feature_detector.hpp"
 #include "core/vision/feature_follower.hpp"
+#include "core/vision/image_noise.hpp"
 #include "core/vision/instrument_mask.hpp"
 #include "daemon/commands/progress.hpp"
 #include "daemon/process/stop_signal.hpp"

@@ -11,6 +11,7 @@
 
 #include "core/vision/feature_detector.hpp"
 #include "core/vision/feature_follower.hpp"
+#include "core/vision/image_noise.hpp"
 #include "core/vision/instrument_mask.hpp"
 #include "core/vision/neighbour_motion.hpp"
 #include "core/vision/patch_continuity.hpp"

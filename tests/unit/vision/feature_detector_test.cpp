@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/vision/image_noise.hpp"
 #include "tests/unit/vision/synthetic_scene.hpp"
 
 namespace perimap {
@@ -112,21 +113,6 @@ TEST(FeatureDetector, SaysWhatItCannotUse) {
   const auto refused = find_features(image.view(), {}, settings, 5);
   ASSERT_FALSE(refused.has_value());
   EXPECT_NE(refused.error().message.find("tile_px"), std::string::npos);
-}
-
-TEST(PictureLight, IsTheMedianOfWhatIsLitAndTheGreyOfAnEvenSurround) {
-  std::mt19937 random(2);
-  ImageBuffer image = textured();
-  EXPECT_NEAR(estimate_light(image.view()).lit_grey, 120, 10);
-  EXPECT_EQ(estimate_light(image.view()).surround_grey, 0);
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      if (std::hypot(x - 160, y - 120) > 110) image.at(x, y) = static_cast<std::uint8_t>(23 + random() % 4);
-    }
-  }
-  EXPECT_NEAR(estimate_light(image.view()).surround_grey, 24.5, 1);
-  EXPECT_NEAR(estimate_light(image.view()).lit_grey, 120, 10);
-  EXPECT_EQ(estimate_light(ImageBuffer(40, 30).view()).lit_grey, 0);
 }
 
 // As `perimap track` asks for them.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/vision/feature_detector.hpp"
+#include "core/vision/image_noise.hpp"
 #include "core/vision/instrument_mask.hpp"
 #include "counted_allocations.hpp"
 #include "tests/unit/vision/synthetic_scene.hpp"
@@ -294,16 +295,6 @@ TEST_F(FeatureFollowerTest, TakesNothingFromTheHeapToFollow) {
   for (const ImageBuffer* frame : std::initializer_list<const ImageBuffer*>{&cut, &black, &frames.back()})
     follower_.follow(frame->view());
   EXPECT_EQ(test::allocations, before);
-}
-
-TEST(NoiseEstimate, IsTheNoisesDeviationOnTexture) {
-  std::mt19937 random(2);
-  for (const double sigma : {1.0, 2.0, 4.0}) {
-    const ImageBuffer image = render(Texture(3, 20, 12, 90), View{}, kWidth, kHeight, sigma, random);
-    EXPECT_NEAR(estimate_noise(image.view()), sigma, 0.15 * sigma + 0.1);
-  }
-  EXPECT_EQ(estimate_noise(ImageBuffer(20, 20).view()), 0);
-  EXPECT_EQ(estimate_noise(GreyImage{}), 0);
 }
 
 TEST(InstrumentMask, IsWhatHasNoColourUnlessAlmostNothingHas) {

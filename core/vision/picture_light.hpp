@@ -1,0 +1,18 @@
+// How bright a picture is, whatever camera took it.
+#pragma once
+
+#include "core/sensors/grey_image.hpp"
+
+namespace perimap {
+
+struct PictureLight {
+  static constexpr double kUsual_grey = 90;
+
+  double lit_grey = kUsual_grey;  // the median of what is lit; 0 when nothing is
+  double surround_grey = 0;       // of the even frame about a view that does not fill the picture; 0 without one
+};
+
+// The surround is told by corners of the picture that are flat, of one grey, and far darker than what is lit.
+[[nodiscard]] PictureLight estimate_light(const GreyImage& image);
+
+}  // namespace perimap
