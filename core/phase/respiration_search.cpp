@@ -78,9 +78,10 @@ double alignment(const BreathWave& wave, const BreathWave& other) noexcept {
     if (likeness(kTwoPi * i / kSteps) > likeness(best)) best = kTwoPi * i / kSteps;
   }
   double step = kTwoPi / kSteps;
-  for (int i = 0; i < kRefinements; ++i, step *= 0.6) {
+  for (int i = 0; i < kRefinements; ++i) {
     if (likeness(best + step) > likeness(best)) best += step;
     if (likeness(best - step) > likeness(best)) best -= step;
+    step *= 0.6;
   }
   return best;
 }
@@ -157,7 +158,9 @@ bool RespirationSearch::find(FoundBreath& found) const noexcept {
   const double step = kTwoPi / (6.0 * span_s);
   double best = fastest;
   double best_residual = fit(fastest).residual;
-  for (double rate = fastest - step; rate >= slowest; rate -= step) {
+  const int slower = static_cast<int>((fastest - slowest) / step);
+  for (int i = 1; i <= slower; ++i) {
+    const double rate = fastest - i * step;
     const double residual = fit(rate).residual;
     // Against the neighbouring rates the least counts; against a faster one that is already good, a clear gain does.
     const bool near = best - rate < 2.5 * step;
@@ -167,7 +170,7 @@ bool RespirationSearch::find(FoundBreath& found) const noexcept {
     }
   }
   double width = 0.5 * step;
-  for (int i = 0; i < kRefinements && width > 1e-6; ++i, width *= 0.6) {
+  for (int i = 0; i < kRefinements && width > 1e-6; ++i) {
     for (const double rate : {best - width, best + width}) {
       const double residual = fit(rate).residual;
       if (residual < best_residual) {
@@ -175,6 +178,7 @@ bool RespirationSearch::find(FoundBreath& found) const noexcept {
         best_residual = residual;
       }
     }
+    width *= 0.6;
   }
   // At the end of the range the best candidate may be any faster motion's neighbour.
   if (kTwoPi / best * settings_.breaths > span_s || best > fastest - 0.5 * step) return false;

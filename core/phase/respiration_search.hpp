@@ -20,8 +20,8 @@ inline constexpr int kBreathHarmonics = 2;
 
 // Displacement by breathing (mm, frame W) = sum_k a_k cos(k psi) - b_k sin(k psi), k = 1, 2.
 struct BreathWave {
-  Eigen::Vector3d a[kBreathHarmonics] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-  Eigen::Vector3d b[kBreathHarmonics] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  std::array<Eigen::Vector3d, kBreathHarmonics> a = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  std::array<Eigen::Vector3d, kBreathHarmonics> b = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
 
   [[nodiscard]] Eigen::Vector3d at(double phase_rad) const noexcept;
   [[nodiscard]] Eigen::Vector3d slope_at(double phase_rad) const noexcept;  // mm/rad

@@ -55,7 +55,7 @@ void RhythmMonitor::push(Seconds rr) noexcept {
   double tolerance = kTolerance_s;
   int similar = 0;
   int followed = 0;
-  for (;; tolerance *= kWiden) {
+  for (;;) {
     similar = 0;
     followed = 0;
     for (int i = 0; i + 1 < count_; ++i) {
@@ -66,6 +66,7 @@ void RhythmMonitor::push(Seconds rr) noexcept {
       }
     }
     if (followed >= kLeastMatches || tolerance > mean) break;
+    tolerance *= kWiden;
   }
   entropy_ = std::log(static_cast<double>(similar) / std::max(followed, 1)) + std::log(2.0 * tolerance / mean);
   const bool was = rhythm_ == Rhythm::kUnpredictable;

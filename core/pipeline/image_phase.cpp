@@ -103,15 +103,15 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
     agreed_ = solved;
     refuse_what_disagrees(groups, frame, model, settings, solved_at, solved);
   }
-  const auto answer = [&](Eigen::Index unknown, double shift, double prior_s2, double phase_rad, double rate_rad_per_s,
-                          double largest_deviation_s, double common_deviation_s) {
+  const auto answer = [&](Eigen::Index unknown, double found_s, double prior_s2, double phase_rad,
+                          double rate_rad_per_s, double largest_deviation_s, double common_deviation_s) {
     ImagePhaseAnswer result;
     // Without what the prior said.
     const double variance_s2 = solved.covariance(unknown, unknown);
     const double precision = 1.0 / variance_s2 - 1.0 / prior_s2;
     if (!(precision > 1.0 / (largest_deviation_s * largest_deviation_s))) return result;
     result.outcome = converged ? ImagePhaseOutcome::kObserved : ImagePhaseOutcome::kTentative;
-    result.observed = {frame.stamp.capture, phase_rad + rate_rad_per_s * shift / (variance_s2 * precision),
+    result.observed = {frame.stamp.capture, phase_rad + rate_rad_per_s * found_s / (variance_s2 * precision),
                        rate_rad_per_s * std::sqrt(1.0 / precision + common_deviation_s * common_deviation_s)};
     return result;
   };

@@ -43,6 +43,18 @@ template <class... Functions>
 struct Overloaded : Functions... {
   using Functions::operator()...;
 };
+template <class... Functions>
+Overloaded(Functions...) -> Overloaded<Functions...>;
+
+// As std::visit of a variant of two that always holds one of them: it has nothing to throw.
+template <class Banks, class Function>
+void with(Banks& banks, const Function& function) noexcept {
+  if (auto* const first = std::get_if<0>(&banks)) {
+    function(*first);
+  } else {
+    function(*std::get_if<1>(&banks));
+  }
+}
 
 }  // namespace
 
@@ -59,77 +71,73 @@ MapBank::MapBank(const BankSettings& settings, Precision precision)
       groups_(std::visit([](const auto& held) { return held.bank.groups(); }, banks_)) {}
 
 void MapBank::set(int feature, const FeatureEstimate& estimate) noexcept {
-  std::visit([&](auto& held) { held.bank.set(feature, estimate); }, banks_);
+  with(banks_, [&](auto& held) { held.bank.set(feature, estimate); });
 }
 
 void MapBank::clear(int feature) noexcept {
-  std::visit([&](auto& held) { held.bank.clear(feature); }, banks_);
+  with(banks_, [&](auto& held) { held.bank.clear(feature); });
 }
 
 void MapBank::get(int feature, FeatureEstimate& estimate) const noexcept {
-  std::visit([&](const auto& held) { held.bank.get(feature, estimate); }, banks_);
+  with(banks_, [&](const auto& held) { held.bank.get(feature, estimate); });
 }
 
 void MapBank::get(int feature, StateVector& x) const noexcept {
-  std::visit([&](const auto& held) { held.bank.get(feature, x); }, banks_);
+  with(banks_, [&](const auto& held) { held.bank.get(feature, x); });
 }
 
 void MapBank::diffuse(int feature, double deviation_mm) noexcept {
-  std::visit([&](auto& held) { held.bank.diffuse(feature, deviation_mm); }, banks_);
+  with(banks_, [&](auto& held) { held.bank.diffuse(feature, deviation_mm); });
 }
 
 void MapBank::sweep(int group, const SweepPhases<double>& phases) noexcept {
-  std::visit(Overloaded{[&](Double& held) { held.bank.sweep(group, phases); },
-                        [&](Single& held) {
-                          held.swept[static_cast<std::size_t>(group)].assign(phases);
-                          held.bank.sweep(group, held.phases(group));
-                        }},
-             banks_);
+  with(banks_, Overloaded{[&](Double& held) { held.bank.sweep(group, phases); },
+                          [&](Single& held) {
+                            held.swept[static_cast<std::size_t>(group)].assign(phases);
+                            held.bank.sweep(group, held.phases(group));
+                          }});
 }
 
 void MapBank::motion(int group, const SweepPhases<double>& phases, int k, LaneMotions<double>& motions) noexcept {
-  std::visit(Overloaded{[&](Double& held) { held.bank.motion(group, phases, k, motions); },
-                        [&](Single& held) {
-                          LaneMotions<float> single;
-                          held.bank.motion(group, held.phases(group), k, single);
-                          convert(single, motions);
-                        }},
-             banks_);
+  with(banks_, Overloaded{[&](Double& held) { held.bank.motion(group, phases, k, motions); },
+                          [&](Single& held) {
+                            LaneMotions<float> single;
+                            held.bank.motion(group, held.phases(group), k, single);
+                            convert(single, motions);
+                          }});
 }
 
 void MapBank::motion_near(int group, const SweepPhases<double>& phases, int k, const SweepPhase<double>& at,
                           LaneMotions<double>& motions) noexcept {
-  std::visit(Overloaded{[&](Double& held) { held.bank.motion_near(group, phases, k, at, motions); },
-                        [&](Single& held) {
-                          SweepPhase<float> single_at;
-                          single_at.assign(at);
-                          LaneMotions<float> single;
-                          held.bank.motion_near(group, held.phases(group), k, single_at, single);
-                          convert(single, motions);
-                        }},
-             banks_);
+  with(banks_, Overloaded{[&](Double& held) { held.bank.motion_near(group, phases, k, at, motions); },
+                          [&](Single& held) {
+                            SweepPhase<float> single_at;
+                            single_at.assign(at);
+                            LaneMotions<float> single;
+                            held.bank.motion_near(group, held.phases(group), k, single_at, single);
+                            convert(single, motions);
+                          }});
 }
 
 void MapBank::position_gain(int feature, const SweepPhases<double>& phases, int k, PositionGain& M) noexcept {
-  std::visit(Overloaded{[&](Double& held) { held.bank.position_gain(feature, phases, k, M); },
-                        [&](Single& held) { held.bank.position_gain(feature, held.phases(feature / kLanes), k, M); }},
-             banks_);
+  with(banks_,
+       Overloaded{[&](Double& held) { held.bank.position_gain(feature, phases, k, M); },
+                  [&](Single& held) { held.bank.position_gain(feature, held.phases(feature / kLanes), k, M); }});
 }
 
 void MapBank::update(int group, const SweepPhases<double>& phases, int k, const Pose& X_CW, const PixelModel& model,
                      const LaneObservations<double>& observations, const UpdateSettings& settings,
                      LaneOutcomes<double>& outcomes) noexcept {
-  std::visit(
-      Overloaded{
-          [&](Double& held) { held.bank.update(group, phases, k, X_CW, model, observations, settings, outcomes); },
-          [&](Single& held) {
-            LaneObservations<float> single_observations;
-            convert(observations, single_observations);
-            LaneOutcomes<float> single;
-            held.bank.update(group, held.phases(group), k, X_CW, model, single_observations, settings, single);
-            convert(single, outcomes);
-          }},
-      banks_);
+  with(banks_,
+       Overloaded{
+           [&](Double& held) { held.bank.update(group, phases, k, X_CW, model, observations, settings, outcomes); },
+           [&](Single& held) {
+             LaneObservations<float> single_observations;
+             convert(observations, single_observations);
+             LaneOutcomes<float> single;
+             held.bank.update(group, held.phases(group), k, X_CW, model, single_observations, settings, single);
+             convert(single, outcomes);
+           }});
 }
 
 }  // namespace perimap

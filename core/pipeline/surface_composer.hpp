@@ -50,7 +50,7 @@ class SurfaceComposer {
     double share = 0.0;
   };
   struct Ordered {
-    const FeatureSnapshot* feature;
+    const FeatureSnapshot* feature = nullptr;
     Covered covered;
   };
   [[nodiscard]] static Covered covered_by(const ShardSnapshot& snapshot, const Release& release,

@@ -268,8 +268,9 @@ std::string setting_line(const BenchReport& r) {
 // What a reader might take the figures for, and must not.
 const std::vector<std::string>& not_proven() {
   static const std::vector<std::string> lines = {
-      "A recording stands in for the devices: what drivers, buses and exposure add before a frame arrives is as it was "
-      "when recorded, and reading and unpacking it costs processor time that devices do not.",
+      {"A recording stands in for the devices: what drivers, buses and exposure add before a frame arrives is as it "
+       "was "
+       "when recorded, and reading and unpacking it costs processor time that devices do not."},
       "Capture is the recording's own stamp; an error of that stamp is in no figure.",
       "Loopback on one host: a network between publisher and subscriber adds its own.",
       "Some seconds a run: what comes once an hour, and a maximum, are not shown by them.",

@@ -10,17 +10,18 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
-#include <cstring>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 namespace perimap::bench {
 
 std::optional<std::string> find_program(const std::string& name) {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing here writes the environment
   const char* path = std::getenv("PATH");
   std::istringstream folders(path != nullptr ? path : "/usr/bin:/bin");
   for (std::string folder; std::getline(folders, folder, ':');) {
-    std::string program = folder + "/" + name;
+    std::string program = folder.append("/").append(name);
     if (access(program.c_str(), X_OK) == 0) return program;
   }
   return std::nullopt;
@@ -28,7 +29,7 @@ std::optional<std::string> find_program(const std::string& name) {
 
 Expected<ChildProcess> ChildProcess::start(const std::string& program, const std::vector<std::string>& arguments) {
   const auto failed = [&](int error) {
-    return fail(fmt::format("{}: cannot be run: {}", program, std::strerror(error)));
+    return fail(fmt::format("{}: cannot be run: {}", program, std::generic_category().message(error)));
   };
   std::array<int, 2> to{};
   std::array<int, 2> from{};
@@ -54,6 +55,7 @@ Expected<ChildProcess> ChildProcess::start(const std::string& program, const std
   std::vector<std::string> words = {program};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   pid_t process = 0;
@@ -89,7 +91,7 @@ void ChildProcess::close_input() noexcept {
   if (input_ >= 0) close(std::exchange(input_, -1));
 }
 
-void ChildProcess::terminate() noexcept {
+void ChildProcess::terminate() const noexcept {
   if (process_ > 0) kill(process_, SIGTERM);
 }
 

@@ -29,7 +29,7 @@ class ChildProcess {
   ~ChildProcess();
 
   void close_input() noexcept;
-  void terminate() noexcept;
+  void terminate() const noexcept;
   // One line without its end; nothing when the output has ended.
   [[nodiscard]] std::optional<std::string> read_line();
   // All that is still to come, until the program closes its output.

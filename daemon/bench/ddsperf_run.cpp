@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdio>
+#include <string_view>
+#include <system_error>
 
 #include "core/statistics/upper_median.hpp"
 #include "daemon/bench/child_process.hpp"
@@ -12,18 +14,31 @@
 namespace perimap::bench {
 namespace {
 
+// The number behind `name` and before `unit`; leaves what follows.
+template <class Number>
+bool take_number(std::string_view& rest, std::string_view name, std::string_view unit, Number& number) {
+  const auto found = rest.find(name);
+  if (found == std::string_view::npos) return false;
+  rest.remove_prefix(found + name.size());
+  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), number);
+  if (error != std::errc{}) return false;
+  rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
+  if (!rest.starts_with(unit)) return false;
+  rest.remove_prefix(unit.size());
+  return true;
+}
+
 double median(std::vector<double> values) { return upper_median(values.begin(), values.end()); }
 
 }  // namespace
 
 std::optional<DdsperfSecond> parse_ddsperf_line(const std::string& line) {
-  const auto begin = line.find(" mean ");
-  if (begin == std::string::npos) return std::nullopt;
+  std::string_view rest = line;
   DdsperfSecond second;
-  const int read =
-      std::sscanf(line.c_str() + begin, " mean %*fus min %*fus 50%% %lfus 90%% %*fus 99%% %lfus max %lfus cnt %d",
-                  &second.p50_us, &second.p99_us, &second.max_us, &second.count);
-  if (read != 4) return std::nullopt;
+  const bool told = take_number(rest, " 50% ", "us ", second.p50_us) &&
+                    take_number(rest, "99% ", "us ", second.p99_us) &&
+                    take_number(rest, "max ", "us ", second.max_us) && take_number(rest, "cnt ", "", second.count);
+  if (!told) return std::nullopt;
   return second;
 }
 

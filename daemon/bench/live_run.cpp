@@ -113,6 +113,7 @@ std::vector<LoggedRelease> those_that_count(std::span<const LoggedRelease> all, 
 template <class Of>
 Figures over(const std::vector<LoggedRelease>& releases, Of of) {
   std::vector<Duration> durations;
+  durations.reserve(releases.size());
   for (const LoggedRelease& release : releases) durations.push_back(of(release));
   return figures_of(std::move(durations));
 }
@@ -143,6 +144,7 @@ void add_bare_waits(std::span<const BareWait> waits, const std::vector<LoggedRel
 Expected<void> add_receipts(std::vector<Subscriber>& subscribers, bool last_is_slow,
                             const std::vector<LoggedRelease>& releases, LiveFigures& figures) {
   std::vector<std::uint64_t> sent;
+  sent.reserve(releases.size());
   for (const LoggedRelease& release : releases) sent.push_back(release.sequence);
   for (std::size_t i = 0; i < subscribers.size(); ++i) {
     const auto receipts = subscribers[i].finish();

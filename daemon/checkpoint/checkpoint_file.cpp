@@ -107,7 +107,7 @@ class Reader {
   std::string text(std::string_view what) {
     const std::uint32_t n = count(kLongestText, 1, what);
     const auto bytes = cursor_.take(n);
-    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
   }
   void raw(void* data, std::size_t size, std::string_view what) {
     const auto bytes = cursor_.take(size);
@@ -194,28 +194,28 @@ EcgBlock read_block(Reader& in) {
 }
 
 void add_respiration(Bytes& out, const RespirationMemory& respiration) {
-  out.add(std::uint8_t{respiration.found});
+  out.add(static_cast<std::uint8_t>(respiration.found));
   for (const auto& coefficients : {respiration.wave.a, respiration.wave.b}) {
-    for (int k = 0; k < kBreathHarmonics; ++k) {
-      for (const double x : coefficients[k]) out.add(x);
+    for (const Eigen::Vector3d& coefficient : coefficients) {
+      for (const double x : coefficient) out.add(x);
     }
   }
   const RespiratoryClock& clock = respiration.clock;
-  out.add(static_cast<std::uint8_t>(clock.state)).add(std::uint8_t{clock.suspected}).add(clock.time);
+  out.add(static_cast<std::uint8_t>(clock.state)).add(static_cast<std::uint8_t>(clock.suspected)).add(clock.time);
   for (const double x : {clock.phase_rad, clock.rate_rad_per_s, clock.phase_variance_rad2, clock.covariance_rad2_per_s,
                          clock.rate_variance_rad2_per_s2}) {
     out.add(x);
   }
-  out.add(std::uint8_t{respiration.offset_known}).add(respiration.offset_rad);
+  out.add(static_cast<std::uint8_t>(respiration.offset_known)).add(respiration.offset_rad);
 }
 
 // What is not kept is the new run's own: its settings, and what follows from the wave.
 RespirationMemory read_respiration(Reader& in) {
   RespirationMemory respiration;
   respiration.found = in.flag("whether breathing was found");
-  for (auto* coefficients : {respiration.wave.a, respiration.wave.b}) {
-    for (int k = 0; k < kBreathHarmonics; ++k) {
-      for (double& x : coefficients[k]) x = in.number<double>("how breathing displaces the surface");
+  for (auto* coefficients : {&respiration.wave.a, &respiration.wave.b}) {
+    for (Eigen::Vector3d& coefficient : *coefficients) {
+      for (double& x : coefficient) x = in.number<double>("how breathing displaces the surface");
     }
   }
   RespiratoryClock& clock = respiration.clock;
@@ -279,7 +279,9 @@ std::string serialize_feature(const FeatureMemory& feature) {
                          state.gain, state.bias}) {
     out.add(x);
   }
-  out.add(std::int32_t{feature.updates}).add(std::uint8_t{feature.converged}).add(std::uint8_t{feature.breathing});
+  out.add(std::int32_t{feature.updates})
+      .add(static_cast<std::uint8_t>(feature.converged))
+      .add(static_cast<std::uint8_t>(feature.breathing));
   out.add(feature.largest_deviation_mm);
   const FeatureEstimate& estimate = feature.estimate;
   for (const double x : estimate.x) out.add(x);
@@ -301,7 +303,7 @@ std::string serialize(const Checkpoint& checkpoint, std::span<const std::string>
   body.add(static_cast<std::uint32_t>(memory.ecg.size()));
   for (const EcgBlock& block : memory.ecg) {
     body.add(block.first_sample_time).add(std::int64_t{block.sample_period.count()});
-    body.add(std::uint8_t{block.lead_off}).add(block.count);
+    body.add(static_cast<std::uint8_t>(block.lead_off)).add(block.count);
     for (const float mV : block.samples()) body.add(mV);
   }
   add_respiration(body, memory.respiration);

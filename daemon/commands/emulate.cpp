@@ -265,6 +265,7 @@ int run(Options& options) {
   std::atomic<bool> failed{false};
   std::mutex messages;
   std::vector<std::jthread> threads;
+  threads.reserve(devices.size());
   for (const Device& device : devices) {
     threads.emplace_back([&, device] {
       const auto served = serve(device, theatre, interrupt);

@@ -181,7 +181,7 @@ int complain(const Error& error, int exit_code) {
 
 // One device while it is listened to.
 struct Probed {
-  const char* kind;
+  const char* kind = "";
   std::string where;
   std::function<void(const Interrupt&)> serve;
   DeviceHealth health;
@@ -265,6 +265,7 @@ int run(const Options& options) {
   {
     Interrupt interrupt;
     std::vector<std::jthread> threads;
+    threads.reserve(all.size());
     for (const auto& probed : all) {
       threads.emplace_back([&probed = *probed, &interrupt] { probed.serve(interrupt); });
     }

@@ -323,11 +323,11 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
       .file("recording", PERIMAP_MEMBER(replay.recording), "the recording to replay, from this file's folder");
   Section camera("camera", keys);
   camera
-      .optional_text("device", "\"v4l2:/dev/videoN\" or \"video:FILE\"", &is_camera, PERIMAP_MEMBER(camera.device),
+      .optional_text("device", R"("v4l2:/dev/videoN" or "video:FILE")", &is_camera, PERIMAP_MEMBER(camera.device),
                      "where the camera is: a V4L2 device, or a video file in its place")
       .add(
           "format", "what the camera is to give; any: the first of these that it has",
-          "\"any\" or \"mono8\" or \"nv12\" or \"yuyv\" or \"uyvy\" or \"jpeg\"",
+          R"("any" or "mono8" or "nv12" or "yuyv" or "uyvy" or "jpeg")",
           [](const ConfigurationValue& value, Configuration& configuration) {
             const auto* name = std::get_if<std::string>(&value);
             if (name == nullptr) return false;
@@ -356,7 +356,7 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
 }
 
 // Where a device is, as a text; none: nowhere.
-constexpr std::string_view kPort = "an absolute path of a serial port, \"tcp:HOST:PORT\" or \"can:INTERFACE\"";
+constexpr std::string_view kPort = R"(an absolute path of a serial port, "tcp:HOST:PORT" or "can:INTERFACE")";
 bool is_endpoint(const std::string& text) { return parse_endpoint(text).has_value(); }
 
 bool is_path(const std::string& text) { return text.starts_with('/') && text.find('\0') == std::string::npos; }

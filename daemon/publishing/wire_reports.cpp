@@ -397,9 +397,10 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   const std::optional<CountsThen> then = facts.recent != nullptr ? facts.recent->then() : std::nullopt;
   wire_.recent_ns = then ? (now - then->time).count() : 0;
   for (std::uint32_t i = 0; i < sources; ++i) {
-    if (then && now > then->time)
+    if (then && now > then->time) {
       sources_[i].rate_hz = static_cast<double>(sources_[i].received - then->received_of(sources_[i].kind)) /
                             to_seconds(now - then->time);
+    }
   }
   for (std::size_t i = 0; i < kStatusStages.size(); ++i) {
     stages_[i] = stage_latency(kStatusStages[i], stage_histogram(c, stream_, kStatusStages[i]),

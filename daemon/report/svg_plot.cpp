@@ -136,8 +136,9 @@ std::string plot_group(const Plot& plot, double x_px, double y_px, double width_
                          escaped(line.color), line.width_px);
     }
     if (line.label.empty()) continue;
-    const double x_legend = kMarginLeft + (labelled % 2) * inner_width / 2;
-    const double y_legend = axis_y + kLegendRow * (1 + labelled / 2);
+    const int legend_column = labelled % 2, legend_row = labelled / 2;
+    const double x_legend = kMarginLeft + legend_column * inner_width / 2;
+    const double y_legend = axis_y + kLegendRow * (1 + legend_row);
     out += fmt::format("<path d=\"M{:.1f} {:.1f}h22\" stroke=\"{}\" stroke-width=\"3\"/>\n", x_legend, y_legend - 4,
                        escaped(line.color));
     out += text_at(x_legend + 28, y_legend, "start", line.label);

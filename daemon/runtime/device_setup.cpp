@@ -128,7 +128,7 @@ bool names_devices(const Configuration& configuration) noexcept {
 
 Expected<TrackerDevice> tracker_device(const TrackerConfiguration& c) {
   if (c.protocol == TrackerConfiguration::Protocol::kNone)
-    return wrong("tracker.protocol", "\"ndi\" or \"igtl\"", "\"none\"");
+    return wrong("tracker.protocol", R"("ndi" or "igtl")", R"("none")");
   auto endpoint = endpoint_of("tracker.port", c.port);
   if (!endpoint) return tl::unexpected(std::move(endpoint.error()));
   if (std::holds_alternative<CanEndpoint>(*endpoint)) {
@@ -176,10 +176,11 @@ Expected<RTriggerDevice> r_trigger_device(const EcgConfiguration& c) {
 
 Expected<CameraDevice> camera_device(const CameraConfiguration& c, const std::filesystem::path& configuration_file) {
   if (c.device && c.playback) return wrong("camera.playback", "nothing beside 'camera.device'", c.playback->string());
-  if (c.playback)
+  if (c.playback) {
     return camera_playback(c.playback->string(), c.playback_start_s).map([](CameraPlayback playback) {
       return CameraDevice(std::move(playback));
     });
+  }
   if (!c.device) return wrong("camera.device", "a camera, or a recording in 'camera.playback'", "nothing");
   const auto endpoint = parse_camera_endpoint(*c.device);
   if (!endpoint) return tl::unexpected(endpoint.error());

@@ -104,7 +104,7 @@ void SessionRecorder::frame(const CameraFrame& frame) noexcept {
   // The bytes first: once the head is seen they are there. So room for the head is made sure of before; what the other
   // thread has taken meanwhile only makes more.
   if (frames_put_ - frames_taken_.get() >= kFrameHeads || !bytes_->push(frame.bytes)) return frames_.refused.add();
-  FrameHead head{frame, frame.bytes.size()};
+  RecordedFrameHead head{frame, frame.bytes.size()};
   head.frame.bytes = {};
   static_cast<void>(frames_.ring.push(head));
   ++frames_put_;

@@ -28,6 +28,12 @@
 
 namespace perimap {
 
+// A frame on its way to the writing thread without its bytes, which go another way in the same order.
+struct RecordedFrameHead {
+  CameraFrame frame;
+  std::size_t size = 0;
+};
+
 // Each device's thread copies into a ring of its own; one thread writes, a quarter of a second behind, so that it has
 // them in order of arrival. What finds no room, because the disk does not keep up, is counted, and so is everything
 // after an error of the disk, which ends the recording and nothing else. One file may follow another; between them,
@@ -78,12 +84,6 @@ class SessionRecorder {
   [[nodiscard]] std::filesystem::path file() const;
 
  private:
-  // A frame without its bytes, which are in bytes_ in the same order.
-  struct FrameHead {
-    CameraFrame frame;
-    std::size_t size = 0;
-  };
-
   // What one device's thread gives, on its way to the writing thread.
   template <class Sample>
   struct Lane {
@@ -106,7 +106,7 @@ class SessionRecorder {
 
   std::size_t memory_bytes_;
   std::optional<SpscByteRing> bytes_;  // there before a frame is accepted
-  Lane<FrameHead> frames_;
+  Lane<RecordedFrameHead> frames_;
   std::tuple<Lane<TrackerSample>, Lane<EcgBlock>, Lane<RTriggerPulse>, Lane<RespirationBlock>> others_;
 
   // Of the writing thread: where it writes, none between two files.

@@ -89,6 +89,7 @@ bool memory_may_be_locked() noexcept {
 perimap_Privilege lock_memory(bool requested) noexcept {
   if (!requested) return perimap_PRIVILEGE_NOT_REQUESTED;
   if (!memory_may_be_locked() || mlockall(MCL_CURRENT | MCL_FUTURE) != 0) return perimap_PRIVILEGE_REFUSED;
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): before the other threads begin
   mallopt(M_TRIM_THRESHOLD, -1);
   return perimap_PRIVILEGE_GRANTED;
 }

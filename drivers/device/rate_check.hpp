@@ -37,8 +37,8 @@ class RateCheck {
     Instant arrival;
   };
   struct Span {
-    int quarters;
-    double tolerance;
+    int quarters = 1;
+    double tolerance = 0.0;
     Point from = {};
     int since = 0;   // quarters
     int before = 0;  // of the span before: -1 too slow, 0 right or unknown, 1 too fast

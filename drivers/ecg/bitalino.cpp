@@ -96,7 +96,7 @@ std::span<const std::byte> BitalinoProtocol::after_name(std::span<const std::byt
   const std::size_t end = may_be_name ? text.find('\n') : std::string_view::npos;
   if (may_be_name && end == std::string_view::npos && text.size() < kLongestName) return {};
   named_ = true;
-  if (end == std::string_view::npos || end >= kLongestName) return begun_;
+  if (end >= kLongestName) return begun_;  // or none
   health().set_identity(std::string(text.substr(0, end)));
   return std::span(begun_).subspan(end + 1);
 }

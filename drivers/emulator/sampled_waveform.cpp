@@ -78,7 +78,7 @@ SampledWaveform SampledWaveform::breathing(Duration period, Instant start) {
     const Duration since = static_cast<std::int64_t>(i) * period / static_cast<std::int64_t>(kSamples);
     values.push_back(static_cast<float>(2.0 * respiration_displacement(motion, Instant(since)).x() - 1.0));
   }
-  return SampledWaveform(start, kSamples / to_seconds(period), std::move(values), true);
+  return {start, kSamples / to_seconds(period), std::move(values), true};
 }
 
 std::optional<float> SampledWaveform::at(Instant t) const noexcept {

@@ -31,8 +31,8 @@ struct JpegDecoder::Impl {
     errors.emit_message = [](j_common_ptr common, int level) {
       // -1 is a warning: the data was damaged, and the library goes on with what it can make of it.
       if (level >= 0) return;
-      // NOLINTNEXTLINE(cppcoreguidelines-pro-type-union-access): the library's own type; the second number is the
-      // marker
+      // The second number is the marker.
+      // NOLINTNEXTLINE(cppcoreguidelines-pro-type-union-access): the library's own type
       const bool before_end = common->err->msg_parm.i[1] == JPEG_EOI;
       if (common->err->msg_code == JWRN_EXTRANEOUS_DATA && before_end) return;
       common->err->error_exit(common);

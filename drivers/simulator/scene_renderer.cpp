@@ -50,7 +50,7 @@ SceneRenderer::SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_
   const std::size_t subsamples = static_cast<std::size_t>(stride_) * kSubsamples * lens.height;
   ray_x_.resize(subsamples, 0.0F);
   ray_y_.resize(subsamples, 0.0F);
-  for (int row = 0; row < kSubsamples * lens.height; ++row)
+  for (int row = 0; row < kSubsamples * lens.height; ++row) {
     for (int column = 0; column < kSubsamples * lens.width; ++column) {
       const auto place = [](int subsample) { return (subsample + 0.5) / kSubsamples - 0.5; };
       const Vector3d ray = lens.ray({place(column), place(row)});
@@ -58,13 +58,15 @@ SceneRenderer::SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_
       ray_x_[index] = static_cast<float>(ray.x());
       ray_y_[index] = static_cast<float>(ray.y());
     }
+  }
   vignetting_.resize(static_cast<std::size_t>(lens.width) * lens.height);
-  for (int row = 0; row < lens.height; ++row)
+  for (int row = 0; row < lens.height; ++row) {
     for (int column = 0; column < lens.width; ++column) {
       // cos^4 of the angle to the axis, and the cone of the light on top of it.
       const double cosine = 1.0 / lens.ray({column, row}).norm();
       vignetting_[static_cast<std::size_t>(row) * lens.width + column] = static_cast<float>(std::pow(cosine, 6.0));
     }
+  }
 }
 
 void SceneRenderer::project(const Pose& X_WC, std::span<const Vector3d> vertices_W, RenderWorkspace& workspace) const {
@@ -171,7 +173,7 @@ std::optional<SceneRenderer::Bounds> SceneRenderer::bounds(std::size_t t, const 
   const auto limit = [](float value, int last) { return std::clamp(value, -1.0F, static_cast<float>(last + 1)); };
   const int last_column = kSubsamples * lens_.width - 1;
   const int last_row = kSubsamples * lens_.height - 1;
-  Bounds b;
+  Bounds b{};
   b.left = std::max(0, static_cast<int>(std::ceil(limit(subsample(low.x() - margin), last_column))));
   b.right = std::min(last_column, static_cast<int>(std::floor(limit(subsample(high.x() + margin), last_column))));
   b.top = std::max(0, static_cast<int>(std::ceil(limit(subsample(low.y() - margin), last_row))));
@@ -205,20 +207,24 @@ void SceneRenderer::find_visible(RenderWorkspace& workspace) const {
   const int tile_columns = (columns + kTile - 1) / kTile;
   const int tile_rows = (rows + kTile - 1) / kTile;
   workspace.farthest.assign(static_cast<std::size_t>(tile_columns) * tile_rows, std::numeric_limits<float>::infinity());
-  for (int row = 0; row < rows; ++row)
+  for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       float& farthest = workspace.farthest[static_cast<std::size_t>(row / kTile) * tile_columns + column / kTile];
       farthest = std::min(farthest, workspace.inverse_depth[static_cast<std::size_t>(row) * stride_ + column]);
     }
+  }
   for (const std::uint32_t t : workspace.inner_sides) {
     const std::optional<Bounds> place = bounds(t, workspace);
     double nearest = 0.0;
-    for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t i = 0; i < 3; ++i) {
       nearest = std::max(nearest, 1.0 / workspace.vertices_C[triangles_[3 * std::size_t{t} + i]].z());
+    }
     bool hidden = true;
-    for (int row = place->top / kTile; row <= place->bottom / kTile; ++row)
-      for (int column = place->left / kTile; column <= place->right / kTile; ++column)
+    for (int row = place->top / kTile; row <= place->bottom / kTile; ++row) {
+      for (int column = place->left / kTile; column <= place->right / kTile; ++column) {
         hidden = hidden && nearest < workspace.farthest[static_cast<std::size_t>(row) * tile_columns + column];
+      }
+    }
     if (!hidden) draw(t, workspace, *place);
   }
 }
@@ -271,10 +277,11 @@ void SceneRenderer::shade(const Pose& X_WC, double subject_distance_mm, RenderWo
                     ? cavity(y)
                     : light_at(R_CW, subject2, x, y, workspace.triangles[static_cast<std::size_t>(seen[at[0]])]);
       } else {
-        for (const std::size_t i : at)
+        for (const std::size_t i : at) {
           light += 0.25F * (seen[i] == kNone ? cavity(ray_y_[i])
                                              : light_at(R_CW, subject2, ray_x_[i], ray_y_[i],
                                                         workspace.triangles[static_cast<std::size_t>(seen[i])]));
+        }
       }
       workspace.radiance[static_cast<std::size_t>(row) * lens_.width + column] = kGreyLevels * light;
     }
@@ -294,9 +301,10 @@ void SceneRenderer::expose(std::uint64_t noise_seed, RenderWorkspace& workspace,
   for (int row = 0; row < height; ++row) {
     const float* in = workspace.radiance.data() + static_cast<std::size_t>(row) * width;
     float* out = workspace.blurred.data() + static_cast<std::size_t>(row) * width;
-    for (int column = 0; column < width; ++column)
+    for (int column = 0; column < width; ++column) {
       out[column] = (1.0F - 2.0F * kSide) * in[column] +
                     kSide * (in[std::max(0, column - 1)] + in[std::min(width - 1, column + 1)]);
+    }
   }
   for (int row = 0; row < height; ++row) {
     const float* middle = workspace.blurred.data() + static_cast<std::size_t>(row) * width;

@@ -118,9 +118,10 @@ Expected<std::uint32_t> start_sample(const SimulationSettings& s, const EcgRecor
     return fail(fmt::format("duration: ECG record {} holds no {} s", record.name, to_seconds(s.duration)));
   if (!s.ecg_start) return static_cast<std::uint32_t>(CounterNoise(s.seed, kSession).uniform(0, first, last));
   const double asked = samples(*s.ecg_start);
-  if (asked < first || asked > last)
+  if (asked < first || asked > last) {
     return fail(fmt::format("ECG start: {} s is outside {:.1f} to {:.1f} s of record {}", to_seconds(*s.ecg_start),
                             first / record.sample_rate_hz, last / record.sample_rate_hz, record.name));
+  }
   return static_cast<std::uint32_t>(asked);
 }
 

@@ -96,8 +96,10 @@ TEST(Ddsperf, ItsLinesOfASecondAreRead) {
 }
 
 TEST(Ddsperf, ItsOtherLinesAreNotTakenForFigures) {
-  for (const char* line : {"", "[27320] participant vm:27318: new", "[27320] 2.000  rss:7.6MB vcsw:135 ivcsw:7",
-                           "size 30000 mean 73.489us min 37.781us 50% 75.342us"}) {
+  for (const char* line :
+       {"", "[27320] participant vm:27318: new", "[27320] 2.000  rss:7.6MB vcsw:135 ivcsw:7",
+        "size 30000 mean 73.489us min 37.781us 50% 75.342us", "50% 75.3ms 99% 112.1us max 113.5us cnt 60",
+        "x 50% 75.3ms 99% 112.1us max 113.5us cnt 60", "x 50% us 99% 112.1us max 113.5us cnt 60"}) {
     EXPECT_FALSE(parse_ddsperf_line(line)) << line;
   }
 }
