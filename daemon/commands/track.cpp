@@ -50,6 +50,8 @@ class FrameSource {
   [[nodiscard]] virtual Expected<const VideoFrame*> next() = 0;
   [[nodiscard]] virtual std::uint64_t announced_frames() const = 0;
   [[nodiscard]] virtual double frames_per_s() const = 0;
+  // What could not be read, once next() has given null.
+  [[nodiscard]] virtual std::vector<Error> damage() const { return {}; }
 };
 
 class VideoSource final : public FrameSource {
@@ -82,6 +84,7 @@ class RecordingSource final : public FrameSource {
   }
   [[nodiscard]] std::uint64_t announced_frames() const override { return 0; }
   [[nodiscard]] double frames_per_s() const override { return 0; }
+  [[nodiscard]] std::vector<Error> damage() const override { return reader_.damage(); }
 
  private:
   RecordingReader reader_;
@@ -104,7 +107,8 @@ Expected<std::unique_ptr<FrameSource>> open_source(const std::string& path) {
     if (!video) return tl::unexpected(video.error());
     return std::make_unique<VideoSource>(*std::move(video));
   }
-  auto recording = RecordingReader::open(path);
+  // As of a video, what is whole is followed.
+  auto recording = RecordingReader::open(path, ReadMode::kWhole);
   if (!recording) return tl::unexpected(recording.error());
   const std::string_view channels[] = {channels::kCameraImage};
   if (const auto selected = recording->select(channels); !selected) return tl::unexpected(selected.error());
@@ -305,6 +309,7 @@ int track(const Options& options) {
     if (const auto finished = video->finish(); !finished) return refuse(finished.error(), kFailure);
   }
   const Summary& summary = tracking.summary();
+  for (const Error& damage : (*source)->damage()) fmt::print(stderr, "perimap track: {}\n", damage.message);
   // Containers round: one frame less is none that is missing.
   const std::uint64_t announced = (*source)->announced_frames();
   if (!stop->requested() && summary.frames + 1 < announced) {

@@ -61,5 +61,11 @@ head -c $(($(stat -c %s "$work/a.mkv") * 6 / 10)) "$work/a.mkv" > "$work/cut.mkv
   fail "cut video: ended with $?: $(cat "$work/error")"
 grep -q "cut.mkv: announces .* frames, .* could be read" "$work/error" || fail "nothing is said of the cut: $(cat "$work/error")"
 [ "$(wc -l < "$work/cut.csv")" -gt 1000 ] || fail "only $(wc -l < "$work/cut.csv") rows of a cut video"
-rm -f "$work"/*.mkv
+# So does a recording that was cut off.
+head -c $(($(stat -c %s "$recording") * 6 / 10)) "$recording" > "$work/cut.mcap"
+"$perimap" track "$work/cut.mcap" --csv "$work/cut.csv" --features 60 > /dev/null 2> "$work/error" ||
+  fail "cut recording: ended with $?: $(cat "$work/error")"
+grep -q "cut.mcap: byte .* cut off" "$work/error" || fail "nothing is said of the recording's cut: $(cat "$work/error")"
+[ "$(wc -l < "$work/cut.csv")" -gt 1000 ] || fail "only $(wc -l < "$work/cut.csv") rows of a cut recording"
+rm -f "$work"/*.mkv "$work/cut.mcap"
 echo "as promised: $kept of $first features kept over $last frames"
