@@ -21,7 +21,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (frame.format == PixelFormat::kMjpg) {
     const auto announced = read_jpeg_size(frame.bytes);
     // As a replay takes it; but for what would only take long.
-    if (announced && data[3] % 2 == 0 && announced->width * announced->height < 1 << 16) {
+    if (announced && data[3] % 2 == 0 && std::int64_t{announced->width} * announced->height < 1 << 16) {
       frame.width = announced->width;
       frame.height = announced->height;
     }
