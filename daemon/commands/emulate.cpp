@@ -94,6 +94,11 @@ Expected<Device> parse_device(const std::string& text) {
   if (std::holds_alternative<CanEndpoint>(*where) != (name == "can-ecg")) {
     return fail(fmt::format("device '{}': cannot be at {}", name, format_endpoint(*where)));
   }
+  if (const auto* tcp = std::get_if<TcpEndpoint>(&*where)) {
+    if (tcp->host != "127.0.0.1" && tcp->host != "localhost") {
+      return fail(fmt::format("device '{}': listens on this host alone, at tcp:127.0.0.1:{}", name, tcp->port));
+    }
+  }
   return Device{name, std::move(*where)};
 }
 

@@ -99,11 +99,11 @@ std::string reason(std::string_view kind, const DeviceHealth& health) {
     case DeviceState::kSilent:
       return "samples came and have stopped: switched off, cable out, or a device of another kind?";
     case DeviceState::kStarting:
-      if (kind == "r_trigger") {
-        return "open, but the line has not changed: is the monitor's output on, and wired to ecg.r_trigger_line?";
-      }
       if (const std::string awaited = health.awaited(); !awaited.empty()) {
         return fmt::format("open: {} Listen for longer (--seconds)", awaited);
+      }
+      if (kind == "r_trigger") {
+        return "open, but the line has not changed: is the monitor's output on, and wired to ecg.r_trigger_line?";
       }
       return "open, but nothing has come yet: listen for longer (--seconds)";
     default:
@@ -115,7 +115,7 @@ nlohmann::json as_json(std::string_view kind, const DeviceHealth& health, const 
   const auto jitter = health.jitter.summary();
   return {{"where", where},
           {"state", device_state_name(health.state())},
-          {"reason", reason(kind, health)},
+          {"reason", health.state() == DeviceState::kStreaming ? "" : reason(kind, health)},
           {"identity", health.identity().empty() ? nlohmann::json(nullptr) : nlohmann::json(health.identity())},
           {"openings", health.openings.get()},
           {"samples", health.samples.get()},

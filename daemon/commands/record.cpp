@@ -35,8 +35,9 @@ int complain(const Error& error, int exit_code) {
 
 std::string progress_line(const SessionRecorder& recorder, double elapsed_s) {
   const SessionRecorder::Summary summary = recorder.summary();
-  std::error_code ignored;
-  const double megabytes = static_cast<double>(std::filesystem::file_size(recorder.file(), ignored)) / 1e6;
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(recorder.file(), error);
+  const double megabytes = error ? 0.0 : static_cast<double>(bytes) / 1e6;
   return fmt::format("{:.0f} s: {} messages recorded, {:.0f} MB; not recorded: {} frames, {} others", elapsed_s,
                      summary.recorded, megabytes, summary.frames_not_recorded, summary.other_not_recorded);
 }
@@ -110,6 +111,9 @@ int run(const Options& options) {
   const SessionRecorder::Summary summary = ended.summary();
   if (summary.stopped) return complain({ended.reason()}, 1);
   const std::uint64_t lost = summary.frames_not_recorded + summary.other_not_recorded;
+  if (summary.recorded == 0) {
+    return complain({fmt::format("no device gave anything: perimap probe {} says why", options.configuration)}, 1);
+  }
   if (lost > 0) return complain({fmt::format("{} messages found no room: the disk did not keep up", lost)}, 1);
   return 0;
 }

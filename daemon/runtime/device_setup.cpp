@@ -55,6 +55,11 @@ Expected<NdiTool> ndi_tool(std::string_view key, const std::optional<std::string
   return tool;
 }
 
+// A tool seen from itself stands still where it is: a pose that looks well and says nothing.
+tl::unexpected<Error> same_tool(const std::string& name) {
+  return wrong("tracker.reference", "another tool than 'tracker.sensor'", fmt::format("\"{}\"", name));
+}
+
 Expected<NdiSettings> ndi_settings(const TrackerConfiguration& c) {
   NdiSettings settings;
   auto sensor = ndi_tool("tracker.sensor", c.sensor, c.sensor_definition);
@@ -63,6 +68,7 @@ Expected<NdiSettings> ndi_settings(const TrackerConfiguration& c) {
   if (c.reference || c.reference_definition) {
     auto reference = ndi_tool("tracker.reference", c.reference, c.reference_definition);
     if (!reference) return tl::unexpected(std::move(reference.error()));
+    if (settings.sensor.handle && reference->handle == settings.sensor.handle) return same_tool(*c.reference);
     settings.reference = std::move(*reference);
   }
   settings.frame_rate_hz = c.frame_rate_hz;
@@ -138,6 +144,7 @@ Expected<TrackerDevice> tracker_device(const TrackerConfiguration& c) {
   WorldSettings world;
   world.X_IW = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), c.rotation_IW_wxyz);
   if (c.protocol == TrackerConfiguration::Protocol::kIgtl) {
+    if (c.reference && c.reference == c.sensor) return same_tool(*c.reference);
     return TrackerDevice{std::move(*endpoint), IgtlSettings{c.sensor.value_or(""), c.reference, world}};
   }
   auto settings = ndi_settings(c);

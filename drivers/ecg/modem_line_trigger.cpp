@@ -164,7 +164,16 @@ std::optional<RTriggerPulse> TriggerEdges::take(const ModemPort::Line& line, boo
     health_.lost.add((changes + (line.on == settings_.rising ? 1 : 0)) / 2);
     return std::nullopt;
   }
-  if (line.on != settings_.rising) return std::nullopt;
+  if (line.on != settings_.rising) {
+    constexpr std::uint32_t kOthersInARow = 3;
+    if (++others_ == kOthersInARow) {
+      health_.set_awaited(
+          fmt::format("only the {} edge comes (of ri, many ports tell no other); should ecg.r_trigger_edge be that?",
+                      settings_.rising ? "falling" : "rising"));
+    }
+    return std::nullopt;
+  }
+  others_ = 0;
   if (count_ > 0 && now - last_ < settings_.shortest_interval) {
     health_.damaged.add();
     return std::nullopt;

@@ -64,6 +64,7 @@ class TriggerEdges {
   DeviceHealth& health_;
   std::uint32_t changes_ = 0;
   std::uint32_t count_ = 0;
+  std::uint32_t others_ = 0;  // edges the other way, since the last one of an R peak
   Instant last_{};
 };
 

@@ -398,6 +398,10 @@ bool NdiSession::choose_tools(LinkControl& link) {
     link.fail(fmt::format("no such tool: port handle {:02X}; there are: {}", sensor_handle_, list_of(enabled_)));
     return false;
   }
+  if (settings_.reference && sensor_handle_ == reference_handle_) {
+    link.fail(fmt::format("sensor and reference are both the tool of port handle {:02X}", sensor_handle_));
+    return false;
+  }
   return true;
 }
 

@@ -46,6 +46,12 @@ printf 'version = 1\n[ecg]\nprotocol = "bitalino"\nport = "/dev/ttyUSB0"\n[respi
 "$perimap" check "$scratch/breath.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "an input that the device has not must end with 2"
 grep -q "^$scratch/breath.toml:6:18: key 'respiration.device_channel': expected 1 to 6 of a bitalino" "$scratch/error" || fail "$(cat "$scratch/error")"
+for tools in 'protocol = "ndi" sensor = "A" reference = "0a"' 'protocol = "igtl" sensor = "Scope" reference = "Scope"'; do
+  printf 'version = 1\n[tracker]\nport = "tcp:127.0.0.1:1"\n%s\n' "${tools//\" /\"$'\n'}" >"$scratch/tools.toml"
+  "$perimap" check "$scratch/tools.toml" >"$scratch/out" 2>"$scratch/error"
+  [ $? -eq 2 ] || fail "a tool that is its own reference must end with 2"
+  grep -q "tools.toml: key 'tracker.reference': expected another tool" "$scratch/error" || fail "$(cat "$scratch/error")"
+done
 "$perimap" check /nowhere/x.toml 2>/dev/null
 [ $? -eq 2 ] || fail "a missing configuration must end with 2"
 "$perimap" check 2>/dev/null

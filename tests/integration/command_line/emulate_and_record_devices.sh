@@ -29,6 +29,7 @@ done
 for option in --bad-check --garbled; do
   refused "device 'camera': cannot do $option" camera=v4l2:/dev/video-that-is-not-there $option 0.1
 done
+refused "device 'ndi': listens on this host alone" ndi=tcp:192.0.2.7:$port
 refused "--ndi-reference: expected a rotation" ndi=tcp:127.0.0.1:$port --ndi-reference 0 0 -500 1 1 0 0
 
 "$perimap" emulate ndi=tcp:127.0.0.1:$port --ndi-reference 10 0 -520 0.70711 0 0 0.70711 > "$work/emulator" 2>&1 &
@@ -63,9 +64,10 @@ assert.equal(tracker.state, "streaming");
 assert.equal(tracker.invalid, 0);
 END
 
-# The line need not be there.
+# A line that is not there is waited for, and that nothing came is said at the end.
 printf 'version = 1\n[ecg]\nr_trigger = true\nr_trigger_port = "/dev/tty-that-is-not-there"\n' > "$work/trigger.toml"
-"$perimap" record -c "$work/trigger.toml" "$work/trigger.mcap" --seconds 0.5 > "$work/record" 2>&1 ||
+"$perimap" record -c "$work/trigger.toml" "$work/trigger.mcap" --seconds 0.5 > "$work/record" 2>&1
+[ $? -eq 1 ] && grep -q "0 messages recorded" "$work/record" && grep -q "no device gave anything" "$work/record" ||
   fail "a trigger alone: $(cat "$work/record")"
 [ -s "$work/trigger.mcap" ] || fail "nothing was written: $(cat "$work/record")"
 echo 'version = 1' > "$work/none.toml"

@@ -67,6 +67,15 @@ TEST_F(Edges, AnEdgeWithoutAKnownInstantGivesNoRPeak) {
   EXPECT_EQ(health.samples.get(), 0U);
 }
 
+// 16550s count the end of a ring alone.
+TEST_F(Edges, ThatOnlyTheOtherEdgeComesIsSaid) {
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(health.awaited(), "");
+    EXPECT_FALSE(change(1, false, milliseconds(800 * i)));
+  }
+  EXPECT_THAT(health.awaited(), HasSubstr("only the falling edge comes"));
+}
+
 TEST_F(Edges, NoChangeIsNothing) {
   EXPECT_FALSE(change(0, false, milliseconds(0), false));
   EXPECT_EQ(health.lost.get(), 0U);

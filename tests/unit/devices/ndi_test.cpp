@@ -464,6 +464,16 @@ TEST(NdiSession, UploadsToolDefinitionsAndMeasuresRelativeToTheReference) {
   EXPECT_LT((sample.X_WS.t - expected.t).norm(), 1e-3);
 }
 
+TEST(NdiSession, AToolIsNotItsOwnReference) {
+  NdiSettings settings = wired();
+  settings.sensor.handle = 0x0A;
+  settings.reference = NdiTool{{}, 0x0A};
+  Theatre theatre(settings, {.wired_tools = 2, .reference = Pose{}});
+  theatre.run(seconds(1));
+  EXPECT_THAT(theatre.host.failure, HasSubstr("sensor and reference are both the tool of port handle 0A"));
+  EXPECT_TRUE(theatre.samples.empty());
+}
+
 TEST(NdiSession, WithoutANameTheOneToolBesideTheReferenceIsTheSensor) {
   for (const std::uint16_t reference : {std::uint16_t{0x0A}, std::uint16_t{0x0B}}) {
     const Pose X_TR{so3_exp(Vector3d(0.3, -0.2, 0.1)), Vector3d(100, 0, -600)};

@@ -12,7 +12,7 @@ systemctl is-active perimapd || fail "the service is not active"
 systemctl is-enabled perimapd || fail "the service is not enabled"
 [ "$(ps -o user= -p "$(systemctl show -P MainPID perimapd)")" = perimap ] || fail "it does not run as perimap"
 systemctl show -P StatusText perimapd
-for kind in ttyS ttyUSB ttyACM rfcomm video4linux; do
+for kind in ttyS ttyUSB ttyACM video4linux; do
   grep -q " $kind\$" /proc/devices || fail "a $kind that is plugged in from now on is forbidden to it"
 done
 echo "ok: each kind of device that it may open was known when it started"
