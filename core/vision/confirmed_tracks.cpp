@@ -22,11 +22,15 @@ std::span<const TrackRow> ConfirmedTracks::add(std::uint64_t frame, std::span<co
 
 std::span<const TrackRow> ConfirmedTracks::finish() {
   released_.clear();
+  if (!has_released_ && !waiting_.empty()) {
+    for (const TrackRow& row : waiting_.back()) is_confirmed_[row.id] = true;
+  }
   while (!waiting_.empty()) release_oldest();
   return released_;
 }
 
 void ConfirmedTracks::release_oldest() {
+  has_released_ = true;
   const auto is_confirmed = [this](const TrackRow& row) { return is_confirmed_[row.id]; };
   std::copy_if(waiting_.front().begin(), waiting_.front().end(), std::back_inserter(released_), is_confirmed);
   waiting_.pop_front();

@@ -29,13 +29,15 @@ class ConfirmedTracks {
   // What was found in the next frame. Returns the rows that this releases, in the order of their frames; valid until
   // the next call.
   [[nodiscard]] std::span<const TrackRow> add(std::uint64_t frame, std::span<const FollowedFeature> features);
-  // There are no more frames: what still waits.
+  // There are no more frames: what still waits. Where no row has been given yet, candidates of the last frame count as
+  // tracked: there were too few frames to tell.
   [[nodiscard]] std::span<const TrackRow> finish();
 
  private:
   void release_oldest();
 
   std::size_t delay_frames_;
+  bool has_released_ = false;
   std::deque<std::vector<TrackRow>> waiting_;  // a frame each
   std::vector<bool> is_confirmed_;             // by id
   std::vector<TrackRow> released_;

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/statistics/upper_median.hpp"
 #include "core/vision/confirmed_tracks.hpp"
 #include "core/vision/feature_detector.hpp"
 #include "core/vision/feature_follower.hpp"
@@ -33,6 +34,7 @@ namespace {
 
 constexpr int kOk = 0;
 constexpr int kFailure = 1;
+constexpr int kWrongUse = 2;
 
 struct Options {
   std::string input;
@@ -51,47 +53,93 @@ class FrameSource {
   [[nodiscard]] virtual std::uint64_t announced_frames() const = 0;
   [[nodiscard]] virtual double frames_per_s() const = 0;
   // What could not be read, once next() has given null.
-  [[nodiscard]] virtual std::vector<Error> damage() const { return {}; }
+  [[nodiscard]] virtual std::vector<Error> damage() const = 0;
 };
 
 class VideoSource final : public FrameSource {
  public:
-  explicit VideoSource(VideoReader reader) : reader_(std::move(reader)) {}
+  VideoSource(VideoReader reader, std::string path) : reader_(std::move(reader)), path_(std::move(path)) {}
   Expected<const VideoFrame*> next() override { return reader_.next(); }
   [[nodiscard]] std::uint64_t announced_frames() const override { return reader_.announced_frames(); }
   [[nodiscard]] double frames_per_s() const override { return reader_.frames_per_s(); }
+  [[nodiscard]] std::vector<Error> damage() const override {
+    if (!reader_.ends_early()) return {};
+    return {{fmt::format("{}: announces {} frames and ends before: it may have been cut off", path_,
+                         reader_.announced_frames())}};
+  }
 
  private:
   VideoReader reader_;
+  std::string path_;
 };
 
 class RecordingSource final : public FrameSource {
  public:
-  RecordingSource(RecordingReader reader, std::string path) : reader_(std::move(reader)), path_(std::move(path)) {}
+  RecordingSource(RecordingReader reader, std::string path, double frames_per_s)
+      : reader_(std::move(reader)), path_(std::move(path)), frames_per_s_(frames_per_s) {}
 
+  // A frame that cannot be used is passed over; it keeps its number.
   Expected<const VideoFrame*> next() override {
-    auto message = reader_.next();
-    if (!message) return tl::unexpected(message.error());
-    if (!*message) return nullptr;
-    const auto image = recorded_.read(reader_, **message);
-    if (!image) return tl::unexpected(image.error());
-    if (frame_.grey.data != nullptr && (image->width != frame_.grey.width || image->height != frame_.grey.height)) {
-      return fail(fmt::format("{}: byte {}: a frame of another size than the first", path_, (*message)->file_offset));
+    for (;; ++messages_) {
+      auto message = reader_.next();
+      if (!message) return tl::unexpected(message.error());
+      if (!*message) return nullptr;
+      auto image = recorded_.read(reader_, **message);
+      if (image && frame_.grey.data != nullptr &&
+          (image->width != frame_.grey.width || image->height != frame_.grey.height)) {
+        image =
+            fail(fmt::format("{}: byte {}: a frame of another size than the first", path_, (*message)->file_offset));
+      }
+      if (!image) {
+        if (unusable_++ == 0) first_unusable_ = std::move(image.error());
+        continue;
+      }
+      frame_.number = messages_++;
+      frame_.grey = *image;
+      return &frame_;
     }
-    if (frame_.grey.data != nullptr) ++frame_.number;
-    frame_.grey = *image;
-    return &frame_;
   }
   [[nodiscard]] std::uint64_t announced_frames() const override { return 0; }
-  [[nodiscard]] double frames_per_s() const override { return 0; }
-  [[nodiscard]] std::vector<Error> damage() const override { return reader_.damage(); }
+  [[nodiscard]] double frames_per_s() const override { return frames_per_s_; }
+  [[nodiscard]] std::vector<Error> damage() const override {
+    std::vector<Error> all = reader_.damage();
+    if (unusable_ > 0) {
+      all.push_back({fmt::format("{} frames passed over, the first: {}", unusable_, first_unusable_.message)});
+    }
+    return all;
+  }
 
  private:
   RecordingReader reader_;
   std::string path_;
+  double frames_per_s_;
+  std::uint64_t messages_ = 0;
+  std::uint64_t unusable_ = 0;
+  Error first_unusable_;
   RecordedFrame recorded_;
   VideoFrame frame_;
 };
+
+// By the middle one of the first intervals between the frames' captures; 0 with less than three frames. Starts the
+// reading over.
+Expected<double> rate_of_frames(RecordingReader& recording) {
+  constexpr std::size_t kFrames = 32;
+  const std::string_view channels[] = {channels::kCameraImage};
+  if (const auto selected = recording.select(channels); !selected) return tl::unexpected(selected.error());
+  std::vector<double> intervals_s;
+  std::optional<Instant> before;
+  while (intervals_s.size() < kFrames) {
+    const auto message = recording.next();
+    if (!message) return tl::unexpected(message.error());
+    if (!*message) break;
+    if (before) intervals_s.push_back(to_seconds((*message)->source_time - *before));
+    before = (*message)->source_time;
+  }
+  if (const auto selected = recording.select(channels); !selected) return tl::unexpected(selected.error());
+  if (intervals_s.size() < 2) return 0.0;
+  const double middle_s = upper_median(intervals_s.begin(), intervals_s.end());
+  return middle_s > 0.0 ? 1.0 / middle_s : 0.0;
+}
 
 bool is_recording(const std::string& path) {
   constexpr std::string_view kMagic = "\x89MCAP";
@@ -105,17 +153,23 @@ Expected<std::unique_ptr<FrameSource>> open_source(const std::string& path) {
   if (!is_recording(path)) {
     auto video = VideoReader::open(path);
     if (!video) return tl::unexpected(video.error());
-    return std::make_unique<VideoSource>(*std::move(video));
+    return std::make_unique<VideoSource>(*std::move(video), path);
   }
   // As of a video, what is whole is followed.
   auto recording = RecordingReader::open(path, ReadMode::kWhole);
   if (!recording) return tl::unexpected(recording.error());
-  const std::string_view channels[] = {channels::kCameraImage};
-  if (const auto selected = recording->select(channels); !selected) return tl::unexpected(selected.error());
-  return std::make_unique<RecordingSource>(*std::move(recording), path);
+  const auto rate = rate_of_frames(*recording);
+  if (!rate) return tl::unexpected(rate.error());
+  return std::make_unique<RecordingSource>(*std::move(recording), path, *rate);
 }
 
-// The tracks as text, in a file beside the one it will become.
+bool is_special(const std::string& path) {
+  std::error_code error;
+  return std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error);
+}
+
+// The tracks as text, in a file beside the one it will become; straight into what is there and no file (a pipe, a
+// device).
 class TrackTable {
  public:
   static Expected<TrackTable> create(const std::string& path) {
@@ -131,7 +185,7 @@ class TrackTable {
   TrackTable(const TrackTable&) = delete;
   TrackTable& operator=(const TrackTable&) = delete;
   ~TrackTable() {
-    if (file_ == nullptr) return;
+    if (file_ == nullptr || partial_ == path_) return;
     file_.reset();
     std::error_code ignored;
     std::filesystem::remove(partial_, ignored);
@@ -151,7 +205,7 @@ class TrackTable {
     if (std::ferror(file_.get()) != 0 || std::fflush(file_.get()) != 0) {
       return fail(path_ + ": could not be written whole");
     }
-    std::filesystem::rename(partial_, path_, error);
+    if (partial_ != path_) std::filesystem::rename(partial_, path_, error);
     if (error) return fail(path_ + ": " + error.message());
     file_.reset();
     return {};
@@ -161,7 +215,7 @@ class TrackTable {
   struct Close {
     void operator()(std::FILE* file) const noexcept { (void)std::fclose(file); }
   };
-  explicit TrackTable(const std::string& path) : path_(path), partial_(path + ".part") {}
+  explicit TrackTable(const std::string& path) : path_(path), partial_(is_special(path) ? path : path + ".part") {}
   std::string path_, partial_;
   std::unique_ptr<std::FILE, Close> file_;
   std::size_t rows_ = 0;
@@ -271,7 +325,24 @@ int refuse(const Error& error, int code) {
   return code;
 }
 
+bool is_same_file(const std::string& a, const std::string& b) {
+  std::error_code error;
+  if (is_special(a) || is_special(b)) return false;
+  if (std::filesystem::equivalent(a, b, error) && !error) return true;
+  return std::filesystem::weakly_canonical(a, error) == std::filesystem::weakly_canonical(b, error);
+}
+
+// What is read must not be written over.
+Expected<void> check_outputs(const Options& options) {
+  if (is_same_file(options.csv, options.input)) return fail("--csv: is INPUT itself");
+  if (options.video.empty()) return {};
+  if (is_same_file(options.video, options.input)) return fail("--video: is INPUT itself");
+  if (is_same_file(options.video, options.csv)) return fail("--video: is the file of --csv");
+  return {};
+}
+
 int track(const Options& options) {
+  if (const auto apart = check_outputs(options); !apart) return refuse(apart.error(), kWrongUse);
   auto stop = StopSignal::install();
   if (!stop) return refuse(stop.error(), kFailure);
   auto source = open_source(options.input);
@@ -281,11 +352,15 @@ int track(const Options& options) {
   std::optional<VideoWriter> video;
   Tracking tracking(options, (*source)->frames_per_s());
   ConfirmedTracks tracks(FollowedFeature::kTrail);
+  std::optional<Error> broken;  // ends the reading; what was found until then is written
   {
     Progress progress("frames", (*source)->announced_frames());
     while (!stop->requested()) {
       const auto frame = (*source)->next();
-      if (!frame) return refuse(frame.error(), kFailure);
+      if (!frame) {
+        broken = frame.error();
+        break;
+      }
       if (*frame == nullptr) break;
       if (const auto taken = tracking.take(**frame); !taken) return refuse(taken.error(), kFailure);
       table->write(tracks.add((*frame)->number, tracking.features()));
@@ -309,12 +384,8 @@ int track(const Options& options) {
     if (const auto finished = video->finish(); !finished) return refuse(finished.error(), kFailure);
   }
   const Summary& summary = tracking.summary();
-  for (const Error& damage : (*source)->damage()) fmt::print(stderr, "perimap track: {}\n", damage.message);
-  // Containers round: one frame less is none that is missing.
-  const std::uint64_t announced = (*source)->announced_frames();
-  if (!stop->requested() && summary.frames + 1 < announced) {
-    fmt::print(stderr, "perimap track: {}: announces {} frames, {} could be read: it may have been cut off\n",
-               options.input, announced, summary.frames);
+  if (!stop->requested()) {
+    for (const Error& damage : (*source)->damage()) fmt::print(stderr, "perimap track: {}\n", damage.message);
   }
   if (2 * summary.poor_frames > summary.frames || table->rows() == 0) {
     fmt::print(stderr,
@@ -329,7 +400,7 @@ int track(const Options& options) {
   fmt::print("{}{} frames, {:.1f} features a frame, {:.2f} ms a frame to follow them: {}\n",
              stop->requested() ? "stopped early: " : "", summary.frames, static_cast<double>(table->rows()) / frames,
              1e3 * summary.follow_s / frames, options.csv);
-  return kOk;
+  return broken ? refuse(*broken, kFailure) : kOk;
 }
 
 }  // namespace

@@ -98,6 +98,17 @@ double VideoReader::frames_per_s() const noexcept {
   return is_plausible_rate(rate) ? rate : 0;
 }
 
+bool VideoReader::ends_early() const noexcept {
+  // Containers round: a frame less is none that is missing, nor is one at a rate that changes.
+  constexpr double kMargin = 0.02, kMargin_frames = 2;
+  const auto announced = static_cast<double>(announced_frames());
+  const double rate = frames_per_s();
+  const auto last = static_cast<double>(impl_->number);
+  if (last + kMargin_frames >= announced) return false;
+  const double reached = rate > 0 && impl_->time_ms > 0 ? 1e-3 * impl_->time_ms * rate : last;
+  return reached + kMargin_frames < (1 - kMargin) * announced;
+}
+
 Expected<const VideoFrame*> VideoReader::next() {
   try {
     if (!std::exchange(impl_->first_is_waiting, false) && !impl_->read_next(announced_frames(), frames_per_s())) {
@@ -124,6 +135,7 @@ struct VideoWriter::Impl {
   std::string path;
   cv::VideoWriter writer;
   cv::Mat drawn;
+  std::uint64_t frames = 0;
 };
 
 VideoWriter::VideoWriter(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
@@ -169,6 +181,7 @@ Expected<void> VideoWriter::write(const VideoFrame& frame, const std::vector<Vid
       }
     }
     impl_->writer.write(impl_->drawn);
+    ++impl_->frames;
     return {};
   } catch (const std::exception& thrown) {
     return failed(impl_->path, thrown);
@@ -176,9 +189,19 @@ Expected<void> VideoWriter::write(const VideoFrame& frame, const std::vector<Vid
 }
 
 Expected<void> VideoWriter::finish() {
-  impl_->writer.release();
-  std::error_code error;
-  if (std::filesystem::file_size(impl_->path, error) == 0 || error) return fail(impl_->path + ": nothing was written");
+  const std::string cut = impl_->path + ": was not written whole: is the disk full?";
+  try {
+    impl_->writer.release();
+    // OpenCV says nothing of an error of the disk.
+    cv::VideoCapture written(impl_->path, cv::CAP_FFMPEG);
+    const double last = static_cast<double>(impl_->frames) - 1;
+    if (!written.isOpened() || written.get(cv::CAP_PROP_FRAME_COUNT) < last) return fail(cut);
+    cv::Mat frame;
+    if (last > 0) written.set(cv::CAP_PROP_POS_FRAMES, last);
+    if (!written.read(frame)) return fail(cut);
+  } catch (const std::exception& thrown) {
+    return failed(impl_->path, thrown);
+  }
   return {};
 }
 

@@ -32,9 +32,12 @@ class VideoReader {
   VideoReader& operator=(const VideoReader&) = delete;
   ~VideoReader();
 
-  // As the container says; 0 when it does not.
+  // As the container says, or as its length and usual rate let guess; 0 when it does not.
   [[nodiscard]] std::uint64_t announced_frames() const noexcept;
   [[nodiscard]] double frames_per_s() const noexcept;
+  // After the end: whether the last frame's time, or their number where frames have no times, is so far from what is
+  // announced that something must be missing.
+  [[nodiscard]] bool ends_early() const noexcept;
 
   // Null at the end. Frames that cannot be decoded are passed over while fewer have come than the container announces.
   // A frame of another size than the first ends the reading with an error.
@@ -66,7 +69,8 @@ class VideoWriter {
 
   // The frame with the marks drawn on a copy of it; in grey when it has no colour.
   [[nodiscard]] Expected<void> write(const VideoFrame& frame, const std::vector<VideoMark>& marks);
-  // Closes the file. Without it the file is closed too, but nothing is said of an error.
+  // Closes the file, and looks whether its last frame can be read. Without it the file is closed too, but nothing is
+  // said of an error.
   [[nodiscard]] Expected<void> finish();
 
  private:

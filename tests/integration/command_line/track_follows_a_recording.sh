@@ -52,14 +52,33 @@ exits "folder" 1 "a folder or a device" "$perimap" track "$work" --csv "$work/c.
 exits "not a video" 1 "a.csv: not a video" "$perimap" track "$work/a.csv" --csv "$work/c.csv"
 exits "unwritable table" 1 "c.csv: can not be written" "$perimap" track "$work/a.mkv" --csv "$work/none/c.csv"
 exits "unwritable video" 1 "c.mkv: can not be written" "$perimap" track "$work/a.mkv" --csv "$work/c.csv" --video "$work/none/c.mkv"
+exits "table over the input" 2 "--csv: is INPUT itself" "$perimap" track "$work/a.mkv" --csv "$work/../${work##*/}/a.mkv"
+ln -s a.mkv "$work/link.mkv"
+exits "video over the input" 2 "--video: is INPUT itself" "$perimap" track "$work/a.mkv" --csv "$work/c.csv" --video "$work/link.mkv"
+exits "video over the table" 2 "--video: is the file of --csv" "$perimap" track "$work/a.mkv" --csv "$work/c.mkv" --video "$work/c.mkv"
 exits "no table" 2 "--csv" "$perimap" track "$work/a.mkv"
 exits "no features" 2 "--features" "$perimap" track "$work/a.mkv" --csv "$work/c.csv" --features 0
+
+# A pipe or a device is written to, not put away.
+mkfifo "$work/pipe"
+cat "$work/pipe" > "$work/piped.csv" &
+"$perimap" track "$recording" --csv "$work/pipe" --features 60 > /dev/null 2>&1 || fail "to a pipe: ended with $?"
+wait
+cmp "$work/a.csv" "$work/piped.csv" || fail "another result by a pipe"
+
+# A disk that takes no more: nothing is called done.
+(
+  trap '' XFSZ
+  ulimit -f 400
+  "$perimap" track "$work/a.mkv" --csv "$work/c.csv" --video "$work/full.mkv" --features 20 > /dev/null 2> "$work/error"
+)
+[ $? -eq 1 ] && grep -q "full.mkv: was not written whole" "$work/error" || fail "a full disk: $(cat "$work/error")"
 
 # A video that ends in the middle of a frame: what is whole is followed, and it says that something is missing.
 head -c $(($(stat -c %s "$work/a.mkv") * 6 / 10)) "$work/a.mkv" > "$work/cut.mkv"
 "$perimap" track "$work/cut.mkv" --csv "$work/cut.csv" --features 60 > /dev/null 2> "$work/error" ||
   fail "cut video: ended with $?: $(cat "$work/error")"
-grep -q "cut.mkv: announces .* frames, .* could be read" "$work/error" || fail "nothing is said of the cut: $(cat "$work/error")"
+grep -q "cut.mkv: announces .* frames and ends before: it may have been cut off" "$work/error" || fail "nothing is said of the cut: $(cat "$work/error")"
 [ "$(wc -l < "$work/cut.csv")" -gt 1000 ] || fail "only $(wc -l < "$work/cut.csv") rows of a cut video"
 # So does a recording that was cut off.
 head -c $(($(stat -c %s "$recording") * 6 / 10)) "$recording" > "$work/cut.mcap"

@@ -33,6 +33,15 @@ TEST(ConfirmedTracks, LeavesOutACandidateThatIsNeverTracked) {
   EXPECT_TRUE(rows_of(std::vector(6, feature(7, FollowState::kCandidate))).empty());
 }
 
+TEST(ConfirmedTracks, GivesTheCandidatesThatAVideoTooShortToTellEndsWith) {
+  const std::vector<TrackRow> rows = rows_of(std::vector(kDelay, feature(7, FollowState::kCandidate)));
+  ASSERT_EQ(rows.size(), kDelay);
+  for (const TrackRow& row : rows) EXPECT_TRUE(row.is_candidate);
+  std::vector<FollowedFeature> given_up(2, feature(7, FollowState::kCandidate));
+  given_up.push_back(feature(7, FollowState::kEmpty, false));
+  EXPECT_TRUE(rows_of(given_up).empty());
+}
+
 TEST(ConfirmedTracks, GivesACandidatesRowsOnceItIsTracked) {
   std::vector<FollowedFeature> frames(3, feature(7, FollowState::kCandidate));
   frames.push_back(feature(7, FollowState::kTracked));
