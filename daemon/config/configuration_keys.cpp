@@ -326,7 +326,8 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
       .optional_text("device", R"("v4l2:/dev/videoN" or "video:FILE")", &is_camera, PERIMAP_MEMBER(camera.device),
                      "where the camera is: a V4L2 device, or a video file in its place")
       .add(
-          "format", "what the camera is to give; any: the first of these that it has",
+          "format",
+          "what the camera is to give; any: the first of these that it has, at no much lower rate than the others",
           R"("any" or "mono8" or "nv12" or "yuyv" or "uyvy" or "jpeg")",
           [](const ConfigurationValue& value, Configuration& configuration) {
             const auto* name = std::get_if<std::string>(&value);

@@ -169,6 +169,25 @@ std::string V4l2Stream::offered_sizes(std::uint32_t fourcc) {
   return all;
 }
 
+double V4l2Stream::fastest_hz(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) {
+  double fastest = 0.0;
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    v4l2_frmivalenum interval{};
+    interval.index = i;
+    interval.pixel_format = fourcc;
+    interval.width = width;
+    interval.height = height;
+    if (node_->control(VIDIOC_ENUM_FRAMEINTERVALS, &interval) != 0) break;
+    const bool discrete = interval.type == V4L2_FRMIVAL_TYPE_DISCRETE;
+    const v4l2_fract& shortest = discrete ? interval.discrete : interval.stepwise.min;
+    if (shortest.numerator > 0) {
+      fastest = std::max(fastest, static_cast<double>(shortest.denominator) / shortest.numerator);
+    }
+    if (!discrete) break;
+  }
+  return fastest;
+}
+
 Expected<void> V4l2Stream::settle_format() {
   v4l2_format format{};
   format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -176,10 +195,23 @@ Expected<void> V4l2Stream::settle_format() {
   const bool sized = settings_.width > 0 && settings_.height > 0;
   const std::uint32_t width = sized ? static_cast<std::uint32_t>(settings_.width) : format.fmt.pix.width;
   const std::uint32_t height = sized ? static_cast<std::uint32_t>(settings_.height) : format.fmt.pix.height;
+  // Over USB the plain formats of large pictures are often much slower than JPEG. Where the format is free the first
+  // one is taken that is as fast as asked, or about as fast as the fastest.
+  double enough_hz = 0.0;
+  if (!settings_.format) {
+    constexpr double kAboutAsFast = 0.9;
+    for (const KnownFormat& known : kFormats) enough_hz = std::max(enough_hz, fastest_hz(known.fourcc, width, height));
+    if (settings_.frame_rate_hz > 0.0) enough_hz = std::min(enough_hz, settings_.frame_rate_hz);
+    enough_hz *= kAboutAsFast;
+  }
+  const auto is_too_slow = [&](std::uint32_t fourcc) {
+    const double hz = fastest_hz(fourcc, width, height);
+    return hz > 0.0 && hz < enough_hz;
+  };
   // The driver puts what it can do in place of what it cannot. So each format is asked for, and the answer read.
   std::optional<v4l2_pix_format> right_format;
   for (const KnownFormat& wanted : kFormats) {
-    if (settings_.format && *settings_.format != wanted.format) continue;
+    if ((settings_.format && *settings_.format != wanted.format) || is_too_slow(wanted.fourcc)) continue;
     v4l2_format given = format;
     given.fmt.pix.pixelformat = wanted.fourcc;
     given.fmt.pix.width = width;

@@ -87,6 +87,8 @@ class V4l2Stream {
   [[nodiscard]] std::optional<std::int32_t> control(std::uint32_t id);
   [[nodiscard]] std::string offered_formats();
   [[nodiscard]] std::string offered_sizes(std::uint32_t fourcc);
+  // The most frames/s that the driver says it has of such pictures; 0 when it does not say.
+  [[nodiscard]] double fastest_hz(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height);
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& what) const;
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& what, int error) const;
   [[nodiscard]] Expected<void> give_back();

@@ -35,7 +35,8 @@ struct FakeCamera {
   std::uint32_t width = 640, height = 480;  // the only size
   std::uint32_t padding = 0;                // bytes at the end of each row
   std::uint32_t field = V4L2_FIELD_NONE;
-  v4l2_fract period{1, 30};  // the only one
+  v4l2_fract period{1, 30};                                          // the only one
+  std::map<std::uint32_t, std::vector<v4l2_fract>> offered_periods;  // by format, as it says
   std::uint32_t most_buffers = 4;
   std::map<std::uint32_t, std::int32_t> controls{{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
                                                  {V4L2_CID_EXPOSURE_ABSOLUTE, 156}};
@@ -79,6 +80,14 @@ class FakeV4l2Node final : public V4l2Node {
           if (s.index > 0) return EINVAL;
           s.type = V4L2_FRMSIZE_TYPE_DISCRETE;
           s.discrete = {camera_.width, camera_.height};
+          return 0;
+        });
+      case VIDIOC_ENUM_FRAMEINTERVALS:
+        return answer<v4l2_frmivalenum>(argument, [this](v4l2_frmivalenum& i) {
+          const auto found = camera_.offered_periods.find(i.pixel_format);
+          if (found == camera_.offered_periods.end() || i.index >= found->second.size()) return EINVAL;
+          i.type = V4L2_FRMIVAL_TYPE_DISCRETE;
+          i.discrete = found->second[i.index];
           return 0;
         });
       case VIDIOC_G_FMT:

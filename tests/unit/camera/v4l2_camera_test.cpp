@@ -80,6 +80,22 @@ TEST(V4l2Stream, TakesTheFormatThatNeedsTheLeastWork) {
   EXPECT_THAT((*stream)->identity(), AllOf(HasSubstr("Fake (fake)"), HasSubstr("nv12 640x480 at 30.00 Hz")));
 }
 
+TEST(V4l2Stream, PassesOverAFormatThatIsMuchSlowerThanAnother) {
+  FakeCamera camera;
+  camera.formats = {V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_MJPEG};
+  camera.offered_periods = {{V4L2_PIX_FMT_YUYV, {{1, 5}}}, {V4L2_PIX_FMT_MJPEG, {{1, 15}, {1, 30}}}};
+  auto wanted = settings();
+  EXPECT_EQ(open(camera, wanted).value()->frame().format, PixelFormat::kMjpg);
+  wanted.frame_rate_hz = 30;
+  EXPECT_EQ(open(camera, wanted).value()->frame().format, PixelFormat::kMjpg);
+  wanted.frame_rate_hz = 0;
+  wanted.format = PixelFormat::kYuyv;  // as asked
+  EXPECT_EQ(open(camera, wanted).value()->frame().format, PixelFormat::kYuyv);
+  wanted.format.reset();
+  camera.offered_periods[V4L2_PIX_FMT_YUYV] = {{1, 28}, {1, 5}};
+  EXPECT_EQ(open(camera, wanted).value()->frame().format, PixelFormat::kYuyv);
+}
+
 TEST(V4l2Stream, GivesFramesWithTheirStampAndRowsAsTheDriverHasThem) {
   FakeCamera camera;
   camera.padding = 64;
