@@ -54,6 +54,8 @@ class EcgAssembler {
   void end_chunk(Instant arrival);
 
   [[nodiscard]] bool any() const noexcept { return any_; }
+  // Of the sample that comes next: all that came before it, and those that were lost.
+  [[nodiscard]] std::int64_t next_count() const noexcept { return next_count_; }
   [[nodiscard]] Instant last_arrival() const noexcept { return last_arrival_; }
 
  private:

@@ -16,10 +16,14 @@ constexpr Duration kReopenAfter = std::chrono::seconds(2);
 
 EcgProtocol::EcgProtocol(double sample_rate_hz, Duration transport_delay, EcgSinks sinks, DeviceHealth& health)
     : samples_({.period_ns = 1e9 / sample_rate_hz, .transport_delay = transport_delay}, std::move(sinks), health),
-      health_(health) {}
+      health_(health),
+      sample_rate_hz_(sample_rate_hz),
+      rate_(sample_rate_hz) {}
 
 void EcgProtocol::on_open(LinkControl& link, Instant now) {
   samples_.restart();
+  rate_.restart();
+  refused_ = false;
   opened_ = now;
   now_ = now;
   bytes_ = 0;
@@ -43,9 +47,36 @@ void EcgProtocol::on_bytes(LinkControl& link, std::span<const std::byte> bytes, 
   now_ = arrival;
   bytes_ += bytes.size();
   const std::uint64_t before = health_.samples.get();
+  const std::int64_t count = samples_.next_count();
   decode(link, bytes, arrival);
+  // Bytes without a sample say nothing of the rate.
+  if (samples_.next_count() != count && !expect_rate(link, arrival)) {
+    refused_ = true;
+    samples_.restart();
+    return;
+  }
   samples_.end_chunk(arrival);
   if (health_.samples.get() != before) health_.set_state(DeviceState::kStreaming);
+}
+
+bool EcgProtocol::expect_rate(LinkControl& link, Instant arrival) {
+  const bool was_wrong = rate_.wrong();
+  rate_.observe(samples_.next_count(), arrival);
+  if (!rate_.wrong()) {
+    if (was_wrong) health_.set_reason("");
+    return true;
+  }
+  // What an earlier conversation has found is given time to become right in this one.
+  if (!was_wrong) link.fail(wrong_rate());
+  return false;
+}
+
+std::string EcgProtocol::wrong_rate() const {
+  return fmt::format(
+      "{:.1f} samples come a second, and the protocol has {:g}: none can be stamped; was the command that sets the "
+      "rate "
+      "lost, or does the line lose bytes?",
+      rate_.seen_hz(), sample_rate_hz_);
 }
 
 Instant EcgProtocol::next_time() const noexcept {
@@ -65,7 +96,7 @@ void EcgProtocol::on_time(LinkControl& link, Instant now) {
     return;
   }
   if (now < started_ + kReopenAfter) return;
-  link.fail(why_no_sample(bytes_, to_seconds(now - opened_)));
+  link.fail(refused_ ? wrong_rate() : why_no_sample(bytes_, to_seconds(now - opened_)));
 }
 
 std::string EcgProtocol::why_no_sample(std::uint64_t bytes, double seconds) const {

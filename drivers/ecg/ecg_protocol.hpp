@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "drivers/device/device_protocol.hpp"
+#include "drivers/device/rate_check.hpp"
 #include "drivers/ecg/ecg_assembler.hpp"
 
 namespace perimap {
@@ -20,7 +21,9 @@ namespace perimap {
 }
 
 // A device that says nothing for 300 ms is silent; after 2 s, and at the start after 2 s more than the start takes, the
-// link is opened anew, because a device that was switched off has to be started again.
+// link is opened anew, because a device that was switched off has to be started again. So it is when samples come at
+// another rate than the protocol's, which a device may not have been told; none is taken then until a second of them
+// came at the right one, since stamps are made by it.
 class EcgProtocol : public DeviceProtocol {
  public:
   // `transport_delay`: from a sample's measurement to the earliest that it can be here.
@@ -60,7 +63,13 @@ class EcgProtocol : public DeviceProtocol {
     std::vector<std::byte> bytes;
   };
   void send_due(LinkControl& link, Instant now);
+  // Whether samples come at the rate that stamps are made by; gives the link up when they no longer do.
+  bool expect_rate(LinkControl& link, Instant arrival);
+  [[nodiscard]] std::string wrong_rate() const;
 
+  double sample_rate_hz_;
+  RateCheck rate_;
+  bool refused_ = false;  // samples of this conversation, for their rate
   std::deque<Command> commands_;
   Instant now_{};
   Instant opened_{};

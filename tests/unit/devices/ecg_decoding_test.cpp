@@ -1,4 +1,5 @@
 // The ECG protocols on bytes: good, garbled, truncated, overlong, in any chunks.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -155,6 +156,67 @@ TEST(EcgProtocol, SilenceIsSaidAndThenTheLinkIsOpenedAnew) {
   EXPECT_TRUE(link.failure.empty());
   protocol.on_time(link, kStart + milliseconds(2100));
   EXPECT_THAT(link.failure, HasSubstr("no sample for 2 s"));
+}
+
+// `rate_hz`: of the module, which sends what it has 20 times a second.
+void run_medlab(MedlabProtocol& protocol, ScriptedLink& link, double rate_hz, Instant begin, Duration lasting) {
+  protocol.on_bytes(link, bytes_of({0xF8}), begin);
+  double owed = 0.0;
+  for (Duration t{0}; t < lasting && link.failure.empty(); t += milliseconds(50)) {
+    owed += rate_hz * 0.05;
+    const auto whole = static_cast<std::size_t>(owed);
+    owed -= static_cast<double>(whole);
+    while (link.failure.empty() && protocol.next_time() <= begin + t) protocol.on_time(link, protocol.next_time());
+    protocol.on_bytes(link, std::vector<std::byte>(whole, std::byte{0x81}), begin + t);
+  }
+}
+
+TEST(Medlab, OneThatWasNotToldItsRateIsGivenUpAndTakenAgainOnlyAtTheRightOne) {
+  Received received;
+  MedlabProtocol protocol({}, received.sink(), received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  run_medlab(protocol, link, 100.0, kStart, seconds(10));
+  EXPECT_THAT(link.failure, HasSubstr("100.0 samples come a second, and the protocol has 300"));
+  const std::uint64_t taken = received.health.samples.get();
+  EXPECT_LE(taken, 100U) << "a second";
+
+  // At the next opening it still has not heard it: not a sample is taken, and it is told again.
+  ScriptedLink again;
+  protocol.on_open(again, kStart + seconds(20));
+  EXPECT_EQ(again.sent, "NS0G1");
+  run_medlab(protocol, again, 100.0, kStart + seconds(20), seconds(10));
+  EXPECT_THAT(again.failure, HasSubstr("100.0 samples come a second, and the protocol has 300"));
+  EXPECT_EQ(received.health.samples.get(), taken);
+
+  // One from which nothing comes says nothing of its rate.
+  ScriptedLink off;
+  protocol.on_open(off, kStart + seconds(30));
+  while (off.failure.empty()) protocol.on_time(off, protocol.next_time());
+  EXPECT_THAT(off.failure, HasSubstr("not a byte"));
+
+  ScriptedLink told;
+  protocol.on_open(told, kStart + seconds(40));
+  received.health.set_reason(again.failure);
+  run_medlab(protocol, told, 300.0, kStart + seconds(40), seconds(4));
+  EXPECT_EQ(told.failure, "");
+  EXPECT_EQ(received.health.reason(), "");
+  EXPECT_GE(received.health.samples.get(), taken + 600U);
+  EXPECT_EQ(received.health.state(), DeviceState::kStreaming);
+}
+
+TEST(Medlab, BytesThatHoldNoSampleSayNothingOfItsRate) {
+  Received received;
+  MedlabProtocol protocol({}, received.sink(), received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  run_medlab(protocol, link, 300.0, kStart, seconds(2));
+  for (Duration t{0}; t < seconds(1); t += milliseconds(50)) {
+    protocol.on_bytes(link, bytes_of({0xFA, 0x48}), kStart + seconds(2) + t);
+  }
+  run_medlab(protocol, link, 300.0, kStart + seconds(3), seconds(2));
+  EXPECT_EQ(link.failure, "");
+  EXPECT_GE(received.health.samples.get(), 1190U);
 }
 
 TEST(EcgProtocol, BytesWithoutSenseSuggestTheWrongRateAndNoBytesThatItIsOff) {
@@ -391,6 +453,53 @@ TEST(CountedProtocols, GarbledStreamsGiveNoSampleThatWasNotSent) {
     EXPECT_GT(values.size(), whole * 85 / 100);
     // Delivered and lost together are what the device sent, to the last frames still held back.
     EXPECT_NEAR(static_cast<double>(values.size() + received.health.lost.get()), kFrames, 8);
+  }
+}
+
+TEST(CountedProtocols, ABoardAtAnotherRateIsGivenUpWithThatReason) {
+  for (const Counted& device : kCounted) {
+    for (const double times : {0.1, 0.5, 0.9, 1.1, 2.0}) {
+      SCOPED_TRACE(std::string(device.name) + " " + std::to_string(times));
+      Received received;
+      const auto protocol = device.protocol(received);
+      ScriptedLink link;
+      device.open(*protocol, link);
+      const double period_ns = static_cast<double>(device.period.count()) / times;
+      std::uint64_t taken = 0;
+      for (unsigned i = 0; i * period_ns < 10e9; ++i) {
+        if (link.failure.empty()) taken = received.health.samples.get();
+        protocol->on_bytes(link, device.frame(i, 300), kStart + Duration(std::llround(i * period_ns)));
+      }
+      const double rate_hz = 1e9 / static_cast<double>(device.period.count());
+      EXPECT_THAT(link.failure, HasSubstr(fmt::format("{:.1f} samples come a second, and the protocol has {:g}",
+                                                      times * rate_hz, rate_hz)));
+      EXPECT_EQ(received.health.samples.get(), taken);
+      EXPECT_LT(static_cast<double>(taken), 3.0 * times * rate_hz);
+    }
+  }
+}
+
+// One frame in ten is lost, and every two seconds the link stands still for 0.4 s and gives what came meanwhile at
+// once.
+TEST(CountedProtocols, LostFramesAndBurstsAreNoWrongRate) {
+  for (const Counted& device : kCounted) {
+    SCOPED_TRACE(device.name);
+    std::mt19937 random(5);
+    Received received;
+    const auto protocol = device.protocol(received);
+    ScriptedLink link;
+    device.open(*protocol, link);
+    std::vector<std::byte> waiting;
+    for (unsigned i = 0; i * device.period < seconds(30); ++i) {
+      const Duration measured = i * device.period;
+      if (random() % 10 != 0) append(waiting, device.frame(i, 300));
+      if (measured % seconds(2) < milliseconds(400)) continue;
+      protocol->on_bytes(link, waiting, kStart + measured);
+      waiting.clear();
+    }
+    EXPECT_EQ(link.failure, "");
+    EXPECT_EQ(received.health.reason(), "");
+    EXPECT_GT(received.health.lost.get(), 0U);
   }
 }
 
