@@ -57,7 +57,13 @@ CanEcgDecoder::CanEcgDecoder(const CanEcgSettings& settings, EcgSinks sinks, Dev
     : settings_(settings),
       samples_({.period_ns = 1e9 / settings.sample_rate_hz, .transport_delay = kFrameTime}, std::move(sinks), health),
       health_(health),
-      rate_(settings.sample_rate_hz) {}
+      rate_(settings.sample_rate_hz) {
+  // A bus of another bit rate, and one on which others talk, is as silent as none.
+  health_.set_awaited(fmt::format(
+      "frames of config/perimap_ecg.dbc with the {}-bit identifier 0x{:0{}X} are awaited; are the bit rate, "
+      "the identifier and the module right?",
+      settings.extended ? 29 : 11, settings.identifier, settings.extended ? 8 : 3));
+}
 
 void CanEcgDecoder::restart() noexcept {
   samples_.restart();

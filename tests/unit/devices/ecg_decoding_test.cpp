@@ -962,6 +962,16 @@ TEST(CanEcg, TheControllersWordsAreTold) {
   EXPECT_EQ(received.health.bus_errors.get(), 5U);
 }
 
+TEST(CanEcg, WhatIsAwaitedOnASilentBusIsSaid) {
+  for (const bool extended : {false, true}) {
+    Received received;
+    const CanEcgDecoder decoder({.identifier = 0x2E, .extended = extended}, received.sink(), received.health);
+    EXPECT_THAT(received.health.awaited(),
+                HasSubstr(extended ? "29-bit identifier 0x0000002E" : "11-bit identifier 0x02E"));
+    EXPECT_THAT(received.health.awaited(), HasSubstr("bit rate, the identifier and the module"));
+  }
+}
+
 TEST(CanEcg, SamplesAtAnotherRateThanConfiguredAreNotTakenAndTold) {
   Received received;
   CanEcgDecoder decoder({.sample_rate_hz = 250.0}, received.sink(), received.health);
