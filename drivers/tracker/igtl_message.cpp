@@ -167,6 +167,7 @@ std::optional<std::variant<IgtlMessage, IgtlDamaged>> IgtlFramer::next() {
       return IgtlDamaged{fmt::format("{} message of {} bytes", message.type, size), true};
     }
     if (!is_read(message.type)) {
+      ++passed_over_;
       const std::uint64_t whole = kHeader + size;
       const std::size_t there = static_cast<std::size_t>(std::min<std::uint64_t>(whole, pending_.size()));
       skip_ = whole - there;

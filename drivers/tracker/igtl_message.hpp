@@ -48,9 +48,12 @@ class IgtlFramer {
   void feed(std::span<const std::byte> bytes);
   // The next whole message; none when more bytes must come.
   [[nodiscard]] std::optional<std::variant<IgtlMessage, IgtlDamaged>> next();
+  // How many messages have been, or are being, passed over.
+  [[nodiscard]] std::uint64_t passed_over() const noexcept { return passed_over_; }
 
  private:
   std::vector<std::byte> pending_;
+  std::uint64_t passed_over_ = 0;
   std::uint64_t skip_ = 0;  // bytes of a message that is passed over
 };
 

@@ -9,6 +9,10 @@ namespace perimap {
 namespace {
 
 constexpr Duration kSilentAfter = std::chrono::milliseconds(300);
+// A sensor that is sent less often than this, while other messages come, is out of sight. Shorter than kSilentAfter:
+// the device is not silent then.
+constexpr Duration kAbsentAfter = std::chrono::milliseconds(200);
+constexpr Duration kLongestWait = std::chrono::seconds(2);  // for a tool's first pose
 constexpr Duration kReopenAfter = std::chrono::seconds(2);
 constexpr Duration kListenForOthers = std::chrono::seconds(1);
 constexpr unsigned kStatusOk = 1;
@@ -41,8 +45,12 @@ void IgtlSession::on_open(LinkControl& link, Instant now) {
   reference_follows_ = false;
   held_.reset();
   delivered_ = {};
+  sensor_seen_ = false;
+  reference_seen_ = !settings_.reference;
   last_ = now;
-  any_ = false;
+  heard_ = now;
+  absent_ = false;
+  told_ = false;
   listen_until_ = several_ ? now + kListenForOthers : now;
   server_fault_.clear();
   names_.clear();
@@ -50,6 +58,7 @@ void IgtlSession::on_open(LinkControl& link, Instant now) {
 }
 
 void IgtlSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) {
+  const std::uint64_t passed_over = framer_.passed_over();
   framer_.feed(bytes);
   while (auto next = framer_.next()) {
     if (const auto* damaged = std::get_if<IgtlDamaged>(&*next)) {
@@ -57,12 +66,22 @@ void IgtlSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, 
       if (damaged->lost_track) return link.fail(fmt::format("{}; is it an OpenIGTLink server?", damaged->what));
     } else {
       on_message(link, std::get<IgtlMessage>(*next), arrival);
+      on_sign_of_life(arrival);
     }
   }
+  if (framer_.passed_over() != passed_over) on_sign_of_life(arrival);
+}
+
+// Servers that cannot say that a tool is missing leave its messages out; the others' tell that the server goes on.
+void IgtlSession::on_sign_of_life(Instant arrival) {
+  heard_ = arrival;
+  if (!all_seen() || held_ || arrival < listen_until_) return;
+  if (arrival - std::max(last_, delivered_.arrival) < kAbsentAfter) return;
+  absent_ = true;
+  give({}, arrival, arrival);
 }
 
 void IgtlSession::on_message(LinkControl& link, const IgtlMessage& message, Instant arrival) {
-  if (message.type == "TRANSFORM" || message.type == "POSITION") note_name(message.device);
   if (message.type == "TRANSFORM") return on_pose(link, message, decode_igtl_transform(message.content), arrival);
   if (message.type == "POSITION") return on_pose(link, message, decode_igtl_position(message.content), arrival);
   if (message.type == "TDATA") return on_tdata(link, message, arrival);
@@ -97,6 +116,7 @@ bool IgtlSession::is_sensor(LinkControl& link, const std::string& name, Instant 
 }
 
 void IgtlSession::on_pose(LinkControl& link, const IgtlMessage& message, const Expected<Pose>& pose, Instant arrival) {
+  if (pose) note_name(message.device);
   const bool is_reference = settings_.reference && message.device == *settings_.reference;
   if (!is_reference && !is_sensor(link, message.device, arrival)) return;
   if (!pose) return health_.damaged.add();
@@ -105,6 +125,7 @@ void IgtlSession::on_pose(LinkControl& link, const IgtlMessage& message, const E
     if (key == "TransformStatus" && value != "OK") reading = {};
   }
   const Told told{reading, message.time_stamp, message.time_ns(), arrival};
+  (is_reference ? reference_seen_ : sensor_seen_) = true;
   return is_reference ? on_reference(told) : on_sensor(told);
 }
 
@@ -151,8 +172,14 @@ void IgtlSession::on_tdata(LinkControl& link, const IgtlMessage& message, Instan
   ToolReading reference;
   for (const IgtlTool& tool : *tools) {
     note_name(tool.name);
-    if (settings_.reference && tool.name == *settings_.reference) reference = {ToolState::kOk, tool.X_TO};
-    if (is_sensor(link, tool.name, arrival)) sensor = {ToolState::kOk, tool.X_TO};
+    if (settings_.reference && tool.name == *settings_.reference) {
+      reference = {ToolState::kOk, tool.X_TO};
+      reference_seen_ = true;
+    }
+    if (is_sensor(link, tool.name, arrival)) {
+      sensor = {ToolState::kOk, tool.X_TO};
+      sensor_seen_ = true;
+    }
   }
   if (arrival < listen_until_) return;
   const Told told{sensor, message.time_stamp, message.time_ns(), arrival};
@@ -163,48 +190,70 @@ void IgtlSession::on_tdata(LinkControl& link, const IgtlMessage& message, Instan
 
 void IgtlSession::deliver(const Told& sensor, const Told& reference) {
   delivered_ = sensor;
-  TrackerSample sample;
-  sample.arrival = sensor.arrival;
-  sample.source_time = sensor.arrival;
+  // Not missing: a tool that was never there may have another name.
+  if (!all_seen()) return;
+  absent_ = false;
+  Instant source_time = sensor.arrival;
   if (sensor.stamp != 0) {
     clock_.observe(sensor.time_ns, sensor.arrival);
     health_.jitter.add(clock_.lateness(sensor.time_ns, sensor.arrival));
-    sample.source_time = clock_.stamp(sensor.time_ns);
+    source_time = clock_.stamp(sensor.time_ns);
   }
-  sample.device_frame = count_++;
   const bool near = apart(sensor, reference) <= kReferenceAge;
-  const ToolReading reading = in_world(sensor.reading, near ? reference.reading : ToolReading{}, settings_.world);
+  give(in_world(sensor.reading, near ? reference.reading : ToolReading{}, settings_.world), source_time,
+       sensor.arrival);
+}
+
+void IgtlSession::give(const ToolReading& reading, Instant source_time, Instant arrival) {
+  TrackerSample sample;
+  sample.arrival = arrival;
+  sample.source_time = source_time;
+  sample.device_frame = count_++;
   sample.state = reading.state;
   sample.X_WS = reading.X_TO;
-  last_ = sensor.arrival;
-  any_ = true;
+  if (std::exchange(told_, false)) health_.set_reason(server_fault_);  // what was awaited has come
+  last_ = arrival;
   health_.samples.add();
   health_.set_state(DeviceState::kStreaming);
   sink_(sample);
 }
 
 Instant IgtlSession::next_time() const noexcept {
-  const Instant expected = last_ + (health_.state() == DeviceState::kStreaming ? kSilentAfter : kReopenAfter);
-  return held_ ? std::min(expected, held_->arrival + kLongestHold) : expected;
+  Instant next = heard_ + kReopenAfter;
+  if (may_fall_silent()) next = std::min(next, last_ + kSilentAfter);
+  if (!all_seen() && !told_) next = std::min(next, last_ + kLongestWait);
+  return held_ ? std::min(next, held_->arrival + kLongestHold) : next;
 }
+
+// While the sensor is out of sight the other messages, which may be rare, are what is listened to.
+bool IgtlSession::may_fall_silent() const noexcept { return health_.state() == DeviceState::kStreaming && !absent_; }
 
 void IgtlSession::on_time(LinkControl& link, Instant now) {
   if (held_ && now - held_->arrival >= kLongestHold) {
     reference_follows_ = false;
     deliver(*std::exchange(held_, std::nullopt), reference_);
   }
-  if (now - last_ >= kSilentAfter && health_.state() == DeviceState::kStreaming) {
-    health_.set_state(DeviceState::kSilent);
+  if (may_fall_silent() && now - last_ >= kSilentAfter) health_.set_state(DeviceState::kSilent);
+  if (now - heard_ >= kReopenAfter) return link.fail(all_seen() ? with_fault("nothing came for 2 s") : awaited());
+  if (all_seen() || told_ || now - last_ < kLongestWait) return;
+  told_ = true;
+  health_.set_reason(awaited());
+}
+
+std::string IgtlSession::awaited() const {
+  if (names_.empty()) return with_fault("connected, but no pose of any tool in 2 s");
+  std::vector<std::string> tools;
+  if (!sensor_seen_) {
+    tools.push_back(settings_.sensor.empty() ? "for the sensor" : fmt::format("'{}'", settings_.sensor));
   }
-  if (now - last_ < kReopenAfter) return;
-  // What the server itself complains of is the likelier reason.
-  const std::string why = any_ ? std::string("no pose of the sensor for 2 s")
-                          : settings_.sensor.empty()
-                              ? std::string("connected, but no pose of any tool in 2 s")
-                              : fmt::format("connected, but no pose of '{}' in 2 s", settings_.sensor);
-  link.fail(!server_fault_.empty()             ? fmt::format("{}: {}", why, server_fault_)
-            : any_ || settings_.sensor.empty() ? why
-                                               : why + "; is it the name that the server sends?");
+  if (!reference_seen_) tools.push_back(fmt::format("'{}'", *settings_.reference));
+  return with_fault(fmt::format("no tool {} in 2 s; the server sends {}", fmt::join(tools, " and no tool "),
+                                fmt::join(names_, ", ")));
+}
+
+// What the server itself complains of is the likelier reason.
+std::string IgtlSession::with_fault(std::string why) const {
+  return server_fault_.empty() ? why : fmt::format("{}: {}", why, server_fault_);
 }
 
 }  // namespace perimap

@@ -23,6 +23,11 @@ struct IgtlSettings {
 // at the start (STT_TDATA, every 10 ms) and where a tool that is left out is missing. A message with metadata
 // "TransformStatus" (PLUS, 3D Slicer) other than OK says that the tool is missing. A STATUS that is not OK is told.
 //
+// A tool, sensor or reference, that no message of the connection has named is awaited and not missing: until both are
+// there nothing is delivered, and after 2 s the reason tells what the server sends instead. Once there, a sensor of
+// which nothing has come for 200 ms while other messages come is missing, at most every 200 ms: TRANSFORM and POSITION
+// of header 1 are left out while it is out of sight. The link fails when nothing at all comes for 2 s.
+//
 // A reference is of the sensor's instant by the server's stamps, whichever is sent first; where no reference has the
 // sensor's own stamp, the nearest within 100 ms counts. Without stamps arrivals count in their place.
 //
@@ -59,6 +64,13 @@ class IgtlSession final : public DeviceProtocol {
   void on_sensor(const Told& sensor);
   void on_reference(const Told& reference);
   void deliver(const Told& sensor, const Told& reference);
+  void give(const ToolReading& reading, Instant source_time, Instant arrival);
+  void on_sign_of_life(Instant arrival);
+  [[nodiscard]] bool all_seen() const noexcept { return sensor_seen_ && reference_seen_; }
+  [[nodiscard]] bool may_fall_silent() const noexcept;
+  // Which tools have not come, and what has.
+  [[nodiscard]] std::string awaited() const;
+  [[nodiscard]] std::string with_fault(std::string why) const;
 
   IgtlSettings settings_;
   TrackerSink sink_;
@@ -69,10 +81,15 @@ class IgtlSession final : public DeviceProtocol {
   // Servers that send the sensor before the reference of the same instant: the sensor then waits for it.
   bool reference_follows_ = false;
   std::optional<Told> held_;
-  Told delivered_;  // of the sensor, the last
+  Told delivered_;  // of the sensor, the last; withheld while the reference is awaited
+  // In this connection.
+  bool sensor_seen_ = false;
+  bool reference_seen_ = false;  // or none is asked for
   std::uint32_t count_ = 0;
-  Instant last_{};  // reading, or the opening
-  bool any_ = false;
+  Instant last_{};                  // reading, or the opening
+  Instant heard_{};                 // any message that is not damaged, or the opening
+  bool absent_ = false;             // nothing comes of the sensor, but other messages do
+  bool told_ = false;               // what is awaited
   std::vector<std::string> names_;  // of what poses came of, in this connection
   std::string only_tool_;           // that came first, when the settings name no sensor; no other takes its place later
   bool several_ = false;            // tools have come; of earlier connections too

@@ -333,7 +333,7 @@ TEST(IgtlSession, OtherToolsAreNotTheSensor) {
   Theatre theatre({.sensor = "Probe", .reference = std::nullopt, .world = {}}, {});
   theatre.run(seconds(5));
   EXPECT_TRUE(theatre.samples.empty());
-  EXPECT_THAT(theatre.host.failure, HasSubstr("no pose of 'Probe'"));
+  EXPECT_EQ(theatre.health.reason(), "no tool 'Probe' in 2 s; the server sends Scope");
 }
 
 TEST(IgtlSession, WhatTheServerComplainsOfIsTheReasonWhenNoPoseComes) {
@@ -352,10 +352,13 @@ TEST(IgtlSession, WhatTheServerComplainsOfIsTheReasonWhenNoPoseComes) {
     };
     status(13);
     if (recovered) status(1);
+    session.on_time(link, kStart + seconds(2));
+    EXPECT_EQ(link.failure, "") << "the server spoke 1.99 s ago";
     session.on_time(link, session.next_time());
-    EXPECT_THAT(link.failure, HasSubstr("no pose of 'Scope'"));
-    EXPECT_EQ(link.failure.find("Server reports status 13 no camera") != std::string::npos, !recovered);
-    EXPECT_EQ(link.failure.find("is it the name") != std::string::npos, recovered);
+    for (const std::string& told : {health.reason(), link.failure}) {
+      EXPECT_THAT(told, HasSubstr("no pose of any tool"));
+      EXPECT_EQ(told.find("Server reports status 13 no camera") != std::string::npos, !recovered);
+    }
   }
 }
 
@@ -371,7 +374,8 @@ TEST(IgtlSession, MeasuresRelativeToTheReferenceWhileThatIsFresh) {
   const auto say = [&](const std::string& name, const Pose& X, std::uint64_t stamp, Instant arrival) {
     session.on_bytes(link, encode_igtl({1, "TRANSFORM", name, stamp, encode_igtl_transform(X), {}}), arrival);
   };
-  say("Scope", kPose, 1ULL << 32U, kStart);
+  say("Patient", X_TR, 1ULL << 32U, kStart - milliseconds(200));
+  say("Scope", kPose, (1ULL << 32U) + (1ULL << 30U), kStart);
   say("Patient", X_TR, 2ULL << 32U, kStart + milliseconds(10));
   say("Scope", kPose, 2ULL << 32U, kStart + milliseconds(11));
   say("Scope", kPose, 3ULL << 32U, kStart + milliseconds(500));
@@ -396,6 +400,13 @@ struct Listener {
   void transform(const std::string& name, Duration at, const Pose& X = kPose, std::uint64_t stamp = 0) {
     send("TRANSFORM", name, encode_igtl_transform(X), at, stamp);
   }
+  void let_time_pass(Duration until) {
+    while (link.failure.empty() && session.next_time() <= kStart + until) {
+      const Instant next = session.next_time();
+      session.on_time(link, next);
+      ASSERT_TRUE(!link.failure.empty() || session.next_time() > next) << "it would be called without end";
+    }
+  }
 
   std::vector<TrackerSample> samples;
   DeviceHealth health;
@@ -414,15 +425,13 @@ TEST(IgtlSession, APoseIsRelativeToTheReferenceOfItsOwnInstantWhicheverIsSentFir
         const Pose X_TR{Matrix3d::Identity(), Vector3d(10.0 * i, 0, 0)};
         const Duration at = milliseconds(20 * i);
         const std::size_t given = listener.samples.size();
+        const bool awaited = i == 0 && scope_first;
         if (scope_first) listener.transform("Scope", at, kPose, stamp);
         listener.transform("Patient", at + milliseconds(1), X_TR, stamp + between);
         if (!scope_first) listener.transform("Scope", at + milliseconds(2), kPose, stamp);
-        ASSERT_EQ(listener.samples.size(), given + 1);
+        ASSERT_EQ(listener.samples.size(), given + (awaited ? 0 : 1)) << "nothing before the first reference";
+        if (awaited) continue;
         const TrackerSample& sample = listener.samples.back();
-        if (i == 0 && scope_first) {
-          EXPECT_EQ(sample.state, ToolState::kMissing) << "before any reference";
-          continue;
-        }
         ASSERT_EQ(sample.state, ToolState::kOk);
         EXPECT_NEAR(sample.X_WS.t[0], kPose.t[0] - 10.0 * i, 1e-3);
         EXPECT_EQ(sample.arrival, kStart + at + milliseconds(scope_first ? 0 : 2));
@@ -438,17 +447,17 @@ TEST(IgtlSession, AReferenceThatStaysAwayHoldsUpOnePoseForTwentyMilliseconds) {
     listener.transform("Scope", milliseconds(20 * i), kPose, stamp(i));
     listener.transform("Patient", milliseconds(20 * i + 1), Pose{}, stamp(i));
   }
-  ASSERT_EQ(listener.samples.size(), 10U);
+  ASSERT_EQ(listener.samples.size(), 9U) << "the first came before any reference";
   listener.transform("Scope", milliseconds(200), kPose, stamp(10));
-  EXPECT_EQ(listener.samples.size(), 10U);
+  EXPECT_EQ(listener.samples.size(), 9U);
   EXPECT_EQ(listener.session.next_time(), kStart + milliseconds(220));
   listener.session.on_time(listener.link, kStart + milliseconds(220));
-  ASSERT_EQ(listener.samples.size(), 11U);
+  ASSERT_EQ(listener.samples.size(), 10U);
   EXPECT_EQ(listener.samples.back().state, ToolState::kOk) << "the last reference is 20 ms old";
   EXPECT_EQ(listener.health.state(), DeviceState::kStreaming);
   for (int i = 11; i < 20; ++i) {
     listener.transform("Scope", milliseconds(20 * i), kPose, stamp(i));
-    ASSERT_EQ(listener.samples.size(), static_cast<std::size_t>(i + 1));
+    ASSERT_EQ(listener.samples.size(), static_cast<std::size_t>(i));
     EXPECT_EQ(listener.samples.back().state, i < 15 ? ToolState::kOk : ToolState::kMissing) << i;
   }
 }
@@ -483,14 +492,174 @@ TEST(IgtlSession, WithoutANameTdataMustHoldOneToolBesideTheReference) {
   const auto tdata = [](std::vector<IgtlTool> tools) { return encode_igtl_tdata(tools); };
   Listener listener({.sensor = "", .reference = "Patient", .world = {}});
   listener.send("TDATA", "Tracker", tdata({{"Patient", X_TR}}), milliseconds(10));
-  ASSERT_EQ(listener.samples.size(), 1U);
-  EXPECT_EQ(listener.samples[0].state, ToolState::kMissing) << "the reference is not the sensor";
+  EXPECT_EQ(listener.samples.size(), 0U) << "the reference is not the sensor";
   listener.send("TDATA", "Tracker", tdata({{"Patient", X_TR}, {"Scope", kPose}}), milliseconds(20));
-  ASSERT_EQ(listener.samples.size(), 2U);
-  EXPECT_LT((listener.samples[1].X_WS.t - (X_TR.inverse() * kPose).t).norm(), 1e-5);
+  ASSERT_EQ(listener.samples.size(), 1U);
+  EXPECT_LT((listener.samples[0].X_WS.t - (X_TR.inverse() * kPose).t).norm(), 1e-5);
   listener.send("TDATA", "Tracker", tdata({{"Scope", kPose}, {"Pointer", X_TR}}), milliseconds(30));
-  EXPECT_EQ(listener.samples.size(), 2U);
+  EXPECT_EQ(listener.samples.size(), 1U);
   EXPECT_THAT(listener.link.failure, HasSubstr("several tools ('Scope', 'Pointer')"));
+}
+
+TEST(IgtlSession, AToolThatNeverCameIsAwaitedAndNotMissing) {
+  const std::vector<IgtlTool> sent{{"Probe", kPose}, {"Patient", kPose}};
+  struct Case {
+    const char* sensor;
+    std::optional<std::string> reference;
+    const char* reason;
+  };
+  const Case cases[] = {
+      {"Wrong", std::nullopt, "no tool 'Wrong' in 2 s; the server sends Probe, Patient"},
+      {"Probe", "Wrong", "no tool 'Wrong' in 2 s; the server sends Probe, Patient"},
+      {"Wrong", "Other", "no tool 'Wrong' and no tool 'Other' in 2 s; the server sends Probe, Patient"},
+  };
+  for (const bool tdata : {true, false}) {
+    for (const Case& c : cases) {
+      SCOPED_TRACE(c.reason);
+      Listener listener({.sensor = c.sensor, .reference = c.reference, .world = {}});
+      listener.health.set_state(DeviceState::kStarting);
+      for (int i = 0; i < 500; ++i) {
+        const Duration at = milliseconds(10 * i);
+        if (tdata) {
+          listener.send("TDATA", "Tracker", encode_igtl_tdata(sent), at, (1ULL << 32U) + static_cast<unsigned>(i));
+        } else {
+          for (const IgtlTool& tool : sent) listener.transform(tool.name, at);
+        }
+        listener.let_time_pass(at);
+        ASSERT_EQ(listener.health.reason(), i < 200 ? "" : c.reason);
+      }
+      EXPECT_TRUE(listener.samples.empty());
+      EXPECT_EQ(listener.health.state(), DeviceState::kStarting);
+      EXPECT_EQ(listener.link.failure, "");
+    }
+  }
+}
+
+TEST(IgtlSession, AToolThatComesLateIsMissingOnlyFromThenOnAndAwaitedAgainInTheNextConnection) {
+  const auto tdata = [](std::vector<IgtlTool> tools) { return encode_igtl_tdata(tools); };
+  Listener listener({.sensor = "Scope", .reference = "Patient", .world = {}});
+  for (int i = 0; i < 300; ++i) {
+    listener.send("TDATA", "Tracker", tdata({{"Patient", kPose}}), milliseconds(10 * i));
+    listener.let_time_pass(milliseconds(10 * i));
+  }
+  EXPECT_TRUE(listener.samples.empty());
+  EXPECT_THAT(listener.health.reason(), HasSubstr("no tool 'Scope'"));
+  listener.send("TDATA", "Tracker", tdata({{"Patient", kPose}, {"Scope", kPose}}), milliseconds(3000));
+  listener.send("TDATA", "Tracker", tdata({{"Patient", kPose}}), milliseconds(3010));
+  listener.send("TDATA", "Tracker", tdata({{"Scope", kPose}}), milliseconds(3020));
+  ASSERT_EQ(listener.samples.size(), 3U);
+  EXPECT_EQ(listener.samples[0].state, ToolState::kOk);
+  EXPECT_EQ(listener.samples[1].state, ToolState::kMissing);
+  EXPECT_EQ(listener.samples[2].state, ToolState::kMissing);
+  EXPECT_EQ(listener.health.state(), DeviceState::kStreaming);
+  EXPECT_EQ(listener.health.reason(), "");
+  listener.session.on_open(listener.link, kStart + seconds(4));
+  listener.send("TDATA", "Tracker", tdata({{"Patient", kPose}}), milliseconds(4010));
+  listener.send("TDATA", "Tracker", tdata({{"Scope", kPose}}), milliseconds(4020));
+  ASSERT_EQ(listener.samples.size(), 4U) << "each tool has been seen, though not at once";
+  EXPECT_EQ(listener.samples[3].state, ToolState::kMissing);
+}
+
+TEST(IgtlSession, ASensorThatGoesBeforeTheReferenceComesIsMissing) {
+  Listener listener({.sensor = "Scope", .reference = "Patient", .world = {}});
+  listener.transform("Scope", milliseconds(0));
+  for (int i = 0; i < 200; ++i) {
+    const Duration at = milliseconds(1000 + 20 * i);
+    listener.let_time_pass(at);
+    listener.transform("Patient", at);
+  }
+  EXPECT_GE(listener.samples.size(), 18U);
+  for (const TrackerSample& sample : listener.samples) EXPECT_EQ(sample.state, ToolState::kMissing);
+  EXPECT_EQ(listener.health.state(), DeviceState::kStreaming);
+  EXPECT_EQ(listener.health.reason(), "");
+}
+
+TEST(IgtlSession, AReferenceThatComesLateMakesNoPoseMissing) {
+  Listener listener({.sensor = "Scope", .reference = "Patient", .world = {}});
+  for (int i = 0; i < 100; ++i) {
+    listener.transform("Scope", milliseconds(20 * i));
+    if (i >= 50) listener.transform("Patient", milliseconds(20 * i + 1));
+  }
+  EXPECT_EQ(listener.samples.size(), 49U);
+  for (const TrackerSample& sample : listener.samples) EXPECT_EQ(sample.state, ToolState::kOk);
+}
+
+// Header 1: what is out of sight is not sent.
+TEST(IgtlSession, AToolOutOfSightIsMissingWhileAnythingElseComes) {
+  std::vector<std::byte> well(30);
+  well[1] = std::byte{1};
+  struct Case {
+    const char* type;
+    const char* name;
+    std::vector<std::byte> content;
+    Duration every;
+    std::size_t least;  // readings in 10 s
+    std::size_t most;
+  };
+  const Case cases[] = {
+      {"TRANSFORM", "Patient", encode_igtl_transform(kPose), milliseconds(20), 45, 50},
+      {"TDATA", "Tracker", encode_igtl_tdata(std::vector<IgtlTool>{{"Patient", kPose}}), milliseconds(20), 500, 501},
+      {"STATUS", "Server", well, seconds(1), 9, 11},
+      {"IMAGE", "Ultrasound", std::vector<std::byte>(500), milliseconds(100), 45, 51},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.type);
+    Listener listener({.sensor = "Scope", .reference = "Patient", .world = {}});
+    listener.transform("Patient", milliseconds(0));
+    listener.transform("Scope", milliseconds(10));
+    ASSERT_EQ(listener.samples.size(), 1U);
+    Duration at = milliseconds(10);
+    while (at < seconds(10)) {
+      at += c.every;
+      listener.let_time_pass(at);
+      listener.send(c.type, c.name, c.content, at);
+      ASSERT_EQ(listener.link.failure, "");
+      ASSERT_TRUE(at <= seconds(2) || listener.health.state() == DeviceState::kStreaming);
+    }
+    EXPECT_GE(listener.samples.size(), 1 + c.least);
+    EXPECT_LE(listener.samples.size(), 1 + c.most);
+    for (std::size_t i = 1; i < listener.samples.size(); ++i) {
+      ASSERT_EQ(listener.samples[i].state, ToolState::kMissing);
+      ASSERT_GT(listener.samples[i].source_time, listener.samples[i - 1].source_time);
+    }
+    // Back in sight, over the same link.
+    listener.transform("Patient", at + milliseconds(1));
+    listener.transform("Scope", at + milliseconds(2));
+    EXPECT_EQ(listener.samples.back().state, ToolState::kOk);
+    // Nothing at all.
+    listener.let_time_pass(at + milliseconds(301));
+    EXPECT_EQ(listener.health.state(), DeviceState::kStreaming);
+    listener.let_time_pass(at + milliseconds(302));
+    EXPECT_EQ(listener.health.state(), DeviceState::kSilent);
+    listener.let_time_pass(at + milliseconds(2001));
+    EXPECT_EQ(listener.link.failure, "");
+    listener.let_time_pass(at + milliseconds(2002));
+    EXPECT_THAT(listener.link.failure, HasSubstr("nothing came for 2 s"));
+  }
+}
+
+TEST(IgtlSession, ATrackedToolIsNeverMissingBetweenTwoOfItsPoses) {
+  Listener listener({.sensor = "Scope", .reference = "Patient", .world = {}});
+  for (int i = 0; i < 500; ++i) {
+    listener.transform("Patient", milliseconds(10 * i));
+    listener.transform("Pointer", milliseconds(10 * i + 1));
+    if (i % 10 == 0) listener.transform("Scope", milliseconds(10 * i + 2));
+  }
+  EXPECT_EQ(listener.samples.size(), 50U);
+  for (const TrackerSample& sample : listener.samples) EXPECT_EQ(sample.state, ToolState::kOk);
+}
+
+TEST(IgtlSession, AServerWhoseMessagesAreAllDamagedIsGivenUp) {
+  Listener listener({.sensor = "Scope", .reference = std::nullopt, .world = {}});
+  listener.transform("Scope", milliseconds(0));
+  auto damaged = encode_igtl({1, "TRANSFORM", "Scope", 0, encode_igtl_transform(kPose), {}});
+  damaged.back() ^= std::byte{1};
+  for (int i = 1; i < 250; ++i) {
+    listener.session.on_bytes(listener.link, damaged, kStart + milliseconds(10 * i));
+    listener.let_time_pass(milliseconds(10 * i));
+    ASSERT_EQ(listener.link.failure.empty(), i < 200);
+  }
+  EXPECT_EQ(listener.samples.size(), 1U);
 }
 
 TEST(IgtlSession, DamagedMessagesGiveNoPose) {
