@@ -87,6 +87,17 @@ printf 'version = 1\n[tracker]\nprotocol = "ndi"\nport = "tcp:127.0.0.1:%d"\n' $
 [ $? -eq 1 ] && grep -q "why .*no answer yet to INIT:" "$work/deaf" && grep -q "faults .*0 damaged" "$work/deaf" ||
   fail "a tracker that says nothing: $(cat "$work/deaf")"
 
+# A server that does not send the tool that is asked for.
+"$perimap" emulate igtl=tcp:127.0.0.1:$((port + 3)) --igtl-message tdata > "$work/igtl" 2>&1 &
+emulators="$emulators $!"
+for _ in $(seq 100); do
+  grep -q ' at ' "$work/igtl" && break
+  sleep 0.1
+done
+printf 'version = 1\n[tracker]\nprotocol = "igtl"\nport = "tcp:127.0.0.1:%d"\nsensor = "Wrong"\n' $((port + 3)) > "$work/name.toml"
+"$perimap" probe "$work/name.toml" --seconds 3 > "$work/name" 2>&1
+[ $? -eq 1 ] && grep -q "why .*no tool 'Wrong' in 2 s; the server sends Scope" "$work/name" || fail "a tool that is not sent: $(cat "$work/name")"
+
 printf 'version = 1\n[camera]\ndevice = "video:none.avi"\n' > "$work/wrong.toml"
 "$perimap" probe "$work/wrong.toml" > "$work/out" 2>&1
 [ $? -eq 2 ] && grep -q "none.avi, which is not there" "$work/out" || fail "a missing video: $(cat "$work/out")"
