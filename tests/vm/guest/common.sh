@@ -1,4 +1,5 @@
 # For the guest's scripts: the installed package, devices, what a subscriber receives.
+. /vm/until_true.sh
 cd /tmp || exit 1
 mkdir -m 755 /run/emulated
 
@@ -100,14 +101,4 @@ holds() {
   else
     fail "$2: $3 does not hold of $(tail -n 1 "$1")"
   fi
-}
-
-# until_true SECONDS COMMAND...
-until_true() {
-  local limit=$((SECONDS + $1))
-  shift
-  until "$@" > /dev/null 2>&1; do
-    [ $SECONDS -lt $limit ] || return 1
-    sleep 0.2
-  done
 }

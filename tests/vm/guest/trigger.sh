@@ -1,6 +1,8 @@
 # An R trigger's line, for the guest's scripts: a USB serial gadget at a bus of the kernel's own. While its end is open,
 # the other end, /dev/ttyACM0, sees carrier.
 
+. /vm/until_true.sh
+
 # trigger_line ON_S OFF_S: pulses so long, with such pauses; $beats is the process that makes them. The USB device is
 # $trigger_usb: while its `authorized` there is 0 the kernel has taken the port away, as when its plug is pulled. (The
 # gadget's own `soft_connect` does not bring it back on this bus.)
