@@ -74,8 +74,7 @@ bool EcgProtocol::expect_rate(LinkControl& link, Instant arrival) {
 std::string EcgProtocol::wrong_rate() const {
   return fmt::format(
       "{:.1f} samples come a second, and the protocol has {:g}: none can be stamped; was the command that sets the "
-      "rate "
-      "lost, or does the line lose bytes?",
+      "rate lost, or does the line lose bytes?",
       rate_.seen_hz(), sample_rate_hz_);
 }
 

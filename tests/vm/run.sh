@@ -87,7 +87,7 @@ for kernel in "${kernels[@]}"; do
     exchange=$folder/$test-$kernel
     rm -rf "$exchange"
     mkdir -p "$exchange"
-    cp "$vm_guest"/{common.sh,trigger.sh,camera.yaml} "$exchange/"
+    cp "$vm_guest"/{common.sh,trigger.sh,until_true.sh,camera.yaml} "$exchange/"
     # The guest has a /tmp of its own, and the build may lie in there.
     mkdir "$exchange/bin"
     cp "$build"/tests/vm/{hold_thread,same_frames,pulled_device} "$build/daemon/perimap" "$exchange/bin/"
