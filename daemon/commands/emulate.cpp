@@ -58,6 +58,10 @@ struct Options {
   NdiEmulatorSettings ndi{.wired_tools = 1};
   IgtlEmulatorSettings igtl;
   CanEcgSettings can;
+  std::vector<const CLI::Option*> can_options = {};
+  [[nodiscard]] bool can_given() const {
+    return std::any_of(can_options.begin(), can_options.end(), [](const auto* option) { return option->count() > 0; });
+  }
 };
 
 struct Device {
@@ -114,6 +118,19 @@ Expected<void> check_faults(const Device& device, const EmulatorFaults& faults) 
   if (faults.bad_check > 0.0 && (can || camera)) return refuse("--bad-check", can ? kWholeFrames : kPictures);
   if (faults.garbled > 0.0 && (can || camera)) return refuse("--garbled", can ? kWholeFrames : kPictures);
   if (faults.truncated > 0.0 && can) return refuse("--truncated", kWholeFrames);
+  return {};
+}
+
+Expected<void> check_can_frame(const Options& options, const std::vector<Device>& devices) {
+  const auto is_can = [](const Device& device) { return device.name == "can-ecg"; };
+  if (options.can_given() && std::none_of(devices.begin(), devices.end(), is_can)) {
+    return fail("--can-...: expected the device 'can-ecg'");
+  }
+  constexpr std::uint32_t kLargestOf11Bits = 0x7FF;
+  if (!options.can.extended && options.can.identifier > kLargestOf11Bits) {
+    return fail(fmt::format("--can-identifier: expected at most 0x7FF without --can-extended, got 0x{:X}",
+                            options.can.identifier));
+  }
   return {};
 }
 
@@ -251,6 +268,7 @@ int run(Options& options) {
   spans(options.missing_s, options.faults.missing_every, options.faults.missing_for);
   spans(options.unplug_s, options.faults.unplug_every, options.faults.unplug_for);
   options.faults.seed = options.simulation.seed();
+  if (const auto frame = check_can_frame(options, devices); !frame) return complain(frame.error(), 2);
 
   if (!options.ndi_reference.empty()) {
     const auto reference = reference_of(options.ndi_reference);
@@ -345,6 +363,17 @@ void add_emulate_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1U, 2U))
       ->capture_default_str();
   command->add_option("--igtl-tool", options->igtl.tool, "Name of the tool")->capture_default_str();
+  options->can_options = {
+      command->add_option("--can-identifier", options->can.identifier, "Of the frames over CAN, as 736 or 0x2E0")
+          ->check(CLI::Range(0U, 0x1FFFFFFFU))
+          ->capture_default_str(),
+      command->add_flag("--can-extended", options->can.extended, "That identifier has 29 bits"),
+      command->add_option("--can-rate", options->can.sample_rate_hz, "Samples a second over CAN")
+          ->check(CLI::Range(50.0, 4000.0))
+          ->capture_default_str(),
+      command->add_option("--can-count", options->can.count_mV, "mV that a count of these samples stands for")
+          ->check(CLI::Range(1e-6, 1000.0))
+          ->capture_default_str()};
   // One heart for all devices; where a camera is to see it, for so long as --duration says.
   options->simulation.add_to(*command->add_option_group("Simulated heart"));
   command->callback([options, &exit_code] { exit_code = run(*options); });

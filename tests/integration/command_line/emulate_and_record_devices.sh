@@ -29,6 +29,8 @@ done
 for option in --bad-check --garbled; do
   refused "device 'camera': cannot do $option" camera=v4l2:/dev/video-that-is-not-there $option 0.1
 done
+refused "--can-...: expected the device 'can-ecg'" ndi=tcp:127.0.0.1:$port --can-rate 500
+refused "--can-identifier: expected at most 0x7FF without --can-extended, got 0x800" can-ecg=can:none --can-identifier 0x800
 refused "device 'ndi': listens on this host alone" ndi=tcp:192.0.2.7:$port
 refused "--ndi-reference: expected a rotation" ndi=tcp:127.0.0.1:$port --ndi-reference 0 0 -500 1 1 0 0
 

@@ -40,7 +40,8 @@ device_nodes() {
 
 # Tracker and ECG of a simulated heart. The pseudo-terminal belongs to the service's group, as udev would have it.
 devices_emulated() {
-  perimap emulate ndi=/run/emulated/tracker can-ecg=can:vcan0 "$@" > /tmp/emulators 2>&1 &
+  perimap emulate ndi=/run/emulated/tracker can-ecg=can:vcan0 \
+    --can-identifier 0x18FF02E0 --can-extended --can-rate 500 --can-count 0.01 "$@" > /tmp/emulators 2>&1 &
   emulators=$!
   for _ in $(seq 300); do
     [ ! -e /run/emulated/tracker ] || break
@@ -64,6 +65,10 @@ port = "/run/emulated/tracker"
 [ecg]
 protocol = "can"
 port = "can:vcan0"
+can_identifier = 0x18FF02E0
+can_extended = true
+can_sample_rate_hz = 500
+count_mV = 0.01
 END
   chgrp perimap /etc/perimap/perimapd.toml /etc/perimap/camera.yaml
   perimap check /etc/perimap/perimapd.toml > /dev/null || fail "the configuration is refused"
