@@ -22,6 +22,7 @@
 #include "daemon/commands/simulate.hpp"
 #include "daemon/commands/simulation_options.hpp"
 #include "daemon/process/stop_signal.hpp"
+#include "drivers/ecg/can_ecg.hpp"
 #include "drivers/emulator/camera_emulator.hpp"
 #include "drivers/emulator/can_ecg_emulator.hpp"
 #include "drivers/emulator/ecg_emulator.hpp"
@@ -126,9 +127,9 @@ Expected<void> check_can_frame(const Options& options, const std::vector<Device>
   if (options.can_given() && std::none_of(devices.begin(), devices.end(), is_can)) {
     return fail("--can-...: expected the device 'can-ecg'");
   }
-  constexpr std::uint32_t kLargestOf11Bits = 0x7FF;
-  if (!options.can.extended && options.can.identifier > kLargestOf11Bits) {
-    return fail(fmt::format("--can-identifier: expected at most 0x7FF without --can-extended, got 0x{:X}",
+  constexpr std::uint32_t kLargest = CanEcgSettings::kLargestStandardIdentifier;
+  if (!options.can.extended && options.can.identifier > kLargest) {
+    return fail(fmt::format("--can-identifier: expected at most 0x{:X} without --can-extended, got 0x{:X}", kLargest,
                             options.can.identifier));
   }
   return {};

@@ -111,10 +111,10 @@ int run(const Options& options) {
   const SessionRecorder::Summary summary = ended.summary();
   if (summary.stopped) return complain({ended.reason()}, 1);
   const std::uint64_t lost = summary.frames_not_recorded + summary.other_not_recorded;
+  if (lost > 0) return complain({fmt::format("{} messages found no room: the disk did not keep up", lost)}, 1);
   if (summary.recorded == 0) {
     return complain({fmt::format("no device gave anything: perimap probe {} says why", options.configuration)}, 1);
   }
-  if (lost > 0) return complain({fmt::format("{} messages found no room: the disk did not keep up", lost)}, 1);
   return 0;
 }
 

@@ -4,10 +4,12 @@
 
 #include <array>
 #include <charconv>
+#include <cstdint>
 #include <utility>
 
 #include "daemon/config/ecg_inputs.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/ecg/can_ecg.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/text_file/text_file.hpp"
 #include "drivers/transport/camera_endpoint.hpp"
@@ -166,8 +168,10 @@ Expected<EcgDevice> ecg_device(const Configuration& configuration) {
   if (const auto input = wrong_input(configuration)) {
     return wrong(fmt::format("{}.{}", input->section, input->key), input->expected, input->got);
   }
-  if (!c.can_extended && c.can_identifier > 0x7FF) {
-    return wrong("ecg.can_identifier", "at most 2047 with 11 bits", fmt::format("{}", c.can_identifier));
+  constexpr std::uint32_t kLargest = CanEcgSettings::kLargestStandardIdentifier;
+  if (!c.can_extended && static_cast<std::uint32_t>(c.can_identifier) > kLargest) {
+    return wrong("ecg.can_identifier", fmt::format("at most {} with 11 bits", kLargest),
+                 fmt::format("{}", c.can_identifier));
   }
   return EcgDevice{std::move(*endpoint), c, configuration.respiration.device_channel};
 }

@@ -12,6 +12,8 @@
 namespace perimap {
 
 struct CanEcgSettings {
+  static constexpr std::uint32_t kLargestStandardIdentifier = 0x7FF;  // of 11 bits; an extended one has 29
+
   std::uint32_t identifier = 0x2E0;
   bool extended = false;
   double sample_rate_hz = 360.0;
