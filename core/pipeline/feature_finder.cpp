@@ -1,10 +1,13 @@
 #include "core/pipeline/feature_finder.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <utility>
 
 #include "core/realtime/realtime_scope.hpp"
+#include "core/vision/feature_detector.hpp"
+#include "core/vision/instrument_mask.hpp"
 
 namespace perimap {
 namespace {
@@ -20,28 +23,50 @@ constexpr int with_spare(int wanted) { return 2 * wanted; }
 FeatureFinder::FeatureFinder(const PipelineSettings& settings, PipelineCounters& counters)
     : width_(settings.camera.width),
       height_(settings.camera.height),
-      interval_(std::max(settings.features.detection_interval_frames, kFinderDelayFrames + 1)),
+      bands_(bands_of(width_, height_)),
+      interval_(static_cast<std::uint64_t>(
+          std::max(settings.features.detection_interval_frames / bands_, kFinderDelayFrames + 1))),
       lockstep_(settings.lockstep),
+      min_distance_px_(settings.features.minimum_distance_px),
+      maximum_(settings.features.maximum),
       counters_(counters),
       steps_(kFinderDelayFrames) {
-  detector_.min_distance_px = settings.features.minimum_distance_px;
   for (Frame& frame : frames_) {
     frame.pixels.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   }
+  bgr_.resize(static_cast<std::size_t>(3 * reduced_side(width_)) * static_cast<std::size_t>(reduced_side(height_)));
   occupied_.reserve(static_cast<std::size_t>(settings.features.maximum));
   found_.reserve(kMaximumPerRound);
 }
 
+bool FeatureFinder::may_begin(std::uint64_t frame_index, const ColourImage& colour) noexcept {
+  // Not every frame of a colour camera has to come with colour; one that has none any more is not waited for for ever.
+  constexpr std::uint64_t kColourFrames = 60;
+  const bool coloured = colour.bgr != nullptr;
+  if (coloured) colour_until_ = frame_index + kColourFrames;
+  return frame_index >= next_round_at_ && (coloured || frame_index >= colour_until_);
+}
+
 void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, const GreyImage& image,
-                          std::span<const Vector2d> occupied, int wanted) noexcept {
+                          const ColourImage& colour, std::span<const Vector2d> occupied, int wanted) noexcept {
+  const bool may = may_begin(frame_index, colour);
   if (!active_) {
-    if (wanted <= 0 || frame_index % static_cast<std::uint64_t>(interval_) != 0) return;
+    if (wanted <= 0 || !may) return;
     active_ = true;
     begun_at_ = frame_index;
+    next_round_at_ = frame_index + interval_;
     // Relaxed: housekeeping sets it again only after it has popped this round's steps, and the ring orders that.
     done_.store(false, std::memory_order_relaxed);
     occupied_.assign(occupied.begin(), occupied.end());
-    wanted_ = std::min(with_spare(wanted), static_cast<int>(kMaximumPerRound));
+    // Of each band its share, so that the first ones do not take all places.
+    const int share = (with_spare(maximum_) + bands_ - 1) / bands_;
+    wanted_ = std::min({with_spare(wanted), share, static_cast<int>(kMaximumPerRound)});
+    band_ = (band_ + 1) % bands_;
+    coloured_ = colour.bgr != nullptr;
+    const auto row_bytes = static_cast<std::size_t>(3 * reduced_side(width_));
+    for (std::size_t y = 0; coloured_ && y < static_cast<std::size_t>(reduced_side(height_)); ++y) {
+      std::memcpy(bgr_.data() + y * row_bytes, colour.row(static_cast<int>(y)), row_bytes);
+    }
   }
   const std::uint64_t step = frame_index - begun_at_;
   if (step >= frames_.size()) return;
@@ -100,18 +125,45 @@ void FeatureFinder::work(int step) noexcept {
   if (lockstep_) finished_.post();
 }
 
+Expected<std::vector<Vector2d>> FeatureFinder::corners(const GreyImage& image, const DetectorSettings& detector) const {
+  GreyImage barred;
+  std::vector<std::uint8_t> mask;
+  if (coloured_) {
+    const int stride = 3 * reduced_side(width_);
+    auto found = find_instruments({bgr_.data(), reduced_side(width_), reduced_side(height_), stride}, width_, height_);
+    if (!found) return tl::unexpected(std::move(found.error()));
+    mask = *std::move(found);
+    barred = {mask.data(), width_, height_, width_};
+  }
+  const RowRange band = rows_of_band(height_, band_, bands_);
+  DetectorSettings strong = detector;
+  strong.min_corner = std::max(detector.min_corner, DetectorSettings{}.min_corner);
+  auto found = find_features(image, occupied_, strong, wanted_, barred, band);
+  // Weak corners are followed less exactly than their matches say: only where strong ones are too few.
+  if (!found || with_spare(static_cast<int>(found->size())) >= wanted_) return found;
+  std::vector<Vector2d> taken = occupied_;
+  taken.insert(taken.end(), found->begin(), found->end());
+  const auto weak = find_features(image, taken, detector, wanted_ - static_cast<int>(found->size()), barred, band);
+  if (!weak) return weak;
+  found->insert(found->end(), weak->begin(), weak->end());
+  return found;
+}
+
 void FeatureFinder::find(const Frame& frame) noexcept {
   found_.clear();
   const GreyImage image{frame.pixels.data(), width_, height_, width_};
-  const auto corners = find_features(image, occupied_, detector_, wanted_);
-  if (!corners) {
+  DetectorSettings detector = detector_settings_for(image, maximum_);
+  detector.min_distance_px = min_distance_px_;
+  const auto found = corners(image, detector);
+  if (!found) {
     counters_.searches_failed.add();
     return;
   }
-  for (const Vector2d& px : *corners) {
+  const TemplateSettings of_templates = template_settings_for(detector);
+  for (const Vector2d& px : *found) {
     if (found_.size() == kMaximumPerRound) break;
     FoundFeature feature;
-    if (make_patch_template(image, px, template_, tracker_.kernels(), feature.patch) != TemplateVerdict::kGood)
+    if (make_patch_template(image, px, of_templates, tracker_.kernels(), feature.patch) != TemplateVerdict::kGood)
       continue;
     feature.first_observed = frame.stamp.capture;
     feature.first_observed_px = px;

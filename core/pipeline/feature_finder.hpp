@@ -1,5 +1,5 @@
-// Housekeeping: finds new features in a frame and follows them through the next few, on a thread of its own, so that
-// they can be adopted at a stated frame.
+// Housekeeping: finds new features in a part of a frame and follows them through the next few, on a thread of its own,
+// so that they can be adopted at a stated frame.
 #pragma once
 
 #include <array>
@@ -8,10 +8,12 @@
 #include <span>
 #include <vector>
 
+#include "core/error/expected.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/realtime/spsc_ring.hpp"
 #include "core/realtime/wakeup.hpp"
+#include "core/sensors/colour_image.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/vision/feature_detector.hpp"
@@ -32,7 +34,10 @@ struct FoundFeature {
 };
 
 // A round: the frame begun at, and the kFinderDelayFrames - 1 after it, are copied here by the mapper as they come; the
-// result is due at the frame after them. One round at a time.
+// result is due at the frame after them. One round at a time, in one band of the picture; the next one takes the next
+// band, so that a large picture takes no longer a time than a small one, and all of it is searched about each
+// detection_interval_frames. What is a corner goes by the picture's own light and noise.
+// Where frames come with colour, a round begins at one that has it, and finds nothing on what is grey like instruments.
 // offer() and adopt() belong to the mapper, serve() to the housekeeping thread.
 class FeatureFinder {
  public:
@@ -40,9 +45,10 @@ class FeatureFinder {
 
   FeatureFinder(const PipelineSettings& settings, PipelineCounters& counters);
 
-  // Mapper, once a frame after its features are known: takes what the round needs of it. `occupied` are the pixels of
-  // the features that are followed now; a round begins only when `wanted` > 0.
-  void offer(std::uint64_t frame_index, const FrameStamp& stamp, const GreyImage& image,
+  // Mapper, once a frame after its features are known: takes what the round needs of it. `colour` is reduced as
+  // colour_image.hpp says, or without pixels. `occupied` are the pixels of the features that are followed now; a round
+  // begins only when `wanted` > 0.
+  void offer(std::uint64_t frame_index, const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour,
              std::span<const Vector2d> occupied, int wanted) noexcept;
 
   // Mapper, once a frame before its features are followed: the result that is due at this frame; empty when none is.
@@ -62,16 +68,19 @@ class FeatureFinder {
     std::vector<std::uint8_t> pixels;
   };
 
+  [[nodiscard]] bool may_begin(std::uint64_t frame_index, const ColourImage& colour) noexcept;
   void work(int step) noexcept;
   void find(const Frame& frame) noexcept;
+  [[nodiscard]] Expected<std::vector<Vector2d>> corners(const GreyImage& image, const DetectorSettings& detector) const;
   void follow(const Frame& frame) noexcept;
 
   int width_;
   int height_;
-  int interval_;
+  int bands_;
+  std::uint64_t interval_;
   bool lockstep_;
-  DetectorSettings detector_;
-  TemplateSettings template_;
+  double min_distance_px_;
+  int maximum_;
   PatchTracker tracker_;
   PipelineCounters& counters_;
 
@@ -79,9 +88,14 @@ class FeatureFinder {
   bool active_ = false;
   bool discarded_ = false;  // the round that is active
   std::uint64_t begun_at_ = 0;
+  std::uint64_t next_round_at_ = 0;
+  std::uint64_t colour_until_ = 0;  // up to this frame one with colour is waited for
 
   // Filled by the mapper before the step's number goes into the ring, read by housekeeping after it comes out.
   std::array<Frame, kFinderDelayFrames> frames_;
+  std::vector<std::uint8_t> bgr_;  // of the first one, reduced, without gaps between rows
+  bool coloured_ = false;
+  int band_ = 0;
   std::vector<Vector2d> occupied_;
   int wanted_ = 0;
   SpscRing<int> steps_;

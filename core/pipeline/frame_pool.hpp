@@ -9,6 +9,7 @@
 #include "core/realtime/counter.hpp"
 #include "core/realtime/spsc_ring.hpp"
 #include "core/realtime/wakeup.hpp"
+#include "core/sensors/colour_image.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
 
@@ -17,6 +18,7 @@ namespace perimap {
 // A frame in the pool; the pixels stay valid until the consumer gives it back.
 struct FrameHandle {
   int buffer = -1;
+  bool coloured = false;
   FrameStamp stamp;
 };
 
@@ -29,6 +31,8 @@ class FramePool {
       : width_(width),
         height_(height),
         pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * static_cast<std::size_t>(buffers)),
+        bgr_(static_cast<std::size_t>(3 * reduced_side(width)) * static_cast<std::size_t>(reduced_side(height)) *
+             static_cast<std::size_t>(buffers)),
         in_use_(std::make_unique<std::atomic<bool>[]>(static_cast<std::size_t>(buffers))),
         buffers_(buffers) {}
 
@@ -57,13 +61,24 @@ class FramePool {
            static_cast<std::size_t>(buffer) * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
   }
   [[nodiscard]] GreyImage image(int buffer) noexcept { return {pixels(buffer), width_, height_, width_}; }
+  // Room for the colour that may come with a frame, reduced.
+  [[nodiscard]] std::uint8_t* bgr(int buffer) noexcept {
+    return bgr_.data() + static_cast<std::size_t>(buffer) * static_cast<std::size_t>(colour_stride()) *
+                             static_cast<std::size_t>(reduced_side(height_));
+  }
+  [[nodiscard]] ColourImage colour(int buffer) noexcept {
+    return {bgr(buffer), reduced_side(width_), reduced_side(height_), colour_stride()};
+  }
   [[nodiscard]] int width() const noexcept { return width_; }
   [[nodiscard]] int height() const noexcept { return height_; }
 
  private:
+  [[nodiscard]] int colour_stride() const noexcept { return 3 * reduced_side(width_); }
+
   int width_;
   int height_;
   std::vector<std::uint8_t> pixels_;
+  std::vector<std::uint8_t> bgr_;
   std::unique_ptr<std::atomic<bool>[]> in_use_;
   int buffers_;
 };

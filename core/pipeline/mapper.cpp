@@ -68,7 +68,8 @@ void Mapper::add_pose(const TrackerSample& sample) noexcept {
   last_pose_arrival_ = std::max(last_pose_arrival_, sample.arrival);
 }
 
-void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& newest_clock) noexcept {
+void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour,
+                     const CardiacClock& newest_clock) noexcept {
   const RealtimeScope realtime;
   finish_learning();
   CardiacClock ecg_clock = newest_clock.as_of(stamp.arrival);
@@ -114,7 +115,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Card
   team_.run(&run_stage<&Mapper::follow_shard>, this);
   const Instant followed = MonotonicClock::now();
 
-  offer_to_finder(frame, image);
+  offer_to_finder(frame, image, colour);
   fill_feed();
 
   counters_.predict_and_find.add(found - begun);
@@ -589,7 +590,7 @@ void Mapper::adopt_found_features(std::uint64_t frame_index) noexcept {
   }
 }
 
-void Mapper::offer_to_finder(const FrameRecord& frame, const GreyImage& image) noexcept {
+void Mapper::offer_to_finder(const FrameRecord& frame, const GreyImage& image, const ColourImage& colour) noexcept {
   occupied_.clear();
   int free = 0;
   for (const FeatureSlot& slot : slots_) {
@@ -601,7 +602,7 @@ void Mapper::offer_to_finder(const FrameRecord& frame, const GreyImage& image) n
   }
   // Where there is no time for those that can be seen, no more are looked for.
   free = std::min(free, shedding_decision_.limit() - shedding_.in_sight());
-  finder_.offer(frame.index, frame.stamp, image, occupied_, free);
+  finder_.offer(frame.index, frame.stamp, image, colour, occupied_, free);
 }
 
 }  // namespace perimap

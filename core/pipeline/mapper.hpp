@@ -50,8 +50,9 @@ class Mapper {
   // The tracker has told all about instant t that it will: no need to wait longer.
   [[nodiscard]] bool pose_reached(Instant t) const noexcept { return poses_.reached(t); }
 
-  // Stages A, B and C. `image` is not used after the return.
-  void process(const FrameStamp& stamp, const GreyImage& image, const CardiacClock& newest_clock) noexcept;
+  // Stages A, B and C. The images are not used after the return; `colour` may be without pixels.
+  void process(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour,
+               const CardiacClock& newest_clock) noexcept;
 
   // Stage D of the frame just processed; the workers do it while the mapper waits for the next frame. In lockstep it
   // is done on return.
@@ -91,7 +92,7 @@ class Mapper {
   void publish_nothing() noexcept;
   void fill_feed() noexcept;
   void adopt_found_features(std::uint64_t frame_index) noexcept;
-  void offer_to_finder(const FrameRecord& frame, const GreyImage& image) noexcept;
+  void offer_to_finder(const FrameRecord& frame, const GreyImage& image, const ColourImage& colour) noexcept;
 
   struct alignas(64) WorkerTally {
     std::uint64_t lost_unseen = 0;

@@ -59,7 +59,7 @@ void Pipeline::map(const FrameHandle& frame) noexcept {
   TripleBuffer<CardiacClock>& clock = entrance_.clocks().mapper;
   clock.update();
   if (settings_.respiration.channel) mapper_.follow_breath(entrance_.breath(), frame.stamp.capture);
-  mapper_.process(frame.stamp, entrance_.image(frame), clock.front());
+  mapper_.process(frame.stamp, entrance_.image(frame), entrance_.colour(frame), clock.front());
   entrance_.give_back(frame);
   mapper_.learn();
 }

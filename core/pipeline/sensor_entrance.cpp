@@ -26,7 +26,7 @@ SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& e
       breath_settings_(breath),
       breath_(breath) {}
 
-bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept {
+bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour) noexcept {
   const RealtimeScope realtime;
   counters_.frames_received.add();
   // A capture after its own arrival is a broken stamp; on it the release times of all that follows would be fitted.
@@ -44,20 +44,25 @@ bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image)
   // The release is owed even when the pixels find no place, so the stamps go first.
   const bool told = publisher_stamps_.push(stamp);
   if (told) publisher_wakeup_.post();
-  const bool stored = store(stamp, image);
+  const bool stored = store(stamp, image, colour);
   // One whose stamps find no place is mapped, but released as if it had not come.
   if (!told || !stored) counters_.frames_dropped.add();
   return stored;
 }
 
-bool SensorEntrance::store(const FrameStamp& stamp, const GreyImage& image) noexcept {
+bool SensorEntrance::store(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour) noexcept {
   const int buffer = image.width == pool_.width() && image.height == pool_.height() ? pool_.acquire() : -1;
   if (buffer < 0) return false;
   const auto width = static_cast<std::size_t>(image.width);
   for (int y = 0; y < image.height; ++y) {
     std::memcpy(pool_.pixels(buffer) + static_cast<std::size_t>(y) * width, image.row(y), width);
   }
-  if (!mapper_frames_.push({buffer, stamp})) {
+  const ColourImage room = pool_.colour(buffer);
+  const bool coloured = colour.bgr != nullptr && colour.width == room.width && colour.height == room.height;
+  for (int y = 0; coloured && y < room.height; ++y) {
+    std::memcpy(pool_.bgr(buffer) + y * room.stride, colour.row(y), static_cast<std::size_t>(room.stride));
+  }
+  if (!mapper_frames_.push({buffer, coloured, stamp})) {
     pool_.give_back(buffer);
     return false;
   }

@@ -11,6 +11,7 @@
 #include "core/realtime/spsc_ring.hpp"
 #include "core/realtime/triple_buffer.hpp"
 #include "core/realtime/wakeup.hpp"
+#include "core/sensors/colour_image.hpp"
 #include "core/sensors/device_count.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/frame_stamp.hpp"
@@ -29,9 +30,10 @@ class SensorEntrance {
   SensorEntrance(int width, int height, const EcgIntakeSettings& ecg, const BreathDetectorSettings& breath,
                  PipelineCounters& counters);
 
-  // Copies the pixels. False when the mapper does not get the frame: no free buffer, or another size than the
-  // pipeline's.
-  bool push_frame(const FrameStamp& stamp, const GreyImage& image) noexcept;
+  // Copies the pixels. `colour`, of this frame or the one before, may be left out; it is passed over unless it is
+  // reduced as colour_image.hpp says. False when the mapper does not get the frame: no free buffer, or another size
+  // than the pipeline's.
+  bool push_frame(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour = {}) noexcept;
   void push_pose(const TrackerSample& sample) noexcept;
   void push_ecg(const EcgBlock& block) noexcept { ecg_.push(block); }
   void push_r_trigger(const RTriggerPulse& pulse) noexcept { ecg_.push(pulse); }
@@ -53,6 +55,10 @@ class SensorEntrance {
   [[nodiscard]] bool pop_frame(FrameHandle& frame) noexcept { return mapper_frames_.pop(frame); }
   [[nodiscard]] bool pop_pose(TrackerSample& sample) noexcept { return poses_.pop(sample); }
   [[nodiscard]] GreyImage image(const FrameHandle& frame) noexcept { return pool_.image(frame.buffer); }
+  // Without pixels when the frame came without colour.
+  [[nodiscard]] ColourImage colour(const FrameHandle& frame) noexcept {
+    return frame.coloured ? pool_.colour(frame.buffer) : ColourImage{};
+  }
   void give_back(const FrameHandle& frame) noexcept { pool_.give_back(frame.buffer); }
   // The newest that the respiration channel told.
   [[nodiscard]] const BreathSignal& breath() noexcept {
@@ -68,7 +74,7 @@ class SensorEntrance {
   [[nodiscard]] ClockCells& clocks() noexcept { return clocks_; }
 
  private:
-  [[nodiscard]] bool store(const FrameStamp& stamp, const GreyImage& image) noexcept;
+  [[nodiscard]] bool store(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour) noexcept;
   void count(const RespirationBlock& block) noexcept;
 
   PipelineCounters& counters_;

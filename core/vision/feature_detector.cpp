@@ -7,6 +7,9 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <tuple>
+#include <utility>
+
+#include "core/vision/image_noise.hpp"
 
 namespace perimap {
 namespace {
@@ -109,11 +112,12 @@ cv::Mat borrow(const GreyImage& image) {
           static_cast<std::size_t>(image.stride)};
 }
 
-std::vector<Vector2d> find(const cv::Mat& image, std::span<const Vector2d> occupied, const DetectorSettings& settings,
-                           std::size_t how_many, const GreyImage& barred) {
+// `taken` may lie outside: the image can be a part of one.
+std::vector<Vector2d> find(const cv::Mat& image, std::vector<Vector2d> taken, const DetectorSettings& settings,
+                           std::size_t how_many, const cv::Mat& barred) {
   const cv::Mat strength = corner_strength(image, settings.min_roundness);
   cv::Mat mask = forbidden(image, settings);
-  if (barred.data != nullptr && barred.width == image.cols && barred.height == image.rows) mask |= borrow(barred);
+  if (!barred.empty()) mask |= barred;
   const int columns = (image.cols + settings.tile_px - 1) / settings.tile_px;
   const int rows = (image.rows + settings.tile_px - 1) / settings.tile_px;
   std::vector<Tile> tiles(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
@@ -130,10 +134,8 @@ std::vector<Vector2d> find(const cv::Mat& image, std::span<const Vector2d> occup
   }
   for (Tile& tile : tiles) std::sort(tile.corners.begin(), tile.corners.end(), stronger);
 
-  std::vector<Vector2d> taken;
-  for (const Vector2d& px : occupied) {
+  for (const Vector2d& px : taken) {
     if (!(px.x() >= 0 && px.y() >= 0 && px.x() < image.cols && px.y() < image.rows)) continue;
-    taken.push_back(px);
     ++tile_at(static_cast<int>(px.x()), static_cast<int>(px.y())).features;
   }
   std::vector<Vector2d> found;
@@ -168,6 +170,8 @@ DetectorSettings detector_settings_for(int width, int height, double noise, int 
     background = std::max(background, std::min(light.surround_grey + kSurroundMargin_grey, 0.5 * light.lit_grey));
   }
   settings.background_grey = static_cast<int>(std::lround(background));
+  constexpr int kBelowWhite_grey = 10;
+  settings.highlight_grey = light.white_grey - kBelowWhite_grey;
   const double spacing = std::sqrt(static_cast<double>(width) * height / std::max(how_many, 1));
   constexpr double kRoundness = 0.1;
   settings.min_roundness = kRoundness;
@@ -176,8 +180,36 @@ DetectorSettings detector_settings_for(int width, int height, double noise, int 
   return settings;
 }
 
+DetectorSettings detector_settings_for(const GreyImage& image, int how_many) {
+  const PictureLight light = estimate_light(image);
+  // In a dim picture hardly anything is above the grey that counts as dark elsewhere.
+  const int dark_grey = std::min(kDark_grey, static_cast<int>(0.5 * light.lit_grey));
+  return detector_settings_for(image.width, image.height, estimate_noise(image, dark_grey), how_many, light);
+}
+
+TemplateSettings template_settings_for(const DetectorSettings& settings) noexcept {
+  TemplateSettings of_templates;
+  of_templates.min_texture = 0.8 * settings.min_corner;
+  of_templates.min_texture_coarse = 0.3 * settings.min_corner;
+  // One that only just counts as a highlight is not clipped yet.
+  constexpr int kClippedAbove_grey = 5;
+  of_templates.saturated_grey = settings.highlight_grey + kClippedAbove_grey;
+  return of_templates;
+}
+
+int bands_of(int width, int height) noexcept {
+  constexpr std::int64_t kBand_pixels = 640 * 480;
+  const std::int64_t pixels = std::int64_t{width} * height;
+  return static_cast<int>(std::max<std::int64_t>((pixels + kBand_pixels - 1) / kBand_pixels, 1));
+}
+
+RowRange rows_of_band(int height, int band, int bands) noexcept {
+  return {band * height / bands, (band + 1) * height / bands};
+}
+
 Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<const Vector2d> occupied,
-                                              const DetectorSettings& settings, int how_many, const GreyImage& barred) {
+                                              const DetectorSettings& settings, int how_many, const GreyImage& barred,
+                                              RowRange rows) {
   if (image.data == nullptr || image.width < 1 || image.height < 1 || image.stride < image.width) {
     return fail("feature detector: image of " + std::to_string(image.width) + "x" + std::to_string(image.height) +
                 " with stride " + std::to_string(image.stride) + " cannot be read");
@@ -186,9 +218,24 @@ Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<
     return fail("feature detector: tile_px, background_size_px and min_distance_px must be positive");
   }
   if (how_many <= 0) return std::vector<Vector2d>{};
+  // The band, with as much about it as a feature needs.
+  const int border = std::max(settings.border_px, 0);
+  const int first = std::max(rows.begin, border) - border;
+  const int last = rows.end < image.height - border ? std::max(rows.end + border, first) : image.height;
+  const auto band_of = [&](const GreyImage& whole) {
+    return GreyImage{whole.row(first), whole.width, last - first, whole.stride};
+  };
+  if (last <= first) return std::vector<Vector2d>{};
+  const bool bars = barred.data != nullptr && barred.width == image.width && barred.height == image.height;
   try {
     cv::setNumThreads(1);  // the process has the threads it made itself, and no others
-    return find(borrow(image), occupied, settings, static_cast<std::size_t>(how_many), barred);
+    const Vector2d origin(0, first);
+    std::vector<Vector2d> taken(occupied.begin(), occupied.end());
+    for (Vector2d& px : taken) px -= origin;
+    std::vector<Vector2d> found = find(borrow(band_of(image)), std::move(taken), settings,
+                                       static_cast<std::size_t>(how_many), bars ? borrow(band_of(barred)) : cv::Mat());
+    for (Vector2d& px : found) px += origin;
+    return found;
   } catch (const std::exception& error) {
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');

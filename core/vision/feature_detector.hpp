@@ -1,12 +1,14 @@
 // Places worth following: corners spread evenly over the visible tissue.
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
 #include "core/error/expected.hpp"
 #include "core/geometry/pose.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "core/vision/patch_template.hpp"
 #include "core/vision/picture_light.hpp"
 
 namespace perimap {
@@ -30,12 +32,30 @@ struct DetectorSettings {
 [[nodiscard]] DetectorSettings detector_settings_for(int width, int height, double noise, int how_many,
                                                      const PictureLight& light = {}) noexcept;
 
+// Likewise, of what this image shows.
+[[nodiscard]] DetectorSettings detector_settings_for(const GreyImage& image, int how_many);
+
+// For the templates of what was found so.
+[[nodiscard]] TemplateSettings template_settings_for(const DetectorSettings& settings) noexcept;
+
+// Rows [begin, end) of an image; all of them as it stands.
+struct RowRange {
+  int begin = 0;
+  int end = std::numeric_limits<int>::max();
+};
+
+// To look for features with a bounded amount of work at a time: in how many bands, of about as many pixels as 640x480
+// has each, and which rows the bands 0, 1, ... are.
+[[nodiscard]] int bands_of(int width, int height) noexcept;
+[[nodiscard]] RowRange rows_of_band(int height, int band, int bands) noexcept;
+
 // Up to how_many new features, level-0 pixels (whole ones), none within min_distance_px of another or of occupied.
 // `barred`, when it has the image's size, is not 0 where no feature may be (instruments); an empty one bars nothing.
+// Features are found in `rows` alone, and no more of the image is read than those and border_px about them.
 // The same input gives the same output in the same order, best tiles' corners first. Allocates; meant for a thread
 // without a deadline. An empty list when there is nothing to be found; an error for an unusable image or setting.
 [[nodiscard]] Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<const Vector2d> occupied,
                                                             const DetectorSettings& settings, int how_many,
-                                                            const GreyImage& barred = {});
+                                                            const GreyImage& barred = {}, RowRange rows = {});
 
 }  // namespace perimap

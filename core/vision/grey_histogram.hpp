@@ -1,6 +1,7 @@
 // How often each grey level occurs in an image.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <numeric>
@@ -8,6 +9,9 @@
 #include "core/sensors/grey_image.hpp"
 
 namespace perimap {
+
+// As many pixels of large images as of small ones are enough to tell what they are like.
+[[nodiscard]] inline int sampling_step(const GreyImage& image) noexcept { return std::max(2, image.width / 320); }
 
 class GreyHistogram {
  public:
@@ -30,6 +34,12 @@ class GreyHistogram {
       if (*count > 0 && below >= wanted) return static_cast<int>(count - counts_.begin());
     }
     return 0;
+  }
+
+  // Of all that is counted; 0 when nothing is.
+  [[nodiscard]] double share_from(int grey) const noexcept {
+    const double all = std::accumulate(counts_.begin(), counts_.end(), 0.0);
+    return all > 0 ? std::accumulate(counts_.begin() + grey, counts_.end(), 0.0) / all : 0;
   }
 
  private:

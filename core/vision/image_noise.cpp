@@ -4,19 +4,21 @@
 #include <cstdint>
 #include <cstdlib>
 
+#include "core/vision/grey_histogram.hpp"
+
 namespace perimap {
 
 double estimate_noise(const GreyImage& image, int dark_grey) {
   constexpr int kClipped = 245;
-  constexpr int kStep = 2;  // a quarter of the pixels will do
+  const int step = sampling_step(image);
   // The sum below is an integer of at most 8 * 255.
   std::array<int, 8 * 255 + 1> counts{};
   long total = 0;
-  for (int y = 1; y + 1 < image.height; y += kStep) {
+  for (int y = 1; y + 1 < image.height; y += step) {
     const std::uint8_t* const above = image.row(y - 1);
     const std::uint8_t* const here = image.row(y);
     const std::uint8_t* const below = image.row(y + 1);
-    for (int x = 1; x + 1 < image.width; x += kStep) {
+    for (int x = 1; x + 1 < image.width; x += step) {
       if (here[x] < dark_grey || here[x] > kClipped) continue;
       const int off = above[x - 1] - 2 * above[x] + above[x + 1] - 2 * here[x - 1] + 4 * here[x] - 2 * here[x + 1] +
                       below[x - 1] - 2 * below[x] + below[x + 1];

@@ -9,14 +9,15 @@
 namespace perimap {
 namespace {
 
-std::vector<std::uint8_t> find(const cv::Mat& image) {
-  constexpr int kReduction = 4;  // colour is coarse, in video anyhow
+std::vector<std::uint8_t> find(const cv::Mat& image, int width, int height) {
   constexpr int kLit_grey = 30;
   constexpr double kLeastSaturation = 0.18;  // (largest - smallest) / largest of the three channels
   constexpr double kMargin = 1.0 / 80;       // of the image's width
-  cv::Mat small;
-  cv::resize(image, small, {std::max(1, image.cols / kReduction), std::max(1, image.rows / kReduction)}, 0, 0,
-             cv::INTER_AREA);
+  cv::Mat small = image;
+  const cv::Size reduced(reduced_side(width), reduced_side(height));
+  if (image.cols > reduced.width || image.rows > reduced.height) {
+    cv::resize(image, small, reduced, 0, 0, cv::INTER_AREA);
+  }
   cv::Mat grey(small.size(), CV_8UC1, cv::Scalar(0));
   int lit = 0, unsaturated = 0;
   for (int y = 0; y < small.rows; ++y) {
@@ -30,7 +31,7 @@ std::vector<std::uint8_t> find(const cv::Mat& image) {
       grey.at<std::uint8_t>(y, x) = 255;
     }
   }
-  const auto bytes = static_cast<std::size_t>(image.cols) * static_cast<std::size_t>(image.rows);
+  const auto bytes = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   std::vector<std::uint8_t> mask(bytes, 0);
   if (2 * unsaturated > lit) return mask;
   // Without the glints, which are small; they are barred as highlights.
@@ -40,15 +41,16 @@ std::vector<std::uint8_t> find(const cv::Mat& image) {
   };
   cv::morphologyEx(grey, grey, cv::MORPH_OPEN, disc(2));
   cv::dilate(grey, grey, disc(margin));
-  cv::Mat full(image.rows, image.cols, CV_8UC1, mask.data());
+  cv::Mat full(height, width, CV_8UC1, mask.data());
   cv::resize(grey, full, full.size(), 0, 0, cv::INTER_NEAREST);
   return mask;
 }
 
 }  // namespace
 
-Expected<std::vector<std::uint8_t>> find_instruments(const ColourImage& image) {
-  if (image.bgr == nullptr || image.width < 1 || image.height < 1 || image.stride < 3 * image.width) {
+Expected<std::vector<std::uint8_t>> find_instruments(const ColourImage& image, int width, int height) {
+  if (image.bgr == nullptr || image.width < 1 || image.height < 1 || image.stride < 3 * image.width || width < 1 ||
+      height < 1) {
     return fail("instrument mask: colour image of " + std::to_string(image.width) + "x" + std::to_string(image.height) +
                 " with stride " + std::to_string(image.stride) + " cannot be read");
   }
@@ -56,7 +58,8 @@ Expected<std::vector<std::uint8_t>> find_instruments(const ColourImage& image) {
     cv::setNumThreads(1);  // the process has the threads it made itself, and no others
     // OpenCV takes no const data; find() only reads it.
     return find(cv::Mat(image.height, image.width, CV_8UC3, const_cast<std::uint8_t*>(image.bgr),
-                        static_cast<std::size_t>(image.stride)));
+                        static_cast<std::size_t>(image.stride)),
+                width, height);
   } catch (const std::exception& error) {
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');

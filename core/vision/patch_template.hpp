@@ -79,14 +79,6 @@ struct TemplateSettings {
   double max_saturated_share = 0.03;
 };
 
-// For corners that were asked for at least min_corner (DetectorSettings).
-[[nodiscard]] inline TemplateSettings template_settings_for(double min_corner) noexcept {
-  TemplateSettings settings;
-  settings.min_texture = 0.8 * min_corner;
-  settings.min_texture_coarse = 0.3 * min_corner;
-  return settings;
-}
-
 // Makes the template of the feature at px (level-0 pixels, need not be whole: windows stay on the pixel grid and carry
 // the offset, so nothing is interpolated). out is meaningful with kGood only.
 [[nodiscard]] TemplateVerdict make_patch_template(const GreyImage& image, const Vector2d& px,

@@ -46,9 +46,8 @@ double surround_of(const GreyImage& image) {
 }  // namespace
 
 PictureLight estimate_light(const GreyImage& image) {
-  constexpr int kStep = 2;
   constexpr double kBrightShare = 0.95, kLitOfBright = 0.25, kSurroundOfLit = 0.5;
-  const GreyHistogram counts(image, kStep);
+  const GreyHistogram counts(image, sampling_step(image));
   const auto lit_above = [&](double surround) {
     constexpr double kMargin_grey = 6;
     const double bright = counts.quantile(kBrightShare);
@@ -57,6 +56,10 @@ PictureLight estimate_light(const GreyImage& image) {
   };
   PictureLight light;
   if (image.width < 1 || image.height < 1) return light;
+  // Overshoots of what is clipped at the limited range's white stay below.
+  constexpr int kBeyondLimited_grey = 241, kLimitedWhite_grey = 235;
+  constexpr double kNextToNothing = 1e-4;
+  if (counts.share_from(kBeyondLimited_grey) < kNextToNothing) light.white_grey = kLimitedWhite_grey;
   light.surround_grey = surround_of(image);
   light.lit_grey = lit_above(light.surround_grey);
   if (light.surround_grey > kSurroundOfLit * light.lit_grey) {

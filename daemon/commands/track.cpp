@@ -20,7 +20,6 @@
 #include "core/vision/confirmed_tracks.hpp"
 #include "core/vision/feature_detector.hpp"
 #include "core/vision/feature_follower.hpp"
-#include "core/vision/image_noise.hpp"
 #include "core/vision/instrument_mask.hpp"
 #include "daemon/commands/progress.hpp"
 #include "daemon/process/stop_signal.hpp"
@@ -96,6 +95,7 @@ class RecordingSource final : public FrameSource {
       }
       frame_.number = messages_++;
       frame_.grey = *image;
+      frame_.colour = recorded_.colour();
       return &frame_;
     }
   }
@@ -116,16 +116,19 @@ class RecordingSource final : public FrameSource {
   std::uint64_t messages_ = 0;
   std::uint64_t unusable_ = 0;
   Error first_unusable_;
-  RecordedFrame recorded_;
+  RecordedFrame recorded_{1};  // with the colour of any that may be looked for features in
   VideoFrame frame_;
 };
 
-// By the middle one of the first intervals between the frames' captures; 0 with less than three frames. Starts the
-// reading over.
+// By the middle one of the first intervals between the frames' captures; 0 with less than three frames. Leaves
+// the recording at its first frame.
 Expected<double> rate_of_frames(RecordingReader& recording) {
   constexpr std::size_t kFrames = 32;
-  const std::string_view channels[] = {channels::kCameraImage};
-  if (const auto selected = recording.select(channels); !selected) return tl::unexpected(selected.error());
+  const auto start_over = [&] {
+    const std::string_view channels[] = {channels::kCameraImage};
+    return recording.select(channels);
+  };
+  if (const auto started = start_over(); !started) return tl::unexpected(started.error());
   std::vector<double> intervals_s;
   std::optional<Instant> before;
   while (intervals_s.size() < kFrames) {
@@ -135,7 +138,7 @@ Expected<double> rate_of_frames(RecordingReader& recording) {
     if (before) intervals_s.push_back(to_seconds((*message)->source_time - *before));
     before = (*message)->source_time;
   }
-  if (const auto selected = recording.select(channels); !selected) return tl::unexpected(selected.error());
+  if (const auto started = start_over(); !started) return tl::unexpected(started.error());
   if (intervals_s.size() < 2) return 0.0;
   const double middle_s = upper_median(intervals_s.begin(), intervals_s.end());
   return middle_s > 0.0 ? 1.0 / middle_s : 0.0;
@@ -295,21 +298,17 @@ class Tracking {
     const std::vector<Vector2d> occupied = follower_.occupied();
     GreyImage barred;
     std::vector<std::uint8_t> mask;
-    if (frame.bgr != nullptr) {
-      auto instruments = find_instruments({frame.bgr, frame.grey.width, frame.grey.height, frame.bgr_stride});
+    if (frame.colour.bgr != nullptr) {
+      auto instruments = find_instruments(frame.colour, frame.grey.width, frame.grey.height);
       if (!instruments) return tl::unexpected(instruments.error());
       mask = *std::move(instruments);
       barred = {mask.data(), frame.grey.width, frame.grey.height, frame.grey.width};
     }
     const GreyImage& image = frame.grey;
-    const PictureLight light = estimate_light(image);
-    // In a dim picture hardly anything is above the grey that counts as dark elsewhere.
-    const int dark_grey = std::min(kDark_grey, static_cast<int>(0.5 * light.lit_grey));
-    const DetectorSettings detector =
-        detector_settings_for(image.width, image.height, estimate_noise(image, dark_grey), options_.features, light);
+    const DetectorSettings detector = detector_settings_for(image, options_.features);
     const auto corners = find_features(image, occupied, detector, follower_.free(), barred);
     if (!corners) return tl::unexpected(corners.error());
-    follower_.add(image, *corners, template_settings_for(detector.min_corner));
+    follower_.add(image, *corners, template_settings_for(detector));
     has_found_ = has_found_ || !corners->empty();
     return {};
   }

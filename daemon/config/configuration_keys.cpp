@@ -328,7 +328,7 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
       .add(
           "format",
           "what the camera is to give; any: the first of these that it has, at no much lower rate than the others",
-          R"("any" or "mono8" or "nv12" or "yuyv" or "uyvy" or "jpeg")",
+          R"("any" or "nv12" or "yuyv" or "uyvy" or "mono8" or "jpeg")",
           [](const ConfigurationValue& value, Configuration& configuration) {
             const auto* name = std::get_if<std::string>(&value);
             if (name == nullptr) return false;

@@ -13,6 +13,7 @@
 #include "drivers/ecg/can_ecg.hpp"
 #include "drivers/ecg/cyton.hpp"
 #include "drivers/ecg/medlab.hpp"
+#include "drivers/image/colour_reducer.hpp"
 #include "drivers/image/grey_converter.hpp"
 
 namespace perimap {
@@ -123,15 +124,27 @@ void DeviceFeeder::start(ThreadLauncher& threads) {
 
 void DeviceFeeder::run_camera(const CameraDevice& device) {
   GreyConverter converter;
-  if (const auto* v4l2 = std::get_if<V4l2Settings>(&device)) converter.reserve(v4l2->width, v4l2->height);
-  const CameraSink sink = [this, &converter](const CameraFrame& frame) {
+  ColourReducer colour;
+  if (const auto* v4l2 = std::get_if<V4l2Settings>(&device)) {
+    converter.reserve(v4l2->width, v4l2->height);
+    colour.reserve(v4l2->width, v4l2->height);
+  }
+  const CameraSink sink = [this, &converter, &colour, first = true](const CameraFrame& frame) mutable {
     // Without a pipeline nobody needs it in grey.
-    if (intake_.entrance == nullptr) return intake_.frame(frame, {});
+    if (intake_.entrance == nullptr) return intake_.frame(frame, {}, {});
     const auto grey = converter.convert(frame);
-    if (grey) return intake_.frame(frame, *grey);
-    // A damaged JPEG is recorded as it came; to the pipeline it is a gap in the count.
-    camera_health_.damaged.add();
-    SensorIntake{nullptr, intake_.recorder}.frame(frame, {});
+    if (!grey) {
+      // A damaged JPEG is recorded as it came; to the pipeline it is a gap in the count.
+      camera_health_.damaged.add();
+      SensorIntake{nullptr, intake_.recorder}.frame(frame, {}, {});
+      return;
+    }
+    // A frame does not wait for its colour: that goes with the next one. Only the first tells at once that there is
+    // any.
+    const bool now = std::exchange(first, false);
+    if (now) colour.take(frame);
+    intake_.frame(frame, *grey, colour.picture());
+    if (!now) colour.take(frame);
   };
   auto served = serve_camera(device, sink, camera_health_, interrupt_);
   if (!served) camera_error_ = std::move(served.error());

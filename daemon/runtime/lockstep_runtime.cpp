@@ -43,7 +43,7 @@ void LockstepRuntime::deliver(const ReplayEvent& event) {
   if (const auto* frame = std::get_if<FrameEvent>(&event)) {
     // Live, several frames may wait; in virtual time the one before has to be mapped first.
     if (frame_waits_) map_ready_frame();
-    static_cast<void>(entrance.push_frame(frame->stamp, frame->image()));
+    static_cast<void>(entrance.push_frame(frame->stamp, frame->image(), frame->colour()));
     pipeline_.drain_stamps(now_);
     frame_waits_ = entrance.pop_frame(frame_);
   } else if (const auto* pose = std::get_if<TrackerSample>(&event)) {

@@ -86,7 +86,7 @@ void ReplayFeeder::deliver() {
       as_it_came.height = grey.height;
       as_it_came.stride = static_cast<std::size_t>(grey.stride);
       as_it_came.bytes = std::as_bytes(std::span(frame->pixels));
-      intake_.frame(as_it_came, grey);
+      intake_.frame(as_it_came, grey, frame->colour());
     } else if (const auto* pose = std::get_if<TrackerSample>(&*event)) {
       intake_.pose(*pose);
     } else if (const auto* ecg = std::get_if<EcgBlock>(&*event)) {

@@ -13,8 +13,8 @@ struct SensorIntake {
   SessionRecorder* recorder = nullptr;
 
   // To the pipeline first: it is the one in a hurry.
-  void frame(const CameraFrame& as_it_came, const GreyImage& grey) const noexcept {
-    if (entrance != nullptr) static_cast<void>(entrance->push_frame(as_it_came.stamp, grey));
+  void frame(const CameraFrame& as_it_came, const GreyImage& grey, const ColourImage& colour) const noexcept {
+    if (entrance != nullptr) static_cast<void>(entrance->push_frame(as_it_came.stamp, grey, colour));
     if (recorder != nullptr) recorder->frame(as_it_came);
   }
   void pose(const TrackerSample& sample) const noexcept {

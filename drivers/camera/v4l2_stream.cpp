@@ -7,6 +7,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstddef>
 #include <system_error>
 #include <utility>
 
@@ -21,10 +22,12 @@ struct KnownFormat {
   PixelFormat format;
 };
 // In order of preference: what needs no work first.
-constexpr std::array<KnownFormat, 6> kFormats{{{V4L2_PIX_FMT_GREY, PixelFormat::kGrey},
-                                               {V4L2_PIX_FMT_NV12, PixelFormat::kNv12},
+// The first that a camera has is taken: those with colour, by which instruments are told, before grey, and those that
+// need less work before others.
+constexpr std::array<KnownFormat, 6> kFormats{{{V4L2_PIX_FMT_NV12, PixelFormat::kNv12},
                                                {V4L2_PIX_FMT_YUYV, PixelFormat::kYuyv},
                                                {V4L2_PIX_FMT_UYVY, PixelFormat::kUyvy},
+                                               {V4L2_PIX_FMT_GREY, PixelFormat::kGrey},
                                                {V4L2_PIX_FMT_MJPEG, PixelFormat::kMjpg},
                                                {V4L2_PIX_FMT_JPEG, PixelFormat::kMjpg}}};
 
@@ -197,21 +200,21 @@ Expected<void> V4l2Stream::settle_format() {
   const std::uint32_t height = sized ? static_cast<std::uint32_t>(settings_.height) : format.fmt.pix.height;
   // Over USB the plain formats of large pictures are often much slower than JPEG. Where the format is free the first
   // one is taken that is as fast as asked, or about as fast as the fastest.
+  std::array<double, kFormats.size()> formats_hz{};
   double enough_hz = 0.0;
   if (!settings_.format) {
     constexpr double kAboutAsFast = 0.9;
-    for (const KnownFormat& known : kFormats) enough_hz = std::max(enough_hz, fastest_hz(known.fourcc, width, height));
+    for (std::size_t i = 0; i < kFormats.size(); ++i) formats_hz[i] = fastest_hz(kFormats[i].fourcc, width, height);
+    enough_hz = *std::max_element(formats_hz.begin(), formats_hz.end());
     if (settings_.frame_rate_hz > 0.0) enough_hz = std::min(enough_hz, settings_.frame_rate_hz);
     enough_hz *= kAboutAsFast;
   }
-  const auto is_too_slow = [&](std::uint32_t fourcc) {
-    const double hz = fastest_hz(fourcc, width, height);
-    return hz > 0.0 && hz < enough_hz;
-  };
   // The driver puts what it can do in place of what it cannot. So each format is asked for, and the answer read.
   std::optional<v4l2_pix_format> right_format;
-  for (const KnownFormat& wanted : kFormats) {
-    if ((settings_.format && *settings_.format != wanted.format) || is_too_slow(wanted.fourcc)) continue;
+  for (std::size_t i = 0; i < kFormats.size(); ++i) {
+    const KnownFormat& wanted = kFormats[i];
+    const bool is_too_slow = formats_hz[i] > 0.0 && formats_hz[i] < enough_hz;
+    if ((settings_.format && *settings_.format != wanted.format) || is_too_slow) continue;
     v4l2_format given = format;
     given.fmt.pix.pixelformat = wanted.fourcc;
     given.fmt.pix.width = width;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <span>
 
+#include "core/error/expected.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "drivers/image/pixel_format.hpp"
 
@@ -19,6 +20,9 @@ struct CameraFrame {
   std::size_t stride = 0;  // bytes from row to row; 0 with kMjpg
   std::span<const std::byte> bytes;
 };
+
+// Whether the bytes hold the picture that the frame announces; what a JPEG holds its decoder says.
+[[nodiscard]] Expected<void> check_bytes(const CameraFrame& frame);
 
 // Takes what a camera's thread has got; the frame ends with the call.
 using CameraSink = std::function<void(const CameraFrame&)>;

@@ -11,6 +11,8 @@
 #include <array>
 #include <new>
 
+#include "core/sensors/colour_image.hpp"
+
 namespace perimap {
 
 // NOLINTBEGIN(cert-err52-cpp): longjmp is the library's way out of an error; only C frames and trivial locals are left
@@ -66,32 +68,42 @@ struct JpegDecoder::Impl {
   }
 
   // Null when it is done; otherwise what is wrong. Its locals are trivial, since a longjmp runs no destructors.
-  const char* decode(std::span<const std::byte> bytes, int width, int height, std::uint8_t* grey) {
+  const char* decode(std::span<const std::byte> bytes, int width, int height, bool colour, std::uint8_t* out) {
     if (setjmp(on_error) != 0) {
       jpeg_abort_decompress(&jpeg);
       return message.data();
     }
     read_header(bytes);
-    const bool luma = jpeg.jpeg_color_space == JCS_YCbCr || jpeg.jpeg_color_space == JCS_GRAYSCALE;
-    if (!luma || jpeg.image_width != static_cast<JDIMENSION>(width) ||
-        jpeg.image_height != static_cast<JDIMENSION>(height)) {
-      const char* const wrong = luma ? "another size than announced" : "no luma";
+    if (const char* const wrong = unusable(width, height, colour); wrong != nullptr) {
       jpeg_abort_decompress(&jpeg);
       return wrong;
     }
-    if (jpeg.progressive_mode != FALSE) {
-      // No camera sends it, and its scans can make a small file take minutes.
-      jpeg_abort_decompress(&jpeg);
-      return "progressive";
+    if (colour) {
+      jpeg.out_color_space = JCS_EXT_BGR;
+      jpeg.scale_denom = kColourReduction * jpeg.scale_num;
+    } else {
+      jpeg.out_color_space = JCS_GRAYSCALE;
     }
-    jpeg.out_color_space = JCS_GRAYSCALE;
     (void)jpeg_start_decompress(&jpeg);
+    const std::size_t row_bytes = std::size_t{jpeg.output_width} * static_cast<unsigned>(jpeg.output_components);
     while (jpeg.output_scanline < jpeg.output_height) {
-      JSAMPROW row = grey + std::size_t{jpeg.output_scanline} * jpeg.output_width;
+      JSAMPROW row = out + jpeg.output_scanline * row_bytes;
       (void)jpeg_read_scanlines(&jpeg, &row, 1);
     }
     (void)jpeg_finish_decompress(&jpeg);
     return nullptr;
+  }
+
+  // Null when the picture whose header has been read can be decoded; otherwise what is wrong with it.
+  [[nodiscard]] const char* unusable(int width, int height, bool colour) const {
+    const bool luma = jpeg.jpeg_color_space == JCS_YCbCr || jpeg.jpeg_color_space == JCS_GRAYSCALE;
+    if (!luma) return "no luma";
+    if (colour && jpeg.jpeg_color_space == JCS_GRAYSCALE) return "no colour";
+    if (jpeg.image_width != static_cast<JDIMENSION>(width) || jpeg.image_height != static_cast<JDIMENSION>(height)) {
+      return "another size than announced";
+    }
+    // No camera sends it, and its scans can make a small file take minutes.
+    return jpeg.progressive_mode != FALSE ? "progressive" : nullptr;
   }
 };
 // NOLINTEND(cert-err52-cpp)
@@ -112,11 +124,23 @@ JpegDecoder::~JpegDecoder() = default;
 
 Expected<void> JpegDecoder::decode(std::span<const std::byte> jpeg, int width, int height,
                                    std::span<std::uint8_t> grey) {
+  return decode(jpeg, width, height, {width, height, 1}, grey);
+}
+
+Expected<void> JpegDecoder::decode_reduced_colour(std::span<const std::byte> jpeg, int width, int height,
+                                                  std::span<std::uint8_t> bgr) {
+  return decode(jpeg, width, height, {reduced_side(width), reduced_side(height), 3}, bgr);
+}
+
+Expected<void> JpegDecoder::decode(std::span<const std::byte> jpeg, int width, int height, const Wanted& wanted,
+                                   std::span<std::uint8_t> out) {
   if (jpeg.empty()) return fail("JPEG: empty");
-  if (width <= 0 || height <= 0 || grey.size() < static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
-    return fail(fmt::format("JPEG: {} x {} pixels do not fit {} bytes", width, height, grey.size()));
+  if (width <= 0 || height <= 0 ||
+      out.size() < static_cast<std::size_t>(wanted.width) * static_cast<std::size_t>(wanted.height) *
+                       static_cast<std::size_t>(wanted.samples)) {
+    return fail(fmt::format("JPEG: {} x {} pixels do not fit {} bytes", wanted.width, wanted.height, out.size()));
   }
-  if (const char* wrong = impl_->decode(jpeg, width, height, grey.data()); wrong != nullptr) {
+  if (const char* wrong = impl_->decode(jpeg, width, height, wanted.samples > 1, out.data()); wrong != nullptr) {
     return fail(fmt::format("JPEG: {}", wrong));
   }
   return {};

@@ -32,9 +32,21 @@ class JpegDecoder {
   [[nodiscard]] Expected<void> decode(std::span<const std::byte> jpeg, int width, int height,
                                       std::span<std::uint8_t> grey);
 
+  // Its colours, reduced as colour_image.hpp says, into rows without gaps. Fails likewise, and when it is grey.
+  [[nodiscard]] Expected<void> decode_reduced_colour(std::span<const std::byte> jpeg, int width, int height,
+                                                     std::span<std::uint8_t> bgr);
+
   struct Impl;  // libjpeg's own
 
  private:
+  struct Wanted {
+    int width;
+    int height;
+    int samples;  // a pixel
+  };
+  [[nodiscard]] Expected<void> decode(std::span<const std::byte> jpeg, int width, int height, const Wanted& wanted,
+                                      std::span<std::uint8_t> out);
+
   std::unique_ptr<Impl> impl_;
 };
 

@@ -27,6 +27,7 @@ Expected<GreyImage> RecordedFrame::read(const RecordingReader& reader, const Rec
   if (!frame) return tl::unexpected(frame.error());
   auto grey = converter_.convert(*frame);
   if (!grey) return reader.wrong(message, grey.error().message);
+  colour_.take(*frame);
   return grey;
 }
 

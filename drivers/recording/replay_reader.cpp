@@ -120,6 +120,9 @@ Expected<ReplayEvent> ReplayReader::frame_event(const RecordedMessage& message) 
     std::copy_n(image->row(y), image->width,
                 event.pixels.begin() + static_cast<std::ptrdiff_t>(y) * static_cast<std::ptrdiff_t>(image->width));
   }
+  if (const ColourImage& colour = frame_.colour(); colour.bgr != nullptr) {
+    event.bgr.assign(colour.bgr, colour.row(colour.height));
+  }
   return event;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "core/sensors/colour_image.hpp"
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
@@ -28,8 +29,13 @@ struct FrameEvent {
   int width = 0;
   int height = 0;
   std::vector<std::uint8_t> pixels;  // rows without gaps
+  std::vector<std::uint8_t> bgr;     // reduced, rows without gaps; empty in most frames, and without colour in all
 
   [[nodiscard]] GreyImage image() const noexcept { return {pixels.data(), width, height, width}; }
+  [[nodiscard]] ColourImage colour() const noexcept {
+    if (bgr.empty()) return {};
+    return {bgr.data(), reduced_side(width), reduced_side(height), std::ptrdiff_t{3} * reduced_side(width)};
+  }
 };
 
 using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock, RTriggerPulse, RespirationBlock>;

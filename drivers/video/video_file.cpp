@@ -122,8 +122,7 @@ Expected<const VideoFrame*> VideoReader::next() {
     cv::extractChannel(colour, impl_->grey, 1);
     const cv::Mat& grey = impl_->grey;
     impl_->frame = {impl_->number,
-                    colour.data,
-                    static_cast<std::ptrdiff_t>(colour.step),
+                    {colour.data, colour.cols, colour.rows, static_cast<std::ptrdiff_t>(colour.step)},
                     {grey.data, grey.cols, grey.rows, static_cast<std::ptrdiff_t>(grey.step)}};
     return &impl_->frame;
   } catch (const std::exception& thrown) {
@@ -161,9 +160,10 @@ Expected<VideoWriter> VideoWriter::create(const std::string& path, int width, in
 Expected<void> VideoWriter::write(const VideoFrame& frame, const std::vector<VideoMark>& marks) {
   try {
     // OpenCV takes no const data; what is borrowed here is only read.
-    if (frame.bgr != nullptr) {
-      cv::Mat(frame.grey.height, frame.grey.width, CV_8UC3, const_cast<std::uint8_t*>(frame.bgr),
-              static_cast<std::size_t>(frame.bgr_stride))
+    const ColourImage& colour = frame.colour;
+    if (colour.bgr != nullptr && colour.width == frame.grey.width && colour.height == frame.grey.height) {
+      cv::Mat(colour.height, colour.width, CV_8UC3, const_cast<std::uint8_t*>(colour.bgr),
+              static_cast<std::size_t>(colour.stride))
           .copyTo(impl_->drawn);
     } else {
       const cv::Mat grey(frame.grey.height, frame.grey.width, CV_8UC1, const_cast<std::uint8_t*>(frame.grey.data),
@@ -171,13 +171,13 @@ Expected<void> VideoWriter::write(const VideoFrame& frame, const std::vector<Vid
       cv::cvtColor(grey, impl_->drawn, cv::COLOR_GRAY2BGR);
     }
     for (const VideoMark& mark : marks) {
-      const cv::Scalar colour(mark.blue, mark.green, mark.red);
+      const cv::Scalar ink(mark.blue, mark.green, mark.red);
       constexpr int kFractionBits = 4;
       constexpr int kUnit = 1 << kFractionBits;
       const cv::Point at(static_cast<int>(std::lround(mark.u * kUnit)), static_cast<int>(std::lround(mark.v * kUnit)));
-      cv::circle(impl_->drawn, at, 5 * kUnit, colour, 1, cv::LINE_AA, kFractionBits);
+      cv::circle(impl_->drawn, at, 5 * kUnit, ink, 1, cv::LINE_AA, kFractionBits);
       for (const cv::Point& arm : {cv::Point(2 * kUnit, 0), cv::Point(0, 2 * kUnit)}) {
-        cv::line(impl_->drawn, at - arm, at + arm, colour, 1, cv::LINE_AA, kFractionBits);
+        cv::line(impl_->drawn, at - arm, at + arm, ink, 1, cv::LINE_AA, kFractionBits);
       }
     }
     impl_->writer.write(impl_->drawn);

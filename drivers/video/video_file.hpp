@@ -1,13 +1,13 @@
 // Video files of any kind that OpenCV's videoio (FFmpeg) reads and writes.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "core/sensors/colour_image.hpp"
 #include "core/sensors/grey_image.hpp"
 
 namespace perimap {
@@ -17,8 +17,7 @@ namespace perimap {
 struct VideoFrame {
   // Counted from 0; from the first frame that could not be decoded on, by the video's times at its usual rate.
   std::uint64_t number = 0;
-  const std::uint8_t* bgr = nullptr;  // 3 bytes a pixel, blue first, bgr_stride bytes from row to row
-  std::ptrdiff_t bgr_stride = 0;
+  ColourImage colour;  // in a video's frames as large as the grey; may be reduced elsewhere, or without pixels
   GreyImage grey;
 };
 
@@ -67,7 +66,7 @@ class VideoWriter {
   VideoWriter& operator=(const VideoWriter&) = delete;
   ~VideoWriter();
 
-  // The frame with the marks drawn on a copy of it; in grey when it has no colour.
+  // The frame with the marks drawn on a copy of it; in grey when its colour is reduced or not there.
   [[nodiscard]] Expected<void> write(const VideoFrame& frame, const std::vector<VideoMark>& marks);
   // Closes the file, and looks whether its last frame can be read. Without it the file is closed too, but nothing is
   // said of an error.

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/vision/feature_detector.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 #include "footage.hpp"
@@ -263,6 +264,28 @@ void compare_targets(const Footage& footage) {
   }
 }
 
+// What a round of the finder costs at once, beside what the whole picture would.
+void find(const Footage& footage) {
+  constexpr int kTimes = 15;
+  const GreyImage image = footage.image(0);
+  const int features = static_cast<int>(footage.px[0].size());
+  const int bands = bands_of(footage.width, footage.height);
+  const auto look = [&](RowRange rows) {
+    const DetectorSettings settings = detector_settings_for(image, features);
+    if (!find_features(image, {}, settings, features, {}, rows)) std::printf("  nothing could be looked for\n");
+  };
+  std::vector<Candidate> candidates;
+  candidates.emplace_back("the whole picture", 1.0, [&] { look({}); });
+  candidates.emplace_back("a band of it, one of " + std::to_string(bands), 1.0,
+                          [&] { look(rows_of_band(footage.height, bands / 2, bands)); });
+  time_interleaved(candidates, kTimes);
+  std::printf("\n%s, %dx%d, finding features, ms p50, p99, max\n", footage.name.c_str(), footage.width, footage.height);
+  for (const Candidate& candidate : candidates) {
+    std::printf("  %-48s %8.2f %8.2f %8.2f\n", candidate.name.c_str(), 1e-6 * candidate.median(),
+                1e-6 * candidate.quantile(0.99), 1e-6 * candidate.quantile(1.0));
+  }
+}
+
 }  // namespace
 }  // namespace perimap::bench
 
@@ -283,6 +306,7 @@ int main() {
         compare(footage, "steady");
         compare(lit, "changing");
         if (features == 200) {
+          find(footage);
           compare_targets(footage);
           capture(lit);
         }

@@ -1,9 +1,10 @@
-// Any bytes as a camera's frame, in any of its formats and sizes: a picture of that size, or an error.
+// Any bytes as a camera's frame, in any of its formats and sizes: a picture of that size, or an error; and its colour.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <span>
 
+#include "drivers/image/colour_reducer.hpp"
 #include "drivers/image/grey_converter.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -26,6 +27,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       frame.height = announced->height;
     }
   }
+  static ColourReducer reducer(1);
+  reducer.take(frame);
+  const ColourImage& colour = reducer.picture();
+  unsigned colours = 0;
+  for (int y = 0; y < colour.height; ++y) {
+    for (int i = 0; i < 3 * colour.width; ++i) colours += colour.row(y)[i];
+  }
+  if (colours > 255U * 3U * static_cast<unsigned>(colour.width * colour.height)) std::abort();
   const auto image = converter.convert(frame);
   if (!image) return 0;
   if (image->width != frame.width || image->height != frame.height || image->stride < image->width) std::abort();

@@ -94,14 +94,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const NeighbourMotion::Around around = motion.around(at, &inside);
   if (around.known && at.allFinite() && predicted.allFinite() && !(around.disagreement_px >= 0)) std::abort();
 
-  const auto corners = find_features(
-      image, {}, detector_settings_for(width, height, estimate_noise(image), 20, estimate_light(image)), 20);
+  const DetectorSettings detector = detector_settings_for(image, 20);
+  const auto corners = find_features(image, {}, detector, 20);
   if (!corners) std::abort();
+  const RowRange rows{input.take<std::int16_t>(), input.take<std::int16_t>()};
+  const auto in_rows = find_features(image, *corners, detector, 20, image, rows);
+  if (!in_rows) std::abort();
+  for (const Vector2d& px : *in_rows) {
+    if (px.y() < rows.begin || px.y() >= rows.end) std::abort();
+  }
   FollowerSettings settings;
   settings.maximum = 20;
   FeatureFollower follower(settings);
   follower.add(image, *corners, easy);
   for (int i = 0; i < 3; ++i) follower.follow(image);
-  if (width >= 3 && !find_instruments({pixels.data(), width / 3, height, stride})) std::abort();
+  for (const int reduction : {1, 4}) {
+    if (width >= 3 && !find_instruments({pixels.data(), width / 3, height, stride}, reduction * width, height)) {
+      std::abort();
+    }
+  }
   return 0;
 }

@@ -44,7 +44,9 @@ void for_each_arrival(const Simulation& simulation,
     FrameEvent frame;
     if (arrival.source == Simulation::Source::kCamera) {
       const auto pixels = frames.next();
-      frame = {simulation.frames()[arrival.index].stamp, simulation.settings().width, simulation.settings().height, {}};
+      frame.stamp = simulation.frames()[arrival.index].stamp;
+      frame.width = simulation.settings().width;
+      frame.height = simulation.settings().height;
       frame.pixels.assign(pixels.begin(), pixels.end());
     }
     take(arrival, frame);

@@ -25,7 +25,7 @@ class VideoCamera : public ::testing::Test {
     const std::vector<std::uint8_t> pixels(std::size_t{64} * 48, 100);
     auto writer = VideoWriter::create(file_, 64, 48, 200.0).value();
     for (int i = 0; i < kFrames; ++i) {
-      EXPECT_TRUE(writer.write({0, nullptr, 0, {pixels.data(), 64, 48, 64}}, {}));
+      EXPECT_TRUE(writer.write({0, {}, {pixels.data(), 64, 48, 64}}, {}));
     }
     EXPECT_TRUE(writer.finish());
   }
@@ -91,7 +91,7 @@ TEST(VideoReader, ReadsOnBehindABrokenSpotAndKeepsTheFramesNumbers) {
   std::vector<std::uint8_t> pixels(std::size_t{64} * 48);
   for (std::uint64_t i = 0; i < kMany; ++i) {
     for (std::uint8_t& pixel : pixels) pixel = static_cast<std::uint8_t>(random() % 256);
-    ASSERT_TRUE(writer.write({i, nullptr, 0, {pixels.data(), 64, 48, 64}}, {}));
+    ASSERT_TRUE(writer.write({i, {}, {pixels.data(), 64, 48, 64}}, {}));
   }
   ASSERT_TRUE(writer.finish());
   const auto bytes = static_cast<std::streamoff>(std::filesystem::file_size(file));

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <thread>
+#include <vector>
 
 #include "tests/unit/vision/synthetic_scene.hpp"
 
@@ -10,37 +13,55 @@ namespace perimap {
 namespace {
 
 // A still texture, in lockstep, so that a round's result is there when it is due.
-struct Finder : ::testing::Test {
-  static constexpr int kWidth = 160, kHeight = 120;
-
+struct Still {
   test::Texture texture{5};
   std::mt19937 random{1};
-  test::ImageBuffer image = test::render(texture, test::View{}, kWidth, kHeight, 1, random);
+  test::ImageBuffer image;
   PipelineCounters counters;
-  FeatureFinder finder{settings(), counters};
+  FeatureFinder finder;
   std::thread housekeeping{[this] { finder.serve(); }};
   std::uint64_t frame = 0;
+  std::vector<Vector2d> occupied;
 
-  Finder() = default;
-  Finder(const Finder&) = delete;
-  Finder& operator=(const Finder&) = delete;
-  ~Finder() override {
+  Still(int width, int height)
+      : image(test::render(texture, test::View{}, width, height, 1, random)),
+        finder(settings(width, height), counters) {}
+  Still(const Still&) = delete;
+  Still& operator=(const Still&) = delete;
+  ~Still() {
     finder.dismiss();
     housekeeping.join();
   }
 
-  static PipelineSettings settings() {
+  static PipelineSettings settings(int width, int height) {
     PipelineSettings s;
-    s.camera.width = kWidth;
-    s.camera.height = kHeight;
+    s.camera.width = width;
+    s.camera.height = height;
     s.lockstep = true;
     return s;
   }
-  // How many are adopted at the next frame.
-  std::size_t next_frame() {
-    const std::size_t adopted = finder.adopt(frame).size();
-    finder.offer(frame++, {}, image.view(), {}, 8);
+  // Those adopted at the next frame, which are then occupied.
+  std::vector<Vector2d> next_frame(const ColourImage& colour, int wanted) {
+    std::vector<Vector2d> adopted;
+    for (const FoundFeature& found : finder.adopt(frame)) adopted.push_back(found.first_observed_px);
+    occupied.insert(occupied.end(), adopted.begin(), adopted.end());
+    finder.offer(frame++, {}, image.view(), colour, occupied, wanted);
     return adopted;
+  }
+};
+
+struct Finder : ::testing::Test {
+  static constexpr int kWidth = 160, kHeight = 120;
+
+  Still still{kWidth, kHeight};
+  FeatureFinder& finder = still.finder;
+  PipelineCounters& counters = still.counters;
+
+  static PipelineSettings settings() { return Still::settings(kWidth, kHeight); }
+  // How many are adopted at the next frame.
+  std::size_t next_frame(const ColourImage& colour = {}) {
+    still.occupied.clear();
+    return still.next_frame(colour, 8).size();
   }
   // How many are adopted in so many frames.
   std::size_t adopted_in(int frames) {
@@ -68,6 +89,71 @@ TEST_F(Finder, DiscardingBetweenRoundsTakesNothingFromTheNext) {
   static_cast<void>(adopted_in(kFinderDelayFrames + 1));
   finder.discard_round();
   EXPECT_GT(adopted_in(settings().features.detection_interval_frames + 1), 0U);
+}
+
+// What is grey between columns 40 and 100 of tissue.
+struct ColouredFinder : Finder {
+  static constexpr int kColourWidth = reduced_side(kWidth), kColourHeight = reduced_side(kHeight);
+  std::vector<std::uint8_t> bgr;
+  ColourImage colour;
+
+  ColouredFinder() {
+    for (int y = 0; y < kColourHeight; ++y) {
+      for (int x = 0; x < kColourWidth; ++x) {
+        const bool instrument = x >= 10 && x < 25;
+        for (const int value : instrument ? std::array{120, 122, 125} : std::array{70, 80, 180}) {
+          bgr.push_back(static_cast<std::uint8_t>(value));
+        }
+      }
+    }
+    colour = {bgr.data(), kColourWidth, kColourHeight, std::ptrdiff_t{3} * kColourWidth};
+  }
+};
+
+TEST_F(ColouredFinder, FindsNothingOnInstruments) {
+  std::size_t beside = 0;
+  for (int i = 0; i < 60; ++i) {
+    for (const Vector2d& px : still.next_frame(colour, 40)) {
+      EXPECT_TRUE(px.x() < 40 || px.x() >= 100) << px.transpose();
+      ++beside;
+    }
+  }
+  EXPECT_GE(beside, 4U);
+  // As many more lie there, when nothing tells that it is an instrument.
+  std::size_t on_it = 0;
+  for (int i = 0; i < 120; ++i) {
+    for (const Vector2d& px : still.next_frame({}, 40)) on_it += px.x() >= 40 && px.x() < 100 ? 1 : 0;
+  }
+  EXPECT_GE(on_it, 4U);
+}
+
+TEST_F(ColouredFinder, BeginsARoundAtAFrameWithColourWhereThereAreAny) {
+  // Of the first frame, and then of every seventh.
+  const int interval = settings().features.detection_interval_frames;
+  const auto colour_of = [&](std::uint64_t frame) { return frame % 7 == 0 ? colour : ColourImage{}; };
+  std::vector<std::uint64_t> adopted_at;
+  while (still.frame < 4 * static_cast<std::uint64_t>(interval)) {
+    const std::uint64_t frame = still.frame;
+    if (next_frame(colour_of(frame)) > 0) adopted_at.push_back(frame);
+  }
+  ASSERT_GE(adopted_at.size(), 2U);
+  for (const std::uint64_t frame : adopted_at) EXPECT_EQ((frame - kFinderDelayFrames) % 7, 0U);
+}
+
+TEST(FinderOfALargePicture, SearchesABandOfItInEachRoundAndAllOfItInTurn) {
+  constexpr int kWidth = 640, kHeight = 1200;  // two and a half times what is searched at once
+  Still still(kWidth, kHeight);
+  std::array<int, 3> adopted{};
+  for (int i = 0; i < 45; ++i) {
+    double least = kHeight, most = 0;
+    for (const Vector2d& px : still.next_frame({}, 120)) {
+      ++adopted[static_cast<std::size_t>(px.y() * 3 / kHeight)];
+      least = std::min(least, px.y());
+      most = std::max(most, px.y());
+    }
+    EXPECT_LE(most - least, kHeight / 3.0);
+  }
+  for (const int band : adopted) EXPECT_GE(band, 10);
 }
 
 }  // namespace

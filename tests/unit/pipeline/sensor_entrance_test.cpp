@@ -36,6 +36,30 @@ TEST_F(Entrance, CopiesTheRowsOfAPaddedImage) {
   EXPECT_EQ(entrance->image(frame).row(4)[5], 7);
 }
 
+TEST_F(Entrance, CarriesAFramesColourIfItIsReducedAsAgreed) {
+  constexpr int kColourWidth = reduced_side(kWidth), kColourHeight = reduced_side(kHeight),
+                kStride = 3 * kColourWidth + 5;
+  std::vector<std::uint8_t> bgr(kStride * kColourHeight, 1);
+  bgr[2 * kStride + 4] = 77;
+  FrameHandle frame;
+  ASSERT_TRUE(entrance->push_frame(stamp(0), image, {bgr.data(), kColourWidth, kColourHeight, kStride}));
+  ASSERT_TRUE(entrance->pop_frame(frame));
+  const ColourImage colour = entrance->colour(frame);
+  ASSERT_NE(colour.bgr, nullptr);
+  EXPECT_EQ(colour.width, kColourWidth);
+  EXPECT_EQ(colour.height, kColourHeight);
+  EXPECT_EQ(colour.row(2)[4], 77);
+  EXPECT_EQ(colour.row(2)[5], 1);
+  // In the same buffer, after the one with colour.
+  for (const ColourImage& none : {ColourImage{}, ColourImage{bgr.data(), kColourWidth, kColourHeight - 1, kStride}}) {
+    entrance->give_back(frame);
+    ASSERT_TRUE(entrance->push_frame(stamp(1), image, none));
+    ASSERT_TRUE(entrance->pop_frame(frame));
+    EXPECT_EQ(entrance->colour(frame).bgr, nullptr);
+    EXPECT_EQ(entrance->image(frame).row(3)[5], 7);
+  }
+}
+
 TEST_F(Entrance, KeepsAMinutesStampsForAPublisherThatIsHeldUp) {
   for (std::uint64_t i = 0; i < 3600; ++i) static_cast<void>(entrance->push_frame(stamp(i), image));
   FrameStamp told;

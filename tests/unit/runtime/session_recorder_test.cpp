@@ -171,12 +171,15 @@ TEST_F(SessionRecording, KeepsFramesInTheCamerasOwnFormat) {
     seen = true;
   }
   EXPECT_TRUE(seen);
-  // And a replay sees its luma.
+  // And a replay sees its luma, and the colour.
   auto replay = ReplayReader::open(file_.string(), ReadMode::kStrict).value();
   for (auto event = replay.next().value(); event; event = replay.next().value()) {
     const auto* shown = std::get_if<FrameEvent>(&*event);
     if (shown != nullptr) {
       EXPECT_NEAR(shown->pixels[10], 110, 4);
+      const ColourImage colour = shown->colour();
+      ASSERT_NE(colour.bgr, nullptr);
+      EXPECT_GT(colour.row(0)[1], colour.row(0)[0] + 40);  // of chroma 90, 90
     }
   }
 }

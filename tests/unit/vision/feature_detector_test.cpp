@@ -2,9 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <tuple>
 
-#include "core/vision/image_noise.hpp"
 #include "tests/unit/vision/synthetic_scene.hpp"
 
 namespace perimap {
@@ -102,6 +103,71 @@ TEST(FeatureDetector, GivesTheSameListEachTime) {
   EXPECT_EQ(found_in(image, {}, 40), found_in(image, {}, 40));
 }
 
+TEST(FeatureDetector, FindsInEachBandOfRowsWhatItFindsInTheWholePicture) {
+  const ImageBuffer image = textured();
+  DetectorSettings settings;
+  settings.min_distance_px = 0;  // so that no corner takes another's place
+  constexpr int kAll = 1000;
+  const auto whole = find_features(image.view(), {}, settings, kAll);
+  ASSERT_TRUE(whole.has_value());
+  std::vector<Vector2d> in_bands;
+  for (const RowRange& rows : {RowRange{0, 100}, RowRange{100, 101}, RowRange{101, 200}, RowRange{200, kHeight}}) {
+    const auto found = find_features(image.view(), {}, settings, kAll, {}, rows);
+    ASSERT_TRUE(found.has_value());
+    for (const Vector2d& px : *found) {
+      EXPECT_GE(px.y(), rows.begin);
+      EXPECT_LT(px.y(), rows.end);
+      in_bands.push_back(px);
+    }
+  }
+  const auto before = [](const Vector2d& a, const Vector2d& b) {
+    return std::tuple(a.y(), a.x()) < std::tuple(b.y(), b.x());
+  };
+  std::vector<Vector2d> all = *whole;
+  std::sort(all.begin(), all.end(), before);
+  std::sort(in_bands.begin(), in_bands.end(), before);
+  ASSERT_GE(all.size(), 50U);
+  EXPECT_EQ(in_bands, all);
+  for (const RowRange& none : {RowRange{kHeight, kHeight + 50}, RowRange{60, 60}, RowRange{80, 20}, RowRange{-50, 0}}) {
+    EXPECT_EQ(find_features(image.view(), {}, settings, kAll, {}, none).value().size(), 0U) << none.begin;
+  }
+}
+
+TEST(FeatureDetector, KeepsItsDistanceFromOccupiedPlacesBeyondTheBand) {
+  const ImageBuffer image = textured();
+  DetectorSettings settings;
+  settings.min_distance_px = 40;  // farther than the border that is read with the band
+  const RowRange rows{120, 200};
+  std::vector<Vector2d> occupied;
+  for (int x = 0; x < kWidth; x += 10) occupied.emplace_back(x, rows.begin - 30);
+  const auto found = find_features(image.view(), occupied, settings, 20, {}, rows);
+  ASSERT_TRUE(found.has_value());
+  ASSERT_FALSE(found->empty());
+  for (const Vector2d& px : *found) {
+    for (const Vector2d& taken : occupied) EXPECT_GE((px - taken).norm(), settings.min_distance_px);
+  }
+}
+
+TEST(FeatureDetector, KnowsHighlightsInVideoOfLimitedRange) {
+  ImageBuffer image = textured();
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const bool highlight = std::hypot(x - 160, y - 120) < 6;
+      image.at(x, y) = highlight ? 235 : static_cast<std::uint8_t>(16 + 200 * image.at(x, y) / 255);
+    }
+  }
+  const DetectorSettings settings = detector_settings_for(image.view(), 40);
+  EXPECT_LT(settings.highlight_grey, 235);
+  EXPECT_LE(template_settings_for(settings).saturated_grey, 235);
+  const auto found = find_features(image.view(), {}, settings, 400);
+  ASSERT_TRUE(found.has_value());
+  ASSERT_GE(found->size(), 20U);
+  for (const Vector2d& px : *found) EXPECT_GT((px - Vector2d(160, 120)).norm(), settings.highlight_clearance_px);
+  image.at(20, 20) = image.at(21, 20) = image.at(40, 44) = image.at(80, 44) = 255;
+  for (int x = 0; x < kWidth; ++x) image.at(x, 3) = 255;
+  EXPECT_EQ(detector_settings_for(image.view(), 40).highlight_grey, DetectorSettings{}.highlight_grey);
+}
+
 TEST(FeatureDetector, SaysWhatItCannotUse) {
   EXPECT_FALSE(find_features(GreyImage{}, {}, DetectorSettings{}, 5).has_value());
   const ImageBuffer image(64, 64);
@@ -115,12 +181,8 @@ TEST(FeatureDetector, SaysWhatItCannotUse) {
   EXPECT_NE(refused.error().message.find("tile_px"), std::string::npos);
 }
 
-// As `perimap track` asks for them.
 std::vector<Vector2d> found_by_light(const ImageBuffer& image, int how_many) {
-  const PictureLight light = estimate_light(image.view());
-  const double noise = estimate_noise(image.view(), static_cast<int>(0.5 * light.lit_grey));
-  const auto found =
-      find_features(image.view(), {}, detector_settings_for(kWidth, kHeight, noise, how_many, light), how_many);
+  const auto found = find_features(image.view(), {}, detector_settings_for(image.view(), how_many), how_many);
   EXPECT_TRUE(found.has_value());
   return found.value_or(std::vector<Vector2d>{});
 }

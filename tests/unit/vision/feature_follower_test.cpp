@@ -54,7 +54,7 @@ class FeatureFollowerTest : public testing::Test {
     const DetectorSettings detector = detector_settings_for(kWidth, kHeight, noise, kFeatures);
     const auto corners = find_features(image_.view(), occupied, detector, follower_.free());
     ASSERT_TRUE(corners.has_value());
-    follower_.add(image_.view(), *corners, template_settings_for(detector.min_corner));
+    follower_.add(image_.view(), *corners, template_settings_for(detector));
     note_places();
   }
 
@@ -307,15 +307,15 @@ TEST(InstrumentMask, IsWhatHasNoColourUnlessAlmostNothingHas) {
   };
   fill(0, kSide, {70, 80, 180});
   fill(40, 80, {120, 122, 125});
-  const auto mask = find_instruments({bgr.data(), kSide, kSide, 3 * kSide});
+  const auto mask = find_instruments({bgr.data(), kSide, kSide, 3 * kSide}, kSide, kSide);
   ASSERT_TRUE(mask.has_value());
   EXPECT_EQ((*mask)[60 * kSide + 80], 255);
   EXPECT_EQ((*mask)[120 * kSide + 80], 0);
   fill(0, kSide, {100, 100, 100});
-  const auto grey = find_instruments({bgr.data(), kSide, kSide, 3 * kSide});
+  const auto grey = find_instruments({bgr.data(), kSide, kSide, 3 * kSide}, kSide, kSide);
   ASSERT_TRUE(grey.has_value());
   EXPECT_EQ(std::count(grey->begin(), grey->end(), 255), 0);
-  EXPECT_FALSE(find_instruments({}).has_value());
+  EXPECT_FALSE(find_instruments({}, kSide, kSide).has_value());
 }
 
 }  // namespace

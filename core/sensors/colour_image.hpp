@@ -1,0 +1,24 @@
+// A borrowed 8-bit colour image.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace perimap {
+
+// Blue, green, red; 3 bytes a pixel. Row y starts at bgr + y * stride.
+struct ColourImage {
+  const std::uint8_t* bgr = nullptr;
+  int width = 0;
+  int height = 0;
+  std::ptrdiff_t stride = 0;  // bytes from row to row, >= 3 * width
+
+  [[nodiscard]] const std::uint8_t* row(int y) const noexcept { return bgr + y * stride; }
+};
+
+// What goes with a grey frame of a colour camera: each pixel the mean of so many by so many. Video's colour is coarse
+// anyhow, and what is told by it, instruments, is large.
+inline constexpr int kColourReduction = 4;
+[[nodiscard]] constexpr int reduced_side(int side) noexcept { return (side + kColourReduction - 1) / kColourReduction; }
+
+}  // namespace perimap

@@ -1,0 +1,140 @@
+#include "drivers/image/colour_reducer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <vector>
+
+#include "tests/unit/camera/made_jpeg.hpp"
+
+namespace perimap {
+namespace {
+
+struct Yuv {
+  int y, u, v;
+};
+// ITU-R BT.601, limited range: full red, and a middle grey.
+constexpr Yuv kRed{81, 90, 240}, kGrey{126, 128, 128};
+
+// Red on the left of `edge`, which is even, and grey on the right.
+class Picture {
+ public:
+  Picture(PixelFormat format, int width, int height, int edge, std::size_t padding) {
+    const auto colour = [&](int x) { return x < edge ? kRed : kGrey; };
+    frame_.format = format;
+    frame_.width = width;
+    frame_.height = height;
+    frame_.stride = row_bytes(format, width) + padding;
+    bytes_.resize(picture_bytes(format, height, frame_.stride));
+    const auto put = [&](std::size_t row, std::size_t at, int value) {
+      bytes_.at(row * frame_.stride + at) = static_cast<std::byte>(value);
+    };
+    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
+      for (int x = 0; x < width; ++x) {
+        const auto at = static_cast<std::size_t>(x);
+        const Yuv c = colour(x);
+        if (format == PixelFormat::kGrey) put(y, at, c.y);
+        if (format == PixelFormat::kNv12) {
+          put(y, at, c.y);
+          put(static_cast<std::size_t>(height) + y / 2, at, x % 2 == 0 ? c.u : c.v);
+          if (x % 2 == 0) put(static_cast<std::size_t>(height) + y / 2, at + 1, c.v);
+        }
+        if (format == PixelFormat::kYuyv || format == PixelFormat::kUyvy) {
+          const std::size_t luma = format == PixelFormat::kYuyv ? 0 : 1;
+          put(y, 2 * at + luma, c.y);
+          put(y, 2 * at + 1 - luma, x % 2 == 0 ? c.u : c.v);
+          if (x % 2 == 0) put(y, 2 * at + 3 - luma, c.v);
+        }
+      }
+    }
+    frame_.bytes = bytes_;
+  }
+  [[nodiscard]] const CameraFrame& frame() const noexcept { return frame_; }
+
+ private:
+  CameraFrame frame_;
+  std::vector<std::byte> bytes_;
+};
+
+std::array<int, 3> bgr_at(const ColourImage& image, int x, int y) {
+  const std::uint8_t* const p = image.row(y) + static_cast<std::ptrdiff_t>(3) * x;
+  return {p[0], p[1], p[2]};
+}
+
+void expect_near(const std::array<int, 3>& bgr, const std::array<int, 3>& expected) {
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(bgr[i], expected[i], 3) << "channel " << i;
+}
+
+TEST(ColourReducer, GivesTheColoursOfEachFormatAtAQuarterOfTheSize) {
+  for (const PixelFormat format : {PixelFormat::kYuyv, PixelFormat::kUyvy, PixelFormat::kNv12}) {
+    for (const auto& [width, height] : {std::pair{32, 16}, std::pair{33, 17}, std::pair{30, 15}, std::pair{29, 2}}) {
+      SCOPED_TRACE(testing::Message() << pixel_format_name(format) << " " << width << "x" << height);
+      const Picture picture(format, width, height, 16, 6);
+      ColourReducer reducer;
+      reducer.take(picture.frame());
+      const ColourImage& colour = reducer.picture();
+      ASSERT_NE(colour.bgr, nullptr);
+      ASSERT_EQ(colour.width, (width + 3) / 4);
+      ASSERT_EQ(colour.height, (height + 3) / 4);
+      for (int y = 0; y < colour.height; ++y) {
+        for (int x = 0; x < colour.width; ++x) {
+          expect_near(bgr_at(colour, x, y), x < 4 ? std::array{0, 0, 255} : std::array{128, 128, 128});
+        }
+      }
+    }
+  }
+}
+
+TEST(ColourReducer, GivesTheColoursOfAJpeg) {
+  constexpr int kWidth = 50, kHeight = 34;
+  CameraFrame frame;
+  frame.format = PixelFormat::kMjpg;
+  frame.width = kWidth;
+  frame.height = kHeight;
+  // Chroma 90 in both channels, luma 100: JFIF's full range.
+  const auto jpeg = test::make_jpeg(kWidth, kHeight, [](int, int) { return std::uint8_t{100}; });
+  frame.bytes = jpeg;
+  ColourReducer reducer(1);
+  reducer.take(frame);
+  ASSERT_NE(reducer.picture().bgr, nullptr);
+  EXPECT_EQ(reducer.picture().width, 13);
+  EXPECT_EQ(reducer.picture().height, 9);
+  expect_near(bgr_at(reducer.picture(), 6, 4), {33, 140, 47});
+  frame.bytes = std::span(jpeg).first(jpeg.size() / 2);
+  reducer.take(frame);
+  EXPECT_EQ(reducer.picture().bgr, nullptr);
+  const auto grey = test::make_jpeg(
+      kWidth, kHeight, [](int, int) { return std::uint8_t{100}; }, false);
+  frame.bytes = grey;
+  reducer.take(frame);
+  EXPECT_EQ(reducer.picture().bgr, nullptr);
+}
+
+TEST(ColourReducer, HasNoneOfGreyFramesOrOfThoseThatDoNotHoldTheirPicture) {
+  ColourReducer reducer(1);
+  reducer.take(Picture(PixelFormat::kGrey, 32, 16, 16, 0).frame());
+  EXPECT_EQ(reducer.picture().bgr, nullptr);
+  for (const PixelFormat format : {PixelFormat::kYuyv, PixelFormat::kUyvy, PixelFormat::kNv12}) {
+    const Picture picture(format, 32, 16, 16, 0);
+    CameraFrame frame = picture.frame();
+    reducer.take(frame);
+    EXPECT_NE(reducer.picture().bgr, nullptr);
+    frame.bytes = frame.bytes.first(frame.bytes.size() - 1);
+    reducer.take(frame);
+    EXPECT_EQ(reducer.picture().bgr, nullptr);
+  }
+}
+
+TEST(ColourReducer, LooksAtTheFirstFrameAndThenAtEveryNth) {
+  const Picture picture(PixelFormat::kYuyv, 32, 16, 16, 0);
+  ColourReducer reducer(3);
+  std::vector<bool> seen;
+  for (int i = 0; i < 7; ++i) {
+    reducer.take(picture.frame());
+    seen.push_back(reducer.picture().bgr != nullptr);
+  }
+  EXPECT_EQ(seen, (std::vector<bool>{true, false, false, true, false, false, true}));
+}
+
+}  // namespace
+}  // namespace perimap
