@@ -40,7 +40,7 @@ FeatureFinder::FeatureFinder(const PipelineSettings& settings, PipelineCounters&
 }
 
 bool FeatureFinder::may_begin(std::uint64_t frame_index, const ColourImage& colour) noexcept {
-  // Not every frame of a colour camera has to come with colour; one that has none any more is not waited for for ever.
+  // Not every frame of a colour camera comes with colour; and one may have none any more, or lose just those frames.
   constexpr std::uint64_t kColourFrames = 60;
   const bool coloured = colour.bgr != nullptr;
   if (coloured) colour_until_ = frame_index + kColourFrames;
@@ -58,9 +58,8 @@ void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, co
     // Relaxed: housekeeping sets it again only after it has popped this round's steps, and the ring orders that.
     done_.store(false, std::memory_order_relaxed);
     occupied_.assign(occupied.begin(), occupied.end());
-    // Of each band its share, so that the first ones do not take all places.
-    const int share = (with_spare(maximum_) + bands_ - 1) / bands_;
-    wanted_ = std::min({with_spare(wanted), share, static_cast<int>(kMaximumPerRound)});
+    share_ = static_cast<std::size_t>((maximum_ + bands_ - 1) / bands_);
+    wanted_ = std::min({with_spare(wanted), with_spare(static_cast<int>(share_)), static_cast<int>(kMaximumPerRound)});
     band_ = (band_ + 1) % bands_;
     coloured_ = colour.bgr != nullptr;
     const auto row_bytes = static_cast<std::size_t>(3 * reduced_side(width_));
@@ -120,6 +119,7 @@ void FeatureFinder::work(int step) noexcept {
     follow(frame);
   }
   if (step + 1 < kFinderDelayFrames) return;
+  if (found_.size() > share_) found_.resize(share_);
   // Release: found_ is complete before the mapper can see the flag.
   done_.store(true, std::memory_order_release);
   if (lockstep_) finished_.post();
@@ -136,17 +136,7 @@ Expected<std::vector<Vector2d>> FeatureFinder::corners(const GreyImage& image, c
     barred = {mask.data(), width_, height_, width_};
   }
   const RowRange band = rows_of_band(height_, band_, bands_);
-  DetectorSettings strong = detector;
-  strong.min_corner = std::max(detector.min_corner, DetectorSettings{}.min_corner);
-  auto found = find_features(image, occupied_, strong, wanted_, barred, band);
-  // Weak corners are followed less exactly than their matches say: only where strong ones are too few.
-  if (!found || with_spare(static_cast<int>(found->size())) >= wanted_) return found;
-  std::vector<Vector2d> taken = occupied_;
-  taken.insert(taken.end(), found->begin(), found->end());
-  const auto weak = find_features(image, taken, detector, wanted_ - static_cast<int>(found->size()), barred, band);
-  if (!weak) return weak;
-  found->insert(found->end(), weak->begin(), weak->end());
-  return found;
+  return find_features(image, occupied_, detector, wanted_, barred, band);
 }
 
 void FeatureFinder::find(const Frame& frame) noexcept {

@@ -34,10 +34,11 @@ struct FoundFeature {
 };
 
 // A round: the frame begun at, and the kFinderDelayFrames - 1 after it, are copied here by the mapper as they come; the
-// result is due at the frame after them. One round at a time, in one band of the picture; the next one takes the next
-// band, so that a large picture takes no longer a time than a small one, and all of it is searched about each
-// detection_interval_frames. What is a corner goes by the picture's own light and noise.
-// Where frames come with colour, a round begins at one that has it, and finds nothing on what is grey like instruments.
+// result is due at the frame after them. One round at a time, in one band of the picture, so that the search of a large
+// picture takes no longer than that of a small one; the next round takes the next band, and no band gives more than its
+// share of a full map at a time. What is a corner goes by the picture's own light and noise.
+// Where frames have come with colour lately, a round begins at one that has it, and finds nothing on what is grey like
+// instruments.
 // offer() and adopt() belong to the mapper, serve() to the housekeeping thread.
 class FeatureFinder {
  public:
@@ -98,6 +99,7 @@ class FeatureFinder {
   int band_ = 0;
   std::vector<Vector2d> occupied_;
   int wanted_ = 0;
+  std::size_t share_ = 0;  // of what the round finds at most so many are given
   SpscRing<int> steps_;
   Wakeup go_;
 

@@ -16,8 +16,8 @@ struct ColourImage {
   [[nodiscard]] const std::uint8_t* row(int y) const noexcept { return bgr + y * stride; }
 };
 
-// What goes with a grey frame of a colour camera: each pixel the mean of so many by so many. Video's colour is coarse
-// anyhow, and what is told by it, instruments, is large.
+// What goes with a grey frame of a colour camera: one pixel for so many by so many. Video's colour is coarse anyhow,
+// and what is told by it, instruments, is large.
 inline constexpr int kColourReduction = 4;
 [[nodiscard]] constexpr int reduced_side(int side) noexcept { return (side + kColourReduction - 1) / kColourReduction; }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/vision/image_noise.hpp"
+#include "core/vision/widened_mask.hpp"
 
 namespace perimap {
 namespace {
@@ -25,26 +26,15 @@ bool stronger(const Corner& a, const Corner& b) {
   return std::tuple(-a.strength, a.y, a.x) < std::tuple(-b.strength, b.y, b.x);
 }
 
-void widen(cv::Mat& mask, double by_px) {
-  const int reach = static_cast<int>(std::ceil(by_px));
-  if (reach <= 0) return;
-  // The distance transform costs the same whatever the reach; dilation does not.
-  cv::Mat away, distance;
-  cv::bitwise_not(mask, away);
-  cv::distanceTransform(away, distance, cv::DIST_L2, cv::DIST_MASK_3);
-  mask = distance <= by_px;
-}
-
 // 255 where no feature may be.
 cv::Mat forbidden(const cv::Mat& image, const DetectorSettings& settings) {
-  cv::Mat highlight = image >= settings.highlight_grey;
-  widen(highlight, settings.highlight_clearance_px);
+  const cv::Mat highlight = widened(image >= settings.highlight_grey, settings.highlight_clearance_px);
   // Averaged, so that a dark vessel or a noisy pixel is not taken for the background.
   cv::Mat mean;
   cv::blur(image, mean, {settings.background_size_px, settings.background_size_px});
-  cv::Mat background = mean < settings.background_grey;
   // The mean turns dark only half a window inside the background.
-  widen(background, settings.background_clearance_px + 0.5 * settings.background_size_px);
+  const cv::Mat background =
+      widened(mean < settings.background_grey, settings.background_clearance_px + 0.5 * settings.background_size_px);
   return highlight | background;
 }
 

@@ -56,9 +56,10 @@ PictureLight estimate_light(const GreyImage& image) {
   };
   PictureLight light;
   if (image.width < 1 || image.height < 1) return light;
-  // Overshoots of what is clipped at the limited range's white stay below.
+  // Beyond a limited range's white there is no more than the overshoots of sharpened edges. Where that is so of a full
+  // range, nothing is clipped, and what is nearly white is no place for a feature either.
   constexpr int kBeyondLimited_grey = 241, kLimitedWhite_grey = 235;
-  constexpr double kNextToNothing = 1e-4;
+  constexpr double kNextToNothing = 1e-3;
   if (counts.share_from(kBeyondLimited_grey) < kNextToNothing) light.white_grey = kLimitedWhite_grey;
   light.surround_grey = surround_of(image);
   light.lit_grey = lit_above(light.surround_grey);

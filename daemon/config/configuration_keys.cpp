@@ -494,7 +494,7 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
   Section("features", keys)
       .integer("maximum", 1, 1000, PERIMAP_MEMBER(features.maximum), "features followed at a time")
       .integer("detection_interval_frames", 6, 1000, PERIMAP_MEMBER(features.detection_interval_frames),
-               "frames from one search for new features to the next")
+               "frames in which all of the picture is searched for new features once; a large one takes longer")
       .number("minimum_distance_px", 1, 1000, PERIMAP_MEMBER(features.minimum_distance_px),
               "a new feature keeps this distance from all others");
   const std::array<std::pair<std::string_view, UpdateMethod>, 2> updates{

@@ -7,14 +7,13 @@
 #include <utility>
 
 #include "daemon/config/ecg_inputs.hpp"
+#include "daemon/runtime/camera_intake.hpp"
 #include "drivers/camera/v4l2_camera.hpp"
 #include "drivers/device/device_link.hpp"
 #include "drivers/ecg/bitalino.hpp"
 #include "drivers/ecg/can_ecg.hpp"
 #include "drivers/ecg/cyton.hpp"
 #include "drivers/ecg/medlab.hpp"
-#include "drivers/image/colour_reducer.hpp"
-#include "drivers/image/grey_converter.hpp"
 
 namespace perimap {
 namespace {
@@ -123,28 +122,10 @@ void DeviceFeeder::start(ThreadLauncher& threads) {
 }
 
 void DeviceFeeder::run_camera(const CameraDevice& device) {
-  GreyConverter converter;
-  ColourReducer colour;
-  if (const auto* v4l2 = std::get_if<V4l2Settings>(&device)) {
-    converter.reserve(v4l2->width, v4l2->height);
-    colour.reserve(v4l2->width, v4l2->height);
-  }
-  const CameraSink sink = [this, &converter, &colour, first = true](const CameraFrame& frame) mutable {
-    // Without a pipeline nobody needs it in grey.
-    if (intake_.entrance == nullptr) return intake_.frame(frame, {}, {});
-    const auto grey = converter.convert(frame);
-    if (!grey) {
-      // A damaged JPEG is recorded as it came; to the pipeline it is a gap in the count.
-      camera_health_.damaged.add();
-      SensorIntake{nullptr, intake_.recorder}.frame(frame, {}, {});
-      return;
-    }
-    // A frame does not wait for its colour: that goes with the next one. Only the first tells at once that there is
-    // any.
-    const bool now = std::exchange(first, false);
-    if (now) colour.take(frame);
-    intake_.frame(frame, *grey, colour.picture());
-    if (!now) colour.take(frame);
+  CameraIntake camera(intake_);
+  if (const auto* v4l2 = std::get_if<V4l2Settings>(&device)) camera.reserve(v4l2->width, v4l2->height);
+  const CameraSink sink = [this, &camera](const CameraFrame& frame) {
+    if (!camera.take(frame)) camera_health_.damaged.add();
   };
   auto served = serve_camera(device, sink, camera_health_, interrupt_);
   if (!served) camera_error_ = std::move(served.error());

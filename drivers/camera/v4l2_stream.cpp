@@ -21,9 +21,8 @@ struct KnownFormat {
   std::uint32_t fourcc;
   PixelFormat format;
 };
-// In order of preference: what needs no work first.
-// The first that a camera has is taken: those with colour, by which instruments are told, before grey, and those that
-// need less work before others.
+// In order of preference: raw formats with colour, by which instruments are told, then grey, then what has to be
+// decoded; among alike ones what needs less work first.
 constexpr std::array<KnownFormat, 6> kFormats{{{V4L2_PIX_FMT_NV12, PixelFormat::kNv12},
                                                {V4L2_PIX_FMT_YUYV, PixelFormat::kYuyv},
                                                {V4L2_PIX_FMT_UYVY, PixelFormat::kUyvy},

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/vision/feature_detector.hpp"
+#include "core/vision/instrument_mask.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 #include "footage.hpp"
@@ -264,15 +265,20 @@ void compare_targets(const Footage& footage) {
   }
 }
 
-// What a round of the finder costs at once, beside what the whole picture would.
+// What a round of the finder looks at, beside what the whole picture would cost; all of a red that no instrument has.
 void find(const Footage& footage) {
   constexpr int kTimes = 15;
+  const int width = reduced_side(footage.width), height = reduced_side(footage.height);
+  std::vector<std::uint8_t> bgr;
+  for (int i = 0; i < width * height; ++i) bgr.insert(bgr.end(), {70, 80, 180});
   const GreyImage image = footage.image(0);
   const int features = static_cast<int>(footage.px[0].size());
   const int bands = bands_of(footage.width, footage.height);
   const auto look = [&](RowRange rows) {
     const DetectorSettings settings = detector_settings_for(image, features);
-    if (!find_features(image, {}, settings, features, {}, rows)) std::printf("  nothing could be looked for\n");
+    const auto mask = find_instruments({bgr.data(), width, height, 3 * width}, footage.width, footage.height);
+    const GreyImage barred{mask.value().data(), footage.width, footage.height, footage.width};
+    if (!find_features(image, {}, settings, features, barred, rows)) std::printf("  nothing could be looked for\n");
   };
   std::vector<Candidate> candidates;
   candidates.emplace_back("the whole picture", 1.0, [&] { look({}); });

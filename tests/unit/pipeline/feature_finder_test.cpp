@@ -140,20 +140,23 @@ TEST_F(ColouredFinder, BeginsARoundAtAFrameWithColourWhereThereAreAny) {
   for (const std::uint64_t frame : adopted_at) EXPECT_EQ((frame - kFinderDelayFrames) % 7, 0U);
 }
 
-TEST(FinderOfALargePicture, SearchesABandOfItInEachRoundAndAllOfItInTurn) {
-  constexpr int kWidth = 640, kHeight = 1200;  // two and a half times what is searched at once
+TEST(FinderOfALargePicture, SearchesABandOfItInEachRoundUntilAllHaveTheirShare) {
+  constexpr int kWidth = 640, kHeight = 2880;  // six times what is searched at once
+  constexpr std::size_t kBands = 6;
   Still still(kWidth, kHeight);
-  std::array<int, 3> adopted{};
-  for (int i = 0; i < 45; ++i) {
+  const auto maximum = static_cast<std::size_t>(Still::settings(kWidth, kHeight).features.maximum);
+  std::array<std::size_t, kBands> adopted{};
+  while (still.frame < 50) {
     double least = kHeight, most = 0;
-    for (const Vector2d& px : still.next_frame({}, 120)) {
-      ++adopted[static_cast<std::size_t>(px.y() * 3 / kHeight)];
+    for (const Vector2d& px : still.next_frame({}, static_cast<int>(maximum - still.occupied.size()))) {
+      ++adopted[static_cast<std::size_t>(px.y()) * kBands / kHeight];
       least = std::min(least, px.y());
       most = std::max(most, px.y());
     }
-    EXPECT_LE(most - least, kHeight / 3.0);
+    EXPECT_LT(most - least, kHeight / kBands);
   }
-  for (const int band : adopted) EXPECT_GE(band, 10);
+  // Nothing is lost here: the first bands would take all places.
+  for (const std::size_t band : adopted) EXPECT_EQ(band, maximum / kBands);
 }
 
 }  // namespace

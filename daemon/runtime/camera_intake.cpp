@@ -1,0 +1,40 @@
+#include "daemon/runtime/camera_intake.hpp"
+
+#include <utility>
+
+namespace perimap {
+
+void CameraIntake::reserve(int width, int height) {
+  grey_.reserve(width, height);
+  colour_.reserve(width, height);
+}
+
+bool CameraIntake::take(const CameraFrame& frame) {
+  if (intake_.entrance == nullptr) {
+    // Without a pipeline nobody needs it in grey.
+    intake_.frame(frame, {}, {});
+    return true;
+  }
+  const auto grey = grey_.convert(frame);
+  if (!grey) {
+    SensorIntake{nullptr, intake_.recorder}.frame(frame, {}, {});
+    return false;
+  }
+  const bool first = !before_;
+  // Only the first one's goes with itself, to tell at once that there is any.
+  if (first) colour_.take(frame);
+  intake_.frame(frame, *grey, first ? colour_.picture() : colour_for(frame));
+  if (!first) colour_.take(frame);
+  before_ = frame.stamp;
+  return true;
+}
+
+ColourImage CameraIntake::colour_for(const CameraFrame& frame) {
+  // After a gap, or an interruption, instruments may be anywhere.
+  constexpr Duration kLongestPeriod = std::chrono::milliseconds(250);
+  const bool follows =
+      frame.stamp.sequence == before_->sequence + 1 && frame.stamp.capture - before_->capture <= kLongestPeriod;
+  return follows ? colour_.picture() : ColourImage{};
+}
+
+}  // namespace perimap
