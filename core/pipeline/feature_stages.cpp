@@ -15,6 +15,7 @@ constexpr double kUnmappedMotionDeviation_px = 10.0;
 
 struct PixelPrediction {
   bool valid = false;
+  double pose_deviation_px = 0.0;  // largest, of the part that is not the map's
   Vector2d px = Vector2d::Zero();
   Matrix2d covariance_px2 = Matrix2d::Identity();
 };
@@ -22,18 +23,27 @@ struct PixelPrediction {
 // One pixel more on each axis: what the model does not know about the tissue.
 Matrix2d of_the_model() noexcept { return Matrix2d::Identity(); }
 
-PixelPrediction predict_from_map(const MapPrediction& map, const FrameRecord& frame, const PixelModel& model) noexcept {
+PixelPrediction predict_from_map(const MapPrediction& map, const FrameRecord& frame, const PixelModel& model,
+                                 const CommonShift& shift = {}) noexcept {
   if (!map.valid || !frame.measurable) return {};
   PixelPrediction prediction;
   Matrix23d J_C;
   const Vector3d p_WF = map.p_WF + frame.displacement_mm;
   if (model.camera.project(frame.X_CW * p_WF, prediction.px, &J_C) != ProjectionStatus::kOk) return {};
   const Matrix23d J_p = J_C * frame.X_CW.R;
-  CameraPose pose = frame.pose;
-  pose.position_variance_mm2 =
-      frame.tracker_variance_mm2 + frame.displacement_deviation_mm * frame.displacement_deviation_mm;
-  prediction.covariance_px2 =
-      J_p * map.covariance_W * J_p.transpose() + pose_noise_covariance(pose, p_WF, J_p) + of_the_model();
+  Matrix2d of_pose;
+  if (shift.known) {
+    // It has the errors of pose and displacement, and its deviation what the model does not know.
+    of_pose = shift.variance_at(prediction.px) * Matrix2d::Identity();
+    prediction.px += shift.at(prediction.px);
+  } else {
+    CameraPose pose = frame.pose;
+    pose.position_variance_mm2 =
+        frame.tracker_variance_mm2 + frame.displacement_deviation_mm * frame.displacement_deviation_mm;
+    of_pose = pose_noise_covariance(pose, p_WF, J_p) + of_the_model();
+  }
+  prediction.covariance_px2 = J_p * map.covariance_W * J_p.transpose() + of_pose;
+  prediction.pose_deviation_px = std::sqrt(larger_eigenvalue(of_pose));
   prediction.valid = prediction.covariance_px2.allFinite();
   return prediction;
 }
@@ -186,9 +196,18 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   const PixelPrediction from_map = predict_from_map(map, *job.frame, model);
   if (map.valid && job.frame->measurable) slot.in_view = from_map.valid && settings.camera.contains(from_map.px);
   if (slot.shed) return;
-  seek(slot, surer(from_map, predict_from_velocity(slot, job)), Looks::kAskedInDoubt, job, settings);
+  const PixelPrediction wide = surer(from_map, predict_from_velocity(slot, job));
+  if (job.shift.known && from_map.valid) {
+    const PixelPrediction near = predict_from_map(map, *job.frame, model, job.shift);
+    const bool is_surer = near.valid && near.covariance_px2.trace() < wide.covariance_px2.trace();
+    if (is_surer) seek(slot, near, Looks::kAskedInDoubt, job, settings);
+  }
+  if (slot.match.state != MatchState::kFound) seek(slot, wide, Looks::kAskedInDoubt, job, settings);
   if (slot.match.state != MatchState::kFound) return;
   slot.match_agrees = from_map.valid && agrees(slot.match, from_map, settings.estimator.update.gate);
+  if (!slot.is_scout) return;
+  slot.off_px = slot.match.px - from_map.px;
+  slot.pose_deviation_px = from_map.pose_deviation_px;
 }
 
 void follow(FeatureSlot& slot, const MapPrediction& map, const FrameJob& job, const PixelModel& model,

@@ -17,7 +17,8 @@ struct MapPrediction {
 };
 
 // A: predicts the feature's pixel with its covariance (map and pose, or its own motion in the image), searches there,
-// leaves slot.match.
+// leaves slot.match. Where the shift that the predictions have in common is known, a mapped feature is searched for
+// near there first.
 void predict_and_find(FeatureSlot& slot, const MapPrediction& from_map, const FrameJob& job, const PixelModel& model,
                       const PipelineSettings& settings) noexcept;
 

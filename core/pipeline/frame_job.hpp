@@ -8,6 +8,7 @@
 #include "core/periodic/basis.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/phase_spread.hpp"
+#include "core/pipeline/scouts.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/time/instant.hpp"
@@ -30,6 +31,7 @@ struct FrameJob {
   const FrameHistory* history = nullptr;
   GreyImage image;  // while features are searched for
   const PatchTracker* tracker = nullptr;
+  CommonShift shift;  // once the scouts have been searched for
   BasesAbout about_capture;
   std::array<FrameCamera, kCamerasKept> cameras;
   std::array<Instant, kCovariances> instants{};

@@ -105,7 +105,11 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
   plan_evaluation(frame, clock);
   adopt_found_features(frame.index);
 
-  team_.run(&run_stage<&Mapper::predict_and_find_shard>, this);
+  job_.shift = {};
+  choose_scouts(slots_, frame.index);
+  team_.run(&run_stage<&Mapper::predict_and_scout_shard>, this);
+  job_.shift = shift_of_scouts(slots_);
+  team_.run(&run_stage<&Mapper::find_shard>, this);
   const Instant found = MonotonicClock::now();
   settle_phases(frame);
   const Instant joined = MonotonicClock::now();
@@ -404,14 +408,23 @@ void Mapper::shed_load(bool put_off) noexcept {
   counters_.features_shed.set(shedding_.apply(shedding_decision_.limit()));
 }
 
-void Mapper::predict_and_find_shard(int worker) noexcept {
+void Mapper::predict_and_scout_shard(int worker) noexcept {
   const RealtimeScope realtime;
   for (auto g = static_cast<std::size_t>(worker); g < groups_.size(); g += tallies_.size()) {
-    FeatureGroup& group = groups_[g];
-    group.sweep(job_);
-    for (std::size_t lane = 0; lane < group.slots().size(); ++lane) {
-      predict_and_find(group.slots()[lane], group.prediction(lane), job_, model_, settings_);
-    }
+    groups_[g].sweep(job_);
+    find_in(groups_[g], true);
+  }
+}
+
+void Mapper::find_shard(int worker) noexcept {
+  const RealtimeScope realtime;
+  for (auto g = static_cast<std::size_t>(worker); g < groups_.size(); g += tallies_.size()) find_in(groups_[g], false);
+}
+
+void Mapper::find_in(FeatureGroup& group, bool scouts) noexcept {
+  for (std::size_t lane = 0; lane < group.slots().size(); ++lane) {
+    FeatureSlot& slot = group.slots()[lane];
+    if (slot.is_scout == scouts) predict_and_find(slot, group.prediction(lane), job_, model_, settings_);
   }
 }
 
