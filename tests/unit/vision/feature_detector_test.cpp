@@ -153,7 +153,7 @@ TEST(FeatureDetector, KnowsHighlightsInVideoOfLimitedRange) {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       const bool highlight = std::hypot(x - 160, y - 120) < 6;
-      image.at(x, y) = highlight ? 235 : static_cast<std::uint8_t>(16 + 200 * image.at(x, y) / 255);
+      image.at(x, y) = static_cast<std::uint8_t>(highlight ? 235 : 16 + 200 * image.at(x, y) / 255);
     }
   }
   const DetectorSettings settings = detector_settings_for(image.view(), 40);
