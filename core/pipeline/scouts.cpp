@@ -54,22 +54,26 @@ CommonShift shift_of_scouts(std::span<const FeatureSlot> slots) noexcept {
   // A pixel's deviation over that of a slope, squared: what few or crowded scouts do not tell is taken for small.
   constexpr double kSlope_px = 3.0;
   const Eigen::Matrix3d usual = Eigen::Vector3d(0.0, 1.0, 1.0).asDiagonal() * (1.0 / (kSlope_px * kSlope_px));
+  Eigen::Matrix3d counted = usual;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d terms = shift.terms(predicted(*found[i]));
+    counted += terms * terms.transpose();
+  }
+  shift.spread = counted.inverse();
+  if (!shift.spread.allFinite()) return {};
   constexpr int kRounds = 6;
   constexpr double kExact_px = 0.5;
   for (int round = 0; round < kRounds; ++round) {
     Eigen::Matrix3d normal = usual;
-    Eigen::Matrix3d counted = usual;
     Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
     for (std::size_t i = 0; i < count; ++i) {
       const double weight = round == 0 ? 1.0 : 1.0 / std::max(off_it(*found[i]), kExact_px);
       const Eigen::Vector3d terms = shift.terms(predicted(*found[i]));
       normal += weight * terms * terms.transpose();
-      counted += terms * terms.transpose();
       right += weight * terms * found[i]->off_px.transpose();
     }
     shift.coefficients = normal.ldlt().solve(right);
-    shift.spread = counted.inverse();
-    if (!shift.coefficients.allFinite() || !shift.spread.allFinite()) return {};
+    if (!shift.coefficients.allFinite()) return {};
   }
   constexpr double kLeast_px = 1.0, kMost_px = 4.0, kOfMiddle = 2.0;
   shift.deviation_px = std::max(kLeast_px, kOfMiddle * middle(off_it));

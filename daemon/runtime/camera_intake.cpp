@@ -1,6 +1,6 @@
 #include "daemon/runtime/camera_intake.hpp"
 
-#include <utility>
+#include <chrono>
 
 namespace perimap {
 

@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <vector>
-
-#include "tests/unit/camera/made_jpeg.hpp"
 
 namespace perimap {
 namespace {
