@@ -31,7 +31,7 @@ class FramePool {
       : width_(width),
         height_(height),
         pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * static_cast<std::size_t>(buffers)),
-        bgr_(static_cast<std::size_t>(3 * reduced_side(width)) * static_cast<std::size_t>(reduced_side(height)) *
+        bgr_(reduced_row_bytes(width) * static_cast<std::size_t>(reduced_side(height)) *
              static_cast<std::size_t>(buffers)),
         in_use_(std::make_unique<std::atomic<bool>[]>(static_cast<std::size_t>(buffers))),
         buffers_(buffers) {}
@@ -73,7 +73,7 @@ class FramePool {
   [[nodiscard]] int height() const noexcept { return height_; }
 
  private:
-  [[nodiscard]] int colour_stride() const noexcept { return 3 * reduced_side(width_); }
+  [[nodiscard]] int colour_stride() const noexcept { return static_cast<int>(reduced_row_bytes(width_)); }
 
   int width_;
   int height_;

@@ -20,5 +20,9 @@ struct ColourImage {
 // and what is told by it, instruments, is large.
 inline constexpr int kColourReduction = 4;
 [[nodiscard]] constexpr int reduced_side(int side) noexcept { return (side + kColourReduction - 1) / kColourReduction; }
+// Of a view of this width, reduced, without gaps between rows.
+[[nodiscard]] constexpr std::size_t reduced_row_bytes(int width) noexcept {
+  return std::size_t{3} * static_cast<std::size_t>(reduced_side(width));
+}
 
 }  // namespace perimap

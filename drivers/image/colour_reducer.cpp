@@ -65,8 +65,7 @@ void reduce_video(const CameraFrame& frame, std::uint8_t* out) noexcept {
 }  // namespace
 
 void ColourReducer::reserve(int width, int height) {
-  bgr_.resize(std::size_t{3} * static_cast<std::size_t>(reduced_side(width)) *
-              static_cast<std::size_t>(reduced_side(height)));
+  bgr_.resize(reduced_row_bytes(width) * static_cast<std::size_t>(reduced_side(height)));
 }
 
 void ColourReducer::take(const CameraFrame& frame) {
@@ -75,14 +74,13 @@ void ColourReducer::take(const CameraFrame& frame) {
   any_ = true;
   passed_over_ = 0;
   if (!reduce(frame)) return;
-  const int width = reduced_side(frame.width);
-  picture_ = {bgr_.data(), width, reduced_side(frame.height), std::ptrdiff_t{3} * width};
+  picture_ = {bgr_.data(), reduced_side(frame.width), reduced_side(frame.height),
+              static_cast<std::ptrdiff_t>(reduced_row_bytes(frame.width))};
 }
 
 bool ColourReducer::reduce(const CameraFrame& frame) {
   if (frame.format == PixelFormat::kGrey || !check_bytes(frame)) return false;
-  const std::size_t bytes = std::size_t{3} * static_cast<std::size_t>(reduced_side(frame.width)) *
-                            static_cast<std::size_t>(reduced_side(frame.height));
+  const std::size_t bytes = reduced_row_bytes(frame.width) * static_cast<std::size_t>(reduced_side(frame.height));
   if (bgr_.size() < bytes) bgr_.resize(bytes);
   if (frame.format == PixelFormat::kMjpg) {
     return jpeg_.decode_reduced_colour(frame.bytes, frame.width, frame.height, bgr_).has_value();

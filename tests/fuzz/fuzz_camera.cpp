@@ -27,9 +27,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       frame.height = announced->height;
     }
   }
-  static ColourReducer reducer(1);
+  static ColourReducer kept(1);
+  ColourReducer fresh(1);  // whose room is the picture's own, so that nothing behind it is missed
+  ColourReducer& reducer = data[3] / 128 == 0 ? kept : fresh;
   reducer.take(frame);
   const ColourImage& colour = reducer.picture();
+  const bool has_colour =
+      frame.format == PixelFormat::kYuyv || frame.format == PixelFormat::kUyvy || frame.format == PixelFormat::kNv12;
+  if (has_colour && check_bytes(frame) && colour.bgr == nullptr) std::abort();
+  if (colour.bgr != nullptr &&
+      (colour.width != reduced_side(frame.width) || colour.height != reduced_side(frame.height))) {
+    std::abort();
+  }
   unsigned colours = 0;
   for (int y = 0; y < colour.height; ++y) {
     for (int i = 0; i < 3 * colour.width; ++i) colours += colour.row(y)[i];

@@ -16,11 +16,13 @@ struct Yuv {
 // ITU-R BT.601, limited range: full red, and a middle grey.
 constexpr Yuv kRed{81, 90, 240}, kGrey{126, 128, 128};
 
-// Red on the left of `edge`, which is even, and grey on the right.
+// Red on the left of `edge`, which is even, in the rows above kLower; all else is grey.
 class Picture {
  public:
+  static constexpr int kLower = 8;
+
   Picture(PixelFormat format, int width, int height, int edge, std::size_t padding) {
-    const auto colour = [&](int x) { return x < edge ? kRed : kGrey; };
+    const auto colour = [&](int x, int y) { return x < edge && y < kLower ? kRed : kGrey; };
     frame_.format = format;
     frame_.width = width;
     frame_.height = height;
@@ -32,7 +34,7 @@ class Picture {
     for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
       for (int x = 0; x < width; ++x) {
         const auto at = static_cast<std::size_t>(x);
-        const Yuv c = colour(x);
+        const Yuv c = colour(x, static_cast<int>(y));
         if (format == PixelFormat::kGrey) put(y, at, c.y);
         if (format == PixelFormat::kNv12) {
           put(y, at, c.y);
@@ -78,7 +80,8 @@ TEST(ColourReducer, GivesTheColoursOfEachFormatAtAQuarterOfTheSize) {
       ASSERT_EQ(colour.height, (height + 3) / 4);
       for (int y = 0; y < colour.height; ++y) {
         for (int x = 0; x < colour.width; ++x) {
-          expect_near(bgr_at(colour, x, y), x < 4 ? std::array{0, 0, 255} : std::array{128, 128, 128});
+          const bool red = x < 4 && y < Picture::kLower / 4;
+          expect_near(bgr_at(colour, x, y), red ? std::array{0, 0, 255} : std::array{128, 128, 128});
         }
       }
     }
@@ -92,14 +95,16 @@ TEST(ColourReducer, GivesTheColoursOfAJpeg) {
   frame.width = kWidth;
   frame.height = kHeight;
   // Chroma 90 in both channels, luma 100: JFIF's full range.
-  const auto jpeg = test::make_jpeg(kWidth, kHeight, [](int, int) { return std::uint8_t{100}; });
+  const auto jpeg =
+      test::make_jpeg(kWidth, kHeight, [](int, int y) { return static_cast<std::uint8_t>(y < 16 ? 40 : 100); });
   frame.bytes = jpeg;
   ColourReducer reducer(1);
   reducer.take(frame);
   ASSERT_NE(reducer.picture().bgr, nullptr);
   EXPECT_EQ(reducer.picture().width, 13);
   EXPECT_EQ(reducer.picture().height, 9);
-  expect_near(bgr_at(reducer.picture(), 6, 4), {33, 140, 47});
+  expect_near(bgr_at(reducer.picture(), 6, 7), {33, 140, 47});
+  expect_near(bgr_at(reducer.picture(), 6, 1), {0, 80, 0});
   frame.bytes = std::span(jpeg).first(jpeg.size() / 2);
   reducer.take(frame);
   EXPECT_EQ(reducer.picture().bgr, nullptr);
