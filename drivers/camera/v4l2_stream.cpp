@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::uint32_t kBuffers = 8;  // a sixth of a second at 50 frames/s
 constexpr Duration kOldestStamp = std::chrono::seconds(2);
+constexpr double kNearRate = 0.01;  // a rate this near to the one asked for is that one
 
 struct KnownFormat {
   std::uint32_t fourcc;
@@ -204,9 +205,9 @@ Expected<void> V4l2Stream::settle_format() {
   if (!settings_.format) {
     constexpr double kAboutAsFast = 0.9;
     for (std::size_t i = 0; i < kFormats.size(); ++i) formats_hz[i] = fastest_hz(kFormats[i].fourcc, width, height);
-    enough_hz = *std::max_element(formats_hz.begin(), formats_hz.end());
-    if (settings_.frame_rate_hz > 0.0) enough_hz = std::min(enough_hz, settings_.frame_rate_hz);
-    enough_hz *= kAboutAsFast;
+    const double fastest = *std::max_element(formats_hz.begin(), formats_hz.end());
+    const double asked_hz = (1 - kNearRate) * settings_.frame_rate_hz;
+    enough_hz = asked_hz > 0.0 && fastest >= asked_hz ? asked_hz : kAboutAsFast * fastest;
   }
   // The driver puts what it can do in place of what it cannot. So each format is asked for, and the answer read.
   std::optional<v4l2_pix_format> right_format;
@@ -270,8 +271,7 @@ Expected<void> V4l2Stream::settle_rate() {
     }
     // What it took is the nearest that it can.
     const double given_hz = wanted.numerator > 0 ? static_cast<double>(wanted.denominator) / wanted.numerator : 0.0;
-    constexpr double kNear = 0.01;
-    if (std::abs(given_hz - settings_.frame_rate_hz) > kNear * settings_.frame_rate_hz) {
+    if (std::abs(given_hz - settings_.frame_rate_hz) > kNearRate * settings_.frame_rate_hz) {
       return refuse(fmt::format("gives {:.3g} frames/s instead of {:.3g}; at this size and format it may have no other",
                                 given_hz, settings_.frame_rate_hz));
     }

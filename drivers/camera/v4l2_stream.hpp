@@ -22,7 +22,7 @@ namespace perimap {
 
 struct V4l2Settings {
   std::string path;
-  std::optional<PixelFormat> format;  // none: the first that the camera has, in the order of PixelFormat, NV12 second
+  std::optional<PixelFormat> format;  // none: the first that the camera has at no much lower rate, raw colour first
   int width = 0;                      // 0, 0: what the camera is set to
   int height = 0;
   int input = -1;              // of a card with several; -1: what it is set to

@@ -94,6 +94,8 @@ TEST(V4l2Stream, PassesOverAFormatThatIsMuchSlowerThanAnother) {
   wanted.format.reset();
   camera.offered_periods[V4L2_PIX_FMT_YUYV] = {{1, 28}, {1, 5}};
   EXPECT_EQ(open(camera, wanted).value()->frame().format, PixelFormat::kYuyv);
+  wanted.frame_rate_hz = 30;  // which 28 is not
+  EXPECT_EQ(open(camera, wanted).value()->frame().format, PixelFormat::kMjpg);
 }
 
 TEST(V4l2Stream, GivesFramesWithTheirStampAndRowsAsTheDriverHasThem) {
