@@ -49,6 +49,8 @@ class FrameSource {
   virtual ~FrameSource() = default;
   // Null at the end; valid until the next call.
   [[nodiscard]] virtual Expected<const VideoFrame*> next() = 0;
+  // Of the frame given last, in its size or reduced; without pixels when it has none.
+  [[nodiscard]] virtual ColourImage colour() = 0;
   [[nodiscard]] virtual std::uint64_t announced_frames() const = 0;
   [[nodiscard]] virtual double frames_per_s() const = 0;
   // What could not be read, once next() has given null.
@@ -58,7 +60,12 @@ class FrameSource {
 class VideoSource final : public FrameSource {
  public:
   VideoSource(VideoReader reader, std::string path) : reader_(std::move(reader)), path_(std::move(path)) {}
-  Expected<const VideoFrame*> next() override { return reader_.next(); }
+  Expected<const VideoFrame*> next() override {
+    auto frame = reader_.next();
+    colour_ = frame && *frame != nullptr ? (*frame)->colour : ColourImage{};
+    return frame;
+  }
+  [[nodiscard]] ColourImage colour() override { return colour_; }
   [[nodiscard]] std::uint64_t announced_frames() const override { return reader_.announced_frames(); }
   [[nodiscard]] double frames_per_s() const override { return reader_.frames_per_s(); }
   [[nodiscard]] std::vector<Error> damage() const override {
@@ -70,6 +77,7 @@ class VideoSource final : public FrameSource {
  private:
   VideoReader reader_;
   std::string path_;
+  ColourImage colour_;
 };
 
 class RecordingSource final : public FrameSource {
@@ -83,7 +91,7 @@ class RecordingSource final : public FrameSource {
       auto message = reader_.next();
       if (!message) return tl::unexpected(message.error());
       if (!*message) return nullptr;
-      auto image = recorded_.read(reader_, **message);
+      auto image = recorded_.read(reader_, **message).and_then([this] { return recorded_.grey(); });
       if (image && frame_.grey.data != nullptr &&
           (image->width != frame_.grey.width || image->height != frame_.grey.height)) {
         image =
@@ -95,10 +103,10 @@ class RecordingSource final : public FrameSource {
       }
       frame_.number = messages_++;
       frame_.grey = *image;
-      frame_.colour = recorded_.colour();
       return &frame_;
     }
   }
+  [[nodiscard]] ColourImage colour() override { return recorded_.colour(); }
   [[nodiscard]] std::uint64_t announced_frames() const override { return 0; }
   [[nodiscard]] double frames_per_s() const override { return frames_per_s_; }
   [[nodiscard]] std::vector<Error> damage() const override {
@@ -116,7 +124,7 @@ class RecordingSource final : public FrameSource {
   std::uint64_t messages_ = 0;
   std::uint64_t unusable_ = 0;
   Error first_unusable_;
-  RecordedFrame recorded_{1};  // with the colour of any that may be looked for features in
+  RecordedFrame recorded_{1};
   VideoFrame frame_;
 };
 
@@ -254,7 +262,7 @@ class Tracking {
       : options_(options), follower_(settings(options, frames_per_s)) {}
 
   // Follows every feature in the frame and fills up their number every kFindInterval frames.
-  Expected<void> take(const VideoFrame& frame) {
+  Expected<void> take(const VideoFrame& frame, FrameSource& source) {
     const auto begin = std::chrono::steady_clock::now();
     follower_.follow(frame.grey);
     summary_.follow_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -263,7 +271,7 @@ class Tracking {
         follower_.saw_anything() && (options_.no_new_features ? !has_found_ : summary_.frames % kFindInterval == 0);
     ++summary_.frames;
     if (may_find && follower_.free() > 0) {
-      if (auto done = find(frame); !done) return done;
+      if (auto done = find(frame.grey, source.colour()); !done) return done;
     }
     constexpr int kPoor = 10;  // one in so many
     const auto found = std::count_if(follower_.features().begin(), follower_.features().end(),
@@ -294,17 +302,16 @@ class Tracking {
     return settings;
   }
 
-  Expected<void> find(const VideoFrame& frame) {
+  Expected<void> find(const GreyImage& image, const ColourImage& colour) {
     const std::vector<Vector2d> occupied = follower_.occupied();
     GreyImage barred;
     std::vector<std::uint8_t> mask;
-    if (frame.colour.bgr != nullptr) {
-      auto instruments = find_instruments(frame.colour, frame.grey.width, frame.grey.height);
+    if (colour.bgr != nullptr) {
+      auto instruments = find_instruments(colour, image.width, image.height);
       if (!instruments) return tl::unexpected(instruments.error());
       mask = *std::move(instruments);
-      barred = {mask.data(), frame.grey.width, frame.grey.height, frame.grey.width};
+      barred = {mask.data(), image.width, image.height, image.width};
     }
-    const GreyImage& image = frame.grey;
     const DetectorSettings detector = detector_settings_for(image, options_.features);
     const auto corners = find_features(image, occupied, detector, follower_.free(), barred);
     if (!corners) return tl::unexpected(corners.error());
@@ -361,7 +368,7 @@ int track(const Options& options) {
         break;
       }
       if (*frame == nullptr) break;
-      if (const auto taken = tracking.take(**frame); !taken) return refuse(taken.error(), kFailure);
+      if (const auto taken = tracking.take(**frame, **source); !taken) return refuse(taken.error(), kFailure);
       table->write(tracks.add((*frame)->number, tracking.features()));
       if (!options.video.empty()) {
         if (!video) {

@@ -17,7 +17,9 @@ constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
 
 ReplayFeeder::ReplayFeeder(ReplayReader reader, const SensorIntake& intake, std::optional<Duration> offset,
                            ReplayEdit edit)
-    : reader_(std::move(reader)), intake_(intake), offset_(offset), edit_(std::move(edit)) {}
+    : reader_(std::move(reader)), intake_(intake), offset_(offset), edit_(std::move(edit)) {
+  if (intake_.recorder != nullptr) reader_.keep_frames_as_they_came();
+}
 
 void ReplayFeeder::start(ThreadLauncher& threads) {
   reading_ = threads.launch("replay-read", ThreadRole::kHousekeeping, [this] { read_ahead(); });
@@ -67,26 +69,30 @@ std::optional<ReplayEvent> ReplayFeeder::take() {
 void ReplayFeeder::deliver() {
   std::optional<Duration> offset = offset_;
   const Instant begun = MonotonicClock::now();
+  std::vector<std::uint8_t> passed_over;  // the last colour
   while (auto event = take()) {
     if (!offset) offset = MonotonicClock::now() + kLead - arrival_of(*event);
     shift(*event, *offset);
     const Instant arrival = arrival_of(*event);
-    // As from a device: what came before there was anyone to take it is gone.
-    if (offset_ && arrival < begun) continue;
+    // As from a device: what came before there was anyone to take it is gone; but that there is colour is known from
+    // the first frame on.
+    if (offset_ && arrival < begun) {
+      if (auto* frame = std::get_if<FrameEvent>(&*event); frame != nullptr && !frame->bgr.empty()) {
+        passed_over.swap(frame->bgr);
+      }
+      continue;
+    }
+    if (auto* frame = std::get_if<FrameEvent>(&*event); frame != nullptr && !passed_over.empty()) {
+      if (frame->bgr.empty()) frame->bgr.swap(passed_over);
+      passed_over.clear();
+    }
     for (Instant now = MonotonicClock::now(); now < arrival; now = MonotonicClock::now()) {
       sleep_until(std::min(arrival, now + kLongestSleep));
       const std::lock_guard lock(mutex_);
       if (stopping_) return;
     }
     if (const auto* frame = std::get_if<FrameEvent>(&*event)) {
-      const GreyImage grey = frame->image();
-      CameraFrame as_it_came;
-      as_it_came.stamp = frame->stamp;
-      as_it_came.width = grey.width;
-      as_it_came.height = grey.height;
-      as_it_came.stride = static_cast<std::size_t>(grey.stride);
-      as_it_came.bytes = std::as_bytes(std::span(frame->pixels));
-      intake_.frame(as_it_came, grey, frame->colour());
+      intake_.frame(frame->as_it_came(), frame->image(), frame->colour());
     } else if (const auto* pose = std::get_if<TrackerSample>(&*event)) {
       intake_.pose(*pose);
     } else if (const auto* ecg = std::get_if<EcgBlock>(&*event)) {

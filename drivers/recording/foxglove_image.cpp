@@ -105,10 +105,10 @@ Expected<CameraFrame> borrow_camera_frame(const foxglove_CompressedImage& messag
   CameraFrame frame;
   frame.format = PixelFormat::kMjpg;
   frame.bytes = std::as_bytes(std::span(message.data._buffer, message.data._length));
-  const auto size = read_jpeg_size(frame.bytes);
-  if (!size) return tl::unexpected(size.error());
-  frame.width = size->width;
-  frame.height = size->height;
+  if (const auto size = read_jpeg_size(frame.bytes)) {
+    frame.width = size->width;
+    frame.height = size->height;
+  }
   return frame;
 }
 

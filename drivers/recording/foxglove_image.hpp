@@ -28,7 +28,7 @@ namespace perimap {
 [[nodiscard]] foxglove_CompressedImage borrow_compressed_image(const CameraFrame& frame, const std::string& frame_id);
 
 // The frame in a message, borrowed from it and without its stamp. Fails when the encoding is none that a camera of ours
-// gives, or the sizes do not fit together; whether a JPEG is whole shows when it is decoded.
+// gives, or the sizes do not fit together; whether a JPEG is one, and whole, shows when it is decoded.
 [[nodiscard]] Expected<CameraFrame> borrow_camera_frame(const foxglove_RawImage& message);
 [[nodiscard]] Expected<CameraFrame> borrow_camera_frame(const foxglove_CompressedImage& message);
 

@@ -21,14 +21,17 @@ Expected<CameraFrame> decode(const RecordingReader& reader, const RecordedMessag
 
 }  // namespace
 
-Expected<GreyImage> RecordedFrame::read(const RecordingReader& reader, const RecordedMessage& message) {
+Expected<void> RecordedFrame::read(const RecordingReader& reader, const RecordedMessage& message) {
   const bool compressed = message.type == topic_type<foxglove_CompressedImage>().schema_name();
   const auto frame = compressed ? decode(reader, message, compressed_) : decode(reader, message, raw_);
   if (!frame) return tl::unexpected(frame.error());
-  auto grey = converter_.convert(*frame);
-  if (!grey) return reader.wrong(message, grey.error().message);
-  colour_.take(*frame);
-  return grey;
+  frame_ = *frame;
+  return {};
+}
+
+const ColourImage& RecordedFrame::colour() {
+  colour_.take(frame_);
+  return colour_.picture();
 }
 
 }  // namespace perimap

@@ -4,7 +4,9 @@
 #include <optional>
 
 #include "core/error/expected.hpp"
+#include "core/sensors/colour_image.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "drivers/image/camera_frame.hpp"
 #include "drivers/image/colour_reducer.hpp"
 #include "drivers/image/grey_converter.hpp"
 #include "drivers/recording/recording_reader.hpp"
@@ -13,19 +15,24 @@ namespace perimap {
 
 class RecordedFrame {
  public:
-  // Colour is looked at in every so manieth frame alone.
+  // Colour is looked at in every so manieth alone of the frames that are asked for it.
   explicit RecordedFrame(int colour_interval_frames = ColourReducer::kUsualInterval)
       : colour_(colour_interval_frames) {}
 
-  // Of either of the types that a camera's channel can have. The image is valid until the next call. Errors have the
-  // form of RecordingReader's.
-  [[nodiscard]] Expected<GreyImage> read(const RecordingReader& reader, const RecordedMessage& message);
-  // Of the frame read last; without pixels when it has none, or was not looked at.
-  [[nodiscard]] const ColourImage& colour() const noexcept { return colour_.picture(); }
+  // Of either of the types that a camera's channel can have. Errors have the form of RecordingReader's. The others are
+  // about the frame read last, and valid until the next one is.
+  [[nodiscard]] Expected<void> read(const RecordingReader& reader, const RecordedMessage& message);
+  // Without its stamp.
+  [[nodiscard]] const CameraFrame& as_it_came() const noexcept { return frame_; }
+  // An error when it cannot be decoded.
+  [[nodiscard]] Expected<GreyImage> grey() { return converter_.convert(frame_); }
+  // Without pixels when it has none, or was not looked at.
+  [[nodiscard]] const ColourImage& colour();
 
  private:
   std::optional<Sample<foxglove_RawImage>> raw_;
   std::optional<Sample<foxglove_CompressedImage>> compressed_;
+  CameraFrame frame_;
   GreyConverter converter_;
   ColourReducer colour_;
 };

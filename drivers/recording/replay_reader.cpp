@@ -15,7 +15,7 @@ namespace {
 constexpr std::array<std::string_view, 3> kSensorChannels = {channels::kCameraImage, channels::kTrackerPose,
                                                              channels::kEcgSamples};
 
-Expected<ReplayEvent> pose_event(const RecordingReader& reader, const RecordedMessage& message) {
+Expected<std::optional<ReplayEvent>> pose_event(const RecordingReader& reader, const RecordedMessage& message) {
   const auto pose = reader.decode<perimap_TrackerPose>(message);
   if (!pose) return tl::unexpected(pose.error());
   auto sample = to_tracker_sample(**pose);
@@ -24,7 +24,7 @@ Expected<ReplayEvent> pose_event(const RecordingReader& reader, const RecordedMe
   return *sample;
 }
 
-Expected<ReplayEvent> ecg_event(const RecordingReader& reader, const RecordedMessage& message) {
+Expected<std::optional<ReplayEvent>> ecg_event(const RecordingReader& reader, const RecordedMessage& message) {
   const auto ecg = reader.decode<perimap_EcgSamples>(message);
   if (!ecg) return tl::unexpected(ecg.error());
   auto block = to_ecg_block(**ecg);
@@ -33,7 +33,7 @@ Expected<ReplayEvent> ecg_event(const RecordingReader& reader, const RecordedMes
   return *block;
 }
 
-Expected<ReplayEvent> r_trigger_event(const RecordingReader& reader, const RecordedMessage& message) {
+Expected<std::optional<ReplayEvent>> r_trigger_event(const RecordingReader& reader, const RecordedMessage& message) {
   const auto recorded = reader.decode<perimap_RTriggerPulse>(message);
   if (!recorded) return tl::unexpected(recorded.error());
   RTriggerPulse pulse = to_r_trigger_pulse(**recorded);
@@ -41,7 +41,7 @@ Expected<ReplayEvent> r_trigger_event(const RecordingReader& reader, const Recor
   return pulse;
 }
 
-Expected<ReplayEvent> respiration_event(const RecordingReader& reader, const RecordedMessage& message) {
+Expected<std::optional<ReplayEvent>> respiration_event(const RecordingReader& reader, const RecordedMessage& message) {
   const auto respiration = reader.decode<perimap_RespirationSamples>(message);
   if (!respiration) return tl::unexpected(respiration.error());
   auto block = to_respiration_block(**respiration);
@@ -51,6 +51,22 @@ Expected<ReplayEvent> respiration_event(const RecordingReader& reader, const Rec
 }
 
 }  // namespace
+
+CameraFrame FrameEvent::as_it_came() const noexcept {
+  CameraFrame frame;
+  frame.stamp = stamp;
+  frame.format = format;
+  frame.width = width;
+  frame.height = height;
+  frame.stride = stride;
+  frame.bytes = bytes;
+  if (bytes.empty()) {
+    frame.format = PixelFormat::kGrey;
+    frame.stride = static_cast<std::size_t>(width);
+    frame.bytes = std::as_bytes(std::span(pixels));
+  }
+  return frame;
+}
 
 Instant arrival_of(const ReplayEvent& event) noexcept {
   if (const auto* frame = std::get_if<FrameEvent>(&event)) return frame->stamp.arrival;
@@ -108,9 +124,17 @@ bool ReplayReader::has(std::string_view channel) const {
   return std::any_of(all.begin(), all.end(), [&](const RecordedChannel& c) { return c.name == channel; });
 }
 
-Expected<ReplayEvent> ReplayReader::frame_event(const RecordedMessage& message) {
-  const auto image = frame_.read(reader_, message);
-  if (!image) return tl::unexpected(image.error());
+Expected<std::optional<ReplayEvent>> ReplayReader::frame_event(const RecordedMessage& message) {
+  if (const auto read = frame_.read(reader_, message); !read) return tl::unexpected(read.error());
+  const auto image = frame_.grey();
+  if (!image) {
+    if (undecoded_++ == 0) first_undecoded_ = reader_.wrong(message, image.error().message).value();
+    return std::optional<ReplayEvent>();
+  }
+  if (frame_width_ > 0 && (image->width != frame_width_ || image->height != frame_height_)) {
+    return reader_.wrong(message, fmt::format("frame of {}x{}, the calibration is for {}x{}", image->width,
+                                              image->height, frame_width_, frame_height_));
+  }
   FrameEvent event;
   event.stamp = {message.sequence, message.source_time, message.arrival};
   event.width = image->width;
@@ -123,14 +147,34 @@ Expected<ReplayEvent> ReplayReader::frame_event(const RecordedMessage& message) 
   if (const ColourImage& colour = frame_.colour(); colour.bgr != nullptr) {
     event.bgr.assign(colour.bgr, colour.row(colour.height));
   }
+  if (const CameraFrame& came = frame_.as_it_came(); keeps_frames_ && came.format != PixelFormat::kGrey) {
+    event.format = came.format;
+    event.stride = came.stride;
+    event.bytes.assign(came.bytes.begin(), came.bytes.end());
+  }
   return event;
 }
 
+std::vector<Error> ReplayReader::damage() const {
+  std::vector<Error> all = reader_.damage();
+  if (undecoded_ > 0) {
+    all.push_back({fmt::format("{} frames could not be decoded and are left out, the first: {}", undecoded_,
+                               first_undecoded_.message)});
+  }
+  return all;
+}
+
 Expected<std::optional<ReplayEvent>> ReplayReader::next() {
-  const auto message = reader_.next();
-  if (!message) return tl::unexpected(message.error());
-  if (!*message) return std::optional<ReplayEvent>();
-  const RecordedMessage& m = **message;
+  for (;;) {
+    const auto message = reader_.next();
+    if (!message) return tl::unexpected(message.error());
+    if (!*message) return std::optional<ReplayEvent>();
+    auto event = event_of(**message);
+    if (!event || *event) return event;
+  }
+}
+
+Expected<std::optional<ReplayEvent>> ReplayReader::event_of(const RecordedMessage& m) {
   if (m.arrival < last_arrival_) {
     return reader_.wrong(m, fmt::format("arrival {} ns lies before the message ahead of it", to_ns(m.arrival)));
   }
@@ -139,18 +183,11 @@ Expected<std::optional<ReplayEvent>> ReplayReader::next() {
         m, fmt::format("arrival {} ns lies before its own source time {} ns", to_ns(m.arrival), to_ns(m.source_time)));
   }
   last_arrival_ = m.arrival;
-  auto event = m.channel == channels::kCameraImage   ? frame_event(m)
-               : m.channel == channels::kTrackerPose ? pose_event(reader_, m)
-               : m.channel == channels::kEcgSamples  ? ecg_event(reader_, m)
-               : m.channel == channels::kRTrigger    ? r_trigger_event(reader_, m)
-                                                     : respiration_event(reader_, m);
-  if (!event) return tl::unexpected(event.error());
-  if (const auto* frame = std::get_if<FrameEvent>(&*event);
-      frame != nullptr && frame_width_ > 0 && (frame->width != frame_width_ || frame->height != frame_height_)) {
-    return reader_.wrong(m, fmt::format("frame of {}x{}, the calibration is for {}x{}", frame->width, frame->height,
-                                        frame_width_, frame_height_));
-  }
-  return std::optional<ReplayEvent>(std::move(*event));
+  return m.channel == channels::kCameraImage   ? frame_event(m)
+         : m.channel == channels::kTrackerPose ? pose_event(reader_, m)
+         : m.channel == channels::kEcgSamples  ? ecg_event(reader_, m)
+         : m.channel == channels::kRTrigger    ? r_trigger_event(reader_, m)
+                                               : respiration_event(reader_, m);
 }
 
 }  // namespace perimap

@@ -1,6 +1,7 @@
 // The sensors' messages of a recording as the values that sources push into the pipeline, in order of arrival.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -18,6 +19,7 @@
 #include "core/sensors/r_trigger_pulse.hpp"
 #include "core/sensors/respiration_block.hpp"
 #include "core/sensors/tracker_sample.hpp"
+#include "drivers/image/camera_frame.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/recorded_frame.hpp"
 #include "drivers/recording/recording_reader.hpp"
@@ -30,12 +32,19 @@ struct FrameEvent {
   int height = 0;
   std::vector<std::uint8_t> pixels;  // rows without gaps
   std::vector<std::uint8_t> bgr;     // reduced, rows without gaps; empty in most frames, and without colour in all
+  // As the camera gave it, where that is kept and was not in grey.
+  PixelFormat format = PixelFormat::kGrey;
+  std::size_t stride = 0;
+  std::vector<std::byte> bytes;
 
   [[nodiscard]] GreyImage image() const noexcept { return {pixels.data(), width, height, width}; }
   [[nodiscard]] ColourImage colour() const noexcept {
     if (bgr.empty()) return {};
-    return {bgr.data(), reduced_side(width), reduced_side(height), std::ptrdiff_t{3} * reduced_side(width)};
+    return {bgr.data(), reduced_side(width), reduced_side(height),
+            static_cast<std::ptrdiff_t>(reduced_row_bytes(width))};
   }
+  // In grey where it is not kept.
+  [[nodiscard]] CameraFrame as_it_came() const noexcept;
 };
 
 using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock, RTriggerPulse, RespirationBlock>;
@@ -45,7 +54,8 @@ using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock, RTriggerPu
 void shift(ReplayEvent& event, Duration offset) noexcept;
 
 // Errors have the form "FILE: byte N: channel NAME: what is wrong". Messages lie in the file in order of arrival; one
-// that goes back, or that arrives before it was measured, is an error: replay could not deliver it at its time.
+// that goes back, or that arrives before it was measured, is an error: replay could not deliver it at its time. A frame
+// that cannot be decoded is left out, as it was when it was recorded: a gap in the count.
 class ReplayReader {
  public:
   // Fails when the recording has no camera, tracker or ECG channel. Triggers and breaths are given where there are any.
@@ -61,13 +71,17 @@ class ReplayReader {
   // The next event; nullopt at the end. Channels other than the sensors' are passed over.
   [[nodiscard]] Expected<std::optional<ReplayEvent>> next();
 
+  // From now on frames keep what they came as.
+  void keep_frames_as_they_came() noexcept { keeps_frames_ = true; }
+
   // From now on a frame of another size is an error.
   void require_frame_size(int width, int height) noexcept {
     frame_width_ = width;
     frame_height_ = height;
   }
 
-  [[nodiscard]] std::vector<Error> damage() const { return reader_.damage(); }
+  // What is damaged, of the file with ReadMode::kWhole and of the frames. Complete once next() has given nullopt.
+  [[nodiscard]] std::vector<Error> damage() const;
 
  private:
   explicit ReplayReader(RecordingReader reader) : reader_(std::move(reader)) {}
@@ -75,10 +89,14 @@ class ReplayReader {
   [[nodiscard]] bool has(std::string_view channel) const;
   [[nodiscard]] static Expected<ReplayReader> select(RecordingReader reader,
                                                      std::span<const std::string_view> channels);
-  [[nodiscard]] Expected<ReplayEvent> frame_event(const RecordedMessage& message);
+  [[nodiscard]] Expected<std::optional<ReplayEvent>> event_of(const RecordedMessage& message);
+  [[nodiscard]] Expected<std::optional<ReplayEvent>> frame_event(const RecordedMessage& message);
 
   RecordingReader reader_;
   RecordedFrame frame_;
+  bool keeps_frames_ = false;
+  std::uint64_t undecoded_ = 0;
+  Error first_undecoded_;
   Instant last_arrival_;
   int frame_width_ = 0;
   int frame_height_ = 0;

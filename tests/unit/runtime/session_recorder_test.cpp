@@ -1,5 +1,6 @@
 #include "daemon/runtime/session_recorder.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "counted_allocations.hpp"
+#include "daemon/runtime/replay_feeder.hpp"
 #include "daemon/runtime/session_recording.hpp"
 #include "drivers/recording/replay_reader.hpp"
 #include "tests/unit/camera/made_jpeg.hpp"
@@ -24,6 +26,7 @@ namespace perimap {
 namespace {
 
 using std::chrono::milliseconds;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr int kWidth = 64, kHeight = 48;
@@ -172,15 +175,78 @@ TEST_F(SessionRecording, KeepsFramesInTheCamerasOwnFormat) {
   }
   EXPECT_TRUE(seen);
   // And a replay sees its luma, and the colour.
+  int frames = 0;
   auto replay = ReplayReader::open(file_.string(), ReadMode::kStrict).value();
   for (auto event = replay.next().value(); event; event = replay.next().value()) {
     const auto* shown = std::get_if<FrameEvent>(&*event);
-    if (shown != nullptr) {
-      EXPECT_NEAR(shown->pixels[10], 110, 4);
-      const ColourImage colour = shown->colour();
-      ASSERT_NE(colour.bgr, nullptr);
-      EXPECT_GT(colour.row(0)[1], colour.row(0)[0] + 40);  // of chroma 90, 90
+    if (shown == nullptr) continue;
+    ++frames;
+    EXPECT_NEAR(shown->pixels[10], 110, 4);
+    const ColourImage colour = shown->colour();
+    ASSERT_NE(colour.bgr, nullptr);
+    EXPECT_GT(colour.row(0)[1], colour.row(0)[0] + 40);  // of chroma 90, 90
+  }
+  EXPECT_EQ(frames, 1);
+}
+
+TEST_F(SessionRecording, OfAFrameThatCanNotBeDecodedReplaysWithoutItAndSaysSo) {
+  const auto jpeg = test::make_jpeg(kWidth, kHeight, [](int x, int) { return static_cast<std::uint8_t>(100 + x); });
+  const Instant now = MonotonicClock::now();
+  auto session = recorder();
+  session->start(threads);
+  for (std::uint64_t i = 1; i <= 3; ++i) {
+    CameraFrame compressed = frame(i, now, PixelFormat::kMjpg);
+    compressed.bytes = std::span(jpeg).first(i == 2 ? jpeg.size() / 3 : jpeg.size());
+    session->frame(compressed);
+  }
+  session->pose(pose(2, now));
+  session->ecg(block(1, now));
+  session->stop();
+  auto replay = ReplayReader::open(file_.string(), ReadMode::kStrict).value();
+  std::vector<std::uint64_t> frames;
+  for (auto event = replay.next().value(); event; event = replay.next().value()) {
+    if (const auto* shown = std::get_if<FrameEvent>(&*event)) frames.push_back(shown->stamp.sequence);
+  }
+  EXPECT_EQ(frames, (std::vector<std::uint64_t>{1, 3}));
+  ASSERT_EQ(replay.damage().size(), 1U);
+  EXPECT_THAT(replay.damage()[0].message, AllOf(HasSubstr(file_.string()), HasSubstr("1 frames could not be decoded")));
+}
+
+TEST_F(SessionRecording, OfOneThatIsPlayedHasItsFramesAsTheyCame) {
+  const auto jpeg = test::make_jpeg(kWidth, kHeight, [](int x, int) { return static_cast<std::uint8_t>(100 + x); });
+  for (const PixelFormat format : {PixelFormat::kMjpg, PixelFormat::kYuyv}) {
+    SCOPED_TRACE(pixel_format_name(format));
+    const Instant now = MonotonicClock::now();
+    CameraFrame came = frame(1, now, format);
+    if (format == PixelFormat::kMjpg) came.bytes = jpeg;
+    file_ = folder_ / fmt::format("played-{}.mcap", pixel_format_name(format));
+    auto first = recorder();
+    first->start(threads);
+    first->frame(came);
+    first->pose(pose(2, now));
+    first->ecg(block(1, now));
+    first->stop();
+    auto played = ReplayReader::open(file_.string(), ReadMode::kStrict).value();
+    file_ += ".again";
+    auto again = recorder();
+    again->start(threads);
+    {
+      ReplayFeeder feeder(std::move(played), {nullptr, again.get()});
+      feeder.start(threads);
+      while (!feeder.ended()) std::this_thread::sleep_for(milliseconds(5));
     }
+    again->stop();
+    auto reader = ReplayReader::open(file_.string(), ReadMode::kStrict).value();
+    reader.keep_frames_as_they_came();
+    int frames = 0;
+    for (auto event = reader.next().value(); event; event = reader.next().value()) {
+      const auto* shown = std::get_if<FrameEvent>(&*event);
+      if (shown == nullptr) continue;
+      ++frames;
+      EXPECT_EQ(shown->as_it_came().format, format);
+      EXPECT_TRUE(std::equal(came.bytes.begin(), came.bytes.end(), shown->bytes.begin(), shown->bytes.end()));
+    }
+    EXPECT_EQ(frames, 1);
   }
 }
 
