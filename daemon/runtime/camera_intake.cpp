@@ -25,16 +25,14 @@ bool CameraIntake::take(const CameraFrame& frame) {
   if (first) colour_.take(frame);
   intake_.frame(frame, *grey, first ? colour_.picture() : colour_for(frame));
   if (!first) colour_.take(frame);
-  before_ = frame.stamp;
+  before_ = frame.stamp.capture;
   return true;
 }
 
 ColourImage CameraIntake::colour_for(const CameraFrame& frame) {
-  // After a gap, or an interruption, instruments may be anywhere.
-  constexpr Duration kLongestPeriod = std::chrono::milliseconds(250);
-  const bool follows =
-      frame.stamp.sequence == before_->sequence + 1 && frame.stamp.capture - before_->capture <= kLongestPeriod;
-  return follows ? colour_.picture() : ColourImage{};
+  // After an interruption instruments may be anywhere. A frame that is lost between the two is none.
+  constexpr Duration kOldest = std::chrono::milliseconds(250);
+  return frame.stamp.capture - *before_ <= kOldest ? colour_.picture() : ColourImage{};
 }
 
 }  // namespace perimap

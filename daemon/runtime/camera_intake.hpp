@@ -3,14 +3,14 @@
 
 #include <optional>
 
-#include "core/sensors/frame_stamp.hpp"
+#include "core/time/instant.hpp"
 #include "daemon/runtime/sensor_intake.hpp"
 #include "drivers/image/colour_reducer.hpp"
 #include "drivers/image/grey_converter.hpp"
 
 namespace perimap {
 
-// Belongs to the camera's thread. A frame does not wait for its colour: that goes with the next one, if it follows.
+// Belongs to the camera's thread. A frame does not wait for its colour: that goes with the next one, if it comes soon.
 class CameraIntake {
  public:
   explicit CameraIntake(const SensorIntake& intake) : intake_(intake) {}
@@ -27,7 +27,7 @@ class CameraIntake {
   const SensorIntake& intake_;
   GreyConverter grey_;
   ColourReducer colour_;
-  std::optional<FrameStamp> before_;  // the frame whose colour colour_ has
+  std::optional<Instant> before_;  // when the frame was captured whose colour colour_ has
 };
 
 }  // namespace perimap

@@ -8,6 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "counted_allocations.hpp"
+
 namespace perimap {
 namespace {
 
@@ -59,19 +61,35 @@ TEST_F(CameraInto, AFramesColourGoesWithTheNextOneAndTheFirstOnesWithBoth) {
   EXPECT_EQ(seen, (std::vector<bool>{true, true, false, false, true, false, false, true}));
 }
 
-TEST_F(CameraInto, ColourIsNotKeptOverAGapOrAnInterruption) {
+TEST_F(CameraInto, ColourIsKeptOverLostFramesAndNotOverAnInterruption) {
   for (std::uint64_t i = 0; i < 4; ++i) static_cast<void>(coloured(frame(i)));
-  EXPECT_EQ(coloured(frame(5)), false) << "frame 4 is missing";
+  EXPECT_EQ(coloured(frame(5)), true) << "frame 4 is missing";
   for (std::uint64_t i = 6; i < 8; ++i) static_cast<void>(coloured(frame(i)));
-  EXPECT_EQ(coloured(frame(8, std::chrono::minutes(2))), false) << "the camera was gone";
+  EXPECT_EQ(coloured(frame(8, milliseconds(300))), false) << "the camera was gone";
 }
 
-TEST_F(CameraInto, AFrameThatCanNotBeDecodedIsAGap) {
+TEST_F(CameraInto, FramesThatLackEverySecondOneStillHaveColour) {
+  int with_colour = 0;
+  for (std::uint64_t i = 0; i < 12; ++i) with_colour += coloured(frame(2 * i)).value() ? 1 : 0;
+  EXPECT_EQ(with_colour, 5);
+}
+
+TEST_F(CameraInto, AFrameThatCanNotBeDecodedIsAGapAndTakesNoColourAway) {
   for (std::uint64_t i = 0; i < 4; ++i) static_cast<void>(coloured(frame(i)));
   CameraFrame damaged = frame(4);
   damaged.format = PixelFormat::kMjpg;
-  EXPECT_FALSE(camera_.take(damaged));
-  EXPECT_EQ(coloured(frame(5)), false);
+  EXPECT_EQ(coloured(damaged), std::nullopt);
+  EXPECT_EQ(coloured(frame(5)), true);
+}
+
+TEST_F(CameraInto, FramesTakeNothingFromTheHeapOnceThereIsRoom) {
+  camera_.reserve(kWidth, kHeight);
+  bool all = true;
+  EXPECT_EQ(test::allocations_of([&] {
+              for (std::uint64_t i = 0; i < 4; ++i) all = camera_.take(frame(i)) && all;
+            }),
+            0);
+  EXPECT_TRUE(all);
 }
 
 TEST_F(CameraInto, GreyFramesHaveNone) {
