@@ -75,6 +75,16 @@ bool is_local_maximum(const cv::Mat& strength, int x, int y) {
   return true;
 }
 
+// A local maximum has neighbours.
+int border_of(const DetectorSettings& settings) { return std::max(settings.border_px, 1); }
+
+// As far as a pixel's verdict looks.
+int reach_of(const DetectorSettings& settings) {
+  const double highlight = settings.highlight_clearance_px;
+  const double background = settings.background_clearance_px + settings.background_size_px;
+  return std::max(border_of(settings), static_cast<int>(std::ceil(std::max(highlight, background))));
+}
+
 struct Tile {
   std::vector<Corner> corners;  // strongest first
   std::size_t next = 0;         // the first corner not looked at yet
@@ -102,21 +112,21 @@ cv::Mat borrow(const GreyImage& image) {
           static_cast<std::size_t>(image.stride)};
 }
 
-// `taken` may lie outside: the image can be a part of one.
+// In `rows` of the image, which can be a part of one: `taken` may lie outside.
 std::vector<Vector2d> find(const cv::Mat& image, std::vector<Vector2d> taken, const DetectorSettings& settings,
-                           std::size_t how_many, const cv::Mat& barred) {
+                           std::size_t how_many, const cv::Mat& barred, RowRange rows) {
   const cv::Mat strength = corner_strength(image, settings.min_roundness);
   cv::Mat mask = forbidden(image, settings);
   if (!barred.empty()) mask |= barred;
   const int columns = (image.cols + settings.tile_px - 1) / settings.tile_px;
-  const int rows = (image.rows + settings.tile_px - 1) / settings.tile_px;
-  std::vector<Tile> tiles(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  const int down = (image.rows + settings.tile_px - 1) / settings.tile_px;
+  std::vector<Tile> tiles(static_cast<std::size_t>(columns) * static_cast<std::size_t>(down));
   const auto tile_at = [&](int x, int y) -> Tile& {
     return tiles[static_cast<std::size_t>(y / settings.tile_px) * static_cast<std::size_t>(columns) +
                  static_cast<std::size_t>(x / settings.tile_px)];
   };
-  const int border = std::max(settings.border_px, 1);  // a local maximum has neighbours
-  for (int y = border; y < image.rows - border; ++y) {
+  const int border = border_of(settings);
+  for (int y = rows.begin; y < rows.end; ++y) {
     for (int x = border; x < image.cols - border; ++x) {
       if (mask.at<std::uint8_t>(y, x) != 0 || strength.at<float>(y, x) < settings.min_corner) continue;
       if (is_local_maximum(strength, x, y)) tile_at(x, y).corners.push_back({x, y, strength.at<float>(y, x)});
@@ -197,6 +207,10 @@ RowRange rows_of_band(int height, int band, int bands) noexcept {
   return {band * height / bands, (band + 1) * height / bands};
 }
 
+int band_of_row(int height, int row, int bands) noexcept {
+  return std::clamp(((row + 1) * bands - 1) / std::max(height, 1), 0, bands - 1);
+}
+
 Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<const Vector2d> occupied,
                                               const DetectorSettings& settings, int how_many, const GreyImage& barred,
                                               RowRange rows) {
@@ -208,22 +222,22 @@ Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<
     return fail("feature detector: tile_px, background_size_px and min_distance_px must be positive");
   }
   if (how_many <= 0) return std::vector<Vector2d>{};
-  // The band, with as much about it as a feature needs.
-  const int border = std::max(settings.border_px, 0);
-  const int first = std::max(rows.begin, border) - border;
-  const int last = rows.end < image.height - border ? std::max(rows.end + border, first) : image.height;
+  const int border = border_of(settings), reach = reach_of(settings);
+  const RowRange searched{std::max(rows.begin, border), std::min(rows.end, image.height - border)};
+  if (searched.end <= searched.begin) return std::vector<Vector2d>{};
+  const int first = std::max(searched.begin - reach, 0), last = std::min(searched.end + reach, image.height);
   const auto band_of = [&](const GreyImage& whole) {
     return GreyImage{whole.row(first), whole.width, last - first, whole.stride};
   };
-  if (last <= first) return std::vector<Vector2d>{};
   const bool bars = barred.data != nullptr && barred.width == image.width && barred.height == image.height;
   try {
     cv::setNumThreads(1);  // the process has the threads it made itself, and no others
     const Vector2d origin(0, first);
     std::vector<Vector2d> taken(occupied.begin(), occupied.end());
     for (Vector2d& px : taken) px -= origin;
-    std::vector<Vector2d> found = find(borrow(band_of(image)), std::move(taken), settings,
-                                       static_cast<std::size_t>(how_many), bars ? borrow(band_of(barred)) : cv::Mat());
+    std::vector<Vector2d> found =
+        find(borrow(band_of(image)), std::move(taken), settings, static_cast<std::size_t>(how_many),
+             bars ? borrow(band_of(barred)) : cv::Mat(), {searched.begin - first, searched.end - first});
     for (Vector2d& px : found) px += origin;
     return found;
   } catch (const std::exception& error) {

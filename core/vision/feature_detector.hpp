@@ -44,14 +44,16 @@ struct RowRange {
   int end = std::numeric_limits<int>::max();
 };
 
-// To look for features with a bounded amount of work at a time: in how many bands, of about as many pixels as 640x480
-// has each, and which rows the bands 0, 1, ... are.
+// To look for features with a bounded amount of work at a time: in how many bands, of no more pixels than 640x480 has
+// each, which rows the bands 0, 1, ... are, and which of them has a row.
 [[nodiscard]] int bands_of(int width, int height) noexcept;
 [[nodiscard]] RowRange rows_of_band(int height, int band, int bands) noexcept;
+[[nodiscard]] int band_of_row(int height, int row, int bands) noexcept;
 
 // Up to how_many new features, level-0 pixels (whole ones), none within min_distance_px of another or of occupied.
 // `barred`, when it has the image's size, is not 0 where no feature may be (instruments); an empty one bars nothing.
-// Features are found in `rows` alone, and no more of the image is read than those and border_px about them.
+// Features are found in `rows` alone, the same ones of a row whatever the others, but for distances and shares; no more
+// of the image is read than those rows and what is within the border's and the clearances' reach of them.
 // The same input gives the same output in the same order, best tiles' corners first. Allocates; meant for a thread
 // without a deadline. An empty list when there is nothing to be found; an error for an unusable image or setting.
 [[nodiscard]] Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<const Vector2d> occupied,

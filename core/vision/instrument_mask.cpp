@@ -15,6 +15,7 @@ std::vector<std::uint8_t> find(const cv::Mat& image, int width, int height) {
   constexpr int kLit_grey = 30;
   constexpr double kLeastSaturation = 0.18;                 // (largest - smallest) / largest of the three channels
   constexpr double kMargin = 1.0 / 80, kGlint = 1.0 / 160;  // of the image's width; a glint's radius
+  constexpr double kLeastMargin = 16.0 / kColourReduction;  // no template reaches onto what slides over the tissue
   cv::Mat small = image;
   const cv::Size reduced(reduced_side(width), reduced_side(height));
   if (image.cols > reduced.width || image.rows > reduced.height) {
@@ -37,10 +38,10 @@ std::vector<std::uint8_t> find(const cv::Mat& image, int width, int height) {
   std::vector<std::uint8_t> mask(bytes, 0);
   if (2 * unsaturated > lit) return mask;
   // Without the glints, which are small; they are barred as highlights.
-  const int radius = std::max(1, static_cast<int>(kGlint * small.cols));
+  const int radius = std::clamp(static_cast<int>(kGlint * small.cols), 1, 2);
   const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1});
   cv::morphologyEx(grey, grey, cv::MORPH_OPEN, disc);
-  grey = widened(grey, std::max(1.0, kMargin * small.cols));
+  grey = widened(grey, std::max(kLeastMargin, kMargin * small.cols));
   cv::Mat full(height, width, CV_8UC1, mask.data());
   cv::resize(grey, full, full.size(), 0, 0, cv::INTER_NEAREST);
   return mask;

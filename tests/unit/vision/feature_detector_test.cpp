@@ -104,8 +104,16 @@ TEST(FeatureDetector, GivesTheSameListEachTime) {
 }
 
 TEST(FeatureDetector, FindsInEachBandOfRowsWhatItFindsInTheWholePicture) {
-  const ImageBuffer image = textured();
+  ImageBuffer image = textured();
+  // What is dark, and what is white, bar places across the bands.
+  for (int y = 60; y < 75; ++y) {
+    for (int x = 40; x < 140; ++x) image.at(x, y) = 0;
+  }
+  for (int y = 112; y < 115; ++y) {
+    for (int x = 200; x < 203; ++x) image.at(x, y) = 255;
+  }
   DetectorSettings settings;
+  settings.border_px = 0;
   settings.min_distance_px = 0;  // so that no corner takes another's place
   constexpr int kAll = 1000;
   const auto whole = find_features(image.view(), {}, settings, kAll);
@@ -128,6 +136,12 @@ TEST(FeatureDetector, FindsInEachBandOfRowsWhatItFindsInTheWholePicture) {
   std::sort(in_bands.begin(), in_bands.end(), before);
   ASSERT_GE(all.size(), 50U);
   EXPECT_EQ(in_bands, all);
+  for (int bands = 1; bands < 8; ++bands) {
+    for (int y = 0; y < kHeight; ++y) {
+      const RowRange rows = rows_of_band(kHeight, band_of_row(kHeight, y, bands), bands);
+      EXPECT_TRUE(rows.begin <= y && y < rows.end) << y << " of " << bands;
+    }
+  }
   for (const RowRange& none : {RowRange{kHeight, kHeight + 50}, RowRange{60, 60}, RowRange{80, 20}, RowRange{-50, 0}}) {
     EXPECT_EQ(find_features(image.view(), {}, settings, kAll, {}, none).value().size(), 0U) << none.begin;
   }
