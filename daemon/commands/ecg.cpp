@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -13,6 +15,9 @@
 #include <system_error>
 #include <vector>
 
+#include "core/phase/ecg_filter.hpp"
+#include "core/statistics/upper_median.hpp"
+#include "core/time/instant.hpp"
 #include "daemon/commands/progress.hpp"
 #include "daemon/ecg/beat_score.hpp"
 #include "daemon/ecg/ecg_analysis.hpp"
@@ -229,11 +234,27 @@ std::string to_text(const BeatScore& score) {
   return text;
 }
 
+// The detector takes nothing at other rates.
+Expected<void> check_rate(const EcgTrace& trace, const std::string& input) {
+  constexpr std::size_t kEnough = 1000;
+  std::vector<double> intervals_s;
+  for (std::size_t i = 1; i < std::min(trace.time_s.size(), kEnough); ++i) {
+    intervals_s.push_back(trace.time_s[i] - trace.time_s[i - 1]);
+  }
+  if (intervals_s.empty()) return {};
+  const double period_s = upper_median(intervals_s.begin(), intervals_s.end());
+  if (period_s >= to_seconds(EcgFilter::kShortestPeriod) && period_s <= to_seconds(EcgFilter::kLongestPeriod)) {
+    return {};
+  }
+  return fail(fmt::format("{}: {:.4g} samples a second; from 100 to 1000 are taken", input, 1 / period_s));
+}
+
 Expected<void> run(const Options& options) {
   auto stop = StopSignal::install();
   if (!stop) return tl::unexpected(stop.error());
   const auto trace = read_trace(options);
   if (!trace) return tl::unexpected(trace.error());
+  if (const auto fits = check_rate(*trace, options.input); !fits) return fits;
   std::vector<ReferenceBeat> reference;
   if (!options.reference.empty()) {
     const auto text = read_whole(options.reference, "table of reference beats");

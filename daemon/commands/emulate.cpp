@@ -370,7 +370,7 @@ void add_emulate_command(CLI::App& app, int& exit_code) {
           ->capture_default_str(),
       command->add_flag("--can-extended", options->can.extended, "That identifier has 29 bits"),
       command->add_option("--can-rate", options->can.sample_rate_hz, "Samples a second over CAN")
-          ->check(CLI::Range(50.0, 4000.0))
+          ->check(CLI::Range(100.0, 1000.0))
           ->capture_default_str(),
       command->add_option("--can-count", options->can.count_mV, "mV that a count of these samples stands for")
           ->check(CLI::Range(1e-6, 1000.0))

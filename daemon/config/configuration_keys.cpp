@@ -425,7 +425,7 @@ void add_ecg(std::vector<ConfigurationKey>& keys) {
                "input of a bitalino (1 to 6) or cyton (1 to 8) that carries the ECG; 0: the usual one, 2 and 1")
       .number("count_mV", 0, 1000, PERIMAP_MEMBER(ecg.count_mV),
               "mV of one count of medlab and can; 0: the usual, 0.02 and 0.005")
-      .number("can_sample_rate_hz", 50, 4000, PERIMAP_MEMBER(ecg.can_sample_rate_hz), "samples a second over can")
+      .number("can_sample_rate_hz", 100, 1000, PERIMAP_MEMBER(ecg.can_sample_rate_hz), "samples a second over can")
       .integer("can_identifier", 0, 0x1FFFFFFF, PERIMAP_MEMBER(ecg.can_identifier),
                "identifier of the frames of config/perimap_ecg.dbc")
       .flag("can_extended", PERIMAP_MEMBER(ecg.can_extended), "the identifier has 29 bits")

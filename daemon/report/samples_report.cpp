@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "daemon/report/recorded_beats.hpp"
 #include "daemon/report/recorded_truth.hpp"
 #include "drivers/recording/channels.hpp"
 
@@ -37,7 +38,10 @@ Expected<SamplesReport> report_samples(const std::string& recording, const std::
   constexpr std::array<std::string_view, 2> kPublished = {channels::kSurface, channels::kSurfaceModel};
   if (auto selected = reader->select(kPublished); !selected) return tl::unexpected(selected.error());
 
+  auto beats = load_beats(recording, mode);
+  if (!beats) return tl::unexpected(std::move(beats.error()));
   Accuracy accuracy((*truth)->truth, (*truth)->camera, (*truth)->captures.begin()->second);
+  accuracy.set_beats(*std::move(beats));
   SamplesReport report;
   std::string wanted = stream;
   std::optional<Duration> to_recording;

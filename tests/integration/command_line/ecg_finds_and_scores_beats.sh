@@ -34,6 +34,7 @@ printf 'time_s,mV\n0,1\n0.1,x\n' > "$work/garbled.csv"
 expect 1 'garbled.csv:3:5: expected a number' "$work/garbled.csv"
 expect 1 'nothing.csv' "$work/nothing.csv"
 expect 1 'say --rate' "$work/alone.csv"
+expect 1 'alone.csv: 2000 samples a second; from 100 to 1000 are taken' "$work/alone.csv" --rate 2000
 expect 1 'no WFDB\|nothing.hea' "$work/nothing.hea"
 head -c 100000 "$recording" > "$work/cut.mcap"
 expect 1 'cut.mcap: byte 100000: .*cut off' "$work/cut.mcap"

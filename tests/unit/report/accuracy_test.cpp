@@ -47,9 +47,11 @@ perimap_SurfaceFeature feature(std::uint32_t id, perimap_FeatureState state, dou
   return f;
 }
 
-void publish(Accuracy& accuracy, double valid_s, std::vector<perimap_SurfaceFeature> features) {
+void publish(Accuracy& accuracy, double valid_s, std::vector<perimap_SurfaceFeature> features,
+             perimap_SurfaceState state = perimap_SurfaceState{}) {
   perimap_Surface sample{};
-  sample.valid_time_ns = static_cast<std::int64_t>(valid_s * 1e9);
+  sample.state = state;
+  sample.valid_time_ns = sample.release_time_ns = static_cast<std::int64_t>(valid_s * 1e9);
   const auto n = static_cast<std::uint32_t>(features.size());
   sample.features = {n, n, features.data(), false};
   accuracy.add(sample);
@@ -113,6 +115,30 @@ TEST(Accuracy, SaysWhichConvergedFeaturesHaveNoTruth) {
   const AccuracyReport report = accuracy.report(Duration(0));
   EXPECT_EQ(report.features_without_truth, 2U);
   EXPECT_EQ(report.settled.count, 0U);
+}
+
+TEST(Accuracy, CountsApartWhatWasReleasedBeforeThePrematureBeatWasKnown) {
+  const GroundTruth truth = still_triangle();
+  Accuracy accuracy(truth, camera(), kFirstFrame);
+  const auto beat = [](double time_s, double detected_s, BeatClass beat_class) {
+    RPeak peak;
+    peak.time = Instant(from_seconds(time_s));
+    peak.detected_at = Instant(from_seconds(detected_s));
+    peak.beat_class = beat_class;
+    return peak;
+  };
+  accuracy.set_beats({beat(16.0, 16.1, BeatClass::kNormal), beat(16.5, 16.6, BeatClass::kPremature),
+                      beat(17.5, 17.6, BeatClass::kNormal)});
+  tell_origin(accuracy, 1);
+  for (const double t : {15.9, 16.4, 17.0, 17.1}) {
+    publish(accuracy, t, {feature(1, perimap_FEATURE_CONVERGED, t < 17.05 ? 5.0 : 1.0)}, perimap_SURFACE_GOOD);
+  }
+  const AccuracyReport report = accuracy.report(Duration(0));
+  EXPECT_EQ(report.good.premature_beats, 1U);
+  EXPECT_EQ(report.good.off_before_known, 1U) << "at 16.4 s";
+  EXPECT_EQ(report.good.off, 2U);
+  EXPECT_EQ(report.good.count, 4U);
+  EXPECT_EQ(report.good.features_off, 1U);
 }
 
 TEST(Accuracy, BringsPublishedInstantsToTheRecordingsClock) {
