@@ -1,6 +1,7 @@
 #include "core/pipeline/feature_finder.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <utility>
@@ -34,8 +35,10 @@ FeatureFinder::FeatureFinder(const PipelineSettings& settings, PipelineCounters&
   for (Frame& frame : frames_) {
     frame.pixels.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   }
-  bgr_.resize(static_cast<std::size_t>(3 * reduced_side(width_)) * static_cast<std::size_t>(reduced_side(height_)));
+  bgr_.resize(reduced_row_bytes(width_) * static_cast<std::size_t>(reduced_side(height_)));
   occupied_.reserve(static_cast<std::size_t>(settings.features.maximum));
+  in_bands_.resize(static_cast<std::size_t>(bands_), 0);
+  gave_.resize(static_cast<std::size_t>(bands_), true);
   found_.reserve(kMaximumPerRound);
 }
 
@@ -45,6 +48,19 @@ bool FeatureFinder::may_begin(std::uint64_t frame_index, const ColourImage& colo
   const bool coloured = colour.bgr != nullptr;
   if (coloured) colour_until_ = frame_index + kColourFrames;
   return frame_index >= next_round_at_ && (coloured || frame_index >= colour_until_);
+}
+
+int FeatureFinder::next_band() noexcept {
+  std::fill(in_bands_.begin(), in_bands_.end(), 0);
+  for (const Vector2d& px : occupied_) {
+    ++in_bands_[static_cast<std::size_t>(band_of_row(height_, static_cast<int>(px.y()), bands_))];
+  }
+  const auto has_room = [this](int band) { return in_bands_[static_cast<std::size_t>(band)] < share_; };
+  bool any = false;
+  for (int band = 0; band < bands_; ++band) any = any || (has_room(band) && gave_[static_cast<std::size_t>(band)]);
+  int next = (band_ + 1) % bands_;
+  while (any && !has_room(next)) next = (next + 1) % bands_;
+  return next;
 }
 
 void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, const GreyImage& image,
@@ -60,9 +76,9 @@ void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, co
     occupied_.assign(occupied.begin(), occupied.end());
     share_ = static_cast<std::size_t>((maximum_ + bands_ - 1) / bands_);
     wanted_ = std::min({with_spare(wanted), with_spare(static_cast<int>(share_)), static_cast<int>(kMaximumPerRound)});
-    band_ = (band_ + 1) % bands_;
+    band_ = next_band();
     coloured_ = colour.bgr != nullptr;
-    const auto row_bytes = static_cast<std::size_t>(3 * reduced_side(width_));
+    const std::size_t row_bytes = reduced_row_bytes(width_);
     for (std::size_t y = 0; coloured_ && y < static_cast<std::size_t>(reduced_side(height_)); ++y) {
       std::memcpy(bgr_.data() + y * row_bytes, colour.row(static_cast<int>(y)), row_bytes);
     }
@@ -91,8 +107,10 @@ std::span<const FoundFeature> FeatureFinder::adopt(std::uint64_t frame_index) no
     return {};
   }
   active_ = false;
+  adopted_templates_ = templates_;
   // Late, the features have moved on and nobody followed them: the round is lost, the next one begins.
   const bool discarded = std::exchange(discarded_, false);
+  if (due) gave_[static_cast<std::size_t>(band_)] = !found_.empty();
   const bool wanted = due && !discarded;
   return wanted ? std::span<const FoundFeature>(found_) : std::span<const FoundFeature>();
 }
@@ -129,7 +147,7 @@ Expected<std::vector<Vector2d>> FeatureFinder::corners(const GreyImage& image, c
   GreyImage barred;
   std::vector<std::uint8_t> mask;
   if (coloured_) {
-    const int stride = 3 * reduced_side(width_);
+    const auto stride = static_cast<std::ptrdiff_t>(reduced_row_bytes(width_));
     auto found = find_instruments({bgr_.data(), reduced_side(width_), reduced_side(height_), stride}, width_, height_);
     if (!found) return tl::unexpected(std::move(found.error()));
     mask = *std::move(found);
@@ -149,11 +167,11 @@ void FeatureFinder::find(const Frame& frame) noexcept {
     counters_.searches_failed.add();
     return;
   }
-  const TemplateSettings of_templates = template_settings_for(detector);
+  templates_ = template_settings_for(detector);
   for (const Vector2d& px : *found) {
     if (found_.size() == kMaximumPerRound) break;
     FoundFeature feature;
-    if (make_patch_template(image, px, of_templates, tracker_.kernels(), feature.patch) != TemplateVerdict::kGood)
+    if (make_patch_template(image, px, templates_, tracker_.kernels(), feature.patch) != TemplateVerdict::kGood)
       continue;
     feature.first_observed = frame.stamp.capture;
     feature.first_observed_px = px;

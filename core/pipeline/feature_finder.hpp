@@ -34,9 +34,11 @@ struct FoundFeature {
 };
 
 // A round: the frame begun at, and the kFinderDelayFrames - 1 after it, are copied here by the mapper as they come; the
-// result is due at the frame after them. One round at a time, in one band of the picture, so that the search of a large
-// picture takes no longer than that of a small one; the next round takes the next band, and no band gives more than its
-// share of a full map at a time. What is a corner goes by the picture's own light and noise.
+// result is due at the frame after them. One round at a time, in one band of the picture, so that a large picture's
+// search takes not much longer than a small one's; the next round takes the next band, and no band gives more than its
+// share of a full map at a time. A band that holds its share already is passed over while another one, which holds
+// less, still gives something: else the features would gather where they live longest. What is a corner goes by the
+// picture's own light and noise.
 // Where frames have come with colour lately, a round begins at one that has it, and finds nothing on what is grey like
 // instruments.
 // offer() and adopt() belong to the mapper, serve() to the housekeeping thread.
@@ -56,6 +58,9 @@ class FeatureFinder {
   // A result that is not there in time is lost and counted; in lockstep it is waited for.
   [[nodiscard]] std::span<const FoundFeature> adopt(std::uint64_t frame_index) noexcept;
 
+  // Mapper: what a template needed in the last round that was adopted from, or could have been; as it stands before.
+  [[nodiscard]] const TemplateSettings& templates() const noexcept { return adopted_templates_; }
+
   // Mapper: what the running round finds is not to be adopted. The next one is as ever.
   void discard_round() noexcept { discarded_ = active_; }
 
@@ -69,6 +74,7 @@ class FeatureFinder {
     std::vector<std::uint8_t> pixels;
   };
 
+  [[nodiscard]] int next_band() noexcept;
   [[nodiscard]] bool may_begin(std::uint64_t frame_index, const ColourImage& colour) noexcept;
   void work(int step) noexcept;
   void find(const Frame& frame) noexcept;
@@ -90,7 +96,10 @@ class FeatureFinder {
   bool discarded_ = false;  // the round that is active
   std::uint64_t begun_at_ = 0;
   std::uint64_t next_round_at_ = 0;
-  std::uint64_t colour_until_ = 0;  // up to this frame one with colour is waited for
+  std::uint64_t colour_until_ = 0;     // up to this frame one with colour is waited for
+  std::vector<std::size_t> in_bands_;  // features followed, by band
+  std::vector<bool> gave_;             // by band: whether its last round found anything
+  TemplateSettings adopted_templates_;
 
   // Filled by the mapper before the step's number goes into the ring, read by housekeeping after it comes out.
   std::array<Frame, kFinderDelayFrames> frames_;
@@ -105,6 +114,7 @@ class FeatureFinder {
 
   // Housekeeping's own until done_ is set; the mapper's until the next round begins.
   std::vector<FoundFeature> found_;
+  TemplateSettings templates_;
   std::atomic<bool> done_{false};
   Wakeup finished_;
 

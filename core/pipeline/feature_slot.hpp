@@ -105,8 +105,8 @@ struct FeatureSlot {
   PatchMatch match;                     // of this frame
   bool match_agrees = false;            // it lies where the map predicted it
   bool is_scout = false;                // of this frame: see scouts.hpp
-  Vector2d off_px = Vector2d::Zero();   // this frame's match, from where map and tracker have it; of a scout
-  double pose_deviation_px = 0.0;       // largest, of what pose and model add to that prediction; likewise
+  Vector2d off_px = Vector2d::Zero();   // the last match of stage A, from where map and tracker have it
+  double pose_deviation_px = 0.0;       // largest, of what pose and model add to that prediction; 0 without a map
 
   // learning
   HeldMatches held;

@@ -141,7 +141,7 @@ void renew_stale_template(FeatureSlot& slot, const FrameJob& job) noexcept {
   if (slot.stale_matches < kStaleBeforeRenewal) return;
   slot.stale_matches = 0;
   PatchTemplate renewed;
-  if (make_patch_template(job.image, slot.match.px, TemplateSettings{}, job.tracker->kernels(), renewed) !=
+  if (make_patch_template(job.image, slot.match.px, job.templates, job.tracker->kernels(), renewed) !=
       TemplateVerdict::kGood) {
     return;
   }
@@ -197,15 +197,17 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   if (map.valid && job.frame->measurable) slot.in_view = from_map.valid && settings.camera.contains(from_map.px);
   if (slot.shed) return;
   const PixelPrediction wide = surer(from_map, predict_from_velocity(slot, job));
+  Looks looks = Looks::kAskedInDoubt;
   if (job.shift.known && from_map.valid) {
     const PixelPrediction near = predict_from_map(map, *job.frame, model, job.shift);
-    const bool is_surer = near.valid && near.covariance_px2.trace() < wide.covariance_px2.trace();
-    if (is_surer) seek(slot, near, Looks::kAskedInDoubt, job, settings);
+    if (near.valid && near.covariance_px2.trace() < wide.covariance_px2.trace()) {
+      seek(slot, near, looks, job, settings);
+      looks = Looks::kAskedAlways;  // what is found where the others are not
+    }
   }
-  if (slot.match.state != MatchState::kFound) seek(slot, wide, Looks::kAskedInDoubt, job, settings);
+  if (slot.match.state != MatchState::kFound) seek(slot, wide, looks, job, settings);
   if (slot.match.state != MatchState::kFound) return;
   slot.match_agrees = from_map.valid && agrees(slot.match, from_map, settings.estimator.update.gate);
-  if (!slot.is_scout) return;
   slot.off_px = slot.match.px - from_map.px;
   slot.pose_deviation_px = from_map.pose_deviation_px;
 }

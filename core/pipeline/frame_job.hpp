@@ -13,6 +13,7 @@
 #include "core/sensors/grey_image.hpp"
 #include "core/time/instant.hpp"
 #include "core/vision/neighbour_motion.hpp"
+#include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 
 namespace perimap {
@@ -31,7 +32,9 @@ struct FrameJob {
   const FrameHistory* history = nullptr;
   GreyImage image;  // while features are searched for
   const PatchTracker* tracker = nullptr;
-  CommonShift shift;  // once the scouts have been searched for
+  TemplateSettings templates;  // what a template must be in these pictures
+  bool scouting = false;       // some features are scouts, and the others are searched for once those have been
+  CommonShift shift;           // that they tell
   BasesAbout about_capture;
   std::array<FrameCamera, kCamerasKept> cameras;
   std::array<Instant, kCovariances> instants{};

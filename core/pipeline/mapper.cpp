@@ -105,11 +105,14 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
   plan_evaluation(frame, clock);
   adopt_found_features(frame.index);
 
+  job_.templates = finder_.templates();
   job_.shift = {};
-  choose_scouts(slots_, frame.index);
-  team_.run(&run_stage<&Mapper::predict_and_scout_shard>, this);
-  job_.shift = shift_of_scouts(slots_);
-  team_.run(&run_stage<&Mapper::find_shard>, this);
+  job_.scouting = choose_scouts(slots_, frame.index);
+  team_.run(&run_stage<&Mapper::predict_shard>, this);
+  if (job_.scouting) {
+    job_.shift = shift_of_scouts(slots_);
+    team_.run(&run_stage<&Mapper::find_shard>, this);
+  }
   const Instant found = MonotonicClock::now();
   settle_phases(frame);
   const Instant joined = MonotonicClock::now();
@@ -408,11 +411,12 @@ void Mapper::shed_load(bool put_off) noexcept {
   counters_.features_shed.set(shedding_.apply(shedding_decision_.limit()));
 }
 
-void Mapper::predict_and_scout_shard(int worker) noexcept {
+// Features are predicted, and searched for: the scouts first where there are any.
+void Mapper::predict_shard(int worker) noexcept {
   const RealtimeScope realtime;
   for (auto g = static_cast<std::size_t>(worker); g < groups_.size(); g += tallies_.size()) {
     groups_[g].sweep(job_);
-    find_in(groups_[g], true);
+    find_in(groups_[g], job_.scouting);
   }
 }
 

@@ -73,7 +73,7 @@ class Mapper {
   static void run_stage(void* self, int worker) noexcept {
     (static_cast<Mapper*>(self)->*Stage)(worker);
   }
-  void predict_and_scout_shard(int worker) noexcept;
+  void predict_shard(int worker) noexcept;
   void find_shard(int worker) noexcept;
   void find_in(FeatureGroup& group, bool scouts) noexcept;
   void plan_evaluation(const FrameRecord& frame, const CardiacClock& clock) noexcept;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 
+#include "core/bank/lanes.hpp"
 #include "core/statistics/upper_median.hpp"
 
 namespace perimap {
@@ -13,26 +14,33 @@ namespace {
 
 constexpr std::size_t kScouts = 12;
 constexpr std::size_t kFewestFound = 8;  // of which a third may mislead
+// What a shift leaves must be less than half of what it takes away.
+constexpr double kLeastLeft_px = 1.0, kWorthIt = 0.5;
 
 Vector2d predicted(const FeatureSlot& slot) noexcept { return slot.match.px - slot.off_px; }
 
 bool can_scout(const FeatureSlot& slot, std::uint64_t frame_index) noexcept {
   return slot.state == SlotState::kMapped && slot.converged && !slot.shed && slot.in_view &&
-         slot.last_found_frame + 1 == frame_index;
+         slot.last_found_frame + 1 == frame_index && kWorthIt * slot.pose_deviation_px >= kLeastLeft_px;
 }
 
 }  // namespace
 
-void choose_scouts(std::span<FeatureSlot> slots, std::uint64_t frame_index) noexcept {
+bool choose_scouts(std::span<FeatureSlot> slots, std::uint64_t frame_index) noexcept {
   const auto able = static_cast<std::size_t>(
       std::count_if(slots.begin(), slots.end(), [=](const FeatureSlot& slot) { return can_scout(slot, frame_index); }));
-  std::size_t nth = 0;
-  for (FeatureSlot& slot : slots) {
-    slot.is_scout = false;
-    if (able < 2 * kScouts || !can_scout(slot, frame_index)) continue;
-    slot.is_scout = (nth + 1) * kScouts / able != nth * kScouts / able;
+  const bool any = able >= 2 * kScouts;
+  std::size_t nth = 0, chosen = 0;
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    slots[i].is_scout = false;
+    if (!any || !can_scout(slots[i], frame_index)) continue;
+    // From groups of even and odd number by turns: those of one worker's groups alone would let the others wait.
+    const bool is_turn = i / kLanes % 2 == chosen % 2;
+    slots[i].is_scout = is_turn && chosen < kScouts && nth >= chosen * able / kScouts;
+    chosen += slots[i].is_scout ? 1 : 0;
     ++nth;
   }
+  return any;
 }
 
 CommonShift shift_of_scouts(std::span<const FeatureSlot> slots) noexcept {
@@ -75,10 +83,9 @@ CommonShift shift_of_scouts(std::span<const FeatureSlot> slots) noexcept {
     shift.coefficients = normal.ldlt().solve(right);
     if (!shift.coefficients.allFinite()) return {};
   }
-  constexpr double kLeast_px = 1.0, kMost_px = 4.0, kOfMiddle = 2.0;
-  shift.deviation_px = std::max(kLeast_px, kOfMiddle * middle(off_it));
+  constexpr double kMost_px = 4.0, kOfMiddle = 2.0;
+  shift.deviation_px = std::max(kLeastLeft_px, kOfMiddle * middle(off_it));
   const double replaced_px = middle([](const FeatureSlot& slot) { return slot.pose_deviation_px; });
-  constexpr double kWorthIt = 0.5;
   shift.known = shift.deviation_px <= std::min(kMost_px, kWorthIt * replaced_px);
   return shift;
 }

@@ -37,9 +37,9 @@ struct CommonShift {
 // few converged features, the scouts, are searched for as widely as the pose is uncertain, and the others near where
 // those say.
 
-// Before any is searched for: marks the frame's scouts, spread over the slots; none where there are too few features to
-// be worth it. No heap.
-void choose_scouts(std::span<FeatureSlot> slots, std::uint64_t frame_index) noexcept;
+// Before any is searched for: marks the frame's scouts, spread over the slots, and tells whether there are any: not
+// where there are too few features to be worth it, or the pose was sure in the last frame. No heap.
+[[nodiscard]] bool choose_scouts(std::span<FeatureSlot> slots, std::uint64_t frame_index) noexcept;
 
 // Once they have been searched for. Unknown when too few were found, when they do not agree, or when the predictions
 // are so sure that there is nothing to gain.

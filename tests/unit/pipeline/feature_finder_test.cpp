@@ -91,16 +91,17 @@ TEST_F(Finder, DiscardingBetweenRoundsTakesNothingFromTheNext) {
   EXPECT_GT(adopted_in(settings().features.detection_interval_frames + 1), 0U);
 }
 
-// What is grey between columns 40 and 100 of tissue.
+// What is grey between columns 40 and 100 of tissue, above row kLower.
 struct ColouredFinder : Finder {
   static constexpr int kColourWidth = reduced_side(kWidth), kColourHeight = reduced_side(kHeight);
+  static constexpr int kLower = 60;
   std::vector<std::uint8_t> bgr;
   ColourImage colour;
 
   ColouredFinder() {
     for (int y = 0; y < kColourHeight; ++y) {
       for (int x = 0; x < kColourWidth; ++x) {
-        const bool instrument = x >= 10 && x < 25;
+        const bool instrument = x >= 10 && x < 25 && y < kLower / kColourReduction;
         for (const int value : instrument ? std::array{120, 122, 125} : std::array{70, 80, 180}) {
           bgr.push_back(static_cast<std::uint8_t>(value));
         }
@@ -111,20 +112,25 @@ struct ColouredFinder : Finder {
 };
 
 TEST_F(ColouredFinder, FindsNothingOnInstruments) {
-  std::size_t beside = 0;
+  std::size_t beside = 0, below = 0;
   for (int i = 0; i < 60; ++i) {
     for (const Vector2d& px : still.next_frame(colour, 40)) {
-      EXPECT_TRUE(px.x() < 40 || px.x() >= 100) << px.transpose();
+      // No template reaches onto it.
+      EXPECT_TRUE(px.x() < 30 || px.x() >= 110 || px.y() >= kLower + 10) << px.transpose();
       ++beside;
+      below += px.x() >= 40 && px.x() < 100 ? 1 : 0;
     }
   }
   EXPECT_GE(beside, 4U);
+  EXPECT_GE(below, 1U);
   // As many more lie there, when nothing tells that it is an instrument.
   std::size_t on_it = 0;
   for (int i = 0; i < 120; ++i) {
-    for (const Vector2d& px : still.next_frame({}, 40)) on_it += px.x() >= 40 && px.x() < 100 ? 1 : 0;
+    for (const Vector2d& px : still.next_frame({}, 40)) {
+      on_it += px.x() >= 40 && px.x() < 100 && px.y() < kLower ? 1 : 0;
+    }
   }
-  EXPECT_GE(on_it, 4U);
+  EXPECT_GE(on_it, 3U);
 }
 
 TEST_F(ColouredFinder, BeginsARoundAtAFrameWithColourWhereThereAreAny) {
@@ -157,6 +163,22 @@ TEST(FinderOfALargePicture, SearchesABandOfItInEachRoundUntilAllHaveTheirShare) 
   }
   // Nothing is lost here: the first bands would take all places.
   for (const std::size_t band : adopted) EXPECT_EQ(band, maximum / kBands);
+}
+
+TEST(FinderOfALargePicture, FillsTheBandThatLosesItsFeaturesRatherThanThoseThatHaveTheirShare) {
+  constexpr int kWidth = 640, kHeight = 2880, kBand = kHeight / 6;
+  Still still(kWidth, kHeight);
+  const auto maximum = static_cast<std::size_t>(Still::settings(kWidth, kHeight).features.maximum);
+  std::size_t in_first = 0, elsewhere = 0;
+  while (still.frame < 200) {
+    for (const Vector2d& px : still.next_frame({}, static_cast<int>(maximum - still.occupied.size()))) {
+      ++(px.y() < kBand ? in_first : elsewhere);
+    }
+    // Where the heart beats.
+    if (still.frame > 50) std::erase_if(still.occupied, [](const Vector2d& px) { return px.y() < kBand; });
+  }
+  EXPECT_EQ(elsewhere, 5 * maximum / 6);
+  EXPECT_GT(in_first, 10 * maximum / 6);
 }
 
 }  // namespace

@@ -120,6 +120,74 @@ TEST_F(Candidate, WithoutNeighboursIsBelievedWhereItsOwnMotionLeads) {
   EXPECT_TRUE(is_found());
 }
 
+TEST_F(Candidate, SeenFarLargerGetsAFreshTemplateWhereThePictureHasOne) {
+  test::View larger;
+  larger.A = 2.1 * Matrix2d::Identity();
+  larger.t = start - larger.A * start;
+  const test::ImageBuffer image = test::render(texture, larger, kWidth, kHeight, 1, random);
+  slot.patch_state.A = larger.A;
+  job.templates.min_texture = 1e6;  // no picture has so much
+  for (int i = 0; i < 70; ++i) next_frame({0, 0}, image);
+  ASSERT_TRUE(is_found());
+  EXPECT_NEAR(slot.patch_state.A(0, 0), 2.1, 0.1);
+  job.templates.min_texture = 0.5;
+  for (int i = 0; i < 70; ++i) next_frame({0, 0}, image);
+  ASSERT_TRUE(is_found());
+  EXPECT_NEAR(slot.patch_state.A(0, 0), 1.0, 0.1);
+}
+
+// A mapped feature that the map has 25 px beside its place, as a pose that is off makes it.
+struct MappedFeature : Candidate {
+  MapPrediction map;
+  const Vector2d mapped_px{105, 100};
+
+  MappedFeature() {
+    constexpr double kDepth_mm = 500;  // at which a pixel is a mm
+    map.valid = true;
+    map.p_WF << mapped_px.x() - 120, mapped_px.y() - 100, kDepth_mm;
+    map.covariance_W = 0.01 * Matrix3d::Identity();
+    job.shift.known = true;
+    job.shift.centre_px = mapped_px;
+    job.shift.coefficients.row(0) << 25, 0;
+    job.shift.deviation_px = 1;
+  }
+
+  void search(const test::ImageBuffer& image) {
+    FrameRecord& frame = history->append({});
+    frame.measurable = true;
+    frame.tracker_variance_mm2 = 64;
+    job.frame = &frame;
+    job.image = image.view();
+    predict_and_find(slot, map, job, model, settings);
+  }
+};
+
+TEST_F(MappedFeature, IsSoughtWhereTheScoutsHaveIt) {
+  shift = {10, 0};
+  test::ImageBuffer image = view(shift);
+  // Its very like where the map has it.
+  test::ImageBuffer like = view(Vector2d::Zero());
+  for (int y = -12; y <= 12; ++y) {
+    for (int x = -12; x <= 12; ++x) {
+      image.at(static_cast<int>(mapped_px.x()) + x, static_cast<int>(mapped_px.y()) + y) =
+          like.at(static_cast<int>(start.x()) + x, static_cast<int>(start.y()) + y);
+    }
+  }
+  search(image);
+  EXPECT_TRUE(is_found()) << slot.match.px.transpose();
+  EXPECT_NEAR(slot.off_px.x(), 25, 0.5);
+  EXPECT_GT(slot.pose_deviation_px, 7);
+  job.shift.known = false;
+  search(image);
+  EXPECT_NEAR((slot.match.px - mapped_px).norm(), 0, 0.5);
+}
+
+TEST_F(MappedFeature, ThatIsNotThereIsSoughtWhereTheMapHasIt) {
+  shift = mapped_px - start;
+  search(view(shift));
+  EXPECT_TRUE(is_found()) << slot.match.px.transpose();
+}
+
 TEST_F(Candidate, WhosePlaceIsHardlyToldIsNotFound) {
   // Contrast as little above the noise as smoke leaves it.
   test::View smoky;

@@ -3,9 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 #include <vector>
+
+#include "core/bank/lanes.hpp"
 
 namespace perimap {
 namespace {
@@ -13,12 +17,13 @@ namespace {
 constexpr std::uint64_t kFrame = 100;
 
 // Features on a grid of 640x480, all of which can scout.
-std::vector<FeatureSlot> features() {
-  std::vector<FeatureSlot> slots(120);
+std::vector<FeatureSlot> features(std::size_t count = 120) {
+  std::vector<FeatureSlot> slots(count);
   for (FeatureSlot& slot : slots) {
     slot.state = SlotState::kMapped;
     slot.converged = true;
     slot.last_found_frame = kFrame - 1;
+    slot.pose_deviation_px = 6.0;
   }
   return slots;
 }
@@ -30,7 +35,7 @@ std::size_t scouts_of(const std::vector<FeatureSlot>& slots) {
 
 // Each scout found where `off` has it off its prediction.
 void find(std::vector<FeatureSlot>& slots, const std::function<Vector2d(const Vector2d&)>& off) {
-  choose_scouts(slots, kFrame);
+  static_cast<void>(choose_scouts(slots, kFrame));
   for (std::size_t i = 0; i < slots.size(); ++i) {
     FeatureSlot& slot = slots[i];
     const Vector2d predicted(40.0 + 50.0 * static_cast<double>(i % 12), 30.0 + 45.0 * static_cast<double>(i / 12));
@@ -38,7 +43,6 @@ void find(std::vector<FeatureSlot>& slots, const std::function<Vector2d(const Ve
     slot.match.px = predicted + slot.off_px;
     slot.match.state = MatchState::kFound;
     slot.match_agrees = true;
-    slot.pose_deviation_px = 6.0;
   }
 }
 
@@ -51,20 +55,38 @@ TEST(Scouts, AreAFewSpreadOverTheFeaturesThatAreSure) {
   slots[2].shed = true;
   slots[3].in_view = false;
   slots[4].state = SlotState::kTracked;
-  choose_scouts(slots, kFrame);
+  EXPECT_TRUE(choose_scouts(slots, kFrame));
   EXPECT_EQ(scouts_of(slots), 12U);
   for (std::size_t i = 0; i < 5; ++i) EXPECT_FALSE(slots[i].is_scout) << i;
   const auto last = std::find_if(slots.rbegin(), slots.rend(), [](const FeatureSlot& slot) { return slot.is_scout; });
   EXPECT_LT(last - slots.rbegin(), 24);
   // All the same in the next frame, in which nothing was found in this one.
-  choose_scouts(slots, kFrame + 1);
+  EXPECT_FALSE(choose_scouts(slots, kFrame + 1));
+  EXPECT_EQ(scouts_of(slots), 0U);
+}
+
+TEST(Scouts, AreAsManyInGroupsOfEachOfTwoWorkers) {
+  for (const std::size_t count : {96U, 120U, 192U, 200U, 384U}) {
+    std::vector<FeatureSlot> slots = features(count);
+    ASSERT_TRUE(choose_scouts(slots, kFrame));
+    std::array<int, 2> of_worker{};
+    for (std::size_t i = 0; i < slots.size(); ++i) of_worker[i / kLanes % 2] += slots[i].is_scout ? 1 : 0;
+    EXPECT_EQ(of_worker[0] + of_worker[1], 12) << count;
+    EXPECT_LE(std::abs(of_worker[0] - of_worker[1]), 1) << count;
+  }
+}
+
+TEST(Scouts, AreNoneWhereThePoseIsSureByItself) {
+  std::vector<FeatureSlot> slots = features();
+  for (FeatureSlot& slot : slots) slot.pose_deviation_px = 1.5;
+  EXPECT_FALSE(choose_scouts(slots, kFrame));
   EXPECT_EQ(scouts_of(slots), 0U);
 }
 
 TEST(Scouts, AreNoneWhereThereAreHardlyMoreFeaturesThanScouts) {
   std::vector<FeatureSlot> slots = features();
   for (std::size_t i = 23; i < slots.size(); ++i) slots[i].converged = false;
-  choose_scouts(slots, kFrame);
+  EXPECT_FALSE(choose_scouts(slots, kFrame));
   EXPECT_EQ(scouts_of(slots), 0U);
 }
 
