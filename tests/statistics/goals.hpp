@@ -16,8 +16,8 @@ namespace perimap::test {
 struct HorizonScenes {
   std::vector<std::string> records;
   std::vector<MotionLaw> laws;
-  int width = 400;  // px
-  int height = 300;
+  int width = 640;  // px
+  int height = 480;
   int duration_s = 0;
 };
 
