@@ -7,6 +7,7 @@
 #include "core/estimation/batch_status.hpp"
 #include "core/pipeline/release_stream.hpp"
 #include "core/realtime/counter.hpp"
+#include "core/realtime/deadline.hpp"
 #include "core/realtime/latency_histogram.hpp"
 
 namespace perimap {
@@ -17,8 +18,16 @@ struct StreamCounters {
   Counter samples_without_frame;
   Counter samples_from_late_update;
   Counter releases_missed;  // left out, because it was too late for them, see ReleasePlan
+  Counter releases_late;    // written, but begun to be more than kOnTime after their deadline
   LatencyHistogram release_tardiness;
   LatencyHistogram dds_write;
+
+  // Of one release: from its deadline to just before its write.
+  void count_tardiness(Duration tardiness) noexcept {
+    release_tardiness.add(tardiness);
+    // Counted by itself, because the histogram is right to 1/16 only.
+    if (tardiness > kOnTime) releases_late.add();
+  }
 };
 
 // Each member is written by one thread, named here, and read by the status thread.

@@ -67,6 +67,7 @@ Json json_of_run(const LiveResult& result) {
   json["without_frame"] = f.without_frame;
   json["from_late_update"] = f.from_late_update;
   json["releases_missed"] = f.releases_missed;
+  json["releases_late"] = f.releases_late;
   json["learning_put_off"] = f.learning_put_off;
   json["frames_not_recorded"] = f.frames_not_recorded;
   return json;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <unordered_set>
 
+#include "core/realtime/deadline.hpp"
+
 namespace perimap::bench {
 namespace {
 

@@ -9,9 +9,6 @@
 
 namespace perimap::bench {
 
-// A release counts as on time within this.
-inline constexpr Duration kOnTime = std::chrono::microseconds(500);
-
 struct Figures {
   std::uint64_t count = 0;
   Duration p50{0};

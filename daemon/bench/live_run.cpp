@@ -259,6 +259,7 @@ Expected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case
   figures.without_frame = stream.samples_without_frame.get();
   figures.from_late_update = stream.samples_from_late_update.get();
   figures.releases_missed = stream.releases_missed.get();
+  figures.releases_late = stream.releases_late.get();
   figures.learning_put_off = counters.learning_put_off.get();
   if (recorder) {
     const SessionRecorder::Summary summary = recorder->summary();

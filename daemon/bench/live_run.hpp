@@ -56,6 +56,7 @@ struct LiveFigures {
   std::uint64_t without_frame = 0;
   std::uint64_t from_late_update = 0;
   std::uint64_t releases_missed = 0;
+  std::uint64_t releases_late = 0;
   std::uint64_t learning_put_off = 0;
   std::uint64_t frames_not_recorded = 0;
   bool priority_granted = false;

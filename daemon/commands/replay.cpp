@@ -258,9 +258,9 @@ int replay(const Options& options) {
              counters.frames_without_pose.get());
   for (const ReleaseStream stream : streams) {
     const StreamCounters& c = counters.of(stream);
-    fmt::print("stream {}: {} samples ({} without frame, {} from a late update), {} releases missed\n", name_of(stream),
-               c.samples.get(), c.samples_without_frame.get(), c.samples_from_late_update.get(),
-               c.releases_missed.get());
+    fmt::print("stream {}: {} samples ({} without frame, {} from a late update), {} releases missed, {} late\n",
+               name_of(stream), c.samples.get(), c.samples_without_frame.get(), c.samples_from_late_update.get(),
+               c.releases_missed.get(), c.releases_late.get());
   }
   fmt::print("\n{}\n{}", stage_table(counters, pipeline.settings()), breath_text(pipeline.status_respiration()));
   // The first stream's in its old place, for who knows of no other.

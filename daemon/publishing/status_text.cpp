@@ -54,7 +54,8 @@ Json stream_counts_json(const perimap_Status& status) {
   return {{"samples", status.samples},
           {"samples_without_frame", status.samples_without_frame},
           {"samples_from_late_update", status.samples_from_late_update},
-          {"releases_missed", status.releases_missed}};
+          {"releases_missed", status.releases_missed},
+          {"releases_late", status.releases_late}};
 }
 
 Json counts_json(const perimap_Status& status) {

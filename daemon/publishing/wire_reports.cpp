@@ -355,6 +355,7 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.samples_without_frame = stream.samples_without_frame.get();
   wire_.samples_from_late_update = stream.samples_from_late_update.get();
   wire_.releases_missed = stream.releases_missed.get();
+  wire_.releases_late = stream.releases_late.get();
   wire_.learning_put_off = c.learning_put_off.get();
   wire_.adoptions_late = c.adoptions_late.get();
   wire_.features_tracked = static_cast<std::uint32_t>(c.features_tracked.get());

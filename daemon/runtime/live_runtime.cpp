@@ -148,7 +148,7 @@ void LiveRuntime::run_publisher() {
     StreamCounters& stream = counters.of(release.stream);
     stream.dds_write.add(MonotonicClock::now() - ready);
     pipeline_.sent(surface);
-    stream.release_tardiness.add(ready - release.deadline);
+    stream.count_tardiness(ready - release.deadline);
   }
 }
 

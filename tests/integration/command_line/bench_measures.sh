@@ -31,6 +31,7 @@ for (const run of json.live) {
   // 1.5 s at 30 frames/s.
   expect(run.sent >= 30 && run.sent <= 55, `${name}: ${run.sent} surfaces`);
   expect(run.release_tardiness.count === run.sent, `${name}: not every release is counted`);
+  expect(run.releases_late >= 0, `${name}: how many were late is not told`);
   const received = run.write_to_receipt.count;
   expect(received > 0, `${name}: nothing was received`);
   expect(received + run.missing === run.sent, `${name}: ${received} received, ${run.missing} missing, ${run.sent} sent`);

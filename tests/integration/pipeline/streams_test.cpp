@@ -1,6 +1,7 @@
 // Surfaces by the clock, alone and beside those of the frames.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/realtime/deadline.hpp"
 #include "daemon/runtime/live_runtime.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/model_moment.hpp"
@@ -290,17 +292,26 @@ class HeldUpOnce final : public Publication {
  public:
   explicit HeldUpOnce(Duration by) : by_(by) {}
   void surface(const perimap_Surface& sample) override {
-    if (++count_ == 30) std::this_thread::sleep_for(by_);
+    late_ += MonotonicClock::now() - from_ns(sample.release_time_ns) > kOnTime ? 1U : 0U;
+    if (++count_ == 30) {
+      std::this_thread::sleep_for(by_);
+      went_on_ = MonotonicClock::now();
+    }
     collected_.surface(sample);
   }
   void surface_model(const perimap_SurfaceModel& /*model*/) override {}
   void phase(const perimap_Phase& /*phase*/) override {}
   void status(const perimap_Status& /*status*/) override {}
   [[nodiscard]] std::vector<CollectedSurface> frames() const { return collected_.of(ReleaseStream::kFrame); }
+  [[nodiscard]] Instant went_on() const { return went_on_; }
+  // How many surfaces were not on time when they came here, which is after the pipeline has looked at its clock.
+  [[nodiscard]] std::uint64_t late() const { return late_; }
 
  private:
   Duration by_;
   int count_ = 0;
+  Instant went_on_;
+  std::uint64_t late_ = 0;
   CollectedSurfaces collected_;
 };
 
@@ -318,6 +329,12 @@ TEST(ReleaseStreams, LiveAPublisherThatWasHeldUpLeavesOutWhatIsStaleAndCountsIt)
   EXPECT_GE(gap, (kHeldUp - usable).count()) << "nothing is sent of which the validity has passed";
   EXPECT_GT(counters.releases_missed.get(), 30U) << "at 30 frames/s";
   EXPECT_EQ(counters.samples.get(), frames.size());
+  // Those that had been due while it was held up, and were sent after it.
+  const auto made_up_for = std::count_if(frames.begin() + 30, frames.end(), [&](const CollectedSurface& surface) {
+    return publication.went_on() - from_ns(surface.head.release_time_ns) > kOnTime;
+  });
+  EXPECT_GE(counters.releases_late.get(), static_cast<std::uint64_t>(made_up_for));
+  EXPECT_LE(counters.releases_late.get(), publication.late()) << "what was left out does not count as late as well";
   for (std::size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i].head.sample_sequence, i + 1);
 }
 

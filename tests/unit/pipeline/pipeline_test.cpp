@@ -8,6 +8,7 @@
 namespace perimap {
 namespace {
 
+using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
 constexpr Duration kPeriod = milliseconds(30);
@@ -50,6 +51,19 @@ TEST(Pipeline, CountsASurfaceOnceItIsSentSoThatNoCountIsEverLowered) {
   ASSERT_TRUE(without_frame.release.frame_missing);
   pipeline.sent(without_frame);
   EXPECT_EQ(counters.samples_without_frame.get(), 1U);
+}
+
+TEST(StreamCounters, AReleaseIsLateFromMoreThanHalfAMillisecondOn) {
+  StreamCounters counters;
+  for (const Duration punctual : {Duration(0), Duration(microseconds(20)), Duration(microseconds(500))}) {
+    counters.count_tardiness(punctual);
+  }
+  EXPECT_EQ(counters.releases_late.get(), 0U);
+  counters.count_tardiness(microseconds(500) + Duration(1));
+  counters.count_tardiness(milliseconds(30));
+  EXPECT_EQ(counters.releases_late.get(), 2U);
+  EXPECT_EQ(counters.release_tardiness.summary().count, 5U) << "punctual ones too";
+  EXPECT_EQ(counters.releases_missed.get(), 0U) << "they were written";
 }
 
 // The surface model is judged by it: see Pipeline::model_footing().

@@ -112,7 +112,8 @@ TEST_F(RecentCountsTest, EachStreamHasAStatusWithItsOwnReleases) {
   StreamCounters& clock = counters_->of(ReleaseStream::kClock);
   clock.samples.add(70);
   clock.releases_missed.add(3);
-  clock.release_tardiness.add(milliseconds(2));
+  clock.count_tardiness(microseconds(2));
+  clock.count_tardiness(milliseconds(2));
   StatusFacts facts;
   facts.recent = &recent_;
   const perimap_Status& of_frames = statuses[0].fill(*counters_, facts, now_ + seconds(1));
@@ -125,8 +126,16 @@ TEST_F(RecentCountsTest, EachStreamHasAStatusWithItsOwnReleases) {
   EXPECT_EQ(of_clock.samples, 70U);
   EXPECT_EQ(of_frames.releases_missed, 0U);
   EXPECT_EQ(of_clock.releases_missed, 3U);
+  EXPECT_EQ(of_frames.releases_late, 0U);
+  EXPECT_EQ(of_clock.releases_late, 1U);
   EXPECT_EQ(tardiness(of_frames).count, 0U);
-  EXPECT_EQ(tardiness(of_clock).recent_count, 1U);
+  EXPECT_EQ(tardiness(of_clock).recent_count, 2U);
+  // As `perimap ctl status` and a replay's report have them.
+  EXPECT_EQ(stream_status_json(of_frames)["releases_late"], 0);
+  for (const auto& json : {full_status_json(of_clock), stream_status_json(of_clock), counts_json(of_clock)}) {
+    EXPECT_EQ(json["releases_missed"], 3);
+    EXPECT_EQ(json["releases_late"], 1);
+  }
 }
 
 TEST(WireStatusTest, TellsWhyFeaturesAreNotInTheMap) {

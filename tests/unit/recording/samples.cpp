@@ -289,6 +289,7 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.start_matches_needed);
   next(s.start_matches_most);
   next(s.start_matches_mean);
+  next(s.releases_late);
 }
 
 void fill(Filler& next, perimap_TrackerPose& s) {
@@ -588,7 +589,8 @@ json to_json(const perimap_Status& s) {
           MEMBER(starts_failed_outliers),
           MEMBER(start_matches_needed),
           MEMBER(start_matches_most),
-          MEMBER(start_matches_mean)};
+          MEMBER(start_matches_mean),
+          MEMBER(releases_late)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {

@@ -161,6 +161,21 @@ TEST(WatchReport, JsonIsOneLineAndParsesWhateverTheNamesHold) {
   }
 }
 
+TEST(WatchReport, JsonHasWhatTheStatusCountsOfReleases) {
+  const perimap_Surface sample = surface(0);
+  perimap_Status status{};
+  dds::assign(status.source, sample.source);
+  dds::assign(status.stream, sample.stream);
+  status.releases_missed = 3;
+  status.releases_late = 7;
+  WatchStatistics statistics;
+  statistics.add(sample, release_of(sample));
+  statistics.add(status);
+  const auto json = nlohmann::json::parse(report_json(statistics.totals().at(0), ReportKind::kSummary));
+  EXPECT_EQ(json["status"]["releases_missed"], 3);
+  EXPECT_EQ(json["status"]["releases_late"], 7);
+}
+
 TEST(WatchReport, TheLineTellsRateLossesStateAndReason) {
   WatchStatistics statistics;
   for (const std::uint64_t sequence : {0U, 1U, 3U}) {
