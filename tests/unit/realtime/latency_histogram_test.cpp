@@ -2,6 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <thread>
+#include <vector>
+
 namespace perimap {
 namespace {
 
@@ -51,6 +57,49 @@ TEST(LatencyHistogram, HoldsTheExtremes) {
   EXPECT_EQ(s.count, 3U);
   EXPECT_EQ(s.p50, Duration(0));
   EXPECT_EQ(s.max, std::chrono::hours(10));
+}
+
+// Looks until the writer has done, and once more. Counts and maximum only rise, and never beyond what will be there.
+void watch(const LatencyHistogram& histogram, const LatencyHistogram& whole, const std::atomic<bool>& done) {
+  const LatencyHistogram::Counts all = whole.counts();
+  LatencyHistogram::Counts before{};
+  Duration max{0};
+  std::uint64_t came = 0;
+  for (bool last = false; !last;) {
+    last = done.load(std::memory_order_acquire);
+    const LatencyHistogram::Counts counts = histogram.counts();
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      ASSERT_GE(counts[i], before[i]) << i;
+      ASSERT_LE(counts[i], all[i]) << i;
+    }
+    came += LatencyHistogram::between(before, counts).count;
+    before = counts;
+    const LatencyHistogram::Summary summary = histogram.summary();
+    ASSERT_GE(summary.max, max);
+    max = summary.max;
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(before, all);
+  EXPECT_EQ(came, whole.summary().count);
+  EXPECT_EQ(max, whole.summary().max);
+}
+
+TEST(LatencyHistogram, ReadersLoseNothingOfWhatIsAddedMeanwhile) {
+  constexpr int kDurations = 20'000;
+  // Each bucket again and again, and a maximum that rises throughout.
+  const auto duration = [](int i) { return microseconds(i % 7 == 0 ? i : i % 1000); };
+  LatencyHistogram whole;
+  for (int i = 0; i < kDurations; ++i) whole.add(duration(i));
+  LatencyHistogram histogram;
+  std::atomic<bool> done{false};
+  std::vector<std::thread> readers;
+  for (int i = 0; i < 2; ++i) readers.emplace_back([&] { watch(histogram, whole, done); });
+  for (int i = 0; i < kDurations; ++i) {
+    histogram.add(duration(i));
+    if (i % 512 == 0) std::this_thread::yield();
+  }
+  done.store(true, std::memory_order_release);
+  for (std::thread& reader : readers) reader.join();
 }
 
 }  // namespace
