@@ -24,24 +24,14 @@ Expected<ReplaySetup> prepare_run(const BenchInput& input, int features, int wor
 }
 
 ReplayEdit paced(int every_frame, double speed, Duration length) {
-  // Instants since the first arrival are divided by the speed.
   return [every_frame, speed, length, first = std::optional<Instant>()](ReplayEvent& event) mutable {
     if (!first) first = arrival_of(event);
-    const auto at = [&](Instant t) { return *first + from_seconds(to_seconds(t - *first) / speed); };
-    if (at(arrival_of(event)) - *first > length) return ReplayStep::kEnd;
+    speed_up(event, *first, speed);
+    if (arrival_of(event) - *first > length) return ReplayStep::kEnd;
     if (auto* frame = std::get_if<FrameEvent>(&event)) {
       const auto n = static_cast<std::uint64_t>(every_frame);
       if (frame->stamp.sequence % n != 0) return ReplayStep::kSkip;
       frame->stamp.sequence /= n;
-      frame->stamp.capture = at(frame->stamp.capture);
-      frame->stamp.arrival = at(frame->stamp.arrival);
-    } else if (auto* pose = std::get_if<TrackerSample>(&event)) {
-      pose->source_time = at(pose->source_time);
-      pose->arrival = at(pose->arrival);
-    } else if (auto* ecg = std::get_if<EcgBlock>(&event)) {
-      ecg->first_sample_time = at(ecg->first_sample_time);
-      ecg->arrival = at(ecg->arrival);
-      ecg->sample_period = from_seconds(to_seconds(ecg->sample_period) / speed);
     }
     return ReplayStep::kDeliver;
   };

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <utility>
+#include <variant>
 
+#include "core/sensors/sample_block.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/sensor_messages.hpp"
 
@@ -50,6 +52,42 @@ Expected<std::optional<ReplayEvent>> respiration_event(const RecordingReader& re
   return *block;
 }
 
+// Calls `instant` with each instant of an event, and `period` with the time from one of its samples to the next. A kind
+// of event that no overload takes does not compile.
+template <class OnInstant, class OnPeriod>
+struct EachTime {
+  OnInstant instant;
+  OnPeriod period;
+
+  void operator()(FrameEvent& frame) const {
+    instant(frame.stamp.capture);
+    instant(frame.stamp.arrival);
+  }
+  void operator()(TrackerSample& pose) const {
+    instant(pose.source_time);
+    instant(pose.arrival);
+  }
+  void operator()(SampleBlock& block) const {  // of the ECG or of respiration
+    instant(block.first_sample_time);
+    instant(block.arrival);
+    period(block.sample_period);
+  }
+  void operator()(RTriggerPulse& pulse) const {
+    instant(pulse.time);
+    instant(pulse.arrival);
+  }
+};
+template <class OnInstant, class OnPeriod>
+EachTime(OnInstant, OnPeriod) -> EachTime<OnInstant, OnPeriod>;
+
+struct ArrivalOf {
+  Instant operator()(const FrameEvent& frame) const noexcept { return frame.stamp.arrival; }
+  template <class Event>
+  Instant operator()(const Event& event) const noexcept {
+    return event.arrival;
+  }
+};
+
 }  // namespace
 
 CameraFrame FrameEvent::as_it_came() const noexcept {
@@ -68,31 +106,16 @@ CameraFrame FrameEvent::as_it_came() const noexcept {
   return frame;
 }
 
-Instant arrival_of(const ReplayEvent& event) noexcept {
-  if (const auto* frame = std::get_if<FrameEvent>(&event)) return frame->stamp.arrival;
-  if (const auto* pose = std::get_if<TrackerSample>(&event)) return pose->arrival;
-  if (const auto* ecg = std::get_if<EcgBlock>(&event)) return ecg->arrival;
-  if (const auto* respiration = std::get_if<RespirationBlock>(&event)) return respiration->arrival;
-  return std::get<RTriggerPulse>(event).arrival;
-}
+Instant arrival_of(const ReplayEvent& event) noexcept { return std::visit(ArrivalOf(), event); }
 
 void shift(ReplayEvent& event, Duration offset) noexcept {
-  if (auto* frame = std::get_if<FrameEvent>(&event)) {
-    frame->stamp.capture += offset;
-    frame->stamp.arrival += offset;
-  } else if (auto* pose = std::get_if<TrackerSample>(&event)) {
-    pose->source_time += offset;
-    pose->arrival += offset;
-  } else if (auto* ecg = std::get_if<EcgBlock>(&event)) {
-    ecg->first_sample_time += offset;
-    ecg->arrival += offset;
-  } else if (auto* pulse = std::get_if<RTriggerPulse>(&event)) {
-    pulse->time += offset;
-    pulse->arrival += offset;
-  } else if (auto* respiration = std::get_if<RespirationBlock>(&event)) {
-    respiration->first_sample_time += offset;
-    respiration->arrival += offset;
-  }
+  std::visit(EachTime{[offset](Instant& t) { t += offset; }, [](Duration& /*period*/) {}}, event);
+}
+
+void speed_up(ReplayEvent& event, Instant origin, double speed) noexcept {
+  const auto faster = [speed](Duration d) { return from_seconds(to_seconds(d) / speed); };
+  std::visit(EachTime{[&](Instant& t) { t = origin + faster(t - origin); }, [&](Duration& d) { d = faster(d); }},
+             event);
 }
 
 Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode) {

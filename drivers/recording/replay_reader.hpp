@@ -52,6 +52,8 @@ using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock, RTriggerPu
 [[nodiscard]] Instant arrival_of(const ReplayEvent& event) noexcept;
 // The same event with all its instants moved by `offset`.
 void shift(ReplayEvent& event, Duration offset) noexcept;
+// The same event as of clocks that run `speed` times as fast from `origin` on.
+void speed_up(ReplayEvent& event, Instant origin, double speed) noexcept;
 
 // Errors have the form "FILE: byte N: channel NAME: what is wrong". Messages lie in the file in order of arrival; one
 // that goes back, or that arrives before it was measured, is an error: replay could not deliver it at its time. A frame

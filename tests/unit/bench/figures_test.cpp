@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <variant>
+#include <vector>
+
 #include "daemon/bench/bare_loop.hpp"
 #include "daemon/bench/bench.hpp"
 #include "daemon/bench/ddsperf_run.hpp"
@@ -181,6 +184,43 @@ TEST(Paced, PlaysEveryNthFrameFasterAndEndsAfterItsLength) {
     EXPECT_EQ(frames[i].sequence, 3U + i);
     EXPECT_EQ(frames[i].arrival, from_ns(0) + milliseconds(1010 + 50 + 100 * static_cast<int>(i)));
   }
+}
+
+// One of each kind that a recording may hold, each measured at 2000 ms and there 10 ms later.
+TEST(Paced, MovesEveryInstantOfEveryKindOfEvent) {
+  const Instant measured = from_ns(0) + milliseconds(2000);
+  const Instant arrival = measured + milliseconds(10);
+  TrackerSample pose;
+  pose.source_time = measured;
+  pose.arrival = arrival;
+  EcgBlock ecg = block(0, milliseconds(2000));
+  ecg.arrival = arrival;
+  RespirationBlock respiration;
+  respiration.first_sample_time = measured;
+  respiration.arrival = arrival;
+  respiration.sample_period = milliseconds(40);
+  std::vector<ReplayEvent> events = {frame(0, milliseconds(2000)), pose, ecg, RTriggerPulse{measured, arrival},
+                                     respiration};
+  ASSERT_EQ(events.size(), std::variant_size_v<ReplayEvent>);
+
+  const ReplayEdit edit = paced(1, 2.0, std::chrono::seconds(10));
+  ReplayEvent first = frame(0, milliseconds(990));
+  ASSERT_EQ(edit(first), ReplayStep::kDeliver);
+  EXPECT_EQ(arrival_of(first), from_ns(0) + milliseconds(1000));
+  const Instant measured_then = from_ns(0) + milliseconds(1500);
+  const Instant arrival_then = measured_then + milliseconds(5);
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    ASSERT_EQ(events[i].index(), i) << "not one of each";
+    ASSERT_EQ(edit(events[i]), ReplayStep::kDeliver);
+    EXPECT_EQ(arrival_of(events[i]), arrival_then) << i;
+  }
+  EXPECT_EQ(std::get<FrameEvent>(events[0]).stamp.capture, measured_then);
+  EXPECT_EQ(std::get<TrackerSample>(events[1]).source_time, measured_then);
+  EXPECT_EQ(std::get<EcgBlock>(events[2]).first_sample_time, measured_then);
+  EXPECT_EQ(std::get<EcgBlock>(events[2]).sample_period, milliseconds(2));
+  EXPECT_EQ(std::get<RTriggerPulse>(events[3]).time, measured_then);
+  EXPECT_EQ(std::get<RespirationBlock>(events[4]).first_sample_time, measured_then);
+  EXPECT_EQ(std::get<RespirationBlock>(events[4]).sample_period, milliseconds(20));
 }
 
 }  // namespace
