@@ -13,10 +13,19 @@ commands() { sed -n '/^Subcommands:/,/^$/s/^  \([a-z][a-z-]*\) .*/\1/p'; }
 for command in $("$perimap" --help | commands); do
   grep -q "^\.B $command\$" "$build/deploy/perimap.1" || fail "perimap(1) does not know $command"
 done
-for key in $(grep -oE '^(# )?[a-zA-Z_]+ =' "$source/config/replay.toml" | grep -oE '[a-zA-Z_]+'); do
-  grep -q "^\.B $key = " "$build/deploy/perimapd.toml.5" || fail "perimapd.toml(5) does not know $key"
-done
-grep -q '^\.SH \[realtime\]' "$build/deploy/perimapd.toml.5" || fail "perimapd.toml(5) has no sections"
+# Sections, keys with their defaults, and below each key the whole of its comment.
+in_the_configuration() {
+  awk '/^\[/ { print }
+       /^(# )?[a-zA-Z_]+ =/ { sub(/^# /, ""); print $0 meaning; meaning = ""; next }
+       /^# / { meaning = meaning "\n" substr($0, 3) }
+       /^$/ { meaning = "" }' "$source/config/replay.toml"
+}
+on_the_page() {
+  sed -n -e '/^\.TP$/,/^\.SH SEE/{/^\.TP$/d; /^\.SH SEE/d; s/^\.SH //; s/^\.B //; s/\\-/-/g; s/\\e/\\/g; p}' \
+    "$build/deploy/perimapd.toml.5"
+}
+[ "$(in_the_configuration | grep -c ' = ')" -gt 50 ] || fail "config/replay.toml has no keys"
+diff <(in_the_configuration) <(on_the_page) || fail "perimapd.toml(5) is not what config/replay.toml says"
 
 # shellcheck source=/dev/null
 . "$source/deploy/completion/perimap"
