@@ -40,4 +40,8 @@ completes() { # EXPECTED WORD...: the last word is completed
 completes simulate perimap sim
 completes --duration perimap simulate --dur
 completes new-patient perimap ctl new
+completes on perimap ctl record o
+completes off perimap ctl --socket /run/other record ''
+completes --json perimap ctl status --
+completes --socket perimap ctl --
 echo "as promised"
