@@ -30,6 +30,25 @@ printf '[dds]\nmaximum_MB_per_s = 1\n' >>"$scratch/both.toml"
 grep -q "both.toml:4:17: key 'pipeline.clock_rate_hz': expected what dds.maximum_MB_per_s = 1 allows" "$scratch/error" ||
   fail "$(cat "$scratch/error")"
 
+# What this user would be refused is told, and the configuration is sound all the same. A processor that is not there is
+# refused to everyone; any memory may be locked by root, and by whoever has no limit.
+printf 'version = 1\n[realtime]\npriority = 10\ncpus = [1023]\nlock_memory = false\n' >"$scratch/refused.toml"
+"$perimap" check "$scratch/refused.toml" >"$scratch/out" 2>"$scratch/error" || fail "refused priority ended with $?"
+[ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line of a refused priority: $(cat "$scratch/error")"
+grep -q '^note: this user is not given SCHED_FIFO priority 10 ' "$scratch/error" || fail "$(cat "$scratch/error")"
+printf 'version = 1\n[realtime]\npriority = 0\ncpus = [1023]\nlock_memory = true\n' >"$scratch/locked.toml"
+other_user=()
+[ "$(id -u)" -ne 0 ] || other_user=(unshare --user)
+if "${other_user[@]}" true 2>"$scratch/error"; then
+  (ulimit -l 64 && exec "${other_user[@]}" "$perimap" check "$scratch/locked.toml") >"$scratch/out" 2>"$scratch/error" ||
+    fail "refused memory ended with $?"
+  [ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line of refused memory: $(cat "$scratch/error")"
+  grep -q '^note: this user may not lock memory ' "$scratch/error" || fail "$(cat "$scratch/error")"
+fi
+sed 's/^lock_memory = true/lock_memory = false/' "$scratch/locked.toml" >"$scratch/nothing.toml"
+"$perimap" check "$scratch/nothing.toml" >"$scratch/out" 2>"$scratch/error" || fail "nothing asked for ended with $?"
+[ ! -s "$scratch/error" ] || fail "nothing was asked for, but: $(cat "$scratch/error")"
+
 printf 'version = 1\n[phase]\nlaw = 3\n' >"$scratch/wrong.toml"
 "$perimap" check "$scratch/wrong.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "a wrong configuration must end with 2"
