@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <set>
@@ -55,55 +54,39 @@ TEST(FramePool, BuffersDoNotOverlap) {
 // Each frame is filled with its number: one that is filled anew while it is read, or read before it is filled, has
 // another somewhere.
 TEST(FramePool, NoBufferIsFilledWhileItIsRead) {
-  constexpr std::uint64_t kFrames = 500;
+  constexpr std::uint64_t kFrames = 1000;
   const auto value_of = [](std::uint64_t sequence) { return static_cast<std::uint8_t>(sequence % 251); };
   FramePool pool(16, 12, kBuffers);
   // One place less than buffers: now the camera finds no free buffer, now it cannot hand on the one it has filled.
   SpscRing<FrameHandle> frames(kBuffers - 1);
-  std::atomic<bool> done{false};
-  std::uint64_t handed_on = 0;
   std::thread camera([&] {
-    for (std::uint64_t sequence = 0; sequence < kFrames; ++sequence) {
+    for (std::uint64_t sequence = 0; sequence < kFrames;) {
       FrameHandle frame;
       while ((frame.buffer = pool.acquire()) < 0) std::this_thread::yield();
       frame.stamp.sequence = sequence;
       std::ranges::fill(grey_of(pool, frame.buffer), value_of(sequence));
       std::ranges::fill(bgr_of(pool, frame.buffer), value_of(sequence));
       if (frames.push(frame)) {
-        ++handed_on;
+        ++sequence;
       } else {
         pool.give_back(frame.buffer);
         std::this_thread::yield();
       }
     }
-    done.store(true, std::memory_order_release);
   });
-  std::uint64_t received = 0;
-  std::uint64_t mixed = 0;  // no assertion in the loop: the camera would wait for a buffer for ever
-  std::uint64_t out_of_order = 0;
-  std::uint64_t next = 0;
-  for (;;) {
-    const bool last = done.load(std::memory_order_acquire);
+  int wrong = 0;  // no assertion in the loop: the camera would wait for a buffer for ever
+  for (std::uint64_t sequence = 0; sequence < kFrames; ++sequence) {
     FrameHandle frame;
-    if (!frames.pop(frame)) {
-      if (last) break;
-      std::this_thread::yield();
-      continue;
-    }
-    ++received;
-    out_of_order += frame.stamp.sequence < next ? 1U : 0U;
-    next = frame.stamp.sequence + 1;
-    const auto is_its_own = [&](std::uint8_t value) { return value == value_of(frame.stamp.sequence); };
-    const bool whole = std::ranges::all_of(grey_of(pool, frame.buffer), is_its_own) &&
+    while (!frames.pop(frame)) std::this_thread::yield();
+    const auto is_its_own = [&](std::uint8_t value) { return value == value_of(sequence); };
+    const bool whole = frame.stamp.sequence == sequence &&
+                       std::ranges::all_of(grey_of(pool, frame.buffer), is_its_own) &&
                        std::ranges::all_of(bgr_of(pool, frame.buffer), is_its_own);
-    mixed += whole ? 0U : 1U;
+    wrong += whole ? 0 : 1;
     pool.give_back(frame.buffer);
   }
   camera.join();
-  EXPECT_EQ(mixed, 0U);
-  EXPECT_EQ(out_of_order, 0U);
-  EXPECT_EQ(received, handed_on);
-  EXPECT_EQ(received + frames.refused(), kFrames);
+  EXPECT_EQ(wrong, 0);
   expect_all_free(pool);
 }
 
