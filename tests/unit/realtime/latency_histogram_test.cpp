@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <thread>
-#include <vector>
 
 namespace perimap {
 namespace {
@@ -92,8 +92,8 @@ TEST(LatencyHistogram, ReadersLoseNothingOfWhatIsAddedMeanwhile) {
   for (int i = 0; i < kDurations; ++i) whole.add(duration(i));
   LatencyHistogram histogram;
   std::atomic<bool> done{false};
-  std::vector<std::thread> readers;
-  for (int i = 0; i < 2; ++i) readers.emplace_back([&] { watch(histogram, whole, done); });
+  std::array<std::thread, 2> readers;
+  for (std::thread& reader : readers) reader = std::thread([&] { watch(histogram, whole, done); });
   for (int i = 0; i < kDurations; ++i) {
     histogram.add(duration(i));
     if (i % 512 == 0) std::this_thread::yield();
