@@ -39,6 +39,8 @@ void motion_with_many_harmonics(const Extent& extent, const HeartMesh& heart, Go
 void motion_that_breathes(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Path error and covariance with errors of the camera pose, white and slow, without and with the shared pose.
 void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& report);
+// Path error and covariance of maps that learn with the phase of completed cycles, beside maps that learn at once.
+void learning_late(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Beats found in real ECG records with disturbances added, and which rhythms are called unpredictable; docs/ecg.md.
 void beats_under_disturbances(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Displayed positions some time ahead, by predictor, record and motion law; docs/ecg.md.

@@ -17,6 +17,7 @@
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "drivers/simulator/simulation.hpp"
 #include "goals.hpp"
+#include "motion_laws.hpp"
 #include "tests/simulated/simulated_session.hpp"
 
 namespace perimap::test {
@@ -41,18 +42,6 @@ struct Cell {
   double nees = 0.0;        // NEES/3 at the release
   std::vector<Span> spans;  // of kSpan_s each, at the release
 };
-
-const char* name_of(PhaseLaw law) {
-  switch (law) {
-    case PhaseLaw::kWarped:
-      return "warped";
-    case PhaseLaw::kTimeLocked:
-      return "time-locked";
-    case PhaseLaw::kLinear:
-      break;
-  }
-  return "linear";
-}
 
 // Composes every release anew for each horizon, with all that is known at the release, and compares with the truth.
 class Horizons final : public Publication {
@@ -129,18 +118,6 @@ class Horizons final : public Publication {
   std::vector<std::unique_ptr<Ahead>> ahead_;
   std::unique_ptr<LockstepRuntime> runtime_;
 };
-
-PhaseLaw law_of(MotionLaw law) {
-  switch (law) {
-    case MotionLaw::kWarped:
-      return PhaseLaw::kWarped;
-    case MotionLaw::kTimeLocked:
-      return PhaseLaw::kTimeLocked;
-    case MotionLaw::kLinear:
-      break;
-  }
-  return PhaseLaw::kLinear;
-}
 
 // The predictors that go by the ECG alone are told the law; with the images it has to be found, or is told too.
 std::array<Cell, 4> cells_of(const SimulationSettings& scene) {

@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
                                           {"breath", perimap::test::motion_that_breathes},
                                           {"harmonics", perimap::test::motion_with_many_harmonics},
                                           {"pose", perimap::test::pose_errors},
+                                          {"late", perimap::test::learning_late},
                                           {"ecg", perimap::test::beats_under_disturbances},
                                           {"horizons", perimap::test::displayed_ahead}};
   CLI::App app(
@@ -29,8 +30,8 @@ int main(int argc, char** argv) {
   Extent extent;
   std::vector<std::string> chosen;
   app.add_option("GOALS", chosen,
-                 "lost, optimal, drift, breath, harmonics, pose, ecg, horizons; all when none is named")
-      ->check(CLI::IsMember({"lost", "optimal", "drift", "breath", "harmonics", "pose", "ecg", "horizons"}));
+                 "lost, optimal, drift, breath, harmonics, pose, late, ecg, horizons; all when none is named")
+      ->check(CLI::IsMember({"lost", "optimal", "drift", "breath", "harmonics", "pose", "late", "ecg", "horizons"}));
   app.add_flag("--long", extent.whole, "As many trials as the figures in docs/experiments.md and docs/ecg.md");
   app.add_option("--seed", extent.seed, "Another seed, other trials")->capture_default_str();
   HorizonScenes& scenes = extent.horizons;
@@ -46,7 +47,7 @@ int main(int argc, char** argv) {
   app.add_option("--duration", scenes.duration_s, "horizons: s");
   CLI11_PARSE(app, argc, argv);
   for (const std::string& name : law_names) scenes.laws.push_back(laws.at(name));
-  if (chosen.empty()) chosen = {"lost", "optimal", "drift", "breath", "harmonics", "pose", "ecg", "horizons"};
+  if (chosen.empty()) chosen = {"lost", "optimal", "drift", "breath", "harmonics", "pose", "late", "ecg", "horizons"};
   try {
     const auto heart = perimap::load_heart();
     if (!heart) throw std::runtime_error(heart.error().message);
