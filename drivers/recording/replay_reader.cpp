@@ -106,13 +106,13 @@ CameraFrame FrameEvent::as_it_came() const noexcept {
   return frame;
 }
 
-Instant arrival_of(const ReplayEvent& event) noexcept { return std::visit(ArrivalOf(), event); }
+Instant arrival_of(const ReplayEvent& event) { return std::visit(ArrivalOf(), event); }
 
-void shift(ReplayEvent& event, Duration offset) noexcept {
+void shift(ReplayEvent& event, Duration offset) {
   std::visit(EachTime{[offset](Instant& t) { t += offset; }, [](Duration& /*period*/) {}}, event);
 }
 
-void speed_up(ReplayEvent& event, Instant origin, double speed) noexcept {
+void speed_up(ReplayEvent& event, Instant origin, double speed) {
   const auto faster = [speed](Duration d) { return from_seconds(to_seconds(d) / speed); };
   std::visit(EachTime{[&](Instant& t) { t = origin + faster(t - origin); }, [&](Duration& d) { d = faster(d); }},
              event);

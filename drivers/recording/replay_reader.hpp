@@ -49,11 +49,11 @@ struct FrameEvent {
 
 using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock, RTriggerPulse, RespirationBlock>;
 
-[[nodiscard]] Instant arrival_of(const ReplayEvent& event) noexcept;
+[[nodiscard]] Instant arrival_of(const ReplayEvent& event);
 // The same event with all its instants moved by `offset`.
-void shift(ReplayEvent& event, Duration offset) noexcept;
+void shift(ReplayEvent& event, Duration offset);
 // The same event as of clocks that run `speed` times as fast from `origin` on.
-void speed_up(ReplayEvent& event, Instant origin, double speed) noexcept;
+void speed_up(ReplayEvent& event, Instant origin, double speed);
 
 // Errors have the form "FILE: byte N: channel NAME: what is wrong". Messages lie in the file in order of arrival; one
 // that goes back, or that arrives before it was measured, is an error: replay could not deliver it at its time. A frame

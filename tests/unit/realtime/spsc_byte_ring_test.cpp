@@ -41,7 +41,7 @@ TEST(SpscByteRing, KeepsEveryByteInOrderAcrossThreads) {
   SpscByteRing ring(2039);  // fills up before the lengths do, and no run ends where it does
   SpscRing<std::uint32_t> lengths(64);
   std::thread producer([&] {
-    std::array<std::byte, kLongest> run;
+    std::array<std::byte, kLongest> run{};
     std::uint32_t k = 0;
     for (std::uint32_t i = 0; i < kRuns; ++i) {
       const std::uint32_t length = 1 + i % kLongest;
@@ -50,7 +50,7 @@ TEST(SpscByteRing, KeepsEveryByteInOrderAcrossThreads) {
       while (!lengths.push(length)) std::this_thread::yield();
     }
   });
-  std::array<std::byte, kLongest> run;
+  std::array<std::byte, kLongest> run{};
   std::uint32_t k = 0;
   std::uint32_t wrong = 0;  // no assertion in the loop: the producer would wait for room for ever
   for (std::uint32_t i = 0; i < kRuns; ++i) {
