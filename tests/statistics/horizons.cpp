@@ -167,7 +167,8 @@ void judge(const SimulationSettings& scene, GoalReport& report) {
     constexpr std::array<double, 3> kGoal{0.10, 0.16, 0.35};
     if (scene.ecg_record == "100" && scene.law != MotionLaw::kTimeLocked)
       report.at_most(where + ", law found, mm", kGoal[i], seen.errors[i]);
-    // Beside those that are told the law.
+    // That is told the law.
+    report.at_most(where + ", law found / AR", 1.0, seen.errors[i] / alone.errors[i]);
     report.at_most(where + ", law told / AR", 1.0, told.errors[i] / alone.errors[i]);
     if (scene.ecg_record == "100" && i < 2)
       report.at_most(where + ", law found / previous cycle", 1.0 / 3.0, seen.errors[i] / previous.errors[i]);

@@ -113,29 +113,31 @@ TEST(FeatureDetector, FindsInEachBandOfRowsWhatItFindsInTheWholePicture) {
     for (int x = 200; x < 203; ++x) image.at(x, y) = 255;
   }
   DetectorSettings settings;
-  settings.border_px = 0;
   settings.min_distance_px = 0;  // so that no corner takes another's place
   constexpr int kAll = 1000;
-  const auto whole = find_features(image.view(), {}, settings, kAll);
-  ASSERT_TRUE(whole.has_value());
-  std::vector<Vector2d> in_bands;
-  for (const RowRange& rows : {RowRange{0, 100}, RowRange{100, 101}, RowRange{101, 200}, RowRange{200, kHeight}}) {
-    const auto found = find_features(image.view(), {}, settings, kAll, {}, rows);
-    ASSERT_TRUE(found.has_value());
-    for (const Vector2d& px : *found) {
-      EXPECT_GE(px.y(), rows.begin);
-      EXPECT_LT(px.y(), rows.end);
-      in_bands.push_back(px);
+  for (const int border_px : {0, DetectorSettings{}.border_px}) {
+    settings.border_px = border_px;
+    const auto whole = find_features(image.view(), {}, settings, kAll);
+    ASSERT_TRUE(whole.has_value());
+    std::vector<Vector2d> in_bands;
+    for (const RowRange& rows : {RowRange{0, 100}, RowRange{100, 101}, RowRange{101, 200}, RowRange{200, kHeight}}) {
+      const auto found = find_features(image.view(), {}, settings, kAll, {}, rows);
+      ASSERT_TRUE(found.has_value());
+      for (const Vector2d& px : *found) {
+        EXPECT_GE(px.y(), rows.begin);
+        EXPECT_LT(px.y(), rows.end);
+        in_bands.push_back(px);
+      }
     }
+    const auto before = [](const Vector2d& a, const Vector2d& b) {
+      return std::tuple(a.y(), a.x()) < std::tuple(b.y(), b.x());
+    };
+    std::vector<Vector2d> all = *whole;
+    std::sort(all.begin(), all.end(), before);
+    std::sort(in_bands.begin(), in_bands.end(), before);
+    ASSERT_GE(all.size(), 50U);
+    EXPECT_EQ(in_bands, all) << "border " << border_px;
   }
-  const auto before = [](const Vector2d& a, const Vector2d& b) {
-    return std::tuple(a.y(), a.x()) < std::tuple(b.y(), b.x());
-  };
-  std::vector<Vector2d> all = *whole;
-  std::sort(all.begin(), all.end(), before);
-  std::sort(in_bands.begin(), in_bands.end(), before);
-  ASSERT_GE(all.size(), 50U);
-  EXPECT_EQ(in_bands, all);
   for (int bands = 1; bands < 8; ++bands) {
     for (int y = 0; y < kHeight; ++y) {
       const RowRange rows = rows_of_band(kHeight, band_of_row(kHeight, y, bands), bands);

@@ -311,6 +311,10 @@ TEST(InstrumentMask, IsWhatHasNoColourUnlessAlmostNothingHas) {
   ASSERT_TRUE(mask.has_value());
   EXPECT_EQ((*mask)[60 * kSide + 80], 255);
   EXPECT_EQ((*mask)[120 * kSide + 80], 0);
+  // Thin, in a small picture.
+  fill(0, kSide, {70, 80, 180});
+  fill(56, 68, {120, 122, 125});
+  EXPECT_EQ(find_instruments({bgr.data(), kSide, kSide, 3 * kSide}, kSide, kSide).value()[62 * kSide + 80], 255);
   fill(0, kSide, {100, 100, 100});
   const auto grey = find_instruments({bgr.data(), kSide, kSide, 3 * kSide}, kSide, kSide);
   ASSERT_TRUE(grey.has_value());
