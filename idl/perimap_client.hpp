@@ -75,17 +75,18 @@ struct Phase {
   double deviation_rad = 0.0;
 };
 
-// The phase runs evenly through up to three parts of a cycle. `bound` is w of perimap.idl at a part's beginning and
-// end.
+// The phase runs evenly through up to three parts of a cycle. `bound` and `previous` are w and p of perimap.idl at a
+// part's beginning and end.
 struct Part {
-  double begin_s, end_s, begin_rad, end_rad, begin_bound, end_bound;
+  double begin_s, end_s, begin_rad, end_rad, begin_bound, end_bound, begin_previous, end_previous;
 };
 
-// Under one law. `bound` is w of perimap.idl.
+// Under one law. `bound` and `previous` are w and p of perimap.idl.
 struct LawPhase {
   double phase_rad = 0.0;
   double rate_rad_per_s = 0.0;
   double bound = 0.0;
+  double previous = 0.0;
 };
 
 // False: the law is not known, or its numbers make no cycle.
@@ -96,13 +97,14 @@ inline bool law_phase_at(const perimap_PhaseClock& clock, const perimap_CardiacC
   std::size_t count = 1;
   switch (law) {
     case perimap_PHASE_LAW_LINEAR:
-      parts[0] = {0.0, length, 0.0, kTwoPi, 0.0, 1.0};
+      parts[0] = {0.0, length, 0.0, kTwoPi, 0.0, 1.0, 0.0, 0.0};
       break;
     case perimap_PHASE_LAW_WARPED: {
       const double systole = seconds(cycle.systole_ns);
       const double systole_rad = kTwoPi * clock.systole_fraction;
-      parts[0] = {0.0, systole, 0.0, systole_rad, 0.0, 0.0};
-      parts[1] = {systole, length, systole_rad, kTwoPi, 0.0, 1.0};
+      const double slope = cycle.systole_slope;
+      parts[0] = {0.0, systole, 0.0, systole_rad, 0.0, 0.0, 0.0, slope};
+      parts[1] = {systole, length, systole_rad, kTwoPi, 0.0, 1.0, slope, 0.0};
       count = 2;
       break;
     }
@@ -111,9 +113,9 @@ inline bool law_phase_at(const perimap_PhaseClock& clock, const perimap_CardiacC
       const double filling = length - seconds(cycle.locked_filling_ns);
       const double systole_rad = clock.locked_systole_phase_rad;
       const double filling_rad = clock.locked_filling_phase_rad;
-      parts[0] = {0.0, systole, 0.0, systole_rad, 0.0, 0.0};
-      parts[1] = {systole, filling, systole_rad, filling_rad, 0.0, 1.0};
-      parts[2] = {filling, length, filling_rad, kTwoPi, 1.0, 1.0};
+      parts[0] = {0.0, systole, 0.0, systole_rad, 0.0, 0.0, 0.0, 0.0};
+      parts[1] = {systole, filling, systole_rad, filling_rad, 0.0, 1.0, 0.0, 0.0};
+      parts[2] = {filling, length, filling_rad, kTwoPi, 1.0, 1.0, 0.0, 0.0};
       count = 3;
       break;
     }
@@ -127,6 +129,7 @@ inline bool law_phase_at(const perimap_PhaseClock& clock, const perimap_CardiacC
   const double share = (s - part.begin_s) / (part.end_s - part.begin_s);
   phase.rate_rad_per_s = (part.end_rad - part.begin_rad) / (part.end_s - part.begin_s);
   phase.phase_rad = part.begin_rad + share * (part.end_rad - part.begin_rad);
+  phase.previous = part.begin_previous + share * (part.end_previous - part.begin_previous);
   phase.bound = cycle.stretches ? s / length : part.begin_bound + share * (part.end_bound - part.begin_bound);
   return true;
 }
@@ -152,9 +155,13 @@ inline bool phase_at(const perimap_PhaseClock& clock, const perimap_CardiacCycle
   phase.rate_rad_per_s = told.rate_rad_per_s;
   const double begin = seconds(cycle.begin_deviation_ns);
   const double end = told.bound * seconds(cycle.length_deviation_ns);
-  const double irregular = told.bound * seconds(cycle.irregularity_ns);
+  const double irregular = cycle.measured ? told.bound * seconds(cycle.irregularity_ns) : 0.0;
+  const double begin_bound = cycle.measured ? 1.0 - told.bound : 1.0;
+  const double previous = seconds(cycle.previous_length_deviation_ns);
+  const double shared = std::min(begin, previous);
   const double deviation_s =
-      cycle.measured ? std::hypot(std::hypot((1.0 - told.bound) * begin, end), irregular) : std::hypot(begin, end);
+      std::sqrt(begin_bound * begin_bound * begin * begin + 2.0 * begin_bound * told.previous * shared * shared +
+                told.previous * told.previous * previous * previous + end * end + irregular * irregular);
   phase.deviation_rad = std::hypot(phase.rate_rad_per_s * deviation_s, std::sqrt(law_variance_rad2));
   return std::isfinite(phase.phase_rad) && std::isfinite(phase.deviation_rad);
 }

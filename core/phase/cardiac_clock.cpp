@@ -14,6 +14,9 @@ constexpr double kLawsDiffer_s = 0.02;
 
 Duration rounded(Seconds s) noexcept { return from_seconds(s.count()); }
 
+// Of a difference of two, from theirs.
+Duration both(Duration a, Duration b) noexcept { return from_seconds(std::hypot(to_seconds(a), to_seconds(b))); }
+
 }  // namespace
 
 PhaseEstimate CardiacClock::at(Instant t) const noexcept {
@@ -34,14 +37,16 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   const double w = phase.length_sensitivity;
   const double begin = to_seconds(cycle.begin_deviation);
   const double length = to_seconds(cycle.length_deviation);
-  if (located.exact) {
-    // Both ends are measured: their errors are shared out by how much the phase is bound to each.
-    const double irregular = w * to_seconds(located.irregularity);
-    estimate.deviation_s =
-        std::sqrt((1.0 - w) * (1.0 - w) * begin * begin + w * w * length * length + irregular * irregular);
-  } else {
-    estimate.deviation_s = std::hypot(begin, w * length);
-  }
+  // The beginning ends the cycle before as well: a measured one shares its own error with that one's length, a
+  // predicted one all of that length's.
+  const double p = phase.previous_sensitivity;
+  const double previous = to_seconds(cycle.previous_length_deviation);
+  const double shared = std::min(begin, previous);
+  // Where both ends are measured their errors are shared out by how much the phase is bound to each.
+  const double bound = located.exact ? 1.0 - w : 1.0;
+  const double irregular = located.exact ? w * to_seconds(located.irregularity) : 0.0;
+  estimate.deviation_s = std::sqrt(bound * bound * begin * begin + 2.0 * bound * p * shared * shared +
+                                   p * p * previous * previous + w * w * length * length + irregular * irregular);
   const double law_rad = law_deviation_rad(law_, phase.phase_rad, t - cycle.begin, cycle.length, cycle.previous_length);
   estimate.deviation_s = std::hypot(estimate.deviation_s, law_rad / phase.rate_rad_per_s);
   estimate.law_undecided =
@@ -68,12 +73,7 @@ CardiacClock CardiacClock::corrected(const CycleCorrection& correction) const no
   if (correction.beats == 0) return clock;
   if (correction.carried) {
     if (at(now_).state == PhaseState::kLocked) return clock;
-    std::copy_backward(clock.history_.begin(), clock.history_.end() - 1, clock.history_.end());
-    clock.history_[0] = Beat{};
-    clock.history_[0].index_in_run = kBeatsToLock;
-    clock.held_ = std::min(held_ + 1, static_cast<int>(history_.size()));
-    clock.carried_ = true;
-    clock.seen_ = correction.seen;
+    clock.carry(correction);
   } else if (correction.beats != beats_) {
     return clock;
   }
@@ -87,6 +87,29 @@ CardiacClock CardiacClock::corrected(const CycleCorrection& correction) const no
     clock.next_deviation_ = Seconds(to_seconds(correction.next_length_deviation));
   }
   return clock;
+}
+
+void CardiacClock::push(const Beat& beat) noexcept {
+  std::copy_backward(history_.begin(), history_.end() - 1, history_.end());
+  history_[0] = beat;
+  held_ = std::min(held_ + 1, static_cast<int>(history_.size()));
+}
+
+// Makes room for the beginning of the cycle that the images carry on, and for that of the cycle before.
+void CardiacClock::carry(const CycleCorrection& correction) noexcept {
+  carried_ = true;
+  seen_ = correction.seen;
+  if (correction.ahead == 0) return;
+  Beat beat;
+  beat.unheard = true;
+  if (correction.ahead > 1) {
+    // Those before it are not kept: from the last known R peak on there is a gap.
+    beat.time = correction.begin - correction.previous_length;
+    beat.deviation = correction.begin_deviation;
+    push(beat);
+  }
+  beat.index_in_run = kBeatsToLock;
+  push(beat);
 }
 
 CardiacClock::Located CardiacClock::locate(Instant t) const noexcept {
@@ -111,8 +134,8 @@ CardiacClock::Located CardiacClock::locate_completed(int newer) const noexcept {
   for (int i = newer - 1; i >= 0 && beat(i).index_in_run > reached; --i) reached = beat(i).index_in_run;
   if (reached + 1 < kBeatsToLock) return located;
 
-  located.state = PhaseState::kLocked;
-  located.exact = true;
+  located.exact = !end.unheard;
+  located.state = located.exact ? PhaseState::kLocked : carried_state();
   located.irregularity = end.irregularity;
   located.cycle.teaches = end.teaches;
   located.cycle.begin = begin.time;
@@ -120,8 +143,11 @@ CardiacClock::Located CardiacClock::locate_completed(int newer) const noexcept {
   located.cycle.length = end.time - begin.time;
   located.cycle.length_deviation = end.deviation;
   located.cycle.previous_length = located.cycle.length;
+  located.cycle.previous_length_deviation = rounded(length_deviation_);
   if (begin.index_in_run > 0 && newer + 2 < held_) {
-    located.cycle.previous_length = begin.time - beat(newer + 2).time;
+    const Beat& before = beat(newer + 2);
+    located.cycle.previous_length = begin.time - before.time;
+    located.cycle.previous_length_deviation = both(begin.deviation, before.deviation);
   }
   return located;
 }
@@ -138,7 +164,7 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   const bool overdue = t > expected_until();
   located.state = PhaseState::kLocked;
   if (overdue || interrupted_ || carried_ || settling) located.state = PhaseState::kFreeRunning;
-  if (!overdue && carried_ && seen_) located.state = PhaseState::kFromImage;
+  if (!overdue && carried_) located.state = carried_state();
   located.ectopic = beat(0).beat_class == BeatClass::kPremature;
   const bool nobody_heard = unheard();
 
@@ -146,6 +172,11 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   cycle.begin = beat(0).time;
   cycle.begin_deviation = beat(0).deviation;
   cycle.previous_length = last_rr();
+  cycle.previous_length_deviation = both(beat(0).deviation, beat(1).deviation);
+  if (cycle.previous_length == Duration::zero()) {
+    cycle.previous_length = predicted_length();
+    cycle.previous_length_deviation = rounded(length_deviation_);
+  }
   double variance_s2 = to_seconds(beat(0).deviation) * to_seconds(beat(0).deviation);
   for (int ahead = 0;; ++ahead) {
     const Seconds told = ahead == 0 ? running_deviation_ : ahead == 1 ? next_deviation_ : length_deviation_;
@@ -157,6 +188,7 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
     variance_s2 += deviation.count() * deviation.count();
     cycle.begin_deviation = from_seconds(std::sqrt(variance_s2));
     cycle.previous_length = cycle.length;
+    cycle.previous_length_deviation = cycle.length_deviation;
   }
 }
 

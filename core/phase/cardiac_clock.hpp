@@ -51,10 +51,11 @@ struct CardiacCycle {
   Duration length{0};
   Duration length_deviation{0};
   Duration previous_length{0};  // the warped law depends on it
-  Duration systole{0};          // under the warped law's rule
-  Duration irregularity{0};     // completed: by how much its end missed the prediction, 0 when in rhythm
-  bool completed = false;       // both its R peaks are known
-  bool teaches = false;         // completed, and what was seen in it may be learnt, see CardiacClockTracker
+  Duration previous_length_deviation{0};
+  Duration systole{0};       // under the warped law's rule
+  Duration irregularity{0};  // completed: by how much its end missed the prediction, 0 when in rhythm
+  bool completed = false;    // both its R peaks are known
+  bool teaches = false;      // completed, and what was seen in it may be learnt, see CardiacClockTracker
 };
 
 class CardiacClock {
@@ -115,6 +116,7 @@ class CardiacClock {
     Duration irregularity{0};  // by how much the interval before it missed its prediction, 0 when in rhythm
     bool teaches = false;      // the cycle before it does
     bool resumed = false;  // its run began after an interruption shorter than a loss: the rhythm is known from before
+    bool unheard = false;  // the images show that a cycle began: no R peak is known
   };
 
   struct Located {
@@ -127,6 +129,11 @@ class CardiacClock {
 
   // No beat can be heard by now, or one that was due has not been. What the images carry on, they would have shown.
   [[nodiscard]] bool unheard() const noexcept { return (interrupted_ || now_ > expected_until()) && !carried_; }
+  void push(const Beat& beat) noexcept;
+  void carry(const CycleCorrection& correction) noexcept;
+  [[nodiscard]] PhaseState carried_state() const noexcept {
+    return seen_ ? PhaseState::kFromImage : PhaseState::kFreeRunning;
+  }
   [[nodiscard]] Located locate(Instant t) const noexcept;
   [[nodiscard]] Located locate_completed(int newer) const noexcept;
   [[nodiscard]] Located locate_predicted(Instant t) const noexcept;

@@ -61,9 +61,7 @@ void CardiacClockTracker::on_r_peak(const RPeak& peak) noexcept {
   }
   unheard_ = false;
 
-  std::copy_backward(clock_.history_.begin(), clock_.history_.end() - 1, clock_.history_.end());
-  clock_.history_[0] = beat;
-  clock_.held_ = std::min(clock_.held_ + 1, static_cast<int>(clock_.history_.size()));
+  clock_.push(beat);
   ++clock_.beats_;
   last_unusual_ = peak.unusual_shape;
   const bool ectopic = ectopic_.prevails() && rhythm_.rhythm() != Rhythm::kUnpredictable;

@@ -21,6 +21,8 @@ struct CycleCorrection {
   // The ECG tells nothing: the images carry the phase on, and this cycle begins with an R peak that nobody has seen.
   // Then `beats` counts those known before.
   bool carried = false;
+  int ahead = 0;                 // carried: this many cycles after the one that began with the last known R peak
+  Duration previous_length{0};   // carried: of the cycle before this one
   bool seen = false;             // carried, and the images have told the phase lately
   std::optional<LawBelief> law;  // what the images show of it; none: as configured
 };

@@ -16,18 +16,20 @@ bool warped_stretches(double systole, double rr) noexcept {
   return systole >= kLongestSystole * rr || systole <= kShortestSystole * rr;
 }
 
-CyclePhase linear(double s, double rr) noexcept { return {kTwoPi * s / rr, kTwoPi / rr, s / rr}; }
+CyclePhase linear(double s, double rr) noexcept { return {kTwoPi * s / rr, kTwoPi / rr, s / rr, 0.0}; }
 
 CyclePhase warped(const PhaseLawSettings& settings, double s, double rr, double rr_previous) noexcept {
   const double systole = systole_duration(settings, Seconds(rr), Seconds(rr_previous)).count();
+  const double slope = systole_slope(settings, Seconds(rr), Seconds(rr_previous));
   const double fraction = settings.systole_fraction;
   CyclePhase result;
   if (s < systole) {
-    result = {kTwoPi * fraction * s / systole, kTwoPi * fraction / systole, 0.0};
+    result = {kTwoPi * fraction * s / systole, kTwoPi * fraction / systole, 0.0, slope * s / systole};
   } else {
     const double diastole = rr - systole;
     const double share = (s - systole) / diastole;
-    result = {kTwoPi * (fraction + (1.0 - fraction) * share), kTwoPi * (1.0 - fraction) / diastole, share};
+    result = {kTwoPi * (fraction + (1.0 - fraction) * share), kTwoPi * (1.0 - fraction) / diastole, share,
+              slope * (1.0 - share)};
   }
   if (warped_stretches(systole, rr)) result.length_sensitivity = s / rr;
   return result;
@@ -42,14 +44,14 @@ CyclePhase time_locked(const PhaseLawSettings& settings, double s, double rr) no
   const double filling_begins = rr - filling;
   CyclePhase result;
   if (s < systole) {
-    result = {at_systole * s / systole, at_systole / systole, 0.0};
+    result = {at_systole * s / systole, at_systole / systole, 0.0, 0.0};
   } else if (s < filling_begins) {
     const double diastasis = filling_begins - systole;
     const double share = (s - systole) / diastasis;
-    result = {at_systole + (at_filling - at_systole) * share, (at_filling - at_systole) / diastasis, share};
+    result = {at_systole + (at_filling - at_systole) * share, (at_filling - at_systole) / diastasis, share, 0.0};
   } else {
-    result = {at_filling + (kTwoPi - at_filling) * (s - filling_begins) / filling, (kTwoPi - at_filling) / filling,
-              1.0};
+    result = {at_filling + (kTwoPi - at_filling) * (s - filling_begins) / filling, (kTwoPi - at_filling) / filling, 1.0,
+              0.0};
   }
   if (parts.stretches) result.length_sensitivity = s / rr;
   return result;
@@ -60,6 +62,11 @@ CyclePhase time_locked(const PhaseLawSettings& settings, double s, double rr) no
 Seconds systole_duration(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept {
   const double by_rate = settings.systole_offset_s - settings.systole_slope_s_per_bpm * 60.0 / rr_previous.count();
   return std::max(std::min(Seconds(by_rate), kLongestSystole * rr), kShortestSystole * rr);
+}
+
+double systole_slope(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept {
+  if (warped_stretches(systole_duration(settings, rr, rr_previous).count(), rr.count())) return 0.0;
+  return settings.systole_slope_s_per_bpm * 60.0 / (rr_previous.count() * rr_previous.count());
 }
 
 LockedParts locked_parts(const PhaseLawSettings& settings, Seconds rr) noexcept {

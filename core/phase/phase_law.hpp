@@ -67,10 +67,14 @@ struct CyclePhase {
   // Seconds by which the phase runs early for each second that the cycle turns out longer: 0 where the motion is bound
   // to the R peak behind, 1 where it is bound to the one ahead.
   double length_sensitivity = 0.0;
+  // The same for each second that the cycle before it was longer: under the warped law that one's length sets systole.
+  double previous_sensitivity = 0.0;
 };
 
 // Duration of systole under the warped law; always within the cycle.
 [[nodiscard]] Seconds systole_duration(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept;
+// Its derivative by `rr_previous`; 0 where it is a share of the cycle itself.
+[[nodiscard]] double systole_slope(const PhaseLawSettings& settings, Seconds rr, Seconds rr_previous) noexcept;
 
 // Under the time-locked law, in a cycle of length `rr`.
 struct LockedParts {

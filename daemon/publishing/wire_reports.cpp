@@ -106,6 +106,8 @@ perimap_CardiacCycle to_wire(const CardiacCycle& cycle, const PhaseLawSettings& 
   wire.systole_ns = cycle.systole.count();
   wire.locked_systole_ns = from_seconds(locked.systole.count()).count();
   wire.locked_filling_ns = from_seconds(locked.filling.count()).count();
+  wire.systole_slope = systole_slope(law, cycle.length, cycle.previous_length);
+  wire.previous_length_deviation_ns = cycle.previous_length_deviation.count();
   return wire;
 }
 

@@ -198,8 +198,12 @@ struct Carried : Cycle {
   [[nodiscard]] double phase_at(Instant t) const {
     Instant start = begin;
     std::size_t i = 0;
-    while (t >= start + lengths[i]) start += lengths[i++];
-    return kTwoPi * to_seconds(t - start) / to_seconds(lengths[i]);
+    Duration previous = tracker.clock().last_rr();
+    while (t >= start + lengths[i]) {
+      previous = lengths[i];
+      start += lengths[i++];
+    }
+    return phase_in_cycle(tracker.clock().law(), t - start, lengths[i], previous).phase_rad;
   }
   CardiacClock ecg(Instant t) {
     if (t > gone) tracker.interrupt();
@@ -227,6 +231,43 @@ TEST_F(Carried, TheImagesCarryThePhaseOnWhenTheEcgIsGoneAndSaySo) {
   EXPECT_LT(std::abs(error_s), 0.012);
   EXPECT_LT(std::abs(error_s), 4.0 * phase.deviation_s);
   EXPECT_EQ(ecg(now).at(now).state, PhaseState::kFreeRunning) << "the ECG alone";
+}
+
+// Systole is as long as the cycle before says, and that is no time between R peaks any more.
+TEST_F(Carried, UnderTheWarpedLawEveryCarriedCycleHasItsSystole) {
+  CardiacClockSettings settings;
+  settings.law.law = PhaseLaw::kWarped;
+  CardiacClockTracker warped(settings);
+  std::normal_distribution<double> scatter(0.0, 0.03);
+  Instant t = from_ns(5'000'000'000);
+  for (int i = 0; i < 20; ++i, t += from_seconds(0.8 + scatter(generator))) {
+    warped.on_r_peak({t, t + milliseconds(90), 1.0, milliseconds(2)});
+    begin = t;
+  }
+  tracker = warped;
+  gone = begin + milliseconds(100);
+  int scored = 0;
+  Instant watched = begin + milliseconds(20);
+  for (int ms = 250; ms < 2900; ms += 33) {
+    const Instant now = begin + milliseconds(ms);
+    watch(watched, now);
+    watched = now;
+    const CycleCorrection correction = posterior.correction();
+    if (!correction.carried) continue;
+    const CardiacClock clock = ecg(now).corrected(correction);
+    for (const Duration past : {milliseconds(0), milliseconds(60)}) {
+      const PhaseEstimate phase = clock.at(now - past);
+      const double error_s = std::remainder(phase.phase_rad - phase_at(now - past), kTwoPi) / phase.rate_rad_per_s;
+      EXPECT_LT(std::abs(error_s), 0.02) << ms << " ms";
+      EXPECT_LT(std::abs(error_s), 4.5 * phase.deviation_s) << ms << " ms";
+      if (now - past > gone + lengths[0]) {
+        EXPECT_FALSE(phase.exact) << ms << " ms";
+        EXPECT_EQ(phase.state, PhaseState::kFromImage) << ms << " ms";
+      }
+      ++scored;
+    }
+  }
+  EXPECT_GT(scored, 120);
 }
 
 TEST_F(Carried, WithoutImagesTheDeviationGrowsAndThenThereIsNoPhase) {

@@ -38,7 +38,7 @@ TEST_P(EveryLaw, RunsFromZeroToOneTurnWithoutAJumpOrAStop) {
   }
 }
 
-TEST_P(EveryLaw, RateAndSensitivityAreTheDerivatives) {
+TEST_P(EveryLaw, RateAndSensitivitiesAreTheDerivatives) {
   const Seconds previous(0.8);
   for (const double rr : {0.45, 0.863, 1.3}) {
     for (const double share : {0.03, 0.2, 0.33, 0.48, 0.71, 0.88, 0.97}) {
@@ -51,6 +51,10 @@ TEST_P(EveryLaw, RateAndSensitivityAreTheDerivatives) {
       const double longer = phase_in_cycle(settings_, s, Seconds(rr + h), previous).phase_rad;
       const double shorter = phase_in_cycle(settings_, s, Seconds(rr - h), previous).phase_rad;
       EXPECT_NEAR(-(longer - shorter) / (2 * h) / at.rate_rad_per_s, at.length_sensitivity, 1e-4) << rr << " " << share;
+      const double after_longer = phase_in_cycle(settings_, s, Seconds(rr), previous + Seconds(h)).phase_rad;
+      const double after_shorter = phase_in_cycle(settings_, s, Seconds(rr), previous - Seconds(h)).phase_rad;
+      EXPECT_NEAR(-(after_longer - after_shorter) / (2 * h) / at.rate_rad_per_s, at.previous_sensitivity, 1e-4)
+          << rr << " " << share;
     }
   }
 }
@@ -68,6 +72,9 @@ TEST(PhaseLaw, WarpedSystoleFollowsTheBeatBefore) {
   settings.law = PhaseLaw::kWarped;
   EXPECT_NEAR(systole_duration(settings, Seconds(2.0), Seconds(1.0)).count(), 0.546 - 0.0021 * 60.0, 1e-12);
   EXPECT_NEAR(systole_duration(settings, Seconds(0.4), Seconds(1.0)).count(), 0.3, 1e-12);
+  EXPECT_NEAR(systole_slope(settings, Seconds(2.0), Seconds(0.5)), 0.0021 * 60.0 / 0.25, 1e-12);
+  EXPECT_EQ(systole_slope(settings, Seconds(0.4), Seconds(1.0)), 0.0) << "a share of the cycle";
+  EXPECT_GT(phase_in_cycle(settings, Seconds(0.4), Seconds(0.8), Seconds(0.8)).previous_sensitivity, 0.1);
 }
 
 TEST(PhaseLaw, TimeLockedSystoleAndAtrialFillingDoNotStretch) {

@@ -159,6 +159,8 @@ void fill(Filler& next, perimap_CardiacCycle& s) {
   next(s.systole_ns);
   next(s.locked_systole_ns);
   next(s.locked_filling_ns);
+  next(s.systole_slope);
+  next(s.previous_length_deviation_ns);
 }
 
 void fill(Filler& next, perimap_ModelFeature& s) {
@@ -465,9 +467,10 @@ json to_json(const perimap_RespiratoryClock& s) {
 }
 template <>
 json to_json(const perimap_CardiacCycle& s) {
-  return {MEMBER(measured),          MEMBER(stretches),           MEMBER(begin_time_ns),   MEMBER(begin_deviation_ns),
-          MEMBER(length_ns),         MEMBER(length_deviation_ns), MEMBER(irregularity_ns), MEMBER(systole_ns),
-          MEMBER(locked_systole_ns), MEMBER(locked_filling_ns)};
+  return {MEMBER(measured),           MEMBER(stretches),     MEMBER(begin_time_ns),
+          MEMBER(begin_deviation_ns), MEMBER(length_ns),     MEMBER(length_deviation_ns),
+          MEMBER(irregularity_ns),    MEMBER(systole_ns),    MEMBER(locked_systole_ns),
+          MEMBER(locked_filling_ns),  MEMBER(systole_slope), MEMBER(previous_length_deviation_ns)};
 }
 template <>
 json to_json(const perimap_ModelFeature& s) {
