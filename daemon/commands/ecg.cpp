@@ -254,7 +254,7 @@ Expected<void> run(const Options& options) {
   if (!stop) return tl::unexpected(stop.error());
   const auto trace = read_trace(options);
   if (!trace) return tl::unexpected(trace.error());
-  if (const auto fits = check_rate(*trace, options.input); !fits) return fits;
+  if (auto fits = check_rate(*trace, options.input); !fits) return fits;
   std::vector<ReferenceBeat> reference;
   if (!options.reference.empty()) {
     const auto text = read_whole(options.reference, "table of reference beats");
