@@ -38,7 +38,7 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   const double begin = to_seconds(cycle.begin_deviation);
   const double length = to_seconds(cycle.length_deviation);
   // The beginning ends the cycle before as well: a measured one shares its own error with that one's length, a
-  // predicted one all of that length's.
+  // predicted one all of that length's. Where the length is not known at all the term is too much, and small.
   const double p = phase.previous_sensitivity;
   const double previous = to_seconds(cycle.previous_length_deviation);
   const double shared = std::min(begin, previous);
@@ -95,14 +95,16 @@ void CardiacClock::push(const Beat& beat) noexcept {
   held_ = std::min(held_ + 1, static_cast<int>(history_.size()));
 }
 
-// Makes room for the beginning of the cycle that the images carry on, and for that of the cycle before.
+// Makes room for the beginning of the cycle that the images carry on, and for that of the cycle before, unless these
+// are known R peaks. A beat that has come since is no such one: it has not locked the rhythm again.
 void CardiacClock::carry(const CycleCorrection& correction) noexcept {
   carried_ = true;
   seen_ = correction.seen;
-  if (correction.ahead == 0) return;
+  const bool follows = correction.beats == beats_;
+  if (follows && correction.ahead == 0) return;
   Beat beat;
   beat.unheard = true;
-  if (correction.ahead > 1) {
+  if (!follows || correction.ahead > 1) {
     // Those before it are not kept: from the last known R peak on there is a gap.
     beat.time = correction.begin - correction.previous_length;
     beat.deviation = correction.begin_deviation;
@@ -173,7 +175,7 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   cycle.begin_deviation = beat(0).deviation;
   cycle.previous_length = last_rr();
   cycle.previous_length_deviation = both(beat(0).deviation, beat(1).deviation);
-  if (cycle.previous_length == Duration::zero()) {
+  if (cycle.previous_length <= Duration::zero()) {
     cycle.previous_length = predicted_length();
     cycle.previous_length_deviation = rounded(length_deviation_);
   }

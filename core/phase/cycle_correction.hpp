@@ -18,10 +18,9 @@ struct CycleCorrection {
   Duration next_length{0};  // of the cycle after it; 0: nothing is known
   Duration next_length_deviation{0};
   bool contradicted = false;  // the images show another phase than this; the deviation has been widened
-  // The ECG tells nothing: the images carry the phase on, and this cycle begins with an R peak that nobody has seen.
-  // Then `beats` counts those known before.
+  // The ECG tells nothing: the images carry the phase on. `beats` counts those known when they began to.
   bool carried = false;
-  int ahead = 0;                 // carried: this many cycles after the one that began with the last known R peak
+  int ahead = 0;                 // carried: this many cycles after the one that began with the last of `beats`
   Duration previous_length{0};   // carried: of the cycle before this one
   bool seen = false;             // carried, and the images have told the phase lately
   std::optional<LawBelief> law;  // what the images show of it; none: as configured

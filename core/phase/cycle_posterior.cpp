@@ -152,8 +152,9 @@ void CyclePosterior::weigh(const ObservedPhase& observed) noexcept {
 
 CyclePhase CyclePosterior::phase_of(Instant t, double begin_s, double length_s, double next_s) const noexcept {
   const double since_s = to_seconds(t - r_peak_) - begin_s;
-  return since_s < length_s ? phase_in_cycle(law_, Seconds(since_s), Seconds(length_s), Seconds(previous_length_s_))
-                            : phase_in_cycle(law_, Seconds(since_s - length_s), Seconds(next_s), Seconds(length_s));
+  return since_s < length_s
+             ? phase_in_cycle(law_, Seconds(since_s), Seconds(length_s), Seconds(previous_length_s_ + begin_s))
+             : phase_in_cycle(law_, Seconds(since_s - length_s), Seconds(next_s), Seconds(length_s));
 }
 
 double CyclePosterior::contradiction_s(double begin_s, double length_s,
@@ -220,7 +221,7 @@ CycleCorrection CyclePosterior::correction() const noexcept {
   correction.beats = beats_;
   correction.carried = carried_;
   correction.ahead = carried_ ? ahead_ : 0;
-  correction.previous_length = from_seconds(previous_length_s_);
+  correction.previous_length = from_seconds(previous_length_s_ + begin);
   correction.seen = carried_ && now_ - last_observed_ <= kSeen;
   correction.begin = r_peak_ + from_seconds(begin);
   correction.length = from_seconds(length_mean_s_ + length);
