@@ -23,15 +23,18 @@ int main(int argc, char** argv) {
                                           {"pose", perimap::test::pose_errors},
                                           {"late", perimap::test::learning_late},
                                           {"ecg", perimap::test::beats_under_disturbances},
-                                          {"horizons", perimap::test::displayed_ahead}};
+                                          {"horizons", perimap::test::displayed_ahead},
+                                          {"ventilated", perimap::test::ventilated}};
   CLI::App app(
       "Monte Carlo statistics of the estimator, with known phase and association, of the ECG side, "
       "and of what the whole pipeline displays");
   Extent extent;
   std::vector<std::string> chosen;
-  app.add_option("GOALS", chosen,
-                 "lost, optimal, drift, breath, harmonics, pose, late, ecg, horizons; all when none is named")
-      ->check(CLI::IsMember({"lost", "optimal", "drift", "breath", "harmonics", "pose", "late", "ecg", "horizons"}));
+  app.add_option(
+         "GOALS", chosen,
+         "lost, optimal, drift, breath, harmonics, pose, late, ecg, horizons, ventilated; all when none is named")
+      ->check(CLI::IsMember(
+          {"lost", "optimal", "drift", "breath", "harmonics", "pose", "late", "ecg", "horizons", "ventilated"}));
   app.add_flag("--long", extent.whole, "As many trials as the figures in docs/experiments.md and docs/ecg.md");
   app.add_option("--seed", extent.seed, "Another seed, other trials")->capture_default_str();
   HorizonScenes& scenes = extent.horizons;
@@ -47,7 +50,8 @@ int main(int argc, char** argv) {
   app.add_option("--duration", scenes.duration_s, "horizons: s");
   CLI11_PARSE(app, argc, argv);
   for (const std::string& name : law_names) scenes.laws.push_back(laws.at(name));
-  if (chosen.empty()) chosen = {"lost", "optimal", "drift", "breath", "harmonics", "pose", "late", "ecg", "horizons"};
+  if (chosen.empty())
+    chosen = {"lost", "optimal", "drift", "breath", "harmonics", "pose", "late", "ecg", "horizons", "ventilated"};
   try {
     const auto heart = perimap::load_heart();
     if (!heart) throw std::runtime_error(heart.error().message);
