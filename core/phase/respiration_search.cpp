@@ -205,7 +205,6 @@ bool RespirationSearch::take(double rate_rad_per_s, FoundBreath& found) const no
     found.wave.a[k] = fitted.coefficients.row(kOther + k).transpose();
     found.wave.b[k] = fitted.coefficients.row(kOther + kBreathHarmonics + k).transpose();
   }
-  if (!(found.explained >= settings_.explained) || !(found.wave.rms_mm() >= settings_.least_rms_mm)) return false;
   // Cramer-Rao for phase and frequency of a known wave in white noise (Rife & Boorstyn, IEEE Trans. IT 20, 1974), taken
   // to the newest instant.
   const double slope = found.wave.slope_mm_per_rad();
@@ -214,7 +213,8 @@ bool RespirationSearch::take(double rate_rad_per_s, FoundBreath& found) const no
   found.rate_variance_rad2_per_s2 = 12.0 * centre / (span_s * span_s);
   found.covariance_rad2_per_s = 0.5 * span_s * found.rate_variance_rad2_per_s2;
   found.phase_variance_rad2 = centre + 0.25 * span_s * span_s * found.rate_variance_rad2_per_s2;
-  return std::sqrt(found.phase_variance_rad2) <= settings_.phase_deviation_rad;
+  return found.explained >= settings_.explained && found.wave.rms_mm() >= settings_.least_rms_mm &&
+         std::sqrt(found.phase_variance_rad2) <= settings_.phase_deviation_rad;
 }
 
 }  // namespace perimap

@@ -20,6 +20,12 @@ constexpr double kGate = 13.8;  // chi-squared, 1 degree: 99.98 %
 constexpr double kSuspected = 0.2;
 constexpr double kConfirmed = 0.5;
 constexpr int kSuspectedInARow = 2;  // searches: what a young map gets wrong comes and goes
+// A heart that beats irregularly moves a young map's displacement more than breathing does. What looks like breathing
+// in it for some seconds has no period that stays; that of a ventilator does.
+constexpr double kPersistentExplained = 0.4;
+constexpr double kPersistentDeviation_rad = 0.2;
+constexpr double kSamePeriod = 0.015;  // share
+constexpr Duration kPersists = std::chrono::seconds(10);
 constexpr Duration kSuspicionLasts = std::chrono::seconds(15);
 constexpr Duration kContradictedBeforeSearch = std::chrono::milliseconds(1500);
 constexpr Duration kSilentBeforeSearch = std::chrono::seconds(15);
@@ -63,7 +69,7 @@ void RespiratoryTracker::search(Instant now) noexcept {
     suspect(found, now);
     return;
   }
-  if (!there) return;
+  if (!there && (by_channel || !persists(found, now))) return;
   // The coefficients that the map has learnt count from where the phase was zero then.
   double turn_rad = locks_ > 0 ? alignment(found.wave, wave_) : 0.0;
   if (by_channel) {
@@ -87,7 +93,21 @@ void RespiratoryTracker::search(Instant now) noexcept {
   clock_.slope_mm_per_rad = wave_.slope_mm_per_rad() / std::numbers::sqrt3;
   last_agreed_ = last_told_ = now;
   ++locks_;
+  candidate_period_s_ = 0.0;
   search_.clear();
+}
+
+bool RespiratoryTracker::persists(const FoundBreath& found, Instant now) noexcept {
+  const bool candidate = found.explained >= kPersistentExplained &&
+                         found.wave.rms_mm() >= settings_.search.least_rms_mm &&
+                         std::sqrt(found.phase_variance_rad2) <= kPersistentDeviation_rad;
+  const double period_s = candidate ? kTwoPi / found.rate_rad_per_s : 0.0;
+  if (!candidate || !(std::abs(period_s - candidate_period_s_) <= kSamePeriod * candidate_period_s_)) {
+    candidate_period_s_ = period_s;
+    candidate_since_ = now;
+    return false;
+  }
+  return now - candidate_since_ >= kPersists;
 }
 
 void RespiratoryTracker::follow(const BreathSignal& signal, Instant now) noexcept {
@@ -196,6 +216,7 @@ void RespiratoryTracker::add_contradiction(Instant t) noexcept {
 void RespiratoryTracker::lose() noexcept {
   clock_.state = RespirationState::kSearching;
   clock_.source = RespirationSource::kNone;
+  candidate_period_s_ = 0.0;
   search_.clear();
 }
 

@@ -64,6 +64,8 @@ class RespiratoryTracker {
   void predict(Instant t) noexcept;
   [[nodiscard]] bool rate_is_possible() const noexcept;
   void suspect(const FoundBreath& found, Instant now) noexcept;
+  // The same period search after search, though much else moves the surface.
+  [[nodiscard]] bool persists(const FoundBreath& found, Instant now) noexcept;
   void lose() noexcept;
 
   RespirationSettings settings_;
@@ -77,7 +79,9 @@ class RespiratoryTracker {
   Instant last_agreed_;
   Instant last_told_;
   int locks_ = 0;
-  int in_a_row_ = 0;  // searches that found what looks like breathing, while off
+  int in_a_row_ = 0;                 // searches that found what looks like breathing, while off
+  double candidate_period_s_ = 0.0;  // of persists(); 0: none
+  Instant candidate_since_;
 };
 
 }  // namespace perimap

@@ -133,6 +133,27 @@ TEST_F(Tracking, UntilTheBreathIsKnownItsDisplacementIsReckonedWith) {
   for (double t = now_s; t < now_s + 4.0; t += 0.2) EXPECT_LT((predicted(tracker, t) - truth(t)).norm(), 1.0) << t;
 }
 
+// An irregular heart moves the map's displacement by as much as breathing does, at no period of its own.
+TEST_F(Tracking, APeriodThatStaysIsFoundThoughMuchElseMovesTheSurface) {
+  patient.noise_mm = 4.0;
+  RespiratoryTracker tracker(settings);
+  ASSERT_TRUE(lock(tracker));
+  EXPECT_LE(now_s, 45.0);
+  EXPECT_NEAR(to_seconds(tracker.clock().period()), patient.period_s, 0.02 * patient.period_s);
+}
+
+TEST_F(Tracking, APeriodThatDoesNotStayIsNoBreath) {
+  patient.noise_mm = 4.0;
+  RespiratoryTracker tracker(settings);
+  for (; now_s < 60.0; now_s += 1.0) {
+    // 2.4 to 3.6 s: slower by a sixtieth each second.
+    patient.period_s = 2.4 + 0.02 * now_s;
+    watch(tracker, patient, now_s, now_s + 1.0);
+    tracker.search(at_s(now_s + 1.0));
+    ASSERT_NE(tracker.clock().state, RespirationState::kLocked) << now_s;
+  }
+}
+
 TEST_F(Tracking, ThePhaseIsFollowedWhenTheRateDrifts) {
   RespiratoryTracker tracker(settings);
   ASSERT_TRUE(lock(tracker));
