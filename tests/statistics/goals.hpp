@@ -45,7 +45,7 @@ void learning_late(const Extent& extent, const HeartMesh& heart, GoalReport& rep
 void beats_under_disturbances(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Displayed positions some time ahead, by predictor, record and motion law; docs/ecg.md.
 void displayed_ahead(const Extent& extent, const HeartMesh& heart, GoalReport& report);
-// The map's path and displayed positions of a heart that a ventilator moves too; docs/ecg.md.
+// Displayed positions of a heart that a ventilator moves too; docs/ecg.md.
 void ventilated(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 
 }  // namespace perimap::test

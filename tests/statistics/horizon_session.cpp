@@ -75,7 +75,7 @@ std::vector<HorizonErrors> HorizonSession::errors() const {
 
 std::string HorizonSession::description() const {
   const std::string changed = law_changed_s_ ? fmt::format(" after {:.0f} s", *law_changed_s_) : "";
-  return fmt::format("{} features, law {}{}", ahead_.front()->accuracy.report(Duration(0)).converged_at_15_s,
+  return fmt::format("{} features, law {}{}", ahead_.front()->accuracy.report(Duration(0)).features_converged,
                      name_of(law_), changed);
 }
 

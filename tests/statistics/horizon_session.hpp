@@ -32,8 +32,7 @@ struct HorizonErrors {
   [[nodiscard]] double rms_from(std::size_t span) const;
 };
 
-// Composes every release anew for each horizon, with all that is known at the release, and compares with the truth. A
-// horizon below zero lies in the past: in a completed cycle the phase is exact, and what is left is the map's error.
+// Composes every release anew for each horizon, with all that is known at the release, and compares with the truth.
 class HorizonSession final : public Publication {
  public:
   HorizonSession(const Simulation& simulation, const PipelineSettings& settings, const std::vector<Duration>& horizons);
