@@ -14,8 +14,10 @@ constexpr double kLawsDiffer_s = 0.02;
 
 Duration rounded(Seconds s) noexcept { return from_seconds(s.count()); }
 
-// Of a difference of two, from theirs.
-Duration both(Duration a, Duration b) noexcept { return from_seconds(std::hypot(to_seconds(a), to_seconds(b))); }
+// From those of two independent instants.
+Duration deviation_of_difference(Duration a, Duration b) noexcept {
+  return from_seconds(std::hypot(to_seconds(a), to_seconds(b)));
+}
 
 }  // namespace
 
@@ -149,7 +151,7 @@ CardiacClock::Located CardiacClock::locate_completed(int newer) const noexcept {
   if (begin.index_in_run > 0 && newer + 2 < held_) {
     const Beat& before = beat(newer + 2);
     located.cycle.previous_length = begin.time - before.time;
-    located.cycle.previous_length_deviation = both(begin.deviation, before.deviation);
+    located.cycle.previous_length_deviation = deviation_of_difference(begin.deviation, before.deviation);
   }
   return located;
 }
@@ -174,7 +176,7 @@ CardiacClock::Located CardiacClock::locate_predicted(Instant t) const noexcept {
   cycle.begin = beat(0).time;
   cycle.begin_deviation = beat(0).deviation;
   cycle.previous_length = last_rr();
-  cycle.previous_length_deviation = both(beat(0).deviation, beat(1).deviation);
+  cycle.previous_length_deviation = deviation_of_difference(beat(0).deviation, beat(1).deviation);
   if (cycle.previous_length <= Duration::zero()) {
     cycle.previous_length = predicted_length();
     cycle.previous_length_deviation = rounded(length_deviation_);

@@ -220,7 +220,7 @@ CycleCorrection CyclePosterior::correction() const noexcept {
   }
   correction.beats = beats_;
   correction.carried = carried_;
-  correction.ahead = carried_ ? ahead_ : 0;
+  correction.ahead = ahead_;
   correction.previous_length = from_seconds(previous_length_s_ + begin);
   correction.seen = carried_ && now_ - last_observed_ <= kSeen;
   correction.begin = r_peak_ + from_seconds(begin);

@@ -65,6 +65,11 @@ BreathWave BreathWave::shifted(double phase_rad) const noexcept {
   return wave;
 }
 
+bool FoundBreath::reaches(double least_explained, double least_rms_mm, double largest_deviation_rad) const noexcept {
+  return explained >= least_explained && wave.rms_mm() >= least_rms_mm &&
+         std::sqrt(phase_variance_rad2) <= largest_deviation_rad;
+}
+
 double alignment(const BreathWave& wave, const BreathWave& other) noexcept {
   const auto likeness = [&](double phase_rad) {
     const BreathWave turned = wave.shifted(phase_rad);
@@ -213,8 +218,7 @@ bool RespirationSearch::take(double rate_rad_per_s, FoundBreath& found) const no
   found.rate_variance_rad2_per_s2 = 12.0 * centre / (span_s * span_s);
   found.covariance_rad2_per_s = 0.5 * span_s * found.rate_variance_rad2_per_s2;
   found.phase_variance_rad2 = centre + 0.25 * span_s * span_s * found.rate_variance_rad2_per_s2;
-  return found.explained >= settings_.explained && found.wave.rms_mm() >= settings_.least_rms_mm &&
-         std::sqrt(found.phase_variance_rad2) <= settings_.phase_deviation_rad;
+  return found.reaches(settings_.explained, settings_.least_rms_mm, settings_.phase_deviation_rad);
 }
 
 }  // namespace perimap

@@ -44,6 +44,9 @@ struct FoundBreath {
   double rate_variance_rad2_per_s2 = 0.0;
   double explained = 0.0;  // share of the displacement's variance, all else left out
   BreathWave wave;
+
+  // As much of the displacement as that, a motion of that size, its phase that well known.
+  [[nodiscard]] bool reaches(double least_explained, double least_rms_mm, double largest_deviation_rad) const noexcept;
 };
 
 struct RespirationSearchSettings {

@@ -98,9 +98,7 @@ void RespiratoryTracker::search(Instant now) noexcept {
 }
 
 bool RespiratoryTracker::persists(const FoundBreath& found, Instant now) noexcept {
-  const bool candidate = found.explained >= kPersistentExplained &&
-                         found.wave.rms_mm() >= settings_.search.least_rms_mm &&
-                         std::sqrt(found.phase_variance_rad2) <= kPersistentDeviation_rad;
+  const bool candidate = found.reaches(kPersistentExplained, settings_.search.least_rms_mm, kPersistentDeviation_rad);
   const double period_s = candidate ? kTwoPi / found.rate_rad_per_s : 0.0;
   if (!candidate || !(std::abs(period_s - candidate_period_s_) <= kSamePeriod * candidate_period_s_)) {
     candidate_period_s_ = period_s;

@@ -19,6 +19,12 @@ double HorizonErrors::rms_from(std::size_t span) const {
   return sum.rms_mm();
 }
 
+std::vector<double> HorizonErrors::rms_by_span() const {
+  std::vector<double> all;
+  for (const Span& span : spans) all.push_back(span.rms_mm());
+  return all;
+}
+
 HorizonSession::HorizonSession(const Simulation& simulation, const PipelineSettings& settings,
                                const std::vector<Duration>& horizons)
     : start_(simulation.frames().front().stamp.capture),

@@ -30,6 +30,8 @@ struct HorizonErrors {
 
   // RMS of all spans from this one on, mm.
   [[nodiscard]] double rms_from(std::size_t span) const;
+  // RMS of each, mm; not a number where there is nothing.
+  [[nodiscard]] std::vector<double> rms_by_span() const;
 };
 
 // Composes every release anew for each horizon, with all that is known at the release, and compares with the truth.

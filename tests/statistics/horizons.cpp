@@ -68,10 +68,8 @@ void judge(const SimulationSettings& scene, GoalReport& report) {
                         {cell.errors[0].rms_mm, cell.errors[1].rms_mm, cell.errors[2].rms_mm, cell.errors[0].nees});
   }
   for (const Cell* cell : {&seen, &told}) {
-    std::vector<double> by_span;
-    for (const HorizonErrors::Span& span : cell->errors[0].spans) by_span.push_back(span.rms_mm());
     GoalReport::line_of(fmt::format("  law {}: each {:g} s", cell == &told ? "told" : "found", HorizonErrors::kSpan_s),
-                        by_span);
+                        cell->errors[0].rms_by_span());
   }
   for (std::size_t i = 0; i < kHorizons.size(); ++i) {
     const std::string where =

@@ -41,9 +41,7 @@ void ventilated(const Extent& extent, const HeartMesh& /*heart*/, GoalReport& re
     // What is displayed holds the errors of both phases besides.
     report.shown("  the path from 20 s on, at most that", "(<= 0.1)", errors.rms_from(kLearning));
     report.shown("  NEES/3", "", errors.nees);
-    std::vector<double> by_span;
-    for (const HorizonErrors::Span& span : errors.spans) by_span.push_back(span.rms_mm());
-    GoalReport::line_of(fmt::format("  each {:g} s", HorizonErrors::kSpan_s), by_span);
+    GoalReport::line_of(fmt::format("  each {:g} s", HorizonErrors::kSpan_s), errors.rms_by_span());
   }
 }
 

@@ -173,9 +173,8 @@ TEST(CardiacClock, StatesThePhaseErrorThatTheCycleBeforeMakesUnderTheWarpedLaw) 
   constexpr int kTrials = 3000;
   for (int trial = 0; trial < kTrials; ++trial) {
     CardiacClockTracker tracker(settings);
-    double t_s = 1.0;
     double rr_s[34] = {};
-    double r_s[35] = {t_s};
+    double r_s[35] = {1.0};
     for (int i = 0; i < 34; ++i) {
       rr_s[i] = 0.49 + 0.022 * noise(random);
       r_s[i + 1] = r_s[i] + rr_s[i];

@@ -26,7 +26,10 @@ struct Cycle : ::testing::Test {
   Duration length = milliseconds(830);
   static constexpr double kDeviation_s = 2e-3;
 
-  Cycle() {
+  Cycle() { beat({}); }
+
+  void beat(const CardiacClockSettings& settings) {
+    tracker = CardiacClockTracker(settings);
     std::normal_distribution<double> scatter(0.0, 0.03);
     Instant t = from_ns(5'000'000'000);
     for (int i = 0; i < 20; ++i) {
@@ -266,13 +269,7 @@ struct CarriedAndWarped : Carried {
   CarriedAndWarped() {
     CardiacClockSettings settings;
     settings.law.law = PhaseLaw::kWarped;
-    tracker = CardiacClockTracker(settings);
-    std::normal_distribution<double> scatter(0.0, 0.03);
-    Instant t = from_ns(5'000'000'000);
-    for (int i = 0; i < 20; ++i, t += from_seconds(0.8 + scatter(generator))) {
-      tracker.on_r_peak({t, t + milliseconds(90), 1.0, milliseconds(2)});
-      begin = t;
-    }
+    beat(settings);
     gone = begin + milliseconds(100);
     first_previous = tracker.clock().last_rr();
   }

@@ -146,8 +146,10 @@ TEST_F(Tracking, APeriodThatDoesNotStayIsNoBreath) {
   patient.noise_mm = 4.0;
   RespiratoryTracker tracker(settings);
   for (; now_s < 60.0; now_s += 1.0) {
-    // 2.4 to 3.6 s: slower by a sixtieth each second.
-    patient.period_s = 2.4 + 0.02 * now_s;
+    // Slower by 4 % in ten seconds, without a jump.
+    const double slower = 1.004;
+    patient.begin_s = now_s - slower * (now_s - patient.begin_s);
+    patient.period_s *= slower;
     watch(tracker, patient, now_s, now_s + 1.0);
     tracker.search(at_s(now_s + 1.0));
     ASSERT_NE(tracker.clock().state, RespirationState::kLocked) << now_s;
