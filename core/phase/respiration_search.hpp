@@ -3,7 +3,8 @@
 // The displacement is averaged over tenths of a second; the last half minute of it is fitted, by least squares, with a
 // mean, a drift, what a map that is not good yet gets wrong in each cardiac cycle alike (three harmonics of the cardiac
 // phase), and two harmonics of each candidate frequency; the best frequency is refined. Ventilators keep their period,
-// and spontaneous breath keeps it well enough over some breaths.
+// and spontaneous breath keeps it well enough over some breaths. What a map in its first seconds tells may be so wrong
+// that the rest tells more without it, so of the oldest seconds as many are left out as make the phase surest.
 //
 // No heap, no locks.
 #pragma once
@@ -52,10 +53,11 @@ struct FoundBreath {
 struct RespirationSearchSettings {
   Duration shortest_period = std::chrono::seconds(2);
   Duration longest_period = std::chrono::seconds(10);
-  double breaths = 2.2;              // that must have been seen
-  double explained = 0.8;            // least share
-  double phase_deviation_rad = 0.1;  // largest, at the newest instant
-  double least_rms_mm = 0.3;         // of what is called breathing
+  double breaths = 2.2;               // that must have been seen
+  double explained = 0.8;             // least share
+  double phase_deviation_rad = 0.12;  // largest, at the newest instant
+  double rate_deviation = 0.01;       // largest, share of the rate
+  double least_rms_mm = 0.3;          // of what is called breathing
 };
 
 class RespirationSearch {
@@ -78,6 +80,7 @@ class RespirationSearch {
 
   static constexpr int kCardiacHarmonics = 3;
   static constexpr int kOther = 2 + 2 * kCardiacHarmonics;  // columns that are not breathing
+  static constexpr std::uint64_t kLeastBins = 4 * (kOther + 2 * kBreathHarmonics);
 
   struct Bin {
     Instant begin;
@@ -92,8 +95,14 @@ class RespirationSearch {
     return bins_[static_cast<std::size_t>(index % kBins)];
   }
   [[nodiscard]] std::uint64_t oldest() const noexcept { return count_ > kBins ? count_ - kBins : 0; }
-  [[nodiscard]] Fit fit(double rate_rad_per_s) const noexcept;
-  [[nodiscard]] bool take(double rate_rad_per_s, FoundBreath& found) const noexcept;
+  // From the bin `first` on.
+  [[nodiscard]] Fit fit(double rate_rad_per_s, std::uint64_t first) const noexcept;
+  [[nodiscard]] double refine(double rate_rad_per_s, double width_rad_per_s, std::uint64_t first) const noexcept;
+  [[nodiscard]] FoundBreath breath_at(double rate_rad_per_s, std::uint64_t first) const noexcept;
+  // The surest with some of the oldest left out, of so many breaths at least.
+  [[nodiscard]] FoundBreath surest(double rate_rad_per_s, double width_rad_per_s, double breaths) const noexcept;
+  [[nodiscard]] bool is_known(const FoundBreath& found) const noexcept;
+  [[nodiscard]] double span_s(std::uint64_t first) const noexcept;
 
   RespirationSearchSettings settings_;
   std::array<Bin, kBins> bins_{};

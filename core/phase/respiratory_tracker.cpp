@@ -23,7 +23,7 @@ constexpr int kSuspectedInARow = 2;  // searches: what a young map gets wrong co
 // A heart that beats irregularly moves a young map's displacement more than breathing does. What looks like breathing
 // in it for some seconds has no period that stays; that of a ventilator does.
 constexpr double kPersistentExplained = 0.4;
-constexpr double kPersistentDeviation_rad = 0.2;
+constexpr double kPersistentDeviation_rad = 0.4;
 constexpr double kSamePeriod = 0.015;  // share
 constexpr Duration kPersists = std::chrono::seconds(10);
 constexpr Duration kSuspicionLasts = std::chrono::seconds(15);
@@ -92,7 +92,7 @@ void RespiratoryTracker::search(Instant now) noexcept {
   clock_.rate_variance_rad2_per_s2 = found.rate_variance_rad2_per_s2;
   clock_.slope_mm_per_rad = wave_.slope_mm_per_rad() / std::numbers::sqrt3;
   last_agreed_ = last_told_ = now;
-  ++locks_;
+  if (locks_++ == 0) first_breath_ends_ = now + clock_.period();
   candidate_period_s_ = 0.0;
   search_.clear();
 }
@@ -126,8 +126,8 @@ void RespiratoryTracker::follow(const BreathSignal& signal, Instant now) noexcep
     offset_known_ = true;
     return;
   }
-  add_phase(now, signal.phase_at(now) + offset_rad_,
-            std::max(kLeastChannelDeviation_rad, kTwoPi * to_seconds(signal.deviation) / to_seconds(signal.period)));
+  correct(now, signal.phase_at(now) + offset_rad_,
+          std::max(kLeastChannelDeviation_rad, kTwoPi * to_seconds(signal.deviation) / to_seconds(signal.period)));
 }
 
 // A map without breathing follows it in part, which leaves a weak trace of it. That is enough to reckon with its
@@ -188,6 +188,14 @@ void RespiratoryTracker::recall(const RespirationMemory& memory, Instant now) no
 
 void RespiratoryTracker::add_phase(Instant t, double phase_rad, double deviation_rad) noexcept {
   if (clock_.state != RespirationState::kLocked) return;
+  if (t < first_breath_ends_) {
+    last_agreed_ = last_told_ = t;
+    return;
+  }
+  correct(t, phase_rad, deviation_rad);
+}
+
+void RespiratoryTracker::correct(Instant t, double phase_rad, double deviation_rad) noexcept {
   predict(t);
   last_told_ = t;
   const double innovation = std::remainder(phase_rad - clock_.phase_rad, kTwoPi);

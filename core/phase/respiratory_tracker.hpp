@@ -21,8 +21,10 @@ struct RespirationSettings {
 };
 
 // Once locked, the clock is a Kalman filter of phase and rate. Both may wander: a ventilator's rate hardly does, a
-// patient's own breath by some percent. When the images contradict it for kContradictedBeforeSearch, or tell nothing
-// for kSilentBeforeSearch, the search begins again; the phase found then is counted as before, by the wave's shape.
+// patient's own breath by some percent. In the first breath of all the map learns how it breathes by this very clock,
+// and what the images show by that map would only confirm it: they do not correct it before the second. When the images
+// contradict it for kContradictedBeforeSearch, or tell nothing for kSilentBeforeSearch, the search begins again; the
+// phase found then is counted as before, by the wave's shape.
 //
 // With a channel, the search has only to find the displacement that goes with its phase, in two breaths; each breath
 // then corrects the clock as the images do. The channel's phase differs from the clock's by a constant that is known
@@ -35,7 +37,8 @@ class RespiratoryTracker {
   // The common displacement of the surface, mm, frame W, from where the map has it: without breathing while the clock
   // is not locked, with it when it is. In order of time; the cardiac phase is that of the same instant.
   void add_displacement(Instant t, const Eigen::Vector3d& displacement_mm, double cardiac_phase_rad) noexcept;
-  // The phase that a frame showed, for a locked clock. In order of time.
+  // The phase that a frame showed, for a locked clock. In order of time. Tells nothing in the first breath after a
+  // lock.
   void add_phase(Instant t, double phase_rad, double deviation_rad) noexcept;
   // A frame that showed no phase near the predicted one.
   void add_contradiction(Instant t) noexcept;
@@ -62,6 +65,7 @@ class RespiratoryTracker {
 
  private:
   void predict(Instant t) noexcept;
+  void correct(Instant t, double phase_rad, double deviation_rad) noexcept;
   [[nodiscard]] bool rate_is_possible() const noexcept;
   void suspect(const FoundBreath& found, Instant now) noexcept;
   // The same period search after search, though much else moves the surface.
@@ -78,6 +82,7 @@ class RespiratoryTracker {
   double offset_rad_ = 0.0;  // the clock's phase minus the channel's
   Instant last_agreed_;
   Instant last_told_;
+  Instant first_breath_ends_;
   int locks_ = 0;
   int in_a_row_ = 0;                 // searches that found what looks like breathing, while off
   double candidate_period_s_ = 0.0;  // of persists(); 0: none

@@ -66,6 +66,7 @@ std::vector<HorizonErrors> HorizonSession::errors() const {
     HorizonErrors errors;
     errors.rms_mm = report.settled.rms_mm;
     errors.nees = report.mean_nees;
+    errors.good = report.good;
     for (const ErrorSpan& second : report.seconds) {
       const auto at = static_cast<std::size_t>(second.begin_s / HorizonErrors::kSpan_s);
       if (at >= errors.spans.size()) errors.spans.resize(at + 1);

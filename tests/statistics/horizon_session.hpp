@@ -27,6 +27,7 @@ struct HorizonErrors {
   double rms_mm = 0.0;
   double nees = 0.0;        // NEES/3
   std::vector<Span> spans;  // of kSpan_s each
+  GoodPositions good;       // of surfaces and features that are called so
 
   // RMS of all spans from this one on, mm.
   [[nodiscard]] double rms_from(std::size_t span) const;

@@ -70,6 +70,20 @@ TEST(RespirationSearch, FindsPeriodPhaseAndWaveWithinItsDeviations) {
   }
 }
 
+TEST(RespirationSearch, TheFirstSecondsOfAYoungMapAreLeftOutWhereTheyAreWrong) {
+  Patient patient;
+  RespirationSearch search;
+  for (double t = 0.0; t < 13.0; t += 1.0 / 30.0) {
+    const Vector3d seen = patient.displacement(t);
+    const bool young = t < 3.5;
+    search.add(at_s(t), young ? Vector3d(0.2 * seen + Vector3d(0.0, -1.5, -4.0)) : seen, Patient::cardiac_rad(t));
+  }
+  FoundBreath found;
+  ASSERT_TRUE(search.find(found));
+  EXPECT_NEAR(kTwoPi / found.rate_rad_per_s, patient.period_s, 0.01 * patient.period_s);
+  EXPECT_GT(found.explained, 0.9);
+}
+
 TEST(RespirationSearch, FindsNothingInNoiseOrInTheHeartBeatOrBeforeTwoBreaths) {
   Patient still;
   still.amplitude_mm = 0.0;
@@ -154,6 +168,24 @@ TEST_F(Tracking, APeriodThatDoesNotStayIsNoBreath) {
     tracker.search(at_s(now_s + 1.0));
     ASSERT_NE(tracker.clock().state, RespirationState::kLocked) << now_s;
   }
+}
+
+TEST_F(Tracking, AMapThatLearnsTheFirstBreathByTheClockDoesNotConfirmIt) {
+  RespiratoryTracker tracker(settings);
+  ASSERT_TRUE(lock(tracker));
+  const RespiratoryClock at_lock = tracker.clock();
+  const double period_s = to_seconds(at_lock.period());
+  const double phase = at_lock.at(at_s(now_s)).phase_rad;
+  const auto show = [&](double since_s) {
+    tracker.add_phase(at_s(now_s + since_s), phase + 0.1 + at_lock.rate_rad_per_s * since_s, 0.01);
+  };
+  for (double since_s = 0.0; since_s < period_s - 0.05; since_s += 0.04) show(since_s);
+  EXPECT_EQ(tracker.clock().rate_rad_per_s, at_lock.rate_rad_per_s);
+  EXPECT_EQ(tracker.clock().rate_variance_rad2_per_s2, at_lock.rate_variance_rad2_per_s2);
+  for (double since_s = period_s; since_s < period_s + 0.5; since_s += 0.04) show(since_s);
+  const double error =
+      std::remainder(tracker.clock().at(at_s(now_s)).phase_rad - at_lock.at(at_s(now_s)).phase_rad - 0.1, kTwoPi);
+  EXPECT_LT(std::abs(error), 0.05) << "the second breath is told by what was learnt in the first";
 }
 
 TEST_F(Tracking, ThePhaseIsFollowedWhenTheRateDrifts) {
