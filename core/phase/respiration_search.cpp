@@ -13,18 +13,16 @@ using Eigen::Vector3d;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr int kBreathColumns = 2 * kBreathHarmonics;  // cosines, -sines
 // Neighbouring tenths of a second err alike (the map is the same), so that so many count for one. Measured on simulated
-// hearts: with 5 the period found was off by up to five of its deviations, with 20 by less than two.
+// hearts: with 5 the period found was off by up to five of its deviations, with 20 by two and a half.
 constexpr double kErrorsInCommon = 20.0;
 // A fit of a longer period holds the shorter one as its second harmonic: the shorter wins unless this much better.
 constexpr double kClearlyBetter = 0.8;
 constexpr int kRefinements = 24;
-constexpr double kNarrowest_rad_per_s = 1e-6;
+constexpr double kNarrowest_rad_per_s = 1e-4;  // a tenth of what the rate is known to at best
 // Slower candidates than may be found are tried too, so that what is found is no slower one's nearest neighbour.
 constexpr double kLeastBreaths = 1.5;
 constexpr double kBreathsOfKnownRate = 2.0;
-// Of the oldest, which a young map got wrong: a second more each time.
-constexpr std::uint64_t kBinsLeftOut = 10;
-constexpr std::uint64_t kMostLeftOut = 50;
+constexpr std::uint64_t kBinsASecond = 10;
 
 }  // namespace
 
@@ -160,6 +158,7 @@ RespirationSearch::Fit RespirationSearch::fit(double rate_rad_per_s, std::uint64
 }
 
 double RespirationSearch::refine(double rate_rad_per_s, double width_rad_per_s, std::uint64_t first) const noexcept {
+  if (!(width_rad_per_s > kNarrowest_rad_per_s)) return rate_rad_per_s;
   double best = rate_rad_per_s;
   double best_residual = fit(best, first).residual;
   double width = width_rad_per_s;
@@ -202,6 +201,7 @@ bool RespirationSearch::find(FoundBreath& found) const noexcept {
   // At the end of the range the best candidate may be any faster motion's neighbour.
   if (kTwoPi / best * settings_.breaths > span || best > fastest - 0.5 * step) return false;
   found = surest(best, 0.5 * step, settings_.breaths);
+  if (found.rate_rad_per_s > fastest) return false;
   // What the map learns in its first breath is wrong by what the phase drifts off in it.
   const double largest = settings_.rate_deviation * found.rate_rad_per_s;
   return is_known(found) && found.rate_variance_rad2_per_s2 <= largest * largest;
@@ -214,11 +214,15 @@ bool RespirationSearch::find_at(double rate_rad_per_s, FoundBreath& found) const
 }
 
 FoundBreath RespirationSearch::surest(double rate_rad_per_s, double width_rad_per_s, double breaths) const noexcept {
-  FoundBreath best = breath_at(rate_rad_per_s, oldest());
-  for (std::uint64_t left_out = kBinsLeftOut; left_out <= kMostLeftOut; left_out += kBinsLeftOut) {
-    const std::uint64_t first = oldest() + left_out;
-    if (count_ - first < kLeastBins || rate_rad_per_s * span_s(first) < kTwoPi * breaths) break;
-    const FoundBreath found = breath_at(refine(rate_rad_per_s, width_rad_per_s, first), first);
+  static_assert(kBinsASecond < kLeastBins);
+  const bool known = !(width_rad_per_s > 0.0);
+  FoundBreath best = breath_at(rate_rad_per_s, known, oldest());
+  for (int second = 1; second <= settings_.seconds_left_out; ++second) {
+    const std::uint64_t first = oldest() + static_cast<std::uint64_t>(second) * kBinsASecond;
+    if (count_ < first + kLeastBins) break;
+    const double rate = refine(rate_rad_per_s, width_rad_per_s, first);
+    if (rate * span_s(first) < kTwoPi * breaths) break;
+    const FoundBreath found = breath_at(rate, known, first);
     if (found.phase_variance_rad2 < best.phase_variance_rad2) best = found;
   }
   return best;
@@ -228,7 +232,7 @@ bool RespirationSearch::is_known(const FoundBreath& found) const noexcept {
   return found.reaches(settings_.explained, settings_.least_rms_mm, settings_.phase_deviation_rad);
 }
 
-FoundBreath RespirationSearch::breath_at(double rate_rad_per_s, std::uint64_t first) const noexcept {
+FoundBreath RespirationSearch::breath_at(double rate_rad_per_s, bool known, std::uint64_t first) const noexcept {
   FoundBreath found;
   const auto bins = static_cast<int>(count_ - first);
   const double span = span_s(first);
@@ -246,7 +250,7 @@ FoundBreath RespirationSearch::breath_at(double rate_rad_per_s, std::uint64_t fi
   const double slope = found.wave.slope_mm_per_rad();
   const double variance_mm2 = fitted.residual / (3.0 * (bins - Fit::kColumns));
   const double centre = kErrorsInCommon * variance_mm2 / (bins * slope * slope);
-  found.rate_variance_rad2_per_s2 = 12.0 * centre / (span * span);
+  found.rate_variance_rad2_per_s2 = known ? 0.0 : 12.0 * centre / (span * span);
   found.covariance_rad2_per_s = 0.5 * span * found.rate_variance_rad2_per_s2;
   found.phase_variance_rad2 = centre + 0.25 * span * span * found.rate_variance_rad2_per_s2;
   return found;

@@ -58,6 +58,7 @@ struct RespirationSearchSettings {
   double phase_deviation_rad = 0.12;  // largest, at the newest instant
   double rate_deviation = 0.01;       // largest, share of the rate
   double least_rms_mm = 0.3;          // of what is called breathing
+  int seconds_left_out = 5;           // at most, of the oldest
 };
 
 class RespirationSearch {
@@ -71,7 +72,8 @@ class RespirationSearch {
   // Some milliseconds' work: not for the critical path. False when there is no breathing to be seen yet; `found` then
   // tells of the best candidate, if any.
   [[nodiscard]] bool find(FoundBreath& found) const noexcept;
-  // The same where the rate is known: two breaths are enough. (After one, a young map has taken part of it in.)
+  // The same where the rate is known: two breaths are enough. (After one, a young map has taken part of it in.) What is
+  // not known of the rate is not counted.
   [[nodiscard]] bool find_at(double rate_rad_per_s, FoundBreath& found) const noexcept;
 
  private:
@@ -98,8 +100,10 @@ class RespirationSearch {
   // From the bin `first` on.
   [[nodiscard]] Fit fit(double rate_rad_per_s, std::uint64_t first) const noexcept;
   [[nodiscard]] double refine(double rate_rad_per_s, double width_rad_per_s, std::uint64_t first) const noexcept;
-  [[nodiscard]] FoundBreath breath_at(double rate_rad_per_s, std::uint64_t first) const noexcept;
-  // The surest with some of the oldest left out, of so many breaths at least.
+  // The deviations are those of a rate that was found, or zero of one that is known.
+  [[nodiscard]] FoundBreath breath_at(double rate_rad_per_s, bool known, std::uint64_t first) const noexcept;
+  // With as many of the oldest left out as make it surest, of so many breaths at least. A rate that is known has no
+  // width to be refined in.
   [[nodiscard]] FoundBreath surest(double rate_rad_per_s, double width_rad_per_s, double breaths) const noexcept;
   [[nodiscard]] bool is_known(const FoundBreath& found) const noexcept;
   [[nodiscard]] double span_s(std::uint64_t first) const noexcept;

@@ -32,10 +32,17 @@ constexpr Duration kSilentBeforeSearch = std::chrono::seconds(15);
 // Of a phase to go on from: beyond it the wave is no straight line, and the images may agree with a wrong phase.
 constexpr double kLargestRecalledDeviation_rad = 0.5;
 
+RespirationSearchSettings search_settings(const RespirationSettings& settings) noexcept {
+  RespirationSearchSettings search = settings.search;
+  // A suspicion needs neither phase nor period so well, and the search is then everybody's.
+  if (!settings.enabled) search.seconds_left_out = 0;
+  return search;
+}
+
 }  // namespace
 
 RespiratoryTracker::RespiratoryTracker(const RespirationSettings& settings) noexcept
-    : settings_(settings), search_(settings.search) {
+    : settings_(settings), search_(search_settings(settings)) {
   clock_.state = settings.enabled ? RespirationState::kSearching : RespirationState::kOff;
   clock_.unknown_displacement_mm = settings.displacement_mm;
 }
@@ -69,7 +76,7 @@ void RespiratoryTracker::search(Instant now) noexcept {
     suspect(found, now);
     return;
   }
-  if (!there && (by_channel || !persists(found, now))) return;
+  if (!there && !persists(found, now)) return;
   // The coefficients that the map has learnt count from where the phase was zero then.
   double turn_rad = locks_ > 0 ? alignment(found.wave, wave_) : 0.0;
   if (by_channel) {
@@ -78,8 +85,7 @@ void RespiratoryTracker::search(Instant now) noexcept {
     offset_known_ = true;
     turn_rad = -(channel_rad + offset_rad_);
     const double rate_deviation = channel_rate_rad_per_s * to_seconds(channel_.deviation) / to_seconds(channel_.period);
-    found.rate_variance_rad2_per_s2 = std::min(found.rate_variance_rad2_per_s2, rate_deviation * rate_deviation);
-    found.covariance_rad2_per_s = 0.0;
+    found.rate_variance_rad2_per_s2 = rate_deviation * rate_deviation;
   }
   wave_ = found.wave.shifted(turn_rad);
   clock_.state = RespirationState::kLocked;
@@ -92,7 +98,8 @@ void RespiratoryTracker::search(Instant now) noexcept {
   clock_.rate_variance_rad2_per_s2 = found.rate_variance_rad2_per_s2;
   clock_.slope_mm_per_rad = wave_.slope_mm_per_rad() / std::numbers::sqrt3;
   last_agreed_ = last_told_ = now;
-  if (locks_++ == 0) first_breath_ends_ = now + clock_.period();
+  ++locks_;
+  if (!breath_learnt_) first_breath_ends_ = now + clock_.period();
   candidate_period_s_ = 0.0;
   search_.clear();
 }
@@ -171,6 +178,7 @@ void RespiratoryTracker::recall(const RespirationMemory& memory, Instant now) no
   }
   if (!memory.found) return;
   locks_ = 1;
+  breath_learnt_ = true;
   wave_ = memory.wave;
   offset_known_ = memory.offset_known;
   offset_rad_ = memory.offset_rad;
@@ -189,22 +197,32 @@ void RespiratoryTracker::recall(const RespirationMemory& memory, Instant now) no
 void RespiratoryTracker::add_phase(Instant t, double phase_rad, double deviation_rad) noexcept {
   if (clock_.state != RespirationState::kLocked) return;
   if (t < first_breath_ends_) {
-    last_agreed_ = last_told_ = t;
+    predict(t);
+    static_cast<void>(agrees(t, phase_rad, deviation_rad));
     return;
   }
+  breath_learnt_ = true;
   correct(t, phase_rad, deviation_rad);
 }
 
-void RespiratoryTracker::correct(Instant t, double phase_rad, double deviation_rad) noexcept {
-  predict(t);
+// With the clock, predicted to t; what does not contradicts it.
+bool RespiratoryTracker::agrees(Instant t, double phase_rad, double deviation_rad) noexcept {
   last_told_ = t;
   const double innovation = std::remainder(phase_rad - clock_.phase_rad, kTwoPi);
   const double variance = clock_.phase_variance_rad2 + deviation_rad * deviation_rad;
   if (innovation * innovation > kGate * variance) {
     add_contradiction(t);
-    return;
+    return false;
   }
   last_agreed_ = t;
+  return true;
+}
+
+void RespiratoryTracker::correct(Instant t, double phase_rad, double deviation_rad) noexcept {
+  predict(t);
+  if (!agrees(t, phase_rad, deviation_rad)) return;
+  const double innovation = std::remainder(phase_rad - clock_.phase_rad, kTwoPi);
+  const double variance = clock_.phase_variance_rad2 + deviation_rad * deviation_rad;
   const double K_phase = clock_.phase_variance_rad2 / variance;
   const double K_rate = clock_.covariance_rad2_per_s / variance;
   clock_.phase_rad += K_phase * innovation;

@@ -21,8 +21,8 @@ struct RespirationSettings {
 };
 
 // Once locked, the clock is a Kalman filter of phase and rate. Both may wander: a ventilator's rate hardly does, a
-// patient's own breath by some percent. In the first breath of all the map learns how it breathes by this very clock,
-// and what the images show by that map would only confirm it: they do not correct it before the second. When the images
+// patient's own breath by some percent. Until a whole breath has been learnt the map learns by this very clock, and
+// what the images show by that map would only confirm it: they may contradict it, but do not correct it. When they
 // contradict it for kContradictedBeforeSearch, or tell nothing for kSilentBeforeSearch, the search begins again; the
 // phase found then is counted as before, by the wave's shape.
 //
@@ -37,8 +37,7 @@ class RespiratoryTracker {
   // The common displacement of the surface, mm, frame W, from where the map has it: without breathing while the clock
   // is not locked, with it when it is. In order of time; the cardiac phase is that of the same instant.
   void add_displacement(Instant t, const Eigen::Vector3d& displacement_mm, double cardiac_phase_rad) noexcept;
-  // The phase that a frame showed, for a locked clock. In order of time. Tells nothing in the first breath after a
-  // lock.
+  // The phase that a frame showed, for a locked clock. In order of time.
   void add_phase(Instant t, double phase_rad, double deviation_rad) noexcept;
   // A frame that showed no phase near the predicted one.
   void add_contradiction(Instant t) noexcept;
@@ -65,6 +64,7 @@ class RespiratoryTracker {
 
  private:
   void predict(Instant t) noexcept;
+  [[nodiscard]] bool agrees(Instant t, double phase_rad, double deviation_rad) noexcept;
   void correct(Instant t, double phase_rad, double deviation_rad) noexcept;
   [[nodiscard]] bool rate_is_possible() const noexcept;
   void suspect(const FoundBreath& found, Instant now) noexcept;
@@ -83,6 +83,7 @@ class RespiratoryTracker {
   Instant last_agreed_;
   Instant last_told_;
   Instant first_breath_ends_;
+  bool breath_learnt_ = false;  // by the map, with a clock that was locked all the while
   int locks_ = 0;
   int in_a_row_ = 0;                 // searches that found what looks like breathing, while off
   double candidate_period_s_ = 0.0;  // of persists(); 0: none

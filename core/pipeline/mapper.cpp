@@ -160,7 +160,7 @@ void Mapper::note_motion(const FrameRecord& frame) noexcept {
 // B. What the correction changes is the time to come: the publisher evaluates with it, and so does the next frame's A.
 void Mapper::settle_phases(const FrameRecord& frame) noexcept {
   const bool breath_known = frame.respiration.known;
-  bool breath_told = false;
+  bool breath_told = false;  // or contradicted, which a displacement does not take back
   job_.shared_pose = nullptr;
   if (settings_.phase_from_image || breath_known) {
     const ImagePhases seen = image_phase_.observe(groups_, frame, model_, settings_.estimator);
@@ -172,6 +172,7 @@ void Mapper::settle_phases(const FrameRecord& frame) noexcept {
       breath_told = true;
     } else if (breath_known && seen.respiratory.outcome == ImagePhaseOutcome::kContradicts) {
       respiration_.add_contradiction(frame.stamp.capture);
+      breath_told = true;
     }
   }
   // Where breathing is only watched for: a phase that is off displaces the surface too.
