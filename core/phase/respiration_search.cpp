@@ -22,7 +22,6 @@ constexpr double kNarrowest_rad_per_s = 1e-4;  // a tenth of what the rate is kn
 // Slower candidates than may be found are tried too, so that what is found is no slower one's nearest neighbour.
 constexpr double kLeastBreaths = 1.5;
 constexpr double kBreathsOfKnownRate = 2.0;
-constexpr std::uint64_t kBinsASecond = 10;
 
 }  // namespace
 
@@ -214,6 +213,7 @@ bool RespirationSearch::find_at(double rate_rad_per_s, FoundBreath& found) const
 }
 
 FoundBreath RespirationSearch::surest(double rate_rad_per_s, double width_rad_per_s, double breaths) const noexcept {
+  constexpr auto kBinsASecond = static_cast<std::uint64_t>(std::chrono::seconds(1) / kBin);
   static_assert(kBinsASecond < kLeastBins);
   const bool known = !(width_rad_per_s > 0.0);
   FoundBreath best = breath_at(rate_rad_per_s, known, oldest());

@@ -133,8 +133,8 @@ void RespiratoryTracker::follow(const BreathSignal& signal, Instant now) noexcep
     offset_known_ = true;
     return;
   }
-  correct(now, signal.phase_at(now) + offset_rad_,
-          std::max(kLeastChannelDeviation_rad, kTwoPi * to_seconds(signal.deviation) / to_seconds(signal.period)));
+  hear(now, signal.phase_at(now) + offset_rad_,
+       std::max(kLeastChannelDeviation_rad, kTwoPi * to_seconds(signal.deviation) / to_seconds(signal.period)), true);
 }
 
 // A map without breathing follows it in part, which leaves a weak trace of it. That is enough to reckon with its
@@ -196,33 +196,22 @@ void RespiratoryTracker::recall(const RespirationMemory& memory, Instant now) no
 
 void RespiratoryTracker::add_phase(Instant t, double phase_rad, double deviation_rad) noexcept {
   if (clock_.state != RespirationState::kLocked) return;
-  if (t < first_breath_ends_) {
-    predict(t);
-    static_cast<void>(agrees(t, phase_rad, deviation_rad));
-    return;
-  }
-  breath_learnt_ = true;
-  correct(t, phase_rad, deviation_rad);
+  const bool learnt = t >= first_breath_ends_;
+  breath_learnt_ = breath_learnt_ || learnt;
+  hear(t, phase_rad, deviation_rad, learnt);
 }
 
-// With the clock, predicted to t; what does not contradicts it.
-bool RespiratoryTracker::agrees(Instant t, double phase_rad, double deviation_rad) noexcept {
+void RespiratoryTracker::hear(Instant t, double phase_rad, double deviation_rad, bool corrects) noexcept {
+  predict(t);
   last_told_ = t;
   const double innovation = std::remainder(phase_rad - clock_.phase_rad, kTwoPi);
   const double variance = clock_.phase_variance_rad2 + deviation_rad * deviation_rad;
   if (innovation * innovation > kGate * variance) {
     add_contradiction(t);
-    return false;
+    return;
   }
   last_agreed_ = t;
-  return true;
-}
-
-void RespiratoryTracker::correct(Instant t, double phase_rad, double deviation_rad) noexcept {
-  predict(t);
-  if (!agrees(t, phase_rad, deviation_rad)) return;
-  const double innovation = std::remainder(phase_rad - clock_.phase_rad, kTwoPi);
-  const double variance = clock_.phase_variance_rad2 + deviation_rad * deviation_rad;
+  if (!corrects) return;
   const double K_phase = clock_.phase_variance_rad2 / variance;
   const double K_rate = clock_.covariance_rad2_per_s / variance;
   clock_.phase_rad += K_phase * innovation;

@@ -64,8 +64,8 @@ class RespiratoryTracker {
 
  private:
   void predict(Instant t) noexcept;
-  [[nodiscard]] bool agrees(Instant t, double phase_rad, double deviation_rad) noexcept;
-  void correct(Instant t, double phase_rad, double deviation_rad) noexcept;
+  // Agrees with the clock, and then corrects it if it may, or contradicts it.
+  void hear(Instant t, double phase_rad, double deviation_rad, bool corrects) noexcept;
   [[nodiscard]] bool rate_is_possible() const noexcept;
   void suspect(const FoundBreath& found, Instant now) noexcept;
   // The same period search after search, though much else moves the surface.
