@@ -382,6 +382,8 @@ inline const char* describe(perimap_SurfaceReason reason) noexcept {
       return "premature beats prevail";
     case perimap_SURFACE_REASON_LAW_UNDECIDED:
       return "how the motion goes with the beat is not certain yet";
+    case perimap_SURFACE_REASON_NOT_SEEN:
+      return "the images do not show what is mapped";
     default:
       return "a reason that this client does not know";
   }

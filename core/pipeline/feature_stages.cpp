@@ -252,7 +252,7 @@ void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept {
 
 void describe(const FeatureSlot& slot, Instant now, FeatureSnapshot& snapshot) noexcept {
   snapshot.id = slot.id;
-  snapshot.last_observed = slot.last_observed;
+  snapshot.last_observed = slot.match_agrees ? now : slot.last_observed;
   snapshot.first_observed = slot.first_observed;
   snapshot.first_observed_px = slot.first_observed_px;
   snapshot.largest_deviation_mm = slot.largest_deviation_mm;

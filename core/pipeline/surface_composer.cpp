@@ -4,6 +4,7 @@
 
 #include "core/periodic/periodic_motion.hpp"
 #include "core/pipeline/phase_spread.hpp"
+#include "core/pipeline/sight.hpp"
 #include "core/pipeline/surface_state.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
@@ -74,8 +75,10 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
 
   order_.clear();
   bool pose_missing = false;
+  Sight sight;
   for (const ShardSnapshot* snapshot : snapshots) {
     pose_missing = pose_missing || snapshot->pose_missing;
+    sight.add(*snapshot);
     const Covered covered = covered_by(*snapshot, release, sample_.valid_time);
     for (const FeatureSnapshot& feature : snapshot->features) order_.push_back({&feature, covered});
   }
@@ -93,7 +96,8 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
                                .mapped = !order_.empty(),
                                .frame_missing = missing,
                                .update_late = late,
-                               .pose_missing = pose_missing};
+                               .pose_missing = pose_missing,
+                               .not_seen = sight.lost()};
   sample_.reason = reason_of(phase, clock.rhythm(), footing);
   sample_.state = state_of(sample_.reason);
 

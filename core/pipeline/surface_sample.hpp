@@ -27,7 +27,8 @@ enum class SurfaceReason : std::uint8_t {
   kEctopicBeat,
   kRhythmUnpredictable,
   kRhythmEctopic,
-  kLawUndecided
+  kLawUndecided,
+  kNotSeen
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost, kShed };

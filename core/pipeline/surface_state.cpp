@@ -13,6 +13,7 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (footing.frame_missing) return SurfaceReason::kFrameMissing;
   if (footing.update_late) return SurfaceReason::kUpdateLate;
   if (footing.pose_missing) return SurfaceReason::kPoseMissing;
+  if (footing.not_seen) return SurfaceReason::kNotSeen;
   if (phase.ectopic) return SurfaceReason::kEctopicBeat;
   if (rhythm == Rhythm::kUnpredictable) return SurfaceReason::kRhythmUnpredictable;
   if (rhythm == Rhythm::kEctopic) return SurfaceReason::kRhythmEctopic;

@@ -13,6 +13,7 @@ struct SurfaceFooting {
   bool frame_missing = false;
   bool update_late = false;
   bool pose_missing = false;
+  bool not_seen = false;  // see Sight
 };
 
 // The first thing that is wrong, worst first.

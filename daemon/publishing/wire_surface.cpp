@@ -51,6 +51,8 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_RHYTHM_ECTOPIC;
     case SurfaceReason::kLawUndecided:
       return perimap_SURFACE_REASON_LAW_UNDECIDED;
+    case SurfaceReason::kNotSeen:
+      return perimap_SURFACE_REASON_NOT_SEEN;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }

@@ -306,10 +306,12 @@ TEST_F(Shedding, TakenBackAFeatureIsCalledConvergedOnlyWhenItHasBeenObserved) {
   describe(slot, now, snapshot);
   EXPECT_EQ(snapshot.state, FeatureState::kConverging);
   EXPECT_EQ(snapshot.reason, FeatureReason::kNotObserved);
+  EXPECT_EQ(snapshot.last_observed, slot.last_observed);
   slot.match_agrees = true;
   describe(slot, now, snapshot);
   EXPECT_EQ(snapshot.state, FeatureState::kConverged);
   EXPECT_EQ(snapshot.reason, FeatureReason::kNone);
+  EXPECT_EQ(snapshot.last_observed, now) << "by the match of this frame";
 }
 
 }  // namespace

@@ -219,6 +219,19 @@ TEST(SurfaceComposer, SaysThatTheFrameOrThePoseIsMissing) {
   EXPECT_EQ(composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view).reason, SurfaceReason::kPoseMissing);
 }
 
+TEST(SurfaceComposer, SaysThatTheImagesShowNothingOfTheMap) {
+  SurfaceComposer composer(settings());
+  ShardSnapshot snapshot = shard(100, {feature(1, 1.0), feature(2, 1.0)});
+  snapshot.capture = kRelease.capture;
+  for (FeatureSnapshot& feature : snapshot.features) feature.last_observed = snapshot.capture - milliseconds(501);
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  const SurfaceSample& unseen = composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view);
+  EXPECT_EQ(unseen.state, SurfaceState::kDegraded);
+  EXPECT_EQ(unseen.reason, SurfaceReason::kNotSeen);
+  snapshot.features[0].last_observed = snapshot.capture;
+  EXPECT_EQ(composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view).state, SurfaceState::kGood);
+}
+
 TEST(SurfaceComposer, MarksEveryPositionInvalidWhenThePhaseIsUnknownOrLost) {
   SurfaceComposer composer(settings());
   const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
@@ -376,6 +389,7 @@ ShardSnapshot clock_shard(std::uint64_t frame_sequence) {
   }
   ShardSnapshot snapshot = shard(frame_sequence, {shown});
   snapshot.capture = at_ms(9150 + 30 * (static_cast<int>(frame_sequence) - 100));
+  snapshot.features[0].last_observed = snapshot.capture;
   for (int i = 0; i < static_cast<int>(kInstantsCovered); ++i) {
     snapshot.instants[kReleasesCovered + static_cast<std::size_t>(i)] = at_ms(9200 + 20 * i);
   }

@@ -25,11 +25,20 @@ TEST(SurfaceState, IsDegradedWhileTheLawOfTheMotionIsUndecided) {
   EXPECT_EQ(state_of(SurfaceReason::kLawUndecided), SurfaceState::kDegraded);
 }
 
+TEST(SurfaceState, IsDegradedWhenTheImagesShowNothingOfTheMap) {
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, {.mapped = true, .not_seen = true}), SurfaceReason::kNotSeen);
+  EXPECT_EQ(state_of(SurfaceReason::kNotSeen), SurfaceState::kDegraded);
+}
+
 TEST(SurfaceState, TellsWhatIsWorseFirst) {
   PhaseEstimate phase = locked();
   phase.law_undecided = true;
   EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, kMapped), SurfaceReason::kRhythmEctopic);
   EXPECT_EQ(reason_of(phase, Rhythm::kPredictable, {}), SurfaceReason::kNothingMapped);
+  SurfaceFooting footing{.mapped = true, .not_seen = true};
+  EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, footing), SurfaceReason::kNotSeen);
+  footing.pose_missing = true;
+  EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, footing), SurfaceReason::kPoseMissing);
   phase.state = PhaseState::kFreeRunning;
   EXPECT_EQ(reason_of(phase, Rhythm::kPredictable, kMapped), SurfaceReason::kPhaseFreeRunning);
   phase.state = PhaseState::kLost;
