@@ -5,6 +5,7 @@
 
 #include "core/geometry/symmetric_matrix2.hpp"
 #include "core/pipeline/pose_noise.hpp"
+#include "core/pipeline/sight.hpp"
 
 namespace perimap {
 namespace {
@@ -252,7 +253,9 @@ void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept {
 
 void describe(const FeatureSlot& slot, Instant now, FeatureSnapshot& snapshot) noexcept {
   snapshot.id = slot.id;
-  snapshot.last_observed = slot.match_agrees ? now : slot.last_observed;
+  snapshot.last_observed = slot.last_observed;
+  snapshot.expected = slot.in_view && !slot.shed;
+  snapshot.in_sight = slot.match_agrees || now - slot.last_observed <= Sight::kLately;
   snapshot.first_observed = slot.first_observed;
   snapshot.first_observed_px = slot.first_observed_px;
   snapshot.largest_deviation_mm = slot.largest_deviation_mm;

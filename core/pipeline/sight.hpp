@@ -5,31 +5,35 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "core/pipeline/image_phase.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 
 namespace perimap {
 
+// Of features called converged alone: one that is not agrees with almost any match.
 class Sight {
  public:
-  // One feature is in sight that agreed with the map so shortly before its shard's frame: longer than smoke or blur of
-  // a few frames, shorter than a heart beat.
+  // So long after it agreed with the map a feature is still in sight: longer than smoke or blur of a few frames,
+  // shorter than a heart beat.
   static constexpr Duration kLately = std::chrono::milliseconds(500);
-  // With fewer in sight the images can not contradict the phase either.
-  static constexpr std::size_t kEnough = ImagePhase::kFewestMatches;
+  // As many must be in sight wherever so many are twice expected; of more a third, since chance finds some.
+  static constexpr std::size_t kEnough = 8;
 
   void add(const ShardSnapshot& shard) noexcept {
-    mapped_ += shard.features.size();
-    seen_ += static_cast<std::size_t>(std::count_if(
-        shard.features.begin(), shard.features.end(),
-        [&](const FeatureSnapshot& feature) { return shard.capture - feature.last_observed <= kLately; }));
+    for (const FeatureSnapshot& feature : shard.features) {
+      if (feature.state != FeatureState::kConverged) continue;
+      ++converged_;
+      expected_ += feature.expected ? 1 : 0;
+      seen_ += feature.in_sight ? 1 : 0;
+    }
   }
 
-  // Of a map with few features half must be in sight.
-  [[nodiscard]] bool lost() const noexcept { return seen_ < std::min(kEnough, (mapped_ + 1) / 2); }
+  [[nodiscard]] bool lost() const noexcept {
+    const std::size_t some = std::max({std::size_t{1}, std::min(kEnough, (expected_ + 1) / 2), (expected_ + 2) / 3});
+    return converged_ > 0 && seen_ < some;
+  }
 
  private:
-  std::size_t mapped_ = 0, seen_ = 0;
+  std::size_t converged_ = 0, expected_ = 0, seen_ = 0;
 };
 
 }  // namespace perimap

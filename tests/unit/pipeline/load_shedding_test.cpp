@@ -306,12 +306,24 @@ TEST_F(Shedding, TakenBackAFeatureIsCalledConvergedOnlyWhenItHasBeenObserved) {
   describe(slot, now, snapshot);
   EXPECT_EQ(snapshot.state, FeatureState::kConverging);
   EXPECT_EQ(snapshot.reason, FeatureReason::kNotObserved);
-  EXPECT_EQ(snapshot.last_observed, slot.last_observed);
   slot.match_agrees = true;
   describe(slot, now, snapshot);
   EXPECT_EQ(snapshot.state, FeatureState::kConverged);
   EXPECT_EQ(snapshot.reason, FeatureReason::kNone);
-  EXPECT_EQ(snapshot.last_observed, now) << "by the match of this frame";
+}
+
+TEST_F(Shedding, AShedFeatureIsNotExpectedToBeSeenNorIsOneOutOfView) {
+  FeatureSlot& slot = add(1, SlotState::kMapped, true, 0.5);
+  FeatureSnapshot snapshot;
+  describe(slot, slot.last_observed, snapshot);
+  EXPECT_TRUE(snapshot.expected);
+  slot.shed = true;
+  describe(slot, slot.last_observed, snapshot);
+  EXPECT_FALSE(snapshot.expected);
+  slot.shed = false;
+  slot.in_view = false;
+  describe(slot, slot.last_observed, snapshot);
+  EXPECT_FALSE(snapshot.expected);
 }
 
 }  // namespace

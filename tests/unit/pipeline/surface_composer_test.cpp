@@ -34,6 +34,8 @@ FeatureSnapshot feature(std::uint32_t id, double amplitude_mm) {
   snapshot.x(1) = amplitude_mm;  // a_1 of x
   snapshot.covariances_W_mm2.fill(0.04 * Matrix3d::Identity());
   snapshot.largest_deviation_mm = 0.5;
+  snapshot.expected = true;
+  snapshot.in_sight = true;
   return snapshot;
 }
 
@@ -222,13 +224,12 @@ TEST(SurfaceComposer, SaysThatTheFrameOrThePoseIsMissing) {
 TEST(SurfaceComposer, SaysThatTheImagesShowNothingOfTheMap) {
   SurfaceComposer composer(settings());
   ShardSnapshot snapshot = shard(100, {feature(1, 1.0), feature(2, 1.0)});
-  snapshot.capture = kRelease.capture;
-  for (FeatureSnapshot& feature : snapshot.features) feature.last_observed = snapshot.capture - milliseconds(501);
+  for (FeatureSnapshot& feature : snapshot.features) feature.in_sight = false;
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
   const SurfaceSample& unseen = composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view);
   EXPECT_EQ(unseen.state, SurfaceState::kDegraded);
   EXPECT_EQ(unseen.reason, SurfaceReason::kNotSeen);
-  snapshot.features[0].last_observed = snapshot.capture;
+  snapshot.features[0].in_sight = true;
   EXPECT_EQ(composer.compose(kRelease, steady_clock(), RespiratoryClock{}, view).state, SurfaceState::kGood);
 }
 
@@ -389,7 +390,6 @@ ShardSnapshot clock_shard(std::uint64_t frame_sequence) {
   }
   ShardSnapshot snapshot = shard(frame_sequence, {shown});
   snapshot.capture = at_ms(9150 + 30 * (static_cast<int>(frame_sequence) - 100));
-  snapshot.features[0].last_observed = snapshot.capture;
   for (int i = 0; i < static_cast<int>(kInstantsCovered); ++i) {
     snapshot.instants[kReleasesCovered + static_cast<std::size_t>(i)] = at_ms(9200 + 20 * i);
   }
