@@ -1,6 +1,5 @@
 #include "core/pipeline/pipeline.hpp"
 
-#include "core/pipeline/sight.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
@@ -47,6 +46,7 @@ Pipeline::Pipeline(const PipelineSettings& settings)
       }
     }
   }
+  (void)model_snapshots();  // so that model_view_ holds no null
 }
 
 void Pipeline::drain_poses() noexcept {
@@ -160,18 +160,12 @@ std::span<const ShardSnapshot* const> Pipeline::model_snapshots() noexcept {
 }
 
 SurfaceFooting Pipeline::model_footing(const RespiratoryClock& respiration, Instant now) const noexcept {
-  SurfaceFooting footing;
+  SurfaceFooting footing = footing_of(model_view_);
   footing.breath_unknown = respiration.unknown();
-  Sight sight;
   for (const ShardSnapshot* snapshot : model_view_) {
-    if (snapshot == nullptr) continue;
-    footing.mapped = footing.mapped || !snapshot->features.empty();
-    footing.pose_missing = footing.pose_missing || snapshot->pose_missing;
-    sight.add(*snapshot);
     footing.update_late =
         footing.update_late || !snapshot->any || snapshot->recalled || snapshot->frame_sequence < model_owes_;
   }
-  footing.not_seen = sight.lost();
   // As the schedule has it: the frame after the last one, half a period late, has passed its release.
   const auto last = from_ns(static_cast<std::int64_t>(counters_.last_frame_ns.get()));
   const Duration period(static_cast<std::int64_t>(counters_.frame_period_ns.get()));

@@ -4,7 +4,6 @@
 
 #include "core/periodic/periodic_motion.hpp"
 #include "core/pipeline/phase_spread.hpp"
-#include "core/pipeline/sight.hpp"
 #include "core/pipeline/surface_state.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
@@ -74,11 +73,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   const bool behind = rest_on(release, snapshots);
 
   order_.clear();
-  bool pose_missing = false;
-  Sight sight;
   for (const ShardSnapshot* snapshot : snapshots) {
-    pose_missing = pose_missing || snapshot->pose_missing;
-    sight.add(*snapshot);
     const Covered covered = covered_by(*snapshot, release, sample_.valid_time);
     for (const FeatureSnapshot& feature : snapshot->features) order_.push_back({&feature, covered});
   }
@@ -92,12 +87,10 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   const bool missing = sample_.release.frame_missing;
   const bool late = behind && !missing;
   sample_.update_late = late;
-  const SurfaceFooting footing{.breath_unknown = respiration.unknown(),
-                               .mapped = !order_.empty(),
-                               .frame_missing = missing,
-                               .update_late = late,
-                               .pose_missing = pose_missing,
-                               .not_seen = sight.lost()};
+  SurfaceFooting footing = footing_of(snapshots);
+  footing.breath_unknown = respiration.unknown();
+  footing.frame_missing = missing;
+  footing.update_late = late;
   sample_.reason = reason_of(phase, clock.rhythm(), footing);
   sample_.state = state_of(sample_.reason);
 

@@ -1,6 +1,20 @@
 #include "core/pipeline/surface_state.hpp"
 
+#include "core/pipeline/sight.hpp"
+
 namespace perimap {
+
+SurfaceFooting footing_of(std::span<const ShardSnapshot* const> snapshots) noexcept {
+  SurfaceFooting footing;
+  Sight sight;
+  for (const ShardSnapshot* snapshot : snapshots) {
+    footing.mapped = footing.mapped || !snapshot->features.empty();
+    footing.pose_missing = footing.pose_missing || snapshot->pose_missing;
+    sight.add(*snapshot);
+  }
+  footing.not_seen = sight.lost();
+  return footing;
+}
 
 SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const SurfaceFooting& footing) noexcept {
   if (phase.state == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;

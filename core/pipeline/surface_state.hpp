@@ -1,7 +1,10 @@
 // What is wrong with a surface, and how far it may be used all the same.
 #pragma once
 
+#include <span>
+
 #include "core/phase/cardiac_clock.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/surface_sample.hpp"
 
 namespace perimap {
@@ -15,6 +18,9 @@ struct SurfaceFooting {
   bool pose_missing = false;
   bool not_seen = false;  // see Sight
 };
+
+// As far as the newest snapshots tell: whether there are features, poses and sight of them.
+[[nodiscard]] SurfaceFooting footing_of(std::span<const ShardSnapshot* const> snapshots) noexcept;
 
 // The first thing that is wrong, worst first.
 [[nodiscard]] SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm,
