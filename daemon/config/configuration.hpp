@@ -148,8 +148,8 @@ struct EstimationConfiguration {
   double tolerance = 1e-2;
   double gate_chi2 = 23.0;
   double prior_dc_deviation_mm = 40.0;
-  double prior_harmonic_deviation_mm = 4.0;      // of harmonic 1; harmonic k has this / k^2
-  double configured_converged_deviation_mm = 0;  // 0: automatic, see converged_deviation_mm()
+  double prior_harmonic_deviation_mm = 4.0;  // of harmonic 1; harmonic k has this / k^2
+  double converged_deviation_mm = 1.0;       // 0, which recordings may hold: 1 mm
 
   bool operator==(const EstimationConfiguration&) const = default;
 };
@@ -234,16 +234,6 @@ struct Configuration {
 // From one of the clock's releases to the next, whether or not it releases.
 [[nodiscard]] inline Duration clock_period(const PipelineConfiguration& pipeline) noexcept {
   return Duration(std::llround(1e9 / pipeline.clock_rate_hz));
-}
-
-// The bound below which a feature counts as converged: the configured one, or 1 mm with an exact tracker and 2 mm with
-// a noisy one.
-[[nodiscard]] inline double converged_deviation_mm(const Configuration& configuration) noexcept {
-  if (configuration.estimation.configured_converged_deviation_mm > 0) {
-    return configuration.estimation.configured_converged_deviation_mm;
-  }
-  const TrackerConfiguration& tracker = configuration.tracker;
-  return tracker.position_deviation_mm > 0 || tracker.rotation_deviation_rad > 0 ? 2.0 : 1.0;
 }
 
 }  // namespace perimap

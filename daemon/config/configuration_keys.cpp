@@ -538,8 +538,8 @@ void add_estimation(std::vector<ConfigurationKey>& keys) {
               "prior standard deviation of a feature's mean position")
       .number("prior_harmonic_deviation_mm", 0.01, 1000, PERIMAP_MEMBER(estimation.prior_harmonic_deviation_mm),
               "prior standard deviation of harmonic 1; harmonic k has this / k^2")
-      .number("converged_deviation_mm", 0, 100, PERIMAP_MEMBER(estimation.configured_converged_deviation_mm),
-              "largest deviation over the cycle of a converged feature; 0: 1 mm, or 2 mm with tracker noise");
+      .number("converged_deviation_mm", 0, 100, PERIMAP_MEMBER(estimation.converged_deviation_mm),
+              "largest deviation over the cycle, in any direction, of a converged feature; 0: 1 mm");
 }
 
 bool is_socket_path(const std::string& text) {

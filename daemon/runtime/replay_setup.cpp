@@ -100,7 +100,9 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.estimator.batch.prior_depth_mm = c.estimation.start_depths_mm[c.estimation.start_depths_mm.size() / 2];
   s.estimator.start_observations = c.estimation.start_observations;
   s.estimator.pixel_deviation_px = c.estimation.pixel_deviation_px;
-  s.estimator.converged_deviation_mm = converged_deviation_mm(c);
+  constexpr double kUsual_mm = 1.0;  // what 0 means
+  s.estimator.converged_deviation_mm =
+      c.estimation.converged_deviation_mm > 0.0 ? c.estimation.converged_deviation_mm : kUsual_mm;
   s.workers = c.pipeline.workers;
   s.latency = c.pipeline.latency;
   s.lead = c.pipeline.lead;

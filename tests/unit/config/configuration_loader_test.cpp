@@ -401,14 +401,5 @@ TEST(ShippedConfiguration, TheReplayConfigurationHoldsTheDefaults) {
   EXPECT_EQ(*result, Configuration{});
 }
 
-TEST(ConvergedDeviation, FollowsTheTrackerNoiseUnlessConfigured) {
-  Configuration configuration;
-  EXPECT_EQ(converged_deviation_mm(configuration), 1.0);
-  configuration.tracker.position_deviation_mm = 1.4;
-  EXPECT_EQ(converged_deviation_mm(configuration), 2.0);
-  configuration.estimation.configured_converged_deviation_mm = 0.5;
-  EXPECT_EQ(converged_deviation_mm(configuration), 0.5);
-}
-
 }  // namespace
 }  // namespace perimap
