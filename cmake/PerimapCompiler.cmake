@@ -21,7 +21,9 @@ if(PERIMAP_SANITIZE)
   # -O1: instrumented Eigen code takes several times as long to compile at -O2 and hardly runs faster.
   string(REPLACE "-O2" "-O1" CMAKE_CXX_FLAGS_RELWITHDEBINFO "${CMAKE_CXX_FLAGS_RELWITHDEBINFO}")
   add_compile_options(-fsanitize=${PERIMAP_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
-  add_link_options(-fsanitize=${PERIMAP_SANITIZE})
+  # Their runtimes call dlopen() in the program's place, so that glibc looks at their run path; at a program's DT_RPATH, the
+  # older tag, it looks for whoever calls.
+  add_link_options(-fsanitize=${PERIMAP_SANITIZE} LINKER:--disable-new-dtags)
 endif()
 set(PERIMAP_UNDEFINED all CACHE STRING "Checks of UndefinedBehaviorSanitizer: all, or some")
 if(PERIMAP_SANITIZE STREQUAL "address,undefined" AND PERIMAP_UNDEFINED STREQUAL some)

@@ -59,23 +59,24 @@ class FrameSource {
 
 class VideoSource final : public FrameSource {
  public:
-  VideoSource(VideoReader reader, std::string path) : reader_(std::move(reader)), path_(std::move(path)) {}
+  VideoSource(std::unique_ptr<VideoReader> reader, std::string path)
+      : reader_(std::move(reader)), path_(std::move(path)) {}
   Expected<const VideoFrame*> next() override {
-    auto frame = reader_.next();
+    auto frame = reader_->next();
     colour_ = frame && *frame != nullptr ? (*frame)->colour : ColourImage{};
     return frame;
   }
   [[nodiscard]] ColourImage colour() override { return colour_; }
-  [[nodiscard]] std::uint64_t announced_frames() const override { return reader_.announced_frames(); }
-  [[nodiscard]] double frames_per_s() const override { return reader_.frames_per_s(); }
+  [[nodiscard]] std::uint64_t announced_frames() const override { return reader_->announced_frames(); }
+  [[nodiscard]] double frames_per_s() const override { return reader_->frames_per_s(); }
   [[nodiscard]] std::vector<Error> damage() const override {
-    if (!reader_.ends_early()) return {};
+    if (!reader_->ends_early()) return {};
     return {{fmt::format("{}: announces {} frames and ends before: it may have been cut off", path_,
-                         reader_.announced_frames())}};
+                         reader_->announced_frames())}};
   }
 
  private:
-  VideoReader reader_;
+  std::unique_ptr<VideoReader> reader_;
   std::string path_;
   ColourImage colour_;
 };
@@ -355,7 +356,7 @@ int track(const Options& options) {
   if (!source) return refuse(source.error(), kFailure);
   auto table = TrackTable::create(options.csv);
   if (!table) return refuse(table.error(), kFailure);
-  std::optional<VideoWriter> video;
+  std::unique_ptr<VideoWriter> video;
   Tracking tracking(options, (*source)->frames_per_s());
   ConfirmedTracks tracks(FollowedFeature::kTrail);
   std::optional<Error> broken;  // ends the reading; what was found until then is written
@@ -375,7 +376,7 @@ int track(const Options& options) {
           const GreyImage& grey = (*frame)->grey;
           auto created = VideoWriter::create(options.video, grey.width, grey.height, (*source)->frames_per_s());
           if (!created) return refuse(created.error(), kFailure);
-          video.emplace(*std::move(created));
+          video = *std::move(created);
         }
         if (const auto written = video->write(**frame, tracking.marks()); !written) {
           return refuse(written.error(), kFailure);

@@ -13,6 +13,7 @@
 #include "drivers/recording/channels.hpp"
 #include "drivers/text_file/text_file.hpp"
 #include "drivers/transport/camera_endpoint.hpp"
+#include "drivers/video/video_file.hpp"
 
 namespace perimap {
 namespace {
@@ -260,6 +261,10 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
   if (!devices) return wrong_configuration(devices.error());
   if (auto* playback = std::get_if<CameraPlayback>(&*devices->camera)) {
     playback->reader.require_frame_size(basis.camera.width, basis.camera.height);
+  }
+  if (std::holds_alternative<VideoCameraSettings>(*devices->camera)) {
+    if (auto loaded = load_video_support(); !loaded)
+      return tl::unexpected(SetupError{std::move(loaded.error()), false});
   }
   const PipelineSettings pipeline = pipeline_settings(configuration, basis.camera);
   const Identity identity{configuration.source.name, first_stream(pipeline), configuration.source.world_frame};

@@ -22,8 +22,8 @@ class Playing {
     for (bool again = true; again && !interrupt_.requested(); again = settings_.loop) {
       auto reader = VideoReader::open(settings_.file);
       if (!reader) return tl::unexpected(std::move(reader.error()));
-      begin(*reader);
-      if (auto played = play(*reader); !played) return played;
+      begin(**reader);
+      if (auto played = play(**reader); !played) return played;
     }
     return {};
   }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <fstream>
@@ -19,10 +20,16 @@ Expected<std::string> read_text_file(const std::filesystem::path& file, std::siz
   };
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
   if (!stream) return refuse(errno);
-  std::string text(largest + 1, '\0');
+  // Piece by piece: what may be large is mostly not, and need not be asked for and cleared.
+  std::string text, piece(std::min<std::size_t>(largest + 1, 1U << 16U), '\0');
   errno = 0;
-  text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
-  if (std::ferror(stream.get()) != 0) return refuse(errno);
+  while (text.size() <= largest) {
+    const std::size_t got =
+        std::fread(piece.data(), 1, std::min(piece.size(), largest + 1 - text.size()), stream.get());
+    text.append(piece, 0, got);
+    if (std::ferror(stream.get()) != 0) return refuse(errno);
+    if (got == 0) break;
+  }
   return text;
 }
 

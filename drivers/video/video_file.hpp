@@ -1,4 +1,7 @@
 // Video files of any kind that OpenCV's videoio (FFmpeg) reads and writes.
+//
+// It brings more than 200 shared libraries: a quarter of a second of every start, and 280 MB of a process that locks
+// its memory. So they are loaded when a video is first asked for, as a module of their own (video_module.hpp).
 #pragma once
 
 #include <cstdint>
@@ -21,31 +24,32 @@ struct VideoFrame {
   GreyImage grey;
 };
 
+// Loads what reads and writes videos, once; else the first open() or create() does. To be called before threads have
+// priority and memory is locked. Fails when the module, or one of its libraries, is not there; the error names it.
+[[nodiscard]] Expected<void> load_video_support();
+
 class VideoReader {
  public:
-  // Fails when the file is not there, is no video, or its first frame can not be decoded; the error names it.
-  [[nodiscard]] static Expected<VideoReader> open(const std::string& path);
-  VideoReader(VideoReader&&) noexcept;
+  // Fails when the file is not there, is no video, or its first frame can not be decoded, and names it then; and as
+  // load_video_support() does.
+  [[nodiscard]] static Expected<std::unique_ptr<VideoReader>> open(const std::string& path);
+  VideoReader() = default;
+  VideoReader(VideoReader&&) = delete;
   VideoReader& operator=(VideoReader&&) = delete;
   VideoReader(const VideoReader&) = delete;
   VideoReader& operator=(const VideoReader&) = delete;
-  ~VideoReader();
+  virtual ~VideoReader() = default;
 
   // As the container says, or as its length and usual rate let guess; 0 when it does not.
-  [[nodiscard]] std::uint64_t announced_frames() const noexcept;
-  [[nodiscard]] double frames_per_s() const noexcept;
+  [[nodiscard]] virtual std::uint64_t announced_frames() const noexcept = 0;
+  [[nodiscard]] virtual double frames_per_s() const noexcept = 0;
   // After the end: whether the last frame's time, or their number where frames have no times, is so far from what is
   // announced that something must be missing.
-  [[nodiscard]] bool ends_early() const noexcept;
+  [[nodiscard]] virtual bool ends_early() const noexcept = 0;
 
   // Null at the end. Frames that cannot be decoded are passed over while fewer have come than the container announces.
   // A frame of another size than the first ends the reading with an error.
-  [[nodiscard]] Expected<const VideoFrame*> next();
-
- private:
-  struct Impl;
-  explicit VideoReader(std::unique_ptr<Impl> impl) noexcept;
-  std::unique_ptr<Impl> impl_;
+  [[nodiscard]] virtual Expected<const VideoFrame*> next() = 0;
 };
 
 // A mark on a frame: a circle with a cross in it.
@@ -57,25 +61,22 @@ struct VideoMark {
 
 class VideoWriter {
  public:
-  // Motion JPEG, which every player knows, in the container that the path's extension names (.mkv, .avi, .mov).
-  [[nodiscard]] static Expected<VideoWriter> create(const std::string& path, int width, int height,
-                                                    double frames_per_s);
-  VideoWriter(VideoWriter&&) noexcept;
+  // Motion JPEG, which every player knows, in the container that the path's extension names (.mkv, .avi, .mov). Fails
+  // when the file cannot be written, and as load_video_support() does.
+  [[nodiscard]] static Expected<std::unique_ptr<VideoWriter>> create(const std::string& path, int width, int height,
+                                                                     double frames_per_s);
+  VideoWriter() = default;
+  VideoWriter(VideoWriter&&) = delete;
   VideoWriter& operator=(VideoWriter&&) = delete;
   VideoWriter(const VideoWriter&) = delete;
   VideoWriter& operator=(const VideoWriter&) = delete;
-  ~VideoWriter();
+  virtual ~VideoWriter() = default;
 
   // The frame with the marks drawn on a copy of it; in grey when its colour is reduced or not there.
-  [[nodiscard]] Expected<void> write(const VideoFrame& frame, const std::vector<VideoMark>& marks);
+  [[nodiscard]] virtual Expected<void> write(const VideoFrame& frame, const std::vector<VideoMark>& marks) = 0;
   // Closes the file, and looks whether its last frame can be read. Without it the file is closed too, but nothing is
   // said of an error.
-  [[nodiscard]] Expected<void> finish();
-
- private:
-  struct Impl;
-  explicit VideoWriter(std::unique_ptr<Impl> impl) noexcept;
-  std::unique_ptr<Impl> impl_;
+  [[nodiscard]] virtual Expected<void> finish() = 0;
 };
 
 }  // namespace perimap

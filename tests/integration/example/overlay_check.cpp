@@ -52,9 +52,9 @@ int prepare(const std::string& recording, const std::string& video, const std::s
     if (frame->stamp.sequence != expected++) throw std::runtime_error("a frame is missing in the recording");
     VideoFrame picture;
     picture.grey = frame->image();
-    if (auto written = writer.write(picture, {}); !written) throw std::runtime_error(written.error().message);
+    if (auto written = writer->write(picture, {}); !written) throw std::runtime_error(written.error().message);
   }
-  if (auto finished = writer.finish(); !finished) throw std::runtime_error(finished.error().message);
+  if (auto finished = writer->finish(); !finished) throw std::runtime_error(finished.error().message);
   fmt::print("{}\n", truth.captures.begin()->first);
   return 0;
 }

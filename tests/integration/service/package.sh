@@ -45,6 +45,13 @@ inside systemd-analyze verify --man=no /lib/systemd/system/perimapd.service > "$
 
 printf 'version = 1\n[replay]\nrecording = "/tmp/%s"\n[dds]\ndomain = %d\n' "$(basename "$recording")" $((40 + RANDOM % 150)) \
   > "$root/system/etc/perimap/perimapd.toml"
+# The module for videos is found where it was installed, and its absence is said.
+no_video() { inside perimap track /etc/hostname --csv /tmp/tracks.csv 2>&1; }
+[[ $(no_video) == *"/etc/hostname: not a video"* ]] || fail "videos: $(no_video)"
+mv "$root/system/usr/lib/perimap" "$root/system/tmp/modules"
+[[ $(no_video) == *"libperimap_video.so: cannot open"* ]] || fail "without the module for videos: $(no_video)"
+mv "$root/system/tmp/modules" "$root/system/usr/lib/perimap"
+
 inside setpriv --reuid perimap --regid perimap --init-groups perimap check /etc/perimap/perimapd.toml > /dev/null || fail "check"
 inside env CYCLONEDDS_URI=file:///etc/perimap/cyclonedds-loopback.xml setpriv --reuid perimap --regid perimap --init-groups \
   perimapd -c /etc/perimap/perimapd.toml 2> "$work/log" || fail "perimapd: $(cat "$work/log")"

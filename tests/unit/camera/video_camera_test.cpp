@@ -25,9 +25,9 @@ class VideoCamera : public ::testing::Test {
     const std::vector<std::uint8_t> pixels(std::size_t{64} * 48, 100);
     auto writer = VideoWriter::create(file_, 64, 48, 200.0).value();
     for (int i = 0; i < kFrames; ++i) {
-      EXPECT_TRUE(writer.write({0, {}, {pixels.data(), 64, 48, 64}}, {}));
+      EXPECT_TRUE(writer->write({0, {}, {pixels.data(), 64, 48, 64}}, {}));
     }
-    EXPECT_TRUE(writer.finish());
+    EXPECT_TRUE(writer->finish());
   }
   ~VideoCamera() override { std::filesystem::remove(file_); }
   VideoCamera(const VideoCamera&) = delete;
@@ -91,16 +91,16 @@ TEST(VideoReader, ReadsOnBehindABrokenSpotAndKeepsTheFramesNumbers) {
   std::vector<std::uint8_t> pixels(std::size_t{64} * 48);
   for (std::uint64_t i = 0; i < kMany; ++i) {
     for (std::uint8_t& pixel : pixels) pixel = static_cast<std::uint8_t>(random() % 256);
-    ASSERT_TRUE(writer.write({i, {}, {pixels.data(), 64, 48, 64}}, {}));
+    ASSERT_TRUE(writer->write({i, {}, {pixels.data(), 64, 48, 64}}, {}));
   }
-  ASSERT_TRUE(writer.finish());
+  ASSERT_TRUE(writer->finish());
   const auto bytes = static_cast<std::streamoff>(std::filesystem::file_size(file));
   std::fstream(file, std::ios::in | std::ios::out | std::ios::binary).seekp(bytes * 3 / 10)
       << std::string(static_cast<std::size_t>(bytes / 5), '\0');
 
   auto reader = VideoReader::open(file).value();
   std::vector<std::uint64_t> numbers;
-  for (auto frame = reader.next(); frame.has_value() && *frame != nullptr; frame = reader.next()) {
+  for (auto frame = reader->next(); frame.has_value() && *frame != nullptr; frame = reader->next()) {
     numbers.push_back((*frame)->number);
   }
   std::filesystem::remove(file);
