@@ -23,8 +23,9 @@ namespace {
 constexpr double kOff_s = 30;  // when the electrode comes off
 constexpr Duration kTriggerDelay = std::chrono::milliseconds(40);
 
-SimulationSettings scene() {
+SimulationSettings scene(MotionLaw law) {
   SimulationSettings settings;
+  settings.law = law;
   settings.seed = 5;
   settings.width = 400;
   settings.height = 300;
@@ -176,8 +177,10 @@ class Session {
   std::size_t next_peak_ = 0;
 };
 
-TEST(EcgLost, IsSaidAtOnceIsCarriedByTheImagesAndLeavesNothingWrongBehind) {
-  const Simulation simulation = test::simulation_of(scene());
+class EcgLost : public testing::TestWithParam<MotionLaw> {};
+
+TEST_P(EcgLost, IsSaidAtOnceIsCarriedByTheImagesAndLeavesNothingWrongBehind) {
+  const Simulation simulation = test::simulation_of(scene(GetParam()));
   PipelineSettings usual = test::settings_for(simulation, {});
   usual.features.maximum = 60;
   PipelineSettings blind = usual;
@@ -230,6 +233,9 @@ TEST(EcgLost, IsSaidAtOnceIsCarriedByTheImagesAndLeavesNothingWrongBehind) {
   EXPECT_GE(sessions[3]->count(kOff_s + 12, kOff_s + 60, perimap_SURFACE_REASON_PHASE_LOST), 1400);
   EXPECT_LE(sessions[5]->window(kOff_s, kOff_s + 30).rms_mm, 1.1 * never.window(kOff_s, kOff_s + 30).rms_mm);
 }
+
+INSTANTIATE_TEST_SUITE_P(Laws, EcgLost, testing::Values(MotionLaw::kLinear, MotionLaw::kWarped),
+                         [](const auto& test) { return test.param == MotionLaw::kLinear ? "Linear" : "Warped"; });
 
 }  // namespace
 }  // namespace perimap
