@@ -12,8 +12,6 @@
 namespace perimap {
 namespace {
 
-// From which detector, classes and the autoregression over 60 intervals are learnt again.
-constexpr Duration kKeptEcg = std::chrono::seconds(60);
 constexpr Duration kLongestWait = std::chrono::milliseconds(100);
 
 }  // namespace
@@ -43,7 +41,7 @@ void CheckpointKeeper::begin_with(const MapMemory& memory) {
   for (const FeatureMemory& feature : memory.features) features_[slot++] = serialize_feature(feature);
   respiration_ = memory.respiration;
   law_ = memory.law;
-  ecg_.assign(memory.ecg.begin(), memory.ecg.end());
+  for (const EcgBlock& block : memory.ecg) ecg_.add(block);
 }
 
 void CheckpointKeeper::run() {
@@ -86,15 +84,14 @@ void CheckpointKeeper::take_map() {
 
 void CheckpointKeeper::take_ecg() {
   EcgBlock block;
-  while (pipeline_.entrance().pop_heard_ecg(block)) ecg_.push_back(block);
-  while (!ecg_.empty() && ecg_.front().first_sample_time + kKeptEcg < ecg_.back().first_sample_time) ecg_.pop_front();
+  while (pipeline_.entrance().pop_heard_ecg(block)) ecg_.add(block);
 }
 
 void CheckpointKeeper::write() {
   if (features_.empty()) return;
   const Now now = this_boot_now();
   Checkpoint checkpoint{set_up_, now.boot, now.monotonic, now.utc_ns, now.suspended, {}};
-  checkpoint.memory.ecg.assign(ecg_.begin(), ecg_.end());
+  checkpoint.memory.ecg.assign(ecg_.blocks().begin(), ecg_.blocks().end());
   checkpoint.memory.respiration = respiration_;
   checkpoint.memory.law = law_;
   const PipelineCounters& counters = pipeline_.counters();

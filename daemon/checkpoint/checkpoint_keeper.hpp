@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <deque>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -12,6 +11,7 @@
 
 #include "core/pipeline/pipeline.hpp"
 #include "daemon/checkpoint/checkpoint_file.hpp"
+#include "daemon/checkpoint/recent_ecg.hpp"
 #include "daemon/config/configuration.hpp"
 
 namespace perimap {
@@ -53,7 +53,7 @@ class CheckpointKeeper {
   std::map<std::size_t, std::string> features_;  // by slot, serialized
   RespirationMemory respiration_;
   LawMemory law_;
-  std::deque<EcgBlock> ecg_;
+  RecentEcg ecg_;
   std::uint64_t maps_forgotten_ = 0;  // before the map that is kept
   bool forgetting_ = false;           // that map is to go, and the pipeline still has it: nothing is kept
   bool write_failed_ = false;

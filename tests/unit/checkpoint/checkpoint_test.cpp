@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/checkpoint/checkpoint_file.hpp"
+#include "daemon/checkpoint/recent_ecg.hpp"
 #include "daemon/checkpoint/warm_restart.hpp"
 #include "tests/unit/checkpoint/samples.hpp"
 
@@ -320,6 +321,44 @@ TEST(ReplaceFile, ReplacesAWholeFileAndLeavesTheOldOneWhenItCannot) {
   std::getline(std::ifstream(file), text);
   EXPECT_EQ(text, "second one");
   fs::remove_all(folder);
+}
+
+// A block of half a second.
+EcgBlock block_at(Instant first) {
+  EcgBlock block;
+  block.first_sample_time = first;
+  block.sample_period = std::chrono::milliseconds(50);
+  block.count = 10;
+  return block;
+}
+
+TEST(RecentEcg, KeepsTheLastMinuteThatWasHeard) {
+  RecentEcg ecg;
+  Instant t(seconds(10));
+  for (int i = 0; i < 200; ++i, t += std::chrono::milliseconds(500)) ecg.add(block_at(t));
+  ASSERT_EQ(ecg.blocks().size(), 120U);
+  EXPECT_EQ(ecg.blocks().back().first_sample_time, t - std::chrono::milliseconds(500));
+  EXPECT_EQ(ecg.blocks().front().first_sample_time, t - seconds(60));
+}
+
+TEST(RecentEcg, CountsNoGapsSoThatARhythmFromBeforeManyOfThemStays) {
+  RecentEcg ecg;
+  Instant t(seconds(10));
+  for (int i = 0; i < 60; ++i, t += std::chrono::milliseconds(500)) ecg.add(block_at(t));
+  for (int i = 0; i < 50; ++i, t += seconds(2)) ecg.add(block_at(t));
+  ASSERT_EQ(ecg.blocks().size(), 110U) << "100 s of gaps and the half minute before them";
+  EXPECT_EQ(ecg.blocks().front().first_sample_time, Instant(seconds(10)));
+}
+
+TEST(RecentEcg, BlocksWithoutSamplesTakeNoRoom) {
+  RecentEcg ecg;
+  EcgBlock empty = block_at(Instant(seconds(1)));
+  empty.count = 0;
+  for (int i = 0; i < 1000; ++i) ecg.add(empty);
+  EXPECT_TRUE(ecg.blocks().empty());
+  ecg.add(block_at(Instant(seconds(2))));
+  ecg.clear();
+  EXPECT_TRUE(ecg.blocks().empty());
 }
 
 }  // namespace
