@@ -14,10 +14,14 @@ namespace {
 // Looked for where the programs' run path says (CMAKE_BUILD_RPATH, INSTALL_RPATH). Never unloaded: OpenCV and
 // FFmpeg leave threads and handlers behind.
 Expected<const VideoModule*> load() {
+  const auto failed = [] {
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): each thread has its own in glibc
+    return fail(fmt::format("videos can not be read or written: {}", dlerror()));
+  };
   void* const library = dlopen(kVideoModule, RTLD_NOW | RTLD_LOCAL);
-  if (library == nullptr) return fail(fmt::format("videos can not be read or written: {}", dlerror()));
+  if (library == nullptr) return failed();
   const auto entry = reinterpret_cast<decltype(&perimap_video_module)>(dlsym(library, kVideoModuleEntry));
-  if (entry == nullptr) return fail(fmt::format("videos can not be read or written: {}", dlerror()));
+  if (entry == nullptr) return failed();
   return entry();
 }
 

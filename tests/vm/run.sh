@@ -99,7 +99,7 @@ for kernel in "${kernels[@]}"; do
       continue
     fi
     say "$test, $vm_release ..."
-    if vm_run "$vm_guest/$test.sh" "$exchange" 600; then
+    if vm_run "$vm_guest/$test.sh" "$exchange" 900; then
       say "$test, $vm_release: passed"
     else
       failures+=("$test on $kernel")
