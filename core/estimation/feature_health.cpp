@@ -22,10 +22,11 @@ void FeatureHealth::set_level(std::size_t level) noexcept {
   slow_.reset();
 }
 
-HealthAction FeatureHealth::add(double nis, bool accepted) noexcept {
+HealthAction FeatureHealth::add(double nis, bool accepted, double common) noexcept {
   constexpr int kCountLimit = 1'000'000;
+  // To the fast one it makes no difference why the phase is wrong.
   fast_.add(accepted ? nis : std::numeric_limits<double>::infinity());
-  if (accepted) slow_.add(nis);
+  if (accepted) slow_.add(nis, common);
   since_change_ = std::min(since_change_ + 1, kCountLimit);
   if (since_inflation_ >= 0) since_inflation_ = std::min(since_inflation_ + 1, kCountLimit);
 
@@ -48,7 +49,7 @@ HealthAction FeatureHealth::add(double nis, bool accepted) noexcept {
   const bool drifts = slow_.verdict() == InnovationVerdict::kElevated || slow_.high();
   if (drifts && level_ < most && since_change_ >= settings_.updates_before_more) {
     set_level(level_ + 1);
-  } else if (level_ > 0 && since_change_ >= settings_.updates_before_less && slow_.mean() < settings_.calm_below) {
+  } else if (level_ > 0 && since_change_ >= settings_.updates_before_less && !slow_.above(settings_.calm_below)) {
     set_level(level_ - 1);
   }
   return HealthAction::kNone;

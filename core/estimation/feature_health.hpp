@@ -3,10 +3,10 @@
 // Two statistics of its normalised innovations squared (NIS) are followed. A slow one, over accepted updates alone,
 // tells drift: the motion changes little by little (amplitude, heart rate, posture), the filter with its small
 // covariance lags behind. Then process noise is turned on by steps and, after a long calm, off by steps: 0 while
-// consistent, because without drift noise of .01 mm/sqrt(s) doubles the error. A fast one, over all updates with
-// refused ones counted as outliers, tells that something is wrong altogether (a jump, another point followed, a wrong
-// phase). When that lasts, the covariance is inflated once, and when that does not help the feature is to be started
-// anew.
+// consistent, because without drift noise of .01 mm/sqrt(s) doubles the error. So it must not take for drift what the
+// errors of a few R peaks do to all matches of their cycles. A fast one, over all updates with refused ones counted as
+// outliers, tells that something is wrong altogether (a jump, another point followed, a wrong phase). When that lasts,
+// the covariance is inflated once, and when that does not help the feature is to be started anew.
 #pragma once
 
 #include <array>
@@ -46,9 +46,12 @@ class FeatureHealth {
  public:
   explicit FeatureHealth(const FeatureHealthSettings& settings = {}) noexcept;
 
-  // After each update: its NIS, which counts only if it was accepted (one refused may have none). The caller carries
-  // the action out; kStartAnew comes once.
-  [[nodiscard]] HealthAction add(double nis, bool accepted) noexcept;
+  // After each update: its NIS, which counts only if it was accepted (one refused may have none), and the part of it
+  // that is common to the cycle's updates, see InnovationMonitor. The caller carries the action out; kStartAnew comes
+  // once.
+  [[nodiscard]] HealthAction add(double nis, bool accepted, double common = 0.0) noexcept;
+  // The updates to come are of another cardiac cycle.
+  void begin_cycle() noexcept { slow_.begin_cycle(); }
   // After a new start.
   void reset() noexcept;
 

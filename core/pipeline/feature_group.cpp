@@ -208,9 +208,9 @@ void FeatureGroup::follow_slow_errors(const PixelModel& model, int k, const Lane
   }
 }
 
-void FeatureGroup::judge(std::size_t lane, double nis, bool accepted) noexcept {
+void FeatureGroup::judge(std::size_t lane, double nis, bool accepted, double common) noexcept {
   FeatureSlot& slot = slots_[lane];
-  if (slot.health.add(nis, accepted) == HealthAction::kInflate) bank_.diffuse(feature(lane), kInflation_mm);
+  if (slot.health.add(nis, accepted, common) == HealthAction::kInflate) bank_.diffuse(feature(lane), kInflation_mm);
   count_update(slot, accepted);
 }
 
@@ -221,6 +221,7 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
     bank_.motion(index_, plan_.phases, k, motions);
     LaneObservations<double> observations;
     std::array<Matrix2d, kLanes> R;
+    std::array<double, kLanes> common{};
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
       FeatureSlot& slot = slots_[lane];
       if (slot.state != SlotState::kMapped || slot.held.size() == 0 || slot.held[0].frame_index != frame.index)
@@ -232,13 +233,17 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
       Vector2d predicted_px;
       Matrix23d J_C;
       if (model.camera.project(frame.X_CW * p_WF, predicted_px, &J_C) != ProjectionStatus::kOk) {
-        judge(lane, 0.0, false);
+        judge(lane, 0.0, false, 0.0);
         continue;
       }
       const Matrix23d J_p = J_C * frame.X_CW.R;
       const Vector2d phase_spread = J_p * motions.velocity_of(l) * frame.phase.deviation_s;
       R[lane] = match_covariance(held, frame, p_WF, J_p, settings.pixel_deviation_px) +
                 phase_spread * phase_spread.transpose();
+      // All of a cycle's phases err with its R peaks. The map's own error, which R lacks, is common to them as well.
+      common[lane] = phase_spread.dot(R[lane].inverse() * phase_spread);
+      if (frame.phase.phase_rad < slot.last_learnt_rad) slot.health.begin_cycle();
+      slot.last_learnt_rad = frame.phase.phase_rad;
       observations.set(l, held.px, R[lane]);
     }
     LaneOutcomes<double> outcomes;
@@ -246,7 +251,7 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
     follow_slow_errors(model, k, outcomes, R);
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
       if ((outcomes.considered >> lane & 1) == 0) continue;
-      judge(lane, outcomes.normalised_innovation_squared[lane], (outcomes.accepted >> lane & 1) != 0);
+      judge(lane, outcomes.normalised_innovation_squared[lane], (outcomes.accepted >> lane & 1) != 0, common[lane]);
       FeatureSlot& slot = slots_[lane];
       if (slot.health.process_noise() > 0.0 && frame.stamp.capture > slot.last_learnt) {
         const double elapsed_s = to_seconds(frame.stamp.capture - slot.last_learnt);

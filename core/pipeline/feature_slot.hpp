@@ -114,7 +114,8 @@ struct FeatureSlot {
   bool forgotten = false;  // while starting: to be emptied when housekeeping has given it back
   BatchStartExchange start;
   FeatureHealth health;
-  Instant last_learnt;  // capture time of the last update, for process noise
+  Instant last_learnt;           // capture time of the last update, for process noise
+  double last_learnt_rad = 0.0;  // its phase
   int updates = 0;
   // What a slow error of the tracker adds to the estimate's covariance; null where that error is white. Belongs to
   // housekeeping while the batch start is under way, which begins it.

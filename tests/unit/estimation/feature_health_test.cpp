@@ -47,6 +47,41 @@ TEST(FeatureHealth, ConsistentInnovationsTurnNothingOn) {
   EXPECT_LE(noisy, 2) << "of 200 features over two minutes";
 }
 
+// One in a direction of which nine tenths are common to a cycle of 15 updates, one in the other; seeded.
+bool drifts_after_cycles(FeatureHealth& health, unsigned seed, double scale, int cycles) {
+  constexpr double kCommon = 0.9;
+  std::mt19937 generator(seed);
+  std::normal_distribution<double> normal;
+  for (int cycle = 0; cycle < cycles; ++cycle) {
+    health.begin_cycle();
+    const double shared = normal(generator);
+    for (int i = 0; i < 15; ++i) {
+      const double along = std::sqrt(kCommon) * shared + std::sqrt(1.0 - kCommon) * normal(generator);
+      const double nis = scale * scale * (along * along + std::pow(normal(generator), 2));
+      (void)health.add(nis, nis < kGate, kCommon);
+    }
+  }
+  return health.process_noise() > 0.0;
+}
+
+TEST(FeatureHealth, ErrorsCommonToACyclesUpdatesAreNoDrift) {
+  int noisy = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    FeatureHealth health;
+    noisy += drifts_after_cycles(health, seed, 1.0, 120) ? 1 : 0;
+  }
+  EXPECT_LE(noisy, 4) << "of 200 features over a minute";
+}
+
+TEST(FeatureHealth, DriftShowsAmongErrorsCommonToACyclesUpdates) {
+  int noisy = 0;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    FeatureHealth health;
+    noisy += drifts_after_cycles(health, seed, 1.3, 120) ? 1 : 0;
+  }
+  EXPECT_GE(noisy, 90) << "of 100 features";
+}
+
 TEST(FeatureHealth, AFewGrossOutliersTurnNothingOn) {
   FeatureHealth health;
   Innovations innovations(7);

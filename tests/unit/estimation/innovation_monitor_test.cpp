@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <random>
 
@@ -60,6 +61,29 @@ TEST(InnovationMonitor, NoticesInnovationsTwiceTooWideAndRecovers) {
   EXPECT_TRUE(monitor.high());
   for (int i = 0; i < 200; ++i) monitor.add(draw_nis(generator));
   EXPECT_TRUE(monitor.consistent());
+}
+
+// As often above a limit of two of its standard deviations, whatever the updates of a cycle have in common.
+TEST(InnovationMonitor, ItsLimitsAreAsWideAsItsMeanScatters) {
+  for (const double common : {0.0, 0.5, 1.0}) {
+    std::mt19937 generator(4);
+    std::normal_distribution<double> normal;
+    constexpr double kMemory = 600.0;
+    InnovationMonitor monitor({.memory_updates = kMemory, .largest_nis = 100.0});
+    const double limit = 1.0 + 2.0 / std::sqrt(2.0 * kMemory - 1.0);
+    constexpr int kUpdates = 600'000;
+    int above = 0;
+    for (int i = 0; i < kUpdates;) {
+      monitor.begin_cycle();
+      const double shared = normal(generator);
+      for (const int end = i + 15; i < end; ++i) {
+        const double along = std::sqrt(common) * shared + std::sqrt(1.0 - common) * normal(generator);
+        monitor.add(along * along + std::pow(normal(generator), 2), common);
+        above += monitor.above(limit) ? 1 : 0;
+      }
+    }
+    EXPECT_NEAR(static_cast<double>(above) / kUpdates, 0.027, 0.012) << common;
+  }
 }
 
 TEST(InnovationMonitor, OneGrossOutlierIsNotADrift) {

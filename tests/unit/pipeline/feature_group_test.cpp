@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "core/pipeline/batch_starter.hpp"
@@ -34,6 +36,7 @@ struct Stages : ::testing::Test {
   FrameJob job;
   int next_beat_ms = 1000;
   int beats_known_ahead_ms = 2000;
+  milliseconds beat_deviation{1};
   double pose_variance_mm2 = 0.0;
   FrameRecord* current = nullptr;
 
@@ -53,7 +56,7 @@ struct Stages : ::testing::Test {
   void beat_until(int ms) {
     for (; next_beat_ms <= ms; next_beat_ms += 800) {
       const Instant t(milliseconds{next_beat_ms});
-      clock.on_r_peak({t, t + milliseconds(60), 1.0, milliseconds(1)});
+      clock.on_r_peak({t, t + milliseconds(60), 1.0, beat_deviation});
     }
   }
 
@@ -491,6 +494,53 @@ TEST_F(Evidence, ThatTheEstimateIsRightLeavesProcessNoiseOff) {
     ASSERT_LE(variance_mm2(0), before_mm2);
     before_mm2 = variance_mm2(0);
   }
+}
+
+// A feature that moves so fast that errors of the R peaks are most of what its matches are off by.
+struct UncertainBeats : Stages {
+  UncertainBeats() {
+    // Those before the first frame as well.
+    clock = CardiacClockTracker({});
+    beat_deviation = milliseconds(10);
+    next_beat_ms = 1000;
+    beat_until(5000);
+    estimate = still_feature();
+    estimate.x(1) = 12.0;
+    slot->state = SlotState::kMapped;
+    bank->set(0, estimate);
+  }
+
+  FeatureEstimate estimate;
+};
+
+TEST_F(UncertainBeats, AreNoDrift) {
+  const Matrix2d R = match_covariance(0.05 * Matrix2d::Identity(), settings.estimator.pixel_deviation_px);
+  const double scatter_px = std::sqrt(R(0, 0));
+  int drifting = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    bank->set(0, estimate);
+    slot->health.reset();
+    std::mt19937 generator(seed);
+    std::normal_distribution<double> normal;
+    double begin_s = 0.01 * normal(generator);
+    double end_s = 0.01 * normal(generator);
+    double last_rad = 0.0;
+    for (int i = 0; i < 900; ++i) {
+      next_frame();
+      const PhaseEstimate& phase = current->phase;
+      if (phase.phase_rad < last_rad) begin_s = std::exchange(end_s, 0.01 * normal(generator));
+      last_rad = phase.phase_rad;
+      const double off_s = std::lerp(begin_s, end_s, phase.phase_rad / (2.0 * std::numbers::pi));
+      const double seen_rad = phase.phase_rad + phase.rate_rad_per_s * off_s;
+      Vector2d px;
+      ASSERT_EQ(model.camera.project(estimate.position(basis_at(settings.estimator.layout, seen_rad)), px),
+                ProjectionStatus::kOk);
+      found_at(px + scatter_px * Vector2d(normal(generator), normal(generator)));
+      ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+    }
+    drifting += slot->health.process_noise() > 0.0 ? 1 : 0;
+  }
+  EXPECT_LE(drifting, 1) << "of 20";
 }
 
 // Sideways variance shown after 300 frames with a pose that is off by 1 mm, and after as many again.
