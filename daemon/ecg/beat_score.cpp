@@ -12,6 +12,10 @@ constexpr double kPeakWithin_s = 0.060;
 
 double seconds(Instant t) { return to_seconds(t.time_since_epoch()); }
 
+bool normal_or_unsaid(const ReferenceBeat& beat) {
+  return beat.kind == ReferenceBeat::Kind::kNormal || beat.symbol.empty();
+}
+
 // For each reference beat the detection that is it, or -1.
 std::vector<int> match(const std::vector<ReferenceBeat>& reference, const EcgAnalysis& analysis) {
   struct Pair {
@@ -45,7 +49,8 @@ std::vector<int> match(const std::vector<ReferenceBeat>& reference, const EcgAna
   return matched;
 }
 
-// Where the signal is farthest from its median within 60 ms of t.
+// The local peak farthest from the signal's median within 60 ms of t. The end of that stretch is none: there the signal
+// may be on its way to a larger excursion outside.
 std::optional<double> peak_near(const EcgTrace& trace, double t) {
   const auto begin = std::lower_bound(trace.time_s.begin(), trace.time_s.end(), t - kPeakWithin_s);
   const auto end = std::upper_bound(begin, trace.time_s.end(), t + kPeakWithin_s);
@@ -56,9 +61,15 @@ std::optional<double> peak_near(const EcgTrace& trace, double t) {
   if (std::any_of(values.begin(), values.end(), [](float v) { return !std::isfinite(v); })) return std::nullopt;
   auto sorted = values;
   const float median = upper_median(sorted.begin(), sorted.end());
-  const auto peak = std::max_element(values.begin(), values.end(),
-                                     [&](float a, float b) { return std::abs(a - median) < std::abs(b - median); });
-  return trace.time_s[first + static_cast<std::size_t>(peak - values.begin())];
+  for (float& value : values) value -= median;
+  std::optional<std::size_t> peak;
+  for (std::size_t i = 1; i + 1 < values.size(); ++i) {
+    const float side = values[i] < 0.0F ? -1.0F : 1.0F;
+    const bool turns = side * values[i] >= side * values[i - 1] && side * values[i] >= side * values[i + 1];
+    if (turns && (!peak || std::abs(values[i]) > std::abs(values[*peak]))) peak = i;
+  }
+  if (!peak) return std::nullopt;
+  return trace.time_s[first + *peak];
 }
 
 double root_mean(double squares, std::size_t count) {
@@ -96,7 +107,7 @@ BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnal
       ++score.premature_sensitivity.hits;
       ++score.premature_precision.hits;
     }
-    if (premature) continue;
+    if (!normal_or_unsaid(beat)) continue;
     apart_s.push_back(seconds(peak.time) - beat.time_s);
     if (const auto t = peak_near(trace, beat.time_s)) from_peak_s.push_back(seconds(peak.time) - *t);
   }
@@ -141,9 +152,7 @@ PredictionErrors prediction_errors(const EcgAnalysis& analysis, const std::vecto
     }
   } else {
     const std::vector<int> matched = match(reference, analysis);
-    const auto excluded = [&](std::size_t i) {
-      return matched[i] < 0 || (reference[i].kind != ReferenceBeat::Kind::kNormal && !reference[i].symbol.empty());
-    };
+    const auto excluded = [&](std::size_t i) { return matched[i] < 0 || !normal_or_unsaid(reference[i]); };
     for (std::size_t i = 1; i < reference.size(); ++i) {
       if (excluded(i - 1) || excluded(i)) continue;
       take(analysis.beats[static_cast<std::size_t>(matched[i - 1])],

@@ -126,6 +126,34 @@ TEST(Wfdb, RefusesGarbledHeaders) {
   }
 }
 
+// ---- the score
+
+// An R wave of 1 mV at 0.5 s beside noise that is larger where the stretch around the reference ends, but has its own
+// peak outside; and an unclassifiable beat at 0.8 s, found 100 ms early.
+TEST(BeatScore, TimesNormalBeatsByTheirLocalPeak) {
+  EcgTrace trace;
+  for (int i = 0; i < 1000; ++i) {
+    const double t = 0.001 * i;
+    const double r_wave = std::max(1.0 - std::abs(t - 0.5) / 0.020, 0.0);
+    const double noise = 3.0 * std::max(1.0 - std::abs(t - 0.580) / 0.040, 0.0);
+    trace.time_s.push_back(t);
+    trace.mV.push_back(static_cast<float>(r_wave + noise));
+  }
+  const std::vector<ReferenceBeat> reference{{0.5, "N", ReferenceBeat::Kind::kNormal},
+                                             {0.8, "Q", ReferenceBeat::Kind::kUnknown}};
+  EcgAnalysis analysis;
+  for (const double t : {0.502, 0.700}) {
+    AnalysedBeat beat;
+    beat.peak.time = Instant(from_seconds(t));
+    analysis.beats.push_back(beat);
+  }
+  const BeatScore score = score_beats(reference, analysis, trace);
+  EXPECT_EQ(score.sensitivity.hits, 2);
+  EXPECT_NEAR(score.timing_median_s, 0.002, 1e-6);
+  ASSERT_TRUE(score.peak_rms_s);
+  EXPECT_NEAR(*score.peak_rms_s, 0.002, 1e-6);
+}
+
 // ---- the whole way over real records, 30 minutes each, one set of parameters
 
 struct Goal {
@@ -173,9 +201,8 @@ TEST_P(WholeRecord, MeetsItsFigures) {
   const DelayFigures delay = delay_figures(analysis);
   EXPECT_LE(delay.median_s, 0.120);
   EXPECT_LE(delay.p95_s, 0.200);
-  if (std::string(goal.record) != "105") {
-    EXPECT_LE(*score.peak_rms_s, 0.006);
-  }
+  // In 105 noise is taken for a few beats that it hides.
+  EXPECT_LE(*score.peak_rms_s, std::string(goal.record) != "105" ? 0.006 : 0.0065);
   if (goal.premature_percent > 0.0) {
     EXPECT_GE(score.premature_sensitivity.percent(), goal.premature_percent);
     EXPECT_GE(score.premature_precision.percent(), goal.premature_percent);
