@@ -106,8 +106,7 @@ constexpr double kUnfamiliarMost = 6.0;             // times the usual energy: a
 constexpr double kDisturbance = 0.33;               // size from which on what is no beat says that there is noise
 constexpr Duration kNoisyFor = seconds(2);          // after a disturbance: they come in trains
 constexpr Duration kStepReach = milliseconds(100);  // each side, outside the complex
-constexpr double kStep = 0.85;           // change of level to the excursions, from which on the electrode has moved,
-constexpr double kStepUnlike = 0.82;     // unless the shape is more alike than this: a beat on a step
+constexpr double kStep = 0.85;           // change of level to the excursions, from which on the electrode has moved
 constexpr double kVeryLike = 0.93;       // a held candidate so much alike is a beat whatever the rhythm
 constexpr double kOtherStrength = 0.45;  // of a beat that is of a rare template: such as the P wave's,
 constexpr double kEstablishedStrength = 0.3;    // and of a frequent one
@@ -664,7 +663,8 @@ void RPeakDetector::decide_unfamiliar(const Candidate& candidate) noexcept {
 }
 
 void RPeakDetector::hold(const Candidate& candidate) noexcept {
-  if ((candidate.step > kStep && candidate.correlation < kStepUnlike) ||
+  // A familiar shape is a beat on a step.
+  if ((candidate.step > kStep && candidate.correlation < kFamiliar) ||
       (has_held_ && likelihood(candidate) <= likelihood(held_)))
     return;
   held_ = candidate;
