@@ -17,6 +17,7 @@ constexpr double kLongestOfMean = 1.3;
 
 constexpr double kErrorMemory = 30.0;        // beats over which past errors fade
 constexpr double kPriorWeight = 4.0;         // beats that the starting value counts for
+constexpr double kPriorMemory = 6.0;         // beats over which it fades: some rhythms are far more even
 constexpr double kPriorDeviation = 0.05;     // of the interval: resting sinus rhythm
 constexpr double kLargestScoredError = 0.5;  // of the prediction: a missed beat must not count as a whole cycle's error
 
@@ -40,6 +41,7 @@ void RrPredictor::score(Seconds rr) noexcept {
   const double keep = 1.0 - 1.0 / kErrorMemory;
   squared_error_sum_s2_ = keep * squared_error_sum_s2_ + error * error;
   error_weight_ = keep * error_weight_ + 1.0;
+  prior_weight_ *= 1.0 - 1.0 / kPriorMemory;
 }
 
 void RrPredictor::push(Seconds rr) noexcept {
@@ -47,8 +49,8 @@ void RrPredictor::push(Seconds rr) noexcept {
     score(rr);
   } else {
     const double prior = kPriorDeviation * rr.count();
-    squared_error_sum_s2_ = kPriorWeight * prior * prior;
-    error_weight_ = kPriorWeight;
+    prior_variance_s2_ = prior * prior;
+    prior_weight_ = kPriorWeight;
   }
   if (count_ == kWindow) {
     std::copy(rr_s_.begin() + 1, rr_s_.end(), rr_s_.begin());
@@ -118,7 +120,8 @@ void RrPredictor::predict_autoregressive(std::span<Seconds> next) const noexcept
 }
 
 Seconds RrPredictor::deviation() const noexcept {
-  return Seconds(error_weight_ > 0.0 ? std::sqrt(squared_error_sum_s2_ / error_weight_) : 0.0);
+  const double weight = prior_weight_ + error_weight_;
+  return Seconds(weight > 0.0 ? std::sqrt((prior_weight_ * prior_variance_s2_ + squared_error_sum_s2_) / weight) : 0.0);
 }
 
 }  // namespace perimap

@@ -47,7 +47,8 @@ class RrPredictor {
   // The next intervals in order, each predicted from those before it. Zero before the first push.
   void predict(std::span<Seconds> next) const noexcept;
 
-  // Standard deviation of the one-step prediction: RMS of its past errors, older ones fading, started from 5 %.
+  // Standard deviation of the one-step prediction: RMS of its past errors, older ones fading, started from 5 %, which
+  // gives way within some ten beats.
   // Zero before the first push.
   [[nodiscard]] Seconds deviation() const noexcept;
 
@@ -60,6 +61,8 @@ class RrPredictor {
   AutoregressionSettings autoregression_;
   int count_ = 0;
   std::array<double, kWindow> rr_s_{};  // oldest first
+  double prior_variance_s2_ = 0.0;
+  double prior_weight_ = 0.0;  // intervals
   double squared_error_sum_s2_ = 0.0;
   double error_weight_ = 0.0;
 };
