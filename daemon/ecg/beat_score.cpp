@@ -107,7 +107,7 @@ BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnal
       ++score.premature_sensitivity.hits;
       ++score.premature_precision.hits;
     }
-    if (!normal_or_unsaid(beat)) continue;
+    if (!normal_or_unsaid(beat) || peak.beat_class == BeatClass::kNoise) continue;
     apart_s.push_back(seconds(peak.time) - beat.time_s);
     if (const auto t = peak_near(trace, beat.time_s)) from_peak_s.push_back(seconds(peak.time) - *t);
   }

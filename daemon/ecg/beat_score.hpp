@@ -31,7 +31,8 @@ struct BeatScore {
   std::vector<double> extra_s;
 
   // Detected minus reference time of the normal beats that were found (of all where the reference has no kinds), about
-  // its median; and to the largest local peak of the signal within 60 ms of the reference.
+  // its median; and to the largest local peak of the signal within 60 ms of the reference. Without those classed as
+  // noise, whose times nothing goes by; they count as found all the same.
   double timing_median_s = 0.0;
   double timing_rms_s = 0.0;
   std::optional<double> peak_rms_s;
