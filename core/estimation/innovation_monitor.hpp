@@ -25,9 +25,11 @@ class InnovationMonitor {
   explicit InnovationMonitor(const InnovationMonitorSettings& settings = {}) noexcept : settings_(settings) {}
 
   // The NIS of an update, accepted or rejected by the gate. NaN counts as an outlier. `common`: which part of the
-  // innovation's variance, in the direction where that is the largest, comes from an error common to its cycle; 0..1.
+  // measurement's variance, in the direction where that is the largest, comes from an error common to its cycle; 0..1.
+  // A map that is little known adds to the innovation's: then it is more than its part of that, and limits too wide.
   void add(double nis, double common = 0.0) noexcept;
-  // The updates to come have no error in common with those so far.
+  // The updates to come are of another cycle. They share next to nothing with those so far: an R peak ends a cycle and
+  // begins the next, at phases where it counts little for one of the two.
   void begin_cycle() noexcept { common_ = 0.0; }
   void reset() noexcept;
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "core/pipeline/match_covariance.hpp"
@@ -240,9 +241,10 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
       const Vector2d phase_spread = J_p * motions.velocity_of(l) * frame.phase.deviation_s;
       R[lane] = match_covariance(held, frame, p_WF, J_p, settings.pixel_deviation_px) +
                 phase_spread * phase_spread.transpose();
-      // All of a cycle's phases err with its R peaks. The map's own error, which R lacks, is common to them as well.
+      // All of a cycle's phases err with its R peaks.
       common[lane] = phase_spread.dot(R[lane].inverse() * phase_spread);
-      if (frame.phase.phase_rad < slot.last_learnt_rad) slot.health.begin_cycle();
+      const double since_rad = to_seconds(frame.stamp.capture - slot.last_learnt) * frame.phase.rate_rad_per_s;
+      if (frame.phase.phase_rad < slot.last_learnt_rad || since_rad > 2.0 * std::numbers::pi) slot.health.begin_cycle();
       slot.last_learnt_rad = frame.phase.phase_rad;
       observations.set(l, held.px, R[lane]);
     }

@@ -12,8 +12,14 @@ constexpr double kPeakWithin_s = 0.060;
 
 double seconds(Instant t) { return to_seconds(t.time_since_epoch()); }
 
-bool normal_or_unsaid(const ReferenceBeat& beat) {
-  return beat.kind == ReferenceBeat::Kind::kNormal || beat.symbol.empty();
+bool has_kinds(const std::vector<ReferenceBeat>& reference) {
+  return std::any_of(reference.begin(), reference.end(),
+                     [](const ReferenceBeat& beat) { return beat.kind != ReferenceBeat::Kind::kUnknown; });
+}
+
+// Whether the times of a beat and of the detection that is it count: see BeatScore.
+bool is_timed(const ReferenceBeat& beat, bool kinds, const RPeak& peak) {
+  return (!kinds || beat.kind == ReferenceBeat::Kind::kNormal) && peak.beat_class != BeatClass::kNoise;
 }
 
 // For each reference beat the detection that is it, or -1.
@@ -63,10 +69,13 @@ std::optional<double> peak_near(const EcgTrace& trace, double t) {
   const float median = upper_median(sorted.begin(), sorted.end());
   for (float& value : values) value -= median;
   std::optional<std::size_t> peak;
-  for (std::size_t i = 1; i + 1 < values.size(); ++i) {
+  for (std::size_t i = 1, after = 2; after < values.size(); i = after++) {
+    // A saturated peak is flat.
+    while (after < values.size() && values[after] == values[i]) ++after;
+    if (after == values.size()) break;
     const float side = values[i] < 0.0F ? -1.0F : 1.0F;
-    const bool turns = side * values[i] >= side * values[i - 1] && side * values[i] >= side * values[i + 1];
-    if (turns && (!peak || std::abs(values[i]) > std::abs(values[*peak]))) peak = i;
+    const bool turns = side * values[i] > side * values[i - 1] && side * values[i] > side * values[after];
+    if (turns && (!peak || std::abs(values[i]) > std::abs(values[*peak]))) peak = (i + after - 1) / 2;
   }
   if (!peak) return std::nullopt;
   return trace.time_s[first + *peak];
@@ -86,12 +95,12 @@ BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnal
   const auto& beats = analysis.beats;
   const std::vector<int> matched = match(reference, analysis);
   BeatScore score;
+  score.has_kinds = has_kinds(reference);
   std::vector<bool> used(beats.size(), false);
   std::vector<double> apart_s;
   std::vector<double> from_peak_s;
   for (std::size_t i = 0; i < reference.size(); ++i) {
     const ReferenceBeat& beat = reference[i];
-    score.has_kinds = score.has_kinds || beat.kind != ReferenceBeat::Kind::kUnknown;
     const bool premature = beat.kind == ReferenceBeat::Kind::kPremature;
     if (premature) ++score.premature_sensitivity.all;
     auto& counts = score.symbols[beat.symbol];
@@ -107,7 +116,7 @@ BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnal
       ++score.premature_sensitivity.hits;
       ++score.premature_precision.hits;
     }
-    if (!normal_or_unsaid(beat) || peak.beat_class == BeatClass::kNoise) continue;
+    if (!is_timed(beat, score.has_kinds, peak)) continue;
     apart_s.push_back(seconds(peak.time) - beat.time_s);
     if (const auto t = peak_near(trace, beat.time_s)) from_peak_s.push_back(seconds(peak.time) - *t);
   }
@@ -121,6 +130,7 @@ BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnal
   const int both = static_cast<int>(reference.size() + beats.size());
   score.f1_percent = both > 0 ? 200.0 * found / both : 0.0;
 
+  score.timed = static_cast<int>(apart_s.size());
   score.timing_median_s = median_of(apart_s);
   double squares = 0.0;
   for (const double apart : apart_s) squares += (apart - score.timing_median_s) * (apart - score.timing_median_s);
@@ -152,11 +162,13 @@ PredictionErrors prediction_errors(const EcgAnalysis& analysis, const std::vecto
     }
   } else {
     const std::vector<int> matched = match(reference, analysis);
-    const auto excluded = [&](std::size_t i) { return matched[i] < 0 || !normal_or_unsaid(reference[i]); };
-    for (std::size_t i = 1; i < reference.size(); ++i) {
-      if (excluded(i - 1) || excluded(i)) continue;
-      take(analysis.beats[static_cast<std::size_t>(matched[i - 1])],
-           analysis.beats[static_cast<std::size_t>(matched[i])]);
+    const bool kinds = has_kinds(reference);
+    const AnalysedBeat* last = nullptr;
+    for (std::size_t i = 0; i < reference.size(); ++i) {
+      const AnalysedBeat* beat = matched[i] < 0 ? nullptr : &analysis.beats[static_cast<std::size_t>(matched[i])];
+      if (beat != nullptr && !is_timed(reference[i], kinds, beat->peak)) beat = nullptr;
+      if (last != nullptr && beat != nullptr) take(*last, *beat);
+      last = beat;
     }
   }
   for (std::size_t i = 0; i < squares.size(); ++i) {

@@ -33,6 +33,7 @@ struct BeatScore {
   // Detected minus reference time of the normal beats that were found (of all where the reference has no kinds), about
   // its median; and to the largest local peak of the signal within 60 ms of the reference. Without those classed as
   // noise, whose times nothing goes by; they count as found all the same.
+  int timed = 0;  // beats
   double timing_median_s = 0.0;
   double timing_rms_s = 0.0;
   std::optional<double> peak_rms_s;

@@ -157,6 +157,30 @@ TEST(BeatScore, TimesNormalBeatsByTheirLocalPeak) {
   EXPECT_NEAR(*score.peak_rms_s, 0.002, 1e-6);
 }
 
+// A saturated R wave, flat from 0.49 to 0.51 s, with a shelf on its flank; what beat it is the reference does not say.
+TEST(BeatScore, AFlatPeakIsAtItsMiddleAndAShelfIsNone) {
+  EcgTrace trace;
+  for (int i = 0; i < 1000; ++i) {
+    const double t = 0.001 * i;
+    const double flank = std::abs(t - 0.5) < 0.0105 ? 1.0 : std::max(0.9 - 20.0 * (std::abs(t - 0.5) - 0.0105), 0.0);
+    trace.time_s.push_back(t);
+    trace.mV.push_back(static_cast<float>(t > 0.520 && t < 0.5245 ? 0.65 : flank));
+  }
+  EcgAnalysis analysis;
+  AnalysedBeat beat;
+  beat.peak.time = Instant(from_seconds(0.503));
+  analysis.beats.push_back(beat);
+  for (const std::string symbol : {"", "beat"}) {
+    const BeatScore score = score_beats({{0.5, symbol, ReferenceBeat::Kind::kUnknown}}, analysis, trace);
+    EXPECT_EQ(score.timed, 1);
+    ASSERT_TRUE(score.peak_rms_s);
+    EXPECT_NEAR(*score.peak_rms_s, 0.003, 1e-6);
+  }
+  // Up to here the flank rises to the shelf, and no further in the stretch that is looked at.
+  const BeatScore score = score_beats({{0.581, "", ReferenceBeat::Kind::kUnknown}}, analysis, trace);
+  EXPECT_FALSE(score.peak_rms_s);
+}
+
 // ---- the whole way over real records, 30 minutes each, one set of parameters
 
 struct Goal {
@@ -204,7 +228,12 @@ TEST_P(WholeRecord, MeetsItsFigures) {
   const DelayFigures delay = delay_figures(analysis);
   EXPECT_LE(delay.median_s, 0.120);
   EXPECT_LE(delay.p95_s, 0.200);
+  ASSERT_TRUE(score.peak_rms_s);
   EXPECT_LE(*score.peak_rms_s, 0.006);
+  const auto normal = std::count_if(reference.begin(), reference.end(), [](const ReferenceBeat& beat) {
+    return beat.kind == ReferenceBeat::Kind::kNormal;
+  });
+  EXPECT_GE(score.timed, 0.995 * static_cast<double>(normal));
   if (goal.premature_percent > 0.0) {
     EXPECT_GE(score.premature_sensitivity.percent(), goal.premature_percent);
     EXPECT_GE(score.premature_precision.percent(), goal.premature_percent);
