@@ -48,8 +48,7 @@ class RrPredictor {
   void predict(std::span<Seconds> next) const noexcept;
 
   // Standard deviation of the one-step prediction: RMS of its past errors, older ones fading, started from 5 %, which
-  // gives way within some ten beats.
-  // Zero before the first push.
+  // gives way within some twenty beats. Zero before the first push.
   [[nodiscard]] Seconds deviation() const noexcept;
 
   [[nodiscard]] int count() const noexcept { return count_; }  // intervals held, at most kWindow

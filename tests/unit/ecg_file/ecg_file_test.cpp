@@ -152,6 +152,7 @@ TEST(BeatScore, TimesNormalBeatsByTheirLocalPeak) {
   analysis.beats.back().peak.beat_class = BeatClass::kNoise;
   const BeatScore score = score_beats(reference, analysis, trace);
   EXPECT_EQ(score.sensitivity.hits, 3);
+  EXPECT_EQ(score.timed, 1);
   EXPECT_NEAR(score.timing_median_s, 0.002, 1e-6);
   ASSERT_TRUE(score.peak_rms_s);
   EXPECT_NEAR(*score.peak_rms_s, 0.002, 1e-6);
