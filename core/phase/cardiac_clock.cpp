@@ -81,6 +81,7 @@ CardiacClock CardiacClock::corrected(const CycleCorrection& correction) const no
   }
   clock.history_[0].time = correction.begin;
   clock.history_[0].deviation = correction.begin_deviation;
+  clock.given_way_ = correction.given_way;
   clock.predicted_[0] = Seconds(to_seconds(correction.length));
   clock.running_deviation_ = Seconds(to_seconds(correction.length_deviation));
   clock.contradicted_ = correction.contradicted;
@@ -214,7 +215,7 @@ CardiacCycle CardiacClock::cycle_at(Instant t) const noexcept {
   return cycle;
 }
 
-Instant CardiacClock::anchor() const noexcept { return beat(0).time; }
+Instant CardiacClock::anchor() const noexcept { return beat(0).time - given_way_; }
 Duration CardiacClock::anchor_deviation() const noexcept { return beat(0).deviation; }
 Duration CardiacClock::predicted_length(int ahead) const noexcept {
   return rounded(predicted_[static_cast<std::size_t>(std::min(ahead, kPredictedCycles - 1))]);

@@ -46,7 +46,7 @@ struct PhaseEstimate {
 
 // One cycle, completed or predicted.
 struct CardiacCycle {
-  Instant begin;  // R peak, or its prediction
+  Instant begin;  // R peak, or its prediction; up to 3 % of the length beside it where it gave way, see CyclePosterior
   Duration begin_deviation{0};
   Duration length{0};
   Duration length_deviation{0};
@@ -76,13 +76,14 @@ class CardiacClock {
   // 0.
   [[nodiscard]] PhaseEstimate at(Instant t) const noexcept;
 
-  // The last R peak and the cycle predicted to follow it. Zero before the first beat.
+  // The last R peak, wherever the running cycle begins, and the cycle predicted to follow it. Zero before the first
+  // beat.
   [[nodiscard]] Instant anchor() const noexcept;
   [[nodiscard]] Duration anchor_deviation() const noexcept;
   [[nodiscard]] Duration predicted_length(int ahead = 0) const noexcept;  // of the running cycle or a later one
   [[nodiscard]] Duration length_deviation() const noexcept;
   [[nodiscard]] Duration last_rr() const noexcept;  // zero before the second beat of a run
-  [[nodiscard]] Instant predicted_r_peak() const noexcept { return anchor() + predicted_length(); }
+  [[nodiscard]] Instant predicted_r_peak() const noexcept { return beat(0).time + predicted_length(); }
   [[nodiscard]] Duration predicted_r_peak_deviation() const noexcept;
   // A later instant counts as free-running: the beat that is due should be known by then. With the ECG gone that holds
   // for earlier ones as well.
@@ -150,6 +151,7 @@ class CardiacClock {
   Seconds running_deviation_{0.0};    // of the running cycle's length
   Seconds next_deviation_{0.0};       // of the length of the cycle after it
   Seconds premature_deviation_{0.0};  // that a premature beat adds to a cycle which nobody has heard
+  Duration given_way_{0};             // the running cycle begins so much after its R peak
   bool contradicted_ = false;
   bool samples_ = false;      // there are samples to be heard, not pulses alone
   bool interrupted_ = false;  // the lead is off, or nothing comes

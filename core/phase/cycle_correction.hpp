@@ -11,8 +11,9 @@ namespace perimap {
 
 struct CycleCorrection {
   std::uint64_t beats = 0;  // CardiacClock::beats() during the cycle that this is about; 0: nothing is known
-  Instant begin;            // the R peak
+  Instant begin;
   Duration begin_deviation{0};
+  Duration given_way{0};  // `begin` lies so much after the R peak, see CyclePosterior
   Duration length{0};
   Duration length_deviation{0};
   Duration next_length{0};  // of the cycle after it; 0: nothing is known

@@ -27,6 +27,10 @@ constexpr double kRolled = 0.3;
 constexpr double kCarriedDeviation = 1.5;         // of a carried cycle's length, to that of one after a known beat
 constexpr double kLargestBeginDeviation = 0.125;  // of the length
 constexpr Duration kSeen = std::chrono::milliseconds(500);
+// By so much of the length the beginning may be moved for the end's sake.
+constexpr double kLargestGivingWay = 0.03;
+constexpr int kHalvings = 6;     // towards the farthest move of the end that there is a beginning for
+constexpr int kBisections = 24;  // of twice 3 % of a length: to nanoseconds
 
 // Where the i-th of n even steps from -span to span lies.
 double step_of(int i, int n, double span) noexcept { return span * (2.0 * i / (n - 1) - 1.0); }
@@ -58,9 +62,12 @@ void CyclePosterior::follow(const CardiacClock& clock, Instant now) noexcept {
     return;
   }
   const bool anew = !locked_ || carried_ || clock.beats() != beats_;
+  const bool ended = locked_ && !carried_ && clock.beats() == beats_ + 1;
   locked_ = true;
   carried_ = false;
   if (!anew) return;
+  if (ended && clock.cycle_at(r_peak_).teaches) trust().score(clock.anchor());
+  for (EndTrust& each : trust_) each.discard();
   beats_ = clock.beats();
   begin_cycle(clock);
 }
@@ -82,7 +89,8 @@ void CyclePosterior::carry_on(const CardiacClock& clock) noexcept {
   // As long as was predicted before the ECG went, or as the last was: rhythms wander.
   const double predicted_s = to_seconds(clock.predicted_length(std::min(++ahead_, CardiacClock::kPredictedCycles - 1)));
   r_peak_ = end;
-  previous_length_s_ = to_seconds(cycle.length);
+  // From its R peak, where there was one.
+  previous_length_s_ = to_seconds(cycle.length + cycle.given_way);
   length_mean_s_ = 0.5 * (predicted_s + previous_length_s_);
   next_length_s_ = length_mean_s_;
   length_deviation_s_ = kCarriedDeviation * to_seconds(clock.length_deviation());
@@ -112,6 +120,7 @@ void CyclePosterior::begin_grid() noexcept {
   length_deviation_s_ = std::min(length_deviation_s_, 0.5 * length_mean_s_ / kLengthSpan);
   contradicted_ = false;
   observed_ = 0;
+  seen_until_ = r_peak_;
   for (int i = 0; i < kBeginnings; ++i) {
     for (int j = 0; j < kLengths; ++j) {
       const double b = begin_s(i) / begin_deviation_s_;
@@ -129,12 +138,15 @@ void CyclePosterior::add(const ObservedPhase& observed) noexcept {
   any_observed_ = true;
   last_observed_ = observed.time;
   contradicted_ = false;
-  if (locked_ && observed.time >= r_peak_) weigh(observed);
+  if (!locked_ || observed.time < r_peak_) return;
+  weigh(observed);
+  foretell();
 }
 
 void CyclePosterior::weigh(const ObservedPhase& observed) noexcept {
   if (length_mean_s_ <= 0.0) return;
   ++observed_;
+  seen_until_ = std::max(seen_until_, observed.time);
   for (int i = 0; i < kBeginnings; ++i) {
     for (int j = 0; j < kLengths; ++j) {
       const CyclePhase phase = phase_of(observed.time, begin_s(i), length_s(j), next_length_s_);
@@ -169,9 +181,7 @@ double CyclePosterior::contradiction_s(double begin_s, double length_s,
   return difference > kContradicts * newest.deviation_rad ? difference / phase.rate_rad_per_s : 0.0;
 }
 
-CycleCorrection CyclePosterior::correction() const noexcept {
-  CycleCorrection correction;
-  if (!locked_ || (observed_ == 0 && !contradicted_ && !carried_)) return correction;
+std::optional<CyclePosterior::Summary> CyclePosterior::summary() const noexcept {
   const double known_until_s = to_seconds(now_ - detector_delay_ - r_peak_);
   std::array<double, kLengths * kBeginnings> log_weights{};
   double best = -std::numeric_limits<double>::infinity();
@@ -205,30 +215,113 @@ CycleCorrection CyclePosterior::correction() const noexcept {
       length_square += weight * l * l;
     }
   }
-  if (!(sum > 0.0) || !std::isfinite(sum)) return correction;
+  if (!(sum > 0.0) || !std::isfinite(sum)) return std::nullopt;
   begin /= sum;
   length /= sum;
-  double begin_variance =
+  Summary cycle;
+  cycle.begin_s = begin;
+  cycle.length_s = length_mean_s_ + length;
+  cycle.begin_variance_s2 =
       std::max(begin_square / sum - begin * begin, step_variance(kBeginnings, begin_deviation_s_ * kBeginningSpan));
-  double length_variance =
+  cycle.length_variance_s2 =
       std::max(length_square / sum - length * length, step_variance(kLengths, length_deviation_s_ * kLengthSpan));
   // Where even the best candidate does not explain the observations, they are worth less than they say.
   if (observed_ >= kEnoughForMisfit) {
     const double worse = std::max(1.0, best_misfit / observed_);
-    begin_variance *= worse;
-    length_variance *= worse;
+    cycle.begin_variance_s2 *= worse;
+    cycle.length_variance_s2 *= worse;
   }
+  return cycle;
+}
+
+double CyclePosterior::seen_sensitivity(double begin_s, double length_s) const noexcept {
+  const double since_s = to_seconds(seen_until_ - r_peak_) - begin_s;
+  return since_s < length_s ? phase_of(seen_until_, begin_s, length_s, next_length_s_).length_sensitivity : 1.0;
+}
+
+void CyclePosterior::foretell() noexcept {
+  if (carried_ || trust().foretold()) return;
+  // A summary costs as much as weighing an observation: only about where it counts.
+  const double about = seen_sensitivity(0.0, length_mean_s_);
+  if (about < 0.8 * EndTrust::kLeastSensitivity || about > 1.1 * EndTrust::kMostSensitivity) return;
+  const std::optional<Summary> cycle = summary();
+  if (!cycle) return;
+  trust().foretell({r_peak_ + from_seconds(length_mean_s_), from_seconds(std::sqrt(predicted_variance_s2())),
+                    from_seconds(cycle->end_s() - length_mean_s_)},
+                   seen_sensitivity(cycle->begin_s, cycle->length_s));
+}
+
+CyclePosterior::Summary CyclePosterior::with_trusted_end(const Summary& seen) const noexcept {
+  // A carried cycle that follows another has no R peak at either end.
+  if (observed_ == 0 || (carried_ && ahead_ > 0)) return seen;
+  const double weight = trust().weight(seen_sensitivity(seen.begin_s, seen.length_s), predicted_variance_s2());
+  if (weight >= 1.0) return seen;
+  // Up to there the detector has heard, and no R peak.
+  const double heard_s = to_seconds((carried_ ? carried_since_ : now_) - detector_delay_ - r_peak_);
+  const double pull = length_mean_s_ - seen.end_s();
+  const double wanted = std::max((1.0 - weight) * pull, std::min(0.0, heard_s - seen.end_s()));
+  Summary trusted = seen;
+  // By as much of it as there is a beginning for.
+  double reached = 0.0;
+  double step = wanted;
+  for (int i = 0; i <= kHalvings && reached != wanted; ++i) {
+    const std::optional<double> begin = beginning_for(seen, seen.end_s() + reached + step);
+    if (begin) {
+      trusted.begin_s = *begin;
+      reached += step;
+    }
+    step *= 0.5;
+  }
+  trusted.length_s = seen.end_s() + reached - trusted.begin_s;
+  // The beginning is wrong by as much as it gave way, which is more than the end by what it was not moved. Otherwise
+  // the end is as uncertain as what is kept of either prediction. So the phase seen last is told as more uncertain than
+  // it is: one beginning and one length that are independent cannot tell that they err against each other.
+  const double given_way = trusted.begin_s - seen.begin_s;
+  const double kept_of_predicted = std::abs(pull) > 0.0 ? wanted / pull : 1.0 - weight;
+  const double end_variance_s2 =
+      seen.end_variance_s2() + kept_of_predicted * std::max(predicted_variance_s2() - seen.end_variance_s2(), 0.0);
+  trusted.begin_variance_s2 = seen.begin_variance_s2 + given_way * given_way;
+  trusted.length_variance_s2 = std::max(end_variance_s2 - trusted.begin_variance_s2, seen.length_variance_s2);
+  return trusted;
+}
+
+std::optional<double> CyclePosterior::beginning_for(const Summary& seen, double end_s) const noexcept {
+  const double phase_rad = phase_of(seen_until_, seen.begin_s, seen.length_s, next_length_s_).phase_rad;
+  const double seen_s = to_seconds(seen_until_ - r_peak_);
+  if (seen_s >= std::min(end_s, seen.end_s())) return std::nullopt;
+  const double span_s = kLargestGivingWay * seen.length_s;
+  double early = seen.begin_s - span_s;
+  double late = seen.begin_s + span_s;
+  // The later it begins, the earlier the phase.
+  const auto ahead = [&](double begin_s) {
+    return phase_of(seen_until_, begin_s, end_s - begin_s, next_length_s_).phase_rad >= phase_rad;
+  };
+  if (!ahead(early) || ahead(late)) return std::nullopt;
+  for (int i = 0; i < kBisections; ++i) {
+    const double middle = 0.5 * (early + late);
+    (ahead(middle) ? early : late) = middle;
+  }
+  return 0.5 * (early + late);
+}
+
+CycleCorrection CyclePosterior::correction() const noexcept {
+  CycleCorrection correction;
+  if (!locked_ || (observed_ == 0 && !contradicted_ && !carried_)) return correction;
+  const std::optional<Summary> seen = summary();
+  if (!seen) return correction;
+  const Summary cycle = with_trusted_end(*seen);
   correction.beats = beats_;
   correction.carried = carried_;
   correction.ahead = ahead_;
-  correction.previous_length = from_seconds(previous_length_s_ + begin);
+  correction.previous_length = from_seconds(previous_length_s_ + cycle.begin_s);
   correction.seen = carried_ && now_ - last_observed_ <= kSeen;
-  correction.begin = r_peak_ + from_seconds(begin);
-  correction.length = from_seconds(length_mean_s_ + length);
-  correction.length_deviation = from_seconds(std::sqrt(length_variance));
-  correct_next(begin, length_mean_s_ + length, begin_variance + length_variance, correction);
-  const double contradiction = contradiction_s(begin, length_mean_s_ + length, correction);
-  correction.begin_deviation = from_seconds(std::sqrt(begin_variance + contradiction * contradiction));
+  correction.begin = r_peak_ + from_seconds(cycle.begin_s);
+  correction.given_way = from_seconds(cycle.begin_s - seen->begin_s);
+  correction.length = from_seconds(cycle.length_s);
+  correction.length_deviation = from_seconds(std::sqrt(cycle.length_variance_s2));
+  correct_next(cycle.begin_s, cycle.length_s, cycle.end_variance_s2(), correction);
+  const double contradiction = contradiction_s(cycle.begin_s, cycle.length_s, correction);
+  correction.begin_deviation = from_seconds(std::sqrt(cycle.begin_variance_s2 + contradiction * contradiction));
   correction.contradicted = contradiction > kWorthSaying_s;
   return correction;
 }

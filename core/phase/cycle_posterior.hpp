@@ -11,15 +11,20 @@
 // by what they show is followed by one whose beginning is that end, for so long as is allowed, and not when they too
 // have told nothing for kBlind.
 //
+// The end that the images foretell of a cycle counts for what such ends have been worth (EndTrust); the rest is the
+// rhythm's prediction. The phase seen last stays: the beginning gives way, by 3 % of the length at most.
+//
 // No heap, no locks.
 #pragma once
 
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <optional>
 
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cycle_correction.hpp"
+#include "core/phase/end_trust.hpp"
 #include "core/phase/observed_phase.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/time/instant.hpp"
@@ -55,10 +60,31 @@ class CyclePosterior {
     double misfit = 0.0;  // sum of squared normalised residuals, each at most 9
   };
 
+  // Mean and variance of the posterior.
+  struct Summary {
+    double begin_s = 0.0;  // after the R peak of the ECG
+    double length_s = 0.0;
+    double begin_variance_s2 = 0.0;
+    double length_variance_s2 = 0.0;
+
+    [[nodiscard]] double end_s() const noexcept { return begin_s + length_s; }
+    [[nodiscard]] double end_variance_s2() const noexcept { return begin_variance_s2 + length_variance_s2; }
+  };
+
   void begin_cycle(const CardiacClock& clock) noexcept;
   void carry_on(const CardiacClock& clock) noexcept;
   void begin_grid() noexcept;
   void weigh(const ObservedPhase& observed) noexcept;
+  // None where the candidates' weights are no numbers.
+  [[nodiscard]] std::optional<Summary> summary() const noexcept;
+  // The length sensitivity of the phase seen last in such a cycle; 1 past its end.
+  [[nodiscard]] double seen_sensitivity(double begin_s, double length_s) const noexcept;
+  void foretell() noexcept;
+  // The same with its end moved towards the predicted one by what the images' ends are not worth.
+  [[nodiscard]] Summary with_trusted_end(const Summary& seen) const noexcept;
+  // Where a cycle must begin that ends at `end_s` and has, when seen last, the phase that `seen` has. None when that is
+  // further than kLargestGivingWay from where `seen` begins.
+  [[nodiscard]] std::optional<double> beginning_for(const Summary& seen, double end_s) const noexcept;
   // Phase and rate at an instant if the cycle began then and lasted so long, and the next one too.
   [[nodiscard]] CyclePhase phase_of(Instant t, double begin_s, double length_s, double next_s) const noexcept;
   // By how much the newest observation contradicts that cycle, s; 0 while it lies within its own deviation.
@@ -69,6 +95,12 @@ class CyclePosterior {
   [[nodiscard]] double begin_s(int i) const noexcept;  // after the R peak of the ECG
   [[nodiscard]] double length_s(int j) const noexcept;
   [[nodiscard]] std::uint64_t oldest_kept() const noexcept { return kept_count_ > kKept ? kept_count_ - kKept : 0; }
+  [[nodiscard]] EndTrust& trust() noexcept { return trust_[index_of(law_.law)]; }
+  [[nodiscard]] const EndTrust& trust() const noexcept { return trust_[index_of(law_.law)]; }
+  // Of the end of the running cycle by the ECG alone.
+  [[nodiscard]] double predicted_variance_s2() const noexcept {
+    return begin_deviation_s_ * begin_deviation_s_ + length_deviation_s_ * length_deviation_s_;
+  }
   [[nodiscard]] Candidate& candidate(int i, int j) noexcept {
     return grid_[static_cast<std::size_t>(i * kLengths + j)];
   }
@@ -87,11 +119,13 @@ class CyclePosterior {
   Duration detector_delay_{0};
   double begin_deviation_s_ = 0.0;
   double length_mean_s_ = 0.0;
-  double length_deviation_s_ = 0.0;  // of any cycle, as predicted
+  double length_deviation_s_ = 0.0;  // of any cycle, as predicted; as much at least as the grid can tell
   double previous_length_s_ = 0.0;
   double next_length_s_ = 0.0;
   bool contradicted_ = false;
   int observed_ = 0;
+  Instant seen_until_;                               // the newest instant observed in the running cycle
+  std::array<EndTrust, kPhaseLaws.size()> trust_{};  // under each law
   std::array<Candidate, kLengths * kBeginnings> grid_{};
   std::array<ObservedPhase, kKept> kept_{};
   std::uint64_t kept_count_ = 0;
