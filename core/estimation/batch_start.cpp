@@ -338,7 +338,6 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
   }
   if (!seen_somewhere) return refuse(BatchStatus::kBehindCamera);
   if (!best) return refuse(BatchStatus::kDiverged);
-  outcome.robust_cost = best->cost;
 
   // The plain estimate of what lies within the gate, until that set stays. One that has come in stays in, so that the
   // set can't alternate.
@@ -351,7 +350,7 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
   Solution solution = std::move(*best);
   problem.widen(solution.y);
   if (settings.robust) {
-    problem.evaluate(solution.y, Loss::kStudentT);
+    outcome.robust_cost = problem.evaluate(solution.y, Loss::kStudentT);
     outcome.weights = problem.weight();
     for (std::size_t k = 0; k < observations.size(); ++k)
       problem.used()[k] = problem.residual2()[k] < settings.gate ? 1 : 0;

@@ -14,6 +14,8 @@ constexpr double kDecisive = 4.0;     // difference of the log likelihoods
 constexpr double kWildest_rad = 0.8;  // no phase but a wrong match
 constexpr double kSameScale = 0.1;    // of the usual length
 constexpr double kRuledOut = 1e-3;    // probability of a law that is not asked any more
+constexpr std::size_t kFewestTrials = 8;
+constexpr double kKeep = 1.0 - 1.0 / kMemory;
 
 }  // namespace
 
@@ -30,7 +32,7 @@ PhaseLawSettings law_even_at(PhaseLaw law, Seconds rr) noexcept {
 LawMemory LawChoice::memory() const noexcept {
   // What cut-short cycles alone have told gives way to the first other one.
   if (taught_ < kCyclesForScale || !any_in_rhythm_) return {};
-  return {belief_.settings.law, scale_, cycles_, squares_, log_likelihoods_};
+  return {belief_.settings.law, scale_, cycles_, squares_, evidence()};
 }
 
 void LawChoice::recall(const LawMemory& memory) noexcept {
@@ -43,13 +45,14 @@ void LawChoice::recall(const LawMemory& memory) noexcept {
   scale(memory.usual);
   cycles_ = memory.cycles;
   squares_ = memory.squares;
-  log_likelihoods_ = memory.log_likelihoods;
+  trial_log_likelihoods_ = memory.log_likelihoods;
   believe();
 }
 
 bool LawChoice::on_beat(const CardiacClock& clock) noexcept {
   const CardiacCycle cycle = clock.cycle_at(clock.anchor() - Duration(1));
   if (!cycle.teaches) return false;
+  for (double& likelihood : trial_log_likelihoods_) likelihood *= kKeep;
   if (usual_changes(cycle)) {
     weigh_again(clock);
   } else if (taught_ >= kCyclesForScale) {
@@ -63,8 +66,8 @@ bool LawChoice::on_beat(const CardiacClock& clock) noexcept {
 // A heart may begin with a run of ectopic beats: as long as phases are told by the linear law, which has no scale, the
 // usual length may turn out another one. Cycles that a premature beat cut short tell it only where there are no others.
 bool LawChoice::usual_changes(const CardiacCycle& cycle) noexcept {
-  if (belief_.settings.law != PhaseLaw::kLinear) return false;
   ++taught_;
+  if (belief_.settings.law != PhaseLaw::kLinear) return false;
   const bool in_rhythm = cycle.irregularity == Duration::zero();
   if (in_rhythm && !any_in_rhythm_) {
     any_in_rhythm_ = true;
@@ -103,7 +106,6 @@ void LawChoice::scale(Seconds usual) noexcept {
 }
 
 void LawChoice::weigh(const CardiacCycle& cycle) noexcept {
-  constexpr double kKeep = 1.0 - 1.0 / kMemory;
   int seen = 0;
   std::array<double, kLaws> squares{};
   const std::uint64_t oldest = kept_count_ > kKept ? kept_count_ - kKept : 0;
@@ -144,21 +146,56 @@ double LawChoice::scatter(PhaseLaw law) const noexcept {
   return cycles_ > 0.0 ? squares_[index_of(law)] / cycles_ : 0.0;
 }
 
+bool LawChoice::weigh(std::span<LawTrial> trials) noexcept {
+  if (trials.size() < kFewestTrials) return false;
+  Instant begin = trials.front().begin;
+  Instant end = trials.front().end;
+  for (const LawTrial& trial : trials) {
+    begin = std::min(begin, trial.begin);
+    end = std::max(end, trial.end);
+  }
+  if (end <= std::max(begin, tried_until_)) return false;
+  const double new_share = to_seconds(end - std::max(begin, tried_until_)) / to_seconds(end - begin);
+  tried_until_ = end;
+  const auto excess = [](const LawTrial& trial, std::size_t law) {
+    return trial.costs[law] - *std::min_element(trial.costs.begin(), trial.costs.end());
+  };
+  for (std::size_t law = 0; law < kLaws; ++law) {
+    const auto middle = trials.begin() + static_cast<std::ptrdiff_t>(trials.size() / 2);
+    std::nth_element(trials.begin(), middle, trials.end(),
+                     [&](const LawTrial& a, const LawTrial& b) { return excess(a, law) < excess(b, law); });
+    trial_log_likelihoods_[law] -= 0.5 * new_share * excess(*middle, law);
+  }
+  const bool another = choose();
+  believe();
+  return another;
+}
+
+std::array<double, LawChoice::kLaws> LawChoice::evidence() const noexcept {
+  std::array<double, kLaws> sum = trial_log_likelihoods_;
+  if (cycles_ < kLeastCycles) return sum;
+  for (std::size_t i = 0; i < kLaws; ++i) sum[i] += log_likelihoods_[i];
+  return sum;
+}
+
 bool LawChoice::choose() noexcept {
-  if (cycles_ < kLeastCycles) return false;
-  const auto best = static_cast<std::size_t>(std::max_element(log_likelihoods_.begin(), log_likelihoods_.end()) -
-                                             log_likelihoods_.begin());
-  if (!(log_likelihoods_[best] - log_likelihoods_[index_of(belief_.settings.law)] > kDecisive)) return false;
+  // The scale of a law that is told stays.
+  if (!any_in_rhythm_ && taught_ < kCyclesForScale) return false;
+  const std::array<double, kLaws> likelihoods = evidence();
+  const auto best =
+      static_cast<std::size_t>(std::max_element(likelihoods.begin(), likelihoods.end()) - likelihoods.begin());
+  if (!(likelihoods[best] - likelihoods[index_of(belief_.settings.law)] > kDecisive)) return false;
   belief_.settings.law = kPhaseLaws[best];
   return true;
 }
 
 // Any law is as likely as another beforehand, and until as many cycles have been weighed as a choice takes.
 void LawChoice::believe() noexcept {
-  const double largest = *std::max_element(log_likelihoods_.begin(), log_likelihoods_.end());
+  const std::array<double, kLaws> likelihoods = evidence();
+  const double largest = *std::max_element(likelihoods.begin(), likelihoods.end());
   double sum = 0.0;
   for (std::size_t i = 0; i < kLaws; ++i) {
-    const double likelihood = cycles_ < kLeastCycles ? 1.0 : std::exp(log_likelihoods_[i] - largest);
+    const double likelihood = std::exp(likelihoods[i] - largest);
     belief_.probabilities[i] = likelihood < kRuledOut ? 0.0 : likelihood;
     sum += belief_.probabilities[i];
   }

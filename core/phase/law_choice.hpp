@@ -7,6 +7,11 @@
 // cycle counts as one, by Student's likelihood of their mean square (1 degree of freedom): a young map is now and then
 // far off in one cycle, whatever the law.
 //
+// Before there is a map, and where it was learnt under another law, the matches that features start from tell more: a
+// motion is fitted to them under each law (LawTrial). Of the features that start together the median counts, as one:
+// they share the errors of their camera's poses, of the R peaks and of the heart. So does what several trials saw at
+// the same time.
+//
 // The laws are scaled to be the same in a cycle of the usual length, so that the map stays right when the law changes.
 //
 // No heap, no locks.
@@ -14,9 +19,11 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/law_memory.hpp"
+#include "core/phase/law_trial.hpp"
 #include "core/phase/observed_phase.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/phase/seconds.hpp"
@@ -35,6 +42,9 @@ class LawChoice {
   // A beat has become known: what was seen in the cycle before it is weighed, unless that one teaches nothing. True
   // when another law is taken.
   bool on_beat(const CardiacClock& clock) noexcept;
+
+  // Of features that start together, in any order, which is not kept. True when another law is taken.
+  bool weigh(std::span<LawTrial> trials) noexcept;
 
   // What an earlier run knew, before the first beat of this one. The means in each part of the cycle are found anew.
   [[nodiscard]] LawMemory memory() const noexcept;
@@ -62,6 +72,7 @@ class LawChoice {
   void weigh_again(const CardiacClock& clock) noexcept;
   void scale(Seconds usual) noexcept;
   void weigh(const CardiacCycle& cycle) noexcept;
+  [[nodiscard]] std::array<double, kLaws> evidence() const noexcept;
   [[nodiscard]] bool choose() noexcept;
   void believe() noexcept;
 
@@ -75,6 +86,8 @@ class LawChoice {
   double cycles_ = 0.0;  // weighed, older ones fading, here and below
   std::array<double, kLaws> squares_{};
   std::array<double, kLaws> log_likelihoods_{};
+  std::array<double, kLaws> trial_log_likelihoods_{};  // and an earlier run's; fading likewise, whatever the scale
+  Instant tried_until_;
   std::array<ObservedPhase, kKept> kept_{};
   std::uint64_t kept_count_ = 0;
 };

@@ -5,6 +5,7 @@
 // Schoenfeld, "Systolic time intervals in heart failure in man", Circulation 37, 1968). The other two laws say so.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -48,10 +49,26 @@ inline constexpr std::array<PhaseLaw, 3> kPhaseLaws{PhaseLaw::kLinear, PhaseLaw:
 // Where in kPhaseLaws it stands.
 [[nodiscard]] constexpr std::size_t index_of(PhaseLaw law) noexcept { return static_cast<std::size_t>(law); }
 
+// Which law is told, and which are not ruled out, in order of kPhaseLaws.
+struct BelievedLaws {
+  PhaseLaw told = PhaseLaw::kLinear;
+  std::array<bool, kPhaseLaws.size()> possible{};
+
+  [[nodiscard]] bool undecided() const noexcept { return std::count(possible.begin(), possible.end(), true) > 1; }
+  [[nodiscard]] bool operator==(const BelievedLaws&) const noexcept = default;
+};
+
 // The law that phases are told by, and how sure that is.
 struct LawBelief {
   PhaseLawSettings settings;
   std::array<double, kPhaseLaws.size()> probabilities{};  // of kPhaseLaws; all 0: the law is known
+
+  [[nodiscard]] BelievedLaws laws() const noexcept {
+    BelievedLaws laws{settings.law, {}};
+    for (std::size_t i = 0; i < kPhaseLaws.size(); ++i)
+      laws.possible[i] = probabilities[i] > 0.0 || kPhaseLaws[i] == settings.law;
+    return laws;
+  }
 
   // Another law of the same numbers.
   [[nodiscard]] PhaseLawSettings with(PhaseLaw law) const noexcept {

@@ -1,16 +1,27 @@
 #include "core/pipeline/batch_starter.hpp"
 
+#include <algorithm>
+
 #include "core/pipeline/pose_noise.hpp"
+#include "core/pipeline/try_laws.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
+namespace {
+
+// Features with which the laws are tried, of those that may start at the same beat: each takes as long as another
+// start, and starts that wait are adopted late.
+constexpr std::size_t kTrials = 40;
+
+}  // namespace
 
 BatchStarter::BatchStarter(const PipelineSettings& settings, std::span<FeatureSlot> slots)
     : model_{settings.camera},
       layout_(settings.estimator.layout),
       prior_(settings.estimator.prior),
       batch_(settings.estimator.batch),
-      slots_(slots) {
+      slots_(slots),
+      trial_stride_(std::max<std::size_t>(1, slots.size() / kTrials)) {
   for (int i = 0; i < settings.workers; ++i) lanes_.push_back(std::make_unique<Lane>(slots.size()));
 }
 
@@ -51,6 +62,11 @@ void BatchStarter::solve(FeatureSlot& slot) noexcept {
   const std::span<const Observation> observations(slot.start.observations.data(),
                                                   static_cast<std::size_t>(slot.start.count));
   slot.start.outcome = batch_start(observations, model_, layout_, prior_, batch_);
+  slot.start.trial.reset();
+  const auto number = static_cast<std::size_t>(&slot - slots_.data());
+  if (slot.start.law.laws().undecided() && number % trial_stride_ == 0) {
+    slot.start.trial = try_laws(slot.start, model_, layout_, prior_, batch_);
+  }
   if (slot.slow_error != nullptr && slot.start.outcome.ok()) begin_slow_error(slot);
   // Release: the outcome is complete before the worker can see the flag (pairs with the acquire in feature_life).
   slot.start.ready.store(true, std::memory_order_release);

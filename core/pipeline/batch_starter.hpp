@@ -39,6 +39,7 @@ class BatchStarter {
   Prior prior_;
   BatchSettings batch_;
   std::span<FeatureSlot> slots_;
+  std::size_t trial_stride_;  // of slots, with whose starts the laws are tried
   struct Lane {
     explicit Lane(std::size_t capacity) : ring(capacity) {}
     SpscRing<int> ring;

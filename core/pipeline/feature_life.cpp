@@ -24,6 +24,7 @@ bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& mod
   const auto& depths = settings.batch.start_depths_mm;
   const double depth_mm = depths[depths.size() / 2];  // only scales the pose noise; the start finds the true depth
   slot.start.count = 0;
+  slot.start.law = job.law;
   for (int i = 0; i < settings.start_observations; ++i) {
     const auto k = static_cast<std::uint32_t>(i);
     const HeldMatch& held = slot.held[k];
@@ -45,6 +46,7 @@ bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& mod
     observation.R = match_covariance(held, *frame, frame->pose.X_WC * (depth_mm * ray_C), J_C * frame->X_CW.R,
                                      settings.pixel_deviation_px);
     slot.start.captures[k] = frame->stamp.capture;
+    slot.start.cycles[k] = {frame->cycle, frame->respiration};
     slot.start.poses[k] = frame->pose;
     ++slot.start.count;
   }
@@ -70,13 +72,8 @@ class Step {
     // history or lost its phase is dealt with below.)
     const FrameRecord* last = job_.history->find(slot_.held[wanted - 1].frame_index);
     if (last != nullptr && last->measurable && !last->phase.exact) return LifeEvent::kNone;
-    if (!prepare_start(slot_, job_, model_, settings_.estimator)) return LifeEvent::kNone;
-    slot_.start.adopt_at_frame = now() + static_cast<std::uint64_t>(settings_.adoption_delay_frames);
-    // Relaxed: housekeeping touches the flag only after it has popped this slot's request, and the ring orders that.
-    slot_.start.ready.store(false, std::memory_order_relaxed);
     slot_.forgotten = false;
-    slot_.state = SlotState::kStarting;
-    return LifeEvent::kStartRequested;
+    return request_start();
   }
 
   LifeEvent starting() noexcept {
@@ -86,6 +83,8 @@ class Step {
       return now() == slot_.start.adopt_at_frame ? LifeEvent::kAdoptionLate : LifeEvent::kNone;
     }
     if (slot_.forgotten) return give_up(LifeEvent::kNone);
+    // Another law has been taken since, or ruled out: by that the same matches tell more.
+    if (slot_.start.law.laws() != job_.law.laws()) return request_start();
     const auto used = static_cast<std::uint32_t>(slot_.start.count);
     if (!slot_.start.outcome.ok()) {
       if (++slot_.failed_starts >= kFailedStartsBeforeLost) return give_up(LifeEvent::kLostUnstarted);
@@ -98,6 +97,8 @@ class Step {
     }
     slot_.held.drop(used);
     bank_.set(feature_, slot_.start.outcome.estimate);
+    // It is not worth what its covariance says: what is seen from now on shall win.
+    if (slot_.start.outcome.contradicted()) bank_.diffuse(feature_, kInflation_mm);
     slot_.last_learnt = slot_.last_observed;
     slot_.health.reset();
     slot_.updates = 0;
@@ -135,6 +136,17 @@ class Step {
 
  private:
   [[nodiscard]] std::uint64_t now() const noexcept { return job_.frame->index; }
+
+  // Of the matches that are held, if all their frames are there.
+  LifeEvent request_start() noexcept {
+    slot_.state = SlotState::kTracked;
+    if (!prepare_start(slot_, job_, model_, settings_.estimator)) return LifeEvent::kNone;
+    slot_.start.adopt_at_frame = now() + static_cast<std::uint64_t>(settings_.adoption_delay_frames);
+    // Relaxed: housekeeping touches the flag only after it has popped this slot's request, and the ring orders that.
+    slot_.start.ready.store(false, std::memory_order_relaxed);
+    slot_.state = SlotState::kStarting;
+    return LifeEvent::kStartRequested;
+  }
 
   LifeEvent give_up(LifeEvent why) noexcept {
     slot_.state = SlotState::kEmpty;

@@ -6,11 +6,16 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "core/estimation/batch_start.hpp"
 #include "core/estimation/correlated_pose_noise.hpp"
 #include "core/estimation/feature_health.hpp"
 #include "core/estimation/observation.hpp"
+#include "core/phase/cardiac_clock.hpp"
+#include "core/phase/law_trial.hpp"
+#include "core/phase/phase_law.hpp"
+#include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/time/instant.hpp"
@@ -68,15 +73,24 @@ class HeldMatches {
   std::uint32_t tail_ = 0;
 };
 
+// What other laws make of an observation's basis.
+struct ObservedCycle {
+  CardiacCycle cycle;
+  RespiratoryPhase respiration;
+};
+
 // The hand-over to housekeeping and back: the worker fills `observations`, raises `requested` through its ring, and
 // does not touch the rest before `ready`.
 struct BatchStartExchange {
   std::array<Observation, kMaxStartObservations> observations{};
   std::array<Instant, kMaxStartObservations> captures{};
   std::array<CameraPose, kMaxStartObservations> poses{};  // with their noise
+  std::array<ObservedCycle, kMaxStartObservations> cycles{};
+  LawBelief law;  // by which the observations have their bases
   int count = 0;
   std::uint64_t adopt_at_frame = 0;
   BatchOutcome outcome;
+  std::optional<LawTrial> trial;  // where more than one law was possible
   // Housekeeping stores true with release after writing `outcome`; the worker's acquire load then sees all of it.
   std::atomic<bool> ready{false};
 };

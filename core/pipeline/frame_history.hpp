@@ -24,6 +24,7 @@ struct FrameRecord {
   Vector3d displacement_mm = Vector3d::Zero();
   double displacement_deviation_mm = 0.0;  // per axis
   PhaseEstimate phase;                     // at capture, as known at the last refresh
+  CardiacCycle cycle;                      // that the capture lies in, once the phase is exact
   Basis b;
   Basis b_rate;
 };
@@ -59,13 +60,10 @@ class FrameHistory {
 
   // Fills phases and basis of a record, whose pose is set, from the clocks. The basis is computed here, once a frame.
   void set_phase(FrameRecord& record, const CardiacClock& clock, const RespiratoryClock& respiration) noexcept {
-    record.phase = clock.at(record.stamp.capture);
-    record.measurable = record.pose.valid() && usable(record.phase.state);
     record.respiration = respiration.at(record.stamp.capture);
     record.pose.position_variance_mm2 =
         record.tracker_variance_mm2 + record.respiration.deviation_mm * record.respiration.deviation_mm;
-    record.b = basis_at(layout_, record.phase.phase_rad, record.respiration);
-    record.b_rate = basis_rate(layout_, record.phase.phase_rad);
+    set_cardiac_phase(record, clock);
   }
 
   // After a beat: the frames whose cycle was still open get what is known now. At most a cycle or two of frames.
@@ -78,7 +76,24 @@ class FrameHistory {
     }
   }
 
+  // After another law has been taken: all frames of completed cycles, which nothing else changes any more.
+  void retell_phases(const CardiacClock& clock) noexcept {
+    const std::uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
+    for (std::uint64_t i = oldest; i < count_; ++i) {
+      FrameRecord& record = records_[i % kCapacity];
+      if (record.phase.exact) set_cardiac_phase(record, clock);
+    }
+  }
+
  private:
+  void set_cardiac_phase(FrameRecord& record, const CardiacClock& clock) const noexcept {
+    record.phase = clock.at(record.stamp.capture);
+    if (record.phase.exact) record.cycle = clock.cycle_at(record.stamp.capture);
+    record.measurable = record.pose.valid() && usable(record.phase.state);
+    record.b = basis_at(layout_, record.phase.phase_rad, record.respiration);
+    record.b_rate = basis_rate(layout_, record.phase.phase_rad);
+  }
+
   BasisLayout layout_;
   std::array<FrameRecord, kCapacity> records_{};
   std::uint64_t count_ = 0;

@@ -6,6 +6,7 @@
 
 #include "core/estimation/shared_pose.hpp"
 #include "core/periodic/basis.hpp"
+#include "core/phase/phase_law.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/phase_spread.hpp"
 #include "core/pipeline/scouts.hpp"
@@ -42,6 +43,7 @@ struct FrameJob {
   // After B: how the features found have moved, and the pose that they agree on; null when they do not tell it.
   const NeighbourMotion* motion = nullptr;
   const CommonEstimate* shared_pose = nullptr;
+  LawBelief law;        // by which the history's phases are told
   Instant learn_until;  // learning that has not begun by then is put off; never in lockstep
 };
 

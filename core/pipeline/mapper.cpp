@@ -55,6 +55,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       cycle_(settings.image_alone),
       tallies_(static_cast<std::size_t>(team.size())) {
   occupied_.reserve(slots.size());
+  law_trials_.reserve(slots.size());
   counters_.start_matches_needed.set(static_cast<std::uint64_t>(settings.estimator.start_observations));
   for (int g = 0; g < bank_.groups(); ++g) {
     const auto first = static_cast<std::size_t>(g) * kLanes;
@@ -73,12 +74,8 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
   const RealtimeScope realtime;
   finish_learning();
   CardiacClock ecg_clock = newest_clock.as_of(stamp.arrival);
-  if (settings_.law_from_image) {
-    if (ecg_clock.beats() != beats_ && law_.on_beat(ecg_clock)) {
-      for (FeatureGroup& group : groups_) group.doubt();
-    }
-    ecg_clock = ecg_clock.with_law(law_.belief());
-  }
+  if (settings_.law_from_image) ecg_clock = find_law(ecg_clock);
+  job_.law = ecg_clock.law_belief();
   const Instant begun = MonotonicClock::now();
 
   if (respiration_.locks() == 1 && !breath_begun_) {
@@ -134,6 +131,27 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
   counters_.frames.add();
   if (!frame.pose.valid()) counters_.frames_without_pose.add();
   if (frame.pose.valid() && !frame.measurable) counters_.frames_without_phase.add();
+}
+
+// The clock under the law that what has been seen is in favour of.
+CardiacClock Mapper::find_law(const CardiacClock& clock) noexcept {
+  const LawBelief before = law_.belief();
+  law_trials_.clear();
+  for (const FeatureSlot& slot : slots_) {
+    // Taken as its worker takes the outcome, at the end of this frame. Acquire: as there.
+    const bool taken = slot.state == SlotState::kStarting && !slot.forgotten &&
+                       history_->count() >= slot.start.adopt_at_frame &&
+                       slot.start.ready.load(std::memory_order_acquire);
+    if (taken && slot.start.trial) law_trials_.push_back(*slot.start.trial);
+  }
+  bool another = law_.weigh(law_trials_);
+  if (clock.beats() != beats_) another = law_.on_beat(clock) || another;
+  if (another) {
+    for (FeatureGroup& group : groups_) group.doubt();
+  }
+  const CardiacClock told = clock.with_law(law_.belief());
+  if (law_.belief().laws() != before.laws()) history_->retell_phases(told);
+  return told;
 }
 
 // While breathing is not known the surface is expected displaced as it was seen last.

@@ -8,6 +8,7 @@
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cycle_posterior.hpp"
 #include "core/phase/law_choice.hpp"
+#include "core/phase/law_trial.hpp"
 #include "core/phase/respiratory_tracker.hpp"
 #include "core/pipeline/batch_starter.hpp"
 #include "core/pipeline/feature_finder.hpp"
@@ -86,6 +87,7 @@ class Mapper {
   void advance_slot(FeatureGroup& group, std::size_t lane, int worker) noexcept;
   void finish_learning() noexcept;
   void shed_load(bool put_off) noexcept;
+  [[nodiscard]] CardiacClock find_law(const CardiacClock& clock) noexcept;
   void expect_displacement(FrameRecord& frame) const noexcept;
   void settle_phases(const FrameRecord& frame) noexcept;
   void settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept;
@@ -133,6 +135,7 @@ class Mapper {
   NeighbourMotion motion_;
   CyclePosterior cycle_;
   LawChoice law_;
+  std::vector<LawTrial> law_trials_;
   FrameJob job_;
   std::vector<WorkerTally> tallies_;
   std::vector<Vector2d> occupied_;

@@ -186,6 +186,69 @@ TEST_F(Stages, AnAdoptedFeatureWasLastObservedWhenItsStartsLastMatchWas) {
   EXPECT_EQ(slot->last_observed, last);
 }
 
+TEST_F(Stages, AStartUnderALawThatHasGivenWayIsSolvedOnceMore) {
+  slot->state = SlotState::kTracked;
+  job.law.probabilities.fill(1.0 / 3.0);
+  LifeEvent event = LifeEvent::kNone;
+  while (event == LifeEvent::kNone) {
+    next_frame();
+    found_at({320, 240});
+    event = learn_frame();
+  }
+  ASSERT_TRUE(slot->start.law.laws().undecided());
+  const Observation linear = slot->start.observations[5];
+  slot->start.outcome.status = BatchStatus::kOk;
+  slot->start.outcome.estimate = still_feature();
+  slot->start.ready.store(true);
+  job.law = LawBelief{.settings = {.law = PhaseLaw::kTimeLocked}};
+  history->retell_phases(clock.clock().with_law(job.law));
+  do {
+    next_frame();
+    event = learn_frame();
+  } while (event == LifeEvent::kNone);
+  EXPECT_EQ(event, LifeEvent::kStartRequested);
+  EXPECT_EQ(slot->state, SlotState::kStarting);
+  EXPECT_FALSE(slot->start.ready.load());
+  EXPECT_EQ(slot->start.law.laws(), job.law.laws());
+  EXPECT_EQ(slot->start.adopt_at_frame, job.frame->index + static_cast<std::uint64_t>(settings.adoption_delay_frames));
+  EXPECT_EQ(slot->start.observations[5].z, linear.z);
+  const Instant capture = slot->start.captures[5];
+  const double told_rad = clock.clock().with_law(job.law).at(capture).phase_rad;
+  EXPECT_GT((slot->start.observations[5].b - linear.b).norm(), 0.01);
+  EXPECT_EQ(slot->start.observations[5].b, basis_at(settings.estimator.layout, told_rad, {}));
+
+  slot->start.ready.store(true);
+  while (slot->state == SlotState::kStarting) {
+    next_frame();
+    ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+  }
+  EXPECT_EQ(slot->state, SlotState::kMapped);
+}
+
+TEST_F(Stages, AStartThatItsObservationsContradictIsAdoptedAsUncertain) {
+  const auto deviation_with = [&](double misfit) {
+    slot->state = SlotState::kStarting;
+    slot->start.count = 1;
+    slot->held.clear();
+    slot->held.push({});
+    slot->start.adopt_at_frame = 0;
+    slot->start.outcome.status = BatchStatus::kOk;
+    slot->start.outcome.estimate = still_feature();
+    slot->start.outcome.weights.assign(60, 1.0);
+    slot->start.outcome.robust_cost = misfit * 60.0 * kMeanStudentLoss;
+    slot->start.ready.store(true);
+    next_frame();
+    EXPECT_EQ(learn_frame(), LifeEvent::kNone);
+    EXPECT_EQ(slot->state, SlotState::kMapped);
+    FeatureEstimate adopted;
+    bank->get(0, adopted);
+    return std::sqrt(adopted.P(0, 0));
+  };
+  const double deviation_mm = std::sqrt(still_feature().P(0, 0));
+  EXPECT_NEAR(deviation_with(0.9 * kContradictedMisfit), deviation_mm, 1e-6);
+  EXPECT_NEAR(deviation_with(1.1 * kContradictedMisfit), std::hypot(deviation_mm, kInflation_mm), 0.01);
+}
+
 TEST_F(Stages, ALateStartIsToldOnceAndAdoptedWhenItComes) {
   slot->state = SlotState::kStarting;
   slot->start.adopt_at_frame = 0;
