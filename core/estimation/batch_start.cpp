@@ -43,6 +43,15 @@ LossValue loss_of(Loss loss, double s, double huber_deviations) noexcept {
 // thousand deviations, without a gradient. So a start on the wrong side of one camera is bad but not lost.
 constexpr double kInvisible = 1e6;
 
+// Mean of the Student-t loss beside that of residuals which are as large as they are said to be: (nu + 2) e^a E_1(a)
+// with a = nu / 2. Some gross outliers do not add much to it.
+double misfit_of(std::span<const double> residual2) {
+  constexpr double kExpected = 2.2417;
+  double sum = 0.0;
+  for (const double s : residual2) sum += student_t_loss(s);
+  return sum / (kExpected * static_cast<double>(residual2.size()));
+}
+
 // The cost J(y) = |y|^2 + sum_k rho_k in coordinates whitened by the prior, x = x_0 + sigma y. There the Hessian is I +
 // sum_k w_k B_k^T G_k B_k with G = J^T R^-1 J (3x3): six scalars an observation times b b^T.
 template <class Model>
@@ -354,6 +363,7 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
     outcome.weights = problem.weight();
     for (std::size_t k = 0; k < observations.size(); ++k)
       problem.used()[k] = problem.residual2()[k] < settings.gate ? 1 : 0;
+    outcome.misfit = misfit_of(problem.residual2());
   } else {
     problem.evaluate(solution.y, Loss::kQuadratic);
     outcome.weights = problem.weight();

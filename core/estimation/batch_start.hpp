@@ -18,7 +18,6 @@
 #include "core/estimation/feature_estimate.hpp"
 #include "core/estimation/measurement_model.hpp"
 #include "core/estimation/observation.hpp"
-#include "core/estimation/student_t_loss.hpp"
 
 namespace perimap {
 
@@ -39,24 +38,20 @@ inline constexpr double kContradictedMisfit = 2.0;
 
 struct BatchOutcome {
   BatchStatus status = BatchStatus::kDiverged;
-  FeatureEstimate estimate;          // valid when status is kOk
-  double map_cost = 0.0;             // prior + inliers, as in iterated_update
-  double robust_cost = 0.0;          // with the Student-t loss, where kTooManyOutliers too; map_cost when not robust
-  std::vector<double> weights;       // per observation: the Student-t weight at its solution, about 1 for a good one
+  FeatureEstimate estimate;     // valid when status is kOk
+  double map_cost = 0.0;        // prior + inliers, as in iterated_update
+  double robust_cost = 0.0;     // with the Student-t loss, where kTooManyOutliers too; map_cost when not robust
+  double misfit = 0.0;          // of a robust start: the mean loss of its residuals beside what is expected, about 1
+  std::vector<double> weights;  // per observation: the Student-t weight at its solution, about 1 for a good one
   std::vector<std::uint8_t> inlier;  // per observation: 1 when used in the estimate
   std::vector<Matrix2d> R;           // per observation: what it counted with there, the phase's deviation included
   int inliers = 0;
   int iterations = 0;  // over all starts and losses
 
   [[nodiscard]] bool ok() const noexcept { return status == BatchStatus::kOk; }
-  // Of a robust start, what it leaves of its observations beside what they should err by: 1, or less by what the fit
-  // takes in.
-  [[nodiscard]] double misfit() const noexcept {
-    return robust_cost / (kMeanStudentLoss * static_cast<double>(weights.size()));
-  }
   // No motion of this kind explains the observations: their phases are wrong, or the tissue moves by more than the
   // heart.
-  [[nodiscard]] bool contradicted() const noexcept { return misfit() > kContradictedMisfit; }
+  [[nodiscard]] bool contradicted() const noexcept { return misfit > kContradictedMisfit; }
 };
 
 template <class Model>

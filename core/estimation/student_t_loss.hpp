@@ -7,8 +7,6 @@
 namespace perimap {
 
 inline constexpr double kStudentFreedom = 3.0;  // nu
-// Mean of student_t_loss() over measurements that err as their covariances say: (nu + 2) e^a E_1(a), a = nu / 2.
-inline constexpr double kMeanStudentLoss = 2.2417;
 
 // -2 log of the bivariate density: (nu + 2) log(1 + s / nu), and its derivative, the measurement's weight.
 [[nodiscard]] inline double student_t_loss(double s) noexcept {

@@ -21,21 +21,6 @@ Duration deviation_of_difference(Duration a, Duration b) noexcept {
 
 }  // namespace
 
-double timing_deviation_s(const CardiacCycle& cycle, const CyclePhase& phase) noexcept {
-  const double w = phase.length_sensitivity;
-  const double begin = to_seconds(cycle.begin_deviation);
-  const double length = to_seconds(cycle.length_deviation);
-  // The beginning ends the cycle before as well: a measured one shares its own error with that one's length, a
-  // predicted one all of that length's. Where the length is not known at all the term is too much, and small.
-  const double p = phase.previous_sensitivity;
-  const double previous = to_seconds(cycle.previous_length_deviation);
-  const double shared = std::min(begin, previous);
-  // Where both ends are measured their errors are shared out by how much the phase is bound to each.
-  const double bound = cycle.completed ? 1.0 - w : 1.0;
-  return std::sqrt(bound * bound * begin * begin + 2.0 * bound * p * shared * shared + p * p * previous * previous +
-                   w * w * length * length);
-}
-
 PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   const Located located = locate(t);
   PhaseEstimate estimate;
@@ -51,9 +36,21 @@ PhaseEstimate CardiacClock::at(Instant t) const noexcept {
   estimate.teaches = cycle.teaches;
   estimate.ectopic = located.ectopic;
 
-  const double irregular = located.exact ? phase.length_sensitivity * to_seconds(cycle.irregularity) : 0.0;
+  const double w = phase.length_sensitivity;
+  const double begin = to_seconds(cycle.begin_deviation);
+  const double length = to_seconds(cycle.length_deviation);
+  // The beginning ends the cycle before as well: a measured one shares its own error with that one's length, a
+  // predicted one all of that length's. Where the length is not known at all the term is too much, and small.
+  const double p = phase.previous_sensitivity;
+  const double previous = to_seconds(cycle.previous_length_deviation);
+  const double shared = std::min(begin, previous);
+  // Where both ends are measured their errors are shared out by how much the phase is bound to each.
+  const double bound = located.exact ? 1.0 - w : 1.0;
+  const double irregular = located.exact ? w * to_seconds(located.irregularity) : 0.0;
+  estimate.deviation_s = std::sqrt(bound * bound * begin * begin + 2.0 * bound * p * shared * shared +
+                                   p * p * previous * previous + w * w * length * length + irregular * irregular);
   const double law_rad = law_deviation_rad(law_, phase.phase_rad, t - cycle.begin, cycle.length, cycle.previous_length);
-  estimate.deviation_s = std::hypot(timing_deviation_s(cycle, phase), irregular, law_rad / phase.rate_rad_per_s);
+  estimate.deviation_s = std::hypot(estimate.deviation_s, law_rad / phase.rate_rad_per_s);
   estimate.law_undecided =
       !located.exact && law_difference_s(law_, cycle.length, cycle.previous_length) > kLawsDiffer_s;
   return estimate;
@@ -144,8 +141,7 @@ CardiacClock::Located CardiacClock::locate_completed(int newer) const noexcept {
 
   located.exact = !end.unheard;
   located.state = located.exact ? PhaseState::kLocked : carried_state();
-  located.cycle.completed = located.exact;
-  located.cycle.irregularity = end.irregularity;
+  located.irregularity = end.irregularity;
   located.cycle.teaches = end.teaches;
   located.cycle.begin = begin.time;
   located.cycle.begin_deviation = begin.deviation;
@@ -209,7 +205,10 @@ Instant CardiacClock::expected_until() const noexcept {
 }
 
 CardiacCycle CardiacClock::cycle_at(Instant t) const noexcept {
-  CardiacCycle cycle = locate(t).cycle;
+  const Located located = locate(t);
+  CardiacCycle cycle = located.cycle;
+  cycle.completed = located.exact;
+  cycle.irregularity = located.irregularity;
   if (cycle.length > Duration::zero()) {
     cycle.systole = rounded(systole_duration(law_.settings, cycle.length, cycle.previous_length));
   }

@@ -58,10 +58,6 @@ struct CardiacCycle {
   bool teaches = false;      // completed, and what was seen in it may be learnt, see CardiacClockTracker
 };
 
-// What the R peaks' own times leave unknown of a phase in the cycle, as time: neither what the law nor what an end that
-// missed its prediction leaves.
-[[nodiscard]] double timing_deviation_s(const CardiacCycle& cycle, const CyclePhase& phase) noexcept;
-
 class CardiacClock {
  public:
   static constexpr int kCompletedCycles = 32;
@@ -126,6 +122,7 @@ class CardiacClock {
 
   struct Located {
     CardiacCycle cycle;
+    Duration irregularity{0};
     PhaseState state = PhaseState::kUnknown;
     bool exact = false;
     bool ectopic = false;

@@ -61,7 +61,8 @@ void CyclePosterior::follow(const CardiacClock& clock, Instant now) noexcept {
     carry_on(clock);
     return;
   }
-  const bool anew = !locked_ || carried_ || clock.beats() != beats_;
+  // Under another law what was observed in this cycle is weighed again.
+  const bool anew = !locked_ || carried_ || clock.beats() != beats_ || clock.law().law != law_.law;
   const bool ended = locked_ && !carried_ && clock.beats() == beats_ + 1;
   locked_ = true;
   carried_ = false;

@@ -39,7 +39,7 @@ class CyclePosterior {
   explicit CyclePosterior(Duration carry = std::chrono::seconds(10)) noexcept : carry_(carry) {}
 
   // Before each frame: the clock as the ECG has it. A beat more begins a new cycle; while it is not locked, so does the
-  // end of the last as the images show it.
+  // end of the last as the images show it. Under another law the running one is begun again.
   void follow(const CardiacClock& clock, Instant now) noexcept;
 
   // In order of time. Ignored before the clock is locked.

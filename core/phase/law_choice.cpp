@@ -14,7 +14,9 @@ constexpr double kDecisive = 4.0;     // difference of the log likelihoods
 constexpr double kWildest_rad = 0.8;  // no phase but a wrong match
 constexpr double kSameScale = 0.1;    // of the usual length
 constexpr double kRuledOut = 1e-3;    // probability of a law that is not asked any more
-constexpr std::size_t kFewestTrials = 8;
+// Enough to rule the others out, and outweighed by some cycles that say otherwise: what else moved the heart or the
+// pictures in those seconds is in all the features alike.
+constexpr double kMostOfATrial = 8.0;
 constexpr double kKeep = 1.0 - 1.0 / kMemory;
 
 }  // namespace
@@ -31,7 +33,7 @@ PhaseLawSettings law_even_at(PhaseLaw law, Seconds rr) noexcept {
 
 LawMemory LawChoice::memory() const noexcept {
   // What cut-short cycles alone have told gives way to the first other one.
-  if (taught_ < kCyclesForScale || !any_in_rhythm_) return {};
+  if (!any_in_rhythm_ || (taught_ < kCyclesForScale && belief_.settings.law == PhaseLaw::kLinear)) return {};
   return {belief_.settings.law, scale_, cycles_, squares_, evidence()};
 }
 
@@ -147,25 +149,30 @@ double LawChoice::scatter(PhaseLaw law) const noexcept {
 }
 
 bool LawChoice::weigh(std::span<LawTrial> trials) noexcept {
-  if (trials.size() < kFewestTrials) return false;
-  Instant begin = trials.front().begin;
-  Instant end = trials.front().end;
-  for (const LawTrial& trial : trials) {
-    begin = std::min(begin, trial.begin);
-    end = std::max(end, trial.end);
-  }
-  if (end <= std::max(begin, tried_until_)) return false;
-  const double new_share = to_seconds(end - std::max(begin, tried_until_)) / to_seconds(end - begin);
-  tried_until_ = end;
-  const auto excess = [](const LawTrial& trial, std::size_t law) {
-    return trial.costs[law] - *std::min_element(trial.costs.begin(), trial.costs.end());
+  // What of a trial's time others have not told yet.
+  const auto new_share = [this](const LawTrial& trial) {
+    if (!(trial.end > std::max(trial.begin, tried_until_))) return 0.0;
+    return to_seconds(trial.end - std::max(trial.begin, tried_until_)) / to_seconds(trial.end - trial.begin);
   };
+  const auto end = std::partition(trials.begin(), trials.end(), [&](const LawTrial& t) { return new_share(t) > 0.0; });
+  trials = trials.first(static_cast<std::size_t>(end - trials.begin()));
+  if (trials.size() < kFewestTrials) return false;
+  std::array<double, kLaws> excess{};
   for (std::size_t law = 0; law < kLaws; ++law) {
+    const auto of = [&](const LawTrial& trial) {
+      return new_share(trial) * (trial.costs[law] - *std::min_element(trial.costs.begin(), trial.costs.end()));
+    };
     const auto middle = trials.begin() + static_cast<std::ptrdiff_t>(trials.size() / 2);
     std::nth_element(trials.begin(), middle, trials.end(),
-                     [&](const LawTrial& a, const LawTrial& b) { return excess(a, law) < excess(b, law); });
-    trial_log_likelihoods_[law] -= 0.5 * new_share * excess(*middle, law);
+                     [&](const LawTrial& left, const LawTrial& right) { return of(left) < of(right); });
+    excess[law] = of(*middle);
   }
+  // Where no law is the best for most features.
+  const double least = *std::min_element(excess.begin(), excess.end());
+  for (std::size_t law = 0; law < kLaws; ++law) {
+    trial_log_likelihoods_[law] -= std::min(0.5 * (excess[law] - least), kMostOfATrial);
+  }
+  for (const LawTrial& trial : trials) tried_until_ = std::max(tried_until_, trial.end);
   const bool another = choose();
   believe();
   return another;
@@ -180,7 +187,8 @@ std::array<double, LawChoice::kLaws> LawChoice::evidence() const noexcept {
 
 bool LawChoice::choose() noexcept {
   // The scale of a law that is told stays.
-  if (!any_in_rhythm_ && taught_ < kCyclesForScale) return false;
+  const bool scaled = any_in_rhythm_ && length_count_ >= kRhythmicCyclesForScale;
+  if (!scaled && taught_ < kCyclesForScale) return false;
   const std::array<double, kLaws> likelihoods = evidence();
   const auto best =
       static_cast<std::size_t>(std::max_element(likelihoods.begin(), likelihoods.end()) - likelihoods.begin());

@@ -9,8 +9,8 @@
 //
 // Before there is a map, and where it was learnt under another law, the matches that features start from tell more: a
 // motion is fitted to them under each law (LawTrial). Of the features that start together the median counts, as one:
-// they share the errors of their camera's poses, of the R peaks and of the heart. So does what several trials saw at
-// the same time.
+// they share the errors of their camera's poses, of the R peaks and of the heart. What was seen at a time that trials
+// have told before does not count again, and there is a most that a trial counts.
 //
 // The laws are scaled to be the same in a cycle of the usual length, so that the map stays right when the law changes.
 //
@@ -36,6 +36,7 @@ namespace perimap {
 class LawChoice {
  public:
   static constexpr std::size_t kLaws = kPhaseLaws.size();
+  static constexpr std::size_t kFewestTrials = 8;
 
   // In order of time.
   void add(const ObservedPhase& observed) noexcept { kept_[kept_count_++ % kKept] = observed; }
@@ -43,7 +44,8 @@ class LawChoice {
   // when another law is taken.
   bool on_beat(const CardiacClock& clock) noexcept;
 
-  // Of features that start together, in any order, which is not kept. True when another law is taken.
+  // Of features that start together, in any order, which is not kept; fewer than kFewestTrials that tell something new
+  // are passed over. True when another law is taken.
   bool weigh(std::span<LawTrial> trials) noexcept;
 
   // What an earlier run knew, before the first beat of this one. The means in each part of the cycle are found anew.
@@ -60,7 +62,8 @@ class LawChoice {
  private:
   static constexpr int kParts = 24;  // of the cycle
   static constexpr std::uint64_t kCyclesForScale = 6;
-  static constexpr std::uint64_t kLengths = 12;  // the last ones, whose mean is the usual one
+  static constexpr std::uint64_t kRhythmicCyclesForScale = 2;  // or so many that no premature beat cut short
+  static constexpr std::uint64_t kLengths = 12;                // the last ones, whose mean is the usual one
   static constexpr std::uint64_t kKept = 256;
 
   struct Part {

@@ -10,9 +10,10 @@
 namespace perimap {
 
 struct LawTrial {
-  std::array<double, kPhaseLaws.size()> costs{};  // -2 log posterior of the best motion, by Student's likelihood
-  Instant begin;                                  // of the first match
-  Instant end;                                    // of the last
+  std::array<double, kPhaseLaws.size()>
+      costs{};    // -2 log posterior of the best motion, by Student's likelihood; a constant off
+  Instant begin;  // of the first match
+  Instant end;    // of the last
 };
 
 }  // namespace perimap

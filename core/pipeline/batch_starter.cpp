@@ -21,7 +21,7 @@ BatchStarter::BatchStarter(const PipelineSettings& settings, std::span<FeatureSl
       prior_(settings.estimator.prior),
       batch_(settings.estimator.batch),
       slots_(slots),
-      trial_stride_(std::max<std::size_t>(1, slots.size() / kTrials)) {
+      trial_stride_((slots.size() + kTrials - 1) / kTrials) {
   for (int i = 0; i < settings.workers; ++i) lanes_.push_back(std::make_unique<Lane>(slots.size()));
 }
 
@@ -64,7 +64,8 @@ void BatchStarter::solve(FeatureSlot& slot) noexcept {
   slot.start.outcome = batch_start(observations, model_, layout_, prior_, batch_);
   slot.start.trial.reset();
   const auto number = static_cast<std::size_t>(&slot - slots_.data());
-  if (slot.start.law.laws().undecided() && number % trial_stride_ == 0) {
+  // A tracker's slow error is no noise that a wrong law could be told from.
+  if (slot.start.law.laws().undecided() && slot.slow_error == nullptr && number % trial_stride_ == 0) {
     slot.start.trial = try_laws(slot.start, model_, layout_, prior_, batch_);
   }
   if (slot.slow_error != nullptr && slot.start.outcome.ok()) begin_slow_error(slot);

@@ -78,13 +78,15 @@ class Step {
 
   LifeEvent starting() noexcept {
     if (now() < slot_.start.adopt_at_frame) return LifeEvent::kNone;
-    // Acquire: pairs with housekeeping's release store, so that the whole outcome is visible.
-    if (!slot_.start.ready.load(std::memory_order_acquire)) {
+    if (!slot_.start.due) {
       return now() == slot_.start.adopt_at_frame ? LifeEvent::kAdoptionLate : LifeEvent::kNone;
     }
     if (slot_.forgotten) return give_up(LifeEvent::kNone);
-    // Another law has been taken since, or ruled out: by that the same matches tell more.
-    if (slot_.start.law.laws() != job_.law.laws()) return request_start();
+    // By a law that has been taken since, or that is certain now, the same matches tell more.
+    const BelievedLaws before = slot_.start.law.laws();
+    const BelievedLaws now_believed = job_.law.laws();
+    const bool told_more = before.told != now_believed.told || (before.undecided() && !now_believed.undecided());
+    if (told_more && job_.history->find(slot_.held[0].frame_index) != nullptr) return request_start();
     const auto used = static_cast<std::uint32_t>(slot_.start.count);
     if (!slot_.start.outcome.ok()) {
       if (++slot_.failed_starts >= kFailedStartsBeforeLost) return give_up(LifeEvent::kLostUnstarted);
@@ -144,6 +146,7 @@ class Step {
     slot_.start.adopt_at_frame = now() + static_cast<std::uint64_t>(settings_.adoption_delay_frames);
     // Relaxed: housekeeping touches the flag only after it has popped this slot's request, and the ring orders that.
     slot_.start.ready.store(false, std::memory_order_relaxed);
+    slot_.start.due = false;
     slot_.state = SlotState::kStarting;
     return LifeEvent::kStartRequested;
   }

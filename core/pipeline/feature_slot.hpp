@@ -91,8 +91,10 @@ struct BatchStartExchange {
   std::uint64_t adopt_at_frame = 0;
   BatchOutcome outcome;
   std::optional<LawTrial> trial;  // where more than one law was possible
-  // Housekeeping stores true with release after writing `outcome`; the worker's acquire load then sees all of it.
+  // Housekeeping stores true with release after writing `outcome` and `trial`; the mapper's acquire load then sees all
+  // of it, and so does a worker, whose stage begins after that.
   std::atomic<bool> ready{false};
+  bool due = false;  // the mapper has seen it ready at the frame of its adoption, or later
 };
 
 struct FeatureSlot {

@@ -74,7 +74,8 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
   const RealtimeScope realtime;
   finish_learning();
   CardiacClock ecg_clock = newest_clock.as_of(stamp.arrival);
-  if (settings_.law_from_image) ecg_clock = find_law(ecg_clock);
+  take_starts();
+  if (settings_.law_from_image) ecg_clock = find_law(ecg_clock, stamp.capture);
   job_.law = ecg_clock.law_belief();
   const Instant begun = MonotonicClock::now();
 
@@ -133,18 +134,29 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
   if (frame.pose.valid() && !frame.measurable) counters_.frames_without_phase.add();
 }
 
-// The clock under the law that what has been seen is in favour of.
-CardiacClock Mapper::find_law(const CardiacClock& clock) noexcept {
-  const LawBelief before = law_.belief();
-  law_trials_.clear();
-  for (const FeatureSlot& slot : slots_) {
-    // Taken as its worker takes the outcome, at the end of this frame. Acquire: as there.
-    const bool taken = slot.state == SlotState::kStarting && !slot.forgotten &&
-                       history_->count() >= slot.start.adopt_at_frame &&
-                       slot.start.ready.load(std::memory_order_acquire);
-    if (taken && slot.start.trial) law_trials_.push_back(*slot.start.trial);
+// Before this frame's adoptions. In lockstep all starts are ready at their frames.
+void Mapper::take_starts() noexcept {
+  for (FeatureSlot& slot : slots_) {
+    BatchStartExchange& start = slot.start;
+    const bool awaited = slot.state == SlotState::kStarting && !start.due && history_->count() >= start.adopt_at_frame;
+    // Acquire: pairs with housekeeping's release store, so that the whole outcome is visible.
+    if (!awaited || !start.ready.load(std::memory_order_acquire)) continue;
+    start.due = true;
+    if (start.trial && !slot.forgotten && law_trials_.size() < law_trials_.capacity()) {
+      law_trials_.push_back(*start.trial);
+    }
   }
-  bool another = law_.weigh(law_trials_);
+}
+
+// The clock under the law that what has been seen is in favour of.
+CardiacClock Mapper::find_law(const CardiacClock& clock, Instant capture) noexcept {
+  const LawBelief before = law_.belief();
+  bool another = false;
+  // Not while the images carry the phase on: by the law that it was told by when they began.
+  if (law_trials_.size() >= LawChoice::kFewestTrials && clock.at(capture).state == PhaseState::kLocked) {
+    another = law_.weigh(law_trials_);
+    law_trials_.clear();
+  }
   if (clock.beats() != beats_) another = law_.on_beat(clock) || another;
   if (another) {
     for (FeatureGroup& group : groups_) group.doubt();
@@ -267,6 +279,7 @@ void Mapper::forget() noexcept {
   breath_begun_ = false;
   cycle_ = CyclePosterior(settings_.image_alone);
   law_ = LawChoice();
+  law_trials_.clear();
   finder_.discard_round();
   publish_nothing();
   counters_.maps_forgotten.add();

@@ -87,7 +87,8 @@ class Mapper {
   void advance_slot(FeatureGroup& group, std::size_t lane, int worker) noexcept;
   void finish_learning() noexcept;
   void shed_load(bool put_off) noexcept;
-  [[nodiscard]] CardiacClock find_law(const CardiacClock& clock) noexcept;
+  void take_starts() noexcept;
+  [[nodiscard]] CardiacClock find_law(const CardiacClock& clock, Instant capture) noexcept;
   void expect_displacement(FrameRecord& frame) const noexcept;
   void settle_phases(const FrameRecord& frame) noexcept;
   void settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept;
@@ -135,7 +136,7 @@ class Mapper {
   NeighbourMotion motion_;
   CyclePosterior cycle_;
   LawChoice law_;
-  std::vector<LawTrial> law_trials_;
+  std::vector<LawTrial> law_trials_;  // until there are enough
   FrameJob job_;
   std::vector<WorkerTally> tallies_;
   std::vector<Vector2d> occupied_;

@@ -1,5 +1,6 @@
 #include "core/pipeline/try_laws.hpp"
 
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -9,14 +10,15 @@
 namespace perimap {
 namespace {
 
-// `observation` as the law has it.
+// `observation` as the law has it. Its phase is taken for as uncertain as both R peaks are, whatever the law makes of
+// them, so that none gains by being less sure.
 void retell(Observation& observation, const ObservedCycle& observed, const PhaseLawSettings& law, Instant capture,
             const BasisLayout& layout) {
   const CardiacCycle& cycle = observed.cycle;
   const CyclePhase phase = phase_in_cycle(law, Seconds(capture - cycle.begin), cycle.length, cycle.previous_length);
+  const double deviation_s = std::hypot(to_seconds(cycle.begin_deviation), to_seconds(cycle.length_deviation));
   observation.b = basis_at(layout, phase.phase_rad, observed.respiration);
-  observation.b_deviation =
-      basis_rate(layout, phase.phase_rad) * (phase.rate_rad_per_s * timing_deviation_s(cycle, phase));
+  observation.b_deviation = basis_rate(layout, phase.phase_rad) * (phase.rate_rad_per_s * deviation_s);
 }
 
 }  // namespace
@@ -24,6 +26,9 @@ void retell(Observation& observation, const ObservedCycle& observed, const Phase
 std::optional<LawTrial> try_laws(const BatchStartExchange& start, const PixelModel& model, const BasisLayout& layout,
                                  const Prior& prior, const BatchSettings& settings) {
   const std::span<const Observation> told(start.observations.data(), static_cast<std::size_t>(start.count));
+  for (std::size_t k = 0; k < told.size(); ++k) {
+    if (start.cycles[k].respiration.deviation_mm > 0.0) return std::nullopt;
+  }
   BatchSettings from_outcome = settings;
   if (start.outcome.ok()) {
     // The depth hardly depends on the law.

@@ -203,7 +203,7 @@ class Learner {
       slot.start.count = static_cast<int>(used);
       slot.start.outcome = theirs.start.outcome;
       slot.start.adopt_at_frame = theirs.start.adopt_at_frame;
-      slot.start.ready = true;
+      slot.start.due = true;
       slot.state = SlotState::kStarting;
     }
   }
@@ -239,7 +239,7 @@ class Learner {
                                                     static_cast<std::size_t>(slot.start.count));
     const EstimatorSettings& estimator = settings_.estimator;
     slot.start.outcome = batch_start(observations, model_, estimator.layout, estimator.prior, estimator.batch);
-    slot.start.ready = true;
+    slot.start.due = true;
   }
 
   const PipelineSettings& settings_;

@@ -127,13 +127,13 @@ TEST(BatchStart, IsContradictedByObservationsThatNoPeriodicMotionExplains) {
     SimulatedFeature feature = simulate_feature(kPixelModel, kLayout, Prior{}, kStart, kPixelDeviation, 0.0, generator);
     const BatchOutcome good = batch_start(feature.observations, kPixelModel, kLayout, Prior{});
     ASSERT_TRUE(good.ok());
-    EXPECT_FALSE(good.contradicted()) << good.misfit();
-    sum += good.misfit();
+    EXPECT_FALSE(good.contradicted()) << good.misfit;
+    sum += good.misfit;
     // The phases of a clock that takes every second beat for none.
     for (std::size_t k = 0; k < feature.observations.size(); ++k)
       feature.observations[k].b = basis_at(kLayout, 3.67 * static_cast<double>(k) / 30.0);
     const BatchOutcome wrong = batch_start(feature.observations, kPixelModel, kLayout, Prior{});
-    EXPECT_TRUE(wrong.contradicted()) << wrong.misfit();
+    EXPECT_TRUE(wrong.contradicted()) << wrong.misfit;
   }
   EXPECT_GT(sum / kFeatures, 0.5);
   EXPECT_LT(sum / kFeatures, 1.1);

@@ -101,6 +101,24 @@ TEST_F(Cycle, TheBeginningMovesTheWarpedSystoleWithIt) {
   EXPECT_NEAR((told.phase_rad - truth(asked).phase_rad) / told.rate_rad_per_s, 0.0, 1e-3);
 }
 
+TEST_F(Cycle, WhatWasObservedIsWeighedAnewUnderALawThatIsTakenMeanwhile) {
+  const CardiacClock linear = tracker.clock();
+  const CardiacClock warped = linear.with_law({.settings = {.law = PhaseLaw::kWarped}, .probabilities = {}});
+  CyclePosterior always;
+  const Instant taken = begin + milliseconds(400);
+  for (Instant t = begin + milliseconds(20); t < taken + milliseconds(100); t += milliseconds(33)) {
+    const CyclePhase phase = phase_in_cycle(warped.law(), t - begin, length, linear.last_rr());
+    const ObservedPhase seen{t, phase.phase_rad, phase.rate_rad_per_s * kDeviation_s};
+    always.follow(warped, t);
+    always.add(seen);
+    posterior.follow(t < taken ? linear : warped, t);
+    posterior.add(seen);
+  }
+  EXPECT_GT(always.correction().beats, 0U);
+  EXPECT_EQ(posterior.correction().begin, always.correction().begin);
+  EXPECT_EQ(posterior.correction().length, always.correction().length);
+}
+
 TEST_F(Cycle, AWrongObservationOfFiveDoesNotMoveIt) {
   int k = 0;
   for (Duration s = milliseconds(20); s <= milliseconds(600); s += milliseconds(33)) {

@@ -176,7 +176,7 @@ TEST_F(Stages, AnAdoptedFeatureWasLastObservedWhenItsStartsLastMatchWas) {
   slot->start.outcome.status = BatchStatus::kOk;
   slot->start.outcome.estimate =
       prior_estimate(settings.estimator.layout, settings.estimator.prior, Vector3d(0, 0, 100));
-  slot->start.ready.store(true);
+  slot->start.due = true;
   while (slot->state == SlotState::kStarting) {
     next_frame();
     ASSERT_EQ(learn_frame(), LifeEvent::kNone);
@@ -199,7 +199,7 @@ TEST_F(Stages, AStartUnderALawThatHasGivenWayIsSolvedOnceMore) {
   const Observation linear = slot->start.observations[5];
   slot->start.outcome.status = BatchStatus::kOk;
   slot->start.outcome.estimate = still_feature();
-  slot->start.ready.store(true);
+  slot->start.due = true;
   job.law = LawBelief{.settings = {.law = PhaseLaw::kTimeLocked}};
   history->retell_phases(clock.clock().with_law(job.law));
   do {
@@ -208,7 +208,7 @@ TEST_F(Stages, AStartUnderALawThatHasGivenWayIsSolvedOnceMore) {
   } while (event == LifeEvent::kNone);
   EXPECT_EQ(event, LifeEvent::kStartRequested);
   EXPECT_EQ(slot->state, SlotState::kStarting);
-  EXPECT_FALSE(slot->start.ready.load());
+  EXPECT_FALSE(slot->start.due);
   EXPECT_EQ(slot->start.law.laws(), job.law.laws());
   EXPECT_EQ(slot->start.adopt_at_frame, job.frame->index + static_cast<std::uint64_t>(settings.adoption_delay_frames));
   EXPECT_EQ(slot->start.observations[5].z, linear.z);
@@ -217,7 +217,7 @@ TEST_F(Stages, AStartUnderALawThatHasGivenWayIsSolvedOnceMore) {
   EXPECT_GT((slot->start.observations[5].b - linear.b).norm(), 0.01);
   EXPECT_EQ(slot->start.observations[5].b, basis_at(settings.estimator.layout, told_rad, {}));
 
-  slot->start.ready.store(true);
+  slot->start.due = true;
   while (slot->state == SlotState::kStarting) {
     next_frame();
     ASSERT_EQ(learn_frame(), LifeEvent::kNone);
@@ -234,9 +234,8 @@ TEST_F(Stages, AStartThatItsObservationsContradictIsAdoptedAsUncertain) {
     slot->start.adopt_at_frame = 0;
     slot->start.outcome.status = BatchStatus::kOk;
     slot->start.outcome.estimate = still_feature();
-    slot->start.outcome.weights.assign(60, 1.0);
-    slot->start.outcome.robust_cost = misfit * 60.0 * kMeanStudentLoss;
-    slot->start.ready.store(true);
+    slot->start.outcome.misfit = misfit;
+    slot->start.due = true;
     next_frame();
     EXPECT_EQ(learn_frame(), LifeEvent::kNone);
     EXPECT_EQ(slot->state, SlotState::kMapped);
@@ -258,7 +257,7 @@ TEST_F(Stages, ALateStartIsToldOnceAndAdoptedWhenItComes) {
   EXPECT_EQ(learn_frame(), LifeEvent::kAdoptionLate);
   next_frame();
   EXPECT_EQ(learn_frame(), LifeEvent::kNone);
-  slot->start.ready.store(true);
+  slot->start.due = true;
   next_frame();
   EXPECT_EQ(learn_frame(), LifeEvent::kStartFailed);
   EXPECT_EQ(slot->state, SlotState::kTracked) << "a failed start tries again";
@@ -271,7 +270,7 @@ TEST_F(Stages, AFeatureWhoseStartsFailIsGivenUpForThat) {
     slot->start.adopt_at_frame = 0;
     slot->start.count = 0;
     slot->start.outcome.status = BatchStatus::kTooManyOutliers;
-    slot->start.ready.store(true);
+    slot->start.due = true;
     next_frame();
     event = learn_frame();
     ASSERT_TRUE(event == LifeEvent::kStartFailed || event == LifeEvent::kLostUnstarted);
@@ -285,7 +284,7 @@ TEST_F(Stages, AFeatureThatIsForgottenWhileItStartsIsNotLost) {
   slot->state = SlotState::kStarting;
   slot->forgotten = true;
   slot->start.adopt_at_frame = 0;
-  slot->start.ready.store(true);
+  slot->start.due = true;
   next_frame();
   EXPECT_EQ(learn_frame(), LifeEvent::kNone);
   EXPECT_EQ(slot->state, SlotState::kEmpty);
@@ -661,6 +660,7 @@ TEST_F(SlowPoseError, OfTheBatchStartIsCountedToo) {
     if (learn_frame() == LifeEvent::kStartRequested) {
       starter.request(0, 0);
       starter.wait_until_done();
+      slot->start.due = slot->start.ready.load();
     }
   }
   starter.dismiss();
