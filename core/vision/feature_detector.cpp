@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/vision/image_noise.hpp"
+#include "core/vision/opencv_threads.hpp"
 #include "core/vision/widened_mask.hpp"
 
 namespace perimap {
@@ -231,7 +232,7 @@ Expected<std::vector<Vector2d>> find_features(const GreyImage& image, std::span<
   };
   const bool bars = barred.data != nullptr && barred.width == image.width && barred.height == image.height;
   try {
-    cv::setNumThreads(1);  // the process has the threads it made itself, and no others
+    keep_opencv_to_one_thread();
     const Vector2d origin(0, first);
     std::vector<Vector2d> taken(occupied.begin(), occupied.end());
     for (Vector2d& px : taken) px -= origin;

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
+#include "core/vision/opencv_threads.hpp"
 #include "core/vision/widened_mask.hpp"
 
 namespace perimap {
@@ -56,7 +57,7 @@ Expected<std::vector<std::uint8_t>> find_instruments(const ColourImage& image, i
                 " with stride " + std::to_string(image.stride) + " cannot be read");
   }
   try {
-    cv::setNumThreads(1);  // the process has the threads it made itself, and no others
+    keep_opencv_to_one_thread();
     // OpenCV takes no const data; find() only reads it.
     return find(cv::Mat(image.height, image.width, CV_8UC3, const_cast<std::uint8_t*>(image.bgr),
                         static_cast<std::size_t>(image.stride)),

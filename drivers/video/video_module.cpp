@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/vision/opencv_threads.hpp"
 #include "drivers/video/video_file.hpp"
 
 namespace perimap {
@@ -216,6 +217,7 @@ Expected<std::unique_ptr<VideoWriter>> create(const std::string& path, int width
 
 const perimap::VideoModule* perimap_video_module() {
   static constexpr perimap::VideoModule kModule{&perimap::open, &perimap::create};
+  perimap::keep_opencv_to_one_thread();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said here
   return &kModule;
 }

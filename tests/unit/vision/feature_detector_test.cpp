@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <thread>
 #include <tuple>
+#include <vector>
 
 #include "tests/unit/vision/synthetic_scene.hpp"
 
@@ -101,6 +104,25 @@ TEST(FeatureDetector, FindsNothingOnFlatOrBlackFrames) {
 TEST(FeatureDetector, GivesTheSameListEachTime) {
   const ImageBuffer image = textured();
   EXPECT_EQ(found_in(image, {}, 40), found_in(image, {}, 40));
+}
+
+TEST(FeatureDetector, WorksInSeveralThreadsOfAProcessAtOnce) {
+  // A small picture, so that the threads meet in what surrounds the search.
+  std::mt19937 random(2);
+  const ImageBuffer image = render(Texture(3), View{}, 64, 48, 2, random, 5);
+  constexpr int kThreads = 4, kEach = 2000;
+  std::array<std::vector<std::vector<Vector2d>>, kThreads> found;
+  std::vector<std::thread> threads;
+  for (auto& of_thread : found) {
+    threads.emplace_back([&] {
+      for (int i = 0; i < kEach; ++i) of_thread.push_back(found_in(image, {}, 20));
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& of_thread : found) {
+    ASSERT_EQ(of_thread.size(), static_cast<std::size_t>(kEach));
+    for (const auto& list : of_thread) ASSERT_EQ(list, found[0][0]);
+  }
 }
 
 TEST(FeatureDetector, FindsInEachBandOfRowsWhatItFindsInTheWholePicture) {
