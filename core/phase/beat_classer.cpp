@@ -6,8 +6,13 @@
 namespace perimap {
 namespace {
 
-constexpr double kUsual = 0.9;     // correlation with the usual shape from which on a beat is of it
-constexpr double kStranger = 1.5;  // times the usual beats' strangeness: a premature beat is ventricular
+constexpr double kUsual = 0.9;         // correlation with the usual shape from which on a beat is of it
+constexpr double kOfItsOwn = 0.2;      // 1 - correlation with the usual shape: no usual beat that noise has bent
+constexpr double kMostUnusual = 0.43;  // of the beats: beyond, neither of two shapes is the usual one
+constexpr double kWider = 0.8;         // a ventricular complex's sharpness, of the usual one's
+constexpr double kShareMemory = 32.0;  // beats
+constexpr int kConductionChanged = 4;  // beats in a row
+constexpr double kStranger = 1.5;      // times the usual beats' strangeness: a premature beat is ventricular
 constexpr double kSlight = 0.01;
 constexpr double kStrangenessMemory = 16.0;  // beats
 constexpr int kDisplaced = 4;                // steps, 20 ms
@@ -19,6 +24,18 @@ constexpr double kPause = 1.5;               // rhythm's cycles
 constexpr double kGap = 4.0;                 // beyond, beats were missed
 constexpr double kLongest = 1.35;            // cycles
 
+// How fast the slope changes beside how large it is: the less, the wider the complex. 0 for a shape of no points.
+double sharpness(const QrsShape& shape) noexcept {
+  double change = 0.0;
+  double size = 0.0;
+  for (int i = 1; i < shape.points; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    change += std::abs(shape.slope[k] - shape.slope[k - 1]);
+    size += std::abs(shape.slope[k]);
+  }
+  return size > 0.0 ? change / size : 0.0;
+}
+
 }  // namespace
 
 // 1 - correlation with the usual shape; 0 while there is none.
@@ -26,6 +43,14 @@ double BeatClasser::strangeness(const QrsShape& shape) const noexcept {
   const int usual = templates_.heaviest();
   if (usual < 0 || !templates_.usable(usual) || shape.points == 0) return 0.0;
   return 1.0 - templates_.best_match_with(usual, shape, kDisplaced).correlation;
+}
+
+bool BeatClasser::recurs_beside_the_usual(const QrsShape& shape) const noexcept {
+  for (int i = 0; i < ShapeTemplates::kTemplates; ++i) {
+    if (i == templates_.heaviest() || !templates_.usable(i)) continue;
+    if (templates_.best_match_with(i, shape, kDisplaced).correlation > kUsual) return true;
+  }
+  return false;
 }
 
 BeatClass BeatClasser::by_interval(const RPeak& peak, bool unusual) const noexcept {
@@ -59,6 +84,11 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
   const double strange = strangeness(peak.shape);
   const bool unusual = strange > 1.0 - kUsual;
   peak.beat_class = by_interval(peak, unusual);
+  const bool ventricular_on_time = peak.beat_class == BeatClass::kNormal && strange > kOfItsOwn &&
+                                   unusual_share_ < kMostUnusual && sharpness(peak.shape) < kWider * usual_sharpness_ &&
+                                   recurs_beside_the_usual(peak.shape);
+  on_time_in_another_shape_ = ventricular_on_time ? std::min(on_time_in_another_shape_ + 1, kConductionChanged + 1) : 0;
+  if (ventricular_on_time && on_time_in_another_shape_ <= kConductionChanged) peak.beat_class = BeatClass::kPremature;
   if (unusual && peak.confidence < kDoubtful && !is_due(peak)) peak.beat_class = BeatClass::kNoise;
   peak.unusual_shape =
       unusual || (peak.beat_class == BeatClass::kPremature && strange > kStranger * strangeness_ + kSlight);
@@ -67,6 +97,8 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
   templates_.learn(peak.shape, true);
   if (has_last_) learn(peak, unusual);
   last_unusual_ = peak.unusual_shape;
+  if (!unusual) usual_sharpness_ += (sharpness(peak.shape) - usual_sharpness_) / kShareMemory;
+  unusual_share_ += ((unusual ? 1.0 : 0.0) - unusual_share_) / kShareMemory;
   if (peak.beat_class == BeatClass::kNormal) strangeness_ += (strange - strangeness_) / kStrangenessMemory;
   last_ = peak.time;
   last_class_ = peak.beat_class;

@@ -10,7 +10,7 @@ namespace perimap {
 
 enum class BeatClass : std::uint8_t {
   kNormal,
-  kPremature,  // early, and of another shape (ventricular) or of the same (atrial)
+  kPremature,  // early, and of another shape (ventricular) or of the same (atrial); or ventricular and on time
   kPause,      // later than the rhythm allows: after it the cycle is no guide to the next
   kNoise       // the detection is thought false: no beat
 };

@@ -38,6 +38,15 @@ class Classed : public testing::Test {
     for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(800 + 10 * (i % 3)), BeatClass::kNormal);
   }
 
+  // Early ones, every fifth beat.
+  void ventricular_beats() {
+    for (int i = 0; i < 6; ++i) {
+      EXPECT_EQ(beat(550, 0.4), BeatClass::kPremature);
+      EXPECT_EQ(beat(1050), BeatClass::kNormal);
+      for (int k = 0; k < 3; ++k) EXPECT_EQ(beat(805), BeatClass::kNormal);
+    }
+  }
+
   Instant t_ = from_ns(1'000'000'000);
   BeatClasser classer_;
   RPeak last_;
@@ -57,6 +66,23 @@ TEST_F(Classed, BigeminyStaysBigeminy) {
     EXPECT_EQ(beat(550, 0.4), BeatClass::kPremature) << i;
     EXPECT_EQ(beat(1050), BeatClass::kNormal) << i;
   }
+}
+
+TEST_F(Classed, VentricularBeatThatComesOnTimeIsNoneTheLessOne) {
+  settle();
+  EXPECT_EQ(beat(810, 0.4), BeatClass::kNormal) << "a shape never seen before may be noise";
+  settle();
+  ventricular_beats();
+  EXPECT_EQ(beat(810, 0.4), BeatClass::kPremature);
+  EXPECT_TRUE(last_.unusual_shape);
+  EXPECT_EQ(beat(810), BeatClass::kNormal);
+}
+
+TEST_F(Classed, ConductionThatHasChangedIsNormalFromItsFifthBeatOn) {
+  settle();
+  ventricular_beats();
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(beat(800, 0.4), BeatClass::kPremature) << i;
+  for (int i = 0; i < 40; ++i) EXPECT_EQ(beat(800 + 10 * (i % 3), 0.4), BeatClass::kNormal) << i;
 }
 
 TEST_F(Classed, InterpolatedBeatDoesNotMakeTheNextPremature) {
