@@ -197,7 +197,7 @@ bool LawChoice::choose() noexcept {
   return true;
 }
 
-// Any law is as likely as another beforehand, and until as many cycles have been weighed as a choice takes.
+// Any law is as likely as another beforehand.
 void LawChoice::believe() noexcept {
   const std::array<double, kLaws> likelihoods = evidence();
   const double largest = *std::max_element(likelihoods.begin(), likelihoods.end());

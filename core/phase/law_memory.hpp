@@ -11,9 +11,9 @@ namespace perimap {
 struct LawMemory {
   PhaseLaw law = PhaseLaw::kLinear;
   Seconds usual{0.0};   // length of the cycle in which the laws are even; 0: nothing was weighed
-  double cycles = 0.0;  // weighed, older ones faded, here and below
+  double cycles = 0.0;  // weighed, older ones faded, here and in the squares
   std::array<double, kPhaseLaws.size()> squares{};
-  std::array<double, kPhaseLaws.size()> log_likelihoods{};
+  std::array<double, kPhaseLaws.size()> log_likelihoods{};  // of all that was weighed, trials too
 };
 
 }  // namespace perimap

@@ -46,7 +46,7 @@ Session session_with(const Change& change, Duration changed_for) {
   scene.duration = kChangedAfter + changed_for + std::chrono::seconds(2);
   const Simulation simulation = test::simulation_of(scene);
   PipelineSettings settings = test::settings_for(simulation, {});
-  // The law is known: within the scene's seconds the images could not tell, and no surface would be good.
+  // The law is known, so that no surface is degraded for its sake.
   settings.law_from_image = false;
   Pipeline pipeline(settings);
   CollectedSurfaces collected;

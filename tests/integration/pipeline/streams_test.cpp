@@ -33,7 +33,7 @@ constexpr Duration kPeriod = milliseconds(4);
 ReplaySetup setup() {
   auto made = prepare_replay(PERIMAP_TEST_RECORDING, std::nullopt, ReadMode::kStrict);
   if (!made) throw std::runtime_error(made.error().error.message);
-  // The law is known: within the recording's seconds the images could not tell, and no surface would be good.
+  // The law is known, so that no surface is degraded for its sake.
   made->pipeline.law_from_image = false;
   return std::move(*made);
 }
