@@ -40,9 +40,15 @@ class RespiratoryClock {
   double slope_mm_per_rad = 0.0;         // RMS over a breath and the axes of d displacement / d phase
   double unknown_displacement_mm = 0.0;  // per axis, while searching or suspected
   bool suspected = false;                // while off: the surface moves as by breathing
+  bool corrected = false;                // the images have corrected it for half a breath, by a map that had learnt one
 
   // There is breathing, or may be, and its phase is not known.
   [[nodiscard]] bool unknown() const noexcept { return state == RespirationState::kSearching || suspected; }
+
+  // What is displayed by it is not to be called good.
+  [[nodiscard]] bool doubtful() const noexcept {
+    return unknown() || (state == RespirationState::kLocked && !corrected);
+  }
 
   [[nodiscard]] RespiratoryPhase at(Instant t) const noexcept {
     RespiratoryPhase phase;

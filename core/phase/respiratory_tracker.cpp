@@ -99,7 +99,7 @@ void RespiratoryTracker::search(Instant now) noexcept {
   clock_.slope_mm_per_rad = wave_.slope_mm_per_rad() / std::numbers::sqrt3;
   last_agreed_ = last_told_ = now;
   ++locks_;
-  if (!breath_learnt_) first_breath_ends_ = now + clock_.period();
+  if (!clock_.corrected) first_breath_ends_ = now + clock_.period();
   candidate_period_s_ = 0.0;
   search_.clear();
 }
@@ -178,13 +178,14 @@ void RespiratoryTracker::recall(const RespirationMemory& memory, Instant now) no
   }
   if (!memory.found) return;
   locks_ = 1;
-  breath_learnt_ = true;
+  clock_.corrected = true;
   wave_ = memory.wave;
   offset_known_ = memory.offset_known;
   offset_rad_ = memory.offset_rad;
   if (memory.clock.state != RespirationState::kLocked) return;
   const double unknown_displacement_mm = clock_.unknown_displacement_mm;
   clock_ = memory.clock;
+  clock_.corrected = true;
   clock_.source = RespirationSource::kImage;
   clock_.slope_mm_per_rad = wave_.slope_mm_per_rad() / std::numbers::sqrt3;
   clock_.unknown_displacement_mm = unknown_displacement_mm;
@@ -196,9 +197,8 @@ void RespiratoryTracker::recall(const RespirationMemory& memory, Instant now) no
 
 void RespiratoryTracker::add_phase(Instant t, double phase_rad, double deviation_rad) noexcept {
   if (clock_.state != RespirationState::kLocked) return;
-  const bool learnt = t >= first_breath_ends_;
-  breath_learnt_ = breath_learnt_ || learnt;
-  hear(t, phase_rad, deviation_rad, learnt);
+  if (t >= first_breath_ends_ + clock_.period() / 2) clock_.corrected = true;
+  hear(t, phase_rad, deviation_rad, clock_.corrected || t >= first_breath_ends_);
 }
 
 void RespiratoryTracker::hear(Instant t, double phase_rad, double deviation_rad, bool corrects) noexcept {

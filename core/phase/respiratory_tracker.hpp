@@ -22,7 +22,8 @@ struct RespirationSettings {
 
 // Once locked, the clock is a Kalman filter of phase and rate. Both may wander: a ventilator's rate hardly does, a
 // patient's own breath by some percent. Until a whole breath has been learnt the map learns by this very clock, and
-// what the images show by that map would only confirm it: they may contradict it, but do not correct it. When they
+// what the images show by that map would only confirm it: they may contradict it, but do not correct it. Half a breath
+// later they have corrected the rate, and with it what the phase was before. When they
 // contradict it for kContradictedBeforeSearch, or tell nothing for kSilentBeforeSearch, the search begins again; the
 // phase found then is counted as before, by the wave's shape.
 //
@@ -83,7 +84,6 @@ class RespiratoryTracker {
   Instant last_agreed_;
   Instant last_told_;
   Instant first_breath_ends_;
-  bool breath_learnt_ = false;  // by the map, with a clock that was locked all the while
   int locks_ = 0;
   int in_a_row_ = 0;                 // searches that found what looks like breathing, while off
   double candidate_period_s_ = 0.0;  // of persists(); 0: none

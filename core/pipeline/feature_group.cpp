@@ -19,6 +19,9 @@ constexpr int kRefusalsBeforeRelock = 10;
 // learnt while the phase was not known.
 constexpr double kBreathDeviation_mm = 2.0;
 constexpr double kBreathMeanDeviation_mm = 1.5;
+// What a period that is off by half a percent makes of the first breath that is learnt by it. So much of what was
+// learnt is forgotten that it hardly counts beside the same matches, learnt once more.
+constexpr double kFirstBreath_mm = 0.4;
 static_assert(kBreathHarmonics == kMaxRespiratoryHarmonics);
 constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::max();
 
@@ -45,6 +48,13 @@ void drop_what_can_not_be_learnt(FeatureSlot& slot, const FrameHistory& history)
     if (frame != nullptr && frame->measurable && (!frame->phase.exact || frame->phase.teaches)) return;
     slot.held.drop(1);
   }
+}
+
+// Not where the poses' errors have much in common: that is followed in order of time.
+bool take_back(FeatureSlot& slot) noexcept {
+  if (slot.slow_error != nullptr) return false;
+  slot.held.take_back();
+  return true;
 }
 
 void count_update(FeatureSlot& slot, bool accepted) noexcept {
@@ -133,7 +143,9 @@ void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double
 
 void FeatureGroup::begin_breath(const BreathWave& wave) noexcept {
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
-    if (slots_[lane].state == SlotState::kMapped) begin_breath(lane, wave);
+    if (slots_[lane].state != SlotState::kMapped) continue;
+    begin_breath(lane, wave);
+    take_back(slots_[lane]);
   }
 }
 
@@ -157,6 +169,13 @@ void FeatureGroup::begin_breath(std::size_t lane, const BreathWave& wave) noexce
     }
   }
   bank_.set(feature(lane), estimate);
+}
+
+void FeatureGroup::learn_again() noexcept {
+  for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
+    FeatureSlot& slot = slots_[lane];
+    if (slot.state == SlotState::kMapped && take_back(slot)) bank_.diffuse(feature(lane), kFirstBreath_mm);
+  }
 }
 
 void FeatureGroup::doubt() noexcept {

@@ -82,11 +82,14 @@ class Step {
       return now() == slot_.start.adopt_at_frame ? LifeEvent::kAdoptionLate : LifeEvent::kNone;
     }
     if (slot_.forgotten) return give_up(LifeEvent::kNone);
-    // By a law that has been taken since, or that is certain now, the same matches tell more.
+    // By a law that has been taken since, or that is certain now, the same matches tell more; and by breathing that has
+    // been found.
     const BelievedLaws before = slot_.start.law.laws();
     const BelievedLaws now_believed = job_.law.laws();
-    const bool told_more = before.told != now_believed.told || (before.undecided() && !now_believed.undecided());
-    if (told_more && job_.history->find(slot_.held[0].frame_index) != nullptr) return request_start();
+    const bool law_told = before.told != now_believed.told || (before.undecided() && !now_believed.undecided());
+    const FrameRecord* first = job_.history->find(slot_.held[0].frame_index);
+    const bool breath_told = first != nullptr && first->respiration.known && !slot_.start.cycles[0].respiration.known;
+    if (first != nullptr && (law_told || breath_told)) return request_start();
     const auto used = static_cast<std::uint32_t>(slot_.start.count);
     if (!slot_.start.outcome.ok()) {
       if (++slot_.failed_starts >= kFailedStartsBeforeLost) return give_up(LifeEvent::kLostUnstarted);

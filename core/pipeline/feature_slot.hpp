@@ -57,6 +57,11 @@ class HeldMatches {
     matches_[head_++ % kCapacity] = match;
   }
   void drop(std::uint32_t n) noexcept { tail_ += n < size() ? n : size(); }
+  // All that was dropped is held again, as far back as it has not been written over.
+  void take_back() noexcept {
+    const auto frame = [this](std::uint32_t i) { return matches_[i % kCapacity].frame_index; };
+    while (tail_ > 0 && size() < kCapacity && (size() == 0 || frame(tail_ - 1) < frame(tail_))) --tail_;
+  }
   template <class Condition>
   void drop_if(Condition condition) noexcept {
     std::uint32_t kept = tail_;

@@ -60,9 +60,7 @@ class FrameHistory {
 
   // Fills phases and basis of a record, whose pose is set, from the clocks. The basis is computed here, once a frame.
   void set_phase(FrameRecord& record, const CardiacClock& clock, const RespiratoryClock& respiration) noexcept {
-    record.respiration = respiration.at(record.stamp.capture);
-    record.pose.position_variance_mm2 =
-        record.tracker_variance_mm2 + record.respiration.deviation_mm * record.respiration.deviation_mm;
+    set_respiration(record, respiration);
     set_cardiac_phase(record, clock);
   }
 
@@ -76,6 +74,16 @@ class FrameHistory {
     }
   }
 
+  // After breathing has been found in them: what is known of it now counts for all frames.
+  void retell_respiration(const RespiratoryClock& respiration) noexcept {
+    const std::uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
+    for (std::uint64_t i = oldest; i < count_; ++i) {
+      FrameRecord& record = records_[i % kCapacity];
+      set_respiration(record, respiration);
+      record.b = basis_at(layout_, record.phase.phase_rad, record.respiration);
+    }
+  }
+
   // After another law has been taken: all frames of completed cycles, which nothing else changes any more.
   void retell_phases(const CardiacClock& clock) noexcept {
     const std::uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
@@ -86,6 +94,12 @@ class FrameHistory {
   }
 
  private:
+  static void set_respiration(FrameRecord& record, const RespiratoryClock& respiration) noexcept {
+    record.respiration = respiration.at(record.stamp.capture);
+    record.pose.position_variance_mm2 =
+        record.tracker_variance_mm2 + record.respiration.deviation_mm * record.respiration.deviation_mm;
+  }
+
   void set_cardiac_phase(FrameRecord& record, const CardiacClock& clock) const noexcept {
     record.phase = clock.at(record.stamp.capture);
     if (record.phase.exact) record.cycle = clock.cycle_at(record.stamp.capture);

@@ -73,15 +73,21 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
                      const CardiacClock& newest_clock) noexcept {
   const RealtimeScope realtime;
   finish_learning();
+  const Instant begun = MonotonicClock::now();
   CardiacClock ecg_clock = newest_clock.as_of(stamp.arrival);
   take_starts();
   if (settings_.law_from_image) ecg_clock = find_law(ecg_clock, stamp.capture);
   job_.law = ecg_clock.law_belief();
-  const Instant begun = MonotonicClock::now();
 
   if (respiration_.locks() == 1 && !breath_begun_) {
     breath_begun_ = true;
+    history_->retell_respiration(respiration_.clock());
     for (FeatureGroup& group : groups_) group.begin_breath(respiration_.wave());
+  }
+  if (respiration_.clock().corrected && !breath_corrected_) {
+    breath_corrected_ = true;
+    history_->retell_respiration(respiration_.clock());
+    for (FeatureGroup& group : groups_) group.learn_again();
   }
   if (ecg_clock.beats() != beats_) {
     history_->refresh_phases(ecg_clock, respiration_.clock());
@@ -277,6 +283,7 @@ void Mapper::forget() noexcept {
   respiration_ = RespiratoryTracker(settings_.respiration);
   displacement_seen_ = false;
   breath_begun_ = false;
+  breath_corrected_ = false;
   cycle_ = CyclePosterior(settings_.image_alone);
   law_ = LawChoice();
   law_trials_.clear();
@@ -288,6 +295,7 @@ void Mapper::forget() noexcept {
 void Mapper::recall(const MapMemory& memory, Instant now) {
   respiration_.recall(memory.respiration, now);
   breath_begun_ = respiration_.locks() > 0;
+  breath_corrected_ = respiration_.clock().corrected;
   if (settings_.law_from_image) law_.recall(memory.law);
   const double since_s = std::max(0.0, to_seconds(now - memory.last_capture));
   const std::uint32_t left_out = kIdsLeftOut + static_cast<std::uint32_t>(kIdsLeftOutPerSecond * since_s);

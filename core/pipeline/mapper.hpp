@@ -125,7 +125,8 @@ class Mapper {
   bool displacement_seen_ = false;
   Vector3d displacement_mm_ = Vector3d::Zero();  // of the surface from the map, as seen last
   Instant displacement_time_;
-  bool breath_begun_ = false;  // the features that were mapped when it was first found have it
+  bool breath_begun_ = false;      // the features that were mapped when it was first found have it
+  bool breath_corrected_ = false;  // and have learnt again what was seen before its rate was corrected
   std::unique_ptr<FrameHistory> history_;
   PatchTracker tracker_;
   MapBank bank_;

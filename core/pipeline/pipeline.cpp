@@ -161,7 +161,7 @@ std::span<const ShardSnapshot* const> Pipeline::model_snapshots() noexcept {
 
 SurfaceFooting Pipeline::model_footing(const RespiratoryClock& respiration, Instant now) const noexcept {
   SurfaceFooting footing = footing_of(model_view_);
-  footing.breath_unknown = respiration.unknown();
+  footing.breath_doubtful = respiration.doubtful();
   for (const ShardSnapshot* snapshot : model_view_) {
     footing.update_late =
         footing.update_late || !snapshot->any || snapshot->recalled || snapshot->frame_sequence < model_owes_;

@@ -88,7 +88,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   const bool late = behind && !missing;
   sample_.update_late = late;
   SurfaceFooting footing = footing_of(snapshots);
-  footing.breath_unknown = respiration.unknown();
+  footing.breath_doubtful = respiration.doubtful();
   footing.frame_missing = missing;
   footing.update_late = late;
   sample_.reason = reason_of(phase, clock.rhythm(), footing);

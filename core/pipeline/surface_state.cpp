@@ -20,7 +20,7 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (phase.state == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;
   if (phase.state == PhaseState::kLost) return SurfaceReason::kPhaseLost;
   if (!footing.mapped) return SurfaceReason::kNothingMapped;
-  if (footing.breath_unknown) return SurfaceReason::kRespirationUnknown;
+  if (footing.breath_doubtful) return SurfaceReason::kRespirationUnknown;
   if (phase.state == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
   if (phase.contradicted) return SurfaceReason::kPhaseContradicted;
   if (phase.state == PhaseState::kFromImage) return SurfaceReason::kPhaseFromImage;
@@ -51,7 +51,7 @@ SurfaceState state_of(SurfaceReason reason) noexcept {
 FeatureVerdict verdict_of(const FeatureVerdict& own, PhaseState phase, const SurfaceFooting& footing) noexcept {
   if (!usable(phase)) return {FeatureState::kInvalid, FeatureReason::kPhaseLost};
   FeatureVerdict verdict = own;
-  if (footing.breath_unknown && verdict.state == FeatureState::kConverged) {
+  if (footing.breath_doubtful && verdict.state == FeatureState::kConverged) {
     verdict = {FeatureState::kConverging, FeatureReason::kDeviationLarge};
   }
   if (verdict.reason == FeatureReason::kNone && (footing.frame_missing || footing.update_late)) {

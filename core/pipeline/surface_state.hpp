@@ -11,8 +11,8 @@ namespace perimap {
 
 // What a surface rests on beside the phase.
 struct SurfaceFooting {
-  bool breath_unknown = false;
-  bool mapped = false;  // there are features
+  bool breath_doubtful = false;  // RespiratoryClock::doubtful()
+  bool mapped = false;           // there are features
   bool frame_missing = false;
   bool update_late = false;
   bool pose_missing = false;

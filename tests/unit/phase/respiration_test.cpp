@@ -225,12 +225,16 @@ TEST_F(Tracking, AMapThatLearnsTheFirstBreathByTheClockDoesNotConfirmIt) {
     tracker.add_phase(at_s(now_s + since_s), phase + 0.1 + at_lock.rate_rad_per_s * since_s, 0.01);
   };
   for (double since_s = 0.0; since_s < period_s - 0.05; since_s += 0.04) show(since_s);
+  EXPECT_TRUE(tracker.clock().doubtful());
   EXPECT_EQ(tracker.clock().rate_rad_per_s, at_lock.rate_rad_per_s);
   EXPECT_GE(tracker.clock().rate_variance_rad2_per_s2, at_lock.rate_variance_rad2_per_s2);
   for (double since_s = period_s; since_s < period_s + 0.5; since_s += 0.04) show(since_s);
   const double error =
       std::remainder(tracker.clock().at(at_s(now_s)).phase_rad - at_lock.at(at_s(now_s)).phase_rad - 0.1, kTwoPi);
   EXPECT_LT(std::abs(error), 0.05) << "the second breath is told by what was learnt in the first";
+  EXPECT_TRUE(tracker.clock().doubtful()) << "corrected for less than half a breath";
+  for (double since_s = period_s + 0.5; since_s < 1.5 * period_s + 0.1; since_s += 0.04) show(since_s);
+  EXPECT_FALSE(tracker.clock().doubtful());
 }
 
 TEST_F(Tracking, AfterALossInTheFirstBreathTheNextOneIsTheFirst) {

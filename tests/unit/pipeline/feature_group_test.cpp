@@ -28,6 +28,7 @@ struct Stages : ::testing::Test {
   PipelineSettings settings;
   PixelModel model;
   CardiacClockTracker clock{{}};
+  RespiratoryClock respiration;
   std::unique_ptr<FrameHistory> history;
   std::vector<FeatureSlot> slots{2};
   FeatureSlot* slot = slots.data();
@@ -64,13 +65,13 @@ struct Stages : ::testing::Test {
     const auto n = static_cast<int>(history->count());
     const Instant capture(milliseconds(5000 + 33 * n));
     beat_until(5000 + 33 * n + beats_known_ahead_ms);
-    history->refresh_phases(clock.clock(), RespiratoryClock{});
+    history->refresh_phases(clock.clock(), respiration);
     FrameRecord& frame = history->append({static_cast<std::uint64_t>(n), capture, capture + milliseconds(12)});
     CameraPose pose;
     pose.state = CameraPose::State::kInterpolated;
     pose.position_variance_mm2 = pose_variance_mm2;
     FrameHistory::set_pose(frame, pose);
-    history->set_phase(frame, clock.clock(), RespiratoryClock{});
+    history->set_phase(frame, clock.clock(), respiration);
     job.frame = current = &frame;
     job.about_capture = bases_about(settings.estimator.layout, frame.phase, frame.respiration);
     job.history = history.get();
@@ -448,6 +449,138 @@ TEST_F(Stages, AFeatureRefusedTenTimesLetsGoOfItsPatchAndIsStillGivenUpWhenUnsee
     ASSERT_LT(++frames, 1000);
   } while (learn_frame() != LifeEvent::kLostUnseen);
   EXPECT_EQ(slot->state, SlotState::kEmpty);
+}
+
+// The surface breathes from left to right, by 1 mm and every 2 s; it is found after 3 s.
+struct Breathing : Stages {
+  Breathing() {
+    settings.estimator.layout.respiratory_harmonics = 2;
+    history = std::make_unique<FrameHistory>(settings.estimator.layout);
+    bank =
+        std::make_unique<MapBank>(BankSettings{.layout = settings.estimator.layout, .features = 2}, Precision::kDouble);
+    group = std::make_unique<FeatureGroup>(*bank, 0, slots);
+    respiration.state = RespirationState::kSearching;
+    respiration.unknown_displacement_mm = 5.0;
+  }
+
+  RespiratoryClock truth() const {
+    RespiratoryClock found = respiration;
+    found.state = RespirationState::kLocked;
+    found.time = Instant(milliseconds(5000));
+    found.rate_rad_per_s = std::numbers::pi;
+    return found;
+  }
+  void see() {
+    next_frame();
+    found_at({320.0 + 5.0 * std::cos(truth().at(job.frame->stamp.capture).phase_rad), 240.0});
+  }
+  void find_breathing() {
+    respiration = truth();
+    history->retell_respiration(respiration);
+    group->begin_breath(BreathWave{});
+  }
+  void map_and_see(int frames) {
+    map_feature();
+    for (int i = 0; i < frames; ++i) {
+      see();
+      ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+    }
+  }
+};
+
+TEST_F(Breathing, WhatWasSeenBeforeItWasFoundIsLearntOnceMore) {
+  map_and_see(90);
+  ASSERT_LT(slot->held.size(), 5U);
+  find_breathing();
+  ASSERT_EQ(slot->held.size(), 90U);
+  for (int i = 0; i < 40; ++i) {
+    next_frame();
+    ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+  }
+  EXPECT_EQ(slot->held.size(), 0U);
+  FeatureEstimate estimate;
+  bank->get(0, estimate);
+  const int first = 1 + 2 * settings.estimator.layout.cardiac_harmonics;
+  EXPECT_NEAR(estimate.x(first), 1.0, 0.02);
+  EXPECT_NEAR(estimate.x(first + settings.estimator.layout.respiratory_harmonics), 0.0, 0.02);
+}
+
+TEST_F(Breathing, WhatWasSeenBeforeItWasCorrectedIsLearntOnceMoreAndHardlyCountsTwice) {
+  const auto learn_what_is_held = [&] {
+    while (slot->held.size() > 0) {
+      next_frame();
+      ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+    }
+  };
+  const int a_1 = 1 + 2 * settings.estimator.layout.cardiac_harmonics;
+  const auto wave_and_deviation = [&] {
+    FeatureEstimate estimate;
+    bank->get(0, estimate);
+    return std::pair(estimate.x(a_1), std::sqrt(estimate.P(a_1, a_1)));
+  };
+  map_and_see(90);
+  respiration = truth();
+  respiration.rate_rad_per_s *= 1.1;  // a false one
+  history->retell_respiration(respiration);
+  group->begin_breath(BreathWave{});
+  learn_what_is_held();
+  const auto [wrong, deviation] = wave_and_deviation();
+  EXPECT_GT(std::abs(wrong - 1.0), 0.05);
+  respiration = truth();
+  history->retell_respiration(respiration);
+  group->learn_again();
+  ASSERT_EQ(slot->held.size(), 90U);
+  EXPECT_GT(wave_and_deviation().second, 10.0 * deviation);
+  learn_what_is_held();
+  const auto [right, deviation_after] = wave_and_deviation();
+  EXPECT_NEAR(right, 1.0, 0.01);
+  EXPECT_NEAR(deviation_after, deviation, 0.2 * deviation);
+}
+
+TEST_F(Breathing, WithASlowTrackerErrorNothingIsLearntOnceMore) {
+  slot->slow_error = std::make_unique<CorrelatedPoseNoise>(bank->layout().state_size(), 0.5);
+  map_and_see(90);
+  const std::uint32_t held = slot->held.size();
+  find_breathing();
+  FeatureEstimate begun;
+  bank->get(0, begun);
+  group->learn_again();
+  EXPECT_EQ(slot->held.size(), held);
+  FeatureEstimate estimate;
+  bank->get(0, estimate);
+  EXPECT_EQ(estimate.P, begun.P);
+}
+
+TEST_F(Breathing, AStartOfBeforeItWasFoundIsSolvedOnceMore) {
+  slot->state = SlotState::kTracked;
+  LifeEvent event = LifeEvent::kNone;
+  while (event == LifeEvent::kNone) {
+    see();
+    event = learn_frame();
+  }
+  ASSERT_EQ(event, LifeEvent::kStartRequested);
+  const Observation before = slot->start.observations[5];
+  find_breathing();
+  const auto finish_start = [&] {
+    slot->start.outcome.status = BatchStatus::kOk;
+    slot->start.outcome.estimate =
+        prior_estimate(settings.estimator.layout, settings.estimator.prior, Vector3d(0, 0, 100));
+    slot->start.due = true;
+    do {
+      next_frame();
+      event = learn_frame();
+    } while (event == LifeEvent::kNone && slot->state == SlotState::kStarting);
+  };
+  finish_start();
+  ASSERT_EQ(event, LifeEvent::kStartRequested);
+  const Observation& observation = slot->start.observations[5];
+  EXPECT_EQ(observation.z, before.z);
+  EXPECT_EQ(observation.b, history->find(5)->b);
+  EXPECT_GT((observation.b - before.b).norm(), 0.5);
+  EXPECT_LT(observation.R.trace(), 0.1 * before.R.trace());
+  finish_start();
+  EXPECT_EQ(event, LifeEvent::kNone);
+  EXPECT_EQ(slot->state, SlotState::kMapped);
 }
 
 TEST_F(Stages, NothingIsShownOfAFeatureBeforeItsStart) {

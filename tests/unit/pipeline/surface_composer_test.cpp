@@ -73,6 +73,7 @@ TEST(SurfaceComposer, BreathingIsPartOfPositionVelocityAndCovariance) {
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
   RespiratoryClock clock;
   clock.state = RespirationState::kLocked;
+  clock.corrected = true;
   clock.time = kRelease.deadline - milliseconds(500);
   clock.phase_rad = 0.2;
   clock.rate_rad_per_s = 1.5;
@@ -104,6 +105,23 @@ TEST(SurfaceComposer, WhileTheBreathIsNotKnownNothingIsCalledGood) {
     EXPECT_EQ(sample.features[0].state, FeatureState::kConverging);
     EXPECT_GT(sample.features[0].covariance_W_mm2(2, 2), 25.0);
   }
+}
+
+TEST(SurfaceComposer, NothingIsCalledGoodBeforeTheImagesHaveCorrectedTheBreath) {
+  SurfaceComposer composer(settings());
+  const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  RespiratoryClock clock;
+  clock.state = RespirationState::kLocked;
+  clock.time = kRelease.deadline;
+  clock.rate_rad_per_s = 1.5;
+  const auto states = [&] {
+    const SurfaceSample& sample = composer.compose(kRelease, steady_clock(), clock, view);
+    return std::pair(sample.reason, sample.features.at(0).state);
+  };
+  EXPECT_EQ(states(), std::pair(SurfaceReason::kRespirationUnknown, FeatureState::kConverging));
+  clock.corrected = true;
+  EXPECT_EQ(states(), std::pair(SurfaceReason::kNone, FeatureState::kConverged));
 }
 
 TEST(SurfaceComposer, EvaluatesPositionAndVelocityAtTheValidTimesPhase) {

@@ -44,6 +44,7 @@ CardiacClock clock_with(PhaseLaw law, double early_ms = 0.0) {
 RespiratoryClock breath_at(Instant now) {
   RespiratoryClock clock;
   clock.state = RespirationState::kLocked;
+  clock.corrected = true;
   clock.time = now - milliseconds(371);
   clock.phase_rad = 2.9;
   clock.rate_rad_per_s = 1.613;
@@ -195,7 +196,7 @@ TEST(Client, LeavesOutABreathThatIsNotKnown) {
   moment.moment().respiration = {};
   moment.moment().respiration.state = RespirationState::kSearching;
   moment.moment().respiration.unknown_displacement_mm = 5.0;
-  moment.moment().footing.breath_unknown = true;
+  moment.moment().footing.breath_doubtful = true;
   expect_equal_at_all_horizons(moment, 1e-9);
   const PredictedSurface surface = predicted(moment.model(), moment.now(), {.degraded = true});
   EXPECT_EQ(surface.reason, perimap_SURFACE_REASON_RESPIRATION_UNKNOWN);

@@ -1,0 +1,65 @@
+#include "core/pipeline/frame_history.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <numbers>
+
+#include "core/phase/cardiac_clock_tracker.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr double kTracker_mm2 = 0.04;
+
+// Ten frames from 3 s on, a beat every 800 ms, and breathing that is searched for.
+struct FramesBeforeBreathing : ::testing::Test {
+  BasisLayout layout{2, 2};
+  std::unique_ptr<FrameHistory> history = std::make_unique<FrameHistory>(layout);
+  CardiacClockTracker clock{{}};
+  RespiratoryClock searching;
+
+  FramesBeforeBreathing() {
+    searching.state = RespirationState::kSearching;
+    searching.unknown_displacement_mm = 5.0;
+    for (int ms = 1000; ms <= 5000; ms += 800) {
+      const Instant t{milliseconds(ms)};
+      clock.on_r_peak({t, t + milliseconds(60), 1.0, milliseconds(1)});
+    }
+    for (int i = 0; i < 10; ++i) {
+      const Instant capture{milliseconds(3000 + 33 * i)};
+      FrameRecord& frame = history->append({static_cast<std::uint64_t>(i), capture, capture + milliseconds(12)});
+      CameraPose pose;
+      pose.state = CameraPose::State::kInterpolated;
+      pose.position_variance_mm2 = kTracker_mm2;
+      FrameHistory::set_pose(frame, pose);
+      history->set_phase(frame, clock.clock(), searching);
+    }
+  }
+};
+
+TEST_F(FramesBeforeBreathing, HaveItsPhaseAndNoDisplacementMoreOnceItIsFound) {
+  ASSERT_NEAR(history->find(0)->pose.position_variance_mm2, kTracker_mm2 + 25.0, 1e-12);
+  ASSERT_FALSE(history->find(0)->respiration.known);
+  RespiratoryClock found = searching;
+  found.state = RespirationState::kLocked;
+  found.time = Instant(milliseconds(4000));
+  found.phase_rad = 0.5;
+  found.rate_rad_per_s = 2.0 * std::numbers::pi / 4.0;
+  found.phase_variance_rad2 = 0.01;
+  found.slope_mm_per_rad = 3.0;
+  history->retell_respiration(found);
+  for (std::uint64_t i = 0; i < history->count(); ++i) {
+    const FrameRecord& frame = *history->find(i);
+    EXPECT_TRUE(frame.phase.exact);
+    EXPECT_TRUE(frame.respiration.known);
+    EXPECT_NEAR(frame.pose.position_variance_mm2, kTracker_mm2 + 0.09, 1e-12);
+    const double breath_rad = 0.5 + found.rate_rad_per_s * (0.033 * static_cast<double>(i) - 1.0);
+    EXPECT_LT((frame.b - basis_at(layout, frame.phase.phase_rad, breath_rad)).norm(), 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace perimap
