@@ -27,6 +27,7 @@ constexpr double kPersistentDeviation_rad = 0.4;
 constexpr double kSamePeriod = 0.015;  // share
 constexpr Duration kPersists = std::chrono::seconds(10);
 constexpr Duration kSuspicionLasts = std::chrono::seconds(15);
+constexpr Duration kLongestTold = std::chrono::milliseconds(200);  // by one frame
 constexpr Duration kContradictedBeforeSearch = std::chrono::milliseconds(1500);
 constexpr Duration kSilentBeforeSearch = std::chrono::seconds(15);
 // Of a phase to go on from: beyond it the wave is no straight line, and the images may agree with a wrong phase.
@@ -99,7 +100,8 @@ void RespiratoryTracker::search(Instant now) noexcept {
   clock_.slope_mm_per_rad = wave_.slope_mm_per_rad() / std::numbers::sqrt3;
   last_agreed_ = last_told_ = now;
   ++locks_;
-  if (!clock_.corrected) first_breath_ends_ = now + clock_.period();
+  first_breath_ = clock_.period();
+  told_for_ = Duration(0);
   candidate_period_s_ = 0.0;
   search_.clear();
 }
@@ -170,6 +172,15 @@ bool RespiratoryTracker::rate_is_possible() const noexcept {
   return clock_.rate_rad_per_s < 1.5 * fastest && clock_.rate_rad_per_s > slowest / 1.5;
 }
 
+// A clock that was not corrected yet has taught the map nothing that could be gone on from as if it were true.
+RespirationMemory RespiratoryTracker::memory() const noexcept {
+  RespirationMemory memory{locks_ > 0, wave_, clock_, offset_known_, offset_rad_};
+  if (memory.clock.state == RespirationState::kLocked && !clock_.corrected) {
+    memory.clock.state = RespirationState::kSearching;
+  }
+  return memory;
+}
+
 void RespiratoryTracker::recall(const RespirationMemory& memory, Instant now) noexcept {
   last_agreed_ = last_told_ = now;
   if (!settings_.enabled) {
@@ -178,7 +189,6 @@ void RespiratoryTracker::recall(const RespirationMemory& memory, Instant now) no
   }
   if (!memory.found) return;
   locks_ = 1;
-  clock_.corrected = true;
   wave_ = memory.wave;
   offset_known_ = memory.offset_known;
   offset_rad_ = memory.offset_rad;
@@ -197,8 +207,11 @@ void RespiratoryTracker::recall(const RespirationMemory& memory, Instant now) no
 
 void RespiratoryTracker::add_phase(Instant t, double phase_rad, double deviation_rad) noexcept {
   if (clock_.state != RespirationState::kLocked) return;
-  if (t >= first_breath_ends_ + clock_.period() / 2) clock_.corrected = true;
-  hear(t, phase_rad, deviation_rad, clock_.corrected || t >= first_breath_ends_);
+  const Duration since = t - last_agreed_;
+  hear(t, phase_rad, deviation_rad, clock_.corrected || told_for_ >= first_breath_);
+  if (last_agreed_ != t || clock_.state != RespirationState::kLocked) return;
+  told_for_ += std::min(since, kLongestTold);
+  if (told_for_ >= first_breath_ + clock_.period() / 2) clock_.corrected = true;
 }
 
 void RespiratoryTracker::hear(Instant t, double phase_rad, double deviation_rad, bool corrects) noexcept {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 
 #include "core/phase/breath_detector.hpp"
 #include "core/phase/respiration_memory.hpp"
@@ -22,8 +23,8 @@ struct RespirationSettings {
 
 // Once locked, the clock is a Kalman filter of phase and rate. Both may wander: a ventilator's rate hardly does, a
 // patient's own breath by some percent. Until a whole breath has been learnt the map learns by this very clock, and
-// what the images show by that map would only confirm it: they may contradict it, but do not correct it. Half a breath
-// later they have corrected the rate, and with it what the phase was before. When they
+// what the images show by that map would only confirm it: they may contradict it, but do not correct it. When they have
+// corrected it for half a breath they have told the rate, and with it what the phase was before. When they
 // contradict it for kContradictedBeforeSearch, or tell nothing for kSilentBeforeSearch, the search begins again; the
 // phase found then is counted as before, by the wave's shape.
 //
@@ -46,13 +47,14 @@ class RespiratoryTracker {
   // Before each frame: what the respiration channel told until then.
   void follow(const BreathSignal& signal, Instant now) noexcept;
 
+  // After a lock: the map learns by this clock what it has seen already, and needs so long for it.
+  void map_catches_up_for(Duration time) noexcept { first_breath_ = std::max(clock_.period(), time); }
+
   // Looks for breathing in what was added; takes some milliseconds.
   void search(Instant now) noexcept;
 
   // What another tracker goes on from.
-  [[nodiscard]] RespirationMemory memory() const noexcept {
-    return {locks_ > 0, wave_, clock_, offset_known_, offset_rad_};
-  }
+  [[nodiscard]] RespirationMemory memory() const noexcept;
   // Before anything was added: goes on from what an earlier run knew, its phase carried on to `now` with the deviation
   // that it has got by then. Where that is too large, or the rate is none that is looked for, the phase is searched for
   // and counted as then; a suspicion stands, for as long as any.
@@ -83,7 +85,8 @@ class RespiratoryTracker {
   double offset_rad_ = 0.0;  // the clock's phase minus the channel's
   Instant last_agreed_;
   Instant last_told_;
-  Instant first_breath_ends_;
+  Duration first_breath_{};  // after a lock, until the map has learnt one
+  Duration told_for_{};      // since the lock: in which images agreed with the clock
   int locks_ = 0;
   int in_a_row_ = 0;                 // searches that found what looks like breathing, while off
   double candidate_period_s_ = 0.0;  // of persists(); 0: none

@@ -19,9 +19,10 @@ constexpr int kRefusalsBeforeRelock = 10;
 // learnt while the phase was not known.
 constexpr double kBreathDeviation_mm = 2.0;
 constexpr double kBreathMeanDeviation_mm = 1.5;
-// What a period that is off by half a percent makes of the first breath that is learnt by it. So much of what was
-// learnt is forgotten that it hardly counts beside the same matches, learnt once more.
+// What a period that is off by half a percent makes of the first breath that is learnt by it; and by how much all
+// variances grow besides, so that what was learnt hardly counts beside the same matches, learnt once more.
 constexpr double kFirstBreath_mm = 0.4;
+constexpr double kForgotten = 4.0;
 static_assert(kBreathHarmonics == kMaxRespiratoryHarmonics);
 constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::max();
 
@@ -141,11 +142,11 @@ void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double
   }
 }
 
-void FeatureGroup::begin_breath(const BreathWave& wave) noexcept {
+void FeatureGroup::begin_breath(const BreathWave& wave, bool again) noexcept {
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
     if (slots_[lane].state != SlotState::kMapped) continue;
     begin_breath(lane, wave);
-    take_back(slots_[lane]);
+    if (again) take_back(slots_[lane]);
   }
 }
 
@@ -174,7 +175,12 @@ void FeatureGroup::begin_breath(std::size_t lane, const BreathWave& wave) noexce
 void FeatureGroup::learn_again() noexcept {
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
     FeatureSlot& slot = slots_[lane];
-    if (slot.state == SlotState::kMapped && take_back(slot)) bank_.diffuse(feature(lane), kFirstBreath_mm);
+    if (slot.state != SlotState::kMapped || !take_back(slot)) continue;
+    FeatureEstimate estimate;
+    bank_.get(feature(lane), estimate);
+    estimate.P *= kForgotten;
+    bank_.set(feature(lane), estimate);
+    bank_.diffuse(feature(lane), kFirstBreath_mm);
   }
 }
 
@@ -242,18 +248,20 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
     LaneObservations<double> observations;
     std::array<Matrix2d, kLanes> R;
     std::array<double, kLanes> common{};
+    std::array<bool, kLanes> again{};  // learnt before, and judged then
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
       FeatureSlot& slot = slots_[lane];
       if (slot.state != SlotState::kMapped || slot.held.size() == 0 || slot.held[0].frame_index != frame.index)
         continue;
       const HeldMatch held = slot.held[0];
       slot.held.drop(1);
+      again[lane] = frame.stamp.capture <= slot.last_learnt;
       const auto l = static_cast<int>(lane);
       const Vector3d p_WF = motions.position_of(l);
       Vector2d predicted_px;
       Matrix23d J_C;
       if (model.camera.project(frame.X_CW * p_WF, predicted_px, &J_C) != ProjectionStatus::kOk) {
-        judge(lane, 0.0, false, 0.0);
+        if (!again[lane]) judge(lane, 0.0, false, 0.0);
         continue;
       }
       const Matrix23d J_p = J_C * frame.X_CW.R;
@@ -263,8 +271,12 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
       // All of a cycle's phases err with its R peaks.
       common[lane] = phase_spread.dot(R[lane].inverse() * phase_spread);
       const double since_rad = to_seconds(frame.stamp.capture - slot.last_learnt) * frame.phase.rate_rad_per_s;
-      if (frame.phase.phase_rad < slot.last_learnt_rad || since_rad > 2.0 * std::numbers::pi) slot.health.begin_cycle();
-      slot.last_learnt_rad = frame.phase.phase_rad;
+      if (!again[lane]) {
+        if (frame.phase.phase_rad < slot.last_learnt_rad || since_rad > 2.0 * std::numbers::pi) {
+          slot.health.begin_cycle();
+        }
+        slot.last_learnt_rad = frame.phase.phase_rad;
+      }
       observations.set(l, held.px, R[lane]);
     }
     LaneOutcomes<double> outcomes;
@@ -272,6 +284,7 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
     follow_slow_errors(model, k, outcomes, R);
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
       if ((outcomes.considered >> lane & 1) == 0) continue;
+      if (again[lane]) continue;
       judge(lane, outcomes.normalised_innovation_squared[lane], (outcomes.accepted >> lane & 1) != 0, common[lane]);
       FeatureSlot& slot = slots_[lane];
       if (slot.health.process_noise() > 0.0 && frame.stamp.capture > slot.last_learnt) {

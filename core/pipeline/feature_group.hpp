@@ -50,10 +50,10 @@ class FeatureGroup {
   void collect(const SweepPhase<double>& at, const SweepPhase<double>* breath, bool converged,
                double pixel_deviation_px, std::vector<CommonMatch>& matches,
                std::vector<FeatureSlot*>& owners) noexcept;
-  // The breathing's phase has become known: all mapped features take the motion that they have in common with it, and
-  // learn once more what the frame history still has, by that phase. As long as it was not known a match was worth
-  // hardly anything beside what it is now, so that none counts twice.
-  void begin_breath(const BreathWave& wave) noexcept;
+  // The breathing's phase has become known: all mapped features take the motion that they have in common with it and,
+  // when `again`, learn once more what the frame history still has, by that phase. As long as it was not known a match
+  // was worth hardly anything beside what it is now, so that none counts twice.
+  void begin_breath(const BreathWave& wave, bool again) noexcept;
   // The images have corrected the breathing's rate, and its phase in the frame history: what that has is learnt again.
   void learn_again() noexcept;
   // begin_breath() for one lane, whose feature is mapped; from then on.

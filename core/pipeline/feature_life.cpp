@@ -1,6 +1,8 @@
 #include "core/pipeline/feature_life.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "core/pipeline/feature_stages.hpp"
 #include "core/pipeline/match_covariance.hpp"
@@ -15,6 +17,7 @@ constexpr double kVagueDeviations = 3.0;  // of a converged feature's largest
 constexpr std::uint64_t kUnobservedVagueFramesBeforeLost = 30;
 constexpr int kFailedStartsBeforeLost = 3;
 constexpr std::uint64_t kConvergenceCheckFrames = 15;
+constexpr double kSamePhase_rad = 0.01;      // of a breath
 constexpr int kUpdatesBeforeConverged = 30;  // beyond the start, so that the innovation statistic means something
 
 // Fills slot.start from the first held matches. False when one of them can not be used (its frame has left the history
@@ -88,7 +91,11 @@ class Step {
     const BelievedLaws now_believed = job_.law.laws();
     const bool law_told = before.told != now_believed.told || (before.undecided() && !now_believed.undecided());
     const FrameRecord* first = job_.history->find(slot_.held[0].frame_index);
-    const bool breath_told = first != nullptr && first->respiration.known && !slot_.start.cycles[0].respiration.known;
+    const RespiratoryPhase& breath_before = slot_.start.cycles[0].respiration;
+    const bool breath_told =
+        first != nullptr && first->respiration.known &&
+        (!breath_before.known || std::abs(std::remainder(first->respiration.phase_rad - breath_before.phase_rad,
+                                                         2.0 * std::numbers::pi)) > kSamePhase_rad);
     if (first != nullptr && (law_told || breath_told)) return request_start();
     const auto used = static_cast<std::uint32_t>(slot_.start.count);
     if (!slot_.start.outcome.ok()) {

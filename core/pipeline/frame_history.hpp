@@ -33,6 +33,7 @@ struct FrameRecord {
 class FrameHistory {
  public:
   static constexpr std::uint64_t kCapacity = 256;
+  static constexpr double kExactTracker_mm2 = 0.25;
 
   explicit FrameHistory(const BasisLayout& layout) noexcept : layout_(layout) {}
 
@@ -45,6 +46,17 @@ class FrameHistory {
   }
 
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+
+  // So that it pays to learn its frames once more: beyond, a map is no better for it, by measurement (docs/ecg.md).
+  [[nodiscard]] bool tracker_is_exact() const noexcept {
+    return count_ > 0 && records_[(count_ - 1) % kCapacity].tracker_variance_mm2 <= kExactTracker_mm2;
+  }
+
+  [[nodiscard]] Duration span() const noexcept {
+    if (count_ == 0) return Duration(0);
+    const std::uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
+    return records_[(count_ - 1) % kCapacity].stamp.capture - records_[oldest % kCapacity].stamp.capture;
+  }
 
   // Null when the frame has left the history.
   [[nodiscard]] const FrameRecord* find(std::uint64_t index) const noexcept {

@@ -79,16 +79,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
   if (settings_.law_from_image) ecg_clock = find_law(ecg_clock, stamp.capture);
   job_.law = ecg_clock.law_belief();
 
-  if (respiration_.locks() == 1 && !breath_begun_) {
-    breath_begun_ = true;
-    history_->retell_respiration(respiration_.clock());
-    for (FeatureGroup& group : groups_) group.begin_breath(respiration_.wave());
-  }
-  if (respiration_.clock().corrected && !breath_corrected_) {
-    breath_corrected_ = true;
-    history_->retell_respiration(respiration_.clock());
-    for (FeatureGroup& group : groups_) group.learn_again();
-  }
+  follow_breathing();
   if (ecg_clock.beats() != beats_) {
     history_->refresh_phases(ecg_clock, respiration_.clock());
     beats_ = ecg_clock.beats();
@@ -172,6 +163,43 @@ CardiacClock Mapper::find_law(const CardiacClock& clock, Instant capture) noexce
   return told;
 }
 
+// Until the images have corrected what was found of it.
+void Mapper::follow_breathing() noexcept {
+  const RespiratoryClock& breath = respiration_.clock();
+  if (breath_corrected_) return;
+  if (breath.state != breath_state_) {
+    breath_state_ = breath.state;
+    history_->retell_respiration(breath);
+    if (breath.state == RespirationState::kLocked) begin_breath();
+  }
+  if (breath.state == RespirationState::kLocked && breath.corrected) {
+    breath_corrected_ = true;
+    history_->retell_respiration(breath);
+    if (!history_->tracker_is_exact()) return;
+    for (FeatureGroup& group : groups_) group.learn_again();
+  }
+}
+
+void Mapper::begin_breath() noexcept {
+  const bool again = history_->tracker_is_exact();
+  for (FeatureGroup& group : groups_) {
+    // What was learnt by a phase that has been lost since.
+    if (breath_begun_) group.doubt();
+    group.begin_breath(respiration_.wave(), again);
+  }
+  breath_begun_ = true;
+  // So many are learnt in a frame, one of which is new.
+  if (again) respiration_.map_catches_up_for(history_->span() / (kLearnPerFrame - 1));
+}
+
+// What was found is not told as corrected before the map has followed.
+void Mapper::publish_respiration() noexcept {
+  RespiratoryClock clock = respiration_.clock();
+  clock.corrected = clock.corrected && breath_corrected_;
+  phase_cells_.publisher_respiration.write(clock);
+  phase_cells_.status_respiration.write(clock);
+}
+
 // While breathing is not known the surface is expected displaced as it was seen last.
 void Mapper::expect_displacement(FrameRecord& frame) const noexcept {
   frame.displacement_deviation_mm = frame.respiration.deviation_mm;
@@ -219,8 +247,7 @@ void Mapper::settle_phases(const FrameRecord& frame) noexcept {
     displacement_time_ = frame.stamp.capture;
     respiration_.add_displacement(frame.stamp.capture, displacement_mm_, frame.phase.phase_rad);
   }
-  phase_cells_.publisher_respiration.write(respiration_.clock());
-  phase_cells_.status_respiration.write(respiration_.clock());
+  publish_respiration();
 }
 
 void Mapper::settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept {
@@ -284,6 +311,7 @@ void Mapper::forget() noexcept {
   displacement_seen_ = false;
   breath_begun_ = false;
   breath_corrected_ = false;
+  breath_state_ = RespirationState::kOff;
   cycle_ = CyclePosterior(settings_.image_alone);
   law_ = LawChoice();
   law_trials_.clear();
@@ -295,7 +323,7 @@ void Mapper::forget() noexcept {
 void Mapper::recall(const MapMemory& memory, Instant now) {
   respiration_.recall(memory.respiration, now);
   breath_begun_ = respiration_.locks() > 0;
-  breath_corrected_ = respiration_.clock().corrected;
+  breath_corrected_ = breath_begun_;
   if (settings_.law_from_image) law_.recall(memory.law);
   const double since_s = std::max(0.0, to_seconds(now - memory.last_capture));
   const std::uint32_t left_out = kIdsLeftOut + static_cast<std::uint32_t>(kIdsLeftOutPerSecond * since_s);
@@ -347,8 +375,7 @@ void Mapper::recall(const MapMemory& memory, Instant now) {
     }
   }
   publish_correction();
-  phase_cells_.publisher_respiration.write(respiration_.clock());
-  phase_cells_.status_respiration.write(respiration_.clock());
+  publish_respiration();
 }
 
 // Before the workers learn from the frame, while they are at rest.
@@ -392,8 +419,7 @@ void Mapper::publish_nothing() noexcept {
     }
   }
   publish_correction();
-  phase_cells_.publisher_respiration.write(respiration_.clock());
-  phase_cells_.status_respiration.write(respiration_.clock());
+  publish_respiration();
 }
 
 void Mapper::finish_learning() noexcept {

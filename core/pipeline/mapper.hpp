@@ -89,10 +89,13 @@ class Mapper {
   void shed_load(bool put_off) noexcept;
   void take_starts() noexcept;
   [[nodiscard]] CardiacClock find_law(const CardiacClock& clock, Instant capture) noexcept;
+  void follow_breathing() noexcept;
+  void begin_breath() noexcept;
   void expect_displacement(FrameRecord& frame) const noexcept;
   void settle_phases(const FrameRecord& frame) noexcept;
   void settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept;
   void publish_correction() noexcept;
+  void publish_respiration() noexcept;
   void note_motion(const FrameRecord& frame) noexcept;
   void publish_nothing() noexcept;
   void fill_feed() noexcept;
@@ -125,8 +128,9 @@ class Mapper {
   bool displacement_seen_ = false;
   Vector3d displacement_mm_ = Vector3d::Zero();  // of the surface from the map, as seen last
   Instant displacement_time_;
+  RespirationState breath_state_ = RespirationState::kOff;  // until it is corrected: that the frame history tells of
   bool breath_begun_ = false;      // the features that were mapped when it was first found have it
-  bool breath_corrected_ = false;  // and have learnt again what was seen before its rate was corrected
+  bool breath_corrected_ = false;  // and have learnt again what was seen before the images had corrected its rate
   std::unique_ptr<FrameHistory> history_;
   PatchTracker tracker_;
   MapBank bank_;

@@ -237,6 +237,42 @@ TEST_F(Tracking, AMapThatLearnsTheFirstBreathByTheClockDoesNotConfirmIt) {
   EXPECT_FALSE(tracker.clock().doubtful());
 }
 
+TEST_F(Tracking, WhatNoImageHasToldDoesNotCountAsCorrected) {
+  RespiratoryTracker tracker(settings);
+  ASSERT_TRUE(lock(tracker));
+  const double rate = tracker.clock().rate_rad_per_s;
+  now_s += 12.0;  // nothing is seen
+  tracker.add_phase(at_s(now_s), tracker.clock().at(at_s(now_s)).phase_rad + 0.1, 0.05);
+  EXPECT_TRUE(tracker.clock().doubtful());
+  EXPECT_EQ(tracker.clock().rate_rad_per_s, rate);
+}
+
+TEST_F(Tracking, AMapThatCatchesUpForLongerIsNotAskedForLonger) {
+  const auto corrects_after_s = [&](Duration catches_up) {
+    RespiratoryTracker tracker(settings);
+    if (!lock(tracker)) return 0.0;
+    tracker.map_catches_up_for(catches_up);
+    const double rate = tracker.clock().rate_rad_per_s;
+    const double locked_s = now_s;
+    while (tracker.clock().rate_rad_per_s == rate && now_s < locked_s + 30.0) {
+      now_s += 1.0 / 30.0;
+      tracker.add_phase(at_s(now_s), tracker.clock().at(at_s(now_s)).phase_rad + 0.1, 0.05);
+    }
+    return now_s - locked_s;
+  };
+  EXPECT_NEAR(corrects_after_s(Duration(0)), patient.period_s, 0.2);
+  EXPECT_NEAR(corrects_after_s(from_seconds(2.0 * patient.period_s)), 2.0 * patient.period_s, 0.2);
+}
+
+TEST_F(Tracking, APhaseThatIsNotCorrectedYetIsNoneToGoOnFrom) {
+  RespiratoryTracker tracker(settings);
+  ASSERT_TRUE(lock(tracker));
+  RespiratoryTracker later(settings);
+  later.recall(tracker.memory(), at_s(now_s));
+  EXPECT_EQ(later.clock().state, RespirationState::kSearching);
+  EXPECT_EQ(later.locks(), 1) << "the map has coefficients by its wave all the same";
+}
+
 TEST_F(Tracking, AfterALossInTheFirstBreathTheNextOneIsTheFirst) {
   RespiratoryTracker tracker(settings);
   ASSERT_TRUE(lock(tracker));
