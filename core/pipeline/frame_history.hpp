@@ -54,8 +54,7 @@ class FrameHistory {
 
   [[nodiscard]] Duration span() const noexcept {
     if (count_ == 0) return Duration(0);
-    const std::uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
-    return records_[(count_ - 1) % kCapacity].stamp.capture - records_[oldest % kCapacity].stamp.capture;
+    return records_[(count_ - 1) % kCapacity].stamp.capture - records_[oldest() % kCapacity].stamp.capture;
   }
 
   // Null when the frame has left the history.
@@ -78,8 +77,7 @@ class FrameHistory {
 
   // After a beat: the frames whose cycle was still open get what is known now. At most a cycle or two of frames.
   void refresh_phases(const CardiacClock& clock, const RespiratoryClock& respiration) noexcept {
-    const std::uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
-    for (std::uint64_t i = count_; i > oldest; --i) {
+    for (std::uint64_t i = count_; i > oldest(); --i) {
       FrameRecord& record = records_[(i - 1) % kCapacity];
       if (record.phase.exact) return;
       set_phase(record, clock, respiration);
@@ -88,8 +86,7 @@ class FrameHistory {
 
   // After breathing has been found in them: what is known of it now counts for all frames.
   void retell_respiration(const RespiratoryClock& respiration) noexcept {
-    const std::uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
-    for (std::uint64_t i = oldest; i < count_; ++i) {
+    for (std::uint64_t i = oldest(); i < count_; ++i) {
       FrameRecord& record = records_[i % kCapacity];
       set_respiration(record, respiration);
       record.b = basis_at(layout_, record.phase.phase_rad, record.respiration);
@@ -98,14 +95,16 @@ class FrameHistory {
 
   // After another law has been taken: all frames of completed cycles, which nothing else changes any more.
   void retell_phases(const CardiacClock& clock) noexcept {
-    const std::uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
-    for (std::uint64_t i = oldest; i < count_; ++i) {
+    for (std::uint64_t i = oldest(); i < count_; ++i) {
       FrameRecord& record = records_[i % kCapacity];
       if (record.phase.exact) set_cardiac_phase(record, clock);
     }
   }
 
  private:
+  // Index of the oldest record that is still there; count() when there is none.
+  [[nodiscard]] std::uint64_t oldest() const noexcept { return count_ > kCapacity ? count_ - kCapacity : 0; }
+
   static void set_respiration(FrameRecord& record, const RespiratoryClock& respiration) noexcept {
     record.respiration = respiration.at(record.stamp.capture);
     record.pose.position_variance_mm2 =
