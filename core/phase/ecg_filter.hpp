@@ -1,8 +1,9 @@
 // The ECG as the beat detector sees it: without pacing spikes and mains hum, as slope, and as the slope's energy.
 //
 // All filters are causal averages of a fixed duration, so that they do the same at every sample rate. The despiking
-// median removes what is narrower than 4 ms (at 200 Hz and below nothing: a spike is no narrower there than a QRS
-// complex); averages over 20 ms take out 50 Hz mains, and 60 Hz by 30 dB.
+// median removes what is narrower than 4 ms. At 200 Hz and below, where it would take the tip of a QRS complex as well,
+// a sample is removed that stands out from its neighbours by several times what they differ. Averages over 20 ms take
+// out 50 Hz mains, and 60 Hz by 30 dB.
 #pragma once
 
 #include <array>
@@ -14,8 +15,9 @@ namespace perimap {
 
 struct EcgSample {
   Instant time;
+  bool made_up = false;  // it was missing
   double mV = 0.0;
-  double despiked = 0.0;  // median over a few samples
+  double despiked = 0.0;  // without spikes
   double smooth = 0.0;    // mean of that over 20 ms
   double smoother = 0.0;  // mean of that over 20 ms
   double residue = 0.0;   // |mV - smooth|
@@ -32,7 +34,12 @@ class EcgFilter {
 
   // Forgets the signal. The next sample is the first; before it the signal is taken to have stood still.
   void restart(Duration sample_period) noexcept;
-  void push(Instant t, double mV) noexcept;
+  void push(Instant t, double mV, bool made_up) noexcept;
+  // What is known of the converter.
+  void forget() noexcept { quantum_mV_ = 0.0; }
+
+  // The smallest step between samples so far: the converter's resolution. 0 before there was one.
+  [[nodiscard]] double quantum_mV() const noexcept { return quantum_mV_; }
 
   [[nodiscard]] std::int64_t now() const noexcept { return now_; }  // index of the newest sample, -1 before the first
   [[nodiscard]] const EcgSample& at(
@@ -52,9 +59,14 @@ class EcgFilter {
  private:
   static constexpr int kMaxSpikeHalf = 4;
 
+  [[nodiscard]] double median_about(std::int64_t centre) const noexcept;
+  [[nodiscard]] double unless_alone(std::int64_t centre) const noexcept;
+
   Duration period_{0};
   std::int64_t now_ = -1;
-  int spike_half_ = 0;
+  int spike_half_ = 0;  // samples to each side that tell a spike
+  bool slow_ = false;
+  double quantum_mV_ = 0.0;
   int smooth_width_ = 1;
   int energy_width_ = 1;
   std::array<EcgSample, kHistory> samples_{};

@@ -16,10 +16,12 @@ using std::chrono::seconds;
 
 // ---- the signal
 
-constexpr int kGapPeriods = 4;                    // a longer step between stamps is a gap; stamps jitter by less
+constexpr Duration kJitter = std::chrono::microseconds(1500);  // of stamps that are rounded to a millisecond
 constexpr Duration kPadding = milliseconds(200);  // more than the filters' delay and the stretch behind a QRS complex
 constexpr Duration kFlatAfter = seconds(1);       // a converter repeats itself for a fraction of that in diastole
-constexpr Duration kForgetAfter = seconds(30);    // of interruption: by then the electrode sits elsewhere
+constexpr double kHardly = 0.03;  // of the beats' excursions: a bit or two of an amplifier at its limit,
+constexpr Duration kHardlyAfter = milliseconds(2500);  // for longer than a diastole lasts at 30 beats a minute
+constexpr Duration kForgetAfter = seconds(30);         // of interruption: by then the electrode sits elsewhere
 
 // ---- maxima of the energy
 
@@ -29,10 +31,12 @@ constexpr double kRiseAgain = 1.5;               // the next one begins when the
 
 // ---- the matched filter
 
-constexpr Duration kShapeStep = milliseconds(5);     // averages of 20 ms pass little above 50 Hz: four points a period
-constexpr Duration kShapeBefore = milliseconds(90);  // half of a wide (ventricular) QRS complex and its onset,
-constexpr Duration kShapeAfter = milliseconds(50);   // and no more after the peak than the delay allows
-constexpr Duration kFitReach = milliseconds(60);     // a maximum of the energy and a fit so far apart are one complex
+constexpr Duration kShapeStep = milliseconds(5);  // averages of 20 ms pass little above 50 Hz: four points a period
+// Half of a wide (ventricular) QRS complex and its onset, and no more after the peak than the delay allows. Not round:
+// at the usual rates a whole number of steps would be one more or less by the last digit of the sample period.
+constexpr Duration kShapeBefore = milliseconds(91);
+constexpr Duration kShapeAfter = milliseconds(49);
+constexpr Duration kFitReach = milliseconds(60);  // a maximum of the energy and a fit so far apart are one complex
 constexpr Duration kFitAwait = milliseconds(30);  // how long a maximum of the energy waits for a fit after its middle
 constexpr int kFitConfirm = 3;                    // steps after which a maximum of the correlation is one
 constexpr double kFamiliar = 0.8;                 // correlation of a beat in the noise that the averages let through
@@ -146,7 +150,7 @@ constexpr double kUnknownResemblance = 0.7;  // of a shape that has not been see
 
 }  // namespace
 
-RPeakDetector::RPeakDetector(Duration sample_period) noexcept : given_period_(sample_period) {
+RPeakDetector::RPeakDetector() noexcept {
   forget();
   restart_signal();
 }
@@ -154,7 +158,7 @@ RPeakDetector::RPeakDetector(Duration sample_period) noexcept : given_period_(sa
 void RPeakDetector::forget() noexcept {
   period_ = Duration::zero();
   quiet_level_ = 0.0;
-  quantum_mV_ = 0.0;
+  filter_.forget();
   noise_level_ = 0.0;
   rough_level_ = 0.0;
   other_gain_ = 0.0;
@@ -163,12 +167,15 @@ void RPeakDetector::forget() noexcept {
   rr_s_.clear();
   templates_.clear();
   learning_ = true;
+  learnt_for_ = Duration::zero();
+  learnt_count_ = 0;
   upward_ = 0.0;
   downward_ = 0.0;
 }
 
 void RPeakDetector::restart_signal() noexcept {
   filter_.restart(period_);
+  rate_.interrupt();
   started_ = false;
   first_count_ = 0;
   rising_ = true;
@@ -179,7 +186,10 @@ void RPeakDetector::restart_signal() noexcept {
   fit_count_ = 0;
   best_fit_.of = -1;
   quiet_count_ = 0;
-  learnt_count_ = 0;
+  // What has been learnt from so far stands, but for what was taken for a beat.
+  const auto end = std::remove_if(learnt_.begin(), learnt_.begin() + learnt_count_,
+                                  [&](const Candidate& c) { return !learning_ || too_soon(c); });
+  learnt_count_ = static_cast<int>(end - learnt_.begin());
   has_last_ = false;
   has_passed_over_ = false;
   has_held_ = false;
@@ -189,6 +199,7 @@ void RPeakDetector::interrupt(Instant t, EcgSignal reason) noexcept {
   interruption_ = reason;
   if (interrupted_) return;
   interrupted_ = true;
+  ++interruptions_;
   interrupted_at_ = t;
   restart_signal();
 }
@@ -205,58 +216,82 @@ EcgSignal RPeakDetector::signal() const noexcept {
 }
 
 std::optional<RPeak> RPeakDetector::push(Instant t, float mV) noexcept {
+  const bool first = !started_ && !interrupted_ && first_count_ == 0;
   if (!std::isfinite(mV)) {
-    lead_off(t);
+    if (first || t - newest_ > kBridged) lead_off(t);
     return pop();
   }
-  const bool first = !started_ && !interrupted_ && first_count_ == 0;
   if (!first && t <= newest_) return pop();
-  if (!first && !interrupted_ && period_ > Duration::zero() && t - newest_ > kGapPeriods * period_) {
-    interrupt(newest_, EcgSignal::kLeadOff);
-  }
-  const bool changed = mV != newest_mV_ || first || (interrupted_ && interruption_ != EcgSignal::kFlat);
-  newest_ = t;
-  newest_mV_ = mV;
-  if (changed) {
-    changed_at_ = t;
-  } else if (t - changed_at_ >= kFlatAfter) {
-    interrupt(changed_at_, EcgSignal::kFlat);
+  if (!first && !interrupted_ && t - newest_ > kBridged) interrupt(newest_, EcgSignal::kLeadOff);
+  if (stands_still(t, mV, first || (interrupted_ && interruption_ != EcgSignal::kFlat))) {
+    newest_ = t;
+    newest_mV_ = mV;
+    interrupt(std::min(changed_at_, left_at_), EcgSignal::kFlat);
     return pop();
   }
   if (interrupted_) {
     interrupted_ = false;
-    if (t - interrupted_at_ > kForgetAfter) forget();
-  }
-
-  if (period_ > Duration::zero()) {
-    take_sample(t, mV);
-    return pop();
-  }
-  const Duration period = learn_rate(t, mV);
-  if (period > Duration::zero()) {
-    set_rate(period);
-    for (int i = 0; i < first_count_; ++i) {
-      take_sample(first_times_[static_cast<std::size_t>(i)], first_values_[static_cast<std::size_t>(i)]);
+    if (t - interrupted_at_ > kForgetAfter) {
+      forget();
+      rate_ = SampleRate();
     }
   }
+  const Instant before = newest_;
+  const float before_mV = newest_mV_;
+  newest_ = t;
+  newest_mV_ = mV;
+  rate_.push(t);
+  if (period_ > Duration::zero() && rate_.contradicts(period_)) {
+    ++interruptions_;
+    forget();
+    restart_signal();
+  }
+  if (period_ == Duration::zero()) {
+    learn_rate(t, mV);
+    return pop();
+  }
+  if (started_) bridge(before, before_mV, t, mV);
+  take_sample(t, mV, false);
   return pop();
 }
 
-void RPeakDetector::take_sample(Instant t, float mV) noexcept {
+// The value has not changed for a second, or hardly, by the beats' measure, for longer. `anew`: what was before is
+// gone.
+bool RPeakDetector::stands_still(Instant t, float mV, bool anew) noexcept {
+  const double value_mV = static_cast<double>(mV);
+  if (anew || mV != newest_mV_) changed_at_ = t;
+  if (anew || std::abs(value_mV - level_mV_) > kHardly * (upward_ + downward_)) {
+    left_at_ = t;
+    level_mV_ = value_mV;
+  }
+  return t - changed_at_ >= kFlatAfter || t - left_at_ >= kHardlyAfter;
+}
+
+// The samples between two, where some are missing.
+void RPeakDetector::bridge(Instant from, float from_mV, Instant to, float to_mV) noexcept {
+  const Duration step = to - from;
+  if (step <= period_ + kJitter) return;
+  const auto steps = static_cast<int>((step + period_ / 2) / period_);
+  for (int i = 1; i < steps; ++i) {
+    const float share = static_cast<float>(i) / static_cast<float>(steps);
+    take_sample(from + i * step / steps, from_mV + share * (to_mV - from_mV), true);
+  }
+}
+
+void RPeakDetector::take_sample(Instant t, float mV, bool made_up) noexcept {
   if (period_ < EcgFilter::kShortestPeriod || period_ > EcgFilter::kLongestPeriod) return;
   if (!started_) {
     start_ = t;
     started_ = true;
   }
-  const double step = std::abs(static_cast<double>(mV) - filter_.at(filter_.now()).mV);
-  if (filter_.now() >= 0 && step > 0.0 && (quantum_mV_ == 0.0 || step < quantum_mV_)) quantum_mV_ = step;
-  filter_.push(t, static_cast<double>(mV));
+  learnt_for_ += period_;
+  filter_.push(t, static_cast<double>(mV), made_up);
   watch_quiet_level();
   watch_roughness();
   if (follow_energy() && crest_count_ < kPending) crests_[static_cast<std::size_t>(crest_count_++)] = crest_at_;
   if (filter_.now() % step_ == 0) follow_templates();
   decide_crests();
-  if (learning_ && t - start_ > kLearning && t > rough_until_) finish_learning();
+  if (learning_ && learnt_for_ > kLearning && t > rough_until_) finish_learning();
   resolve_overdue();
 }
 
@@ -267,7 +302,7 @@ std::optional<RPeak> RPeakDetector::flush() noexcept {
     const float value = newest_mV_;
     const int padding = filter_.samples_in(kPadding);
     ending_ = true;
-    for (int i = 1; i <= padding; ++i) take_sample(end + i * period_, value);
+    for (int i = 1; i <= padding; ++i) take_sample(end + i * period_, value, true);
     ending_ = false;
     if (learning_) finish_learning();
     restart_signal();
@@ -283,15 +318,20 @@ std::optional<RPeak> RPeakDetector::pop() noexcept {
   return peak;
 }
 
-Duration RPeakDetector::learn_rate(Instant t, float mV) noexcept {
-  first_times_[static_cast<std::size_t>(first_count_)] = t;
-  first_values_[static_cast<std::size_t>(first_count_)] = mV;
-  ++first_count_;
-  if (given_period_ > Duration::zero()) return given_period_;
-  if (first_count_ < static_cast<int>(first_times_.size())) return Duration::zero();
-  std::array<Duration, std::tuple_size_v<decltype(first_times_)> - 1> steps{};
-  for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = first_times_[i + 1] - first_times_[i];
-  return upper_median(steps.begin(), steps.end());
+// The samples that tell the rate are taken once it is known.
+void RPeakDetector::learn_rate(Instant t, float mV) noexcept {
+  if (first_count_ < static_cast<int>(first_times_.size())) {
+    first_times_[static_cast<std::size_t>(first_count_)] = t;
+    first_values_[static_cast<std::size_t>(first_count_)] = mV;
+    ++first_count_;
+  }
+  if (rate_.period() == Duration::zero()) return;
+  set_rate(rate_.period());
+  for (int i = 0; i < first_count_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (i > 0) bridge(first_times_[at - 1], first_values_[at - 1], first_times_[at], first_values_[at]);
+    take_sample(first_times_[at], first_values_[at], false);
+  }
 }
 
 void RPeakDetector::set_rate(Duration sample_period) noexcept {
@@ -479,7 +519,7 @@ void RPeakDetector::measure_step(std::int64_t peak, Candidate& candidate) const 
     return filter_.at(std::clamp<std::int64_t>(i + filter_.smooth_delay(), 0, filter_.now())).smooth;
   };
   const int reach = filter_.samples_in(kStepReach);
-  const double excursions = std::max(candidate.upward + candidate.downward, quantum_mV_);
+  const double excursions = std::max(candidate.upward + candidate.downward, filter_.quantum_mV());
   candidate.step = std::abs(level(peak + reach) - level(peak - reach)) / excursions;
 }
 
@@ -560,6 +600,10 @@ void RPeakDetector::refine_peak(std::int64_t peak, Candidate& candidate) const n
       break;
     }
   }
+  int made_up = 0;
+  for (std::int64_t i = peak - reach; i <= peak + reach; ++i) made_up += filter_.at(i).made_up ? 1 : 0;
+  // Where the peak lies among samples that are missing: uniform.
+  if (!ending_) deviation_s = std::hypot(deviation_s, made_up * step_s / std::sqrt(12.0));
   candidate.peak.time = filter_.at(peak).time + from_seconds(vertex_s);
   candidate.peak.deviation = from_seconds(std::min(std::hypot(deviation_s, kDeviationFloor_s), kDeviationCap_s));
 }
@@ -862,7 +906,7 @@ double RPeakDetector::strength(const Candidate& candidate) const noexcept {
 
 // Far above the quiet part of the signal and above the converter's own steps.
 bool RPeakDetector::stands_out(const Candidate& candidate, double times) const noexcept {
-  return candidate.energy > times * quiet_level_ && candidate.energy > kQuanta * quantum_mV_;
+  return candidate.energy > times * quiet_level_ && candidate.energy > kQuanta * filter_.quantum_mV();
 }
 
 double RPeakDetector::beat_threshold() const noexcept {

@@ -17,6 +17,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 
@@ -24,26 +25,31 @@
 #include "core/phase/qrs_shape.hpp"
 #include "core/phase/r_peak.hpp"
 #include "core/phase/recent_values.hpp"
+#include "core/phase/sample_rate.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
 
 enum class EcgSignal : std::uint8_t {
-  kLearning,  // nothing has stood out from the noise yet
+  kLearning,  // nothing has stood out from the noise yet, or for some cycles
   kGood,
   kNoisy,    // disturbances of a beat's size within the last seconds
-  kFlat,     // the value has not changed for a second: a lead that is off, or an amplifier at its limit
-  kLeadOff,  // said by the device, or values that are none
+  kFlat,     // the value has hardly changed: a lead that is off, or an amplifier at its limit
+  kLeadOff,  // said by the device, or samples that are missing
 };
 
 class RPeakDetector {
  public:
-  // `sample_period` 0: learnt from the first stamps. Rates from 100 to 1000 Hz are supported; at others no peak is
-  // found.
-  explicit RPeakDetector(Duration sample_period = Duration::zero()) noexcept;
+  // So long a stretch of missing samples is filled in by a straight line: a third of a normal QRS complex, whose peak
+  // may lie in it but which does not go unseen. In a longer one a beat may be hidden.
+  static constexpr Duration kBridged = std::chrono::milliseconds(30);
 
-  // The next sample, evenly stamped. A stamp that does not advance is ignored; a gap or a value that is not finite
-  // counts as lead off. At most one peak a call; when several become known at once, the next calls give the others.
+  // Rates from 100 to 1000 Hz are supported; at others no peak is found. The rate is learnt from the stamps; when it
+  // turns out to be another, all is learnt anew.
+  RPeakDetector() noexcept;
+
+  // The next sample, evenly stamped. A stamp that does not advance is ignored; a value that is not finite is a missing
+  // sample. At most one peak a call; when several become known at once, the next calls give the others.
   [[nodiscard]] std::optional<RPeak> push(Instant t, float mV) noexcept;
 
   // The electrode fell off: forgets the signal, and after 30 s its levels too.
@@ -53,6 +59,8 @@ class RPeakDetector {
   [[nodiscard]] std::optional<RPeak> flush() noexcept;
 
   [[nodiscard]] EcgSignal signal() const noexcept;
+  // How often the signal has broken off; in each of them beats may be hidden, and those of the 0.1 s before.
+  [[nodiscard]] std::uint64_t interruptions() const noexcept { return interruptions_; }
 
  private:
   static constexpr int kQuietHistory = 128;  // energies, one each 20 ms
@@ -86,9 +94,11 @@ class RPeakDetector {
   void forget() noexcept;
   void interrupt(Instant t, EcgSignal reason) noexcept;
   void restart_signal() noexcept;
-  [[nodiscard]] Duration learn_rate(Instant t, float mV) noexcept;
+  void learn_rate(Instant t, float mV) noexcept;
   void set_rate(Duration sample_period) noexcept;
-  void take_sample(Instant t, float mV) noexcept;
+  [[nodiscard]] bool stands_still(Instant t, float mV, bool anew) noexcept;
+  void bridge(Instant from, float from_mV, Instant to, float to_mV) noexcept;
+  void take_sample(Instant t, float mV, bool made_up) noexcept;
   void watch_quiet_level() noexcept;
   void watch_roughness() noexcept;
   [[nodiscard]] bool follow_energy() noexcept;
@@ -125,13 +135,15 @@ class RPeakDetector {
   [[nodiscard]] std::optional<RPeak> pop() noexcept;
 
   // The signal.
-  Duration given_period_;
-  Duration period_{0};  // zero until known
+  SampleRate rate_;
+  Duration period_{0};  // that is used; zero until known
   std::array<Instant, 17> first_times_{};
   std::array<float, 17> first_values_{};
   int first_count_ = 0;
   EcgFilter filter_;
   Instant start_;
+  Duration learnt_for_{0};  // of signal, since the levels were forgotten
+  std::uint64_t interruptions_ = 0;
   Instant interrupted_at_;
   bool interrupted_ = false;
   EcgSignal interruption_ = EcgSignal::kLeadOff;
@@ -139,7 +151,9 @@ class RPeakDetector {
   bool ending_ = false;
   Instant newest_;
   float newest_mV_ = 0.0F;
-  Instant changed_at_;  // when the value last changed
+  Instant changed_at_;  // when the value last changed,
+  Instant left_at_;     // and when it last left the surroundings of
+  double level_mV_ = 0.0;
 
   // The energy's local maxima, and those that wait for what follows them.
   bool rising_ = true;
@@ -162,7 +176,6 @@ class RPeakDetector {
   std::array<double, kQuietHistory> quiet_{};
   std::int64_t quiet_count_ = 0;
   double quiet_level_ = 0.0;
-  double quantum_mV_ = 0.0;  // smallest step between samples: the converter's resolution
   double noise_level_ = 0.0;
   double rough_level_ = 0.0;  // the lowest of late
   Instant smooth_at_;         // the last instant that was not rough

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <stdexcept>
@@ -119,6 +120,24 @@ Lead paced(Lead lead, double height_mV, double before_s) {
     lead.mV[static_cast<std::size_t>(i + 1)] += static_cast<float>(0.3 * height_mV);
   }
   return lead;
+}
+
+// A spike of 2 ms, of which a converter so slow takes the mean over one sample.
+Lead paced_at(const Lead& whole, double rate_hz, double height_mV, double before_s) {
+  Lead lead = resampled(whole, rate_hz);
+  for (const ReferenceBeat& beat : lead.beats) {
+    const auto i = static_cast<long>((beat.time_s - before_s) * lead.rate_hz);
+    if (i < 0 || i >= static_cast<long>(lead.mV.size())) continue;
+    lead.mV[static_cast<std::size_t>(i)] += static_cast<float>(height_mV * 0.002 * rate_hz);
+  }
+  return lead;
+}
+
+// The first samples of each period are none.
+Lead with_missing(const Lead& lead, double every_s, double for_s) {
+  return changed(lead, [&](double t, double mV) {
+    return std::fmod(t, every_s) < for_s ? std::numeric_limits<double>::quiet_NaN() : mV;
+  });
 }
 
 // A bump of 45 ms standard deviation where the T wave is: 0.3 s / sqrt(s) after the R peak, as Bazett has it.
@@ -236,6 +255,14 @@ std::vector<Disturbance> disturbances() {
   add("pacing spikes 2 mV, 60 ms before", 99.0, [](const Lead& lead, Generator&) { return paced(lead, 2.0, 0.06); });
   add("pacing spikes -5 mV, 60 ms before", 99.0, [](const Lead& lead, Generator&) { return paced(lead, -5.0, 0.06); });
   add("pacing spikes 4 mV, 160 ms before", 99.0, [](const Lead& lead, Generator&) { return paced(lead, 4.0, 0.16); });
+  for (const double rate_hz : {100.0, 200.0}) {
+    add(fmt::format("pacing spikes 5 mV, 160 ms before, {:g} Hz", rate_hz), 98.0,
+        [rate_hz](const Lead& lead, Generator&) { return paced_at(lead, rate_hz, 5.0, 0.16); });
+  }
+  add("no samples for 15 ms of each 0.7 s", 99.0,
+      [](const Lead& lead, Generator&) { return with_missing(lead, 0.7, 0.015); });
+  add("no samples for 25 ms of each 0.7 s", 98.0,
+      [](const Lead& lead, Generator&) { return with_missing(lead, 0.7, 0.025); });
   add("T waves 1.2 mV higher", 93.0, [](const Lead& lead, Generator&) { return tall_t_waves(lead, 1.2); });
   add("amplitude / 10 for a sixth of the time", 96.0,
       [](const Lead& lead, Generator&) { return with_amplitude(lead, 0.1); });

@@ -296,6 +296,185 @@ TEST(RPeakDetector, GivesNoBeatsWhileTheLeadIsOff) {
   EXPECT_EQ(score(later, peaks).missed, 0);
 }
 
+// What detect() tells of a record of which the samples that `missing` names are blank, or not there at all.
+template <class Missing>
+Score without(const EcgRecord& record, bool blank, Missing&& missing, std::uint64_t* interruptions = nullptr) {
+  const auto detector = std::make_unique<RPeakDetector>();
+  std::vector<RPeak> peaks;
+  for (std::size_t i = 0; i < record.t_s.size(); ++i) {
+    if (missing(i) && !blank) continue;
+    const float value = missing(i) ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(record.mV[i]);
+    const auto peak = detector->push(Instant(from_seconds(record.t_s[i])), value);
+    if (peak) peaks.push_back(*peak);
+  }
+  while (const auto peak = detector->flush()) peaks.push_back(*peak);
+  if (interruptions != nullptr) *interruptions = detector->interruptions();
+  return score(record.beats_s, peaks);
+}
+
+TEST(RPeakDetector, SamplesThatAreMissingNowAndThenHideNoBeat) {
+  const EcgRecord record = load("100");
+  for (const bool blank : {false, true}) {
+    for (const double every_s : {0.5, 1.0, 1.9}) {
+      for (const std::size_t length : {1U, 5U, 9U}) {
+        const auto every = static_cast<std::size_t>(every_s * 360.0);
+        std::uint64_t interruptions = 0;
+        const Score result = without(
+            record, blank, [&](std::size_t i) { return i % every > 20 && i % every <= 20 + length; }, &interruptions);
+        EXPECT_EQ(result.missed + result.extra, 0) << blank << ' ' << every_s << ' ' << length;
+        EXPECT_EQ(interruptions, 0U);
+      }
+    }
+  }
+}
+
+TEST(RPeakDetector, ABeatIsKnownWhenSamplesSoonAfterItAreMissing) {
+  const EcgRecord record = load("100");
+  const double begin = record.t_s.front();
+  const auto after_a_beat = [&](std::size_t i) {
+    for (const double beat : record.beats_s) {
+      const double since = record.t_s[i] - beat;
+      if (since > 0.060 && since < 0.080 && static_cast<int>(beat - begin) % 4 == 0) return true;
+    }
+    return false;
+  };
+  const Score result = without(record, false, after_a_beat);
+  EXPECT_EQ(result.missed + result.extra, 0);
+}
+
+TEST(RPeakDetector, AStretchThatIsTooLongToBridgeIsAnInterruption) {
+  const EcgRecord record = load("100");
+  for (const bool blank : {false, true}) {
+    for (const std::size_t missing : {9U, 12U}) {
+      std::uint64_t interruptions = 0;
+      static_cast<void>(without(
+          record, blank, [&](std::size_t i) { return i >= 5000 && i < 5000 + missing; }, &interruptions));
+      EXPECT_EQ(interruptions, missing == 9U ? 0U : 1U) << blank << ' ' << missing;
+    }
+  }
+  const auto detector = std::make_unique<RPeakDetector>();
+  for (std::size_t i = 0; i < 5000; ++i) {
+    static_cast<void>(detector->push(Instant(from_seconds(record.t_s[i])), static_cast<float>(record.mV[i])));
+  }
+  for (std::size_t i = 5000; i < 5020; ++i) {
+    EXPECT_FALSE(detector->push(Instant(from_seconds(record.t_s[i])), std::numeric_limits<float>::quiet_NaN()));
+  }
+  EXPECT_EQ(detector->signal(), EcgSignal::kLeadOff);
+}
+
+// Each stretch is forgotten, not what has been learnt before it.
+TEST(RPeakDetector, LearnsWhatBeatsLookLikeThoughItIsInterruptedAllTheTime) {
+  const EcgRecord record = load("100");
+  const Score result = without(record, false, [](std::size_t i) { return i % 540 < 18; });
+  EXPECT_GT(result.found, 50) << "an interruption every 1.5 s hides some";
+  EXPECT_EQ(result.extra, 0);
+}
+
+TEST(RPeakDetector, APeakAmongMissingSamplesIsToldLessSurely) {
+  const EcgRecord record = synthetic(360.0, 0.8137, 20.0, 0.3);
+  const double beat = record.beats_s[15];
+  const auto whole = detect(record);
+  const auto detector = std::make_unique<RPeakDetector>();
+  std::vector<RPeak> peaks;
+  for (std::size_t i = 0; i < record.t_s.size(); ++i) {
+    if (std::abs(record.t_s[i] - beat) < 0.011) continue;
+    const auto peak = detector->push(Instant(from_seconds(record.t_s[i])), static_cast<float>(record.mV[i]));
+    if (peak) peaks.push_back(*peak);
+  }
+  ASSERT_GT(peaks.size(), 16U);
+  EXPECT_NEAR(seconds(peaks[15].time), beat, 0.012);
+  EXPECT_GT(to_seconds(peaks[15].deviation), 0.004);
+  EXPECT_LT(to_seconds(whole[15].deviation), 0.002);
+}
+
+TEST(RPeakDetector, PacingSpikesAreNotBeatsAtAnyRate) {
+  for (const double rate : {100.0, 125.0, 200.0, 250.0, 500.0, 1000.0}) {
+    for (const double height : {5.0, -5.0, 20.0}) {
+      for (const double before : {0.16, 0.05}) {
+        EcgRecord record = synthetic(rate, 0.8137, 30.0, 0.3);
+        // Of 2 ms; a slow converter takes the mean over its sample.
+        for (const double beat : record.beats_s) {
+          const auto first = static_cast<std::size_t>((beat - before) * rate);
+          const auto samples = static_cast<std::size_t>(std::max(1.0, std::round(0.002 * rate)));
+          for (std::size_t i = first; i < first + samples; ++i) record.mV[i] += height * std::min(1.0, 0.002 * rate);
+        }
+        const auto peaks = detect(record);
+        const Score result = score(record.beats_s, peaks);
+        EXPECT_EQ(result.missed, 0) << rate << ' ' << height << ' ' << before;
+        EXPECT_EQ(result.extra, 0) << rate << ' ' << height << ' ' << before;
+        for (std::size_t i = 0; i < std::min(peaks.size(), record.beats_s.size()); ++i) {
+          EXPECT_NEAR(seconds(peaks[i].time), record.beats_s[i], 0.008) << rate << ' ' << height << ' ' << before;
+        }
+      }
+    }
+  }
+}
+
+TEST(RPeakDetector, AnAmplifierAtItsLimitIsFlatThoughItsLastBitIsNot) {
+  const EcgRecord record = load("100");
+  std::mt19937 generator(3);
+  const auto detector = std::make_unique<RPeakDetector>();
+  for (std::size_t i = 0; i < 9000; ++i) {
+    const bool off = i >= 3600 && i < 7200;
+    const double value = off ? 5.115 + 0.005 * static_cast<double>(generator() % 2) : record.mV[i];
+    const auto peak = detector->push(Instant(from_seconds(record.t_s[i])), static_cast<float>(value));
+    if (off && i > 3600 + 1000) {
+      EXPECT_EQ(detector->signal(), EcgSignal::kFlat) << i;
+      EXPECT_FALSE(peak);
+    }
+  }
+  EXPECT_EQ(detector->signal(), EcgSignal::kGood);
+}
+
+// Of `record` from sample `from` on, at `rate` and with stamps of milliseconds where asked for.
+EcgRecord resampled(const EcgRecord& record, double from_s, double to_s, double rate, bool milliseconds) {
+  EcgRecord result;
+  std::size_t i = 0;
+  for (int k = 0;; ++k) {
+    const double t = from_s + k / rate;
+    if (t >= to_s) break;
+    while (i + 2 < record.t_s.size() && record.t_s[i + 1] <= t) ++i;
+    const double share = (t - record.t_s[i]) / (record.t_s[i + 1] - record.t_s[i]);
+    result.t_s.push_back(milliseconds ? 1e-3 * std::round(1e3 * t) : t);
+    result.mV.push_back((1.0 - share) * record.mV[i] + share * record.mV[i + 1]);
+  }
+  return result;
+}
+
+TEST(RPeakDetector, AnotherRateThanTheFirstStampsTellIsLearnt) {
+  const EcgRecord record = load("100");
+  const double begin = record.t_s.front();
+  const double end = record.t_s.back();
+  EcgRecord burst = record;
+  for (std::size_t i = 0; i < 20; ++i) burst.t_s[i] = burst.t_s[20] - 0.0005 * static_cast<double>(20 - i);
+  EXPECT_EQ(score(record.beats_s, detect(burst)).missed, 0);
+
+  EcgRecord slower = resampled(record, begin, begin + 20.0, 500.0, false);
+  const EcgRecord rest = resampled(record, begin + 20.5, end, 100.0, false);
+  slower.t_s.insert(slower.t_s.end(), rest.t_s.begin(), rest.t_s.end());
+  slower.mV.insert(slower.mV.end(), rest.mV.begin(), rest.mV.end());
+  std::vector<double> apart;
+  for (const double beat : record.beats_s) {
+    if (beat < begin + 19.8 || beat > begin + 23.0) apart.push_back(beat);
+  }
+  EXPECT_EQ(score(apart, detect(slower)).missed, 0);
+}
+
+TEST(RPeakDetector, StampsThatAreRoundedToMillisecondsDelayNothing) {
+  const EcgRecord record = load("100");
+  for (const double rate : {360.0, 600.0, 720.0, 800.0}) {
+    const EcgRecord rounded = resampled(record, record.t_s.front(), record.t_s.back(), rate, true);
+    std::vector<Duration> delays;
+    const auto peaks = detect(rounded);
+    const Score result = score(record.beats_s, peaks);
+    EXPECT_EQ(result.missed + result.extra, 0) << rate;
+    for (const RPeak& peak : peaks) delays.push_back(peak.detected_at - peak.time);
+    const auto middle = delays.begin() + static_cast<std::ptrdiff_t>(delays.size() / 2);
+    std::nth_element(delays.begin(), middle, delays.end());
+    EXPECT_LT(*middle, std::chrono::milliseconds(105)) << rate;
+  }
+}
+
 TEST(RPeakDetector, ValuesThatAreNotFiniteAndStampsThatDoNotAdvanceGiveNothing) {
   const auto detector = std::make_unique<RPeakDetector>();
   const float nan = std::numeric_limits<float>::quiet_NaN();
