@@ -1,17 +1,10 @@
 #include "core/pipeline/ecg_intake.hpp"
 
-#include <chrono>
 #include <optional>
 
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
-namespace {
-
-// Between two blocks: shorter than this no beat is hidden.
-constexpr Duration kMissing = std::chrono::milliseconds(100);
-
-}  // namespace
 
 void EcgIntake::push(const EcgBlock& block) noexcept {
   const RealtimeScope realtime;
@@ -40,29 +33,24 @@ void EcgIntake::count(const EcgBlock& block) noexcept {
 }
 
 void EcgIntake::hear(const EcgBlock& block) noexcept {
-  if (block.lead_off) {
-    detector_.lead_off(block.first_sample_time);
-    interrupt();
-    publish();
-    return;
-  }
-  if (any_heard_ && block.first_sample_time - heard_until_ > kMissing) interrupt();
   std::uint64_t flat = 0;
   Instant t = block.first_sample_time;
+  if (block.lead_off) beats_.lead_off(t);
   for (const float mV : block.samples()) {
-    if (const std::optional<RPeak> peak = detector_.push(t, mV)) tracker_.on_r_peak(classer_.classify(*peak));
-    if (detector_.signal() == EcgSignal::kFlat) ++flat;
-    heard_until_ = t;
+    if (block.lead_off) break;
+    if (const std::optional<RPeak> peak = beats_.push(t, mV)) tracker_.on_r_peak(*peak);
+    if (beats_.take_interruption()) tracker_.interrupt();
+    if (beats_.signal() == EcgSignal::kFlat) ++flat;
     t += block.sample_period;
   }
-  any_heard_ = true;
   if (flat > 0) counters_.ecg_lead_off.add(flat);
-  const EcgSignal signal = detector_.signal();
+  const EcgSignal signal = beats_.signal();
   if (signal == EcgSignal::kFlat || signal == EcgSignal::kLeadOff) {
-    interrupt();
-  } else {
-    tracker_.heard(heard_until_);
-    counters_.last_good_ecg_ns.set(static_cast<std::uint64_t>(to_ns(heard_until_)));
+    tracker_.interrupt();
+  } else if (block.count > 0) {
+    const Instant until = block.last_sample_time();
+    tracker_.heard(until);
+    counters_.last_good_ecg_ns.set(static_cast<std::uint64_t>(to_ns(until)));
   }
   publish();
 }
@@ -78,22 +66,16 @@ void EcgIntake::push(const RTriggerPulse& pulse) noexcept {
   forget_when_asked();
   const std::optional<RPeak> peak = trigger_->push(pulse.time, pulse.arrival);
   if (!peak) return;
-  tracker_.on_r_peak(classer_.classify(*peak));
+  tracker_.on_r_peak(trigger_classer_.classify(*peak));
   publish();
-}
-
-void EcgIntake::interrupt() noexcept {
-  classer_.interrupt();
-  tracker_.interrupt();
 }
 
 void EcgIntake::forget_when_asked() noexcept {
   if (!forget_asked_.exchange(false, std::memory_order_relaxed)) return;
-  detector_ = RPeakDetector();
+  beats_ = BeatFinder();
   if (trigger_) trigger_.emplace(*settings_.r_trigger);
-  classer_ = BeatClasser();
+  trigger_classer_ = BeatClasser();
   tracker_ = CardiacClockTracker(settings_.clock);
-  any_heard_ = false;
   publish();
 }
 

@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "core/phase/beat_classer.hpp"
+#include "core/phase/beat_finder.hpp"
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
-#include "core/phase/r_peak_detector.hpp"
 #include "core/phase/r_trigger.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/realtime/spsc_ring.hpp"
@@ -56,22 +56,19 @@ class EcgIntake {
   static constexpr std::size_t kHeardBlocks = 256;
 
   void forget_when_asked() noexcept;
-  void interrupt() noexcept;
   void count(const EcgBlock& block) noexcept;
   void hear(const EcgBlock& block) noexcept;
   void publish() noexcept;
 
   EcgIntakeSettings settings_;
-  RPeakDetector detector_;
+  BeatFinder beats_;
   std::optional<RTrigger> trigger_;
-  BeatClasser classer_;
+  BeatClasser trigger_classer_;
   CardiacClockTracker tracker_;
   ClockCells& cells_;
   PipelineCounters& counters_;
   SpscRing<EcgBlock> heard_{kHeardBlocks};
   DeviceCount sample_count_;
-  bool any_heard_ = false;
-  Instant heard_until_;
   DeviceCount pulse_count_;
   std::atomic<bool> forget_asked_{false};  // relaxed: a message by itself
 };

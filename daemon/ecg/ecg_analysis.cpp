@@ -4,9 +4,8 @@
 #include <memory>
 #include <optional>
 
-#include "core/phase/beat_classer.hpp"
+#include "core/phase/beat_finder.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
-#include "core/phase/r_peak_detector.hpp"
 
 namespace perimap {
 namespace {
@@ -23,6 +22,9 @@ class Predictions {
       if (tracker.clock().anchor() != beat.peak.time) continue;  // refused
       beat.predicted_rr_s[i] = to_seconds(tracker.clock().predicted_length());
     }
+  }
+  void interrupt() {
+    for (const auto& tracker : trackers_) tracker->interrupt();
   }
   [[nodiscard]] Rhythm rhythm() const { return trackers_.back()->clock().rhythm(); }
 
@@ -41,13 +43,12 @@ class Predictions {
 
 EcgAnalysis analyse(const EcgTrace& trace, const std::function<bool(std::size_t)>& progress) {
   EcgAnalysis analysis;
-  const auto detector = std::make_unique<RPeakDetector>();
-  BeatClasser classer;
+  const auto finder = std::make_unique<BeatFinder>();
   Predictions predictions;
   const auto take = [&](const std::optional<RPeak>& peak) {
     if (!peak) return;
     AnalysedBeat beat;
-    beat.peak = classer.classify(*peak);
+    beat.peak = *peak;
     predictions.take(beat);
     analysis.beats.push_back(beat);
   };
@@ -55,15 +56,23 @@ EcgAnalysis analyse(const EcgTrace& trace, const std::function<bool(std::size_t)
   for (std::size_t i = 0; i < trace.mV.size(); ++i) {
     if (i % kProgressEvery == 0 && !progress(i)) break;
     const double step_s = i > 0 ? trace.time_s[i] - trace.time_s[i - 1] : 0.0;
-    const Instant t(from_seconds(trace.time_s[i]));
-    take(detector->push(t, trace.mV[i]));
-    const EcgSignal signal = detector->signal();
+    take(finder->push(Instant(from_seconds(trace.time_s[i])), trace.mV[i]));
+    const bool interrupted = finder->take_interruption();
+    if (interrupted) {
+      predictions.interrupt();
+      ++analysis.interruptions;
+    }
+    const EcgSignal signal = finder->signal();
     analysis.duration_s += step_s;
-    if (signal == EcgSignal::kLeadOff || signal == EcgSignal::kFlat) analysis.unusable_s += step_s;
+    if (interrupted || signal == EcgSignal::kLeadOff || signal == EcgSignal::kFlat) {
+      analysis.unusable_s += step_s;
+    } else if (signal == EcgSignal::kLearning) {
+      analysis.without_beats_s += step_s;
+    }
     if (signal == EcgSignal::kNoisy) analysis.noisy_s += step_s;
     if (predictions.rhythm() == Rhythm::kUnpredictable) analysis.unpredictable_s += step_s;
   }
-  while (const auto peak = detector->flush()) take(peak);
+  while (const auto peak = finder->flush()) take(peak);
   static_cast<void>(progress(trace.mV.size()));
   return analysis;
 }

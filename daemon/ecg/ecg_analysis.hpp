@@ -25,9 +25,11 @@ inline constexpr std::array<RrMethod, 3> kPredictionMethods{RrMethod::kPrevious,
 struct EcgAnalysis {
   std::vector<AnalysedBeat> beats;  // in order of time
   double duration_s = 0.0;
-  double unusable_s = 0.0;       // lead off or flat
-  double noisy_s = 0.0;          // disturbances of a beat's size
-  double unpredictable_s = 0.0;  // the rhythm was atrial fibrillation or the like
+  double unusable_s = 0.0;          // lead off or flat, or samples missing
+  std::uint64_t interruptions = 0;  // by those
+  double without_beats_s = 0.0;     // nothing like beats was known in it
+  double noisy_s = 0.0;             // disturbances of a beat's size
+  double unpredictable_s = 0.0;     // the rhythm was atrial fibrillation or the like
 };
 
 // The trace begins at instant 0 of the result's clock. `progress` is told how many samples are done and answers whether

@@ -5,8 +5,7 @@
 #include <string_view>
 #include <variant>
 
-#include "core/phase/beat_classer.hpp"
-#include "core/phase/r_peak_detector.hpp"
+#include "core/phase/beat_finder.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/replay_reader.hpp"
 
@@ -16,8 +15,7 @@ Expected<std::vector<RPeak>> load_beats(const std::string& recording, ReadMode m
   constexpr std::array<std::string_view, 1> kEcg = {channels::kEcgSamples};
   auto reader = ReplayReader::open(recording, mode, kEcg);
   if (!reader) return tl::unexpected(reader.error());
-  const auto detector = std::make_unique<RPeakDetector>();
-  BeatClasser classer;
+  const auto finder = std::make_unique<BeatFinder>();
   std::vector<RPeak> beats;
   for (;;) {
     const auto event = reader->next();
@@ -25,16 +23,14 @@ Expected<std::vector<RPeak>> load_beats(const std::string& recording, ReadMode m
     if (!*event) return beats;
     const auto& block = std::get<EcgBlock>(**event);
     if (block.lead_off) {
-      detector->lead_off(block.first_sample_time);
-      classer.interrupt();
+      finder->lead_off(block.first_sample_time);
       continue;
     }
     Instant t = block.first_sample_time;
     for (const float mV : block.samples()) {
-      if (const auto peak = detector->push(t, mV)) {
-        RPeak beat = classer.classify(*peak);
-        beat.detected_at = block.arrival;
-        if (beat.beat_class != BeatClass::kNoise) beats.push_back(beat);
+      if (auto beat = finder->push(t, mV)) {
+        beat->detected_at = block.arrival;
+        if (beat->beat_class != BeatClass::kNoise) beats.push_back(*beat);
       }
       t += block.sample_period;
     }

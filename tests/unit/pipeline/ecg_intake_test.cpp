@@ -1,0 +1,97 @@
+#include "core/pipeline/ecg_intake.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr Duration kPeriod = milliseconds(2);
+constexpr int kBlock = 10;
+constexpr Duration kCycle = milliseconds(800);
+
+// One QRS complex each 0.8 s, at 0.4, 1.2, ... s.
+float lead_mV(Instant t) {
+  const double x = std::remainder(to_seconds(t.time_since_epoch()) - 0.4, 0.8) / 0.012;
+  return static_cast<float>(std::exp(-0.5 * x * x));
+}
+
+struct Intake : ::testing::Test {
+  std::unique_ptr<ClockCells> cells = std::make_unique<ClockCells>();
+  std::unique_ptr<PipelineCounters> counters = std::make_unique<PipelineCounters>();
+  std::unique_ptr<EcgIntake> intake = std::make_unique<EcgIntake>(EcgIntakeSettings{}, *cells, *counters);
+  Instant t{milliseconds(0)};
+  std::uint32_t sequence = 0;
+
+  // Blocks until `until`, each sample's value by its time.
+  template <class Value>
+  void hear(Instant until, Value&& value) {
+    while (t < until) {
+      EcgBlock block;
+      block.device_sequence = sequence;
+      sequence += kBlock;
+      block.sample_period = kPeriod;
+      block.first_sample_time = t;
+      block.count = kBlock;
+      for (std::size_t i = 0; i < kBlock; ++i) {
+        block.mV[i] = value(t);
+        t += kPeriod;
+      }
+      block.arrival = t;
+      intake->push(block);
+    }
+  }
+  const CardiacClock& clock() {
+    static_cast<void>(cells->mapper.update());
+    return cells->mapper.front();
+  }
+  // The running cycle is no guide to others once it has ended.
+  bool cycle_taught(Instant in_it) { return clock().at(in_it).teaches; }
+};
+
+constexpr Instant kMidCycle{milliseconds(20'000)};  // 0.4 s after a beat
+
+TEST_F(Intake, ALineThatGoesFlatIsCountedAndSaid) {
+  hear(kMidCycle, lead_mV);
+  ASSERT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
+  const std::uint64_t heard = counters->last_good_ecg_ns.get();
+  hear(kMidCycle + milliseconds(1500), [](Instant) { return 4.0F; });
+  EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kFreeRunning);
+  EXPECT_NEAR(static_cast<double>(counters->ecg_lead_off.get()), 250.0, 15.0) << "from a second on";
+  EXPECT_LT(counters->last_good_ecg_ns.get(), heard + 1'100'000'000U);
+}
+
+TEST_F(Intake, AShortStretchOfMissingSamplesInterruptsNothing) {
+  hear(kMidCycle, lead_mV);
+  t += milliseconds(20);
+  hear(kMidCycle + kCycle + milliseconds(300), lead_mV);
+  EXPECT_TRUE(cycle_taught(kMidCycle));
+}
+
+TEST_F(Intake, ACycleInWhichABeatMayBeHiddenTeachesNothing) {
+  hear(kMidCycle, lead_mV);
+  t += milliseconds(60);
+  hear(kMidCycle + 2 * kCycle, lead_mV);
+  EXPECT_FALSE(cycle_taught(kMidCycle));
+  EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
+}
+
+// The last sample of each block is a number.
+TEST_F(Intake, SoDoValuesThatAreNoneWithinBlocks) {
+  hear(kMidCycle, lead_mV);
+  hear(kMidCycle + milliseconds(60), [&](Instant at) {
+    const bool told =
+        (at + kPeriod - kMidCycle) % (kBlock * kPeriod) == Duration::zero() && at > kMidCycle + milliseconds(50);
+    return told ? lead_mV(at) : std::numeric_limits<float>::quiet_NaN();
+  });
+  hear(kMidCycle + 2 * kCycle, lead_mV);
+  EXPECT_FALSE(cycle_taught(kMidCycle));
+}
+
+}  // namespace
+}  // namespace perimap
