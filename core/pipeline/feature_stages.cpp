@@ -281,7 +281,7 @@ bool is_called_converged(const FeatureSlot& slot, Instant now) noexcept {
 
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept {
   if (slot.state == SlotState::kEmpty || slot.match.state != MatchState::kFound || !job.frame->measurable) return;
-  slot.held.push({job.frame->index, slot.match.px, slot.match.covariance_px2});
+  if (job.frame->held) slot.held.push({job.frame->index, slot.match.px, slot.match.covariance_px2});
   if (slot.match_agrees) slot.last_observed = job.frame->stamp.capture;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 
 #include "core/periodic/basis.hpp"
@@ -16,6 +17,7 @@ struct FrameRecord {
   std::uint64_t index = 0;  // the mapper's own count, without gaps
   FrameStamp stamp;
   bool measurable = false;  // pose and phase are there, so its matches can be learnt from
+  bool held = false;        // and are, where the camera is no faster than what is learnt
   CameraPose pose;  // what is not known of the breathing counts as noise of its position: either moves all alike
   Pose X_CW;
   double tracker_variance_mm2 = 0.0;  // of the position, per axis, the tracker's part alone
@@ -32,7 +34,11 @@ struct FrameRecord {
 // Written by the mapper while no stage runs, read by the workers during stages.
 class FrameHistory {
  public:
-  static constexpr std::uint64_t kCapacity = 256;
+  static constexpr std::uint64_t kHeld = 256;       // frames that are learnt from
+  static constexpr std::uint64_t kCapacity = 1024;  // with those between, to 280 frames a second
+  // Between two that are learnt from, so that the slowest heart's cycle is there until it has ended. More a second
+  // would tell little more, for errors of the R peaks are common to a cycle's matches.
+  static constexpr Duration kHeldEvery = std::chrono::milliseconds(14);
   static constexpr double kExactTracker_mm2 = 0.25;
 
   explicit FrameHistory(const BasisLayout& layout) noexcept : layout_(layout) {}
@@ -42,6 +48,12 @@ class FrameHistory {
     record = FrameRecord{};
     record.index = count_++;
     record.stamp = stamp;
+    record.held = held_ == 0 || stamp.capture < last_held_ || stamp.capture - last_held_ >= kHeldEvery;
+    if (record.held) {
+      last_held_ = stamp.capture;
+      ++held_;
+    }
+    while (held_ > kHeld || count_ - oldest_ > kCapacity) held_ -= records_[oldest_++ % kCapacity].held ? 1 : 0;
     return record;
   }
 
@@ -54,12 +66,12 @@ class FrameHistory {
 
   [[nodiscard]] Duration span() const noexcept {
     if (count_ == 0) return Duration(0);
-    return records_[(count_ - 1) % kCapacity].stamp.capture - records_[oldest() % kCapacity].stamp.capture;
+    return records_[(count_ - 1) % kCapacity].stamp.capture - records_[oldest_ % kCapacity].stamp.capture;
   }
 
   // Null when the frame has left the history.
   [[nodiscard]] const FrameRecord* find(std::uint64_t index) const noexcept {
-    if (index >= count_ || count_ - index > kCapacity) return nullptr;
+    if (index >= count_ || index < oldest_) return nullptr;
     return &records_[index % kCapacity];
   }
 
@@ -77,7 +89,7 @@ class FrameHistory {
 
   // After a beat: the frames whose cycle was still open get what is known now. At most a cycle or two of frames.
   void refresh_phases(const CardiacClock& clock, const RespiratoryClock& respiration) noexcept {
-    for (std::uint64_t i = count_; i > oldest(); --i) {
+    for (std::uint64_t i = count_; i > oldest_; --i) {
       FrameRecord& record = records_[(i - 1) % kCapacity];
       if (record.phase.exact) return;
       set_phase(record, clock, respiration);
@@ -86,7 +98,7 @@ class FrameHistory {
 
   // After breathing has been found in them: what is known of it now counts for all frames.
   void retell_respiration(const RespiratoryClock& respiration) noexcept {
-    for (std::uint64_t i = oldest(); i < count_; ++i) {
+    for (std::uint64_t i = oldest_; i < count_; ++i) {
       FrameRecord& record = records_[i % kCapacity];
       set_respiration(record, respiration);
       record.b = basis_at(layout_, record.phase.phase_rad, record.respiration);
@@ -95,16 +107,13 @@ class FrameHistory {
 
   // After another law has been taken: all frames of completed cycles, which nothing else changes any more.
   void retell_phases(const CardiacClock& clock) noexcept {
-    for (std::uint64_t i = oldest(); i < count_; ++i) {
+    for (std::uint64_t i = oldest_; i < count_; ++i) {
       FrameRecord& record = records_[i % kCapacity];
       if (record.phase.exact) set_cardiac_phase(record, clock);
     }
   }
 
  private:
-  // Index of the oldest record that is still there; count() when there is none.
-  [[nodiscard]] std::uint64_t oldest() const noexcept { return count_ > kCapacity ? count_ - kCapacity : 0; }
-
   static void set_respiration(FrameRecord& record, const RespiratoryClock& respiration) noexcept {
     record.respiration = respiration.at(record.stamp.capture);
     record.pose.position_variance_mm2 =
@@ -122,6 +131,9 @@ class FrameHistory {
   BasisLayout layout_;
   std::array<FrameRecord, kCapacity> records_{};
   std::uint64_t count_ = 0;
+  std::uint64_t oldest_ = 0;  // index of the oldest that is still there; count_ when there is none
+  std::uint64_t held_ = 0;    // of those that are there
+  Instant last_held_;
 };
 
 }  // namespace perimap

@@ -28,7 +28,7 @@ constexpr double kIdsLeftOutPerSecond = 1000.0;
 constexpr Duration kLongestCoveredPeriod = std::chrono::milliseconds(50);
 constexpr Duration kCoveredBeyond = std::chrono::milliseconds(20);
 constexpr Duration kReleasesBeyond = std::chrono::milliseconds(10);
-static_assert(kMostFramesUnderway + kCamerasBefore < FrameHistory::kCapacity);
+static_assert(kMostFramesUnderway + kCamerasBefore < FrameHistory::kHeld);
 
 }  // namespace
 

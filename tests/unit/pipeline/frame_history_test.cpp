@@ -64,5 +64,41 @@ TEST_F(FramesBeforeBreathing, HaveItsPhaseAndNoDisplacementMoreOnceItIsFound) {
   }
 }
 
+struct FramesOfACamera : ::testing::Test {
+  std::unique_ptr<FrameHistory> history = std::make_unique<FrameHistory>(BasisLayout{2, 0});
+
+  // How many of them are there to be learnt from.
+  int append(int frames, double rate_hz, double from_s = 1.0) {
+    int held = 0;
+    for (int i = 0; i < frames; ++i) {
+      const Instant capture(from_seconds(from_s + i / rate_hz));
+      held += history->append({static_cast<std::uint64_t>(i), capture, capture}).held ? 1 : 0;
+    }
+    return held;
+  }
+};
+
+TEST_F(FramesOfACamera, AreAllHeldUpToSixtyASecond) {
+  EXPECT_EQ(append(1000, 30.0), 1000);
+  EXPECT_EQ(history->find(1000 - FrameHistory::kHeld - 1), nullptr);
+  EXPECT_NE(history->find(1000 - FrameHistory::kHeld), nullptr);
+  EXPECT_EQ(append(1000, 60.0, 100.0), 1000);
+}
+
+TEST_F(FramesOfACamera, OfAFastOneEnoughAreHeldForTheSlowestHeartsCycle) {
+  for (const double rate_hz : {100.0, 120.0, 200.0, 240.0}) {
+    history = std::make_unique<FrameHistory>(BasisLayout{2, 0});
+    EXPECT_GE(append(2000, rate_hz), 2000 * 50 / static_cast<int>(rate_hz)) << rate_hz;
+    const auto two_seconds = static_cast<std::uint64_t>(2.2 * rate_hz);
+    EXPECT_NE(history->find(2000 - two_seconds), nullptr) << rate_hz;
+    EXPECT_GT(to_seconds(history->span()), 3.0) << rate_hz;
+  }
+}
+
+TEST_F(FramesOfACamera, AreHeldAfterItsClockHasJumpedBack) {
+  append(100, 30.0, 50.0);
+  EXPECT_EQ(append(100, 30.0, 1.0), 100);
+}
+
 }  // namespace
 }  // namespace perimap
