@@ -346,6 +346,21 @@ TEST(CardiacClock, WhereEctopicBeatsPrevailItIsSaidAndCyclesThatBeginNormallyTea
   EXPECT_NEAR(to_seconds(clock.predicted_length()), 0.8, 0.05) << "the next premature beat is not predicted";
 }
 
+TEST(CardiacClock, SaysWhenTheRhythmIsUnpredictable) {
+  std::mt19937 generator(8);
+  std::uniform_real_distribution<double> rr_s(0.4, 1.2);
+  CardiacClockTracker fibrillation{CardiacClockSettings{}};
+  CardiacClockTracker sinus{CardiacClockSettings{}};
+  Instant random = from_ns(5'000'000'000);
+  Instant even = random;
+  for (int i = 0; i < 60; ++i) {
+    fibrillation.on_r_peak(peak_at(random += from_seconds(rr_s(generator))));
+    sinus.on_r_peak(peak_at(even += milliseconds(800 + i % 3)));
+  }
+  EXPECT_EQ(fibrillation.clock().rhythm(), Rhythm::kUnpredictable);
+  EXPECT_EQ(sinus.clock().rhythm(), Rhythm::kPredictable);
+}
+
 TEST(CardiacClock, AfterAPrematureBeatAPauseIsExpectedAndTheCycleIsCalledEctopic) {
   Steady steady(40);
   RPeak premature = peak_at(steady.last + milliseconds(500));

@@ -66,6 +66,21 @@ TEST(RrPredictor, KnowsNothingBeforeTheFirstInterval) {
   EXPECT_EQ(predictor.deviation().count(), 0.0);
 }
 
+TEST(RrPredictor, GivesThePreviousIntervalUntilThereAreFourteen) {
+  RrPredictor predictor;
+  std::mt19937 generator(2);
+  std::normal_distribution<double> noise(0.8, 0.03);
+  for (int i = 1; i < RrPredictor::kOrder + 6; ++i) {
+    const Seconds rr(noise(generator));
+    predictor.push(rr);
+    EXPECT_EQ(next_of(predictor), rr) << i;
+  }
+  const Seconds last(noise(generator));
+  predictor.push(last);
+  EXPECT_NE(next_of(predictor), last);
+  EXPECT_NEAR(next_of(predictor).count(), 0.8, 0.1);
+}
+
 TEST(RrPredictor, ConstantRhythmGivesItself) {
   RrPredictor predictor;
   for (int i = 0; i < 100; ++i) predictor.push(Seconds(0.75));

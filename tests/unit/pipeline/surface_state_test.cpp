@@ -25,6 +25,11 @@ TEST(SurfaceState, IsDegradedWhileTheLawOfTheMotionIsUndecided) {
   EXPECT_EQ(state_of(SurfaceReason::kLawUndecided), SurfaceState::kDegraded);
 }
 
+TEST(SurfaceState, IsDegradedWhileTheRhythmIsUnpredictable) {
+  EXPECT_EQ(reason_of(locked(), Rhythm::kUnpredictable, kMapped), SurfaceReason::kRhythmUnpredictable);
+  EXPECT_EQ(state_of(SurfaceReason::kRhythmUnpredictable), SurfaceState::kDegraded);
+}
+
 TEST(SurfaceState, IsDegradedWhenTheImagesShowNothingOfTheMap) {
   EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, {.mapped = true, .not_seen = true}), SurfaceReason::kNotSeen);
   EXPECT_EQ(state_of(SurfaceReason::kNotSeen), SurfaceState::kDegraded);
