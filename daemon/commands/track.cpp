@@ -22,6 +22,7 @@
 #include "core/vision/feature_follower.hpp"
 #include "core/vision/instrument_mask.hpp"
 #include "daemon/commands/progress.hpp"
+#include "daemon/commands/same_file.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/recorded_frame.hpp"
@@ -175,11 +176,6 @@ Expected<std::unique_ptr<FrameSource>> open_source(const std::string& path) {
   return std::make_unique<RecordingSource>(*std::move(recording), path, *rate);
 }
 
-bool is_special(const std::string& path) {
-  std::error_code error;
-  return std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error);
-}
-
 // The tracks as text, in a file beside the one it will become; straight into what is there and no file (a pipe, a
 // device).
 class TrackTable {
@@ -330,13 +326,6 @@ class Tracking {
 int refuse(const Error& error, int code) {
   fmt::print(stderr, "perimap track: {}\n", error.message);
   return code;
-}
-
-bool is_same_file(const std::string& a, const std::string& b) {
-  std::error_code error;
-  if (is_special(a) || is_special(b)) return false;
-  if (std::filesystem::equivalent(a, b, error) && !error) return true;
-  return std::filesystem::weakly_canonical(a, error) == std::filesystem::weakly_canonical(b, error);
 }
 
 // What is read must not be written over.

@@ -1,0 +1,15 @@
+// Whether a command would write over what it reads.
+#pragma once
+
+#include <string>
+
+namespace perimap {
+
+// There, and no regular file: a pipe, a device.
+[[nodiscard]] bool is_special(const std::string& path);
+
+// By any name, link or hard link; also two names of one file that is not there yet. What is special is never the same:
+// writing to it puts nothing away.
+[[nodiscard]] bool is_same_file(const std::string& a, const std::string& b);
+
+}  // namespace perimap
