@@ -309,12 +309,15 @@ void add_ecg_command(CLI::App& app, int& exit_code) {
       "--beats", options->beats,
       "Write the beats to this table: time_s,class,confidence,detected_at_s; classes normal, premature, "
       "pause, noise; times of a recording count from its first ECG sample");
-  command->add_option("--rate", options->rate_hz, "Samples a second of a table without times")
+  command
+      ->add_option("--rate", options->rate_hz,
+                   "Samples a second of a table without times; times that its heading names are passed over, and the "
+                   "first sample is at 0 s")
       ->check(CLI::Range(1.0, 100000.0));
   command
       ->add_option("--column", options->column,
                    "Column of the table, or signal of the WFDB record, that holds the ECG, from 1 [2 beside times, "
-                   "else 1]")
+                   "1 of a record or of values alone; several columns without times need it]")
       ->check(CLI::Range(1, 10000));
   command->add_option("--gain", options->gain, "mV a unit of the input; the beats do not depend on it [1]");
   command->add_option("--reference", options->reference,

@@ -15,7 +15,10 @@ namespace perimap {
 // Walks the lines of a table and the fields of each line; knows where it is, for errors: "NAME:LINE:COLUMN: what".
 class CsvCursor {
  public:
-  CsvCursor(std::string name, std::string_view text) : name_(std::move(name)), rest_(text) {}
+  CsvCursor(std::string name, std::string_view text) : name_(std::move(name)), rest_(text) {
+    // What spreadsheets put before UTF-8.
+    if (rest_.starts_with("\xEF\xBB\xBF")) rest_.remove_prefix(3);
+  }
 
   // Moves to the next line that is not empty; false at the end.
   [[nodiscard]] bool next_line() noexcept {

@@ -21,6 +21,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace perimap;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   for (const EcgCsvOptions& options : {EcgCsvOptions{}, EcgCsvOptions{.rate_hz = 250.0, .column = {}, .gain = 2.0},
+                                       EcgCsvOptions{.rate_hz = 250.0, .column = 2, .gain = 1.0},
                                        EcgCsvOptions{.rate_hz = {}, .column = 3, .gain = 1.0}}) {
     const auto trace = parse_ecg_csv(text, "fuzz.csv", options);
     check(trace);

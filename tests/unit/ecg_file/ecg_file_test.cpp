@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ std::string error_of(const std::string& text, const EcgCsvOptions& options = {})
   const auto trace = parse_ecg_csv(text, "ecg.csv", options);
   return trace ? "" : trace.error().message;
 }
+
+EcgCsvOptions at_rate(std::optional<int> column = {}) { return {.rate_hz = 250.0, .column = column, .gain = 1.0}; }
 
 TEST(EcgCsv, ReadsTimesAndValues) {
   const auto trace = parse_ecg_csv("time_s,mV\r\n0.0,0.5\n\n# a remark\n0.01,\n0.02,nan\n0.03,-1e-1\n", "e", {});
@@ -55,6 +58,78 @@ TEST(EcgCsv, NamesLineAndColumnOfWhatIsWrong) {
     const std::string message = error_of(garbled);
     EXPECT_FALSE(message.empty()) << garbled;
     EXPECT_EQ(message.find('\n'), std::string::npos);
+  }
+}
+
+// What a heading must say for its first column to be passed over.
+TEST(EcgCsv, AtARateTimesAreThoseThatTheHeadingNames) {
+  for (const char* heading : {"time_s,mV\n", "Time,mV\n", "TIME , mV\n", "\"Elapsed time\",\"MLII\"\n", " time,mV\n",
+                              "\xEF\xBB\xBFtime_s,mV\n", "t (s),mV\n", "# a remark\n\ntime,mV\n",
+                              "'Elapsed time','MLII'\n'hh:mm:ss.mmm','mV'\n"}) {
+    const auto trace = parse_ecg_csv(std::string(heading) + "60,0.5\n61,0.25\n", "e", at_rate());
+    ASSERT_TRUE(trace) << heading << trace.error().message;
+    EXPECT_EQ(trace->mV, (std::vector<float>{0.5F, 0.25F})) << heading;
+    EXPECT_EQ(trace->time_s, (std::vector<double>{0.0, 0.004})) << heading;
+  }
+}
+
+TEST(EcgCsv, AtARateSeveralColumnsWithoutTimesNeedToBeTold) {
+  for (const char* text : {"60,0.5\n61,0.25\n", "I,II\n60,0.5\n61,0.25\n", "'sample #','MLII'\n60,0.5\n61,0.25\n",
+                           "centimetre,mV\n60,0.5\n61,0.25\n"}) {
+    const std::string error = error_of(text, at_rate());
+    EXPECT_EQ(error.rfind("ecg.csv:1:1: 2 columns, and no heading that begins with a time: say by --column", 0), 0U)
+        << text << error;
+    const auto second = parse_ecg_csv(text, "e", at_rate(2));
+    ASSERT_TRUE(second) << text << second.error().message;
+    EXPECT_EQ(second->mV, (std::vector<float>{0.5F, 0.25F})) << text;
+    const auto first = parse_ecg_csv(text, "e", at_rate(1));
+    ASSERT_TRUE(first) << text << first.error().message;
+    EXPECT_EQ(first->mV, (std::vector<float>{60.0F, 61.0F})) << text;
+  }
+  EXPECT_EQ(error_of("time_s,mV\n0,1\n", at_rate(1)), "ecg.csv:1:1: column 1 holds the time; choose another");
+}
+
+TEST(EcgCsv, ReadsHeadingsWithUnitsSpacesAndQuotes) {
+  for (const char* text : {"'Elapsed time','MLII'\n'seconds','mV'\n60.5,0.25\n", "time,ecg\n(s),[uV]\n60.5,0.25\n",
+                           "time_s,mV\n 60.5 ,\t0.25\n", "\"60.5\",\"0.25\"\n",
+                           "\xEF\xBB\xBF"
+                           "60.5,0.25\n",
+                           "time,0,1\n60.5,0.25,1\n"}) {
+    const auto trace = parse_ecg_csv(text, "e", {});
+    ASSERT_TRUE(trace) << text << trace.error().message;
+    EXPECT_EQ(trace->time_s, (std::vector<double>{60.5})) << text;
+    EXPECT_EQ(trace->mV, (std::vector<float>{0.25F})) << text;
+  }
+  const auto alone = parse_ecg_csv("MLII\nmV\n0.25\n", "e", at_rate());
+  ASSERT_TRUE(alone) << alone.error().message;
+  EXPECT_EQ(alone->mV, (std::vector<float>{0.25F}));
+}
+
+TEST(EcgCsv, TakesNoLineOfValuesForAHeadingOrUnits) {
+  struct Case {
+    const char* text;
+    EcgCsvOptions options;
+    const char* error;
+  };
+  const EcgCsvOptions rate = at_rate();
+  for (const Case& one : {
+           Case{"x,1\n0,1\n", {}, "ecg.csv:1:1: expected a number, found 'x'"},
+           Case{"time,ecg\n'minutes','mV'\n1,1\n", {}, "ecg.csv:2:1: expected times in seconds, found 'minutes'"},
+           Case{"'Elapsed time','I'\n'hh:mm:ss','mV'\n1,1\n",
+                {},
+                "ecg.csv:2:1: expected times in seconds, found 'hh:mm:ss'"},
+           Case{"time,ecg\ns,mV\ns,mV\n1,1\n", {}, "ecg.csv:3:1: expected a number, found 's'"},
+           Case{"s,mV\n", {}, "ecg.csv: there are no samples in it"},
+           Case{"time,ecg\nx,y\n", {}, "ecg.csv:2:1: expected a number, found 'x'"},
+           Case{"0,1\ns,mV\n", {}, "ecg.csv:2:1: expected a number, found 's'"},
+           Case{"mV\nx\n1\n", rate, "ecg.csv:2:1: expected a number, found 'x'"},
+           Case{"mV\n0,5\n", rate, "ecg.csv:2:1: expected one value in a line, as in the first"},
+           Case{"1\n2,\n", rate, "ecg.csv:2:1: expected one value in a line, as in the first"},
+           Case{"time_s,mV\n0, \" \n", {}, "ecg.csv:2:3: expected a number, found ' \" '"},
+           Case{"'0:00.000',1\n", {}, "ecg.csv:1:1: expected a number, found ''0:00.000''"},
+           Case{"time\n1\n", rate, "ecg.csv:1:1: column 1 holds the time; choose another"},
+       }) {
+    EXPECT_EQ(error_of(one.text, one.options), one.error) << one.text;
   }
 }
 
