@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -154,37 +155,56 @@ std::string beat_rows(const EcgAnalysis& analysis) {
   return rows;
 }
 
-nlohmann::json to_json(const EcgAnalysis& analysis, const PredictionErrors& errors) {
-  const DelayFigures delay = delay_figures(analysis);
+std::array<int, 4> count_classes(const EcgAnalysis& analysis) {
   std::array<int, 4> classes{};
   for (const AnalysedBeat& beat : analysis.beats) ++classes[static_cast<std::size_t>(beat.peak.beat_class)];
+  return classes;
+}
+
+nlohmann::json milliseconds(std::optional<double> s) { return s ? nlohmann::json(1e3 * *s) : nlohmann::json(nullptr); }
+
+nlohmann::json to_json(const EcgAnalysis& analysis, const PredictionErrors& errors) {
+  const auto delay = delay_figures(analysis);
+  const auto classes = count_classes(analysis);
+  const auto delay_ms = [&](double DelayFigures::*figure) {
+    return delay ? milliseconds((*delay).*figure) : nlohmann::json(nullptr);
+  };
   nlohmann::json json = {
       {"duration_s", analysis.duration_s},
       {"beats", analysis.beats.size()},
       {"classes", {{"normal", classes[0]}, {"premature", classes[1]}, {"pause", classes[2]}, {"noise", classes[3]}}},
-      {"delay_ms", {{"median", 1e3 * delay.median_s}, {"p95", 1e3 * delay.p95_s}}},
+      {"delay_ms", {{"median", delay_ms(&DelayFigures::median_s)}, {"p95", delay_ms(&DelayFigures::p95_s)}}},
       {"unusable_s", analysis.unusable_s},
       {"noisy_s", analysis.noisy_s},
       {"unpredictable_s", analysis.unpredictable_s},
       {"prediction", {{"cycles", errors.cycles}}}};
-  for (std::size_t i = 0; i < errors.rms_s.size(); ++i) {
-    json["prediction"][std::string(name_of(kPredictionMethods[i])) + "_rms_ms"] = 1e3 * errors.rms_s[i];
+  for (std::size_t i = 0; i < kPredictionMethods.size(); ++i) {
+    json["prediction"][std::string(name_of(kPredictionMethods[i])) + "_rms_ms"] =
+        errors.rms_s ? milliseconds((*errors.rms_s)[i]) : nlohmann::json(nullptr);
   }
   return json;
 }
 
-nlohmann::json to_json(const Rate& rate) {
-  return {{"percent", rate.percent()}, {"hits", rate.hits}, {"of", rate.all}};
+nlohmann::json to_json(std::optional<double> figure) {
+  return figure ? nlohmann::json(*figure) : nlohmann::json(nullptr);
 }
 
-nlohmann::json to_json(const BeatScore& score) {
+nlohmann::json to_json(const Rate& rate) {
+  return {{"percent", to_json(rate.percent())}, {"hits", rate.hits}, {"of", rate.all}};
+}
+
+nlohmann::json to_json(const BeatScore& score, std::size_t left_out) {
   nlohmann::json json = {{"sensitivity", to_json(score.sensitivity)},
                          {"positive_predictivity", to_json(score.positive_predictivity)},
-                         {"f1_percent", score.f1_percent},
+                         {"f1_percent", to_json(score.f1_percent)},
+                         {"annotations_left_out", left_out},
                          {"missed_s", score.missed_s},
                          {"extra_s", score.extra_s},
-                         {"timing_ms", {{"median", 1e3 * score.timing_median_s}, {"rms", 1e3 * score.timing_rms_s}}}};
-  if (score.peak_rms_s) json["timing_ms"]["to_local_peak_rms"] = 1e3 * *score.peak_rms_s;
+                         {"timing_ms",
+                          {{"beats", score.timed},
+                           {"median", milliseconds(score.timing_median_s)},
+                           {"rms", milliseconds(score.timing_rms_s)},
+                           {"to_local_peak_rms", milliseconds(score.peak_rms_s)}}}};
   if (!score.has_kinds) return json;
   json["premature"] = {{"sensitivity", to_json(score.premature_sensitivity)},
                        {"precision", to_json(score.premature_precision)}};
@@ -199,34 +219,42 @@ nlohmann::json to_json(const BeatScore& score) {
 }
 
 std::string to_text(const EcgAnalysis& analysis, const PredictionErrors& errors) {
-  const DelayFigures delay = delay_figures(analysis);
-  std::array<int, 4> classes{};
-  for (const AnalysedBeat& beat : analysis.beats) ++classes[static_cast<std::size_t>(beat.peak.beat_class)];
-  return fmt::format(
-      "beats       {} in {:.1f} s: {} normal, {} premature, {} after a pause, {} thought noise\n"
-      "delay       R peak to detection, median / 95 %: {:.0f} / {:.0f} ms\n"
-      "signal      unusable for {:.1f} s, noisy for {:.1f} s; rhythm unpredictable for {:.1f} s\n"
-      "prediction  next cycle, RMS over {} normal cycles: previous {:.1f}, mean of 8 {:.1f}, autoregressive {:.1f} "
-      "ms\n",
-      analysis.beats.size(), analysis.duration_s, classes[0], classes[1], classes[2], classes[3], 1e3 * delay.median_s,
-      1e3 * delay.p95_s, analysis.unusable_s, analysis.noisy_s, analysis.unpredictable_s, errors.cycles,
-      1e3 * errors.rms_s[0], 1e3 * errors.rms_s[1], 1e3 * errors.rms_s[2]);
+  const auto classes = count_classes(analysis);
+  std::string text =
+      fmt::format("beats       {} in {:.1f} s: {} normal, {} premature, {} after a pause, {} thought noise\n",
+                  analysis.beats.size(), analysis.duration_s, classes[0], classes[1], classes[2], classes[3]);
+  const auto delay = delay_figures(analysis);
+  text += "delay       R peak to detection, median / 95 %: ";
+  text += delay ? fmt::format("{:.0f} / {:.0f} ms\n", 1e3 * delay->median_s, 1e3 * delay->p95_s) : "none\n";
+  text += fmt::format("signal      unusable for {:.1f} s, noisy for {:.1f} s; rhythm unpredictable for {:.1f} s\n",
+                      analysis.unusable_s, analysis.noisy_s, analysis.unpredictable_s);
+  if (!errors.rms_s) return text + "prediction  next cycle: none, there are no normal cycles to tell it from\n";
+  const auto& rms_s = *errors.rms_s;
+  return text + fmt::format(
+                    "prediction  next cycle, RMS over {} normal cycles: previous {:.1f}, mean of 8 {:.1f}, "
+                    "autoregressive {:.1f} ms\n",
+                    errors.cycles, 1e3 * rms_s[0], 1e3 * rms_s[1], 1e3 * rms_s[2]);
 }
 
-std::string to_text(const BeatScore& score) {
-  std::string text = fmt::format(
-      "reference   sensitivity {:.2f} % ({} of {}), positive predictivity {:.2f} % ({} of {}), F1 {:.3f} %\n"
-      "timing      normal beats to the reference: median {:+.1f} ms, RMS about it {:.1f} ms",
-      score.sensitivity.percent(), score.sensitivity.hits, score.sensitivity.all, score.positive_predictivity.percent(),
-      score.positive_predictivity.hits, score.positive_predictivity.all, score.f1_percent, 1e3 * score.timing_median_s,
-      1e3 * score.timing_rms_s);
+std::string to_text(const Rate& rate) {
+  const auto percent = rate.percent();
+  return fmt::format("{} ({} of {})", percent ? fmt::format("{:.2f} %", *percent) : "none", rate.hits, rate.all);
+}
+
+std::string to_text(const BeatScore& score, std::size_t left_out) {
+  std::string text = fmt::format("reference   sensitivity {}, positive predictivity {}, F1 {}\n",
+                                 to_text(score.sensitivity), to_text(score.positive_predictivity),
+                                 score.f1_percent ? fmt::format("{:.3f} %", *score.f1_percent) : "none");
+  if (left_out > 0) text += fmt::format("            annotations in it that are no beats, left out: {}\n", left_out);
+  text += "timing      normal beats to the reference: ";
+  text += score.timing_median_s ? fmt::format("median {:+.1f} ms, RMS about it {:.1f} ms", 1e3 * *score.timing_median_s,
+                                              1e3 * *score.timing_rms_s)
+                                : "none";
   if (score.peak_rms_s) text += fmt::format("; to the local peak: RMS {:.1f} ms", 1e3 * *score.peak_rms_s);
   text += '\n';
   if (!score.has_kinds) return text;
-  text += fmt::format("premature   sensitivity {:.2f} % ({} of {}), precision {:.2f} % ({} of {})\n",
-                      score.premature_sensitivity.percent(), score.premature_sensitivity.hits,
-                      score.premature_sensitivity.all, score.premature_precision.percent(),
-                      score.premature_precision.hits, score.premature_precision.all);
+  text += fmt::format("premature   sensitivity {}, precision {}\n", to_text(score.premature_sensitivity),
+                      to_text(score.premature_precision));
   for (const auto& [symbol, counts] : score.symbols) {
     text += fmt::format("  {:<9} normal {}, premature {}, pause {}, noise {}, missed {}\n", symbol, counts[0],
                         counts[1], counts[2], counts[3], counts[4]);
@@ -255,13 +283,13 @@ Expected<void> run(const Options& options) {
   const auto trace = read_trace(options);
   if (!trace) return tl::unexpected(trace.error());
   if (auto fits = check_rate(*trace, options.input); !fits) return fits;
-  std::vector<ReferenceBeat> reference;
+  BeatTable reference;
   if (!options.reference.empty()) {
     const auto text = read_whole(options.reference, "table of reference beats");
     if (!text) return tl::unexpected(text.error());
     auto beats = parse_beat_table(*text, options.reference);
     if (!beats) return tl::unexpected(beats.error());
-    reference = std::move(*beats);
+    reference = *std::move(beats);
   }
 
   std::optional<Progress> progress;
@@ -279,17 +307,17 @@ Expected<void> run(const Options& options) {
     const auto written = write_text_file(options.beats, beat_rows(analysis));
     if (!written) return tl::unexpected(written.error());
   }
-  const PredictionErrors errors = prediction_errors(analysis, reference);
+  const PredictionErrors errors = prediction_errors(analysis, reference.beats);
   std::optional<BeatScore> score;
-  if (!reference.empty()) score = score_beats(reference, analysis, *trace);
+  if (!reference.beats.empty()) score = score_beats(reference.beats, analysis, *trace);
   if (options.json) {
     nlohmann::json json = to_json(analysis, errors);
     json["input"] = options.input;
-    if (score) json["score"] = to_json(*score);
+    if (score) json["score"] = to_json(*score, reference.left_out);
     fmt::print("{}\n", json.dump(2));
   } else {
     fmt::print("{}", to_text(analysis, errors));
-    if (score) fmt::print("{}", to_text(*score));
+    if (score) fmt::print("{}", to_text(*score, reference.left_out));
   }
   return {};
 }
@@ -321,8 +349,10 @@ void add_ecg_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1, 10000));
   command->add_option("--gain", options->gain, "mV a unit of the input; the beats do not depend on it [1]");
   command->add_option("--reference", options->reference,
-                      "Score against these beats: a table of time_s or time_s,symbol with MIT-BIH symbols or classes; "
-                      "a beat counts as found within 150 ms");
+                      "Score against these beats: a table of time_s, or with a kind in a column that the heading calls "
+                      "symbol or class (without a heading in the second): MIT-BIH symbols, of which those that are no "
+                      "beats are left out, * any other beat, or the words normal and premature. A beat counts as found "
+                      "within 150 ms");
   command->add_flag("--json", options->json, "Print the figures as JSON");
   command->callback([options, &exit_code] {
     if (const std::string wrong = misuse(*options); !wrong.empty()) {

@@ -81,12 +81,11 @@ std::optional<double> peak_near(const EcgTrace& trace, double t) {
   return trace.time_s[first + *peak];
 }
 
-double root_mean(double squares, std::size_t count) {
-  return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
-}
-
-double median_of(std::vector<double> values) {
-  return values.empty() ? 0.0 : upper_median(values.begin(), values.end());
+// Of at least one value.
+double root_mean_square(const std::vector<double>& values) {
+  double squares = 0.0;
+  for (const double value : values) squares += value * value;
+  return std::sqrt(squares / static_cast<double>(values.size()));
 }
 
 }  // namespace
@@ -128,16 +127,17 @@ BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnal
   score.sensitivity = {found, static_cast<int>(reference.size())};
   score.positive_predictivity = {found, static_cast<int>(beats.size())};
   const int both = static_cast<int>(reference.size() + beats.size());
-  score.f1_percent = both > 0 ? 200.0 * found / both : 0.0;
+  if (both > 0) score.f1_percent = 200.0 * found / both;
 
   score.timed = static_cast<int>(apart_s.size());
-  score.timing_median_s = median_of(apart_s);
-  double squares = 0.0;
-  for (const double apart : apart_s) squares += (apart - score.timing_median_s) * (apart - score.timing_median_s);
-  score.timing_rms_s = root_mean(squares, apart_s.size());
-  squares = 0.0;
-  for (const double apart : from_peak_s) squares += apart * apart;
-  if (!from_peak_s.empty()) score.peak_rms_s = root_mean(squares, from_peak_s.size());
+  if (!apart_s.empty()) {
+    auto sorted = apart_s;
+    const double median_s = upper_median(sorted.begin(), sorted.end());
+    for (double& apart : apart_s) apart -= median_s;
+    score.timing_median_s = median_s;
+    score.timing_rms_s = root_mean_square(apart_s);
+  }
+  if (!from_peak_s.empty()) score.peak_rms_s = root_mean_square(from_peak_s);
   return score;
 }
 
@@ -171,23 +171,23 @@ PredictionErrors prediction_errors(const EcgAnalysis& analysis, const std::vecto
       last = beat;
     }
   }
-  for (std::size_t i = 0; i < squares.size(); ++i) {
-    errors.rms_s[i] = root_mean(squares[i], static_cast<std::size_t>(errors.cycles));
-  }
+  if (errors.cycles == 0) return errors;
+  for (double& rms : squares) rms = std::sqrt(rms / errors.cycles);
+  errors.rms_s = squares;
   return errors;
 }
 
-DelayFigures delay_figures(const EcgAnalysis& analysis) {
+std::optional<DelayFigures> delay_figures(const EcgAnalysis& analysis) {
   std::vector<double> delays_s;
   for (const AnalysedBeat& beat : analysis.beats) {
     delays_s.push_back(to_seconds(beat.peak.detected_at - beat.peak.time));
   }
-  if (delays_s.empty()) return {};
+  if (delays_s.empty()) return std::nullopt;
   std::sort(delays_s.begin(), delays_s.end());
   const auto at = [&](double q) {
     return delays_s[static_cast<std::size_t>(q * static_cast<double>(delays_s.size() - 1))];
   };
-  return {at(0.5), at(0.95)};
+  return DelayFigures{at(0.5), at(0.95)};
 }
 
 }  // namespace perimap

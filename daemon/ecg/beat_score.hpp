@@ -18,15 +18,20 @@ struct Rate {
   int hits = 0;
   int all = 0;
 
-  [[nodiscard]] double percent() const noexcept { return all > 0 ? 100.0 * hits / all : 0.0; }
+  // None of nothing.
+  [[nodiscard]] std::optional<double> percent() const noexcept {
+    if (all == 0) return std::nullopt;
+    return 100.0 * hits / all;
+  }
 };
 
+// A figure that there is nothing to tell from is not there.
 struct BeatScore {
   static constexpr double kWindow_s = 0.150;  // ANSI/AAMI EC57
 
   Rate sensitivity;            // reference beats found
   Rate positive_predictivity;  // detections that are reference beats
-  double f1_percent = 0.0;
+  std::optional<double> f1_percent;
   std::vector<double> missed_s;
   std::vector<double> extra_s;
 
@@ -34,8 +39,8 @@ struct BeatScore {
   // its median; and to the largest local peak of the signal within 60 ms of the reference. Without those classed as
   // noise, whose times nothing goes by; they count as found all the same.
   int timed = 0;  // beats
-  double timing_median_s = 0.0;
-  double timing_rms_s = 0.0;
+  std::optional<double> timing_median_s;
+  std::optional<double> timing_rms_s;
   std::optional<double> peak_rms_s;
 
   bool has_kinds = false;
@@ -52,7 +57,7 @@ struct BeatScore {
 // (both beats found), else by class.
 struct PredictionErrors {
   int cycles = 0;
-  std::array<double, 3> rms_s{};  // of kPredictionMethods
+  std::optional<std::array<double, 3>> rms_s;  // of kPredictionMethods; where there are cycles
 };
 
 [[nodiscard]] PredictionErrors prediction_errors(const EcgAnalysis& analysis,
@@ -64,6 +69,7 @@ struct DelayFigures {
   double p95_s = 0.0;
 };
 
-[[nodiscard]] DelayFigures delay_figures(const EcgAnalysis& analysis);
+// None without beats.
+[[nodiscard]] std::optional<DelayFigures> delay_figures(const EcgAnalysis& analysis);
 
 }  // namespace perimap

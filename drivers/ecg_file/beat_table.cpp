@@ -1,7 +1,12 @@
 #include "drivers/ecg_file/beat_table.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
 
+#include "drivers/ecg_file/table_field.hpp"
 #include "drivers/text_file/csv.hpp"
 
 namespace perimap {
@@ -16,38 +21,69 @@ ReferenceBeat::Kind kind_of(std::string_view symbol) {
   return ReferenceBeat::Kind::kUnknown;
 }
 
+// What PhysioNet lists as annotations that are no beats, but for `*`.
+bool is_beat(std::string_view symbol) {
+  return symbol.size() != 1 || std::string_view("[!]x()ptu`'^|~+sTD=\"@").find(symbol) == std::string_view::npos;
+}
+
+// The column that a heading names as that of the symbols.
+std::optional<std::size_t> symbol_column(const std::vector<std::string_view>& heading) {
+  const auto named = std::find_if(heading.begin() + 1, heading.end(), [](std::string_view field) {
+    const std::string name = word_of(field);
+    return name == "symbol" || name == "class";
+  });
+  if (named == heading.end()) return std::nullopt;
+  return static_cast<std::size_t>(named - heading.begin());
+}
+
+// Cut to what can be shown.
+std::string symbol_of(std::string_view field) {
+  constexpr std::size_t kLongest = 16;
+  if (field == "\"\"") return "\"";  // as a quoted field has it
+  return std::string(field.substr(0, kLongest));
+}
+
 }  // namespace
 
-Expected<std::vector<ReferenceBeat>> parse_beat_table(std::string_view text, const std::string& name) {
-  std::vector<ReferenceBeat> beats;
+Expected<BeatTable> parse_beat_table(std::string_view text, const std::string& name) {
+  BeatTable table;
   CsvCursor rows(name, text);
   bool first = true;
-  bool has_kind = false;
+  bool has_heading = false;
+  std::optional<std::size_t> symbols;
+  double last_s = -std::numeric_limits<double>::infinity();  // of any annotation
   while (rows.next_line()) {
-    std::string_view line = rows.rest_of_line();
-    if (line.front() == '#') continue;
-    if (first) {
-      first = false;
-      if (line.substr(0, 4) == "time") {
-        const std::size_t comma = line.find(',');
-        line = comma == std::string_view::npos ? std::string_view{} : line.substr(comma + 1);
-        line = line.substr(0, line.find(','));
-        has_kind = line == "symbol" || line == "class";
-        continue;
-      }
+    if (rows.rest_of_line().front() == '#') continue;
+    const auto fields = fields_of(rows.rest_of_line());
+    if (std::exchange(first, false) && is_time_name(fields[0])) {
+      has_heading = true;
+      symbols = symbol_column(fields);
+      continue;
     }
     ReferenceBeat beat;
-    const auto time = rows.number<double>();
-    if (!time) return tl::unexpected(time.error());
+    const auto time = to_number(fields[0]);
+    if (!time) return rows.wrong("expected a number", fields[0]);
     beat.time_s = *time;
     if (!(std::abs(beat.time_s) < 1e8)) return rows.wrong("the time is out of bounds");
-    if (!beats.empty() && beat.time_s <= beats.back().time_s) return rows.wrong("the beats do not ascend");
-    if (has_kind) beat.symbol = std::string(rows.field().substr(0, 16));
+    if (has_heading) {
+      if (symbols && *symbols < fields.size()) beat.symbol = symbol_of(fields[*symbols]);
+    } else if (fields.size() > 1 && !to_number(fields[1])) {
+      beat.symbol = symbol_of(fields[1]);
+    }
+    // What is no beat may stand beside one.
+    const bool counts = is_beat(beat.symbol);
+    const bool repeats = counts && !table.beats.empty() && beat.time_s <= table.beats.back().time_s;
+    if (beat.time_s < last_s || repeats) return rows.wrong("the beats do not ascend");
+    last_s = beat.time_s;
+    if (!counts) {
+      ++table.left_out;
+      continue;
+    }
     beat.kind = kind_of(beat.symbol);
-    beats.push_back(std::move(beat));
+    table.beats.push_back(std::move(beat));
   }
-  if (beats.empty()) return fail(name + ": there are no beats in it");
-  return beats;
+  if (table.beats.empty()) return fail(name + ": there are no beats in it");
+  return table;
 }
 
 }  // namespace perimap

@@ -31,6 +31,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (!(trace->time_s[i] > trace->time_s[i - 1])) std::abort();
     }
   }
-  check(parse_beat_table(text, "fuzz.csv"));
+  const auto table = parse_beat_table(text, "fuzz.csv");
+  check(table);
+  if (table) {
+    if (table->beats.empty()) std::abort();
+    for (std::size_t i = 1; i < table->beats.size(); ++i) {
+      if (!(table->beats[i].time_s > table->beats[i - 1].time_s)) std::abort();
+    }
+  }
   return 0;
 }

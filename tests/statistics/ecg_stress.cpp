@@ -56,7 +56,7 @@ Lead load(const EmbeddedEcgRecord& embedded, bool whole) {
     if (!whole && lead.duration_s() >= kExcerpt_s) break;
     lead.mV.push_back(record->mV(i));
   }
-  for (const ReferenceBeat& beat : *beats) {
+  for (const ReferenceBeat& beat : beats->beats) {
     if (beat.time_s < lead.duration_s()) lead.beats.push_back(beat);
   }
   return lead;
@@ -409,7 +409,7 @@ void beats_under_disturbances(const Extent& extent, const HeartMesh&, GoalReport
       const Lead disturbed = disturbance.apply(lead, generator);
       EcgTrace trace;
       const EcgAnalysis analysis = analysed(disturbed, trace);
-      row.push_back(score_beats(disturbed.beats, analysis, trace).f1_percent);
+      row.push_back(score_beats(disturbed.beats, analysis, trace).f1_percent.value());
       if (unpredictable.size() < leads.size()) {
         unpredictable.push_back(100.0 * analysis.unpredictable_s / analysis.duration_s);
       }

@@ -65,7 +65,7 @@ double detector_offset_s(std::string_view name) {
   const auto embedded = std::find_if(records.begin(), records.end(), [&](const auto& one) { return one.name == name; });
   const auto beats = parse_beat_table(embedded->beats_csv, std::string(name));
   if (!beats) throw std::runtime_error(beats.error().message);
-  return score_beats(*beats, analyse(trace, [](std::size_t) { return true; }), trace).timing_median_s;
+  return score_beats(beats->beats, analyse(trace, [](std::size_t) { return true; }), trace).timing_median_s.value();
 }
 
 // Frames, phases and poses of the session, and no features yet.
