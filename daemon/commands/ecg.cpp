@@ -14,6 +14,7 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "core/phase/ecg_filter.hpp"
@@ -53,20 +54,32 @@ Expected<std::string> read_whole(const std::string& file, std::string_view what)
   return read_text_file(file, error ? 0 : static_cast<std::size_t>(size), what);
 }
 
-// The ECG channel of a recording; samples while the lead was off have no value.
-Expected<EcgTrace> read_recorded(const std::string& file, double gain) {
-  auto reader = RecordingReader::open(file);
+struct Input {
+  EcgTrace trace;
+  std::vector<Error> damage;  // what of the file could not be read
+};
+
+// The ECG channel of a recording; samples while the lead was off have no value. What is whole of a damaged one is
+// taken.
+Expected<Input> read_recorded(const std::string& file, double gain) {
+  auto reader = RecordingReader::open(file, ReadMode::kWhole);
   if (!reader) return tl::unexpected(reader.error());
   const std::array wanted{channels::kEcgSamples};
-  if (const auto selected = reader->select(wanted); !selected) return tl::unexpected(selected.error());
-  EcgTrace trace;
+  const auto selected = reader->select(wanted);
+  Input input;
+  EcgTrace& trace = input.trace;
   std::optional<std::int64_t> begin_ns;
-  for (;;) {
+  std::size_t unusable = 0;  // blocks
+  Error first_unusable;
+  while (selected) {
     const auto message = reader->next();
     if (!message) return tl::unexpected(message.error());
     if (!*message) break;
     const auto samples = reader->decode<perimap_EcgSamples>(**message);
-    if (!samples) return tl::unexpected(samples.error());
+    if (!samples) {
+      if (unusable++ == 0) first_unusable = samples.error();
+      continue;
+    }
     const auto& block = **samples;
     if (!begin_ns) begin_ns = block.first_sample_time_ns;
     for (std::uint32_t i = 0; i < block.ecg_mV._length; ++i) {
@@ -79,15 +92,22 @@ Expected<EcgTrace> read_recorded(const std::string& file, double gain) {
       trace.mV.push_back(static_cast<float>(mV));
     }
   }
-  if (trace.mV.empty()) return fail(file + ": there are no ECG samples in it");
-  return trace;
+  input.damage = reader->damage();
+  if (unusable > 0) {
+    input.damage.push_back({fmt::format("{} ECG blocks passed over, the first: {}", unusable, first_unusable.message)});
+  }
+  if (!trace.mV.empty()) return input;
+  if (!input.damage.empty()) return fail(input.damage.front().message + "; nothing of its ECG is whole");
+  if (!selected) return tl::unexpected(selected.error());
+  return fail(file + ": there are no ECG samples in it");
 }
 
+std::filesystem::path wfdb_header(std::filesystem::path path) { return path.replace_extension(".hea"); }
+
 bool is_wfdb(const std::filesystem::path& path) {
-  std::filesystem::path header = path;
-  header.replace_extension(".hea");
+  std::error_code unknown;
   return path.extension() == ".hea" || path.extension() == ".dat" ||
-         (path.extension().empty() && std::filesystem::exists(header));
+         (path.extension().empty() && std::filesystem::exists(wfdb_header(path), unknown));
 }
 
 // What is wrong with the options; empty when nothing is.
@@ -100,22 +120,22 @@ std::string misuse(const Options& options) {
   return {};
 }
 
-Expected<EcgTrace> read_trace(const Options& options) {
+Expected<Input> read_input(const Options& options) {
   const std::filesystem::path path(options.input);
-  const std::string extension = path.extension().string();
-  if (extension == ".mcap") return read_recorded(options.input, options.gain);
+  if (path.extension() == ".mcap") return read_recorded(options.input, options.gain);
+  Expected<EcgTrace> trace;
   if (is_wfdb(path)) {
-    std::filesystem::path header = path;
-    header.replace_extension(".hea");
-    auto trace = read_wfdb(header.string(), options.column.value_or(1));
+    trace = read_wfdb(wfdb_header(path), options.column.value_or(1));
     if (trace) {
       for (float& mV : trace->mV) mV *= static_cast<float>(options.gain);
     }
-    return trace;
+  } else {
+    const auto text = read_whole(options.input, "ECG table");
+    if (!text) return tl::unexpected(text.error());
+    trace = parse_ecg_csv(*text, options.input, {options.rate_hz, options.column, options.gain});
   }
-  const auto text = read_whole(options.input, "ECG table");
-  if (!text) return tl::unexpected(text.error());
-  return parse_ecg_csv(*text, options.input, {options.rate_hz, options.column, options.gain});
+  if (!trace) return tl::unexpected(trace.error());
+  return Input{*std::move(trace), {}};
 }
 
 std::string_view name_of(BeatClass beat_class) {
@@ -280,9 +300,10 @@ Expected<void> check_rate(const EcgTrace& trace, const std::string& input) {
 Expected<void> run(const Options& options) {
   auto stop = StopSignal::install();
   if (!stop) return tl::unexpected(stop.error());
-  const auto trace = read_trace(options);
-  if (!trace) return tl::unexpected(trace.error());
-  if (auto fits = check_rate(*trace, options.input); !fits) return fits;
+  const auto input = read_input(options);
+  if (!input) return tl::unexpected(input.error());
+  const EcgTrace& trace = input->trace;
+  if (auto fits = check_rate(trace, options.input); !fits) return fits;
   BeatTable reference;
   if (!options.reference.empty()) {
     const auto text = read_whole(options.reference, "table of reference beats");
@@ -291,11 +312,16 @@ Expected<void> run(const Options& options) {
     if (!beats) return tl::unexpected(beats.error());
     reference = *std::move(beats);
   }
+  for (const Error& damage : input->damage) fmt::print(stderr, "perimap ecg: {}\n", damage.message);
+  if (!input->damage.empty()) {
+    fmt::print(stderr, "perimap ecg: {}: is damaged: what is whole of its ECG ends {:.3f} s after its first sample\n",
+               options.input, trace.time_s.back());
+  }
 
   std::optional<Progress> progress;
-  if (trace->mV.size() > kLongWithoutProgress) progress.emplace("samples", trace->mV.size());
+  if (trace.mV.size() > kLongWithoutProgress) progress.emplace("samples", trace.mV.size());
   bool stopped = false;
-  const EcgAnalysis analysis = analyse(*trace, [&](std::size_t done) {
+  const EcgAnalysis analysis = analyse(trace, [&](std::size_t done) {
     if (progress) progress->update(done);
     stopped = stopped || stop->requested();
     return !stopped;
@@ -309,10 +335,12 @@ Expected<void> run(const Options& options) {
   }
   const PredictionErrors errors = prediction_errors(analysis, reference.beats);
   std::optional<BeatScore> score;
-  if (!reference.beats.empty()) score = score_beats(reference.beats, analysis, *trace);
+  if (!reference.beats.empty()) score = score_beats(reference.beats, analysis, trace);
   if (options.json) {
     nlohmann::json json = to_json(analysis, errors);
     json["input"] = options.input;
+    json["input_damage"] = nlohmann::json::array();
+    for (const Error& damage : input->damage) json["input_damage"].push_back(damage.message);
     if (score) json["score"] = to_json(*score, reference.left_out);
     fmt::print("{}\n", json.dump(2));
   } else {
@@ -330,8 +358,9 @@ void add_ecg_command(CLI::App& app, int& exit_code) {
       "ecg", "Find and class the beats of an ECG as the daemon would, and score them against a reference");
   command
       ->add_option("INPUT", options->input,
-                   "A table of time_s,mV a line or of values alone with --rate (CSV), a WFDB record (.hea, formats "
-                   "212 and 16), or a recording (.mcap)")
+                   "A table of time_s,mV a line or of values alone with --rate (CSV), a WFDB record (.hea, .dat or its "
+                   "name, formats 212 and 16), or a recording (.mcap); of a damaged recording what is whole, and it "
+                   "is said what is not")
       ->required();
   command->add_option(
       "--beats", options->beats,
