@@ -21,6 +21,7 @@
 #include "core/statistics/upper_median.hpp"
 #include "core/time/instant.hpp"
 #include "daemon/commands/progress.hpp"
+#include "daemon/commands/same_file.hpp"
 #include "daemon/ecg/beat_score.hpp"
 #include "daemon/ecg/ecg_analysis.hpp"
 #include "daemon/process/stop_signal.hpp"
@@ -110,6 +111,20 @@ bool is_wfdb(const std::filesystem::path& path) {
          (path.extension().empty() && std::filesystem::exists(wfdb_header(path), unknown));
 }
 
+// What is read must not be written over. Empty when it is not.
+std::string overwritten(const Options& options) {
+  const std::filesystem::path path(options.input);
+  if (is_same_file(options.beats, options.input)) return "--beats: is INPUT itself";
+  if (is_same_file(options.beats, options.reference)) return "--beats: is the file of --reference";
+  if (!is_wfdb(path)) return {};
+  auto record = wfdb_files(wfdb_header(path));
+  record.push_back(std::filesystem::path(path).replace_extension(".dat"));
+  for (const auto& file : record) {
+    if (is_same_file(options.beats, file)) return fmt::format("--beats: is {}, of the record INPUT", file.string());
+  }
+  return {};
+}
+
 // What is wrong with the options; empty when nothing is.
 std::string misuse(const Options& options) {
   if (!std::isfinite(options.gain) || options.gain == 0.0) return "--gain must be a number other than 0";
@@ -117,7 +132,7 @@ std::string misuse(const Options& options) {
   if (path.extension() == ".mcap" && (options.rate_hz || options.column))
     return "a recording knows its rate and channel: leave out --rate and --column";
   if (is_wfdb(path) && options.rate_hz) return "a WFDB record knows its rate: leave out --rate";
-  return {};
+  return overwritten(options);
 }
 
 Expected<Input> read_input(const Options& options) {
@@ -362,10 +377,10 @@ void add_ecg_command(CLI::App& app, int& exit_code) {
                    "name, formats 212 and 16), or a recording (.mcap); of a damaged recording what is whole, and it "
                    "is said what is not")
       ->required();
-  command->add_option(
-      "--beats", options->beats,
-      "Write the beats to this table: time_s,class,confidence,detected_at_s; classes normal, premature, "
-      "pause, noise; times of a recording count from its first ECG sample");
+  command->add_option("--beats", options->beats,
+                      "Write the beats to this table, over an earlier one but not over what is read: "
+                      "time_s,class,confidence,detected_at_s; classes normal, premature, "
+                      "pause, noise; times of a recording count from its first ECG sample");
   command
       ->add_option("--rate", options->rate_hz,
                    "Samples a second of a table without times; times that its heading names are passed over, and the "

@@ -5,7 +5,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <optional>
 
@@ -181,6 +180,13 @@ std::size_t samples_in(int format, std::size_t bytes) {
   return format == 16 ? bytes / 2 : bytes / 3 * 2 + (bytes % 3 == 2 ? 1 : 0);
 }
 
+Expected<WfdbHeader> read_header(const std::string& file) {
+  const auto text = read_text_file(file, kLargestHeader, "WFDB header");
+  if (!text) return tl::unexpected(text.error());
+  if (text->size() > kLargestHeader) return fail(file + ": is too long for a WFDB header");
+  return parse_wfdb_header(*text, file);
+}
+
 }  // namespace
 
 Expected<WfdbHeader> parse_wfdb_header(std::string_view text, const std::string& name) {
@@ -232,11 +238,16 @@ Expected<EcgTrace> decode_wfdb_signal(const WfdbHeader& header, std::size_t sign
   return trace;
 }
 
+std::vector<std::filesystem::path> wfdb_files(const std::string& header_file) {
+  std::vector<std::filesystem::path> files{header_file};
+  const auto header = read_header(header_file);
+  if (!header) return files;
+  for (const WfdbSignal& signal : header->signals) files.push_back(files.front().parent_path() / signal.file);
+  return files;
+}
+
 Expected<EcgTrace> read_wfdb(const std::string& header_file, int signal) {
-  const auto text = read_text_file(header_file, kLargestHeader, "WFDB header");
-  if (!text) return tl::unexpected(text.error());
-  if (text->size() > kLargestHeader) return fail(header_file + ": is too long for a WFDB header");
-  const auto header = parse_wfdb_header(*text, header_file);
+  const auto header = read_header(header_file);
   if (!header) return tl::unexpected(header.error());
   const auto signals = static_cast<int>(header->signals.size());
   if (signal < 1 || signal > signals) {

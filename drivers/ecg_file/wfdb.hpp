@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
@@ -42,6 +43,9 @@ struct WfdbHeader {
 // The samples of one signal, from the bytes of its file. Errors: "NAME: byte N: what is wrong".
 [[nodiscard]] Expected<EcgTrace> decode_wfdb_signal(const WfdbHeader& header, std::size_t signal,
                                                     std::span<const std::uint8_t> bytes, const std::string& name);
+
+// The header and the files of samples that it names; only the header where it cannot be read.
+[[nodiscard]] std::vector<std::filesystem::path> wfdb_files(const std::string& header_file);
 
 // Reads header and samples. `signal` counts from 1.
 [[nodiscard]] Expected<EcgTrace> read_wfdb(const std::string& header_file, int signal);
