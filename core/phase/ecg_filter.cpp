@@ -13,7 +13,7 @@ using std::chrono::milliseconds;
 constexpr Duration kSpike = milliseconds(4);  // a pacing spike behind a monitor's own filter
 constexpr Duration kSlow = milliseconds(5);   // a median over three of these blunts a QRS complex
 constexpr int kSlowHalf = 2;
-constexpr double kAlone = 3.0;  // an R wave of 40 ms, at 100 Hz, stands out by 1.5 times what its neighbours differ
+constexpr double kAlone = 2.0;  // an R wave of 40 ms, at 100 Hz, stands out by 1.5 times what its neighbours differ
 constexpr Duration kSmooth = milliseconds(20);  // a whole period of 50 Hz
 constexpr Duration kEnergy = milliseconds(80);  // about a normal QRS complex
 

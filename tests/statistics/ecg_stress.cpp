@@ -256,7 +256,7 @@ std::vector<Disturbance> disturbances() {
   add("pacing spikes -5 mV, 60 ms before", 99.0, [](const Lead& lead, Generator&) { return paced(lead, -5.0, 0.06); });
   add("pacing spikes 4 mV, 160 ms before", 99.0, [](const Lead& lead, Generator&) { return paced(lead, 4.0, 0.16); });
   for (const double rate_hz : {100.0, 200.0}) {
-    add(fmt::format("pacing spikes 5 mV, 160 ms before, {:g} Hz", rate_hz), 98.0,
+    add(fmt::format("pacing spikes 5 mV, 160 ms before, {:g} Hz", rate_hz), 99.0,
         [rate_hz](const Lead& lead, Generator&) { return paced_at(lead, rate_hz, 5.0, 0.16); });
   }
   add("no samples for 15 ms of each 0.7 s", 99.0,
