@@ -12,6 +12,7 @@
 
 #include "core/pipeline/pipeline.hpp"
 #include "daemon/commands/progress.hpp"
+#include "daemon/commands/same_file.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/dds_publication.hpp"
@@ -196,6 +197,10 @@ Expected<LockstepEnd> run_lockstep(Pipeline& pipeline, ReplaySetup& setup, Publi
 }
 
 int replay(const Options& options) {
+  for (const auto& [name, file] : {std::pair("--json", options.json), std::pair("--samples", options.samples)}) {
+    if (is_same_file(file, options.recording))
+      return refuse(Error{fmt::format("{}: is the recording itself", name)}, kWrongUse);
+  }
   auto stop = StopSignal::install();
   if (!stop) return refuse(stop.error(), kFailure);
   const ReadMode mode = options.whole ? ReadMode::kWhole : ReadMode::kStrict;

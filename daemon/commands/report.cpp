@@ -8,7 +8,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 
+#include "daemon/commands/same_file.hpp"
 #include "daemon/report/accuracy_picture.hpp"
 #include "daemon/report/accuracy_text.hpp"
 #include "daemon/report/samples_report.hpp"
@@ -39,12 +41,20 @@ nlohmann::json figures_json(const DurationFigures& figures) {
           {"max_ms", milliseconds(figures.max)}};
 }
 
-int refuse(const std::string& message) {
+constexpr int kFailure = 1;
+constexpr int kWrongUse = 2;
+
+int refuse(const std::string& message, int code = kFailure) {
   fmt::print(stderr, "perimap report: {}\n", message);
-  return 1;
+  return code;
 }
 
 int report(const Options& options) {
+  for (const auto& [name, file] : {std::pair("--json", options.json), std::pair("--picture", options.picture)}) {
+    if (is_same_file(file, options.recording) || is_same_file(file, options.samples)) {
+      return refuse(fmt::format("{}: is a file that is read", name), kWrongUse);
+    }
+  }
   const auto result = report_samples(options.recording, options.samples, options.stream,
                                      options.whole ? ReadMode::kWhole : ReadMode::kStrict);
   if (!result) return refuse(result.error().message);
