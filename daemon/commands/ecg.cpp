@@ -210,6 +210,8 @@ nlohmann::json to_json(const EcgAnalysis& analysis, const PredictionErrors& erro
       {"classes", {{"normal", classes[0]}, {"premature", classes[1]}, {"pause", classes[2]}, {"noise", classes[3]}}},
       {"delay_ms", {{"median", delay_ms(&DelayFigures::median_s)}, {"p95", delay_ms(&DelayFigures::p95_s)}}},
       {"unusable_s", analysis.unusable_s},
+      {"interruptions", analysis.interruptions},
+      {"without_beats_s", analysis.without_beats_s},
       {"noisy_s", analysis.noisy_s},
       {"unpredictable_s", analysis.unpredictable_s},
       {"prediction", {{"cycles", errors.cycles}}}};
@@ -261,8 +263,11 @@ std::string to_text(const EcgAnalysis& analysis, const PredictionErrors& errors)
   const auto delay = delay_figures(analysis);
   text += "delay       R peak to detection, median / 95 %: ";
   text += delay ? fmt::format("{:.0f} / {:.0f} ms\n", 1e3 * delay->median_s, 1e3 * delay->p95_s) : "none\n";
-  text += fmt::format("signal      unusable for {:.1f} s, noisy for {:.1f} s; rhythm unpredictable for {:.1f} s\n",
-                      analysis.unusable_s, analysis.noisy_s, analysis.unpredictable_s);
+  text += fmt::format(
+      "signal      unusable for {:.1f} s, interrupted {} times, without beats for {:.1f} s, noisy for {:.1f} s; rhythm "
+      "unpredictable for {:.1f} s\n",
+      analysis.unusable_s, analysis.interruptions, analysis.without_beats_s, analysis.noisy_s,
+      analysis.unpredictable_s);
   if (!errors.rms_s) return text + "prediction  next cycle: none, there are no normal cycles to tell it from\n";
   const auto& rms_s = *errors.rms_s;
   return text + fmt::format(

@@ -145,7 +145,7 @@ PredictionErrors prediction_errors(const EcgAnalysis& analysis, const std::vecto
   PredictionErrors errors;
   std::array<double, 3> squares{};
   const auto take = [&](const AnalysedBeat& begin, const AnalysedBeat& end) {
-    if (begin.predicted_rr_s[0] <= 0.0 || begin.predicted_rr_s[2] <= 0.0) return;
+    if (end.after_interruption || begin.predicted_rr_s[0] <= 0.0 || begin.predicted_rr_s[2] <= 0.0) return;
     const double rr_s = to_seconds(end.peak.time - begin.peak.time);
     for (std::size_t i = 0; i < squares.size(); ++i) {
       squares[i] += (begin.predicted_rr_s[i] - rr_s) * (begin.predicted_rr_s[i] - rr_s);

@@ -45,10 +45,13 @@ EcgAnalysis analyse(const EcgTrace& trace, const std::function<bool(std::size_t)
   EcgAnalysis analysis;
   const auto finder = std::make_unique<BeatFinder>();
   Predictions predictions;
+  bool unheard = false;
   const auto take = [&](const std::optional<RPeak>& peak) {
     if (!peak) return;
     AnalysedBeat beat;
     beat.peak = *peak;
+    beat.after_interruption = unheard;
+    unheard = unheard && peak->beat_class == BeatClass::kNoise;
     predictions.take(beat);
     analysis.beats.push_back(beat);
   };
@@ -61,6 +64,7 @@ EcgAnalysis analyse(const EcgTrace& trace, const std::function<bool(std::size_t)
     if (interrupted) {
       predictions.interrupt();
       ++analysis.interruptions;
+      unheard = true;
     }
     const EcgSignal signal = finder->signal();
     analysis.duration_s += step_s;
@@ -68,6 +72,7 @@ EcgAnalysis analyse(const EcgTrace& trace, const std::function<bool(std::size_t)
       analysis.unusable_s += step_s;
     } else if (signal == EcgSignal::kLearning) {
       analysis.without_beats_s += step_s;
+      unheard = true;
     }
     if (signal == EcgSignal::kNoisy) analysis.noisy_s += step_s;
     if (predictions.rhythm() == Rhythm::kUnpredictable) analysis.unpredictable_s += step_s;

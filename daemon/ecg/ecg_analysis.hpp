@@ -17,6 +17,8 @@ struct AnalysedBeat {
   // The length of the cycle that begins with this beat as predicted when it became known, by each method; 0 before
   // there was a prediction. The methods learn from cycles between normal beats.
   std::array<double, 3> predicted_rr_s{};
+  // The signal has broken off since the beat before, or nothing like beats was known: some may be hidden between them.
+  bool after_interruption = false;
 };
 
 inline constexpr std::array<RrMethod, 3> kPredictionMethods{RrMethod::kPrevious, RrMethod::kMeanOf8,

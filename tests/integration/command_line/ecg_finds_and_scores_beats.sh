@@ -49,7 +49,7 @@ number_in "$work/score.json" rms 0 6
 "$perimap" ecg "$data/119_60s.csv" --reference "$data/119_60s_beats.csv" > "$work/text"
 for line in 'beats       [0-9]* in 60.0 s: [0-9]* normal, [0-9]* premature, [0-9]* after a pause, [0-9]* thought noise' \
   'delay       R peak to detection, median / 95 %: [0-9]* / [0-9]* ms' \
-  'signal      unusable for 0.0 s, noisy for [0-9.]* s; rhythm unpredictable for [0-9.]* s' \
+  'signal      unusable for 0.0 s, interrupted 0 times, without beats for [0-9.]* s, noisy for [0-9.]* s; rhythm unpredictable for [0-9.]* s' \
   'prediction  next cycle, RMS over [1-9][0-9]* normal cycles: previous [0-9.]*, mean of 8 [0-9.]*, autoregressive [0-9.]* ms' \
   'reference   sensitivity 100.00 % (\([0-9]*\) of \1), positive predictivity [0-9.]* % ([0-9]* of [0-9]*), F1 [0-9.]* %' \
   'timing      normal beats to the reference: median [-+][0-9.]* ms, RMS about it [0-9.]* ms; to the local peak: RMS [0-9.]* ms' \
@@ -111,6 +111,13 @@ done
 beats=$(tail -n +2 "$work/recorded.csv" | wc -l)
 [ "$beats" -ge 5 ] && [ "$beats" -le 9 ] || { echo "$beats beats in 6 s"; exit 1; }
 grep -q '"unusable_s": 0.0' "$work/recorded.json"
+
+# What is missing is said: twenty seconds of samples, and the beats of the last fifteen, which are noise.
+awk -F, 'BEGIN { srand(1) } NR == 1 { print; next } NR == 2 { t0 = $1 }
+  { t = $1 - t0 } t > 15 && t < 35 { next } t > 45 { $2 = 0.1 * (rand() - 0.5) } { print $1 "," $2 }' \
+  "$data/100_60s.csv" > "$work/broken.csv"
+"$perimap" ecg "$work/broken.csv" --beats "$work/broken_beats.csv" --json > "$work/broken.json"
+json_has "$work/broken.json" '"interruptions":1,' '"unusable_s":20.' '"without_beats_s":1'
 
 expect() {  # EXIT_CODE PATTERN ARGUMENT...
   code=$1 pattern=$2

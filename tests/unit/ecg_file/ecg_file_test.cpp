@@ -335,6 +335,22 @@ TEST(BeatScore, WhatThereIsNothingToTellFromIsNoFigure) {
   EXPECT_FALSE(prediction_errors({}, {normal}).rms_s);
 }
 
+// What went on while samples were missing is no cycle.
+TEST(BeatScore, NoPredictionIsHeldAgainstAnInterruption) {
+  EcgAnalysis analysis;
+  for (const double t : {1.0, 2.0, 30.0, 31.0}) {
+    AnalysedBeat beat;
+    beat.peak.time = Instant(from_seconds(t));
+    beat.predicted_rr_s = {1.0, 1.0, 1.0};
+    beat.after_interruption = t == 30.0;
+    analysis.beats.push_back(beat);
+  }
+  const PredictionErrors errors = prediction_errors(analysis, {});
+  EXPECT_EQ(errors.cycles, 2);
+  ASSERT_TRUE(errors.rms_s);
+  EXPECT_NEAR((*errors.rms_s)[0], 0.0, 1e-9);
+}
+
 // Three normal beats 1 s apart, of which the last was expected 50 ms late.
 TEST(BeatScore, PredictionsAreHeldAgainstTheCyclesThatCame) {
   EcgAnalysis analysis;
