@@ -68,7 +68,8 @@ double residual_variance(const PatchTemplate::Level& level, const PatchSamples& 
   const double scaled_bias = kGreyScale * kBlock * kBlock * (fit.bias + (fit.gain - 1) * PatchTemplate::kGreyOrigin);
   double sum_squares = 0;
   for (int by = 0; by < kAcross; ++by) {
-    std::array<int, kSide> seen, expected;  // sums over the block's rows
+    std::array<int, kSide> seen{};  // sums over the block's rows
+    std::array<int, kSide> expected{};
     const std::int16_t* const grey = samples.grey.data() + kBlock * by * kSide;
     const std::int16_t* const value = level.value.data() + kBlock * by * kSide;
     for (int x = 0; x < kSide; ++x) {
@@ -143,7 +144,7 @@ struct AffineStep {
 template <class Step>
 AlignmentResult iterate(const GreyImage& image, const PatchTemplate::Level& level, const Step& step,
                         const AlignmentLimits& limits, const PatchKernels& kernels, PatchWarp& warp) noexcept {
-  PatchSamples samples;
+  PatchSamples samples;  // NOLINT(cppcoreguidelines-pro-type-member-init): sample_window() fills it, each iteration
   const Vector2d start = warp.centre;
   AlignmentResult result;
   bool at_rest = false;

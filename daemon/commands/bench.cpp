@@ -49,6 +49,7 @@ void keep_to_ourselves() {
       "<MaxAutoParticipantIndex>40</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>"
       "<Internal><SocketReceiveBufferSize max=\"8MB\"/></Internal></Domain></CycloneDDS>",
       getpid());
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): before the other threads begin
   setenv("CYCLONEDDS_URI", settings.c_str(), 1);
 }
 
