@@ -92,6 +92,17 @@ CardiacClock CardiacClock::corrected(const CycleCorrection& correction) const no
   return clock;
 }
 
+CardiacClock CardiacClock::with_r_peaks(std::span<const MovedRPeak> moved) const noexcept {
+  CardiacClock clock = *this;
+  for (const MovedRPeak& peak : moved) {
+    if (peak.beat == 0 || peak.beat > beats_ || beats_ - peak.beat >= static_cast<std::uint64_t>(held_)) continue;
+    Beat& beat = clock.history_[beats_ - peak.beat];
+    beat.time += peak.by;
+    beat.deviation = peak.deviation;
+  }
+  return clock;
+}
+
 void CardiacClock::push(const Beat& beat) noexcept {
   std::copy_backward(history_.begin(), history_.end() - 1, history_.end());
   history_[0] = beat;

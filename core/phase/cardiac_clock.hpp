@@ -8,6 +8,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <span>
 #include <type_traits>
 
 #include "core/phase/cycle_correction.hpp"
@@ -58,6 +59,13 @@ struct CardiacCycle {
   bool teaches = false;      // completed, and what was seen in it may be learnt, see CardiacClockTracker
 };
 
+// An R peak whose time is better known than by the ECG alone.
+struct MovedRPeak {
+  std::uint64_t beat = 0;  // CardiacClock::beats() from that R peak to the next
+  Duration by{0};          // later than the ECG has it
+  Duration deviation{0};
+};
+
 class CardiacClock {
  public:
   static constexpr int kCompletedCycles = 32;
@@ -71,6 +79,8 @@ class CardiacClock {
   // The same with the running cycle as corrected; unchanged when the correction is of another cycle, or carries the
   // phase on although as_of() its instant the ECG tells it.
   [[nodiscard]] CardiacClock corrected(const CycleCorrection& correction) const noexcept;
+  // The same with these R peaks so much later, each by less than a cycle; those that it does not hold are passed over.
+  [[nodiscard]] CardiacClock with_r_peaks(std::span<const MovedRPeak> moved) const noexcept;
 
   // Any instant. Instants before the history, and those in gaps too long to be cycles, are kUnknown or kLost with rate
   // 0.

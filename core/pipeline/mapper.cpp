@@ -81,7 +81,9 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
 
   follow_breathing();
   if (ecg_clock.beats() != beats_) {
-    history_->refresh_phases(ecg_clock, respiration_.clock());
+    // Under laws that are not ruled out the same phases would tell of other R peaks.
+    if (!job_.law.laws().undecided()) r_peaks_.on_beat(ecg_clock);
+    history_->refresh_phases(r_peaks_.moved(ecg_clock), respiration_.clock());
     beats_ = ecg_clock.beats();
   }
   cycle_.follow(ecg_clock, stamp.capture);
@@ -159,7 +161,8 @@ CardiacClock Mapper::find_law(const CardiacClock& clock, Instant capture) noexce
     for (FeatureGroup& group : groups_) group.doubt();
   }
   const CardiacClock told = clock.with_law(law_.belief());
-  if (law_.belief().laws() != before.laws()) history_->retell_phases(told);
+  if (law_.belief().settings.law != before.settings.law) r_peaks_.forget();
+  if (law_.belief().laws() != before.laws()) history_->retell_phases(r_peaks_.moved(told));
   return told;
 }
 
@@ -254,6 +257,7 @@ void Mapper::settle_cardiac_phase(const ImagePhaseAnswer& seen) noexcept {
   switch (seen.outcome) {
     case ImagePhaseOutcome::kObserved:
       cycle_.add(seen.observed);
+      r_peaks_.add(seen.observed);
       law_.add(seen.observed);
       counters_.phases_from_image.add();
       break;
@@ -313,6 +317,7 @@ void Mapper::forget() noexcept {
   breath_corrected_ = false;
   breath_state_ = RespirationState::kOff;
   cycle_ = CyclePosterior(settings_.image_alone);
+  r_peaks_.forget();
   law_ = LawChoice();
   law_trials_.clear();
   finder_.discard_round();

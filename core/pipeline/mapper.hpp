@@ -9,6 +9,7 @@
 #include "core/phase/cycle_posterior.hpp"
 #include "core/phase/law_choice.hpp"
 #include "core/phase/law_trial.hpp"
+#include "core/phase/r_peak_smoother.hpp"
 #include "core/phase/respiratory_tracker.hpp"
 #include "core/pipeline/batch_starter.hpp"
 #include "core/pipeline/feature_finder.hpp"
@@ -140,6 +141,7 @@ class Mapper {
   ImagePhase image_phase_;
   NeighbourMotion motion_;
   CyclePosterior cycle_;
+  RPeakSmoother r_peaks_;  // where completed cycles begin and end, for what is learnt in them
   LawChoice law_;
   std::vector<LawTrial> law_trials_;  // until there are enough
   FrameJob job_;

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <random>
 
@@ -65,6 +67,38 @@ TEST(CardiacClock, CompletedCyclesAreExactAtLeastTwentyFourBack) {
   EXPECT_NEAR(estimate.phase_rad, kTwoPi * 0.25, 1e-9);
   EXPECT_LE(estimate.deviation_s, to_seconds(kPeakDeviation));
   EXPECT_EQ(steady.at(steady.first).state, PhaseState::kUnknown);  // long before what is held
+}
+
+TEST(CardiacClock, ARPeakThatIsKnownBetterMovesBothItsCyclesAndNoOther) {
+  const Steady steady(20);
+  const CardiacClock& clock = steady.tracker.clock();
+  const std::uint64_t beat = clock.beats() - 4;
+  const Instant r_peak = steady.last - 4 * milliseconds(800);
+  const CardiacClock moved = clock.with_r_peaks(std::array{MovedRPeak{beat, milliseconds(3), milliseconds(1)}});
+  const auto cycle = [&](int after) { return moved.cycle_at(r_peak + after * milliseconds(800) + milliseconds(400)); };
+  EXPECT_EQ(cycle(-1).begin, r_peak - milliseconds(800));
+  EXPECT_EQ(cycle(-1).length, milliseconds(803));
+  EXPECT_EQ(cycle(-1).length_deviation, milliseconds(1));
+  EXPECT_EQ(cycle(0).begin, r_peak + milliseconds(3));
+  EXPECT_EQ(cycle(0).begin_deviation, milliseconds(1));
+  EXPECT_EQ(cycle(0).length, milliseconds(797));
+  EXPECT_EQ(cycle(0).previous_length, milliseconds(803));
+  EXPECT_EQ(cycle(1).begin, r_peak + milliseconds(800));
+  EXPECT_EQ(cycle(1).previous_length, milliseconds(797));
+  EXPECT_EQ(cycle(2).previous_length, milliseconds(800));
+}
+
+TEST(CardiacClock, RPeaksThatItDoesNotHoldAreNotMoved) {
+  const Steady steady(100);
+  const CardiacClock& clock = steady.tracker.clock();
+  const std::array<MovedRPeak, 3> unknown{
+      MovedRPeak{}, {clock.beats() + 1, milliseconds(3), milliseconds(1)}, {10, milliseconds(3), milliseconds(1)}};
+  const CardiacClock moved = clock.with_r_peaks(unknown);
+  for (int ms = -25'000; ms < 800; ms += 50) {
+    const Instant t = steady.last + milliseconds(ms);
+    EXPECT_EQ(moved.at(t).phase_rad, clock.at(t).phase_rad);
+    EXPECT_EQ(moved.at(t).deviation_s, clock.at(t).deviation_s);
+  }
 }
 
 TEST(CardiacClock, AnchorsAtThePeaksOwnTimeNotAtItsDetection) {

@@ -1,0 +1,63 @@
+// Where the R peaks of completed cycles were, by the ECG and by the phases that the images showed between them.
+//
+// The map is learnt with the phase of completed cycles, which lies between two R peaks as the ECG has them: noise moves
+// each by a millisecond or so, and the heart moves 50 um in one. The phases seen all through the cycle tell where it
+// began and ended better. They are those of the map, though, which may be off by some phase of its own: that must be
+// estimated too, or the map would only confirm itself, and drift. Over many cycles the R peaks hold it where they are
+// on average.
+//
+// A Kalman filter from cycle to cycle over three times: by how much the R peak at the beginning and that at the end are
+// later than the ECG has them, and by how much the map's phase is early. The R peak at the end is the next cycle's at
+// the beginning. A phase seen where the length sensitivity is w and the one to the cycle before is p (CyclePhase) is
+// early by -(1 - w + p) begin - w end + p begin of the cycle before.
+//
+// A map that has hardly converged is off by another phase in each part of the cycle, so no R peak is moved before some
+// cycles have been weighed.
+//
+// No heap, no locks.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/phase/cardiac_clock.hpp"
+#include "core/phase/observed_phase.hpp"
+
+namespace perimap {
+
+class RPeakSmoother {
+ public:
+  static constexpr int kFewestObservations = 5;      // in a cycle
+  static constexpr std::uint64_t kFirstCycles = 20;  // move nothing yet
+
+  // In order of time; of a map that has converged.
+  void add(const ObservedPhase& observed) noexcept { kept_[kept_count_++ % kKept] = observed; }
+  // A beat has become known: the cycle that it ends is weighed, if it teaches and is in rhythm. `ecg`: as the ECG alone
+  // tells it, under the law that the heart is believed to follow.
+  void on_beat(const CardiacClock& ecg) noexcept;
+  // The clock with the R peaks where they are believed to be.
+  [[nodiscard]] CardiacClock moved(const CardiacClock& clock) const noexcept;
+  void forget() noexcept { *this = RPeakSmoother(); }
+
+ private:
+  static constexpr std::size_t kKept = 256;
+  static constexpr std::size_t kPeaks = CardiacClock::kCompletedCycles + 2;
+
+  enum State : std::uint8_t { kBegin, kEnd, kMap };
+
+  [[nodiscard]] double moved_by_s(std::uint64_t beat) const noexcept;
+  void begin_cycle(const CardiacCycle& cycle, std::uint64_t end_beat) noexcept;
+  void keep(std::uint64_t beat, State state) noexcept;
+
+  std::array<ObservedPhase, kKept> kept_{};
+  std::uint64_t kept_count_ = 0;
+  std::array<MovedRPeak, kPeaks> peaks_{};            // at their beat's number modulo kPeaks
+  std::uint64_t cycles_ = 0;                          // weighed
+  std::uint64_t last_end_ = 0;                        // the beat that ended the last one of them; 0: none
+  Eigen::Vector3d mean_s_ = Eigen::Vector3d::Zero();  // of the last one, in order of State
+  Eigen::Matrix3d covariance_s2_ = Eigen::Matrix3d::Zero();
+};
+
+}  // namespace perimap
