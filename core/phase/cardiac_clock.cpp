@@ -94,6 +94,7 @@ CardiacClock CardiacClock::corrected(const CycleCorrection& correction) const no
 
 CardiacClock CardiacClock::with_r_peaks(std::span<const MovedRPeak> moved) const noexcept {
   CardiacClock clock = *this;
+  if (carried_) return clock;
   for (const MovedRPeak& peak : moved) {
     if (peak.beat == 0 || peak.beat > beats_ || beats_ - peak.beat >= static_cast<std::uint64_t>(held_)) continue;
     Beat& beat = clock.history_[beats_ - peak.beat];

@@ -80,6 +80,7 @@ class CardiacClock {
   // phase on although as_of() its instant the ECG tells it.
   [[nodiscard]] CardiacClock corrected(const CycleCorrection& correction) const noexcept;
   // The same with these R peaks so much later, each by less than a cycle; those that it does not hold are passed over.
+  // As the ECG tells it: a clock that the images carry on stays as it is.
   [[nodiscard]] CardiacClock with_r_peaks(std::span<const MovedRPeak> moved) const noexcept;
 
   // Any instant. Instants before the history, and those in gaps too long to be cycles, are kUnknown or kLost with rate

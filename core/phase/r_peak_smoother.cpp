@@ -20,49 +20,100 @@ constexpr double kMapDeviation_s = 0.003;
 constexpr double kLeastMapWalk_s = 0.0001;
 // Student's weights, as for the features' matches: the map is wrong in parts of the cycle.
 constexpr double kDegrees = 3.0;
-constexpr int kPasses = 3;
-// What the map gets wrong is alike in so many frames in a row, about.
-constexpr double kAlike = 4.0;
+constexpr int kPasses = 5;
+// What the map gets wrong is alike for about so long.
+constexpr double kAlike_s = 0.13;
+constexpr Duration kKeptEvery = std::chrono::milliseconds(14);
+// Mean square after the weights: about 0.8 where the phases fit, 4 where none does.
+constexpr double kMostMisfit = 2.0;
+// An R peak that the detector doubts may be off by a tenth of a second, over which the laws are anything but straight:
+// the phases would fit elsewhere too.
+constexpr Duration kMostDoubt = std::chrono::milliseconds(20);
 // No R peak is known better: the phase laws are no better models of a heart.
 constexpr double kLeastDeviation_s = 0.0002;
-
-// One phase seen, against the ECG's, as times.
-struct Residual {
-  Vector3d gradient;
-  double value_s = 0.0;
-  double deviation_s = 0.0;
-};
+// Of an R peak by what is known of it before the cycle was seen.
+constexpr double kMostDeviations = 4.0;
 
 }  // namespace
+
+void RPeakSmoother::add(const ObservedPhase& observed) noexcept {
+  const bool soon = kept_count_ > 0 && observed.time >= last_kept_ && observed.time - last_kept_ < kKeptEvery;
+  if (soon || !(observed.deviation_rad > 0.0)) return;
+  last_kept_ = observed.time;
+  kept_[kept_count_++ % kKept] = observed;
+}
 
 void RPeakSmoother::on_beat(const CardiacClock& ecg) noexcept {
   const std::uint64_t end_beat = ecg.beats();
   const CardiacCycle cycle = ecg.cycle_at(ecg.anchor() - Duration(1));
   if (end_beat < 2 || !cycle.completed || !cycle.teaches || cycle.irregularity != Duration::zero()) return;
 
-  std::array<Residual, kKept> residuals;
-  std::size_t count = 0;
-  const double before_s = moved_by_s(end_beat - 2);
-  for (const ObservedPhase& seen : kept_) {
-    if (seen.time < cycle.begin || seen.time >= cycle.begin + cycle.length) continue;
-    const CyclePhase told = phase_in_cycle(ecg.law(), seen.time - cycle.begin, cycle.length, cycle.previous_length);
+  if (std::max(cycle.begin_deviation, cycle.length_deviation) > kMostDoubt) return;
+  const Vector3d mean_s = mean_s_;
+  const Matrix3d covariance_s2 = covariance_s2_;
+  begin_cycle(cycle, end_beat);
+  if (!estimate(ecg, cycle, moved_by_s(end_beat - 2))) {
+    mean_s_ = mean_s;
+    covariance_s2_ = covariance_s2;
+    last_end_ = 0;
+    return;
+  }
+  if (cycles_ >= kFirstCycles) {
+    keep(end_beat - 1, kBegin);
+    keep(end_beat, kEnd);
+  }
+  last_end_ = end_beat;
+  ++cycles_;
+}
+
+// The phases seen in the cycle whose R peaks are later than the ECG's by the first two of `about_s`.
+void RPeakSmoother::collect(const CardiacClock& ecg, const CardiacCycle& cycle, const Vector3d& about_s,
+                            double before_s, Residuals& residuals) const noexcept {
+  const Instant begin = cycle.begin + from_seconds(about_s(kBegin));
+  const Duration length = cycle.length + from_seconds(about_s(kEnd) - about_s(kBegin));
+  const Duration previous = cycle.previous_length + from_seconds(about_s(kBegin) - before_s);
+  residuals.count = 0;
+  const auto kept = static_cast<std::size_t>(std::min<std::uint64_t>(kept_count_, kKept));
+  for (std::size_t i = 0; i < kept; ++i) {
+    const ObservedPhase& seen = kept_[i];
+    if (seen.time < begin || seen.time >= begin + length) continue;
+    const CyclePhase told = phase_in_cycle(ecg.law(), seen.time - begin, length, previous);
     const double w = told.length_sensitivity;
     const double p = told.previous_sensitivity;
     const double early_s = std::remainder(seen.phase_rad - told.phase_rad, kTwoPi) / told.rate_rad_per_s;
-    residuals[count++] = {Vector3d(-(1.0 - w + p), -w, 1.0), early_s - p * before_s,
-                          seen.deviation_rad / told.rate_rad_per_s};
+    const Vector3d gradient(-(1.0 - w + p), -w, 1.0);
+    residuals.of[residuals.count++] = {gradient,
+                                       early_s + gradient(kBegin) * about_s(kBegin) + gradient(kEnd) * about_s(kEnd),
+                                       seen.deviation_rad / told.rate_rad_per_s};
   }
-  if (count < static_cast<std::size_t>(kFewestObservations)) return;
+}
 
-  begin_cycle(cycle, end_beat);
-  const Matrix3d prior_information = covariance_s2_.inverse();
+// From the prior that mean and covariance are. False when nothing believable comes of it; they are of no use then.
+bool RPeakSmoother::estimate(const CardiacClock& ecg, const CardiacCycle& cycle, double before_s) noexcept {
   const Vector3d prior_mean_s = mean_s_;
+  const Matrix3d prior_covariance_s2 = covariance_s2_;
+  const Matrix3d prior_information = prior_covariance_s2.inverse();
+  const double shortest_s = 0.5 * to_seconds(std::min(cycle.length, cycle.previous_length));
+  const auto believable = [&] {
+    if (!mean_s_.allFinite() || !covariance_s2_.allFinite() || !(covariance_s2_.diagonal().array() > 0.0).all()) {
+      return false;
+    }
+    for (const State peak : {kBegin, kEnd}) {
+      if (std::abs(mean_s_(peak)) > 0.5 * shortest_s) return false;
+    }
+    return true;
+  };
+  Residuals residuals;
+  double misfit = 0.0;  // mean; the last pass's
   for (int pass = 0; pass < kPasses; ++pass) {
+    if (!believable()) return false;
+    collect(ecg, cycle, mean_s_, before_s, residuals);
+    if (residuals.count < kFewestObservations) return false;
     Matrix3d seen_information = Matrix3d::Zero();
     Vector3d seen = Vector3d::Zero();
-    double misfit = 0.0;
-    for (std::size_t i = 0; i < count; ++i) {
-      const Residual& residual = residuals[i];
+    misfit = 0.0;
+    for (std::size_t i = 0; i < residuals.count; ++i) {
+      const Residual& residual = residuals.of[i];
       const double square = std::pow((residual.value_s - residual.gradient.dot(mean_s_)) / residual.deviation_s, 2);
       // The first pass is to come near: an offset of the map's would make all of them outliers.
       const double weight = pass == 0 ? 1.0 : (kDegrees + 1.0) / (kDegrees + square);
@@ -71,16 +122,19 @@ void RPeakSmoother::on_beat(const CardiacClock& ecg) noexcept {
       seen += information * residual.value_s * residual.gradient;
       misfit += weight * square;
     }
-    const double share = 1.0 / (kAlike * (pass == 0 ? 1.0 : std::max(1.0, misfit / static_cast<double>(count))));
+    const auto count = static_cast<double>(residuals.count);
+    const double alike = std::max(1.0, kAlike_s * count / to_seconds(cycle.length));
+    misfit /= count;
+    const double share = 1.0 / (alike * (pass == 0 ? 1.0 : std::max(1.0, misfit)));
     covariance_s2_ = (prior_information + share * seen_information).inverse();
     mean_s_ = covariance_s2_ * (prior_information * prior_mean_s + share * seen);
   }
-  if (cycles_ >= kFirstCycles) {
-    keep(end_beat - 1, kBegin);
-    keep(end_beat, kEnd);
+  if (!believable() || misfit > kMostMisfit) return false;
+  for (const State peak : {kBegin, kEnd}) {
+    const double far_s = kMostDeviations * std::sqrt(prior_covariance_s2(peak, peak));
+    if (std::abs(mean_s_(peak) - prior_mean_s(peak)) > far_s) return false;
   }
-  last_end_ = end_beat;
-  ++cycles_;
+  return true;
 }
 
 CardiacClock RPeakSmoother::moved(const CardiacClock& clock) const noexcept { return clock.with_r_peaks(peaks_); }
@@ -92,8 +146,8 @@ double RPeakSmoother::moved_by_s(std::uint64_t beat) const noexcept {
 
 // The prior of its times.
 void RPeakSmoother::begin_cycle(const CardiacCycle& cycle, std::uint64_t end_beat) noexcept {
-  const double begin_s = to_seconds(cycle.begin_deviation);
-  const double end_s = to_seconds(cycle.length_deviation);
+  const double begin_s = std::max(kLeastDeviation_s, to_seconds(cycle.begin_deviation));
+  const double end_s = std::max(kLeastDeviation_s, to_seconds(cycle.length_deviation));
   const bool follows = last_end_ != 0 && last_end_ + 1 == end_beat;
   Vector3d mean_s(0.0, 0.0, mean_s_(kMap));
   Matrix3d covariance_s2 = Vector3d(begin_s * begin_s, end_s * end_s, kMapDeviation_s * kMapDeviation_s).asDiagonal();

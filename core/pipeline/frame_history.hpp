@@ -81,10 +81,13 @@ class FrameHistory {
     if (pose.valid()) record.X_CW = pose.X_WC.inverse();
   }
 
-  // Fills phases and basis of a record, whose pose is set, from the clocks. The basis is computed here, once a frame.
+  // Fills phases and basis of a new record, whose pose is set, from the clocks. The basis is computed here, once a
+  // frame. Whatever the clock knows, the next beat's refresh is the first to tell the phase as exact: the frames before
+  // were told by another clock where the last cycle ended, and one of them may be open yet.
   void set_phase(FrameRecord& record, const CardiacClock& clock, const RespiratoryClock& respiration) noexcept {
     set_respiration(record, respiration);
     set_cardiac_phase(record, clock);
+    record.phase.exact = false;
   }
 
   // After a beat: the frames whose cycle was still open get what is known now. At most a cycle or two of frames.
@@ -92,7 +95,8 @@ class FrameHistory {
     for (std::uint64_t i = count_; i > oldest_; --i) {
       FrameRecord& record = records_[(i - 1) % kCapacity];
       if (record.phase.exact) return;
-      set_phase(record, clock, respiration);
+      set_respiration(record, respiration);
+      set_cardiac_phase(record, clock);
     }
   }
 

@@ -92,8 +92,6 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
   FrameHistory::set_pose(frame, poses_.at(stamp.capture));
   history_->set_phase(frame, clock, respiration_.clock());
   expect_displacement(frame);
-  // Only the ECG completes a cycle. A corrected beginning may lie after a frame of the running one.
-  frame.phase.exact = frame.phase.exact && stamp.capture < ecg_clock.anchor();
   job_.frame = &frame;
   job_.history = history_.get();
   job_.image = image;
@@ -161,8 +159,10 @@ CardiacClock Mapper::find_law(const CardiacClock& clock, Instant capture) noexce
     for (FeatureGroup& group : groups_) group.doubt();
   }
   const CardiacClock told = clock.with_law(law_.belief());
-  if (law_.belief().settings.law != before.settings.law) r_peaks_.forget();
-  if (law_.belief().laws() != before.laws()) history_->retell_phases(r_peaks_.moved(told));
+  if (law_.belief().laws() != before.laws()) {
+    r_peaks_.forget();
+    history_->retell_phases(told);
+  }
   return told;
 }
 
@@ -179,11 +179,13 @@ void Mapper::follow_breathing() noexcept {
     breath_corrected_ = true;
     history_->retell_respiration(breath);
     if (!history_->tracker_is_exact()) return;
+    r_peaks_.forget();
     for (FeatureGroup& group : groups_) group.learn_again();
   }
 }
 
 void Mapper::begin_breath() noexcept {
+  r_peaks_.forget();
   const bool again = history_->tracker_is_exact();
   for (FeatureGroup& group : groups_) {
     // What was learnt by a phase that has been lost since.

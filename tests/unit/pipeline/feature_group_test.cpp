@@ -65,13 +65,13 @@ struct Stages : ::testing::Test {
     const auto n = static_cast<int>(history->count());
     const Instant capture(milliseconds(5000 + 33 * n));
     beat_until(5000 + 33 * n + beats_known_ahead_ms);
-    history->refresh_phases(clock.clock(), respiration);
     FrameRecord& frame = history->append({static_cast<std::uint64_t>(n), capture, capture + milliseconds(12)});
     CameraPose pose;
     pose.state = CameraPose::State::kInterpolated;
     pose.position_variance_mm2 = pose_variance_mm2;
     FrameHistory::set_pose(frame, pose);
     history->set_phase(frame, clock.clock(), respiration);
+    history->refresh_phases(clock.clock(), respiration);
     job.frame = current = &frame;
     job.about_capture = bases_about(settings.estimator.layout, frame.phase, frame.respiration);
     job.history = history.get();

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <chrono>
+#include <cstdint>
 #include <memory>
 #include <numbers>
 
@@ -38,6 +41,7 @@ struct FramesBeforeBreathing : ::testing::Test {
       FrameHistory::set_pose(frame, pose);
       history->set_phase(frame, clock.clock(), searching);
     }
+    history->refresh_phases(clock.clock(), searching);
   }
 };
 
@@ -61,6 +65,37 @@ TEST_F(FramesBeforeBreathing, HaveItsPhaseAndNoDisplacementMoreOnceItIsFound) {
     EXPECT_NEAR(frame.pose.position_variance_mm2, kTracker_mm2 + 0.09, 1e-12);
     const double breath_rad = 0.5 + found.rate_rad_per_s * (0.033 * static_cast<double>(i) - 1.0);
     EXPECT_LT((frame.b - basis_at(layout, frame.phase.phase_rad, breath_rad)).norm(), 1e-9);
+  }
+}
+
+// A beat becomes known before a frame that was captured ahead of it, as from a trigger, and what is learnt by has its R
+// peak ahead of an earlier frame too.
+TEST(FramesAroundAnRPeak, AreAllToldExactlyByTheNextBeatWhereverItIsMoved) {
+  for (int moved_ms = -12; moved_ms <= 12; ++moved_ms) {
+    CardiacClockTracker clock{{}};
+    FrameHistory history(BasisLayout{2, 0});
+    Instant next_beat(milliseconds(1000));
+    const auto told = [&] {
+      return clock.clock().with_r_peaks(
+          std::array{MovedRPeak{clock.clock().beats(), milliseconds(moved_ms), milliseconds(1)}});
+    };
+    for (int i = 0; i < 600; ++i) {
+      const Instant capture(milliseconds(1000) + i * std::chrono::microseconds(8333));
+      if (next_beat + milliseconds(10) <= capture + milliseconds(25)) {
+        clock.on_r_peak({next_beat, next_beat + milliseconds(10), 1.0, milliseconds(1)});
+        next_beat += milliseconds(800);
+        history.refresh_phases(told(), {});
+      }
+      history.set_phase(history.append({static_cast<std::uint64_t>(i), capture, capture + milliseconds(25)}),
+                        clock.clock(), {});
+    }
+    history.refresh_phases(told(), {});
+    const Instant locked = Instant(milliseconds(2600));
+    for (std::uint64_t i = history.count() - FrameHistory::kHeld; i < history.count(); ++i) {
+      const FrameRecord* frame = history.find(i);
+      if (frame == nullptr || frame->stamp.capture < locked) continue;
+      EXPECT_EQ(frame->phase.exact, frame->stamp.capture < told().anchor()) << i << ", moved by " << moved_ms << " ms";
+    }
   }
 }
 
