@@ -144,6 +144,7 @@ TEST_P(BeatsOfALaw, AreFoundWhereTheyWere) {
   for (int i = 0; i < 3; ++i) {
     next_beat(kRr_s, 0.0, kPeakDeviation_s);
     EXPECT_NEAR(moved_s.back(), 0.0, 1e-4) << i + 1 << " cycles after";
+    EXPECT_LT(deviation_s.back(), 0.5 * kPeakDeviation_s) << "not weighed";
     const Instant begin = smoother.moved(tracker.clock()).cycle_at(truth[late_beat + 2] + milliseconds(200)).begin;
     EXPECT_NEAR(to_seconds(begin - truth[late_beat + 2]), 0.0, 1e-4);
   }
@@ -207,6 +208,14 @@ TEST_P(BeatsOfALaw, PoorlyKnownAreAsUncertainAsTold) {
   EXPECT_LT(squares / phases, 1.2);
   EXPECT_LE(far, phases / 100);
   EXPECT_LT(std::sqrt(moved_s2 / by_ecg_s2), 0.2);
+}
+
+TEST_F(Beats, StayWhereTheEcgHasThemWhereThePhasesDoNotFit) {
+  run();
+  outliers = 0.6;
+  next_beat(0.8);
+  EXPECT_EQ(moved_s.back(), 0.0);
+  EXPECT_EQ(deviation_s.back(), kPeakDeviation_s);
 }
 
 TEST_F(Beats, DoubtfulStayWhereTheEcgHasThem) {
