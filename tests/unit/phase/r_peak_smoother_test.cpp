@@ -180,9 +180,9 @@ TEST_P(BeatsOfALaw, PoorlyKnownAreAsUncertainAsTold) {
   double moved_s2 = 0.0;
   int far = 0;
   int phases = 0;
-  for (double late_s = -0.05; late_s <= 0.0501; late_s += 0.005) {
+  for (int late_ms = -50; late_ms <= 50; late_ms += 5) {
     run(40);
-    next_beat(0.8, late_s, kPoor_s);
+    next_beat(0.8, 0.001 * late_ms, kPoor_s);
     next_beat(0.8);
     const CardiacClock moved = smoother.moved(tracker.clock());
     for (std::size_t i = truth.size() - 3; i + 1 < truth.size(); ++i) {
