@@ -33,6 +33,8 @@ constexpr Duration kMostDoubt = std::chrono::milliseconds(20);
 constexpr double kLeastDeviation_s = 0.0002;
 // Of an R peak by what is known of it before the cycle was seen.
 constexpr double kMostDeviations = 4.0;
+// Of the shorter of its two cycles, whatever the deviations.
+constexpr double kMostMoved = 0.25;
 
 }  // namespace
 
@@ -47,23 +49,39 @@ void RPeakSmoother::on_beat(const CardiacClock& ecg) noexcept {
   const std::uint64_t end_beat = ecg.beats();
   const CardiacCycle cycle = ecg.cycle_at(ecg.anchor() - Duration(1));
   if (end_beat < 2 || !cycle.completed || !cycle.teaches || cycle.irregularity != Duration::zero()) return;
-
   if (std::max(cycle.begin_deviation, cycle.length_deviation) > kMostDoubt) return;
-  const Vector3d mean_s = mean_s_;
-  const Matrix3d covariance_s2 = covariance_s2_;
-  begin_cycle(cycle, end_beat);
-  if (!estimate(ecg, cycle, moved_by_s(end_beat - 2))) {
-    mean_s_ = mean_s;
-    covariance_s2_ = covariance_s2;
+  const auto believed = estimate(ecg, cycle, moved_by_s(end_beat - 2), expected(cycle, end_beat));
+  if (!believed) {
     last_end_ = 0;
     return;
   }
+  last_ = *believed;
   if (cycles_ >= kFirstCycles) {
     keep(end_beat - 1, kBegin);
     keep(end_beat, kEnd);
   }
   last_end_ = end_beat;
   ++cycles_;
+}
+
+// Before what was seen in it counts.
+RPeakSmoother::Belief RPeakSmoother::expected(const CardiacCycle& cycle, std::uint64_t end_beat) const noexcept {
+  const double begin_s = std::max(kLeastDeviation_s, to_seconds(cycle.begin_deviation));
+  const double end_s = std::max(kLeastDeviation_s, to_seconds(cycle.length_deviation));
+  const bool follows = last_end_ != 0 && last_end_ + 1 == end_beat;
+  Belief belief;
+  belief.mean_s(kMap) = last_.mean_s(kMap);
+  belief.covariance_s2 = Vector3d(begin_s * begin_s, end_s * end_s, kMapDeviation_s * kMapDeviation_s).asDiagonal();
+  if (cycles_ > 0) {
+    const double walk_s = std::max(kLeastMapWalk_s, end_s / static_cast<double>(cycles_ + 1));
+    belief.covariance_s2(kMap, kMap) = last_.covariance_s2(kMap, kMap) + walk_s * walk_s;
+  }
+  if (follows) {
+    belief.mean_s(kBegin) = last_.mean_s(kEnd);
+    belief.covariance_s2(kBegin, kBegin) = last_.covariance_s2(kEnd, kEnd);
+    belief.covariance_s2(kBegin, kMap) = belief.covariance_s2(kMap, kBegin) = last_.covariance_s2(kEnd, kMap);
+  }
+  return belief;
 }
 
 // The phases seen in the cycle whose R peaks are later than the ECG's by the first two of `about_s`.
@@ -88,33 +106,30 @@ void RPeakSmoother::collect(const CardiacClock& ecg, const CardiacCycle& cycle, 
   }
 }
 
-// From the prior that mean and covariance are. False when nothing believable comes of it; they are of no use then.
-bool RPeakSmoother::estimate(const CardiacClock& ecg, const CardiacCycle& cycle, double before_s) noexcept {
-  const Vector3d prior_mean_s = mean_s_;
-  const Matrix3d prior_covariance_s2 = covariance_s2_;
-  const Matrix3d prior_information = prior_covariance_s2.inverse();
-  const double shortest_s = 0.5 * to_seconds(std::min(cycle.length, cycle.previous_length));
-  const auto believable = [&] {
-    if (!mean_s_.allFinite() || !covariance_s2_.allFinite() || !(covariance_s2_.diagonal().array() > 0.0).all()) {
-      return false;
-    }
-    for (const State peak : {kBegin, kEnd}) {
-      if (std::abs(mean_s_(peak)) > 0.5 * shortest_s) return false;
-    }
-    return true;
+// Nothing when what comes of it cannot be believed.
+std::optional<RPeakSmoother::Belief> RPeakSmoother::estimate(const CardiacClock& ecg, const CardiacCycle& cycle,
+                                                             double before_s, const Belief& prior) const noexcept {
+  const Matrix3d prior_information = prior.covariance_s2.inverse();
+  const double most_s = kMostMoved * to_seconds(std::min(cycle.length, cycle.previous_length));
+  Belief belief = prior;
+  const auto possible = [&] {
+    if (!belief.mean_s.allFinite() || !belief.covariance_s2.allFinite()) return false;
+    if (!(belief.covariance_s2.diagonal().array() > 0.0).all()) return false;
+    return std::abs(belief.mean_s(kBegin)) <= most_s && std::abs(belief.mean_s(kEnd)) <= most_s;
   };
   Residuals residuals;
   double misfit = 0.0;  // mean; the last pass's
   for (int pass = 0; pass < kPasses; ++pass) {
-    if (!believable()) return false;
-    collect(ecg, cycle, mean_s_, before_s, residuals);
-    if (residuals.count < kFewestObservations) return false;
+    if (!possible()) return std::nullopt;
+    collect(ecg, cycle, belief.mean_s, before_s, residuals);
+    if (residuals.count < kFewestObservations) return std::nullopt;
     Matrix3d seen_information = Matrix3d::Zero();
     Vector3d seen = Vector3d::Zero();
     misfit = 0.0;
     for (std::size_t i = 0; i < residuals.count; ++i) {
       const Residual& residual = residuals.of[i];
-      const double square = std::pow((residual.value_s - residual.gradient.dot(mean_s_)) / residual.deviation_s, 2);
+      const double square =
+          std::pow((residual.value_s - residual.gradient.dot(belief.mean_s)) / residual.deviation_s, 2);
       // The first pass is to come near: an offset of the map's would make all of them outliers.
       const double weight = pass == 0 ? 1.0 : (kDegrees + 1.0) / (kDegrees + square);
       const double information = weight / (residual.deviation_s * residual.deviation_s);
@@ -126,15 +141,15 @@ bool RPeakSmoother::estimate(const CardiacClock& ecg, const CardiacCycle& cycle,
     const double alike = std::max(1.0, kAlike_s * count / to_seconds(cycle.length));
     misfit /= count;
     const double share = 1.0 / (alike * (pass == 0 ? 1.0 : std::max(1.0, misfit)));
-    covariance_s2_ = (prior_information + share * seen_information).inverse();
-    mean_s_ = covariance_s2_ * (prior_information * prior_mean_s + share * seen);
+    belief.covariance_s2 = (prior_information + share * seen_information).inverse();
+    belief.mean_s = belief.covariance_s2 * (prior_information * prior.mean_s + share * seen);
   }
-  if (!believable() || misfit > kMostMisfit) return false;
+  if (!possible() || misfit > kMostMisfit) return std::nullopt;
   for (const State peak : {kBegin, kEnd}) {
-    const double far_s = kMostDeviations * std::sqrt(prior_covariance_s2(peak, peak));
-    if (std::abs(mean_s_(peak) - prior_mean_s(peak)) > far_s) return false;
+    const double far_s = kMostDeviations * std::sqrt(prior.covariance_s2(peak, peak));
+    if (std::abs(belief.mean_s(peak) - prior.mean_s(peak)) > far_s) return std::nullopt;
   }
-  return true;
+  return belief;
 }
 
 CardiacClock RPeakSmoother::moved(const CardiacClock& clock) const noexcept { return clock.with_r_peaks(peaks_); }
@@ -144,29 +159,9 @@ double RPeakSmoother::moved_by_s(std::uint64_t beat) const noexcept {
   return peak.beat == beat ? to_seconds(peak.by) : 0.0;
 }
 
-// The prior of its times.
-void RPeakSmoother::begin_cycle(const CardiacCycle& cycle, std::uint64_t end_beat) noexcept {
-  const double begin_s = std::max(kLeastDeviation_s, to_seconds(cycle.begin_deviation));
-  const double end_s = std::max(kLeastDeviation_s, to_seconds(cycle.length_deviation));
-  const bool follows = last_end_ != 0 && last_end_ + 1 == end_beat;
-  Vector3d mean_s(0.0, 0.0, mean_s_(kMap));
-  Matrix3d covariance_s2 = Vector3d(begin_s * begin_s, end_s * end_s, kMapDeviation_s * kMapDeviation_s).asDiagonal();
-  if (cycles_ > 0) {
-    const double walk_s = std::max(kLeastMapWalk_s, end_s / static_cast<double>(cycles_ + 1));
-    covariance_s2(kMap, kMap) = covariance_s2_(kMap, kMap) + walk_s * walk_s;
-  }
-  if (follows) {
-    mean_s(kBegin) = mean_s_(kEnd);
-    covariance_s2(kBegin, kBegin) = covariance_s2_(kEnd, kEnd);
-    covariance_s2(kBegin, kMap) = covariance_s2(kMap, kBegin) = covariance_s2_(kEnd, kMap);
-  }
-  mean_s_ = mean_s;
-  covariance_s2_ = covariance_s2;
-}
-
 void RPeakSmoother::keep(std::uint64_t beat, State state) noexcept {
-  const double deviation_s = std::max(kLeastDeviation_s, std::sqrt(covariance_s2_(state, state)));
-  peaks_[beat % kPeaks] = {beat, from_seconds(mean_s_(state)), from_seconds(deviation_s)};
+  const double deviation_s = std::max(kLeastDeviation_s, std::sqrt(last_.covariance_s2(state, state)));
+  peaks_[beat % kPeaks] = {beat, from_seconds(last_.mean_s(state)), from_seconds(deviation_s)};
 }
 
 }  // namespace perimap

@@ -24,6 +24,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/observed_phase.hpp"
@@ -61,21 +62,27 @@ class RPeakSmoother {
     std::size_t count = 0;
   };
 
+  // Of a cycle's times, in order of State.
+  struct Belief {
+    Eigen::Vector3d mean_s = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d covariance_s2 = Eigen::Matrix3d::Zero();
+  };
+
+  [[nodiscard]] Belief expected(const CardiacCycle& cycle, std::uint64_t end_beat) const noexcept;
+  [[nodiscard]] std::optional<Belief> estimate(const CardiacClock& ecg, const CardiacCycle& cycle, double before_s,
+                                               const Belief& prior) const noexcept;
   void collect(const CardiacClock& ecg, const CardiacCycle& cycle, const Eigen::Vector3d& about_s, double before_s,
                Residuals& residuals) const noexcept;
-  [[nodiscard]] bool estimate(const CardiacClock& ecg, const CardiacCycle& cycle, double before_s) noexcept;
   [[nodiscard]] double moved_by_s(std::uint64_t beat) const noexcept;
-  void begin_cycle(const CardiacCycle& cycle, std::uint64_t end_beat) noexcept;
   void keep(std::uint64_t beat, State state) noexcept;
 
   std::array<ObservedPhase, kKept> kept_{};
   std::uint64_t kept_count_ = 0;
   Instant last_kept_;
-  std::array<MovedRPeak, kPeaks> peaks_{};            // at their beat's number modulo kPeaks
-  std::uint64_t cycles_ = 0;                          // weighed
-  std::uint64_t last_end_ = 0;                        // the beat that ended the last one of them; 0: none
-  Eigen::Vector3d mean_s_ = Eigen::Vector3d::Zero();  // of the last one, in order of State
-  Eigen::Matrix3d covariance_s2_ = Eigen::Matrix3d::Zero();
+  std::array<MovedRPeak, kPeaks> peaks_{};  // at their beat's number modulo kPeaks
+  std::uint64_t cycles_ = 0;                // weighed
+  std::uint64_t last_end_ = 0;  // the beat that ended the last one weighed; 0: the next does not go on from it
+  Belief last_;                 // of the last one weighed
 };
 
 }  // namespace perimap

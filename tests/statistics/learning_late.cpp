@@ -250,6 +250,10 @@ class Learner {
 
 // ---- what comes of it
 
+double phase_error_s(const PhaseEstimate& told, double true_rad) {
+  return std::remainder(told.phase_rad - true_rad, 2.0 * std::numbers::pi) / told.rate_rad_per_s;
+}
+
 // One way of learning, over features and sessions.
 struct Sums {
   std::vector<double> errors_mm;  // infinite without a map
@@ -260,8 +264,7 @@ struct Sums {
   int phases = 0;
 
   void add(const PhaseEstimate& phase, double true_rad) {
-    const double error_rad = std::remainder(phase.phase_rad - true_rad, 2.0 * std::numbers::pi);
-    square_phase_error_s2 += std::pow(error_rad / phase.rate_rad_per_s, 2);
+    square_phase_error_s2 += std::pow(phase_error_s(phase, true_rad), 2);
     ++phases;
   }
   [[nodiscard]] double median_mm() const { return quantile(errors_mm, 0.5); }
@@ -322,9 +325,7 @@ double r_peaks_late_s(const Simulation& simulation, const Scene& scene, PhaseLaw
     const CardiacClock& clock = cells.mapper.front();
     for (; open < scene.frames.size() && simulation.frames()[open].stamp.capture < clock.anchor(); ++open) {
       const PhaseEstimate told = clock.at(simulation.frames()[open].stamp.capture);
-      if (!told.teaches) continue;
-      const double error_rad = std::remainder(told.phase_rad - scene.frames[open].phase_rad, 2.0 * std::numbers::pi);
-      late_s.push_back(-error_rad / told.rate_rad_per_s);
+      if (told.teaches) late_s.push_back(-phase_error_s(told, scene.frames[open].phase_rad));
     }
   }
   return quantile(std::move(late_s), 0.5);

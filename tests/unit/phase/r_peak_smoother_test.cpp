@@ -96,6 +96,12 @@ struct Beats : ::testing::Test {
     }
     return std::sqrt(squares / n - sum * sum / n / n);
   }
+  // Of what is told of instant t in the cycle that truly begins with truth[i].
+  [[nodiscard]] double phase_error_s(const PhaseEstimate& told, std::size_t i, Instant t) const {
+    const CyclePhase phase =
+        phase_in_cycle(settings.law, t - truth[i], truth[i + 1] - truth[i], truth[i] - truth[i - 1]);
+    return std::remainder(told.phase_rad - phase.phase_rad, kTwoPi) / phase.rate_rad_per_s;
+  }
   [[nodiscard]] double mean_moved_s() const {
     double sum = 0.0;
     for (std::size_t i = kSettled; i < moved_s.size(); ++i) sum += moved_s[i];
@@ -114,13 +120,8 @@ TEST_P(BeatsOfALaw, CompletedCyclesHaveABetterPhase) {
   const CardiacClock moved = smoother.moved(tracker.clock());
   for (std::size_t i = truth.size() - 20; i + 1 < truth.size(); ++i) {
     for (Instant t = truth[i] + milliseconds(20); t < truth[i + 1] - milliseconds(20); t += milliseconds(20)) {
-      const CyclePhase phase =
-          phase_in_cycle(settings.law, t - truth[i], truth[i + 1] - truth[i], truth[i] - truth[i - 1]);
-      const auto error_s2 = [&](const CardiacClock& clock) {
-        return std::pow(std::remainder(clock.at(t).phase_rad - phase.phase_rad, kTwoPi) / phase.rate_rad_per_s, 2);
-      };
-      by_ecg_s2 += error_s2(tracker.clock());
-      moved_s2 += error_s2(moved);
+      by_ecg_s2 += std::pow(phase_error_s(tracker.clock().at(t), i, t), 2);
+      moved_s2 += std::pow(phase_error_s(moved.at(t), i, t), 2);
     }
   }
   EXPECT_LT(std::sqrt(moved_s2 / by_ecg_s2), 0.7);
@@ -187,17 +188,12 @@ TEST_P(BeatsOfALaw, PoorlyKnownAreAsUncertainAsTold) {
     const CardiacClock moved = smoother.moved(tracker.clock());
     for (std::size_t i = truth.size() - 3; i + 1 < truth.size(); ++i) {
       for (Instant t = truth[i] + milliseconds(10); t < truth[i + 1]; t += milliseconds(30)) {
-        const CyclePhase phase =
-            phase_in_cycle(settings.law, t - truth[i], truth[i + 1] - truth[i], truth[i] - truth[i - 1]);
         const PhaseEstimate by_ecg = tracker.clock().at(t);
         const PhaseEstimate told = moved.at(t);
         if (!by_ecg.teaches || !told.teaches) continue;
-        const auto error_s = [&](const PhaseEstimate& estimate) {
-          return std::remainder(estimate.phase_rad - phase.phase_rad, kTwoPi) / phase.rate_rad_per_s;
-        };
-        by_ecg_s2 += std::pow(error_s(by_ecg), 2);
-        moved_s2 += std::pow(error_s(told), 2);
-        const double deviations = error_s(told) / told.deviation_s;
+        by_ecg_s2 += std::pow(phase_error_s(by_ecg, i, t), 2);
+        moved_s2 += std::pow(phase_error_s(told, i, t), 2);
+        const double deviations = phase_error_s(told, i, t) / told.deviation_s;
         squares += deviations * deviations;
         far += std::abs(deviations) > 3.0 ? 1 : 0;
         ++phases;
