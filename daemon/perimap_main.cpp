@@ -3,19 +3,19 @@
 #include <cstdio>
 #include <exception>
 
-#include "daemon/commands/bench.hpp"
 #include "daemon/commands/check.hpp"
 #include "daemon/commands/ctl.hpp"
-#include "daemon/commands/ecg.hpp"
-#include "daemon/commands/emulate.hpp"
-#include "daemon/commands/experiment.hpp"
 #include "daemon/commands/probe.hpp"
 #include "daemon/commands/record.hpp"
-#include "daemon/commands/replay.hpp"
-#include "daemon/commands/report.hpp"
-#include "daemon/commands/simulate.hpp"
-#include "daemon/commands/track.hpp"
-#include "daemon/commands/watch.hpp"
+#include "daemon/evaluation/commands/bench.hpp"
+#include "daemon/evaluation/commands/ecg.hpp"
+#include "daemon/evaluation/commands/experiment.hpp"
+#include "daemon/evaluation/commands/replay.hpp"
+#include "daemon/evaluation/commands/report.hpp"
+#include "daemon/evaluation/commands/track.hpp"
+#include "daemon/evaluation/commands/watch.hpp"
+#include "daemon/standins/commands/emulate.hpp"
+#include "daemon/standins/commands/simulate.hpp"
 
 namespace {
 

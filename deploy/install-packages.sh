@@ -27,11 +27,11 @@ build=(
   cyclonedds-dev cyclonedds-tools            # idl, daemon: DDS and its IDL compiler
   libfmt-dev
   libzstd-dev libdeflate-dev                 # drivers/recording: compression, check sums
-  zlib1g-dev                                 # drivers/simulator: its data
+  zlib1g-dev                                 # drivers/standins/simulator: its data
   libyaml-cpp-dev                            # drivers: calibration files
   libtomlplusplus-dev libcli11-dev libspdlog-dev nlohmann-json3-dev  # daemon
   libsystemd-dev                             # daemon/process: readiness, watchdog
-  librsvg2-dev fonts-dejavu-core             # daemon/report: figures as PNG
+  librsvg2-dev fonts-dejavu-core             # daemon/evaluation/report: figures as PNG
 )
 tests=(
   libgtest-dev libgmock-dev

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "core/vision/feature_detector.hpp"
-#include "drivers/simulator/simulation.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
 
 namespace perimap::bench {
 namespace {

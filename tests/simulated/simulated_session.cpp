@@ -5,11 +5,11 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/commands/frame_renderer.hpp"
-#include "daemon/commands/simulate.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/runtime/replay_setup.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/standins/session/session_writer.hpp"
+#include "drivers/standins/simulator/frame_renderer.hpp"
 
 namespace perimap::test {
 namespace {

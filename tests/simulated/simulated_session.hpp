@@ -5,7 +5,7 @@
 
 #include "core/pipeline/pipeline.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
-#include "drivers/simulator/simulation.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
 
 namespace perimap::test {
 

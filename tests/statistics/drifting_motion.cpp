@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "core/estimation/feature_health.hpp"
-#include "daemon/experiment/accuracy_figures.hpp"
-#include "daemon/experiment/method.hpp"
+#include "daemon/evaluation/experiment/accuracy_figures.hpp"
+#include "daemon/evaluation/experiment/method.hpp"
 #include "goals.hpp"
 
 namespace perimap::test {

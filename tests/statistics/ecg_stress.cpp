@@ -17,12 +17,12 @@
 #include <vector>
 
 #include "core/phase/rhythm_monitor.hpp"
-#include "daemon/ecg/beat_score.hpp"
-#include "daemon/ecg/ecg_analysis.hpp"
+#include "daemon/evaluation/ecg/beat_score.hpp"
+#include "daemon/evaluation/ecg/ecg_analysis.hpp"
 #include "drivers/ecg_file/beat_table.hpp"
 #include "drivers/ecg_file/ecg_trace.hpp"
-#include "drivers/simulator/ecg_record.hpp"
-#include "drivers/simulator/embedded_data.hpp"
+#include "drivers/standins/simulator/ecg_record.hpp"
+#include "drivers/standins/simulator/embedded_data.hpp"
 #include "goals.hpp"
 
 namespace perimap::test {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/simulator/heart_mesh.hpp"
-#include "drivers/simulator/heart_motion.hpp"
+#include "drivers/standins/truth/heart_mesh.hpp"
+#include "drivers/standins/truth/heart_motion.hpp"
 #include "goal_report.hpp"
 
 namespace perimap::test {

@@ -8,11 +8,11 @@
 
 #include "core/pipeline/pipeline.hpp"
 #include "core/pipeline/surface_composer.hpp"
+#include "daemon/evaluation/report/accuracy.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/publishing/wire_surface.hpp"
-#include "daemon/report/accuracy.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
-#include "drivers/simulator/simulation.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
 
 namespace perimap::test {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
-#include "drivers/simulator/simulation.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
 #include "goals.hpp"
 #include "horizon_session.hpp"
 #include "motion_laws.hpp"

@@ -4,9 +4,9 @@
 #include <numbers>
 #include <vector>
 
-#include "daemon/experiment/accuracy_figures.hpp"
-#include "daemon/experiment/comparison.hpp"
-#include "daemon/experiment/method.hpp"
+#include "daemon/evaluation/experiment/accuracy_figures.hpp"
+#include "daemon/evaluation/experiment/comparison.hpp"
+#include "daemon/evaluation/experiment/method.hpp"
 #include "goals.hpp"
 
 namespace perimap::test {

@@ -3,8 +3,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "daemon/experiment/accuracy_figures.hpp"
-#include "daemon/experiment/method.hpp"
+#include "daemon/evaluation/experiment/accuracy_figures.hpp"
+#include "daemon/evaluation/experiment/method.hpp"
 #include "goals.hpp"
 
 namespace perimap::test {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/phase/phase_law.hpp"
-#include "drivers/simulator/heart_motion.hpp"
+#include "drivers/standins/truth/heart_motion.hpp"
 
 namespace perimap::test {
 

@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "daemon/experiment/accuracy_figures.hpp"
-#include "daemon/experiment/shared_map.hpp"
+#include "daemon/evaluation/experiment/accuracy_figures.hpp"
+#include "daemon/evaluation/experiment/shared_map.hpp"
 #include "goals.hpp"
 
 namespace perimap::test {

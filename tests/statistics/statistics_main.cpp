@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/experiment/scene.hpp"
+#include "daemon/evaluation/experiment/scene.hpp"
 #include "goals.hpp"
 
 int main(int argc, char** argv) {

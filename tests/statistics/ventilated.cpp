@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/simulator/simulation.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
 #include "goals.hpp"
 #include "horizon_session.hpp"
 #include "tests/simulated/simulated_session.hpp"

@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/report/recorded_truth.hpp"
+#include "daemon/evaluation/report/recorded_truth.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/replay_reader.hpp"

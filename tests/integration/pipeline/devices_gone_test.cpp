@@ -22,10 +22,10 @@
 #include <vector>
 
 #include "daemon/publishing/wire_names.hpp"
-#include "drivers/emulator/ecg_emulator.hpp"
-#include "drivers/emulator/igtl_emulator.hpp"
-#include "drivers/emulator/ndi_emulator.hpp"
-#include "drivers/emulator/played_session.hpp"
+#include "drivers/standins/emulator/ecg_emulator.hpp"
+#include "drivers/standins/emulator/igtl_emulator.hpp"
+#include "drivers/standins/emulator/ndi_emulator.hpp"
+#include "drivers/standins/emulator/played_session.hpp"
 #include "drivers/transport/tcp_stream.hpp"
 #include "plugged_device.hpp"
 #include "process_figures.hpp"

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "daemon/evaluation/report/accuracy.hpp"
 #include "daemon/publishing/publication.hpp"
-#include "daemon/report/accuracy.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
-#include "drivers/simulator/simulation.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
 #include "tests/simulated/simulated_session.hpp"
 
 namespace perimap {

@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "daemon/evaluation/report/recorded_truth.hpp"
 #include "daemon/publishing/publication.hpp"
-#include "daemon/report/recorded_truth.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/replay_setup.hpp"
 #include "drivers/calibration/calibration_file.hpp"

@@ -6,7 +6,7 @@
 
 #include "core/pipeline/pipeline.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
-#include "drivers/simulator/simulation.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
 #include "tests/integration/pipeline/collected_surfaces.hpp"
 #include "tests/simulated/simulated_session.hpp"
 

@@ -13,7 +13,7 @@
 
 #include "core/time/instant.hpp"
 #include "drivers/device/device_protocol.hpp"
-#include "drivers/emulator/emulator_server.hpp"
+#include "drivers/standins/emulator/emulator_server.hpp"
 #include "drivers/transport/endpoint.hpp"
 #include "drivers/transport/interrupt.hpp"
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "daemon/evaluation/report/recorded_beats.hpp"
 #include "daemon/publishing/publication.hpp"
-#include "daemon/report/recorded_beats.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/replay_setup.hpp"
 #include "daemon/runtime/session_recording.hpp"

@@ -15,7 +15,7 @@
 #include "core/pipeline/pipeline.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
-#include "drivers/simulator/simulation.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
 #include "tests/simulated/simulated_session.hpp"
 
 namespace perimap {

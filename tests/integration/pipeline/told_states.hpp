@@ -13,7 +13,7 @@
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
-#include "daemon/watch/sample_receiver.hpp"
+#include "daemon/evaluation/watch/sample_receiver.hpp"
 
 namespace perimap::test {
 

@@ -1,15 +1,15 @@
-#include "daemon/bench/figures.hpp"
+#include "daemon/evaluation/bench/figures.hpp"
 
 #include <gtest/gtest.h>
 
 #include <variant>
 #include <vector>
 
-#include "daemon/bench/bare_loop.hpp"
-#include "daemon/bench/bench.hpp"
-#include "daemon/bench/ddsperf_run.hpp"
-#include "daemon/bench/lockstep_run.hpp"
-#include "daemon/bench/subscriber.hpp"
+#include "daemon/evaluation/bench/bare_loop.hpp"
+#include "daemon/evaluation/bench/bench.hpp"
+#include "daemon/evaluation/bench/ddsperf_run.hpp"
+#include "daemon/evaluation/bench/lockstep_run.hpp"
+#include "daemon/evaluation/bench/subscriber.hpp"
 
 namespace perimap::bench {
 namespace {

@@ -1,4 +1,4 @@
-#include "daemon/bench/table.hpp"
+#include "daemon/evaluation/bench/table.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "drivers/emulator/camera_emulator.hpp"
+#include "drivers/standins/emulator/camera_emulator.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,11 +12,11 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/emulator/played_session.hpp"
-#include "drivers/emulator/recorded_frames.hpp"
-#include "drivers/emulator/simulated_frames.hpp"
-#include "drivers/emulator/video_output.hpp"
 #include "drivers/recording/sensor_writer.hpp"
+#include "drivers/standins/emulator/played_session.hpp"
+#include "drivers/standins/emulator/recorded_frames.hpp"
+#include "drivers/standins/emulator/simulated_frames.hpp"
+#include "drivers/standins/emulator/video_output.hpp"
 
 namespace perimap {
 namespace {

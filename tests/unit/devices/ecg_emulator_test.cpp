@@ -1,5 +1,5 @@
 // Drivers and emulators together over real pseudo-terminals, in real time.
-#include "drivers/emulator/ecg_emulator.hpp"
+#include "drivers/standins/emulator/ecg_emulator.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 #include "drivers/ecg/bitalino.hpp"
 #include "drivers/ecg/cyton.hpp"
 #include "drivers/ecg/medlab.hpp"
-#include "drivers/emulator/emulator_server.hpp"
+#include "drivers/standins/emulator/emulator_server.hpp"
 #include "wait_until.hpp"
 
 namespace perimap {

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "drivers/emulator/igtl_emulator.hpp"
+#include "drivers/standins/emulator/igtl_emulator.hpp"
 #include "drivers/tracker/igtl_message.hpp"
 #include "drivers/tracker/igtl_session.hpp"
 #include "scripted_link.hpp"

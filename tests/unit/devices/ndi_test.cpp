@@ -7,7 +7,7 @@
 #include <functional>
 #include <random>
 
-#include "drivers/emulator/ndi_emulator.hpp"
+#include "drivers/standins/emulator/ndi_emulator.hpp"
 #include "drivers/tracker/ndi_session.hpp"
 #include "scripted_link.hpp"
 

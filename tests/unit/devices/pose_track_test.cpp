@@ -1,10 +1,10 @@
-#include "drivers/emulator/pose_track.hpp"
+#include "drivers/standins/emulator/pose_track.hpp"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "drivers/emulator/igtl_emulator.hpp"
+#include "drivers/standins/emulator/igtl_emulator.hpp"
 
 namespace perimap {
 namespace {

@@ -1,5 +1,5 @@
 // What emulated devices measure, from records and recordings.
-#include "drivers/emulator/sampled_waveform.hpp"
+#include "drivers/standins/emulator/sampled_waveform.hpp"
 
 #include <gtest/gtest.h>
 

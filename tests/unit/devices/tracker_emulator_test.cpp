@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "drivers/device/device_link.hpp"
-#include "drivers/emulator/emulator_server.hpp"
-#include "drivers/emulator/igtl_emulator.hpp"
-#include "drivers/emulator/ndi_emulator.hpp"
+#include "drivers/standins/emulator/emulator_server.hpp"
+#include "drivers/standins/emulator/igtl_emulator.hpp"
+#include "drivers/standins/emulator/ndi_emulator.hpp"
 #include "drivers/tracker/igtl_session.hpp"
 #include "drivers/tracker/ndi_session.hpp"
 #include "wait_until.hpp"

@@ -1,4 +1,4 @@
-#include "daemon/report/accuracy.hpp"
+#include "daemon/evaluation/report/accuracy.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/report/accuracy_text.hpp"
+#include "daemon/evaluation/report/accuracy_text.hpp"
 
 namespace perimap {
 namespace {

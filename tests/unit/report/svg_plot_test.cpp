@@ -1,4 +1,4 @@
-#include "daemon/report/svg_plot.hpp"
+#include "daemon/evaluation/report/svg_plot.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,9 +9,9 @@
 #include "daemon/publishing/wire_reports.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/session_recording.hpp"
-#include "drivers/emulator/ecg_emulator.hpp"
-#include "drivers/emulator/emulator_server.hpp"
 #include "drivers/recording/replay_reader.hpp"
+#include "drivers/standins/emulator/ecg_emulator.hpp"
+#include "drivers/standins/emulator/emulator_server.hpp"
 #include "wait_until.hpp"
 
 namespace perimap {

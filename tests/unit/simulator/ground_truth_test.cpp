@@ -1,8 +1,8 @@
-#include "drivers/simulator/ground_truth.hpp"
+#include "drivers/standins/truth/ground_truth.hpp"
 
 #include <gtest/gtest.h>
 
-#include "drivers/simulator/lens.hpp"
+#include "drivers/standins/simulator/lens.hpp"
 
 namespace perimap {
 namespace {

@@ -1,4 +1,4 @@
-#include "drivers/simulator/heart_mesh.hpp"
+#include "drivers/standins/truth/heart_mesh.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "drivers/simulator/embedded_data.hpp"
+#include "drivers/standins/simulator/embedded_data.hpp"
 
 namespace perimap {
 namespace {

@@ -1,4 +1,4 @@
-#include "drivers/simulator/heart_motion.hpp"
+#include "drivers/standins/truth/heart_motion.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "drivers/simulator/scene_renderer.hpp"
+#include "drivers/standins/simulator/scene_renderer.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <thread>
 
-#include "drivers/simulator/simulation.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
 
 namespace perimap {
 namespace {

@@ -1,4 +1,4 @@
-#include "drivers/simulator/simulation.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "drivers/simulator/ecg_record.hpp"
+#include "drivers/standins/simulator/ecg_record.hpp"
 
 namespace perimap {
 namespace {

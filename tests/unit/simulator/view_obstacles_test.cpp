@@ -1,4 +1,4 @@
-#include "drivers/simulator/view_obstacles.hpp"
+#include "drivers/standins/simulator/view_obstacles.hpp"
 
 #include <gtest/gtest.h>
 

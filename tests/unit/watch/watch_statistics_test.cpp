@@ -1,4 +1,4 @@
-#include "daemon/watch/watch_statistics.hpp"
+#include "daemon/evaluation/watch/watch_statistics.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/dds/bounded_string.hpp"
-#include "daemon/watch/watch_report.hpp"
+#include "daemon/evaluation/watch/watch_report.hpp"
 
 namespace perimap {
 namespace {

@@ -1,0 +1,176 @@
+#include "daemon/evaluation/commands/bench.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/evaluation/bench/bench.hpp"
+#include "daemon/evaluation/bench/bench_text.hpp"
+#include "daemon/evaluation/bench/subscriber.hpp"
+#include "daemon/logging/logging.hpp"
+#include "daemon/process/stop_signal.hpp"
+#include "drivers/text_file/text_file.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr int kDomain = 99;
+
+struct Options {
+  bench::BenchSettings settings;
+  std::string configuration;
+  std::vector<std::string> only;
+  std::string scratch;
+  double seconds = 10.0;
+  double settle = 8.0;
+  std::string json;
+  std::string html;
+};
+
+int complain(const Error& error) {
+  fmt::print(stderr, "perimap bench: {}\n", error.message);
+  return 1;
+}
+
+// On this host alone, and apart from every other participant whatever its domain: a surface of a benchmark must not
+// reach those who navigate by another. Cyclone DDS reads it when the first participant is made, children inherit it.
+void keep_to_ourselves() {
+  const std::string settings = fmt::format(
+      "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces>"
+      "<AllowMulticast>false</AllowMulticast><MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
+      "</General><Discovery><Tag>perimap-bench-{}</Tag><ParticipantIndex>auto</ParticipantIndex>"
+      "<MaxAutoParticipantIndex>40</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>"
+      "<Internal><SocketReceiveBufferSize max=\"8MB\"/></Internal></Domain></CycloneDDS>",
+      getpid());
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): before the other threads begin
+  setenv("CYCLONEDDS_URI", settings.c_str(), 1);
+}
+
+// A folder for what the runs write, gone when this is.
+class Scratch {
+ public:
+  static Expected<Scratch> create(const std::filesystem::path& in) {
+    std::string path = (in / "perimap-bench-XXXXXX").string();
+    if (mkdtemp(path.data()) == nullptr) return fail(in.string() + ": a folder cannot be made there");
+    return Scratch(path);
+  }
+  Scratch(Scratch&& other) noexcept : path_(std::move(other.path_)) { other.path_.clear(); }
+  Scratch& operator=(Scratch&&) = delete;
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  ~Scratch() {
+    std::error_code ignored;
+    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
+  }
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  explicit Scratch(std::filesystem::path path) : path_(std::move(path)) {}
+
+  std::filesystem::path path_;
+};
+
+int run(const Options& options) {
+  auto stop = StopSignal::install();
+  if (!stop) return complain(stop.error());
+  const auto scratch = Scratch::create(options.scratch.empty() ? std::filesystem::temp_directory_path()
+                                                               : std::filesystem::path(options.scratch));
+  if (!scratch) return complain(scratch.error());
+  keep_to_ourselves();
+  const Logging logging(LogConfiguration::Level::kError);
+
+  bench::BenchSettings settings = options.settings;
+  const std::vector<std::string>& chosen = options.only.empty() ? bench::kParts : options.only;
+  settings.parts.insert(chosen.begin(), chosen.end());
+  if (settings.parts.contains("ddsperf")) settings.parts.insert("live");  // it is held beside those
+  if (!options.configuration.empty()) settings.input.configuration = options.configuration;
+  settings.input.domain = kDomain;
+  settings.input.settle = from_seconds(options.settle);
+  settings.input.measure = from_seconds(options.seconds);
+  settings.input.scratch = scratch->path();
+  const auto report = bench::run_bench(settings, *stop, [](int number, int all, const std::string& name) {
+    fmt::print(stderr, "{:3}/{} {}\n", number, all, name);
+    (void)std::fflush(stderr);
+  });
+  if (!report) return complain(report.error());
+  if (!options.json.empty()) {
+    if (auto done = write_text_file(options.json, to_json(*report).dump(2) + "\n"); !done)
+      return complain(done.error());
+  }
+  if (!options.html.empty()) {
+    if (auto done = write_text_file(options.html, to_html(*report)); !done) return complain(done.error());
+  }
+  fmt::print("{}", to_table(*report));
+  return 0;
+}
+
+void add_subscriber_command(CLI::App& app, int& exit_code) {
+  struct SubscriberOptions {
+    int domain = 0;
+    std::string stream = "frame";
+    int pause_ms = 0;
+  };
+  const auto options = std::make_shared<SubscriberOptions>();
+  CLI::App* command = app.add_subcommand(bench::kSubscriberCommand, "What perimap bench runs in another process");
+  command->group("");
+  command->add_option("--domain", options->domain)->check(CLI::Range(0, 230));
+  command->add_option("--stream", options->stream);
+  command->add_option("--pause-ms", options->pause_ms)->check(CLI::Range(0, 10'000));
+  command->callback([options, &exit_code] {
+    const auto done = bench::subscribe_until_input_ends(options->domain, options->stream,
+                                                        std::chrono::milliseconds(options->pause_ms));
+    exit_code = done ? 0 : complain(done.error());
+  });
+}
+
+}  // namespace
+
+void add_bench_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "bench",
+      "Measure latencies by replaying a recording through the whole runtime, with subscribers in other processes");
+  bench::BenchSettings& settings = options->settings;
+  command->add_option("RECORDING", settings.input.recording, "The recording (MCAP)")->required();
+  command->add_option("-c,--config", options->configuration,
+                      "Configuration file; without it the recording's own configuration over the defaults");
+  command->add_option("--json", options->json, "Write the figures as JSON to this file");
+  command->add_option("--html", options->html, "Write one self-contained page to this file");
+  command->add_option("--only", options->only, "These parts alone; ddsperf runs after each run of 'live'")
+      ->check(CLI::IsMember(bench::kParts))
+      ->delimiter(',');
+  command->add_option("--seconds", options->seconds, "Measured a run")
+      ->check(CLI::Range(0.5, 1e6))
+      ->capture_default_str();
+  command->add_option("--settle", options->settle, "Played before, for the map to grow; not measured")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command->add_option("--runs", settings.runs, "How often the part 'live' is run")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--frames", settings.frames, "Frames of the part 'memory'")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40))
+      ->capture_default_str();
+  command->add_option("--features", settings.features, "Features at a time")
+      ->check(CLI::Range(1, 5000))
+      ->capture_default_str();
+  command->add_option("--workers", settings.workers, "Worker threads")->check(CLI::Range(1, 64))->capture_default_str();
+  command->add_option("--priority", settings.priority, "SCHED_FIFO priority of the runs that have one")
+      ->check(CLI::Range(3, 98))
+      ->capture_default_str();
+  command->add_option("--cpus", settings.cpus, "Processors of these runs' real-time threads [any]")
+      ->check(CLI::Range(0, 1023))
+      ->delimiter(',');
+  command->add_option("--scratch", options->scratch, "Where recordings of a run go [the system's temporary folder]");
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+  add_subscriber_command(app, exit_code);
+}
+
+}  // namespace perimap

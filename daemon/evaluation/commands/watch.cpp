@@ -1,0 +1,136 @@
+#include "daemon/evaluation/commands/watch.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "daemon/evaluation/watch/sample_receiver.hpp"
+#include "daemon/evaluation/watch/watch_report.hpp"
+#include "daemon/process/stop_signal.hpp"
+
+namespace perimap {
+namespace {
+
+// How soon the end of a watch (its limit, its duration, its wait) is noticed. Signals are noticed at once.
+constexpr Duration kSlice = std::chrono::milliseconds(20);
+constexpr Duration kReportInterval = std::chrono::seconds(1);
+
+struct Options {
+  int domain = 0;
+  bool json = false;
+  bool once = false;
+  double duration_s = 0.0;     // 0: no limit
+  std::uint64_t surfaces = 0;  // 0: no limit
+  double wait_s = 0.0;         // 0: no limit
+  std::string recording;
+};
+
+void print(const std::string& line) {
+  fmt::print("{}\n", line);
+  (void)std::fflush(stdout);
+}
+
+int fail_with(const Error& error) {
+  fmt::print(stderr, "perimap watch: {}\n", error.message);
+  return 1;
+}
+
+void print_interval(const Options& options, const std::vector<StreamReport>& reports) {
+  if (reports.empty()) {
+    print(options.json ? std::string(R"({"kind":"waiting"})")
+                       : "waiting for a publisher in DDS domain " + std::to_string(options.domain));
+  }
+  for (const StreamReport& report : reports) {
+    print(options.json ? report_json(report, ReportKind::kInterval) : report_line(report));
+  }
+}
+
+// Until a signal, a limit or an error ends it.
+void watch(const Options& options, StopSignal& stop, SampleReceiver& receiver) {
+  const Instant start = MonotonicClock::now();
+  std::optional<Instant> first;  // when the first surface was seen
+  Instant last_report = start;
+  while (!stop.wait_for(kSlice) && !receiver.ended()) {
+    const Instant now = MonotonicClock::now();
+    if (!first && receiver.surfaces() > 0) {
+      first = now;
+    }
+    if (!first && options.wait_s > 0 && now - start >= from_seconds(options.wait_s)) {
+      return;
+    }
+    if (now - last_report >= kReportInterval && !options.once) {
+      print_interval(options, receiver.take_interval(now - last_report));
+      last_report = now;
+    }
+    if (first && options.duration_s > 0 && now - *first >= from_seconds(options.duration_s)) {
+      return;
+    }
+  }
+}
+
+int run(const Options& options) {
+  Expected<StopSignal> stop = StopSignal::install();
+  if (!stop) {
+    return fail_with(stop.error());
+  }
+  std::optional<SampleRecorder> recorder;
+  if (!options.recording.empty()) {
+    Expected<SampleRecorder> created = SampleRecorder::create(options.recording, "perimap watch " PERIMAP_VERSION);
+    if (!created) {
+      return fail_with(created.error());
+    }
+    recorder = std::move(*created);
+  }
+  Expected<SampleReaders> readers = SampleReaders::create(options.domain, recorder.has_value());
+  if (!readers) {
+    return fail_with(readers.error());
+  }
+  SampleReceiver receiver(std::move(*readers), std::move(recorder),
+                          {options.once ? 1 : options.surfaces, options.once && options.json});
+  watch(options, *stop, receiver);
+  const Expected<void> finished = receiver.finish();
+
+  for (const StreamReport& report : receiver.totals()) {
+    if (options.once) {
+      print(options.json ? receiver.first_surface() : report_line(report));
+    } else {
+      print(options.json ? report_json(report, ReportKind::kSummary) : summary_text(report));
+    }
+  }
+  if (!finished) {
+    return fail_with(finished.error());
+  }
+  if (receiver.surfaces() == 0) {
+    return fail_with({"no surface was received in DDS domain " + std::to_string(options.domain)});
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_watch_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "watch",
+      "Subscribes to a publishing perimapd and prints a line a second: rate and lost samples, latency (receipt minus "
+      "capture, on the publisher's host only), lateness (receipt minus release), jitter, phase, features, state");
+  command->add_option("--domain", options->domain, "DDS domain")->check(CLI::Range(0, 230))->capture_default_str();
+  command->add_flag("--json", options->json, "One JSON object a line");
+  CLI::Option* once = command->add_flag("--once", options->once, "Print the first surface and end");
+  command->add_option("--duration", options->duration_s, "End so many seconds after the first surface")
+      ->check(CLI::Range(0.001, 1e9))
+      ->excludes(once);
+  command->add_option("--count", options->surfaces, "End after so many surfaces")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53))
+      ->excludes(once);
+  command->add_option("--wait", options->wait_s, "End with exit code 1 when no surface has come after so many seconds")
+      ->check(CLI::Range(0.001, 1e9));
+  command->add_option("--record", options->recording, "Write every received sample of all topics to this MCAP file");
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace perimap

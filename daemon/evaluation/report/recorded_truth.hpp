@@ -1,0 +1,43 @@
+// The ground truth of a simulated recording, and the clock on which it was published.
+#pragma once
+
+#include <perimap.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "core/error/expected.hpp"
+#include "core/geometry/camera_model.hpp"
+#include "core/time/instant.hpp"
+#include "drivers/recording/recording_reader.hpp"
+#include "drivers/standins/truth/ground_truth.hpp"
+
+namespace perimap {
+
+struct RecordedTruth {
+  GroundTruth truth;
+  CameraModel camera;
+  std::map<std::uint64_t, Instant> captures;  // by frame sequence
+
+  // What to add to the instants of samples to come to the recording's clock, told by one published frame. Nothing when
+  // the recording has no such frame.
+  [[nodiscard]] std::optional<Duration> to_recording(std::uint64_t frame_sequence, Instant published_capture) const {
+    const auto capture = captures.find(frame_sequence);
+    if (capture == captures.end()) return std::nullopt;
+    return capture->second - published_capture;
+  }
+};
+
+// The surface says of nothing that hides whether its frame came, so that its capture is the frame's own.
+[[nodiscard]] constexpr bool rests_on_its_frame(perimap_SurfaceReason reason) noexcept {
+  return reason == perimap_SURFACE_REASON_NONE || reason == perimap_SURFACE_REASON_ECTOPIC_BEAT ||
+         reason == perimap_SURFACE_REASON_RHYTHM_UNPREDICTABLE || reason == perimap_SURFACE_REASON_RHYTHM_ECTOPIC ||
+         reason == perimap_SURFACE_REASON_LAW_UNDECIDED || reason == perimap_SURFACE_REASON_NOT_SEEN;
+}
+
+// Nothing when the recording has no ground truth (it is not a simulated one).
+[[nodiscard]] Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, ReadMode mode);
+
+}  // namespace perimap

@@ -1,0 +1,96 @@
+// What a subscriber sees of the published surfaces: losses, latency, jitter, states.
+#pragma once
+
+#include <perimap.h>
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/time/instant.hpp"
+#include "daemon/evaluation/watch/duration_counts.hpp"
+
+namespace perimap {
+
+// One surface in brief.
+struct SurfaceDigest {
+  std::uint64_t sample_sequence = 0;
+  perimap_SurfaceState state = perimap_SURFACE_INVALID;
+  perimap_SurfaceReason reason = perimap_SURFACE_REASON_NONE;
+  double cardiac_phase_rad = 0.0;
+  double cardiac_phase_deviation_rad = 0.0;
+  double cardiac_phase_rate_rad_per_s = 0.0;
+  std::array<std::uint32_t, 4> features{};  // by FeatureState
+  // Median over all features that are not invalid of the largest standard deviation in any direction.
+  std::optional<double> median_deviation_mm;
+};
+
+// The last status of a stream.
+struct StatusDigest {
+  perimap_Status status{};  // its sequences are empty
+  std::vector<perimap_StageLatency> stages;
+  std::vector<perimap_SourceStatus> sources;
+};
+
+// What one stream of one source did over some time.
+struct StreamReport {
+  std::string source;
+  std::string stream;
+  Duration length{0};
+  std::uint64_t received = 0;
+  std::uint64_t missing = 0;   // sequence numbers that never came, between samples that did
+  std::uint64_t restarts = 0;  // the sequence began anew
+  std::uint64_t expired = 0;   // received after their own valid_until_ns
+  DurationSpread latency;      // receipt minus capture
+  DurationSpread lateness;     // receipt minus release deadline; early counts as zero
+  DurationSpread jitter;       // |receipt interval minus release interval| of neighbouring samples
+  std::optional<SurfaceDigest> last;
+  std::optional<StatusDigest> status;
+};
+
+// One thread at a time. Latencies make sense on the publisher's host only, whose CLOCK_MONOTONIC the samples carry.
+class WatchStatistics {
+ public:
+  void add(const perimap_Surface& surface, Instant receipt);
+  void add(const perimap_Status& status);
+
+  [[nodiscard]] std::uint64_t surfaces() const noexcept { return surfaces_; }
+
+  // What each stream did since the last call, which was `length` ago.
+  [[nodiscard]] std::vector<StreamReport> take_interval(Duration length);
+  // What each stream did from its first sample to its last.
+  [[nodiscard]] std::vector<StreamReport> totals() const;
+
+ private:
+  // Of an interval, or of all.
+  struct Tally {
+    std::uint64_t received = 0;
+    std::uint64_t missing = 0;
+    std::uint64_t restarts = 0;
+    std::uint64_t expired = 0;
+    DurationCounts latency;
+    DurationCounts lateness;
+    DurationCounts jitter;
+  };
+  struct Stream {
+    Tally interval;
+    Tally total;
+    Instant first_receipt;
+    Instant last_receipt;
+    Instant last_release;
+    std::optional<SurfaceDigest> last;
+    std::optional<StatusDigest> status;
+  };
+  using Key = std::pair<std::string, std::string>;
+
+  static StreamReport report(const Key& key, const Stream& stream, const Tally& tally, Duration length);
+
+  std::map<Key, Stream> streams_;
+  std::uint64_t surfaces_ = 0;
+};
+
+}  // namespace perimap

@@ -1,0 +1,59 @@
+#include "drivers/standins/emulator/played_session.hpp"
+
+#include <utility>
+#include <variant>
+
+#include "drivers/recording/channels.hpp"
+#include "drivers/recording/replay_reader.hpp"
+
+namespace perimap {
+
+Expected<PlayedSession> PlayedSession::read(const std::string& path) {
+  PlayedSession played;
+  auto all = ReplayReader::open(path, ReadMode::kStrict);
+  if (!all) return tl::unexpected(std::move(all.error()));
+  const auto first = all->next();
+  if (!first) return tl::unexpected(first.error());
+  if (!*first) return fail(path + ": the recording is empty");
+  played.first_arrival_ = arrival_of(**first);
+
+  // Without the frames, which are nearly all of it.
+  std::vector<std::string_view> wanted{channels::kTrackerPose, channels::kEcgSamples};
+  if (all->has_respiration()) wanted.push_back(channels::kRespirationSamples);
+  auto reader = ReplayReader::open(path, ReadMode::kStrict, wanted);
+  if (!reader) return tl::unexpected(std::move(reader.error()));
+  for (;;) {
+    auto event = reader->next();
+    if (!event) return tl::unexpected(std::move(event.error()));
+    if (!*event) break;
+    if (const auto* sample = std::get_if<TrackerSample>(&**event)) played.tracker_.push_back(*sample);
+    if (const auto* block = std::get_if<EcgBlock>(&**event)) played.ecg_.push_back(*block);
+    if (const auto* block = std::get_if<RespirationBlock>(&**event)) played.respiration_.push_back(*block);
+  }
+  if (played.tracker_.empty() || played.ecg_.empty()) return fail(path + ": holds no poses or no ECG");
+  return played;
+}
+
+PlayedSession PlayedSession::of(const Simulation& simulation, const TrackerNoise& noise) {
+  PlayedSession played;
+  played.first_arrival_ = simulation.arrivals().front().arrival;
+  for (std::size_t i = 0; i < simulation.tracker_sample_count(); ++i) {
+    played.tracker_.push_back(simulation.tracker_sample(i, noise));
+  }
+  played.ecg_.assign(simulation.ecg().begin(), simulation.ecg().end());
+  played.respiration_.assign(simulation.respiration().begin(), simulation.respiration().end());
+  return played;
+}
+
+PoseTrack PlayedSession::poses(Instant start) const {
+  return PoseTrack::of_samples(start + (tracker_.front().source_time - first_arrival_), tracker_);
+}
+
+EcgDeviceSignals PlayedSession::ecg_device(Instant start) const {
+  const Duration offset = start - first_arrival_;
+  EcgDeviceSignals signals{SampledWaveform(ecg_, offset)};
+  if (!respiration_.empty()) signals.respiration.emplace(respiration_, offset);
+  return signals;
+}
+
+}  // namespace perimap

@@ -1,0 +1,230 @@
+#include "drivers/standins/session/session_writer.hpp"
+
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <memory>
+#include <numbers>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include "drivers/recording/channels.hpp"
+#include "drivers/recording/foxglove_image.hpp"
+#include "drivers/recording/foxglove_pose.hpp"
+#include "drivers/recording/recording_writer.hpp"
+#include "drivers/recording/sensor_messages.hpp"
+#include "drivers/standins/simulator/frame_renderer.hpp"
+#include "drivers/standins/truth/truth_messages.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr double kRadians_per_degree = std::numbers::pi / 180.0;
+
+const char* law_name(MotionLaw law) noexcept {
+  switch (law) {
+    case MotionLaw::kWarped:
+      return "warped";
+    case MotionLaw::kTimeLocked:
+      return "time-locked";
+    case MotionLaw::kLinear:
+      break;
+  }
+  return "linear";
+}
+
+std::string description(const Simulation& simulation, const TrackerNoise& noise) {
+  const SimulationSettings& s = simulation.settings();
+  const double correlation_s = to_seconds(s.tracker_correlation);
+  return fmt::format(
+      "simulated heart: seed {}, {} s, {}x{} at {} Hz, ECG record {}, motion {}, respiration {} mm, tracker {} Hz with "
+      "{} mm and {:.3g} deg RMS{}",
+      s.seed, to_seconds(s.duration), s.width, s.height, s.frames_per_s, s.ecg_record, law_name(s.law),
+      s.respiration_mm, s.tracker_rate_hz, noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
+      correlation_s > 0.0 ? fmt::format(", correlated over {} s", correlation_s) : "");
+}
+
+// One recording under way, in a file beside the one it will become.
+class SessionWriter {
+ public:
+  static Expected<std::unique_ptr<SessionWriter>> create(const Simulation& simulation,
+                                                         const SimulatedRecording& recording) {
+    std::filesystem::path partial = recording.path;
+    partial += ".part";
+    auto writer = RecordingWriter::create(partial.string());
+    if (!writer) return tl::unexpected(writer.error());
+    auto session = std::unique_ptr<SessionWriter>(
+        new SessionWriter(simulation, recording, std::move(partial), *std::move(writer)));
+    if (const auto begun = session->begin(); !begun) return tl::unexpected(begun.error());
+    return session;
+  }
+
+  SessionWriter(const SessionWriter&) = delete;
+  SessionWriter& operator=(const SessionWriter&) = delete;
+  ~SessionWriter() {
+    if (finished_) return;
+    std::error_code ignored;
+    std::filesystem::remove(partial_, ignored);
+  }
+
+  Expected<void> write_frame(const Simulation::Frame& frame, std::span<const std::uint8_t> pixels) {
+    const auto sequence = static_cast<std::uint32_t>(frame.stamp.sequence);
+    const int width = simulation_.settings().width;
+    const GreyImage image{pixels.data(), width, simulation_.settings().height, width};
+    const auto raw = borrow_raw_image(image, frame.stamp.capture, kCameraFrame, packed_);
+    const auto truth = to_truth_camera({frame.stamp.capture, frame.X_WC});
+    return writer_.write(image_, raw, frame.stamp.arrival, frame.stamp.capture, sequence).and_then([&] {
+      return writer_.write(truth_camera_, truth, frame.stamp.arrival, frame.stamp.capture, sequence);
+    });
+  }
+
+  Expected<void> write_tracker(const TrackerSample& sample) {
+    const perimap_TrackerPose message = to_tracker_pose(sample);
+    auto written = writer_.write(tracker_, message, sample.arrival, sample.source_time, sample.device_frame);
+    if (!written || sample.state != ToolState::kOk) return written;
+    const auto viewer = borrow_pose_in_frame(sample.X_WS, sample.source_time, kWorldFrame);
+    return writer_.write(viewer_, viewer, sample.arrival, sample.source_time, sample.device_frame);
+  }
+
+  Expected<void> write_ecg(const EcgBlock& block) {
+    const perimap_EcgSamples message = borrow_ecg_samples(block);
+    return writer_.write(ecg_, message, block.arrival, block.first_sample_time, block.device_sequence);
+  }
+
+  Expected<void> write_respiration(const RespirationBlock& block) {
+    const perimap_RespirationSamples message = borrow_respiration_samples(block);
+    return writer_.write(respiration_, message, block.arrival, block.first_sample_time, block.device_sequence);
+  }
+
+  Expected<void> finish() {
+    if (auto done = writer_.finish(); !done) return done;
+    std::error_code error;
+    std::filesystem::rename(partial_, recording_.path, error);
+    if (error) return fail(fmt::format("{}: {}", recording_.path.string(), error.message()));
+    finished_ = true;
+    return {};
+  }
+
+ private:
+  SessionWriter(const Simulation& simulation, const SimulatedRecording& recording, std::filesystem::path partial,
+                RecordingWriter writer)
+      : simulation_(simulation), recording_(recording), partial_(std::move(partial)), writer_(std::move(writer)) {}
+
+  Expected<void> attach(std::string_view name, std::string_view media_type, const std::string& text) {
+    return writer_.write_attachment(name, media_type, std::as_bytes(std::span(text)));
+  }
+
+  Expected<void> begin() {
+    Expected<ChannelId> info = writer_.add_channel<perimap_RecordingInfo>(channels::kRecordingInfo);
+    Expected<ChannelId> mesh = writer_.add_channel<perimap_TruthMesh>(channels::kTruthMesh);
+    Expected<ChannelId> motion = writer_.add_channel<perimap_TruthMotion>(channels::kTruthMotion);
+    Expected<ChannelId> truth_camera = writer_.add_channel<perimap_TruthCamera>(channels::kTruthCamera);
+    Expected<ChannelId> image = writer_.add_channel<foxglove_RawImage>(channels::kCameraImage);
+    Expected<ChannelId> tracker = writer_.add_channel<perimap_TrackerPose>(channels::kTrackerPose);
+    Expected<ChannelId> viewer = writer_.add_channel<foxglove_PoseInFrame>(channels::kTrackerViewer);
+    Expected<ChannelId> ecg = writer_.add_channel<perimap_EcgSamples>(channels::kEcgSamples);
+    for (const auto* channel : {&info, &mesh, &motion, &truth_camera, &image, &tracker, &viewer, &ecg})
+      if (!*channel) return tl::unexpected(channel->error());
+    truth_camera_ = *truth_camera;
+    image_ = *image;
+    tracker_ = *tracker;
+    viewer_ = *viewer;
+    ecg_ = *ecg;
+    if (simulation_.settings().respiration_channel) {
+      const auto respiration = writer_.add_channel<perimap_RespirationSamples>(channels::kRespirationSamples);
+      if (!respiration) return tl::unexpected(respiration.error());
+      respiration_ = *respiration;
+    }
+
+    std::string generator = fmt::format("perimap simulate {}", PERIMAP_VERSION);
+    std::string text = description(simulation_, recording_.noise);
+    std::string world = kWorldFrame;
+    const perimap_RecordingInfo facts{generator.data(), text.data(), simulation_.utc_minus_monotonic_ns(),
+                                      world.data()};
+    std::vector<std::int64_t> r_peaks_ns;
+    const auto truth_mesh = borrow_truth_mesh(simulation_.truth().mesh());
+    const auto truth_motion = borrow_truth_motion(simulation_.truth().motion(), r_peaks_ns);
+    const Instant start = simulation_.start();
+    return attach(attachments::kCalibration, "application/yaml", simulation_.lens().opencv_yaml())
+        .and_then([&] {
+          return attach(attachments::kConfiguration, "application/toml",
+                        simulated_configuration(simulation_, recording_.noise));
+        })
+        .and_then([&] { return writer_.write(*info, facts, start, start, 0); })
+        .and_then([&] { return writer_.write(*mesh, truth_mesh, start, start, 0); })
+        .and_then([&] { return writer_.write(*motion, truth_motion, start, start, 0); });
+  }
+
+  static inline const std::string kCameraFrame = "camera";
+  static inline const std::string kWorldFrame = "tracker";
+
+  const Simulation& simulation_;
+  SimulatedRecording recording_;
+  std::filesystem::path partial_;
+  RecordingWriter writer_;
+  ChannelId image_, truth_camera_, tracker_, viewer_, ecg_, respiration_;
+  std::vector<std::uint8_t> packed_;
+  bool finished_ = false;
+};
+
+}  // namespace
+
+std::string simulated_configuration(const Simulation& simulation, const TrackerNoise& noise) {
+  const Pose& X_SC = simulation.hand_eye_X_SC();
+  double q[4];
+  rotation_to_wxyz(X_SC.R, q);
+  const double correlation_s = to_seconds(simulation.settings().tracker_correlation);
+  return fmt::format(
+      "version = 1\n\n"
+      "[tracker]\n"
+      "position_deviation_mm = {:#}\n"
+      "rotation_deviation_deg = {:#}\n"
+      "{}"
+      "hand_eye_translation_SC_mm = [{:#}, {:#}, {:#}]\n"
+      "hand_eye_rotation_SC_wxyz = [{:#}, {:#}, {:#}, {:#}]\n\n"
+      "{}",
+      noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
+      correlation_s > 0.0 ? fmt::format("error_correlation_s = {:#}\n", correlation_s) : "", X_SC.t.x(), X_SC.t.y(),
+      X_SC.t.z(), q[0], q[1], q[2], q[3],
+      simulation.settings().respiration_mm > 0.0 ? "\n[respiration]\nenabled = true\n" : "");
+}
+
+Expected<void> write_simulation(const Simulation& simulation, const std::vector<SimulatedRecording>& recordings,
+                                unsigned threads, const std::function<void(std::uint64_t frames)>& progress) {
+  std::vector<std::unique_ptr<SessionWriter>> writers;
+  for (const SimulatedRecording& recording : recordings) {
+    auto writer = SessionWriter::create(simulation, recording);
+    if (!writer) return tl::unexpected(writer.error());
+    writers.push_back(*std::move(writer));
+  }
+  FrameRenderer frames(simulation, threads);
+  for (const Simulation::Arrival& arrival : simulation.arrivals()) {
+    std::span<const std::uint8_t> pixels;
+    if (arrival.source == Simulation::Source::kCamera) pixels = frames.next();
+    for (std::size_t i = 0; i < writers.size(); ++i) {
+      Expected<void> written;
+      switch (arrival.source) {
+        case Simulation::Source::kCamera:
+          written = writers[i]->write_frame(simulation.frames()[arrival.index], pixels);
+          break;
+        case Simulation::Source::kTracker:
+          written = writers[i]->write_tracker(simulation.tracker_sample(arrival.index, recordings[i].noise));
+          break;
+        case Simulation::Source::kEcg:
+          written = writers[i]->write_ecg(simulation.ecg()[arrival.index]);
+          break;
+        case Simulation::Source::kRespiration:
+          written = writers[i]->write_respiration(simulation.respiration()[arrival.index]);
+          break;
+      }
+      if (!written) return written;
+    }
+    if (arrival.source == Simulation::Source::kCamera) progress(arrival.index + 1);
+  }
+  for (const auto& writer : writers)
+    if (auto done = writer->finish(); !done) return done;
+  return {};
+}
+
+}  // namespace perimap

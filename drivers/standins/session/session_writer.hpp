@@ -1,0 +1,30 @@
+// A simulated session as recordings: what the sensors give, the truth, and what perimapd needs to know about it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/error/expected.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
+
+namespace perimap {
+
+struct SimulatedRecording {
+  std::filesystem::path path;
+  TrackerNoise noise;
+};
+
+// What perimapd needs to know about this session, as a configuration file.
+[[nodiscard]] std::string simulated_configuration(const Simulation& simulation, const TrackerNoise& noise);
+
+// Renders the simulation once, on so many threads, and writes one recording for each tracker noise. Equal simulations
+// give equal bytes, whatever the number of threads. Each file gets its name only when it is whole. `progress` hears of
+// every frame.
+[[nodiscard]] Expected<void> write_simulation(const Simulation& simulation,
+                                              const std::vector<SimulatedRecording>& recordings, unsigned threads,
+                                              const std::function<void(std::uint64_t frames)>& progress);
+
+}  // namespace perimap

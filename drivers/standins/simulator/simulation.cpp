@@ -1,0 +1,342 @@
+#include "drivers/standins/simulator/simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/simulator/ecg_record.hpp"
+#include "drivers/standins/simulator/embedded_data.hpp"
+#include "drivers/standins/simulator/scope_path.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+// Independent sequences of random numbers.
+enum Stream : std::uint64_t {
+  kSession = 1,
+  kCameraDelay,
+  kTrackerDelay,
+  kEcgDelay,
+  kTrackerPeriod,
+  kTrackerPosition,
+  kTrackerRotation,
+  kTrackerDropout,
+  kImage
+};
+
+constexpr std::size_t kBeatsBefore = 8;
+constexpr std::size_t kBeatsAfter = 3;
+constexpr std::size_t kEcgSamplesPerBlock = 4;
+
+// The heart (frame H of its table: x left, y posterior, z superior) as it lies in the tracker's frame.
+Pose X_WH() noexcept { return {so3_exp(Vector3d(0.4, -0.7, 1.1)), Vector3d(140.0, -75.0, -230.0)}; }
+// From the heart towards the scope: the anterior and left lateral wall faces it, the valves do not.
+Vector3d view_axis_H() noexcept { return Vector3d(0.45, -0.80, -0.38).normalized(); }
+Vector3d up_H() noexcept { return {0.0, 0.0, 1.0}; }
+// Inspiration moves the heart down and forward.
+Vector3d inspiration_H() noexcept { return Vector3d(0.10, -0.35, -0.93).normalized(); }
+constexpr double kScopeDistance_mm = 120.0;  // from the heart's surface, at rest
+
+// Arrival = source time + least + an exponentially distributed rest, never before an earlier one of the same source.
+class Transport {
+ public:
+  Transport(CounterNoise noise, Duration least, Duration mean_rest) noexcept
+      : noise_(noise), least_(least), mean_rest_(mean_rest) {}
+
+  [[nodiscard]] Instant arrival(Instant source_time, std::uint64_t index) noexcept {
+    const double rest = std::min(8.0, -std::log(noise_.uniform(index)));
+    const Instant arrival = source_time + least_ + from_seconds(rest * to_seconds(mean_rest_));
+    latest_ = std::max(arrival, latest_ + Duration(1));
+    return latest_;
+  }
+
+ private:
+  CounterNoise noise_;
+  Duration least_;
+  Duration mean_rest_;
+  Instant latest_{};
+};
+
+struct Interval {
+  Duration begin, end;
+};
+
+// At most one dropout in each equal part of the session, so that they are spread and as many as asked for.
+std::vector<Interval> dropouts(std::uint64_t seed, Duration duration, double per_min) {
+  const CounterNoise noise(seed, kTrackerDropout);
+  const auto count = static_cast<std::uint64_t>(std::ceil(per_min * to_seconds(duration) / 60.0 - 1e-9));
+  std::vector<Interval> intervals;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const double part = to_seconds(duration) / static_cast<double>(count);
+    const double length = std::min(noise.uniform(2 * i, 0.05, 0.30), 0.5 * part);
+    const double begin = (static_cast<double>(i) + noise.uniform(2 * i + 1) * (1.0 - length / part)) * part;
+    intervals.push_back({from_seconds(begin), from_seconds(begin + length)});
+  }
+  return intervals;
+}
+
+Vector3d normal3(const CounterNoise& noise, std::uint64_t index) noexcept {
+  return {noise.normal(3 * index), noise.normal(3 * index + 1), noise.normal(3 * index + 2)};
+}
+
+Expected<void> check(const SimulationSettings& s) {
+  const auto outside = [](const char* what, double value, double low, double high, const char* unit) -> Expected<void> {
+    if (value >= low && value <= high) return {};
+    return fail(fmt::format("{}: {} is outside {} to {} {}", what, value, low, high, unit));
+  };
+  if (s.width % 2 != 0 || s.height % 2 != 0)
+    return fail(fmt::format("size: {}x{} is not even in both directions", s.width, s.height));
+  for (const Expected<void>& result :
+       {outside("duration", to_seconds(s.duration), 1.0, 1700.0, "s"), outside("width", s.width, 64, 4096, "px"),
+        outside("height", s.height, 64, 4096, "px"), outside("fps", s.frames_per_s, 1.0, 1000.0, "Hz"),
+        outside("respiration", s.respiration_mm, 0.0, 50.0, "mm"),
+        outside("respiration period", to_seconds(s.respiration_period), 0.5, 60.0, "s"),
+        outside("tracker rate", s.tracker_rate_hz, 1.0, 1000.0, "Hz"),
+        outside("tracker correlation", to_seconds(s.tracker_correlation), 0.0, 1000.0, "s"),
+        outside("tracker dropouts", s.tracker_dropouts_per_min, 0.0, 60.0, "a minute"),
+        outside("scope sweep", s.scope_sweep, 0.0, 20.0, "times the usual"),
+        outside("exposure", s.exposure_share, 0.0, 1.0, "of the frame period"),
+        outside("glints", s.glints, 0, 1000, ""), outside("smoke", s.smoke, 0.0, 10.0, "")})
+    if (!result) return result;
+  return {};
+}
+
+// The record's sample at which the session starts.
+Expected<std::uint32_t> start_sample(const SimulationSettings& s, const EcgRecord& record) {
+  const auto samples = [&](Duration d) { return to_seconds(d) * record.sample_rate_hz; };
+  const double first = record.beat_samples[kBeatsBefore];
+  const double last = record.beat_samples[record.beat_samples.size() - 1 - kBeatsAfter] - samples(s.duration);
+  if (last < first)
+    return fail(fmt::format("duration: ECG record {} holds no {} s", record.name, to_seconds(s.duration)));
+  if (!s.ecg_start) return static_cast<std::uint32_t>(CounterNoise(s.seed, kSession).uniform(0, first, last));
+  const double asked = samples(*s.ecg_start);
+  if (asked < first || asked > last) {
+    return fail(fmt::format("ECG start: {} s is outside {:.1f} to {:.1f} s of record {}", to_seconds(*s.ecg_start),
+                            first / record.sample_rate_hz, last / record.sample_rate_hz, record.name));
+  }
+  return static_cast<std::uint32_t>(asked);
+}
+
+}  // namespace
+
+Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeLens lens,
+                       Vector3d surface_W, const ScopePath& path)
+    : settings_(std::move(settings)),
+      start_(start),
+      truth_(std::move(truth)),
+      lens_(lens),
+      // The sensor sits beside the lens, some way up the shaft, turned about the shaft's axis.
+      X_SC_{so3_exp(Vector3d(0.15, -0.1, 1.2)), Vector3d(4.2, -6.8, 14.5)},
+      path_(path),
+      obstacles_(settings_.seed, lens.width, lens.height, settings_.instrument, settings_.glints, settings_.smoke),
+      surface_W_(std::move(surface_W)) {}
+
+std::int64_t Simulation::utc_minus_monotonic_ns() const noexcept { return 1'750'000'000'000'000'000; }
+
+Expected<Simulation> Simulation::create(const SimulationSettings& settings, const ParallelFor& parallel_for) {
+  if (const auto good = check(settings); !good) return tl::unexpected(good.error());
+  const auto record = load_ecg_record(settings.ecg_record);
+  if (!record) return tl::unexpected(record.error());
+  const auto first_sample = start_sample(settings, *record);
+  if (!first_sample) return tl::unexpected(first_sample.error());
+  auto mesh_H = parse_heart_mesh(embedded_epicardium_fourier_csv(), embedded_epicardium_faces_csv());
+  if (!mesh_H) return tl::unexpected(mesh_H.error());
+
+  // A host that has been up for an hour or two.
+  const Instant start{from_seconds(CounterNoise(settings.seed, kSession).uniform(1, 3600.0, 7200.0))};
+  const auto sample_time = [&](std::int64_t sample) {
+    return start + from_seconds(static_cast<double>(sample - *first_sample) / record->sample_rate_hz);
+  };
+
+  HeartMotion motion;
+  motion.law = settings.law;
+  for (const std::uint32_t beat : record->beat_samples) motion.r_peaks.push_back(sample_time(beat));
+  const auto after_start = std::upper_bound(motion.r_peaks.begin(), motion.r_peaks.end(), start);
+  const auto after_end = std::upper_bound(after_start, motion.r_peaks.end(), start + settings.duration);
+  motion.r_peaks.erase(after_end + kBeatsAfter, motion.r_peaks.end());
+  motion.r_peaks.erase(motion.r_peaks.begin(), after_start - kBeatsBefore);
+  if (settings.respiration_mm > 0.0) {
+    motion.respiration_mm = settings.respiration_mm * (X_WH().R * inspiration_H());
+    motion.respiration_period = settings.respiration_period;
+  }
+
+  // The scope rests above the point of the surface that faces it.
+  const HeartMesh mesh_W = transformed(X_WH(), *std::move(mesh_H));
+  std::vector<Vector3d> material_W(mesh_W.vertex_count);
+  vertex_positions(mesh_W, fourier_basis(0.0, mesh_W.harmonics), material_W);
+  Vector3d centre_W = Vector3d::Zero();
+  for (const Vector3d& p : material_W) centre_W += p / static_cast<double>(material_W.size());
+  const Vector3d axis_W = X_WH().R * view_axis_H();
+  const ScopeLens lens = scope_lens(settings.width, settings.height);
+
+  auto still = GroundTruth::create(mesh_W, motion);
+  if (!still) return tl::unexpected(still.error());
+  const Pose far{Matrix3d::Identity(), centre_W + 300.0 * axis_W};
+  const auto facing = still->first_hit(far, -axis_W, motion.r_peaks.front());
+  if (!facing) return fail("heart mesh: the scope's axis misses it");
+  const Vector3d surface_W = still->position(*facing, motion.r_peaks.front());
+  const ScopePath path(settings.seed, surface_W + kScopeDistance_mm * axis_W, centre_W, X_WH().R * up_H(),
+                       settings.scope_sweep);
+
+  // Camera. Frame times of a free-running sensor, with the jitter of its stamps' quantisation.
+  std::vector<Frame> frames;
+  std::vector<CameraTruth> cameras;
+  const auto frame_count = static_cast<std::uint64_t>(to_seconds(settings.duration) * settings.frames_per_s);
+  Transport camera(CounterNoise(settings.seed, kCameraDelay), milliseconds(11), microseconds(1000));
+  const double offset_s = 0.5 / settings.frames_per_s;
+  for (std::uint64_t k = 0; k < frame_count; ++k) {
+    const Duration since = from_seconds(offset_s + static_cast<double>(k) / settings.frames_per_s);
+    frames.push_back({{k, start + since, camera.arrival(start + since, k)}, path.X_WC(since)});
+    cameras.push_back({start + since, frames.back().X_WC});
+  }
+
+  auto truth = GroundTruth::create(mesh_W, motion, std::move(cameras));
+  if (!truth) return tl::unexpected(truth.error());
+  Simulation simulation(settings, start, *std::move(truth), lens, surface_W, path);
+  simulation.frames_ = std::move(frames);
+
+  // Tracker: its own period wavers a little.
+  const auto gaps = dropouts(settings.seed, settings.duration, settings.tracker_dropouts_per_min);
+  const Pose X_CS = simulation.X_SC_.inverse();
+  const CounterNoise period(settings.seed, kTrackerPeriod);
+  const CounterNoise position(settings.seed, kTrackerPosition);
+  const CounterNoise rotation(settings.seed, kTrackerRotation);
+  const double correlation =
+      settings.tracker_correlation > Duration(0)
+          ? std::exp(-1.0 / (settings.tracker_rate_hz * to_seconds(settings.tracker_correlation)))
+          : 0.0;
+  Vector3d position_error = Vector3d::Zero();
+  Vector3d rotation_error = Vector3d::Zero();
+  // The first reading's error is all its own.
+  double kept = 0.0;
+  double drive = 1.0;
+  Transport tracker(CounterNoise(settings.seed, kTrackerDelay), milliseconds(7), microseconds(1000));
+  const auto reading_count = static_cast<std::uint64_t>(to_seconds(settings.duration) * settings.tracker_rate_hz);
+  for (std::uint64_t k = 0; k < reading_count; ++k) {
+    const Duration since =
+        from_seconds((static_cast<double>(k) + period.uniform(k, -0.02, 0.02) + 0.5) / settings.tracker_rate_hz);
+    const bool missing = std::any_of(gaps.begin(), gaps.end(),
+                                     [&](const Interval& gap) { return since >= gap.begin && since < gap.end; });
+    position_error = kept * position_error + drive * normal3(position, k);
+    rotation_error = kept * rotation_error + drive * normal3(rotation, k);
+    simulation.tracker_stamps_.push_back({start + since, tracker.arrival(start + since, k), missing,
+                                          path.X_WC(since) * X_CS, position_error, rotation_error});
+    kept = correlation;
+    drive = std::sqrt(1.0 - kept * kept);
+  }
+
+  // ECG: small blocks, sent when their last sample is there.
+  Transport ecg(CounterNoise(settings.seed, kEcgDelay), milliseconds(4), microseconds(800));
+  const auto sample_count = static_cast<std::uint32_t>(to_seconds(settings.duration) * record->sample_rate_hz);
+  for (std::uint32_t k = 0; k + kEcgSamplesPerBlock <= sample_count; k += kEcgSamplesPerBlock) {
+    EcgBlock block;
+    const std::uint32_t from = *first_sample + k;
+    block.first_sample_time = sample_time(from);
+    block.sample_period = from_seconds(1.0 / record->sample_rate_hz);
+    block.arrival = ecg.arrival(sample_time(from + kEcgSamplesPerBlock - 1), k);
+    block.device_sequence = k;
+    block.count = kEcgSamplesPerBlock;
+    const Duration since = block.first_sample_time - start;
+    block.lead_off = std::any_of(settings.ecg_off.begin(), settings.ecg_off.end(),
+                                 [&](const auto& off) { return since >= off.begin && since < off.begin + off.length; });
+    for (std::uint32_t i = 0; i < block.count && !block.lead_off; ++i) block.mV[i] = record->mV(from + i);
+    simulation.ecg_.push_back(block);
+  }
+
+  // The lung's volume goes with the displacement; the monitor's figure in litres, say.
+  constexpr Duration kRespirationPeriod = milliseconds(8);
+  constexpr std::uint32_t kRespirationSamplesPerBlock = 4;
+  const HeartMotion& heart = simulation.truth_.motion();
+  const double full_mm = heart.respiration_mm.norm();
+  for (std::uint32_t k = 0; settings.respiration_channel && k * kRespirationPeriod < settings.duration;
+       k += kRespirationSamplesPerBlock) {
+    RespirationBlock block;
+    block.first_sample_time = start + k * kRespirationPeriod;
+    block.sample_period = kRespirationPeriod;
+    block.arrival = block.first_sample_time + kRespirationSamplesPerBlock * kRespirationPeriod;
+    block.device_sequence = k;
+    block.count = kRespirationSamplesPerBlock;
+    for (std::uint32_t i = 0; i < block.count && full_mm > 0.0; ++i) {
+      const Instant t = block.first_sample_time + i * kRespirationPeriod;
+      block.values[i] = static_cast<float>(0.5 * respiration_displacement(heart, t).norm() / full_mm);
+    }
+    simulation.respiration_.push_back(block);
+  }
+
+  auto& arrivals = simulation.arrivals_;
+  const auto add = [&](Instant arrival, Source source, std::size_t index) {
+    arrivals.push_back({arrival, source, static_cast<std::uint32_t>(index)});
+  };
+  for (std::size_t i = 0; i < simulation.frames_.size(); ++i)
+    add(simulation.frames_[i].stamp.arrival, Source::kCamera, i);
+  for (std::size_t i = 0; i < simulation.tracker_stamps_.size(); ++i)
+    add(simulation.tracker_stamps_[i].arrival, Source::kTracker, i);
+  for (std::size_t i = 0; i < simulation.ecg_.size(); ++i) add(simulation.ecg_[i].arrival, Source::kEcg, i);
+  for (std::size_t i = 0; i < simulation.respiration_.size(); ++i)
+    add(simulation.respiration_[i].arrival, Source::kRespiration, i);
+  // Stable: what arrives in the same nanosecond keeps the order above.
+  std::stable_sort(arrivals.begin(), arrivals.end(),
+                   [](const Arrival& a, const Arrival& b) { return a.arrival < b.arrival; });
+
+  // A texel a pixel or more, at rest.
+  const int texture_size = std::min(
+      4096, static_cast<int>(std::bit_ceil(static_cast<unsigned>(3 * std::max(settings.width, settings.height)))));
+  const auto texture_seed = static_cast<std::uint32_t>(CounterNoise(settings.seed, kSession).bits(2));
+  simulation.texture_ = std::make_unique<const TissueTexture>(material_W, simulation.truth_.mesh().triangles, centre_W,
+                                                              axis_W, texture_size, texture_seed, parallel_for);
+  simulation.renderer_ =
+      std::make_unique<const SceneRenderer>(lens, simulation.truth_.mesh().triangles, *simulation.texture_);
+  return simulation;
+}
+
+TrackerSample Simulation::tracker_sample(std::size_t index, const TrackerNoise& noise) const noexcept {
+  const TrackerStamp& stamp = tracker_stamps_[index];
+  TrackerSample sample;
+  sample.source_time = stamp.source_time;
+  sample.arrival = stamp.arrival;
+  sample.device_frame = static_cast<std::uint32_t>(index);
+  if (stamp.missing) {
+    sample.state = ToolState::kMissing;
+    sample.X_WS.R.setConstant(std::numeric_limits<double>::quiet_NaN());
+    sample.X_WS.t.setConstant(std::numeric_limits<double>::quiet_NaN());
+    return sample;
+  }
+  const double per_axis = 1.0 / std::numbers::sqrt3;
+  sample.state = ToolState::kOk;
+  sample.X_WS.t = stamp.X_WS.t + noise.position_rms_mm * per_axis * stamp.position_error;
+  sample.X_WS.R = stamp.X_WS.R * so3_exp(noise.rotation_rms_rad * per_axis * stamp.rotation_error);
+  return sample;
+}
+
+void Simulation::render(std::size_t index, RenderWorkspace& workspace, std::span<std::uint8_t> image) const {
+  const Frame& frame = frames_[index];
+  std::vector<Vector3d> vertices_W(truth_.mesh().vertex_count);
+  // Instants spread evenly over the exposure; its middle alone when it is short.
+  constexpr int kInstants = 3;
+  const int instants = settings_.exposure_share > 0.0 ? kInstants : 1;
+  const double exposure_s = settings_.exposure_share / settings_.frames_per_s;
+  for (int k = 0; k < instants; ++k) {
+    const Instant t = frame.stamp.capture + from_seconds(exposure_s * ((k + 0.5) / instants - 0.5));
+    const Pose X_WC = instants == 1 ? frame.X_WC : path_.X_WC(t - start_);
+    truth_.vertices_at(t, vertices_W);
+    renderer_->light(X_WC, vertices_W, (frame.X_WC.t - surface_W_).norm(), workspace);
+    obstacles_.draw(t - start_, workspace.radiance);
+    if (instants == 1) break;
+    if (k == 0) workspace.exposure.assign(workspace.radiance.size(), 0.0F);
+    for (std::size_t i = 0; i < workspace.radiance.size(); ++i) {
+      workspace.exposure[i] += workspace.radiance[i] / static_cast<float>(instants);
+    }
+  }
+  if (instants > 1) workspace.radiance.swap(workspace.exposure);
+  renderer_->expose(CounterNoise(settings_.seed, kImage).bits(index), workspace, image);
+}
+
+}  // namespace perimap

@@ -1,0 +1,141 @@
+// A whole simulated session: a heart that beats to a real ECG, a hand-held scope, a pose tracker, and when each of
+// their data would have arrived. Everything is a function of the settings; nothing depends on time, threads or order of
+// calls.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/error/expected.hpp"
+#include "core/sensors/ecg_block.hpp"
+#include "core/sensors/frame_stamp.hpp"
+#include "core/sensors/respiration_block.hpp"
+#include "core/sensors/tracker_sample.hpp"
+#include "core/time/instant.hpp"
+#include "drivers/standins/simulator/lens.hpp"
+#include "drivers/standins/simulator/parallel_for.hpp"
+#include "drivers/standins/simulator/scene_renderer.hpp"
+#include "drivers/standins/simulator/scope_path.hpp"
+#include "drivers/standins/simulator/tissue_texture.hpp"
+#include "drivers/standins/simulator/view_obstacles.hpp"
+#include "drivers/standins/truth/ground_truth.hpp"
+
+namespace perimap {
+
+struct SimulationSettings {
+  std::uint64_t seed = 1;
+  Duration duration = std::chrono::seconds(60);
+  int width = 640;   // px
+  int height = 480;  // px
+  double frames_per_s = 30.0;
+  std::string ecg_record = "100";
+  std::optional<Duration> ecg_start;  // of the session, from the record's start; chosen by the seed when not given
+  MotionLaw law = MotionLaw::kLinear;
+  double respiration_mm = 0.0;
+  Duration respiration_period = std::chrono::seconds(4);
+  bool respiration_channel = false;  // a volume channel tells of the breathing
+  double tracker_rate_hz = 100.0;
+  // Time in which the tracker's error falls to 1/e of what it was (Gauss-Markov); 0: new at each reading.
+  Duration tracker_correlation{0};
+  double tracker_dropouts_per_min = 3.0;
+  // The electrode is off, and the device says so: from the session's start to begin, and for how long.
+  struct EcgOff {
+    Duration begin, length;
+  };
+  std::vector<EcgOff> ecg_off;
+  // What makes seeing hard.
+  double scope_sweep = 1.0;     // see ScopePath
+  double exposure_share = 0.0;  // of the frame period, about the capture: motion blur
+  bool instrument = false;      // see ViewObstacles
+  int glints = 0;
+  double smoke = 0.0;
+};
+
+// Norms in three dimensions: the standard deviation of one axis is 1 / sqrt(3) of them.
+struct TrackerNoise {
+  double position_rms_mm = 0.0;
+  double rotation_rms_rad = 0.0;
+};
+
+class Simulation {
+ public:
+  struct Frame {
+    FrameStamp stamp;
+    Pose X_WC;
+  };
+
+  enum class Source : std::uint8_t { kCamera, kTracker, kEcg, kRespiration };
+  struct Arrival {
+    Instant arrival;
+    Source source = Source::kCamera;
+    std::uint32_t index = 0;  // into frames(), of tracker_sample(), into ecg(), respiration()
+  };
+
+  // Errors name the setting that is out of range, in words of the command line.
+  [[nodiscard]] static Expected<Simulation> create(const SimulationSettings& settings,
+                                                   const ParallelFor& parallel_for = serial_for);
+
+  Simulation(Simulation&&) noexcept = default;
+  Simulation& operator=(Simulation&&) = delete;
+  Simulation(const Simulation&) = delete;
+  Simulation& operator=(const Simulation&) = delete;
+  ~Simulation() = default;
+
+  [[nodiscard]] const SimulationSettings& settings() const noexcept { return settings_; }
+  [[nodiscard]] Instant start() const noexcept { return start_; }
+  // Stands for the recording's fixed epoch; the same for every recording, since nothing may depend on today.
+  [[nodiscard]] std::int64_t utc_minus_monotonic_ns() const noexcept;
+  [[nodiscard]] const ScopeLens& lens() const noexcept { return lens_; }
+  // Camera frame C in the tracked sensor's frame S.
+  [[nodiscard]] const Pose& hand_eye_X_SC() const noexcept { return X_SC_; }
+  [[nodiscard]] const GroundTruth& truth() const noexcept { return truth_; }
+  [[nodiscard]] const ViewObstacles& obstacles() const noexcept { return obstacles_; }
+
+  // Everything that arrives, in order of arrival; the order within a source is the order of its own stamps.
+  [[nodiscard]] std::span<const Arrival> arrivals() const noexcept { return arrivals_; }
+  [[nodiscard]] std::span<const Frame> frames() const noexcept { return frames_; }
+  [[nodiscard]] std::span<const EcgBlock> ecg() const noexcept { return ecg_; }
+  [[nodiscard]] std::span<const RespirationBlock> respiration() const noexcept { return respiration_; }
+  [[nodiscard]] std::size_t tracker_sample_count() const noexcept { return tracker_stamps_.size(); }
+  // A reading with this much noise; the same draw for any amount, so recordings of one rendering differ in scale alone.
+  // While the tool is missing the pose is not a number.
+  [[nodiscard]] TrackerSample tracker_sample(std::size_t index, const TrackerNoise& noise) const noexcept;
+
+  // Renders frames()[index] into width * height bytes. Safe from several threads, each with its own workspace.
+  void render(std::size_t index, RenderWorkspace& workspace, std::span<std::uint8_t> image) const;
+
+ private:
+  struct TrackerStamp {
+    Instant source_time;
+    Instant arrival;
+    bool missing = false;
+    Pose X_WS;                                   // true
+    Vector3d position_error = Vector3d::Zero();  // of unit variance per axis
+    Vector3d rotation_error = Vector3d::Zero();
+  };
+
+  Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeLens lens, Vector3d surface_W,
+             const ScopePath& path);
+
+  SimulationSettings settings_;
+  Instant start_;
+  GroundTruth truth_;
+  ScopeLens lens_;
+  Pose X_SC_;
+  ScopePath path_;
+  ViewObstacles obstacles_;
+  Vector3d surface_W_;  // the point about which the scope moves; exposure is right there
+  std::unique_ptr<const TissueTexture> texture_;
+  std::unique_ptr<const SceneRenderer> renderer_;
+  std::vector<Frame> frames_;
+  std::vector<TrackerStamp> tracker_stamps_;
+  std::vector<EcgBlock> ecg_;
+  std::vector<RespirationBlock> respiration_;
+  std::vector<Arrival> arrivals_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,171 @@
+#include "drivers/standins/simulator/view_obstacles.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+#include "drivers/standins/simulator/counter_noise.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr std::uint64_t kStream = 0x6f627374;
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kPeriod_s = 6.0;
+constexpr double kComes_s = 2.0, kGoes_s = 5.0;  // within the period
+
+struct OnShaft {
+  double along = 0.0;   // 0 at its beginning, 1 at the tip
+  double across = 0.0;  // px from its axis, with a sign; beyond the tip the distance from it
+};
+
+OnShaft on_shaft(const Vector2d& from, const Vector2d& tip, const Vector2d& px) noexcept {
+  const Vector2d axis = tip - from;
+  const Vector2d d = px - from;
+  const double along = d.dot(axis) / axis.squaredNorm();
+  if (along > 1.0) return {along, (px - tip).norm()};
+  return {along, (axis.x() * d.y() - axis.y() * d.x()) / axis.norm()};
+}
+
+}  // namespace
+
+ViewObstacles::ViewObstacles(std::uint64_t seed, int width, int height, bool instrument, int glints, double smoke)
+    : seed_(seed),
+      width_(width),
+      height_(height),
+      instrument_(instrument),
+      glints_(glints),
+      smoke_(smoke),
+      half_width_px_(0.04 * width) {}
+
+ViewObstacles::Shaft ViewObstacles::shaft(double t_s) const noexcept {
+  if (!instrument_ || t_s < 0.0) return {};
+  const double number = std::floor(t_s / kPeriod_s);
+  const double within = t_s - number * kPeriod_s;
+  if (within < kComes_s || within > kGoes_s) return {};
+  const CounterNoise noise(seed_, kStream);
+  const auto index = 4 * static_cast<std::uint64_t>(number);
+  const double angle = noise.uniform(index, 0.0, kTwoPi);
+  const Vector2d middle(0.5 * width_, 0.5 * height_);
+  const double reach = 0.5 * std::hypot(width_, height_) + 2.0 * half_width_px_;
+  const Vector2d aim =
+      middle + Vector2d(noise.uniform(index + 1, -0.2, 0.2) * width_, noise.uniform(index + 2, -0.2, 0.2) * height_);
+  Shaft shaft;
+  shaft.is_in_view = true;
+  shaft.from = middle + reach * Vector2d(std::cos(angle), std::sin(angle));
+  // In and out within 0.4 s each, at work between.
+  constexpr double kInOut_s = 0.4;
+  const double in = std::clamp(std::min(within - kComes_s, kGoes_s - within) / kInOut_s, 0.0, 1.0);
+  const double share = in * in * (3.0 - 2.0 * in);
+  const Vector2d work(0.03 * width_ * std::sin(kTwoPi * 0.9 * t_s), 0.03 * width_ * std::cos(kTwoPi * 0.7 * t_s));
+  shaft.tip = shaft.from + (0.02 + 0.98 * share) * (aim + work - shaft.from);
+  return shaft;
+}
+
+bool ViewObstacles::instrument_covers(const Vector2d& px, Duration since_start, double margin_px) const noexcept {
+  const Shaft now = shaft(to_seconds(since_start));
+  if (!now.is_in_view) return false;
+  const OnShaft place = on_shaft(now.from, now.tip, px);
+  return place.along >= 0.0 && std::abs(place.across) <= half_width_px_ + margin_px;
+}
+
+void ViewObstacles::draw(Duration since_start, std::span<float> radiance) const {
+  const double t_s = to_seconds(since_start);
+  draw_glints(t_s, radiance);
+  draw_shaft(t_s, radiance);
+  draw_smoke(t_s, radiance);
+}
+
+// A cylinder of brushed steel: bright along a line, darker towards its sides.
+void ViewObstacles::draw_shaft(double t_s, std::span<float> radiance) const {
+  const Shaft now = shaft(t_s);
+  if (!now.is_in_view) return;
+  for (int row = 0; row < height_; ++row) {
+    for (int column = 0; column < width_; ++column) {
+      const OnShaft place = on_shaft(now.from, now.tip, Vector2d(column, row));
+      const double side = place.across / half_width_px_;
+      if (place.along < 0.0 || std::abs(side) > 1.0) continue;
+      const double round = std::sqrt(1.0 - side * side);
+      const double shine = std::exp(-40.0 * (side + 0.3) * (side + 0.3));
+      radiance[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)] =
+          static_cast<float>(25.0 + 90.0 * round + 150.0 * shine);
+    }
+  }
+}
+
+void ViewObstacles::draw_glints(double t_s, std::span<float> radiance) const {
+  const CounterNoise noise(seed_, kStream + 1);
+  for (int glint = 0; glint < glints_; ++glint) {
+    const auto index = 8 * static_cast<std::uint64_t>(glint);
+    const double rate_hz = noise.uniform(index, 0.3, 1.2);
+    const double phase = noise.uniform(index + 1, 0.0, kTwoPi);
+    const double light = std::sin(kTwoPi * rate_hz * t_s + phase);
+    if (light < 0.0) continue;
+    const double wander_px = 0.02 * width_;
+    const Vector2d middle(
+        noise.uniform(index + 2, 0.1, 0.9) * width_ + wander_px * std::sin(kTwoPi * 0.5 * t_s + phase),
+        noise.uniform(index + 3, 0.1, 0.9) * height_ + wander_px * std::cos(1.9 * t_s + 2.0 * phase));
+    const double radius_px = noise.uniform(index + 4, 0.003, 0.009) * width_;
+    const double stretch = noise.uniform(index + 5, 1.0, 2.5);
+    const int reach = static_cast<int>(std::ceil(2.0 * stretch * radius_px));
+    const int u = static_cast<int>(middle.x()), v = static_cast<int>(middle.y());
+    for (int row = std::max(0, v - reach); row <= std::min(height_ - 1, v + reach); ++row) {
+      for (int column = std::max(0, u - reach); column <= std::min(width_ - 1, u + reach); ++column) {
+        const double x = (column - middle.x()) / (stretch * radius_px), y = (row - middle.y()) / radius_px;
+        radiance[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)] +=
+            static_cast<float>(500.0 * light * std::exp(-1.5 * (x * x + y * y)));
+      }
+    }
+  }
+}
+
+// Scatters the scope's own light back, and dims what lies behind (Koschmieder's law). Clouds are a sum of drifting
+// waves, smooth enough to be worked out on a coarse grid.
+void ViewObstacles::draw_smoke(double t_s, std::span<float> radiance) const {
+  constexpr double kSmokePeriod_s = 8.0, kSmoke_s = 5.0;
+  const double within = t_s - std::floor(t_s / kSmokePeriod_s) * kSmokePeriod_s;
+  if (!(smoke_ > 0.0) || t_s < 0.0 || within > kSmoke_s) return;
+  const double strength = smoke_ * std::pow(std::sin(std::numbers::pi * within / kSmoke_s), 2.0);
+  const CounterNoise noise(seed_, kStream + 2);
+  const auto depth_at = [&](double x, double y) {
+    constexpr int kWaves = 6;
+    double sum = 0.0;
+    for (int wave = 0; wave < kWaves; ++wave) {
+      const auto index = 4 * static_cast<std::uint64_t>(wave);
+      const double direction = noise.uniform(index, 0.0, kTwoPi);
+      const double length_px = noise.uniform(index + 1, 0.2, 0.8) * width_;
+      const double rate_hz = noise.uniform(index + 2, 0.1, 0.5);
+      sum += std::sin(kTwoPi * ((std::cos(direction) * x + std::sin(direction) * y) / length_px + rate_hz * t_s) +
+                      noise.uniform(index + 3, 0.0, kTwoPi));
+    }
+    return strength * std::clamp(0.5 + sum / kWaves, 0.0, 1.0);
+  };
+  constexpr int kGrid_px = 16;
+  const int columns = (width_ + kGrid_px - 1) / kGrid_px + 1, rows = (height_ + kGrid_px - 1) / kGrid_px + 1;
+  std::vector<float> transmission;
+  transmission.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      transmission.push_back(static_cast<float>(std::exp(-depth_at(column * kGrid_px, row * kGrid_px))));
+    }
+  }
+  constexpr float kScattered = 190.0F;  // grey levels, of smoke that nothing shines through
+  for (int row = 0; row < height_; ++row) {
+    const float* const above = transmission.data() + static_cast<std::size_t>(row / kGrid_px) * columns;
+    const float* const below = above + columns;
+    const float down = static_cast<float>(row % kGrid_px) / kGrid_px;
+    for (int column = 0; column < width_; ++column) {
+      const int c = column / kGrid_px;
+      const float right = static_cast<float>(column % kGrid_px) / kGrid_px;
+      const float share = (1 - down) * ((1 - right) * above[c] + right * above[c + 1]) +
+                          down * ((1 - right) * below[c] + right * below[c + 1]);
+      float& seen =
+          radiance[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)];
+      seen = share * seen + (1 - share) * kScattered;
+    }
+  }
+}
+
+}  // namespace perimap

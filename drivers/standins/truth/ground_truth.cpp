@@ -1,0 +1,52 @@
+#include "drivers/standins/truth/ground_truth.hpp"
+
+#include <algorithm>
+
+namespace perimap {
+
+Expected<GroundTruth> GroundTruth::create(HeartMesh mesh_W, HeartMotion motion, std::vector<CameraTruth> cameras) {
+  if (const auto good = check(mesh_W); !good) return tl::unexpected(good.error());
+  if (const auto good = check(motion); !good) return tl::unexpected(good.error());
+  std::sort(cameras.begin(), cameras.end(),
+            [](const CameraTruth& a, const CameraTruth& b) { return a.capture < b.capture; });
+  return GroundTruth(std::move(mesh_W), std::move(motion), std::move(cameras));
+}
+
+std::optional<Pose> GroundTruth::camera_pose(Instant capture) const noexcept {
+  const auto found =
+      std::lower_bound(cameras_.begin(), cameras_.end(), capture,
+                       [](const CameraTruth& camera, Instant instant) { return camera.capture < instant; });
+  if (found == cameras_.end() || found->capture != capture) return std::nullopt;
+  return found->X_WC;
+}
+
+void GroundTruth::vertices_at(Instant t, std::span<Vector3d> out) const {
+  const auto basis = fourier_basis(phase(t).phase_rad, mesh_.harmonics);
+  vertex_positions(mesh_, basis, out);
+  const Vector3d breathing = respiration_displacement(motion_, t);
+  for (Vector3d& p : out) p += breathing;
+}
+
+SurfaceView GroundTruth::view(const Pose& X_WC, Instant t) const {
+  std::vector<Vector3d> p_C(mesh_.vertex_count);
+  vertices_at(t, p_C);
+  const Pose X_CW = X_WC.inverse();
+  for (Vector3d& p : p_C) p = X_CW * p;
+  return {p_C, mesh_.triangles};
+}
+
+std::optional<SurfacePoint> GroundTruth::first_hit(const Pose& X_WC, const Vector3d& ray_C, Instant t) const {
+  return view(X_WC, t).first_hit(ray_C);
+}
+
+Vector3d GroundTruth::position(const SurfacePoint& point, Instant t) const {
+  const auto basis = fourier_basis(phase(t).phase_rad, mesh_.harmonics);
+  Vector3d p = respiration_displacement(motion_, t);
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    p += point.barycentric[corner] *
+         vertex_position(mesh_, basis, mesh_.triangles[3 * std::size_t{point.triangle} + corner]);
+  }
+  return p;
+}
+
+}  // namespace perimap

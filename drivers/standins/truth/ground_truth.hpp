@@ -1,0 +1,58 @@
+// Where any point of a simulated heart really is: the same surface and motion from which the images are rendered.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/error/expected.hpp"
+#include "core/geometry/pose.hpp"
+#include "core/time/instant.hpp"
+#include "drivers/standins/truth/heart_mesh.hpp"
+#include "drivers/standins/truth/heart_motion.hpp"
+#include "drivers/standins/truth/surface_view.hpp"
+
+namespace perimap {
+
+struct CameraTruth {
+  Instant capture;
+  Pose X_WC;
+};
+
+class GroundTruth {
+ public:
+  // The mesh's coordinates are world coordinates (W). `cameras` may be empty; it is sorted by capture time here.
+  // The error names what is wrong with the mesh or the motion.
+  [[nodiscard]] static Expected<GroundTruth> create(HeartMesh mesh_W, HeartMotion motion,
+                                                    std::vector<CameraTruth> cameras = {});
+
+  [[nodiscard]] const HeartMesh& mesh() const noexcept { return mesh_; }
+  [[nodiscard]] const HeartMotion& motion() const noexcept { return motion_; }
+  [[nodiscard]] MotionPhase phase(Instant t) const noexcept { return motion_phase(motion_, t); }
+
+  // True pose of the camera in the frame captured at exactly this instant.
+  [[nodiscard]] std::optional<Pose> camera_pose(Instant capture) const noexcept;
+
+  // Positions of all vertices at t, W, mm; `out` has mesh().vertex_count places.
+  void vertices_at(Instant t, std::span<Vector3d> out) const;
+
+  // The surface as a camera at X_WC has it before it at t.
+  [[nodiscard]] SurfaceView view(const Pose& X_WC, Instant t) const;
+
+  // view(X_WC, t).first_hit(ray_C), for a single ray.
+  [[nodiscard]] std::optional<SurfacePoint> first_hit(const Pose& X_WC, const Vector3d& ray_C, Instant t) const;
+
+  // Position of a material point at t, W, mm.
+  [[nodiscard]] Vector3d position(const SurfacePoint& point, Instant t) const;
+
+ private:
+  GroundTruth(HeartMesh mesh_W, HeartMotion motion, std::vector<CameraTruth> cameras) noexcept
+      : mesh_(std::move(mesh_W)), motion_(std::move(motion)), cameras_(std::move(cameras)) {}
+
+  HeartMesh mesh_;
+  HeartMotion motion_;
+  std::vector<CameraTruth> cameras_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,108 @@
+#include "drivers/standins/truth/truth_messages.hpp"
+
+#include <cmath>
+
+namespace perimap {
+
+perimap_TruthMesh borrow_truth_mesh(const HeartMesh& mesh_W) {
+  perimap_TruthMesh message{};
+  message.vertex_count = mesh_W.vertex_count;
+  message.harmonics = mesh_W.harmonics;
+  // The C types have no const; nothing that serialises them writes.
+  message.coefficients_W_mm._buffer = const_cast<double*>(mesh_W.coefficients_mm.data());
+  message.coefficients_W_mm._length = static_cast<std::uint32_t>(mesh_W.coefficients_mm.size());
+  message.coefficients_W_mm._maximum = message.coefficients_W_mm._length;
+  message.triangles._buffer = const_cast<std::uint32_t*>(mesh_W.triangles.data());
+  message.triangles._length = static_cast<std::uint32_t>(mesh_W.triangles.size());
+  message.triangles._maximum = message.triangles._length;
+  return message;
+}
+
+perimap_TruthMotion borrow_truth_motion(const HeartMotion& motion, std::vector<std::int64_t>& r_peaks_ns) {
+  r_peaks_ns.clear();
+  for (const Instant r_peak : motion.r_peaks) r_peaks_ns.push_back(to_ns(r_peak));
+  perimap_TruthMotion message{};
+  switch (motion.law) {
+    case MotionLaw::kLinear:
+      message.law = perimap_PHASE_LAW_LINEAR;
+      break;
+    case MotionLaw::kWarped:
+      message.law = perimap_PHASE_LAW_WARPED;
+      break;
+    case MotionLaw::kTimeLocked:
+      message.law = perimap_PHASE_LAW_TIME_LOCKED;
+      break;
+  }
+  message.r_peak_time_ns._buffer = r_peaks_ns.data();
+  message.r_peak_time_ns._length = static_cast<std::uint32_t>(r_peaks_ns.size());
+  message.r_peak_time_ns._maximum = message.r_peak_time_ns._length;
+  message.systole_fraction = motion.systole_fraction;
+  message.systole_offset_s = motion.systole_offset_s;
+  message.systole_slope_s_per_bpm = motion.systole_slope_s_per_bpm;
+  message.locked_systole_ns = motion.locked_systole.count();
+  message.locked_filling_ns = motion.locked_filling.count();
+  message.locked_systole_phase_rad = motion.locked_systole_phase_rad;
+  message.locked_filling_phase_rad = motion.locked_filling_phase_rad;
+  for (int axis = 0; axis < 3; ++axis) message.respiration_W_mm[axis] = motion.respiration_mm[axis];
+  message.respiration_period_ns = motion.respiration_period.count();
+  return message;
+}
+
+perimap_TruthCamera to_truth_camera(const CameraTruth& camera) noexcept {
+  perimap_TruthCamera message{};
+  message.capture_time_ns = to_ns(camera.capture);
+  for (int axis = 0; axis < 3; ++axis) message.translation_WC_mm[axis] = camera.X_WC.t[axis];
+  rotation_to_wxyz(camera.X_WC.R, message.rotation_WC_wxyz);
+  return message;
+}
+
+Expected<HeartMesh> heart_mesh(const perimap_TruthMesh& message) {
+  HeartMesh mesh;
+  mesh.vertex_count = message.vertex_count;
+  mesh.harmonics = message.harmonics;
+  const auto& coefficients = message.coefficients_W_mm;
+  mesh.coefficients_mm.assign(coefficients._buffer, coefficients._buffer + coefficients._length);
+  mesh.triangles.assign(message.triangles._buffer, message.triangles._buffer + message.triangles._length);
+  if (const auto good = check(mesh); !good) return tl::unexpected(good.error());
+  return mesh;
+}
+
+Expected<HeartMotion> heart_motion(const perimap_TruthMotion& message) {
+  HeartMotion motion;
+  switch (message.law) {
+    case perimap_PHASE_LAW_LINEAR:
+      motion.law = MotionLaw::kLinear;
+      break;
+    case perimap_PHASE_LAW_WARPED:
+      motion.law = MotionLaw::kWarped;
+      break;
+    case perimap_PHASE_LAW_TIME_LOCKED:
+      motion.law = MotionLaw::kTimeLocked;
+      break;
+    default:
+      return fail("heart motion: there is no phase law " + std::to_string(static_cast<int>(message.law)));
+  }
+  for (std::uint32_t i = 0; i < message.r_peak_time_ns._length; ++i)
+    motion.r_peaks.push_back(from_ns(message.r_peak_time_ns._buffer[i]));
+  motion.systole_fraction = message.systole_fraction;
+  motion.systole_offset_s = message.systole_offset_s;
+  motion.systole_slope_s_per_bpm = message.systole_slope_s_per_bpm;
+  motion.locked_systole = Duration(message.locked_systole_ns);
+  motion.locked_filling = Duration(message.locked_filling_ns);
+  motion.locked_systole_phase_rad = message.locked_systole_phase_rad;
+  motion.locked_filling_phase_rad = message.locked_filling_phase_rad;
+  motion.respiration_mm = Vector3d(message.respiration_W_mm);
+  motion.respiration_period = Duration(message.respiration_period_ns);
+  if (const auto good = check(motion); !good) return tl::unexpected(good.error());
+  return motion;
+}
+
+Expected<CameraTruth> camera_truth(const perimap_TruthCamera& message) {
+  const Vector3d t(message.translation_WC_mm);
+  const double norm = Eigen::Vector4d(message.rotation_WC_wxyz).norm();
+  if (!t.allFinite() || !(std::abs(norm - 1.0) < 1e-6))
+    return fail("camera truth at " + std::to_string(message.capture_time_ns) + " ns: its pose is not a rigid one");
+  return CameraTruth{from_ns(message.capture_time_ns), pose_from_wxyz(t, message.rotation_WC_wxyz)};
+}
+
+}  // namespace perimap
