@@ -1,0 +1,329 @@
+#!/bin/bash
+# Measures anew what a command can measure, and writes the tables of docs/evidence.
+#
+# A table that this script makes stands in its page between two lines:
+#     <!-- made: NAME -->
+#     <!-- end: NAME -->
+# What lies between them is replaced by the table, and by a line that says by which command, commit and machine it was
+# made. Everything else in the pages is written by hand.
+set -uo pipefail
+cd "$(dirname "$0")/../.."
+
+usage() {
+  cat << 'END'
+docs/evidence/make.sh [--build FOLDER] [--keep FOLDER] [--list] [NAME...]
+  Runs the commands of the tables NAME (all of them when none is named) and writes the tables into docs/evidence/*.md.
+  --build  where the programs are: build/release (the default) or another preset's folder
+  --keep   keeps recordings and reports in FOLDER; without it they go when the script ends
+  --list   prints the names, with about how long each takes on two cores that do nothing else
+Exit code 0 when all were made, 1 when one failed, 2 for a wrong command line.
+END
+}
+
+# NAME  ABOUT
+list() {
+  cat << 'END'
+experiment-1    1 minute    the paper's first experiment
+experiment-2    1 minute    the paper's second experiment
+displayed       3 minutes   what is displayed, 0, 100 and 300 ms ahead
+image           9 minutes   what the image brings beside the ECG alone, by rhythm and law
+breathing       7 minutes   breathing of 10 mm, on and off
+slow-tracker    4 minutes   a tracker whose errors are slow, told and not told
+precision       3 minutes   the map in single precision
+lost            5 minutes   statistics --long lost
+optimal        10 minutes   statistics --long optimal
+breath          5 minutes   statistics --long breath
+harmonics       5 minutes   statistics --long harmonics
+drift           5 minutes   statistics --long drift
+pose           30 minutes   statistics --long pose
+ecg            20 minutes   statistics --long ecg
+horizons       30 minutes   statistics --long horizons
+late            5 minutes   statistics --long late
+ventilated     20 minutes   statistics --long ventilated
+update         10 minutes   update_bench: speed of the update
+seeing          5 minutes   vision_bench: speed and accuracy of the patch tracker
+latency        10 minutes   perimap bench
+END
+}
+
+build=build/release
+keep=
+names=()
+while [ $# -gt 0 ]; do
+  case $1 in
+    --build)
+      build=${2:?--build needs a folder}
+      shift
+      ;;
+    --keep)
+      keep=${2:?--keep needs a folder}
+      shift
+      ;;
+    --list)
+      list
+      exit 0
+      ;;
+    -h | --help)
+      usage
+      exit 0
+      ;;
+    -*)
+      echo "make.sh: unknown option $1" >&2
+      usage >&2
+      exit 2
+      ;;
+    *)
+      if ! list | grep -q "^$1 "; then
+        echo "make.sh: there is no table $1; --list names them" >&2
+        exit 2
+      fi
+      names+=("$1")
+      ;;
+  esac
+  shift
+done
+[ ${#names[@]} -gt 0 ] || mapfile -t names < <(list | cut -d ' ' -f 1)
+
+if [ -n "$keep" ]; then
+  mkdir -p "$keep"
+  work=$keep
+else
+  work=$(mktemp -d)
+  trap 'rm -rf "$work"' EXIT
+fi
+
+perimap=$build/daemon/perimap
+statistics=$build/tests/statistics/statistics
+benches=$build/tests/bench
+
+machine() {
+  local model system
+  model=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)
+  system=$(uname -s -r | cut -d - -f 1)
+  printf '%s, %s processors, %s, load %s' "${model:-unknown processor}" "$(nproc)" "$system" "$(cut -d ' ' -f 1 /proc/loadavg)"
+}
+
+# The newest commit that changed what is measured; documents do not count.
+commit() {
+  local changed=
+  git diff --quiet HEAD -- core drivers daemon idl tests cmake || changed=', with changes'
+  printf '%s%s' "$(git log -1 --format='%h of %cs' -- core drivers daemon idl tests cmake)" "$changed"
+}
+
+# Lines that are a table stay; any other text is set as it was printed.
+as_printed() {
+  local text
+  text=$(cat)
+  if grep -q '^|' <<< "$text"; then
+    printf '%s\n' "$text"
+  else
+    printf '```\n%s\n```\n' "$text"
+  fi
+}
+
+# ---- the figures of one replay, from its own words
+
+# simulate STEM OPTION...: makes the recording $work/STEM.mcap unless it is there.
+simulate() {
+  local stem=$1
+  shift
+  [ -e "$work/$stem.mcap" ] && return 0
+  "$perimap" simulate "$work/$stem.mcap" "$@" > "$work/$stem.log" 2>&1 || { cat "$work/$stem.log" >&2; return 1; }
+}
+
+# replay STEM NAME: in lockstep with the configuration read from standard input; its words go to $work/NAME.txt.
+replay() {
+  { echo 'version = 1'; cat; } > "$work/$2.toml"
+  "$perimap" replay "$work/$1.mcap" -c "$work/$2.toml" --lockstep > "$work/$2.txt" 2> "$work/$2.log" ||
+    { cat "$work/$2.log" >&2; return 1; }
+}
+
+# figure NAME WHICH: of $work/NAME.txt.
+figure() {
+  local pattern
+  case $2 in
+    rms) pattern='s/^error .*RMS \([0-9.]*\) mm.*/\1/p' ;;
+    median) pattern='s/^error .*median \([0-9.]*\) mm.*/\1/p' ;;
+    p95) pattern='s/^error .*95th percentile \([0-9.]*\) mm.*/\1/p' ;;
+    largest) pattern='s/^error .*largest \([0-9.]*\) mm.*/\1/p' ;;
+    nees) pattern='s/^consistency mean NEES\/3 \([0-9.]*\).*/\1/p' ;;
+    converged) pattern='s/^features .* \([0-9]*\) converged.*/\1/p' ;;
+    early) pattern='s/^features .* \([0-9]*\) of them within 15 s.*/\1/p' ;;
+    off) pattern='s/^good  *\([0-9]* of [0-9]*\) positions.*/\1/p' ;;
+  esac
+  local value
+  value=$(sed -n "$pattern" "$work/$1.txt" | head -n 1)
+  printf '%s' "${value:-none}"
+}
+
+# ---- one function for each table; `command` is what its last line names
+
+experiment() {
+  command="perimap experiment $1"
+  # Columns are two blanks apart or more.
+  "$perimap" experiment "$1" 2> /dev/null | awk -F '  +' '
+    /^path error/ { head = 1 }
+    head && NF > 3 {
+      line = "|"
+      for (i = 1; i <= NF; ++i) line = line " " $i " |"
+      print line
+      if (head++ == 1) { line = "|"; for (i = 1; i <= NF; ++i) line = line "---|"; print line }
+    }'
+}
+make_experiment_1() { experiment 1; }
+make_experiment_2() { experiment 2; }
+
+make_displayed() {
+  command='perimap simulate --ecg RECORD --duration 60 --tracker-noise 0 --seed 5; perimap replay --lockstep with pipeline.lead_ms'
+  echo '| record | 0 ms | 100 ms | 300 ms |'
+  echo '|---|---|---|---|'
+  local record lead row
+  for record in 100 123; do
+    simulate "displayed-$record" --ecg $record --duration 60 --tracker-noise 0 --seed 5 || return 1
+    row="| $record |"
+    for lead in 0 100 300; do
+      replay "displayed-$record" "displayed-$record-$lead" <<< "$(printf '[pipeline]\nlead_ms = %s' $lead)" || return 1
+      row="$row $(figure "displayed-$record-$lead" rms) |"
+    done
+    echo "$row"
+  done
+}
+
+make_image() {
+  command='perimap simulate --ecg RECORD --motion LAW --duration 40 --seed 5; perimap replay --lockstep with phase.from_image false and true'
+  echo '| rhythm, motion | ECG alone: median / 95 % / NEES/3 | with the image |'
+  echo '|---|---|---|'
+  local record law noise name stem
+  while read -r record law noise name; do
+    stem=image-$record-$law-$noise
+    simulate "$stem" --ecg "$record" --motion "$law" --duration 40 --tracker-noise "$noise" --seed 5 || return 1
+    replay "$stem" "$stem-alone" <<< "$(printf '[phase]\nlaw = "%s"\nfrom_image = false' "$law")" || return 1
+    replay "$stem" "$stem-image" <<< "$(printf '[phase]\nlaw = "%s"\nfrom_image = true' "$law")" || return 1
+    local columns=() with
+    for with in alone image; do
+      columns+=("$(figure "$stem-$with" median) / $(figure "$stem-$with" p95) mm / $(figure "$stem-$with" nees)")
+    done
+    echo "| $name | ${columns[0]} | ${columns[1]} |"
+  done << 'END'
+100 linear 0 100, linear
+100 linear 1.4 100, linear, tracker 1.4 mm
+100 warped 0 100, warped
+100 time-locked 0 100, time-locked
+106 linear 0 106, bigeminy
+119 linear 0 119, bigeminy
+105 linear 0 105, high-grade noise
+END
+}
+
+make_breathing() {
+  command='perimap simulate --respiration 10 --duration 60 --seed 5; perimap replay --lockstep with respiration.enabled'
+  echo '| tracker | breathing | converged | error, median / 95 % / largest | NEES/3 |'
+  echo '|---|---|---|---|---|'
+  local noise breath enabled name stem
+  while read -r noise breath enabled name; do
+    stem=breathing-$noise-$breath
+    simulate "$stem" --respiration "$breath" --duration 60 --tracker-noise "$noise" --seed 5 || return 1
+    replay "$stem" "$stem-$enabled" <<< "$(printf '[respiration]\nenabled = %s' "$enabled")" || return 1
+    echo "| $name | $(figure "$stem-$enabled" converged) | $(figure "$stem-$enabled" median) / $(figure "$stem-$enabled" p95) / $(figure "$stem-$enabled" largest) mm | $(figure "$stem-$enabled" nees) |"
+  done << 'END'
+0 10 true exact | on
+0 10 false exact | off: suspected
+1.4 10 true 1.4 mm | on
+1.4 10 false 1.4 mm | off: suspected
+0 0 false exact | none there, off
+END
+}
+
+make_slow_tracker() {
+  command='perimap simulate --duration 60 --seed 5 --tracker-noise 1.4 --tracker-correlation TAU; perimap replay --lockstep with tracker.error_correlation_s TAU and 0'
+  echo '| correlation time | told | converged within 15 s, in all | error, median / 95 % | NEES/3 | called good, off by more than 3 mm |'
+  echo '|---|---|---|---|---|---|'
+  local tau told stem
+  for tau in 0.5 5; do
+    simulate "slow-$tau" --duration 60 --seed 5 --tracker-noise 1.4 --tracker-correlation $tau || return 1
+    for told in $tau 0; do
+      stem=slow-$tau-$told
+      replay "slow-$tau" "$stem" <<< "$(printf '[tracker]\nerror_correlation_s = %s' "$told")" || return 1
+      echo "| $tau s | $([ "$told" = 0 ] && echo 'no, taken for white' || echo yes) | $(figure "$stem" early), $(figure "$stem" converged) | $(figure "$stem" median) / $(figure "$stem" p95) mm | $(figure "$stem" nees) | $(figure "$stem" off) |"
+    done
+  done
+}
+
+make_precision() {
+  command='perimap simulate --duration 40; perimap replay --lockstep with estimation.precision'
+  echo '| tracker, precision | RMS | median | 95 % | largest, mm | NEES/3 |'
+  echo '|---|---|---|---|---|---|'
+  local noise precision stem
+  for noise in 0 1.4; do
+    simulate "precision-$noise" --duration 40 --tracker-noise $noise || return 1
+    for precision in double single; do
+      stem=precision-$noise-$precision
+      replay "precision-$noise" "$stem" <<< "$(printf '[estimation]\nprecision = "%s"' $precision)" || return 1
+      echo "| $noise mm, $precision | $(figure "$stem" rms) | $(figure "$stem" median) | $(figure "$stem" p95) | $(figure "$stem" largest) | $(figure "$stem" nees) |"
+    done
+  done
+}
+
+of_statistics() {
+  command="statistics --long $1"
+  "$statistics" --long "$1" 2> /dev/null | as_printed
+}
+make_lost() { of_statistics lost; }
+make_optimal() { of_statistics optimal; }
+make_breath() { of_statistics breath; }
+make_harmonics() { of_statistics harmonics; }
+make_drift() { of_statistics drift; }
+make_pose() { of_statistics pose; }
+make_ecg() { of_statistics ecg; }
+make_horizons() { of_statistics horizons; }
+make_late() { of_statistics late; }
+make_ventilated() { of_statistics ventilated; }
+
+make_update() {
+  command='update_bench'
+  "$benches/update_bench" 2> /dev/null | as_printed
+}
+make_seeing() {
+  command='vision_bench'
+  "$benches/vision_bench" 2> /dev/null | as_printed
+}
+make_latency() {
+  command='perimap simulate --size 640x480 --fps 60 --duration 25 --tracker-noise 0; perimap bench'
+  simulate latency --size 640x480 --fps 60 --duration 25 --tracker-noise 0 || return 1
+  "$perimap" bench "$work/latency.mcap" 2> /dev/null | as_printed
+}
+
+# put NAME FILE: the text of FILE into the place of NAME.
+put() {
+  local page
+  page=$(grep -lF "<!-- made: $1 -->" docs/evidence/*.md)
+  if [ "$(wc -w <<< "$page")" != 1 ]; then
+    echo "make.sh: $1 has a place in these pages, expected one: ${page:-none}" >&2
+    return 1
+  fi
+  awk -v name="$1" -v text="$2" '
+    $0 == "<!-- end: " name " -->" { inside = 0 }
+    !inside { print }
+    $0 == "<!-- made: " name " -->" { inside = 1; while ((getline line < text) > 0) print line }
+  ' "$page" > "$work/page.md" && cat "$work/page.md" > "$page"
+}
+
+status=0
+for name in "${names[@]}"; do
+  echo "$name ..."
+  command=
+  # Not in a subshell: the function names its command.
+  if "make_${name//-/_}" > "$work/$name.table" && [ -s "$work/$name.table" ]; then
+    {
+      echo
+      cat "$work/$name.table"
+      printf '\nMade by `docs/evidence/make.sh %s` (`%s`) at commit %s: %s, preset %s.\n\n' "$name" "$command" "$(commit)" \
+        "$(machine)" "$(basename "$build")"
+    } > "$work/$name.block"
+    put "$name" "$work/$name.block" || status=1
+  else
+    echo "make.sh: $name gave no table" >&2
+    status=1
+  fi
+done
+exit $status

@@ -1,0 +1,142 @@
+#!/bin/bash
+# check_documents.sh ROOT: what the documents of the project point at is there.
+#
+#   - each relative link of a *.md file leads to a file or folder, and its #anchor to a heading of that file
+#   - each path of the project in backticks exists: `core/phase/phase_law` (a name without its suffix will do),
+#     `tests/run.sh --full`, `drivers/ecg/*.cpp`
+#   - each key of the configuration in backticks (`phase.law`) is one of config/replay.toml
+#   - each file of a folder with an index (README.md) is linked from that index
+#
+# What it finds is printed as FILE:LINE: what; exit code 1 then. No network: links to elsewhere are passed over.
+set -uo pipefail
+root=$(cd "$1" && pwd) || exit 2
+cd "$root" || exit 2
+
+faults=0
+fault() {
+  echo "$1"
+  faults=$((faults + 1))
+}
+
+mapfile -t documents < <(find . -name '*.md' -not -path './build/*' -not -path './.git/*' -not -path '*/node_modules/*' \
+  -not -path './demo-output/*' | sed 's|^\./||' | sort)
+if [ ${#documents[@]} -eq 0 ]; then
+  echo "$root: no *.md files"
+  exit 1
+fi
+
+# The anchors that GitHub gives the headings of a file, one a line.
+anchors_of() {
+  awk '
+    /^```/ { code = !code; next }
+    !code && /^#+ / {
+      sub(/^#+ +/, ""); sub(/ +$/, "")
+      # Of a link only its text counts.
+      while (match($0, /\[[^]]*\]\([^)]*\)/)) {
+        link = substr($0, RSTART, RLENGTH); text = link
+        sub(/^\[/, "", text); sub(/\]\(.*$/, "", text)
+        $0 = substr($0, 1, RSTART - 1) text substr($0, RSTART + RLENGTH)
+      }
+      anchor = tolower($0)
+      gsub(/[^a-z0-9_ \200-\377-]/, "", anchor)
+      gsub(/ /, "-", anchor)
+      if (seen[anchor]++) anchor = anchor "-" (seen[anchor] - 1)
+      print anchor
+    }' "$1"
+}
+
+# FILE -> lines "NUMBER<tab>TARGET" of its links and pictures; code is no link.
+links_of() {
+  awk '
+    /^```/ { code = !code; next }
+    code { next }
+    {
+      line = $0
+      gsub(/`[^`]*`/, "", line)
+      while (match(line, /\]\([^)]*\)/)) {
+        print NR "\t" substr(line, RSTART + 2, RLENGTH - 3)
+        line = substr(line, RSTART + RLENGTH)
+      }
+    }' "$1"
+}
+
+# FILE -> lines "NUMBER<tab>TEXT" of what stands in backticks outside of code blocks.
+quoted_in() {
+  awk '
+    /^```/ { code = !code; next }
+    code { next }
+    {
+      line = $0
+      while (match(line, /`[^`]+`/)) {
+        print NR "\t" substr(line, RSTART + 1, RLENGTH - 2)
+        line = substr(line, RSTART + RLENGTH)
+      }
+    }' "$1"
+}
+
+# A path of the project exists: as it stands, without its suffix, or as a pattern.
+is_there() {
+  local path=${1%/}
+  [ -e "$path" ] && return 0
+  compgen -G "$path" > /dev/null && return 0
+  compgen -G "$path.*" > /dev/null
+}
+
+# "section.key" of every key, commented out or not.
+keys=$(awk '
+  /^\[[a-z]+\]$/ { section = substr($0, 2, length($0) - 2) }
+  match($0, /^(# )?[a-zA-Z_]+ = /) { key = $0; sub(/^# /, "", key); sub(/ =.*$/, "", key); print section "." key }
+' config/replay.toml)
+sections=$(sed -n 's/^\[\([a-z]*\)\]$/\1/p' config/replay.toml | paste -sd '|')
+
+for document in "${documents[@]}"; do
+  folder=$(dirname "$document")
+  while IFS=$'\t' read -r number target; do
+    case $target in
+      http://* | https://* | mailto:*) continue ;;
+    esac
+    path=${target%%#*}
+    file=$document
+    if [ -n "$path" ]; then
+      file=$(realpath -m --relative-to=. "$folder/$path")
+      if [ ! -e "$file" ]; then
+        fault "$document:$number: the link $target leads nowhere"
+        continue
+      fi
+    fi
+    if [[ $target == *'#'* && $file == *.md ]] && ! anchors_of "$file" | grep -qxF -- "${target#*#}"; then
+      fault "$document:$number: $file has no heading #${target#*#}"
+    fi
+  done < <(links_of "$document")
+
+  while IFS=$'\t' read -r number text; do
+    word=${text%% *}
+    word=${word%[,;:]}
+    if [[ $word =~ ^(core|drivers|daemon|idl|config|tests|deploy|docs|cmake|\.ci)/[A-Za-z0-9_./*+-]+$ ]]; then
+      is_there "$word" || fault "$document:$number: there is no $word"
+    elif [[ $text =~ ^($sections)\.([a-z][a-zA-Z_]*)( =.*)?$ ]]; then
+      key=${BASH_REMATCH[1]}.${BASH_REMATCH[2]}
+      # `recording.mcap` and its like are files.
+      [[ $key =~ \.(mcap|toml|csv|cpp|hpp|yaml|md|idl)$ ]] && continue
+      grep -qxF "$key" <<< "$keys" || fault "$document:$number: the configuration has no key $key"
+    fi
+  done < <(quoted_in "$document")
+done
+
+# An index that leaves out a file of its folder hides it.
+for index in docs/README.md docs/*/README.md; do
+  [ -e "$index" ] || continue
+  folder=$(dirname "$index")
+  targets=$(links_of "$index" | cut -f 2 | sed 's/#.*$//')
+  for file in "$folder"/*.md; do
+    name=$(basename "$file")
+    [ "$name" = README.md ] && continue
+    grep -qxF "$name" <<< "$targets" || fault "$index: $name is not linked from here"
+  done
+done
+
+if [ $faults -gt 0 ]; then
+  echo "$faults faults in ${#documents[@]} documents"
+  exit 1
+fi
+echo "${#documents[@]} documents: every link, path and key is there"

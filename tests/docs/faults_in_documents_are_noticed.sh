@@ -1,0 +1,68 @@
+#!/bin/bash
+# faults_in_documents_are_noticed.sh: a folder of documents without a fault passes check_documents.sh, and each kind of
+# fault alone is noticed at its line.
+set -uo pipefail
+check=$(cd "$(dirname "$0")" && pwd)/check_documents.sh
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+status=0
+
+fresh() {
+  rm -rf "$work/tree"
+  mkdir -p "$work/tree/docs/room" "$work/tree/core/phase" "$work/tree/config"
+  cd "$work/tree" || exit 2
+  printf '[phase]\n# how\nlaw = "auto"\n# other = 1\n' > config/replay.toml
+  touch core/phase/phase_law.hpp
+  printf '# The room\n\n## A `heading`, twice\n\n## A heading, twice\n' > docs/room/page.md
+  printf '# Index\n\n[page](page.md)\n' > docs/room/README.md
+  cat > README.md << 'END'
+# Title
+
+[page](docs/room/page.md), [its heading](docs/room/page.md#a-heading-twice), [the other](docs/room/page.md#a-heading-twice-1),
+[here](#title), [elsewhere](https://example.org/nowhere), `core/phase/phase_law`, `core/phase/*.hpp`, `phase.law = "auto"`,
+`phase.other`, `[not a link](nowhere.md)`
+
+```sh
+ls [neither](nowhere.md) `core/nowhere`
+```
+END
+}
+
+fresh
+if ! bash "$check" . > out 2>&1; then
+  echo "FAILED: documents without a fault are refused:"
+  cat out
+  status=1
+fi
+
+noticed() { # TEXT EXPECTED: with the text as the last line of README.md
+  fresh
+  printf '\n%s\n' "$1" >> README.md
+  local line
+  line=$(wc -l < README.md)
+  if bash "$check" . > out 2>&1; then
+    echo "FAILED: not noticed: $1"
+    status=1
+  elif ! grep -qF "README.md:$line: $2" out; then
+    echo "FAILED: expected 'README.md:$line: $2' of '$1', got:"
+    cat out
+    status=1
+  fi
+}
+noticed '[gone](docs/gone.md)' 'the link docs/gone.md leads nowhere'
+noticed '![picture](docs/gone.png)' 'the link docs/gone.png leads nowhere'
+noticed '[gone](docs/room/page.md#gone)' 'docs/room/page.md has no heading #gone'
+noticed '[gone](#gone)' 'README.md has no heading #gone'
+noticed 'see `core/phase/gone`' 'there is no core/phase/gone'
+noticed 'run `tests/gone.sh --full`' 'there is no tests/gone.sh'
+noticed 'set `phase.gone`' 'the configuration has no key phase.gone'
+noticed 'set `phase.gone = 3`' 'the configuration has no key phase.gone'
+
+fresh
+touch docs/room/hidden.md
+if bash "$check" . > out 2>&1 || ! grep -qF 'docs/room/README.md: hidden.md is not linked from here' out; then
+  echo "FAILED: a page that its index leaves out is not noticed:"
+  cat out
+  status=1
+fi
+exit $status
