@@ -25,7 +25,7 @@ struct UpdateSettings {
   double tolerance = 1e-2;
   // An update with J above this at its end is refused: chi-squared with 2 degrees of freedom, 99.999 %. A narrower one
   // costs accuracy: at 99.9 % one good observation of each 1000 is lost, and one feature of 100 was 6 % further off
-  // than with all of them, measured when the gate was chosen (docs/experiments.md).
+  // than with all of them, measured when the gate was chosen (docs/decisions/0019-a-batch-starts-a-feature.md).
   double gate = 23.0;
   CovarianceLinearisation covariance = CovarianceLinearisation::kFinalIterate;
 };

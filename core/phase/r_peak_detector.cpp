@@ -11,8 +11,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// Where no other reason stands beside it, a number was chosen so that the five records of docs/ecg.md, plain and with
-// the disturbances tabled there, lose the fewest beats by one set of numbers.
+// Where no other reason stands beside it, a number was chosen so that the five records of docs/evidence/ecg.md, plain
+// and with the disturbances tabled there, lose the fewest beats by one set of numbers.
 
 // ---- the signal
 
@@ -58,7 +58,7 @@ constexpr Duration kParabola = milliseconds(10);         // each side of the pea
 constexpr double kOpposite = 2.0;  // a beat points the other way when its other excursion is larger by this factor
 constexpr double kPolarityHysteresis = 1.3;  // an RS complex of equal parts must not change sides with each beat
 constexpr double kPolarityMemory = 8.0;      // beats, as the levels
-constexpr double kDeviationFloor_s = 0.001;  // clean beats scatter by that about their peaks (docs/ecg.md)
+constexpr double kDeviationFloor_s = 0.001;  // clean beats scatter by that about their peaks (docs/evidence/ecg.md)
 constexpr double kDeviationCap_s = 0.020;    // where there is no vertex: uniform over the complex's top
 // Of an unfamiliar beat in noise that is taken because one is due: it may be noise beside the true one, anywhere within
 // the 150 ms of a match. Uniform over that makes 87 ms; twelve such beats of the records have 85 ms RMS.

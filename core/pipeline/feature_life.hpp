@@ -1,4 +1,4 @@
-// How a feature passes from one state of its life to the next (docs/architecture.md has the table).
+// How a feature passes from one state of its life to the next (docs/design/pipeline.md has the table).
 #pragma once
 
 #include <cstdint>

@@ -59,7 +59,7 @@ class FrameHistory {
 
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
 
-  // So that it pays to learn its frames once more: beyond, a map is no better for it, by measurement (docs/ecg.md).
+  // So that it pays to learn its frames once more: beyond, a map is no better for it, by measurement (docs/evidence).
   [[nodiscard]] bool tracker_is_exact() const noexcept {
     return count_ > 0 && records_[(count_ - 1) % kCapacity].tracker_variance_mm2 <= kExactTracker_mm2;
   }

@@ -17,7 +17,7 @@ inline void sleep_until(Instant deadline) noexcept {
 }
 
 // What comes at most so long after its deadline counts as on time: the limit of the bench and of the targets in
-// docs/latency.md.
+// docs/evidence/latency.md.
 inline constexpr Duration kOnTime = std::chrono::microseconds(500);
 
 // How long before a deadline a thread wakes to spin the rest away. Measured: the p99.9 of being late is 26 us when it

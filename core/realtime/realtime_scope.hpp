@@ -20,8 +20,8 @@ class RealtimeScope {
   static inline thread_local int depth_ = 0;
 };
 
-// Within such a stretch, a wait that belongs to the design (docs/architecture.md): of the mapper for its workers and,
-// in lockstep, for housekeeping. Elsewhere the real-time threads wait outside of their scopes.
+// Within such a stretch, a wait that belongs to the design (docs/design/pipeline.md): of the mapper for its workers
+// and, in lockstep, for housekeeping. Elsewhere the real-time threads wait outside of their scopes.
 class NamedWait {
  public:
   NamedWait() noexcept : depth_(RealtimeScope::depth_) { RealtimeScope::depth_ = 0; }

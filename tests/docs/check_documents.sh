@@ -6,6 +6,7 @@
 #     `tests/run.sh --full`, `drivers/ecg/*.cpp`
 #   - each key of the configuration in backticks (`phase.law`) is one of config/replay.toml
 #   - each file of a folder with an index (README.md) is linked from that index
+#   - each document that a comment of the sources names exists
 #
 # What it finds is printed as FILE:LINE: what; exit code 1 then. No network: links to elsewhere are passed over.
 set -uo pipefail
@@ -134,6 +135,12 @@ for index in docs/README.md docs/*/README.md; do
     grep -qxF "$name" <<< "$targets" || fault "$index: $name is not linked from here"
   done
 done
+
+# Not idl/: its text, comments included, is part of every recording, so it changes with its next version alone.
+while IFS=: read -r file number name; do
+  [ -e "$name" ] || fault "$file:$number: there is no $name"
+done < <(grep -rnoE --include='*.[ch]pp' --include='*.sh' --include='CMakeLists.txt' --include='*.cmake' --include='*.toml' \
+  '\bdocs/[a-zA-Z0-9_/-]+\.md\b' core drivers daemon tests deploy config cmake 2> /dev/null | grep -v '^tests/docs/')
 
 if [ $faults -gt 0 ]; then
   echo "$faults faults in ${#documents[@]} documents"

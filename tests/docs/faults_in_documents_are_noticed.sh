@@ -59,6 +59,15 @@ noticed 'set `phase.gone`' 'the configuration has no key phase.gone'
 noticed 'set `phase.gone = 3`' 'the configuration has no key phase.gone'
 
 fresh
+printf '\n// see docs/room/gone.md\n// and docs/room/page.md\n' > core/phase/phase_law.hpp
+if bash "$check" . > out 2>&1 || ! grep -qF 'core/phase/phase_law.hpp:2: there is no docs/room/gone.md' out ||
+  grep -qF 'page.md' out; then
+  echo "FAILED: a comment that names a document which is not there is not noticed:"
+  cat out
+  status=1
+fi
+
+fresh
 touch docs/room/hidden.md
 if bash "$check" . > out 2>&1 || ! grep -qF 'docs/room/README.md: hidden.md is not linked from here' out; then
   echo "FAILED: a page that its index leaves out is not noticed:"

@@ -1,5 +1,5 @@
 // The ECG side on real records with disturbances added, and the rhythm monitor on rhythms that are drawn: the tables of
-// docs/ecg.md.
+// docs/evidence/ecg.md.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// The estimator's goals that can be tried with known phase and association (docs/experiments.md has what is reached),
-// and those of the ECG side (docs/ecg.md).
+// The estimator's goals that can be tried with known phase and association (docs/evidence/estimation.md has what is
+// reached), and those of the ECG side (docs/evidence/ecg.md).
 #pragma once
 
 #include <cstdint>
@@ -41,11 +41,12 @@ void motion_that_breathes(const Extent& extent, const HeartMesh& heart, GoalRepo
 void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Path error and covariance of maps that learn with the phase of completed cycles, beside maps that learn at once.
 void learning_late(const Extent& extent, const HeartMesh& heart, GoalReport& report);
-// Beats found in real ECG records with disturbances added, and which rhythms are called unpredictable; docs/ecg.md.
+// Beats found in real ECG records with disturbances added, and which rhythms are called unpredictable;
+// docs/evidence/ecg.md.
 void beats_under_disturbances(const Extent& extent, const HeartMesh& heart, GoalReport& report);
-// Displayed positions some time ahead, by predictor, record and motion law; docs/ecg.md.
+// Displayed positions some time ahead, by predictor, record and motion law; docs/evidence/accuracy.md.
 void displayed_ahead(const Extent& extent, const HeartMesh& heart, GoalReport& report);
-// Displayed positions of a heart that a ventilator moves too; docs/ecg.md.
+// Displayed positions of a heart that a ventilator moves too; docs/evidence/accuracy.md.
 void ventilated(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 
 }  // namespace perimap::test

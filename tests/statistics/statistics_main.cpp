@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
          "lost, optimal, drift, breath, harmonics, pose, late, ecg, horizons, ventilated; all when none is named")
       ->check(CLI::IsMember(
           {"lost", "optimal", "drift", "breath", "harmonics", "pose", "late", "ecg", "horizons", "ventilated"}));
-  app.add_flag("--long", extent.whole, "As many trials as the figures in docs/experiments.md and docs/ecg.md");
+  app.add_flag("--long", extent.whole, "As many trials as the figures in docs/evidence");
   app.add_option("--seed", extent.seed, "Another seed, other trials")->capture_default_str();
   HorizonScenes& scenes = extent.horizons;
   const std::map<std::string, perimap::MotionLaw> laws{{"linear", perimap::MotionLaw::kLinear},

@@ -43,7 +43,7 @@ constexpr int kSilences = 5;
 constexpr int kRoundsToGood = 5;  // after so many rounds the surface is to be good again before the next
 constexpr Duration kPatience = seconds(60);
 constexpr Duration kOut = milliseconds(1000);  // longer than every word below takes
-// What docs/architecture.md and tracker.maximum_extrapolation_ms promise, and as much again for a busy machine: an ECG
+// What docs/design/phase.md and tracker.maximum_extrapolation_ms promise, and as much again for a busy machine: an ECG
 // of which nothing has come for 250 ms is gone, and a pose is carried on for 20 ms.
 constexpr Duration kEcgGone = milliseconds(500);
 constexpr Duration kPoseGone = milliseconds(70);

@@ -222,8 +222,9 @@ class Session {
         quantile(f.errors_px, 0.5), quantile(f.errors_px, 0.95), quantile(f.normalised, 0.5));
     EXPECT_GE(f.returned, 50);
     EXPECT_GE(f.gated, 10'000);
-    // The goals, 95 %, 0.5 % and nine tenths, are met (docs/vision.md); the bounds of the latter two leave room for one
-    // feature that follows another point for the whole session, 0.7 % of all matches, and for a frame of bad luck.
+    // The goals, 95 %, 0.5 % and nine tenths, are met (docs/evidence/vision.md); the bounds of the latter two leave
+    // room for one feature that follows another point for the whole session, 0.7 % of all matches, and for a frame of
+    // bad luck.
     EXPECT_GE(f.reacquired, 0.95 * f.returned);
     EXPECT_LT(f.off, 0.01 * f.gated);
     EXPECT_LT(f.frames_short_of_features, 0.02 * f.frames);

@@ -54,8 +54,8 @@ TEST(RateCheck, ADeviceThatChangesItsRateIsNoticedAsSoon) {
   EXPECT_TRUE(check.wrong());
 }
 
-// The bound that docs/devices.md states: of a device that counts up to four times too slowly or too fast, from the
-// start or from some moment on.
+// The bound that docs/guide/devices.md states: of a device that counts up to four times too slowly or too fast, from
+// the start or from some moment on.
 TEST(RateCheck, UntilItIsNoticedAStampIsWrongByTwoThirdsOfASecondAtMost) {
   constexpr double kNominal_hz = 60.0;
   for (const bool from_the_start : {true, false}) {
