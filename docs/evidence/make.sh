@@ -28,6 +28,7 @@ experiment-2    1 minute    the paper's second experiment
 displayed       3 minutes   what is displayed, 0, 100 and 300 ms ahead
 image           9 minutes   what the image brings beside the ECG alone, by rhythm and law
 breathing       7 minutes   breathing of 10 mm, on and off
+set-up          3 minutes   a lens, a hand-eye transform or a delay that is wrong
 slow-tracker    4 minutes   a tracker whose errors are slow, told and not told
 precision       3 minutes   the map in single precision
 lost            5 minutes   statistics --long lost
@@ -247,6 +248,43 @@ make_slow_tracker() {
       echo "| $tau s | $([ "$told" = 0 ] && echo 'no, taken for white' || echo yes) | $(figure "$stem" early), $(figure "$stem" converged) | $(figure "$stem" median) / $(figure "$stem" p95) mm | $(figure "$stem" nees) | $(figure "$stem" off) |"
     done
   done
+}
+
+# The numbers are those of the simulated scope at 320x240, slightly or grossly wrong.
+make_set_up() {
+  command='perimap simulate --duration 36 --size 320x240 --seed 1 --tracker-noise 1.4; perimap replay --lockstep with another calibration, tracker.hand_eye_..., tracker.time_offset_ms'
+  echo '| wrong by | error, median / 95 % | NEES/3 | called good, off by more than 3 mm |'
+  echo '|---|---|---|---|'
+  simulate set-up --duration 36 --size 320x240 --seed 1 --tracker-noise 1.4 || return 1
+  local stem focal settings name
+  while IFS='|' read -r stem focal settings name; do
+    stem=set-up-$stem
+    cat > "$work/$stem.yaml" << END
+%YAML:1.0
+---
+image_width: 320
+image_height: 240
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ $(awk "BEGIN { print 400 * $focal }"), 0., 163.34, 0., $(awk "BEGIN { print 400.8 * $focal }"), 117.34, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ -0.12, 0.05, 0.0006, -0.0004, 0 ]
+END
+    replay set-up "$stem" <<< "$(printf '[camera]\ncalibration = "%s.yaml"\n[tracker]\n%s' "$stem" "$settings")" || return 1
+    echo "| $name | $(figure "$stem" median) / $(figure "$stem" p95) mm | $(figure "$stem" nees) | $(figure "$stem" off) |"
+  done << 'END'
+none|1||nothing
+focal-2|1.02||focal length, 2 %
+focal-5|1.05||focal length, 5 %
+across|1|hand_eye_translation_SC_mm = [14.2, -6.8, 14.5]|hand-eye, 10 mm
+roll|1|hand_eye_rotation_SC_wxyz = [0.7961381, 0.0724649, -0.0438691, 0.5991565]|hand-eye, 5 degrees
+late|1|time_offset_ms = 33.3|delay, one frame
+END
 }
 
 make_precision() {
