@@ -191,7 +191,7 @@ make_displayed() {
 }
 
 make_image() {
-  command='perimap simulate --ecg RECORD --motion LAW --duration 40 --seed 5; perimap replay --lockstep with phase.from_image false and true'
+  command='perimap simulate --ecg RECORD --motion LAW --duration 40 --seed 5; perimap replay --lockstep with phase.law LAW, phase.from_image false and true'
   echo '| rhythm, motion | ECG alone: median / 95 % / NEES/3 | with the image |'
   echo '|---|---|---|'
   local record law noise name stem
