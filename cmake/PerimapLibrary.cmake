@@ -23,6 +23,9 @@ function(perimap_library NAME FOLDER)
     target_include_directories(${NAME} INTERFACE ${root})
     target_link_libraries(${NAME} INTERFACE ${ARG_DEPENDS})
   endif()
+  # For the tests of the architecture, which try every library.
+  set_property(TARGET ${NAME} PROPERTY PERIMAP_FOLDER ${FOLDER})
+  set_property(GLOBAL APPEND PROPERTY PERIMAP_LIBRARIES ${NAME})
 endfunction()
 
 # perimap_prelude(NAME [FOR_PROGRAMS] HEADERS <header>... DEPENDS target...)
