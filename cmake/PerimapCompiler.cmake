@@ -35,10 +35,10 @@ if(PERIMAP_FUZZ)
   add_link_options(-fsanitize=address,undefined)
 endif()
 
-# Warnings as errors, for the project's own code only (generated code is not linked to this).
+# Warnings, as errors unless it is a part of another project, for the project's own code only (generated code is not linked to this).
 add_library(perimap_warnings INTERFACE)
 target_compile_options(perimap_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
-  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast> -Werror)
+  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast> $<$<BOOL:${PERIMAP_WARNINGS_AS_ERRORS}>:-Werror>)
 # GCC 12's flow analysis reports uninitialised values inside Eigen's fixed-capacity types, at -O3 and with sanitizers, that
 # are not there.
 target_compile_options(perimap_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
