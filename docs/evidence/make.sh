@@ -283,7 +283,7 @@ focal-2|1.02||focal length, 2 %
 focal-5|1.05||focal length, 5 %
 across|1|hand_eye_translation_SC_mm = [14.2, -6.8, 14.5]|hand-eye, 10 mm
 roll|1|hand_eye_rotation_SC_wxyz = [0.7961381, 0.0724649, -0.0438691, 0.5991565]|hand-eye, 5 degrees
-late|1|time_offset_ms = 33.3|delay, one frame
+late|1|time_offset_ms = 33.3|tracker late by a frame
 END
 }
 
