@@ -22,7 +22,8 @@ void FeatureHealth::set_level(std::size_t level) noexcept {
   slow_.reset();
 }
 
-HealthAction FeatureHealth::add(double nis, bool accepted, double common) noexcept {
+HealthAction FeatureHealth::add(double nis, bool accepted, double common, const FrameRate& rate) noexcept {
+  const auto updates = [&rate](Duration time) { return static_cast<int>(rate.frames(time)); };
   constexpr int kCountLimit = 1'000'000;
   // To the fast one it makes no difference why the phase is wrong.
   fast_.add(accepted ? nis : std::numeric_limits<double>::infinity());
@@ -33,7 +34,7 @@ HealthAction FeatureHealth::add(double nis, bool accepted, double common) noexce
   const std::size_t most = settings_.process_noise.size() - 1;
   high_in_a_row_ = fast_.high() ? std::min(high_in_a_row_ + 1, kCountLimit) : 0;
   if (fast_.high()) {
-    if (high_in_a_row_ < settings_.updates_before_inflation) return HealthAction::kNone;
+    if (high_in_a_row_ < updates(settings_.before_inflation)) return HealthAction::kNone;
     if (since_inflation_ < 0) {
       since_inflation_ = 0;
       high_in_a_row_ = 0;
@@ -41,15 +42,15 @@ HealthAction FeatureHealth::add(double nis, bool accepted, double common) noexce
       set_level(most);
       return HealthAction::kInflate;
     }
-    if (since_inflation_ < settings_.updates_after_inflation || failed_) return HealthAction::kNone;
+    if (since_inflation_ < updates(settings_.after_inflation) || failed_) return HealthAction::kNone;
     failed_ = true;
     return HealthAction::kStartAnew;
   }
-  if (since_inflation_ >= settings_.updates_before_less && fast_.consistent()) since_inflation_ = -1;
+  if (since_inflation_ >= updates(settings_.before_less) && fast_.consistent()) since_inflation_ = -1;
   const bool drifts = slow_.verdict() == InnovationVerdict::kElevated || slow_.high();
-  if (drifts && level_ < most && since_change_ >= settings_.updates_before_more) {
+  if (drifts && level_ < most && since_change_ >= updates(settings_.before_more)) {
     set_level(level_ + 1);
-  } else if (level_ > 0 && since_change_ >= settings_.updates_before_less && !slow_.above(settings_.calm_below)) {
+  } else if (level_ > 0 && since_change_ >= updates(settings_.before_less) && !slow_.above(settings_.calm_below)) {
     set_level(level_ - 1);
   }
   return HealthAction::kNone;

@@ -10,9 +10,12 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 
 #include "core/estimation/innovation_monitor.hpp"
+#include "core/time/frame_rate.hpp"
+#include "core/time/instant.hpp"
 
 namespace perimap {
 
@@ -22,11 +25,11 @@ struct FeatureHealthSettings {
       .memory_updates = 150.0, .enough_updates = 100, .consistent_below = 1.25, .high_above = 1.6};
   // Random walk of each coefficient, divided by its harmonic's number (mm/sqrt(s)).
   std::array<double, 3> process_noise = {0.0, 0.01, 0.03};
-  int updates_before_more = 150;      // process noise, after its last change
-  int updates_before_less = 900;      // half a minute at 30 frames/s
-  double calm_below = 1.1;            // mean NIS/2 of the slow statistic
-  int updates_before_inflation = 60;  // with the fast statistic high; shorter lies an instrument passing over
-  int updates_after_inflation = 60;   // the time that inflation gets to help
+  Duration before_more = std::chrono::seconds(5);       // process noise, after its last change
+  Duration before_less = std::chrono::seconds(30);      // likewise
+  double calm_below = 1.1;                              // mean NIS/2 of the slow statistic
+  Duration before_inflation = std::chrono::seconds(2);  // with the fast statistic high; an instrument passes faster
+  Duration after_inflation = std::chrono::seconds(2);   // the time that inflation gets to help
 };
 
 enum class HealthState : std::uint8_t {
@@ -47,9 +50,10 @@ class FeatureHealth {
   explicit FeatureHealth(const FeatureHealthSettings& settings = {}) noexcept;
 
   // After each update: its NIS, which counts only if it was accepted (one refused may have none), and the part of it
-  // that is common to the cycle's updates, see InnovationMonitor. The caller carries the action out; kStartAnew comes
-  // once.
-  [[nodiscard]] HealthAction add(double nis, bool accepted, double common = 0.0) noexcept;
+  // that is common to the cycle's updates, see InnovationMonitor. `rate`: of what is learnt from. The caller carries
+  // the action out; kStartAnew comes once.
+  [[nodiscard]] HealthAction add(double nis, bool accepted, double common = 0.0,
+                                 const FrameRate& rate = FrameRate()) noexcept;
   // The updates to come are of another cardiac cycle.
   void begin_cycle() noexcept { slow_.begin_cycle(); }
   // After a new start.

@@ -164,8 +164,8 @@ void seek(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks, con
   if (slot.match.state != MatchState::kFound) return;
   const std::uint64_t frames = frames_since_found(slot, job);
   const bool is_asked = looks == Looks::kAskedAlways || is_doubtful(prediction, slot.match.px, frames);
-  const bool is_other =
-      is_asked && !slot.looks.is_plausible(slot.patch_state, slot.seen, slot.match.correlation, frames);
+  const bool is_other = is_asked && !slot.looks.is_plausible(slot.patch_state, slot.seen, slot.match.correlation,
+                                                             static_cast<double>(frames));
   if (is_other || is_vague(slot.match)) slot.match.state = MatchState::kLowCorrelation;
 }
 

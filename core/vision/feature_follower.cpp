@@ -16,7 +16,9 @@ namespace {
 constexpr double kFirstDeviation_px = 6.0;
 constexpr std::size_t kEnoughDisplacements = 4;
 constexpr std::size_t kMostOverlays = 512;
-constexpr std::size_t kOverlayWindow = FollowedFeature::kTrail - 1;  // frames
+// Of a trail: half a second and a fifth.
+constexpr Duration kTrailEvery = std::chrono::microseconds(33333);
+constexpr std::size_t kOverlayWindow = FollowedFeature::kTrail - 1;
 constexpr std::size_t kCandidateWindow = 6;
 
 bool is_sought(const FollowedFeature& feature) noexcept {
@@ -42,13 +44,13 @@ bool shows_anything(const GreyImage& image) noexcept {
 }  // namespace
 
 bool FollowedFeature::fills_place() const noexcept {
-  constexpr int kBriefly_frames = 3;
   return state == FollowState::kCandidate || state == FollowState::kTracked ||
-         (state == FollowState::kOccluded && !swept && misses <= kBriefly_frames);
+         (state == FollowState::kOccluded && !swept && !is_away);
 }
 
 FeatureFollower::FeatureFollower(const FollowerSettings& settings)
     : settings_(settings),
+      trail_stride_(settings.rate.frames(kTrailEvery)),
       tracker_({.min_correlation = settings.min_correlation}),
       // As many again may be away.
       features_(2 * static_cast<std::size_t>(std::max(settings.maximum, 0))),
@@ -56,6 +58,15 @@ FeatureFollower::FeatureFollower(const FollowerSettings& settings)
       deviation_px_(kFirstDeviation_px) {
   scratch_.reserve(features_.size());
   overlays_.reserve(kMostOverlays);
+}
+
+int FeatureFollower::frames(Duration time, int least) const noexcept {
+  return std::max(static_cast<int>(settings_.rate.frames(time)), least);
+}
+
+std::size_t FeatureFollower::frames_to_judge() const noexcept {
+  return std::max(static_cast<std::size_t>(FollowedFeature::kTrail * trail_stride_),
+                  static_cast<std::size_t>(frames(settings_.candidate, settings_.candidate_frames)));
 }
 
 int FeatureFollower::free() const noexcept {
@@ -113,9 +124,9 @@ void FeatureFollower::follow(const GreyImage& image) noexcept {
   }
   ++frame_;
   if (blind_frames_ > 0) {
-    constexpr double kDriftOfFrame_px = 0.5;
-    deviation_px_ = std::min(std::max(deviation_px_, kFirstDeviation_px) + kDriftOfFrame_px * blind_frames_,
-                             settings_.widest_deviation_px);
+    constexpr double kDrift_px_per_s = 15.0;
+    const double drift_px = kDrift_px_per_s / settings_.rate.per_s() * blind_frames_;
+    deviation_px_ = std::min(std::max(deviation_px_, kFirstDeviation_px) + drift_px, settings_.widest_deviation_px);
   }
   for (FollowedFeature& feature : features_) {
     if (!is_sought(feature)) continue;
@@ -256,7 +267,9 @@ void FeatureFollower::find_again(const GreyImage& image) noexcept {
     const Vector2d expected = feature.last_px + (neighbours.known ? 1.0 : kShareKept) * neighbours.by;
     const bool is_occluded = feature.state == FollowState::kOccluded;
     // Unseen for long, the place has been carried along without a measurement.
-    const double deviation_px = std::min(2 * deviation_px_ + 0.1 * feature.misses, settings_.widest_deviation_px);
+    constexpr double kDrift_px_per_s = 3.0;
+    const double deviation_px = std::min(2 * deviation_px_ + kDrift_px_per_s / settings_.rate.per_s() * feature.misses,
+                                         settings_.widest_deviation_px);
     constexpr double kLessThanUsual = 0.03;
     const double min_correlation =
         std::max(settings_.recovered_correlation, feature.usual_correlation - kLessThanUsual);
@@ -267,20 +280,24 @@ void FeatureFollower::find_again(const GreyImage& image) noexcept {
 }
 
 void FeatureFollower::judge(const GreyImage& image) noexcept {
+  // A candidate that is not found again at once was none; a feature may be covered for a while.
+  constexpr Duration kMissesOfCandidate = std::chrono::milliseconds(67), kBriefly = std::chrono::milliseconds(100);
+  const int misses_of_candidate = frames(kMissesOfCandidate, 2);
+  const int briefly = frames(kBriefly, 3);
+  const int occluded = frames(settings_.occluded, settings_.occluded_frames);
+  const int candidate = frames(settings_.candidate, settings_.candidate_frames);
   note_displacements();
   scratch_.clear();
   for (FollowedFeature& feature : features_) {
     if (feature.state == FollowState::kEmpty) continue;
     if (!feature.found) {
-      ++feature.misses;
+      feature.is_away = ++feature.misses > briefly;
       feature.velocity_px = feature.px - feature.last_px;
       const bool is_outside = feature.px.x() < 0 || feature.px.y() < 0 || feature.px.x() > image.width - 1 ||
                               feature.px.y() > image.height - 1;
-      constexpr int kMissesOfCandidate = 2;
       const bool is_candidate = feature.state == FollowState::kCandidate;
-      if (is_candidate && feature.misses <= kMissesOfCandidate) continue;
-      if (is_candidate || feature.misses > settings_.occluded_frames ||
-          (is_outside && feature.misses > settings_.occluded_frames / 4)) {
+      if (is_candidate && feature.misses <= misses_of_candidate) continue;
+      if (is_candidate || feature.misses > occluded || (is_outside && feature.misses > occluded / 4)) {
         let_go(feature);
       } else {
         feature.state = FollowState::kOccluded;
@@ -296,6 +313,7 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
     }
     const bool is_back = feature.misses > 0 || blind_frames_ > 0;
     feature.misses = 0;
+    feature.is_away = false;
     feature.swept = false;
     ++feature.frames;
     if (feature.state == FollowState::kOccluded) feature.state = FollowState::kTracked;
@@ -309,7 +327,7 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
     constexpr double kMoved_px = 1.5;
     const bool may_be_overlay =
         camera_lately_.at(feature.px).norm() > kMoved_px && has_stood_still(feature, kCandidateWindow);
-    if (is_candidate && feature.frames >= settings_.candidate_frames && !may_be_overlay) {
+    if (is_candidate && feature.frames >= candidate && !may_be_overlay) {
       feature.state = FollowState::kTracked;
     }
     renew_worn_template(image, feature);
@@ -329,27 +347,33 @@ bool FeatureFollower::moves_with_neighbours(FollowedFeature& feature, bool is_ba
   scratch_.push_back(astray.norm());
   // Of the distance to the neighbours: what a beat strains the tissue by, in a frame and in all.
   constexpr double kStrainOfFrame = 0.06, kStrain = 0.35;
-  const bool is_strange =
-      astray.norm() > 4 * strangeness_px_ + 0.25 * neighbours.by.norm() + kStrainOfFrame * neighbours.distance_px;
+  const double usual = settings_.rate.of_usual();
+  const bool is_strange = astray.norm() > 4 * strangeness_px_ + 0.25 * neighbours.by.norm() +
+                                              usual * kStrainOfFrame * neighbours.distance_px;
   feature.strange = std::max(0, feature.strange + (is_strange ? 2 : -1));
-  constexpr int kMostStrangeCandidate = 5, kMostStrange = 20;
-  if (feature.strange > (feature.state == FollowState::kCandidate ? kMostStrangeCandidate : kMostStrange)) return false;
+  // It counts up by two: three strange frames, and a third of a second of them.
+  constexpr Duration kStrangeCandidate = std::chrono::milliseconds(167), kStrange = std::chrono::milliseconds(667);
+  const bool is_candidate = feature.state == FollowState::kCandidate;
+  if (feature.strange > (is_candidate ? frames(kStrangeCandidate, 5) : frames(kStrange, 20))) return false;
   // What comes back makes up for a place that was only guessed.
   constexpr double kForgetting = 0.03, kMostAstray_px = 4, kMostAstrayOfStrangeness = 6;
-  feature.astray_px = is_back ? Vector2d::Zero() : Vector2d((1 - kForgetting) * feature.astray_px + astray);
+  const double kept = 1 - usual * kForgetting;
+  feature.astray_px = is_back ? Vector2d::Zero() : Vector2d(kept * feature.astray_px + astray);
   return feature.astray_px.norm() <=
          kMostAstray_px + kMostAstrayOfStrangeness * strangeness_px_ + kStrain * neighbours.distance_px;
 }
 
 void FeatureFollower::renew_worn_template(const GreyImage& image, FollowedFeature& feature) const noexcept {
   constexpr double kSmoothing = 1.0 / 15, kSteady = 0.02, kWorn = 0.93;
+  constexpr Duration kWornFor = std::chrono::milliseconds(333);
   constexpr int kWornFrames = 10;
   const double correlation = feature.match.correlation;
   const bool is_steady = std::abs(correlation - feature.usual_correlation) < kSteady;
-  feature.usual_correlation += kSmoothing * (correlation - feature.usual_correlation);
+  feature.usual_correlation +=
+      std::min(1.0, settings_.rate.of_usual() * kSmoothing) * (correlation - feature.usual_correlation);
   const bool is_worn = (correlation < kWorn && is_steady) || template_is_stale(feature.patch_state);
   feature.worn = is_worn ? feature.worn + 1 : 0;
-  if (feature.worn < kWornFrames) return;
+  if (feature.worn < frames(kWornFor, kWornFrames)) return;
   feature.worn = 0;
   PatchTemplate renewed;
   if (make_patch_template(image, feature.px, template_settings_, tracker_.kernels(), renewed) !=
@@ -388,15 +412,15 @@ void FeatureFollower::keep_to_maximum() noexcept {
   }
 }
 
-const Vector2d& FeatureFollower::trailed(const FollowedFeature& feature, std::size_t frames_ago) const noexcept {
-  return feature.trail[(frame_ - frames_ago) % FollowedFeature::kTrail];
+const Vector2d& FeatureFollower::trailed(const FollowedFeature& feature, std::size_t places_ago) const noexcept {
+  return feature.trail[(frame_ / trail_stride_ - places_ago) % FollowedFeature::kTrail];
 }
 
-// Up to the frame before this one's place is noted, from `frames` frames before it on.
-bool FeatureFollower::has_stood_still(const FollowedFeature& feature, std::size_t frames) const noexcept {
+// Before this frame's own place is noted, from `places` places before it on.
+bool FeatureFollower::has_stood_still(const FollowedFeature& feature, std::size_t places) const noexcept {
   constexpr double kStill_px = 0.4;
-  if (feature.trail_length < frames) return false;
-  for (std::size_t ago = 1; ago <= frames; ++ago) {
+  if (feature.trail_length < places) return false;
+  for (std::size_t ago = 1; ago <= places; ++ago) {
     if ((feature.px - trailed(feature, ago)).squaredNorm() > kStill_px * kStill_px) return false;
   }
   return true;
@@ -404,7 +428,7 @@ bool FeatureFollower::has_stood_still(const FollowedFeature& feature, std::size_
 
 // By what moves; known where that is most of all there is and nearly all of it goes together. Then it is the camera
 // that has moved; a beating part moves beside what stands still, by more and less.
-std::optional<FeatureFollower::CameraMotion> FeatureFollower::camera_motion(std::size_t frames) noexcept {
+std::optional<FeatureFollower::CameraMotion> FeatureFollower::camera_motion(std::size_t places) noexcept {
   constexpr std::size_t kEnoughToTell = 8;
   constexpr double kMost = 0.6, kAlike = 0.3, kAlike_px = 1.0, kOutlier = 2.5;
   std::size_t trailing = 0;
@@ -415,7 +439,7 @@ std::optional<FeatureFollower::CameraMotion> FeatureFollower::camera_motion(std:
     Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
     std::size_t moving = 0;
     trailing = 0;
-    for_each_trail(frames, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
+    for_each_trail(places, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
       ++trailing;
       const Vector2d by = feature.px - from;
       if (stood_still || (round > 0 && (by - camera.at(from)).norm() > most_px)) return;
@@ -429,13 +453,13 @@ std::optional<FeatureFollower::CameraMotion> FeatureFollower::camera_motion(std:
     }
     camera.coefficients = normal.ldlt().solve(right);
     scratch_.clear();
-    for_each_trail(frames, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
+    for_each_trail(places, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
       if (!stood_still) scratch_.push_back((feature.px - from - camera.at(from)).norm());
     });
     most_px = kOutlier * upper_median(scratch_.begin(), scratch_.end());
   }
   std::size_t alike = 0;
-  for_each_trail(frames, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
+  for_each_trail(places, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
     const Vector2d by = camera.at(from);
     const bool is_alike = (feature.px - from - by).norm() <= kAlike * by.norm() + kAlike_px;
     alike += !stood_still && is_alike ? 1 : 0;
@@ -464,6 +488,7 @@ bool FeatureFollower::is_overlay(const FollowedFeature& feature, const CameraMot
 
 void FeatureFollower::let_overlays_go() noexcept {
   std::erase_if(overlays_, [&](const Overlay& overlay) { return overlay.until_frame <= frame_; });
+  if (frame_ % trail_stride_ != 0) return;
   const auto lately = camera_motion(kCandidateWindow);
   camera_lately_ = lately.value_or(CameraMotion{});
   if (const auto camera = camera_motion(kOverlayWindow)) {
@@ -475,13 +500,13 @@ void FeatureFollower::let_overlays_go() noexcept {
     }
   }
   for (FollowedFeature& feature : features_) {
-    feature.trail[frame_ % FollowedFeature::kTrail] = feature.px;
+    feature.trail[frame_ / trail_stride_ % FollowedFeature::kTrail] = feature.px;
     feature.trail_length = std::min(feature.trail_length + 1, FollowedFeature::kTrail);
   }
 }
 
 void FeatureFollower::bar(const Vector2d& px) noexcept {
-  const Overlay overlay{px, frame_ + static_cast<std::uint64_t>(settings_.overlay_frames)};
+  const Overlay overlay{px, frame_ + settings_.rate.frames(settings_.overlay)};
   if (overlays_.size() < kMostOverlays) {
     overlays_.push_back(overlay);
     return;
@@ -526,7 +551,7 @@ void FeatureFollower::add(const GreyImage& image, std::span<const Vector2d> corn
     place->match.px = px;
     place->match.correlation = 1;
     place->frames = 1;
-    place->trail[frame_ % FollowedFeature::kTrail] = px;
+    place->trail[frame_ / trail_stride_ % FollowedFeature::kTrail] = px;
     place->trail_length = 1;
   }
 }

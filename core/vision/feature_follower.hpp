@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -12,6 +13,8 @@
 
 #include "core/geometry/pose.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "core/time/frame_rate.hpp"
+#include "core/time/instant.hpp"
 #include "core/vision/neighbour_motion.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
@@ -20,15 +23,21 @@ namespace perimap {
 
 struct FollowerSettings {
   int maximum = 200;
-  int candidate_frames = 8;           // found so often, and moving as its neighbours do, a candidate is tracked
-  int occluded_frames = 15;           // of those that show anything: unseen so long, a feature is lost
+  FrameRate rate;  // of the pictures
+  // Found so long and so often, and moving as its neighbours do, a candidate is tracked.
+  Duration candidate = std::chrono::milliseconds(267);
+  int candidate_frames = 8;
+  // Unseen so long, and in so many frames of those that show anything, a feature is lost.
+  Duration occluded = std::chrono::milliseconds(500);
+  int occluded_frames = 15;
   double least_deviation_px = 1.0;    // of a prediction, per axis
   double widest_deviation_px = 11.0;  // the search reaches +-40 px
   // Compressed video loses what little texture tissue has: more is asked for only where a wrong place may be found.
   double min_correlation = 0.84;
   double recovered_correlation = 0.92;  // asked of a feature that comes back
-  int overlay_frames = 900;             // a place that shows what was laid over the picture takes no feature so long
-  double largest_deviation_px = 0.6;    // of a match: one less sure tells too little of where the tissue is
+  // A place that shows what was laid over the picture takes no feature so long.
+  Duration overlay = std::chrono::seconds(30);
+  double largest_deviation_px = 0.6;  // of a match: one less sure tells too little of where the tissue is
 };
 
 enum class FollowState : std::uint8_t {
@@ -39,7 +48,7 @@ enum class FollowState : std::uint8_t {
 };
 
 struct FollowedFeature {
-  static constexpr std::size_t kTrail = 16;  // frames, the last one included
+  static constexpr std::size_t kTrail = 16;  // places kept, about a 30th of a second apart
 
   FollowState state = FollowState::kEmpty;
   std::uint32_t id = 0;
@@ -52,6 +61,7 @@ struct FollowedFeature {
   Vector2d last_px = Vector2d::Zero();  // in the frame before
   int frames = 0;                       // found in
   int misses = 0;                       // in a row
+  bool is_away = false;                 // missed for more than a moment
   int strange = 0;  // frames in which it moved otherwise than its neighbours, less those in which not
   Vector2d astray_px = Vector2d::Zero();  // how far it has lately gone another way than its neighbours
   int worn = 0;                           // frames in a row in which the template fitted badly, but steadily
@@ -60,7 +70,7 @@ struct FollowedFeature {
   bool swept = false;                     // it vanished together with nearly all others
   bool is_recalled = false;               // it has come back with them in the last frame
   PatchState last_state;                  // in the frame before: what is not believed is taken back
-  std::array<Vector2d, kTrail> trail{};   // where it was, by the frame's number
+  std::array<Vector2d, kTrail> trail{};   // where it was, by the number of the place
   std::size_t trail_length = 0;
 
   // False for what has been away for more than a moment: another may take its place then.
@@ -98,6 +108,8 @@ class FeatureFollower {
   [[nodiscard]] int free() const noexcept;
   // Where no new feature is wanted: at those that fill a place, and at what is laid over the picture.
   [[nodiscard]] std::vector<Vector2d> occupied() const;
+  // So many frames later it is known whether a feature is one, or laid over the picture.
+  [[nodiscard]] std::size_t frames_to_judge() const noexcept;
 
  private:
   // What the whole picture has gone by over some frames, as an affine function of the place.
@@ -117,6 +129,8 @@ class FeatureFollower {
   }
   void note_displacements() noexcept;
   void find_again(const GreyImage& image) noexcept;
+  // As many as take so long, but not fewer than there must be to tell anything.
+  [[nodiscard]] int frames(Duration time, int least) const noexcept;
   [[nodiscard]] bool has_vanished() const noexcept;
   void disbelieve(FollowedFeature& feature) const noexcept;
   void sweep() noexcept;
@@ -126,17 +140,17 @@ class FeatureFollower {
   [[nodiscard]] bool moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept;
   void drop_doubles() noexcept;
   void keep_to_maximum() noexcept;
-  [[nodiscard]] const Vector2d& trailed(const FollowedFeature& feature, std::size_t frames_ago) const noexcept;
-  [[nodiscard]] bool has_stood_still(const FollowedFeature& feature, std::size_t frames) const noexcept;
-  // Of those found that have been followed for so many frames: feature, where it was then, whether it has stayed there.
+  [[nodiscard]] const Vector2d& trailed(const FollowedFeature& feature, std::size_t places_ago) const noexcept;
+  [[nodiscard]] bool has_stood_still(const FollowedFeature& feature, std::size_t places) const noexcept;
+  // Of those found that have so long a trail: feature, where it was then, whether it has stayed there.
   template <class Function>
-  void for_each_trail(std::size_t frames, Function&& function) const {
+  void for_each_trail(std::size_t places, Function&& function) const {
     for (const FollowedFeature& feature : features_) {
-      if (!feature.found || feature.trail_length < frames) continue;
-      function(feature, trailed(feature, frames), has_stood_still(feature, frames));
+      if (!feature.found || feature.trail_length < places) continue;
+      function(feature, trailed(feature, places), has_stood_still(feature, places));
     }
   }
-  [[nodiscard]] std::optional<CameraMotion> camera_motion(std::size_t frames) noexcept;
+  [[nodiscard]] std::optional<CameraMotion> camera_motion(std::size_t places) noexcept;
   [[nodiscard]] bool is_overlay(const FollowedFeature& feature, const CameraMotion& camera) const noexcept;
   void let_overlays_go() noexcept;
   void bar(const Vector2d& px) noexcept;
@@ -144,6 +158,7 @@ class FeatureFollower {
   void renew_worn_template(const GreyImage& image, FollowedFeature& feature) const noexcept;
 
   FollowerSettings settings_;
+  std::uint64_t trail_stride_;  // frames from one place of a trail to the next
   TemplateSettings template_settings_;
   PatchTracker tracker_;
   std::vector<FollowedFeature> features_;

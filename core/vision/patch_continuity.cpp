@@ -7,16 +7,16 @@
 namespace perimap {
 
 bool PatchContinuity::is_plausible(const PatchState& before, const PatchState& now, double correlation,
-                                   std::uint64_t frames) const noexcept {
+                                   double usual_frames) const noexcept {
   if (usual_correlation_ <= 0) return true;
   // What is missing to 1 may be some times the usual (blur, smoke, a slanted view come within a few frames), and a
   // little more where nearly nothing is missing.
   constexpr double kTimesUsual = 3.0, kAlways = 0.02;
   if (1 - correlation > kTimesUsual * (1 - usual_correlation_) + kAlways) return false;
-  // A systole stretches the picture by up to 1.1 a frame at 30 frames/s.
-  constexpr double kStretchPerFrame = 1.25;
-  constexpr std::uint64_t kFramesCounted = 3;
-  const double stretch = std::pow(kStretchPerFrame, static_cast<double>(std::min(frames, kFramesCounted)));
+  // A systole stretches the picture by up to 1.1 in a frame at the usual rate, and noise the shape that is found,
+  // however short the time.
+  constexpr double kStretch = 1.25, kFramesCounted = 3;
+  const double stretch = std::pow(kStretch, std::clamp(usual_frames, 1.0, kFramesCounted));
   const StretchRange change = stretch_of(now.A * before.A.inverse());
   return change.largest <= stretch && change.smallest * stretch >= 1;
 }

@@ -62,7 +62,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   PatchContinuity looks;
   const int believed = input.below(8);
   for (int i = 0; i < believed; ++i) looks.add(input.take<float>());
-  const auto frames = input.take<std::uint64_t>();
+  const auto usual_frames = static_cast<double>(input.take<std::uint64_t>());
   const std::vector<std::uint8_t> pixels = input.pixels(static_cast<std::size_t>((height - 1) * stride + width));
   const GreyImage image{pixels.data(), width, height, stride};
 
@@ -82,7 +82,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
           match.px.x() >= 0 && match.px.y() >= 0 && match.px.x() <= width - 1 && match.px.y() <= height - 1;
       if (!is_inside || !match.covariance_px2.allFinite() || !(match.covariance_px2.determinant() > 0)) std::abort();
       // Whatever it has been taken for before: what looks the same and fits perfectly is never something else.
-      (void)looks.is_plausible(state, now, match.correlation, frames);
+      (void)looks.is_plausible(state, now, match.correlation, usual_frames);
       PatchContinuity usual;
       usual.add(match.correlation);
       if (!usual.is_plausible(now, now, 1, 1)) std::abort();

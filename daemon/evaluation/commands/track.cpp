@@ -256,16 +256,17 @@ struct Summary {
 class Tracking {
  public:
   Tracking(const Options& options, double frames_per_s)
-      : options_(options), follower_(settings(options, frames_per_s)) {}
+      : options_(options),
+        find_interval_(settings(options, frames_per_s).rate.frames(std::chrono::milliseconds(167))),
+        follower_(settings(options, frames_per_s)) {}
 
-  // Follows every feature in the frame and fills up their number every kFindInterval frames.
+  // Follows every feature in the frame and fills up their number every sixth of a second.
   Expected<void> take(const VideoFrame& frame, FrameSource& source) {
     const auto begin = std::chrono::steady_clock::now();
     follower_.follow(frame.grey);
     summary_.follow_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    constexpr std::uint64_t kFindInterval = 5;
     const bool may_find =
-        follower_.saw_anything() && (options_.no_new_features ? !has_found_ : summary_.frames % kFindInterval == 0);
+        follower_.saw_anything() && (options_.no_new_features ? !has_found_ : summary_.frames % find_interval_ == 0);
     ++summary_.frames;
     if (may_find && follower_.free() > 0) {
       if (auto done = find(frame.grey, source.colour()); !done) return done;
@@ -288,14 +289,13 @@ class Tracking {
   }
 
   [[nodiscard]] const Summary& summary() const noexcept { return summary_; }
+  [[nodiscard]] std::size_t frames_to_judge() const noexcept { return follower_.frames_to_judge(); }
 
  private:
   static FollowerSettings settings(const Options& options, double frames_per_s) {
     FollowerSettings settings;
     settings.maximum = options.features;
-    constexpr double kOccluded_s = 0.5, kMostOccluded = 60;
-    const double least = settings.occluded_frames;
-    settings.occluded_frames = static_cast<int>(std::clamp(kOccluded_s * frames_per_s, least, kMostOccluded));
+    if (frames_per_s > 0) settings.rate = FrameRate(frames_per_s);
     return settings;
   }
 
@@ -318,6 +318,7 @@ class Tracking {
   }
 
   const Options& options_;
+  std::uint64_t find_interval_;  // frames
   FeatureFollower follower_;
   bool has_found_ = false;
   Summary summary_;
@@ -347,7 +348,7 @@ int track(const Options& options) {
   if (!table) return refuse(table.error(), kFailure);
   std::unique_ptr<VideoWriter> video;
   Tracking tracking(options, (*source)->frames_per_s());
-  ConfirmedTracks tracks(FollowedFeature::kTrail);
+  ConfirmedTracks tracks(tracking.frames_to_judge());
   std::optional<Error> broken;  // ends the reading; what was found until then is written
   {
     Progress progress("frames", (*source)->announced_frames());

@@ -33,7 +33,7 @@ class FeatureFollowerTest : public testing::Test {
   static FollowerSettings settings() {
     FollowerSettings settings;
     settings.maximum = kFeatures;
-    settings.occluded_frames = 30;
+    settings.occluded = std::chrono::seconds(1);
     return settings;
   }
 
