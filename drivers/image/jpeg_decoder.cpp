@@ -21,6 +21,7 @@ struct JpegDecoder::Impl {
   jpeg_decompress_struct jpeg{};
   std::jmp_buf on_error{};
   std::array<char, JMSG_LENGTH_MAX> message{};
+  bool one_scan = false;  // as the header has it, once it is read
 
   Impl() {
     jpeg.err = jpeg_std_error(&errors);
@@ -32,11 +33,7 @@ struct JpegDecoder::Impl {
     };
     errors.emit_message = [](j_common_ptr common, int level) {
       // -1 is a warning: the data was damaged, and the library goes on with what it can make of it.
-      if (level >= 0) return;
-      // The second number is the marker.
-      // NOLINTNEXTLINE(cppcoreguidelines-pro-type-union-access): the library's own type
-      const bool before_end = common->err->msg_parm.i[1] == JPEG_EOI;
-      if (common->err->msg_code == JWRN_EXTRANEOUS_DATA && before_end) return;
+      if (level >= 0 || is_harmless(common)) return;
       common->err->error_exit(common);
     };
     if (setjmp(on_error) != 0) throw std::bad_alloc();
@@ -45,6 +42,20 @@ struct JpegDecoder::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
   ~Impl() { jpeg_destroy_decompress(&jpeg); }
+
+  // What leaves every pixel as it was sent. Data that are missing, or do not fit their Huffman codes, are told by
+  // warnings of their own.
+  static bool is_harmless(j_common_ptr common) {
+    const int code = common->err->msg_code;
+    if (code == JWRN_EXTRANEOUS_DATA) {
+      // Bytes to spare before the end, or before a restart, where webcams pad. The second number is the marker.
+      // NOLINTNEXTLINE(cppcoreguidelines-pro-type-union-access): the library's own type
+      const int marker = common->err->msg_parm.i[1];
+      return marker == JPEG_EOI || (marker >= JPEG_RST0 && marker <= JPEG_RST0 + 7);
+    }
+    // No end marker. Of one scan all the data may be there; of several none may be missing.
+    return code == JWRN_JPEG_EOF && of(common).one_scan;
+  }
 
   static Impl& of(j_common_ptr common) { return *static_cast<Impl*>(common->client_data); }
 
@@ -63,8 +74,10 @@ struct JpegDecoder::Impl {
   void read_header(std::span<const std::byte> bytes) {
     // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): libjpeg 6's type lacks the const; it only reads
     auto* data = const_cast<unsigned char*>(reinterpret_cast<const unsigned char*>(bytes.data()));
+    one_scan = false;
     jpeg_mem_src(&jpeg, data, bytes.size());
     (void)jpeg_read_header(&jpeg, TRUE);
+    one_scan = jpeg_has_multiple_scans(&jpeg) == FALSE;
   }
 
   // Null when it is done; otherwise what is wrong. Its locals are trivial, since a longjmp runs no destructors.

@@ -28,7 +28,8 @@ class JpegDecoder {
 
   // Into rows of `width` bytes without gaps; `grey` holds width * height. Fails when the picture has another size, has
   // no luma (RGB, CMYK), or is damaged or cut short, where libjpeg would make pixels up; `grey` then means nothing.
-  // Bytes between the picture's end and the JPEG's are let pass: cameras pad.
+  // Bytes between the picture's end, or a restart interval's, and the marker after it are let pass: cameras pad. So is
+  // a missing end marker when no data are missing.
   [[nodiscard]] Expected<void> decode(std::span<const std::byte> jpeg, int width, int height,
                                       std::span<std::uint8_t> grey);
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <numeric>
 
@@ -125,11 +126,50 @@ TEST_F(Jpeg, MayBePaddedAsCamerasDo) {
 
 TEST_F(Jpeg, CutShortAnywhereIsNoPicture) {
   const auto jpeg = test::make_jpeg(kWidth, kHeight, &luma);
-  // Without its end marker alone it is still whole, but who would know.
-  for (std::size_t length = 0; length < jpeg.size(); length += 7) {
+  // Without its end marker alone it is still whole.
+  for (std::size_t length = 0; length + 2 < jpeg.size(); length += 7) {
     EXPECT_NE(error_of(std::span(jpeg).first(length)), "decoded") << length;
   }
+  EXPECT_NE(error_of(std::span(jpeg).first(jpeg.size() - 3)), "decoded");
+  EXPECT_EQ(error_of(std::span(jpeg).first(jpeg.size() - 2)), "decoded");
   EXPECT_EQ(error_of(jpeg), "decoded");
+}
+
+// Where each restart marker begins.
+std::vector<std::size_t> restarts_of(const std::vector<std::byte>& jpeg) {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i + 1 < jpeg.size(); ++i) {
+    if (jpeg[i] == std::byte{0xFF} && (jpeg[i + 1] & std::byte{0xF8}) == std::byte{0xD0}) found.push_back(i);
+  }
+  return found;
+}
+
+TEST_F(Jpeg, MayHaveBytesBeforeARestartAsWebcamsDo) {
+  const auto jpeg = test::make_jpeg(kWidth, kHeight, &luma, true, false, 2);
+  const auto restarts = restarts_of(jpeg);
+  ASSERT_GT(restarts.size(), 3U);
+  const auto plain = converter_.convert(frame(PixelFormat::kMjpg, kWidth, kHeight, 0, jpeg));
+  ASSERT_TRUE(plain);
+  const std::vector<std::uint8_t> expected(plain->data, plain->data + kWidth * kHeight);
+  for (const std::size_t count : {1U, 2U, 5U}) {
+    auto padded = jpeg;
+    for (auto at = restarts.rbegin(); at != restarts.rend(); ++at) {
+      padded.insert(padded.begin() + static_cast<std::ptrdiff_t>(*at), count, std::byte{0});
+    }
+    const auto image = converter_.convert(frame(PixelFormat::kMjpg, kWidth, kHeight, 0, padded));
+    ASSERT_TRUE(image) << image.error().message;
+    EXPECT_TRUE(std::equal(expected.begin(), expected.end(), image->data)) << count;
+  }
+}
+
+TEST_F(Jpeg, OfWhichARestartIntervalIsMissingIsNoPicture) {
+  const auto jpeg = test::make_jpeg(kWidth, kHeight, &luma, true, false, 2);
+  const auto restarts = restarts_of(jpeg);
+  auto without = jpeg;
+  without.erase(without.begin() + static_cast<std::ptrdiff_t>(restarts[1]),
+                without.begin() + static_cast<std::ptrdiff_t>(restarts[2]));
+  EXPECT_NE(error_of(without), "decoded");
+  for (const std::size_t at : restarts) EXPECT_NE(error_of(std::span(jpeg).first(at)), "decoded") << at;
 }
 
 TEST_F(Jpeg, OfAnotherSizeOrKindIsRefused) {

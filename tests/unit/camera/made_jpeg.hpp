@@ -16,9 +16,10 @@ namespace perimap::test {
 
 using Luma = std::function<std::uint8_t(int x, int y)>;
 
-// Colour, 4:2:2 as from a UVC camera, or grey; or progressive, as from none.
+// Colour, 4:2:2 as from a UVC camera, or grey; or progressive, as from none. Restart markers each so many blocks, or
+// none.
 inline std::vector<std::byte> make_jpeg(int width, int height, const Luma& luma, bool colour = true,
-                                        bool progressive = false) {
+                                        bool progressive = false, unsigned restart_interval = 0) {
   jpeg_compress_struct jpeg{};
   jpeg_error_mgr errors{};
   jpeg.err = jpeg_std_error(&errors);
@@ -33,6 +34,7 @@ inline std::vector<std::byte> make_jpeg(int width, int height, const Luma& luma,
   jpeg_set_defaults(&jpeg);
   jpeg_set_quality(&jpeg, 95, TRUE);
   if (colour) jpeg.comp_info[0].v_samp_factor = 1;
+  jpeg.restart_interval = restart_interval;
   if (progressive) jpeg_simple_progression(&jpeg);
   jpeg_start_compress(&jpeg, TRUE);
   std::vector<std::uint8_t> row(static_cast<std::size_t>(width) * (colour ? 3U : 1U), 90);
