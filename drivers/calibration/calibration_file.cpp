@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <span>
 #include <system_error>
 #include <vector>
@@ -32,6 +33,9 @@ class Calibration {
   Calibration(const YAML::Node& root, std::string_view name) : root_(root), name_(name) {}
 
   Expected<CameraModel> camera() const {
+    if (const auto once = each_key_once(); !once) {
+      return tl::unexpected(once.error());
+    }
     CameraModel camera;
     auto size = image_side("image_width").and_then([&](int width) {
       camera.width = width;
@@ -60,7 +64,7 @@ class Calibration {
                     fmt::format("{} and {}", camera.fx, camera.fy));
     }
 
-    const Expected<Lens> lens = lens_of("distortion_model");
+    const Expected<Lens> lens = lens_of("distortion_model", "fisheye_model");
     if (!lens) {
       return tl::unexpected(lens.error());
     }
@@ -106,20 +110,50 @@ class Calibration {
     return camera;
   }
 
-  // OpenCV's files do not name the model; calibrators that do use the names of ROS (sensor_msgs/distortion_models.h).
-  Expected<Lens> lens_of(const char* key) const {
-    const YAML::Node node = root_[key];
+  // Of two values of one key nobody knows which is meant.
+  Expected<void> each_key_once() const {
+    std::vector<std::string> keys;
+    for (const auto& entry : root_) {
+      if (!entry.first.IsScalar()) continue;
+      const std::string& key = entry.first.Scalar();
+      if (std::find(keys.begin(), keys.end(), key) != keys.end()) {
+        return refuse(key, "one value", "two: it is there twice");
+      }
+      keys.push_back(key);
+    }
+    return {};
+  }
+
+  // Calibrators that name the model use the names of ROS (sensor_msgs/distortion_models.h); OpenCV's own program writes
+  // a fisheye_model of 1 or 0 (samples/cpp/.../camera_calibration.cpp), and its other files say nothing.
+  Expected<Lens> lens_of(const char* name_key, const char* flag_key) const {
+    std::optional<Lens> flagged;
+    if (const YAML::Node node = root_[flag_key]; node.IsDefined()) {
+      int flag = 0;
+      if (!node.IsScalar() || !YAML::convert<int>::decode(node, flag) || flag < 0 || flag > 1) {
+        return refuse(flag_key, "0 or 1", node.IsScalar() ? node.Scalar() : "something else");
+      }
+      flagged = flag == 1 ? Lens::kKannalaBrandt : Lens::kBrownConrady;
+    }
+    const YAML::Node node = root_[name_key];
     if (!node.IsDefined()) {
-      return Lens::kBrownConrady;
+      return flagged.value_or(Lens::kBrownConrady);
     }
     const std::string name = node.IsScalar() ? node.Scalar() : "something else";
+    std::optional<Lens> named;
     if (name == "plumb_bob" || name == "rational_polynomial") {
-      return Lens::kBrownConrady;
+      named = Lens::kBrownConrady;
     }
     if (name == "equidistant" || name == "fisheye") {
-      return Lens::kKannalaBrandt;
+      named = Lens::kKannalaBrandt;
     }
-    return refuse(key, "plumb_bob, rational_polynomial, equidistant or fisheye", name);
+    if (!named) {
+      return refuse(name_key, "plumb_bob, rational_polynomial, equidistant or fisheye", name);
+    }
+    if (flagged && *flagged != *named) {
+      return refuse(name_key, fmt::format("the same lens as key '{}' has", flag_key), name);
+    }
+    return *named;
   }
 
   tl::unexpected<Error> refuse(std::string_view key, std::string_view expected, std::string_view got) const {

@@ -1,6 +1,7 @@
 // Camera calibration files as OpenCV writes them (cv::FileStorage, YAML or JSON): camera_matrix,
-// distortion_coefficients, image_width, image_height; distortion_model tells a fisheye. Other keys are ignored. Read by
-// yaml-cpp, because cv::FileStorage crashes on damaged files (OpenCV 4.6: XML that ends in an attribute).
+// distortion_coefficients, image_width, image_height; distortion_model or fisheye_model tells a fisheye. Other keys are
+// ignored. Read by yaml-cpp, because cv::FileStorage crashes on damaged files (OpenCV 4.6: XML that ends in an
+// attribute).
 #pragma once
 
 #include <filesystem>
@@ -14,7 +15,8 @@ namespace perimap {
 
 // Accepts distortion_coefficients of 4, 5, 8, 12 or 14 numbers (k1 k2 p1 p2 k3 ...) as long as those after the fifth
 // are zero, and matrices with or without OpenCV's type tag. With `distortion_model: equidistant` (or fisheye) they are
-// the four of cv::fisheye; without the key the lens is Brown-Conrady's. Errors name the file and the key.
+// the four of cv::fisheye, and so they are with `fisheye_model: 1`, as OpenCV's own calibration program writes; without
+// either key the lens is Brown-Conrady's. A key that is there twice is an error. Errors name the file and the key.
 [[nodiscard]] Expected<CameraModel> read_calibration(const std::filesystem::path& file);
 
 // The same from memory; `name` stands in messages.

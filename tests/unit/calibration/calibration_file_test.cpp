@@ -219,5 +219,34 @@ TEST(CalibrationFile, EveryTruncationAndEveryDamagedByteEndsInAResult) {
   }
 }
 
+// As OpenCV's own calibration program writes a fisheye: without a model's name.
+std::string fisheye_of_opencv(std::string_view flag) {
+  return with(with(with(kYaml, "rows: 5", "rows: 4"), "-2.0e-3, 0.01 ]", "-2.0e-3 ]"), "avg_reprojection_error: 0.2",
+              flag);
+}
+
+TEST(FisheyeModel, OfOpenCVsOwnProgramIsRead) {
+  const auto fisheye = parse_calibration(fisheye_of_opencv("fisheye_model: 1"), "cam");
+  ASSERT_TRUE(fisheye) << fisheye.error().message;
+  EXPECT_EQ(fisheye->lens, Lens::kKannalaBrandt);
+  EXPECT_EQ(fisheye->k4, -2.0e-3);
+  const auto other = parse_calibration(with(kYaml, "avg_reprojection_error: 0.2", "fisheye_model: 0"), "cam");
+  ASSERT_TRUE(other) << other.error().message;
+  EXPECT_EQ(other->lens, Lens::kBrownConrady);
+}
+
+TEST(FisheyeModel, IsRefusedWhenItIsNoFlagOrContradictsTheName) {
+  EXPECT_THAT(error_of(fisheye_of_opencv("fisheye_model: 2")),
+              HasSubstr("key 'fisheye_model': expected 0 or 1, got 2"));
+  EXPECT_THAT(error_of(fisheye_of_opencv("fisheye_model: 1\ndistortion_model: plumb_bob")),
+              HasSubstr("key 'distortion_model'"));
+}
+
+TEST(CalibrationKeys, AreRefusedWhenThereTwice) {
+  const std::string again = "avg_reprojection_error: 0.2\nimage_width: 320";
+  EXPECT_EQ(error_of(with(kYaml, "avg_reprojection_error: 0.2", again)),
+            "cam.yaml: key 'image_width': expected one value, got two: it is there twice");
+}
+
 }  // namespace
 }  // namespace perimap
