@@ -25,6 +25,13 @@ if(PERIMAP_SANITIZE)
   # older tag, it looks for whoever calls.
   add_link_options(-fsanitize=${PERIMAP_SANITIZE} LINKER:--disable-new-dtags)
 endif()
+# gold, a part of binutils, links in half of the time that its elder brother takes.
+if(CMAKE_BUILD_TYPE STREQUAL RelWithDebInfo AND CMAKE_CXX_COMPILER_ID STREQUAL GNU AND PROJECT_IS_TOP_LEVEL)
+  find_program(PERIMAP_GOLD ld.gold)
+  if(PERIMAP_GOLD)
+    add_link_options(-fuse-ld=gold)
+  endif()
+endif()
 set(PERIMAP_UNDEFINED all CACHE STRING "Checks of UndefinedBehaviorSanitizer: all, or some")
 if(PERIMAP_SANITIZE STREQUAL "address,undefined" AND PERIMAP_UNDEFINED STREQUAL some)
   # A third of the build time for what AddressSanitizer mostly traps as well.

@@ -52,7 +52,9 @@ endfunction()
 
 # perimap_test(NAME [PLAIN] [ALWAYS] [THREADS] SOURCES f... DEPENDS target... [LABELS l...])
 #
-# A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA.
+# A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. In the two builds of a
+# quick tests/run.sh CTest runs each program in four parts instead: starting a program with AddressSanitizer and its libraries
+# for each case takes longer than most cases.
 #
 # A quick tests/run.sh makes two builds. `plain`: the programs, the tests of whole programs, and the unit tests marked
 # PLAIN (counting allocations, very long to compile with a sanitizer, or of much that no other unit test needs).
@@ -80,7 +82,13 @@ function(perimap_test NAME)
     target_precompile_headers(${NAME} REUSE_FROM test_prelude)
   endif()
   target_compile_definitions(${NAME} PRIVATE PERIMAP_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
-  if(wanted)
+  if(wanted AND PERIMAP_TESTS MATCHES "^(plain|other)$")
+    foreach(part RANGE 3)
+      add_test(NAME ${NAME}.part_${part} COMMAND ${NAME})
+      set_tests_properties(${NAME}.part_${part} PROPERTIES
+        ENVIRONMENT "GTEST_TOTAL_SHARDS=4;GTEST_SHARD_INDEX=${part}" LABELS "${ARG_LABELS}" TIMEOUT 900)
+    endforeach()
+  elseif(wanted)
     gtest_discover_tests(${NAME} TEST_PREFIX "${NAME}." DISCOVERY_TIMEOUT 60 PROPERTIES LABELS "${ARG_LABELS}")
   endif()
 endfunction()

@@ -142,6 +142,9 @@ run_tests() { # NAME PRESET CTEST_OPTION...
     fi
   fi
   grep -a 'tests passed' "$log"
+  # Where CTest runs whole programs it counts those; GoogleTest counts the cases.
+  grep -aoE '^\[  PASSED  \] [0-9]+' "build/$preset/Testing/Temporary/LastTest.log" |
+    awk '{ cases += $4 } END { if (cases) print cases " cases of unit tests passed in them" }'
 }
 
 # Each target starts from the seeds of its own name, where there are any, and adds what it finds to a corpus in build/.
