@@ -106,11 +106,11 @@ class Reader {
   }
   std::string text(std::string_view what) {
     const std::uint32_t n = count(kLongestText, 1, what);
-    const auto bytes = cursor_.take(n);
+    const auto bytes = cursor_.read_bytes(n);
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
   }
   void raw(void* data, std::size_t size, std::string_view what) {
-    const auto bytes = cursor_.take(size);
+    const auto bytes = cursor_.read_bytes(size);
     expect(bytes.size() == size, what);
     if (good()) std::memcpy(data, bytes.data(), size);
   }

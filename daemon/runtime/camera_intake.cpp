@@ -22,9 +22,9 @@ bool CameraIntake::take(const CameraFrame& frame) {
   }
   const bool first = !before_;
   // Only the first one's goes with itself, to tell at once that there is any.
-  if (first) colour_.take(frame);
+  if (first) colour_.reduce_colour(frame);
   intake_.frame(frame, *grey, first ? colour_.picture() : colour_for(frame));
-  if (!first) colour_.take(frame);
+  if (!first) colour_.reduce_colour(frame);
   before_ = frame.stamp.capture;
   return true;
 }

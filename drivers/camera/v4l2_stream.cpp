@@ -383,10 +383,10 @@ Expected<V4l2Stream::Grab> V4l2Stream::next(Duration longest, const Interrupt& i
     case V4l2Node::Ready::kInterrupted:
       return Grab::kInterrupted;
     case V4l2Node::Ready::kBuffer:
-      return take();
+      return dequeue_buffer();
     case V4l2Node::Ready::kError: {
       // Without a reason of its own it would be asked again at once, for ever.
-      auto taken = take();
+      auto taken = dequeue_buffer();
       if (taken && *taken == Grab::kNothing) return refuse("its driver has stopped");
       return taken;
     }
@@ -403,7 +403,7 @@ Expected<V4l2Stream::Grab> V4l2Stream::next(Duration longest, const Interrupt& i
   return Grab::kNothing;
 }
 
-Expected<V4l2Stream::Grab> V4l2Stream::take() {
+Expected<V4l2Stream::Grab> V4l2Stream::dequeue_buffer() {
   v4l2_buffer buffer = mapped_buffer(0);
   if (const int error = node_->control(VIDIOC_DQBUF, &buffer); error != 0) {
     if (error == EAGAIN) return Grab::kNothing;

@@ -92,7 +92,7 @@ class V4l2Stream {
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& what) const;
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& what, int error) const;
   [[nodiscard]] Expected<void> give_back();
-  [[nodiscard]] Expected<Grab> take();
+  [[nodiscard]] Expected<Grab> dequeue_buffer();
 
   std::unique_ptr<V4l2Node> node_;
   V4l2Settings settings_;

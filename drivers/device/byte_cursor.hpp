@@ -19,7 +19,7 @@ class ByteCursor {
   [[nodiscard]] bool good() const noexcept { return good_; }
   [[nodiscard]] std::size_t left() const noexcept { return bytes_.size(); }
 
-  std::span<const std::byte> take(std::size_t count) noexcept {
+  std::span<const std::byte> read_bytes(std::size_t count) noexcept {
     if (count > bytes_.size()) {
       good_ = false;
       bytes_ = {};
@@ -32,7 +32,7 @@ class ByteCursor {
 
   template <std::unsigned_integral T>
   T number() noexcept {
-    const auto taken = take(sizeof(T));
+    const auto taken = read_bytes(sizeof(T));
     T value = 0;
     for (std::size_t i = 0; i < taken.size(); ++i) {
       const std::size_t at = Order == std::endian::little ? taken.size() - 1 - i : i;

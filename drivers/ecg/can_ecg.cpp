@@ -46,7 +46,7 @@ std::string read_frames(CanSocket& socket, CanEcgDecoder& decoder, const Interru
     if (waited[1].revents != 0) return "";
     const auto frame = socket.receive();
     if (!frame) return frame.error().message;
-    if (*frame) decoder.take(**frame);
+    if (*frame) decoder.decode_frame(**frame);
     decoder.watch(MonotonicClock::now());
   }
 }
@@ -113,7 +113,7 @@ bool CanEcgDecoder::expect_rate(Instant arrival) {
   return !rate_refused_;
 }
 
-void CanEcgDecoder::take(const CanFrame& frame) {
+void CanEcgDecoder::decode_frame(const CanFrame& frame) {
   health_.dropped.add(frame.dropped_before - dropped_);
   dropped_ = frame.dropped_before;
   if (frame.error) {

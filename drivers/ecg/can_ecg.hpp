@@ -31,7 +31,7 @@ class CanEcgDecoder {
   CanEcgDecoder(const CanEcgSettings& settings, EcgSinks sinks, DeviceHealth& health);
 
   void restart() noexcept;
-  void take(const CanFrame& frame);
+  void decode_frame(const CanFrame& frame);
   // After every wait and every frame of whatever kind: whether samples come still.
   void watch(Instant now) noexcept;
 

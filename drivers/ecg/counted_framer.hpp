@@ -31,10 +31,10 @@ class CountedFramer {
     any_ = false;
   }
 
-  // take(frame, lost, behind): `lost` is how many frames are missing before this one, modulo the modulus, or none when
-  // it follows; `behind` is how many frames more are there already. Returns the number of bytes passed over.
-  template <class Take>
-  std::uint64_t feed(std::span<const std::byte> bytes, const Take& take) {
+  // on_frame(frame, lost, behind): `lost` is how many frames are missing before this one, modulo the modulus, or none
+  // when it follows; `behind` is how many frames more are there already. Returns the number of bytes passed over.
+  template <class OnFrame>
+  std::uint64_t feed(std::span<const std::byte> bytes, const OnFrame& on_frame) {
     pending_.insert(pending_.end(), bytes.begin(), bytes.end());
     std::uint64_t passed_over = 0;
     std::size_t at = 0;
@@ -56,7 +56,7 @@ class CountedFramer {
       synchronised_ = true;
       const std::optional<unsigned> lost =
           follows || !any_ ? std::nullopt : std::optional((count(at) + shape_.modulus - next_) % shape_.modulus);
-      take(frame(at), lost, (pending_.size() - at) / shape_.bytes - 1);
+      on_frame(frame(at), lost, (pending_.size() - at) / shape_.bytes - 1);
       any_ = true;
       next_ = (count(at) + 1) % shape_.modulus;
       at += shape_.bytes;

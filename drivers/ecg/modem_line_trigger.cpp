@@ -129,7 +129,7 @@ std::string watch_line(ModemPort& port, TriggerEdges& edges, const RTriggerSink&
     if (!woken) return woken.error().message;
     const auto line = port.read();
     if (!line) return line.error().message;
-    if (const auto trigger = edges.take(*line, *woken, now)) {
+    if (const auto trigger = edges.observe_line(*line, *woken, now)) {
       last = now;
       health.set_state(DeviceState::kStreaming);
       sink(*trigger);
@@ -155,7 +155,7 @@ Expected<std::unique_ptr<ModemPort>> open_modem_port(const std::string& path, Mo
   return port;
 }
 
-std::optional<RTriggerPulse> TriggerEdges::take(const ModemPort::Line& line, bool woken, Instant now) noexcept {
+std::optional<RTriggerPulse> TriggerEdges::observe_line(const ModemPort::Line& line, bool woken, Instant now) noexcept {
   const std::uint32_t changes = line.changes - changes_;
   changes_ = line.changes;
   if (changes == 0) return std::nullopt;

@@ -57,7 +57,8 @@ class TriggerEdges {
   // The line as it is found at an opening.
   void restart(const ModemPort::Line& line) noexcept { changes_ = line.changes; }
   // As it is at `now`, right after a wait that did or did not end by a change.
-  [[nodiscard]] std::optional<RTriggerPulse> take(const ModemPort::Line& line, bool woken, Instant now) noexcept;
+  [[nodiscard]] std::optional<RTriggerPulse> observe_line(const ModemPort::Line& line, bool woken,
+                                                          Instant now) noexcept;
 
  private:
   ModemTriggerSettings settings_;

@@ -68,7 +68,7 @@ void ColourReducer::reserve(int width, int height) {
   bgr_.resize(reduced_row_bytes(width) * static_cast<std::size_t>(reduced_side(height)));
 }
 
-void ColourReducer::take(const CameraFrame& frame) {
+void ColourReducer::reduce_colour(const CameraFrame& frame) {
   picture_ = {};
   if (any_ && ++passed_over_ < interval_) return;
   any_ = true;

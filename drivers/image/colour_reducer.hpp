@@ -20,10 +20,10 @@ class ColourReducer {
   // Makes room, so that frames of up to this size allocate nothing; kMjpg excepted, where libjpeg does.
   void reserve(int width, int height);
 
-  void take(const CameraFrame& frame);
+  void reduce_colour(const CameraFrame& frame);
 
-  // Of the frame taken last, reduced as colour_image.hpp says; without pixels when it was passed over, has no colour,
-  // or is damaged. Valid until the next one is taken.
+  // Of the last frame, reduced as colour_image.hpp says; without pixels when it was passed over, has no colour,
+  // or is damaged. Valid until the next one.
   [[nodiscard]] const ColourImage& picture() const noexcept { return picture_; }
 
  private:

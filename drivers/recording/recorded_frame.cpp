@@ -30,7 +30,7 @@ Expected<void> RecordedFrame::read(const RecordingReader& reader, const Recorded
 }
 
 const ColourImage& RecordedFrame::colour() {
-  colour_.take(frame_);
+  colour_.reduce_colour(frame_);
   return colour_.picture();
 }
 

@@ -113,8 +113,8 @@ std::optional<IgtlDamaged> split(std::span<const std::byte> body, IgtlMessage& m
     const std::size_t key_size = index.number<std::uint16_t>();
     (void)index.number<std::uint16_t>();  // encoding of the value
     const std::size_t value_size = index.number<std::uint32_t>();
-    const auto key = values.take(key_size);
-    const auto value = values.take(value_size);
+    const auto key = values.read_bytes(key_size);
+    const auto value = values.read_bytes(value_size);
     if (!index.good() || !values.good()) return IgtlDamaged{"metadata does not fit its body"};
     message.metadata.emplace_back(text_of(key), text_of(value));
   }
@@ -151,8 +151,8 @@ std::optional<std::variant<IgtlMessage, IgtlDamaged>> IgtlFramer::next() {
     Cursor cursor(pending_);
     IgtlMessage message;
     message.version = cursor.number<std::uint16_t>();
-    message.type = text_of(cursor.take(kTypeLength));
-    message.device = text_of(cursor.take(kNameLength));
+    message.type = text_of(cursor.read_bytes(kTypeLength));
+    message.device = text_of(cursor.read_bytes(kNameLength));
     message.time_stamp = cursor.number<std::uint64_t>();
     const auto size = cursor.number<std::uint64_t>();
     const auto crc = cursor.number<std::uint64_t>();
@@ -175,7 +175,7 @@ std::optional<std::variant<IgtlMessage, IgtlDamaged>> IgtlFramer::next() {
       continue;
     }
     if (cursor.left() < size) return std::nullopt;
-    const auto body = cursor.take(static_cast<std::size_t>(size));
+    const auto body = cursor.read_bytes(static_cast<std::size_t>(size));
     std::optional<IgtlDamaged> damage;
     if (igtl_crc(body) != crc) {
       damage = IgtlDamaged{message.type + " message: body CRC"};
@@ -253,7 +253,7 @@ Expected<std::vector<IgtlTool>> decode_igtl_tdata(std::span<const std::byte> con
   Cursor cursor(content);
   while (cursor.left() > 0) {
     IgtlTool tool;
-    tool.name = text_of(cursor.take(kNameLength));
+    tool.name = text_of(cursor.read_bytes(kNameLength));
     (void)cursor.number<std::uint16_t>();  // type, reserved
     const auto pose = read_transform(cursor);
     if (!pose) return fail("TDATA: the matrix of a tool is no rigid pose");
@@ -268,9 +268,9 @@ Expected<IgtlStatus> decode_igtl_status(std::span<const std::byte> content) {
   IgtlStatus status;
   status.code = cursor.number<std::uint16_t>();
   (void)cursor.number<std::uint64_t>();  // subcode
-  status.name = text_of(cursor.take(kStatusName));
+  status.name = text_of(cursor.read_bytes(kStatusName));
   if (!cursor.good()) return fail("STATUS: ends too early");
-  status.text = text_of(cursor.take(cursor.left()));
+  status.text = text_of(cursor.read_bytes(cursor.left()));
   return status;
 }
 

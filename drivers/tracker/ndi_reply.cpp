@@ -52,13 +52,13 @@ std::optional<NdiReply> NdiReplyFramer::next_binary(std::size_t length_bytes) {
   const std::size_t header = 2 + length_bytes;
   if (pending_.size() < header + 2) return std::nullopt;
   ByteCursor<std::endian::little> cursor(pending_);
-  cursor.take(2);
+  cursor.read_bytes(2);
   const std::size_t length = length_bytes == 2 ? cursor.number<std::uint16_t>() : cursor.number<std::uint32_t>();
   const auto header_crc = cursor.number<std::uint16_t>();
   if (header_crc != ndi_crc(std::span(pending_).first(header))) return damaged("header CRC");
   if (length > kLongestBody) return damaged(fmt::format("{} bytes of body", length));
   if (cursor.left() < length + 2) return std::nullopt;
-  const auto body = cursor.take(length);
+  const auto body = cursor.read_bytes(length);
   if (cursor.number<std::uint16_t>() != ndi_crc(body)) return damaged("body CRC");
   NdiBinary reply{{body.begin(), body.end()}};
   pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(header + 2 + length + 2));

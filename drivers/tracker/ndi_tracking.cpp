@@ -98,7 +98,7 @@ Expected<void> decode_container(Cursor& cursor, std::optional<std::uint32_t> fra
     if (!cursor.good()) return truncated("BX2");
     if (size < kComponentHeader) return fail("BX2 reply: a component shorter than its header");
     if (size - kComponentHeader > cursor.left()) return truncated("BX2");
-    Cursor inside(cursor.take(size - kComponentHeader));
+    Cursor inside(cursor.read_bytes(size - kComponentHeader));
     if (type == kFrames) {
       for (std::uint32_t item = 0; item < items && inside.good(); ++item) {
         (void)inside.number<std::uint8_t>();   // type

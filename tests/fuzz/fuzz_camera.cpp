@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static ColourReducer kept(1);
   ColourReducer fresh(1);  // whose room is the picture's own, so that nothing behind it is missed
   ColourReducer& reducer = data[3] / 128 == 0 ? kept : fresh;
-  reducer.take(frame);
+  reducer.reduce_colour(frame);
   const ColourImage& colour = reducer.picture();
   const bool has_colour =
       frame.format == PixelFormat::kYuyv || frame.format == PixelFormat::kUyvy || frame.format == PixelFormat::kNv12;

@@ -53,7 +53,7 @@ void feed_can(std::span<const std::byte> input) {
     now += Duration(std::to_integer<int>(input[3])) * 1'000'000;
     frame.arrival = now;
     for (std::size_t i = 0; i < 8; ++i) frame.data[i] = std::to_integer<std::uint8_t>(input[4 + i]);
-    decoder.take(frame);
+    decoder.decode_frame(frame);
   }
 }
 

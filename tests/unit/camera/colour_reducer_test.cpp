@@ -73,7 +73,7 @@ TEST(ColourReducer, GivesTheColoursOfEachFormatAtAQuarterOfTheSize) {
       SCOPED_TRACE(testing::Message() << pixel_format_name(format) << " " << width << "x" << height);
       const Picture picture(format, width, height, 16, 6);
       ColourReducer reducer;
-      reducer.take(picture.frame());
+      reducer.reduce_colour(picture.frame());
       const ColourImage& colour = reducer.picture();
       ASSERT_NE(colour.bgr, nullptr);
       ASSERT_EQ(colour.width, (width + 3) / 4);
@@ -99,33 +99,33 @@ TEST(ColourReducer, GivesTheColoursOfAJpeg) {
       test::make_jpeg(kWidth, kHeight, [](int, int y) { return static_cast<std::uint8_t>(y < 16 ? 40 : 100); });
   frame.bytes = jpeg;
   ColourReducer reducer(1);
-  reducer.take(frame);
+  reducer.reduce_colour(frame);
   ASSERT_NE(reducer.picture().bgr, nullptr);
   EXPECT_EQ(reducer.picture().width, 13);
   EXPECT_EQ(reducer.picture().height, 9);
   expect_near(bgr_at(reducer.picture(), 6, 7), {33, 140, 47});
   expect_near(bgr_at(reducer.picture(), 6, 1), {0, 80, 0});
   frame.bytes = std::span(jpeg).first(jpeg.size() / 2);
-  reducer.take(frame);
+  reducer.reduce_colour(frame);
   EXPECT_EQ(reducer.picture().bgr, nullptr);
   const auto grey = test::make_jpeg(
       kWidth, kHeight, [](int, int) { return std::uint8_t{100}; }, false);
   frame.bytes = grey;
-  reducer.take(frame);
+  reducer.reduce_colour(frame);
   EXPECT_EQ(reducer.picture().bgr, nullptr);
 }
 
 TEST(ColourReducer, HasNoneOfGreyFramesOrOfThoseThatDoNotHoldTheirPicture) {
   ColourReducer reducer(1);
-  reducer.take(Picture(PixelFormat::kGrey, 32, 16, 16, 0).frame());
+  reducer.reduce_colour(Picture(PixelFormat::kGrey, 32, 16, 16, 0).frame());
   EXPECT_EQ(reducer.picture().bgr, nullptr);
   for (const PixelFormat format : {PixelFormat::kYuyv, PixelFormat::kUyvy, PixelFormat::kNv12}) {
     const Picture picture(format, 32, 16, 16, 0);
     CameraFrame frame = picture.frame();
-    reducer.take(frame);
+    reducer.reduce_colour(frame);
     EXPECT_NE(reducer.picture().bgr, nullptr);
     frame.bytes = frame.bytes.first(frame.bytes.size() - 1);
-    reducer.take(frame);
+    reducer.reduce_colour(frame);
     EXPECT_EQ(reducer.picture().bgr, nullptr);
   }
 }
@@ -135,7 +135,7 @@ TEST(ColourReducer, LooksAtTheFirstFrameAndThenAtEveryNth) {
   ColourReducer reducer(3);
   std::vector<bool> seen;
   for (int i = 0; i < 7; ++i) {
-    reducer.take(picture.frame());
+    reducer.reduce_colour(picture.frame());
     seen.push_back(reducer.picture().bgr != nullptr);
   }
   EXPECT_EQ(seen, (std::vector<bool>{true, false, false, true, false, false, true}));

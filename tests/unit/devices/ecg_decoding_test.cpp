@@ -860,27 +860,27 @@ TEST(CanEcg, GapsErrorsAndOverflowsAreCounted) {
     f.arrival = kStart + i * std::chrono::microseconds(5556);
     return f;
   };
-  for (int i = 0; i < 100; ++i) decoder.take(frame(i));
+  for (int i = 0; i < 100; ++i) decoder.decode_frame(frame(i));
   EXPECT_EQ(received.health.samples.get(), 200U);
-  decoder.take(frame(103));
+  decoder.decode_frame(frame(103));
   EXPECT_EQ(received.health.lost.get(), 6U);
-  decoder.take(frame(103));  // the same again
+  decoder.decode_frame(frame(103));  // the same again
   EXPECT_EQ(received.health.samples.get(), 202U);
-  decoder.take(frame(104 + 256 * 3));  // the count went round three times
+  decoder.decode_frame(frame(104 + 256 * 3));  // the count went round three times
   EXPECT_EQ(received.health.lost.get(), 6U + 2 * 256 * 3);
   CanFrame error = frame(0);
   error.error = true;
   error.identifier = 0x04;  // CAN_ERR_CRTL
-  decoder.take(error);
+  decoder.decode_frame(error);
   EXPECT_EQ(received.health.bus_errors.get(), 1U);
   EXPECT_EQ(received.health.reason(), "");
   error.identifier = 0x40;  // CAN_ERR_BUSOFF
-  decoder.take(error);
+  decoder.decode_frame(error);
   EXPECT_EQ(received.health.bus_errors.get(), 2U);
   EXPECT_THAT(received.health.reason(), HasSubstr("off the bus"));
   CanFrame after_overflow = frame(105 + 256 * 3);
   after_overflow.dropped_before = 7;
-  decoder.take(after_overflow);
+  decoder.decode_frame(after_overflow);
   EXPECT_EQ(received.health.dropped.get(), 7U);
   EXPECT_EQ(received.health.samples.get(), 206U);
 }
@@ -903,8 +903,8 @@ TEST(CanEcg, RespirationComesWithTheSampleThatItWasTakenWith) {
     f.arrival = kStart + i * std::chrono::microseconds(2778);
     return f;
   };
-  for (int i = 0; i < 100; ++i) decoder.take(frame(i, i >= 60 && i < 80));
-  decoder.take(frame(110, false));
+  for (int i = 0; i < 100; ++i) decoder.decode_frame(frame(i, i >= 60 && i < 80));
+  decoder.decode_frame(frame(110, false));
   EXPECT_EQ(received.health.lost.get(), 10U) << "a lost frame held one sample of the ECG";
   ASSERT_EQ(received.breaths.size(), 101U);
   ASSERT_EQ(received.blocks.size(), 101U);
@@ -926,7 +926,7 @@ TEST(CanEcg, AFloodOfErrorsAndOfStrangersIsSilenceOfTheDevice) {
     CanEcgDecoder decoder({}, received.sink(), received.health);
     CanFrame good = can_frame(1, 2, 3, 4);
     good.arrival = kStart;
-    decoder.take(good);
+    decoder.decode_frame(good);
     decoder.watch(kStart);
     EXPECT_EQ(received.health.state(), DeviceState::kStreaming);
     for (int i = 1; i < 400; ++i) {
@@ -936,7 +936,7 @@ TEST(CanEcg, AFloodOfErrorsAndOfStrangersIsSilenceOfTheDevice) {
       frame.length = errors ? 8 : 3;
       frame.identifier = errors ? 0x80 : 0x2E0;  // CAN_ERR_BUSERROR
       frame.arrival = kStart + milliseconds(i);
-      decoder.take(frame);
+      decoder.decode_frame(frame);
       decoder.watch(frame.arrival);
     }
   }
@@ -956,7 +956,7 @@ TEST(CanEcg, TheControllersWordsAreTold) {
   for (const Case& c : {Case{0x04, ""}, Case{0x01, "has run over"}, Case{0x10, "error-passive"},
                         Case{0x02, "has run over"}, Case{0x20, "error-passive"}}) {
     error.data[1] = c.controller;
-    decoder.take(error);
+    decoder.decode_frame(error);
     EXPECT_THAT(received.health.reason(), HasSubstr(c.reason));
   }
   EXPECT_EQ(received.health.bus_errors.get(), 5U);
@@ -980,7 +980,7 @@ TEST(CanEcg, SamplesAtAnotherRateThanConfiguredAreNotTakenAndTold) {
       const Duration since = (i - from) * period;
       CanFrame f = can_frame(static_cast<std::uint8_t>(i), static_cast<std::uint16_t>(since / milliseconds(1)), 0, 0);
       f.arrival = begin + since;
-      decoder.take(f);
+      decoder.decode_frame(f);
     }
   };
   // 360 Hz, two samples a frame, for ten seconds.
@@ -999,7 +999,7 @@ TEST(CanEcg, RespirationThatNobodyAskedForIsNoSampleOfTheEcg) {
   CanEcgDecoder decoder({}, EcgSinks(received.sink().ecg), received.health);
   CanFrame frame = encode_can_ecg({0, false, false, 1, 0, {7, 30000}, true, false}, 0x2E0, false);
   frame.arrival = kStart;
-  decoder.take(frame);
+  decoder.decode_frame(frame);
   EXPECT_EQ(received.counts(0.005), std::vector<int>{7});
   EXPECT_TRUE(received.breaths.empty());
 }

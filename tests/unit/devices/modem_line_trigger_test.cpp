@@ -25,7 +25,7 @@ struct Edges : ::testing::Test {
   std::optional<RTriggerPulse> change(std::uint32_t times, bool on, Duration at, bool woken = true) {
     line.changes += times;
     line.on = on;
-    return edges.take(line, woken, kStart + at);
+    return edges.observe_line(line, woken, kStart + at);
   }
 
   DeviceHealth health;
@@ -85,8 +85,8 @@ TEST(FallingEdges, AreRPeaksWhenTheMonitorIsThatWay) {
   DeviceHealth health;
   TriggerEdges edges({.path = "", .rising = false}, health);
   edges.restart({5, true});
-  EXPECT_TRUE(edges.take({6, false}, true, kStart));
-  EXPECT_FALSE(edges.take({7, true}, true, kStart + milliseconds(100)));
+  EXPECT_TRUE(edges.observe_line({6, false}, true, kStart));
+  EXPECT_FALSE(edges.observe_line({7, true}, true, kStart + milliseconds(100)));
 }
 
 // A port whose line does as it is told.
