@@ -9,7 +9,7 @@ void CameraIntake::reserve(int width, int height) {
   colour_.reserve(width, height);
 }
 
-bool CameraIntake::take(const CameraFrame& frame) {
+bool CameraIntake::deliver_frame(const CameraFrame& frame) {
   if (intake_.entrance == nullptr) {
     // Without a pipeline nobody needs it in grey.
     intake_.frame(frame, {}, {});

@@ -19,7 +19,7 @@ class CameraIntake {
   void reserve(int width, int height);
 
   // False when the frame cannot be decoded: it is recorded as it came, and to the pipeline it is a gap in the count.
-  bool take(const CameraFrame& frame);
+  bool deliver_frame(const CameraFrame& frame);
 
  private:
   [[nodiscard]] ColourImage colour_for(const CameraFrame& frame);

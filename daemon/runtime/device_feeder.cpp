@@ -125,7 +125,7 @@ void DeviceFeeder::run_camera(const CameraDevice& device) {
   CameraIntake camera(intake_);
   if (const auto* v4l2 = std::get_if<V4l2Settings>(&device)) camera.reserve(v4l2->width, v4l2->height);
   const CameraSink sink = [this, &camera](const CameraFrame& frame) {
-    if (!camera.take(frame)) camera_health_.damaged.add();
+    if (!camera.deliver_frame(frame)) camera_health_.damaged.add();
   };
   auto served = serve_camera(device, sink, camera_health_, interrupt_);
   if (!served) camera_error_ = std::move(served.error());

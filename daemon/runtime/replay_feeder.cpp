@@ -56,7 +56,7 @@ void ReplayFeeder::read_ahead() {
   }
 }
 
-std::optional<ReplayEvent> ReplayFeeder::take() {
+std::optional<ReplayEvent> ReplayFeeder::next_event() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return stopping_ || read_all_ || !ahead_.empty(); });
   if (stopping_ || ahead_.empty()) return std::nullopt;
@@ -70,7 +70,7 @@ void ReplayFeeder::deliver() {
   std::optional<Duration> offset = offset_;
   const Instant begun = MonotonicClock::now();
   std::vector<std::uint8_t> passed_over;  // the last colour
-  while (auto event = take()) {
+  while (auto event = next_event()) {
     if (!offset) offset = MonotonicClock::now() + kLead - arrival_of(*event);
     shift(*event, *offset);
     const Instant arrival = arrival_of(*event);

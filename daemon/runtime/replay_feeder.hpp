@@ -44,7 +44,7 @@ class ReplayFeeder final : public SensorFeeder {
  private:
   void read_ahead();
   void deliver();
-  [[nodiscard]] std::optional<ReplayEvent> take();
+  [[nodiscard]] std::optional<ReplayEvent> next_event();
 
   ReplayReader reader_;
   SensorIntake intake_;

@@ -111,21 +111,21 @@ void SessionRecorder::frame(const CameraFrame& frame) noexcept {
 }
 
 template <class Sample>
-void SessionRecorder::take(Lane<Sample>& lane, const Sample& sample) noexcept {
+void SessionRecorder::enqueue(Lane<Sample>& lane, const Sample& sample) noexcept {
   const RealtimeScope realtime;
   if (!accepting_.load(std::memory_order_acquire)) return;
   if (stopped_.load(std::memory_order_relaxed) || !lane.ring.push(sample)) lane.refused.add();
 }
 
 void SessionRecorder::pose(const TrackerSample& sample) noexcept {
-  take(std::get<Lane<TrackerSample>>(others_), sample);
+  enqueue(std::get<Lane<TrackerSample>>(others_), sample);
 }
-void SessionRecorder::ecg(const EcgBlock& block) noexcept { take(std::get<Lane<EcgBlock>>(others_), block); }
+void SessionRecorder::ecg(const EcgBlock& block) noexcept { enqueue(std::get<Lane<EcgBlock>>(others_), block); }
 void SessionRecorder::r_trigger(const RTriggerPulse& pulse) noexcept {
-  take(std::get<Lane<RTriggerPulse>>(others_), pulse);
+  enqueue(std::get<Lane<RTriggerPulse>>(others_), pulse);
 }
 void SessionRecorder::respiration(const RespirationBlock& block) noexcept {
-  take(std::get<Lane<RespirationBlock>>(others_), block);
+  enqueue(std::get<Lane<RespirationBlock>>(others_), block);
 }
 
 SessionRecorder::Summary SessionRecorder::summary() const noexcept {

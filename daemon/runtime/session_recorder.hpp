@@ -95,7 +95,7 @@ class SessionRecorder {
   };
 
   template <class Sample>
-  void take(Lane<Sample>& lane, const Sample& sample) noexcept;
+  void enqueue(Lane<Sample>& lane, const Sample& sample) noexcept;
   void run();
   void finish_file();
   // Writes what arrived until then.

@@ -52,7 +52,7 @@ void follow(const Scene& scene, Follower& follower) {
       const int end_frame = static_cast<int>(kSeconds[at] * scene.settings.frames_per_s);
       if (end_frame > scene.settings.frames) break;
       while (next < feature.sightings.size() && feature.sightings[next].frame < end_frame)
-        method->take(feature.sightings[next++]);
+        method->observe(feature.sightings[next++]);
       Sums& sums = follower.sums[at];
       const FeatureEstimate* estimate = method->estimate();
       if (estimate == nullptr) {

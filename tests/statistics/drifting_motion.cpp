@@ -43,7 +43,7 @@ void follow(const Scene& scene, const SceneFeature& feature, ProcessNoise noise,
   for (const Sighting& sighting : feature.sightings) {
     const SceneFrame& frame = scene.frames[static_cast<std::size_t>(sighting.frame)];
     if (!mapped) {
-      start->take(sighting);
+      start->observe(sighting);
       mapped = start->estimate() != nullptr;
       if (mapped) estimate = *start->estimate();
       last_s = frame.time_s;

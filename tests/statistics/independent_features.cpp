@@ -29,7 +29,7 @@ struct Outcome {
 Outcome outcome_of(MethodKind kind, const Scene& scene, const SceneFeature& feature, double first_depth_mm,
                    const MethodOptions& options = {}) {
   const auto method = make_method(kind, {&scene, BasisLayout{}, Prior{}, first_depth_mm}, options);
-  for (const Sighting& sighting : feature.sightings) method->take(sighting);
+  for (const Sighting& sighting : feature.sightings) method->observe(sighting);
   const FeatureEstimate* estimate = method->estimate();
   if (estimate == nullptr) return {};
   return {path_error_mm(*estimate, method->layout(), scene, feature),

@@ -25,7 +25,7 @@ struct Outcome {
 
 void follow(const Scene& scene, const SceneFeature& feature, const BasisLayout& layout, Outcome& outcome) {
   const auto method = make_method(MethodKind::kDelayed, {&scene, layout, Prior{}, kFirstDepth_mm});
-  for (const Sighting& sighting : feature.sightings) method->take(sighting);
+  for (const Sighting& sighting : feature.sightings) method->observe(sighting);
   const FeatureEstimate* estimate = method->estimate();
   if (estimate == nullptr) {
     outcome.errors_mm.push_back(INFINITY);

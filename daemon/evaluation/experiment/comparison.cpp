@@ -46,7 +46,7 @@ void Comparison::add_feature(const Scene& scene, const SceneFeature& feature) {
     for (std::size_t k = 0; k < feature.sightings.size(); ++k) {
       const Sighting& sighting = feature.sightings[k];
       const double begin_ns = processor_ns();
-      method->take(sighting);
+      method->observe(sighting);
       figures.taken_ns += processor_ns() - begin_ns;
       if (kind == MethodKind::kStaticEkf) {
         static_innovations.push_back(method->last_innovation());

@@ -64,7 +64,7 @@ SceneSettings scene_settings(const ExperimentSettings& settings, int trial) {
 Plot cycle_plot(const Scene& scene, const SceneFeature& feature, MethodKind kind, const MethodSetting& setting,
                 const MethodOptions& options, int sightings) {
   const auto method = make_method(kind, setting, options);
-  for (int k = 0; k < sightings; ++k) method->take(feature.sightings[static_cast<std::size_t>(k)]);
+  for (int k = 0; k < sightings; ++k) method->observe(feature.sightings[static_cast<std::size_t>(k)]);
   Plot plot;
   plot.title = method_name(kind) + ", after " + std::to_string(sightings) + " sightings";
   plot.x_label = "phase (cycles)";
@@ -152,7 +152,7 @@ ExperimentFigure paths_figure(const Scene& scene, const MethodSetting& setting, 
     for (const Drawn drawn :
          {Drawn{MethodKind::kStaticEkf, 6.0}, Drawn{MethodKind::kIterated, 1.0}, Drawn{MethodKind::kDelayed, 1.6}}) {
       const auto method = make_method(drawn.kind, setting, options);
-      for (const Sighting& sighting : feature.sightings) method->take(sighting);
+      for (const Sighting& sighting : feature.sightings) method->observe(sighting);
       PlotLine line{{}, color_of(drawn.kind), drawn.width_px, first ? method_name(drawn.kind) : ""};
       const FeatureEstimate* estimate = method->estimate();
       for (int i = 0; i <= kSteps && estimate != nullptr; ++i) {

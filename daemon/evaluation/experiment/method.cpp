@@ -42,7 +42,7 @@ class RecursiveMethod final : public Method {
   RecursiveMethod(const MethodSetting& setting, const BasisLayout& layout, const UpdateSettings& settings)
       : setting_(setting), layout_(layout), settings_(settings) {}
 
-  void take(const Sighting& sighting) override {
+  void observe(const Sighting& sighting) override {
     const Scene& scene = *setting_.scene;
     if (!estimate_)
       estimate_ = prior_estimate(layout_, setting_.prior, on_ray(scene, sighting, setting_.first_depth_mm));
@@ -87,7 +87,7 @@ class DelayedMethod final : public Method {
   DelayedMethod(const MethodSetting& setting, int buffered)
       : setting_(setting), wanted_(static_cast<std::size_t>(buffered)), buffered_(wanted_) {}
 
-  void take(const Sighting& sighting) override {
+  void observe(const Sighting& sighting) override {
     const Scene& scene = *setting_.scene;
     if (!estimate_) {
       waiting_.push_back(sighting);
@@ -124,7 +124,7 @@ class BatchMethod final : public Method {
  public:
   BatchMethod(const MethodSetting& setting, bool only_good) : setting_(setting), only_good_(only_good) {}
 
-  void take(const Sighting& sighting) override {
+  void observe(const Sighting& sighting) override {
     if (only_good_ && sighting.outlier) return;
     sightings_.push_back(sighting);
     solved_ = false;

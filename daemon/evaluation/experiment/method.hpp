@@ -24,7 +24,7 @@ class Method {
  public:
   virtual ~Method() = default;
 
-  virtual void take(const Sighting& sighting) = 0;
+  virtual void observe(const Sighting& sighting) = 0;
   // What is known from all sightings so far; nothing when the method has no answer. Valid until the next call.
   [[nodiscard]] virtual const FeatureEstimate* estimate() = 0;
   // Of the estimate.

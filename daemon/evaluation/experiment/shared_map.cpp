@@ -36,7 +36,7 @@ void SharedMap::start(std::size_t i) {
   const auto& sightings = scene_.features[i].sightings;
   const auto method = make_method(MethodKind::kDelayed, {&scene_, layout_, prior_, scene_.settings.distance_mm},
                                   {.buffered = static_cast<int>(next_sighting_[i])});
-  for (std::size_t k = 0; k < next_sighting_[i]; ++k) method->take(sightings[k]);
+  for (std::size_t k = 0; k < next_sighting_[i]; ++k) method->observe(sightings[k]);
   const FeatureEstimate* estimate = method->estimate();
   if (estimate == nullptr) return;
   estimates_[i] = *estimate;

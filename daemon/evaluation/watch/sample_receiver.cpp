@@ -80,7 +80,7 @@ Expected<void> SampleReceiver::finish() {
 }
 
 template <class T, class Use>
-void SampleReceiver::take(dds::Reader<T>& reader, Instant receipt, Use use) {
+void SampleReceiver::receive_samples(dds::Reader<T>& reader, Instant receipt, Use use) {
   const Expected<dds::Loan<T>> loan = reader.take();
   if (!loan) {
     result_ = tl::unexpected(loan.error());
@@ -103,16 +103,16 @@ void SampleReceiver::receive() {
   while (readers_.wait_set.wait()) {
     const Instant receipt = MonotonicClock::now();
     const std::lock_guard lock(mutex_);
-    take(readers_.surfaces, receipt, [&](const perimap_Surface& surface) {
+    receive_samples(readers_.surfaces, receipt, [&](const perimap_Surface& surface) {
       if (limits_.keep_first_surface && statistics_.surfaces() == 0) {
         first_surface_ = surface_json(surface, receipt);
       }
       statistics_.add(surface, receipt);
     });
-    take(readers_.statuses, receipt, [&](const perimap_Status& status) { statistics_.add(status); });
+    receive_samples(readers_.statuses, receipt, [&](const perimap_Status& status) { statistics_.add(status); });
     if (recorder_) {
-      take(readers_.models, receipt, [](const perimap_SurfaceModel&) {});
-      take(readers_.phases, receipt, [](const perimap_Phase&) {});
+      receive_samples(readers_.models, receipt, [](const perimap_SurfaceModel&) {});
+      receive_samples(readers_.phases, receipt, [](const perimap_Phase&) {});
     }
     if (limit_reached() || !result_) {
       break;

@@ -59,7 +59,7 @@ class SampleReceiver {
   }
   // Takes what one reader holds and hands each sample on.
   template <class T, class Use>
-  void take(dds::Reader<T>& reader, Instant receipt, Use use);
+  void receive_samples(dds::Reader<T>& reader, Instant receipt, Use use);
 
   SampleReaders readers_;
   std::optional<SampleRecorder> recorder_;

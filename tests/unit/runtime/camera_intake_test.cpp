@@ -33,7 +33,7 @@ class CameraInto : public ::testing::Test {
   }
   // Whether the pipeline gets it with colour; nothing when it does not get it.
   std::optional<bool> coloured(const CameraFrame& given) {
-    static_cast<void>(camera_.take(given));
+    static_cast<void>(camera_.deliver_frame(given));
     FrameHandle handle;
     if (!entrance_->pop_frame(handle)) return std::nullopt;
     EXPECT_EQ(entrance_->image(handle).row(3)[5], 100);
@@ -78,7 +78,7 @@ TEST_F(CameraInto, AFrameThatCanNotBeDecodedIsAGapAndTakesNoColourAway) {
   for (std::uint64_t i = 0; i < 4; ++i) static_cast<void>(coloured(frame(i)));
   CameraFrame damaged = frame(4);
   damaged.format = PixelFormat::kMjpg;
-  EXPECT_FALSE(camera_.take(damaged));
+  EXPECT_FALSE(camera_.deliver_frame(damaged));
   FrameHandle nothing;
   EXPECT_FALSE(entrance_->pop_frame(nothing));
   EXPECT_EQ(coloured(frame(5)), true);
@@ -88,7 +88,7 @@ TEST_F(CameraInto, FramesTakeNothingFromTheHeapOnceThereIsRoom) {
   camera_.reserve(kWidth, kHeight);
   bool all = true;
   EXPECT_EQ(test::allocations_of([&] {
-              for (std::uint64_t i = 0; i < 4; ++i) all = camera_.take(frame(i)) && all;
+              for (std::uint64_t i = 0; i < 4; ++i) all = camera_.deliver_frame(frame(i)) && all;
             }),
             0);
   EXPECT_TRUE(all);
