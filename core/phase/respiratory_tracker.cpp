@@ -117,7 +117,7 @@ bool RespiratoryTracker::persists(const FoundBreath& found, Instant now) noexcep
   return now - candidate_since_ >= kPersists;
 }
 
-void RespiratoryTracker::follow(const BreathSignal& signal, Instant now) noexcept {
+void RespiratoryTracker::track_signal(const BreathSignal& signal, Instant now) noexcept {
   if (!settings_.enabled) return;
   const bool breathed = channel_known_;
   const bool another = signal.onsets != channel_.onsets;

@@ -45,7 +45,7 @@ class RespiratoryTracker {
   void add_contradiction(Instant t) noexcept;
 
   // Before each frame: what the respiration channel told until then.
-  void follow(const BreathSignal& signal, Instant now) noexcept;
+  void track_signal(const BreathSignal& signal, Instant now) noexcept;
 
   // After a lock: the map learns by this clock what it has seen already, and needs so long for it.
   void map_catches_up_for(Duration time) noexcept { first_breath_ = std::max(clock_.period(), time); }

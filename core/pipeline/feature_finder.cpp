@@ -134,7 +134,7 @@ void FeatureFinder::work(int step) noexcept {
   if (step == 0) {
     find(frame);
   } else {
-    follow(frame);
+    track_candidates(frame);
   }
   if (step + 1 < kFinderDelayFrames) return;
   if (found_.size() > share_) found_.resize(share_);
@@ -180,7 +180,7 @@ void FeatureFinder::find(const Frame& frame) noexcept {
   }
 }
 
-void FeatureFinder::follow(const Frame& frame) noexcept {
+void FeatureFinder::track_candidates(const Frame& frame) noexcept {
   const GreyImage image{frame.pixels.data(), width_, height_, width_};
   const Matrix2d covariance = kMotionDeviation_px * kMotionDeviation_px * Matrix2d::Identity();
   std::erase_if(found_, [&](FoundFeature& feature) {

@@ -79,7 +79,7 @@ class FeatureFinder {
   void work(int step) noexcept;
   void find(const Frame& frame) noexcept;
   [[nodiscard]] Expected<std::vector<Vector2d>> corners(const GreyImage& image, const DetectorSettings& detector) const;
-  void follow(const Frame& frame) noexcept;
+  void track_candidates(const Frame& frame) noexcept;
 
   int width_;
   int height_;

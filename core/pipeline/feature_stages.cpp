@@ -213,8 +213,8 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   slot.pose_deviation_px = from_map.pose_deviation_px;
 }
 
-void follow(FeatureSlot& slot, const MapPrediction& map, const FrameJob& job, const PixelModel& model,
-            const PipelineSettings& settings) noexcept {
+void settle_match(FeatureSlot& slot, const MapPrediction& map, const FrameJob& job, const PixelModel& model,
+                  const PipelineSettings& settings) noexcept {
   if (slot.state == SlotState::kEmpty || slot.shed) return;
   const double gate = settings.estimator.update.gate;
   const NeighbourMotion::Around neighbours = job.motion->around(slot.carried_px, &slot.patch_state.px);

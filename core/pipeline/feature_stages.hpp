@@ -30,8 +30,8 @@ void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept;
 
 // After the hand-over: what was not found, or went another way than what is around it, is searched for again where the
 // pose that the frame's matches agree on has it, or where its neighbours have moved. Then what was found is believed.
-void follow(FeatureSlot& slot, const MapPrediction& from_map, const FrameJob& job, const PixelModel& model,
-            const PipelineSettings& settings) noexcept;
+void settle_match(FeatureSlot& slot, const MapPrediction& from_map, const FrameJob& job, const PixelModel& model,
+                  const PipelineSettings& settings) noexcept;
 
 // So long a feature is still called converged after it was last observed. One that is looked for is mostly given up
 // before, see kUnobservedFramesBeforeLost; one that is shed is not.

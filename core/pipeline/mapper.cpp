@@ -594,7 +594,7 @@ void Mapper::follow_shard(int worker) noexcept {
   for (auto g = static_cast<std::size_t>(worker); g < groups_.size(); g += tallies_.size()) {
     FeatureGroup& group = groups_[g];
     for (std::size_t lane = 0; lane < group.slots().size(); ++lane) {
-      follow(group.slots()[lane], group.prediction(lane), job_, model_, settings_);
+      settle_match(group.slots()[lane], group.prediction(lane), job_, model_, settings_);
     }
   }
 }

@@ -47,7 +47,9 @@ class Mapper {
 
   void add_pose(const TrackerSample& sample) noexcept;
   // Before process(): what the respiration channel told until that capture, or later.
-  void follow_breath(const BreathSignal& signal, Instant capture) noexcept { respiration_.follow(signal, capture); }
+  void follow_breath(const BreathSignal& signal, Instant capture) noexcept {
+    respiration_.track_signal(signal, capture);
+  }
 
   // The tracker has told all about instant t that it will: no need to wait longer.
   [[nodiscard]] bool pose_reached(Instant t) const noexcept { return poses_.reached(t); }

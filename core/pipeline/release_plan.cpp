@@ -24,7 +24,7 @@ std::optional<Release> ReleasePlan::next() const noexcept {
   return Release{due_.frame_sequence, due_.capture, *grid, due_.frame_missing, ReleaseStream::kClock};
 }
 
-Release ReleasePlan::take() noexcept {
+Release ReleasePlan::take_release() noexcept {
   Release release = *next();
   if (release.stream == ReleaseStream::kFrame) {
     take_frame();
@@ -60,7 +60,7 @@ void ReleasePlan::leave_out_frame() noexcept {
 
 void ReleasePlan::take_frame() noexcept {
   any_due_ = true;
-  due_ = frames_.take();
+  due_ = frames_.take_release();
   if (!due_.frame_missing) owed_ = due_.frame_sequence;
 }
 

@@ -43,7 +43,7 @@ class ReleasePlan {
     return release.frame_missing || release.stream == ReleaseStream::kClock;
   }
   // Takes it off the plan. Requires next().
-  Release take() noexcept;
+  Release take_release() noexcept;
 
   // Nobody can use this release's surface any more.
   [[nodiscard]] bool stale(const Release& release, Instant now) const noexcept {

@@ -84,7 +84,7 @@ std::optional<Release> ReleaseSchedule::next() const noexcept {
   return Release{stamp.sequence, stamp.capture, stamp.capture + latency_, false};
 }
 
-Release ReleaseSchedule::take() noexcept {
+Release ReleaseSchedule::take_release() noexcept {
   const Release release = *next();
   if (!release.frame_missing) {
     ++tail_;

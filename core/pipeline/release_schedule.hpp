@@ -46,7 +46,7 @@ class ReleaseSchedule {
   [[nodiscard]] bool pending() const noexcept { return head_ != tail_; }
 
   // Takes the next release off the schedule. Requires next().
-  Release take() noexcept;
+  Release take_release() noexcept;
 
   [[nodiscard]] Duration period() const noexcept { return period_; }
 

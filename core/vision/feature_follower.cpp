@@ -110,7 +110,7 @@ NeighbourMotion::Around FeatureFollower::around(const Vector2d& px, const Follow
   return result;
 }
 
-void FeatureFollower::follow(const GreyImage& image) noexcept {
+void FeatureFollower::track_into(const GreyImage& image) noexcept {
   std::size_t sought = 0, found = 0;
   for (FollowedFeature& feature : features_) {
     feature.found = feature.is_overlay = feature.is_recalled = false;

@@ -96,7 +96,7 @@ class FeatureFollower {
   explicit FeatureFollower(const FollowerSettings& settings);
 
   // Finds every feature in the next frame, or notes that it is not there. Takes nothing from the heap.
-  void follow(const GreyImage& image) noexcept;
+  void track_into(const GreyImage& image) noexcept;
 
   // New candidates at these pixels of the image followed last. Those that make no good template are left out. Templates
   // that are renewed later are judged likewise.

@@ -132,7 +132,7 @@ void LiveRuntime::run_publisher() {
     // What is provisional waits for a frame that still comes and takes its place, or has a release before it.
     if (ReleasePlan::provisional(*next) && wakeup.wait_until(next->deadline - kComposing)) continue;
     sleep_until(next->deadline - kComposing);
-    const Release release = pipeline_.plan().take();
+    const Release release = pipeline_.plan().take_release();
     WireSurface& wire = wire_surfaces_[index_of(release.stream)];
     const SurfaceSample& surface = pipeline_.compose(release);
     const perimap_Surface& sample = wire.fill(surface, utc_minus_monotonic());

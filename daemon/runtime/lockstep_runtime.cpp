@@ -92,7 +92,7 @@ void LockstepRuntime::map_ready_frame() {
 }
 
 void LockstepRuntime::release() {
-  const Release release = pipeline_.plan().take();
+  const Release release = pipeline_.plan().take_release();
   WireSurface& wire = wire_surfaces_[index_of(release.stream)];
   const SurfaceSample& surface = pipeline_.compose(release);
   publication_.surface(wire.fill(surface, utc_minus_monotonic_));

@@ -107,7 +107,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   settings.maximum = 20;
   FeatureFollower follower(settings);
   follower.add(image, *corners, easy);
-  for (int i = 0; i < 3; ++i) follower.follow(image);
+  for (int i = 0; i < 3; ++i) follower.track_into(image);
   for (const int reduction : {1, 4}) {
     if (width >= 3 && !find_instruments({pixels.data(), width / 3, height, stride}, reduction * width, height)) {
       std::abort();

@@ -263,7 +263,7 @@ class Tracking {
   // Follows every feature in the frame and fills up their number every sixth of a second.
   Expected<void> take(const VideoFrame& frame, FrameSource& source) {
     const auto begin = std::chrono::steady_clock::now();
-    follower_.follow(frame.grey);
+    follower_.track_into(frame.grey);
     summary_.follow_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     const bool may_find =
         follower_.saw_anything() && (options_.no_new_features ? !has_found_ : summary_.frames % find_interval_ == 0);

@@ -237,7 +237,7 @@ TEST(ReleaseStreams, WhileTheMapperHangsTheModelSaysSoAsTheSurfacesDo) {
     hangs = true;
     for (auto next = pipeline.plan().next(); next && next->deadline <= now; next = pipeline.plan().next()) {
       const Instant deadline = next->deadline;
-      const SurfaceReason surface = pipeline.compose(pipeline.plan().take()).reason;
+      const SurfaceReason surface = pipeline.compose(pipeline.plan().take_release()).reason;
       if (surface != SurfaceReason::kUpdateLate) continue;
       EXPECT_EQ(model_reason(pipeline, deadline), SurfaceReason::kUpdateLate);
       ++late;

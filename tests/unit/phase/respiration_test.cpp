@@ -435,7 +435,7 @@ struct WithChannel : Tracking {
   bool lock_by_channel(RespiratoryTracker& tracker, double from_s) {
     for (now_s = from_s; tracker.clock().state != RespirationState::kLocked && now_s < from_s + 60.0; now_s += 1.0) {
       watch(tracker, patient, now_s, now_s + 1.0);
-      tracker.follow(channel.at(now_s + 1.0), at_s(now_s + 1.0));
+      tracker.track_signal(channel.at(now_s + 1.0), at_s(now_s + 1.0));
       tracker.search(at_s(now_s + 1.0));
     }
     return tracker.clock().state == RespirationState::kLocked;
@@ -464,7 +464,7 @@ TEST_F(WithChannel, AStoppedBreathIsLostWhenTheNextIsOverdueAndCountedAsBeforeWh
   channel.until_s = now_s;
   double lost_s = 0.0;
   for (; now_s < channel.until_s + 20.0; now_s += 1.0 / 30.0) {
-    tracker.follow(channel.at(now_s), at_s(now_s));
+    tracker.track_signal(channel.at(now_s), at_s(now_s));
     if (lost_s == 0.0 && tracker.clock().state == RespirationState::kSearching) lost_s = now_s;
   }
   EXPECT_GT(lost_s, 0.0);
@@ -498,7 +498,7 @@ TEST_F(WithChannel, WhereTheChannelIsGoneTheImagesCarryOn) {
   const BreathSignal last = channel.detector.signal();
   for (int i = 0; i < 300; ++i) {
     now_s += 1.0 / 30.0;
-    tracker.follow(last, at_s(now_s));
+    tracker.track_signal(last, at_s(now_s));
     tracker.add_phase(at_s(now_s), tracker.clock().at(at_s(now_s)).phase_rad, 0.05);
   }
   EXPECT_EQ(tracker.clock().state, RespirationState::kLocked);
@@ -509,7 +509,7 @@ TEST_F(WithChannel, WhereNobodyBreathesInTheChannelItTellsNothing) {
   RespiratoryTracker tracker(settings);
   channel.until_s = 0.0;
   for (now_s = 0.0; now_s < 30.0; now_s += 1.0) {
-    tracker.follow(channel.at(now_s), at_s(now_s));
+    tracker.track_signal(channel.at(now_s), at_s(now_s));
     tracker.search(at_s(now_s));
   }
   EXPECT_EQ(tracker.clock().state, RespirationState::kSearching);

@@ -59,7 +59,7 @@ struct Candidate : ::testing::Test {
     }
     shift += by;
     predict_and_find(slot, {}, job, model, settings);
-    follow(slot, {}, job, model, settings);
+    settle_match(slot, {}, job, model, settings);
   }
   void next_frame(const Vector2d& by) {
     const test::ImageBuffer image = view(shift + by);
@@ -116,7 +116,7 @@ TEST_F(Candidate, WithoutNeighboursIsBelievedWhereItsOwnMotionLeads) {
   motion.clear();
   shift += Vector2d(-18, 0);
   predict_and_find(slot, {}, job, model, settings);
-  follow(slot, {}, job, model, settings);
+  settle_match(slot, {}, job, model, settings);
   EXPECT_TRUE(is_found());
 }
 

@@ -36,18 +36,18 @@ TEST(Pipeline, CountsASurfaceOnceItIsSentSoThatNoCountIsEverLowered) {
   Pipeline pipeline(settings());
   const StreamCounters& counters = pipeline.counters().of(ReleaseStream::kFrame);
   for (std::uint64_t i = 0; i < 2; ++i) let_in(pipeline, i);
-  const SurfaceSample& unsent = pipeline.compose(pipeline.plan().take());
+  const SurfaceSample& unsent = pipeline.compose(pipeline.plan().take_release());
   EXPECT_TRUE(unsent.update_late) << "nobody maps";
   EXPECT_EQ(counters.samples.get(), 0U);
   EXPECT_EQ(counters.samples_from_late_update.get(), 0U);
   pipeline.take_back(unsent);
   EXPECT_EQ(counters.samples.get(), 0U);
   EXPECT_EQ(counters.releases_missed.get(), 1U);
-  pipeline.sent(pipeline.compose(pipeline.plan().take()));
+  pipeline.sent(pipeline.compose(pipeline.plan().take_release()));
   EXPECT_EQ(counters.samples.get(), 1U);
   EXPECT_EQ(counters.samples_from_late_update.get(), 1U);
   EXPECT_EQ(counters.samples_without_frame.get(), 0U);
-  const SurfaceSample& without_frame = pipeline.compose(pipeline.plan().take());
+  const SurfaceSample& without_frame = pipeline.compose(pipeline.plan().take_release());
   ASSERT_TRUE(without_frame.release.frame_missing);
   pipeline.sent(without_frame);
   EXPECT_EQ(counters.samples_without_frame.get(), 1U);
@@ -83,7 +83,7 @@ TEST(Pipeline, WhatIsOwedByNowDoesNotWaitForTheClocksNextRelease) {
   EXPECT_EQ(owed_at(first + 30 * kPeriod), 9U) << "those that have not come are owed by nobody";
   // Of a publisher that was held up: the release at 2 s tells what was due by then.
   EXPECT_EQ(owed_at(first + milliseconds(1500)), 9U);
-  const Release release = pipeline.plan().take();
+  const Release release = pipeline.plan().take_release();
   EXPECT_EQ(release.deadline, Instant(milliseconds(2000)));
   EXPECT_EQ(release.capture, first + 31 * kPeriod);
 }

@@ -18,7 +18,7 @@ using test::kLatency;
 std::vector<Release> run(ReleasePlan& plan, int frames, int until_ms) {
   std::vector<Release> taken;
   const auto take_until = [&](Instant t) {
-    for (auto next = plan.next(); next && next->deadline <= t; next = plan.next()) taken.push_back(plan.take());
+    for (auto next = plan.next(); next && next->deadline <= t; next = plan.next()) taken.push_back(plan.take_release());
   };
   for (int i = 0; i < frames; ++i) {
     take_until(at_ms(30 * i + 12));
@@ -75,7 +75,7 @@ TEST(ReleasePlan, WhenFramesStopTheClockGoesOnAndSaysSo) {
   ReleasePlan plan({kLatency, false, milliseconds(10)});
   run(plan, 10, 30 * 9 + 50);
   for (int ms = 330; ms < 400; ms += 10) {
-    const Release release = plan.take();
+    const Release release = plan.take_release();
     EXPECT_EQ(release.deadline, at_ms(ms));
     EXPECT_EQ(release.frame_missing, ms >= 350) << ms << ": the next would have been due at 350";
   }
@@ -122,7 +122,7 @@ TEST(ReleasePlan, ReleasesThatAnotherHasCaughtUpWithAreLeftOutAndCounted) {
   EXPECT_EQ(left_out(340), 0U) << "counted once";
   EXPECT_EQ(plan.next()->deadline, at_ms(340));
   EXPECT_EQ(left_out(395), 5U);
-  EXPECT_EQ(plan.take().deadline, at_ms(390)) << "on the grid as before";
+  EXPECT_EQ(plan.take_release().deadline, at_ms(390)) << "on the grid as before";
 }
 
 // Ten frames in time, then the publisher is held up: what arrives until `now_ms` is told of at that instant, at once.
@@ -139,7 +139,7 @@ TEST(ReleasePlan, FramesThatArrivedWhileThePublisherWasHeldUpAreReleasedAsTheFra
   ReleasePlan plan = held_up({kLatency, true, Duration(0), milliseconds(200)}, 470);
   EXPECT_EQ(plan.leave_out_missed(at_ms(470)), MissedReleases{});
   for (std::uint64_t i = 10; i <= 15; ++i) {
-    const Release release = plan.take();
+    const Release release = plan.take_release();
     EXPECT_FALSE(release.frame_missing) << i;
     EXPECT_EQ(release.frame_sequence, i);
   }
@@ -149,7 +149,7 @@ TEST(ReleasePlan, TheClockTellsOfTheFramesThatArrivedWhileThePublisherWasHeldUp)
   for (const int now_ms : {470, 5000}) {
     ReleasePlan plan = held_up({kLatency, false, milliseconds(10), milliseconds(200)}, now_ms);
     EXPECT_GT(plan.leave_out_missed(at_ms(now_ms))[index_of(ReleaseStream::kClock)], 0U);
-    const Release release = plan.take();
+    const Release release = plan.take_release();
     EXPECT_FALSE(release.frame_missing);
     EXPECT_EQ(release.frame_sequence, static_cast<std::uint64_t>((release.deadline - at_ms(50)) / milliseconds(30)));
   }
@@ -162,7 +162,7 @@ TEST(ReleasePlan, FramesReleasesThatNobodyCanUseAnyMoreAreLeftOutAndCounted) {
   EXPECT_EQ(left_out, (10'070 - 350) / 30U);
   EXPECT_EQ(plan.leave_out_missed(at_ms(10'270)), MissedReleases{}) << "counted once";
   int sent = 0;
-  for (; plan.next()->deadline <= at_ms(10'270); ++sent) EXPECT_FALSE(plan.take().frame_missing);
+  for (; plan.next()->deadline <= at_ms(10'270); ++sent) EXPECT_FALSE(plan.take_release().frame_missing);
   EXPECT_EQ(sent, 7);
 }
 
@@ -181,7 +181,7 @@ TEST(ReleasePlan, NoMoreReleasesThanAReaderKeepsFollowOneUponTheOther) {
   EXPECT_GT(plan.leave_out_missed(at_ms(2000))[index_of(ReleaseStream::kFrame)], 40U);
   int sent = 0;
   while (plan.next()->deadline <= at_ms(2000)) {
-    plan.take();
+    plan.take_release();
     ++sent;
   }
   EXPECT_EQ(sent, ReleasePlan::kMostTogether);
@@ -193,18 +193,18 @@ TEST(ReleasePlan, AfterARestartTheClockBeginsWithTheNextReleaseThatIsExpected) {
   const auto next = plan.next();
   ASSERT_TRUE(next);
   EXPECT_EQ(next->deadline, at_ms(110)) << "30 ms after the release at 80";
-  EXPECT_TRUE(plan.take().frame_missing);
+  EXPECT_TRUE(plan.take_release().frame_missing);
 }
 
 TEST(ReleasePlan, AfterARestartNoReleaseHasANumberUntilAFrameHasOne) {
   ReleasePlan plan({kLatency, true, milliseconds(10)});
   plan.resume(at_ms(0), milliseconds(30), at_ms(105));
-  for (int i = 0; i < 8; ++i) EXPECT_EQ(plan.take().frame_sequence, 0U);
-  while (plan.next()->deadline < at_ms(190)) static_cast<void>(plan.take());
+  for (int i = 0; i < 8; ++i) EXPECT_EQ(plan.take_release().frame_sequence, 0U);
+  while (plan.next()->deadline < at_ms(190)) static_cast<void>(plan.take_release());
   ASSERT_TRUE(plan.on_frame(frame(3, 180), at_ms(192)));
   std::vector<std::uint64_t> of_frames;
   while (of_frames.size() < 3) {
-    const Release release = plan.take();
+    const Release release = plan.take_release();
     if (release.stream == ReleaseStream::kFrame) of_frames.push_back(release.frame_sequence);
   }
   EXPECT_EQ(of_frames, (std::vector<std::uint64_t>{0, 3, 4})) << "that at 150, the frame, and one that is missing";

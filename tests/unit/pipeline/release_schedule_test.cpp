@@ -17,7 +17,7 @@ ReleaseSchedule running(int n) {
   ReleaseSchedule schedule(kLatency);
   for (int i = 0; i < n; ++i) {
     EXPECT_TRUE(schedule.on_frame(frame(static_cast<std::uint64_t>(i), 30 * i)));
-    const Release release = schedule.take();
+    const Release release = schedule.take_release();
     EXPECT_FALSE(release.frame_missing);
     EXPECT_EQ(release.deadline, at_ms(30 * i + 50));
   }
@@ -31,7 +31,7 @@ TEST(ReleaseSchedule, ReleasesEachFrameAtCapturePlusLatency) { running(10); }
 TEST(ReleaseSchedule, AJitteringFrameIsReleasedAtItsOwnTime) {
   ReleaseSchedule schedule = running(10);
   ASSERT_TRUE(schedule.on_frame(frame(10, 303)));
-  const Release release = schedule.take();
+  const Release release = schedule.take_release();
   EXPECT_FALSE(release.frame_missing);
   EXPECT_EQ(release.deadline, at_ms(353));
 }
@@ -39,7 +39,7 @@ TEST(ReleaseSchedule, AJitteringFrameIsReleasedAtItsOwnTime) {
 TEST(ReleaseSchedule, GoesOnAtTheFittedTimesWhenFramesStop) {
   ReleaseSchedule schedule = running(10);
   for (int k = 0; k < 5; ++k) {
-    const Release release = schedule.take();
+    const Release release = schedule.take_release();
     EXPECT_TRUE(release.frame_missing);
     EXPECT_EQ(release.frame_sequence, static_cast<std::uint64_t>(10 + k));
     EXPECT_EQ(release.deadline, at_ms(300 + 30 * k + 50));
@@ -49,10 +49,10 @@ TEST(ReleaseSchedule, GoesOnAtTheFittedTimesWhenFramesStop) {
 TEST(ReleaseSchedule, ADroppedFrameStillGetsItsRelease) {
   ReleaseSchedule schedule = running(10);
   ASSERT_TRUE(schedule.on_frame(frame(11, 330)));
-  const Release missing = schedule.take();
+  const Release missing = schedule.take_release();
   EXPECT_TRUE(missing.frame_missing);
   EXPECT_EQ(missing.deadline, at_ms(350));
-  const Release next = schedule.take();
+  const Release next = schedule.take_release();
   EXPECT_FALSE(next.frame_missing);
   EXPECT_EQ(next.frame_sequence, 11U);
 }
@@ -70,7 +70,7 @@ TEST(ReleaseSchedule, HoldsAsManyFramesAsAreUnderwayWithALongLatency) {
   for (int i = 0; i < 600; ++i) {
     const Instant capture = at_ms(0) + i * period;
     while (schedule.next() && schedule.next()->deadline <= capture + milliseconds(12)) {
-      EXPECT_FALSE(schedule.take().frame_missing) << i;
+      EXPECT_FALSE(schedule.take_release().frame_missing) << i;
     }
     ASSERT_TRUE(schedule.on_frame({static_cast<std::uint64_t>(i), capture, capture + milliseconds(12)})) << i;
   }
@@ -78,10 +78,10 @@ TEST(ReleaseSchedule, HoldsAsManyFramesAsAreUnderwayWithALongLatency) {
 
 TEST(ReleaseSchedule, RefusesAFrameWhoseReleaseWasTakenAsMissing) {
   ReleaseSchedule schedule = running(10);
-  EXPECT_TRUE(schedule.take().frame_missing);
+  EXPECT_TRUE(schedule.take_release().frame_missing);
   EXPECT_FALSE(schedule.on_frame(frame(10, 300)));
   ASSERT_TRUE(schedule.on_frame(frame(11, 330)));
-  EXPECT_EQ(schedule.take().frame_sequence, 11U);
+  EXPECT_EQ(schedule.take_release().frame_sequence, 11U);
 }
 
 TEST(ReleaseSchedule, RefusesAFrameThatGoesBackInTime) {
@@ -91,9 +91,9 @@ TEST(ReleaseSchedule, RefusesAFrameThatGoesBackInTime) {
 
 TEST(ReleaseSchedule, ResumesWithRealFramesAfterAStop) {
   ReleaseSchedule schedule = running(10);
-  for (int k = 0; k < 7; ++k) EXPECT_TRUE(schedule.take().frame_missing);
+  for (int k = 0; k < 7; ++k) EXPECT_TRUE(schedule.take_release().frame_missing);
   ASSERT_TRUE(schedule.on_frame(frame(17, 508)));
-  const Release release = schedule.take();
+  const Release release = schedule.take_release();
   EXPECT_FALSE(release.frame_missing);
   EXPECT_EQ(release.deadline, at_ms(558));
 }
@@ -102,9 +102,9 @@ TEST(ReleaseSchedule, AFrameBehindAMissingOneIsStillPending) {
   ReleaseSchedule schedule = running(10);
   ASSERT_TRUE(schedule.on_frame(frame(11, 330)));
   EXPECT_TRUE(schedule.pending());
-  EXPECT_TRUE(schedule.take().frame_missing);
+  EXPECT_TRUE(schedule.take_release().frame_missing);
   EXPECT_TRUE(schedule.pending());
-  EXPECT_EQ(schedule.take().frame_sequence, 11U);
+  EXPECT_EQ(schedule.take_release().frame_sequence, 11U);
   EXPECT_FALSE(schedule.pending());
 }
 
@@ -112,16 +112,16 @@ TEST(ReleaseSchedule, AFrameBehindAMissingOneIsStillPending) {
 TEST(ReleaseSchedule, AfterAnOutageEveryFrameIsReleasedThoughTheNumbersHaveNoGap) {
   ReleaseSchedule schedule = running(10);
   const auto take_until = [&](Instant t) {
-    while (schedule.next()->deadline <= t) EXPECT_TRUE(schedule.take().frame_missing);
+    while (schedule.next()->deadline <= t) EXPECT_TRUE(schedule.take_release().frame_missing);
   };
   for (int i = 0; i < 60; ++i) {
     const int capture_ms = 5277 + 30 * i;
     if (i == 0) take_until(at_ms(capture_ms + 12));
     ASSERT_TRUE(schedule.on_frame(frame(static_cast<std::uint64_t>(10 + i), capture_ms))) << i;
     EXPECT_EQ(schedule.period(), milliseconds(30));
-    Release release = schedule.take();
+    Release release = schedule.take_release();
     // Up to the first one what is released may still be the last of the outage.
-    while (i == 0 && release.frame_missing) release = schedule.take();
+    while (i == 0 && release.frame_missing) release = schedule.take_release();
     EXPECT_FALSE(release.frame_missing) << i;
     EXPECT_EQ(release.deadline, at_ms(capture_ms + 50));
   }
@@ -132,7 +132,7 @@ TEST(ReleaseSchedule, AnOutageAfterTheVeryFirstFrameIsNotTakenForThePeriodForLon
   for (int i = 0; i < 20; ++i) {
     const int capture_ms = 5000 + 30 * i;
     ASSERT_TRUE(schedule.on_frame(frame(static_cast<std::uint64_t>(1 + i), capture_ms))) << i;
-    EXPECT_EQ(schedule.take().deadline, at_ms(capture_ms + 50));
+    EXPECT_EQ(schedule.take_release().deadline, at_ms(capture_ms + 50));
   }
   EXPECT_EQ(schedule.period(), milliseconds(30));
 }
@@ -144,7 +144,8 @@ TEST(ReleaseSchedule, FollowsAnotherFrameRateWithinSomeFramesAndRefusesNone) {
     for (int i = 1; i <= 30; ++i) {
       const int capture_ms = 270 + period_ms * i;
       ASSERT_TRUE(schedule.on_frame(frame(static_cast<std::uint64_t>(9 + i), capture_ms))) << i;
-      while (schedule.next()->deadline <= at_ms(capture_ms + 50)) missing += schedule.take().frame_missing ? 1 : 0;
+      while (schedule.next()->deadline <= at_ms(capture_ms + 50))
+        missing += schedule.take_release().frame_missing ? 1 : 0;
     }
     EXPECT_EQ(schedule.period(), milliseconds(period_ms));
     EXPECT_LE(missing, 8);
@@ -156,7 +157,7 @@ TEST(ReleaseSchedule, FitsThePeriodThroughJitter) {
   for (int i = 0; i < 200; ++i) {
     const int capture_ms = 30 * i + (i % 3) * 2;
     ASSERT_TRUE(schedule.on_frame(frame(static_cast<std::uint64_t>(i), capture_ms)));
-    EXPECT_FALSE(schedule.take().frame_missing);
+    EXPECT_FALSE(schedule.take_release().frame_missing);
   }
   EXPECT_NEAR(to_seconds(schedule.period()), 0.030, 0.001);
 }

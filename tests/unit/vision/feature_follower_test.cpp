@@ -65,7 +65,7 @@ class FeatureFollowerTest : public testing::Test {
   }
 
   void follow() {
-    follower_.follow(image_.view());
+    follower_.track_into(image_.view());
     note_places();
   }
 
@@ -172,7 +172,7 @@ TEST_F(FeatureFollowerTest, FillsUpAtOnceAfterACutAndKeepsNothingOfTheScenesBefo
   for (const FollowedFeature& feature : follower_.features()) before.insert(feature.id);
   for (int k = 1; k <= 20; ++k) {
     image_ = render(Texture(8), view_at({2.0 * k, 0}), kWidth, kHeight, 1, random_, 5);
-    follower_.follow(image_.view());
+    follower_.track_into(image_.view());
     for (const FollowedFeature& feature : follower_.features()) {
       EXPECT_FALSE(feature.found && before.contains(feature.id)) << feature.id << " in frame " << k;
     }
@@ -205,7 +205,7 @@ TEST_F(FeatureFollowerTest, FindsItsFeaturesAgainAfterABlackoutInWhichTheCameraM
   for (int k = 0; k < 60; ++k) {
     image_ = ImageBuffer(kWidth, kHeight);
     for (std::uint8_t& pixel : image_.pixels) pixel = static_cast<std::uint8_t>(random_() % 4);
-    follower_.follow(image_.view());
+    follower_.track_into(image_.view());
     for (const FollowedFeature& feature : follower_.features()) EXPECT_FALSE(feature.found);
   }
   for (int k = 0; k < 3; ++k) {
@@ -236,7 +236,7 @@ TEST_F(FeatureFollowerTest, LetsGoOfWhatIsLaidOverThePictureAndTakesItNoMore) {
     image_ =
         render(Texture(3), view_at({25 * std::sin(0.08 * k), 10 * std::sin(0.06 * k)}), kWidth, kHeight, 1, random_, 5);
     lay_sign_over(image_, kLeft, kTop);
-    follower_.follow(image_.view());
+    follower_.track_into(image_.view());
     if (k % 5 == 0) find();
     for (const FollowedFeature& feature : follower_.features()) {
       if (!feature.found || !on_sign(feature.px)) continue;
@@ -263,7 +263,7 @@ TEST_F(FeatureFollowerTest, KeepsTissueThatStandsStillBesideABeatingPart) {
     for (int v = 0; v < kHeight; ++v) {
       std::copy_n(rest.pixels.begin() + v * rest.stride, kWidth / 2, image_.pixels.begin() + v * image_.stride);
     }
-    follower_.follow(image_.view());
+    follower_.track_into(image_.view());
     if (k == 0) find();
     if (k == 10) {
       for (const FollowedFeature& feature : follower_.features()) {
@@ -291,9 +291,9 @@ TEST_F(FeatureFollowerTest, TakesNothingFromTheHeapToFollow) {
     if (k == 0) find();
   }
   const long before = test::allocations;
-  for (const ImageBuffer& frame : frames) follower_.follow(frame.view());
+  for (const ImageBuffer& frame : frames) follower_.track_into(frame.view());
   for (const ImageBuffer* frame : std::initializer_list<const ImageBuffer*>{&cut, &black, &frames.back()})
-    follower_.follow(frame->view());
+    follower_.track_into(frame->view());
   EXPECT_EQ(test::allocations, before);
 }
 
