@@ -45,7 +45,8 @@ std::string symbol_of(std::string_view field) {
 
 }  // namespace
 
-Expected<BeatTable> parse_beat_table(std::string_view text, const std::string& name) {
+Expected<BeatTable> parse_beat_table(std::string_view written, const std::string& name) {
+  const std::string text = with_commas(written);
   BeatTable table;
   CsvCursor rows(name, text);
   bool first = true;
@@ -64,7 +65,7 @@ Expected<BeatTable> parse_beat_table(std::string_view text, const std::string& n
     const auto time = to_number(fields[0]);
     if (!time) return rows.wrong("expected a number", fields[0]);
     beat.time_s = *time;
-    if (!(std::abs(beat.time_s) < 1e8)) return rows.wrong("the time is out of bounds");
+    if (!(std::abs(beat.time_s) < 4e9)) return rows.wrong("the time is out of bounds");
     if (has_heading) {
       if (symbols && *symbols < fields.size()) beat.symbol = symbol_of(fields[*symbols]);
     } else if (fields.size() > 1 && !to_number(fields[1])) {

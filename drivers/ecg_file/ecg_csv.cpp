@@ -14,7 +14,7 @@
 namespace perimap {
 namespace {
 
-constexpr double kLatest_s = 1e8;  // three years; keeps instants within what nanoseconds can count
+constexpr double kLatest_s = 4e9;  // the year 2096 in Unix time; keeps instants within what nanoseconds can count
 constexpr double kLargest_mV = 1e6;
 
 bool is_seconds(std::string_view unit) {
@@ -72,13 +72,18 @@ Expected<bool> has_units(const CsvCursor& rows, const Layout& layout) {
 
 }  // namespace
 
-Expected<EcgTrace> parse_ecg_csv(std::string_view text, const std::string& name, const EcgCsvOptions& options) {
+Expected<EcgTrace> parse_ecg_csv(std::string_view written, const std::string& name, const EcgCsvOptions& options) {
   if (options.rate_hz && !(*options.rate_hz > 0.0)) return fail(name + ": the sample rate must be above 0");
   if (options.column && *options.column < 1) return fail(name + ": columns are counted from 1");
+  if (written.starts_with("\xFF\xFE") || written.starts_with("\xFE\xFF")) {
+    return fail(name + ": is written in UTF-16; save it as UTF-8");
+  }
+  const std::string text = with_commas(written);
   EcgTrace trace;
   CsvCursor rows(name, text);
   std::optional<Layout> layout;
   bool after_heading = false;
+  bool first_row = true;
   while (rows.next_line()) {
     if (rows.rest_of_line().front() == '#') continue;
     if (!layout) {
@@ -93,13 +98,23 @@ Expected<EcgTrace> parse_ecg_csv(std::string_view text, const std::string& name,
       if (!units) return tl::unexpected(units.error());
       if (*units) continue;
     }
+    if (std::exchange(first_row, false) && layout->heading &&
+        fields_of(rows.rest_of_line()).size() == 2 * layout->columns && layout->columns > 1) {
+      return rows.wrong(
+          "twice as many fields as the heading has: are commas the decimal signs as well? Separate the fields by "
+          "semicolons or tabs",
+          rows.rest_of_line());
+    }
     double time_s = 0.0;
     if (layout->timed) {
       const std::string_view field = rows.field();
       const auto value = to_number(field);
       if (!value) return rows.wrong("expected a number", field);
       time_s = *value;
-      if (!(std::abs(time_s) < kLatest_s)) return rows.wrong("the time is out of bounds");
+      if (!(std::abs(time_s) < kLatest_s)) {
+        return rows.wrong("the time is out of bounds: seconds are expected, as Unix times too; is it in milliseconds?",
+                          field);
+      }
       if (!trace.time_s.empty() && time_s <= trace.time_s.back()) return rows.wrong("the times do not ascend");
     } else {
       time_s = static_cast<double>(trace.time_s.size()) / *options.rate_hz;
@@ -112,7 +127,7 @@ Expected<EcgTrace> parse_ecg_csv(std::string_view text, const std::string& name,
     }
     const std::string_view field = rows.field();
     double mV = std::numeric_limits<double>::quiet_NaN();
-    if (!bare(field).empty()) {
+    if (!is_nothing(field)) {
       const auto value = to_number(field);
       if (!value) return rows.wrong("expected a number", field);
       mV = *value * options.gain;

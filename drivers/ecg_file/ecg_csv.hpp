@@ -16,11 +16,12 @@ struct EcgCsvOptions {
   double gain = 1.0;              // mV a unit of that column
 };
 
-// Fields are separated by commas and may be quoted; empty lines and lines that begin with # are passed over. The first
-// line may be a heading, with units below it. Without a rate the first column holds the times in seconds. With one, a
-// heading whose first name is a time (`is_time_name`) says that there are times to pass over; several columns without
-// such a heading are an error unless `column` tells which is meant. An empty field or `nan` is a sample without value.
-// Errors: "NAME:LINE:COLUMN: what is wrong".
+// Fields are separated by commas, semicolons, tabs or spaces, with decimal commas beside semicolons and tabs, and may
+// be quoted; empty lines and lines that begin with # are passed over. The first line may be a heading, with units below
+// it. Without a rate the first column holds the times in seconds. With one, a heading whose first name is a time
+// (`is_time_name`) says that there are times to pass over; several columns without such a heading are an error unless
+// `column` tells which is meant. An empty field, `nan`, `NA` and the like are a sample without value. Times may count
+// from 1970. Errors: "NAME:LINE:COLUMN: what is wrong".
 [[nodiscard]] Expected<EcgTrace> parse_ecg_csv(std::string_view text, const std::string& name,
                                                const EcgCsvOptions& options);
 

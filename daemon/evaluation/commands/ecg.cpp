@@ -13,7 +13,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -36,6 +35,7 @@ namespace perimap {
 namespace {
 
 constexpr std::size_t kLargestTable = std::size_t{1} << 32;
+constexpr double kReferenceEndsEarly_s = 5.0;            // longer than hearts pause
 constexpr std::size_t kLongWithoutProgress = 1'000'000;  // samples
 
 struct Options {
@@ -44,6 +44,7 @@ struct Options {
   std::string reference;
   std::optional<double> rate_hz;
   std::optional<int> column;
+  std::string signal;
   double gain = 1.0;
   bool json = false;
 };
@@ -57,7 +58,8 @@ Expected<std::string> read_whole(const std::string& file, std::string_view what)
 
 struct Input {
   EcgTrace trace;
-  std::vector<Error> damage;  // what of the file could not be read
+  std::vector<Error> damage;                          // what of the file could not be read
+  std::optional<std::pair<int, std::string>> signal;  // of a record, that was read: from 1, as its header calls it
 };
 
 // The ECG channel of a recording; samples while the lead was off have no value. What is whole of a damaged one is
@@ -132,25 +134,26 @@ std::string misuse(const Options& options) {
   if (path.extension() == ".mcap" && (options.rate_hz || options.column))
     return "a recording knows its rate and channel: leave out --rate and --column";
   if (is_wfdb(path) && options.rate_hz) return "a WFDB record knows its rate: leave out --rate";
+  if (!is_wfdb(path) && !options.signal.empty()) return "--signal chooses of a WFDB record; a table has --column";
+  if (options.column && !options.signal.empty()) return "--signal and --column say the same: leave out one";
   return overwritten(options);
 }
 
 Expected<Input> read_input(const Options& options) {
   const std::filesystem::path path(options.input);
   if (path.extension() == ".mcap") return read_recorded(options.input, options.gain);
-  Expected<EcgTrace> trace;
   if (is_wfdb(path)) {
-    trace = read_wfdb(wfdb_header(path), options.column.value_or(1));
-    if (trace) {
-      for (float& mV : trace->mV) mV *= static_cast<float>(options.gain);
-    }
-  } else {
-    const auto text = read_whole(options.input, "ECG table");
-    if (!text) return tl::unexpected(text.error());
-    trace = parse_ecg_csv(*text, options.input, {options.rate_hz, options.column, options.gain});
+    const std::string wanted = options.column ? std::to_string(*options.column) : options.signal;
+    auto record = read_wfdb(wfdb_header(path), wanted);
+    if (!record) return tl::unexpected(record.error());
+    for (float& mV : record->trace.mV) mV *= static_cast<float>(options.gain);
+    return Input{std::move(record->trace), {}, std::pair(record->signal, std::move(record->description))};
   }
+  const auto text = read_whole(options.input, "ECG table");
+  if (!text) return tl::unexpected(text.error());
+  auto trace = parse_ecg_csv(*text, options.input, {options.rate_hz, options.column, options.gain});
   if (!trace) return tl::unexpected(trace.error());
-  return Input{*std::move(trace), {}};
+  return Input{*std::move(trace), {}, {}};
 }
 
 std::string_view name_of(BeatClass beat_class) {
@@ -338,6 +341,16 @@ Expected<void> run(const Options& options) {
                options.input, trace.time_s.back());
   }
 
+  const double ends_s = trace.time_s.back();
+  const bool reference_ends_early =
+      !reference.beats.empty() && reference.beats.back().time_s < ends_s - kReferenceEndsEarly_s;
+  if (reference_ends_early) {
+    fmt::print(
+        stderr,
+        "perimap ecg: {}: its last beat is at {:.1f} s, the ECG ends at {:.1f} s: beats found in between count as "
+        "false\n",
+        options.reference, reference.beats.back().time_s, ends_s);
+  }
   std::optional<Progress> progress;
   if (trace.mV.size() > kLongWithoutProgress) progress.emplace("samples", trace.mV.size());
   bool stopped = false;
@@ -361,9 +374,12 @@ Expected<void> run(const Options& options) {
     json["input"] = options.input;
     json["input_damage"] = nlohmann::json::array();
     for (const Error& damage : input->damage) json["input_damage"].push_back(damage.message);
+    if (input->signal) json["signal"] = {{"number", input->signal->first}, {"name", input->signal->second}};
     if (score) json["score"] = to_json(*score, reference.left_out);
+    if (!reference.beats.empty()) json["reference_ends_s"] = reference.beats.back().time_s;
     fmt::print("{}\n", json.dump(2));
   } else {
+    if (input->signal) fmt::print("signal      {} of the record: {}\n", input->signal->first, input->signal->second);
     fmt::print("{}", to_text(analysis, errors));
     if (score) fmt::print("{}", to_text(*score, reference.left_out));
   }
@@ -379,7 +395,8 @@ void add_ecg_command(CLI::App& app, int& exit_code) {
   command
       ->add_option("INPUT", options->input,
                    "A table of time_s,mV a line or of values alone with --rate (CSV), a WFDB record (.hea, .dat or its "
-                   "name, formats 212 and 16), or a recording (.mcap); of a damaged recording what is whole, and it "
+                   "name, formats 16, 24, 32, 61, 80 and 212), or a recording (.mcap); of a damaged recording what is "
+                   "whole, and it "
                    "is said what is not")
       ->required();
   command->add_option("--beats", options->beats,
@@ -393,9 +410,13 @@ void add_ecg_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1.0, 100000.0));
   command
       ->add_option("--column", options->column,
-                   "Column of the table, or signal of the WFDB record, that holds the ECG, from 1 [2 beside times, "
-                   "1 of a record or of values alone; several columns without times need it]")
+                   "Column of the table that holds the ECG, from 1 [2 beside times, 1 of values alone; several "
+                   "columns without times need it]; of a WFDB record the number of its signal, as --signal")
       ->check(CLI::Range(1, 10000));
+  command->add_option(
+      "--signal", options->signal,
+      "Signal of a WFDB record, by its name in the header or its number from 1 [the first that is named "
+      "as a lead of an ECG is]");
   command->add_option("--gain", options->gain, "mV a unit of the input; the beats do not depend on it [1]");
   command->add_option("--reference", options->reference,
                       "Score against these beats: a table of time_s, or with a kind in a column that the heading calls "

@@ -54,7 +54,7 @@ TEST(EcgCsv, NamesLineAndColumnOfWhatIsWrong) {
   EXPECT_NE(error_of("1\n2\n").find("say --rate"), std::string::npos);
   EXPECT_NE(error_of("0,1\n", {.rate_hz = {}, .column = 5, .gain = 1.0}).find("there is no column 5"),
             std::string::npos);
-  for (const char* garbled : {"nan,1\n", "inf,1\n", "1e99,1\n", "0,1e99\n", "0,inf\n", "0;1\n", "\x01\x02,\n1\n"}) {
+  for (const char* garbled : {"nan,1\n", "inf,1\n", "1e99,1\n", "0,1e99\n", "0,inf\n", "\x01\x02,\n1\n"}) {
     const std::string message = error_of(garbled);
     EXPECT_FALSE(message.empty()) << garbled;
     EXPECT_EQ(message.find('\n'), std::string::npos);
@@ -196,14 +196,14 @@ TEST(BeatTable, NamesLineAndColumnOfWhatIsWrong) {
   EXPECT_EQ(beat_error_of("1,+\n0.5,N\n"), "r.csv:2:1: the beats do not ascend");
   EXPECT_EQ(beat_error_of("sample,symbol\n1,N\n"), "r.csv:1:1: expected a number, found 'sample'");
   EXPECT_EQ(beat_error_of("time_s\ntime_s\n"), "r.csv:2:1: expected a number, found 'time_s'");
-  EXPECT_EQ(beat_error_of("1;N\n"), "r.csv:1:1: expected a number, found '1;N'");
+  EXPECT_EQ(beat_error_of("1:N\n"), "r.csv:1:1: expected a number, found '1:N'");
   EXPECT_EQ(beat_error_of("1,N\n,N\n"), "r.csv:2:1: expected a number");
   for (const char* garbled : {"nan,N\n", "inf\n", "-1e99,N\n"}) {
     EXPECT_EQ(beat_error_of(garbled), "r.csv:1:1: the time is out of bounds") << garbled;
   }
 }
 
-constexpr const char* kHeader = "x 2 360 3\nx.dat 212 200 11 1024 995 2 0 MLII\nx.dat 212 200 11 1024 1011 0 0 V5\n";
+constexpr const char* kHeader = "x 2 360 3\nx.dat 212 200 11 1024 995 2 0 MLII\nx.dat 212 200 11 1024 1011 1 0 V5\n";
 
 TEST(Wfdb, ReadsFormat212) {
   const auto header = parse_wfdb_header(kHeader, "x.hea");
@@ -247,17 +247,135 @@ TEST(Wfdb, RefusesGarbledHeaders) {
                            "x 1 360 -3\n",
                            "x 2 360\nx.dat 212\n",
                            "x 1 360\nx.dat\n",
-                           "x 1 360\nx.dat 80\n",
-                           "x 1 360\nx.dat 212x4\n",
+                           "x 1 360\nx.dat 212x0\n",
+                           "x 1 360\nx.dat 212x\n",
+                           "x 1 360\nx.dat 212:\n",
+                           "x 1 360\nx.dat 212+\n",
+                           "x 1 360\nx.dat 212y4\n",
+                           "x 1 360\nx.dat ECG\n",
+                           "x/1 1 360\nx_1 650000\n",
                            "x 1 360\nx.dat 212 inf\n",
                            "x 1 360\nx.dat 212 200(\n",
-                           "x 1 360\nx.dat 212 200/mmHg\n",
+                           "x 1 360\nx.dat 212 200mmHg\n",
                            "x 1 360\nx.dat 212 200 11 zero\n",
                            "x 1 360\nx.dat 212 200 11 0 0 sum\n"}) {
     const auto header = parse_wfdb_header(text, "x.hea");
     ASSERT_FALSE(header) << text;
     EXPECT_EQ(header.error().message.rfind("x.hea", 0), 0U) << header.error().message;
   }
+}
+
+// The same three samples in each format.
+TEST(Wfdb, ReadsFormatsOfOneToFourBytes) {
+  const std::vector<std::pair<std::string, std::vector<std::uint8_t>>> written{
+      {"80", {0x7F, 0xE4, 0x00}},
+      {"16", {0xFF, 0xFF, 0x64, 0x00, 0x00, 0x80}},
+      {"61", {0xFF, 0xFF, 0x00, 0x64, 0x80, 0x00}},
+      {"24", {0xFF, 0xFF, 0xFF, 0x64, 0x00, 0x00, 0x00, 0x00, 0x80}},
+      {"32", {0xFF, 0xFF, 0xFF, 0xFF, 0x64, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x80}}};
+  for (const auto& [format, bytes] : written) {
+    const auto header = parse_wfdb_header("y 1 500\ny.dat " + format + " 100/mV\n", "y.hea");
+    ASSERT_TRUE(header) << header.error().message;
+    const auto trace = decode_wfdb_signal(*header, 0, bytes, "y.dat");
+    ASSERT_TRUE(trace) << trace.error().message;
+    ASSERT_EQ(trace->mV.size(), 3U) << format;
+    EXPECT_FLOAT_EQ(trace->mV[0], -0.01F) << format;
+    EXPECT_FLOAT_EQ(trace->mV[1], 1.0F) << format;
+    EXPECT_TRUE(std::isnan(trace->mV[2])) << format;
+  }
+  const auto other = parse_wfdb_header("y 1 500\ny.dat 310\n", "y.hea");
+  ASSERT_TRUE(other);
+  EXPECT_EQ(decode_wfdb_signal(*other, 0, {}, "y.dat").error().message,
+            "y.dat: signal 1 is of format 310; 16, 24, 32, 61, 80 and 212 are read");
+}
+
+// Two samples a frame of the first signal, one of the second; the third is a frame late.
+TEST(Wfdb, ReadsSeveralSamplesAFrameAndASkew) {
+  const auto header = parse_wfdb_header(
+      "z 3 100 2\nz.dat 80x2 1/mV 8 0 0 0 0 II\nz.dat 80 1/mmHg 8 0 0 0 0 ABP\nz.dat 80:1 1/mV 8 0 0 0 0 V5\n",
+      "z.hea");
+  ASSERT_TRUE(header) << header.error().message;
+  const std::vector<std::uint8_t> bytes{129, 130, 131, 132, 133, 134, 135, 136};
+  const auto fast = decode_wfdb_signal(*header, 0, bytes, "z.dat");
+  ASSERT_TRUE(fast) << fast.error().message;
+  EXPECT_EQ(fast->mV, (std::vector<float>{1.0F, 2.0F, 5.0F, 6.0F}));
+  EXPECT_EQ(fast->time_s, (std::vector<double>{0.0, 0.005, 0.01, 0.015}));
+  EXPECT_NE(decode_wfdb_signal(*header, 1, bytes, "z.dat").error().message.find("in mmHg, which is no voltage"),
+            std::string::npos);
+  const auto late = decode_wfdb_signal(*header, 2, bytes, "z.dat");
+  ASSERT_TRUE(late) << late.error().message;
+  EXPECT_EQ(late->mV, (std::vector<float>{8.0F}));
+}
+
+TEST(Wfdb, ChoosesTheFirstLeadOrWhatIsNamed) {
+  const auto chosen = [](const std::string& signals, const std::string& wanted) -> std::string {
+    const auto header = parse_wfdb_header("x 3 360\n" + signals, "x.hea");
+    if (!header) return header.error().message;
+    const auto index = choose_wfdb_signal(*header, wanted, "x.hea");
+    return index ? header->signals[*index].description : index.error().message;
+  };
+  const std::string monitor =
+      "x.dat 16 1/mV 16 0 0 0 0 RESP\nx.dat 16 1/mmHg 16 0 0 0 0 ABP\nx.dat 16 1/mV 16 0 0 0 0 MLII\n";
+  EXPECT_EQ(chosen(monitor, ""), "MLII");
+  EXPECT_EQ(chosen(monitor, "resp"), "RESP");
+  EXPECT_EQ(chosen(monitor, "2"), "ABP");
+  EXPECT_EQ(chosen(monitor, "V5"), "x.hea: there is no signal V5; it has 3: 1 RESP, 2 ABP, 3 MLII");
+  EXPECT_EQ(chosen(monitor, "4"), "x.hea: there is no signal 4; it has 3: 1 RESP, 2 ABP, 3 MLII");
+  EXPECT_EQ(chosen("x.dat 16 1/mV 16 0 0 0 0 PLETH\nx.dat 16 1/mV 16 0 0 0 0 chest\nx.dat 16\n", ""), "chest");
+  EXPECT_NE(
+      chosen("x.dat 16 1/NU 16 0 0 0 0 PLETH\nx.dat 16 1/mV 16 0 0 0 0 RESP\nx.dat 16 1/mmHg 16 0 0 0 0 ABP\n", "")
+          .find("none of its signals looks like an ECG; say which by --signal"),
+      std::string::npos);
+}
+
+// As spreadsheets, loggers and statistics programs write it.
+TEST(EcgCsv, ReadsOtherSeparatorsAndDecimalCommas) {
+  for (const char* text :
+       {"time_s,mV\n0,0.5\n0.01,0.6\n0.02,-0.7\n", "time_s;mV\r\n0;0,5\r\n0,01;0,6\r\n0,02;-0,7\r\n",
+        "t (s)\tII, chest\n0\t0,5\n0,01\t0,6\n0,02\t-0,7\n", "\xEF\xBB\xBFtime_s;mV\n0;0.5\n0.01;0.6\n0.02;-0.7\n",
+        "# a logger's\n0.00  0.5\n0.01  0.6 \n0.02 -0.7\n",
+        "time_s\tmV\n0\t\"0.5\"\n0.01\t\"0.6\"\n0.02\t\"-0.7\"\n"}) {
+    const auto trace = parse_ecg_csv(text, "e", {});
+    ASSERT_TRUE(trace) << trace.error().message << '\n' << text;
+    EXPECT_EQ(trace->time_s, (std::vector<double>{0.0, 0.01, 0.02})) << text;
+    EXPECT_EQ(trace->mV, (std::vector<float>{0.5F, 0.6F, -0.7F})) << text;
+  }
+  const auto thousands = parse_ecg_csv("time_s,uV\n0.0,\"1,041.2\"\n0.1,\"-12,000\"\n0.2,\"0,5\"\n", "e", {});
+  ASSERT_TRUE(thousands) << thousands.error().message;
+  EXPECT_EQ(thousands->mV, (std::vector<float>{1041.2F, -12000.0F, 0.5F}));
+  const auto alone = parse_ecg_csv("0,5\n0,6\n", "e", at_rate());
+  EXPECT_FALSE(alone) << "a comma between numbers of one column";
+}
+
+TEST(EcgCsv, TakesWhatProgramsWriteForNothingAsNothing) {
+  const auto trace = parse_ecg_csv("time_s,mV\n0,NA\n1,N/A\n2,null\n3,-\n4,?\n5,NaN\n6,\n7,\"\"\n", "e", {});
+  ASSERT_TRUE(trace) << trace.error().message;
+  ASSERT_EQ(trace->mV.size(), 8U);
+  for (const float mV : trace->mV) EXPECT_TRUE(std::isnan(mV));
+}
+
+TEST(EcgCsv, ReadsUnixTimesAndSaysWhatOthersMayBe) {
+  const auto trace = parse_ecg_csv("timestamp,ecg\n1700000000.000000,1\n1700000000.002778,2\n", "e", {});
+  ASSERT_TRUE(trace) << trace.error().message;
+  EXPECT_DOUBLE_EQ(trace->time_s[0], 1.7e9);
+  EXPECT_NE(error_of("timestamp,ecg\n1700000000000,1\n").find("is it in milliseconds?"), std::string::npos);
+  EXPECT_NE(error_of(std::string("\xFF\xFEt\0", 4)).find("UTF-16"), std::string::npos);
+}
+
+TEST(EcgCsv, RefusesCommasThatAreDecimalSignsAsWell) {
+  for (const EcgCsvOptions& options : {EcgCsvOptions{}, at_rate()}) {
+    EXPECT_NE(error_of("time_s,mV\n0,000000,0,01288\n0,002778,0,01493\n", options)
+                  .find("are commas the decimal signs as well?"),
+              std::string::npos);
+  }
+}
+
+TEST(BeatTable, ReadsOtherSeparators) {
+  const auto table = parse_beat_table("time_s;symbol\n0,5;N\n1,25;V\n", "r.csv");
+  ASSERT_TRUE(table) << table.error().message;
+  ASSERT_EQ(table->beats.size(), 2U);
+  EXPECT_DOUBLE_EQ(table->beats[1].time_s, 1.25);
+  EXPECT_EQ(table->beats[1].kind, ReferenceBeat::Kind::kPremature);
 }
 
 // ---- the score
