@@ -71,7 +71,6 @@ CardiacClock CardiacClock::as_of(Instant now) const noexcept {
 
 CardiacClock CardiacClock::corrected(const CycleCorrection& correction) const noexcept {
   CardiacClock clock = *this;
-  if (correction.law) clock.law_ = *correction.law;
   if (correction.beats == 0) return clock;
   if (correction.carried) {
     if (at(now_).state == PhaseState::kLocked) return clock;

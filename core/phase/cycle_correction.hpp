@@ -2,9 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 
-#include "core/phase/phase_law.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
@@ -21,10 +19,9 @@ struct CycleCorrection {
   bool contradicted = false;  // the images show another phase than this; the deviation has been widened
   // The ECG tells nothing: the images carry the phase on. `beats` counts those known when they began to.
   bool carried = false;
-  int ahead = 0;                 // carried: this many cycles after the one that began with the last of `beats`
-  Duration previous_length{0};   // carried: of the cycle before this one
-  bool seen = false;             // carried, and the images have told the phase lately
-  std::optional<LawBelief> law;  // what the images show of it; none: as configured
+  int ahead = 0;                // carried: this many cycles after the one that began with the last of `beats`
+  Duration previous_length{0};  // carried: of the cycle before this one
+  bool seen = false;            // carried, and the images have told the phase lately
 };
 
 }  // namespace perimap

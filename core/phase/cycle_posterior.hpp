@@ -11,6 +11,27 @@
 // by what they show is followed by one whose beginning is that end, for so long as is allowed, and not when they too
 // have told nothing for kBlind.
 //
+// The equations, in the code's names; b and l are a candidate's beginning (s after the ECG's R peak) and length (s),
+// psi(t; b, l) is phase_of(t, b, l) with its rate psi' and its length sensitivity w, z_k an observed phase of standard
+// deviation sigma_k (rad) at t_k. Bayes' rule on a fixed grid is the point-mass filter (Bucy & Senne, "Digital
+// synthesis of non-linear filters", Automatica 7, 1971); Student's likelihood in a least-squares problem: Lange, Little
+// & Taylor, "Robust statistical modeling using the t distribution", JASA 84, 1989.
+//
+//   begin_s()           b_i = begin_deviation x beta_i,                  beta_i = -2.5 ... 2.5, 7 of them
+//   length_s()          l_j = length_mean + length_deviation x lambda_j, lambda_j = -4 ... 4, 81 of them
+//   begin_grid()        prior: log p(b_i, l_j) = -1/2 (beta_i^2 + lambda_j^2)
+//   weigh()             likelihood: log p(z_k | b, l) = -(nu + 1) / 2 log(1 + square_k / nu), nu = kFreedom
+//                       square_k = (z_k - psi(t_k; b, l))^2 / (sigma_k^2 + loose_k^2)
+//                       loose_k = w psi' length_deviation past b + l, in a cycle whose length is predicted; else 0
+//   summary()           no R peak known by now: log p = -1/2 overdue^2; 0 while carried
+//                       overdue = max(0, now - detector_delay - r_peak - b - l) / kMissedBeatDeviation
+//                       posterior: p(b, l) ~ exp of the sum of these; told are its mean and its variance:
+//                       max(variance, step^2 / 12) x max(1, misfit / n), n observations, from kEnoughForMisfit on,
+//                       misfit = sum_k min(square_k, kLargestSquare) of the likeliest candidate
+//   with_trusted_end()  the end e = E[b] + E[l] is told as e + (1 - weight) (length_mean - e), weight by EndTrust
+//   correct_next()      the next cycle's length is next_length + length_deviation x lambda_j, with log p(lambda_j) =
+//                       -1/2 lambda_j^2 + likelihood of the z_k after e, sigma_k^2 grown by psi'^2 Var[e]
+//
 // The end that the images foretell of a cycle counts for what such ends have been worth (EndTrust); the rest is the
 // rhythm's prediction. The phase seen last stays: the beginning gives way, by 3 % of the length at most.
 //

@@ -20,7 +20,7 @@
 namespace perimap {
 
 // The ECG thread is the one writer of the clock. A triple buffer serves one reader, so there is a cell per reader.
-struct ClockCells {
+struct EcgClockCells {
   TripleBuffer<CardiacClock> mapper;
   TripleBuffer<CardiacClock> publisher;
   TripleBuffer<CardiacClock> status;
@@ -33,7 +33,7 @@ struct EcgIntakeSettings {
 
 class EcgIntake {
  public:
-  EcgIntake(const EcgIntakeSettings& settings, ClockCells& cells, PipelineCounters& counters) noexcept
+  EcgIntake(const EcgIntakeSettings& settings, EcgClockCells& cells, PipelineCounters& counters) noexcept
       : settings_(settings), tracker_(settings.clock), cells_(cells), counters_(counters) {
     if (settings.r_trigger) trigger_.emplace(*settings.r_trigger);
   }
@@ -65,7 +65,7 @@ class EcgIntake {
   std::optional<RTrigger> trigger_;
   BeatClasser trigger_classer_;
   CardiacClockTracker tracker_;
-  ClockCells& cells_;
+  EcgClockCells& cells_;
   PipelineCounters& counters_;
   SpscRing<EcgBlock> heard_{kHeardBlocks};
   DeviceCount sample_count_;

@@ -92,8 +92,8 @@ void FeatureGroup::plan(const FrameJob& job) noexcept {
   }
   const FrameRecord& now = *job.frame;
   plan_.capture = plan_.phases.add_predicted(now.b, now.b_rate, now.phase.rate_rad_per_s);
-  for (std::size_t i = job.evaluated.begin; i < job.evaluated.end; ++i) {
-    plan_.evaluated[i] = plan_.phases.add_predicted(job.evaluated.b[i], Basis());
+  for (std::size_t i = job.plan.begin; i < job.plan.end; ++i) {
+    plan_.evaluated[i] = plan_.phases.add_predicted(job.evaluated_b[i], Basis());
   }
 }
 
@@ -192,7 +192,7 @@ void FeatureGroup::doubt() noexcept {
 
 void FeatureGroup::evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept {
   if (plan_.capture < 0) return;
-  const auto [begin, end] = std::pair(job.evaluated.begin, job.evaluated.end);
+  const auto [begin, end] = std::pair(job.plan.begin, job.plan.end);
   std::array<LaneMotions<double>, kCovariances> evaluated;
   for (std::size_t i = begin; i < end; ++i) {
     bank_.motion(index_, plan_.phases, plan_.evaluated[i], evaluated[i]);
@@ -205,7 +205,7 @@ void FeatureGroup::evaluate(const FrameJob& job, ShardSnapshot& publisher, Shard
     for (std::size_t i = begin; i < end; ++i) {
       snapshot.covariances_W_mm2[i] = evaluated[i].covariance_of(static_cast<int>(lane));
       if (const auto& slow_error = slots_[lane].slow_error) {
-        snapshot.covariances_W_mm2[i] += slow_error->position_covariance(job.evaluated.b[i]);
+        snapshot.covariances_W_mm2[i] += slow_error->position_covariance(job.evaluated_b[i]);
       }
     }
     publisher.features.push_back(snapshot);

@@ -39,7 +39,6 @@ class FrameHistory {
   // Between two that are learnt from, so that the slowest heart's cycle is there until it has ended. More a second
   // would tell little more, for errors of the R peaks are common to a cycle's matches.
   static constexpr Duration kHeldEvery = std::chrono::milliseconds(14);
-  static constexpr double kExactTracker_mm2 = 0.25;
 
   explicit FrameHistory(const BasisLayout& layout) noexcept : layout_(layout) {}
 
@@ -59,9 +58,9 @@ class FrameHistory {
 
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
 
-  // So that it pays to learn its frames once more: beyond, a map is no better for it, by measurement (docs/evidence).
-  [[nodiscard]] bool tracker_is_exact() const noexcept {
-    return count_ > 0 && records_[(count_ - 1) % kCapacity].tracker_variance_mm2 <= kExactTracker_mm2;
+  // Null before the first frame.
+  [[nodiscard]] const FrameRecord* newest() const noexcept {
+    return count_ == 0 ? nullptr : &records_[(count_ - 1) % kCapacity];
   }
 
   [[nodiscard]] Duration span() const noexcept {

@@ -7,6 +7,7 @@
 #include "core/estimation/shared_pose.hpp"
 #include "core/periodic/basis.hpp"
 #include "core/phase/phase_law.hpp"
+#include "core/pipeline/evaluation_plan.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/phase_spread.hpp"
 #include "core/pipeline/scouts.hpp"
@@ -19,14 +20,6 @@
 
 namespace perimap {
 
-// The bases at the snapshot's instants, with the phase as known now. Only [begin, end) are asked for: a stream that is
-// not published costs nothing.
-struct EvaluatedBases {
-  std::array<Basis, kCovariances> b;
-  std::size_t begin = 0;
-  std::size_t end = 0;
-};
-
 // Written by the mapper before a stage, read by all workers during it.
 struct FrameJob {
   const FrameRecord* frame = nullptr;
@@ -37,9 +30,8 @@ struct FrameJob {
   bool scouting = false;       // some features are scouts, and the others are searched for once those have been
   CommonShift shift;           // that they tell
   BasesAbout about_capture;
-  std::array<FrameCamera, kCamerasKept> cameras;
-  std::array<Instant, kCovariances> instants{};
-  EvaluatedBases evaluated;
+  EvaluationPlan plan;
+  std::array<Basis, kCovariances> evaluated_b;  // the bases at the plan's instants, with the phases as known now
   // After B: how the features found have moved, and the pose that they agree on; null when they do not tell it.
   const NeighbourMotion* motion = nullptr;
   const CommonEstimate* shared_pose = nullptr;

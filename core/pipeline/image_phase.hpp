@@ -8,26 +8,14 @@
 
 #include "core/estimation/measurement_model.hpp"
 #include "core/estimation/shared_pose.hpp"
-#include "core/phase/cycle_posterior.hpp"
+#include "core/phase/image_phase_answer.hpp"
 #include "core/pipeline/feature_group.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 
 namespace perimap {
 
-enum class ImagePhaseOutcome : std::uint8_t {
-  kObserved,
-  kTentative,  // observed, but by a map that has not converged: its phase may be off by what the map gets wrong
-  kCanNotTell,
-  kContradicts
-};
-
-// What a frame's matches tell of one phase.
-struct ImagePhaseAnswer {
-  ImagePhaseOutcome outcome = ImagePhaseOutcome::kCanNotTell;
-  ObservedPhase observed;  // when kObserved or kTentative
-};
-
+// What a frame's matches tell.
 struct ImagePhases {
   ImagePhaseAnswer cardiac;
   ImagePhaseAnswer respiratory;  // kCanNotTell too where breathing is not known

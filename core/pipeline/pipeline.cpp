@@ -57,12 +57,12 @@ void Pipeline::drain_poses() noexcept {
 
 void Pipeline::map(const FrameHandle& frame) noexcept {
   const RealtimeScope realtime;
-  TripleBuffer<CardiacClock>& clock = entrance_.clocks().mapper;
-  clock.update();
-  if (settings_.respiration.channel) mapper_.follow_breath(entrance_.breath(), frame.stamp.capture);
-  mapper_.process(frame.stamp, entrance_.image(frame), entrance_.colour(frame), clock.front());
+  TripleBuffer<CardiacClock>& ecg = entrance_.ecg_clocks().mapper;
+  ecg.update();
+  if (settings_.respiration.channel) mapper_.hear_breath(entrance_.breath(), frame.stamp.capture);
+  mapper_.process(frame.stamp, entrance_.image(frame), entrance_.colour(frame), ecg.front());
   entrance_.give_back(frame);
-  mapper_.learn();
+  mapper_.beside_learning();
 }
 
 void Pipeline::ask_to_forget() noexcept {
@@ -121,32 +121,31 @@ void Pipeline::take_back(const SurfaceSample& sample) noexcept {
 
 const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
   const RealtimeScope realtime;
-  TripleBuffer<CardiacClock>& clock = entrance_.clocks().publisher;
-  clock.update();
+  TripleBuffer<CardiacClock>& ecg = entrance_.ecg_clocks().publisher;
+  ecg.update();
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     cells_[i].publisher.update();
     publisher_view_[i] = &cells_[i].publisher.front();
   }
-  phase_cells_.publisher_correction.update();
-  phase_cells_.publisher_respiration.update();
-  const CardiacClock corrected =
-      clock.front().as_of(release.deadline).corrected(phase_cells_.publisher_correction.front());
+  phase_cells_.publisher_heart.update();
+  phase_cells_.publisher_breath.update();
+  const CardiacClock heart = phase_cells_.publisher_heart.front().clock(ecg.front(), release.deadline);
   const SurfaceSample& sample = composers_[index_of(release.stream)].compose(
-      release, corrected, phase_cells_.publisher_respiration.front(), publisher_view_);
+      release, heart, phase_cells_.publisher_breath.front(), publisher_view_);
   tell_due();
   return sample;
 }
 
 CardiacClock Pipeline::status_clock(Instant now) noexcept {
-  TripleBuffer<CardiacClock>& clock = entrance_.clocks().status;
-  clock.update();
-  phase_cells_.status_correction.update();
-  return clock.front().as_of(now).corrected(phase_cells_.status_correction.front());
+  TripleBuffer<CardiacClock>& ecg = entrance_.ecg_clocks().status;
+  ecg.update();
+  phase_cells_.status_heart.update();
+  return phase_cells_.status_heart.front().clock(ecg.front(), now);
 }
 
 RespiratoryClock Pipeline::status_respiration() noexcept {
-  phase_cells_.status_respiration.update();
-  return phase_cells_.status_respiration.front();
+  phase_cells_.status_breath.update();
+  return phase_cells_.status_breath.front();
 }
 
 std::span<const ShardSnapshot* const> Pipeline::model_snapshots() noexcept {

@@ -22,7 +22,7 @@ SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& e
       mapper_frames_(kFrameBuffers),
       publisher_stamps_(kStampRing),
       poses_(kPoseRing),
-      ecg_(ecg, clocks_, counters),
+      ecg_(ecg, ecg_clocks_, counters),
       breath_settings_(breath),
       breath_(breath) {}
 

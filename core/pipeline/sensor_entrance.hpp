@@ -71,7 +71,7 @@ class SensorEntrance {
   [[nodiscard]] bool pop_stamp(FrameStamp& stamp) noexcept { return publisher_stamps_.pop(stamp); }
   [[nodiscard]] Wakeup& publisher_wakeup() noexcept { return publisher_wakeup_; }
 
-  [[nodiscard]] ClockCells& clocks() noexcept { return clocks_; }
+  [[nodiscard]] EcgClockCells& ecg_clocks() noexcept { return ecg_clocks_; }
 
  private:
   [[nodiscard]] bool store(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour) noexcept;
@@ -84,7 +84,7 @@ class SensorEntrance {
   SpscRing<TrackerSample> poses_;
   Wakeup mapper_wakeup_;
   Wakeup publisher_wakeup_;
-  ClockCells clocks_;
+  EcgClockCells ecg_clocks_;
   EcgIntake ecg_;
   BreathDetectorSettings breath_settings_;
   BreathDetector breath_;

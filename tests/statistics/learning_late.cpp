@@ -314,7 +314,7 @@ void add_maps(const Scene& scene, const PipelineSettings& settings, const Learne
 double r_peaks_late_s(const Simulation& simulation, const Scene& scene, PhaseLaw law) {
   PipelineSettings settings = settings_for(simulation, {});
   settings.clock.law.law = law;
-  ClockCells cells;
+  EcgClockCells cells;
   const auto counters = std::make_unique<PipelineCounters>();
   EcgIntake intake({settings.clock, {}}, cells, *counters);
   std::vector<double> late_s;
@@ -336,7 +336,7 @@ void add_session(const Simulation& simulation, const Scene& scene, double offset
   settings.camera = std::get<PixelModel>(scene.model).camera;
   settings.estimator.pixel_deviation_px = scene.settings.deviation;
   settings.clock.law.law = told;
-  ClockCells cells;
+  EcgClockCells cells;
   const auto counters = std::make_unique<PipelineCounters>();
   EcgIntake intake({settings.clock, {}}, cells, *counters);
   Learner late(settings, Learning::kLate);

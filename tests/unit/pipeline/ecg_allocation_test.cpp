@@ -1,5 +1,5 @@
-// What the ECG thread runs, and what is made of its beats, takes nothing from the heap once made. A program of its own,
-// because it counts the calls of the allocator.
+// What the ECG thread runs, and what the mapper makes of heart and breathing, takes nothing from the heap once made. A
+// program of its own, because it counts the calls of the allocator.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,8 +12,10 @@
 #include <vector>
 
 #include "core/phase/cardiac_clock_tracker.hpp"
-#include "core/phase/r_peak_smoother.hpp"
+#include "core/phase/heart_phase.hpp"
+#include "core/pipeline/breathing.hpp"
 #include "core/pipeline/ecg_intake.hpp"
+#include "core/pipeline/evaluation_plan.hpp"
 #include "counted_allocations.hpp"
 
 namespace perimap {
@@ -62,7 +64,7 @@ std::vector<EcgBlock> eventful_minute() {
 TEST(Allocation, TheEcgThreadTakesNothingFromTheHeap) {
   const std::vector<EcgBlock> blocks = eventful_minute();
   ASSERT_GT(blocks.size(), 600U);
-  const auto cells = std::make_unique<ClockCells>();
+  const auto cells = std::make_unique<EcgClockCells>();
   const auto counters = std::make_unique<PipelineCounters>();
   for (const RrMethod method : {RrMethod::kPrevious, RrMethod::kMeanOf8, RrMethod::kAutoregressive}) {
     EcgIntakeSettings settings;
@@ -97,28 +99,69 @@ TEST(Allocation, TheEndOfASignalTakesNothingFromTheHeap) {
   EXPECT_GT(beats, 8);
 }
 
-TEST(Allocation, MovingRPeaksTakesNothingFromTheHeap) {
-  const auto smoother = std::make_unique<RPeakSmoother>();
+// A heart of which half of the R peaks are heard 1 ms late, which the phases seen show; then another patient's.
+TEST(Allocation, WhatIsBelievedOfTheHeartTakesNothingFromTheHeap) {
+  HeartPhaseSettings settings;
+  settings.law_from_image = true;
+  const auto heart = std::make_unique<HeartPhase>(settings);
   CardiacClockTracker tracker{CardiacClockSettings{}};
   constexpr double kRr_s = 0.8;
   Duration moved{0};
+  int laws = 0;
   const long count = allocations_of([&] {
     for (int beat = 0; beat < 60; ++beat) {
-      // Half of the peaks are 1 ms late, which the phases seen show.
       const Instant peak(from_seconds(kRr_s * beat + 0.001 * (beat % 2)));
       tracker.on_r_peak({peak, peak + std::chrono::milliseconds(90), 1.0, std::chrono::milliseconds(2)});
-      smoother->on_beat(tracker.clock());
-      const CardiacClock clock = smoother->moved(tracker.clock());
-      moved = std::max(moved, clock.anchor() < peak ? peak - clock.anchor() : clock.anchor() - peak);
+      for (std::size_t i = 0; beat == 20 && i < 2 * HeartPhase::kMostTrials; ++i) {
+        heart->add({{20.0, 80.0, 80.0}, peak - std::chrono::seconds(2), peak});
+      }
       for (int i = 0; i < 26; ++i) {
         const double s = 0.01 + 0.03 * i;
         const Instant seen(from_seconds(kRr_s * beat + s));
-        smoother->add({seen, 2.0 * std::numbers::pi * s / kRr_s, 0.01});
+        laws += heart->begin_frame(tracker.clock(), seen, seen).other_laws ? 1 : 0;
+        heart->observe({ImagePhaseOutcome::kObserved, {seen, 2.0 * std::numbers::pi * s / kRr_s, 0.01}});
+        static_cast<void>(heart->belief().clock(tracker.clock(), seen));
+        const CardiacClock clock = heart->completed();
+        moved = std::max(moved, clock.anchor() < peak ? peak - clock.anchor() : clock.anchor() - peak);
       }
     }
+    heart->recall(heart->law_memory());
+    *heart = HeartPhase(settings, heart->beats());
   });
   EXPECT_EQ(count, 0);
   EXPECT_GT(moved, std::chrono::microseconds(200));
+  EXPECT_GT(laws, 0);
+}
+
+// Breathing of 10 mm every 4 s that is found, followed and lost; then another patient's.
+TEST(Allocation, WhatIsBelievedOfBreathingAndWhatIsEvaluatedTakesNothingFromTheHeap) {
+  PipelineSettings settings;
+  settings.respiration.enabled = true;
+  settings.clock_period = std::chrono::milliseconds(10);
+  const auto history = std::make_unique<FrameHistory>(BasisLayout{2, 2});
+  const auto breathing = std::make_unique<Breathing>(settings.respiration);
+  const CardiacClock heart;
+  int begun = 0;
+  const long count = allocations_of([&] {
+    for (int i = 0; i < 30 * 30; ++i) {
+      const double t_s = 5.0 + i / 30.0;
+      begun += breathing->begin_frame(*history).begun ? 1 : 0;
+      FrameRecord& frame = history->append({history->count(), Instant(from_seconds(t_s)), Instant(from_seconds(t_s))});
+      history->set_phase(frame, heart, breathing->clock());
+      breathing->expect_displacement(frame);
+      static_cast<void>(plan_evaluation(*history, frame, frame.stamp.arrival, settings));
+      if (breathing->asks_for_displacement(frame, false)) {
+        const double sine = std::sin(std::numbers::pi * t_s / 4.0);
+        breathing->add_displacement(frame, 10.0 * std::pow(sine, 4) * Vector3d(0.1, -0.35, -0.93));
+      }
+      if (i > 25 * 30)
+        static_cast<void>(breathing->observe({ImagePhaseOutcome::kContradicts, {}}, frame.stamp.capture));
+      breathing->search(frame);
+    }
+    *breathing = Breathing(settings.respiration);
+  });
+  EXPECT_EQ(count, 0);
+  EXPECT_GT(begun, 0);
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ float lead_mV(Instant t) {
 }
 
 struct Intake : ::testing::Test {
-  std::unique_ptr<ClockCells> cells = std::make_unique<ClockCells>();
+  std::unique_ptr<EcgClockCells> cells = std::make_unique<EcgClockCells>();
   std::unique_ptr<PipelineCounters> counters = std::make_unique<PipelineCounters>();
   std::unique_ptr<EcgIntake> intake = std::make_unique<EcgIntake>(EcgIntakeSettings{}, *cells, *counters);
   Instant t{milliseconds(0)};

@@ -75,8 +75,8 @@ struct Stages : ::testing::Test {
     job.frame = current = &frame;
     job.about_capture = bases_about(settings.estimator.layout, frame.phase, frame.respiration);
     job.history = history.get();
-    job.evaluated.b.fill(basis_at(settings.estimator.layout, 1.0));
-    job.evaluated.end = kCovariances;
+    job.evaluated_b.fill(basis_at(settings.estimator.layout, 1.0));
+    job.plan.end = kCovariances;
     for (FeatureSlot& s : slots) s.match = PatchMatch{};
     group->sweep(job);
   }
@@ -638,7 +638,7 @@ TEST_F(Stages, WhatIsPredictedAndShownIsWhatTheBankHolds) {
   ASSERT_EQ(snapshots.size(), 1U);
   EXPECT_EQ(snapshots[0].x, estimate.x);
   for (const Matrix3d& covariance : snapshots[0].covariances_W_mm2) {
-    EXPECT_LT((covariance - estimate.position_covariance(job.evaluated.b[0])).norm(), 1e-12);
+    EXPECT_LT((covariance - estimate.position_covariance(job.evaluated_b[0])).norm(), 1e-12);
   }
 }
 
@@ -816,7 +816,7 @@ TEST_F(SlowPoseError, OfTheBatchStartIsCountedToo) {
   next_frame();
   FeatureEstimate estimate;
   bank->get(0, estimate);
-  EXPECT_LT(estimate.position_covariance(job.evaluated.b[0])(1, 1), 0.2) << "what the recursion believes";
+  EXPECT_LT(estimate.position_covariance(job.evaluated_b[0])(1, 1), 0.2) << "what the recursion believes";
   EXPECT_GT(shown().at(0).covariances_W_mm2[0](1, 1), 0.8);
 }
 

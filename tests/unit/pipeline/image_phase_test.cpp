@@ -63,8 +63,8 @@ struct Surface : ::testing::Test {
     job.frame = &frame;
     job.about_capture = bases_about(settings.layout, frame.phase, frame.respiration);
     job.history = &history;
-    job.evaluated.b.fill(frame.b);
-    job.evaluated.end = kReleasesCovered;
+    job.evaluated_b.fill(frame.b);
+    job.plan.end = kReleasesCovered;
     for (FeatureGroup& group : groups) group.sweep(job);
   }
 

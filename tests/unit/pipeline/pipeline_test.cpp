@@ -5,6 +5,15 @@
 
 #include <vector>
 
+#include "core/phase/respiratory_clock.hpp"
+#include "core/pipeline/map_memory.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/release_plan.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/surface_sample.hpp"
+#include "core/pipeline/surface_state.hpp"
+
 namespace perimap {
 namespace {
 
@@ -86,6 +95,23 @@ TEST(Pipeline, WhatIsOwedByNowDoesNotWaitForTheClocksNextRelease) {
   const Release release = pipeline.plan().take_release();
   EXPECT_EQ(release.deadline, Instant(milliseconds(2000)));
   EXPECT_EQ(release.capture, first + 31 * kPeriod);
+}
+
+// A suspicion is the mapper's; what is recalled stands at once.
+TEST(Pipeline, BreathingThatIsSuspectedReachesTheStatusAndEachSurfaceUntilThePatientIsForgotten) {
+  Pipeline pipeline(settings());
+  EXPECT_FALSE(pipeline.status_respiration().suspected);
+  MapMemory memory;
+  memory.respiration.clock.suspected = true;
+  memory.last_capture = Instant(milliseconds(500));
+  pipeline.recall(memory, Instant(milliseconds(1000)));
+  const RespiratoryClock told = pipeline.status_respiration();
+  EXPECT_TRUE(told.suspected);
+  EXPECT_TRUE(pipeline.model_footing(told, Instant(milliseconds(1000))).breath_doubtful);
+  pipeline.ask_to_forget();
+  pipeline.forget_if_asked();
+  EXPECT_FALSE(pipeline.status_respiration().suspected);
+  EXPECT_EQ(pipeline.counters().maps_forgotten.get(), 1U);
 }
 
 }  // namespace

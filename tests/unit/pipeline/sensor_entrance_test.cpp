@@ -163,8 +163,8 @@ TEST_F(Entrance, LeadOffSamplesReachTheCountersAndNotTheClock) {
   block.lead_off = true;
   entrance->push_ecg(block);
   EXPECT_EQ(counters.ecg_lead_off.get(), 4U);
-  ASSERT_TRUE(entrance->clocks().mapper.update());
-  EXPECT_EQ(entrance->clocks().mapper.front().beats(), 0U);
+  ASSERT_TRUE(entrance->ecg_clocks().mapper.update());
+  EXPECT_EQ(entrance->ecg_clocks().mapper.front().beats(), 0U);
 }
 
 TEST_F(Entrance, PulsesOfATriggerLineReplaceTheDetector) {
@@ -180,13 +180,13 @@ TEST_F(Entrance, PulsesOfATriggerLineReplaceTheDetector) {
     triggered->push_r_trigger({edge, edge + milliseconds(1), i});
     entrance->push_r_trigger({edge, edge + milliseconds(1), i});
   }
-  ASSERT_TRUE(triggered->clocks().mapper.update());
-  const CardiacClock& clock = triggered->clocks().mapper.front();
+  ASSERT_TRUE(triggered->ecg_clocks().mapper.update());
+  const CardiacClock& clock = triggered->ecg_clocks().mapper.front();
   EXPECT_EQ(clock.beats(), 19U);
   EXPECT_EQ(clock.anchor(), first + 19 * milliseconds(800) - milliseconds(30));
   EXPECT_EQ(counters.r_triggers.get(), 38U);
   EXPECT_EQ(counters.r_triggers_dropped.get(), 2U);
-  EXPECT_FALSE(entrance->clocks().mapper.update()) << "without a trigger configured pulses are only counted";
+  EXPECT_FALSE(entrance->ecg_clocks().mapper.update()) << "without a trigger configured pulses are only counted";
 }
 
 // Half a second of breaths of 4 s.

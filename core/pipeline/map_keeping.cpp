@@ -1,0 +1,88 @@
+#include "core/pipeline/map_keeping.hpp"
+
+#include <algorithm>
+
+namespace perimap {
+
+void MapKeeping::fill_feed(const Breathing& breathing, const HeartPhase& heart, std::uint64_t maps_forgotten) noexcept {
+  MapFeed::Batch* batch = feed_.back();
+  if (batch == nullptr) return;
+  batch->maps_forgotten = maps_forgotten;
+  batch->respiration = breathing.memory();
+  batch->law = heart.law_memory();
+  for (MapFeed::Entry& entry : batch->entries) {
+    entry.slot = next_fed_slot_;
+    next_fed_slot_ = (next_fed_slot_ + 1) % slots_.size();
+    const FeatureSlot& slot = slots_[entry.slot];
+    entry.mapped = slot.state == SlotState::kMapped && slot.health.state() != HealthState::kInconsistent;
+    if (!entry.mapped) continue;
+    remember(slot, entry.feature);
+    bank_.get(static_cast<int>(entry.slot), entry.feature.estimate);
+    if (slot.slow_error != nullptr) entry.feature.estimate.P += slot.slow_error->covariance();
+    entry.feature.breathing = breathing.begun();
+  }
+  feed_.hand_over();
+}
+
+void MapKeeping::remember(const FeatureSlot& slot, FeatureMemory& feature) const noexcept {
+  feature.id = slot.id;
+  feature.first_observed = slot.first_observed;
+  feature.first_observed_px = slot.first_observed_px;
+  feature.last_observed = slot.last_observed;
+  feature.patch = slot.patch;
+  feature.patch_state = slot.patch_state;
+  feature.updates = slot.updates;
+  feature.converged = slot.converged;
+  feature.largest_deviation_mm = slot.largest_deviation_mm;
+}
+
+std::uint32_t MapKeeping::recall(std::span<const FeatureMemory> features, const Breathing& breathing) noexcept {
+  std::uint32_t largest_id = 0;
+  std::size_t index = 0;
+  for (const FeatureMemory& feature : features) {
+    if (index >= slots_.size()) break;
+    if (feature.estimate.x.size() != bank_.layout().state_size()) continue;
+    recall(slots_[index], feature);
+    bank_.set(static_cast<int>(index), feature.estimate);
+    // Taken before breathing was found, and not again since.
+    if (breathing.begun() && !feature.breathing) {
+      groups_[index / kLanes].begin_breath(index % kLanes, breathing.wave());
+    }
+    largest_id = std::max(largest_id, feature.id);
+    ++index;
+  }
+  return largest_id;
+}
+
+void MapKeeping::recall(FeatureSlot& slot, const FeatureMemory& feature) noexcept {
+  slot.state = SlotState::kMapped;
+  slot.id = feature.id;
+  slot.first_observed = feature.first_observed;
+  slot.first_observed_px = feature.first_observed_px;
+  slot.last_observed = feature.last_observed;
+  slot.last_learnt = feature.last_observed;
+  slot.patch = feature.patch;
+  slot.patch_state = feature.patch_state;
+  slot.carried_px = feature.patch_state.px;
+  // So long before the first frame that the map alone tells where to look; the difference of the counts is what
+  // matters, and wraps.
+  slot.last_found_frame = std::uint64_t{0} - (kCarriedMissesAllowed + 1);
+  slot.updates = feature.updates;
+  slot.converged = feature.converged;
+  slot.recalled_converged = feature.converged;
+  slot.largest_deviation_mm = feature.largest_deviation_mm;
+}
+
+void MapKeeping::forget() noexcept {
+  for (std::size_t index = 0; index < slots_.size(); ++index) {
+    FeatureSlot& slot = slots_[index];
+    if (slot.state == SlotState::kStarting) {
+      slot.forgotten = true;
+    } else if (slot.state != SlotState::kEmpty) {
+      slot.state = SlotState::kEmpty;
+      bank_.clear(static_cast<int>(index));
+    }
+  }
+}
+
+}  // namespace perimap

@@ -1,0 +1,173 @@
+#include "core/pipeline/map_keeping.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/pipeline/pipeline_settings.hpp"
+
+namespace perimap {
+namespace {
+
+// Ten slots in two groups.
+struct Keeping : ::testing::Test {
+  static constexpr std::size_t kSlots = 10;
+
+  PipelineSettings settings;
+  std::vector<FeatureSlot> slots{kSlots};
+  std::unique_ptr<MapBank> bank;
+  std::vector<FeatureGroup> groups;
+  std::unique_ptr<MapKeeping> keeping;
+  std::unique_ptr<Breathing> breathing;
+  HeartPhase heart;
+
+  Keeping() {
+    settings.estimator.layout = {2, 2};
+    settings.respiration.enabled = true;
+    bank = std::make_unique<MapBank>(
+        BankSettings{.layout = settings.estimator.layout, .features = static_cast<int>(kSlots)}, Precision::kDouble);
+    groups.emplace_back(*bank, 0, std::span(slots).first(kLanes));
+    groups.emplace_back(*bank, 1, std::span(slots).subspan(kLanes));
+    keeping = std::make_unique<MapKeeping>(slots, *bank, groups);
+    breathing = std::make_unique<Breathing>(settings.respiration);
+  }
+
+  [[nodiscard]] FeatureMemory feature(std::uint32_t id) const {
+    FeatureMemory memory;
+    memory.id = id;
+    memory.updates = static_cast<int>(id) + 1000;
+    memory.converged = id % 2 == 0;
+    memory.largest_deviation_mm = 0.01 * id;
+    memory.last_observed = Instant(std::chrono::seconds(id));
+    memory.estimate = prior_estimate(settings.estimator.layout, settings.estimator.prior, Vector3d(id, 2.0, 100.0));
+    return memory;
+  }
+  [[nodiscard]] std::vector<FeatureMemory> features(std::size_t count) const {
+    std::vector<FeatureMemory> all;
+    for (std::size_t i = 0; i < count; ++i) all.push_back(feature(static_cast<std::uint32_t>(50 - i)));
+    return all;
+  }
+  [[nodiscard]] FeatureEstimate estimate(std::size_t slot) const {
+    FeatureEstimate of;
+    bank->get(static_cast<int>(slot), of);
+    return of;
+  }
+  // The next batch, as its reader gets it.
+  [[nodiscard]] MapFeed::Batch feed(std::uint64_t maps_forgotten = 0) {
+    keeping->fill_feed(*breathing, heart, maps_forgotten);
+    const MapFeed::Batch* batch = keeping->feed().front();
+    EXPECT_NE(batch, nullptr);
+    const MapFeed::Batch copy = *batch;
+    keeping->feed().give_back();
+    return copy;
+  }
+  void breathe() {
+    RespirationMemory memory;
+    memory.found = true;
+    memory.wave.a[0] = Vector3d(1.0, 2.0, 3.0);
+    breathing->recall(memory, Instant(std::chrono::seconds(60)));
+    ASSERT_TRUE(breathing->begun());
+  }
+};
+
+TEST_F(Keeping, WhatIsRecalledIsMappedAsItWas) {
+  EXPECT_EQ(keeping->recall(features(3), *breathing), 50U) << "the largest id";
+  for (std::size_t i = 0; i < kSlots; ++i) {
+    if (i >= 3) {
+      EXPECT_EQ(slots[i].state, SlotState::kEmpty);
+      continue;
+    }
+    const FeatureMemory as = feature(static_cast<std::uint32_t>(50 - i));
+    EXPECT_EQ(slots[i].state, SlotState::kMapped);
+    EXPECT_EQ(slots[i].id, as.id);
+    EXPECT_EQ(slots[i].updates, as.updates);
+    EXPECT_EQ(slots[i].converged, as.converged);
+    EXPECT_EQ(slots[i].recalled_converged, as.converged);
+    EXPECT_EQ(slots[i].last_learnt, as.last_observed);
+    EXPECT_EQ(estimate(i).x, as.estimate.x);
+    // In the first frame the map alone tells where it is.
+    EXPECT_GT(std::uint64_t{0} - slots[i].last_found_frame, kCarriedMissesAllowed);
+  }
+}
+
+TEST_F(Keeping, NoMoreThanThereIsRoomForAndOnlyOfThisLayout) {
+  std::vector<FeatureMemory> all = features(kSlots + 5);
+  all[0].estimate = prior_estimate({8, 0}, settings.estimator.prior, Vector3d(0, 0, 100));
+  EXPECT_EQ(keeping->recall(all, *breathing), 49U);
+  EXPECT_EQ(slots[0].id, 49U);
+  EXPECT_EQ(slots[kSlots - 1].id, 50U - kSlots);
+  EXPECT_EQ(keeping->recall({}, *breathing), 0U);
+}
+
+TEST_F(Keeping, AFeatureThatWasKeptBeforeBreathingWasFoundTakesItsWave) {
+  breathe();
+  std::vector<FeatureMemory> all = features(2);
+  all[0].breathing = true;
+  static_cast<void>(keeping->recall(all, *breathing));
+  EXPECT_EQ(estimate(0).x, all[0].estimate.x);
+  EXPECT_EQ(estimate(0).P, all[0].estimate.P);
+  EXPECT_NE(estimate(1).x, all[1].estimate.x);
+}
+
+TEST_F(Keeping, TheFeedGoesRoundAllSlotsTwoAtATime) {
+  static_cast<void>(keeping->recall(features(kSlots), *breathing));
+  slots[3].health = FeatureHealth();
+  slots[4].state = SlotState::kStarting;
+  for (std::size_t round = 0; round < 2; ++round) {
+    for (std::size_t slot = 0; slot < kSlots; slot += MapFeed::kSlotsABatch) {
+      const MapFeed::Batch batch = feed(7);
+      EXPECT_EQ(batch.maps_forgotten, 7U);
+      for (std::size_t i = 0; i < MapFeed::kSlotsABatch; ++i) {
+        EXPECT_EQ(batch.entries[i].slot, slot + i);
+        EXPECT_EQ(batch.entries[i].mapped, slot + i != 4);
+        if (!batch.entries[i].mapped) continue;
+        EXPECT_EQ(batch.entries[i].feature.id, slots[slot + i].id);
+        EXPECT_EQ(batch.entries[i].feature.updates, slots[slot + i].updates);
+        EXPECT_EQ(batch.entries[i].feature.estimate.x, estimate(slot + i).x);
+        EXPECT_FALSE(batch.entries[i].feature.breathing);
+      }
+    }
+  }
+}
+
+TEST_F(Keeping, WhatIsFedSaysWhetherBreathingIsInIt) {
+  breathe();
+  static_cast<void>(keeping->recall(features(2), *breathing));
+  const MapFeed::Batch batch = feed();
+  EXPECT_TRUE(batch.entries[0].feature.breathing);
+  EXPECT_TRUE(batch.respiration.found);
+}
+
+TEST_F(Keeping, WhatIsFedIsAsUncertainAsASlowErrorOfTheTrackerMakesIt) {
+  static_cast<void>(keeping->recall(features(1), *breathing));
+  slots[0].slow_error = std::make_unique<CorrelatedPoseNoise>(settings.estimator.layout.state_size(), 5.0);
+  EXPECT_EQ(feed().entries[0].feature.estimate.P, estimate(0).P + slots[0].slow_error->covariance());
+}
+
+TEST_F(Keeping, TheReaderIsNotHurried) {
+  static_cast<void>(keeping->recall(features(kSlots), *breathing));
+  keeping->fill_feed(*breathing, heart, 0);
+  for (int i = 0; i < 5; ++i) keeping->fill_feed(*breathing, heart, 0);
+  EXPECT_EQ(keeping->feed().front()->entries[0].slot, 0U);
+  keeping->feed().give_back();
+  EXPECT_EQ(feed().entries[0].slot, MapFeed::kSlotsABatch);
+}
+
+TEST_F(Keeping, WhatIsForgottenIsGoneButForStartsThatAreUnderWay) {
+  static_cast<void>(keeping->recall(features(kSlots), *breathing));
+  slots[5].state = SlotState::kStarting;
+  slots[9].state = SlotState::kTracked;
+  keeping->forget();
+  for (std::size_t i = 0; i < kSlots; ++i) {
+    EXPECT_EQ(slots[i].state, i == 5 ? SlotState::kStarting : SlotState::kEmpty);
+    EXPECT_EQ(slots[i].forgotten, i == 5);
+  }
+  for (int i = 0; i < 5; ++i) {
+    for (const MapFeed::Entry& entry : feed().entries) EXPECT_FALSE(entry.mapped);
+  }
+}
+
+}  // namespace
+}  // namespace perimap
