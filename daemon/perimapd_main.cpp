@@ -10,6 +10,9 @@
 #include <string>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/checkpoint/checkpoint_keeper.hpp"
 #include "daemon/config/configuration_difference.hpp"
 #include "daemon/config/configuration_loader.hpp"

@@ -1,6 +1,26 @@
 #include "core/pipeline/pipeline.hpp"
 
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "core/phase/cardiac_clock.hpp"
+#include "core/phase/respiratory_clock.hpp"
+#include "core/pipeline/batch_starter.hpp"
+#include "core/pipeline/feature_finder.hpp"
+#include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/mapper.hpp"
+#include "core/pipeline/phase_cells.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/release_plan.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
+#include "core/pipeline/surface_composer.hpp"
+#include "core/pipeline/surface_state.hpp"
 #include "core/realtime/realtime_scope.hpp"
+#include "core/realtime/worker_team.hpp"
 
 namespace perimap {
 namespace {
@@ -16,98 +36,139 @@ ComposerSettings composer_settings(const PipelineSettings& settings) {
 
 }  // namespace
 
-Pipeline::Pipeline(const PipelineSettings& settings)
-    : settings_(settings),
-      slots_(static_cast<std::size_t>(settings.features.maximum)),
-      cells_(static_cast<std::size_t>(settings.workers)),
-      entrance_(settings.camera.width, settings.camera.height, {settings.clock, settings.r_trigger},
-                {settings.respiration.search.shortest_period, settings.respiration.search.longest_period}, counters_),
-      team_(settings.workers),
-      finder_(settings, counters_),
-      starter_(settings, slots_),
-      mapper_(settings, slots_, cells_, team_, finder_, starter_, phase_cells_, counters_),
-      plan_({settings.latency, settings.frame_stream, settings.clock_period, settings.lead + settings.validity}),
-      composers_{SurfaceComposer(composer_settings(settings)), SurfaceComposer(composer_settings(settings))},
-      publisher_view_(cells_.size()),
-      model_view_(cells_.size()) {
+// In the order in which they are made: each may refer to those before it.
+struct Pipeline::Parts {
+  explicit Parts(const PipelineSettings& of);
+
+  void tell_due() noexcept;
+
+  PipelineSettings settings;
+  PipelineCounters counters;
+  std::vector<FeatureSlot> slots;
+  std::vector<ShardCells> cells;
+  SensorEntrance entrance;
+  WorkerTeam team;
+  FeatureFinder finder;
+  BatchStarter starter;
+  PhaseCells phase_cells;
+  Mapper mapper;
+  ReleasePlan plan;
+  std::array<SurfaceComposer, kReleaseStreams.size()> composers;  // one a stream
+  // Relaxed: a message by itself; the mapper's wake-up follows it.
+  std::atomic<bool> forget_asked{false};
+  std::vector<const ShardSnapshot*> publisher_view;
+  std::vector<const ShardSnapshot*> model_view;
+  std::uint64_t model_owes = 0;  // the frame whose update the snapshots of model_view ought to have
+};
+
+Pipeline::Parts::Parts(const PipelineSettings& of)
+    : settings(of),
+      slots(static_cast<std::size_t>(settings.features.maximum)),
+      cells(static_cast<std::size_t>(settings.workers)),
+      entrance(settings.camera.width, settings.camera.height, {settings.clock, settings.r_trigger},
+               {settings.respiration.search.shortest_period, settings.respiration.search.longest_period}, counters),
+      team(settings.workers),
+      finder(settings, counters),
+      starter(settings, slots),
+      mapper(settings, slots, cells, team, finder, starter, phase_cells, counters),
+      plan({settings.latency, settings.frame_stream, settings.clock_period, settings.lead + settings.validity}),
+      composers{SurfaceComposer(composer_settings(settings)), SurfaceComposer(composer_settings(settings))},
+      publisher_view(cells.size()),
+      model_view(cells.size()) {
   if (settings.pose.error_correlation > Duration(0)) {
-    for (FeatureSlot& slot : slots_) {
+    for (FeatureSlot& slot : slots) {
       slot.slow_error = std::make_unique<CorrelatedPoseNoise>(settings.estimator.layout.state_size(),
                                                               to_seconds(settings.pose.error_correlation));
     }
   }
-  for (ShardCells& cells : cells_) {
-    for (TripleBuffer<ShardSnapshot>* cell : {&cells.publisher, &cells.model}) {
+  for (ShardCells& shard : cells) {
+    for (TripleBuffer<ShardSnapshot>* cell : {&shard.publisher, &shard.model}) {
       // Each of the three copies needs its own reserve: copying a vector does not copy its capacity.
       for (int i = 0; i < 3; ++i) {
-        cell->back().features.reserve(slots_.size());
+        cell->back().features.reserve(slots.size());
         cell->publish();
         cell->update();
       }
     }
   }
-  (void)model_snapshots();  // so that model_view_ holds no null
 }
+
+Pipeline::Pipeline(const PipelineSettings& settings) : parts_(std::make_unique<Parts>(settings)) {
+  static_cast<void>(model_snapshots());  // so that model_view holds no null
+}
+
+Pipeline::~Pipeline() = default;
+
+const PipelineSettings& Pipeline::settings() const noexcept { return parts_->settings; }
+PipelineCounters& Pipeline::counters() noexcept { return parts_->counters; }
+SensorEntrance& Pipeline::entrance() noexcept { return parts_->entrance; }
+WorkerTeam& Pipeline::team() noexcept { return parts_->team; }
+FeatureFinder& Pipeline::finder() noexcept { return parts_->finder; }
+BatchStarter& Pipeline::starter() noexcept { return parts_->starter; }
+ReleasePlan& Pipeline::plan() noexcept { return parts_->plan; }
+std::span<const FeatureSlot> Pipeline::slots() const noexcept { return parts_->slots; }
+bool Pipeline::pose_reached(Instant t) const noexcept { return parts_->mapper.pose_reached(t); }
+MapFeed& Pipeline::map_feed() noexcept { return parts_->mapper.feed(); }
 
 void Pipeline::drain_poses() noexcept {
   const RealtimeScope realtime;
   TrackerSample sample;
-  while (entrance_.pop_pose(sample)) mapper_.add_pose(sample);
+  while (parts_->entrance.pop_pose(sample)) parts_->mapper.add_pose(sample);
 }
 
 void Pipeline::map(const FrameHandle& frame) noexcept {
   const RealtimeScope realtime;
-  TripleBuffer<CardiacClock>& ecg = entrance_.ecg_clocks().mapper;
+  TripleBuffer<CardiacClock>& ecg = parts_->entrance.ecg_clocks().mapper;
   ecg.update();
-  if (settings_.respiration.channel) mapper_.hear_breath(entrance_.breath(), frame.stamp.capture);
-  mapper_.process(frame.stamp, entrance_.image(frame), entrance_.colour(frame), ecg.front());
-  entrance_.give_back(frame);
-  mapper_.beside_learning();
+  if (parts_->settings.respiration.channel) parts_->mapper.hear_breath(parts_->entrance.breath(), frame.stamp.capture);
+  parts_->mapper.process(frame.stamp, parts_->entrance.image(frame), parts_->entrance.colour(frame), ecg.front());
+  parts_->entrance.give_back(frame);
+  parts_->mapper.beside_learning();
 }
 
 void Pipeline::ask_to_forget() noexcept {
-  entrance_.ask_to_forget();
-  forget_asked_.store(true, std::memory_order_relaxed);
-  entrance_.mapper_wakeup().post();
+  parts_->entrance.ask_to_forget();
+  parts_->forget_asked.store(true, std::memory_order_relaxed);
+  parts_->entrance.mapper_wakeup().post();
 }
 
 void Pipeline::forget_if_asked() noexcept {
-  if (forget_asked_.exchange(false, std::memory_order_relaxed)) mapper_.forget();
+  if (parts_->forget_asked.exchange(false, std::memory_order_relaxed)) parts_->mapper.forget();
 }
 
 void Pipeline::recall(const MapMemory& memory, Instant now) {
-  for (const EcgBlock& block : memory.ecg) entrance_.recall_ecg(block);
-  mapper_.recall(memory, now);
-  plan_.resume(memory.last_capture, memory.frame_period, now);
+  for (const EcgBlock& block : memory.ecg) parts_->entrance.recall_ecg(block);
+  parts_->mapper.recall(memory, now);
+  parts_->plan.resume(memory.last_capture, memory.frame_period, now);
 }
 
 void Pipeline::drain_stamps(Instant now) noexcept {
   const RealtimeScope realtime;
   FrameStamp stamp;
-  while (entrance_.pop_stamp(stamp)) {
-    if (!plan_.on_frame(stamp, now)) counters_.frames_too_late.add();
+  while (parts_->entrance.pop_stamp(stamp)) {
+    if (!parts_->plan.on_frame(stamp, now)) parts_->counters.frames_too_late.add();
   }
 }
 
 void Pipeline::leave_out_missed(Instant now) noexcept {
   const RealtimeScope realtime;
-  const MissedReleases missed = plan_.leave_out_missed(now);
+  const MissedReleases missed = parts_->plan.leave_out_missed(now);
   for (const ReleaseStream stream : kReleaseStreams) {
-    if (missed[index_of(stream)] > 0) counters_.of(stream).releases_missed.add(missed[index_of(stream)]);
+    if (missed[index_of(stream)] > 0) parts_->counters.of(stream).releases_missed.add(missed[index_of(stream)]);
   }
-  plan_.let_come_due(now);
-  tell_due();
+  parts_->plan.let_come_due(now);
+  parts_->tell_due();
 }
 
-void Pipeline::tell_due() noexcept {
-  counters_.last_release_capture_ns.set(static_cast<std::uint64_t>(to_ns(plan_.last_due().capture)));
-  counters_.last_owed_sequence.set(plan_.last_owed());
-  counters_.frame_period_ns.set(static_cast<std::uint64_t>(plan_.frame_period().count()));
+void Pipeline::Parts::tell_due() noexcept {
+  counters.last_release_capture_ns.set(static_cast<std::uint64_t>(to_ns(plan.last_due().capture)));
+  counters.last_owed_sequence.set(plan.last_owed());
+  counters.frame_period_ns.set(static_cast<std::uint64_t>(plan.frame_period().count()));
 }
 
 void Pipeline::sent(const SurfaceSample& sample) noexcept {
   const RealtimeScope realtime;
-  StreamCounters& stream = counters_.of(sample.release.stream);
+  StreamCounters& stream = parts_->counters.of(sample.release.stream);
   stream.samples.add();
   if (sample.release.frame_missing) stream.samples_without_frame.add();
   if (sample.update_late) stream.samples_from_late_update.add();
@@ -115,60 +176,60 @@ void Pipeline::sent(const SurfaceSample& sample) noexcept {
 
 void Pipeline::take_back(const SurfaceSample& sample) noexcept {
   const RealtimeScope realtime;
-  counters_.of(sample.release.stream).releases_missed.add();
-  composers_[index_of(sample.release.stream)].take_back();
+  parts_->counters.of(sample.release.stream).releases_missed.add();
+  parts_->composers[index_of(sample.release.stream)].take_back();
 }
 
 const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
   const RealtimeScope realtime;
-  TripleBuffer<CardiacClock>& ecg = entrance_.ecg_clocks().publisher;
+  TripleBuffer<CardiacClock>& ecg = parts_->entrance.ecg_clocks().publisher;
   ecg.update();
-  for (std::size_t i = 0; i < cells_.size(); ++i) {
-    cells_[i].publisher.update();
-    publisher_view_[i] = &cells_[i].publisher.front();
+  for (std::size_t i = 0; i < parts_->cells.size(); ++i) {
+    parts_->cells[i].publisher.update();
+    parts_->publisher_view[i] = &parts_->cells[i].publisher.front();
   }
-  phase_cells_.publisher_heart.update();
-  phase_cells_.publisher_breath.update();
-  const CardiacClock heart = phase_cells_.publisher_heart.front().clock(ecg.front(), release.deadline);
-  const SurfaceSample& sample = composers_[index_of(release.stream)].compose(
-      release, heart, phase_cells_.publisher_breath.front(), publisher_view_);
-  tell_due();
+  parts_->phase_cells.publisher_heart.update();
+  parts_->phase_cells.publisher_breath.update();
+  const CardiacClock heart = parts_->phase_cells.publisher_heart.front().clock(ecg.front(), release.deadline);
+  const SurfaceSample& sample = parts_->composers[index_of(release.stream)].compose(
+      release, heart, parts_->phase_cells.publisher_breath.front(), parts_->publisher_view);
+  parts_->tell_due();
   return sample;
 }
 
 CardiacClock Pipeline::status_clock(Instant now) noexcept {
-  TripleBuffer<CardiacClock>& ecg = entrance_.ecg_clocks().status;
+  TripleBuffer<CardiacClock>& ecg = parts_->entrance.ecg_clocks().status;
   ecg.update();
-  phase_cells_.status_heart.update();
-  return phase_cells_.status_heart.front().clock(ecg.front(), now);
+  parts_->phase_cells.status_heart.update();
+  return parts_->phase_cells.status_heart.front().clock(ecg.front(), now);
 }
 
 RespiratoryClock Pipeline::status_respiration() noexcept {
-  phase_cells_.status_breath.update();
-  return phase_cells_.status_breath.front();
+  parts_->phase_cells.status_breath.update();
+  return parts_->phase_cells.status_breath.front();
 }
 
 std::span<const ShardSnapshot* const> Pipeline::model_snapshots() noexcept {
   // Before they are taken: a release that falls due afterwards asks nothing of them.
-  model_owes_ = counters_.last_owed_sequence.get();
-  for (std::size_t i = 0; i < cells_.size(); ++i) {
-    cells_[i].model.update();
-    model_view_[i] = &cells_[i].model.front();
+  parts_->model_owes = parts_->counters.last_owed_sequence.get();
+  for (std::size_t i = 0; i < parts_->cells.size(); ++i) {
+    parts_->cells[i].model.update();
+    parts_->model_view[i] = &parts_->cells[i].model.front();
   }
-  return model_view_;
+  return parts_->model_view;
 }
 
 SurfaceFooting Pipeline::model_footing(const RespiratoryClock& respiration, Instant now) const noexcept {
-  SurfaceFooting footing = footing_of(model_view_);
+  SurfaceFooting footing = footing_of(parts_->model_view);
   footing.breath_doubtful = respiration.doubtful();
-  for (const ShardSnapshot* snapshot : model_view_) {
+  for (const ShardSnapshot* snapshot : parts_->model_view) {
     footing.update_late =
-        footing.update_late || !snapshot->any || snapshot->recalled || snapshot->frame_sequence < model_owes_;
+        footing.update_late || !snapshot->any || snapshot->recalled || snapshot->frame_sequence < parts_->model_owes;
   }
   // As the schedule has it: the frame after the last one, half a period late, has passed its release.
-  const auto last = from_ns(static_cast<std::int64_t>(counters_.last_frame_ns.get()));
-  const Duration period(static_cast<std::int64_t>(counters_.frame_period_ns.get()));
-  footing.frame_missing = now > last + period + period / 2 + settings_.latency;
+  const auto last = from_ns(static_cast<std::int64_t>(parts_->counters.last_frame_ns.get()));
+  const Duration period(static_cast<std::int64_t>(parts_->counters.frame_period_ns.get()));
+  footing.frame_missing = now > last + period + period / 2 + parts_->settings.latency;
   return footing;
 }
 

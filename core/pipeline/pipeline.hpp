@@ -1,45 +1,53 @@
 // All parts of the pipeline, built once and joined; the threads that run them are the daemon's.
 #pragma once
 
-#include <array>
-#include <atomic>
 #include <memory>
 #include <span>
-#include <vector>
 
-#include "core/pipeline/batch_starter.hpp"
-#include "core/pipeline/feature_finder.hpp"
-#include "core/pipeline/feature_slot.hpp"
-#include "core/pipeline/mapper.hpp"
-#include "core/pipeline/phase_cells.hpp"
-#include "core/pipeline/pipeline_counters.hpp"
-#include "core/pipeline/pipeline_settings.hpp"
-#include "core/pipeline/release_plan.hpp"
-#include "core/pipeline/sensor_entrance.hpp"
-#include "core/pipeline/shard_snapshot.hpp"
-#include "core/pipeline/surface_composer.hpp"
-#include "core/pipeline/surface_state.hpp"
-#include "core/realtime/worker_team.hpp"
+#include "core/time/instant.hpp"
 
 namespace perimap {
 
+class BatchStarter;
+class CardiacClock;
+class FeatureFinder;
+class MapFeed;
+class ReleasePlan;
+class RespiratoryClock;
+class SensorEntrance;
+class WorkerTeam;
+struct FeatureSlot;
+struct FrameHandle;
+struct MapMemory;
+struct PipelineCounters;
+struct PipelineSettings;
+struct Release;
+struct ShardSnapshot;
+struct SurfaceFooting;
+struct SurfaceSample;
+
+// What it is made of is not seen here: who uses a part includes that part's header, and those who only pass a pipeline
+// on compile without any. The parts are made once, so that this costs the real-time path a pointer.
 class Pipeline {
  public:
   explicit Pipeline(const PipelineSettings& settings);
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+  ~Pipeline();
 
-  [[nodiscard]] const PipelineSettings& settings() const noexcept { return settings_; }
-  [[nodiscard]] PipelineCounters& counters() noexcept { return counters_; }
-  [[nodiscard]] SensorEntrance& entrance() noexcept { return entrance_; }
-  [[nodiscard]] WorkerTeam& team() noexcept { return team_; }
-  [[nodiscard]] FeatureFinder& finder() noexcept { return finder_; }
-  [[nodiscard]] BatchStarter& starter() noexcept { return starter_; }
-  [[nodiscard]] ReleasePlan& plan() noexcept { return plan_; }
+  [[nodiscard]] const PipelineSettings& settings() const noexcept;
+  [[nodiscard]] PipelineCounters& counters() noexcept;
+  [[nodiscard]] SensorEntrance& entrance() noexcept;
+  [[nodiscard]] WorkerTeam& team() noexcept;
+  [[nodiscard]] FeatureFinder& finder() noexcept;
+  [[nodiscard]] BatchStarter& starter() noexcept;
+  [[nodiscard]] ReleasePlan& plan() noexcept;
   // Every feature with its match of the last frame. For tests, in lockstep: between frames nothing changes them.
-  [[nodiscard]] std::span<const FeatureSlot> slots() const noexcept { return slots_; }
+  [[nodiscard]] std::span<const FeatureSlot> slots() const noexcept;
 
   // Mapper thread: takes over what the tracker has sent.
   void drain_poses() noexcept;
-  [[nodiscard]] bool pose_reached(Instant t) const noexcept { return mapper_.pose_reached(t); }
+  [[nodiscard]] bool pose_reached(Instant t) const noexcept;
   // Mapper thread: one frame through A, B and C, its buffer given back, then D begun.
   void map(const FrameHandle& frame) noexcept;
 
@@ -52,7 +60,7 @@ class Pipeline {
   // Before any thread runs: what an earlier run knew. Publishing goes on from it at once, before any source is back.
   void recall(const MapMemory& memory, Instant now);
   // One housekeeping thread: the mapped features, a few at a time, and the breathing.
-  [[nodiscard]] MapFeed& map_feed() noexcept { return mapper_.feed(); }
+  [[nodiscard]] MapFeed& map_feed() noexcept;
 
   // Publisher thread: takes over the stamps of the frames that have arrived.
   void drain_stamps(Instant now) noexcept;
@@ -76,25 +84,9 @@ class Pipeline {
   [[nodiscard]] SurfaceFooting model_footing(const RespiratoryClock& respiration, Instant now) const noexcept;
 
  private:
-  void tell_due() noexcept;
+  struct Parts;
 
-  PipelineSettings settings_;
-  PipelineCounters counters_;
-  std::vector<FeatureSlot> slots_;
-  std::vector<ShardCells> cells_;
-  SensorEntrance entrance_;
-  WorkerTeam team_;
-  FeatureFinder finder_;
-  BatchStarter starter_;
-  PhaseCells phase_cells_;
-  Mapper mapper_;
-  ReleasePlan plan_;
-  std::array<SurfaceComposer, kReleaseStreams.size()> composers_;  // one a stream
-  // Relaxed: a message by itself; the mapper's wake-up follows it.
-  std::atomic<bool> forget_asked_{false};
-  std::vector<const ShardSnapshot*> publisher_view_;
-  std::vector<const ShardSnapshot*> model_view_;
-  std::uint64_t model_owes_ = 0;  // the frame whose update the snapshots of model_view_ ought to have
+  std::unique_ptr<Parts> parts_;
 };
 
 }  // namespace perimap

@@ -7,6 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "core/pipeline/map_feed.hpp"
+#include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/checkpoint/warm_restart.hpp"
 
 namespace perimap {

@@ -9,12 +9,14 @@
 #include <mutex>
 #include <string>
 
-#include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/map_memory.hpp"
 #include "daemon/checkpoint/checkpoint_file.hpp"
 #include "daemon/checkpoint/recent_ecg.hpp"
 #include "daemon/config/configuration.hpp"
 
 namespace perimap {
+
+class Pipeline;
 
 // run() takes the mapped features from the pipeline as they come, some a frame, breathing, and the ECG; every
 // `interval` it replaces the file. None of it is on the real-time path.

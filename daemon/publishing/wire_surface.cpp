@@ -2,92 +2,13 @@
 
 #include <algorithm>
 
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/surface_sample.hpp"
 #include "core/realtime/realtime_scope.hpp"
+#include "daemon/publishing/wire_states.hpp"
 #include "daemon/publishing/wire_text.hpp"
 
 namespace perimap {
-
-perimap_SurfaceState to_wire(SurfaceState state) noexcept {
-  switch (state) {
-    case SurfaceState::kGood:
-      return perimap_SURFACE_GOOD;
-    case SurfaceState::kDegraded:
-      return perimap_SURFACE_DEGRADED;
-    case SurfaceState::kInvalid:
-      return perimap_SURFACE_INVALID;
-  }
-  return perimap_SURFACE_INVALID;
-}
-
-perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
-  switch (reason) {
-    case SurfaceReason::kNone:
-      return perimap_SURFACE_REASON_NONE;
-    case SurfaceReason::kNothingMapped:
-      return perimap_SURFACE_REASON_NOTHING_MAPPED;
-    case SurfaceReason::kPhaseUnknown:
-      return perimap_SURFACE_REASON_PHASE_UNKNOWN;
-    case SurfaceReason::kPhaseFreeRunning:
-      return perimap_SURFACE_REASON_PHASE_FREE_RUNNING;
-    case SurfaceReason::kPhaseLost:
-      return perimap_SURFACE_REASON_PHASE_LOST;
-    case SurfaceReason::kFrameMissing:
-      return perimap_SURFACE_REASON_FRAME_MISSING;
-    case SurfaceReason::kUpdateLate:
-      return perimap_SURFACE_REASON_UPDATE_LATE;
-    case SurfaceReason::kPoseMissing:
-      return perimap_SURFACE_REASON_POSE_MISSING;
-    case SurfaceReason::kPhaseContradicted:
-      return perimap_SURFACE_REASON_PHASE_CONTRADICTED;
-    case SurfaceReason::kRespirationUnknown:
-      return perimap_SURFACE_REASON_RESPIRATION_UNKNOWN;
-    case SurfaceReason::kPhaseFromImage:
-      return perimap_SURFACE_REASON_PHASE_FROM_IMAGE;
-    case SurfaceReason::kEctopicBeat:
-      return perimap_SURFACE_REASON_ECTOPIC_BEAT;
-    case SurfaceReason::kRhythmUnpredictable:
-      return perimap_SURFACE_REASON_RHYTHM_UNPREDICTABLE;
-    case SurfaceReason::kRhythmEctopic:
-      return perimap_SURFACE_REASON_RHYTHM_ECTOPIC;
-    case SurfaceReason::kLawUndecided:
-      return perimap_SURFACE_REASON_LAW_UNDECIDED;
-    case SurfaceReason::kNotSeen:
-      return perimap_SURFACE_REASON_NOT_SEEN;
-  }
-  return perimap_SURFACE_REASON_NOTHING_MAPPED;
-}
-
-perimap_FeatureState to_wire(FeatureState state) noexcept {
-  switch (state) {
-    case FeatureState::kConverged:
-      return perimap_FEATURE_CONVERGED;
-    case FeatureState::kConverging:
-      return perimap_FEATURE_CONVERGING;
-    case FeatureState::kInconsistent:
-      return perimap_FEATURE_INCONSISTENT;
-    case FeatureState::kInvalid:
-      return perimap_FEATURE_INVALID;
-  }
-  return perimap_FEATURE_INVALID;
-}
-
-perimap_FeatureReason to_wire(FeatureReason reason) noexcept {
-  switch (reason) {
-    case FeatureReason::kNone:
-      return perimap_FEATURE_REASON_NONE;
-    case FeatureReason::kNotObserved:
-      return perimap_FEATURE_REASON_NOT_OBSERVED;
-    case FeatureReason::kDeviationLarge:
-      return perimap_FEATURE_REASON_DEVIATION_LARGE;
-    case FeatureReason::kInnovationsHigh:
-      return perimap_FEATURE_REASON_INNOVATIONS_HIGH;
-    case FeatureReason::kPhaseLost:
-      return perimap_FEATURE_REASON_PHASE_LOST;
-    case FeatureReason::kShed:
-      return perimap_FEATURE_REASON_SHED;
-  }
-  return perimap_FEATURE_REASON_PHASE_LOST;
-}
 
 WireSurface::WireSurface(const Identity& identity, std::size_t maximum_features) : features_(maximum_features) {
   copy_text(identity.source, wire_.source);

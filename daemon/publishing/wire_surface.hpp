@@ -3,13 +3,16 @@
 
 #include <perimap.h>
 
+#include <cstddef>
 #include <vector>
 
-#include "core/pipeline/pipeline_settings.hpp"
-#include "core/pipeline/surface_sample.hpp"
+#include "core/time/instant.hpp"
 #include "daemon/publishing/identity.hpp"
 
 namespace perimap {
+
+struct PipelineSettings;
+struct SurfaceSample;
 
 class WireSurface {
  public:
@@ -31,10 +34,5 @@ class WireSurface {
 
 // One for each ReleaseStream, in their order.
 [[nodiscard]] std::vector<WireSurface> wire_surfaces(const Identity& identity, const PipelineSettings& settings);
-
-[[nodiscard]] perimap_SurfaceState to_wire(SurfaceState state) noexcept;
-[[nodiscard]] perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept;
-[[nodiscard]] perimap_FeatureState to_wire(FeatureState state) noexcept;
-[[nodiscard]] perimap_FeatureReason to_wire(FeatureReason reason) noexcept;
 
 }  // namespace perimap

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <string_view>
 
+#include "daemon/publishing/identity.hpp"
+
 namespace perimap {
 
 // Cuts what does not fit; always terminated.
@@ -13,6 +15,13 @@ void copy_text(std::string_view text, char (&out)[N]) noexcept {
   const std::size_t n = std::min(text.size(), N - 1);
   std::copy_n(text.data(), n, out);
   out[n] = '\0';
+}
+
+// Who publishes the message, and on which stream.
+template <class Message>
+void name_as(Message& message, const Identity& identity) noexcept {
+  copy_text(identity.source, message.source);
+  copy_text(name_of(identity.stream), message.stream);
 }
 
 }  // namespace perimap

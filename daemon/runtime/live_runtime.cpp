@@ -3,7 +3,17 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/pipeline/batch_starter.hpp"
+#include "core/pipeline/feature_finder.hpp"
+#include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/release_plan.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/surface_sample.hpp"
 #include "core/realtime/deadline.hpp"
+#include "core/realtime/worker_team.hpp"
+#include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/latency_check.hpp"
 #include "daemon/runtime/model_moment.hpp"
 #include "daemon/runtime/utc_offset.hpp"

@@ -9,15 +9,21 @@
 #include <utility>
 #include <vector>
 
-#include "core/pipeline/pipeline.hpp"
+#include "core/phase/cardiac_clock.hpp"
+#include "core/phase/respiratory_clock.hpp"
 #include "core/realtime/counter.hpp"
+#include "core/realtime/wakeup.hpp"
 #include "daemon/publishing/identity.hpp"
-#include "daemon/publishing/publication.hpp"
-#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/recent_counts.hpp"
+#include "daemon/publishing/wire_model.hpp"
+#include "daemon/publishing/wire_status.hpp"
 #include "daemon/publishing/wire_surface.hpp"
 #include "daemon/runtime/thread_launcher.hpp"
 
 namespace perimap {
+
+class Pipeline;
+class Publication;
 
 struct RuntimeSettings {
   Identity identity;

@@ -6,9 +6,21 @@
 #include <string>
 #include <utility>
 
+#include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
+#include "daemon/checkpoint/checkpoint_keeper.hpp"
+#include "daemon/control/control_server.hpp"
+#include "daemon/process/service_manager.hpp"
+#include "daemon/process/stop_signal.hpp"
+#include "daemon/publishing/publication.hpp"
 #include "daemon/publishing/status_text.hpp"
 #include "daemon/runtime/latency_check.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
+#include "daemon/runtime/sensor_feeder.hpp"
+#include "daemon/runtime/session_commands.hpp"
+#include "drivers/recording/replay_reader.hpp"
 
 namespace perimap {
 namespace {
@@ -35,6 +47,10 @@ LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Pu
       identity_(settings.identity),
       service_status_(settings.identity) {}
 
+LiveSession::~LiveSession() = default;
+
+void LiveSession::keep_checkpoints(std::unique_ptr<CheckpointKeeper> keeper) { keeper_ = std::move(keeper); }
+
 void LiveSession::take_commands_at(std::string socket, std::function<Expected<std::string>()> reload) {
   control_socket_ = std::move(socket);
   reload_ = std::move(reload);
@@ -56,7 +72,7 @@ Expected<void> LiveSession::start_control() {
   auto server =
       ControlServer::create(control_socket_, [this](ControlCommand command) { return commands_->answer(command); });
   if (!server) return tl::unexpected(std::move(server.error()));
-  control_.emplace(std::move(*server));
+  control_ = std::make_unique<ControlServer>(std::move(*server));
   control_thread_ =
       runtime_.threads().launch("control", ThreadRole::kHousekeeping, [this] { control_->serve(control_interrupt_); });
   return {};

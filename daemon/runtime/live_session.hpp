@@ -3,25 +3,26 @@
 
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <thread>
-#include <utility>
 
 #include "core/error/expected.hpp"
-#include "core/pipeline/pipeline.hpp"
-#include "daemon/checkpoint/checkpoint_keeper.hpp"
-#include "daemon/control/control_server.hpp"
-#include "daemon/process/service_manager.hpp"
-#include "daemon/process/stop_signal.hpp"
-#include "daemon/publishing/publication.hpp"
+#include "daemon/publishing/identity.hpp"
+#include "daemon/publishing/wire_status.hpp"
 #include "daemon/runtime/live_runtime.hpp"
-#include "daemon/runtime/sensor_feeder.hpp"
-#include "daemon/runtime/session_commands.hpp"
-#include "drivers/recording/replay_reader.hpp"
 #include "drivers/transport/interrupt.hpp"
 
 namespace perimap {
+
+class CheckpointKeeper;
+class ControlServer;
+class Pipeline;
+class Publication;
+class ReplayReader;
+class SensorFeeder;
+class ServiceManager;
+class SessionCommands;
+class StopSignal;
 
 class LiveSession {
  public:
@@ -33,6 +34,10 @@ class LiveSession {
   LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Publication& publication,
               std::unique_ptr<SensorFeeder> feeder, std::function<void()> on_tick = {});
 
+  LiveSession(const LiveSession&) = delete;
+  LiveSession& operator=(const LiveSession&) = delete;
+  ~LiveSession();
+
   // Before run(): `service` is told of readiness, health and end. It must outlive this.
   void report_to(ServiceManager& service) noexcept { service_ = &service; }
 
@@ -40,7 +45,7 @@ class LiveSession {
   void take_commands_at(std::string socket, std::function<Expected<std::string>()> reload);
 
   // Before run(): `keeper`, over the same pipeline, keeps checkpoints while it runs.
-  void keep_checkpoints(std::unique_ptr<CheckpointKeeper> keeper) { keeper_ = std::move(keeper); }
+  void keep_checkpoints(std::unique_ptr<CheckpointKeeper> keeper);
 
   // Returns when every surface of the recording is released, or on a stop signal; an error when reading failed.
   [[nodiscard]] Expected<void> run(StopSignal& stop);
@@ -65,7 +70,7 @@ class LiveSession {
   std::string control_socket_;
   std::function<Expected<std::string>()> reload_;
   std::unique_ptr<SessionCommands> commands_;
-  std::optional<ControlServer> control_;
+  std::unique_ptr<ControlServer> control_;
   Interrupt control_interrupt_;
   std::thread control_thread_;
   std::unique_ptr<CheckpointKeeper> keeper_;

@@ -3,6 +3,16 @@
 #include <algorithm>
 #include <variant>
 
+#include "core/pipeline/batch_starter.hpp"
+#include "core/pipeline/feature_finder.hpp"
+#include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/release_plan.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/surface_sample.hpp"
+#include "core/realtime/worker_team.hpp"
+#include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/model_moment.hpp"
 
 namespace perimap {

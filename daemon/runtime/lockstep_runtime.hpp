@@ -4,14 +4,17 @@
 #include <thread>
 #include <vector>
 
-#include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/frame_pool.hpp"
 #include "daemon/publishing/identity.hpp"
-#include "daemon/publishing/publication.hpp"
-#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/wire_model.hpp"
+#include "daemon/publishing/wire_status.hpp"
 #include "daemon/publishing/wire_surface.hpp"
 #include "drivers/recording/replay_reader.hpp"
 
 namespace perimap {
+
+class Pipeline;
+class Publication;
 
 // Events are delivered at their recorded arrival times and nothing is known before; deadlines fall at their virtual
 // instants; computing takes no virtual time. Workers and housekeeping are real threads, waited for where the live

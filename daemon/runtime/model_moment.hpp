@@ -2,7 +2,10 @@
 #pragma once
 
 #include "core/pipeline/pipeline.hpp"
-#include "daemon/publishing/wire_reports.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
+#include "core/pipeline/surface_state.hpp"
+#include "daemon/publishing/model_moment.hpp"
 
 namespace perimap {
 

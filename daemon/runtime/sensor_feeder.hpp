@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
-#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/wire_status.hpp"
 #include "daemon/runtime/thread_launcher.hpp"
 
 namespace perimap {

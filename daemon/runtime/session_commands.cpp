@@ -3,6 +3,8 @@
 #include <thread>
 #include <utility>
 
+#include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
 #include "daemon/publishing/status_text.hpp"
 
 namespace perimap {

@@ -7,12 +7,13 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
-#include "core/pipeline/pipeline.hpp"
 #include "daemon/control/control_request.hpp"
 #include "daemon/publishing/identity.hpp"
-#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/wire_status.hpp"
 
 namespace perimap {
+
+class Pipeline;
 
 // Used by the thread that takes the commands.
 class SessionCommands {

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "drivers/standins/simulator/simulation.hpp"
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/surface_composer.hpp"
 #include "daemon/evaluation/report/accuracy.hpp"
 #include "daemon/publishing/publication.hpp"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
 #include "drivers/standins/simulator/simulation.hpp"
 #include "goals.hpp"
 #include "horizon_session.hpp"

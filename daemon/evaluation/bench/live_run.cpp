@@ -12,15 +12,22 @@
 #include <utility>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/evaluation/bench/bare_loop.hpp"
 #include "daemon/evaluation/bench/child_process.hpp"
 #include "daemon/evaluation/bench/machine.hpp"
 #include "daemon/evaluation/bench/release_log.hpp"
 #include "daemon/evaluation/bench/subscriber.hpp"
+#include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/dds_publication.hpp"
 #include "daemon/runtime/live_session.hpp"
+#include "daemon/runtime/replay_feeder.hpp"
+#include "daemon/runtime/sensor_feeder.hpp"
+#include "daemon/runtime/sensor_intake.hpp"
 #include "daemon/runtime/session_recorder.hpp"
 #include "daemon/runtime/session_recording.hpp"
+#include "drivers/recording/replay_reader.hpp"
 
 namespace perimap::bench {
 namespace {

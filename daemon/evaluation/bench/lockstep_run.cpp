@@ -10,7 +10,12 @@
 #include <variant>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "daemon/process/stop_signal.hpp"
+#include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
+#include "drivers/recording/replay_reader.hpp"
 
 namespace perimap::bench {
 namespace {

@@ -10,7 +10,10 @@
 #include <string>
 #include <utility>
 
+#include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
 #include "daemon/commands/progress.hpp"
 #include "daemon/commands/same_file.hpp"
 #include "daemon/evaluation/report/accuracy.hpp"
@@ -23,7 +26,8 @@
 #include "daemon/publishing/publication_recorder.hpp"
 #include "daemon/publishing/status_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
-#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/wire_states.hpp"
+#include "daemon/publishing/wire_status.hpp"
 #include "daemon/runtime/live_session.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/replay_setup.hpp"

@@ -10,8 +10,14 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/phase/cardiac_clock.hpp"
+#include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/surface_sample.hpp"
+#include "daemon/publishing/model_moment.hpp"
 #include "daemon/publishing/publication.hpp"
+#include "daemon/publishing/wire_model.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/model_moment.hpp"
 #include "daemon/runtime/replay_setup.hpp"

@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/evaluation/report/accuracy.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"

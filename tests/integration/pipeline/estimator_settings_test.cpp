@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
 #include "daemon/evaluation/report/recorded_truth.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"

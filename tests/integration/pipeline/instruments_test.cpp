@@ -8,10 +8,13 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/replay_setup.hpp"
 #include "daemon/runtime/session_recording.hpp"
+#include "drivers/recording/replay_reader.hpp"
 #include "drivers/recording/sensor_writer.hpp"
 
 namespace perimap {

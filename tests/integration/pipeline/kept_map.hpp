@@ -6,7 +6,10 @@
 #include <map>
 #include <vector>
 
+#include "core/pipeline/map_feed.hpp"
+#include "core/pipeline/map_memory.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
 
 namespace perimap::test {
 

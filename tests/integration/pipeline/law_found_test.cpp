@@ -4,7 +4,10 @@
 
 #include <chrono>
 
+#include "core/phase/cardiac_clock.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "drivers/standins/simulator/simulation.hpp"
 #include "tests/integration/pipeline/collected_surfaces.hpp"

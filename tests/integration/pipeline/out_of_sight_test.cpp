@@ -7,8 +7,12 @@
 #include <functional>
 #include <vector>
 
+#include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/sight.hpp"
+#include "core/pipeline/surface_state.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "drivers/standins/simulator/simulation.hpp"
 #include "tests/integration/pipeline/collected_surfaces.hpp"

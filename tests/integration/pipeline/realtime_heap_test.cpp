@@ -24,6 +24,9 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
 #include "core/realtime/realtime_scope.hpp"
 #include "core/realtime/wakeup.hpp"
 #include "daemon/publishing/publication.hpp"

@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "core/pipeline/map_memory.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
 #include "daemon/checkpoint/checkpoint_file.hpp"
 #include "daemon/checkpoint/warm_restart.hpp"
 #include "daemon/publishing/publication.hpp"

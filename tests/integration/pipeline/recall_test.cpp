@@ -14,7 +14,14 @@
 #include <utility>
 #include <vector>
 
+#include "core/phase/cardiac_clock.hpp"
+#include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/map_memory.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/surface_sample.hpp"
 #include "daemon/checkpoint/checkpoint_keeper.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"

@@ -12,7 +12,10 @@
 #include <string>
 #include <vector>
 
+#include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
 #include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "drivers/standins/simulator/simulation.hpp"

@@ -20,9 +20,14 @@
 #include <vector>
 
 #include "core/pipeline/load_shedding.hpp"
+#include "core/pipeline/map_memory.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/replay_setup.hpp"
+#include "drivers/recording/replay_reader.hpp"
 #include "tests/integration/pipeline/collected_surfaces.hpp"
 #include "tests/integration/pipeline/kept_map.hpp"
 

@@ -12,13 +12,22 @@
 #include <variant>
 #include <vector>
 
+#include "core/phase/cardiac_clock.hpp"
+#include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/release_plan.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/surface_sample.hpp"
 #include "core/realtime/deadline.hpp"
+#include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/live_runtime.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
 #include "daemon/runtime/model_moment.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
 #include "daemon/runtime/replay_setup.hpp"
+#include "drivers/recording/replay_reader.hpp"
 #include "tests/integration/pipeline/collected_surfaces.hpp"
 
 namespace perimap {

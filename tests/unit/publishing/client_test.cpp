@@ -10,7 +10,8 @@
 #include "core/phase/cardiac_clock_tracker.hpp"
 #include "core/phase/law_choice.hpp"
 #include "core/pipeline/surface_composer.hpp"
-#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/model_moment.hpp"
+#include "daemon/publishing/wire_model.hpp"
 #include "perimap_client.hpp"
 
 namespace perimap {

@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "core/pipeline/pipeline_settings.hpp"
 #include "daemon/publishing/status_text.hpp"
-#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/wire_status.hpp"
 
 namespace perimap {
 namespace {

@@ -6,8 +6,11 @@
 #include <vector>
 
 #include "core/phase/cardiac_clock_tracker.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/surface_sample.hpp"
 #include "daemon/config/surface_traffic.hpp"
-#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/model_moment.hpp"
+#include "daemon/publishing/wire_model.hpp"
 #include "drivers/recording/cdr.hpp"
 
 namespace perimap {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "begun_recording.hpp"
-#include "daemon/publishing/wire_reports.hpp"
+#include "daemon/publishing/wire_status.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/session_recording.hpp"
 #include "drivers/recording/replay_reader.hpp"

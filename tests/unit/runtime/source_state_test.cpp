@@ -4,6 +4,11 @@
 #include <array>
 #include <atomic>
 
+#include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/sensor_entrance.hpp"
+#include "daemon/publishing/publication.hpp"
 #include "daemon/runtime/live_runtime.hpp"
 #include "wait_until.hpp"
 

@@ -1,66 +1,21 @@
-// The slower topics as wire types: surface model, phase, status. Not for the real-time path: they allocate.
+// The status as its wire type. Not for the real-time path: it allocates.
 #pragma once
 
 #include <perimap.h>
 
 #include <array>
-#include <span>
-#include <string>
+#include <cstdint>
 #include <vector>
 
-#include "core/periodic/basis.hpp"
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/respiratory_clock.hpp"
-#include "core/pipeline/pipeline_counters.hpp"
-#include "core/pipeline/pipeline_settings.hpp"
-#include "core/pipeline/shard_snapshot.hpp"
-#include "core/pipeline/surface_state.hpp"
+#include "core/time/instant.hpp"
 #include "daemon/publishing/identity.hpp"
 #include "daemon/publishing/recent_counts.hpp"
 
 namespace perimap {
 
-// One moment of the map and its clocks.
-struct ModelMoment {
-  std::span<const ShardSnapshot* const> snapshots;  // in order of shard
-  BasisLayout layout;
-  CardiacClock clock;
-  RespiratoryClock respiration;
-  SurfaceFooting footing;
-  Instant now;
-  Duration utc_minus_monotonic{0};
-  Duration validity{0};  // nothing is said of instants further ahead
-};
-
-[[nodiscard]] perimap_RespirationState to_wire(RespirationState state) noexcept;
-[[nodiscard]] perimap_RespirationSource to_wire(RespirationSource source) noexcept;
-
-// Owns the buffers that its message points to.
-class WireModel {
- public:
-  explicit WireModel(const Identity& identity);
-
-  // Valid until the next call.
-  [[nodiscard]] const perimap_SurfaceModel& fill(const ModelMoment& moment);
-
- private:
-  void fill_features(const ModelMoment& moment);
-  void fill_cycles(const ModelMoment& moment);
-
-  std::vector<perimap_ModelFeature> features_;
-  std::vector<std::vector<double>> coefficients_;
-  std::vector<perimap_CardiacCycle> cycles_;
-  perimap_SurfaceModel wire_{};
-};
-
-class WirePhase {
- public:
-  explicit WirePhase(const Identity& identity);
-  [[nodiscard]] const perimap_Phase& fill(const CardiacClock& clock, Instant now) noexcept;
-
- private:
-  perimap_Phase wire_{};
-};
+struct PipelineSettings;
 
 // What the driver of a device knows beside the counters.
 struct SourceLink {

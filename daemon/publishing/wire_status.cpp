@@ -1,0 +1,200 @@
+#include "daemon/publishing/wire_status.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "core/pipeline/pipeline_settings.hpp"
+#include "daemon/publishing/wire_states.hpp"
+#include "daemon/publishing/wire_text.hpp"
+
+namespace perimap {
+namespace {
+
+// A trigger gives one pulse a beat.
+constexpr Duration kLongestBeat = std::chrono::seconds(3);
+
+// What is known of one source.
+struct SourceFacts {
+  perimap_SourceKind kind;
+  const SourceLink& link;
+  std::uint64_t received = 0;
+  std::uint64_t dropped = 0;
+  std::uint64_t invalid = 0;
+  const Counter& last_ns;
+  const Counter& last_good_ns;
+  const LatencyHistogram& delay;
+  Duration stalled_after;  // silent for longer, it counts as stalled
+};
+
+// Calls `tell(SourceFacts)` for each source that there is, in the order of kStatusSources.
+template <class Tell>
+void for_each_source(const PipelineCounters& c, const StatusFacts& facts, Tell tell) noexcept {
+  const Duration stalled = facts.stalled_after;
+  tell(SourceFacts{perimap_SOURCE_CAMERA, facts.camera, c.frames_received.get(), c.frames_dropped.get(), 0,
+                   c.last_frame_ns, c.last_frame_ns, c.camera_delay, stalled});
+  tell(SourceFacts{perimap_SOURCE_TRACKER, facts.tracker, c.poses_received.get(),
+                   c.poses_dropped.get() + c.poses_refused.get(), c.poses_invalid.get(), c.last_pose_ns,
+                   c.last_good_pose_ns, c.tracker_delay, stalled});
+  if (facts.ecg_device) {
+    tell(SourceFacts{perimap_SOURCE_ECG, facts.ecg, c.ecg_samples.get(), c.ecg_dropped.get(), c.ecg_lead_off.get(),
+                     c.last_ecg_ns, c.last_good_ecg_ns, c.ecg_delay, stalled});
+  }
+  if (facts.r_trigger) {
+    tell(SourceFacts{perimap_SOURCE_R_TRIGGER, facts.r_trigger_line, c.r_triggers.get(), c.r_triggers_dropped.get(), 0,
+                     c.last_r_trigger_ns, c.last_r_trigger_ns, c.r_trigger_delay, std::max(stalled, kLongestBeat)});
+  }
+  if (facts.respiration_channel) {
+    tell(SourceFacts{perimap_SOURCE_RESPIRATION, facts.respiration_link, c.respiration_samples.get(),
+                     c.respiration_dropped.get(), c.respiration_off.get(), c.last_respiration_ns,
+                     c.last_good_respiration_ns, c.respiration_delay, stalled});
+  }
+}
+
+// `ended`: of a recording.
+perimap_SourceState state_of(const SourceFacts& source, bool ended, Instant now) noexcept {
+  if (source.link.closed) return perimap_SOURCE_CLOSED;
+  if (source.received == 0) return perimap_SOURCE_STARTING;
+  if (ended) return perimap_SOURCE_ENDED;
+  const Instant last = from_ns(static_cast<std::int64_t>(source.last_ns.get()));
+  return now - last > source.stalled_after ? perimap_SOURCE_STALLED : perimap_SOURCE_OK;
+}
+
+perimap_SourceStatus source_status(const SourceFacts& source, bool ended, Instant now) noexcept {
+  const LatencyHistogram::Summary summary = source.delay.summary();
+  perimap_SourceStatus wire{};
+  wire.kind = source.kind;
+  wire.state = state_of(source, ended, now);
+  wire.received = source.received;
+  wire.dropped = source.dropped;
+  wire.invalid = source.invalid;
+  wire.last_source_time_ns = static_cast<std::int64_t>(source.last_ns.get());
+  wire.last_good_time_ns = static_cast<std::int64_t>(source.last_good_ns.get());
+  wire.delay_p50_ns = summary.p50.count();
+  wire.delay_p99_ns = summary.p99.count();
+  wire.delay_max_ns = summary.max.count();
+  wire.jitter_p50_ns = source.link.jitter_p50.count();
+  wire.jitter_p99_ns = source.link.jitter_p99.count();
+  return wire;
+}
+
+// `then`: the counts of some seconds ago; null when they are not known.
+perimap_StageLatency stage_latency(perimap_StageKind kind, const LatencyHistogram& histogram,
+                                   const LatencyHistogram::Counts* then) noexcept {
+  const LatencyHistogram::Summary all = histogram.summary();
+  perimap_StageLatency wire{};
+  wire.kind = kind;
+  wire.count = all.count;
+  wire.p50_ns = all.p50.count();
+  wire.p99_ns = all.p99.count();
+  wire.p999_ns = all.p999.count();
+  wire.max_ns = all.max.count();
+  if (then == nullptr) return wire;
+  const LatencyHistogram::Summary recent = LatencyHistogram::between(*then, histogram.counts());
+  wire.recent_count = recent.count;
+  wire.recent_p50_ns = recent.p50.count();
+  wire.recent_p99_ns = recent.p99.count();
+  wire.recent_p999_ns = recent.p999.count();
+  wire.recent_max_ns = recent.max.count();
+  return wire;
+}
+
+}  // namespace
+
+SourceStates source_states(const PipelineCounters& counters, const StatusFacts& facts, Instant now) noexcept {
+  SourceStates states;
+  states.fill(perimap_SOURCE_STARTING);
+  for_each_source(counters, facts, [&](const SourceFacts& source) noexcept {
+    for (std::size_t i = 0; i < kStatusSources.size(); ++i) {
+      if (kStatusSources[i].kind == source.kind) states[i] = state_of(source, facts.sources_ended, now);
+    }
+  });
+  return states;
+}
+
+WireStatus::WireStatus(const Identity& identity) : stream_(identity.stream) {
+  name_as(wire_, identity);
+  copy_text(PERIMAP_VERSION, wire_.version);
+}
+
+const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFacts& facts, Instant now) noexcept {
+  ++wire_.sample_sequence;
+  wire_.time_ns = to_ns(now);
+  wire_.realtime_priority = facts.realtime_priority;
+  wire_.memory_locked = facts.memory_locked;
+  wire_.latency_ns = facts.latency.count();
+  wire_.frames = c.frames.get();
+  wire_.frames_too_late = c.frames_too_late.get();
+  wire_.frames_without_pose = c.frames_without_pose.get();
+  wire_.frames_without_phase = c.frames_without_phase.get();
+  wire_.phases_from_image = c.phases_from_image.get();
+  const StreamCounters& stream = c.of(stream_);
+  wire_.samples = stream.samples.get();
+  wire_.samples_without_frame = stream.samples_without_frame.get();
+  wire_.samples_from_late_update = stream.samples_from_late_update.get();
+  wire_.releases_missed = stream.releases_missed.get();
+  wire_.releases_late = stream.releases_late.get();
+  wire_.learning_put_off = c.learning_put_off.get();
+  wire_.adoptions_late = c.adoptions_late.get();
+  wire_.features_tracked = static_cast<std::uint32_t>(c.features_tracked.get());
+  wire_.features_starting = static_cast<std::uint32_t>(c.features_starting.get());
+  wire_.features_converging = static_cast<std::uint32_t>(c.features_converging.get());
+  wire_.features_converged = static_cast<std::uint32_t>(c.features_converged.get());
+  wire_.features_inconsistent = static_cast<std::uint32_t>(c.features_inconsistent.get());
+  wire_.features_shed = static_cast<std::uint32_t>(c.features_shed.get());
+  wire_.times_shed = c.times_shed.get();
+  wire_.features_lost = c.features_lost();
+  wire_.features_lost_unseen = c.features_lost_unseen.get();
+  wire_.features_lost_refused = c.features_lost_refused.get();
+  wire_.features_lost_unstarted = c.features_lost_unstarted.get();
+  wire_.starts_failed_unusable =
+      c.starts_failed_by(BatchStatus::kTooFewObservations) + c.starts_failed_by(BatchStatus::kBadObservation);
+  wire_.starts_failed_behind = c.starts_failed_by(BatchStatus::kBehindCamera);
+  wire_.starts_failed_diverged = c.starts_failed_by(BatchStatus::kDiverged);
+  wire_.starts_failed_outliers = c.starts_failed_by(BatchStatus::kTooManyOutliers);
+  wire_.start_matches_needed = static_cast<std::uint32_t>(c.start_matches_needed.get());
+  wire_.start_matches_most = static_cast<std::uint32_t>(c.start_matches_most.get());
+  wire_.start_matches_mean = static_cast<std::uint32_t>(c.start_matches_mean.get());
+  wire_.respiration = to_wire(facts.respiration);
+  wire_.respiration_suspected = facts.respiration_suspected;
+  wire_.respiration_source = to_wire(facts.respiration_source);
+  wire_.features_started_anew = c.features_started_anew.get();
+  wire_.recording = facts.recording.state;
+  wire_.messages_recorded = facts.recording.recorded;
+  wire_.frames_not_recorded = facts.recording.frames_not_recorded;
+  wire_.other_not_recorded = facts.recording.other_not_recorded;
+  wire_.phase_state = to_wire(facts.phase);
+  wire_.rhythm = to_wire(facts.rhythm);
+  wire_.latency_short = facts.latency_short;
+
+  std::uint32_t sources = 0;
+  for_each_source(c, facts, [&](const SourceFacts& source) noexcept {
+    sources_[sources++] = source_status(source, facts.sources_ended, now);
+  });
+  wire_.sources = {sources, sources, sources_, false};
+
+  const std::optional<CountsThen> then = facts.recent != nullptr ? facts.recent->then() : std::nullopt;
+  wire_.recent_ns = then ? (now - then->time).count() : 0;
+  for (std::uint32_t i = 0; i < sources; ++i) {
+    if (then && now > then->time) {
+      sources_[i].rate_hz = static_cast<double>(sources_[i].received - then->received_of(sources_[i].kind)) /
+                            to_seconds(now - then->time);
+    }
+  }
+  for (std::size_t i = 0; i < kStatusStages.size(); ++i) {
+    stages_[i] = stage_latency(kStatusStages[i], stage_histogram(c, stream_, kStatusStages[i]),
+                               then ? &then->stages[index_of(stream_)][i] : nullptr);
+  }
+  constexpr auto kStages = static_cast<std::uint32_t>(kStatusStages.size());
+  wire_.stages = {kStages, kStages, stages_, false};
+  return wire_;
+}
+
+std::vector<WireStatus> wire_statuses(const Identity& identity, const PipelineSettings& settings) {
+  std::vector<WireStatus> statuses;
+  for (const ReleaseStream stream : kReleaseStreams) {
+    if (publishes(settings, stream)) statuses.emplace_back(identity.of(stream));
+  }
+  return statuses;
+}
+
+}  // namespace perimap
