@@ -1,16 +1,16 @@
 #include "core/pipeline/breathing.hpp"
 
-#include <cstdint>
+#include <chrono>
 
 #include "core/pipeline/feature_group.hpp"
 
 namespace perimap {
 namespace {
 
-// Frames from one search for breathing to the next, and, where it is not asked for, from one look at the common
-// displacement to the next.
-constexpr std::uint64_t kSearchInterval = 32;
-constexpr std::uint64_t kDisplacementInterval = 3;
+// From one search for breathing to the next, and, where it is not asked for, from one look at the common displacement
+// to the next.
+constexpr Duration kSearchInterval = std::chrono::milliseconds(1067);
+constexpr Duration kDisplacementInterval = std::chrono::milliseconds(100);
 // How well a frame tells the common displacement while the map is young, and how fast breathing changes it.
 constexpr double kDisplacementDeviation_mm = 1.0;
 constexpr double kDisplacementRate_mm_per_s = 15.0;
@@ -77,7 +77,7 @@ bool Breathing::observe(const ImagePhaseAnswer& seen, Instant capture) noexcept 
 bool Breathing::asks_for_displacement(const FrameRecord& frame, bool phase_told) const noexcept {
   if (settings_.enabled) return !phase_told;
   // Where breathing is only watched for: a phase that is off displaces the surface too.
-  return frame.index % kDisplacementInterval == 0 && frame.phase.state == PhaseState::kLocked;
+  return frame.index % frame.rate.frames(kDisplacementInterval) == 0 && frame.phase.state == PhaseState::kLocked;
 }
 
 void Breathing::add_displacement(const FrameRecord& frame, const Vector3d& displacement_mm) noexcept {
@@ -88,7 +88,7 @@ void Breathing::add_displacement(const FrameRecord& frame, const Vector3d& displ
 }
 
 void Breathing::search(const FrameRecord& frame) noexcept {
-  if (frame.index % kSearchInterval == 0) tracker_.search(frame.stamp.capture);
+  if (frame.index % frame.rate.frames(kSearchInterval) == 0) tracker_.search(frame.stamp.capture);
 }
 
 RespiratoryClock Breathing::published() const noexcept {

@@ -1,6 +1,7 @@
 #include "core/pipeline/feature_finder.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -14,7 +15,8 @@ namespace perimap {
 namespace {
 
 // As wide as the search for a feature that has no map yet.
-constexpr double kMotionDeviation_px = 10.0;
+constexpr double kMotion_px_per_s = 300.0;
+constexpr Duration kTakenEvery = std::chrono::microseconds(33333);
 
 // Not all that is found lives through the round, least of all where the heart moves fastest; what is over is let go.
 constexpr int with_spare(int wanted) { return 2 * wanted; }
@@ -25,13 +27,12 @@ FeatureFinder::FeatureFinder(const PipelineSettings& settings, PipelineCounters&
     : width_(settings.camera.width),
       height_(settings.camera.height),
       bands_(bands_of(width_, height_)),
-      interval_(static_cast<std::uint64_t>(
-          std::max(settings.features.detection_interval_frames / bands_, kFinderDelayFrames + 1))),
+      interval_(settings.features.detection_interval),
       lockstep_(settings.lockstep),
       min_distance_px_(settings.features.minimum_distance_px),
       maximum_(settings.features.maximum),
       counters_(counters),
-      steps_(kFinderDelayFrames) {
+      steps_(kFinderFrames) {
   for (Frame& frame : frames_) {
     frame.pixels.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   }
@@ -42,11 +43,11 @@ FeatureFinder::FeatureFinder(const PipelineSettings& settings, PipelineCounters&
   found_.reserve(kMaximumPerRound);
 }
 
-bool FeatureFinder::may_begin(std::uint64_t frame_index, const ColourImage& colour) noexcept {
+bool FeatureFinder::may_begin(std::uint64_t frame_index, const FrameRate& rate, const ColourImage& colour) noexcept {
   // Not every frame of a colour camera comes with colour; and one may have none any more, or lose just those frames.
-  constexpr std::uint64_t kColourFrames = 60;
+  constexpr Duration kColourAwaited = std::chrono::seconds(2);
   const bool coloured = colour.bgr != nullptr;
-  if (coloured) colour_until_ = frame_index + kColourFrames;
+  if (coloured) colour_until_ = frame_index + rate.frames(kColourAwaited);
   return frame_index >= next_round_at_ && (coloured || frame_index >= colour_until_);
 }
 
@@ -63,14 +64,18 @@ int FeatureFinder::next_band() noexcept {
   return next;
 }
 
-void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, const GreyImage& image,
-                          const ColourImage& colour, std::span<const Vector2d> occupied, int wanted) noexcept {
-  const bool may = may_begin(frame_index, colour);
+void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, const FrameRate& rate,
+                          const GreyImage& image, const ColourImage& colour, std::span<const Vector2d> occupied,
+                          int wanted) noexcept {
+  const bool may = may_begin(frame_index, rate, colour);
   if (!active_) {
     if (wanted <= 0 || !may) return;
     active_ = true;
     begun_at_ = frame_index;
-    next_round_at_ = frame_index + interval_;
+    stride_ = rate.frames(kTakenEvery);
+    stride_s_ = static_cast<double>(stride_) / rate.per_s();
+    const auto bands = static_cast<std::uint64_t>(bands_);
+    next_round_at_ = std::max(frame_index + rate.frames(interval_) / bands, adopted_at() + 1);
     // Relaxed: housekeeping sets it again only after it has popped this round's steps, and the ring orders that.
     done_.store(false, std::memory_order_relaxed);
     occupied_.assign(occupied.begin(), occupied.end());
@@ -83,8 +88,8 @@ void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, co
       std::memcpy(bgr_.data() + y * row_bytes, colour.row(static_cast<int>(y)), row_bytes);
     }
   }
-  const std::uint64_t step = frame_index - begun_at_;
-  if (step >= frames_.size()) return;
+  const std::uint64_t step = (frame_index - begun_at_) / stride_;
+  if (step >= frames_.size() || (frame_index - begun_at_) % stride_ != 0) return;
   Frame& frame = frames_[step];
   frame.stamp = stamp;
   for (int y = 0; y < height_; ++y) {
@@ -95,12 +100,12 @@ void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, co
 }
 
 std::span<const FoundFeature> FeatureFinder::adopt(std::uint64_t frame_index) noexcept {
-  if (!active_ || frame_index < begun_at_ + frames_.size()) return {};
+  if (!active_ || frame_index < adopted_at()) return {};
   if (lockstep_) {
     const NamedWait wait;
     finished_.wait();
   }
-  const bool due = frame_index == begun_at_ + frames_.size();
+  const bool due = frame_index == adopted_at();
   // Acquire: what housekeeping found is visible once the flag is (pairs with the release in work()).
   if (!done_.load(std::memory_order_acquire)) {
     if (due) counters_.adoptions_late.add();
@@ -136,7 +141,8 @@ void FeatureFinder::work(int step) noexcept {
   } else {
     track_candidates(frame);
   }
-  if (step + 1 < kFinderDelayFrames) return;
+  if (step + 1 < kFinderFrames) return;
+  for (FoundFeature& feature : found_) feature.velocity_px /= static_cast<double>(stride_);
   if (found_.size() > share_) found_.resize(share_);
   // Release: found_ is complete before the mapper can see the flag.
   done_.store(true, std::memory_order_release);
@@ -182,13 +188,15 @@ void FeatureFinder::find(const Frame& frame) noexcept {
 
 void FeatureFinder::track_candidates(const Frame& frame) noexcept {
   const GreyImage image{frame.pixels.data(), width_, height_, width_};
-  const Matrix2d covariance = kMotionDeviation_px * kMotionDeviation_px * Matrix2d::Identity();
+  const double deviation_px = kMotion_px_per_s * stride_s_;
+  const Matrix2d covariance = deviation_px * deviation_px * Matrix2d::Identity();
+  const double usual_frames = FrameRate::kUsual_per_s * stride_s_;
   std::erase_if(found_, [&](FoundFeature& feature) {
     const PatchState last = feature.patch_state;
     const PatchMatch match =
         tracker_.track(image, feature.patch, feature.patch_state, last.px + feature.velocity_px, covariance);
     if (match.state != MatchState::kFound ||
-        !feature.looks.is_plausible(last, feature.patch_state, match.correlation, 1)) {
+        !feature.looks.is_plausible(last, feature.patch_state, match.correlation, usual_frames)) {
       return true;
     }
     feature.looks.add(match.correlation);

@@ -16,6 +16,8 @@
 #include "core/sensors/colour_image.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "core/time/frame_rate.hpp"
+#include "core/time/instant.hpp"
 #include "core/vision/feature_detector.hpp"
 #include "core/vision/patch_continuity.hpp"
 #include "core/vision/patch_template.hpp"
@@ -30,18 +32,17 @@ struct FoundFeature {
   PatchTemplate patch;
   PatchState patch_state;  // in the round's last frame
   PatchContinuity looks;
-  Vector2d velocity_px = Vector2d::Zero();  // per frame
+  Vector2d velocity_px = Vector2d::Zero();  // per frame; while the round lasts, from one that is taken to the next
 };
 
-// A round: the frame begun at, and the kFinderDelayFrames - 1 after it, are copied here by the mapper as they come; the
-// result is due at the frame after them. One round at a time, in one band of the picture, so that a large picture's
-// search takes not much longer than a small one's; the next round takes the next band, and no band gives more than its
-// share of a full map at a time. A band that holds its share already is passed over while another one, which holds
-// less, still gives something: else the features would gather where they live longest. What is a corner goes by the
-// picture's own light and noise.
-// Where frames have come with colour lately, a round begins at one that has it, and finds nothing on what is grey like
-// instruments.
-// offer() and adopt() belong to the mapper, serve() to the housekeeping thread.
+// A round: the frame begun at, and kFinderFrames - 1 after it, are copied here by the mapper as they come; the result
+// is due at the frame after them. A fast camera's are not all taken: the search needs its time. One round at a time, in
+// one band of the picture, so that a large picture's search takes not much longer than a small one's; the next round
+// takes the next band, and no band gives more than its share of a full map at a time. A band that holds its share
+// already is passed over while another one, which holds less, still gives something: else the features would gather
+// where they live longest. What is a corner goes by the picture's own light and noise. Where frames have come with
+// colour lately, a round begins at one that has it, and finds nothing on what is grey like instruments. offer() and
+// adopt() belong to the mapper, serve() to the housekeeping thread.
 class FeatureFinder {
  public:
   static constexpr std::size_t kMaximumPerRound = 48;
@@ -51,8 +52,8 @@ class FeatureFinder {
   // Mapper, once a frame after its features are known: takes what the round needs of it. `colour` is reduced as
   // colour_image.hpp says, or without pixels. `occupied` are the pixels of the features that are followed now; a round
   // begins only when `wanted` > 0.
-  void offer(std::uint64_t frame_index, const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour,
-             std::span<const Vector2d> occupied, int wanted) noexcept;
+  void offer(std::uint64_t frame_index, const FrameStamp& stamp, const FrameRate& rate, const GreyImage& image,
+             const ColourImage& colour, std::span<const Vector2d> occupied, int wanted) noexcept;
 
   // Mapper, once a frame before its features are followed: the result that is due at this frame; empty when none is.
   // A result that is not there in time is lost and counted; in lockstep it is waited for.
@@ -75,7 +76,8 @@ class FeatureFinder {
   };
 
   [[nodiscard]] int next_band() noexcept;
-  [[nodiscard]] bool may_begin(std::uint64_t frame_index, const ColourImage& colour) noexcept;
+  [[nodiscard]] std::uint64_t adopted_at() const noexcept { return begun_at_ + (kFinderFrames - 1) * stride_ + 1; }
+  [[nodiscard]] bool may_begin(std::uint64_t frame_index, const FrameRate& rate, const ColourImage& colour) noexcept;
   void work(int step) noexcept;
   void find(const Frame& frame) noexcept;
   [[nodiscard]] Expected<std::vector<Vector2d>> corners(const GreyImage& image, const DetectorSettings& detector) const;
@@ -84,7 +86,7 @@ class FeatureFinder {
   int width_;
   int height_;
   int bands_;
-  std::uint64_t interval_;
+  Duration interval_;
   bool lockstep_;
   double min_distance_px_;
   int maximum_;
@@ -102,9 +104,11 @@ class FeatureFinder {
   TemplateSettings adopted_templates_;
 
   // Filled by the mapper before the step's number goes into the ring, read by housekeeping after it comes out.
-  std::array<Frame, kFinderDelayFrames> frames_;
+  std::array<Frame, kFinderFrames> frames_;
   std::vector<std::uint8_t> bgr_;  // of the first one, reduced, without gaps between rows
   bool coloured_ = false;
+  std::uint64_t stride_ = 1;  // frames from one that is taken to the next
+  double stride_s_ = 0.0;
   int band_ = 0;
   std::vector<Vector2d> occupied_;
   int wanted_ = 0;

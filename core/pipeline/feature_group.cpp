@@ -1,6 +1,7 @@
 #include "core/pipeline/feature_group.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -14,7 +15,7 @@ namespace {
 
 // A linear law makes 0.3 to 1 mm of a warped heart, as the lengths of its cycles vary.
 constexpr double kDoubt_mm = 1.0;
-constexpr int kRefusalsBeforeRelock = 10;
+constexpr Duration kRefusedBeforeRelock = std::chrono::milliseconds(333);
 // How much a feature's breathing differs from the common one, first harmonic, and by how much its mean is off that was
 // learnt while the phase was not known.
 constexpr double kBreathDeviation_mm = 2.0;
@@ -58,9 +59,10 @@ bool take_back(FeatureSlot& slot) noexcept {
   return true;
 }
 
-void count_update(FeatureSlot& slot, bool accepted) noexcept {
+void count_update(FeatureSlot& slot, bool accepted, const FrameRate& held_rate) noexcept {
   if (!accepted) {
-    slot.follows_something_else = ++slot.refused_in_a_row % kRefusalsBeforeRelock == 0 || slot.follows_something_else;
+    const bool long_enough = ++slot.refused_in_a_row % held_rate.frames(kRefusedBeforeRelock) == 0;
+    slot.follows_something_else = long_enough || slot.follows_something_else;
     return;
   }
   slot.refused_in_a_row = 0;
@@ -234,10 +236,13 @@ void FeatureGroup::follow_slow_errors(const PixelModel& model, int k, const Lane
   }
 }
 
-void FeatureGroup::judge(std::size_t lane, double nis, bool accepted, double common) noexcept {
+void FeatureGroup::judge(std::size_t lane, double nis, bool accepted, double common,
+                         const FrameRate& held_rate) noexcept {
   FeatureSlot& slot = slots_[lane];
-  if (slot.health.add(nis, accepted, common) == HealthAction::kInflate) bank_.diffuse(feature(lane), kInflation_mm);
-  count_update(slot, accepted);
+  if (slot.health.add(nis, accepted, common, held_rate) == HealthAction::kInflate) {
+    bank_.diffuse(feature(lane), kInflation_mm);
+  }
+  count_update(slot, accepted, held_rate);
 }
 
 void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& settings) noexcept {
@@ -261,12 +266,12 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
       Vector2d predicted_px;
       Matrix23d J_C;
       if (model.camera.project(frame.X_CW * p_WF, predicted_px, &J_C) != ProjectionStatus::kOk) {
-        if (!again[lane]) judge(lane, 0.0, false, 0.0);
+        if (!again[lane]) judge(lane, 0.0, false, 0.0, frame.held_rate);
         continue;
       }
       const Matrix23d J_p = J_C * frame.X_CW.R;
       const Vector2d phase_spread = J_p * motions.velocity_of(l) * frame.phase.deviation_s;
-      R[lane] = match_covariance(held, frame, p_WF, J_p, settings.pixel_deviation_px) +
+      R[lane] = match_covariance(held, frame, p_WF, J_p, settings.pixel_deviation_px, matches_alike(frame.held_rate)) +
                 phase_spread * phase_spread.transpose();
       // All of a cycle's phases err with its R peaks.
       common[lane] = phase_spread.dot(R[lane].inverse() * phase_spread);
@@ -285,7 +290,8 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
       if ((outcomes.considered >> lane & 1) == 0) continue;
       if (again[lane]) continue;
-      judge(lane, outcomes.normalised_innovation_squared[lane], (outcomes.accepted >> lane & 1) != 0, common[lane]);
+      judge(lane, outcomes.normalised_innovation_squared[lane], (outcomes.accepted >> lane & 1) != 0, common[lane],
+            frame.held_rate);
       FeatureSlot& slot = slots_[lane];
       if (slot.health.process_noise() > 0.0 && frame.stamp.capture > slot.last_learnt) {
         const double elapsed_s = to_seconds(frame.stamp.capture - slot.last_learnt);

@@ -74,7 +74,7 @@ class FeatureGroup {
   void plan(const FrameJob& job) noexcept;
   void follow_slow_errors(const PixelModel& model, int k, const LaneOutcomes<double>& outcomes,
                           const std::array<Matrix2d, kLanes>& R) noexcept;
-  void judge(std::size_t lane, double nis, bool accepted, double common) noexcept;
+  void judge(std::size_t lane, double nis, bool accepted, double common, const FrameRate& held_rate) noexcept;
 
   MapBank& bank_;
   int index_;

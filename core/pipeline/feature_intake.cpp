@@ -53,7 +53,7 @@ void FeatureIntake::offer(const FrameRecord& frame, const GreyImage& image, cons
       occupied_.push_back(slot.match.px);
     }
   }
-  finder_.offer(frame.index, frame.stamp, image, colour, occupied_, std::min(free, room));
+  finder_.offer(frame.index, frame.stamp, frame.rate, image, colour, occupied_, std::min(free, room));
 }
 
 void FeatureIntake::go_on_from(std::uint32_t largest_id, Duration ago) noexcept {

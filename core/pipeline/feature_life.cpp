@@ -1,6 +1,7 @@
 #include "core/pipeline/feature_life.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <numbers>
 
@@ -10,13 +11,13 @@
 namespace perimap {
 namespace {
 
-constexpr int kRefusalsBeforeLost = 90;
-constexpr std::uint64_t kUnobservedFramesBeforeLost = 900;
+constexpr Duration kRefusedBeforeLost = std::chrono::seconds(3);
+constexpr Duration kUnobservedBeforeLost = std::chrono::seconds(30);
 // Of a feature whose estimate is so uncertain the map can not tell where to search: its slot serves better.
 constexpr double kVagueDeviations = 3.0;  // of a converged feature's largest
-constexpr std::uint64_t kUnobservedVagueFramesBeforeLost = 30;
+constexpr Duration kUnobservedVagueBeforeLost = std::chrono::seconds(1);
 constexpr int kFailedStartsBeforeLost = 3;
-constexpr std::uint64_t kConvergenceCheckFrames = 15;
+constexpr Duration kConvergenceCheck = std::chrono::milliseconds(500);
 constexpr double kSamePhase_rad = 0.01;      // of a breath
 constexpr int kUpdatesBeforeConverged = 30;  // beyond the start, so that the innovation statistic means something
 
@@ -47,7 +48,7 @@ bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& mod
     observation.b = frame->b;
     observation.b_deviation = frame->b_rate * (frame->phase.rate_rad_per_s * frame->phase.deviation_s);
     observation.R = match_covariance(held, *frame, frame->pose.X_WC * (depth_mm * ray_C), J_C * frame->X_CW.R,
-                                     settings.pixel_deviation_px);
+                                     settings.pixel_deviation_px, matches_alike(rate_of_starts(frame->held_rate)));
     slot.start.captures[k] = frame->stamp.capture;
     slot.start.cycles[k] = {frame->cycle, frame->respiration};
     slot.start.poses[k] = frame->pose;
@@ -64,7 +65,7 @@ class Step {
       : slot_(slot), bank_(bank), feature_(feature), job_(job), model_(model), settings_(settings) {}
 
   LifeEvent tracked() noexcept {
-    if (now() - slot_.last_found_frame > kCarriedMissesAllowed) return give_up(LifeEvent::kLostUnseen);
+    if (now() - slot_.last_found_frame > rate().frames(kCarriedUnseen)) return give_up(LifeEvent::kLostUnseen);
     slot_.held.drop_if([this](const HeldMatch& held) {
       const FrameRecord* frame = job_.history->find(held.frame_index);
       return frame == nullptr || (frame->phase.exact && !frame->phase.teaches);
@@ -125,14 +126,15 @@ class Step {
 
   LifeEvent mapped() noexcept {
     // Refusals come up to a cycle late; what the map and this frame's match say of each other is newer.
-    const bool refused = slot_.refused_in_a_row >= kRefusalsBeforeLost && !slot_.match_agrees;
+    const bool refused_long = slot_.refused_in_a_row >= job_.frame->held_rate.frames(kRefusedBeforeLost);
+    const bool refused = refused_long && !slot_.match_agrees;
     const bool vague = slot_.largest_deviation_mm > kVagueDeviations * settings_.estimator.converged_deviation_mm;
     if (slot_.last_found_frame == now()) {
       slot_.unseen_frames = 0;
     } else if (job_.frame->measurable && !slot_.shed) {
       ++slot_.unseen_frames;
     }
-    const std::uint64_t allowed = vague ? kUnobservedVagueFramesBeforeLost : kUnobservedFramesBeforeLost;
+    const std::uint64_t allowed = rate().frames(vague ? kUnobservedVagueBeforeLost : kUnobservedBeforeLost);
     if (refused) return give_up(LifeEvent::kLostRefused);
     if (slot_.unseen_frames > allowed) return give_up(LifeEvent::kLostUnseen);
     if (slot_.follows_something_else) {
@@ -140,7 +142,7 @@ class Step {
       if (!slot_.match_agrees) let_go(slot_, *job_.frame);
     }
     // Spread over the frames by id, so that no frame pays for all features.
-    if ((now() + slot_.id) % kConvergenceCheckFrames == 0) check_convergence();
+    if ((now() + slot_.id) % rate().frames(kConvergenceCheck) == 0) check_convergence();
     if (slot_.health.state() == HealthState::kFailed) return start_anew();
     if (slot_.health.state() == HealthState::kInconsistent) slot_.converged = false;
     return LifeEvent::kNone;
@@ -148,12 +150,13 @@ class Step {
 
  private:
   [[nodiscard]] std::uint64_t now() const noexcept { return job_.frame->index; }
+  [[nodiscard]] const FrameRate& rate() const noexcept { return job_.frame->rate; }
 
   // Of the matches that are held, if all their frames are there.
   LifeEvent request_start() noexcept {
     slot_.state = SlotState::kTracked;
     if (!prepare_start(slot_, job_, model_, settings_.estimator)) return LifeEvent::kNone;
-    slot_.start.adopt_at_frame = now() + static_cast<std::uint64_t>(settings_.adoption_delay_frames);
+    slot_.start.adopt_at_frame = now() + rate().frames(settings_.adoption_delay);
     // Relaxed: housekeeping touches the flag only after it has popped this slot's request, and the ring orders that.
     slot_.start.ready.store(false, std::memory_order_relaxed);
     slot_.start.due = false;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -18,6 +19,7 @@
 #include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
+#include "core/time/frame_rate.hpp"
 #include "core/time/instant.hpp"
 #include "core/vision/patch_continuity.hpp"
 #include "core/vision/patch_template.hpp"
@@ -25,10 +27,19 @@
 
 namespace perimap {
 
-// Frames without a match after which the image alone no longer tells where a feature is: by its last place, and carried
+// Time without a match after which the image alone no longer tells where a feature is: by its last place, and carried
 // along with the features around it.
-inline constexpr std::uint64_t kTrackedMissesAllowed = 5;
-inline constexpr std::uint64_t kCarriedMissesAllowed = 15;
+inline constexpr Duration kTrackedUnseen = std::chrono::milliseconds(167);
+inline constexpr Duration kCarriedUnseen = std::chrono::milliseconds(500);
+// Before this frame, at any rate longer than that: what was found then tells nothing any more. The difference of the
+// counts is what matters, and wraps.
+inline constexpr std::uint64_t kFramesLongAgo = std::uint64_t{1} << 32U;
+
+// A start's matches are about so far apart where the camera is faster: they span as long at every rate.
+inline constexpr Duration kStartMatchesEvery = std::chrono::microseconds(33333);
+[[nodiscard]] inline FrameRate rate_of_starts(const FrameRate& held_rate) noexcept {
+  return FrameRate(held_rate.per_s() / static_cast<double>(held_rate.frames(kStartMatchesEvery)));
+}
 
 enum class SlotState : std::uint8_t {
   kEmpty,
@@ -120,8 +131,8 @@ struct FeatureSlot {
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   std::uint64_t last_found_frame = 0;
   std::uint64_t unseen_frames = 0;      // since then, in which it could have been searched for where the map has it
-  int stale_matches = 0;                // in a row, of a template that fits the view badly
-  int refused_in_a_row = 0;             // found, but at learning the estimate's gate said no
+  std::uint64_t stale_matches = 0;      // in a row, of a template that fits the view badly
+  std::uint64_t refused_in_a_row = 0;   // found, but at learning the estimate's gate said no
   bool follows_something_else = false;  // refused so often that the patch must be let go
   PatchMatch match;                     // of this frame
   bool match_agrees = false;            // it lies where the map predicted it

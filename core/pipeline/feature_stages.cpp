@@ -1,6 +1,7 @@
 #include "core/pipeline/feature_stages.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "core/geometry/symmetric_matrix2.hpp"
@@ -11,8 +12,8 @@ namespace perimap {
 namespace {
 
 // Image motion changes by about this much from frame to frame where no map predicts it (systole begins at up to
-// 25 px/frame at 640x480 and 30 frames/s).
-constexpr double kUnmappedMotionDeviation_px = 10.0;
+// 750 px/s at 640x480).
+constexpr double kUnmappedMotion_px_per_s = 300.0;
 
 struct PixelPrediction {
   bool valid = false;
@@ -64,6 +65,8 @@ PixelPrediction predict_from_shared_pose(const MapPrediction& map, const CommonE
   return prediction;
 }
 
+double unmapped_motion_px(const FrameJob& job) noexcept { return kUnmappedMotion_px_per_s / job.frame->rate.per_s(); }
+
 std::uint64_t frames_since_found(const FeatureSlot& slot, const FrameJob& job) noexcept {
   return job.frame->index - slot.last_found_frame;
 }
@@ -74,7 +77,8 @@ PixelPrediction predict_from_velocity(const FeatureSlot& slot, const FrameJob& j
   PixelPrediction prediction;
   prediction.valid = frames_since_found(slot, job) == 1;
   prediction.px = slot.patch_state.px + slot.velocity_px;
-  prediction.covariance_px2 = kUnmappedMotionDeviation_px * kUnmappedMotionDeviation_px * Matrix2d::Identity();
+  const double deviation_px = unmapped_motion_px(job);
+  prediction.covariance_px2 = deviation_px * deviation_px * Matrix2d::Identity();
   return prediction;
 }
 
@@ -82,9 +86,9 @@ PixelPrediction predict_from_velocity(const FeatureSlot& slot, const FrameJob& j
 PixelPrediction predict_from_last_place(const FeatureSlot& slot, const FrameJob& job) noexcept {
   const std::uint64_t frames = frames_since_found(slot, job);
   PixelPrediction prediction;
-  prediction.valid = frames > 1 && frames <= kTrackedMissesAllowed;
+  prediction.valid = frames > 1 && frames <= job.frame->rate.frames(kTrackedUnseen);
   prediction.px = slot.patch_state.px;
-  const double deviation_px = kUnmappedMotionDeviation_px * static_cast<double>(frames);
+  const double deviation_px = unmapped_motion_px(job) * static_cast<double>(frames);
   prediction.covariance_px2 = deviation_px * deviation_px * Matrix2d::Identity();
   return prediction;
 }
@@ -92,13 +96,13 @@ PixelPrediction predict_from_last_place(const FeatureSlot& slot, const FrameJob&
 // Where the features around it say that it has moved to; each frame since it was found has added to the doubt.
 PixelPrediction predict_from_neighbours(const FeatureSlot& slot, const NeighbourMotion::Around& neighbours,
                                         const FrameJob& job) noexcept {
-  constexpr double kStrain_px = 1.5, kDoubtPerFrame_px = 0.5;
+  constexpr double kStrain_px = 1.5, kDoubt_px_per_s = 15.0;
   const std::uint64_t frames = frames_since_found(slot, job);
   PixelPrediction prediction;
-  prediction.valid = neighbours.known && frames <= kCarriedMissesAllowed;
+  prediction.valid = neighbours.known && frames <= job.frame->rate.frames(kCarriedUnseen);
   prediction.px = slot.carried_px + neighbours.by;
-  const double deviation_px =
-      kStrain_px + neighbours.disagreement_px + kDoubtPerFrame_px * static_cast<double>(frames - 1);
+  const double deviation_px = kStrain_px + neighbours.disagreement_px +
+                              kDoubt_px_per_s / job.frame->rate.per_s() * static_cast<double>(frames - 1);
   prediction.covariance_px2 = deviation_px * deviation_px * Matrix2d::Identity();
   return prediction;
 }
@@ -110,10 +114,11 @@ const PixelPrediction& surer(const PixelPrediction& a, const PixelPrediction& b)
 
 // Whether this may be a look-alike: there is room for one in the search region, and the feature was not there in the
 // frame before, or not found about where it was expected.
-bool is_doubtful(const PixelPrediction& prediction, const Vector2d& px, std::uint64_t frames) noexcept {
+bool is_doubtful(const PixelPrediction& prediction, const Vector2d& px, std::uint64_t frames,
+                 double unmapped_motion_px) noexcept {
   constexpr double kNarrow_px = 3;
   if (prediction.covariance_px2.trace() <= 2 * kNarrow_px * kNarrow_px) return false;
-  return frames > 1 || (px - prediction.px).norm() > kUnmappedMotionDeviation_px;
+  return frames > 1 || (px - prediction.px).norm() > unmapped_motion_px;
 }
 
 // Whether the match can be the feature, as far as the prediction tells. What is learnt from it is judged again when its
@@ -132,14 +137,14 @@ bool is_vague(const PatchMatch& match) noexcept {
 }
 
 // Longer than a heart's beat, which stretches the picture of its surface and lets it go again.
-constexpr int kStaleBeforeRenewal = 60;
+constexpr Duration kStaleBeforeRenewal = std::chrono::seconds(2);
 
 // The view has turned so far, and for so long, that the template fits badly: a fresh one at the place just found. Each
 // renewal moves the followed point by about the match's deviation, which no later match makes up for. Where none can be
 // made there the old one stays.
 void renew_stale_template(FeatureSlot& slot, const FrameJob& job) noexcept {
   slot.stale_matches = template_is_stale(slot.patch_state) ? slot.stale_matches + 1 : 0;
-  if (slot.stale_matches < kStaleBeforeRenewal) return;
+  if (slot.stale_matches < job.frame->rate.frames(kStaleBeforeRenewal)) return;
   slot.stale_matches = 0;
   PatchTemplate renewed;
   if (make_patch_template(job.image, slot.match.px, job.templates, job.tracker->kernels(), renewed) !=
@@ -163,9 +168,11 @@ void seek(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks, con
   slot.match = job.tracker->track(job.image, slot.patch, slot.seen, prediction.px, prediction.covariance_px2);
   if (slot.match.state != MatchState::kFound) return;
   const std::uint64_t frames = frames_since_found(slot, job);
-  const bool is_asked = looks == Looks::kAskedAlways || is_doubtful(prediction, slot.match.px, frames);
-  const bool is_other = is_asked && !slot.looks.is_plausible(slot.patch_state, slot.seen, slot.match.correlation,
-                                                             static_cast<double>(frames));
+  const bool is_asked =
+      looks == Looks::kAskedAlways || is_doubtful(prediction, slot.match.px, frames, unmapped_motion_px(job));
+  const double usual_frames = static_cast<double>(frames) * job.frame->rate.of_usual();
+  const bool is_other =
+      is_asked && !slot.looks.is_plausible(slot.patch_state, slot.seen, slot.match.correlation, usual_frames);
   if (is_other || is_vague(slot.match)) slot.match.state = MatchState::kLowCorrelation;
 }
 
@@ -238,10 +245,7 @@ void settle_match(FeatureSlot& slot, const MapPrediction& map, const FrameJob& j
 }
 
 void let_go(FeatureSlot& slot, const FrameRecord& frame) noexcept {
-  // The difference of the counts is what matters, and wraps.
-  if (frame.index - slot.last_found_frame <= kCarriedMissesAllowed) {
-    slot.last_found_frame = frame.index - (kCarriedMissesAllowed + 1);
-  }
+  if (frame.index - slot.last_found_frame < kFramesLongAgo) slot.last_found_frame = frame.index - kFramesLongAgo;
 }
 
 void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept {
@@ -279,9 +283,22 @@ bool is_called_converged(const FeatureSlot& slot, Instant now) noexcept {
   return slot.match_agrees || now - slot.last_observed <= kBelievedUnseen;
 }
 
+namespace {
+
+bool is_wanted_for_start(const FeatureSlot& slot, const FrameJob& job) noexcept {
+  if (slot.held.size() == 0) return true;
+  const FrameRecord* last = job.history->find(slot.held[slot.held.size() - 1].frame_index);
+  if (last == nullptr) return true;
+  return job.frame->held_number - last->held_number >= job.frame->held_rate.frames(kStartMatchesEvery);
+}
+
+}  // namespace
+
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept {
   if (slot.state == SlotState::kEmpty || slot.match.state != MatchState::kFound || !job.frame->measurable) return;
-  if (job.frame->held) slot.held.push({job.frame->index, slot.match.px, slot.match.covariance_px2});
+  if (job.frame->held && (slot.state != SlotState::kTracked || is_wanted_for_start(slot, job))) {
+    slot.held.push({job.frame->index, slot.match.px, slot.match.covariance_px2});
+  }
   if (slot.match_agrees) slot.last_observed = job.frame->stamp.capture;
 }
 

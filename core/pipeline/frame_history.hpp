@@ -10,14 +10,19 @@
 #include "core/pipeline/phase_basis.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/sensors/frame_stamp.hpp"
+#include "core/sensors/measured_frame_rate.hpp"
+#include "core/time/frame_rate.hpp"
 
 namespace perimap {
 
 struct FrameRecord {
   std::uint64_t index = 0;  // the mapper's own count, without gaps
   FrameStamp stamp;
-  bool measurable = false;  // pose and phase are there, so its matches can be learnt from
-  bool held = false;        // and are, where the camera is no faster than what is learnt
+  bool measurable = false;        // pose and phase are there, so its matches can be learnt from
+  bool held = false;              // and are, where the camera is no faster than what is learnt
+  std::uint64_t held_number = 0;  // of those that are held, up to this one
+  FrameRate rate;                 // of the frames, as known by then
+  FrameRate held_rate;            // of those that are held
   CameraPose pose;  // what is not known of the breathing counts as noise of its position: either moves all alike
   Pose X_CW;
   double tracker_variance_mm2 = 0.0;  // of the position, per axis, the tracker's part alone
@@ -31,7 +36,8 @@ struct FrameRecord {
   Basis b_rate;
 };
 
-// Written by the mapper while no stage runs, read by the workers during stages.
+// Owns the measured frame rate: what lasts is counted in frames that are mapped, or in frames that are held, by the
+// record's own rates. Written by the mapper while no stage runs, read by the workers during stages.
 class FrameHistory {
  public:
   static constexpr std::uint64_t kHeld = 256;       // frames that are learnt from
@@ -48,10 +54,16 @@ class FrameHistory {
     record.index = count_++;
     record.stamp = stamp;
     record.held = held_ == 0 || stamp.capture < last_held_ || stamp.capture - last_held_ >= kHeldEvery;
+    rate_.add(stamp.capture);
     if (record.held) {
+      held_rate_.add(stamp.capture);
       last_held_ = stamp.capture;
       ++held_;
+      ++held_ever_;
     }
+    record.held_number = held_ever_;
+    record.rate = rate_.rate();
+    record.held_rate = held_rate_.rate();
     while (held_ > kHeld || count_ - oldest_ > kCapacity) held_ -= records_[oldest_++ % kCapacity].held ? 1 : 0;
     return record;
   }
@@ -136,6 +148,9 @@ class FrameHistory {
   std::uint64_t count_ = 0;
   std::uint64_t oldest_ = 0;  // index of the oldest that is still there; count_ when there is none
   std::uint64_t held_ = 0;    // of those that are there
+  std::uint64_t held_ever_ = 0;
+  MeasuredFrameRate rate_;       // of the frames that are mapped
+  MeasuredFrameRate held_rate_;  // of those that are learnt from
   Instant last_held_;
 };
 

@@ -103,6 +103,8 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
     agreed_ = solved;
     refuse_what_disagrees(groups, frame, model, settings, solved_at, solved);
   }
+  // Frames that follow each other faster than usual err alike (see match_covariance): together they tell no more.
+  const double alike = std::max(1.0, 1.0 / frame.rate.of_usual());
   const auto answer = [&](Eigen::Index unknown, double found_s, double prior_s2, double phase_rad,
                           double rate_rad_per_s, double largest_deviation_s, double common_deviation_s) {
     ImagePhaseAnswer result;
@@ -112,7 +114,7 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
     if (!(precision > 1.0 / (largest_deviation_s * largest_deviation_s))) return result;
     result.outcome = converged ? ImagePhaseOutcome::kObserved : ImagePhaseOutcome::kTentative;
     result.observed = {frame.stamp.capture, phase_rad + rate_rad_per_s * found_s / (variance_s2 * precision),
-                       rate_rad_per_s * std::sqrt(1.0 / precision + common_deviation_s * common_deviation_s)};
+                       rate_rad_per_s * std::sqrt(alike * (1.0 / precision + common_deviation_s * common_deviation_s))};
     return result;
   };
   ImagePhases phases;

@@ -24,14 +24,14 @@ bool LoadSheddingDecision::add(const FrameTime& frame, int followed) noexcept {
   const bool calm = !overrun && to_seconds(frame.until_evaluated) < kCalmShare * to_seconds(budget_);
   constexpr std::uint32_t kMask = (1U << kWindow) - 1U;
   overruns_ = (overruns_ << 1U | (overrun ? 1U : 0U)) & kMask;
-  since_taken_back_ = std::min(since_taken_back_ + 1, kTooSoonFrames);
+  if (since_taken_back_ != kNever) ++since_taken_back_;
   if (overrun) {
     calm_ = 0;
   } else if (calm) {
     ++calm_;
   }
   if (std::popcount(overruns_) >= kOverruns && followed > kLeast) {
-    patience_ = since_taken_back_ < kTooSoonFrames ? std::min(2 * patience_, kLongestPatience) : patience_;
+    patience_ = is_too_soon(frame.rate) ? std::min(2 * patience_, kLongestPatience) : patience_;
     const int in_use = std::min(followed, limit_);
     limit_ = std::max(kLeast, in_use - std::max(1, in_use / 8));
     // What was shed takes effect from here on.
@@ -39,8 +39,12 @@ bool LoadSheddingDecision::add(const FrameTime& frame, int followed) noexcept {
     calm_ = 0;
     return true;
   }
-  if (limit_ < maximum_ && calm_ >= kCalmFrames * patience_) take_back();
+  if (limit_ < maximum_ && calm_ >= frame.rate.frames(kCalm * patience_)) take_back();
   return false;
+}
+
+bool LoadSheddingDecision::is_too_soon(const FrameRate& rate) const noexcept {
+  return since_taken_back_ < rate.frames(kTooSoon);
 }
 
 void LoadSheddingDecision::take_back() noexcept {
@@ -68,9 +72,9 @@ int LoadShedding::in_sight() const noexcept {
   return seen;
 }
 
-int LoadShedding::sight_of(const FeatureSlot& slot, const Watch& watch) noexcept {
+int LoadShedding::sight_of(const FeatureSlot& slot, const Watch& watch) const noexcept {
   if (!slot.shed) {
-    if (watch.misses <= kMissesAllowed) return kSeen;
+    if (watch.misses <= rate_.frames(kMissesAllowed)) return kSeen;
     return slot.in_view ? kPerhapsSeen : kUnseen;
   }
   if (slot.state != SlotState::kMapped || !slot.in_view) return kUnseen;
@@ -88,15 +92,16 @@ bool LoadShedding::more_useful(const Ranked& a, const Ranked& b) noexcept {
   return a.slot->id < b.slot->id;
 }
 
-void LoadShedding::note(std::uint64_t frame_index, bool measurable) noexcept {
-  since_ranked_ = std::min(since_ranked_ + 1, kReviewFrames);
+void LoadShedding::note(std::uint64_t frame_index, bool measurable, const FrameRate& rate) noexcept {
+  rate_ = rate;
+  ++since_ranked_;
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     const FeatureSlot& slot = slots_[i];
     Watch& watch = watches_[i];
     if (slot.state == SlotState::kEmpty || slot.id != watch.id) watch = {};
     watch.id = slot.id;
     if (slot.state == SlotState::kEmpty) continue;
-    watch.set_aside = slot.shed && !slot.in_view ? 0 : std::max(0, watch.set_aside - 1);
+    watch.set_aside = (slot.shed && !slot.in_view) || watch.set_aside == 0 ? 0 : watch.set_aside - 1;
     if (slot.shed) continue;
     if (slot.last_found_frame == frame_index) {
       watch.misses = 0;
@@ -120,13 +125,13 @@ std::size_t LoadShedding::apply(int limit) noexcept {
   }
   const std::size_t keep = std::min(order_.size(), static_cast<std::size_t>(std::max(0, limit)));
   const bool as_many = order_.size() - shed == keep;
-  if (as_many && (shed == 0 || since_ranked_ < kReviewFrames)) return shed;
+  if (as_many && (shed == 0 || since_ranked_ < rate_.frames(kReview))) return shed;
   since_ranked_ = 0;
   std::nth_element(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(keep), order_.end(), &more_useful);
   for (std::size_t i = 0; i < order_.size(); ++i) {
     const auto [slot, watch, sight] = order_[i];
     const bool sheds = i >= keep;
-    if (sheds && !slot->shed && sight != kSeen) watch->set_aside = kSetAsideFrames;
+    if (sheds && !slot->shed && sight != kSeen) watch->set_aside = rate_.frames(kSetAside);
     if (!sheds && slot->shed) watch->misses = 0;
     slot->shed = sheds;
   }

@@ -64,9 +64,8 @@ void MapKeeping::recall(FeatureSlot& slot, const FeatureMemory& feature) noexcep
   slot.patch = feature.patch;
   slot.patch_state = feature.patch_state;
   slot.carried_px = feature.patch_state.px;
-  // So long before the first frame that the map alone tells where to look; the difference of the counts is what
-  // matters, and wraps.
-  slot.last_found_frame = std::uint64_t{0} - (kCarriedMissesAllowed + 1);
+  // So that the map alone tells where to look.
+  slot.last_found_frame = std::uint64_t{0} - kFramesLongAgo;
   slot.updates = feature.updates;
   slot.converged = feature.converged;
   slot.recalled_converged = feature.converged;

@@ -226,8 +226,11 @@ void Mapper::finish_learning() noexcept {
 // By the time that the last frame took. What a machine takes differs from run to run, so never in lockstep.
 void Mapper::shed_load(bool put_off) noexcept {
   if (!settings_.shedding || settings_.lockstep) return;
-  if (shedding_decision_.add({computed_before_learning_, put_off}, shedding_.followed())) counters_.times_shed.add();
-  shedding_.note(job_.frame->index, job_.frame->measurable);
+  const FrameRate rate = job_.frame->rate;
+  if (shedding_decision_.add({computed_before_learning_, put_off, rate}, shedding_.followed())) {
+    counters_.times_shed.add();
+  }
+  shedding_.note(job_.frame->index, job_.frame->measurable, rate);
   counters_.features_shed.set(shedding_.apply(shedding_decision_.limit()));
 }
 

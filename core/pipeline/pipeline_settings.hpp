@@ -1,6 +1,7 @@
 // How the pipeline is set up; plain values, filled by the daemon from its configuration.
 #pragma once
 
+#include <chrono>
 #include <optional>
 
 #include "core/estimation/batch_start.hpp"
@@ -19,7 +20,7 @@ namespace perimap {
 
 struct FeatureSettings {
   int maximum = 120;
-  int detection_interval_frames = 10;
+  Duration detection_interval = std::chrono::milliseconds(333);
   double minimum_distance_px = 18.0;
 };
 
@@ -53,7 +54,8 @@ struct PipelineSettings {
   bool phase_from_image = true;
   bool law_from_image = false;                      // clock.law holds until the images show another
   Duration image_alone = std::chrono::seconds(10);  // the images carry the phase on so long without the ECG
-  int adoption_delay_frames = 15;                   // D, for batch starts
+  // D, for batch starts: counted in frames when the start is requested.
+  Duration adoption_delay = std::chrono::milliseconds(500);
   // Lockstep: nothing is shed and every housekeeping result is there at its stated frame, so that a replay gives the
   // same samples every time.
   bool lockstep = false;
@@ -68,7 +70,8 @@ struct PipelineSettings {
 }
 
 inline constexpr int kMaxStartObservations = 96;
-// Frames from a search for new features to their adoption: the finder follows them through these frames.
-inline constexpr int kFinderDelayFrames = 5;
+// From a search for new features to their adoption the finder follows them through so many frames, about a thirtieth of
+// a second apart where the camera is faster than that.
+inline constexpr int kFinderFrames = 5;
 
 }  // namespace perimap

@@ -123,14 +123,14 @@ struct PipelineConfiguration {
   Duration budget = std::chrono::milliseconds(12);   // computing time kept free before the release
   bool shedding = true;
   int workers = 2;
-  int adoption_delay_frames = 15;  // D: from a housekeeping request to the frame that adopts its result
+  Duration adoption_delay = std::chrono::milliseconds(500);  // D: from a housekeeping request to its adoption
 
   bool operator==(const PipelineConfiguration&) const = default;
 };
 
 struct FeaturesConfiguration {
   int maximum = 120;
-  int detection_interval_frames = 10;
+  Duration detection_interval = std::chrono::milliseconds(333);
   double minimum_distance_px = 18.0;
 
   bool operator==(const FeaturesConfiguration&) const = default;

@@ -29,6 +29,8 @@ struct ConfigurationKey {
   std::function<bool(const ConfigurationValue&, Configuration&)> read;
   // The configuration's value; none when the configuration leaves it open.
   std::function<std::optional<ConfigurationValue>(const Configuration&)> write;
+  // Another key has taken its place: read, so that files that have it go on to work, and neither written nor offered.
+  bool is_former = false;
 };
 
 // In the order in which they are printed; the keys of a section stand together.

@@ -247,6 +247,7 @@ class Overlay {
     std::string known;
     std::string_view last;
     for (const ConfigurationKey& key : configuration_keys()) {
+      if (key.is_former) continue;
       const std::string_view candidate = section.empty() && !key.section.empty() ? key.section : key.name;
       if ((section.empty() || key.section == section) && candidate != last) {
         known += fmt::format("{}{}", known.empty() ? "" : ", ", candidate);
@@ -409,6 +410,7 @@ std::string to_toml(const Configuration& configuration) {
   std::string text;
   std::string section;
   for (const ConfigurationKey& key : configuration_keys()) {
+    if (key.is_former) continue;
     if (key.section != section) {
       section = key.section;
       text += fmt::format("\n[{}]\n", section);

@@ -84,7 +84,7 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   if (c.respiration.enabled) s.estimator.layout.respiratory_harmonics = kBreathHarmonics;
   s.phase_from_image = c.phase.from_image;
   s.features.maximum = c.features.maximum;
-  s.features.detection_interval_frames = c.features.detection_interval_frames;
+  s.features.detection_interval = c.features.detection_interval;
   s.features.minimum_distance_px = c.features.minimum_distance_px;
   s.estimator.layout.cardiac_harmonics = c.estimation.harmonics;
   s.estimator.precision = c.estimation.precision;
@@ -111,7 +111,7 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   s.budget = c.pipeline.budget;
   s.shedding = c.pipeline.shedding;
   s.validity = c.dds.surface_lifespan > Duration(0) ? c.dds.surface_lifespan : s.validity;
-  s.adoption_delay_frames = c.pipeline.adoption_delay_frames;
+  s.adoption_delay = c.pipeline.adoption_delay;
   return s;
 }
 

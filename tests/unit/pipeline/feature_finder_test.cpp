@@ -12,6 +12,8 @@
 namespace perimap {
 namespace {
 
+int frames_of(Duration time, const FrameRate& rate = {}) { return static_cast<int>(rate.frames(time)); }
+
 // A still texture, in lockstep, so that a round's result is there when it is due.
 struct Still {
   test::Texture texture{5};
@@ -20,6 +22,7 @@ struct Still {
   PipelineCounters counters;
   FeatureFinder finder;
   std::thread housekeeping{[this] { finder.serve(); }};
+  FrameRate rate;
   std::uint64_t frame = 0;
   std::vector<Vector2d> occupied;
 
@@ -45,7 +48,7 @@ struct Still {
     std::vector<Vector2d> adopted;
     for (const FoundFeature& found : finder.adopt(frame)) adopted.push_back(found.first_observed_px);
     occupied.insert(occupied.end(), adopted.begin(), adopted.end());
-    finder.offer(frame++, {}, image.view(), colour, occupied, wanted);
+    finder.offer(frame++, {}, rate, image.view(), colour, occupied, wanted);
     return adopted;
   }
 };
@@ -72,23 +75,33 @@ struct Finder : ::testing::Test {
 };
 
 TEST_F(Finder, WhatARoundFindsIsAdoptedAtItsFrame) {
-  EXPECT_EQ(adopted_in(kFinderDelayFrames), 0U);
+  EXPECT_EQ(adopted_in(kFinderFrames), 0U);
   EXPECT_GT(next_frame(), 0U);
+}
+
+TEST_F(Finder, ARoundLastsAsLongWhereTheCameraIsFaster) {
+  for (const double per_s : {60.0, 120.0, 240.0}) {
+    Still fast(kWidth, kHeight);
+    fast.rate = FrameRate(per_s);
+    const auto stride = static_cast<std::uint64_t>(per_s / FrameRate::kUsual_per_s);
+    while (fast.frame <= (kFinderFrames - 1) * stride) EXPECT_TRUE(fast.next_frame({}, 8).empty()) << per_s;
+    EXPECT_FALSE(fast.next_frame({}, 8).empty()) << per_s;
+  }
 }
 
 TEST_F(Finder, ARoundThatIsDiscardedGivesNothingAndTheNextOneDoes) {
   EXPECT_EQ(adopted_in(2), 0U);
   finder.discard_round();
-  const int interval = settings().features.detection_interval_frames;
+  const int interval = frames_of(settings().features.detection_interval);
   EXPECT_EQ(adopted_in(interval - 2), 0U);
-  EXPECT_GT(adopted_in(kFinderDelayFrames + 1), 0U);
+  EXPECT_GT(adopted_in(kFinderFrames + 1), 0U);
   EXPECT_EQ(counters.adoptions_late.get(), 0U);
 }
 
 TEST_F(Finder, DiscardingBetweenRoundsTakesNothingFromTheNext) {
-  static_cast<void>(adopted_in(kFinderDelayFrames + 1));
+  static_cast<void>(adopted_in(kFinderFrames + 1));
   finder.discard_round();
-  EXPECT_GT(adopted_in(settings().features.detection_interval_frames + 1), 0U);
+  EXPECT_GT(adopted_in(frames_of(settings().features.detection_interval) + 1), 0U);
 }
 
 // What is grey between columns 40 and 100 of tissue, above row kLower.
@@ -136,7 +149,7 @@ TEST_F(ColouredFinder, FindsNothingOnInstruments) {
 
 TEST_F(ColouredFinder, BeginsARoundAtAFrameWithColourWhereThereAreAny) {
   // Of the first frame, and then of every seventh.
-  const int interval = settings().features.detection_interval_frames;
+  const int interval = frames_of(settings().features.detection_interval);
   const auto colour_of = [&](std::uint64_t frame) { return frame % 7 == 0 ? colour : ColourImage{}; };
   std::vector<std::uint64_t> adopted_at;
   while (still.frame < 4 * static_cast<std::uint64_t>(interval)) {
@@ -144,7 +157,7 @@ TEST_F(ColouredFinder, BeginsARoundAtAFrameWithColourWhereThereAreAny) {
     if (next_frame(colour_of(frame)) > 0) adopted_at.push_back(frame);
   }
   ASSERT_GE(adopted_at.size(), 2U);
-  for (const std::uint64_t frame : adopted_at) EXPECT_EQ((frame - kFinderDelayFrames) % 7, 0U);
+  for (const std::uint64_t frame : adopted_at) EXPECT_EQ((frame - kFinderFrames) % 7, 0U);
 }
 
 TEST(FinderOfALargePicture, SearchesABandOfItInEachRoundUntilAllHaveTheirShare) {

@@ -15,9 +15,11 @@ using std::chrono::milliseconds;
 using Decision = LoadSheddingDecision;
 
 constexpr Duration kBudget = milliseconds(10);
-constexpr FrameTime kTooLong{milliseconds(11), false};
-constexpr FrameTime kLong{milliseconds(9), false};
-constexpr FrameTime kShort{milliseconds(2), false};
+constexpr FrameTime kTooLong{milliseconds(11), false, {}};
+constexpr FrameTime kLong{milliseconds(9), false, {}};
+constexpr FrameTime kShort{milliseconds(2), false, {}};
+
+int frames_of(Duration time, const FrameRate& rate = {}) { return static_cast<int>(rate.frames(time)); }
 
 // So many frames of one kind, with as many features followed as may be. How often more had to be shed.
 int frames(Decision& decision, int n, const FrameTime& time, int followed = 1000) {
@@ -61,7 +63,7 @@ TEST(LoadSheddingDecision, WhatIsShedIsAShareOfThoseThatAreFollowed) {
 
 TEST(LoadSheddingDecision, LearningThatIsPutOffIsAnOverrun) {
   Decision decision(120, kBudget);
-  EXPECT_EQ(frames(decision, 8, {milliseconds(1), true}), 1);
+  EXPECT_EQ(frames(decision, 8, {milliseconds(1), true, {}}), 1);
 }
 
 TEST(LoadSheddingDecision, TakesBackWhenThereIsRoomAndNotBefore) {
@@ -70,7 +72,7 @@ TEST(LoadSheddingDecision, TakesBackWhenThereIsRoomAndNotBefore) {
   ASSERT_EQ(decision.limit(), 140);
   frames(decision, 1000, kLong);
   EXPECT_EQ(decision.limit(), 140) << "within the budget, but more would not be";
-  frames(decision, Decision::kCalmFrames - 1, kShort);
+  frames(decision, frames_of(Decision::kCalm) - 1, kShort);
   EXPECT_EQ(decision.limit(), 140);
   frames(decision, 1, kShort);
   EXPECT_EQ(decision.limit(), 150);
@@ -78,12 +80,26 @@ TEST(LoadSheddingDecision, TakesBackWhenThereIsRoomAndNotBefore) {
   EXPECT_EQ(decision.limit(), 160) << "all, and no more than all";
 }
 
+TEST(LoadSheddingDecision, TheCalmLastsAsLongAtEveryRate) {
+  for (const double per_s : {15.0, 60.0, 240.0}) {
+    const FrameRate rate(per_s);
+    const FrameTime brief{milliseconds(1), false, rate};
+    Decision decision(160, kBudget);
+    frames(decision, 8, kTooLong);
+    frames(decision, frames_of(Decision::kCalm, rate) - 1, brief);
+    EXPECT_EQ(decision.limit(), 140) << per_s;
+    frames(decision, 1, brief);
+    EXPECT_EQ(decision.limit(), 150) << per_s;
+    EXPECT_NEAR(frames_of(Decision::kCalm, rate) / per_s, to_seconds(Decision::kCalm), 0.5 / per_s);
+  }
+}
+
 TEST(LoadSheddingDecision, AnOverrunBeginsTheCalmAnew) {
   Decision decision(160, kBudget);
   frames(decision, 8, kTooLong);
-  frames(decision, Decision::kCalmFrames - 1, kShort);
+  frames(decision, frames_of(Decision::kCalm) - 1, kShort);
   frames(decision, 1, kTooLong);
-  frames(decision, Decision::kCalmFrames - 1, kShort);
+  frames(decision, frames_of(Decision::kCalm) - 1, kShort);
   EXPECT_EQ(decision.limit(), 140);
   frames(decision, 1, kShort);
   EXPECT_EQ(decision.limit(), 150);
@@ -95,7 +111,7 @@ TEST(LoadSheddingDecision, SettlesBelowWhatTheMachineCanDoInsteadOfSwinging) {
   int changes = 0;
   int last = decision.limit();
   for (int i = 0; i < 20'000; ++i) {
-    decision.add({kBudget * decision.limit() / 100, false}, decision.limit());
+    decision.add({kBudget * decision.limit() / 100, false, {}}, decision.limit());
     if (i >= 1000) {
       EXPECT_GE(decision.limit(), 60);
       EXPECT_LE(decision.limit(), 110);
@@ -120,7 +136,7 @@ TEST(LoadSheddingDecision, WhatWasTakenBackInVainIsTriedLessOften) {
     if (decision.limit() < low) frames(decision, 1, kShort);
   }
   EXPECT_LT(2 * waits.front(), waits.back());
-  EXPECT_LE(waits.back(), 3 * Decision::kCalmFrames * Decision::kLongestPatience) << "but it is tried";
+  EXPECT_LE(waits.back(), 3 * frames_of(Decision::kCalm) * Decision::kLongestPatience) << "but it is tried";
 }
 
 class Shedding : public ::testing::Test {
@@ -210,7 +226,7 @@ class SheddingInView : public Shedding {
         const bool found = std::find(seen.begin(), seen.end(), slot.id) != seen.end();
         if (found && !slot.shed && slot.state != SlotState::kEmpty) slot.last_found_frame = frame;
       }
-      shedding.note(frame, measurable);
+      shedding.note(frame, measurable, {});
       shedding.apply(limit);
     }
   }
@@ -221,7 +237,7 @@ class SheddingInView : public Shedding {
     }
     return ids;
   }
-  static constexpr int kLong = LoadShedding::kReviewFrames + LoadShedding::kMissesAllowed;
+  const int a_while = frames_of(LoadShedding::kReview) + frames_of(LoadShedding::kMissesAllowed);
   using Ids = std::vector<std::uint32_t>;
 
   LoadShedding shedding{slots};
@@ -232,7 +248,7 @@ TEST_F(SheddingInView, ThoseThatTheScopeHasLeftMakeRoomForThoseThatItShows) {
   frames(1, 2, {1, 2, 3, 4, 5, 6});
   ASSERT_EQ(followed(), (Ids{1, 2}));
   for (const std::size_t left : {0U, 1U, 2U, 3U}) slots[left].in_view = false;
-  frames(kLong, 2, {5, 6});
+  frames(a_while, 2, {5, 6});
   EXPECT_EQ(followed(), (Ids{5, 6}));
   EXPECT_EQ(shedding.in_sight(), 2);
 }
@@ -241,7 +257,7 @@ TEST_F(SheddingInView, WhereNoneOfThemIsToBeSeenThereIsRoomForNewOnes) {
   frames(1, 2, {1, 2, 3, 4, 5, 6});
   EXPECT_EQ(shedding.in_sight(), 6);
   for (FeatureSlot& slot : slots) slot.in_view = false;
-  frames(kLong, 2, {});
+  frames(a_while, 2, {});
   EXPECT_EQ(shedding.in_sight(), 0);
   FeatureSlot& young = add(7, SlotState::kTracked);
   frames(1, 2, {7});
@@ -252,36 +268,36 @@ TEST_F(SheddingInView, WhereNoneOfThemIsToBeSeenThereIsRoomForNewOnes) {
 // Something hides three of them where the map has them in the image.
 TEST_F(SheddingInView, HiddenOnesDoNotTakeTurnsAndThoseThatAreSeenAreKept) {
   const Ids seen = {4, 6};
-  frames(20 * kLong, 2, seen);
+  frames(20 * a_while, 2, seen);
   EXPECT_EQ(followed(), seen);
   int changes = 0;
   for (int i = 0; i < 20; ++i) {
     const Ids before = followed();
-    frames(kLong, 2, seen);
+    frames(a_while, 2, seen);
     changes += followed() != before ? 1 : 0;
   }
   EXPECT_EQ(changes, 0);
 }
 
 TEST_F(SheddingInView, OneThatWasHiddenIsTriedAgainAfterAWhile) {
-  frames(4 * kLong, 1, {6});
+  frames(4 * a_while, 1, {6});
   ASSERT_EQ(followed(), (Ids{6}));
-  frames(LoadShedding::kSetAsideFrames + 6 * kLong, 1, {1});
+  frames(frames_of(LoadShedding::kSetAside) + 6 * a_while, 1, {1});
   EXPECT_EQ(followed(), (Ids{1}));
 }
 
 TEST_F(SheddingInView, FramesThatCanNotTellWhereToLookCountAgainstNone) {
   frames(1, 2, {1, 2});
-  frames(10 * kLong, 2, {}, false);
+  frames(10 * a_while, 2, {}, false);
   EXPECT_EQ(followed(), (Ids{1, 2}));
 }
 
 TEST_F(SheddingInView, BetterOnesThatWereShedDoNotReturnWhileTheOthersAreSeen) {
   for (const std::size_t left : {0U, 1U}) slots[left].in_view = false;
-  frames(2 * kLong, 2, {3, 4, 5, 6});
+  frames(2 * a_while, 2, {3, 4, 5, 6});
   ASSERT_EQ(followed(), (Ids{3, 4}));
   for (const std::size_t left : {0U, 1U}) slots[left].in_view = true;
-  frames(10 * kLong, 2, {1, 2, 3, 4, 5, 6});
+  frames(10 * a_while, 2, {1, 2, 3, 4, 5, 6});
   EXPECT_EQ(followed(), (Ids{3, 4}));
 }
 
