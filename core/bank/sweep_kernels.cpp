@@ -53,6 +53,146 @@ struct TileWork {
   Real* S = nullptr;
 };
 
+// What stays the same during a visit of a tile: the rows' part of the pending updates and of the phases. Vectors live in
+// small arrays here, which only fully unrolled loops keep in registers.
+template <int kRows, int kPairs, int kLearnt, int kPredicted, class Real>
+struct TileRows {
+  // Arrays of length zero are not C++.
+  static constexpr int kU = std::max(kPairs, 1);
+  static constexpr int kL = std::max(kLearnt, 1);
+  static constexpr int kQ = std::max(kPredicted, 1);
+
+  // A store of a vector may change anything, as far as the compiler knows: what stays the same is kept outside.
+  int n;
+  int d;
+  int a;    // the axis
+  int i_0;  // the first row
+  int k_0;  // its coefficient
+  const Real* U[kU];
+  Vector<Real> U_i[kU][kRows][2];
+  const Real* b[kL];
+  Real* M[kL];
+  Vector<Real> b_i[kL][kRows];
+  const Real* b_predicted[kQ];
+
+  HWY_INLINE TileRows(const GroupView<Real>& group, const CovarianceTile& tile, const TileWork<Real>& work,
+                      int lane) noexcept
+      : n(group.n), d(group.d), a(tile.axis), i_0(tile.first_row), k_0(i_0 - a * n) {
+    const Tag<Real> tag;
+    for (int m = 0; m < kPairs; ++m) {
+      U[m] = at(work.U, m * d * 2, lane);
+      for (int r = 0; r < kRows; ++r) {
+        U_i[m][r][0] = hn::Load(tag, U[m] + 2 * (i_0 + r) * kLanes);
+        U_i[m][r][1] = hn::Load(tag, U[m] + (2 * (i_0 + r) + 1) * kLanes);
+      }
+    }
+    for (int q = 0; q < kLearnt; ++q) {
+      b[q] = work.learnt[q].b.data();
+      M[q] = at(work.gain, q * 3 * d, lane);
+      for (int r = 0; r < kRows; ++r) b_i[q][r] = hn::Set(tag, b[q][k_0 + r]);
+    }
+    for (int q = 0; q < kPredicted; ++q) b_predicted[q] = work.predicted[q].b.data();
+  }
+};
+
+// What the columns of one axis add up to, row by row.
+template <int kRows, int kLearnt, int kPredicted, class Real>
+struct RowSums {
+  Vector<Real> M_i[std::max(kLearnt, 1)][kRows];
+  Vector<Real> Pb_i[std::max(kPredicted, 1)][kRows];
+
+  HWY_INLINE RowSums() noexcept {
+    const Tag<Real> tag;
+    for (int q = 0; q < kLearnt; ++q) {
+      for (int r = 0; r < kRows; ++r) M_i[q][r] = hn::Zero(tag);
+    }
+    for (int q = 0; q < kPredicted; ++q) {
+      for (int r = 0; r < kRows; ++r) Pb_i[q][r] = hn::Zero(tag);
+    }
+  }
+};
+
+// The first `columns` columns of axis c, all of them left of the diagonal.
+template <int kRows, int kPairs, int kLearnt, int kPredicted, class Real>
+HWY_INLINE void visit_columns(const TileRows<kRows, kPairs, kLearnt, kPredicted, Real>& rows, int c, int columns,
+                              Real*& P, RowSums<kRows, kLearnt, kPredicted, Real>& sums) noexcept {
+  using V = Vector<Real>;
+  using Rows = TileRows<kRows, kPairs, kLearnt, kPredicted, Real>;
+  const Tag<Real> tag;
+  const Real* U_column[Rows::kU];
+  for (int m = 0; m < kPairs; ++m) U_column[m] = rows.U[m] + 2 * c * rows.n * kLanes;
+  Real* M_column[Rows::kL];
+  for (int q = 0; q < kLearnt; ++q) M_column[q] = rows.M[q] + (rows.a * rows.d + c * rows.n) * kLanes;
+  for (int k = 0; k < columns; ++k) {
+    V U_j[Rows::kU][2];
+    for (int m = 0; m < kPairs; ++m) {
+      U_j[m][0] = hn::Load(tag, U_column[m]);
+      U_j[m][1] = hn::Load(tag, U_column[m] + kLanes);
+      U_column[m] += 2 * kLanes;
+    }
+    V M_j[Rows::kL];
+    for (int q = 0; q < kLearnt; ++q) M_j[q] = hn::Load(tag, M_column[q]);
+    V b_k[Rows::kL];
+    for (int q = 0; q < kLearnt; ++q) b_k[q] = hn::Set(tag, rows.b[q][k]);
+    V b_predicted_k[Rows::kQ];
+    for (int q = 0; q < kPredicted; ++q) b_predicted_k[q] = hn::Set(tag, rows.b_predicted[q][k]);
+    for (int r = 0; r < kRows; ++r) {
+      V p = hn::Load(tag, P + r * kLanes);
+      for (int m = 0; m < kPairs; ++m) {
+        p = hn::NegMulAdd(rows.U_i[m][r][0], U_j[m][0], p);
+        p = hn::NegMulAdd(rows.U_i[m][r][1], U_j[m][1], p);
+      }
+      if constexpr (kPairs > 0) hn::Store(p, tag, P + r * kLanes);
+      for (int q = 0; q < kLearnt; ++q) {
+        sums.M_i[q][r] = hn::MulAdd(p, b_k[q], sums.M_i[q][r]);
+        M_j[q] = hn::MulAdd(p, rows.b_i[q][r], M_j[q]);
+      }
+      for (int q = 0; q < kPredicted; ++q) sums.Pb_i[q][r] = hn::MulAdd(p, b_predicted_k[q], sums.Pb_i[q][r]);
+    }
+    for (int q = 0; q < kLearnt; ++q) {
+      hn::Store(M_j[q], tag, M_column[q]);
+      M_column[q] += kLanes;
+    }
+    P += kRows * kLanes;
+  }
+}
+
+// The block on the diagonal: left of it element by element, then the diagonal itself.
+template <int kRows, int kPairs, int kLearnt, int kPredicted, class Real>
+HWY_INLINE void visit_corner(const GroupView<Real>& group,
+                             const TileRows<kRows, kPairs, kLearnt, kPredicted, Real>& rows, int lane, Real*& P,
+                             RowSums<kRows, kLearnt, kPredicted, Real>& sums) noexcept {
+  using V = Vector<Real>;
+  const Tag<Real> tag;
+  unroll<kRows>([&](auto r) HWY_ATTR {
+    unroll<r>([&](auto s) HWY_ATTR {
+      V p = hn::Load(tag, P);
+      for (int m = 0; m < kPairs; ++m) {
+        p = hn::NegMulAdd(rows.U_i[m][r][0], rows.U_i[m][s][0], p);
+        p = hn::NegMulAdd(rows.U_i[m][r][1], rows.U_i[m][s][1], p);
+      }
+      if constexpr (kPairs > 0) hn::Store(p, tag, P);
+      P += kLanes;
+      for (int q = 0; q < kLearnt; ++q) {
+        sums.M_i[q][r] = hn::MulAdd(p, rows.b_i[q][s], sums.M_i[q][r]);
+        sums.M_i[q][s] = hn::MulAdd(p, rows.b_i[q][r], sums.M_i[q][s]);
+      }
+      for (int q = 0; q < kPredicted; ++q) {
+        sums.Pb_i[q][r] = hn::MulAdd(p, hn::Set(tag, rows.b_predicted[q][rows.k_0 + s]), sums.Pb_i[q][r]);
+      }
+    });
+  });
+  for (int r = 0; r < kRows; ++r) {
+    const V p = hn::Load(tag, at(group.diagonal, rows.i_0 + r, lane));
+    for (int q = 0; q < kLearnt; ++q) sums.M_i[q][r] = hn::MulAdd(p, rows.b_i[q][r], sums.M_i[q][r]);
+    // Half: the block on the diagonal is doubled where the rows are summed.
+    for (int q = 0; q < kPredicted; ++q) {
+      const V half = hn::Set(tag, Real(0.5) * rows.b_predicted[q][rows.k_0 + r]);
+      sums.Pb_i[q][r] = hn::MulAdd(p, half, sums.Pb_i[q][r]);
+    }
+  }
+}
+
 // Applies kPairs pending updates, then adds the tile's part to M and to S.
 //
 // An element P_ij left of the diagonal counts twice, as P_ij and as P_ji: M gets P_ij b_j in row i and P_ij b_i in row
@@ -62,120 +202,23 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
                            int lane) noexcept {
   using V = Vector<Real>;
   const Tag<Real> tag;
-  // A store of a vector may change anything, as far as the compiler knows: what stays the same is kept outside.
-  const int n = group.n;
-  const int d = group.d;
-  const int a = tile.axis;
-  const int i_0 = tile.first_row;
-  const int k_0 = i_0 - a * n;  // the first row's coefficient
-  // Arrays of length zero are not C++.
-  constexpr int kU = std::max(kPairs, 1);
-  constexpr int kL = std::max(kLearnt, 1);
-  constexpr int kQ = std::max(kPredicted, 1);
-
-  const Real* U[kU];
-  V U_i[kU][kRows][2];
-  for (int m = 0; m < kPairs; ++m) {
-    U[m] = at(work.U, m * d * 2, lane);
-    for (int r = 0; r < kRows; ++r) {
-      U_i[m][r][0] = hn::Load(tag, U[m] + 2 * (i_0 + r) * kLanes);
-      U_i[m][r][1] = hn::Load(tag, U[m] + (2 * (i_0 + r) + 1) * kLanes);
-    }
-  }
-  const Real* b[kL];
-  Real* M[kL];
-  V b_i[kL][kRows];
-  for (int q = 0; q < kLearnt; ++q) {
-    b[q] = work.learnt[q].b.data();
-    M[q] = at(work.gain, q * 3 * d, lane);
-    for (int r = 0; r < kRows; ++r) b_i[q][r] = hn::Set(tag, b[q][k_0 + r]);
-  }
-  const Real* b_predicted[kQ];
-  for (int q = 0; q < kPredicted; ++q) b_predicted[q] = work.predicted[q].b.data();
-
+  const TileRows<kRows, kPairs, kLearnt, kPredicted, Real> rows(group, tile, work, lane);
+  const int a = rows.a;
   Real* P = at(group.lower, static_cast<int>(tile.offset), lane);
   for (int c = 0; c <= a; ++c) {
-    V M_i[kL][kRows];
-    V Pb_i[kQ][kRows];
+    RowSums<kRows, kLearnt, kPredicted, Real> sums;
+    visit_columns(rows, c, c < a ? rows.n : rows.k_0, P, sums);
+    if (c == a) visit_corner(group, rows, lane, P, sums);
     for (int q = 0; q < kLearnt; ++q) {
-      for (int r = 0; r < kRows; ++r) M_i[q][r] = hn::Zero(tag);
-    }
-    for (int q = 0; q < kPredicted; ++q) {
-      for (int r = 0; r < kRows; ++r) Pb_i[q][r] = hn::Zero(tag);
-    }
-    const int columns = c < a ? n : k_0;
-    const Real* U_column[kU];
-    for (int m = 0; m < kPairs; ++m) U_column[m] = U[m] + 2 * c * n * kLanes;
-    Real* M_column[kL];
-    for (int q = 0; q < kLearnt; ++q) M_column[q] = M[q] + (a * d + c * n) * kLanes;
-    for (int k = 0; k < columns; ++k) {
-      V U_j[kU][2];
-      for (int m = 0; m < kPairs; ++m) {
-        U_j[m][0] = hn::Load(tag, U_column[m]);
-        U_j[m][1] = hn::Load(tag, U_column[m] + kLanes);
-        U_column[m] += 2 * kLanes;
-      }
-      V M_j[kL];
-      for (int q = 0; q < kLearnt; ++q) M_j[q] = hn::Load(tag, M_column[q]);
-      V b_k[kL];
-      for (int q = 0; q < kLearnt; ++q) b_k[q] = hn::Set(tag, b[q][k]);
-      V b_predicted_k[kQ];
-      for (int q = 0; q < kPredicted; ++q) b_predicted_k[q] = hn::Set(tag, b_predicted[q][k]);
       for (int r = 0; r < kRows; ++r) {
-        V p = hn::Load(tag, P + r * kLanes);
-        for (int m = 0; m < kPairs; ++m) {
-          p = hn::NegMulAdd(U_i[m][r][0], U_j[m][0], p);
-          p = hn::NegMulAdd(U_i[m][r][1], U_j[m][1], p);
-        }
-        if constexpr (kPairs > 0) hn::Store(p, tag, P + r * kLanes);
-        for (int q = 0; q < kLearnt; ++q) {
-          M_i[q][r] = hn::MulAdd(p, b_k[q], M_i[q][r]);
-          M_j[q] = hn::MulAdd(p, b_i[q][r], M_j[q]);
-        }
-        for (int q = 0; q < kPredicted; ++q) {
-          Pb_i[q][r] = hn::MulAdd(p, b_predicted_k[q], Pb_i[q][r]);
-        }
+        hn::Store(sums.M_i[q][r], tag, rows.M[q] + (c * rows.d + rows.i_0 + r) * kLanes);
       }
-      for (int q = 0; q < kLearnt; ++q) {
-        hn::Store(M_j[q], tag, M_column[q]);
-        M_column[q] += kLanes;
-      }
-      P += kRows * kLanes;
-    }
-    if (c == a) {
-      unroll<kRows>([&](auto r) HWY_ATTR {
-        unroll<r>([&](auto s) HWY_ATTR {
-          V p = hn::Load(tag, P);
-          for (int m = 0; m < kPairs; ++m) {
-            p = hn::NegMulAdd(U_i[m][r][0], U_i[m][s][0], p);
-            p = hn::NegMulAdd(U_i[m][r][1], U_i[m][s][1], p);
-          }
-          if constexpr (kPairs > 0) hn::Store(p, tag, P);
-          P += kLanes;
-          for (int q = 0; q < kLearnt; ++q) {
-            M_i[q][r] = hn::MulAdd(p, b_i[q][s], M_i[q][r]);
-            M_i[q][s] = hn::MulAdd(p, b_i[q][r], M_i[q][s]);
-          }
-          for (int q = 0; q < kPredicted; ++q) {
-            Pb_i[q][r] = hn::MulAdd(p, hn::Set(tag, b_predicted[q][k_0 + s]), Pb_i[q][r]);
-          }
-        });
-      });
-      for (int r = 0; r < kRows; ++r) {
-        const V p = hn::Load(tag, at(group.diagonal, i_0 + r, lane));
-        for (int q = 0; q < kLearnt; ++q) M_i[q][r] = hn::MulAdd(p, b_i[q][r], M_i[q][r]);
-        // Half: the block on the diagonal is doubled below.
-        for (int q = 0; q < kPredicted; ++q) {
-          Pb_i[q][r] = hn::MulAdd(p, hn::Set(tag, Real(0.5) * b_predicted[q][k_0 + r]), Pb_i[q][r]);
-        }
-      }
-    }
-    for (int q = 0; q < kLearnt; ++q) {
-      for (int r = 0; r < kRows; ++r) hn::Store(M_i[q][r], tag, M[q] + (c * d + i_0 + r) * kLanes);
     }
     for (int q = 0; q < kPredicted; ++q) {
       V sum = hn::Zero(tag);
-      for (int r = 0; r < kRows; ++r) sum = hn::MulAdd(Pb_i[q][r], hn::Set(tag, b_predicted[q][k_0 + r]), sum);
+      for (int r = 0; r < kRows; ++r) {
+        sum = hn::MulAdd(sums.Pb_i[q][r], hn::Set(tag, rows.b_predicted[q][rows.k_0 + r]), sum);
+      }
       if (c == a) sum = hn::Add(sum, sum);
       Real* S = at(work.S, q * 6 + lower_index(a, c), lane);
       hn::Store(hn::Add(hn::Load(tag, S), sum), tag, S);
@@ -183,7 +226,9 @@ HWY_INLINE void visit_tile(const GroupView<Real>& group, const CovarianceTile& t
   }
   for (int q = 0; q < kLearnt; ++q) {
     for (int c = a + 1; c < 3; ++c) {
-      for (int r = 0; r < kRows; ++r) hn::Store(hn::Zero(tag), tag, M[q] + (c * d + i_0 + r) * kLanes);
+      for (int r = 0; r < kRows; ++r) {
+        hn::Store(hn::Zero(tag), tag, rows.M[q] + (c * rows.d + rows.i_0 + r) * kLanes);
+      }
     }
   }
 }

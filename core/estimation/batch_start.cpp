@@ -284,6 +284,128 @@ bool usable(const Observation& observation, const Model&, int n) noexcept {
          observation.X_CW.R.allFinite() && observation.X_CW.t.allFinite();
 }
 
+// The rough solutions only choose the basin.
+constexpr double kRough = 1e-3;
+
+// From one start through the robust losses; none when another start has led to the same place.
+template <class Model>
+std::optional<Solution> descend(BatchProblem<Model>& problem, VectorXd y, const BatchSettings& settings,
+                                std::vector<Solution>& rough_solutions, int& iterations) {
+  const Loss first_loss = settings.robust ? Loss::kHuber : Loss::kQuadratic;
+  Solution solution = minimise(problem, std::move(y), first_loss, settings.max_iterations, kRough, iterations);
+  if (!settings.robust) return solution;
+  // Two starts that meet need not go on twice.
+  const bool known = std::any_of(rough_solutions.begin(), rough_solutions.end(), [&](const Solution& other) {
+    return (solution.y - other.y).squaredNorm() < 1e-4 * static_cast<double>(problem.dimension()) &&
+           std::abs(solution.cost - other.cost) < 0.1;
+  });
+  if (known) return std::nullopt;
+  rough_solutions.push_back(solution);
+  VectorXd huber_y = solution.y;
+  solution = minimise(problem, std::move(solution.y), Loss::kStudentT, settings.max_iterations, kRough, iterations);
+  // Without an outlier there is nothing to be caught by.
+  const bool outliers = std::any_of(problem.residual2().begin(), problem.residual2().end(),
+                                    [&](double s) { return !(s < settings.gate); });
+  if (outliers) {
+    Solution other = graduate(problem, std::move(huber_y), settings.max_iterations, kRough, iterations);
+    if (other.converged && (!solution.converged || other.cost < solution.cost)) solution = std::move(other);
+  }
+  return solution;
+}
+
+// The best that the starts at all depths lead to. `offset_of` tells where a depth lies, from the prior's mean.
+template <class Model, class OffsetOf>
+BatchStatus best_of_starts(BatchProblem<Model>& problem, const OffsetOf& offset_of, double dc_deviation_mm, Index n,
+                           const BatchSettings& settings, int& iterations, Solution& best) {
+  std::vector<Solution> rough_solutions;
+  bool seen_somewhere = false;
+  bool any = false;
+  for (const double depth_mm : settings.start_depths_mm) {
+    VectorXd y = VectorXd::Zero(problem.dimension());
+    const Vector3d offset = offset_of(depth_mm);
+    for (Index axis = 0; axis < 3; ++axis) y(axis * n) = offset(axis) / dc_deviation_mm;
+    problem.evaluate(y, settings.robust ? Loss::kHuber : Loss::kQuadratic);
+    if (problem.visible() == 0) continue;
+    seen_somewhere = true;
+    std::optional<Solution> solution = descend(problem, std::move(y), settings, rough_solutions, iterations);
+    if (!solution || !solution->converged || (any && !(solution->cost < best.cost))) continue;
+    best = *std::move(solution);
+    any = true;
+  }
+  if (!seen_somewhere) return BatchStatus::kBehindCamera;
+  return any ? BatchStatus::kOk : BatchStatus::kDiverged;
+}
+
+template <class Model>
+int count_inliers(BatchProblem<Model>& problem) {
+  return static_cast<int>(std::count(problem.used().begin(), problem.used().end(), 1));
+}
+
+// The plain estimate of what lies within the gate, until that set stays. One that has come in stays in, so that the set
+// can't alternate.
+template <class Model>
+BatchStatus refine(BatchProblem<Model>& problem, const BatchSettings& settings, Solution& solution,
+                   BatchOutcome& outcome) {
+  const std::size_t count = problem.residual2().size();
+  const int enough = std::max(settings.min_observations,
+                              static_cast<int>(std::ceil(settings.min_inlier_fraction * static_cast<double>(count))));
+  problem.widen(solution.y);
+  if (settings.robust) {
+    outcome.robust_cost = problem.evaluate(solution.y, Loss::kStudentT);
+    outcome.weights = problem.weight();
+    for (std::size_t k = 0; k < count; ++k) problem.used()[k] = problem.residual2()[k] < settings.gate ? 1 : 0;
+    outcome.misfit = misfit_of(problem.residual2());
+  } else {
+    problem.evaluate(solution.y, Loss::kQuadratic);
+    outcome.weights = problem.weight();
+  }
+  constexpr int kMaxRounds = 5;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    if (count_inliers(problem) < enough) return BatchStatus::kTooManyOutliers;
+    solution = minimise(problem, std::move(solution.y), Loss::kQuadratic, settings.max_iterations, settings.tolerance,
+                        outcome.iterations);
+    if (!solution.converged) return BatchStatus::kDiverged;
+    if (!settings.robust) break;
+    bool changed = false;
+    for (std::size_t k = 0; k < count; ++k) {
+      if (problem.used()[k] == 0 && problem.residual2()[k] < settings.gate) {
+        problem.used()[k] = 1;
+        changed = true;
+      }
+    }
+    if (!changed) break;
+  }
+  if (!settings.robust) outcome.robust_cost = solution.cost;
+  return BatchStatus::kOk;
+}
+
+// State and covariance at the solution, out of the whitened coordinates. False when they are no numbers.
+template <class Model>
+bool estimate_at(BatchProblem<Model>& problem, const VectorXd& y, const Basis& deviations, const Vector3d& prior_mean,
+                 BatchOutcome& outcome) {
+  const Index n = deviations.size();
+  const Index d = problem.dimension();
+  MatrixXd A;
+  VectorXd descent;
+  outcome.map_cost = problem.evaluate(y, Loss::kQuadratic);
+  problem.normal_equations(y, A, descent);
+  const Eigen::LLT<MatrixXd> factor(A);
+  if (factor.info() != Eigen::Success) return false;
+  const MatrixXd P = factor.solve(MatrixXd::Identity(d, d));
+  VectorXd sigma(d);
+  for (Index axis = 0; axis < 3; ++axis) sigma.segment(axis * n, n) = deviations;
+  FeatureEstimate& estimate = outcome.estimate;
+  estimate.x = sigma.cwiseProduct(y);
+  for (Index axis = 0; axis < 3; ++axis) estimate.x(axis * n) += prior_mean(axis);
+  estimate.P.resize(d, d);
+  for (Index j = 0; j < d; ++j) {
+    for (Index i = j; i < d; ++i) {
+      estimate.P(i, j) = estimate.P(j, i) = 0.5 * (P(i, j) + P(j, i)) * sigma(i) * sigma(j);
+    }
+  }
+  return estimate.x.allFinite() && estimate.P.allFinite();
+}
+
 }  // namespace
 
 template <class Model>
@@ -305,109 +427,19 @@ BatchOutcome batch_start(std::span<const Observation> observations, const Model&
   if (!model.ray(observations.front().z, ray_C)) return refuse(BatchStatus::kBadObservation);
   const Pose X_WC = observations.front().X_CW.inverse();
   const Vector3d prior_mean = X_WC * (settings.prior_depth_mm * ray_C);
-
   const Basis deviations = prior_deviations(layout, prior);
   BatchProblem<Model> problem(observations, model, deviations, prior_mean, settings.huber_deviations);
 
-  // Every start, through the robust losses; the rough solutions only choose the basin.
-  constexpr double kRough = 1e-3;
-  std::optional<Solution> best;
-  std::vector<Solution> rough_solutions;
-  bool seen_somewhere = false;
-  for (const double depth_mm : settings.start_depths_mm) {
-    VectorXd y = VectorXd::Zero(problem.dimension());
-    const Vector3d offset = X_WC * (depth_mm * ray_C) - prior_mean;
-    for (Index axis = 0; axis < 3; ++axis) y(axis * n) = offset(axis) / deviations(0);
-    const Loss first_loss = settings.robust ? Loss::kHuber : Loss::kQuadratic;
-    problem.evaluate(y, first_loss);
-    if (problem.visible() == 0) continue;
-    seen_somewhere = true;
-    Solution solution =
-        minimise(problem, std::move(y), first_loss, settings.max_iterations, kRough, outcome.iterations);
-    if (settings.robust) {
-      // Two starts that meet need not go on twice.
-      const bool known = std::any_of(rough_solutions.begin(), rough_solutions.end(), [&](const Solution& other) {
-        return (solution.y - other.y).squaredNorm() < 1e-4 * static_cast<double>(problem.dimension()) &&
-               std::abs(solution.cost - other.cost) < 0.1;
-      });
-      if (known) continue;
-      rough_solutions.push_back(solution);
-      VectorXd huber_y = solution.y;
-      solution = minimise(problem, std::move(solution.y), Loss::kStudentT, settings.max_iterations, kRough,
-                          outcome.iterations);
-      // Without an outlier there is nothing to be caught by.
-      const bool outliers = std::any_of(problem.residual2().begin(), problem.residual2().end(),
-                                        [&](double s) { return !(s < settings.gate); });
-      if (outliers) {
-        Solution other = graduate(problem, std::move(huber_y), settings.max_iterations, kRough, outcome.iterations);
-        if (other.converged && (!solution.converged || other.cost < solution.cost)) solution = std::move(other);
-      }
-    }
-    if (solution.converged && (!best || solution.cost < best->cost)) best = std::move(solution);
-  }
-  if (!seen_somewhere) return refuse(BatchStatus::kBehindCamera);
-  if (!best) return refuse(BatchStatus::kDiverged);
-
-  // The plain estimate of what lies within the gate, until that set stays. One that has come in stays in, so that the
-  // set can't alternate.
-  const auto count_inliers = [&] {
-    return static_cast<int>(std::count(problem.used().begin(), problem.used().end(), 1));
-  };
-  const int enough =
-      std::max(settings.min_observations,
-               static_cast<int>(std::ceil(settings.min_inlier_fraction * static_cast<double>(observations.size()))));
-  Solution solution = std::move(*best);
-  problem.widen(solution.y);
-  if (settings.robust) {
-    outcome.robust_cost = problem.evaluate(solution.y, Loss::kStudentT);
-    outcome.weights = problem.weight();
-    for (std::size_t k = 0; k < observations.size(); ++k)
-      problem.used()[k] = problem.residual2()[k] < settings.gate ? 1 : 0;
-    outcome.misfit = misfit_of(problem.residual2());
-  } else {
-    problem.evaluate(solution.y, Loss::kQuadratic);
-    outcome.weights = problem.weight();
-  }
-  constexpr int kMaxRounds = 5;
-  for (int round = 0; round < kMaxRounds; ++round) {
-    if (count_inliers() < enough) return refuse(BatchStatus::kTooManyOutliers);
-    solution = minimise(problem, std::move(solution.y), Loss::kQuadratic, settings.max_iterations, settings.tolerance,
-                        outcome.iterations);
-    if (!solution.converged) return refuse(BatchStatus::kDiverged);
-    if (!settings.robust) break;
-    bool changed = false;
-    for (std::size_t k = 0; k < observations.size(); ++k) {
-      if (problem.used()[k] == 0 && problem.residual2()[k] < settings.gate) {
-        problem.used()[k] = 1;
-        changed = true;
-      }
-    }
-    if (!changed) break;
-  }
-  if (!settings.robust) outcome.robust_cost = solution.cost;
-
-  MatrixXd A;
-  VectorXd descent;
-  outcome.map_cost = problem.evaluate(solution.y, Loss::kQuadratic);
-  problem.normal_equations(solution.y, A, descent);
-  const Eigen::LLT<MatrixXd> factor(A);
-  if (factor.info() != Eigen::Success) return refuse(BatchStatus::kDiverged);
-  const Index d = problem.dimension();
-  const MatrixXd P = factor.solve(MatrixXd::Identity(d, d));
-  VectorXd sigma(d);
-  for (Index axis = 0; axis < 3; ++axis) sigma.segment(axis * n, n) = deviations;
-  FeatureEstimate& estimate = outcome.estimate;
-  estimate.x = sigma.cwiseProduct(solution.y);
-  for (Index axis = 0; axis < 3; ++axis) estimate.x(axis * n) += prior_mean(axis);
-  estimate.P.resize(d, d);
-  for (Index j = 0; j < d; ++j) {
-    for (Index i = j; i < d; ++i) {
-      estimate.P(i, j) = estimate.P(j, i) = 0.5 * (P(i, j) + P(j, i)) * sigma(i) * sigma(j);
-    }
-  }
-  if (!estimate.x.allFinite() || !estimate.P.allFinite()) return refuse(BatchStatus::kDiverged);
+  const auto offset_of = [&](double depth_mm) { return Vector3d(X_WC * (depth_mm * ray_C) - prior_mean); };
+  Solution solution;
+  const BatchStatus started =
+      best_of_starts(problem, offset_of, deviations(0), n, settings, outcome.iterations, solution);
+  if (started != BatchStatus::kOk) return refuse(started);
+  const BatchStatus refined = refine(problem, settings, solution, outcome);
+  if (refined != BatchStatus::kOk) return refuse(refined);
+  if (!estimate_at(problem, solution.y, deviations, prior_mean, outcome)) return refuse(BatchStatus::kDiverged);
   outcome.inlier = problem.used();
-  outcome.inliers = count_inliers();
+  outcome.inliers = count_inliers(problem);
   outcome.R = problem.R();
   outcome.status = BatchStatus::kOk;
   return outcome;

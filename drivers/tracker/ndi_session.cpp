@@ -21,15 +21,10 @@ constexpr Duration kLongReplyTime = seconds(6);  // INIT over TCP, TSTART, PINIT
 constexpr Duration kResetTime = seconds(1);
 constexpr Duration kSettleTime = milliseconds(100);
 constexpr Duration kStreamReplyTime = milliseconds(300);
-constexpr Duration kSilentAfter = milliseconds(300);
-constexpr Duration kReopenAfter = seconds(2);
-// A pose of the reference that is farther away than this is none of the sensor's frame.
-constexpr double kReferenceAge_s = 0.05;
 constexpr Duration kQuietTime = milliseconds(20);
 constexpr int kMostRetries = 3;
 constexpr int kMostSearches = 16;  // a device that always finds a port to initialise does not hold up the start
 constexpr std::size_t kBlock = 64;
-constexpr std::uint16_t kHardwareFailure = 0x0010;
 
 // "ERROR0C" as the guide explains it, for those that tell a user something.
 std::string explain(const std::string& reply) {
@@ -440,134 +435,6 @@ void NdiSession::ask(LinkControl& link, Instant now) {
     case Query::kTx:
       return command(link, "TX:0801", kStreamReplyTime, now);
   }
-}
-
-void NdiSession::on_tracking(LinkControl& link, const Expected<NdiTracking>& tracking, Instant arrival) {
-  if (!tracking) return on_damage(link, tracking.error().message, arrival);
-  answered_ = true;
-  retries_ = 0;
-  damaged_ = 0;
-  if ((tracking->system_status & kHardwareFailure) != 0) return link.fail("the tracker reports a hardware failure");
-  // In a BX2 reply the frames come one after the other, each with its tools.
-  for (const NdiToolReading& sensor : tracking->tools) {
-    if (sensor.handle != sensor_handle_) continue;
-    deliver(sensor, settings_.reference ? reference_at(*tracking, sensor.frame) : ToolReading{}, arrival);
-  }
-  if (settings_.reference) hear_reference(*tracking, arrival);
-  // Five questions a frame: a frame is seen at most a fifth of its period after it is there.
-  due_ = std::max(arrival, asked_ + from_seconds(0.2 / settings_.frame_rate_hz));
-  command_.clear();
-}
-
-void NdiSession::hear_reference(const NdiTracking& tracking, Instant arrival) {
-  for (const NdiToolReading& tool : tracking.tools) {
-    if (tool.handle != reference_handle_) continue;
-    reference_ = tool;
-    if (tool.reading.state != ToolState::kDisabled) reference_there_ = arrival;
-  }
-}
-
-// Some devices tell tools of different kinds in frames, or even replies, of their own.
-ToolReading NdiSession::reference_at(const NdiTracking& tracking, std::uint32_t frame) const noexcept {
-  const auto apart = [frame](const NdiToolReading& tool) {
-    return std::min(tool.frame - frame, frame - tool.frame);  // over the count's end, too
-  };
-  std::optional<NdiToolReading> nearest;
-  const auto consider = [&](const NdiToolReading& tool) {
-    if (!nearest || apart(tool) < apart(*nearest)) nearest = tool;
-  };
-  for (const NdiToolReading& tool : tracking.tools) {
-    if (tool.handle != reference_handle_) continue;
-    // A disabled tool has no frame, and no earlier reading stands for it.
-    if (tool.reading.state == ToolState::kDisabled) return tool.reading;
-    consider(tool);
-  }
-  if (reference_.handle == reference_handle_ && reference_.reading.state != ToolState::kDisabled) consider(reference_);
-  const bool near = nearest && apart(*nearest) <= kReferenceAge_s * settings_.frame_rate_hz;
-  return near ? nearest->reading : ToolReading{};
-}
-
-bool NdiSession::expect_rate(std::int64_t count, Instant arrival) {
-  rate_.observe(count, arrival);
-  if (rate_.wrong() == rate_refused_) return !rate_refused_;
-  rate_refused_ = rate_.wrong();
-  clock_.reset();
-  if (!rate_refused_) {
-    health_.set_reason("");
-    return true;
-  }
-  health_.set_reason(fmt::format("{:.1f} frames come a second, and frame_rate_hz says {:.1f}: no pose can be stamped",
-                                 rate_.seen_hz(), settings_.frame_rate_hz));
-  health_.set_state(DeviceState::kSilent);
-  return false;
-}
-
-void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& reference, Instant arrival) {
-  TrackerSample sample;
-  sample.arrival = arrival;
-  if (sensor.reading.state == ToolState::kDisabled && sensor.frame == 0) {
-    // It has no frame and so no instant; it is told once, then again when it changes.
-    if (std::exchange(disabled_, true)) return;
-    last_frame_.reset();
-    sample.source_time = arrival;
-  } else {
-    if (last_frame_ == sensor.frame) return;  // asked before the next frame was there
-    const std::uint32_t step = last_frame_ ? sensor.frame - *last_frame_ : 0;
-    constexpr std::uint32_t kBackwards = 0x80000000U;
-    if (step > 0 && step < kBackwards) {
-      stride_ = stride_ == 0 ? step : std::min(stride_, step);
-      health_.lost.add(step / stride_ - 1);
-    }
-    disabled_ = false;
-    last_frame_ = sensor.frame;
-    // Over the end of the device's 32 bits the count goes on.
-    count_ += static_cast<std::int32_t>(sensor.frame - static_cast<std::uint32_t>(count_));
-    if (!expect_rate(count_, arrival)) {
-      last_reading_ = arrival;  // the device is there, and a new start would help nobody
-      return;
-    }
-    clock_.observe(count_, arrival - on_line_);
-    health_.jitter.add(clock_.lateness(count_, arrival - on_line_));
-    sample.source_time = clock_.stamp(count_);
-  }
-  sample.device_frame = sensor.frame;
-  const ToolReading reading = in_world(sensor.reading, reference, settings_.world);
-  sample.state = reading.state;
-  sample.X_WS = reading.X_TO;
-  last_reading_ = arrival;
-  health_.samples.add();
-  health_.set_state(DeviceState::kStreaming);
-  sink_(sample);
-}
-
-Instant NdiSession::next_expectation() const noexcept {
-  return last_reading_ + (health_.state() == DeviceState::kStreaming ? kSilentAfter : kReopenAfter);
-}
-
-bool NdiSession::expect_readings(LinkControl& link, Instant now) {
-  if (now - last_reading_ >= kReopenAfter) {
-    link.fail(why_no_reading());
-    return false;
-  }
-  // Plugged in again it must be initialised again, which only a new start does.
-  if (settings_.reference && now - reference_there_ >= kReopenAfter) {
-    link.fail("no reading of the reference tool for 2 s, or it is disabled: is it unplugged?");
-    return false;
-  }
-  if (now - last_reading_ >= kSilentAfter && health_.state() == DeviceState::kStreaming) {
-    health_.set_state(DeviceState::kSilent);
-  }
-  return true;
-}
-
-std::string NdiSession::why_no_reading() const {
-  if (damaged_ > 0) {
-    return fmt::format("no whole reply to {} for 2 s, {} came damaged (the last: {}); a bad line, or another device?",
-                       command_, damaged_, damage_);
-  }
-  if (!command_.empty()) return fmt::format("no answer to {} for 2 s", command_);
-  if (disabled_) return "the sensor's tool has been disabled for 2 s: is it unplugged?";
-  return "no reading of the sensor's tool for 2 s";
 }
 
 void NdiSession::on_time(LinkControl& link, Instant now) {

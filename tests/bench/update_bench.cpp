@@ -222,6 +222,7 @@ void print_rows(const std::vector<Candidate>& candidates, double memory_ns, doub
   }
 }
 
+// Long: a list of what is timed side by side, each with what it works on, which must outlive the timing.
 void bench_updates(int harmonics) {
   const BasisLayout layout{.cardiac_harmonics = harmonics};
   const int groups = std::max(1, static_cast<int>(kLevelTwoShare_bytes / (kLanes * covariance_bytes(layout))));

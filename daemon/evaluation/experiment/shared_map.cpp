@@ -129,17 +129,13 @@ void SharedMap::take_frame(int frame) {
   }
 }
 
-std::vector<FeatureEstimate> joint_cramer_rao_bound(const Scene& scene, const BasisLayout& layout, const Prior& prior,
-                                                    JointPrior joint, int end_frame) {
-  const Index n = layout.size();
+namespace {
+
+// What features that are no further apart than a heart is large have in common, put into the information of their
+// separate priors.
+void join_priors(const Scene& scene, JointPrior joint, Index n, MatrixXd& information) {
   const auto features = static_cast<Index>(scene.features.size());
   const Index d = 3 * n;
-  std::vector<FeatureEstimate> bounds;
-  MatrixXd information = MatrixXd::Zero(d * features, d * features);
-  for (Index i = 0; i < features; ++i) {
-    bounds.push_back(cramer_rao_bound(scene, scene.features[static_cast<std::size_t>(i)], layout, prior, 0));
-    information.diagonal().segment(i * d, d) = bounds.back().P.diagonal().cwiseInverse();
-  }
   if (joint == JointPrior::kCommonPart) {
     // Covariance sigma^2 (I + 1 1^T) over the features, so information (I - 1 1^T / (1 + features)) / sigma^2.
     for (Index coefficient = 0; coefficient < d; ++coefficient) {
@@ -170,6 +166,22 @@ std::vector<FeatureEstimate> joint_cramer_rao_bound(const Scene& scene, const Ba
       }
     }
   }
+}
+
+}  // namespace
+
+std::vector<FeatureEstimate> joint_cramer_rao_bound(const Scene& scene, const BasisLayout& layout, const Prior& prior,
+                                                    JointPrior joint, int end_frame) {
+  const Index n = layout.size();
+  const auto features = static_cast<Index>(scene.features.size());
+  const Index d = 3 * n;
+  std::vector<FeatureEstimate> bounds;
+  MatrixXd information = MatrixXd::Zero(d * features, d * features);
+  for (Index i = 0; i < features; ++i) {
+    bounds.push_back(cramer_rao_bound(scene, scene.features[static_cast<std::size_t>(i)], layout, prior, 0));
+    information.diagonal().segment(i * d, d) = bounds.back().P.diagonal().cwiseInverse();
+  }
+  join_priors(scene, joint, n, information);
   const PoseError& error = scene.settings.pose_error;
   const double keep =
       error.correlation_s > 0.0 ? std::exp(-1.0 / (scene.settings.frames_per_s * error.correlation_s)) : 0.0;

@@ -11,7 +11,6 @@ namespace {
 constexpr double kSettledAfter_s = 15.0;
 constexpr double kPathLength_s = 1.0;
 constexpr double kOff_mm = 3.0;
-constexpr Duration kFrame = std::chrono::milliseconds(34);  // at 30 frames a second
 
 ErrorFigures figures_of(std::vector<double> errors) {
   ErrorFigures figures;
@@ -68,6 +67,133 @@ class Spans {
   std::vector<std::size_t> last_;
 };
 
+// One published position beside the true one.
+struct Compared {
+  std::uint32_t id = 0;
+  bool converged = false;
+  Vector3d published;
+  Vector3d truth;
+  Matrix3d P_mm2;
+};
+
+// What the samples say, taken in one after the other.
+class Tally {
+ public:
+  Tally(const std::vector<double>& second_edges, const std::vector<double>& cycle_edges)
+      : seconds_(second_edges), cycles_(cycle_edges) {}
+
+  // `early`: released before a premature beat could be known.
+  void begin_sample(double t_s, perimap_SurfaceState state, bool early) {
+    t_s_ = t_s;
+    good_ = state == perimap_SURFACE_GOOD;
+    early_ = early;
+    converged_ = 0;
+    if (t_s < kSettledAfter_s) return;
+    ++report_.settled_samples;
+    report_.degraded += state == perimap_SURFACE_DEGRADED ? 1 : 0;
+    report_.invalid += state == perimap_SURFACE_INVALID ? 1 : 0;
+  }
+
+  // Of the sample. True from the first in which the feature was converged.
+  bool counts(std::uint32_t id, bool converged) {
+    seen_.insert(id);
+    if (converged) {
+      ++converged_;
+      converged_at_.try_emplace(id, t_s_);
+    }
+    return converged_at_.contains(id);
+  }
+
+  void add_without_truth(std::uint32_t id) { without_truth_.insert(id); }
+
+  void add(const Compared& feature, bool on_path) {
+    const Vector3d e = feature.published - feature.truth;
+    const double error = e.norm();
+    const double nees = e.dot(feature.P_mm2.ldlt().solve(e)) / 3.0;
+    seconds_.add_error(t_s_, error, nees);
+    cycles_.add_error(t_s_, error, nees);
+    feature_errors_[feature.id].push_back(error);
+    if (feature.converged && good_) add_good(feature.id, error, nees);
+    if (t_s_ >= kSettledAfter_s) {
+      settled_.push_back(error);
+      nees_sum_ += nees;
+    }
+    if (on_path) {
+      paths_[feature.id].published.push_back(feature.published);
+      paths_[feature.id].truth.push_back(feature.truth);
+    }
+  }
+
+  void end_sample() {
+    if (t_s_ <= kSettledAfter_s) report_.converged_at_15_s = converged_;
+    seconds_.add_sample(t_s_, converged_);
+    cycles_.add_sample(t_s_, converged_);
+  }
+
+  // Of all samples; called once.
+  [[nodiscard]] AccuracyReport report() {
+    report_.features_published = seen_.size();
+    report_.features_converged = converged_at_.size();
+    report_.converged_by_15_s = static_cast<std::size_t>(std::count_if(
+        converged_at_.begin(), converged_at_.end(), [](const auto& c) { return c.second <= kSettledAfter_s; }));
+    report_.features_without_truth = without_truth_.size();
+    report_.good.features_off = off_.size();
+    if (report_.good.count > 0) {
+      const auto count = static_cast<double>(report_.good.count);
+      report_.good.rms_mm = std::sqrt(good_squares_ / count);
+      report_.good.mean_nees = good_nees_sum_ / count;
+    }
+    report_.settled = figures_of(settled_);
+    if (!settled_.empty()) {
+      report_.mean_nees = nees_sum_ / static_cast<double>(settled_.size());
+      const auto above = std::count_if(settled_.begin(), settled_.end(), [](double e) { return e > kOff_mm; });
+      report_.share_above_3_mm = static_cast<double>(above) / static_cast<double>(settled_.size());
+    }
+    report_.seconds = seconds_.figures();
+    report_.cycles = cycles_.figures();
+    for (auto& [id, errors] : feature_errors_) {
+      FeaturePath path = std::move(paths_[id]);
+      path.id = id;
+      path.error = figures_of(std::move(errors));
+      report_.paths.push_back(std::move(path));
+    }
+    return std::move(report_);
+  }
+
+ private:
+  void add_good(std::uint32_t id, double error, double nees) {
+    GoodPositions& good = report_.good;
+    ++good.count;
+    good_squares_ += error * error;
+    good_nees_sum_ += nees;
+    double& largest = early_ ? good.largest_before_known_mm : good.largest_mm;
+    largest = std::fmax(largest, error);
+    if (error <= kOff_mm) return;
+    ++(early_ ? good.off_before_known : good.off);
+    if (!early_) off_.insert(id);
+  }
+
+  AccuracyReport report_;
+  Spans seconds_;
+  Spans cycles_;
+  // Of the sample:
+  double t_s_ = 0.0;
+  bool good_ = false;
+  bool early_ = false;
+  std::size_t converged_ = 0;
+  // Of all:
+  std::set<std::uint32_t> seen_;
+  std::map<std::uint32_t, double> converged_at_;
+  std::map<std::uint32_t, std::vector<double>> feature_errors_;
+  std::map<std::uint32_t, FeaturePath> paths_;
+  std::set<std::uint32_t> without_truth_;
+  std::set<std::uint32_t> off_;
+  std::vector<double> settled_;
+  double nees_sum_ = 0.0;
+  double good_squares_ = 0.0;
+  double good_nees_sum_ = 0.0;
+};
+
 }  // namespace
 
 Accuracy::Accuracy(const GroundTruth& truth, const CameraModel& camera, Instant first_frame)
@@ -90,6 +216,8 @@ void Accuracy::add(const perimap_Surface& sample) {
     published.P_mm2 << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
     published_.push_back(published);
   }
+  // Surfaces that the clock releases repeat a frame's, which does not tell.
+  frames_.add(from_ns(sample.capture_time_ns));
   samples_.push_back(
       {from_ns(sample.valid_time_ns), from_ns(sample.release_time_ns), sample.state, begin, published_.size()});
 }
@@ -115,17 +243,17 @@ std::map<std::uint32_t, SurfacePoint> Accuracy::resolve_origins(Duration to_reco
 }
 
 bool Accuracy::before_premature_beat_is_known(Instant released) const {
+  // And a fiftieth, for what the stamps are rounded by.
+  const Duration frame = from_seconds(1.02 / frames_.rate().per_s());
   for (std::size_t i = 1; i < beats_.size(); ++i) {
     if (beats_[i].beat_class != BeatClass::kPremature) continue;
-    if (released >= beats_[i - 1].time && released <= beats_[i].detected_at + kFrame) return true;
+    if (released >= beats_[i - 1].time && released <= beats_[i].detected_at + frame) return true;
   }
   return false;
 }
 
 AccuracyReport Accuracy::report(Duration to_recording) const {
-  AccuracyReport report;
-  report.samples = samples_.size();
-  if (samples_.empty()) return report;
+  if (samples_.empty()) return {};
   const auto points = resolve_origins(to_recording);
   const auto since_start = [this](Instant t) { return to_seconds(t - first_frame_); };
   const double end_s = since_start(samples_.back().valid_time + to_recording);
@@ -136,101 +264,28 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
   for (const Instant r : truth_.motion().r_peaks) {
     if (const double t = since_start(r); t >= 0.0 && t <= end_s) cycle_edges.push_back(t);
   }
-  Spans seconds(second_edges);
-  Spans cycles(cycle_edges);
-
-  std::set<std::uint32_t> seen;
-  std::map<std::uint32_t, double> converged_at;
-  std::map<std::uint32_t, std::vector<double>> feature_errors;
-  std::map<std::uint32_t, FeaturePath> paths;
-  std::set<std::uint32_t> without_truth;
-  std::set<std::uint32_t> off;
-  std::vector<double> settled;
-  double nees_sum = 0.0;
-  double good_squares = 0.0;
-  double good_nees_sum = 0.0;
-  report.good.premature_beats = static_cast<std::size_t>(std::count_if(
-      beats_.begin(), beats_.end(), [](const RPeak& beat) { return beat.beat_class == BeatClass::kPremature; }));
+  Tally tally(second_edges, cycle_edges);
   for (const SampleRange& sample : samples_) {
     const Instant valid_time = sample.valid_time + to_recording;
     const double t = since_start(valid_time);
-    const bool early = before_premature_beat_is_known(sample.released + to_recording);
-    if (t >= kSettledAfter_s) {
-      ++report.settled_samples;
-      report.degraded += sample.state == perimap_SURFACE_DEGRADED ? 1 : 0;
-      report.invalid += sample.state == perimap_SURFACE_INVALID ? 1 : 0;
-    }
-    std::size_t converged = 0;
+    tally.begin_sample(t, sample.state, before_premature_beat_is_known(sample.released + to_recording));
     for (std::size_t i = sample.begin; i < sample.end; ++i) {
       const Published& feature = published_[i];
-      seen.insert(feature.id);
-      if (feature.converged) {
-        ++converged;
-        converged_at.try_emplace(feature.id, t);
-      }
-      if (!converged_at.contains(feature.id)) continue;
+      if (!tally.counts(feature.id, feature.converged)) continue;
       const auto point = points.find(feature.id);
       if (point == points.end()) {
-        without_truth.insert(feature.id);
+        tally.add_without_truth(feature.id);
         continue;
       }
       const Vector3d p_true = truth_.position(point->second, valid_time);
-      const Vector3d e = feature.p_W_mm - p_true;
-      const double error = e.norm();
-      const double nees = e.dot(feature.P_mm2.ldlt().solve(e)) / 3.0;
-      seconds.add_error(t, error, nees);
-      cycles.add_error(t, error, nees);
-      feature_errors[feature.id].push_back(error);
-      if (feature.converged && sample.state == perimap_SURFACE_GOOD) {
-        ++report.good.count;
-        good_squares += error * error;
-        good_nees_sum += nees;
-        double& largest = early ? report.good.largest_before_known_mm : report.good.largest_mm;
-        largest = std::fmax(largest, error);
-        if (error > kOff_mm) {
-          ++(early ? report.good.off_before_known : report.good.off);
-          if (!early) off.insert(feature.id);
-        }
-      }
-      if (t >= kSettledAfter_s) {
-        settled.push_back(error);
-        nees_sum += nees;
-      }
-      if (t >= end_s - kPathLength_s) {
-        paths[feature.id].published.push_back(feature.p_W_mm);
-        paths[feature.id].truth.push_back(p_true);
-      }
+      tally.add({feature.id, feature.converged, feature.p_W_mm, p_true, feature.P_mm2}, t >= end_s - kPathLength_s);
     }
-    if (t <= kSettledAfter_s) report.converged_at_15_s = converged;
-    seconds.add_sample(t, converged);
-    cycles.add_sample(t, converged);
+    tally.end_sample();
   }
-
-  report.features_published = seen.size();
-  report.features_converged = converged_at.size();
-  report.converged_by_15_s = static_cast<std::size_t>(std::count_if(
-      converged_at.begin(), converged_at.end(), [](const auto& c) { return c.second <= kSettledAfter_s; }));
-  report.features_without_truth = without_truth.size();
-  report.good.features_off = off.size();
-  if (report.good.count > 0) {
-    const auto count = static_cast<double>(report.good.count);
-    report.good.rms_mm = std::sqrt(good_squares / count);
-    report.good.mean_nees = good_nees_sum / count;
-  }
-  report.settled = figures_of(settled);
-  if (!settled.empty()) {
-    report.mean_nees = nees_sum / static_cast<double>(settled.size());
-    const auto above = std::count_if(settled.begin(), settled.end(), [](double e) { return e > kOff_mm; });
-    report.share_above_3_mm = static_cast<double>(above) / static_cast<double>(settled.size());
-  }
-  report.seconds = seconds.figures();
-  report.cycles = cycles.figures();
-  for (auto& [id, errors] : feature_errors) {
-    FeaturePath path = std::move(paths[id]);
-    path.id = id;
-    path.error = figures_of(std::move(errors));
-    report.paths.push_back(std::move(path));
-  }
+  AccuracyReport report = tally.report();
+  report.samples = samples_.size();
+  report.good.premature_beats = static_cast<std::size_t>(std::count_if(
+      beats_.begin(), beats_.end(), [](const RPeak& beat) { return beat.beat_class == BeatClass::kPremature; }));
   return report;
 }
 

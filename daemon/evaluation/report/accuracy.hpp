@@ -12,6 +12,7 @@
 
 #include "core/geometry/camera_model.hpp"
 #include "core/phase/r_peak.hpp"
+#include "core/sensors/measured_frame_rate.hpp"
 #include "core/time/instant.hpp"
 #include "drivers/standins/truth/ground_truth.hpp"
 
@@ -125,7 +126,8 @@ class Accuracy {
   CameraModel camera_;
   Instant first_frame_;
   std::vector<RPeak> beats_;
-  std::vector<SampleRange> samples_;  // with published_, touched by add(Surface) alone
+  MeasuredFrameRate frames_;  // with samples_ and published_, touched by add(Surface) alone
+  std::vector<SampleRange> samples_;
   std::vector<Published> published_;
   std::map<std::uint32_t, Origin> origins_;  // touched by add(SurfaceModel) alone
 };

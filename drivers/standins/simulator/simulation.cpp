@@ -125,6 +125,75 @@ Expected<std::uint32_t> start_sample(const SimulationSettings& s, const EcgRecor
   return static_cast<std::uint32_t>(asked);
 }
 
+// When the ECG record's samples were taken.
+class SampleTimes {
+ public:
+  SampleTimes(Instant start, std::uint32_t first_sample, double rate_hz) noexcept
+      : start_(start), first_sample_(first_sample), rate_hz_(rate_hz) {}
+
+  [[nodiscard]] Instant operator()(std::int64_t sample) const noexcept {
+    return start_ + from_seconds(static_cast<double>(sample - first_sample_) / rate_hz_);
+  }
+
+ private:
+  Instant start_;
+  std::int64_t first_sample_;
+  double rate_hz_;
+};
+
+HeartMotion heart_motion(const SimulationSettings& settings, const EcgRecord& record, const SampleTimes& sample_time,
+                         Instant start) {
+  HeartMotion motion;
+  motion.law = settings.law;
+  for (const std::uint32_t beat : record.beat_samples) motion.r_peaks.push_back(sample_time(beat));
+  const auto after_start = std::upper_bound(motion.r_peaks.begin(), motion.r_peaks.end(), start);
+  const auto after_end = std::upper_bound(after_start, motion.r_peaks.end(), start + settings.duration);
+  motion.r_peaks.erase(after_end + kBeatsAfter, motion.r_peaks.end());
+  motion.r_peaks.erase(motion.r_peaks.begin(), after_start - kBeatsBefore);
+  if (settings.respiration_mm > 0.0) {
+    motion.respiration_mm = settings.respiration_mm * (X_WH().R * inspiration_H());
+    motion.respiration_period = settings.respiration_period;
+  }
+  return motion;
+}
+
+// Where the scope looks from, and at what.
+struct View {
+  std::vector<Vector3d> material_W;
+  Vector3d centre_W = Vector3d::Zero();
+  Vector3d axis_W = Vector3d::Zero();
+  Vector3d surface_W = Vector3d::Zero();
+};
+
+// The scope rests above the point of the surface that faces it.
+Expected<View> view_of(const HeartMesh& mesh_W, const HeartMotion& motion) {
+  View view;
+  view.material_W.resize(mesh_W.vertex_count);
+  vertex_positions(mesh_W, fourier_basis(0.0, mesh_W.harmonics), view.material_W);
+  for (const Vector3d& p : view.material_W) view.centre_W += p / static_cast<double>(view.material_W.size());
+  view.axis_W = X_WH().R * view_axis_H();
+  auto still = GroundTruth::create(mesh_W, motion);
+  if (!still) return tl::unexpected(still.error());
+  const Pose far{Matrix3d::Identity(), view.centre_W + 300.0 * view.axis_W};
+  const auto facing = still->first_hit(far, -view.axis_W, motion.r_peaks.front());
+  if (!facing) return fail("heart mesh: the scope's axis misses it");
+  view.surface_W = still->position(*facing, motion.r_peaks.front());
+  return view;
+}
+
+// Frame times of a free-running sensor, with the jitter of its stamps' quantisation.
+std::vector<Simulation::Frame> frames_of(const SimulationSettings& settings, Instant start, const ScopePath& path) {
+  std::vector<Simulation::Frame> frames;
+  const auto count = static_cast<std::uint64_t>(to_seconds(settings.duration) * settings.frames_per_s);
+  Transport camera(CounterNoise(settings.seed, kCameraDelay), milliseconds(11), microseconds(1000));
+  const double offset_s = 0.5 / settings.frames_per_s;
+  for (std::uint64_t k = 0; k < count; ++k) {
+    const Duration since = from_seconds(offset_s + static_cast<double>(k) / settings.frames_per_s);
+    frames.push_back({{k, start + since, camera.arrival(start + since, k)}, path.X_WC(since)});
+  }
+  return frames;
+}
+
 }  // namespace
 
 Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeLens lens,
@@ -141,125 +210,69 @@ Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth t
 
 std::int64_t Simulation::utc_minus_monotonic_ns() const noexcept { return 1'750'000'000'000'000'000; }
 
-Expected<Simulation> Simulation::create(const SimulationSettings& settings, const ParallelFor& parallel_for) {
-  if (const auto good = check(settings); !good) return tl::unexpected(good.error());
-  const auto record = load_ecg_record(settings.ecg_record);
-  if (!record) return tl::unexpected(record.error());
-  const auto first_sample = start_sample(settings, *record);
-  if (!first_sample) return tl::unexpected(first_sample.error());
-  auto mesh_H = parse_heart_mesh(embedded_epicardium_fourier_csv(), embedded_epicardium_faces_csv());
-  if (!mesh_H) return tl::unexpected(mesh_H.error());
-
-  // A host that has been up for an hour or two.
-  const Instant start{from_seconds(CounterNoise(settings.seed, kSession).uniform(1, 3600.0, 7200.0))};
-  const auto sample_time = [&](std::int64_t sample) {
-    return start + from_seconds(static_cast<double>(sample - *first_sample) / record->sample_rate_hz);
-  };
-
-  HeartMotion motion;
-  motion.law = settings.law;
-  for (const std::uint32_t beat : record->beat_samples) motion.r_peaks.push_back(sample_time(beat));
-  const auto after_start = std::upper_bound(motion.r_peaks.begin(), motion.r_peaks.end(), start);
-  const auto after_end = std::upper_bound(after_start, motion.r_peaks.end(), start + settings.duration);
-  motion.r_peaks.erase(after_end + kBeatsAfter, motion.r_peaks.end());
-  motion.r_peaks.erase(motion.r_peaks.begin(), after_start - kBeatsBefore);
-  if (settings.respiration_mm > 0.0) {
-    motion.respiration_mm = settings.respiration_mm * (X_WH().R * inspiration_H());
-    motion.respiration_period = settings.respiration_period;
-  }
-
-  // The scope rests above the point of the surface that faces it.
-  const HeartMesh mesh_W = transformed(X_WH(), *std::move(mesh_H));
-  std::vector<Vector3d> material_W(mesh_W.vertex_count);
-  vertex_positions(mesh_W, fourier_basis(0.0, mesh_W.harmonics), material_W);
-  Vector3d centre_W = Vector3d::Zero();
-  for (const Vector3d& p : material_W) centre_W += p / static_cast<double>(material_W.size());
-  const Vector3d axis_W = X_WH().R * view_axis_H();
-  const ScopeLens lens = scope_lens(settings.width, settings.height);
-
-  auto still = GroundTruth::create(mesh_W, motion);
-  if (!still) return tl::unexpected(still.error());
-  const Pose far{Matrix3d::Identity(), centre_W + 300.0 * axis_W};
-  const auto facing = still->first_hit(far, -axis_W, motion.r_peaks.front());
-  if (!facing) return fail("heart mesh: the scope's axis misses it");
-  const Vector3d surface_W = still->position(*facing, motion.r_peaks.front());
-  const ScopePath path(settings.seed, surface_W + kScopeDistance_mm * axis_W, centre_W, X_WH().R * up_H(),
-                       settings.scope_sweep);
-
-  // Camera. Frame times of a free-running sensor, with the jitter of its stamps' quantisation.
-  std::vector<Frame> frames;
-  std::vector<CameraTruth> cameras;
-  const auto frame_count = static_cast<std::uint64_t>(to_seconds(settings.duration) * settings.frames_per_s);
-  Transport camera(CounterNoise(settings.seed, kCameraDelay), milliseconds(11), microseconds(1000));
-  const double offset_s = 0.5 / settings.frames_per_s;
-  for (std::uint64_t k = 0; k < frame_count; ++k) {
-    const Duration since = from_seconds(offset_s + static_cast<double>(k) / settings.frames_per_s);
-    frames.push_back({{k, start + since, camera.arrival(start + since, k)}, path.X_WC(since)});
-    cameras.push_back({start + since, frames.back().X_WC});
-  }
-
-  auto truth = GroundTruth::create(mesh_W, motion, std::move(cameras));
-  if (!truth) return tl::unexpected(truth.error());
-  Simulation simulation(settings, start, *std::move(truth), lens, surface_W, path);
-  simulation.frames_ = std::move(frames);
-
-  // Tracker: its own period wavers a little.
-  const auto gaps = dropouts(settings.seed, settings.duration, settings.tracker_dropouts_per_min);
-  const Pose X_CS = simulation.X_SC_.inverse();
-  const CounterNoise period(settings.seed, kTrackerPeriod);
-  const CounterNoise position(settings.seed, kTrackerPosition);
-  const CounterNoise rotation(settings.seed, kTrackerRotation);
+// Its own period wavers a little.
+void Simulation::read_tracker() {
+  const auto gaps = dropouts(settings_.seed, settings_.duration, settings_.tracker_dropouts_per_min);
+  const Pose X_CS = X_SC_.inverse();
+  const CounterNoise period(settings_.seed, kTrackerPeriod);
+  const CounterNoise position(settings_.seed, kTrackerPosition);
+  const CounterNoise rotation(settings_.seed, kTrackerRotation);
   const double correlation =
-      settings.tracker_correlation > Duration(0)
-          ? std::exp(-1.0 / (settings.tracker_rate_hz * to_seconds(settings.tracker_correlation)))
+      settings_.tracker_correlation > Duration(0)
+          ? std::exp(-1.0 / (settings_.tracker_rate_hz * to_seconds(settings_.tracker_correlation)))
           : 0.0;
   Vector3d position_error = Vector3d::Zero();
   Vector3d rotation_error = Vector3d::Zero();
   // The first reading's error is all its own.
   double kept = 0.0;
   double drive = 1.0;
-  Transport tracker(CounterNoise(settings.seed, kTrackerDelay), milliseconds(7), microseconds(1000));
-  const auto reading_count = static_cast<std::uint64_t>(to_seconds(settings.duration) * settings.tracker_rate_hz);
+  Transport tracker(CounterNoise(settings_.seed, kTrackerDelay), milliseconds(7), microseconds(1000));
+  const auto reading_count = static_cast<std::uint64_t>(to_seconds(settings_.duration) * settings_.tracker_rate_hz);
   for (std::uint64_t k = 0; k < reading_count; ++k) {
     const Duration since =
-        from_seconds((static_cast<double>(k) + period.uniform(k, -0.02, 0.02) + 0.5) / settings.tracker_rate_hz);
+        from_seconds((static_cast<double>(k) + period.uniform(k, -0.02, 0.02) + 0.5) / settings_.tracker_rate_hz);
     const bool missing = std::any_of(gaps.begin(), gaps.end(),
                                      [&](const Interval& gap) { return since >= gap.begin && since < gap.end; });
     position_error = kept * position_error + drive * normal3(position, k);
     rotation_error = kept * rotation_error + drive * normal3(rotation, k);
-    simulation.tracker_stamps_.push_back({start + since, tracker.arrival(start + since, k), missing,
-                                          path.X_WC(since) * X_CS, position_error, rotation_error});
+    tracker_stamps_.push_back({start_ + since, tracker.arrival(start_ + since, k), missing, path_.X_WC(since) * X_CS,
+                               position_error, rotation_error});
     kept = correlation;
     drive = std::sqrt(1.0 - kept * kept);
   }
+}
 
-  // ECG: small blocks, sent when their last sample is there.
-  Transport ecg(CounterNoise(settings.seed, kEcgDelay), milliseconds(4), microseconds(800));
-  const auto sample_count = static_cast<std::uint32_t>(to_seconds(settings.duration) * record->sample_rate_hz);
+// Small blocks, sent when their last sample is there.
+void Simulation::read_ecg(const EcgRecord& record, std::uint32_t first_sample) {
+  Transport ecg(CounterNoise(settings_.seed, kEcgDelay), milliseconds(4), microseconds(800));
+  const SampleTimes sample_time(start_, first_sample, record.sample_rate_hz);
+  const auto sample_count = static_cast<std::uint32_t>(to_seconds(settings_.duration) * record.sample_rate_hz);
   for (std::uint32_t k = 0; k + kEcgSamplesPerBlock <= sample_count; k += kEcgSamplesPerBlock) {
     EcgBlock block;
-    const std::uint32_t from = *first_sample + k;
+    const std::uint32_t from = first_sample + k;
     block.first_sample_time = sample_time(from);
-    block.sample_period = from_seconds(1.0 / record->sample_rate_hz);
+    block.sample_period = from_seconds(1.0 / record.sample_rate_hz);
     block.arrival = ecg.arrival(sample_time(from + kEcgSamplesPerBlock - 1), k);
     block.device_sequence = k;
     block.count = kEcgSamplesPerBlock;
-    const Duration since = block.first_sample_time - start;
-    block.lead_off = std::any_of(settings.ecg_off.begin(), settings.ecg_off.end(),
+    const Duration since = block.first_sample_time - start_;
+    block.lead_off = std::any_of(settings_.ecg_off.begin(), settings_.ecg_off.end(),
                                  [&](const auto& off) { return since >= off.begin && since < off.begin + off.length; });
-    for (std::uint32_t i = 0; i < block.count && !block.lead_off; ++i) block.mV[i] = record->mV(from + i);
-    simulation.ecg_.push_back(block);
+    for (std::uint32_t i = 0; i < block.count && !block.lead_off; ++i) block.mV[i] = record.mV(from + i);
+    ecg_.push_back(block);
   }
+}
 
-  // The lung's volume goes with the displacement; the monitor's figure in litres, say.
+// The lung's volume goes with the displacement; the monitor's figure in litres, say.
+void Simulation::read_respiration() {
   constexpr Duration kRespirationPeriod = milliseconds(8);
   constexpr std::uint32_t kRespirationSamplesPerBlock = 4;
-  const HeartMotion& heart = simulation.truth_.motion();
+  const HeartMotion& heart = truth_.motion();
   const double full_mm = heart.respiration_mm.norm();
-  for (std::uint32_t k = 0; settings.respiration_channel && k * kRespirationPeriod < settings.duration;
+  for (std::uint32_t k = 0; settings_.respiration_channel && k * kRespirationPeriod < settings_.duration;
        k += kRespirationSamplesPerBlock) {
     RespirationBlock block;
-    block.first_sample_time = start + k * kRespirationPeriod;
+    block.first_sample_time = start_ + k * kRespirationPeriod;
     block.sample_period = kRespirationPeriod;
     block.arrival = block.first_sample_time + kRespirationSamplesPerBlock * kRespirationPeriod;
     block.device_sequence = k;
@@ -268,32 +281,63 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
       const Instant t = block.first_sample_time + i * kRespirationPeriod;
       block.values[i] = static_cast<float>(0.5 * respiration_displacement(heart, t).norm() / full_mm);
     }
-    simulation.respiration_.push_back(block);
+    respiration_.push_back(block);
   }
+}
 
-  auto& arrivals = simulation.arrivals_;
+void Simulation::order_arrivals() {
   const auto add = [&](Instant arrival, Source source, std::size_t index) {
-    arrivals.push_back({arrival, source, static_cast<std::uint32_t>(index)});
+    arrivals_.push_back({arrival, source, static_cast<std::uint32_t>(index)});
   };
-  for (std::size_t i = 0; i < simulation.frames_.size(); ++i)
-    add(simulation.frames_[i].stamp.arrival, Source::kCamera, i);
-  for (std::size_t i = 0; i < simulation.tracker_stamps_.size(); ++i)
-    add(simulation.tracker_stamps_[i].arrival, Source::kTracker, i);
-  for (std::size_t i = 0; i < simulation.ecg_.size(); ++i) add(simulation.ecg_[i].arrival, Source::kEcg, i);
-  for (std::size_t i = 0; i < simulation.respiration_.size(); ++i)
-    add(simulation.respiration_[i].arrival, Source::kRespiration, i);
+  for (std::size_t i = 0; i < frames_.size(); ++i) add(frames_[i].stamp.arrival, Source::kCamera, i);
+  for (std::size_t i = 0; i < tracker_stamps_.size(); ++i) add(tracker_stamps_[i].arrival, Source::kTracker, i);
+  for (std::size_t i = 0; i < ecg_.size(); ++i) add(ecg_[i].arrival, Source::kEcg, i);
+  for (std::size_t i = 0; i < respiration_.size(); ++i) add(respiration_[i].arrival, Source::kRespiration, i);
   // Stable: what arrives in the same nanosecond keeps the order above.
-  std::stable_sort(arrivals.begin(), arrivals.end(),
+  std::stable_sort(arrivals_.begin(), arrivals_.end(),
                    [](const Arrival& a, const Arrival& b) { return a.arrival < b.arrival; });
+}
+
+Expected<Simulation> Simulation::create(const SimulationSettings& settings, const ParallelFor& parallel_for) {
+  if (const auto good = check(settings); !good) return tl::unexpected(good.error());
+  const auto record = load_ecg_record(settings.ecg_record);
+  if (!record) return tl::unexpected(record.error());
+  const auto first_sample = start_sample(settings, *record);
+  if (!first_sample) return tl::unexpected(first_sample.error());
+  auto mesh_H = parse_heart_mesh(embedded_epicardium_fourier_csv(), embedded_epicardium_faces_csv());
+  if (!mesh_H) return tl::unexpected(mesh_H.error());
+  const HeartMesh mesh_W = transformed(X_WH(), *std::move(mesh_H));
+
+  // A host that has been up for an hour or two.
+  const Instant start{from_seconds(CounterNoise(settings.seed, kSession).uniform(1, 3600.0, 7200.0))};
+  const HeartMotion motion =
+      heart_motion(settings, *record, SampleTimes(start, *first_sample, record->sample_rate_hz), start);
+  const auto view = view_of(mesh_W, motion);
+  if (!view) return tl::unexpected(view.error());
+  const ScopePath path(settings.seed, view->surface_W + kScopeDistance_mm * view->axis_W, view->centre_W,
+                       X_WH().R * up_H(), settings.scope_sweep);
+
+  std::vector<Frame> frames = frames_of(settings, start, path);
+  std::vector<CameraTruth> cameras;
+  for (const Frame& frame : frames) cameras.push_back({frame.stamp.capture, frame.X_WC});
+  auto truth = GroundTruth::create(mesh_W, motion, std::move(cameras));
+  if (!truth) return tl::unexpected(truth.error());
+  const ScopeLens lens = scope_lens(settings.width, settings.height);
+  Simulation simulation(settings, start, *std::move(truth), lens, view->surface_W, path);
+  simulation.frames_ = std::move(frames);
+  simulation.read_tracker();
+  simulation.read_ecg(*record, *first_sample);
+  simulation.read_respiration();
+  simulation.order_arrivals();
 
   // A texel a pixel or more, at rest.
   const int texture_size = std::min(
       4096, static_cast<int>(std::bit_ceil(static_cast<unsigned>(3 * std::max(settings.width, settings.height)))));
   const auto texture_seed = static_cast<std::uint32_t>(CounterNoise(settings.seed, kSession).bits(2));
-  simulation.texture_ = std::make_unique<const TissueTexture>(material_W, simulation.truth_.mesh().triangles, centre_W,
-                                                              axis_W, texture_size, texture_seed, parallel_for);
-  simulation.renderer_ =
-      std::make_unique<const SceneRenderer>(lens, simulation.truth_.mesh().triangles, *simulation.texture_);
+  const auto& triangles = simulation.truth_.mesh().triangles;
+  simulation.texture_ = std::make_unique<const TissueTexture>(view->material_W, triangles, view->centre_W, view->axis_W,
+                                                              texture_size, texture_seed, parallel_for);
+  simulation.renderer_ = std::make_unique<const SceneRenderer>(lens, triangles, *simulation.texture_);
   return simulation;
 }
 

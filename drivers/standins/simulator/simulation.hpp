@@ -26,6 +26,8 @@
 
 namespace perimap {
 
+struct EcgRecord;
+
 struct SimulationSettings {
   std::uint64_t seed = 1;
   Duration duration = std::chrono::seconds(60);
@@ -120,6 +122,12 @@ class Simulation {
 
   Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeLens lens, Vector3d surface_W,
              const ScopePath& path);
+
+  // What the devices deliver, in the order of arrival at the end.
+  void read_tracker();
+  void read_ecg(const EcgRecord& record, std::uint32_t first_sample);
+  void read_respiration();
+  void order_arrivals();
 
   SimulationSettings settings_;
   Instant start_;

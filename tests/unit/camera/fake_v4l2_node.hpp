@@ -58,6 +58,7 @@ class FakeV4l2Node final : public V4l2Node {
  public:
   explicit FakeV4l2Node(FakeCamera& camera) : camera_(camera) {}
 
+  // Long: a case for each request, as the kernel documents them one by one.
   int control(unsigned long request, void* argument) override {
     if (const auto found = camera_.errors.find(request); found != camera_.errors.end()) return found->second;
     switch (request) {

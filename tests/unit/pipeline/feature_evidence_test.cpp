@@ -66,8 +66,7 @@ TEST_F(Evidence, ThatTheEstimateIsRightLeavesProcessNoiseOff) {
   }
 }
 
-// A feature that moves so fast that errors of the R peaks are most of what its
-// matches are off by.
+// A feature that moves so fast that errors of the R peaks are most of what its matches are off by.
 struct UncertainBeats : Stages {
   UncertainBeats() {
     // Those before the first frame as well.
@@ -81,8 +80,7 @@ struct UncertainBeats : Stages {
     bank->set(0, estimate);
   }
 
-  // Of 20 features, how many get process noise in half a minute in which they
-  // are off by so many deviations.
+  // Of 20 features, how many get process noise in half a minute in which they are off by so many deviations.
   int drifting(double deviations) {
     const Matrix2d R = match_covariance(0.05 * Matrix2d::Identity(), settings.estimator.pixel_deviation_px);
     const double scatter_px = deviations * std::sqrt(R(0, 0));
@@ -121,8 +119,7 @@ TEST_F(UncertainBeats, AreNoDrift) { EXPECT_LE(drifting(1.0), 1); }
 
 TEST_F(UncertainBeats, DoNotHideDrift) { EXPECT_GE(drifting(1.3), 15); }
 
-// Sideways variance shown after 300 frames with a pose that is off by 1 mm, and
-// after as many again.
+// Sideways variance shown after 300 frames with a pose that is off by 1 mm, and after as many again.
 struct SlowPoseError : Stages {
   SlowPoseError() { pose_variance_mm2 = 1.0; }
 

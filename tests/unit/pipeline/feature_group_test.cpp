@@ -50,8 +50,7 @@ TEST_F(Stages, AMatchWhoseFrameLostItsPhaseIsNotLearnt) {
   found_at({320, 240});
   ASSERT_EQ(learn_frame(), LifeEvent::kNone);
   const FrameRecord* lost = job.frame;
-  // No beat for ten seconds, then beats again: the frame lay in a gap that was
-  // no cycle.
+  // No beat for ten seconds, then beats again: the frame lay in a gap that was no cycle.
   next_beat_ms = 15'000;
   beat_until(18'000);
   history->refresh_phases(clock.clock(), RespiratoryClock{});
@@ -136,8 +135,7 @@ TEST_F(Stages, AFeatureRefusedTenTimesLetsGoOfItsPatchAndIsStillGivenUpWhenUnsee
   EXPECT_EQ(slot->state, SlotState::kEmpty);
 }
 
-// The surface breathes from left to right, by 1 mm and every 2 s; it is found
-// after 3 s.
+// The surface breathes from left to right, by 1 mm and every 2 s; it is found after 3 s.
 struct Breathing : Stages {
   Breathing() {
     settings.estimator.layout.respiratory_harmonics = 2;
@@ -327,8 +325,7 @@ TEST_F(Stages, WhatIsPredictedAndShownIsWhatTheBankHolds) {
   }
 }
 
-// Two mapped features whose matches scatter by as much as they are said to; the
-// first can be made to drift.
+// Two mapped features whose matches scatter by as much as they are said to; the first can be made to drift.
 
 }  // namespace
 }  // namespace perimap

@@ -100,8 +100,7 @@ struct Stages : ::testing::Test {
     return advance(*slot, *bank, 0, job, model, settings);
   }
 
-  // A mapped feature at (0, 0, 100) mm, seen at the image centre, with little
-  // deviation.
+  // A mapped feature at (0, 0, 100) mm, seen at the image centre, with little deviation.
   FeatureEstimate still_feature() const {
     FeatureEstimate estimate = prior_estimate(settings.estimator.layout, settings.estimator.prior, Vector3d(0, 0, 100));
     estimate.P *= 1e-4;
