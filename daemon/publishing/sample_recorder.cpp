@@ -11,12 +11,15 @@ std::uint32_t short_sequence(std::uint64_t sequence) { return static_cast<std::u
 
 }  // namespace
 
-Expected<SampleRecorder> SampleRecorder::create(const std::filesystem::path& file, std::string generator) {
-  Expected<RecordingWriter> writer = RecordingWriter::create(file.string());
-  if (!writer) {
-    return tl::unexpected(writer.error());
-  }
-  SampleRecorder recorder(std::move(*writer), std::move(generator));
+Expected<SampleRecorder> SampleRecorder::create(const std::filesystem::path& file, std::string generator,
+                                                Unfinished unfinished) {
+  auto whole = WholeFile::create(file);
+  if (!whole) return tl::unexpected(whole.error());
+  auto sink = create_file(whole->path().string(), file.string());
+  if (!sink) return tl::unexpected(sink.error());
+  auto writer = RecordingWriter::create(std::move(*sink));
+  if (!writer) return tl::unexpected(writer.error());
+  SampleRecorder recorder(std::move(*whole), std::move(*writer), std::move(generator), unfinished);
   const auto keep = [](ChannelId& place) { return [&place](ChannelId id) { place = id; }; };
   const Expected<void> results[] = {
       recorder.writer_.add_channel<perimap_RecordingInfo>(channels::kRecordingInfo).map(keep(recorder.info_)),
@@ -41,6 +44,13 @@ Expected<void> SampleRecorder::write_info(const perimap_Surface& surface, Instan
   info.utc_minus_monotonic_ns = surface.release_utc_ns - surface.release_time_ns;
   info.world_frame_id = world_frame.data();
   return writer_.write(info_, info, receipt, receipt, 0);
+}
+
+Expected<void> SampleRecorder::finish() {
+  auto done = writer_.finish().and_then([this] { return file_.finish(); });
+  if (done || unfinished_ == Unfinished::kRemoved) return done;
+  file_.keep_unfinished();
+  return fail(done.error().message + "; what came before is in " + file_.path().string());
 }
 
 Expected<void> SampleRecorder::write(const perimap_Surface& surface, Instant receipt) {

@@ -8,31 +8,40 @@
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
+#include "drivers/file/whole_file.hpp"
 #include "drivers/recording/recording_writer.hpp"
 
 namespace perimap {
 
-// Log time is the receipt, publish time the sample's own: release_time_ns of a surface, time_ns of the others.
+// Log time is the receipt, publish time the sample's own: release_time_ns of a surface, time_ns of the others. The file
+// has its name when finish() has succeeded.
 class SampleRecorder {
  public:
+  // What becomes of a file that could not be finished: what a replay gives can be had again, what was received cannot.
+  enum class Unfinished { kRemoved, kKept };
+
   // `generator` names the program and its version in the recording.
-  [[nodiscard]] static Expected<SampleRecorder> create(const std::filesystem::path& file, std::string generator);
+  [[nodiscard]] static Expected<SampleRecorder> create(const std::filesystem::path& file, std::string generator,
+                                                       Unfinished unfinished = Unfinished::kRemoved);
 
   [[nodiscard]] Expected<void> write(const perimap_Surface& surface, Instant receipt);
   [[nodiscard]] Expected<void> write(const perimap_SurfaceModel& model, Instant receipt);
   [[nodiscard]] Expected<void> write(const perimap_Phase& phase, Instant receipt);
   [[nodiscard]] Expected<void> write(const perimap_Status& status, Instant receipt);
-  [[nodiscard]] Expected<void> finish() { return writer_.finish(); }
+  // An error says where what was kept is.
+  [[nodiscard]] Expected<void> finish();
 
  private:
-  SampleRecorder(RecordingWriter writer, std::string generator)
-      : writer_(std::move(writer)), generator_(std::move(generator)) {}
+  SampleRecorder(WholeFile file, RecordingWriter writer, std::string generator, Unfinished unfinished)
+      : file_(std::move(file)), writer_(std::move(writer)), generator_(std::move(generator)), unfinished_(unfinished) {}
 
   // The facts of the recording, known with the first surface.
   [[nodiscard]] Expected<void> write_info(const perimap_Surface& surface, Instant receipt);
 
+  WholeFile file_;  // goes after what writes to it
   RecordingWriter writer_;
   std::string generator_;
+  Unfinished unfinished_;
   bool info_written_ = false;
   ChannelId info_;
   ChannelId surface_;

@@ -4,13 +4,9 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <memory>
 #include <optional>
 #include <span>
-#include <system_error>
 #include <vector>
 
 #include "core/error/one_line.hpp"
@@ -255,14 +251,7 @@ std::string format_calibration(const CameraModel& camera) {
 }
 
 Expected<void> write_calibration(const std::filesystem::path& file, const CameraModel& camera) {
-  const std::string text = format_calibration(camera);
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "wb"), &std::fclose);
-  const bool written = stream && std::fwrite(text.data(), 1, text.size(), stream.get()) == text.size();
-  if (!written || std::fclose(stream.release()) != 0) {
-    return fail(
-        on_one_line(fmt::format("{}: cannot write: {}", file.string(), std::generic_category().message(errno))));
-  }
-  return {};
+  return write_text_file(file, format_calibration(camera));
 }
 
 }  // namespace perimap

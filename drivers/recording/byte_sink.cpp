@@ -70,10 +70,11 @@ class FileSink final : public ByteSink {
 
 }  // namespace
 
-Expected<std::unique_ptr<ByteSink>> create_file(const std::string& path) {
+Expected<std::unique_ptr<ByteSink>> create_file(const std::string& path, const std::string& told_as) {
+  const std::string& name = told_as.empty() ? path : told_as;
   const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (fd < 0) return fail(fmt::format("{}: cannot create: {}", path, errno_text(errno)));
-  return std::make_unique<FileSink>(fd, path);
+  if (fd < 0) return fail(fmt::format("{}: cannot create: {}", name, errno_text(errno)));
+  return std::make_unique<FileSink>(fd, name);
 }
 
 }  // namespace perimap

@@ -19,7 +19,7 @@ class ByteSink {
   [[nodiscard]] virtual Expected<void> close() = 0;
 };
 
-// Creates the file, or empties it. Errors name the path.
-[[nodiscard]] Expected<std::unique_ptr<ByteSink>> create_file(const std::string& path);
+// Creates the file, or empties it. Errors call it `told_as`, or else by its path.
+[[nodiscard]] Expected<std::unique_ptr<ByteSink>> create_file(const std::string& path, const std::string& told_as = "");
 
 }  // namespace perimap

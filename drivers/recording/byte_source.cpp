@@ -1,12 +1,13 @@
 #include "drivers/recording/byte_source.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <system_error>
+
+#include "drivers/file/regular_file.hpp"
 
 namespace perimap {
 namespace {
@@ -45,12 +46,11 @@ class FileSource final : public ByteSource {
 }  // namespace
 
 Expected<std::unique_ptr<ByteSource>> open_file(const std::string& path) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return fail(fmt::format("{}: cannot open: {}", path, errno_text(errno)));
-  auto source = std::make_unique<FileSource>(fd);
+  const auto opened = open_regular_file(path);
+  if (!opened) return fail(fmt::format("{}: cannot open: {}", path, opened.error()));
+  auto source = std::make_unique<FileSource>(*opened);
   struct stat status {};
-  if (::fstat(fd, &status) != 0) return fail(fmt::format("{}: cannot examine: {}", path, errno_text(errno)));
-  if (!S_ISREG(status.st_mode)) return fail(fmt::format("{}: not a regular file", path));
+  if (::fstat(*opened, &status) != 0) return fail(fmt::format("{}: cannot examine: {}", path, errno_text(errno)));
   source->set_size(static_cast<std::uint64_t>(status.st_size));
   return source;
 }

@@ -5,21 +5,23 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <system_error>
 
 #include "core/error/one_line.hpp"
+#include "drivers/file/regular_file.hpp"
+#include "drivers/file/whole_file.hpp"
 
 namespace perimap {
 
 Expected<std::string> read_text_file(const std::filesystem::path& file, std::size_t largest, std::string_view what) {
-  const auto refuse = [&](int error) {
-    return fail(on_one_line(fmt::format("{}: expected a readable {}, got: {}", file.string(), what,
-                                        std::generic_category().message(error))));
+  const auto refuse = [&](std::string_view reason) {
+    return fail(on_one_line(fmt::format("{}: expected a readable {}, got: {}", file.string(), what, reason)));
   };
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
-  if (!stream) return refuse(errno);
+  const auto opened = open_regular_file(file);
+  if (!opened) return refuse(opened.error());
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(::fdopen(*opened, "rb"), &std::fclose);
+  if (!stream) return refuse(std::generic_category().message(errno));
   // Piece by piece: what may be large is mostly not, and need not be asked for and cleared.
   std::string text, piece(std::min<std::size_t>(largest + 1, 1U << 16U), '\0');
   errno = 0;
@@ -27,17 +29,22 @@ Expected<std::string> read_text_file(const std::filesystem::path& file, std::siz
     const std::size_t got =
         std::fread(piece.data(), 1, std::min(piece.size(), largest + 1 - text.size()), stream.get());
     text.append(piece, 0, got);
-    if (std::ferror(stream.get()) != 0) return refuse(errno);
+    if (std::ferror(stream.get()) != 0) return refuse(std::generic_category().message(errno));
     if (got == 0) break;
   }
   return text;
 }
 
 Expected<void> write_text_file(const std::filesystem::path& file, std::string_view text) {
-  std::ofstream stream(file, std::ios::binary);
-  stream << text;
-  if (!stream.flush()) return fail(file.string() + ": cannot be written");
-  return {};
+  auto whole = WholeFile::create(file);
+  if (!whole) return tl::unexpected(whole.error());
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(whole->path().c_str(), "wb"), &std::fclose);
+  const bool written = stream && std::fwrite(text.data(), 1, text.size(), stream.get()) == text.size();
+  if (!written || std::fclose(stream.release()) != 0) {
+    return fail(
+        on_one_line(fmt::format("{}: cannot be written: {}", file.string(), std::generic_category().message(errno))));
+  }
+  return whole->finish();
 }
 
 }  // namespace perimap

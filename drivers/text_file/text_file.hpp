@@ -11,11 +11,13 @@
 namespace perimap {
 
 // The file's text, at most largest + 1 bytes of it, so that a parser can refuse what is too long. `what` names the kind
-// of file in errors: "FILE: expected a readable WHAT, got: No such file or directory".
+// of file in errors: "FILE: expected a readable WHAT, got: No such file or directory". What is no regular file is
+// refused at once: a pipe would be waited for.
 [[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file, std::size_t largest,
                                                    std::string_view what);
 
-// Replaces the file by the text, byte for byte. Error: "FILE: cannot be written".
+// Replaces the file by the text, byte for byte, or leaves it as it was (WholeFile). Error: "FILE: cannot be written: No
+// space left on device".
 [[nodiscard]] Expected<void> write_text_file(const std::filesystem::path& file, std::string_view text);
 
 }  // namespace perimap

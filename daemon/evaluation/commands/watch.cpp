@@ -79,11 +79,12 @@ int run(const Options& options) {
   }
   std::optional<SampleRecorder> recorder;
   if (!options.recording.empty()) {
-    Expected<SampleRecorder> created = SampleRecorder::create(options.recording, "perimap watch " PERIMAP_VERSION);
+    Expected<SampleRecorder> created = SampleRecorder::create(options.recording, "perimap watch " PERIMAP_VERSION,
+                                                              SampleRecorder::Unfinished::kKept);
     if (!created) {
       return fail_with(created.error());
     }
-    recorder = std::move(*created);
+    recorder.emplace(std::move(*created));
   }
   Expected<SampleReaders> readers = SampleReaders::create(options.domain, recorder.has_value());
   if (!readers) {

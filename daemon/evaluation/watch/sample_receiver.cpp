@@ -73,8 +73,8 @@ Expected<void> SampleReceiver::finish() {
   if (thread_.joinable()) {
     thread_.join();
   }
-  if (result_ && recorder_) {
-    result_ = recorder_->finish();
+  if (recorder_) {
+    if (auto closed = recorder_->finish(); !closed) result_ = std::move(closed);
   }
   return result_;
 }
