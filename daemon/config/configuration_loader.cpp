@@ -10,20 +10,28 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <system_error>
 #include <utility>
+#include <vector>
 
+#include "core/error/nearest_name.hpp"
 #include "core/error/one_line.hpp"
 #include "core/pipeline/release_schedule.hpp"
 #include "daemon/config/configuration_keys.hpp"
 #include "daemon/config/ecg_inputs.hpp"
+#include "daemon/config/session_keys.hpp"
 #include "daemon/config/surface_traffic.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
 namespace {
+
+// Where a text comes from: from whoever runs perimap, who may say all; or along with a recording, which may say of its
+// session alone. What else one says is refused, or passed over.
+enum class Source { kFile, kRecording, kRecordingPassedOver };
 
 // A generous bound for a file written by hand. It also bounds the recursion of the TOML library, which is as deep as
 // a dotted key is long.
@@ -165,11 +173,11 @@ std::optional<std::string> refused_character(std::string_view text) {
   return std::nullopt;
 }
 
-// Walks one parsed file, keeps what is good and remembers the error that stands first in the file.
+// Walks one parsed file, keeps what is good and remembers what is wrong.
 class Overlay {
  public:
-  Overlay(const std::filesystem::path& file, const Configuration& base, NamedFiles named_files)
-      : file_(file), named_files_(named_files), configuration_(base) {}
+  Overlay(const std::filesystem::path& file, const Configuration& base, NamedFiles named_files, Source source)
+      : file_(file), named_files_(named_files), source_(source), configuration_(base) {}
 
   Expected<Configuration> apply(const toml::table& root) {
     for (const auto& [key, node] : root) {
@@ -188,14 +196,22 @@ class Overlay {
     if (!root.contains("version")) {
       refuse({1, 1}, "version", find("", "version")->expected, "nothing");
     }
-    check_budget(root);
-    check_frames_underway(root);
-    check_inputs(root);
-    check_traffic(root);
-    if (!error_.empty()) {
-      return fail(error_);
+    // Whether values go together can be told of good values alone.
+    if (errors_.empty()) {
+      check_budget(root);
+      check_frames_underway(root);
+      check_inputs(root);
+      check_traffic(root);
     }
+    if (!errors_.empty()) return fail(told());
     return configuration_;
+  }
+
+  // The keys that a recording may not set, and that were passed over.
+  [[nodiscard]] std::vector<Error> passed_over() const {
+    std::vector<Error> all;
+    for (const Wrong& wrong : passed_over_) all.push_back({wrong.message});
+    return all;
   }
 
  private:
@@ -223,6 +239,10 @@ class Overlay {
       refuse_unknown(section, name);
       return;
     }
+    if (source_ != Source::kFile && !describes_session(*key)) {
+      refuse_of_recording(full_name(section, name.str()), name);
+      return;
+    }
     std::optional<ConfigurationValue> value = value_of(node);
     if (value && key->names_file && std::holds_alternative<std::string>(*value)) {
       // An empty name stays empty, so that the key refuses it.
@@ -244,17 +264,27 @@ class Overlay {
   }
 
   void refuse_unknown(std::string_view section, const toml::key& name) {
-    std::string known;
-    std::string_view last;
+    std::vector<std::string_view> known;
+    std::string elsewhere;
     for (const ConfigurationKey& key : configuration_keys()) {
       if (key.is_former) continue;
       const std::string_view candidate = section.empty() && !key.section.empty() ? key.section : key.name;
-      if ((section.empty() || key.section == section) && candidate != last) {
-        known += fmt::format("{}{}", known.empty() ? "" : ", ", candidate);
-        last = candidate;
+      if ((section.empty() || key.section == section) && (known.empty() || candidate != known.back())) {
+        known.push_back(candidate);
       }
+      if (elsewhere.empty() && key.name == name.str()) elsewhere = full_name(key.section, key.name);
     }
-    refuse(name.source().begin, full_name(section, name.str()), fmt::format("one of {}", known), "an unknown key");
+    // One that stands in the wrong section is not misspelt.
+    const std::string meant =
+        elsewhere.empty() ? did_you_mean(name.str(), known) : fmt::format("; did you mean '{}'?", elsewhere);
+    refuse(name.source().begin, full_name(section, name.str()), fmt::format("one of {}", fmt::join(known, ", ")),
+           "an unknown key" + meant);
+  }
+
+  void refuse_of_recording(const std::string& key, const toml::key& name) {
+    refuse(name.source().begin, key, "of a recording what describes its session, and nothing else",
+           "a key that only a configuration file may set (perimap replay --whole passes over it)",
+           source_ == Source::kRecordingPassedOver ? passed_over_ : errors_);
   }
 
   // Where the file has the first of these keys, as "section.name"; its beginning when it has none.
@@ -318,21 +348,42 @@ class Overlay {
         key, fmt::format("what dds.maximum_MB_per_s = {:.6g} allows ({})", most_MB_per_s, fits), got);
   }
 
+  struct Wrong {
+    toml::source_position where;
+    std::string message;
+  };
+
   void refuse(toml::source_position where, std::string_view key, std::string_view expected, std::string_view got) {
-    const bool first =
-        error_.empty() || where.line < where_.line || (where.line == where_.line && where.column < where_.column);
-    if (first) {
-      where_ = where;
-      error_ = on_one_line(fmt::format("{}:{}:{}: key '{}': expected {}, got {}", file_.string(), where.line,
-                                       where.column, key, expected, got));
+    refuse(where, key, expected, got, errors_);
+  }
+  void refuse(toml::source_position where, std::string_view key, std::string_view expected, std::string_view got,
+              std::vector<Wrong>& wrong) const {
+    wrong.push_back({where, on_one_line(fmt::format("{}:{}:{}: key '{}': expected {}, got {}", file_.string(),
+                                                    where.line, where.column, key, expected, got))});
+  }
+
+  // All that is wrong, a line each, as it stands in the file.
+  [[nodiscard]] std::string told() {
+    constexpr std::size_t kMost = 20;  // what is wrong more often is another kind of file
+    std::stable_sort(errors_.begin(), errors_.end(), [](const Wrong& a, const Wrong& b) {
+      return std::pair(a.where.line, a.where.column) < std::pair(b.where.line, b.where.column);
+    });
+    std::string all;
+    for (std::size_t i = 0; i < std::min(kMost, errors_.size()); ++i) {
+      all += fmt::format("{}{}", i > 0 ? "\n" : "", errors_[i].message);
     }
+    if (errors_.size() > kMost) {
+      all += fmt::format("\n{}: and {} more wrong keys", on_one_line(file_.string()), errors_.size() - kMost);
+    }
+    return all;
   }
 
   const std::filesystem::path& file_;
   NamedFiles named_files_;
+  Source source_;
   Configuration configuration_;
-  toml::source_position where_{};
-  std::string error_;
+  std::vector<Wrong> errors_;
+  std::vector<Wrong> passed_over_;
 };
 
 std::string printed(const ConfigurationValue& value) {
@@ -377,8 +428,10 @@ std::string printed(const ConfigurationValue& value) {
 
 }  // namespace
 
-Expected<Configuration> parse_configuration(std::string_view text, const std::filesystem::path& file,
-                                            const Configuration& base, NamedFiles named_files) {
+namespace {
+
+Expected<RecordedConfiguration> parse(std::string_view text, const std::filesystem::path& file,
+                                      const Configuration& base, NamedFiles named_files, Source source) {
   if (text.size() > kLargestFile) {
     return fail(on_one_line(
         fmt::format("{}:1:1: expected at most {} bytes of TOML, got {}", file.string(), kLargestFile, text.size())));
@@ -391,12 +444,30 @@ Expected<Configuration> parse_configuration(std::string_view text, const std::fi
     return fail(on_one_line(fmt::format("{}:{}", file.string(), *refused)));
   }
   try {
-    return Overlay(file, base, named_files).apply(toml::parse(text));
+    Overlay overlay(file, base, named_files, source);
+    auto configuration = overlay.apply(toml::parse(text));
+    if (!configuration) return tl::unexpected(std::move(configuration.error()));
+    return RecordedConfiguration{std::move(*configuration), overlay.passed_over()};
   } catch (const toml::parse_error& error) {
     const toml::source_position where = error.source().begin;
     return fail(on_one_line(
         fmt::format("{}:{}:{}: expected TOML, got: {}", file.string(), where.line, where.column, error.description())));
   }
+}
+
+}  // namespace
+
+Expected<Configuration> parse_configuration(std::string_view text, const std::filesystem::path& file,
+                                            const Configuration& base, NamedFiles named_files) {
+  return parse(text, file, base, named_files, Source::kFile).map([](RecordedConfiguration read) {
+    return std::move(read.configuration);
+  });
+}
+
+Expected<RecordedConfiguration> parse_recorded_configuration(std::string_view text, const std::string& name,
+                                                             const Configuration& base, OtherKeys others) {
+  return parse(text, name, base, NamedFiles::kMayBeMissing,
+               others == OtherKeys::kRefused ? Source::kRecording : Source::kRecordingPassedOver);
 }
 
 Expected<Configuration> load_configuration(const std::filesystem::path& file, const Configuration& base,
@@ -406,11 +477,13 @@ Expected<Configuration> load_configuration(const std::filesystem::path& file, co
   return parse_configuration(*text, file, base, named_files);
 }
 
-std::string to_toml(const Configuration& configuration) {
+namespace {
+
+std::string printed(const Configuration& configuration, bool (*wanted)(const ConfigurationKey&)) {
   std::string text;
   std::string section;
   for (const ConfigurationKey& key : configuration_keys()) {
-    if (key.is_former) continue;
+    if (key.is_former || !wanted(key)) continue;
     if (key.section != section) {
       section = key.section;
       text += fmt::format("\n[{}]\n", section);
@@ -421,5 +494,13 @@ std::string to_toml(const Configuration& configuration) {
   }
   return text;
 }
+
+}  // namespace
+
+std::string to_toml(const Configuration& configuration) {
+  return printed(configuration, [](const ConfigurationKey&) { return true; });
+}
+
+std::string session_toml(const Configuration& configuration) { return printed(configuration, &describes_session); }
 
 }  // namespace perimap

@@ -1,12 +1,14 @@
 // Configuration files: TOML 1.0, checked key by key against configuration_keys.
 //
-// Every error is one line, `FILE:LINE:COL: key 'a.b': expected ..., got ...`. Unknown keys, wrong types, values out of
-// range and named files that do not exist are errors; of several the first in the file is told.
+// Unknown keys, wrong types, values out of range and named files that do not exist are errors. All of them are told, in
+// the order of the file, a line each: `FILE:LINE:COL: key 'a.b': expected ..., got ...`, and of an unknown key which
+// one may have been meant. Where all values are good, the same is told of values that do not go together.
 #pragma once
 
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/error/expected.hpp"
 #include "daemon/config/configuration.hpp"
@@ -26,7 +28,25 @@ enum class NamedFiles { kMustExist, kMayBeMissing };
                                                           const Configuration& base = {},
                                                           NamedFiles named_files = NamedFiles::kMustExist);
 
+// What becomes of the keys of a recording's configuration that do not describe its session (describes_session).
+enum class OtherKeys { kRefused, kPassedOver };
+
+struct RecordedConfiguration {
+  Configuration configuration;
+  std::vector<Error> passed_over;  // a line for each such key; none where they are refused
+};
+
+// The configuration that a recording brings along, over `base`. A file that came from elsewhere must not decide which
+// files are written, which devices are opened and what is published. `name` stands in messages.
+[[nodiscard]] Expected<RecordedConfiguration> parse_recorded_configuration(std::string_view text,
+                                                                           const std::string& name,
+                                                                           const Configuration& base = {},
+                                                                           OtherKeys others = OtherKeys::kRefused);
+
 // The configuration as TOML, all keys, each with its meaning as a comment; parsing it gives the same configuration.
 [[nodiscard]] std::string to_toml(const Configuration& configuration);
+
+// Likewise, but what describes the session alone: what a recording of it brings along.
+[[nodiscard]] std::string session_toml(const Configuration& configuration);
 
 }  // namespace perimap

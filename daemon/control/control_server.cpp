@@ -17,6 +17,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/error/one_line.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
@@ -146,7 +147,7 @@ void ControlServer::serve_client(const Descriptor& client, const Interrupt& inte
     spdlog::info("command {} from {}: done", name_of(*command), peer);
   } else {
     spdlog::warn("command {} from {}: refused: {}", command ? name_of(*command) : "that is none", peer,
-                 answer.error().message);
+                 on_one_line(answer.error().message));
   }
   const std::string text =
       answer ? fmt::format("{}{}", kOk, *answer) : fmt::format("{}{}\n", kError, answer.error().message);

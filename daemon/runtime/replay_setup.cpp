@@ -129,9 +129,11 @@ tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& record
   if (facts->world_frame) configuration.source.world_frame = *facts->world_frame;
   if (facts->configuration) {
     const std::string name = fmt::format("{}:{}", recording, attachments::kConfiguration);
-    auto own = parse_configuration(*facts->configuration, name, configuration, NamedFiles::kMayBeMissing);
+    auto own = parse_recorded_configuration(*facts->configuration, name, configuration,
+                                            mode == ReadMode::kWhole ? OtherKeys::kPassedOver : OtherKeys::kRefused);
     if (!own) return wrong_recording(std::move(own.error()));
-    configuration = std::move(*own);
+    configuration = std::move(own->configuration);
+    basis.passed_over = std::move(own->passed_over);
   }
   if (configuration_file) {
     auto overlaid = load_configuration(*configuration_file, configuration);
@@ -172,8 +174,8 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
   const PipelineSettings pipeline = pipeline_settings(basis->configuration, basis->camera);
   const Identity identity{basis->configuration.source.name, first_stream(pipeline),
                           basis->configuration.source.world_frame};
-  return ReplaySetup{std::move(basis->configuration), pipeline, identity, basis->utc_minus_monotonic,
-                     std::move(*reader)};
+  return ReplaySetup{std::move(basis->configuration), pipeline,          identity, basis->utc_minus_monotonic,
+                     std::move(basis->passed_over),   std::move(*reader)};
 }
 
 RuntimeSettings runtime_settings(const Configuration& configuration, const Identity& identity) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/error/expected.hpp"
 #include "core/geometry/camera_model.hpp"
@@ -20,6 +21,7 @@ struct ReplaySetup {
   PipelineSettings pipeline;
   Identity identity;
   Duration utc_minus_monotonic{0};  // of the recording
+  std::vector<Error> passed_over;   // keys of its configuration that do not describe the session (ReadMode::kWhole)
   ReplayReader reader;              // at the first event
 };
 
@@ -34,6 +36,7 @@ struct RecordedBasis {
   Configuration configuration;  // effective: defaults, then the recording's own, then the file's
   CameraModel camera;           // of the file's calibration, or the recording's own
   Duration utc_minus_monotonic{0};
+  std::vector<Error> passed_over;  // keys of its configuration that do not describe the session (ReadMode::kWhole)
 };
 [[nodiscard]] tl::expected<RecordedBasis, SetupError> recorded_basis(
     const std::string& recording, const std::optional<std::filesystem::path>& configuration_file, ReadMode mode);

@@ -16,8 +16,8 @@ namespace perimap {
 [[nodiscard]] std::filesystem::path recording_path(const std::filesystem::path& folder,
                                                    std::chrono::system_clock::time_point now);
 
-// The configuration goes along as a replay needs it: without the devices, and without what their drivers have applied
-// to the samples already (the registration, the camera's delay).
+// The calibration goes along, and of the configuration what describes the session (session_toml): without the devices,
+// and without what their drivers have applied to the samples already (the registration, the camera's delay).
 [[nodiscard]] SensorRecordingFacts recording_facts(const Configuration& configuration,
                                                    const std::optional<CameraModel>& camera, std::string generator);
 

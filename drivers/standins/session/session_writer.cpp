@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "drivers/file/whole_file.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/foxglove_image.hpp"
 #include "drivers/recording/foxglove_pose.hpp"
@@ -45,28 +46,26 @@ std::string description(const Simulation& simulation, const TrackerNoise& noise)
       correlation_s > 0.0 ? fmt::format(", correlated over {} s", correlation_s) : "");
 }
 
-// One recording under way, in a file beside the one it will become.
+// One recording under way.
 class SessionWriter {
  public:
   static Expected<std::unique_ptr<SessionWriter>> create(const Simulation& simulation,
                                                          const SimulatedRecording& recording) {
-    std::filesystem::path partial = recording.path;
-    partial += ".part";
-    auto writer = RecordingWriter::create(partial.string());
+    auto file = WholeFile::create(recording.path);
+    if (!file) return tl::unexpected(file.error());
+    auto sink = create_file(file->path().string(), recording.path.string());
+    if (!sink) return tl::unexpected(sink.error());
+    auto writer = RecordingWriter::create(*std::move(sink));
     if (!writer) return tl::unexpected(writer.error());
-    auto session = std::unique_ptr<SessionWriter>(
-        new SessionWriter(simulation, recording, std::move(partial), *std::move(writer)));
+    auto session =
+        std::unique_ptr<SessionWriter>(new SessionWriter(simulation, recording, *std::move(file), *std::move(writer)));
     if (const auto begun = session->begin(); !begun) return tl::unexpected(begun.error());
     return session;
   }
 
   SessionWriter(const SessionWriter&) = delete;
   SessionWriter& operator=(const SessionWriter&) = delete;
-  ~SessionWriter() {
-    if (finished_) return;
-    std::error_code ignored;
-    std::filesystem::remove(partial_, ignored);
-  }
+  ~SessionWriter() = default;
 
   Expected<void> write_frame(const Simulation::Frame& frame, std::span<const std::uint8_t> pixels) {
     const auto sequence = static_cast<std::uint32_t>(frame.stamp.sequence);
@@ -98,18 +97,13 @@ class SessionWriter {
   }
 
   Expected<void> finish() {
-    if (auto done = writer_.finish(); !done) return done;
-    std::error_code error;
-    std::filesystem::rename(partial_, recording_.path, error);
-    if (error) return fail(fmt::format("{}: {}", recording_.path.string(), error.message()));
-    finished_ = true;
-    return {};
+    return writer_.finish().and_then([this] { return file_.finish(); });
   }
 
  private:
-  SessionWriter(const Simulation& simulation, const SimulatedRecording& recording, std::filesystem::path partial,
+  SessionWriter(const Simulation& simulation, const SimulatedRecording& recording, WholeFile file,
                 RecordingWriter writer)
-      : simulation_(simulation), recording_(recording), partial_(std::move(partial)), writer_(std::move(writer)) {}
+      : simulation_(simulation), recording_(recording), file_(std::move(file)), writer_(std::move(writer)) {}
 
   Expected<void> attach(std::string_view name, std::string_view media_type, const std::string& text) {
     return writer_.write_attachment(name, media_type, std::as_bytes(std::span(text)));
@@ -161,11 +155,10 @@ class SessionWriter {
 
   const Simulation& simulation_;
   SimulatedRecording recording_;
-  std::filesystem::path partial_;
+  WholeFile file_;  // goes after what writes to it
   RecordingWriter writer_;
   ChannelId image_, truth_camera_, tracker_, viewer_, ecg_, respiration_;
   std::vector<std::uint8_t> packed_;
-  bool finished_ = false;
 };
 
 }  // namespace

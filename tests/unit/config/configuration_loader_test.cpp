@@ -3,11 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <numbers>
+#include <sstream>
 
 #include "daemon/config/configuration_keys.hpp"
+#include "daemon/config/session_keys.hpp"
 #include "daemon/config/surface_traffic.hpp"
 
 namespace perimap {
@@ -217,10 +221,104 @@ TEST(SurfaceTraffic, CountsTheStreamsThatArePublishedAndTheModels) {
   EXPECT_THAT(lines[3], HasSubstr("together at most 3.41 of 50 MB/s to one reader"));
 }
 
-TEST(ConfigurationLoader, OfSeveralErrorsTheFirstInTheFileIsTold) {
-  EXPECT_THAT(
-      error_of("version = 1\n[tracker]\nposition_deviation_mm = -1\n[phase]\nlaw = 3\nx = 1\n[camera]\ny = 2\n"),
-      StartsWith("test.toml:3:25: key 'tracker.position_deviation_mm'"));
+TEST(ConfigurationLoader, AllErrorsAreToldInTheOrderOfTheFile) {
+  std::istringstream lines(
+      error_of("version = 1\n[tracker]\nposition_deviation_mm = -1\n[phase]\nlaw = 3\nx = 1\n[camera]\ny = 2\n"));
+  for (const char* told :
+       {"test.toml:3:25: key 'tracker.position_deviation_mm': expected ", "test.toml:5:7: key 'phase.law': expected ",
+        "test.toml:6:1: key 'phase.x': expected ", "test.toml:8:1: key 'camera.y': expected "}) {
+    std::string line;
+    ASSERT_TRUE(std::getline(lines, line)) << told;
+    EXPECT_THAT(line, StartsWith(told));
+  }
+  EXPECT_EQ(lines.peek(), EOF);
+}
+
+// The default latency is 50 ms: the budget would be more than that.
+TEST(ConfigurationLoader, WhetherValuesGoTogetherIsNotToldOfWrongOnes) {
+  EXPECT_EQ(error_of("version = 1\n[pipeline]\nlatency_ms = \"80\"\nbudget_ms = 60\n"),
+            "test.toml:3:14: key 'pipeline.latency_ms': expected a number from 1 to 1000, got \"80\"");
+}
+
+TEST(ConfigurationLoader, AFileOfAnotherKindIsNotToldToItsEnd) {
+  std::string text = "version = 1\n";
+  for (int i = 0; i < 100; ++i) text += "x" + std::to_string(i) + " = 1\n";
+  const std::string error = error_of(text);
+  EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 20);
+  EXPECT_THAT(error, ::testing::EndsWith("\ntest.toml: and 80 more wrong keys"));
+}
+
+TEST(ConfigurationLoader, AMisspeltKeyIsToldWhatWasMeant) {
+  using ::testing::EndsWith;
+  EXPECT_THAT(error_of("version = 1\n[traker]\n"), EndsWith("got an unknown key; did you mean 'tracker'?"));
+  EXPECT_THAT(error_of("version = 1\n[phase]\nlost_afer_s = 1\n"), EndsWith("; did you mean 'lost_after_s'?"));
+  EXPECT_THAT(error_of("version = 1\n[phase]\nworkers = 1\n"), EndsWith("; did you mean 'pipeline.workers'?"));
+  EXPECT_THAT(error_of("version = 1\nlatency_ms = 1\n"), EndsWith("; did you mean 'pipeline.latency_ms'?"));
+  EXPECT_THAT(error_of("version = 1\n[phase]\nxyz = 1\n"), EndsWith("got an unknown key"));
+}
+
+constexpr const char* kSession =
+    "version = 1\n[camera]\nframe_rate_hz = 25\n[tracker]\nposition_deviation_mm = 1.4\n"
+    "hand_eye_translation_SC_mm = [1, 2, 3]\n[ecg]\nr_trigger = true\n[phase]\nlaw = \"warped\"\n"
+    "[respiration]\nenabled = true\n[estimation]\nharmonics = 5\n";
+
+TEST(RecordedConfiguration, SetsWhatDescribesItsSession) {
+  const auto recorded = parse_recorded_configuration(kSession, "heart.mcap:configuration.toml");
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  const Expected<Configuration> same = parse(kSession);
+  ASSERT_TRUE(same) << same.error().message;
+  EXPECT_EQ(recorded->configuration, *same);
+  EXPECT_TRUE(recorded->passed_over.empty());
+}
+
+// One that came from elsewhere must not decide which files are written and what is published, or where.
+TEST(RecordedConfiguration, IsRefusedAnythingElseByName) {
+  for (const ConfigurationKey& key : configuration_keys()) {
+    if (describes_session(key)) continue;
+    const std::string text = "version = 1\n[" + key.section + "]\n" + key.name + " = 1\n";
+    const auto recorded = parse_recorded_configuration(text, "heart.mcap:configuration.toml");
+    ASSERT_FALSE(recorded) << key.section << "." << key.name;
+    EXPECT_THAT(recorded.error().message, StartsWith("heart.mcap:configuration.toml:3:1: key '" + key.section + "." +
+                                                     key.name + "': expected of a recording what describes its"));
+  }
+}
+
+TEST(RecordedConfiguration, OfNoFileNoDeviceAndNothingOfTheRunMayBeSet) {
+  for (const ConfigurationKey& key : configuration_keys()) {
+    if (!describes_session(key)) continue;
+    EXPECT_FALSE(key.names_file) << key.section << "." << key.name;
+    for (const char* section : {"source", "replay", "pipeline", "features", "realtime", "dds", "recording", "status",
+                                "log", "control", "checkpoint"}) {
+      EXPECT_NE(key.section, section) << key.name;
+    }
+    for (const char* name : {"device", "protocol", "port", "device_channel", "r_trigger_port"}) {
+      EXPECT_NE(key.name, name) << key.section;
+    }
+  }
+}
+
+TEST(RecordedConfiguration, MayBePassedOverWhatItMayNotSet) {
+  const std::string text = std::string(kSession) + "[checkpoint]\nfile = \"/etc/passwd\"\n[dds]\ndomain = 7\n";
+  const auto recorded = parse_recorded_configuration(text, "heart.mcap:configuration.toml", {}, OtherKeys::kPassedOver);
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  EXPECT_EQ(recorded->configuration, *parse(kSession));
+  ASSERT_EQ(recorded->passed_over.size(), 2U);
+  EXPECT_THAT(recorded->passed_over[0].message, HasSubstr("key 'checkpoint.file'"));
+  EXPECT_THAT(recorded->passed_over[1].message, HasSubstr("key 'dds.domain'"));
+  // What is wrong is wrong all the same.
+  EXPECT_FALSE(parse_recorded_configuration("version = 1\n[dds]\ndomain = 7\n[phase]\nlaw = 3\n", "x", {},
+                                            OtherKeys::kPassedOver));
+}
+
+TEST(RecordedConfiguration, WhatIsPrintedOfASessionIsTakenFromARecording) {
+  Configuration configuration = *parse(kSession);
+  configuration.source.name = "theatre 3";
+  configuration.dds.domain = 7;
+  configuration.tracker.port = "/dev/ttyUSB0";
+  configuration.tracker.translation_IW_mm[0] = 5.0;
+  const auto recorded = parse_recorded_configuration(session_toml(configuration), "x");
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  EXPECT_EQ(recorded->configuration, *parse(kSession));
 }
 
 struct Wrong {
