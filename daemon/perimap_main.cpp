@@ -1,58 +1,54 @@
 // perimap, the companion of perimapd. Exit codes: 0 done, 1 failed, 2 wrong usage or configuration.
-#include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 
-#include "daemon/commands/check.hpp"
-#include "daemon/commands/ctl.hpp"
-#include "daemon/commands/probe.hpp"
-#include "daemon/commands/record.hpp"
-#include "daemon/evaluation/commands/bench.hpp"
-#include "daemon/evaluation/commands/ecg.hpp"
-#include "daemon/evaluation/commands/experiment.hpp"
-#include "daemon/evaluation/commands/replay.hpp"
-#include "daemon/evaluation/commands/report.hpp"
-#include "daemon/evaluation/commands/track.hpp"
-#include "daemon/evaluation/commands/watch.hpp"
-#include "daemon/standins/commands/emulate.hpp"
-#include "daemon/standins/commands/simulate.hpp"
+#include "daemon/command_line/commands.hpp"
+
+// A command is one file in a folder `commands`, which defines add_NAME_command(), and one line here, in the order of
+// perimap --help.
+#define PERIMAP_COMMANDS(COMMAND) \
+  COMMAND(simulate)               \
+  COMMAND(replay)                 \
+  COMMAND(watch)                  \
+  COMMAND(report)                 \
+  COMMAND(ecg)                    \
+  COMMAND(bench)                  \
+  COMMAND(experiment)             \
+  COMMAND(track)                  \
+  COMMAND(emulate)                \
+  COMMAND(probe)                  \
+  COMMAND(record)                 \
+  COMMAND(check)                  \
+  COMMAND(ctl)
+
+namespace perimap {
+
+#define PERIMAP_DECLARE(NAME) void add_##NAME##_command(Commands& commands);
+PERIMAP_COMMANDS(PERIMAP_DECLARE)
+#undef PERIMAP_DECLARE
 
 namespace {
 
 int run(int argc, char** argv) {
-  CLI::App app("Companion of perimapd, which predicts where a beating organ's surface will be.");
-  app.set_version_flag("--version", "perimap " PERIMAP_VERSION);
-  app.require_subcommand(1);
-  app.footer(
-      "Exit codes: 0 done, 1 failed, 2 wrong usage or configuration.\n"
-      "Research software, not a certified medical device.");
-  int exit_code = 0;
-  perimap::add_simulate_command(app, exit_code);
-  perimap::add_replay_command(app, exit_code);
-  perimap::add_watch_command(app, exit_code);
-  perimap::add_report_command(app, exit_code);
-  perimap::add_ecg_command(app, exit_code);
-  perimap::add_bench_command(app, exit_code);
-  perimap::add_experiment_command(app, exit_code);
-  perimap::add_track_command(app, exit_code);
-  perimap::add_emulate_command(app, exit_code);
-  perimap::add_probe_command(app, exit_code);
-  perimap::add_record_command(app, exit_code);
-  perimap::add_check_command(app, exit_code);
-  perimap::add_ctl_command(app, exit_code);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  return exit_code;
+  // A file that may not grow is an error like a full disk, and told like one.
+  (void)std::signal(SIGXFSZ, SIG_IGN);
+  Commands commands("perimap", PERIMAP_VERSION,
+                    "Companion of perimapd, which predicts where a beating organ's surface will be.",
+                    "Exit codes: 0 done, 1 failed, 2 wrong usage or configuration.\n"
+                    "Research software, not a certified medical device.");
+#define PERIMAP_ADD(NAME) add_##NAME##_command(commands);
+  PERIMAP_COMMANDS(PERIMAP_ADD)
+#undef PERIMAP_ADD
+  return commands.run(argc, argv);
 }
 
 }  // namespace
+}  // namespace perimap
 
 int main(int argc, char** argv) {
   try {
-    return run(argc, argv);
+    return perimap::run(argc, argv);
   } catch (const std::exception& error) {
     (void)std::fprintf(stderr, "perimap: %s\n", error.what());
     return 1;

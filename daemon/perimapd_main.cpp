@@ -3,8 +3,10 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,14 +16,17 @@
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/checkpoint/checkpoint_keeper.hpp"
-#include "daemon/config/configuration_difference.hpp"
+#include "daemon/command_line/arguments.hpp"
+#include "daemon/command_line/console.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/surface_traffic.hpp"
 #include "daemon/logging/logging.hpp"
+#include "daemon/process/reload_signal.hpp"
 #include "daemon/process/service_folder.hpp"
 #include "daemon/process/service_manager.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/dds_publication.hpp"
+#include "daemon/runtime/configuration_reload.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/device_setup.hpp"
 #include "daemon/runtime/live_session.hpp"
@@ -33,47 +38,28 @@
 namespace perimap {
 namespace {
 
-constexpr int kOk = 0;
-constexpr int kFailure = 1;
-constexpr int kWrongConfiguration = 2;
-
-int refuse(const Error& error, int code) {
-  fmt::print(stderr, "perimapd: {}\n", error.message);
-  return code;
-}
-
-// Puts into effect what may change while it runs, the log's level; says what needs a restart. `running`: what the
-// file came to when it was read last.
-Expected<std::string> reload(const std::string& configuration_file, Configuration& running) {
-  const auto read = load_configuration(configuration_file);
-  if (!read) return tl::unexpected(read.error());
-  std::string restart;
-  for (const std::string& key : differing_keys(running, *read)) {
-    if (key != "log.level") restart += fmt::format("{}{}", restart.empty() ? "" : ", ", key);
-  }
-  Logging::set_level(read->log.level);
-  running.log.level = read->log.level;
-  return restart.empty() ? std::string("in effect\n")
-                         : fmt::format("in effect but for what needs a restart: {}\n", restart);
-}
+struct Signals {
+  StopSignal stop;
+  ReloadSignal reload;
+};
 
 // A session over whatever `make_feeder` gives for the pipeline's entrance. `given`: the file as loaded by itself.
 template <class MakeFeeder>
-int run_session(const std::string& configuration_file, const Configuration& given, const Configuration& configuration,
-                const PipelineSettings& settings, const Identity& identity, StopSignal& stop,
-                const MakeFeeder& make_feeder) {
+Outcome run_session(const std::string& configuration_file, const Configuration& given,
+                    const Configuration& configuration, const PipelineSettings& settings, const Identity& identity,
+                    Signals& signals, const MakeFeeder& make_feeder) {
   const Logging logging(configuration.log.level);
   if (!configuration.dds.enabled) {
-    return refuse(
-        {fmt::format("{}: key 'dds.enabled': expected true, since nothing else publishes", configuration_file)},
-        kWrongConfiguration);
+    return refuse(fmt::format("{}: key 'dds.enabled': expected true, since nothing else publishes", configuration_file),
+                  ExitCode::kWrongUsage);
   }
   auto publication = DdsPublication::create(
       {configuration.dds.domain, configuration.dds.surface_deadline, configuration.dds.surface_lifespan});
-  if (!publication) return refuse(publication.error(), kFailure);
+  if (!publication) return refuse(publication.error());
 
   Pipeline pipeline(settings);
   const RuntimeSettings runtime = runtime_settings(configuration, identity);
+  ConfigurationReload reload(configuration_file, given);
   LiveSession session(pipeline, runtime, **publication, make_feeder(pipeline.entrance()));
   ServiceManager service;
   session.report_to(service);
@@ -81,28 +67,29 @@ int run_session(const std::string& configuration_file, const Configuration& give
                                                       : service_file("STATE_DIRECTORY", "checkpoint")) {
     session.keep_checkpoints(CheckpointKeeper::go_on_from(*file, configuration, pipeline));
   }
-  Configuration running = given;
+  session.reload_at(signals.reload, std::ref(reload));
   if (const auto socket =
           configuration.control.socket ? configuration.control.socket : service_file("RUNTIME_DIRECTORY", "control")) {
-    session.take_commands_at(*socket, [&configuration_file, &running] { return reload(configuration_file, running); });
+    session.take_commands_at(*socket, std::ref(reload));
   }
   spdlog::info("perimapd {}: publishing '{}' on DDS domain {}, latency {} ms, {} workers", PERIMAP_VERSION,
                configuration.source.name, configuration.dds.domain,
                std::chrono::duration_cast<std::chrono::milliseconds>(configuration.pipeline.latency).count(),
                configuration.pipeline.workers);
   for (const std::string& line : traffic_lines(configuration)) spdlog::info("{}", line);
-  const Expected<void> ended = session.run(stop);
+  const Expected<void> ended = session.run(signals.stop);
   const PipelineCounters& counters = pipeline.counters();
   std::uint64_t surfaces = 0;
   for (const ReleaseStream stream : kReleaseStreams) surfaces += counters.of(stream).samples.get();
-  spdlog::info("{}: {} frames, {} surfaces, {} features converged", stop.requested() ? "stopped" : "recording ended",
-               counters.frames.get(), surfaces, counters.features_converged.get());
+  spdlog::info("{}: {} frames, {} surfaces, {} features converged",
+               signals.stop.requested() ? "stopped" : "recording ended", counters.frames.get(), surfaces,
+               counters.features_converged.get());
   if ((*publication)->failures() > 0) spdlog::error("{} DDS writes failed", (*publication)->failures());
   if (!ended) {
     spdlog::error("{}", ended.error().message);
-    return kFailure;
+    return refuse("");  // it stands in the log
   }
-  return kOk;
+  return {};
 }
 
 // Guidance does not wait for a disk: without a recording the session goes on, and says so.
@@ -125,36 +112,43 @@ DeviceRecording prepare_recording(const std::string& configuration_file, const D
   return recording;
 }
 
-int run(const std::string& configuration_file) {
+Outcome run(const std::string& configuration_file) {
   auto stop = StopSignal::install();
-  if (!stop) return refuse(stop.error(), kFailure);
+  if (!stop) return refuse(stop.error());
+  auto reload = ReloadSignal::install();
+  if (!reload) return refuse(reload.error());
+  Signals signals{*std::move(stop), *std::move(reload)};
+  // Whoever read our output has gone away: nothing to stop for. And a file that may not grow is an error like a full
+  // disk.
+  (void)std::signal(SIGPIPE, SIG_IGN);
+  (void)std::signal(SIGXFSZ, SIG_IGN);
   const auto given = load_configuration(configuration_file);
-  if (!given) return refuse(given.error(), kWrongConfiguration);
+  if (!given) return refuse(given.error(), ExitCode::kWrongUsage);
   if (!given->replay.recording && names_devices(*given)) {
     auto setup = prepare_devices(configuration_file, *given);
-    if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
-    return run_session(configuration_file, *given, setup->configuration, setup->pipeline, setup->identity, *stop,
+    if (!setup) return refuse(setup.error());
+    return run_session(configuration_file, *given, setup->configuration, setup->pipeline, setup->identity, signals,
                        [&setup, &configuration_file](SensorEntrance& entrance) {
                          return std::make_unique<DeviceFeeder>(std::move(setup->devices), &entrance,
                                                                prepare_recording(configuration_file, *setup));
                        });
   }
   if (!given->replay.recording) {
-    return refuse({fmt::format("{}: key 'replay.recording': expected the recording to replay, or devices in [camera], "
-                               "[tracker] and [ecg], got nothing",
-                               configuration_file)},
-                  kWrongConfiguration);
+    return refuse(fmt::format("{}: key 'replay.recording': expected the recording to replay, or devices in [camera], "
+                              "[tracker] and [ecg], got nothing",
+                              configuration_file),
+                  ExitCode::kWrongUsage);
   }
   if (given->recording.record) {
     return refuse(
-        {fmt::format("{}: key 'recording.record': expected false with 'replay.recording', which is a recording "
-                     "already, got true",
-                     configuration_file)},
-        kWrongConfiguration);
+        fmt::format("{}: key 'recording.record': expected false with 'replay.recording', which is a recording "
+                    "already, got true",
+                    configuration_file),
+        ExitCode::kWrongUsage);
   }
   auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
-  if (!setup) return refuse(setup.error().error, setup.error().configuration ? kWrongConfiguration : kFailure);
-  return run_session(configuration_file, *given, setup->configuration, setup->pipeline, setup->identity, *stop,
+  if (!setup) return refuse(setup.error());
+  return run_session(configuration_file, *given, setup->configuration, setup->pipeline, setup->identity, signals,
                      [&setup](SensorEntrance& entrance) {
                        return std::make_unique<ReplayFeeder>(std::move(setup->reader), SensorIntake{&entrance});
                      });
@@ -168,12 +162,8 @@ int parse_and_run(int argc, char** argv) {
   app.set_version_flag("--version", PERIMAP_VERSION);
   std::string configuration_file;
   app.add_option("-c,--config", configuration_file, "Configuration file (TOML; see config/replay.toml)")->required();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kOk : kWrongConfiguration;
-  }
-  return run(configuration_file);
+  if (const auto ended = parse_arguments(app, argc, argv)) return *ended;
+  return Console("perimapd").end(run(configuration_file));
 }
 
 }  // namespace

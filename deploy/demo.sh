@@ -64,9 +64,9 @@ fail() {
 }
 
 # In the background and waited for, so that Ctrl-C is heard at once. timeout(1) makes a process group of its own and
-# passes the signal on to all of it, compilers included.
+# passes the signal on to all of it, compilers included; of time there is no limit (0), since nobody knows the machine.
 run() {
-  timeout --kill-after=10 30m "$@" &
+  timeout --kill-after=10 0 "$@" &
   processes=($!)
   wait "${processes[0]}"
   local status=$?
@@ -83,6 +83,35 @@ run_quietly() { # LOG COMMAND...
   fi
 }
 
+# How far the log of a build has come: the last "[123/456]" in it. A line that is written anew on a terminal, elsewhere a
+# line for each tenth.
+tell_progress() { # LOG
+  local done=0 all=0 tenth=0 last=''
+  while sleep 1 && kill -0 $$ 2> /dev/null; do  # not longer than the script
+    last=$(grep -aoE '^\[[0-9]+/[0-9]+\]' "$1" 2> /dev/null | tail -n 1 | tr -d '[]')
+    [ -n "$last" ] || continue
+    done=${last%/*} all=${last#*/}
+    if [ -t 1 ]; then
+      printf '\r        %d of %d steps (%d %%), %d:%02d' "$done" "$all" $((100 * done / all)) \
+        $((SECONDS / 60)) $((SECONDS % 60))
+    elif [ $((10 * done / all)) -gt $tenth ]; then
+      tenth=$((10 * done / all))
+      printf '[%2d:%02d] %d of %d steps\n' $((SECONDS / 60)) $((SECONDS % 60)) "$done" "$all"
+    fi
+  done
+}
+
+run_with_progress() { # LOG COMMAND...
+  : > "$1"
+  tell_progress "$1" &
+  local teller=$! status=0
+  run_quietly "$@" || status=$?
+  kill "$teller" 2> /dev/null
+  wait "$teller" 2> /dev/null
+  if [ -t 1 ]; then echo; fi
+  return $status
+}
+
 mkdir -p "$output"
 
 say "Packages"
@@ -94,7 +123,7 @@ if command -v ccache > /dev/null; then
   launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
 fi
 run_quietly "$output/configure.log" cmake --preset release -DPERIMAP_TESTS=OFF "${launcher[@]}" || fail "configuring"
-run_quietly "$output/build.log" cmake --build --preset release -j "$jobs" --target perimap perimapd || fail "building"
+run_with_progress "$output/build.log" cmake --build --preset release -j "$jobs" --target perimap perimapd || fail "building"
 
 say "Simulating $duration s of a beating heart, with an exact tracker and with 1.4 mm of noise"
 rm -f "$output"/heart-*

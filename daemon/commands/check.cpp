@@ -1,12 +1,11 @@
-#include "daemon/commands/check.hpp"
-
+// `perimap check`: whether a configuration file is sound, and what it comes to.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 #include <string>
 
+#include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/surface_traffic.hpp"
 #include "daemon/runtime/device_setup.hpp"
@@ -15,20 +14,20 @@
 namespace perimap {
 namespace {
 
-// What perimapd would ask of this machine and this user would not be given, on standard error: the configuration is
-// sound all the same, and the service has limits of its own.
-void tell_refused_privileges(const RealtimeConfiguration& realtime) {
+// What perimapd would ask of this machine and this user would not be given: the configuration is sound all the same,
+// and the service has limits of its own.
+void tell_refused_privileges(const RealtimeConfiguration& realtime, const Console& console) {
   if (realtime.lock_memory && !memory_may_be_locked()) {
-    fmt::print(stderr, "note: this user may not lock memory (realtime.lock_memory); perimapd would run on without\n");
+    console.complain("note: this user may not lock memory (realtime.lock_memory); perimapd would run on without");
   }
   ThreadLauncher threads({realtime.priority, realtime.cpus});
   threads.launch("privileges", ThreadRole::kPublisher, [] {}).join();
   threads.launch("privileges", ThreadRole::kSource, [] {}).join();
   if (threads.priority() == perimap_PRIVILEGE_REFUSED) {
-    fmt::print(stderr,
-               "note: this user is not given SCHED_FIFO priority {} on the processors asked for (realtime.priority, "
-               "realtime.cpus); perimapd would run on without\n",
-               realtime.priority);
+    console.complain(fmt::format(
+        "note: this user is not given SCHED_FIFO priority {} on the processors asked for (realtime.priority, "
+        "realtime.cpus); perimapd would run on without",
+        realtime.priority));
   }
 }
 
@@ -42,24 +41,23 @@ Expected<Configuration> load_whole(const std::string& file) {
   return configuration;
 }
 
+Outcome check(const std::string& file, const Console& console) {
+  const Expected<Configuration> configuration = load_whole(file);
+  if (!configuration) return refuse(configuration.error(), ExitCode::kWrongUsage);
+  fmt::print("{}\n", to_toml(*configuration));
+  for (const std::string& line : traffic_lines(*configuration)) fmt::print("# {}\n", line);
+  tell_refused_privileges(configuration->realtime, console);
+  return {};
+}
+
 }  // namespace
 
-void add_check_command(CLI::App& app, int& exit_code) {
+void add_check_command(Commands& commands) {
   const auto file = std::make_shared<std::string>();
-  CLI::App* command = app.add_subcommand(
-      "check", "Checks a configuration file and prints the effective configuration, all keys with their meaning");
-  command->add_option("FILE", *file, "Configuration of perimapd (TOML)")->required();
-  command->callback([file, &exit_code] {
-    const Expected<Configuration> configuration = load_whole(*file);
-    if (configuration) {
-      fmt::print("{}\n", to_toml(*configuration));
-      for (const std::string& line : traffic_lines(*configuration)) fmt::print("# {}\n", line);
-      tell_refused_privileges(configuration->realtime);
-    } else {
-      fmt::print(stderr, "{}\n", configuration.error().message);
-    }
-    exit_code = configuration ? 0 : 2;
-  });
+  CLI::App& command = commands.add(
+      "check", "Checks a configuration file and prints the effective configuration, all keys with their meaning",
+      [file](const Console& console) { return check(*file, console); });
+  command.add_option("FILE", *file, "Configuration of perimapd (TOML)")->required();
 }
 
 }  // namespace perimap

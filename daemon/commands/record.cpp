@@ -1,14 +1,13 @@
-#include "daemon/commands/record.hpp"
-
+// `perimap record`: what the devices of a configuration give, into a recording.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/stop_signal.hpp"
@@ -27,11 +26,6 @@ struct Options {
   std::filesystem::path out;
   double seconds = 0.0;  // 0: until stopped
 };
-
-int complain(const Error& error, int exit_code) {
-  fmt::print(stderr, "perimap record: {}\n", error.message);
-  return exit_code;
-}
 
 std::string progress_line(const SessionRecorder& recorder, double elapsed_s) {
   const SessionRecorder::Summary summary = recorder.summary();
@@ -66,7 +60,7 @@ tl::expected<Basis, SetupError> basis_of(const Options& options) {
 }
 
 // Until the signal, the end of what is played, the limit or an error of the disk.
-void watch(const Options& options, StopSignal& stop, DeviceFeeder& feeder) {
+void watch(const Options& options, const Console& console, StopSignal& stop, DeviceFeeder& feeder) {
   constexpr Duration kTick = std::chrono::milliseconds(100);
   constexpr Duration kReport = std::chrono::seconds(5);
   const Instant start = MonotonicClock::now();
@@ -78,56 +72,57 @@ void watch(const Options& options, StopSignal& stop, DeviceFeeder& feeder) {
     if (options.seconds > 0.0 && now - start >= from_seconds(options.seconds)) return;
     if (now - reported < kReport) continue;
     reported = now;
-    fmt::print(stderr, "{}\n", progress_line(*feeder.recorder(), to_seconds(now - start)));
+    console.complain(progress_line(*feeder.recorder(), to_seconds(now - start)));
   }
 }
 
-int run(const Options& options) {
+Outcome record(const Options& options, const Console& console) {
   auto stop = StopSignal::install();
-  if (!stop) return complain(stop.error(), 1);
+  if (!stop) return refuse(stop.error());
   auto basis = basis_of(options);
-  if (!basis) return complain(basis.error().error, basis.error().configuration ? 2 : 1);
+  if (!basis) return refuse(basis.error());
   auto devices = named_devices(basis->configuration, options.configuration);
-  if (!devices) return complain({options.configuration + ": " + devices.error().message}, 2);
+  if (!devices) return refuse(options.configuration + ": " + devices.error().message, ExitCode::kWrongUsage);
   if (!devices->tracker && !devices->ecg && !devices->r_trigger && !devices->camera) {
-    return complain({options.configuration + ": names no device; expected [camera], [tracker] or [ecg]"}, 2);
+    return refuse(options.configuration + ": names no device; expected [camera], [tracker] or [ecg]",
+                  ExitCode::kWrongUsage);
   }
   auto recorder = SessionRecorder::create(
       options.out, recording_facts(basis->configuration, basis->camera, "perimap record " PERIMAP_VERSION),
       static_cast<std::size_t>(basis->configuration.recording.memory_MB) << 20U);
-  if (!recorder) return complain(recorder.error(), 1);
+  if (!recorder) return refuse(recorder.error());
 
   const Logging logging(basis->configuration.log.level);
   const Instant start = MonotonicClock::now();
   DeviceFeeder feeder(std::move(*devices), nullptr, {std::move(*recorder), {}});
   ThreadLauncher threads({});
   feeder.start(threads);
-  watch(options, *stop, feeder);
+  watch(options, console, *stop, feeder);
   feeder.stop();
 
   const SessionRecorder& ended = *feeder.recorder();
   fmt::print("{}: {}\n", ended.file().string(), progress_line(ended, to_seconds(MonotonicClock::now() - start)));
-  if (feeder.error()) return complain(*feeder.error(), 1);
+  if (feeder.error()) return refuse(*feeder.error());
   const SessionRecorder::Summary summary = ended.summary();
-  if (summary.stopped) return complain({ended.reason()}, 1);
+  if (summary.stopped) return refuse(ended.reason());
   const std::uint64_t lost = summary.frames_not_recorded + summary.other_not_recorded;
-  if (lost > 0) return complain({fmt::format("{} messages found no room: the disk did not keep up", lost)}, 1);
+  if (lost > 0) return refuse(fmt::format("{} messages found no room: the disk did not keep up", lost));
   if (summary.recorded == 0) {
-    return complain({fmt::format("no device gave anything: perimap probe {} says why", options.configuration)}, 1);
+    return refuse(fmt::format("no device gave anything: perimap probe {} says why", options.configuration));
   }
-  return 0;
+  return {};
 }
 
 }  // namespace
 
-void add_record_command(CLI::App& app, int& exit_code) {
+void add_record_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("record", "Record what the devices of a configuration give, as it comes, until stopped");
-  command->add_option("-c,--config", options->configuration, "Configuration of perimapd (TOML)")->required();
-  command->add_option("OUT", options->out, "The recording to write (.mcap); it must not be there yet")->required();
-  command->add_option("--seconds", options->seconds, "How long, s [until stopped]")->check(CLI::Range(0.1, 1e6));
-  command->callback([options, &exit_code] { exit_code = run(*options); });
+  CLI::App& command =
+      commands.add("record", "Record what the devices of a configuration give, as it comes, until stopped",
+                   [options](const Console& console) { return record(*options, console); });
+  command.add_option("-c,--config", options->configuration, "Configuration of perimapd (TOML)")->required();
+  command.add_option("OUT", options->out, "The recording to write (.mcap); it must not be there yet")->required();
+  command.add_option("--seconds", options->seconds, "How long, s [until stopped]")->check(CLI::Range(0.1, 1e6));
 }
 
 }  // namespace perimap

@@ -6,12 +6,14 @@
 #include <string>
 #include <utility>
 
+#include "core/error/one_line.hpp"
 #include "core/pipeline/pipeline.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/checkpoint/checkpoint_keeper.hpp"
 #include "daemon/control/control_server.hpp"
+#include "daemon/process/reload_signal.hpp"
 #include "daemon/process/service_manager.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/publication.hpp"
@@ -56,6 +58,11 @@ void LiveSession::take_commands_at(std::string socket, std::function<Expected<st
   reload_ = std::move(reload);
 }
 
+void LiveSession::reload_at(ReloadSignal& signal, std::function<Expected<std::string>()> reload) {
+  reload_signal_ = &signal;
+  reload_at_signal_ = std::move(reload);
+}
+
 StatusFacts LiveSession::facts() const {
   StatusFacts facts = runtime_.facts();
   feeder_->describe(facts);
@@ -85,8 +92,29 @@ void LiveSession::stop_control() {
   control_.reset();
 }
 
+// On a thread of its own: a disk that hangs must not keep run() from feeding the watchdog.
+void LiveSession::start_reloading() {
+  if (reload_signal_ == nullptr) return;
+  reload_thread_ = runtime_.threads().launch("reload", ThreadRole::kHousekeeping, [this] {
+    while (reload_signal_->wait(reload_interrupt_.descriptor())) {
+      if (const auto done = reload_at_signal_()) {
+        spdlog::info("SIGHUP: the configuration is read again: {}", on_one_line(*done));
+      } else {
+        spdlog::warn("SIGHUP: the configuration stays as it was: {}", on_one_line(done.error().message));
+      }
+    }
+  });
+}
+
+void LiveSession::stop_reloading() {
+  if (!reload_thread_.joinable()) return;
+  reload_interrupt_.request();
+  reload_thread_.join();
+}
+
 Expected<void> LiveSession::run(StopSignal& stop) {
   if (auto started = start_control(); !started) return started;
+  start_reloading();
   runtime_.describe_sources_by([this](StatusFacts& facts) { feeder_->describe(facts); });
   runtime_.start();
   feeder_->start(runtime_.threads());
@@ -111,6 +139,7 @@ Expected<void> LiveSession::run(StopSignal& stop) {
   }
   if (service_ != nullptr) service_->stopping();
   stop_control();
+  stop_reloading();
   if (checkpoint_thread_.joinable()) {
     keeper_->stop();
     checkpoint_thread_.join();

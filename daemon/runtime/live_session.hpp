@@ -18,6 +18,7 @@ class CheckpointKeeper;
 class ControlServer;
 class Pipeline;
 class Publication;
+class ReloadSignal;
 class ReplayReader;
 class SensorFeeder;
 class ServiceManager;
@@ -44,6 +45,9 @@ class LiveSession {
   // Before run(): commands are taken at `socket` while it runs, and `reload` is what the command of that name does.
   void take_commands_at(std::string socket, std::function<Expected<std::string>()> reload);
 
+  // Before run(): while it runs, the signal does the same.
+  void reload_at(ReloadSignal& signal, std::function<Expected<std::string>()> reload);
+
   // Before run(): `keeper`, over the same pipeline, keeps checkpoints while it runs.
   void keep_checkpoints(std::unique_ptr<CheckpointKeeper> keeper);
 
@@ -53,6 +57,8 @@ class LiveSession {
  private:
   [[nodiscard]] Expected<void> start_control();
   void stop_control();
+  void start_reloading();
+  void stop_reloading();
   [[nodiscard]] StatusFacts facts() const;
   void report();
   void warn_of_refused_privileges();
@@ -73,6 +79,10 @@ class LiveSession {
   std::unique_ptr<ControlServer> control_;
   Interrupt control_interrupt_;
   std::thread control_thread_;
+  ReloadSignal* reload_signal_ = nullptr;
+  std::function<Expected<std::string>()> reload_at_signal_;
+  Interrupt reload_interrupt_;
+  std::thread reload_thread_;
   std::unique_ptr<CheckpointKeeper> keeper_;
   std::thread checkpoint_thread_;
   bool privileges_told_ = false;

@@ -1,4 +1,5 @@
-#include "daemon/evaluation/commands/bench.hpp"
+// `perimap bench`: latencies, measured with subscribers in other processes.
+#include "daemon/evaluation/bench/bench.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -11,7 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/evaluation/bench/bench.hpp"
+#include "daemon/command_line/commands.hpp"
+#include "daemon/command_line/outputs.hpp"
 #include "daemon/evaluation/bench/bench_text.hpp"
 #include "daemon/evaluation/bench/subscriber.hpp"
 #include "daemon/logging/logging.hpp"
@@ -33,11 +35,6 @@ struct Options {
   std::string json;
   std::string html;
 };
-
-int complain(const Error& error) {
-  fmt::print(stderr, "perimap bench: {}\n", error.message);
-  return 1;
-}
 
 // On this host alone, and apart from every other participant whatever its domain: a surface of a benchmark must not
 // reach those who navigate by another. Cyclone DDS reads it when the first participant is made, children inherit it.
@@ -77,12 +74,20 @@ class Scratch {
   std::filesystem::path path_;
 };
 
-int run(const Options& options) {
+Outcome measure(const Options& options) {
+  const std::string& recording = options.settings.input.recording;
+  if (auto apart =
+          check_apart({{"--json", options.json}, {"--html", options.html}}, {{"the recording itself", recording}});
+      !apart) {
+    return refuse(apart.error(), ExitCode::kWrongUsage);
+  }
+  if (auto able = check_writable({{"--json", options.json}, {"--html", options.html}}); !able)
+    return refuse(able.error());
   auto stop = StopSignal::install();
-  if (!stop) return complain(stop.error());
+  if (!stop) return refuse(stop.error());
   const auto scratch = Scratch::create(options.scratch.empty() ? std::filesystem::temp_directory_path()
                                                                : std::filesystem::path(options.scratch));
-  if (!scratch) return complain(scratch.error());
+  if (!scratch) return refuse(scratch.error());
   keep_to_ourselves();
   const Logging logging(LogConfiguration::Level::kError);
 
@@ -99,78 +104,78 @@ int run(const Options& options) {
     fmt::print(stderr, "{:3}/{} {}\n", number, all, name);
     (void)std::fflush(stderr);
   });
-  if (!report) return complain(report.error());
+  if (!report) return refuse(report.error());
   if (!options.json.empty()) {
-    if (auto done = write_text_file(options.json, to_json(*report).dump(2) + "\n"); !done)
-      return complain(done.error());
+    if (auto done = write_text_file(options.json, to_json(*report).dump(2) + "\n"); !done) return refuse(done.error());
   }
   if (!options.html.empty()) {
-    if (auto done = write_text_file(options.html, to_html(*report)); !done) return complain(done.error());
+    if (auto done = write_text_file(options.html, to_html(*report)); !done) return refuse(done.error());
   }
   fmt::print("{}", to_table(*report));
-  return 0;
+  return {};
 }
 
-void add_subscriber_command(CLI::App& app, int& exit_code) {
+void add_subscriber_command(Commands& commands) {
   struct SubscriberOptions {
     int domain = 0;
     std::string stream = "frame";
     int pause_ms = 0;
   };
   const auto options = std::make_shared<SubscriberOptions>();
-  CLI::App* command = app.add_subcommand(bench::kSubscriberCommand, "What perimap bench runs in another process");
-  command->group("");
-  command->add_option("--domain", options->domain)->check(CLI::Range(0, 230));
-  command->add_option("--stream", options->stream);
-  command->add_option("--pause-ms", options->pause_ms)->check(CLI::Range(0, 10'000));
-  command->callback([options, &exit_code] {
-    const auto done = bench::subscribe_until_input_ends(options->domain, options->stream,
-                                                        std::chrono::milliseconds(options->pause_ms));
-    exit_code = done ? 0 : complain(done.error());
-  });
+  CLI::App& command = commands.add(
+      bench::kSubscriberCommand, "What perimap bench runs in another process", [options](const Console&) -> Outcome {
+        const auto done = bench::subscribe_until_input_ends(options->domain, options->stream,
+                                                            std::chrono::milliseconds(options->pause_ms));
+        if (!done) return refuse(done.error());
+        return {};
+      });
+  command.group("");
+  command.add_option("--domain", options->domain)->check(CLI::Range(0, 230));
+  command.add_option("--stream", options->stream);
+  command.add_option("--pause-ms", options->pause_ms)->check(CLI::Range(0, 10'000));
 }
 
 }  // namespace
 
-void add_bench_command(CLI::App& app, int& exit_code) {
+void add_bench_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
+  CLI::App& command = commands.add(
       "bench",
-      "Measure latencies by replaying a recording through the whole runtime, with subscribers in other processes");
+      "Measure latencies by replaying a recording through the whole runtime, with subscribers in other processes",
+      [options](const Console&) { return measure(*options); });
   bench::BenchSettings& settings = options->settings;
-  command->add_option("RECORDING", settings.input.recording, "The recording (MCAP)")->required();
-  command->add_option("-c,--config", options->configuration,
-                      "Configuration file; without it the recording's own configuration over the defaults");
-  command->add_option("--json", options->json, "Write the figures as JSON to this file");
-  command->add_option("--html", options->html, "Write one self-contained page to this file");
-  command->add_option("--only", options->only, "These parts alone; ddsperf runs after each run of 'live'")
+  command.add_option("RECORDING", settings.input.recording, "The recording (MCAP)")->required();
+  command.add_option("-c,--config", options->configuration,
+                     "Configuration file; without it the recording's own configuration over the defaults");
+  command.add_option("--json", options->json, "Write the figures as JSON to this file");
+  command.add_option("--html", options->html, "Write one self-contained page to this file");
+  command.add_option("--only", options->only, "These parts alone; ddsperf runs after each run of 'live'")
       ->check(CLI::IsMember(bench::kParts))
       ->delimiter(',');
-  command->add_option("--seconds", options->seconds, "Measured a run")
+  command.add_option("--seconds", options->seconds, "Measured a run")
       ->check(CLI::Range(0.5, 1e6))
       ->capture_default_str();
-  command->add_option("--settle", options->settle, "Played before, for the map to grow; not measured")
+  command.add_option("--settle", options->settle, "Played before, for the map to grow; not measured")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  command->add_option("--runs", settings.runs, "How often the part 'live' is run")
+  command.add_option("--runs", settings.runs, "How often the part 'live' is run")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command->add_option("--frames", settings.frames, "Frames of the part 'memory'")
+  command.add_option("--frames", settings.frames, "Frames of the part 'memory'")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40))
       ->capture_default_str();
-  command->add_option("--features", settings.features, "Features at a time")
+  command.add_option("--features", settings.features, "Features at a time")
       ->check(CLI::Range(1, 5000))
       ->capture_default_str();
-  command->add_option("--workers", settings.workers, "Worker threads")->check(CLI::Range(1, 64))->capture_default_str();
-  command->add_option("--priority", settings.priority, "SCHED_FIFO priority of the runs that have one")
+  command.add_option("--workers", settings.workers, "Worker threads")->check(CLI::Range(1, 64))->capture_default_str();
+  command.add_option("--priority", settings.priority, "SCHED_FIFO priority of the runs that have one")
       ->check(CLI::Range(3, 98))
       ->capture_default_str();
-  command->add_option("--cpus", settings.cpus, "Processors of these runs' real-time threads [any]")
+  command.add_option("--cpus", settings.cpus, "Processors of these runs' real-time threads [any]")
       ->check(CLI::Range(0, 1023))
       ->delimiter(',');
-  command->add_option("--scratch", options->scratch, "Where recordings of a run go [the system's temporary folder]");
-  command->callback([options, &exit_code] { exit_code = run(*options); });
-  add_subscriber_command(app, exit_code);
+  command.add_option("--scratch", options->scratch, "Where recordings of a run go [the system's temporary folder]");
+  add_subscriber_command(commands);
 }
 
 }  // namespace perimap

@@ -1,4 +1,5 @@
-#include "daemon/evaluation/commands/experiment.hpp"
+// `perimap experiment`: the paper's experiments.
+#include "daemon/evaluation/experiment/experiment.hpp"
 
 #include <fmt/format.h>
 
@@ -9,10 +10,11 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "daemon/commands/progress.hpp"
-#include "daemon/evaluation/experiment/experiment.hpp"
+#include "daemon/command_line/commands.hpp"
+#include "daemon/command_line/progress.hpp"
 #include "daemon/evaluation/experiment/experiment_text.hpp"
 #include "daemon/evaluation/report/png_picture.hpp"
+#include "drivers/file/whole_file.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -25,9 +27,6 @@ struct Options {
 };
 
 Expected<void> write_files(const Experiment& experiment, const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return fail(folder.string() + ": " + error.message());
   const std::string stem = "experiment-" + std::to_string(experiment.number);
   const auto path = [&](const std::string& rest) { return folder / (stem + rest); };
   for (const ExperimentFigure& figure : experiment.figures) {
@@ -44,58 +43,62 @@ Expected<void> write_files(const Experiment& experiment, const std::filesystem::
       .and_then([&] { return write_text_file(path(".html"), to_html(experiment)); });
 }
 
-int complain(const Error& error) {
-  fmt::print(stderr, "perimap experiment: {}\n", error.message);
-  return 1;
+// Before the trials, which may take hours.
+Expected<void> prepare_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return fail(folder.string() + ": " + error.message());
+  return check_writable(folder / "experiment.csv");
 }
 
-int run(const Options& options) {
+Outcome repeat(const Options& options) {
+  if (!options.out.empty()) {
+    if (const auto able = prepare_folder(options.out); !able) return refuse(able.error());
+  }
   Expected<Experiment> experiment = tl::unexpected(Error{});
   {
     Progress progress("trials", static_cast<std::uint64_t>(options.settings.trials));
     experiment =
         run_experiment(options.settings, [&](int trials) { progress.update(static_cast<std::uint64_t>(trials)); });
   }
-  if (!experiment) return complain(experiment.error());
+  if (!experiment) return refuse(experiment.error());
   if (!options.out.empty()) {
-    if (const auto written = write_files(*experiment, options.out); !written) return complain(written.error());
+    if (const auto written = write_files(*experiment, options.out); !written) return refuse(written.error());
   }
   fmt::print("{}", options.json ? to_json(*experiment).dump(2) + "\n" : to_table(*experiment));
-  return 0;
+  return {};
 }
 
 }  // namespace
 
-void add_experiment_command(CLI::App& app, int& exit_code) {
+void add_experiment_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("experiment",
-                                         "Repeat an experiment of the paper: static EKF, EKF on the Fourier state, the "
-                                         "paper's filter, ours, batch MAP and "
-                                         "the Cramer-Rao bound on simulated trials");
+  CLI::App& command = commands.add("experiment",
+                                   "Repeat an experiment of the paper: static EKF, EKF on the Fourier state, the "
+                                   "paper's filter, ours, batch MAP and the Cramer-Rao bound on simulated trials",
+                                   [options](const Console&) { return repeat(*options); });
   command
-      ->add_option("NUMBER", options->settings.number,
-                   "1: surface of a real heart, bearings; 2: laparoscope, 8 features, pixels, tracker noise")
+      .add_option("NUMBER", options->settings.number,
+                  "1: surface of a real heart, bearings; 2: laparoscope, 8 features, pixels, tracker noise")
       ->required()
       ->check(CLI::Range(1, 2));
-  command->add_option(
-      "--out", options->out,
-      "Folder for the table (CSV, JSON), the figures (PNG, SVG, CSV) and one HTML page; made if needed");
-  command->add_option("--seed", options->settings.seed, "Chooses features, path, rhythm and noise")
+  command.add_option("--out", options->out,
+                     "Folder for the table (CSV, JSON), the figures (PNG, SVG, CSV) and one HTML page; made if needed");
+  command.add_option("--seed", options->settings.seed, "Chooses features, path, rhythm and noise")
       ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1'000'000'000}))
       ->capture_default_str();
-  command->add_option("--trials", options->settings.trials, "How many trials of 5 (1) or 8 (2) features")
+  command.add_option("--trials", options->settings.trials, "How many trials of 5 (1) or 8 (2) features")
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str();
   command
-      ->add_option("--step-factor", options->settings.methods.paper_step,
-                   "Gamma of the paper's update: the share of each Gauss-Newton step that is taken")
+      .add_option("--step-factor", options->settings.methods.paper_step,
+                  "Gamma of the paper's update: the share of each Gauss-Newton step that is taken")
       ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
-  command->add_option("--iterations", options->settings.methods.paper_iterations, "Iterations of the paper's update")
+  command.add_option("--iterations", options->settings.methods.paper_iterations, "Iterations of the paper's update")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command->add_flag("--json", options->json, "Print JSON in place of the table");
-  command->callback([options, &exit_code] { exit_code = run(*options); });
+  command.add_flag("--json", options->json, "Print JSON in place of the table");
 }
 
 }  // namespace perimap

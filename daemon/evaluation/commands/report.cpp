@@ -1,19 +1,16 @@
-#include "daemon/evaluation/commands/report.hpp"
-
+// `perimap report`: received samples against the truth.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
-#include <cstdio>
+#include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
-#include <utility>
 
-#include "daemon/commands/same_file.hpp"
+#include "daemon/command_line/commands.hpp"
+#include "daemon/command_line/outputs.hpp"
 #include "daemon/evaluation/report/accuracy_picture.hpp"
-#include "daemon/evaluation/report/accuracy_text.hpp"
-#include "daemon/evaluation/report/samples_report.hpp"
+#include "daemon/evaluation/report/png_picture.hpp"
+#include "daemon/evaluation/report/report_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -28,89 +25,59 @@ struct Options {
   bool whole = false;
 };
 
-double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
+bool is_png(const std::string& picture) { return std::filesystem::path(picture).extension() == ".png"; }
 
-std::string figures_text(const DurationFigures& figures) {
-  return fmt::format("{:.2f} / {:.2f} / {:.2f} ms", milliseconds(figures.p50), milliseconds(figures.p99),
-                     milliseconds(figures.max));
+// The ending says which kind of picture is wanted.
+Expected<void> check_picture(const std::string& picture) {
+  const std::string ending = std::filesystem::path(picture).extension();
+  if (picture.empty() || ending == ".svg" || ending == ".png") return {};
+  return fail(fmt::format("--picture: expected a file that ends in .svg or .png, got {}", picture));
 }
 
-nlohmann::json figures_json(const DurationFigures& figures) {
-  return {{"p50_ms", milliseconds(figures.p50)},
-          {"p99_ms", milliseconds(figures.p99)},
-          {"max_ms", milliseconds(figures.max)}};
+Expected<void> write_picture(const Options& options, const AccuracyReport& accuracy) {
+  const std::string svg = to_svg(accuracy, options.recording);
+  if (!is_png(options.picture)) return write_text_file(options.picture, svg);
+  return png_of_svg(svg).and_then([&options](const std::string& png) { return write_text_file(options.picture, png); });
 }
 
-constexpr int kFailure = 1;
-constexpr int kWrongUse = 2;
-
-int refuse(const std::string& message, int code = kFailure) {
-  fmt::print(stderr, "perimap report: {}\n", message);
-  return code;
-}
-
-int report(const Options& options) {
-  for (const auto& [name, file] : {std::pair("--json", options.json), std::pair("--picture", options.picture)}) {
-    if (is_same_file(file, options.recording) || is_same_file(file, options.samples)) {
-      return refuse(fmt::format("{}: is a file that is read", name), kWrongUse);
-    }
-  }
+Outcome report(const Options& options) {
+  const Output json{"--json", options.json};
+  const Output picture{"--picture", options.picture};
+  const auto usable = check_apart({json, picture}, {{"a file that is read", options.recording},
+                                                    {"a file that is read", options.samples}})
+                          .and_then([&options] { return check_picture(options.picture); });
+  if (!usable) return refuse(usable.error(), ExitCode::kWrongUsage);
+  if (auto able = check_writable({json, picture}); !able) return refuse(able.error());
   const auto result = report_samples(options.recording, options.samples, options.stream,
                                      options.whole ? ReadMode::kWhole : ReadMode::kStrict);
-  if (!result) return refuse(result.error().message);
-  // In lockstep nothing takes time.
-  const bool timed = result->release_to_receipt.max != Duration(0);
-  fmt::print("samples     {} received, {} missed, {} without frame, {} from a late update\n", result->samples,
-             result->missed, result->without_frame, result->from_late_update);
-  if (!timed) {
-    fmt::print("latency     not measured: these samples are of a lockstep replay\n");
-  } else {
-    fmt::print(
-        "latency     capture to receipt p50 / p99 / max {}\n"
-        "release     receipt after its deadline {}, jitter {}\n",
-        figures_text(result->capture_to_receipt), figures_text(result->release_to_receipt),
-        figures_text(result->jitter));
-  }
-  fmt::print("{}\n", to_text(result->accuracy));
+  if (!result) return refuse(result.error());
+  fmt::print("{}", to_text(*result));
   if (!options.picture.empty()) {
-    const auto written = write_text_file(options.picture, to_svg(result->accuracy, options.recording));
-    if (!written) return refuse(written.error().message);
+    if (auto written = write_picture(options, result->accuracy); !written) return refuse(written.error());
     fmt::print("picture     {}\n", options.picture);
   }
-  if (!options.json.empty()) {
-    const auto figures = [timed](const DurationFigures& measured) {
-      return timed ? figures_json(measured) : nlohmann::json(nullptr);
-    };
-    const nlohmann::json json = {{"recording", options.recording},
-                                 {"samples",
-                                  {{"received", result->samples},
-                                   {"missed", result->missed},
-                                   {"without_frame", result->without_frame},
-                                   {"from_late_update", result->from_late_update}}},
-                                 {"capture_to_receipt", figures(result->capture_to_receipt)},
-                                 {"release_to_receipt", figures(result->release_to_receipt)},
-                                 {"jitter", figures(result->jitter)},
-                                 {"accuracy", to_json(result->accuracy)}};
-    const auto written = write_text_file(options.json, json.dump(2) + "\n");
-    if (!written) return refuse(written.error().message);
-  }
-  return 0;
+  if (options.json.empty()) return {};
+  nlohmann::json figures = to_json(*result);
+  figures["recording"] = options.recording;
+  if (auto written = write_text_file(options.json, figures.dump(2) + "\n"); !written) return refuse(written.error());
+  return {};
 }
 
 }  // namespace
 
-void add_report_command(CLI::App& app, int& exit_code) {
-  auto* command =
-      app.add_subcommand("report", "Compare received samples with the truth of the simulated recording they are of");
-  auto options = std::make_shared<Options>();
-  command->add_option("RECORDING", options->recording, "The simulated recording (MCAP)")->required();
-  command->add_option("--samples", options->samples, "What was received (perimap watch --record, replay --samples)")
+void add_report_command(Commands& commands) {
+  const auto options = std::make_shared<Options>();
+  CLI::App& command =
+      commands.add("report", "Compare received samples with the truth of the simulated recording they are of",
+                   [options](const Console&) { return report(*options); });
+  command.add_option("RECORDING", options->recording, "The simulated recording (MCAP)")->required();
+  command.add_option("--samples", options->samples, "What was received (perimap watch --record, replay --samples)")
       ->required();
-  command->add_option("--stream", options->stream, "The stream to report on, where there are several: frame or clock");
-  command->add_option("--picture", options->picture, "Write motion paths and error over time to this SVG file");
-  command->add_option("--json", options->json, "Write the report as JSON to this file");
-  command->add_flag("--whole", options->whole, "Use what is whole of damaged files");
-  command->callback([options, &exit_code] { exit_code = report(*options); });
+  command.add_option("--stream", options->stream, "The stream to report on, where there are several: frame or clock");
+  command.add_option("--picture", options->picture,
+                     "Write motion paths and error over time to this picture (.svg or .png)");
+  command.add_option("--json", options->json, "Write the report as JSON to this file");
+  command.add_flag("--whole", options->whole, "Use what is whole of damaged files");
 }
 
 }  // namespace perimap

@@ -1,5 +1,4 @@
-#include "daemon/evaluation/commands/watch.hpp"
-
+// `perimap watch`: a subscriber in the terminal.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -8,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "daemon/command_line/commands.hpp"
 #include "daemon/evaluation/watch/sample_receiver.hpp"
 #include "daemon/evaluation/watch/watch_report.hpp"
 #include "daemon/process/stop_signal.hpp"
@@ -34,11 +34,6 @@ void print(const std::string& line) {
   (void)std::fflush(stdout);
 }
 
-int fail_with(const Error& error) {
-  fmt::print(stderr, "perimap watch: {}\n", error.message);
-  return 1;
-}
-
 void print_interval(const Options& options, const std::vector<StreamReport>& reports) {
   if (reports.empty()) {
     print(options.json ? std::string(R"({"kind":"waiting"})")
@@ -50,7 +45,7 @@ void print_interval(const Options& options, const std::vector<StreamReport>& rep
 }
 
 // Until a signal, a limit or an error ends it.
-void watch(const Options& options, StopSignal& stop, SampleReceiver& receiver) {
+void print_until_ended(const Options& options, StopSignal& stop, SampleReceiver& receiver) {
   const Instant start = MonotonicClock::now();
   std::optional<Instant> first;  // when the first surface was seen
   Instant last_report = start;
@@ -72,27 +67,27 @@ void watch(const Options& options, StopSignal& stop, SampleReceiver& receiver) {
   }
 }
 
-int run(const Options& options) {
+Outcome watch(const Options& options) {
   Expected<StopSignal> stop = StopSignal::install();
   if (!stop) {
-    return fail_with(stop.error());
+    return refuse(stop.error());
   }
   std::optional<SampleRecorder> recorder;
   if (!options.recording.empty()) {
-    Expected<SampleRecorder> created = SampleRecorder::create(options.recording, "perimap watch " PERIMAP_VERSION,
-                                                              SampleRecorder::Unfinished::kKept);
+    Expected<SampleRecorder> created =
+        SampleRecorder::create(options.recording, "perimap watch " PERIMAP_VERSION, SampleRecorder::Unfinished::kKept);
     if (!created) {
-      return fail_with(created.error());
+      return refuse(created.error());
     }
     recorder.emplace(std::move(*created));
   }
   Expected<SampleReaders> readers = SampleReaders::create(options.domain, recorder.has_value());
   if (!readers) {
-    return fail_with(readers.error());
+    return refuse(readers.error());
   }
   SampleReceiver receiver(std::move(*readers), std::move(recorder),
                           {options.once ? 1 : options.surfaces, options.once && options.json});
-  watch(options, *stop, receiver);
+  print_until_ended(options, *stop, receiver);
   const Expected<void> finished = receiver.finish();
 
   for (const StreamReport& report : receiver.totals()) {
@@ -103,35 +98,35 @@ int run(const Options& options) {
     }
   }
   if (!finished) {
-    return fail_with(finished.error());
+    return refuse(finished.error());
   }
   if (receiver.surfaces() == 0) {
-    return fail_with({"no surface was received in DDS domain " + std::to_string(options.domain)});
+    return refuse("no surface was received in DDS domain " + std::to_string(options.domain));
   }
-  return 0;
+  return {};
 }
 
 }  // namespace
 
-void add_watch_command(CLI::App& app, int& exit_code) {
+void add_watch_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
+  CLI::App& command = commands.add(
       "watch",
       "Subscribes to a publishing perimapd and prints a line a second: rate and lost samples, latency (receipt minus "
-      "capture, on the publisher's host only), lateness (receipt minus release), jitter, phase, features, state");
-  command->add_option("--domain", options->domain, "DDS domain")->check(CLI::Range(0, 230))->capture_default_str();
-  command->add_flag("--json", options->json, "One JSON object a line");
-  CLI::Option* once = command->add_flag("--once", options->once, "Print the first surface and end");
-  command->add_option("--duration", options->duration_s, "End so many seconds after the first surface")
+      "capture, on the publisher's host only), lateness (receipt minus release), jitter, phase, features, state",
+      [options](const Console&) { return watch(*options); });
+  command.add_option("--domain", options->domain, "DDS domain")->check(CLI::Range(0, 230))->capture_default_str();
+  command.add_flag("--json", options->json, "One JSON object a line");
+  CLI::Option* once = command.add_flag("--once", options->once, "Print the first surface and end");
+  command.add_option("--duration", options->duration_s, "End so many seconds after the first surface")
       ->check(CLI::Range(0.001, 1e9))
       ->excludes(once);
-  command->add_option("--count", options->surfaces, "End after so many surfaces")
+  command.add_option("--count", options->surfaces, "End after so many surfaces")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53))
       ->excludes(once);
-  command->add_option("--wait", options->wait_s, "End with exit code 1 when no surface has come after so many seconds")
+  command.add_option("--wait", options->wait_s, "End with exit code 1 when no surface has come after so many seconds")
       ->check(CLI::Range(0.001, 1e9));
-  command->add_option("--record", options->recording, "Write every received sample of all topics to this MCAP file");
-  command->callback([options, &exit_code] { exit_code = run(*options); });
+  command.add_option("--record", options->recording, "Write every received sample of all topics to this MCAP file");
 }
 
 }  // namespace perimap

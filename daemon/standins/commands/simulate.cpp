@@ -1,5 +1,4 @@
-#include "daemon/standins/commands/simulate.hpp"
-
+// `perimap simulate`: a recording of a beating heart with its ground truth.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -12,7 +11,8 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/commands/progress.hpp"
+#include "daemon/command_line/commands.hpp"
+#include "daemon/command_line/progress.hpp"
 #include "daemon/standins/commands/simulation_options.hpp"
 #include "drivers/standins/session/session_writer.hpp"
 #include "drivers/standins/simulator/frame_renderer.hpp"
@@ -41,30 +41,25 @@ std::vector<SimulatedRecording> planned(const Options& options) {
   return recordings;
 }
 
-int complain(const Error& error, int exit_code) {
-  fmt::print(stderr, "perimap simulate: {}\n", error.message);
-  return exit_code;
-}
-
-int run(const Options& options) {
+Outcome simulate(const Options& options) {
   const auto begin = std::chrono::steady_clock::now();
   const auto settings = options.simulation.settings();
-  if (!settings) return complain(settings.error(), 2);
+  if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
   const std::vector<SimulatedRecording> recordings = planned(options);
   for (const SimulatedRecording& recording : recordings) {
     if (!options.force && std::filesystem::exists(recording.path)) {
-      return complain({recording.path.string() + ": the file exists; --force overwrites it"}, 2);
+      return refuse(recording.path.string() + ": the file exists; --force overwrites it", ExitCode::kWrongUsage);
     }
   }
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
 
   const auto simulation = Simulation::create(*settings, threaded_for(threads));
-  if (!simulation) return complain(simulation.error(), 2);
+  if (!simulation) return refuse(simulation.error(), ExitCode::kWrongUsage);
   {
     Progress progress("frames", simulation->frames().size());
     const auto written =
         write_simulation(*simulation, recordings, threads, [&](std::uint64_t frames) { progress.update(frames); });
-    if (!written) return complain(written.error(), 1);
+    if (!written) return refuse(written.error());
   }
   const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   for (const SimulatedRecording& recording : recordings) {
@@ -74,27 +69,27 @@ int run(const Options& options) {
                simulation->frames().size(), static_cast<double>(bytes) / 1e6, recording.noise.position_rms_mm,
                elapsed_s);
   }
-  return 0;
+  return {};
 }
 
 }  // namespace
 
-void add_simulate_command(CLI::App& app, int& exit_code) {
+void add_simulate_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "simulate", "Write a recording of a beating heart with its ground truth: real motion, real ECG, rendered images");
-  command->add_option("OUT", options->out, "The recording to write (.mcap)")->required();
-  CLI::Option* noise = options->simulation.add_to(*command);
+  CLI::App& command = commands.add(
+      "simulate", "Write a recording of a beating heart with its ground truth: real motion, real ECG, rendered images",
+      [options](const Console&) { return simulate(*options); });
+  command.add_option("OUT", options->out, "The recording to write (.mcap)")->required();
+  CLI::Option* noise = options->simulation.add_to(command);
   command
-      ->add_option("--tracker-noises", options->tracker_noises_mm,
-                   "Several position noises, mm, from one rendering: OUT-0mm.mcap, OUT-1.4mm.mcap for 0,1.4")
+      .add_option("--tracker-noises", options->tracker_noises_mm,
+                  "Several position noises, mm, from one rendering: OUT-0mm.mcap, OUT-1.4mm.mcap for 0,1.4")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 100.0))
       ->excludes(noise);
-  command->add_option("--threads", options->threads, "Rendering threads; the result is the same [all processors]")
+  command.add_option("--threads", options->threads, "Rendering threads; the result is the same [all processors]")
       ->check(CLI::Range(1U, 256U));
-  command->add_flag("--force", options->force, "Overwrite OUT");
-  command->callback([options, &exit_code] { exit_code = run(*options); });
+  command.add_flag("--force", options->force, "Overwrite OUT");
 }
 
 }  // namespace perimap

@@ -35,7 +35,7 @@ grep -q "both.toml:4:17: key 'pipeline.clock_rate_hz': expected what dds.maximum
 printf 'version = 1\n[realtime]\npriority = 10\ncpus = [1023]\nlock_memory = false\n' >"$scratch/refused.toml"
 "$perimap" check "$scratch/refused.toml" >"$scratch/out" 2>"$scratch/error" || fail "refused priority ended with $?"
 [ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line of a refused priority: $(cat "$scratch/error")"
-grep -q '^note: this user is not given SCHED_FIFO priority 10 ' "$scratch/error" || fail "$(cat "$scratch/error")"
+grep -q '^perimap check: note: this user is not given SCHED_FIFO priority 10 ' "$scratch/error" || fail "$(cat "$scratch/error")"
 printf 'version = 1\n[realtime]\npriority = 0\ncpus = [1023]\nlock_memory = true\n' >"$scratch/locked.toml"
 other_user=()
 [ "$(id -u)" -ne 0 ] || other_user=(unshare --user)
@@ -43,7 +43,7 @@ if "${other_user[@]}" true 2>"$scratch/error"; then
   (ulimit -l 64 && exec "${other_user[@]}" "$perimap" check "$scratch/locked.toml") >"$scratch/out" 2>"$scratch/error" ||
     fail "refused memory ended with $?"
   [ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line of refused memory: $(cat "$scratch/error")"
-  grep -q '^note: this user may not lock memory ' "$scratch/error" || fail "$(cat "$scratch/error")"
+  grep -q '^perimap check: note: this user may not lock memory ' "$scratch/error" || fail "$(cat "$scratch/error")"
 fi
 sed 's/^lock_memory = true/lock_memory = false/' "$scratch/locked.toml" >"$scratch/nothing.toml"
 "$perimap" check "$scratch/nothing.toml" >"$scratch/out" 2>"$scratch/error" || fail "nothing asked for ended with $?"
@@ -54,7 +54,7 @@ printf 'version = 1\n[phase]\nlaw = 3\n' >"$scratch/wrong.toml"
 [ $? -eq 2 ] || fail "a wrong configuration must end with 2"
 [ ! -s "$scratch/out" ] || fail "a wrong configuration was printed"
 [ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line: $(cat "$scratch/error")"
-grep -q "^$scratch/wrong.toml:3:7: key 'phase.law': expected " "$scratch/error" || fail "$(cat "$scratch/error")"
+grep -q "^perimap check: $scratch/wrong.toml:3:7: key 'phase.law': expected " "$scratch/error" || fail "$(cat "$scratch/error")"
 printf 'version = 1\n[ecg]\nr_trigger = true\nprotocol = "cyton"\nport = "/dev/ttyUSB0"\n' >"$scratch/trigger.toml"
 "$perimap" check "$scratch/trigger.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "a trigger without a port must end with 2"
@@ -64,7 +64,7 @@ echo 'r_trigger_port = "/dev/ttyS0"' >>"$scratch/trigger.toml"
 printf 'version = 1\n[ecg]\nprotocol = "bitalino"\nport = "/dev/ttyUSB0"\n[respiration]\ndevice_channel = 7\n' >"$scratch/breath.toml"
 "$perimap" check "$scratch/breath.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "an input that the device has not must end with 2"
-grep -q "^$scratch/breath.toml:6:18: key 'respiration.device_channel': expected 1 to 6 of a bitalino" "$scratch/error" || fail "$(cat "$scratch/error")"
+grep -q "^perimap check: $scratch/breath.toml:6:18: key 'respiration.device_channel': expected 1 to 6 of a bitalino" "$scratch/error" || fail "$(cat "$scratch/error")"
 for tools in 'protocol = "ndi" sensor = "A" reference = "0a"' 'protocol = "igtl" sensor = "Scope" reference = "Scope"'; do
   printf 'version = 1\n[tracker]\nport = "tcp:127.0.0.1:1"\n%s\n' "${tools//\" /\"$'\n'}" >"$scratch/tools.toml"
   "$perimap" check "$scratch/tools.toml" >"$scratch/out" 2>"$scratch/error"

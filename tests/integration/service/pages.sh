@@ -10,9 +10,23 @@ fail() {
 }
 commands() { sed -n '/^Subcommands:/,/^$/s/^  \([a-z][a-z-]*\) .*/\1/p'; }
 [ "$("$perimap" --help | commands | wc -l)" -gt 5 ] || fail "the help names no commands"
-for command in $("$perimap" --help | commands); do
-  grep -q "^\.B $command\$" "$build/deploy/perimap.1" || fail "perimap(1) does not know $command"
-done
+# Every command's help, its option names, and what man(1) shows of the page for it.
+every_command() { # COMMAND...
+  local inner
+  for inner in $("$perimap" "$@" --help | commands); do
+    echo "$* $inner"
+    every_command "$@" "$inner"
+  done
+}
+options() { grep -oE '^ +(-[a-zA-Z],)?--[a-z][a-z-]*' | grep -oE -e '--[a-z-]+' | sort; }
+sed 's/\\-/-/g' "$build/deploy/perimap.1" > "$build/deploy/perimap.1.plain"
+while read -r -a command; do
+  told=$("$perimap" "${command[@]}" --help | options)
+  [ -n "$told" ] || fail "${command[*]} --help names no options"
+  shown=$(sed -n "/^\.SS perimap ${command[*]}\$/,/^\.S[SH] /p" "$build/deploy/perimap.1.plain" | tail -n +2 |
+    sed -n 's/^\.B /  /p' | options)
+  [ "$told" = "$shown" ] || fail "perimap(1) on ${command[*]}: $(diff <(echo "$told") <(echo "$shown"))"
+done < <(every_command)
 # Sections, keys with their defaults, and below each key the whole of its comment.
 in_the_configuration() {
   awk '/^\[/ { print }
@@ -37,6 +51,13 @@ completes() { # EXPECTED WORD...: the last word is completed
   _perimap 2> /dev/null
   printf '%s\n' "${COMPREPLY[@]}" | grep -qx -e "$expected" || fail "'$*' does not come to $expected: ${COMPREPLY[*]}"
 }
+# What the help names is completed, and nothing else.
+while read -r -a command; do
+  COMP_WORDS=(perimap "${command[@]}" --) COMP_CWORD=$((${#command[@]} + 1)) COMPREPLY=()
+  _perimap 2> /dev/null
+  diff <("$perimap" "${command[@]}" --help | options) <(printf '%s\n' "${COMPREPLY[@]}" | sort) ||
+    fail "completion of 'perimap ${command[*]} --'"
+done < <(every_command)
 completes simulate perimap sim
 completes --duration perimap simulate --dur
 completes new-patient perimap ctl new

@@ -1,4 +1,5 @@
 // perimapd under a service manager: readiness, status line and watchdog as sd_notify(3) has them.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/ptrace.h>
@@ -12,7 +13,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "core/time/instant.hpp"
@@ -103,12 +107,27 @@ class Service : public testing::Test {
         << 40 + getpid() % 150 << "\n";
     daemon_ = fork();
     if (daemon_ != 0) return;
+    const int log = open((folder_ / "log").c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
+    dup2(log, STDOUT_FILENO);
+    dup2(log, STDERR_FILENO);
     setenv("NOTIFY_SOCKET", manager_->path().c_str(), 1);
     setenv("WATCHDOG_USEC", "800000", 1);
     unsetenv("WATCHDOG_PID");
     setenv("CYCLONEDDS_URI", "file://" PERIMAP_CYCLONEDDS_XML, 1);
     execl(PERIMAPD, "perimapd", "-c", (folder_ / "perimapd.toml").c_str(), nullptr);
     _exit(127);
+  }
+
+  // Whether the log says so in time.
+  [[nodiscard]] bool logs(const std::string& text) const {
+    const Instant until = MonotonicClock::now() + kPatience;
+    while (MonotonicClock::now() < until) {
+      std::ifstream log(folder_ / "log");
+      const std::string all{std::istreambuf_iterator<char>(log), {}};
+      if (all.find(text) != std::string::npos) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return false;
   }
 
   // Of the daemon's thread of that name; 0 when there is none.
@@ -138,6 +157,28 @@ TEST_F(Service, IsReadyAndFeedsTheWatchdogThoughNoDeviceAnswersAndNoFrameComes) 
   daemon_ = 0;
   EXPECT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+// systemd takes an end by either for a clean one, and starts nothing again.
+TEST_F(Service, AHangupReloadsTheConfigurationAndABrokenPipeIsNothing) {
+  start(std::chrono::hours(1));
+  ASSERT_TRUE(manager_->hears("READY=1")) << manager_->last();
+  kill(daemon_, SIGPIPE);
+  std::ofstream(folder_ / "perimapd.toml", std::ios::app) << "surface_lifespan_ms = 20\n[log]\nlevel = \"debug\"\n";
+  kill(daemon_, SIGHUP);
+  EXPECT_TRUE(
+      logs("SIGHUP: the configuration is read again: in effect but for what needs a restart: "
+           "dds.surface_lifespan_ms"));
+  std::ofstream(folder_ / "perimapd.toml", std::ios::app) << "levle = 3\n";
+  kill(daemon_, SIGHUP);
+  EXPECT_TRUE(logs("SIGHUP: the configuration stays as it was: "));
+  EXPECT_TRUE(logs("did you mean 'level'?"));
+  EXPECT_TRUE(manager_->hears("WATCHDOG=1")) << "it has ended";
+  kill(daemon_, SIGTERM);
+  int status = 0;
+  ASSERT_EQ(waitpid(daemon_, &status, 0), daemon_);
+  daemon_ = 0;
+  EXPECT_TRUE(WIFEXITED(status)) << "by signal " << WTERMSIG(status);
 }
 
 TEST_F(Service, FeedsTheWatchdogWhileFramesCome) {

@@ -1,0 +1,59 @@
+#include "daemon/command_line/commands.hpp"
+
+#include <CLI/CLI.hpp>
+#include <utility>
+
+#include "daemon/command_line/arguments.hpp"
+
+namespace perimap {
+namespace {
+
+std::string full_name(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  return parent == nullptr ? command.get_name() : full_name(*parent) + " " + command.get_name();
+}
+
+}  // namespace
+
+Commands::Commands(const std::string& program, const std::string& version, const std::string& description,
+                   const std::string& footer)
+    : app_(std::make_unique<CLI::App>(description, program)) {
+  app_->set_version_flag("--version", program + " " + version);
+  app_->require_subcommand(1);
+  app_->footer(footer);
+}
+
+Commands::~Commands() = default;
+
+CLI::App& Commands::add(const std::string& name, const std::string& description, Run run) {
+  return add(*app_, name, description, std::move(run));
+}
+
+CLI::App& Commands::add_group(const std::string& name, const std::string& description) {
+  return add_group(*app_, name, description);
+}
+
+CLI::App& Commands::add_group(CLI::App& group, const std::string& name, const std::string& description) {
+  CLI::App* command = group.add_subcommand(name, description);
+  command->require_subcommand(1);
+  return *command;
+}
+
+CLI::App& Commands::add(CLI::App& group, const std::string& name, const std::string& description, Run run) {
+  CLI::App* command = group.add_subcommand(name, description);
+  // Nothing is done before all is parsed.
+  command->callback([this, command, run = std::move(run)] {
+    chosen_ = [command, &run] {
+      const Console console(full_name(*command));
+      return console.end(run(console));
+    };
+  });
+  return *command;
+}
+
+int Commands::run(int argc, const char* const* argv) {
+  if (const auto ended = parse_arguments(*app_, argc, argv)) return *ended;
+  return chosen_();
+}
+
+}  // namespace perimap

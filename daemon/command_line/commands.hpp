@@ -1,0 +1,43 @@
+// The commands of a program: each is options, one library call, text.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "daemon/command_line/console.hpp"
+#include "daemon/command_line/outcome.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace perimap {
+
+class Commands {
+ public:
+  // What a command does once its options are parsed.
+  using Run = std::function<Outcome(const Console&)>;
+
+  Commands(const std::string& program, const std::string& version, const std::string& description,
+           const std::string& footer);
+  Commands(const Commands&) = delete;
+  Commands& operator=(const Commands&) = delete;
+  ~Commands();
+
+  // The command's own options are added to what this returns.
+  CLI::App& add(const std::string& name, const std::string& description, Run run);
+  // A command of commands, such as `ctl`, and one of its own.
+  CLI::App& add_group(const std::string& name, const std::string& description);
+  CLI::App& add_group(CLI::App& group, const std::string& name, const std::string& description);
+  CLI::App& add(CLI::App& group, const std::string& name, const std::string& description, Run run);
+
+  // Parses what was typed and does it; returns the program's exit code.
+  [[nodiscard]] int run(int argc, const char* const* argv);
+
+ private:
+  std::unique_ptr<CLI::App> app_;
+  std::function<int()> chosen_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,28 @@
+// Files that a command is to write.
+#pragma once
+
+#include <initializer_list>
+#include <string>
+
+#include "core/error/expected.hpp"
+
+namespace perimap {
+
+struct Output {
+  std::string option;  // that names it: "--json"
+  std::string file;    // empty: none was asked for
+};
+
+struct Input {
+  std::string name;  // as the message is to call it: "the recording itself"
+  std::string file;
+};
+
+// Before the work begins: that none of the outputs is what is read, by any name, nor another output. An error is wrong
+// usage.
+[[nodiscard]] Expected<void> check_apart(std::initializer_list<Output> outputs, std::initializer_list<Input> inputs);
+
+// Likewise, that each can be written: nobody wants to hear of that when the work is done.
+[[nodiscard]] Expected<void> check_writable(std::initializer_list<Output> outputs);
+
+}  // namespace perimap

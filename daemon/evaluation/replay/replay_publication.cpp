@@ -1,0 +1,49 @@
+#include "daemon/evaluation/replay/replay_publication.hpp"
+
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/publishing/wire_names.hpp"
+
+namespace perimap {
+
+ReplayPublication::ReplayPublication(const RecordedTruth* truth, const std::vector<RPeak>& beats,
+                                     PublicationRecorder* recorder, Publication* dds)
+    : recorder_(recorder), dds_(dds), truth_(truth) {
+  if (truth == nullptr) return;
+  for (std::size_t i = 0; i < kReleaseStreams.size(); ++i) {
+    accuracies_.emplace_back(truth->truth, truth->camera, truth->captures.begin()->second).set_beats(beats);
+  }
+}
+
+void ReplayPublication::surface(const perimap_Surface& sample) {
+  if (recorder_ != nullptr) recorder_->surface(sample);
+  if (dds_ != nullptr) dds_->surface(sample);
+  if (accuracies_.empty()) return;
+  if (!to_recording_ && rests_on_its_frame(sample.reason)) {
+    to_recording_ = truth_->to_recording(sample.frame_sequence, from_ns(sample.capture_time_ns));
+  }
+  const bool clock = sample.stream == name_of(ReleaseStream::kClock);
+  accuracies_[index_of(clock ? ReleaseStream::kClock : ReleaseStream::kFrame)].add(sample);
+}
+
+void ReplayPublication::surface_model(const perimap_SurfaceModel& model) {
+  if (recorder_ != nullptr) recorder_->surface_model(model);
+  if (dds_ != nullptr) dds_->surface_model(model);
+  for (Accuracy& accuracy : accuracies_) accuracy.add(model);
+}
+
+void ReplayPublication::phase(const perimap_Phase& phase) {
+  if (recorder_ != nullptr) recorder_->phase(phase);
+  if (dds_ != nullptr) dds_->phase(phase);
+}
+
+void ReplayPublication::status(const perimap_Status& status) {
+  if (recorder_ != nullptr) recorder_->drain();
+  if (dds_ != nullptr) dds_->status(status);
+}
+
+std::optional<AccuracyReport> ReplayPublication::report(ReleaseStream stream) {
+  if (accuracies_.empty() || !to_recording_) return std::nullopt;
+  return accuracies_[index_of(stream)].report(*to_recording_);
+}
+
+}  // namespace perimap

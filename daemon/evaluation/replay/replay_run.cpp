@@ -1,0 +1,161 @@
+#include "daemon/evaluation/replay/replay_run.hpp"
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "core/pipeline/pipeline.hpp"
+#include "daemon/evaluation/replay/replay_publication.hpp"
+#include "daemon/evaluation/report/recorded_beats.hpp"
+#include "daemon/evaluation/report/recorded_truth.hpp"
+#include "daemon/logging/logging.hpp"
+#include "daemon/publishing/dds_publication.hpp"
+#include "daemon/publishing/publication_recorder.hpp"
+#include "daemon/publishing/status_text.hpp"
+#include "daemon/publishing/wire_states.hpp"
+#include "daemon/publishing/wire_status.hpp"
+#include "daemon/runtime/live_session.hpp"
+#include "daemon/runtime/lockstep_runtime.hpp"
+
+namespace perimap {
+namespace {
+
+tl::unexpected<SetupError> failed(Error error) { return tl::unexpected(SetupError{std::move(error), false}); }
+
+std::vector<ReplayReport::Stage> stages(const PipelineCounters& c, const PipelineSettings& settings) {
+  std::vector<ReplayReport::Stage> all = {{"predict and find", c.predict_and_find.summary()},
+                                          {"phase and pose", c.phase_and_pose.summary()},
+                                          {"evaluate", c.evaluate.summary()},
+                                          {"learn", c.learn.summary()}};
+  // Deadlines are virtual in lockstep: nothing is early or late.
+  if (settings.lockstep) return all;
+  all.push_back({"capture to update", c.capture_to_update.summary()});
+  if (settings.frame_stream) {
+    all.push_back({"release tardiness", c.of(ReleaseStream::kFrame).release_tardiness.summary()});
+  }
+  if (publishes(settings, ReleaseStream::kClock)) {
+    all.push_back({"clock tardiness", c.of(ReleaseStream::kClock).release_tardiness.summary()});
+  }
+  return all;
+}
+
+// What the status of `stream` counts.
+perimap_Status counted(const Identity& identity, ReleaseStream stream, const PipelineCounters& counters) {
+  perimap_Status status = WireStatus(identity.of(stream)).fill(counters, {}, Instant{});
+  status.sources = {};
+  status.stages = {};
+  return status;
+}
+
+// Those, and what the status tells with each source.
+nlohmann::json counts(const perimap_Status& status, const PipelineCounters& c) {
+  nlohmann::json json = counts_json(status);
+  json["frames_dropped"] = c.frames_dropped.get();
+  json["respiration_samples"] = c.respiration_samples.get();
+  json["respiration_dropped"] = c.respiration_dropped.get();
+  json["respiration_off"] = c.respiration_off.get();
+  return json;
+}
+
+using FrameProgress = std::function<void(std::uint64_t frames)>;
+
+// In virtual time. Whether a signal stopped it; what of the recording was not whole goes to `damage`.
+Expected<bool> run_lockstep(Pipeline& pipeline, ReplaySetup& setup, Publication& publication, StopSignal& stop,
+                            const FrameProgress& progress, std::vector<Error>& damage) {
+  LockstepRuntime runtime(pipeline, setup.identity, setup.utc_minus_monotonic, publication);
+  std::uint64_t shown = 0;
+  for (;;) {
+    auto event = setup.reader.next();
+    if (!event) return tl::unexpected(event.error());
+    if (!*event) break;
+    runtime.deliver(**event);
+    const std::uint64_t frames = pipeline.counters().frames.get();
+    if (frames == shown) continue;
+    shown = frames;
+    progress(frames);
+    if (stop.requested()) return true;
+  }
+  runtime.finish();
+  const auto found = setup.reader.damage();
+  damage.insert(damage.end(), found.begin(), found.end());
+  return false;
+}
+
+Expected<bool> run_live(Pipeline& pipeline, ReplaySetup& setup, Publication& publication, StopSignal& stop,
+                        const FrameProgress& progress) {
+  LiveSession session(pipeline, runtime_settings(setup.configuration, setup.identity), publication,
+                      std::move(setup.reader), [&] { progress(pipeline.counters().frames.get()); });
+  return session.run(stop).map([&stop] { return stop.requested(); });
+}
+
+ReplayReport report_of(Pipeline& pipeline, const Identity& identity, ReplayPublication& publication) {
+  const PipelineCounters& counters = pipeline.counters();
+  const PipelineSettings& settings = pipeline.settings();
+  ReplayReport report;
+  report.lockstep = settings.lockstep;
+  report.workers = settings.workers;
+  report.frames = counters.frames.get();
+  report.frames_without_pose = counters.frames_without_pose.get();
+  report.features_converged = counters.features_converged.get();
+  for (const ReleaseStream stream : kReleaseStreams) {
+    if (!publishes(settings, stream)) continue;
+    const StreamCounters& c = counters.of(stream);
+    report.streams.push_back({stream, c.samples.get(), c.samples_without_frame.get(), c.samples_from_late_update.get(),
+                              c.releases_missed.get(), c.releases_late.get(),
+                              stream_counts_json(counted(identity, stream, counters)), publication.report(stream)});
+  }
+  report.stages = stages(counters, settings);
+  report.breathing = pipeline.status_respiration();
+  report.counts = counts(counted(identity, report.streams.front().stream, counters), counters);
+  return report;
+}
+
+}  // namespace
+
+tl::expected<ReplayReport, SetupError> run_replay(
+    const ReplayOptions& options, StopSignal& stop,
+    const std::function<void(std::uint64_t frames, std::uint64_t all)>& progress) {
+  auto setup = prepare_replay(options.recording, options.configuration, options.mode);
+  if (!setup) return tl::unexpected(std::move(setup.error()));
+  setup->pipeline.lockstep = options.lockstep;
+  if (options.workers > 0) setup->pipeline.workers = options.workers;
+  const auto truth = load_truth(options.recording, options.mode);
+  if (!truth) return failed(truth.error());
+  Expected<std::vector<RPeak>> beats;
+  if (*truth) beats = load_beats(options.recording, options.mode);
+  if (!beats) return failed(beats.error());
+
+  const Logging logging(setup->configuration.log.level);
+  std::unique_ptr<PublicationRecorder> recorder;
+  if (!options.samples.empty()) {
+    auto created = PublicationRecorder::create(options.samples, options.generator, options.lockstep,
+                                               static_cast<std::size_t>(setup->pipeline.features.maximum));
+    if (!created) return failed(created.error());
+    recorder = std::move(*created);
+  }
+  std::unique_ptr<DdsPublication> dds;
+  if (options.dds) {
+    const DdsConfiguration& c = setup->configuration.dds;
+    auto created = DdsPublication::create({c.domain, c.surface_deadline, c.surface_lifespan});
+    if (!created) return failed(created.error());
+    dds = std::move(*created);
+  }
+  ReplayPublication publication(*truth ? &**truth : nullptr, *beats, recorder.get(), dds.get());
+  Pipeline pipeline(setup->pipeline);
+  const std::uint64_t all = *truth ? (*truth)->captures.size() : 0;
+  const FrameProgress frames_done = [&progress, all](std::uint64_t frames) { progress(frames, all); };
+  std::vector<Error> damage = std::move(setup->passed_over);
+  const auto stopped = options.lockstep ? run_lockstep(pipeline, *setup, publication, stop, frames_done, damage)
+                                        : run_live(pipeline, *setup, publication, stop, frames_done);
+  if (!stopped) return failed(stopped.error());
+  if (recorder) {
+    if (const auto finished = recorder->finish(); !finished) return failed(finished.error());
+  }
+  ReplayReport report = report_of(pipeline, setup->identity, publication);
+  report.stopped = *stopped;
+  report.has_truth = truth->has_value();
+  report.damage = std::move(damage);
+  return report;
+}
+
+}  // namespace perimap

@@ -1,0 +1,25 @@
+#include "daemon/runtime/configuration_reload.hpp"
+
+#include <fmt/format.h>
+
+#include "daemon/config/configuration_difference.hpp"
+#include "daemon/config/configuration_loader.hpp"
+#include "daemon/logging/logging.hpp"
+
+namespace perimap {
+
+Expected<std::string> ConfigurationReload::operator()() {
+  const auto read = load_configuration(file_);
+  if (!read) return tl::unexpected(read.error());
+  const std::lock_guard lock(mutex_);
+  std::string restart;
+  for (const std::string& key : differing_keys(running_, *read)) {
+    if (key != "log.level") restart += fmt::format("{}{}", restart.empty() ? "" : ", ", key);
+  }
+  Logging::set_level(read->log.level);
+  running_.log.level = read->log.level;
+  return restart.empty() ? std::string("in effect\n")
+                         : fmt::format("in effect but for what needs a restart: {}\n", restart);
+}
+
+}  // namespace perimap
