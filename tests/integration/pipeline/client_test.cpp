@@ -14,6 +14,7 @@
 #include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/pipeline.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/surface_composer.hpp"
 #include "core/pipeline/surface_sample.hpp"
 #include "daemon/publishing/model_moment.hpp"
 #include "daemon/publishing/publication.hpp"

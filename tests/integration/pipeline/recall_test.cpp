@@ -15,11 +15,14 @@
 #include <vector>
 
 #include "core/phase/cardiac_clock.hpp"
+#include "core/phase/law_choice.hpp"
+#include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/map_memory.hpp"
 #include "core/pipeline/pipeline.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/release_plan.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
 #include "core/pipeline/surface_sample.hpp"
 #include "daemon/checkpoint/checkpoint_keeper.hpp"
