@@ -7,6 +7,7 @@
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/config/configuration_text.hpp"
 #include "daemon/config/surface_traffic.hpp"
 #include "daemon/runtime/device_setup.hpp"
 #include "daemon/runtime/thread_launcher.hpp"

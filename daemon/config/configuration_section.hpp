@@ -44,10 +44,14 @@ inline std::optional<std::vector<double>> as_numbers(const ConfigurationValue& v
   return std::nullopt;
 }
 
-inline bool within(double value, double low, double high) { return std::isfinite(value) && value >= low && value <= high; }
+inline bool within(double value, double low, double high) {
+  return std::isfinite(value) && value >= low && value <= high;
+}
 
 // Angles are given in degrees and kept in radians; 15 digits give the typed figure back.
-inline double degrees_as_typed(double rad) { return std::strtod(fmt::format("{:.15g}", rad / kDegree).c_str(), nullptr); }
+inline double degrees_as_typed(double rad) {
+  return std::strtod(fmt::format("{:.15g}", rad / kDegree).c_str(), nullptr);
+}
 
 // Collects the keys of one section. `member` says where a key's value lives, given a Configuration.
 class Section {

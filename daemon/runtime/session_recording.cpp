@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/config/configuration_text.hpp"
 #include "daemon/runtime/utc_offset.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/config/configuration_text.hpp"
 #include "daemon/config/session_keys.hpp"
 
 namespace {

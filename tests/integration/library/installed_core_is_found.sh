@@ -26,4 +26,4 @@ grep -q 'a rate from 100 to 1000 Hz is needed' error || fail "$(cat error)"
 # All of core, with the libraries behind it; the install folder is all that it sees.
 make everything "$here/everything"
 "$work/everything/everything" || fail "everything ended with $?"
-if grep -q "$source" "$work/root$prefix/share/perimap/cmake"/*.cmake; then fail "what is installed names the source folder"; fi
+if grep -q "$source/" "$work/root$prefix/share/perimap/cmake"/*.cmake; then fail "what is installed names the source folder"; fi

@@ -2,7 +2,7 @@
 # phases against the annotated beats (RECORD_beats.csv): from 10 s on the phase of each beat's sample is within 0.5 rad of zero (it is predicted)
 # for nine beats in ten, half-way between two beats it is not, and the point moves by 3 mm to either side.
 phase_of_record() {
-  zcat "$2_ch0_200perMV_360Hz.i16.gz" | od -An -v -td2 -w2 | head -n 21600 | awk '{ print $1 / 200 }' | "$1" 360 > phases || return 1
+  zcat "$2_ch0_200perMV_360Hz.i16.gz" | od -An -v -td2 -w2 | awk 'NR <= 21600 { print $1 / 200 }' | "$1" 360 > phases || return 1
   awk -v beats="$2_beats.csv" '
     BEGIN { FS = "," ; while ((getline < beats) > 0) if ($3 + 0 > 3600 && $3 + 0 < 21240) beat[++n] = $3 + 0; FS = " " }
     { at = int($1 * 360 + 0.5); split($0, f, " "); phase[at] = f[2]; z = f[6]; if (z > high) high = z; if (!low || z < low) low = z }

@@ -407,7 +407,7 @@ TEST(RecordingFacts, LeaveOutWhatTheDriversHaveDoneAlready) {
   EXPECT_THAT(*facts.configuration, HasSubstr("position_deviation_mm = 1.4"));
   EXPECT_THAT(*facts.configuration, ::testing::Not(HasSubstr("video0")));
   EXPECT_THAT(*facts.configuration, ::testing::Not(HasSubstr("ttyUSB0")));
-  EXPECT_THAT(*facts.configuration, HasSubstr("registration_translation_IW_mm = [0.0, 0.0, 0.0]"));
+  EXPECT_THAT(*facts.configuration, ::testing::Not(HasSubstr("registration")));
   EXPECT_FALSE(facts.calibration);
 }
 
