@@ -16,6 +16,7 @@
   COMMAND(bench)                  \
   COMMAND(experiment)             \
   COMMAND(track)                  \
+  COMMAND(judge)                  \
   COMMAND(emulate)                \
   COMMAND(probe)                  \
   COMMAND(record)                 \

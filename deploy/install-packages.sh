@@ -23,6 +23,7 @@ build=(
   libhwy-dev                                 # core/bank: portable SIMD with a choice at run time
   libopencv-core-dev libopencv-imgproc-dev   # core/vision
   libopencv-videoio-dev                      # drivers/video: video files
+  libopencv-video-dev                        # drivers/video: Lucas-Kanade, that the tracker is held against
   libjpeg62-turbo-dev                        # drivers/image: MJPG cameras
   cyclonedds-dev cyclonedds-tools            # idl, daemon: DDS and its IDL compiler
   libfmt-dev
@@ -45,7 +46,6 @@ full=(
   clang-tidy clang-format
   qemu-system-x86 busybox-static cpio zstd kmod udev iproute2 v4l-utils  # tests/vm: CAN, V4L2 and systemd on Debian's own kernels
   libceres-dev                               # tests/bench: the batch alternative
-  libopencv-video-dev                        # tests/bench: Lucas-Kanade as others have it
   stress-ng                                  # perimap bench: latencies under load
   dpkg-dev lintian systemd man-db            # the Debian package and its service, checked
 )

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/vision/opencv_threads.hpp"
+#include "drivers/video/lucas_kanade_module.hpp"
 #include "drivers/video/video_file.hpp"
 
 namespace perimap {
@@ -216,7 +217,7 @@ Expected<std::unique_ptr<VideoWriter>> create(const std::string& path, int width
 }  // namespace perimap
 
 const perimap::VideoModule* perimap_video_module() {
-  static constexpr perimap::VideoModule kModule{&perimap::open, &perimap::create};
+  static constexpr perimap::VideoModule kModule{&perimap::open, &perimap::create, &perimap::make_lucas_kanade};
   perimap::keep_opencv_to_one_thread();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said here
   return &kModule;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "drivers/video/lucas_kanade.hpp"
 #include "drivers/video/video_file.hpp"
 
 namespace perimap {
@@ -13,6 +14,8 @@ struct VideoModule {
   // As VideoReader::open() and VideoWriter::create().
   Expected<std::unique_ptr<VideoReader>> (*open)(const std::string& path);
   Expected<std::unique_ptr<VideoWriter>> (*create)(const std::string& path, int width, int height, double frames_per_s);
+  // As LucasKanade::create().
+  Expected<std::unique_ptr<LucasKanade>> (*lucas_kanade)();
 };
 
 inline constexpr const char* kVideoModule = "libperimap_video.so";

@@ -10,9 +10,8 @@
 #include <utility>
 
 #include "core/vision/confirmed_tracks.hpp"
-#include "core/vision/feature_detector.hpp"
 #include "core/vision/feature_follower.hpp"
-#include "core/vision/instrument_mask.hpp"
+#include "core/vision/video_tracker.hpp"
 #include "daemon/evaluation/tracking/frame_source.hpp"
 #include "daemon/evaluation/tracking/track_table.hpp"
 #include "drivers/file/whole_file.hpp"
@@ -45,75 +44,45 @@ struct Counts {
   double follow_s = 0;
 };
 
-// When new features are looked for, and where.
+// The tracker, and what is counted of it.
 class Tracking {
  public:
   Tracking(const FollowSettings& options, double frames_per_s)
       : options_(options),
-        find_interval_(settings(options, frames_per_s).rate.frames(std::chrono::milliseconds(167))),
-        follower_(settings(options, frames_per_s)) {}
+        tracker_({.features = options.features,
+                  .first_features_alone = options.first_features_alone,
+                  .frames_per_s = frames_per_s}) {}
 
-  // Follows every feature in the frame and fills up their number every sixth of a second.
+  // Follows every feature in the frame and fills up their number.
   Expected<void> take(const VideoFrame& frame, FrameSource& source) {
     const auto begin = std::chrono::steady_clock::now();
-    follower_.track_into(frame.grey);
+    tracker_.track_into(frame.grey);
     counts_.follow_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    const bool may_find = follower_.saw_anything() &&
-                          (options_.first_features_alone ? !has_found_ : counts_.frames % find_interval_ == 0);
     ++counts_.frames;
-    if (may_find && follower_.free() > 0) {
-      if (auto done = find(frame.grey, source.colour()); !done) return done;
-    }
+    if (auto done = tracker_.fill_up(frame.grey, source.colour()); !done) return done;
     constexpr int kPoor = 10;  // one in so many
-    const auto found = std::count_if(follower_.features().begin(), follower_.features().end(),
+    const auto found = std::count_if(tracker_.features().begin(), tracker_.features().end(),
                                      [](const FollowedFeature& feature) { return feature.found; });
     counts_.poor_frames += kPoor * found < options_.features ? 1 : 0;
     return {};
   }
 
-  [[nodiscard]] std::span<const FollowedFeature> features() const noexcept { return follower_.features(); }
+  [[nodiscard]] std::span<const FollowedFeature> features() const noexcept { return tracker_.features(); }
 
   [[nodiscard]] std::vector<VideoMark> marks() const {
     std::vector<VideoMark> marks;
-    for (const FollowedFeature& feature : follower_.features()) {
+    for (const FollowedFeature& feature : tracker_.features()) {
       if (feature.state != FollowState::kEmpty) marks.push_back(mark_of(feature));
     }
     return marks;
   }
 
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
-  [[nodiscard]] std::size_t frames_to_judge() const noexcept { return follower_.frames_to_judge(); }
+  [[nodiscard]] std::size_t frames_to_judge() const noexcept { return tracker_.frames_to_judge(); }
 
  private:
-  static FollowerSettings settings(const FollowSettings& options, double frames_per_s) {
-    FollowerSettings settings;
-    settings.maximum = options.features;
-    if (frames_per_s > 0) settings.rate = FrameRate(frames_per_s);
-    return settings;
-  }
-
-  Expected<void> find(const GreyImage& image, const ColourImage& colour) {
-    const std::vector<Vector2d> occupied = follower_.occupied();
-    GreyImage barred;
-    std::vector<std::uint8_t> mask;
-    if (colour.bgr != nullptr) {
-      auto instruments = find_instruments(colour, image.width, image.height);
-      if (!instruments) return tl::unexpected(instruments.error());
-      mask = *std::move(instruments);
-      barred = {mask.data(), image.width, image.height, image.width};
-    }
-    const DetectorSettings detector = detector_settings_for(image, options_.features);
-    const auto corners = find_features(image, occupied, detector, follower_.free(), barred);
-    if (!corners) return tl::unexpected(corners.error());
-    follower_.add(image, *corners, template_settings_for(detector));
-    has_found_ = has_found_ || !corners->empty();
-    return {};
-  }
-
   FollowSettings options_;
-  std::uint64_t find_interval_;  // frames
-  FeatureFollower follower_;
-  bool has_found_ = false;
+  VideoTracker tracker_;
   Counts counts_;
 };
 
