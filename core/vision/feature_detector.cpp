@@ -188,6 +188,22 @@ DetectorSettings detector_settings_for(const GreyImage& image, int how_many) {
   return detector_settings_for(image.width, image.height, estimate_noise(image, dark_grey), how_many, light);
 }
 
+DetectorSettings detector_settings_for_trial(const GreyImage& image, int how_many) {
+  DetectorSettings settings = detector_settings_for(image, how_many);
+  // A template of level 0 fits with its gradients; coarser ones are done without where they do not.
+  settings.border_px = PatchTemplate::kSide[0] / 2 + 2;
+  constexpr double kShareOfCorner = 0.1, kRoundness = 0.03, kWidth = 1280, kSmallest = 0.25;
+  settings.min_corner *= kShareOfCorner;
+  settings.min_roundness = kRoundness;
+  const double scale = std::clamp(image.width / kWidth, kSmallest, 1.0);
+  settings.highlight_clearance_px *= scale;
+  settings.background_clearance_px *= scale;
+  const double spacing = std::sqrt(static_cast<double>(image.width) * image.height / std::max(how_many, 1));
+  constexpr double kOfSpacing = 0.3, kLeast_px = 7, kMost_px = 40;
+  settings.min_distance_px = std::clamp(kOfSpacing * spacing, kLeast_px, kMost_px);
+  return settings;
+}
+
 TemplateSettings template_settings_for(const DetectorSettings& settings) noexcept {
   TemplateSettings of_templates;
   of_templates.min_texture = 0.8 * settings.min_corner;

@@ -35,6 +35,10 @@ struct DetectorSettings {
 // Likewise, of what this image shows.
 [[nodiscard]] DetectorSettings detector_settings_for(const GreyImage& image, int how_many);
 
+// Likewise, for corners that are tried before they are followed: whatever stands out of the noise at all, and lengths
+// go with the picture's width.
+[[nodiscard]] DetectorSettings detector_settings_for_trial(const GreyImage& image, int how_many);
+
 // For the templates of what was found so.
 [[nodiscard]] TemplateSettings template_settings_for(const DetectorSettings& settings) noexcept;
 

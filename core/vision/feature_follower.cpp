@@ -52,8 +52,8 @@ FeatureFollower::FeatureFollower(const FollowerSettings& settings)
     : settings_(settings),
       trail_stride_(settings.rate.frames(kTrailEvery)),
       tracker_({.min_correlation = settings.min_correlation}),
-      // As many again may be away.
-      features_(2 * static_cast<std::size_t>(std::max(settings.maximum, 0))),
+      // As many again may be away, and as many as are on trial.
+      features_(static_cast<std::size_t>((2 + settings.candidates_per_place) * std::max(settings.maximum, 0))),
       motion_(features_.size()),
       deviation_px_(kFirstDeviation_px) {
   scratch_.reserve(features_.size());
@@ -72,7 +72,7 @@ std::size_t FeatureFollower::frames_to_judge() const noexcept {
 int FeatureFollower::free() const noexcept {
   const auto filled = std::count_if(features_.begin(), features_.end(),
                                     [](const FollowedFeature& feature) { return feature.fills_place(); });
-  return std::max(0, settings_.maximum - static_cast<int>(filled));
+  return filled_by_features() >= settings_.maximum ? 0 : std::max(0, most_candidates() - static_cast<int>(filled));
 }
 
 std::vector<Vector2d> FeatureFollower::occupied() const {
@@ -86,15 +86,16 @@ std::vector<Vector2d> FeatureFollower::occupied() const {
 
 bool FeatureFollower::seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
                            double deviation_px, double min_correlation) const noexcept {
-  PatchState state = feature.patch_state;
-  const Matrix2d covariance = deviation_px * deviation_px * Matrix2d::Identity();
-  feature.match = tracker_.track(image, feature.patch, state, predicted, covariance);
-  feature.found = feature.match.state == MatchState::kFound && feature.match.correlation >= min_correlation &&
-                  largest_deviation(feature.match.covariance_px2) <= settings_.largest_deviation_px;
-  if (!feature.found) return false;
-  feature.patch_state = state;
-  feature.px = feature.match.px;
-  return true;
+  const bool has_way_back = before_.data != nullptr && feature.misses == 0;
+  feature.match = feature.patch.find(tracker_, image,
+                                     {.predicted_px = predicted,
+                                      .deviation_px = deviation_px,
+                                      .min_correlation = min_correlation,
+                                      .before = has_way_back ? &before_ : nullptr,
+                                      .before_px = feature.last_px});
+  feature.found = feature.match.state == MatchState::kFound;
+  if (feature.found) feature.px = feature.match.px;
+  return feature.found;
 }
 
 void FeatureFollower::note_displacements() noexcept {
@@ -115,7 +116,7 @@ void FeatureFollower::track_into(const GreyImage& image) noexcept {
   for (FollowedFeature& feature : features_) {
     feature.found = feature.is_overlay = feature.is_recalled = false;
     feature.last_px = feature.px;
-    feature.last_state = feature.patch_state;
+    feature.last_places = feature.patch.places();
   }
   if (!shows_anything(image)) {
     ++blind_frames_;
@@ -168,9 +169,11 @@ void FeatureFollower::track_into(const GreyImage& image) noexcept {
   find_again(image);
   judge(image);
   drop_doubles();
+  promote_the_surest();
   keep_to_maximum();
   let_overlays_go();
   blind_frames_ = 0;
+  remember(image);
 }
 
 // Nearly all of what is tracked. Candidates tell nothing: many of them are none from the beginning.
@@ -188,7 +191,7 @@ bool FeatureFollower::has_vanished() const noexcept {
 void FeatureFollower::disbelieve(FollowedFeature& feature) const noexcept {
   feature.found = false;
   feature.px = feature.last_px;
-  feature.patch_state = feature.last_state;
+  feature.patch.put_back(feature.last_places);
 }
 
 void FeatureFollower::sweep() noexcept {
@@ -270,10 +273,7 @@ void FeatureFollower::find_again(const GreyImage& image) noexcept {
     constexpr double kDrift_px_per_s = 3.0;
     const double deviation_px = std::min(2 * deviation_px_ + kDrift_px_per_s / settings_.rate.per_s() * feature.misses,
                                          settings_.widest_deviation_px);
-    constexpr double kLessThanUsual = 0.03;
-    const double min_correlation =
-        std::max(settings_.recovered_correlation, feature.usual_correlation - kLessThanUsual);
-    if (!seek(image, feature, expected, deviation_px, is_occluded ? min_correlation : 0)) {
+    if (!seek(image, feature, expected, deviation_px, is_occluded ? settings_.recovered_correlation : 0)) {
       feature.px = expected;
     }
   }
@@ -328,9 +328,10 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
     const bool may_be_overlay =
         camera_lately_.at(feature.px).norm() > kMoved_px && has_stood_still(feature, kCandidateWindow);
     if (is_candidate && feature.frames >= candidate && !may_be_overlay) {
-      feature.state = FollowState::kTracked;
+      feature.is_ripe = true;
     }
-    renew_worn_template(image, feature);
+    if (is_candidate) feature.doubt_px += largest_deviation(feature.match.covariance_px2) + feature.patch.back_px();
+    feature.patch.keep_view(image, feature.match, tracker_.kernels());
   }
   if (scratch_.size() >= kEnoughDisplacements) {
     constexpr double kShareOfNew = 0.2, kLeast_px = 0.4;
@@ -363,29 +364,6 @@ bool FeatureFollower::moves_with_neighbours(FollowedFeature& feature, bool is_ba
          kMostAstray_px + kMostAstrayOfStrangeness * strangeness_px_ + kStrain * neighbours.distance_px;
 }
 
-void FeatureFollower::renew_worn_template(const GreyImage& image, FollowedFeature& feature) const noexcept {
-  constexpr double kSmoothing = 1.0 / 15, kSteady = 0.02, kWorn = 0.93;
-  constexpr Duration kWornFor = std::chrono::milliseconds(333);
-  constexpr int kWornFrames = 10;
-  const double correlation = feature.match.correlation;
-  const bool is_steady = std::abs(correlation - feature.usual_correlation) < kSteady;
-  feature.usual_correlation +=
-      std::min(1.0, settings_.rate.of_usual() * kSmoothing) * (correlation - feature.usual_correlation);
-  const bool is_worn = (correlation < kWorn && is_steady) || template_is_stale(feature.patch_state);
-  feature.worn = is_worn ? feature.worn + 1 : 0;
-  if (feature.worn < frames(kWornFor, kWornFrames)) return;
-  feature.worn = 0;
-  PatchTemplate renewed;
-  if (make_patch_template(image, feature.px, template_settings_, tracker_.kernels(), renewed) !=
-      TemplateVerdict::kGood) {
-    return;
-  }
-  feature.patch = renewed;
-  feature.patch_state = PatchState{};
-  feature.patch_state.px = feature.px;
-  feature.usual_correlation = 1;
-}
-
 // Two features at one place follow the same tissue, one of them wrongly: the older one stays.
 void FeatureFollower::drop_doubles() noexcept {
   constexpr double kApart_px = 3.0;
@@ -399,17 +377,48 @@ void FeatureFollower::drop_doubles() noexcept {
   }
 }
 
+std::ptrdiff_t FeatureFollower::filled_by_features() const noexcept {
+  return std::count_if(features_.begin(), features_.end(), [](const FollowedFeature& feature) {
+    return feature.state != FollowState::kCandidate && feature.fills_place();
+  });
+}
+
+// Of the candidates that are ripe, as many as there is room for; the others are let go.
+void FeatureFollower::promote_the_surest() noexcept {
+  std::ptrdiff_t room = settings_.maximum - filled_by_features();
+  for (;; --room) {
+    FollowedFeature* surest = nullptr;
+    for (FollowedFeature& feature : features_) {
+      if (feature.state != FollowState::kCandidate || !feature.is_ripe) continue;
+      if (surest == nullptr || feature.doubt_px < surest->doubt_px) surest = &feature;
+    }
+    if (surest == nullptr) return;
+    if (room > 0) {
+      surest->state = FollowState::kTracked;
+    } else {
+      let_go(*surest);
+    }
+  }
+}
+
 // The youngest give way to those that came back.
 void FeatureFollower::keep_to_maximum() noexcept {
-  auto filled = std::count_if(features_.begin(), features_.end(),
-                              [](const FollowedFeature& feature) { return feature.fills_place(); });
-  for (; filled > settings_.maximum; --filled) {
+  for (std::ptrdiff_t filled = filled_by_features(); filled > settings_.maximum; --filled) {
     FollowedFeature* youngest = nullptr;
     for (FollowedFeature& feature : features_) {
-      if (feature.fills_place() && (youngest == nullptr || feature.frames < youngest->frames)) youngest = &feature;
+      if (feature.state == FollowState::kCandidate || !feature.fills_place()) continue;
+      if (youngest == nullptr || feature.frames < youngest->frames) youngest = &feature;
     }
     let_go(*youngest);
   }
+}
+
+// For the ways back.
+void FeatureFollower::remember(const GreyImage& image) noexcept {
+  before_pixels_.resize(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
+  std::uint8_t* to = before_pixels_.data();
+  for (int y = 0; y < image.height; ++y) to = std::copy_n(image.row(y), image.width, to);
+  before_ = {before_pixels_.data(), image.width, image.height, image.width};
 }
 
 const Vector2d& FeatureFollower::trailed(const FollowedFeature& feature, std::size_t places_ago) const noexcept {
@@ -528,12 +537,12 @@ FollowedFeature* FeatureFollower::place_for_new() noexcept {
 
 void FeatureFollower::add(const GreyImage& image, std::span<const Vector2d> corners,
                           const TemplateSettings& settings) noexcept {
-  template_settings_ = settings;
+  remember(image);
   PatchTemplate patch;
   int wanted = free();
   for (const Vector2d& px : corners) {
     if (wanted <= 0) return;
-    if (make_patch_template(image, px, template_settings_, tracker_.kernels(), patch) != TemplateVerdict::kGood) {
+    if (make_patch_template(image, px, settings, tracker_.kernels(), patch) != TemplateVerdict::kGood) {
       continue;
     }
     FollowedFeature* const place = place_for_new();
@@ -545,8 +554,7 @@ void FeatureFollower::add(const GreyImage& image, std::span<const Vector2d> corn
     place->found = true;
     place->px = place->last_px = px;
     place->velocity_px = displacement_around(px, nullptr);
-    place->patch = patch;
-    place->patch_state.px = px;
+    place->patch.begin(patch, px);
     place->match.state = MatchState::kFound;
     place->match.px = px;
     place->match.correlation = 1;

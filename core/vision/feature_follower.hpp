@@ -15,6 +15,7 @@
 #include "core/sensors/grey_image.hpp"
 #include "core/time/frame_rate.hpp"
 #include "core/time/instant.hpp"
+#include "core/vision/followed_patch.hpp"
 #include "core/vision/neighbour_motion.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
@@ -28,16 +29,18 @@ struct FollowerSettings {
   Duration candidate = std::chrono::milliseconds(267);
   int candidate_frames = 8;
   // Unseen so long, and in so many frames of those that show anything, a feature is lost.
-  Duration occluded = std::chrono::milliseconds(500);
+  Duration occluded = std::chrono::seconds(2);
   int occluded_frames = 15;
   double least_deviation_px = 1.0;    // of a prediction, per axis
   double widest_deviation_px = 11.0;  // the search reaches +-40 px
-  // Compressed video loses what little texture tissue has: more is asked for only where a wrong place may be found.
-  double min_correlation = 0.84;
-  double recovered_correlation = 0.92;  // asked of a feature that comes back
+  // So little that only what has nothing in common is left out: weak texture correlates badly with itself from one
+  // frame to the next, by its noise. The way back judges (followed_patch.hpp).
+  double min_correlation = 0.5;
+  double recovered_correlation = 0.97;  // asked of a feature that comes back, for which there is no way back
   // A place that shows what was laid over the picture takes no feature so long.
   Duration overlay = std::chrono::seconds(30);
-  double largest_deviation_px = 0.6;  // of a match: one less sure tells too little of where the tissue is
+  // Candidates that may be on trial beside as many features as are wanted, of the maximum; the best become features.
+  double candidates_per_place = 1.0;
 };
 
 enum class FollowState : std::uint8_t {
@@ -55,8 +58,7 @@ struct FollowedFeature {
   bool found = false;                       // in the last frame
   Vector2d px = Vector2d::Zero();           // where it was found, else where it is expected
   Vector2d velocity_px = Vector2d::Zero();  // per frame
-  PatchTemplate patch;
-  PatchState patch_state;
+  FollowedPatch patch;
   PatchMatch match;                     // of the last frame
   Vector2d last_px = Vector2d::Zero();  // in the frame before
   int frames = 0;                       // found in
@@ -64,13 +66,13 @@ struct FollowedFeature {
   bool is_away = false;                 // missed for more than a moment
   int strange = 0;  // frames in which it moved otherwise than its neighbours, less those in which not
   Vector2d astray_px = Vector2d::Zero();  // how far it has lately gone another way than its neighbours
-  int worn = 0;                           // frames in a row in which the template fitted badly, but steadily
-  double usual_correlation = 1.0;         // smoothed over some 15 frames
-  bool is_overlay = false;                // let go in the last frame because it is laid over the picture
-  bool swept = false;                     // it vanished together with nearly all others
-  bool is_recalled = false;               // it has come back with them in the last frame
-  PatchState last_state;                  // in the frame before: what is not believed is taken back
-  std::array<Vector2d, kTrail> trail{};   // where it was, by the number of the place
+  double doubt_px = 0;                   // deviations of its matches and misses of the ways back, summed over its trial
+  bool is_ripe = false;                  // a candidate that has stood its trial
+  bool is_overlay = false;               // let go in the last frame because it is laid over the picture
+  bool swept = false;                    // it vanished together with nearly all others
+  bool is_recalled = false;              // it has come back with them in the last frame
+  FollowedPatch::Places last_places;     // in the frame before: what is not believed is taken back
+  std::array<Vector2d, kTrail> trail{};  // where it was, by the number of the place
   std::size_t trail_length = 0;
 
   // False for what has been away for more than a moment: another may take its place then.
@@ -88,9 +90,8 @@ struct FollowedFeature {
 // What stands still to a few tenths of a pixel while the whole picture moves beside it is no tissue but laid over the
 // picture: text, a logo. It is let go, and its place is not taken again for long.
 //
-// A template is renewed when it has fitted badly but steadily for some time, or when the view has changed by a factor
-// of two: a worn template, not an occluded feature, which stops fitting within a few frames. Each renewal moves the
-// followed point by about the match's deviation, so there are few.
+// How a feature's looks are kept is in followed_patch.hpp. More candidates are tried than there are places; those whose
+// matches were surest become features. A match's deviation refuses nothing.
 class FeatureFollower {
  public:
   explicit FeatureFollower(const FollowerSettings& settings);
@@ -98,14 +99,19 @@ class FeatureFollower {
   // Finds every feature in the next frame, or notes that it is not there. Takes nothing from the heap.
   void track_into(const GreyImage& image) noexcept;
 
-  // New candidates at these pixels of the image followed last. Those that make no good template are left out. Templates
-  // that are renewed later are judged likewise.
+  // New candidates at these pixels of the image followed last. Those that make no good template are left out. The first
+  // call takes memory for a copy of the image, and one with an image of another size.
   void add(const GreyImage& image, std::span<const Vector2d> corners, const TemplateSettings& settings) noexcept;
 
   [[nodiscard]] std::span<const FollowedFeature> features() const noexcept { return features_; }
   // False when the last frame had no contrast.
   [[nodiscard]] bool saw_anything() const noexcept { return blind_frames_ == 0; }
+  // Candidates that it would take.
   [[nodiscard]] int free() const noexcept;
+  // As many as can be on trial where no place is filled.
+  [[nodiscard]] int most_candidates() const noexcept {
+    return static_cast<int>((1 + settings_.candidates_per_place) * settings_.maximum);
+  }
   // Where no new feature is wanted: at those that fill a place, and at what is laid over the picture.
   [[nodiscard]] std::vector<Vector2d> occupied() const;
   // So many frames later it is known whether a feature is one, or laid over the picture.
@@ -155,13 +161,16 @@ class FeatureFollower {
   void let_overlays_go() noexcept;
   void bar(const Vector2d& px) noexcept;
   [[nodiscard]] FollowedFeature* place_for_new() noexcept;
-  void renew_worn_template(const GreyImage& image, FollowedFeature& feature) const noexcept;
+  void promote_the_surest() noexcept;
+  [[nodiscard]] std::ptrdiff_t filled_by_features() const noexcept;
+  void remember(const GreyImage& image) noexcept;
 
   FollowerSettings settings_;
   std::uint64_t trail_stride_;  // frames from one place of a trail to the next
-  TemplateSettings template_settings_;
   PatchTracker tracker_;
   std::vector<FollowedFeature> features_;
+  std::vector<std::uint8_t> before_pixels_;
+  GreyImage before_;        // the frame before; without pixels until there was one
   NeighbourMotion motion_;  // of this frame
   std::vector<double> scratch_;
   double deviation_px_;

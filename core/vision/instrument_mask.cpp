@@ -12,11 +12,10 @@
 namespace perimap {
 namespace {
 
-std::vector<std::uint8_t> find(const cv::Mat& image, int width, int height) {
+std::vector<std::uint8_t> find(const cv::Mat& image, int width, int height, double least_margin_px) {
   constexpr int kLit_grey = 30;
   constexpr double kLeastSaturation = 0.18;                 // (largest - smallest) / largest of the three channels
   constexpr double kMargin = 1.0 / 80, kGlint = 1.0 / 160;  // of the image's width; a glint's radius
-  constexpr double kLeastMargin = 16.0 / kColourReduction;  // no template reaches onto what slides over the tissue
   cv::Mat small = image;
   const cv::Size reduced(reduced_side(width), reduced_side(height));
   if (image.cols > reduced.width || image.rows > reduced.height) {
@@ -42,7 +41,7 @@ std::vector<std::uint8_t> find(const cv::Mat& image, int width, int height) {
   const int radius = std::clamp(static_cast<int>(kGlint * small.cols), 1, 2);
   const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1});
   cv::morphologyEx(grey, grey, cv::MORPH_OPEN, disc);
-  grey = widened(grey, std::max(kLeastMargin, kMargin * small.cols));
+  grey = widened(grey, std::max(least_margin_px / kColourReduction, kMargin * small.cols));
   cv::Mat full(height, width, CV_8UC1, mask.data());
   cv::resize(grey, full, full.size(), 0, 0, cv::INTER_NEAREST);
   return mask;
@@ -50,7 +49,8 @@ std::vector<std::uint8_t> find(const cv::Mat& image, int width, int height) {
 
 }  // namespace
 
-Expected<std::vector<std::uint8_t>> find_instruments(const ColourImage& image, int width, int height) {
+Expected<std::vector<std::uint8_t>> find_instruments(const ColourImage& image, int width, int height,
+                                                     double least_margin_px) {
   if (image.bgr == nullptr || image.width < 1 || image.height < 1 || image.stride < 3 * image.width || width < 1 ||
       height < 1) {
     return fail("instrument mask: colour image of " + std::to_string(image.width) + "x" + std::to_string(image.height) +
@@ -61,7 +61,7 @@ Expected<std::vector<std::uint8_t>> find_instruments(const ColourImage& image, i
     // OpenCV takes no const data; find() only reads it.
     return find(cv::Mat(image.height, image.width, CV_8UC3, const_cast<std::uint8_t*>(image.bgr),
                         static_cast<std::size_t>(image.stride)),
-                width, height);
+                width, height, least_margin_px);
   } catch (const std::exception& error) {
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');

@@ -35,13 +35,14 @@ Expected<void> VideoTracker::find(const GreyImage& image, const ColourImage& col
   const std::vector<Vector2d> occupied = follower_.occupied();
   GreyImage barred;
   std::vector<std::uint8_t> mask;
+  const int candidates = follower_.most_candidates();
+  const DetectorSettings detector = detector_settings_for_trial(image, candidates);
   if (colour.bgr != nullptr) {
-    auto instruments = find_instruments(colour, image.width, image.height);
+    auto instruments = find_instruments(colour, image.width, image.height, detector.background_clearance_px);
     if (!instruments) return tl::unexpected(instruments.error());
     mask = *std::move(instruments);
     barred = {mask.data(), image.width, image.height, image.width};
   }
-  const DetectorSettings detector = detector_settings_for(image, settings_.features);
   const auto corners = find_features(image, occupied, detector, follower_.free(), barred);
   if (!corners) return tl::unexpected(corners.error());
   follower_.add(image, *corners, template_settings_for(detector));

@@ -22,7 +22,8 @@ class VideoTracker {
  public:
   explicit VideoTracker(const VideoTrackerSettings& settings);
 
-  // Follows every feature into the next frame. Takes nothing from the heap once fill_up() has seen an image of its size.
+  // Follows every feature into the next frame. Takes nothing from the heap once fill_up() has seen an image of its
+  // size.
   void track_into(const GreyImage& image) noexcept { follower_.track_into(image); }
   // New features in the image followed last, when it is time for them and places are free. `colour`, when it has
   // pixels, tells instruments; it may be reduced. The error says what is wrong with the images.

@@ -29,8 +29,8 @@ class LucasKanade {
 
   // Takes the points of one image into the next, of the same size. Those that are not found become empty; empty ones
   // stay so.
-  [[nodiscard]] virtual Expected<void> follow(const GreyImage& from, const GreyImage& to,
-                                              std::vector<std::optional<Vector2d>>& points) = 0;
+  [[nodiscard]] virtual Expected<void> track_points(const GreyImage& from, const GreyImage& to,
+                                                    std::vector<std::optional<Vector2d>>& points) = 0;
 };
 
 }  // namespace perimap

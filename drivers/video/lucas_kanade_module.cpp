@@ -39,8 +39,8 @@ class OpenCvLucasKanade final : public LucasKanade {
     }
   }
 
-  Expected<void> follow(const GreyImage& from, const GreyImage& to,
-                        std::vector<std::optional<Vector2d>>& points) override {
+  Expected<void> track_points(const GreyImage& from, const GreyImage& to,
+                              std::vector<std::optional<Vector2d>>& points) override {
     constexpr int kLevelsAboveFirst = 3;
     constexpr double kMostOff_px = 1;
     try {

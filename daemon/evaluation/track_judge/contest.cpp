@@ -42,7 +42,7 @@ Expected<Tracks> follow_with_lucas_kanade(const Clip& clip, int features, LucasK
   Tracks tracks;
   for (std::size_t step = 0; step < clip.steps(); ++step) {
     if (step > 0) {
-      const auto followed = tracker.follow(clip.luminance(step - 1), clip.luminance(step), points);
+      const auto followed = tracker.track_points(clip.luminance(step - 1), clip.luminance(step), points);
       if (!followed) return tl::unexpected(followed.error());
     }
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -67,7 +67,7 @@ Expected<std::map<std::uint32_t, Vector2d>> reference_at_turn(const Clip& clip, 
       points.push_back(track[first]);
     }
     for (std::size_t step = first + 1; step <= clip.turn(); ++step) {
-      const auto followed = tracker.follow(clip.luminance(step - 1), clip.luminance(step), points);
+      const auto followed = tracker.track_points(clip.luminance(step - 1), clip.luminance(step), points);
       if (!followed) return tl::unexpected(followed.error());
     }
     for (std::size_t k = 0; k < ids.size(); ++k) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <numbers>
 #include <vector>
@@ -37,7 +38,8 @@ std::vector<std::uint8_t> darkened(const Clip& clip, int stride) {
     const std::uint8_t* const from = colour.row(y);
     std::uint8_t* const to = pixels.data() + static_cast<std::ptrdiff_t>(y) * stride;
     for (int x = 0; x < clip.width(); ++x) {
-      for (int channel = 0; channel < 3; ++channel) to[4 * x + channel] = from[3 * x + channel] / 2;
+      for (int channel = 0; channel < 3; ++channel)
+        to[4 * x + channel] = static_cast<std::uint8_t>(from[3 * x + channel] / 2);
     }
   }
   return pixels;

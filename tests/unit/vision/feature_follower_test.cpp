@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -110,8 +111,32 @@ TEST_F(FeatureFollowerTest, FollowsSteadyMotionAndPromotesItsCandidates) {
     show({2.3 * k, -1.1 * k});
     follow();
   }
-  EXPECT_GE(count(FollowState::kTracked), candidates * 6 / 10);  // some leave the view
+  EXPECT_GE(count(FollowState::kTracked), std::min(candidates, kFeatures) * 6 / 10);  // some leave the view
+  EXPECT_LE(count(FollowState::kTracked), kFeatures);                                 // however many were tried
   EXPECT_LT(worst_px(), 0.5);
+}
+
+// Within 40 frames one texture turns into another that goes the same way.
+TEST_F(FeatureFollowerTest, KeepsFeaturesThatTurnIntoOthersByAndBy) {
+  track_ten_frames(0.5);
+  const int before = count(FollowState::kTracked);
+  ASSERT_GE(before, 25);
+  for (int k = 11; k <= 50; ++k) {
+    show({0.5 * k, 0});
+    const ImageBuffer other = render(Texture(9), view_at(shift_), kWidth, kHeight, 1, random_, 5);
+    const double share = (k - 10) / 40.0;
+    for (std::size_t i = 0; i < image_.pixels.size(); ++i) {
+      image_.pixels[i] =
+          static_cast<std::uint8_t>(std::lround((1 - share) * image_.pixels[i] + share * other.pixels[i]));
+    }
+    follow();
+  }
+  int found = 0;
+  for (const FollowedFeature& feature : follower_.features()) {
+    found += feature.found && feature.state == FollowState::kTracked ? 1 : 0;
+  }
+  EXPECT_GE(found, before / 2);
+  EXPECT_LT(worst_px(), 3);
 }
 
 TEST_F(FeatureFollowerTest, KeepsItsFeaturesWhenTheCameraJerks) {

@@ -1,0 +1,115 @@
+#include "core/vision/followed_patch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/geometry/symmetric_matrix2.hpp"
+
+namespace perimap {
+namespace {
+
+// Of the first view, where it may take over: one that fits worse tells no better than the last one where it is.
+constexpr double kFirstViewFits = 0.98;
+
+// Any place that has been found makes a view: whether it is a good one was judged when the feature began.
+TemplateSettings any_texture() noexcept {
+  TemplateSettings settings;
+  settings.min_texture = settings.min_texture_coarse = 1e-3;
+  settings.max_saturated_share = 1;
+  return settings;
+}
+
+}  // namespace
+
+void FollowedPatch::begin(const PatchTemplate& first, const Vector2d& px) noexcept {
+  first_ = first;
+  first_state_ = last_state_ = PatchState{};
+  first_state_.px = px;
+  has_last_ = false;
+  drift_px2_ = back_px_ = 0;
+}
+
+double FollowedPatch::drift_px() const noexcept { return std::sqrt(drift_px2_); }
+
+void FollowedPatch::put_back(const Places& places) noexcept {
+  first_state_ = places.first;
+  last_state_ = places.last;
+  drift_px2_ = places.drift_px2;
+}
+
+PatchMatch FollowedPatch::find(const PatchTracker& tracker, const GreyImage& image, const Search& search) noexcept {
+  const Matrix2d covariance = search.deviation_px * search.deviation_px * Matrix2d::Identity();
+  PatchState state = has_last_ ? last_state_ : first_state_;
+  PatchMatch match = tracker.track(image, has_last_ ? last_ : first_, state, search.predicted_px, covariance);
+  if (match.state == MatchState::kFound && match.correlation < search.min_correlation) {
+    match.state = MatchState::kLowCorrelation;
+  }
+  if (match.state == MatchState::kFound && search.before != nullptr && !comes_back(tracker, image, search, match)) {
+    match.state = MatchState::kTooFar;
+  }
+  if (match.state == MatchState::kFound) {
+    if (has_last_) {
+      last_state_ = state;
+      drift_px2_ += larger_eigenvalue(match.covariance_px2);
+      correct_by_first_view(tracker, image, match);
+    } else {
+      first_state_ = state;
+    }
+    return match;
+  }
+  if (!has_last_) return match;
+  // What has been covered, or has gone and come back, may look as it did at first.
+  PatchState first = first_state_;
+  const PatchMatch again = tracker.track(image, first_, first, search.predicted_px, covariance);
+  if (again.state != MatchState::kFound || again.correlation < std::max(search.min_correlation, kFirstViewFits)) {
+    return match;
+  }
+  first_state_ = first;
+  drift_px2_ = 0;
+  return again;
+}
+
+// As Lucas-Kanade is commonly checked, but with gain and bias.
+bool FollowedPatch::comes_back(const PatchTracker& tracker, const GreyImage& image, const Search& search,
+                               const PatchMatch& match) noexcept {
+  constexpr double kMostOff_px = 1.0;
+  PatchTemplate now;
+  if (make_patch_template(image, match.px, any_texture(), tracker.kernels(), now) != TemplateVerdict::kGood) {
+    return false;
+  }
+  now.affine_usable = false;
+  PatchState state;
+  // The way back begins without knowing where it should end: by the same prediction, as far off as that was.
+  const Vector2d expected = search.before_px + (match.px - search.predicted_px);
+  constexpr double kLeastDeviation_px = 2;
+  const double deviation_px = std::max(search.deviation_px, kLeastDeviation_px);
+  const PatchMatch back =
+      tracker.track(*search.before, now, state, expected, deviation_px * deviation_px * Matrix2d::Identity());
+  if (back.state != MatchState::kFound) return false;
+  back_px_ = (back.px - search.before_px).norm();
+  return back_px_ < kMostOff_px;
+}
+
+void FollowedPatch::correct_by_first_view(const PatchTracker& tracker, const GreyImage& image,
+                                          PatchMatch& match) noexcept {
+  constexpr double kLeast_px = 0.7;  // of what the two views of one place may differ by
+  PatchState state = first_state_;
+  const double variance = drift_px2_ + kLeast_px * kLeast_px;
+  const PatchMatch first = tracker.track(image, first_, state, match.px, variance * Matrix2d::Identity());
+  if (first.state != MatchState::kFound || first.correlation < kFirstViewFits) return;
+  first_state_ = state;
+  drift_px2_ = 0;
+  match = first;
+}
+
+void FollowedPatch::keep_view(const GreyImage& image, const PatchMatch& match, const PatchKernels& kernels) noexcept {
+  PatchTemplate view;
+  if (make_patch_template(image, match.px, any_texture(), kernels, view) != TemplateVerdict::kGood) return;
+  last_ = view;
+  last_.affine_usable = false;
+  last_state_ = PatchState{};
+  last_state_.px = match.px;
+  has_last_ = true;
+}
+
+}  // namespace perimap

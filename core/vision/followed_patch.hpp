@@ -1,0 +1,64 @@
+// What one followed feature looks like: as it was first seen, and as it looked last.
+#pragma once
+
+#include "core/geometry/pose.hpp"
+#include "core/sensors/grey_image.hpp"
+#include "core/vision/patch_template.hpp"
+#include "core/vision/patch_tracker.hpp"
+
+namespace perimap {
+
+// Tissue changes its looks within seconds: it is stretched, lit from elsewhere, wetted. A template of the first view
+// does not drift but soon stops fitting; one of the frame before fits and drifts, by a match's deviation a frame. So
+// both are kept (Matthews, Ishikawa & Baker, "The template update problem", IEEE PAMI 26(6), 2004): the last view finds
+// the place, and the first one, whenever it fits well there, corrects it.
+//
+// The last view moves without changing its shape: from one frame to the next tissue hardly does, and weak texture does
+// not determine more. A place that it finds counts when the way back, of what is seen at the found place into the frame
+// before, ends where it began: that tells highlights and edges, along which two ways differ, and asks for no
+// correlation, which says more about texture than about the match.
+class FollowedPatch {
+ public:
+  // Of the first view, at px.
+  void begin(const PatchTemplate& first, const Vector2d& px) noexcept;
+
+  struct Search {
+    Vector2d predicted_px = Vector2d::Zero();
+    double deviation_px = 0;     // of the prediction, per axis
+    double min_correlation = 0;  // asked for beside the tracker's own
+    // The frame before and where the feature was found in it; null when it was not: then there is no way back.
+    const GreyImage* before = nullptr;
+    Vector2d before_px = Vector2d::Zero();
+  };
+  // Where it is in the image. Places are noted with MatchState::kFound alone.
+  [[nodiscard]] PatchMatch find(const PatchTracker& tracker, const GreyImage& image, const Search& search) noexcept;
+
+  // The view of the place just found becomes the last one. Without a template to be had there, the one before stays.
+  void keep_view(const GreyImage& image, const PatchMatch& match, const PatchKernels& kernels) noexcept;
+
+  // How far the way back has ended from where it began, px, when it was last gone.
+  [[nodiscard]] double back_px() const noexcept { return back_px_; }
+  // How far the followed point may have drifted since the first view fitted, standard deviation, px.
+  [[nodiscard]] double drift_px() const noexcept;
+
+  // All but the templates: what is not believed is put back. To be done before keep_view().
+  struct Places {
+    PatchState first, last;
+    double drift_px2 = 0;
+  };
+  [[nodiscard]] Places places() const noexcept { return {first_state_, last_state_, drift_px2_}; }
+  void put_back(const Places& places) noexcept;
+
+ private:
+  [[nodiscard]] bool comes_back(const PatchTracker& tracker, const GreyImage& image, const Search& search,
+                                const PatchMatch& match) noexcept;
+  void correct_by_first_view(const PatchTracker& tracker, const GreyImage& image, PatchMatch& match) noexcept;
+
+  PatchTemplate first_, last_;
+  PatchState first_state_, last_state_;
+  bool has_last_ = false;  // else the first view is the last one
+  double drift_px2_ = 0;
+  double back_px_ = 0;
+};
+
+}  // namespace perimap
