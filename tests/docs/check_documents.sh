@@ -6,6 +6,7 @@
 #     `tests/run.sh --full`, `drivers/ecg/*.cpp`
 #   - each key of the configuration in backticks (`phase.law`) is one of config/replay.toml
 #   - each file of a folder with an index (README.md) is linked from that index
+#   - each folder of the sources that has a header stands in the table of docs/design/architecture.md
 #   - each document that a comment of the sources names exists
 #
 # What it finds is printed as FILE:LINE: what; exit code 1 then. No network: links to elsewhere are passed over.
@@ -135,6 +136,14 @@ for index in docs/README.md docs/*/README.md; do
     grep -qxF "$name" <<< "$targets" || fault "$index: $name is not linked from here"
   done
 done
+
+# The table of targets has every folder of the sources that has a header.
+table=docs/design/architecture.md
+if [ -e $table ]; then
+  while read -r folder; do
+    grep -qF "| \`$folder\`" $table || grep -qE "^\|.*, \`$folder\`" $table || fault "$table: there is no row for $folder"
+  done < <(find core drivers daemon -name '*.hpp' -printf '%h\n' 2> /dev/null | sort -u)
+fi
 
 # Not idl/: its text, comments included, is part of every recording, so it changes with its next version alone.
 while IFS=: read -r file number name; do
