@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -11,6 +12,8 @@
 
 namespace perimap {
 namespace {
+
+constexpr int kMostPartial = 1000;  // beside one file
 
 tl::unexpected<Error> cannot_write(const std::filesystem::path& file, int error) {
   return fail(on_one_line(file.string() + ": cannot be written: " + std::generic_category().message(error)));
@@ -50,11 +53,16 @@ Expected<WholeFile> WholeFile::create(const std::filesystem::path& file, Name na
   std::filesystem::path target = without_links(file);
   // A new file takes the place of the old one, which may say that it is not to be written.
   if (::access(target.c_str(), W_OK) != 0 && errno != ENOENT) return cannot_write(file, errno);
-  std::filesystem::path partial = target;
-  partial += ".part";
-  if (name == Name::kPartWithEnding) partial += target.extension();
-  const int descriptor = ::open(partial.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NONBLOCK | O_CLOEXEC, 0666);
-  if (descriptor < 0) return cannot_write(file, errno);
+  std::filesystem::path partial;
+  int descriptor = -1;
+  // What has that name already may be all that is left of an earlier run, or another's that is under way.
+  for (int number = 1; descriptor < 0; ++number) {
+    partial = target;
+    partial += number == 1 ? ".part" : ".part-" + std::to_string(number);
+    if (name == Name::kPartWithEnding) partial += target.extension();
+    descriptor = ::open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor < 0 && (errno != EEXIST || number == kMostPartial)) return cannot_write(file, errno);
+  }
   ::close(descriptor);
   std::error_code error;
   const auto before = std::filesystem::status(target, error);

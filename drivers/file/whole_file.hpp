@@ -15,7 +15,8 @@ namespace perimap {
 // Errors name the file, not the other name: "heart.mcap: cannot be written: No space left on device".
 class WholeFile {
  public:
-  // How the other name is made: FILE.part, or FILE.part.mkv for those who tell the kind of file by its ending.
+  // How the other name is made: FILE.part, or FILE.part.mkv for those who tell the kind of file by its ending;
+  // FILE.part-2 and so on where there is one already, which is left alone.
   enum class Name { kPart, kPartWithEnding };
 
   // Makes the file under its other name, empty, so that a folder that takes none is found before the work begins.

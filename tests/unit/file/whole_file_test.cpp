@@ -99,6 +99,23 @@ TEST_F(WholeFileTest, AnEndingThatTellsTheKindIsKept) {
   EXPECT_EQ(whole->path(), folder_ / "a.mkv.part.mkv");
 }
 
+TEST_F(WholeFileTest, WhatIsLeftOfAnEarlierRunStays) {
+  const auto file = folder_ / "a.txt";
+  std::ofstream(folder_ / "a.txt.part") << "all that came";
+  auto whole = WholeFile::create(file);
+  ASSERT_TRUE(whole) << whole.error().message;
+  auto another = WholeFile::create(file, WholeFile::Name::kPartWithEnding);
+  ASSERT_TRUE(another) << another.error().message;
+  EXPECT_EQ(whole->path(), folder_ / "a.txt.part-2");
+  EXPECT_EQ(another->path(), folder_ / "a.txt.part.txt");
+  EXPECT_EQ(WholeFile::create(file, WholeFile::Name::kPartWithEnding)->path(), folder_ / "a.txt.part-2.txt");
+  ASSERT_TRUE(check_writable(file));
+  std::ofstream(whole->path()) << "new";
+  ASSERT_TRUE(whole->finish());
+  EXPECT_EQ(content(file), "new");
+  EXPECT_EQ(content(folder_ / "a.txt.part"), "all that came");
+}
+
 TEST_F(WholeFileTest, ALinkStaysALinkToWhatIsWritten) {
   std::filesystem::create_directory(folder_ / "elsewhere");
   std::ofstream(folder_ / "elsewhere" / "a.txt") << "old";
