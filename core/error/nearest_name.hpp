@@ -33,8 +33,22 @@ namespace perimap {
   return row[b.size()];
 }
 
-// The one of `names` that is nearest to `misspelt`, the first of several; empty when none is so near that it could be
-// meant: a third of its letters may differ.
+// The one name that begins so, case apart; empty when that is none or several, or when fewer than three letters are
+// given.
+template <class Names>
+[[nodiscard]] std::string only_name_that_begins(std::string_view start, const Names& names) {
+  std::string found;
+  if (start.size() < 3) return found;
+  for (const std::string_view name : names) {
+    if (name.size() < start.size() || letters_apart(start, name.substr(0, start.size())) != 0) continue;
+    if (!found.empty()) return {};
+    found = name;
+  }
+  return found;
+}
+
+// The one of `names` that is nearest to `misspelt`, the first of several; where none is so near that it could be meant
+// (a third of its letters may differ), the only one that begins so; empty without one.
 template <class Names>
 [[nodiscard]] std::string nearest_name(std::string_view misspelt, const Names& names) {
   constexpr std::size_t kLongest = 64;  // what is longer is no slip of a finger, and would take long
@@ -48,7 +62,7 @@ template <class Names>
     least = apart;
     nearest = name;
   }
-  return nearest;
+  return nearest.empty() ? only_name_that_begins(misspelt, names) : nearest;
 }
 
 // For the end of a message: "; did you mean 'simulate'?", or nothing.

@@ -38,6 +38,13 @@ TEST(NearestName, IsWhatWasMeant) {
   EXPECT_EQ(did_you_mean("ctrl", kNames), "; did you mean 'ctl'?");
 }
 
+TEST(NearestName, IsTheOnlyOneOfWhichTheBeginningIsGiven) {
+  EXPECT_EQ(nearest_name("rec", kNames), "record");
+  EXPECT_EQ(nearest_name("WAT", kNames), "watch");
+  EXPECT_EQ(nearest_name("rep", kNames), "") << "replay or report";
+  EXPECT_EQ(nearest_name("wa", kNames), "") << "as good as nothing";
+}
+
 TEST(NearestName, IsNoneWhereNothingIsNear) {
   EXPECT_EQ(nearest_name("simulate", kNames), "");
   EXPECT_EQ(nearest_name("", kNames), "");
