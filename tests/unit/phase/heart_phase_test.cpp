@@ -194,6 +194,33 @@ TEST_F(Heart, MoreTrialsThanThereIsRoomForAreLeftOut) {
   EXPECT_TRUE(change.another_law);
 }
 
+TEST_F(Heart, TrialsThatWereWeighedMakeRoomForOthers) {
+  settings.law_from_image = true;
+  sees = false;
+  run(12);
+  for (std::size_t tried = 0; tried < HeartPhase::kMostTrials; tried += 64) {
+    try_laws(64, kLinearExplains);
+    run(4);
+  }
+  ASSERT_EQ(heart->by_ecg().law().law, PhaseLaw::kLinear);
+  for (int i = 0; i < 15 && heart->by_ecg().law().law == PhaseLaw::kLinear; ++i) {
+    try_laws(64, kWarpedExplains);
+    run(4);
+  }
+  EXPECT_EQ(heart->by_ecg().law().law, PhaseLaw::kWarped);
+}
+
+TEST_F(Heart, ALawThatIsFoundInTheFrameThatKnowsABeatIsToldOf) {
+  settings.law_from_image = true;
+  sees = false;
+  run(12);
+  next_cycle();
+  try_laws(20, kWarpedExplains);
+  next_frame();
+  EXPECT_TRUE(change.beat);
+  EXPECT_TRUE(change.another_law);
+}
+
 // Moved R peaks are for completed cycles alone: neither what is searched by nor what is published goes by them.
 TEST_F(Heart, CompletedCyclesLieBetweenMovedRPeaks) {
   run(40);
