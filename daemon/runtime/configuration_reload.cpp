@@ -9,9 +9,10 @@
 namespace perimap {
 
 Expected<std::string> ConfigurationReload::operator()() {
+  // Over the reading, too: of two that come together the one that reads later has the last word.
+  const std::lock_guard lock(mutex_);
   const auto read = load_configuration(file_);
   if (!read) return tl::unexpected(read.error());
-  const std::lock_guard lock(mutex_);
   std::string restart;
   for (const std::string& key : differing_keys(running_, *read)) {
     if (key != "log.level") restart += fmt::format("{}{}", restart.empty() ? "" : ", ", key);
