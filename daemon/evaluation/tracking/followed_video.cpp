@@ -54,7 +54,7 @@ class Tracking {
                   .frames_per_s = frames_per_s}) {}
 
   // Follows every feature in the frame and fills up their number.
-  Expected<void> take(const VideoFrame& frame, FrameSource& source) {
+  Expected<void> track(const VideoFrame& frame, FrameSource& source) {
     const auto begin = std::chrono::steady_clock::now();
     tracker_.track_into(frame.grey);
     counts_.follow_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -146,7 +146,7 @@ Expected<FollowSummary> follow_features(const FollowSettings& settings, StopSign
       break;
     }
     if (*frame == nullptr) break;
-    if (const auto taken = tracking.take(**frame, **source); !taken) return tl::unexpected(taken.error());
+    if (const auto taken = tracking.track(**frame, **source); !taken) return tl::unexpected(taken.error());
     table->write(tracks.add((*frame)->number, tracking.features()));
     if (const auto written = video.write(**frame, tracking.marks()); !written) return tl::unexpected(written.error());
     progress(tracking.counts().frames, (*source)->announced_frames());
