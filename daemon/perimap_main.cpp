@@ -21,6 +21,8 @@
   COMMAND(probe)                  \
   COMMAND(record)                 \
   COMMAND(check)                  \
+  COMMAND(calibrate)              \
+  COMMAND(register)               \
   COMMAND(ctl)
 
 namespace perimap {

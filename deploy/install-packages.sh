@@ -22,7 +22,10 @@ build=(
   libboost-dev                               # core/realtime: lock-free rings
   libhwy-dev                                 # core/bank: portable SIMD with a choice at run time
   libopencv-core-dev libopencv-imgproc-dev   # core/vision
-  libopencv-videoio-dev                      # drivers/video: video files
+  libopencv-videoio-dev libopencv-imgcodecs-dev  # drivers/video: video files, pictures
+  libopencv-calib3d-dev                      # daemon/setup: lenses, boards, other hand-eye solutions
+  libopencv-contrib-dev                      # daemon/setup: ArUco and AprilTag markers, which OpenCV 4.6 has there alone
+  libceres-dev                               # daemon/setup: least squares with derivatives and covariance
   libopencv-video-dev                        # drivers/video: Lucas-Kanade, that the tracker is held against
   libjpeg62-turbo-dev                        # drivers/image: MJPG cameras
   cyclonedds-dev cyclonedds-tools            # idl, daemon: DDS and its IDL compiler
@@ -36,8 +39,6 @@ build=(
 )
 tests=(
   libgtest-dev libgmock-dev
-  libopencv-calib3d-dev                      # the camera model is held against OpenCV; the example subscriber
-  libopencv-imgcodecs-dev                    # the example subscriber
   libopenigtlink-dev                         # the peer of the OpenIGTLink client
   nodejs=node npm=npm ca-certificates        # recordings are read back by the official npm packages
 )
@@ -45,7 +46,6 @@ full=(
   clang-16 libclang-rt-16-dev                # fuzzing
   clang-tidy clang-format
   qemu-system-x86 busybox-static cpio zstd kmod udev iproute2 v4l-utils  # tests/vm: CAN, V4L2 and systemd on Debian's own kernels
-  libceres-dev                               # tests/bench: the batch alternative
   stress-ng                                  # perimap bench: latencies under load
   dpkg-dev lintian systemd man-db            # the Debian package and its service, checked
 )

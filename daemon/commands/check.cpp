@@ -10,6 +10,7 @@
 #include "daemon/config/configuration_text.hpp"
 #include "daemon/config/surface_traffic.hpp"
 #include "daemon/runtime/device_setup.hpp"
+#include "daemon/runtime/setup_warnings.hpp"
 #include "daemon/runtime/thread_launcher.hpp"
 
 namespace perimap {
@@ -47,6 +48,7 @@ Outcome check(const std::string& file, const Console& console) {
   if (!configuration) return refuse(configuration.error(), ExitCode::kWrongUsage);
   fmt::print("{}\n", to_toml(*configuration));
   for (const std::string& line : traffic_lines(*configuration)) fmt::print("# {}\n", line);
+  for (const std::string& line : setup_warnings(*configuration)) console.complain("warning: " + line);
   tell_refused_privileges(configuration->realtime, console);
   return {};
 }

@@ -10,6 +10,7 @@
 #include "daemon/probe/device_probe.hpp"
 #include "daemon/probe/probe_report.hpp"
 #include "daemon/process/stop_signal.hpp"
+#include "daemon/runtime/setup_warnings.hpp"
 
 namespace perimap {
 namespace {
@@ -44,6 +45,7 @@ Outcome probe(const Options& options, const Console& console) {
         options.file + ": names no device; expected keys 'camera.device', 'tracker.protocol' or 'ecg.protocol'",
         ExitCode::kWrongUsage);
   }
+  for (const std::string& line : setup_warnings(*configuration)) console.complain("warning: " + line);
   if (!wait_for_playback(camera, *stop, console)) return refuse("stopped before it began to listen");
   const ProbedDevices probed = probe_devices(*configuration, *devices, from_seconds(options.seconds), *stop);
   if (stop->requested()) console.complain("stopped early");

@@ -53,4 +53,10 @@ Expected<std::unique_ptr<LucasKanade>> LucasKanade::create() {
   return module().and_then([](const VideoModule* video) { return video->lucas_kanade(); });
 }
 
+Expected<PictureFile> read_picture(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return fail(path + ": there is no such picture");
+  return module().and_then([&](const VideoModule* video) { return video->read_picture(path); });
+}
+
 }  // namespace perimap

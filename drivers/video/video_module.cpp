@@ -8,6 +8,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <string>
@@ -213,11 +214,25 @@ Expected<std::unique_ptr<VideoWriter>> create(const std::string& path, int width
   }
 }
 
+Expected<PictureFile> read_grey(const std::string& path) {
+  try {
+    // As the sensor has it, whichever way the camera was held.
+    const cv::Mat grey = cv::imread(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    if (grey.empty()) return fail(path + ": not a picture that can be read");
+    PictureFile picture{grey.cols, grey.rows, {}};
+    for (int y = 0; y < grey.rows; ++y) picture.grey.insert(picture.grey.end(), grey.ptr(y), grey.ptr(y) + grey.cols);
+    return picture;
+  } catch (const std::exception& thrown) {
+    return failed(path, thrown);
+  }
+}
+
 }  // namespace
 }  // namespace perimap
 
 const perimap::VideoModule* perimap_video_module() {
-  static constexpr perimap::VideoModule kModule{&perimap::open, &perimap::create, &perimap::make_lucas_kanade};
+  static constexpr perimap::VideoModule kModule{&perimap::open, &perimap::create, &perimap::read_grey,
+                                                &perimap::make_lucas_kanade};
   perimap::keep_opencv_to_one_thread();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said here
   return &kModule;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "drivers/video/lucas_kanade.hpp"
+#include "drivers/video/picture_file.hpp"
 #include "drivers/video/video_file.hpp"
 
 namespace perimap {
@@ -14,6 +15,8 @@ struct VideoModule {
   // As VideoReader::open() and VideoWriter::create().
   Expected<std::unique_ptr<VideoReader>> (*open)(const std::string& path);
   Expected<std::unique_ptr<VideoWriter>> (*create)(const std::string& path, int width, int height, double frames_per_s);
+  // As read_picture().
+  Expected<PictureFile> (*read_picture)(const std::string& path);
   // As LucasKanade::create().
   Expected<std::unique_ptr<LucasKanade>> (*lucas_kanade)();
 };

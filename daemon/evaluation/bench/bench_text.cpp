@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "daemon/evaluation/bench/table.hpp"
-#include "daemon/evaluation/report/html_page.hpp"
-#include "daemon/evaluation/report/svg_plot.hpp"
+#include "daemon/pages/html_page.hpp"
+#include "daemon/pages/svg_plot.hpp"
 
 namespace perimap::bench {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "daemon/evaluation/report/html_page.hpp"
+#include "daemon/pages/html_page.hpp"
 
 namespace perimap::bench {
 

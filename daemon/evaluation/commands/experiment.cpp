@@ -13,7 +13,7 @@
 #include "daemon/command_line/commands.hpp"
 #include "daemon/command_line/progress.hpp"
 #include "daemon/evaluation/experiment/experiment_text.hpp"
-#include "daemon/evaluation/report/png_picture.hpp"
+#include "daemon/pages/png_picture.hpp"
 #include "drivers/file/whole_file.hpp"
 #include "drivers/text_file/text_file.hpp"
 

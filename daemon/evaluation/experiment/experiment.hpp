@@ -13,7 +13,7 @@
 
 #include "core/error/expected.hpp"
 #include "daemon/evaluation/experiment/comparison.hpp"
-#include "daemon/evaluation/report/svg_plot.hpp"
+#include "daemon/pages/svg_plot.hpp"
 
 namespace perimap {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "daemon/evaluation/report/html_page.hpp"
+#include "daemon/pages/html_page.hpp"
 
 namespace perimap {
 namespace {

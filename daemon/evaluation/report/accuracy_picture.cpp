@@ -1,6 +1,6 @@
 #include "daemon/evaluation/report/accuracy_picture.hpp"
 
-#include "daemon/evaluation/report/svg_plot.hpp"
+#include "daemon/pages/svg_plot.hpp"
 
 namespace perimap {
 namespace {

@@ -1,4 +1,4 @@
-#include "daemon/evaluation/report/svg_plot.hpp"
+#include "daemon/pages/svg_plot.hpp"
 
 #include <gtest/gtest.h>
 

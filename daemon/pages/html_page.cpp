@@ -1,4 +1,4 @@
-#include "daemon/evaluation/report/html_page.hpp"
+#include "daemon/pages/html_page.hpp"
 
 #include <fmt/format.h>
 

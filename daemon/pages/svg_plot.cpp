@@ -1,4 +1,4 @@
-#include "daemon/evaluation/report/svg_plot.hpp"
+#include "daemon/pages/svg_plot.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "daemon/evaluation/report/html_page.hpp"
+#include "daemon/pages/html_page.hpp"
 
 namespace perimap {
 namespace {

@@ -1,4 +1,4 @@
-#include "daemon/evaluation/report/png_picture.hpp"
+#include "daemon/pages/png_picture.hpp"
 
 #include <cairo.h>
 #include <librsvg/rsvg.h>

@@ -1,0 +1,32 @@
+// Poses over time as a calibration gets them: a whole sequence at once, with dropouts, in the order of their times.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/geometry/pose.hpp"
+
+namespace perimap {
+
+struct TimedPose {
+  double t_s = 0.0;
+  Pose X;  // mm
+};
+
+// In the order of their times, each time once: of several at one time the first is kept.
+[[nodiscard]] std::vector<TimedPose> in_order(std::vector<TimedPose> poses);
+
+// Of consecutive times; 0 with fewer than two.
+[[nodiscard]] double median_interval_s(const std::vector<TimedPose>& poses);
+
+struct PoseWithTwist {
+  Pose X;
+  Vector6d twist = Vector6d::Zero();  // in the moving frame: angular velocity, rad/s, then velocity, mm/s
+};
+
+// Between the two poses around t (constant angular velocity, translation linear); none outside, or in a gap that is
+// longer. `poses` as in_order() gives them.
+[[nodiscard]] std::optional<PoseWithTwist> pose_at(const std::vector<TimedPose>& poses, double t_s,
+                                                   double longest_gap_s);
+
+}  // namespace perimap

@@ -1,0 +1,116 @@
+#include "daemon/setup/camera_report.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/calibration/calibration_file.hpp"
+
+namespace perimap {
+namespace {
+
+std::size_t used_of(const CameraCalibration& result) {
+  return static_cast<std::size_t>(
+      std::count_if(result.views.begin(), result.views.end(), [](const ViewResult& view) { return view.used; }));
+}
+
+std::vector<double> distortion_of(const CameraModel& c) {
+  if (c.lens == Lens::kKannalaBrandt) return {c.k1, c.k2, c.k3, c.k4};
+  return {c.k1, c.k2, c.p1, c.p2, c.k3};
+}
+
+std::vector<double> distortion_deviations_of(const CameraCalibration& result) {
+  const std::size_t count = distortion_of(result.camera).size();
+  return {result.deviations.begin() + 4, result.deviations.begin() + 4 + static_cast<std::ptrdiff_t>(count)};
+}
+
+// Of the RMS of so many residuals, widened as the lens's deviations are.
+double rms_deviation(const CameraCalibration& result) {
+  const double coordinates = 2.0 * static_cast<double>(std::max<std::size_t>(1, result.points));
+  return result.rms_px * std::sqrt(result.variance_factor / (2.0 * coordinates));
+}
+
+}  // namespace
+
+std::string text_of(const CameraCalibration& result, const Board& board, const std::vector<std::string>& without) {
+  const CameraModel& c = result.camera;
+  const std::vector<double>& s = result.deviations;
+  std::string text =
+      fmt::format("Lens of {}x{} pictures, by {} views of a {}\n", c.width, c.height, used_of(result), name_of(board));
+  text += fmt::format("  focal length     {:.2f} {:.2f} px, deviations {:.2f} {:.2f}\n", c.fx, c.fy, s[0], s[1]);
+  text += fmt::format("  principal point  {:.2f} {:.2f} px, deviations {:.2f} {:.2f}\n", c.cx, c.cy, s[2], s[3]);
+  text += fmt::format("  distortion       {} {:.5f}, deviations {:.5f}\n",
+                      c.lens == Lens::kKannalaBrandt ? "k1 k2 k3 k4" : "k1 k2 p1 p2 k3",
+                      fmt::join(distortion_of(c), " "), fmt::join(distortion_deviations_of(result), " "));
+  text += fmt::format("  reprojection     {:.3f} px RMS of {} points; {} more left out, {:.3f} px with them\n",
+                      result.rms_px, result.points, result.points_left_out, result.rms_all_px);
+  text += fmt::format("  held aside       each fifth of the views by the others: {:.3f} px RMS\n",
+                      result.held_aside_rms_px);
+  if (result.variance_factor > 1.0) {
+    text +=
+        fmt::format("  deviations are {:.1f} times those of independent residuals, for those of a view go together\n",
+                    std::sqrt(result.variance_factor));
+  }
+  text += "  points in each ninth of the picture:\n";
+  for (std::size_t row = 0; row < 3; ++row) {
+    text += fmt::format("    {:>6} {:>6} {:>6}\n", result.coverage[3 * row], result.coverage[3 * row + 1],
+                        result.coverage[3 * row + 2]);
+  }
+  if (std::any_of(result.coverage.begin(), result.coverage.end(), [](int n) { return n == 0; })) {
+    text += "  where there are none the distortion is only guessed: show the board there too\n";
+  }
+  for (const ViewResult& view : result.views) {
+    if (!view.used) text += fmt::format("  not fitted: {}\n", view.name);
+  }
+  for (const std::string& name : without) text += fmt::format("  no board: {}\n", name);
+  return text;
+}
+
+nlohmann::json json_of(const CameraCalibration& result, const Board& board, const std::vector<std::string>& without) {
+  const CameraModel& c = result.camera;
+  const std::vector<double>& s = result.deviations;
+  nlohmann::json covariance = nlohmann::json::array();
+  for (const auto& row : result.covariance) covariance.push_back(row);
+  nlohmann::json views = nlohmann::json::array();
+  for (const ViewResult& view : result.views) {
+    views.push_back({{"name", view.name}, {"used", view.used}, {"rms_px", view.rms_px}});
+  }
+  return {{"rms_px", result.rms_px},
+          {"rms_px_deviation", rms_deviation(result)},
+          {"rms_all_px", result.rms_all_px},
+          {"focal_px", {c.fx, c.fy}},
+          {"focal_px_deviation", {s[0], s[1]}},
+          {"principal_point_px", {c.cx, c.cy}},
+          {"principal_point_px_deviation", {s[2], s[3]}},
+          {"views", used_of(result)},
+          {"views_deviation", 0},
+          {"distortion_model", c.lens == Lens::kKannalaBrandt ? "equidistant" : "plumb_bob"},
+          {"distortion_coefficients", distortion_of(c)},
+          {"distortion_coefficients_deviation", distortion_deviations_of(result)},
+          {"covariance", covariance},
+          {"covariance_order", "fx, fy, cx, cy (px)"},
+          {"held_aside_rms_px", result.held_aside_rms_px},
+          {"variance_factor", result.variance_factor},
+          {"image_width", c.width},
+          {"image_height", c.height},
+          {"points", result.points},
+          {"points_left_out", result.points_left_out},
+          {"coverage", result.coverage},
+          {"board", name_of(board)},
+          {"pictures", views},
+          {"pictures_without_board", without}};
+}
+
+std::string calibration_text_of(const CameraCalibration& result, const Board& board, const std::string& date) {
+  const std::vector<double>& s = result.deviations;
+  return format_calibration(result.camera) +
+         fmt::format(
+             "calibration_time: \"{}\"\nnr_of_frames: {}\navg_reprojection_error: {}\nheld_aside_reprojection_error: "
+             "{}\n"
+             "focal_length_deviation: [ {}, {} ]\nprincipal_point_deviation: [ {}, {} ]\nboard: \"{}\"\n",
+             date, used_of(result), result.rms_px, result.held_aside_rms_px, s[0], s[1], s[2], s[3], name_of(board));
+}
+
+}  // namespace perimap

@@ -1,0 +1,90 @@
+#include "daemon/setup/commands/measurement.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <CLI/CLI.hpp>
+
+#include "daemon/command_line/outputs.hpp"
+#include "daemon/command_line/same_file.hpp"
+#include "daemon/setup/setup_plots.hpp"
+
+namespace perimap {
+
+std::string list_of(const nlohmann::json& values) {
+  std::string text = "[";
+  for (const auto& value : values) text += fmt::format("{}{:.8g}", text.size() > 1 ? ", " : "", value.get<double>());
+  return text + "]";
+}
+
+std::string number_of(double value) {
+  const std::string text = fmt::format("{:.6g}", value);
+  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
+}
+
+Outcome check_outputs(const CommonOptions& options, const std::vector<std::string>& inputs) {
+  const std::initializer_list<Output> outputs = {
+      {"--output", options.output}, {"--html", options.html}, {"--configuration", options.configuration}};
+  if (const auto apart = check_apart(outputs, {}); !apart) return refuse(apart.error(), ExitCode::kWrongUsage);
+  for (const Output& output : outputs) {
+    for (const std::string& input : inputs) {
+      if (!output.file.empty() && is_same_file(output.file, input)) {
+        return refuse(fmt::format("{}: is {} itself, which is read", output.option, input), ExitCode::kWrongUsage);
+      }
+    }
+  }
+  if (const auto able = check_writable(outputs); !able) return refuse(able.error());
+  return {};
+}
+
+Outcome finish(const Expected<Measurement>& measured, const CommonOptions& options, const std::string& made_from) {
+  if (!measured) return refuse(measured.error());
+  const std::string date = date_now();
+  nlohmann::json json = measured->json;
+  json["date"] = date;
+  json["made_from"] = made_from;
+  // First what may still be refused: no file is changed then.
+  if (!options.configuration.empty()) {
+    const std::string comment = fmt::format("measured {} from {}", date, made_from);
+    if (const auto set = set_keys(options.configuration, measured->section, measured->keys, comment); !set) {
+      return refuse(set.error());
+    }
+  }
+  if (!options.output.empty()) {
+    const std::string text = measured->file.empty() ? json.dump(2) + "\n" : measured->file;
+    if (const auto written = write_kept(options.output, text); !written) return refuse(written.error());
+  }
+  if (!options.html.empty()) {
+    const std::string page = setup_page(made_from, measured->text, measured->plots);
+    if (const auto written = write_kept(options.html, page); !written) return refuse(written.error());
+  }
+  if (options.json) {
+    fmt::print("{}\n", json.dump(2));
+    return {};
+  }
+  fmt::print("{}", measured->text);
+  for (const std::string& file : {options.output, options.configuration, options.html}) {
+    if (!file.empty()) fmt::print("written to {}\n", file);
+  }
+  return {};
+}
+
+void add_common(CLI::App& command, CommonOptions& options, bool has_unit, bool has_keys) {
+  if (has_unit) {
+    command.add_option("--unit", options.unit, "Unit of the files' lengths")
+        ->check(CLI::IsMember({"m", "mm"}))
+        ->capture_default_str();
+  }
+  command.add_flag("--json", options.json, "Print the result as JSON, every figure with its standard deviation");
+  command.add_option("--output", options.output,
+                     "Write the result to this file; one that is there is kept beside it with its date");
+  command.add_option("--html", options.html, "Write a page with pictures of what the fit leaves over");
+  if (has_keys) {
+    command.add_option("--configuration", options.configuration,
+                       "Set the measured keys in this configuration (TOML); the one before is kept with its date");
+  }
+}
+
+std::string joined(const std::vector<std::string>& files) { return fmt::format("{}", fmt::join(files, ", ")); }
+
+}  // namespace perimap

@@ -1,0 +1,57 @@
+// What the commands that measure a set-up have in common: options, and what is done with a result.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/error/expected.hpp"
+#include "daemon/command_line/outcome.hpp"
+#include "daemon/pages/svg_plot.hpp"
+#include "daemon/setup/kept_result.hpp"
+#include "drivers/pose_file/pose_table.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace perimap {
+
+// What every calibration is told besides its input.
+struct CommonOptions {
+  std::string unit = "m";
+  bool json = false;
+  std::string output;         // the result as a file
+  std::string html;           // a page with pictures
+  std::string configuration;  // whose keys the result becomes
+
+  [[nodiscard]] LengthUnit length_unit() const { return unit == "mm" ? LengthUnit::kMillimetre : LengthUnit::kMetre; }
+};
+
+// What a calibration gives.
+struct Measurement {
+  std::string text;
+  nlohmann::json json;
+  std::vector<MeasuredKey> keys{};  // of the configuration's section
+  std::string section = "tracker";
+  std::vector<Plot> plots{};  // of the page
+  std::string file{};         // what --output writes; empty: the JSON
+};
+
+// Before the work begins: that what is to be written can be, and is nothing that is read, nor another of them.
+[[nodiscard]] Outcome check_outputs(const CommonOptions& options, const std::vector<std::string>& inputs);
+
+// Prints the measurement, and writes what is to be written; refuses with its error when there is none.
+[[nodiscard]] Outcome finish(const Expected<Measurement>& measured, const CommonOptions& options,
+                             const std::string& made_from);
+
+// --unit, --json, --output, --html and --configuration, for results that have them.
+void add_common(CLI::App& command, CommonOptions& options, bool has_unit, bool has_keys);
+
+// Numbers as TOML.
+[[nodiscard]] std::string list_of(const nlohmann::json& values);
+[[nodiscard]] std::string number_of(double value);
+
+[[nodiscard]] std::string joined(const std::vector<std::string>& files);
+
+}  // namespace perimap

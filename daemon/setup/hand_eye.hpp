@@ -1,0 +1,63 @@
+// Where the camera sits in the tracked sensor, from the poses of both: `perimap calibrate hand-eye`.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/calibration/timed_poses.hpp"
+#include "core/error/expected.hpp"
+#include "daemon/setup/hand_eye_adjustment.hpp"
+
+namespace perimap {
+
+struct HandEyeSettings {
+  double largest_offset_s = 1.5;  // between the two clocks
+  // A result that is less certain than this in any direction is refused.
+  double largest_translation_deviation_mm = 5.0;
+  double largest_rotation_deviation_deg = 2.0;
+};
+
+// What another solver makes of the same pairs.
+struct OtherHandEye {
+  std::string method;
+  Pose X_SC;
+  double residual_median_mm = 0.0;
+};
+
+struct HandEyeCalibration {
+  Pose X_SC;
+  Pose X_WB;
+  Eigen::Matrix<double, 7, 7>
+      covariance;             // as HandEyeAdjustment has it, for errors that last `correlation_length` poses
+  Matrix6d error_covariance;  // of one pose, at the sensor
+  double correlation_length = 1.0;
+  bool offset_measured = false;    // false: there is no motion with times of its own to measure it by
+  double offset_s = 0.0;           // added to the tracker's times to get the camera's
+  double joint_offset_s = 0.0;     // what the adjustment together with the places would have it, all errors being noise
+  bool paired_by_rows = false;     // the times of the two files say nothing of which pose belongs to which
+  double speed_correlation = 0.0;  // of the angular speeds, at
+  double speed_offset_s = 0.0;     // the offset that they alone tell
+  std::vector<PosePair> pairs;
+  std::vector<char> used;                  // of each pair
+  std::size_t without_tracker_pose = 0;    // camera poses that fall into the tracker's gaps
+  Vector3d spread_deg = Vector3d::Zero();  // of the orientations about their principal axes, largest first
+  std::vector<double> disagreements_mm;    // translation of AX - XB over all pairs of poses 1 s apart, none left out
+  double disagreement_interval_s = 1.0;    // 1, or what lies between poses where none are 1 s apart
+  double residual_median_mm = 0.0;         // their median
+  double residual_median_mm_deviation = 0.0;
+  double fitted_rms_mm = 0.0;      // the camera's place in the board's frame, of the poses used
+  double held_aside_rms_mm = 0.0;  // each fifth of the time about what the others tell
+  double held_aside_rms_deg = 0.0;
+  std::vector<OtherHandEye> others;
+};
+
+// X_WS of the tracker and X_BC of the camera, each with times of its own clock, in any order. Fails, and says what is
+// missing, when they never overlap or do not move alike, when there are too few, or when their motion does not
+// determine the result.
+[[nodiscard]] Expected<HandEyeCalibration> calibrate_hand_eye(std::vector<TimedPose> camera,
+                                                              std::vector<TimedPose> tracker,
+                                                              const HandEyeSettings& settings);
+
+}  // namespace perimap

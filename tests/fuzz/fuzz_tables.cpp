@@ -1,0 +1,34 @@
+// Any bytes as a table of poses, of a signal, of points: an error of one line, or finite numbers.
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+#include "drivers/pose_file/point_table.hpp"
+#include "drivers/pose_file/pose_table.hpp"
+
+namespace {
+
+void check_error(const perimap::Error& error) {
+  if (error.message.find_first_of("\r\n") != std::string::npos) std::abort();
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace perimap;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  if (const auto poses = parse_pose_table(text, "fuzz.csv", LengthUnit::kMetre); !poses) {
+    check_error(poses.error());
+  } else {
+    for (const TimedPose& pose : poses->poses) {
+      if (!std::isfinite(pose.t_s) || !pose.X.t.allFinite() || !pose.X.R.allFinite()) std::abort();
+    }
+  }
+  if (const auto signal = parse_signal_table(text, "fuzz.csv"); !signal) check_error(signal.error());
+  if (const auto points = parse_point_table(text, "fuzz.csv", LengthUnit::kMillimetre); !points) {
+    check_error(points.error());
+  }
+  return 0;
+}

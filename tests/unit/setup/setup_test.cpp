@@ -1,0 +1,286 @@
+// daemon/setup: what is refused and in which words, boards that are recognised, results that are kept.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <opencv2/aruco/charuco.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <sstream>
+#include <string>
+
+#include "daemon/setup/board.hpp"
+#include "daemon/setup/camera_calibration.hpp"
+#include "daemon/setup/hand_eye.hpp"
+#include "daemon/setup/kept_result.hpp"
+#include "daemon/setup/signal_offset.hpp"
+
+namespace perimap {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kPi = std::numbers::pi;
+
+struct Poses {
+  std::vector<TimedPose> camera;
+  std::vector<TimedPose> tracker;
+};
+
+// A camera swung about a board; `turns`: about how many axes.
+Poses swung(int turns, double offset_s, const Pose& X_SC, double noise_mm = 0.2) {
+  std::mt19937 generator(3);
+  std::normal_distribution<double> normal;
+  Poses poses;
+  for (int i = 0; i < 1200; ++i) {
+    const double t = i / 30.0;
+    Vector3d w(0.5 * std::sin(1.3 * t) + 0.2 * std::sin(4.1 * t), 0.5 * std::sin(1.9 * t + 1.0),
+               0.6 * std::sin(0.9 * t + 2.0));
+    if (turns < 3) w.z() = 0.0;
+    if (turns < 2) w.y() = 0.0;
+    if (turns < 1) w.x() = 0.0;
+    const Pose X_BC{so3_exp(w),
+                    Vector3d(30.0 * std::sin(t), 20.0 * std::cos(1.7 * t), 100.0 + 10.0 * std::sin(2.0 * t))};
+    const Pose X_WB{so3_exp({0.3, 1.0, -0.4}), {100.0, 20.0, -900.0}};
+    Pose X_WS = X_WB * X_BC * X_SC.inverse();
+    X_WS.t += noise_mm * Vector3d(normal(generator), normal(generator), normal(generator));
+    poses.camera.push_back({t + offset_s, X_BC});
+    poses.tracker.push_back({t, X_WS});
+  }
+  return poses;
+}
+
+const Pose kX_SC{so3_exp({0.1, -0.2, 1.5}), {10.0, -5.0, 200.0}};
+
+TEST(HandEye, IsFoundWithTheClocksOffset) {
+  const Poses poses = swung(3, 0.4, kX_SC);
+  const auto result = calibrate_hand_eye(poses.camera, poses.tracker, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_LT((result->X_SC.t - kX_SC.t).norm(), 0.5);
+  EXPECT_LT(so3_log(result->X_SC.R.transpose() * kX_SC.R).norm(), 0.002);
+  EXPECT_NEAR(result->offset_s, 0.4, 0.001);
+  EXPECT_LT(result->residual_median_mm, 1.0);
+}
+
+TEST(HandEye, OfPosesAtRestIsFoundWithoutAnOffset) {
+  const Poses all = swung(3, 0.0, kX_SC);
+  Poses few;
+  for (std::size_t i = 0; i < all.camera.size(); i += 40) {
+    few.camera.push_back({static_cast<double>(i), all.camera[i].X});
+    few.tracker.push_back({static_cast<double>(i), all.tracker[i].X});
+  }
+  few.camera[4].X.t += Vector3d(40.0, 0.0, 0.0);
+  const auto result = calibrate_hand_eye(few.camera, few.tracker, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_FALSE(result->offset_measured);
+  EXPECT_LT((result->X_SC.t - kX_SC.t).norm(), 1.0);
+  EXPECT_EQ(result->used[4], 0);
+}
+
+std::string refusal_of(const Poses& poses) {
+  const auto result = calibrate_hand_eye(poses.camera, poses.tracker, {});
+  return result ? "accepted" : result.error().message;
+}
+
+TEST(HandEye, IsRefusedWhereTheMotionLeavesItOpen) {
+  EXPECT_THAT(refusal_of(swung(1, 0.0, kX_SC)), HasSubstr("about one axis only"));
+  EXPECT_NE(refusal_of(swung(0, 0.0, kX_SC, 0.0)), "accepted");
+}
+
+TEST(HandEye, IsRefusedWithoutCommonTimes) {
+  EXPECT_THAT(refusal_of(swung(3, 500.0, kX_SC)), HasSubstr("never overlap"));
+  Poses poses = swung(3, 0.0, kX_SC);
+  poses.camera.resize(5);
+  EXPECT_THAT(refusal_of(poses), HasSubstr("too few poses"));
+}
+
+TEST(HandEye, IsRefusedWhereTheTwoDoNotTurnAlike) {
+  Poses poses = swung(3, 0.0, kX_SC);
+  const Poses other = swung(3, 0.0, kX_SC);
+  for (std::size_t i = 0; i < poses.tracker.size(); ++i) {
+    // The same session, played three times as fast.
+    poses.tracker[i].X = other.tracker[(3 * i + 200) % other.tracker.size()].X;
+  }
+  EXPECT_THAT(refusal_of(poses), HasSubstr("turn alike"));
+}
+
+std::vector<TimedValue> sampled(double interval_s, double shift_s, double period_s, double (*of)(double)) {
+  std::vector<TimedValue> signal;
+  for (double t = 0.0; t < 30.0; t += interval_s) signal.push_back({t, of((t - shift_s) / period_s)});
+  return signal;
+}
+
+double uneven(double x) { return std::sin(x) + 0.7 * std::sin(2.3 * x + 1.0) + 0.5 * std::sin(0.37 * x); }
+
+TEST(SignalOffset, IsFoundWhicheverIsFaster) {
+  for (const auto& [first, second] : {std::pair(0.1, 0.02), std::pair(0.02, 0.1)}) {
+    const auto result =
+        measure_signal_offset(sampled(first, 0.061, 0.3, uneven), sampled(second, 0.0, 0.3, uneven), 1.0);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_NEAR(result->offset_s, 0.061, 0.003);
+  }
+}
+
+TEST(SignalOffset, IsRefusedForAMotionThatRepeatsItself) {
+  const auto sine = [](double x) { return std::sin(x); };
+  const auto result = measure_signal_offset(sampled(0.02, 0.05, 0.05, sine), sampled(0.02, 0.0, 0.05, sine), 1.0);
+  ASSERT_FALSE(result);
+  EXPECT_THAT(result.error().message, HasSubstr("repeats itself"));
+}
+
+// A picture of the board from a pinhole camera, smoothed a little.
+cv::Mat picture_of(const cv::Mat& board, const Vector3d& turn, double distance) {
+  const double f = 1000.0;
+  const Matrix3d R = so3_exp(turn);
+  Matrix3d place;  // of the board's pixels in the camera's frame, board 1 wide
+  const double unit = 1.0 / board.cols;
+  place.col(0) = R.col(0) * unit;
+  place.col(1) = R.col(1) * unit;
+  place.col(2) = -0.5 * R.col(0) - 0.5 * board.rows * unit * R.col(1) + Vector3d(0.0, 0.0, distance);
+  Matrix3d K;
+  K << f, 0.0, 640.0, 0.0, f, 360.0, 0.0, 0.0, 1.0;
+  const Matrix3d H = K * place;
+  cv::Mat M(3, 3, CV_64F);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) M.at<double>(i, j) = H(i, j);
+  }
+  cv::Mat picture;
+  cv::warpPerspective(board, picture, M, {1280, 720}, cv::INTER_AREA, cv::BORDER_CONSTANT, cv::Scalar(128));
+  cv::GaussianBlur(picture, picture, {3, 3}, 0.8);
+  return picture;
+}
+
+GreyImage grey_of(const cv::Mat& picture) {
+  return {picture.data, picture.cols, picture.rows, static_cast<std::ptrdiff_t>(picture.step)};
+}
+
+const std::vector<Vector3d> kTurns{{0.0, 0.0, 0.0},  {0.5, 0.0, 0.1},  {0.0, 0.5, -0.2},
+                                   {-0.4, 0.3, 0.4}, {0.3, -0.5, 0.2}, {-0.5, -0.2, -0.3}};
+
+TEST(Board, ACharucoBoardIsRecognisedWithSizeAndDictionary) {
+  for (const auto& [columns, rows] : {std::pair(9, 7), std::pair(8, 5), std::pair(10, 6)}) {
+    const auto layout = cv::aruco::CharucoBoard::create(columns, rows, 1.0F, 0.75F,
+                                                        cv::aruco::getPredefinedDictionary(cv::aruco::DICT_5X5_100));
+    cv::Mat drawn;
+    layout->draw({columns * 90, rows * 90}, drawn, 0, 1);
+    std::vector<cv::Mat> pictures;
+    std::vector<GreyImage> greys;
+    for (const Vector3d& turn : kTurns) pictures.push_back(picture_of(drawn, turn, 1.3));
+    for (const cv::Mat& picture : pictures) greys.push_back(grey_of(picture));
+    const auto board = recognise_board(greys, {});
+    ASSERT_TRUE(board) << board.error().message;
+    EXPECT_EQ(board->kind, BoardKind::kCharuco);
+    EXPECT_EQ(board->columns, columns);
+    EXPECT_NEAR(board->marker_share, 0.75, 0.03);
+    EXPECT_THAT(name_of(*board), HasSubstr("5X5_"));
+    const auto view = find_board(greys[1], *board);
+    ASSERT_TRUE(view);
+    EXPECT_GE(view->px.size(), static_cast<std::size_t>((columns - 1) * (rows - 1) * 3 / 4));
+  }
+}
+
+TEST(Board, AChessboardIsRecognisedWithItsSize) {
+  cv::Mat drawn(8 * 80, 11 * 80, CV_8UC1, cv::Scalar(255));
+  for (int y = 0; y < 7; ++y) {
+    for (int x = 0; x < 10; ++x) {
+      if ((x + y) % 2 == 0) drawn(cv::Rect(40 + 80 * x, 40 + 80 * y, 80, 80)).setTo(0);
+    }
+  }
+  std::vector<cv::Mat> pictures;
+  std::vector<GreyImage> greys;
+  for (const Vector3d& turn : kTurns) pictures.push_back(picture_of(drawn, turn, 1.4));
+  for (const cv::Mat& picture : pictures) greys.push_back(grey_of(picture));
+  const auto board = recognise_board(greys, {});
+  ASSERT_TRUE(board) << board.error().message;
+  EXPECT_EQ(board->kind, BoardKind::kChessboard);
+  EXPECT_EQ(board->columns, 9);
+  EXPECT_EQ(board->rows, 6);
+  std::vector<BoardView> views;
+  for (const GreyImage& grey : greys) {
+    if (auto view = find_board(grey, *board)) views.push_back(*view);
+  }
+  ASSERT_EQ(views.size(), kTurns.size());
+  const auto result = calibrate_camera(views, 1280, 720, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_NEAR(result->camera.fx, 1000.0, 5.0);
+  EXPECT_NEAR(result->camera.cx, 640.0, 5.0);
+  EXPECT_LT(result->rms_px, 0.2);
+}
+
+TEST(Board, PicturesWithoutOneAreRefused) {
+  const cv::Mat empty(480, 640, CV_8UC1, cv::Scalar(90));
+  const auto board = recognise_board({grey_of(empty), grey_of(empty)}, {});
+  ASSERT_FALSE(board);
+  EXPECT_THAT(board.error().message, HasSubstr("no board is seen"));
+}
+
+TEST(Camera, IsRefusedWithTooFewViewsAndWithViewsFromTheFront) {
+  std::vector<BoardView> views;
+  for (int v = 0; v < 8; ++v) {
+    BoardView view;
+    for (int y = 0; y < 6; ++y) {
+      for (int x = 0; x < 9; ++x) {
+        view.board_mm.emplace_back(10.0 * x, 10.0 * y, 0.0);
+        view.px.emplace_back(400.0 + 40.0 * x + 5.0 * v + 0.3 * ((x * 7 + y * 3 + v) % 5 - 2),
+                             200.0 + 40.0 * y + 4.0 * v);
+      }
+    }
+    views.push_back(view);
+  }
+  EXPECT_THAT(calibrate_camera({views[0], views[1]}, 1280, 720, {}).error().message, HasSubstr("at least 4"));
+  const auto flat = calibrate_camera(views, 1280, 720, {});
+  ASSERT_FALSE(flat);
+  EXPECT_THAT(flat.error().message, HasSubstr("tilt"));
+}
+
+TEST(ConfigurationKeys, AreSetInTheirPlace) {
+  const std::string text =
+      "version = 1\n# of the tracker\n[tracker]\nprotocol = \"ndi\"\n# hand-eye\n# time_offset_ms = 0.0\n\n[ecg]\nport "
+      "= \"x\"\n";
+  EXPECT_EQ(
+      with_keys(text, "tracker", {{"time_offset_ms", "-30.2"}, {"position_deviation_mm", "0.3"}}, "measured"),
+      "version = 1\n# of the tracker\n[tracker]\nprotocol = \"ndi\"\n# hand-eye\ntime_offset_ms = -30.2  # measured\n"
+      "position_deviation_mm = 0.3  # measured\n\n[ecg]\nport = \"x\"\n");
+  EXPECT_EQ(with_keys("version = 1\n", "tracker", {{"time_offset_ms", "1.0"}}, "m"),
+            "version = 1\n[tracker]\ntime_offset_ms = 1.0  # m\n");
+}
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::stringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+TEST(KeptResult, LeavesTheOneBeforeBesideIt) {
+  const auto folder = std::filesystem::temp_directory_path() / "perimap_kept_result_test";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directory(folder);
+  const auto file = folder / "camera.yaml";
+  ASSERT_TRUE(write_kept(file, "first\n"));
+  ASSERT_TRUE(write_kept(file, "second\n"));
+  EXPECT_EQ(text_of(file), "second\n");
+  std::vector<std::string> others;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path() != file) others.push_back(text_of(entry.path()));
+  }
+  EXPECT_THAT(others, testing::ElementsAre("first\n"));
+  const auto failed = write_kept(folder / "nowhere" / "camera.yaml", "third\n");
+  EXPECT_FALSE(failed);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(KeptResult, AConfigurationThatWouldBeUnsoundIsLeftAsItIs) {
+  const auto file = std::filesystem::temp_directory_path() / "perimap_set_keys_test.toml";
+  std::ofstream(file) << "version = 1\n";
+  const auto set = set_keys(file, "tracker", {{"time_offset_ms", "1e9"}}, "measured");
+  EXPECT_FALSE(set);
+  EXPECT_EQ(text_of(file), "version = 1\n");
+  std::filesystem::remove(file);
+}
+
+}  // namespace
+}  // namespace perimap
