@@ -80,6 +80,36 @@ TEST(HandEye, OfPosesAtRestIsFoundWithoutAnOffset) {
   EXPECT_EQ(result->used[4], 0);
 }
 
+TEST(HandEye, OfStopsWhoseTimesSayNothingIsFoundRowByRow) {
+  const Poses all = swung(3, 0.0, kX_SC);
+  Poses few;
+  for (std::size_t i = 0; i < all.camera.size() && few.camera.size() < 25; i += 40) {
+    few.camera.push_back({static_cast<double>(i), all.camera[i].X});
+    few.tracker.push_back({5000.0 + static_cast<double>(i), all.tracker[i].X});
+  }
+  const auto result = calibrate_hand_eye(few.camera, few.tracker, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_TRUE(result->paired_by_rows);
+  EXPECT_LT((result->X_SC.t - kX_SC.t).norm(), 1.0);
+  // As many rows, of which one is not there and another comes later: nothing agrees.
+  std::rotate(few.tracker.begin(), few.tracker.begin() + 7, few.tracker.end());
+  EXPECT_FALSE(calibrate_hand_eye(few.camera, few.tracker, {}));
+}
+
+TEST(HandEye, OffsetIsNotWhatSlowErrorsMakeOfIt) {
+  Poses poses = swung(3, 0.4, kX_SC, 0.1);
+  // As a lens that is off, or a board seen from one side: turned by slow motion as if it were later.
+  std::size_t i = 0;
+  for (TimedPose& pose : poses.camera) {
+    const double t = poses.tracker[i++].t_s;
+    pose.X.R = pose.X.R * so3_exp(0.02 * Vector3d(std::cos(0.9 * t + 2.0), std::cos(1.3 * t), std::cos(1.3 * t)));
+  }
+  const auto result = calibrate_hand_eye(poses.camera, poses.tracker, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_LT(std::abs(result->offset_s - 0.4), std::abs(result->joint_offset_s - 0.4));
+  EXPECT_LT(std::abs(result->offset_s - 0.4), 3.0 * std::sqrt(result->covariance(6, 6)));
+}
+
 std::string refusal_of(const Poses& poses) {
   const auto result = calibrate_hand_eye(poses.camera, poses.tracker, {});
   return result ? "accepted" : result.error().message;
