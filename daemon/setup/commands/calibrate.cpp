@@ -144,12 +144,11 @@ struct FromPoses {
 
 void add_from_poses(Commands& commands, CLI::App& calibrate, const FromPoses& what) {
   const auto options = std::make_shared<PosesOptions>();
-  CLI::App& command = commands.add(calibrate, what.name, what.description,
-                                   [options, measure = what.measure](const Console&) -> Outcome {
-                                     if (auto able = check_outputs(options->common, {options->poses}); !able)
-                                       return able;
-                                     return finish(measure(*options), options->common, options->poses);
-                                   });
+  CLI::App& command =
+      commands.add(calibrate, what.name, what.description, [options, take = what.measure](const Console&) -> Outcome {
+        if (auto able = check_outputs(options->common, {options->poses}); !able) return able;
+        return finish(take(*options), options->common, options->poses);
+      });
   command.add_option("POSES", options->poses, what.poses)->required();
   add_common(command, options->common, true, what.has_keys);
 }
