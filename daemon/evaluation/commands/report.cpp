@@ -9,8 +9,8 @@
 #include "daemon/command_line/commands.hpp"
 #include "daemon/command_line/outputs.hpp"
 #include "daemon/evaluation/report/accuracy_picture.hpp"
-#include "daemon/pages/png_picture.hpp"
 #include "daemon/evaluation/report/report_text.hpp"
+#include "daemon/pages/png_picture.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {

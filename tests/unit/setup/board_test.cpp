@@ -1,0 +1,110 @@
+// Boards recognised in drawn pictures.
+#include "daemon/setup/board.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/aruco/charuco.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/geometry/pose.hpp"
+#include "daemon/setup/camera_calibration.hpp"
+
+namespace perimap {
+namespace {
+
+using testing::HasSubstr;
+
+// A picture of the board from a pinhole camera, smoothed a little.
+cv::Mat picture_of(const cv::Mat& board, const Vector3d& turn, double distance) {
+  const double f = 1000.0;
+  const Matrix3d R = so3_exp(turn);
+  Matrix3d place;  // of the board's pixels in the camera's frame, board 1 wide
+  const double unit = 1.0 / board.cols;
+  place.col(0) = R.col(0) * unit;
+  place.col(1) = R.col(1) * unit;
+  place.col(2) = -0.5 * R.col(0) - 0.5 * board.rows * unit * R.col(1) + Vector3d(0.0, 0.0, distance);
+  Matrix3d K;
+  K << f, 0.0, 640.0, 0.0, f, 360.0, 0.0, 0.0, 1.0;
+  const Matrix3d H = K * place;
+  cv::Mat M(3, 3, CV_64F);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) M.at<double>(i, j) = H(i, j);
+  }
+  cv::Mat picture;
+  cv::warpPerspective(board, picture, M, {1280, 720}, cv::INTER_AREA, cv::BORDER_CONSTANT, cv::Scalar(128));
+  cv::GaussianBlur(picture, picture, {3, 3}, 0.8);
+  return picture;
+}
+
+GreyImage grey_of(const cv::Mat& picture) {
+  return {picture.data, picture.cols, picture.rows, static_cast<std::ptrdiff_t>(picture.step)};
+}
+
+const std::vector<Vector3d> kTurns{{0.0, 0.0, 0.0},  {0.5, 0.0, 0.1},  {0.0, 0.5, -0.2},
+                                   {-0.4, 0.3, 0.4}, {0.3, -0.5, 0.2}, {-0.5, -0.2, -0.3}};
+
+TEST(Board, ACharucoBoardIsRecognisedWithSizeAndDictionary) {
+  for (const auto& [columns, rows] : {std::pair(9, 7), std::pair(8, 5), std::pair(10, 6)}) {
+    const auto layout = cv::aruco::CharucoBoard::create(columns, rows, 1.0F, 0.75F,
+                                                        cv::aruco::getPredefinedDictionary(cv::aruco::DICT_5X5_100));
+    cv::Mat drawn;
+    layout->draw({columns * 90, rows * 90}, drawn, 0, 1);
+    std::vector<cv::Mat> pictures;
+    std::vector<GreyImage> greys;
+    for (const Vector3d& turn : kTurns) pictures.push_back(picture_of(drawn, turn, 1.3));
+    for (const cv::Mat& picture : pictures) greys.push_back(grey_of(picture));
+    const auto board = recognise_board(greys, {});
+    ASSERT_TRUE(board) << board.error().message;
+    EXPECT_EQ(board->kind, BoardKind::kCharuco);
+    EXPECT_EQ(board->columns, columns);
+    EXPECT_NEAR(board->marker_share, 0.75, 0.03);
+    EXPECT_THAT(name_of(*board), HasSubstr("5X5_"));
+    const auto view = find_board(greys[1], *board);
+    ASSERT_TRUE(view);
+    EXPECT_GE(view->px.size(), static_cast<std::size_t>((columns - 1) * (rows - 1) * 3 / 4));
+  }
+}
+
+TEST(Board, AChessboardIsRecognisedWithItsSize) {
+  cv::Mat drawn(8 * 80, 11 * 80, CV_8UC1, cv::Scalar(255));
+  for (int y = 0; y < 7; ++y) {
+    for (int x = 0; x < 10; ++x) {
+      if ((x + y) % 2 == 0) drawn(cv::Rect(40 + 80 * x, 40 + 80 * y, 80, 80)).setTo(0);
+    }
+  }
+  std::vector<cv::Mat> pictures;
+  std::vector<GreyImage> greys;
+  for (const Vector3d& turn : kTurns) pictures.push_back(picture_of(drawn, turn, 1.4));
+  for (const cv::Mat& picture : pictures) greys.push_back(grey_of(picture));
+  const auto board = recognise_board(greys, {});
+  ASSERT_TRUE(board) << board.error().message;
+  EXPECT_EQ(board->kind, BoardKind::kChessboard);
+  EXPECT_EQ(board->columns, 9);
+  EXPECT_EQ(board->rows, 6);
+  std::vector<BoardView> views;
+  for (const GreyImage& grey : greys) {
+    if (auto view = find_board(grey, *board)) views.push_back(*view);
+  }
+  ASSERT_EQ(views.size(), kTurns.size());
+  const auto result = calibrate_camera(views, 1280, 720, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_NEAR(result->camera.fx, 1000.0, 5.0);
+  EXPECT_NEAR(result->camera.cx, 640.0, 5.0);
+  EXPECT_LT(result->rms_px, 0.2);
+}
+
+TEST(Board, PicturesWithoutOneAreRefused) {
+  const cv::Mat empty(480, 640, CV_8UC1, cv::Scalar(90));
+  const auto board = recognise_board({grey_of(empty), grey_of(empty)}, {});
+  ASSERT_FALSE(board);
+  EXPECT_THAT(board.error().message, HasSubstr("no board is seen"));
+}
+
+}  // namespace
+}  // namespace perimap
