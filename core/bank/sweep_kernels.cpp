@@ -53,8 +53,8 @@ struct TileWork {
   Real* S = nullptr;
 };
 
-// What stays the same during a visit of a tile: the rows' part of the pending updates and of the phases. Vectors live in
-// small arrays here, which only fully unrolled loops keep in registers.
+// What stays the same during a visit of a tile: the rows' part of the pending updates and of the phases. Vectors live
+// in small arrays here, which only fully unrolled loops keep in registers.
 template <int kRows, int kPairs, int kLearnt, int kPredicted, class Real>
 struct TileRows {
   // Arrays of length zero are not C++.

@@ -1,3 +1,5 @@
+#include "drivers/standins/session/session_writer.hpp"
+
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -6,7 +8,6 @@
 #include <iterator>
 
 #include "daemon/command_line/commands.hpp"
-#include "drivers/standins/session/session_writer.hpp"
 #include "drivers/standins/truth/truth_messages.hpp"
 
 namespace perimap {
