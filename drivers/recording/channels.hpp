@@ -1,6 +1,7 @@
 // The names that recordings of this project use: channels with the type of their messages, and attachments.
 #pragma once
 
+#include <string>
 #include <string_view>
 
 namespace perimap::channels {
@@ -9,7 +10,10 @@ namespace perimap::channels {
 inline constexpr std::string_view kCameraImage = "camera/image";      // foxglove::RawImage or CompressedImage
 inline constexpr std::string_view kTrackerPose = "tracker/pose";      // perimap::TrackerPose
 inline constexpr std::string_view kTrackerViewer = "tracker/viewer";  // foxglove::PoseInFrame, metres, valid poses only
-inline constexpr std::string_view kEcgSamples = "ecg/samples";        // perimap::EcgSamples
+// Of another tracked tool ("reference", "pointer", ...): perimap::TrackerPose, as kTrackerPose.
+[[nodiscard]] inline std::string tool_pose(std::string_view tool) { return "tracker/" + std::string(tool) + "/pose"; }
+inline constexpr std::string_view kPointer = "pointer";         // the tool that touches
+inline constexpr std::string_view kEcgSamples = "ecg/samples";  // perimap::EcgSamples
 inline constexpr std::string_view kRTrigger = "ecg/r_trigger";  // perimap::RTriggerPulse, where there is a trigger
 inline constexpr std::string_view kRespirationSamples = "respiration/samples";  // perimap::RespirationSamples; optional
 
