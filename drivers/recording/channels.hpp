@@ -1,19 +1,18 @@
 // The names that recordings of this project use: channels with the type of their messages, and attachments.
 #pragma once
 
-#include <string>
 #include <string_view>
 
 namespace perimap::channels {
 
 // What the devices gave. Log time is the arrival, publish time the source's own stamp.
-inline constexpr std::string_view kCameraImage = "camera/image";      // foxglove::RawImage or CompressedImage
-inline constexpr std::string_view kTrackerPose = "tracker/pose";      // perimap::TrackerPose
+inline constexpr std::string_view kCameraImage = "camera/image";  // foxglove::RawImage or CompressedImage
+inline constexpr std::string_view kTrackerPose = "tracker/pose";  // perimap::TrackerPose
+// Of other tracked tools each a channel of its own below this: perimap::TrackerPose, likewise in the frame W, but of
+// the reference in the tracker's own. "tracker/reference", "tracker/pointer", "tracker/instrument/NAME".
+inline constexpr std::string_view kTrackedTools = "tracker/";
 inline constexpr std::string_view kTrackerViewer = "tracker/viewer";  // foxglove::PoseInFrame, metres, valid poses only
-// Of another tracked tool ("reference", "pointer", ...): perimap::TrackerPose, as kTrackerPose.
-[[nodiscard]] inline std::string tool_pose(std::string_view tool) { return "tracker/" + std::string(tool) + "/pose"; }
-inline constexpr std::string_view kPointer = "pointer";         // the tool that touches
-inline constexpr std::string_view kEcgSamples = "ecg/samples";  // perimap::EcgSamples
+inline constexpr std::string_view kEcgSamples = "ecg/samples";        // perimap::EcgSamples
 inline constexpr std::string_view kRTrigger = "ecg/r_trigger";  // perimap::RTriggerPulse, where there is a trigger
 inline constexpr std::string_view kRespirationSamples = "respiration/samples";  // perimap::RespirationSamples; optional
 
