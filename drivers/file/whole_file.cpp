@@ -27,6 +27,22 @@ std::filesystem::path without_links(const std::filesystem::path& file) {
   return error ? file : target;
 }
 
+// Whether a link of its way is that of a descriptor, as /dev/stdout and /dev/fd/3 are: whoever opened the file that it
+// leads to goes on with that file, whatever takes its name.
+bool is_open_already(std::filesystem::path file) {
+  constexpr int kMostLinks = 40;  // as the kernel follows
+  for (int link = 0; link < kMostLinks; ++link) {
+    std::error_code error;
+    const auto folder = std::filesystem::weakly_canonical(std::filesystem::absolute(file, error).parent_path(), error);
+    if (error) return false;
+    if (folder.string().starts_with("/proc/")) return true;
+    const auto target = std::filesystem::read_symlink(folder / file.filename(), error);
+    if (error) return false;
+    file = folder / target;
+  }
+  return false;
+}
+
 // On the disk, whatever opened it and however it was written. 0, or the error.
 int synchronise(const std::filesystem::path& path, int flags) {
   const int descriptor = ::open(path.c_str(), flags | O_CLOEXEC);
@@ -40,7 +56,8 @@ int synchronise(const std::filesystem::path& path, int flags) {
 
 bool is_special(const std::filesystem::path& file) {
   std::error_code error;
-  return std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error);
+  if (!std::filesystem::exists(file, error)) return false;
+  return !std::filesystem::is_regular_file(file, error) || is_open_already(file);
 }
 
 Expected<WholeFile> WholeFile::create(const std::filesystem::path& file, Name name) {

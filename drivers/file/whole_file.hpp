@@ -49,7 +49,7 @@ class WholeFile {
 // Whether the file could be written now; nothing is left of the trial.
 [[nodiscard]] Expected<void> check_writable(const std::filesystem::path& file);
 
-// There, and no regular file: a pipe, a device, a folder.
+// There, and no regular file (a pipe, a device, a folder), or one that is known by a descriptor alone (/dev/stdout).
 [[nodiscard]] bool is_special(const std::filesystem::path& file);
 
 }  // namespace perimap

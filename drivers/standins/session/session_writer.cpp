@@ -183,8 +183,8 @@ std::string simulated_configuration(const Simulation& simulation, const TrackerN
       simulation.settings().respiration_mm > 0.0 ? "\n[respiration]\nenabled = true\n" : "");
 }
 
-Expected<void> write_simulation(const Simulation& simulation, const std::vector<SimulatedRecording>& recordings,
-                                unsigned threads, const std::function<void(std::uint64_t frames)>& progress) {
+Expected<bool> write_simulation(const Simulation& simulation, const std::vector<SimulatedRecording>& recordings,
+                                unsigned threads, const std::function<bool(std::uint64_t frames)>& progress) {
   std::vector<std::unique_ptr<SessionWriter>> writers;
   for (const SimulatedRecording& recording : recordings) {
     auto writer = SessionWriter::create(simulation, recording);
@@ -211,13 +211,13 @@ Expected<void> write_simulation(const Simulation& simulation, const std::vector<
           written = writers[i]->write_respiration(simulation.respiration()[arrival.index]);
           break;
       }
-      if (!written) return written;
+      if (!written) return tl::unexpected(written.error());
     }
-    if (arrival.source == Simulation::Source::kCamera) progress(arrival.index + 1);
+    if (arrival.source == Simulation::Source::kCamera && !progress(arrival.index + 1)) return false;
   }
   for (const auto& writer : writers)
-    if (auto done = writer->finish(); !done) return done;
-  return {};
+    if (auto done = writer->finish(); !done) return tl::unexpected(done.error());
+  return true;
 }
 
 }  // namespace perimap

@@ -22,9 +22,9 @@ struct SimulatedRecording {
 
 // Renders the simulation once, on so many threads, and writes one recording for each tracker noise. Equal simulations
 // give equal bytes, whatever the number of threads. Each file gets its name only when it is whole. `progress` hears of
-// every frame.
-[[nodiscard]] Expected<void> write_simulation(const Simulation& simulation,
+// every frame and says whether to go on; where not, nothing is left and false is returned.
+[[nodiscard]] Expected<bool> write_simulation(const Simulation& simulation,
                                               const std::vector<SimulatedRecording>& recordings, unsigned threads,
-                                              const std::function<void(std::uint64_t frames)>& progress);
+                                              const std::function<bool(std::uint64_t frames)>& progress);
 
 }  // namespace perimap

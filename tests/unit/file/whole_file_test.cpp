@@ -1,8 +1,10 @@
 #include "drivers/file/whole_file.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <fstream>
@@ -46,6 +48,32 @@ class FullDisk {
  private:
   rlimit before_{};
 };
+
+TEST_F(WholeFileTest, WhatADescriptorHoldsIsWrittenToAndNotReplaced) {
+  const auto file = folder_ / "out.txt";
+  const int descriptor = open(file.c_str(), O_RDWR | O_CREAT, 0600);
+  ASSERT_GE(descriptor, 0);
+  const auto link = folder_ / "link";
+  std::filesystem::create_symlink("/dev/fd/" + std::to_string(descriptor), link);
+  for (const auto& name : {std::filesystem::path("/dev/fd/" + std::to_string(descriptor)),
+                           std::filesystem::path("/proc/self/fd/" + std::to_string(descriptor)), link}) {
+    auto whole = WholeFile::create(name);
+    ASSERT_TRUE(whole) << whole.error().message;
+    std::ofstream(whole->path()) << name.string();
+    ASSERT_TRUE(whole->finish());
+    struct stat held {
+    }, named{};
+    ASSERT_EQ(fstat(descriptor, &held), 0);
+    ASSERT_EQ(stat(file.c_str(), &named), 0);
+    EXPECT_EQ(held.st_ino, named.st_ino) << name;
+    EXPECT_EQ(content(file), name.string());
+  }
+  // Another link is no descriptor.
+  EXPECT_TRUE(is_special("/dev/null"));
+  std::filesystem::create_symlink("out.txt", folder_ / "other");
+  EXPECT_FALSE(is_special(folder_ / "other"));
+  close(descriptor);
+}
 
 TEST_F(WholeFileTest, HasItsNameWhenItIsFinishedAndNotBefore) {
   const auto file = folder_ / "a.txt";

@@ -60,6 +60,7 @@ TEST_F(WriteSimulation, GivesTheSameBytesWithOneAndWithThreeThreads) {
         write_simulation(*simulation, {{folder_ / name, {1.4, 0.01}}}, threads, [&](std::uint64_t frames) {
           EXPECT_EQ(frames, last + 1);
           last = frames;
+          return true;
         });
     EXPECT_TRUE(written.has_value()) << written.error().message;
     EXPECT_EQ(last, 60U);
@@ -73,10 +74,26 @@ TEST_F(WriteSimulation, GivesTheSameBytesWithOneAndWithThreeThreads) {
 TEST_F(WriteSimulation, LeavesNothingBehindWhenItCannotWrite) {
   const auto simulation = Simulation::create(small());
   ASSERT_TRUE(simulation.has_value()) << simulation.error().message;
-  const auto written = write_simulation(
-      *simulation, {{folder_ / "good.mcap", {}}, {folder_ / "no such folder" / "x.mcap", {}}}, 1, [](std::uint64_t) {});
+  const auto written =
+      write_simulation(*simulation, {{folder_ / "good.mcap", {}}, {folder_ / "no such folder" / "x.mcap", {}}}, 1,
+                       [](std::uint64_t) { return true; });
   ASSERT_FALSE(written.has_value());
   EXPECT_NE(written.error().message.find("no such folder"), std::string::npos) << written.error().message;
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+TEST_F(WriteSimulation, LeavesNothingBehindWhenItIsStopped) {
+  const auto simulation = Simulation::create(small());
+  ASSERT_TRUE(simulation.has_value()) << simulation.error().message;
+  std::uint64_t last = 0;
+  const auto written =
+      write_simulation(*simulation, {{folder_ / "a.mcap", {}}, {folder_ / "b.mcap", {}}}, 2, [&](std::uint64_t frames) {
+        last = frames;
+        return frames < 3;
+      });
+  ASSERT_TRUE(written.has_value()) << written.error().message;
+  EXPECT_FALSE(*written);
+  EXPECT_EQ(last, 3U);
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
 }
 
