@@ -40,7 +40,12 @@ struct Keeping : ::testing::Test {
     memory.updates = static_cast<int>(id) + 1000;
     memory.converged = id % 2 == 0;
     memory.largest_deviation_mm = 0.01 * id;
+    memory.first_observed = Instant(std::chrono::milliseconds(id));
+    memory.first_observed_px = Vector2d(id, 2.0 * id);
     memory.last_observed = Instant(std::chrono::seconds(id));
+    memory.patch.levels[0].mean = id;
+    memory.patch_state.px = Vector2d(3.0 * id, 4.0 * id);
+    memory.patch_state.gain = 1.0 + 0.001 * id;
     memory.estimate = prior_estimate(settings.estimator.layout, settings.estimator.prior, Vector3d(id, 2.0, 100.0));
     return memory;
   }
@@ -48,6 +53,17 @@ struct Keeping : ::testing::Test {
     std::vector<FeatureMemory> all;
     for (std::size_t i = 0; i < count; ++i) all.push_back(feature(static_cast<std::uint32_t>(50 - i)));
     return all;
+  }
+  // What is neither counted nor estimated.
+  static void expect_looks(const FeatureMemory& memory, const FeatureMemory& as) {
+    EXPECT_EQ(memory.first_observed, as.first_observed);
+    EXPECT_EQ(memory.first_observed_px, as.first_observed_px);
+    EXPECT_EQ(memory.last_observed, as.last_observed);
+    EXPECT_EQ(memory.patch.levels[0].mean, as.patch.levels[0].mean);
+    EXPECT_EQ(memory.patch_state.px, as.patch_state.px);
+    EXPECT_EQ(memory.patch_state.gain, as.patch_state.gain);
+    EXPECT_EQ(memory.converged, as.converged);
+    EXPECT_EQ(memory.largest_deviation_mm, as.largest_deviation_mm);
   }
   [[nodiscard]] FeatureEstimate estimate(std::size_t slot) const {
     FeatureEstimate of;
@@ -86,10 +102,42 @@ TEST_F(Keeping, WhatIsRecalledIsMappedAsItWas) {
     EXPECT_EQ(slots[i].converged, as.converged);
     EXPECT_EQ(slots[i].recalled_converged, as.converged);
     EXPECT_EQ(slots[i].last_learnt, as.last_observed);
+    EXPECT_EQ(slots[i].carried_px, as.patch_state.px);
     EXPECT_EQ(estimate(i).x, as.estimate.x);
     // In the first frame the map alone tells where it is.
     EXPECT_GE(std::uint64_t{0} - slots[i].last_found_frame, kFramesLongAgo);
   }
+}
+
+TEST_F(Keeping, WhatIsRecalledAndFedIsTheSameFeature) {
+  const std::vector<FeatureMemory> all = features(2);
+  static_cast<void>(keeping->recall(all, *breathing));
+  const MapFeed::Batch batch = feed();
+  for (std::size_t i = 0; i < all.size(); ++i) expect_looks(batch.entries[i].feature, all[i]);
+}
+
+TEST_F(Keeping, WhatContradictsItsMapIsNotKept) {
+  static_cast<void>(keeping->recall(features(2), *breathing));
+  for (int i = 0; i < 1000 && slots[1].health.state() != HealthState::kInconsistent; ++i) {
+    static_cast<void>(slots[1].health.add(100.0, true));
+  }
+  ASSERT_EQ(slots[1].health.state(), HealthState::kInconsistent);
+  const MapFeed::Batch batch = feed();
+  EXPECT_TRUE(batch.entries[0].mapped);
+  EXPECT_FALSE(batch.entries[1].mapped);
+}
+
+TEST_F(Keeping, TheLawIsFedAsItIsKnown) {
+  LawMemory law;
+  law.law = PhaseLaw::kTimeLocked;
+  law.usual = Seconds(0.8);
+  law.cycles = 12.0;
+  HeartPhaseSettings by_image;
+  by_image.law_from_image = true;
+  heart = HeartPhase(by_image);
+  heart.recall(law);
+  EXPECT_EQ(feed().law.usual, law.usual);
+  EXPECT_EQ(feed().law.cycles, law.cycles);
 }
 
 TEST_F(Keeping, NoMoreThanThereIsRoomForAndOnlyOfThisLayout) {
@@ -163,6 +211,7 @@ TEST_F(Keeping, WhatIsForgottenIsGoneButForStartsThatAreUnderWay) {
   for (std::size_t i = 0; i < kSlots; ++i) {
     EXPECT_EQ(slots[i].state, i == 5 ? SlotState::kStarting : SlotState::kEmpty);
     EXPECT_EQ(slots[i].forgotten, i == 5);
+    EXPECT_EQ(estimate(i).x.isZero(), i != 5) << "the bank's place is free";
   }
   for (int i = 0; i < 5; ++i) {
     for (const MapFeed::Entry& entry : feed().entries) EXPECT_FALSE(entry.mapped);
