@@ -1,12 +1,16 @@
-# perimap_library(NAME FOLDER [PRELUDE p] [SOURCES f...] [DEPENDS target...] [PRIVATE_DEPENDS target...])
+# A quick tests/run.sh: as little time as possible for one build. Daily work has better use for files that are compiled alone.
+option(PERIMAP_QUICK "Compile files together where a target allows that, and nothing for the tests labelled `long`" OFF)
+
+# perimap_library(NAME FOLDER [UNITY] [PRELUDE p] [SOURCES f...] [DEPENDS target...] [PRIVATE_DEPENDS target...])
 #
 # One target per folder. Headers are included by their path from the project's root ("core/time/instant.hpp"), but a
 # target sees a folder's headers only when it depends on that folder's target: each target carries an include root of
 # its own that holds nothing but its folder. So an include against the direction of the architecture does not build.
 #
-# PRELUDE names the precompiled headers (perimap_prelude) that its files begin with.
+# PRELUDE names the precompiled headers (perimap_prelude) that its files begin with. UNITY: a quick tests/run.sh compiles
+# eight of its files as one, in four fifths to a half of the time; what is local to them must have different names then.
 function(perimap_library NAME FOLDER)
-  cmake_parse_arguments(ARG "" "PRELUDE" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "UNITY" "PRELUDE" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
   set(root ${PROJECT_BINARY_DIR}/include_roots/${NAME})
   get_filename_component(parent ${root}/${FOLDER} DIRECTORY)
   file(MAKE_DIRECTORY ${parent})
@@ -19,6 +23,9 @@ function(perimap_library NAME FOLDER)
       PRIVATE ${ARG_PRIVATE_DEPENDS} $<BUILD_INTERFACE:perimap_warnings>)
     if(ARG_PRELUDE AND TARGET ${ARG_PRELUDE})
       target_precompile_headers(${NAME} REUSE_FROM ${ARG_PRELUDE})
+    endif()
+    if(ARG_UNITY)
+      set_target_properties(${NAME} PROPERTIES UNITY_BUILD ${PERIMAP_QUICK})
     endif()
   else()
     add_library(${NAME} INTERFACE)
@@ -50,7 +57,7 @@ function(perimap_prelude NAME)
   endif()
 endfunction()
 
-# perimap_test(NAME [PLAIN] [ALWAYS] [THREADS] SOURCES f... DEPENDS target... [LABELS l...])
+# perimap_test(NAME [UNITY] [PLAIN] [ALWAYS] [THREADS] [LONG] SOURCES f... DEPENDS target...)
 #
 # A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. In the two builds of a
 # quick tests/run.sh CTest runs each program in four parts instead: starting a program with AddressSanitizer and its libraries
@@ -66,12 +73,19 @@ if(PROJECT_IS_TOP_LEVEL)
 endif()
 set(PERIMAP_TESTS ${tests} CACHE STRING "Tests to build: all, plain, other, threads, or OFF")
 function(perimap_test NAME)
-  cmake_parse_arguments(ARG "PLAIN;ALWAYS;THREADS" "" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "UNITY;PLAIN;ALWAYS;THREADS;LONG" "" "SOURCES;DEPENDS" ${ARGN})
   set(wanted ON)
   if(NOT ARG_ALWAYS AND ((PERIMAP_TESTS STREQUAL plain AND NOT ARG_PLAIN) OR (PERIMAP_TESTS STREQUAL other AND ARG_PLAIN)))
     set(wanted OFF)
   elseif(PERIMAP_TESTS STREQUAL threads AND NOT ARG_THREADS)
     set(wanted OFF)
+  endif()
+  set(label "")
+  if(ARG_LONG)
+    set(label long)
+    if(PERIMAP_QUICK)
+      set(wanted OFF)
+    endif()
   endif()
   add_executable(${NAME} ${ARG_SOURCES})
   if(NOT wanted)
@@ -81,14 +95,32 @@ function(perimap_test NAME)
   if(TARGET test_prelude)
     target_precompile_headers(${NAME} REUSE_FROM test_prelude)
   endif()
+  if(ARG_UNITY)
+    set_target_properties(${NAME} PROPERTIES UNITY_BUILD ${PERIMAP_QUICK})
+  endif()
   target_compile_definitions(${NAME} PRIVATE PERIMAP_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
   if(wanted AND PERIMAP_TESTS MATCHES "^(plain|other)$")
     foreach(part RANGE 3)
       add_test(NAME ${NAME}.part_${part} COMMAND ${NAME})
       set_tests_properties(${NAME}.part_${part} PROPERTIES
-        ENVIRONMENT "GTEST_TOTAL_SHARDS=4;GTEST_SHARD_INDEX=${part}" LABELS "${ARG_LABELS}" TIMEOUT 900)
+        ENVIRONMENT "GTEST_TOTAL_SHARDS=4;GTEST_SHARD_INDEX=${part}" LABELS "${label}" TIMEOUT 900)
     endforeach()
   elseif(wanted)
-    gtest_discover_tests(${NAME} TEST_PREFIX "${NAME}." DISCOVERY_TIMEOUT 60 PROPERTIES LABELS "${ARG_LABELS}")
+    gtest_discover_tests(${NAME} TEST_PREFIX "${NAME}." DISCOVERY_TIMEOUT 60 PROPERTIES LABELS "${label}")
+  endif()
+endfunction()
+
+# perimap_test_program(NAME [LONG] SOURCES f... DEPENDS target...)
+#
+# A program that tests run, or that is one. LONG: only tests labelled `long` do; a quick tests/run.sh does not build it.
+function(perimap_test_program NAME)
+  cmake_parse_arguments(ARG "LONG" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${NAME} ${ARG_SOURCES})
+  target_link_libraries(${NAME} PRIVATE ${ARG_DEPENDS} perimap_warnings)
+  if(TARGET test_prelude AND ARG_DEPENDS MATCHES GTest)
+    target_precompile_headers(${NAME} REUSE_FROM test_prelude)
+  endif()
+  if(ARG_LONG AND PERIMAP_QUICK)
+    set_target_properties(${NAME} PROPERTIES EXCLUDE_FROM_ALL ON)
   endif()
 endfunction()

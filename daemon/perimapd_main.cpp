@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -16,8 +15,7 @@
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/checkpoint/checkpoint_keeper.hpp"
-#include "daemon/command_line/arguments.hpp"
-#include "daemon/command_line/console.hpp"
+#include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/surface_traffic.hpp"
 #include "daemon/logging/logging.hpp"
@@ -155,15 +153,16 @@ Outcome run(const std::string& configuration_file) {
 }
 
 int parse_and_run(int argc, char** argv) {
-  CLI::App app{
+  std::string configuration_file;
+  return run_program(
+      "perimapd", PERIMAP_VERSION,
       "Maps a beating organ and publishes its predicted surface over DDS at a fixed latency.\n"
       "Research software, not a certified medical device.",
-      "perimapd"};
-  app.set_version_flag("--version", PERIMAP_VERSION);
-  std::string configuration_file;
-  app.add_option("-c,--config", configuration_file, "Configuration file (TOML; see config/replay.toml)")->required();
-  if (const auto ended = parse_arguments(app, argc, argv)) return *ended;
-  return Console("perimapd").end(run(configuration_file));
+      [&](Command& command) {
+        command.add_option("-c,--config", configuration_file, "Configuration file (TOML; see config/replay.toml)")
+            ->required();
+      },
+      [&](const Console&) { return run(configuration_file); }, argc, argv);
 }
 
 }  // namespace

@@ -109,8 +109,9 @@ if command -v ccache > /dev/null; then
 fi
 
 build() { # PRESET BUILD_OPTION...
-  local preset=$1 tests=all undefined=all
+  local preset=$1 tests=all undefined=all quick=OFF
   shift
+  if [ $full = no ]; then quick=ON; fi
   # Which tests: see perimap_test in cmake/PerimapLibrary.cmake. A unit test once is enough for a quick run.
   case $preset in
     dev) tests=plain ;;
@@ -122,7 +123,8 @@ build() { # PRESET BUILD_OPTION...
       fi
       ;;
   esac
-  step "$preset configure" 5m cmake --preset "$preset" -DPERIMAP_TESTS=$tests -DPERIMAP_UNDEFINED=$undefined "${launcher[@]}" &&
+  step "$preset configure" 5m cmake --preset "$preset" -DPERIMAP_TESTS=$tests -DPERIMAP_UNDEFINED=$undefined \
+    -DPERIMAP_QUICK=$quick "${launcher[@]}" &&
     step "$preset build" 40m cmake --build --preset "$preset" -j "$jobs" "$@"
 }
 

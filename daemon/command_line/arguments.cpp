@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <utility>
 
 #include "core/error/nearest_name.hpp"
 #include "core/error/one_line.hpp"
@@ -53,14 +54,18 @@ std::vector<std::string> options_of(const CLI::App& app) {
 std::vector<std::string> unknown_arguments(const CLI::App& app) {
   std::vector<std::string> told;
   const auto commands = commands_of(app);
+  bool follows_option = false;
   for (const std::string& argument : app.remaining()) {
+    // What follows an option that is none may be its value.
+    const bool may_be_value =
+        std::exchange(follows_option, argument.starts_with('-') && argument.find('=') == std::string::npos);
     if (argument.starts_with('-')) {
       const std::string name = argument.substr(0, argument.find('='));
       told.push_back(fmt::format("{}: is no option{}", argument, did_you_mean(name, options_of(app))));
     } else if (!commands.empty()) {
       told.push_back(fmt::format("'{}': is no command{}", argument, did_you_mean(argument, commands)));
       break;
-    } else {
+    } else if (!may_be_value) {
       told.push_back(fmt::format("'{}': is one argument too many", argument));
     }
   }

@@ -17,7 +17,7 @@ std::string full_name(const CLI::App& command) {
 
 Commands::Commands(const std::string& program, const std::string& version, const std::string& description,
                    const std::string& footer)
-    : app_(std::make_unique<CLI::App>(description, program)) {
+    : app_(std::make_unique<CLI::App>(description, program)), program_(std::make_unique<Command>(*app_)) {
   app_->set_version_flag("--version", program + " " + version);
   app_->require_subcommand(1);
   app_->footer(footer);
@@ -25,22 +25,24 @@ Commands::Commands(const std::string& program, const std::string& version, const
 
 Commands::~Commands() = default;
 
-CLI::App& Commands::add(const std::string& name, const std::string& description, Run run) {
-  return add(*app_, name, description, std::move(run));
+Command& Commands::keep(CLI::App& command) { return *commands_.emplace_back(std::make_unique<Command>(command)); }
+
+Command& Commands::add(const std::string& name, const std::string& description, Run run) {
+  return add(*program_, name, description, std::move(run));
 }
 
-CLI::App& Commands::add_group(const std::string& name, const std::string& description) {
-  return add_group(*app_, name, description);
+Command& Commands::add_group(const std::string& name, const std::string& description) {
+  return add_group(*program_, name, description);
 }
 
-CLI::App& Commands::add_group(CLI::App& group, const std::string& name, const std::string& description) {
-  CLI::App* command = group.add_subcommand(name, description);
+Command& Commands::add_group(Command& group, const std::string& name, const std::string& description) {
+  CLI::App* command = group.app().add_subcommand(name, description);
   command->require_subcommand(1);
-  return *command;
+  return keep(*command);
 }
 
-CLI::App& Commands::add(CLI::App& group, const std::string& name, const std::string& description, Run run) {
-  CLI::App* command = group.add_subcommand(name, description);
+Command& Commands::add(Command& group, const std::string& name, const std::string& description, Run run) {
+  CLI::App* command = group.app().add_subcommand(name, description);
   // Nothing is done before all is parsed.
   command->callback([this, command, run = std::move(run)] {
     chosen_ = [command, &run] {
@@ -48,12 +50,24 @@ CLI::App& Commands::add(CLI::App& group, const std::string& name, const std::str
       return console.end(run(console));
     };
   });
-  return *command;
+  return keep(*command);
 }
 
 int Commands::run(int argc, const char* const* argv) {
   if (const auto ended = parse_arguments(*app_, argc, argv)) return *ended;
   return chosen_();
+}
+
+int run_program(const std::string& name, const std::string& version, const std::string& description,
+                const std::function<void(Command&)>& add_options, const Commands::Run& run, int argc,
+                const char* const* argv) {
+  CLI::App app(description, name);
+  app.set_version_flag("--version", version);
+  Command options(app);
+  add_options(options);
+  if (const auto ended = parse_arguments(app, argc, argv)) return *ended;
+  const Console console(name);
+  return console.end(run(console));
 }
 
 }  // namespace perimap

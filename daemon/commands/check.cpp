@@ -1,7 +1,6 @@
 // `perimap check`: whether a configuration file is sound, and what it comes to.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
 
@@ -57,7 +56,7 @@ Outcome check(const std::string& file, const Console& console) {
 
 void add_check_command(Commands& commands) {
   const auto file = std::make_shared<std::string>();
-  CLI::App& command = commands.add(
+  Command& command = commands.add(
       "check", "Checks a configuration file and prints the effective configuration, all keys with their meaning",
       [file](const Console& console) { return check(*file, console); });
   command.add_option("FILE", *file, "Configuration of perimapd (TOML)")->required();

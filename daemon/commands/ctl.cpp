@@ -1,7 +1,6 @@
 // `perimap ctl`: tells the perimapd that runs on this host what to do.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -49,12 +48,12 @@ void add_ctl_command(Commands& commands) {
   const auto telling = [&options](const std::string& command) {
     return [options, command](const Console&) { return tell(*options, command); };
   };
-  CLI::App& ctl = commands.add_group("ctl", "Tells the perimapd that runs on this host what to do");
+  Command& ctl = commands.add_group("ctl", "Tells the perimapd that runs on this host what to do");
   ctl.add_option("--socket", options->socket, "Where it takes commands (control.socket)")->capture_default_str();
   commands.add(ctl, "status", "What it publishes, its sources, and how long each stage takes", telling("status"))
       .add_flag("--json", options->json, "Machine-readable, one line");
   commands.add(ctl, "new-patient", "Clears the map, and what is known of the heart's rhythm", telling("new-patient"));
-  CLI::App& record = commands.add_group(ctl, "record", "Begins to record what the devices give, or ends the recording");
+  Command& record = commands.add_group(ctl, "record", "Begins to record what the devices give, or ends the recording");
   commands.add(record, "on", "Into a new file of recording.folder", telling("record on"));
   commands.add(record, "off", "Once all that has come is in the file", telling("record off"));
   commands.add(ctl, "reload", "Reads the configuration again; says what needs a restart", telling("reload"));

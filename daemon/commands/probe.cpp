@@ -1,7 +1,6 @@
 // `perimap probe`: whether the devices are there, and well.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
 
@@ -59,12 +58,12 @@ Outcome probe(const Options& options, const Console& console) {
 
 void add_probe_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command =
+  Command& command =
       commands.add("probe", "Opens each device of a configuration and tells whether it is there and well",
                    [options](const Console& console) { return probe(*options, console); });
   command.add_option("FILE", options->file, "Configuration of perimapd (TOML)")->required();
   command.add_option("--seconds", options->seconds, "How long to listen, s")
-      ->check(CLI::Range(0.1, 3600.0))
+      ->check(Range(0.1, 3600.0))
       ->capture_default_str();
   command.add_flag("--json", options->json, "Print JSON");
 }

@@ -1,7 +1,6 @@
 // `perimap record`: what the devices of a configuration give, into a recording.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -117,12 +116,12 @@ Outcome record(const Options& options, const Console& console) {
 
 void add_record_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command =
+  Command& command =
       commands.add("record", "Record what the devices of a configuration give, as it comes, until stopped",
                    [options](const Console& console) { return record(*options, console); });
   command.add_option("-c,--config", options->configuration, "Configuration of perimapd (TOML)")->required();
   command.add_option("OUT", options->out, "The recording to write (.mcap); it must not be there yet")->required();
-  command.add_option("--seconds", options->seconds, "How long, s [until stopped]")->check(CLI::Range(0.1, 1e6));
+  command.add_option("--seconds", options->seconds, "How long, s [until stopped]")->check(Range(0.1, 1e6));
 }
 
 }  // namespace perimap

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -122,24 +121,24 @@ void add_subscriber_command(Commands& commands) {
     int pause_ms = 0;
   };
   const auto options = std::make_shared<SubscriberOptions>();
-  CLI::App& command = commands.add(
-      bench::kSubscriberCommand, "What perimap bench runs in another process", [options](const Console&) -> Outcome {
-        const auto done = bench::subscribe_until_input_ends(options->domain, options->stream,
-                                                            std::chrono::milliseconds(options->pause_ms));
-        if (!done) return refuse(done.error());
-        return {};
-      });
+  Command& command = commands.add(bench::kSubscriberCommand, "What perimap bench runs in another process",
+                                  [options](const Console&) -> Outcome {
+                                    const auto done = bench::subscribe_until_input_ends(
+                                        options->domain, options->stream, std::chrono::milliseconds(options->pause_ms));
+                                    if (!done) return refuse(done.error());
+                                    return {};
+                                  });
   command.group("");
-  command.add_option("--domain", options->domain)->check(CLI::Range(0, 230));
+  command.add_option("--domain", options->domain)->check(Range(0, 230));
   command.add_option("--stream", options->stream);
-  command.add_option("--pause-ms", options->pause_ms)->check(CLI::Range(0, 10'000));
+  command.add_option("--pause-ms", options->pause_ms)->check(Range(0, 10'000));
 }
 
 }  // namespace
 
 void add_bench_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command = commands.add(
+  Command& command = commands.add(
       "bench",
       "Measure latencies by replaying a recording through the whole runtime, with subscribers in other processes",
       [options](const Console&) { return measure(*options); });
@@ -150,29 +149,27 @@ void add_bench_command(Commands& commands) {
   command.add_option("--json", options->json, "Write the figures as JSON to this file");
   command.add_option("--html", options->html, "Write one self-contained page to this file");
   command.add_option("--only", options->only, "These parts alone; ddsperf runs after each run of 'live'")
-      ->check(CLI::IsMember(bench::kParts))
+      ->check(OneOf(bench::kParts))
       ->delimiter(',');
-  command.add_option("--seconds", options->seconds, "Measured a run")
-      ->check(CLI::Range(0.5, 1e6))
-      ->capture_default_str();
+  command.add_option("--seconds", options->seconds, "Measured a run")->check(Range(0.5, 1e6))->capture_default_str();
   command.add_option("--settle", options->settle, "Played before, for the map to grow; not measured")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(Range(0.0, 1e6))
       ->capture_default_str();
   command.add_option("--runs", settings.runs, "How often the part 'live' is run")
-      ->check(CLI::Range(1, 1000))
+      ->check(Range(1, 1000))
       ->capture_default_str();
   command.add_option("--frames", settings.frames, "Frames of the part 'memory'")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40))
+      ->check(Range(std::uint64_t{1}, std::uint64_t{1} << 40))
       ->capture_default_str();
   command.add_option("--features", settings.features, "Features at a time")
-      ->check(CLI::Range(1, 5000))
+      ->check(Range(1, 5000))
       ->capture_default_str();
-  command.add_option("--workers", settings.workers, "Worker threads")->check(CLI::Range(1, 64))->capture_default_str();
+  command.add_option("--workers", settings.workers, "Worker threads")->check(Range(1, 64))->capture_default_str();
   command.add_option("--priority", settings.priority, "SCHED_FIFO priority of the runs that have one")
-      ->check(CLI::Range(3, 98))
+      ->check(Range(3, 98))
       ->capture_default_str();
   command.add_option("--cpus", settings.cpus, "Processors of these runs' real-time threads [any]")
-      ->check(CLI::Range(0, 1023))
+      ->check(Range(0, 1023))
       ->delimiter(',');
   command.add_option("--scratch", options->scratch, "Where recordings of a run go [the system's temporary folder]");
   add_subscriber_command(commands);

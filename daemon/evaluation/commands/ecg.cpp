@@ -1,7 +1,6 @@
 // `perimap ecg`: beats, classes and predictions of an ECG.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -110,7 +109,7 @@ Outcome find_beats(const Options& options, const Console& console) {
 
 void add_ecg_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command =
+  Command& command =
       commands.add("ecg", "Find and class the beats of an ECG as the daemon would, and score them against a reference",
                    [options](const Console& console) { return find_beats(*options, console); });
   command
@@ -127,12 +126,12 @@ void add_ecg_command(Commands& commands) {
       .add_option("--rate", options->ecg.rate_hz,
                   "Samples a second of a table without times; times that its heading names are passed over, and the "
                   "first sample is at 0 s")
-      ->check(CLI::Range(1.0, 100000.0));
+      ->check(Range(1.0, 100000.0));
   command
       .add_option("--column", options->ecg.column,
                   "Column of the table that holds the ECG, from 1 [2 beside times, 1 of values alone; several "
                   "columns without times need it]; of a WFDB record the number of its signal, as --signal")
-      ->check(CLI::Range(1, 10000));
+      ->check(Range(1, 10000));
   command.add_option("--signal", options->ecg.signal,
                      "Signal of a WFDB record, by its name in the header or its number from 1 [the first that is named "
                      "as a lead of an ECG is]");

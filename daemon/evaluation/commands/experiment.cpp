@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -73,30 +72,30 @@ Outcome repeat(const Options& options) {
 
 void add_experiment_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command = commands.add("experiment",
-                                   "Repeat an experiment of the paper: static EKF, EKF on the Fourier state, the "
-                                   "paper's filter, ours, batch MAP and the Cramer-Rao bound on simulated trials",
-                                   [options](const Console&) { return repeat(*options); });
+  Command& command = commands.add("experiment",
+                                  "Repeat an experiment of the paper: static EKF, EKF on the Fourier state, the "
+                                  "paper's filter, ours, batch MAP and the Cramer-Rao bound on simulated trials",
+                                  [options](const Console&) { return repeat(*options); });
   command
       .add_option("NUMBER", options->settings.number,
                   "1: surface of a real heart, bearings; 2: laparoscope, 8 features, pixels, tracker noise")
       ->required()
-      ->check(CLI::Range(1, 2));
+      ->check(Range(1, 2));
   command.add_option("--out", options->out,
                      "Folder for the table (CSV, JSON), the figures (PNG, SVG, CSV) and one HTML page; made if needed");
   command.add_option("--seed", options->settings.seed, "Chooses features, path, rhythm and noise")
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1'000'000'000}))
+      ->check(Range(std::uint64_t{0}, std::uint64_t{1'000'000'000}))
       ->capture_default_str();
   command.add_option("--trials", options->settings.trials, "How many trials of 5 (1) or 8 (2) features")
-      ->check(CLI::Range(1, 100'000))
+      ->check(Range(1, 100'000))
       ->capture_default_str();
   command
       .add_option("--step-factor", options->settings.methods.paper_step,
                   "Gamma of the paper's update: the share of each Gauss-Newton step that is taken")
-      ->check(CLI::Range(0.01, 1.0))
+      ->check(Range(0.01, 1.0))
       ->capture_default_str();
   command.add_option("--iterations", options->settings.methods.paper_iterations, "Iterations of the paper's update")
-      ->check(CLI::Range(1, 1000))
+      ->check(Range(1, 1000))
       ->capture_default_str();
   command.add_flag("--json", options->json, "Print JSON in place of the table");
 }

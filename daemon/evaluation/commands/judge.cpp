@@ -1,7 +1,6 @@
 // `perimap judge`: the visual front end over footage of which no truth is known, beside Lucas-Kanade.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cstddef>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -47,16 +46,16 @@ Outcome judge(const Options& options) {
 
 void add_judge_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command = commands.add(
+  Command& command = commands.add(
       "judge", "Follow features through a video played there and back, beside Lucas-Kanade, and count what comes back",
       [options](const Console& /*console*/) { return judge(*options); });
   command.add_option("VIDEO", options->input, "A video file")->required();
   command.add_option("--features", options->features, "How many each of the two begins with at most")
-      ->check(CLI::Range(1, 5000))
+      ->check(Range(1, 5000))
       ->capture_default_str();
   command.add_option("--first", options->first, "The first frame, counted from 0")->capture_default_str();
   command.add_option("--frames", options->frames, "How many frames are played at most; all are held in memory")
-      ->check(CLI::Range(2, 100000))
+      ->check(Range(2, 100000))
       ->capture_default_str();
   command.add_option(
       "--picture", options->picture,

@@ -1,7 +1,6 @@
 // `perimap replay`: the whole pipeline over a recording.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 #include <string>
@@ -56,16 +55,15 @@ Outcome replay(const Options& options, const Console& console) {
 
 void add_replay_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command = commands.add("replay", "Run the pipeline over a recording and report accuracy and latencies",
-                                   [options](const Console& console) { return replay(*options, console); });
+  Command& command = commands.add("replay", "Run the pipeline over a recording and report accuracy and latencies",
+                                  [options](const Console& console) { return replay(*options, console); });
   ReplayOptions& replay = options->replay;
   command.add_option("RECORDING", replay.recording, "The recording (MCAP)")->required();
   command.add_option("-c,--config", options->configuration,
                      "Configuration file; without it the recording's own configuration over the defaults");
   command.add_flag("--lockstep", replay.lockstep,
                    "Virtual time, as fast as it goes: the same samples every time (otherwise real time)");
-  command.add_option("--workers", replay.workers, "Worker threads (default: the configuration's)")
-      ->check(CLI::Range(1, 64));
+  command.add_option("--workers", replay.workers, "Worker threads (default: the configuration's)")->check(Range(1, 64));
   command.add_option("--json", options->json, "Write the report as JSON to this file");
   command.add_option("--samples", replay.samples, "Write every published sample to this recording (MCAP)");
   command.add_flag("--dds", replay.dds, "Publish over DDS too");

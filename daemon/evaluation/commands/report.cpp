@@ -1,7 +1,6 @@
 // `perimap report`: received samples against the truth.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -67,7 +66,7 @@ Outcome report(const Options& options) {
 
 void add_report_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command =
+  Command& command =
       commands.add("report", "Compare received samples with the truth of the simulated recording they are of",
                    [options](const Console&) { return report(*options); });
   command.add_option("RECORDING", options->recording, "The simulated recording (MCAP)")->required();

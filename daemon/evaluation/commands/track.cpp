@@ -1,7 +1,6 @@
 // `perimap track`: features followed through a video by their looks alone.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,7 +42,7 @@ Outcome track(const FollowSettings& settings, const Console& console) {
 
 void add_track_command(Commands& commands) {
   const auto settings = std::make_shared<FollowSettings>();
-  CLI::App& command = commands.add(
+  Command& command = commands.add(
       "track", "Follow features through a video or the frames of a recording by their looks alone, without map or pose",
       [settings](const Console& console) { return track(*settings, console); });
   command.add_option("INPUT", settings->input, "A video file, or a recording (MCAP)")->required();
@@ -56,7 +55,7 @@ void add_track_command(Commands& commands) {
       ->required();
   command.add_option("--video", settings->video, "Where to write the frames with their features marked (.mkv, .avi)");
   command.add_option("--features", settings->features, "How many are kept followed")
-      ->check(CLI::Range(1, 5000))
+      ->check(Range(1, 5000))
       ->capture_default_str();
   command.add_flag("--no-new-features", settings->first_features_alone,
                    "Only those found in the first frame that shows any");

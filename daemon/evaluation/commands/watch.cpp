@@ -1,7 +1,6 @@
 // `perimap watch`: a subscriber in the terminal.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -110,22 +109,22 @@ Outcome watch(const Options& options) {
 
 void add_watch_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command = commands.add(
+  Command& command = commands.add(
       "watch",
       "Subscribes to a publishing perimapd and prints a line a second: rate and lost samples, latency (receipt minus "
       "capture, on the publisher's host only), lateness (receipt minus release), jitter, phase, features, state",
       [options](const Console&) { return watch(*options); });
-  command.add_option("--domain", options->domain, "DDS domain")->check(CLI::Range(0, 230))->capture_default_str();
+  command.add_option("--domain", options->domain, "DDS domain")->check(Range(0, 230))->capture_default_str();
   command.add_flag("--json", options->json, "One JSON object a line");
-  CLI::Option* once = command.add_flag("--once", options->once, "Print the first surface and end");
+  Option* once = command.add_flag("--once", options->once, "Print the first surface and end");
   command.add_option("--duration", options->duration_s, "End so many seconds after the first surface")
-      ->check(CLI::Range(0.001, 1e9))
+      ->check(Range(0.001, 1e9))
       ->excludes(once);
   command.add_option("--count", options->surfaces, "End after so many surfaces")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53))
+      ->check(Range(std::uint64_t{1}, std::uint64_t{1} << 53))
       ->excludes(once);
   command.add_option("--wait", options->wait_s, "End with exit code 1 when no surface has come after so many seconds")
-      ->check(CLI::Range(0.001, 1e9));
+      ->check(Range(0.001, 1e9));
   command.add_option("--record", options->recording, "Write every received sample of all topics to this MCAP file");
 }
 

@@ -1,7 +1,6 @@
 // `perimap calibrate`: lens, hand-eye, time offset, tool and tracker.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <functional>
 #include <memory>
@@ -45,9 +44,9 @@ Expected<Measurement> measure(const HandEyeOptions& options) {
   return measured;
 }
 
-void add_hand_eye(Commands& commands, CLI::App& calibrate) {
+void add_hand_eye(Commands& commands, Command& calibrate) {
   const auto options = std::make_shared<HandEyeOptions>();
-  CLI::App& command =
+  Command& command =
       commands.add(calibrate, "hand-eye",
                    "The camera's place in the tracked sensor, and the offset of the two clocks, from poses of both",
                    [options](const Console&) -> Outcome {
@@ -59,7 +58,7 @@ void add_hand_eye(Commands& commands, CLI::App& calibrate) {
       ->required();
   command.add_option("--tracker-poses", options->tracker, "The sensor in the tracker's frame, likewise")->required();
   command.add_option("--largest-offset-s", options->settings.largest_offset_s, "The clocks differ by no more")
-      ->check(CLI::Range(0.0, 3600.0))
+      ->check(Range(0.0, 3600.0))
       ->capture_default_str();
   add_common(command, options->common, true, true);
 }
@@ -84,9 +83,9 @@ Expected<Measurement> measure(const TimeOptions& options) {
   return measured;
 }
 
-void add_time(Commands& commands, CLI::App& calibrate) {
+void add_time(Commands& commands, Command& calibrate) {
   const auto options = std::make_shared<TimeOptions>();
-  CLI::App& command =
+  Command& command =
       commands.add(calibrate, "time", "The offset of two clocks, from a motion that both devices recorded",
                    [options](const Console&) -> Outcome {
                      if (auto able = check_outputs(options->common, options->signals); !able) return able;
@@ -97,7 +96,7 @@ void add_time(Commands& commands, CLI::App& calibrate) {
                   "Time and value, twice: first the camera's, then the tracker's. Gain and sign are found")
       ->required();
   command.add_option("--largest-offset-s", options->largest_offset_s, "The clocks differ by no more")
-      ->check(CLI::Range(0.0, 3600.0))
+      ->check(Range(0.0, 3600.0))
       ->capture_default_str();
   add_common(command, options->common, false, true);
 }
@@ -142,9 +141,9 @@ struct FromPoses {
   Expected<Measurement> (*measure)(const PosesOptions&);
 };
 
-void add_from_poses(Commands& commands, CLI::App& calibrate, const FromPoses& what) {
+void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& what) {
   const auto options = std::make_shared<PosesOptions>();
-  CLI::App& command =
+  Command& command =
       commands.add(calibrate, what.name, what.description, [options, take = what.measure](const Console&) -> Outcome {
         if (auto able = check_outputs(options->common, {options->poses}); !able) return able;
         return finish(take(*options), options->common, options->poses);
@@ -156,7 +155,7 @@ void add_from_poses(Commands& commands, CLI::App& calibrate, const FromPoses& wh
 }  // namespace
 
 void add_calibrate_command(Commands& commands) {
-  CLI::App& calibrate = commands.add_group("calibrate", "Measures the set-up: each figure with its standard deviation");
+  Command& calibrate = commands.add_group("calibrate", "Measures the set-up: each figure with its standard deviation");
   calibrate.footer(
       "A result that the data can not determine is refused with what is missing (exit code 1), and no file is "
       "changed.");

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
@@ -180,24 +179,24 @@ Outcome run(CameraOptions& options) {
 
 }  // namespace
 
-void add_calibrate_camera(Commands& commands, CLI::App& calibrate) {
+void add_calibrate_camera(Commands& commands, Command& calibrate) {
   const auto options = std::make_shared<CameraOptions>();
-  CLI::App& command =
+  Command& command =
       commands.add(calibrate, "camera", "Focal lengths, principal point and distortion, from pictures of a board",
                    [options](const Console&) { return run(*options); });
   command.add_option("IMAGES", options->pictures, "Pictures of one board, folders of them, or a video")->required();
   command.add_option("--board", options->board, "What the board is; auto: it is looked for")
-      ->check(CLI::IsMember({"auto", "chessboard", "charuco", "markers", "circles", "asymmetric-circles"}))
+      ->check(OneOf({"auto", "chessboard", "charuco", "markers", "circles", "asymmetric-circles"}))
       ->capture_default_str();
   command.add_option(
       "--size", options->size,
       "COLUMNSxROWS: a chessboard's inner corners, a ChArUco board's squares, markers or circles; none: looked for");
   command.add_option("--square-mm", options->wish.square_mm, "Side of a square, or distance of neighbours")
-      ->check(CLI::Range(0.01, 1e4));
-  command.add_option("--marker-mm", options->wish.marker_mm, "Side of a marker")->check(CLI::Range(0.01, 1e4));
+      ->check(Range(0.01, 1e4));
+  command.add_option("--marker-mm", options->wish.marker_mm, "Side of a marker")->check(Range(0.01, 1e4));
   command.add_option("--dictionary", options->wish.dictionary, "Of the markers, such as 4X4_250 or APRILTAG_36h11");
   command.add_option("--lens", options->lens, "Model of the distortion; fisheye for more than 120 degrees")
-      ->check(CLI::IsMember({"brown-conrady", "fisheye"}))
+      ->check(OneOf({"brown-conrady", "fisheye"}))
       ->capture_default_str();
   add_common(command, options->common, false, false);
 }

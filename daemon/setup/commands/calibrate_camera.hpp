@@ -1,14 +1,11 @@
 // perimap calibrate camera.
 #pragma once
 
-namespace CLI {
-class App;
-}
-
 namespace perimap {
 
+class Command;
 class Commands;
 
-void add_calibrate_camera(Commands& commands, CLI::App& calibrate);
+void add_calibrate_camera(Commands& commands, Command& calibrate);
 
 }  // namespace perimap

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
-
 #include "daemon/command_line/outputs.hpp"
 #include "daemon/command_line/same_file.hpp"
 #include "daemon/setup/setup_plots.hpp"
@@ -69,10 +67,10 @@ Outcome finish(const Expected<Measurement>& measured, const CommonOptions& optio
   return {};
 }
 
-void add_common(CLI::App& command, CommonOptions& options, bool has_unit, bool has_keys) {
+void add_common(Command& command, CommonOptions& options, bool has_unit, bool has_keys) {
   if (has_unit) {
     command.add_option("--unit", options.unit, "Unit of the files' lengths")
-        ->check(CLI::IsMember({"m", "mm"}))
+        ->check(OneOf({"m", "mm"}))
         ->capture_default_str();
   }
   command.add_flag("--json", options.json, "Print the result as JSON, every figure with its standard deviation");

@@ -6,14 +6,11 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "daemon/command_line/command.hpp"
 #include "daemon/command_line/outcome.hpp"
 #include "daemon/pages/svg_plot.hpp"
 #include "daemon/setup/kept_result.hpp"
 #include "drivers/pose_file/pose_table.hpp"
-
-namespace CLI {
-class App;
-}
 
 namespace perimap {
 
@@ -46,7 +43,7 @@ struct Measurement {
                              const std::string& made_from);
 
 // --unit, --json, --output, --html and --configuration, for results that have them.
-void add_common(CLI::App& command, CommonOptions& options, bool has_unit, bool has_keys);
+void add_common(Command& command, CommonOptions& options, bool has_unit, bool has_keys);
 
 // Numbers as TOML.
 [[nodiscard]] std::string list_of(const nlohmann::json& values);

@@ -1,7 +1,6 @@
 // `perimap register`: where the tracker's frame is in the image's.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -64,7 +63,7 @@ Expected<Measurement> measure(const Options& options) {
 
 void add_register_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command = commands.add(
+  Command& command = commands.add(
       "register", "The place of the tracker's frame in the image's, by landmarks touched with a calibrated tool",
       [options](const Console&) -> Outcome {
         const std::vector<std::string> inputs = {options->model, options->touched};
@@ -80,7 +79,7 @@ void add_register_command(Commands& commands) {
       ->expected(3)
       ->trigger_on_parse();
   command.add_option("--tolerance-mm", options->tolerance_mm, "A landmark off by more is another point")
-      ->check(CLI::Range(0.1, 1000.0))
+      ->check(Range(0.1, 1000.0))
       ->capture_default_str();
   add_common(command, options->common, true, true);
 }

@@ -1,7 +1,6 @@
 // `perimap emulate`: stands in for devices.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
@@ -33,7 +32,7 @@ struct Options {
   std::vector<double> unplug_s;
   std::vector<double> ndi_reference;  // translation, then rotation wxyz
   TheatreSettings theatre;
-  std::vector<const CLI::Option*> can_options = {};
+  std::vector<const Option*> can_options = {};
   [[nodiscard]] bool can_given() const {
     return std::any_of(can_options.begin(), can_options.end(), [](const auto* option) { return option->count() > 0; });
   }
@@ -146,7 +145,7 @@ Outcome emulate(const Options& options, const Console& console) {
 
 void add_emulate_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command = commands.add(
+  Command& command = commands.add(
       "emulate",
       "Stand in for devices: the real protocols on pseudo-terminals, TCP ports, CAN and video outputs, until stopped",
       [options](const Console& console) { return emulate(*options, console); });
@@ -166,15 +165,15 @@ void add_emulate_command(Commands& commands) {
                      "Write the calibration of the simulated camera, and what else perimapd is to know of it, to "
                      "camera.yaml and scene.toml in this folder");
   EmulatorFaults& faults = theatre.faults;
-  const auto probability = CLI::Range(0.0, 1.0);
+  const auto probability = Range(0.0, 1.0);
   command.add_option("--bad-check", faults.bad_check, "Part of the messages with a wrong check sum")
       ->check(probability);
   command.add_option("--garbled", faults.garbled, "Part of the messages with a wrong byte")->check(probability);
   command.add_option("--truncated", faults.truncated, "Part of the messages without their end")->check(probability);
   command.add_option("--lost", faults.lost, "Part of the messages that are left out")->check(probability);
   command.add_option("--drift", faults.drift_ppm, "How much the device's clock runs fast, ppm")
-      ->check(CLI::Range(-5000.0, 5000.0));
-  const auto seconds = CLI::Range(0.01, 86400.0);
+      ->check(Range(-5000.0, 5000.0));
+  const auto seconds = Range(0.01, 86400.0);
   command.add_option("--missing", options->missing_s, "EVERY FOR, s: the tool is out of sight, the lead is off")
       ->expected(2)
       ->check(seconds);
@@ -185,7 +184,7 @@ void add_emulate_command(Commands& commands) {
              {{"bx2", NdiNewest::kBx2}, {"bx", NdiNewest::kBx}, {"tx", NdiNewest::kTx}},
              "Newest query that the NDI tracker knows [bx2]");
   command.add_option("--ndi-tools", theatre.ndi.wired_tools, "Tools in its ports; 0: all are uploaded")
-      ->check(CLI::Range(0, 8))
+      ->check(Range(0, 8))
       ->capture_default_str();
   command
       .add_option("--ndi-reference", options->ndi_reference,
@@ -196,22 +195,22 @@ void add_emulate_command(Commands& commands) {
              {{"transform", IgtlKind::kTransform}, {"tdata", IgtlKind::kTdata}, {"position", IgtlKind::kPosition}},
              "What the OpenIGTLink server sends [transform]");
   command.add_option("--igtl-version", theatre.igtl.version, "OpenIGTLink header version")
-      ->check(CLI::Range(1U, 2U))
+      ->check(Range(1U, 2U))
       ->capture_default_str();
   command.add_option("--igtl-tool", theatre.igtl.tool, "Name of the tool")->capture_default_str();
   options->can_options = {
       command.add_option("--can-identifier", theatre.can.identifier, "Of the frames over CAN, as 736 or 0x2E0")
-          ->check(CLI::Range(0U, 0x1FFFFFFFU))
+          ->check(Range(0U, 0x1FFFFFFFU))
           ->capture_default_str(),
       command.add_flag("--can-extended", theatre.can.extended, "That identifier has 29 bits"),
       command.add_option("--can-rate", theatre.can.sample_rate_hz, "Samples a second over CAN")
-          ->check(CLI::Range(100.0, 1000.0))
+          ->check(Range(100.0, 1000.0))
           ->capture_default_str(),
       command.add_option("--can-count", theatre.can.count_mV, "mV that a count of these samples stands for")
-          ->check(CLI::Range(1e-6, 1000.0))
+          ->check(Range(1e-6, 1000.0))
           ->capture_default_str()};
   // One heart for all devices; where a camera is to see it, for so long as --duration says.
-  options->simulation.add_to(*command.add_option_group("Simulated heart"));
+  options->simulation.add_to(command.add_option_group("Simulated heart"));
 }
 
 }  // namespace perimap

@@ -1,7 +1,6 @@
 // `perimap simulate`: a recording of a beating heart with its ground truth.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -13,6 +12,7 @@
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/command_line/progress.hpp"
+#include "daemon/process/stop_signal.hpp"
 #include "daemon/standins/commands/simulation_options.hpp"
 #include "drivers/standins/session/session_writer.hpp"
 #include "drivers/standins/simulator/frame_renderer.hpp"
@@ -53,13 +53,19 @@ Outcome simulate(const Options& options) {
   }
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
 
+  // Before the rendering threads begin.
+  auto stop = StopSignal::install();
+  if (!stop) return refuse(stop.error());
   const auto simulation = Simulation::create(*settings, threaded_for(threads));
   if (!simulation) return refuse(simulation.error(), ExitCode::kWrongUsage);
   {
     Progress progress("frames", simulation->frames().size());
-    const auto written =
-        write_simulation(*simulation, recordings, threads, [&](std::uint64_t frames) { progress.update(frames); });
+    const auto written = write_simulation(*simulation, recordings, threads, [&](std::uint64_t frames) {
+      progress.update(frames);
+      return !stop->requested();
+    });
     if (!written) return refuse(written.error());
+    if (!*written) return refuse("stopped by a signal; nothing was written");
   }
   const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   for (const SimulatedRecording& recording : recordings) {
@@ -76,19 +82,19 @@ Outcome simulate(const Options& options) {
 
 void add_simulate_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command = commands.add(
+  Command& command = commands.add(
       "simulate", "Write a recording of a beating heart with its ground truth: real motion, real ECG, rendered images",
       [options](const Console&) { return simulate(*options); });
   command.add_option("OUT", options->out, "The recording to write (.mcap)")->required();
-  CLI::Option* noise = options->simulation.add_to(command);
+  Option* noise = options->simulation.add_to(command);
   command
       .add_option("--tracker-noises", options->tracker_noises_mm,
                   "Several position noises, mm, from one rendering: OUT-0mm.mcap, OUT-1.4mm.mcap for 0,1.4")
       ->delimiter(',')
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(Range(0.0, 100.0))
       ->excludes(noise);
   command.add_option("--threads", options->threads, "Rendering threads; the result is the same [all processors]")
-      ->check(CLI::Range(1U, 256U));
+      ->check(Range(1U, 256U));
   command.add_flag("--force", options->force, "Overwrite OUT");
 }
 

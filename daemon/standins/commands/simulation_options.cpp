@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <charconv>
 #include <map>
 #include <numbers>
@@ -41,7 +40,7 @@ Expected<void> parse_size(const std::string& text, SimulationSettings& settings)
 
 }  // namespace
 
-CLI::Option* SimulationOptions::add_to(CLI::App& command) {
+Option* SimulationOptions::add_to(Command& command) {
   command
       .add_option("--seed", settings_.seed, "Chooses texture, path, noise and part of the ECG; same seed, same bytes")
       ->capture_default_str();
@@ -62,7 +61,7 @@ CLI::Option* SimulationOptions::add_to(CLI::App& command) {
           "--motion", [this, laws](const std::string& name) { settings_.law = laws.at(name); },
           "How motion runs between R peaks: linear, warped (systole keeps its length), time-locked (diastasis "
           "stretches) [linear]")
-      ->check(CLI::IsMember({"linear", "warped", "time-locked"}));
+      ->check(OneOf({"linear", "warped", "time-locked"}));
   command.add_option("--respiration", settings_.respiration_mm, "Breathing displacement at full inspiration, mm")
       ->capture_default_str();
   command.add_flag("--respiration-channel", settings_.respiration_channel,
@@ -81,14 +80,14 @@ CLI::Option* SimulationOptions::add_to(CLI::App& command) {
       ->capture_default_str();
   command.add_option("--glints", settings_.glints, "Highlights that wander over the tissue, besides its own")
       ->capture_default_str();
-  CLI::Option* noise =
+  Option* noise =
       command.add_option("--tracker-noise", tracker_noise_mm_, "Tracker position noise, RMS of the 3-D norm, mm")
-          ->check(CLI::Range(0.0, 100.0))
+          ->check(Range(0.0, 100.0))
           ->capture_default_str();
   command
       .add_option("--tracker-rotation-noise", tracker_rotation_noise_deg_,
                   "Tracker rotation noise, RMS of the 3-D norm, degrees [0.5, or 0 without position noise]")
-      ->check(CLI::Range(0.0, 45.0));
+      ->check(Range(0.0, 45.0));
   command
       .add_option("--tracker-correlation", tracker_correlation_s_,
                   "Time in which the tracker's error falls to 1/e of what it was, s; 0: it is new at each reading")

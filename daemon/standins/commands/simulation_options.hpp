@@ -6,12 +6,8 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "daemon/command_line/command.hpp"
 #include "drivers/standins/simulator/simulation.hpp"
-
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
 
 namespace perimap {
 
@@ -20,7 +16,7 @@ class SimulationOptions {
   explicit SimulationOptions(double duration_s = 60.0) : duration_s_(duration_s) {}
 
   // Returns --tracker-noise. The command writes into this object when it is parsed.
-  CLI::Option* add_to(CLI::App& command);
+  Option* add_to(Command& command);
 
   // What was given, or by default; an error names an option that is none.
   [[nodiscard]] Expected<SimulationSettings> settings() const;

@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <CLI/CLI.hpp>
-
 #include "daemon/command_line/choice.hpp"
 
 namespace perimap {
@@ -31,18 +29,18 @@ struct Program {
 
   Ended run(std::vector<const char*> arguments) {
     Commands commands("prog", "1.2", "What it does.", "The end.");
-    CLI::App& replay = commands.add("replay", "Replays", [this](const Console& console) {
+    Command& replay = commands.add("replay", "Replays", [this](const Console& console) {
       done = console.name();
       return outcome;
     });
     replay.add_option("INPUT", input)->required();
-    replay.add_option("-w,--workers", workers)->check(CLI::Range(1, 4));
+    replay.add_option("-w,--workers", workers)->check(Range(1, 4));
     replay.add_option_group("Others")->add_flag("--loudly");
     add_choice(replay, "--kind", kind, {{"first", Kind::kFirst}, {"second", Kind::kSecond}}, "Which one [first]");
     commands.add("report", "Reports", [this](const Console&) { return outcome; });
     commands.add("hidden", "Not for users", [this](const Console&) { return outcome; }).group("");
-    CLI::App& ctl = commands.add_group("ctl", "Tells");
-    CLI::App& record = commands.add_group(ctl, "record", "Records");
+    Command& ctl = commands.add_group("ctl", "Tells");
+    Command& record = commands.add_group(ctl, "record", "Records");
     commands.add(record, "on", "Begins", [this](const Console& console) {
       done = console.name();
       return outcome;
@@ -105,6 +103,11 @@ TEST(Commands, AMisspeltOptionIsToldWhichOneWasMeant) {
   EXPECT_EQ(ended.code, 2);
   EXPECT_THAT(ended.error, StartsWith("prog replay: --wokers=3: is no option; did you mean '--workers'?\n"
                                       "prog replay: --xyz: is no option\n"));
+  // Nor that its value is one argument too many; another is.
+  ended = program.run({"replay", "heart.mcap", "--wokers", "3", "4"});
+  EXPECT_THAT(ended.error, ::testing::Not(HasSubstr("'3'")));
+  EXPECT_THAT(ended.error, HasSubstr("prog replay: '4': is one argument too many\n"));
+  EXPECT_THAT(program.run({"replay", "heart.mcap", "--wokers=3", "4"}).error, HasSubstr("'4': is one"));
   EXPECT_THAT(program.run({"replay", "x", "--loudy"}).error, HasSubstr("did you mean '--loudly'?"));
   // What is missing because of it need not be told.
   EXPECT_THAT(program.run({"replay", "--lodly"}).error, ::testing::Not(HasSubstr("required")));
