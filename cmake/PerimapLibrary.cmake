@@ -57,11 +57,11 @@ function(perimap_prelude NAME)
   endif()
 endfunction()
 
-# perimap_test(NAME [UNITY] [PLAIN] [ALWAYS] [THREADS] [LONG] SOURCES f... DEPENDS target...)
+# perimap_test(NAME [UNITY [ALONE f...]] [PLAIN] [ALWAYS] [THREADS] [LONG] SOURCES f... DEPENDS target...)
 #
 # A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. In the two builds of a
 # quick tests/run.sh CTest runs each program in four parts instead: starting a program with AddressSanitizer and its libraries
-# for each case takes longer than most cases.
+# for each case takes longer than most cases. ALONE: files whose local names stand for something else in others.
 #
 # A quick tests/run.sh makes two builds. `plain`: the programs, the tests of whole programs, and the unit tests marked
 # PLAIN (counting allocations, very long to compile with a sanitizer, or of much that no other unit test needs).
@@ -73,7 +73,7 @@ if(PROJECT_IS_TOP_LEVEL)
 endif()
 set(PERIMAP_TESTS ${tests} CACHE STRING "Tests to build: all, plain, other, threads, or OFF")
 function(perimap_test NAME)
-  cmake_parse_arguments(ARG "UNITY;PLAIN;ALWAYS;THREADS;LONG" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "UNITY;PLAIN;ALWAYS;THREADS;LONG" "" "ALONE;SOURCES;DEPENDS" ${ARGN})
   set(wanted ON)
   if(NOT ARG_ALWAYS AND ((PERIMAP_TESTS STREQUAL plain AND NOT ARG_PLAIN) OR (PERIMAP_TESTS STREQUAL other AND ARG_PLAIN)))
     set(wanted OFF)
@@ -97,6 +97,9 @@ function(perimap_test NAME)
   endif()
   if(ARG_UNITY)
     set_target_properties(${NAME} PROPERTIES UNITY_BUILD ${PERIMAP_QUICK})
+    if(ARG_ALONE)
+      set_source_files_properties(${ARG_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
   endif()
   target_compile_definitions(${NAME} PRIVATE PERIMAP_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
   if(wanted AND PERIMAP_TESTS MATCHES "^(plain|other)$")

@@ -21,6 +21,7 @@ struct Program {
   enum class Kind { kFirst, kSecond };
 
   int workers = 0;
+  bool loudly = false;
   Kind kind = Kind::kFirst;
   std::string input;
   std::string done;  // what was run
@@ -35,7 +36,7 @@ struct Program {
     });
     replay.add_option("INPUT", input)->required();
     replay.add_option("-w,--workers", workers)->check(Range(1, 4));
-    replay.add_option_group("Others")->add_flag("--loudly");
+    replay.add_option_group("Others").add_flag("--loudly", loudly);
     add_choice(replay, "--kind", kind, {{"first", Kind::kFirst}, {"second", Kind::kSecond}}, "Which one [first]");
     commands.add("report", "Reports", [this](const Console&) { return outcome; });
     commands.add("hidden", "Not for users", [this](const Console&) { return outcome; }).group("");
