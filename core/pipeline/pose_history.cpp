@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace perimap {
 namespace {
@@ -18,12 +19,25 @@ constexpr double square(double x) noexcept { return x * x; }
 
 }  // namespace
 
+PoseHistory::Reading PoseHistory::reading_of(const TrackerSample& sample) const noexcept {
+  Reading reading{sample.source_time + settings_.time_offset, sample.state == ToolState::kOk, sample.X_WS};
+  const double error_mm = sample.error_mm / std::numbers::sqrt3;  // per axis
+  // Written so that a value that is not a number changes nothing.
+  if (!(error_mm > settings_.position_deviation_mm)) return reading;
+  if (settings_.position_deviation_mm > 0.0) {
+    reading.growth = error_mm / settings_.position_deviation_mm;
+  } else {
+    reading.own_mm = error_mm;
+  }
+  return reading;
+}
+
 bool PoseHistory::add(const TrackerSample& sample) noexcept {
   const Instant time = sample.source_time + settings_.time_offset;
   if (count_ > 0 && time <= reading(count_ - 1).time) return false;
   const bool valid = sample.state == ToolState::kOk;
   if (valid && !(sample.X_WS.R.allFinite() && sample.X_WS.t.allFinite())) return false;
-  readings_[count_ % kCapacity] = {time, valid, sample.X_WS};
+  readings_[count_ % kCapacity] = reading_of(sample);
   ++count_;
   return true;
 }
@@ -43,9 +57,13 @@ CameraPose PoseHistory::between(const Reading& r_0, const Reading& r_1, Instant 
   const double common = settings_.error_correlation > Duration(0)
                             ? std::exp(-to_seconds(r_1.time - r_0.time) / to_seconds(settings_.error_correlation))
                             : 0.0;
-  const double weight = square(1.0 - s) + square(s) + 2.0 * common * s * (1.0 - s);
+  const auto weigh = [common, s](double a, double b) {
+    return square((1.0 - s) * a) + square(s * b) + 2.0 * common * s * (1.0 - s) * a * b;
+  };
+  const double weight = weigh(r_0.growth, r_1.growth);
   const double beyond_s = std::max(0.0, to_seconds(t - r_1.time));
-  pose.position_variance_mm2 = weight * square(settings_.position_deviation_mm) + square(kInterpolationDeviation_mm) +
+  pose.position_variance_mm2 = weight * square(settings_.position_deviation_mm) + weigh(r_0.own_mm, r_1.own_mm) +
+                               square(kInterpolationDeviation_mm) +
                                square(0.5 * kHandAcceleration_mm_per_s2 * square(beyond_s));
   pose.rotation_variance_rad2 = weight * square(settings_.rotation_deviation_rad) +
                                 square(kInterpolationDeviation_rad) +

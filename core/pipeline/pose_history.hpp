@@ -21,6 +21,10 @@ struct PoseHistorySettings {
   Duration maximum_extrapolation = std::chrono::milliseconds(20);
 };
 
+// A reading is at least as far off as the device itself says (TrackerSample::error_mm): where that is more than
+// position_deviation_mm stands for, both deviations grow in proportion; a tracker that is said to be exact has that
+// error of its position.
+//
 // X_WC at one instant with its noise: the sensor's translation moves by an isotropic error of variance
 // position_variance_mm2 per axis, and its rotation by one of rotation_variance_rad2 per axis about the sensor, which
 // sits at -lever_W_mm from the camera centre.
@@ -60,9 +64,12 @@ class PoseHistory {
     Instant time;  // on the camera's clock
     bool valid = false;
     Pose X_WS;
+    double growth = 1.0;  // of both deviations
+    double own_mm = 0.0;  // deviation per axis of a tracker that is said to be exact
   };
 
   [[nodiscard]] const Reading& reading(std::uint64_t index) const noexcept { return readings_[index % kCapacity]; }
+  [[nodiscard]] Reading reading_of(const TrackerSample& sample) const noexcept;
   [[nodiscard]] CameraPose between(const Reading& r_0, const Reading& r_1, Instant t,
                                    CameraPose::State state) const noexcept;
 

@@ -1,6 +1,7 @@
 // One reading of the pose tracker, as it came.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "core/geometry/pose.hpp"
@@ -15,7 +16,15 @@ struct TrackerSample {
   Instant arrival;
   std::uint32_t device_frame = 0;
   ToolState state = ToolState::kMissing;
-  Pose X_WS;  // meaningful with kOk only
+  Pose X_WS;              // meaningful with kOk only
+  double error_mm = 0.0;  // the device's own figure of how far off this pose is, RMS; 0: it gives none
+};
+
+// One reading of another tool O that the tracker sees beside the sensor, with the tool's pose X_WO in the place of the
+// sensor's.
+struct ToolSample : TrackerSample {
+  // 0: the patient's reference, whose pose is in the tracker's own frame; then the others as they were asked for.
+  std::size_t tool = 0;
 };
 
 }  // namespace perimap

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 namespace perimap {
@@ -72,6 +73,42 @@ TEST(PoseHistory, ExtrapolatesAtMostTheSettingWithGrownVariance) {
   EXPECT_GT(near.position_variance_mm2, inside.position_variance_mm2);
   EXPECT_GT(far.position_variance_mm2, near.position_variance_mm2);
   EXPECT_FALSE(history.at(at_ms(31)).valid());
+}
+
+// Where the device's own figure is what the configuration says anyway, nothing changes.
+TEST(PoseHistory, APoseIsAtLeastAsUncertainAsTheDeviceSaysItIs) {
+  PoseHistorySettings settings = noisy();  // 1 mm an axis
+  settings.rotation_deviation_rad = 0.01;
+  const auto at_middle = [&settings](double before_mm, double after_mm) {
+    PoseHistory history(settings);
+    TrackerSample first = reading(0, 0.0);
+    TrackerSample second = reading(10, 10.0);
+    first.error_mm = before_mm;
+    second.error_mm = after_mm;
+    EXPECT_TRUE(history.add(first) && history.add(second));
+    return history.at(at_ms(5));
+  };
+  const CameraPose usual = at_middle(0.0, 0.0);
+  const CameraPose good = at_middle(1.7, 0.2);
+  EXPECT_EQ(good.position_variance_mm2, usual.position_variance_mm2);
+  EXPECT_EQ(good.rotation_variance_rad2, usual.rotation_variance_rad2);
+  EXPECT_EQ(at_middle(std::numeric_limits<double>::quiet_NaN(), 0.0).position_variance_mm2,
+            usual.position_variance_mm2);
+  const double twice_mm = 2.0 * std::sqrt(3.0);  // RMS of the norm: 2 mm an axis
+  const CameraPose bad = at_middle(twice_mm, twice_mm);
+  EXPECT_NEAR(bad.position_variance_mm2 / usual.position_variance_mm2, 4.0, 0.01);
+  EXPECT_NEAR(bad.rotation_variance_rad2 / usual.rotation_variance_rad2, 4.0, 0.01);
+  const CameraPose half = at_middle(twice_mm, 0.0);
+  EXPECT_NEAR(half.position_variance_mm2 / usual.position_variance_mm2, (4.0 + 1.0) / 2.0, 0.01);
+}
+
+TEST(PoseHistory, ATrackerThatIsSaidToBeExactIsAsFarOffAsItSays) {
+  PoseHistory history({});
+  TrackerSample first = reading(0, 0.0);
+  TrackerSample second = reading(10, 10.0);
+  first.error_mm = second.error_mm = 0.3 * std::sqrt(3.0);
+  ASSERT_TRUE(history.add(first) && history.add(second));
+  EXPECT_NEAR(history.at(at_ms(10)).position_variance_mm2, 0.09, 1e-3);
 }
 
 TEST(PoseHistory, NeverExtrapolatesFromAMissingTool) {
