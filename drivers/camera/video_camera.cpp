@@ -34,6 +34,7 @@ class Playing {
     double rate_hz = settings_.frame_rate_hz > 0.0 ? settings_.frame_rate_hz : reader.frames_per_s();
     if (rate_hz <= 0.0) rate_hz = kUsualRate_hz;
     period_ = from_seconds(1.0 / rate_hz);
+    by_rate_ = settings_.frame_rate_hz > 0.0;
     capture_ = MonotonicClock::now();
     health_.openings.add();
     health_.set_identity(settings_.file);
@@ -41,6 +42,7 @@ class Playing {
 
   Expected<void> play(VideoReader& reader) {
     std::uint64_t expected = 0;
+    const Instant first = capture_ + period_;
     while (!interrupt_.requested()) {
       auto decoded = reader.next();
       if (!decoded) return tl::unexpected(std::move(decoded.error()));
@@ -53,7 +55,11 @@ class Playing {
       const std::uint64_t undecoded = (*decoded)->number - expected;
       expected = (*decoded)->number + 1;
       sequence_ += undecoded + 1;
-      capture_ += static_cast<std::int64_t>(undecoded + 1) * period_;
+      const Instant by_rate = capture_ + static_cast<std::int64_t>(undecoded + 1) * period_;
+      const auto& time_s = (*decoded)->time_s;
+      const Instant as_told = time_s ? first + from_seconds(*time_s) : by_rate;
+      // A rate that was asked for is in the place of the file's own times, and so is the usual one where it tells none.
+      capture_ = by_rate_ || as_told <= capture_ ? by_rate : as_told;
       if (undecoded > 0) health_.lost.add(undecoded);
       const Duration ahead = capture_ - MonotonicClock::now();
       if (ahead < -period_) {
@@ -84,6 +90,7 @@ class Playing {
   DeviceHealth& health_;
   const Interrupt& interrupt_;
   Duration period_{0};
+  bool by_rate_ = false;
   Instant capture_{};
   std::uint64_t sequence_ = 0;
 };

@@ -18,6 +18,8 @@ struct VideoCameraSettings {
   int height = 0;
 };
 
+// Frames have the times that the file gives them; with `frame_rate_hz`, or where it gives none, they come evenly.
+//
 // Runs on the calling thread until interrupted, or to the end without `loop`. Frames that cannot be decoded in time are
 // passed over, as a camera would, and counted in health.lost. Fails when the file cannot be read, or its frames have
 // another size.

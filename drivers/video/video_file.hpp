@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct VideoFrame {
   std::uint64_t number = 0;
   ColourImage colour;  // in a video's frames as large as the grey; may be reduced elsewhere, or without pixels
   GreyImage grey;
+  std::optional<double> time_s = {};  // since the first frame, as the container has it; none: it tells no time
 };
 
 // Loads what reads and writes videos, once; else the first open() or create() does. To be called before threads have

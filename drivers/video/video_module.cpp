@@ -2,6 +2,10 @@
 
 #include "drivers/video/video_module.hpp"
 
+extern "C" {
+#include <libavformat/avformat.h>
+}
+
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -11,6 +15,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,6 +36,29 @@ tl::unexpected<Error> failed(const std::string& path, const std::exception& erro
 
 bool is_plausible_rate(double frames_per_s) noexcept { return frames_per_s > 0.1 && frames_per_s < 2000; }
 
+// How many of the frames that an MP4 or MOV file holds its edit list has shown, which OpenCV does not tell; none: all,
+// or it is another kind of file.
+std::optional<std::uint64_t> frames_shown(const std::string& path) {
+  AVFormatContext* context = nullptr;
+  if (avformat_open_input(&context, path.c_str(), nullptr, nullptr) < 0) return std::nullopt;
+  std::optional<std::uint64_t> shown;
+  for (unsigned i = 0; i < context->nb_streams && std::string(context->iformat->name).starts_with("mov"); ++i) {
+    const AVStream* stream = context->streams[i];
+    if (stream->codecpar->codec_type != AVMEDIA_TYPE_VIDEO) continue;
+    std::uint64_t kept = 0;
+    // FFmpeg's functions take no const stream; this one only reads.
+    auto* indexed = const_cast<AVStream*>(stream);
+    for (int entry = 0; entry < avformat_index_get_entries_count(stream); ++entry) {
+      const AVIndexEntry* frame = avformat_index_get_entry(indexed, entry);
+      if (frame != nullptr && (frame->flags & AVINDEX_DISCARD_FRAME) == 0) ++kept;
+    }
+    if (kept > 0 && static_cast<std::int64_t>(kept) < stream->nb_frames) shown = kept;
+    break;
+  }
+  avformat_close_input(&context);
+  return shown;
+}
+
 class CapturingReader final : public VideoReader {
  public:
   explicit CapturingReader(std::string path) : path_(std::move(path)) {}
@@ -42,6 +70,7 @@ class CapturingReader final : public VideoReader {
 
  private:
   [[nodiscard]] bool read() { return capture_.read(colour_) && !colour_.empty(); }
+  [[nodiscard]] std::optional<double> time_since_first() const;
   [[nodiscard]] bool read_next(std::uint64_t announced, double frames_per_s);
 
   std::string path_;
@@ -50,6 +79,8 @@ class CapturingReader final : public VideoReader {
   cv::Size size_;
   bool first_is_waiting_ = true;
   std::uint64_t number_ = 0;
+  std::optional<std::uint64_t> shown_;
+  double first_ms_ = 0;               // the first frame's time
   double time_ms_ = 0;                // of the last frame that had one
   std::uint64_t frames_untimed_ = 0;  // since
   bool is_broken_ = false;
@@ -81,10 +112,13 @@ Expected<void> CapturingReader::begin() {
   if (!capture_.open(path_, cv::CAP_FFMPEG)) return fail(path_ + ": not a video that can be read");
   if (!read()) return fail(path_ + ": the first frame can not be decoded");
   size_ = colour_.size();
+  shown_ = frames_shown(path_);
+  first_ms_ = std::max(0.0, capture_.get(cv::CAP_PROP_POS_MSEC));
   return {};
 }
 
 std::uint64_t CapturingReader::announced_frames() const noexcept {
+  if (shown_) return *shown_;
   const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);
   return count > 0 && count < 1e12 ? static_cast<std::uint64_t>(count) : 0;
 }
@@ -105,6 +139,12 @@ bool CapturingReader::ends_early() const noexcept {
   return reached + kMargin_frames < (1 - kMargin) * announced;
 }
 
+std::optional<double> CapturingReader::time_since_first() const {
+  if (number_ == 0) return 0.0;
+  const double now_ms = capture_.get(cv::CAP_PROP_POS_MSEC);
+  return now_ms > first_ms_ ? std::optional(1e-3 * (now_ms - first_ms_)) : std::nullopt;
+}
+
 Expected<const VideoFrame*> CapturingReader::next() {
   try {
     if (!std::exchange(first_is_waiting_, false) && !read_next(announced_frames(), frames_per_s())) return nullptr;
@@ -115,7 +155,8 @@ Expected<const VideoFrame*> CapturingReader::next() {
     cv::extractChannel(colour_, grey_, 1);
     frame_ = {number_,
               {colour_.data, colour_.cols, colour_.rows, static_cast<std::ptrdiff_t>(colour_.step)},
-              {grey_.data, grey_.cols, grey_.rows, static_cast<std::ptrdiff_t>(grey_.step)}};
+              {grey_.data, grey_.cols, grey_.rows, static_cast<std::ptrdiff_t>(grey_.step)},
+              time_since_first()};
     return &frame_;
   } catch (const std::exception& thrown) {
     return failed(path_, thrown);

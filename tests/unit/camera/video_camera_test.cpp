@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
@@ -17,6 +19,52 @@ namespace perimap {
 namespace {
 
 constexpr int kFrames = 6;
+
+// The blocks of a Matroska file (RFC 8794, RFC 9559), found by the sizes that its elements tell.
+class Matroska {
+ public:
+  explicit Matroska(const std::string& file) : file_(file) {
+    std::ifstream in(file, std::ios::binary);
+    bytes_.assign(std::istreambuf_iterator<char>(in), {});
+    walk(0, bytes_.size());
+  }
+  [[nodiscard]] std::size_t blocks() const { return blocks_.size(); }
+  // Each block's time in its cluster.
+  void retime(const std::vector<int>& ms) {
+    for (std::size_t i = 0; i < blocks_.size() && i < ms.size(); ++i) {
+      bytes_[blocks_[i]] = static_cast<char>(ms[i] >> 8);
+      bytes_[blocks_[i] + 1] = static_cast<char>(ms[i] & 0xFF);
+    }
+    std::ofstream(file_, std::ios::binary).write(bytes_.data(), static_cast<std::streamsize>(bytes_.size()));
+  }
+
+ private:
+  std::uint64_t number(std::size_t& at, bool keep_marker) const {
+    const auto first = static_cast<unsigned char>(bytes_.at(at));
+    const int length = std::countl_zero(first) + 1;
+    std::uint64_t value = keep_marker ? first : first & (0xFFU >> static_cast<unsigned>(length));
+    for (int i = 1; i < length; ++i) {
+      value = value << 8U | static_cast<unsigned char>(bytes_.at(at + static_cast<std::size_t>(i)));
+    }
+    at += static_cast<std::size_t>(length);
+    return value;
+  }
+  void walk(std::size_t at, std::size_t end) {
+    constexpr std::uint64_t kSegment = 0x18538067, kCluster = 0x1F43B675, kSimpleBlock = 0xA3;
+    while (at < end) {
+      const std::uint64_t id = number(at, true);
+      const std::uint64_t size = number(at, false);
+      const std::size_t next = std::min<std::size_t>(end, at + size);
+      if (id == kSegment || id == kCluster) walk(at, next);
+      if (id == kSimpleBlock) blocks_.push_back(at + 1);  // behind the track's number
+      at = next;
+    }
+  }
+
+  std::string file_;
+  std::vector<char> bytes_;
+  std::vector<std::size_t> blocks_;
+};
 
 // In the test's working folder, which is a build folder.
 class VideoCamera : public ::testing::Test {
@@ -55,6 +103,37 @@ TEST_F(VideoCamera, GivesItsFramesAtItsOwnPaceAndEnds) {
     EXPECT_EQ(stamps_[i].capture - stamps_[i - 1].capture, steps * std::chrono::milliseconds(50));
   }
   EXPECT_EQ(health_.reason(), "the video has ended");
+}
+
+// As a capture program writes them that leaves out what has not changed.
+TEST_F(VideoCamera, FramesHaveTheTimesThatTheFileGivesThem) {
+  const std::string file = "FramesHaveTheTimes.mkv";
+  const std::vector<std::uint8_t> pixels(std::size_t{64} * 48, 100);
+  auto writer = VideoWriter::create(file, 64, 48, 20.0).value();
+  for (int i = 0; i < kFrames; ++i) ASSERT_TRUE(writer->write({0, {}, {pixels.data(), 64, 48, 64}}, {}));
+  ASSERT_TRUE(writer->finish());
+  const std::vector<int> times_ms{0, 67, 83, 150, 167, 233};
+  Matroska matroska(file);
+  ASSERT_EQ(matroska.blocks(), times_ms.size());
+  matroska.retime(times_ms);
+  const CameraSink sink = [this](const CameraFrame& frame) { stamps_.push_back(frame.stamp); };
+  for (const double rate_hz : {0.0, 50.0}) {
+    stamps_.clear();
+    const auto played = serve_video_camera({file, rate_hz, false}, sink, health_, interrupt_);
+    ASSERT_TRUE(played) << played.error().message;
+    ASSERT_GE(stamps_.size(), 2U);
+    for (std::size_t i = 1; i < stamps_.size(); ++i) {
+      const std::size_t at = stamps_[i].sequence - 1;
+      const std::size_t before = stamps_[i - 1].sequence - 1;
+      const auto passed = stamps_[i].capture - stamps_[i - 1].capture;
+      if (rate_hz > 0.0) {
+        EXPECT_EQ(passed, static_cast<std::int64_t>(at - before) * std::chrono::milliseconds(20));
+      } else {
+        EXPECT_NEAR(to_seconds(passed), 1e-3 * (times_ms.at(at) - times_ms.at(before)), 1e-6);
+      }
+    }
+  }
+  std::filesystem::remove(file);
 }
 
 TEST_F(VideoCamera, BeginsAnewWithOneCount) {
