@@ -21,6 +21,7 @@ constexpr int kMostResets = 2;
 // What the dongle says in place of a board that does not answer; it ends as a greeting does.
 constexpr std::string_view kNoBoard = "Failure";
 constexpr std::string_view kName = "OpenBCI";
+constexpr std::string_view kDaisy = "Daisy";  // "On Daisy ADS1299 Device ID: 0x3E", where there is one
 constexpr Duration kBetweenBegins = std::chrono::milliseconds(500);
 constexpr int kMostBegins = 20;
 constexpr std::size_t kLongestGreeting = 2048;
@@ -80,7 +81,7 @@ void CytonProtocol::start() {
   health().set_awaited("no answer yet to v, which asks for its name; is it switched on?");
 }
 
-void CytonProtocol::await_greeting(std::span<const std::byte> bytes) {
+void CytonProtocol::await_greeting(LinkControl& link, std::span<const std::byte> bytes) {
   for (const std::byte b : bytes) heard_.push_back(static_cast<char>(b));
   for (std::size_t end = heard_.find(kPrompt); end != std::string::npos; end = heard_.find(kPrompt)) {
     const std::string text = heard_.substr(0, end);
@@ -88,7 +89,7 @@ void CytonProtocol::await_greeting(std::span<const std::byte> bytes) {
     const std::size_t name = text.rfind(kName);
     const std::size_t failure = text.rfind(kNoBoard);
     if (failure == std::string::npos || (name != std::string::npos && name > failure)) {
-      return begin(name == std::string::npos ? "" : text.substr(name));
+      return begin(link, name == std::string::npos ? "" : text.substr(name));
     }
     no_board_ = true;
     patience_ = kPatience;
@@ -103,8 +104,14 @@ void CytonProtocol::await_greeting(std::span<const std::byte> bytes) {
   (void)framer_.feed(bytes, running);
 }
 
-void CytonProtocol::begin(const std::string& name) {
+void CytonProtocol::begin(LinkControl& link, const std::string& name) {
   if (!name.empty()) health().set_identity(name);
+  if (name.find(kDaisy) != std::string::npos) {
+    patience_ = kPatience;
+    return link.fail(
+        "a Cyton with a Daisy module, whose packets are of the one board and the other in turn, 125 a second of each: "
+        "take the Daisy off");
+  }
   prompted_ = true;
   patience_ = kPatience;
   framer_.restart();
@@ -130,8 +137,8 @@ std::string CytonProtocol::why_no_sample(std::uint64_t bytes, double seconds) co
   return EcgProtocol::why_no_sample(bytes, seconds);
 }
 
-void CytonProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> bytes, Instant arrival) {
-  if (!prompted_) return await_greeting(bytes);
+void CytonProtocol::decode(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) {
+  if (!prompted_) return await_greeting(link, bytes);
   const double count_mV = kReference_mV / settings_.gain / kFullScale;
   const auto take = [&](std::span<const std::byte> packet, std::optional<unsigned> lost, std::size_t behind) {
     drop_commands();

@@ -9,6 +9,8 @@
 // the port 8 and 14 s, then 5 s again. One that has greeted may have missed its `b`: it is told again every half second
 // until samples come. A dongle that reaches no board says so, "Failure: ...$$$", which is no greeting.
 //
+// With a Daisy module packets are of the two boards in turn; its greeting names it, and it is refused by that name.
+//
 // There is no check sum, so shape and count stand for it: synchronisation needs three packets in a row, and a packet
 // whose number does not follow counts only when the next agrees with it.
 #pragma once
@@ -49,8 +51,8 @@ class CytonProtocol final : public EcgProtocol {
   static constexpr Duration kPatience = std::chrono::seconds(3);
   static constexpr Duration kLongestPatience = std::chrono::seconds(12);
 
-  void await_greeting(std::span<const std::byte> bytes);
-  void begin(const std::string& name);
+  void await_greeting(LinkControl& link, std::span<const std::byte> bytes);
+  void begin(LinkControl& link, const std::string& name);
   void answers(std::string awaited);
 
   CytonSettings settings_;

@@ -113,9 +113,10 @@ class BitalinoEmulator final : public EcgEmulator {
 
 class CytonEmulator final : public EcgEmulator {
  public:
-  CytonEmulator(EcgDeviceSignals signals, const EmulatorFaults& faults)
+  CytonEmulator(EcgDeviceSignals signals, const EmulatorFaults& faults, bool daisy)
       : EcgEmulator(std::move(signals), CytonProtocol::kSampleRate_hz,
-                    time_on_line(CytonProtocol::kPacketBytes, CytonProtocol::kBaud), faults) {}
+                    time_on_line(CytonProtocol::kPacketBytes, CytonProtocol::kBaud), faults),
+        daisy_(daisy) {}
 
  protected:
   void command(LinkControl& link, std::uint8_t byte) override {
@@ -123,7 +124,9 @@ class CytonEmulator final : public EcgEmulator {
     if (byte == 'b') run(true, now());
     if (byte == 'v') {
       run(false, now());
-      link.send(std::string_view("OpenBCI V3 8-16 channel\nADS1299 Device ID: 0x3E\nFirmware: v3.1.2\n$$$"));
+      link.send(std::string_view("OpenBCI V3 8-16 channel\nOn Board ADS1299 Device ID: 0x3E\n"));
+      if (daisy_) link.send(std::string_view("On Daisy ADS1299 Device ID: 0x3E\n"));
+      link.send(std::string_view("LIS3DH Device ID: 0x33\nFirmware: v3.1.2\n$$$"));
     }
   }
 
@@ -132,7 +135,9 @@ class CytonEmulator final : public EcgEmulator {
     packet.front() = std::byte{0xA0};
     packet[1] = static_cast<std::byte>(count_++);
     for (int channel = 1; channel <= CytonProtocol::kChannels; ++channel) {
-      const float input_mV = channel == CytonSettings{}.channel ? mV : respiration;
+      // Packets of even numbers are the Daisy's, to which nothing is wired.
+      const bool of_daisy = daisy_ && (count_ - 1) % 2 == 0;
+      const float input_mV = of_daisy ? 0.0F : channel == CytonSettings{}.channel ? mV : respiration;
       const std::size_t at = 2 + 3 * static_cast<std::size_t>(channel - 1);
       for (unsigned i = 0; i < 3; ++i) packet[at + i] = static_cast<std::byte>(counts(input_mV) >> (16U - 8U * i));
     }
@@ -149,6 +154,7 @@ class CytonEmulator final : public EcgEmulator {
         std::lround(std::isnan(mV) ? kFullScale : std::clamp(counts, -kFullScale, kFullScale)));
   }
 
+  bool daisy_;
   std::uint8_t count_ = 0;
 };
 
@@ -208,7 +214,10 @@ std::unique_ptr<EcgEmulator> emulate_bitalino(EcgDeviceSignals signals, const Em
   return std::make_unique<BitalinoEmulator>(std::move(signals), faults);
 }
 std::unique_ptr<EcgEmulator> emulate_cyton(EcgDeviceSignals signals, const EmulatorFaults& faults) {
-  return std::make_unique<CytonEmulator>(std::move(signals), faults);
+  return std::make_unique<CytonEmulator>(std::move(signals), faults, false);
+}
+std::unique_ptr<EcgEmulator> emulate_cyton_with_daisy(EcgDeviceSignals signals, const EmulatorFaults& faults) {
+  return std::make_unique<CytonEmulator>(std::move(signals), faults, true);
 }
 
 }  // namespace perimap

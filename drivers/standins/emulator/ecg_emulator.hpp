@@ -51,5 +51,8 @@ class EcgEmulator : public DeviceProtocol {
 [[nodiscard]] std::unique_ptr<EcgEmulator> emulate_medlab(EcgDeviceSignals signals, const EmulatorFaults& faults);
 [[nodiscard]] std::unique_ptr<EcgEmulator> emulate_bitalino(EcgDeviceSignals signals, const EmulatorFaults& faults);
 [[nodiscard]] std::unique_ptr<EcgEmulator> emulate_cyton(EcgDeviceSignals signals, const EmulatorFaults& faults);
+// With that module, whose packets come in turn with the board's.
+[[nodiscard]] std::unique_ptr<EcgEmulator> emulate_cyton_with_daisy(EcgDeviceSignals signals,
+                                                                    const EmulatorFaults& faults);
 
 }  // namespace perimap
