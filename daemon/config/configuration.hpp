@@ -56,8 +56,14 @@ struct TrackerConfiguration {
   std::optional<std::string> port;                            // as parse_endpoint() takes it
   std::optional<std::string> sensor;                          // NDI: port handle; OpenIGTLink: name
   std::optional<std::string> reference;                       // likewise
+  std::optional<std::string> pointer;                         // likewise
+  std::vector<std::string> instruments;                       // likewise
   std::optional<std::filesystem::path> sensor_definition;     // NDI, uploaded
   std::optional<std::filesystem::path> reference_definition;  // NDI, uploaded
+  std::optional<std::filesystem::path> pointer_definition;    // NDI, uploaded
+  std::vector<std::filesystem::path> instrument_definitions;  // NDI, uploaded; beside `instruments`
+  std::optional<std::filesystem::path> pointer_calibration;   // its tip
+  bool igtl_stamps_by_arrival = false;                        // not by the server's stamps
   double frame_rate_hz = 60.0;                                // of NDI's frame numbers
   double translation_IW_mm[3] = {0.0, 0.0, 0.0};              // registration X_IW
   double rotation_IW_wxyz[4] = {1.0, 0.0, 0.0, 0.0};          // registration X_IW, unit quaternion
@@ -68,8 +74,16 @@ struct TrackerConfiguration {
   Duration maximum_extrapolation = std::chrono::milliseconds(20);
   double translation_SC_mm[3] = {0.0, 0.0, 0.0};      // hand-eye X_SC
   double rotation_SC_wxyz[4] = {1.0, 0.0, 0.0, 0.0};  // hand-eye X_SC, unit quaternion
+  std::optional<std::string> hand_eye_date;           // on which it was measured, as calibration_date_of() takes it
+  std::optional<std::string> hand_eye_sensor;         // of which it was
 
   bool operator==(const TrackerConfiguration&) const = default;
+};
+
+struct SetupConfiguration {
+  double maximum_age_days = 30.0;  // of calibrations; 0: any
+
+  bool operator==(const SetupConfiguration&) const = default;
 };
 
 struct EcgConfiguration {
@@ -214,6 +228,7 @@ struct Configuration {
   ReplayConfiguration replay;
   CameraConfiguration camera;
   TrackerConfiguration tracker;
+  SetupConfiguration setup;
   EcgConfiguration ecg;
   PhaseConfiguration phase;
   RespirationConfiguration respiration;

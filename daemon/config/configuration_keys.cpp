@@ -91,6 +91,19 @@ bool is_tool_name(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c < 0x7F; });
 }
 
+// Digits in their places; which days a month has is looked at where ages are told.
+bool is_day(const std::string& text) {
+  constexpr std::string_view kForm = "0000-00-00";
+  if (text.size() < kForm.size() || text.size() > 40) return false;
+  for (std::size_t i = 0; i < kForm.size(); ++i) {
+    const bool digit = text[i] >= '0' && text[i] <= '9';
+    if (kForm[i] == '-' ? text[i] != '-' : !digit) return false;
+  }
+  return std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c < 0x7F; });
+}
+
+constexpr std::size_t kMostInstruments = 8;
+
 void add_tracker(std::vector<ConfigurationKey>& keys) {
   const auto ms = std::chrono::milliseconds(1);
   const auto s = std::chrono::seconds(1);
@@ -98,18 +111,33 @@ void add_tracker(std::vector<ConfigurationKey>& keys) {
   using Protocol = TrackerConfiguration::Protocol;
   const std::array<std::pair<std::string_view, Protocol>, 3> protocols{
       {{"none", Protocol::kNone}, {"ndi", Protocol::kNdi}, {"igtl", Protocol::kIgtl}}};
+  const std::array<std::pair<std::string_view, bool>, 2> igtl_stamps{{{"sender", false}, {"arrival", true}}};
   Section("tracker", keys)
       .choice("protocol", protocols, PERIMAP_MEMBER(tracker.protocol), "what the tracker speaks")
       .optional_text("port", std::string(kPort), &is_endpoint, PERIMAP_MEMBER(tracker.port), "where the tracker is")
-      .optional_text("sensor", tool, &is_tool_name, PERIMAP_MEMBER(tracker.sensor),
-                     "the sensor's port handle (ndi, hexadecimal) or name (igtl); none: the only one but the reference")
+      .optional_text(
+          "sensor", tool, &is_tool_name, PERIMAP_MEMBER(tracker.sensor),
+          "the sensor's port handle (ndi, hexadecimal) or name (igtl); none: the only one that is no other's")
       .optional_text("reference", tool, &is_tool_name, PERIMAP_MEMBER(tracker.reference),
                      "the patient's reference tool, likewise; W is its frame; none: W is the tracker's")
+      .optional_text("pointer", tool, &is_tool_name, PERIMAP_MEMBER(tracker.pointer),
+                     "the tool that touches landmarks, likewise; recorded as tracker/pointer")
+      .texts("instruments", kMostInstruments, "texts of 1 to 20 printable characters", &is_tool_name,
+             PERIMAP_MEMBER(tracker.instruments), "further tools, likewise; each recorded as tracker/instrument/NAME")
       .file("sensor_definition", PERIMAP_MEMBER(tracker.sensor_definition),
             "the sensor's tool definition (.rom), uploaded to an ndi tracker")
       .file("reference_definition", PERIMAP_MEMBER(tracker.reference_definition),
             "the reference's tool definition, likewise")
+      .file("pointer_definition", PERIMAP_MEMBER(tracker.pointer_definition), "the pointer's tool definition, likewise")
+      .files("instrument_definitions", kMostInstruments, PERIMAP_MEMBER(tracker.instrument_definitions),
+             "tool definitions, likewise, of further instruments; each has the name of its file")
+      .file("pointer_calibration", PERIMAP_MEMBER(tracker.pointer_calibration),
+            "the pointer's tip, as `perimap calibrate tool --output` writes it; one of another tool is refused")
       .number("frame_rate_hz", 1, 1000, PERIMAP_MEMBER(tracker.frame_rate_hz), "of the ndi tracker's frame numbers")
+      .choice(
+          "igtl_stamps", igtl_stamps, PERIMAP_MEMBER(tracker.igtl_stamps_by_arrival),
+          "when an igtl tracker's poses were measured: as the sender stamps them, or, where its clock is no good, when "
+          "they arrive")
       .pose("registration", "IW", PERIMAP_MEMBER(tracker.translation_IW_mm), PERIMAP_MEMBER(tracker.rotation_IW_wxyz),
             "registration X_IW: the place of W in the frame I, which is then published as source.world_frame",
             "registration X_IW: the orientation of W in the frame I")
@@ -125,7 +153,14 @@ void add_tracker(std::vector<ConfigurationKey>& keys) {
                 "a pose is extrapolated at most this far; beyond, a frame gives no measurement")
       .pose("hand_eye", "SC", PERIMAP_MEMBER(tracker.translation_SC_mm), PERIMAP_MEMBER(tracker.rotation_SC_wxyz),
             "hand-eye X_SC: the camera's place in the sensor's frame",
-            "hand-eye X_SC: the camera's orientation in the sensor's frame");
+            "hand-eye X_SC: the camera's orientation in the sensor's frame")
+      .optional_text("hand_eye_date", "a day, as 2026-11-25", &is_day, PERIMAP_MEMBER(tracker.hand_eye_date),
+                     "when the hand-eye was measured")
+      .optional_text("hand_eye_sensor", tool, &is_tool_name, PERIMAP_MEMBER(tracker.hand_eye_sensor),
+                     "the sensor that it was measured of; where that is not tracker.sensor it is refused");
+  Section("setup", keys)
+      .number("maximum_age_days", 0, 36500, PERIMAP_MEMBER(setup.maximum_age_days),
+              "check and probe warn of calibrations that are older; 0: of none");
 }
 
 void add_ecg(std::vector<ConfigurationKey>& keys) {

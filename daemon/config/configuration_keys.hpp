@@ -15,8 +15,8 @@ namespace perimap {
 
 // A value as TOML gives it, of the types that keys can have. Integers stay integers; a key that wants a floating-point
 // number takes both.
-using ConfigurationValue =
-    std::variant<bool, std::int64_t, double, std::string, std::vector<std::int64_t>, std::vector<double>>;
+using ConfigurationValue = std::variant<bool, std::int64_t, double, std::string, std::vector<std::int64_t>,
+                                        std::vector<double>, std::vector<std::string>>;
 
 struct ConfigurationKey {
   std::string section;

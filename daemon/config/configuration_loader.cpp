@@ -99,6 +99,11 @@ std::optional<ConfigurationValue> value_of(const toml::node& node) {
   if (array == nullptr) {
     return std::nullopt;
   }
+  if (!array->empty() && array->is_homogeneous<std::string>()) {
+    std::vector<std::string> texts;
+    for (const toml::node& element : *array) texts.push_back(element.as_string()->get());
+    return texts;
+  }
   std::vector<std::int64_t> integers;
   std::vector<double> numbers;
   for (const toml::node& element : *array) {
@@ -244,23 +249,36 @@ class Overlay {
       return;
     }
     std::optional<ConfigurationValue> value = value_of(node);
-    if (value && key->names_file && std::holds_alternative<std::string>(*value)) {
-      // An empty name stays empty, so that the key refuses it.
-      const std::string& named = std::get<std::string>(*value);
-      std::error_code code;
-      const std::filesystem::path folder = std::filesystem::absolute(file_, code).parent_path();
-      const std::filesystem::path path = (folder / named).lexically_normal();
-      if (named_files_ == NamedFiles::kMustExist && !std::filesystem::is_regular_file(path, code)) {
+    if (value && key->names_file) {
+      if (const auto wrong = place_files(*value)) {
         refuse(node.source().begin, full_name(section, name.str()), key->expected,
-               fmt::format("{} ({} is {})", describe(node), path.string(),
-                           std::filesystem::exists(path, code) ? "not a file" : "not there"));
+               fmt::format("{} ({})", describe(node), *wrong));
         return;
       }
-      value = named.empty() ? std::string() : path.string();
     }
     if (!value || !key->read(*value, configuration_)) {
       refuse(node.source().begin, full_name(section, name.str()), key->expected, describe(node));
     }
+  }
+
+  // Names of files as paths from this file's folder; what is wrong with one of them.
+  [[nodiscard]] std::optional<std::string> place_files(ConfigurationValue& value) const {
+    std::vector<std::string*> names;
+    if (auto* name = std::get_if<std::string>(&value)) names.push_back(name);
+    if (auto* list = std::get_if<std::vector<std::string>>(&value)) {
+      for (std::string& name : *list) names.push_back(&name);
+    }
+    for (std::string* name : names) {
+      std::error_code code;
+      const std::filesystem::path folder = std::filesystem::absolute(file_, code).parent_path();
+      const std::filesystem::path path = (folder / *name).lexically_normal();
+      if (named_files_ == NamedFiles::kMustExist && !std::filesystem::is_regular_file(path, code)) {
+        return fmt::format("{} is {}", path.string(), std::filesystem::exists(path, code) ? "not a file" : "not there");
+      }
+      // An empty name stays empty, so that the key refuses it.
+      if (!name->empty()) *name = path.string();
+    }
+    return std::nullopt;
   }
 
   void refuse_unknown(std::string_view section, const toml::key& name) {

@@ -44,6 +44,15 @@ inline std::optional<std::vector<double>> as_numbers(const ConfigurationValue& v
   return std::nullopt;
 }
 
+// A list of texts; an empty list arrives as one of integers.
+inline std::optional<std::vector<std::string>> as_texts(const ConfigurationValue& value) {
+  if (const auto* texts = std::get_if<std::vector<std::string>>(&value)) {
+    return *texts;
+  }
+  const auto* none = std::get_if<std::vector<std::int64_t>>(&value);
+  return none != nullptr && none->empty() ? std::optional(std::vector<std::string>()) : std::nullopt;
+}
+
 inline bool within(double value, double low, double high) {
   return std::isfinite(value) && value >= low && value <= high;
 }
@@ -201,6 +210,36 @@ class Section {
           const std::optional<std::string>& text = member(configuration);
           return text ? std::optional<ConfigurationValue>(*text) : std::nullopt;
         });
+  }
+
+  // A list of at most `most` texts, into a vector of what a text converts to. `valid` says whether one is expected.
+  template <class Member>
+  Section& texts(const std::string& name, std::size_t most, const std::string& expected,
+                 bool (*valid)(const std::string&), Member member, const std::string& meaning) {
+    return add(
+        name, meaning, fmt::format("up to {} {}", most, expected),
+        [member, most, valid](const ConfigurationValue& value, Configuration& configuration) {
+          const std::optional<std::vector<std::string>> texts = as_texts(value);
+          if (!texts || texts->size() > most || !std::all_of(texts->begin(), texts->end(), valid)) return false;
+          auto& list = member(configuration);
+          list.assign(texts->begin(), texts->end());
+          return true;
+        },
+        [member](const Configuration& configuration) -> std::optional<ConfigurationValue> {
+          const auto& list = member(configuration);
+          return std::vector<std::string>(list.begin(), list.end());
+        });
+  }
+
+  // A list of names of files.
+  template <class Member>
+  Section& files(const std::string& name, std::size_t most, Member member, const std::string& meaning) {
+    constexpr auto kIsName = [](const std::string& text) {
+      return !text.empty() && text.find('\0') == std::string::npos;
+    };
+    texts(name, most, "names of existing files", kIsName, member, meaning);
+    keys_.back().names_file = true;
+    return *this;
   }
 
   // A pose in two keys, PREFIX_translation_FRAMES_mm and PREFIX_rotation_FRAMES_wxyz.

@@ -45,6 +45,9 @@ std::string printed(const ConfigurationValue& value) {
       }
       return fmt::format("\"{}\"", escaped);
     }
+    std::string operator()(const std::vector<std::string>& texts) const {
+      return print_list(texts, [this](const std::string& text) { return (*this)(text); });
+    }
     std::string operator()(const std::vector<std::int64_t>& integers) const {
       return print_list(integers, [](std::int64_t integer) { return fmt::format("{}", integer); });
     }

@@ -15,13 +15,16 @@ namespace perimap {
 namespace {
 
 void listen_to(const TrackerDevice& device, ProbedDevice& probed, const Interrupt& interrupt) {
-  const TrackerSink sink = [&seen = probed.seen](const TrackerSample& sample) {
+  const auto add = [](const TrackerSample& sample, ProbedSamples& seen) {
     seen.add(sample.source_time, 1);
     seen.delay.add(sample.arrival - sample.source_time);
     ++seen.tools[static_cast<std::size_t>(sample.state)];
     if (sample.state != ToolState::kOk) ++seen.invalid;
+    seen.largest_error_mm = std::max(seen.largest_error_mm, sample.error_mm);
   };
-  serve_tracker(device, sink, probed.health, interrupt);
+  const TrackerSink sensor = [&](const TrackerSample& sample) { add(sample, probed.seen); };
+  const ToolSink others = [&](const ToolSample& sample) { add(sample, probed.tools.at(sample.tool).seen); };
+  serve_tracker(device, sensor, others, probed.health, interrupt);
 }
 
 void listen_to(const EcgDevice& device, ProbedDevice& probed, const Interrupt& interrupt) {
@@ -96,7 +99,10 @@ ProbedDevices probe_devices(const Configuration& configuration, const Devices& d
     listeners.emplace_back([&device, &probed](const Interrupt& interrupt) { listen_to(device, probed, interrupt); });
   };
   if (devices.camera) add("camera", *configuration.camera.device, *devices.camera);
-  if (devices.tracker) add("tracker", format_endpoint(devices.tracker->endpoint), *devices.tracker);
+  if (devices.tracker) {
+    add("tracker", format_endpoint(devices.tracker->endpoint), *devices.tracker);
+    for (const std::string& name : devices.tracker->tools) all.back()->tools.emplace_back().name = name;
+  }
   if (devices.ecg) {
     add("ecg", format_endpoint(devices.ecg->endpoint), *devices.ecg);
     all.back()->respiration_channel = devices.ecg->respiration_channel;

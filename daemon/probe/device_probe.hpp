@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <string>
@@ -24,6 +25,7 @@ namespace perimap {
 struct ProbedSamples {
   std::uint64_t invalid = 0;
   std::array<std::uint64_t, 4> tools{};  // by ToolState
+  double largest_error_mm = 0.0;         // by the tracker's own figure; 0: it gives none
   LatencyHistogram delay;
   std::uint64_t count = 0;
   std::uint64_t first_count = 0;  // of them with the first stamp
@@ -45,6 +47,12 @@ struct ProbedBreathing {
   void add(const RespirationBlock& block);
 };
 
+// What came of another tool that the tracker sees.
+struct ProbedTool {
+  std::string name;  // as of tracked_tool_names()
+  ProbedSamples seen;
+};
+
 // One device, after it was listened to.
 struct ProbedDevice {
   const char* kind = "";  // "camera", "tracker", "ecg", "r_trigger"
@@ -54,6 +62,7 @@ struct ProbedDevice {
   ProbedSamples seen;
   int respiration_channel = 0;  // of an ECG device; 0: none
   ProbedBreathing breathing;
+  std::deque<ProbedTool> tools;  // of a tracker, by ToolSample::tool; without a name: not asked for
 };
 
 using ProbedDevices = std::vector<std::unique_ptr<ProbedDevice>>;

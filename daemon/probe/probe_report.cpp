@@ -48,6 +48,7 @@ nlohmann::json as_json(std::string_view kind, const DeviceHealth& health, const 
           {"state", device_state_name(health.state())},
           {"reason", health.state() == DeviceState::kStreaming ? "" : reason(kind, health)},
           {"identity", health.identity().empty() ? nlohmann::json(nullptr) : nlohmann::json(health.identity())},
+          {"notice", health.notice()},
           {"openings", health.openings.get()},
           {"samples", health.samples.get()},
           {"rate_hz", seen.rate_hz()},
@@ -58,7 +59,27 @@ nlohmann::json as_json(std::string_view kind, const DeviceHealth& health, const 
           {"bus_errors", health.bus_errors.get()},
           {"jitter_p50_ms", milliseconds(jitter.p50)},
           {"jitter_p99_ms", milliseconds(jitter.p99)},
-          {"delay_p50_ms", milliseconds(seen.delay.summary().p50)}};
+          {"delay_p50_ms", milliseconds(seen.delay.summary().p50)},
+          {"misnumbered", health.misnumbered.get()},
+          {"largest_error_mm", seen.largest_error_mm}};
+}
+
+nlohmann::json as_json(const ProbedTool& tool) {
+  const ProbedSamples& seen = tool.seen;
+  return {{"readings", seen.count},
+          {"rate_hz", seen.rate_hz()},
+          {"ok", seen.tools[0]},
+          {"missing", seen.tools[1]},
+          {"out_of_volume", seen.tools[2]},
+          {"disabled", seen.tools[3]},
+          {"largest_error_mm", seen.largest_error_mm}};
+}
+
+std::string tool_text(const ProbedTool& tool) {
+  const ProbedSamples& seen = tool.seen;
+  if (seen.count == 0) return fmt::format("  {}: no reading\n", tool.name);
+  return fmt::format("  {}: {} readings, seen in {}, missing in {}, out of volume in {}, disabled in {}\n", tool.name,
+                     seen.count, seen.tools[0], seen.tools[1], seen.tools[2], seen.tools[3]);
 }
 
 nlohmann::json as_json(const ProbedBreathing& seen, int channel) {
@@ -106,6 +127,7 @@ std::string device_text(const char* kind, const nlohmann::json& j, const std::st
   told += fmt::format("  faults     {} lost, {} damaged, {} dropped by the kernel, {} bus errors\n",
                       j["lost"].get<std::uint64_t>(), j["damaged"].get<std::uint64_t>(),
                       j["dropped"].get<std::uint64_t>(), j["bus_errors"].get<std::uint64_t>());
+  if (!text("notice").empty()) told += fmt::format("  note       {}\n", text("notice"));
   if (!invalid.empty()) told += fmt::format("  validity   {}\n", invalid);
   if (!text("reason").empty() && text("state") != "streaming") told += fmt::format("  why        {}\n", text("reason"));
   return told;
@@ -122,6 +144,9 @@ nlohmann::json to_json(const ProbedDevices& devices) {
   nlohmann::json json;
   for (const auto& device : devices) {
     json[device->kind] = as_json(device->kind, device->health, device->seen, device->where);
+    for (const ProbedTool& tool : device->tools) {
+      if (!tool.name.empty()) json[device->kind]["tools"][tool.name] = as_json(tool);
+    }
     if (device->respiration_channel == 0) continue;
     json[device->kind]["respiration"] = as_json(device->breathing, device->respiration_channel);
   }
@@ -134,6 +159,9 @@ std::string to_text(const ProbedDevices& devices) {
   for (const auto& device : devices) {
     const nlohmann::json& told = json[device->kind];
     text += device_text(device->kind, told, complaint(device->kind, device->seen));
+    for (const ProbedTool& tool : device->tools) {
+      if (!tool.name.empty()) text += tool_text(tool);
+    }
     if (told.contains("respiration")) text += breathing_text(told["respiration"]);
   }
   return text;

@@ -41,14 +41,14 @@ SerialEcg serial_ecg(const EcgDevice& device, EcgSinks sinks, DeviceHealth& heal
 
 }  // namespace
 
-void serve_tracker(const TrackerDevice& device, const TrackerSink& sink, DeviceHealth& health,
+void serve_tracker(const TrackerDevice& device, const TrackerSink& sink, const ToolSink& tools, DeviceHealth& health,
                    const Interrupt& interrupt) {
   const StreamOpener open = opener_of(device.endpoint, NdiSettings::kFirstBaud);
   if (const auto* ndi = std::get_if<NdiSettings>(&device.settings)) {
-    NdiSession session(*ndi, sink, health);
+    NdiSession session(*ndi, sink, health, tools);
     serve_device(open, session, health, interrupt);
   } else {
-    IgtlSession session(std::get<IgtlSettings>(device.settings), sink, health);
+    IgtlSession session(std::get<IgtlSettings>(device.settings), sink, health, tools);
     serve_device(open, session, health, interrupt);
   }
 }
@@ -98,7 +98,8 @@ void DeviceFeeder::start(ThreadLauncher& threads) {
   if (devices_.tracker) {
     threads_.push_back(threads.launch("tracker", ThreadRole::kSource, [this] {
       const TrackerSink sink = [this](const TrackerSample& sample) { intake_.pose(sample); };
-      serve_tracker(*devices_.tracker, sink, tracker_health_, interrupt_);
+      const ToolSink tools = [this](const ToolSample& sample) { intake_.tool(sample); };
+      serve_tracker(*devices_.tracker, sink, tools, tracker_health_, interrupt_);
     }));
   }
   if (devices_.ecg) {
@@ -157,6 +158,7 @@ std::vector<Error> DeviceFeeder::damage() const { return playback_ ? playback_->
 void DeviceFeeder::tell(const DeviceHealth& health, DeviceNews& news) {
   const auto line = news.next(health.state(), health.reason(), health.identity(), MonotonicClock::now());
   if (line) spdlog::log(line->warning ? spdlog::level::warn : spdlog::level::info, "{}", line->text);
+  if (const auto note = news.note(health.notice())) spdlog::warn("{}", *note);
 }
 
 void DeviceFeeder::describe(StatusFacts& facts) const {

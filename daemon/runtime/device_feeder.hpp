@@ -25,7 +25,7 @@
 namespace perimap {
 
 // Reads the device on the calling thread until interrupted; reopens it when it fails.
-void serve_tracker(const TrackerDevice& device, const TrackerSink& sink, DeviceHealth& health,
+void serve_tracker(const TrackerDevice& device, const TrackerSink& sink, const ToolSink& tools, DeviceHealth& health,
                    const Interrupt& interrupt);
 void serve_ecg(const EcgDevice& device, const EcgSinks& sinks, DeviceHealth& health, const Interrupt& interrupt);
 void serve_r_trigger(const RTriggerDevice& device, const RTriggerSink& sink, DeviceHealth& health,

@@ -19,6 +19,13 @@ std::optional<DeviceNews::Line> DeviceNews::next(DeviceState state, const std::s
   return told;
 }
 
+std::optional<std::string> DeviceNews::note(const std::string& notice) {
+  // While a device is opened anew it has none; the same one afterwards is no news.
+  if (notice.empty() || notice == noted_) return std::nullopt;
+  noted_ = notice;
+  return fmt::format("{}: {}", name_, notice);
+}
+
 void DeviceNews::earn(Instant now) {
   while (lines_left_ < kAtOnce && now - earned_ >= kEvery) {
     ++lines_left_;

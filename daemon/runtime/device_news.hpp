@@ -29,6 +29,8 @@ class DeviceNews {
   // Some times a second, `now` rising: the line that is due, if any. `identity` is what the device says that it is.
   [[nodiscard]] std::optional<Line> next(DeviceState state, const std::string& reason, const std::string& identity,
                                          Instant now);
+  // What the device is used in spite of, when that is news.
+  [[nodiscard]] std::optional<std::string> note(const std::string& notice);
 
  private:
   struct Seen {
@@ -43,6 +45,7 @@ class DeviceNews {
   std::string name_;
   Seen seen_;  // last
   Seen told_;
+  std::string noted_;
   std::uint64_t changes_ = 0;  // since told_
   int lines_left_ = kAtOnce;
   Instant earned_;  // the last of them, or when all were there

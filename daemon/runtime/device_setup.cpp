@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "daemon/config/ecg_inputs.hpp"
+#include "daemon/config/tracked_tools.hpp"
+#include "daemon/runtime/calibration_fit.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/ecg/can_ecg.hpp"
 #include "drivers/recording/channels.hpp"
@@ -59,8 +61,8 @@ Expected<NdiTool> ndi_tool(std::string_view key, const std::optional<std::string
 }
 
 // A tool seen from itself stands still where it is: a pose that looks well and says nothing.
-tl::unexpected<Error> same_tool(const std::string& name) {
-  return wrong("tracker.reference", "another tool than 'tracker.sensor'", fmt::format("\"{}\"", name));
+tl::unexpected<Error> refuse_twice(const ToolTwice& twice) {
+  return wrong(twice.key, fmt::format("another tool than '{}'", twice.also), fmt::format("\"{}\"", twice.tool));
 }
 
 Expected<NdiSettings> ndi_settings(const TrackerConfiguration& c) {
@@ -71,9 +73,27 @@ Expected<NdiSettings> ndi_settings(const TrackerConfiguration& c) {
   if (c.reference || c.reference_definition) {
     auto reference = ndi_tool("tracker.reference", c.reference, c.reference_definition);
     if (!reference) return tl::unexpected(std::move(reference.error()));
-    if (settings.sensor.handle && reference->handle == settings.sensor.handle) return same_tool(*c.reference);
     settings.reference = std::move(*reference);
   }
+  const auto add = [&settings](std::string name) {
+    return [&settings, name = std::move(name)](NdiTool tool) mutable {
+      tool.name = std::move(name);
+      settings.tools.push_back(std::move(tool));
+    };
+  };
+  Expected<void> added;
+  if (c.pointer || c.pointer_definition) {
+    added = ndi_tool("tracker.pointer", c.pointer, c.pointer_definition).map(add("pointer"));
+  }
+  for (const std::string& instrument : c.instruments) {
+    if (added) added = ndi_tool("tracker.instruments", instrument, std::nullopt).map(add("instrument " + instrument));
+  }
+  for (const std::filesystem::path& definition : c.instrument_definitions) {
+    if (!added) break;
+    added = ndi_tool("tracker.instrument_definitions", std::nullopt, definition)
+                .map(add("instrument " + definition.stem().string()));
+  }
+  if (!added) return tl::unexpected(std::move(added.error()));
   settings.frame_rate_hz = c.frame_rate_hz;
   return settings;
 }
@@ -146,14 +166,18 @@ Expected<TrackerDevice> tracker_device(const TrackerConfiguration& c) {
   const double(&t)[3] = c.translation_IW_mm;
   WorldSettings world;
   world.X_IW = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), c.rotation_IW_wxyz);
+  if (const auto twice = tool_named_twice(c)) return refuse_twice(*twice);
   if (c.protocol == TrackerConfiguration::Protocol::kIgtl) {
-    if (c.reference && c.reference == c.sensor) return same_tool(*c.reference);
-    return TrackerDevice{std::move(*endpoint), IgtlSettings{c.sensor.value_or(""), c.reference, world}};
+    IgtlSettings settings{c.sensor.value_or(""), c.reference, world, {}};
+    settings.stamps_by_arrival = c.igtl_stamps_by_arrival;
+    if (c.pointer) settings.tools.push_back(*c.pointer);
+    settings.tools.insert(settings.tools.end(), c.instruments.begin(), c.instruments.end());
+    return TrackerDevice{std::move(*endpoint), std::move(settings), tracked_tool_names(c)};
   }
   auto settings = ndi_settings(c);
   if (!settings) return tl::unexpected(std::move(settings.error()));
   settings->world = world;
-  return TrackerDevice{std::move(*endpoint), std::move(*settings)};
+  return TrackerDevice{std::move(*endpoint), std::move(*settings), tracked_tool_names(c)};
 }
 
 Expected<EcgDevice> ecg_device(const Configuration& configuration) {
@@ -251,6 +275,7 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
     }
   }
   Configuration& configuration = basis.configuration;
+  if (const auto fits = calibrations_fit(configuration); !fits) return wrong_configuration(fits.error());
   auto devices = named_devices(configuration, configuration_file);
   // A map takes camera, tracker and R peaks: one that is not named is asked for as it would be.
   if (devices && !devices->tracker) devices = tl::unexpected(tracker_device(configuration.tracker).error());

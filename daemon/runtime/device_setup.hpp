@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "core/error/expected.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
@@ -24,6 +25,7 @@ namespace perimap {
 struct TrackerDevice {
   Endpoint endpoint;
   std::variant<NdiSettings, IgtlSettings> settings;
+  std::vector<std::string> tools = {};  // names, by ToolSample::tool (tracked_tool_names)
 };
 
 struct EcgDevice {

@@ -21,6 +21,10 @@ struct SensorIntake {
     if (entrance != nullptr) entrance->push_pose(sample);
     if (recorder != nullptr) recorder->pose(sample);
   }
+  // The pipeline has no use for them.
+  void tool(const ToolSample& sample) const noexcept {
+    if (recorder != nullptr) recorder->tool(sample);
+  }
   void ecg(const EcgBlock& block) const noexcept {
     if (entrance != nullptr) entrance->push_ecg(block);
     if (recorder != nullptr) recorder->ecg(block);

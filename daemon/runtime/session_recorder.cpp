@@ -16,6 +16,7 @@ constexpr Duration kTick = std::chrono::milliseconds(20);
 constexpr Duration kFlushAfter = std::chrono::seconds(1);
 constexpr std::size_t kFrameHeads = 1024;
 constexpr std::size_t kSampleRing = 2048;
+constexpr std::size_t kToolRing = 4 * kSampleRing;  // several tools at the sensor's rate
 
 }  // namespace
 
@@ -28,7 +29,9 @@ Expected<std::unique_ptr<SessionRecorder>> SessionRecorder::create(const std::fi
 }
 
 SessionRecorder::SessionRecorder(std::size_t memory_bytes)
-    : memory_bytes_(memory_bytes), frames_(kFrameHeads), others_(kSampleRing, kSampleRing, kSampleRing, kSampleRing) {}
+    : memory_bytes_(memory_bytes),
+      frames_(kFrameHeads),
+      others_(kSampleRing, kToolRing, kSampleRing, kSampleRing, kSampleRing) {}
 
 Expected<void> SessionRecorder::open(const std::filesystem::path& file, const SensorRecordingFacts& facts) {
   if (accepting_.load(std::memory_order_relaxed))
@@ -120,6 +123,7 @@ void SessionRecorder::enqueue(Lane<Sample>& lane, const Sample& sample) noexcept
 void SessionRecorder::pose(const TrackerSample& sample) noexcept {
   enqueue(std::get<Lane<TrackerSample>>(others_), sample);
 }
+void SessionRecorder::tool(const ToolSample& sample) noexcept { enqueue(std::get<Lane<ToolSample>>(others_), sample); }
 void SessionRecorder::ecg(const EcgBlock& block) noexcept { enqueue(std::get<Lane<EcgBlock>>(others_), block); }
 void SessionRecorder::r_trigger(const RTriggerPulse& pulse) noexcept {
   enqueue(std::get<Lane<RTriggerPulse>>(others_), pulse);

@@ -65,6 +65,7 @@ class SessionRecorder {
   // Each of one thread. None of them blocks or allocates.
   void frame(const CameraFrame& frame) noexcept;
   void pose(const TrackerSample& sample) noexcept;
+  void tool(const ToolSample& sample) noexcept;
   void ecg(const EcgBlock& block) noexcept;
   void r_trigger(const RTriggerPulse& pulse) noexcept;
   void respiration(const RespirationBlock& block) noexcept;
@@ -107,7 +108,8 @@ class SessionRecorder {
   std::size_t memory_bytes_;
   std::optional<SpscByteRing> bytes_;  // there before a frame is accepted
   Lane<RecordedFrameHead> frames_;
-  std::tuple<Lane<TrackerSample>, Lane<EcgBlock>, Lane<RTriggerPulse>, Lane<RespirationBlock>> others_;
+  std::tuple<Lane<TrackerSample>, Lane<ToolSample>, Lane<EcgBlock>, Lane<RTriggerPulse>, Lane<RespirationBlock>>
+      others_;
 
   // Of the writing thread: where it writes, none between two files.
   std::optional<SensorWriter> writer_;

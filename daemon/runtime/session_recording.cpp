@@ -9,8 +9,10 @@
 
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/configuration_text.hpp"
+#include "daemon/config/tracked_tools.hpp"
 #include "daemon/runtime/utc_offset.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/recording/channels.hpp"
 
 namespace perimap {
 
@@ -33,6 +35,9 @@ SensorRecordingFacts recording_facts(const Configuration& configuration, const s
   if (camera) facts.calibration = format_calibration(*camera);
   facts.configuration = session_toml(configuration);
   facts.r_trigger = configuration.ecg.r_trigger;
+  for (const std::string& tool : tracked_tool_names(configuration.tracker)) {
+    facts.tools.push_back(tool.empty() ? tool : std::string(channels::kTrackedTools) + tool);
+  }
   facts.respiration = configuration.respiration.device_channel > 0;
   return facts;
 }

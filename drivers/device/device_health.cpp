@@ -40,6 +40,16 @@ std::string DeviceHealth::identity() const {
   return identity_;
 }
 
+void DeviceHealth::set_notice(std::string notice) {
+  const std::lock_guard lock(mutex_);
+  notice_ = on_one_line(std::move(notice));
+}
+
+std::string DeviceHealth::notice() const {
+  const std::lock_guard lock(mutex_);
+  return notice_;
+}
+
 void DeviceHealth::set_awaited(std::string awaited) {
   const std::lock_guard lock(mutex_);
   awaited_ = on_one_line(std::move(awaited));

@@ -23,6 +23,7 @@ enum class DeviceState : std::uint8_t {
 struct DeviceCounters {
   Counter samples;          // delivered
   Counter lost;             // by the device's own count
+  Counter misnumbered;      // whose number went back or jumped, and which nobody was given
   Counter damaged;          // messages that failed their check, or bytes that fit nowhere
   Counter dropped;          // by the kernel's own count, before we could read them
   Counter bus_errors;       // CAN error frames
@@ -41,6 +42,9 @@ class DeviceHealth : public DeviceCounters {
   [[nodiscard]] std::string reason() const;
   void set_identity(std::string identity);
   [[nodiscard]] std::string identity() const;
+  // What the user should know of a device that is used all the same, one line; empty: nothing.
+  void set_notice(std::string notice);
+  [[nodiscard]] std::string notice() const;
   // How far a device that is starting has come and what is awaited of it: a sentence for the user.
   void set_awaited(std::string awaited);
   [[nodiscard]] std::string awaited() const;
@@ -51,6 +55,7 @@ class DeviceHealth : public DeviceCounters {
   std::string reason_;
   std::string identity_;
   std::string awaited_;
+  std::string notice_;
 };
 
 }  // namespace perimap

@@ -58,6 +58,7 @@ perimap_TrackerPose to_tracker_pose(const TrackerSample& sample) noexcept {
   } else {
     for (double& component : message.rotation_WS_wxyz) component = std::numeric_limits<double>::quiet_NaN();
   }
+  message.error_mm = sample.error_mm;
   return message;
 }
 
@@ -92,6 +93,8 @@ Expected<TrackerSample> to_tracker_sample(const perimap_TrackerPose& message) {
   const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(std::abs(norm - 1.0) < 1e-3)) return fail("rotation is not a unit quaternion");
   sample.X_WS = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), q);
+  // Of others' recordings it may be anything: what is no figure is none.
+  if (message.error_mm > 0.0 && std::isfinite(message.error_mm)) sample.error_mm = message.error_mm;
   return sample;
 }
 

@@ -1,5 +1,7 @@
 #include "drivers/recording/sensor_writer.hpp"
 
+#include <fmt/format.h>
+
 #include <span>
 #include <utility>
 
@@ -22,6 +24,14 @@ template <class Message>
 Expected<void> SensorWriter::add_optional(bool wanted, std::string_view name, std::optional<ChannelId>& place) {
   if (!wanted) return {};
   return writer_.add_channel<Message>(name).map([&place](ChannelId id) { place = id; });
+}
+
+Expected<void> SensorWriter::add_tools(const std::vector<std::string>& names) {
+  tools_.resize(names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (auto added = add_optional<perimap_TrackerPose>(!names[i].empty(), names[i], tools_[i]); !added) return added;
+  }
+  return {};
 }
 
 Expected<void> SensorWriter::begin(const SensorRecordingFacts& facts, Instant begin) {
@@ -50,6 +60,7 @@ Expected<void> SensorWriter::begin(const SensorRecordingFacts& facts, Instant be
             return add_optional<perimap_RespirationSamples>(facts.respiration, channels::kRespirationSamples,
                                                             respiration_);
           })
+          .and_then([&] { return add_tools(facts.tools); })
           .and_then([&] { return attach(attachments::kCalibration, "application/yaml", facts.calibration); })
           .and_then([&] { return attach(attachments::kConfiguration, "application/toml", facts.configuration); })
           .and_then([&] { return writer_.write(info_channel, info, begin, begin, 0); });
@@ -85,6 +96,13 @@ Expected<void> SensorWriter::write(const TrackerSample& sample, Instant arrival)
   if (!written || sample.state != ToolState::kOk) return written;
   const auto viewer = borrow_pose_in_frame(sample.X_WS, sample.source_time, world_frame_);
   return writer_.write(viewer_, viewer, arrival, sample.source_time, sample.device_frame);
+}
+
+Expected<void> SensorWriter::write(const ToolSample& sample, Instant arrival) {
+  if (sample.tool >= tools_.size() || !tools_[sample.tool]) {
+    return fail(fmt::format("tool {} came, and the recording has no channel for it", sample.tool));
+  }
+  return writer_.write(*tools_[sample.tool], to_tracker_pose(sample), arrival, sample.source_time, sample.device_frame);
 }
 
 Expected<void> SensorWriter::write(const EcgBlock& block, Instant arrival) {

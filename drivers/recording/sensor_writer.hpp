@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/error/expected.hpp"
 #include "core/sensors/ecg_block.hpp"
@@ -26,6 +27,7 @@ struct SensorRecordingFacts {
   std::optional<std::string> configuration;  // of perimapd, TOML
   bool r_trigger = false;                    // there is a trigger whose pulses may come
   bool respiration = false;                  // there is a respiration channel
+  std::vector<std::string> tools = {};  // channels of other tracked tools, by ToolSample::tool; empty: not recorded
 };
 
 // Not for the real-time path. Messages must be written in order of `arrival`, which a replay keeps to; it is not before
@@ -39,6 +41,8 @@ class SensorWriter {
   [[nodiscard]] Expected<void> write(const CameraFrame& frame, Instant arrival);
   // Valid poses also for viewers.
   [[nodiscard]] Expected<void> write(const TrackerSample& sample, Instant arrival);
+  // Only of a tool that the facts named.
+  [[nodiscard]] Expected<void> write(const ToolSample& sample, Instant arrival);
   [[nodiscard]] Expected<void> write(const EcgBlock& block, Instant arrival);
   // Only of a trigger that the facts named.
   [[nodiscard]] Expected<void> write(const RTriggerPulse& pulse, Instant arrival);
@@ -54,6 +58,7 @@ class SensorWriter {
       : writer_(std::move(writer)), world_frame_(std::move(world_frame)) {}
 
   [[nodiscard]] Expected<void> begin(const SensorRecordingFacts& facts, Instant begin);
+  [[nodiscard]] Expected<void> add_tools(const std::vector<std::string>& names);
   template <class Message>
   [[nodiscard]] Expected<void> add_optional(bool wanted, std::string_view name, std::optional<ChannelId>& place);
   [[nodiscard]] Expected<ChannelId> camera_channel(bool compressed);
@@ -64,6 +69,7 @@ class SensorWriter {
   std::optional<ChannelId> camera_;  // its type is known with the first frame
   bool compressed_ = false;
   ChannelId tracker_, viewer_, ecg_;
+  std::vector<std::optional<ChannelId>> tools_;  // by ToolSample::tool
   std::optional<ChannelId> r_trigger_, respiration_;
 };
 

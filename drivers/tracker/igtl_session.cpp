@@ -33,17 +33,20 @@ std::vector<std::byte> start_tdata() {
 
 }  // namespace
 
-IgtlSession::IgtlSession(IgtlSettings settings, TrackerSink sink, DeviceHealth& health)
-    : settings_(std::move(settings)), sink_(std::move(sink)), health_(health) {
+IgtlSession::IgtlSession(IgtlSettings settings, TrackerSink sink, DeviceHealth& health, ToolSink tool_sink)
+    : settings_(std::move(settings)), sink_(std::move(sink)), tool_sink_(std::move(tool_sink)), health_(health) {
   settings_.world.relative_to_reference = settings_.reference.has_value();
 }
 
 void IgtlSession::on_open(LinkControl& link, Instant now) {
   framer_.restart();
   clock_.reset();
+  stamps_.restart();
+  stamps_told_.clear();  // what is still wrong is told again
   reference_ = {};
   reference_follows_ = false;
   held_.reset();
+  others_told_.assign(1 + settings_.tools.size(), std::nullopt);
   delivered_ = {};
   sensor_seen_ = false;
   reference_seen_ = !settings_.reference;
@@ -76,6 +79,8 @@ void IgtlSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, 
 void IgtlSession::on_sign_of_life(Instant arrival) {
   heard_ = arrival;
   if (!all_seen() || held_ || arrival < listen_until_) return;
+  // Stamps that stand still are no sensor that is out of sight.
+  if (delivered_.stamp != 0 && (stamps_.wrong() || !stamps_.judged())) return;
   if (arrival - std::max(last_, delivered_.arrival) < kAbsentAfter) return;
   absent_ = true;
   give({}, arrival, arrival);
@@ -100,9 +105,16 @@ void IgtlSession::note_name(const std::string& name) {
   health_.set_identity(fmt::format("sends poses of {}", fmt::join(names_, ", ")));
 }
 
+std::optional<std::size_t> IgtlSession::other_tool(const std::string& name) const {
+  if (settings_.reference && name == *settings_.reference) return 0;
+  const auto found = std::find(settings_.tools.begin(), settings_.tools.end(), name);
+  if (found == settings_.tools.end()) return std::nullopt;
+  return 1 + static_cast<std::size_t>(found - settings_.tools.begin());
+}
+
 bool IgtlSession::is_sensor(LinkControl& link, const std::string& name, Instant arrival) {
   if (!settings_.sensor.empty()) return name == settings_.sensor;
-  if (settings_.reference && name == *settings_.reference) return false;
+  if (other_tool(name)) return false;
   if (only_tool_.empty()) only_tool_ = name;
   if (name != only_tool_) {
     several_ = true;
@@ -117,16 +129,37 @@ bool IgtlSession::is_sensor(LinkControl& link, const std::string& name, Instant 
 
 void IgtlSession::on_pose(LinkControl& link, const IgtlMessage& message, const Expected<Pose>& pose, Instant arrival) {
   if (pose) note_name(message.device);
-  const bool is_reference = settings_.reference && message.device == *settings_.reference;
-  if (!is_reference && !is_sensor(link, message.device, arrival)) return;
+  const std::optional<std::size_t> other = other_tool(message.device);
+  if (!other && !is_sensor(link, message.device, arrival)) return;
   if (!pose) return health_.damaged.add();
   ToolReading reading{ToolState::kOk, *pose};
   for (const auto& [key, value] : message.metadata) {
     if (key == "TransformStatus" && value != "OK") reading = {};
   }
-  const Told told{reading, message.time_stamp, message.time_ns(), arrival};
-  (is_reference ? reference_seen_ : sensor_seen_) = true;
-  return is_reference ? on_reference(told) : on_sensor(told);
+  const Told told{reading, settings_.stamps_by_arrival ? 0 : message.time_stamp, message.time_ns(), arrival};
+  if (other) on_tool(*other, told);
+  if (other && *other > 0) return;
+  (other ? reference_seen_ : sensor_seen_) = true;
+  return other ? on_reference(told) : on_sensor(told);
+}
+
+void IgtlSession::on_tool(std::size_t tool, const Told& told) {
+  std::optional<Told>& before = others_told_[tool];
+  if (told.stamp != 0 && before && before->stamp == told.stamp) return;  // the same reading again
+  before = told;
+  if (!tool_sink_ || (told.stamp != 0 && stamps_.wrong())) return;
+  ToolSample sample;
+  sample.tool = tool;
+  sample.arrival = told.arrival;
+  sample.source_time = stamped(told);
+  sample.device_frame = tool_count_++;
+  const bool near = tool > 0 && apart(told, reference_) <= kReferenceAge;
+  const ToolReading reading =
+      tool == 0 ? told.reading : in_world(told.reading, near ? reference_.reading : ToolReading{}, settings_.world);
+  sample.state = reading.state;
+  sample.X_WS = reading.X_TO;
+  sample.error_mm = reading.error_mm;
+  tool_sink_(sample);
 }
 
 Duration IgtlSession::apart(const Told& a, const Told& b) noexcept {
@@ -137,7 +170,35 @@ Duration IgtlSession::apart(const Told& a, const Told& b) noexcept {
       static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier), Duration::max().count())));
 }
 
+// The sensor's stamps make the clock, which those of the others, a little before or behind, must not move.
+Instant IgtlSession::stamped(const Told& told) const noexcept {
+  if (told.stamp == 0 || !stamps_.judged() || !clock_.started()) return told.arrival;
+  return std::min(clock_.stamp(told.time_ns), told.arrival);
+}
+
+bool IgtlSession::stamps_wrong(const Told& sensor) {
+  if (sensor.stamp == 0) return false;
+  stamps_.observe(sensor.stamp, sensor.arrival);
+  if (stamps_.fault() != stamps_told_) {
+    stamps_told_ = stamps_.fault();
+    clock_.reset();
+    health_.set_reason(stamps_told_.empty()
+                           ? server_fault_
+                           : fmt::format("the server's stamps are {}: no pose can be stamped by them; mend the "
+                                         "server, or set tracker.igtl_stamps = \"arrival\"",
+                                         stamps_told_));
+  }
+  if (!stamps_.wrong()) return false;
+  health_.set_state(DeviceState::kSilent);
+  held_.reset();
+  return true;
+}
+
 void IgtlSession::on_sensor(const Told& sensor) {
+  if (stamps_wrong(sensor)) {
+    delivered_ = sensor;
+    return;
+  }
   const Told& last = held_ ? *held_ : delivered_;
   if (sensor.stamp != 0 && sensor.stamp == last.stamp) return;  // the same reading again
   if (held_) {
@@ -170,21 +231,34 @@ void IgtlSession::on_tdata(LinkControl& link, const IgtlMessage& message, Instan
   if (!tools) return health_.damaged.add();
   ToolReading sensor;
   ToolReading reference;
+  std::vector<std::optional<ToolReading>> others(others_told_.size());
   for (const IgtlTool& tool : *tools) {
     note_name(tool.name);
-    if (settings_.reference && tool.name == *settings_.reference) {
-      reference = {ToolState::kOk, tool.X_TO};
+    const ToolReading reading{ToolState::kOk, tool.X_TO};
+    if (const auto other = other_tool(tool.name)) {
+      others[*other] = reading;
+      if (*other > 0) continue;
+      reference = reading;
       reference_seen_ = true;
     }
     if (is_sensor(link, tool.name, arrival)) {
-      sensor = {ToolState::kOk, tool.X_TO};
+      sensor = reading;
       sensor_seen_ = true;
     }
   }
   if (arrival < listen_until_) return;
-  const Told told{sensor, message.time_stamp, message.time_ns(), arrival};
+  const Told told{sensor, settings_.stamps_by_arrival ? 0 : message.time_stamp, message.time_ns(), arrival};
+  if (stamps_wrong(told)) {
+    delivered_ = told;
+    return;
+  }
   if (told.stamp != 0 && told.stamp == delivered_.stamp) return;  // the same reading again
   reference_ = {reference, told.stamp, told.time_ns, arrival};
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    if (others[i] || others_told_[i]) {
+      on_tool(i, {others[i].value_or(ToolReading{}), told.stamp, told.time_ns, arrival});
+    }
+  }
   deliver(told, reference_);
 }
 
@@ -193,14 +267,12 @@ void IgtlSession::deliver(const Told& sensor, const Told& reference) {
   // Not missing: a tool that was never there may have another name.
   if (!all_seen()) return;
   absent_ = false;
-  Instant source_time = sensor.arrival;
   if (sensor.stamp != 0) {
     clock_.observe(sensor.time_ns, sensor.arrival);
     health_.jitter.add(clock_.lateness(sensor.time_ns, sensor.arrival));
-    source_time = clock_.stamp(sensor.time_ns);
   }
   const bool near = apart(sensor, reference) <= kReferenceAge;
-  give(in_world(sensor.reading, near ? reference.reading : ToolReading{}, settings_.world), source_time,
+  give(in_world(sensor.reading, near ? reference.reading : ToolReading{}, settings_.world), stamped(sensor),
        sensor.arrival);
 }
 

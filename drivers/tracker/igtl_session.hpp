@@ -9,6 +9,7 @@
 #include "drivers/device/device_health.hpp"
 #include "drivers/device/device_protocol.hpp"
 #include "drivers/tracker/igtl_message.hpp"
+#include "drivers/tracker/stamp_check.hpp"
 #include "drivers/tracker/tool_reading.hpp"
 
 namespace perimap {
@@ -17,6 +18,8 @@ struct IgtlSettings {
   std::string sensor;                    // device name, or name of a tool in TDATA; empty: the only one that comes
   std::optional<std::string> reference;  // W is its frame
   WorldSettings world;
+  std::vector<std::string> tools = {};  // others, likewise
+  bool stamps_by_arrival = false;       // the server's stamps are not looked at
 };
 
 // TRANSFORM and POSITION of the sensor's name give its pose; so does TDATA with a tool of that name, which is asked for
@@ -31,14 +34,18 @@ struct IgtlSettings {
 // A reference is of the sensor's instant by the server's stamps, whichever is sent first; where no reference has the
 // sensor's own stamp, the nearest within 100 ms counts. Without stamps arrivals count in their place.
 //
+// The reference and the other tools are told to a sink of their own as they come, each with the reference that is
+// nearest then. One that TDATA leaves out is missing from when it has come once.
+//
 // Without a sensor's name the server must send one tool alone, beside the reference: a second one fails the link, and
 // after that the server is listened to for a second before one tool counts as the only one.
 //
 // The protocol has no common clock: stamps are the sender's, fitted to the host's by their arrival; a message without a
-// stamp is stamped by its arrival.
+// stamp is stamped by its arrival. So is what comes before the stamps have been watched for a second (StampCheck);
+// where they are wrong no pose is given, and the reason says what they are.
 class IgtlSession final : public DeviceProtocol {
  public:
-  IgtlSession(IgtlSettings settings, TrackerSink sink, DeviceHealth& health);
+  IgtlSession(IgtlSettings settings, TrackerSink sink, DeviceHealth& health, ToolSink tool_sink = {});
 
   void on_open(LinkControl& link, Instant now) override;
   void on_bytes(LinkControl& link, std::span<const std::byte> bytes, Instant arrival) override;
@@ -59,8 +66,15 @@ class IgtlSession final : public DeviceProtocol {
     std::int64_t time_ns = 0;
     Instant arrival;
   };
+  // Whether the sensor's stamp is wrong, as all are then; tells when that changes.
+  [[nodiscard]] bool stamps_wrong(const Told& sensor);
+  [[nodiscard]] Instant stamped(const Told& told) const noexcept;
   // From the earlier to the later of the two, by their stamps where both have one.
   [[nodiscard]] static Duration apart(const Told& a, const Told& b) noexcept;
+  // `tool`: as of ToolSample.
+  void on_tool(std::size_t tool, const Told& told);
+  // The tool that has this name, as of ToolSample; none: it is the sensor, or nobody asked for it.
+  [[nodiscard]] std::optional<std::size_t> other_tool(const std::string& name) const;
   void on_sensor(const Told& sensor);
   void on_reference(const Told& reference);
   void deliver(const Told& sensor, const Told& reference);
@@ -74,18 +88,23 @@ class IgtlSession final : public DeviceProtocol {
 
   IgtlSettings settings_;
   TrackerSink sink_;
+  ToolSink tool_sink_;
   DeviceHealth& health_;
   IgtlFramer framer_;
   ArrivalClock clock_{{.period_ns = 1.0}};
+  StampCheck stamps_;
+  std::string stamps_told_;  // what is wrong with them
   Told reference_;
   // Servers that send the sensor before the reference of the same instant: the sensor then waits for it.
   bool reference_follows_ = false;
   std::optional<Told> held_;
-  Told delivered_;  // of the sensor, the last; withheld while the reference is awaited
+  std::vector<std::optional<Told>> others_told_;  // in this connection, by ToolSample::tool
+  Told delivered_;                                // of the sensor, the last; withheld while the reference is awaited
   // In this connection.
   bool sensor_seen_ = false;
   bool reference_seen_ = false;  // or none is asked for
   std::uint32_t count_ = 0;
+  std::uint32_t tool_count_ = 0;    // of what the sink of the other tools was given
   Instant last_{};                  // reading, or the opening
   Instant heard_{};                 // any message that is not damaged, or the opening
   bool absent_ = false;             // nothing comes of the sensor, but other messages do

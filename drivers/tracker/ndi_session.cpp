@@ -69,12 +69,6 @@ std::optional<std::vector<std::string>> handles_of(std::string_view reply) {
   return handles;
 }
 
-std::string list_of(std::span<const std::uint16_t> handles) {
-  std::string list;
-  for (const std::uint16_t handle : handles) list += fmt::format("{}{:02X}", list.empty() ? "" : ", ", handle);
-  return list;
-}
-
 // From the reply's first byte to its last.
 Duration time_on_line(const NdiReply& reply, const LinkControl& link) {
   constexpr std::size_t kTextFrame = 5;          // CRC, CR
@@ -90,13 +84,15 @@ Duration time_on_line(const NdiReply& reply, const LinkControl& link) {
 
 }  // namespace
 
-NdiSession::NdiSession(NdiSettings settings, TrackerSink sink, DeviceHealth& health)
+NdiSession::NdiSession(NdiSettings settings, TrackerSink sink, DeviceHealth& health, ToolSink tool_sink)
     : settings_(std::move(settings)),
       sink_(std::move(sink)),
+      tool_sink_(std::move(tool_sink)),
       health_(health),
       clock_({.period_ns = 1e9 / settings_.frame_rate_hz}),
       rate_(settings_.frame_rate_hz) {
   settings_.world.relative_to_reference = settings_.reference.has_value();
+  others_.resize(settings_.tools.size());
 }
 
 void NdiSession::on_open(LinkControl& link, Instant now) {
@@ -106,6 +102,12 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
   rate_refused_ = false;  // what is still wrong is told again
   last_frame_.reset();
   disabled_ = false;
+  for (OtherTool& other : others_) other = {other.handle, std::nullopt, false};
+  reference_told_ = {};
+  broken_.clear();
+  jumps_.clear();
+  refused_frame_.reset();
+  health_.set_notice("");
   stride_ = 0;
   query_ = Query::kBx2;
   heard_ = false;
@@ -254,6 +256,7 @@ void NdiSession::on_error(LinkControl& link, const std::string& text, Instant no
       break;
   }
   if (text.starts_with("ERROR04") && ++retries_ <= kMostRetries) return command(link, command_, kReplyTime, now);
+  if (step_ == Step::kInitialisePort || step_ == Step::kEnablePort) return on_broken_port(link, explain(text), now);
   link.fail(fmt::format("{} answered with {}", command_, explain(text)));
 }
 
@@ -283,6 +286,9 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
       auto handles = handles_of(text);
       if (!handles) break;
       ports_.assign(handles->rbegin(), handles->rend());  // taken from the end
+      std::erase_if(ports_, [this](const std::string& port) {
+        return std::any_of(broken_.begin(), broken_.end(), [&](const auto& b) { return b.handle == *hex(port); });
+      });
       search_again_ = step_ == Step::kFindToInitialise && !ports_.empty() && ++searches_ < kMostSearches;
       return next_port(link, step_, now);
     }
@@ -292,7 +298,7 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
     case Step::kRequestPort: {
       const auto handle = hex(text);
       if (!handle || text.size() != 2) break;
-      (tool_ == 0 ? sensor_handle_ : reference_handle_) = *handle;
+      handle_of(tool_) = *handle;
       port_requested_ = true;
       return next_upload(link, now);
     }
@@ -334,12 +340,13 @@ void NdiSession::next_port(LinkControl& link, Step search, Instant now) {
       step_ = Step::kFree;
       return command(link, "PHF:" + handle, kReplyTime, now);
     }
+    port_ = *hex(handle);
     if (search == Step::kFindToInitialise) {
       step_ = Step::kInitialisePort;
       return command(link, "PINIT:" + handle, kLongReplyTime, now);
     }
     step_ = Step::kEnablePort;
-    enabled_.push_back(*hex(handle));
+    enabled_.push_back(port_);
     return command(link, fmt::format("PENA:{}D", handle), kReplyTime, now);
   }
   if (search == Step::kFindToFree) {
@@ -358,17 +365,14 @@ void NdiSession::next_port(LinkControl& link, Step search, Instant now) {
 
 // The next block of a definition, the next definition, or on to the initialisation of all ports.
 void NdiSession::next_upload(LinkControl& link, Instant now) {
-  for (; tool_ < 2; ++tool_, block_ = 0, port_requested_ = false) {
-    const NdiTool* tool = tool_ == 0 ? &settings_.sensor : settings_.reference ? &*settings_.reference : nullptr;
+  for (; tool_ < tool_count(); ++tool_, block_ = 0, port_requested_ = false) {
+    const NdiTool* tool = tool_settings(tool_);
     if (tool == nullptr || block_ * kBlock >= tool->definition.size()) {
-      if (tool != nullptr && tool->definition.empty() && tool->handle) {
-        (tool_ == 0 ? sensor_handle_ : reference_handle_) = *tool->handle;
-      }
+      if (tool != nullptr && tool->definition.empty() && tool->handle) handle_of(tool_) = *tool->handle;
       continue;
     }
     if (!port_requested_) return enter(link, Step::kRequestPort, now);
-    std::string text =
-        fmt::format("PVWR:{:02X}{:04X}", tool_ == 0 ? sensor_handle_ : reference_handle_, block_ * kBlock);
+    std::string text = fmt::format("PVWR:{:02X}{:04X}", handle_of(tool_), block_ * kBlock);
     for (std::size_t i = block_ * kBlock; i < (block_ + 1) * kBlock; ++i) {
       const auto value = i < tool->definition.size() ? std::to_integer<unsigned>(tool->definition[i]) : 0U;
       text += fmt::format("{:02X}", value);
@@ -377,52 +381,6 @@ void NdiSession::next_upload(LinkControl& link, Instant now) {
     return command(link, text, kReplyTime, now);
   }
   enter(link, Step::kFindToInitialise, now);
-}
-
-bool NdiSession::choose_tools(LinkControl& link) {
-  const auto present = [this](std::uint16_t handle) {
-    return std::find(enabled_.begin(), enabled_.end(), handle) != enabled_.end();
-  };
-  if (settings_.reference && !present(reference_handle_)) {
-    link.fail(
-        fmt::format("no such reference tool: port handle {:02X}; there are: {}", reference_handle_, list_of(enabled_)));
-    return false;
-  }
-  if (settings_.sensor.definition.empty() && !settings_.sensor.handle && !choose_unnamed_sensor(link)) return false;
-  if (!present(sensor_handle_)) {
-    link.fail(fmt::format("no such tool: port handle {:02X}; there are: {}", sensor_handle_, list_of(enabled_)));
-    return false;
-  }
-  if (settings_.reference && sensor_handle_ == reference_handle_) {
-    link.fail(fmt::format("sensor and reference are both the tool of port handle {:02X}", sensor_handle_));
-    return false;
-  }
-  return true;
-}
-
-// The one tool that is not the reference, and no other one when the link was lost meanwhile.
-bool NdiSession::choose_unnamed_sensor(LinkControl& link) {
-  std::vector<std::uint16_t> others = enabled_;
-  if (settings_.reference) std::erase(others, reference_handle_);
-  const std::string beside = settings_.reference ? " beside the reference" : "";
-  if (others.empty()) {
-    link.fail(fmt::format("the tracker knows no tool{}: name a tool definition or plug one in", beside));
-    return false;
-  }
-  if (others.size() > 1) {
-    link.fail(
-        fmt::format("several tools{} ({}): say by tracker.sensor which one is the sensor", beside, list_of(others)));
-    return false;
-  }
-  if (unnamed_sensor_ && *unnamed_sensor_ != others.front()) {
-    link.fail(
-        fmt::format("port handle {:02X} is there, and {:02X} was the sensor: plug that in, or say by "
-                    "tracker.sensor which one it is",
-                    others.front(), *unnamed_sensor_));
-    return false;
-  }
-  unnamed_sensor_ = sensor_handle_ = others.front();
-  return true;
 }
 
 void NdiSession::ask(LinkControl& link, Instant now) {

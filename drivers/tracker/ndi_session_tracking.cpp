@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <optional>
 #include <utility>
 
@@ -17,6 +18,7 @@ constexpr Duration kSilentAfter = milliseconds(300);
 constexpr Duration kReopenAfter = seconds(2);
 // A pose of the reference that is farther away than this is none of the sensor's frame.
 constexpr double kReferenceAge_s = 0.05;
+constexpr double kJump_s = 0.5;
 constexpr std::uint16_t kHardwareFailure = 0x0010;
 
 }  // namespace
@@ -33,6 +35,7 @@ void NdiSession::on_tracking(LinkControl& link, const Expected<NdiTracking>& tra
     deliver(sensor, settings_.reference ? reference_at(*tracking, sensor.frame) : ToolReading{}, arrival);
   }
   if (settings_.reference) hear_reference(*tracking, arrival);
+  if (tool_sink_) deliver_tools(*tracking, arrival);
   // Five questions a frame: a frame is seen at most a fifth of its period after it is there.
   due_ = std::max(arrival, asked_ + from_seconds(0.2 / settings_.frame_rate_hz));
   command_.clear();
@@ -66,6 +69,38 @@ ToolReading NdiSession::reference_at(const NdiTracking& tracking, std::uint32_t 
   return near ? nearest->reading : ToolReading{};
 }
 
+// At the rate, and by the clock, of the sensor's frames, which all tools share; before there are any, by arrival.
+void NdiSession::deliver_tools(const NdiTracking& tracking, Instant arrival) {
+  if (rate_refused_) return;
+  for (const NdiToolReading& told : tracking.tools) {
+    const bool is_reference = settings_.reference && told.handle == reference_handle_;
+    const auto other =
+        std::find_if(others_.begin(), others_.end(), [&](const OtherTool& tool) { return tool.handle == told.handle; });
+    if (!is_reference && other == others_.end()) continue;
+    OtherTool& tool = is_reference ? reference_told_ : *other;
+    const bool disabled = told.reading.state == ToolState::kDisabled && told.frame == 0;
+    // A disabled tool has no frame and so no instant; it is told once, then again when it changes.
+    if (disabled ? tool.disabled : tool.last_frame == told.frame) continue;
+    if (!disabled && told.frame == refused_frame_) continue;
+    tool.disabled = disabled;
+    tool.last_frame = disabled ? std::nullopt : std::optional(told.frame);
+    ToolSample sample;
+    sample.tool = is_reference ? 0 : 1 + static_cast<std::size_t>(other - others_.begin());
+    sample.arrival = sample.source_time = arrival;
+    if (!disabled && clock_.started()) {
+      const std::int64_t count = count_ + static_cast<std::int32_t>(told.frame - static_cast<std::uint32_t>(count_));
+      sample.source_time = std::min(clock_.stamp(count), arrival);
+    }
+    sample.device_frame = told.frame;
+    const ToolReading reading =
+        is_reference ? told.reading : in_world(told.reading, reference_at(tracking, told.frame), settings_.world);
+    sample.state = reading.state;
+    sample.X_WS = reading.X_TO;
+    sample.error_mm = reading.error_mm;
+    tool_sink_(sample);
+  }
+}
+
 bool NdiSession::expect_rate(std::int64_t count, Instant arrival) {
   rate_.observe(count, arrival);
   if (rate_.wrong() == rate_refused_) return !rate_refused_;
@@ -81,6 +116,31 @@ bool NdiSession::expect_rate(std::int64_t count, Instant arrival) {
   return false;
 }
 
+// Back, or on by half a second and more than what has passed, were it at twice the rate.
+bool NdiSession::misnumbered(std::int32_t step, Instant arrival) const noexcept {
+  if (step <= 0) return step < 0;
+  const double passed = to_seconds(arrival - numbered_) * settings_.frame_rate_hz;
+  return step > 2.0 * passed + kJump_s * settings_.frame_rate_hz;
+}
+
+// When such a frame was measured nobody knows. The count begins anew with it.
+void NdiSession::refuse_number(std::uint32_t frame, std::int32_t step, Instant arrival) {
+  health_.misnumbered.add();
+  const std::uint64_t times = health_.misnumbered.get();
+  if (std::has_single_bit(times)) {  // told at the first, and whenever they have doubled
+    const std::string often = times == 1 ? "once" : fmt::format("{} times", times);
+    jumps_ = fmt::format("frame numbers went back or jumped, {} by now, the last by {:+d}: such a frame gives no pose",
+                         often, step);
+    tell_notice();
+  }
+  last_frame_ = refused_frame_ = frame;
+  numbered_ = arrival;
+  count_ = frame;
+  clock_.reset();
+  rate_.restart();
+  last_reading_ = arrival;
+}
+
 void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& reference, Instant arrival) {
   TrackerSample sample;
   sample.arrival = arrival;
@@ -91,14 +151,16 @@ void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& refere
     sample.source_time = arrival;
   } else {
     if (last_frame_ == sensor.frame) return;  // asked before the next frame was there
-    const std::uint32_t step = last_frame_ ? sensor.frame - *last_frame_ : 0;
-    constexpr std::uint32_t kBackwards = 0x80000000U;
-    if (step > 0 && step < kBackwards) {
-      stride_ = stride_ == 0 ? step : std::min(stride_, step);
-      health_.lost.add(step / stride_ - 1);
+    const auto step = last_frame_ ? static_cast<std::int32_t>(sensor.frame - *last_frame_) : 0;
+    if (misnumbered(step, arrival)) return refuse_number(sensor.frame, step, arrival);
+    if (step > 0) {
+      const auto frames = static_cast<std::uint32_t>(step);
+      stride_ = stride_ == 0 ? frames : std::min(stride_, frames);
+      health_.lost.add(frames / stride_ - 1);
     }
     disabled_ = false;
     last_frame_ = sensor.frame;
+    numbered_ = arrival;
     // Over the end of the device's 32 bits the count goes on.
     count_ += static_cast<std::int32_t>(sensor.frame - static_cast<std::uint32_t>(count_));
     if (!expect_rate(count_, arrival)) {
@@ -113,6 +175,7 @@ void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& refere
   const ToolReading reading = in_world(sensor.reading, reference, settings_.world);
   sample.state = reading.state;
   sample.X_WS = reading.X_TO;
+  sample.error_mm = reading.error_mm;
   last_reading_ = arrival;
   health_.samples.add();
   health_.set_state(DeviceState::kStreaming);

@@ -15,6 +15,8 @@ using Cursor = ByteCursor<std::endian::little>;
 // Port status, all commands.
 constexpr std::uint32_t kPortOutOfVolume = 0x40;
 
+constexpr double kLargestError_mm = 1000.0;  // beyond it a figure is none
+
 // BX
 constexpr unsigned kValid = 1;
 constexpr unsigned kMissing = 2;
@@ -38,13 +40,14 @@ tl::unexpected<Error> truncated(const char* command) { return fail(fmt::format("
 struct Transform {
   double wxyz[4];
   Vector3d t;
+  double error_mm;  // RMS of the fit; of an electromagnetic tracker its indicator value
 };
 
 Transform read_transform(Cursor& cursor) noexcept {
   Transform transform{};
   for (double& component : transform.wxyz) component = cursor.float32();
   for (int axis = 0; axis < 3; ++axis) transform.t[axis] = cursor.float32();
-  (void)cursor.float32();  // RMS error of the fit, mm
+  transform.error_mm = cursor.float32();
   return transform;
 }
 
@@ -53,7 +56,9 @@ Expected<ToolReading> valid_reading(const Transform& transform, bool out_of_volu
   if (out_of_volume) return ToolReading{ToolState::kOutOfVolume, {}};
   const auto pose = pose_of_device(transform.t, transform.wxyz);
   if (!pose) return fail("reply: a transform marked valid is no pose");
-  return ToolReading{ToolState::kOk, *pose};
+  // Written so that a value that is not a number fails: it is then no figure, and the pose stays one.
+  const bool told = transform.error_mm > 0.0 && transform.error_mm <= kLargestError_mm;
+  return ToolReading{ToolState::kOk, *pose, told ? transform.error_mm : 0.0};
 }
 
 ToolState state_of_code(unsigned status) noexcept {
@@ -223,7 +228,7 @@ Expected<NdiTracking> decode_tx(std::string_view text) {
       transform.emplace();
       for (double& component : transform->wxyz) component = cursor.decimal(6, 1e-4);
       for (int axis = 0; axis < 3; ++axis) transform->t[axis] = cursor.decimal(7, 1e-2);
-      (void)cursor.decimal(6, 1e-4);
+      transform->error_mm = cursor.decimal(6, 1e-4);
     }
     if (tool.reading.state == ToolState::kDisabled && cursor.skip("\n")) {
       tracking.tools.push_back(tool);

@@ -17,9 +17,10 @@ std::optional<Pose> pose_of_device(const Vector3d& t, const double (&wxyz)[4]) n
 
 ToolReading in_world(const ToolReading& sensor, const ToolReading& reference, const WorldSettings& settings) noexcept {
   if (sensor.state != ToolState::kOk) return {sensor.state, {}};
-  if (!settings.relative_to_reference) return {ToolState::kOk, settings.X_IW * sensor.X_TO};
+  if (!settings.relative_to_reference) return {ToolState::kOk, settings.X_IW * sensor.X_TO, sensor.error_mm};
   if (reference.state != ToolState::kOk) return {reference.state, {}};
-  return {ToolState::kOk, settings.X_IW * (reference.X_TO.inverse() * sensor.X_TO)};
+  return {ToolState::kOk, settings.X_IW * (reference.X_TO.inverse() * sensor.X_TO),
+          std::hypot(sensor.error_mm, reference.error_mm)};
 }
 
 }  // namespace perimap

@@ -11,10 +11,12 @@
 namespace perimap {
 
 using TrackerSink = std::function<void(const TrackerSample&)>;
+using ToolSink = std::function<void(const ToolSample&)>;
 
 struct ToolReading {
   ToolState state = ToolState::kMissing;
-  Pose X_TO;  // the tool O in the tracker's frame T; meaningful with kOk only
+  Pose X_TO;              // the tool O in the tracker's frame T; meaningful with kOk only
+  double error_mm = 0.0;  // the device's own figure of how far off it is, RMS; 0: it gives none
 };
 
 // From unit quaternion and translation, mm, as a device sends them; none when they are no pose: not finite, a norm off
@@ -27,8 +29,8 @@ struct WorldSettings {
   Pose X_IW;                           // registration: the frame I that is published, from W
 };
 
-// The sensor in the published frame. Without a valid reference, when one is asked for, there is no pose, and the state
-// is the reference's.
+// The sensor, or another tool, in the published frame. Without a valid reference, when one is asked for, there is no
+// pose, and the state is the reference's. The error is what the device says of the two together.
 [[nodiscard]] ToolReading in_world(const ToolReading& sensor, const ToolReading& reference,
                                    const WorldSettings& settings) noexcept;
 

@@ -1,8 +1,10 @@
 // Any bytes from a tracker: every pose that comes out is a pose, stamped before it arrived.
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <memory>
 
 #include "device_bytes.hpp"
@@ -13,6 +15,8 @@ namespace perimap {
 namespace {
 
 void check(const ToolReading& reading) {
+  // What is no figure is none.
+  if (!(reading.error_mm >= 0.0 && std::isfinite(reading.error_mm))) std::abort();
   if (reading.state != ToolState::kOk) return;
   const Matrix3d error = reading.X_TO.R.transpose() * reading.X_TO.R - Matrix3d::Identity();
   if (!(error.norm() < 1e-6) || !(reading.X_TO.t.norm() < 1e5)) std::abort();
@@ -20,7 +24,7 @@ void check(const ToolReading& reading) {
 
 void check(const TrackerSample& sample) {
   if (sample.source_time > sample.arrival) std::abort();
-  check(ToolReading{sample.state, sample.X_WS});
+  check(ToolReading{sample.state, sample.X_WS, sample.error_mm});
 }
 
 void check(const Expected<NdiTracking>& tracking) {
@@ -42,6 +46,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view text(reinterpret_cast<const char*>(input.data()), input.size());
   DeviceHealth health;
   const TrackerSink sink = [](const TrackerSample& sample) { check(sample); };
+  const ToolSink tools = [](const ToolSample& sample) {
+    if (sample.tool > 1) std::abort();
+    check(static_cast<const TrackerSample&>(sample));
+  };
   std::unique_ptr<DeviceProtocol> protocol;
   ScriptedLink link;
   const Instant now(std::chrono::seconds(1));
@@ -58,7 +66,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       return 0;
     case 3:
     case 4: {
-      protocol = std::make_unique<NdiSession>(NdiSettings{}, sink, health);
+      NdiSettings settings;
+      settings.tools.push_back({{}, 0x0B, "pointer"});
+      protocol = std::make_unique<NdiSession>(settings, sink, health, tools);
       protocol->on_open(link, now);
       if (data[0] % 6 == 4) break;
       for (const std::string_view answer : kAnswers) {
@@ -80,15 +90,26 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       break;
     }
     default:
-      protocol = std::make_unique<IgtlSession>(IgtlSettings{}, sink, health);
+      IgtlSettings settings;
+      settings.tools.emplace_back("Pointer");
+      protocol = std::make_unique<IgtlSession>(settings, sink, health, tools);
       protocol->on_open(link, now);
       if (data[1] % 4 != 0) {
         static constexpr std::string_view kTypes[] = {"TRANSFORM", "TDATA", "POSITION", "STATUS"};
         IgtlMessage message;
         message.type = kTypes[data[1] / 4 % 4];
         message.content = stream;
-        message.time_stamp = data[1];
-        stream = encode_igtl(message);
+        // Many of them in a row, with stamps that begin anywhere and go on by anything.
+        std::uint64_t stamp = 0;
+        std::memcpy(&stamp, data, std::min<std::size_t>(size, sizeof(stamp)));
+        const std::uint64_t step = stamp >> (data[0] % 64U);
+        if (data[1] % 8U >= 4) message.device = "Pointer";
+        stream.clear();
+        for (int i = 0; i < 40; ++i) {
+          message.time_stamp = stamp + static_cast<std::uint64_t>(i) * step;
+          const auto one = encode_igtl(message);
+          stream.insert(stream.end(), one.begin(), one.end());
+        }
         // A body of header version 2 holds sizes of its own; the input is all of it.
         if (data[1] % 4 == 3) stream[1] = std::byte{2};
       }

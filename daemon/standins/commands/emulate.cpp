@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -31,6 +32,9 @@ struct Options {
   std::vector<double> missing_s;
   std::vector<double> unplug_s;
   std::vector<double> ndi_reference;  // translation, then rotation wxyz
+  std::vector<std::string> tools;     // NAME=MOTION
+  std::vector<std::string> broken;    // port handles
+  std::vector<double> frame_jump;     // s, frames
   TheatreSettings theatre;
   std::vector<const Option*> can_options = {};
   [[nodiscard]] bool can_given() const {
@@ -80,6 +84,20 @@ Expected<TheatreSettings> settings_of(const Options& options) {
     settings.ndi.reference = *reference;
     // Where tools are wired the reference is, too.
     if (settings.ndi.wired_tools == 1) settings.ndi.wired_tools = 2;
+  }
+  for (const std::string& text : options.tools) {
+    auto tool = parse_emulated_tool(text);
+    if (!tool) return tl::unexpected(tool.error());
+    settings.tools.push_back(std::move(*tool));
+  }
+  for (const std::string& text : options.broken) {
+    const auto handle = port_handle_of(text);
+    if (!handle) return tl::unexpected(handle.error());
+    settings.ndi.broken.insert(*handle);
+  }
+  if (options.frame_jump.size() == 2) {
+    settings.ndi.jump_every = from_seconds(std::max(options.frame_jump[0], 0.01));
+    settings.ndi.jump_by = std::llround(options.frame_jump[1]);
   }
   auto heart = options.simulation.settings();
   if (!heart) return tl::unexpected(heart.error());
@@ -141,6 +159,54 @@ Outcome emulate(const Options& options, const Console& console) {
   return serve(*theatre, *devices, *stop, console);
 }
 
+void add_tracker_options(Command& command, Options& options) {
+  TheatreSettings& theatre = options.theatre;
+  add_choice(command, "--ndi-newest", theatre.ndi.newest,
+             {{"bx2", NdiNewest::kBx2}, {"bx", NdiNewest::kBx}, {"tx", NdiNewest::kTx}},
+             "Newest query that the NDI tracker knows [bx2]");
+  command.add_option("--ndi-tools", theatre.ndi.wired_tools, "Tools in its ports; 0: all are uploaded")
+      ->check(Range(0, 8))
+      ->capture_default_str();
+  command
+      .add_option("--ndi-reference", options.ndi_reference,
+                  "TX TY TZ W X Y Z, mm and unit quaternion: where the second tool of the NDI tracker is, the "
+                  "patient's reference; it stays there [missing]")
+      ->expected(7);
+  command.add_option("--tool", options.tools,
+                     "NAME=MOTION: a further tool of the tracker, by its port handle (NDI: 0B, ...) or name "
+                     "(OpenIGTLink): sway, pivot[:X,Y,Z] about a tip in the tool's frame, still:TX,TY,TZ,W,X,Y,Z, or a "
+                     "file of poses in metres, t_s,x,y,z,qx,qy,qz,qw; once for each tool");
+  command.add_option("--ndi-broken", options.broken, "Port handle of a tool that cannot be initialised (ERROR13)");
+  command.add_option("--ndi-error", theatre.ndi.error_mm, "RMS error that the NDI tracker says its poses have, mm")
+      ->check(Range(0.0, 9.0));
+  command
+      .add_option("--ndi-frame-jump", options.frame_jump,
+                  "EVERY BY: every so many seconds the frame numbers jump by so many, or go back")
+      ->expected(2)
+      ->check(Range(-1e6, 1e6));
+  using Stamps = IgtlEmulatorSettings::Stamps;
+  add_choice(command, "--igtl-stamps", theatre.igtl.stamps,
+             {{"seconds", Stamps::kSeconds},
+              {"milliseconds", Stamps::kMilliseconds},
+              {"microseconds", Stamps::kMicroseconds},
+              {"whole-seconds", Stamps::kWholeSeconds},
+              {"nanosecond-fraction", Stamps::kNanosecondFraction},
+              {"counts", Stamps::kCounts},
+              {"none", Stamps::kNone}},
+             "What the OpenIGTLink server stamps with [seconds]");
+  command
+      .add_option("--igtl-clock", theatre.igtl.clock_rate, "Seconds of the OpenIGTLink server's clock in one of ours")
+      ->check(Range(0.01, 100.0))
+      ->capture_default_str();
+  add_choice(command, "--igtl-message", theatre.igtl.message,
+             {{"transform", IgtlKind::kTransform}, {"tdata", IgtlKind::kTdata}, {"position", IgtlKind::kPosition}},
+             "What the OpenIGTLink server sends [transform]");
+  command.add_option("--igtl-version", theatre.igtl.version, "OpenIGTLink header version")
+      ->check(Range(1U, 2U))
+      ->capture_default_str();
+  command.add_option("--igtl-tool", theatre.igtl.tool, "Name of the tool")->capture_default_str();
+}
+
 }  // namespace
 
 void add_emulate_command(Commands& commands) {
@@ -180,24 +246,8 @@ void add_emulate_command(Commands& commands) {
   command.add_option("--unplug", options->unplug_s, "EVERY FOR, s: the device is unplugged")
       ->expected(2)
       ->check(seconds);
-  add_choice(command, "--ndi-newest", theatre.ndi.newest,
-             {{"bx2", NdiNewest::kBx2}, {"bx", NdiNewest::kBx}, {"tx", NdiNewest::kTx}},
-             "Newest query that the NDI tracker knows [bx2]");
-  command.add_option("--ndi-tools", theatre.ndi.wired_tools, "Tools in its ports; 0: all are uploaded")
-      ->check(Range(0, 8))
-      ->capture_default_str();
-  command
-      .add_option("--ndi-reference", options->ndi_reference,
-                  "TX TY TZ W X Y Z, mm and unit quaternion: where the second tool of the NDI tracker is, the "
-                  "patient's reference; it stays there [missing]")
-      ->expected(7);
-  add_choice(command, "--igtl-message", theatre.igtl.message,
-             {{"transform", IgtlKind::kTransform}, {"tdata", IgtlKind::kTdata}, {"position", IgtlKind::kPosition}},
-             "What the OpenIGTLink server sends [transform]");
-  command.add_option("--igtl-version", theatre.igtl.version, "OpenIGTLink header version")
-      ->check(Range(1U, 2U))
-      ->capture_default_str();
-  command.add_option("--igtl-tool", theatre.igtl.tool, "Name of the tool")->capture_default_str();
+  add_tracker_options(command, *options);
+  command.add_flag("--cyton-daisy", theatre.cyton_daisy, "The Cyton has a Daisy module, as its greeting says");
   options->can_options = {
       command.add_option("--can-identifier", theatre.can.identifier, "Of the frames over CAN, as 736 or 0x2E0")
           ->check(Range(0U, 0x1FFFFFFFU))

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "drivers/device/device_protocol.hpp"
 #include "drivers/standins/emulator/emulator_faults.hpp"
@@ -17,10 +19,24 @@ struct IgtlEmulatorSettings {
   Message message = Message::kTransform;
   unsigned version = 1;  // of the header; 2 tells a missing tool in its metadata
   std::string tool = "Scope";
+  std::vector<std::pair<std::string, PoseTrack>> others = {};  // names and places of further tools, or of this one
+
+  // What it stamps with; OpenIGTLink means seconds of the sender's clock.
+  enum class Stamps : std::uint8_t {
+    kSeconds,
+    kMilliseconds,        // where the seconds belong
+    kMicroseconds,        // likewise
+    kWholeSeconds,        // without their fraction
+    kNanosecondFraction,  // a fraction in ns, where 2^-32 s are meant
+    kCounts,              // of the messages
+    kNone
+  };
+  Stamps stamps = Stamps::kSeconds;
+  double clock_rate = 1.0;  // seconds of its clock in one of ours
 };
 
-// Sends a message at each reading of the track, from the connection on. Where a message cannot say that the tool is
-// missing (TRANSFORM and POSITION of version 1), it is not sent.
+// Sends a message at each reading of the track, and of each other tool's place then, from the connection on. Where a
+// message cannot say that the tool is missing (TRANSFORM and POSITION of version 1), it is not sent.
 class IgtlEmulator final : public DeviceProtocol {
  public:
   IgtlEmulator(PoseTrack track, IgtlEmulatorSettings settings, const EmulatorFaults& faults);
@@ -31,6 +47,8 @@ class IgtlEmulator final : public DeviceProtocol {
   [[nodiscard]] Instant next_time() const noexcept override { return due(next_); }
 
  private:
+  [[nodiscard]] std::uint64_t stamp_of(Duration since) const noexcept;
+  void send(LinkControl& link, const std::string& name, std::uint64_t stamp, const ToolReading& reading);
   [[nodiscard]] Instant due(std::size_t reading) const noexcept;
 
   PoseTrack track_;

@@ -28,12 +28,12 @@ class Bytes {
   Bytes& u16(unsigned value) { return number(value, 2); }
   Bytes& u32(std::uint32_t value) { return number(value, 4); }
   Bytes& f32(double value) { return number(std::bit_cast<std::uint32_t>(static_cast<float>(value)), 4); }
-  Bytes& transform(const Pose& X) {
+  Bytes& transform(const Pose& X, double error_mm) {
     double q[4];
     rotation_to_wxyz(X.R, q);
     for (const double component : q) f32(component);
     for (int axis = 0; axis < 3; ++axis) f32(X.t[axis]);
-    return f32(0.1);
+    return f32(error_mm);
   }
   Bytes& append(const Bytes& other) {
     all.insert(all.end(), other.all.begin(), other.all.end());
@@ -101,6 +101,9 @@ void NdiEmulator::restart() {
   ports_.clear();
   for (int i = 0; i < settings_.wired_tools; ++i) {
     ports_[static_cast<std::uint16_t>(kFirstWiredPort + i)].wired = true;
+  }
+  for (const auto& [handle, track] : settings_.tools) {
+    if (handle >= kFirstWiredPort) ports_[handle].wired = true;
   }
   tracking_ = false;
 }
@@ -246,6 +249,9 @@ void NdiEmulator::on_command(LinkControl& link, const std::string& line, Instant
     }
   } else if (name == "PINIT") {
     if (!port->wired && port->definition.empty()) return reply(link, "ERROR0D");
+    if (settings_.broken.contains(static_cast<std::uint16_t>(*hex(std::string_view(arguments).substr(0, 2))))) {
+      return reply(link, "ERROR13");
+    }
     port->initialised = true;
     if (settings_.second_channel && port == &ports_.at(kFirstWiredPort)) {
       ports_[static_cast<std::uint16_t>(kFirstWiredPort + settings_.wired_tools)].wired = true;
@@ -268,10 +274,26 @@ std::int64_t NdiEmulator::frame_at(Instant now) const noexcept {
   return static_cast<std::int64_t>(std::floor(to_seconds(now - track_.start()) * rate_hz + 1e-6));
 }
 
-ToolReading NdiEmulator::reading(std::size_t tool, std::int64_t frame) const noexcept {
-  if (tool > 0) return settings_.reference ? ToolReading{ToolState::kOk, *settings_.reference} : ToolReading{};
+std::uint32_t NdiEmulator::number_of(std::int64_t frame) const noexcept {
   const Duration since = from_seconds(static_cast<double>(std::max<std::int64_t>(frame, 0)) / track_.rate_hz());
-  return faults_.missing(since) ? ToolReading{} : track_.at(frame);
+  const std::int64_t jumps = settings_.jump_every > Duration(0) ? since / settings_.jump_every : 0;
+  return static_cast<std::uint32_t>(frame + jumps * settings_.jump_by);
+}
+
+ToolReading NdiEmulator::reading(std::uint16_t handle, std::size_t tool, std::int64_t frame) const noexcept {
+  const Duration since = from_seconds(static_cast<double>(std::max<std::int64_t>(frame, 0)) / track_.rate_hz());
+  const auto other = settings_.tools.find(handle);
+  ToolReading seen;
+  if (other != settings_.tools.end()) {
+    seen = other->second.at(track_.start() + since - other->second.start());
+  } else if (tool > 0) {
+    if (settings_.reference) seen = {ToolState::kOk, *settings_.reference};
+  } else {
+    seen = track_.at(frame);
+  }
+  if (tool == 0 && faults_.missing(since)) return {};
+  if (seen.state == ToolState::kOk) seen.error_mm = settings_.error_mm;
+  return seen;
 }
 
 void NdiEmulator::send_bx(LinkControl& link, std::int64_t frame) {
@@ -279,7 +301,7 @@ void NdiEmulator::send_bx(LinkControl& link, std::int64_t frame) {
   body.u8(static_cast<unsigned>(ports_.size()));
   std::size_t tool = 0;
   for (const auto& [handle, port] : ports_) {
-    const ToolReading r = reading(tool++, frame);
+    const ToolReading r = reading(handle, tool++, frame);
     body.u8(handle);
     if (!port.enabled || r.state == ToolState::kDisabled) {
       body.u8(4);
@@ -287,8 +309,8 @@ void NdiEmulator::send_bx(LinkControl& link, std::int64_t frame) {
     }
     const bool has_transform = r.state == ToolState::kOk;
     body.u8(has_transform ? 1 : 2);
-    if (has_transform) body.transform(r.X_TO);
-    body.u32(port_status(r)).u32(static_cast<std::uint32_t>(frame));
+    if (has_transform) body.transform(r.X_TO, r.error_mm);
+    body.u32(port_status(r)).u32(number_of(frame));
   }
   body.u16(0);
   reply_binary(link, body.all);
@@ -301,7 +323,7 @@ void NdiEmulator::send_bx2(LinkControl& link, std::int64_t frame) {
   std::uint32_t count = 0;
   const auto end_frame = [&](std::int64_t number) {
     const Duration device_time = from_seconds(static_cast<double>(number) / track_.rate_hz());
-    items.u8(1).u8(static_cast<unsigned>(number) & 0xFFU).u16(0).u32(static_cast<std::uint32_t>(number));
+    items.u8(1).u8(static_cast<unsigned>(number) & 0xFFU).u16(0).u32(number_of(number));
     items.u32(static_cast<std::uint32_t>(device_time.count() / 1'000'000'000));
     items.u32(static_cast<std::uint32_t>(device_time.count() % 1'000'000'000));
     items.u16(1).u16(1).append(component(2, std::exchange(count, 0), std::exchange(tools, {})));
@@ -309,13 +331,13 @@ void NdiEmulator::send_bx2(LinkControl& link, std::int64_t frame) {
   };
   std::size_t tool = 0;
   for (const auto& [handle, port] : ports_) {
-    const ToolReading r = reading(tool, frame);
+    const ToolReading r = reading(handle, tool, frame);
     ++count;
     tools.u16(handle);
     if (!port.enabled || r.state == ToolState::kDisabled) {
       tools.u16(0x0120);
     } else if (r.state == ToolState::kOk) {
-      tools.u16(0).transform(r.X_TO);
+      tools.u16(0).transform(r.X_TO, r.error_mm);
     } else {
       tools.u16(r.state == ToolState::kOutOfVolume ? 0x0109U : 0x011FU);
     }
@@ -332,7 +354,7 @@ void NdiEmulator::send_tx(LinkControl& link, std::int64_t frame) {
   std::string text = fmt::format("{:02X}", ports_.size());
   std::size_t tool = 0;
   for (const auto& [handle, port] : ports_) {
-    const ToolReading r = reading(tool++, frame);
+    const ToolReading r = reading(handle, tool++, frame);
     text += fmt::format("{:02X}", handle);
     if (!port.enabled || r.state == ToolState::kDisabled) {
       text += "DISABLED\n";
@@ -343,11 +365,11 @@ void NdiEmulator::send_tx(LinkControl& link, std::int64_t frame) {
       rotation_to_wxyz(r.X_TO.R, q);
       for (const double component_q : q) text += fmt::format("{:+06d}", std::lround(component_q * 1e4));
       for (int axis = 0; axis < 3; ++axis) text += fmt::format("{:+07d}", std::lround(r.X_TO.t[axis] * 1e2));
-      text += "+01000";
+      text += fmt::format("{:+06d}", std::lround(r.error_mm * 1e4));
     } else {
       text += "MISSING";
     }
-    text += fmt::format("{:08X}{:08X}\n", port_status(r), static_cast<std::uint32_t>(frame));
+    text += fmt::format("{:08X}{:08X}\n", port_status(r), number_of(frame));
   }
   reply(link, text + "0000");
 }

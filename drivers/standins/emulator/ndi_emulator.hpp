@@ -5,6 +5,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,13 @@ struct NdiEmulatorSettings {
   std::optional<Pose> reference = std::nullopt;  // where the second tool is, constant; the first follows the track
   bool second_channel = false;                   // of the first wired tool: shows when that has been initialised
   bool frame_a_tool = false;                     // BX2: each tool has a frame of its own, one number after the other's
-  bool malformed_bx2 = false;                    // its BX2 replies are whole, but their bodies are not as in the guide
+  std::map<std::uint16_t, PoseTrack> tools =
+      {};                               // where tools of these handles are; those from 0A on are in their ports
+  std::set<std::uint16_t> broken = {};  // port handles that PINIT answers with ERROR13
+  double error_mm = 0.0;                // that it says each of its poses has
+  Duration jump_every{0};               // 0: never
+  std::int64_t jump_by = 0;             // then its frame numbers jump by so many
+  bool malformed_bx2 = false;           // its BX2 replies are whole, but their bodies are not as in the guide
 };
 
 // On a serial line it begins at 9600 baud and goes on at what COMM says, until it is plugged in anew; while the other
@@ -71,7 +78,10 @@ class NdiEmulator final : public DeviceProtocol {
   [[nodiscard]] std::string search(std::string_view option) const;
   [[nodiscard]] Port* port_of(std::string_view digits);
   [[nodiscard]] std::int64_t frame_at(Instant now) const noexcept;
-  [[nodiscard]] ToolReading reading(std::size_t tool, std::int64_t frame) const noexcept;
+  // What it says the frame's number is.
+  [[nodiscard]] std::uint32_t number_of(std::int64_t frame) const noexcept;
+  // Of the tool of this handle, the `tool`-th of all of them.
+  [[nodiscard]] ToolReading reading(std::uint16_t handle, std::size_t tool, std::int64_t frame) const noexcept;
   void send_bx(LinkControl& link, std::int64_t frame);
   void send_bx2(LinkControl& link, std::int64_t frame);
   void send_tx(LinkControl& link, std::int64_t frame);

@@ -13,6 +13,7 @@ namespace {
 // Of a period: readings farther apart have a gap between them, and a reading nearer to a frame is that frame's own.
 constexpr double kGap = 1.5;
 constexpr double kOwn = 1e-3;
+constexpr Duration kLasting = std::chrono::hours(1);  // of motions that are made here
 
 // The mean of the steps that are no gaps.
 double rate_of(const std::vector<TrackerSample>& samples) {
@@ -50,10 +51,9 @@ PoseTrack PoseTrack::of_samples(Instant start, const std::vector<TrackerSample>&
 }
 
 PoseTrack PoseTrack::swaying(Instant start, double rate_hz) {
-  constexpr double kSeconds = 3600.0;
   constexpr double kPeriod_s = 4.0;
   std::vector<Timed> readings;
-  const auto count = static_cast<std::size_t>(kSeconds * rate_hz);
+  const auto count = static_cast<std::size_t>(to_seconds(kLasting) * rate_hz);
   readings.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double t = static_cast<double>(i) / rate_hz;
@@ -65,6 +65,31 @@ PoseTrack PoseTrack::swaying(Instant start, double rate_hz) {
   return {start, rate_hz, std::move(readings)};
 }
 
+PoseTrack PoseTrack::pivoting(Instant start, double rate_hz, const Vector3d& tip_O_mm) {
+  constexpr double kSwing_rad = 0.5;
+  constexpr double kPeriods_s[3] = {3.0, 4.1, 7.3};  // of the three axes: no two swing together
+  const Vector3d tip_T_mm(50.0, 30.0, -500.0);
+  std::vector<Timed> readings;
+  const auto count = static_cast<std::size_t>(to_seconds(kLasting) * rate_hz);
+  readings.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double t = static_cast<double>(i) / rate_hz;
+    Vector3d turn;
+    for (int axis = 0; axis < 3; ++axis)
+      turn[axis] = kSwing_rad * std::sin(2.0 * std::numbers::pi * t / kPeriods_s[axis]);
+    const Matrix3d R = so3_exp(turn);
+    readings.push_back({from_seconds(t), {ToolState::kOk, {R, tip_T_mm - R * tip_O_mm}}});
+  }
+  return {start, rate_hz, std::move(readings)};
+}
+
+PoseTrack PoseTrack::still(Instant start, const Pose& X_TO) {
+  constexpr double kRate_hz = 1.0;
+  std::vector<Timed> readings;
+  for (Duration t{0}; t <= kLasting; t += std::chrono::seconds(1)) readings.push_back({t, {ToolState::kOk, X_TO}});
+  return {start, kRate_hz, std::move(readings)};
+}
+
 std::size_t PoseTrack::index_at(Duration since) const noexcept {
   const auto after = std::upper_bound(readings_.begin(), readings_.end(), since,
                                       [](Duration t, const Timed& reading) { return t < reading.since; });
@@ -72,8 +97,13 @@ std::size_t PoseTrack::index_at(Duration since) const noexcept {
 }
 
 ToolReading PoseTrack::at(std::int64_t frame) const noexcept {
+  return reading_at(static_cast<double>(frame) * 1e9 / rate_hz_);
+}
+
+ToolReading PoseTrack::at(Duration since) const noexcept { return reading_at(static_cast<double>(since.count())); }
+
+ToolReading PoseTrack::reading_at(double t_ns) const noexcept {
   const double period_ns = 1e9 / rate_hz_;
-  const double t_ns = static_cast<double>(frame) * period_ns;
   if (readings_.empty()) return {};
   const std::size_t before = index_at(Duration(std::llround(t_ns)));
   const std::size_t after = std::min(before + 1, readings_.size() - 1);

@@ -20,6 +20,12 @@ class PoseTrack {
   // A scope held half a metre in front of the tracker that sways by 20 mm and 0.1 rad within four seconds, for an hour.
   [[nodiscard]] static PoseTrack swaying(Instant start, double rate_hz);
 
+  // A pointer whose tip, there in its own frame, rests half a metre in front of the tracker while it is turned about it
+  // by half a radian each way, for an hour.
+  [[nodiscard]] static PoseTrack pivoting(Instant start, double rate_hz, const Vector3d& tip_O_mm);
+  // Held still there, for an hour.
+  [[nodiscard]] static PoseTrack still(Instant start, const Pose& X_TO);
+
   [[nodiscard]] Instant start() const noexcept { return start_; }
   // Of a device that would have given these readings: gaps do not count.
   [[nodiscard]] double rate_hz() const noexcept { return rate_hz_; }
@@ -34,12 +40,16 @@ class PoseTrack {
   // For a device that measures at even frames, rate_hz() a second: where the tool is at that frame, between the two
   // readings around it. Next to a gap, where there is but one, that one when it is nearer than half a period.
   [[nodiscard]] ToolReading at(std::int64_t frame) const noexcept;
+  // The same so long after the start.
+  [[nodiscard]] ToolReading at(Duration since) const noexcept;
 
  private:
   struct Timed {
     Duration since;
     ToolReading reading;
   };
+
+  [[nodiscard]] ToolReading reading_at(double since_ns) const noexcept;
 
   PoseTrack(Instant start, double rate_hz, std::vector<Timed> readings);
 

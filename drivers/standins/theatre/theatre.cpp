@@ -22,16 +22,6 @@
 
 namespace perimap {
 
-Expected<Pose> parse_place(const std::vector<double>& given, const std::string& option) {
-  const Vector3d t_mm(given[0], given[1], given[2]);
-  const double wxyz[4] = {given[3], given[4], given[5], given[6]};
-  const double norm = std::sqrt(wxyz[0] * wxyz[0] + wxyz[1] * wxyz[1] + wxyz[2] * wxyz[2] + wxyz[3] * wxyz[3]);
-  if (!(std::abs(norm - 1.0) < 1e-3)) {
-    return fail(fmt::format("{}: expected a rotation W X Y Z of norm 1 within 1e-3, got norm {:g}", option, norm));
-  }
-  return pose_from_wxyz(t_mm, wxyz);
-}
-
 Expected<Theatre> Theatre::create(const TheatreSettings& settings, bool with_camera) {
   Theatre theatre(settings);
   if (!settings.recording.empty()) {
@@ -78,12 +68,25 @@ Expected<std::unique_ptr<PlayedFrames>> Theatre::frames() const {
 }
 
 Expected<std::unique_ptr<DeviceProtocol>> Theatre::protocol_of(const EmulatedDevice& device) const {
-  if (device.name == "ndi") return std::make_unique<NdiEmulator>(poses(), settings_.ndi, settings_.faults);
-  if (device.name == "igtl") return std::make_unique<IgtlEmulator>(poses(), settings_.igtl, settings_.faults);
+  if (device.name == "ndi") {
+    NdiEmulatorSettings ndi = settings_.ndi;
+    for (const EmulatedTool& tool : settings_.tools) {
+      const auto handle = port_handle_of(tool.name);
+      if (!handle) return tl::unexpected(handle.error());
+      ndi.tools.emplace(*handle, track_of(tool, start_));
+    }
+    return std::make_unique<NdiEmulator>(poses(), ndi, settings_.faults);
+  }
+  if (device.name == "igtl") {
+    IgtlEmulatorSettings igtl = settings_.igtl;
+    for (const EmulatedTool& tool : settings_.tools) igtl.others.emplace_back(tool.name, track_of(tool, start_));
+    return std::make_unique<IgtlEmulator>(poses(), igtl, settings_.faults);
+  }
   auto ecg = ecg_device();
   if (!ecg) return tl::unexpected(std::move(ecg.error()));
   if (device.name == "medlab") return emulate_medlab(std::move(*ecg), settings_.faults);
   if (device.name == "bitalino") return emulate_bitalino(std::move(*ecg), settings_.faults);
+  if (settings_.cyton_daisy) return emulate_cyton_with_daisy(std::move(*ecg), settings_.faults);
   return emulate_cyton(std::move(*ecg), settings_.faults);
 }
 

@@ -21,6 +21,7 @@
 #include "drivers/standins/emulator/played_session.hpp"
 #include "drivers/standins/simulator/simulation.hpp"
 #include "drivers/standins/theatre/emulated_device.hpp"
+#include "drivers/standins/theatre/emulated_tool.hpp"
 #include "drivers/transport/interrupt.hpp"
 
 namespace perimap {
@@ -34,11 +35,10 @@ struct TheatreSettings {
   EmulatorFaults faults;
   NdiEmulatorSettings ndi{.wired_tools = 1};
   IgtlEmulatorSettings igtl;
+  bool cyton_daisy = false;
+  std::vector<EmulatedTool> tools;  // further ones of a tracker
   CanEcgSettings can;
 };
-
-// A place as on a command line: TX TY TZ W X Y Z, mm and unit quaternion.
-[[nodiscard]] Expected<Pose> parse_place(const std::vector<double>& given, const std::string& option);
 
 class Theatre {
  public:

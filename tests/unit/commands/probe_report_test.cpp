@@ -71,6 +71,35 @@ TEST(ProbeReport, WhatIsNoSampleIsToldInTheDevicesOwnWords) {
   }
 }
 
+TEST(ProbeReport, EachToolThatWasAskedForHasALine) {
+  auto devices = one("tracker", DeviceState::kStreaming);
+  for (int i = 0; i < 3; ++i) devices.front()->tools.emplace_back();
+  devices.front()->tools[1].name = "pointer";
+  devices.front()->tools[2].name = "instrument/0D";
+  ProbedSamples& pointer = devices.front()->tools[1].seen;
+  for (int i = 1; i <= 3; ++i) pointer.add(Instant(i * kPeriod), 1);
+  pointer.tools = {2, 1, 0, 0};
+  pointer.largest_error_mm = 0.4;
+  const std::string text = to_text(devices);
+  EXPECT_THAT(text, HasSubstr("  pointer: 3 readings, seen in 2, missing in 1, out of volume in 0, disabled in 0\n"));
+  EXPECT_THAT(text, HasSubstr("  instrument/0D: no reading\n"));
+  const auto json = to_json(devices);
+  EXPECT_EQ(json["tracker"]["tools"].size(), 2U);
+  EXPECT_EQ(json["tracker"]["tools"]["pointer"]["ok"], 2);
+  EXPECT_EQ(json["tracker"]["tools"]["pointer"]["largest_error_mm"], 0.4);
+}
+
+TEST(ProbeReport, WhatADeviceIsUsedInSpiteOfIsToldWhileItStreams) {
+  auto devices = one("tracker", DeviceState::kStreaming);
+  EXPECT_THAT(to_text(devices), Not(HasSubstr("note")));
+  devices.front()->health.set_notice("the pointer is not there");
+  devices.front()->health.misnumbered.add(3);
+  EXPECT_THAT(to_text(devices), HasSubstr("  note       the pointer is not there\n"));
+  EXPECT_EQ(to_json(devices)["tracker"]["notice"], "the pointer is not there");
+  EXPECT_EQ(to_json(devices)["tracker"]["misnumbered"], 3);
+  EXPECT_TRUE(all_well(devices));
+}
+
 TEST(ProbeReport, BreathingStandsWithTheDeviceThatHearsIt) {
   auto devices = one("ecg", DeviceState::kStreaming);
   devices.front()->respiration_channel = 4;

@@ -102,6 +102,26 @@ level = "debug"
   EXPECT_EQ(result->log.level, LogConfiguration::Level::kDebug);
 }
 
+TEST(ConfigurationLoader, ReadsListsOfTextsAndAnEmptyOne) {
+  const auto result = parse("version = 1\n[tracker]\npointer = \"0C\"\ninstruments = [\"0D\", \"Grasper 2\"]\n");
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->tracker.pointer, "0C");
+  EXPECT_THAT(result->tracker.instruments, ::testing::ElementsAre("0D", "Grasper 2"));
+  const auto none = parse("version = 1\n[tracker]\ninstruments = []\n", *result);
+  ASSERT_TRUE(none) << none.error().message;
+  EXPECT_TRUE(none->tracker.instruments.empty());
+  for (const char* list :
+       {"[1]", "\"0D\"", "[\"\"]", "[\"0D\", 2]", "[\"1\",\"2\",\"3\",\"4\",\"5\",\"6\",\"7\",\"8\",\"9\"]"}) {
+    const auto wrong = parse(std::string("version = 1\n[tracker]\ninstruments = ") + list + "\n");
+    ASSERT_FALSE(wrong) << list;
+    EXPECT_THAT(wrong.error().message, ::testing::HasSubstr("up to 8 texts of 1 to 20 printable characters"));
+  }
+  const auto missing = parse_configuration("version = 1\n[tracker]\ninstrument_definitions = [\"not-there.rom\"]\n",
+                                           "test.toml", {}, NamedFiles::kMustExist);
+  ASSERT_FALSE(missing);
+  EXPECT_THAT(missing.error().message, ::testing::HasSubstr("not-there.rom is not there"));
+}
+
 TEST(ConfigurationLoader, TextMayBeInAnyScriptWithinStringsAndComments) {
   const Expected<Configuration> result = parse(
       "version = 1  # \xe3\x80\x81\n[source]\nname = \"th\xc3\xa9\xc3\xa2tre \\\"\xe3\x80\x81\\\" \"\nworld_frame = "
@@ -278,10 +298,11 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"Empty", "", "test.toml:1:1: key 'version': expected 1, got nothing"},
         Wrong{"OtherVersion", "version = 2", "test.toml:1:11: key 'version': expected 1, got 2"},
         Wrong{"VersionAsText", "version = \"1\"", "test.toml:1:11: key 'version': expected 1, got \"1\""},
-        Wrong{"UnknownSection", "version = 1\n[traker]\n",
-              "test.toml:2:2: key 'traker': expected one of version, source, replay, camera, tracker, ecg, phase, "
-              "respiration, pipeline, features, estimation, realtime, dds, recording, status, log, control, "
-              "checkpoint, got an unknown key"},
+        Wrong{
+            "UnknownSection", "version = 1\n[traker]\n",
+            "test.toml:2:2: key 'traker': expected one of version, source, replay, camera, tracker, setup, ecg, phase, "
+            "respiration, pipeline, features, estimation, realtime, dds, recording, status, log, control, "
+            "checkpoint, got an unknown key"},
         Wrong{"UnknownKey", "version = 1\n[phase]\nlow = 1\n",
               "test.toml:3:1: key 'phase.low': expected one of law, lost_after_s, from_image, image_alone_s, "
               "predictor, got an unknown key"},

@@ -1,38 +1,8 @@
 // Sessions with an OpenIGTLink server.
-#include "igtl_messages.hpp"
+#include "igtl_theatre.hpp"
 
 namespace perimap {
 namespace {
-
-struct Theatre {
-  Theatre(IgtlSettings settings, IgtlEmulatorSettings device_settings, const EmulatorFaults& faults = {})
-      : device(track(), std::move(device_settings), faults),
-        session(
-            std::move(settings), [this](const TrackerSample& sample) { samples.push_back(sample); }, health) {
-    device.on_open(far, now);
-    session.on_open(host, now);
-  }
-  static const PoseTrack& track() {
-    static const PoseTrack swaying = PoseTrack::swaying(kStart, 50.0);
-    return swaying;
-  }
-  void run(Duration longest) {
-    for (const Instant end = now + longest; now < end && host.failure.empty(); now += milliseconds(1)) {
-      if (now >= device.next_time()) device.on_time(far, now);
-      const std::string sent = far.take_sent();
-      if (!sent.empty()) session.on_bytes(host, std::as_bytes(std::span(sent.data(), sent.size())), now);
-      if (now >= session.next_time()) session.on_time(host, now);
-    }
-  }
-
-  Instant now = kStart;
-  std::vector<TrackerSample> samples;
-  DeviceHealth health;
-  ScriptedLink far;
-  IgtlEmulator device;
-  ScriptedLink host;
-  IgtlSession session;
-};
 
 TEST(IgtlSession, GivesEveryPoseByTransformTdataAndPosition) {
   using Message = IgtlEmulatorSettings::Message;
@@ -41,8 +11,8 @@ TEST(IgtlSession, GivesEveryPoseByTransformTdataAndPosition) {
       SCOPED_TRACE(static_cast<int>(message));
       EmulatorFaults drifting;
       drifting.drift_ppm = 200.0;
-      Theatre theatre({.sensor = "Scope", .reference = std::nullopt, .world = {}}, {message, version, "Scope"},
-                      drifting);
+      IgtlTheatre theatre({.sensor = "Scope", .reference = std::nullopt, .world = {}}, {message, version, "Scope"},
+                          drifting);
       theatre.run(seconds(4));
       ASSERT_EQ(theatre.host.failure, "");
       EXPECT_THAT(theatre.host.sent, HasSubstr("STT_TDATA"));
@@ -50,7 +20,7 @@ TEST(IgtlSession, GivesEveryPoseByTransformTdataAndPosition) {
       for (std::size_t i = 0; i < theatre.samples.size(); ++i) {
         const TrackerSample& sample = theatre.samples[i];
         ASSERT_EQ(sample.state, ToolState::kOk);
-        ASSERT_LT((sample.X_WS.t - Theatre::track().at(static_cast<std::int64_t>(i)).X_TO.t).norm(), 1e-3);
+        ASSERT_LT((sample.X_WS.t - IgtlTheatre::track().at(static_cast<std::int64_t>(i)).X_TO.t).norm(), 1e-3);
         ASSERT_LE(sample.source_time, sample.arrival);
         ASSERT_LT(sample.arrival - sample.source_time, milliseconds(3));
       }
@@ -77,7 +47,8 @@ TEST(IgtlSession, AToolLeftOutOfTdataOrMarkedSoIsMissing) {
   faults.missing_every = seconds(1);
   faults.missing_for = milliseconds(300);
   for (const auto& [message, version] : {std::pair{Message::kTdata, 1U}, std::pair{Message::kTransform, 2U}}) {
-    Theatre theatre({.sensor = "Scope", .reference = std::nullopt, .world = {}}, {message, version, "Scope"}, faults);
+    IgtlTheatre theatre({.sensor = "Scope", .reference = std::nullopt, .world = {}}, {message, version, "Scope"},
+                        faults);
     theatre.run(seconds(2));
     ASSERT_GT(theatre.samples.size(), 95U);
     for (std::size_t i = 0; i < theatre.samples.size(); ++i) {
@@ -87,7 +58,7 @@ TEST(IgtlSession, AToolLeftOutOfTdataOrMarkedSoIsMissing) {
 }
 
 TEST(IgtlSession, OtherToolsAreNotTheSensor) {
-  Theatre theatre({.sensor = "Probe", .reference = std::nullopt, .world = {}}, {});
+  IgtlTheatre theatre({.sensor = "Probe", .reference = std::nullopt, .world = {}}, {});
   theatre.run(seconds(5));
   EXPECT_TRUE(theatre.samples.empty());
   EXPECT_EQ(theatre.health.reason(), "no tool 'Probe' in 2 s; the server sends Scope");
@@ -280,7 +251,8 @@ TEST(IgtlSession, AToolThatNeverCameIsAwaitedAndNotMissing) {
       for (int i = 0; i < 500; ++i) {
         const Duration at = milliseconds(10 * i);
         if (tdata) {
-          listener.send("TDATA", "Tracker", encode_igtl_tdata(sent), at, (1ULL << 32U) + static_cast<unsigned>(i));
+          listener.send("TDATA", "Tracker", encode_igtl_tdata(sent), at,
+                        (1ULL << 32U) + static_cast<std::uint64_t>(i) * 42949673U);
         } else {
           for (const IgtlTool& tool : sent) listener.transform(tool.name, at);
         }
@@ -425,7 +397,7 @@ TEST(IgtlSession, DamagedMessagesGiveNoPose) {
   EmulatorFaults faults;
   faults.bad_check = 0.05;
   faults.lost = 0.05;
-  Theatre theatre({.sensor = "Scope", .reference = std::nullopt, .world = {}}, {}, faults);
+  IgtlTheatre theatre({.sensor = "Scope", .reference = std::nullopt, .world = {}}, {}, faults);
   theatre.run(seconds(20));
   EXPECT_GT(theatre.health.damaged.get(), 20U);
   EXPECT_GT(theatre.samples.size(), 800U);
@@ -433,7 +405,7 @@ TEST(IgtlSession, DamagedMessagesGiveNoPose) {
     double nearest = 1e9;
     const auto frame = (sample.arrival - kStart) / milliseconds(20);
     for (std::int64_t near = frame - 1; near <= frame + 1; ++near) {
-      nearest = std::min(nearest, (sample.X_WS.t - Theatre::track().at(near).X_TO.t).norm());
+      nearest = std::min(nearest, (sample.X_WS.t - IgtlTheatre::track().at(near).X_TO.t).norm());
     }
     EXPECT_LT(nearest, 1e-3);
   }

@@ -40,7 +40,8 @@ struct Theatre {
       : far(serial, baud),
         device(poses, device_settings, faults),
         session(
-            std::move(settings), [this](const TrackerSample& sample) { samples.push_back(sample); }, health),
+            std::move(settings), [this](const TrackerSample& sample) { samples.push_back(sample); }, health,
+            [this](const ToolSample& sample) { tools.push_back(sample); }),
         host(serial, baud) {
     device.on_open(far, now);
     session.on_open(host, now);
@@ -62,6 +63,7 @@ struct Theatre {
 
   Instant now = kStart;
   std::vector<TrackerSample> samples;
+  std::vector<ToolSample> tools;
   std::string sent;
   DeviceHealth health;
   ScriptedLink far;

@@ -67,5 +67,15 @@ TEST_F(News, AfterAQuietTimeChangesAreToldAtOnceAgain) {
   EXPECT_EQ(told.size(), 2U);
 }
 
+TEST(DeviceNews, ANoticeIsToldOnceAndAgainWhenItIsAnother) {
+  DeviceNews news("tracker");
+  EXPECT_FALSE(news.note(""));
+  EXPECT_EQ(news.note("the pointer is not there"), "tracker: the pointer is not there");
+  EXPECT_FALSE(news.note("the pointer is not there"));
+  EXPECT_FALSE(news.note("")) << "while it is opened anew";
+  EXPECT_FALSE(news.note("the pointer is not there"));
+  EXPECT_TRUE(news.note("port handle 0D is left alone"));
+}
+
 }  // namespace
 }  // namespace perimap

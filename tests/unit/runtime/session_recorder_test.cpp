@@ -118,6 +118,44 @@ Counts read(const std::filesystem::path& file, ReadMode mode = ReadMode::kStrict
   return counts;
 }
 
+TEST_F(SessionRecording, OtherToolsHaveChannelsOfTheirOwnThatAReplayPassesOver) {
+  SensorRecordingFacts facts{"test", "test", "tracker", {}, "camera_matrix", "version = 1\n"};
+  facts.tools = {"tracker/reference", "tracker/pointer"};
+  {
+    auto session = SessionRecorder::create(file_, facts, kMemory);
+    ASSERT_TRUE(session) << session.error().message;
+    (*session)->start(threads);
+    (*session)->frame(frame(1, MonotonicClock::now()));
+    for (std::uint32_t i = 1; i <= 10; ++i) {
+      const Instant now = MonotonicClock::now();
+      ToolSample tool;
+      static_cast<TrackerSample&>(tool) = pose(i, now);
+      tool.error_mm = 0.25;
+      for (tool.tool = 0; tool.tool < 2; ++tool.tool) (*session)->tool(tool);
+      (*session)->pose(pose(i, now));
+    }
+    (*session)->stop();
+    EXPECT_EQ((*session)->reason(), "");
+    EXPECT_EQ((*session)->summary().recorded, 31U);
+  }
+  const Counts counts = read(file_);
+  EXPECT_EQ(counts.poses, 10);
+  EXPECT_EQ(counts.frames, 1);
+
+  auto reader = RecordingReader::open(file_.string());
+  ASSERT_TRUE(reader) << reader.error().message;
+  const std::string_view pointer[] = {"tracker/pointer"};
+  ASSERT_TRUE(reader->select(pointer));
+  std::uint32_t count = 0;
+  for (auto message = reader->next(); message && *message; message = reader->next()) {
+    const auto told = reader->decode<perimap_TrackerPose>(**message);
+    ASSERT_TRUE(told) << told.error().message;
+    EXPECT_EQ((*told)->device_frame, ++count);
+    EXPECT_EQ((*told)->error_mm, 0.25);
+  }
+  EXPECT_EQ(count, 10U);
+}
+
 TEST_F(SessionRecording, OfThreeThreadsReplaysInOrderOfArrival) {
   const auto session = recorder();
   session->start(threads);

@@ -1,0 +1,29 @@
+// The tools that a configuration names beside the tracked sensor.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/config/configuration.hpp"
+
+namespace perimap {
+
+// By ToolSample::tool: "reference" (empty where there is none), "pointer" where there is one, then "instrument/NAME".
+// The names are those of messages, and of a recording's channels below channels::kTrackedTools. An instrument of a
+// definition has the file's name without its extension.
+[[nodiscard]] std::vector<std::string> tracked_tool_names(const TrackerConfiguration& configuration);
+
+// Whether the two name one tool. Of an NDI tracker handles are numbers, so that "a" is "0A".
+[[nodiscard]] bool same_tool(const std::string& a, const std::string& b, TrackerConfiguration::Protocol protocol);
+
+struct ToolTwice {
+  std::string key;   // "tracker.pointer"
+  std::string tool;  // as it is written there
+  std::string also;  // the key that has it too
+};
+
+// A tool that two keys name: it cannot be both.
+[[nodiscard]] std::optional<ToolTwice> tool_named_twice(const TrackerConfiguration& configuration);
+
+}  // namespace perimap
