@@ -8,6 +8,7 @@
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/configuration_text.hpp"
 #include "daemon/config/surface_traffic.hpp"
+#include "daemon/runtime/calibration_fit.hpp"
 #include "daemon/runtime/device_setup.hpp"
 #include "daemon/runtime/setup_warnings.hpp"
 #include "daemon/runtime/thread_launcher.hpp"
@@ -35,7 +36,10 @@ void tell_refused_privileges(const RealtimeConfiguration& realtime, const Consol
 // The devices that it names, each with all its keys.
 Expected<Configuration> load_whole(const std::string& file) {
   auto configuration = load_configuration(file);
-  if (!configuration || configuration->replay.recording || !names_devices(*configuration)) return configuration;
+  if (!configuration) return configuration;
+  if (const auto fits = frames_fit(*configuration, file); !fits) return fail(file + ": " + fits.error().message);
+  if (configuration->replay.recording || !names_devices(*configuration)) return configuration;
+  if (const auto fits = calibrations_fit(*configuration); !fits) return fail(file + ": " + fits.error().message);
   if (const auto devices = named_devices(*configuration, file); !devices) {
     return fail(file + ": " + devices.error().message);
   }

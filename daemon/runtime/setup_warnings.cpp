@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <iterator>
 #include <numbers>
+#include <utility>
 
+#include "daemon/runtime/calibration_fit.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 
 namespace perimap {
@@ -68,7 +71,12 @@ std::vector<std::string> setup_warnings(const Configuration& configuration) {
   if (configuration.camera.calibration) {
     if (auto read = read_calibration(*configuration.camera.calibration)) camera = *read;
   }
-  return setup_warnings(configuration, camera);
+  std::vector<std::string> warnings = setup_warnings(configuration, camera);
+  if (configuration.replay.recording) return warnings;
+  for (std::string& old : old_calibrations(configuration, std::chrono::system_clock::now())) {
+    warnings.push_back(std::move(old));
+  }
+  return warnings;
 }
 
 }  // namespace perimap

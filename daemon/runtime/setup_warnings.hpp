@@ -15,7 +15,8 @@ namespace perimap {
 [[nodiscard]] std::vector<std::string> setup_warnings(const Configuration& configuration,
                                                       const std::optional<CameraModel>& camera);
 
-// Of the calibration that the configuration names; none when it names none, or it can not be read.
+// Of the calibration that the configuration names, and of what is older than it may be; none of a calibration when it
+// names none, or it can not be read.
 [[nodiscard]] std::vector<std::string> setup_warnings(const Configuration& configuration);
 
 }  // namespace perimap

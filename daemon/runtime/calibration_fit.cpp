@@ -1,0 +1,126 @@
+#include "daemon/runtime/calibration_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <optional>
+#include <string_view>
+#include <variant>
+
+#include "daemon/config/tracked_tools.hpp"
+#include "drivers/calibration/calibration_facts.hpp"
+#include "drivers/calibration/calibration_file.hpp"
+#include "drivers/recording/channels.hpp"
+#include "drivers/recording/replay_reader.hpp"
+#include "drivers/transport/camera_endpoint.hpp"
+#include "drivers/video/video_file.hpp"
+
+namespace perimap {
+namespace {
+
+tl::unexpected<Error> wrong(std::string_view key, const std::string& expected, const std::string& got,
+                            std::string_view do_next) {
+  return fail(fmt::format("key '{}': expected {}, got {}: {}", key, expected, got, do_next));
+}
+
+std::optional<std::string> pointer_fact(const TrackerConfiguration& tracker, const char* key) {
+  return tracker.pointer_calibration ? calibration_fact(*tracker.pointer_calibration, key) : std::nullopt;
+}
+
+Expected<void> of_size(int width, int height, const CameraModel& camera, const std::string& played) {
+  if (width == camera.width && height == camera.height) return {};
+  return wrong("camera.calibration", fmt::format("one for frames of {}x{}, as {} has", width, height, played),
+               fmt::format("one for {}x{}", camera.width, camera.height),
+               "measure that camera with `perimap calibrate camera`, or play what the calibration is of");
+}
+
+Expected<void> video_fits(const std::string& file, const CameraModel& camera) {
+  auto reader = VideoReader::open(file);
+  if (!reader) return tl::unexpected(std::move(reader.error()));
+  const auto frame = (*reader)->next();
+  if (!frame) return tl::unexpected(frame.error());
+  if (*frame == nullptr) return {};
+  return of_size((*frame)->grey.width, (*frame)->grey.height, camera, file);
+}
+
+Expected<void> recording_fits(const std::string& file, const CameraModel& camera) {
+  constexpr std::array<std::string_view, 1> kFrames{channels::kCameraImage};
+  auto reader = ReplayReader::open(file, ReadMode::kWhole, kFrames);
+  if (!reader) return tl::unexpected(std::move(reader.error()));
+  const auto event = reader->next();
+  if (!event) return tl::unexpected(event.error());
+  if (!*event) return {};
+  const auto& frame = std::get<FrameEvent>(**event);
+  return of_size(frame.width, frame.height, camera, file);
+}
+
+void warn_of_age(const std::string& what, std::optional<CalibrationDate> made, double most_days, CalibrationDate today,
+                 std::string_view anew, std::vector<std::string>& warnings) {
+  if (!made || most_days <= 0.0) return;
+  const auto days = (today - *made).count();
+  if (days < -1) {  // a day more or less may be another part of the world
+    warnings.push_back(
+        fmt::format("{} of {}: that day is yet to come; is this machine's clock right?", what, date_text(*made)));
+  } else if (static_cast<double>(days) > most_days) {
+    warnings.push_back(
+        fmt::format("{} of {} is {} days old, and setup.maximum_age_days is {:g}; measure it anew with `{}`", what,
+                    date_text(*made), days, most_days, anew));
+  }
+}
+
+std::optional<CalibrationDate> date_of(const std::optional<std::string>& text) {
+  return text ? calibration_date_of(*text) : std::nullopt;
+}
+
+}  // namespace
+
+Expected<void> calibrations_fit(const Configuration& configuration) {
+  const TrackerConfiguration& c = configuration.tracker;
+  if (c.hand_eye_sensor && c.sensor && !same_tool(*c.hand_eye_sensor, *c.sensor, c.protocol)) {
+    return wrong("tracker.hand_eye_sensor", fmt::format("\"{}\", the tracker.sensor", *c.sensor),
+                 fmt::format("\"{}\"", *c.hand_eye_sensor),
+                 "the hand-eye is another sensor's; measure it with `perimap calibrate hand-eye`");
+  }
+  const auto tool = pointer_fact(c, "tool");
+  // Recordings have it by its role, which says nothing of which tool it was.
+  if (tool && *tool != "pointer" && c.pointer && !same_tool(*tool, *c.pointer, c.protocol)) {
+    return wrong("tracker.pointer_calibration", fmt::format("one of \"{}\", the tracker.pointer", *c.pointer),
+                 fmt::format("one of \"{}\"", *tool),
+                 "the tip is another tool's; measure it with `perimap calibrate tool`");
+  }
+  return {};
+}
+
+Expected<void> frames_fit(const Configuration& configuration, const std::filesystem::path& configuration_file) {
+  const CameraConfiguration& c = configuration.camera;
+  if (!c.calibration) return {};
+  const auto camera = read_calibration(*c.calibration);
+  if (!camera) return tl::unexpected(camera.error());
+  if (configuration.replay.recording) return recording_fits(configuration.replay.recording->string(), *camera);
+  if (c.playback) return recording_fits(c.playback->string(), *camera);
+  if (!c.device) return {};
+  const auto endpoint = parse_camera_endpoint(*c.device);
+  const auto* video = endpoint ? std::get_if<VideoEndpoint>(&*endpoint) : nullptr;
+  if (video == nullptr) return {};
+  return video_fits((configuration_file.parent_path() / video->file).lexically_normal().string(), *camera);
+}
+
+std::vector<std::string> old_calibrations(const Configuration& configuration,
+                                          std::chrono::system_clock::time_point now) {
+  std::vector<std::string> warnings;
+  const auto today = std::chrono::floor<std::chrono::days>(now);
+  const TrackerConfiguration& c = configuration.tracker;
+  const double most = configuration.setup.maximum_age_days;
+  if (configuration.camera.calibration) {
+    warn_of_age("camera.calibration: the one", camera_calibration_date(*configuration.camera.calibration), most, today,
+                "perimap calibrate camera", warnings);
+  }
+  if (c.protocol == TrackerConfiguration::Protocol::kNone) return warnings;
+  warn_of_age("tracker.hand_eye_date: the hand-eye", date_of(c.hand_eye_date), most, today,
+              "perimap calibrate hand-eye", warnings);
+  warn_of_age("tracker.pointer_calibration: the one", date_of(pointer_fact(c, "date")), most, today,
+              "perimap calibrate tool", warnings);
+  return warnings;
+}
+
+}  // namespace perimap

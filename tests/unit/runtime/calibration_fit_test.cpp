@@ -1,0 +1,141 @@
+#include "daemon/runtime/calibration_fit.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "drivers/calibration/calibration_facts.hpp"
+#include "drivers/calibration/calibration_file.hpp"
+#include "drivers/video/video_file.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::days;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const std::chrono::system_clock::time_point kToday =
+    CalibrationDate(std::chrono::year(2026) / std::chrono::November / 25) + std::chrono::hours(9);
+
+CameraModel lens() {
+  CameraModel camera;
+  camera.width = 64, camera.height = 48;
+  camera.fx = camera.fy = 80.0;
+  camera.cx = 32.0, camera.cy = 24.0;
+  return camera;
+}
+
+class CalibrationFit : public ::testing::Test {
+ protected:
+  CalibrationFit() {
+    std::string name = (std::filesystem::temp_directory_path() / "perimap-fit-XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+    configuration_.tracker.protocol = TrackerConfiguration::Protocol::kNdi;
+  }
+  ~CalibrationFit() override { std::filesystem::remove_all(folder_); }
+  CalibrationFit(const CalibrationFit&) = delete;
+  CalibrationFit& operator=(const CalibrationFit&) = delete;
+
+  std::filesystem::path write(const char* name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+
+  std::filesystem::path folder_;
+  Configuration configuration_;
+};
+
+TEST(CalibrationDate, IsReadAsPerimapAndOpenCvWriteIt) {
+  const CalibrationDate day(std::chrono::year(2026) / std::chrono::November / 25);
+  for (const char* text : {"2026-11-25", "2026-11-25 18:30 UTC", "Wed Nov 25 18:30:00 2026",
+                           "Wed 25 Nov 2026 06:30:00 PM UTC", "25 Nov 2026"}) {
+    EXPECT_EQ(calibration_date_of(text), day) << text;
+  }
+  for (const char* text : {"", "yesterday", "2026-13-01", "2026-02-30", "18:30"}) {
+    EXPECT_FALSE(calibration_date_of(text)) << text;
+  }
+}
+
+TEST_F(CalibrationFit, AHandEyeOfAnotherSensorIsRefused) {
+  configuration_.tracker.hand_eye_sensor = "0a";
+  EXPECT_TRUE(calibrations_fit(configuration_)) << "which sensor there is, is not said";
+  configuration_.tracker.sensor = "0A";
+  EXPECT_TRUE(calibrations_fit(configuration_)) << "handles are numbers";
+  configuration_.tracker.sensor = "0B";
+  const auto fits = calibrations_fit(configuration_);
+  ASSERT_FALSE(fits);
+  EXPECT_EQ(fits.error().message,
+            "key 'tracker.hand_eye_sensor': expected \"0B\", the tracker.sensor, got \"0a\": the hand-eye is another "
+            "sensor's; measure it with `perimap calibrate hand-eye`");
+  configuration_.tracker.protocol = TrackerConfiguration::Protocol::kIgtl;
+  configuration_.tracker.sensor = "0A";
+  EXPECT_FALSE(calibrations_fit(configuration_)) << "names are names";
+}
+
+TEST_F(CalibrationFit, ATipOfAnotherToolIsRefused) {
+  configuration_.tracker.pointer = "0C";
+  configuration_.tracker.pointer_calibration = write("tip.json", R"({"tool": "0D", "tip_mm": [0, 0, 150]})");
+  const auto fits = calibrations_fit(configuration_);
+  ASSERT_FALSE(fits);
+  EXPECT_THAT(fits.error().message, HasSubstr("'tracker.pointer_calibration': expected one of \"0C\""));
+  EXPECT_THAT(fits.error().message, HasSubstr("perimap calibrate tool"));
+  for (const char* text : {R"({"tool": "C"})", R"({"tool": "pointer"})", R"({"tip_mm": [0, 0, 1]})", "{", "", "[1]"}) {
+    configuration_.tracker.pointer_calibration = write("tip.json", text);
+    EXPECT_TRUE(calibrations_fit(configuration_)) << text;
+  }
+}
+
+TEST_F(CalibrationFit, ACalibrationForFramesOfAnotherSizeIsRefused) {
+  const std::vector<std::uint8_t> pixels(std::size_t{64} * 48, 100);
+  auto writer = VideoWriter::create((folder_ / "scope.avi").string(), 64, 48, 30.0).value();
+  ASSERT_TRUE(writer->write({0, {}, {pixels.data(), 64, 48, 64}}, {}));
+  ASSERT_TRUE(writer->finish());
+  configuration_.camera.device = "video:scope.avi";
+  configuration_.camera.calibration = folder_ / "camera.yaml";
+  ASSERT_TRUE(write_calibration(folder_ / "camera.yaml", lens()));
+  EXPECT_TRUE(frames_fit(configuration_, folder_ / "devices.toml"));
+  CameraModel other = lens();
+  other.width = 128;
+  ASSERT_TRUE(write_calibration(folder_ / "camera.yaml", other));
+  const auto fits = frames_fit(configuration_, folder_ / "devices.toml");
+  ASSERT_FALSE(fits);
+  EXPECT_THAT(fits.error().message, HasSubstr("key 'camera.calibration': expected one for frames of 64x48"));
+  EXPECT_THAT(fits.error().message, HasSubstr("got one for 128x48"));
+}
+
+TEST_F(CalibrationFit, WhatIsOlderThanItMayBeIsWarnedOf) {
+  configuration_.camera.calibration =
+      write("camera.yaml", "%YAML:1.0\n---\ncalibration_time: \"2026-10-01 10:00 UTC\"\n");
+  configuration_.tracker.hand_eye_date = "2026-10-26";
+  configuration_.tracker.pointer_calibration = write("tip.json", R"({"date": "2026-10-25 07:00 UTC"})");
+  EXPECT_THAT(old_calibrations(configuration_, kToday),
+              ElementsAre("camera.calibration: the one of 2026-10-01 is 55 days old, and setup.maximum_age_days is 30; "
+                          "measure it anew with `perimap calibrate camera`",
+                          HasSubstr("tracker.pointer_calibration: the one of 2026-10-25 is 31 days old")));
+  configuration_.setup.maximum_age_days = 60;
+  EXPECT_THAT(old_calibrations(configuration_, kToday), IsEmpty());
+  EXPECT_THAT(old_calibrations(configuration_, kToday + days(100)), ::testing::SizeIs(3));
+  configuration_.setup.maximum_age_days = 0;
+  EXPECT_THAT(old_calibrations(configuration_, kToday + days(10000)), IsEmpty());
+}
+
+TEST_F(CalibrationFit, ADayThatIsYetToComeIsWarnedOf) {
+  configuration_.tracker.hand_eye_date = "2027-01-01";
+  EXPECT_THAT(old_calibrations(configuration_, kToday), ElementsAre(HasSubstr("yet to come")));
+}
+
+// It is not younger than the file.
+TEST_F(CalibrationFit, WithoutADateAFileIsAsOldAsItsLastWriting) {
+  configuration_.camera.calibration = write("camera.yaml", "%YAML:1.0\n---\nimage_width: 64\n");
+  const auto now = std::chrono::system_clock::now();
+  EXPECT_THAT(old_calibrations(configuration_, now), IsEmpty());
+  EXPECT_THAT(old_calibrations(configuration_, now + days(40)), ElementsAre(HasSubstr("days old")));
+}
+
+}  // namespace
+}  // namespace perimap
