@@ -278,7 +278,8 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
       set_rate(link, kFastBaud);
       return enter(link, Step::kSettle, now);
     case Step::kVersion:
-      health_.set_identity(text.substr(0, text.find('\n')));
+      version_ = text.substr(0, text.find('\n'));
+      health_.set_identity(version_);
       return enter(link, Step::kFindToFree, now);
     case Step::kFindToFree:
     case Step::kFindToInitialise:

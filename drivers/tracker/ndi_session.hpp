@@ -143,6 +143,7 @@ class NdiSession final : public DeviceProtocol {
   std::string command_;                 // the one under way, for messages
   std::vector<std::string> ports_;      // handles that the step still has to see to
   std::vector<std::uint16_t> enabled_;
+  std::string version_;  // as the device told it first
   std::vector<NdiBrokenPort> broken_;
   std::uint16_t port_ = 0;  // under way
   std::size_t tool_ = 0;    // of uploads, as tool_count() counts

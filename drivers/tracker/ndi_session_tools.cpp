@@ -86,6 +86,8 @@ bool NdiSession::choose_tools(LinkControl& link) {
     link.fail(fmt::format("sensor and reference are both the tool of port handle {:02X}", sensor_handle_));
     return false;
   }
+  health_.set_identity(
+      fmt::format("{}{}tools at port handles {}", version_, version_.empty() ? "" : "; ", list_of(enabled_)));
   tell_notice();
   return true;
 }

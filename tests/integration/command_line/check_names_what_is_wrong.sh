@@ -49,6 +49,29 @@ sed 's/^lock_memory = true/lock_memory = false/' "$scratch/locked.toml" >"$scrat
 "$perimap" check "$scratch/nothing.toml" >"$scratch/out" 2>"$scratch/error" || fail "nothing asked for ended with $?"
 [ ! -s "$scratch/error" ] || fail "nothing was asked for, but: $(cat "$scratch/error")"
 
+# A calibration of something else is refused in one line; an old one is warned of.
+cat >"$scratch/tracker.toml" <<'END'
+version = 1
+[tracker]
+protocol = "ndi"
+port = "tcp:127.0.0.1:8765"
+sensor = "0B"
+position_deviation_mm = 0.3
+hand_eye_translation_SC_mm = [0, 0, 200]
+hand_eye_date = "2020-02-29"
+hand_eye_sensor = "0B"
+[realtime]
+lock_memory = false
+END
+"$perimap" check "$scratch/tracker.toml" >"$scratch/out" 2>"$scratch/error" || fail "an old hand-eye ended with $?"
+grep -q '^perimap check: warning: tracker.hand_eye_date: the hand-eye of 2020-02-29 is .* days old' "$scratch/error" ||
+  fail "$(cat "$scratch/error")"
+sed 's/^sensor = "0B"/sensor = "0A"/' "$scratch/tracker.toml" >"$scratch/other.toml"
+"$perimap" check "$scratch/other.toml" >"$scratch/out" 2>"$scratch/error"
+[ $? -eq 2 ] || fail "a hand-eye of another sensor must end with 2"
+[ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line: $(cat "$scratch/error")"
+grep -q "other.toml: key 'tracker.hand_eye_sensor': .*perimap calibrate hand-eye" "$scratch/error" || fail "$(cat "$scratch/error")"
+
 printf 'version = 1\n[phase]\nlaw = 3\n' >"$scratch/wrong.toml"
 "$perimap" check "$scratch/wrong.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "a wrong configuration must end with 2"

@@ -52,6 +52,28 @@ TEST(Theatre, APlaceHasAUnitQuaternion) {
               HasSubstr("--ndi-reference: expected a rotation W X Y Z of norm 1"));
 }
 
+TEST(EmulatedTool, IsReadWithItsMotion) {
+  EXPECT_EQ(parse_emulated_tool("0C=sway").value().motion, EmulatedTool::Motion::kSwaying);
+  EXPECT_EQ(parse_emulated_tool("0C=pivot").value().tip_O_mm, Vector3d(0, 0, 150));
+  EXPECT_EQ(parse_emulated_tool("Pointer 2=pivot:-1.5,2,3e1").value().tip_O_mm, Vector3d(-1.5, 2, 30));
+  const auto still = parse_emulated_tool("0B=still:1,2,3,0,0,1,0");
+  ASSERT_TRUE(still) << still.error().message;
+  EXPECT_EQ(still->place.t, Vector3d(1, 2, 3));
+  EXPECT_EQ(port_handle_of("0C").value(), 0x0C);
+}
+
+TEST(EmulatedTool, WhatIsNoneIsRefusedByName) {
+  for (const char* text :
+       {"", "=", "0C", "=sway", "0C=", "0C=swaying", "0C=pivot:", "0C=pivot:1,2", "0C=pivot:1,2,3,4", "0C=pivot:1,2,x",
+        "0C=pivot:1,2,inf", "0C=still", "0C=still:1,2,3", "0C=still:0,0,0,1,1,0,0", "0C=/nowhere/poses.csv",
+        "a name of more than 20=sway", "0C=pivot:1,,3", "0C=pivot:1,2,3,"}) {
+    const auto tool = parse_emulated_tool(text);
+    ASSERT_FALSE(tool) << text;
+    EXPECT_THAT(tool.error().message, HasSubstr("--tool")) << text;
+  }
+  for (const char* handle : {"", "0x", "G1", "100", "-1", " 1"}) EXPECT_FALSE(port_handle_of(handle)) << handle;
+}
+
 TEST(Theatre, WhatIsNoRecordingIsNotPlayed) {
   TheatreSettings settings;
   settings.recording = "/nowhere/heart.mcap";
