@@ -4,7 +4,9 @@
 #include <variant>
 
 #include "drivers/recording/channels.hpp"
+#include "drivers/recording/recording_reader.hpp"
 #include "drivers/recording/replay_reader.hpp"
+#include "drivers/recording/sensor_messages.hpp"
 
 namespace perimap {
 
@@ -31,7 +33,37 @@ Expected<PlayedSession> PlayedSession::read(const std::string& path) {
     if (const auto* block = std::get_if<RespirationBlock>(&**event)) played.respiration_.push_back(*block);
   }
   if (played.tracker_.empty() || played.ecg_.empty()) return fail(path + ": holds no poses or no ECG");
+  if (auto tools = played.read_tools(path); !tools) return tl::unexpected(std::move(tools.error()));
   return played;
+}
+
+Expected<void> PlayedSession::read_tools(const std::string& path) {
+  auto reader = RecordingReader::open(path);
+  if (!reader) return tl::unexpected(std::move(reader.error()));
+  for (const RecordedChannel& channel : reader->channels()) {
+    if (!channel.name.starts_with(channels::kTrackedTools) || channel.name == channels::kTrackerPose) continue;
+    if (channel.type != topic_type<perimap_TrackerPose>().schema_name()) continue;
+    const std::string name = channel.name.substr(channels::kTrackedTools.size());
+    if (name != "reference") tools_.emplace_back(name, std::vector<TrackerSample>());
+  }
+  for (auto& [name, samples] : tools_) {
+    const std::string channel = std::string(channels::kTrackedTools) + name;
+    const std::string_view wanted[] = {channel};
+    if (auto selected = reader->select(wanted); !selected) return selected;
+    for (;;) {
+      const auto message = reader->next();
+      if (!message) return tl::unexpected(message.error());
+      if (!*message) break;
+      const auto pose = reader->decode<perimap_TrackerPose>(**message);
+      if (!pose) return tl::unexpected(pose.error());
+      const auto sample = to_tracker_sample(**pose);
+      if (!sample) return reader->wrong(**message, sample.error().message);
+      // A track is in order of time.
+      if (samples.empty() || sample->source_time > samples.back().source_time) samples.push_back(*sample);
+    }
+  }
+  std::erase_if(tools_, [](const auto& tool) { return tool.second.empty(); });
+  return {};
 }
 
 PlayedSession PlayedSession::of(const Simulation& simulation, const TrackerNoise& noise) {
@@ -47,6 +79,14 @@ PlayedSession PlayedSession::of(const Simulation& simulation, const TrackerNoise
 
 PoseTrack PlayedSession::poses(Instant start) const {
   return PoseTrack::of_samples(start + (tracker_.front().source_time - first_arrival_), tracker_);
+}
+
+std::vector<std::pair<std::string, PoseTrack>> PlayedSession::tools(Instant start) const {
+  std::vector<std::pair<std::string, PoseTrack>> tracks;
+  for (const auto& [name, samples] : tools_) {
+    tracks.emplace_back(name, PoseTrack::of_samples(start + (samples.front().source_time - first_arrival_), samples));
+  }
+  return tracks;
 }
 
 EcgDeviceSignals PlayedSession::ecg_device(Instant start) const {

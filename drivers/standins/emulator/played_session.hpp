@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/error/expected.hpp"
@@ -22,12 +23,18 @@ class PlayedSession {
   [[nodiscard]] static PlayedSession of(const Simulation& simulation, const TrackerNoise& noise);
 
   [[nodiscard]] PoseTrack poses(Instant start) const;
+  // Of the other tools that the recording has, by their channels' names below channels::kTrackedTools: "pointer",
+  // "instrument/0D". They are in the frame that poses() is in, and the reference, whose frame that may be, is left out.
+  [[nodiscard]] std::vector<std::pair<std::string, PoseTrack>> tools(Instant start) const;
   // With respiration where there is such a channel.
   [[nodiscard]] EcgDeviceSignals ecg_device(Instant start) const;
 
  private:
+  [[nodiscard]] Expected<void> read_tools(const std::string& path);
+
   Instant first_arrival_{};
   std::vector<TrackerSample> tracker_;
+  std::vector<std::pair<std::string, std::vector<TrackerSample>>> tools_;  // those with readings
   std::vector<EcgBlock> ecg_;
   std::vector<RespirationBlock> respiration_;
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <variant>
@@ -67,21 +68,48 @@ Expected<std::unique_ptr<PlayedFrames>> Theatre::frames() const {
   });
 }
 
+// A recorded pointer is in the third port, where the example of the guide has it, and an instrument where its name
+// says.
+Expected<NdiEmulatorSettings> Theatre::ndi_settings() const {
+  constexpr std::uint16_t kPointerPort = 0x0C;
+  constexpr std::string_view kInstrument = "instrument/";
+  NdiEmulatorSettings ndi = settings_.ndi;
+  for (const EmulatedTool& tool : settings_.tools) {
+    const auto handle = port_handle_of(tool.name);
+    if (!handle) return tl::unexpected(handle.error());
+    ndi.tools.insert_or_assign(*handle, track_of(tool, start_));
+  }
+  if (!session_) return ndi;
+  for (auto& [name, track] : session_->tools(start_)) {
+    Expected<std::uint16_t> handle = fail("no port");
+    if (name == "pointer") handle = kPointerPort;
+    if (name.starts_with(kInstrument)) handle = port_handle_of(name.substr(kInstrument.size()));
+    if (handle) ndi.tools.try_emplace(*handle, std::move(track));  // a tool that was asked for comes first
+  }
+  return ndi;
+}
+
+// Recorded tools have the names of their channels: "pointer", and an instrument its own.
+IgtlEmulatorSettings Theatre::igtl_settings() const {
+  IgtlEmulatorSettings igtl = settings_.igtl;
+  for (const EmulatedTool& tool : settings_.tools) igtl.others.emplace_back(tool.name, track_of(tool, start_));
+  if (!session_) return igtl;
+  for (auto& [name, track] : session_->tools(start_)) {
+    const std::string own = name.substr(name.rfind('/') + 1);
+    const bool asked =
+        std::any_of(igtl.others.begin(), igtl.others.end(), [&](const auto& t) { return t.first == own; });
+    if (!asked) igtl.others.emplace_back(own, std::move(track));
+  }
+  return igtl;
+}
+
 Expected<std::unique_ptr<DeviceProtocol>> Theatre::protocol_of(const EmulatedDevice& device) const {
   if (device.name == "ndi") {
-    NdiEmulatorSettings ndi = settings_.ndi;
-    for (const EmulatedTool& tool : settings_.tools) {
-      const auto handle = port_handle_of(tool.name);
-      if (!handle) return tl::unexpected(handle.error());
-      ndi.tools.emplace(*handle, track_of(tool, start_));
-    }
-    return std::make_unique<NdiEmulator>(poses(), ndi, settings_.faults);
+    return ndi_settings().map([&](const NdiEmulatorSettings& ndi) -> std::unique_ptr<DeviceProtocol> {
+      return std::make_unique<NdiEmulator>(poses(), ndi, settings_.faults);
+    });
   }
-  if (device.name == "igtl") {
-    IgtlEmulatorSettings igtl = settings_.igtl;
-    for (const EmulatedTool& tool : settings_.tools) igtl.others.emplace_back(tool.name, track_of(tool, start_));
-    return std::make_unique<IgtlEmulator>(poses(), igtl, settings_.faults);
-  }
+  if (device.name == "igtl") return std::make_unique<IgtlEmulator>(poses(), igtl_settings(), settings_.faults);
   auto ecg = ecg_device();
   if (!ecg) return tl::unexpected(std::move(ecg.error()));
   if (device.name == "medlab") return emulate_medlab(std::move(*ecg), settings_.faults);

@@ -60,6 +60,8 @@ class Theatre {
  private:
   explicit Theatre(TheatreSettings settings) : settings_(std::move(settings)) {}
   [[nodiscard]] PoseTrack poses() const;
+  [[nodiscard]] Expected<NdiEmulatorSettings> ndi_settings() const;
+  [[nodiscard]] IgtlEmulatorSettings igtl_settings() const;
   [[nodiscard]] Expected<EcgDeviceSignals> ecg_device() const;
   [[nodiscard]] Expected<std::unique_ptr<PlayedFrames>> frames() const;
   [[nodiscard]] Expected<std::unique_ptr<DeviceProtocol>> protocol_of(const EmulatedDevice& device) const;

@@ -19,6 +19,7 @@
 #include "daemon/runtime/replay_feeder.hpp"
 #include "daemon/runtime/session_recording.hpp"
 #include "drivers/recording/replay_reader.hpp"
+#include "drivers/standins/emulator/played_session.hpp"
 #include "tests/unit/camera/made_jpeg.hpp"
 #include "wait_until.hpp"
 
@@ -126,6 +127,7 @@ TEST_F(SessionRecording, OtherToolsHaveChannelsOfTheirOwnThatAReplayPassesOver) 
     ASSERT_TRUE(session) << session.error().message;
     (*session)->start(threads);
     (*session)->frame(frame(1, MonotonicClock::now()));
+    (*session)->ecg(block(1, MonotonicClock::now()));
     for (std::uint32_t i = 1; i <= 10; ++i) {
       const Instant now = MonotonicClock::now();
       ToolSample tool;
@@ -136,7 +138,7 @@ TEST_F(SessionRecording, OtherToolsHaveChannelsOfTheirOwnThatAReplayPassesOver) 
     }
     (*session)->stop();
     EXPECT_EQ((*session)->reason(), "");
-    EXPECT_EQ((*session)->summary().recorded, 31U);
+    EXPECT_EQ((*session)->summary().recorded, 32U);
   }
   const Counts counts = read(file_);
   EXPECT_EQ(counts.poses, 10);
@@ -154,6 +156,14 @@ TEST_F(SessionRecording, OtherToolsHaveChannelsOfTheirOwnThatAReplayPassesOver) 
     EXPECT_EQ((*told)->error_mm, 0.25);
   }
   EXPECT_EQ(count, 10U);
+
+  // An emulated tracker plays them again, but for the reference, whose frame the others may be in.
+  const auto played = PlayedSession::read(file_.string());
+  ASSERT_TRUE(played) << played.error().message;
+  const auto tools = played->tools(Instant(std::chrono::seconds(1)));
+  ASSERT_EQ(tools.size(), 1U);
+  EXPECT_EQ(tools.front().first, "pointer");
+  EXPECT_EQ(tools.front().second.size(), 10U);
 }
 
 TEST_F(SessionRecording, OfThreeThreadsReplaysInOrderOfArrival) {
