@@ -18,11 +18,13 @@
   COMMAND(track)                  \
   COMMAND(judge)                  \
   COMMAND(emulate)                \
+  COMMAND(setup)                  \
   COMMAND(probe)                  \
   COMMAND(record)                 \
   COMMAND(check)                  \
   COMMAND(calibrate)              \
   COMMAND(register)               \
+  COMMAND(verify)                 \
   COMMAND(ctl)
 
 namespace perimap {

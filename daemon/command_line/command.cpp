@@ -88,6 +88,9 @@ template Option* Command::add_option_function(const std::string&, const std::fun
 template Option* Command::add_option_function(const std::string&,
                                               const std::function<void(const std::vector<double>&)>&,
                                               const std::string&);
+template Option* Command::add_option_function(const std::string&,
+                                              const std::function<void(const std::vector<std::string>&)>&,
+                                              const std::string&);
 
 Command& Command::add_option_group(const std::string& name) {
   return *groups_.emplace_back(std::make_unique<Command>(*app_.add_option_group(name)));

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "daemon/setup/board_markers.hpp"
+#include "daemon/setup/marker_dictionary.hpp"
 
 namespace perimap {
 namespace {
@@ -184,6 +185,33 @@ Points marker_points(const cv::Mat& grey, const Board& board) {
   return points;
 }
 
+// Grey level in the middle of the square to the right of and below a corner.
+double level_of_square(const cv::Mat& grey, const std::vector<cv::Point2f>& corners, int columns, int x, int y) {
+  const auto at = [&](int i, int j) { return corners[static_cast<std::size_t>(j * columns + i)]; };
+  const cv::Point2f middle = 0.25F * (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1));
+  const cv::Rect around(static_cast<int>(middle.x) - 1, static_cast<int>(middle.y) - 1, 3, 3);
+  const cv::Rect seen = around & cv::Rect(0, 0, grey.cols, grey.rows);
+  return seen.empty() ? 0.0 : cv::mean(grey(seen))[0];
+}
+
+// A chessboard turned by half a turn looks alike but for its colours, where it has an odd number of corners one way and
+// an even one the other: then the first square is the black one. Other boards have no first corner; theirs is as found.
+void put_black_first(const cv::Mat& grey, const Board& board, std::vector<cv::Point2f>& corners) {
+  if (board.columns % 2 == board.rows % 2) return;
+  double even = 0.0;
+  double odd = 0.0;
+  for (int y = 0; y + 1 < board.rows; ++y) {
+    for (int x = 0; x + 1 < board.columns; ++x) {
+      ((x + y) % 2 == 0 ? even : odd) += level_of_square(grey, corners, board.columns, x, y);
+    }
+  }
+  // As many of each kind, or one more of those that the first is of: an average square's level decides.
+  const int squares = (board.columns - 1) * (board.rows - 1);
+  const double of_even = even / ((squares + 1) / 2);
+  const double of_odd = odd / std::max(1, squares / 2);
+  if (of_even > of_odd) std::reverse(corners.begin(), corners.end());
+}
+
 Points grid_points(const cv::Mat& grey, const Board& board) {
   Points points;
   const cv::Size size(board.columns, board.rows);
@@ -197,6 +225,7 @@ Points grid_points(const cv::Mat& grey, const Board& board) {
           cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
       if (found) refine(grey, points.first);
     }
+    if (found) put_black_first(grey, board, points.first);
   } else {
     found = find_circles(grey, board, points.first);
   }
@@ -237,9 +266,8 @@ std::string name_of(const Board& board) {
 Expected<Board> recognise_board(const std::vector<GreyImage>& pictures, const BoardWish& wish) {
   // A few tell it, from all over the series.
   constexpr std::size_t kMostLooked = 8;
-  const std::vector<std::string> names = dictionary_names();
-  if (!wish.dictionary.empty() && std::find(names.begin(), names.end(), wish.dictionary) == names.end()) {
-    return fail(fmt::format("--dictionary: '{}' is not one of {}", wish.dictionary, fmt::join(names, ", ")));
+  if (!wish.dictionary.empty()) {
+    if (const auto known = dictionary_named(wish.dictionary); !known) return tl::unexpected(known.error());
   }
   std::vector<cv::Mat> looked;
   const std::size_t count = std::min(kMostLooked, pictures.size());

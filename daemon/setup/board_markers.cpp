@@ -11,53 +11,14 @@
 #include <opencv2/calib3d.hpp>
 #include <utility>
 
+#include "daemon/setup/marker_dictionary.hpp"
+
 namespace perimap {
 namespace {
 
 constexpr int kLargestBoard = 60;  // squares a side that are tried
 
-struct DictionaryName {
-  const char* name;
-  cv::aruco::PREDEFINED_DICTIONARY_NAME id;
-};
-constexpr std::array<DictionaryName, 21> kDictionaries{{
-    {"4X4_50", cv::aruco::DICT_4X4_50},
-    {"4X4_100", cv::aruco::DICT_4X4_100},
-    {"4X4_250", cv::aruco::DICT_4X4_250},
-    {"4X4_1000", cv::aruco::DICT_4X4_1000},
-    {"5X5_50", cv::aruco::DICT_5X5_50},
-    {"5X5_100", cv::aruco::DICT_5X5_100},
-    {"5X5_250", cv::aruco::DICT_5X5_250},
-    {"5X5_1000", cv::aruco::DICT_5X5_1000},
-    {"6X6_50", cv::aruco::DICT_6X6_50},
-    {"6X6_100", cv::aruco::DICT_6X6_100},
-    {"6X6_250", cv::aruco::DICT_6X6_250},
-    {"6X6_1000", cv::aruco::DICT_6X6_1000},
-    {"7X7_50", cv::aruco::DICT_7X7_50},
-    {"7X7_100", cv::aruco::DICT_7X7_100},
-    {"7X7_250", cv::aruco::DICT_7X7_250},
-    {"7X7_1000", cv::aruco::DICT_7X7_1000},
-    {"ARUCO_ORIGINAL", cv::aruco::DICT_ARUCO_ORIGINAL},
-    {"APRILTAG_16h5", cv::aruco::DICT_APRILTAG_16h5},
-    {"APRILTAG_25h9", cv::aruco::DICT_APRILTAG_25h9},
-    {"APRILTAG_36h10", cv::aruco::DICT_APRILTAG_36h10},
-    {"APRILTAG_36h11", cv::aruco::DICT_APRILTAG_36h11},
-}};
-
 }  // namespace
-
-const char* dictionary_name(int id) {
-  for (const DictionaryName& dictionary : kDictionaries) {
-    if (dictionary.id == id) return dictionary.name;
-  }
-  return "?";
-}
-
-std::vector<std::string> dictionary_names() {
-  std::vector<std::string> names;
-  for (const DictionaryName& dictionary : kDictionaries) names.emplace_back(dictionary.name);
-  return names;
-}
 
 Markers markers_in(const cv::Mat& grey, int dictionary) {
   Markers markers;
@@ -110,6 +71,20 @@ Markers patch_of(const Markers& markers) {
   return patch;
 }
 
+// Whether a marker stands in the layout as the plane image H of the layout has it: its own sides along rows and
+// columns. A layout of another width fits many middles as well, and lies askew.
+bool is_upright(const cv::Mat& H, const cv::Point2f& cell, const std::vector<cv::Point2f>& corners) {
+  std::vector<cv::Point2f> ends{cell - cv::Point2f(0.3F, 0.0F), cell + cv::Point2f(0.3F, 0.0F),
+                                cell - cv::Point2f(0.0F, 0.3F), cell + cv::Point2f(0.0F, 0.3F)};
+  cv::perspectiveTransform(ends, ends, H);
+  const auto cosine = [](const cv::Point2f& a, const cv::Point2f& b) {
+    return a.dot(b) / std::max(1e-9, cv::norm(a) * cv::norm(b));
+  };
+  constexpr double kAlike = 0.95;
+  return cosine(ends[1] - ends[0], corners[1] - corners[0]) > kAlike &&
+         cosine(ends[3] - ends[2], corners[3] - corners[0]) > kAlike;
+}
+
 // RMS distance, in markers' sides, of the markers' middles from a plane image of the layout, of those that fit it;
 // infinite when fewer than three quarters do, or it is a mirror image.
 double misfit_of(const Markers& markers, int columns, Layout layout) {
@@ -132,7 +107,7 @@ double misfit_of(const Markers& markers, int columns, Layout layout) {
   double count = 0.0;
   for (std::size_t i = 0; i < mapped.size(); ++i) {
     const double d = cv::norm(mapped[i] - image[i]) / side;
-    if (d <= kNear) squares += d * d, count += 1.0;
+    if (d <= kNear && is_upright(H, board[i], markers.corners[i])) squares += d * d, count += 1.0;
   }
   if (count < 0.75 * static_cast<double>(mapped.size())) return kNone;
   return std::sqrt(squares / count);
@@ -200,7 +175,7 @@ std::optional<std::pair<int, std::vector<Markers>>> most_markers(const std::vect
                                                                  const BoardWish& wish) {
   std::optional<std::pair<int, std::vector<Markers>>> best;
   std::size_t most = 0;
-  for (const DictionaryName& dictionary : kDictionaries) {
+  for (const MarkerDictionary& dictionary : marker_dictionaries()) {
     const std::string name = dictionary.name;
     if (!wish.dictionary.empty() ? name != wish.dictionary
                                  : name.ends_with("_50") || name.ends_with("_100") || name.ends_with("_250")) {
@@ -228,7 +203,7 @@ int smallest_dictionary(int dictionary, int largest_id) {
   const std::string prefix = family.substr(0, family.find('_') + 1);
   for (const int size : {50, 100, 250}) {
     if (largest_id >= size) continue;
-    for (const DictionaryName& one : kDictionaries) {
+    for (const MarkerDictionary& one : marker_dictionaries()) {
       if (one.name == prefix + std::to_string(size)) return one.id;
     }
   }

@@ -28,12 +28,6 @@ enum class Layout { kCharucoBlackFirst, kCharucoWhiteFirst, kGridDown, kGridUp }
 
 [[nodiscard]] Cell cell_of(int id, int columns, Layout layout);
 
-// "4X4_250"; "?" for a number that is none of OpenCV's.
-[[nodiscard]] const char* dictionary_name(int id);
-
-// All that there are.
-[[nodiscard]] std::vector<std::string> dictionary_names();
-
 // The board whose markers most of the pictures show; none when none shows six that fit a layout.
 [[nodiscard]] std::optional<Board> recognise_markers(const std::vector<cv::Mat>& pictures, const BoardWish& wish);
 

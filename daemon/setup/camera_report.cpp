@@ -32,6 +32,15 @@ double rms_deviation(const CameraCalibration& result) {
   return result.rms_px * std::sqrt(result.variance_factor / (2.0 * coordinates));
 }
 
+// The first few, and how many more there are.
+std::string some_of(const char* what, const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 5;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMost, names.size()); ++i) text += fmt::format("  {}: {}\n", what, names[i]);
+  if (names.size() > kMost) text += fmt::format("  {}: {} more\n", what, names.size() - kMost);
+  return text;
+}
+
 }  // namespace
 
 std::string text_of(const CameraCalibration& result, const Board& board, const std::vector<std::string>& without) {
@@ -41,6 +50,17 @@ std::string text_of(const CameraCalibration& result, const Board& board, const s
       fmt::format("Lens of {}x{} pictures, by {} views of a {}\n", c.width, c.height, used_of(result), name_of(board));
   text += fmt::format("  focal length     {:.2f} {:.2f} px, deviations {:.2f} {:.2f}\n", c.fx, c.fy, s[0], s[1]);
   text += fmt::format("  principal point  {:.2f} {:.2f} px, deviations {:.2f} {:.2f}\n", c.cx, c.cy, s[2], s[3]);
+  // 95 % of two normal axes lie within 2.45 deviations.
+  constexpr double kWanted_px = 2.0 / 2.45;
+  const double centre_px = std::sqrt(0.5 * (s[2] * s[2] + s[3] * s[3]));
+  if (centre_px > kWanted_px) {
+    const double ratio = centre_px / kWanted_px;
+    text += fmt::format(
+        "                   within {:.1f} px (95 %): some {:.0f} views more of this kind, tilted and turned, would "
+        "make it "
+        "2 px\n",
+        2.45 * centre_px, std::ceil((ratio * ratio - 1.0) * static_cast<double>(used_of(result))));
+  }
   text += fmt::format("  distortion       {} {:.5f}, deviations {:.5f}\n",
                       c.lens == Lens::kKannalaBrandt ? "k1 k2 k3 k4" : "k1 k2 p1 p2 k3",
                       fmt::join(distortion_of(c), " "), fmt::join(distortion_deviations_of(result), " "));
@@ -61,11 +81,11 @@ std::string text_of(const CameraCalibration& result, const Board& board, const s
   if (std::any_of(result.coverage.begin(), result.coverage.end(), [](int n) { return n == 0; })) {
     text += "  where there are none the distortion is only guessed: show the board there too\n";
   }
+  std::vector<std::string> unfitted;
   for (const ViewResult& view : result.views) {
-    if (!view.used) text += fmt::format("  not fitted: {}\n", view.name);
+    if (!view.used) unfitted.push_back(view.name);
   }
-  for (const std::string& name : without) text += fmt::format("  no board: {}\n", name);
-  return text;
+  return text + some_of("not fitted", unfitted) + some_of("no board", without);
 }
 
 nlohmann::json json_of(const CameraCalibration& result, const Board& board, const std::vector<std::string>& without) {

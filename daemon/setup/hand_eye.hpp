@@ -33,9 +33,11 @@ struct HandEyeCalibration {
       covariance;             // as HandEyeAdjustment has it, for errors that last `correlation_length` poses
   Matrix6d error_covariance;  // of one pose, at the sensor
   double correlation_length = 1.0;
-  bool offset_measured = false;    // false: there is no motion with times of its own to measure it by
-  double offset_s = 0.0;           // added to the tracker's times to get the camera's
-  double joint_offset_s = 0.0;     // what the adjustment together with the places would have it, all errors being noise
+  bool offset_measured = false;  // false: there is no motion with times of its own to measure it by
+  double offset_s = 0.0;         // added to the tracker's times to get the camera's
+  double joint_offset_s = 0.0;   // what the adjustment together with the places would have it, all errors being noise
+  // RMS of the camera's angular speed less its mean over half a second: what tells time from errors that last.
+  double brisk_rad_per_s = 0.0;
   bool paired_by_rows = false;     // the times of the two files say nothing of which pose belongs to which
   double speed_correlation = 0.0;  // of the angular speeds, at
   double speed_offset_s = 0.0;     // the offset that they alone tell
@@ -51,6 +53,11 @@ struct HandEyeCalibration {
   double held_aside_rms_mm = 0.0;  // each fifth of the time about what the others tell
   double held_aside_rms_deg = 0.0;
   std::vector<OtherHandEye> others;
+
+  // Whether something moved fast enough for the offset's deviation to be trusted; the errors of a lens, or of a board
+  // seen from one side, last, and without fast motion they pass for time.
+  static constexpr double kLeastBrisk_rad_per_s = 0.2;
+  [[nodiscard]] bool is_brisk() const { return brisk_rad_per_s >= kLeastBrisk_rad_per_s; }
 };
 
 // X_WS of the tracker and X_BC of the camera, each with times of its own clock, in any order. Fails, and says what is

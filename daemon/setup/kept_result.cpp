@@ -109,11 +109,12 @@ std::string with_keys(std::string_view text, std::string_view section, const std
 }
 
 Expected<void> set_keys(const std::filesystem::path& file, std::string_view section,
-                        const std::vector<MeasuredKey>& keys, std::string_view comment) {
+                        const std::vector<MeasuredKey>& keys, std::string_view comment, bool files_may_be_missing) {
   const auto text = read_text_file(file, kLargestConfiguration, "configuration");
   if (!text) return tl::unexpected(text.error());
   const std::string changed = with_keys(*text, section, keys, comment);
-  if (const auto sound = parse_configuration(changed, file); !sound) return tl::unexpected(sound.error());
+  const NamedFiles named = files_may_be_missing ? NamedFiles::kMayBeMissing : NamedFiles::kMustExist;
+  if (const auto sound = parse_configuration(changed, file, {}, named); !sound) return tl::unexpected(sound.error());
   return write_kept(file, changed);
 }
 

@@ -27,7 +27,8 @@ struct MeasuredKey {
 
 // Sets the keys in the configuration file, when the result is a sound configuration; write_kept() writes it.
 [[nodiscard]] Expected<void> set_keys(const std::filesystem::path& file, std::string_view section,
-                                      const std::vector<MeasuredKey>& keys, std::string_view comment);
+                                      const std::vector<MeasuredKey>& keys, std::string_view comment,
+                                      bool files_may_be_missing = false);
 
 // 2026-11-25 18:30 UTC
 [[nodiscard]] std::string date_now();

@@ -54,6 +54,34 @@ QuaternionFigures quaternion_figures(const Matrix3d& R, const Matrix3d& covarian
   return figures;
 }
 
+std::string offset_text_of(const HandEyeCalibration& result) {
+  std::string text =
+      fmt::format("  time offset    {:.2f} ms, deviation {:.2f}: added to the tracker's times to get the camera's\n",
+                  1e3 * result.offset_s, 1e3 * std::sqrt(result.covariance(6, 6)));
+  text += fmt::format("                 {:.2f} ms by the angular speeds alone, which correlate by {:.3f}\n",
+                      1e3 * result.speed_offset_s, result.speed_correlation);
+  text +=
+      fmt::format("                 {:.2f} ms if no error lasted longer than a pose\n", 1e3 * result.joint_offset_s);
+  if (!result.is_brisk()) {
+    text += fmt::format(
+        "                 may be wrong by more than it says: nothing moved briskly ({:.2f} rad/s within half a second, "
+        "{:g} and more are needed), and what is wrong with the lens then passes for time; swing the scope briskly now "
+        "and then, and record again\n",
+        result.brisk_rad_per_s, HandEyeCalibration::kLeastBrisk_rad_per_s);
+  }
+  return text;
+}
+
+nlohmann::json offset_json_of(const HandEyeCalibration& result) {
+  return {{"time_offset_ms", 1e3 * result.offset_s},
+          {"time_offset_ms_deviation", 1e3 * std::sqrt(result.covariance(6, 6))},
+          {"joint_time_offset_ms", 1e3 * result.joint_offset_s},
+          {"speed_time_offset_ms", 1e3 * result.speed_offset_s},
+          {"speed_correlation", result.speed_correlation},
+          {"brisk_rad_per_s", result.brisk_rad_per_s},
+          {"brisk", result.is_brisk()}};
+}
+
 std::string text_of(const HandEyeCalibration& result) {
   const QuaternionFigures q = quaternion_figures(result.X_SC.R, result.covariance.topLeftCorner<3, 3>());
   const Eigen::Matrix<double, 7, 1> deviation = result.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -64,13 +92,7 @@ std::string text_of(const HandEyeCalibration& result) {
   text += fmt::format("  rotation       {:.6f} (w x y z), deviations {} degrees about the camera's axes\n",
                       fmt::join(q.wxyz, " "), three(deviation.head<3>() / kDegree, 3));
   if (result.offset_measured) {
-    text +=
-        fmt::format("  time offset    {:.2f} ms, deviation {:.2f}: added to the tracker's times to get the camera's\n",
-                    1e3 * result.offset_s, 1e3 * deviation[6]);
-    text += fmt::format("                 {:.2f} ms by the angular speeds alone, which correlate by {:.3f}\n",
-                        1e3 * result.speed_offset_s, result.speed_correlation);
-    text +=
-        fmt::format("                 {:.2f} ms if no error lasted longer than a pose\n", 1e3 * result.joint_offset_s);
+    text += offset_text_of(result);
   } else if (result.paired_by_rows) {
     text += "  time offset    not measured: the times of the two files say nothing, and poses were paired row by row\n";
   } else {
@@ -122,11 +144,7 @@ nlohmann::json json_of(const HandEyeCalibration& result) {
       {"paired_by_rows", result.paired_by_rows},
       {"correlation_length", result.correlation_length}};
   if (result.offset_measured) {
-    json["time_offset_ms"] = 1e3 * result.offset_s;
-    json["time_offset_ms_deviation"] = 1e3 * deviation[6];
-    json["joint_time_offset_ms"] = 1e3 * result.joint_offset_s;
-    json["speed_time_offset_ms"] = 1e3 * result.speed_offset_s;
-    json["speed_correlation"] = result.speed_correlation;
+    json.update(offset_json_of(result));
   }
   const QuaternionFigures board = quaternion_figures(result.X_WB.R, Matrix3d::Zero());
   json["board_translation_WB_mm"] = list(result.X_WB.t);

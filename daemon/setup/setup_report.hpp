@@ -29,6 +29,9 @@ struct TargetError {
 };
 
 [[nodiscard]] std::string text_of(const HandEyeCalibration& result);
+// Of a hand-eye calibration what it says of the clocks alone.
+[[nodiscard]] std::string offset_text_of(const HandEyeCalibration& result);
+[[nodiscard]] nlohmann::json offset_json_of(const HandEyeCalibration& result);
 [[nodiscard]] std::string text_of(const SignalOffset& result);
 [[nodiscard]] std::string text_of(const PivotCalibration& result);
 [[nodiscard]] std::string text_of(const MeasuredNoise& result);

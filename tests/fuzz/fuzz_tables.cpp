@@ -1,10 +1,11 @@
-// Any bytes as a table of poses, of a signal, of points: an error of one line, or finite numbers.
+// Any bytes as a table of poses, of a signal, of points, as a tool's tip: an error of one line, or finite numbers.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
+#include "drivers/calibration/tool_tip.hpp"
 #include "drivers/pose_file/point_table.hpp"
 #include "drivers/pose_file/pose_table.hpp"
 
@@ -29,6 +30,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (const auto signal = parse_signal_table(text, "fuzz.csv"); !signal) check_error(signal.error());
   if (const auto points = parse_point_table(text, "fuzz.csv", LengthUnit::kMillimetre); !points) {
     check_error(points.error());
+  }
+  if (const auto tip = parse_tool_tip(text, "fuzz.json"); !tip) {
+    check_error(tip.error());
+  } else if (!tip->tip_T.allFinite() || !tip->covariance_T.allFinite()) {
+    std::abort();
   }
   return 0;
 }

@@ -44,7 +44,10 @@ Outcome finish(const Expected<Measurement>& measured, const CommonOptions& optio
   // First what may still be refused: no file is changed then.
   if (!options.configuration.empty()) {
     const std::string comment = fmt::format("measured {} from {}", date, made_from);
-    if (const auto set = set_keys(options.configuration, measured->section, measured->keys, comment); !set) {
+    // The calibration file that the section of the camera names is written next.
+    const bool files_may_be_missing = !measured->file.empty();
+    const auto set = set_keys(options.configuration, measured->section, measured->keys, comment, files_may_be_missing);
+    if (!set) {
       return refuse(set.error());
     }
   }
@@ -53,7 +56,10 @@ Outcome finish(const Expected<Measurement>& measured, const CommonOptions& optio
     if (const auto written = write_kept(options.output, text); !written) return refuse(written.error());
   }
   if (!options.html.empty()) {
-    const std::string page = setup_page(made_from, measured->text, measured->plots);
+    // The text's first line says what it is.
+    const std::string heading = measured->text.substr(0, measured->text.find('\n'));
+    const std::string text = fmt::format("measured {} from {}\n{}", date, made_from, measured->text);
+    const std::string page = setup_page(heading, text, measured->plots);
     if (const auto written = write_kept(options.html, page); !written) return refuse(written.error());
   }
   if (options.json) {

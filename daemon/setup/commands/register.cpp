@@ -7,10 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/dwells.hpp"
 #include "daemon/command_line/commands.hpp"
 #include "daemon/setup/commands/measurement.hpp"
+#include "daemon/setup/commands/recorded_options.hpp"
+#include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/setup_plots.hpp"
 #include "daemon/setup/setup_report.hpp"
+#include "drivers/calibration/tool_tip.hpp"
 #include "drivers/pose_file/point_table.hpp"
 
 namespace perimap {
@@ -20,14 +24,52 @@ struct Options {
   CommonOptions common;
   std::string model;
   std::string touched;
+  std::string recording;  // in place of `touched`
+  std::string tool = "pointer";
+  std::string tip;
+  double touch_s = 1.5;
+  double touch_radius_mm = 4.0;
   std::vector<std::vector<double>> targets;
   double tolerance_mm = 10.0;
+
+  [[nodiscard]] std::vector<std::string> inputs() const { return {model, recording.empty() ? touched : recording}; }
 };
+
+// Of each landmark of the model, in the order of the table, where the tip was held still.
+Expected<std::vector<NamedPoint>> touched_in_recording(const Options& options, const std::vector<NamedPoint>& model) {
+  if (options.tip.empty()) {
+    return fail("--tip: expected the file of the pointer's tip that perimap calibrate tool --output wrote");
+  }
+  const auto tip = read_tool_tip(options.tip);
+  if (!tip) return tl::unexpected(tip.error());
+  const auto poses = read_recorded_poses(options.recording, options.tool);
+  if (!poses) return tl::unexpected(poses.error());
+  std::vector<TimedPoint> points;
+  for (const TimedPose& pose : *poses) points.push_back({pose.t_s, pose.X * tip->tip_T});
+  const std::vector<Dwell> touches = find_dwells(points, options.touch_s, options.touch_radius_mm);
+  if (touches.size() != model.size()) {
+    std::string when;
+    for (const Dwell& touch : touches) {
+      when += fmt::format("{}{:.1f}", when.empty() ? " at " : ", ", touch.begin_s - points.front().t_s);
+    }
+    return fail(
+        fmt::format("{}: {} touches of {:g} s and more are found{} s, and {} has {} landmarks: touch each once, "
+                    "in the order of the table, hold the tip still for two seconds, and lift it in between",
+                    options.recording, touches.size(), options.touch_s, when, options.model, model.size()));
+  }
+  std::vector<NamedPoint> touched;
+  for (std::size_t i = 0; i < model.size(); ++i) touched.push_back({model[i].name, touches[i].p});
+  return touched;
+}
 
 Expected<std::vector<Landmark>> landmarks_of(const Options& options) {
   const auto model = read_point_table(options.model, options.common.length_unit());
   if (!model) return tl::unexpected(model.error());
-  const auto touched = read_point_table(options.touched, options.common.length_unit());
+  if (options.touched.empty() == options.recording.empty()) {
+    return fail("expected either touched landmarks with --touched or a recording of the touches with --from");
+  }
+  const auto touched = options.recording.empty() ? read_point_table(options.touched, options.common.length_unit())
+                                                 : touched_in_recording(options, *model);
   if (!touched) return tl::unexpected(touched.error());
   std::vector<Landmark> landmarks;
   for (const NamedPoint& point : *touched) {
@@ -66,12 +108,21 @@ void add_register_command(Commands& commands) {
   Command& command = commands.add(
       "register", "The place of the tracker's frame in the image's, by landmarks touched with a calibrated tool",
       [options](const Console&) -> Outcome {
-        const std::vector<std::string> inputs = {options->model, options->touched};
+        const std::vector<std::string> inputs = options->inputs();
         if (auto able = check_outputs(options->common, inputs); !able) return able;
         return finish(measure(*options), options->common, joined(inputs));
       });
   command.add_option("--model", options->model, "The landmarks in the image's frame: name,x,y,z")->required();
-  command.add_option("--touched", options->touched, "The same, as touched, in the tracker's frame")->required();
+  command.add_option("--touched", options->touched, "The same, as touched, in the tracker's frame");
+  add_from(command, options->recording);
+  command.add_option("--tip", options->tip, "With --from: the tip of the tool that touches, by perimap calibrate tool");
+  command.add_option("--tool", options->tool, "With --from: the tool that touches")->capture_default_str();
+  command.add_option("--touch-s", options->touch_s, "With --from: what is held still for so long is a touch")
+      ->check(Range(0.5, 60.0))
+      ->capture_default_str();
+  command.add_option("--touch-radius-mm", options->touch_radius_mm, "With --from: within this it is held still")
+      ->check(Range(0.1, 50.0))
+      ->capture_default_str();
   command
       .add_option_function<std::vector<double>>(
           "--target", [options](const std::vector<double>& target) { options->targets.push_back(target); },

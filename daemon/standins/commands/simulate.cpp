@@ -5,17 +5,24 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <numbers>
+#include <optional>
+#include <string>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/command_line/progress.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/standins/commands/simulation_options.hpp"
+#include "drivers/standins/session/bench_writer.hpp"
 #include "drivers/standins/session/session_writer.hpp"
 #include "drivers/standins/simulator/frame_renderer.hpp"
+#include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
 namespace {
@@ -27,7 +34,58 @@ struct Options {
   std::vector<double> tracker_noises_mm;
   unsigned threads = 0;
   bool force = false;
+  std::optional<BenchAct> act;  // none: the heart
+  std::string board = "charuco";
+  std::optional<double> notch_deg;
+  std::filesystem::path truth;
+  std::filesystem::path landmarks;
+
+  [[nodiscard]] unsigned thread_count() const {
+    return threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
+  }
 };
+
+// A4 paper takes either; a scope at 15 cm sees most of it.
+Expected<BoardPattern> board_of(const Options& options) {
+  constexpr int kDictionary4x4_100 = 1;
+  return options.board == "chessboard" ? chessboard_pattern(9, 6, 8.0)
+                                       : charuco_pattern(12, 9, 8.0, 6.0, kDictionary4x4_100);
+}
+
+Outcome check_new(const std::filesystem::path& path, const Options& options) {
+  if (options.force || !std::filesystem::exists(path)) return {};
+  return refuse(path.string() + ": the file exists; --force overwrites it", ExitCode::kWrongUsage);
+}
+
+Outcome simulate_bench(const Options& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  auto settings = options.simulation.bench(*options.act);
+  if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
+  auto board = board_of(options);
+  if (!board) return refuse(board.error(), ExitCode::kWrongUsage);
+  settings->board = *std::move(board);
+  if (options.notch_deg) settings->notch_rad = *options.notch_deg * std::numbers::pi / 180.0;
+  const auto scene = BenchScene::create(*settings);
+  if (!scene) return refuse(scene.error(), ExitCode::kWrongUsage);
+  if (auto is_new = check_new(options.out, options); !is_new) return is_new;
+  const TrackerNoise noise = options.simulation.noise();
+  {
+    Progress progress("frames", scene->frames().size());
+    const auto written = write_bench(*scene, options.out, noise, options.thread_count(),
+                                     [&](std::uint64_t frames) { progress.update(frames); });
+    if (!written) return refuse(written.error());
+  }
+  for (const auto& [path, text] : {std::pair(options.truth, true_setup_of(*scene, noise)),
+                                   std::pair(options.landmarks, landmark_table_of(*scene))}) {
+    if (path.empty()) continue;
+    if (const auto written = write_text_file(path, text); !written) return refuse(written.error());
+  }
+  const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  fmt::print("{}: {}, {} frames, {} poses each of scope and pointer, tracker noise {} mm, in {:.0f} s\n",
+             options.out.string(), scene->settings().board.name, scene->frames().size(), scene->reading_count(),
+             noise.position_rms_mm, elapsed_s);
+  return {};
+}
 
 std::vector<SimulatedRecording> planned(const Options& options) {
   if (options.tracker_noises_mm.empty()) return {{options.out, options.simulation.noise()}};
@@ -42,16 +100,15 @@ std::vector<SimulatedRecording> planned(const Options& options) {
 }
 
 Outcome simulate(const Options& options) {
+  if (options.act) return simulate_bench(options);
   const auto begin = std::chrono::steady_clock::now();
   const auto settings = options.simulation.settings();
   if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
   const std::vector<SimulatedRecording> recordings = planned(options);
   for (const SimulatedRecording& recording : recordings) {
-    if (!options.force && std::filesystem::exists(recording.path)) {
-      return refuse(recording.path.string() + ": the file exists; --force overwrites it", ExitCode::kWrongUsage);
-    }
+    if (auto is_new = check_new(recording.path, options); !is_new) return is_new;
   }
-  const unsigned threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
+  const unsigned threads = options.thread_count();
 
   // Before the rendering threads begin.
   auto stop = StopSignal::install();
@@ -82,11 +139,36 @@ Outcome simulate(const Options& options) {
 
 void add_simulate_command(Commands& commands) {
   const auto options = std::make_shared<Options>();
-  Command& command = commands.add(
-      "simulate", "Write a recording of a beating heart with its ground truth: real motion, real ECG, rendered images",
-      [options](const Console&) { return simulate(*options); });
+  Command& command = commands.add("simulate",
+                                  "Write a recording of a beating heart with its ground truth: real motion, real ECG, "
+                                  "rendered images; or of a bench "
+                                  "on which a set-up is measured",
+                                  [options](const Console&) { return simulate(*options); });
   command.add_option("OUT", options->out, "The recording to write (.mcap)")->required();
   Option* noise = options->simulation.add_to(command);
+  command
+      .add_option_function<std::string>(
+          "--scene",
+          [options](const std::string& name) {
+            const std::map<std::string, BenchAct> acts{
+                {"board", BenchAct::kBoard}, {"still", BenchAct::kStill}, {"landmarks", BenchAct::kLandmarks}};
+            const auto act = acts.find(name);
+            options->act = act == acts.end() ? std::nullopt : std::optional(act->second);
+          },
+          "heart; or what calibrations are made from: board (the scope is swung about a board, a pointer about the "
+          "board's origin), still (both lie still), landmarks (six of a patient's are touched) [heart]")
+      ->check(OneOf({"heart", "board", "still", "landmarks"}));
+  command.add_option("--board", options->board, "The board of such a scene: squares of 8 mm, 10x7 or 12x9 of them")
+      ->check(OneOf({"chessboard", "charuco"}))
+      ->capture_default_str();
+  command
+      .add_option("--field-stop", options->notch_deg,
+                  "Of such a scene: a field stop leaves a round of the picture; its notch is so many degrees from the "
+                  "right towards below [none]")
+      ->check(Range(-360.0, 360.0));
+  command.add_option("--truth", options->truth, "Of such a scene: write to this file what is to be found (JSON)");
+  command.add_option("--landmarks", options->landmarks,
+                     "Of such a scene: write the landmarks of the patient's image to this file, for perimap register");
   command
       .add_option("--tracker-noises", options->tracker_noises_mm,
                   "Several position noises, mm, from one rendering: OUT-0mm.mcap, OUT-1.4mm.mcap for 0,1.4")

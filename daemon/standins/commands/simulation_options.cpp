@@ -44,6 +44,10 @@ Option* SimulationOptions::add_to(Command& command) {
   command
       .add_option("--seed", settings_.seed, "Chooses texture, path, noise and part of the ECG; same seed, same bytes")
       ->capture_default_str();
+  command
+      .add_option("--setup-seed", settings_.setup_seed,
+                  "Draws another lens, place of the sensor on the scope and delay of the tracker; 0: the usual ones")
+      ->capture_default_str();
   command.add_option("--duration", duration_s_, "Length, s")->capture_default_str();
   command.add_option("--size", size_, "Image size WIDTHxHEIGHT, px")->capture_default_str();
   command.add_option("--fps", settings_.frames_per_s, "Camera frame rate, Hz")->capture_default_str();
@@ -98,6 +102,22 @@ Option* SimulationOptions::add_to(Command& command) {
                   "Times a minute that the tracker loses the tool, for 50 to 300 ms")
       ->capture_default_str();
   return noise;
+}
+
+Expected<BenchSettings> SimulationOptions::bench(BenchAct act) const {
+  SimulationSettings size;
+  if (const auto good = parse_size(size_, size); !good) return tl::unexpected(good.error());
+  BenchSettings bench;
+  bench.act = act;
+  bench.seed = settings_.seed;
+  bench.setup_seed = settings_.setup_seed;
+  bench.width = size.width;
+  bench.height = size.height;
+  bench.duration = from_seconds(duration_s_);
+  bench.frames_per_s = settings_.frames_per_s;
+  bench.tracker_rate_hz = settings_.tracker_rate_hz;
+  bench.tracker_correlation = from_seconds(tracker_correlation_s_);
+  return bench;
 }
 
 Expected<SimulationSettings> SimulationOptions::settings() const {

@@ -7,6 +7,7 @@
 
 #include "core/error/expected.hpp"
 #include "daemon/command_line/command.hpp"
+#include "drivers/standins/simulator/bench_scene.hpp"
 #include "drivers/standins/simulator/simulation.hpp"
 
 namespace perimap {
@@ -20,6 +21,8 @@ class SimulationOptions {
 
   // What was given, or by default; an error names an option that is none.
   [[nodiscard]] Expected<SimulationSettings> settings() const;
+  // The same of a bench on which a set-up is measured; its board is not set.
+  [[nodiscard]] Expected<BenchSettings> bench(BenchAct act) const;
   // The tracker's, as --tracker-noise says, or with this one of the position in its place.
   [[nodiscard]] TrackerNoise noise() const { return noise(tracker_noise_mm_); }
   [[nodiscard]] TrackerNoise noise(double position_mm) const;

@@ -168,19 +168,20 @@ std::string simulated_configuration(const Simulation& simulation, const TrackerN
   double q[4];
   rotation_to_wxyz(X_SC.R, q);
   const double correlation_s = to_seconds(simulation.settings().tracker_correlation);
+  const double offset_ms = 1e3 * to_seconds(simulation.setup().tracker_offset);
   return fmt::format(
       "version = 1\n\n"
       "[tracker]\n"
       "position_deviation_mm = {:#}\n"
       "rotation_deviation_deg = {:#}\n"
-      "{}"
+      "{}{}"
       "hand_eye_translation_SC_mm = [{:#}, {:#}, {:#}]\n"
       "hand_eye_rotation_SC_wxyz = [{:#}, {:#}, {:#}, {:#}]\n\n"
       "{}",
       noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
-      correlation_s > 0.0 ? fmt::format("error_correlation_s = {:#}\n", correlation_s) : "", X_SC.t.x(), X_SC.t.y(),
-      X_SC.t.z(), q[0], q[1], q[2], q[3],
-      simulation.settings().respiration_mm > 0.0 ? "\n[respiration]\nenabled = true\n" : "");
+      correlation_s > 0.0 ? fmt::format("error_correlation_s = {:#}\n", correlation_s) : "",
+      offset_ms > 0.0 ? fmt::format("time_offset_ms = {:#}\n", offset_ms) : "", X_SC.t.x(), X_SC.t.y(), X_SC.t.z(),
+      q[0], q[1], q[2], q[3], simulation.settings().respiration_mm > 0.0 ? "\n[respiration]\nenabled = true\n" : "");
 }
 
 Expected<bool> write_simulation(const Simulation& simulation, const std::vector<SimulatedRecording>& recordings,

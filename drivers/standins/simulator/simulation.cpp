@@ -12,6 +12,7 @@
 #include "drivers/standins/simulator/ecg_record.hpp"
 #include "drivers/standins/simulator/embedded_data.hpp"
 #include "drivers/standins/simulator/scope_path.hpp"
+#include "drivers/standins/simulator/transport_delay.hpp"
 
 namespace perimap {
 namespace {
@@ -44,26 +45,6 @@ Vector3d up_H() noexcept { return {0.0, 0.0, 1.0}; }
 // Inspiration moves the heart down and forward.
 Vector3d inspiration_H() noexcept { return Vector3d(0.10, -0.35, -0.93).normalized(); }
 constexpr double kScopeDistance_mm = 120.0;  // from the heart's surface, at rest
-
-// Arrival = source time + least + an exponentially distributed rest, never before an earlier one of the same source.
-class Transport {
- public:
-  Transport(CounterNoise noise, Duration least, Duration mean_rest) noexcept
-      : noise_(noise), least_(least), mean_rest_(mean_rest) {}
-
-  [[nodiscard]] Instant arrival(Instant source_time, std::uint64_t index) noexcept {
-    const double rest = std::min(8.0, -std::log(noise_.uniform(index)));
-    const Instant arrival = source_time + least_ + from_seconds(rest * to_seconds(mean_rest_));
-    latest_ = std::max(arrival, latest_ + Duration(1));
-    return latest_;
-  }
-
- private:
-  CounterNoise noise_;
-  Duration least_;
-  Duration mean_rest_;
-  Instant latest_{};
-};
 
 struct Interval {
   Duration begin, end;
@@ -185,7 +166,7 @@ Expected<View> view_of(const HeartMesh& mesh_W, const HeartMotion& motion) {
 std::vector<Simulation::Frame> frames_of(const SimulationSettings& settings, Instant start, const ScopePath& path) {
   std::vector<Simulation::Frame> frames;
   const auto count = static_cast<std::uint64_t>(to_seconds(settings.duration) * settings.frames_per_s);
-  Transport camera(CounterNoise(settings.seed, kCameraDelay), milliseconds(11), microseconds(1000));
+  TransportDelay camera(CounterNoise(settings.seed, kCameraDelay), milliseconds(11), microseconds(1000));
   const double offset_s = 0.5 / settings.frames_per_s;
   for (std::uint64_t k = 0; k < count; ++k) {
     const Duration since = from_seconds(offset_s + static_cast<double>(k) / settings.frames_per_s);
@@ -196,16 +177,15 @@ std::vector<Simulation::Frame> frames_of(const SimulationSettings& settings, Ins
 
 }  // namespace
 
-Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeLens lens,
+Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeSetup setup,
                        Vector3d surface_W, const ScopePath& path)
     : settings_(std::move(settings)),
       start_(start),
       truth_(std::move(truth)),
-      lens_(lens),
-      // The sensor sits beside the lens, some way up the shaft, turned about the shaft's axis.
-      X_SC_{so3_exp(Vector3d(0.15, -0.1, 1.2)), Vector3d(4.2, -6.8, 14.5)},
+      setup_(std::move(setup)),
       path_(path),
-      obstacles_(settings_.seed, lens.width, lens.height, settings_.instrument, settings_.glints, settings_.smoke),
+      obstacles_(settings_.seed, setup_.lens.width, setup_.lens.height, settings_.instrument, settings_.glints,
+                 settings_.smoke),
       surface_W_(std::move(surface_W)) {}
 
 std::int64_t Simulation::utc_minus_monotonic_ns() const noexcept { return 1'750'000'000'000'000'000; }
@@ -213,7 +193,7 @@ std::int64_t Simulation::utc_minus_monotonic_ns() const noexcept { return 1'750'
 // Its own period wavers a little.
 void Simulation::read_tracker() {
   const auto gaps = dropouts(settings_.seed, settings_.duration, settings_.tracker_dropouts_per_min);
-  const Pose X_CS = X_SC_.inverse();
+  const Pose X_CS = setup_.X_SC.inverse();
   const CounterNoise period(settings_.seed, kTrackerPeriod);
   const CounterNoise position(settings_.seed, kTrackerPosition);
   const CounterNoise rotation(settings_.seed, kTrackerRotation);
@@ -226,7 +206,7 @@ void Simulation::read_tracker() {
   // The first reading's error is all its own.
   double kept = 0.0;
   double drive = 1.0;
-  Transport tracker(CounterNoise(settings_.seed, kTrackerDelay), milliseconds(7), microseconds(1000));
+  TransportDelay tracker(CounterNoise(settings_.seed, kTrackerDelay), milliseconds(7), microseconds(1000));
   const auto reading_count = static_cast<std::uint64_t>(to_seconds(settings_.duration) * settings_.tracker_rate_hz);
   for (std::uint64_t k = 0; k < reading_count; ++k) {
     const Duration since =
@@ -235,8 +215,8 @@ void Simulation::read_tracker() {
                                      [&](const Interval& gap) { return since >= gap.begin && since < gap.end; });
     position_error = kept * position_error + drive * normal3(position, k);
     rotation_error = kept * rotation_error + drive * normal3(rotation, k);
-    tracker_stamps_.push_back({start_ + since, tracker.arrival(start_ + since, k), missing, path_.X_WC(since) * X_CS,
-                               position_error, rotation_error});
+    tracker_stamps_.push_back({start_ + since - setup_.tracker_offset, tracker.arrival(start_ + since, k), missing,
+                               path_.X_WC(since) * X_CS, position_error, rotation_error});
     kept = correlation;
     drive = std::sqrt(1.0 - kept * kept);
   }
@@ -244,7 +224,7 @@ void Simulation::read_tracker() {
 
 // Small blocks, sent when their last sample is there.
 void Simulation::read_ecg(const EcgRecord& record, std::uint32_t first_sample) {
-  Transport ecg(CounterNoise(settings_.seed, kEcgDelay), milliseconds(4), microseconds(800));
+  TransportDelay ecg(CounterNoise(settings_.seed, kEcgDelay), milliseconds(4), microseconds(800));
   const SampleTimes sample_time(start_, first_sample, record.sample_rate_hz);
   const auto sample_count = static_cast<std::uint32_t>(to_seconds(settings_.duration) * record.sample_rate_hz);
   for (std::uint32_t k = 0; k + kEcgSamplesPerBlock <= sample_count; k += kEcgSamplesPerBlock) {
@@ -322,8 +302,9 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   for (const Frame& frame : frames) cameras.push_back({frame.stamp.capture, frame.X_WC});
   auto truth = GroundTruth::create(mesh_W, motion, std::move(cameras));
   if (!truth) return tl::unexpected(truth.error());
-  const ScopeLens lens = scope_lens(settings.width, settings.height);
-  Simulation simulation(settings, start, *std::move(truth), lens, view->surface_W, path);
+  const ScopeSetup setup = settings.setup_seed != 0 ? drawn_setup(settings.setup_seed, settings.width, settings.height)
+                                                    : usual_setup(settings.width, settings.height);
+  Simulation simulation(settings, start, *std::move(truth), setup, view->surface_W, path);
   simulation.frames_ = std::move(frames);
   simulation.read_tracker();
   simulation.read_ecg(*record, *first_sample);
@@ -337,7 +318,7 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   const auto& triangles = simulation.truth_.mesh().triangles;
   simulation.texture_ = std::make_unique<const TissueTexture>(view->material_W, triangles, view->centre_W, view->axis_W,
                                                               texture_size, texture_seed, parallel_for);
-  simulation.renderer_ = std::make_unique<const SceneRenderer>(lens, triangles, *simulation.texture_);
+  simulation.renderer_ = std::make_unique<const SceneRenderer>(setup.lens, triangles, *simulation.texture_);
   return simulation;
 }
 

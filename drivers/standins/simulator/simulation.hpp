@@ -20,6 +20,7 @@
 #include "drivers/standins/simulator/parallel_for.hpp"
 #include "drivers/standins/simulator/scene_renderer.hpp"
 #include "drivers/standins/simulator/scope_path.hpp"
+#include "drivers/standins/simulator/scope_setup.hpp"
 #include "drivers/standins/simulator/tissue_texture.hpp"
 #include "drivers/standins/simulator/view_obstacles.hpp"
 #include "drivers/standins/truth/ground_truth.hpp"
@@ -30,6 +31,7 @@ struct EcgRecord;
 
 struct SimulationSettings {
   std::uint64_t seed = 1;
+  std::uint64_t setup_seed = 0;  // draws scope, tracker and sensor (drawn_setup()); 0: the usual ones
   Duration duration = std::chrono::seconds(60);
   int width = 640;   // px
   int height = 480;  // px
@@ -91,9 +93,10 @@ class Simulation {
   [[nodiscard]] Instant start() const noexcept { return start_; }
   // Stands for the recording's fixed epoch; the same for every recording, since nothing may depend on today.
   [[nodiscard]] std::int64_t utc_minus_monotonic_ns() const noexcept;
-  [[nodiscard]] const ScopeLens& lens() const noexcept { return lens_; }
+  [[nodiscard]] const ScopeLens& lens() const noexcept { return setup_.lens; }
+  [[nodiscard]] const ScopeSetup& setup() const noexcept { return setup_; }
   // Camera frame C in the tracked sensor's frame S.
-  [[nodiscard]] const Pose& hand_eye_X_SC() const noexcept { return X_SC_; }
+  [[nodiscard]] const Pose& hand_eye_X_SC() const noexcept { return setup_.X_SC; }
   [[nodiscard]] const GroundTruth& truth() const noexcept { return truth_; }
   [[nodiscard]] const ViewObstacles& obstacles() const noexcept { return obstacles_; }
 
@@ -120,7 +123,7 @@ class Simulation {
     Vector3d rotation_error = Vector3d::Zero();
   };
 
-  Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeLens lens, Vector3d surface_W,
+  Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeSetup setup, Vector3d surface_W,
              const ScopePath& path);
 
   // What the devices deliver, in the order of arrival at the end.
@@ -132,8 +135,7 @@ class Simulation {
   SimulationSettings settings_;
   Instant start_;
   GroundTruth truth_;
-  ScopeLens lens_;
-  Pose X_SC_;
+  ScopeSetup setup_;
   ScopePath path_;
   ViewObstacles obstacles_;
   Vector3d surface_W_;  // the point about which the scope moves; exposure is right there

@@ -13,6 +13,7 @@
 #include "daemon/setup/camera_calibration.hpp"
 #include "daemon/setup/hand_eye.hpp"
 #include "daemon/setup/kept_result.hpp"
+#include "daemon/setup/setup_report.hpp"
 #include "daemon/setup/signal_offset.hpp"
 
 namespace perimap {
@@ -113,6 +114,26 @@ TEST(HandEye, OffsetIsNotWhatSlowErrorsMakeOfIt) {
   EXPECT_GT(std::abs(result->joint_offset_s - 0.4), 0.1 * kSeems_s);
   EXPECT_LT(std::abs(result->offset_s - 0.4), std::abs(result->joint_offset_s - 0.4));
   EXPECT_LT(std::abs(result->offset_s - 0.4), 3.0 * std::sqrt(result->covariance(6, 6)));
+}
+
+TEST(HandEye, MotionThatIsTooSlowToTellTimeIsTold) {
+  Poses poses = swung(3, 0.4, kX_SC);
+  for (TimedPose& pose : poses.camera) pose.t_s = 0.4 + 4.0 * (pose.t_s - 0.4);
+  for (TimedPose& pose : poses.tracker) pose.t_s *= 4.0;
+  const auto slow = calibrate_hand_eye(poses.camera, poses.tracker, {});
+  ASSERT_TRUE(slow) << slow.error().message;
+  EXPECT_FALSE(slow->is_brisk());
+  EXPECT_THAT(text_of(*slow), HasSubstr("nothing moved briskly"));
+  Poses brisk = swung(3, 0.4, kX_SC);
+  for (std::size_t i = 0; i < brisk.camera.size(); ++i) {
+    const double t = brisk.tracker[i].t_s;
+    const Pose turn{so3_exp(0.05 * Vector3d(std::sin(15.0 * t), std::cos(13.0 * t), 0.0)), Vector3d::Zero()};
+    brisk.tracker[i].X = brisk.tracker[i].X * kX_SC * turn * kX_SC.inverse();
+    brisk.camera[i].X = brisk.camera[i].X * turn;
+  }
+  const auto fast = calibrate_hand_eye(brisk.camera, brisk.tracker, {});
+  ASSERT_TRUE(fast) << fast.error().message;
+  EXPECT_TRUE(fast->is_brisk());
 }
 
 std::string refusal_of(const Poses& poses) {

@@ -1,0 +1,12 @@
+// perimap calibrate hand-eye, perimap calibrate time.
+#pragma once
+
+namespace perimap {
+
+class Command;
+class Commands;
+
+void add_calibrate_hand_eye(Commands& commands, Command& calibrate);
+void add_calibrate_time(Commands& commands, Command& calibrate);
+
+}  // namespace perimap

@@ -1,0 +1,42 @@
+// What calibrations from a recording are told, and the recording's poses and views by it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/calibration/timed_poses.hpp"
+#include "core/error/expected.hpp"
+#include "core/geometry/camera_model.hpp"
+#include "daemon/setup/commands/board_options.hpp"
+#include "daemon/setup/recorded_board.hpp"
+
+namespace perimap {
+
+class Command;
+struct RecordedOptions {
+  std::string recording;    // empty: not from a recording
+  std::string calibration;  // the lens; empty: the configuration's
+  BoardOptions board;
+};
+
+// --from.
+void add_from(Command& command, std::string& recording);
+// --calibration, and the board's.
+void add_lens_and_board(Command& command, RecordedOptions& options);
+
+// By --calibration, else by what the configuration names; empty: there is none. Fails when neither says it.
+[[nodiscard]] Expected<CameraModel> lens_of(const RecordedOptions& options, const std::string& configuration);
+
+struct RecordedMotion {
+  RecordedBoard board;
+  CameraModel camera;
+  std::vector<TimedPose> camera_poses;  // X_BC, on the camera's clock
+  std::vector<TimedPose> sensor_poses;  // X_WS, on the tracker's
+};
+
+// The scope's motion as camera and tracker saw it. Fails when the board's size is not told, with which lengths would be
+// in squares.
+[[nodiscard]] Expected<RecordedMotion> recorded_motion(const RecordedOptions& options,
+                                                       const std::string& configuration);
+
+}  // namespace perimap

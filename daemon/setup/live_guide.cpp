@@ -1,0 +1,197 @@
+#include "daemon/setup/live_guide.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/calibration/pivot.hpp"
+#include "core/calibration/rotation_spread.hpp"
+#include "core/calibration/tracker_noise.hpp"
+#include "daemon/setup/hand_eye.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr std::array<const char*, 9> kNinths{"upper left", "upper middle", "upper right",  "left",       "middle",
+                                             "right",      "lower left",   "lower middle", "lower right"};
+
+Vector3d turned_deg(const std::vector<TimedPose>& poses) {
+  std::vector<Matrix3d> rotations;
+  for (const TimedPose& pose : poses) rotations.push_back(pose.X.R);
+  return rotation_spread(rotations).deviation_rad / kDegree;
+}
+
+double span_s(const std::vector<TimedPose>& poses) {
+  return poses.empty() ? 0.0 : poses.back().t_s - poses.front().t_s;
+}
+
+// At most so many of them, evenly: what is judged while it goes on must be quick.
+std::vector<TimedPose> thinned(const std::vector<TimedPose>& poses, std::size_t most) {
+  if (poses.size() <= most) return poses;
+  std::vector<TimedPose> few;
+  for (std::size_t k = 0; k < most; ++k) few.push_back(poses[k * poses.size() / most]);
+  return few;
+}
+
+class BoardGuide final : public LiveGuide {
+ public:
+  BoardGuide(const BoardWish& wish, std::optional<CameraModel> camera, double least_s)
+      : wish_(wish), camera_(std::move(camera)), least_s_(least_s) {}
+
+  void see(double t_s, const GreyImage& grey) override {
+    ++frames_;
+    first_s_ = std::min(first_s_.value_or(t_s), t_s);
+    last_s_ = t_s;
+    if (!board_) {
+      const auto found = recognise_board({grey}, wish_);
+      if (!found) return;
+      board_ = *found;
+    }
+    auto view = find_board(grey, *board_);
+    sees_ = view.has_value();
+    if (!view) return;
+    for (const Vector2d& px : view->px) {
+      const int column = std::clamp(static_cast<int>(3.0 * px.x() / grey.width), 0, 2);
+      const int row = std::clamp(static_cast<int>(3.0 * px.y() / grey.height), 0, 2);
+      ++coverage_[static_cast<std::size_t>(3 * row + column)];
+    }
+    views_.push_back({t_s, *std::move(view)});
+  }
+
+  void follow(const std::vector<TimedPose>& poses) override {
+    turned_deg_ = turned_deg(thinned(poses, 500));
+    // Anew every five seconds of views.
+    constexpr double kEvery_s = 5.0;
+    if (!camera_ || views_.size() < 50 || views_.back().t_s - judged_s_ < kEvery_s) return;
+    judged_s_ = views_.back().t_s;
+    const auto result = calibrate_hand_eye(camera_poses_of(views_, *camera_), poses, {});
+    residual_ = result ? fmt::format("AX - XB {:.2f} mm, held aside {:.2f} mm", result->residual_median_mm,
+                                     result->held_aside_rms_mm)
+                       : result.error().message;
+    determined_ = result.has_value();
+  }
+
+  [[nodiscard]] std::string line() const override {
+    if (!board_) return "no board is seen: bring all of it into view, sharp and evenly lit";
+    std::string text = fmt::format("{} views{}", views_.size(), sees_ ? "" : " (not seen now)");
+    const std::string missing = missing_ninths();
+    if (!missing.empty()) {
+      text += "; show it " + missing;
+    } else if (turned_deg_.minCoeff() < kWanted_deg) {
+      text += fmt::format("; turned {:.0f} {:.0f} {:.0f} degrees about three axes: tilt and turn the scope further",
+                          turned_deg_[0], turned_deg_[1], turned_deg_[2]);
+    } else {
+      text += "; from all sides";
+    }
+    return residual_.empty() ? text : text + "; " + residual_;
+  }
+
+  [[nodiscard]] bool enough() const override {
+    return views_.size() >= kWantedViews && last_s_ - first_s_.value_or(last_s_) >= least_s_ &&
+           missing_ninths().empty() && turned_deg_.minCoeff() >= kWanted_deg && (!camera_ || determined_);
+  }
+
+ private:
+  static constexpr std::size_t kWantedViews = 100;
+  static constexpr double kWanted_deg = 8.0;  // standard deviation about each axis
+
+  [[nodiscard]] std::string missing_ninths() const {
+    constexpr int kFewest = 30;  // points
+    std::string missing;
+    for (std::size_t i = 0; i < coverage_.size(); ++i) {
+      if (coverage_[i] < kFewest) missing += fmt::format("{}{}", missing.empty() ? "" : ", ", kNinths[i]);
+    }
+    return missing;
+  }
+
+  BoardWish wish_;
+  std::optional<CameraModel> camera_;
+  double least_s_;
+  std::optional<Board> board_;
+  std::vector<TimedView> views_;
+  std::array<int, 9> coverage_{};
+  std::size_t frames_ = 0;
+  std::optional<double> first_s_;
+  double last_s_ = 0.0;
+  double judged_s_ = -1e9;
+  bool sees_ = false;
+  bool determined_ = false;
+  Vector3d turned_deg_ = Vector3d::Zero();
+  std::string residual_;
+};
+
+class PivotGuide final : public LiveGuide {
+ public:
+  explicit PivotGuide(double least_s) : least_s_(least_s) {}
+
+  void see(double /*t_s*/, const GreyImage& /*grey*/) override {}
+
+  void follow(const std::vector<TimedPose>& poses) override {
+    span_s_ = span_s(poses);
+    turned_deg_ = turned_deg(thinned(poses, 500));
+    const auto result = calibrate_pivot(thinned(poses, 300));
+    determined_ = result.has_value();
+    state_ = result ? fmt::format("{:.2f} mm RMS, tip within {:.2f} mm", result->rms_mm,
+                                  std::sqrt(result->covariance_T.trace()))
+                    : result.error().message;
+  }
+
+  [[nodiscard]] std::string line() const override {
+    return fmt::format("{:.0f} s, turned {:.0f} {:.0f} {:.0f} degrees about three axes; {}", span_s_, turned_deg_[0],
+                       turned_deg_[1], turned_deg_[2], state_.empty() ? "no poses of the tool yet" : state_);
+  }
+
+  [[nodiscard]] bool enough() const override {
+    constexpr double kWanted_deg = 10.0;
+    return determined_ && span_s_ >= least_s_ && turned_deg_[1] >= kWanted_deg;
+  }
+
+ private:
+  double least_s_;
+  double span_s_ = 0.0;
+  bool determined_ = false;
+  Vector3d turned_deg_ = Vector3d::Zero();
+  std::string state_;
+};
+
+class StillGuide final : public LiveGuide {
+ public:
+  explicit StillGuide(double least_s) : least_s_(least_s) {}
+
+  void see(double /*t_s*/, const GreyImage& /*grey*/) override {}
+
+  void follow(const std::vector<TimedPose>& poses) override {
+    const auto result = measure_tracker_noise(thinned(poses, 2000));
+    still_s_ = result ? result->still_s : 0.0;
+    state_ = result ? fmt::format("{:.2f} mm and {:.2f} degrees RMS", result->position_deviation_mm,
+                                  result->rotation_deviation_deg)
+                    : result.error().message;
+  }
+
+  [[nodiscard]] std::string line() const override {
+    return fmt::format("still for {:.0f} of {:.0f} s; {}", still_s_, least_s_,
+                       state_.empty() ? "no poses of the sensor yet" : state_);
+  }
+
+  [[nodiscard]] bool enough() const override { return still_s_ >= least_s_; }
+
+ private:
+  double least_s_;
+  double still_s_ = 0.0;
+  std::string state_;
+};
+
+}  // namespace
+
+std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<CameraModel> camera, double least_s) {
+  return std::make_unique<BoardGuide>(wish, std::move(camera), least_s);
+}
+
+std::unique_ptr<LiveGuide> pivot_guide(double least_s) { return std::make_unique<PivotGuide>(least_s); }
+
+std::unique_ptr<LiveGuide> still_guide(double least_s) { return std::make_unique<StillGuide>(least_s); }
+
+}  // namespace perimap

@@ -1,0 +1,205 @@
+#include "drivers/standins/simulator/bench_scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/simulator/transport_delay.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+// Independent sequences of random numbers; none is one of Simulation's.
+enum BenchStream : std::uint64_t {
+  kBench = 101,
+  kScopeTurn,
+  kScopePlace,
+  kPointerTurn,
+  kBenchCameraDelay,
+  kBenchTrackerDelay,
+  kScopeError,
+  kPointerError,
+  kBenchImage,
+  kLandmark,
+  kFieldStop
+};
+
+constexpr double kDistance_mm = 150.0;  // of the scope from the board, at rest
+constexpr double kDwell_s = 2.5;        // on each landmark
+constexpr double kMove_s = 1.5;         // from one to the next
+constexpr std::size_t kLandmarks = 6;
+
+Expected<void> check_bench(const BenchSettings& s) {
+  const auto outside = [](const char* what, double value, double low, double high, const char* unit) -> Expected<void> {
+    if (value >= low && value <= high) return {};
+    return fail(fmt::format("{}: {} is outside {} to {} {}", what, value, low, high, unit));
+  };
+  for (const Expected<void>& result :
+       {outside("duration", to_seconds(s.duration), 1.0, 1700.0, "s"), outside("width", s.width, 64, 4096, "px"),
+        outside("height", s.height, 64, 4096, "px"), outside("fps", s.frames_per_s, 1.0, 1000.0, "Hz"),
+        outside("tracker rate", s.tracker_rate_hz, 1.0, 1000.0, "Hz"),
+        outside("tracker correlation", to_seconds(s.tracker_correlation), 0.0, 1000.0, "s"),
+        outside("swing", s.swing, 0.0, 3.0, "times the usual")}) {
+    if (!result) return result;
+  }
+  return {};
+}
+
+double smooth(double s) { return s * s * (3.0 - 2.0 * s); }
+
+// A little off the middle, as they are.
+FieldStop field_stop_of(const BenchSettings& settings) {
+  if (!settings.notch_rad) return {};
+  const CounterNoise noise(settings.setup_seed, kFieldStop);
+  const double height = settings.height;
+  FieldStop stop;
+  stop.centre_px = Vector2d(0.5 * settings.width + noise.uniform(0, -0.02, 0.02) * height,
+                            0.5 * height + noise.uniform(1, -0.02, 0.02) * height);
+  stop.radius_px = noise.uniform(2, 0.42, 0.46) * height;
+  stop.notch_rad = *settings.notch_rad;
+  stop.notch_depth_px = 0.07 * stop.radius_px;
+  stop.notch_width_px = 0.10 * stop.radius_px;
+  return stop;
+}
+
+Vector3d drawn_vector(const CounterNoise& noise, std::uint64_t index, double half) {
+  return {noise.uniform(3 * index, -half, half), noise.uniform(3 * index + 1, -half, half),
+          noise.uniform(3 * index + 2, -half, half)};
+}
+
+}  // namespace
+
+BenchScene::BenchScene(const BenchSettings& settings) : settings_(settings) {
+  setup_ = settings.setup_seed != 0 ? drawn_setup(settings.setup_seed, settings.width, settings.height)
+                                    : usual_setup(settings.width, settings.height);
+  const CounterNoise bench(settings.seed, kBench);
+  start_ = Instant(from_seconds(bench.uniform(0, 3600.0, 7200.0)));
+  X_WB_ = {so3_exp(drawn_vector(bench, 1, 1.2)), Vector3d(80.0, -40.0, -950.0) + drawn_vector(bench, 2, 120.0)};
+  pointer_rest_ = so3_exp(drawn_vector(bench, 3, 1.0));
+  const double swing = settings.swing;
+  scope_turn_ = HandSway3(CounterNoise(settings.seed, kScopeTurn), 0, swing * Vector3d(0.50, 0.50, 0.9),
+                          swing * Vector3d(0.10, 0.10, 0.12));
+  scope_place_ = HandSway3(CounterNoise(settings.seed, kScopePlace), 0, swing * Vector3d(14.0, 10.0, 30.0),
+                           swing * Vector3d(2.0, 2.0, 3.0));
+  pointer_turn_ =
+      HandSway3(CounterNoise(settings.seed, kPointerTurn), 0, Vector3d(0.6, 0.6, 0.6), Vector3d(0.1, 0.1, 0.1));
+}
+
+Expected<BenchScene> BenchScene::create(const BenchSettings& settings) {
+  if (const auto good = check_bench(settings); !good) return tl::unexpected(good.error());
+  BenchScene scene(settings);
+  scene.draw_landmarks();
+  if (settings.act == BenchAct::kLandmarks) {
+    scene.settings_.duration = from_seconds(static_cast<double>(kLandmarks) * (kDwell_s + kMove_s));
+  }
+  scene.time_devices();
+  scene.draw_errors();
+  if (settings.act == BenchAct::kBoard) {
+    scene.renderer_ = std::make_shared<const BoardRenderer>(scene.setup_.lens, settings.board, field_stop_of(settings));
+  }
+  return scene;
+}
+
+// Spread over a chest, no three on a line.
+void BenchScene::draw_landmarks() {
+  const CounterNoise noise(settings_.setup_seed + 1, kLandmark);
+  for (std::size_t k = 0; k < kLandmarks; ++k) {
+    const double angle = 2.0 * std::numbers::pi * static_cast<double>(k) / kLandmarks;
+    const Vector3d round(90.0 * std::cos(angle), 70.0 * std::sin(angle), k % 2 == 0 ? 25.0 : -25.0);
+    landmarks_.push_back({fmt::format("landmark {}", k + 1), round + drawn_vector(noise, k, 15.0)});
+  }
+}
+
+void BenchScene::time_devices() {
+  if (settings_.act == BenchAct::kBoard) {
+    TransportDelay camera(CounterNoise(settings_.seed, kBenchCameraDelay), milliseconds(11), microseconds(1000));
+    const auto count = static_cast<std::uint64_t>(to_seconds(settings_.duration) * settings_.frames_per_s);
+    for (std::uint64_t k = 0; k < count; ++k) {
+      const Instant t = start_ + from_seconds((static_cast<double>(k) + 0.5) / settings_.frames_per_s);
+      frames_.push_back({k, t, camera.arrival(t, k)});
+    }
+  }
+  TransportDelay tracker(CounterNoise(settings_.seed, kBenchTrackerDelay), milliseconds(7), microseconds(1000));
+  const auto count = static_cast<std::uint64_t>(to_seconds(settings_.duration) * settings_.tracker_rate_hz);
+  for (std::uint64_t k = 0; k < count; ++k) {
+    const Instant t = start_ + from_seconds((static_cast<double>(k) + 0.5) / settings_.tracker_rate_hz);
+    times_.push_back(t);
+    arrivals_.push_back(tracker.arrival(t, k));
+  }
+}
+
+void BenchScene::draw_errors() {
+  const double correlation_s = to_seconds(settings_.tracker_correlation);
+  const double rho = correlation_s > 0.0 ? std::exp(-1.0 / (settings_.tracker_rate_hz * correlation_s)) : 0.0;
+  for (const Tool tool : {Tool::kScope, Tool::kPointer}) {
+    const CounterNoise noise(settings_.seed, tool == Tool::kScope ? kScopeError : kPointerError);
+    const auto normal3 = [&](std::uint64_t index) {
+      return Vector3d(noise.normal(3 * index), noise.normal(3 * index + 1), noise.normal(3 * index + 2));
+    };
+    Error error;
+    for (std::uint64_t k = 0; k < times_.size(); ++k) {
+      const double kept = k == 0 ? 0.0 : rho;
+      const double drive = std::sqrt(1.0 - kept * kept);
+      error.position = kept * error.position + drive * normal3(2 * k);
+      error.rotation = kept * error.rotation + drive * normal3(2 * k + 1);
+      errors_[static_cast<std::size_t>(tool)].push_back(error);
+    }
+  }
+}
+
+Pose BenchScene::X_WC(Duration since) const noexcept {
+  const double t_s = settings_.act == BenchAct::kBoard ? to_seconds(since) : 0.0;
+  const BoardRectangle& all = settings_.board.outline;
+  const Vector3d middle_B(all.x_mm + 0.5 * all.width_mm, all.y_mm + 0.5 * all.height_mm, 0.0);
+  const Pose swing{so3_exp(scope_turn_.at(t_s)), middle_B};
+  return X_WB_ * swing * Pose{Matrix3d::Identity(), scope_place_.at(t_s) - Vector3d(0.0, 0.0, kDistance_mm)};
+}
+
+// Where the pointer's tip is.
+Vector3d BenchScene::touched_W(double t_s) const noexcept {
+  if (settings_.act != BenchAct::kLandmarks) return X_WB_.t;
+  const Pose X_WI = setup_.X_IW.inverse();
+  const double of_each_s = kDwell_s + kMove_s;
+  const auto at = std::min(kLandmarks - 1, static_cast<std::size_t>(t_s / of_each_s));
+  const double within_s = t_s - static_cast<double>(at) * of_each_s;
+  const Vector3d here = X_WI * landmarks_[at].p_I;
+  if (within_s <= kDwell_s || at + 1 == kLandmarks) return here;
+  const double s = smooth((within_s - kDwell_s) / kMove_s);
+  const Vector3d next = X_WI * landmarks_[at + 1].p_I;
+  const Vector3d lifted(0.0, 0.0, 40.0 * std::sin(std::numbers::pi * s));
+  return here + s * (next - here) + X_WI.R * lifted;
+}
+
+Pose BenchScene::X_WT(Duration since) const noexcept {
+  const double t_s = settings_.act == BenchAct::kStill ? 0.0 : to_seconds(since);
+  const Matrix3d R = pointer_rest_ * so3_exp(pointer_turn_.at(t_s));
+  return {R, touched_W(t_s) - R * setup_.tip_T};
+}
+
+TrackerSample BenchScene::reading(Tool tool, std::size_t index, const TrackerNoise& noise) const noexcept {
+  const Duration since = times_[index] - start_;
+  const Pose truth = tool == Tool::kScope ? X_WC(since) * setup_.X_SC.inverse() : X_WT(since);
+  const Error& error = errors_[static_cast<std::size_t>(tool)][index];
+  const double per_axis = 1.0 / std::numbers::sqrt3;
+  TrackerSample sample;
+  sample.source_time = times_[index] - setup_.tracker_offset;
+  sample.arrival = arrivals_[index];
+  sample.device_frame = static_cast<std::uint32_t>(index);
+  sample.state = ToolState::kOk;
+  sample.X_WS.t = truth.t + noise.position_rms_mm * per_axis * error.position;
+  sample.X_WS.R = truth.R * so3_exp(noise.rotation_rms_rad * per_axis * error.rotation);
+  return sample;
+}
+
+void BenchScene::render(std::size_t index, std::span<std::uint8_t> image) const {
+  const Pose X_CB = X_WC(frames_[index].capture - start_).inverse() * X_WB_;
+  renderer_->render(X_CB, CounterNoise(settings_.seed, kBenchImage).bits(index), image);
+}
+
+}  // namespace perimap

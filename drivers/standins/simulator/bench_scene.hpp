@@ -1,0 +1,106 @@
+// A bench on which a set-up is measured: a board, a scope that a hand swings about it, a pointer, and the tracker that
+// sees both. Everything is a function of the settings; nothing depends on time, threads or order of calls.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/error/expected.hpp"
+#include "core/sensors/frame_stamp.hpp"
+#include "core/sensors/tracker_sample.hpp"
+#include "core/time/instant.hpp"
+#include "drivers/board/board_pattern.hpp"
+#include "drivers/standins/simulator/board_renderer.hpp"
+#include "drivers/standins/simulator/hand_sway.hpp"
+#include "drivers/standins/simulator/scope_setup.hpp"
+#include "drivers/standins/simulator/simulation.hpp"
+
+namespace perimap {
+
+// What is done on the bench.
+enum class BenchAct : std::uint8_t {
+  kBoard,      // the scope is swung about the board; the pointer's tip rests on its origin and is swung as well
+  kStill,      // scope and pointer lie still; the camera is off
+  kLandmarks,  // the pointer touches the landmarks of the patient's image one after the other; the camera is off
+};
+
+struct BenchSettings {
+  BenchAct act = BenchAct::kBoard;
+  BoardPattern board;
+  std::uint64_t seed = 1;        // of motion and noise
+  std::uint64_t setup_seed = 0;  // as SimulationSettings has it
+  Duration duration = std::chrono::seconds(40);
+  int width = 640;   // px
+  int height = 480;  // px
+  double frames_per_s = 15.0;
+  double tracker_rate_hz = 100.0;
+  Duration tracker_correlation{0};
+  double swing = 1.0;  // how far the scope is swung, times the usual
+  // Where the notch of the field stop is, which then leaves a round of the picture; none: all of it is seen.
+  std::optional<double> notch_rad;
+};
+
+struct BenchLandmark {
+  std::string name;
+  Vector3d p_I = Vector3d::Zero();  // mm
+};
+
+class BenchScene {
+ public:
+  enum class Tool : std::uint8_t { kScope, kPointer };
+
+  // Errors name the setting that is out of range, in words of the command line.
+  [[nodiscard]] static Expected<BenchScene> create(const BenchSettings& settings);
+
+  [[nodiscard]] const BenchSettings& settings() const noexcept { return settings_; }
+  [[nodiscard]] const ScopeSetup& setup() const noexcept { return setup_; }
+  [[nodiscard]] Instant start() const noexcept { return start_; }
+  // Those of the patient's image; the same whatever the act.
+  [[nodiscard]] const std::vector<BenchLandmark>& landmarks() const noexcept { return landmarks_; }
+
+  [[nodiscard]] std::span<const FrameStamp> frames() const noexcept { return frames_; }
+  // Safe from several threads.
+  void render(std::size_t index, std::span<std::uint8_t> image) const;
+
+  // Of both tools at the same times, in order of their arrival.
+  [[nodiscard]] std::size_t reading_count() const noexcept { return arrivals_.size(); }
+  [[nodiscard]] TrackerSample reading(Tool tool, std::size_t index, const TrackerNoise& noise) const noexcept;
+
+  // True poses, since the start.
+  [[nodiscard]] Pose X_WC(Duration since) const noexcept;
+  [[nodiscard]] Pose X_WT(Duration since) const noexcept;
+  [[nodiscard]] const Pose& X_WB() const noexcept { return X_WB_; }
+
+ private:
+  explicit BenchScene(const BenchSettings& settings);
+
+  void draw_landmarks();
+  void time_devices();
+  void draw_errors();
+  [[nodiscard]] Vector3d touched_W(double t_s) const noexcept;
+
+  // Of unit variance per axis.
+  struct Error {
+    Vector3d position = Vector3d::Zero();
+    Vector3d rotation = Vector3d::Zero();
+  };
+
+  BenchSettings settings_;
+  ScopeSetup setup_;
+  Instant start_;
+  Pose X_WB_;
+  Matrix3d pointer_rest_ = Matrix3d::Identity();
+  HandSway3 scope_turn_, scope_place_, pointer_turn_;
+  std::vector<BenchLandmark> landmarks_;
+  std::shared_ptr<const BoardRenderer> renderer_;  // none where the camera is off
+  std::vector<FrameStamp> frames_;
+  std::vector<Instant> times_;  // true, of each reading
+  std::vector<Instant> arrivals_;
+  std::vector<Error> errors_[2];  // of each tool
+};
+
+}  // namespace perimap

@@ -1,0 +1,44 @@
+#include "drivers/standins/simulator/scope_setup.hpp"
+
+#include <algorithm>
+
+#include "drivers/standins/simulator/counter_noise.hpp"
+
+namespace perimap {
+
+ScopeSetup usual_setup(int width_px, int height_px) noexcept {
+  ScopeSetup setup;
+  setup.lens = scope_lens(width_px, height_px);
+  // The sensor sits beside the lens, some way up the shaft, turned about the shaft's axis.
+  setup.X_SC = {so3_exp(Vector3d(0.15, -0.1, 1.2)), Vector3d(4.2, -6.8, 14.5)};
+  return setup;
+}
+
+ScopeSetup drawn_setup(std::uint64_t seed, int width_px, int height_px) noexcept {
+  constexpr std::uint64_t kStream = 0x7365747570;
+  const CounterNoise noise(seed, kStream);
+  std::uint64_t index = 0;
+  const auto uniform = [&](double low, double high) { return noise.uniform(index++, low, high); };
+  const auto vector = [&](double half) {
+    return Vector3d(uniform(-half, half), uniform(-half, half), uniform(-half, half));
+  };
+  ScopeSetup setup;
+  setup.lens = scope_lens(width_px, height_px);
+  ScopeLens& lens = setup.lens;
+  lens.fx *= uniform(0.85, 1.05);
+  lens.fy = lens.fx * uniform(0.994, 1.006);
+  lens.cx = 0.5 * (width_px - 1) + uniform(-0.03, 0.03) * width_px;
+  lens.cy = 0.5 * (height_px - 1) + uniform(-0.03, 0.03) * height_px;
+  lens.k1 = uniform(-0.25, -0.05);
+  lens.k2 = uniform(0.0, 0.08);
+  lens.p1 = uniform(-8e-4, 8e-4);
+  lens.p2 = uniform(-8e-4, 8e-4);
+  setup.X_SC.R = so3_exp(vector(0.4)) * so3_exp(Vector3d(0.0, 0.0, uniform(-3.1, 3.1)));
+  setup.X_SC.t = vector(15.0) + Vector3d(0.0, 0.0, uniform(20.0, 80.0));
+  setup.tracker_offset = from_seconds(uniform(0.005, 0.040));
+  setup.tip_T = vector(8.0) + Vector3d(0.0, 0.0, uniform(100.0, 200.0));
+  setup.X_IW = {so3_exp(vector(1.5)), vector(250.0)};
+  return setup;
+}
+
+}  // namespace perimap

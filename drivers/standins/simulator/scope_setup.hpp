@@ -1,0 +1,27 @@
+// How a simulated scope, its tracker and a pointer are put together: what a calibration has to find.
+#pragma once
+
+#include <cstdint>
+
+#include "core/geometry/pose.hpp"
+#include "core/time/instant.hpp"
+#include "drivers/standins/simulator/lens.hpp"
+
+namespace perimap {
+
+struct ScopeSetup {
+  ScopeLens lens;
+  Pose X_SC;                                    // the camera in the tracked sensor
+  Duration tracker_offset{0};                   // to be added to the tracker's stamps to get the camera's clock
+  Vector3d tip_T = Vector3d(1.5, -2.0, 148.0);  // the pointer's tip in its sensor's frame, mm
+  Pose X_IW = {Matrix3d::Identity(), Vector3d::Zero()};  // the tracker's frame in the patient's image
+};
+
+// The scope as it is where nothing is drawn.
+[[nodiscard]] ScopeSetup usual_setup(int width_px, int height_px) noexcept;
+
+// Drawn at random: another lens of about the same view, the sensor elsewhere on the scope, a tracker that stamps its
+// poses 5 to 40 ms early, another pointer, another image. A function of its arguments alone.
+[[nodiscard]] ScopeSetup drawn_setup(std::uint64_t seed, int width_px, int height_px) noexcept;
+
+}  // namespace perimap

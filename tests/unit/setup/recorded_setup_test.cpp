@@ -1,0 +1,282 @@
+// daemon/setup: what recordings, touches and printed boards are made of, and in which words they are refused.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <random>
+#include <string>
+
+#include "core/calibration/dwells.hpp"
+#include "daemon/config/configuration_loader.hpp"
+#include "daemon/setup/attached_devices.hpp"
+#include "daemon/setup/first_configuration.hpp"
+#include "daemon/setup/kept_result.hpp"
+#include "daemon/setup/printed_target.hpp"
+#include "daemon/setup/verification.hpp"
+#include "drivers/board/board_pattern.hpp"
+#include "drivers/calibration/tool_tip.hpp"
+
+namespace perimap {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class Folder {
+ public:
+  Folder() {
+    std::string name = (std::filesystem::temp_directory_path() / "perimap-setup-XXXXXX").string();
+    path_ = ::mkdtemp(name.data());
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  ~Folder() { std::filesystem::remove_all(path_); }
+  [[nodiscard]] std::filesystem::path write(const std::string& name, const std::string& text) const {
+    std::filesystem::create_directories((path_ / name).parent_path());
+    std::ofstream(path_ / name) << text;
+    return path_ / name;
+  }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// ---- touches
+
+std::vector<TimedPoint> touched(const std::vector<Vector3d>& places, double noise_mm) {
+  std::mt19937 generator(5);
+  std::normal_distribution<double> normal;
+  std::vector<TimedPoint> points;
+  double t_s = 10.0;
+  const auto add = [&](const Vector3d& p) {
+    points.push_back({t_s, p + noise_mm * Vector3d(normal(generator), normal(generator), normal(generator))});
+    t_s += 0.01;
+  };
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (int k = 0; k < 250; ++k) add(places[i]);
+    if (i + 1 == places.size()) break;
+    for (int k = 0; k < 100; ++k) add(places[i] + k / 100.0 * (places[i + 1] - places[i]));
+  }
+  return points;
+}
+
+TEST(Dwells, AreWhereTheTipIsHeldStill) {
+  const std::vector<Vector3d> places{{0, 0, 0}, {60, 0, 10}, {60, 50, -10}};
+  const auto dwells = find_dwells(touched(places, 1.0), 1.5, 4.0);
+  ASSERT_EQ(dwells.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_LT((dwells[i].p - places[i]).norm(), 0.6);
+    EXPECT_LT((dwells[i].p - places[i]).norm(), 5.0 * dwells[i].deviation_mm);
+    EXPECT_NEAR(dwells[i].end_s - dwells[i].begin_s, 2.5, 0.4);
+  }
+}
+
+TEST(Dwells, AreNoneWhereItOnlyPassesBy) {
+  std::vector<TimedPoint> points;
+  for (int k = 0; k < 1000; ++k) points.push_back({0.01 * k, Vector3d(0.3 * k, 0.0, 0.0)});
+  EXPECT_TRUE(find_dwells(points, 1.5, 4.0).empty());
+  EXPECT_TRUE(find_dwells({}, 1.5, 4.0).empty());
+}
+
+TEST(Dwells, EndAtAGap) {
+  std::vector<TimedPoint> points;
+  for (int k = 0; k < 200; ++k) points.push_back({0.01 * k, Vector3d::Zero()});
+  for (int k = 0; k < 200; ++k) points.push_back({5.0 + 0.01 * k, Vector3d::Zero()});
+  EXPECT_EQ(find_dwells(points, 1.5, 4.0).size(), 2U);
+}
+
+// ---- a tool's tip from its file
+
+TEST(ToolTip, IsReadFromWhatCalibrateToolWrites) {
+  const Folder folder;
+  const auto file = folder.write(
+      "pointer.json", R"({"tip_mm": [1, 2.5, -3], "covariance": [[0.04, 0, 0], [0, 0.09, 0], [0, 0, 0.01]]})");
+  const auto tip = read_tool_tip(file);
+  ASSERT_TRUE(tip) << tip.error().message;
+  EXPECT_EQ(tip->tip_T, Vector3d(1, 2.5, -3));
+  EXPECT_EQ(tip->covariance_T(1, 1), 0.09);
+}
+
+TEST(ToolTip, GarbledFilesAreRefusedByName) {
+  const Folder folder;
+  for (const char* text :
+       {"", "[]", "{", R"({"tip_mm": [1, 2]})", R"({"tip_mm": [1, 2, "3"], "covariance": [[1,0,0],[0,1,0],[0,0,1]]})",
+        R"({"tip_mm": [1, 2, 1e9], "covariance": [[1,0,0],[0,1,0],[0,0,1]]})",
+        R"({"tip_mm": [1, 2, 3], "covariance": [[1,0,0],[0,1],[0,0,1]]})", R"({"tip_mm": [1, 2, 3]})"}) {
+    const auto tip = read_tool_tip(folder.write("pointer.json", text));
+    ASSERT_FALSE(tip) << text;
+    EXPECT_THAT(tip.error().message, HasSubstr("pointer.json: "));
+  }
+}
+
+// ---- verification
+
+struct Watched {
+  std::vector<TimedPose> camera;
+  std::vector<TimedPose> sensor;
+  TouchOnTrial touch;
+  SetupOnTrial truth;
+};
+
+constexpr double kNoise_mm = 0.4;
+
+Watched watched(double turn = 0.4) {
+  std::mt19937 generator(11);
+  std::normal_distribution<double> normal;
+  Watched w;
+  w.truth = {{so3_exp({0.1, -0.2, 1.5}), {10.0, -5.0, 60.0}}, 0.02};
+  const Pose X_WB{so3_exp({0.3, 1.0, -0.4}), {100.0, 20.0, -900.0}};
+  for (int i = 0; i < 1500; ++i) {
+    const double t = 0.01 * i;
+    const Pose X_BC{so3_exp(turn * Vector3d(std::sin(1.3 * t), std::sin(1.9 * t + 1.0), std::sin(0.9 * t + 2.0))),
+                    {20.0 * std::sin(t), 10.0 * std::cos(1.7 * t), -150.0}};
+    Pose X_WS = X_WB * X_BC * w.truth.X_SC.inverse();
+    X_WS.t += kNoise_mm * Vector3d(normal(generator), normal(generator), normal(generator));
+    if (i % 7 == 0) w.camera.push_back({t, X_BC});
+    w.sensor.push_back({t - w.truth.time_offset_s, X_WS});
+    w.touch.tip_W.push_back(
+        {t, X_WB.t + kNoise_mm * Vector3d(normal(generator), normal(generator), normal(generator))});
+  }
+  return w;
+}
+
+const Vector3d kMiddle_B(40.0, 30.0, 0.0);
+
+TEST(Verification, OfARightSetupPasses) {
+  const Watched w = watched();
+  const auto result = verify_setup(w.camera, w.sensor, kMiddle_B, w.truth, w.touch, 1.0);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_TRUE(result->passed()) << text_of(*result);
+  EXPECT_LT(result->error_mm, 0.3);
+  EXPECT_LT(result->touch->error_mm, 0.3);
+  EXPECT_NEAR(result->scatter_mm, kNoise_mm * std::sqrt(3.0), 0.1);
+}
+
+TEST(Verification, OfAWrongSetupFails) {
+  const Watched w = watched();
+  const auto fails = [&](const SetupOnTrial& setup) {
+    const auto result = verify_setup(w.camera, w.sensor, kMiddle_B, setup, w.touch, 1.0);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_FALSE(result->passed()) << text_of(*result);
+  };
+  SetupOnTrial wrong = w.truth;
+  wrong.X_SC.t.x() += 8.0;
+  fails(wrong);
+  wrong = w.truth;
+  wrong.X_SC.R = wrong.X_SC.R * so3_exp({0.03, 0.0, 0.0});
+  fails(wrong);
+  wrong = w.truth;
+  wrong.time_offset_s += 0.05;
+  fails(wrong);
+}
+
+TEST(Verification, WhatIsWrongAlikeFromAllSidesShowsByTheTouchedPoint) {
+  Watched w = watched();
+  for (TimedPoint& point : w.touch.tip_W) point.p += Vector3d(0.0, 3.0, 0.0);
+  const auto result = verify_setup(w.camera, w.sensor, kMiddle_B, w.truth, w.touch, 1.0);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_TRUE(result->board_passed());
+  EXPECT_FALSE(result->touch_passed());
+  EXPECT_NEAR(result->touch->error_mm, 3.0, 0.3);
+}
+
+TEST(Verification, WhatIsMissingIsSaid) {
+  const Watched w = watched();
+  const auto refusal = [&](const Watched& of, const std::optional<TouchOnTrial>& touch) {
+    const auto result = verify_setup(of.camera, of.sensor, kMiddle_B, of.truth, touch, 1.0);
+    return result ? std::string("accepted") : result.error().message;
+  };
+  Watched few = w;
+  few.camera.resize(10);
+  EXPECT_THAT(refusal(few, {}), HasSubstr("keep board and sensor in sight"));
+  EXPECT_THAT(refusal(watched(0.02), {}), HasSubstr("swing it about the board"));
+  TouchOnTrial elsewhere = w.touch;
+  elsewhere.touched_B = Vector3d(90.0, 0.0, 0.0);
+  EXPECT_THAT(refusal(w, elsewhere), HasSubstr("--touched"));
+  TouchOnTrial moving = w.touch;
+  for (std::size_t i = 0; i < moving.tip_W.size(); ++i) moving.tip_W[i].p.x() += static_cast<double>(i);
+  EXPECT_THAT(refusal(w, moving), HasSubstr("held still nowhere"));
+}
+
+// ---- boards to print
+
+TEST(PrintedTarget, StatesItsPageAndIsOfExactMillimetres) {
+  const auto pattern = charuco_pattern(12, 9, 8.0, 6.0, 1);
+  ASSERT_TRUE(pattern) << pattern.error().message;
+  const auto paper = paper_named("A4");
+  ASSERT_TRUE(paper);
+  const auto target = print_target(*pattern, *paper);
+  ASSERT_TRUE(target) << target.error().message;
+  EXPECT_EQ(target->page_width_mm, 297.0);
+  EXPECT_TRUE(target->pdf.starts_with("%PDF-"));
+  // 297 x 210 mm are 841.89 x 595.28 points.
+  EXPECT_THAT(target->pdf, HasSubstr("/MediaBox [ 0 0 841.889764 595.275591 ]"));
+}
+
+TEST(PrintedTarget, WhatDoesNotFitIsRefused) {
+  const auto pattern = chessboard_pattern(9, 6, 30.0);
+  ASSERT_TRUE(pattern);
+  EXPECT_THAT(print_target(*pattern, *paper_named("A4")).error().message, HasSubstr("larger page"));
+  EXPECT_TRUE(print_target(*pattern, *paper_named("A3")));
+  EXPECT_THAT(paper_named("A9").error().message, HasSubstr("--page"));
+}
+
+TEST(BoardPattern, SquaresAreWhereTheBoardsFrameHasThem) {
+  const auto pattern = chessboard_pattern(9, 6, 8.0);
+  ASSERT_TRUE(pattern);
+  EXPECT_EQ(pattern->black.size(), 35U);  // of 10 x 7
+  EXPECT_EQ(pattern->black.front().x_mm, -8.0);
+  EXPECT_EQ(pattern->outline.width_mm, 80.0);
+  EXPECT_THAT(chessboard_pattern(1, 6, 8.0).error().message, HasSubstr("columns and rows"));
+  EXPECT_THAT(charuco_pattern(20, 20, 8.0, 6.0, 0).error().message, HasSubstr("the dictionary has 50"));
+  EXPECT_THAT(charuco_pattern(12, 9, 8.0, 8.0, 0).error().message, HasSubstr("markers of 20 to 95 %"));
+}
+
+// ---- the first configuration
+
+TEST(FirstConfiguration, IsSoundWithAndWithoutDevices) {
+  const Folder folder;
+  const auto file = folder.path() / "perimap.toml";
+  const auto none = parse_configuration(first_configuration({}, "perimap.toml", "today"), file);
+  ASSERT_TRUE(none) << none.error().message;
+  EXPECT_EQ(none->tracker.protocol, TrackerConfiguration::Protocol::kNone);
+  SetupAnswers answers{"v4l2:/dev/video0", "", "ndi", "/dev/ttyUSB0", "cyton", "/dev/ttyUSB1"};
+  const auto all = parse_configuration(first_configuration(answers, "perimap.toml", "today"), file);
+  ASSERT_TRUE(all) << all.error().message;
+  EXPECT_EQ(all->camera.device, "v4l2:/dev/video0");
+  EXPECT_EQ(all->ecg.port, "/dev/ttyUSB1");
+}
+
+TEST(FirstConfiguration, MeasuredKeysTakeTheirPlaces) {
+  const Folder folder;
+  const auto file = folder.write("perimap.toml", first_configuration({}, "perimap.toml", "today"));
+  ASSERT_TRUE(set_keys(file, "tracker", {{"position_deviation_mm", "1.25"}}, "measured"));
+  ASSERT_TRUE(set_keys(file, "camera", {{"calibration", "\"camera.yaml\""}}, "measured", true));
+  const auto loaded = load_configuration(file, {}, NamedFiles::kMayBeMissing);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_EQ(loaded->tracker.position_deviation_mm, 1.25);
+  EXPECT_EQ(loaded->camera.calibration, folder.path() / "camera.yaml");
+}
+
+TEST(AttachedDevices, AreFoundByTheirLastingNames) {
+  const Folder folder;
+  static_cast<void>(folder.write("v4l/by-id/usb-Scope-video-index0", ""));
+  static_cast<void>(folder.write("v4l/by-id/usb-Scope-video-index1", ""));
+  static_cast<void>(folder.write("serial/by-id/usb-FTDI_FT231X_USB_UART_D1-if00-port0", ""));
+  static_cast<void>(folder.write("serial/by-id/usb-NDI_NDI_Host_USB_P1-if00-port0", ""));
+  static_cast<void>(folder.write("video0", ""));
+  EXPECT_THAT(attached_cameras(folder.path()),
+              ElementsAre((folder.path() / "v4l/by-id/usb-Scope-video-index0").string()));
+  const auto ports = attached_ports(folder.path());
+  ASSERT_EQ(ports.size(), 2U);
+  EXPECT_EQ(ports[0].ecg, "cyton");
+  EXPECT_EQ(ports[1].tracker, "ndi");
+  EXPECT_TRUE(attached_ports(folder.path() / "nothing").empty());
+}
+
+}  // namespace
+}  // namespace perimap
