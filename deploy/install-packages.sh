@@ -23,7 +23,7 @@ build=(
   libhwy-dev                                 # core/bank: portable SIMD with a choice at run time
   libopencv-core-dev libopencv-imgproc-dev   # core/vision
   libopencv-videoio-dev libopencv-imgcodecs-dev  # drivers/video: video files, pictures
-  libavformat-dev                            # drivers/video: what an edit list leaves of a video
+  libavformat-dev                            # drivers/video: when the frames of a video are shown
   libopencv-calib3d-dev                      # daemon/setup: lenses, boards, other hand-eye solutions
   libopencv-contrib-dev                      # daemon/setup: ArUco and AprilTag markers, which OpenCV 4.6 has there alone
   libceres-dev                               # daemon/setup: least squares with derivatives and covariance

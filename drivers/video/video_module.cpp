@@ -2,10 +2,6 @@
 
 #include "drivers/video/video_module.hpp"
 
-extern "C" {
-#include <libavformat/avformat.h>
-}
-
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -21,6 +17,7 @@ extern "C" {
 #include <vector>
 
 #include "core/vision/opencv_threads.hpp"
+#include "drivers/video/frame_times.hpp"
 #include "drivers/video/lucas_kanade_module.hpp"
 #include "drivers/video/video_file.hpp"
 
@@ -36,32 +33,9 @@ tl::unexpected<Error> failed(const std::string& path, const std::exception& erro
 
 bool is_plausible_rate(double frames_per_s) noexcept { return frames_per_s > 0.1 && frames_per_s < 2000; }
 
-// How many of the frames that an MP4 or MOV file holds its edit list has shown, which OpenCV does not tell; none: all,
-// or it is another kind of file.
-std::optional<std::uint64_t> frames_shown(const std::string& path) {
-  AVFormatContext* context = nullptr;
-  if (avformat_open_input(&context, path.c_str(), nullptr, nullptr) < 0) return std::nullopt;
-  std::optional<std::uint64_t> shown;
-  for (unsigned i = 0; i < context->nb_streams && std::string(context->iformat->name).starts_with("mov"); ++i) {
-    const AVStream* stream = context->streams[i];
-    if (stream->codecpar->codec_type != AVMEDIA_TYPE_VIDEO) continue;
-    std::uint64_t kept = 0;
-    // FFmpeg's functions take no const stream; this one only reads.
-    auto* indexed = const_cast<AVStream*>(stream);
-    for (int entry = 0; entry < avformat_index_get_entries_count(stream); ++entry) {
-      const AVIndexEntry* frame = avformat_index_get_entry(indexed, entry);
-      if (frame != nullptr && (frame->flags & AVINDEX_DISCARD_FRAME) == 0) ++kept;
-    }
-    if (kept > 0 && static_cast<std::int64_t>(kept) < stream->nb_frames) shown = kept;
-    break;
-  }
-  avformat_close_input(&context);
-  return shown;
-}
-
 class CapturingReader final : public VideoReader {
  public:
-  explicit CapturingReader(std::string path) : path_(std::move(path)) {}
+  explicit CapturingReader(std::string path) : path_(std::move(path)), times_(path_) {}
   [[nodiscard]] Expected<void> begin();
   [[nodiscard]] std::uint64_t announced_frames() const noexcept override;
   [[nodiscard]] double frames_per_s() const noexcept override;
@@ -70,7 +44,7 @@ class CapturingReader final : public VideoReader {
 
  private:
   [[nodiscard]] bool read() { return capture_.read(colour_) && !colour_.empty(); }
-  [[nodiscard]] std::optional<double> time_since_first() const;
+  [[nodiscard]] std::optional<double> time_since_first();
   [[nodiscard]] bool read_next(std::uint64_t announced, double frames_per_s);
 
   std::string path_;
@@ -79,8 +53,8 @@ class CapturingReader final : public VideoReader {
   cv::Size size_;
   bool first_is_waiting_ = true;
   std::uint64_t number_ = 0;
-  std::optional<std::uint64_t> shown_;
-  double first_ms_ = 0;               // the first frame's time
+  FrameTimes times_;
+  std::optional<double> first_s_;     // the first frame's time
   double time_ms_ = 0;                // of the last frame that had one
   std::uint64_t frames_untimed_ = 0;  // since
   bool is_broken_ = false;
@@ -112,13 +86,11 @@ Expected<void> CapturingReader::begin() {
   if (!capture_.open(path_, cv::CAP_FFMPEG)) return fail(path_ + ": not a video that can be read");
   if (!read()) return fail(path_ + ": the first frame can not be decoded");
   size_ = colour_.size();
-  shown_ = frames_shown(path_);
-  first_ms_ = std::max(0.0, capture_.get(cv::CAP_PROP_POS_MSEC));
   return {};
 }
 
 std::uint64_t CapturingReader::announced_frames() const noexcept {
-  if (shown_) return *shown_;
+  if (times_.shown()) return *times_.shown();
   const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);
   return count > 0 && count < 1e12 ? static_cast<std::uint64_t>(count) : 0;
 }
@@ -139,10 +111,15 @@ bool CapturingReader::ends_early() const noexcept {
   return reached + kMargin_frames < (1 - kMargin) * announced;
 }
 
-std::optional<double> CapturingReader::time_since_first() const {
-  if (number_ == 0) return 0.0;
-  const double now_ms = capture_.get(cv::CAP_PROP_POS_MSEC);
-  return now_ms > first_ms_ ? std::optional(1e-3 * (now_ms - first_ms_)) : std::nullopt;
+// Beyond a broken spot nobody knows which packet a frame is of.
+std::optional<double> CapturingReader::time_since_first() {
+  if (number_ == 0) {
+    first_s_ = times_.next();
+    return 0.0;
+  }
+  const std::optional<double> now_s = is_broken_ ? std::nullopt : times_.next();
+  if (!now_s || !first_s_) return std::nullopt;
+  return *now_s - *first_s_;
 }
 
 Expected<const VideoFrame*> CapturingReader::next() {

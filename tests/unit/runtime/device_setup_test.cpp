@@ -44,6 +44,44 @@ TEST(DeviceSetup, WhatReadsAVideoIsLoadedBeforeItsThreadBegins) {
   std::filesystem::remove_all(folder);
 }
 
+TEST(DeviceSetup, AHandEyeOfAnotherSensorIsRefused) {
+  Configuration configuration;
+  configuration.tracker.protocol = TrackerConfiguration::Protocol::kNdi;
+  configuration.tracker.port = "tcp:127.0.0.1:1";
+  configuration.tracker.sensor = "0A";
+  configuration.tracker.hand_eye_sensor = "0B";
+  const auto setup = prepare_devices("devices.toml", configuration);
+  ASSERT_FALSE(setup);
+  EXPECT_TRUE(setup.error().error.message.starts_with("devices.toml: key 'tracker.hand_eye_sensor': "))
+      << setup.error().error.message;
+}
+
+TEST(DeviceSetup, OneToolIsNotTwo) {
+  TrackerConfiguration tracker;
+  tracker.protocol = TrackerConfiguration::Protocol::kNdi;
+  tracker.port = "tcp:127.0.0.1:1";
+  tracker.sensor = "0A";
+  tracker.reference = "0B";
+  tracker.pointer = "0C";
+  tracker.instruments = {"0D", "E"};
+  const auto device = tracker_device(tracker);
+  ASSERT_TRUE(device) << device.error().message;
+  const std::vector<std::string> names{"reference", "pointer", "instrument/0D", "instrument/E"};
+  EXPECT_EQ(device->tools, names);
+  EXPECT_EQ(std::get<NdiSettings>(device->settings).tools.at(2).handle, 0x0E);
+  for (const char* same : {"0A", "a", "0b", "C", "0D"}) {
+    tracker.instruments = {"0D", same};
+    const auto twice = tracker_device(tracker);
+    ASSERT_FALSE(twice) << same;
+    EXPECT_TRUE(twice.error().message.starts_with("key 'tracker.instruments': expected another tool than 'tracker."));
+  }
+  tracker.instruments = {"GG"};
+  EXPECT_FALSE(tracker_device(tracker)) << "no port handle";
+  tracker.protocol = TrackerConfiguration::Protocol::kIgtl;
+  tracker.instruments = {"a", "A"};
+  EXPECT_TRUE(tracker_device(tracker)) << "names are names";
+}
+
 TEST(PipelineSettings, AConvergedDeviationOfZeroAsRecordingsHoldItIsOneMillimetre) {
   Configuration configuration;
   configuration.tracker.position_deviation_mm = 1.4;
