@@ -16,7 +16,9 @@ constexpr double kStranger = 1.5;      // times the usual beats' strangeness: a 
 constexpr double kSlight = 0.01;
 constexpr double kStrangenessMemory = 16.0;  // beats
 constexpr int kDisplaced = 4;                // steps, 20 ms
-constexpr double kDoubtful = 0.3;            // confidence below which an unusual shape is thought noise
+constexpr double kDoubtful = 0.3;            // confidence below which an unusual shape is thought noise,
+constexpr double kMostDoubtful = 0.15;       // and a usual one, unless it comes when a beat is due
+constexpr int kUnseen = 2;                   // cycles: noise may have hidden the beat before
 constexpr double kEarly = 0.9;               // of the rhythm's cycle, in an unusual shape
 constexpr double kMuchTooEarly = 0.8;        // in the usual one
 constexpr double kInRhythm = 0.15;           // of the rhythm's cycle, either way
@@ -64,17 +66,17 @@ BeatClass BeatClasser::by_interval(const RPeak& peak, bool unusual) const noexce
   const bool again = last_class_ == BeatClass::kPremature && !last_unusual_ && raw_rr_s_ > 0.0 &&
                      std::abs(rr_s - raw_rr_s_) < kInRhythm * raw_rr_s_;
   if (!unusual && again) return BeatClass::kNormal;
-  if (!unusual && rr_s < kMuchTooEarly * usual_s && !is_due(peak)) return BeatClass::kPremature;
+  if (!unusual && rr_s < kMuchTooEarly * usual_s && !is_due(peak, 1)) return BeatClass::kPremature;
   if (rr_s > kPause * cycle_s && last_class_ != BeatClass::kPremature) return BeatClass::kPause;
   return BeatClass::kNormal;
 }
 
-// One cycle after the last normal beat: after an interpolated beat the next normal one is where it would have been
-// without.
-bool BeatClasser::is_due(const RPeak& peak) const noexcept {
+// One cycle after the last normal beat, or so many at most: after an interpolated beat the next normal one is where it
+// would have been without.
+bool BeatClasser::is_due(const RPeak& peak, int most_cycles) const noexcept {
   if (!has_normal_ || normal_rr_s_.count() == 0) return false;
-  const double cycle_s = normal_rr_s_.median();
-  return std::abs(to_seconds(peak.time - last_normal_) - cycle_s) < kInRhythm * cycle_s;
+  const double cycles = to_seconds(peak.time - last_normal_) / normal_rr_s_.median();
+  return std::abs(cycles - std::clamp(std::round(cycles), 1.0, static_cast<double>(most_cycles))) < kInRhythm;
 }
 
 RPeak BeatClasser::classify(RPeak peak) noexcept {
@@ -89,7 +91,8 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
                                    recurs_beside_the_usual(peak.shape);
   on_time_in_another_shape_ = ventricular_on_time ? std::min(on_time_in_another_shape_ + 1, kConductionChanged + 1) : 0;
   if (ventricular_on_time && on_time_in_another_shape_ <= kConductionChanged) peak.beat_class = BeatClass::kPremature;
-  if (unusual && peak.confidence < kDoubtful && !is_due(peak)) peak.beat_class = BeatClass::kNoise;
+  if (peak.confidence < (unusual ? kDoubtful : kMostDoubtful) && !is_due(peak, kUnseen))
+    peak.beat_class = BeatClass::kNoise;
   peak.unusual_shape =
       unusual || (peak.beat_class == BeatClass::kPremature && strange > kStranger * strangeness_ + kSlight);
   if (peak.beat_class == BeatClass::kNoise) return peak;  // as if it had not been

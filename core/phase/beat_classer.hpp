@@ -33,7 +33,7 @@ class BeatClasser {
   [[nodiscard]] double strangeness(const QrsShape& shape) const noexcept;
   [[nodiscard]] BeatClass by_interval(const RPeak& peak, bool unusual) const noexcept;
   [[nodiscard]] bool recurs_beside_the_usual(const QrsShape& shape) const noexcept;
-  [[nodiscard]] bool is_due(const RPeak& peak) const noexcept;
+  [[nodiscard]] bool is_due(const RPeak& peak, int most_cycles) const noexcept;
   void learn(const RPeak& peak, bool unusual) noexcept;
 
   ShapeTemplates templates_;

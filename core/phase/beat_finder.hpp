@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "core/phase/beat_classer.hpp"
@@ -22,6 +23,15 @@ class BeatFinder {
   }
   [[nodiscard]] std::optional<RPeak> flush() noexcept { return classed(detector_.flush()); }
   [[nodiscard]] EcgSignal signal() const noexcept { return detector_.signal(); }
+
+  // All is forgotten, as if it were new. The detector's parts refer to each other, so it is made anew in its place.
+  void restart() noexcept {
+    std::destroy_at(&detector_);
+    std::construct_at(&detector_);
+    classer_ = BeatClasser();
+    interruptions_ = 0;
+    interrupted_ = false;
+  }
 
   // Since the last call the signal has broken off: beats may be hidden after the one given last.
   [[nodiscard]] bool take_interruption() noexcept {

@@ -73,9 +73,11 @@ void EcgFilter::push(Instant t, double mV, bool made_up) noexcept {
   sample.smooth = mean(smooth_width_, [](const EcgSample& s) { return s.despiked; });
   sample.smoother = mean(smooth_width_, [](const EcgSample& s) { return s.smooth; });
   sample.slope = sample.smoother - at(now_ - smooth_width_).smoother;
+  sample.curvature = sample.slope - at(now_ - smooth_width_).slope;
   sample.residue = std::abs(at(now_ - spike_half_ - smooth_width_ / 2).mV - sample.smooth);
   sample.rough = mean(energy_width_, [](const EcgSample& s) { return s.residue; });
   sample.energy = mean(energy_width_, [](const EcgSample& s) { return std::abs(s.slope); });
+  sample.sharpness = mean(energy_width_, [](const EcgSample& s) { return std::abs(s.curvature); });
 }
 
 }  // namespace perimap

@@ -17,13 +17,15 @@ struct EcgSample {
   Instant time;
   bool made_up = false;  // it was missing
   double mV = 0.0;
-  double despiked = 0.0;  // without spikes
-  double smooth = 0.0;    // mean of that over 20 ms
-  double smoother = 0.0;  // mean of that over 20 ms
-  double residue = 0.0;   // |mV - smooth|
-  double slope = 0.0;     // mV a 20 ms: difference of `smoother` over 20 ms
-  double energy = 0.0;    // mean of |slope| over 80 ms
-  double rough = 0.0;     // mV, mean of |mV - smooth| over 80 ms: what is too fast for a QRS complex
+  double despiked = 0.0;   // without spikes
+  double smooth = 0.0;     // mean of that over 20 ms
+  double smoother = 0.0;   // mean of that over 20 ms
+  double residue = 0.0;    // |mV - smooth|
+  double slope = 0.0;      // mV a 20 ms: difference of `smoother` over 20 ms
+  double energy = 0.0;     // mean of |slope| over 80 ms
+  double curvature = 0.0;  // mV a (20 ms)^2: difference of `slope` over 20 ms
+  double sharpness = 0.0;  // mean of |curvature| over 80 ms: what is above 15 Hz, where P and T waves hardly reach
+  double rough = 0.0;      // mV, mean of |mV - smooth| over 80 ms: what is too fast for a QRS complex
 };
 
 class EcgFilter {
@@ -54,6 +56,7 @@ class EcgFilter {
   [[nodiscard]] int smooth_delay() const noexcept { return spike_half_ + smooth_width_ / 2; }
   [[nodiscard]] int slope_delay() const noexcept { return spike_half_ + (3 * smooth_width_ - 2) / 2; }
   [[nodiscard]] int energy_delay() const noexcept { return slope_delay() + (energy_width_ - 1) / 2; }
+  [[nodiscard]] int sharpness_delay() const noexcept { return energy_delay() + smooth_width_ / 2; }
   [[nodiscard]] int energy_width() const noexcept { return energy_width_; }
 
  private:

@@ -21,18 +21,17 @@ class RecentValues {
     next_ = 0;
     count_ = 0;
   }
-  void scale(double factor) noexcept {
-    for (double& value : values_) value *= factor;
-  }
   [[nodiscard]] int count() const noexcept { return count_; }
   // Of an even number of values the upper of the middle two. At least one must be held.
   [[nodiscard]] double median() const noexcept {
     auto sorted = values_;
     return upper_median(sorted.begin(), sorted.begin() + count_);
   }
+  // At least one must be held.
+  [[nodiscard]] double newest() const noexcept { return values_[static_cast<std::size_t>((next_ + N - 1) % N)]; }
   // Of the newest two, or the only one.
   [[nodiscard]] double mean_of_last_two() const noexcept {
-    const double last = values_[static_cast<std::size_t>((next_ + N - 1) % N)];
+    const double last = newest();
     return count_ < 2 ? last : 0.5 * (last + values_[static_cast<std::size_t>((next_ + N - 2) % N)]);
   }
 

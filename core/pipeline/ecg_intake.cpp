@@ -72,7 +72,7 @@ void EcgIntake::push(const RTriggerPulse& pulse) noexcept {
 
 void EcgIntake::forget_when_asked() noexcept {
   if (!forget_asked_.exchange(false, std::memory_order_relaxed)) return;
-  beats_ = BeatFinder();
+  beats_.restart();
   if (trigger_) trigger_.emplace(*settings_.r_trigger);
   trigger_classer_ = BeatClasser();
   tracker_ = CardiacClockTracker(settings_.clock);

@@ -1,0 +1,482 @@
+#include "core/phase/beat_decision.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace perimap {
+
+// ---- levels
+
+void BeatLevels::learn(const QrsCandidate& beat) noexcept {
+  energy_.push(beat.energy);
+  sharpness_.push(beat.sharpness);
+  slope_.push(beat.slope);
+}
+
+void BeatLevels::turn(const QrsCandidate& beat, const DecisionSettings& settings) noexcept {
+  const bool known = polarity().known;
+  const double keep = known ? 1.0 - 1.0 / settings.polarity_memory : 0.0;
+  const double hysteresis = known ? settings.polarity_hysteresis : 1.0;
+  upward_ = keep * upward_ + (1.0 - keep) * beat.upward;
+  downward_ = keep * downward_ + (1.0 - keep) * beat.downward;
+  if (points_up_ ? downward_ > hysteresis * upward_ : upward_ >= hysteresis * downward_) points_up_ = !points_up_;
+}
+
+void BeatLevels::forget_size() noexcept {
+  energy_.clear();
+  sharpness_.clear();
+  slope_.clear();
+}
+
+void BeatLevels::clear() noexcept {
+  forget_size();
+  upward_ = 0.0;
+  downward_ = 0.0;
+  points_up_ = true;
+}
+
+double BeatLevels::size(const QrsCandidate& candidate) const noexcept {
+  if (!known()) return 1.0;
+  return std::sqrt(candidate.energy / energy() * candidate.sharpness / sharpness());
+}
+
+// ---- decision
+
+void BeatDecision::forget() noexcept {
+  clusters_.clear();
+  beats_.clear();
+  rr_s_.clear();
+  rhythm_ = {};
+  rr_deviation_ = 0.05;
+  beats_told_ = 0;
+  changed_count_ = 0;
+  disturbances_ = 0.0;
+  count_ = 0;
+  has_last_ = false;
+}
+
+void BeatDecision::fall_silent() noexcept {
+  beats_.forget_size();
+  told_since_silence_ = 0;
+}
+
+void BeatDecision::restart(Instant now) noexcept {
+  count_ = 0;
+  has_last_ = false;
+  since_ = now;
+  seen_.fill({});
+}
+
+void BeatDecision::burst() noexcept { count_ = 0; }
+
+bool BeatDecision::learning(Instant now) const noexcept {
+  if (beats_told_ == 0) return true;
+  const double since_s = to_seconds(now - (has_last_ ? last_.time : since_));
+  return since_s > settings_.silence_s && since_s > settings_.silence_cycles * rhythm_.cycle_s;
+}
+
+double BeatDecision::disturbed(Instant t) const noexcept {
+  return disturbances_ * std::exp(-std::max(to_seconds(t - disturbed_at_), 0.0) / settings_.disturbance_memory_s);
+}
+
+bool BeatDecision::chaotic(Instant now) const noexcept {
+  return disturbed(now) > settings_.chaos && now - familiar_at_ > settings_.chaos_after;
+}
+
+bool BeatDecision::in_burst(Instant now) const noexcept {
+  return beats_.known() && clusters_.any_settled() && disturbed(now) > settings_.much_noise;
+}
+
+bool BeatDecision::noisy(Instant now) const noexcept { return disturbed(now) > settings_.some_noise; }
+
+void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex, Instant now) noexcept {
+  if (candidate.shape.points == 0) return;
+  if (has_last_ && candidate.time - last_.time < one_complex) return;
+  // Of two that are one complex the larger is its middle; the first, which was found by its shape, if they are alike.
+  for (int i = 0; i < count_; ++i) {
+    const QrsCandidate& other = waiting_[static_cast<std::size_t>(i)].candidate;
+    const Duration apart = candidate.time - other.time;
+    if (apart >= one_complex || -apart >= one_complex) continue;
+    if (candidate.energy < settings_.larger * other.energy) return;
+    remove_at(i--);
+  }
+  if (count_ == BeatPath::kMost) {
+    const auto least = std::min_element(waiting_.begin(), waiting_.end(), [](const Waiting& a, const Waiting& b) {
+      return a.probability < b.probability;
+    });
+    refuse(*least);
+    remove_at(static_cast<int>(least - waiting_.begin()));
+  }
+  Waiting waiting;
+  waiting.candidate = candidate;
+  const ClusterMatch match = clusters_.nearest(candidate.shape, settings_.displaced);
+  waiting.correlation = match.correlation;
+  waiting.gain = match.gain;
+  waiting.cluster = match.correlation > 0.0 ? match.of : -1;
+  const bool large = candidate.energy > settings_.cluster_of_quiet * levels_.quiet() &&
+                     candidate.energy > settings_.cluster_of_top * levels_.top_energy();
+  int learnt = -1;
+  if (large) {
+    learnt = clusters_.learn(candidate.shape, candidate.points_up, disturbed(candidate.time) < settings_.some_noise,
+                             candidate.time);
+    if (waiting.cluster >= 0 && learnt != waiting.cluster && !clusters_.recurs(waiting.cluster)) waiting.cluster = -1;
+    note_followers(candidate, learnt);
+  }
+  waiting.sharpest_before = sharpest_before(candidate.time);
+  waiting.log_odds = by_itself(waiting);
+  clusters_.judged(learnt, waiting.log_odds);
+  if (learnt >= 0) note_crowding(waiting);
+  if (beats_.known() && candidate.energy > settings_.too_large * beats_.energy()) note_disturbance(candidate.time, 1.0);
+  int at = count_;
+  while (at > 0 && waiting_[static_cast<std::size_t>(at - 1)].candidate.time > candidate.time) {
+    waiting_[static_cast<std::size_t>(at)] = waiting_[static_cast<std::size_t>(at - 1)];
+    --at;
+  }
+  waiting_[static_cast<std::size_t>(at)] = waiting;
+  ++count_;
+  weigh(now);
+}
+
+// A complex as sharp as others before it, within a PR interval: those may be P waves.
+void BeatDecision::note_followers(const QrsCandidate& candidate, int cluster) noexcept {
+  for (Seen& seen : seen_) {
+    if (!seen.waits) continue;
+    const Duration apart = candidate.time - seen.time;
+    if (apart < settings_.pr_shortest || apart > settings_.pr_longest) continue;
+    const double sharper = seen.cluster == cluster ? settings_.sharper_of_one_kind : settings_.as_sharp;
+    if (candidate.sharpness < sharper * seen.sharpness) continue;
+    clusters_.followed(seen.cluster, true);
+    seen.waits = false;
+  }
+  seen_[static_cast<std::size_t>(next_seen_)] = {candidate.time, candidate.sharpness, cluster, true, -10.0};
+  next_seen_ = (next_seen_ + 1) % kSeen;
+}
+
+// Two complexes that each look like a QRS by themselves, closer than ventricles can contract: arcs, a loose cable.
+void BeatDecision::note_crowding(const Waiting& waiting) noexcept {
+  Seen& newest = seen_[static_cast<std::size_t>((next_seen_ + kSeen - 1) % kSeen)];
+  newest.log_odds = waiting.log_odds;
+  // Before any kind is settled a P wave looks like a QRS complex as well.
+  if (waiting.log_odds < settings_.qrs_like || !clusters_.any_settled()) return;
+  for (const Seen& seen : seen_) {
+    const Duration apart = newest.time - seen.time;
+    if (seen.log_odds < settings_.qrs_like || apart < settings_.crowd_from || apart > settings_.crowd_to) continue;
+    note_disturbance(newest.time, 0.7);
+    return;
+  }
+}
+
+void BeatDecision::expire_followers(Instant now) noexcept {
+  for (Seen& seen : seen_) {
+    if (!seen.waits || now - seen.time < settings_.time_to_decide + settings_.pr_longest / 2) continue;
+    clusters_.followed(seen.cluster, false);
+    seen.waits = false;
+  }
+}
+
+// Of the complexes within the T wave's time before.
+double BeatDecision::sharpest_before(Instant t) const noexcept {
+  double sharpest = 0.0;
+  for (const Seen& seen : seen_) {
+    const Duration apart = t - seen.time;
+    if (seen.sharpness > 0.0 && apart > settings_.t_wave_begins && apart < settings_.t_wave_ends) {
+      sharpest = std::max(sharpest, seen.sharpness);
+    }
+  }
+  return sharpest;
+}
+
+double BeatDecision::like(const Waiting& waiting) const noexcept {
+  if (!clusters_.recurs(waiting.cluster)) return 0.0;
+  // A beat may be small, but a P or T wave is not suddenly large. And what recurs in bursts alone speaks for no beat.
+  const bool of_waves = clusters_.log_odds(waiting.cluster) < 0.0;
+  if (!of_waves && !clusters_.settled(waiting.cluster)) return 0.0;
+  return likeness(waiting.correlation, of_waves ? std::max(waiting.gain, 1.0) : 1.0);
+}
+
+// It is of a kind that is known not to be a P wave, and no noise is near that the beat might be still to come after.
+bool BeatDecision::followed_by_none(const Waiting& waiting) const noexcept {
+  return waiting.disturbed <= settings_.some_noise && familiar(waiting) &&
+         clusters_.followers_known(waiting.cluster) >= 3.0 &&
+         clusters_.followers(waiting.cluster) < settings_.followed_by_chance;
+}
+
+// Noise that stands where a beat is due, or a beat: nobody can tell.
+bool BeatDecision::unknown_in_noise(const Waiting& waiting) const noexcept {
+  return clusters_.any_settled() && disturbed(waiting.candidate.time) > settings_.burst && !familiar(waiting);
+}
+
+// Like a settled kind that looks like a QRS complex.
+bool BeatDecision::familiar(const Waiting& waiting) const noexcept {
+  return clusters_.settled(waiting.cluster) && waiting.correlation >= settings_.familiar &&
+         clusters_.log_odds(waiting.cluster) > 0.0 && !unlike_any_beat(waiting.candidate);
+}
+
+// The line goes to another level, or what is too fast for a heart is nearly as large: an electrode that moves, arcs.
+bool BeatDecision::unlike_any_beat(const QrsCandidate& candidate) const noexcept {
+  return candidate.step > settings_.most_step || candidate.rough > settings_.most_rough * candidate.energy;
+}
+
+bool BeatDecision::strange(const Waiting& waiting) const noexcept {
+  return beats_.known() && (waiting.correlation < settings_.familiar || unlike_any_beat(waiting.candidate)) &&
+         beats_.size(waiting.candidate) > settings_.size_of_disturbance;
+}
+
+EvidenceOf<ComplexEvidence> BeatDecision::complex_evidence(const Waiting& waiting) const noexcept {
+  ComplexContext context;
+  context.top_energy = levels_.top_energy();
+  context.top_sharpness = levels_.top_sharpness();
+  context.quiet_energy = levels_.quiet();
+  if (clusters_.recurs(waiting.cluster)) {
+    context.followed =
+        likeness(waiting.correlation, std::max(waiting.gain, 1.0)) * clusters_.followers(waiting.cluster);
+  }
+  context.sharpest_before = waiting.sharpest_before;
+  return evidence_of(waiting.candidate, context);
+}
+
+double BeatDecision::by_itself(const Waiting& waiting) const noexcept {
+  const auto evidence = complex_evidence(waiting);
+  // Bare noise recurs as well as beats do, if not as exactly, and there is nothing yet to hold it against.
+  const bool learning = std::min(beats_told_, told_since_silence_) < settings_.beats_at_start;
+  if (learning && !familiar(waiting) && waiting.correlation < settings_.exactly_alike &&
+      evidence[static_cast<std::size_t>(ComplexEvidence::kQuiet)] < settings_.stand_out) {
+    return -settings_.most_odds;
+  }
+  return std::clamp(log_odds(evidence, weights_.complex), -settings_.most_odds, settings_.most_odds);
+}
+
+void BeatDecision::weigh(Instant now) noexcept {
+  evaluated_at_ = now;
+  BeatContext context;
+  context.any_recurs = clusters_.any_settled();
+  for (int i = 0; i < count_; ++i) {
+    Waiting& waiting = waiting_[static_cast<std::size_t>(i)];
+    waiting.log_odds = by_itself(waiting);
+    context.complex_log_odds = waiting.log_odds;
+    context.like = like(waiting);
+    context.gain = waiting.gain;
+    context.cluster_log_odds = context.like > 0.0 ? clusters_.log_odds(waiting.cluster) : 0.0;
+    waiting.disturbed = disturbed(waiting.candidate.time);
+    context.disturbed = waiting.disturbed;
+    context.strangers = 0.0;
+    for (int k = 0; k < count_; ++k) {
+      const Waiting& other = waiting_[static_cast<std::size_t>(k)];
+      const Duration apart = other.candidate.time - waiting.candidate.time;
+      if (k != i && apart < settings_.around && -apart < settings_.around && strange(other)) context.strangers += 1.0;
+    }
+    waiting.evidence = evidence_of(context);
+  }
+  path_.weigh(
+      count_, [&](int before, int candidate) { return odds(before, candidate); },
+      [&](int last) {
+        if (last < 0 && !has_last_) return std::max(rhythm_.survival(to_seconds(now - since_)), settings_.unheard);
+        const Instant from = last >= 0 ? waiting_[static_cast<std::size_t>(last)].candidate.time : last_.time;
+        return rhythm_.survival(to_seconds(now - from) - 0.1);
+      });
+  for (int i = 0; i < count_; ++i) waiting_[static_cast<std::size_t>(i)].probability = path_.probability(i);
+}
+
+// With what the beat before tells: another that waits, or with -1 the last one told.
+EvidenceOf<BeatEvidence> BeatDecision::paired(int before, int candidate) const noexcept {
+  const Waiting& waiting = waiting_[static_cast<std::size_t>(candidate)];
+  EvidenceOf<BeatEvidence> evidence = waiting.evidence;
+  if (before < 0 && !has_last_) return evidence;
+  const QrsCandidate& last = before < 0 ? last_ : waiting_[static_cast<std::size_t>(before)].candidate;
+  PairContext pair;
+  pair.rr_s = to_seconds(waiting.candidate.time - last.time);
+  pair.cycle_s = rhythm_.cycle_s > 0.0 ? rhythm_.cycle_s : 0.8;
+  pair.log_rhythm = rhythm_.log_density(pair.rr_s);
+  pair.disturbed = waiting.disturbed;
+  pair.before_sharpness = last.sharpness;
+  pair.sharpness = waiting.candidate.sharpness;
+  add_pair(pair, evidence);
+  return evidence;
+}
+
+double BeatDecision::odds(int before, int candidate) const noexcept {
+  const Waiting& waiting = waiting_[static_cast<std::size_t>(candidate)];
+  const bool follows = before >= 0 || has_last_;
+  const QrsCandidate& last = before >= 0 ? waiting_[static_cast<std::size_t>(before)].candidate : last_;
+  if (follows && waiting.candidate.time - last.time < settings_.refractory) return settings_.excluded;
+  // The filters see a step where the line begins.
+  if (waiting.candidate.time - since_ < settings_.begins && clusters_.any_recurs() &&
+      (waiting.correlation < settings_.very_familiar || waiting.cluster < 0 ||
+       clusters_.log_odds(waiting.cluster) < settings_.qrs_like)) {
+    return settings_.excluded;
+  }
+  return log_odds(paired(before, candidate), weights_.beat);
+}
+
+// It is a beat, and what comes after it would hardly change that.
+bool BeatDecision::known(const Waiting& waiting, Instant now, bool ending) const noexcept {
+  const Duration age = now - waiting.candidate.time;
+  if (age < settings_.cut_off && waiting.probability < settings_.certain) return false;
+  const bool starting = beats_told_ < settings_.beats_at_start && !familiar(waiting);
+  const bool stranger = clusters_.any_settled() && !familiar(waiting);
+  const bool may_be_followed = clusters_.followers(waiting.cluster) >= settings_.followed_by_chance;
+  if (!starting && !stranger && !may_be_followed && waiting.probability >= settings_.sure &&
+      waiting.log_odds >= settings_.sure_by_itself) {
+    return true;
+  }
+  const bool new_one = !clusters_.recurs(waiting.cluster) || waiting.correlation < settings_.familiar;
+  const bool early = waiting.disturbed <= settings_.some_noise && has_last_ &&
+                     to_seconds(waiting.candidate.time - last_.time) < settings_.before_due * rhythm_.cycle_s;
+  const Duration beside = new_one && !early ? settings_.time_of_strangers : settings_.time_if_known;
+  if (!starting && stranger && waiting.probability >= settings_.sure && age >= beside) return true;
+  const Duration time = starting                    ? settings_.time_at_start
+                        : followed_by_none(waiting) ? settings_.time_if_known
+                                                    : settings_.time_to_decide;
+  return (ending || age >= time) && waiting.probability > settings_.more_likely;
+}
+
+void BeatDecision::decide(Instant now, bool ending) noexcept {
+  expire_followers(now);
+  if (count_ == 0) return;
+  if (now - evaluated_at_ >= settings_.evaluate_every || ending) weigh(now);
+  for (bool again = true; again && count_ > 0;) {
+    again = false;
+    for (int i = 0; i < count_; ++i) {
+      if (!known(waiting_[static_cast<std::size_t>(i)], now, ending)) continue;
+      accept(i, now);
+      again = true;
+      break;
+    }
+  }
+  while (count_ > 0 && (ending || now - waiting_[0].candidate.time > settings_.too_late)) {
+    refuse(waiting_[0]);
+    remove_first(1);
+  }
+}
+
+// Those before it that are beats, given that it is one, are told first.
+void BeatDecision::accept(int index, Instant now) noexcept {
+  const Waiting accepted = waiting_[static_cast<std::size_t>(index)];
+  BeatPath before;
+  before.weigh(
+      index, [&](int b, int c) { return odds(b, c); }, [&](int last) { return std::exp(odds(last, index)); });
+  std::array<bool, BeatPath::kMost> taken{};
+  std::array<double, BeatPath::kMost> probability{};
+  for (int i = 0; i < index; ++i) {
+    probability[static_cast<std::size_t>(i)] = before.probability(i);
+    taken[static_cast<std::size_t>(i)] = before.probability(i) > settings_.more_likely;
+  }
+  for (int i = 0; i < index; ++i) {
+    Waiting& waiting = waiting_[static_cast<std::size_t>(i)];
+    if (taken[static_cast<std::size_t>(i)]) {
+      waiting.probability = probability[static_cast<std::size_t>(i)];
+      tell(waiting, now);
+    } else {
+      refuse(waiting);
+    }
+  }
+  tell(accepted, now);
+  remove_first(index + 1);
+  // What is of the same complex, or too soon after it.
+  while (count_ > 0 && waiting_[0].candidate.time - last_.time < std::chrono::milliseconds(60)) remove_first(1);
+  weigh(now);
+}
+
+void BeatDecision::refuse(const Waiting& waiting) noexcept {
+  if (strange(waiting)) note_disturbance(waiting.candidate.time, 1.0);
+}
+
+void BeatDecision::note_disturbance(Instant t, double weight) noexcept {
+  disturbances_ = std::min(disturbed(t) + weight, settings_.most_disturbances);
+  disturbed_at_ = std::max(t, disturbed_at_);
+}
+
+// What is seen for the first time or in a burst may be anything, however much it looks like a beat.
+double BeatDecision::confidence(const Waiting& waiting, bool familiar, Instant now) const noexcept {
+  const double noise = disturbed(now);
+  const bool settled = familiar && now - clusters_.born(waiting.cluster) > settings_.longer_than_bursts &&
+                       clusters_.settled(waiting.cluster);
+  const bool young = !settled && now - since_ > settings_.longer_than_bursts;
+  // An arc that looks like a beat comes at any time, and hardly as large as one.
+  const double rr_s = has_last_ ? to_seconds(waiting.candidate.time - last_.time) : rhythm_.cycle_s;
+  const bool another = waiting.correlation < settings_.very_familiar ||
+                       std::abs(std::log(std::max(waiting.gain, 1e-3))) > settings_.same_gain;
+  const bool out_of_place = rr_s < (another ? settings_.early : settings_.very_early) * rhythm_.cycle_s;
+  const bool early_in_noise = another && noise > settings_.much_noise && rr_s < settings_.before_due * rhythm_.cycle_s;
+  if (early_in_noise) return std::min(waiting.probability, settings_.early_in_noise);
+  if (unknown_in_noise(waiting)) return std::min(waiting.probability, settings_.lost_in_noise);
+  const bool doubtful = young || unlike_any_beat(waiting.candidate) || (!familiar && clusters_.any_recurs()) ||
+                        noise > settings_.burst || out_of_place || (noise > settings_.some_noise && !settled);
+  return doubtful ? std::min(waiting.probability, settings_.doubtful) : waiting.probability;
+}
+
+// Beats in a row that are alike, and of no kind known from before: the gain or the conduction has changed, or the
+// electrodes sit elsewhere. They are the usual beats from now on.
+void BeatDecision::follow_change(const Waiting& waiting, bool familiar) noexcept {
+  const bool alike = !familiar && clusters_.recurs(waiting.cluster) &&
+                     waiting.correlation >= settings_.surely_familiar && !unlike_any_beat(waiting.candidate);
+  changed_count_ = !alike ? 0 : waiting.cluster == changed_to_ ? changed_count_ + 1 : 1;
+  changed_to_ = waiting.cluster;
+  if (changed_count_ < settings_.changed_after) return;
+  changed_count_ = 0;
+  clusters_.settle(waiting.cluster);
+  beats_.forget_size();
+  disturbances_ = 0.0;
+}
+
+void BeatDecision::tell(const Waiting& waiting, Instant now) noexcept {
+  const QrsCandidate& candidate = waiting.candidate;
+  const bool familiar = this->familiar(waiting);
+  follow_change(waiting, familiar);
+  const bool learnt = waiting.probability >= settings_.learnt;
+  if (familiar || !beats_.known() || (learnt && !clusters_.any_recurs())) beats_.learn(candidate);
+  beats_.turn(candidate, settings_);
+
+  RPeak peak;
+  peak.time = candidate.time;
+  peak.shape = candidate.shape;
+  peak.deviation = candidate.deviation;
+  if (unknown_in_noise(waiting)) peak.deviation = from_seconds(settings_.doubtful_deviation_s);
+  peak.confidence = confidence(waiting, familiar, now);
+  if (strange(waiting)) note_disturbance(candidate.time, 0.5);
+  if (familiar) familiar_at_ = candidate.time;
+  if (peak.time <= now && queue_count_ < kQueue) {
+    peak.detected_at = now;
+    queue_[static_cast<std::size_t>((queue_begin_ + queue_count_) % kQueue)] = peak;
+    ++queue_count_;
+  }
+  learn_rhythm(waiting);
+  last_ = candidate;
+  last_probability_ = waiting.probability;
+  has_last_ = true;
+  ++beats_told_;
+  ++told_since_silence_;
+}
+
+void BeatDecision::learn_rhythm(const Waiting& waiting) noexcept {
+  if (!has_last_ || std::min(waiting.probability, last_probability_) < settings_.learnt) return;
+  const double rr_s = to_seconds(waiting.candidate.time - last_.time);
+  if (rhythm_.cycle_s > 0.0) {
+    const double off = std::min(std::abs(std::log(rr_s / rhythm_.cycle_s)), 0.7);
+    rr_deviation_ += (off - rr_deviation_) / 12.0;
+  }
+  rr_s_.push(rr_s);
+  const double usual_s = rr_s_.count() < 8 ? std::max(rr_s_.median(), rr_s_.mean_of_last_two()) : rr_s_.median();
+  rhythm_.cycle_s = std::min(usual_s, settings_.slowest_cycle_s);
+  rhythm_.spread = std::clamp(1.25 * rr_deviation_, 0.06, 0.4);
+}
+
+void BeatDecision::remove_first(int count) noexcept {
+  std::copy(waiting_.begin() + count, waiting_.begin() + count_, waiting_.begin());
+  count_ -= count;
+}
+
+void BeatDecision::remove_at(int index) noexcept {
+  std::copy(waiting_.begin() + index + 1, waiting_.begin() + count_, waiting_.begin() + index);
+  --count_;
+}
+
+std::optional<RPeak> BeatDecision::pop() noexcept {
+  if (queue_count_ == 0) return std::nullopt;
+  const RPeak peak = queue_[static_cast<std::size_t>(queue_begin_)];
+  queue_begin_ = (queue_begin_ + 1) % kQueue;
+  --queue_count_;
+  return peak;
+}
+
+}  // namespace perimap

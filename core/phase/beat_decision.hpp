@@ -1,0 +1,154 @@
+// Decides which candidates are R peaks, when that is known, and how sure.
+//
+// Candidates wait here until they are sure one way or the other. Each is held against levels, clusters and disturbances
+// (qrs_evidence), and all that wait against each other and the rhythm (beat_path).
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "core/phase/beat_path.hpp"
+#include "core/phase/ecg_levels.hpp"
+#include "core/phase/qrs_candidate.hpp"
+#include "core/phase/qrs_clusters.hpp"
+#include "core/phase/qrs_evidence.hpp"
+#include "core/phase/r_peak.hpp"
+#include "core/phase/r_peak_detector_settings.hpp"
+#include "core/phase/recent_values.hpp"
+
+namespace perimap {
+
+// What the last beats were like.
+class BeatLevels {
+ public:
+  void learn(const QrsCandidate& beat) noexcept;
+  void turn(const QrsCandidate& beat, const DecisionSettings& settings) noexcept;  // polarity and excursions
+  void forget_size() noexcept;
+  void clear() noexcept;
+
+  [[nodiscard]] bool known() const noexcept { return energy_.count() > 0; }
+  [[nodiscard]] double energy() const noexcept { return known() ? energy_.median() : 0.0; }
+  [[nodiscard]] double sharpness() const noexcept { return known() ? sharpness_.median() : 0.0; }
+  [[nodiscard]] double slope() const noexcept { return known() ? slope_.median() : 0.0; }
+  [[nodiscard]] Polarity polarity() const noexcept { return {upward_ > 0.0 || downward_ > 0.0, points_up_}; }
+  [[nodiscard]] double excursions() const noexcept { return upward_ + downward_; }
+  // 1 for the usual beat.
+  [[nodiscard]] double size(const QrsCandidate& candidate) const noexcept;
+
+ private:
+  RecentValues<8> energy_;
+  RecentValues<8> sharpness_;
+  RecentValues<8> slope_;
+  double upward_ = 0.0;  // excursions of the beats so far, fading mean
+  double downward_ = 0.0;
+  bool points_up_ = true;
+};
+
+class BeatDecision {
+ public:
+  BeatDecision(const DecisionSettings& settings, const EcgLevels& levels) noexcept
+      : settings_(settings), levels_(levels) {}
+
+  // A complex was measured. `one_complex`: what is nearer to another is the same.
+  void consider(const QrsCandidate& candidate, Duration one_complex, Instant now) noexcept;
+  // Time has passed: tells beats that have become known.
+  void decide(Instant now, bool ending) noexcept;
+  void restart(Instant now) noexcept;  // the line was broken off: what waits is lost
+  void forget() noexcept;
+  void fall_silent() noexcept;  // no beat has come for some time: the gain may have changed, or there are none
+  void burst() noexcept;        // nothing can be seen: what waits in it is no beat
+
+  [[nodiscard]] std::optional<RPeak> pop() noexcept;
+  [[nodiscard]] const BeatLevels& beats() const noexcept { return beats_; }
+  [[nodiscard]] const QrsClusters& clusters() const noexcept { return clusters_; }
+  // Nothing like beats is known, or none has come for some time.
+  [[nodiscard]] bool learning(Instant now) const noexcept;
+  [[nodiscard]] bool noisy(Instant now) const noexcept;
+  // What is seen now is no measure of beats.
+  [[nodiscard]] bool in_burst(Instant now) const noexcept;
+  // So many disturbances, and no beat of a known kind among them, that the lead may be off.
+  [[nodiscard]] bool chaotic(Instant now) const noexcept;
+
+ private:
+  static constexpr int kSeen = 8;
+  static constexpr int kQueue = BeatPath::kMost + 4;
+
+  struct Waiting {
+    QrsCandidate candidate;
+    int cluster = -1;
+    double correlation = 0.0;
+    double gain = 1.0;
+    double disturbed = 0.0;
+    double probability = 0.0;
+    double sharpest_before = 0.0;         // within the T wave's time
+    double log_odds = 0.0;                // of the complex alone
+    EvidenceOf<BeatEvidence> evidence{};  // but for that of pairs
+  };
+  // For what follows complexes.
+  struct Seen {
+    Instant time;
+    double sharpness = 0.0;
+    int cluster = -1;
+    bool waits = false;
+    double log_odds = -10.0;  // by itself
+  };
+
+  void note_followers(const QrsCandidate& candidate, int cluster) noexcept;
+  void note_crowding(const Waiting& waiting) noexcept;
+  void expire_followers(Instant now) noexcept;
+  [[nodiscard]] EvidenceOf<ComplexEvidence> complex_evidence(const Waiting& waiting) const noexcept;
+  [[nodiscard]] double by_itself(const Waiting& waiting) const noexcept;
+  void weigh(Instant now) noexcept;
+  [[nodiscard]] double sharpest_before(Instant t) const noexcept;
+  [[nodiscard]] double like(const Waiting& waiting) const noexcept;  // to its cluster, where that recurs
+  [[nodiscard]] bool followed_by_none(const Waiting& waiting) const noexcept;
+  [[nodiscard]] bool unknown_in_noise(const Waiting& waiting) const noexcept;
+  [[nodiscard]] bool familiar(const Waiting& waiting) const noexcept;
+  [[nodiscard]] bool unlike_any_beat(const QrsCandidate& candidate) const noexcept;
+  [[nodiscard]] bool strange(const Waiting& waiting) const noexcept;
+  [[nodiscard]] EvidenceOf<BeatEvidence> paired(int before, int candidate) const noexcept;
+  [[nodiscard]] double odds(int before, int candidate) const noexcept;
+  [[nodiscard]] bool known(const Waiting& waiting, Instant now, bool ending) const noexcept;
+  void accept(int index, Instant now) noexcept;
+  void tell(const Waiting& waiting, Instant now) noexcept;
+  void refuse(const Waiting& waiting) noexcept;
+  void note_disturbance(Instant t, double weight) noexcept;
+  [[nodiscard]] double confidence(const Waiting& waiting, bool familiar, Instant now) const noexcept;
+  void remove_first(int count) noexcept;
+  void remove_at(int index) noexcept;
+  void learn_rhythm(const Waiting& waiting) noexcept;
+  void follow_change(const Waiting& waiting, bool familiar) noexcept;
+  [[nodiscard]] double disturbed(Instant t) const noexcept;
+
+  const DecisionSettings& settings_;
+  const EcgLevels& levels_;
+  EvidenceWeights weights_ = kFittedWeights;
+  QrsClusters clusters_;
+  BeatLevels beats_;
+  RhythmModel rhythm_;
+  RecentValues<8> rr_s_;
+  double rr_deviation_ = 0.05;  // fading mean of |log(interval / cycle)|
+  BeatPath path_;
+  std::array<Waiting, BeatPath::kMost> waiting_{};  // in order of time
+  int count_ = 0;
+  std::array<Seen, kSeen> seen_{};
+  int next_seen_ = 0;
+  bool has_last_ = false;
+  QrsCandidate last_;  // the last beat
+  double last_probability_ = 0.0;
+  Instant since_;  // beats have been looked for
+  int beats_told_ = 0;
+  int told_since_silence_ = 0;
+  int changed_to_ = -1;    // the cluster of the last beat, when it was of no settled kind,
+  int changed_count_ = 0;  // and how many in a row were of it
+  double disturbances_ = 0.0;
+  Instant disturbed_at_;
+  Instant familiar_at_;  // of the last beat of a settled kind
+  Instant evaluated_at_;
+
+  std::array<RPeak, kQueue> queue_{};
+  int queue_begin_ = 0;
+  int queue_count_ = 0;
+};
+
+}  // namespace perimap

@@ -1,0 +1,58 @@
+// The levels of an ECG that go by the signal alone, not by what is taken for a beat: its quiet part, its largest
+// complexes, its roughness. What goes by them cannot be locked on to the wrong wave.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/phase/ecg_filter.hpp"
+#include "core/phase/r_peak_detector_settings.hpp"
+#include "core/phase/recent_values.hpp"
+
+namespace perimap {
+
+class EcgLevels {
+ public:
+  explicit EcgLevels(const EcgLevelSettings& settings) noexcept : settings_(settings) {}
+
+  // The filter has a new sample. `beat_slope`: of the usual beat, 0 where none is known. `burst`: among disturbances,
+  // whose complexes are no measure.
+  void follow(const EcgFilter& filter, double beat_slope, bool burst) noexcept;
+  void restart() noexcept;  // the line was broken off
+  void forget() noexcept;
+  void forget_top() noexcept;  // but for that of the last window: no complex of late is as large as those before
+
+  [[nodiscard]] double quiet() const noexcept { return quiet_level_; }                  // energy
+  [[nodiscard]] double top_energy() const noexcept { return top(energies_, energy_); }  // of the largest complexes
+  [[nodiscard]] double top_sharpness() const noexcept { return top(sharpnesses_, sharpness_); }
+  // Nothing can be seen, for the line is too rough, from then to then; of the last such stretch.
+  [[nodiscard]] Instant rough_since() const noexcept { return rough_since_; }
+  [[nodiscard]] Instant rough_until() const noexcept { return rough_until_; }
+  [[nodiscard]] bool rough(Instant t) const noexcept { return t > rough_since_ && t < rough_until_; }
+
+ private:
+  static constexpr int kQuietHistory = 128;  // energies, one each 20 ms
+  static constexpr int kWindows = 8;
+
+  void follow_quiet(const EcgFilter& filter) noexcept;
+  void follow_top(const EcgFilter& filter, bool burst) noexcept;
+  void follow_roughness(const EcgFilter& filter, double beat_slope) noexcept;
+  [[nodiscard]] static double top(const RecentValues<kWindows>& windows, double current) noexcept;
+
+  EcgLevelSettings settings_;
+  std::array<double, kQuietHistory> quiet_{};
+  std::int64_t quiet_count_ = 0;
+  double quiet_level_ = 0.0;
+  RecentValues<kWindows> energies_;
+  RecentValues<kWindows> sharpnesses_;
+  double energy_ = 0.0;  // largest of the current window
+  double sharpness_ = 0.0;
+  Instant window_began_;
+  bool in_window_ = false;
+  double rough_level_ = 0.0;  // the lowest of late
+  Instant smooth_at_;         // the last instant that was not rough
+  Instant rough_since_;
+  Instant rough_until_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,16 @@
+// What an ECG lead is good for at the moment.
+#pragma once
+
+#include <cstdint>
+
+namespace perimap {
+
+enum class EcgSignal : std::uint8_t {
+  kLearning,  // nothing has stood out from the noise yet, or for some cycles
+  kGood,
+  kNoisy,    // disturbances of a beat's size within the last seconds
+  kFlat,     // the value has hardly changed: a lead that is off, or an amplifier at its limit
+  kLeadOff,  // said by the device, samples that are missing, or a line that swings as no heart does
+};
+
+}  // namespace perimap

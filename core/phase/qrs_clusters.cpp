@@ -1,0 +1,120 @@
+#include "core/phase/qrs_clusters.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace perimap {
+namespace {
+
+constexpr double kKeep = 0.99;  // of a cluster's weight from complex to complex
+constexpr double kSame = 0.85;  // correlation from which on a complex is of a cluster
+// A T wave may have the shape of a ventricular beat, but not its size.
+constexpr double kSameSize = 2.0;
+constexpr double kLeastGain = 0.25;  // of a beat whose shape is looked for: ten times less is not seen in noise
+constexpr double kSlowestLearning = 1.0 / 8.0;
+constexpr int kDisplaced = 3;         // steps, 15 ms
+constexpr double kMemory = 12.0;      // members that shares are of
+constexpr double kLongMemory = 60.0;  // a burst of 20 s must not outweigh the beats before it
+constexpr double kCaution = 2.0;      // members
+
+double root_mean_square(const QrsShape& shape) noexcept {
+  double sum = 0.0;
+  for (int i = 0; i < shape.points; ++i) {
+    const double slope = static_cast<double>(shape.slope[static_cast<std::size_t>(i)]);
+    sum += slope * slope;
+  }
+  return std::sqrt(sum / std::max(shape.points, 1));
+}
+
+}  // namespace
+
+ClusterMatch QrsClusters::nearest(const QrsShape& shape, int most_displaced) const noexcept {
+  ClusterMatch nearest;
+  for (int i = 0; i < kClusters; ++i) {
+    if (at(i).weight == 0.0) continue;
+    const ShapeMatch m = best_match(shape, at(i).shape, most_displaced);
+    const double gain = m.gain / at(i).size;
+    if (m.correlation <= nearest.correlation || gain > kSameSize || gain < 1.0 / kSameSize) continue;
+    nearest = {i, m.correlation, gain};
+  }
+  return nearest;
+}
+
+ClusterMatch QrsClusters::nearest_beat(const QrsShape& shape) const noexcept {
+  ClusterMatch nearest;
+  for (int i = 0; i < kClusters; ++i) {
+    if (!recurs(i) || log_odds(i) < 0.0) continue;
+    const ShapeMatch m = match(shape, at(i).shape);
+    const double gain = m.gain / at(i).size;
+    if (m.correlation <= nearest.correlation || gain < kLeastGain) continue;
+    nearest = {i, m.correlation, gain};
+  }
+  return nearest;
+}
+
+int QrsClusters::learn(const QrsShape& shape, bool upward, bool calm, Instant seen) noexcept {
+  const double size = root_mean_square(shape);
+  if (!(size > 0.0)) return -1;
+  for (Cluster& c : clusters_) c.weight *= kKeep;
+  ClusterMatch same = nearest(shape, kDisplaced);
+  if (same.correlation < kSame) {
+    const auto rarest = std::min_element(clusters_.begin(), clusters_.end(),
+                                         [](const Cluster& a, const Cluster& b) { return a.weight < b.weight; });
+    *rarest = {};
+    rarest->shape.points = shape.points;
+    rarest->upward = upward;
+    rarest->born = seen;
+    same.of = static_cast<int>(rarest - clusters_.begin());
+  }
+  Cluster& c = clusters_[static_cast<std::size_t>(same.of)];
+  c.weight += 1.0;
+  c.calm_known = std::min(c.calm_known + 1.0, kLongMemory);
+  c.calm += ((calm ? 1.0 : 0.0) - c.calm) / c.calm_known;
+  const double rate = std::max(1.0 / c.weight, kSlowestLearning);
+  for (int i = 0; i < shape.points; ++i) {
+    float& mean = c.shape.slope[static_cast<std::size_t>(i)];
+    mean += static_cast<float>(rate) * (shape.slope[static_cast<std::size_t>(i)] / static_cast<float>(size) - mean);
+  }
+  const auto norm = static_cast<float>(root_mean_square(c.shape));
+  if (norm > 0.0F) {
+    for (float& slope : c.shape.slope) slope /= norm;
+  }
+  c.sizes.push(size);
+  c.size = c.sizes.median();
+  return same.of;
+}
+
+void QrsClusters::judged(int of, double log_odds) noexcept {
+  if (of < 0) return;
+  Cluster& c = clusters_[static_cast<std::size_t>(of)];
+  c.judged = std::min(c.judged + 1.0, kMemory);
+  c.log_odds += (log_odds - c.log_odds) / c.judged;
+}
+
+double QrsClusters::log_odds(int i) const noexcept { return at(i).log_odds * at(i).judged / (at(i).judged + kCaution); }
+
+void QrsClusters::followed(int of, bool by_sharper) noexcept {
+  if (of < 0) return;
+  Cluster& c = clusters_[static_cast<std::size_t>(of)];
+  c.followed_known = std::min(c.followed_known + 1.0, kMemory);
+  c.followed += ((by_sharper ? 1.0 : 0.0) - c.followed) / c.followed_known;
+}
+
+void QrsClusters::settle(int of) noexcept {
+  Cluster& c = clusters_[static_cast<std::size_t>(of)];
+  c.calm = 1.0;
+  c.calm_known = kCaution;
+}
+
+bool QrsClusters::any_settled() const noexcept {
+  for (int i = 0; i < kClusters; ++i) {
+    if (settled(i)) return true;
+  }
+  return false;
+}
+
+bool QrsClusters::any_recurs() const noexcept {
+  return std::any_of(clusters_.begin(), clusters_.end(), [](const Cluster& c) { return c.weight >= kRecurs; });
+}
+
+}  // namespace perimap

@@ -1,0 +1,75 @@
+// The complexes that recur in a lead, beats and P and T waves alike, and which of them look like the QRS.
+//
+// A cluster is a running template of the slope's shape. How much its members look like QRS complexes by
+// themselves and what follows them is learnt of every member, whatever it was taken for: no wave is locked on to.
+#pragma once
+
+#include <array>
+
+#include "core/phase/qrs_shape.hpp"
+#include "core/phase/recent_values.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+struct ClusterMatch {
+  int of = -1;
+  double correlation = 0.0;
+  double gain = 1.0;  // to the size that its members have had lately
+};
+
+class QrsClusters {
+ public:
+  static constexpr int kClusters = 8;
+
+  // The cluster that a shape is most like, of all or of those that look like beats.
+  [[nodiscard]] ClusterMatch nearest(const QrsShape& shape, int most_displaced) const noexcept;
+  [[nodiscard]] ClusterMatch nearest_beat(const QrsShape& shape) const noexcept;
+
+  // A complex was seen. Gives the cluster that it now belongs to. `calm`: no disturbance was near.
+  int learn(const QrsShape& shape, bool upward, bool calm, Instant seen) noexcept;
+  // How much it looked like a QRS by itself.
+  void judged(int of, double log_odds) noexcept;
+  // Whether a complex as sharp or sharper followed it within a PR interval.
+  void followed(int of, bool by_sharper) noexcept;
+  // Its members are beats, though they were seen among disturbances.
+  void settle(int of) noexcept;
+  void clear() noexcept { clusters_.fill({}); }
+
+  // Seen often enough to be told from chance.
+  [[nodiscard]] bool recurs(int i) const noexcept { return i >= 0 && at(i).weight >= kRecurs; }
+  [[nodiscard]] bool any_recurs() const noexcept;
+  // Recurs, and was mostly seen in calm: arcs and noise recur as well, but in bursts.
+  [[nodiscard]] bool settled(int i) const noexcept { return recurs(i) && at(i).calm > kCalm; }
+  [[nodiscard]] bool any_settled() const noexcept;
+  [[nodiscard]] double log_odds(int i) const noexcept;  // mean of its members', cautious where there are few
+  [[nodiscard]] double followers(int i) const noexcept { return i < 0 ? 0.0 : at(i).followed; }  // share
+  // How many of its members it is known of whether something followed them, bounded.
+  [[nodiscard]] double followers_known(int i) const noexcept { return i < 0 ? 0.0 : at(i).followed_known; }
+  [[nodiscard]] Instant born(int i) const noexcept { return at(i).born; }  // its first member was seen
+  [[nodiscard]] bool upward(int i) const noexcept { return at(i).upward; }
+
+ private:
+  static constexpr double kRecurs = 2.5;
+  static constexpr double kCalm = 0.5;  // share of its members
+
+  struct Cluster {
+    QrsShape shape;  // root mean square 1
+    RecentValues<8> sizes;
+    double size = 0.0;
+    double weight = 0.0;  // members, older ones fading; 0: free
+    double log_odds = 0.0;
+    double judged = 0.0;  // members that it is of, bounded
+    double followed = 0.0;
+    double followed_known = 0.0;
+    double calm = 0.0;
+    double calm_known = 0.0;
+    bool upward = true;
+    Instant born;
+  };
+  [[nodiscard]] const Cluster& at(int i) const noexcept { return clusters_[static_cast<std::size_t>(i)]; }
+
+  std::array<Cluster, kClusters> clusters_{};
+};
+
+}  // namespace perimap

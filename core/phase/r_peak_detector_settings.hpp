@@ -1,0 +1,128 @@
+// The constants of the R peak detector that is made of EcgLine, EcgLevels, CandidateFinder and BeatDecision.
+//
+// "dev" as a reason: chosen on the development part of the records (docs/evidence/ecg.md), where its worth on the part
+// aside stands as well.
+#pragma once
+
+#include <array>
+#include <chrono>
+
+#include "core/phase/ecg_line.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+struct EcgLevelSettings {
+  Duration quiet_step = std::chrono::milliseconds(20);  // the energy is a mean of 80 ms: nothing is missed
+  double quiet_quantile = 0.3;                          // of the last 2.5 s: diastole even at 180 beats a minute
+  Duration window = std::chrono::milliseconds(1500);    // holds a beat at 40 a minute and more
+  double rough = 4.0;                                   // times the usual roughness,
+  double rough_to_beats = 0.5;    // and this share of the beats' slope over 20 ms: nothing can be seen (dev)
+  double rough_hysteresis = 0.5;  // a burst fluctuates about its limit
+  double rough_rise_s = 30.0;     // longer than a burst lasts, shorter than hum that comes to stay
+  Duration rough_at_least = std::chrono::milliseconds(200);  // a QRS complex is rough for less
+  Duration rough_before = std::chrono::milliseconds(100);    // the burst begins before its mean is rough,
+  Duration rough_after = std::chrono::milliseconds(150);     // and the filters ring after it
+};
+
+struct CandidateSettings {
+  Duration confirm = std::chrono::milliseconds(50);  // a maximum is one when nothing exceeded it for so long,
+  double confirm_fall = 0.75;                        // or when the energy has fallen to this share of it (dev)
+  double rise_again = 1.5;  // the next one begins when the energy has risen by this factor: ripple (dev)
+  Duration shape_step = std::chrono::milliseconds(5);  // averages of 20 ms pass little above 50 Hz
+  // Half of a wide (ventricular) QRS complex and its onset, and no more after the peak than the delay allows. Not
+  // round: at the usual rates a whole number of steps would be one more or less by the last digit of the period.
+  Duration shape_before = std::chrono::milliseconds(91);
+  Duration shape_after = std::chrono::milliseconds(49);
+  Duration one_complex = std::chrono::milliseconds(60);  // a maximum of the energy and a fit so far apart are one
+  Duration fit_await = std::chrono::milliseconds(30);    // how long a maximum of the energy waits for a fit
+  int fit_confirm = 3;                                   // steps after which a maximum of the correlation is one
+  double alike = 0.6;           // correlation with a template that makes a candidate, whatever its energy (dev)
+  double least_of_quiet = 1.2;  // times the quiet level: what is less is no candidate
+  double quanta = 2.0;          // times the converter's resolution; a single step of it reaches 0.75
+  Duration peak_window = std::chrono::milliseconds(80);       // each side of the middle: wide complexes take 160 ms
+  Duration fit_peak_window = std::chrono::milliseconds(15);   // as far as peaks of one shape are displaced
+  Duration baseline_before = std::chrono::milliseconds(200);  // so that the complex is the smaller part of the stretch
+  Duration step_reach = std::chrono::milliseconds(100);       // each side, outside the complex
+  Duration parabola = std::chrono::milliseconds(10);          // each side of the peak: an R wave is a parabola so far
+  double opposite = 2.0;             // a beat points the other way when its other excursion is larger by this factor
+  double deviation_floor_s = 0.001;  // clean beats scatter by that about their peaks (docs/ecg.md)
+  double deviation_cap_s = 0.020;    // where there is no vertex: uniform over the complex's top
+};
+
+struct DecisionSettings {
+  double sure = 0.9;                                         // probability from which on a beat is told at once (dev)
+  double more_likely = 0.5;                                  // and when it has had its time: more likely than not
+  Duration time_to_decide = std::chrono::milliseconds(330);  // when a P wave's own QRS complex would have been measured
+  Duration time_if_known = std::chrono::milliseconds(180);   // of a kind that is known to be none
+  Duration time_of_strangers = std::chrono::milliseconds(240);  // what is like nothing: the beat itself may yet come,
+  double before_due = 0.85;                                     // unless it comes so early, in usual cycles
+  Duration cut_off = std::chrono::milliseconds(49);    // before the signal's end: half the shape is made up, and a beat
+  double certain = 0.99;                               // must be as probable as that
+  Duration too_late = std::chrono::milliseconds(950);  // after that a beat is told no more
+  Duration evaluate_every = std::chrono::milliseconds(20);
+  double larger = 1.2;          // energy, by which another measure of one complex is the better one
+  double sure_by_itself = 0.7;  // log odds that the complex alone must have for it: rhythm makes no beat
+  Duration time_at_start = std::chrono::milliseconds(700);
+  int beats_at_start = 3;  // until so many are known none is told at once: the first wave may be a P wave
+  Duration refractory = std::chrono::milliseconds(180);  // of the ventricles; Pan & Tompkins 1985 have 200 ms
+  double excluded = -30.0;                               // log odds of a second beat within it
+  double size_of_disturbance = 0.33;  // of a beat's, from which on what is like nothing says that there is noise
+  double disturbance_memory_s = 1.5;  // they come in trains
+  double too_large = 4.0;             // times the beats' energy: no ectopic beat is
+  double stand_out = 1.25;      // log of energy to the quiet level; bare noise reaches 3.5 times it about once a minute
+  double exactly_alike = 0.97;  // correlation that noise hardly reaches: where waves fill the cycle nothing stands out
+  double unheard = 0.3;  // probability that no beat has come since the line began: the last may have been just before
+  Duration begins =
+      std::chrono::milliseconds(400);  // after the line broke off, what is like nothing is no beat for so long
+  double qrs_like = 0.7;               // log odds of a complex by itself
+  Duration crowd_from = std::chrono::milliseconds(110);  // longer than a wide complex has two maxima
+  Duration crowd_to = std::chrono::milliseconds(240);    // shorter than a cycle at 240 a minute
+  double most_disturbances = 3.0;
+  double some_noise = 0.3;  // disturbances, fading,
+  double burst = 0.5;       // of which so many are electrosurgery or a loose cable,
+  double much_noise = 1.5;  // and so many one in which nothing is a beat that comes early,
+  double chaos = 2.2;       // and so many a lead that is off,
+  Duration chaos_after = std::chrono::milliseconds(900);  // when no known beat has come for so long
+  double early = 0.7;                                     // of the usual cycle: what comes so early and
+  double very_early = 0.40;                               // (or what comes so early, whatever it is like)
+  double very_familiar = 0.92;  // is less like a cluster than that, or of another size, may be an arc
+  double doubtful = 0.5;        // confidence that nothing in them exceeds,
+  double lost_in_noise = 0.25;  // and nothing that is unlike the beats among disturbances,
+  double early_in_noise = 0.1;  // nor what comes early there: BeatClasser takes them for noise
+  Duration longer_than_bursts = std::chrono::seconds(25);
+  Duration around = std::chrono::milliseconds(500);  // what is strange so near makes a strange one less likely
+  Duration pr_shortest = std::chrono::milliseconds(100);
+  Duration pr_longest = std::chrono::milliseconds(280);
+  Duration t_wave_begins = std::chrono::milliseconds(120);
+  Duration t_wave_ends = std::chrono::milliseconds(420);
+  double most_odds = 6.0;             // of a complex by itself, log: no measure is as sure as that
+  double as_sharp = 1.0;              // as another, from which on it is the QRS complex of a P wave,
+  double sharper_of_one_kind = 1.15;  // and so much sharper where both have one shape
+  double followed_by_chance = 0.3;    // share of its kind, from which on a complex may be a P wave
+  double cluster_of_quiet = 2.5;      // times the quiet level, from which on a complex is learnt as one that recurs
+  double cluster_of_top = 0.1;        // and this share of the largest
+  int displaced = 3;                  // steps; the peaks of unknown shapes are found so far apart
+  double familiar = 0.8;
+  double most_step = 0.75;  // change of level to the excursions: of clean beats one in a thousand has more,
+  double most_rough = 0.5;  // and of this, to the energy
+  double surely_familiar = 0.85;
+  int changed_after = 5;                // beats in a row that are alike and of no known kind: arcs are neither
+  double same_gain = 0.3;               // logarithm, of two beats that are of one size
+  double learnt = 0.8;                  // probability from which on a beat teaches rhythm and levels
+  double polarity_hysteresis = 1.3;     // an RS complex of equal parts must not change sides with each beat
+  double polarity_memory = 8.0;         // beats, as the levels
+  double doubtful_deviation_s = 0.087;  // uniform over the 150 ms of a match
+  double silence_s = 3.0;               // without a beat: longer than a compensatory pause,
+  double silence_cycles = 3.0;          // and usual cycles
+  double slowest_cycle_s = 2.2;         // a block must not make the detector wait for ever
+};
+
+struct RPeakDetectorSettings {
+  EcgLineSettings line;
+  EcgLevelSettings levels;
+  CandidateSettings candidates;
+  DecisionSettings decision;
+};
+
+}  // namespace perimap

@@ -1,0 +1,105 @@
+#include "core/phase/qrs_candidate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <functional>
+
+#include "core/phase/ecg_filter.hpp"
+
+namespace perimap {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr double kRate_hz = 500.0;
+constexpr double kPeak_s = 1.0004;  // between two samples
+
+double wave(double t_s, double sigma_s) {
+  const double x = (t_s - kPeak_s) / sigma_s;
+  return std::exp(-0.5 * x * x);
+}
+
+double qrs_mV(double t_s) { return wave(t_s, 0.012); }
+
+// A complex in the middle of two seconds, as measured about the sample that is nearest to it.
+struct Measured {
+  explicit Measured(const std::function<double(double)>& value_mV, Polarity polarity = {}) {
+    const Duration period = from_seconds(1.0 / kRate_hz);
+    filter.restart(period);
+    meter.set_period(period);
+    for (int i = 0; i < static_cast<int>(1.4 * kRate_hz); ++i) {
+      filter.push(Instant(i * period), value_mV(i / kRate_hz), false);
+    }
+    const auto centre = static_cast<std::int64_t>(std::lround(kPeak_s * kRate_hz));
+    candidate = meter.about_crest(centre + filter.energy_delay(), polarity, 0.0);
+  }
+
+  CandidateSettings settings;
+  EcgFilter filter;
+  QrsMeter meter{settings, filter};
+  QrsCandidate candidate;
+};
+
+double seconds(const QrsCandidate& candidate) { return to_seconds(candidate.time.time_since_epoch()); }
+
+TEST(QrsMeter, TheTimeIsThatOfThePeakBetweenSamples) {
+  for (const double sign : {1.0, -1.0}) {
+    const Measured measured([&](double t_s) { return sign * qrs_mV(t_s); });
+    EXPECT_NEAR(seconds(measured.candidate), kPeak_s, 2e-4);
+    EXPECT_EQ(measured.candidate.points_up, sign > 0.0);
+  }
+}
+
+TEST(QrsMeter, MeasuresGrowWithTheSignalAndItsShapeDoesNot) {
+  const Measured one(qrs_mV);
+  const Measured ten([](double t_s) { return 10.0 * qrs_mV(t_s); });
+  EXPECT_NEAR(ten.candidate.energy, 10.0 * one.candidate.energy, 1e-9);
+  EXPECT_NEAR(ten.candidate.sharpness, 10.0 * one.candidate.sharpness, 1e-9);
+  EXPECT_NEAR(ten.candidate.slope, 10.0 * one.candidate.slope, 1e-9);
+  EXPECT_NEAR(ten.candidate.upward, 10.0 * one.candidate.upward, 1e-9);
+  EXPECT_NEAR(match(ten.candidate.shape, one.candidate.shape).correlation, 1.0, 1e-6);
+  EXPECT_NEAR(match(ten.candidate.shape, one.candidate.shape).gain, 10.0, 1e-4);
+}
+
+TEST(QrsMeter, AnOffsetChangesNothing) {
+  const Measured without(qrs_mV);
+  const Measured with([](double t_s) { return 3.0 + qrs_mV(t_s); });
+  EXPECT_NEAR(with.candidate.energy, without.candidate.energy, 1e-9);
+  EXPECT_NEAR(with.candidate.upward, without.candidate.upward, 1e-9);
+  EXPECT_NEAR(with.candidate.step, without.candidate.step, 1e-9);
+}
+
+// As high: a T wave has less energy and, beside it, hardly any sharpness.
+TEST(QrsMeter, ABluntWaveIsLessSharpThanItIsLarge) {
+  const Measured qrs(qrs_mV);
+  const Measured t_wave([](double t_s) { return wave(t_s, 0.045); });
+  EXPECT_NEAR(t_wave.candidate.upward, qrs.candidate.upward, 0.25);
+  EXPECT_LT(t_wave.candidate.energy, 0.6 * qrs.candidate.energy);
+  EXPECT_LT(t_wave.candidate.sharpness / t_wave.candidate.energy, 0.6 * qrs.candidate.sharpness / qrs.candidate.energy);
+}
+
+TEST(QrsMeter, ALineThatStaysAtAnotherLevelHasStepped) {
+  const Measured beat(qrs_mV);
+  EXPECT_LT(beat.candidate.step, 0.05);
+  const Measured step([](double t_s) { return t_s > kPeak_s ? 2.0 : 0.0; });
+  EXPECT_GT(step.candidate.step, 0.9);
+}
+
+TEST(QrsMeter, WhatIsTooFastForAHeartIsRough) {
+  const Measured beat(qrs_mV);
+  const Measured arc([](double t_s) { return qrs_mV(t_s) + std::sin(2.0 * 3.14159265 * 180.0 * t_s); });
+  EXPECT_LT(beat.candidate.rough, 0.3 * beat.candidate.energy);
+  EXPECT_GT(arc.candidate.rough, 0.5 * arc.candidate.energy);
+}
+
+TEST(QrsMeter, PointsTheWayTheBeatsDoUnlessTheOtherIsFarLarger) {
+  const auto both = [](double down) { return [down](double t_s) { return qrs_mV(t_s) - down * qrs_mV(t_s - 0.03); }; };
+  EXPECT_FALSE(Measured(both(1.5)).candidate.points_up);
+  EXPECT_TRUE(Measured(both(1.5), {.known = true, .up = true}).candidate.points_up);
+  EXPECT_FALSE(Measured(both(2.6), {.known = true, .up = true}).candidate.points_up);
+}
+
+}  // namespace
+}  // namespace perimap
