@@ -384,6 +384,8 @@ inline const char* describe(perimap_SurfaceReason reason) noexcept {
       return "how the motion goes with the beat is not certain yet";
     case perimap_SURFACE_REASON_NOT_SEEN:
       return "the images do not show what is mapped";
+    case perimap_SURFACE_REASON_NO_PARALLAX:
+      return "the camera keeps still: how far away the surface is cannot be seen";
     default:
       return "a reason that this client does not know";
   }

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <utility>
 
+#include "core/geometry/symmetric_matrix2.hpp"
 #include "core/realtime/realtime_scope.hpp"
 #include "core/vision/feature_detector.hpp"
 #include "core/vision/instrument_mask.hpp"
@@ -19,7 +21,7 @@ constexpr double kMotion_px_per_s = 300.0;
 constexpr Duration kTakenEvery = std::chrono::microseconds(33333);
 
 // Not all that is found lives through the round, least of all where the heart moves fastest; what is over is let go.
-constexpr int with_spare(int wanted) { return 2 * wanted; }
+constexpr std::size_t with_spare(std::size_t wanted) { return 2 * wanted; }
 
 }  // namespace
 
@@ -31,6 +33,7 @@ FeatureFinder::FeatureFinder(const PipelineSettings& settings, PipelineCounters&
       lockstep_(settings.lockstep),
       min_distance_px_(settings.features.minimum_distance_px),
       maximum_(settings.features.maximum),
+      share_(static_cast<std::size_t>((maximum_ + bands_ - 1) / bands_)),
       counters_(counters),
       steps_(kFinderFrames) {
   for (Frame& frame : frames_) {
@@ -79,8 +82,8 @@ void FeatureFinder::offer(std::uint64_t frame_index, const FrameStamp& stamp, co
     // Relaxed: housekeeping sets it again only after it has popped this round's steps, and the ring orders that.
     done_.store(false, std::memory_order_relaxed);
     occupied_.assign(occupied.begin(), occupied.end());
-    share_ = static_cast<std::size_t>((maximum_ + bands_ - 1) / bands_);
-    wanted_ = std::min({with_spare(wanted), with_spare(static_cast<int>(share_)), static_cast<int>(kMaximumPerRound)});
+    wanted_ = std::min(static_cast<std::size_t>(wanted), share_);
+    tried_ = std::min(with_spare(wanted_), kMaximumPerRound);
     band_ = next_band();
     coloured_ = colour.bgr != nullptr;
     const std::size_t row_bytes = reduced_row_bytes(width_);
@@ -135,74 +138,114 @@ void FeatureFinder::dismiss() noexcept {
 }
 
 void FeatureFinder::work(int step) noexcept {
-  const Frame& frame = frames_[static_cast<std::size_t>(step)];
+  const auto number = static_cast<std::size_t>(step);
+  const Frame& frame = frames_[number];
   if (step == 0) {
     find(frame);
   } else {
-    track_candidates(frame);
+    track_candidates(frame, frames_[number - 1]);
   }
   if (step + 1 < kFinderFrames) return;
+  put_the_surest_first();
   for (FoundFeature& feature : found_) feature.velocity_px /= static_cast<double>(stride_);
-  if (found_.size() > share_) found_.resize(share_);
   // Release: found_ is complete before the mapper can see the flag.
   done_.store(true, std::memory_order_release);
   if (lockstep_) finished_.post();
 }
 
-Expected<std::vector<Vector2d>> FeatureFinder::corners(const GreyImage& image, const DetectorSettings& detector) const {
-  GreyImage barred;
-  std::vector<std::uint8_t> mask;
-  if (coloured_) {
-    const auto stride = static_cast<std::ptrdiff_t>(reduced_row_bytes(width_));
-    auto found = find_instruments({bgr_.data(), reduced_side(width_), reduced_side(height_), stride}, width_, height_);
-    if (!found) return tl::unexpected(std::move(found.error()));
-    mask = *std::move(found);
-    barred = {mask.data(), width_, height_, width_};
-  }
-  const RowRange band = rows_of_band(height_, band_, bands_);
-  return find_features(image, occupied_, detector, wanted_, barred, band);
+Expected<std::vector<std::uint8_t>> FeatureFinder::instruments() const {
+  if (!coloured_) return std::vector<std::uint8_t>{};
+  const auto stride = static_cast<std::ptrdiff_t>(reduced_row_bytes(width_));
+  return find_instruments({bgr_.data(), reduced_side(width_), reduced_side(height_), stride}, width_, height_);
 }
 
 void FeatureFinder::find(const Frame& frame) noexcept {
   found_.clear();
-  const GreyImage image{frame.pixels.data(), width_, height_, width_};
-  DetectorSettings detector = detector_settings_for(image, maximum_);
-  detector.min_distance_px = min_distance_px_;
-  const auto found = corners(image, detector);
-  if (!found) {
+  const GreyImage image = image_of(frame);
+  const auto mask = instruments();
+  if (!mask) {
     counters_.searches_failed.add();
     return;
   }
+  const GreyImage barred = mask->empty() ? GreyImage{} : GreyImage{mask->data(), width_, height_, width_};
+  DetectorSettings detector = detector_settings_for(image, maximum_);
+  detector.min_distance_px = min_distance_px_;
   templates_ = template_settings_for(detector);
-  for (const Vector2d& px : *found) {
-    if (found_.size() == kMaximumPerRound) break;
+  if (!add_corners(frame, detector, barred) || found_.size() >= tried_) return;
+  detector = detector_settings_for_trial(image, maximum_);
+  detector.min_distance_px = min_distance_px_;
+  static_cast<void>(add_corners(frame, detector, barred));
+}
+
+// As many as are still to be tried. False when the search failed.
+bool FeatureFinder::add_corners(const Frame& frame, const DetectorSettings& detector, const GreyImage& barred) {
+  const GreyImage image = image_of(frame);
+  std::vector<Vector2d> taken = occupied_;
+  for (const FoundFeature& feature : found_) taken.push_back(feature.first_observed_px);
+  const auto corners = find_features(image, taken, detector, static_cast<int>(tried_ - found_.size()), barred,
+                                     rows_of_band(height_, band_, bands_));
+  if (!corners) {
+    counters_.searches_failed.add();
+    return false;
+  }
+  const TemplateSettings templates = template_settings_for(detector);
+  for (const Vector2d& px : *corners) {
     FoundFeature feature;
-    if (make_patch_template(image, px, templates_, tracker_.kernels(), feature.patch) != TemplateVerdict::kGood)
+    if (make_patch_template(image, px, templates, tracker_.kernels(), feature.patch) != TemplateVerdict::kGood)
       continue;
     feature.first_observed = frame.stamp.capture;
     feature.first_observed_px = px;
     feature.patch_state.px = px;
     found_.push_back(feature);
   }
+  return true;
 }
 
-void FeatureFinder::track_candidates(const Frame& frame) noexcept {
-  const GreyImage image{frame.pixels.data(), width_, height_, width_};
+// As later in its life: by its first view, or as it looked in the frame before.
+PatchMatch FeatureFinder::find_candidate(FoundFeature& feature, const Frame& frame, const Frame& before) noexcept {
   const double deviation_px = kMotion_px_per_s * stride_s_;
   const Matrix2d covariance = deviation_px * deviation_px * Matrix2d::Identity();
+  const PatchState last = feature.patch_state;
+  const Vector2d predicted_px = last.px + feature.velocity_px;
+  const GreyImage image = image_of(frame), image_before = image_of(before);
+  PatchMatch match = tracker_.track(image, feature.patch, feature.patch_state, predicted_px, covariance);
   const double usual_frames = FrameRate::kUsual_per_s * stride_s_;
-  std::erase_if(found_, [&](FoundFeature& feature) {
-    const PatchState last = feature.patch_state;
-    const PatchMatch match =
-        tracker_.track(image, feature.patch, feature.patch_state, last.px + feature.velocity_px, covariance);
-    if (match.state != MatchState::kFound ||
-        !feature.looks.is_plausible(last, feature.patch_state, match.correlation, usual_frames)) {
-      return true;
-    }
+  if (match.state == MatchState::kFound &&
+      feature.looks.is_plausible(last, feature.patch_state, match.correlation, usual_frames)) {
     feature.looks.add(match.correlation);
-    feature.velocity_px = match.px - last.px;
-    return false;
+    return match;
+  }
+  feature.patch_state = last;
+  LastView view;
+  view.make(image_before, 0, last.px, tracker_.kernels());
+  if (!view.is_of(0)) return {};
+  match = view.follow(view_tracker_, image, image_before, last.px, predicted_px, covariance);
+  if (match.state == MatchState::kFound) feature.patch_state.px = match.px;
+  return match;
+}
+
+void FeatureFinder::track_candidates(const Frame& frame, const Frame& before) noexcept {
+  std::erase_if(found_, [&](FoundFeature& feature) {
+    const Vector2d last_px = feature.patch_state.px;
+    const PatchMatch match = find_candidate(feature, frame, before);
+    feature.velocity_px = feature.patch_state.px - last_px;
+    feature.doubt_px += std::sqrt(larger_eigenvalue(match.covariance_px2));
+    return match.state != MatchState::kFound;
   });
+}
+
+// As many as are wanted come first, for the others there may be room yet; both in the order in which they were found,
+// which spreads them over the picture.
+void FeatureFinder::put_the_surest_first() noexcept {
+  if (found_.size() > wanted_) {
+    std::vector<double> doubts;
+    for (const FoundFeature& feature : found_) doubts.push_back(feature.doubt_px);
+    const auto last = doubts.begin() + static_cast<std::ptrdiff_t>(wanted_) - 1;
+    std::nth_element(doubts.begin(), last, doubts.end());
+    std::stable_partition(found_.begin(), found_.end(),
+                          [most = *last](const FoundFeature& feature) { return feature.doubt_px <= most; });
+  }
+  if (found_.size() > share_) found_.resize(share_);
 }
 
 }  // namespace perimap

@@ -19,6 +19,7 @@
 #include "core/time/frame_rate.hpp"
 #include "core/time/instant.hpp"
 #include "core/vision/feature_detector.hpp"
+#include "core/vision/last_view.hpp"
 #include "core/vision/patch_continuity.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
@@ -33,6 +34,7 @@ struct FoundFeature {
   PatchState patch_state;  // in the round's last frame
   PatchContinuity looks;
   Vector2d velocity_px = Vector2d::Zero();  // per frame; while the round lasts, from one that is taken to the next
+  double doubt_px = 0;                      // deviations of its matches, summed over the round
 };
 
 // A round: the frame begun at, and kFinderFrames - 1 after it, are copied here by the mapper as they come; the result
@@ -40,9 +42,10 @@ struct FoundFeature {
 // one band of the picture, so that a large picture's search takes not much longer than a small one's; the next round
 // takes the next band, and no band gives more than its share of a full map at a time. A band that holds its share
 // already is passed over while another one, which holds less, still gives something: else the features would gather
-// where they live longest. What is a corner goes by the picture's own light and noise. Where frames have come with
-// colour lately, a round begins at one that has it, and finds nothing on what is grey like instruments. offer() and
-// adopt() belong to the mapper, serve() to the housekeeping thread.
+// where they live longest. What is a corner goes by the picture's own light and noise; where there are too few, what
+// stands out of the noise at all is tried too. More are followed than there is room for; the surest come first.
+// Where frames have come with colour lately, a round begins at one that has it, and finds nothing on what is grey like
+// instruments. offer() and adopt() belong to the mapper, serve() to the housekeeping thread.
 class FeatureFinder {
  public:
   static constexpr std::size_t kMaximumPerRound = 48;
@@ -80,8 +83,14 @@ class FeatureFinder {
   [[nodiscard]] bool may_begin(std::uint64_t frame_index, const FrameRate& rate, const ColourImage& colour) noexcept;
   void work(int step) noexcept;
   void find(const Frame& frame) noexcept;
-  [[nodiscard]] Expected<std::vector<Vector2d>> corners(const GreyImage& image, const DetectorSettings& detector) const;
-  void track_candidates(const Frame& frame) noexcept;
+  [[nodiscard]] Expected<std::vector<std::uint8_t>> instruments() const;
+  [[nodiscard]] bool add_corners(const Frame& frame, const DetectorSettings& detector, const GreyImage& barred);
+  [[nodiscard]] GreyImage image_of(const Frame& frame) const noexcept {
+    return {frame.pixels.data(), width_, height_, width_};
+  }
+  void track_candidates(const Frame& frame, const Frame& before) noexcept;
+  [[nodiscard]] PatchMatch find_candidate(FoundFeature& feature, const Frame& frame, const Frame& before) noexcept;
+  void put_the_surest_first() noexcept;
 
   int width_;
   int height_;
@@ -90,7 +99,9 @@ class FeatureFinder {
   bool lockstep_;
   double min_distance_px_;
   int maximum_;
+  std::size_t share_;  // of a full map, a band's
   PatchTracker tracker_;
+  PatchTracker view_tracker_ = LastView::tracker();
   PipelineCounters& counters_;
 
   // The mapper's own.
@@ -111,8 +122,8 @@ class FeatureFinder {
   double stride_s_ = 0.0;
   int band_ = 0;
   std::vector<Vector2d> occupied_;
-  int wanted_ = 0;
-  std::size_t share_ = 0;  // of what the round finds at most so many are given
+  std::size_t tried_ = 0;  // at most
+  std::size_t wanted_ = 0;
   SpscRing<int> steps_;
   Wakeup go_;
 

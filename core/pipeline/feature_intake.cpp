@@ -30,6 +30,7 @@ void FeatureIntake::adopt(std::uint64_t frame_index, int room) noexcept {
     slot->patch_state = found.patch_state;
     slot->carried_px = found.patch_state.px;
     slot->looks = found.looks;
+    slot->last_view.forget();
     slot->velocity_px = found.velocity_px;
     slot->last_found_frame = frame_index - 1;
     slot->stale_matches = 0;

@@ -100,7 +100,9 @@ class Step {
     if (first != nullptr && (law_told || breath_told)) return request_start();
     const auto used = static_cast<std::uint32_t>(slot_.start.count);
     if (!slot_.start.outcome.ok()) {
-      if (++slot_.failed_starts >= kFailedStartsBeforeLost) return give_up(LifeEvent::kLostUnstarted);
+      // What no start explains is a highlight or an instrument; but not where hardly any feature can be started.
+      const bool tried_enough = ++slot_.failed_starts >= kFailedStartsBeforeLost;
+      if (tried_enough && !job_.starts_fail_alike) return give_up(LifeEvent::kLostUnstarted);
       slot_.held.drop(used / 2);
       slot_.state = SlotState::kTracked;
       return LifeEvent::kStartFailed;

@@ -21,6 +21,7 @@
 #include "core/pipeline/pose_history.hpp"
 #include "core/time/frame_rate.hpp"
 #include "core/time/instant.hpp"
+#include "core/vision/last_view.hpp"
 #include "core/vision/patch_continuity.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
@@ -124,8 +125,10 @@ struct FeatureSlot {
 
   // following
   PatchTemplate patch;
-  PatchState patch_state;                  // when it was found last
-  PatchState seen;                         // of this frame's match, until that is believed
+  PatchState patch_state;          // when it was found last
+  PatchState seen;                 // of this frame's match, until that is believed
+  bool seen_by_last_view = false;  // likewise: the first view fits nowhere
+  LastView last_view;
   Vector2d carried_px = Vector2d::Zero();  // patch_state.px, moved since then with the features around it
   PatchContinuity looks;
   Vector2d velocity_px = Vector2d::Zero();  // per frame

@@ -5,112 +5,13 @@
 #include <cmath>
 
 #include "core/geometry/symmetric_matrix2.hpp"
-#include "core/pipeline/pose_noise.hpp"
 #include "core/pipeline/sight.hpp"
 
 namespace perimap {
 namespace {
 
-// Image motion changes by about this much from frame to frame where no map predicts it (systole begins at up to
-// 750 px/s at 640x480).
-constexpr double kUnmappedMotion_px_per_s = 300.0;
-
-struct PixelPrediction {
-  bool valid = false;
-  double pose_deviation_px = 0.0;  // largest, of the part that is not the map's
-  Vector2d px = Vector2d::Zero();
-  Matrix2d covariance_px2 = Matrix2d::Identity();
-};
-
-// One pixel more on each axis: what the model does not know about the tissue.
-Matrix2d of_the_model() noexcept { return Matrix2d::Identity(); }
-
-PixelPrediction predict_from_map(const MapPrediction& map, const FrameRecord& frame, const PixelModel& model,
-                                 const CommonShift& shift = {}) noexcept {
-  if (!map.valid || !frame.measurable) return {};
-  PixelPrediction prediction;
-  Matrix23d J_C;
-  const Vector3d p_WF = map.p_WF + frame.displacement_mm;
-  if (model.camera.project(frame.X_CW * p_WF, prediction.px, &J_C) != ProjectionStatus::kOk) return {};
-  const Matrix23d J_p = J_C * frame.X_CW.R;
-  Matrix2d of_pose;
-  if (shift.known) {
-    // It has the errors of pose and displacement, and its deviation what the model does not know.
-    of_pose = shift.variance_at(prediction.px) * Matrix2d::Identity();
-    prediction.px += shift.at(prediction.px);
-  } else {
-    CameraPose pose = frame.pose;
-    pose.position_variance_mm2 =
-        frame.tracker_variance_mm2 + frame.displacement_deviation_mm * frame.displacement_deviation_mm;
-    of_pose = pose_noise_covariance(pose, p_WF, J_p) + of_the_model();
-  }
-  prediction.covariance_px2 = J_p * map.covariance_W * J_p.transpose() + of_pose;
-  prediction.pose_deviation_px = std::sqrt(larger_eigenvalue(of_pose));
-  prediction.valid = prediction.covariance_px2.allFinite();
-  return prediction;
-}
-
-// From the pose that the frame's matches agree on: far narrower than the tracker's where that is noisy.
-PixelPrediction predict_from_shared_pose(const MapPrediction& map, const CommonEstimate& shared,
-                                         const PixelModel& model) noexcept {
-  PixelPrediction prediction;
-  MeasurementJacobians J;
-  if (measure(model, shared.X_CW, map.p_WF, prediction.px, &J) != ProjectionStatus::kOk) return {};
-  CommonJacobian J_s(2, kPoseUnknowns);
-  J_s << J.dz_dtheta, J.dz_dc;
-  prediction.covariance_px2 = J.dz_dp * map.covariance_W * J.dz_dp.transpose() +
-                              common_noise(J_s, shared.covariance.topLeftCorner(kPoseUnknowns, kPoseUnknowns)) +
-                              of_the_model();
-  prediction.valid = prediction.covariance_px2.allFinite();
-  return prediction;
-}
-
-double unmapped_motion_px(const FrameJob& job) noexcept { return kUnmappedMotion_px_per_s / job.frame->rate.per_s(); }
-
-std::uint64_t frames_since_found(const FeatureSlot& slot, const FrameJob& job) noexcept {
-  return job.frame->index - slot.last_found_frame;
-}
-
-// By its own motion, while it is fresh: an older velocity misleads more than it helps, the motion turns within a few
-// frames.
-PixelPrediction predict_from_velocity(const FeatureSlot& slot, const FrameJob& job) noexcept {
-  PixelPrediction prediction;
-  prediction.valid = frames_since_found(slot, job) == 1;
-  prediction.px = slot.patch_state.px + slot.velocity_px;
-  const double deviation_px = unmapped_motion_px(job);
-  prediction.covariance_px2 = deviation_px * deviation_px * Matrix2d::Identity();
-  return prediction;
-}
-
-// From where it was found last some frames ago, whatever has moved since.
-PixelPrediction predict_from_last_place(const FeatureSlot& slot, const FrameJob& job) noexcept {
-  const std::uint64_t frames = frames_since_found(slot, job);
-  PixelPrediction prediction;
-  prediction.valid = frames > 1 && frames <= job.frame->rate.frames(kTrackedUnseen);
-  prediction.px = slot.patch_state.px;
-  const double deviation_px = unmapped_motion_px(job) * static_cast<double>(frames);
-  prediction.covariance_px2 = deviation_px * deviation_px * Matrix2d::Identity();
-  return prediction;
-}
-
-// Where the features around it say that it has moved to; each frame since it was found has added to the doubt.
-PixelPrediction predict_from_neighbours(const FeatureSlot& slot, const NeighbourMotion::Around& neighbours,
-                                        const FrameJob& job) noexcept {
-  constexpr double kStrain_px = 1.5, kDoubt_px_per_s = 15.0;
-  const std::uint64_t frames = frames_since_found(slot, job);
-  PixelPrediction prediction;
-  prediction.valid = neighbours.known && frames <= job.frame->rate.frames(kCarriedUnseen);
-  prediction.px = slot.carried_px + neighbours.by;
-  const double deviation_px = kStrain_px + neighbours.disagreement_px +
-                              kDoubt_px_per_s / job.frame->rate.per_s() * static_cast<double>(frames - 1);
-  prediction.covariance_px2 = deviation_px * deviation_px * Matrix2d::Identity();
-  return prediction;
-}
-
-const PixelPrediction& surer(const PixelPrediction& a, const PixelPrediction& b) noexcept {
-  if (!a.valid || !b.valid) return a.valid ? a : b;
-  return a.covariance_px2.trace() < b.covariance_px2.trace() ? a : b;
-}
+// For so long a feature is still sought as it looked last.
+constexpr Duration kLastViewKept = std::chrono::seconds(2);
 
 // Whether this may be a look-alike: there is room for one in the search region, and the feature was not there in the
 // frame before, or not found about where it was expected.
@@ -157,16 +58,23 @@ void renew_stale_template(FeatureSlot& slot, const FrameJob& job) noexcept {
   slot.patch_state.px = slot.match.px;
 }
 
+// The last view is made only when it is needed; the frame before is there for one frame.
+void make_last_view(FeatureSlot& slot, const FrameJob& job) noexcept {
+  if (job.before.data == nullptr || frames_since_found(slot, job) != 1) return;
+  slot.last_view.make(job.before, slot.last_found_frame, slot.patch_state.px, job.tracker->kernels());
+}
+
 // Whether a match may be believed without looking like the feature.
 enum class Looks : std::uint8_t { kAskedInDoubt, kAskedAlways };
+// Whether a release waits for it.
+enum class Hurry : std::uint8_t { kNone, kRelease };
 
-void seek(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks, const FrameJob& job,
-          const PipelineSettings& settings) noexcept {
-  slot.match = PatchMatch{};
-  if (!prediction.valid || !settings.camera.contains(prediction.px)) return;
+// False when nothing was found by the first view that can be believed.
+bool seek_first_view(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks, const FrameJob& job) noexcept {
   slot.seen = slot.patch_state;
+  slot.seen_by_last_view = false;
   slot.match = job.tracker->track(job.image, slot.patch, slot.seen, prediction.px, prediction.covariance_px2);
-  if (slot.match.state != MatchState::kFound) return;
+  if (slot.match.state != MatchState::kFound) return false;
   const std::uint64_t frames = frames_since_found(slot, job);
   const bool is_asked =
       looks == Looks::kAskedAlways || is_doubtful(prediction, slot.match.px, frames, unmapped_motion_px(job));
@@ -174,6 +82,36 @@ void seek(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks, con
   const bool is_other =
       is_asked && !slot.looks.is_plausible(slot.patch_state, slot.seen, slot.match.correlation, usual_frames);
   if (is_other || is_vague(slot.match)) slot.match.state = MatchState::kLowCorrelation;
+  return slot.match.state == MatchState::kFound;
+}
+
+// As it looked in the frame before; and for a while, what has come back as it looked last, which the release need not
+// wait for.
+void seek_last_view(FeatureSlot& slot, const PixelPrediction& prediction, Hurry hurry, const FrameJob& job) noexcept {
+  if (job.view_tracker == nullptr) return;
+  const std::uint64_t frames = frames_since_found(slot, job);
+  PatchMatch match;
+  if (frames == 1) {
+    make_last_view(slot, job);
+    if (!slot.last_view.is_of(slot.last_found_frame)) return;
+    match = slot.last_view.follow(*job.view_tracker, job.image, job.before, slot.patch_state.px, prediction.px,
+                                  prediction.covariance_px2);
+  } else if (hurry == Hurry::kNone && slot.last_view.is_of(slot.last_found_frame) &&
+             frames <= job.frame->rate.frames(kLastViewKept)) {
+    match = slot.last_view.find_again(*job.view_tracker, job.image, prediction.px, prediction.covariance_px2);
+  }
+  if (match.state != MatchState::kFound) return;
+  slot.match = match;
+  slot.seen = slot.patch_state;
+  slot.seen.px = match.px;
+  slot.seen_by_last_view = true;
+}
+
+void seek(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks, Hurry hurry, const FrameJob& job,
+          const PipelineSettings& settings) noexcept {
+  slot.match = PatchMatch{};
+  if (!prediction.valid || !settings.camera.contains(prediction.px)) return;
+  if (!seek_first_view(slot, prediction, looks, job)) seek_last_view(slot, prediction, hurry, job);
 }
 
 // What was found is believed: the next search builds on it.
@@ -182,8 +120,13 @@ void believe(FeatureSlot& slot, const FrameJob& job) noexcept {
       frames_since_found(slot, job) == 1 ? Vector2d(slot.match.px - slot.patch_state.px) : Vector2d::Zero();
   slot.patch_state = slot.seen;
   slot.carried_px = slot.match.px;
-  slot.looks.add(slot.match.correlation);
-  renew_stale_template(slot, job);
+  if (slot.seen_by_last_view) {
+    slot.last_view.drift_to(slot.match);
+  } else {
+    slot.last_view.end_drift();
+    slot.looks.add(slot.match.correlation);
+    renew_stale_template(slot, job);
+  }
   slot.last_found_frame = job.frame->index;
 }
 
@@ -191,7 +134,9 @@ void believe(FeatureSlot& slot, const FrameJob& job) noexcept {
 // have judged it.
 bool moves_otherwise(const FeatureSlot& slot, const PixelPrediction& from_neighbours, double gate) noexcept {
   if (slot.converged || !from_neighbours.valid) return false;
-  return !agrees(slot.match, from_neighbours, gate);
+  PatchMatch since_last = slot.match;
+  if (slot.seen_by_last_view) since_last.covariance_px2 -= slot.last_view.drift_px2() * Matrix2d::Identity();
+  return !agrees(since_last, from_neighbours, gate);
 }
 
 }  // namespace
@@ -209,11 +154,11 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   if (job.shift.known && from_map.valid) {
     const PixelPrediction near = predict_from_map(map, *job.frame, model, job.shift);
     if (near.valid && near.covariance_px2.trace() < wide.covariance_px2.trace()) {
-      seek(slot, near, looks, job, settings);
+      seek(slot, near, looks, Hurry::kRelease, job, settings);
       looks = Looks::kAskedAlways;  // what is found where the others are not
     }
   }
-  if (slot.match.state != MatchState::kFound) seek(slot, wide, looks, job, settings);
+  if (slot.match.state != MatchState::kFound) seek(slot, wide, looks, Hurry::kRelease, job, settings);
   if (slot.match.state != MatchState::kFound) return;
   slot.match_agrees = from_map.valid && agrees(slot.match, from_map, settings.estimator.update.gate);
   slot.off_px = slot.match.px - from_map.px;
@@ -232,7 +177,7 @@ void settle_match(FeatureSlot& slot, const MapPrediction& map, const FrameJob& j
                                                     : predict_from_map(map, *job.frame, model);
     slot.match_agrees = false;
     seek(slot, surer(from_map, from_neighbours.valid ? from_neighbours : predict_from_last_place(slot, job)),
-         Looks::kAskedAlways, job, settings);
+         Looks::kAskedAlways, Hurry::kNone, job, settings);
     if (slot.match.state == MatchState::kFound) {
       slot.match_agrees = from_map.valid && agrees(slot.match, from_map, gate);
     }
@@ -240,6 +185,7 @@ void settle_match(FeatureSlot& slot, const MapPrediction& map, const FrameJob& j
   if (slot.match.state == MatchState::kFound) {
     believe(slot, job);
   } else {
+    make_last_view(slot, job);
     slot.carried_px += neighbours.by;
   }
 }

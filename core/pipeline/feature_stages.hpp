@@ -5,16 +5,10 @@
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/frame_job.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/pixel_prediction.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 
 namespace perimap {
-
-// Where the map expects a feature at this frame's capture, the phase's deviation included; invalid without an estimate.
-struct MapPrediction {
-  bool valid = false;
-  Vector3d p_WF = Vector3d::Zero();          // mm
-  Matrix3d covariance_W = Matrix3d::Zero();  // mm^2
-};
 
 // A: predicts the feature's pixel with its covariance (map and pose, or its own motion in the image), searches there,
 // leaves slot.match. Where the shift that the predictions have in common is known, a mapped feature is searched for

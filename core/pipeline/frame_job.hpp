@@ -24,19 +24,24 @@ namespace perimap {
 struct FrameJob {
   const FrameRecord* frame = nullptr;
   const FrameHistory* history = nullptr;
-  GreyImage image;  // while features are searched for
+  // While features are searched for; `before`, the frame before, without pixels where there was none.
+  GreyImage image;
+  GreyImage before;
   const PatchTracker* tracker = nullptr;
-  TemplateSettings templates;  // what a template must be in these pictures
-  bool scouting = false;       // some features are scouts, and the others are searched for once those have been
-  CommonShift shift;           // that they tell
+  const PatchTracker* view_tracker = nullptr;  // of last views; null: they are not asked
+  TemplateSettings templates;                  // what a template must be in these pictures
+  bool scouting = false;  // some features are scouts, and the others are searched for once those have been
+  CommonShift shift;      // that they tell
   BasesAbout about_capture;
   EvaluationPlan plan;
   std::array<Basis, kCovariances> evaluated_b;  // the bases at the plan's instants, with the phases as known now
   // After B: how the features found have moved, and the pose that they agree on; null when they do not tell it.
   const NeighbourMotion* motion = nullptr;
   const CommonEstimate* shared_pose = nullptr;
-  LawBelief law;        // by which the history's phases are told
-  Instant learn_until;  // learning that has not begun by then is put off; never in lockstep
+  bool no_parallax = false;        // the camera has lately been in one place
+  bool starts_fail_alike = false;  // of more features than have an estimate: it is not the single feature's fault
+  LawBelief law;                   // by which the history's phases are told
+  Instant learn_until;             // learning that has not begun by then is put off; never in lockstep
 };
 
 }  // namespace perimap

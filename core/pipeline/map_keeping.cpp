@@ -64,6 +64,7 @@ void MapKeeping::recall(FeatureSlot& slot, const FeatureMemory& feature) noexcep
   slot.patch = feature.patch;
   slot.patch_state = feature.patch_state;
   slot.carried_px = feature.patch_state.px;
+  slot.last_view.forget();
   // So that the map alone tells where to look.
   slot.last_found_frame = std::uint64_t{0} - kFramesLongAgo;
   slot.updates = feature.updates;

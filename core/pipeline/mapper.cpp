@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/pipeline/map_census.hpp"
+#include "core/pipeline/start_progress.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
@@ -39,6 +40,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       shedding_(slots) {
   job_.history = history_.get();
   job_.tracker = &tracker_;
+  job_.view_tracker = &view_tracker_;
   counters_.start_matches_needed.set(static_cast<std::uint64_t>(settings.estimator.start_observations));
 }
 
@@ -48,8 +50,8 @@ void Mapper::add_pose(const TrackerSample& sample) noexcept {
   last_pose_arrival_ = std::max(last_pose_arrival_, sample.arrival);
 }
 
-void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour,
-                     const CardiacClock& ecg) noexcept {
+void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const GreyImage& before,
+                     const ColourImage& colour, const CardiacClock& ecg) noexcept {
   const RealtimeScope realtime;
   finish_learning();
   const Instant begun = MonotonicClock::now();
@@ -57,6 +59,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Colo
   StageEnds ends;
   // A
   job_.image = image;
+  job_.before = before;
   find_features(frame);
   ends.found = MonotonicClock::now();
   // B
@@ -84,6 +87,9 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const CardiacClo
   tell_earlier_frames(heart, breath);
   FrameRecord& frame = history_->append(stamp);
   FrameHistory::set_pose(frame, poses_.at(stamp.capture));
+  parallax_.add(frame.pose, stamp.capture);
+  job_.no_parallax = parallax_.none();
+  job_.starts_fail_alike = starts_fail_alike(slots_);
   history_->set_phase(frame, heart_.clock(), breathing_.clock());
   breathing_.expect_displacement(frame);
   job_.frame = &frame;

@@ -19,6 +19,7 @@
 #include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/map_keeping.hpp"
 #include "core/pipeline/map_memory.hpp"
+#include "core/pipeline/parallax.hpp"
 #include "core/pipeline/phase_cells.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
@@ -51,8 +52,9 @@ class Mapper {
   [[nodiscard]] bool pose_reached(Instant t) const noexcept { return poses_.reached(t); }
 
   // Stages A, B and C; then D is begun: the workers learn until the next frame, or whatever else is called here. The
-  // images are not used after the return; `colour` may be without pixels. `ecg`: the ECG's newest clock.
-  void process(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour,
+  // images are not used after the return; `before` is the frame processed before, without pixels at first, and `colour`
+  // may be without pixels. `ecg`: the ECG's newest clock.
+  void process(const FrameStamp& stamp, const GreyImage& image, const GreyImage& before, const ColourImage& colour,
                const CardiacClock& ecg) noexcept;
   // What the mapper does while the workers learn from the frame just processed. In lockstep they have done on return,
   // and so has housekeeping.
@@ -102,10 +104,12 @@ class Mapper {
   PoseHistory poses_;
   HeartPhase heart_;
   Breathing breathing_;
+  Parallax parallax_;
   std::unique_ptr<FrameHistory> history_;
 
   // The features, and what is done with them. (A surface through them belongs here.)
   PatchTracker tracker_;
+  PatchTracker view_tracker_ = LastView::tracker();
   MapBank bank_;
   FrameJob job_;
   ShardStages stages_;

@@ -52,6 +52,7 @@ struct Pipeline::Parts {
   BatchStarter starter;
   PhaseCells phase_cells;
   Mapper mapper;
+  FrameHandle mapped_before;  // its buffer is still taken; without one before the first frame
   ReleasePlan plan;
   std::array<SurfaceComposer, kReleaseStreams.size()> composers;  // one a stream
   // Relaxed: a message by itself; the mapper's wake-up follows it.
@@ -121,8 +122,14 @@ void Pipeline::map(const FrameHandle& frame) noexcept {
   TripleBuffer<CardiacClock>& ecg = parts_->entrance.ecg_clocks().mapper;
   ecg.update();
   if (parts_->settings.respiration.channel) parts_->mapper.hear_breath(parts_->entrance.breath(), frame.stamp.capture);
-  parts_->mapper.process(frame.stamp, parts_->entrance.image(frame), parts_->entrance.colour(frame), ecg.front());
-  parts_->entrance.give_back(frame);
+  SensorEntrance& entrance = parts_->entrance;
+  const bool first = parts_->mapped_before.buffer < 0;
+  parts_->mapper.process(frame.stamp, entrance.image(frame),
+                         first ? GreyImage{} : entrance.image(parts_->mapped_before), entrance.colour(frame),
+                         ecg.front());
+  // The next one's features are sought in it too.
+  if (!first) parts_->entrance.give_back(parts_->mapped_before);
+  parts_->mapped_before = frame;
   parts_->mapper.beside_learning();
 }
 

@@ -48,7 +48,7 @@ class Pipeline {
   // Mapper thread: takes over what the tracker has sent.
   void drain_poses() noexcept;
   [[nodiscard]] bool pose_reached(Instant t) const noexcept;
-  // Mapper thread: one frame through A, B and C, its buffer given back, then D begun.
+  // Mapper thread: one frame through A, B and C, the buffer of the one before given back, then D begun.
   void map(const FrameHandle& frame) noexcept;
 
   // Any thread: a new patient. The mapper forgets the map, the ECG thread the rhythm and the respiration thread the

@@ -8,7 +8,8 @@
 namespace perimap {
 namespace {
 
-constexpr int kFrameBuffers = 8;  // a quarter of a second at 30 frames/s
+// A quarter of a second at 30 frames/s, and the last frame that was mapped.
+constexpr int kFrameBuffers = 9;
 // More than a minute at 60 frames/s: what a publisher that was held up has to know.
 constexpr std::size_t kStampRing = 4096;
 constexpr std::size_t kPoseRing = 256;  // more than a second of a fast tracker

@@ -54,6 +54,7 @@ struct ShardSnapshot {
   Instant capture;                        // of that frame
   CameraPlace camera;                     // at that capture
   bool pose_missing = false;              // that frame gave no measurement for want of a pose
+  bool no_parallax = false;               // the camera has lately been in one place
   std::vector<FeatureSnapshot> features;  // capacity reserved at start
 };
 

@@ -78,6 +78,7 @@ void ShardStages::evaluate_shard(int worker) noexcept {
     snapshot.cameras = job_.plan.cameras;
     snapshot.camera = {job_.frame->pose.valid(), job_.frame->pose.X_WC};
     snapshot.pose_missing = !job_.frame->pose.valid();
+    snapshot.no_parallax = job_.no_parallax;
     snapshot.features.clear();
   }
   for_shard(worker, [&](FeatureGroup& group) { group.evaluate(job_, cells.publisher.back(), cells.model.back()); });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -29,6 +30,18 @@ struct StartProgress {
   }
   if (progress.features > 0) progress.mean_matches = sum / progress.features;
   return progress;
+}
+
+// Of more features than have an estimate: then it is what all have in common that is wrong (no parallax, another
+// heart's ECG, a wrong set-up), not what the single feature follows.
+[[nodiscard]] inline bool starts_fail_alike(std::span<const FeatureSlot> slots) noexcept {
+  std::ptrdiff_t failing = 0, mapped = 0;
+  for (const FeatureSlot& slot : slots) {
+    const bool is_unmapped = slot.state == SlotState::kTracked || slot.state == SlotState::kStarting;
+    failing += is_unmapped && slot.failed_starts > 0 ? 1 : 0;
+    mapped += slot.state == SlotState::kMapped ? 1 : 0;
+  }
+  return failing > mapped;
 }
 
 }  // namespace perimap

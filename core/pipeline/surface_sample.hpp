@@ -28,7 +28,8 @@ enum class SurfaceReason : std::uint8_t {
   kRhythmUnpredictable,
   kRhythmEctopic,
   kLawUndecided,
-  kNotSeen
+  kNotSeen,
+  kNoParallax
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost, kShed };

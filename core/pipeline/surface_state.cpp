@@ -1,17 +1,29 @@
 #include "core/pipeline/surface_state.hpp"
 
+#include <algorithm>
+
 #include "core/pipeline/sight.hpp"
 
 namespace perimap {
 
+namespace {
+
+bool is_converged(const FeatureSnapshot& feature) noexcept { return feature.state == FeatureState::kConverged; }
+
+}  // namespace
+
 SurfaceFooting footing_of(std::span<const ShardSnapshot* const> snapshots) noexcept {
   SurfaceFooting footing;
   Sight sight;
+  bool still = false, converged = false;
   for (const ShardSnapshot* snapshot : snapshots) {
     footing.mapped = footing.mapped || !snapshot->features.empty();
     footing.pose_missing = footing.pose_missing || snapshot->pose_missing;
     sight.add(*snapshot);
+    still = still || snapshot->no_parallax;
+    converged = converged || std::any_of(snapshot->features.begin(), snapshot->features.end(), is_converged);
   }
+  footing.no_parallax = still && !converged;
   footing.not_seen = sight.lost();
   return footing;
 }
@@ -28,6 +40,7 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (footing.update_late) return SurfaceReason::kUpdateLate;
   if (footing.pose_missing) return SurfaceReason::kPoseMissing;
   if (footing.not_seen) return SurfaceReason::kNotSeen;
+  if (footing.no_parallax) return SurfaceReason::kNoParallax;
   if (phase.ectopic) return SurfaceReason::kEctopicBeat;
   if (rhythm == Rhythm::kUnpredictable) return SurfaceReason::kRhythmUnpredictable;
   if (rhythm == Rhythm::kEctopic) return SurfaceReason::kRhythmEctopic;

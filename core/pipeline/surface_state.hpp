@@ -16,7 +16,8 @@ struct SurfaceFooting {
   bool frame_missing = false;
   bool update_late = false;
   bool pose_missing = false;
-  bool not_seen = false;  // see Sight
+  bool not_seen = false;     // see Sight
+  bool no_parallax = false;  // the camera keeps still, and no feature has converged
 };
 
 // As far as the newest snapshots tell: whether there are features, poses and sight of them.

@@ -52,9 +52,10 @@ FeatureFollower::FeatureFollower(const FollowerSettings& settings)
     : settings_(settings),
       trail_stride_(settings.rate.frames(kTrailEvery)),
       tracker_({.min_correlation = settings.min_correlation}),
-      // As many again may be away, and as many as are on trial.
-      features_(static_cast<std::size_t>((2 + settings.candidates_per_place) * std::max(settings.maximum, 0))),
+      // Twice as many may be away, here and where the lens has been meanwhile; and as many as are on trial.
+      features_(static_cast<std::size_t>((3 + settings.candidates_per_place) * std::max(settings.maximum, 0))),
       motion_(features_.size()),
+      validity_(settings.rate),
       deviation_px_(kFirstDeviation_px) {
   scratch_.reserve(features_.size());
   overlays_.reserve(kMostOverlays);
@@ -85,17 +86,32 @@ std::vector<Vector2d> FeatureFollower::occupied() const {
 }
 
 bool FeatureFollower::seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
-                           double deviation_px, double min_correlation) const noexcept {
+                           double deviation_px, double min_correlation, bool is_vouched_for) const noexcept {
   const bool has_way_back = before_.data != nullptr && feature.misses == 0;
   feature.match = feature.patch.find(tracker_, image,
                                      {.predicted_px = predicted,
                                       .deviation_px = deviation_px,
                                       .min_correlation = min_correlation,
+                                      .is_vouched_for = is_vouched_for,
                                       .before = has_way_back ? &before_ : nullptr,
                                       .before_px = feature.last_px});
   feature.found = feature.match.state == MatchState::kFound;
   if (feature.found) feature.px = feature.match.px;
   return feature.found;
+}
+
+// Near where it is expected, since others vouch for that.
+bool FeatureFollower::seek_vouched_for(const GreyImage& image, FollowedFeature& feature, const Vector2d& expected,
+                                       double deviation_px) const noexcept {
+  constexpr double kOff_px = 2, kOffOfWidth = 0.006;
+  const FollowedPatch::Places places = feature.patch.places();
+  if (!seek(image, feature, expected, deviation_px, settings_.vouched_correlation, true)) return false;
+  const bool is_sure = feature.match.correlation >= settings_.recovered_correlation;
+  if (is_sure || (feature.px - expected).norm() <= kOff_px + kOffOfWidth * image.width) return true;
+  feature.patch.put_back(places);
+  feature.found = false;
+  feature.px = feature.last_px;
+  return false;
 }
 
 void FeatureFollower::note_displacements() noexcept {
@@ -124,6 +140,7 @@ void FeatureFollower::track_into(const GreyImage& image) noexcept {
     return;
   }
   ++frame_;
+  validity_.look_at(image);
   if (blind_frames_ > 0) {
     constexpr double kDrift_px_per_s = 15.0;
     const double drift_px = kDrift_px_per_s / settings_.rate.per_s() * blind_frames_;
@@ -172,6 +189,7 @@ void FeatureFollower::track_into(const GreyImage& image) noexcept {
   promote_the_surest();
   keep_to_maximum();
   let_overlays_go();
+  note_picture(image);
   blind_frames_ = 0;
   remember(image);
 }
@@ -181,11 +199,25 @@ bool FeatureFollower::has_vanished() const noexcept {
   constexpr std::size_t kEnoughToTell = 8, kNearlyAll = 5;  // one in so many is left at most
   std::size_t tracked = 0, found = 0;
   for (const FollowedFeature& feature : features_) {
-    if (feature.state != FollowState::kTracked) continue;
+    if (feature.state != FollowState::kTracked && !has_lately_been_lost(feature)) continue;
     ++tracked;
     found += feature.found ? 1 : 0;
   }
   return tracked >= kEnoughToTell && kNearlyAll * found < tracked;
+}
+
+// A lens that is wiped, or withdrawn, loses them within some frames, not in one.
+bool FeatureFollower::has_lately_been_lost(const FollowedFeature& feature) const noexcept {
+  constexpr Duration kLately = std::chrono::milliseconds(400);
+  return feature.state == FollowState::kOccluded && !feature.swept && feature.misses <= frames(kLately, 5);
+}
+
+// A third to half a second ago there is always one.
+void FeatureFollower::note_picture(const GreyImage& image) noexcept {
+  constexpr std::uint64_t kPlacesApart = 5;
+  const std::uint64_t place = frame_ / trail_stride_;
+  if (frame_ % (kPlacesApart * trail_stride_) != 0) return;
+  recent_[place / kPlacesApart % recent_.size()] = {thumbnail_of(image), place};
 }
 
 void FeatureFollower::disbelieve(FollowedFeature& feature) const noexcept {
@@ -194,32 +226,43 @@ void FeatureFollower::disbelieve(FollowedFeature& feature) const noexcept {
   feature.patch.put_back(feature.last_places);
 }
 
+// They are where they were before it began, as their places of then have it, and so is the picture.
 void FeatureFollower::sweep() noexcept {
+  const Recent& then = *std::min_element(
+      recent_.begin(), recent_.end(), [](const Recent& a, const Recent& b) { return a.trail_place < b.trail_place; });
+  const int place = places_.remember(then.picture);
+  const std::uint64_t ago = frame_ / trail_stride_ - then.trail_place;
   for (FollowedFeature& feature : features_) {
     if (feature.state == FollowState::kCandidate) let_go(feature);
-    if (feature.state != FollowState::kTracked) continue;
+    if (feature.state != FollowState::kTracked && !has_lately_been_lost(feature)) continue;
     disbelieve(feature);
+    if (ago > 0 && ago <= feature.trail_length && ago < FollowedFeature::kTrail) {
+      feature.px = feature.last_px = trailed(feature, static_cast<std::size_t>(ago));
+    }
     feature.velocity_px.setZero();
     feature.swept = true;
+    feature.place = place;
   }
 }
 
-// By how much those found of the swept have moved, if a good share of them has moved alike.
-std::optional<Vector2d> FeatureFollower::displacement_of_swept() noexcept {
+// By how much those found of a place's have moved, if a good share of them has moved alike.
+std::optional<Vector2d> FeatureFollower::displacement_of_swept(int place) noexcept {
   std::size_t found = 0, alike = 0;
   Vector2d middle = Vector2d::Zero();
   for (int axis = 0; axis < 2; ++axis) {
     scratch_.clear();
     for (const FollowedFeature& feature : features_) {
-      if (feature.swept && feature.found) scratch_.push_back((feature.px - feature.last_px)[axis]);
+      if (feature.swept && feature.place == place && feature.found) {
+        scratch_.push_back((feature.px - feature.last_px)[axis]);
+      }
     }
     found = scratch_.size();
     if (found < kEnoughDisplacements) return std::nullopt;
     middle[axis] = upper_median(scratch_.begin(), scratch_.end());
   }
-  const double tolerance_px = 4 + 0.3 * middle.norm();
+  const double tolerance_px = 3 + 0.15 * middle.norm();
   for (FollowedFeature& feature : features_) {
-    if (!feature.swept || !feature.found) continue;
+    if (!feature.swept || feature.place != place || !feature.found) continue;
     if ((feature.px - feature.last_px - middle).norm() <= tolerance_px) {
       ++alike;
     } else {
@@ -230,35 +273,50 @@ std::optional<Vector2d> FeatureFollower::displacement_of_swept() noexcept {
   return middle;
 }
 
-// A share of them is sought widely; only when those are there, the rest is sought near.
 void FeatureFollower::recall_swept(const GreyImage& image) noexcept {
+  const auto is_swept = [](const FollowedFeature& feature) { return feature.swept; };
+  if (std::none_of(features_.begin(), features_.end(), is_swept)) return;
+  const Thumbnail now = thumbnail_of(image);
+  for (int place = 0; place < SeenPlaces::kMost; ++place) {
+    if (!recall_place(image, place, now)) continue;
+    note_displacements();
+    return;
+  }
+}
+
+// A share of a place's features is sought widely, where the coarse picture has them; only when those are there, the
+// rest is sought near.
+bool FeatureFollower::recall_place(const GreyImage& image, int place, const Thumbnail& now) noexcept {
   constexpr std::size_t kProbes = 40, kShareAlike = 4;  // one in so many at least
-  const auto swept = static_cast<std::size_t>(
-      std::count_if(features_.begin(), features_.end(), [](const FollowedFeature& feature) { return feature.swept; }));
-  if (swept == 0) return;
+  const auto is_of_place = [place](const FollowedFeature& feature) { return feature.swept && feature.place == place; };
+  const auto swept = static_cast<std::size_t>(std::count_if(features_.begin(), features_.end(), is_of_place));
+  if (swept == 0) return false;
+  const Vector2d coarse = displacement_between(places_[place], now).value_or(Vector2d::Zero());
   const std::size_t stride = (swept + kProbes - 1) / kProbes;
   std::size_t nth = frame_ % stride, probed = 0;
   for (FollowedFeature& feature : features_) {
-    if (!feature.swept || nth++ % stride != 0) continue;
+    if (!is_of_place(feature) || nth++ % stride != 0) continue;
     ++probed;
-    (void)seek(image, feature, feature.last_px, settings_.widest_deviation_px, settings_.recovered_correlation);
+    (void)seek(image, feature, feature.last_px + coarse, settings_.widest_deviation_px, settings_.vouched_correlation,
+               true);
   }
-  const std::optional<Vector2d> displacement = displacement_of_swept();
+  const std::optional<Vector2d> displacement = displacement_of_swept(place);
   const auto found =
-      static_cast<std::size_t>(std::count_if(features_.begin(), features_.end(), [](const FollowedFeature& feature) {
-        return feature.swept && feature.found;
+      static_cast<std::size_t>(std::count_if(features_.begin(), features_.end(), [&](const FollowedFeature& feature) {
+        return is_of_place(feature) && feature.found;
       }));
   const bool are_back = displacement && kShareAlike * found >= probed;
   for (FollowedFeature& feature : features_) {
-    if (!feature.swept) continue;
+    if (!is_of_place(feature)) continue;
     if (!are_back || !feature.found) disbelieve(feature);
     feature.swept = !are_back;
     feature.is_recalled = are_back;
     if (are_back && !feature.found) {
-      (void)seek(image, feature, feature.last_px + *displacement, kFirstDeviation_px, settings_.recovered_correlation);
+      const Vector2d expected = feature.last_px + *displacement;
+      if (!seek_vouched_for(image, feature, expected, kFirstDeviation_px)) feature.px = expected;
     }
   }
-  if (are_back) note_displacements();
+  return are_back;
 }
 
 // What its own velocity did not find, and what was occluded: with the displacement of what is around it.
@@ -273,9 +331,12 @@ void FeatureFollower::find_again(const GreyImage& image) noexcept {
     constexpr double kDrift_px_per_s = 3.0;
     const double deviation_px = std::min(2 * deviation_px_ + kDrift_px_per_s / settings_.rate.per_s() * feature.misses,
                                          settings_.widest_deviation_px);
-    if (!seek(image, feature, expected, deviation_px, is_occluded ? settings_.recovered_correlation : 0)) {
-      feature.px = expected;
-    }
+    // What its region hid comes back with what is around it.
+    const bool is_vouched_for = is_occluded && feature.hidden > 0 && neighbours.known;
+    const bool is_found = is_vouched_for ? seek_vouched_for(image, feature, expected, deviation_px)
+                                         : seek(image, feature, expected, deviation_px,
+                                                is_occluded ? settings_.recovered_correlation : 0);
+    if (!is_found) feature.px = expected;
   }
 }
 
@@ -285,19 +346,24 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
   const int misses_of_candidate = frames(kMissesOfCandidate, 2);
   const int briefly = frames(kBriefly, 3);
   const int occluded = frames(settings_.occluded, settings_.occluded_frames);
+  const int hidden = frames(settings_.hidden, settings_.occluded_frames);
   const int candidate = frames(settings_.candidate, settings_.candidate_frames);
+  constexpr Duration kSettledEvery = std::chrono::milliseconds(500);
+  const auto view_stride = static_cast<std::uint64_t>(frames(kSettledEvery, 1));
   note_displacements();
   scratch_.clear();
   for (FollowedFeature& feature : features_) {
     if (feature.state == FollowState::kEmpty) continue;
     if (!feature.found) {
       feature.is_away = ++feature.misses > briefly;
+      feature.hidden += feature.swept || validity_.at(feature.px) != RegionFault::kNone ? 1 : 0;
       feature.velocity_px = feature.px - feature.last_px;
       const bool is_outside = feature.px.x() < 0 || feature.px.y() < 0 || feature.px.x() > image.width - 1 ||
                               feature.px.y() > image.height - 1;
       const bool is_candidate = feature.state == FollowState::kCandidate;
       if (is_candidate && feature.misses <= misses_of_candidate) continue;
-      if (is_candidate || feature.misses > occluded || (is_outside && feature.misses > occluded / 4)) {
+      const int missed = feature.misses - feature.hidden;
+      if (is_candidate || missed > occluded || feature.hidden > hidden || (is_outside && missed > occluded / 4)) {
         let_go(feature);
       } else {
         feature.state = FollowState::kOccluded;
@@ -312,7 +378,7 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
           feature.misses == 0 ? Vector2d(feature.px - feature.last_px) : displacement_around(feature.px, &feature);
     }
     const bool is_back = feature.misses > 0 || blind_frames_ > 0;
-    feature.misses = 0;
+    feature.misses = feature.hidden = 0;
     feature.is_away = false;
     feature.swept = false;
     ++feature.frames;
@@ -332,6 +398,7 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
     }
     if (is_candidate) feature.doubt_px += largest_deviation(feature.match.covariance_px2) + feature.patch.back_px();
     feature.patch.keep_view(image, feature.match, tracker_.kernels());
+    if (frame_ % view_stride == 0 && validity_.at(feature.px) == RegionFault::kNone) feature.patch.settle_view();
   }
   if (scratch_.size() >= kEnoughDisplacements) {
     constexpr double kShareOfNew = 0.2, kLeast_px = 0.4;

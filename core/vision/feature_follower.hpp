@@ -19,6 +19,8 @@
 #include "core/vision/neighbour_motion.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
+#include "core/vision/picture_validity.hpp"
+#include "core/vision/seen_places.hpp"
 
 namespace perimap {
 
@@ -31,12 +33,16 @@ struct FollowerSettings {
   // Unseen so long, and in so many frames of those that show anything, a feature is lost.
   Duration occluded = std::chrono::seconds(2);
   int occluded_frames = 15;
+  // Where the picture shows no tissue, and where nearly all features were lost together, so long.
+  Duration hidden = std::chrono::seconds(120);
   double least_deviation_px = 1.0;    // of a prediction, per axis
   double widest_deviation_px = 11.0;  // the search reaches +-40 px
   // So little that only what has nothing in common is left out: weak texture correlates badly with itself from one
   // frame to the next, by its noise. The way back judges (followed_patch.hpp).
   double min_correlation = 0.5;
   double recovered_correlation = 0.97;  // asked of a feature that comes back, for which there is no way back
+  // Of one that comes back where others have it that come back with it, or that were never away.
+  double vouched_correlation = 0.9;
   // A place that shows what was laid over the picture takes no feature so long.
   Duration overlay = std::chrono::seconds(30);
   // Candidates that may be on trial beside as many features as are wanted, of the maximum; the best become features.
@@ -63,6 +69,7 @@ struct FollowedFeature {
   Vector2d last_px = Vector2d::Zero();  // in the frame before
   int frames = 0;                       // found in
   int misses = 0;                       // in a row
+  int hidden = 0;                       // of them, those in which its region showed no tissue
   bool is_away = false;                 // missed for more than a moment
   int strange = 0;  // frames in which it moved otherwise than its neighbours, less those in which not
   Vector2d astray_px = Vector2d::Zero();  // how far it has lately gone another way than its neighbours
@@ -70,6 +77,7 @@ struct FollowedFeature {
   bool is_ripe = false;                  // a candidate that has stood its trial
   bool is_overlay = false;               // let go in the last frame because it is laid over the picture
   bool swept = false;                    // it vanished together with nearly all others
+  int place = 0;                         // SeenPlaces' number of the picture that they vanished from
   bool is_recalled = false;              // it has come back with them in the last frame
   FollowedPatch::Places last_places;     // in the frame before: what is not believed is taken back
   std::array<Vector2d, kTrail> trail{};  // where it was, by the number of the place
@@ -85,7 +93,9 @@ struct FollowedFeature {
 //
 // Where nearly all fail even so, the picture is another one: a cut, smoke, a leap. The few that something was found for
 // are not believed. All are kept where they were, and taken back only together, when a good share of them is found
-// moved alike. A frame without contrast (black, faded) is no look at anything: nothing is sought and nothing is missed.
+// moved alike; by how much is told beforehand by a coarse picture of where they vanished (seen_places.hpp). What is
+// missed in a region that shows no tissue (picture_validity.hpp) counts as hidden. A frame without contrast (black,
+// faded) is no look at anything: nothing is sought and nothing is missed.
 //
 // What stands still to a few tenths of a pixel while the whole picture moves beside it is no tissue but laid over the
 // picture: text, a logo. It is let go, and its place is not taken again for long.
@@ -104,6 +114,8 @@ class FeatureFollower {
   void add(const GreyImage& image, std::span<const Vector2d> corners, const TemplateSettings& settings) noexcept;
 
   [[nodiscard]] std::span<const FollowedFeature> features() const noexcept { return features_; }
+  // Of the last frame.
+  [[nodiscard]] const PictureValidity& validity() const noexcept { return validity_; }
   // False when the last frame had no contrast.
   [[nodiscard]] bool saw_anything() const noexcept { return blind_frames_ == 0; }
   // Candidates that it would take.
@@ -127,7 +139,9 @@ class FeatureFollower {
   };
 
   [[nodiscard]] bool seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
-                          double deviation_px, double min_correlation) const noexcept;
+                          double deviation_px, double min_correlation, bool is_vouched_for = false) const noexcept;
+  [[nodiscard]] bool seek_vouched_for(const GreyImage& image, FollowedFeature& feature, const Vector2d& expected,
+                                      double deviation_px) const noexcept;
   // Of the features around `px`, without `but`; its own velocity where there are too few.
   [[nodiscard]] NeighbourMotion::Around around(const Vector2d& px, const FollowedFeature* but) const noexcept;
   [[nodiscard]] Vector2d displacement_around(const Vector2d& px, const FollowedFeature* but) const noexcept {
@@ -139,9 +153,12 @@ class FeatureFollower {
   [[nodiscard]] int frames(Duration time, int least) const noexcept;
   [[nodiscard]] bool has_vanished() const noexcept;
   void disbelieve(FollowedFeature& feature) const noexcept;
+  [[nodiscard]] bool has_lately_been_lost(const FollowedFeature& feature) const noexcept;
+  void note_picture(const GreyImage& image) noexcept;
   void sweep() noexcept;
   void recall_swept(const GreyImage& image) noexcept;
-  [[nodiscard]] std::optional<Vector2d> displacement_of_swept() noexcept;
+  [[nodiscard]] bool recall_place(const GreyImage& image, int place, const Thumbnail& now) noexcept;
+  [[nodiscard]] std::optional<Vector2d> displacement_of_swept(int place) noexcept;
   void judge(const GreyImage& image) noexcept;
   [[nodiscard]] bool moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept;
   void drop_doubles() noexcept;
@@ -172,6 +189,13 @@ class FeatureFollower {
   std::vector<std::uint8_t> before_pixels_;
   GreyImage before_;        // the frame before; without pixels until there was one
   NeighbourMotion motion_;  // of this frame
+  PictureValidity validity_;
+  SeenPlaces places_;
+  struct Recent {
+    Thumbnail picture;
+    std::uint64_t trail_place = 0;
+  };
+  std::array<Recent, 3> recent_{};  // pictures of the last half second
   std::vector<double> scratch_;
   double deviation_px_;
   double strangeness_px_ = 1.0;  // how far a displacement usually is from that of the neighbours

@@ -4,20 +4,13 @@
 #include <cmath>
 
 #include "core/geometry/symmetric_matrix2.hpp"
+#include "core/vision/way_back.hpp"
 
 namespace perimap {
 namespace {
 
 // Of the first view, where it may take over: one that fits worse tells no better than the last one where it is.
 constexpr double kFirstViewFits = 0.98;
-
-// Any place that has been found makes a view: whether it is a good one was judged when the feature began.
-TemplateSettings any_texture() noexcept {
-  TemplateSettings settings;
-  settings.min_texture = settings.min_texture_coarse = 1e-3;
-  settings.max_saturated_share = 1;
-  return settings;
-}
 
 }  // namespace
 
@@ -26,6 +19,7 @@ void FollowedPatch::begin(const PatchTemplate& first, const Vector2d& px) noexce
   first_state_ = last_state_ = PatchState{};
   first_state_.px = px;
   has_last_ = false;
+  settled_views_ = 0;
   drift_px2_ = back_px_ = 0;
 }
 
@@ -61,33 +55,28 @@ PatchMatch FollowedPatch::find(const PatchTracker& tracker, const GreyImage& ima
   // What has been covered, or has gone and come back, may look as it did at first.
   PatchState first = first_state_;
   const PatchMatch again = tracker.track(image, first_, first, search.predicted_px, covariance);
-  if (again.state != MatchState::kFound || again.correlation < std::max(search.min_correlation, kFirstViewFits)) {
-    return match;
+  const double fits = search.is_vouched_for ? search.min_correlation : std::max(search.min_correlation, kFirstViewFits);
+  if (again.state == MatchState::kFound && again.correlation >= fits) {
+    first_state_ = first;
+    drift_px2_ = 0;
+    return again;
   }
-  first_state_ = first;
-  drift_px2_ = 0;
-  return again;
+  if (search.before != nullptr || settled_views_ < settled_.size()) return match;
+  PatchState settled;
+  const PatchMatch back = tracker.track(image, settled_.back(), settled, search.predicted_px, covariance);
+  if (back.state != MatchState::kFound || back.correlation < search.min_correlation) return match;
+  last_state_ = settled;
+  drift_px2_ += larger_eigenvalue(back.covariance_px2);
+  return back;
 }
 
-// As Lucas-Kanade is commonly checked, but with gain and bias.
 bool FollowedPatch::comes_back(const PatchTracker& tracker, const GreyImage& image, const Search& search,
                                const PatchMatch& match) noexcept {
-  constexpr double kMostOff_px = 1.0;
-  PatchTemplate now;
-  if (make_patch_template(image, match.px, any_texture(), tracker.kernels(), now) != TemplateVerdict::kGood) {
-    return false;
-  }
-  now.affine_usable = false;
-  PatchState state;
-  // The way back begins without knowing where it should end: by the same prediction, as far off as that was.
-  const Vector2d expected = search.before_px + (match.px - search.predicted_px);
-  constexpr double kLeastDeviation_px = 2;
-  const double deviation_px = std::max(search.deviation_px, kLeastDeviation_px);
-  const PatchMatch back =
-      tracker.track(*search.before, now, state, expected, deviation_px * deviation_px * Matrix2d::Identity());
-  if (back.state != MatchState::kFound) return false;
-  back_px_ = (back.px - search.before_px).norm();
-  return back_px_ < kMostOff_px;
+  const auto off_px = off_on_way_back(tracker, image, match.px,
+                                      {*search.before, search.before_px, search.predicted_px, search.deviation_px});
+  if (!off_px) return false;
+  back_px_ = *off_px;
+  return back_px_ < kMostOffOnWayBack_px;
 }
 
 void FollowedPatch::correct_by_first_view(const PatchTracker& tracker, const GreyImage& image,
@@ -104,12 +93,18 @@ void FollowedPatch::correct_by_first_view(const PatchTracker& tracker, const Gre
 
 void FollowedPatch::keep_view(const GreyImage& image, const PatchMatch& match, const PatchKernels& kernels) noexcept {
   PatchTemplate view;
-  if (make_patch_template(image, match.px, any_texture(), kernels, view) != TemplateVerdict::kGood) return;
+  if (!make_view(image, match.px, kernels, view)) return;
   last_ = view;
-  last_.affine_usable = false;
   last_state_ = PatchState{};
   last_state_.px = match.px;
   has_last_ = true;
+}
+
+void FollowedPatch::settle_view() noexcept {
+  if (!has_last_) return;
+  settled_.back() = settled_.front();
+  settled_.front() = last_;
+  settled_views_ = std::min(settled_views_ + 1, settled_.size());
 }
 
 }  // namespace perimap

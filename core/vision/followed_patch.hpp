@@ -1,6 +1,9 @@
 // What one followed feature looks like: as it was first seen, and as it looked last.
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 #include "core/geometry/pose.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/vision/patch_template.hpp"
@@ -13,10 +16,8 @@ namespace perimap {
 // both are kept (Matthews, Ishikawa & Baker, "The template update problem", IEEE PAMI 26(6), 2004): the last view finds
 // the place, and the first one, whenever it fits well there, corrects it.
 //
-// The last view moves without changing its shape: from one frame to the next tissue hardly does, and weak texture does
-// not determine more. A place that it finds counts when the way back, of what is seen at the found place into the frame
-// before, ends where it began: that tells highlights and edges, along which two ways differ, and asks for no
-// correlation, which says more about texture than about the match.
+// The last view moves without changing its shape. A place that it finds counts when the way back ends where it began
+// (way_back.hpp).
 class FollowedPatch {
  public:
   // Of the first view, at px.
@@ -24,8 +25,9 @@ class FollowedPatch {
 
   struct Search {
     Vector2d predicted_px = Vector2d::Zero();
-    double deviation_px = 0;     // of the prediction, per axis
-    double min_correlation = 0;  // asked for beside the tracker's own
+    double deviation_px = 0;      // of the prediction, per axis
+    double min_correlation = 0;   // asked for beside the tracker's own
+    bool is_vouched_for = false;  // others tell where it is: the first view need fit no better than the last one
     // The frame before and where the feature was found in it; null when it was not: then there is no way back.
     const GreyImage* before = nullptr;
     Vector2d before_px = Vector2d::Zero();
@@ -35,6 +37,10 @@ class FollowedPatch {
 
   // The view of the place just found becomes the last one. Without a template to be had there, the one before stays.
   void keep_view(const GreyImage& image, const PatchMatch& match, const PatchKernels& kernels) noexcept;
+
+  // The last view is kept beside those that follow, to be asked when it comes back after half a second or more: it was
+  // made before whatever covered the place began to.
+  void settle_view() noexcept;
 
   // How far the way back has ended from where it began, px, when it was last gone.
   [[nodiscard]] double back_px() const noexcept { return back_px_; }
@@ -55,6 +61,8 @@ class FollowedPatch {
   void correct_by_first_view(const PatchTracker& tracker, const GreyImage& image, PatchMatch& match) noexcept;
 
   PatchTemplate first_, last_;
+  std::array<PatchTemplate, 2> settled_;  // the newer first
+  std::size_t settled_views_ = 0;
   PatchState first_state_, last_state_;
   bool has_last_ = false;  // else the first view is the last one
   double drift_px2_ = 0;

@@ -19,10 +19,11 @@ std::string_view name_of(perimap_SurfaceState state) noexcept {
 }
 
 std::string_view name_of(perimap_SurfaceReason reason) noexcept {
-  return name_in<16>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
-                      "update_late", "pose_missing", "phase_contradicted", "respiration_unknown", "phase_from_image",
-                      "ectopic_beat", "rhythm_unpredictable", "rhythm_ectopic", "law_undecided", "not_seen"},
-                     static_cast<int>(reason));
+  return name_in<17>(
+      {"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing", "update_late",
+       "pose_missing", "phase_contradicted", "respiration_unknown", "phase_from_image", "ectopic_beat",
+       "rhythm_unpredictable", "rhythm_ectopic", "law_undecided", "not_seen", "no_parallax"},
+      static_cast<int>(reason));
 }
 
 std::string_view name_of(perimap_FeatureState state) noexcept {

@@ -52,6 +52,8 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_LAW_UNDECIDED;
     case SurfaceReason::kNotSeen:
       return perimap_SURFACE_REASON_NOT_SEEN;
+    case SurfaceReason::kNoParallax:
+      return perimap_SURFACE_REASON_NO_PARALLAX;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }

@@ -67,13 +67,15 @@ class Playing {
         continue;
       }
       if (ahead > Duration(0) && !wait_unless_interrupted(ahead, interrupt_)) return {};
-      deliver(grey);
+      deliver(**decoded);
     }
     return {};
   }
 
-  void deliver(const GreyImage& grey) {
+  void deliver(const VideoFrame& decoded) {
+    const GreyImage& grey = decoded.grey;
     CameraFrame frame;
+    frame.colour = decoded.colour;
     frame.stamp = {sequence_, capture_, std::max(capture_, MonotonicClock::now())};
     frame.width = grey.width;
     frame.height = grey.height;

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "core/error/expected.hpp"
+#include "core/sensors/colour_image.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "drivers/image/pixel_format.hpp"
 
@@ -19,6 +20,9 @@ struct CameraFrame {
   int height = 0;
   std::size_t stride = 0;  // bytes from row to row; 0 with kMjpg
   std::span<const std::byte> bytes;
+  // Of a source that decodes colour anyhow: the picture that the bytes are the grey of. Without pixels else, or where
+  // the bytes themselves have the colour.
+  ColourImage colour;
 };
 
 // Whether the bytes hold the picture that the frame announces; what a JPEG holds its decoder says.

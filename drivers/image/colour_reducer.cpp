@@ -62,6 +62,30 @@ void reduce_video(const CameraFrame& frame, std::uint8_t* out) noexcept {
   }
 }
 
+// Likewise, all pixels of them. False for a picture of another size.
+bool reduce_decoded(const CameraFrame& frame, std::uint8_t* out) noexcept {
+  constexpr int kRows = 2;
+  const ColourImage& colour = frame.colour;
+  if (colour.width != frame.width || colour.height != frame.height) return false;
+  for (int by = 0; by < reduced_side(frame.height); ++by) {
+    for (int bx = 0; bx < reduced_side(frame.width); ++bx, out += 3) {
+      std::array<int, 3> sums{};
+      for (int i = 0; i < kRows; ++i) {
+        const std::uint8_t* const row = colour.row(std::min(kColourReduction * by + 1 + i, frame.height - 1));
+        for (int k = 0; k < kColourReduction; ++k) {
+          const std::uint8_t* const pixel =
+              row + std::ptrdiff_t{3} * std::min(kColourReduction * bx + k, frame.width - 1);
+          for (std::size_t channel = 0; channel < sums.size(); ++channel) sums[channel] += pixel[channel];
+        }
+      }
+      for (std::size_t channel = 0; channel < sums.size(); ++channel) {
+        out[channel] = static_cast<std::uint8_t>(sums[channel] / (kRows * kColourReduction));
+      }
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 void ColourReducer::reserve(int width, int height) {
@@ -79,9 +103,11 @@ void ColourReducer::reduce_colour(const CameraFrame& frame) {
 }
 
 bool ColourReducer::reduce(const CameraFrame& frame) {
-  if (frame.format == PixelFormat::kGrey || !check_bytes(frame)) return false;
+  const bool is_decoded = frame.colour.bgr != nullptr;
+  if ((frame.format == PixelFormat::kGrey && !is_decoded) || !check_bytes(frame)) return false;
   const std::size_t bytes = reduced_row_bytes(frame.width) * static_cast<std::size_t>(reduced_side(frame.height));
   if (bgr_.size() < bytes) bgr_.resize(bytes);
+  if (is_decoded) return reduce_decoded(frame, bgr_.data());
   if (frame.format == PixelFormat::kMjpg) {
     return jpeg_.decode_reduced_colour(frame.bytes, frame.width, frame.height, bgr_).has_value();
   }

@@ -13,10 +13,13 @@
 #include "core/vision/feature_follower.hpp"
 #include "core/vision/image_noise.hpp"
 #include "core/vision/instrument_mask.hpp"
+#include "core/vision/last_view.hpp"
 #include "core/vision/neighbour_motion.hpp"
 #include "core/vision/patch_continuity.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
+#include "core/vision/picture_validity.hpp"
+#include "core/vision/seen_places.hpp"
 
 namespace {
 
@@ -108,6 +111,27 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   FeatureFollower follower(settings);
   follower.add(image, *corners, easy);
   for (int i = 0; i < 3; ++i) follower.track_into(image);
+  const PatchTracker view_tracker = LastView::tracker();
+  LastView view;
+  view.make(image, 0, inside, view_tracker.kernels());
+  if (view.is_of(0)) {
+    const Matrix2d covariance = deviation * deviation * Matrix2d::Identity();
+    for (const Vector2d& sought : {predicted, inside}) {
+      for (const PatchMatch& match : {view.follow(view_tracker, image, image, inside, sought, covariance),
+                                      view.find_again(view_tracker, image, sought, covariance)}) {
+        if (match.state != MatchState::kFound) continue;
+        if (!match.px.allFinite() || !match.covariance_px2.allFinite()) std::abort();
+        view.drift_to(match);
+      }
+    }
+    if (!(view.drift_px2() >= 0)) std::abort();
+  }
+  PictureValidity validity{FrameRate()};
+  for (int i = 0; i < 2; ++i) validity.look_at(image);
+  for (const Vector2d& px : {at, inside}) (void)validity.at(px);
+  const Thumbnail small = thumbnail_of(image);
+  const auto displacement = displacement_between(small, small);
+  if (displacement && !(displacement->norm() < 1e-9)) std::abort();
   for (const int reduction : {1, 4}) {
     if (width >= 3 && !find_instruments({pixels.data(), width / 3, height, stride}, reduction * width, height)) {
       std::abort();

@@ -34,7 +34,8 @@ struct RecordedTruth {
 [[nodiscard]] constexpr bool rests_on_its_frame(perimap_SurfaceReason reason) noexcept {
   return reason == perimap_SURFACE_REASON_NONE || reason == perimap_SURFACE_REASON_ECTOPIC_BEAT ||
          reason == perimap_SURFACE_REASON_RHYTHM_UNPREDICTABLE || reason == perimap_SURFACE_REASON_RHYTHM_ECTOPIC ||
-         reason == perimap_SURFACE_REASON_LAW_UNDECIDED || reason == perimap_SURFACE_REASON_NOT_SEEN;
+         reason == perimap_SURFACE_REASON_LAW_UNDECIDED || reason == perimap_SURFACE_REASON_NOT_SEEN ||
+         reason == perimap_SURFACE_REASON_NO_PARALLAX;
 }
 
 // Nothing when the recording has no ground truth (it is not a simulated one).

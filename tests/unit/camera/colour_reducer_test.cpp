@@ -88,6 +88,35 @@ TEST(ColourReducer, GivesTheColoursOfEachFormatAtAQuarterOfTheSize) {
   }
 }
 
+TEST(ColourReducer, ReducesThePictureThatAGreyFrameWasMadeOf) {
+  constexpr int kWidth = 30, kHeight = 18;
+  std::vector<std::uint8_t> bgr;
+  for (int i = 0; i < kWidth * kHeight; ++i) {
+    for (const int value : i % kWidth < 16 ? std::array{10, 20, 200} : std::array{90, 80, 70}) {
+      bgr.push_back(static_cast<std::uint8_t>(value));
+    }
+  }
+  const std::vector<std::byte> grey(static_cast<std::size_t>(kWidth) * kHeight);
+  CameraFrame frame;
+  frame.width = kWidth;
+  frame.height = kHeight;
+  frame.stride = kWidth;
+  frame.bytes = grey;
+  frame.colour = {bgr.data(), kWidth, kHeight, std::ptrdiff_t{3} * kWidth};
+  ColourReducer reducer(1);
+  reducer.reduce_colour(frame);
+  ASSERT_NE(reducer.picture().bgr, nullptr);
+  EXPECT_EQ(reducer.picture().width, 8);
+  EXPECT_EQ(reducer.picture().height, 5);
+  for (int y = 0; y < 5; ++y) {
+    expect_near(bgr_at(reducer.picture(), 3, y), {10, 20, 200});
+    expect_near(bgr_at(reducer.picture(), 7, y), {90, 80, 70});
+  }
+  frame.colour.width = kWidth - 1;
+  reducer.reduce_colour(frame);
+  EXPECT_EQ(reducer.picture().bgr, nullptr) << "it is of another picture";
+}
+
 TEST(ColourReducer, GivesTheColoursOfAJpeg) {
   constexpr int kWidth = 50, kHeight = 34;
   CameraFrame frame;

@@ -195,6 +195,29 @@ TEST_F(Stages, ALateStartIsToldOnceAndAdoptedWhenItComes) {
   EXPECT_EQ(slot->state, SlotState::kTracked) << "a failed start tries again";
 }
 
+TEST_F(Stages, AFeatureWhoseStartsFailIsKeptWhereHardlyAnyCanBeStarted) {
+  job.starts_fail_alike = true;
+  for (int i = 0; i < 10; ++i) {
+    slot->state = SlotState::kStarting;
+    slot->start.adopt_at_frame = 0;
+    slot->start.count = 0;
+    slot->start.outcome.status = BatchStatus::kTooManyOutliers;
+    slot->start.due = true;
+    next_frame();
+    ASSERT_EQ(learn_frame(), LifeEvent::kStartFailed);
+    ASSERT_EQ(slot->state, SlotState::kTracked);
+  }
+}
+
+TEST_F(Stages, StartsFailAlikeWhereMoreFailThanAreMapped) {
+  slots[0].state = slots[1].state = SlotState::kTracked;
+  EXPECT_FALSE(starts_fail_alike(slots));
+  slots[0].failed_starts = 1;
+  EXPECT_TRUE(starts_fail_alike(slots));
+  slots[1].state = SlotState::kMapped;
+  EXPECT_FALSE(starts_fail_alike(slots));
+}
+
 TEST_F(Stages, AFeatureWhoseStartsFailIsGivenUpForThat) {
   int failed = 0;
   for (LifeEvent event = LifeEvent::kNone; event != LifeEvent::kLostUnstarted; ++failed) {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
+#include <utility>
 
 #include "tests/unit/vision/synthetic_scene.hpp"
 
@@ -134,6 +136,73 @@ TEST_F(Candidate, SeenFarLargerGetsAFreshTemplateWhereThePictureHasOne) {
   for (int i = 0; i < 70; ++i) next_frame({0, 0}, image);
   ASSERT_TRUE(is_found());
   EXPECT_NEAR(slot.patch_state.A(0, 0), 1.0, 0.1);
+}
+
+// Tissue that is wetted, or lit from elsewhere: it fades into another one, and both move alike.
+struct ChangingLooks : Candidate {
+  test::Texture other{9};
+  PatchTracker view_tracker = LastView::tracker();
+  std::unique_ptr<test::ImageBuffer> before;
+
+  ChangingLooks() { job.view_tracker = &view_tracker; }
+
+  void next_look(double share, const Vector2d& by) {
+    test::View moved;
+    moved.t = shift + by;
+    auto image = std::make_unique<test::ImageBuffer>(view(moved.t));
+    test::ImageBuffer faded = test::render(other, moved, kWidth, kHeight, 1, random);
+    for (std::size_t i = 0; i < image->pixels.size(); ++i) {
+      const double grey = (1 - share) * image->pixels[i] + share * faded.pixels[i];
+      image->pixels[i] = static_cast<std::uint8_t>(std::lround(grey));
+    }
+    job.before = before != nullptr ? before->view() : GreyImage{};
+    next_frame(by, *image);
+    before = std::move(image);
+  }
+};
+
+TEST_F(ChangingLooks, AreFollowedFromTheFrameBeforeAndTheDriftIsTold) {
+  constexpr int kFrames = 30;
+  double deviation_px = 0;
+  for (int i = 0; i <= kFrames; ++i) {
+    next_look(static_cast<double>(i) / kFrames, {1.5, -0.5});
+    ASSERT_EQ(slot.match.state, MatchState::kFound) << i;
+    ASSERT_LT((slot.match.px - place()).norm(), 1.5) << i;
+    if (slot.seen_by_last_view) {
+      EXPECT_GT(slot.match.covariance_px2(0, 0), deviation_px * deviation_px) << "it drifts on";
+      deviation_px = std::sqrt(slot.last_view.drift_px2());
+    }
+  }
+  EXPECT_TRUE(slot.seen_by_last_view) << "the first view should not fit what it has become";
+  EXPECT_GT(deviation_px, 0.1);
+  // It is as it was.
+  for (int i = kFrames; i >= 0; --i) next_look(static_cast<double>(i) / kFrames, {-1.5, 0.5});
+  EXPECT_TRUE(is_found());
+  EXPECT_FALSE(slot.seen_by_last_view);
+  EXPECT_EQ(slot.last_view.drift_px2(), 0);
+}
+
+TEST_F(ChangingLooks, AreNotFollowedWhereTheWayBackEndsElsewhere) {
+  next_look(0, {1, 0});
+  // All of it has been replaced: nothing of the frame before is there.
+  next_look(1, {1, 0});
+  EXPECT_NE(slot.match.state, MatchState::kFound);
+}
+
+TEST_F(ChangingLooks, AreFoundAgainAsTheyWereWhenTheyWereCovered) {
+  constexpr int kFrames = 30;
+  for (int i = 0; i <= kFrames; ++i) next_look(static_cast<double>(i) / kFrames, {1, 0});
+  ASSERT_TRUE(slot.seen_by_last_view);
+  for (int i = 0; i < 5; ++i) {
+    auto nothing = std::make_unique<test::ImageBuffer>(kWidth, kHeight);
+    job.before = before->view();
+    next_frame({1, 0}, *nothing);
+    ASSERT_NE(slot.match.state, MatchState::kFound);
+    before = std::move(nothing);
+  }
+  next_look(1, {1, 0});
+  EXPECT_EQ(slot.match.state, MatchState::kFound);
+  EXPECT_LT((slot.match.px - place()).norm(), 1.5);
 }
 
 // A mapped feature that the map has 25 px beside its place, as a pose that is off makes it.

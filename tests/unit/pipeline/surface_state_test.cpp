@@ -35,6 +35,21 @@ TEST(SurfaceState, IsDegradedWhenTheImagesShowNothingOfTheMap) {
   EXPECT_EQ(state_of(SurfaceReason::kNotSeen), SurfaceState::kDegraded);
 }
 
+TEST(SurfaceState, IsDegradedWhileTheCameraKeepsStillAndNothingHasConverged) {
+  ShardSnapshot shard;
+  shard.no_parallax = true;
+  shard.features.resize(2);
+  shard.features[0].state = FeatureState::kConverging;
+  const ShardSnapshot* const shards[] = {&shard};
+  const SurfaceFooting footing = footing_of(shards);
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing), SurfaceReason::kNoParallax);
+  EXPECT_EQ(state_of(SurfaceReason::kNoParallax), SurfaceState::kDegraded);
+  shard.features[1].state = FeatureState::kConverged;
+  shard.features[1].expected = shard.features[1].in_sight = true;
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing_of(shards)), SurfaceReason::kNone)
+      << "it was seen before";
+}
+
 TEST(SurfaceState, TellsWhatIsWorseFirst) {
   PhaseEstimate phase = locked();
   phase.law_undecided = true;

@@ -34,7 +34,7 @@ class FeatureFollowerTest : public testing::Test {
   static FollowerSettings settings() {
     FollowerSettings settings;
     settings.maximum = kFeatures;
-    settings.occluded = std::chrono::seconds(1);
+    settings.occluded = settings.hidden = std::chrono::seconds(1);
     return settings;
   }
 
