@@ -10,6 +10,7 @@
 #include "daemon/command_line/outputs.hpp"
 #include "daemon/evaluation/track_judge/clip.hpp"
 #include "daemon/evaluation/track_judge/contest.hpp"
+#include "daemon/evaluation/track_judge/disturbance_trial.hpp"
 #include "daemon/evaluation/track_judge/judge_text.hpp"
 #include "daemon/evaluation/track_judge/track_picture.hpp"
 
@@ -22,6 +23,7 @@ struct Options {
   int features = 131;
   std::size_t first = 0;
   std::size_t frames = 100;
+  bool events = false;
   bool json = false;
 };
 
@@ -33,6 +35,12 @@ Outcome judge(const Options& options) {
   if (auto able = check_writable({picture}); !able) return refuse(able.error());
   const auto clip = Clip::read(options.input, options.first, options.frames);
   if (!clip) return refuse(clip.error());
+  if (options.events) {
+    const auto figures = try_disturbances(*clip, options.features);
+    if (!figures) return refuse(fmt::format("{}: {}", options.input, figures.error().message));
+    fmt::print("{}", options.json ? to_json(*figures).dump(2) + "\n" : to_text(*figures));
+    return {};
+  }
   const auto contest = hold_contest(*clip, options.features);
   if (!contest) return refuse(contest.error());
   if (!options.picture.empty()) {
@@ -57,10 +65,17 @@ void add_judge_command(Commands& commands) {
   command.add_option("--frames", options->frames, "How many frames are played at most; all are held in memory")
       ->check(Range(2, 100000))
       ->capture_default_str();
-  command.add_option(
+  const Option* const picture = command.add_option(
       "--picture", options->picture,
       "Where to write the tracks over the first frame, as PNG: perimap's on the left, Lucas-Kanade's on\n"
       "the right; green right, yellow strayed at the turn, red elsewhere at the end, grey lost");
+  command
+      .add_flag("--events", options->events,
+                "Instead, compose events on the clip, played there and back (blood, fog, a lens that is wiped, one\n"
+                "that is withdrawn for 5 s and comes back elsewhere, a step of exposure), and count the features\n"
+                "that are found again within 1 s of the picture's return, and those that are wrong by then; the\n"
+                "tracks of the clip without the event are the truth")
+      ->excludes(picture);
   command.add_flag("--json", options->json, "Print the figures as JSON");
   command.footer(
       "begun: in one of the first three frames. alive: found in the last one. right: alive, within 3 px of where it\n"
