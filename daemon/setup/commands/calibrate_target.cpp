@@ -33,7 +33,10 @@ Expected<BoardPattern> pattern_of(const Options& options) {
   const auto dictionary = dictionary_named(wish->dictionary);
   if (!dictionary) return tl::unexpected(dictionary.error());
   const double marker_mm = wish->marker_mm > 0.0 ? wish->marker_mm : 0.75 * wish->square_mm;
-  return charuco_pattern(sized ? wish->columns : 12, sized ? wish->rows : 9, wish->square_mm, marker_mm, *dictionary);
+  auto pattern =
+      charuco_pattern(sized ? wish->columns : 12, sized ? wish->rows : 9, wish->square_mm, marker_mm, *dictionary);
+  if (pattern) pattern->name += ", dictionary " + wish->dictionary;
+  return pattern;
 }
 
 Outcome run(const Options& options) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <numbers>
 #include <span>
@@ -82,15 +83,12 @@ class BenchWriter {
     const auto scope = writer_.add_channel<perimap_TrackerPose>(channels::kTrackerPose);
     const auto pointer = writer_.add_channel<perimap_TrackerPose>(std::string(channels::kTrackedTools) + "pointer");
     const auto viewer = writer_.add_channel<foxglove_PoseInFrame>(channels::kTrackerViewer);
-    for (const auto* channel : {&info, &scope, &pointer, &viewer}) {
+    const auto image = writer_.add_channel<foxglove_RawImage>(channels::kCameraImage);
+    const auto ecg = writer_.add_channel<perimap_EcgSamples>(channels::kEcgSamples);
+    for (const auto* channel : {&info, &scope, &pointer, &viewer, &image, &ecg}) {
       if (!*channel) return tl::unexpected(channel->error());
     }
-    scope_ = *scope, pointer_ = *pointer, viewer_ = *viewer;
-    if (!scene_.frames().empty()) {
-      const auto image = writer_.add_channel<foxglove_RawImage>(channels::kCameraImage);
-      if (!image) return tl::unexpected(image.error());
-      image_ = *image;
-    }
+    scope_ = *scope, pointer_ = *pointer, viewer_ = *viewer, image_ = *image, ecg_ = *ecg;
     std::string generator = fmt::format("perimap simulate {}", PERIMAP_VERSION);
     std::string text = description_of(scene_, noise_);
     std::string world = kWorldFrame;
@@ -116,19 +114,39 @@ class BenchWriter {
         .and_then([&] {
           return writer_.write(pointer_, to_tracker_pose(pointer), pointer.arrival, pointer.source_time,
                                pointer.device_frame);
-        });
+        })
+        .and_then([&] { return write_ecg(scope.arrival); });
   }
 
   Expected<void> finish() { return writer_.finish(); }
 
  private:
+  // Of a device whose electrodes nobody wears; whoever plays a recording asks for one. Blocks that have come by then.
+  Expected<void> write_ecg(Instant now) {
+    EcgBlock block;
+    block.sample_period = std::chrono::milliseconds(4);
+    block.count = 10;
+    block.lead_off = true;
+    while (scene_.start() + (ecg_samples_ + block.count) * block.sample_period <= now) {
+      block.first_sample_time = scene_.start() + ecg_samples_ * block.sample_period;
+      block.device_sequence = static_cast<std::uint32_t>(ecg_samples_);
+      block.arrival = now;
+      ecg_samples_ += block.count;
+      const auto written =
+          writer_.write(ecg_, borrow_ecg_samples(block), now, block.first_sample_time, block.device_sequence);
+      if (!written) return written;
+    }
+    return {};
+  }
+
   static inline const std::string kCameraFrame = "camera";
   static inline const std::string kWorldFrame = "tracker";
 
   const BenchScene& scene_;
   TrackerNoise noise_;
   RecordingWriter writer_;
-  ChannelId image_, scope_, pointer_, viewer_;
+  ChannelId image_, scope_, pointer_, viewer_, ecg_;
+  std::int64_t ecg_samples_ = 0;
   std::vector<std::uint8_t> packed_;
 };
 

@@ -14,6 +14,7 @@
 #include "daemon/setup/attached_devices.hpp"
 #include "daemon/setup/first_configuration.hpp"
 #include "daemon/setup/kept_result.hpp"
+#include "daemon/setup/live_guide.hpp"
 #include "daemon/setup/printed_target.hpp"
 #include "daemon/setup/verification.hpp"
 #include "drivers/board/board_pattern.hpp"
@@ -200,6 +201,42 @@ TEST(Verification, WhatIsMissingIsSaid) {
   TouchOnTrial moving = w.touch;
   for (std::size_t i = 0; i < moving.tip_W.size(); ++i) moving.tip_W[i].p.x() += static_cast<double>(i);
   EXPECT_THAT(refusal(w, moving), HasSubstr("held still nowhere"));
+}
+
+// ---- what is told while it is recorded
+
+TEST(LiveGuide, PivotIsEnoughOnceTheToolWasTurnedToAllSides) {
+  const auto guide = pivot_guide(10.0);
+  const auto swung = [](double seconds, double turn) {
+    std::mt19937 generator(2);
+    std::normal_distribution<double> normal(0.0, 0.3);
+    std::vector<TimedPose> poses;
+    for (double t = 0.0; t < seconds; t += 0.02) {
+      Pose X;
+      X.R = so3_exp(turn * Vector3d(std::sin(1.3 * t), std::sin(1.9 * t + 1.0), std::sin(0.9 * t)));
+      X.t = Vector3d(10.0, 0.0, -500.0) - X.R * Vector3d(0.0, 0.0, 120.0) +
+            Vector3d(normal(generator), normal(generator), normal(generator));
+      poses.push_back({t, X});
+    }
+    return poses;
+  };
+  EXPECT_FALSE(guide->enough());
+  EXPECT_THAT(guide->line(), HasSubstr("no poses"));
+  guide->follow(swung(3.0, 0.5));
+  EXPECT_FALSE(guide->enough()) << "too short";
+  guide->follow(swung(15.0, 0.02));
+  EXPECT_FALSE(guide->enough()) << "hardly turned";
+  guide->follow(swung(15.0, 0.5));
+  EXPECT_TRUE(guide->enough()) << guide->line();
+  EXPECT_THAT(guide->line(), HasSubstr("mm RMS"));
+}
+
+TEST(LiveGuide, BoardThatIsNotSeenIsToldAndSoIsWhereItIsMissing) {
+  const auto guide = board_guide({}, std::nullopt, 1.0);
+  const std::vector<std::uint8_t> grey(64 * 64, 90);
+  guide->see(0.0, {grey.data(), 64, 64, 64});
+  EXPECT_THAT(guide->line(), HasSubstr("no board is seen"));
+  EXPECT_FALSE(guide->enough());
 }
 
 // ---- boards to print
