@@ -57,15 +57,16 @@ CameraPose PoseHistory::between(const Reading& r_0, const Reading& r_1, Instant 
   const double common = settings_.error_correlation > Duration(0)
                             ? std::exp(-to_seconds(r_1.time - r_0.time) / to_seconds(settings_.error_correlation))
                             : 0.0;
-  const auto weigh = [common, s](double a, double b) {
-    return square((1.0 - s) * a) + square(s * b) + 2.0 * common * s * (1.0 - s) * a * b;
-  };
-  const double weight = weigh(r_0.growth, r_1.growth);
+  const double weight = square(1.0 - s) + square(s) + 2.0 * common * s * (1.0 - s);
+  // What a reading is farther off than usual is its own: nothing of it is common with the other, and it never makes the
+  // pose better.
+  const double excess = square(1.0 - s) * (square(r_0.growth) - 1.0) + square(s) * (square(r_1.growth) - 1.0);
+  const double own_mm2 = square((1.0 - s) * r_0.own_mm) + square(s * r_1.own_mm);
   const double beyond_s = std::max(0.0, to_seconds(t - r_1.time));
-  pose.position_variance_mm2 = weight * square(settings_.position_deviation_mm) + weigh(r_0.own_mm, r_1.own_mm) +
+  pose.position_variance_mm2 = (weight + excess) * square(settings_.position_deviation_mm) + own_mm2 +
                                square(kInterpolationDeviation_mm) +
                                square(0.5 * kHandAcceleration_mm_per_s2 * square(beyond_s));
-  pose.rotation_variance_rad2 = weight * square(settings_.rotation_deviation_rad) +
+  pose.rotation_variance_rad2 = (weight + excess) * square(settings_.rotation_deviation_rad) +
                                 square(kInterpolationDeviation_rad) +
                                 square(0.5 * kHandAcceleration_rad_per_s2 * square(beyond_s));
   return pose;

@@ -102,6 +102,33 @@ TEST(PoseHistory, APoseIsAtLeastAsUncertainAsTheDeviceSaysItIs) {
   EXPECT_NEAR(half.position_variance_mm2 / usual.position_variance_mm2, (4.0 + 1.0) / 2.0, 0.01);
 }
 
+// Between the readings and beyond them, whether their errors last or not.
+TEST(PoseHistory, AnErrorThatTheDeviceTellsNeverMakesAPoseBetter) {
+  for (const double correlation_s : {0.0, 0.005, 0.1, 10.0, 1e6}) {
+    PoseHistorySettings settings = noisy();
+    settings.rotation_deviation_rad = 0.01;
+    settings.error_correlation = from_seconds(correlation_s);
+    settings.maximum_extrapolation = milliseconds(20);
+    for (const double before_mm : {0.0, 2.0, 3.5, 5.2, 20.0}) {
+      for (const double after_mm : {0.0, 2.0, 3.5, 5.2, 20.0}) {
+        PoseHistory usual(settings);
+        PoseHistory told(settings);
+        TrackerSample first = reading(0, 0.0);
+        TrackerSample second = reading(10, 10.0);
+        ASSERT_TRUE(usual.add(first) && usual.add(second));
+        first.error_mm = before_mm;
+        second.error_mm = after_mm;
+        ASSERT_TRUE(told.add(first) && told.add(second));
+        for (int ms = 0; ms <= 30; ++ms) {
+          ASSERT_GE(told.at(at_ms(ms)).position_variance_mm2, usual.at(at_ms(ms)).position_variance_mm2)
+              << ms << " ms, " << before_mm << " and " << after_mm << " mm, " << correlation_s << " s";
+          ASSERT_GE(told.at(at_ms(ms)).rotation_variance_rad2, usual.at(at_ms(ms)).rotation_variance_rad2);
+        }
+      }
+    }
+  }
+}
+
 TEST(PoseHistory, ATrackerThatIsSaidToBeExactIsAsFarOffAsItSays) {
   PoseHistory history({});
   TrackerSample first = reading(0, 0.0);
