@@ -10,6 +10,7 @@
 #include "daemon/config/tracked_tools.hpp"
 #include "drivers/calibration/calibration_facts.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/calibration/tool_tip.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/replay_reader.hpp"
 #include "drivers/transport/camera_endpoint.hpp"
@@ -76,10 +77,17 @@ std::optional<CalibrationDate> date_of(const std::optional<std::string>& text) {
 
 Expected<void> calibrations_fit(const Configuration& configuration) {
   const TrackerConfiguration& c = configuration.tracker;
+  if (c.hand_eye_sensor && !c.sensor && c.protocol != TrackerConfiguration::Protocol::kNone) {
+    return wrong("tracker.sensor", fmt::format("\"{}\", as 'tracker.hand_eye_sensor' says", *c.hand_eye_sensor),
+                 "nothing", "without it any other sensor would be taken for that one; name the sensor");
+  }
   if (c.hand_eye_sensor && c.sensor && !same_tool(*c.hand_eye_sensor, *c.sensor, c.protocol)) {
     return wrong("tracker.hand_eye_sensor", fmt::format("\"{}\", the tracker.sensor", *c.sensor),
                  fmt::format("\"{}\"", *c.hand_eye_sensor),
                  "the hand-eye is another sensor's; measure it with `perimap calibrate hand-eye`");
+  }
+  if (c.pointer_calibration) {
+    if (const auto tip = read_tool_tip(*c.pointer_calibration); !tip) return tl::unexpected(tip.error());
   }
   const auto tool = pointer_fact(c, "tool");
   // Recordings have it by its role, which says nothing of which tool it was.

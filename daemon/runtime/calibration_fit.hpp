@@ -11,8 +11,9 @@
 
 namespace perimap {
 
-// A hand-eye of another sensor, or a tip of another tool, than the configuration has: one line that names the key and
-// says what to do. What does not say what it is of fits.
+// A hand-eye of another sensor, or a tip of another tool, than the configuration has, or a tip that cannot be read: one
+// line that names the key or file and says what to do. What does not say what it is of fits; where a hand-eye says so,
+// the sensor must be named.
 [[nodiscard]] Expected<void> calibrations_fit(const Configuration& configuration);
 
 // Whether the frames of a video or recording that the configuration plays are as large as those that its calibration is

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/command_line/commands.hpp"
+#include "daemon/config/configuration_loader.hpp"
 #include "daemon/setup/commands/calibrate_camera.hpp"
 #include "daemon/setup/commands/calibrate_hand_eye.hpp"
 #include "daemon/setup/commands/calibrate_scope.hpp"
@@ -50,14 +51,24 @@ Expected<std::vector<TimedPose>> poses_of(const PosesOptions& options) {
   return in_order(table->poses);
 }
 
+// As check compares it with tracker.pointer. A recording knows it by its role; live devices are those of a
+// configuration, which says which tool has that role.
+Expected<std::string> tool_of(const PosesOptions& options) {
+  if (options.live.configuration.empty() || options.tool != "pointer") return options.tool;
+  const auto configuration = load_configuration(options.live.configuration, {}, NamedFiles::kMayBeMissing);
+  if (!configuration) return tl::unexpected(configuration.error());
+  return configuration->tracker.pointer.value_or(options.tool);
+}
+
 Expected<Measurement> measure_tool(const PosesOptions& options) {
   const auto poses = poses_of(options);
   if (!poses) return tl::unexpected(poses.error());
   const auto result = calibrate_pivot(*poses);
   if (!result) return fail(options.input() + ": " + result.error().message);
   Measurement measured{text_of(*result), json_of(*result), {}};
-  // Recordings know it by its role.
-  if (options.poses.empty()) measured.json["tool"] = options.tool;
+  const auto tool = tool_of(options);
+  if (!tool) return tl::unexpected(tool.error());
+  measured.json["tool"] = *tool;
   measured.plots = plots_of(*result, *poses);
   return measured;
 }
@@ -101,7 +112,11 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
   command.add_option("POSES", options->poses, what.poses);
   add_from(command, options->recording);
   add_live(command, options->live);
-  command.add_option("--tool", options->tool, "With --from or --live: the tracked tool; scope is the scope's sensor")
+  command
+      .add_option(
+          "--tool", options->tool,
+          "The tracked tool: with --from or --live one of the recording's, scope being the scope's sensor; with a "
+          "file what it is written down as")
       ->capture_default_str();
   add_common(command, options->common, true, what.has_keys);
 }

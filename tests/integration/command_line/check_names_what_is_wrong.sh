@@ -72,6 +72,24 @@ sed 's/^sensor = "0B"/sensor = "0A"/' "$scratch/tracker.toml" >"$scratch/other.t
 [ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line: $(cat "$scratch/error")"
 grep -q "other.toml: key 'tracker.hand_eye_sensor': .*perimap calibrate hand-eye" "$scratch/error" || fail "$(cat "$scratch/error")"
 
+# What calibrate writes is what check compares.
+awk 'BEGIN {
+  print "t_s,x,y,z,qx,qy,qz,qw"
+  for (i = 0; i < 400; ++i) {
+    a = 0.4 * sin(0.1 * i); b = 0.4 * cos(0.13 * i)
+    printf "%.3f,%.6f,%.6f,%.6f,%.9f,%.9f,%.9f,%.9f\n", i / 50, -150 * sin(2 * b), 150 * sin(2 * a) * cos(2 * b),
+      -150 * cos(2 * a) * cos(2 * b), sin(a) * cos(b), cos(a) * sin(b), sin(a) * sin(b), cos(a) * cos(b)
+  }
+}' >"$scratch/pivot.csv"
+"$perimap" calibrate tool "$scratch/pivot.csv" --unit mm --tool 0D --output "$scratch/tip.json" >"$scratch/out" 2>"$scratch/error" ||
+  fail "the tip was not measured: $(cat "$scratch/error")"
+sed 's/^sensor = "0B"/sensor = "0B"\npointer = "0D"\npointer_calibration = "tip.json"/' "$scratch/tracker.toml" >"$scratch/pointer.toml"
+"$perimap" check "$scratch/pointer.toml" >"$scratch/out" 2>"$scratch/error" || fail "the tip does not fit: $(cat "$scratch/error")"
+sed 's/^pointer = "0D"/pointer = "0C"/' "$scratch/pointer.toml" >"$scratch/other.toml"
+"$perimap" check "$scratch/other.toml" >"$scratch/out" 2>"$scratch/error"
+[ $? -eq 2 ] || fail "a tip of another tool must end with 2"
+grep -q "other.toml: key 'tracker.pointer_calibration': .*perimap calibrate tool" "$scratch/error" || fail "$(cat "$scratch/error")"
+
 printf 'version = 1\n[phase]\nlaw = 3\n' >"$scratch/wrong.toml"
 "$perimap" check "$scratch/wrong.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "a wrong configuration must end with 2"

@@ -63,7 +63,9 @@ TEST(CalibrationDate, IsReadAsPerimapAndOpenCvWriteIt) {
 
 TEST_F(CalibrationFit, AHandEyeOfAnotherSensorIsRefused) {
   configuration_.tracker.hand_eye_sensor = "0a";
-  EXPECT_TRUE(calibrations_fit(configuration_)) << "which sensor there is, is not said";
+  const auto unnamed = calibrations_fit(configuration_);
+  ASSERT_FALSE(unnamed) << "any other sensor would be taken for it";
+  EXPECT_THAT(unnamed.error().message, HasSubstr("key 'tracker.sensor': expected \"0a\""));
   configuration_.tracker.sensor = "0A";
   EXPECT_TRUE(calibrations_fit(configuration_)) << "handles are numbers";
   configuration_.tracker.sensor = "0B";
@@ -79,14 +81,28 @@ TEST_F(CalibrationFit, AHandEyeOfAnotherSensorIsRefused) {
 
 TEST_F(CalibrationFit, ATipOfAnotherToolIsRefused) {
   configuration_.tracker.pointer = "0C";
-  configuration_.tracker.pointer_calibration = write("tip.json", R"({"tool": "0D", "tip_mm": [0, 0, 150]})");
+  const auto tip_of = [](const std::string& tool) {
+    return R"({"tip_mm": [0, 0, 150], "covariance": [[1, 0, 0], [0, 1, 0], [0, 0, 1]])" + tool + "}";
+  };
+  configuration_.tracker.pointer_calibration = write("tip.json", tip_of(R"(, "tool": "0D")"));
   const auto fits = calibrations_fit(configuration_);
   ASSERT_FALSE(fits);
   EXPECT_THAT(fits.error().message, HasSubstr("'tracker.pointer_calibration': expected one of \"0C\""));
   EXPECT_THAT(fits.error().message, HasSubstr("perimap calibrate tool"));
-  for (const char* text : {R"({"tool": "C"})", R"({"tool": "pointer"})", R"({"tip_mm": [0, 0, 1]})", "{", "", "[1]"}) {
+  for (const char* tool : {R"(, "tool": "C")", R"(, "tool": "pointer")", ""}) {
+    configuration_.tracker.pointer_calibration = write("tip.json", tip_of(tool));
+    EXPECT_TRUE(calibrations_fit(configuration_)) << tool;
+  }
+}
+
+TEST_F(CalibrationFit, ATipThatCannotBeReadIsRefused) {
+  configuration_.tracker.pointer = "0C";
+  for (const char* text :
+       {"{", "", "[1]", "{}", R"({"tool": "0C"})", R"({"tip_mm": [0, 0]})", R"({"tip_mm": "x"})", "NDI\x01\x02"}) {
     configuration_.tracker.pointer_calibration = write("tip.json", text);
-    EXPECT_TRUE(calibrations_fit(configuration_)) << text;
+    const auto fits = calibrations_fit(configuration_);
+    ASSERT_FALSE(fits) << text;
+    EXPECT_THAT(fits.error().message, HasSubstr("tip.json: ")) << text;
   }
 }
 
