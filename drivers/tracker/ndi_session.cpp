@@ -106,7 +106,7 @@ void NdiSession::on_open(LinkControl& link, Instant now) {
   reference_told_ = {};
   broken_.clear();
   jumps_.clear();
-  refused_frame_.reset();
+  jumps_are_reason_ = false;
   health_.set_notice("");
   stride_ = 0;
   query_ = Query::kBx2;
@@ -315,7 +315,7 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
       return next_port(link, Step::kFindToEnable, now);
     case Step::kStart:
       if (!okay) break;
-      last_reading_ = now;
+      last_reading_ = last_pose_ = now;
       reference_ = {};
       reference_there_ = now;
       damaged_ = 0;

@@ -170,15 +170,17 @@ class NdiSession final : public DeviceProtocol {
   NdiToolReading reference_;   // the last
   Instant reference_there_{};  // not disabled
   Instant quiet_until_{};
-  std::uint64_t damaged_ = 0;                   // replies since the last whole one
-  std::string damage_;                          // of the last of them
-  std::optional<std::uint32_t> last_frame_;     // none while the sensor is disabled
-  Instant numbered_{};                          // when it came
-  std::optional<std::uint32_t> refused_frame_;  // for its number, the last
-  std::string jumps_;                           // of the frame numbers, in words
-  bool disabled_ = false;                       // was told last of the sensor, without a frame
-  std::int64_t count_ = 0;                      // of frames, without an end
-  std::uint32_t stride_ = 0;                    // device frames from one reading to the next, the least seen
+  std::uint64_t damaged_ = 0;                // replies since the last whole one
+  std::string damage_;                       // of the last of them
+  std::optional<std::uint32_t> last_frame_;  // none while the sensor is disabled
+  Instant numbered_{};                       // when it came
+  bool reply_refused_ = false;               // the one under way, for the number of its frame
+  Instant last_pose_{};                      // was given, or the start
+  bool jumps_are_reason_ = false;            // why no pose is given
+  std::string jumps_;                        // of the frame numbers, in words
+  bool disabled_ = false;                    // was told last of the sensor, without a frame
+  std::int64_t count_ = 0;                   // of frames, without an end
+  std::uint32_t stride_ = 0;                 // device frames from one reading to the next, the least seen
   int retries_ = 0;
 };
 

@@ -106,9 +106,12 @@ bool NdiSession::choose_unnamed_sensor(LinkControl& link) {
     link.fail(fmt::format("the tracker knows no tool{}: name a tool definition or plug one in{}", beside, broken));
     return false;
   }
-  if (others.size() > 1) {
-    link.fail(
-        fmt::format("several tools{} ({}): say by tracker.sensor which one is the sensor", beside, list_of(others)));
+  // One that cannot be used may well be the sensor.
+  if (others.size() + broken_.size() > 1) {
+    std::string all = list_of(others);
+    for (const NdiBrokenPort& port : broken_)
+      all += fmt::format("; {:02X}, which cannot be used: {}", port.handle, port.why);
+    link.fail(fmt::format("several tools{} ({}): say by tracker.sensor which one is the sensor", beside, all));
     return false;
   }
   if (unnamed_sensor_ && *unnamed_sensor_ != others.front()) {

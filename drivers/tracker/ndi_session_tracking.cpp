@@ -29,6 +29,7 @@ void NdiSession::on_tracking(LinkControl& link, const Expected<NdiTracking>& tra
   retries_ = 0;
   damaged_ = 0;
   if ((tracking->system_status & kHardwareFailure) != 0) return link.fail("the tracker reports a hardware failure");
+  reply_refused_ = false;
   // In a BX2 reply the frames come one after the other, each with its tools.
   for (const NdiToolReading& sensor : tracking->tools) {
     if (sensor.handle != sensor_handle_) continue;
@@ -81,9 +82,9 @@ void NdiSession::deliver_tools(const NdiTracking& tracking, Instant arrival) {
     const bool disabled = told.reading.state == ToolState::kDisabled && told.frame == 0;
     // A disabled tool has no frame and so no instant; it is told once, then again when it changes.
     if (disabled ? tool.disabled : tool.last_frame == told.frame) continue;
-    if (!disabled && told.frame == refused_frame_) continue;
     tool.disabled = disabled;
     tool.last_frame = disabled ? std::nullopt : std::optional(told.frame);
+    if (reply_refused_) continue;  // nobody knows its instant either
     ToolSample sample;
     sample.tool = is_reference ? 0 : 1 + static_cast<std::size_t>(other - others_.begin());
     sample.arrival = sample.source_time = arrival;
@@ -133,12 +134,17 @@ void NdiSession::refuse_number(std::uint32_t frame, std::int32_t step, Instant a
                          often, step);
     tell_notice();
   }
-  last_frame_ = refused_frame_ = frame;
+  reply_refused_ = true;
+  last_frame_ = frame;
   numbered_ = arrival;
   count_ = frame;
   clock_.reset();
   rate_.restart();
-  last_reading_ = arrival;
+  last_reading_ = arrival;  // the device is there, and a new start would help nobody
+  if (arrival - last_pose_ < kSilentAfter) return;
+  health_.set_state(DeviceState::kSilent);
+  health_.set_reason(jumps_);
+  jumps_are_reason_ = true;
 }
 
 void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& reference, Instant arrival) {
@@ -176,7 +182,8 @@ void NdiSession::deliver(const NdiToolReading& sensor, const ToolReading& refere
   sample.state = reading.state;
   sample.X_WS = reading.X_TO;
   sample.error_mm = reading.error_mm;
-  last_reading_ = arrival;
+  last_reading_ = last_pose_ = arrival;
+  if (std::exchange(jumps_are_reason_, false)) health_.set_reason("");
   health_.samples.add();
   health_.set_state(DeviceState::kStreaming);
   sink_(sample);

@@ -87,16 +87,27 @@ TEST(NdiTools, APortThatFailsAndNobodyAskedForIsLeftAloneAndTold) {
   NdiEmulatorSettings device = with_pointer();
   device.broken = {0x0D};
   device.tools.emplace(0x0D, PoseTrack::still(kStart, kReference));
-  for (const bool named : {true, false}) {
-    NdiSettings settings = scope_patient_and_pointer();
-    if (!named) settings.sensor.handle.reset();
-    Theatre theatre(settings, device);
-    theatre.run(seconds(2));
-    ASSERT_EQ(theatre.host.failure, "");
-    EXPECT_GT(theatre.samples.size(), 150U);
-    EXPECT_THAT(theatre.health.notice(), HasSubstr("port handle 0D, which nobody asked for"));
-    EXPECT_THAT(theatre.health.notice(), HasSubstr("ERROR13"));
-  }
+  Theatre theatre(scope_patient_and_pointer(), device);
+  theatre.run(seconds(2));
+  ASSERT_EQ(theatre.host.failure, "");
+  EXPECT_GT(theatre.samples.size(), 150U);
+  EXPECT_THAT(theatre.health.notice(), HasSubstr("port handle 0D, which nobody asked for"));
+  EXPECT_THAT(theatre.health.notice(), HasSubstr("ERROR13"));
+}
+
+// The one that is left need not be the scope's.
+TEST(NdiTools, WithoutASensorsNameAPortThatFailsMayBeTheSensor) {
+  NdiEmulatorSettings device = with_pointer();
+  device.broken = {0x0A};
+  device.tools.emplace(0x0D, PoseTrack::still(kStart, kReference));
+  NdiSettings settings = scope_patient_and_pointer();
+  settings.sensor.handle.reset();
+  Theatre theatre(settings, device);
+  theatre.run(seconds(2));
+  EXPECT_TRUE(theatre.samples.empty());
+  EXPECT_THAT(theatre.host.failure,
+              HasSubstr("several tools beside those that were named (0D; 0A, which cannot be used"));
+  EXPECT_THAT(theatre.host.failure, HasSubstr("tracker.sensor"));
 }
 
 TEST(NdiTools, APortThatFailsAndWasAskedForIsAnErrorThatNamesIt) {
@@ -167,6 +178,16 @@ TEST(NdiFrameNumbers, AFrameThatGivesNoPoseGivesNoneOfTheOtherToolsEither) {
   theatre.run(milliseconds(2300));
   EXPECT_EQ(theatre.health.misnumbered.get(), 4U);
   EXPECT_EQ(theatre.tools.size(), 2 * theatre.samples.size());
+}
+
+TEST(NdiFrameNumbers, ThatAreNeverRightMakeTheTrackerSilentWithThatReason) {
+  Theatre theatre(wired(), {.wired_tools = 1, .jump_every = milliseconds(10), .jump_by = -2});
+  theatre.run(seconds(3));
+  EXPECT_EQ(theatre.host.failure, "") << "a new start would help nobody";
+  EXPECT_EQ(theatre.health.state(), DeviceState::kSilent);
+  EXPECT_THAT(theatre.health.reason(), HasSubstr("frame numbers went back or jumped"));
+  EXPECT_LE(theatre.samples.size(), 1U);
+  EXPECT_GT(theatre.health.misnumbered.get(), 200U);
 }
 
 TEST(NdiFrameNumbers, APauseOfTheHostIsNoJump) {
