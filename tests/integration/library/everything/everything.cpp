@@ -17,7 +17,7 @@ int main() {
       pixels[static_cast<std::size_t>(y * kSide + x)] = static_cast<std::uint8_t>(60 + (x / 9 * 37 + y / 9 * 59) % 140);
   const perimap::GreyImage image{pixels.data(), kSide, kSide, kSide};
   const auto corners = perimap::find_features(image, {}, perimap::detector_settings_for(image, 10), 10);
-  if (!corners || corners->empty()) return 1;
+  if (!corners || corners->size() != 10) return 1;
 
   perimap::Pipeline pipeline{perimap::PipelineSettings{}};
   return pipeline.slots().empty() ? 2 : 0;
