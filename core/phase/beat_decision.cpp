@@ -84,7 +84,10 @@ bool BeatDecision::chaotic(Instant now) const noexcept {
 }
 
 bool BeatDecision::in_burst(Instant now) const noexcept {
-  return beats_.known() && clusters_.any_settled() && disturbed(now) > settings_.much_noise;
+  if (!beats_.known() || !clusters_.any_settled()) return false;
+  const double noise = disturbed(now);
+  const bool beats_come = now - familiar_at_ < settings_.beats_come;
+  return noise > (beats_come ? settings_.much_noise : settings_.burst);
 }
 
 bool BeatDecision::noisy(Instant now) const noexcept { return disturbed(now) > settings_.some_noise; }

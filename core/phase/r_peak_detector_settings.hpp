@@ -84,6 +84,7 @@ struct DecisionSettings {
   double much_noise = 1.5;  // and so many one in which nothing is a beat that comes early,
   double chaos = 2.2;       // and so many a lead that is off,
   Duration chaos_after = std::chrono::milliseconds(900);  // when no known beat has come for so long
+  Duration beats_come = std::chrono::milliseconds(1500);  // since the last of a known kind; else less noise is a burst
   double early = 0.7;                                     // of the usual cycle: what comes so early and
   double very_early = 0.40;                               // (or what comes so early, whatever it is like)
   double very_familiar = 0.92;  // is less like a cluster than that, or of another size, may be an arc
