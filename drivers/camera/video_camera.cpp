@@ -12,6 +12,9 @@ namespace perimap {
 namespace {
 
 constexpr double kUsualRate_hz = 30.0;
+// A time that is farther on is a damaged one: nobody waits for its frame.
+constexpr double kLongestVideo_s = 1e6;
+constexpr Duration kLongestStep = std::chrono::seconds(60);
 
 class Playing {
  public:
@@ -57,9 +60,10 @@ class Playing {
       sequence_ += undecoded + 1;
       const Instant by_rate = capture_ + static_cast<std::int64_t>(undecoded + 1) * period_;
       const auto& time_s = (*decoded)->time_s;
-      const Instant as_told = time_s ? first + from_seconds(*time_s) : by_rate;
+      const bool told = time_s && *time_s < kLongestVideo_s;
+      const Instant as_told = told ? first + from_seconds(*time_s) : by_rate;
       // A rate that was asked for is in the place of the file's own times, and so is the usual one where it tells none.
-      capture_ = by_rate_ || as_told <= capture_ ? by_rate : as_told;
+      capture_ = by_rate_ || as_told <= capture_ || as_told - capture_ > kLongestStep ? by_rate : as_told;
       if (undecoded > 0) health_.lost.add(undecoded);
       const Duration ahead = capture_ - MonotonicClock::now();
       if (ahead < -period_) {

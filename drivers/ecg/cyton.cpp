@@ -89,7 +89,10 @@ void CytonProtocol::await_greeting(LinkControl& link, std::span<const std::byte>
     const std::size_t name = text.rfind(kName);
     const std::size_t failure = text.rfind(kNoBoard);
     if (failure == std::string::npos || (name != std::string::npos && name > failure)) {
-      return begin(link, name == std::string::npos ? "" : text.substr(name));
+      // All that was said counts: of a greeting whose head was lost the name is missing, and the Daisy may be in it.
+      if (text.find(kDaisy) != std::string::npos)
+        return refuse_daisy(link, text.substr(name == std::string::npos ? 0 : name));
+      return begin(name == std::string::npos ? "" : text.substr(name));
     }
     no_board_ = true;
     patience_ = kPatience;
@@ -104,14 +107,16 @@ void CytonProtocol::await_greeting(LinkControl& link, std::span<const std::byte>
   (void)framer_.feed(bytes, running);
 }
 
-void CytonProtocol::begin(LinkControl& link, const std::string& name) {
+void CytonProtocol::refuse_daisy(LinkControl& link, const std::string& greeting) {
+  health().set_identity(greeting);
+  patience_ = kPatience;
+  link.fail(
+      "a Cyton with a Daisy module, whose packets are of the one board and the other in turn, 125 a second of each: "
+      "take the Daisy off");
+}
+
+void CytonProtocol::begin(const std::string& name) {
   if (!name.empty()) health().set_identity(name);
-  if (name.find(kDaisy) != std::string::npos) {
-    patience_ = kPatience;
-    return link.fail(
-        "a Cyton with a Daisy module, whose packets are of the one board and the other in turn, 125 a second of each: "
-        "take the Daisy off");
-  }
   prompted_ = true;
   patience_ = kPatience;
   framer_.restart();

@@ -52,7 +52,8 @@ class CytonProtocol final : public EcgProtocol {
   static constexpr Duration kLongestPatience = std::chrono::seconds(12);
 
   void await_greeting(LinkControl& link, std::span<const std::byte> bytes);
-  void begin(LinkControl& link, const std::string& name);
+  void begin(const std::string& name);
+  void refuse_daisy(LinkControl& link, const std::string& greeting);
   void answers(std::string awaited);
 
   CytonSettings settings_;
