@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -91,15 +92,20 @@ bool is_tool_name(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c < 0x7F; });
 }
 
-// Digits in their places; which days a month has is looked at where ages are told.
+// 2026-11-25, or as perimap writes it with the time of the day, 2026-11-25 18:30 UTC.
 bool is_day(const std::string& text) {
-  constexpr std::string_view kForm = "0000-00-00";
-  if (text.size() < kForm.size() || text.size() > 40) return false;
-  for (std::size_t i = 0; i < kForm.size(); ++i) {
+  constexpr std::string_view kForm = "0000-00-00 00:00 UTC";
+  constexpr std::size_t kDay = 10;
+  if (text.size() != kDay && text.size() != kForm.size()) return false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
     const bool digit = text[i] >= '0' && text[i] <= '9';
-    if (kForm[i] == '-' ? text[i] != '-' : !digit) return false;
+    if (kForm[i] == '0' ? !digit : text[i] != kForm[i]) return false;
   }
-  return std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c < 0x7F; });
+  const auto number = [&text](std::size_t at, std::size_t length) { return std::stoi(text.substr(at, length)); };
+  const std::chrono::year_month_day day{std::chrono::year(number(0, 4)),
+                                        std::chrono::month(static_cast<unsigned>(number(5, 2))),
+                                        std::chrono::day(static_cast<unsigned>(number(8, 2)))};
+  return day.ok();
 }
 
 constexpr std::size_t kMostInstruments = 8;

@@ -36,8 +36,9 @@ std::vector<std::string> tracked_tool_names(const TrackerConfiguration& c) {
 
 std::optional<ToolTwice> tool_named_twice(const TrackerConfiguration& c) {
   std::vector<std::pair<std::string, std::string>> named;  // key, tool
-  const auto add = [&named](const char* key, const std::optional<std::string>& tool, bool has_definition) {
-    if (tool && !has_definition) named.emplace_back(key, *tool);  // what is uploaded is given a handle
+  const bool uploads = c.protocol == TrackerConfiguration::Protocol::kNdi;
+  const auto add = [&named, uploads](const char* key, const std::optional<std::string>& tool, bool has_definition) {
+    if (tool && !(uploads && has_definition)) named.emplace_back(key, *tool);  // what is uploaded is given a handle
   };
   add("tracker.sensor", c.sensor, c.sensor_definition.has_value());
   add("tracker.reference", c.reference, c.reference_definition.has_value());

@@ -122,6 +122,17 @@ TEST(ConfigurationLoader, ReadsListsOfTextsAndAnEmptyOne) {
   EXPECT_THAT(missing.error().message, ::testing::HasSubstr("not-there.rom is not there"));
 }
 
+TEST(ConfigurationLoader, ADayIsOneOfTheCalendar) {
+  const auto dated = [](const std::string& day) {
+    return parse("version = 1\n[tracker]\nhand_eye_date = \"" + day + "\"\n").has_value();
+  };
+  for (const char* day : {"2026-11-25", "2024-02-29", "2026-11-25 18:30 UTC"}) EXPECT_TRUE(dated(day)) << day;
+  for (const char* day :
+       {"", "2026-13-45", "2026-02-31", "2026-11-25garbage", "2026-11-25 18:30", "25.11.2026", "2026-1-2"}) {
+    EXPECT_FALSE(dated(day)) << day;
+  }
+}
+
 TEST(ConfigurationLoader, TextMayBeInAnyScriptWithinStringsAndComments) {
   const Expected<Configuration> result = parse(
       "version = 1  # \xe3\x80\x81\n[source]\nname = \"th\xc3\xa9\xc3\xa2tre \\\"\xe3\x80\x81\\\" \"\nworld_frame = "

@@ -80,6 +80,9 @@ TEST(DeviceSetup, OneToolIsNotTwo) {
   tracker.protocol = TrackerConfiguration::Protocol::kIgtl;
   tracker.instruments = {"a", "A"};
   EXPECT_TRUE(tracker_device(tracker)) << "names are names";
+  tracker.sensor_definition = "scope.rom";
+  tracker.reference = tracker.sensor;
+  EXPECT_FALSE(tracker_device(tracker)) << "nothing is uploaded over OpenIGTLink";
 }
 
 TEST(PipelineSettings, AConvergedDeviationOfZeroAsRecordingsHoldItIsOneMillimetre) {
