@@ -79,8 +79,7 @@ void IgtlSession::on_bytes(LinkControl& link, std::span<const std::byte> bytes, 
 void IgtlSession::on_sign_of_life(Instant arrival) {
   heard_ = arrival;
   if (!all_seen() || held_ || arrival < listen_until_) return;
-  // Stamps that stand still are no sensor that is out of sight.
-  if (delivered_.stamp != 0 && (stamps_.wrong() || !stamps_.judged())) return;
+  if (delivered_.stamp != 0 && stamps_.wrong()) return;  // there are poses, which nobody can stamp
   if (arrival - std::max(last_, delivered_.arrival) < kAbsentAfter) return;
   absent_ = true;
   give({}, arrival, arrival);
@@ -136,7 +135,8 @@ void IgtlSession::on_pose(LinkControl& link, const IgtlMessage& message, const E
   for (const auto& [key, value] : message.metadata) {
     if (key == "TransformStatus" && value != "OK") reading = {};
   }
-  const Told told{reading, settings_.stamps_by_arrival ? 0 : message.time_stamp, message.time_ns(), arrival};
+  const Told told{reading, settings_.stamps_by_arrival ? 0 : message.time_stamp, message.time_ns(), arrival,
+                  message.time_stamp};
   if (other) on_tool(*other, told);
   if (other && *other > 0) return;
   (other ? reference_seen_ : sensor_seen_) = true;
@@ -145,7 +145,7 @@ void IgtlSession::on_pose(LinkControl& link, const IgtlMessage& message, const E
 
 void IgtlSession::on_tool(std::size_t tool, const Told& told) {
   std::optional<Told>& before = others_told_[tool];
-  if (told.stamp != 0 && before && before->stamp == told.stamp) return;  // the same reading again
+  if (before && repeats(told, *before)) return;
   before = told;
   if (!tool_sink_ || (told.stamp != 0 && stamps_.wrong())) return;
   ToolSample sample;
@@ -160,6 +160,11 @@ void IgtlSession::on_tool(std::size_t tool, const Told& told) {
   sample.X_WS = reading.X_TO;
   sample.error_mm = reading.error_mm;
   tool_sink_(sample);
+}
+
+bool IgtlSession::repeats(const Told& told, const Told& before) noexcept {
+  return told.sent_stamp != 0 && told.sent_stamp == before.sent_stamp && told.reading.state == before.reading.state &&
+         told.reading.X_TO.R == before.reading.X_TO.R && told.reading.X_TO.t == before.reading.X_TO.t;
 }
 
 Duration IgtlSession::apart(const Told& a, const Told& b) noexcept {
@@ -182,11 +187,12 @@ bool IgtlSession::stamps_wrong(const Told& sensor) {
   if (stamps_.fault() != stamps_told_) {
     stamps_told_ = stamps_.fault();
     clock_.reset();
-    health_.set_reason(stamps_told_.empty()
-                           ? server_fault_
-                           : fmt::format("the server's stamps are {}: no pose can be stamped by them; mend the "
-                                         "server, or set tracker.igtl_stamps = \"arrival\"",
-                                         stamps_told_));
+    // By arrival a server that repeats an old pose would look well.
+    const char* or_by_arrival = stamps_.stand_still() ? "" : R"(, or set tracker.igtl_stamps = "arrival")";
+    health_.set_reason(stamps_told_.empty() ? server_fault_
+                                            : fmt::format("the server's stamps are {}: no pose can be stamped by them; "
+                                                          "mend the server{}",
+                                                          stamps_told_, or_by_arrival));
   }
   if (!stamps_.wrong()) return false;
   health_.set_state(DeviceState::kSilent);
@@ -195,12 +201,12 @@ bool IgtlSession::stamps_wrong(const Told& sensor) {
 }
 
 void IgtlSession::on_sensor(const Told& sensor) {
+  const Told& last = held_ ? *held_ : delivered_;
+  if (repeats(sensor, last)) return;
   if (stamps_wrong(sensor)) {
     delivered_ = sensor;
     return;
   }
-  const Told& last = held_ ? *held_ : delivered_;
-  if (sensor.stamp != 0 && sensor.stamp == last.stamp) return;  // the same reading again
   if (held_) {
     reference_follows_ = false;
     deliver(*std::exchange(held_, std::nullopt), reference_);
@@ -213,6 +219,7 @@ void IgtlSession::on_sensor(const Told& sensor) {
 }
 
 void IgtlSession::on_reference(const Told& reference) {
+  if (repeats(reference, reference_)) return;  // it grows old
   const Told before = std::exchange(reference_, reference);
   if (reference.stamp == 0) return;
   if (!held_) {
@@ -247,16 +254,18 @@ void IgtlSession::on_tdata(LinkControl& link, const IgtlMessage& message, Instan
     }
   }
   if (arrival < listen_until_) return;
-  const Told told{sensor, settings_.stamps_by_arrival ? 0 : message.time_stamp, message.time_ns(), arrival};
+  const Told told{sensor, settings_.stamps_by_arrival ? 0 : message.time_stamp, message.time_ns(), arrival,
+                  message.time_stamp};
+  if (repeats(told, delivered_)) return;
   if (stamps_wrong(told)) {
     delivered_ = told;
     return;
   }
-  if (told.stamp != 0 && told.stamp == delivered_.stamp) return;  // the same reading again
-  reference_ = {reference, told.stamp, told.time_ns, arrival};
+  const Told patient{reference, told.stamp, told.time_ns, arrival, told.sent_stamp};
+  if (!repeats(patient, reference_)) reference_ = patient;
   for (std::size_t i = 0; i < others.size(); ++i) {
     if (others[i] || others_told_[i]) {
-      on_tool(i, {others[i].value_or(ToolReading{}), told.stamp, told.time_ns, arrival});
+      on_tool(i, {others[i].value_or(ToolReading{}), told.stamp, told.time_ns, arrival, told.sent_stamp});
     }
   }
   deliver(told, reference_);

@@ -62,13 +62,17 @@ class IgtlSession final : public DeviceProtocol {
   // What a message says of one tool.
   struct Told {
     ToolReading reading;
-    std::uint64_t stamp = 0;  // 32.32 fixed point, s; 0: none
+    std::uint64_t stamp = 0;  // 32.32 fixed point, s; 0: none, or not to be looked at
     std::int64_t time_ns = 0;
     Instant arrival;
+    std::uint64_t sent_stamp = 0;  // as the server sent it, whatever it is good for
   };
   // Whether the sensor's stamp is wrong, as all are then; tells when that changes.
   [[nodiscard]] bool stamps_wrong(const Told& sensor);
   [[nodiscard]] Instant stamped(const Told& told) const noexcept;
+  // The same pose with the same stamp: some servers repeat their last message, also while the tool is out of sight. A
+  // sensor has noise, so another pose is another reading, whatever its stamp.
+  [[nodiscard]] static bool repeats(const Told& told, const Told& before) noexcept;
   // From the earlier to the later of the two, by their stamps where both have one.
   [[nodiscard]] static Duration apart(const Told& a, const Told& b) noexcept;
   // `tool`: as of ToolSample.

@@ -33,6 +33,7 @@ void StampCheck::begin(const Point& first) noexcept {
   quarters_off_ = 0;
   second_off_ = 0;
   twice_off_ = long_off_ = sparse_ = false;
+  long_before_ = 0;
   now_ = second_ = {};
   quarter_begin_ = first.arrival;
   earliest_ = long_from_ = first;
@@ -72,7 +73,9 @@ void StampCheck::end_quarter() {
   // A clock that is set is no clock that runs at another pace.
   if (quarter_off) long_from_ = earliest_;
   if (earliest_.arrival - long_from_.arrival >= kLong) {
-    long_off_ = off(long_from_, earliest_, 0.01, 0.0) != 0;
+    const int direction = off(long_from_, earliest_, 0.01, 0.0);
+    long_off_ = direction != 0 && direction == long_before_;
+    long_before_ = direction;
     long_from_ = earliest_;
   }
   if ((seen_ - 1) % kQuarters == 0) end_second(earliest_);
@@ -108,7 +111,7 @@ std::string StampCheck::describe() const {
   if (near(1e9)) return "nanoseconds where seconds belong";
   if (look.whole && std::abs(pace) < 4.0) return "whole seconds";
   if (look.whole) return fmt::format("counts, such as frame numbers, {:.0f} a second", pace);
-  if (sparse_) return "the same for half a second and more";
+  if (sparse_) return kStandStill;
   // Within a second such stamps go on by 1e9 / 2^32 of what passes.
   const double quarter_s = to_seconds(quarters_[kQuarters].arrival - quarters_[kQuarters - 1].arrival);
   const double quarter_pace = stamped_s(quarters_[kQuarters - 1], quarters_[kQuarters]) / quarter_s;

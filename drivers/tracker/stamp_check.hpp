@@ -15,7 +15,7 @@ namespace perimap {
 // seconds, a fraction in nanoseconds, frame numbers, and a clock that runs at another pace. So stamps are held against
 // arrivals, which are late by a varying amount and never early: of every quarter second the message that came earliest
 // for its stamp counts. From one quarter to the next the two may differ by 30 %, over a second by 5 %, over eight by 1
-// %. Three of four quarters that do not, two seconds in a row and in the same direction, or eight seconds, and the
+// %. Three of four quarters that do not, two seconds, or two times eight, in a row and in the same direction, and the
 // stamps are wrong; so are those that change twice a second at most while more messages come. They are right again when
 // nothing of that has been seen for a second. A clock that is set once makes one quarter wrong, and a network that
 // stands still two.
@@ -32,11 +32,15 @@ class StampCheck {
   // What they are instead, as "whole seconds"; empty while they are right.
   [[nodiscard]] const std::string& fault() const noexcept { return fault_; }
 
+  // That the same stamp comes again and again.
+  [[nodiscard]] bool stand_still() const noexcept { return wrong_ && fault_ == kStandStill; }
+
   StampCheck() = default;
 
  private:
   explicit StampCheck(std::string fault) : wrong_(true), fault_(std::move(fault)) {}
 
+  static constexpr const char* kStandStill = "the same for half a second and more";
   static constexpr Duration kQuarter = std::chrono::milliseconds(250);
   static constexpr Duration kLongestGap = std::chrono::milliseconds(500);
   static constexpr Duration kLong = std::chrono::seconds(8);
@@ -75,6 +79,7 @@ class StampCheck {
   int second_off_ = 0;                           // of the last whole one: -1 too slow, 1 too fast
   bool twice_off_ = false;
   Point long_from_;
+  int long_before_ = 0;  // of the last such span, as second_off_
   bool long_off_ = false;
   Look now_, second_;  // of the running second, and of the one before
   bool sparse_ = false;

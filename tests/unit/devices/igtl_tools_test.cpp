@@ -121,5 +121,43 @@ TEST(IgtlStamps, ThatAreNotLookedAtHarmNothing) {
   }
 }
 
+// A server that holds the last pose, and its stamp, while the tool is out of sight.
+TEST(IgtlStamps, APoseThatIsRepeatedIsNoNewOneWhateverStampsAreGoodFor) {
+  for (const bool by_arrival : {false, true}) {
+    SCOPED_TRACE(by_arrival);
+    std::vector<TrackerSample> samples;
+    DeviceHealth health;
+    IgtlSession session(
+        {.sensor = "Scope", .reference = "Patient", .world = {}, .stamps_by_arrival = by_arrival},
+        [&samples](const TrackerSample& sample) { samples.push_back(sample); }, health);
+    ScriptedLink link;
+    session.on_open(link, kStart);
+    const auto say = [&](const char* name, const Pose& X, std::uint64_t stamp, Instant arrival) {
+      session.on_bytes(link, encode_igtl({1, "TRANSFORM", name, stamp, encode_igtl_transform(X), {}}), arrival);
+    };
+    const auto stamp = [](int i) { return (1ULL << 32U) + static_cast<std::uint64_t>(i) * 85899346U; };  // 20 ms
+    const auto moved = [](int i) { return Pose{Matrix3d::Identity(), Vector3d(i, 0, 0)}; };
+    for (const char* frozen : {"Scope", "Patient"}) {
+      samples.clear();
+      const int begin = frozen[0] == 'S' ? 0 : 300;
+      for (int i = begin; i < begin + 150; ++i) {
+        const Instant now = kStart + i * milliseconds(20);
+        const int held = std::min(i, begin + 100);
+        const int patient = frozen[0] == 'P' ? held : i;
+        const int scope = frozen[0] == 'S' ? held : i;
+        say("Patient", moved(-patient), stamp(patient), now);
+        say("Scope", moved(scope), stamp(scope), now);
+      }
+      ASSERT_GT(samples.size(), 100U);
+      EXPECT_EQ(samples.back().state, ToolState::kMissing);
+      EXPECT_EQ(health.reason(), "") << "a tool out of sight is no fault of the server's";
+      for (const TrackerSample& sample : samples) {
+        const bool fresh = sample.arrival <= kStart + (begin + 100) * milliseconds(20) + milliseconds(110);
+        EXPECT_TRUE(fresh || sample.state != ToolState::kOk) << frozen;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace perimap
