@@ -43,7 +43,19 @@ Expected<void> fit_axis(const std::vector<Turns>& turns, TurnedScope& scope) {
     }
     axis += (turn.angle > 0.0 ? 1.0 : -1.0) * w;
   }
-  scope.axis_S = axis.normalized();
+  // A turn of nearly half a turn has either sign: the one that leaves less of all turns.
+  const auto left_with = [&](const Vector3d& trial) {
+    double left = 0.0;
+    for (const Turns& turn : turns) left += so3_log(so3_exp(-turn.angle * trial) * turn.carried.R).squaredNorm();
+    return left;
+  };
+  std::vector<Vector3d> trials{axis.normalized()};
+  for (const Turns& turn : turns) {
+    const Vector3d w = so3_log(turn.carried.R).normalized();
+    trials.insert(trials.end(), {w, Vector3d(-w)});
+  }
+  scope.axis_S = *std::min_element(trials.begin(), trials.end(),
+                                   [&](const Vector3d& a, const Vector3d& b) { return left_with(a) < left_with(b); });
   Matrix3d A = scope.axis_S * scope.axis_S.transpose();  // along the axis: next to the camera
   Vector3d b = scope.axis_S * scope.axis_S.dot(scope.reference.X_SC.t);
   for (const Turns& turn : turns) {
@@ -95,6 +107,12 @@ Expected<TurnedScope> fit_turned_scope(const std::vector<SetupAtRotation>& setup
   });
   if (!scope.sensor_on_scope) {
     if (const auto fitted = fit_axis(turns, scope); !fitted) return tl::unexpected(fitted.error());
+    // Of half a turn alone the sign of the axis is not told.
+    constexpr double kTelling_rad = 150.0 * kDegree;
+    if (std::all_of(turns.begin(), turns.end(), [](const Turns& t) { return std::abs(t.angle) > kTelling_rad; })) {
+      return fail(
+          "set-ups half a turn apart do not tell which way the scope turns: measure one at a quarter of a turn too");
+    }
   }
   if (turns.size() < 2) return scope;
   double rotation = 0.0;
@@ -106,6 +124,13 @@ Expected<TurnedScope> fit_turned_scope(const std::vector<SetupAtRotation>& setup
   }
   scope.rotation_rms_deg = std::sqrt(rotation);
   scope.translation_rms_mm = std::sqrt(translation);
+  constexpr double kMost_deg = 1.0;
+  constexpr double kMost_mm = 2.0;
+  if (scope.rotation_rms_deg > kMost_deg || scope.translation_rms_mm > kMost_mm) {
+    return fail("the set-ups do not fit one turning scope (" + std::to_string(scope.rotation_rms_deg) +
+                " degrees and " + std::to_string(scope.translation_rms_mm) +
+                " mm RMS are left over): measure each with the scope held at its turn, and the sensor fast");
+  }
   return scope;
 }
 

@@ -80,7 +80,7 @@ class BoardGuide final : public LiveGuide {
     const std::string missing = missing_ninths();
     if (!missing.empty()) {
       text += "; show it " + missing;
-    } else if (turned_deg_.minCoeff() < kWanted_deg) {
+    } else if (camera_ && turned_deg_.minCoeff() < kWanted_deg) {
       text += fmt::format("; turned {:.0f} {:.0f} {:.0f} degrees about three axes: tilt and turn the scope further",
                           turned_deg_[0], turned_deg_[1], turned_deg_[2]);
     } else {
@@ -91,7 +91,7 @@ class BoardGuide final : public LiveGuide {
 
   [[nodiscard]] bool enough() const override {
     return views_.size() >= kWantedViews && last_s_ - first_s_.value_or(last_s_) >= least_s_ &&
-           missing_ninths().empty() && turned_deg_.minCoeff() >= kWanted_deg && (!camera_ || determined_);
+           missing_ninths().empty() && (!camera_ || (turned_deg_.minCoeff() >= kWanted_deg && determined_));
   }
 
  private:

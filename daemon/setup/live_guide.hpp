@@ -33,8 +33,8 @@ class LiveGuide {
   [[nodiscard]] virtual bool enough() const = 0;
 };
 
-// The board from all sides: in which ninths of the picture it was, how far the scope was turned, and, where the lens is
-// known, what a hand-eye calibration would leave over by now.
+// The board from all sides: in which ninths of the picture it was, and, where the lens is known, how far the tracked
+// scope was turned and what a hand-eye calibration would leave over by now.
 [[nodiscard]] std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<CameraModel> camera,
                                                      double least_s);
 // A tool swung about its tip: how far it was turned, and what a calibration would leave over by now.

@@ -64,7 +64,8 @@ std::string offset_text_of(const HandEyeCalibration& result) {
       fmt::format("                 {:.2f} ms if no error lasted longer than a pose\n", 1e3 * result.joint_offset_s);
   if (!result.is_brisk()) {
     text += fmt::format(
-        "                 may be wrong by more than it says: nothing moved briskly ({:.2f} rad/s within half a second, "
+        "                 may be wrong by more than it says, and is set in no configuration: nothing moved briskly "
+        "({:.2f} rad/s within half a second, "
         "{:g} and more are needed), and what is wrong with the lens then passes for time; swing the scope briskly now "
         "and then, and record again\n",
         result.brisk_rad_per_s, HandEyeCalibration::kLeastBrisk_rad_per_s);

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 
 #include "core/calibration/rotation_spread.hpp"
+#include "core/statistics/upper_median.hpp"
 
 namespace perimap {
 namespace {
@@ -17,7 +19,17 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 struct Seen {
   double t_s = 0.0;  // on the tracker's clock
   Pose X_WB;
+  double kept = 1.0;  // share of the variance of one of the tracker's poses that is left between two
 };
+
+// Between poses s of the way from one to the next.
+double kept_between(const std::vector<TimedPose>& sensor, double t_s) {
+  const auto next =
+      std::lower_bound(sensor.begin(), sensor.end(), t_s, [](const TimedPose& pose, double t) { return pose.t_s < t; });
+  if (next == sensor.begin() || next == sensor.end()) return 1.0;
+  const double s = (t_s - std::prev(next)->t_s) / (next->t_s - std::prev(next)->t_s);
+  return s * s + (1.0 - s) * (1.0 - s);
+}
 
 double longest_gap_s(const std::vector<TimedPose>& poses) { return std::max(0.1, 3.0 * median_interval_s(poses)); }
 
@@ -30,7 +42,7 @@ std::vector<Seen> seen_boards(const std::vector<TimedPose>& camera, const std::v
     const double t_s = pose.t_s - setup.time_offset_s;
     const auto at = pose_at(sensor, t_s, gap_s);
     if (!at) continue;
-    seen.push_back({t_s, at->X * setup.X_SC * pose.X.inverse()});
+    seen.push_back({t_s, at->X * setup.X_SC * pose.X.inverse(), kept_between(sensor, t_s)});
     turned.push_back(at->X.R);
   }
   return seen;
@@ -42,60 +54,84 @@ Vector3d mean_of(const std::vector<Vector3d>& points) {
   return sum;
 }
 
-// A few views are wrong altogether (the board's mirror image, a tracker's slip): what is six times as far off as most.
-void leave_out_wrong(std::vector<Seen>& seen, const Vector3d& middle_B) {
+// A few views are wrong altogether (the board's mirror image): what is six times as far off as most, here and there.
+// Where they are more than a few, or one after the other, it is the set-up that moved, and they count like all others.
+std::size_t leave_out_wrong(std::vector<Seen>& seen, const Vector3d& middle_B) {
   std::vector<double> x[3];
   for (const Seen& s : seen) {
     for (int axis = 0; axis < 3; ++axis) x[axis].push_back((s.X_WB * middle_B)[axis]);
   }
   Vector3d middle;
-  for (int axis = 0; axis < 3; ++axis) {
-    auto& values = x[axis];
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    middle[axis] = values[values.size() / 2];
-  }
+  for (int axis = 0; axis < 3; ++axis) middle[axis] = upper_median(x[axis].begin(), x[axis].end());
   std::vector<double> distances;
   for (const Seen& s : seen) distances.push_back((s.X_WB * middle_B - middle).norm());
   std::vector<double> sorted = distances;
-  const auto half = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), half, sorted.end());
-  const double limit = 6.0 * *half + 0.1;
+  const double limit = 6.0 * upper_median(sorted.begin(), sorted.end()) + 0.1;
+  std::size_t wrong = 0;
+  std::size_t run = 0;
+  std::size_t longest_run = 0;
+  for (const double distance : distances) {
+    run = distance > limit ? run + 1 : 0;
+    wrong += distance > limit ? 1 : 0;
+    longest_run = std::max(longest_run, run);
+  }
+  constexpr double kMostShare = 0.03;
+  constexpr std::size_t kLongestRun = 2;
+  if (wrong == 0 || longest_run > kLongestRun ||
+      static_cast<double>(wrong) > kMostShare * static_cast<double>(seen.size())) {
+    return 0;
+  }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (distances[i] <= limit) seen[kept++] = seen[i];
   }
   seen.resize(kept);
+  return wrong;
 }
 
-// The part of the scatter that means over a second keep, by an analysis of variance between and within them.
+// Variance of the 3-D position of a point of the sensor's, mm^2, that is new in each of the tracker's poses: by second
+// differences, in which a hand's motion hardly shows at a tracker's rate.
+double noise_variance(const std::vector<TimedPose>& sensor, const Vector3d& point_S) {
+  const double gap_s = 2.5 * median_interval_s(sensor);
+  std::vector<double> squares;
+  for (std::size_t i = 1; i + 1 < sensor.size(); ++i) {
+    if (sensor[i + 1].t_s - sensor[i - 1].t_s > gap_s) continue;
+    const Vector3d between = 0.5 * (sensor[i - 1].X * point_S + sensor[i + 1].X * point_S);
+    squares.push_back((sensor[i].X * point_S - between).squaredNorm());
+  }
+  if (squares.empty()) return 0.0;
+  // Of 1.5 variances; the median of a chi-squared of three degrees of freedom is 2.366 of its 3.
+  return upper_median(squares.begin(), squares.end()) / 1.5 * 3.0 / 2.366;
+}
+
+// What is left of the scatter when the tracker's own new noise is taken off: every error that stays, or goes with the
+// pose or the speed. Its deviation is that of the means over a second.
 void judge_board(Verification& result, const std::vector<Seen>& seen, const std::vector<Vector3d>& places,
-                 const Vector3d& mean) {
+                 const Vector3d& mean, double noise_of_pose) {
   constexpr double kBlock_s = 1.0;
-  double within = 0.0;        // squares about the blocks' own means
-  double within_count = 0.0;  // degrees of freedom
-  double between = 0.0;       // squares of the blocks' means
-  double inverse_sizes = 0.0;
-  double blocks = 0.0;
+  double noise = 0.0;
+  for (const Seen& s : seen) noise += s.kept * noise_of_pose / static_cast<double>(seen.size());
+  std::vector<double> blocks;
+  double all = 0.0;
   for (std::size_t begin = 0; begin < seen.size();) {
     std::size_t end = begin;
-    while (end < seen.size() && seen[end].t_s < seen[begin].t_s + kBlock_s) ++end;
-    const std::vector<Vector3d> block(places.begin() + static_cast<std::ptrdiff_t>(begin),
-                                      places.begin() + static_cast<std::ptrdiff_t>(end));
-    const Vector3d block_mean = mean_of(block);
-    for (const Vector3d& p : block) within += (p - block_mean).squaredNorm();
-    within_count += static_cast<double>(block.size() - 1);
-    between += (block_mean - mean).squaredNorm();
-    inverse_sizes += 1.0 / static_cast<double>(block.size());
-    blocks += 1.0;
+    double squares = 0.0;
+    while (end < seen.size() && seen[end].t_s < seen[begin].t_s + kBlock_s) {
+      squares += (places[end] - mean).squaredNorm();
+      ++end;
+    }
+    all += squares;
+    blocks.push_back(squares / static_cast<double>(end - begin));
     begin = end;
   }
-  const double noise = within / std::max(1.0, within_count);
-  const double of_means = between / std::max(1.0, blocks - 1.0);
-  const double lasting = of_means - noise * inverse_sizes / blocks;
-  result.error_mm = std::sqrt(std::max(0.0, lasting));
-  // A sum of 3 (blocks - 1) squares, of which the error's own part is what is asked.
-  const double of_variance = of_means * std::sqrt(2.0 / (3.0 * std::max(1.0, blocks - 1.0)));
-  result.error_mm_deviation = of_variance / (2.0 * std::sqrt(std::max(lasting, of_variance)));
+  const double square = all / static_cast<double>(std::max<std::size_t>(2, seen.size()) - 1);
+  double spread = 0.0;
+  for (const double block : blocks) spread += (block - square) * (block - square);
+  const auto count = static_cast<double>(blocks.size());
+  const double of_square = std::sqrt(spread / std::max(1.0, count - 1.0) / count);
+  const double left = square - noise;
+  result.error_mm = std::sqrt(std::max(0.0, left));
+  result.error_mm_deviation = of_square / (2.0 * std::sqrt(std::max(left, of_square + 1e-12)));
 }
 
 // The stretch that was held nearest to where the camera has the point.
@@ -158,7 +194,7 @@ Expected<Verification> verify_setup(const std::vector<TimedPose>& camera, const 
                     "three axes), which hides a wrong set-up: swing it about the board to all sides",
                     result.turned_deg[0], result.turned_deg[1], result.turned_deg[2]));
   }
-  leave_out_wrong(seen, middle_B);
+  result.views_left_out = leave_out_wrong(seen, middle_B);
   result.views = seen.size();
   result.watched_s = seen.back().t_s - seen.front().t_s;
   std::vector<Vector3d> places;
@@ -171,7 +207,9 @@ Expected<Verification> verify_setup(const std::vector<TimedPose>& camera, const 
     squares += (places[i] - mean).squaredNorm();
   }
   result.scatter_mm = std::sqrt(squares / static_cast<double>(seen.size() - 1));
-  judge_board(result, seen, places, mean);
+  // The board's middle as the sensor has it at the first view: how far out a turn of the sensor is felt.
+  const Vector3d middle_S = setup.X_SC * (camera.front().X.inverse() * middle_B);
+  judge_board(result, seen, places, mean, noise_variance(sensor, middle_S));
   if (touch) {
     const auto judged = judge_touch(*touch, seen);
     if (!judged) return tl::unexpected(judged.error());
@@ -184,8 +222,10 @@ std::string text_of(const Verification& result) {
   const auto verdict = [](bool passed) { return passed ? "passed" : "FAILED"; };
   std::string text = fmt::format("Set-up on the spot, at 0 ms, by {} views over {:.0f} s: {} (bound {:g} mm)\n",
                                  result.views, result.watched_s, verdict(result.passed()), result.bound_mm);
-  text += fmt::format("  board         {:.2f} mm, deviation {:.2f}: the error that stays while the scope does; {}\n",
-                      result.error_mm, result.error_mm_deviation, verdict(result.board_passed()));
+  text += fmt::format(
+      "  board         {:.2f} mm, deviation {:.2f}: the error of where the board is seen, the tracker's noise of each "
+      "pose taken off; {}\n",
+      result.error_mm, result.error_mm_deviation, verdict(result.board_passed()));
   text +=
       fmt::format("                {:.2f} mm RMS of single views, the tracker's noise included\n", result.scatter_mm);
   if (result.touch) {
@@ -198,6 +238,8 @@ std::string text_of(const Verification& result) {
   } else {
     text += "  touched point none: what is wrong alike from all sides does not show; touch a point with --tip\n";
   }
+  if (result.views_left_out > 0)
+    text += fmt::format("  left out      {} views that are far off\n", result.views_left_out);
   text += fmt::format("  turned        {:.1f} {:.1f} {:.1f} degrees (standard deviation about three axes)\n",
                       result.turned_deg[0], result.turned_deg[1], result.turned_deg[2]);
   return text;

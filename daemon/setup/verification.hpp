@@ -37,12 +37,13 @@ struct VerifiedTouch {
 struct Verification {
   double bound_mm = 0.0;
   std::size_t views = 0;
+  std::size_t views_left_out = 0;  // a few that are far off, one by one
   double watched_s = 0.0;
   Vector3d turned_deg = Vector3d::Zero();  // the scope, standard deviations about three axes
   // Where the board's middle is in W by the views, about its mean.
   double scatter_mm = 0.0;  // RMS of single views, 3-D: all errors, the tracker's noise too
-  // What is left of it in means over a second, less what their noise makes of it: the error that stays while the scope
-  // does, and that no averaging takes away.
+  // What is left of it when the tracker's noise that is new in each pose is taken off, by its poses' own second
+  // differences: errors that stay, and those that go with the scope's pose or speed.
   double error_mm = 0.0;
   double error_mm_deviation = 0.0;
   std::optional<VerifiedTouch> touch;

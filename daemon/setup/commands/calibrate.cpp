@@ -42,7 +42,7 @@ struct PosesOptions {
 };
 
 Expected<std::vector<TimedPose>> poses_of(const PosesOptions& options) {
-  if (options.poses.empty() == options.recording.empty()) {
+  if (options.poses.empty() && options.recording.empty()) {
     return fail("expected a file of poses, a recording with --from, or devices with --live");
   }
   if (!options.recording.empty()) return read_recorded_poses(options.recording, options.tool);
@@ -103,10 +103,15 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
   const auto options = std::make_shared<PosesOptions>();
   Command& command =
       commands.add(calibrate, what.name, what.description, [options, what](const Console& console) -> Outcome {
-        if (auto able = check_outputs(options->common, {options->input()}); !able) return able;
+        if (auto able = check_outputs(options->common, {options->poses, options->recording}); !able) return able;
+        if (!options->poses.empty() && options->input() != options->poses) {
+          return refuse(options->poses + ": not read beside --from or --live; expected one of them",
+                        ExitCode::kWrongUsage);
+        }
+        const std::string made_from = options->input();
         const auto guide = what.guide(what.least_s);
         return with_recording(options->live, options->tool, *guide, console, options->recording,
-                              [&] { return finish(what.measure(*options), options->common, options->input()); });
+                              [&] { return finish(what.measure(*options), options->common, made_from); });
       });
   options->tool = what.tool;
   command.add_option("POSES", options->poses, what.poses);

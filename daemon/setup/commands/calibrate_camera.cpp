@@ -93,9 +93,6 @@ Expected<SeenBoard> seen_in_recording(const CameraOptions& options, const BoardW
 Expected<Measurement> measure(const CameraOptions& options) {
   const auto wish = wish_of(options.board);
   if (!wish) return tl::unexpected(wish.error());
-  if (options.pictures.empty() == options.recording.empty()) {
-    return fail("expected pictures of a board, a recording with --from, or devices with --live");
-  }
   const auto seen = options.recording.empty() ? seen_in_pictures(options, *wish) : seen_in_recording(options, *wish);
   if (!seen) return tl::unexpected(seen.error());
   CameraCalibrationSettings settings;
@@ -127,7 +124,15 @@ Outcome run(CameraOptions& options, const Console& console) {
     return refuse("--configuration: expected --output too, the calibration file that the configuration is to name",
                   ExitCode::kWrongUsage);
   }
-  if (auto able = check_outputs(options.common, options.pictures); !able) return able;
+  std::vector<std::string> inputs = options.pictures;
+  inputs.push_back(options.recording);
+  if (auto able = check_outputs(options.common, inputs); !able) return able;
+  const int ways = (options.pictures.empty() ? 0 : 1) + (options.recording.empty() ? 0 : 1) +
+                   (options.live.configuration.empty() ? 0 : 1);
+  if (ways != 1) {
+    return refuse("expected pictures of a board, a recording with --from, or devices with --live",
+                  ways == 0 ? ExitCode::kFailed : ExitCode::kWrongUsage);
+  }
   const auto wish = wish_of(options.board);
   if (!wish) return refuse(wish.error(), ExitCode::kWrongUsage);
   const std::string from = made_from(options);

@@ -34,10 +34,11 @@ struct HandEyeOptions {
   HandEyeSettings settings;
 
   [[nodiscard]] bool is_recorded() const { return !recorded.recording.empty(); }
+  // All that is read, but the configuration, which may take the result.
   [[nodiscard]] std::vector<std::string> inputs() const {
-    if (!live.configuration.empty()) return {live.configuration};
-    return is_recorded() ? std::vector{recorded.recording} : std::vector{camera, tracker};
+    return {camera, tracker, recorded.recording, recorded.calibration};
   }
+  [[nodiscard]] std::vector<std::string> files() const { return {camera, tracker}; }
 };
 
 Expected<HandEyeCalibration> by_recording(const RecordedOptions& recorded, const CommonOptions& common,
@@ -77,7 +78,9 @@ Expected<Measurement> measure(const HandEyeOptions& options) {
     }
   }
   measured.plots = plots_of(*result);
-  if (result->offset_measured) measured.keys.push_back({"time_offset_ms", number_of(1e3 * result->offset_s)});
+  if (result->offset_measured && result->is_brisk()) {
+    measured.keys.push_back({"time_offset_ms", number_of(1e3 * result->offset_s)});
+  }
   return measured;
 }
 
@@ -90,9 +93,11 @@ struct TimeOptions {
 
   [[nodiscard]] bool is_recorded() const { return !recorded.recording.empty(); }
   [[nodiscard]] std::vector<std::string> inputs() const {
-    if (!live.configuration.empty()) return {live.configuration};
-    return is_recorded() ? std::vector{recorded.recording} : signals;
+    std::vector<std::string> all = signals;
+    all.insert(all.end(), {recorded.recording, recorded.calibration});
+    return all;
   }
+  [[nodiscard]] std::vector<std::string> files() const { return signals; }
 };
 
 // By the motion of a board in view: what hand-eye calibration says of the clocks.
@@ -135,16 +140,29 @@ Expected<Measurement> measure(const TimeOptions& options) {
   return measured;
 }
 
-// Of either.
+// Of either. What can be refused is refused before anything is recorded.
 template <class Options>
 Outcome run(Options& options, const Console& console) {
-  const std::vector<std::string> inputs = options.inputs();
-  if (auto able = check_outputs(options.common, inputs); !able) return able;
+  if (auto able = check_outputs(options.common, options.inputs()); !able) return able;
+  const bool live = !options.live.configuration.empty();
+  options.recorded.live = options.live.configuration;
+  const std::vector<std::string> files = named(options.files());
+  if ((live || options.is_recorded()) && !files.empty()) {
+    return refuse(joined(files) + ": not read beside --from or --live; expected one of them", ExitCode::kWrongUsage);
+  }
+  if (live || options.is_recorded()) {
+    if (const auto able = check_motion_options(options.recorded, options.common.configuration); !able) {
+      return refuse(able.error());
+    }
+  }
+  const std::string made_from = live                    ? options.live.configuration
+                                : options.is_recorded() ? options.recorded.recording
+                                                        : joined(files);
   constexpr double kLeast_s = 25.0;
   const auto guide = live_board_guide(options.live, options.recorded, options.common.configuration, kLeast_s);
   if (!guide) return refuse(guide.error());
   return with_recording(options.live, kScopeTool, **guide, console, options.recorded.recording,
-                        [&] { return finish(measure(options), options.common, joined(inputs)); });
+                        [&] { return finish(measure(options), options.common, made_from); });
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "daemon/setup/commands/recorded_options.hpp"
 #include "daemon/setup/recorded_board.hpp"
 #include "daemon/setup/scope_rotation.hpp"
+#include "drivers/calibration/calibration_file.hpp"
 
 namespace perimap {
 namespace {
@@ -75,6 +76,15 @@ Expected<TurnedScope> turned_scope(const Options& options) {
     if (!rotation) return tl::unexpected(rotation.error());
     auto setup = read_setup(files.at(1), files.at(2));
     if (!setup) return tl::unexpected(setup.error());
+    const auto lens = read_calibration(files.at(2));
+    if (!lens) return tl::unexpected(lens.error());
+    const auto picture = read_pictures({files.at(0)});
+    if (!picture) return tl::unexpected(picture.error());
+    const PictureFile& of = picture->front().picture;
+    if (of.width != lens->width || of.height != lens->height) {
+      return fail(fmt::format("{}: is {}x{}, and {} is for {}x{}: they belong to one camera as it is used", files.at(0),
+                              of.width, of.height, files.at(2), lens->width, lens->height));
+    }
     setup->rotation_rad = rotation->rotation_rad;
     setups.push_back(*setup);
     turn_px += rotation->centre_px / static_cast<double>(options.setups.size());
@@ -111,9 +121,15 @@ void add_calibrate_scope(Commands& commands, Command& calibrate) {
       calibrate, "scope",
       "How far an angled scope is turned in its camera head, by its field stop's notch; and the set-up by it",
       [options](const Console&) -> Outcome {
-        if (auto able = check_outputs(options->common, options->inputs()); !able) return able;
+        std::vector<std::string> read = options->inputs();
+        for (const auto& files : options->setups) read.insert(read.end(), files.begin(), files.end());
+        if (auto able = check_outputs(options->common, read); !able) return able;
         return finish(measure(*options), options->common, joined(options->inputs()));
       });
+  command.footer(
+      "perimapd does not take a turned scope's state: it maps with the set-up of its configuration. Who turns the "
+      "scope "
+      "measures hand-eye and lens anew, or writes what this says of the new turn into the configuration.");
   command.add_option("IMAGES", options->pictures, "Pictures with the field stop, folders of them, or a video");
   add_from(command, options->recording);
   command

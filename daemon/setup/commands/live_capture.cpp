@@ -155,6 +155,13 @@ Expected<LiveRecording> record_live(const LiveOptions& options, const std::strin
   if (devices->camera && std::holds_alternative<CameraPlayback>(*devices->camera)) {
     return fail(options.configuration + ": plays a recording as the camera; measure from it with --from");
   }
+  const std::vector<std::string> names = tracked_tool_names(configuration->tracker);
+  if (tool != kScopeTool && std::find(names.begin(), names.end(), tool) == names.end()) {
+    return fail(
+        fmt::format("{}: names no tool '{}' beside the sensor: name it as tracker.pointer or in "
+                    "tracker.instruments",
+                    options.configuration, tool));
+  }
   const auto file = recording_file(options);
   if (!file) return tl::unexpected(file.error());
   auto recorder = SessionRecorder::create(
@@ -163,13 +170,6 @@ Expected<LiveRecording> record_live(const LiveOptions& options, const std::strin
   if (!recorder) return tl::unexpected(recorder.error());
   LiveRecording recording(*file, !options.keep.empty());
 
-  const std::vector<std::string> names = tracked_tool_names(configuration->tracker);
-  if (tool != kScopeTool && std::find(names.begin(), names.end(), tool) == names.end()) {
-    return fail(
-        fmt::format("{}: names no tool '{}' beside the sensor: name it as tracker.pointer or in "
-                    "tracker.instruments",
-                    options.configuration, tool));
-  }
   Shown shown;
   Interrupt interrupt;
   DeviceHealth camera_health;

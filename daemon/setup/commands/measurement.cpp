@@ -26,7 +26,7 @@ Outcome check_outputs(const CommonOptions& options, const std::vector<std::strin
   if (const auto apart = check_apart(outputs, {}); !apart) return refuse(apart.error(), ExitCode::kWrongUsage);
   for (const Output& output : outputs) {
     for (const std::string& input : inputs) {
-      if (!output.file.empty() && is_same_file(output.file, input)) {
+      if (!output.file.empty() && !input.empty() && is_same_file(output.file, input)) {
         return refuse(fmt::format("{}: is {} itself, which is read", output.option, input), ExitCode::kWrongUsage);
       }
     }
@@ -90,5 +90,10 @@ void add_common(Command& command, CommonOptions& options, bool has_unit, bool ha
 }
 
 std::string joined(const std::vector<std::string>& files) { return fmt::format("{}", fmt::join(files, ", ")); }
+
+std::vector<std::string> named(std::vector<std::string> files) {
+  std::erase(files, std::string());
+  return files;
+}
 
 }  // namespace perimap

@@ -36,6 +36,7 @@ struct Measurement {
 };
 
 // Before the work begins: that what is to be written can be, and is nothing that is read, nor another of them.
+// `inputs`: every file that an option may name; those without a name do not count.
 [[nodiscard]] Outcome check_outputs(const CommonOptions& options, const std::vector<std::string>& inputs);
 
 // Prints the measurement, and writes what is to be written; refuses with its error when there is none.
@@ -50,5 +51,7 @@ void add_common(Command& command, CommonOptions& options, bool has_unit, bool ha
 [[nodiscard]] std::string number_of(double value);
 
 [[nodiscard]] std::string joined(const std::vector<std::string>& files);
+// Those that have a name.
+[[nodiscard]] std::vector<std::string> named(std::vector<std::string> files);
 
 }  // namespace perimap

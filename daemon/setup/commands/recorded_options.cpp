@@ -22,8 +22,9 @@ void add_lens_and_board(Command& command, RecordedOptions& options) {
 
 Expected<CameraModel> lens_of(const RecordedOptions& options, const std::string& configuration) {
   std::string file = options.calibration;
-  if (file.empty() && !configuration.empty()) {
-    const auto loaded = load_configuration(configuration, {}, NamedFiles::kMayBeMissing);
+  for (const std::string& from : {configuration, options.live}) {
+    if (!file.empty() || from.empty()) continue;
+    const auto loaded = load_configuration(from, {}, NamedFiles::kMayBeMissing);
     if (!loaded) return tl::unexpected(loaded.error());
     if (loaded->camera.calibration) file = loaded->camera.calibration->string();
   }
@@ -35,12 +36,20 @@ Expected<CameraModel> lens_of(const RecordedOptions& options, const std::string&
   return read_calibration(file);
 }
 
-Expected<RecordedMotion> recorded_motion(const RecordedOptions& options, const std::string& configuration) {
+Expected<void> check_motion_options(const RecordedOptions& options, const std::string& configuration) {
   const auto wish = wish_of(options.board);
   if (!wish) return tl::unexpected(wish.error());
   if (wish->square_mm <= 0.0) {
     return fail("--square-mm: expected the side of the board's squares, without which its distance is not known");
   }
+  const auto camera = lens_of(options, configuration);
+  if (!camera) return tl::unexpected(camera.error());
+  return {};
+}
+
+Expected<RecordedMotion> recorded_motion(const RecordedOptions& options, const std::string& configuration) {
+  if (const auto able = check_motion_options(options, configuration); !able) return tl::unexpected(able.error());
+  const auto wish = wish_of(options.board);
   auto camera = lens_of(options, configuration);
   if (!camera) return tl::unexpected(camera.error());
   auto sensor = read_recorded_poses(options.recording, kScopeTool);

@@ -16,6 +16,7 @@ class Command;
 struct RecordedOptions {
   std::string recording;    // empty: not from a recording
   std::string calibration;  // the lens; empty: the configuration's
+  std::string live;         // the configuration of live devices, whose lens it is where no other says it
   BoardOptions board;
 };
 
@@ -26,6 +27,9 @@ void add_lens_and_board(Command& command, RecordedOptions& options);
 
 // By --calibration, else by what the configuration names; empty: there is none. Fails when neither says it.
 [[nodiscard]] Expected<CameraModel> lens_of(const RecordedOptions& options, const std::string& configuration);
+
+// What recorded_motion() needs besides the recording: the board's size and the lens.
+[[nodiscard]] Expected<void> check_motion_options(const RecordedOptions& options, const std::string& configuration);
 
 struct RecordedMotion {
   RecordedBoard board;

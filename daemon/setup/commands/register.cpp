@@ -109,7 +109,9 @@ void add_register_command(Commands& commands) {
       "register", "The place of the tracker's frame in the image's, by landmarks touched with a calibrated tool",
       [options](const Console&) -> Outcome {
         const std::vector<std::string> inputs = options->inputs();
-        if (auto able = check_outputs(options->common, inputs); !able) return able;
+        std::vector<std::string> read = inputs;
+        read.push_back(options->tip);
+        if (auto able = check_outputs(options->common, read); !able) return able;
         return finish(measure(*options), options->common, joined(inputs));
       });
   command.add_option("--model", options->model, "The landmarks in the image's frame: name,x,y,z")->required();
@@ -126,7 +128,7 @@ void add_register_command(Commands& commands) {
   command
       .add_option_function<std::vector<double>>(
           "--target", [options](const std::vector<double>& target) { options->targets.push_back(target); },
-          "x y z in the image's frame, where the expected error is told")
+          "x y z in the image's frame, where the expected error is told; in the unit of the files (--unit)")
       ->expected(3)
       ->trigger_on_parse();
   command.add_option("--tolerance-mm", options->tolerance_mm, "A landmark off by more is another point")

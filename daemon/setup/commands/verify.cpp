@@ -63,6 +63,7 @@ nlohmann::json json_of(const Verification& result, const Options& options) {
                          {"board_error_mm_deviation", result.error_mm_deviation},
                          {"scatter_mm", result.scatter_mm},
                          {"views", result.views},
+                         {"views_left_out", result.views_left_out},
                          {"watched_s", result.watched_s},
                          {"touch_error_mm", nullptr},
                          {"touch_error_mm_deviation", nullptr}};
@@ -115,11 +116,15 @@ Outcome verified(const Options& options, const std::string& made_from) {
 }
 
 Outcome run(Options& options, const Console& console) {
-  const std::vector<std::string> inputs = {options.configuration, options.recorded.recording};
+  const std::vector<std::string> inputs = {options.configuration, options.recorded.recording,
+                                           options.recorded.calibration, options.tip};
   if (auto able = check_outputs(options.common, inputs); !able) return able;
   if (options.live == !options.recorded.recording.empty()) {
     return refuse("expected a recording with --from, or --live for the configuration's own devices",
                   ExitCode::kWrongUsage);
+  }
+  if (const auto able = check_motion_options(options.recorded, options.configuration); !able) {
+    return refuse(able.error());
   }
   LiveOptions live;
   if (options.live) live.configuration = options.configuration;

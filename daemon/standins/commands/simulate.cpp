@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "daemon/command_line/commands.hpp"
+#include "daemon/command_line/outputs.hpp"
 #include "daemon/command_line/progress.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/standins/commands/simulation_options.hpp"
@@ -67,7 +68,17 @@ Outcome simulate_bench(const Options& options) {
   if (options.notch_deg) settings->notch_rad = *options.notch_deg * std::numbers::pi / 180.0;
   const auto scene = BenchScene::create(*settings);
   if (!scene) return refuse(scene.error(), ExitCode::kWrongUsage);
-  if (auto is_new = check_new(options.out, options); !is_new) return is_new;
+  if (const auto apart = check_apart({{"OUT", options.out.string()},
+                                      {"--truth", options.truth.string()},
+                                      {"--landmarks", options.landmarks.string()}},
+                                     {});
+      !apart) {
+    return refuse(apart.error(), ExitCode::kWrongUsage);
+  }
+  for (const std::filesystem::path& path : {options.out, options.truth, options.landmarks}) {
+    if (path.empty()) continue;
+    if (auto is_new = check_new(path, options); !is_new) return is_new;
+  }
   const TrackerNoise noise = options.simulation.noise();
   {
     Progress progress("frames", scene->frames().size());
@@ -100,6 +111,14 @@ std::vector<SimulatedRecording> planned(const Options& options) {
 }
 
 Outcome simulate(const Options& options) {
+  const bool of_bench = !options.truth.empty() || !options.landmarks.empty() || options.notch_deg;
+  if (!options.act && of_bench) {
+    return refuse("--truth, --landmarks, --field-stop: expected --scene board, still or landmarks",
+                  ExitCode::kWrongUsage);
+  }
+  if (options.act && !options.tracker_noises_mm.empty()) {
+    return refuse("--tracker-noises: expected --scene heart; a bench has one, --tracker-noise", ExitCode::kWrongUsage);
+  }
   if (options.act) return simulate_bench(options);
   const auto begin = std::chrono::steady_clock::now();
   const auto settings = options.simulation.settings();

@@ -16,6 +16,14 @@ fail() {
 quiet() { "$perimap" "$@" > out 2> errors || fail "perimap $*: $(cat out errors)"; }
 # number FILE KEY: the first number of a key in JSON.
 number() { tr -d ' \n' < "$1" | grep -o "\"$2\":\[*-*[0-9.e+-]*" | head -1 | sed 's/.*[:[]//'; }
+# nth FILE KEY N: the Nth number of a key's first list.
+nth() { tr -d ' \n' < "$1" | grep -o "\"$2\":\[[^]]*" | head -1 | cut -d'[' -f2 | cut -d, -f"$3"; }
+# near WHAT VALUE TRUTH TOLERANCE
+near() {
+  awk -v v="$2" -v t="$3" -v e="$4" 'BEGIN { d = v - t; if (d < 0) d = -d; exit !(v != "" && t != "" && d <= e) }' ||
+    fail "$1: $2, expected $3 within $4"
+  echo "$1: $2 (truth $3)"
+}
 # at_most WHAT VALUE BOUND
 at_most() {
   awk -v v="$2" -v b="$3" 'BEGIN { exit !(v != "" && v + 0 <= b + 0) }' || fail "$1: $2, expected at most $3"
@@ -43,11 +51,30 @@ quiet calibrate tracker --from still.mcap --configuration devices.toml --json
 cp out tracker.json
 quiet register --model image.csv --from landmarks.mcap --tip pointer.json --output registration.json
 quiet check devices.toml
+# Without what OpenCV's solvers make of it.
+tr -d ' \n' < hand-eye.json | sed 's/"opencv":.*}},//' > ours.json
+for i in 1 2; do
+  near "focal length $i, px" "$(nth camera.json focal_px $i)" "$(nth truth.json focal_px $i)" 2.2
+  near "principal point $i, px" "$(nth camera.json principal_point_px $i)" "$(nth truth.json principal_point_px $i)" 1.4
+done
+for i in 1 2 3; do
+  near "hand-eye translation $i, mm" "$(nth ours.json translation_mm $i)" "$(nth truth.json translation_mm $i)" 0.5
+  near "pointer's tip $i, mm" "$(nth pointer.json tip_mm $i)" "$(nth truth.json tip_mm $i)" 0.3
+done
+near "time offset, ms" "$(number time.json time_offset_ms)" "$(number truth.json time_offset_ms)" 2
+near "tracker's position noise, mm" "$(number tracker.json position_deviation_mm)" 1.4 0.21
+near "tracker's rotation noise, degrees" "$(number tracker.json rotation_deviation_deg)" 0.5 0.075
+# Where the landmarks are, not at the far origin: each as the others have it.
+at_most "registration, mm left over" "$(number registration.json fre_mm)" 0.5
 
 # ---- is it right?
 quiet verify devices.toml --from check.mcap --square-mm 8 --tip pointer.json --bound-mm 2 --output verified.json
 grep -q '"passed": true' verified.json || fail "verify passed, and its record says otherwise"
 sed 's/^hand_eye_translation_SC_mm = .*/hand_eye_translation_SC_mm = [40.0, 0.0, 30.0]/' devices.toml > wrong.toml
+sed 's/^time_offset_ms = .*/time_offset_ms = 0.0/' devices.toml > late.toml
+if "$perimap" verify late.toml --from check.mcap --square-mm 8 --bound-mm 2 > out 2> errors; then
+  fail "verify lets clocks pass that are off by $(number truth.json time_offset_ms) ms: $(cat out)"
+fi
 if "$perimap" verify wrong.toml --from check.mcap --square-mm 8 --tip pointer.json --bound-mm 2 > out 2> errors; then
   fail "verify lets a wrong hand-eye pass: $(grep hand_eye_translation wrong.toml; cat out)"
 fi

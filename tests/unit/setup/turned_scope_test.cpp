@@ -44,6 +44,18 @@ TEST(TurnedScope, IsKnownAtTurnsThatNobodyMeasured) {
   }
 }
 
+TEST(TurnedScope, HalfATurnIsFittedTheRightWayRound) {
+  const Built scope;
+  SetupAtRotation half = scope.at(3.14);
+  half.rotation_rad = -3.14;  // as the notch may say it
+  const auto fitted = fit_turned_scope({scope.at(0.0), scope.at(1.5), half}, {320.0, 240.0});
+  ASSERT_TRUE(fitted) << fitted.error().message;
+  EXPECT_GT(fitted->axis_S.dot(scope.X_SH.R.col(2)), 0.999);
+  const auto alone = fit_turned_scope({scope.at(0.0), half}, {320.0, 240.0});
+  ASSERT_FALSE(alone);
+  EXPECT_THAT(alone.error().message, HasSubstr("which way"));
+}
+
 TEST(TurnedScope, SensorOnTheScopeIsTold) {
   const Pose X_SO{so3_exp({0.1, 0.2, 0.3}), {1.0, 2.0, 80.0}};
   const auto at = [&](double theta) {
