@@ -94,7 +94,8 @@ Expected<TrackerSample> to_tracker_sample(const perimap_TrackerPose& message) {
   if (!(std::abs(norm - 1.0) < 1e-3)) return fail("rotation is not a unit quaternion");
   sample.X_WS = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), q);
   // Of others' recordings it may be anything: what is no figure is none.
-  if (message.error_mm > 0.0 && std::isfinite(message.error_mm)) sample.error_mm = message.error_mm;
+  constexpr double kLargestError_mm = 1000.0;
+  if (message.error_mm > 0.0 && message.error_mm <= kLargestError_mm) sample.error_mm = message.error_mm;
   return sample;
 }
 

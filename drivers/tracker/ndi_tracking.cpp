@@ -15,7 +15,8 @@ using Cursor = ByteCursor<std::endian::little>;
 // Port status, all commands.
 constexpr std::uint32_t kPortOutOfVolume = 0x40;
 
-constexpr double kLargestError_mm = 1000.0;  // beyond it a figure is none
+constexpr double kLargestError_mm = 1000.0;
+constexpr double kNoFigure = -1e27;
 
 // BX
 constexpr unsigned kValid = 1;
@@ -56,8 +57,11 @@ Expected<ToolReading> valid_reading(const Transform& transform, bool out_of_volu
   if (out_of_volume) return ToolReading{ToolState::kOutOfVolume, {}};
   const auto pose = pose_of_device(transform.t, transform.wxyz);
   if (!pose) return fail("reply: a transform marked valid is no pose");
-  // Written so that a value that is not a number fails: it is then no figure, and the pose stays one.
+  // Written so that a value that is not a number fails. A device that calls a pose good and its error absurd is not
+  // believed; the guide's value for "no figure" is -3.7e28.
+  const bool none = transform.error_mm == 0.0 || transform.error_mm < kNoFigure;
   const bool told = transform.error_mm > 0.0 && transform.error_mm <= kLargestError_mm;
+  if (!none && !told) return ToolReading{};
   return ToolReading{ToolState::kOk, *pose, told ? transform.error_mm : 0.0};
 }
 

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "ndi_theatre.hpp"
 
@@ -148,6 +149,32 @@ TEST(NdiTools, TheDevicesOwnErrorIsToldAndOfTwoToolsBoth) {
     for (const ToolSample& tool : theatre.tools) {
       EXPECT_NEAR(tool.error_mm, tool.tool == 0 ? 0.3 : 0.3 * std::sqrt(2.0), 1e-3);
     }
+  }
+}
+
+// BX: one tool that is marked valid.
+TEST(NdiTools, APoseWhoseOwnErrorIsAbsurdIsMissing) {
+  const auto decoded = [](float error_mm) {
+    std::vector<std::byte> body{std::byte{1}, std::byte{0x0A}, std::byte{1}};
+    const auto put = [&body](std::uint32_t bits, int bytes) {
+      for (int i = 0; i < bytes; ++i)
+        body.push_back(static_cast<std::byte>(bits >> (8U * static_cast<unsigned>(i)) & 0xFFU));
+    };
+    for (const float value : {1.0F, 0.0F, 0.0F, 0.0F, 10.0F, 20.0F, -500.0F, error_mm})
+      put(std::bit_cast<std::uint32_t>(value), 4);
+    put(0x31, 4);
+    put(7, 4);
+    put(0, 2);
+    return decode_bx(body).value().tools.at(0).reading;
+  };
+  for (const float none : {0.0F, -3.697314e28F}) {
+    EXPECT_EQ(decoded(none).state, ToolState::kOk);
+    EXPECT_EQ(decoded(none).error_mm, 0.0);
+  }
+  EXPECT_NEAR(decoded(0.25F).error_mm, 0.25, 1e-9);
+  for (const float absurd :
+       {-0.1F, 1001.0F, 1e30F, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+    EXPECT_EQ(decoded(absurd).state, ToolState::kMissing) << absurd;
   }
 }
 
