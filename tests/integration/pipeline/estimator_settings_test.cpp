@@ -195,7 +195,7 @@ INSTANTIATE_TEST_SUITE_P(
              "[estimation]\nupdate = \"gauss-newton\"\nstep_factor = 0.3\niterations = 30\ntolerance = 0.0\n", 8, 60,
              0.4},
         Case{"Fisheye", "[camera]\ncalibration = \"fisheye.yaml\"\n", 8, 60, 0.4, true}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& of) { return std::string(of.param.name); });
 
 }  // namespace
 }  // namespace perimap

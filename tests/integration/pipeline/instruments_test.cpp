@@ -58,9 +58,15 @@ class ColourReplay : public ::testing::Test {
             .value();
     for (; event; event = reader.next().value()) {
       const Instant arrival = arrival_of(*event);
-      if (const auto* pose = std::get_if<TrackerSample>(&*event)) EXPECT_TRUE(writer.write(*pose, arrival));
-      if (const auto* ecg = std::get_if<EcgBlock>(&*event)) EXPECT_TRUE(writer.write(*ecg, arrival));
-      if (const auto* frame = std::get_if<FrameEvent>(&*event)) EXPECT_TRUE(writer.write(coloured(*frame), arrival));
+      if (const auto* pose = std::get_if<TrackerSample>(&*event)) {
+        EXPECT_TRUE(writer.write(*pose, arrival));
+      }
+      if (const auto* ecg = std::get_if<EcgBlock>(&*event)) {
+        EXPECT_TRUE(writer.write(*ecg, arrival));
+      }
+      if (const auto* frame = std::get_if<FrameEvent>(&*event)) {
+        EXPECT_TRUE(writer.write(coloured(*frame), arrival));
+      }
     }
     EXPECT_TRUE(writer.finish());
     return file;

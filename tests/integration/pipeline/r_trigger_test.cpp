@@ -89,7 +89,9 @@ class RTriggerReplay : public ::testing::Test {
     for (; event; event = reader.next().value()) {
       const Instant arrival = arrival_of(*event);
       write_pulses_until(arrival);
-      if (const auto* pose = std::get_if<TrackerSample>(&*event)) EXPECT_TRUE(writer.write(*pose, arrival));
+      if (const auto* pose = std::get_if<TrackerSample>(&*event)) {
+        EXPECT_TRUE(writer.write(*pose, arrival));
+      }
       if (const auto* frame = std::get_if<FrameEvent>(&*event)) {
         CameraFrame as_it_came;
         as_it_came.stamp = frame->stamp;

@@ -117,7 +117,7 @@ TEST(Recall, PublishesWhatTheEarlierRunWouldHave) {
 
 // The numbers that are kept are double in either.
 TEST(Recall, AMapOfOnePrecisionIsGoneOnWithInTheOther) {
-  for (const auto [then, now] :
+  for (const auto& [then, now] :
        {std::pair(Precision::kDouble, Precision::kSingle), std::pair(Precision::kSingle, Precision::kDouble)}) {
     EarlierRun earlier(then);
     ASSERT_GT(earlier.memory.features.size(), 5U);
