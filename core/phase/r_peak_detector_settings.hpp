@@ -46,7 +46,7 @@ struct CandidateSettings {
   Duration step_reach = std::chrono::milliseconds(100);       // each side, outside the complex
   Duration parabola = std::chrono::milliseconds(10);          // each side of the peak: an R wave is a parabola so far
   double opposite = 2.0;             // a beat points the other way when its other excursion is larger by this factor
-  double deviation_floor_s = 0.001;  // clean beats scatter by that about their peaks (docs/ecg.md)
+  double deviation_floor_s = 0.001;  // clean beats scatter by that about their peaks (docs/design/phase.md)
   double deviation_cap_s = 0.020;    // where there is no vertex: uniform over the complex's top
 };
 
