@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 usage() {
   cat << 'END'
 tests/run.sh [--full [PART...]] [--jobs N]
-  Installs the packages, builds the presets dev and asan, runs their tests. 15 minutes on two cores at most.
+  Installs the packages, builds the presets dev and asan, runs their tests. About 20 minutes on two cores.
   Whole programs are tested without sanitizers, a unit test in one of the two, mostly under AddressSanitizer.
   --full    everything, or the parts named. About three hours on two cores that do nothing else.
               dev    whole programs, and unit tests that count allocations or compute much, without sanitizers
