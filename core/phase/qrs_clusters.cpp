@@ -17,15 +17,6 @@ constexpr double kMemory = 12.0;      // members that shares are of
 constexpr double kLongMemory = 60.0;  // a burst of 20 s must not outweigh the beats before it
 constexpr double kCaution = 2.0;      // members
 
-double root_mean_square(const QrsShape& shape) noexcept {
-  double sum = 0.0;
-  for (int i = 0; i < shape.points; ++i) {
-    const double slope = static_cast<double>(shape.slope[static_cast<std::size_t>(i)]);
-    sum += slope * slope;
-  }
-  return std::sqrt(sum / std::max(shape.points, 1));
-}
-
 }  // namespace
 
 ClusterMatch QrsClusters::nearest(const QrsShape& shape, int most_displaced) const noexcept {

@@ -8,11 +8,10 @@
 namespace perimap {
 namespace {
 
-constexpr double kKeep = 0.99;         // of a template's weight from beat to beat: some 100 beats count
-constexpr double kSame = 0.85;         // correlation from which on a beat is of a template's kind
-constexpr double kTrusted = 3.5;       // weight
-constexpr double kEstablished = 0.12;  // of the weight of all
-constexpr double kSmallest = 0.25;     // of the largest template's size
+constexpr double kKeep = 0.99;      // of a template's weight from beat to beat: some 100 beats count
+constexpr double kSame = 0.85;      // correlation from which on a beat is of a template's kind
+constexpr double kTrusted = 3.5;    // weight
+constexpr double kSmallest = 0.25;  // of the largest template's size
 constexpr double kSlowestLearning = 1.0 / 8.0;
 constexpr int kDisplaced = 3;  // steps, 15 ms
 
@@ -33,6 +32,8 @@ ShapeMatch match_displaced(const QrsShape& shape, const QrsShape& reference, int
   return {xy / std::sqrt(xx * yy), xy / yy};
 }
 
+}  // namespace
+
 double root_mean_square(const QrsShape& shape) noexcept {
   double sum = 0.0;
   for (int i = 0; i < shape.points; ++i) {
@@ -41,8 +42,6 @@ double root_mean_square(const QrsShape& shape) noexcept {
   }
   return std::sqrt(sum / std::max(shape.points, 1));
 }
-
-}  // namespace
 
 ShapeMatch match(const QrsShape& shape, const QrsShape& reference) noexcept { return best_match(shape, reference, 0); }
 
@@ -66,25 +65,10 @@ bool ShapeTemplates::usable(int i) const noexcept {
   return of(i).weight >= kTrusted && of(i).size > kSmallest * largest;
 }
 
-bool ShapeTemplates::established(int i) const noexcept {
-  if (i < 0 || !usable(i)) return false;
-  double total = 0.0;
-  for (const Template& t : templates_) total += t.weight;
-  return of(i).weight >= kEstablished * total;
-}
-
-bool ShapeTemplates::any_usable() const noexcept {
-  return std::any_of(templates_.begin(), templates_.end(), [](const Template& t) { return t.weight >= kTrusted; });
-}
-
 int ShapeTemplates::heaviest() const noexcept {
   const auto heaviest = std::max_element(templates_.begin(), templates_.end(),
                                          [](const Template& a, const Template& b) { return a.weight < b.weight; });
   return heaviest->weight > 0.0 ? static_cast<int>(heaviest - templates_.begin()) : -1;
-}
-
-ShapeMatch ShapeTemplates::match_with(int i, const QrsShape& shape) const noexcept {
-  return best_match_with(i, shape, 0);
 }
 
 ShapeMatch ShapeTemplates::best_match_with(int i, const QrsShape& shape, int most_displaced) const noexcept {
@@ -132,16 +116,5 @@ int ShapeTemplates::learn(const QrsShape& shape, bool upward) noexcept {
 }
 
 void ShapeTemplates::clear() noexcept { templates_.fill({}); }
-
-void ShapeTemplates::distrust() noexcept {
-  for (Template& t : templates_) t.weight = std::min(t.weight, 1.0);
-}
-
-void ShapeTemplates::scale(double factor) noexcept {
-  for (Template& t : templates_) {
-    for (double& size : t.sizes) size *= factor;
-    t.size *= factor;
-  }
-}
 
 }  // namespace perimap

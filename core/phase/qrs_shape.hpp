@@ -22,6 +22,9 @@ struct ShapeMatch {
 
 [[nodiscard]] ShapeMatch match(const QrsShape& shape, const QrsShape& reference) noexcept;
 
+// Of the slope's points; 0 without any.
+[[nodiscard]] double root_mean_square(const QrsShape& shape) noexcept;
+
 // The best match over small displacements against each other: the R peaks of wide complexes are not found alike.
 [[nodiscard]] ShapeMatch best_match(const QrsShape& shape, const QrsShape& reference, int most_displaced) noexcept;
 
@@ -33,23 +36,15 @@ class ShapeTemplates {
   // Whether a template is to be believed: it has recurred, and is not far smaller than another that has (that would be
   // a P or T wave).
   [[nodiscard]] bool usable(int i) const noexcept;
-  // Usable, and a good part of the beats are of it.
-  [[nodiscard]] bool established(int i) const noexcept;
-  [[nodiscard]] bool any_usable() const noexcept;
   [[nodiscard]] int heaviest() const noexcept;  // -1 when there is none
 
   // How much a shape is like template i; the gain is to the size that its beats have had lately.
-  [[nodiscard]] ShapeMatch match_with(int i, const QrsShape& shape) const noexcept;
   [[nodiscard]] ShapeMatch best_match_with(int i, const QrsShape& shape, int most_displaced) const noexcept;
   [[nodiscard]] bool upward(int i) const noexcept { return of(i).upward; }  // which way its R peak points
 
   // A beat of this shape was found. Gives the template that it now belongs to, -1 for a shape of no points.
   int learn(const QrsShape& shape, bool upward) noexcept;
   void clear() noexcept;
-  // Other beats have come: each template has to prove itself anew.
-  void distrust() noexcept;
-  // The gain of the signal has changed.
-  void scale(double factor) noexcept;
 
  private:
   static constexpr int kSizes = 8;
