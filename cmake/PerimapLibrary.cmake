@@ -1,7 +1,7 @@
 # A quick tests/run.sh: as little time as possible for one build. Daily work has better use for files that are compiled alone.
 option(PERIMAP_QUICK "Compile files together where a target allows that, and nothing for the tests labelled `long`" OFF)
 
-# perimap_library(NAME FOLDER [UNITY] [PRELUDE p] [SOURCES f...] [DEPENDS target...] [PRIVATE_DEPENDS target...])
+# perimap_library(NAME FOLDER [UNITY [ALONE f...]] [PRELUDE p] [SOURCES f...] [DEPENDS target...] [PRIVATE_DEPENDS target...])
 #
 # One target per folder. Headers are included by their path from the project's root ("core/time/instant.hpp"), but a
 # target sees a folder's headers only when it depends on that folder's target: each target carries an include root of
@@ -9,8 +9,9 @@ option(PERIMAP_QUICK "Compile files together where a target allows that, and not
 #
 # PRELUDE names the precompiled headers (perimap_prelude) that its files begin with. UNITY: a quick tests/run.sh compiles
 # eight of its files as one, in four fifths to a half of the time; what is local to them must have different names then.
+# ALONE: files whose local names stand for something else in others.
 function(perimap_library NAME FOLDER)
-  cmake_parse_arguments(ARG "UNITY" "PRELUDE" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "UNITY" "PRELUDE" "ALONE;SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
   set(root ${PROJECT_BINARY_DIR}/include_roots/${NAME})
   get_filename_component(parent ${root}/${FOLDER} DIRECTORY)
   file(MAKE_DIRECTORY ${parent})
@@ -26,6 +27,9 @@ function(perimap_library NAME FOLDER)
     endif()
     if(ARG_UNITY)
       set_target_properties(${NAME} PROPERTIES UNITY_BUILD ${PERIMAP_QUICK})
+      if(ARG_ALONE)
+        set_source_files_properties(${ARG_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+      endif()
     endif()
   else()
     add_library(${NAME} INTERFACE)
@@ -61,7 +65,7 @@ endfunction()
 #
 # A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. In the two builds of a
 # quick tests/run.sh CTest runs each program in four parts instead: starting a program with AddressSanitizer and its libraries
-# for each case takes longer than most cases. ALONE: files whose local names stand for something else in others.
+# for each case takes longer than most cases. ALONE: as above.
 #
 # A quick tests/run.sh makes two builds. `plain`: the programs, the tests of whole programs, and the unit tests marked
 # PLAIN (counting allocations, very long to compile with a sanitizer, or of much that no other unit test needs).

@@ -11,12 +11,11 @@
 #include <string>
 #include <vector>
 
+#include "core/angle/angle.hpp"
 #include "core/statistics/upper_median.hpp"
 
 namespace perimap {
 namespace {
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 double median_of(std::vector<double> values) {
   return values.empty() ? 0.0 : upper_median(values.begin(), values.end());

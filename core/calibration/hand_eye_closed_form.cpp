@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
+#include "core/angle/angle.hpp"
 #include "core/statistics/upper_median.hpp"
 
 namespace perimap {
 namespace {
 
 constexpr std::size_t kMostMotions = 4000;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 struct Motion {
   Pose A;          // of the sensor

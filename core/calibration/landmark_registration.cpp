@@ -2,9 +2,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
+
+#include "core/calibration/one_decimal.hpp"
 
 namespace perimap {
 namespace {
@@ -46,12 +46,6 @@ Pose fit(const std::vector<Landmark>& landmarks, std::optional<std::size_t> with
 }
 
 double distance_mm(const Landmark& landmark, const Pose& X_IW) { return (landmark.p_I - X_IW * landmark.p_W).norm(); }
-
-std::string one_decimal(double value) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "%.1f", value);
-  return text.data();
-}
 
 // The landmark whose absence lets the others agree, when none agrees with all.
 std::optional<Error> other_point_touched(const std::vector<Landmark>& landmarks, double tolerance_mm) {

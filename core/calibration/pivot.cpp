@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <random>
 #include <string>
 
+#include "core/angle/angle.hpp"
 #include "core/calibration/residual_correlation.hpp"
 #include "core/calibration/rotation_spread.hpp"
 #include "core/statistics/upper_median.hpp"
@@ -17,7 +17,6 @@ namespace {
 
 constexpr std::size_t kFewestPoses = 10;
 constexpr double kFewestSpread_deg = 3.0;  // about the second axis
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 struct Solution {
   Vector3d tip_T;

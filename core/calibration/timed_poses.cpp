@@ -21,6 +21,8 @@ double median_interval_s(const std::vector<TimedPose>& poses) {
   return upper_median(intervals.begin(), intervals.end());
 }
 
+double longest_gap_s(const std::vector<TimedPose>& poses) { return std::max(0.1, 3.0 * median_interval_s(poses)); }
+
 std::optional<PoseWithTwist> pose_at(const std::vector<TimedPose>& poses, double t_s, double longest_gap_s) {
   const auto after =
       std::lower_bound(poses.begin(), poses.end(), t_s, [](const TimedPose& p, double t) { return p.t_s < t; });

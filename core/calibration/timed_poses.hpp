@@ -18,6 +18,8 @@ struct TimedPose {
 
 // Of consecutive times; 0 with fewer than two.
 [[nodiscard]] double median_interval_s(const std::vector<TimedPose>& poses);
+// Between poses of one motion: three median intervals, and 0.1 s at least.
+[[nodiscard]] double longest_gap_s(const std::vector<TimedPose>& poses);
 
 struct PoseWithTwist {
   Pose X;

@@ -1,12 +1,11 @@
 #include "core/calibration/tracker_noise.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
-#include <numbers>
 
+#include "core/angle/angle.hpp"
+#include "core/calibration/one_decimal.hpp"
 #include "core/statistics/upper_median.hpp"
 
 namespace perimap {
@@ -14,7 +13,6 @@ namespace {
 
 constexpr double kShortest_s = 10.0;
 constexpr std::size_t kFewestPoses = 200;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 using Errors = std::vector<Vector6d>;  // rotation, rad, then position, mm
 
@@ -157,12 +155,6 @@ std::vector<AllanPoint> allan_of(const std::vector<TimedPose>& poses, const Erro
                       std::sqrt(squares.head<3>().sum()) / kDegree});
   }
   return points;
-}
-
-std::string one_decimal(double value) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "%.1f", value);
-  return text.data();
 }
 
 }  // namespace

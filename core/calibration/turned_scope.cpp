@@ -6,10 +6,10 @@
 #include <numbers>
 #include <string>
 
+#include "core/angle/angle.hpp"
+
 namespace perimap {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 double turn_between(double a, double b) { return std::remainder(a - b, 2.0 * std::numbers::pi); }
 

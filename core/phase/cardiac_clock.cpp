@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "core/angle/angle.hpp"
 
 namespace perimap {
 namespace {
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kOverdueDeviations = 3.0;
 // A heart moves 48 mm/s RMS: less is within a millimetre.
 constexpr double kLawsDiffer_s = 0.02;

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "core/angle/angle.hpp"
 
 namespace perimap {
 namespace {
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kLengthSpan = 4.0;     // deviations to either side
 constexpr double kBeginningSpan = 2.5;  // likewise
 constexpr double kLeastBeginDeviation_s = 1e-3;

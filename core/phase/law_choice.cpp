@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "core/angle/angle.hpp"
 
 namespace perimap {
 namespace {
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kMemory = 100.0;  // cycles; the map learns on, and its phase's errors change
 constexpr double kLeastCycles = 4.0;
 constexpr double kDecisive = 4.0;     // difference of the log likelihoods

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/angle/angle.hpp"
+
 namespace perimap {
 namespace {
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // Systole may take at most this share of the cycle, and at least the other, whatever the coefficients say.
 constexpr double kLongestSystole = 0.75;

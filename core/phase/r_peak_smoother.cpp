@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
+
+#include "core/angle/angle.hpp"
 
 namespace perimap {
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // Of the map's phase before the first cycle: it was learnt from R peaks as the ECG has them. After n cycles it follows
 // their mean, which moves by a share 1 / (n + 1) of what one is off; what is learnt never ends, so it moves for ever.

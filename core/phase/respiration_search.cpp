@@ -3,14 +3,14 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "core/angle/angle.hpp"
 
 namespace perimap {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr int kBreathColumns = 2 * kBreathHarmonics;  // cosines, -sines
 // Neighbouring tenths of a second err alike (the map is the same), so that so many count for one. Measured on simulated
 // hearts: with 5 the period found was off by up to five of its deviations, with 20 by two and a half.

@@ -4,10 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/angle/angle.hpp"
+
 namespace perimap {
 namespace {
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 // Random walks, per second: phase 0.02 rad (0.3 % of a breath), rate 0.003 rad/s.
 constexpr double kPhaseWalk_rad2_per_s = 0.02 * 0.02;
 constexpr double kRateWalk_rad2_per_s3 = 0.003 * 0.003;

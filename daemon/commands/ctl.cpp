@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Options {
+struct CtlOptions {
   std::string socket = "/run/perimap/control";
   bool json = false;
 };
@@ -29,7 +29,7 @@ void print_lines(const Json& json, const std::string& prefix) {
   }
 }
 
-Outcome tell(const Options& options, const std::string& command) {
+Outcome tell(const CtlOptions& options, const std::string& command) {
   const Expected<std::string> answer = ask_control(options.socket, command);
   if (!answer) return refuse(answer.error());
   const Json json = command == "status" && !options.json ? Json::parse(*answer, nullptr, false) : Json();
@@ -44,7 +44,7 @@ Outcome tell(const Options& options, const std::string& command) {
 }  // namespace
 
 void add_ctl_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CtlOptions>();
   const auto telling = [&options](const std::string& command) {
     return [options, command](const Console&) { return tell(*options, command); };
   };

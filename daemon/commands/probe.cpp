@@ -14,7 +14,7 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct ProbeOptions {
   std::string file;
   double seconds = 5.0;
   bool json = false;
@@ -29,7 +29,7 @@ bool wait_for_playback(const CameraConfiguration& camera, StopSignal& stop, cons
   return !stop.wait_for(left);
 }
 
-Outcome probe(const Options& options, const Console& console) {
+Outcome probe(const ProbeOptions& options, const Console& console) {
   auto stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
   auto configuration = load_configuration(options.file, {}, NamedFiles::kMayBeMissing);
@@ -57,7 +57,7 @@ Outcome probe(const Options& options, const Console& console) {
 }  // namespace
 
 void add_probe_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ProbeOptions>();
   Command& command =
       commands.add("probe", "Opens each device of a configuration and tells whether it is there and well",
                    [options](const Console& console) { return probe(*options, console); });

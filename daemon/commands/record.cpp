@@ -20,7 +20,7 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct RecordOptions {
   std::string configuration;
   std::filesystem::path out;
   double seconds = 0.0;  // 0: until stopped
@@ -41,7 +41,7 @@ struct Basis {
   std::optional<CameraModel> camera;
 };
 
-tl::expected<Basis, SetupError> basis_of(const Options& options) {
+tl::expected<Basis, SetupError> basis_of(const RecordOptions& options) {
   auto given = load_configuration(options.configuration);
   if (!given) return tl::unexpected(SetupError{std::move(given.error()), true});
   if (given->camera.playback) {
@@ -59,7 +59,7 @@ tl::expected<Basis, SetupError> basis_of(const Options& options) {
 }
 
 // Until the signal, the end of what is played, the limit or an error of the disk.
-void watch(const Options& options, const Console& console, StopSignal& stop, DeviceFeeder& feeder) {
+void watch(const RecordOptions& options, const Console& console, StopSignal& stop, DeviceFeeder& feeder) {
   constexpr Duration kTick = std::chrono::milliseconds(100);
   constexpr Duration kReport = std::chrono::seconds(5);
   const Instant start = MonotonicClock::now();
@@ -75,7 +75,7 @@ void watch(const Options& options, const Console& console, StopSignal& stop, Dev
   }
 }
 
-Outcome record(const Options& options, const Console& console) {
+Outcome record(const RecordOptions& options, const Console& console) {
   auto stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
   auto basis = basis_of(options);
@@ -115,7 +115,7 @@ Outcome record(const Options& options, const Console& console) {
 }  // namespace
 
 void add_record_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RecordOptions>();
   Command& command =
       commands.add("record", "Record what the devices of a configuration give, as it comes, until stopped",
                    [options](const Console& console) { return record(*options, console); });

@@ -8,20 +8,18 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "core/angle/angle.hpp"
 #include "core/time/frame_rate.hpp"
 #include "core/time/instant.hpp"
 #include "daemon/config/configuration_keys.hpp"
 
 namespace perimap {
-
-inline constexpr double kDegree = std::numbers::pi / 180.0;
 
 inline std::optional<double> as_number(const ConfigurationValue& value) {
   if (const auto* number = std::get_if<double>(&value)) {

@@ -6,16 +6,14 @@
 #include <chrono>
 #include <cmath>
 #include <iterator>
-#include <numbers>
 #include <utility>
 
+#include "core/angle/angle.hpp"
 #include "daemon/runtime/calibration_fit.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 
 namespace perimap {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 void warn_of_tracker(const TrackerConfiguration& tracker, std::vector<std::string>& warnings) {
   if (tracker.protocol == TrackerConfiguration::Protocol::kNone) return;

@@ -5,9 +5,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
+#include "core/angle/angle.hpp"
 #include "core/calibration/brisk_speed.hpp"
 #include "core/calibration/motion_offset.hpp"
 #include "core/calibration/residual_correlation.hpp"
@@ -19,7 +19,6 @@
 namespace perimap {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::size_t kFewestPairs = 8;
 constexpr double kFewestSpread_deg = 1.5;    // about the second axis
 constexpr double kSlowestSequence_s = 0.25;  // between poses; beyond, they are taken one by one, at rest
@@ -28,8 +27,6 @@ constexpr double kOutlier = 30.0;            // of a chi-squared of six degrees 
 double median_of(std::vector<double> values) {
   return values.empty() ? 0.0 : upper_median(values.begin(), values.end());
 }
-
-double longest_gap_s(const std::vector<TimedPose>& poses) { return std::max(0.1, 3.0 * median_interval_s(poses)); }
 
 // Whether both were taken on and on, so that their motions can be laid over each other.
 bool is_sequence(const std::vector<TimedPose>& poses) {

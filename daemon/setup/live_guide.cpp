@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "core/angle/angle.hpp"
 #include "core/calibration/pivot.hpp"
 #include "core/calibration/rotation_spread.hpp"
 #include "core/calibration/tracker_noise.hpp"
@@ -14,7 +14,6 @@
 namespace perimap {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::array<const char*, 9> kNinths{"upper left", "upper middle", "upper right",  "left",       "middle",
                                              "right",      "lower left",   "lower middle", "lower right"};
 

@@ -7,13 +7,12 @@
 #include <limits>
 #include <numbers>
 
+#include "core/angle/angle.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 bool read_numbers(const nlohmann::json& json, const char* key, double* values, std::size_t count) {
   if (!json.contains(key) || !json[key].is_array() || json[key].size() != count) return false;

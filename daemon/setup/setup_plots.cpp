@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "core/angle/angle.hpp"
 #include "daemon/pages/html_page.hpp"
 
 namespace perimap {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kNoPoint = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kKept = "#1f6f8b";
 constexpr const char* kLeftOut = "#c0392b";

@@ -6,12 +6,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "core/angle/angle.hpp"
 
 namespace perimap {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 std::string three(const Vector3d& v, int decimals) {
   return fmt::format("{:.{}f} {:.{}f} {:.{}f}", v.x(), decimals, v.y(), decimals, v.z(), decimals);

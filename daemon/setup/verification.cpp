@@ -6,15 +6,13 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <numbers>
 
+#include "core/angle/angle.hpp"
 #include "core/calibration/rotation_spread.hpp"
 #include "core/statistics/upper_median.hpp"
 
 namespace perimap {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 struct Seen {
   double t_s = 0.0;  // on the tracker's clock
@@ -30,8 +28,6 @@ double kept_between(const std::vector<TimedPose>& sensor, double t_s) {
   const double s = (t_s - std::prev(next)->t_s) / (next->t_s - std::prev(next)->t_s);
   return s * s + (1.0 - s) * (1.0 - s);
 }
-
-double longest_gap_s(const std::vector<TimedPose>& poses) { return std::max(0.1, 3.0 * median_interval_s(poses)); }
 
 // The board in W by each view.
 std::vector<Seen> seen_boards(const std::vector<TimedPose>& camera, const std::vector<TimedPose>& sensor,

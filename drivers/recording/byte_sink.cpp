@@ -5,13 +5,12 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <system_error>
 #include <utility>
+
+#include "drivers/recording/errno_text.hpp"
 
 namespace perimap {
 namespace {
-
-std::string errno_text(int error) { return std::generic_category().message(error); }
 
 class FileSink final : public ByteSink {
  public:

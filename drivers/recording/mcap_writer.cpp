@@ -41,7 +41,7 @@ struct ChunkEntry {
   std::uint64_t uncompressed_size = 0;
 };
 
-struct AttachmentEntry {
+struct WrittenAttachment {
   std::uint64_t offset = 0;
   std::uint64_t length = 0;
   std::uint64_t log_time_ns = 0;
@@ -302,7 +302,7 @@ class McapWriter::Impl {
       for (const ChunkEntry& chunk : chunks_) put_chunk_index(chunk);
     });
     put_group(Opcode::kAttachmentIndex, [&] {
-      for (const AttachmentEntry& attachment : attachments_) {
+      for (const WrittenAttachment& attachment : attachments_) {
         put_record(out_, Opcode::kAttachmentIndex, [&] {
           put(out_, attachment.offset);
           put(out_, attachment.length);
@@ -399,7 +399,7 @@ class McapWriter::Impl {
   std::vector<std::uint64_t> message_counts_;
   MessageTimes all_times_;
   std::vector<ChunkEntry> chunks_;
-  std::vector<AttachmentEntry> attachments_;
+  std::vector<WrittenAttachment> attachments_;
   std::vector<MetadataEntry> metadata_;
 };
 

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
+
+#include "core/angle/angle.hpp"
 
 namespace perimap {
 namespace {
 
 constexpr int kMargin_px = 48;  // of texture around the picture
-constexpr double kTwoPi = 2 * std::numbers::pi;
 
 // Octaves of noise from `finest` px on, each stronger than the next finer one by `growth`, of this standard deviation.
 cv::Mat octaves(cv::Size size, int finest, int count, double growth, double deviation, cv::RNG& random) {

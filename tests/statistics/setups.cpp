@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/angle/angle.hpp"
 #include "core/calibration/pivot.hpp"
 #include "core/calibration/tracker_noise.hpp"
 #include "daemon/setup/camera_calibration.hpp"
@@ -20,7 +21,6 @@
 namespace perimap::test {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kTracker_mm = 1.4;   // RMS of the 3-D norm
 constexpr double kTracker_deg = 0.5;  // likewise
 

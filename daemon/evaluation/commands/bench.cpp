@@ -24,7 +24,7 @@ namespace {
 
 constexpr int kDomain = 99;
 
-struct Options {
+struct BenchOptions {
   bench::BenchSettings settings;
   std::string configuration;
   std::vector<std::string> only;
@@ -73,7 +73,7 @@ class Scratch {
   std::filesystem::path path_;
 };
 
-Outcome measure(const Options& options) {
+Outcome measure(const BenchOptions& options) {
   const std::string& recording = options.settings.input.recording;
   if (auto apart =
           check_apart({{"--json", options.json}, {"--html", options.html}}, {{"the recording itself", recording}});
@@ -137,7 +137,7 @@ void add_subscriber_command(Commands& commands) {
 }  // namespace
 
 void add_bench_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BenchOptions>();
   Command& command = commands.add(
       "bench",
       "Measure latencies by replaying a recording through the whole runtime, with subscribers in other processes",

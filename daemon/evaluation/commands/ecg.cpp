@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t kLongWithoutProgress = 1'000'000;  // samples
 constexpr double kReferenceEndsEarly_s = 5.0;            // longer than hearts pause
 
-struct Options {
+struct EcgOptions {
   EcgFile ecg;
   std::string beats;
   std::string reference;
@@ -30,7 +30,7 @@ struct Options {
 };
 
 // What is wrong with the options; empty when nothing is.
-std::string misuse(const Options& options) {
+std::string misuse(const EcgOptions& options) {
   if (std::string wrong = misfit(options.ecg); !wrong.empty()) return wrong;
   const auto apart = check_apart({{"--beats", options.beats}},
                                  {{"INPUT itself", options.ecg.path}, {"the file of --reference", options.reference}});
@@ -56,7 +56,7 @@ std::optional<EcgAnalysis> analyse_until_stopped(const EcgTrace& trace, StopSign
 }
 
 // A line that says so; empty where it reaches to the end.
-std::string reference_ends_early(const Options& options, const BeatTable& reference, const EcgTrace& trace) {
+std::string reference_ends_early(const EcgOptions& options, const BeatTable& reference, const EcgTrace& trace) {
   const double ends_s = trace.time_s.back();
   if (reference.beats.empty() || reference.beats.back().time_s >= ends_s - kReferenceEndsEarly_s) return {};
   return fmt::format(
@@ -64,7 +64,7 @@ std::string reference_ends_early(const Options& options, const BeatTable& refere
       options.reference, reference.beats.back().time_s, ends_s);
 }
 
-Outcome find_beats(const Options& options, const Console& console) {
+Outcome find_beats(const EcgOptions& options, const Console& console) {
   if (const std::string wrong = misuse(options); !wrong.empty()) return refuse(wrong, ExitCode::kWrongUsage);
   if (auto able = check_writable({{"--beats", options.beats}}); !able) return refuse(able.error());
   auto stop = StopSignal::install();
@@ -108,7 +108,7 @@ Outcome find_beats(const Options& options, const Console& console) {
 }  // namespace
 
 void add_ecg_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<EcgOptions>();
   Command& command =
       commands.add("ecg", "Find and class the beats of an ECG as the daemon would, and score them against a reference",
                    [options](const Console& console) { return find_beats(*options, console); });

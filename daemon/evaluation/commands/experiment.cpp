@@ -19,7 +19,7 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct ExperimentOptions {
   ExperimentSettings settings;
   std::filesystem::path out;
   bool json = false;
@@ -50,7 +50,7 @@ Expected<void> prepare_folder(const std::filesystem::path& folder) {
   return check_writable(folder / "experiment.csv");
 }
 
-Outcome repeat(const Options& options) {
+Outcome repeat(const ExperimentOptions& options) {
   if (!options.out.empty()) {
     if (const auto able = prepare_folder(options.out); !able) return refuse(able.error());
   }
@@ -71,7 +71,7 @@ Outcome repeat(const Options& options) {
 }  // namespace
 
 void add_experiment_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ExperimentOptions>();
   Command& command = commands.add("experiment",
                                   "Repeat an experiment of the paper: static EKF, EKF on the Fourier state, the "
                                   "paper's filter, ours, batch MAP and the Cramer-Rao bound on simulated trials",

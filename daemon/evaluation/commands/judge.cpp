@@ -17,7 +17,7 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct JudgeOptions {
   std::string input;
   std::string picture;
   int features = 131;
@@ -27,7 +27,7 @@ struct Options {
   bool json = false;
 };
 
-Outcome judge(const Options& options) {
+Outcome judge(const JudgeOptions& options) {
   const Output picture{"--picture", options.picture};
   if (auto apart = check_apart({picture}, {{"VIDEO itself", options.input}}); !apart) {
     return refuse(apart.error(), ExitCode::kWrongUsage);
@@ -53,7 +53,7 @@ Outcome judge(const Options& options) {
 }  // namespace
 
 void add_judge_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<JudgeOptions>();
   Command& command = commands.add(
       "judge", "Follow features through a video played there and back, beside Lucas-Kanade, and count what comes back",
       [options](const Console& /*console*/) { return judge(*options); });

@@ -15,14 +15,14 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct ReplayCommandOptions {
   ReplayOptions replay;
   std::string configuration;
   std::string json;
   bool whole = false;
 };
 
-Outcome replay(const Options& options, const Console& console) {
+Outcome replay(const ReplayCommandOptions& options, const Console& console) {
   ReplayOptions wanted = options.replay;
   if (!options.configuration.empty()) wanted.configuration = options.configuration;
   if (options.whole) wanted.mode = ReadMode::kWhole;
@@ -54,7 +54,7 @@ Outcome replay(const Options& options, const Console& console) {
 }  // namespace
 
 void add_replay_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReplayCommandOptions>();
   Command& command = commands.add("replay", "Run the pipeline over a recording and report accuracy and latencies",
                                   [options](const Console& console) { return replay(*options, console); });
   ReplayOptions& replay = options->replay;

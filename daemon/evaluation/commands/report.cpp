@@ -15,7 +15,7 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct ReportOptions {
   std::string recording;
   std::string samples;
   std::string stream;
@@ -33,13 +33,13 @@ Expected<void> check_picture(const std::string& picture) {
   return fail(fmt::format("--picture: expected a file that ends in .svg or .png, got {}", picture));
 }
 
-Expected<void> write_picture(const Options& options, const AccuracyReport& accuracy) {
+Expected<void> write_picture(const ReportOptions& options, const AccuracyReport& accuracy) {
   const std::string svg = to_svg(accuracy, options.recording);
   if (!is_png(options.picture)) return write_text_file(options.picture, svg);
   return png_of_svg(svg).and_then([&options](const std::string& png) { return write_text_file(options.picture, png); });
 }
 
-Outcome report(const Options& options) {
+Outcome report(const ReportOptions& options) {
   const Output json{"--json", options.json};
   const Output picture{"--picture", options.picture};
   const auto usable = check_apart({json, picture}, {{"a file that is read", options.recording},
@@ -65,7 +65,7 @@ Outcome report(const Options& options) {
 }  // namespace
 
 void add_report_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReportOptions>();
   Command& command =
       commands.add("report", "Compare received samples with the truth of the simulated recording they are of",
                    [options](const Console&) { return report(*options); });

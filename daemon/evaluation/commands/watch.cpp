@@ -18,7 +18,7 @@ namespace {
 constexpr Duration kSlice = std::chrono::milliseconds(20);
 constexpr Duration kReportInterval = std::chrono::seconds(1);
 
-struct Options {
+struct WatchOptions {
   int domain = 0;
   bool json = false;
   bool once = false;
@@ -33,7 +33,7 @@ void print(const std::string& line) {
   (void)std::fflush(stdout);
 }
 
-void print_interval(const Options& options, const std::vector<StreamReport>& reports) {
+void print_interval(const WatchOptions& options, const std::vector<StreamReport>& reports) {
   if (reports.empty()) {
     print(options.json ? std::string(R"({"kind":"waiting"})")
                        : "waiting for a publisher in DDS domain " + std::to_string(options.domain));
@@ -44,7 +44,7 @@ void print_interval(const Options& options, const std::vector<StreamReport>& rep
 }
 
 // Until a signal, a limit or an error ends it.
-void print_until_ended(const Options& options, StopSignal& stop, SampleReceiver& receiver) {
+void print_until_ended(const WatchOptions& options, StopSignal& stop, SampleReceiver& receiver) {
   const Instant start = MonotonicClock::now();
   std::optional<Instant> first;  // when the first surface was seen
   Instant last_report = start;
@@ -66,7 +66,7 @@ void print_until_ended(const Options& options, StopSignal& stop, SampleReceiver&
   }
 }
 
-Outcome watch(const Options& options) {
+Outcome watch(const WatchOptions& options) {
   Expected<StopSignal> stop = StopSignal::install();
   if (!stop) {
     return refuse(stop.error());
@@ -108,7 +108,7 @@ Outcome watch(const Options& options) {
 }  // namespace
 
 void add_watch_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<WatchOptions>();
   Command& command = commands.add(
       "watch",
       "Subscribes to a publishing perimapd and prints a line a second: rate and lost samples, latency (receipt minus "

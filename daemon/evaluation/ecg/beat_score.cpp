@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kPeakWithin_s = 0.060;
 
-double seconds(Instant t) { return to_seconds(t.time_since_epoch()); }
+double seconds_of(Instant t) { return to_seconds(t.time_since_epoch()); }
 
 bool has_kinds(const std::vector<ReferenceBeat>& reference) {
   return std::any_of(reference.begin(), reference.end(),
@@ -34,9 +34,9 @@ std::vector<int> match(const std::vector<ReferenceBeat>& reference, const EcgAna
   std::size_t from = 0;
   for (std::size_t i = 0; i < reference.size(); ++i) {
     const double t = reference[i].time_s;
-    while (from < beats.size() && seconds(beats[from].peak.time) < t - BeatScore::kWindow_s) ++from;
+    while (from < beats.size() && seconds_of(beats[from].peak.time) < t - BeatScore::kWindow_s) ++from;
     for (std::size_t j = from; j < beats.size(); ++j) {
-      const double apart = seconds(beats[j].peak.time) - t;
+      const double apart = seconds_of(beats[j].peak.time) - t;
       if (apart > BeatScore::kWindow_s) break;
       if (apart < -BeatScore::kWindow_s) continue;
       pairs.push_back({std::abs(apart), static_cast<int>(i), static_cast<int>(j)});
@@ -116,12 +116,12 @@ BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnal
       ++score.premature_precision.hits;
     }
     if (!is_timed(beat, score.has_kinds, peak)) continue;
-    apart_s.push_back(seconds(peak.time) - beat.time_s);
-    if (const auto t = peak_near(trace, beat.time_s)) from_peak_s.push_back(seconds(peak.time) - *t);
+    apart_s.push_back(seconds_of(peak.time) - beat.time_s);
+    if (const auto t = peak_near(trace, beat.time_s)) from_peak_s.push_back(seconds_of(peak.time) - *t);
   }
   for (std::size_t j = 0; j < beats.size(); ++j) {
     if (beats[j].peak.beat_class == BeatClass::kPremature) ++score.premature_precision.all;
-    if (!used[j]) score.extra_s.push_back(seconds(beats[j].peak.time));
+    if (!used[j]) score.extra_s.push_back(seconds_of(beats[j].peak.time));
   }
   const int found = static_cast<int>(reference.size() - score.missed_s.size());
   score.sensitivity = {found, static_cast<int>(reference.size())};

@@ -106,7 +106,7 @@ Expected<EcgInput> read_record(const EcgFile& file) {
   EcgInput input;
   input.trace = std::move(record->trace);
   for (float& mV : input.trace.mV) mV *= static_cast<float>(file.gain);
-  input.signal = EcgSignal{record->signal, std::move(record->description)};
+  input.signal = EcgLead{record->signal, std::move(record->description)};
   return input;
 }
 

@@ -21,7 +21,7 @@ struct EcgFile {
 };
 
 // Of a WFDB record, the one that was read.
-struct EcgSignal {
+struct EcgLead {
   int number = 1;    // from 1
   std::string name;  // as the header calls it
 };
@@ -30,7 +30,7 @@ struct EcgInput {
   EcgTrace trace;
   std::vector<Error> damage;  // what of the file could not be read
   std::string whole_until;    // a line that says until when a damaged one is whole; empty for others
-  std::optional<EcgSignal> signal;
+  std::optional<EcgLead> signal;
 };
 
 // What of it does not go with this kind of file; empty when all does.

@@ -7,13 +7,13 @@
 #include <limits>
 #include <numbers>
 
+#include "core/angle/angle.hpp"
 #include "daemon/evaluation/experiment/accuracy_figures.hpp"
 
 namespace perimap {
 namespace {
 
 constexpr double kFirstDepth_mm = 90.0;
-constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 // Earlier errors, tens of millimetres in depth, would flatten the curves.
 constexpr double kErrorsFrom_s = 2.0;
 constexpr const char* kTruthColor = "#9a9a9a";
@@ -46,7 +46,7 @@ SceneSettings scene_settings(const ExperimentSettings& settings, int trial) {
     scene.bearings = true;
     scene.features = 5;
     scene.frames = 600;
-    scene.deviation = 0.2 * kRadiansPerDegree;
+    scene.deviation = 0.2 * kDegree;
     scene.ecg_record = "100";
   } else {
     scene.surface = SceneSurface::kPlate;
@@ -55,7 +55,7 @@ SceneSettings scene_settings(const ExperimentSettings& settings, int trial) {
     scene.min_frames = 60;
     scene.deviation = 0.7;
     scene.ecg_record = "100";
-    scene.pose_error = {1.4, 0.5 * kRadiansPerDegree, 0.0};
+    scene.pose_error = {1.4, 0.5 * kDegree, 0.0};
   }
   return scene;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/angle/angle.hpp"
 #include "drivers/standins/simulator/counter_noise.hpp"
 #include "drivers/standins/simulator/ecg_record.hpp"
 #include "drivers/standins/simulator/embedded_data.hpp"
@@ -12,8 +13,6 @@
 
 namespace perimap {
 namespace {
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // Independent sequences of random numbers; those of features come after the last, four each.
 enum Stream : std::uint64_t {

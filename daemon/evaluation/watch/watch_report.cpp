@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/angle/angle.hpp"
 #include "daemon/publishing/status_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 
@@ -14,7 +15,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 constexpr double kPerMinutePerRadian = 60.0 / (2.0 * std::numbers::pi);  // rad/s to cycles a minute
 
 double ms(Duration duration) { return to_seconds(duration) * 1e3; }
@@ -104,10 +104,9 @@ std::string report_line(const StreamReport& report) {
   }
   if (report.received > 0 && report.last) {
     const SurfaceDigest& last = *report.last;
-    line +=
-        fmt::format(" | phase {:.0f} +- {:.1f} deg, {:.1f}/min | {} | {}", last.cardiac_phase_rad * kDegreesPerRadian,
-                    last.cardiac_phase_deviation_rad * kDegreesPerRadian,
-                    last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian, features_text(last), state_text(last));
+    line += fmt::format(" | phase {:.0f} +- {:.1f} deg, {:.1f}/min | {} | {}", last.cardiac_phase_rad / kDegree,
+                        last.cardiac_phase_deviation_rad / kDegree,
+                        last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian, features_text(last), state_text(last));
   }
   if (report.status) line += stages_text(*report.status);
   if (report.status && report.status->status.recording == perimap_RECORDING_STOPPED) line += " | RECORDING STOPPED";

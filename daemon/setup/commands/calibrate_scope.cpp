@@ -19,7 +19,7 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct CalibrateScopeOptions {
   CommonOptions common;
   std::vector<std::string> pictures;
   std::string recording;
@@ -68,7 +68,7 @@ Expected<ScopeRotation> rotation_in_recording(const std::string& recording) {
 }
 
 // The set-up as a function of the rotation, from those that --at names.
-Expected<TurnedScope> turned_scope(const Options& options) {
+Expected<TurnedScope> turned_scope(const CalibrateScopeOptions& options) {
   std::vector<SetupAtRotation> setups;
   Vector2d turn_px = Vector2d::Zero();
   for (const std::vector<std::string>& files : options.setups) {
@@ -92,7 +92,7 @@ Expected<TurnedScope> turned_scope(const Options& options) {
   return fit_turned_scope(setups, turn_px);
 }
 
-Expected<Measurement> measure(const Options& options) {
+Expected<Measurement> measure(const CalibrateScopeOptions& options) {
   Measurement measured{"", nlohmann::json::object(), {}};
   if (!options.setups.empty()) {
     const auto scope = turned_scope(options);
@@ -116,7 +116,7 @@ Expected<Measurement> measure(const Options& options) {
 }  // namespace
 
 void add_calibrate_scope(Commands& commands, Command& calibrate) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CalibrateScopeOptions>();
   Command& command = commands.add(
       calibrate, "scope",
       "How far an angled scope is turned in its camera head, by its field stop's notch; and the set-up by it",

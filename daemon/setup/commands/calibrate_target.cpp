@@ -15,13 +15,13 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct CalibrateTargetOptions {
   BoardOptions board{"charuco", "", 8.0, 0.0, "4X4_100"};
   std::string page = "A4";
   std::string pdf;
 };
 
-Expected<BoardPattern> pattern_of(const Options& options) {
+Expected<BoardPattern> pattern_of(const CalibrateTargetOptions& options) {
   const auto wish = wish_of(options.board);
   if (!wish) return tl::unexpected(wish.error());
   const bool sized = wish->columns > 0;
@@ -39,7 +39,7 @@ Expected<BoardPattern> pattern_of(const Options& options) {
   return pattern;
 }
 
-Outcome run(const Options& options) {
+Outcome run(const CalibrateTargetOptions& options) {
   const auto pattern = pattern_of(options);
   if (!pattern) return refuse(pattern.error(), ExitCode::kWrongUsage);
   const auto paper = paper_named(options.page);
@@ -56,7 +56,7 @@ Outcome run(const Options& options) {
 }  // namespace
 
 void add_calibrate_target(Commands& commands, Command& calibrate) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CalibrateTargetOptions>();
   Command& command = commands.add(calibrate, "target", "A board to print: exact millimetres, as PDF",
                                   [options](const Console&) { return run(*options); });
   command.add_option("--pdf", options->pdf, "The file to write")->required();

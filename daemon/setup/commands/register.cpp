@@ -20,7 +20,7 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct RegisterOptions {
   CommonOptions common;
   std::string model;
   std::string touched;
@@ -36,7 +36,8 @@ struct Options {
 };
 
 // Of each landmark of the model, in the order of the table, where the tip was held still.
-Expected<std::vector<NamedPoint>> touched_in_recording(const Options& options, const std::vector<NamedPoint>& model) {
+Expected<std::vector<NamedPoint>> touched_in_recording(const RegisterOptions& options,
+                                                       const std::vector<NamedPoint>& model) {
   if (options.tip.empty()) {
     return fail("--tip: expected the file of the pointer's tip that perimap calibrate tool --output wrote");
   }
@@ -62,7 +63,7 @@ Expected<std::vector<NamedPoint>> touched_in_recording(const Options& options, c
   return touched;
 }
 
-Expected<std::vector<Landmark>> landmarks_of(const Options& options) {
+Expected<std::vector<Landmark>> landmarks_of(const RegisterOptions& options) {
   const auto model = read_point_table(options.model, options.common.length_unit());
   if (!model) return tl::unexpected(model.error());
   if (options.touched.empty() == options.recording.empty()) {
@@ -83,7 +84,7 @@ Expected<std::vector<Landmark>> landmarks_of(const Options& options) {
   return landmarks;
 }
 
-Expected<Measurement> measure(const Options& options) {
+Expected<Measurement> measure(const RegisterOptions& options) {
   const auto landmarks = landmarks_of(options);
   if (!landmarks) return tl::unexpected(landmarks.error());
   const auto result = register_landmarks(*landmarks, options.tolerance_mm);
@@ -104,7 +105,7 @@ Expected<Measurement> measure(const Options& options) {
 }  // namespace
 
 void add_register_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RegisterOptions>();
   Command& command = commands.add(
       "register", "The place of the tracker's frame in the image's, by landmarks touched with a calibrated tool",
       [options](const Console&) -> Outcome {

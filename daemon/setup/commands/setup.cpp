@@ -27,7 +27,7 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct SetupOptions {
   std::string output = "perimap.toml";
   std::string camera;   // what is not given is asked, or found
   std::string tracker;  // PROTOCOL=PORT
@@ -103,7 +103,7 @@ const std::vector<std::string> kTrackers{"ndi", "igtl"};
 const std::vector<std::string> kEcgs{"cyton", "bitalino", "medlab", "can"};
 
 // What was given; else, at a terminal, what is asked, and elsewhere the only one that is plausible.
-Expected<SetupAnswers> answers_of(const Options& options, bool interactive) {
+Expected<SetupAnswers> answers_of(const SetupOptions& options, bool interactive) {
   const auto chosen = [&](const std::string& given, const std::string& question, const std::vector<Choice>& all,
                           const std::vector<Choice>& plausible) {
     if (!given.empty()) return given == "none" ? std::string() : given;
@@ -126,7 +126,7 @@ Expected<SetupAnswers> answers_of(const Options& options, bool interactive) {
 }
 
 // What the devices say of themselves, as comments below the text.
-Expected<std::string> probed(const std::string& text, const Options& options) {
+Expected<std::string> probed(const std::string& text, const SetupOptions& options) {
   const auto configuration = parse_configuration(text, options.output, {}, NamedFiles::kMayBeMissing);
   if (!configuration) return tl::unexpected(configuration.error());
   const auto devices = named_devices(*configuration, options.output);
@@ -140,7 +140,7 @@ Expected<std::string> probed(const std::string& text, const Options& options) {
   return to_text(found);
 }
 
-Outcome setup(const Options& options, const Console& console) {
+Outcome setup(const SetupOptions& options, const Console& console) {
   const bool interactive = ::isatty(STDIN_FILENO) != 0 && ::isatty(STDOUT_FILENO) != 0;
   const auto answers = answers_of(options, interactive);
   if (!answers) return refuse(answers.error(), ExitCode::kWrongUsage);
@@ -167,7 +167,7 @@ Outcome setup(const Options& options, const Console& console) {
 }  // namespace
 
 void add_setup_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SetupOptions>();
   Command& command =
       commands.add("setup", "Asks what is there, listens to it, and writes a configuration with comments",
                    [options](const Console& console) { return setup(*options, console); });

@@ -20,7 +20,7 @@
 namespace perimap {
 namespace {
 
-struct Options {
+struct VerifyOptions {
   CommonOptions common;
   std::string configuration;
   RecordedOptions recorded;
@@ -32,7 +32,7 @@ struct Options {
   double bound_mm = 2.0;
 };
 
-Expected<std::optional<TouchOnTrial>> touch_of(const Options& options) {
+Expected<std::optional<TouchOnTrial>> touch_of(const VerifyOptions& options) {
   if (options.tip.empty()) return std::nullopt;
   const auto tip = read_tool_tip(options.tip);
   if (!tip) return tl::unexpected(tip.error());
@@ -54,7 +54,7 @@ Vector3d middle_of(const std::vector<TimedView>& views) {
   return sum / std::max(1.0, count);
 }
 
-nlohmann::json json_of(const Verification& result, const Options& options) {
+nlohmann::json json_of(const Verification& result, const VerifyOptions& options) {
   nlohmann::json json = {{"passed", result.passed()},
                          {"bound_mm", result.bound_mm},
                          {"configuration", options.configuration},
@@ -76,7 +76,7 @@ nlohmann::json json_of(const Verification& result, const Options& options) {
   return json;
 }
 
-Expected<Verification> verify(const Options& options) {
+Expected<Verification> verify(const VerifyOptions& options) {
   const auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
   if (!configuration) return tl::unexpected(configuration.error());
   const TrackerConfiguration& tracker = configuration->tracker;
@@ -103,7 +103,7 @@ std::string advice_of(const Verification& result) {
          "whether the point touched is the one named";
 }
 
-Outcome verified(const Options& options, const std::string& made_from) {
+Outcome verified(const VerifyOptions& options, const std::string& made_from) {
   const auto result = verify(options);
   if (!result) return refuse(result.error());
   Measurement measured{text_of(*result), json_of(*result, options), {}};
@@ -115,7 +115,7 @@ Outcome verified(const Options& options, const std::string& made_from) {
   return {};
 }
 
-Outcome run(Options& options, const Console& console) {
+Outcome run(VerifyOptions& options, const Console& console) {
   const std::vector<std::string> inputs = {options.configuration, options.recorded.recording,
                                            options.recorded.calibration, options.tip};
   if (auto able = check_outputs(options.common, inputs); !able) return able;
@@ -140,7 +140,7 @@ Outcome run(Options& options, const Console& console) {
 }  // namespace
 
 void add_verify_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<VerifyOptions>();
   Command& command = commands.add(
       "verify", "Whether the set-up is right, before a session: the error on the spot, in mm, against a bound",
       [options](const Console& console) { return run(*options, console); });

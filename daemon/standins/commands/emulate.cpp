@@ -24,7 +24,7 @@ namespace {
 using NdiNewest = NdiEmulatorSettings::Newest;
 using IgtlKind = IgtlEmulatorSettings::Message;
 
-struct Options {
+struct EmulateOptions {
   std::vector<std::string> devices;  // NAME or NAME=WHERE
   std::string setup;                 // folder
   SimulationOptions simulation{600.0};
@@ -42,7 +42,7 @@ struct Options {
   }
 };
 
-Expected<void> check_can_frame(const Options& options, const std::vector<EmulatedDevice>& devices) {
+Expected<void> check_can_frame(const EmulateOptions& options, const std::vector<EmulatedDevice>& devices) {
   const auto is_can = [](const EmulatedDevice& device) { return device.name == "can-ecg"; };
   if (options.can_given() && std::none_of(devices.begin(), devices.end(), is_can)) {
     return fail("--can-...: expected the device 'can-ecg'");
@@ -55,7 +55,7 @@ Expected<void> check_can_frame(const Options& options, const std::vector<Emulate
   return {};
 }
 
-Expected<std::vector<EmulatedDevice>> devices_of(const Options& options) {
+Expected<std::vector<EmulatedDevice>> devices_of(const EmulateOptions& options) {
   std::vector<EmulatedDevice> devices;
   for (const std::string& text : options.devices) {
     auto device = parse_emulated_device(text);
@@ -68,7 +68,7 @@ Expected<std::vector<EmulatedDevice>> devices_of(const Options& options) {
 }
 
 // With all that the options say in their own words.
-Expected<TheatreSettings> settings_of(const Options& options) {
+Expected<TheatreSettings> settings_of(const EmulateOptions& options) {
   TheatreSettings settings = options.theatre;
   const auto spans = [](const std::vector<double>& given, Duration& every, Duration& lasting) {
     if (given.size() != 2) return;
@@ -136,7 +136,7 @@ Outcome serve(const Theatre& theatre, const std::vector<EmulatedDevice>& devices
   return {};
 }
 
-Outcome emulate(const Options& options, const Console& console) {
+Outcome emulate(const EmulateOptions& options, const Console& console) {
   const auto devices = devices_of(options);
   if (!devices) return refuse(devices.error(), ExitCode::kWrongUsage);
   const auto settings = settings_of(options);
@@ -159,7 +159,7 @@ Outcome emulate(const Options& options, const Console& console) {
   return serve(*theatre, *devices, *stop, console);
 }
 
-void add_tracker_options(Command& command, Options& options) {
+void add_tracker_options(Command& command, EmulateOptions& options) {
   TheatreSettings& theatre = options.theatre;
   add_choice(command, "--ndi-newest", theatre.ndi.newest,
              {{"bx2", NdiNewest::kBx2}, {"bx", NdiNewest::kBx}, {"tx", NdiNewest::kTx}},
@@ -210,7 +210,7 @@ void add_tracker_options(Command& command, Options& options) {
 }  // namespace
 
 void add_emulate_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<EmulateOptions>();
   Command& command = commands.add(
       "emulate",
       "Stand in for devices: the real protocols on pseudo-terminals, TCP ports, CAN and video outputs, until stopped",

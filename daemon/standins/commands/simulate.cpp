@@ -29,7 +29,7 @@ namespace perimap {
 namespace {
 
 // What the command line gave.
-struct Options {
+struct SimulateOptions {
   std::filesystem::path out;
   SimulationOptions simulation;
   std::vector<double> tracker_noises_mm;
@@ -47,18 +47,18 @@ struct Options {
 };
 
 // A4 paper takes either; a scope at 15 cm sees most of it.
-Expected<BoardPattern> board_of(const Options& options) {
+Expected<BoardPattern> board_of(const SimulateOptions& options) {
   constexpr int kDictionary4x4_100 = 1;
   return options.board == "chessboard" ? chessboard_pattern(9, 6, 8.0)
                                        : charuco_pattern(12, 9, 8.0, 6.0, kDictionary4x4_100);
 }
 
-Outcome check_new(const std::filesystem::path& path, const Options& options) {
+Outcome check_new(const std::filesystem::path& path, const SimulateOptions& options) {
   if (options.force || !std::filesystem::exists(path)) return {};
   return refuse(path.string() + ": the file exists; --force overwrites it", ExitCode::kWrongUsage);
 }
 
-Outcome simulate_bench(const Options& options) {
+Outcome simulate_bench(const SimulateOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   auto settings = options.simulation.bench(*options.act);
   if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
@@ -98,7 +98,7 @@ Outcome simulate_bench(const Options& options) {
   return {};
 }
 
-std::vector<SimulatedRecording> planned(const Options& options) {
+std::vector<SimulatedRecording> planned(const SimulateOptions& options) {
   if (options.tracker_noises_mm.empty()) return {{options.out, options.simulation.noise()}};
   std::vector<SimulatedRecording> recordings;
   for (const double noise_mm : options.tracker_noises_mm) {
@@ -110,7 +110,7 @@ std::vector<SimulatedRecording> planned(const Options& options) {
   return recordings;
 }
 
-Outcome simulate(const Options& options) {
+Outcome simulate(const SimulateOptions& options) {
   const bool of_bench = !options.truth.empty() || !options.landmarks.empty() || options.notch_deg;
   if (!options.act && of_bench) {
     return refuse("--truth, --landmarks, --field-stop: expected --scene board, still or landmarks",
@@ -157,7 +157,7 @@ Outcome simulate(const Options& options) {
 }  // namespace
 
 void add_simulate_command(Commands& commands) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SimulateOptions>();
   Command& command = commands.add("simulate",
                                   "Write a recording of a beating heart with its ground truth: real motion, real ECG, "
                                   "rendered images; or of a bench "

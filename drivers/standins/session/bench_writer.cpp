@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
-#include <numbers>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "core/angle/angle.hpp"
 #include "drivers/file/whole_file.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/foxglove_image.hpp"
@@ -20,8 +20,6 @@
 
 namespace perimap {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 const char* name_of(BenchAct act) {
   switch (act) {

@@ -1,14 +1,12 @@
 #include "drivers/standins/simulator/scope_path.hpp"
 
 #include <cmath>
-#include <numbers>
 
+#include "core/angle/angle.hpp"
 #include "drivers/standins/simulator/counter_noise.hpp"
 
 namespace perimap {
 namespace {
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // Camera axes (x right, y down, z forward) that look along `forward` with `up` upwards.
 Matrix3d looking(const Vector3d& forward, const Vector3d& up) noexcept {

@@ -6,13 +6,13 @@
 #include <numbers>
 #include <vector>
 
+#include "core/angle/angle.hpp"
 #include "drivers/standins/simulator/counter_noise.hpp"
 
 namespace perimap {
 namespace {
 
 constexpr std::uint64_t kStream = 0x6f627374;
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kPeriod_s = 6.0;
 constexpr double kComes_s = 2.0, kGoes_s = 5.0;  // within the period
 

@@ -48,8 +48,8 @@ Expected<void> Theatre::write_setup(const std::filesystem::path& folder) const {
 }
 
 PoseTrack Theatre::poses() const {
-  constexpr double kRate_hz = 60.0;
-  return session_ ? session_->poses(start_) : PoseTrack::swaying(start_, kRate_hz);
+  constexpr double kPoseRate_hz = 60.0;
+  return session_ ? session_->poses(start_) : PoseTrack::swaying(start_, kPoseRate_hz);
 }
 
 Expected<EcgDeviceSignals> Theatre::ecg_device() const {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <string>
 
+#include "core/angle/angle.hpp"
+
 namespace perimap {
 namespace {
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 struct Cycle {
   Instant start;

@@ -23,7 +23,6 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using ::testing::HasSubstr;
 
-const Instant kStart(seconds(100));
 const Pose kPose{so3_exp(Vector3d(0.3, -0.4, 0.5)), Vector3d(10, -20, 30)};
 
 inline void expect_pose(const Expected<Pose>& pose) {

@@ -9,6 +9,9 @@
 
 namespace perimap {
 
+// When a test of a protocol begins.
+inline const Instant kStart(std::chrono::seconds(100));
+
 class ScriptedLink final : public LinkControl {
  public:
   // `baud`: of a serial line whose bytes take their time; 0: they take none.

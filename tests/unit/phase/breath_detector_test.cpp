@@ -5,15 +5,14 @@
 
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "core/angle/angle.hpp"
+
 namespace perimap {
 namespace {
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 Instant at_s(double seconds) { return Instant(from_seconds(seconds)); }
 

@@ -6,16 +6,15 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <random>
 
+#include "core/angle/angle.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
 
 namespace perimap {
 namespace {
 
 using std::chrono::milliseconds;
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr Duration kPeakDeviation = std::chrono::microseconds(1500);
 
 RPeak peak_at(Instant t) { return {t, t + milliseconds(90), 0.9, kPeakDeviation}; }

@@ -4,17 +4,16 @@
 
 #include <chrono>
 #include <cmath>
-#include <numbers>
 #include <random>
 #include <vector>
 
+#include "core/angle/angle.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
 
 namespace perimap {
 namespace {
 
 using std::chrono::milliseconds;
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // Twenty beats 800 ms apart within some milliseconds, so that the next length is predicted with a few percent. The
 // cycle after them truly begins at `begin` and lasts `length`; the heart runs evenly from R peak to R peak.

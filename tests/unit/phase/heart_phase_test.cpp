@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <random>
 
+#include "core/angle/angle.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
 
 namespace perimap {
@@ -17,7 +17,6 @@ namespace {
 using std::chrono::milliseconds;
 using Costs = std::array<double, kPhaseLaws.size()>;  // linear, warped, time-locked
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr Costs kWarpedExplains{80.0, 20.0, 60.0};
 constexpr Costs kLinearExplains{20.0, 80.0, 80.0};
 

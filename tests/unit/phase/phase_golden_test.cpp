@@ -6,18 +6,16 @@
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <string>
 #include <vector>
 
+#include "core/angle/angle.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/phase/rr_predictor.hpp"
 
 namespace perimap {
 namespace {
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // The autoregression of the vectors, before it was made to survive outliers.
 const AutoregressionSettings kVectors{.ridge = 1e-2, .pull = 0.0, .clip = std::numeric_limits<double>::infinity()};

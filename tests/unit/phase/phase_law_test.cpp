@@ -7,13 +7,12 @@
 #include <numbers>
 #include <random>
 
+#include "core/angle/angle.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
 #include "core/phase/law_choice.hpp"
 
 namespace perimap {
 namespace {
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 class EveryLaw : public testing::TestWithParam<PhaseLaw> {
  protected:

@@ -4,18 +4,17 @@
 
 #include <chrono>
 #include <cmath>
-#include <numbers>
 #include <random>
 #include <tuple>
 #include <vector>
 
+#include "core/angle/angle.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
 
 namespace perimap {
 namespace {
 
 using std::chrono::milliseconds;
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // A heart that follows a law from R peak to R peak; the ECG's are off by chance, and the map's phase by an offset.
 struct Beats : ::testing::Test {

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/angle/angle.hpp"
 #include "core/phase/respiration_search.hpp"
 #include "core/phase/respiratory_tracker.hpp"
 
@@ -11,8 +12,6 @@ namespace perimap {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 Instant at_s(double seconds) { return Instant(from_seconds(seconds)); }
 

@@ -14,7 +14,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kPeriod_s = 4.0;
 constexpr double kExactTracker_mm2 = 0.04;
 constexpr double kNoisyTracker_mm2 = 1.4 * 1.4;

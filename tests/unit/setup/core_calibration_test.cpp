@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/angle/angle.hpp"
 #include "core/calibration/hand_eye_closed_form.hpp"
 #include "core/calibration/landmark_registration.hpp"
 #include "core/calibration/pivot.hpp"
@@ -18,8 +19,6 @@ namespace perimap {
 namespace {
 
 using testing::HasSubstr;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 class Draw {
  public:

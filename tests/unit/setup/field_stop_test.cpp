@@ -9,12 +9,12 @@
 #include <random>
 #include <vector>
 
+#include "core/angle/angle.hpp"
+
 namespace perimap {
 namespace {
 
 using testing::HasSubstr;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 struct Drawn {
   int width = 640;

@@ -5,14 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
+
+#include "core/angle/angle.hpp"
 
 namespace perimap {
 namespace {
 
 using testing::HasSubstr;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // The head H carries the sensor S; the scope's shaft lies along H's z axis and is turned about it by theta; at its end
 // the objective looks 30 degrees aside. The camera's axes are those of the chip in the head, so that the picture of

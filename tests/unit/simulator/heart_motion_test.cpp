@@ -5,13 +5,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/angle/angle.hpp"
+
 namespace perimap {
 namespace {
 
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 // Regular, early (short for every law's fixed parts) and late beats.
 HeartMotion motion_with(MotionLaw law) {
