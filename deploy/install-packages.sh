@@ -40,11 +40,11 @@ build=(
 )
 tests=(
   libgtest-dev libgmock-dev
+  clang-16 libclang-rt-16-dev                # AddressSanitizer, fuzzing
   libopenigtlink-dev                         # the peer of the OpenIGTLink client
   nodejs=node npm=npm ca-certificates        # recordings are read back by the official npm packages
 )
 full=(
-  clang-16 libclang-rt-16-dev                # fuzzing
   clang-tidy clang-format
   qemu-system-x86 busybox-static cpio zstd kmod udev iproute2 v4l-utils  # tests/vm: CAN, V4L2 and systemd on Debian's own kernels
   stress-ng                                  # perimap bench: latencies under load

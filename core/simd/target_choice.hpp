@@ -5,7 +5,7 @@
 // SSE4, AVX2 and AVX-512; besides them Highway always compiles the baseline of the compiler's flags. The rest would
 // only cost build time, and so would all but AVX2 under AddressSanitizer: there the kernels take longer than anything
 // else.
-#ifdef __SANITIZE_ADDRESS__
+#ifdef PERIMAP_ADDRESS_SANITIZER
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3 | HWY_AVX3_DL)
 #else
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)

@@ -13,7 +13,7 @@ std::atomic<long> allocations{0};
 
 using perimap::test::allocations;
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef PERIMAP_SANITIZER
 // The sanitizers own malloc, and tell of its calls.
 extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*malloc_hook)(const volatile void*, std::size_t),
                                                          void (*free_hook)(const volatile void*));

@@ -124,7 +124,7 @@ double least_eigenvalue_over(FeatureBank<Real> bank, int updates) {
 }
 
 constexpr BasisLayout kShipped{.cardiac_harmonics = 8};
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef PERIMAP_SANITIZER
 constexpr int kShortRun = 500;
 constexpr int kMillionRun = 500;
 #else
