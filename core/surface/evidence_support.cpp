@@ -1,0 +1,65 @@
+#include "core/surface/evidence_support.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+namespace perimap {
+namespace {
+
+// In units of the spacing. In a lattice no place is further than 0.6 from a point of it.
+constexpr double kReach = 1.5;
+constexpr double kEdge = 1.0;
+
+double third_nearest(std::span<const Vector2d> places, const Vector2d& s) {
+  std::array<double, 4> nearest;  // itself too
+  nearest.fill(std::numeric_limits<double>::infinity());
+  for (const Vector2d& place : places) {
+    const double d2 = (place - s).squaredNorm();
+    if (d2 >= nearest.back()) continue;
+    nearest.back() = d2;
+    std::sort(nearest.begin(), nearest.end());
+  }
+  const auto last = std::find_if(nearest.rbegin(), nearest.rend(), [](double d2) { return std::isfinite(d2); });
+  return std::sqrt(*last);
+}
+
+// Whether a half-plane whose border goes through the origin holds none of the directions (rad).
+bool lie_on_one_side(std::vector<double>& directions) {
+  std::sort(directions.begin(), directions.end());
+  double gap = directions.front() + 2.0 * std::numbers::pi - directions.back();
+  for (std::size_t i = 1; i < directions.size(); ++i) gap = std::max(gap, directions[i] - directions[i - 1]);
+  return gap > std::numbers::pi;
+}
+
+}  // namespace
+
+EvidenceSupport::EvidenceSupport(std::vector<Vector2d> places) : places_(std::move(places)) {
+  std::vector<double> distances;
+  distances.reserve(places_.size());
+  for (const Vector2d& place : places_) distances.push_back(third_nearest(places_, place));
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  spacing_mm_ = *middle;
+  reach_mm_ = std::clamp(kReach * spacing_mm_, 8.0, 20.0);
+  edge_mm_ = std::clamp(kEdge * spacing_mm_, 5.0, 12.0);
+}
+
+Support EvidenceSupport::at(const Vector2d& s) const {
+  double nearest2 = std::numeric_limits<double>::infinity();
+  for (const Vector2d& place : places_) nearest2 = std::min(nearest2, (place - s).squaredNorm());
+  if (!(nearest2 <= reach_mm_ * reach_mm_)) return Support::kTooFar;
+  if (nearest2 <= edge_mm_ * edge_mm_) return Support::kSupported;
+  std::vector<double> directions;
+  const double around_mm = 2.0 * reach_mm_;
+  for (const Vector2d& place : places_) {
+    const Vector2d d = place - s;
+    if (d.squaredNorm() <= around_mm * around_mm) directions.push_back(std::atan2(d.y(), d.x()));
+  }
+  return lie_on_one_side(directions) ? Support::kBeyondEdge : Support::kSupported;
+}
+
+}  // namespace perimap

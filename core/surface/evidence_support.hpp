@@ -1,0 +1,41 @@
+// Whether a place of the surface has features about it, or is a guess: in a hole, or beyond the edge.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/geometry/pose.hpp"
+
+namespace perimap {
+
+enum class Support : std::uint8_t {
+  kSupported,
+  kTooFar,       // from every feature: a hole, or what nobody has looked at
+  kBeyondEdge,   // all features about it lie on one side of it, and none is near
+  kUncertain,    // its deviation is above the bound
+  kOutsideChart  // behind the mean camera
+};
+
+// How far from features a place may be goes by how far they are from each other.
+class EvidenceSupport {
+ public:
+  // Places in the chart (mm), at least two.
+  explicit EvidenceSupport(std::vector<Vector2d> places);
+
+  [[nodiscard]] Support at(const Vector2d& s) const;
+
+  [[nodiscard]] double spacing_mm() const noexcept { return spacing_mm_; }  // the middle distance of the third nearest
+  [[nodiscard]] double reach_mm() const noexcept { return reach_mm_; }
+  [[nodiscard]] double edge_mm() const noexcept { return edge_mm_; }
+  [[nodiscard]] std::span<const Vector2d> places() const noexcept { return places_; }
+
+ private:
+  std::vector<Vector2d> places_;
+  double spacing_mm_ = 0.0;
+  double reach_mm_ = 0.0;
+  double edge_mm_ = 0.0;
+};
+
+}  // namespace perimap

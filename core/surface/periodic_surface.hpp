@@ -1,0 +1,121 @@
+// One continuous surface through the features of the map, which moves as they do: a Gaussian process of their Fourier
+// coefficients over the organ.
+//
+// The mean place at a bearing of the chart has a depth (DepthField), and the harmonics are fields over the mean place
+// in space (MotionField); low harmonics, high ones and breathing have kernels of their own. The equations are in
+// docs/design/surface.md.
+//
+// Made off the critical path: it allocates, and takes milliseconds.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "core/periodic/basis.hpp"
+#include "core/surface/depth_field.hpp"
+#include "core/surface/evidence_support.hpp"
+#include "core/surface/motion_field.hpp"
+#include "core/surface/surface_chart.hpp"
+#include "core/surface/surface_evidence.hpp"
+
+namespace perimap {
+
+struct SurfaceSettings {
+  std::size_t fewest_features = 8;
+  double largest_deviation_mm = 1.0;  // of the position in any direction, above which a place is not supported
+  double contradiction = 5.0;         // deviations from what all others say, above which a feature is left out
+};
+
+// Harmonics that have their kernels in common.
+enum class HarmonicGroup : std::uint8_t { kLow, kHigh, kBreath };
+inline constexpr std::size_t kHarmonicGroups = 3;
+struct SurfaceKernels {
+  Kernel depth;
+  std::array<MotionField::Kernels, kHarmonicGroups> motion;
+};
+
+enum class SurfaceRefusalKind : std::uint8_t {
+  kTooFewFeatures,
+  kNotANumber,    // a coefficient or a variance of a feature, or where the camera is
+  kBehindCamera,  // a feature, in the chart that all of them make
+  kOnALine,       // the features, as the chart has them: nothing is known to either side
+  kNoKernel       // none explains them: numbers out of all reason
+};
+struct SurfaceRefusal {
+  SurfaceRefusalKind kind{};
+  std::string message;  // what and where, one line
+};
+
+// The surface as it is predicted at V places.
+struct PredictedPlaces {
+  Eigen::MatrixXd coefficients_W_mm;  // 3 V x basis: rows x, y, z of place 0, then of place 1
+  Matrix6Xd covariances_W_mm2;        // 6 x V, of the position, mean over the cycle: xx xy xz yy yz zz
+  std::vector<Support> support;       // V
+};
+
+// Each feature beside what all others make of it: what the surface is worth, with no truth needed.
+struct SurfaceAgreement {
+  double rms_mm = 0.0;  // of the position, over cycle and features
+  double nees = 0.0;    // mean of the squared differences by their variances, surface's and feature's: 1 is consistent
+  std::size_t features = 0;
+};
+
+class PeriodicSurface {
+ public:
+  // `camera_W` (mm): where the camera has been in the mean. With `kernels` those are used, else they are learnt, from
+  // `start`. The result is a function of the arguments alone.
+  [[nodiscard]] static tl::expected<PeriodicSurface, SurfaceRefusal> fit(
+      const BasisLayout& layout, std::span<const SurfaceEvidence> evidence, const Vector3d& camera_W,
+      const SurfaceSettings& settings = {}, const std::optional<SurfaceKernels>& kernels = std::nullopt,
+      const SurfaceKernels& start = {});
+
+  [[nodiscard]] const BasisLayout& layout() const noexcept { return layout_; }
+  [[nodiscard]] const SurfaceChart& chart() const noexcept { return chart_; }
+  [[nodiscard]] const SurfaceKernels& kernels() const noexcept { return kernels_; }
+  [[nodiscard]] const EvidenceSupport& support() const noexcept { return *support_; }
+  [[nodiscard]] const DepthField& depth() const noexcept { return *depth_; }
+  // By HarmonicGroup; without a value where the layout has no such harmonics.
+  [[nodiscard]] const std::array<std::optional<MotionField>, kHarmonicGroups>& motion() const noexcept {
+    return motion_;
+  }
+
+  // At places of the chart (mm). Those without support have figures all the same, and are to be refused.
+  [[nodiscard]] PredictedPlaces predict(std::span<const Vector2d> places) const;
+
+  [[nodiscard]] const SurfaceAgreement& agreement() const noexcept { return agreement_; }
+  // How many features it rests on, and the ids of those that contradict their neighbours and were left out.
+  [[nodiscard]] std::size_t features() const noexcept { return evidence_.size(); }
+  [[nodiscard]] std::span<const std::uint32_t> contradicted() const noexcept { return contradicted_; }
+
+ private:
+  PeriodicSurface() = default;
+
+  [[nodiscard]] tl::expected<void, SurfaceRefusal> fit_to_evidence(const Vector3d& camera_W, bool learn);
+  [[nodiscard]] tl::expected<void, SurfaceRefusal> place_features(const Vector3d& camera_W);
+  [[nodiscard]] ChartedMotion charted_motion(HarmonicGroup group) const;
+  // By how many deviations each feature is off what all others make of it; sets agreement_.
+  [[nodiscard]] std::vector<double> leave_one_out();
+  [[nodiscard]] bool leave_out_contradicted();
+  void predict_block(std::span<const Vector2d> places, Eigen::Index first, PredictedPlaces& out) const;
+
+  BasisLayout layout_;
+  SurfaceSettings settings_;
+  std::vector<SurfaceEvidence> evidence_;
+  SurfaceChart chart_;
+  ChartedPlaces places_;
+  Eigen::Matrix3Xd p_W_mm_;  // mean places, 3 x N
+  SurfaceKernels kernels_;
+  std::optional<DepthField> depth_;
+  std::array<std::optional<MotionField>, kHarmonicGroups> motion_;
+  std::optional<EvidenceSupport> support_;
+  SurfaceAgreement agreement_;
+  std::vector<std::uint32_t> contradicted_;
+};
+
+}  // namespace perimap
