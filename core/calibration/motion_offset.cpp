@@ -1,9 +1,10 @@
 #include "core/calibration/motion_offset.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
+
+#include "core/calibration/variance_of_sum.hpp"
 
 namespace perimap {
 namespace {
@@ -21,21 +22,6 @@ std::vector<Vector6d> without_slow(const std::vector<Vector6d>& values, const st
     fast.push_back(values[i] - sum / static_cast<double>(end - begin));
   }
   return fast;
-}
-
-// Of the sum of values that may go together over up to a tenth of them, or a hundred.
-double variance_of_sum(const std::vector<double>& values) {
-  const std::size_t n = values.size();
-  const std::size_t lags = std::min<std::size_t>(100, n / 10);
-  double alone = 0.0;
-  for (const double value : values) alone += value * value;
-  double variance = alone;
-  for (std::size_t lag = 1; lag < lags; ++lag) {
-    double together = 0.0;
-    for (std::size_t i = lag; i < n; ++i) together += values[i] * values[i - lag];
-    variance += 2.0 * (1.0 - static_cast<double>(lag) / static_cast<double>(lags)) * together;
-  }
-  return std::max(variance, 0.5 * alone);  // what falls below is chance
 }
 
 }  // namespace

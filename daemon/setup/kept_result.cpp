@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 
 #include <ctime>
+#include <span>
 #include <system_error>
 
 #include "daemon/config/configuration_loader.hpp"
@@ -43,31 +44,70 @@ std::vector<std::string> lines_of(std::string_view text) {
 
 std::string date_now() { return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr))); }
 
-Expected<void> write_kept(const std::filesystem::path& file, std::string_view text) {
-  std::error_code error;
-  const auto written = std::filesystem::path(file.string() + ".new");
-  if (auto done = write_text_file(written, text); !done) {
-    std::filesystem::remove(written, error);
-    return done;
-  }
+KeptResults::~KeptResults() {
+  std::error_code unknown;
+  for (const Result& result : results_) std::filesystem::remove(result.written, unknown);
+}
+
+Expected<void> KeptResults::add(const std::filesystem::path& file, std::string_view text) {
+  results_.push_back({file, std::filesystem::path(file.string() + ".new"), {}});
+  auto written = write_text_file(results_.back().written, text);
+  if (!written) results_.pop_back();
+  return written;
+}
+
+Expected<void> KeptResults::keep_before(Result& result) {
   struct stat before {};
-  if (::stat(file.c_str(), &before) == 0) {
-    const std::string dated = fmt::format("{}.{:%Y%m%dT%H%M%SZ}", file.string(), fmt::gmtime(before.st_mtime));
-    std::filesystem::path kept = dated;
-    // Two of one second are both kept.
-    for (int k = 2; std::filesystem::exists(kept, error); ++k) kept = fmt::format("{}-{}", dated, k);
-    std::filesystem::create_hard_link(file, kept, error);
-    if (error) std::filesystem::copy_file(file, kept, std::filesystem::copy_options::overwrite_existing, error);
-    if (error) {
-      std::error_code unknown;
-      std::filesystem::remove(written, unknown);
-      return fail(
-          fmt::format("{}: the one before can not be kept as {}: {}", file.string(), kept.string(), error.message()));
+  if (::stat(result.file.c_str(), &before) != 0) return {};
+  std::error_code error;
+  const std::string dated = fmt::format("{}.{:%Y%m%dT%H%M%SZ}", result.file.string(), fmt::gmtime(before.st_mtime));
+  std::filesystem::path kept = dated;
+  // Two of one second are both kept.
+  for (int k = 2; std::filesystem::exists(kept, error); ++k) kept = fmt::format("{}-{}", dated, k);
+  std::filesystem::create_hard_link(result.file, kept, error);
+  if (error) std::filesystem::copy_file(result.file, kept, error);
+  if (error) {
+    return fail(fmt::format("{}: the one before can not be kept as {}: {}", result.file.string(), kept.string(),
+                            error.message()));
+  }
+  result.kept = kept;
+  return {};
+}
+
+// The first so many as they were before.
+void KeptResults::undo(std::size_t count) {
+  std::error_code unknown;
+  for (Result& result : std::span(results_).first(count)) {
+    if (result.kept.empty()) {
+      std::filesystem::remove(result.file, unknown);
+    } else {
+      std::filesystem::rename(result.kept, result.file, unknown);
     }
   }
-  std::filesystem::rename(written, file, error);
-  if (error) return fail(fmt::format("{}: cannot be written: {}", file.string(), error.message()));
+}
+
+Expected<void> KeptResults::put_in_place() {
+  for (std::size_t i = 0; i < results_.size(); ++i) {
+    Result& result = results_[i];
+    std::error_code error;
+    auto kept = keep_before(result);
+    if (kept) std::filesystem::rename(result.written, result.file, error);
+    if (kept && !error) continue;
+    if (kept && !result.kept.empty()) {
+      std::error_code unknown;
+      std::filesystem::remove(result.kept, unknown);  // the file itself is still there
+    }
+    undo(i);
+    if (!kept) return kept;
+    return fail(fmt::format("{}: cannot be written: {}", result.file.string(), error.message()));
+  }
   return {};
+}
+
+Expected<void> write_kept(const std::filesystem::path& file, std::string_view text) {
+  KeptResults results;
+  if (auto added = results.add(file, text); !added) return added;
+  return results.put_in_place();
 }
 
 std::string with_keys(std::string_view text, std::string_view section, const std::vector<MeasuredKey>& keys,
@@ -108,14 +148,15 @@ std::string with_keys(std::string_view text, std::string_view section, const std
   return out;
 }
 
-Expected<void> set_keys(const std::filesystem::path& file, std::string_view section,
-                        const std::vector<MeasuredKey>& keys, std::string_view comment, bool files_may_be_missing) {
+Expected<std::string> configuration_with_keys(const std::filesystem::path& file, std::string_view section,
+                                              const std::vector<MeasuredKey>& keys, std::string_view comment,
+                                              bool files_may_be_missing) {
   const auto text = read_text_file(file, kLargestConfiguration, "configuration");
   if (!text) return tl::unexpected(text.error());
-  const std::string changed = with_keys(*text, section, keys, comment);
+  std::string changed = with_keys(*text, section, keys, comment);
   const NamedFiles named = files_may_be_missing ? NamedFiles::kMayBeMissing : NamedFiles::kMustExist;
   if (const auto sound = parse_configuration(changed, file, {}, named); !sound) return tl::unexpected(sound.error());
-  return write_kept(file, changed);
+  return changed;
 }
 
 }  // namespace perimap

@@ -10,11 +10,13 @@
 #include "core/angle/angle.hpp"
 #include "core/calibration/rotation_spread.hpp"
 #include "core/statistics/upper_median.hpp"
+#include "daemon/setup/clock_on_trial.hpp"
 
 namespace perimap {
 namespace {
 
 struct Seen {
+  TimedPose view;
   double t_s = 0.0;  // on the tracker's clock
   Pose X_WB;
   double kept = 1.0;  // share of the variance of one of the tracker's poses that is left between two
@@ -38,7 +40,7 @@ std::vector<Seen> seen_boards(const std::vector<TimedPose>& camera, const std::v
     const double t_s = pose.t_s - setup.time_offset_s;
     const auto at = pose_at(sensor, t_s, gap_s);
     if (!at) continue;
-    seen.push_back({t_s, at->X * setup.X_SC * pose.X.inverse(), kept_between(sensor, t_s)});
+    seen.push_back({pose, t_s, at->X * setup.X_SC * pose.X.inverse(), kept_between(sensor, t_s)});
     turned.push_back(at->X.R);
   }
   return seen;
@@ -130,6 +132,22 @@ void judge_board(Verification& result, const std::vector<Seen>& seen, const std:
   result.error_mm_deviation = of_square / (2.0 * std::sqrt(std::max(left, of_square + 1e-12)));
 }
 
+// Fails where nothing tells.
+Expected<void> judge_clocks(Verification& result, const std::vector<Seen>& seen, const std::vector<TimedPose>& sensor,
+                            const SetupOnTrial& setup) {
+  std::vector<TimedPose> views;
+  for (const Seen& s : seen) views.push_back(s.view);
+  const auto clocks = clock_error(views, sensor, setup.X_SC, setup.time_offset_s);
+  if (!clocks) {
+    return fail(
+        "the tracker's poses around the views are too few to tell how fast the scope was, and so whether the time "
+        "offset is right: keep the sensor in sight, and look for longer");
+  }
+  result.clock_error_ms = 1e3 * clocks->change_s;
+  result.clock_error_ms_deviation = 1e3 * clocks->deviation_s;
+  return {};
+}
+
 // The stretch that was held nearest to where the camera has the point.
 Expected<VerifiedTouch> judge_touch(const TouchOnTrial& touch, const std::vector<Seen>& seen) {
   constexpr double kShortest_s = 1.5;
@@ -206,6 +224,9 @@ Expected<Verification> verify_setup(const std::vector<TimedPose>& camera, const 
   // The board's middle as the sensor has it at the first view: how far out a turn of the sensor is felt.
   const Vector3d middle_S = setup.X_SC * (camera.front().X.inverse() * middle_B);
   judge_board(result, seen, places, mean, noise_variance(sensor, middle_S));
+  if (auto judged = judge_clocks(result, seen, sensor, setup); !judged) {
+    return tl::unexpected(judged.error());
+  }
   if (touch) {
     const auto judged = judge_touch(*touch, seen);
     if (!judged) return tl::unexpected(judged.error());
@@ -224,6 +245,13 @@ std::string text_of(const Verification& result) {
       result.error_mm, result.error_mm_deviation, verdict(result.board_passed()));
   text +=
       fmt::format("                {:.2f} mm RMS of single views, the tracker's noise included\n", result.scatter_mm);
+  text += fmt::format(
+      "  clocks        {:.1f} ms, deviation {:.1f}: to be added to the time offset; {:.1f} mm for a scope that moves "
+      "at "
+      "{:g} mm/s; {}\n",
+      result.clock_error_ms, result.clock_error_ms_deviation,
+      1e-3 * std::abs(result.clock_error_ms) * Verification::kBrisk_mm_per_s, Verification::kBrisk_mm_per_s,
+      verdict(result.clock_passed()));
   if (result.touch) {
     const Vector3d& e = result.touch->error_W_mm;
     text += fmt::format(

@@ -2,6 +2,7 @@
 // sides, and a pointer may touch a point of it.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -46,15 +47,23 @@ struct Verification {
   // differences: errors that stay, and those that go with the scope's pose or speed.
   double error_mm = 0.0;
   double error_mm_deviation = 0.0;
+  // How far off the time offset is, to be added to it. Within the bound means: at the speed of a scope that is moved
+  // briskly, whatever the speed it was swung with here.
+  static constexpr double kBrisk_mm_per_s = 200.0;
+  double clock_error_ms = 0.0;
+  double clock_error_ms_deviation = 0.0;
   std::optional<VerifiedTouch> touch;
   std::vector<double> times_s;    // of each view, since the first
   std::vector<double> errors_mm;  // of each view
 
   [[nodiscard]] bool board_passed() const { return error_mm + 2.0 * error_mm_deviation <= bound_mm; }
+  [[nodiscard]] bool clock_passed() const {
+    return (std::abs(clock_error_ms) + 2.0 * clock_error_ms_deviation) * 1e-3 * kBrisk_mm_per_s <= bound_mm;
+  }
   [[nodiscard]] bool touch_passed() const {
     return !touch || touch->error_mm + 2.0 * touch->error_mm_deviation <= bound_mm;
   }
-  [[nodiscard]] bool passed() const { return board_passed() && touch_passed(); }
+  [[nodiscard]] bool passed() const { return board_passed() && clock_passed() && touch_passed(); }
 };
 
 // X_BC by the camera and X_WS by the tracker, each on its own clock. `middle_B`: of the board. Fails, and says what is

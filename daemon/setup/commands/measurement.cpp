@@ -35,32 +35,44 @@ Outcome check_outputs(const CommonOptions& options, const std::vector<std::strin
   return {};
 }
 
+namespace {
+
+// The configuration last: it names the others.
+Expected<void> write_results(const Measurement& measured, const CommonOptions& options, const nlohmann::json& json,
+                             const std::string& date, const std::string& made_from) {
+  KeptResults results;
+  if (!options.output.empty()) {
+    const std::string text = measured.file.empty() ? json.dump(2) + "\n" : measured.file;
+    if (auto added = results.add(options.output, text); !added) return added;
+  }
+  if (!options.html.empty()) {
+    // The text's first line says what it is.
+    const std::string heading = measured.text.substr(0, measured.text.find('\n'));
+    const std::string text = fmt::format("measured {} from {}\n{}", date, made_from, measured.text);
+    if (auto added = results.add(options.html, setup_page(heading, text, measured.plots)); !added) return added;
+  }
+  if (!options.configuration.empty()) {
+    const std::string comment = fmt::format("measured {} from {}", date, made_from);
+    // The calibration file that the section of the camera names is not in its place yet.
+    const bool files_may_be_missing = !measured.file.empty();
+    const auto text =
+        configuration_with_keys(options.configuration, measured.section, measured.keys, comment, files_may_be_missing);
+    if (!text) return tl::unexpected(text.error());
+    if (auto added = results.add(options.configuration, *text); !added) return added;
+  }
+  return results.put_in_place();
+}
+
+}  // namespace
+
 Outcome finish(const Expected<Measurement>& measured, const CommonOptions& options, const std::string& made_from) {
   if (!measured) return refuse(measured.error());
   const std::string date = date_now();
   nlohmann::json json = measured->json;
   json["date"] = date;
   json["made_from"] = made_from;
-  // First what may still be refused: no file is changed then.
-  if (!options.configuration.empty()) {
-    const std::string comment = fmt::format("measured {} from {}", date, made_from);
-    // The calibration file that the section of the camera names is written next.
-    const bool files_may_be_missing = !measured->file.empty();
-    const auto set = set_keys(options.configuration, measured->section, measured->keys, comment, files_may_be_missing);
-    if (!set) {
-      return refuse(set.error());
-    }
-  }
-  if (!options.output.empty()) {
-    const std::string text = measured->file.empty() ? json.dump(2) + "\n" : measured->file;
-    if (const auto written = write_kept(options.output, text); !written) return refuse(written.error());
-  }
-  if (!options.html.empty()) {
-    // The text's first line says what it is.
-    const std::string heading = measured->text.substr(0, measured->text.find('\n'));
-    const std::string text = fmt::format("measured {} from {}\n{}", date, made_from, measured->text);
-    const std::string page = setup_page(heading, text, measured->plots);
-    if (const auto written = write_kept(options.html, page); !written) return refuse(written.error());
+  if (const auto written = write_results(*measured, options, json, date, made_from); !written) {
+    return refuse(written.error());
   }
   if (options.json) {
     fmt::print("{}\n", json.dump(2));

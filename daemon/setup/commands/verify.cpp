@@ -61,6 +61,8 @@ nlohmann::json json_of(const Verification& result, const VerifyOptions& options)
                          {"latency_ms", 0},
                          {"board_error_mm", result.error_mm},
                          {"board_error_mm_deviation", result.error_mm_deviation},
+                         {"clock_error_ms", result.clock_error_ms},
+                         {"clock_error_ms_deviation", result.clock_error_ms_deviation},
                          {"scatter_mm", result.scatter_mm},
                          {"views", result.views},
                          {"views_left_out", result.views_left_out},
@@ -95,6 +97,16 @@ Expected<Verification> verify(const VerifyOptions& options) {
 }
 
 std::string advice_of(const Verification& result) {
+  if (!result.clock_passed()) {
+    constexpr double kUnknown = 2.0;  // deviations within which it may as well be right
+    if (std::abs(result.clock_error_ms) < kUnknown * result.clock_error_ms_deviation) {
+      return "the scope was swung too slowly to tell whether the time offset is right: swing it briskly, and for "
+             "longer";
+    }
+    return fmt::format(
+        "the clocks of camera and tracker are {:.1f} ms off: measure the time offset anew (perimap calibrate time)",
+        result.clock_error_ms);
+  }
   if (!result.board_passed()) {
     return "the board wanders as the scope moves: measure lens, hand-eye and time offset anew (perimap calibrate), and "
            "look whether the sensor is loose on the scope";

@@ -119,14 +119,22 @@ TEST(ToolTip, GarbledFilesAreRefusedByName) {
 struct Watched {
   std::vector<TimedPose> camera;
   std::vector<TimedPose> sensor;
+  std::vector<TimedPose> exact;  // without noise
   TouchOnTrial touch;
   SetupOnTrial truth;
 };
 
 constexpr double kNoise_mm = 0.4;
 
-Watched watched(double turn = 0.4, double speed = 1.0) {
-  std::mt19937 generator(11);
+// Of the tracker, per axis.
+struct Noise {
+  double position_mm = kNoise_mm;
+  double rotation_rad = 0.0;
+  unsigned seed = 11;
+};
+
+Watched watched(double turn = 0.4, double speed = 1.0, const Noise& noise = {}) {
+  std::mt19937 generator(noise.seed);
   std::normal_distribution<double> normal;
   Watched w;
   w.truth = {{so3_exp({0.1, -0.2, 1.5}), {10.0, -5.0, 60.0}}, 0.02};
@@ -137,7 +145,10 @@ Watched watched(double turn = 0.4, double speed = 1.0) {
     const Pose X_BC{so3_exp(turn * Vector3d(std::sin(1.3 * u), std::sin(1.9 * u + 1.0), std::sin(0.9 * u + 2.0))),
                     {20.0 * std::sin(u), 10.0 * std::cos(1.7 * u), -150.0}};
     Pose X_WS = X_WB * X_BC * w.truth.X_SC.inverse();
-    X_WS.t += kNoise_mm * Vector3d(normal(generator), normal(generator), normal(generator));
+    const auto normal3 = [&] { return Vector3d(normal(generator), normal(generator), normal(generator)); };
+    w.exact.push_back({t - w.truth.time_offset_s, X_WS});
+    X_WS.t += noise.position_mm * normal3();
+    if (noise.rotation_rad > 0.0) X_WS.R = X_WS.R * so3_exp(noise.rotation_rad * normal3());
     if (i % 7 == 0) w.camera.push_back({t, X_BC});
     w.sensor.push_back({t - w.truth.time_offset_s, X_WS});
     w.touch.tip_W.push_back(
@@ -176,22 +187,63 @@ TEST(Verification, OfAWrongSetupFails) {
   fails(wrong);
 }
 
-TEST(Verification, OfATimeOffsetFailsHoweverFastTheScopeIsSwung) {
+TEST(Verification, OfATimeOffsetFailsAndSaysHowFarItIsOffHoweverFastTheScopeIsSwung) {
   // About 0.3, 1 and 1.5 Hz.
   for (const double speed : {1.3, 4.5, 6.5}) {
     const Watched w = watched(0.35, speed);
     const auto right = verify_setup(w.camera, w.sensor, kMiddle_B, w.truth, {}, 1.0);
     ASSERT_TRUE(right) << right.error().message;
     EXPECT_TRUE(right->passed()) << speed << ": " << text_of(*right);
-    for (const double offset_s : {0.01, 0.02}) {
-      if (speed * offset_s < 0.025) continue;  // within the bound indeed
+    for (const double offset_s : {-0.02, -0.01, 0.01, 0.02}) {
       SetupOnTrial wrong = w.truth;
       wrong.time_offset_s += offset_s;
       const auto result = verify_setup(w.camera, w.sensor, kMiddle_B, wrong, {}, 1.0);
       ASSERT_TRUE(result) << result.error().message;
       EXPECT_FALSE(result->passed()) << speed << ", " << offset_s << ": " << text_of(*result);
+      EXPECT_FALSE(result->clock_passed()) << speed << ", " << offset_s << ": " << text_of(*result);
+      EXPECT_NEAR(result->clock_error_ms, -1e3 * offset_s, 1.5) << speed << ": " << text_of(*result);
     }
   }
+}
+
+TEST(Verification, OfAScopeSwungTooSlowlyToTellTheClocksFails) {
+  const Watched w = watched(0.35, 0.15, {0.8, 0.02, 3});
+  const auto result = verify_setup(w.camera, w.sensor, kMiddle_B, w.truth, {}, 1.0);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_FALSE(result->clock_passed()) << text_of(*result);
+  EXPECT_LT(std::abs(result->clock_error_ms), 3.0 * result->clock_error_ms_deviation);
+}
+
+// The deviations that are told are those of what is told: of the clocks, and of the error in mm.
+TEST(Verification, DeviationsAreTrue) {
+  constexpr int kTrials = 50;  // of each kind
+  constexpr double kShare = 1.0 / (4.0 * kTrials);
+  double clocks = 0.0;
+  double covered = 0.0;
+  double above = 0.0;
+  unsigned seed = 1000;
+  for (const double offset_s : {0.0, 0.015}) {
+    for (const double speed : {1.3, 4.5}) {
+      for (int trial = 0; trial < kTrials; ++trial) {
+        const Watched w = watched(0.35, speed, {0.8, 0.005, ++seed});
+        SetupOnTrial setup = w.truth;
+        setup.time_offset_s += offset_s;
+        const auto result = verify_setup(w.camera, w.sensor, kMiddle_B, setup, {}, 2.0);
+        ASSERT_TRUE(result) << result.error().message;
+        const double off_ms = result->clock_error_ms + 1e3 * offset_s;
+        clocks += kShare * std::pow(off_ms / result->clock_error_ms_deviation, 2.0);
+        // Of poses without noise, what is off is all there is.
+        const auto exact = verify_setup(w.camera, w.exact, kMiddle_B, setup, {}, 2.0);
+        ASSERT_TRUE(exact) << exact.error().message;
+        covered += exact->scatter_mm <= result->error_mm + 2.0 * result->error_mm_deviation ? kShare : 0.0;
+        above += exact->scatter_mm < result->error_mm - 3.0 * result->error_mm_deviation ? kShare : 0.0;
+      }
+    }
+  }
+  EXPECT_GT(clocks, 0.7);  // of 200 trials, 0.80 to 1.20 by chance (95 %)
+  EXPECT_LT(clocks, 1.2);
+  EXPECT_GT(covered, 0.93);
+  EXPECT_LT(above, 0.1);
 }
 
 TEST(Verification, OfASensorThatSlipsOnTheScopeFails) {
@@ -315,6 +367,49 @@ TEST(BoardPattern, SquaresAreWhereTheBoardsFrameHasThem) {
   EXPECT_THAT(charuco_pattern(12, 9, 8.0, 8.0, 0).error().message, HasSubstr("markers of 20 to 95 %"));
 }
 
+// ---- results as files
+
+std::string text_in(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(KeptResults, AreAllInTheirPlaceOrNone) {
+  const Folder folder;
+  const auto calibration = folder.write("camera.yaml", "before\n");
+  const auto page = folder.path() / "page.html";
+  const auto configuration = folder.write("devices.toml", "before too\n");
+  {
+    KeptResults results;
+    ASSERT_TRUE(results.add(calibration, "after\n"));
+    ASSERT_TRUE(results.add(page, "page\n"));
+    ASSERT_TRUE(results.add(configuration, "after too\n"));
+    // What is in the way of the last one comes in between.
+    std::filesystem::remove(configuration);
+    static_cast<void>(folder.write("devices.toml/in_the_way", ""));
+    const auto put = results.put_in_place();
+    ASSERT_FALSE(put);
+    EXPECT_THAT(put.error().message, HasSubstr("devices.toml"));
+  }
+  EXPECT_EQ(text_in(calibration), "before\n");
+  EXPECT_FALSE(std::filesystem::exists(page));
+  std::size_t files = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder.path())) ++files;
+  EXPECT_EQ(files, 2U) << "nothing is left beside";
+}
+
+TEST(KeptResults, OfWhichOneCannotBeWrittenAreNotThere) {
+  const Folder folder;
+  const auto calibration = folder.write("camera.yaml", "before\n");
+  {
+    KeptResults results;
+    ASSERT_TRUE(results.add(calibration, "after\n"));
+    EXPECT_FALSE(results.add(folder.path() / "gone" / "page.html", "page\n"));
+  }
+  EXPECT_EQ(text_in(calibration), "before\n");
+  EXPECT_FALSE(std::filesystem::exists(calibration.string() + ".new"));
+}
+
 // ---- the first configuration
 
 TEST(FirstConfiguration, IsSoundWithAndWithoutDevices) {
@@ -333,8 +428,12 @@ TEST(FirstConfiguration, IsSoundWithAndWithoutDevices) {
 TEST(FirstConfiguration, MeasuredKeysTakeTheirPlaces) {
   const Folder folder;
   const auto file = folder.write("perimap.toml", first_configuration({}, "perimap.toml", "today"));
-  ASSERT_TRUE(set_keys(file, "tracker", {{"position_deviation_mm", "1.25"}}, "measured"));
-  ASSERT_TRUE(set_keys(file, "camera", {{"calibration", "\"camera.yaml\""}}, "measured", true));
+  const auto noise = configuration_with_keys(file, "tracker", {{"position_deviation_mm", "1.25"}}, "measured");
+  ASSERT_TRUE(noise) << noise.error().message;
+  static_cast<void>(folder.write("perimap.toml", *noise));
+  const auto lens = configuration_with_keys(file, "camera", {{"calibration", "\"camera.yaml\""}}, "measured", true);
+  ASSERT_TRUE(lens) << lens.error().message;
+  static_cast<void>(folder.write("perimap.toml", *lens));
   const auto loaded = load_configuration(file, {}, NamedFiles::kMayBeMissing);
   ASSERT_TRUE(loaded) << loaded.error().message;
   EXPECT_EQ(loaded->tracker.position_deviation_mm, 1.25);

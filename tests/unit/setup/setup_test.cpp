@@ -246,7 +246,7 @@ TEST(KeptResult, LeavesTheOneBeforeBesideIt) {
 TEST(KeptResult, AConfigurationThatWouldBeUnsoundIsLeftAsItIs) {
   const auto file = std::filesystem::temp_directory_path() / "perimap_set_keys_test.toml";
   std::ofstream(file) << "version = 1\n";
-  const auto set = set_keys(file, "tracker", {{"time_offset_ms", "1e9"}}, "measured");
+  const auto set = configuration_with_keys(file, "tracker", {{"time_offset_ms", "1e9"}}, "measured");
   EXPECT_FALSE(set);
   EXPECT_EQ(text_of(file), "version = 1\n");
   std::filesystem::remove(file);
