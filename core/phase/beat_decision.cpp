@@ -90,7 +90,17 @@ bool BeatDecision::in_burst(Instant now) const noexcept {
   return noise > (beats_come ? settings_.much_noise : settings_.burst);
 }
 
-bool BeatDecision::noisy(Instant now) const noexcept { return disturbed(now) > settings_.some_noise; }
+bool BeatDecision::noisy(Instant now) const noexcept {
+  if (disturbed(now) > settings_.some_noise) return true;
+  if (!overdue(now)) return false;
+  const auto waits = waiting_.begin();
+  return disturbed_at_ > familiar_at_ ||
+         std::any_of(waits, waits + count_, [&](const Waiting& waiting) { return strange(waiting); });
+}
+
+bool BeatDecision::overdue(Instant now) const noexcept {
+  return clusters_.any_settled() && now - familiar_at_ > std::max(settings_.chaos_after, from_seconds(rhythm_.cycle_s));
+}
 
 void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex, Instant now) noexcept {
   if (candidate.shape.points == 0) return;

@@ -63,7 +63,10 @@ class BeatDecision {
   [[nodiscard]] const QrsClusters& clusters() const noexcept { return clusters_; }
   // Nothing like beats is known, or none has come for some time.
   [[nodiscard]] bool learning(Instant now) const noexcept;
+  // Disturbances of late, or, where the next beat is overdue, since the last one of a known kind.
   [[nodiscard]] bool noisy(Instant now) const noexcept;
+  // Beats of a known kind came, and the next ought to be there.
+  [[nodiscard]] bool overdue(Instant now) const noexcept;
   // What is seen now is no measure of beats.
   [[nodiscard]] bool in_burst(Instant now) const noexcept;
   // So many disturbances, and no beat of a known kind among them, that the lead may be off.

@@ -60,8 +60,7 @@ void CandidateFinder::follow(const QrsClusters& clusters, Polarity polarity, dou
       if (candidate.energy > settings_.quanta * filter_.quantum_mV()) each(candidate);
     }
   }
-  const int await =
-      filter_.slope_delay() + meter_.points_after() * meter_.step() + filter_.samples_in(settings_.fit_await);
+  const int await = filter_.slope_delay() + meter_.points_after() * meter_.step();
   const int longest = await + filter_.samples_in(settings_.peak_window);
   while (crest_count_ > 0 && filter_.now() >= crests_[0] - filter_.energy_delay() + await) {
     const std::int64_t crest = crests_[0];

@@ -58,6 +58,8 @@ class EcgFilter {
   [[nodiscard]] int energy_delay() const noexcept { return slope_delay() + (energy_width_ - 1) / 2; }
   [[nodiscard]] int sharpness_delay() const noexcept { return energy_delay() + smooth_width_ / 2; }
   [[nodiscard]] int energy_width() const noexcept { return energy_width_; }
+  // All averages are of the signal alone, and no more of what was taken to be before it.
+  [[nodiscard]] bool filled() const noexcept { return now_ >= spike_half_ + smooth_width_ + energy_width_; }
 
  private:
   static constexpr int kMaxSpikeHalf = 4;

@@ -90,8 +90,15 @@ double EcgLevels::top(const RecentValues<kWindows>& windows, double current) noe
 void EcgLevels::follow_roughness(const EcgFilter& filter, double beat_slope) noexcept {
   const EcgSample& sample = filter.at(filter.now());
   const double rough = sample.rough;
+  if (!filter.filled()) {
+    smooth_at_ = usual_at_ = sample.time;
+    rougher_ = false;
+    return;
+  }
   const double risen = rough_level_ * (1.0 + to_seconds(filter.period()) / settings_.rough_rise_s);
   rough_level_ = rough_level_ > 0.0 ? std::min(rough, risen) : rough;
+  if (rough < settings_.rough * rough_level_) usual_at_ = sample.time;
+  rougher_ = sample.time - usual_at_ > settings_.rough_at_least;
   if (!(beat_slope > 0.0)) {
     smooth_at_ = sample.time;
     return;

@@ -29,6 +29,8 @@ class EcgLevels {
   [[nodiscard]] Instant rough_since() const noexcept { return rough_since_; }
   [[nodiscard]] Instant rough_until() const noexcept { return rough_until_; }
   [[nodiscard]] bool rough(Instant t) const noexcept { return t > rough_since_ && t < rough_until_; }
+  // The line has been several times as rough as usual for longer than a QRS complex, however small that is beside it.
+  [[nodiscard]] bool rougher_than_usual() const noexcept { return rougher_; }
 
  private:
   static constexpr int kQuietHistory = 128;  // energies, one each 20 ms
@@ -50,7 +52,9 @@ class EcgLevels {
   Instant window_began_;
   bool in_window_ = false;
   double rough_level_ = 0.0;  // the lowest of late
-  Instant smooth_at_;         // the last instant that was not rough
+  bool rougher_ = false;
+  Instant usual_at_;   // the last instant of the usual roughness
+  Instant smooth_at_;  // the last instant that was not rough
   Instant rough_since_;
   Instant rough_until_;
 };

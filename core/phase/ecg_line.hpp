@@ -58,6 +58,8 @@ class EcgLine {
   [[nodiscard]] Duration period() const noexcept { return period_; }
   [[nodiscard]] Instant newest() const noexcept { return newest_; }
   [[nodiscard]] float newest_mV() const noexcept { return newest_mV_; }
+  // For how long the value has hardly changed, by the beats' measure.
+  [[nodiscard]] Duration still_for() const noexcept { return newest_ - left_at_; }
 
  private:
   template <class Sink>

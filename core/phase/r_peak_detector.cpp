@@ -85,7 +85,11 @@ void RPeakDetector::set_period(Duration period) noexcept {
 EcgSignal RPeakDetector::signal() const noexcept {
   if (line_.interrupted()) return line_.interruption();
   if (decision_.chaotic(newest_)) return EcgSignal::kLeadOff;
+  // A pause, or a lead that came off: what is unusual beside it tells.
+  const bool overdue = decision_.overdue(newest_);
+  if (overdue && line_.still_for() > settings_.decision.chaos_after) return EcgSignal::kFlat;
   if (decision_.learning(newest_)) return EcgSignal::kLearning;
+  if (overdue && levels_.rougher_than_usual()) return EcgSignal::kNoisy;
   return decision_.noisy(newest_) || newest_ < levels_.rough_until() ? EcgSignal::kNoisy : EcgSignal::kGood;
 }
 

@@ -35,7 +35,6 @@ struct CandidateSettings {
   Duration shape_before = std::chrono::milliseconds(91);
   Duration shape_after = std::chrono::milliseconds(49);
   Duration one_complex = std::chrono::milliseconds(60);  // a maximum of the energy and a fit so far apart are one
-  Duration fit_await = std::chrono::milliseconds(30);    // how long a maximum of the energy waits for a fit
   int fit_confirm = 3;                                   // steps after which a maximum of the correlation is one
   double alike = 0.6;           // correlation with a template that makes a candidate, whatever its energy (dev)
   double least_of_quiet = 1.2;  // times the quiet level: what is less is no candidate

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 namespace perimap {
@@ -82,6 +83,38 @@ TEST(RhythmModel, ItBecomesUnlikelyThatNoBeatHasCome) {
     EXPECT_LE(rhythm.survival(since_s), before);
     before = rhythm.survival(since_s);
   }
+}
+
+// ---- the renewal model: four beats of five come in rhythm, the others whenever they like
+
+TEST(RhythmModel, OneBeatOfFiveComesWheneverItLikes) {
+  const RhythmModel rhythm{.cycle_s = 0.8, .spread = 0.08};
+  EXPECT_NEAR(rhythm.log_density(1.6), std::log(0.2), 0.1) << "far from the rhythm";
+  const double peak = 0.8 / (0.08 * std::sqrt(2.0 * std::numbers::pi)) * 2.0;
+  EXPECT_NEAR(rhythm.log_density(0.8), std::log(0.2 + peak), 0.1) << "in it, to intervals over two natural units";
+}
+
+TEST(RhythmModel, VentriclesAreRefractoryAndThenRecover) {
+  const RhythmModel any;
+  EXPECT_NEAR(any.log_density(0.17), -12.0, 1.0);
+  EXPECT_GT(any.log_density(0.19), -7.0);
+  EXPECT_NEAR(any.log_density(0.26), 2.0 * std::log(0.5), 0.1) << "half recovered";
+  EXPECT_LT(any.log_density(0.32), -0.2);
+  EXPECT_EQ(any.log_density(0.36), 0.0) << "excitable as at any time";
+  const RhythmModel slow{.cycle_s = 2.0, .spread = 0.08};
+  EXPECT_NEAR(slow.log_density(0.26) - slow.log_density(0.5), 2.0 * std::log(0.5), 0.1);
+}
+
+TEST(RhythmModel, WhileNoCycleIsKnownItIsSomeEightTenthsOfASecond) {
+  const RhythmModel any;
+  EXPECT_NEAR(any.survival(0.8), 0.8 * 0.5 + 0.2 * 0.5, 0.01);
+  EXPECT_NEAR(any.survival(0.8 * std::exp(0.35)), 0.8 * 0.159 + 0.2 * (0.5 - 0.35 / 2.0), 0.02);
+}
+
+TEST(RhythmModel, WaitingEndsInSlowlyAndNeverForGood) {
+  const RhythmModel rhythm{.cycle_s = 0.8, .spread = 0.08};
+  EXPECT_NEAR(rhythm.survival(0.8 * std::exp(0.5)), 0.2 * 0.25, 0.005);
+  EXPECT_NEAR(rhythm.survival(30.0), 0.03, 0.005);
 }
 
 }  // namespace

@@ -90,5 +90,147 @@ TEST_F(EcgLevelsTest, HumThatComesToStayBecomesTheUsual) {
   EXPECT_FALSE(levels.rough(Instant(from_seconds(t_s - 0.1))));
 }
 
+// ---- the quiet level: of a line that rises evenly the energy is the rise in 20 ms
+
+TEST_F(EcgLevelsTest, TheQuietLevelIsALowQuantileOfTheLastTwoAndAHalfSeconds) {
+  double at_mV = 0.0;
+  const auto rise = [&](double length_s, double mV_per_s) {
+    hear(length_s, [&](double) { return at_mV += mV_per_s / kRate_hz; });
+  };
+  rise(6.0, 0.5);
+  EXPECT_NEAR(levels.quiet(), 0.01, 1e-6);
+  rise(1.70, 5.0);
+  EXPECT_NEAR(levels.quiet(), 0.01, 1e-3);
+  rise(0.25, 5.0);
+  EXPECT_GT(levels.quiet(), 0.05);
+}
+
+TEST_F(EcgLevelsTest, TheQuietLevelIsFormedTenTimesASecond) {
+  hear(5.0, [&](double) { return noise(generator); });
+  int formed = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const double before = levels.quiet();
+    hear(0.5 / kRate_hz, [&](double) { return noise(generator); });
+    formed += levels.quiet() != before ? 1 : 0;
+  }
+  EXPECT_LE(formed, 40);
+  EXPECT_GE(formed, 24) << "now and then it comes out as before";
+}
+
+// ---- the largest complexes: the upper median of eight windows of 1.5 s
+
+TEST_F(EcgLevelsTest, TheTopFollowsSmallerBeatsWhenMostWindowsHoldThem) {
+  hear(15.0, [&](double t) { return beats_mV(t, 1.0); });
+  const double usual = levels.top_energy();
+  hear(6.4, [&](double t) { return beats_mV(t, 0.1); });
+  EXPECT_NEAR(levels.top_energy(), usual, 0.02 * usual);
+  hear(3.2, [&](double t) { return beats_mV(t, 0.1); });
+  EXPECT_NEAR(levels.top_energy(), 0.1 * usual, 0.01 * usual);
+}
+
+TEST_F(EcgLevelsTest, WhileTwoWindowsAreKnownTheLargestOfAllCounts) {
+  hear(3.1, [&](double t) { return beats_mV(t, 1.0); });
+  const double usual = levels.top_energy();
+  hear(0.8, [&](double t) { return beats_mV(t, 6.0); });
+  EXPECT_GT(levels.top_energy(), 5.0 * usual);
+}
+
+TEST_F(EcgLevelsTest, OnceThreeWindowsAreKnownOneLargeComplexIsNoMeasure) {
+  hear(4.7, [&](double t) { return beats_mV(t, 1.0); });
+  const double usual = levels.top_energy();
+  hear(0.9, [&](double t) { return beats_mV(t, 6.0); });
+  EXPECT_NEAR(levels.top_energy(), usual, 0.02 * usual);
+}
+
+// ---- roughness: a line that goes up and down with every sample is evenly rough
+
+struct RoughLine : EcgLevelsTest {
+  // How rough a line is that alternates by 1 mV.
+  double unit = 0.0;
+  double sign = 1.0;
+
+  RoughLine() {
+    EcgFilter alone;
+    alone.restart(from_seconds(1.0 / kRate_hz));
+    for (int i = 0; i < 200; ++i) alone.push(Instant(from_seconds(i / kRate_hz)), i % 2 == 0 ? 1.0 : -1.0, false);
+    unit = alone.at(alone.now()).rough;
+  }
+  void hear_rough(double length_s, double rough) {
+    hear(length_s, [&](double) { return (sign = -sign) * rough / unit; });
+  }
+  [[nodiscard]] bool rough_now() const {
+    return t_s - 1.0 / kRate_hz < to_seconds(levels.rough_until().time_since_epoch()) - 0.149;
+  }
+};
+
+TEST_F(RoughLine, SeveralTimesTheUsualIsRough) {
+  beat_slope = 1e-6;
+  hear_rough(3.0, 0.01);
+  hear_rough(1.0, 0.033);
+  EXPECT_FALSE(rough_now());
+  hear_rough(1.0, 0.048);
+  EXPECT_TRUE(rough_now());
+}
+
+TEST_F(RoughLine, WhereTheLineBeginsItIsNotTakenForSmooth) {
+  beat_slope = 1e-6;
+  hear_rough(3.0, 0.01);
+  filter.restart(from_seconds(1.0 / kRate_hz));
+  levels.restart();
+  hear_rough(3.0, 0.03);
+  EXPECT_FALSE(rough_now());
+}
+
+TEST_F(RoughLine, WhatIsSmallBesideTheBeatsIsNot) {
+  beat_slope = 1.0;
+  hear_rough(3.0, 0.001);
+  hear_rough(1.0, 0.43);
+  EXPECT_FALSE(rough_now());
+  hear_rough(1.0, 0.57);
+  EXPECT_TRUE(rough_now());
+}
+
+TEST_F(RoughLine, ABurstThatFluctuatesIsOne) {
+  beat_slope = 1.0;
+  hear_rough(3.0, 0.001);
+  hear_rough(1.0, 1.0);
+  hear_rough(1.0, 0.28);
+  EXPECT_TRUE(rough_now()) << "half of the limit is a quarter of the beats' slope";
+  hear_rough(1.0, 0.21);
+  EXPECT_FALSE(rough_now());
+}
+
+TEST_F(RoughLine, HumBecomesTheUsualAfterMoreThanABurstLasts) {
+  beat_slope = 1e-6;
+  hear_rough(3.0, 0.01);
+  hear_rough(36.0, 0.08);
+  EXPECT_TRUE(rough_now());
+  hear_rough(12.0, 0.08);
+  EXPECT_FALSE(rough_now());
+}
+
+// The mean over 80 ms is rough for 80 ms longer than the line.
+TEST_F(RoughLine, AQrsComplexIsNotRoughForLongEnough) {
+  beat_slope = 1.0;
+  hear_rough(3.0, 0.001);
+  hear_rough(0.1, 100.0);
+  hear_rough(1.0, 0.001);
+  EXPECT_EQ(levels.rough_until(), Instant());
+  hear_rough(0.15, 100.0);
+  hear_rough(1.0, 0.001);
+  EXPECT_GT(levels.rough_until(), Instant());
+}
+
+TEST_F(RoughLine, ABurstBeginsBeforeItsMeanIsRoughAndTheFiltersRingAfterIt) {
+  beat_slope = 1.0;
+  hear_rough(3.0, 0.001);
+  const double begin_s = t_s;
+  hear_rough(1.0, 100.0);
+  const double end_s = t_s;
+  hear_rough(1.0, 0.001);
+  EXPECT_NEAR(to_seconds(levels.rough_since().time_since_epoch()) - begin_s, -0.1, 0.025);
+  EXPECT_NEAR(to_seconds(levels.rough_until().time_since_epoch()) - end_s, 0.08 + 0.15, 0.025);
+}
+
 }  // namespace
 }  // namespace perimap

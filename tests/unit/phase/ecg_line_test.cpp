@@ -122,5 +122,60 @@ TEST_F(EcgLineTest, AfterHalfAMinuteAllIsOfAnotherSignal) {
   EXPECT_EQ(sink.forgotten, 1);
 }
 
+// The last value before a gap was heard at t - period: so a gap of `length` is one from there.
+TEST_F(EcgLineTest, AGapIsBridgedWhileNoBeatCanHideInIt) {
+  hear(milliseconds(200));
+  t += milliseconds(26) - kPeriod;
+  hear(milliseconds(100));
+  EXPECT_EQ(sink.breaks, 0);
+  t += milliseconds(34) - kPeriod;
+  hear(milliseconds(100));
+  EXPECT_EQ(sink.breaks, 1);
+}
+
+TEST_F(EcgLineTest, AStampThatIsRoundedHidesNoSampleAndALaterOneDoes) {
+  hear(milliseconds(200));
+  const std::size_t before = sink.samples.size();
+  t += std::chrono::microseconds(1300);
+  hear(kPeriod);
+  EXPECT_EQ(sink.samples.size(), before + 1);
+  t += std::chrono::microseconds(1800);
+  hear(kPeriod);
+  EXPECT_EQ(sink.samples.size(), before + 3);
+}
+
+TEST_F(EcgLineTest, WhatMovesByMoreThanTheLastBitsIsNotFlat) {
+  hear(milliseconds(200));
+  line.set_excursions(2.0);
+  for (int i = 0; i < 1500; ++i, t += kPeriod) line.push(t, 5.0F + (i % 2 == 0 ? 0.0F : 0.07F), sink);
+  EXPECT_FALSE(line.interrupted());
+  for (int i = 0; i < 1500; ++i, t += kPeriod) line.push(t, 5.0F + (i % 2 == 0 ? 0.0F : 0.05F), sink);
+  EXPECT_TRUE(line.interrupted());
+}
+
+TEST_F(EcgLineTest, ADiastoleOfASlowHeartIsNotFlat) {
+  hear(milliseconds(200));
+  line.set_excursions(2.0);
+  const auto last_bits = [&](int samples) {
+    for (int i = 0; i < samples; ++i, t += kPeriod) line.push(t, 5.0F + (i % 2 == 0 ? 0.0F : 0.03F), sink);
+  };
+  last_bits(1150);
+  EXPECT_FALSE(line.interrupted());
+  last_bits(200);
+  EXPECT_TRUE(line.interrupted());
+}
+
+TEST_F(EcgLineTest, WhatWasLearntOutlivesAnInterruptionOfLessThanHalfAMinute) {
+  hear(milliseconds(200));
+  line.lead_off(t, sink);
+  t += std::chrono::seconds(26);
+  hear(milliseconds(200));
+  EXPECT_EQ(sink.forgotten, 0);
+  line.lead_off(t, sink);
+  t += std::chrono::seconds(34);
+  hear(milliseconds(200));
+  EXPECT_EQ(sink.forgotten, 1);
+}
+
 }  // namespace
 }  // namespace perimap

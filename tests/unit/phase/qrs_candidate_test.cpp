@@ -25,20 +25,22 @@ double qrs_mV(double t_s) { return wave(t_s, 0.012); }
 
 // A complex in the middle of two seconds, as measured about the sample that is nearest to it.
 struct Measured {
-  explicit Measured(const std::function<double(double)>& value_mV, Polarity polarity = {}) {
+  explicit Measured(const std::function<double(double)>& value_mV, Polarity polarity = {}, double off_s = 0.0,
+                    double noise_mV = 0.0) {
     const Duration period = from_seconds(1.0 / kRate_hz);
     filter.restart(period);
     meter.set_period(period);
     for (int i = 0; i < static_cast<int>(1.4 * kRate_hz); ++i) {
       filter.push(Instant(i * period), value_mV(i / kRate_hz), false);
     }
-    const auto centre = static_cast<std::int64_t>(std::lround(kPeak_s * kRate_hz));
-    candidate = meter.about_crest(centre + filter.energy_delay(), polarity, 0.0);
+    centre = static_cast<std::int64_t>(std::lround((kPeak_s + off_s) * kRate_hz));
+    candidate = meter.about_crest(centre + filter.energy_delay(), polarity, noise_mV);
   }
 
   CandidateSettings settings;
   EcgFilter filter;
   QrsMeter meter{settings, filter};
+  std::int64_t centre = 0;
   QrsCandidate candidate;
 };
 
@@ -99,6 +101,81 @@ TEST(QrsMeter, PointsTheWayTheBeatsDoUnlessTheOtherIsFarLarger) {
   EXPECT_FALSE(Measured(both(1.5)).candidate.points_up);
   EXPECT_TRUE(Measured(both(1.5), {.known = true, .up = true}).candidate.points_up);
   EXPECT_FALSE(Measured(both(2.6), {.known = true, .up = true}).candidate.points_up);
+}
+
+// ---- how far each measure reaches
+
+TEST(QrsMeter, TheShapeIsOfPointsFiveMillisecondsApartFromNinetyBeforeThePeakToFortyFiveAfter) {
+  CandidateSettings settings;
+  EcgFilter filter;
+  filter.restart(milliseconds(1));
+  QrsMeter meter{settings, filter};
+  meter.set_period(milliseconds(1));
+  EXPECT_EQ(meter.step(), 5);
+  for (int i = 0; i < 1000; ++i) filter.push(Instant(i * milliseconds(1)), 0.0, false);
+  EXPECT_EQ(meter.shape_at(500).points, 18 + 1 + 9);
+  EXPECT_EQ(meter.points_after(), 9);
+}
+
+// The middle of a wide complex's energy may be so far from its peak; the T wave is farther.
+TEST(QrsMeter, ThePeakIsSoughtWithinEightyMillisecondsOfTheEnergysMiddle) {
+  EXPECT_NEAR(seconds(Measured(qrs_mV, {}, 0.072).candidate), kPeak_s, 1e-3);
+  EXPECT_NEAR(seconds(Measured(qrs_mV, {}, -0.072).candidate), kPeak_s, 1e-3);
+  EXPECT_GT(std::abs(seconds(Measured(qrs_mV, {}, 0.098).candidate) - kPeak_s), 5e-3);
+}
+
+// A second peak, higher, at so many seconds from where the shape fits.
+TEST(QrsMeter, ThePeakOfAShapeThatFitsIsSoughtWithinFifteenMillisecondsOfIt) {
+  const auto found = [](double apart_s) {
+    const Measured measured([=](double t_s) { return wave(t_s, 0.004) + 1.3 * wave(t_s - apart_s, 0.004); });
+    return seconds(measured.meter.about_fit(measured.centre, true, 0.0)) - kPeak_s;
+  };
+  EXPECT_GT(found(0.014), 0.008);
+  EXPECT_LT(found(0.021), 0.004);
+}
+
+// The line changes to another level so long before the peak.
+TEST(QrsMeter, TheBaselineIsOfTheStretchOfWhichTheComplexIsTheSmallerPart) {
+  const auto height = [](double before_s) {
+    return Measured([=](double t_s) { return qrs_mV(t_s) + (t_s > kPeak_s - before_s ? 1.0 : 0.0); }).candidate.upward;
+  };
+  EXPECT_GT(height(0.040), 1.6) << "most of 200 ms before is of the old level";
+  EXPECT_LT(height(0.080), 1.1) << "and here of the new one";
+}
+
+TEST(QrsMeter, AStepIsAChangeOfLevelWithinTenthsOfASecondOfThePeak) {
+  const auto step = [](double after_s) {
+    return Measured([=](double t_s) { return qrs_mV(t_s) + (t_s > kPeak_s + after_s ? 1.0 : 0.0); }).candidate.step;
+  };
+  EXPECT_GT(step(0.082), 0.4);
+  EXPECT_LT(step(0.118), 0.1);
+}
+
+// Of a parabola through noise of a deviation: that, over twice the curvature and the root of the sum of squares of the
+// instants, which reach 10 ms to either side.
+TEST(QrsMeter, TheDeviationIsThatOfAParabolasVertexInNoise) {
+  const double noise_mV = 0.5;
+  const Measured measured(qrs_mV, {}, 0.0, noise_mV);
+  double squares_s2 = 0.0;
+  for (int i = -5; i <= 5; ++i) squares_s2 += std::pow(i / kRate_hz, 2);
+  const double curvature = 0.5 / (0.012 * 0.012);
+  const double expected_s = noise_mV / (2.0 * curvature * std::sqrt(squares_s2));
+  EXPECT_NEAR(to_seconds(measured.candidate.deviation), std::hypot(expected_s, 0.001), 0.25 * expected_s);
+}
+
+TEST(QrsMeter, WithoutNoiseTheDeviationIsThatOfCleanBeatsAndWithoutAVertexUniform) {
+  EXPECT_NEAR(to_seconds(Measured(qrs_mV).candidate.deviation), 0.001, 1e-4);
+  EXPECT_NEAR(to_seconds(Measured([](double t_s) { return t_s * t_s; }).candidate.deviation), 0.020, 1e-3);
+  EXPECT_NEAR(to_seconds(Measured(qrs_mV, {}, 0.0, 100.0).candidate.deviation), 0.020, 1e-9) << "at most";
+}
+
+TEST(QrsMeter, AFitIsNoBeatWhereAnotherWaveOfTheComplexIsTwiceAsLarge) {
+  const auto points = [](double down) {
+    const Measured measured([=](double t_s) { return wave(t_s, 0.008) - down * wave(t_s - 0.045, 0.012); });
+    return measured.meter.about_fit(measured.centre, true, 0.0).shape.points;
+  };
+  EXPECT_GT(points(1.6), 0);
+  EXPECT_EQ(points(2.4), 0);
 }
 
 }  // namespace

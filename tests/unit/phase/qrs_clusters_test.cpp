@@ -95,5 +95,116 @@ TEST(QrsClusters, JudgesByTheMeanOfItsMembersAndCautiouslyWhereTheyAreFew) {
   EXPECT_NEAR(clusters.log_odds(beat), 3.0, 0.5);
 }
 
+// ---- what makes a kind
+
+// Beside kBeat, as like it as `correlation` says.
+QrsShape mixed(double correlation) {
+  QrsShape other = kOther;
+  const ShapeMatch along = match(other, kBeat);
+  for (int i = 0; i < other.points; ++i) {
+    other.slope[static_cast<std::size_t>(i)] -=
+        static_cast<float>(along.gain) * kBeat.slope[static_cast<std::size_t>(i)];
+  }
+  const double scale = std::sqrt(1.0 - correlation * correlation) * root_mean_square(kBeat) / root_mean_square(other);
+  QrsShape shape = kBeat;
+  for (int i = 0; i < shape.points; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    shape.slope[k] = static_cast<float>(correlation * static_cast<double>(kBeat.slope[k]) +
+                                        scale * static_cast<double>(other.slope[k]));
+  }
+  return shape;
+}
+
+QrsClusters knowing_beats(int count = 10) {
+  QrsClusters clusters;
+  for (int i = 0; i < count; ++i) clusters.judged(clusters.learn(kBeat, true, true, kNow), 3.0);
+  return clusters;
+}
+
+TEST(QrsClusters, AShapeIsOfAKindFromACorrelationOfEightyFivePercentOn) {
+  QrsClusters clusters = knowing_beats();
+  const int beat = clusters.nearest(kBeat, 0).of;
+  EXPECT_EQ(clusters.learn(mixed(0.90), true, true, kNow), beat);
+  EXPECT_NE(knowing_beats().learn(mixed(0.78), true, true, kNow), beat);
+}
+
+TEST(QrsClusters, AKindIsOfSizesUpToTwiceAndDownToHalf) {
+  const QrsClusters clusters = knowing_beats();
+  for (const double gain : {1.8, 0.56}) EXPECT_GE(clusters.nearest(shape(gain, 2.5), 0).of, 0) << gain;
+  for (const double gain : {2.25, 0.45}) EXPECT_LT(clusters.nearest(shape(gain, 2.5), 0).of, 0) << gain;
+}
+
+TEST(QrsClusters, ABeatIsLookedForDownToAQuarterOfItsSize) {
+  const QrsClusters clusters = knowing_beats();
+  EXPECT_GE(clusters.nearest_beat(shape(0.28, 2.5)).of, 0);
+  EXPECT_LT(clusters.nearest_beat(shape(0.22, 2.5)).of, 0);
+}
+
+TEST(QrsClusters, PeaksOfOneKindAreFoundUpToFifteenMillisecondsApart) {
+  QrsClusters clusters;
+  const int narrow = clusters.learn(shape(1.0, 1.2, 14.0), true, true, kNow);
+  EXPECT_EQ(clusters.learn(shape(1.0, 1.2, 17.0), true, true, kNow), narrow);
+  EXPECT_NE(clusters.learn(shape(1.0, 1.2, 18.0), true, true, kNow), narrow);
+}
+
+// ---- what is remembered
+
+TEST(QrsClusters, ATemplateFollowsItsMembersByAnEighthEach) {
+  QrsClusters clusters = knowing_beats(100);
+  const QrsShape bent = mixed(0.88);
+  for (int i = 0; i < 4; ++i) clusters.learn(bent, true, true, kNow);
+  const double share = 1.0 - std::pow(7.0 / 8.0, 4.0);
+  const double along = 1.0 - share + 0.88 * share;
+  const double across = std::sqrt(1.0 - 0.88 * 0.88) * share;
+  EXPECT_NEAR(std::acos(clusters.nearest(kBeat, 0).correlation), std::atan(across / along), 0.03);
+}
+
+TEST(QrsClusters, SharesAreOfTheLastTwelveMembers) {
+  QrsClusters clusters;
+  const int wave = clusters.learn(kOther, true, true, kNow);
+  for (int i = 0; i < 40; ++i) clusters.followed(wave, true);
+  for (int i = 0; i < 8; ++i) clusters.followed(wave, false);
+  EXPECT_NEAR(clusters.followers(wave), std::pow(11.0 / 12.0, 8.0), 0.02);
+}
+
+TEST(QrsClusters, ABurstOfTwentySecondsDoesNotOutweighTheBeatsBeforeItAndALongerOneDoes) {
+  const auto settled_after = [](int in_burst) {
+    QrsClusters clusters = knowing_beats(200);
+    int beat = -1;
+    for (int i = 0; i < in_burst; ++i) beat = clusters.learn(kBeat, true, false, kNow);
+    return clusters.settled(beat);
+  };
+  EXPECT_TRUE(settled_after(36));
+  EXPECT_FALSE(settled_after(48));
+}
+
+TEST(QrsClusters, AKindIsSettledWhenMostOfItsMembersWereSeenInCalm) {
+  const auto settled = [](int calm) {
+    QrsClusters clusters;
+    int beat = -1;
+    for (int i = 0; i < 20; ++i) beat = clusters.learn(kBeat, true, i < calm, kNow);
+    return clusters.settled(beat);
+  };
+  EXPECT_FALSE(settled(8));
+  EXPECT_TRUE(settled(12));
+}
+
+TEST(QrsClusters, OneMemberIsJudgedAsIfTwoOthersHadSaidNothing) {
+  QrsClusters clusters;
+  const int beat = clusters.learn(kBeat, true, true, kNow);
+  clusters.judged(beat, 3.0);
+  EXPECT_NEAR(clusters.log_odds(beat), 1.0, 0.05);
+}
+
+TEST(QrsClusters, WhatIsSeenAgainOutweighsWhatIsNotInAHundredComplexes) {
+  QrsClusters clusters;
+  const int beat = clusters.learn(kBeat, true, true, kNow);
+  for (int i = 0; i < 5; ++i) clusters.learn(kBeat, true, true, kNow);
+  for (int i = 0; i < 60; ++i) clusters.learn(kOther, true, true, kNow);
+  EXPECT_TRUE(clusters.recurs(beat));
+  for (int i = 0; i < 60; ++i) clusters.learn(kOther, true, true, kNow);
+  EXPECT_FALSE(clusters.recurs(beat));
+}
+
 }  // namespace
 }  // namespace perimap
