@@ -2,8 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace perimap {
+namespace {
+
+constexpr double kExcluded = -std::numeric_limits<double>::infinity();  // log odds
+
+}  // namespace
 
 // ---- levels
 
@@ -311,12 +317,12 @@ double BeatDecision::odds(int before, int candidate) const noexcept {
   const Waiting& waiting = waiting_[static_cast<std::size_t>(candidate)];
   const bool follows = before >= 0 || has_last_;
   const QrsCandidate& last = before >= 0 ? waiting_[static_cast<std::size_t>(before)].candidate : last_;
-  if (follows && waiting.candidate.time - last.time < settings_.refractory) return settings_.excluded;
+  if (follows && waiting.candidate.time - last.time < settings_.refractory) return kExcluded;
   // The filters see a step where the line begins.
   if (waiting.candidate.time - since_ < settings_.begins && clusters_.any_recurs() &&
       (waiting.correlation < settings_.very_familiar || waiting.cluster < 0 ||
        clusters_.log_odds(waiting.cluster) < settings_.qrs_like)) {
-    return settings_.excluded;
+    return kExcluded;
   }
   return log_odds(paired(before, candidate), weights_.beat);
 }
@@ -385,8 +391,6 @@ void BeatDecision::accept(int index, Instant now) noexcept {
   }
   tell(accepted, now);
   remove_first(index + 1);
-  // What is of the same complex, or too soon after it.
-  while (count_ > 0 && waiting_[0].candidate.time - last_.time < std::chrono::milliseconds(60)) remove_first(1);
   weigh(now);
 }
 
@@ -421,8 +425,8 @@ double BeatDecision::confidence(const Waiting& waiting, bool familiar, Instant n
 // Beats in a row that are alike, and of no kind known from before: the gain or the conduction has changed, or the
 // electrodes sit elsewhere. They are the usual beats from now on.
 void BeatDecision::follow_change(const Waiting& waiting, bool familiar) noexcept {
-  const bool alike = !familiar && clusters_.recurs(waiting.cluster) &&
-                     waiting.correlation >= settings_.surely_familiar && !unlike_any_beat(waiting.candidate);
+  const bool alike = !familiar && clusters_.recurs(waiting.cluster) && waiting.correlation >= settings_.familiar &&
+                     !unlike_any_beat(waiting.candidate);
   changed_count_ = !alike ? 0 : waiting.cluster == changed_to_ ? changed_count_ + 1 : 1;
   changed_to_ = waiting.cluster;
   if (changed_count_ < settings_.changed_after) return;

@@ -65,7 +65,6 @@ struct DecisionSettings {
   Duration time_at_start = std::chrono::milliseconds(700);
   int beats_at_start = 3;  // until so many are known none is told at once: the first wave may be a P wave
   Duration refractory = std::chrono::milliseconds(180);  // of the ventricles; Pan & Tompkins 1985 have 200 ms
-  double excluded = -30.0;                               // log odds of a second beat within it
   double size_of_disturbance = 0.33;  // of a beat's, from which on what is like nothing says that there is noise
   double disturbance_memory_s = 1.5;  // they come in trains
   double too_large = 4.0;             // times the beats' energy: no ectopic beat is
@@ -106,7 +105,6 @@ struct DecisionSettings {
   double familiar = 0.8;
   double most_step = 0.75;  // change of level to the excursions: of clean beats one in a thousand has more,
   double most_rough = 0.5;  // and of this, to the energy
-  double surely_familiar = 0.85;
   int changed_after = 5;                // beats in a row that are alike and of no known kind: arcs are neither
   double same_gain = 0.3;               // logarithm, of two beats that are of one size
   double learnt = 0.8;                  // probability from which on a beat teaches rhythm and levels

@@ -85,7 +85,7 @@ TEST(CandidateFinder, AMaximumIsOneWhenNothingExceededItForFiftyMilliseconds) {
 
 TEST(CandidateFinder, AFallToThreeQuartersMakesAMaximumAtOnceAndAShallowOneDoesNot) {
   EXPECT_EQ(maxima_about(0.0, 0.016, 4.0), 1U);
-  EXPECT_EQ(maxima_about(0.0, 0.031, 4.0), 2U);
+  EXPECT_EQ(maxima_about(0.0, 0.026, 4.0), 2U);
 }
 
 // A second rise, to so many times the trough.

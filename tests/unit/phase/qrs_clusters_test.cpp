@@ -141,10 +141,11 @@ TEST(QrsClusters, ABeatIsLookedForDownToAQuarterOfItsSize) {
 }
 
 TEST(QrsClusters, PeaksOfOneKindAreFoundUpToFifteenMillisecondsApart) {
-  QrsClusters clusters;
-  const int narrow = clusters.learn(shape(1.0, 1.2, 14.0), true, true, kNow);
-  EXPECT_EQ(clusters.learn(shape(1.0, 1.2, 17.0), true, true, kNow), narrow);
-  EXPECT_NE(clusters.learn(shape(1.0, 1.2, 18.0), true, true, kNow), narrow);
+  for (const double apart : {3.0, 4.0}) {
+    QrsClusters clusters;
+    const int narrow = clusters.learn(shape(1.0, 1.2, 14.0), true, true, kNow);
+    EXPECT_EQ(clusters.learn(shape(1.0, 1.2, 14.0 + apart), true, true, kNow) == narrow, apart == 3.0);
+  }
 }
 
 // ---- what is remembered

@@ -265,7 +265,7 @@ TEST(BeatEvidence, IsWorthWhatTheRecordsSay) {
   };
   const double usual_one = beat([](auto&, auto&) {});
   for (const auto& worth : all) {
-    EXPECT_NEAR(beat(worth.change) - usual_one, worth.log_odds, 0.1 * std::abs(worth.log_odds)) << worth.name;
+    EXPECT_NEAR(beat(worth.change) - usual_one, worth.log_odds, 0.03 * std::abs(worth.log_odds)) << worth.name;
   }
 }
 
