@@ -8,6 +8,7 @@ namespace {
 
 constexpr int kQuietRecompute = 5;  // steps: each 0.1 s; it does not change faster
 constexpr int kFewWindows = 3;      // fewer are no distribution: the largest of all counts
+constexpr int kOfLate = 3;          // windows: where none of them reaches what was usual, the gain has fallen
 
 }  // namespace
 
@@ -82,7 +83,8 @@ void EcgLevels::follow_top(const EcgFilter& filter, bool burst) noexcept {
 double EcgLevels::top(const RecentValues<kWindows>& windows, double current) noexcept {
   if (windows.count() == 0) return current;
   const double usual = windows.median();
-  return windows.count() < kFewWindows ? std::max(usual, current) : usual;
+  if (windows.count() < kFewWindows) return std::max(usual, current);
+  return std::min(usual, std::max(current, windows.largest_of_last(kOfLate)));
 }
 
 // Electrosurgery, chewing, a loose cable: as strong as the beats and too fast to be any. The usual roughness (mains

@@ -29,6 +29,14 @@ class RecentValues {
   }
   // At least one must be held.
   [[nodiscard]] double newest() const noexcept { return values_[static_cast<std::size_t>((next_ + N - 1) % N)]; }
+  // Of the newest so many, or all there are. At least one must be held.
+  [[nodiscard]] double largest_of_last(int count) const noexcept {
+    double largest = newest();
+    for (int i = 2; i <= std::min(count, count_); ++i) {
+      largest = std::max(largest, values_[static_cast<std::size_t>((next_ + 2 * N - i) % N)]);
+    }
+    return largest;
+  }
   // Of the newest two, or the only one.
   [[nodiscard]] double mean_of_last_two() const noexcept {
     const double last = newest();

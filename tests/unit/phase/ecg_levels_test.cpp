@@ -119,13 +119,22 @@ TEST_F(EcgLevelsTest, TheQuietLevelIsFormedTenTimesASecond) {
 
 // ---- the largest complexes: the upper median of eight windows of 1.5 s
 
-TEST_F(EcgLevelsTest, TheTopFollowsSmallerBeatsWhenMostWindowsHoldThem) {
+TEST_F(EcgLevelsTest, TheTopFollowsSmallerBeatsWhenThreeWindowsHoldNoOthers) {
   hear(15.0, [&](double t) { return beats_mV(t, 1.0); });
   const double usual = levels.top_energy();
-  hear(6.4, [&](double t) { return beats_mV(t, 0.1); });
+  hear(4.4, [&](double t) { return beats_mV(t, 0.1); });
   EXPECT_NEAR(levels.top_energy(), usual, 0.02 * usual);
-  hear(3.2, [&](double t) { return beats_mV(t, 0.1); });
+  hear(1.8, [&](double t) { return beats_mV(t, 0.1); });
   EXPECT_NEAR(levels.top_energy(), 0.1 * usual, 0.01 * usual);
+}
+
+TEST_F(EcgLevelsTest, TheTopFollowsLargerBeatsWhenMostWindowsHoldThem) {
+  hear(15.0, [&](double t) { return beats_mV(t, 1.0); });
+  const double usual = levels.top_energy();
+  hear(4.4, [&](double t) { return beats_mV(t, 3.0); });
+  EXPECT_NEAR(levels.top_energy(), usual, 0.02 * usual);
+  hear(3.2, [&](double t) { return beats_mV(t, 3.0); });
+  EXPECT_NEAR(levels.top_energy(), 3.0 * usual, 0.1 * usual);
 }
 
 TEST_F(EcgLevelsTest, WhileTwoWindowsAreKnownTheLargestOfAllCounts) {
