@@ -3,39 +3,30 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/phase/ventricular_evidence.hpp"
+
 namespace perimap {
 namespace {
+constexpr double kUsual = 0.9;          // correlation with the usual shape from which on a beat is of it
+constexpr double kOfItsOwn = 0.2;       // 1 - correlation with the usual shape: no usual beat that noise has bent
+constexpr double kAtAnyTime = 1.0;      // log odds that it takes more where beats come at any time
+constexpr double kAreaMemory = 16.0;    // beats
+constexpr double kRecurs = 3.0;         // of a kind, from which on a ventricular beat may come on time
+constexpr int kConductionChanged = 4;   // beats in a row
+constexpr int kDisplaced = 4;           // steps, 20 ms
+constexpr double kDoubtful = 0.3;       // confidence below which an unusual shape is thought noise,
+constexpr double kMostDoubtful = 0.15;  // and a usual one, unless it comes when a beat is due
+constexpr int kUnseen = 2;              // cycles: noise may have hidden the beat before
+constexpr double kEarly = 0.9;          // of the rhythm's cycle, in an unusual shape
+constexpr double kMuchTooEarly = 0.8;   // in the usual one
+constexpr double kInRhythm = 0.15;      // of the rhythm's cycle, either way
+constexpr double kPause = 1.5;          // rhythm's cycles
+constexpr double kGap = 4.0;            // beyond, beats were missed
+constexpr double kLongest = 1.35;       // cycles
 
-constexpr double kUsual = 0.9;         // correlation with the usual shape from which on a beat is of it
-constexpr double kOfItsOwn = 0.2;      // 1 - correlation with the usual shape: no usual beat that noise has bent
-constexpr double kMostUnusual = 0.43;  // of the beats: beyond, neither of two shapes is the usual one
-constexpr double kWider = 0.8;         // a ventricular complex's sharpness, of the usual one's
-constexpr double kShareMemory = 32.0;  // beats
-constexpr int kConductionChanged = 4;  // beats in a row
-constexpr double kStranger = 1.5;      // times the usual beats' strangeness: a premature beat is ventricular
-constexpr double kSlight = 0.01;
-constexpr double kStrangenessMemory = 16.0;  // beats
-constexpr int kDisplaced = 4;                // steps, 20 ms
-constexpr double kDoubtful = 0.3;            // confidence below which an unusual shape is thought noise,
-constexpr double kMostDoubtful = 0.15;       // and a usual one, unless it comes when a beat is due
-constexpr int kUnseen = 2;                   // cycles: noise may have hidden the beat before
-constexpr double kEarly = 0.9;               // of the rhythm's cycle, in an unusual shape
-constexpr double kMuchTooEarly = 0.8;        // in the usual one
-constexpr double kInRhythm = 0.15;           // of the rhythm's cycle, either way
-constexpr double kPause = 1.5;               // rhythm's cycles
-constexpr double kGap = 4.0;                 // beyond, beats were missed
-constexpr double kLongest = 1.35;            // cycles
-
-// How fast the slope changes beside how large it is: the less, the wider the complex. 0 for a shape of no points.
-double sharpness(const QrsShape& shape) noexcept {
-  double change = 0.0;
-  double size = 0.0;
-  for (int i = 1; i < shape.points; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    change += std::abs(shape.slope[k] - shape.slope[k - 1]);
-    size += std::abs(shape.slope[k]);
-  }
-  return size > 0.0 ? change / size : 0.0;
+// 0 where one of the two is not known.
+double log_ratio(double value, double usual) noexcept {
+  return value > 0.0 && usual > 0.0 ? std::log(value / usual) : 0.0;
 }
 
 }  // namespace
@@ -44,29 +35,37 @@ double sharpness(const QrsShape& shape) noexcept {
 double BeatClasser::strangeness(const QrsShape& shape) const noexcept {
   const int usual = templates_.heaviest();
   if (usual < 0 || !templates_.usable(usual) || shape.points == 0) return 0.0;
-  return 1.0 - templates_.best_match_with(usual, shape, kDisplaced).correlation;
+  return 1.0 - templates_.likeness_to(usual, shape, kDisplaced);
 }
 
-bool BeatClasser::recurs_beside_the_usual(const QrsShape& shape) const noexcept {
-  for (int i = 0; i < ShapeTemplates::kTemplates; ++i) {
-    if (i == templates_.heaviest() || !templates_.usable(i)) continue;
-    if (templates_.best_match_with(i, shape, kDisplaced).correlation > kUsual) return true;
-  }
-  return false;
+bool BeatClasser::ventricular(const RPeak& peak, double strange) const noexcept {
+  if (!has_last_ || normal_rr_s_.count() == 0 || peak.shape.points == 0) return false;
+  const double cycle_s = normal_rr_s_.median();
+  const double rr_s = to_seconds(peak.time - last_);
+  const int kind = templates_.kind_of(peak.shape);
+  const KindArea known = kind < 0 ? KindArea{} : areas_[static_cast<std::size_t>(kind)];
+  if (rr_s >= kEarly * cycle_s && (known.members < kRecurs || strange < kOfItsOwn)) return false;
+  VentricularEvidence evidence;
+  evidence.log_area = log_ratio(area(peak.shape), usual_area_);
+  evidence.log_kind_area = known.log_area;
+  evidence.strangeness = strange;
+  evidence.log_rr = log_ratio(rr_s, cycle_s);
+  evidence.log_rr_before = log_ratio(raw_rr_s_, cycle_s);
+  return log_odds(evidence) > (rhythm_.rhythm() == Rhythm::kUnpredictable ? kAtAnyTime : 0.0);
 }
 
 BeatClass BeatClasser::by_interval(const RPeak& peak, bool unusual) const noexcept {
   if (!has_last_ || normal_rr_s_.count() == 0) return BeatClass::kNormal;
   const double cycle_s = normal_rr_s_.median();
   const double rr_s = to_seconds(peak.time - last_);
-  if (unusual && rr_s < kEarly * cycle_s) return BeatClass::kPremature;
   // Breathing shortens cycles too, but not from one to the next.
   const double usual_s = last_rr_s_ > 0.0 ? std::min(cycle_s, last_rr_s_) : cycle_s;
   // A second cycle as short as the last, in the usual shape, is a new rhythm.
   const bool again = last_class_ == BeatClass::kPremature && !last_unusual_ && raw_rr_s_ > 0.0 &&
                      std::abs(rr_s - raw_rr_s_) < kInRhythm * raw_rr_s_;
   if (!unusual && again) return BeatClass::kNormal;
-  if (!unusual && rr_s < kMuchTooEarly * usual_s && !is_due(peak, 1)) return BeatClass::kPremature;
+  const bool at_any_time = rhythm_.rhythm() == Rhythm::kUnpredictable;
+  if (!at_any_time && rr_s < kMuchTooEarly * usual_s && !is_due(peak, 1)) return BeatClass::kPremature;
   if (rr_s > kPause * cycle_s && last_class_ != BeatClass::kPremature) return BeatClass::kPause;
   return BeatClass::kNormal;
 }
@@ -85,24 +84,21 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
   if (gap) interrupt();
   const double strange = strangeness(peak.shape);
   const bool unusual = strange > 1.0 - kUsual;
-  peak.beat_class = by_interval(peak, unusual);
-  const bool ventricular_on_time = peak.beat_class == BeatClass::kNormal && strange > kOfItsOwn &&
-                                   unusual_share_ < kMostUnusual && sharpness(peak.shape) < kWider * usual_sharpness_ &&
-                                   recurs_beside_the_usual(peak.shape);
-  on_time_in_another_shape_ = ventricular_on_time ? std::min(on_time_in_another_shape_ + 1, kConductionChanged + 1) : 0;
-  if (ventricular_on_time && on_time_in_another_shape_ <= kConductionChanged) peak.beat_class = BeatClass::kPremature;
+  const bool ventricular = this->ventricular(peak, strange);
+  const bool early =
+      has_last_ && normal_rr_s_.count() > 0 && to_seconds(peak.time - last_) < kEarly * normal_rr_s_.median();
+  on_time_in_another_shape_ =
+      ventricular && !early ? std::min(on_time_in_another_shape_ + 1, kConductionChanged + 1) : 0;
+  peak.beat_class = ventricular && on_time_in_another_shape_ <= kConductionChanged ? BeatClass::kPremature
+                                                                                   : by_interval(peak, unusual);
   if (peak.confidence < (unusual ? kDoubtful : kMostDoubtful) && !is_due(peak, kUnseen))
     peak.beat_class = BeatClass::kNoise;
-  peak.unusual_shape =
-      unusual || (peak.beat_class == BeatClass::kPremature && strange > kStranger * strangeness_ + kSlight);
+  peak.unusual_shape = unusual || ventricular;
   if (peak.beat_class == BeatClass::kNoise) return peak;  // as if it had not been
 
-  templates_.learn(peak.shape, true);
-  if (has_last_) learn(peak, unusual);
+  learn_shape(peak.shape, unusual);
+  if (has_last_) learn_rhythm(peak, unusual);
   last_unusual_ = peak.unusual_shape;
-  if (!unusual) usual_sharpness_ += (sharpness(peak.shape) - usual_sharpness_) / kShareMemory;
-  unusual_share_ += ((unusual ? 1.0 : 0.0) - unusual_share_) / kShareMemory;
-  if (peak.beat_class == BeatClass::kNormal) strangeness_ += (strange - strangeness_) / kStrangenessMemory;
   last_ = peak.time;
   last_class_ = peak.beat_class;
   has_last_ = true;
@@ -113,12 +109,25 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
   return peak;
 }
 
+void BeatClasser::learn_shape(const QrsShape& shape, bool unusual) noexcept {
+  const int known = templates_.kind_of(shape);
+  const int kind = templates_.learn(shape);
+  if (kind < 0) return;
+  KindArea& of_kind = areas_[static_cast<std::size_t>(kind)];
+  if (known < 0) of_kind = {};
+  const double covered = area(shape);
+  of_kind.members = std::min(of_kind.members + 1.0, kAreaMemory);
+  of_kind.log_area += (log_ratio(covered, usual_area_) - of_kind.log_area) / of_kind.members;
+  if (!unusual) usual_area_ += (covered - usual_area_) / (usual_area_ > 0.0 ? kAreaMemory : 1.0);
+}
+
 // The rhythm's cycle: intervals between beats in rhythm; from one over a premature beat, as it tells when every second
 // beat is one, half. Bounded, so that a pause hardly counts but a new rhythm does after some beats.
-void BeatClasser::learn(const RPeak& peak, bool unusual) noexcept {
+void BeatClasser::learn_rhythm(const RPeak& peak, bool unusual) noexcept {
   last_rr_s_ = 0.0;
   const double before_s = raw_rr_s_;
   raw_rr_s_ = to_seconds(peak.time - last_);
+  if (!peak.unusual_shape && !last_unusual_) rhythm_.push(Seconds(raw_rr_s_));
   if (peak.beat_class == BeatClass::kPremature || unusual) return;
   const double rr_s = raw_rr_s_;
   const bool again = !last_unusual_ && std::abs(rr_s - before_s) < kInRhythm * before_s;

@@ -7,7 +7,7 @@
 namespace perimap {
 namespace {
 
-constexpr double kExcluded = -std::numeric_limits<double>::infinity();  // log odds
+constexpr double kNever = -std::numeric_limits<double>::infinity();  // log odds
 
 }  // namespace
 
@@ -317,12 +317,12 @@ double BeatDecision::odds(int before, int candidate) const noexcept {
   const Waiting& waiting = waiting_[static_cast<std::size_t>(candidate)];
   const bool follows = before >= 0 || has_last_;
   const QrsCandidate& last = before >= 0 ? waiting_[static_cast<std::size_t>(before)].candidate : last_;
-  if (follows && waiting.candidate.time - last.time < settings_.refractory) return kExcluded;
+  if (follows && waiting.candidate.time - last.time < settings_.refractory) return kNever;
   // The filters see a step where the line begins.
   if (waiting.candidate.time - since_ < settings_.begins && clusters_.any_recurs() &&
       (waiting.correlation < settings_.very_familiar || waiting.cluster < 0 ||
        clusters_.log_odds(waiting.cluster) < settings_.qrs_like)) {
-    return kExcluded;
+    return kNever;
   }
   return log_odds(paired(before, candidate), weights_.beat);
 }

@@ -3,15 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/statistics/upper_median.hpp"
-
 namespace perimap {
 namespace {
 
-constexpr double kKeep = 0.99;      // of a template's weight from beat to beat: some 100 beats count
-constexpr double kSame = 0.85;      // correlation from which on a beat is of a template's kind
-constexpr double kTrusted = 3.5;    // weight
-constexpr double kSmallest = 0.25;  // of the largest template's size
+constexpr double kKeep = 0.99;  // of a template's weight from beat to beat: some 100 beats count
+constexpr double kSame = 0.85;  // correlation from which on a beat is of a template's kind
 constexpr double kSlowestLearning = 1.0 / 8.0;
 constexpr int kDisplaced = 3;  // steps, 15 ms
 
@@ -57,30 +53,13 @@ ShapeMatch best_match(const QrsShape& shape, const QrsShape& reference, int most
   return best;
 }
 
-bool ShapeTemplates::usable(int i) const noexcept {
-  double largest = 0.0;
-  for (const Template& t : templates_) {
-    if (t.weight >= kTrusted) largest = std::max(largest, t.size);
-  }
-  return of(i).weight >= kTrusted && of(i).size > kSmallest * largest;
-}
-
 int ShapeTemplates::heaviest() const noexcept {
   const auto heaviest = std::max_element(templates_.begin(), templates_.end(),
                                          [](const Template& a, const Template& b) { return a.weight < b.weight; });
   return heaviest->weight > 0.0 ? static_cast<int>(heaviest - templates_.begin()) : -1;
 }
 
-ShapeMatch ShapeTemplates::best_match_with(int i, const QrsShape& shape, int most_displaced) const noexcept {
-  ShapeMatch m = best_match(shape, of(i).shape, most_displaced);
-  if (of(i).size > 0.0) m.gain /= of(i).size;
-  return m;
-}
-
-int ShapeTemplates::learn(const QrsShape& shape, bool upward) noexcept {
-  const double size = root_mean_square(shape);
-  if (!(size > 0.0)) return -1;
-  for (Template& t : templates_) t.weight *= kKeep;
+int ShapeTemplates::kind_of(const QrsShape& shape) const noexcept {
   int best = -1;
   double correlation = kSame;
   for (int i = 0; i < kTemplates; ++i) {
@@ -90,12 +69,19 @@ int ShapeTemplates::learn(const QrsShape& shape, bool upward) noexcept {
     correlation = c;
     best = i;
   }
+  return best;
+}
+
+int ShapeTemplates::learn(const QrsShape& shape) noexcept {
+  const double size = root_mean_square(shape);
+  if (!(size > 0.0)) return -1;
+  for (Template& t : templates_) t.weight *= kKeep;
+  int best = kind_of(shape);
   if (best < 0) {
     const auto rarest = std::min_element(templates_.begin(), templates_.end(),
                                          [](const Template& a, const Template& b) { return a.weight < b.weight; });
     *rarest = {};
     rarest->shape.points = shape.points;
-    rarest->upward = upward;
     best = static_cast<int>(rarest - templates_.begin());
   }
   Template& t = templates_[static_cast<std::size_t>(best)];
@@ -107,14 +93,7 @@ int ShapeTemplates::learn(const QrsShape& shape, bool upward) noexcept {
   }
   const auto norm = static_cast<float>(root_mean_square(t.shape));
   for (float& slope : t.shape.slope) slope /= norm;
-
-  t.sizes[static_cast<std::size_t>(t.beats % kSizes)] = size;
-  t.beats = t.beats + 1 < 2 * kSizes ? t.beats + 1 : kSizes;  // bounded, same slot and same fill
-  auto sorted = t.sizes;
-  t.size = upper_median(sorted.begin(), sorted.begin() + std::min(t.beats, kSizes));
   return best;
 }
-
-void ShapeTemplates::clear() noexcept { templates_.fill({}); }
 
 }  // namespace perimap

@@ -33,29 +33,26 @@ class ShapeTemplates {
  public:
   static constexpr int kTemplates = 5;
 
-  // Whether a template is to be believed: it has recurred, and is not far smaller than another that has (that would be
-  // a P or T wave).
-  [[nodiscard]] bool usable(int i) const noexcept;
+  // Whether a template has recurred and is to be believed.
+  [[nodiscard]] bool usable(int i) const noexcept { return of(i).weight >= kTrusted; }
   [[nodiscard]] int heaviest() const noexcept;  // -1 when there is none
 
-  // How much a shape is like template i; the gain is to the size that its beats have had lately.
-  [[nodiscard]] ShapeMatch best_match_with(int i, const QrsShape& shape, int most_displaced) const noexcept;
-  [[nodiscard]] bool upward(int i) const noexcept { return of(i).upward; }  // which way its R peak points
+  // Correlation with template i, at best.
+  [[nodiscard]] double likeness_to(int i, const QrsShape& shape, int most_displaced) const noexcept {
+    return best_match(shape, of(i).shape, most_displaced).correlation;
+  }
 
+  // The template that a shape is of, -1 for none.
+  [[nodiscard]] int kind_of(const QrsShape& shape) const noexcept;
   // A beat of this shape was found. Gives the template that it now belongs to, -1 for a shape of no points.
-  int learn(const QrsShape& shape, bool upward) noexcept;
-  void clear() noexcept;
+  int learn(const QrsShape& shape) noexcept;
 
  private:
-  static constexpr int kSizes = 8;
+  static constexpr double kTrusted = 3.5;
 
   struct Template {
-    QrsShape shape;                      // root mean square 1
-    std::array<double, kSizes> sizes{};  // root mean squares of the last beats, in turn
-    int beats = 0;
+    QrsShape shape;       // root mean square 1
     double weight = 0.0;  // beats, older ones fading; 0: free
-    double size = 0.0;    // median of `sizes`
-    bool upward = true;
   };
 
   [[nodiscard]] const Template& of(int i) const noexcept { return templates_[static_cast<std::size_t>(i)]; }

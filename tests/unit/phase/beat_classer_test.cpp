@@ -10,6 +10,7 @@
 #include "core/phase/cardiac_clock_tracker.hpp"
 #include "core/phase/r_trigger.hpp"
 #include "core/phase/rhythm_monitor.hpp"
+#include "core/phase/ventricular_evidence.hpp"
 
 namespace perimap {
 namespace {
@@ -114,6 +115,206 @@ TEST_F(Classed, DoubtfulStrangeShapeOutOfRhythmIsNoise) {
   settle();
   EXPECT_EQ(beat(450, 0.4, 0.2), BeatClass::kNoise);
   EXPECT_EQ(beat(360), BeatClass::kNormal);
+}
+
+// ---- what each limit is for
+
+// Beside the usual shape, as like it as the correlation says.
+QrsShape like_usual(double correlation, double gain = 1.0) {
+  const QrsShape usual = shape(1.0);
+  QrsShape other = shape(0.4);
+  const double along = match(other, usual).gain;
+  for (int i = 0; i < other.points; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    other.slope[k] -= static_cast<float>(along) * usual.slope[k];
+  }
+  const double across = std::sqrt(1.0 - correlation * correlation) * root_mean_square(usual) / root_mean_square(other);
+  QrsShape s = usual;
+  for (int i = 0; i < s.points; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    s.slope[k] = static_cast<float>(
+        gain * (correlation * static_cast<double>(usual.slope[k]) + across * static_cast<double>(other.slope[k])));
+  }
+  return s;
+}
+
+// Regular beats of 0.8 s.
+struct Steady : Classed {
+  BeatClass see(int after_ms, const QrsShape& of, double confidence = 0.9) {
+    t_ += milliseconds(after_ms);
+    RPeak peak{t_, t_ + milliseconds(95), confidence, milliseconds(1)};
+    peak.shape = of;
+    last_ = classer_.classify(peak);
+    return last_.beat_class;
+  }
+  void settle() {
+    for (int i = 0; i < 20; ++i) see(800, shape(1.0));
+  }
+};
+
+TEST_F(Steady, ABeatIsOfTheUsualShapeFromACorrelationOfNineTenthsOn) {
+  settle();
+  see(800, like_usual(0.93));
+  EXPECT_FALSE(last_.unusual_shape);
+  see(800, like_usual(0.86));
+  EXPECT_TRUE(last_.unusual_shape);
+}
+
+TEST_F(Steady, ABeatOfTheUsualShapeIsPrematureWhenItIsMuchTooEarly) {
+  settle();
+  EXPECT_EQ(see(670, shape(1.0)), BeatClass::kNormal) << "0.84 of the cycle";
+  settle();
+  EXPECT_EQ(see(610, shape(1.0)), BeatClass::kPremature) << "0.76";
+}
+
+TEST_F(Steady, AVentricularBeatIsEarlyBelowNineTenthsOfTheCycleAndElseOnlyOfAKnownKind) {
+  const QrsShape large = shape(0.4);
+  settle();
+  EXPECT_EQ(see(690, large), BeatClass::kPremature) << "0.86 of the cycle";
+  settle();
+  EXPECT_EQ(see(750, large), BeatClass::kNormal) << "0.94, and seen once before";
+  EXPECT_TRUE(last_.unusual_shape);
+}
+
+TEST_F(Steady, APauseIsOverOneAndAHalfCycles) {
+  settle();
+  EXPECT_EQ(see(1150, shape(1.0)), BeatClass::kNormal);
+  settle();
+  EXPECT_EQ(see(1250, shape(1.0)), BeatClass::kPause);
+}
+
+TEST_F(Steady, AfterFourCyclesBeatsWereMissed) {
+  settle();
+  EXPECT_EQ(see(3000, shape(1.0)), BeatClass::kPause);
+  settle();
+  EXPECT_EQ(see(3400, shape(1.0)), BeatClass::kNormal) << "the interval means nothing";
+}
+
+TEST_F(Steady, DoubtfulBeatsThatAreNotDueAreNoise) {
+  const auto noise = [&](const QrsShape& of, double confidence) {
+    settle();
+    const bool none = see(500, of, confidence) == BeatClass::kNoise;
+    settle();
+    return none;
+  };
+  EXPECT_TRUE(noise(like_usual(0.5), 0.27));
+  EXPECT_FALSE(noise(like_usual(0.5), 0.34));
+  EXPECT_TRUE(noise(shape(1.0), 0.13));
+  EXPECT_FALSE(noise(shape(1.0), 0.17));
+}
+
+TEST_F(Steady, ADoubtfulBeatIsNoneUnlessItIsDueAfterOneCycleOrTwo) {
+  const auto noise = [&](int after_ms) {
+    settle();
+    const bool none = see(after_ms, shape(1.0), 0.1) == BeatClass::kNoise;
+    settle();
+    return none;
+  };
+  EXPECT_FALSE(noise(900)) << "an eighth of a cycle late";
+  EXPECT_TRUE(noise(950)) << "a fifth";
+  EXPECT_FALSE(noise(1600));
+  EXPECT_TRUE(noise(2400));
+}
+
+TEST_F(Steady, AKindThatWasSeenThreeTimesMayComeOnTime) {
+  const QrsShape large = shape(0.4);
+  const auto on_time = [&](int seen) {
+    classer_ = BeatClasser();
+    settle();
+    for (int i = 0; i < seen; ++i) {
+      see(550, large);
+      for (int k = 0; k < 4; ++k) see(k == 0 ? 1050 : 800, shape(1.0));
+    }
+    return see(800, large);
+  };
+  EXPECT_EQ(on_time(2), BeatClass::kNormal);
+  EXPECT_EQ(on_time(3), BeatClass::kPremature);
+}
+
+TEST_F(Steady, BeatsThatNoiseHasBentAreNotVentricularOnTimeThoughTheyRecur) {
+  const auto on_time = [&](double correlation) {
+    classer_ = BeatClasser();
+    settle();
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_EQ(see(550, like_usual(correlation, 3.0)), BeatClass::kPremature);
+      for (int k = 0; k < 4; ++k) see(k == 0 ? 1050 : 800, shape(1.0));
+    }
+    return see(800, like_usual(correlation, 3.0));
+  };
+  EXPECT_EQ(on_time(0.83), BeatClass::kNormal);
+  EXPECT_EQ(on_time(0.77), BeatClass::kPremature);
+}
+
+TEST_F(Steady, ALongCycleTeachesTheRhythmByAThirdMoreAtMost) {
+  settle();
+  for (int i = 0; i < 5; ++i) see(1180, shape(1.0));
+  // The rhythm's cycle is 1.08 s now: three quarters of it are much too early, as they are not of 0.8 s.
+  EXPECT_EQ(see(1580, shape(1.0)), BeatClass::kNormal);
+  EXPECT_EQ(see(1700, shape(1.0)), BeatClass::kPause);
+}
+
+TEST_F(Steady, PeaksOfWideComplexesAreFoundUpToTwentyMillisecondsApart) {
+  const auto displaced = [](int steps) {
+    QrsShape s;
+    s.points = 29;
+    for (int i = 0; i < s.points; ++i) {
+      const double x = (i - 14.0 - steps) / 1.2;
+      s.slope[static_cast<std::size_t>(i)] = static_cast<float>(-x * std::exp(-0.5 * x * x));
+    }
+    return s;
+  };
+  for (int i = 0; i < 20; ++i) see(800, displaced(0));
+  see(800, displaced(4));
+  EXPECT_FALSE(last_.unusual_shape);
+  see(800, displaced(5));
+  EXPECT_TRUE(last_.unusual_shape);
+}
+
+// The gain of the amplifier is halved: what a usual beat covers follows in some beats.
+TEST_F(Steady, TheUsualAreaIsThatOfTheLastSixteenBeats) {
+  const auto early = [&](int beats_of_half, double gain) {
+    BeatClasser fresh;
+    classer_ = fresh;
+    for (int i = 0; i < 40; ++i) see(800, shape(1.0));
+    for (int i = 0; i < beats_of_half; ++i) see(800, like_usual(1.0, 0.25));
+    return see(650, like_usual(0.80, gain)) == BeatClass::kPremature;
+  };
+  EXPECT_FALSE(early(6, 0.15));
+  EXPECT_TRUE(early(9, 0.15));
+}
+
+TEST_F(Classed, InFibrillationNoBeatOfTheUsualShapeIsPrematureAndALargeEarlyOneIs) {
+  std::mt19937 generator(11);
+  std::uniform_int_distribution<int> interval(400, 1100);
+  for (int i = 0; i < 60; ++i) beat(interval(generator));
+  int premature = 0;
+  for (int i = 0; i < 60; ++i) premature += beat(interval(generator)) == BeatClass::kPremature ? 1 : 0;
+  EXPECT_EQ(premature, 0);
+  beat(750);
+  EXPECT_EQ(beat(400, 0.4), BeatClass::kPremature);
+  EXPECT_TRUE(last_.unusual_shape);
+}
+
+// Cycles of any length, at last of 0.8 s in the median.
+TEST_F(Steady, WhereBeatsComeAtAnyTimeItTakesMoreToBeVentricular) {
+  const QrsShape other = like_usual(0.80, 0.7);
+  const auto seen = [&](double odds) {
+    classer_ = BeatClasser();
+    std::mt19937 generator(11);
+    std::uniform_int_distribution<int> interval(400, 1200);
+    for (int i = 0; i < 60; ++i) see(interval(generator), shape(1.0));
+    for (const int rr_ms : {620, 1000, 800, 560, 1100, 900, 700, 800}) see(rr_ms, shape(1.0));
+    VentricularEvidence evidence;
+    evidence.log_area = std::log(area(other) / area(shape(1.0)));
+    evidence.strangeness = 0.2;
+    // So much earlier that the odds are what is asked for.
+    const double at_0_8_s = log_odds(evidence);
+    evidence.log_rr = 1.0;
+    const double by_interval = log_odds(evidence) - at_0_8_s;
+    return see(static_cast<int>(std::lround(800.0 * std::exp((odds - at_0_8_s) / by_interval))), other);
+  };
+  EXPECT_EQ(seen(0.85), BeatClass::kNormal);
+  EXPECT_EQ(seen(1.15), BeatClass::kPremature);
 }
 
 TEST_F(Classed, OnlyNormalCyclesTeach) {
