@@ -41,6 +41,7 @@ ecg            20 minutes   statistics --long ecg
 horizons       30 minutes   statistics --long horizons
 late            5 minutes   statistics --long late
 ventilated     20 minutes   statistics --long ventilated
+watched-setups  2 minutes   statistics_watched_setups: what the watch says of right and wrong set-ups
 update         10 minutes   update_bench: speed of the update
 seeing          5 minutes   vision_bench: speed and accuracy of the patch tracker
 latency        10 minutes   perimap bench
@@ -316,6 +317,11 @@ make_ecg() { of_statistics ecg; }
 make_horizons() { of_statistics horizons; }
 make_late() { of_statistics late; }
 make_ventilated() { of_statistics ventilated; }
+
+make_watched-setups() {
+  command='statistics_watched_setups 60'
+  "$build/tests/statistics/statistics_watched_setups" 60 | as_printed
+}
 
 make_update() {
   command='update_bench'
