@@ -318,7 +318,7 @@ make_horizons() { of_statistics horizons; }
 make_late() { of_statistics late; }
 make_ventilated() { of_statistics ventilated; }
 
-make_watched-setups() {
+make_watched_setups() {
   command='statistics_watched_setups 60'
   "$build/tests/statistics/statistics_watched_setups" 60 | as_printed
 }
