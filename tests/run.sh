@@ -149,21 +149,10 @@ run_tests() { # NAME PRESET CTEST_OPTION...
     awk '{ cases += $4 } END { if (cases) print cases " cases of unit tests passed in them" }'
 }
 
-# Each target starts from the seeds of its own name, where there are any, and adds what it finds to a corpus in build/.
 fuzz_smoke() {
-  local programs=build/fuzz/tests/fuzz corpus=build/fuzz/corpus target maker name ran=0
+  local programs=build/fuzz/tests/fuzz corpus=build/fuzz/corpus maker
   for maker in "$programs"/make_*_corpus; do step "$(basename "$maker")" 5m "$maker" "$corpus"; done
-  for target in "$programs"/fuzz_*; do
-    if ! [ -f "$target" ] || ! [ -x "$target" ]; then continue; fi
-    name=${target##*/fuzz_}
-    mkdir -p "$corpus/$name"
-    local folders=("$corpus/$name")
-    if [ -d "tests/fuzz/corpus/$name" ]; then folders+=("tests/fuzz/corpus/$name"); fi
-    step "${target##*/}" 3m "$target" -max_total_time=60 -timeout=10 -rss_limit_mb=2048 -artifact_prefix="$logs/" \
-      "${folders[@]}"
-    ran=$((ran + 1))
-  done
-  if [ $ran -eq 0 ]; then failures+=("fuzz targets: none found in $programs"); fi
+  step "fuzz targets, $jobs at once" 60m tests/fuzz/run_targets.sh "$jobs" "$programs" "$corpus" "$logs"
 }
 
 lint() {
