@@ -457,7 +457,7 @@ Expected<HandEyeCalibration> calibrate_hand_eye(std::vector<TimedPose> camera, s
   if (const auto adjusted = adjust(result, camera, tracker); !adjusted) return tl::unexpected(adjusted.error());
   if (result.offset_measured) {
     if (const auto refined = refine_offset(result, camera, tracker); !refined) return tl::unexpected(refined.error());
-    result.brisk_rad_per_s = brisk_speed(camera);
+    result.brisk_rad_per_s = brisk_speed(result.pairs, result.X_SC.R);
   }
   if (const auto certain = check_certainty(result, settings); !certain) return tl::unexpected(certain.error());
   judge(result);

@@ -36,7 +36,7 @@ struct HandEyeCalibration {
   bool offset_measured = false;  // false: there is no motion with times of its own to measure it by
   double offset_s = 0.0;         // added to the tracker's times to get the camera's
   double joint_offset_s = 0.0;   // what the adjustment together with the places would have it, all errors being noise
-  // RMS of the camera's angular speed less its mean over half a second: what tells time from errors that last.
+  // brisk_speed() of the pairs: what tells time from errors that last.
   double brisk_rad_per_s = 0.0;
   bool paired_by_rows = false;     // the times of the two files say nothing of which pose belongs to which
   double speed_correlation = 0.0;  // of the angular speeds, at

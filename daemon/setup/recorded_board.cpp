@@ -43,6 +43,14 @@ class ThinnedFrames {
       if (!message) return tl::unexpected(message.error());
       if (!*message) return std::nullopt;
       const double t_s = to_seconds((*message)->source_time.time_since_epoch());
+      // A frame that is stamped far ahead would make all that come after it be passed over.
+      constexpr double kMostBack_s = 1.0;
+      if (last_s_ && t_s < *last_s_ - kMostBack_s) {
+        return fail(fmt::format(
+            "{}: the frames' stamps go back by {:.1f} s: the camera's clock was set meanwhile; record again",
+            recording_, *last_s_ - t_s));
+      }
+      last_s_ = t_s;
       if (due_s_ && t_s < *due_s_) continue;
       due_s_ = std::max(t_s, due_s_.value_or(t_s)) + interval_s_ - 1e-3;
       if (const auto read = frame_.read(reader_, **message); !read) return tl::unexpected(read.error());
@@ -71,6 +79,7 @@ class ThinnedFrames {
   RecordedFrame frame_;
   double interval_s_;
   std::optional<double> due_s_;
+  std::optional<double> last_s_;
   double t_s_ = 0.0;
   int width_ = 0;
   int height_ = 0;
@@ -85,7 +94,7 @@ struct Looked {
 };
 
 Expected<Looked> look(const std::string& recording, double frames_per_s) {
-  constexpr std::size_t kEvery = 8;  // of the frames that will be looked at
+  std::size_t every = 8;  // of the frames that will be looked at
   constexpr std::size_t kMost = 64;
   auto frames = ThinnedFrames::open(recording, frames_per_s);
   if (!frames) return tl::unexpected(frames.error());
@@ -94,7 +103,14 @@ Expected<Looked> look(const std::string& recording, double frames_per_s) {
     const auto grey = frames->next();
     if (!grey) return tl::unexpected(grey.error());
     if (!*grey) break;
-    if (looked.frames % kEvery != 0 || looked.pixels.size() == kMost) continue;
+    if (looked.frames % every != 0) continue;
+    if (looked.pixels.size() == kMost) {
+      // Of a longer recording half as many, so that they are of all of it.
+      for (std::size_t i = 1; 2 * i < kMost; ++i) looked.pixels[i] = std::move(looked.pixels[2 * i]);
+      looked.pixels.resize(kMost / 2);
+      every *= 2;
+      if (looked.frames % every != 0) continue;
+    }
     std::vector<std::uint8_t> pixels;
     for (int y = 0; y < (*grey)->height; ++y) {
       const auto* row = (*grey)->data + y * (*grey)->stride;

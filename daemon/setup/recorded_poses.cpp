@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <string_view>
 
 #include "core/time/instant.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/recording_reader.hpp"
-#include "drivers/recording/sensor_messages.hpp"
+#include "drivers/recording/topic.hpp"
+#include "drivers/recording/tracker_samples.hpp"
 
 namespace perimap {
 namespace {
@@ -39,20 +39,13 @@ Expected<std::vector<TimedPose>> read_recorded_poses(const std::string& recordin
     return fail(fmt::format("{}: has no poses of '{}' (it has those of: {}); name the tool with --tool, or record it",
                             recording, tool, tools_of(*reader)));
   }
-  if (const auto selected = reader->select(std::array{std::string_view(channel)}); !selected) {
-    return tl::unexpected(selected.error());
-  }
+  const auto samples = read_tracker_samples(*reader, channel);
+  if (!samples) return tl::unexpected(samples.error());
   std::vector<TimedPose> poses;
-  for (;;) {
-    const auto message = reader->next();
-    if (!message) return tl::unexpected(message.error());
-    if (!*message) break;
-    const auto pose = reader->decode<perimap_TrackerPose>(**message);
-    if (!pose) return tl::unexpected(pose.error());
-    const auto sample = to_tracker_sample(**pose);
-    if (!sample) return reader->wrong(**message, sample.error().message);
-    if (sample->state != ToolState::kOk) continue;
-    poses.push_back({to_seconds(sample->source_time.time_since_epoch()), sample->X_WS});
+  for (const TrackerSample& sample : *samples) {
+    if (sample.state == ToolState::kOk) {
+      poses.push_back({to_seconds(sample.source_time.time_since_epoch()), sample.X_WS});
+    }
   }
   return in_order(std::move(poses));
 }

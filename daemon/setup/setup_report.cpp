@@ -265,10 +265,14 @@ std::string text_of(const LandmarkRegistration& result, const std::vector<Landma
   std::string text = fmt::format("Registration X_IW by {} landmarks\n", landmarks.size());
   text += fmt::format("  translation    {} mm\n  rotation       {:.6f} (w x y z)\n", three(result.X_IW.t, 2),
                       fmt::join(q.wxyz, " "));
-  text += fmt::format("  deviations     {} mm at the landmarks' middle, {} degrees\n", three(deviation.tail<3>(), 2),
-                      three(deviation.head<3>() / kDegree, 2));
-  text += fmt::format("  FRE            {:.2f} mm; one landmark's error by it (FLE) {:.2f} mm\n", result.fre_mm,
-                      result.fle_mm);
+  if (result.fle_mm > 0.0) {
+    text += fmt::format("  deviations     {} mm at the landmarks' middle, {} degrees\n", three(deviation.tail<3>(), 2),
+                        three(deviation.head<3>() / kDegree, 2));
+    text += fmt::format("  FRE            {:.2f} mm; one landmark's error by it (FLE) {:.2f} mm\n", result.fre_mm,
+                        result.fle_mm);
+  } else {
+    text += fmt::format("  deviations     not known\n  FRE            {:.2f} mm\n", result.fre_mm);
+  }
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     text += fmt::format("    {:<14} {:.2f} mm", landmarks[i].name, result.residuals_mm[i]);
     if (!result.held_aside_mm.empty()) text += fmt::format("; by the others {:.2f} mm", result.held_aside_mm[i]);
@@ -303,6 +307,11 @@ nlohmann::json json_of(const LandmarkRegistration& result, const std::vector<Lan
     nlohmann::json one = {{"name", landmarks[i].name}, {"residual_mm", result.residuals_mm[i]}};
     if (!result.held_aside_mm.empty()) one["held_aside_mm"] = result.held_aside_mm[i];
     json["landmarks"].push_back(one);
+  }
+  if (!(result.fle_mm > 0.0)) {
+    for (const char* key : {"rotation_wxyz_deviation", "translation_mm_deviation", "fle_mm", "covariance"}) {
+      json[key] = nullptr;  // three landmarks tell no error
+    }
   }
   json["targets"] = nlohmann::json::array();
   for (const TargetError& target : targets) {

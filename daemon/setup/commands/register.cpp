@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/calibration/dwells.hpp"
+#include "core/calibration/touched_landmarks.hpp"
 #include "daemon/command_line/commands.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
@@ -48,7 +49,12 @@ Expected<std::vector<NamedPoint>> touched_in_recording(const RegisterOptions& op
   std::vector<TimedPoint> points;
   for (const TimedPose& pose : *poses) points.push_back({pose.t_s, pose.X * tip->tip_T});
   const std::vector<Dwell> touches = find_dwells(points, options.touch_s, options.touch_radius_mm);
-  if (touches.size() != model.size()) {
+  std::vector<Vector3d> landmarks_I;
+  for (const NamedPoint& point : model) landmarks_I.push_back(point.p);
+  std::vector<Vector3d> places_W;
+  for (const Dwell& touch : touches) places_W.push_back(touch.p);
+  const auto chosen = touched_landmarks(landmarks_I, places_W);
+  if (!chosen) {
     std::string when;
     for (const Dwell& touch : touches) {
       when += fmt::format("{}{:.1f}", when.empty() ? " at " : ", ", touch.begin_s - points.front().t_s);
@@ -59,7 +65,7 @@ Expected<std::vector<NamedPoint>> touched_in_recording(const RegisterOptions& op
                     options.recording, touches.size(), options.touch_s, when, options.model, model.size()));
   }
   std::vector<NamedPoint> touched;
-  for (std::size_t i = 0; i < model.size(); ++i) touched.push_back({model[i].name, touches[i].p});
+  for (std::size_t i = 0; i < model.size(); ++i) touched.push_back({model[i].name, places_W[chosen->at(i)]});
   return touched;
 }
 
@@ -89,6 +95,9 @@ Expected<Measurement> measure(const RegisterOptions& options) {
   if (!landmarks) return tl::unexpected(landmarks.error());
   const auto result = register_landmarks(*landmarks, options.tolerance_mm);
   if (!result) return tl::unexpected(result.error());
+  if (!options.targets.empty() && landmarks->size() < 4) {
+    return fail("--target: three landmarks fit almost anyhow, and tell no error; touch four of them and more");
+  }
   std::vector<TargetError> targets;
   const double mm = options.common.length_unit() == LengthUnit::kMetre ? 1000.0 : 1.0;
   for (const std::vector<double>& target : options.targets) {

@@ -6,7 +6,8 @@
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/recording_reader.hpp"
 #include "drivers/recording/replay_reader.hpp"
-#include "drivers/recording/sensor_messages.hpp"
+#include "drivers/recording/topic.hpp"
+#include "drivers/recording/tracker_samples.hpp"
 
 namespace perimap {
 
@@ -48,18 +49,11 @@ Expected<void> PlayedSession::read_tools(const std::string& path) {
   }
   for (auto& [name, samples] : tools_) {
     const std::string channel = std::string(channels::kTrackedTools) + name;
-    const std::string_view wanted[] = {channel};
-    if (auto selected = reader->select(wanted); !selected) return selected;
-    for (;;) {
-      const auto message = reader->next();
-      if (!message) return tl::unexpected(message.error());
-      if (!*message) break;
-      const auto pose = reader->decode<perimap_TrackerPose>(**message);
-      if (!pose) return tl::unexpected(pose.error());
-      const auto sample = to_tracker_sample(**pose);
-      if (!sample) return reader->wrong(**message, sample.error().message);
+    auto recorded = read_tracker_samples(*reader, channel);
+    if (!recorded) return tl::unexpected(std::move(recorded.error()));
+    for (const TrackerSample& sample : *recorded) {
       // A track is in order of time.
-      if (samples.empty() || sample->source_time > samples.back().source_time) samples.push_back(*sample);
+      if (samples.empty() || sample.source_time > samples.back().source_time) samples.push_back(sample);
     }
   }
   std::erase_if(tools_, [](const auto& tool) { return tool.second.empty(); });

@@ -7,12 +7,14 @@
 #include <random>
 
 #include "core/angle/angle.hpp"
+#include "core/calibration/brisk_speed.hpp"
 #include "core/calibration/hand_eye_closed_form.hpp"
 #include "core/calibration/landmark_registration.hpp"
 #include "core/calibration/pivot.hpp"
 #include "core/calibration/residual_correlation.hpp"
 #include "core/calibration/rotation_spread.hpp"
 #include "core/calibration/time_correlation.hpp"
+#include "core/calibration/touched_landmarks.hpp"
 #include "core/calibration/tracker_noise.hpp"
 
 namespace perimap {
@@ -320,6 +322,55 @@ TEST(TrackerNoise, RefusesASensorThatMovesAndOneThatRepeatsItself) {
   EXPECT_THAT(measure_tracker_noise(moving).error().message, HasSubstr("still for"));
   for (TimedPose& pose : poses) pose.X = poses.front().X;
   EXPECT_THAT(measure_tracker_noise(poses).error().message, HasSubstr("same to the last bit"));
+}
+
+// ---- how briskly a scope was moved
+
+TEST(BriskSpeed, IsOfWhatCameraAndTrackerShareAndNotOfTheNoiseOfEither) {
+  const Pose X_SC{so3_exp({0.4, -0.3, 1.9}), {3.0, 5.0, 60.0}};
+  const auto told = [&](double brisk_rad) {
+    Draw draw(5);
+    std::vector<PosePair> pairs;
+    for (int i = 0; i < 600; ++i) {
+      const double t = i / 15.0;
+      const Pose X_BC{so3_exp(0.4 * Vector3d(std::sin(0.6 * t), std::sin(0.5 * t + 1.0), std::sin(0.4 * t))) *
+                          so3_exp(brisk_rad * Vector3d(std::sin(12.0 * t), std::cos(10.0 * t), 0.0)),
+                      Vector3d::Zero()};
+      Pose X_WS = X_BC * X_SC.inverse();
+      PosePair pair{t, X_WS, X_BC, Vector6d::Zero()};
+      pair.X_BC.R = pair.X_BC.R * so3_exp(draw.vector(1.0 * kDegree));
+      pair.X_WS.R = pair.X_WS.R * so3_exp(draw.vector(0.3 * kDegree));
+      pairs.push_back(pair);
+    }
+    return brisk_speed(pairs, X_SC.R);
+  };
+  EXPECT_LT(told(0.0), 0.1);
+  // What speeds over 0.13 s, less their mean over half a second, leave of 12 and 10 rad/s: 0.855 and 0.705.
+  const double left = 0.06 * std::sqrt(0.5 * (std::pow(0.855 * 12.0, 2.0) + std::pow(0.705 * 10.0, 2.0)));
+  EXPECT_NEAR(told(0.06), left, 0.15 * left);
+}
+
+// ---- which of the touches are the landmarks
+
+TEST(TouchedLandmarks, AreFoundAmongWhatElseThePointerWasHeldStillAt) {
+  Draw draw(8);
+  const std::vector<Vector3d> landmarks{{90, 0, 25}, {45, 60, -25}, {-45, 60, 25}, {-90, 0, -25}, {-40, -70, 20}};
+  const Pose X_WI{draw.rotation(), {100.0, 50.0, -900.0}};
+  std::vector<Vector3d> places{{0.0, 0.0, 0.0}};  // on the table
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    places.push_back(X_WI * landmarks[i] + draw.vector(0.5));
+    if (i == 2) places.push_back(X_WI * Vector3d(0.0, 30.0, 60.0));  // a rest in between
+  }
+  places.emplace_back(0.0, 10.0, 0.0);
+  const auto chosen = touched_landmarks(landmarks, places);
+  ASSERT_TRUE(chosen);
+  EXPECT_EQ(*chosen, (std::vector<std::size_t>{1, 2, 3, 5, 6}));
+  places.resize(4);
+  EXPECT_FALSE(touched_landmarks(landmarks, places)) << "one is missing";
+  const std::vector<Vector3d> three(landmarks.begin(), landmarks.begin() + 3);
+  EXPECT_FALSE(touched_landmarks(three, places)) << "three of four places fit anyhow";
+  places.resize(3);
+  EXPECT_EQ(*touched_landmarks(three, places), (std::vector<std::size_t>{0, 1, 2}));
 }
 
 }  // namespace
