@@ -9,9 +9,12 @@ namespace {
 
 constexpr double kNever = -std::numeric_limits<double>::infinity();  // log odds
 
-}  // namespace
+// Whatever its size: where that is another, the gain has changed.
+bool has_a_beats_shape(const QrsCandidate& candidate, const QrsClusters& clusters, double correlation) noexcept {
+  return clusters.nearest_beat(candidate.shape).correlation > correlation;
+}
 
-// ---- levels
+}  // namespace
 
 void BeatLevels::learn(const QrsCandidate& beat) noexcept {
   energy_.push(beat.energy);
@@ -45,8 +48,6 @@ double BeatLevels::size(const QrsCandidate& candidate) const noexcept {
   if (!known()) return 1.0;
   return std::sqrt(candidate.energy / energy() * candidate.sharpness / sharpness());
 }
-
-// ---- decision
 
 void BeatDecision::forget() noexcept {
   clusters_.clear();
@@ -109,8 +110,7 @@ bool BeatDecision::overdue(Instant now) const noexcept {
 }
 
 void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex, Instant now) noexcept {
-  if (candidate.shape.points == 0) return;
-  if (has_last_ && candidate.time - last_.time < one_complex) return;
+  if (candidate.shape.points == 0 || (has_last_ && candidate.time - last_.time < one_complex)) return;
   // Of two that are one complex the larger is its middle; the first, which was found by its shape, if they are alike.
   for (int i = 0; i < count_; ++i) {
     const QrsCandidate& other = waiting_[static_cast<std::size_t>(i)].candidate;
@@ -145,7 +145,10 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
   waiting.log_odds = by_itself(waiting);
   clusters_.judged(learnt, waiting.log_odds);
   if (learnt >= 0) note_crowding(waiting);
-  if (beats_.known() && candidate.energy > settings_.too_large * beats_.energy()) note_disturbance(candidate.time, 1.0);
+  const bool too_large = beats_.known() && candidate.energy > settings_.too_large * beats_.energy();
+  if (too_large && !has_a_beats_shape(candidate, clusters_, settings_.very_familiar)) {
+    note_disturbance(candidate.time, 1.0);
+  }
   int at = count_;
   while (at > 0 && waiting_[static_cast<std::size_t>(at - 1)].candidate.time > candidate.time) {
     waiting_[static_cast<std::size_t>(at)] = waiting_[static_cast<std::size_t>(at - 1)];
@@ -237,7 +240,9 @@ bool BeatDecision::unlike_any_beat(const QrsCandidate& candidate) const noexcept
 }
 
 bool BeatDecision::strange(const Waiting& waiting) const noexcept {
-  return beats_.known() && (waiting.correlation < settings_.familiar || unlike_any_beat(waiting.candidate)) &&
+  const bool another = waiting.correlation < settings_.familiar &&
+                       !has_a_beats_shape(waiting.candidate, clusters_, settings_.very_familiar);
+  return beats_.known() && (another || unlike_any_beat(waiting.candidate)) &&
          beats_.size(waiting.candidate) > settings_.size_of_disturbance;
 }
 
@@ -374,16 +379,10 @@ void BeatDecision::accept(int index, Instant now) noexcept {
   BeatPath before;
   before.weigh(
       index, [&](int b, int c) { return odds(b, c); }, [&](int last) { return std::exp(odds(last, index)); });
-  std::array<bool, BeatPath::kMost> taken{};
-  std::array<double, BeatPath::kMost> probability{};
-  for (int i = 0; i < index; ++i) {
-    probability[static_cast<std::size_t>(i)] = before.probability(i);
-    taken[static_cast<std::size_t>(i)] = before.probability(i) > settings_.more_likely;
-  }
   for (int i = 0; i < index; ++i) {
     Waiting& waiting = waiting_[static_cast<std::size_t>(i)];
-    if (taken[static_cast<std::size_t>(i)]) {
-      waiting.probability = probability[static_cast<std::size_t>(i)];
+    if (before.probability(i) > settings_.more_likely) {
+      waiting.probability = before.probability(i);
       tell(waiting, now);
     } else {
       refuse(waiting);

@@ -182,8 +182,9 @@ TEST(BeatDecision, WhatIsSoNearABeatIsOfIt) {
     Known patient;
     patient.beats(1);
     patient.run(patient.last_s + 0.2);
-    patient.decision.consider(patient.complex(patient.last_s + after_s, [](QrsCandidate& c) { c.energy *= 5.0; }),
-                              CandidateSettings{}.one_complex, at(patient.now_s));
+    patient.decision.consider(
+        patient.complex(patient.last_s + after_s, [](QrsCandidate& c) { c.energy *= 5.0, c.shape = kWide; }),
+        CandidateSettings{}.one_complex, at(patient.now_s));
     return patient.decision.noisy(at(patient.now_s));
   };
   EXPECT_FALSE(noisy(0.052));

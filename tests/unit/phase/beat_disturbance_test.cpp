@@ -32,13 +32,15 @@ TEST(BeatDecision, WhatIsOfABeatsSizeAndLikeNothingIsADisturbance) {
 }
 
 TEST(BeatDecision, WhatIsFarLargerThanBeatsIsOneAtOnce) {
-  const auto noisy = [](double energy) {
+  const auto noisy = [](double energy, double correlation) {
     Known patient;
-    patient.see(patient.last_s + 0.8, [&](QrsCandidate& c) { c.energy *= energy; });
+    patient.see(patient.last_s + 0.8, [&](QrsCandidate& c) { c.shape = like_beat(correlation), c.energy *= energy; });
     return patient.decision.noisy(at(patient.now_s));
   };
-  EXPECT_FALSE(noisy(3.5));
-  EXPECT_TRUE(noisy(4.6));
+  EXPECT_FALSE(noisy(3.5, 0.8));
+  EXPECT_TRUE(noisy(4.6, 0.8));
+  EXPECT_TRUE(noisy(4.6, 0.86));
+  EXPECT_FALSE(noisy(4.6, 0.95)) << "the gain has risen";
 }
 
 TEST(BeatDecision, ADisturbanceIsRememberedForTwoSeconds) {
