@@ -124,7 +124,7 @@ TEST_F(EcgLevelsTest, TheTopFollowsSmallerBeatsWhenThreeWindowsHoldNoOthers) {
   const double usual = levels.top_energy();
   hear(4.4, [&](double t) { return beats_mV(t, 0.1); });
   EXPECT_NEAR(levels.top_energy(), usual, 0.02 * usual);
-  hear(1.8, [&](double t) { return beats_mV(t, 0.1); });
+  hear(1.2, [&](double t) { return beats_mV(t, 0.1); });
   EXPECT_NEAR(levels.top_energy(), 0.1 * usual, 0.01 * usual);
 }
 
