@@ -10,9 +10,10 @@
 namespace perimap {
 namespace {
 
-// In units of the spacing. In a lattice no place is further than 0.6 from a point of it.
+// In units of the spacing. Beyond the last features the organ may turn away, and nothing tells. In a lattice no place
+// is further than 0.6 from a point of it.
 constexpr double kReach = 1.5;
-constexpr double kEdge = 1.0;
+constexpr double kEdge = 0.25;
 
 double third_nearest(std::span<const Vector2d> places, const Vector2d& s) {
   std::array<double, 4> nearest;  // itself too
@@ -45,7 +46,7 @@ EvidenceSupport::EvidenceSupport(std::vector<Vector2d> places) : places_(std::mo
   std::nth_element(distances.begin(), middle, distances.end());
   spacing_mm_ = *middle;
   reach_mm_ = std::clamp(kReach * spacing_mm_, 8.0, 20.0);
-  edge_mm_ = std::clamp(kEdge * spacing_mm_, 5.0, 12.0);
+  edge_mm_ = std::clamp(kEdge * spacing_mm_, 1.0, 3.0);
 }
 
 Support EvidenceSupport::at(const Vector2d& s) const {

@@ -13,7 +13,7 @@ constexpr double kLengthSpread = 0.7;  // of the logarithm
 constexpr double kScaleSpread = 1.5;   // of the logarithm
 
 constexpr double kShortest_mm = 4.0;
-constexpr double kLongest_mm = 400.0;
+constexpr double kLongest_mm = 60.0;
 constexpr double kLeastNoise = 1e-8;
 constexpr double kMostNoise = 10.0;
 

@@ -61,6 +61,7 @@ std::string to_text(const ReplayReport& report) {
     if (report.streams.size() > 1) text += fmt::format("stream {}\n", name_of(s.stream));
     text += to_text(*s.accuracy) + "\n";
   }
+  if (report.surface) text += to_text(*report.surface) + "\n";
   if (!report.has_truth) {
     text += fmt::format("no ground truth in this recording: {} features converged\n", report.features_converged);
   }
@@ -75,6 +76,7 @@ nlohmann::json to_json(const ReplayReport& report) {
     // The first stream's in its old place, for who knows of no other.
     (&s == &report.streams.front() ? json : told)["accuracy"] = to_json(*s.accuracy);
   }
+  if (report.surface) json["surface"] = to_json(*report.surface);
   json["breath_s"] = to_seconds(report.breathing.period());
   json["breath_suspected"] = report.breathing.suspected;
   json["breath_state"] = name_of(to_wire(report.breathing.state));

@@ -12,6 +12,7 @@
 #include "core/pipeline/release_stream.hpp"
 #include "core/realtime/latency_histogram.hpp"
 #include "daemon/evaluation/report/accuracy.hpp"
+#include "daemon/evaluation/surface/surface_figures.hpp"
 
 namespace perimap {
 
@@ -35,6 +36,7 @@ struct ReplayReport {
   std::uint64_t frames = 0, frames_without_pose = 0, features_converged = 0;
   std::vector<Stream> streams;  // at least one
   std::vector<Stage> stages;
+  std::optional<SurfaceFigures> surface;  // in lockstep, where there is a truth
   RespiratoryClock breathing;
   nlohmann::json counts;  // of the first stream's status, and of the sources
 };

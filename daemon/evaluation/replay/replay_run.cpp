@@ -1,6 +1,7 @@
 #include "daemon/evaluation/replay/replay_run.hpp"
 
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "daemon/evaluation/replay/replay_publication.hpp"
 #include "daemon/evaluation/report/recorded_beats.hpp"
 #include "daemon/evaluation/report/recorded_truth.hpp"
+#include "daemon/evaluation/surface/surface_watch.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/publishing/dds_publication.hpp"
 #include "daemon/publishing/publication_recorder.hpp"
@@ -60,8 +62,10 @@ nlohmann::json counts(const perimap_Status& status, const PipelineCounters& c) {
 using FrameProgress = std::function<void(std::uint64_t frames)>;
 
 // In virtual time. Whether a signal stopped it; what of the recording was not whole goes to `damage`.
+// `surface`: none without a truth.
 Expected<bool> run_lockstep(Pipeline& pipeline, ReplaySetup& setup, Publication& publication, StopSignal& stop,
-                            const FrameProgress& progress, std::vector<Error>& damage) {
+                            const FrameProgress& progress, std::vector<Error>& damage,
+                            std::optional<SurfaceWatch>& surface) {
   LockstepRuntime runtime(pipeline, setup.identity, setup.utc_minus_monotonic, publication);
   std::uint64_t shown = 0;
   for (;;) {
@@ -72,6 +76,7 @@ Expected<bool> run_lockstep(Pipeline& pipeline, ReplaySetup& setup, Publication&
     const std::uint64_t frames = pipeline.counters().frames.get();
     if (frames == shown) continue;
     shown = frames;
+    if (surface) surface->after_frame();
     progress(frames);
     if (stop.requested()) return true;
   }
@@ -145,8 +150,11 @@ tl::expected<ReplayReport, SetupError> run_replay(
   const std::uint64_t all = *truth ? (*truth)->captures.size() : 0;
   const FrameProgress frames_done = [&progress, all](std::uint64_t frames) { progress(frames, all); };
   std::vector<Error> damage = std::move(setup->passed_over);
-  const auto stopped = options.lockstep ? run_lockstep(pipeline, *setup, publication, stop, frames_done, damage)
-                                        : run_live(pipeline, *setup, publication, stop, frames_done);
+  std::optional<SurfaceWatch> surface;
+  if (*truth && options.lockstep) surface.emplace(pipeline, **truth);
+  const auto stopped = options.lockstep
+                           ? run_lockstep(pipeline, *setup, publication, stop, frames_done, damage, surface)
+                           : run_live(pipeline, *setup, publication, stop, frames_done);
   if (!stopped) return failed(stopped.error());
   if (recorder) {
     if (const auto finished = recorder->finish(); !finished) return failed(finished.error());
@@ -155,6 +163,7 @@ tl::expected<ReplayReport, SetupError> run_replay(
   report.stopped = *stopped;
   report.has_truth = truth->has_value();
   report.damage = std::move(damage);
+  if (surface) report.surface = surface->figures();
   return report;
 }
 

@@ -1,0 +1,186 @@
+#include "daemon/evaluation/surface/surface_watch.hpp"
+
+#include <Eigen/Cholesky>
+#include <chrono>
+#include <cmath>
+
+#include "core/phase/cardiac_clock.hpp"
+#include "core/phase/respiratory_clock.hpp"
+#include "core/pipeline/feature_stages.hpp"
+#include "core/pipeline/map_feed.hpp"
+#include "core/pipeline/phase_basis.hpp"
+#include "core/pipeline/phase_spread.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/shard_snapshot.hpp"
+#include "daemon/evaluation/surface/surface_baselines.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr Duration kScoredEvery = std::chrono::seconds(1);
+// Kernels change slowly.
+constexpr std::uint64_t kFitsAKernel = 4;
+
+Vector3d mean_of(const SurfaceEvidence& evidence, int n) { return {evidence.x(0), evidence.x(n), evidence.x(2 * n)}; }
+
+}  // namespace
+
+struct SurfaceWatch::Scene {
+  std::vector<Vector2d> places;  // of the seen points, in the chart
+  PredictedPlaces predicted;
+  std::vector<Vector2d> features;  // in the chart
+  Eigen::VectorXd depths;
+  Eigen::MatrixXd barycentric;  // N x V
+  Eigen::MatrixXd thin_plate;
+
+  // Of place v at a basis, from the features' motions at it (3 x N), mm, W.
+  [[nodiscard]] Vector3d interpolated(const SurfaceChart& chart, const Eigen::MatrixXd& W, Eigen::Index v,
+                                      const Eigen::Matrix3Xd& motions) const {
+    const auto weights = W.col(v);
+    return chart.point_at(places[static_cast<std::size_t>(v)], depths.dot(weights)) + motions * weights;
+  }
+};
+
+SurfaceWatch::SurfaceWatch(Pipeline& pipeline, const RecordedTruth& truth)
+    : pipeline_(pipeline),
+      truth_(truth.truth),
+      seen_(truth.truth, truth.camera),
+      first_frame_(truth.captures.begin()->second) {}
+
+void SurfaceWatch::take_feed() {
+  MapFeed& feed = pipeline_.map_feed();
+  const MapFeed::Batch* batch = feed.front();
+  if (batch == nullptr) return;
+  if (batch->maps_forgotten != maps_forgotten_) known_.clear();
+  maps_forgotten_ = batch->maps_forgotten;
+  const BasisLayout& layout = pipeline_.settings().estimator.layout;
+  for (const MapFeed::Entry& entry : batch->entries) {
+    known_.erase(entry.slot);
+    if (!entry.mapped || !entry.feature.converged) continue;
+    Known known{surface_evidence(entry.feature.id, layout, entry.feature.estimate), entry.feature.last_observed};
+    if (is_usable(known.evidence, layout)) known_.emplace(entry.slot, std::move(known));
+  }
+  feed.give_back();
+}
+
+void SurfaceWatch::after_frame() {
+  take_feed();
+  const auto capture = from_ns(static_cast<std::int64_t>(pipeline_.counters().last_frame_ns.get()));
+  const CameraPlace& camera = pipeline_.model_snapshots().front()->camera;
+  if (camera.known) {
+    camera_sum_W_ += camera.X_WC.t;
+    ++cameras_;
+  }
+  if (last_scored_ && capture - *last_scored_ < kScoredEvery) return;
+  last_scored_ = capture;
+  seen_.look(capture);
+  fit(capture);
+  score(capture);
+}
+
+void SurfaceWatch::fit(Instant capture) {
+  evidence_.clear();
+  for (const auto& [slot, known] : known_) {
+    if (capture - known.last_observed <= kBelievedUnseen) evidence_.push_back(known.evidence);
+  }
+  surface_.reset();
+  if (cameras_ == 0) return;
+  const Vector3d camera_W = camera_sum_W_ / static_cast<double>(cameras_);
+  const bool learn = fits_ % kFitsAKernel == 0;
+  auto surface = PeriodicSurface::fit(pipeline_.settings().estimator.layout, evidence_, camera_W, {},
+                                      learn ? std::nullopt : std::optional(kernels_), kernels_);
+  if (!surface) {
+    refusal_ = surface.error().message;
+    return;
+  }
+  ++fits_;
+  kernels_ = surface->kernels();
+  surface_.emplace(*std::move(surface));
+}
+
+void SurfaceWatch::score(Instant capture) {
+  tally_.begin_instant(to_seconds(capture - first_frame_));
+  Scene scene;
+  if (surface_) {
+    const SurfaceChart& chart = surface_->chart();
+    for (const std::size_t point : seen_.seen()) scene.places.push_back(chart.place_of(seen_.mean_place(point)).s);
+    scene.predicted = surface_->predict(scene.places);
+    const std::vector<bool> front = seen_.in_front_of(chart.X_WA.t);
+    for (std::size_t i = 0; i < front.size(); ++i) {
+      if (!front[i]) scene.predicted.support[i] = Support::kOutsideChart;
+    }
+    const int n = surface_->layout().size();
+    scene.depths.resize(static_cast<Eigen::Index>(evidence_.size()));
+    for (std::size_t i = 0; i < evidence_.size(); ++i) {
+      const SurfaceChart::Place place = chart.place_of(mean_of(evidence_[i], n));
+      scene.features.push_back(place.s);
+      scene.depths(static_cast<Eigen::Index>(i)) = place.depth_mm;
+    }
+    scene.barycentric = barycentric_weights(scene.features, scene.places);
+    scene.thin_plate = thin_plate_weights(scene.features, scene.places);
+    for (std::size_t h = 0; h < kSurfaceHorizons_ms.size(); ++h) {
+      const PipelineSettings& settings = pipeline_.settings();
+      score_instant(scene, h,
+                    capture + settings.latency + settings.lead + std::chrono::milliseconds(kSurfaceHorizons_ms[h]));
+    }
+  }
+  for (std::size_t i = 0; i < seen_.seen().size(); ++i) {
+    tally_.add_seen(surface_ && scene.predicted.support[i] == Support::kSupported);
+  }
+  tally_.end_instant();
+}
+
+void SurfaceWatch::score_instant(const Scene& scene, std::size_t horizon, Instant valid) {
+  // As a surface that is released then has it.
+  const PipelineSettings& settings = pipeline_.settings();
+  const Instant now = valid - settings.lead - std::chrono::milliseconds(kSurfaceHorizons_ms[horizon]);
+  const PhaseEstimate phase = pipeline_.status_clock(now).at(valid);
+  if (!usable(phase.state)) return;
+  const RespiratoryPhase respiration = pipeline_.status_respiration().at(valid);
+  const BasisLayout& layout = surface_->layout();
+  const Basis b = basis_at(layout, phase.phase_rad, respiration);
+  const BasesAbout about = bases_about(layout, phase, respiration);
+  const double breath_mm2 = respiration.deviation_mm * respiration.deviation_mm;
+
+  Basis motion_b = b;
+  motion_b(0) = 0.0;
+  Eigen::Matrix3Xd motions(3, static_cast<Eigen::Index>(evidence_.size()));
+  for (std::size_t i = 0; i < evidence_.size(); ++i) {
+    motions.col(static_cast<Eigen::Index>(i)) = position_of(evidence_[i].x, motion_b);
+  }
+  std::vector<Vector3d> vertices(truth_.mesh().vertex_count);
+  truth_.vertices_at(valid, vertices);
+  for (std::size_t i = 0; i < scene.places.size(); ++i) {
+    if (scene.predicted.support[i] != Support::kSupported) continue;
+    const auto v = static_cast<Eigen::Index>(i);
+    const std::size_t point = seen_.seen()[i];
+    const auto c = scene.predicted.coefficients_W_mm.middleRows<3>(3 * v);
+    const Vector3d p = c * b;
+    const Vector3d truth = seen_.position(point, vertices);
+    const auto six = scene.predicted.covariances_W_mm2.col(v);
+    Matrix3d covariance;
+    covariance << six(0), six(1), six(2), six(1), six(3), six(4), six(2), six(4), six(5);
+    covariance += phase_spread(p, c * about.earlier, c * about.later) + breath_mm2 * Matrix3d::Identity();
+    const Vector3d e = p - truth;
+    const bool on_rim = seen_.on_rim(point);
+    tally_.add(horizon, {point, on_rim, e.norm(), e.dot(covariance.ldlt().solve(e)) / 3.0});
+    if (horizon != 0 || on_rim || scene.barycentric.col(v).isZero()) continue;
+    const SurfaceChart& chart = surface_->chart();
+    tally_.add_compared(e.norm(), (scene.interpolated(chart, scene.barycentric, v, motions) - truth).norm(),
+                        (scene.interpolated(chart, scene.thin_plate, v, motions) - truth).norm());
+  }
+}
+
+SurfaceFigures SurfaceWatch::figures() const {
+  SurfaceFigures figures = tally_.figures();
+  figures.refusal = refusal_;
+  if (!surface_) return figures;
+  figures.agreement_rms_mm = surface_->agreement().rms_mm;
+  figures.agreement_nees = surface_->agreement().nees;
+  figures.features = surface_->features();
+  figures.contradicted = surface_->contradicted().size();
+  return figures;
+}
+
+}  // namespace perimap
