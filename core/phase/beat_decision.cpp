@@ -161,10 +161,12 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
 
 // A complex as sharp as others before it, within a PR interval: those may be P waves.
 void BeatDecision::note_followers(const QrsCandidate& candidate, int cluster) noexcept {
+  Duration longest = settings_.pr_longest;
+  if (rhythm_.cycle_s > 0.0) longest = std::min(longest, from_seconds(settings_.pr_of_cycle * rhythm_.cycle_s));
   for (Seen& seen : seen_) {
     if (!seen.waits) continue;
     const Duration apart = candidate.time - seen.time;
-    if (apart < settings_.pr_shortest || apart > settings_.pr_longest) continue;
+    if (apart < settings_.pr_shortest || apart > longest) continue;
     const double sharper = seen.cluster == cluster ? settings_.sharper_of_one_kind : settings_.as_sharp;
     if (candidate.sharpness < sharper * seen.sharpness) continue;
     clusters_.followed(seen.cluster, true);
@@ -180,9 +182,11 @@ void BeatDecision::note_crowding(const Waiting& waiting) noexcept {
   newest.log_odds = waiting.log_odds;
   // Before any kind is settled a P wave looks like a QRS complex as well.
   if (waiting.log_odds < settings_.qrs_like || !clusters_.any_settled()) return;
+  Duration longest = settings_.crowd_to;
+  if (rhythm_.cycle_s > 0.0) longest = std::min(longest, from_seconds(settings_.crowd_of_cycle * rhythm_.cycle_s));
   for (const Seen& seen : seen_) {
     const Duration apart = newest.time - seen.time;
-    if (seen.log_odds < settings_.qrs_like || apart < settings_.crowd_from || apart > settings_.crowd_to) continue;
+    if (seen.log_odds < settings_.qrs_like || apart < settings_.crowd_from || apart > longest) continue;
     note_disturbance(newest.time, 0.7);
     return;
   }
@@ -242,7 +246,9 @@ bool BeatDecision::unlike_any_beat(const QrsCandidate& candidate) const noexcept
 bool BeatDecision::strange(const Waiting& waiting) const noexcept {
   const bool another = waiting.correlation < settings_.familiar &&
                        !has_a_beats_shape(waiting.candidate, clusters_, settings_.very_familiar);
-  return beats_.known() && (another || unlike_any_beat(waiting.candidate)) &&
+  // A wave of a kind that is known, as T waves are, is none, whatever the line about it does.
+  const bool a_wave = !another && clusters_.settled(waiting.cluster) && clusters_.log_odds(waiting.cluster) < 0.0;
+  return beats_.known() && (another || (unlike_any_beat(waiting.candidate) && !a_wave)) &&
          beats_.size(waiting.candidate) > settings_.size_of_disturbance;
 }
 

@@ -6,15 +6,16 @@
 namespace perimap {
 namespace {
 
-constexpr double kTwice = 0.7;      // log 2: the beats of one patient differ by so much
-constexpr double kThird = 1.1;      // log 3
-constexpr double kMostLog = 3.0;    // a factor of 20 is as good as any larger one
-constexpr double kUnlike = 0.6;     // correlation of complexes that are not alike,
-constexpr double kAlike = 0.95;     // and of those that are
-constexpr double kSameSize = 0.3;   // |log(size / the cluster's)| of complexes that are of one kind,
-constexpr double kOtherSize = 0.7;  // and of those that are not: an ectopic beat may have a T wave's shape
-constexpr double kTWaveEnd = 0.45;  // s / sqrt(cycle in s), the end of the T wave (Bazett 1920)
-constexpr double kPr_s = 0.28;      // longest usual PR interval
+constexpr double kTwice = 0.7;       // log 2: the beats of one patient differ by so much
+constexpr double kThird = 1.1;       // log 3
+constexpr double kMostLog = 3.0;     // a factor of 20 is as good as any larger one
+constexpr double kUnlike = 0.6;      // correlation of complexes that are not alike,
+constexpr double kAlike = 0.95;      // and of those that are
+constexpr double kSameSize = 0.3;    // |log(size / the cluster's)| of complexes that are of one kind,
+constexpr double kOtherSize = 0.7;   // and of those that are not: an ectopic beat may have a T wave's shape
+constexpr double kTWaveEnd = 0.45;   // s / sqrt(cycle in s), the end of the T wave (Bazett 1920)
+constexpr double kPr_s = 0.28;       // longest usual PR interval,
+constexpr double kPrOfCycle = 0.45;  // and of the cycle: in a fast heart a beat follows another as soon
 constexpr double kByChance =
     0.3;  // share of any complexes that something sharper follows; of P waves in 2:1 block half
 constexpr double kMostOdds = 6.0;  // of a cluster
@@ -77,7 +78,7 @@ void add_pair(const PairContext& pair, EvidenceOf<BeatEvidence>& v) noexcept {
   if (!(pair.rr_s > 0.0) || !(pair.before_sharpness > 0.0)) return;
   const double sharper = log_ratio(pair.sharpness, pair.before_sharpness);
   if (pair.rr_s < kTWaveEnd * std::sqrt(pair.cycle_s)) part(v, Kind::kTWave) = std::max(-sharper, 0.0);
-  if (pair.rr_s < kPr_s) part(v, Kind::kBeforeSharper) = std::max(sharper, 0.0);
+  if (pair.rr_s < std::min(kPr_s, kPrOfCycle * pair.cycle_s)) part(v, Kind::kBeforeSharper) = std::max(sharper, 0.0);
 }
 
 const EvidenceWeights kFittedWeights{

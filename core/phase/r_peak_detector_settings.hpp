@@ -76,6 +76,7 @@ struct DecisionSettings {
   double qrs_like = 0.7;               // log odds of a complex by itself
   Duration crowd_from = std::chrono::milliseconds(110);  // longer than a wide complex has two maxima
   Duration crowd_to = std::chrono::milliseconds(240);    // shorter than a cycle at 240 a minute
+  double crowd_of_cycle = 0.4;  // in a heart that is faster still premature beats come sooner as well
   double most_disturbances = 3.0;
   double some_noise = 0.3;  // disturbances, fading,
   double burst = 0.5;       // of which so many are electrosurgery or a loose cable,
@@ -93,6 +94,7 @@ struct DecisionSettings {
   Duration around = std::chrono::milliseconds(500);  // what is strange so near makes a strange one less likely
   Duration pr_shortest = std::chrono::milliseconds(100);
   Duration pr_longest = std::chrono::milliseconds(280);
+  double pr_of_cycle = 0.45;  // in a fast heart a beat follows another as soon as a QRS complex its P wave
   Duration t_wave_begins = std::chrono::milliseconds(120);
   Duration t_wave_ends = std::chrono::milliseconds(420);
   double most_odds = 6.0;             // of a complex by itself, log: no measure is as sure as that
@@ -103,8 +105,8 @@ struct DecisionSettings {
   double cluster_of_top = 0.1;        // and this share of the largest
   int displaced = 3;                  // steps; the peaks of unknown shapes are found so far apart
   double familiar = 0.8;
-  double most_step = 0.75;  // change of level to the excursions: of clean beats one in a thousand has more,
-  double most_rough = 0.5;  // and of this, to the energy
+  double most_step = 0.75;              // change of level to the excursions: of clean beats one in a thousand has more,
+  double most_rough = 0.5;              // and of this, to the energy
   int changed_after = 5;                // beats in a row that are alike and of no known kind: arcs are neither
   double same_gain = 0.3;               // logarithm, of two beats that are of one size
   double learnt = 0.8;                  // probability from which on a beat teaches rhythm and levels

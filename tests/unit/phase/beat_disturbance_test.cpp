@@ -91,9 +91,9 @@ TEST(BeatDecision, ABeatIsOverdueWhenItsCycleIsOver) {
 
 // Two that each look like a QRS complex, apart by less than a cycle and more than the maxima of a wide one.
 TEST(BeatDecision, ComplexesThatCrowdAreADisturbance) {
-  const auto noisy = [](double apart_s, double by = 1.0) {
-    Known patient;
-    const double first_s = patient.last_s + 0.8;
+  const auto noisy = [](double apart_s, double by = 1.0, double cycle_s = 0.8) {
+    Known patient(40, cycle_s);
+    const double first_s = patient.last_s + cycle_s;
     patient.see(first_s);
     patient.run(first_s + 0.12);
     patient.see(first_s + apart_s, weaker(by));
@@ -103,6 +103,9 @@ TEST(BeatDecision, ComplexesThatCrowdAreADisturbance) {
   EXPECT_TRUE(noisy(0.130));
   EXPECT_TRUE(noisy(0.225));
   EXPECT_FALSE(noisy(0.262));
+  // In a fast heart premature beats come sooner: 0.4 of 0.45 s.
+  EXPECT_TRUE(noisy(0.165, 1.0, 0.45));
+  EXPECT_FALSE(noisy(0.195, 1.0, 0.45));
   double least = 10.0;
   for (double by = 1.0; by > 0.2; by *= 0.97) {
     const Known patient;
@@ -110,6 +113,27 @@ TEST(BeatDecision, ComplexesThatCrowdAreADisturbance) {
     if (noisy(0.15, by)) least = std::min(least, by_itself(patient, patient.complex(1.0, weaker(by))) + std::log(by));
   }
   EXPECT_NEAR(least, 0.7, 0.15);
+}
+
+TEST(BeatDecision, AWaveThatIsKnownIsNoDisturbanceThoughTheLineStepsBesideIt) {
+  const auto noisy = [](const QrsShape& shape) {
+    Patient patient;
+    const auto wave_of = [&](const QrsShape& s, double step) {
+      patient.see(patient.last_s + 0.3,
+                  [&, step](QrsCandidate& c) { c.shape = s, c.energy *= 0.8, c.sharpness *= 0.2, c.step = step; });
+    };
+    for (int i = 0; i < 40; ++i) {
+      patient.see(patient.last_s + 0.5);
+      wave_of(kWide, 0.0);
+    }
+    patient.see(patient.last_s + 0.5);
+    wave_of(shape, 3.0);
+    patient.beats(1, 0.5);
+    patient.run(patient.last_s + 0.3);
+    return patient.decision.noisy(at(patient.now_s));
+  };
+  EXPECT_FALSE(noisy(kWide));
+  EXPECT_TRUE(noisy(strange_shape(7)));
 }
 
 // Where one that is like nothing ceases to be told: others of its kind around it make it less likely.

@@ -270,10 +270,10 @@ TEST(BeatEvidence, IsWorthWhatTheRecordsSay) {
 }
 
 TEST(BeatEvidence, TWavesEndWithTheCycleAndPrIntervalsAreShort) {
-  const auto pair = [](BeatEvidence kind, double rr_s, double before, double sharpness) {
+  const auto pair = [](BeatEvidence kind, double rr_s, double before, double sharpness, double cycle_s = 0.64) {
     PairContext p;
     p.rr_s = rr_s;
-    p.cycle_s = 0.64;
+    p.cycle_s = cycle_s;
     p.before_sharpness = before;
     p.sharpness = sharpness;
     EvidenceOf<BeatEvidence> evidence{};
@@ -285,6 +285,9 @@ TEST(BeatEvidence, TWavesEndWithTheCycleAndPrIntervalsAreShort) {
   EXPECT_EQ(pair(BeatEvidence::kTWave, 0.39, 1.0, 0.5), 0.0);
   EXPECT_GT(pair(BeatEvidence::kBeforeSharper, 0.26, 0.5, 1.0), 0.5);
   EXPECT_EQ(pair(BeatEvidence::kBeforeSharper, 0.30, 0.5, 1.0), 0.0);
+  // And 0.45 of a fast heart's cycle.
+  EXPECT_GT(pair(BeatEvidence::kBeforeSharper, 0.16, 0.5, 1.0, 0.4), 0.5);
+  EXPECT_EQ(pair(BeatEvidence::kBeforeSharper, 0.20, 0.5, 1.0, 0.4), 0.0);
 }
 
 }  // namespace
