@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 
 #include "core/angle/angle.hpp"
@@ -11,7 +10,7 @@
 namespace perimap {
 namespace {
 
-double turn_between(double a, double b) { return std::remainder(a - b, 2.0 * std::numbers::pi); }
+double turn_between(double a, double b) { return std::remainder(a - b, kTwoPi); }
 
 Pose turned_picture(double angle) { return {so3_exp(Vector3d(0.0, 0.0, angle)), Vector3d::Zero()}; }
 

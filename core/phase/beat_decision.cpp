@@ -126,10 +126,13 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
   weigh(now);
 }
 
+Duration BeatDecision::within_cycle(Duration longest, double share) const noexcept {
+  return rhythm_.cycle_s > 0.0 ? std::min(longest, from_seconds(share * rhythm_.cycle_s)) : longest;
+}
+
 // A complex as sharp as others before it, within a PR interval: those may be P waves.
 void BeatDecision::note_followers(const QrsCandidate& candidate, int cluster) noexcept {
-  Duration longest = settings_.pr_longest;
-  if (rhythm_.cycle_s > 0.0) longest = std::min(longest, from_seconds(settings_.pr_of_cycle * rhythm_.cycle_s));
+  const Duration longest = within_cycle(settings_.pr_longest, settings_.pr_of_cycle);
   for (Seen& seen : seen_) {
     if (!seen.waits) continue;
     const Duration apart = candidate.time - seen.time;
@@ -149,8 +152,7 @@ void BeatDecision::note_crowding(const Waiting& waiting) noexcept {
   newest.log_odds = waiting.log_odds;
   // Before any kind is settled a P wave looks like a QRS complex as well.
   if (waiting.log_odds < settings_.qrs_like || !clusters_.any_settled()) return;
-  Duration longest = settings_.crowd_to;
-  if (rhythm_.cycle_s > 0.0) longest = std::min(longest, from_seconds(settings_.crowd_of_cycle * rhythm_.cycle_s));
+  const Duration longest = within_cycle(settings_.crowd_to, settings_.crowd_of_cycle);
   for (const Seen& seen : seen_) {
     const Duration apart = newest.time - seen.time;
     if (seen.log_odds < settings_.qrs_like || apart < settings_.crowd_from || apart > longest) continue;

@@ -71,6 +71,8 @@ class BeatDecision {
     double log_odds = -10.0;  // by itself
   };
 
+  // No longer than this share of the usual cycle, where that is known.
+  [[nodiscard]] Duration within_cycle(Duration longest, double share) const noexcept;
   void note_followers(const QrsCandidate& candidate, int cluster) noexcept;
   void note_crowding(const Waiting& waiting) noexcept;
   void expire_followers(Instant now) noexcept;

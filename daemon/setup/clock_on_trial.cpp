@@ -85,10 +85,11 @@ std::optional<Equations> equations_of(const std::vector<TimedPose>& camera, cons
                                       const Pose& X_SC, double offset_s) {
   constexpr std::size_t kFewest = 20;
   const double interval_s = median_interval_s(sensor);
+  const double gap_s = longest_gap_s(sensor);
   std::vector<PosePair> pairs;
   for (const TimedPose& view : camera) {
     const double t_s = view.t_s - offset_s;
-    const auto at = pose_at(sensor, t_s, std::max(0.1, 3.0 * interval_s));
+    const auto at = pose_at(sensor, t_s, gap_s);
     if (!at) continue;
     if (const auto twist = twist_around(sensor, at->X, t_s, interval_s)) {
       pairs.push_back({view.t_s, at->X, view.X, *twist});
