@@ -125,7 +125,7 @@ build() { # PRESET BUILD_OPTION...
   esac
   step "$preset configure" 5m cmake --preset "$preset" -DPERIMAP_TESTS=$tests -DPERIMAP_UNDEFINED=$undefined \
     -DPERIMAP_QUICK=$quick "${launcher[@]}" &&
-    step "$preset build" 40m cmake --build --preset "$preset" -j "$jobs" "$@"
+    step "$preset build" 90m cmake --build --preset "$preset" -j "$jobs" "$@"
 }
 
 # Many tests run programs against the machine's clock, several at a time, and the machine may have other work besides.

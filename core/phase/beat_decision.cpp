@@ -116,6 +116,11 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
   if (too_large && !has_a_beats_shape(candidate, clusters_, settings_.very_familiar)) {
     note_disturbance(candidate.time, 1.0);
   }
+  // Where a step is large it is no beat, whatever follows; the lead may be off within the second.
+  if (candidate.step > settings_.pure_step && strange(waiting)) {
+    note_disturbance(candidate.time, 1.0);
+    waiting.noted = true;
+  }
   int at = count_;
   while (at > 0 && waiting_[static_cast<std::size_t>(at - 1)].candidate.time > candidate.time) {
     waiting_[static_cast<std::size_t>(at)] = waiting_[static_cast<std::size_t>(at - 1)];
@@ -127,7 +132,8 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
 }
 
 Duration BeatDecision::within_cycle(Duration longest, double share) const noexcept {
-  return rhythm_.cycle_s > 0.0 ? std::min(longest, from_seconds(share * rhythm_.cycle_s)) : longest;
+  if (rr_s_.count() == 0) return longest;
+  return std::min(longest, from_seconds(share * std::min(rhythm_.cycle_s, rr_s_.mean())));
 }
 
 // A complex as sharp as others before it, within a PR interval: those may be P waves.
@@ -215,10 +221,18 @@ bool BeatDecision::unlike_any_beat(const QrsCandidate& candidate) const noexcept
 bool BeatDecision::strange(const Waiting& waiting) const noexcept {
   const bool another = waiting.correlation < settings_.familiar &&
                        !has_a_beats_shape(waiting.candidate, clusters_, settings_.very_familiar);
-  // A wave of a kind that is known, as T waves are, is none, whatever the line about it does.
-  const bool a_wave = !another && clusters_.settled(waiting.cluster) && clusters_.log_odds(waiting.cluster) < 0.0;
-  return beats_.known() && (another || (unlike_any_beat(waiting.candidate) && !a_wave)) &&
-         beats_.size(waiting.candidate) > settings_.size_of_disturbance;
+  return beats_.known() && beats_.size(waiting.candidate) > settings_.size_of_disturbance &&
+         (another || (unlike_any_beat(waiting.candidate) && !of_known_kind(waiting)));
+}
+
+// Whatever the line about it does: a wave of a settled kind, as T waves are, and a beat of a kind that has recurred for
+// longer than a burst lasts. A kind whose own members count as disturbances would never be seen in calm, nor settle.
+bool BeatDecision::of_known_kind(const Waiting& waiting) const noexcept {
+  if (waiting.correlation < settings_.familiar || !clusters_.recurs(waiting.cluster)) return false;
+  const double log_odds = clusters_.log_odds(waiting.cluster);
+  if (log_odds < 0.0) return clusters_.settled(waiting.cluster) && waiting.candidate.step <= settings_.pure_step;
+  return log_odds > settings_.qrs_like && waiting.correlation >= settings_.very_familiar &&
+         waiting.candidate.time - clusters_.born(waiting.cluster) > settings_.longer_than_bursts;
 }
 
 EvidenceOf<ComplexEvidence> BeatDecision::complex_evidence(const Waiting& waiting) const noexcept {
@@ -369,7 +383,7 @@ void BeatDecision::accept(int index, Instant now) noexcept {
 }
 
 void BeatDecision::refuse(const Waiting& waiting) noexcept {
-  if (strange(waiting)) note_disturbance(waiting.candidate.time, 1.0);
+  if (strange(waiting) && !waiting.noted) note_disturbance(waiting.candidate.time, 1.0);
 }
 
 void BeatDecision::note_disturbance(Instant t, double weight) noexcept {
@@ -391,8 +405,11 @@ double BeatDecision::confidence(const Waiting& waiting, bool familiar, Instant n
   const bool early_in_noise = another && noise > settings_.much_noise && rr_s < settings_.before_due * rhythm_.cycle_s;
   if (early_in_noise) return std::min(waiting.probability, settings_.early_in_noise);
   if (unknown_in_noise(waiting)) return std::min(waiting.probability, settings_.lost_in_noise);
-  const bool doubtful = young || unlike_any_beat(waiting.candidate) || (!familiar && clusters_.any_recurs()) ||
-                        noise > settings_.burst || out_of_place || (noise > settings_.some_noise && !settled);
+  // A P wave that is not conducted, where every second one is.
+  const bool may_be_followed = clusters_.followers(waiting.cluster) >= settings_.followed_by_chance;
+  const bool doubtful = young || may_be_followed || unlike_any_beat(waiting.candidate) ||
+                        (!familiar && clusters_.any_recurs()) || noise > settings_.burst || out_of_place ||
+                        (noise > settings_.some_noise && !settled);
   return doubtful ? std::min(waiting.probability, settings_.doubtful) : waiting.probability;
 }
 
@@ -424,7 +441,7 @@ void BeatDecision::tell(const Waiting& waiting, Instant now) noexcept {
   peak.deviation = candidate.deviation;
   if (unknown_in_noise(waiting)) peak.deviation = from_seconds(settings_.doubtful_deviation_s);
   peak.confidence = confidence(waiting, familiar, now);
-  if (strange(waiting)) note_disturbance(candidate.time, 0.5);
+  if (strange(waiting) && !waiting.noted) note_disturbance(candidate.time, 0.5);
   if (familiar) familiar_at_ = candidate.time;
   if (peak.time <= now && queue_count_ < kQueue) {
     peak.detected_at = now;

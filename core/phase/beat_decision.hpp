@@ -60,6 +60,7 @@ class BeatDecision {
     double probability = 0.0;
     double sharpest_before = 0.0;         // within the T wave's time
     double log_odds = 0.0;                // of the complex alone
+    bool noted = false;                   // as a disturbance
     EvidenceOf<BeatEvidence> evidence{};  // but for that of pairs
   };
   // For what follows complexes.
@@ -71,7 +72,7 @@ class BeatDecision {
     double log_odds = -10.0;  // by itself
   };
 
-  // No longer than this share of the usual cycle, where that is known.
+  // No longer than this share of the cycle, where that is known: the usual one, or the mean where beats come in pairs.
   [[nodiscard]] Duration within_cycle(Duration longest, double share) const noexcept;
   void note_followers(const QrsCandidate& candidate, int cluster) noexcept;
   void note_crowding(const Waiting& waiting) noexcept;
@@ -86,6 +87,7 @@ class BeatDecision {
   [[nodiscard]] bool familiar(const Waiting& waiting) const noexcept;
   [[nodiscard]] bool unlike_any_beat(const QrsCandidate& candidate) const noexcept;
   [[nodiscard]] bool strange(const Waiting& waiting) const noexcept;
+  [[nodiscard]] bool of_known_kind(const Waiting& waiting) const noexcept;
   [[nodiscard]] EvidenceOf<BeatEvidence> paired(int before, int candidate) const noexcept;
   [[nodiscard]] double odds(int before, int candidate) const noexcept;
   [[nodiscard]] bool known(const Waiting& waiting, Instant now, bool ending) const noexcept;

@@ -88,13 +88,16 @@ void QrsMeter::measure_about(std::int64_t centre, QrsCandidate& candidate) const
 }
 
 // Whether the signal comes back after the complex; when the lead comes off it goes to another level and stays there.
+// What was before is looked at in three places: one of them may be on a P or T wave, another lead's level on none.
 void QrsMeter::measure_step(std::int64_t peak, QrsCandidate& candidate) const noexcept {
   const auto level = [&](std::int64_t i) {
     return filter_.at(std::clamp<std::int64_t>(i + filter_.smooth_delay(), 0, filter_.now())).smooth;
   };
   const int reach = filter_.samples_in(settings_.step_reach);
-  const double excursions = std::max(candidate.upward + candidate.downward, filter_.quantum_mV());
-  candidate.step = std::abs(level(peak + reach) - level(peak - reach)) / excursions;
+  const double after = level(peak + reach);
+  double least = std::abs(after - level(peak - reach));
+  for (const int halves : {3, 4}) least = std::min(least, std::abs(after - level(peak - halves * reach / 2)));
+  candidate.step = least / std::max(candidate.upward + candidate.downward, filter_.quantum_mV());
 }
 
 // The median of a stretch of which the complex is the smaller part.

@@ -10,6 +10,7 @@ constexpr double kKeep = 0.99;  // of a cluster's weight from complex to complex
 constexpr double kSame = 0.85;  // correlation from which on a complex is of a cluster
 // A T wave may have the shape of a ventricular beat, but not its size.
 constexpr double kSameSize = 2.0;
+constexpr int kAgree = 3;            // sizes
 constexpr double kLeastGain = 0.25;  // of a beat whose shape is looked for: ten times less is not seen in noise
 constexpr double kSlowestLearning = 1.0 / 8.0;
 constexpr int kDisplaced = 3;         // steps, 15 ms
@@ -71,7 +72,8 @@ int QrsClusters::learn(const QrsShape& shape, bool upward, bool calm, Instant se
     for (float& slope : c.shape.slope) slope /= norm;
   }
   c.sizes.push(size);
-  c.size = c.sizes.median();
+  // The median; but where the last few agree that the gain has changed it is late.
+  c.size = std::clamp(c.sizes.median(), c.sizes.smallest_of_last(kAgree), c.sizes.largest_of_last(kAgree));
   return same.of;
 }
 

@@ -18,7 +18,8 @@ constexpr double kPr_s = 0.28;       // longest usual PR interval,
 constexpr double kPrOfCycle = 0.45;  // and of the cycle: in a fast heart a beat follows another as soon
 constexpr double kByChance =
     0.3;  // share of any complexes that something sharper follows; of P waves in 2:1 block half
-constexpr double kMostOdds = 6.0;  // of a cluster
+constexpr double kLeastStay = 0.8;  // change of level to the excursions, from which on the line did not come back
+constexpr double kMostOdds = 6.0;   // of a cluster
 
 double log_ratio(double a, double b) noexcept {
   if (!(b > 0.0)) return 0.0;
@@ -49,6 +50,7 @@ EvidenceOf<ComplexEvidence> evidence_of(const QrsCandidate& candidate, const Com
   part(v, Kind::kQuiet) =
       context.quiet_energy > 0.0 ? std::max(log_ratio(candidate.energy, context.quiet_energy), 0.0) : kMostLog;
   part(v, Kind::kStep) = std::min(candidate.step, 1.0);
+  part(v, Kind::kStays) = std::clamp((candidate.step - kLeastStay) / (1.0 - kLeastStay), 0.0, 1.0);
   part(v, Kind::kRough) = std::log1p(candidate.rough / std::max(candidate.energy, 1e-12));
   part(v, Kind::kWide) = std::clamp(energy - sharp, 0.0, 2.0);
   part(v, Kind::kFollowed) = std::max((context.followed - kByChance) / (1.0 - kByChance), 0.0);
@@ -92,6 +94,7 @@ const EvidenceWeights kFittedWeights{
         -1.2,   // kMoreEnergy
         0.33,   // kQuiet
         -1.2,   // kStep
+        -4.0,   // kStays
         -1.4,   // kRough
         -0.5,   // kWide
         -7.0,   // kFollowed

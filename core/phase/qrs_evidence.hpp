@@ -24,6 +24,7 @@ enum class ComplexEvidence : std::size_t {
   kMoreEnergy,    // and larger by more than twice
   kQuiet,         // log(energy / quiet level), at most 4
   kStep,          // the level has changed, to the excursions
+  kStays,         // how near that comes to all of the excursions, from four fifths on: an electrode that moved
   kRough,         // log(1 + what is too fast for a QRS / energy)
   kWide,          // log(energy / sharpness), beside that of the largest complexes
   kFollowed,      // a sharper complex follows most complexes of this cluster, as QRS follows P

@@ -98,7 +98,7 @@ struct DecisionSettings {
   Duration t_wave_begins = std::chrono::milliseconds(120);
   Duration t_wave_ends = std::chrono::milliseconds(420);
   double most_odds = 6.0;             // of a complex by itself, log: no measure is as sure as that
-  double as_sharp = 1.0;              // as another, from which on it is the QRS complex of a P wave,
+  double as_sharp = 1.0;              // times another, from which on it is the QRS complex of a P wave,
   double sharper_of_one_kind = 1.15;  // and so much sharper where both have one shape
   double followed_by_chance = 0.3;    // share of its kind, from which on a complex may be a P wave
   double cluster_of_quiet = 2.5;      // times the quiet level, from which on a complex is learnt as one that recurs
@@ -106,6 +106,7 @@ struct DecisionSettings {
   int displaced = 3;                  // steps; the peaks of unknown shapes are found so far apart
   double familiar = 0.8;
   double most_step = 0.75;              // change of level to the excursions: of clean beats one in a thousand has more,
+  double pure_step = 0.9;               // of it, from which on a complex is a disturbance as soon as it is seen,
   double most_rough = 0.5;              // and of this, to the energy
   int changed_after = 5;                // beats in a row that are alike and of no known kind: arcs are neither
   double same_gain = 0.3;               // logarithm, of two beats that are of one size

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <numeric>
 
 #include "core/statistics/upper_median.hpp"
 
@@ -28,6 +29,10 @@ class RecentValues {
     return upper_median(sorted.begin(), sorted.begin() + count_);
   }
   // At least one must be held.
+  [[nodiscard]] double mean() const noexcept {
+    return std::accumulate(values_.begin(), values_.begin() + count_, 0.0) / count_;
+  }
+  // At least one must be held.
   [[nodiscard]] double newest() const noexcept { return values_[static_cast<std::size_t>((next_ + N - 1) % N)]; }
   // Of the newest so many, or all there are. At least one must be held.
   [[nodiscard]] double largest_of_last(int count) const noexcept {
@@ -36,6 +41,13 @@ class RecentValues {
       largest = std::max(largest, values_[static_cast<std::size_t>((next_ + 2 * N - i) % N)]);
     }
     return largest;
+  }
+  [[nodiscard]] double smallest_of_last(int count) const noexcept {
+    double smallest = newest();
+    for (int i = 2; i <= std::min(count, count_); ++i) {
+      smallest = std::min(smallest, values_[static_cast<std::size_t>((next_ + 2 * N - i) % N)]);
+    }
+    return smallest;
   }
   // Of the newest two, or the only one.
   [[nodiscard]] double mean_of_last_two() const noexcept {

@@ -103,7 +103,6 @@ TEST(BeatDecision, WhatIsStillUndecidedAfterNearlyASecondIsNone) {
   patient.see(at_s, [](QrsCandidate& c) {
     c.shape = strange_shape(7);
     c.rough = 8.0 * c.energy;
-    c.step = 3.0;
   });
   patient.run(at_s + 0.85);
   EXPECT_FALSE(patient.decision.noisy(at(patient.now_s)));
@@ -309,6 +308,21 @@ TEST(BeatDecision, AQrsComplexFollowsAPWaveByAPrInterval) {
   EXPECT_GT(followed(0.125, 1.5), 0.7);
   EXPECT_GT(followed(0.260, 1.5), 0.7);
   EXPECT_LT(followed(0.300, 1.5), 0.3);
+}
+
+// Ventricular beats after normal ones, a quarter of a second later, in a heart so fast.
+TEST(BeatDecision, WhereBeatsComeInPairsTheSecondIsNoQrsComplexOfTheFirst) {
+  const auto followers = [](double pause_s) {
+    Patient patient;
+    for (int i = 0; i < 40; ++i) {
+      patient.see(patient.last_s + pause_s);
+      patient.see(patient.last_s + 0.25, [](QrsCandidate& c) { c.shape = kWide, c.sharpness *= 1.2; });
+    }
+    patient.run(patient.last_s + 1.2);
+    const QrsClusters& clusters = patient.decision.clusters();
+    return clusters.followers(clusters.nearest(kBeat, 0).of);
+  };
+  EXPECT_LT(followers(0.55), 0.3) << "the mean cycle is 0.4 s";
 }
 
 TEST(BeatDecision, AQrsComplexIsAsSharpAsItsPWaveAndSharperWhereBothHaveOneShape) {

@@ -116,7 +116,7 @@ TEST(BeatDecision, ComplexesThatCrowdAreADisturbance) {
 }
 
 TEST(BeatDecision, AWaveThatIsKnownIsNoDisturbanceThoughTheLineStepsBesideIt) {
-  const auto noisy = [](const QrsShape& shape) {
+  const auto noisy = [](const QrsShape& shape, double step) {
     Patient patient;
     const auto wave_of = [&](const QrsShape& s, double step) {
       patient.see(patient.last_s + 0.3,
@@ -127,13 +127,47 @@ TEST(BeatDecision, AWaveThatIsKnownIsNoDisturbanceThoughTheLineStepsBesideIt) {
       wave_of(kWide, 0.0);
     }
     patient.see(patient.last_s + 0.5);
-    wave_of(shape, 3.0);
+    wave_of(shape, step);
     patient.beats(1, 0.5);
     patient.run(patient.last_s + 0.3);
     return patient.decision.noisy(at(patient.now_s));
   };
-  EXPECT_FALSE(noisy(kWide));
-  EXPECT_TRUE(noisy(strange_shape(7)));
+  EXPECT_FALSE(noisy(kWide, 0.86));
+  EXPECT_TRUE(noisy(strange_shape(7), 0.86));
+  EXPECT_TRUE(noisy(kWide, 0.94)) << "but where the line does not come back at all";
+}
+
+// Each beat of every second pair is of a kind whose members all step: the second pair of minutes of such a rhythm.
+TEST(BeatDecision, ABeatOfAKindThatRecursForLongerThanBurstsLastIsNoDisturbance) {
+  const auto noisy_after = [](double minutes, double correlation) {
+    Known patient;
+    const double begin_s = patient.last_s;
+    const auto stepping = [](const QrsShape& shape) {
+      return [=](QrsCandidate& c) { c.shape = shape, c.step = 0.82; };
+    };
+    while (patient.last_s < begin_s + 60.0 * minutes) {
+      patient.beats(1, 0.9);
+      patient.see(patient.last_s + 0.5, stepping(kWide));
+    }
+    patient.beats(12);
+    patient.see(patient.last_s + 0.8, stepping(between(kWide, strange_shape(3), correlation)));
+    patient.run(patient.last_s + 0.6);
+    return patient.decision.noisy(at(patient.now_s));
+  };
+  EXPECT_TRUE(noisy_after(0.2, 1.0));
+  EXPECT_FALSE(noisy_after(1.0, 1.0));
+  EXPECT_TRUE(noisy_after(1.0, 0.85)) << "but what is less like them";
+}
+
+TEST(BeatDecision, AStepIsADisturbanceAsSoonAsItIsSeen) {
+  const auto noisy = [](double step) {
+    Known patient;
+    patient.see(patient.last_s + 0.4, [&](QrsCandidate& c) { c.shape = strange_shape(7), c.step = step; });
+    patient.run(patient.last_s + 0.12);
+    return patient.decision.noisy(at(patient.now_s));
+  };
+  EXPECT_FALSE(noisy(0.86));
+  EXPECT_TRUE(noisy(0.94));
 }
 
 // Where one that is like nothing ceases to be told: others of its kind around it make it less likely.
@@ -193,6 +227,26 @@ TEST(BeatDecision, WhatIsUnlikeTheBeatsIsDoubtful) {
   EXPECT_NEAR(confidence([](QrsCandidate& c) { c.step = 0.82; }), 0.5, 1e-9);
   EXPECT_GT(confidence([](QrsCandidate& c) { c.rough = 0.45 * c.energy; }), 0.5);
   EXPECT_NEAR(confidence([](QrsCandidate& c) { c.rough = 0.55 * c.energy; }), 0.5, 1e-9);
+}
+
+// Every so many of the wide ones a beat follows, as a QRS complex follows its P wave.
+TEST(BeatDecision, WhatOftenHasASharperOneAfterItIsDoubtful) {
+  const auto most = [](int every) {
+    Patient patient;
+    for (int i = 0; i < 60; ++i) {
+      patient.see(patient.last_s + 0.8, [](QrsCandidate& c) { c.shape = kWide, c.sharpness *= 0.9; });
+      if (i % every == 0) patient.see(patient.last_s + 0.2, [](QrsCandidate& c) { c.energy *= 1.2; });
+    }
+    double confidence = 0.0;
+    for (const RPeak& peak : patient.told) {
+      if (seconds(peak.time) > 40.0 && match(peak.shape, kWide).correlation > 0.99) {
+        confidence = std::max(confidence, peak.confidence);
+      }
+    }
+    return confidence;
+  };
+  EXPECT_GT(most(8), 0.9);
+  EXPECT_LE(most(2), 0.5);
 }
 
 TEST(BeatDecision, PeaksOfOneKindAreFoundUpToThreeStepsApart) {

@@ -29,23 +29,23 @@ inline QrsShape wave(double height, double width, double middle = 18.0) {
 inline const QrsShape kBeat = wave(1.0, 2.5);
 inline const QrsShape kWide = wave(1.0, 7.0, 12.0);
 
-// As like kBeat as the correlation says, and otherwise like something else.
-inline QrsShape like_beat(double correlation, double gain = 1.0) {
-  QrsShape other = kWide;
-  const double along = match(other, kBeat).gain;
+// As like one shape as the correlation says, and otherwise like another.
+inline QrsShape between(const QrsShape& one, QrsShape other, double correlation, double gain = 1.0) {
+  const double along = match(other, one).gain;
   for (int i = 0; i < other.points; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    other.slope[k] -= static_cast<float>(along) * kBeat.slope[k];
+    other.slope[k] -= static_cast<float>(along) * one.slope[k];
   }
-  const double across = std::sqrt(1.0 - correlation * correlation) * root_mean_square(kBeat) / root_mean_square(other);
-  QrsShape shape = kBeat;
+  const double across = std::sqrt(1.0 - correlation * correlation) * root_mean_square(one) / root_mean_square(other);
+  QrsShape shape = one;
   for (int i = 0; i < shape.points; ++i) {
     const auto k = static_cast<std::size_t>(i);
     shape.slope[k] = static_cast<float>(
-        gain * (correlation * static_cast<double>(kBeat.slope[k]) + across * static_cast<double>(other.slope[k])));
+        gain * (correlation * static_cast<double>(one.slope[k]) + across * static_cast<double>(other.slope[k])));
   }
   return shape;
 }
+inline QrsShape like_beat(double correlation, double gain = 1.0) { return between(kBeat, kWide, correlation, gain); }
 
 // A shape that is like no other number's.
 inline QrsShape strange_shape(unsigned number) {

@@ -134,6 +134,23 @@ TEST(QrsClusters, AKindIsOfSizesUpToTwiceAndDownToHalf) {
   for (const double gain : {2.25, 0.45}) EXPECT_LT(clusters.nearest(shape(gain, 2.5), 0).of, 0) << gain;
 }
 
+TEST(QrsClusters, AGainThatFallsFromBeatToBeatIsFollowed) {
+  const auto kinds = [](double by) {
+    QrsClusters clusters;
+    for (int i = 0; i < 8; ++i) clusters.learn(kBeat, true, true, kNow);
+    double height = 1.0;
+    const int beat = clusters.nearest(kBeat, 0).of;
+    int others = 0;
+    for (int i = 0; i < 12; ++i) {
+      height *= by;
+      others += clusters.learn(shape(height, 2.5), true, true, kNow) == beat ? 0 : 1;
+    }
+    return others;
+  };
+  EXPECT_EQ(kinds(0.82), 0) << "the median of eight would be behind by more than half of the size";
+  EXPECT_GT(kinds(0.65), 0);
+}
+
 TEST(QrsClusters, ABeatIsLookedForDownToAQuarterOfItsSize) {
   const QrsClusters clusters = knowing_beats();
   EXPECT_GE(clusters.nearest_beat(shape(0.28, 2.5)).of, 0);
