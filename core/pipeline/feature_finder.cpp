@@ -23,6 +23,14 @@ constexpr Duration kTakenEvery = std::chrono::microseconds(33333);
 // Not all that is found lives through the round, least of all where the heart moves fastest; what is over is let go.
 constexpr std::size_t with_spare(std::size_t wanted) { return 2 * wanted; }
 
+// As many as may be followed are not all to lie where the scope looks first: so far apart that a picture full of tissue
+// takes them all, and one with less of it leaves some for what comes into view.
+double spread_px(const PipelineSettings& settings) noexcept {
+  constexpr double kOfEvenSpacing = 0.63;
+  const double pixels = static_cast<double>(settings.camera.width) * settings.camera.height;
+  return kOfEvenSpacing * std::sqrt(pixels / settings.features.maximum);
+}
+
 }  // namespace
 
 FeatureFinder::FeatureFinder(const PipelineSettings& settings, PipelineCounters& counters)
@@ -31,7 +39,7 @@ FeatureFinder::FeatureFinder(const PipelineSettings& settings, PipelineCounters&
       bands_(bands_of(width_, height_)),
       interval_(settings.features.detection_interval),
       lockstep_(settings.lockstep),
-      min_distance_px_(settings.features.minimum_distance_px),
+      min_distance_px_(std::max(settings.features.minimum_distance_px, spread_px(settings))),
       maximum_(settings.features.maximum),
       share_(static_cast<std::size_t>((maximum_ + bands_ - 1) / bands_)),
       counters_(counters),

@@ -87,6 +87,20 @@ DepthField::Prediction DepthField::at(const Eigen::Matrix2Xd& s_mm) const {
   return prediction;
 }
 
+Vector2d DepthField::slope_at(const Vector2d& s_mm) const {
+  constexpr double kStep_mm = 0.05;
+  Eigen::Matrix2Xd around(2, 4);
+  around.colwise() = s_mm;
+  around(0, 0) += kStep_mm;
+  around(0, 1) -= kStep_mm;
+  around(1, 2) += kStep_mm;
+  around(1, 3) -= kStep_mm;
+  const Eigen::MatrixXd K_star =
+      matern52(distances(s_mm_, around), kernel_.length_mm).matrix() + free_plane(s_mm_, around);
+  const Eigen::Vector4d depth = (K_star.transpose() * process_->alpha()).col(0);
+  return Vector2d(depth(0) - depth(1), depth(2) - depth(3)) / (2.0 * kStep_mm);
+}
+
 DepthField::LeaveOneOut DepthField::leave_one_out() const {
   const GaussianProcess::LeaveOneOut out = process_->leave_one_out();
   return {out.residuals.col(0).array(), process_->signal_variances()(0) * out.variances.array()};

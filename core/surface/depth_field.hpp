@@ -34,6 +34,9 @@ class DepthField {
   };
   [[nodiscard]] Prediction at(const Eigen::Matrix2Xd& s_mm) const;
 
+  // d depth / d s of the predicted surface, mm/mm.
+  [[nodiscard]] Vector2d slope_at(const Vector2d& s_mm) const;
+
   // Of each feature, in mm along the axis and as variances.
   struct LeaveOneOut {
     Eigen::ArrayXd residuals_mm;

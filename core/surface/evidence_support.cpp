@@ -13,6 +13,7 @@ namespace {
 // In units of the spacing. Beyond the last features the organ may turn away, and nothing tells. In a lattice no place
 // is further than 0.6 from a point of it.
 constexpr double kReach = 1.5;
+constexpr double kMargin = 1.0;
 constexpr double kEdge = 0.25;
 
 double third_nearest(std::span<const Vector2d> places, const Vector2d& s) {
@@ -30,6 +31,7 @@ double third_nearest(std::span<const Vector2d> places, const Vector2d& s) {
 
 // Whether a half-plane whose border goes through the origin holds none of the directions (rad).
 bool lie_on_one_side(std::vector<double>& directions) {
+  if (directions.empty()) return true;
   std::sort(directions.begin(), directions.end());
   double gap = directions.front() + 2.0 * std::numbers::pi - directions.back();
   for (std::size_t i = 1; i < directions.size(); ++i) gap = std::max(gap, directions[i] - directions[i - 1]);
@@ -46,21 +48,36 @@ EvidenceSupport::EvidenceSupport(std::vector<Vector2d> places) : places_(std::mo
   std::nth_element(distances.begin(), middle, distances.end());
   spacing_mm_ = *middle;
   reach_mm_ = std::clamp(kReach * spacing_mm_, 8.0, 20.0);
+  margin_mm_ = std::clamp(kMargin * spacing_mm_, 1.0, 8.0);
   edge_mm_ = std::clamp(kEdge * spacing_mm_, 1.0, 3.0);
 }
 
-Support EvidenceSupport::at(const Vector2d& s) const {
+double EvidenceSupport::nearest_mm(const Vector2d& s) const {
   double nearest2 = std::numeric_limits<double>::infinity();
   for (const Vector2d& place : places_) nearest2 = std::min(nearest2, (place - s).squaredNorm());
-  if (!(nearest2 <= reach_mm_ * reach_mm_)) return Support::kTooFar;
-  if (nearest2 <= edge_mm_ * edge_mm_) return Support::kSupported;
+  return std::sqrt(nearest2);
+}
+
+// All that are about it lie on one side of it.
+bool EvidenceSupport::is_beyond(const Vector2d& s) const {
   std::vector<double> directions;
   const double around_mm = 2.0 * reach_mm_;
   for (const Vector2d& place : places_) {
     const Vector2d d = place - s;
     if (d.squaredNorm() <= around_mm * around_mm) directions.push_back(std::atan2(d.y(), d.x()));
   }
-  return lie_on_one_side(directions) ? Support::kBeyondEdge : Support::kSupported;
+  return lie_on_one_side(directions);
+}
+
+Support EvidenceSupport::at(const Vector2d& s) const {
+  const double nearest = nearest_mm(s);
+  if (!(nearest <= reach_mm_)) return Support::kTooFar;
+  return nearest > margin_mm_ && is_beyond(s) ? Support::kBeyondEdge : Support::kSupported;
+}
+
+double EvidenceSupport::beyond_mm(const Vector2d& s) const {
+  const double nearest = nearest_mm(s);
+  return nearest > edge_mm_ && is_beyond(s) ? nearest : 0.0;
 }
 
 }  // namespace perimap

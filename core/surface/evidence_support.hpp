@@ -25,16 +25,25 @@ class EvidenceSupport {
   explicit EvidenceSupport(std::vector<Vector2d> places);
 
   [[nodiscard]] Support at(const Vector2d& s) const;
+  // How far from the nearest feature a place is that has all features on one side of it; 0 where it has not, or one is
+  // near. How the surface goes on there is a guess.
+  [[nodiscard]] double beyond_mm(const Vector2d& s) const;
 
   [[nodiscard]] double spacing_mm() const noexcept { return spacing_mm_; }  // the middle distance of the third nearest
   [[nodiscard]] double reach_mm() const noexcept { return reach_mm_; }
+  // Beyond the last features: so far at most, and so far in any case.
+  [[nodiscard]] double margin_mm() const noexcept { return margin_mm_; }
   [[nodiscard]] double edge_mm() const noexcept { return edge_mm_; }
   [[nodiscard]] std::span<const Vector2d> places() const noexcept { return places_; }
 
  private:
+  [[nodiscard]] double nearest_mm(const Vector2d& s) const;
+  [[nodiscard]] bool is_beyond(const Vector2d& s) const;
+
   std::vector<Vector2d> places_;
   double spacing_mm_ = 0.0;
   double reach_mm_ = 0.0;
+  double margin_mm_ = 0.0;
   double edge_mm_ = 0.0;
 };
 

@@ -52,6 +52,8 @@ class GaussianProcess {
   };
   [[nodiscard]] LeaveOneOut leave_one_out() const;
 
+  // N x C: the prediction is K_star^T alpha as well.
+  [[nodiscard]] const Eigen::MatrixXd& alpha() const noexcept { return alpha_; }
   [[nodiscard]] const Eigen::MatrixXd& Y() const noexcept { return Y_; }
   [[nodiscard]] const Eigen::VectorXd& nu() const noexcept { return nu_; }
 

@@ -220,6 +220,20 @@ bool PeriodicSurface::leave_out_contradicted() {
   return true;
 }
 
+// Of the depth at a place beyond the last features, so far from the nearest: what is not known there of how the surface
+// curves. An organ may begin to turn away within any millimetre.
+double PeriodicSurface::turning_away_mm(const Vector2d& s, double depth_mm, double beyond_mm) const {
+  constexpr double kRadius_mm = 40.0;  // as a heart's
+  // Tangents of depth (s / d, 1).
+  const Vector2d slope = depth_->slope_at(s);
+  const Vector3d ray(s.x() / chart_.depth_mm, s.y() / chart_.depth_mm, 1.0);
+  const Vector3d along_x = slope.x() * ray + depth_mm / chart_.depth_mm * Vector3d::UnitX();
+  const Vector3d along_y = slope.y() * ray + depth_mm / chart_.depth_mm * Vector3d::UnitY();
+  const Vector3d normal = along_x.cross(along_y);
+  const double cosine = std::max(std::abs(normal.dot(ray)) / (normal.norm() * ray.norm()), 0.05);
+  return beyond_mm * beyond_mm / (2.0 * kRadius_mm * cosine * cosine * cosine);
+}
+
 PredictedPlaces PeriodicSurface::predict(std::span<const Vector2d> places) const {
   PredictedPlaces out;
   const auto V = static_cast<Eigen::Index>(places.size());
@@ -247,7 +261,13 @@ void PeriodicSurface::predict_block(std::span<const Vector2d> places, Eigen::Ind
     p_W_mm.col(v) = chart_.point_at(s_mm.col(v), depth.depth_mm(v));
     out.coefficients_W_mm.block<3, 1>(3 * (first + v), 0) = p_W_mm.col(v);
     const Vector3d ray_A(s_mm(0, v) / chart_.depth_mm, s_mm(1, v) / chart_.depth_mm, 1.0);
-    covariance_A_mm2.col(v) = depth.variance_mm2(v) * to_six(ray_A * ray_A.transpose());
+    double variance_mm2 = depth.variance_mm2(v);
+    const Vector2d& place = places[static_cast<std::size_t>(v)];
+    if (const double beyond_mm = support_->beyond_mm(place); beyond_mm > 0.0) {
+      const double turning_mm = turning_away_mm(place, depth.depth_mm(v), beyond_mm);
+      variance_mm2 += turning_mm * turning_mm;
+    }
+    covariance_A_mm2.col(v) = variance_mm2 * to_six(ray_A * ray_A.transpose());
   }
   const Eigen::ArrayXXd r_mm = distances(p_W_mm_, p_W_mm);
   for (const HarmonicGroup group : {HarmonicGroup::kLow, HarmonicGroup::kHigh, HarmonicGroup::kBreath}) {

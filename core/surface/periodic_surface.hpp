@@ -89,7 +89,9 @@ class PeriodicSurface {
   [[nodiscard]] PredictedPlaces predict(std::span<const Vector2d> places) const;
 
   [[nodiscard]] const SurfaceAgreement& agreement() const noexcept { return agreement_; }
-  // How many features it rests on, and the ids of those that contradict their neighbours and were left out.
+  // The features it rests on, how many they are, and the ids of those that contradict their neighbours and were left
+  // out.
+  [[nodiscard]] std::span<const SurfaceEvidence> evidence() const noexcept { return evidence_; }
   [[nodiscard]] std::size_t features() const noexcept { return evidence_.size(); }
   [[nodiscard]] std::span<const std::uint32_t> contradicted() const noexcept { return contradicted_; }
 
@@ -102,6 +104,7 @@ class PeriodicSurface {
   // By how many deviations each feature is off what all others make of it; sets agreement_.
   [[nodiscard]] std::vector<double> leave_one_out();
   [[nodiscard]] bool leave_out_contradicted();
+  [[nodiscard]] double turning_away_mm(const Vector2d& s, double depth_mm, double beyond_mm) const;
   void predict_block(std::span<const Vector2d> places, Eigen::Index first, PredictedPlaces& out) const;
 
   BasisLayout layout_;

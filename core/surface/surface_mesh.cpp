@@ -33,7 +33,7 @@ Lattice lattice_over(const EvidenceSupport& support, std::size_t vertices) {
     low = low.cwiseMin(s);
     high = high.cwiseMax(s);
   }
-  const Vector2d margin = Vector2d::Constant(support.edge_mm());
+  const Vector2d margin = Vector2d::Constant(support.margin_mm());
   low -= margin;
   high += margin;
   const Vector2d size = high - low;
@@ -89,9 +89,13 @@ SurfaceMesh mesh_of(const PeriodicSurface& surface, std::size_t vertices) {
   std::vector<std::uint32_t> vertex_of(lattice.rows * lattice.columns, kNone);
   std::vector<Eigen::Index> kept;
   for (std::size_t i = 0; i < places.size(); ++i) {
-    if (predicted.support[i] != Support::kSupported) continue;
-    vertex_of[lattice_index[i]] = static_cast<std::uint32_t>(kept.size());
+    if (predicted.support[i] == Support::kSupported) {
+      vertex_of[lattice_index[i]] = static_cast<std::uint32_t>(kept.size());
+    } else if (predicted.support[i] != Support::kUncertain) {
+      continue;
+    }
     kept.push_back(static_cast<Eigen::Index>(i));
+    mesh.support.push_back(predicted.support[i]);
   }
   const auto V = static_cast<Eigen::Index>(kept.size());
   mesh.coefficients_W_mm.resize(3 * V, surface.layout().size());

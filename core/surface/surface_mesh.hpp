@@ -12,11 +12,13 @@
 
 namespace perimap {
 
-// Vertices with the harmonics of their motion, and what is known of them. Only what features support is in it.
+// Vertices with the harmonics of their motion, and what is known of them. In it is what features are near to: what they
+// support, and beside it, in no triangle, what is too uncertain.
 struct SurfaceMesh {
   BasisLayout layout;
   Eigen::MatrixXd coefficients_W_mm;                    // 3 V x basis, as PredictedPlaces
   Matrix6Xd covariances_W_mm2;                          // 6 x V, likewise
+  std::vector<Support> support;                         // V: kSupported or kUncertain
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise as the mean camera sees them
 
   [[nodiscard]] Eigen::Index vertices() const noexcept { return covariances_W_mm2.cols(); }

@@ -13,6 +13,7 @@ constexpr double kAreaAPoint_mm2 = 2.0;
 constexpr double kMostPoints = 40000.0;
 constexpr int kSightings = 3;
 constexpr double kRim_mm = 5.0;
+constexpr double kObliquest = 0.5;  // cosine of the angle between ray and normal
 // What is met first lies so near to the point that it is the point, on the next triangle perhaps.
 constexpr double kSamePlace_mm = 0.3;
 
@@ -25,6 +26,7 @@ SeenSurface::SeenSurface(const GroundTruth& truth, const CameraModel& camera) : 
   draw_points();
   find_neighbours();
   sightings_.assign(points_.size(), 0);
+  good_sightings_.assign(points_.size(), 0);
 }
 
 void SeenSurface::draw_points() {
@@ -88,17 +90,18 @@ Vector3d SeenSurface::position(std::size_t point, const std::vector<Vector3d>& v
   return p;
 }
 
-bool SeenSurface::is_in_sight(std::size_t point, const std::vector<Vector3d>& vertices_C,
-                              const SurfaceView& view) const noexcept {
+SeenSurface::Sight SeenSurface::sight_of(std::size_t point, const std::vector<Vector3d>& vertices_C,
+                                         const SurfaceView& view) const noexcept {
   const SurfacePoint& at = points_[point];
   const std::uint32_t* corners = truth_.mesh().triangles.data() + 3 * std::size_t{at.triangle};
   const Vector3d& a = vertices_C[corners[0]];
   const Vector3d normal = (vertices_C[corners[1]] - a).cross(vertices_C[corners[2]] - a);
   const Vector3d p_C = position(point, vertices_C);
-  if (normal.dot(p_C) >= 0.0) return false;
+  if (normal.dot(p_C) >= 0.0) return Sight::kNone;
   Vector2d px;
-  if (camera_.project(p_C, px) != ProjectionStatus::kOk || !camera_.contains(px)) return false;
-  return is_first(point, vertices_C, view);
+  if (camera_.project(p_C, px) != ProjectionStatus::kOk || !camera_.contains(px)) return Sight::kNone;
+  if (!is_first(point, vertices_C, view)) return Sight::kNone;
+  return -normal.dot(p_C) >= kObliquest * normal.norm() * p_C.norm() ? Sight::kWell : Sight::kOblique;
 }
 
 bool SeenSurface::is_first(std::size_t point, const std::vector<Vector3d>& vertices,
@@ -132,14 +135,19 @@ void SeenSurface::look(Instant capture) {
   for (Vector3d& p : vertices) p = X_CW * p;
   const SurfaceView view(vertices, truth_.mesh().triangles);
   for (std::size_t point = 0; point < points_.size(); ++point) {
-    if (sightings_[point] >= kSightings || !is_in_sight(point, vertices, view)) continue;
+    if (seen_well(point)) continue;
+    const Sight sight = sight_of(point, vertices, view);
+    if (sight == Sight::kNone) continue;
     if (++sightings_[point] == kSightings) seen_.push_back(point);
+    if (sight == Sight::kWell) ++good_sightings_[point];
   }
 }
 
+bool SeenSurface::seen_well(std::size_t point) const noexcept { return good_sightings_[point] >= kSightings; }
+
 bool SeenSurface::on_rim(std::size_t point) const noexcept {
-  return std::any_of(neighbours_[point].begin(), neighbours_[point].end(),
-                     [this](std::uint32_t other) { return sightings_[other] < kSightings; });
+  return !seen_well(point) || std::any_of(neighbours_[point].begin(), neighbours_[point].end(),
+                                          [this](std::uint32_t other) { return !seen_well(other); });
 }
 
 }  // namespace perimap

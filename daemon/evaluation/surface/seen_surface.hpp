@@ -11,8 +11,9 @@
 namespace perimap {
 
 // Drawn evenly over the mean shape's area, always the same for a mesh. A point is seen once it was on the sensor, with
-// nothing of the heart before it, in three looks. Instruments and smoke are not known here: what they hide counts as
-// seen.
+// nothing of the heart before it, in three looks; it is seen well once three of them foreshortened it twofold at most
+// (60 degrees), as no feature can be followed through much more. Instruments and smoke are not known here: what they
+// hide counts as seen.
 class SeenSurface {
  public:
   // `truth` must outlive it.
@@ -26,7 +27,8 @@ class SeenSurface {
   // Of the seen ones, which are met first by the rays from a place (W) to the mean shape. What lies behind something is
   // not in a chart of what is seen from there.
   [[nodiscard]] std::vector<bool> in_front_of(const Vector3d& place_W) const;
-  // Of a point that is seen: some point within 5 mm of it is not.
+  [[nodiscard]] bool seen_well(std::size_t point) const noexcept;
+  // It, or some point within 5 mm of it, is not seen well.
   [[nodiscard]] bool on_rim(std::size_t point) const noexcept;
 
   // Mean over the cardiac cycle and over breaths, mm, W.
@@ -40,8 +42,9 @@ class SeenSurface {
   [[nodiscard]] bool is_first(std::size_t point, const std::vector<Vector3d>& vertices,
                               const SurfaceView& view) const noexcept;
   void find_neighbours();
-  [[nodiscard]] bool is_in_sight(std::size_t point, const std::vector<Vector3d>& vertices_C,
-                                 const SurfaceView& view) const noexcept;
+  enum class Sight : std::uint8_t { kNone, kOblique, kWell };
+  [[nodiscard]] Sight sight_of(std::size_t point, const std::vector<Vector3d>& vertices_C,
+                               const SurfaceView& view) const noexcept;
 
   const GroundTruth& truth_;
   CameraModel camera_;
@@ -50,6 +53,7 @@ class SeenSurface {
   std::vector<Vector3d> mean_places_;
   std::vector<std::vector<std::uint32_t>> neighbours_;  // within 5 mm
   std::vector<int> sightings_;
+  std::vector<int> good_sightings_;  // of those
   std::vector<std::size_t> seen_;
 };
 

@@ -46,9 +46,14 @@ void SurfaceTally::begin_instant(double t_s) {
   settled_ = t_s >= kSettledAfter_s;
   seen_ = 0;
   supported_ = 0;
+  seen_at_all_ = 0;
+  supported_at_all_ = 0;
 }
 
-void SurfaceTally::add_seen(bool supported) {
+void SurfaceTally::add_seen(bool supported, bool well) {
+  ++seen_at_all_;
+  supported_at_all_ += supported ? 1 : 0;
+  if (!well) return;
   ++seen_;
   supported_ += supported ? 1 : 0;
 }
@@ -60,6 +65,7 @@ void SurfaceTally::end_instant() {
   if (!settled_) return;
   ++instants_;
   coverages_ += share;
+  coverages_at_any_angle_ += static_cast<double>(supported_at_all_) / static_cast<double>(seen_at_all_);
 }
 
 void SurfaceTally::add(std::size_t horizon, const Error& error) {
@@ -68,6 +74,7 @@ void SurfaceTally::add(std::size_t horizon, const Error& error) {
   if (error.on_rim) {
     if (horizon != 0) return;
     rim_.squares += square;
+    rim_.nees += error.nees;
     ++rim_.count;
     return;
   }
@@ -99,7 +106,11 @@ SurfaceFigures SurfaceTally::figures() const {
   }
   figures.p95_mm = p95_of(errors_mm_);
   figures.rim_rms_mm = root_mean(rim_.squares, rim_.count);
-  if (instants_ > 0) figures.coverage = coverages_ / static_cast<double>(instants_);
+  if (rim_.count > 0) figures.rim_nees = rim_.nees / static_cast<double>(rim_.count);
+  if (instants_ > 0) {
+    figures.coverage = coverages_ / static_cast<double>(instants_);
+    figures.coverage_at_any_angle = coverages_at_any_angle_ / static_cast<double>(instants_);
+  }
   figures.time_to_90_percent_s = time_to_90_percent_s_;
   figures.gaussian_process = compared(compared_mm_[0]);
   figures.barycentric = compared(compared_mm_[1]);
@@ -114,7 +125,9 @@ nlohmann::json to_json(const SurfaceFigures& figures) {
                          {"p95_mm", number(figures.p95_mm)},
                          {"nees", number(figures.horizons[0].nees)},
                          {"rim_rms_mm", number(figures.rim_rms_mm)},
+                         {"rim_nees", number(figures.rim_nees)},
                          {"coverage", number(figures.coverage)},
+                         {"coverage_at_any_angle", number(figures.coverage_at_any_angle)},
                          {"time_to_90_percent_s", number(figures.time_to_90_percent_s)},
                          {"inside",
                           {{"gaussian_process", to_json(figures.gaussian_process)},
@@ -137,16 +150,18 @@ std::string to_text(const SurfaceFigures& figures) {
     return fmt::format("surface     none from 15 s on{}{}", figures.refusal.empty() ? "" : ": ", figures.refusal);
   }
   return fmt::format(
-      "surface     RMS {} mm, 95th percentile {} mm, NEES/3 {} ({} points seen, not on the rim; {} instants from 15 s "
+      "surface     RMS {} mm, 95th percentile {} mm, NEES/3 {} ({} points seen well, not on the rim; {} instants from "
+      "15 s "
       "on)\n"
-      "            rim of 5 mm: RMS {} mm; {} ms ahead {} mm, {} ms ahead {} mm\n"
-      "            coverage {} of what was seen; 90 % after {} s\n"
+      "            rim of 5 mm, and beyond it: RMS {} mm, NEES/3 {}; {} ms ahead {} mm, {} ms ahead {} mm\n"
+      "            coverage {} of what was seen at 60 degrees at most, {} of what was seen at all; 90 % after {} s\n"
       "            within the features: Gaussian process {} (95 % {}), thin plate {} ({}), barycentric {} ({}) mm\n"
       "            leave one out: RMS {} mm, normalised {} ({} features, {} contradict their neighbours)",
       plain(figures.horizons[0].rms_mm, 3), plain(figures.p95_mm, 2), plain(figures.horizons[0].nees, 2),
-      figures.points, figures.instants, plain(figures.rim_rms_mm, 3), kSurfaceHorizons_ms[1],
-      plain(figures.horizons[1].rms_mm, 3), kSurfaceHorizons_ms[2], plain(figures.horizons[2].rms_mm, 3),
-      plain(figures.coverage, 3), plain(figures.time_to_90_percent_s, 0), plain(figures.gaussian_process.rms_mm, 3),
+      figures.points, figures.instants, plain(figures.rim_rms_mm, 3), plain(figures.rim_nees, 1),
+      kSurfaceHorizons_ms[1], plain(figures.horizons[1].rms_mm, 3), kSurfaceHorizons_ms[2],
+      plain(figures.horizons[2].rms_mm, 3), plain(figures.coverage, 3), plain(figures.coverage_at_any_angle, 3),
+      plain(figures.time_to_90_percent_s, 0), plain(figures.gaussian_process.rms_mm, 3),
       plain(figures.gaussian_process.p95_mm, 2), plain(figures.thin_plate.rms_mm, 3),
       plain(figures.thin_plate.p95_mm, 2), plain(figures.barycentric.rms_mm, 3), plain(figures.barycentric.p95_mm, 2),
       plain(figures.agreement_rms_mm, 3), plain(figures.agreement_nees, 2), figures.features, figures.contradicted);

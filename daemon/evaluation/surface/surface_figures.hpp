@@ -16,16 +16,18 @@ inline constexpr std::array<int, 3> kSurfaceHorizons_ms = {0, 100, 300};
 
 struct SurfaceFigures {
   std::size_t instants = 0;  // at which there was a surface and a phase, from 15 s on
-  std::size_t points = 0;    // that were seen, not on the rim, and supported at one of them
+  std::size_t points = 0;    // that were seen well, not on the rim, and supported at one
   struct Horizon {
     double rms_mm = kNoFigure;
     double nees = kNoFigure;  // e' P^-1 e / 3
   };
   std::array<Horizon, kSurfaceHorizons_ms.size()> horizons;  // of those points
   double p95_mm = kNoFigure;                                 // at the first horizon
-  double rim_rms_mm = kNoFigure;                             // of supported points within 5 mm of what was not seen
-  double coverage = kNoFigure;              // supported share of the seen points, mean over the instants from 15 s on
-  double time_to_90_percent_s = kNoFigure;  // from the first frame
+  double rim_rms_mm = kNoFigure;             // of supported points within 5 mm of what was not seen well
+  double rim_nees = kNoFigure;               // likewise, / 3
+  double coverage = kNoFigure;               // supported share of what was seen well, mean of the instants from 15 s on
+  double coverage_at_any_angle = kNoFigure;  // of what was seen at all
+  double time_to_90_percent_s = kNoFigure;   // from the first frame
   // At points that lie within the features as well, so that all three have something to say of them.
   struct Compared {
     double rms_mm = kNoFigure;
@@ -47,7 +49,7 @@ class SurfaceTally {
   // An instant from 15 s on counts for all figures, an earlier one for the time to 90 % alone.
   void begin_instant(double t_s);
   // Of the instant, every point that was seen; call with all of them.
-  void add_seen(bool supported);
+  void add_seen(bool supported, bool well = true);
   // What the instant's seen points came to.
   void end_instant();
 
@@ -74,8 +76,11 @@ class SurfaceTally {
   bool settled_ = false;
   std::size_t seen_ = 0;
   std::size_t supported_ = 0;
+  std::size_t seen_at_all_ = 0;
+  std::size_t supported_at_all_ = 0;
   std::size_t instants_ = 0;
   double coverages_ = 0.0;
+  double coverages_at_any_angle_ = 0.0;
   double time_to_90_percent_s_ = kNoFigure;
   std::array<Sums, kSurfaceHorizons_ms.size()> horizons_;
   Sums rim_;

@@ -6,21 +6,16 @@
 
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/respiratory_clock.hpp"
-#include "core/pipeline/feature_stages.hpp"
-#include "core/pipeline/map_feed.hpp"
 #include "core/pipeline/phase_basis.hpp"
 #include "core/pipeline/phase_spread.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
-#include "core/pipeline/shard_snapshot.hpp"
 #include "daemon/evaluation/surface/surface_baselines.hpp"
 
 namespace perimap {
 namespace {
 
 constexpr Duration kScoredEvery = std::chrono::seconds(1);
-// Kernels change slowly.
-constexpr std::uint64_t kFitsAKernel = 4;
 
 Vector3d mean_of(const SurfaceEvidence& evidence, int n) { return {evidence.x(0), evidence.x(n), evidence.x(2 * n)}; }
 
@@ -48,72 +43,39 @@ SurfaceWatch::SurfaceWatch(Pipeline& pipeline, const RecordedTruth& truth)
       seen_(truth.truth, truth.camera),
       first_frame_(truth.captures.begin()->second) {}
 
-void SurfaceWatch::take_feed() {
-  MapFeed& feed = pipeline_.map_feed();
-  const MapFeed::Batch* batch = feed.front();
-  if (batch == nullptr) return;
-  if (batch->maps_forgotten != maps_forgotten_) known_.clear();
-  maps_forgotten_ = batch->maps_forgotten;
-  const BasisLayout& layout = pipeline_.settings().estimator.layout;
-  for (const MapFeed::Entry& entry : batch->entries) {
-    known_.erase(entry.slot);
-    if (!entry.mapped || !entry.feature.converged) continue;
-    Known known{surface_evidence(entry.feature.id, layout, entry.feature.estimate), entry.feature.last_observed};
-    if (is_usable(known.evidence, layout)) known_.emplace(entry.slot, std::move(known));
-  }
-  feed.give_back();
+const PeriodicSurface* SurfaceWatch::surface() const noexcept {
+  return made_ && made_->surface ? &*made_->surface : nullptr;
 }
 
 void SurfaceWatch::after_frame() {
-  take_feed();
   const auto capture = from_ns(static_cast<std::int64_t>(pipeline_.counters().last_frame_ns.get()));
-  const CameraPlace& camera = pipeline_.model_snapshots().front()->camera;
-  if (camera.known) {
-    camera_sum_W_ += camera.X_WC.t;
-    ++cameras_;
-  }
   if (last_scored_ && capture - *last_scored_ < kScoredEvery) return;
   last_scored_ = capture;
   seen_.look(capture);
-  fit(capture);
+  made_ = pipeline_.surface_maker().newest();
+  if (made_ == nullptr) {
+    refusal_ = "none has been made";
+  } else if (!made_->surface) {
+    refusal_ = made_->refusal.message;
+  }
   score(capture);
-}
-
-void SurfaceWatch::fit(Instant capture) {
-  evidence_.clear();
-  for (const auto& [slot, known] : known_) {
-    if (capture - known.last_observed <= kBelievedUnseen) evidence_.push_back(known.evidence);
-  }
-  surface_.reset();
-  if (cameras_ == 0) return;
-  const Vector3d camera_W = camera_sum_W_ / static_cast<double>(cameras_);
-  const bool learn = fits_ % kFitsAKernel == 0;
-  auto surface = PeriodicSurface::fit(pipeline_.settings().estimator.layout, evidence_, camera_W, {},
-                                      learn ? std::nullopt : std::optional(kernels_), kernels_);
-  if (!surface) {
-    refusal_ = surface.error().message;
-    return;
-  }
-  ++fits_;
-  kernels_ = surface->kernels();
-  surface_.emplace(*std::move(surface));
 }
 
 void SurfaceWatch::score(Instant capture) {
   tally_.begin_instant(to_seconds(capture - first_frame_));
   Scene scene;
-  if (surface_) {
-    const SurfaceChart& chart = surface_->chart();
+  if (surface() != nullptr) {
+    const SurfaceChart& chart = surface()->chart();
     for (const std::size_t point : seen_.seen()) scene.places.push_back(chart.place_of(seen_.mean_place(point)).s);
-    scene.predicted = surface_->predict(scene.places);
+    scene.predicted = surface()->predict(scene.places);
     const std::vector<bool> front = seen_.in_front_of(chart.X_WA.t);
     for (std::size_t i = 0; i < front.size(); ++i) {
       if (!front[i]) scene.predicted.support[i] = Support::kOutsideChart;
     }
-    const int n = surface_->layout().size();
-    scene.depths.resize(static_cast<Eigen::Index>(evidence_.size()));
-    for (std::size_t i = 0; i < evidence_.size(); ++i) {
-      const SurfaceChart::Place place = chart.place_of(mean_of(evidence_[i], n));
+    const int n = surface()->layout().size();
+    scene.depths.resize(static_cast<Eigen::Index>(surface()->evidence().size()));
+    for (std::size_t i = 0; i < surface()->evidence().size(); ++i) {
+      const SurfaceChart::Place place = chart.place_of(mean_of(surface()->evidence()[i], n));
       scene.features.push_back(place.s);
       scene.depths(static_cast<Eigen::Index>(i)) = place.depth_mm;
     }
@@ -126,7 +88,8 @@ void SurfaceWatch::score(Instant capture) {
     }
   }
   for (std::size_t i = 0; i < seen_.seen().size(); ++i) {
-    tally_.add_seen(surface_ && scene.predicted.support[i] == Support::kSupported);
+    tally_.add_seen(surface() != nullptr && scene.predicted.support[i] == Support::kSupported,
+                    seen_.seen_well(seen_.seen()[i]));
   }
   tally_.end_instant();
 }
@@ -138,16 +101,16 @@ void SurfaceWatch::score_instant(const Scene& scene, std::size_t horizon, Instan
   const PhaseEstimate phase = pipeline_.status_clock(now).at(valid);
   if (!usable(phase.state)) return;
   const RespiratoryPhase respiration = pipeline_.status_respiration().at(valid);
-  const BasisLayout& layout = surface_->layout();
+  const BasisLayout& layout = surface()->layout();
   const Basis b = basis_at(layout, phase.phase_rad, respiration);
   const BasesAbout about = bases_about(layout, phase, respiration);
   const double breath_mm2 = respiration.deviation_mm * respiration.deviation_mm;
 
   Basis motion_b = b;
   motion_b(0) = 0.0;
-  Eigen::Matrix3Xd motions(3, static_cast<Eigen::Index>(evidence_.size()));
-  for (std::size_t i = 0; i < evidence_.size(); ++i) {
-    motions.col(static_cast<Eigen::Index>(i)) = position_of(evidence_[i].x, motion_b);
+  Eigen::Matrix3Xd motions(3, static_cast<Eigen::Index>(surface()->evidence().size()));
+  for (std::size_t i = 0; i < surface()->evidence().size(); ++i) {
+    motions.col(static_cast<Eigen::Index>(i)) = position_of(surface()->evidence()[i].x, motion_b);
   }
   std::vector<Vector3d> vertices(truth_.mesh().vertex_count);
   truth_.vertices_at(valid, vertices);
@@ -166,7 +129,7 @@ void SurfaceWatch::score_instant(const Scene& scene, std::size_t horizon, Instan
     const bool on_rim = seen_.on_rim(point);
     tally_.add(horizon, {point, on_rim, e.norm(), e.dot(covariance.ldlt().solve(e)) / 3.0});
     if (horizon != 0 || on_rim || scene.barycentric.col(v).isZero()) continue;
-    const SurfaceChart& chart = surface_->chart();
+    const SurfaceChart& chart = surface()->chart();
     tally_.add_compared(e.norm(), (scene.interpolated(chart, scene.barycentric, v, motions) - truth).norm(),
                         (scene.interpolated(chart, scene.thin_plate, v, motions) - truth).norm());
   }
@@ -175,11 +138,11 @@ void SurfaceWatch::score_instant(const Scene& scene, std::size_t horizon, Instan
 SurfaceFigures SurfaceWatch::figures() const {
   SurfaceFigures figures = tally_.figures();
   figures.refusal = refusal_;
-  if (!surface_) return figures;
-  figures.agreement_rms_mm = surface_->agreement().rms_mm;
-  figures.agreement_nees = surface_->agreement().nees;
-  figures.features = surface_->features();
-  figures.contradicted = surface_->contradicted().size();
+  if (surface() == nullptr) return figures;
+  figures.agreement_rms_mm = surface()->agreement().rms_mm;
+  figures.agreement_nees = surface()->agreement().nees;
+  figures.features = surface()->features();
+  figures.contradicted = surface()->contradicted().size();
   return figures;
 }
 

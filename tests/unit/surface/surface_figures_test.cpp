@@ -60,6 +60,18 @@ TEST(SurfaceTally, CountsSeenPointsWithoutASurfaceAsNotCovered) {
   EXPECT_NE(to_text(tally.figures()).find("none from 15 s on"), std::string::npos);
 }
 
+TEST(SurfaceTally, CountsCoverageOfWhatWasSeenWell) {
+  SurfaceTally tally;
+  tally.begin_instant(20.0);
+  for (int i = 0; i < 10; ++i) tally.add_seen(i < 9, true);
+  for (int i = 0; i < 10; ++i) tally.add_seen(i < 1, false);
+  tally.add(0, {3, true, 2.0, 4.0});
+  tally.end_instant();
+  EXPECT_NEAR(tally.figures().coverage, 0.9, 1e-9);
+  EXPECT_NEAR(tally.figures().coverage_at_any_angle, 0.5, 1e-9);
+  EXPECT_NEAR(tally.figures().rim_nees, 4.0, 1e-9);
+}
+
 TEST(SurfaceFigures, HaveTheKeysThatOthersRead) {
   const nlohmann::json json = to_json(SurfaceFigures{});
   for (const char* key : {"points", "rms_mm", "p95_mm", "nees", "rim_rms_mm", "coverage", "time_to_90_percent_s"}) {
@@ -146,6 +158,27 @@ TEST(SeenSurface, IsWhatWasInTheImageThreeTimes) {
     }
   }
   EXPECT_GT(rim, 500U);
+}
+
+// Lying 70 degrees off, it is in the image all the same.
+TEST(SeenSurface, DoesNotSeeWellWhatItSeesObliquely) {
+  const Matrix3d turn = so3_exp(Vector3d(0.0, 70.0 * 3.14159265 / 180.0, 0.0));
+  std::vector<CameraTruth> cameras;
+  const Vector3d middle(0.0, 0.0, 100.0);
+  for (int i = 0; i < 4; ++i) cameras.push_back({Instant(milliseconds(1000 * i)), Pose{turn, middle - turn * middle}});
+  const auto truth = GroundTruth::create(still_square().mesh(), still_square().motion(), cameras);
+  ASSERT_TRUE(truth.has_value());
+  CameraModel camera;
+  camera.width = camera.height = 100;
+  camera.fx = camera.fy = 500;
+  camera.cx = camera.cy = 49.5;
+  SeenSurface surface(*truth, camera);
+  for (int i = 0; i < 3; ++i) surface.look(Instant(milliseconds(1000 * i)));
+  EXPECT_GT(surface.seen().size(), 50U);
+  for (const std::size_t point : surface.seen()) {
+    EXPECT_FALSE(surface.seen_well(point));
+    EXPECT_TRUE(surface.on_rim(point));
+  }
 }
 
 TEST(SeenSurface, DoesNotSeeTheBack) {

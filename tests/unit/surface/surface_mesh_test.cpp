@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <set>
 
 #include "made_organ.hpp"
@@ -62,7 +63,57 @@ TEST(SurfaceMesh, EndsBesideTheLastFeatures) {
     furthest = std::max(furthest, surface.chart().place_of(mesh.coefficients_W_mm.block<3, 1>(3 * v, 0)).s.norm());
   }
   EXPECT_GT(furthest, 0.9 * last_feature);
-  EXPECT_LT(furthest, last_feature + surface.support().edge_mm());
+  EXPECT_LT(furthest, last_feature + surface.support().margin_mm());
+}
+
+// A ball of 40 mm, whose features end where the camera's rays meet it at 65 degrees and more: what is beyond turns away
+// faster than they tell.
+TEST(SurfaceMesh, EndsAtItsLastFeaturesWhereItTurnsAway) {
+  std::mt19937_64 random(37);
+  std::vector<SurfaceEvidence> evidence;
+  for (const Vector2d& s : test::places_on_disc(110, 27.5, 3.0, random)) {
+    SurfaceEvidence feature = test::evidence_at(static_cast<std::uint32_t>(evidence.size() + 1), s, 0.05, random);
+    const Vector3d ray(s.x() / 100.0, s.y() / 100.0, 1.0);
+    const Vector3d centre(0.0, 0.0, 140.0);
+    const double a = ray.squaredNorm();
+    const double b = ray.dot(centre);
+    const Vector3d p = (b - std::sqrt(b * b - a * (centre.squaredNorm() - 1600.0))) / a * ray;
+    for (int axis = 0; axis < 3; ++axis) feature.x(axis * kLayout.size()) = p(axis);
+    evidence.push_back(feature);
+  }
+  const auto surface = PeriodicSurface::fit(kLayout, evidence, Vector3d::Zero());
+  ASSERT_TRUE(surface.has_value()) << surface.error().message;
+  const EvidenceSupport& support = surface->support();
+  ASSERT_GT(support.margin_mm(), 2.0 * support.edge_mm());
+  const SurfaceMesh mesh = mesh_of(*surface, 4000);
+  double last_feature = 0.0;
+  for (const Vector2d& s : support.places()) last_feature = std::max(last_feature, s.norm());
+  double furthest = 0.0;
+  for (const auto& triangle : mesh.triangles) {
+    for (const std::uint32_t v : triangle) {
+      furthest = std::max(
+          furthest, surface->chart().place_of(mesh.coefficients_W_mm.block<3, 1>(3 * Eigen::Index{v}, 0)).s.norm());
+    }
+  }
+  EXPECT_LT(furthest, last_feature + support.edge_mm());
+}
+
+TEST(SurfaceMesh, HasNoTriangleWhereItIsUncertain) {
+  std::mt19937_64 random(38);
+  auto evidence = test::evidence_on(test::places_on_disc(100, 40.0, 3.5, random), 0.1, random);
+  // What lies to one side is known to 3 mm.
+  for (SurfaceEvidence& feature : evidence) {
+    if (feature.x(0) < 5.0) continue;
+    feature.mean_mm2 += 9.0 * Matrix3d::Identity();
+  }
+  const auto surface = PeriodicSurface::fit(kLayout, evidence, Vector3d::Zero());
+  ASSERT_TRUE(surface.has_value());
+  const SurfaceMesh mesh = mesh_of(*surface, 1000);
+  ASSERT_EQ(static_cast<Eigen::Index>(mesh.support.size()), mesh.vertices());
+  EXPECT_GT(std::count(mesh.support.begin(), mesh.support.end(), Support::kUncertain), 50);
+  for (const auto& triangle : mesh.triangles) {
+    for (const std::uint32_t v : triangle) EXPECT_EQ(mesh.support[v], Support::kSupported);
+  }
 }
 
 TEST(SurfaceMesh, ShowsItsFrontToTheCamera) {
