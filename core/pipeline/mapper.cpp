@@ -17,8 +17,8 @@ HeartPhaseSettings heart_settings(const PipelineSettings& settings) noexcept {
 }  // namespace
 
 Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells,
-               WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter, PhaseCells& phase_cells,
-               PipelineCounters& counters)
+               WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter, SurfaceMaker& surface_maker,
+               PhaseCells& phase_cells, PipelineCounters& counters)
     : settings_(settings),
       model_{settings.camera},
       slots_(slots),
@@ -36,6 +36,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
       motion_(slots.size()),
       intake_(slots, finder),
       keeping_(slots, bank_, stages_.groups()),
+      surface_(slots, bank_, surface_maker, settings.adoption_delay, counters),
       shedding_decision_(static_cast<int>(slots.size()), settings.budget),
       shedding_(slots) {
   job_.history = history_.get();
@@ -73,6 +74,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
   computed_before_learning_ = MonotonicClock::now() - begun;
   intake_.offer(frame, image, colour, room());
   keeping_.fill_feed(breathing_, heart_, counters_.maps_forgotten.get());
+  surface_.on_frame(frame, heart_.clock().law().law);
   count(frame, begun, ends);
   // D
   begin_learning(frame);
@@ -114,6 +116,7 @@ void Mapper::take_starts() noexcept {
 // By what is known now; and what is learnt from them, and was.
 void Mapper::tell_earlier_frames(const HeartPhase::Change& heart, const Breathing::Change& breath) noexcept {
   const std::span<FeatureGroup> groups = stages_.groups();
+  if (heart.another_law || breath.lost_before || breath.map_changes()) surface_.begin_again();
   if (heart.another_law) {
     for (FeatureGroup& group : groups) group.doubt();
   }
@@ -258,6 +261,7 @@ void Mapper::forget() noexcept {
   const RealtimeScope realtime;
   finish_learning();
   keeping_.forget();
+  surface_.forget();
   intake_.discard_round();
   heart_ = HeartPhase(heart_settings(settings_), heart_.beats());
   breathing_ = Breathing(settings_.respiration);

@@ -26,6 +26,7 @@
 #include "core/pipeline/pose_history.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/shard_stages.hpp"
+#include "core/pipeline/surface_keeper.hpp"
 #include "core/realtime/worker_team.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
@@ -42,7 +43,8 @@ namespace perimap {
 class Mapper {
  public:
   Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells, WorkerTeam& team,
-         FeatureFinder& finder, BatchStarter& starter, PhaseCells& phase_cells, PipelineCounters& counters);
+         FeatureFinder& finder, BatchStarter& starter, SurfaceMaker& surface_maker, PhaseCells& phase_cells,
+         PipelineCounters& counters);
 
   void add_pose(const TrackerSample& sample) noexcept;
   // Before process(): what the respiration channel told until that capture, or later.
@@ -107,7 +109,7 @@ class Mapper {
   Parallax parallax_;
   std::unique_ptr<FrameHistory> history_;
 
-  // The features, and what is done with them. (A surface through them belongs here.)
+  // The features, and what is done with them.
   PatchTracker tracker_;
   PatchTracker view_tracker_ = LastView::tracker();
   MapBank bank_;
@@ -117,6 +119,7 @@ class Mapper {
   NeighbourMotion motion_;
   FeatureIntake intake_;
   MapKeeping keeping_;
+  SurfaceKeeper surface_;
   LoadSheddingDecision shedding_decision_;
   LoadShedding shedding_;
 

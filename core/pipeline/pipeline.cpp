@@ -18,12 +18,16 @@
 #include "core/pipeline/sensor_entrance.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/surface_composer.hpp"
+#include "core/pipeline/surface_maker.hpp"
 #include "core/pipeline/surface_state.hpp"
 #include "core/realtime/realtime_scope.hpp"
 #include "core/realtime/worker_team.hpp"
 
 namespace perimap {
 namespace {
+
+// Of the surface that is handed over, over all that is supported: 2 to 3 mm apart on a heart.
+constexpr std::size_t kMeshVertices = 1000;
 
 ComposerSettings composer_settings(const PipelineSettings& settings) {
   ComposerSettings composer;
@@ -50,6 +54,7 @@ struct Pipeline::Parts {
   WorkerTeam team;
   FeatureFinder finder;
   BatchStarter starter;
+  SurfaceMaker surface_maker;
   PhaseCells phase_cells;
   Mapper mapper;
   FrameHandle mapped_before;  // its buffer is still taken; without one before the first frame
@@ -71,7 +76,8 @@ Pipeline::Parts::Parts(const PipelineSettings& of)
       team(settings.workers),
       finder(settings, counters),
       starter(settings, slots),
-      mapper(settings, slots, cells, team, finder, starter, phase_cells, counters),
+      surface_maker(settings.estimator.layout, slots.size(), kMeshVertices, settings.lockstep),
+      mapper(settings, slots, cells, team, finder, starter, surface_maker, phase_cells, counters),
       plan({settings.latency, settings.frame_stream, settings.clock_period, settings.lead + settings.validity}),
       composers{SurfaceComposer(composer_settings(settings)), SurfaceComposer(composer_settings(settings))},
       publisher_view(cells.size()),
@@ -106,6 +112,7 @@ SensorEntrance& Pipeline::entrance() noexcept { return parts_->entrance; }
 WorkerTeam& Pipeline::team() noexcept { return parts_->team; }
 FeatureFinder& Pipeline::finder() noexcept { return parts_->finder; }
 BatchStarter& Pipeline::starter() noexcept { return parts_->starter; }
+SurfaceMaker& Pipeline::surface_maker() noexcept { return parts_->surface_maker; }
 ReleasePlan& Pipeline::plan() noexcept { return parts_->plan; }
 std::span<const FeatureSlot> Pipeline::slots() const noexcept { return parts_->slots; }
 bool Pipeline::pose_reached(Instant t) const noexcept { return parts_->mapper.pose_reached(t); }

@@ -15,6 +15,7 @@ class MapFeed;
 class ReleasePlan;
 class RespiratoryClock;
 class SensorEntrance;
+class SurfaceMaker;
 class WorkerTeam;
 struct FeatureSlot;
 struct FrameHandle;
@@ -41,6 +42,7 @@ class Pipeline {
   [[nodiscard]] WorkerTeam& team() noexcept;
   [[nodiscard]] FeatureFinder& finder() noexcept;
   [[nodiscard]] BatchStarter& starter() noexcept;
+  [[nodiscard]] SurfaceMaker& surface_maker() noexcept;
   [[nodiscard]] ReleasePlan& plan() noexcept;
   // Every feature with its match of the last frame. For tests, in lockstep: between frames nothing changes them.
   [[nodiscard]] std::span<const FeatureSlot> slots() const noexcept;

@@ -18,15 +18,21 @@ namespace {
 
 constexpr std::size_t kTouchedStack = 256 * 1024;  // more than any real-time thread has been seen to use
 
+constexpr int kBackgroundNice = 10;
+
 // What one thread asks for.
 struct ThreadRequest {
   int priority = 0;
   std::vector<int> cpus;
 };
 
+bool of_normal_scheduler(ThreadRole role) noexcept {
+  return role == ThreadRole::kHousekeeping || role == ThreadRole::kBackground;
+}
+
 ThreadRequest request_for(const SchedulingSettings& settings, ThreadRole role, int number) {
   ThreadRequest request;
-  if (settings.priority <= 0 || role == ThreadRole::kHousekeeping) return request;
+  if (settings.priority <= 0 || of_normal_scheduler(role)) return request;
   const int below = role == ThreadRole::kPublisher ? 0 : role == ThreadRole::kWorker ? 2 : 1;
   request.priority = std::max(1, settings.priority - below);
   const std::vector<int>& cpus = settings.cpus;
@@ -45,6 +51,7 @@ ThreadRequest request_for(const SchedulingSettings& settings, ThreadRole role, i
       break;
     case ThreadRole::kSource:
     case ThreadRole::kHousekeeping:
+    case ThreadRole::kBackground:
       request.cpus = cpus;
       break;
   }
@@ -99,7 +106,9 @@ std::thread ThreadLauncher::launch(std::string name, ThreadRole role, std::funct
       [this, name = std::move(name), request = request_for(settings_, role, number), role, body = std::move(body)] {
         pthread_setname_np(pthread_self(), name.substr(0, 15).c_str());
         if (!ask_for(request, settings_.cpus)) refused_.store(true, std::memory_order_relaxed);
-        if (role != ThreadRole::kHousekeeping) touch_stack();
+        // Never refused: a thread may always be nicer.
+        if (role == ThreadRole::kBackground) setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kBackgroundNice);
+        if (!of_normal_scheduler(role)) touch_stack();
         body();
       });
 }

@@ -18,11 +18,12 @@ struct SchedulingSettings {
 
 // From the most to the least urgent.
 enum class ThreadRole {
-  kPublisher,    // the publisher's own priority; the last of the processors
-  kSource,       // one below; any of the processors: it sleeps in the kernel
-  kMapper,       // one below; the first of the processors
-  kWorker,       // two below; worker i: processor i, round and round
-  kHousekeeping  // the normal scheduler, any processor of the machine
+  kPublisher,     // the publisher's own priority; the last of the processors
+  kSource,        // one below; any of the processors: it sleeps in the kernel
+  kMapper,        // one below; the first of the processors
+  kWorker,        // two below; worker i: processor i, round and round
+  kHousekeeping,  // the normal scheduler, any processor of the machine
+  kBackground     // likewise, behind whatever else is to be done (nice 10)
 };
 
 // Locks the process's memory, now and in future, so that no page fault waits for a disk; what is freed is kept for the

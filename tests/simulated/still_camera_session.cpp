@@ -8,6 +8,7 @@
 #include "core/pipeline/feature_finder.hpp"
 #include "core/pipeline/release_plan.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/surface_maker.hpp"
 #include "core/realtime/worker_team.hpp"
 #include "drivers/image/camera_frame.hpp"
 
@@ -50,12 +51,14 @@ StillCameraSession::StillCameraSession(const StillCameraSettings& settings)
   }
   threads_.emplace_back([this] { pipeline_.finder().serve(); });
   threads_.emplace_back([this] { pipeline_.starter().serve(); });
+  threads_.emplace_back([this] { pipeline_.surface_maker().serve(); });
 }
 
 StillCameraSession::~StillCameraSession() {
   pipeline_.team().dismiss();
   pipeline_.finder().dismiss();
   pipeline_.starter().dismiss();
+  pipeline_.surface_maker().dismiss();
   for (std::thread& thread : threads_) thread.join();
 }
 

@@ -1,0 +1,90 @@
+#include "core/pipeline/surface_keeper.hpp"
+
+#include <algorithm>
+
+#include "core/pipeline/feature_stages.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr Duration kMadeEvery = std::chrono::seconds(1);
+// As long as a feature is believed that nobody sees: the mean camera is where they were seen from.
+constexpr Duration kCameraMemory = kBelievedUnseen;
+
+}  // namespace
+
+SurfaceKeeper::SurfaceKeeper(std::span<FeatureSlot> slots, MapBank& bank, SurfaceMaker& maker, Duration adopted_after,
+                             PipelineCounters& counters)
+    : slots_(slots),
+      bank_(bank),
+      maker_(maker),
+      adopted_after_(adopted_after),
+      counters_(counters),
+      gathered_(slots.size()) {}
+
+void SurfaceKeeper::on_frame(const FrameRecord& frame, PhaseLaw law) noexcept {
+  if (asked_ && frame.index >= adopt_at_) {
+    const bool due = frame.index == adopt_at_;
+    asked_ = !maker_.adopt();
+    if (asked_ && due) counters_.adoptions_late.add();
+  }
+  if (frame.pose.valid()) {
+    cameras_ = std::min(cameras_ + 1, frame.rate.frames(kCameraMemory));
+    camera_W_mm_ += (frame.pose.X_WC.t - camera_W_mm_) / static_cast<double>(cameras_);
+  }
+  gather(frame);
+  if (frame.index >= next_request_at_ && fresh_ >= slots_.size() && cameras_ > 0) request(frame, law);
+}
+
+void SurfaceKeeper::gather(const FrameRecord& frame) noexcept {
+  const std::uint64_t round = frame.rate.frames(kMadeEvery);
+  const std::size_t count = (slots_.size() + round - 1) / round;
+  for (std::size_t i = 0; i < count; ++i) {
+    const FeatureSlot& slot = slots_[next_slot_];
+    Gathered& gathered = gathered_[next_slot_];
+    gathered.usable =
+        slot.state == SlotState::kMapped && slot.converged && slot.health.state() != HealthState::kInconsistent;
+    if (gathered.usable) {
+      bank_.get(static_cast<int>(next_slot_), estimate_);
+      if (slot.slow_error != nullptr) estimate_.P += slot.slow_error->covariance();
+      gathered.evidence = surface_evidence(slot.id, bank_.layout(), estimate_);
+      gathered.last_observed = slot.last_observed;
+      gathered.usable = is_usable(gathered.evidence, bank_.layout());
+    }
+    next_slot_ = (next_slot_ + 1) % slots_.size();
+    ++fresh_;
+  }
+}
+
+void SurfaceKeeper::request(const FrameRecord& frame, PhaseLaw law) noexcept {
+  SurfaceJob* job = maker_.job();
+  if (job == nullptr) return;
+  job->evidence.clear();
+  for (const Gathered& gathered : gathered_) {
+    if (gathered.usable && frame.stamp.capture - gathered.last_observed <= kBelievedUnseen) {
+      job->evidence.push_back(gathered.evidence);
+    }
+  }
+  job->camera_W_mm = camera_W_mm_;
+  job->law = law;
+  job->capture = frame.stamp.capture;
+  job->frame_sequence = frame.stamp.sequence;
+  maker_.request();
+  asked_ = true;
+  fresh_ = 0;
+  adopt_at_ = frame.index + frame.rate.frames(adopted_after_);
+  next_request_at_ = frame.index + frame.rate.frames(kMadeEvery);
+}
+
+void SurfaceKeeper::begin_again() noexcept {
+  maker_.withdraw();
+  for (Gathered& gathered : gathered_) gathered.usable = false;
+  fresh_ = 0;
+}
+
+void SurfaceKeeper::forget() noexcept {
+  begin_again();
+  cameras_ = 0;
+}
+
+}  // namespace perimap

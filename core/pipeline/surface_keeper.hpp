@@ -1,0 +1,59 @@
+// The mapper's part of the surface: gathers what it is made of, a few features a frame, asks for it, and adopts it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/frame_history.hpp"
+#include "core/pipeline/map_bank.hpp"
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/surface_maker.hpp"
+
+namespace perimap {
+
+// Nothing is allocated after construction. All members are called by the mapper thread while the workers are at rest.
+class SurfaceKeeper {
+ public:
+  // All must outlive it. `adopted_after`: from the request to the frame that adopts it, counted in frames then.
+  SurfaceKeeper(std::span<FeatureSlot> slots, MapBank& bank, SurfaceMaker& maker, Duration adopted_after,
+                PipelineCounters& counters);
+
+  // Once a frame, after its matches are settled.
+  void on_frame(const FrameRecord& frame, PhaseLaw law) noexcept;
+
+  // What the features are known to do has changed: what was made of it, and is being made, is void.
+  void begin_again() noexcept;
+  // Likewise, and the camera may be elsewhere: another patient.
+  void forget() noexcept;
+
+ private:
+  struct Gathered {
+    bool usable = false;
+    Instant last_observed;
+    SurfaceEvidence evidence;
+  };
+
+  void gather(const FrameRecord& frame) noexcept;
+  void request(const FrameRecord& frame, PhaseLaw law) noexcept;
+
+  std::span<FeatureSlot> slots_;
+  MapBank& bank_;
+  SurfaceMaker& maker_;
+  Duration adopted_after_;
+  PipelineCounters& counters_;
+
+  std::vector<Gathered> gathered_;  // by slot
+  FeatureEstimate estimate_;
+  std::size_t next_slot_ = 0;
+  std::size_t fresh_ = 0;  // slots that were gathered since the last request
+  Vector3d camera_W_mm_ = Vector3d::Zero();
+  std::uint64_t cameras_ = 0;  // that the mean is of, up to its memory
+  std::uint64_t next_request_at_ = 0;
+  std::uint64_t adopt_at_ = 0;
+  bool asked_ = false;
+};
+
+}  // namespace perimap

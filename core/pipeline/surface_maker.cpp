@@ -1,0 +1,91 @@
+#include "core/pipeline/surface_maker.hpp"
+
+#include <utility>
+
+#include "core/realtime/realtime_scope.hpp"
+
+namespace perimap {
+namespace {
+
+// Kernels change slowly, and learning them is most of the work.
+constexpr std::uint64_t kFitsAKernel = 4;
+
+}  // namespace
+
+SurfaceMaker::SurfaceMaker(const BasisLayout& layout, std::size_t features, std::size_t vertices, bool lockstep)
+    : layout_(layout), vertices_(vertices), lockstep_(lockstep) {
+  job_.evidence.reserve(features);
+}
+
+SurfaceJob* SurfaceMaker::job() noexcept {
+  return owner_.load(std::memory_order_acquire) == Owner::kMapper ? &job_ : nullptr;
+}
+
+void SurfaceMaker::request() noexcept {
+  ++job_.number;
+  owner_.store(Owner::kMaker, std::memory_order_release);
+  go_.post();
+}
+
+bool SurfaceMaker::adopt() noexcept {
+  if (lockstep_) {
+    const NamedWait wait;
+    made_.wait();
+  }
+  if (owner_.load(std::memory_order_acquire) != Owner::kMade) return false;
+  adopted_.store(job_.number, std::memory_order_relaxed);
+  owner_.store(Owner::kMapper, std::memory_order_relaxed);  // the mapper's own again: no other thread reads it now
+  return true;
+}
+
+void SurfaceMaker::withdraw() noexcept { withdrawn_.store(job_.number, std::memory_order_relaxed); }
+
+void SurfaceMaker::serve() {
+  for (;;) {
+    go_.wait();
+    if (dismissed_.load(std::memory_order_relaxed)) return;
+    if (owner_.load(std::memory_order_acquire) != Owner::kMaker) continue;
+    make();
+    owner_.store(Owner::kMade, std::memory_order_release);
+    if (lockstep_) made_.post();
+  }
+}
+
+void SurfaceMaker::dismiss() noexcept {
+  dismissed_.store(true, std::memory_order_relaxed);
+  go_.post();
+}
+
+void SurfaceMaker::make() {
+  auto made = std::make_shared<MadeSurface>();
+  made->number = job_.number;
+  made->law = job_.law;
+  made->capture = job_.capture;
+  made->frame_sequence = job_.frame_sequence;
+  const bool learn = fits_ % kFitsAKernel == 0;
+  auto surface = PeriodicSurface::fit(layout_, job_.evidence, job_.camera_W_mm, {},
+                                      learn ? std::nullopt : std::optional(kernels_), kernels_);
+  if (surface) {
+    ++fits_;
+    kernels_ = surface->kernels();
+    made->mesh = mesh_of(*surface, vertices_);
+    made->surface.emplace(*std::move(surface));
+  } else {
+    made->refusal = std::move(surface.error());
+  }
+  const std::lock_guard lock(mutex_);
+  // What was waiting was adopted before this was asked for.
+  if (waiting_) current_ = std::move(waiting_);
+  waiting_ = std::move(made);
+}
+
+std::shared_ptr<const MadeSurface> SurfaceMaker::newest() {
+  const std::lock_guard lock(mutex_);
+  if (waiting_ && waiting_->number <= adopted_.load(std::memory_order_relaxed)) current_ = std::move(waiting_);
+  if (!current_ || current_->number <= withdrawn_.load(std::memory_order_relaxed)) return nullptr;
+  return current_;
+}
+
+bool SurfaceMaker::withdrawn() const noexcept { return withdrawn_.load(std::memory_order_relaxed) > 0; }
+
+}  // namespace perimap
