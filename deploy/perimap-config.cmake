@@ -1,5 +1,6 @@
 # find_package(perimap [COMPONENTS client core]) gives
-#   perimap::client  the C types of perimap.idl, made by Cyclone DDS' compiler for the project that asks, and perimap_client.hpp;
+#   perimap::client  the C types of perimap.idl and perimap_mesh.idl, made by Cyclone DDS' compiler for the project that asks,
+#                    with perimap_client.hpp and perimap_mesh_client.hpp;
 #                    the project's languages must be C and CXX
 #   perimap::core    what perimapd computes with, without devices, files and DDS; its parts are perimap::core_phase and so on
 # A component that is named must be there. Without names: each whose own dependencies are installed.
@@ -12,7 +13,7 @@ if(NOT CycloneDDS_FOUND)
   set(perimap_client_lacks "CycloneDDS")
 elseif(NOT TARGET perimap::client)
   get_filename_component(perimap_data ${CMAKE_CURRENT_LIST_DIR} DIRECTORY)
-  idlc_generate(TARGET perimap_client FILES ${perimap_data}/perimap.idl)
+  idlc_generate(TARGET perimap_client FILES ${perimap_data}/perimap.idl ${perimap_data}/perimap_mesh.idl)
   find_path(perimap_INCLUDE_DIR perimap_client.hpp HINTS ${perimap_data}/../../include REQUIRED)
   target_include_directories(perimap_client INTERFACE ${perimap_INCLUDE_DIR})
   target_link_libraries(perimap_client INTERFACE CycloneDDS::ddsc)

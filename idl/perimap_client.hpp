@@ -310,16 +310,36 @@ inline bool predict_features(const perimap_SurfaceModel& model, std::int64_t t_n
 }
 
 inline Refusal refusal_of(const perimap_SurfaceModel& model, std::int64_t t_ns, std::int64_t now_ns,
-                          const Acceptance& acceptance, const PredictedSurface& surface) noexcept {
+                          const Acceptance& acceptance, perimap_SurfaceState state) noexcept {
   if (now_ns > model.valid_until_ns) return Refusal::kStale;
   if (t_ns < model.valid_from_ns) return Refusal::kBeforeValidity;
   if (t_ns > model.valid_until_ns) return Refusal::kBeyondValidity;
-  if (surface.state == perimap_SURFACE_GOOD) return Refusal::kNone;
-  if (surface.state == perimap_SURFACE_DEGRADED) return acceptance.degraded ? Refusal::kNone : Refusal::kDegraded;
+  if (state == perimap_SURFACE_GOOD) return Refusal::kNone;
+  if (state == perimap_SURFACE_DEGRADED) return acceptance.degraded ? Refusal::kNone : Refusal::kDegraded;
   return Refusal::kInvalid;
 }
 
 }  // namespace detail
+
+// What a model is worth at an instant, whatever is evaluated with it.
+struct SurfaceVerdict {
+  Refusal refusal = Refusal::kMalformed;
+  perimap_SurfaceState state = perimap_SURFACE_INVALID;
+  perimap_SurfaceReason reason = perimap_SURFACE_REASON_NONE;
+};
+
+inline SurfaceVerdict verdict_at(const perimap_SurfaceModel& model, std::int64_t t_ns, std::int64_t now_ns,
+                                 Acceptance acceptance) noexcept {
+  SurfaceVerdict verdict{Refusal::kNone, model.state, model.reason};
+  // A beat that is due by then and has not come: as perimapd itself will say it, unless something worse is the matter.
+  if (t_ns > model.expected_until_ns && model.state != perimap_SURFACE_INVALID &&
+      model.reason != perimap_SURFACE_REASON_RESPIRATION_UNKNOWN) {
+    verdict.state = perimap_SURFACE_DEGRADED;
+    verdict.reason = perimap_SURFACE_REASON_PHASE_FREE_RUNNING;
+  }
+  verdict.refusal = detail::refusal_of(model, t_ns, now_ns, acceptance, verdict.state);
+  return verdict;
+}
 
 // The surface at t_ns, as known from `model` at now_ns. False when refused: surface.refusal, and reason where it is
 // perimapd's, say why, and there are no features.
@@ -328,15 +348,10 @@ inline bool predict(const perimap_SurfaceModel& model, std::int64_t t_ns, std::i
   surface.features.clear();
   surface.time_ns = t_ns;
   surface.cardiac_phase_rad = surface.cardiac_phase_deviation_rad = surface.cardiac_phase_rate_rad_per_s = 0.0;
-  surface.state = model.state;
-  surface.reason = model.reason;
-  // A beat that is due by then and has not come: as perimapd itself will say it, unless something worse is the matter.
-  if (t_ns > model.expected_until_ns && model.state != perimap_SURFACE_INVALID &&
-      model.reason != perimap_SURFACE_REASON_RESPIRATION_UNKNOWN) {
-    surface.state = perimap_SURFACE_DEGRADED;
-    surface.reason = perimap_SURFACE_REASON_PHASE_FREE_RUNNING;
-  }
-  surface.refusal = detail::refusal_of(model, t_ns, now_ns, acceptance, surface);
+  const SurfaceVerdict verdict = verdict_at(model, t_ns, now_ns, acceptance);
+  surface.state = verdict.state;
+  surface.reason = verdict.reason;
+  surface.refusal = verdict.refusal;
   if (surface.refusal == Refusal::kNone && !detail::predict_features(model, t_ns, surface)) {
     surface.refusal = Refusal::kMalformed;
     surface.features.clear();
@@ -391,8 +406,9 @@ inline const char* describe(perimap_SurfaceReason reason) noexcept {
   }
 }
 
-inline const char* describe(const PredictedSurface& surface) noexcept {
-  switch (surface.refusal) {
+// `reason` where the refusal is perimapd's own.
+inline const char* describe(Refusal refusal, perimap_SurfaceReason reason) noexcept {
+  switch (refusal) {
     case Refusal::kStale:
       return "perimapd is not heard any more";
     case Refusal::kBeforeValidity:
@@ -403,11 +419,15 @@ inline const char* describe(const PredictedSurface& surface) noexcept {
       return "the model cannot be read";
     case Refusal::kInvalid:
     case Refusal::kDegraded:
-      break;
     case Refusal::kNone:
-      if (surface.state == perimap_SURFACE_GOOD) return "good";
+      break;
   }
-  return describe(surface.reason);
+  return describe(reason);
+}
+
+inline const char* describe(const PredictedSurface& surface) noexcept {
+  const bool good = surface.refusal == Refusal::kNone && surface.state == perimap_SURFACE_GOOD;
+  return good ? "good" : describe(surface.refusal, surface.reason);
 }
 
 }  // namespace perimap::client

@@ -30,6 +30,12 @@ const TopicDescription& topic_of<perimap_SurfaceModel>() noexcept {
 }
 
 template <>
+const TopicDescription& topic_of<perimap_SurfaceMesh>() noexcept {
+  static const TopicDescription topic{"perimap/surface_mesh", &perimap_SurfaceMesh_desc, true};
+  return topic;
+}
+
+template <>
 const TopicDescription& topic_of<perimap_Phase>() noexcept {
   static const TopicDescription topic{"perimap/phase", &perimap_Phase_desc, false};
   return topic;

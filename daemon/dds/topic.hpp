@@ -9,6 +9,7 @@
 
 extern "C" {
 #include "perimap.h"
+#include "perimap_mesh.h"
 }
 
 namespace perimap::dds {
@@ -28,6 +29,8 @@ template <>
 [[nodiscard]] const TopicDescription& topic_of<perimap_Surface>() noexcept;
 template <>
 [[nodiscard]] const TopicDescription& topic_of<perimap_SurfaceModel>() noexcept;
+template <>
+[[nodiscard]] const TopicDescription& topic_of<perimap_SurfaceMesh>() noexcept;
 template <>
 [[nodiscard]] const TopicDescription& topic_of<perimap_Phase>() noexcept;
 template <>

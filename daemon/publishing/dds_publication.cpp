@@ -12,12 +12,15 @@ Expected<std::unique_ptr<DdsPublication>> DdsPublication::create(const DdsSettin
   if (!surface) return tl::unexpected(surface.error());
   auto model = dds::Writer<perimap_SurfaceModel>::create(*participant);
   if (!model) return tl::unexpected(model.error());
+  auto mesh = dds::Writer<perimap_SurfaceMesh>::create(*participant);
+  if (!mesh) return tl::unexpected(mesh.error());
   auto phase = dds::Writer<perimap_Phase>::create(*participant);
   if (!phase) return tl::unexpected(phase.error());
   auto status = dds::Writer<perimap_Status>::create(*participant);
   if (!status) return tl::unexpected(status.error());
   return std::unique_ptr<DdsPublication>(new DdsPublication(settings, std::move(*participant), std::move(*surface),
-                                                            std::move(*model), std::move(*phase), std::move(*status)));
+                                                            std::move(*model), std::move(*mesh), std::move(*phase),
+                                                            std::move(*status)));
 }
 
 void DdsPublication::status(const perimap_Status& status) {

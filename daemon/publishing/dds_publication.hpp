@@ -31,6 +31,7 @@ class DdsPublication final : public Publication {
 
   void surface(const perimap_Surface& sample) override { count(surface_.write(sample)); }
   void surface_model(const perimap_SurfaceModel& model) override { count(model_.write(model)); }
+  void surface_mesh(const perimap_SurfaceMesh& mesh) override { count(mesh_.write(mesh)); }
   void phase(const perimap_Phase& phase) override { count(phase_.write(phase)); }
   void status(const perimap_Status& status) override;
 
@@ -39,12 +40,13 @@ class DdsPublication final : public Publication {
 
  private:
   DdsPublication(const DdsSettings& settings, dds::Participant participant, dds::Writer<perimap_Surface> surface,
-                 dds::Writer<perimap_SurfaceModel> model, dds::Writer<perimap_Phase> phase,
-                 dds::Writer<perimap_Status> status)
+                 dds::Writer<perimap_SurfaceModel> model, dds::Writer<perimap_SurfaceMesh> mesh,
+                 dds::Writer<perimap_Phase> phase, dds::Writer<perimap_Status> status)
       : settings_(settings),
         participant_(std::move(participant)),
         surface_(std::move(surface)),
         model_(std::move(model)),
+        mesh_(std::move(mesh)),
         phase_(std::move(phase)),
         status_(std::move(status)) {}
 
@@ -55,6 +57,7 @@ class DdsPublication final : public Publication {
   dds::Participant participant_;
   dds::Writer<perimap_Surface> surface_;
   dds::Writer<perimap_SurfaceModel> model_;
+  dds::Writer<perimap_SurfaceMesh> mesh_;
   dds::Writer<perimap_Phase> phase_;
   dds::Writer<perimap_Status> status_;
   // Relaxed: a statistic that orders nothing. Two threads publish, so it is added to atomically.

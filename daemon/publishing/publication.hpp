@@ -2,6 +2,7 @@
 #pragma once
 
 #include <perimap.h>
+#include <perimap_mesh.h>
 
 #include "core/time/instant.hpp"
 
@@ -17,6 +18,7 @@ class Publication {
 
   virtual void surface(const perimap_Surface& sample) = 0;
   virtual void surface_model(const perimap_SurfaceModel& model) = 0;
+  virtual void surface_mesh(const perimap_SurfaceMesh& /*mesh*/) {}
   virtual void phase(const perimap_Phase& phase) = 0;
   virtual void status(const perimap_Status& status) = 0;
 };

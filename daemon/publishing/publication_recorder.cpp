@@ -54,6 +54,11 @@ void PublicationRecorder::surface_model(const perimap_SurfaceModel& model) {
   keep_first_error(recorder_.write(model, from_ns(model.time_ns)));
 }
 
+void PublicationRecorder::surface_mesh(const perimap_SurfaceMesh& mesh) {
+  drain();
+  keep_first_error(recorder_.write(mesh, from_ns(mesh.time_ns)));
+}
+
 void PublicationRecorder::phase(const perimap_Phase& phase) {
   drain();
   keep_first_error(recorder_.write(phase, from_ns(phase.time_ns)));

@@ -25,6 +25,7 @@ Expected<SampleRecorder> SampleRecorder::create(const std::filesystem::path& fil
       recorder.writer_.add_channel<perimap_RecordingInfo>(channels::kRecordingInfo).map(keep(recorder.info_)),
       recorder.writer_.add_channel<perimap_Surface>(channels::kSurface).map(keep(recorder.surface_)),
       recorder.writer_.add_channel<perimap_SurfaceModel>(channels::kSurfaceModel).map(keep(recorder.model_)),
+      recorder.writer_.add_channel<perimap_SurfaceMesh>(channels::kSurfaceMesh).map(keep(recorder.mesh_)),
       recorder.writer_.add_channel<perimap_Phase>(channels::kPhase).map(keep(recorder.phase_)),
       recorder.writer_.add_channel<perimap_Status>(channels::kStatus).map(keep(recorder.status_))};
   for (const Expected<void>& result : results) {
@@ -65,6 +66,10 @@ Expected<void> SampleRecorder::write(const perimap_Surface& surface, Instant rec
 
 Expected<void> SampleRecorder::write(const perimap_SurfaceModel& model, Instant receipt) {
   return writer_.write(model_, model, receipt, from_ns(model.time_ns), short_sequence(model.sample_sequence));
+}
+
+Expected<void> SampleRecorder::write(const perimap_SurfaceMesh& mesh, Instant receipt) {
+  return writer_.write(mesh_, mesh, receipt, from_ns(mesh.time_ns), short_sequence(mesh.sample_sequence));
 }
 
 Expected<void> SampleRecorder::write(const perimap_Phase& phase, Instant receipt) {

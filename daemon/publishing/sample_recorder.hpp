@@ -2,6 +2,7 @@
 #pragma once
 
 #include <perimap.h>
+#include <perimap_mesh.h>
 
 #include <filesystem>
 #include <string>
@@ -26,6 +27,7 @@ class SampleRecorder {
 
   [[nodiscard]] Expected<void> write(const perimap_Surface& surface, Instant receipt);
   [[nodiscard]] Expected<void> write(const perimap_SurfaceModel& model, Instant receipt);
+  [[nodiscard]] Expected<void> write(const perimap_SurfaceMesh& mesh, Instant receipt);
   [[nodiscard]] Expected<void> write(const perimap_Phase& phase, Instant receipt);
   [[nodiscard]] Expected<void> write(const perimap_Status& status, Instant receipt);
   // An error says where what was kept is.
@@ -46,6 +48,7 @@ class SampleRecorder {
   ChannelId info_;
   ChannelId surface_;
   ChannelId model_;
+  ChannelId mesh_;
   ChannelId phase_;
   ChannelId status_;
 };

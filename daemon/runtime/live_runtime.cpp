@@ -10,6 +10,7 @@
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/release_plan.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/surface_maker.hpp"
 #include "core/pipeline/surface_sample.hpp"
 #include "core/realtime/deadline.hpp"
 #include "core/realtime/worker_team.hpp"
@@ -36,6 +37,7 @@ LiveRuntime::LiveRuntime(Pipeline& pipeline, const RuntimeSettings& settings, Pu
       on_status_tick_(std::move(on_status_tick)),
       wire_surfaces_(wire_surfaces(settings.identity, pipeline.settings())),
       wire_model_(settings.identity),
+      wire_mesh_(settings.identity),
       wire_phase_(settings.identity),
       wire_statuses_(wire_statuses(settings.identity, pipeline.settings())) {}
 
@@ -48,6 +50,8 @@ void LiveRuntime::start() {
   const auto housekeeping = ThreadRole::kHousekeeping;
   housekeepers_.push_back(threads_.launch("finder", housekeeping, [this] { pipeline_.finder().serve(); }));
   housekeepers_.push_back(threads_.launch("starter", housekeeping, [this] { pipeline_.starter().serve(); }));
+  housekeepers_.push_back(
+      threads_.launch("surface", ThreadRole::kBackground, [this] { pipeline_.surface_maker().serve(); }));
   mapper_ = threads_.launch("mapper", ThreadRole::kMapper, [this] { run_mapper(); });
   publisher_ = threads_.launch("publisher", ThreadRole::kPublisher, [this] { run_publisher(); });
   status_ = threads_.launch("status", housekeeping, [this] { run_status(); });
@@ -73,6 +77,7 @@ void LiveRuntime::stop() {
   for (std::thread& worker : workers_) worker.join();
   pipeline_.finder().dismiss();
   pipeline_.starter().dismiss();
+  pipeline_.surface_maker().dismiss();
   for (std::thread& housekeeper : housekeepers_) housekeeper.join();
 }
 
@@ -185,6 +190,8 @@ void LiveRuntime::run_status() {
       next_model = now + settings_.model_interval;
       turn_before = turn;
     }
+    const perimap_SurfaceMesh* mesh = wire_mesh_.news(pipeline_.surface_maker(), now, utc_minus_monotonic());
+    if (mesh != nullptr) publication_.surface_mesh(*mesh);
     {
       const std::lock_guard lock(phases_mutex_);
       phases_ = {clock.at(now).state, clock.rhythm(), respiration.state, respiration.suspected, respiration.source};

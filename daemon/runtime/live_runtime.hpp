@@ -15,6 +15,7 @@
 #include "core/realtime/wakeup.hpp"
 #include "daemon/publishing/identity.hpp"
 #include "daemon/publishing/recent_counts.hpp"
+#include "daemon/publishing/wire_mesh.hpp"
 #include "daemon/publishing/wire_model.hpp"
 #include "daemon/publishing/wire_status.hpp"
 #include "daemon/publishing/wire_surface.hpp"
@@ -37,8 +38,8 @@ struct RuntimeSettings {
 
 inline constexpr Duration kLongestPublisherRound = std::chrono::milliseconds(100);
 
-// Threads: mapper, workers, publisher (real-time when permitted), finder, starter, status. Sources are launched by
-// their owner, with threads(), and push into pipeline.entrance().
+// Threads: mapper, workers, publisher (real-time when permitted), finder, starter, surface, status. Sources are
+// launched by their owner, with threads(), and push into pipeline.entrance().
 class LiveRuntime {
  public:
   // `pipeline` and `publication` must outlive it. `on_status_tick` is called by the status thread every
@@ -92,6 +93,7 @@ class LiveRuntime {
   std::function<void(StatusFacts&)> describe_sources_;
   std::vector<WireSurface> wire_surfaces_;  // by ReleaseStream
   WireModel wire_model_;
+  WireMesh wire_mesh_;
   WirePhase wire_phase_;
   std::vector<WireStatus> wire_statuses_;  // of the streams that are published
   RecentCounts recent_;

@@ -10,6 +10,7 @@
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/release_plan.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/surface_maker.hpp"
 #include "core/pipeline/surface_sample.hpp"
 #include "core/realtime/worker_team.hpp"
 #include "daemon/publishing/publication.hpp"
@@ -29,6 +30,7 @@ LockstepRuntime::LockstepRuntime(Pipeline& pipeline, const Identity& identity, D
       publication_(publication),
       wire_surfaces_(wire_surfaces(identity, pipeline.settings())),
       wire_model_(identity),
+      wire_mesh_(identity),
       wire_phase_(identity),
       wire_statuses_(wire_statuses(identity, pipeline.settings())) {
   for (int i = 0; i < pipeline_.team().size(); ++i) {
@@ -36,12 +38,14 @@ LockstepRuntime::LockstepRuntime(Pipeline& pipeline, const Identity& identity, D
   }
   threads_.emplace_back([this] { pipeline_.finder().serve(); });
   threads_.emplace_back([this] { pipeline_.starter().serve(); });
+  threads_.emplace_back([this] { pipeline_.surface_maker().serve(); });
 }
 
 LockstepRuntime::~LockstepRuntime() {
   pipeline_.team().dismiss();
   pipeline_.finder().dismiss();
   pipeline_.starter().dismiss();
+  pipeline_.surface_maker().dismiss();
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -121,6 +125,8 @@ void LockstepRuntime::publish_reports(Instant now) {
   moment.utc_minus_monotonic = utc_minus_monotonic_;
   moment.validity += kReportInterval;
   publication_.surface_model(wire_model_.fill(moment));
+  const perimap_SurfaceMesh* mesh = wire_mesh_.news(pipeline_.surface_maker(), now, utc_minus_monotonic_);
+  if (mesh != nullptr) publication_.surface_mesh(*mesh);
   StatusFacts facts;
   facts.latency = pipeline_.settings().latency;
   facts.respiration = respiration.state;

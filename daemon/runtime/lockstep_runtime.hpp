@@ -6,6 +6,7 @@
 
 #include "core/pipeline/frame_pool.hpp"
 #include "daemon/publishing/identity.hpp"
+#include "daemon/publishing/wire_mesh.hpp"
 #include "daemon/publishing/wire_model.hpp"
 #include "daemon/publishing/wire_status.hpp"
 #include "daemon/publishing/wire_surface.hpp"
@@ -43,6 +44,7 @@ class LockstepRuntime {
   Publication& publication_;
   std::vector<WireSurface> wire_surfaces_;  // by ReleaseStream
   WireModel wire_model_;
+  WireMesh wire_mesh_;
   WirePhase wire_phase_;
   std::vector<WireStatus> wire_statuses_;  // of the streams that are published
   std::vector<std::thread> threads_;

@@ -181,6 +181,7 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
 RuntimeSettings runtime_settings(const Configuration& configuration, const Identity& identity) {
   RuntimeSettings settings;
   settings.identity = identity;
+  settings.identity.run_id = new_run_id();
   settings.scheduling = {configuration.realtime.priority, configuration.realtime.cpus};
   settings.lock_memory = configuration.realtime.lock_memory;
   settings.phase_interval = kModelsApart;  // a model is made with a phase, if at all

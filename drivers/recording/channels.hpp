@@ -27,6 +27,7 @@ inline constexpr std::string_view kTruthCamera = "truth/camera";  // perimap::Tr
 // What was published.
 inline constexpr std::string_view kSurface = "surface";             // perimap::Surface
 inline constexpr std::string_view kSurfaceModel = "surface_model";  // perimap::SurfaceModel
+inline constexpr std::string_view kSurfaceMesh = "surface_mesh";    // perimap::SurfaceMesh
 inline constexpr std::string_view kPhase = "phase";                 // perimap::Phase
 inline constexpr std::string_view kStatus = "status";               // perimap::Status
 

@@ -5,7 +5,8 @@
 
 namespace perimap {
 
-extern const std::string_view kPerimapSchemaText;   // idl/perimap.idl
-extern const std::string_view kFoxgloveSchemaText;  // idl/foxglove/foxglove.idl
+extern const std::string_view kPerimapSchemaText;      // idl/perimap.idl
+extern const std::string_view kPerimapMeshSchemaText;  // idl/perimap_mesh.idl
+extern const std::string_view kFoxgloveSchemaText;     // idl/foxglove/foxglove.idl
 
 }  // namespace perimap

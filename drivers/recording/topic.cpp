@@ -13,6 +13,10 @@ TopicType topic_type<perimap_SurfaceModel>() noexcept {
   return {&perimap_SurfaceModel_desc, kPerimapSchemaText};
 }
 template <>
+TopicType topic_type<perimap_SurfaceMesh>() noexcept {
+  return {&perimap_SurfaceMesh_desc, kPerimapMeshSchemaText};
+}
+template <>
 TopicType topic_type<perimap_Phase>() noexcept {
   return {&perimap_Phase_desc, kPerimapSchemaText};
 }

@@ -3,6 +3,7 @@
 
 #include <foxglove.h>
 #include <perimap.h>
+#include <perimap_mesh.h>
 
 #include <string_view>
 
@@ -28,6 +29,8 @@ template <>
 [[nodiscard]] TopicType topic_type<perimap_Surface>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<perimap_SurfaceModel>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_SurfaceMesh>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<perimap_Phase>() noexcept;
 template <>

@@ -31,6 +31,11 @@ void ReplayPublication::surface_model(const perimap_SurfaceModel& model) {
   for (Accuracy& accuracy : accuracies_) accuracy.add(model);
 }
 
+void ReplayPublication::surface_mesh(const perimap_SurfaceMesh& mesh) {
+  if (recorder_ != nullptr) recorder_->surface_mesh(mesh);
+  if (dds_ != nullptr) dds_->surface_mesh(mesh);
+}
+
 void ReplayPublication::phase(const perimap_Phase& phase) {
   if (recorder_ != nullptr) recorder_->phase(phase);
   if (dds_ != nullptr) dds_->phase(phase);

@@ -15,26 +15,27 @@ Expected<SampleReaders> SampleReaders::create(int domain, bool all_topics) {
   }
   auto surfaces = dds::Reader<perimap_Surface>::create(*participant);
   auto models = dds::Reader<perimap_SurfaceModel>::create(*participant);
+  auto meshes = dds::Reader<perimap_SurfaceMesh>::create(*participant);
   auto phases = dds::Reader<perimap_Phase>::create(*participant);
   auto statuses = dds::Reader<perimap_Status>::create(*participant);
   auto wait_set = dds::WaitSet::create(*participant);
   const auto error_of = [](const auto& result) { return result ? Error{} : result.error(); };
-  for (const Error& error :
-       {error_of(surfaces), error_of(models), error_of(phases), error_of(statuses), error_of(wait_set)}) {
+  for (const Error& error : {error_of(surfaces), error_of(models), error_of(meshes), error_of(phases),
+                             error_of(statuses), error_of(wait_set)}) {
     if (!error.message.empty()) {
       return tl::unexpected(error);
     }
   }
   std::vector<dds_entity_t> conditions{surfaces->condition(), statuses->condition()};
   if (all_topics) {
-    conditions.insert(conditions.end(), {models->condition(), phases->condition()});
+    conditions.insert(conditions.end(), {models->condition(), meshes->condition(), phases->condition()});
   }
   for (const dds_entity_t condition : conditions) {
     if (auto attached = wait_set->attach(condition); !attached) {
       return tl::unexpected(attached.error());
     }
   }
-  return SampleReaders{std::move(*participant), std::move(*surfaces), std::move(*models),
+  return SampleReaders{std::move(*participant), std::move(*surfaces), std::move(*models),  std::move(*meshes),
                        std::move(*phases),      std::move(*statuses), std::move(*wait_set)};
 }
 
@@ -112,6 +113,7 @@ void SampleReceiver::receive() {
     receive_samples(readers_.statuses, receipt, [&](const perimap_Status& status) { statistics_.add(status); });
     if (recorder_) {
       receive_samples(readers_.models, receipt, [](const perimap_SurfaceModel&) {});
+      receive_samples(readers_.meshes, receipt, [](const perimap_SurfaceMesh&) {});
       receive_samples(readers_.phases, receipt, [](const perimap_Phase&) {});
     }
     if (limit_reached() || !result_) {

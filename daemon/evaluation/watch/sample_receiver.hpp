@@ -21,6 +21,7 @@ struct SampleReaders {
   dds::Participant participant;
   dds::Reader<perimap_Surface> surfaces;
   dds::Reader<perimap_SurfaceModel> models;
+  dds::Reader<perimap_SurfaceMesh> meshes;
   dds::Reader<perimap_Phase> phases;
   dds::Reader<perimap_Status> statuses;
   dds::WaitSet wait_set;

@@ -11,7 +11,8 @@
 //
 // For each released frame there is a sample of `surface`, which tells when it was captured and where the camera was.
 // The newest `surface_model` says where each feature was at that very instant: perimap_client.hpp evaluates it, or
-// refuses, and then nothing is drawn but the reason.
+// refuses, and then nothing is drawn but the reason. The newest `surface_mesh` is drawn beneath it, as the surface
+// through all features: perimap_mesh_client.hpp evaluates that, by the same model's clock.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -22,6 +23,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <perimap_client.hpp>
+#include <perimap_mesh_client.hpp>
 #include <string>
 #include <vector>
 
@@ -30,6 +32,7 @@
 namespace {
 
 using perimap::client::PredictedFeature;
+using perimap::client::PredictedMesh;
 using perimap::client::PredictedSurface;
 
 struct Options {
@@ -149,6 +152,35 @@ class Output {
   cv::Mat picture_;
 };
 
+// The one surface, where there is one: its triangles, the brighter the surer. Returns why there is none.
+const char* draw_mesh(const perimap_Surface& frame, const perimap_SurfaceMesh* newest,
+                      const perimap_SurfaceModel& model, const Camera& camera, PredictedMesh& mesh, cv::Mat& picture) {
+  if (newest == nullptr) return "no surface yet";
+  if (!perimap::client::predict(*newest, model, frame.capture_time_ns, monotonic_ns(), {}, mesh)) return describe(mesh);
+  std::vector<cv::Point> places(mesh.positions_W_mm.size());
+  std::vector<bool> before(places.size());
+  constexpr int kShift = 4;  // sixteenths of a pixel
+  for (std::size_t v = 0; v < places.size(); ++v) {
+    cv::Point2d px;
+    before[v] = camera.project(frame, mesh.positions_W_mm[v], px);
+    if (before[v]) places[v] = {cvRound(px.x * (1 << kShift)), cvRound(px.y * (1 << kShift))};
+  }
+  for (const PredictedMesh::Triangle& triangle : mesh.triangles) {
+    double deviation_mm = 0.0;
+    bool visible = true;
+    for (const std::uint32_t v : triangle) {
+      deviation_mm = std::max(deviation_mm, mesh.deviations_mm[v]);
+      visible = visible && before[v];
+    }
+    if (!visible) continue;
+    const double bright = 60.0 + 140.0 * std::max(0.0, 1.0 - deviation_mm);
+    const std::array<cv::Point, 3> corners = {places[triangle[0]], places[triangle[1]], places[triangle[2]]};
+    cv::polylines(picture, std::vector<cv::Point>(corners.begin(), corners.end()), true, {bright, 0.7 * bright, 40.0},
+                  1, cv::LINE_AA, kShift);
+  }
+  return nullptr;
+}
+
 const char* name_of(perimap_FeatureState state) {
   switch (state) {
     case perimap_FEATURE_CONVERGED:
@@ -163,8 +195,8 @@ const char* name_of(perimap_FeatureState state) {
 }
 
 // Draws what is predicted for this frame and tells it; what is refused is written over the picture instead.
-void draw(const perimap_Surface& frame, const perimap_SurfaceModel* model, const Camera& camera,
-          PredictedSurface& surface, cv::Mat& picture) {
+void draw(const perimap_Surface& frame, const perimap_SurfaceModel* model, const perimap_SurfaceMesh* newest_mesh,
+          const Camera& camera, PredictedSurface& surface, PredictedMesh& mesh, cv::Mat& picture) {
   const char* refused = nullptr;
   if (model == nullptr) {
     refused = "no model yet";
@@ -179,7 +211,14 @@ void draw(const perimap_Surface& frame, const perimap_SurfaceModel* model, const
     std::printf("\"refused\": \"%s\"}\n", refused);
     return;
   }
-  std::printf("\"capture_time_ns\": %lld, \"features\": [", static_cast<long long>(frame.capture_time_ns));
+  std::printf("\"capture_time_ns\": %lld, ", static_cast<long long>(frame.capture_time_ns));
+  if (const char* none = draw_mesh(frame, newest_mesh, *model, camera, mesh, picture)) {
+    std::printf("\"mesh\": {\"refused\": \"%s\"}, ", none);
+  } else {
+    std::printf("\"mesh\": {\"vertices\": %zu, \"triangles\": %zu}, ", mesh.positions_W_mm.size(),
+                mesh.triangles.size());
+  }
+  std::printf("\"features\": [");
   const char* separator = "";
   for (const PredictedFeature& feature : surface.features) {
     cv::Point2d px;
@@ -201,8 +240,10 @@ int run(const Options& options) {
   const Participant participant(options.domain);
   Subscriber<perimap_Surface> surfaces(participant, perimap_Surface_desc, "perimap/surface", false, 16);
   Subscriber<perimap_SurfaceModel> models(participant, perimap_SurfaceModel_desc, "perimap/surface_model", true, 1);
+  Subscriber<perimap_SurfaceMesh> meshes(participant, perimap_SurfaceMesh_desc, "perimap/surface_mesh", true, 1);
 
   PredictedSurface surface;
+  PredictedMesh mesh;
   constexpr std::int64_t kSilence_ns = 10000000000;
   const std::int64_t begun = monotonic_ns();
   std::int64_t heard = begun;
@@ -210,12 +251,13 @@ int run(const Options& options) {
   while (!ended && monotonic_ns() - heard < kSilence_ns &&
          static_cast<double>(monotonic_ns() - begun) < 1e9 * options.seconds) {
     models.take([](const perimap_SurfaceModel&) {});
+    meshes.take([](const perimap_SurfaceMesh&) {});
     surfaces.take([&](const perimap_Surface& frame) {
       heard = monotonic_ns();
       // A surface of a frame that never came has no picture.
       cv::Mat picture;
       if (frame.reason == perimap_SURFACE_REASON_FRAME_MISSING || !video.read(frame.frame_sequence, picture)) return;
-      draw(frame, models.newest(), camera, surface, picture);
+      draw(frame, models.newest(), meshes.newest(), camera, surface, mesh, picture);
       output.add(picture);
     });
     dds_sleepfor(DDS_MSECS(2));

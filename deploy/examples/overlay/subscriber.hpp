@@ -24,7 +24,7 @@ class Participant {
   dds_entity_t entity_;
 };
 
-// T: a type of perimap.idl.
+// T: a type of perimap.idl or perimap_mesh.idl.
 template <class T>
 class Subscriber {
  public:

@@ -91,6 +91,7 @@ void run(const std::string& recording_path, const std::string& json_path) {
   writer.write_channel<perimap_TruthCamera>(channels::kTruthCamera);
   writer.write_channel<perimap_Surface>(channels::kSurface);
   writer.write_channel<perimap_SurfaceModel>(channels::kSurfaceModel);
+  writer.write_channel<perimap_SurfaceMesh>(channels::kSurfaceMesh);
   writer.write_channel<perimap_Phase>(channels::kPhase);
   writer.write_channel<perimap_Status>(channels::kStatus);
   writer.finish(json_path);

@@ -7,8 +7,8 @@
 
 namespace perimap::test {
 
-using EveryType = std::tuple<perimap_Surface, perimap_SurfaceModel, perimap_Phase, perimap_Status, perimap_TrackerPose,
-                             perimap_EcgSamples, perimap_RTriggerPulse, perimap_RespirationSamples,
+using EveryType = std::tuple<perimap_Surface, perimap_SurfaceModel, perimap_SurfaceMesh, perimap_Phase, perimap_Status,
+                             perimap_TrackerPose, perimap_EcgSamples, perimap_RTriggerPulse, perimap_RespirationSamples,
                              perimap_RecordingInfo, perimap_TruthMesh, perimap_TruthMotion, perimap_TruthCamera,
                              foxglove_RawImage, foxglove_CompressedImage, foxglove_PoseInFrame>;
 

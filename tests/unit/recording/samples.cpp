@@ -261,6 +261,30 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.releases_late);
 }
 
+void fill(Filler& next, perimap_SurfaceMesh& s) {
+  next(s.source);
+  next(s.frame_id);
+  next(s.run_id);
+  next(s.sample_sequence);
+  next(s.time_ns);
+  next(s.time_utc_ns);
+  next(s.valid_until_ns);
+  next(s.frame_sequence);
+  next(s.state);
+  next(s.reason);
+  next(s.phase_law);
+  next(s.cardiac_harmonics);
+  next(s.respiratory_harmonics);
+  next(s.features);
+  next(s.features_contradicting);
+  next(s.leave_one_out_rms_mm);
+  next(s.leave_one_out_nees);
+  next.sequence(s.vertex_states, 2);
+  next.sequence(s.coefficients_W_mm, 9);
+  next.sequence(s.covariances_W_mm2, 6);
+  next.sequence(s.triangles, 3);
+}
+
 void fill(Filler& next, perimap_TrackerPose& s) {
   next(s.source_time_ns);
   next(s.device_frame);
@@ -371,6 +395,7 @@ Sample<T> make_sample(unsigned seed) {
 
 template Sample<perimap_Surface> make_sample(unsigned);
 template Sample<perimap_SurfaceModel> make_sample(unsigned);
+template Sample<perimap_SurfaceMesh> make_sample(unsigned);
 template Sample<perimap_Phase> make_sample(unsigned);
 template Sample<perimap_Status> make_sample(unsigned);
 template Sample<perimap_TrackerPose> make_sample(unsigned);

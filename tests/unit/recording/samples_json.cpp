@@ -144,6 +144,30 @@ json to_json(const perimap_SurfaceModel& s) {
           MEMBER(cardiac_cycles)};
 }
 template <>
+json to_json(const perimap_SurfaceMesh& s) {
+  return {MEMBER(source),
+          MEMBER(frame_id),
+          MEMBER(run_id),
+          MEMBER(sample_sequence),
+          MEMBER(time_ns),
+          MEMBER(time_utc_ns),
+          MEMBER(valid_until_ns),
+          MEMBER(frame_sequence),
+          MEMBER(state),
+          MEMBER(reason),
+          MEMBER(phase_law),
+          MEMBER(cardiac_harmonics),
+          MEMBER(respiratory_harmonics),
+          MEMBER(features),
+          MEMBER(features_contradicting),
+          MEMBER(leave_one_out_rms_mm),
+          MEMBER(leave_one_out_nees),
+          MEMBER(vertex_states),
+          MEMBER(coefficients_W_mm),
+          MEMBER(covariances_W_mm2),
+          MEMBER(triangles)};
+}
+template <>
 json to_json(const perimap_Phase& s) {
   return {MEMBER(source),
           MEMBER(stream),
