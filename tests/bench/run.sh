@@ -11,6 +11,8 @@ cmake --build --preset release --target recording_bench -j "${1:-$(nproc)}"
 build/release/tests/bench/recording_bench
 cmake --build --preset release --target surface_bench -j "${1:-$(nproc)}"
 build/release/tests/bench/surface_bench
+cmake --build --preset release --target mesh_client_bench -j "${1:-$(nproc)}"
+build/release/tests/bench/mesh_client_bench
 if ninja -C build/release -t query vision_bench > /dev/null 2>&1; then
   cmake --build --preset release --target vision_bench -j "${1:-$(nproc)}"
   build/release/tests/bench/vision_bench
