@@ -401,6 +401,10 @@ inline const char* describe(perimap_SurfaceReason reason) noexcept {
       return "the images do not show what is mapped";
     case perimap_SURFACE_REASON_NO_PARALLAX:
       return "the camera keeps still: how far away the surface is cannot be seen";
+    case perimap_SURFACE_REASON_SETUP_DOUBTED:
+      return "hand-eye, lens or time offset are doubted";
+    case perimap_SURFACE_REASON_NOTHING_CONVERGED:
+      return "no feature has converged yet";
     default:
       return "a reason that this client does not know";
   }

@@ -38,10 +38,12 @@ struct FrameJob {
   // After B: how the features found have moved, and the pose that they agree on; null when they do not tell it.
   const NeighbourMotion* motion = nullptr;
   const CommonEstimate* shared_pose = nullptr;
-  bool no_parallax = false;        // the camera has lately been in one place
-  bool starts_fail_alike = false;  // of more features than have an estimate: it is not the single feature's fault
-  LawBelief law;                   // by which the history's phases are told
-  Instant learn_until;             // learning that has not begun by then is put off; never in lockstep
+  bool no_parallax = false;         // the camera has lately been in one place
+  bool setup_doubted = false;       // see SetupBelief
+  double setup_variance_mm2 = 0.0;  // likewise, per axis
+  bool starts_fail_alike = false;   // of more features than have an estimate: it is not the single feature's fault
+  LawBelief law;                    // by which the history's phases are told
+  Instant learn_until;              // learning that has not begun by then is put off; never in lockstep
 };
 
 }  // namespace perimap

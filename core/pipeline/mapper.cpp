@@ -1,6 +1,7 @@
 #include "core/pipeline/mapper.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 #include "core/pipeline/map_census.hpp"
@@ -14,16 +15,27 @@ HeartPhaseSettings heart_settings(const PipelineSettings& settings) noexcept {
   return {settings.law_from_image, settings.image_alone};
 }
 
+// Bit for bit: a sensor has noise, so what it gives twice is old.
+bool same_pose(const Pose& a, const Pose& b) noexcept { return a.t == b.t && a.R == b.R; }
+bool same_picture(const GreyImage& a, const GreyImage& b) noexcept {
+  if (a.data == nullptr || b.data == nullptr || a.width != b.width || a.height != b.height) return false;
+  for (int y = 0; y < a.height; ++y) {
+    if (std::memcmp(a.row(y), b.row(y), static_cast<std::size_t>(a.width)) != 0) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells,
-               WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter, SurfaceMaker& surface_maker,
-               PhaseCells& phase_cells, PipelineCounters& counters)
+               WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter, SetupWatcher& watcher,
+               SurfaceMaker& surface_maker, PhaseCells& phase_cells, PipelineCounters& counters)
     : settings_(settings),
       model_{settings.camera},
       slots_(slots),
       team_(team),
       starter_(starter),
+      watcher_(watcher),
       phase_cells_(phase_cells),
       counters_(counters),
       poses_(settings.pose),
@@ -47,6 +59,9 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
 
 void Mapper::add_pose(const TrackerSample& sample) noexcept {
   const RealtimeScope realtime;
+  const bool valid = sample.state == ToolState::kOk;
+  if (valid && last_reading_ && same_pose(*last_reading_, sample.X_WS)) counters_.poses_repeated.add();
+  last_reading_ = valid ? std::optional(sample.X_WS) : std::nullopt;
   if (!poses_.add(sample)) counters_.poses_refused.add();
   last_pose_arrival_ = std::max(last_pose_arrival_, sample.arrival);
 }
@@ -58,6 +73,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
   const Instant begun = MonotonicClock::now();
   const FrameRecord& frame = begin_frame(stamp, ecg);
   StageEnds ends;
+  if (same_picture(image, before)) counters_.frames_repeated.add();
   // A
   job_.image = image;
   job_.before = before;
@@ -72,6 +88,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
   // What the release need not wait for.
   settle_matches(frame);
   computed_before_learning_ = MonotonicClock::now() - begun;
+  watcher_.take(*history_, slots_, bank_);
   intake_.offer(frame, image, colour, room());
   keeping_.fill_feed(breathing_, heart_, counters_.maps_forgotten.get());
   surface_.on_frame(frame, heart_.clock().law().law);
@@ -92,6 +109,9 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const CardiacClo
   parallax_.add(frame.pose, stamp.capture);
   job_.no_parallax = parallax_.none();
   job_.starts_fail_alike = starts_fail_alike(slots_);
+  watcher_.adopt(frame);
+  job_.setup_doubted = watcher_.belief().doubted();
+  job_.setup_variance_mm2 = watcher_.belief().variance_mm2();
   history_->set_phase(frame, heart_.clock(), breathing_.clock());
   breathing_.expect_displacement(frame);
   job_.frame = &frame;
@@ -120,8 +140,14 @@ void Mapper::tell_earlier_frames(const HeartPhase::Change& heart, const Breathin
   if (heart.another_law) {
     for (FeatureGroup& group : groups) group.doubt();
   }
-  if (heart.other_laws) history_->retell_phases(heart_.by_ecg());
-  if (breath.told_anew) history_->retell_respiration(breathing_.clock());
+  if (heart.other_laws) {
+    history_->retell_phases(heart_.by_ecg());
+    watcher_.retell_phases(heart_.by_ecg());
+  }
+  if (breath.told_anew) {
+    history_->retell_respiration(breathing_.clock());
+    watcher_.retell_respiration(breathing_.clock());
+  }
   for (FeatureGroup& group : groups) {
     if (breath.lost_before) group.doubt();
     if (breath.begun) group.begin_breath(breathing_.wave(), breath.begun_again);
@@ -263,6 +289,7 @@ void Mapper::forget() noexcept {
   keeping_.forget();
   surface_.forget();
   intake_.discard_round();
+  watcher_.begin_window_anew();
   heart_ = HeartPhase(heart_settings(settings_), heart_.beats());
   breathing_ = Breathing(settings_.respiration);
   stages_.hand_over_nothing();

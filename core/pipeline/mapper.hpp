@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "core/phase/cardiac_clock.hpp"
@@ -24,6 +25,7 @@
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
+#include "core/pipeline/setup_watcher.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/shard_stages.hpp"
 #include "core/pipeline/surface_keeper.hpp"
@@ -43,8 +45,8 @@ namespace perimap {
 class Mapper {
  public:
   Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells, WorkerTeam& team,
-         FeatureFinder& finder, BatchStarter& starter, SurfaceMaker& surface_maker, PhaseCells& phase_cells,
-         PipelineCounters& counters);
+         FeatureFinder& finder, BatchStarter& starter, SetupWatcher& watcher, SurfaceMaker& surface_maker,
+         PhaseCells& phase_cells, PipelineCounters& counters);
 
   void add_pose(const TrackerSample& sample) noexcept;
   // Before process(): what the respiration channel told until that capture, or later.
@@ -99,10 +101,11 @@ class Mapper {
   std::span<FeatureSlot> slots_;
   WorkerTeam& team_;
   BatchStarter& starter_;
+  SetupWatcher& watcher_;
   PhaseCells& phase_cells_;
   PipelineCounters& counters_;
 
-  // What is known at a frame's capture. (A watch over the set-up, and what the map leaves unexplained, belong here.)
+  // What is known at a frame's capture. (What the map leaves unexplained belongs here.)
   PoseHistory poses_;
   HeartPhase heart_;
   Breathing breathing_;
@@ -125,6 +128,7 @@ class Mapper {
 
   Instant last_capture_;
   Instant last_pose_arrival_;
+  std::optional<Pose> last_reading_;  // of the tracker; none where it was not valid
   Instant learn_started_;
   bool learning_ = false;                 // a frame's D was begun and has not been joined
   Duration computed_before_learning_{0};  // A to C and the rest of the search, of the frame that is being learnt from

@@ -16,6 +16,7 @@
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/release_plan.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/setup_watcher.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/surface_composer.hpp"
 #include "core/pipeline/surface_maker.hpp"
@@ -54,6 +55,7 @@ struct Pipeline::Parts {
   WorkerTeam team;
   FeatureFinder finder;
   BatchStarter starter;
+  SetupWatcher watcher;
   SurfaceMaker surface_maker;
   PhaseCells phase_cells;
   Mapper mapper;
@@ -76,8 +78,9 @@ Pipeline::Parts::Parts(const PipelineSettings& of)
       team(settings.workers),
       finder(settings, counters),
       starter(settings, slots),
+      watcher(settings),
       surface_maker(settings.estimator.layout, slots.size(), kMeshVertices, settings.lockstep),
-      mapper(settings, slots, cells, team, finder, starter, surface_maker, phase_cells, counters),
+      mapper(settings, slots, cells, team, finder, starter, watcher, surface_maker, phase_cells, counters),
       plan({settings.latency, settings.frame_stream, settings.clock_period, settings.lead + settings.validity}),
       composers{SurfaceComposer(composer_settings(settings)), SurfaceComposer(composer_settings(settings))},
       publisher_view(cells.size()),
@@ -112,6 +115,7 @@ SensorEntrance& Pipeline::entrance() noexcept { return parts_->entrance; }
 WorkerTeam& Pipeline::team() noexcept { return parts_->team; }
 FeatureFinder& Pipeline::finder() noexcept { return parts_->finder; }
 BatchStarter& Pipeline::starter() noexcept { return parts_->starter; }
+SetupWatcher& Pipeline::setup_watcher() noexcept { return parts_->watcher; }
 SurfaceMaker& Pipeline::surface_maker() noexcept { return parts_->surface_maker; }
 ReleasePlan& Pipeline::plan() noexcept { return parts_->plan; }
 std::span<const FeatureSlot> Pipeline::slots() const noexcept { return parts_->slots; }

@@ -15,6 +15,7 @@ class MapFeed;
 class ReleasePlan;
 class RespiratoryClock;
 class SensorEntrance;
+class SetupWatcher;
 class SurfaceMaker;
 class WorkerTeam;
 struct FeatureSlot;
@@ -42,6 +43,7 @@ class Pipeline {
   [[nodiscard]] WorkerTeam& team() noexcept;
   [[nodiscard]] FeatureFinder& finder() noexcept;
   [[nodiscard]] BatchStarter& starter() noexcept;
+  [[nodiscard]] SetupWatcher& setup_watcher() noexcept;
   [[nodiscard]] SurfaceMaker& surface_maker() noexcept;
   [[nodiscard]] ReleasePlan& plan() noexcept;
   // Every feature with its match of the last frame. For tests, in lockstep: between frames nothing changes them.

@@ -70,6 +70,8 @@ struct PipelineCounters {
   Counter frames_without_phase;
   Counter phases_from_image;  // frames whose matches told the phase
   Counter poses_refused;      // stamps that go back in time
+  Counter poses_repeated;     // bit for bit the reading before
+  Counter frames_repeated;    // likewise, pictures
   Counter learning_put_off;
   Counter adoptions_late;
   Counter features_tracked;

@@ -55,6 +55,8 @@ struct ShardSnapshot {
   CameraPlace camera;                     // at that capture
   bool pose_missing = false;              // that frame gave no measurement for want of a pose
   bool no_parallax = false;               // the camera has lately been in one place
+  bool setup_doubted = false;             // as of that frame
+  double setup_variance_mm2 = 0.0;        // likewise, per axis
   std::vector<FeatureSnapshot> features;  // capacity reserved at start
 };
 

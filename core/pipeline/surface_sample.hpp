@@ -29,7 +29,9 @@ enum class SurfaceReason : std::uint8_t {
   kRhythmEctopic,
   kLawUndecided,
   kNotSeen,
-  kNoParallax
+  kNoParallax,
+  kSetupDoubted,
+  kNothingConverged
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost, kShed };

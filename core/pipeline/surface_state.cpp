@@ -21,9 +21,12 @@ SurfaceFooting footing_of(std::span<const ShardSnapshot* const> snapshots) noexc
     footing.pose_missing = footing.pose_missing || snapshot->pose_missing;
     sight.add(*snapshot);
     still = still || snapshot->no_parallax;
+    footing.setup_doubted = footing.setup_doubted || snapshot->setup_doubted;
+    footing.setup_variance_mm2 = std::max(footing.setup_variance_mm2, snapshot->setup_variance_mm2);
     converged = converged || std::any_of(snapshot->features.begin(), snapshot->features.end(), is_converged);
   }
   footing.no_parallax = still && !converged;
+  footing.converged = converged;
   footing.not_seen = sight.lost();
   return footing;
 }
@@ -32,15 +35,18 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (phase.state == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;
   if (phase.state == PhaseState::kLost) return SurfaceReason::kPhaseLost;
   if (!footing.mapped) return SurfaceReason::kNothingMapped;
-  if (footing.breath_doubtful) return SurfaceReason::kRespirationUnknown;
+  // A set-up that is off displaces the surface as breathing may.
+  if (footing.breath_doubtful && !footing.setup_doubted) return SurfaceReason::kRespirationUnknown;
   if (phase.state == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
   if (phase.contradicted) return SurfaceReason::kPhaseContradicted;
   if (phase.state == PhaseState::kFromImage) return SurfaceReason::kPhaseFromImage;
   if (footing.frame_missing) return SurfaceReason::kFrameMissing;
   if (footing.update_late) return SurfaceReason::kUpdateLate;
   if (footing.pose_missing) return SurfaceReason::kPoseMissing;
+  if (footing.setup_doubted) return SurfaceReason::kSetupDoubted;
   if (footing.not_seen) return SurfaceReason::kNotSeen;
   if (footing.no_parallax) return SurfaceReason::kNoParallax;
+  if (!footing.converged) return SurfaceReason::kNothingConverged;
   if (phase.ectopic) return SurfaceReason::kEctopicBeat;
   if (rhythm == Rhythm::kUnpredictable) return SurfaceReason::kRhythmUnpredictable;
   if (rhythm == Rhythm::kEctopic) return SurfaceReason::kRhythmEctopic;
@@ -64,7 +70,7 @@ SurfaceState state_of(SurfaceReason reason) noexcept {
 FeatureVerdict verdict_of(const FeatureVerdict& own, PhaseState phase, const SurfaceFooting& footing) noexcept {
   if (!usable(phase)) return {FeatureState::kInvalid, FeatureReason::kPhaseLost};
   FeatureVerdict verdict = own;
-  if (footing.breath_doubtful && verdict.state == FeatureState::kConverged) {
+  if ((footing.breath_doubtful || footing.setup_doubted) && verdict.state == FeatureState::kConverged) {
     verdict = {FeatureState::kConverging, FeatureReason::kDeviationLarge};
   }
   if (verdict.reason == FeatureReason::kNone && (footing.frame_missing || footing.update_late)) {

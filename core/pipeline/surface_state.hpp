@@ -16,8 +16,11 @@ struct SurfaceFooting {
   bool frame_missing = false;
   bool update_late = false;
   bool pose_missing = false;
-  bool not_seen = false;     // see Sight
-  bool no_parallax = false;  // the camera keeps still, and no feature has converged
+  bool not_seen = false;            // see Sight
+  bool no_parallax = false;         // the camera keeps still, and no feature has converged
+  bool converged = true;            // some of the features have
+  bool setup_doubted = false;       // see SetupBelief
+  double setup_variance_mm2 = 0.0;  // per axis, of what the set-up may be off by
 };
 
 // As far as the newest snapshots tell: whether there are features, poses and sight of them.

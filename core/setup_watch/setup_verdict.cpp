@@ -97,12 +97,15 @@ SetupVerdict judge_setup(const SetupFit& fit, const SetupVerdictSettings& settin
     const double needed = caution * (settings.doubted_chi2 + settings.doubted_chi2_per_number * (numbers - 1.0));
     if (i == 0) {
       verdict.explained = more.explained;
+      verdict.certainty = more.explained / needed;
       verdict.surface_mm = surface_mm(fit, more.deviation);
     }
     if (more.explained - blamed.explained < needed) break;
     blamed = more;
   }
   if (!blamed.numbers.empty()) verdict.surface_mm = surface_mm(fit, blamed.deviation);
+  const double by_chance = caution * settings.chance_chi2;
+  if (verdict.explained > by_chance) verdict.widening_mm = verdict.surface_mm * (1.0 - by_chance / verdict.explained);
   if (!blamed.numbers.empty() && verdict.surface_mm > settings.doubted_mm) {
     verdict.state = SetupState::kDoubted;
     verdict.blamed = blamed.parts;

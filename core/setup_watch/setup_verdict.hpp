@@ -32,6 +32,10 @@ struct SetupVerdict {
   double surface_mm = 0.0;
   double surface_deviation_mm = 0.0;
   double explained = 0.0;  // of chi-squared, by what is most to blame, doubted or not
+  double certainty = 0.0;  // that, as a multiple of what a doubt needs
+  // What is to be added to the deviation of each published position, RMS of the 3-D norm: `surface_mm` as far as it is
+  // not chance. 0 of most right set-ups.
+  double widening_mm = 0.0;
   double chi2_with = 0.0;
   double chi2_without = 0.0;
   double freedom = 0.0;
@@ -49,6 +53,9 @@ struct SetupVerdictSettings {
   double doubted_chi2 = 25.0;
   double doubted_chi2_per_number = 3.0;
   double undetermined_mm = 1.5;  // deviation of the surface
+  // So much of chi-squared is explained in hardly any window of a right set-up (docs/evidence/setup-watch.md): what is
+  // explained beyond widens, in the way of James and Stein (Proc. 4th Berkeley Symp. 1961).
+  double chance_chi2 = 16.0;
 };
 
 // Parts are blamed one after the other, each time that which explains most of what is left.

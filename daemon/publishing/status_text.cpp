@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <string>
+#include <utility>
 
+#include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 
 namespace perimap {
@@ -63,6 +65,8 @@ Json counts_json(const perimap_Status& status) {
                {"frames_too_late", status.frames_too_late},
                {"frames_without_pose", status.frames_without_pose},
                {"frames_without_phase", status.frames_without_phase},
+               {"poses_repeated", status.poses_repeated},
+               {"frames_repeated", status.frames_repeated},
                {"phases_from_image", status.phases_from_image}};
   json.update(stream_counts_json(status));
   json.update({{"learning_put_off", status.learning_put_off},
@@ -101,6 +105,7 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
                {"respiration", name_of(status.respiration)},
                {"respiration_suspected", status.respiration_suspected},
                {"respiration_source", name_of(status.respiration_source)},
+               {"setup", setup_json(status.setup)},
                {"recording", name_of(status.recording)},
                {"messages_recorded", status.messages_recorded},
                {"frames_not_recorded", status.frames_not_recorded},
@@ -135,6 +140,10 @@ std::string status_line(const perimap_Status& status) {
     line += fmt::format(", {} followed with {} of the {} matches of a start", status.features_tracked,
                         status.start_matches_mean, status.start_matches_needed);
   }
+  for (const auto& [count, what] : {std::pair(status.poses_repeated, "poses"), {status.frames_repeated, "pictures"}}) {
+    if (count > 0) line += fmt::format(", {} {} were the ones before bit for bit", count, what);
+  }
+  if (status.setup.state == perimap_SETUP_DOUBTED) line += ", set-up " + setup_words(status.setup);
   for (const perimap_SourceStatus& source : std::span(status.sources._buffer, status.sources._length)) {
     if (source.state != perimap_SOURCE_OK) line += fmt::format(", {} {}", name_of(source.kind), name_of(source.state));
   }

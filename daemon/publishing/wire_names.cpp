@@ -19,11 +19,11 @@ std::string_view name_of(perimap_SurfaceState state) noexcept {
 }
 
 std::string_view name_of(perimap_SurfaceReason reason) noexcept {
-  return name_in<17>(
-      {"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing", "update_late",
-       "pose_missing", "phase_contradicted", "respiration_unknown", "phase_from_image", "ectopic_beat",
-       "rhythm_unpredictable", "rhythm_ectopic", "law_undecided", "not_seen", "no_parallax"},
-      static_cast<int>(reason));
+  return name_in<19>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
+                      "update_late", "pose_missing", "phase_contradicted", "respiration_unknown", "phase_from_image",
+                      "ectopic_beat", "rhythm_unpredictable", "rhythm_ectopic", "law_undecided", "not_seen",
+                      "no_parallax", "setup_doubted", "nothing_converged"},
+                     static_cast<int>(reason));
 }
 
 std::string_view name_of(perimap_FeatureState state) noexcept {
@@ -71,6 +71,10 @@ std::string_view name_of(perimap_SourceKind kind) noexcept {
 
 std::string_view name_of(perimap_SourceState state) noexcept {
   return name_in<5>({"starting", "ok", "stalled", "ended", "closed"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_SetupState state) noexcept {
+  return name_in<4>({"unknown", "undetermined", "consistent", "doubted"}, static_cast<int>(state));
 }
 
 }  // namespace perimap

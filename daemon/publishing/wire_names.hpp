@@ -22,4 +22,6 @@ namespace perimap {
 [[nodiscard]] std::string_view name_of(perimap_SourceKind kind) noexcept;
 [[nodiscard]] std::string_view name_of(perimap_SourceState state) noexcept;
 
+[[nodiscard]] std::string_view name_of(perimap_SetupState state) noexcept;
+
 }  // namespace perimap

@@ -3,6 +3,7 @@
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/surface_sample.hpp"
+#include "core/setup_watch/setup_verdict.hpp"
 
 namespace perimap {
 
@@ -54,6 +55,10 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_NOT_SEEN;
     case SurfaceReason::kNoParallax:
       return perimap_SURFACE_REASON_NO_PARALLAX;
+    case SurfaceReason::kSetupDoubted:
+      return perimap_SURFACE_REASON_SETUP_DOUBTED;
+    case SurfaceReason::kNothingConverged:
+      return perimap_SURFACE_REASON_NOTHING_CONVERGED;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }
@@ -154,6 +159,20 @@ perimap_RespirationSource to_wire(RespirationSource source) noexcept {
       break;
   }
   return perimap_RESPIRATION_SOURCE_NONE;
+}
+
+perimap_SetupState to_wire(SetupState state) noexcept {
+  switch (state) {
+    case SetupState::kUndetermined:
+      return perimap_SETUP_UNDETERMINED;
+    case SetupState::kConsistent:
+      return perimap_SETUP_CONSISTENT;
+    case SetupState::kDoubted:
+      return perimap_SETUP_DOUBTED;
+    case SetupState::kUnknown:
+      break;
+  }
+  return perimap_SETUP_UNKNOWN;
 }
 
 }  // namespace perimap

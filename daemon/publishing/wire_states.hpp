@@ -14,6 +14,7 @@ enum class PhaseState : std::uint8_t;
 enum class RespirationSource : std::uint8_t;
 enum class RespirationState : std::uint8_t;
 enum class Rhythm : std::uint8_t;
+enum class SetupState : std::uint8_t;
 enum class SurfaceReason : std::uint8_t;
 enum class SurfaceState : std::uint8_t;
 
@@ -24,6 +25,7 @@ enum class SurfaceState : std::uint8_t;
 [[nodiscard]] perimap_RespirationSource to_wire(RespirationSource source) noexcept;
 [[nodiscard]] perimap_RespirationState to_wire(RespirationState state) noexcept;
 [[nodiscard]] perimap_Rhythm to_wire(Rhythm rhythm) noexcept;
+[[nodiscard]] perimap_SetupState to_wire(SetupState state) noexcept;
 [[nodiscard]] perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept;
 [[nodiscard]] perimap_SurfaceState to_wire(SurfaceState state) noexcept;
 

@@ -98,6 +98,26 @@ perimap_StageLatency stage_latency(perimap_StageKind kind, const LatencyHistogra
   return wire;
 }
 
+perimap_SetupWatch to_wire(const SetupBelief& belief) noexcept {
+  const SetupVerdict& told = belief.told();
+  const bool doubted = belief.doubted();
+  perimap_SetupWatch wire{};
+  wire.state = to_wire(told.state);
+  wire.windows = belief.judged();
+  std::copy(told.blamed.begin(), told.blamed.end(), wire.blamed);
+  const SetupVector& numbers = doubted ? told.blamed_deviation : told.deviation;
+  const SetupVector& deviations = doubted ? told.blamed_uncertainty : told.uncertainty;
+  std::copy(numbers.begin(), numbers.end(), wire.numbers);
+  std::copy(deviations.begin(), deviations.end(), wire.deviations);
+  // An offset that is greater takes the pose of an earlier reading.
+  wire.numbers[kTimeAt] = -wire.numbers[kTimeAt];
+  wire.surface_mm = told.surface_mm;
+  wire.surface_deviation_mm = told.surface_deviation_mm;
+  wire.widened_mm = belief.widening_mm();
+  wire.first_doubted_ns = belief.first_doubted().value_or(Duration(0)).count();
+  return wire;
+}
+
 }  // namespace
 
 SourceStates source_states(const PipelineCounters& counters, const StatusFacts& facts, Instant now) noexcept {
@@ -165,6 +185,9 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.phase_state = to_wire(facts.phase);
   wire_.rhythm = to_wire(facts.rhythm);
   wire_.latency_short = facts.latency_short;
+  wire_.setup = to_wire(facts.setup);
+  wire_.poses_repeated = c.poses_repeated.get();
+  wire_.frames_repeated = c.frames_repeated.get();
 
   std::uint32_t sources = 0;
   for_each_source(c, facts, [&](const SourceFacts& source) noexcept {

@@ -9,6 +9,7 @@
 
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/respiratory_clock.hpp"
+#include "core/setup_watch/setup_belief.hpp"
 #include "core/time/instant.hpp"
 #include "daemon/publishing/identity.hpp"
 #include "daemon/publishing/recent_counts.hpp"
@@ -41,6 +42,7 @@ struct StatusFacts {
   RespirationState respiration = RespirationState::kOff;
   bool respiration_suspected = false;
   RespirationSource respiration_source = RespirationSource::kNone;
+  SetupBelief setup;
   RecordingFacts recording;
   PhaseState phase = PhaseState::kUnknown;
   Rhythm rhythm = Rhythm::kUnknown;

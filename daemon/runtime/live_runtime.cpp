@@ -10,6 +10,7 @@
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/release_plan.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/setup_watcher.hpp"
 #include "core/pipeline/surface_maker.hpp"
 #include "core/pipeline/surface_sample.hpp"
 #include "core/realtime/deadline.hpp"
@@ -52,6 +53,8 @@ void LiveRuntime::start() {
   housekeepers_.push_back(threads_.launch("starter", housekeeping, [this] { pipeline_.starter().serve(); }));
   housekeepers_.push_back(
       threads_.launch("surface", ThreadRole::kBackground, [this] { pipeline_.surface_maker().serve(); }));
+  housekeepers_.push_back(
+      threads_.launch("setup-watch", ThreadRole::kBackground, [this] { pipeline_.setup_watcher().serve(); }));
   mapper_ = threads_.launch("mapper", ThreadRole::kMapper, [this] { run_mapper(); });
   publisher_ = threads_.launch("publisher", ThreadRole::kPublisher, [this] { run_publisher(); });
   status_ = threads_.launch("status", housekeeping, [this] { run_status(); });
@@ -78,6 +81,7 @@ void LiveRuntime::stop() {
   pipeline_.finder().dismiss();
   pipeline_.starter().dismiss();
   pipeline_.surface_maker().dismiss();
+  pipeline_.setup_watcher().dismiss();
   for (std::thread& housekeeper : housekeepers_) housekeeper.join();
 }
 
@@ -92,12 +96,13 @@ StatusFacts LiveRuntime::facts() const {
   facts.r_trigger = pipeline_.settings().r_trigger.has_value();
   facts.respiration_channel = pipeline_.settings().respiration.channel;
   facts.sources_ended = sources_ended_.load(std::memory_order_relaxed);
-  const std::lock_guard lock(phases_mutex_);
-  facts.phase = phases_.phase;
-  facts.rhythm = phases_.rhythm;
-  facts.respiration = phases_.respiration;
-  facts.respiration_suspected = phases_.respiration_suspected;
-  facts.respiration_source = phases_.respiration_source;
+  const std::lock_guard lock(beliefs_mutex_);
+  facts.phase = beliefs_.phase;
+  facts.rhythm = beliefs_.rhythm;
+  facts.respiration = beliefs_.respiration;
+  facts.respiration_suspected = beliefs_.respiration_suspected;
+  facts.respiration_source = beliefs_.respiration_source;
+  facts.setup = beliefs_.setup;
   return facts;
 }
 
@@ -193,8 +198,9 @@ void LiveRuntime::run_status() {
     const perimap_SurfaceMesh* mesh = wire_mesh_.news(pipeline_.surface_maker(), now, utc_minus_monotonic());
     if (mesh != nullptr) publication_.surface_mesh(*mesh);
     {
-      const std::lock_guard lock(phases_mutex_);
-      phases_ = {clock.at(now).state, clock.rhythm(), respiration.state, respiration.suspected, respiration.source};
+      const std::lock_guard lock(beliefs_mutex_);
+      beliefs_ = {clock.at(now).state,   clock.rhythm(),     respiration.state,
+                  respiration.suspected, respiration.source, pipeline_.setup_watcher().status_belief()};
     }
     StatusFacts told = facts();
     if (describe_sources_) describe_sources_(told);

@@ -72,13 +72,14 @@ class LiveRuntime {
   [[nodiscard]] StatusFacts facts() const;
 
  private:
-  // Of heart and breath, as the status thread found them last: the pipeline's cells have one reader.
-  struct Phases {
+  // Of heart, breath and set-up, as the status thread found them last: the pipeline's cells have one reader.
+  struct Beliefs {
     PhaseState phase = PhaseState::kUnknown;
     Rhythm rhythm = Rhythm::kUnknown;
     RespirationState respiration = RespirationState::kOff;
     bool respiration_suspected = false;
     RespirationSource respiration_source = RespirationSource::kNone;
+    SetupBelief setup;
   };
 
   void run_mapper() noexcept;
@@ -97,8 +98,8 @@ class LiveRuntime {
   WirePhase wire_phase_;
   std::vector<WireStatus> wire_statuses_;  // of the streams that are published
   RecentCounts recent_;
-  mutable std::mutex phases_mutex_;
-  Phases phases_;
+  mutable std::mutex beliefs_mutex_;
+  Beliefs beliefs_;
   Wakeup status_wakeup_;
   std::vector<std::thread> workers_;
   std::vector<std::thread> housekeepers_;

@@ -17,6 +17,7 @@
 #include "daemon/process/service_manager.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/publishing/publication.hpp"
+#include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/status_text.hpp"
 #include "daemon/runtime/latency_check.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
@@ -131,6 +132,7 @@ Expected<void> LiveSession::run(StopSignal& stop) {
     warn_of_refused_privileges();
     warn_of_short_latency();
     tell_of_shedding();
+    tell_of_setup();
     if (!told_end && feeder_->ended()) {
       runtime_.end_of_sources();
       told_end = true;
@@ -200,6 +202,20 @@ void LiveSession::tell_of_shedding() {
                  milliseconds(pipeline_.settings().budget), shed);
   } else {
     spdlog::info("all features are looked for again");
+  }
+}
+
+// Each time that it is doubted, or is not any more; by how much goes on in the status.
+void LiveSession::tell_of_setup() {
+  if (++setup_ticks_ % kTicksAStatus != 0) return;
+  const perimap_SetupWatch& setup = service_status_.fill(pipeline_.counters(), facts(), MonotonicClock::now()).setup;
+  const bool doubted = setup.state == perimap_SETUP_DOUBTED;
+  if (doubted == setup_told_) return;
+  setup_told_ = doubted;
+  if (doubted) {
+    spdlog::warn("the set-up is {}", setup_words(setup));
+  } else {
+    spdlog::info("the set-up is not doubted any more");
   }
 }
 

@@ -64,6 +64,7 @@ class LiveSession {
   void warn_of_refused_privileges();
   void warn_of_short_latency();
   void tell_of_shedding();
+  void tell_of_setup();
 
   Pipeline& pipeline_;
   LiveRuntime runtime_;
@@ -88,6 +89,8 @@ class LiveSession {
   bool privileges_told_ = false;
   bool latency_checked_ = false;
   bool shedding_told_ = false;
+  std::uint64_t setup_ticks_ = 0;
+  bool setup_told_ = false;
 };
 
 }  // namespace perimap

@@ -10,6 +10,7 @@
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/release_plan.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/setup_watcher.hpp"
 #include "core/pipeline/surface_maker.hpp"
 #include "core/pipeline/surface_sample.hpp"
 #include "core/realtime/worker_team.hpp"
@@ -39,6 +40,7 @@ LockstepRuntime::LockstepRuntime(Pipeline& pipeline, const Identity& identity, D
   threads_.emplace_back([this] { pipeline_.finder().serve(); });
   threads_.emplace_back([this] { pipeline_.starter().serve(); });
   threads_.emplace_back([this] { pipeline_.surface_maker().serve(); });
+  threads_.emplace_back([this] { pipeline_.setup_watcher().serve(); });
 }
 
 LockstepRuntime::~LockstepRuntime() {
@@ -46,6 +48,7 @@ LockstepRuntime::~LockstepRuntime() {
   pipeline_.finder().dismiss();
   pipeline_.starter().dismiss();
   pipeline_.surface_maker().dismiss();
+  pipeline_.setup_watcher().dismiss();
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -132,6 +135,7 @@ void LockstepRuntime::publish_reports(Instant now) {
   facts.respiration = respiration.state;
   facts.respiration_suspected = respiration.suspected;
   facts.respiration_source = respiration.source;
+  facts.setup = pipeline_.setup_watcher().status_belief();
   facts.phase = clock.at(now).state;
   facts.rhythm = clock.rhythm();
   facts.r_trigger = pipeline_.settings().r_trigger.has_value();

@@ -73,6 +73,13 @@ class Walker {
     return align(bytes < 4 ? bytes : 4, limit) && skip(count * bytes, limit);
   }
 
+  bool check_booleans(std::uint64_t count, std::size_t limit) noexcept {
+    for (std::uint64_t i = 0; i < count; ++i) {
+      if (!skip(1, limit) || std::to_integer<unsigned>(body_[at_ - 1]) > 1) return false;
+    }
+    return true;
+  }
+
   // `max_bytes` counts the terminator.
   bool check_string(std::uint32_t max_bytes, std::size_t limit) noexcept {
     std::uint32_t length = 0;
@@ -108,7 +115,7 @@ class Walker {
       case DDS_OP_VAL_8BY:
         return check_numbers(type, 1, limit);
       case DDS_OP_VAL_BLN:
-        return skip(1, limit) && std::to_integer<unsigned>(body_[at_ - 1]) <= 1;
+        return check_booleans(1, limit);
       case DDS_OP_VAL_ENU: {
         std::uint32_t value = 0;
         return DDS_OP_TYPE_SZ(instruction) == sizeof(value) && take(value, limit) && value <= ops[2];
@@ -120,6 +127,7 @@ class Walker {
       case DDS_OP_VAL_SEQ:
         return check_sequence(ops, limit);
       case DDS_OP_VAL_ARR:
+        if (DDS_OP_SUBTYPE(instruction) == DDS_OP_VAL_BLN) return check_booleans(ops[2], limit);
         return check_numbers(DDS_OP_SUBTYPE(instruction), ops[2], limit);
       case DDS_OP_VAL_EXT:
         return check_value(ops + DDS_OP_ADR_JSR(ops[2]), limit);

@@ -8,6 +8,7 @@
 #include "core/pipeline/feature_finder.hpp"
 #include "core/pipeline/release_plan.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/setup_watcher.hpp"
 #include "core/pipeline/surface_maker.hpp"
 #include "core/realtime/worker_team.hpp"
 #include "drivers/image/camera_frame.hpp"
@@ -52,6 +53,7 @@ StillCameraSession::StillCameraSession(const StillCameraSettings& settings)
   threads_.emplace_back([this] { pipeline_.finder().serve(); });
   threads_.emplace_back([this] { pipeline_.starter().serve(); });
   threads_.emplace_back([this] { pipeline_.surface_maker().serve(); });
+  threads_.emplace_back([this] { pipeline_.setup_watcher().serve(); });
 }
 
 StillCameraSession::~StillCameraSession() {
@@ -59,6 +61,7 @@ StillCameraSession::~StillCameraSession() {
   pipeline_.finder().dismiss();
   pipeline_.starter().dismiss();
   pipeline_.surface_maker().dismiss();
+  pipeline_.setup_watcher().dismiss();
   for (std::thread& thread : threads_) thread.join();
 }
 

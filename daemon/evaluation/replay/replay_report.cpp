@@ -6,6 +6,7 @@
 
 #include "core/pipeline/pipeline.hpp"
 #include "daemon/evaluation/report/accuracy_text.hpp"
+#include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 #include "daemon/publishing/wire_states.hpp"
 #include "daemon/publishing/wire_status.hpp"
@@ -45,6 +46,13 @@ std::string breath_text(const RespiratoryClock& clock) {
   return clock.suspected ? "breathing   suspected, and positions leave it out: set respiration.enabled = true\n" : "";
 }
 
+std::string setup_text(const perimap_SetupWatch& setup) {
+  const std::string words = setup_words(setup);
+  if (setup.first_doubted_ns == 0) return fmt::format("set-up      {}\n", words);
+  return fmt::format("set-up      {} (doubted first {:.1f} s after the first frame)\n", words,
+                     to_seconds(Duration(setup.first_doubted_ns)));
+}
+
 }  // namespace
 
 std::string to_text(const ReplayReport& report) {
@@ -56,6 +64,7 @@ std::string to_text(const ReplayReport& report) {
                     name_of(s.stream), s.samples, s.without_frame, s.from_late_update, s.missed, s.late);
   }
   text += fmt::format("\n{}\n{}", stage_table(report), breath_text(report.breathing));
+  text += setup_text(report.setup);
   for (const ReplayReport::Stream& s : report.streams) {
     if (!s.accuracy) continue;
     if (report.streams.size() > 1) text += fmt::format("stream {}\n", name_of(s.stream));
@@ -77,6 +86,7 @@ nlohmann::json to_json(const ReplayReport& report) {
     (&s == &report.streams.front() ? json : told)["accuracy"] = to_json(*s.accuracy);
   }
   if (report.surface) json["surface"] = to_json(*report.surface);
+  json["setup"] = setup_json(report.setup);
   json["breath_s"] = to_seconds(report.breathing.period());
   json["breath_suspected"] = report.breathing.suspected;
   json["breath_state"] = name_of(to_wire(report.breathing.state));

@@ -1,6 +1,8 @@
 // What a replay came to.
 #pragma once
 
+#include <perimap.h>
+
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -38,6 +40,7 @@ struct ReplayReport {
   std::vector<Stage> stages;
   std::optional<SurfaceFigures> surface;  // in lockstep, where there is a truth
   RespiratoryClock breathing;
+  perimap_SetupWatch setup{};
   nlohmann::json counts;  // of the first stream's status, and of the sources
 };
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "core/pipeline/setup_watcher.hpp"
 #include "daemon/evaluation/replay/replay_publication.hpp"
 #include "daemon/evaluation/report/recorded_beats.hpp"
 #include "daemon/evaluation/report/recorded_truth.hpp"
@@ -42,8 +43,9 @@ std::vector<ReplayReport::Stage> stages(const PipelineCounters& c, const Pipelin
 }
 
 // What the status of `stream` counts.
-perimap_Status counted(const Identity& identity, ReleaseStream stream, const PipelineCounters& counters) {
-  perimap_Status status = WireStatus(identity.of(stream)).fill(counters, {}, Instant{});
+perimap_Status counted(const Identity& identity, ReleaseStream stream, const PipelineCounters& counters,
+                       const StatusFacts& facts = {}) {
+  perimap_Status status = WireStatus(identity.of(stream)).fill(counters, facts, Instant{});
   status.sources = {};
   status.stages = {};
   return status;
@@ -111,7 +113,11 @@ ReplayReport report_of(Pipeline& pipeline, const Identity& identity, ReplayPubli
   }
   report.stages = stages(counters, settings);
   report.breathing = pipeline.status_respiration();
-  report.counts = counts(counted(identity, report.streams.front().stream, counters), counters);
+  StatusFacts facts;
+  facts.setup = pipeline.setup_watcher().status_belief();
+  const perimap_Status status = counted(identity, report.streams.front().stream, counters, facts);
+  report.setup = status.setup;
+  report.counts = counts(status, counters);
   return report;
 }
 

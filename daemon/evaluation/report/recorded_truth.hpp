@@ -35,7 +35,8 @@ struct RecordedTruth {
   return reason == perimap_SURFACE_REASON_NONE || reason == perimap_SURFACE_REASON_ECTOPIC_BEAT ||
          reason == perimap_SURFACE_REASON_RHYTHM_UNPREDICTABLE || reason == perimap_SURFACE_REASON_RHYTHM_ECTOPIC ||
          reason == perimap_SURFACE_REASON_LAW_UNDECIDED || reason == perimap_SURFACE_REASON_NOT_SEEN ||
-         reason == perimap_SURFACE_REASON_NO_PARALLAX;
+         reason == perimap_SURFACE_REASON_NO_PARALLAX || reason == perimap_SURFACE_REASON_NOTHING_CONVERGED ||
+         reason == perimap_SURFACE_REASON_SETUP_DOUBTED;
 }
 
 // Nothing when the recording has no ground truth (it is not a simulated one).

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/angle/angle.hpp"
+#include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/status_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 
@@ -109,6 +110,9 @@ std::string report_line(const StreamReport& report) {
                         last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian, features_text(last), state_text(last));
   }
   if (report.status) line += stages_text(*report.status);
+  if (report.status && report.status->status.setup.state == perimap_SETUP_DOUBTED) {
+    line += " | set-up " + setup_words(report.status->status.setup);
+  }
   if (report.status && report.status->status.recording == perimap_RECORDING_STOPPED) line += " | RECORDING STOPPED";
   return line;
 }
@@ -124,6 +128,7 @@ std::string summary_text(const StreamReport& report) {
   if (report.last) {
     text += fmt::format("  last surface: {}; {}\n", state_text(*report.last), features_text(*report.last));
   }
+  if (report.status) text += fmt::format("  set-up: {}\n", setup_words(report.status->status.setup));
   if (report.status && !report.status->stages.empty()) text += stage_table(*report.status);
   return text;
 }

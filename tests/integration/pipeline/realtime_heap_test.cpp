@@ -27,6 +27,7 @@
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "core/pipeline/setup_watcher.hpp"
 #include "core/realtime/realtime_scope.hpp"
 #include "core/realtime/wakeup.hpp"
 #include "daemon/publishing/publication.hpp"
@@ -67,8 +68,8 @@ void expect_none() {
   EXPECT_EQ(calls.blocking, 0) << calls.first_blocking;
 }
 
-ReplaySetup setup() {
-  auto made = prepare_replay(PERIMAP_TEST_RECORDING, std::nullopt, ReadMode::kStrict);
+ReplaySetup setup(const char* recording = PERIMAP_TEST_RECORDING) {
+  auto made = prepare_replay(recording, std::nullopt, ReadMode::kStrict);
   if (!made) throw std::runtime_error(made.error().error.message);
   return std::move(*made);
 }
@@ -173,6 +174,23 @@ TEST_P(RealtimePathIn, NeitherAllocatesNorBlocksInLockstepFromFirstFrameToMapped
 
 INSTANTIATE_TEST_SUITE_P(EachPrecision, RealtimePathIn, testing::Values(Precision::kDouble, Precision::kSingle),
                          [](const auto& param) { return param.param == Precision::kDouble ? "Double" : "Single"; });
+
+TEST(RealtimePath, NeitherAllocatesNorBlocksWhileTheSetUpIsJudged) {
+  ReplaySetup s = setup(PERIMAP_TEST_LONGER_RECORDING);
+  s.pipeline.lockstep = true;
+  Pipeline pipeline(s.pipeline);
+  LastSurface publication;
+  LockstepRuntime runtime(pipeline, s.identity, s.utc_minus_monotonic, publication);
+  forget_forbidden_calls();
+  for (;;) {
+    auto event = s.reader.next();
+    ASSERT_TRUE(event.has_value()) << event.error().message;
+    if (!*event) break;
+    runtime.deliver(**event);
+  }
+  expect_none();
+  EXPECT_GT(pipeline.setup_watcher().status_belief().judged(), 0U);
+}
 
 // With the shortest of budgets, so that features are shed.
 TEST(RealtimePath, NeitherAllocatesNorBlocksLiveWithAllThreads) {

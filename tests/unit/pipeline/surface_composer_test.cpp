@@ -68,6 +68,18 @@ TEST(SurfaceComposer, NothingIsCalledGoodBeforeTheImagesHaveCorrectedTheBreath) 
   EXPECT_EQ(states(), std::pair(SurfaceReason::kNone, FeatureState::kConverged));
 }
 
+TEST(SurfaceComposer, WidensByWhatTheSetUpMayBeOffBy) {
+  SurfaceComposer composer(settings());
+  ShardSnapshot snapshot = shard(100, {feature(1, 0.0)});
+  const std::array<const ShardSnapshot*, 1> view = {&snapshot};
+  const auto variance = [&] {
+    return composer.compose(kRelease, steady_clock(), {}, view).features.at(0).covariance_W_mm2(1, 1);
+  };
+  const double before = variance();
+  snapshot.setup_variance_mm2 = 0.25;
+  EXPECT_NEAR(variance(), before + 0.25, 1e-12);
+}
+
 TEST(SurfaceComposer, EvaluatesPositionAndVelocityAtTheValidTimesPhase) {
   SurfaceComposer composer(settings());
   const ShardSnapshot snapshot = shard(100, {feature(1, 4.0)});

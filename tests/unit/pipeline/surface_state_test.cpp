@@ -50,6 +50,37 @@ TEST(SurfaceState, IsDegradedWhileTheCameraKeepsStillAndNothingHasConverged) {
       << "it was seen before";
 }
 
+TEST(SurfaceState, IsDegradedWhileTheSetUpIsDoubtedAndNothingIsCalledConverged) {
+  ShardSnapshot shard;
+  shard.setup_doubted = true;
+  shard.setup_variance_mm2 = 3.0;
+  shard.features.resize(1);
+  shard.features[0].state = FeatureState::kConverged;
+  shard.features[0].expected = shard.features[0].in_sight = true;
+  const ShardSnapshot other;
+  const ShardSnapshot* const shards[] = {&other, &shard};
+  SurfaceFooting footing = footing_of(shards);
+  EXPECT_EQ(footing.setup_variance_mm2, 3.0);
+  footing.breath_doubtful = true;
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing), SurfaceReason::kSetupDoubted)
+      << "a set-up that is off displaces the surface as breathing may";
+  EXPECT_EQ(state_of(SurfaceReason::kSetupDoubted), SurfaceState::kDegraded);
+  footing.frame_missing = true;
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing), SurfaceReason::kFrameMissing);
+  footing = footing_of(shards);
+  EXPECT_EQ(verdict_of({FeatureState::kConverged, FeatureReason::kNone}, PhaseState::kLocked, footing).state,
+            FeatureState::kConverging);
+}
+
+TEST(SurfaceState, IsNotGoodWithoutAFeatureThatHasConverged) {
+  ShardSnapshot shard;
+  shard.features.resize(1);
+  shard.features[0].state = FeatureState::kConverging;
+  const ShardSnapshot* const shards[] = {&shard};
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing_of(shards)), SurfaceReason::kNothingConverged);
+  EXPECT_EQ(state_of(SurfaceReason::kNothingConverged), SurfaceState::kDegraded);
+}
+
 TEST(SurfaceState, TellsWhatIsWorseFirst) {
   PhaseEstimate phase = locked();
   phase.law_undecided = true;

@@ -206,6 +206,18 @@ void fill(Filler& next, perimap_StageLatency& s) {
   next(s.recent_max_ns);
 }
 
+void fill(Filler& next, perimap_SetupWatch& s) {
+  next(s.state);
+  next(s.windows);
+  next(s.blamed);
+  next(s.numbers);
+  next(s.deviations);
+  next(s.surface_mm);
+  next(s.surface_deviation_mm);
+  next(s.widened_mm);
+  next(s.first_doubted_ns);
+}
+
 void fill(Filler& next, perimap_Status& s) {
   next(s.source);
   next(s.stream);
@@ -259,6 +271,9 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.start_matches_most);
   next(s.start_matches_mean);
   next(s.releases_late);
+  fill(next, s.setup);
+  next(s.poses_repeated);
+  next(s.frames_repeated);
 }
 
 void fill(Filler& next, perimap_SurfaceMesh& s) {

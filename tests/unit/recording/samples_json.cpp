@@ -205,6 +205,18 @@ json to_json(const perimap_StageLatency& s) {
           MEMBER(recent_p99_ns), MEMBER(recent_p999_ns), MEMBER(recent_max_ns)};
 }
 template <>
+json to_json(const perimap_SetupWatch& s) {
+  return {MEMBER(state),
+          MEMBER(windows),
+          MEMBER(blamed),
+          MEMBER(numbers),
+          MEMBER(deviations),
+          MEMBER(surface_mm),
+          MEMBER(surface_deviation_mm),
+          MEMBER(widened_mm),
+          MEMBER(first_doubted_ns)};
+}
+template <>
 json to_json(const perimap_Status& s) {
   return {MEMBER(source),
           MEMBER(stream),
@@ -257,7 +269,10 @@ json to_json(const perimap_Status& s) {
           MEMBER(start_matches_needed),
           MEMBER(start_matches_most),
           MEMBER(start_matches_mean),
-          MEMBER(releases_late)};
+          MEMBER(releases_late),
+          MEMBER(setup),
+          MEMBER(poses_repeated),
+          MEMBER(frames_repeated)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {

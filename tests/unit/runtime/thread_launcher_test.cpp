@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <pthread.h>
 #include <sched.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <array>
 
@@ -33,6 +35,15 @@ TEST(ThreadLauncher, HousekeepingAsksForNothing) {
   int policy = SCHED_FIFO;
   threads.launch("finder", ThreadRole::kHousekeeping, [&policy] { policy = sched_getscheduler(0); }).join();
   EXPECT_EQ(policy, SCHED_OTHER);
+  EXPECT_EQ(threads.priority(), perimap_PRIVILEGE_GRANTED) << "nothing was refused";
+}
+
+TEST(ThreadLauncher, WhatNobodyWaitsForGivesWayToAllElse) {
+  ThreadLauncher threads({50, {1023}});
+  int niceness = -100;
+  const auto ask = [&niceness] { niceness = getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); };
+  threads.launch("setup-watch", ThreadRole::kBackground, ask).join();
+  EXPECT_GE(niceness, 10);
   EXPECT_EQ(threads.priority(), perimap_PRIVILEGE_GRANTED) << "nothing was refused";
 }
 

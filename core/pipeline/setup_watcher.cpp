@@ -1,0 +1,189 @@
+#include "core/pipeline/setup_watcher.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "core/pipeline/match_covariance.hpp"
+#include "core/pipeline/phase_basis.hpp"
+#include "core/realtime/realtime_scope.hpp"
+
+namespace perimap {
+namespace {
+
+// From one round's beginning to the next's: until something is known, and then.
+constexpr Duration kRoundEveryAtFirst = std::chrono::milliseconds(1500);
+constexpr Duration kRoundEvery = std::chrono::seconds(3);
+// From a round's beginning to its adoption.
+constexpr Duration kRoundTakes = std::chrono::milliseconds(700);
+// Where there is too little for a round yet, until it is looked for again.
+constexpr Duration kLookAgain = std::chrono::milliseconds(300);
+// Of told frames, before the first round.
+constexpr std::size_t kFewestFrames = 80;
+constexpr std::size_t kFewestFeatures = 6;
+// A feature's, of those in the window; below, its own motion takes up what it tells.
+constexpr std::size_t kFewestMatches = 40;
+
+}  // namespace
+
+SetupWatcher::SetupWatcher(const PipelineSettings& settings)
+    : camera_(settings.camera),
+      layout_(settings.estimator.layout),
+      motion_(settings.estimator.prior),
+      pixel_deviation_px_(settings.estimator.pixel_deviation_px),
+      error_correlation_s_(to_seconds(settings.pose.error_correlation)),
+      lockstep_(settings.lockstep),
+      window_(static_cast<std::size_t>(settings.features.maximum)),
+      seen_(static_cast<std::size_t>(settings.features.maximum)),
+      round_(std::make_unique<Round>()) {
+  chosen_.reserve(seen_.size());
+}
+
+void SetupWatcher::take(const FrameHistory& history, std::span<const FeatureSlot> slots, const MapBank& bank) noexcept {
+  const FrameRecord& frame = *history.newest();
+  window_.tell(history);
+  window_.add(frame, slots);
+  if (!first_capture_) first_capture_ = frame.stamp.capture;
+  if (active_ || frame.index < next_round_at_) return;
+  next_round_at_ = frame.index + frame.rate.frames(kLookAgain);
+  if (window_.told() < kFewestFrames || !choose_features(slots)) return;
+  copy_window(bank);
+  if (round_->frame_count < kFewestFrames) return;
+  active_ = true;
+  discarded_ = false;
+  adopted_at_ = frame.index + frame.rate.frames(kRoundTakes);
+  const SetupState told = belief_.told().state;
+  const bool known = told == SetupState::kConsistent || told == SetupState::kDoubted;
+  next_round_at_ = frame.index + frame.rate.frames(known ? kRoundEvery : kRoundEveryAtFirst);
+  // Relaxed: housekeeping touches the flag only after it has been woken, and the post orders that.
+  done_.store(false, std::memory_order_relaxed);
+  go_.post();
+}
+
+void SetupWatcher::adopt(const FrameRecord& frame) noexcept {
+  if (!active_ || frame.index < adopted_at_) return;
+  if (lockstep_) {
+    const NamedWait wait;
+    finished_.wait();
+  }
+  // Acquire: pairs with the release of serve(), so that the whole verdict is visible.
+  if (!done_.load(std::memory_order_acquire)) return;
+  active_ = false;
+  if (std::exchange(discarded_, false)) return;
+  belief_.add(verdict_, frame.stamp.capture - *first_capture_);
+  status_.write(belief_);
+}
+
+const SetupBelief& SetupWatcher::status_belief() noexcept {
+  status_.update();
+  return status_.front();
+}
+
+void SetupWatcher::retell_phases(const CardiacClock& clock) noexcept {
+  window_.retell_phases(clock);
+  discarded_ = active_;
+}
+
+void SetupWatcher::retell_respiration(const RespiratoryClock& respiration) noexcept {
+  window_.retell_respiration(respiration);
+  discarded_ = active_;
+}
+
+void SetupWatcher::begin_window_anew() noexcept {
+  window_.clear();
+  discarded_ = active_;
+}
+
+// Those with most matches in frames that are told, of the features that are mapped now.
+bool SetupWatcher::choose_features(std::span<const FeatureSlot> slots) noexcept {
+  for (std::size_t slot = 0; slot < slots.size(); ++slot) seen_[slot] = {slots[slot].id, 0, kNotChosen};
+  for (std::uint64_t number = window_.begin(); number != window_.end(); ++number) {
+    if (window_.frame(number).state != WindowFrame::State::kTold) continue;
+    for (const WindowMatch& match : window_.matches(number)) {
+      seen_[match.slot].matches += match.id == seen_[match.slot].id ? 1 : 0;
+    }
+  }
+  chosen_.clear();
+  for (std::size_t slot = 0; slot < slots.size(); ++slot) {
+    if (slots[slot].state == SlotState::kMapped && seen_[slot].matches >= kFewestMatches) chosen_.push_back(slot);
+  }
+  if (chosen_.size() < kFewestFeatures) return false;
+  const std::size_t count = std::min(chosen_.size(), kFeatures);
+  std::partial_sort(chosen_.begin(), chosen_.begin() + static_cast<std::ptrdiff_t>(count), chosen_.end(),
+                    [this](std::size_t a, std::size_t b) {
+                      return seen_[a].matches > seen_[b].matches || (seen_[a].matches == seen_[b].matches && a < b);
+                    });
+  chosen_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) seen_[chosen_[i]].number = i;
+  return true;
+}
+
+void SetupWatcher::copy_window(const MapBank& bank) noexcept {
+  Round& round = *round_;
+  round.feature_count = chosen_.size();
+  for (std::size_t i = 0; i < chosen_.size(); ++i) bank.get(static_cast<int>(chosen_[i]), round.x[i]);
+  round.frame_count = 0;
+  for (std::uint64_t number = window_.begin(); number != window_.end(); ++number) {
+    const WindowFrame& frame = window_.frame(number);
+    if (frame.state != WindowFrame::State::kTold) continue;
+    std::size_t& count = round.counts[round.frame_count];
+    count = 0;
+    for (const WindowMatch& match : window_.matches(number)) {
+      const Seen& seen = seen_[match.slot];
+      if (seen.number == kNotChosen || seen.id != match.id) continue;
+      WindowMatch& copied = round.matches[round.frame_count][count++];
+      copied = match;
+      copied.slot = seen.number;
+    }
+    if (count >= kFewestFeatures) round.frames[round.frame_count++] = frame;
+  }
+}
+
+void SetupWatcher::serve() noexcept {
+  for (;;) {
+    go_.wait();
+    if (dismissed_.load(std::memory_order_relaxed)) return;
+    judge();
+    // Release: the verdict is complete before the mapper can see the flag.
+    done_.store(true, std::memory_order_release);
+    if (lockstep_) finished_.post();
+  }
+}
+
+void SetupWatcher::dismiss() noexcept {
+  dismissed_.store(true, std::memory_order_relaxed);
+  go_.post();
+}
+
+void SetupWatcher::judge() noexcept {
+  const Round& round = *round_;
+  const double alike = matches_alike(FrameRate(1.0 / to_seconds(MatchWindow::kEvery)));
+  WatchedWindow window;
+  window.error_correlation_s = error_correlation_s_;
+  window.features.assign(round.x.begin(), round.x.begin() + static_cast<std::ptrdiff_t>(round.feature_count));
+  for (std::size_t f = 0; f < round.frame_count; ++f) {
+    const WindowFrame& from = round.frames[f];
+    WatchedFrame& frame = window.frames.emplace_back();
+    frame.t_s = to_seconds(from.capture - round.frames.front().capture);
+    frame.X_WC = from.X_WC;
+    frame.twist = from.twist;
+    frame.lever_W_mm = from.lever_W_mm;
+    // What is not known of breathing moves all alike, as an error of the position does.
+    frame.position_variance_mm2 =
+        from.tracker_variance_mm2 + from.respiration.deviation_mm * from.respiration.deviation_mm;
+    frame.rotation_variance_rad2 = from.rotation_variance_rad2;
+    frame.b = basis_at(layout_, from.phase.phase_rad, from.respiration);
+    frame.b_rate = basis_rate(layout_, from.phase.phase_rad) * from.phase.rate_rad_per_s;
+    frame.phase_deviation_s = from.phase.deviation_s;
+    for (std::size_t i = 0; i < round.counts[f]; ++i) {
+      const WindowMatch& match = round.matches[f][i];
+      frame.matches.push_back(
+          {static_cast<int>(match.slot), match.px, match_covariance(match.covariance_px2, pixel_deviation_px_, alike)});
+    }
+  }
+  SetupFitSettings settings;
+  settings.motion = motion_;
+  verdict_ = judge_setup(fit_setup(window, camera_, layout_, settings));
+}
+
+}  // namespace perimap

@@ -1,0 +1,107 @@
+// Housekeeping: the set-up is judged by the session's own matches, on a thread of its own, so that what comes of it can
+// be adopted at a stated frame.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/frame_history.hpp"
+#include "core/pipeline/map_bank.hpp"
+#include "core/pipeline/match_window.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/realtime/triple_buffer.hpp"
+#include "core/realtime/wakeup.hpp"
+#include "core/setup_watch/setup_belief.hpp"
+#include "core/setup_watch/watched_window.hpp"
+
+namespace perimap {
+
+// A round: the features that have most matches in the window are copied here with them, judged, and the verdict is
+// adopted a stated number of frames after the round began; where it is not there by then, at the first frame that has
+// it, but never so in lockstep. One round at a time. take(), adopt() and begin_window_anew() belong to the mapper,
+// serve() to the housekeeping thread.
+class SetupWatcher {
+ public:
+  static constexpr std::size_t kFeatures = 12;  // of a round: the time that it takes grows with their cube
+
+  explicit SetupWatcher(const PipelineSettings& settings);
+
+  // Mapper, once a frame, when its matches are believed and no worker learns: keeps them, and begins a round when one
+  // is due.
+  void take(const FrameHistory& history, std::span<const FeatureSlot> slots, const MapBank& bank) noexcept;
+  // Mapper, once a frame before that: what a round has come to, at the frame stated when it began.
+  void adopt(const FrameRecord& frame) noexcept;
+  // Mapper, before adopt(): the phases of completed cycles are told by another law, or breathing otherwise. What is
+  // being judged was told by the old ones and counts for nothing.
+  void retell_phases(const CardiacClock& clock) noexcept;
+  void retell_respiration(const RespiratoryClock& respiration) noexcept;
+  // Mapper: another patient. What is believed of the set-up stays.
+  void begin_window_anew() noexcept;
+
+  // Mapper: what is believed as of the last adopt().
+  [[nodiscard]] const SetupBelief& belief() const noexcept { return belief_; }
+  // Status thread: the same, valid until the next call.
+  [[nodiscard]] const SetupBelief& status_belief() noexcept;
+
+  // Until dismiss().
+  void serve() noexcept;
+  void dismiss() noexcept;
+
+ private:
+  struct Round {
+    std::array<WindowFrame, MatchWindow::kFrames> frames;
+    std::array<std::array<WindowMatch, kFeatures>, MatchWindow::kFrames> matches;  // slot: the feature's number
+    std::array<std::size_t, MatchWindow::kFrames> counts{};
+    std::array<StateVector, kFeatures> x;
+    std::size_t frame_count = 0;
+    std::size_t feature_count = 0;
+  };
+
+  static constexpr std::size_t kNotChosen = kFeatures;
+  struct Seen {
+    std::uint32_t id = 0;
+    std::size_t matches = 0;
+    std::size_t number = kNotChosen;  // in a round
+  };
+
+  [[nodiscard]] bool choose_features(std::span<const FeatureSlot> slots) noexcept;
+  void copy_window(const MapBank& bank) noexcept;
+  void judge() noexcept;
+
+  CameraModel camera_;
+  BasisLayout layout_;
+  Prior motion_;
+  double pixel_deviation_px_;
+  double error_correlation_s_;
+  bool lockstep_;
+
+  // The mapper's own.
+  MatchWindow window_;
+  SetupBelief belief_;
+  TripleBuffer<SetupBelief> status_;
+  std::optional<Instant> first_capture_;
+  std::vector<Seen> seen_;           // by slot
+  std::vector<std::size_t> chosen_;  // slots
+  bool active_ = false;
+  bool discarded_ = false;  // the round that is active
+  std::uint64_t adopted_at_ = 0;
+  std::uint64_t next_round_at_ = 0;
+
+  // The mapper's while no round is active, housekeeping's from then until done_ is set.
+  std::unique_ptr<Round> round_;
+  SetupVerdict verdict_;
+  // Housekeeping stores true with release after writing verdict_; the mapper's acquire load then sees all of it.
+  std::atomic<bool> done_{false};
+  Wakeup go_;
+  Wakeup finished_;
+  // Relaxed throughout: the flag alone is the message, and the post of go_ that follows orders it.
+  std::atomic<bool> dismissed_{false};
+};
+
+}  // namespace perimap

@@ -1,0 +1,71 @@
+// What is believed of the set-up after the windows judged so far.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+
+#include "core/setup_watch/setup_verdict.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+// One window's doubt is told at once where it is far beyond chance; else two in a row must blame, and one part is
+// blamed by both. It ends when three in a row would have shown it and do not. A window of which nothing is known
+// changes nothing.
+class SetupBelief {
+ public:
+  // `after`: since the first frame.
+  void add(const SetupVerdict& verdict, Duration after) noexcept {
+    ++judged_;
+    if (verdict.state == SetupState::kUnknown) return;
+    const bool doubts = verdict.state == SetupState::kDoubted;
+    const bool again = doubts && newest_.state == SetupState::kDoubted && blame_alike(verdict, newest_);
+    const bool certain = doubts && verdict.certainty >= kCertain;
+    consistent_ = verdict.state == SetupState::kConsistent ? consistent_ + 1 : 0;
+    newest_ = verdict;
+    if (again || certain || (doubts && doubted_)) {
+      if (!first_doubted_) first_doubted_ = after;
+      doubted_ = true;
+      told_ = verdict;
+    } else if (!doubted_ || consistent_ >= kToBelieve) {
+      doubted_ = false;
+      told_ = verdict;
+      // Not before it has been seen twice.
+      if (doubts) {
+        told_.state = SetupState::kUndetermined;
+        told_.blamed = {};
+      }
+    }
+  }
+
+  [[nodiscard]] bool doubted() const noexcept { return doubted_; }
+  // Of the newest window that tells anything; while doubted, of the newest that doubts.
+  [[nodiscard]] const SetupVerdict& told() const noexcept { return told_; }
+  // What is to be added to the deviation of each published position, RMS of the 3-D norm; and as a variance per axis.
+  [[nodiscard]] double widening_mm() const noexcept { return std::max(told_.widening_mm, newest_.widening_mm); }
+  [[nodiscard]] double variance_mm2() const noexcept { return widening_mm() * widening_mm() / 3.0; }
+  [[nodiscard]] std::uint64_t judged() const noexcept { return judged_; }
+  // Since the first frame; none: never.
+  [[nodiscard]] std::optional<Duration> first_doubted() const noexcept { return first_doubted_; }
+
+ private:
+  static constexpr int kToBelieve = 3;
+  static constexpr double kCertain = 2.0;  // as a multiple of what a doubt needs
+
+  [[nodiscard]] static bool blame_alike(const SetupVerdict& a, const SetupVerdict& b) noexcept {
+    for (std::size_t i = 0; i < a.blamed.size(); ++i) {
+      if (a.blamed[i] && b.blamed[i]) return true;
+    }
+    return false;
+  }
+
+  SetupVerdict newest_;
+  SetupVerdict told_;
+  bool doubted_ = false;
+  int consistent_ = 0;  // windows in a row
+  std::uint64_t judged_ = 0;
+  std::optional<Duration> first_doubted_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,100 @@
+#include "core/setup_watch/setup_belief.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+
+namespace perimap {
+namespace {
+
+using std::chrono::seconds;
+
+SetupVerdict verdict(SetupState state) {
+  SetupVerdict verdict;
+  verdict.state = state;
+  return verdict;
+}
+
+SetupVerdict doubt_of(SetupPart part) {
+  SetupVerdict doubt = verdict(SetupState::kDoubted);
+  doubt.blamed[index_of(part)] = true;
+  return doubt;
+}
+
+TEST(SetupBelief, DoubtsAfterTwoWindowsInARowThatBlameTheSame) {
+  SetupBelief belief;
+  belief.add(doubt_of(SetupPart::kHandEyeTurn), seconds(10));
+  EXPECT_FALSE(belief.doubted());
+  EXPECT_EQ(belief.told().state, SetupState::kUndetermined) << "it was seen once";
+  EXPECT_FALSE(belief.told().blamed[index_of(SetupPart::kHandEyeTurn)]);
+  belief.add(doubt_of(SetupPart::kHandEyeTurn), seconds(13));
+  EXPECT_TRUE(belief.doubted());
+  EXPECT_TRUE(belief.told().blamed[index_of(SetupPart::kHandEyeTurn)]);
+  EXPECT_EQ(belief.first_doubted(), seconds(13));
+  EXPECT_EQ(belief.judged(), 2U);
+}
+
+TEST(SetupBelief, DoubtsAtOnceWhatIsFarBeyondChance) {
+  SetupBelief belief;
+  SetupVerdict certain = doubt_of(SetupPart::kHandEyeTurn);
+  certain.certainty = 2.5;
+  belief.add(certain, seconds(8));
+  EXPECT_TRUE(belief.doubted());
+}
+
+TEST(SetupBelief, DoesNotDoubtWhereEachWindowBlamesAnotherNumber) {
+  SetupBelief belief;
+  for (int i = 0; i < 6; ++i) {
+    belief.add(doubt_of(i % 2 == 0 ? SetupPart::kFocalLength : SetupPart::kTimeOffset), seconds(3 * i));
+  }
+  EXPECT_FALSE(belief.doubted());
+}
+
+TEST(SetupBelief, DoesNotDoubtWhereAWindowBetweenShowsNothing) {
+  SetupBelief belief;
+  belief.add(doubt_of(SetupPart::kFocalLength), seconds(3));
+  belief.add(verdict(SetupState::kConsistent), seconds(6));
+  belief.add(doubt_of(SetupPart::kFocalLength), seconds(9));
+  EXPECT_FALSE(belief.doubted());
+  EXPECT_FALSE(belief.first_doubted().has_value());
+}
+
+TEST(SetupBelief, BelievesAgainAfterThreeWindowsThatWouldHaveShownIt) {
+  SetupBelief belief;
+  belief.add(doubt_of(SetupPart::kFocalLength), seconds(3));
+  belief.add(doubt_of(SetupPart::kFocalLength), seconds(6));
+  for (int i = 0; i < 5; ++i) belief.add(verdict(SetupState::kUndetermined), seconds(9 + 3 * i));
+  EXPECT_TRUE(belief.doubted()) << "it would not have shown";
+  for (int i = 0; i < 2; ++i) belief.add(verdict(SetupState::kConsistent), seconds(30 + 3 * i));
+  EXPECT_TRUE(belief.doubted());
+  EXPECT_EQ(belief.told().state, SetupState::kDoubted);
+  belief.add(verdict(SetupState::kConsistent), seconds(36));
+  EXPECT_FALSE(belief.doubted());
+  EXPECT_EQ(belief.told().state, SetupState::kConsistent);
+  EXPECT_EQ(belief.first_doubted(), seconds(6));
+}
+
+TEST(SetupBelief, AWindowOfWhichNothingIsKnownChangesNothing) {
+  SetupBelief belief;
+  belief.add(doubt_of(SetupPart::kFocalLength), seconds(3));
+  belief.add(verdict(SetupState::kUnknown), seconds(6));
+  belief.add(doubt_of(SetupPart::kFocalLength), seconds(9));
+  EXPECT_TRUE(belief.doubted());
+  belief.add(verdict(SetupState::kUnknown), seconds(12));
+  EXPECT_TRUE(belief.doubted());
+}
+
+TEST(SetupBelief, WidensByTheNewestWindow) {
+  SetupBelief belief;
+  EXPECT_EQ(belief.variance_mm2(), 0.0);
+  SetupVerdict told = verdict(SetupState::kConsistent);
+  told.widening_mm = 0.6;
+  belief.add(told, seconds(3));
+  EXPECT_NEAR(belief.variance_mm2(), 0.12, 1e-12) << "a third of its square on each axis";
+  belief.add(verdict(SetupState::kConsistent), seconds(6));
+  EXPECT_EQ(belief.variance_mm2(), 0.0);
+}
+
+}  // namespace
+}  // namespace perimap
