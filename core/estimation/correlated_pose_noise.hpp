@@ -30,7 +30,7 @@ struct PoseNoiseTerm {
   Matrix23d dz_dp;  // at the position after learning
   Matrix2d R;       // that the observation was given, pose noise included
   Matrix26d dz_ds;  // with respect to the pose's error
-  Matrix6d sigma;   // covariance of the pose's error
+  Matrix6d sigma;   // covariance of the pose's error, of the part that lasts alone: about the same at each
 };
 
 // No heap.

@@ -63,12 +63,14 @@ CameraPose PoseHistory::between(const Reading& r_0, const Reading& r_1, Instant 
   const double excess = square(1.0 - s) * (square(r_0.growth) - 1.0) + square(s) * (square(r_1.growth) - 1.0);
   const double own_mm2 = square((1.0 - s) * r_0.own_mm) + square(s * r_1.own_mm);
   const double beyond_s = std::max(0.0, to_seconds(t - r_1.time));
-  pose.position_variance_mm2 = (weight + excess) * square(settings_.position_deviation_mm) + own_mm2 +
-                               square(kInterpolationDeviation_mm) +
-                               square(0.5 * kHandAcceleration_mm_per_s2 * square(beyond_s));
-  pose.rotation_variance_rad2 = (weight + excess) * square(settings_.rotation_deviation_rad) +
-                                square(kInterpolationDeviation_rad) +
-                                square(0.5 * kHandAcceleration_rad_per_s2 * square(beyond_s));
+  pose.own_position_variance_mm2 = excess * square(settings_.position_deviation_mm) + own_mm2 +
+                                   square(kInterpolationDeviation_mm) +
+                                   square(0.5 * kHandAcceleration_mm_per_s2 * square(beyond_s));
+  pose.own_rotation_variance_rad2 = excess * square(settings_.rotation_deviation_rad) +
+                                    square(kInterpolationDeviation_rad) +
+                                    square(0.5 * kHandAcceleration_rad_per_s2 * square(beyond_s));
+  pose.position_variance_mm2 = weight * square(settings_.position_deviation_mm) + pose.own_position_variance_mm2;
+  pose.rotation_variance_rad2 = weight * square(settings_.rotation_deviation_rad) + pose.own_rotation_variance_rad2;
   return pose;
 }
 

@@ -39,6 +39,10 @@ struct CameraPose {
   Vector3d lever_W_mm = Vector3d::Zero();  // R_WS * t_SC
   double position_variance_mm2 = 0.0;
   double rotation_variance_rad2 = 0.0;
+  // Of these, what is this pose's own and nothing of it in common with the poses before and after: that its readings
+  // are farther off than usual, and what was not measured between and behind them.
+  double own_position_variance_mm2 = 0.0;
+  double own_rotation_variance_rad2 = 0.0;
 
   [[nodiscard]] bool valid() const noexcept { return state != State::kMissing; }
 };
@@ -48,6 +52,9 @@ struct CameraPose {
 class PoseHistory {
  public:
   explicit PoseHistory(const PoseHistorySettings& settings) noexcept : settings_(settings) {}
+
+  // From now on at() tells the pose by this hand-eye.
+  void set_hand_eye(const Pose& X_SC) noexcept { settings_.X_SC = X_SC; }
 
   // False when the reading is refused: its stamp is not after the newest one's, or its pose is not finite.
   bool add(const TrackerSample& sample) noexcept;

@@ -34,6 +34,14 @@ namespace perimap {
   return pose.position_variance_mm2 * J_p * J_p.transpose() + pose.rotation_variance_rad2 * G * G.transpose();
 }
 
+// Of its error's part that lasts.
+[[nodiscard]] inline Matrix6d lasting_error_covariance(const CameraPose& pose) noexcept {
+  CameraPose lasting = pose;
+  lasting.position_variance_mm2 -= pose.own_position_variance_mm2;
+  lasting.rotation_variance_rad2 -= pose.own_rotation_variance_rad2;
+  return pose_error_covariance(lasting);
+}
+
 // What a term has from the pose and from where the feature is: dz_dp, dz_ds, sigma. False where it can not be seen.
 [[nodiscard]] inline bool describe_pose_noise(const PixelModel& model, const Pose& X_CW, const CameraPose& pose,
                                               const Vector3d& p_WF_mm, PoseNoiseTerm& term) noexcept {
@@ -42,7 +50,7 @@ namespace perimap {
   if (model.camera.project(X_CW * p_WF_mm, px, &J_C) != ProjectionStatus::kOk) return false;
   term.dz_dp = J_C * X_CW.R;
   term.dz_ds = pose_error_jacobian(pose, p_WF_mm, term.dz_dp);
-  term.sigma = pose_error_covariance(pose);
+  term.sigma = lasting_error_covariance(pose);
   return true;
 }
 
