@@ -32,6 +32,7 @@
 #include "daemon/runtime/replay_setup.hpp"
 #include "daemon/runtime/session_recorder.hpp"
 #include "daemon/runtime/session_recording.hpp"
+#include "drivers/calibration/turned_scope_file.hpp"
 
 namespace perimap {
 namespace {
@@ -96,9 +97,11 @@ DeviceRecording prepare_recording(const std::string& configuration_file, const D
   DeviceRecording recording;
   recording.recorder = std::make_unique<SessionRecorder>(static_cast<std::size_t>(c.memory_MB) << 20U);
   recording.next = [folder = std::filesystem::path(configuration_file).parent_path() / c.folder,
-                    configuration = setup.configuration, camera = setup.pipeline.camera]() -> DeviceRecording::Next {
-    return {recording_path(folder, std::chrono::system_clock::now()),
-            recording_facts(configuration, camera, "perimapd " PERIMAP_VERSION)};
+                    configuration = setup.configuration, camera = setup.pipeline.camera,
+                    scope = setup.pipeline.turned_scope]() -> DeviceRecording::Next {
+    SensorRecordingFacts facts = recording_facts(configuration, camera, "perimapd " PERIMAP_VERSION);
+    if (scope) facts.turned_scope = format_turned_scope(*scope);
+    return {recording_path(folder, std::chrono::system_clock::now()), std::move(facts)};
   };
   if (!c.record) return recording;
   const DeviceRecording::Next next = recording.next();

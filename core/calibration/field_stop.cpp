@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/angle/angle.hpp"
+#include "core/calibration/edge_on_ray.hpp"
 #include "core/statistics/upper_median.hpp"
 
 namespace perimap {
@@ -22,12 +23,32 @@ double median_of(std::vector<double> values) {
 }
 
 // Between the surround and the picture (Otsu, IEEE Trans. SMC 9(1), 1979), taken of every other pixel; the two classes'
-// means beside it.
+// means beside it, and where the surround's own noise ends.
 struct Levels {
   double threshold = 0.0;
   double dark = 0.0;
   double bright = 0.0;
+  double edge = 0.0;
 };
+
+// The darkest grey level that leaves so much of the histogram's beginning at or below it.
+double quantile_of(const std::array<double, 256>& histogram, double count) {
+  double below = 0.0;
+  std::size_t i = 0;
+  while (i + 1 < histogram.size() && (below += histogram[i]) < count) ++i;
+  return static_cast<double>(i);
+}
+
+// Most of what is dark is the surround, and its noise reaches as far up as down. Not much above that, for vessels at
+// the picture's rim, where it is darker than in its middle, are not part of the surround.
+double edge_level(const std::array<double, 256>& histogram, const Levels& levels) {
+  const auto dark_end = histogram.begin() + static_cast<std::ptrdiff_t>(std::clamp(levels.threshold + 0.5, 1.0, 255.0));
+  const double all_dark = std::accumulate(histogram.begin(), dark_end, 0.0);
+  const double surround = quantile_of(histogram, 0.5 * all_dark);
+  const double noise = surround - quantile_of(histogram, 0.16 * all_dark);
+  constexpr double kLeast = 4.0;  // grey levels
+  return surround + std::max({kLeast, 3.5 * noise, 0.05 * (levels.bright - surround)});
+}
 
 Levels levels_of(const GreyImage& picture) {
   std::array<double, 256> histogram{};
@@ -49,45 +70,13 @@ Levels levels_of(const GreyImage& picture) {
     const double dark = below_sum / below;
     const double bright = (sum - below_sum) / (all - below);
     const double between = below * (all - below) * (bright - dark) * (bright - dark);
-    if (between > largest) largest = between, best = {static_cast<double>(i) + 0.5, dark, bright};
+    if (between > largest) largest = between, best = {static_cast<double>(i) + 0.5, dark, bright, 0.0};
   }
+  best.edge = edge_level(histogram, best);
   return best;
 }
 
-double value_at(const GreyImage& picture, const Vector2d& px) {
-  const double x = std::clamp(px.x(), 0.0, picture.width - 1.001);
-  const double y = std::clamp(px.y(), 0.0, picture.height - 1.001);
-  const int i = static_cast<int>(x), j = static_cast<int>(y);
-  const double a = x - i, b = y - j;
-  const std::uint8_t* row = picture.data + j * picture.stride + i;
-  const std::uint8_t* next = row + picture.stride;
-  return (1.0 - b) * ((1.0 - a) * row[0] + a * row[1]) + b * ((1.0 - a) * next[0] + a * next[1]);
-}
-
-bool inside(const GreyImage& picture, const Vector2d& px) {
-  return px.x() >= 0.0 && px.y() >= 0.0 && px.x() <= picture.width - 1.0 && px.y() <= picture.height - 1.0;
-}
-
 Vector2d direction_of(double angle) { return {std::cos(angle), std::sin(angle)}; }
-
-// Where the picture begins on the way in from `outer` to `inner`, from the centre; a level in between, read between
-// pixels. None where the outer end is bright already: the circle is cut off by the picture's edge there.
-std::optional<double> edge_on_ray(const GreyImage& picture, const Levels& levels, const Vector2d& centre, double angle,
-                                  double outer, double inner) {
-  const Vector2d along = direction_of(angle);
-  while (outer > inner && !inside(picture, centre + outer * along)) outer -= 1.0;
-  double before = value_at(picture, centre + outer * along);
-  if (before > levels.threshold) return std::nullopt;
-  for (double r = outer - 1.0; r >= inner; r -= 1.0) {
-    const double here = value_at(picture, centre + r * along);
-    // Noise alone does not last for two more pixels.
-    if (here > levels.threshold && value_at(picture, centre + (r - 1.5) * along) > levels.threshold) {
-      return r + (here - levels.threshold) / std::max(1e-6, here - before);
-    }
-    before = here;
-  }
-  return std::nullopt;
-}
 
 struct Circle {
   Vector2d centre = Vector2d::Zero();
@@ -159,7 +148,7 @@ struct Profile {
   }
 };
 
-Profile profile_of(const GreyImage& picture, const Levels& levels, const Circle& circle) {
+Profile profile_of(const GreyImage& picture, double level, const Circle& circle) {
   Profile profile;
   const auto count = static_cast<std::size_t>(std::max(180.0, kTwoPi * circle.radius));
   profile.step_rad = kTwoPi / static_cast<double>(count);
@@ -167,7 +156,7 @@ Profile profile_of(const GreyImage& picture, const Levels& levels, const Circle&
   constexpr double kOutside_px = 5.0;
   for (std::size_t i = 0; i < count; ++i) {
     const auto r =
-        edge_on_ray(picture, levels, circle.centre, profile.angle(i), circle.radius + kOutside_px, 0.6 * circle.radius);
+        edge_on_ray(picture, level, circle.centre, profile.angle(i), circle.radius + kOutside_px, 0.6 * circle.radius);
     profile.depth_px[i] = r ? circle.radius - *r : std::nan("");
   }
   return profile;
@@ -242,6 +231,10 @@ Expected<void> find_notch(const Profile& profile, FieldStopReading& reading) {
 
 Expected<FieldStopReading> read_field_stop(const GreyImage& picture) {
   constexpr double kLeastContrast = 20.0;  // grey levels
+  constexpr int kSmallest_px = 32;
+  if (picture.width < kSmallest_px || picture.height < kSmallest_px) {
+    return fail("the picture is smaller than 32 pixels: no field stop can be read in it");
+  }
   const Levels levels = levels_of(picture);
   const std::string no_stop =
       "no field stop is seen: the picture has no dark surround with a round edge; zoom out until its edge is in view, "
@@ -249,12 +242,11 @@ Expected<FieldStopReading> read_field_stop(const GreyImage& picture) {
   if (levels.bright - levels.dark < kLeastContrast) return fail(no_stop);
   const Vector2d middle(0.5 * (picture.width - 1), 0.5 * (picture.height - 1));
   const double diagonal = std::hypot(picture.width, picture.height);
+  const double low = levels.edge;
   std::vector<Vector2d> edge;
   constexpr int kRays = 720;
   for (int k = 0; k < kRays; ++k) {
     const double angle = kTwoPi * k / kRays;
-    // Darkest surround: a third of the way up, for the picture is darker at its rim than in its middle.
-    const Levels low{levels.dark + 0.33 * (levels.threshold - levels.dark), levels.dark, levels.bright};
     const auto r = edge_on_ray(picture, low, middle, angle, 0.5 * diagonal, 0.1 * diagonal);
     if (r) edge.push_back(middle + *r * direction_of(angle));
   }
@@ -262,7 +254,6 @@ Expected<FieldStopReading> read_field_stop(const GreyImage& picture) {
   if (edge.size() < kFewest) return fail(no_stop);
   const auto circle = common_circle(edge, diagonal);
   if (!circle) return fail(no_stop);
-  const Levels low{levels.dark + 0.33 * (levels.threshold - levels.dark), levels.dark, levels.bright};
   Circle fitted = *circle;
   Profile profile;
   FieldStopReading reading;
@@ -289,6 +280,7 @@ Expected<FieldStopReading> read_field_stop(const GreyImage& picture) {
   profile = profile_of(picture, low, fitted);
   reading.centre_px = fitted.centre;
   reading.radius_px = fitted.radius;
+  reading.edge_level = low;
   if (const auto found = find_notch(profile, reading); !found) return tl::unexpected(found.error());
   return reading;
 }

@@ -11,6 +11,7 @@ namespace perimap {
 struct FieldStopReading {
   Vector2d centre_px = Vector2d::Zero();
   double radius_px = 0.0;
+  double edge_level = 0.0;           // grey level at which the picture begins behind the dark surround
   double edge_deviation_px = 0.0;    // of one place of the edge about the circle, along the radius
   double centre_deviation_px = 0.0;  // standard deviation per axis
   double seen_share = 0.0;           // of the circle, inside the picture

@@ -2,8 +2,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "core/angle/angle.hpp"
 
@@ -80,7 +82,61 @@ SetupAtRotation TurnedScope::at(double rotation_rad) const noexcept {
   return setup;
 }
 
-Expected<TurnedScope> fit_turned_scope(const std::vector<SetupAtRotation>& setups, const Vector2d& turn_px) {
+std::optional<LensAtTurn> TurnedScope::lens_at(double rotation_rad, double radius_px) const noexcept {
+  const SetupAtRotation setup = at(rotation_rad);
+  if (focals.empty()) return LensAtTurn{reference.focal_px, setup.principal_px};
+  // Written so that what is no number is none.
+  if (!(radius_px >= focals.front().radius_px * (1.0 - kSameZoom)) ||
+      !(radius_px <= focals.back().radius_px * (1.0 + kSameZoom))) {
+    return std::nullopt;
+  }
+  Vector2d focal = focals.front().focal_px;
+  for (std::size_t i = 1; i < focals.size(); ++i) {
+    const FocalAtRadius& a = focals[i - 1];
+    const FocalAtRadius& b = focals[i];
+    if (radius_px < a.radius_px) break;
+    const double share = std::min(1.0, (radius_px - a.radius_px) / (b.radius_px - a.radius_px));
+    focal = a.focal_px + share * (b.focal_px - a.focal_px);
+  }
+  const Vector2d grown = focal.cwiseQuotient(reference.focal_px);
+  return LensAtTurn{focal, turn_px + grown.cwiseProduct(setup.principal_px - turn_px)};
+}
+
+std::vector<FocalAtRadius> focal_table(std::vector<FocalAtRadius> measured) {
+  std::sort(measured.begin(), measured.end(),
+            [](const FocalAtRadius& a, const FocalAtRadius& b) { return a.radius_px < b.radius_px; });
+  std::vector<FocalAtRadius> table;
+  std::size_t in_last = 0;
+  double first_of_last_px = 0.0;
+  for (const FocalAtRadius& one : measured) {
+    if (!table.empty() && one.radius_px <= first_of_last_px * (1.0 + TurnedScope::kSameZoom)) {
+      const double share = 1.0 / static_cast<double>(++in_last);
+      FocalAtRadius& mean = table.back();
+      mean.radius_px += share * (one.radius_px - mean.radius_px);
+      mean.focal_px += share * (one.focal_px - mean.focal_px);
+    } else {
+      table.push_back(one);
+      in_last = 1;
+      first_of_last_px = one.radius_px;
+    }
+  }
+  return table;
+}
+
+namespace {
+
+// One zoom, if it is told of at all.
+Expected<void> check_zooms(const std::vector<SetupAtRotation>& setups) {
+  const auto [least, most] =
+      std::minmax_element(setups.begin(), setups.end(),
+                          [](const SetupAtRotation& a, const SetupAtRotation& b) { return a.radius_px < b.radius_px; });
+  if (most->radius_px <= least->radius_px * (1.0 + TurnedScope::kSameZoom)) return {};
+  return fail("the set-ups are of several zooms (the field stop's radius is " + std::to_string(least->radius_px) +
+              " to " + std::to_string(most->radius_px) +
+              " px): turn the scope at one zoom, and tell of other zooms by --zoom");
+}
+
+Expected<TurnedScope> fitted(const std::vector<SetupAtRotation>& setups, const Vector2d& turn_px) {
   constexpr double kLeastTurn_rad = 20.0 * kDegree;
   TurnedScope scope;
   scope.turn_px = turn_px;
@@ -105,7 +161,7 @@ Expected<TurnedScope> fit_turned_scope(const std::vector<SetupAtRotation>& setup
     return so3_log(turn.carried.R).norm() < std::min(3.0 * kDegree, 0.2 * std::abs(turn.angle));
   });
   if (!scope.sensor_on_scope) {
-    if (const auto fitted = fit_axis(turns, scope); !fitted) return tl::unexpected(fitted.error());
+    if (const auto axis = fit_axis(turns, scope); !axis) return tl::unexpected(axis.error());
     // Of half a turn alone the sign of the axis is not told.
     constexpr double kTelling_rad = 150.0 * kDegree;
     if (std::all_of(turns.begin(), turns.end(), [](const Turns& t) { return std::abs(t.angle) > kTelling_rad; })) {
@@ -123,13 +179,93 @@ Expected<TurnedScope> fit_turned_scope(const std::vector<SetupAtRotation>& setup
   }
   scope.rotation_rms_deg = std::sqrt(rotation);
   scope.translation_rms_mm = std::sqrt(translation);
+  return scope;
+}
+
+// What a set-up's own number, off by a deviation, makes of all that follows from it.
+class Deviations {
+ public:
+  explicit Deviations(const TurnedScope& scope) : scope_(scope) { principal_.fill(Vector2d::Zero()); }
+
+  void add(const Expected<TurnedScope>& moved) {
+    if (!moved) return;
+    axis_ += (moved->axis_S - scope_.axis_S).squaredNorm();
+    const Vector3d point = moved->point_S - scope_.point_S;
+    point_ += (point - scope_.axis_S * scope_.axis_S.dot(point)).squaredNorm();
+    for (std::size_t i = 0; i < kTurns; ++i) {
+      const double angle = kTwoPi * static_cast<double>(i) / kTurns;
+      const SetupAtRotation before = scope_.at(angle);
+      const SetupAtRotation after = moved->at(angle);
+      rotation_[i] += so3_log(before.X_SC.R.transpose() * after.X_SC.R).squaredNorm();
+      translation_[i] += (after.X_SC.t - before.X_SC.t).squaredNorm();
+      principal_[i] += (after.principal_px - before.principal_px).cwiseAbs2();
+    }
+  }
+
+  void tell(TurnedScope& scope) const {
+    scope.axis_deviation_rad = std::sqrt(axis_);
+    scope.point_deviation_mm = std::sqrt(point_);
+    for (std::size_t i = 0; i < kTurns; ++i) {
+      scope.rotation_deviation_rad = std::max(scope.rotation_deviation_rad, std::sqrt(rotation_[i]));
+      scope.translation_deviation_mm = std::max(scope.translation_deviation_mm, std::sqrt(translation_[i]));
+      scope.principal_deviation_px = std::max(scope.principal_deviation_px, std::sqrt(principal_[i].maxCoeff()));
+    }
+  }
+
+ private:
+  static constexpr std::size_t kTurns = 12;
+
+  const TurnedScope& scope_;
+  double axis_ = 0.0;
+  double point_ = 0.0;
+  std::array<double, kTurns> rotation_{};
+  std::array<double, kTurns> translation_{};
+  std::array<Vector2d, kTurns> principal_;
+};
+
+// Each independent part of each set-up's error in turn, one deviation large.
+void tell_deviations(const std::vector<SetupAtRotation>& setups, const Vector2d& turn_px, TurnedScope& scope) {
+  Deviations deviations(scope);
+  for (std::size_t i = 0; i < setups.size(); ++i) {
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> parts(setups[i].covariance_C);
+    for (int k = 0; k < 6; ++k) {
+      const double deviation = std::sqrt(std::max(0.0, parts.eigenvalues()[k]));
+      if (deviation == 0.0) continue;
+      const Vector6d off = deviation * parts.eigenvectors().col(k);
+      std::vector<SetupAtRotation> moved = setups;
+      moved[i].X_SC = moved[i].X_SC * Pose{so3_exp(off.head<3>()), off.tail<3>()};
+      deviations.add(fitted(moved, turn_px));
+    }
+    for (int k = 0; k < 3; ++k) {
+      std::vector<SetupAtRotation> moved = setups;
+      if (k < 2) moved[i].principal_px[k] += setups[i].principal_deviation_px[k];
+      if (k == 2) moved[i].rotation_rad += setups[i].rotation_deviation_rad;
+      deviations.add(fitted(moved, turn_px));
+    }
+  }
+  deviations.tell(scope);
+}
+
+}  // namespace
+
+Expected<TurnedScope> fit_turned_scope(const std::vector<SetupAtRotation>& setups, const Vector2d& turn_px) {
+  auto scope = fitted(setups, turn_px);
+  if (!scope) return scope;
+  if (const auto one = check_zooms(setups); !one) return tl::unexpected(one.error());
+  std::vector<FocalAtRadius> focals;
+  for (const SetupAtRotation& setup : setups) {
+    if (setup.radius_px > 0.0) focals.push_back({setup.radius_px, setup.focal_px});
+  }
+  scope->focals = focal_table(std::move(focals));
+  if (!scope->focals.empty()) scope->reference.focal_px = scope->focals.front().focal_px;
   constexpr double kMost_deg = 1.0;
   constexpr double kMost_mm = 2.0;
-  if (scope.rotation_rms_deg > kMost_deg || scope.translation_rms_mm > kMost_mm) {
-    return fail("the set-ups do not fit one turning scope (" + std::to_string(scope.rotation_rms_deg) +
-                " degrees and " + std::to_string(scope.translation_rms_mm) +
+  if (scope->rotation_rms_deg > kMost_deg || scope->translation_rms_mm > kMost_mm) {
+    return fail("the set-ups do not fit one turning scope (" + std::to_string(scope->rotation_rms_deg) +
+                " degrees and " + std::to_string(scope->translation_rms_mm) +
                 " mm RMS are left over): measure each with the scope held at its turn, and the sensor fast");
   }
+  tell_deviations(setups, turn_px, *scope);
   return scope;
 }
 

@@ -119,7 +119,7 @@ MapPrediction FeatureGroup::prediction(std::size_t lane) const noexcept {
 }
 
 void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double>* breath, bool converged,
-                           double pixel_deviation_px, std::vector<CommonMatch>& matches,
+                           double pixel_deviation_px, const PixelMap& picture, std::vector<CommonMatch>& matches,
                            std::vector<FeatureSlot*>& owners) noexcept {
   if (plan_.capture < 0) return;
   LaneMotions<double> motions;
@@ -132,8 +132,8 @@ void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double
     if (converged && !slot.converged) continue;
     const auto l = static_cast<int>(lane);
     CommonMatch match;
-    match.z = slot.match.px;
-    match.R = match_covariance(slot.match.covariance_px2, pixel_deviation_px);
+    match.z = picture.to_lens(slot.match.px);
+    match.R = match_covariance(picture.covariance_to_lens(slot.match.covariance_px2), pixel_deviation_px);
     match.p_WF = motions.position_of(l);
     match.S = motions.covariance_of(l);
     match.D.resize(3, breath != nullptr ? 2 : 1);

@@ -46,9 +46,9 @@ class FeatureGroup {
 
   // B: appends what the features that were found say of the frame's pose, and of its phases near `at`: the velocity
   // (mm/s) there, and that of breathing at `breath` unless it is null, are the appended motions. Only converged
-  // features are asked when `converged`. owners[k] becomes the slot of matches[k].
+  // features are asked when `converged`. `picture`: the frame's. owners[k] becomes the slot of matches[k].
   void collect(const SweepPhase<double>& at, const SweepPhase<double>* breath, bool converged,
-               double pixel_deviation_px, std::vector<CommonMatch>& matches,
+               double pixel_deviation_px, const PixelMap& picture, std::vector<CommonMatch>& matches,
                std::vector<FeatureSlot*>& owners) noexcept;
   // The breathing's phase has become known: all mapped features take the motion that they have in common with it and,
   // when `again`, learn once more what the frame history still has, by that phase. As long as it was not known a match

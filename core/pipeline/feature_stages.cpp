@@ -173,7 +173,7 @@ void settle_match(FeatureSlot& slot, const MapPrediction& map, const FrameJob& j
   const PixelPrediction from_neighbours = predict_from_neighbours(slot, neighbours, job);
   if (slot.match.state != MatchState::kFound || moves_otherwise(slot, from_neighbours, gate)) {
     const bool pose_is_shared = map.valid && job.shared_pose != nullptr;
-    const PixelPrediction from_map = pose_is_shared ? predict_from_shared_pose(map, *job.shared_pose, model)
+    const PixelPrediction from_map = pose_is_shared ? predict_from_shared_pose(map, *job.shared_pose, *job.frame, model)
                                                     : predict_from_map(map, *job.frame, model);
     slot.match_agrees = false;
     seek(slot, surer(from_map, from_neighbours.valid ? from_neighbours : predict_from_last_place(slot, job)),
@@ -243,7 +243,9 @@ bool is_wanted_for_start(const FeatureSlot& slot, const FrameJob& job) noexcept 
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept {
   if (slot.state == SlotState::kEmpty || slot.match.state != MatchState::kFound || !job.frame->measurable) return;
   if (job.frame->held && (slot.state != SlotState::kTracked || is_wanted_for_start(slot, job))) {
-    slot.held.push({job.frame->index, slot.match.px, slot.match.covariance_px2});
+    const PixelMap& picture = job.frame->picture;
+    slot.held.push(
+        {job.frame->index, picture.to_lens(slot.match.px), picture.covariance_to_lens(slot.match.covariance_px2)});
   }
   if (slot.match_agrees) slot.last_observed = job.frame->stamp.capture;
 }

@@ -1,10 +1,12 @@
 // What all features share about each of the last frames: pose, phases and basis at capture.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
 
+#include "core/geometry/pixel_map.hpp"
 #include "core/periodic/basis.hpp"
 #include "core/phase/cardiac_clock.hpp"
 #include "core/pipeline/phase_basis.hpp"
@@ -25,6 +27,9 @@ struct FrameRecord {
   FrameRate held_rate;            // of those that are held
   CameraPose pose;  // what is not known of the breathing counts as noise of its position: either moves all alike
   Pose X_CW;
+  // Where the picture has what the camera's model has elsewhere, as the scope is turned and zoomed. Pixels that are
+  // held for learning, and those of CommonMatch, are the model's; all others are the picture's.
+  PixelMap picture;
   double tracker_variance_mm2 = 0.0;  // of the position, per axis, the tracker's part alone
   RespiratoryPhase respiration;       // at capture, as known at the last refresh
   // How the whole surface is displaced from where the map has it, going by the frames before; for the search alone.
@@ -90,6 +95,15 @@ class FrameHistory {
     record.pose = pose;
     record.tracker_variance_mm2 = pose.position_variance_mm2;
     if (pose.valid()) record.X_CW = pose.X_WC.inverse();
+  }
+
+  // The poses of the frames from this one on were told by a set-up that did not hold: nothing more is learnt from them.
+  void disown_poses(std::uint64_t from_index) noexcept {
+    for (std::uint64_t i = std::max(from_index, oldest_); i < count_; ++i) {
+      FrameRecord& record = records_[i % kCapacity];
+      record.pose.state = CameraPose::State::kMissing;
+      record.measurable = false;
+    }
   }
 
   // Fills phases and basis of a new record, whose pose is set, from the clocks. The basis is computed here, once a

@@ -38,6 +38,8 @@ struct FrameJob {
   // After B: how the features found have moved, and the pose that they agree on; null when they do not tell it.
   const NeighbourMotion* motion = nullptr;
   const CommonEstimate* shared_pose = nullptr;
+  bool scope_unread = false;        // how the scope is turned in this frame is not known
+  bool scope_changed = false;       // it is turned otherwise than at first, and nothing tells what follows
   bool no_parallax = false;         // the camera has lately been in one place
   bool setup_doubted = false;       // see SetupBelief
   double setup_variance_mm2 = 0.0;  // likewise, per axis

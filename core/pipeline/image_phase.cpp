@@ -54,8 +54,8 @@ void ImagePhase::collect(std::span<FeatureGroup> groups, const FrameRecord& fram
   owners_.clear();
   const std::size_t stride = (groups.size() + kMostGroups - 1) / kMostGroups;
   for (std::size_t g = frame.index % stride; g < groups.size(); g += stride) {
-    groups[g].collect(at, respiration.known ? &breath : nullptr, converged, settings.pixel_deviation_px, matches_,
-                      owners_);
+    groups[g].collect(at, respiration.known ? &breath : nullptr, converged, settings.pixel_deviation_px, frame.picture,
+                      matches_, owners_);
   }
   used_.assign(matches_.size(), 0);
 }

@@ -29,13 +29,14 @@ bool same_picture(const GreyImage& a, const GreyImage& b) noexcept {
 
 Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells,
                WorkerTeam& team, FeatureFinder& finder, BatchStarter& starter, SetupWatcher& watcher,
-               SurfaceMaker& surface_maker, PhaseCells& phase_cells, PipelineCounters& counters)
+               SurfaceMaker& surface_maker, ScopeWatch* scope, PhaseCells& phase_cells, PipelineCounters& counters)
     : settings_(settings),
       model_{settings.camera},
       slots_(slots),
       team_(team),
       starter_(starter),
       watcher_(watcher),
+      scope_(scope),
       phase_cells_(phase_cells),
       counters_(counters),
       poses_(settings.pose),
@@ -71,7 +72,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
   const RealtimeScope realtime;
   finish_learning();
   const Instant begun = MonotonicClock::now();
-  const FrameRecord& frame = begin_frame(stamp, ecg);
+  const FrameRecord& frame = begin_frame(stamp, image, ecg);
   StageEnds ends;
   if (same_picture(image, before)) counters_.frames_repeated.add();
   // A
@@ -90,6 +91,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
   computed_before_learning_ = MonotonicClock::now() - begun;
   watcher_.take(*history_, slots_, bank_);
   intake_.offer(frame, image, colour, room());
+  if (scope_ != nullptr) scope_->offer(frame.index, frame.rate, image);
   keeping_.fill_feed(breathing_, heart_, counters_.maps_forgotten.get());
   surface_.on_frame(frame, heart_.clock().law().law);
   count(frame, begun, ends);
@@ -98,14 +100,15 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
 }
 
 // The phases and the pose at its capture, and what the workers need of them.
-const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const CardiacClock& ecg) noexcept {
+const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage& image,
+                                       const CardiacClock& ecg) noexcept {
   take_starts();
   const Breathing::Change breath = breathing_.begin_frame(*history_);
   if (breath.map_changes()) heart_.forget_r_peaks();
   const HeartPhase::Change heart = heart_.begin_frame(ecg, stamp.arrival, stamp.capture);
   tell_earlier_frames(heart, breath);
   FrameRecord& frame = history_->append(stamp);
-  FrameHistory::set_pose(frame, poses_.at(stamp.capture));
+  set_pose(frame, image);
   parallax_.add(frame.pose, stamp.capture);
   job_.no_parallax = parallax_.none();
   job_.starts_fail_alike = starts_fail_alike(slots_);
@@ -119,6 +122,27 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const CardiacClo
   job_.about_capture = bases_about(settings_.estimator.layout, frame.phase, frame.respiration);
   plan_evaluation(frame);
   return frame;
+}
+
+// By the tracker, and by how the scope is turned: without either there is none.
+void Mapper::set_pose(FrameRecord& frame, const GreyImage& image) noexcept {
+  bool known = true;
+  double turn_deviation_rad = 0.0;
+  if (scope_ != nullptr) {
+    const ScopeWatch::Frame scope = scope_->begin_frame(frame.index, image);
+    if (scope.mistaken_since) history_->disown_poses(*scope.mistaken_since);
+    job_.scope_unread = scope.unread;
+    job_.scope_changed = scope.changed;
+    known = !scope.unread && !scope.changed;
+    if (scope.state) {
+      poses_.set_hand_eye(scope.state->X_SC);
+      frame.picture = scope.state->picture;
+      turn_deviation_rad = scope.state->rotation_deviation_rad;
+    }
+  }
+  CameraPose pose = known ? poses_.at(frame.stamp.capture) : CameraPose();
+  pose.rotation_variance_rad2 += turn_deviation_rad * turn_deviation_rad;
+  FrameHistory::set_pose(frame, pose);
 }
 
 // Before this frame's adoptions. In lockstep all starts are ready at their frames.

@@ -25,6 +25,7 @@
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
+#include "core/pipeline/scope_watch.hpp"
 #include "core/pipeline/setup_watcher.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/shard_stages.hpp"
@@ -46,7 +47,7 @@ class Mapper {
  public:
   Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, std::span<ShardCells> cells, WorkerTeam& team,
          FeatureFinder& finder, BatchStarter& starter, SetupWatcher& watcher, SurfaceMaker& surface_maker,
-         PhaseCells& phase_cells, PipelineCounters& counters);
+         ScopeWatch* scope, PhaseCells& phase_cells, PipelineCounters& counters);
 
   void add_pose(const TrackerSample& sample) noexcept;
   // Before process(): what the respiration channel told until that capture, or later.
@@ -82,7 +83,9 @@ class Mapper {
     Instant evaluated;  // C
   };
 
-  [[nodiscard]] const FrameRecord& begin_frame(const FrameStamp& stamp, const CardiacClock& ecg) noexcept;
+  [[nodiscard]] const FrameRecord& begin_frame(const FrameStamp& stamp, const GreyImage& image,
+                                               const CardiacClock& ecg) noexcept;
+  void set_pose(FrameRecord& frame, const GreyImage& image) noexcept;
   void take_starts() noexcept;
   void tell_earlier_frames(const HeartPhase::Change& heart, const Breathing::Change& breath) noexcept;
   void plan_evaluation(const FrameRecord& frame) noexcept;
@@ -102,6 +105,7 @@ class Mapper {
   WorkerTeam& team_;
   BatchStarter& starter_;
   SetupWatcher& watcher_;
+  ScopeWatch* scope_;  // null where pictures are not asked how the scope is turned
   PhaseCells& phase_cells_;
   PipelineCounters& counters_;
 

@@ -15,6 +15,7 @@
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/release_plan.hpp"
+#include "core/pipeline/scope_watch.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
 #include "core/pipeline/setup_watcher.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
@@ -57,6 +58,7 @@ struct Pipeline::Parts {
   BatchStarter starter;
   SetupWatcher watcher;
   SurfaceMaker surface_maker;
+  std::unique_ptr<ScopeWatch> scope;  // null where pictures are not asked how the scope is turned
   PhaseCells phase_cells;
   Mapper mapper;
   FrameHandle mapped_before;  // its buffer is still taken; without one before the first frame
@@ -80,7 +82,8 @@ Pipeline::Parts::Parts(const PipelineSettings& of)
       starter(settings, slots),
       watcher(settings),
       surface_maker(settings.estimator.layout, slots.size(), kMeshVertices, settings.lockstep),
-      mapper(settings, slots, cells, team, finder, starter, watcher, surface_maker, phase_cells, counters),
+      scope(settings.turned_scope || settings.watch_scope ? std::make_unique<ScopeWatch>(settings, counters) : nullptr),
+      mapper(settings, slots, cells, team, finder, starter, watcher, surface_maker, scope.get(), phase_cells, counters),
       plan({settings.latency, settings.frame_stream, settings.clock_period, settings.lead + settings.validity}),
       composers{SurfaceComposer(composer_settings(settings)), SurfaceComposer(composer_settings(settings))},
       publisher_view(cells.size()),
@@ -117,6 +120,7 @@ FeatureFinder& Pipeline::finder() noexcept { return parts_->finder; }
 BatchStarter& Pipeline::starter() noexcept { return parts_->starter; }
 SetupWatcher& Pipeline::setup_watcher() noexcept { return parts_->watcher; }
 SurfaceMaker& Pipeline::surface_maker() noexcept { return parts_->surface_maker; }
+ScopeWatch* Pipeline::scope() noexcept { return parts_->scope.get(); }
 ReleasePlan& Pipeline::plan() noexcept { return parts_->plan; }
 std::span<const FeatureSlot> Pipeline::slots() const noexcept { return parts_->slots; }
 bool Pipeline::pose_reached(Instant t) const noexcept { return parts_->mapper.pose_reached(t); }

@@ -14,6 +14,7 @@ class FeatureFinder;
 class MapFeed;
 class ReleasePlan;
 class RespiratoryClock;
+class ScopeWatch;
 class SensorEntrance;
 class SetupWatcher;
 class SurfaceMaker;
@@ -45,6 +46,8 @@ class Pipeline {
   [[nodiscard]] BatchStarter& starter() noexcept;
   [[nodiscard]] SetupWatcher& setup_watcher() noexcept;
   [[nodiscard]] SurfaceMaker& surface_maker() noexcept;
+  // Null where pictures are not asked how the scope is turned.
+  [[nodiscard]] ScopeWatch* scope() noexcept;
   [[nodiscard]] ReleasePlan& plan() noexcept;
   // Every feature with its match of the last frame. For tests, in lockstep: between frames nothing changes them.
   [[nodiscard]] std::span<const FeatureSlot> slots() const noexcept;

@@ -68,10 +68,15 @@ struct PipelineCounters {
   Counter frames;
   Counter frames_without_pose;
   Counter frames_without_phase;
-  Counter phases_from_image;  // frames whose matches told the phase
-  Counter poses_refused;      // stamps that go back in time
-  Counter poses_repeated;     // bit for bit the reading before
-  Counter frames_repeated;    // likewise, pictures
+  Counter phases_from_image;    // frames whose matches told the phase
+  Counter poses_refused;        // stamps that go back in time
+  Counter poses_repeated;       // bit for bit the reading before
+  Counter frames_repeated;      // likewise, pictures
+  Counter scope_read;           // 1: how the scope is turned in its camera head is read in this frame; 0: it is not
+  Counter scope_rotation_urad;  // where its notch is then, 0 to 2 pi
+  Counter scope_changed;        // 1: turned or zoomed otherwise than at first, without a calibration of that
+  Counter scope_turns;          // how often it was turned or zoomed
+  Counter scope_frames_unread;  // in which its notch was sought and not found, where its turns are calibrated
   Counter learning_put_off;
   Counter adoptions_late;
   Counter features_tracked;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <optional>
 
+#include "core/calibration/turned_scope.hpp"
 #include "core/estimation/batch_start.hpp"
 #include "core/estimation/iterated_update.hpp"
 #include "core/estimation/precision.hpp"
@@ -38,6 +39,10 @@ struct EstimatorSettings {
 struct PipelineSettings {
   CameraModel camera;
   PoseHistorySettings pose;
+  // Of an angled scope, whose turn and zoom are read from its field stop in the pictures: the hand-eye, the focal
+  // length and the principal point then go by it, in place of pose.X_SC and the camera's.
+  std::optional<TurnedScope> turned_scope;
+  bool watch_scope = false;  // without that: look in the pictures whether the scope is turned or zoomed meanwhile
   CardiacClockSettings clock;
   std::optional<RTriggerSettings> r_trigger;  // R peaks come from a trigger, not from the ECG's samples
   RespirationSettings respiration;

@@ -24,7 +24,8 @@ PixelPrediction predict_from_map(const MapPrediction& map, const FrameRecord& fr
   Matrix23d J_C;
   const Vector3d p_WF = map.p_WF + frame.displacement_mm;
   if (model.camera.project(frame.X_CW * p_WF, prediction.px, &J_C) != ProjectionStatus::kOk) return {};
-  const Matrix23d J_p = J_C * frame.X_CW.R;
+  prediction.px = frame.picture.to_picture(prediction.px);
+  const Matrix23d J_p = frame.picture.scale.asDiagonal() * (J_C * frame.X_CW.R);
   Matrix2d of_pose;
   if (shift.known) {
     // It has the errors of pose and displacement, and its deviation what the model does not know.
@@ -43,13 +44,16 @@ PixelPrediction predict_from_map(const MapPrediction& map, const FrameRecord& fr
 }
 
 PixelPrediction predict_from_shared_pose(const MapPrediction& map, const CommonEstimate& shared,
-                                         const PixelModel& model) noexcept {
+                                         const FrameRecord& frame, const PixelModel& model) noexcept {
   PixelPrediction prediction;
   MeasurementJacobians J;
   if (measure(model, shared.X_CW, map.p_WF, prediction.px, &J) != ProjectionStatus::kOk) return {};
+  prediction.px = frame.picture.to_picture(prediction.px);
+  const auto scale = frame.picture.scale.asDiagonal();
   CommonJacobian J_s(2, kPoseUnknowns);
-  J_s << J.dz_dtheta, J.dz_dc;
-  prediction.covariance_px2 = J.dz_dp * map.covariance_W * J.dz_dp.transpose() +
+  J_s << scale * J.dz_dtheta, scale * J.dz_dc;
+  const Matrix23d J_p = scale * J.dz_dp;
+  prediction.covariance_px2 = J_p * map.covariance_W * J_p.transpose() +
                               common_noise(J_s, shared.covariance.topLeftCorner(kPoseUnknowns, kPoseUnknowns)) +
                               of_the_model();
   prediction.valid = prediction.covariance_px2.allFinite();

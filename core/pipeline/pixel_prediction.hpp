@@ -28,7 +28,7 @@ struct PixelPrediction {
 
 // From the pose that the frame's matches agree on: far narrower than the tracker's where that is noisy.
 [[nodiscard]] PixelPrediction predict_from_shared_pose(const MapPrediction& map, const CommonEstimate& shared,
-                                                       const PixelModel& model) noexcept;
+                                                       const FrameRecord& frame, const PixelModel& model) noexcept;
 
 // By its own motion, while it is fresh: an older velocity misleads more than it helps, the motion turns within a few
 // frames.

@@ -31,7 +31,9 @@ enum class SurfaceReason : std::uint8_t {
   kNotSeen,
   kNoParallax,
   kSetupDoubted,
-  kNothingConverged
+  kNothingConverged,
+  kScopeUnread,
+  kScopeChanged
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost, kShed };

@@ -19,6 +19,8 @@ SurfaceFooting footing_of(std::span<const ShardSnapshot* const> snapshots) noexc
   for (const ShardSnapshot* snapshot : snapshots) {
     footing.mapped = footing.mapped || !snapshot->features.empty();
     footing.pose_missing = footing.pose_missing || snapshot->pose_missing;
+    footing.scope_unread = footing.scope_unread || snapshot->scope_unread;
+    footing.scope_changed = footing.scope_changed || snapshot->scope_changed;
     sight.add(*snapshot);
     still = still || snapshot->no_parallax;
     footing.setup_doubted = footing.setup_doubted || snapshot->setup_doubted;
@@ -42,6 +44,8 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (phase.state == PhaseState::kFromImage) return SurfaceReason::kPhaseFromImage;
   if (footing.frame_missing) return SurfaceReason::kFrameMissing;
   if (footing.update_late) return SurfaceReason::kUpdateLate;
+  if (footing.scope_unread) return SurfaceReason::kScopeUnread;
+  if (footing.scope_changed) return SurfaceReason::kScopeChanged;
   if (footing.pose_missing) return SurfaceReason::kPoseMissing;
   if (footing.setup_doubted) return SurfaceReason::kSetupDoubted;
   if (footing.not_seen) return SurfaceReason::kNotSeen;

@@ -15,6 +15,8 @@ struct SurfaceFooting {
   bool mapped = false;           // there are features
   bool frame_missing = false;
   bool update_late = false;
+  bool scope_unread = false;   // how the scope is turned cannot be read
+  bool scope_changed = false;  // it is turned otherwise than at first, and nothing tells what follows
   bool pose_missing = false;
   bool not_seen = false;            // see Sight
   bool no_parallax = false;         // the camera keeps still, and no feature has converged

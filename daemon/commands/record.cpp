@@ -10,12 +10,14 @@
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/stop_signal.hpp"
+#include "daemon/runtime/configured_scope.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/device_setup.hpp"
 #include "daemon/runtime/replay_setup.hpp"
 #include "daemon/runtime/session_recorder.hpp"
 #include "daemon/runtime/session_recording.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/calibration/turned_scope_file.hpp"
 
 namespace perimap {
 namespace {
@@ -39,6 +41,7 @@ std::string progress_line(const SessionRecorder& recorder, double elapsed_s) {
 struct Basis {
   Configuration configuration;
   std::optional<CameraModel> camera;
+  std::optional<TurnedScope> turned_scope;
 };
 
 tl::expected<Basis, SetupError> basis_of(const RecordOptions& options) {
@@ -47,13 +50,16 @@ tl::expected<Basis, SetupError> basis_of(const RecordOptions& options) {
   if (given->camera.playback) {
     auto recorded = recorded_basis(given->camera.playback->string(), options.configuration, ReadMode::kStrict);
     if (!recorded) return tl::unexpected(std::move(recorded.error()));
-    return Basis{std::move(recorded->configuration), recorded->camera};
+    return Basis{std::move(recorded->configuration), recorded->camera, recorded->turned_scope};
   }
-  Basis basis{std::move(*given), std::nullopt};
+  Basis basis{std::move(*given), std::nullopt, std::nullopt};
   if (basis.configuration.camera.calibration) {
     auto camera = read_calibration(*basis.configuration.camera.calibration);
     if (!camera) return tl::unexpected(SetupError{std::move(camera.error()), true});
     basis.camera = *camera;
+    auto scope = configured_scope(basis.configuration, *camera);
+    if (!scope) return tl::unexpected(SetupError{std::move(scope.error()), true});
+    basis.turned_scope = *scope;
   }
   return basis;
 }
@@ -86,9 +92,10 @@ Outcome record(const RecordOptions& options, const Console& console) {
     return refuse(options.configuration + ": names no device; expected [camera], [tracker] or [ecg]",
                   ExitCode::kWrongUsage);
   }
-  auto recorder = SessionRecorder::create(
-      options.out, recording_facts(basis->configuration, basis->camera, "perimap record " PERIMAP_VERSION),
-      static_cast<std::size_t>(basis->configuration.recording.memory_MB) << 20U);
+  SensorRecordingFacts facts = recording_facts(basis->configuration, basis->camera, "perimap record " PERIMAP_VERSION);
+  if (basis->turned_scope) facts.turned_scope = format_turned_scope(*basis->turned_scope);
+  auto recorder = SessionRecorder::create(options.out, facts,
+                                          static_cast<std::size_t>(basis->configuration.recording.memory_MB) << 20U);
   if (!recorder) return refuse(recorder.error());
 
   const Logging logging(basis->configuration.log.level);

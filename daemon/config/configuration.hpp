@@ -32,19 +32,20 @@ struct ReplayConfiguration {
 };
 
 struct CameraConfiguration {
-  std::optional<std::string> device;                 // as parse_camera_endpoint() takes it
-  std::optional<PixelFormat> format;                 // none: the camera's best
-  int width = 0;                                     // 0: the calibration's
-  int height = 0;                                    // likewise
-  int input = -1;                                    // of a capture card; -1: as it is
-  double frame_rate_hz = 0.0;                        // 0: the camera's
-  double exposure_ms = 0.0;                          // 0: as it is
-  double gain = -1.0;                                // -1: as it is
-  Duration delay{0};                                 // of the picture when it is stamped
-  bool loop = true;                                  // a video begins anew at its end
-  std::optional<std::filesystem::path> calibration;  // none: the recording's own attachment
-  std::optional<std::filesystem::path> playback;     // a recording whose frames stand in for a camera
-  double playback_start_s = 0.0;                     // CLOCK_MONOTONIC; 0: when the daemon starts
+  std::optional<std::string> device;                  // as parse_camera_endpoint() takes it
+  std::optional<PixelFormat> format;                  // none: the camera's best
+  int width = 0;                                      // 0: the calibration's
+  int height = 0;                                     // likewise
+  int input = -1;                                     // of a capture card; -1: as it is
+  double frame_rate_hz = 0.0;                         // 0: the camera's
+  double exposure_ms = 0.0;                           // 0: as it is
+  double gain = -1.0;                                 // -1: as it is
+  Duration delay{0};                                  // of the picture when it is stamped
+  bool loop = true;                                   // a video begins anew at its end
+  std::optional<std::filesystem::path> calibration;   // none: the recording's own attachment
+  std::optional<std::filesystem::path> turned_scope;  // of a scope that is turned in its camera head
+  std::optional<std::filesystem::path> playback;      // a recording whose frames stand in for a camera
+  double playback_start_s = 0.0;                      // CLOCK_MONOTONIC; 0: when the daemon starts
 
   bool operator==(const CameraConfiguration&) const = default;
 };

@@ -75,6 +75,10 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
       .flag("loop", PERIMAP_MEMBER(camera.loop), "a video begins anew at its end")
       .file("calibration", PERIMAP_MEMBER(camera.calibration),
             "calibration as OpenCV writes it, from this file's folder; none: the recording's own")
+      .file("turned_scope", PERIMAP_MEMBER(camera.turned_scope),
+            "of a scope that is turned in its camera head, as `perimap calibrate scope` writes it: hand-eye and "
+            "principal "
+            "point then go by the notch in the pictures; none: the recording's own")
       .file("playback", PERIMAP_MEMBER(camera.playback), "a recording whose frames stand in for a camera")
       .number("playback_start_s", 0, 1e9, PERIMAP_MEMBER(camera.playback_start_s),
               "when that recording begins, CLOCK_MONOTONIC; 0: when perimapd starts");

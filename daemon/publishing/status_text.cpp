@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "core/angle/angle.hpp"
 #include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 
@@ -89,27 +90,33 @@ Json counts_json(const perimap_Status& status) {
                {"start_matches_needed", status.start_matches_needed},
                {"start_matches_most", status.start_matches_most},
                {"start_matches_mean", status.start_matches_mean},
-               {"features_started_anew", status.features_started_anew}});
+               {"features_started_anew", status.features_started_anew},
+               {"scope_turns", status.scope_turns},
+               {"scope_frames_unread", status.scope_frames_unread}});
   return json;
 }
 
 Json status_json(const perimap_Status& status, std::span<const perimap_StageLatency> stages,
                  std::span<const perimap_SourceStatus> sources) {
-  Json json = {{"version", status.version},
-               {"realtime_priority", name_of(status.realtime_priority)},
-               {"memory_locked", name_of(status.memory_locked)},
-               {"latency_ms", ms(status.latency_ns)},
-               {"latency_short", status.latency_short},
-               {"phase", name_of(status.phase_state)},
-               {"rhythm", name_of(status.rhythm)},
-               {"respiration", name_of(status.respiration)},
-               {"respiration_suspected", status.respiration_suspected},
-               {"respiration_source", name_of(status.respiration_source)},
-               {"setup", setup_json(status.setup)},
-               {"recording", name_of(status.recording)},
-               {"messages_recorded", status.messages_recorded},
-               {"frames_not_recorded", status.frames_not_recorded},
-               {"other_not_recorded", status.other_not_recorded}};
+  Json json = {
+      {"version", status.version},
+      {"realtime_priority", name_of(status.realtime_priority)},
+      {"memory_locked", name_of(status.memory_locked)},
+      {"latency_ms", ms(status.latency_ns)},
+      {"latency_short", status.latency_short},
+      {"phase", name_of(status.phase_state)},
+      {"rhythm", name_of(status.rhythm)},
+      {"respiration", name_of(status.respiration)},
+      {"respiration_suspected", status.respiration_suspected},
+      {"respiration_source", name_of(status.respiration_source)},
+      {"setup", setup_json(status.setup)},
+      {"scope_turn", name_of(status.scope_turn)},
+      {"scope_rotation_deg",
+       status.scope_turn == perimap_SCOPE_TURN_UNREAD ? Json(nullptr) : Json(status.scope_rotation_rad / kDegree)},
+      {"recording", name_of(status.recording)},
+      {"messages_recorded", status.messages_recorded},
+      {"frames_not_recorded", status.frames_not_recorded},
+      {"other_not_recorded", status.other_not_recorded}};
   json.update(counts_json(status));
   Json by_stage = Json::object();
   for (const perimap_StageLatency& stage : stages) by_stage[std::string(name_of(stage.kind))] = stage_json(stage);

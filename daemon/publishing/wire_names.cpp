@@ -19,10 +19,27 @@ std::string_view name_of(perimap_SurfaceState state) noexcept {
 }
 
 std::string_view name_of(perimap_SurfaceReason reason) noexcept {
-  return name_in<19>({"none", "nothing_mapped", "phase_unknown", "phase_free_running", "phase_lost", "frame_missing",
-                      "update_late", "pose_missing", "phase_contradicted", "respiration_unknown", "phase_from_image",
-                      "ectopic_beat", "rhythm_unpredictable", "rhythm_ectopic", "law_undecided", "not_seen",
-                      "no_parallax", "setup_doubted", "nothing_converged"},
+  return name_in<21>({"none",
+                      "nothing_mapped",
+                      "phase_unknown",
+                      "phase_free_running",
+                      "phase_lost",
+                      "frame_missing",
+                      "update_late",
+                      "pose_missing",
+                      "phase_contradicted",
+                      "respiration_unknown",
+                      "phase_from_image",
+                      "ectopic_beat",
+                      "rhythm_unpredictable",
+                      "rhythm_ectopic",
+                      "law_undecided",
+                      "not_seen",
+                      "no_parallax",
+                      "setup_doubted",
+                      "nothing_converged",
+                      "scope_unread",
+                      "scope_changed"},
                      static_cast<int>(reason));
 }
 
@@ -63,6 +80,10 @@ std::string_view name_of(perimap_Privilege privilege) noexcept {
 
 std::string_view name_of(perimap_RecordingState state) noexcept {
   return name_in<3>({"off", "on", "stopped"}, static_cast<int>(state));
+}
+
+std::string_view name_of(perimap_ScopeTurn turn) noexcept {
+  return name_in<3>({"unread", "read", "changed"}, static_cast<int>(turn));
 }
 
 std::string_view name_of(perimap_SourceKind kind) noexcept {

@@ -59,6 +59,10 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_SETUP_DOUBTED;
     case SurfaceReason::kNothingConverged:
       return perimap_SURFACE_REASON_NOTHING_CONVERGED;
+    case SurfaceReason::kScopeUnread:
+      return perimap_SURFACE_REASON_SCOPE_UNREAD;
+    case SurfaceReason::kScopeChanged:
+      return perimap_SURFACE_REASON_SCOPE_CHANGED;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }

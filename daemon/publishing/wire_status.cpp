@@ -188,6 +188,12 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.setup = to_wire(facts.setup);
   wire_.poses_repeated = c.poses_repeated.get();
   wire_.frames_repeated = c.frames_repeated.get();
+  wire_.scope_turn = c.scope_changed.get() != 0 ? perimap_SCOPE_TURN_CHANGED
+                     : c.scope_read.get() != 0  ? perimap_SCOPE_TURN_READ
+                                                : perimap_SCOPE_TURN_UNREAD;
+  wire_.scope_rotation_rad = 1e-6 * static_cast<double>(c.scope_rotation_urad.get());
+  wire_.scope_turns = c.scope_turns.get();
+  wire_.scope_frames_unread = c.scope_frames_unread.get();
 
   std::uint32_t sources = 0;
   for_each_source(c, facts, [&](const SourceFacts& source) noexcept {

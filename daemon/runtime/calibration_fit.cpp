@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "daemon/config/tracked_tools.hpp"
+#include "daemon/runtime/configured_scope.hpp"
 #include "drivers/calibration/calibration_facts.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/calibration/tool_tip.hpp"
@@ -75,8 +76,33 @@ std::optional<CalibrationDate> date_of(const std::optional<std::string>& text) {
 
 }  // namespace
 
+namespace {
+
+// Of the camera's picture, and of the tracker's sensor where it says of which it is.
+Expected<void> scope_fits(const Configuration& configuration) {
+  const CameraConfiguration& c = configuration.camera;
+  const TrackerConfiguration& tracker = configuration.tracker;
+  if (!c.turned_scope) return {};
+  if (c.calibration) {
+    const auto camera = read_calibration(*c.calibration);
+    if (!camera) return tl::unexpected(camera.error());
+    if (const auto scope = configured_scope(configuration, *camera); !scope) return tl::unexpected(scope.error());
+  }
+  const auto sensor = calibration_fact(*c.turned_scope, "sensor");
+  if (!sensor || tracker.protocol == TrackerConfiguration::Protocol::kNone) return {};
+  if (tracker.sensor && same_tool(*sensor, *tracker.sensor, tracker.protocol)) return {};
+  return wrong("camera.turned_scope",
+               tracker.sensor ? fmt::format("one of \"{}\", the tracker.sensor", *tracker.sensor)
+                              : "a tracker.sensor that is named, for it is of one sensor",
+               fmt::format("one of \"{}\"", *sensor),
+               "its hand-eye is that sensor's; name it, or measure the scope with `perimap calibrate scope`");
+}
+
+}  // namespace
+
 Expected<void> calibrations_fit(const Configuration& configuration) {
   const TrackerConfiguration& c = configuration.tracker;
+  if (const auto scope = scope_fits(configuration); !scope) return scope;
   if (c.hand_eye_sensor && !c.sensor && c.protocol != TrackerConfiguration::Protocol::kNone) {
     return wrong("tracker.sensor", fmt::format("\"{}\", as 'tracker.hand_eye_sensor' says", *c.hand_eye_sensor),
                  "nothing", "without it any other sensor would be taken for that one; name the sensor");
@@ -122,6 +148,10 @@ std::vector<std::string> old_calibrations(const Configuration& configuration,
   if (configuration.camera.calibration) {
     warn_of_age("camera.calibration: the one", camera_calibration_date(*configuration.camera.calibration), most, today,
                 "perimap calibrate camera", warnings);
+  }
+  if (configuration.camera.turned_scope) {
+    warn_of_age("camera.turned_scope: the one", date_of(calibration_fact(*configuration.camera.turned_scope, "date")),
+                most, today, "perimap calibrate scope", warnings);
   }
   if (c.protocol == TrackerConfiguration::Protocol::kNone) return warnings;
   warn_of_age("tracker.hand_eye_date: the hand-eye", date_of(c.hand_eye_date), most, today,

@@ -10,6 +10,7 @@
 #include "daemon/config/ecg_inputs.hpp"
 #include "daemon/config/tracked_tools.hpp"
 #include "daemon/runtime/calibration_fit.hpp"
+#include "daemon/runtime/configured_scope.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/ecg/can_ecg.hpp"
 #include "drivers/recording/channels.hpp"
@@ -273,6 +274,9 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
       if (!calibration) return tl::unexpected(SetupError{calibration.error(), true});
       basis.camera = *calibration;
     }
+    auto scope = configured_scope(given, basis.camera);
+    if (!scope) return wrong_configuration(scope.error());
+    basis.turned_scope = *scope;
   }
   Configuration& configuration = basis.configuration;
   if (const auto fits = calibrations_fit(configuration); !fits) return wrong_configuration(fits.error());
@@ -291,7 +295,8 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
     if (auto loaded = load_video_support(); !loaded)
       return tl::unexpected(SetupError{std::move(loaded.error()), false});
   }
-  const PipelineSettings pipeline = pipeline_settings(configuration, basis.camera);
+  PipelineSettings pipeline = pipeline_settings(configuration, basis.camera);
+  pipeline.turned_scope = basis.turned_scope;
   const Identity identity{configuration.source.name, first_stream(pipeline), configuration.source.world_frame};
   return DeviceSetup{std::move(configuration), pipeline, identity, std::move(*devices)};
 }

@@ -9,6 +9,7 @@
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/release_plan.hpp"
+#include "core/pipeline/scope_watch.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
 #include "core/pipeline/setup_watcher.hpp"
 #include "core/pipeline/surface_maker.hpp"
@@ -55,6 +56,9 @@ void LiveRuntime::start() {
       threads_.launch("surface", ThreadRole::kBackground, [this] { pipeline_.surface_maker().serve(); }));
   housekeepers_.push_back(
       threads_.launch("setup-watch", ThreadRole::kBackground, [this] { pipeline_.setup_watcher().serve(); }));
+  if (ScopeWatch* scope = pipeline_.scope()) {
+    housekeepers_.push_back(threads_.launch("scope", housekeeping, [scope] { scope->serve(); }));
+  }
   mapper_ = threads_.launch("mapper", ThreadRole::kMapper, [this] { run_mapper(); });
   publisher_ = threads_.launch("publisher", ThreadRole::kPublisher, [this] { run_publisher(); });
   status_ = threads_.launch("status", housekeeping, [this] { run_status(); });
@@ -82,6 +86,7 @@ void LiveRuntime::stop() {
   pipeline_.starter().dismiss();
   pipeline_.surface_maker().dismiss();
   pipeline_.setup_watcher().dismiss();
+  if (ScopeWatch* scope = pipeline_.scope()) scope->dismiss();
   for (std::thread& housekeeper : housekeepers_) housekeeper.join();
 }
 

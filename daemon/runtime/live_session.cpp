@@ -133,6 +133,7 @@ Expected<void> LiveSession::run(StopSignal& stop) {
     warn_of_short_latency();
     tell_of_shedding();
     tell_of_setup();
+    if (pipeline_.scope() != nullptr) scope_news_.tell(pipeline_.counters(), MonotonicClock::now());
     if (!told_end && feeder_->ended()) {
       runtime_.end_of_sources();
       told_end = true;

@@ -10,6 +10,7 @@
 #include "daemon/publishing/identity.hpp"
 #include "daemon/publishing/wire_status.hpp"
 #include "daemon/runtime/live_runtime.hpp"
+#include "daemon/runtime/scope_news.hpp"
 #include "drivers/transport/interrupt.hpp"
 
 namespace perimap {
@@ -91,6 +92,7 @@ class LiveSession {
   bool shedding_told_ = false;
   std::uint64_t setup_ticks_ = 0;
   bool setup_told_ = false;
+  ScopeNews scope_news_;
 };
 
 }  // namespace perimap

@@ -9,6 +9,7 @@
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/release_plan.hpp"
+#include "core/pipeline/scope_watch.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
 #include "core/pipeline/setup_watcher.hpp"
 #include "core/pipeline/surface_maker.hpp"
@@ -41,6 +42,7 @@ LockstepRuntime::LockstepRuntime(Pipeline& pipeline, const Identity& identity, D
   threads_.emplace_back([this] { pipeline_.starter().serve(); });
   threads_.emplace_back([this] { pipeline_.surface_maker().serve(); });
   threads_.emplace_back([this] { pipeline_.setup_watcher().serve(); });
+  if (ScopeWatch* scope = pipeline_.scope()) threads_.emplace_back([scope] { scope->serve(); });
 }
 
 LockstepRuntime::~LockstepRuntime() {
@@ -49,6 +51,7 @@ LockstepRuntime::~LockstepRuntime() {
   pipeline_.starter().dismiss();
   pipeline_.surface_maker().dismiss();
   pipeline_.setup_watcher().dismiss();
+  if (ScopeWatch* scope = pipeline_.scope()) scope->dismiss();
   for (std::thread& thread : threads_) thread.join();
 }
 

@@ -8,7 +8,9 @@
 
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/surface_traffic.hpp"
+#include "daemon/runtime/configured_scope.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/calibration/turned_scope_file.hpp"
 #include "drivers/recording/channels.hpp"
 
 namespace perimap {
@@ -18,6 +20,7 @@ namespace {
 struct RecordingFacts {
   std::optional<std::string> calibration;
   std::optional<std::string> configuration;
+  std::optional<std::string> turned_scope;
   Duration utc_minus_monotonic{0};
   std::optional<std::string> world_frame;
 };
@@ -39,6 +42,9 @@ Expected<RecordingFacts> read_facts(const std::string& path, ReadMode mode) {
   auto configuration = attached(attachments::kConfiguration);
   if (!configuration) return tl::unexpected(configuration.error());
   facts.configuration = std::move(*configuration);
+  auto turned_scope = attached(attachments::kTurnedScope);
+  if (!turned_scope) return tl::unexpected(turned_scope.error());
+  facts.turned_scope = std::move(*turned_scope);
 
   const auto channels = reader->channels();
   const bool has_info = std::any_of(channels.begin(), channels.end(),
@@ -61,6 +67,7 @@ Expected<RecordingFacts> read_facts(const std::string& path, ReadMode mode) {
 PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& camera) {
   PipelineSettings s;
   s.camera = camera;
+  s.watch_scope = true;
   const double(&t)[3] = c.tracker.translation_SC_mm;
   s.pose.X_SC = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), c.tracker.rotation_SC_wxyz);
   s.pose.position_deviation_mm = c.tracker.position_deviation_mm / std::numbers::sqrt3;
@@ -153,6 +160,14 @@ tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& record
         "{}: no camera calibration is attached; expected key 'camera.calibration' to name one", recording)});
   }
   basis.camera = *camera;
+  auto scope = configured_scope(configuration, *camera);
+  if (!scope) return wrong_configuration(std::move(scope.error()));
+  basis.turned_scope = *scope;
+  if (!basis.turned_scope && facts->turned_scope) {
+    auto own = parse_turned_scope(*facts->turned_scope, fmt::format("{}:{}", recording, attachments::kTurnedScope));
+    if (!own) return wrong_recording(std::move(own.error()));
+    basis.turned_scope = *own;
+  }
   return basis;
 }
 
@@ -171,7 +186,8 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
                    true});
   }
   reader->require_frame_size(basis->camera.width, basis->camera.height);
-  const PipelineSettings pipeline = pipeline_settings(basis->configuration, basis->camera);
+  PipelineSettings pipeline = pipeline_settings(basis->configuration, basis->camera);
+  pipeline.turned_scope = basis->turned_scope;
   const Identity identity{basis->configuration.source.name, first_stream(pipeline),
                           basis->configuration.source.world_frame};
   return ReplaySetup{std::move(basis->configuration), pipeline,          identity, basis->utc_minus_monotonic,

@@ -33,8 +33,9 @@ struct SetupError {
 
 // What a recording and a configuration file over it come to.
 struct RecordedBasis {
-  Configuration configuration;  // effective: defaults, then the recording's own, then the file's
-  CameraModel camera;           // of the file's calibration, or the recording's own
+  Configuration configuration;              // effective: defaults, then the recording's own, then the file's
+  CameraModel camera;                       // of the file's calibration, or the recording's own
+  std::optional<TurnedScope> turned_scope;  // likewise
   Duration utc_minus_monotonic{0};
   std::vector<Error> passed_over;  // keys of its configuration that do not describe the session (ReadMode::kWhole)
 };

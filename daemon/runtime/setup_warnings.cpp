@@ -15,10 +15,12 @@
 namespace perimap {
 namespace {
 
-void warn_of_tracker(const TrackerConfiguration& tracker, std::vector<std::string>& warnings) {
+// `has_scope`: a turned scope has the hand-eye.
+void warn_of_tracker(const TrackerConfiguration& tracker, bool has_scope, std::vector<std::string>& warnings) {
   if (tracker.protocol == TrackerConfiguration::Protocol::kNone) return;
   const TrackerConfiguration untold;
-  if (std::equal(std::begin(tracker.translation_SC_mm), std::end(tracker.translation_SC_mm),
+  if (!has_scope &&
+      std::equal(std::begin(tracker.translation_SC_mm), std::end(tracker.translation_SC_mm),
                  untold.translation_SC_mm) &&
       std::equal(std::begin(tracker.rotation_SC_wxyz), std::end(tracker.rotation_SC_wxyz), untold.rotation_SC_wxyz)) {
     warnings.emplace_back(
@@ -59,7 +61,7 @@ void warn_of_lens(const CameraModel& c, std::vector<std::string>& warnings) {
 std::vector<std::string> setup_warnings(const Configuration& configuration, const std::optional<CameraModel>& camera) {
   std::vector<std::string> warnings;
   if (configuration.replay.recording) return warnings;
-  warn_of_tracker(configuration.tracker, warnings);
+  warn_of_tracker(configuration.tracker, configuration.camera.turned_scope.has_value(), warnings);
   if (camera) warn_of_lens(*camera, warnings);
   return warnings;
 }

@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numbers>
+#include <string_view>
 
 #include "core/angle/angle.hpp"
+#include "daemon/setup/recorded_board.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/calibration/turned_scope_file.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -21,6 +25,35 @@ bool read_numbers(const nlohmann::json& json, const char* key, double* values, s
     values[i] = json[key][i].get<double>();
   }
   return true;
+}
+
+// Of the rotation and the translation, as `perimap calibrate hand-eye` writes it; zeros where there is none.
+Matrix6d covariance_in(const nlohmann::json& json) {
+  Matrix6d covariance = Matrix6d::Zero();
+  if (!json.contains("covariance") || !json["covariance"].is_array() || json["covariance"].size() < 6)
+    return covariance;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const nlohmann::json& row = json["covariance"][i];
+    for (std::size_t k = 0; k < 6; ++k) {
+      if (!row.is_array() || row.size() < 6 || !row[k].is_number()) return Matrix6d::Zero();
+      covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = row[k].get<double>();
+    }
+  }
+  return covariance.allFinite() ? covariance : Matrix6d(Matrix6d::Zero());
+}
+
+// As `perimap calibrate camera` writes it; zeros where there is none.
+Vector2d principal_deviation_in(const std::string& text) {
+  constexpr std::string_view kKey = "principal_point_deviation: [";
+  const auto at = text.find(kKey);
+  if (at == std::string::npos) return Vector2d::Zero();
+  Vector2d deviation;
+  char* end = nullptr;
+  deviation.x() = std::strtod(text.c_str() + at + kKey.size(), &end);
+  while (*end == ' ' || *end == ',') ++end;
+  deviation.y() = std::strtod(end, &end);
+  const bool good = deviation.allFinite() && deviation.minCoeff() >= 0.0 && deviation.maxCoeff() < 1e4;
+  return good ? deviation : Vector2d(Vector2d::Zero());
 }
 
 }  // namespace
@@ -52,6 +85,35 @@ Expected<ScopeRotation> rotation_of(std::vector<ReadPicture> pictures, std::vect
   return result;
 }
 
+void NotchReadings::add(const std::string& name, double t_s, const GreyImage& grey) {
+  width_ = grey.width;
+  height_ = grey.height;
+  const auto reading = read_field_stop(grey);
+  if (reading) {
+    pictures_.push_back({name, t_s, *reading});
+  } else {
+    without_.push_back(name + ": " + reading.error().message);
+  }
+}
+
+Expected<ScopeRotation> NotchReadings::rotation() && {
+  auto rotation = rotation_of(std::move(pictures_), std::move(without_));
+  if (rotation) rotation->width = width_, rotation->height = height_;
+  return rotation;
+}
+
+Expected<ScopeRotation> rotation_in_recording(const std::string& recording) {
+  constexpr double kFrames_per_s = 2.0;
+  NotchReadings readings;
+  const auto read = for_each_recorded_frame(recording, kFrames_per_s, [&](double t_s, const GreyImage& grey) {
+    readings.add(fmt::format("frame at {:.3f} s", t_s), t_s, grey);
+  });
+  if (!read) return tl::unexpected(read.error());
+  auto rotation = std::move(readings).rotation();
+  if (!rotation) return fail(recording + ": " + rotation.error().message);
+  return rotation;
+}
+
 Expected<SetupAtRotation> read_setup(const std::filesystem::path& hand_eye, const std::filesystem::path& camera) {
   constexpr std::size_t kLargest = std::size_t{4} * 1024 * 1024;
   const auto text = read_text_file(hand_eye, kLargest, "hand-eye calibration");
@@ -66,9 +128,21 @@ Expected<SetupAtRotation> read_setup(const std::filesystem::path& hand_eye, cons
   }
   const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(std::abs(norm - 1.0) < 1e-3)) return fail(hand_eye.string() + ": 'rotation_wxyz' is no unit quaternion");
+  constexpr double kFarthest_mm = 10'000.0;
+  if (Vector3d(t[0], t[1], t[2]).norm() > kFarthest_mm) {
+    return fail(hand_eye.string() + ": 'translation_mm' is farther than 10 m");
+  }
   const auto lens = read_calibration(camera);
   if (!lens) return tl::unexpected(lens.error());
-  return SetupAtRotation{0.0, pose_from_wxyz(Vector3d(t[0], t[1], t[2]), q), {lens->cx, lens->cy}};
+  const auto lens_text = read_text_file(camera, kLargest, "calibration");
+  if (!lens_text) return tl::unexpected(lens_text.error());
+  SetupAtRotation setup;
+  setup.X_SC = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), q);
+  setup.principal_px = {lens->cx, lens->cy};
+  setup.focal_px = {lens->fx, lens->fy};
+  setup.covariance_C = covariance_in(json);
+  setup.principal_deviation_px = principal_deviation_in(*lens_text);
+  return setup;
 }
 
 std::string text_of(const ScopeRotation& rotation) {
@@ -111,6 +185,18 @@ std::string text_of(const TurnedScope& scope) {
         "  shaft          along ({:.4f} {:.4f} {:.4f}) of the sensor, through ({:.2f} {:.2f} {:.2f}) mm\n",
         scope.axis_S.x(), scope.axis_S.y(), scope.axis_S.z(), scope.point_S.x(), scope.point_S.y(), scope.point_S.z());
   }
+  text += fmt::format(
+      "  deviations     {:.2f} mm and {:.2f} degrees of the hand-eye, {:.2f} px of the principal point, at the turn "
+      "where they are largest\n",
+      scope.translation_deviation_mm, scope.rotation_deviation_rad / kDegree, scope.principal_deviation_px);
+  if (!scope.sensor_on_scope) {
+    text += fmt::format("                 {:.2f} degrees of the shaft's direction, {:.2f} mm of its place\n",
+                        scope.axis_deviation_rad / kDegree, scope.point_deviation_mm);
+  }
+  for (const FocalAtRadius& row : scope.focals) {
+    text += fmt::format("  focal length   {:.2f} {:.2f} px where the field stop's radius is {:.1f} px\n",
+                        row.focal_px.x(), row.focal_px.y(), row.radius_px);
+  }
   if (scope.translation_rms_mm > 0.0) {
     text += fmt::format("  left over      {:.2f} mm and {:.2f} degrees RMS of the set-ups\n", scope.translation_rms_mm,
                         scope.rotation_rms_deg);
@@ -121,19 +207,7 @@ std::string text_of(const TurnedScope& scope) {
 }
 
 nlohmann::json json_of(const TurnedScope& scope) {
-  const auto three = [](const Vector3d& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
-  double q[4];
-  rotation_to_wxyz(scope.reference.X_SC.R, q);
-  return {{"reference_rotation_deg", scope.reference.rotation_rad / kDegree},
-          {"reference_translation_mm", three(scope.reference.X_SC.t)},
-          {"reference_rotation_wxyz", {q[0], q[1], q[2], q[3]}},
-          {"reference_principal_point_px", {scope.reference.principal_px.x(), scope.reference.principal_px.y()}},
-          {"sensor_on_scope", scope.sensor_on_scope},
-          {"axis", three(scope.axis_S)},
-          {"axis_point_mm", three(scope.point_S)},
-          {"turn_centre_px", {scope.turn_px.x(), scope.turn_px.y()}},
-          {"left_over_mm", scope.translation_rms_mm},
-          {"left_over_deg", scope.rotation_rms_deg}};
+  return nlohmann::json::parse(format_turned_scope(scope)).at("turned_scope");
 }
 
 std::vector<Plot> plots_of(const ScopeRotation& rotation) {

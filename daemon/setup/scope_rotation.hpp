@@ -28,7 +28,25 @@ struct ScopeRotation {
   double spread_rad = 0.0;                // RMS of the pictures about it
   double radius_px = 0.0;                 // mean
   Vector2d centre_px = Vector2d::Zero();  // mean
+  int width = 0;                          // px, of the pictures
+  int height = 0;
 };
+
+// Notches as they are read, picture by picture.
+class NotchReadings {
+ public:
+  void add(const std::string& name, double t_s, const GreyImage& grey);
+  [[nodiscard]] Expected<ScopeRotation> rotation() &&;
+
+ private:
+  std::vector<ReadPicture> pictures_;
+  std::vector<std::string> without_;
+  int width_ = 0;
+  int height_ = 0;
+};
+
+// Of two frames a second.
+[[nodiscard]] Expected<ScopeRotation> rotation_in_recording(const std::string& recording);
 
 // Fails when the notch was read in none, and says why.
 [[nodiscard]] Expected<ScopeRotation> rotation_of(std::vector<ReadPicture> pictures, std::vector<std::string> without);

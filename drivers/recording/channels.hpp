@@ -37,5 +37,6 @@ namespace perimap::attachments {
 
 inline constexpr std::string_view kCalibration = "calibration.yaml";
 inline constexpr std::string_view kConfiguration = "configuration.toml";
+inline constexpr std::string_view kTurnedScope = "turned_scope.json";
 
 }  // namespace perimap::attachments

@@ -23,10 +23,11 @@ struct SensorRecordingFacts {
   std::string description;  // where it comes from
   std::string world_frame;
   Duration utc_minus_monotonic{0};
-  std::optional<std::string> calibration;    // the camera's, as OpenCV writes it
-  std::optional<std::string> configuration;  // of perimapd, TOML
-  bool r_trigger = false;                    // there is a trigger whose pulses may come
-  bool respiration = false;                  // there is a respiration channel
+  std::optional<std::string> calibration;     // the camera's, as OpenCV writes it
+  std::optional<std::string> configuration;   // of perimapd, TOML
+  std::optional<std::string> turned_scope{};  // where the scope is turned in its camera head, as calibrated
+  bool r_trigger = false;                     // there is a trigger whose pulses may come
+  bool respiration = false;                   // there is a respiration channel
   std::vector<std::string> tools = {};  // channels of other tracked tools, by ToolSample::tool; empty: not recorded
 };
 

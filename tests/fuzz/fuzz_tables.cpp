@@ -1,4 +1,5 @@
-// Any bytes as a table of poses, of a signal, of points, as a tool's tip: an error of one line, or finite numbers.
+// Any bytes as a table of poses, of a signal, of points, as a tool's tip, as a turned scope: an error of one line, or
+// finite numbers.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -6,6 +7,7 @@
 #include <string_view>
 
 #include "drivers/calibration/tool_tip.hpp"
+#include "drivers/calibration/turned_scope_file.hpp"
 #include "drivers/pose_file/point_table.hpp"
 #include "drivers/pose_file/pose_table.hpp"
 
@@ -34,6 +36,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (const auto tip = parse_tool_tip(text, "fuzz.json"); !tip) {
     check_error(tip.error());
   } else if (!tip->tip_T.allFinite() || !tip->covariance_T.allFinite()) {
+    std::abort();
+  }
+  if (const auto scope = parse_turned_scope(text, "fuzz.json"); !scope) {
+    check_error(scope.error());
+  } else if (const auto setup = scope->at(1.0); !setup.X_SC.t.allFinite() || !setup.principal_px.allFinite()) {
     std::abort();
   }
   return 0;

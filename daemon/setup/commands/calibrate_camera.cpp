@@ -37,15 +37,6 @@ struct CameraOptions {
   std::string lens = "brown-conrady";
 };
 
-// The calibration file as the configuration names it: from its own folder.
-std::string calibration_key(const CommonOptions& options) {
-  if (options.configuration.empty()) return "";
-  std::error_code error;
-  const auto folder = std::filesystem::absolute(options.configuration, error).parent_path();
-  const auto file = std::filesystem::absolute(options.output, error).lexically_relative(folder);
-  return fmt::format("{:?}", file.string());
-}
-
 // What is measured, wherever the views come from.
 struct SeenBoard {
   Board board;
@@ -108,7 +99,7 @@ Expected<Measurement> measure(const CameraOptions& options) {
   measured.plots = plots_of(*result);
   measured.file = calibration_text_of(*result, seen->board, date_now());
   measured.section = "camera";
-  measured.keys = {{"calibration", calibration_key(options.common)}};
+  measured.keys = {{"calibration", output_key(options.common)}};
   return measured;
 }
 

@@ -2,17 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
-#include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "daemon/command_line/commands.hpp"
+#include "daemon/config/configuration_loader.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/pictures.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
-#include "daemon/setup/recorded_board.hpp"
 #include "daemon/setup/scope_rotation.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 
@@ -23,73 +24,79 @@ struct CalibrateScopeOptions {
   CommonOptions common;
   std::vector<std::string> pictures;
   std::string recording;
-  std::vector<std::vector<std::string>> setups;  // picture, hand-eye, camera
+  std::vector<std::vector<std::string>> setups;  // picture or recording, hand-eye, camera
+  std::vector<std::vector<std::string>> zooms;   // picture or recording, camera
 
   [[nodiscard]] std::vector<std::string> inputs() const {
     return recording.empty() ? pictures : std::vector{recording};
   }
 };
 
-class Readings {
- public:
-  void add(const std::string& name, double t_s, const GreyImage& grey) {
-    const auto reading = read_field_stop(grey);
-    if (reading) {
-      pictures_.push_back({name, t_s, *reading});
-    } else {
-      without_.push_back(name + ": " + reading.error().message);
-    }
-  }
-  [[nodiscard]] Expected<ScopeRotation> rotation() && { return rotation_of(std::move(pictures_), std::move(without_)); }
-
- private:
-  std::vector<ReadPicture> pictures_;
-  std::vector<std::string> without_;
-};
-
 Expected<ScopeRotation> rotation_in_pictures(const std::vector<std::string>& named) {
   const auto pictures = read_pictures(named);
   if (!pictures) return tl::unexpected(pictures.error());
-  Readings readings;
+  NotchReadings readings;
   for (const NamedPicture& picture : *pictures) readings.add(picture.name, 0.0, picture.grey());
   return std::move(readings).rotation();
 }
 
-Expected<ScopeRotation> rotation_in_recording(const std::string& recording) {
-  constexpr double kFrames_per_s = 2.0;
-  Readings readings;
-  const auto read = for_each_recorded_frame(recording, kFrames_per_s, [&](double t_s, const GreyImage& grey) {
-    readings.add(fmt::format("frame at {:.3f} s", t_s), t_s, grey);
-  });
-  if (!read) return tl::unexpected(read.error());
-  auto rotation = std::move(readings).rotation();
-  if (!rotation) return fail(recording + ": " + rotation.error().message);
-  return rotation;
+bool is_recording(const std::string& file) { return std::filesystem::path(file).extension() == ".mcap"; }
+
+// The field stop in a picture or a recording, and the lens that was calibrated then.
+struct SeenWithLens {
+  ScopeRotation stop;
+  CameraModel lens;
+};
+
+Expected<SeenWithLens> seen_with_lens(const std::string& seen, const std::string& lens_file) {
+  auto stop = is_recording(seen) ? rotation_in_recording(seen) : rotation_in_pictures({seen});
+  if (!stop) return tl::unexpected(stop.error());
+  const auto lens = read_calibration(lens_file);
+  if (!lens) return tl::unexpected(lens.error());
+  if (stop->width != lens->width || stop->height != lens->height) {
+    return fail(fmt::format("{}: is {}x{}, and {} is for {}x{}: they belong to one camera as it is used", seen,
+                            stop->width, stop->height, lens_file, lens->width, lens->height));
+  }
+  return SeenWithLens{*std::move(stop), *lens};
 }
 
-// The set-up as a function of the rotation, from those that --at names.
+Expected<void> same_size(const CameraModel& lens, const std::string& lens_file, const CameraModel& first) {
+  if (lens.width == first.width && lens.height == first.height) return {};
+  return fail(
+      fmt::format("{}: is for {}x{}, and the ones before are for {}x{}: they belong to one camera as it is used",
+                  lens_file, lens.width, lens.height, first.width, first.height));
+}
+
+// The set-up as a function of the rotation, from those that --at names, and of the zoom, from those of --zoom too.
 Expected<TurnedScope> turned_scope(const CalibrateScopeOptions& options) {
   std::vector<SetupAtRotation> setups;
+  std::optional<CameraModel> first;
   Vector2d turn_px = Vector2d::Zero();
   for (const std::vector<std::string>& files : options.setups) {
-    const auto rotation = rotation_in_pictures({files.at(0)});
-    if (!rotation) return tl::unexpected(rotation.error());
+    const auto seen = seen_with_lens(files.at(0), files.at(2));
+    if (!seen) return tl::unexpected(seen.error());
     auto setup = read_setup(files.at(1), files.at(2));
     if (!setup) return tl::unexpected(setup.error());
-    const auto lens = read_calibration(files.at(2));
-    if (!lens) return tl::unexpected(lens.error());
-    const auto picture = read_pictures({files.at(0)});
-    if (!picture) return tl::unexpected(picture.error());
-    const PictureFile& of = picture->front().picture;
-    if (of.width != lens->width || of.height != lens->height) {
-      return fail(fmt::format("{}: is {}x{}, and {} is for {}x{}: they belong to one camera as it is used", files.at(0),
-                              of.width, of.height, files.at(2), lens->width, lens->height));
-    }
-    setup->rotation_rad = rotation->rotation_rad;
+    if (!first) first = seen->lens;
+    if (const auto same = same_size(seen->lens, files.at(2), *first); !same) return tl::unexpected(same.error());
+    setup->rotation_rad = seen->stop.rotation_rad;
+    setup->rotation_deviation_rad = seen->stop.rotation_deviation_rad;
+    setup->radius_px = seen->stop.radius_px;
     setups.push_back(*setup);
-    turn_px += rotation->centre_px / static_cast<double>(options.setups.size());
+    turn_px += seen->stop.centre_px / static_cast<double>(options.setups.size());
   }
-  return fit_turned_scope(setups, turn_px);
+  auto scope = fit_turned_scope(setups, turn_px);
+  if (!scope) return scope;
+  scope->width = first->width;
+  scope->height = first->height;
+  for (const std::vector<std::string>& files : options.zooms) {
+    const auto seen = seen_with_lens(files.at(0), files.at(1));
+    if (!seen) return tl::unexpected(seen.error());
+    if (const auto same = same_size(seen->lens, files.at(1), *first); !same) return tl::unexpected(same.error());
+    scope->focals.push_back({seen->stop.radius_px, {seen->lens.fx, seen->lens.fy}});
+  }
+  scope->focals = focal_table(std::move(scope->focals));
+  return scope;
 }
 
 Expected<Measurement> measure(const CalibrateScopeOptions& options) {
@@ -99,6 +106,14 @@ Expected<Measurement> measure(const CalibrateScopeOptions& options) {
     if (!scope) return tl::unexpected(scope.error());
     measured.text += text_of(*scope);
     measured.json["turned_scope"] = json_of(*scope);
+    if (!options.common.configuration.empty()) {
+      // Of which sensor: check and perimapd refuse it with another.
+      const auto configuration = load_configuration(options.common.configuration, {}, NamedFiles::kMayBeMissing);
+      if (!configuration) return tl::unexpected(configuration.error());
+      if (configuration->tracker.sensor) measured.json["sensor"] = *configuration->tracker.sensor;
+    }
+    measured.section = "camera";
+    measured.keys = {{"turned_scope", output_key(options.common)}};
     if (options.pictures.empty() && options.recording.empty()) return measured;
   }
   if (options.pictures.empty() == options.recording.empty()) {
@@ -113,6 +128,22 @@ Expected<Measurement> measure(const CalibrateScopeOptions& options) {
   return measured;
 }
 
+Outcome run(const CalibrateScopeOptions& options) {
+  if (!options.zooms.empty() && options.setups.empty()) {
+    return refuse("--zoom: expected --at too, the set-ups at several turns", ExitCode::kWrongUsage);
+  }
+  if (!options.common.configuration.empty() && (options.common.output.empty() || options.setups.empty())) {
+    return refuse("--configuration: expected --at and --output too, the file that the configuration is to name",
+                  ExitCode::kWrongUsage);
+  }
+  std::vector<std::string> read = options.inputs();
+  for (const auto& named : {options.setups, options.zooms}) {
+    for (const auto& files : named) read.insert(read.end(), files.begin(), files.end());
+  }
+  if (auto able = check_outputs(options.common, read); !able) return able;
+  return finish(measure(options), options.common, joined(read));
+}
+
 }  // namespace
 
 void add_calibrate_scope(Commands& commands, Command& calibrate) {
@@ -120,27 +151,29 @@ void add_calibrate_scope(Commands& commands, Command& calibrate) {
   Command& command = commands.add(
       calibrate, "scope",
       "How far an angled scope is turned in its camera head, by its field stop's notch; and the set-up by it",
-      [options](const Console&) -> Outcome {
-        std::vector<std::string> read = options->inputs();
-        for (const auto& files : options->setups) read.insert(read.end(), files.begin(), files.end());
-        if (auto able = check_outputs(options->common, read); !able) return able;
-        return finish(measure(*options), options->common, joined(options->inputs()));
-      });
+      [options](const Console&) { return run(*options); });
   command.footer(
-      "perimapd does not take a turned scope's state: it maps with the set-up of its configuration. Who turns the "
-      "scope "
-      "measures hand-eye and lens anew, or writes what this says of the new turn into the configuration.");
+      "What --at and --output write goes into a configuration as camera.turned_scope: perimapd, replay and verify then "
+      "read turn and zoom from the field stop in the pictures, and take hand-eye and lens by them.");
   command.add_option("IMAGES", options->pictures, "Pictures with the field stop, folders of them, or a video");
   add_from(command, options->recording);
   command
       .add_option_function<std::vector<std::string>>(
           "--at", [options](const std::vector<std::string>& files) { options->setups.push_back(files); },
-          "PICTURE HAND_EYE CAMERA: a picture at one turn of the scope, and what perimap calibrate hand-eye --output "
-          "and "
-          "calibrate camera --output wrote then; give it twice and more, for the set-up as a function of the turn")
+          "PICTURE HAND_EYE CAMERA: a picture or a recording at one turn of the scope, and what perimap calibrate "
+          "hand-eye --output and calibrate camera --output wrote then; give it twice and more, for the set-up as a "
+          "function of the turn")
       ->expected(3)
       ->trigger_on_parse();
-  add_common(command, options->common, false, false);
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--zoom", [options](const std::vector<std::string>& files) { options->zooms.push_back(files); },
+          "PICTURE CAMERA: with --at, a picture or a recording at another zoom or focus, and what perimap calibrate "
+          "camera --output wrote then: the table of focal lengths by the field stop's radius; between those it is read "
+          "along a line")
+      ->expected(2)
+      ->trigger_on_parse();
+  add_common(command, options->common, false, true);
 }
 
 }  // namespace perimap

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <filesystem>
+#include <system_error>
+
 #include "daemon/command_line/outputs.hpp"
 #include "daemon/command_line/same_file.hpp"
 #include "daemon/setup/setup_plots.hpp"
@@ -18,6 +21,14 @@ std::string list_of(const nlohmann::json& values) {
 std::string number_of(double value) {
   const std::string text = fmt::format("{:.6g}", value);
   return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
+}
+
+std::string output_key(const CommonOptions& options) {
+  if (options.configuration.empty()) return "";
+  std::error_code error;
+  const auto folder = std::filesystem::absolute(options.configuration, error).parent_path();
+  const auto file = std::filesystem::absolute(options.output, error).lexically_relative(folder);
+  return fmt::format("{:?}", file.string());
 }
 
 Outcome check_outputs(const CommonOptions& options, const std::vector<std::string>& inputs) {
@@ -53,8 +64,8 @@ Expected<void> write_results(const Measurement& measured, const CommonOptions& o
   }
   if (!options.configuration.empty()) {
     const std::string comment = fmt::format("measured {} from {}", date, made_from);
-    // The calibration file that the section of the camera names is not in its place yet.
-    const bool files_may_be_missing = !measured.file.empty();
+    // The file that the configuration is to name is not in its place yet.
+    const bool files_may_be_missing = !options.output.empty();
     const auto text =
         configuration_with_keys(options.configuration, measured.section, measured.keys, comment, files_may_be_missing);
     if (!text) return tl::unexpected(text.error());

@@ -46,6 +46,9 @@ struct Measurement {
 // --unit, --json, --output, --html and --configuration, for results that have them.
 void add_common(Command& command, CommonOptions& options, bool has_unit, bool has_keys);
 
+// --output as a value of --configuration, whose folder names start from; empty without one.
+[[nodiscard]] std::string output_key(const CommonOptions& options);
+
 // Numbers as TOML.
 [[nodiscard]] std::string list_of(const nlohmann::json& values);
 [[nodiscard]] std::string number_of(double value);

@@ -52,6 +52,10 @@ Expected<RecordedMotion> recorded_motion(const RecordedOptions& options, const s
   const auto wish = wish_of(options.board);
   auto camera = lens_of(options, configuration);
   if (!camera) return tl::unexpected(camera.error());
+  if (const auto& turned = options.lens_as_turned) {
+    camera->fx = turned->focal_px.x(), camera->fy = turned->focal_px.y();
+    camera->cx = turned->principal_px.x(), camera->cy = turned->principal_px.y();
+  }
   auto sensor = read_recorded_poses(options.recording, kScopeTool);
   if (!sensor) return tl::unexpected(sensor.error());
   constexpr double kFrames_per_s = 15.0;

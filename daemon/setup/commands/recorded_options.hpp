@@ -1,10 +1,12 @@
 // What calibrations from a recording are told, and the recording's poses and views by it.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/calibration/timed_poses.hpp"
+#include "core/calibration/turned_scope.hpp"
 #include "core/error/expected.hpp"
 #include "core/geometry/camera_model.hpp"
 #include "daemon/setup/commands/board_options.hpp"
@@ -18,6 +20,8 @@ struct RecordedOptions {
   std::string calibration;  // the lens; empty: the configuration's
   std::string live;         // the configuration of live devices, whose lens it is where no other says it
   BoardOptions board;
+  // In place of the lens's own focal length and principal point: the scope is turned or zoomed otherwise now.
+  std::optional<LensAtTurn> lens_as_turned = std::nullopt;
 };
 
 // --from.

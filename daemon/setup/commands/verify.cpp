@@ -2,20 +2,24 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/angle/angle.hpp"
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/setup/commands/live_capture.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
 #include "daemon/setup/recorded_poses.hpp"
+#include "daemon/setup/scope_rotation.hpp"
 #include "daemon/setup/verification.hpp"
 #include "drivers/calibration/tool_tip.hpp"
+#include "drivers/calibration/turned_scope_file.hpp"
 
 namespace perimap {
 namespace {
@@ -78,17 +82,47 @@ nlohmann::json json_of(const Verification& result, const VerifyOptions& options)
   return json;
 }
 
+// The set-up as the scope was turned and zoomed while it was recorded.
+struct SetupAsTurned {
+  Pose X_SC;
+  LensAtTurn lens;
+};
+
+Expected<SetupAsTurned> setup_as_turned(const std::filesystem::path& file, const std::string& recording) {
+  const auto scope = read_turned_scope(file);
+  if (!scope) return tl::unexpected(scope.error());
+  const auto rotation = rotation_in_recording(recording);
+  if (!rotation) return tl::unexpected(rotation.error());
+  constexpr double kHeld_rad = 2.0 * kDegree;
+  if (rotation->spread_rad > kHeld_rad) {
+    return fail(recording + ": the scope was turned in its camera head meanwhile; hold it, and record again");
+  }
+  const auto lens = scope->lens_at(rotation->rotation_rad, rotation->radius_px);
+  if (!lens) {
+    return fail(fmt::format("{}: is of a zoom that {} has not: zoom back, or measure lens and scope at this zoom too",
+                            recording, file.string()));
+  }
+  return SetupAsTurned{scope->at(rotation->rotation_rad).X_SC, *lens};
+}
+
 Expected<Verification> verify(const VerifyOptions& options) {
   const auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
   if (!configuration) return tl::unexpected(configuration.error());
   const TrackerConfiguration& tracker = configuration->tracker;
-  const SetupOnTrial setup{
+  SetupOnTrial setup{
       pose_from_wxyz(Vector3d(tracker.translation_SC_mm[0], tracker.translation_SC_mm[1], tracker.translation_SC_mm[2]),
                      tracker.rotation_SC_wxyz),
       to_seconds(tracker.time_offset)};
+  RecordedOptions recorded = options.recorded;
+  if (configuration->camera.turned_scope) {
+    const auto turned = setup_as_turned(*configuration->camera.turned_scope, recorded.recording);
+    if (!turned) return tl::unexpected(turned.error());
+    setup.X_SC = turned->X_SC;
+    recorded.lens_as_turned = turned->lens;
+  }
   const auto touch = touch_of(options);
   if (!touch) return tl::unexpected(touch.error());
-  const auto motion = recorded_motion(options.recorded, options.configuration);
+  const auto motion = recorded_motion(recorded, options.configuration);
   if (!motion) return tl::unexpected(motion.error());
   auto result = verify_setup(motion->camera_poses, motion->sensor_poses, middle_of(motion->board.views), setup, *touch,
                              options.bound_mm);

@@ -90,6 +90,12 @@ TEST(SurfaceState, TellsWhatIsWorseFirst) {
   EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, footing), SurfaceReason::kNotSeen);
   footing.pose_missing = true;
   EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, footing), SurfaceReason::kPoseMissing);
+  footing.scope_changed = true;
+  EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, footing), SurfaceReason::kScopeChanged);
+  footing.scope_unread = true;
+  EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, footing), SurfaceReason::kScopeUnread);
+  EXPECT_EQ(state_of(SurfaceReason::kScopeUnread), SurfaceState::kDegraded);
+  EXPECT_EQ(state_of(SurfaceReason::kScopeChanged), SurfaceState::kDegraded);
   phase.state = PhaseState::kFreeRunning;
   EXPECT_EQ(reason_of(phase, Rhythm::kPredictable, kMapped), SurfaceReason::kPhaseFreeRunning);
   phase.state = PhaseState::kLost;

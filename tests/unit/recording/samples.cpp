@@ -274,6 +274,10 @@ void fill(Filler& next, perimap_Status& s) {
   fill(next, s.setup);
   next(s.poses_repeated);
   next(s.frames_repeated);
+  next(s.scope_turn);
+  next(s.scope_rotation_rad);
+  next(s.scope_turns);
+  next(s.scope_frames_unread);
 }
 
 void fill(Filler& next, perimap_SurfaceMesh& s) {
@@ -362,6 +366,9 @@ void fill(Filler& next, perimap_TruthCamera& s) {
   next(s.capture_time_ns);
   next(s.translation_WC_mm);
   next(s.rotation_WC_wxyz);
+  next(s.focal_px);
+  next(s.principal_point_px);
+  next(s.scope_rotation_rad);
 }
 
 void fill(Filler& next, foxglove_Time& s) {

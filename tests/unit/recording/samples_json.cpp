@@ -272,7 +272,11 @@ json to_json(const perimap_Status& s) {
           MEMBER(releases_late),
           MEMBER(setup),
           MEMBER(poses_repeated),
-          MEMBER(frames_repeated)};
+          MEMBER(frames_repeated),
+          MEMBER(scope_turn),
+          MEMBER(scope_rotation_rad),
+          MEMBER(scope_turns),
+          MEMBER(scope_frames_unread)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {
@@ -317,7 +321,8 @@ json to_json(const perimap_TruthMotion& s) {
 }
 template <>
 json to_json(const perimap_TruthCamera& s) {
-  return {MEMBER(capture_time_ns), MEMBER(translation_WC_mm), MEMBER(rotation_WC_wxyz)};
+  return {MEMBER(capture_time_ns), MEMBER(translation_WC_mm),  MEMBER(rotation_WC_wxyz),
+          MEMBER(focal_px),        MEMBER(principal_point_px), MEMBER(scope_rotation_rad)};
 }
 template <>
 json to_json(const foxglove_Time& s) {

@@ -9,6 +9,7 @@
 
 #include "drivers/calibration/calibration_facts.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/calibration/turned_scope_file.hpp"
 #include "drivers/video/video_file.hpp"
 
 namespace perimap {
@@ -77,6 +78,35 @@ TEST_F(CalibrationFit, AHandEyeOfAnotherSensorIsRefused) {
   configuration_.tracker.protocol = TrackerConfiguration::Protocol::kIgtl;
   configuration_.tracker.sensor = "0A";
   EXPECT_FALSE(calibrations_fit(configuration_)) << "names are names";
+}
+
+TEST_F(CalibrationFit, AScopeOfAnotherSensorOrOfOtherPicturesIsRefused) {
+  TurnedScope scope;
+  scope.reference.focal_px = {80.0, 80.0};
+  scope.width = 64, scope.height = 48;
+  const auto text_of = [&] {
+    std::string text = format_turned_scope(scope);
+    return text.insert(text.find('{') + 1, R"("sensor": "0A",)");
+  };
+  configuration_.camera.calibration = write("camera.yaml", format_calibration(lens()));
+  configuration_.camera.turned_scope = write("scope.json", text_of());
+  configuration_.tracker.sensor = "0a";
+  const auto good = calibrations_fit(configuration_);
+  EXPECT_TRUE(good) << good.error().message;
+  configuration_.tracker.sensor = "0B";
+  const auto other = calibrations_fit(configuration_);
+  ASSERT_FALSE(other);
+  EXPECT_THAT(other.error().message, HasSubstr("key 'camera.turned_scope': expected one of \"0B\""));
+  configuration_.tracker.sensor.reset();
+  EXPECT_FALSE(calibrations_fit(configuration_)) << "any other sensor would be taken for it";
+  configuration_.tracker.sensor = "0A";
+  scope.width = 128;
+  configuration_.camera.turned_scope = write("scope.json", text_of());
+  const auto wide = calibrations_fit(configuration_);
+  ASSERT_FALSE(wide);
+  EXPECT_THAT(wide.error().message, HasSubstr("key 'camera.turned_scope': expected one of pictures of 64x48"));
+  configuration_.camera.turned_scope = write("scope.json", "{");
+  EXPECT_FALSE(calibrations_fit(configuration_));
 }
 
 TEST_F(CalibrationFit, ATipOfAnotherToolIsRefused) {

@@ -4,7 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
+#include <vector>
 
 #include "core/angle/angle.hpp"
 
@@ -75,6 +78,49 @@ TEST(TurnedScope, WhatIsMissingIsSaid) {
   SetupAtRotation other = scope.at(2.0);
   other.X_SC.R = other.X_SC.R * so3_exp({0.0, 0.0, 0.5});
   EXPECT_THAT(fit_turned_scope({scope.at(0.1), other}, {}).error().message, HasSubstr("do not turn with the scope"));
+}
+
+// Set-ups that are off by their own deviations leave a function that is off by those that it tells.
+TEST(TurnedScope, DeviationsAreThoseOfWhatIsTold) {
+  const Built scope;
+  std::mt19937 generator(4021);
+  std::normal_distribution<double> normal;
+  const auto normal3 = [&] { return Vector3d(normal(generator), normal(generator), normal(generator)); };
+  constexpr double kRotation_rad = 0.1 * kDegree;
+  constexpr double kTranslation_mm = 0.3;
+  constexpr double kNotch_rad = 0.2 * kDegree;
+  constexpr int kTrials = 300;
+  constexpr int kTurns = 12;
+  double rotation[kTurns]{};
+  double translation[kTurns]{};
+  double axis = 0.0;
+  TurnedScope told;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::vector<SetupAtRotation> setups;
+    for (const double theta : {0.0, 1.2, 2.4}) {
+      SetupAtRotation setup = scope.at(theta);
+      setup.rotation_rad += kNotch_rad * normal(generator);
+      setup.X_SC = setup.X_SC * Pose{so3_exp(kRotation_rad * normal3()), kTranslation_mm * normal3()};
+      setup.rotation_deviation_rad = kNotch_rad;
+      setup.covariance_C.diagonal() << Vector3d::Constant(kRotation_rad * kRotation_rad),
+          Vector3d::Constant(kTranslation_mm * kTranslation_mm);
+      setups.push_back(setup);
+    }
+    const auto fitted = fit_turned_scope(setups, {320.0, 240.0});
+    ASSERT_TRUE(fitted) << fitted.error().message;
+    told = *fitted;
+    axis += (fitted->axis_S - scope.X_SH.R.col(2)).squaredNorm() / kTrials;
+    for (int i = 0; i < kTurns; ++i) {
+      const double theta = kTwoPi * i / kTurns;
+      const Pose error = scope.at(theta).X_SC.inverse() * fitted->at(theta).X_SC;
+      rotation[i] += so3_log(error.R).squaredNorm() / kTrials;
+      translation[i] += error.t.squaredNorm() / kTrials;
+    }
+  }
+  EXPECT_NEAR(told.axis_deviation_rad / std::sqrt(axis), 1.0, 0.2);
+  EXPECT_NEAR(told.rotation_deviation_rad / std::sqrt(*std::max_element(rotation, rotation + kTurns)), 1.0, 0.2);
+  EXPECT_NEAR(told.translation_deviation_mm / std::sqrt(*std::max_element(translation, translation + kTurns)), 1.0,
+              0.2);
 }
 
 }  // namespace

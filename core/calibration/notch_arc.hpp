@@ -1,0 +1,23 @@
+// The field stop's notch in one frame, looked for about where it was: what a whole reading (field_stop.hpp) costs too
+// much for.
+#pragma once
+
+#include <optional>
+
+#include "core/calibration/field_stop.hpp"
+#include "core/sensors/grey_image.hpp"
+
+namespace perimap {
+
+struct NotchReading {
+  double rotation_rad = 0.0;  // as FieldStopReading::notch_rad
+  double deviation_rad = 0.0;
+};
+
+// Within a fifth of a radian to both sides of `near_rad`, on the circle of `stop`. None where the edge does not lie on
+// that circle, or no notch of about the depth of the one in `stop` lies whole within the arc: it may be elsewhere. No
+// heap; some 10 000 pixels whatever the picture's size.
+[[nodiscard]] std::optional<NotchReading> read_notch_near(const GreyImage& picture, const FieldStopReading& stop,
+                                                          double near_rad) noexcept;
+
+}  // namespace perimap

@@ -1,0 +1,132 @@
+#include "core/pipeline/scope_watch.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+
+#include "core/angle/angle.hpp"
+#include "core/realtime/realtime_scope.hpp"
+
+namespace perimap {
+namespace {
+
+// Where the turns are calibrated a scope that was turned far is found again soon; else it is only to be told.
+constexpr Duration kReadEvery = std::chrono::milliseconds(250);
+constexpr Duration kLookedEvery = std::chrono::seconds(1);
+constexpr Duration kAdoptedAfter = std::chrono::milliseconds(200);
+// Two seconds of pictures without a circle: the frames' own readings, which go by the last one, are not believed
+// longer.
+constexpr int kFailuresBorne = 8;
+
+std::uint64_t microradians(double rotation_rad) noexcept {
+  const double turn_rad = rotation_rad < 0.0 ? rotation_rad + kTwoPi : rotation_rad;
+  return static_cast<std::uint64_t>(std::llround(1e6 * turn_rad));
+}
+
+}  // namespace
+
+ScopeWatch::ScopeWatch(const PipelineSettings& settings, PipelineCounters& counters)
+    : width_(settings.camera.width),
+      height_(settings.camera.height),
+      lockstep_(settings.lockstep),
+      counters_(counters),
+      pixels_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {
+  if (settings.turned_scope) turn_.emplace(*settings.turned_scope, settings.camera);
+}
+
+ScopeWatch::Frame ScopeWatch::begin_frame(std::uint64_t frame_index, const GreyImage& image) noexcept {
+  Frame frame;
+  frame.mistaken_since = adopt(frame_index);
+  if (turn_) {
+    turn_->look(image);
+    frame.state = turn_->state();
+    frame.unread = !frame.state;
+  } else {
+    frame.changed = unchanged_.changed();
+  }
+  count(frame);
+  return frame;
+}
+
+void ScopeWatch::count(const Frame& frame) noexcept {
+  if (turn_) {
+    counters_.scope_read.set(frame.state ? 1 : 0);
+    if (frame.state) counters_.scope_rotation_urad.set(microradians(frame.state->rotation_rad));
+    if (frame.unread) counters_.scope_frames_unread.add();
+    counters_.scope_turns.set(turn_->turns());
+  } else {
+    counters_.scope_read.set(unchanged_.is_read() ? 1 : 0);
+    counters_.scope_rotation_urad.set(microradians(unchanged_.rotation_rad()));
+    counters_.scope_changed.set(frame.changed ? 1 : 0);
+    counters_.scope_turns.set(unchanged_.changes());
+  }
+}
+
+void ScopeWatch::offer(std::uint64_t frame_index, const FrameRate& rate, const GreyImage& image) noexcept {
+  if (active_ || frame_index < next_at_) return;
+  active_ = true;
+  begun_at_ = frame_index;
+  adopted_at_ = frame_index + rate.frames(kAdoptedAfter);
+  next_at_ = std::max(frame_index + rate.frames(turn_ ? kReadEvery : kLookedEvery), adopted_at_ + 1);
+  seen_then_ = turn_ ? turn_->seen() : std::nullopt;
+  const auto row_bytes = static_cast<std::size_t>(width_);
+  for (int y = 0; y < height_; ++y) {
+    std::memcpy(pixels_.data() + static_cast<std::size_t>(y) * row_bytes, image.row(y), row_bytes);
+  }
+  // Relaxed: housekeeping sets it again only after go_, whose post orders it.
+  done_.store(false, std::memory_order_relaxed);
+  go_.post();
+}
+
+std::optional<std::uint64_t> ScopeWatch::adopt(std::uint64_t frame_index) noexcept {
+  if (!active_ || frame_index < adopted_at_) return std::nullopt;
+  if (lockstep_) {
+    const NamedWait wait;
+    finished_.wait();
+  }
+  // Acquire: what was read is visible once the flag is (pairs with the release in serve()).
+  const bool done = done_.load(std::memory_order_acquire);
+  const bool due = frame_index == adopted_at_;
+  if (due && !done) counters_.adoptions_late.add();
+  if (!done) return std::nullopt;
+  active_ = false;
+  // One that came late is lost, and makes room for the next.
+  return due ? take(reading_) : std::nullopt;
+}
+
+std::optional<std::uint64_t> ScopeWatch::take(const std::optional<FieldStopReading>& reading) noexcept {
+  failed_ = reading ? 0 : failed_ + 1;
+  if (!turn_) {
+    if (reading) unchanged_.read(*reading);
+    if (!reading) unchanged_.fail();
+    return std::nullopt;
+  }
+  if (!reading) {
+    if (failed_ >= kFailuresBorne) turn_->give_up();
+    return std::nullopt;
+  }
+  const std::uint64_t agreed_before = agreed_at_;
+  const bool mistaken = turn_->adopt(*reading, seen_then_);
+  if (!mistaken) agreed_at_ = begun_at_;
+  return mistaken ? std::optional(agreed_before + 1) : std::nullopt;
+}
+
+void ScopeWatch::serve() noexcept {
+  for (;;) {
+    go_.wait();
+    if (dismissed_.load(std::memory_order_relaxed)) return;
+    const auto read = read_field_stop({pixels_.data(), width_, height_, width_});
+    reading_ = read ? std::optional(*read) : std::nullopt;
+    // Release: reading_ is complete before the mapper can see the flag.
+    done_.store(true, std::memory_order_release);
+    if (lockstep_) finished_.post();
+  }
+}
+
+void ScopeWatch::dismiss() noexcept {
+  dismissed_.store(true, std::memory_order_relaxed);
+  go_.post();
+}
+
+}  // namespace perimap

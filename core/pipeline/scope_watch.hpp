@@ -1,0 +1,79 @@
+// How the scope is turned in its camera head, from the pictures: whole readings of the field stop by housekeeping, on a
+// thread of its own, adopted at stated frames; and each frame's own notch.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/pipeline/pipeline_counters.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/scope_turn.hpp"
+#include "core/pipeline/unchanged_scope.hpp"
+#include "core/realtime/wakeup.hpp"
+#include "core/sensors/grey_image.hpp"
+#include "core/time/frame_rate.hpp"
+
+namespace perimap {
+
+// One picture at a time: the mapper copies it, and takes what was read at the frame that was stated then. In lockstep
+// that is waited for; else a reading that is not there in time is lost and counted. begin_frame() and offer() belong to
+// the mapper, serve() to the housekeeping thread.
+class ScopeWatch {
+ public:
+  // Of one frame.
+  struct Frame {
+    std::optional<ScopeState> state;              // where the turns are calibrated and this frame's is known
+    bool unread = false;                          // where they are calibrated: it is not known
+    bool changed = false;                         // where they are not: it is another than at first
+    std::optional<std::uint64_t> mistaken_since;  // the poses of the frames from this one on rest on a wrong turn
+  };
+
+  ScopeWatch(const PipelineSettings& settings, PipelineCounters& counters);
+
+  // Mapper, once a frame before its pose is asked for.
+  [[nodiscard]] Frame begin_frame(std::uint64_t frame_index, const GreyImage& image) noexcept;
+
+  // Mapper, once a frame when its surface has been handed over.
+  void offer(std::uint64_t frame_index, const FrameRate& rate, const GreyImage& image) noexcept;
+
+  // Until dismiss().
+  void serve() noexcept;
+  void dismiss() noexcept;
+
+ private:
+  [[nodiscard]] std::optional<std::uint64_t> adopt(std::uint64_t frame_index) noexcept;
+  [[nodiscard]] std::optional<std::uint64_t> take(const std::optional<FieldStopReading>& reading) noexcept;
+  void count(const Frame& frame) noexcept;
+
+  int width_;
+  int height_;
+  bool lockstep_;
+  PipelineCounters& counters_;
+
+  // The mapper's own.
+  std::optional<ScopeTurn> turn_;  // none: the turns are not calibrated
+  UnchangedScope unchanged_;
+  bool active_ = false;
+  std::uint64_t begun_at_ = 0;
+  std::uint64_t adopted_at_ = 0;
+  std::uint64_t next_at_ = 0;
+  std::uint64_t agreed_at_ = 0;            // the last picture whose whole reading told what its frame was told
+  int failed_ = 0;                         // whole readings in a row
+  std::optional<NotchReading> seen_then_;  // in the picture that is being read
+
+  // Filled by the mapper before go_ is posted, read by housekeeping after it.
+  std::vector<std::uint8_t> pixels_;
+  Wakeup go_;
+
+  // Housekeeping's until done_ is set, the mapper's until go_ is posted again.
+  std::optional<FieldStopReading> reading_;
+  std::atomic<bool> done_{false};
+  Wakeup finished_;
+
+  // Relaxed throughout: the flag alone is the message, and the post of go_ that follows orders it.
+  std::atomic<bool> dismissed_{false};
+};
+
+}  // namespace perimap
