@@ -8,6 +8,7 @@
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/runtime/replay_setup.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/standins/session/calibrated_scope.hpp"
 #include "drivers/standins/session/session_writer.hpp"
 #include "drivers/standins/simulator/frame_renderer.hpp"
 
@@ -31,8 +32,10 @@ Simulation simulation_of(const SimulationSettings& settings) {
 PipelineSettings settings_for(const Simulation& simulation, const TrackerNoise& noise) {
   const auto configuration =
       value_of(parse_configuration(simulated_configuration(simulation, noise), "simulated.toml"));
-  const auto camera = value_of(parse_calibration(simulation.lens().opencv_yaml(), "simulated.yaml"));
+  const auto camera =
+      value_of(parse_calibration(simulation.setup_at(Duration(0)).lens.opencv_yaml(), "simulated.yaml"));
   PipelineSettings settings = pipeline_settings(configuration, camera);
+  settings.turned_scope = value_of(calibrated_scope(simulation));
   settings.lockstep = true;
   return settings;
 }

@@ -234,10 +234,16 @@ std::map<std::uint32_t, SurfacePoint> Accuracy::resolve_origins(Duration to_reco
   std::map<std::uint32_t, SurfacePoint> points;
   for (const auto& [id, origin] : origins_) {
     const Instant first_observed = origin.first_observed + to_recording;
-    const auto X_WC = truth_.camera_pose(first_observed);
+    const CameraTruth* camera = truth_.camera(first_observed);
+    if (camera == nullptr) continue;
+    CameraModel lens = camera_;
+    if (camera->focal_px.minCoeff() > 0.0) {
+      lens.fx = camera->focal_px.x(), lens.fy = camera->focal_px.y();
+      lens.cx = camera->principal_px.x(), lens.cy = camera->principal_px.y();
+    }
     Vector3d ray_C;
-    if (!X_WC || !camera_.unproject(origin.px, ray_C)) continue;
-    if (const auto point = truth_.first_hit(*X_WC, ray_C, first_observed)) points.emplace(id, *point);
+    if (!lens.unproject(origin.px, ray_C)) continue;
+    if (const auto point = truth_.first_hit(camera->X_WC, ray_C, first_observed)) points.emplace(id, *point);
   }
   return points;
 }

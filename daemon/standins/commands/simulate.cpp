@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/angle/angle.hpp"
 #include "daemon/command_line/commands.hpp"
 #include "daemon/command_line/outputs.hpp"
 #include "daemon/command_line/progress.hpp"
@@ -38,6 +39,10 @@ struct SimulateOptions {
   std::optional<BenchAct> act;  // none: the heart
   std::string board = "charuco";
   std::optional<double> notch_deg;
+  double zoom = 1.0;
+  std::optional<double> turn_to_deg, zoom_to;
+  double turn_at_s = 10.0;
+  bool scope_uncalibrated = false;
   std::filesystem::path truth;
   std::filesystem::path landmarks;
 
@@ -65,7 +70,8 @@ Outcome simulate_bench(const SimulateOptions& options) {
   auto board = board_of(options);
   if (!board) return refuse(board.error(), ExitCode::kWrongUsage);
   settings->board = *std::move(board);
-  if (options.notch_deg) settings->notch_rad = *options.notch_deg * std::numbers::pi / 180.0;
+  if (options.notch_deg) settings->notch_rad = *options.notch_deg * kDegree;
+  settings->zoom = options.zoom;
   const auto scene = BenchScene::create(*settings);
   if (!scene) return refuse(scene.error(), ExitCode::kWrongUsage);
   if (const auto apart = check_apart({{"OUT", options.out.string()},
@@ -111,18 +117,31 @@ std::vector<SimulatedRecording> planned(const SimulateOptions& options) {
 }
 
 Outcome simulate(const SimulateOptions& options) {
-  const bool of_bench = !options.truth.empty() || !options.landmarks.empty() || options.notch_deg;
+  const bool of_bench = !options.truth.empty() || !options.landmarks.empty();
   if (!options.act && of_bench) {
-    return refuse("--truth, --landmarks, --field-stop: expected --scene board, still or landmarks",
+    return refuse("--truth, --landmarks: expected --scene board, still or landmarks", ExitCode::kWrongUsage);
+  }
+  if ((options.turn_to_deg || options.zoom_to) && (options.act || !options.notch_deg)) {
+    return refuse("--turn-to, --zoom-to: expected --scene heart and --field-stop, where the notch is before",
                   ExitCode::kWrongUsage);
+  }
+  if (options.zoom != 1.0 && !options.notch_deg) {
+    return refuse("--zoom: expected --field-stop, which tells of it", ExitCode::kWrongUsage);
   }
   if (options.act && !options.tracker_noises_mm.empty()) {
     return refuse("--tracker-noises: expected --scene heart; a bench has one, --tracker-noise", ExitCode::kWrongUsage);
   }
   if (options.act) return simulate_bench(options);
   const auto begin = std::chrono::steady_clock::now();
-  const auto settings = options.simulation.settings();
+  auto settings = options.simulation.settings();
   if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
+  if (options.notch_deg) settings->held = ScopeHeld{*options.notch_deg * kDegree, options.zoom};
+  settings->scope_calibrated = !options.scope_uncalibrated;
+  if (options.turn_to_deg || options.zoom_to) {
+    const ScopeHeld to{options.turn_to_deg.value_or(*options.notch_deg) * kDegree,
+                       options.zoom_to.value_or(options.zoom)};
+    settings->turn = SimulationSettings::Turn{from_seconds(options.turn_at_s), to};
+  }
   const std::vector<SimulatedRecording> recordings = planned(options);
   for (const SimulatedRecording& recording : recordings) {
     if (auto is_new = check_new(recording.path, options); !is_new) return is_new;
@@ -182,9 +201,25 @@ void add_simulate_command(Commands& commands) {
       ->capture_default_str();
   command
       .add_option("--field-stop", options->notch_deg,
-                  "Of such a scene: a field stop leaves a round of the picture; its notch is so many degrees from the "
-                  "right towards below [none]")
+                  "An angled scope whose field stop leaves a round of the picture: its notch is so many degrees from "
+                  "the right towards below, and hand-eye and principal point are as the scope is turned then [none]")
       ->check(Range(-360.0, 360.0));
+  command
+      .add_option("--turn-to", options->turn_to_deg,
+                  "Of a heart: the scope is turned in its camera head during the session, until its notch is there")
+      ->check(Range(-360.0, 360.0));
+  command.add_option("--zoom", options->zoom, "With --field-stop: so many times larger are picture and field stop")
+      ->check(Range(0.5, 2.0))
+      ->capture_default_str();
+  command.add_flag("--scope-uncalibrated", options->scope_uncalibrated,
+                   "Of a heart with --field-stop: the recording has hand-eye and lens of its start alone, and not what "
+                   "follows when the scope is turned");
+  command.add_option("--zoom-to", options->zoom_to, "Of a heart: the scope is zoomed to that during the session")
+      ->check(Range(0.5, 2.0));
+  command
+      .add_option("--turn-at", options->turn_at_s, "With --turn-to and --zoom-to: when that begins, s; it takes one")
+      ->check(Range(0.0, 1700.0))
+      ->capture_default_str();
   command.add_option("--truth", options->truth, "Of such a scene: write to this file what is to be found (JSON)");
   command.add_option("--landmarks", options->landmarks,
                      "Of such a scene: write the landmarks of the patient's image to this file, for perimap register");

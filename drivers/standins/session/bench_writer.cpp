@@ -193,12 +193,15 @@ std::string true_setup_of(const BenchScene& scene, const TrackerNoise& noise) {
       "  \"hand_eye\": {{\"translation_mm\": {}, \"rotation_wxyz\": {}, \"time_offset_ms\": {}}},\n"
       "  \"tool\": {{\"tip_mm\": {}}},\n"
       "  \"tracker\": {{\"position_deviation_mm\": {}, \"rotation_deviation_deg\": {}, \"error_correlation_s\": {}}},\n"
-      "  \"registration\": {{\"translation_mm\": {}, \"rotation_wxyz\": {}}}\n"
+      "  \"registration\": {{\"translation_mm\": {}, \"rotation_wxyz\": {}}},\n"
+      "  \"scope_rotation_deg\": {},\n"
+      "  \"zoom\": {}\n"
       "}}\n",
       lens.fx, lens.fy, lens.cx, lens.cy, lens.k1, lens.k2, lens.p1, lens.p2, lens.k3, three(setup.X_SC.t), four(q_SC),
       1e3 * to_seconds(setup.tracker_offset), three(setup.tip_T), noise.position_rms_mm,
       noise.rotation_rms_rad / kDegree, to_seconds(scene.settings().tracker_correlation), three(setup.X_IW.t),
-      four(q_IW));
+      four(q_IW), scene.settings().notch_rad ? fmt::format("{}", *scene.settings().notch_rad / kDegree) : "null",
+      scene.settings().zoom);
 }
 
 std::string landmark_table_of(const BenchScene& scene) {

@@ -9,12 +9,14 @@
 #include <string_view>
 #include <utility>
 
+#include "drivers/calibration/turned_scope_file.hpp"
 #include "drivers/file/whole_file.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/foxglove_image.hpp"
 #include "drivers/recording/foxglove_pose.hpp"
 #include "drivers/recording/recording_writer.hpp"
 #include "drivers/recording/sensor_messages.hpp"
+#include "drivers/standins/session/calibrated_scope.hpp"
 #include "drivers/standins/simulator/frame_renderer.hpp"
 #include "drivers/standins/truth/truth_messages.hpp"
 
@@ -72,7 +74,7 @@ class SessionWriter {
     const int width = simulation_.settings().width;
     const GreyImage image{pixels.data(), width, simulation_.settings().height, width};
     const auto raw = borrow_raw_image(image, frame.stamp.capture, kCameraFrame, packed_);
-    const auto truth = to_truth_camera({frame.stamp.capture, frame.X_WC});
+    const auto truth = to_truth_camera(simulation_.camera_truth(frame));
     return writer_.write(image_, raw, frame.stamp.arrival, frame.stamp.capture, sequence).and_then([&] {
       return writer_.write(truth_camera_, truth, frame.stamp.arrival, frame.stamp.capture, sequence);
     });
@@ -140,14 +142,22 @@ class SessionWriter {
     const auto truth_mesh = borrow_truth_mesh(simulation_.truth().mesh());
     const auto truth_motion = borrow_truth_motion(simulation_.truth().motion(), r_peaks_ns);
     const Instant start = simulation_.start();
-    return attach(attachments::kCalibration, "application/yaml", simulation_.lens().opencv_yaml())
+    return attach(attachments::kCalibration, "application/yaml", simulation_.setup_at(Duration(0)).lens.opencv_yaml())
         .and_then([&] {
           return attach(attachments::kConfiguration, "application/toml",
                         simulated_configuration(simulation_, recording_.noise));
         })
+        .and_then([&] { return attach_turned_scope(); })
         .and_then([&] { return writer_.write(*info, facts, start, start, 0); })
         .and_then([&] { return writer_.write(*mesh, truth_mesh, start, start, 0); })
         .and_then([&] { return writer_.write(*motion, truth_motion, start, start, 0); });
+  }
+
+  Expected<void> attach_turned_scope() {
+    const auto scope = calibrated_scope(simulation_);
+    if (!scope) return tl::unexpected(scope.error());
+    if (!*scope) return {};
+    return attach(attachments::kTurnedScope, "application/json", format_turned_scope(**scope));
   }
 
   static inline const std::string kCameraFrame = "camera";
@@ -164,7 +174,7 @@ class SessionWriter {
 }  // namespace
 
 std::string simulated_configuration(const Simulation& simulation, const TrackerNoise& noise) {
-  const Pose& X_SC = simulation.hand_eye_X_SC();
+  const Pose X_SC = simulation.setup_at(Duration(0)).X_SC;
   double q[4];
   rotation_to_wxyz(X_SC.R, q);
   const double correlation_s = to_seconds(simulation.settings().tracker_correlation);

@@ -26,8 +26,7 @@ enum BenchStream : std::uint64_t {
   kScopeError,
   kPointerError,
   kBenchImage,
-  kLandmark,
-  kFieldStop
+  kLandmark
 };
 
 constexpr double kDistance_mm = 150.0;  // of the scope from the board, at rest
@@ -53,19 +52,8 @@ Expected<void> check_bench(const BenchSettings& s) {
 
 double smooth(double s) { return s * s * (3.0 - 2.0 * s); }
 
-// A little off the middle, as they are.
-FieldStop field_stop_of(const BenchSettings& settings) {
-  if (!settings.notch_rad) return {};
-  const CounterNoise noise(settings.setup_seed, kFieldStop);
-  const double height = settings.height;
-  FieldStop stop;
-  stop.centre_px = Vector2d(0.5 * settings.width + noise.uniform(0, -0.02, 0.02) * height,
-                            0.5 * height + noise.uniform(1, -0.02, 0.02) * height);
-  stop.radius_px = noise.uniform(2, 0.42, 0.46) * height;
-  stop.notch_rad = *settings.notch_rad;
-  stop.notch_depth_px = 0.07 * stop.radius_px;
-  stop.notch_width_px = 0.10 * stop.radius_px;
-  return stop;
+FieldStop field_stop_of(const BenchSettings& s) {
+  return s.notch_rad ? drawn_field_stop(s.setup_seed, s.width, s.height, {*s.notch_rad, s.zoom}) : FieldStop{};
 }
 
 Vector3d drawn_vector(const CounterNoise& noise, std::uint64_t index, double half) {
@@ -78,6 +66,9 @@ Vector3d drawn_vector(const CounterNoise& noise, std::uint64_t index, double hal
 BenchScene::BenchScene(const BenchSettings& settings) : settings_(settings) {
   setup_ = settings.setup_seed != 0 ? drawn_setup(settings.setup_seed, settings.width, settings.height)
                                     : usual_setup(settings.width, settings.height);
+  if (settings.notch_rad) {
+    setup_ = turned_setup(setup_, {*settings.notch_rad, settings.zoom}, field_stop_of(settings).centre_px);
+  }
   const CounterNoise bench(settings.seed, kBench);
   start_ = Instant(from_seconds(bench.uniform(0, 3600.0, 7200.0)));
   X_WB_ = {so3_exp(drawn_vector(bench, 1, 1.2)), Vector3d(80.0, -40.0, -950.0) + drawn_vector(bench, 2, 120.0)};

@@ -40,8 +40,10 @@ struct BenchSettings {
   double tracker_rate_hz = 100.0;
   Duration tracker_correlation{0};
   double swing = 1.0;  // how far the scope is swung, times the usual
-  // Where the notch of the field stop is, which then leaves a round of the picture; none: all of it is seen.
+  // Where the notch of the field stop is, which then leaves a round of the picture; the objective looks aside as the
+  // scope is turned then (turned_setup()). None: all of the picture is seen, and the scope is as at 0.
   std::optional<double> notch_rad;
+  double zoom = 1.0;  // of the picture and the field stop, likewise
 };
 
 struct BenchLandmark {

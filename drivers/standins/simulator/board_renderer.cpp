@@ -22,27 +22,6 @@ double overlap(double from, double to, int i) {
   return std::max(0.0, std::min(to, i + 1.0) - std::max(from, static_cast<double>(i)));
 }
 
-// How much light passes the field stop there: 1 inside, 0 outside, between over a pixel and a half.
-double passed(const FieldStop& stop, const Vector2d& px) {
-  if (stop.radius_px <= 0.0) return 1.0;
-  const Vector2d d = px - stop.centre_px;
-  const Vector2d along(std::cos(stop.notch_rad), std::sin(stop.notch_rad));
-  double inside = stop.radius_px - d.norm();
-  // The notch is a triangle that stands on the circle and points inwards.
-  const double radial = d.dot(along);
-  const double across = std::abs(d.x() * along.y() - d.y() * along.x());
-  if (radial > 0.0 && stop.notch_depth_px > 0.0) {
-    const double tip = stop.radius_px - stop.notch_depth_px;
-    const double half = 0.5 * stop.notch_width_px;
-    // Distance from the triangle's side, positive outside of it.
-    const double slope = std::hypot(half, stop.notch_depth_px);
-    const double outside = (across * stop.notch_depth_px - (radial - tip) * half) / slope;
-    inside = std::min(inside, outside);
-  }
-  constexpr double kSoft_px = 1.5;
-  return std::clamp(0.5 + inside / kSoft_px, 0.0, 1.0);
-}
-
 // A 3x3 binomial: the lens's blur.
 void blur(std::vector<float>& image, int width, int height) {
   std::vector<float> rows(image.size());
@@ -83,7 +62,7 @@ BoardRenderer::BoardRenderer(const ScopeLens& lens, const BoardPattern& pattern,
   for (int y = 0; y < lens.height; ++y) {
     for (int x = 0; x < lens.width; ++x) {
       const double r = std::hypot(x - lens.cx, y - lens.cy) / half_diagonal;
-      light_.push_back(static_cast<float>((1.0 - 0.35 * r * r) * passed(stop, Vector2d(x, y))));
+      light_.push_back(static_cast<float>((1.0 - 0.35 * r * r) * stop.passed(Vector2d(x, y))));
     }
   }
   draw_pattern(pattern);

@@ -7,18 +7,10 @@
 
 #include "core/geometry/pose.hpp"
 #include "drivers/board/board_pattern.hpp"
+#include "drivers/standins/simulator/field_stop.hpp"
 #include "drivers/standins/simulator/lens.hpp"
 
 namespace perimap {
-
-// The dark round that a scope's field stop leaves of the picture, with a notch that points where the scope's side is.
-struct FieldStop {
-  Vector2d centre_px = Vector2d::Zero();
-  double radius_px = 0.0;  // 0: there is none
-  double notch_rad = 0.0;  // direction of the notch from the centre, from x (right) towards y (down)
-  double notch_depth_px = 0.0;
-  double notch_width_px = 0.0;  // where it leaves the circle
-};
 
 class BoardRenderer {
  public:

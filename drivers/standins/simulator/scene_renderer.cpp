@@ -45,7 +45,7 @@ RenderWorkspace::Plane4 plane(const Eigen::Matrix<float, 4, 3>& rows) noexcept {
 }  // namespace
 
 SceneRenderer::SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_t> triangles,
-                             const TissueTexture& texture)
+                             const TissueTexture& texture, const FieldStop& stop)
     : lens_(lens), triangles_(triangles), texture_(texture), stride_((kSubsamples * lens.width + 3) / 4 * 4) {
   const std::size_t subsamples = static_cast<std::size_t>(stride_) * kSubsamples * lens.height;
   ray_x_.resize(subsamples, 0.0F);
@@ -64,7 +64,8 @@ SceneRenderer::SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_
     for (int column = 0; column < lens.width; ++column) {
       // cos^4 of the angle to the axis, and the cone of the light on top of it.
       const double cosine = 1.0 / lens.ray({column, row}).norm();
-      vignetting_[static_cast<std::size_t>(row) * lens.width + column] = static_cast<float>(std::pow(cosine, 6.0));
+      vignetting_[static_cast<std::size_t>(row) * lens.width + column] =
+          static_cast<float>(std::pow(cosine, 6.0) * stop.passed(Vector2d(column, row)));
     }
   }
 }

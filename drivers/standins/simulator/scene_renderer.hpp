@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/geometry/pose.hpp"
+#include "drivers/standins/simulator/field_stop.hpp"
 #include "drivers/standins/simulator/lens.hpp"
 #include "drivers/standins/simulator/tissue_texture.hpp"
 
@@ -46,7 +47,8 @@ struct RenderWorkspace {
 class SceneRenderer {
  public:
   // `triangles` and `texture` belong to one mesh and outlive the renderer.
-  SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_t> triangles, const TissueTexture& texture);
+  SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_t> triangles, const TissueTexture& texture,
+                const FieldStop& stop = {});
 
   // One frame. `vertices_W`: the mesh at the frame's instant. `subject_distance_mm`: where exposure is right.
   // `noise_seed`: one value per frame. `image`: width * height places, row by row. A function of its arguments alone.
@@ -79,7 +81,7 @@ class SceneRenderer {
   int stride_ = 0;            // subsamples a row, a multiple of 4
   std::vector<float> ray_x_;  // per subsample: the ray (x, y, 1)
   std::vector<float> ray_y_;
-  std::vector<float> vignetting_;  // per pixel
+  std::vector<float> vignetting_;  // per pixel, with the field stop
 };
 
 }  // namespace perimap

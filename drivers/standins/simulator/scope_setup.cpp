@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/angle/angle.hpp"
 #include "drivers/standins/simulator/counter_noise.hpp"
 
 namespace perimap {
@@ -39,6 +40,24 @@ ScopeSetup drawn_setup(std::uint64_t seed, int width_px, int height_px) noexcept
   setup.tip_T = vector(8.0) + Vector3d(0.0, 0.0, uniform(100.0, 200.0));
   setup.X_IW = {so3_exp(vector(1.5)), vector(250.0)};
   return setup;
+}
+
+// Part by part: the shaft H in the sensor, and on it the objective O, which turns with the scope. What O sees is turned
+// in the picture as the scope is in the head, and so is its notch: a direction p_O comes out along R_z(turn) p_O.
+ScopeSetup turned_setup(const ScopeSetup& setup, const ScopeHeld& held, const Vector2d& centre_px) noexcept {
+  const Pose X_HO{so3_exp(Vector3d(30.0 * kDegree, 0.0, 0.0)), Vector3d(0.6, -0.4, 0.0)};
+  const Pose X_SH = setup.X_SC * X_HO.inverse();
+  const Pose turned{so3_exp(Vector3d(0.0, 0.0, held.notch_rad)), Vector3d::Zero()};
+  const Pose X_OC = turned.inverse();
+  ScopeSetup result = setup;
+  result.X_SC = X_SH * turned * X_HO * X_OC;
+  const Vector2d arm = held.zoom * (Vector2d(setup.lens.cx, setup.lens.cy) - centre_px);
+  const Vector2d place = centre_px + Vector3d(turned.R * Vector3d(arm.x(), arm.y(), 0.0)).head<2>();
+  result.lens.fx *= held.zoom;
+  result.lens.fy *= held.zoom;
+  result.lens.cx = place.x();
+  result.lens.cy = place.y();
+  return result;
 }
 
 }  // namespace perimap

@@ -5,6 +5,7 @@
 
 #include "core/geometry/pose.hpp"
 #include "core/time/instant.hpp"
+#include "drivers/standins/simulator/field_stop.hpp"
 #include "drivers/standins/simulator/lens.hpp"
 
 namespace perimap {
@@ -23,5 +24,10 @@ struct ScopeSetup {
 // Drawn at random: another lens of about the same view, the sensor elsewhere on the scope, a tracker that stamps its
 // poses 5 to 40 ms early, another pointer, another image. A function of its arguments alone.
 [[nodiscard]] ScopeSetup drawn_setup(std::uint64_t seed, int width_px, int height_px) noexcept;
+
+// The same scope, held so, of an objective that looks 30 degrees aside; `setup` is that at a notch of 0 and a zoom
+// of 1. The sensor is on the head. `centre_px`: of the field stop, about which the picture turns and grows.
+[[nodiscard]] ScopeSetup turned_setup(const ScopeSetup& setup, const ScopeHeld& held,
+                                      const Vector2d& centre_px) noexcept;
 
 }  // namespace perimap

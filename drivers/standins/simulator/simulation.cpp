@@ -75,6 +75,10 @@ Expected<void> check(const SimulationSettings& s) {
   };
   if (s.width % 2 != 0 || s.height % 2 != 0)
     return fail(fmt::format("size: {}x{} is not even in both directions", s.width, s.height));
+  if (s.turn && !s.held) return fail("turn: expected a field stop, whose notch tells of it");
+  if (s.turn && (s.turn->at < Duration(0) || s.turn->length <= Duration(0))) {
+    return fail("turn: expected a time since the start, and a length above 0");
+  }
   for (const Expected<void>& result :
        {outside("duration", to_seconds(s.duration), 1.0, 1700.0, "s"), outside("width", s.width, 64, 4096, "px"),
         outside("height", s.height, 64, 4096, "px"), outside("fps", s.frames_per_s, 1.0, 1000.0, "Hz"),
@@ -190,10 +194,48 @@ Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth t
 
 std::int64_t Simulation::utc_minus_monotonic_ns() const noexcept { return 1'750'000'000'000'000'000; }
 
+// Turned as a hand does: it begins and ends gently.
+std::optional<ScopeHeld> Simulation::held_at(Duration since) const noexcept {
+  if (!settings_.held || !settings_.turn) return settings_.held;
+  const SimulationSettings::Turn& turn = *settings_.turn;
+  const double s = std::clamp(to_seconds(since - turn.at) / to_seconds(turn.length), 0.0, 1.0);
+  const double share = s * s * (3.0 - 2.0 * s);
+  const ScopeHeld& from = *settings_.held;
+  return ScopeHeld{from.notch_rad + share * (turn.to.notch_rad - from.notch_rad),
+                   from.zoom + share * (turn.to.zoom - from.zoom)};
+}
+
+CameraTruth Simulation::camera_truth(const Frame& frame) const noexcept {
+  CameraTruth truth{frame.stamp.capture, frame.X_WC};
+  const Duration since = frame.stamp.capture - start_;
+  if (const auto held = held_at(since)) {
+    const ScopeLens lens = setup_at(since).lens;
+    truth.focal_px = {lens.fx, lens.fy};
+    truth.principal_px = {lens.cx, lens.cy};
+    truth.scope_rotation_rad = held->notch_rad;
+  }
+  return truth;
+}
+
+FieldStop Simulation::field_stop_at(Duration since) const noexcept {
+  const auto held = held_at(since);
+  return held ? drawn_field_stop(settings_.setup_seed, settings_.width, settings_.height, *held) : FieldStop{};
+}
+
+ScopeSetup Simulation::setup_at(Duration since) const noexcept {
+  const auto held = held_at(since);
+  return held ? turned_setup(setup_, *held, field_stop_at(since).centre_px) : setup_;
+}
+
+std::unique_ptr<const SceneRenderer> Simulation::renderer_at(Duration since) const {
+  return std::make_unique<const SceneRenderer>(setup_at(since).lens, truth_.mesh().triangles, *texture_,
+                                               field_stop_at(since));
+}
+
 // Its own period wavers a little.
 void Simulation::read_tracker() {
   const auto gaps = dropouts(settings_.seed, settings_.duration, settings_.tracker_dropouts_per_min);
-  const Pose X_CS = setup_.X_SC.inverse();
+  const Pose X_CS = setup_at(Duration(0)).X_SC.inverse();
   const CounterNoise period(settings_.seed, kTrackerPeriod);
   const CounterNoise position(settings_.seed, kTrackerPosition);
   const CounterNoise rotation(settings_.seed, kTrackerRotation);
@@ -216,7 +258,8 @@ void Simulation::read_tracker() {
     position_error = kept * position_error + drive * normal3(position, k);
     rotation_error = kept * rotation_error + drive * normal3(rotation, k);
     tracker_stamps_.push_back({start_ + since - setup_.tracker_offset, tracker.arrival(start_ + since, k), missing,
-                               path_.X_WC(since) * X_CS, position_error, rotation_error});
+                               path_.X_WC(since) * (settings_.turn ? setup_at(since).X_SC.inverse() : X_CS),
+                               position_error, rotation_error});
     kept = correlation;
     drive = std::sqrt(1.0 - kept * kept);
   }
@@ -318,7 +361,8 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   const auto& triangles = simulation.truth_.mesh().triangles;
   simulation.texture_ = std::make_unique<const TissueTexture>(view->material_W, triangles, view->centre_W, view->axis_W,
                                                               texture_size, texture_seed, parallel_for);
-  simulation.renderer_ = std::make_unique<const SceneRenderer>(setup.lens, triangles, *simulation.texture_);
+  simulation.renderer_ = simulation.renderer_at(Duration(0));
+  if (settings.turn) simulation.turned_renderer_ = simulation.renderer_at(settings.turn->at + settings.turn->length);
   return simulation;
 }
 
@@ -343,6 +387,17 @@ TrackerSample Simulation::tracker_sample(std::size_t index, const TrackerNoise& 
 
 void Simulation::render(std::size_t index, RenderWorkspace& workspace, std::span<std::uint8_t> image) const {
   const Frame& frame = frames_[index];
+  const Duration since = frame.stamp.capture - start_;
+  // While it is turned each frame has a lens of its own.
+  const SceneRenderer* held = renderer_.get();
+  std::unique_ptr<const SceneRenderer> turning;
+  if (settings_.turn && since >= settings_.turn->at + settings_.turn->length) {
+    held = turned_renderer_.get();
+  } else if (settings_.turn && since > settings_.turn->at) {
+    turning = renderer_at(since);
+    held = turning.get();
+  }
+  const SceneRenderer& renderer = *held;
   std::vector<Vector3d> vertices_W(truth_.mesh().vertex_count);
   // Instants spread evenly over the exposure; its middle alone when it is short.
   constexpr int kInstants = 3;
@@ -352,7 +407,7 @@ void Simulation::render(std::size_t index, RenderWorkspace& workspace, std::span
     const Instant t = frame.stamp.capture + from_seconds(exposure_s * ((k + 0.5) / instants - 0.5));
     const Pose X_WC = instants == 1 ? frame.X_WC : path_.X_WC(t - start_);
     truth_.vertices_at(t, vertices_W);
-    renderer_->light(X_WC, vertices_W, (frame.X_WC.t - surface_W_).norm(), workspace);
+    renderer.light(X_WC, vertices_W, (frame.X_WC.t - surface_W_).norm(), workspace);
     obstacles_.draw(t - start_, workspace.radiance);
     if (instants == 1) break;
     if (k == 0) workspace.exposure.assign(workspace.radiance.size(), 0.0F);
@@ -361,7 +416,7 @@ void Simulation::render(std::size_t index, RenderWorkspace& workspace, std::span
     }
   }
   if (instants > 1) workspace.radiance.swap(workspace.exposure);
-  renderer_->expose(CounterNoise(settings_.seed, kImage).bits(index), workspace, image);
+  renderer.expose(CounterNoise(settings_.seed, kImage).bits(index), workspace, image);
 }
 
 }  // namespace perimap

@@ -57,6 +57,18 @@ struct SimulationSettings {
   bool instrument = false;      // see ViewObstacles
   int glints = 0;
   double smoke = 0.0;
+  // A field stop leaves a round of the picture: how the scope is held in its camera head at first, and to where it is
+  // turned and zoomed during the session. The objective looks aside as it is turned (turned_setup()). None: all of the
+  // picture is seen.
+  std::optional<ScopeHeld> held;
+  struct Turn {
+    Duration at;  // begins, since the start
+    ScopeHeld to;
+    Duration length = std::chrono::seconds(1);
+  };
+  std::optional<Turn> turn;
+  bool scope_calibrated =
+      true;  // the recording says what follows from a turn, as `perimap calibrate scope` measures it
 };
 
 // Norms in three dimensions: the standard deviation of one axis is 1 / sqrt(3) of them.
@@ -93,6 +105,7 @@ class Simulation {
   [[nodiscard]] Instant start() const noexcept { return start_; }
   // Stands for the recording's fixed epoch; the same for every recording, since nothing may depend on today.
   [[nodiscard]] std::int64_t utc_minus_monotonic_ns() const noexcept;
+  // Both of a scope that is not turned: at a notch of 0 and a zoom of 1.
   [[nodiscard]] const ScopeLens& lens() const noexcept { return setup_.lens; }
   [[nodiscard]] const ScopeSetup& setup() const noexcept { return setup_; }
   // Camera frame C in the tracked sensor's frame S.
@@ -110,6 +123,14 @@ class Simulation {
   // While the tool is missing the pose is not a number.
   [[nodiscard]] TrackerSample tracker_sample(std::size_t index, const TrackerNoise& noise) const noexcept;
 
+  // All that is true of a frame's camera, its lens as it was held then too.
+  [[nodiscard]] CameraTruth camera_truth(const Frame& frame) const noexcept;
+
+  // As it is held then; what is measured before the session is that of its start.
+  [[nodiscard]] ScopeSetup setup_at(Duration since) const noexcept;
+  // How the scope is held in its camera head then; with a field stop alone.
+  [[nodiscard]] std::optional<ScopeHeld> held_at(Duration since) const noexcept;
+
   // Renders frames()[index] into width * height bytes. Safe from several threads, each with its own workspace.
   void render(std::size_t index, RenderWorkspace& workspace, std::span<std::uint8_t> image) const;
 
@@ -126,6 +147,9 @@ class Simulation {
   Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeSetup setup, Vector3d surface_W,
              const ScopePath& path);
 
+  [[nodiscard]] FieldStop field_stop_at(Duration since) const noexcept;
+  [[nodiscard]] std::unique_ptr<const SceneRenderer> renderer_at(Duration since) const;
+
   // What the devices deliver, in the order of arrival at the end.
   void read_tracker();
   void read_ecg(const EcgRecord& record, std::uint32_t first_sample);
@@ -141,6 +165,7 @@ class Simulation {
   Vector3d surface_W_;  // the point about which the scope moves; exposure is right there
   std::unique_ptr<const TissueTexture> texture_;
   std::unique_ptr<const SceneRenderer> renderer_;
+  std::unique_ptr<const SceneRenderer> turned_renderer_;  // after the turn, if there is one
   std::vector<Frame> frames_;
   std::vector<TrackerStamp> tracker_stamps_;
   std::vector<EcgBlock> ecg_;

@@ -13,11 +13,17 @@ Expected<GroundTruth> GroundTruth::create(HeartMesh mesh_W, HeartMotion motion, 
 }
 
 std::optional<Pose> GroundTruth::camera_pose(Instant capture) const noexcept {
+  const CameraTruth* found = camera(capture);
+  if (found == nullptr) return std::nullopt;
+  return found->X_WC;
+}
+
+const CameraTruth* GroundTruth::camera(Instant capture) const noexcept {
   const auto found =
       std::lower_bound(cameras_.begin(), cameras_.end(), capture,
                        [](const CameraTruth& camera, Instant instant) { return camera.capture < instant; });
-  if (found == cameras_.end() || found->capture != capture) return std::nullopt;
-  return found->X_WC;
+  if (found == cameras_.end() || found->capture != capture) return nullptr;
+  return &*found;
 }
 
 void GroundTruth::vertices_at(Instant t, std::span<Vector3d> out) const {

@@ -18,6 +18,10 @@ namespace perimap {
 struct CameraTruth {
   Instant capture;
   Pose X_WC;
+  // As the scope was turned and zoomed; a focal length of 0: as the calibration has it.
+  Vector2d focal_px = Vector2d::Zero();
+  Vector2d principal_px = Vector2d::Zero();
+  double scope_rotation_rad = 0.0;
 };
 
 class GroundTruth {
@@ -33,6 +37,8 @@ class GroundTruth {
 
   // True pose of the camera in the frame captured at exactly this instant.
   [[nodiscard]] std::optional<Pose> camera_pose(Instant capture) const noexcept;
+  // All that is true of it; null where there was no frame.
+  [[nodiscard]] const CameraTruth* camera(Instant capture) const noexcept;
 
   // Positions of all vertices at t, W, mm; `out` has mesh().vertex_count places.
   void vertices_at(Instant t, std::span<Vector3d> out) const;

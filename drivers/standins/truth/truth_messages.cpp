@@ -53,6 +53,9 @@ perimap_TruthCamera to_truth_camera(const CameraTruth& camera) noexcept {
   message.capture_time_ns = to_ns(camera.capture);
   for (int axis = 0; axis < 3; ++axis) message.translation_WC_mm[axis] = camera.X_WC.t[axis];
   rotation_to_wxyz(camera.X_WC.R, message.rotation_WC_wxyz);
+  for (int axis = 0; axis < 2; ++axis) message.focal_px[axis] = camera.focal_px[axis];
+  for (int axis = 0; axis < 2; ++axis) message.principal_point_px[axis] = camera.principal_px[axis];
+  message.scope_rotation_rad = camera.scope_rotation_rad;
   return message;
 }
 
@@ -102,7 +105,11 @@ Expected<CameraTruth> camera_truth(const perimap_TruthCamera& message) {
   const double norm = Eigen::Vector4d(message.rotation_WC_wxyz).norm();
   if (!t.allFinite() || !(std::abs(norm - 1.0) < 1e-6))
     return fail("camera truth at " + std::to_string(message.capture_time_ns) + " ns: its pose is not a rigid one");
-  return CameraTruth{from_ns(message.capture_time_ns), pose_from_wxyz(t, message.rotation_WC_wxyz)};
+  const Vector2d focal(message.focal_px), principal(message.principal_point_px);
+  if (!focal.allFinite() || !principal.allFinite() || focal.minCoeff() < 0.0)
+    return fail("camera truth at " + std::to_string(message.capture_time_ns) + " ns: its lens is none");
+  return CameraTruth{from_ns(message.capture_time_ns), pose_from_wxyz(t, message.rotation_WC_wxyz), focal, principal,
+                     message.scope_rotation_rad};
 }
 
 }  // namespace perimap
