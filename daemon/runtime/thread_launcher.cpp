@@ -20,6 +20,12 @@ constexpr std::size_t kTouchedStack = 256 * 1024;  // more than any real-time th
 
 constexpr int kBackgroundNice = 10;
 
+// Never refused: a thread may always be nicer, and stays what it is where it is nicer already.
+void step_back() noexcept {
+  const auto self = static_cast<id_t>(gettid());
+  setpriority(PRIO_PROCESS, self, std::max(getpriority(PRIO_PROCESS, self), kBackgroundNice));
+}
+
 // What one thread asks for.
 struct ThreadRequest {
   int priority = 0;
@@ -106,8 +112,7 @@ std::thread ThreadLauncher::launch(std::string name, ThreadRole role, std::funct
       [this, name = std::move(name), request = request_for(settings_, role, number), role, body = std::move(body)] {
         pthread_setname_np(pthread_self(), name.substr(0, 15).c_str());
         if (!ask_for(request, settings_.cpus)) refused_.store(true, std::memory_order_relaxed);
-        // Never refused: a thread may always be nicer.
-        if (role == ThreadRole::kBackground) setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kBackgroundNice);
+        if (role == ThreadRole::kBackground) step_back();
         if (!of_normal_scheduler(role)) touch_stack();
         body();
       });

@@ -6,6 +6,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 
 namespace perimap {
@@ -45,6 +46,18 @@ TEST(ThreadLauncher, WhatNobodyWaitsForGivesWayToAllElse) {
   threads.launch("setup-watch", ThreadRole::kBackground, ask).join();
   EXPECT_GE(niceness, 10);
   EXPECT_EQ(threads.priority(), perimap_PRIVILEGE_GRANTED) << "nothing was refused";
+}
+
+TEST(ThreadLauncher, ABackgroundThreadStepsBackAndNoOther) {
+  ThreadLauncher threads({});
+  const int usual = getpriority(PRIO_PROCESS, 0);
+  int background = 0;
+  int housekeeping = 0;
+  threads.launch("surface", ThreadRole::kBackground, [&] { background = getpriority(PRIO_PROCESS, 0); }).join();
+  threads.launch("finder", ThreadRole::kHousekeeping, [&] { housekeeping = getpriority(PRIO_PROCESS, 0); }).join();
+  EXPECT_EQ(background, std::max(usual, 10));
+  EXPECT_EQ(housekeeping, usual);
+  EXPECT_EQ(getpriority(PRIO_PROCESS, 0), usual);
 }
 
 TEST(ThreadLauncher, TheMoreUrgentRoleGetsTheHigherPriorityAndEachItsOwnProcessor) {
