@@ -1,11 +1,12 @@
-// Any bytes as a table of poses, of a signal, of points, as a tool's tip, as a turned scope: an error of one line, or
-// finite numbers.
+// Any bytes as a table of poses, of a signal, of points, of motion, of R peaks, as a tool's tip, as a turned scope: an
+// error of one line, or finite numbers.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
+#include "daemon/evaluation/traces/motion_trace.hpp"
 #include "drivers/calibration/tool_tip.hpp"
 #include "drivers/calibration/turned_scope_file.hpp"
 #include "drivers/pose_file/point_table.hpp"
@@ -33,6 +34,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (const auto points = parse_point_table(text, "fuzz.csv", LengthUnit::kMillimetre); !points) {
     check_error(points.error());
   }
+  if (const auto trace = parse_motion_trace(text, "fuzz.csv"); !trace) {
+    check_error(trace.error());
+  } else if (!trace->positions.allFinite() || !(trace->period_s > 0.0)) {
+    std::abort();
+  }
+  if (const auto peaks_s = parse_r_peaks(text, "fuzz.csv"); !peaks_s) check_error(peaks_s.error());
   if (const auto tip = parse_tool_tip(text, "fuzz.json"); !tip) {
     check_error(tip.error());
   } else if (!tip->tip_T.allFinite() || !tip->covariance_T.allFinite()) {

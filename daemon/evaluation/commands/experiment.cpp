@@ -3,15 +3,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/command_line/progress.hpp"
 #include "daemon/evaluation/experiment/experiment_text.hpp"
+#include "daemon/evaluation/traces/motion_trace.hpp"
+#include "daemon/evaluation/traces/trace_text.hpp"
+#include "daemon/pages/html_page.hpp"
 #include "daemon/pages/png_picture.hpp"
 #include "drivers/file/whole_file.hpp"
 #include "drivers/text_file/text_file.hpp"
@@ -21,6 +27,9 @@ namespace {
 
 struct ExperimentOptions {
   ExperimentSettings settings;
+  TraceExperimentSettings of_trace;
+  std::filesystem::path trace;
+  std::filesystem::path r_peaks;
   std::filesystem::path out;
   bool json = false;
 };
@@ -50,10 +59,53 @@ Expected<void> prepare_folder(const std::filesystem::path& folder) {
   return check_writable(folder / "experiment.csv");
 }
 
+Expected<void> write_files(const TraceExperiment& experiment, const std::filesystem::path& folder) {
+  const std::string title = "Experiment 3: motion of a real heart, predicted";
+  const std::string svg = svg_document(to_plots(experiment), title);
+  const auto png = png_of_svg(svg);
+  if (!png) return tl::unexpected(png.error());
+  const std::pair<const char*, std::string> files[] = {
+      {".svg", svg},
+      {".png", *png},
+      {".csv", to_csv(experiment)},
+      {".json", to_json(experiment).dump(2) + "\n"},
+      {".html", html_page(title, svg + "<pre>" + escaped(to_table(experiment)) + "</pre>\n")}};
+  for (const auto& [ending, text] : files) {
+    if (auto done = write_text_file(folder / (std::string("experiment-3") + ending), text); !done) return done;
+  }
+  return {};
+}
+
+Outcome predict_trace(const ExperimentOptions& options) {
+  if (options.trace.empty()) return refuse(Error{"experiment 3: needs a motion trace: --trace FILE"});
+  const auto trace = read_motion_trace(options.trace);
+  if (!trace) return refuse(trace.error());
+  std::vector<double> r_peaks_s;
+  if (!options.r_peaks.empty()) {
+    auto read = read_r_peaks(options.r_peaks);
+    if (!read) return refuse(read.error());
+    r_peaks_s = std::move(*read);
+  }
+  Expected<TraceExperiment> experiment = tl::unexpected(Error{});
+  {
+    const int starts = std::max(options.of_trace.to - options.of_trace.from + 1, 1);
+    Progress progress("starts", static_cast<std::uint64_t>(starts));
+    experiment = run_trace_experiment(options.of_trace, *trace, r_peaks_s,
+                                      [&](int done) { progress.update(static_cast<std::uint64_t>(done)); });
+  }
+  if (!experiment) return refuse(experiment.error());
+  if (!options.out.empty()) {
+    if (const auto written = write_files(*experiment, options.out); !written) return refuse(written.error());
+  }
+  fmt::print("{}", options.json ? to_json(*experiment).dump(2) + "\n" : to_table(*experiment));
+  return {};
+}
+
 Outcome repeat(const ExperimentOptions& options) {
   if (!options.out.empty()) {
     if (const auto able = prepare_folder(options.out); !able) return refuse(able.error());
   }
+  if (options.settings.number == 3) return predict_trace(options);
   Expected<Experiment> experiment = tl::unexpected(Error{});
   {
     Progress progress("trials", static_cast<std::uint64_t>(options.settings.trials));
@@ -77,10 +129,12 @@ void add_experiment_command(Commands& commands) {
                                   "paper's filter, ours, batch MAP and the Cramer-Rao bound on simulated trials",
                                   [options](const Console&) { return repeat(*options); });
   command
-      .add_option("NUMBER", options->settings.number,
-                  "1: surface of a real heart, bearings; 2: laparoscope, 8 features, pixels, tracker noise")
+      .add_option(
+          "NUMBER", options->settings.number,
+          "1: surface of a real heart, bearings; 2: laparoscope, 8 features, pixels, tracker noise; 3: recorded "
+          "motion of a real heart (--trace), predicted")
       ->required()
-      ->check(Range(1, 2));
+      ->check(Range(1, 3));
   command.add_option("--out", options->out,
                      "Folder for the table (CSV, JSON), the figures (PNG, SVG, CSV) and one HTML page; made if needed");
   command.add_option("--seed", options->settings.seed, "Chooses features, path, rhythm and noise")
@@ -96,6 +150,16 @@ void add_experiment_command(Commands& commands) {
       ->capture_default_str();
   command.add_option("--iterations", options->settings.methods.paper_iterations, "Iterations of the paper's update")
       ->check(Range(1, 1000))
+      ->capture_default_str();
+  command.add_option("--trace", options->trace,
+                     "Experiment 3: recorded motion, a CSV with a time in seconds and x, y, z in mm of each point");
+  command.add_option("--r-peaks", options->r_peaks,
+                     "Experiment 3: times of R peaks in seconds, one a line; each is used 0.1 s after it");
+  command.add_option("--from", options->of_trace.from, "Experiment 3: first sample that is predicted from")
+      ->check(Range(0, 100'000'000))
+      ->capture_default_str();
+  command.add_option("--to", options->of_trace.to, "Experiment 3: the last one")
+      ->check(Range(0, 100'000'000))
       ->capture_default_str();
   command.add_flag("--json", options->json, "Print JSON in place of the table");
 }
