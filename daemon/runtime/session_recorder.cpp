@@ -12,7 +12,7 @@ namespace perimap {
 namespace {
 
 constexpr Duration kBehind = std::chrono::milliseconds(250);
-constexpr Duration kTick = std::chrono::milliseconds(20);
+constexpr Duration kWriteTick = std::chrono::milliseconds(20);
 constexpr Duration kFlushAfter = std::chrono::seconds(1);
 constexpr std::size_t kFrameHeads = 1024;
 constexpr std::size_t kSampleRing = 2048;
@@ -177,7 +177,7 @@ void SessionRecorder::run() {
       if (const auto done = writer_->flush(); !done) give_up(done.error());
       flushed_ = now;
     }
-    static_cast<void>(wakeup_.wait_until(now + kTick));
+    static_cast<void>(wakeup_.wait_until(now + kWriteTick));
   }
 }
 
