@@ -25,7 +25,7 @@ using Errors = std::map<Eigen::Index, Eigen::RowVectorXd>;
 // An autoregression that is fitted anew now and then, about the mean so far.
 class Refitted {
  public:
-  Refitted(const AutoregressionSettings& settings, int every, const Eigen::VectorXd& noise)
+  Refitted(const VectorAutoregressionSettings& settings, int every, const Eigen::VectorXd& noise)
       : settings_(settings), every_(every), noise_(noise) {}
 
   [[nodiscard]] Eigen::MatrixXd predict(const Eigen::MatrixXd& samples, int count) {
@@ -40,11 +40,11 @@ class Refitted {
   void fit_anew() { fitted_.reset(); }
 
  private:
-  AutoregressionSettings settings_;
+  VectorAutoregressionSettings settings_;
   int every_;
   Eigen::VectorXd noise_;
   Eigen::RowVectorXd mean_;
-  std::optional<Autoregression> fitted_;
+  std::optional<VectorAutoregression> fitted_;
   Eigen::Index fitted_at_ = 0;
 };
 

@@ -22,8 +22,8 @@ struct TraceExperimentSettings {
   std::vector<double> horizons_s = {0.04, 0.08, 0.12, 0.2, 0.4};
   double lateral_noise_mm = 0.1;  // of the trace itself, x and y, by its authors' cameras
   double depth_noise_mm = 0.25;   // and z
-  AutoregressionSettings of_a_point{.lags = 35, .ridge = 300.0};
-  AutoregressionSettings of_all{.lags = 20, .ridge = 300.0};
+  VectorAutoregressionSettings of_a_point{.lags = 35, .ridge = 300.0};
+  VectorAutoregressionSettings of_all{.lags = 20, .ridge = 300.0};
   int fitted_every = 40;  // samples: the autoregressions of the motion
   int warm_up = 100;      // samples before the first start, whose errors tell the covariance
   TracePredictionSettings prediction;

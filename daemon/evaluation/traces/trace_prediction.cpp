@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-
 namespace perimap {
 namespace {
 
@@ -54,7 +53,8 @@ MapPredictions MotionPhasePrediction::predict(const Eigen::MatrixXd& samples, co
   carry_on(*tracks_, period_s_, samples.rows());
   const TwoPhaseMap map = fitted(settings_, samples, period_s_, false, first, *tracks_);
   const Eigen::MatrixXd left = residuals(map, samples, *tracks_);
-  const Eigen::MatrixXd of_residual = Autoregression(settings_.residual, left, noise_).predict(left, ahead.back());
+  const Eigen::MatrixXd of_residual =
+      VectorAutoregression(settings_.residual, left, noise_).predict(left, ahead.back());
   const Eigen::Index newest = samples.rows() - 1;
   const auto count = static_cast<Eigen::Index>(ahead.size());
   MapPredictions result{Eigen::MatrixXd(count, samples.cols()), Eigen::MatrixXd(count, samples.cols())};
@@ -126,7 +126,7 @@ std::optional<MapPredictions> RPeakPrediction::predict(const Eigen::MatrixXd& sa
   map = TwoPhaseMap(settings_.map, samples, period_s_, *tracks_);
 
   const Eigen::MatrixXd left = residuals(map, samples, *tracks_);
-  const Autoregression autoregression(settings_.residual, left, noise_);
+  const VectorAutoregression autoregression(settings_.residual, left, noise_);
   const auto count = static_cast<Eigen::Index>(ahead.size());
   MapPredictions result{Eigen::MatrixXd::Zero(count, samples.cols()), Eigen::MatrixXd::Zero(count, samples.cols())};
   double told = 0.0;

@@ -5,18 +5,18 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/evaluation/traces/autoregression.hpp"
 #include "daemon/evaluation/traces/cycle_lengths.hpp"
 #include "daemon/evaluation/traces/phase_smoother.hpp"
 #include "daemon/evaluation/traces/two_phase_map.hpp"
+#include "daemon/evaluation/traces/vector_autoregression.hpp"
 
 namespace perimap {
 
 struct TracePredictionSettings {
   TwoPhaseMapSettings map;
   PhaseSmootherSettings phases;
-  AutoregressionSettings residual;  // about the map
-  int first_iterations = 25;        // of phases and map, and so many for each sample that is new
+  VectorAutoregressionSettings residual;  // about the map
+  int first_iterations = 25;              // of phases and map, and so many for each sample that is new
   int iterations = 2;
   double detector_delay_s = 0.1;  // after which an R peak is known
 };

@@ -12,19 +12,19 @@ namespace {
 
 const Eigen::VectorXd kNoise = (Eigen::VectorXd(6) << 0.1, 0.1, 0.25, 0.1, 0.1, 0.25).finished();
 
-TEST(Autoregression, ContinuesWhatObeysARecursion) {
+TEST(VectorAutoregression, ContinuesWhatObeysARecursion) {
   Eigen::MatrixXd samples(200, 2);
   for (int i = 0; i < 200; ++i) samples.row(i) << std::cos(0.3 * i), std::sin(0.3 * i) + 0.5 * std::cos(0.7 * i);
-  const Autoregression fitted({.lags = 6, .ridge = 1e-9}, samples.topRows(150), Eigen::Vector2d(1.0, 1.0));
+  const VectorAutoregression fitted({.lags = 6, .ridge = 1e-9}, samples.topRows(150), Eigen::Vector2d(1.0, 1.0));
   const Eigen::MatrixXd next = fitted.predict(samples.topRows(150), 20);
   EXPECT_LT((next - samples.middleRows(150, 20)).cwiseAbs().maxCoeff(), 1e-3);
 }
 
-TEST(Autoregression, ItsRidgeIsInUnitsOfNoise) {
+TEST(VectorAutoregression, ItsRidgeIsInUnitsOfNoise) {
   Eigen::MatrixXd samples(100, 1);
   for (int i = 0; i < 100; ++i) samples(i, 0) = std::cos(0.3 * i);
   const auto next = [&](double noise) {
-    return Autoregression({.lags = 4, .ridge = 10.0}, samples, Eigen::VectorXd::Constant(1, noise))
+    return VectorAutoregression({.lags = 4, .ridge = 10.0}, samples, Eigen::VectorXd::Constant(1, noise))
         .predict(samples, 1)(0, 0);
   };
   const double truth = std::cos(0.3 * 100);

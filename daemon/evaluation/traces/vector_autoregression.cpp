@@ -1,11 +1,11 @@
-#include "daemon/evaluation/traces/autoregression.hpp"
+#include "daemon/evaluation/traces/vector_autoregression.hpp"
 
 #include <Eigen/Cholesky>
 
 namespace perimap {
 
-Autoregression::Autoregression(const AutoregressionSettings& settings, const Eigen::MatrixXd& samples,
-                               const Eigen::VectorXd& noise)
+VectorAutoregression::VectorAutoregression(const VectorAutoregressionSettings& settings, const Eigen::MatrixXd& samples,
+                                           const Eigen::VectorXd& noise)
     : lags_(settings.lags), noise_(noise) {
   const Eigen::Index channels = samples.cols();
   const Eigen::Index equations = samples.rows() - lags_;
@@ -19,7 +19,7 @@ Autoregression::Autoregression(const AutoregressionSettings& settings, const Eig
   A_ = normal.ldlt().solve(X.transpose() * Z.bottomRows(equations));
 }
 
-Eigen::MatrixXd Autoregression::predict(const Eigen::MatrixXd& samples, int count) const {
+Eigen::MatrixXd VectorAutoregression::predict(const Eigen::MatrixXd& samples, int count) const {
   const Eigen::Index channels = samples.cols();
   Eigen::RowVectorXd lagged(lags_ * channels);
   for (Eigen::Index l = 0; l < lags_; ++l) {
