@@ -57,6 +57,7 @@ struct PredictedMesh {
   // What depends on the mesh alone is computed once for each. For the functions of this header.
   struct OfMesh {
     std::array<std::uint8_t, 16> run_id{};
+    std::array<char, sizeof(perimap_SurfaceMesh::source)> source{};
     std::uint64_t sample_sequence = 0;  // 0: of none
     bool sound = false;
     std::vector<double> largest_mm2;  // of each vertex' covariance, the largest eigenvalue
@@ -88,7 +89,7 @@ struct NearestPoint {
   double distance_mm = 0.0;                     // signed: positive in front, where the camera was; negative within
   double deviation_mm = 0.0;                    // of the surface along the normal
   std::array<double, 3> velocity_W_mm_per_s{};  // of the surface there
-  double approach_mm_per_s = 0.0;  // of the distance: negative while they come nearer; of the velocity that was given
+  double approach_mm_per_s = 0.0;  // of the signed distance, by the velocity that was given: negative towards within
 };
 
 namespace detail {
@@ -122,12 +123,18 @@ inline double largest_eigenvalue(const std::array<double, 6>& c) noexcept {
   return mean + 2.0 * p * std::cos(std::acos(half) / 3.0);
 }
 
-inline bool well_formed(const perimap_SurfaceMesh& mesh) noexcept {
+// What is read of any sample, the one before repeated or not, is there.
+inline bool lengths_fit(const perimap_SurfaceMesh& mesh) noexcept {
   if (mesh.cardiac_harmonics > kMostHarmonics || mesh.respiratory_harmonics > kMostHarmonics) return false;
   const std::uint64_t B = 1 + 2 * (std::uint64_t{mesh.cardiac_harmonics} + mesh.respiratory_harmonics);
   const std::uint64_t V = mesh.vertex_states._length;
   if (mesh.coefficients_W_mm._length != 3 * B * V || mesh.covariances_W_mm2._length != 6 * V) return false;
-  if (V == 0 || mesh.triangles._length == 0 || mesh.triangles._length % 3 != 0) return false;
+  return V > 0 && mesh.triangles._length > 0 && mesh.triangles._length % 3 == 0;
+}
+
+inline bool well_formed(const perimap_SurfaceMesh& mesh) noexcept {
+  if (!lengths_fit(mesh)) return false;
+  const std::uint64_t V = mesh.vertex_states._length;
   const auto all_finite = [](const dds_sequence_float& values) {
     return std::all_of(values._buffer, values._buffer + values._length, [](float x) { return std::isfinite(x); });
   };
@@ -166,8 +173,13 @@ inline void find_border(const std::vector<PredictedMesh::Triangle>& triangles, P
 inline void take_mesh(const perimap_SurfaceMesh& mesh, PredictedMesh& out) {
   PredictedMesh::OfMesh& of = out.of_mesh;
   const bool same = of.sample_sequence == mesh.sample_sequence && mesh.sample_sequence != 0 &&
-                    std::memcmp(of.run_id.data(), mesh.run_id, of.run_id.size()) == 0;
-  if (same && of.sound && of.on_border.size() == mesh.vertex_states._length) return;
+                    std::memcmp(of.run_id.data(), mesh.run_id, of.run_id.size()) == 0 &&
+                    std::memcmp(of.source.data(), mesh.source, of.source.size()) == 0;
+  if (same && of.sound && of.on_border.size() == mesh.vertex_states._length &&
+      3 * out.triangles.size() == mesh.triangles._length) {
+    return;
+  }
+  std::memcpy(of.source.data(), mesh.source, of.source.size());
   std::memcpy(of.run_id.data(), mesh.run_id, of.run_id.size());
   of.sample_sequence = mesh.sample_sequence;
   of.sound = well_formed(mesh);
@@ -213,7 +225,8 @@ inline void sum_axis(const float* coefficients, std::size_t V, const Bases& base
   }
 }
 
-inline void move_vertices(const perimap_SurfaceMesh& mesh, const Bases& bases, PredictedMesh& out) {
+// False when something of it is no number: a model's figures may be anything, and sums of finite ones too large.
+inline bool move_vertices(const perimap_SurfaceMesh& mesh, const Bases& bases, PredictedMesh& out) {
   const std::size_t V = mesh.vertex_states._length;
   out.positions_W_mm.resize(V);
   out.velocities_W_mm_per_s.resize(V);
@@ -234,13 +247,17 @@ inline void move_vertices(const perimap_SurfaceMesh& mesh, const Bases& bases, P
       out.other_spreads_mm[v][axis] = static_cast<double>(s[4 * V + v] - s[v]);
     }
   }
+  bool all_finite = true;
   for (std::size_t v = 0; v < V; ++v) {
     const Vector& before = out.half_spreads_mm[v];
     const Vector& after = out.other_spreads_mm[v];
     // The largest eigenvalue of a sum is not above the sum of the largest ones (Weyl).
     out.deviations_mm[v] = std::sqrt(out.of_mesh.largest_mm2[v] + 0.5 * (dot(before, before) + dot(after, after)) +
                                      bases.respiratory_variance_mm2);
+    all_finite = all_finite && std::isfinite(out.deviations_mm[v]) && finite(out.positions_W_mm[v]) &&
+                 finite(out.velocities_W_mm_per_s[v]);
   }
+  return all_finite;
 }
 
 inline void find_normals(PredictedMesh& out) {
@@ -258,8 +275,8 @@ inline void find_normals(PredictedMesh& out) {
 inline MeshRefusal mesh_refusal(const perimap_SurfaceMesh& mesh, const perimap_SurfaceModel& model, std::int64_t t_ns,
                                 std::int64_t now_ns) noexcept {
   if (std::strncmp(mesh.source, model.source, sizeof mesh.source) != 0) return MeshRefusal::kOtherSource;
+  if (mesh.state == perimap_MESH_NONE) return MeshRefusal::kNoSurface;  // none is not too old
   if (now_ns > mesh.valid_until_ns || t_ns > mesh.valid_until_ns) return MeshRefusal::kStale;
-  if (mesh.state == perimap_MESH_NONE) return MeshRefusal::kNoSurface;
   if (mesh.state != perimap_MESH_THERE) return MeshRefusal::kMalformed;
   if (mesh.phase_law != static_cast<std::uint8_t>(model.cardiac_clock.law)) return MeshRefusal::kOtherLaw;
   return MeshRefusal::kNone;
@@ -269,15 +286,15 @@ inline bool move_mesh(const perimap_SurfaceMesh& mesh, const perimap_SurfaceMode
                       PredictedMesh& out) {
   const perimap_CardiacCycle* cycle = cycle_at(model, t_ns);
   Phase phase;
-  // The mesh may have been made before breathing was known, or without it: what one lacks is not moved by.
-  if (cycle == nullptr || mesh.cardiac_harmonics != model.cardiac_harmonics ||
-      mesh.respiratory_harmonics != model.respiratory_harmonics ||
+  // A mesh that was made before breathing was known, or without it, is not moved by a model that has it.
+  if (cycle == nullptr || !well_formed(model) || !lengths_fit(mesh) ||
+      mesh.cardiac_harmonics != model.cardiac_harmonics || mesh.respiratory_harmonics != model.respiratory_harmonics ||
       !phase_at(model.cardiac_clock, *cycle, t_ns, phase)) {
     return false;
   }
   take_mesh(mesh, out);
   if (!out.of_mesh.sound) return false;
-  move_vertices(mesh, bases_at(model, phase, t_ns), out);
+  if (!move_vertices(mesh, bases_at(model, phase, t_ns), out)) return false;
   find_normals(out);
   return true;
 }

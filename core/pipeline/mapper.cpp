@@ -93,7 +93,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
   intake_.offer(frame, image, colour, room());
   if (scope_ != nullptr) scope_->offer(frame.index, frame.rate, image);
   keeping_.fill_feed(breathing_, heart_, counters_.maps_forgotten.get());
-  surface_.on_frame(frame, heart_.clock().law().law);
+  surface_.on_frame(frame, heart_.clock().law().law, job_.setup_variance_mm2);
   count(frame, begun, ends);
   // D
   begin_learning(frame);
@@ -130,7 +130,10 @@ void Mapper::set_pose(FrameRecord& frame, const GreyImage& image) noexcept {
   double turn_deviation_rad = 0.0;
   if (scope_ != nullptr) {
     const ScopeWatch::Frame scope = scope_->begin_frame(frame.index, image);
-    if (scope.mistaken_since) history_->disown_poses(*scope.mistaken_since);
+    if (scope.mistaken_since) {
+      history_->disown_poses(*scope.mistaken_since);
+      watcher_.disown_poses(*scope.mistaken_since);
+    }
     job_.scope_unread = scope.unread;
     job_.scope_changed = scope.changed;
     known = !scope.unread && !scope.changed;

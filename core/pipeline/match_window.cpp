@@ -32,15 +32,18 @@ void MatchWindow::add(const FrameRecord& frame, std::span<const FeatureSlot> slo
   for (std::size_t slot = 0; slot < slots.size(); ++slot) {
     const FeatureSlot& of = slots[slot];
     if (of.state == SlotState::kEmpty || of.match.state != MatchState::kFound) continue;
-    matches_[(end_ % kFrames) * slots_ + count++] = {slot, of.id, of.match.px, of.match.covariance_px2};
+    // As the lens model has it: a scope that is turned or zoomed moves the picture, and is no wrong lens.
+    matches_[(end_ % kFrames) * slots_ + count++] = {slot, of.id, frame.picture.to_lens(of.match.px),
+                                                     frame.picture.covariance_to_lens(of.match.covariance_px2)};
   }
   ++end_;
 }
 
 void MatchWindow::tell(const FrameHistory& history) noexcept {
   if (begin_ == end_) return;
-  const Instant newest = frame(end_ - 1).capture;
-  while (begin_ != end_ && newest - frame(begin_).capture > kLength) ++begin_;
+  // By the frame of now: what was measurable long ago is not judged again and again.
+  const Instant now = history.newest()->stamp.capture;
+  while (begin_ != end_ && now - frame(begin_).capture > kLength) ++begin_;
   for (std::uint64_t number = begin_; number != end_; ++number) {
     WindowFrame& open = frames_[number % kFrames];
     if (open.state != WindowFrame::State::kOpen) continue;
@@ -61,6 +64,13 @@ void MatchWindow::tell(const FrameHistory& history) noexcept {
   }
 }
 
+void MatchWindow::disown(std::uint64_t since_frame) noexcept {
+  for (std::uint64_t number = begin_; number != end_; ++number) {
+    WindowFrame& told = frames_[number % kFrames];
+    if (told.index >= since_frame) told.state = WindowFrame::State::kUseless;
+  }
+}
+
 void MatchWindow::retell_phases(const CardiacClock& clock) noexcept {
   for (std::uint64_t number = begin_; number != end_; ++number) {
     WindowFrame& told = frames_[number % kFrames];
@@ -76,6 +86,14 @@ void MatchWindow::retell_respiration(const RespiratoryClock& respiration) noexce
     WindowFrame& told = frames_[number % kFrames];
     if (told.state == WindowFrame::State::kTold) told.respiration = respiration.at(told.capture);
   }
+}
+
+std::uint64_t MatchWindow::newest_told() const noexcept {
+  for (std::uint64_t number = end_; number != begin_; --number) {
+    const WindowFrame& told = frames_[(number - 1) % kFrames];
+    if (told.state == WindowFrame::State::kTold) return told.index;
+  }
+  return 0;
 }
 
 std::size_t MatchWindow::told() const noexcept {

@@ -57,6 +57,8 @@ class MatchWindow {
   void add(const FrameRecord& frame, std::span<const FeatureSlot> slots) noexcept;
   // Frames whose cycles have ended get what is known of them now; those that are too old go.
   void tell(const FrameHistory& history) noexcept;
+  // Poses from that frame on were mistaken.
+  void disown(std::uint64_t since_frame) noexcept;
   // As FrameHistory does with its frames.
   void retell_phases(const CardiacClock& clock) noexcept;
   void retell_respiration(const RespiratoryClock& respiration) noexcept;
@@ -67,6 +69,8 @@ class MatchWindow {
   [[nodiscard]] std::uint64_t end() const noexcept { return end_; }
   // How many of them are told.
   [[nodiscard]] std::size_t told() const noexcept;
+  // Index of the newest frame of which all is known; none: 0.
+  [[nodiscard]] std::uint64_t newest_told() const noexcept;
   [[nodiscard]] const WindowFrame& frame(std::uint64_t number) const noexcept { return frames_[number % kFrames]; }
   [[nodiscard]] std::span<const WindowMatch> matches(std::uint64_t number) const noexcept {
     return {matches_.data() + (number % kFrames) * slots_, counts_[number % kFrames]};

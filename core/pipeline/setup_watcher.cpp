@@ -46,9 +46,11 @@ void SetupWatcher::take(const FrameHistory& history, std::span<const FeatureSlot
   if (!first_capture_) first_capture_ = frame.stamp.capture;
   if (active_ || frame.index < next_round_at_) return;
   next_round_at_ = frame.index + frame.rate.frames(kLookAgain);
-  if (window_.told() < kFewestFrames || !choose_features(slots)) return;
+  // What was judged already tells nothing new: a tool that is hidden, a phase that is lost.
+  if (window_.newest_told() == judged_frame_ || window_.told() < kFewestFrames || !choose_features(slots)) return;
   copy_window(bank);
   if (round_->frame_count < kFewestFrames) return;
+  judged_frame_ = window_.newest_told();
   active_ = true;
   discarded_ = false;
   adopted_at_ = frame.index + frame.rate.frames(kRoundTakes);
@@ -86,6 +88,11 @@ void SetupWatcher::retell_phases(const CardiacClock& clock) noexcept {
 
 void SetupWatcher::retell_respiration(const RespiratoryClock& respiration) noexcept {
   window_.retell_respiration(respiration);
+  discarded_ = active_;
+}
+
+void SetupWatcher::disown_poses(std::uint64_t since_frame) noexcept {
+  window_.disown(since_frame);
   discarded_ = active_;
 }
 

@@ -24,7 +24,7 @@ namespace perimap {
 
 // A round: the features that have most matches in the window are copied here with them, judged, and the verdict is
 // adopted a stated number of frames after the round began; where it is not there by then, at the first frame that has
-// it, but never so in lockstep. One round at a time. take(), adopt() and begin_window_anew() belong to the mapper,
+// it, but never so in lockstep. One round at a time. take(), adopt() and what voids frames belong to the mapper,
 // serve() to the housekeeping thread.
 class SetupWatcher {
  public:
@@ -43,6 +43,8 @@ class SetupWatcher {
   void retell_respiration(const RespiratoryClock& respiration) noexcept;
   // Mapper: another patient. What is believed of the set-up stays.
   void begin_window_anew() noexcept;
+  // Poses from that frame on were mistaken.
+  void disown_poses(std::uint64_t since_frame) noexcept;
 
   // Mapper: what is believed as of the last adopt().
   [[nodiscard]] const SetupBelief& belief() const noexcept { return belief_; }
@@ -89,7 +91,8 @@ class SetupWatcher {
   std::vector<Seen> seen_;           // by slot
   std::vector<std::size_t> chosen_;  // slots
   bool active_ = false;
-  bool discarded_ = false;  // the round that is active
+  bool discarded_ = false;          // the round that is active
+  std::uint64_t judged_frame_ = 0;  // the newest that the last round knew all of
   std::uint64_t adopted_at_ = 0;
   std::uint64_t next_round_at_ = 0;
 

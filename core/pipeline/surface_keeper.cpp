@@ -1,6 +1,7 @@
 #include "core/pipeline/surface_keeper.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/pipeline/feature_stages.hpp"
 
@@ -22,7 +23,7 @@ SurfaceKeeper::SurfaceKeeper(std::span<FeatureSlot> slots, MapBank& bank, Surfac
       counters_(counters),
       gathered_(slots.size()) {}
 
-void SurfaceKeeper::on_frame(const FrameRecord& frame, PhaseLaw law) noexcept {
+void SurfaceKeeper::on_frame(const FrameRecord& frame, PhaseLaw law, double setup_variance_mm2) noexcept {
   if (asked_ && frame.index >= adopt_at_) {
     const bool due = frame.index == adopt_at_;
     asked_ = !maker_.adopt();
@@ -33,7 +34,8 @@ void SurfaceKeeper::on_frame(const FrameRecord& frame, PhaseLaw law) noexcept {
     camera_W_mm_ += (frame.pose.X_WC.t - camera_W_mm_) / static_cast<double>(cameras_);
   }
   gather(frame);
-  if (frame.index >= next_request_at_ && fresh_ >= slots_.size() && cameras_ > 0) request(frame, law);
+  if (frame.index >= next_request_at_ && fresh_ >= slots_.size() && cameras_ > 0)
+    request(frame, law, setup_variance_mm2);
 }
 
 void SurfaceKeeper::gather(const FrameRecord& frame) noexcept {
@@ -56,7 +58,7 @@ void SurfaceKeeper::gather(const FrameRecord& frame) noexcept {
   }
 }
 
-void SurfaceKeeper::request(const FrameRecord& frame, PhaseLaw law) noexcept {
+void SurfaceKeeper::request(const FrameRecord& frame, PhaseLaw law, double setup_variance_mm2) noexcept {
   SurfaceJob* job = maker_.job();
   if (job == nullptr) return;
   job->evidence.clear();
@@ -67,6 +69,8 @@ void SurfaceKeeper::request(const FrameRecord& frame, PhaseLaw law) noexcept {
   }
   job->camera_W_mm = camera_W_mm_;
   job->law = law;
+  job->anew = std::exchange(anew_, false);
+  job->setup_variance_mm2 = setup_variance_mm2;
   job->capture = frame.stamp.capture;
   job->frame_sequence = frame.stamp.sequence;
   maker_.request();
@@ -78,6 +82,7 @@ void SurfaceKeeper::request(const FrameRecord& frame, PhaseLaw law) noexcept {
 
 void SurfaceKeeper::begin_again() noexcept {
   maker_.withdraw();
+  anew_ = true;
   for (Gathered& gathered : gathered_) gathered.usable = false;
   fresh_ = 0;
 }

@@ -21,8 +21,8 @@ class SurfaceKeeper {
   SurfaceKeeper(std::span<FeatureSlot> slots, MapBank& bank, SurfaceMaker& maker, Duration adopted_after,
                 PipelineCounters& counters);
 
-  // Once a frame, after its matches are settled.
-  void on_frame(const FrameRecord& frame, PhaseLaw law) noexcept;
+  // Once a frame, after its matches are settled. `setup_variance_mm2`: of each published position, by the set-up.
+  void on_frame(const FrameRecord& frame, PhaseLaw law, double setup_variance_mm2) noexcept;
 
   // What the features are known to do has changed: what was made of it, and is being made, is void.
   void begin_again() noexcept;
@@ -37,7 +37,7 @@ class SurfaceKeeper {
   };
 
   void gather(const FrameRecord& frame) noexcept;
-  void request(const FrameRecord& frame, PhaseLaw law) noexcept;
+  void request(const FrameRecord& frame, PhaseLaw law, double setup_variance_mm2) noexcept;
 
   std::span<FeatureSlot> slots_;
   MapBank& bank_;
@@ -54,6 +54,7 @@ class SurfaceKeeper {
   std::uint64_t next_request_at_ = 0;
   std::uint64_t adopt_at_ = 0;
   bool asked_ = false;
+  bool anew_ = false;  // since the last request
 };
 
 }  // namespace perimap

@@ -62,6 +62,10 @@ void SurfaceMaker::make() {
   made->law = job_.law;
   made->capture = job_.capture;
   made->frame_sequence = job_.frame_sequence;
+  if (job_.anew) {
+    fits_ = 0;
+    kernels_ = {};
+  }
   const bool learn = fits_ % kFitsAKernel == 0;
   auto surface = PeriodicSurface::fit(layout_, job_.evidence, job_.camera_W_mm, {},
                                       learn ? std::nullopt : std::optional(kernels_), kernels_);
@@ -69,6 +73,10 @@ void SurfaceMaker::make() {
     ++fits_;
     kernels_ = surface->kernels();
     made->mesh = mesh_of(*surface, vertices_);
+    // After support is decided: a set-up that is a little wrong moves all of it, and hides no place.
+    for (const int diagonal : {0, 3, 5}) {
+      made->mesh.covariances_W_mm2.row(diagonal).array() += job_.setup_variance_mm2;
+    }
     made->surface.emplace(*std::move(surface));
   } else {
     made->refusal = std::move(surface.error());

@@ -23,7 +23,9 @@ struct SurfaceJob {
   std::vector<SurfaceEvidence> evidence;
   Vector3d camera_W_mm = Vector3d::Zero();  // where the camera has been in the mean
   PhaseLaw law{};
-  Instant capture;  // of the newest frame that it knows of
+  double setup_variance_mm2 = 0.0;  // per axis: what all positions have in common, so it is none of the evidence's
+  bool anew = false;                // nothing of an earlier surface holds: another heart, another law
+  Instant capture;                  // of the newest frame that it knows of
   std::uint64_t frame_sequence = 0;
 };
 

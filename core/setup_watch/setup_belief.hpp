@@ -22,7 +22,11 @@ class SetupBelief {
     const bool doubts = verdict.state == SetupState::kDoubted;
     const bool again = doubts && newest_.state == SetupState::kDoubted && blame_alike(verdict, newest_);
     const bool certain = doubts && verdict.certainty >= kCertain;
-    consistent_ = verdict.state == SetupState::kConsistent ? consistent_ + 1 : 0;
+    // A window that is undetermined, the scope at rest, neither ends a doubt nor takes a count or a widening back.
+    if (doubts) consistent_ = 0;
+    if (verdict.state == SetupState::kConsistent) ++consistent_;
+    const bool tells = doubts || verdict.state == SetupState::kConsistent;
+    widening_mm_ = tells ? verdict.widening_mm : std::max(widening_mm_, verdict.widening_mm);
     newest_ = verdict;
     if (again || certain || (doubts && doubted_)) {
       if (!first_doubted_) first_doubted_ = after;
@@ -43,7 +47,9 @@ class SetupBelief {
   // Of the newest window that tells anything; while doubted, of the newest that doubts.
   [[nodiscard]] const SetupVerdict& told() const noexcept { return told_; }
   // What is to be added to the deviation of each published position, RMS of the 3-D norm; and as a variance per axis.
-  [[nodiscard]] double widening_mm() const noexcept { return std::max(told_.widening_mm, newest_.widening_mm); }
+  [[nodiscard]] double widening_mm() const noexcept {
+    return std::max(doubted_ ? told_.widening_mm : 0.0, widening_mm_);
+  }
   [[nodiscard]] double variance_mm2() const noexcept { return widening_mm() * widening_mm() / 3.0; }
   [[nodiscard]] std::uint64_t judged() const noexcept { return judged_; }
   // Since the first frame; none: never.
@@ -63,7 +69,8 @@ class SetupBelief {
   SetupVerdict newest_;
   SetupVerdict told_;
   bool doubted_ = false;
-  int consistent_ = 0;  // windows in a row
+  int consistent_ = 0;  // windows since the last one that doubts
+  double widening_mm_ = 0.0;
   std::uint64_t judged_ = 0;
   std::optional<Duration> first_doubted_;
 };

@@ -46,7 +46,7 @@ expect() { # EXIT_CODE ARGUMENT...
   local got=$?
   [ $got -eq "$code" ] || fail "'experiment $*' ended with $got in place of $code"
 }
-expect 2 3
+expect 2 4
 expect 2 1 --trials 0
 expect 2 1 --no-such-option
 expect 2

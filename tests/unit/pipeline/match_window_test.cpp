@@ -26,6 +26,7 @@ struct WatchedFrames : ::testing::Test {
   std::vector<FeatureSlot> slots = std::vector<FeatureSlot>(3);
   CardiacClockTracker clock{{}};
   int next_beat_ms = 1000;
+  PixelMap picture;
   int frames = 0;
 
   WatchedFrames() {
@@ -51,6 +52,7 @@ struct WatchedFrames : ::testing::Test {
     const double t_s = to_seconds(capture.time_since_epoch());
     pose.X_WC = {so3_exp(Vector3d(t_s * kTurn_rad_per_s)), t_s * kVelocity_mm_per_s};
     FrameHistory::set_pose(frame, pose);
+    frame.picture = picture;
     history->set_phase(frame, clock.clock(), {});
     window->tell(*history);
     window->add(frame, slots);
@@ -77,6 +79,39 @@ TEST_F(WatchedFrames, HoldTheMatchesThatWereFound) {
   EXPECT_EQ(matches[1].slot, 1U);
   EXPECT_EQ(matches[1].id, 11U);
   EXPECT_EQ(matches[1].px, Vector2d(1.0, 1.0));
+}
+
+TEST_F(WatchedFrames, HoldMatchesAsTheLensModelHasThem) {
+  picture = {Vector2d(2.0, 4.0), Vector2d(-7.0, 1.0)};
+  slots[1].match.covariance_px2 = Matrix2d::Identity();
+  add_frame();
+  const WindowMatch& match = window->matches(window->begin())[1];
+  EXPECT_EQ(match.px, Vector2d(4.0, 0.0));
+  EXPECT_NEAR(match.covariance_px2(0, 0), 0.25, 1e-12);
+  EXPECT_NEAR(match.covariance_px2(1, 1), 0.0625, 1e-12);
+}
+
+TEST_F(WatchedFrames, AreUselessFromWherePosesWereMistaken) {
+  add_seconds(5.0);
+  const std::size_t told = window->told();
+  const std::uint64_t since = window->frame(window->begin() + 5).index;
+  window->disown(since);
+  EXPECT_EQ(window->told(), 5U);
+  EXPECT_LT(window->told(), told);
+  EXPECT_LT(window->newest_told(), since);
+}
+
+TEST_F(WatchedFrames, GoWhenTheyAreOldThoughNoOtherCanBeMeasured) {
+  add_seconds(5.0);
+  const std::uint64_t newest = window->newest_told();
+  EXPECT_GT(newest, 0U);
+  for (int i = 0; i < 25 * 30; ++i) {
+    const Instant capture{milliseconds(3000 + kFramePeriod_ms * frames)};
+    history->append({static_cast<std::uint64_t>(frames++), capture, capture + milliseconds(12)});
+    window->tell(*history);
+  }
+  EXPECT_EQ(window->begin(), window->end());
+  EXPECT_EQ(window->newest_told(), 0U);
 }
 
 TEST_F(WatchedFrames, AreToldOnceTheirCycleHasEnded) {

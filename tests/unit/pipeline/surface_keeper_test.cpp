@@ -44,12 +44,12 @@ class Kept : public ::testing::Test {
 
   [[nodiscard]] Instant capture() const { return Instant(seconds(100)) + frame_.index * milliseconds(33); }
   // So many frames more.
-  void frames(int count) {
+  void frames(int count, double setup_variance_mm2 = 0.0) {
     for (int i = 0; i < count; ++i) {
       frame_.stamp.capture = capture();
       frame_.stamp.sequence = 1000 + frame_.index;
       frame_.pose.state = CameraPose::State::kInterpolated;
-      keeper_.on_frame(frame_, PhaseLaw::kLinear);
+      keeper_.on_frame(frame_, PhaseLaw::kLinear, setup_variance_mm2);
       ++frame_.index;
     }
   }
@@ -95,6 +95,19 @@ TEST_F(Kept, IsMadeOfWhatIsConvergedAndBelieved) {
   EXPECT_EQ(maker_.newest()->surface->features() + maker_.newest()->surface->contradicted().size(), kSlots - 3);
 }
 
+TEST_F(Kept, IsAsUncertainAsTheSetUpMakesEveryPosition) {
+  see_all();
+  frames(36);
+  const Eigen::MatrixXd certain = maker_.newest()->mesh.covariances_W_mm2;
+  const auto support = maker_.newest()->mesh.support;
+  frames(30, 0.4);
+  const auto wider = maker_.newest();
+  ASSERT_EQ(wider->number, 2U);
+  EXPECT_EQ(wider->mesh.support, support);
+  for (const int e : {0, 3, 5}) EXPECT_NEAR((wider->mesh.covariances_W_mm2.row(e) - certain.row(e)).mean(), 0.4, 1e-3);
+  for (const int e : {1, 2, 4}) EXPECT_NEAR((wider->mesh.covariances_W_mm2.row(e) - certain.row(e)).mean(), 0.0, 1e-3);
+}
+
 TEST_F(Kept, SaysWhyWhereThereAreTooFew) {
   for (std::size_t i = 7; i < kSlots; ++i) slots_[i].state = SlotState::kEmpty;
   see_all();
@@ -124,7 +137,7 @@ TEST_F(Kept, AsksForNothingBeforeTheCameraIsKnown) {
   see_all();
   for (int i = 0; i < 60; ++i) {
     frame_.stamp.capture = capture();
-    keeper_.on_frame(frame_, PhaseLaw::kLinear);
+    keeper_.on_frame(frame_, PhaseLaw::kLinear, 0.0);
     ++frame_.index;
   }
   EXPECT_EQ(maker_.newest(), nullptr);

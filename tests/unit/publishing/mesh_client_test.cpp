@@ -241,6 +241,43 @@ TEST(MeshClient, RefusesNumbersThatPerimapdDoesNotSend) {
           [](auto& mesh) { mesh.vertex_states._buffer[mesh.triangles._buffer[5]] = perimap_VERTEX_UNCERTAIN; });
 }
 
+// Whoever repeats a run and a number with another sample is not trusted with lengths that are kept.
+TEST(MeshClient, ASampleThatRepeatsANumberIsNotReadBeyondItsEnd) {
+  test::MadeMesh made;
+  const auto refused = [&](const std::function<void(perimap_SurfaceMesh&)>& change) {
+    PredictedMesh kept = predicted(made);
+    perimap_SurfaceMesh mesh = made.mesh();
+    change(mesh);
+    return !client::predict(mesh, made.model(), to_ns(made.now()), to_ns(made.now()), {}, kept) &&
+           kept.refusal == MeshRefusal::kMalformed;
+  };
+  EXPECT_FALSE(refused([](auto&) {}));
+  EXPECT_TRUE(refused([](auto& mesh) {
+    mesh.coefficients_W_mm._buffer = nullptr;
+    mesh.coefficients_W_mm._length = 0;
+  }));
+  EXPECT_TRUE(refused([](auto& mesh) { --mesh.covariances_W_mm2._length; }));
+  EXPECT_TRUE(refused([](auto& mesh) { mesh.triangles._length = 0; }));
+  perimap_SurfaceModel model = made.model();
+  perimap_SurfaceMesh mesh = made.mesh();
+  model.cardiac_harmonics = mesh.cardiac_harmonics = 300;
+  PredictedMesh kept = predicted(made);
+  EXPECT_FALSE(client::predict(mesh, model, to_ns(made.now()), to_ns(made.now()), {}, kept));
+}
+
+TEST(MeshClient, AFigureOfTheModelThatIsNoNumberIsNoDeviation) {
+  test::MadeMesh made;
+  const auto told = [&](const std::function<void(perimap_SurfaceModel&)>& change) {
+    perimap_SurfaceModel model = made.model();
+    change(model);
+    PredictedMesh out;
+    return client::predict(made.mesh(), model, to_ns(made.now()), to_ns(made.now()), {}, out);
+  };
+  EXPECT_TRUE(told([](auto&) {}));
+  EXPECT_FALSE(
+      told([](auto& model) { model.respiratory_clock.deviation_mm = std::numeric_limits<double>::quiet_NaN(); }));
+}
+
 TEST(MeshClient, TakesNoMemoryAfterTheFirst) {
   test::MadeMesh made(2000);
   const perimap_SurfaceMesh& mesh = made.mesh();

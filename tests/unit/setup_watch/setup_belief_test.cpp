@@ -75,6 +75,18 @@ TEST(SetupBelief, BelievesAgainAfterThreeWindowsThatWouldHaveShownIt) {
   EXPECT_EQ(belief.first_doubted(), seconds(6));
 }
 
+TEST(SetupBelief, BelievesAgainThoughTheScopeRestsInBetween) {
+  SetupBelief belief;
+  belief.add(doubt_of(SetupPart::kFocalLength), seconds(3));
+  belief.add(doubt_of(SetupPart::kFocalLength), seconds(6));
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(belief.doubted());
+    belief.add(verdict(SetupState::kConsistent), seconds(9 + 6 * i));
+    belief.add(verdict(SetupState::kUndetermined), seconds(12 + 6 * i));
+  }
+  EXPECT_FALSE(belief.doubted());
+}
+
 TEST(SetupBelief, AWindowOfWhichNothingIsKnownChangesNothing) {
   SetupBelief belief;
   belief.add(doubt_of(SetupPart::kFocalLength), seconds(3));
@@ -94,6 +106,17 @@ TEST(SetupBelief, WidensByTheNewestWindow) {
   EXPECT_NEAR(belief.variance_mm2(), 0.12, 1e-12) << "a third of its square on each axis";
   belief.add(verdict(SetupState::kConsistent), seconds(6));
   EXPECT_EQ(belief.variance_mm2(), 0.0);
+}
+
+TEST(SetupBelief, StaysWideWhileTheScopeRests) {
+  SetupBelief belief;
+  SetupVerdict told = verdict(SetupState::kConsistent);
+  told.widening_mm = 0.6;
+  belief.add(told, seconds(3));
+  belief.add(verdict(SetupState::kUndetermined), seconds(6));
+  EXPECT_NEAR(belief.widening_mm(), 0.6, 1e-12);
+  belief.add(verdict(SetupState::kConsistent), seconds(9));
+  EXPECT_EQ(belief.widening_mm(), 0.0);
 }
 
 }  // namespace
