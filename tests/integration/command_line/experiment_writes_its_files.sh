@@ -53,3 +53,28 @@ expect 2
 touch "$out/file"
 expect 1 1 --trials 1 --out "$out/file"
 grep -q "^perimap experiment: .*$out/file" "$out.error" || fail "the error does not name the folder"
+
+# ---- recorded motion
+awk 'BEGIN {
+  print "t_s,P_x,P_y,P_z"
+  for (i = 0; i < 340; ++i) {
+    t = 0.04 * i
+    printf "%.2f,%.4f,%.4f,%.4f\n", t, 2 * cos(7 * t) + 0.1 * cos(31 * i * i), sin(7 * t + 1) + cos(1.3 * t), 50 + cos(7 * t)
+  }
+}' > "$out/motion.csv"
+awk 'BEGIN { for (t = 0.1; t < 13; t += 0.8976) printf "%.4f\n", t }' > "$out/r-peaks.txt"
+"$perimap" experiment 3 --trace "$out/motion.csv" --r-peaks "$out/r-peaks.txt" --from 300 --to 320 --out "$out/motion" \
+  > "$out.table" 2> "$out.progress" || fail "experiment 3: exit code $?: $(cat "$out.progress")"
+for name in hold ar_point ar_all periodic ours; do
+  grep -qE "^$name +P " "$out.table" || fail "experiment 3: no row $name of the point P: $(cat "$out.table")"
+done
+for ending in csv json html svg png; do
+  [ -s "$out/motion/experiment-3.$ending" ] || fail "experiment-3.$ending is missing"
+done
+[ "$("$perimap" experiment 3 --trace "$out/motion.csv" --from 300 --to 301 --json 2> /dev/null | grep -c '"name": "ours"')" -eq 10 ] ||
+  fail "experiment 3 --json: not five horizons of the point and of all"
+expect 1 3
+expect 1 3 --trace "$out/no-such-file"
+expect 1 3 --trace "$out/r-peaks.txt"
+expect 1 3 --trace "$out/motion.csv" --to 339
+grep -q -- '--to' "$out.error" || fail "the error does not name --to: $(cat "$out.error")"
