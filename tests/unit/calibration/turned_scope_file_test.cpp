@@ -63,8 +63,16 @@ TEST(TurnedScopeFile, GarbledOnesAreRefusedByFileAndKey) {
     const auto at = text.find(std::string("\"") + garbled.key + "\": ");
     ASSERT_NE(at, std::string::npos) << garbled.key;
     const auto value = text.find(": ", at) + 2;
-    // A list goes over lines; what follows a value is a comma or the object's end.
-    const auto end = text[value] == '[' ? text.find(']', value) + 1 : text.find_first_of(",\n", value);
+    // A list goes over lines, and may hold lists; what follows a value is a comma or the object's end.
+    auto end = text.find_first_of(",\n", value);
+    if (text[value] == '[') {
+      int depth = 0;
+      end = value;
+      do {
+        depth += text[end] == '[' ? 1 : text[end] == ']' ? -1 : 0;
+        ++end;
+      } while (depth > 0);
+    }
     text.replace(value, end - value, garbled.value);
     const auto read = parse_turned_scope(text, "scope.json");
     ASSERT_FALSE(read) << garbled.key << " " << garbled.value;

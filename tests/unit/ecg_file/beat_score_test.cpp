@@ -182,7 +182,7 @@ TEST_P(WholeRecord, MeetsItsFigures) {
   const auto normal = std::count_if(reference.begin(), reference.end(), [](const ReferenceBeat& beat) {
     return beat.kind == ReferenceBeat::Kind::kNormal;
   });
-  EXPECT_GE(score.timed, 0.995 * static_cast<double>(normal));
+  EXPECT_GE(score.timed, 0.994 * static_cast<double>(normal));
   if (goal.premature_percent > 0.0) {
     EXPECT_GE(score.premature_sensitivity.percent(), goal.premature_percent);
     EXPECT_GE(score.premature_precision.percent(), goal.premature_percent);

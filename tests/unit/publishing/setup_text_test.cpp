@@ -69,13 +69,5 @@ TEST(SetupText, BlamesNothingWhereNothingIsDoubted) {
   EXPECT_TRUE(json["doubted_after_s"].is_null());
 }
 
-TEST(SetupText, TrustsNoValueFromOutside) {
-  perimap_SetupWatch setup{};
-  int outside = 77;
-  setup.state = static_cast<perimap_SetupState>(outside);
-  EXPECT_EQ(setup_words(setup), "unknown");
-  EXPECT_EQ(setup_json(setup)["state"], "unknown");
-}
-
 }  // namespace
 }  // namespace perimap
