@@ -26,3 +26,10 @@ cmp "$work/turned1.mcap" "$work/turned4.mcap"
 grep -q '"doubted": true' "$work/turned1.json" || { grep -A30 '"setup"' "$work/turned1.json"; exit 1; }
 grep -q '"number": "hand_eye_turn' "$work/turned1.json"
 grep '^set-up  *doubted, positions are off by' "$work/turned1.txt"
+
+# The report counts from 15 s on, long after the doubt: none of its surfaces is good, nor a position.
+number() { tr -d ' \n' < "$1" | grep -o "\"$2\":[0-9.]*" | head -1 | cut -d: -f2; }
+not_good=$(($(number "$work/turned1.json" surfaces_degraded) + $(number "$work/turned1.json" surfaces_invalid)))
+[ "$not_good" -ge $((30 * (22 - 15))) ] || { echo "FAILED: only $not_good surfaces after 15 s are not good"; exit 1; }
+[ "$(number "$work/turned1.json" good_positions)" -eq 0 ] || { echo "FAILED: positions are good though doubted"; exit 1; }
+[ "$(number "$work/right.json" good_positions)" -gt 10000 ] || { echo "FAILED: the right set-up has no good positions"; exit 1; }
