@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include "core/angle/angle.hpp"
-#include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
 namespace {
@@ -29,7 +28,7 @@ std::uint64_t microradians(double rotation_rad) noexcept {
 ScopeWatch::ScopeWatch(const PipelineSettings& settings, PipelineCounters& counters)
     : width_(settings.camera.width),
       height_(settings.camera.height),
-      lockstep_(settings.lockstep),
+      hand_over_(settings.lockstep),
       counters_(counters),
       pixels_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {
   if (settings.turned_scope) turn_.emplace(*settings.turned_scope, settings.camera);
@@ -64,8 +63,7 @@ void ScopeWatch::count(const Frame& frame) noexcept {
 }
 
 void ScopeWatch::offer(std::uint64_t frame_index, const FrameRate& rate, const GreyImage& image) noexcept {
-  if (active_ || frame_index < next_at_) return;
-  active_ = true;
+  if (hand_over_.under_way() || frame_index < next_at_) return;
   begun_at_ = frame_index;
   adopted_at_ = frame_index + rate.frames(kAdoptedAfter);
   next_at_ = std::max(frame_index + rate.frames(turn_ ? kReadEvery : kLookedEvery), adopted_at_ + 1);
@@ -74,23 +72,15 @@ void ScopeWatch::offer(std::uint64_t frame_index, const FrameRate& rate, const G
   for (int y = 0; y < height_; ++y) {
     std::memcpy(pixels_.data() + static_cast<std::size_t>(y) * row_bytes, image.row(y), row_bytes);
   }
-  // Relaxed: housekeeping sets it again only after go_, whose post orders it.
-  done_.store(false, std::memory_order_relaxed);
-  go_.post();
+  hand_over_.begin();
 }
 
 std::optional<std::uint64_t> ScopeWatch::adopt(std::uint64_t frame_index) noexcept {
-  if (!active_ || frame_index < adopted_at_) return std::nullopt;
-  if (lockstep_) {
-    const NamedWait wait;
-    finished_.wait();
-  }
-  // Acquire: what was read is visible once the flag is (pairs with the release in serve()).
-  const bool done = done_.load(std::memory_order_acquire);
+  if (!hand_over_.under_way() || frame_index < adopted_at_) return std::nullopt;
+  const bool done = hand_over_.finish();
   const bool due = frame_index == adopted_at_;
   if (due && !done) counters_.adoptions_late.add();
   if (!done) return std::nullopt;
-  active_ = false;
   // One that came late is lost, and makes room for the next.
   return due ? take(reading_) : std::nullopt;
 }
@@ -113,20 +103,12 @@ std::optional<std::uint64_t> ScopeWatch::take(const std::optional<FieldStopReadi
 }
 
 void ScopeWatch::serve() noexcept {
-  for (;;) {
-    go_.wait();
-    if (dismissed_.load(std::memory_order_relaxed)) return;
+  hand_over_.serve([this] {
     const auto read = read_field_stop({pixels_.data(), width_, height_, width_});
     reading_ = read ? std::optional(*read) : std::nullopt;
-    // Release: reading_ is complete before the mapper can see the flag.
-    done_.store(true, std::memory_order_release);
-    if (lockstep_) finished_.post();
-  }
+  });
 }
 
-void ScopeWatch::dismiss() noexcept {
-  dismissed_.store(true, std::memory_order_relaxed);
-  go_.post();
-}
+void ScopeWatch::dismiss() noexcept { hand_over_.dismiss(); }
 
 }  // namespace perimap

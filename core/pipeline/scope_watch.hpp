@@ -2,7 +2,6 @@
 // thread of its own, adopted at stated frames; and each frame's own notch.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -11,7 +10,7 @@
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/scope_turn.hpp"
 #include "core/pipeline/unchanged_scope.hpp"
-#include "core/realtime/wakeup.hpp"
+#include "core/realtime/background_round.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/time/frame_rate.hpp"
 
@@ -49,13 +48,12 @@ class ScopeWatch {
 
   int width_;
   int height_;
-  bool lockstep_;
+  BackgroundRound hand_over_;  // of a whole reading
   PipelineCounters& counters_;
 
   // The mapper's own.
   std::optional<ScopeTurn> turn_;  // none: the turns are not calibrated
   UnchangedScope unchanged_;
-  bool active_ = false;
   std::uint64_t begun_at_ = 0;
   std::uint64_t adopted_at_ = 0;
   std::uint64_t next_at_ = 0;
@@ -63,17 +61,9 @@ class ScopeWatch {
   int failed_ = 0;                         // whole readings in a row
   std::optional<NotchReading> seen_then_;  // in the picture that is being read
 
-  // Filled by the mapper before go_ is posted, read by housekeeping after it.
+  // Handed over: housekeeping's while a reading is under way.
   std::vector<std::uint8_t> pixels_;
-  Wakeup go_;
-
-  // Housekeeping's until done_ is set, the mapper's until go_ is posted again.
   std::optional<FieldStopReading> reading_;
-  std::atomic<bool> done_{false};
-  Wakeup finished_;
-
-  // Relaxed throughout: the flag alone is the message, and the post of go_ that follows orders it.
-  std::atomic<bool> dismissed_{false};
 };
 
 }  // namespace perimap

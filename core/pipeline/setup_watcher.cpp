@@ -6,7 +6,6 @@
 
 #include "core/pipeline/match_covariance.hpp"
 #include "core/pipeline/phase_basis.hpp"
-#include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
 namespace {
@@ -32,7 +31,7 @@ SetupWatcher::SetupWatcher(const PipelineSettings& settings)
       motion_(settings.estimator.prior),
       pixel_deviation_px_(settings.estimator.pixel_deviation_px),
       error_correlation_s_(to_seconds(settings.pose.error_correlation)),
-      lockstep_(settings.lockstep),
+      hand_over_(settings.lockstep),
       window_(static_cast<std::size_t>(settings.features.maximum)),
       seen_(static_cast<std::size_t>(settings.features.maximum)),
       round_(std::make_unique<Round>()) {
@@ -44,33 +43,24 @@ void SetupWatcher::take(const FrameHistory& history, std::span<const FeatureSlot
   window_.tell(history);
   window_.add(frame, slots);
   if (!first_capture_) first_capture_ = frame.stamp.capture;
-  if (active_ || frame.index < next_round_at_) return;
+  if (hand_over_.under_way() || frame.index < next_round_at_) return;
   next_round_at_ = frame.index + frame.rate.frames(kLookAgain);
   // What was judged already tells nothing new: a tool that is hidden, a phase that is lost.
-  if (window_.newest_told() == judged_frame_ || window_.told() < kFewestFrames || !choose_features(slots)) return;
+  const std::uint64_t newest_told = window_.newest_told();
+  if (newest_told == judged_frame_ || window_.told() < kFewestFrames || !choose_features(slots)) return;
   copy_window(bank);
   if (round_->frame_count < kFewestFrames) return;
-  judged_frame_ = window_.newest_told();
-  active_ = true;
+  judged_frame_ = newest_told;
   discarded_ = false;
   adopted_at_ = frame.index + frame.rate.frames(kRoundTakes);
   const SetupState told = belief_.told().state;
   const bool known = told == SetupState::kConsistent || told == SetupState::kDoubted;
   next_round_at_ = frame.index + frame.rate.frames(known ? kRoundEvery : kRoundEveryAtFirst);
-  // Relaxed: housekeeping touches the flag only after it has been woken, and the post orders that.
-  done_.store(false, std::memory_order_relaxed);
-  go_.post();
+  hand_over_.begin();
 }
 
 void SetupWatcher::adopt(const FrameRecord& frame) noexcept {
-  if (!active_ || frame.index < adopted_at_) return;
-  if (lockstep_) {
-    const NamedWait wait;
-    finished_.wait();
-  }
-  // Acquire: pairs with the release of serve(), so that the whole verdict is visible.
-  if (!done_.load(std::memory_order_acquire)) return;
-  active_ = false;
+  if (frame.index < adopted_at_ || !hand_over_.finish()) return;
   if (std::exchange(discarded_, false)) return;
   belief_.add(verdict_, frame.stamp.capture - *first_capture_);
   status_.write(belief_);
@@ -83,22 +73,22 @@ const SetupBelief& SetupWatcher::status_belief() noexcept {
 
 void SetupWatcher::retell_phases(const CardiacClock& clock) noexcept {
   window_.retell_phases(clock);
-  discarded_ = active_;
+  discarded_ = hand_over_.under_way();
 }
 
 void SetupWatcher::retell_respiration(const RespiratoryClock& respiration) noexcept {
   window_.retell_respiration(respiration);
-  discarded_ = active_;
+  discarded_ = hand_over_.under_way();
 }
 
 void SetupWatcher::disown_poses(std::uint64_t since_frame) noexcept {
   window_.disown(since_frame);
-  discarded_ = active_;
+  discarded_ = hand_over_.under_way();
 }
 
 void SetupWatcher::begin_window_anew() noexcept {
   window_.clear();
-  discarded_ = active_;
+  discarded_ = hand_over_.under_way();
 }
 
 // Those with most matches in frames that are told, of the features that are mapped now.
@@ -147,20 +137,10 @@ void SetupWatcher::copy_window(const MapBank& bank) noexcept {
 }
 
 void SetupWatcher::serve() noexcept {
-  for (;;) {
-    go_.wait();
-    if (dismissed_.load(std::memory_order_relaxed)) return;
-    judge();
-    // Release: the verdict is complete before the mapper can see the flag.
-    done_.store(true, std::memory_order_release);
-    if (lockstep_) finished_.post();
-  }
+  hand_over_.serve([this] { judge(); });
 }
 
-void SetupWatcher::dismiss() noexcept {
-  dismissed_.store(true, std::memory_order_relaxed);
-  go_.post();
-}
+void SetupWatcher::dismiss() noexcept { hand_over_.dismiss(); }
 
 void SetupWatcher::judge() noexcept {
   const Round& round = *round_;

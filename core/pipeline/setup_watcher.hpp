@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -15,8 +14,8 @@
 #include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/match_window.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
+#include "core/realtime/background_round.hpp"
 #include "core/realtime/triple_buffer.hpp"
-#include "core/realtime/wakeup.hpp"
 #include "core/setup_watch/setup_belief.hpp"
 #include "core/setup_watch/watched_window.hpp"
 
@@ -81,7 +80,7 @@ class SetupWatcher {
   Prior motion_;
   double pixel_deviation_px_;
   double error_correlation_s_;
-  bool lockstep_;
+  BackgroundRound hand_over_;  // of a round
 
   // The mapper's own.
   MatchWindow window_;
@@ -90,21 +89,14 @@ class SetupWatcher {
   std::optional<Instant> first_capture_;
   std::vector<Seen> seen_;           // by slot
   std::vector<std::size_t> chosen_;  // slots
-  bool active_ = false;
-  bool discarded_ = false;          // the round that is active
-  std::uint64_t judged_frame_ = 0;  // the newest that the last round knew all of
+  bool discarded_ = false;           // the round that is under way
+  std::uint64_t judged_frame_ = 0;   // the newest that the last round knew all of
   std::uint64_t adopted_at_ = 0;
   std::uint64_t next_round_at_ = 0;
 
-  // The mapper's while no round is active, housekeeping's from then until done_ is set.
+  // Handed over: housekeeping's while a round is under way.
   std::unique_ptr<Round> round_;
   SetupVerdict verdict_;
-  // Housekeeping stores true with release after writing verdict_; the mapper's acquire load then sees all of it.
-  std::atomic<bool> done_{false};
-  Wakeup go_;
-  Wakeup finished_;
-  // Relaxed throughout: the flag alone is the message, and the post of go_ that follows orders it.
-  std::atomic<bool> dismissed_{false};
 };
 
 }  // namespace perimap

@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "core/realtime/realtime_scope.hpp"
-
 namespace perimap {
 namespace {
 
@@ -13,48 +11,30 @@ constexpr std::uint64_t kFitsAKernel = 4;
 }  // namespace
 
 SurfaceMaker::SurfaceMaker(const BasisLayout& layout, std::size_t features, std::size_t vertices, bool lockstep)
-    : layout_(layout), vertices_(vertices), lockstep_(lockstep) {
+    : layout_(layout), vertices_(vertices), hand_over_(lockstep) {
   job_.evidence.reserve(features);
 }
 
-SurfaceJob* SurfaceMaker::job() noexcept {
-  return owner_.load(std::memory_order_acquire) == Owner::kMapper ? &job_ : nullptr;
-}
+SurfaceJob* SurfaceMaker::job() noexcept { return hand_over_.under_way() ? nullptr : &job_; }
 
 void SurfaceMaker::request() noexcept {
   ++job_.number;
-  owner_.store(Owner::kMaker, std::memory_order_release);
-  go_.post();
+  hand_over_.begin();
 }
 
 bool SurfaceMaker::adopt() noexcept {
-  if (lockstep_) {
-    const NamedWait wait;
-    made_.wait();
-  }
-  if (owner_.load(std::memory_order_acquire) != Owner::kMade) return false;
+  if (!hand_over_.finish()) return false;
   adopted_.store(job_.number, std::memory_order_relaxed);
-  owner_.store(Owner::kMapper, std::memory_order_relaxed);  // the mapper's own again: no other thread reads it now
   return true;
 }
 
 void SurfaceMaker::withdraw() noexcept { withdrawn_.store(job_.number, std::memory_order_relaxed); }
 
 void SurfaceMaker::serve() {
-  for (;;) {
-    go_.wait();
-    if (dismissed_.load(std::memory_order_relaxed)) return;
-    if (owner_.load(std::memory_order_acquire) != Owner::kMaker) continue;
-    make();
-    owner_.store(Owner::kMade, std::memory_order_release);
-    if (lockstep_) made_.post();
-  }
+  hand_over_.serve([this] { make(); });
 }
 
-void SurfaceMaker::dismiss() noexcept {
-  dismissed_.store(true, std::memory_order_relaxed);
-  go_.post();
-}
+void SurfaceMaker::dismiss() noexcept { hand_over_.dismiss(); }
 
 void SurfaceMaker::make() {
   auto made = std::make_shared<MadeSurface>();

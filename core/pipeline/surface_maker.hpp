@@ -10,7 +10,7 @@
 
 #include "core/periodic/basis.hpp"
 #include "core/phase/phase_law.hpp"
-#include "core/realtime/wakeup.hpp"
+#include "core/realtime/background_round.hpp"
 #include "core/surface/periodic_surface.hpp"
 #include "core/surface/surface_mesh.hpp"
 #include "core/time/instant.hpp"
@@ -65,25 +65,16 @@ class SurfaceMaker {
   [[nodiscard]] bool withdrawn() const noexcept;
 
  private:
-  enum class Owner : std::uint8_t { kMapper, kMaker, kMade };
-
   void make();
 
   BasisLayout layout_;
   std::size_t vertices_;
-  bool lockstep_;
-  SurfaceJob job_;
-  Wakeup go_;
-  Wakeup made_;
-  // Of the job. The mapper's release of what it has filled pairs with the maker's acquire, and the maker's of what it
-  // has made with the mapper's, so that neither reads a job that the other is writing.
-  std::atomic<Owner> owner_{Owner::kMapper};
+  BackgroundRound hand_over_;
+  SurfaceJob job_;  // handed over: the maker's while one is under way
   // Up to which number the surfaces are adopted and withdrawn. Relaxed: each is a message by itself, the surfaces are
   // guarded by the mutex.
   std::atomic<std::uint64_t> adopted_{0};
   std::atomic<std::uint64_t> withdrawn_{0};
-  // Relaxed: the flag alone is the message, and the post of go_ that follows orders it.
-  std::atomic<bool> dismissed_{false};
 
   // The maker's own.
   SurfaceKernels kernels_;

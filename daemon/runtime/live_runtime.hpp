@@ -38,8 +38,8 @@ struct RuntimeSettings {
 
 inline constexpr Duration kLongestPublisherRound = std::chrono::milliseconds(100);
 
-// Threads: mapper, workers, publisher (real-time when permitted), finder, starter, surface, status. Sources are
-// launched by their owner, with threads(), and push into pipeline.entrance().
+// Threads: mapper, workers, publisher (real-time when permitted), finder, starter, surface, setup-watch, scope where it
+// is asked for, status. Sources are launched by their owner, with threads(), and push into pipeline.entrance().
 class LiveRuntime {
  public:
   // `pipeline` and `publication` must outlive it. `on_status_tick` is called by the status thread every
