@@ -5,12 +5,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/evaluation/json/json_number.hpp"
 #include "daemon/pages/html_page.hpp"
 
 namespace perimap {
 namespace {
-
-nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
 
 // Three digits or so; large values without fractions.
 std::string figure(double value) {
@@ -44,12 +43,12 @@ nlohmann::json to_json(const Experiment& experiment) {
   for (const MethodRow& row : experiment.rows) {
     rows.push_back({{"method", row.method},
                     {"features", row.features},
-                    {"median_mm", number(row.median_mm)},
-                    {"p95_mm", number(row.p95_mm)},
-                    {"worst_mm", number(row.worst_mm)},
-                    {"share_above_2_mm", number(row.share_above_2_mm)},
-                    {"nees_over_3", number(row.mean_nees)},
-                    {"us_per_update", number(row.us_per_update)}});
+                    {"median_mm", json_number(row.median_mm)},
+                    {"p95_mm", json_number(row.p95_mm)},
+                    {"worst_mm", json_number(row.worst_mm)},
+                    {"share_above_2_mm", json_number(row.share_above_2_mm)},
+                    {"nees_over_3", json_number(row.mean_nees)},
+                    {"us_per_update", json_number(row.us_per_update)}});
   }
   return {{"experiment", experiment.number}, {"title", experiment.title},   {"setting", experiment.setting},
           {"seed", experiment.seed},         {"trials", experiment.trials}, {"methods", rows}};

@@ -5,22 +5,22 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/evaluation/json/json_number.hpp"
+
 namespace perimap {
 namespace {
 
 // A figure of nothing is not zero.
-nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
-
 std::string plain(double value) { return std::isfinite(value) ? fmt::format("{:.2f}", value) : "none"; }
 
 std::string in_mm(double value) { return std::isfinite(value) ? fmt::format("{:.2f} mm", value) : "none"; }
 
 nlohmann::json to_json(const ErrorFigures& error) {
   return {{"count", error.count},
-          {"rms_mm", number(error.rms_mm)},
-          {"median_mm", number(error.median_mm)},
-          {"p95_mm", number(error.p95_mm)},
-          {"max_mm", number(error.max_mm)}};
+          {"rms_mm", json_number(error.rms_mm)},
+          {"median_mm", json_number(error.median_mm)},
+          {"p95_mm", json_number(error.p95_mm)},
+          {"max_mm", json_number(error.max_mm)}};
 }
 
 nlohmann::json to_json(const std::vector<ErrorSpan>& spans) {
@@ -29,7 +29,7 @@ nlohmann::json to_json(const std::vector<ErrorSpan>& spans) {
     out.push_back({{"begin_s", span.begin_s},
                    {"end_s", span.end_s},
                    {"converged", span.converged},
-                   {"mean_nees", number(span.mean_nees)},
+                   {"mean_nees", json_number(span.mean_nees)},
                    {"error", to_json(span.error)}});
   }
   return out;
@@ -71,16 +71,16 @@ nlohmann::json to_json(const AccuracyReport& report) {
           {"features_converged_at_15_s", report.converged_at_15_s},
           {"features_without_truth", report.features_without_truth},
           {"settled_error", to_json(report.settled)},
-          {"settled_mean_nees", number(report.mean_nees)},
-          {"settled_share_above_3_mm", number(report.share_above_3_mm)},
+          {"settled_mean_nees", json_number(report.mean_nees)},
+          {"settled_share_above_3_mm", json_number(report.share_above_3_mm)},
           {"surfaces_settled", report.settled_samples},
           {"surfaces_degraded", report.degraded},
           {"surfaces_invalid", report.invalid},
           {"good_positions", report.good.count},
           {"good_positions_off", report.good.off},
           {"good_positions_off_before_known", report.good.off_before_known},
-          {"good_positions_rms_mm", number(report.good.rms_mm)},
-          {"good_positions_mean_nees", number(report.good.mean_nees)},
+          {"good_positions_rms_mm", json_number(report.good.rms_mm)},
+          {"good_positions_mean_nees", json_number(report.good.mean_nees)},
           {"premature_beats", report.good.premature_beats},
           {"seconds", to_json(report.seconds)},
           {"cycles", to_json(report.cycles)},

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/evaluation/json/json_number.hpp"
+
 namespace perimap {
 namespace {
 
@@ -29,10 +31,8 @@ SurfaceFigures::Compared compared(const std::vector<float>& errors) {
   return {root_mean(squares, errors.size()), p95_of(errors)};
 }
 
-nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
-
 nlohmann::json to_json(const SurfaceFigures::Compared& figures) {
-  return {{"rms_mm", number(figures.rms_mm)}, {"p95_mm", number(figures.p95_mm)}};
+  return {{"rms_mm", json_number(figures.rms_mm)}, {"p95_mm", json_number(figures.p95_mm)}};
 }
 
 std::string plain(double value, int digits) {
@@ -121,26 +121,26 @@ SurfaceFigures SurfaceTally::figures() const {
 nlohmann::json to_json(const SurfaceFigures& figures) {
   nlohmann::json json = {{"instants", figures.instants},
                          {"points", figures.points},
-                         {"rms_mm", number(figures.horizons[0].rms_mm)},
-                         {"p95_mm", number(figures.p95_mm)},
-                         {"nees", number(figures.horizons[0].nees)},
-                         {"rim_rms_mm", number(figures.rim_rms_mm)},
-                         {"rim_nees", number(figures.rim_nees)},
-                         {"coverage", number(figures.coverage)},
-                         {"coverage_at_any_angle", number(figures.coverage_at_any_angle)},
-                         {"time_to_90_percent_s", number(figures.time_to_90_percent_s)},
+                         {"rms_mm", json_number(figures.horizons[0].rms_mm)},
+                         {"p95_mm", json_number(figures.p95_mm)},
+                         {"nees", json_number(figures.horizons[0].nees)},
+                         {"rim_rms_mm", json_number(figures.rim_rms_mm)},
+                         {"rim_nees", json_number(figures.rim_nees)},
+                         {"coverage", json_number(figures.coverage)},
+                         {"coverage_at_any_angle", json_number(figures.coverage_at_any_angle)},
+                         {"time_to_90_percent_s", json_number(figures.time_to_90_percent_s)},
                          {"inside",
                           {{"gaussian_process", to_json(figures.gaussian_process)},
                            {"barycentric", to_json(figures.barycentric)},
                            {"thin_plate", to_json(figures.thin_plate)}}},
-                         {"agreement_rms_mm", number(figures.agreement_rms_mm)},
-                         {"agreement_nees", number(figures.agreement_nees)},
+                         {"agreement_rms_mm", json_number(figures.agreement_rms_mm)},
+                         {"agreement_nees", json_number(figures.agreement_nees)},
                          {"features", figures.features},
                          {"features_contradicted", figures.contradicted},
                          {"refusal", figures.refusal}};
   for (std::size_t h = 1; h < kSurfaceHorizons_ms.size(); ++h) {
-    json[fmt::format("rms_{}_ms_mm", kSurfaceHorizons_ms[h])] = number(figures.horizons[h].rms_mm);
-    json[fmt::format("nees_{}_ms", kSurfaceHorizons_ms[h])] = number(figures.horizons[h].nees);
+    json[fmt::format("rms_{}_ms_mm", kSurfaceHorizons_ms[h])] = json_number(figures.horizons[h].rms_mm);
+    json[fmt::format("nees_{}_ms", kSurfaceHorizons_ms[h])] = json_number(figures.horizons[h].nees);
   }
   return json;
 }

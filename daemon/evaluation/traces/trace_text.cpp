@@ -6,6 +6,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "daemon/evaluation/json/json_number.hpp"
+
 namespace perimap {
 
 std::string to_table(const TraceExperiment& experiment) {
@@ -38,15 +40,14 @@ std::string to_table(const TraceExperiment& experiment) {
 }
 
 nlohmann::json to_json(const TraceExperiment& experiment) {
-  const auto number = [](double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); };
   nlohmann::json rows = nlohmann::json::array();
   for (const TraceRow& row : experiment.rows) {
     rows.push_back({{"name", row.name},
                     {"point", row.point},
                     {"horizon_ms", std::round(row.horizon_ms * 1e3) / 1e3},
-                    {"rmse_mm", number(row.rmse_mm)},
-                    {"rmse_lateral_mm", number(row.rmse_lateral_mm)},
-                    {"nees_over_3", number(row.nees)},
+                    {"rmse_mm", json_number(row.rmse_mm)},
+                    {"rmse_lateral_mm", json_number(row.rmse_lateral_mm)},
+                    {"nees_over_3", json_number(row.nees)},
                     {"starts", row.starts}});
   }
   return {{"experiment", 3},
