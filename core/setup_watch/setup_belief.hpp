@@ -11,8 +11,8 @@
 namespace perimap {
 
 // One window's doubt is told at once where it is far beyond chance; else two in a row must blame, and one part is
-// blamed by both. It ends when three in a row would have shown it and do not. A window of which nothing is known
-// changes nothing.
+// blamed by both. It ends when three would have shown it and do not, with none between them that doubts. A window of
+// which nothing is known changes nothing.
 class SetupBelief {
  public:
   // `after`: since the first frame.

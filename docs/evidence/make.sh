@@ -253,6 +253,27 @@ make_slow_tracker() {
   done
 }
 
+# lens NAME FOCAL CENTRE: the simulator's lens at 320x240 as NAME.yaml, its focal length times FOCAL and its principal
+# point CENTRE px to the right.
+lens() {
+  cat > "$work/$1.yaml" << END
+%YAML:1.0
+---
+image_width: 320
+image_height: 240
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ $(awk "BEGIN { print 400 * $2 }"), 0., $(awk "BEGIN { print 163.34 + $3 }"), 0., $(awk "BEGIN { print 400.8 * $2 }"), 117.34, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ -0.12, 0.05, 0.0006, -0.0004, 0 ]
+END
+}
+
 # The numbers are those of the simulated scope at 320x240, slightly or grossly wrong.
 make_set_up() {
   command='perimap simulate --duration 36 --size 320x240 --seed 1 --tracker-noise 1.4; perimap replay --lockstep with another calibration, tracker.hand_eye_..., tracker.time_offset_ms'
@@ -262,22 +283,7 @@ make_set_up() {
   local stem focal settings name
   while IFS='|' read -r stem focal settings name; do
     stem=set-up-$stem
-    cat > "$work/$stem.yaml" << END
-%YAML:1.0
----
-image_width: 320
-image_height: 240
-camera_matrix: !!opencv-matrix
-   rows: 3
-   cols: 3
-   dt: d
-   data: [ $(awk "BEGIN { print 400 * $focal }"), 0., 163.34, 0., $(awk "BEGIN { print 400.8 * $focal }"), 117.34, 0., 0., 1. ]
-distortion_coefficients: !!opencv-matrix
-   rows: 1
-   cols: 5
-   dt: d
-   data: [ -0.12, 0.05, 0.0006, -0.0004, 0 ]
-END
+    lens "$stem" "$focal" 0
     replay set-up "$stem" <<< "$(printf '[camera]\ncalibration = "%s.yaml"\n[tracker]\n%s' "$stem" "$settings")" || return 1
     echo "| $name | $(figure "$stem" median) / $(figure "$stem" p95) mm | $(figure "$stem" nees) | $(figure "$stem" off) |"
   done << 'END'
@@ -351,22 +357,7 @@ make_watched_lies() {
     simulate "watched-$noise" --duration 36 --size 320x240 --seed 1 --tracker-noise $noise || return 1
     while IFS='|' read -r stem focal centre settings name; do
       stem=watched-$noise-$stem
-      cat > "$work/$stem.yaml" << END
-%YAML:1.0
----
-image_width: 320
-image_height: 240
-camera_matrix: !!opencv-matrix
-   rows: 3
-   cols: 3
-   dt: d
-   data: [ $(awk "BEGIN { print 400 * $focal }"), 0., $(awk "BEGIN { print 163.34 + $centre }"), 0., $(awk "BEGIN { print 400.8 * $focal }"), 117.34, 0., 0., 1. ]
-distortion_coefficients: !!opencv-matrix
-   rows: 1
-   cols: 5
-   dt: d
-   data: [ -0.12, 0.05, 0.0006, -0.0004, 0 ]
-END
+      lens "$stem" "$focal" "$centre"
       replay_told "watched-$noise" "$stem" <<< "$(printf '[camera]\ncalibration = "%s.yaml"\n[tracker]\n%s' "$stem" "$settings")" || return 1
       echo "| $name | $noise mm | $(doubted_after "$stem") | $(told "$stem" number | sed 's/null/none/') | $(told "$stem" good_positions_off) of $(told "$stem" good_positions) | $(printf %.2f "$(told "$stem" good_positions_mean_nees)") | $(printf %.2f "$(told "$stem" widened_mm)") mm |"
     done << 'END'

@@ -22,6 +22,13 @@ constexpr const char* kByPeaks = "map by R peaks";
 // Errors of one predictor at one horizon, by the sample predicted from.
 using Errors = std::map<Eigen::Index, Eigen::RowVectorXd>;
 
+// Of each channel.
+Eigen::VectorXd noise_of(const TraceExperimentSettings& settings, Eigen::Index channels) {
+  Eigen::VectorXd noise = Eigen::VectorXd::Constant(channels, settings.lateral_noise_mm);
+  for (Eigen::Index depth = 2; depth < channels; depth += 3) noise[depth] = settings.depth_noise_mm;
+  return noise;
+}
+
 // An autoregression that is fitted anew now and then, about the mean so far.
 class Refitted {
  public:
@@ -54,9 +61,9 @@ class Run {
       : settings_(settings),
         trace_(trace),
         peaks_s_(r_peaks_s),
-        noise_(trace.positions.cols()),
+        noise_(noise_of(settings, trace.positions.cols())),
         begin_(std::max(settings.from - settings.warm_up, settings.of_a_point.lags + 2)),
-        all_(settings.of_all, settings.fitted_every, noise()) {
+        all_(settings.of_all, settings.fitted_every, noise_) {
     for (const double horizon_s : settings.horizons_s) {
       ahead_.push_back(std::max(1, static_cast<int>(std::lround(horizon_s / trace.period_s))));
     }
@@ -87,13 +94,6 @@ class Run {
   }
 
  private:
-  const Eigen::VectorXd& noise() {
-    for (Eigen::Index k = 0; k < noise_.size(); ++k) {
-      noise_[k] = k % 3 == 2 ? settings_.depth_noise_mm : settings_.lateral_noise_mm;
-    }
-    return noise_;
-  }
-
   // Rates and phases are searched for in all samples so far, and what is fitted now and then is fitted.
   void begin_anew(Eigen::Index newest) {
     const TracePredictionSettings& settings = settings_.prediction;

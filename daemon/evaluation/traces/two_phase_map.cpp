@@ -8,10 +8,13 @@ namespace {
 
 constexpr double kLeastVariance_mm2 = 1e-4;
 
+Eigen::Index functions(const TwoPhaseMapSettings& settings) noexcept {
+  return 1 + 2 * (settings.cardiac_harmonics + settings.respiratory_harmonics) + 4 * settings.product_harmonics;
+}
+
 // The mean is free; smooth motion has little in its high harmonics, and breathing changes the beat but little.
 Eigen::VectorXd ridge(const TwoPhaseMapSettings& settings) {
-  Eigen::VectorXd diagonal(1 + 2 * (settings.cardiac_harmonics + settings.respiratory_harmonics) +
-                           4 * settings.product_harmonics);
+  Eigen::VectorXd diagonal(functions(settings));
   Eigen::Index row = 0;
   diagonal[row++] = 0.0;
   for (const int harmonics : {settings.cardiac_harmonics, settings.respiratory_harmonics}) {
@@ -27,9 +30,7 @@ TwoPhaseMap::TwoPhaseMap(const TwoPhaseMapSettings& settings, const Eigen::Matri
                          const PhaseTracks& phases)
     : settings_(settings) {
   const Eigen::Index count = samples.rows();
-  const Eigen::Index functions =
-      1 + 2 * (settings.cardiac_harmonics + settings.respiratory_harmonics) + 4 * settings.product_harmonics;
-  Eigen::MatrixXd B(count, functions);
+  Eigen::MatrixXd B(count, functions(settings));
   Eigen::VectorXd weight(count);
   for (Eigen::Index i = 0; i < count; ++i) {
     B.row(i) = basis(phases.cardiac[i], phases.respiratory[i]).col(0).transpose();
@@ -43,8 +44,7 @@ TwoPhaseMap::TwoPhaseMap(const TwoPhaseMapSettings& settings, const Eigen::Matri
 }
 
 Eigen::MatrixX3d TwoPhaseMap::basis(double cardiac, double respiratory) const {
-  Eigen::MatrixX3d b(
-      1 + 2 * (settings_.cardiac_harmonics + settings_.respiratory_harmonics) + 4 * settings_.product_harmonics, 3);
+  Eigen::MatrixX3d b(functions(settings_), 3);
   Eigen::Index row = 0;
   const auto put = [&](double value, double by_cardiac, double by_respiratory) {
     b.row(row++) << value, by_cardiac, by_respiratory;

@@ -146,6 +146,15 @@ TEST(RealtimePath, ANamedWaitIsNoneOfTheScopeAroundIt) {
   EXPECT_EQ(forbidden_calls().blocking, 1);
 }
 
+void deliver_all(ReplaySetup& s, LockstepRuntime& runtime) {
+  for (;;) {
+    auto event = s.reader.next();
+    ASSERT_TRUE(event.has_value()) << event.error().message;
+    if (!*event) break;
+    runtime.deliver(**event);
+  }
+}
+
 struct RealtimePathIn : testing::TestWithParam<Precision> {};
 
 TEST_P(RealtimePathIn, NeitherAllocatesNorBlocksInLockstepFromFirstFrameToMappedSurface) {
@@ -157,12 +166,7 @@ TEST_P(RealtimePathIn, NeitherAllocatesNorBlocksInLockstepFromFirstFrameToMapped
   LastSurface publication;
   LockstepRuntime runtime(pipeline, s.identity, s.utc_minus_monotonic, publication);
   forget_forbidden_calls();
-  for (;;) {
-    auto event = s.reader.next();
-    ASSERT_TRUE(event.has_value()) << event.error().message;
-    if (!*event) break;
-    runtime.deliver(**event);
-  }
+  ASSERT_NO_FATAL_FAILURE(deliver_all(s, runtime));
   pipeline.ask_to_forget();
   pipeline.forget_if_asked();
   pipeline.entrance().push_ecg({});
@@ -182,12 +186,7 @@ TEST(RealtimePath, NeitherAllocatesNorBlocksWhileTheSetUpIsJudged) {
   LastSurface publication;
   LockstepRuntime runtime(pipeline, s.identity, s.utc_minus_monotonic, publication);
   forget_forbidden_calls();
-  for (;;) {
-    auto event = s.reader.next();
-    ASSERT_TRUE(event.has_value()) << event.error().message;
-    if (!*event) break;
-    runtime.deliver(**event);
-  }
+  ASSERT_NO_FATAL_FAILURE(deliver_all(s, runtime));
   expect_none();
   EXPECT_GT(pipeline.setup_watcher().status_belief().judged(), 0U);
 }
