@@ -72,6 +72,13 @@ stop() {
 }
 trap stop INT TERM
 
+# What ninja and ctest print, "[12/340] ..." and "12/340 Test ...", or how many files clang-tidy has begun.
+progress() {
+  local counted
+  counted=$(grep -aoE '^ *\[?[0-9]+/[0-9]+\]?' "$1" | tail -n 1 | tr -d '[] ')
+  printf '%s' "${counted:-$(grep -ac '^clang-tidy' "$1") files}"
+}
+
 # step NAME LIMIT COMMAND...: runs the command with its output in a log; tells every 20 s how far it is.
 step() {
   local name=$1 limit=$2
@@ -85,8 +92,7 @@ step() {
     sleep 0.2
     if [ $((SECONDS - told)) -ge 20 ]; then
       told=$SECONDS
-      # The progress that ninja and ctest print: "[12/340] ..." and "12/340 Test ...".
-      say "$name: $(grep -aoE '^ *\[?[0-9]+/[0-9]+\]?' "$log" | tail -n 1 | tr -d '[] ')"
+      say "$name: $(progress "$log")"
     fi
   done
   wait "$running"
@@ -108,6 +114,7 @@ if command -v ccache > /dev/null; then
   launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
 fi
 
+# Compiles all that compiles (-k 0): one run tells every error.
 build() { # PRESET BUILD_OPTION...
   local preset=$1 tests=all undefined=all quick=OFF
   shift
@@ -125,7 +132,7 @@ build() { # PRESET BUILD_OPTION...
   esac
   step "$preset configure" 5m cmake --preset "$preset" -DPERIMAP_TESTS=$tests -DPERIMAP_UNDEFINED=$undefined \
     -DPERIMAP_QUICK=$quick "${launcher[@]}" &&
-    step "$preset build" 90m cmake --build --preset "$preset" -j "$jobs" "$@"
+    step "$preset build" 90m cmake --build --preset "$preset" -j "$jobs" "$@" -- -k 0
 }
 
 # Many tests run programs against the machine's clock, several at a time, and the machine may have other work besides.

@@ -116,7 +116,7 @@ TEST(BeatDecision, ComplexesThatCrowdAreADisturbance) {
 }
 
 TEST(BeatDecision, AWaveThatIsKnownIsNoDisturbanceThoughTheLineStepsBesideIt) {
-  const auto noisy = [](const QrsShape& shape, double step) {
+  const auto noisy = [](const QrsShape& shape, double step_beside) {
     Patient patient;
     const auto wave_of = [&](const QrsShape& s, double step) {
       patient.see(patient.last_s + 0.3,
@@ -127,7 +127,7 @@ TEST(BeatDecision, AWaveThatIsKnownIsNoDisturbanceThoughTheLineStepsBesideIt) {
       wave_of(kWide, 0.0);
     }
     patient.see(patient.last_s + 0.5);
-    wave_of(shape, step);
+    wave_of(shape, step_beside);
     patient.beats(1, 0.5);
     patient.run(patient.last_s + 0.3);
     return patient.decision.noisy(at(patient.now_s));
