@@ -38,8 +38,8 @@ Expected<Configuration> load_whole(const std::string& file) {
   auto configuration = load_configuration(file);
   if (!configuration) return configuration;
   if (const auto fits = frames_fit(*configuration, file); !fits) return fail(file + ": " + fits.error().message);
-  if (configuration->replay.recording || !names_devices(*configuration)) return configuration;
   if (const auto fits = calibrations_fit(*configuration); !fits) return fail(file + ": " + fits.error().message);
+  if (configuration->replay.recording || !names_devices(*configuration)) return configuration;
   if (const auto devices = named_devices(*configuration, file); !devices) {
     return fail(file + ": " + devices.error().message);
   }

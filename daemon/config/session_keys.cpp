@@ -18,7 +18,7 @@ constexpr std::array<SessionSection, 7> kSessionSections{
      {"camera", {"width", "height", "frame_rate_hz", "exposure_ms", "gain"}, ""},
      {"tracker",
       {"position_deviation_mm", "rotation_deviation_deg", "error_correlation_s", "time_offset_ms",
-       "maximum_extrapolation_ms", "hand_eye_translation_SC_mm", "hand_eye_rotation_SC_wxyz"},
+       "maximum_extrapolation_ms", "hand_eye_translation_SC_mm", "hand_eye_rotation_SC_wxyz", "sensor", "pointer"},
       ""},
      {"ecg", {"r_trigger", "r_trigger_delay_ms", "r_trigger_deviation_ms"}, ""},
      {"phase", {}, ""},

@@ -12,6 +12,7 @@
 #include "drivers/calibration/calibration_facts.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/calibration/tool_tip.hpp"
+#include "drivers/calibration/turned_scope_file.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/replay_reader.hpp"
 #include "drivers/transport/camera_endpoint.hpp"
@@ -29,23 +30,36 @@ std::optional<std::string> pointer_fact(const TrackerConfiguration& tracker, con
   return tracker.pointer_calibration ? calibration_fact(*tracker.pointer_calibration, key) : std::nullopt;
 }
 
-Expected<void> of_size(int width, int height, const CameraModel& camera, const std::string& played) {
-  if (width == camera.width && height == camera.height) return {};
-  return wrong("camera.calibration", fmt::format("one for frames of {}x{}, as {} has", width, height, played),
-               fmt::format("one for {}x{}", camera.width, camera.height),
-               "measure that camera with `perimap calibrate camera`, or play what the calibration is of");
+// What the frames must be as large as: the calibration and the turned scope that are named.
+struct NamedSizes {
+  std::optional<CameraModel> camera;
+  std::optional<TurnedScope> scope;
+};
+
+Expected<void> of_size(int width, int height, const NamedSizes& named, const std::string& played) {
+  if (const auto& camera = named.camera; camera && (width != camera->width || height != camera->height)) {
+    return wrong("camera.calibration", fmt::format("one for frames of {}x{}, as {} has", width, height, played),
+                 fmt::format("one for {}x{}", camera->width, camera->height),
+                 "measure that camera with `perimap calibrate camera`, or play what the calibration is of");
+  }
+  if (const auto& scope = named.scope; scope && (width != scope->width || height != scope->height)) {
+    return wrong("camera.turned_scope", fmt::format("one of pictures of {}x{}, as {} has", width, height, played),
+                 fmt::format("one of {}x{}", scope->width, scope->height),
+                 "measure that scope with `perimap calibrate scope`, or play what it was measured of");
+  }
+  return {};
 }
 
-Expected<void> video_fits(const std::string& file, const CameraModel& camera) {
+Expected<void> video_fits(const std::string& file, const NamedSizes& named) {
   auto reader = VideoReader::open(file);
   if (!reader) return tl::unexpected(std::move(reader.error()));
   const auto frame = (*reader)->next();
   if (!frame) return tl::unexpected(frame.error());
   if (*frame == nullptr) return {};
-  return of_size((*frame)->grey.width, (*frame)->grey.height, camera, file);
+  return of_size((*frame)->grey.width, (*frame)->grey.height, named, file);
 }
 
-Expected<void> recording_fits(const std::string& file, const CameraModel& camera) {
+Expected<void> recording_fits(const std::string& file, const NamedSizes& named) {
   constexpr std::array<std::string_view, 1> kFrames{channels::kCameraImage};
   auto reader = ReplayReader::open(file, ReadMode::kWhole, kFrames);
   if (!reader) return tl::unexpected(std::move(reader.error()));
@@ -53,7 +67,7 @@ Expected<void> recording_fits(const std::string& file, const CameraModel& camera
   if (!event) return tl::unexpected(event.error());
   if (!*event) return {};
   const auto& frame = std::get<FrameEvent>(**event);
-  return of_size(frame.width, frame.height, camera, file);
+  return of_size(frame.width, frame.height, named, file);
 }
 
 void warn_of_age(const std::string& what, std::optional<CalibrationDate> made, double most_days, CalibrationDate today,
@@ -74,22 +88,44 @@ std::optional<CalibrationDate> date_of(const std::optional<std::string>& text) {
   return text ? calibration_date_of(*text) : std::nullopt;
 }
 
-}  // namespace
+// The size that the configuration says itself, which is a camera's to deliver.
+Expected<void> size_fits(const CameraConfiguration& c, const NamedSizes& named) {
+  if (c.width == 0 || c.height == 0) return {};
+  if (const auto& camera = named.camera; camera && (c.width != camera->width || c.height != camera->height)) {
+    return wrong("camera.width", fmt::format("the calibration's {}x{}", camera->width, camera->height),
+                 fmt::format("{}x{}", c.width, c.height),
+                 "measure the camera with `perimap calibrate camera` as it is used");
+  }
+  return of_size(c.width, c.height, named, "the key 'camera.width'");
+}
 
-namespace {
+Expected<NamedSizes> named_sizes(const CameraConfiguration& c) {
+  NamedSizes named;
+  if (c.calibration) {
+    auto camera = read_calibration(*c.calibration);
+    if (!camera) return tl::unexpected(std::move(camera.error()));
+    named.camera = *camera;
+  }
+  if (c.turned_scope) {
+    auto scope = read_turned_scope(*c.turned_scope);
+    if (!scope) return tl::unexpected(std::move(scope.error()));
+    named.scope = *std::move(scope);
+  }
+  return named;
+}
 
 // Of the camera's picture, and of the tracker's sensor where it says of which it is.
-Expected<void> scope_fits(const Configuration& configuration) {
+Expected<void> scope_fits(const Configuration& configuration, const NamedSizes& named) {
   const CameraConfiguration& c = configuration.camera;
   const TrackerConfiguration& tracker = configuration.tracker;
   if (!c.turned_scope) return {};
-  if (c.calibration) {
-    const auto camera = read_calibration(*c.calibration);
-    if (!camera) return tl::unexpected(camera.error());
-    if (const auto scope = configured_scope(configuration, *camera); !scope) return tl::unexpected(scope.error());
+  if (named.camera) {
+    if (const auto scope = configured_scope(configuration, *named.camera); !scope) return tl::unexpected(scope.error());
   }
   const auto sensor = calibration_fact(*c.turned_scope, "sensor");
-  if (!sensor || tracker.protocol == TrackerConfiguration::Protocol::kNone) return {};
+  if (!sensor) return {};
+  // Where there is no tracker, a sensor that is named says of which one the recorded poses are.
+  if (!tracker.sensor && tracker.protocol == TrackerConfiguration::Protocol::kNone) return {};
   if (tracker.sensor && same_tool(*sensor, *tracker.sensor, tracker.protocol)) return {};
   return wrong("camera.turned_scope",
                tracker.sensor ? fmt::format("one of \"{}\", the tracker.sensor", *tracker.sensor)
@@ -102,7 +138,10 @@ Expected<void> scope_fits(const Configuration& configuration) {
 
 Expected<void> calibrations_fit(const Configuration& configuration) {
   const TrackerConfiguration& c = configuration.tracker;
-  if (const auto scope = scope_fits(configuration); !scope) return scope;
+  const auto named = named_sizes(configuration.camera);
+  if (!named) return tl::unexpected(named.error());
+  if (const auto size = size_fits(configuration.camera, *named); !size) return size;
+  if (const auto scope = scope_fits(configuration, *named); !scope) return scope;
   if (c.hand_eye_sensor && !c.sensor && c.protocol != TrackerConfiguration::Protocol::kNone) {
     return wrong("tracker.sensor", fmt::format("\"{}\", as 'tracker.hand_eye_sensor' says", *c.hand_eye_sensor),
                  "nothing", "without it any other sensor would be taken for that one; name the sensor");
@@ -127,16 +166,16 @@ Expected<void> calibrations_fit(const Configuration& configuration) {
 
 Expected<void> frames_fit(const Configuration& configuration, const std::filesystem::path& configuration_file) {
   const CameraConfiguration& c = configuration.camera;
-  if (!c.calibration) return {};
-  const auto camera = read_calibration(*c.calibration);
-  if (!camera) return tl::unexpected(camera.error());
-  if (configuration.replay.recording) return recording_fits(configuration.replay.recording->string(), *camera);
-  if (c.playback) return recording_fits(c.playback->string(), *camera);
+  const auto named = named_sizes(c);
+  if (!named) return tl::unexpected(named.error());
+  if (!named->camera && !named->scope) return {};
+  if (configuration.replay.recording) return recording_fits(configuration.replay.recording->string(), *named);
+  if (c.playback) return recording_fits(c.playback->string(), *named);
   if (!c.device) return {};
   const auto endpoint = parse_camera_endpoint(*c.device);
   const auto* video = endpoint ? std::get_if<VideoEndpoint>(&*endpoint) : nullptr;
   if (video == nullptr) return {};
-  return video_fits((configuration_file.parent_path() / video->file).lexically_normal().string(), *camera);
+  return video_fits((configuration_file.parent_path() / video->file).lexically_normal().string(), *named);
 }
 
 std::vector<std::string> old_calibrations(const Configuration& configuration,

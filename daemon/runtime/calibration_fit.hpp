@@ -11,13 +11,15 @@
 
 namespace perimap {
 
-// A hand-eye of another sensor, or a tip of another tool, than the configuration has, or a tip that cannot be read: one
-// line that names the key or file and says what to do. What does not say what it is of fits; where a hand-eye says so,
-// the sensor must be named.
+// A hand-eye or turned scope of another sensor, a tip of another tool, or a lens or turned scope for pictures of
+// another size than the configuration says, or one that cannot be read: one line that names the key or file and says
+// what to do. What does not say what it is of fits; where a hand-eye or scope says so, the tracker's sensor must be
+// named. Whether devices are named or not.
 [[nodiscard]] Expected<void> calibrations_fit(const Configuration& configuration);
 
-// Whether the frames of a video or recording that the configuration plays are as large as those that its calibration is
-// for. Of a camera only the camera can tell. `configuration_file`: names of videos start at its folder.
+// Whether the frames of a video or recording that the configuration plays are as large as those that its calibration
+// and its turned scope are for. Of a camera only the camera can tell. `configuration_file`: names of videos start at
+// its folder.
 [[nodiscard]] Expected<void> frames_fit(const Configuration& configuration,
                                         const std::filesystem::path& configuration_file);
 

@@ -8,6 +8,7 @@
 
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/surface_traffic.hpp"
+#include "daemon/runtime/calibration_fit.hpp"
 #include "daemon/runtime/configured_scope.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/calibration/turned_scope_file.hpp"
@@ -127,6 +128,9 @@ tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& record
                                                        ReadMode mode) {
   const auto wrong_recording = [](Error error) { return tl::unexpected(SetupError{std::move(error), false}); };
   const auto wrong_configuration = [](Error error) { return tl::unexpected(SetupError{std::move(error), true}); };
+  const auto in_file = [&configuration_file](const Error& error) {
+    return configuration_file ? Error{fmt::format("{}: {}", configuration_file->string(), error.message)} : error;
+  };
 
   auto facts = read_facts(recording, mode);
   if (!facts) return wrong_recording(std::move(facts.error()));
@@ -140,6 +144,9 @@ tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& record
                                             mode == ReadMode::kWhole ? OtherKeys::kPassedOver : OtherKeys::kRefused);
     if (!own) return wrong_recording(std::move(own.error()));
     configuration = std::move(own->configuration);
+    basis.sensor = std::move(configuration.tracker.sensor);
+    configuration.tracker.sensor.reset();
+    configuration.tracker.pointer.reset();
     basis.passed_over = std::move(own->passed_over);
   }
   if (configuration_file) {
@@ -161,7 +168,7 @@ tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& record
   }
   basis.camera = *camera;
   auto scope = configured_scope(configuration, *camera);
-  if (!scope) return wrong_configuration(std::move(scope.error()));
+  if (!scope) return wrong_configuration(in_file(scope.error()));
   basis.turned_scope = *scope;
   if (!basis.turned_scope && facts->turned_scope) {
     auto own = parse_turned_scope(*facts->turned_scope, fmt::format("{}:{}", recording, attachments::kTurnedScope));
@@ -176,6 +183,13 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
                                                      ReadMode mode) {
   auto basis = recorded_basis(recording, configuration_file, mode);
   if (!basis) return tl::unexpected(std::move(basis.error()));
+  if (configuration_file) {
+    if (basis->sensor) basis->configuration.tracker.sensor = basis->sensor;
+    if (const auto fits = calibrations_fit(basis->configuration); !fits) {
+      return tl::unexpected(
+          SetupError{{fmt::format("{}: {}", configuration_file->string(), fits.error().message)}, true});
+    }
+  }
   auto reader = ReplayReader::open(recording, mode);
   if (!reader) return tl::unexpected(SetupError{std::move(reader.error()), false});
   if (basis->configuration.ecg.r_trigger && !reader->has_r_trigger()) {

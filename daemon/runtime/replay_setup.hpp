@@ -33,7 +33,10 @@ struct SetupError {
 
 // What a recording and a configuration file over it come to.
 struct RecordedBasis {
-  Configuration configuration;              // effective: defaults, then the recording's own, then the file's
+  // Effective: defaults, then the recording's own, then the file's. Which tools a tracker has is the file's to say
+  // alone.
+  Configuration configuration;
+  std::optional<std::string> sensor;        // whose poses the recording has, where it says so
   CameraModel camera;                       // of the file's calibration, or the recording's own
   std::optional<TurnedScope> turned_scope;  // likewise
   Duration utc_minus_monotonic{0};

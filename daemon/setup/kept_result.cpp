@@ -135,6 +135,12 @@ std::string with_keys(std::string_view text, std::string_view section, const std
       at = i;
       if (!trimmed(lines[i]).starts_with('#')) break;  // one that counts rather than one that is commented out
     }
+    if (key.value.empty()) {
+      if (at < end && !trimmed(lines[at]).starts_with('#')) {
+        lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(at));
+      }
+      continue;
+    }
     const std::string line = fmt::format("{} = {}  # {}", key.name, key.value, comment);
     if (at < end) {
       lines[at] = line;

@@ -42,7 +42,7 @@ class KeptResults {
 
 struct MeasuredKey {
   std::string name;
-  std::string value;  // as TOML
+  std::string value;  // as TOML; empty: the key is taken out, for it does not hold any more
 };
 
 // A configuration's text with these keys of a section, in their place where they stand (commented out too), else at the

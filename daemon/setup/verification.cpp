@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -132,6 +133,17 @@ void judge_board(Verification& result, const std::vector<Seen>& seen, const std:
   result.error_mm_deviation = of_square / (2.0 * std::sqrt(std::max(left, of_square + 1e-12)));
 }
 
+// A displacement d of the camera in S puts the board at R_WS d, and its mean over the views is not known for an error.
+double unseen_displacement(const Verification& result, const std::vector<Matrix3d>& turned) {
+  if (!result.board_passed()) return 0.0;
+  Matrix3d mean = Matrix3d::Zero();
+  for (const Matrix3d& R : turned) mean += R / static_cast<double>(turned.size());
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> kept(mean.transpose() * mean);
+  const double shown_share = std::sqrt(std::max(1e-6, 1.0 - kept.eigenvalues().maxCoeff()));
+  const double room = result.bound_mm - 2.0 * result.error_mm_deviation;
+  return std::sqrt(std::max(0.0, room * room - result.error_mm * result.error_mm)) / shown_share;
+}
+
 // Fails where nothing tells.
 Expected<void> judge_clocks(Verification& result, const std::vector<Seen>& seen, const std::vector<TimedPose>& sensor,
                             const SetupOnTrial& setup) {
@@ -224,6 +236,7 @@ Expected<Verification> verify_setup(const std::vector<TimedPose>& camera, const 
   // The board's middle as the sensor has it at the first view: how far out a turn of the sensor is felt.
   const Vector3d middle_S = setup.X_SC * (camera.front().X.inverse() * middle_B);
   judge_board(result, seen, places, mean, noise_variance(sensor, middle_S));
+  result.unseen_mm = unseen_displacement(result, turned);
   if (auto judged = judge_clocks(result, seen, sensor, setup); !judged) {
     return tl::unexpected(judged.error());
   }
@@ -260,7 +273,13 @@ std::string text_of(const Verification& result) {
         result.touch->error_mm, result.touch->error_mm_deviation, e.x(), e.y(), e.z(), result.touch->held_s,
         verdict(result.touch_passed()));
   } else {
-    text += "  touched point none: what is wrong alike from all sides does not show; touch a point with --tip\n";
+    text += "  touched point none: what is wrong alike from all sides does not show";
+    if (result.unseen_mm > 0.0) {
+      text += fmt::format(", and a hand-eye that is up to {:.1f} mm off passes too by this swing", result.unseen_mm);
+    }
+    text +=
+        "; rest the tip of a calibrated pointer on a point of the board and say --tip, or turn the scope further about "
+        "all axes\n";
   }
   if (result.views_left_out > 0)
     text += fmt::format("  left out      {} views that are far off\n", result.views_left_out);

@@ -52,6 +52,10 @@ struct Verification {
   static constexpr double kBrisk_mm_per_s = 200.0;
   double clock_error_ms = 0.0;
   double clock_error_ms_deviation = 0.0;
+  // How far elsewhere in the sensor the camera could be and the board would still pass: views from all sides show only
+  // what turns with the scope, and least of it along the direction that the swing carries about least. A touched point
+  // shows all of it. 0 where the board did not pass.
+  double unseen_mm = 0.0;
   std::optional<VerifiedTouch> touch;
   std::vector<double> times_s;    // of each view, since the first
   std::vector<double> errors_mm;  // of each view

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "daemon/command_line/commands.hpp"
-#include "daemon/config/configuration_loader.hpp"
 #include "daemon/setup/commands/calibrate_camera.hpp"
 #include "daemon/setup/commands/calibrate_hand_eye.hpp"
 #include "daemon/setup/commands/calibrate_scope.hpp"
@@ -20,6 +19,7 @@
 #include "daemon/setup/kept_result.hpp"
 #include "daemon/setup/live_guide.hpp"
 #include "daemon/setup/recorded_poses.hpp"
+#include "daemon/setup/recorded_sensor.hpp"
 #include "daemon/setup/setup_plots.hpp"
 #include "daemon/setup/setup_report.hpp"
 #include "drivers/pose_file/pose_table.hpp"
@@ -51,13 +51,13 @@ Expected<std::vector<TimedPose>> poses_of(const PosesOptions& options) {
   return in_order(table->poses);
 }
 
-// As check compares it with tracker.pointer. A recording knows it by its role; live devices are those of a
-// configuration, which says which tool has that role.
+// As check compares it with tracker.pointer. A recording, and one of live devices is one too, has its poses by the
+// tool's role, and says which tool had it.
 Expected<std::string> tool_of(const PosesOptions& options) {
-  if (options.live.configuration.empty() || options.tool != "pointer") return options.tool;
-  const auto configuration = load_configuration(options.live.configuration, {}, NamedFiles::kMayBeMissing);
-  if (!configuration) return tl::unexpected(configuration.error());
-  return configuration->tracker.pointer.value_or(options.tool);
+  if (options.recording.empty()) return options.tool;
+  const auto handle = recorded_handle(options.recording, options.tool);
+  if (!handle) return tl::unexpected(handle.error());
+  return handle->value_or(options.tool);
 }
 
 Expected<Measurement> measure_tool(const PosesOptions& options) {

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "daemon/setup/kept_result.hpp"
 #include "daemon/setup/live_guide.hpp"
 #include "daemon/setup/recorded_poses.hpp"
+#include "daemon/setup/recorded_sensor.hpp"
 #include "daemon/setup/setup_plots.hpp"
 #include "daemon/setup/setup_report.hpp"
 #include "daemon/setup/signal_offset.hpp"
@@ -61,6 +63,19 @@ Expected<HandEyeCalibration> by_files(const HandEyeOptions& options) {
   return calibrate_hand_eye(camera->poses, tracker->poses, options.settings);
 }
 
+// None where neither the recording nor the configuration says.
+Expected<std::optional<std::string>> sensor_of(const HandEyeOptions& options) {
+  Configuration configuration;
+  const std::string& file = options.common.configuration;
+  if (!file.empty()) {
+    auto loaded = load_configuration(file, {}, NamedFiles::kMayBeMissing);
+    if (!loaded) return tl::unexpected(loaded.error());
+    configuration = *std::move(loaded);
+  }
+  if (!options.is_recorded()) return configuration.tracker.sensor;
+  return calibrated_sensor(options.recorded.recording, configuration, file);
+}
+
 Expected<Measurement> measure(const HandEyeOptions& options) {
   const auto result =
       options.is_recorded() ? by_recording(options.recorded, options.common, options.settings) : by_files(options);
@@ -70,13 +85,11 @@ Expected<Measurement> measure(const HandEyeOptions& options) {
                    {"hand_eye_rotation_SC_wxyz", list_of(measured.json["rotation_wxyz"])}};
   // What check and perimapd look at: when it was measured, and of which sensor.
   measured.keys.push_back({"hand_eye_date", fmt::format("{:?}", date_now())});
-  if (!options.common.configuration.empty()) {
-    const auto configuration = load_configuration(options.common.configuration, {}, NamedFiles::kMayBeMissing);
-    if (!configuration) return tl::unexpected(configuration.error());
-    if (configuration->tracker.sensor) {
-      measured.keys.push_back({"hand_eye_sensor", fmt::format("{:?}", *configuration->tracker.sensor)});
-    }
-  }
+  const auto sensor = sensor_of(options);
+  if (!sensor) return tl::unexpected(sensor.error());
+  if (*sensor) measured.json["sensor"] = **sensor;
+  // One of before would be said of this hand-eye.
+  measured.keys.push_back({"hand_eye_sensor", *sensor ? fmt::format("{:?}", **sensor) : ""});
   measured.plots = plots_of(*result);
   if (result->offset_measured && result->is_brisk()) {
     measured.keys.push_back({"time_offset_ms", number_of(1e3 * result->offset_s)});

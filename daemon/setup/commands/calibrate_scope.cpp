@@ -11,10 +11,12 @@
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/config/tracked_tools.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/pictures.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
 #include "daemon/setup/scope_rotation.hpp"
+#include "drivers/calibration/calibration_facts.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 
 namespace perimap {
@@ -99,6 +101,31 @@ Expected<TurnedScope> turned_scope(const CalibrateScopeOptions& options) {
   return scope;
 }
 
+// Of which sensor the hand-eyes are, as they say, or the configuration; none: nobody says. Fails where one says
+// otherwise.
+Expected<std::optional<std::string>> sensor_of(const CalibrateScopeOptions& options) {
+  std::optional<std::string> sensor;
+  std::string said_by;
+  TrackerConfiguration::Protocol protocol = TrackerConfiguration::Protocol::kNone;
+  if (!options.common.configuration.empty()) {
+    const auto configuration = load_configuration(options.common.configuration, {}, NamedFiles::kMayBeMissing);
+    if (!configuration) return tl::unexpected(configuration.error());
+    sensor = configuration->tracker.sensor;
+    said_by = options.common.configuration;
+    protocol = configuration->tracker.protocol;
+  }
+  for (const std::vector<std::string>& files : options.setups) {
+    const auto own = calibration_fact(files.at(1), "sensor");
+    if (!own) continue;
+    if (sensor && !same_tool(*sensor, *own, protocol)) {
+      return fail(fmt::format("{}: is of the sensor \"{}\", and {} of \"{}\": expected hand-eyes of one sensor",
+                              files.at(1), *own, said_by, *sensor));
+    }
+    if (!sensor) said_by = files.at(1), sensor = own;
+  }
+  return sensor;
+}
+
 Expected<Measurement> measure(const CalibrateScopeOptions& options) {
   Measurement measured{"", nlohmann::json::object(), {}};
   if (!options.setups.empty()) {
@@ -106,12 +133,10 @@ Expected<Measurement> measure(const CalibrateScopeOptions& options) {
     if (!scope) return tl::unexpected(scope.error());
     measured.text += text_of(*scope);
     measured.json["turned_scope"] = json_of(*scope);
-    if (!options.common.configuration.empty()) {
-      // Of which sensor: check and perimapd refuse it with another.
-      const auto configuration = load_configuration(options.common.configuration, {}, NamedFiles::kMayBeMissing);
-      if (!configuration) return tl::unexpected(configuration.error());
-      if (configuration->tracker.sensor) measured.json["sensor"] = *configuration->tracker.sensor;
-    }
+    // Check and perimapd refuse it with another.
+    const auto sensor = sensor_of(options);
+    if (!sensor) return tl::unexpected(sensor.error());
+    if (*sensor) measured.json["sensor"] = **sensor;
     measured.section = "camera";
     measured.keys = {{"turned_scope", output_key(options.common)}};
     if (options.pictures.empty() && options.recording.empty()) return measured;

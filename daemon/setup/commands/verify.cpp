@@ -12,10 +12,12 @@
 #include "core/angle/angle.hpp"
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/runtime/calibration_fit.hpp"
 #include "daemon/setup/commands/live_capture.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
 #include "daemon/setup/recorded_poses.hpp"
+#include "daemon/setup/recorded_sensor.hpp"
 #include "daemon/setup/scope_rotation.hpp"
 #include "daemon/setup/verification.hpp"
 #include "drivers/calibration/tool_tip.hpp"
@@ -71,6 +73,7 @@ nlohmann::json json_of(const Verification& result, const VerifyOptions& options)
                          {"views", result.views},
                          {"views_left_out", result.views_left_out},
                          {"watched_s", result.watched_s},
+                         {"unseen_mm", nullptr},
                          {"touch_error_mm", nullptr},
                          {"touch_error_mm_deviation", nullptr}};
   if (result.touch) {
@@ -79,6 +82,7 @@ nlohmann::json json_of(const Verification& result, const VerifyOptions& options)
     const Vector3d& e = result.touch->error_W_mm;
     json["touch_error_W_mm"] = {e.x(), e.y(), e.z()};
   }
+  if (!result.touch && result.board_passed()) json["unseen_mm"] = result.unseen_mm;
   return json;
 }
 
@@ -105,9 +109,25 @@ Expected<SetupAsTurned> setup_as_turned(const std::filesystem::path& file, const
   return SetupAsTurned{scope->at(rotation->rotation_rad).X_SC, *lens};
 }
 
+// What is on trial must be of the sensor whose poses were recorded. Lens and tip may be others than the
+// configuration's.
+Expected<void> sensor_fits(Configuration configuration, const VerifyOptions& options) {
+  auto sensor = calibrated_sensor(options.recorded.recording, configuration, options.configuration);
+  if (!sensor) return tl::unexpected(sensor.error());
+  configuration.tracker.sensor = *std::move(sensor);
+  configuration.tracker.pointer_calibration.reset();
+  configuration.camera.calibration.reset();
+  configuration.camera.width = configuration.camera.height = 0;
+  if (const auto fits = calibrations_fit(configuration); !fits) {
+    return fail(options.configuration + ": " + fits.error().message);
+  }
+  return {};
+}
+
 Expected<Verification> verify(const VerifyOptions& options) {
   const auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
   if (!configuration) return tl::unexpected(configuration.error());
+  if (const auto fits = sensor_fits(*configuration, options); !fits) return tl::unexpected(fits.error());
   const TrackerConfiguration& tracker = configuration->tracker;
   SetupOnTrial setup{
       pose_from_wxyz(Vector3d(tracker.translation_SC_mm[0], tracker.translation_SC_mm[1], tracker.translation_SC_mm[2]),

@@ -72,6 +72,17 @@ sed 's/^sensor = "0B"/sensor = "0A"/' "$scratch/tracker.toml" >"$scratch/other.t
 [ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line: $(cat "$scratch/error")"
 grep -q "other.toml: key 'tracker.hand_eye_sensor': .*perimap calibrate hand-eye" "$scratch/error" || fail "$(cat "$scratch/error")"
 
+# A lens of a picture half as large has its principal point on the corner.
+lens=$(cd "$(dirname "$0")/../../data/refused_once" && pwd)/k_half.yaml
+printf 'version = 1\n[camera]\ncalibration = "%s"\n[realtime]\nlock_memory = false\n' "$lens" >"$scratch/half.toml"
+"$perimap" check "$scratch/half.toml" >"$scratch/out" 2>"$scratch/error" || fail "a principal point on the corner ended with $?"
+grep -q '^perimap check: warning: camera.calibration: the principal point 320 240 is' "$scratch/error" || fail "$(cat "$scratch/error")"
+# Of another size than the configuration says, also where it names no device.
+sed 's/^calibration/width = 640\nheight = 480\ncalibration/' "$scratch/half.toml" >"$scratch/wide.toml"
+"$perimap" check "$scratch/wide.toml" >"$scratch/out" 2>"$scratch/error"
+[ $? -eq 2 ] || fail "a lens of another size must end with 2"
+grep -q "wide.toml: key 'camera.width': expected the calibration's 320x240, got 640x480" "$scratch/error" || fail "$(cat "$scratch/error")"
+
 # What calibrate writes is what check compares.
 awk 'BEGIN {
   print "t_s,x,y,z,qx,qy,qz,qw"

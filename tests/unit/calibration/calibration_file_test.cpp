@@ -242,6 +242,17 @@ TEST(FisheyeModel, IsRefusedWhenItIsNoFlagOrContradictsTheName) {
               HasSubstr("key 'distortion_model'"));
 }
 
+TEST(CalibrationFile, OnesThatWereMisreadOnceAreReadOrRefused) {
+  const std::string folder = PERIMAP_TEST_DATA "/refused_once/";
+  const auto fisheye = read_calibration(folder + "k_fisheye_tutorial.yaml");
+  ASSERT_TRUE(fisheye) << fisheye.error().message;
+  EXPECT_EQ(fisheye->lens, Lens::kKannalaBrandt);
+  EXPECT_EQ(fisheye->k4, -0.0185);
+  const auto twice = read_calibration(folder + "k_dup.yaml");
+  ASSERT_FALSE(twice);
+  EXPECT_THAT(twice.error().message, HasSubstr("key 'distortion_coefficients': expected one value, got two"));
+}
+
 TEST(CalibrationKeys, AreRefusedWhenThereTwice) {
   const std::string again = "avg_reprojection_error: 0.2\nimage_width: 320";
   EXPECT_EQ(error_of(with(kYaml, "avg_reprojection_error: 0.2", again)),

@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <numeric>
+#include <string>
 
 #include "tests/unit/camera/made_jpeg.hpp"
 
@@ -160,6 +163,26 @@ TEST_F(Jpeg, MayHaveBytesBeforeARestartAsWebcamsDo) {
     ASSERT_TRUE(image) << image.error().message;
     EXPECT_TRUE(std::equal(expected.begin(), expected.end(), image->data)) << count;
   }
+}
+
+TEST_F(Jpeg, OfWebcamsThatWereRefusedOnceAreTheSamePicture) {
+  const auto file = [](const char* name) {
+    std::ifstream stream(std::string(PERIMAP_TEST_DATA "/refused_once/") + name, std::ios::binary);
+    const std::string text((std::istreambuf_iterator<char>(stream)), {});
+    const auto bytes = std::as_bytes(std::span(text));
+    return std::vector<std::byte>(bytes.begin(), bytes.end());
+  };
+  constexpr int kWide = 640, kHigh = 480;
+  const auto decoded = [&](const char* name) {
+    const auto bytes = file(name);
+    const auto image = converter_.convert(frame(PixelFormat::kMjpg, kWide, kHigh, 0, bytes));
+    EXPECT_TRUE(image) << name << ": " << image.error().message;
+    return image ? pixels(*image) : std::vector<int>();
+  };
+  const std::vector<int> plain = decoded("j_plain.jpg");
+  ASSERT_EQ(plain.size(), static_cast<std::size_t>(kWide * kHigh));
+  EXPECT_EQ(decoded("j_rst_extra1.jpg"), plain);
+  EXPECT_EQ(decoded("j_noeoi.jpg"), plain);
 }
 
 TEST_F(Jpeg, OfWhichARestartIntervalIsMissingIsNoPicture) {

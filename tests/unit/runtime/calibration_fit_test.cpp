@@ -109,6 +109,30 @@ TEST_F(CalibrationFit, AScopeOfAnotherSensorOrOfOtherPicturesIsRefused) {
   EXPECT_FALSE(calibrations_fit(configuration_));
 }
 
+// As a configuration over recordings is, which says of whose poses they are.
+TEST_F(CalibrationFit, WithoutDevicesASensorOrSizeThatIsNamedIsHeldAgainstTheCalibrations) {
+  configuration_.tracker.protocol = TrackerConfiguration::Protocol::kNone;
+  TurnedScope scope;
+  scope.reference.focal_px = {80.0, 80.0};
+  scope.width = 64, scope.height = 48;
+  std::string text = format_turned_scope(scope);
+  configuration_.camera.turned_scope = write("scope.json", text.insert(text.find('{') + 1, R"("sensor": "0A",)"));
+  EXPECT_TRUE(calibrations_fit(configuration_)) << "nothing says of which sensor the poses are";
+  configuration_.tracker.sensor = "0B";
+  EXPECT_FALSE(calibrations_fit(configuration_));
+  configuration_.tracker.sensor = "0A";
+  EXPECT_TRUE(calibrations_fit(configuration_));
+  configuration_.camera.width = 128, configuration_.camera.height = 48;
+  const auto wide = calibrations_fit(configuration_);
+  ASSERT_FALSE(wide);
+  EXPECT_THAT(wide.error().message, HasSubstr("key 'camera.turned_scope': expected one of pictures of 128x48"));
+  configuration_.camera.turned_scope.reset();
+  configuration_.camera.calibration = write("camera.yaml", format_calibration(lens()));
+  const auto other = calibrations_fit(configuration_);
+  ASSERT_FALSE(other);
+  EXPECT_THAT(other.error().message, HasSubstr("key 'camera.width': expected the calibration's 64x48, got 128x48"));
+}
+
 TEST_F(CalibrationFit, ATipOfAnotherToolIsRefused) {
   configuration_.tracker.pointer = "0C";
   const auto tip_of = [](const std::string& tool) {
@@ -152,6 +176,14 @@ TEST_F(CalibrationFit, ACalibrationForFramesOfAnotherSizeIsRefused) {
   ASSERT_FALSE(fits);
   EXPECT_THAT(fits.error().message, HasSubstr("key 'camera.calibration': expected one for frames of 64x48"));
   EXPECT_THAT(fits.error().message, HasSubstr("got one for 128x48"));
+  TurnedScope scope;
+  scope.reference.focal_px = {80.0, 80.0};
+  scope.width = 128, scope.height = 48;
+  configuration_.camera.calibration.reset();
+  configuration_.camera.turned_scope = write("scope.json", format_turned_scope(scope));
+  const auto turned = frames_fit(configuration_, folder_ / "devices.toml");
+  ASSERT_FALSE(turned);
+  EXPECT_THAT(turned.error().message, HasSubstr("key 'camera.turned_scope': expected one of pictures of 64x48"));
 }
 
 TEST_F(CalibrationFit, WhatIsOlderThanItMayBeIsWarnedOf) {

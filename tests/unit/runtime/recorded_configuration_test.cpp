@@ -62,6 +62,30 @@ TEST(RecordedConfiguration, IsWhatDescribesTheSessionAndTheCamerasCalibration) {
   EXPECT_EQ(basis->configuration, expected);
 }
 
+TEST(RecordedConfiguration, AHandEyeOfAnotherSensorThanWasRecordedIsRefused) {
+  Configuration live;
+  live.tracker.protocol = TrackerConfiguration::Protocol::kNdi;
+  live.tracker.sensor = "0A";
+  live.tracker.pointer = "0C";
+  const BegunRecording recording;
+  record(recording, recording_facts(live, camera(), "test"));
+  const auto basis = recorded_basis(recording.file(), std::nullopt, ReadMode::kStrict);
+  ASSERT_TRUE(basis) << basis.error().error.message;
+  EXPECT_EQ(basis->sensor, "0A");
+  EXPECT_FALSE(basis->configuration.tracker.sensor) << "a recording does not choose the tools of a tracker";
+  EXPECT_FALSE(basis->configuration.tracker.pointer);
+  const std::string file = recording.folder() + "/other.toml";
+  for (const char* tracker : {"hand_eye_sensor = \"0B\"\n", "hand_eye_sensor = \"0B\"\nsensor = \"0B\"\n"}) {
+    std::ofstream(file) << "version = 1\n[tracker]\n" << tracker;
+    const auto refused = prepare_replay(recording.file(), file, ReadMode::kStrict);
+    ASSERT_FALSE(refused) << tracker;
+    EXPECT_THAT(refused.error().error.message, HasSubstr("other.toml: key 'tracker.hand_eye_sensor': expected \"0A\""));
+  }
+  std::ofstream(file) << "version = 1\n[tracker]\nhand_eye_sensor = \"0A\"\n";
+  const auto fits = prepare_replay(recording.file(), file, ReadMode::kStrict);
+  EXPECT_TRUE(fits) << fits.error().error.message;
+}
+
 TEST(RecordedConfiguration, ThatSaysMoreIsRefusedByNameOrPassedOverWithTheRestOfADamagedRecording) {
   SensorRecordingFacts facts = recording_facts({}, camera(), "test");
   facts.configuration =

@@ -16,9 +16,11 @@
 #include "daemon/setup/kept_result.hpp"
 #include "daemon/setup/live_guide.hpp"
 #include "daemon/setup/printed_target.hpp"
+#include "daemon/setup/recorded_sensor.hpp"
 #include "daemon/setup/verification.hpp"
 #include "drivers/board/board_pattern.hpp"
 #include "drivers/calibration/tool_tip.hpp"
+#include "drivers/recording/sensor_writer.hpp"
 
 namespace perimap {
 namespace {
@@ -279,6 +281,36 @@ TEST(Verification, WhatIsWrongAlikeFromAllSidesShowsByTheTouchedPoint) {
   EXPECT_NEAR(result->touch->error_mm, 3.0, 0.3);
 }
 
+TEST(Verification, WithoutATouchedPointSaysHowMuchItCanNotSee) {
+  const Watched w = watched();
+  const auto right = verify_setup(w.camera, w.sensor, kMiddle_B, w.truth, {}, 2.0);
+  ASSERT_TRUE(right) << right.error().message;
+  const double unseen_mm = right->unseen_mm;
+  EXPECT_GT(unseen_mm, 3.0) << "more than the bound";
+  EXPECT_LT(unseen_mm, 20.0);
+  EXPECT_THAT(text_of(*right), HasSubstr("--tip"));
+  std::mt19937 generator(5);
+  std::normal_distribution<double> normal;
+  int passed = 0;
+  for (int trial = 0; trial < 30; ++trial) {
+    const Vector3d towards = Vector3d(normal(generator), normal(generator), normal(generator)).normalized();
+    SetupOnTrial wrong = w.truth;
+    wrong.X_SC.t += 1.2 * unseen_mm * towards;
+    const auto far = verify_setup(w.camera, w.sensor, kMiddle_B, wrong, {}, 2.0);
+    ASSERT_TRUE(far) << far.error().message;
+    EXPECT_FALSE(far->board_passed()) << text_of(*far);
+    EXPECT_EQ(far->unseen_mm, 0.0);
+    wrong.X_SC.t = w.truth.X_SC.t + 3.0 * towards;
+    const auto near = verify_setup(w.camera, w.sensor, kMiddle_B, wrong, {}, 2.0);
+    ASSERT_TRUE(near) << near.error().message;
+    passed += near->board_passed() ? 1 : 0;
+    const auto touched = verify_setup(w.camera, w.sensor, kMiddle_B, wrong, w.touch, 2.0);
+    ASSERT_TRUE(touched) << touched.error().message;
+    EXPECT_FALSE(touched->touch_passed()) << text_of(*touched);
+  }
+  EXPECT_GT(passed, 0) << "or there would be nothing to say";
+}
+
 TEST(Verification, WhatIsMissingIsSaid) {
   const Watched w = watched();
   const auto refusal = [&](const Watched& of, const std::optional<TouchOnTrial>& touch) {
@@ -408,6 +440,42 @@ TEST(KeptResults, OfWhichOneCannotBeWrittenAreNotThere) {
   }
   EXPECT_EQ(text_in(calibration), "before\n");
   EXPECT_FALSE(std::filesystem::exists(calibration.string() + ".new"));
+}
+
+// ---- whose poses a recording has
+
+std::string recording_of(const Folder& folder, const std::string& name, const char* configuration) {
+  const std::string file = (folder.path() / name).string();
+  SensorRecordingFacts facts;
+  if (configuration != nullptr) facts.configuration = configuration;
+  auto writer = SensorWriter::create(file, facts, Instant(std::chrono::seconds(1)));
+  EXPECT_TRUE(writer && writer->finish()) << file;
+  return file;
+}
+
+TEST(RecordedSensor, IsWhatTheRecordingSaysRatherThanAConfigurationOfToday) {
+  const Folder folder;
+  const std::string told =
+      recording_of(folder, "told.mcap", "version = 1\n[tracker]\nsensor = \"0A\"\npointer = \"0C\"\n");
+  EXPECT_EQ(recorded_handle(told, "scope").value(), "0A");
+  EXPECT_EQ(recorded_handle(told, "pointer").value(), "0C");
+  EXPECT_EQ(recorded_handle(told, "instrument/drill").value(), std::nullopt);
+  Configuration configuration;
+  configuration.tracker.protocol = TrackerConfiguration::Protocol::kNdi;
+  EXPECT_EQ(calibrated_sensor(told, configuration, "devices.toml").value(), "0A");
+  configuration.tracker.sensor = "0a";
+  EXPECT_EQ(calibrated_sensor(told, configuration, "devices.toml").value(), "0a") << "handles are numbers";
+  configuration.tracker.sensor = "0B";
+  const auto other = calibrated_sensor(told, configuration, "devices.toml");
+  ASSERT_FALSE(other);
+  EXPECT_THAT(other.error().message,
+              HasSubstr("told.mcap: is of the sensor \"0A\", and tracker.sensor of devices.toml is \"0B\""));
+  for (const char* silent : {static_cast<const char*>(nullptr), "version = 1\n"}) {
+    const std::string file = recording_of(folder, "silent.mcap", silent);
+    EXPECT_EQ(recorded_handle(file, "scope").value(), std::nullopt);
+    EXPECT_EQ(calibrated_sensor(file, configuration, "devices.toml").value(), "0B");
+    EXPECT_EQ(calibrated_sensor(file, {}, "").value(), std::nullopt);
+  }
 }
 
 // ---- the first configuration

@@ -218,6 +218,12 @@ TEST(ConfigurationKeys, AreSetInTheirPlace) {
             "version = 1\n[tracker]\ntime_offset_ms = 1.0  # m\n");
 }
 
+TEST(ConfigurationKeys, ThatDoNotHoldAnyMoreAreTakenOut) {
+  EXPECT_EQ(with_keys("[tracker]\nhand_eye_sensor = \"0A\"\nport = \"x\"\n# hand_eye_date = \"\"\n", "tracker",
+                      {{"hand_eye_sensor", ""}, {"hand_eye_date", ""}, {"time_offset_ms", ""}}, "m"),
+            "[tracker]\nport = \"x\"\n# hand_eye_date = \"\"\n");
+}
+
 std::string text_of(const std::filesystem::path& file) {
   std::ifstream stream(file);
   std::stringstream text;
