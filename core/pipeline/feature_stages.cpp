@@ -13,6 +13,12 @@ namespace {
 // For so long a feature is still sought as it looked last.
 constexpr Duration kLastViewKept = std::chrono::seconds(2);
 
+// A first view that fits less well is held against the last one.
+constexpr double kSureCorrelation = 0.95;
+// Whether the two have found the same place: chi-squared, 99 %, with what either may slide by where light moves.
+constexpr double kSamePlaceGate = 9.21;
+constexpr double kSlide_px = 0.5;
+
 // Whether this may be a look-alike: there is room for one in the search region, and the feature was not there in the
 // frame before, or not found about where it was expected.
 bool is_doubtful(const PixelPrediction& prediction, const Vector2d& px, std::uint64_t frames,
@@ -87,24 +93,49 @@ bool seek_first_view(FeatureSlot& slot, const PixelPrediction& prediction, Looks
 
 // As it looked in the frame before; and for a while, what has come back as it looked last, which the release need not
 // wait for.
-void seek_last_view(FeatureSlot& slot, const PixelPrediction& prediction, Hurry hurry, const FrameJob& job) noexcept {
-  if (job.view_tracker == nullptr) return;
+PatchMatch follow_last_view(FeatureSlot& slot, const PixelPrediction& prediction, Hurry hurry,
+                            const FrameJob& job) noexcept {
+  if (job.view_tracker == nullptr) return {};
   const std::uint64_t frames = frames_since_found(slot, job);
-  PatchMatch match;
   if (frames == 1) {
     make_last_view(slot, job);
-    if (!slot.last_view.is_of(slot.last_found_frame)) return;
-    match = slot.last_view.follow(*job.view_tracker, job.image, job.before, slot.patch_state.px, prediction.px,
-                                  prediction.covariance_px2);
-  } else if (hurry == Hurry::kNone && slot.last_view.is_of(slot.last_found_frame) &&
-             frames <= job.frame->rate.frames(kLastViewKept)) {
-    match = slot.last_view.find_again(*job.view_tracker, job.image, prediction.px, prediction.covariance_px2);
+    if (!slot.last_view.is_of(slot.last_found_frame)) return {};
+    return slot.last_view.follow(*job.view_tracker, job.image, job.before, slot.patch_state.px, prediction.px,
+                                 prediction.covariance_px2);
   }
-  if (match.state != MatchState::kFound) return;
+  if (hurry == Hurry::kNone && slot.last_view.is_of(slot.last_found_frame) &&
+      frames <= job.frame->rate.frames(kLastViewKept)) {
+    return slot.last_view.find_again(*job.view_tracker, job.image, prediction.px, prediction.covariance_px2);
+  }
+  return {};
+}
+
+void take_last_view(FeatureSlot& slot, const PatchMatch& match) noexcept {
   slot.match = match;
   slot.seen = slot.patch_state;
   slot.seen.px = match.px;
   slot.seen_by_last_view = true;
+}
+
+void seek_last_view(FeatureSlot& slot, const PixelPrediction& prediction, Hurry hurry, const FrameJob& job) noexcept {
+  const PatchMatch match = follow_last_view(slot, prediction, hurry, job);
+  if (match.state == MatchState::kFound) take_last_view(slot, match);
+}
+
+// Where the first view fits badly, the place near by that looks most like it may be another. Such a match would end the
+// last view's drift as well, and the next slip would begin where this one has ended. Followed from the frame before,
+// the feature leads to where it is, as far off as its drift says; the first view must have found it there. True when
+// that is taken instead.
+bool hold_against_last_view(FeatureSlot& slot, const PixelPrediction& prediction, const FrameJob& job) noexcept {
+  if (slot.seen_by_last_view || slot.match.correlation >= kSureCorrelation || !prediction.valid) return false;
+  if (frames_since_found(slot, job) != 1) return false;
+  const PatchMatch followed = follow_last_view(slot, prediction, Hurry::kNone, job);
+  if (followed.state != MatchState::kFound) return false;
+  const Vector2d off_px = slot.match.px - followed.px;
+  const Matrix2d C = slot.match.covariance_px2 + followed.covariance_px2 + kSlide_px * kSlide_px * Matrix2d::Identity();
+  if (off_px.dot(C.inverse() * off_px) <= kSamePlaceGate) return false;
+  take_last_view(slot, followed);
+  return true;
 }
 
 void seek(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks, Hurry hurry, const FrameJob& job,
@@ -137,6 +168,12 @@ bool moves_otherwise(const FeatureSlot& slot, const PixelPrediction& from_neighb
   PatchMatch since_last = slot.match;
   if (slot.seen_by_last_view) since_last.covariance_px2 -= slot.last_view.drift_px2() * Matrix2d::Identity();
   return !agrees(since_last, from_neighbours, gate);
+}
+
+// Where the map has it, by the pose that the frame's matches share if they tell one.
+PixelPrediction predict_now(const MapPrediction& map, const FrameJob& job, const PixelModel& model) noexcept {
+  if (!map.valid || job.shared_pose == nullptr) return predict_from_map(map, *job.frame, model);
+  return predict_from_shared_pose(map, *job.shared_pose, *job.frame, model);
 }
 
 }  // namespace
@@ -172,17 +209,16 @@ void settle_match(FeatureSlot& slot, const MapPrediction& map, const FrameJob& j
   const NeighbourMotion::Around neighbours = job.motion->around(slot.carried_px, &slot.patch_state.px);
   const PixelPrediction from_neighbours = predict_from_neighbours(slot, neighbours, job);
   if (slot.match.state != MatchState::kFound || moves_otherwise(slot, from_neighbours, gate)) {
-    const bool pose_is_shared = map.valid && job.shared_pose != nullptr;
-    const PixelPrediction from_map = pose_is_shared ? predict_from_shared_pose(map, *job.shared_pose, *job.frame, model)
-                                                    : predict_from_map(map, *job.frame, model);
-    slot.match_agrees = false;
+    const PixelPrediction from_map = predict_now(map, job, model);
     seek(slot, surer(from_map, from_neighbours.valid ? from_neighbours : predict_from_last_place(slot, job)),
          Looks::kAskedAlways, Hurry::kNone, job, settings);
-    if (slot.match.state == MatchState::kFound) {
-      slot.match_agrees = from_map.valid && agrees(slot.match, from_map, gate);
-    }
+    slot.match_agrees = slot.match.state == MatchState::kFound && from_map.valid && agrees(slot.match, from_map, gate);
   }
   if (slot.match.state == MatchState::kFound) {
+    if (hold_against_last_view(slot, from_neighbours.valid ? from_neighbours : predict_from_velocity(slot, job), job)) {
+      const PixelPrediction from_map = predict_now(map, job, model);
+      slot.match_agrees = from_map.valid && agrees(slot.match, from_map, gate);
+    }
     believe(slot, job);
   } else {
     make_last_view(slot, job);

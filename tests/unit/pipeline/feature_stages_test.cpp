@@ -146,15 +146,19 @@ struct ChangingLooks : Candidate {
 
   ChangingLooks() { job.view_tracker = &view_tracker; }
 
-  void next_look(double share, const Vector2d& by) {
+  std::unique_ptr<test::ImageBuffer> look(double share, const Vector2d& at) {
     test::View moved;
-    moved.t = shift + by;
-    auto image = std::make_unique<test::ImageBuffer>(view(moved.t));
+    moved.t = at;
+    auto image = std::make_unique<test::ImageBuffer>(view(at));
     test::ImageBuffer faded = test::render(other, moved, kWidth, kHeight, 1, random);
     for (std::size_t i = 0; i < image->pixels.size(); ++i) {
       const double grey = (1 - share) * image->pixels[i] + share * faded.pixels[i];
       image->pixels[i] = static_cast<std::uint8_t>(std::lround(grey));
     }
+    return image;
+  }
+  void next_look(double share, const Vector2d& by) {
+    auto image = look(share, shift + by);
     job.before = before != nullptr ? before->view() : GreyImage{};
     next_frame(by, *image);
     before = std::move(image);
@@ -180,6 +184,38 @@ TEST_F(ChangingLooks, AreFollowedFromTheFrameBeforeAndTheDriftIsTold) {
   EXPECT_TRUE(is_found());
   EXPECT_FALSE(slot.seen_by_last_view);
   EXPECT_EQ(slot.last_view.drift_px2(), 0);
+}
+
+// What is around the feature moves by so little on the whole, and each otherwise, that a look-alike might have moved
+// so.
+TEST_F(ChangingLooks, AreNotMistakenForWhatLooksMoreLikeTheFirstViewBesideIt) {
+  constexpr double kShare = 0.33, kLessFaded = 0.3, kAway_px = 24;
+  constexpr int kFrames = 10, kHalf = 12;
+  for (int i = 0; i <= kFrames; ++i) next_look(kShare * i / kFrames, {0, 0});
+  ASSERT_TRUE(is_found());
+  ASSERT_FALSE(slot.seen_by_last_view);
+
+  auto image = look(kShare, shift);
+  test::ImageBuffer like = *look(kLessFaded, shift);
+  const int u = static_cast<int>(place().x()), v = static_cast<int>(place().y());
+  for (int y = -kHalf; y <= kHalf; ++y) {
+    for (int x = -kHalf; x <= kHalf; ++x) image->at(u + static_cast<int>(kAway_px) + x, v + y) = like.at(u + x, v + y);
+  }
+  slot.velocity_px = {kAway_px, 0};
+  job.before = before->view();
+  job.frame = &history->append({});
+  job.image = image->view();
+  motion.clear();
+  for (int i = 0; i < 8; ++i) {
+    const Vector2d from = place() + Vector2d(10 * i - 40, 20);
+    motion.add(from, from + 7.5 * Vector2d(std::cos(M_PI_2 * i), std::sin(M_PI_2 * i)));
+  }
+  predict_and_find(slot, {}, job, model, settings);
+  ASSERT_NEAR(slot.match.px.x(), place().x() + kAway_px, 1) << "the first view should have found the other place";
+  settle_match(slot, {}, job, model, settings);
+  EXPECT_EQ(slot.match.state, MatchState::kFound);
+  EXPECT_LT((slot.match.px - place()).norm(), 1);
+  EXPECT_TRUE(slot.seen_by_last_view);
 }
 
 TEST_F(ChangingLooks, AreNotFollowedWhereTheWayBackEndsElsewhere) {
