@@ -1,4 +1,4 @@
-// Where the sources' threads put what they have got: the pipeline, a recording, or both.
+// Where the sources' threads put what they have got: the pipeline, a recording, and whoever else looks at the frames.
 #pragma once
 
 #include "core/pipeline/sensor_entrance.hpp"
@@ -7,15 +7,27 @@
 
 namespace perimap {
 
-// Either may be null. Each call belongs to one thread.
+// Sees each frame as it came, on the thread that brings it.
+class FrameObserver {
+ public:
+  FrameObserver() = default;
+  FrameObserver(const FrameObserver&) = delete;
+  FrameObserver& operator=(const FrameObserver&) = delete;
+  virtual ~FrameObserver() = default;
+  virtual void frame(const CameraFrame& frame) = 0;
+};
+
+// Each may be null. Each call belongs to one thread.
 struct SensorIntake {
   SensorEntrance* entrance = nullptr;
   SessionRecorder* recorder = nullptr;
+  FrameObserver* observer = nullptr;
 
   // To the pipeline first: it is the one in a hurry.
   void frame(const CameraFrame& as_it_came, const GreyImage& grey, const ColourImage& colour) const noexcept {
     if (entrance != nullptr) static_cast<void>(entrance->push_frame(as_it_came.stamp, grey, colour));
     if (recorder != nullptr) recorder->frame(as_it_came);
+    if (observer != nullptr) observer->frame(as_it_came);
   }
   void pose(const TrackerSample& sample) const noexcept {
     if (entrance != nullptr) entrance->push_pose(sample);

@@ -17,6 +17,8 @@
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/device_setup.hpp"
+#include "daemon/runtime/replay_feeder.hpp"
+#include "daemon/runtime/sensor_intake.hpp"
 #include "daemon/runtime/session_recorder.hpp"
 #include "daemon/runtime/session_recording.hpp"
 #include "daemon/setup/recorded_poses.hpp"
@@ -27,9 +29,9 @@ namespace perimap {
 namespace {
 
 // What the devices' threads leave for the guide: the newest frame, and all poses of the tool that matters.
-class Shown {
+class Shown final : public FrameObserver {
  public:
-  void frame(const CameraFrame& frame) {
+  void frame(const CameraFrame& frame) override {
     const auto grey = converter_.convert(frame);
     if (!grey) return;
     const std::scoped_lock lock(mutex_);
@@ -152,9 +154,6 @@ Expected<LiveRecording> record_live(const LiveOptions& options, const std::strin
   if (!devices->tracker && !devices->camera) {
     return fail(options.configuration + ": names neither a camera nor a tracker; perimap setup writes one that does");
   }
-  if (devices->camera && std::holds_alternative<CameraPlayback>(*devices->camera)) {
-    return fail(options.configuration + ": plays a recording as the camera; measure from it with --from");
-  }
   const std::vector<std::string> names = tracked_tool_names(configuration->tracker);
   if (tool != kScopeTool && std::find(names.begin(), names.end(), tool) == names.end()) {
     return fail(
@@ -177,7 +176,12 @@ Expected<LiveRecording> record_live(const LiveOptions& options, const std::strin
   ThreadLauncher launcher({});
   (*recorder)->start(launcher);
   std::vector<std::jthread> threads;
-  if (devices->camera) {
+  std::unique_ptr<ReplayFeeder> playback;
+  if (auto* played = devices->camera ? std::get_if<CameraPlayback>(&*devices->camera) : nullptr) {
+    const SensorIntake intake{nullptr, recorder->get(), &shown};
+    playback = std::make_unique<ReplayFeeder>(std::move(played->reader), intake, played->offset);
+    playback->start(launcher);
+  } else if (devices->camera) {
     threads.emplace_back([&] {
       const CameraSink sink = [&](const CameraFrame& frame) {
         (*recorder)->frame(frame);
@@ -210,15 +214,20 @@ Expected<LiveRecording> record_live(const LiveOptions& options, const std::strin
       shown.tell(guide);
       std::string line = guide.line();
       for (const DeviceHealth* health : {&camera_health, &tracker_health}) {
-        if (!health->reason().empty()) line += "; " + health->reason();
+        // Of one that delivers it is why it once did not.
+        const std::string reason = health->state() == DeviceState::kStreaming ? "" : health->reason();
+        if (!reason.empty()) line += "; " + reason;
       }
       lines.show(elapsed_s, line);
+      if (playback && playback->ended()) break;
       if (stopped || guide.enough() || elapsed_s >= options.longest_s || (*recorder)->summary().stopped) break;
     }
   }
   interrupt.request();
   threads.clear();
+  if (playback) playback->stop();
   (*recorder)->stop();
+  if (playback && playback->error()) return fail(playback->error()->message);
   if ((*recorder)->summary().stopped) return fail((*recorder)->reason());
   if ((*recorder)->summary().recorded == 0) {
     return fail(fmt::format("no device gave anything: perimap probe {} says why", options.configuration));

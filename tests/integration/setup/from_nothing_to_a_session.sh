@@ -38,18 +38,25 @@ quiet simulate check.mcap --scene board "${common[@]}" --seed "$((seed + 1000))"
 quiet simulate still.mcap --scene still "${common[@]}" --seed "$seed" --duration 60
 quiet simulate landmarks.mcap --scene landmarks "${common[@]}" --seed "$seed"
 
-# ---- measure it
+quiet simulate stop.mcap --scene board "${common[@]}" --seed "$seed" --duration 2 --fps 5 --field-stop 40
+
+# ---- measure it; what each command shows and prints stays, for the browser (pages_open_in_a_browser.sh)
+mkdir pages
+shown() { # NAME COMMAND...
+  local name=$1
+  shift
+  quiet "$@" --html "pages/$name.html" --json
+  cp out "pages/$name.json"
+  cp out "$name.json"
+}
 quiet setup --output devices.toml --camera none --tracker none --ecg none --seconds 0
-quiet calibrate camera --from board.mcap --square-mm 8 --output camera.yaml --configuration devices.toml --json
-cp out camera.json
-quiet calibrate hand-eye --from board.mcap --square-mm 8 --configuration devices.toml --html hand-eye.html --json
-cp out hand-eye.json
-quiet calibrate time --from board.mcap --square-mm 8 --configuration devices.toml --json
-cp out time.json
-quiet calibrate tool --from board.mcap --output pointer.json
-quiet calibrate tracker --from still.mcap --configuration devices.toml --json
-cp out tracker.json
-quiet register --model image.csv --from landmarks.mcap --tip pointer.json --output registration.json
+shown camera calibrate camera --from board.mcap --square-mm 8 --output camera.yaml --configuration devices.toml
+shown hand-eye calibrate hand-eye --from board.mcap --square-mm 8 --configuration devices.toml
+shown time calibrate time --from board.mcap --square-mm 8 --configuration devices.toml
+shown tool calibrate tool --from board.mcap --output pointer.json
+shown tracker calibrate tracker --from still.mcap --configuration devices.toml
+shown scope calibrate scope --from stop.mcap
+shown register register --model image.csv --from landmarks.mcap --tip pointer.json --output registration.json
 quiet check devices.toml
 # Without what OpenCV's solvers make of it.
 tr -d ' \n' < hand-eye.json | sed 's/"opencv":.*}},//' > ours.json
@@ -68,7 +75,7 @@ near "tracker's rotation noise, degrees" "$(number tracker.json rotation_deviati
 at_most "registration, mm left over" "$(number registration.json fre_mm)" 0.5
 
 # ---- is it right?
-quiet verify devices.toml --from check.mcap --square-mm 8 --tip pointer.json --bound-mm 2 --output verified.json
+shown verify verify devices.toml --from check.mcap --square-mm 8 --tip pointer.json --bound-mm 2 --output verified.json
 grep -q '"passed": true' verified.json || fail "verify passed, and its record says otherwise"
 sed 's/^hand_eye_translation_SC_mm = .*/hand_eye_translation_SC_mm = [40.0, 0.0, 30.0]/' devices.toml > wrong.toml
 sed 's/^time_offset_ms = .*/time_offset_ms = 250.0/' devices.toml > late.toml
