@@ -1,6 +1,6 @@
 // Draws the predicted surface over the video, frame by frame as perimapd releases them.
 //
-//   overlay VIDEO CALIBRATION OUTPUT [--domain N] [--first-sequence N] [--seconds S]
+//   overlay VIDEO CALIBRATION OUTPUT [--domain N] [--first-sequence N] [--seconds S] [--held]
 //
 // VIDEO is what the camera of that perimapd sees, from its frame --first-sequence on (0). OUTPUT is a video (.avi), or
 // a picture
@@ -8,6 +8,11 @@
 // after
 // --seconds, or when perimapd has been silent for ten seconds. Each frame is told on standard output, as JSON in a
 // line.
+//
+// An angled scope that is turned in its camera head, or zoomed, has another principal point and focal length than
+// CALIBRATION, and no sample tells them. Where the status says that a field stop is seen nothing is drawn, therefore,
+// unless
+// --held says that the scope is held as it was calibrated; and nothing any more once it has been turned or zoomed.
 //
 // For each released frame there is a sample of `surface`, which tells when it was captured and where the camera was.
 // The newest `surface_model` says where each feature was at that very instant: perimap_client.hpp evaluates it, or
@@ -40,6 +45,7 @@ struct Options {
   int domain = 0;
   std::uint64_t first_sequence = 0;
   double seconds = 1e9;
+  bool held = false;  // the scope is turned and zoomed as in CALIBRATION
 };
 
 std::int64_t monotonic_ns() {
@@ -194,11 +200,23 @@ const char* name_of(perimap_FeatureState state) {
   }
 }
 
+// Why CALIBRATION may not be the picture's; null: it is.
+const char* lens_doubt(const perimap_Status* status, bool held) {
+  if (status == nullptr) return "no status yet: it is not known how the scope is held";
+  if (status->scope_turns > 0) return "the scope was turned or zoomed: its lens is not told";
+  if (status->scope_turn != perimap_SCOPE_TURN_UNREAD && !held) {
+    return "the scope may be turned: its lens is not told (--held: it is as calibrated)";
+  }
+  return nullptr;
+}
+
 // Draws what is predicted for this frame and tells it; what is refused is written over the picture instead.
 void draw(const perimap_Surface& frame, const perimap_SurfaceModel* model, const perimap_SurfaceMesh* newest_mesh,
-          const Camera& camera, PredictedSurface& surface, PredictedMesh& mesh, cv::Mat& picture) {
-  const char* refused = nullptr;
-  if (model == nullptr) {
+          const Camera& camera, const char* doubt, PredictedSurface& surface, PredictedMesh& mesh, cv::Mat& picture) {
+  const char* refused = doubt;
+  if (refused != nullptr) {
+    // The predictions are as good as ever; where they are in the picture is not known.
+  } else if (model == nullptr) {
     refused = "no model yet";
   } else if (!frame.camera_pose_known) {
     refused = "it is not known where the camera was";
@@ -241,6 +259,7 @@ int run(const Options& options) {
   Subscriber<perimap_Surface> surfaces(participant, perimap_Surface_desc, "perimap/surface", false, 16);
   Subscriber<perimap_SurfaceModel> models(participant, perimap_SurfaceModel_desc, "perimap/surface_model", true, 1);
   Subscriber<perimap_SurfaceMesh> meshes(participant, perimap_SurfaceMesh_desc, "perimap/surface_mesh", true, 1);
+  Subscriber<perimap_Status> states(participant, perimap_Status_desc, "perimap/status", true, 1);
 
   PredictedSurface surface;
   PredictedMesh mesh;
@@ -252,12 +271,14 @@ int run(const Options& options) {
          static_cast<double>(monotonic_ns() - begun) < 1e9 * options.seconds) {
     models.take([](const perimap_SurfaceModel&) {});
     meshes.take([](const perimap_SurfaceMesh&) {});
+    states.take([](const perimap_Status&) {});
     surfaces.take([&](const perimap_Surface& frame) {
       heard = monotonic_ns();
       // A surface of a frame that never came has no picture.
       cv::Mat picture;
       if (frame.reason == perimap_SURFACE_REASON_FRAME_MISSING || !video.read(frame.frame_sequence, picture)) return;
-      draw(frame, models.newest(), meshes.newest(), camera, surface, mesh, picture);
+      const char* doubt = lens_doubt(states.newest(), options.held);
+      draw(frame, models.newest(), meshes.newest(), camera, doubt, surface, mesh, picture);
       output.add(picture);
     });
     dds_sleepfor(DDS_MSECS(2));
@@ -267,7 +288,7 @@ int run(const Options& options) {
 }
 
 int usage() {
-  std::fprintf(stderr, "overlay VIDEO CALIBRATION OUTPUT [--domain N] [--first-sequence N] [--seconds S]\n");
+  std::fprintf(stderr, "overlay VIDEO CALIBRATION OUTPUT [--domain N] [--first-sequence N] [--seconds S] [--held]\n");
   return 2;
 }
 
@@ -279,8 +300,13 @@ int main(int argc, char** argv) {
   options.video = argv[1];
   options.calibration = argv[2];
   options.output = argv[3];
-  for (int i = 4; i + 1 < argc; i += 2) {
-    if (std::strcmp(argv[i], "--domain") == 0) {
+  for (int i = 4; i < argc; i += 2) {
+    if (std::strcmp(argv[i], "--held") == 0) {
+      options.held = true;
+      --i;  // it has no value
+    } else if (i + 1 == argc) {
+      return usage();
+    } else if (std::strcmp(argv[i], "--domain") == 0) {
       options.domain = std::atoi(argv[i + 1]);
     } else if (std::strcmp(argv[i], "--first-sequence") == 0) {
       options.first_sequence = std::strtoull(argv[i + 1], nullptr, 10);
