@@ -29,8 +29,33 @@ Vector3d error_T(const TimedPose& pose, const Vector3d& tip_T, const Vector3d& p
   return tip_T - pose.X.R.transpose() * (pivot_W - pose.X.t);
 }
 
-// Over the poses chosen, errors weighted by W in the tool's frame.
-Solution solve(const std::vector<TimedPose>& poses, const std::vector<char>& used, const Matrix3d& W) {
+// Variance per axis of the tracker's orientation noise, rad^2: what it makes of the tip lies across the arm alone.
+double rotation_variance(const Matrix3d& error_covariance, const Vector3d& tip_T) {
+  const double along = tip_T.dot(error_covariance * tip_T) / tip_T.squaredNorm();
+  const double across = 0.5 * (error_covariance.trace() - along);
+  return std::max(0.0, across - along) / tip_T.squaredNorm();
+}
+
+// What the noise of the orientations makes of the normal equations' sum J^T W e at the true tip, in which it stands in
+// J and in e: without it the arm comes out too short where the tool hardly turned (errors in variables; Fuller 1987).
+// Orientations exp([d]) off with d of variance s^2 per axis: E e = s^2 tip, and E [d] W e = s^2 sum_k [e_k] W [e_k]
+// tip.
+Vector6d orientation_bias(const std::vector<TimedPose>& poses, const std::vector<char>& used, const Matrix3d& W,
+                          double variance, const Vector3d& tip_T) {
+  Matrix3d turned = W;
+  for (int k = 0; k < 3; ++k) turned += cross_matrix(Vector3d::Unit(k)) * W * cross_matrix(Vector3d::Unit(k));
+  Vector6d bias = Vector6d::Zero();
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (used[i] == 0) continue;
+    bias.head<3>() += variance * (W * tip_T);
+    bias.tail<3>() -= variance * (poses[i].X.R * (turned * tip_T));
+  }
+  return bias;
+}
+
+// Over the poses chosen, errors weighted by W in the tool's frame; `bias`: orientation_bias().
+Solution solve(const std::vector<TimedPose>& poses, const std::vector<char>& used, const Matrix3d& W,
+               const Vector6d& bias = Vector6d::Zero()) {
   Solution solution{Vector3d::Zero(), Vector3d::Zero(), Eigen::Matrix<double, 6, 6>::Zero()};
   Vector6d g = Vector6d::Zero();
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -41,7 +66,7 @@ Solution solve(const std::vector<TimedPose>& poses, const std::vector<char>& use
     solution.information += J.transpose() * W * J;
     g -= J.transpose() * W * (X.R.transpose() * X.t);
   }
-  const Vector6d x = solution.information.ldlt().solve(g);
+  const Vector6d x = solution.information.ldlt().solve(g + bias);
   solution.tip_T = x.head<3>();
   solution.pivot_W = x.tail<3>();
   return solution;
@@ -143,8 +168,10 @@ Expected<PivotCalibration> calibrate_pivot(const std::vector<TimedPose>& poses) 
   Matrix3d W = Matrix3d::Identity();
   Solution s = solve(poses, result.used, W);
   for (int round = 0; round < 4; ++round) {
-    W = error_covariance(poses, result.used, s).inverse();
-    s = solve(poses, result.used, W);
+    const Matrix3d covariance = error_covariance(poses, result.used, s);
+    W = covariance.inverse();
+    const double variance = rotation_variance(covariance, s.tip_T);
+    s = solve(poses, result.used, W, orientation_bias(poses, result.used, W, variance, s.tip_T));
   }
   result.tip_T = s.tip_T;
   result.pivot_W = s.pivot_W;

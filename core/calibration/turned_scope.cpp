@@ -136,6 +136,16 @@ Expected<void> check_zooms(const std::vector<SetupAtRotation>& setups) {
               " px): turn the scope at one zoom, and tell of other zooms by --zoom");
 }
 
+// The principal point at the reference by all set-ups, each turned back to it.
+Vector2d reference_principal(const std::vector<SetupAtRotation>& setups, const TurnedScope& scope) {
+  Vector2d arm = Vector2d::Zero();
+  for (const SetupAtRotation& setup : setups) {
+    const Eigen::Rotation2Dd back(-turn_between(setup.rotation_rad, scope.reference.rotation_rad));
+    arm += back * (setup.principal_px - scope.turn_px) / static_cast<double>(setups.size());
+  }
+  return scope.turn_px + arm;
+}
+
 Expected<TurnedScope> fitted(const std::vector<SetupAtRotation>& setups, const Vector2d& turn_px) {
   constexpr double kLeastTurn_rad = 20.0 * kDegree;
   TurnedScope scope;
@@ -156,6 +166,7 @@ Expected<TurnedScope> fitted(const std::vector<SetupAtRotation>& setups, const V
         "set-ups at two turns of the scope are needed, 20 degrees apart and more, better three: turn the scope in its "
         "camera head, and measure lens and hand-eye again");
   }
+  scope.reference.principal_px = reference_principal(setups, scope);
   // A sensor that turns with the scope is not carried about at all.
   scope.sensor_on_scope = std::all_of(turns.begin(), turns.end(), [](const Turns& turn) {
     return so3_log(turn.carried.R).norm() < std::min(3.0 * kDegree, 0.2 * std::abs(turn.angle));

@@ -41,6 +41,7 @@ ecg            20 minutes   statistics --long ecg
 horizons       30 minutes   statistics --long horizons
 late            5 minutes   statistics --long late
 ventilated     20 minutes   statistics --long ventilated
+setups         15 minutes   statistics_setups: 50 set-ups drawn at random, measured
 watched-setups  2 minutes   statistics_watched_setups: what the watch says of right and wrong set-ups
 watched-lies   15 minutes   what the watch says in sessions whose set-up is wrong
 watched-truth  20 minutes   what it says in sessions whose set-up is right
@@ -325,6 +326,12 @@ make_ecg() { of_statistics ecg; }
 make_horizons() { of_statistics horizons; }
 make_late() { of_statistics late; }
 make_ventilated() { of_statistics ventilated; }
+
+make_setups() {
+  command='statistics_setups --seed 996341 --trials 50 hand-eye slow tool tracker scope camera'
+  # shellcheck disable=SC2086
+  "$build/tests/statistics/"$command | as_printed
+}
 
 make_watched_setups() {
   command='statistics_watched_setups 60'

@@ -46,6 +46,15 @@ TEST(TurnedScope, IsKnownAtTurnsThatNobodyMeasured) {
   }
 }
 
+TEST(TurnedScope, PrincipalPointIsThatOfAllSetUps) {
+  const Built scope;
+  SetupAtRotation off = scope.at(0.1);
+  off.principal_px += Vector2d(3.0, 0.0);
+  const auto fitted = fit_turned_scope({off, scope.at(1.2), scope.at(2.5)}, {320.0, 240.0});
+  ASSERT_TRUE(fitted) << fitted.error().message;
+  EXPECT_NEAR((fitted->at(0.7).principal_px - scope.at(0.7).principal_px).norm(), 1.0, 1e-9) << "a third of it";
+}
+
 TEST(TurnedScope, HalfATurnIsFittedTheRightWayRound) {
   const Built scope;
   SetupAtRotation half = scope.at(3.14);
