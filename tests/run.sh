@@ -57,6 +57,7 @@ fi
 logs=build/logs
 mkdir -p "$logs"
 running=
+ahead=
 failures=()
 second_try=()
 
@@ -66,6 +67,7 @@ say() { printf '[%s] %s\n' "$(elapsed)" "$*"; }
 # timeout(1) makes a process group of its own and passes the signal on to all of it.
 stop() {
   trap - INT TERM
+  stop_ahead
   if [ -n "$running" ]; then kill -TERM "$running" 2> /dev/null && wait "$running"; fi
   say "Stopped."
   exit 130
@@ -114,10 +116,8 @@ if command -v ccache > /dev/null; then
   launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
 fi
 
-# Compiles all that compiles (-k 0): one run tells every error.
-build() { # PRESET BUILD_OPTION...
+configure() { # PRESET
   local preset=$1 tests=all undefined=all quick=OFF
-  shift
   if [ $full = no ]; then quick=ON; fi
   # Which tests: see perimap_test in cmake/PerimapLibrary.cmake. A unit test once is enough for a quick run.
   case $preset in
@@ -131,8 +131,31 @@ build() { # PRESET BUILD_OPTION...
       ;;
   esac
   step "$preset configure" 5m cmake --preset "$preset" -DPERIMAP_TESTS=$tests -DPERIMAP_UNDEFINED=$undefined \
-    -DPERIMAP_QUICK=$quick "${launcher[@]}" &&
-    step "$preset build" 90m cmake --build --preset "$preset" -j "$jobs" "$@" -- -k 0
+    -DPERIMAP_QUICK=$quick "${launcher[@]}"
+}
+
+# Compiles all that compiles (-k 0): one run tells every error.
+compile() { # PRESET BUILD_OPTION...
+  local preset=$1
+  shift
+  step "$preset build" 90m cmake --build --preset "$preset" -j "$jobs" "$@" -- -k 0
+}
+
+build() { configure "$1" && compile "$@"; }
+
+# Tests of whole programs wait for clocks and devices more than they compute: what they leave of the processors is for the
+# build that comes next, at the lowest priority. compile() goes on where it was stopped, and tells its errors.
+compile_ahead() { # PRESET
+  timeout 90m nice -n 19 cmake --build --preset "$1" -j "$jobs" -- -k 0 > "$logs/$1-build-ahead.log" 2>&1 < /dev/null &
+  ahead=$!
+}
+
+stop_ahead() {
+  if [ -n "$ahead" ]; then
+    kill -TERM "$ahead" 2> /dev/null
+    wait "$ahead"
+    ahead=
+  fi
 }
 
 # Many tests run programs against the machine's clock, several at a time, and the machine may have other work besides.
@@ -145,6 +168,7 @@ run_tests() { # NAME PRESET CTEST_OPTION...
     local failed
     failed=$(sed -n '/^The following tests FAILED/,$p' "$log" | grep -aoE '[0-9]+ - [^ ]+' | cut -d ' ' -f 3)
     printf '%s\n' "$failed"
+    stop_ahead
     if [ -n "$failed" ] && step "$name again" 60m ctest --preset "$preset" -j 1 --timeout 300 --rerun-failed; then
       unset 'failures[-1]'
       second_try+=("$failed")
@@ -175,9 +199,15 @@ packages=--test
 if [ $full = yes ]; then packages=--full; fi
 deploy/install-packages.sh $packages || exit 1
 
-if [ ${#parts[@]} -eq 0 ]; then
-  parts=(dev asan)
-  if [ $full = yes ]; then parts+=(tsan long fuzz lint); fi
+if [ $full = no ]; then
+  if build dev; then
+    if configure asan; then compile_ahead asan; fi
+    run_tests "dev tests" dev -LE long
+    stop_ahead
+  fi
+  if build asan; then run_tests "asan tests" asan -LE long; fi
+elif [ ${#parts[@]} -eq 0 ]; then
+  parts=(dev asan tsan long fuzz lint)
 fi
 for part in "${parts[@]}"; do
   case $part in
