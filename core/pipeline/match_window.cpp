@@ -12,16 +12,13 @@ constexpr Duration kTwistWithin = std::chrono::milliseconds(170);
 
 void MatchWindow::add(const FrameRecord& frame, std::span<const FeatureSlot> slots) noexcept {
   const Instant capture = frame.stamp.capture;
-  // Half a frame's time early is on time.
-  const Duration early = std::chrono::duration_cast<Duration>(std::chrono::duration<double>(0.5 / frame.rate.per_s()));
   if (!frame.measurable) return;
-  if (begin_ != end_) {
-    const Instant last = frames_[(end_ - 1) % kFrames].capture;
-    if (capture < last)
-      clear();
-    else if (capture - last + early < kEvery)
-      return;
-  }
+  if (begin_ != end_ && capture < frames_[(end_ - 1) % kFrames].capture) clear();
+  // Half a frame's time early is on time, and what one frame is late the next is not: so many a second on the whole.
+  const Duration early = std::chrono::duration_cast<Duration>(std::chrono::duration<double>(0.5 / frame.rate.per_s()));
+  if (begin_ == end_ || capture - due_ > kEvery) due_ = capture;
+  if (capture + early < due_) return;
+  due_ += kEvery;
   if (end_ - begin_ == kFrames) ++begin_;
   WindowFrame& added = frames_[end_ % kFrames];
   std::size_t& count = counts_[end_ % kFrames];

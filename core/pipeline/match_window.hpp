@@ -83,6 +83,7 @@ class MatchWindow {
   std::size_t slots_;
   std::uint64_t begin_ = 0;
   std::uint64_t end_ = 0;
+  Instant due_;  // the next frame
 };
 
 // How fast the camera moves at a frame of the history, by a straight line through the poses of the frames about it: a

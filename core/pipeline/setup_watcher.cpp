@@ -48,7 +48,7 @@ void SetupWatcher::take(const FrameHistory& history, std::span<const FeatureSlot
   // What was judged already tells nothing new: a tool that is hidden, a phase that is lost.
   const std::uint64_t newest_told = window_.newest_told();
   if (newest_told == judged_frame_ || window_.told() < kFewestFrames || !choose_features(slots)) return;
-  copy_window(bank);
+  copy_window(bank, frame.rate);
   if (round_->frame_count < kFewestFrames) return;
   judged_frame_ = newest_told;
   discarded_ = false;
@@ -115,11 +115,12 @@ bool SetupWatcher::choose_features(std::span<const FeatureSlot> slots) noexcept 
   return true;
 }
 
-void SetupWatcher::copy_window(const MapBank& bank) noexcept {
+void SetupWatcher::copy_window(const MapBank& bank, const FrameRate& rate) noexcept {
   Round& round = *round_;
   round.feature_count = chosen_.size();
   for (std::size_t i = 0; i < chosen_.size(); ++i) bank.get(static_cast<int>(chosen_[i]), round.x[i]);
   round.frame_count = 0;
+  round.rate = rate;
   for (std::uint64_t number = window_.begin(); number != window_.end(); ++number) {
     const WindowFrame& frame = window_.frame(number);
     if (frame.state != WindowFrame::State::kTold) continue;
@@ -144,7 +145,7 @@ void SetupWatcher::dismiss() noexcept { hand_over_.dismiss(); }
 
 void SetupWatcher::judge() noexcept {
   const Round& round = *round_;
-  const double alike = matches_alike(FrameRate(1.0 / to_seconds(MatchWindow::kEvery)));
+  const double alike = matches_alike(FrameRate(std::min(round.rate.per_s(), 1.0 / to_seconds(MatchWindow::kEvery))));
   WatchedWindow window;
   window.error_correlation_s = error_correlation_s_;
   window.features.assign(round.x.begin(), round.x.begin() + static_cast<std::ptrdiff_t>(round.feature_count));

@@ -60,6 +60,7 @@ class SetupWatcher {
     std::array<std::array<WindowMatch, kFeatures>, MatchWindow::kFrames> matches;  // slot: the feature's number
     std::array<std::size_t, MatchWindow::kFrames> counts{};
     std::array<StateVector, kFeatures> x;
+    FrameRate rate;  // of the camera
     std::size_t frame_count = 0;
     std::size_t feature_count = 0;
   };
@@ -72,7 +73,7 @@ class SetupWatcher {
   };
 
   [[nodiscard]] bool choose_features(std::span<const FeatureSlot> slots) noexcept;
-  void copy_window(const MapBank& bank) noexcept;
+  void copy_window(const MapBank& bank, const FrameRate& rate) noexcept;
   void judge() noexcept;
 
   CameraModel camera_;

@@ -12,13 +12,18 @@ namespace perimap {
 
 // One window's doubt is told at once where it is far beyond chance; else two in a row must blame, and one part is
 // blamed by both. It ends when three would have shown it and do not, with none between them that doubts. A window of
-// which nothing is known changes nothing.
+// which nothing is known changes nothing; after three of them in a row nothing is known of a set-up that is not
+// doubted.
 class SetupBelief {
  public:
   // `after`: since the first frame.
   void add(const SetupVerdict& verdict, Duration after) noexcept {
     ++judged_;
-    if (verdict.state == SetupState::kUnknown) return;
+    unknown_ = verdict.state == SetupState::kUnknown ? unknown_ + 1 : 0;
+    if (unknown_ > 0) {
+      if (unknown_ >= kToForget && !doubted_) told_ = {};
+      return;
+    }
     const bool doubts = verdict.state == SetupState::kDoubted;
     const bool again = doubts && newest_.state == SetupState::kDoubted && blame_alike(verdict, newest_);
     const bool certain = doubts && verdict.certainty >= kCertain;
@@ -57,6 +62,7 @@ class SetupBelief {
 
  private:
   static constexpr int kToBelieve = 3;
+  static constexpr int kToForget = 3;
   static constexpr double kCertain = 2.0;  // as a multiple of what a doubt needs
 
   [[nodiscard]] static bool blame_alike(const SetupVerdict& a, const SetupVerdict& b) noexcept {
@@ -70,6 +76,7 @@ class SetupBelief {
   SetupVerdict told_;
   bool doubted_ = false;
   int consistent_ = 0;  // windows since the last one that doubts
+  int unknown_ = 0;     // windows in a row
   double widening_mm_ = 0.0;
   std::uint64_t judged_ = 0;
   std::optional<Duration> first_doubted_;

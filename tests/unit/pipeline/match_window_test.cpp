@@ -64,11 +64,11 @@ struct WatchedFrames : ::testing::Test {
 
 TEST_F(WatchedFrames, AreAboutTwentyASecondForTwentySeconds) {
   add_seconds(40.0);
-  EXPECT_NEAR(static_cast<double>(window->end() - window->begin()), 20.0 / 0.066, 3.0);
+  EXPECT_NEAR(static_cast<double>(window->end() - window->begin()), 20.0 / 0.05, 4.0);
   const Instant oldest = window->frame(window->begin()).capture, newest = window->frame(window->end() - 1).capture;
   EXPECT_LE(newest - oldest, MatchWindow::kLength);
   for (std::uint64_t i = window->begin(); i + 1 < window->end(); ++i) {
-    EXPECT_EQ(window->frame(i + 1).capture - window->frame(i).capture, milliseconds(66));
+    EXPECT_LE(window->frame(i + 1).capture - window->frame(i).capture, milliseconds(66));
   }
 }
 

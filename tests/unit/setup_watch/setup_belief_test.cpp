@@ -97,6 +97,25 @@ TEST(SetupBelief, AWindowOfWhichNothingIsKnownChangesNothing) {
   EXPECT_TRUE(belief.doubted());
 }
 
+TEST(SetupBelief, IsNotConsistentAnyMoreWhenThreeWindowsInARowTellNothing) {
+  SetupBelief belief;
+  belief.add(verdict(SetupState::kConsistent), seconds(3));
+  for (int i = 0; i < 2; ++i) belief.add(verdict(SetupState::kUnknown), seconds(6 + 3 * i));
+  EXPECT_EQ(belief.told().state, SetupState::kConsistent);
+  belief.add(verdict(SetupState::kUnknown), seconds(12));
+  EXPECT_EQ(belief.told().state, SetupState::kUnknown);
+  belief.add(verdict(SetupState::kConsistent), seconds(15));
+  EXPECT_EQ(belief.told().state, SetupState::kConsistent);
+}
+
+TEST(SetupBelief, StaysDoubtedWhileWindowsTellNothing) {
+  SetupBelief belief;
+  for (int i = 0; i < 2; ++i) belief.add(doubt_of(SetupPart::kFocalLength), seconds(3 + 3 * i));
+  for (int i = 0; i < 9; ++i) belief.add(verdict(SetupState::kUnknown), seconds(9 + 3 * i));
+  EXPECT_TRUE(belief.doubted());
+  EXPECT_EQ(belief.told().state, SetupState::kDoubted);
+}
+
 TEST(SetupBelief, WidensByTheNewestWindow) {
   SetupBelief belief;
   EXPECT_EQ(belief.variance_mm2(), 0.0);
