@@ -409,6 +409,10 @@ inline const char* describe(perimap_SurfaceReason reason) noexcept {
       return "how the scope is turned in its camera head cannot be read";
     case perimap_SURFACE_REASON_SCOPE_CHANGED:
       return "the scope has been turned or zoomed, and its turns are not calibrated";
+    case perimap_SURFACE_REASON_POSE_REPEATED:
+      return "the tracker gives the same pose again and again";
+    case perimap_SURFACE_REASON_PICTURE_REPEATED:
+      return "the camera gives the same picture again and again";
     default:
       return "a reason that this client does not know";
   }

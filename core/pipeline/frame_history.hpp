@@ -20,7 +20,8 @@ namespace perimap {
 struct FrameRecord {
   std::uint64_t index = 0;  // the mapper's own count, without gaps
   FrameStamp stamp;
-  bool measurable = false;        // pose and phase are there, so its matches can be learnt from
+  bool repeated = false;          // the picture is the one before bit for bit
+  bool measurable = false;        // pose, phase and a picture of its own are there, so its matches can be learnt from
   bool held = false;              // and are, where the camera is no faster than what is learnt
   std::uint64_t held_number = 0;  // of those that are held, up to this one
   FrameRate rate;                 // of the frames, as known by then
@@ -78,6 +79,13 @@ class FrameHistory {
   // Null before the first frame.
   [[nodiscard]] const FrameRecord* newest() const noexcept {
     return count_ == 0 ? nullptr : &records_[(count_ - 1) % kCapacity];
+  }
+
+  // Index of the oldest frame captured at t or later; count() where there is none.
+  [[nodiscard]] std::uint64_t first_since(Instant t) const noexcept {
+    std::uint64_t index = count_;
+    while (index > oldest_ && records_[(index - 1) % kCapacity].stamp.capture >= t) --index;
+    return index;
   }
 
   [[nodiscard]] Duration span() const noexcept {
@@ -152,7 +160,7 @@ class FrameHistory {
   void set_cardiac_phase(FrameRecord& record, const CardiacClock& clock) const noexcept {
     record.phase = clock.at(record.stamp.capture);
     if (record.phase.exact) record.cycle = clock.cycle_at(record.stamp.capture);
-    record.measurable = record.pose.valid() && usable(record.phase.state);
+    record.measurable = record.pose.valid() && usable(record.phase.state) && !record.repeated;
     record.b = basis_at(layout_, record.phase.phase_rad, record.respiration);
     record.b_rate = basis_rate(layout_, record.phase.phase_rad);
   }

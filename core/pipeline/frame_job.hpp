@@ -8,6 +8,7 @@
 #include "core/periodic/basis.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/pipeline/evaluation_plan.hpp"
+#include "core/pipeline/frame_doubts.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/phase_spread.hpp"
 #include "core/pipeline/scouts.hpp"
@@ -38,14 +39,10 @@ struct FrameJob {
   // After B: how the features found have moved, and the pose that they agree on; null when they do not tell it.
   const NeighbourMotion* motion = nullptr;
   const CommonEstimate* shared_pose = nullptr;
-  bool scope_unread = false;        // how the scope is turned in this frame is not known
-  bool scope_changed = false;       // it is turned otherwise than at first, and nothing tells what follows
-  bool no_parallax = false;         // the camera has lately been in one place
-  bool setup_doubted = false;       // see SetupBelief
-  double setup_variance_mm2 = 0.0;  // likewise, per axis
-  bool starts_fail_alike = false;   // of more features than have an estimate: it is not the single feature's fault
-  LawBelief law;                    // by which the history's phases are told
-  Instant learn_until;              // learning that has not begun by then is put off; never in lockstep
+  FrameDoubts doubts;
+  bool starts_fail_alike = false;  // of more features than have an estimate: it is not the single feature's fault
+  LawBelief law;                   // by which the history's phases are told
+  Instant learn_until;             // learning that has not begun by then is put off; never in lockstep
 };
 
 }  // namespace perimap

@@ -61,7 +61,10 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, s
 void Mapper::add_pose(const TrackerSample& sample) noexcept {
   const RealtimeScope realtime;
   const bool valid = sample.state == ToolState::kOk;
-  if (valid && last_reading_ && same_pose(*last_reading_, sample.X_WS)) counters_.poses_repeated.add();
+  const bool repeated = valid && last_reading_ && same_pose(*last_reading_, sample.X_WS);
+  if (repeated) counters_.poses_repeated.add();
+  // By arrival: a tracker that has stopped may stamp as if it had not.
+  pose_repeats_.add(repeated, sample.arrival);
   last_reading_ = valid ? std::optional(sample.X_WS) : std::nullopt;
   if (!poses_.add(sample)) counters_.poses_refused.add();
   last_pose_arrival_ = std::max(last_pose_arrival_, sample.arrival);
@@ -72,9 +75,8 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
   const RealtimeScope realtime;
   finish_learning();
   const Instant begun = MonotonicClock::now();
-  const FrameRecord& frame = begin_frame(stamp, image, ecg);
+  const FrameRecord& frame = begin_frame(stamp, image, before, ecg);
   StageEnds ends;
-  if (same_picture(image, before)) counters_.frames_repeated.add();
   // A
   job_.image = image;
   job_.before = before;
@@ -93,14 +95,14 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
   intake_.offer(frame, image, colour, room());
   if (scope_ != nullptr) scope_->offer(frame.index, frame.rate, image);
   keeping_.fill_feed(breathing_, heart_, counters_.maps_forgotten.get());
-  surface_.on_frame(frame, heart_.clock().law().law, job_.setup_variance_mm2);
+  surface_.on_frame(frame, heart_.clock().law().law, job_.doubts.setup_variance_mm2);
   count(frame, begun, ends);
   // D
   begin_learning(frame);
 }
 
 // The phases and the pose at its capture, and what the workers need of them.
-const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage& image,
+const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage& image, const GreyImage& before,
                                        const CardiacClock& ecg) noexcept {
   take_starts();
   const Breathing::Change breath = breathing_.begin_frame(*history_);
@@ -108,13 +110,15 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage&
   const HeartPhase::Change heart = heart_.begin_frame(ecg, stamp.arrival, stamp.capture);
   tell_earlier_frames(heart, breath);
   FrameRecord& frame = history_->append(stamp);
+  frame.repeated = same_picture(image, before);
+  heed_repeats(frame);
   set_pose(frame, image);
   parallax_.add(frame.pose, stamp.capture);
-  job_.no_parallax = parallax_.none();
+  job_.doubts.still = parallax_.none();
   job_.starts_fail_alike = starts_fail_alike(slots_);
   watcher_.adopt(frame);
-  job_.setup_doubted = watcher_.belief().doubted();
-  job_.setup_variance_mm2 = watcher_.belief().variance_mm2();
+  job_.doubts.setup_doubted = watcher_.belief().doubted();
+  job_.doubts.setup_variance_mm2 = watcher_.belief().variance_mm2();
   history_->set_phase(frame, heart_.clock(), breathing_.clock());
   breathing_.expect_displacement(frame);
   job_.frame = &frame;
@@ -124,19 +128,31 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage&
   return frame;
 }
 
+// What is given again and again is old. A tracker that has said one pose all along may be one that keeps still.
+void Mapper::heed_repeats(const FrameRecord& frame) noexcept {
+  if (frame.repeated) counters_.frames_repeated.add();
+  picture_repeats_.add(frame.repeated, frame.stamp.capture);
+  job_.doubts.picture_repeated = picture_repeats_.long_enough();
+  const bool stuck = pose_repeats_.long_enough() && parallax_.ever();
+  if (stuck && !job_.doubts.pose_repeated) disown_poses(history_->first_since(pose_repeats_.since()));
+  job_.doubts.pose_repeated = stuck;
+}
+
+void Mapper::disown_poses(std::uint64_t since_frame) noexcept {
+  history_->disown_poses(since_frame);
+  watcher_.disown_poses(since_frame);
+}
+
 // By the tracker, and by how the scope is turned: without either there is none.
 void Mapper::set_pose(FrameRecord& frame, const GreyImage& image) noexcept {
-  bool known = true;
+  bool known = !job_.doubts.pose_repeated;
   double turn_deviation_rad = 0.0;
   if (scope_ != nullptr) {
     const ScopeWatch::Frame scope = scope_->begin_frame(frame.index, image);
-    if (scope.mistaken_since) {
-      history_->disown_poses(*scope.mistaken_since);
-      watcher_.disown_poses(*scope.mistaken_since);
-    }
-    job_.scope_unread = scope.unread;
-    job_.scope_changed = scope.changed;
-    known = !scope.unread && !scope.changed;
+    if (scope.mistaken_since) disown_poses(*scope.mistaken_since);
+    job_.doubts.scope_unread = scope.unread;
+    job_.doubts.scope_changed = scope.changed;
+    known = known && !scope.unread && !scope.changed;
     if (scope.state) {
       poses_.set_hand_eye(scope.state->X_SC);
       frame.picture = scope.state->picture;

@@ -25,6 +25,7 @@
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
+#include "core/pipeline/repeats.hpp"
 #include "core/pipeline/scope_watch.hpp"
 #include "core/pipeline/setup_watcher.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
@@ -83,8 +84,10 @@ class Mapper {
     Instant evaluated;  // C
   };
 
-  [[nodiscard]] const FrameRecord& begin_frame(const FrameStamp& stamp, const GreyImage& image,
+  [[nodiscard]] const FrameRecord& begin_frame(const FrameStamp& stamp, const GreyImage& image, const GreyImage& before,
                                                const CardiacClock& ecg) noexcept;
+  void heed_repeats(const FrameRecord& frame) noexcept;
+  void disown_poses(std::uint64_t since_frame) noexcept;
   void set_pose(FrameRecord& frame, const GreyImage& image) noexcept;
   void take_starts() noexcept;
   void tell_earlier_frames(const HeartPhase::Change& heart, const Breathing::Change& breath) noexcept;
@@ -133,6 +136,8 @@ class Mapper {
   Instant last_capture_;
   Instant last_pose_arrival_;
   std::optional<Pose> last_reading_;  // of the tracker; none where it was not valid
+  Repeats pose_repeats_;
+  Repeats picture_repeats_;
   Instant learn_started_;
   bool learning_ = false;                 // a frame's D was begun and has not been joined
   Duration computed_before_learning_{0};  // A to C and the rest of the search, of the frame that is being learnt from

@@ -28,18 +28,24 @@ class Parallax {
     mean_mm_ += share * off;
     spread_mm2_ = (1 - share) * (spread_mm2_ + share * off.squaredNorm());
     noise_mm2_ += share * (noise_mm2 - noise_mm2_);
+    ever_ = ever_ || spread();
   }
 
   // False too while it is not known yet: for some seconds of poses.
-  [[nodiscard]] bool none() const noexcept {
-    constexpr double kLeast_mm = 1.5;  // root mean square about the mean place, beyond the tracker's noise
-    return any_ && last_ - begun_ >= kLately && spread_mm2_ - noise_mm2_ < kLeast_mm * kLeast_mm;
-  }
+  [[nodiscard]] bool none() const noexcept { return any_ && last_ - begun_ >= kLately && !spread(); }
+  // Whether it has been in more than one place since the first pose.
+  [[nodiscard]] bool ever() const noexcept { return ever_; }
 
  private:
   static constexpr Duration kLately = std::chrono::seconds(5);
 
+  [[nodiscard]] bool spread() const noexcept {
+    constexpr double kLeast_mm = 1.5;  // root mean square about the mean place, beyond the tracker's noise
+    return spread_mm2_ - noise_mm2_ >= kLeast_mm * kLeast_mm;
+  }
+
   bool any_ = false;
+  bool ever_ = false;
   Instant begun_, last_;
   Vector3d mean_mm_ = Vector3d::Zero();
   double spread_mm2_ = 0.0;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/estimation/feature_estimate.hpp"
+#include "core/pipeline/frame_doubts.hpp"
 #include "core/pipeline/surface_sample.hpp"
 #include "core/realtime/triple_buffer.hpp"
 
@@ -54,11 +55,7 @@ struct ShardSnapshot {
   Instant capture;                        // of that frame
   CameraPlace camera;                     // at that capture
   bool pose_missing = false;              // that frame gave no measurement for want of a pose
-  bool scope_unread = false;              // likewise, for how the scope is turned is not known
-  bool scope_changed = false;             // likewise, for the scope is turned otherwise, and nothing tells what follows
-  bool no_parallax = false;               // the camera has lately been in one place
-  bool setup_doubted = false;             // as of that frame
-  double setup_variance_mm2 = 0.0;        // likewise, per axis
+  FrameDoubts doubts;                     // likewise of that frame
   std::vector<FeatureSnapshot> features;  // capacity reserved at start
 };
 

@@ -78,11 +78,7 @@ void ShardStages::evaluate_shard(int worker) noexcept {
     snapshot.cameras = job_.plan.cameras;
     snapshot.camera = {job_.frame->pose.valid(), job_.frame->pose.X_WC};
     snapshot.pose_missing = !job_.frame->pose.valid();
-    snapshot.scope_unread = job_.scope_unread;
-    snapshot.scope_changed = job_.scope_changed;
-    snapshot.no_parallax = job_.no_parallax;
-    snapshot.setup_doubted = job_.setup_doubted;
-    snapshot.setup_variance_mm2 = job_.setup_variance_mm2;
+    snapshot.doubts = job_.doubts;
     snapshot.features.clear();
   }
   for_shard(worker, [&](FeatureGroup& group) { group.evaluate(job_, cells.publisher.back(), cells.model.back()); });

@@ -33,7 +33,9 @@ enum class SurfaceReason : std::uint8_t {
   kSetupDoubted,
   kNothingConverged,
   kScopeUnread,
-  kScopeChanged
+  kScopeChanged,
+  kPoseRepeated,
+  kPictureRepeated
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost, kShed };

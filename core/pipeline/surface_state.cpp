@@ -15,19 +15,15 @@ bool is_converged(const FeatureSnapshot& feature) noexcept { return feature.stat
 SurfaceFooting footing_of(std::span<const ShardSnapshot* const> snapshots) noexcept {
   SurfaceFooting footing;
   Sight sight;
-  bool still = false, converged = false;
+  bool converged = false;
   for (const ShardSnapshot* snapshot : snapshots) {
     footing.mapped = footing.mapped || !snapshot->features.empty();
     footing.pose_missing = footing.pose_missing || snapshot->pose_missing;
-    footing.scope_unread = footing.scope_unread || snapshot->scope_unread;
-    footing.scope_changed = footing.scope_changed || snapshot->scope_changed;
+    footing.doubts.add(snapshot->doubts);
     sight.add(*snapshot);
-    still = still || snapshot->no_parallax;
-    footing.setup_doubted = footing.setup_doubted || snapshot->setup_doubted;
-    footing.setup_variance_mm2 = std::max(footing.setup_variance_mm2, snapshot->setup_variance_mm2);
     converged = converged || std::any_of(snapshot->features.begin(), snapshot->features.end(), is_converged);
   }
-  footing.no_parallax = still && !converged;
+  footing.no_parallax = footing.doubts.still && !converged;
   footing.converged = converged;
   footing.not_seen = sight.lost();
   return footing;
@@ -38,16 +34,18 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (phase.state == PhaseState::kLost) return SurfaceReason::kPhaseLost;
   if (!footing.mapped) return SurfaceReason::kNothingMapped;
   // A set-up that is off displaces the surface as breathing may.
-  if (footing.breath_doubtful && !footing.setup_doubted) return SurfaceReason::kRespirationUnknown;
+  if (footing.breath_doubtful && !footing.doubts.setup_doubted) return SurfaceReason::kRespirationUnknown;
   if (phase.state == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
   if (phase.contradicted) return SurfaceReason::kPhaseContradicted;
   if (phase.state == PhaseState::kFromImage) return SurfaceReason::kPhaseFromImage;
   if (footing.frame_missing) return SurfaceReason::kFrameMissing;
   if (footing.update_late) return SurfaceReason::kUpdateLate;
-  if (footing.scope_unread) return SurfaceReason::kScopeUnread;
-  if (footing.scope_changed) return SurfaceReason::kScopeChanged;
+  if (footing.doubts.picture_repeated) return SurfaceReason::kPictureRepeated;
+  if (footing.doubts.scope_unread) return SurfaceReason::kScopeUnread;
+  if (footing.doubts.scope_changed) return SurfaceReason::kScopeChanged;
+  if (footing.doubts.pose_repeated) return SurfaceReason::kPoseRepeated;
   if (footing.pose_missing) return SurfaceReason::kPoseMissing;
-  if (footing.setup_doubted) return SurfaceReason::kSetupDoubted;
+  if (footing.doubts.setup_doubted) return SurfaceReason::kSetupDoubted;
   if (footing.not_seen) return SurfaceReason::kNotSeen;
   if (footing.no_parallax) return SurfaceReason::kNoParallax;
   if (!footing.converged) return SurfaceReason::kNothingConverged;
@@ -74,7 +72,7 @@ SurfaceState state_of(SurfaceReason reason) noexcept {
 FeatureVerdict verdict_of(const FeatureVerdict& own, PhaseState phase, const SurfaceFooting& footing) noexcept {
   if (!usable(phase)) return {FeatureState::kInvalid, FeatureReason::kPhaseLost};
   FeatureVerdict verdict = own;
-  if ((footing.breath_doubtful || footing.setup_doubted) && verdict.state == FeatureState::kConverged) {
+  if ((footing.breath_doubtful || footing.doubts.setup_doubted) && verdict.state == FeatureState::kConverged) {
     verdict = {FeatureState::kConverging, FeatureReason::kDeviationLarge};
   }
   if (verdict.reason == FeatureReason::kNone && (footing.frame_missing || footing.update_late)) {

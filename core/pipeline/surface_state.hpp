@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/phase/cardiac_clock.hpp"
+#include "core/pipeline/frame_doubts.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
 #include "core/pipeline/surface_sample.hpp"
 
@@ -15,14 +16,11 @@ struct SurfaceFooting {
   bool mapped = false;           // there are features
   bool frame_missing = false;
   bool update_late = false;
-  bool scope_unread = false;   // how the scope is turned cannot be read
-  bool scope_changed = false;  // it is turned otherwise than at first, and nothing tells what follows
   bool pose_missing = false;
-  bool not_seen = false;            // see Sight
-  bool no_parallax = false;         // the camera keeps still, and no feature has converged
-  bool converged = true;            // some of the features have
-  bool setup_doubted = false;       // see SetupBelief
-  double setup_variance_mm2 = 0.0;  // per axis, of what the set-up may be off by
+  FrameDoubts doubts = {};
+  bool not_seen = false;     // see Sight
+  bool no_parallax = false;  // the camera keeps still, and no feature has converged
+  bool converged = true;     // some of the features have
 };
 
 // As far as the newest snapshots tell: whether there are features, poses and sight of them.

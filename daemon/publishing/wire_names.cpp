@@ -19,7 +19,7 @@ std::string_view name_of(perimap_SurfaceState state) noexcept {
 }
 
 std::string_view name_of(perimap_SurfaceReason reason) noexcept {
-  return name_in<21>({"none",
+  return name_in<23>({"none",
                       "nothing_mapped",
                       "phase_unknown",
                       "phase_free_running",
@@ -39,7 +39,9 @@ std::string_view name_of(perimap_SurfaceReason reason) noexcept {
                       "setup_doubted",
                       "nothing_converged",
                       "scope_unread",
-                      "scope_changed"},
+                      "scope_changed",
+                      "pose_repeated",
+                      "picture_repeated"},
                      static_cast<int>(reason));
 }
 

@@ -63,6 +63,10 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_SCOPE_UNREAD;
     case SurfaceReason::kScopeChanged:
       return perimap_SURFACE_REASON_SCOPE_CHANGED;
+    case SurfaceReason::kPoseRepeated:
+      return perimap_SURFACE_REASON_POSE_REPEATED;
+    case SurfaceReason::kPictureRepeated:
+      return perimap_SURFACE_REASON_PICTURE_REPEATED;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }

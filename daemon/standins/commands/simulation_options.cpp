@@ -14,7 +14,7 @@ namespace {
 constexpr double kRadians_per_degree = std::numbers::pi / 180.0;
 
 // "BEGIN:LENGTH", s.
-Expected<SimulationSettings::EcgOff> parse_ecg_off(const std::string& text) {
+Expected<SimulationSettings::Stretch> parse_stretch(const char* what, const std::string& text) {
   const char* end = text.data() + text.size();
   double begin_s = 0.0;
   double length_s = 0.0;
@@ -23,9 +23,19 @@ Expected<SimulationSettings::EcgOff> parse_ecg_off(const std::string& text) {
     const auto length = std::from_chars(begin.ptr + 1, end, length_s);
     const bool sound = begin_s >= 0.0 && length_s > 0.0 && begin_s + length_s < 1e6;
     if (length.ec == std::errc{} && length.ptr == end && sound)
-      return SimulationSettings::EcgOff{from_seconds(begin_s), from_seconds(length_s)};
+      return SimulationSettings::Stretch{from_seconds(begin_s), from_seconds(length_s)};
   }
-  return fail(fmt::format("ECG off: expected BEGIN:LENGTH in seconds, such as 30:10, found '{}'", text));
+  return fail(fmt::format("{}: expected BEGIN:LENGTH in seconds, such as 30:10, found '{}'", what, text));
+}
+
+Expected<void> parse_stretches(const char* what, const std::vector<std::string>& texts,
+                               std::vector<SimulationSettings::Stretch>& stretches) {
+  for (const std::string& text : texts) {
+    const auto stretch = parse_stretch(what, text);
+    if (!stretch) return tl::unexpected(stretch.error());
+    stretches.push_back(*stretch);
+  }
+  return {};
 }
 
 Expected<void> parse_size(const std::string& text, SimulationSettings& settings) {
@@ -101,6 +111,13 @@ Option* SimulationOptions::add_to(Command& command) {
       .add_option("--tracker-dropouts", settings_.tracker_dropouts_per_min,
                   "Times a minute that the tracker loses the tool, for 50 to 300 ms")
       ->capture_default_str();
+  command.add_option("--tracker-stuck", tracker_stuck_,
+                     "The tracker gives its last reading again and again, BEGIN:LENGTH in s; may be repeated");
+  command.add_option("--camera-stuck", camera_stuck_, "Likewise the camera its last picture");
+  command
+      .add_option("--camera-repeats", settings_.camera_repeats,
+                  "Each picture comes so often, as of a camera that is slower than its stamps say")
+      ->capture_default_str();
   return noise;
 }
 
@@ -126,10 +143,10 @@ Expected<SimulationSettings> SimulationOptions::settings() const {
   settings.duration = from_seconds(duration_s_);
   settings.respiration_period = from_seconds(respiration_period_s_);
   settings.tracker_correlation = from_seconds(tracker_correlation_s_);
-  for (const std::string& text : ecg_off_) {
-    const auto off = parse_ecg_off(text);
-    if (!off) return tl::unexpected(off.error());
-    settings.ecg_off.push_back(*off);
+  for (const auto& parsed : {parse_stretches("ECG off", ecg_off_, settings.ecg_off),
+                             parse_stretches("tracker stuck", tracker_stuck_, settings.tracker_stuck),
+                             parse_stretches("camera stuck", camera_stuck_, settings.camera_stuck)}) {
+    if (!parsed) return tl::unexpected(parsed.error());
   }
   if (ecg_start_s_) settings.ecg_start = from_seconds(*ecg_start_s_);
   return settings;

@@ -38,6 +38,8 @@ class SimulationOptions {
   std::string size_ = "640x480";
   std::optional<double> ecg_start_s_;
   std::vector<std::string> ecg_off_;
+  std::vector<std::string> tracker_stuck_;
+  std::vector<std::string> camera_stuck_;
   double respiration_period_s_ = 4.0;
   double tracker_correlation_s_ = 0.0;
   double tracker_noise_mm_ = 1.4;

@@ -50,6 +50,15 @@ struct Interval {
   Duration begin, end;
 };
 
+// The stretch that it lies in; null: none.
+const SimulationSettings::Stretch* stretch_of(const std::vector<SimulationSettings::Stretch>& stretches,
+                                              Duration since) noexcept {
+  const auto found = std::find_if(stretches.begin(), stretches.end(), [&](const auto& stretch) {
+    return since >= stretch.begin && since < stretch.begin + stretch.length;
+  });
+  return found == stretches.end() ? nullptr : &*found;
+}
+
 // At most one dropout in each equal part of the session, so that they are spread and as many as asked for.
 std::vector<Interval> dropouts(std::uint64_t seed, Duration duration, double per_min) {
   const CounterNoise noise(seed, kTrackerDropout);
@@ -87,6 +96,7 @@ Expected<void> check(const SimulationSettings& s) {
         outside("tracker rate", s.tracker_rate_hz, 1.0, 1000.0, "Hz"),
         outside("tracker correlation", to_seconds(s.tracker_correlation), 0.0, 1000.0, "s"),
         outside("tracker dropouts", s.tracker_dropouts_per_min, 0.0, 60.0, "a minute"),
+        outside("camera repeats", s.camera_repeats, 1, 100, "times"),
         outside("scope sweep", s.scope_sweep, 0.0, 20.0, "times the usual"),
         outside("exposure", s.exposure_share, 0.0, 1.0, "of the frame period"),
         outside("glints", s.glints, 0, 1000, ""), outside("smoke", s.smoke, 0.0, 10.0, "")})
@@ -257,7 +267,9 @@ void Simulation::read_tracker() {
                                      [&](const Interval& gap) { return since >= gap.begin && since < gap.end; });
     position_error = kept * position_error + drive * normal3(position, k);
     rotation_error = kept * rotation_error + drive * normal3(rotation, k);
-    tracker_stamps_.push_back({start_ + since - setup_.tracker_offset, tracker.arrival(start_ + since, k), missing,
+    const bool stuck = k > 0 && stretch_of(settings_.tracker_stuck, since) != nullptr;
+    tracker_stamps_.push_back({start_ + since - setup_.tracker_offset, tracker.arrival(start_ + since, k),
+                               stuck ? tracker_stamps_.back().reads : static_cast<std::size_t>(k), missing,
                                path_.X_WC(since) * (settings_.turn ? setup_at(since).X_SC.inverse() : X_CS),
                                position_error, rotation_error});
     kept = correlation;
@@ -279,8 +291,7 @@ void Simulation::read_ecg(const EcgRecord& record, std::uint32_t first_sample) {
     block.device_sequence = k;
     block.count = kEcgSamplesPerBlock;
     const Duration since = block.first_sample_time - start_;
-    block.lead_off = std::any_of(settings_.ecg_off.begin(), settings_.ecg_off.end(),
-                                 [&](const auto& off) { return since >= off.begin && since < off.begin + off.length; });
+    block.lead_off = stretch_of(settings_.ecg_off, since) != nullptr;
     for (std::uint32_t i = 0; i < block.count && !block.lead_off; ++i) block.mV[i] = record.mV(from + i);
     ecg_.push_back(block);
   }
@@ -372,7 +383,8 @@ TrackerSample Simulation::tracker_sample(std::size_t index, const TrackerNoise& 
   sample.source_time = stamp.source_time;
   sample.arrival = stamp.arrival;
   sample.device_frame = static_cast<std::uint32_t>(index);
-  if (stamp.missing) {
+  const TrackerStamp& reading = tracker_stamps_[stamp.reads];
+  if (reading.missing) {
     sample.state = ToolState::kMissing;
     sample.X_WS.R.setConstant(std::numeric_limits<double>::quiet_NaN());
     sample.X_WS.t.setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -380,12 +392,19 @@ TrackerSample Simulation::tracker_sample(std::size_t index, const TrackerNoise& 
   }
   const double per_axis = 1.0 / std::numbers::sqrt3;
   sample.state = ToolState::kOk;
-  sample.X_WS.t = stamp.X_WS.t + noise.position_rms_mm * per_axis * stamp.position_error;
-  sample.X_WS.R = stamp.X_WS.R * so3_exp(noise.rotation_rms_rad * per_axis * stamp.rotation_error);
+  sample.X_WS.t = reading.X_WS.t + noise.position_rms_mm * per_axis * reading.position_error;
+  sample.X_WS.R = reading.X_WS.R * so3_exp(noise.rotation_rms_rad * per_axis * reading.rotation_error);
   return sample;
 }
 
-void Simulation::render(std::size_t index, RenderWorkspace& workspace, std::span<std::uint8_t> image) const {
+std::size_t Simulation::pictured(std::size_t index) const noexcept {
+  const auto* stuck = stretch_of(settings_.camera_stuck, frames_[index].stamp.capture - start_);
+  while (stuck != nullptr && index > 0 && frames_[index].stamp.capture - start_ >= stuck->begin) --index;
+  return index - index % static_cast<std::size_t>(settings_.camera_repeats);
+}
+
+void Simulation::render(std::size_t frame_index, RenderWorkspace& workspace, std::span<std::uint8_t> image) const {
+  const std::size_t index = pictured(frame_index);
   const Frame& frame = frames_[index];
   const Duration since = frame.stamp.capture - start_;
   // While it is turned each frame has a lens of its own.

@@ -46,11 +46,15 @@ struct SimulationSettings {
   // Time in which the tracker's error falls to 1/e of what it was (Gauss-Markov); 0: new at each reading.
   Duration tracker_correlation{0};
   double tracker_dropouts_per_min = 3.0;
-  // The electrode is off, and the device says so: from the session's start to begin, and for how long.
-  struct EcgOff {
+  // From the session's start to begin, and for how long.
+  struct Stretch {
     Duration begin, length;
   };
-  std::vector<EcgOff> ecg_off;
+  std::vector<Stretch> ecg_off;  // the electrode is off, and the device says so
+  // The device gives its last reading, or picture, again and again, with stamps and numbers that go on.
+  std::vector<Stretch> tracker_stuck;
+  std::vector<Stretch> camera_stuck;
+  int camera_repeats = 1;  // each picture comes so often, as of a camera that is slower than its stamps say
   // What makes seeing hard.
   double scope_sweep = 1.0;     // see ScopePath
   double exposure_share = 0.0;  // of the frame period, about the capture: motion blur
@@ -138,6 +142,7 @@ class Simulation {
   struct TrackerStamp {
     Instant source_time;
     Instant arrival;
+    std::size_t reads = 0;  // the stamp whose pose it gives: its own, but for a tracker that is stuck
     bool missing = false;
     Pose X_WS;                                   // true
     Vector3d position_error = Vector3d::Zero();  // of unit variance per axis
@@ -147,6 +152,8 @@ class Simulation {
   Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeSetup setup, Vector3d surface_W,
              const ScopePath& path);
 
+  // The frame whose picture frames()[index] shows: its own, but for a camera that is stuck.
+  [[nodiscard]] std::size_t pictured(std::size_t index) const noexcept;
   [[nodiscard]] FieldStop field_stop_at(Duration since) const noexcept;
   [[nodiscard]] std::unique_ptr<const SceneRenderer> renderer_at(Duration since) const;
 

@@ -31,6 +31,7 @@ TEST(Parallax, IsNoneWhileTheCameraStandsWhateverTheTrackersNoise) {
   EXPECT_FALSE(parallax.none()) << "too soon to tell";
   watch(parallax, 12, 10, 0, random);
   EXPECT_TRUE(parallax.none());
+  EXPECT_FALSE(parallax.ever());
 }
 
 TEST(Parallax, IsThereWhereTheCameraSways) {
@@ -40,6 +41,7 @@ TEST(Parallax, IsThereWhereTheCameraSways) {
   EXPECT_FALSE(parallax.none());
   watch(parallax, 30, 25, 0, random);
   EXPECT_TRUE(parallax.none()) << "it has stopped";
+  EXPECT_TRUE(parallax.ever());
 }
 
 }  // namespace

@@ -76,7 +76,7 @@ TEST(SurfaceComposer, WidensByWhatTheSetUpMayBeOffBy) {
     return composer.compose(kRelease, steady_clock(), {}, view).features.at(0).covariance_W_mm2(1, 1);
   };
   const double before = variance();
-  snapshot.setup_variance_mm2 = 0.25;
+  snapshot.doubts.setup_variance_mm2 = 0.25;
   EXPECT_NEAR(variance(), before + 0.25, 1e-12);
 }
 

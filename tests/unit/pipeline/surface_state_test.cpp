@@ -37,7 +37,7 @@ TEST(SurfaceState, IsDegradedWhenTheImagesShowNothingOfTheMap) {
 
 TEST(SurfaceState, IsDegradedWhileTheCameraKeepsStillAndNothingHasConverged) {
   ShardSnapshot shard;
-  shard.no_parallax = true;
+  shard.doubts.still = true;
   shard.features.resize(2);
   shard.features[0].state = FeatureState::kConverging;
   const ShardSnapshot* const shards[] = {&shard};
@@ -52,15 +52,15 @@ TEST(SurfaceState, IsDegradedWhileTheCameraKeepsStillAndNothingHasConverged) {
 
 TEST(SurfaceState, IsDegradedWhileTheSetUpIsDoubtedAndNothingIsCalledConverged) {
   ShardSnapshot shard;
-  shard.setup_doubted = true;
-  shard.setup_variance_mm2 = 3.0;
+  shard.doubts.setup_doubted = true;
+  shard.doubts.setup_variance_mm2 = 3.0;
   shard.features.resize(1);
   shard.features[0].state = FeatureState::kConverged;
   shard.features[0].expected = shard.features[0].in_sight = true;
   const ShardSnapshot other;
   const ShardSnapshot* const shards[] = {&other, &shard};
   SurfaceFooting footing = footing_of(shards);
-  EXPECT_EQ(footing.setup_variance_mm2, 3.0);
+  EXPECT_EQ(footing.doubts.setup_variance_mm2, 3.0);
   footing.breath_doubtful = true;
   EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing), SurfaceReason::kSetupDoubted)
       << "a set-up that is off displaces the surface as breathing may";
@@ -70,6 +70,23 @@ TEST(SurfaceState, IsDegradedWhileTheSetUpIsDoubtedAndNothingIsCalledConverged) 
   footing = footing_of(shards);
   EXPECT_EQ(verdict_of({FeatureState::kConverged, FeatureReason::kNone}, PhaseState::kLocked, footing).state,
             FeatureState::kConverging);
+}
+
+TEST(SurfaceState, IsDegradedWhileTheTrackerOrTheCameraRepeatsItself) {
+  ShardSnapshot shard;
+  shard.doubts.pose_repeated = true;
+  shard.pose_missing = true;
+  const ShardSnapshot other;
+  const ShardSnapshot* const shards[] = {&other, &shard};
+  SurfaceFooting footing = footing_of(shards);
+  footing.mapped = true;
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing), SurfaceReason::kPoseRepeated)
+      << "there is no pose for that";
+  footing.doubts.picture_repeated = true;
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing), SurfaceReason::kPictureRepeated);
+  for (const SurfaceReason reason : {SurfaceReason::kPoseRepeated, SurfaceReason::kPictureRepeated}) {
+    EXPECT_EQ(state_of(reason), SurfaceState::kDegraded);
+  }
 }
 
 TEST(SurfaceState, IsNotGoodWithoutAFeatureThatHasConverged) {
@@ -90,9 +107,9 @@ TEST(SurfaceState, TellsWhatIsWorseFirst) {
   EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, footing), SurfaceReason::kNotSeen);
   footing.pose_missing = true;
   EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, footing), SurfaceReason::kPoseMissing);
-  footing.scope_changed = true;
+  footing.doubts.scope_changed = true;
   EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, footing), SurfaceReason::kScopeChanged);
-  footing.scope_unread = true;
+  footing.doubts.scope_unread = true;
   EXPECT_EQ(reason_of(phase, Rhythm::kEctopic, footing), SurfaceReason::kScopeUnread);
   EXPECT_EQ(state_of(SurfaceReason::kScopeUnread), SurfaceState::kDegraded);
   EXPECT_EQ(state_of(SurfaceReason::kScopeChanged), SurfaceState::kDegraded);

@@ -135,6 +135,50 @@ TEST(Simulation, ExactTrackerAndHandEyeGiveTheCamera) {
   EXPECT_LT(so3_log(X_WC.R.transpose() * frame.X_WC.R).norm(), 5e-4);
 }
 
+TEST(Simulation, AStuckTrackerGivesOneReadingWhileItsStampsGoOn) {
+  SimulationSettings settings = small();
+  settings.tracker_dropouts_per_min = 0.0;
+  settings.tracker_stuck = {{std::chrono::milliseconds(500), std::chrono::milliseconds(200)}};
+  const Simulation simulation = simulate(settings);
+  int same = 0;
+  for (std::size_t i = 1; i < simulation.tracker_sample_count(); ++i) {
+    const TrackerSample before = simulation.tracker_sample(i - 1, {1.0, 0.01});
+    const TrackerSample sample = simulation.tracker_sample(i, {1.0, 0.01});
+    same += sample.X_WS.t == before.X_WS.t && sample.X_WS.R == before.X_WS.R ? 1 : 0;
+    EXPECT_EQ(sample.device_frame, before.device_frame + 1);
+    EXPECT_GT(sample.source_time, before.source_time);
+  }
+  EXPECT_NEAR(same, 0.2 * settings.tracker_rate_hz, 1.0);
+}
+
+// Which of the first pictures are the ones before, bit for bit.
+std::vector<std::size_t> repeated_pictures(const SimulationSettings& settings) {
+  const Simulation simulation = simulate(settings);
+  RenderWorkspace workspace;
+  std::vector<std::uint8_t> before, image(static_cast<std::size_t>(settings.width) * settings.height);
+  std::vector<std::size_t> repeated;
+  for (std::size_t i = 0; i < 24; ++i) {
+    before = image;
+    simulation.render(i, workspace, image);
+    if (image == before) repeated.push_back(i);
+  }
+  return repeated;
+}
+
+TEST(Simulation, AStuckCameraGivesItsLastPictureAgain) {
+  SimulationSettings settings = small();
+  // At 30 frames/s.
+  settings.camera_stuck = {{std::chrono::milliseconds(500), std::chrono::milliseconds(200)}};
+  EXPECT_EQ(repeated_pictures(settings), (std::vector<std::size_t>{15, 16, 17, 18, 19, 20}));
+}
+
+TEST(Simulation, ACameraThatRepeatsGivesEachPictureSoOften) {
+  SimulationSettings settings = small();
+  settings.camera_repeats = 3;
+  EXPECT_EQ(repeated_pictures(settings),
+            (std::vector<std::size_t>{1, 2, 4, 5, 7, 8, 10, 11, 13, 14, 16, 17, 19, 20, 22, 23}));
+}
+
 TEST(Simulation, TrackerLosesTheToolAsOftenAsAskedAndSaysSo) {
   SimulationSettings settings = small();
   settings.duration = std::chrono::seconds(60);

@@ -1,0 +1,30 @@
+// What is wrong with what a frame and its pose are, beside the heart's phase: as the mapper finds it, as the shards
+// hand it over, and as a surface tells it.
+#pragma once
+
+#include <algorithm>
+
+namespace perimap {
+
+struct FrameDoubts {
+  bool scope_unread = false;        // how the scope is turned is not known
+  bool scope_changed = false;       // it is turned otherwise than at first, and nothing tells what follows
+  bool pose_repeated = false;       // the tracker gives one reading again and again, after the camera had moved
+  bool picture_repeated = false;    // likewise the camera one picture
+  bool still = false;               // the camera has lately been in one place
+  bool setup_doubted = false;       // see SetupBelief
+  double setup_variance_mm2 = 0.0;  // per axis, of what the set-up may be off by
+
+  // What is doubted in either.
+  void add(const FrameDoubts& other) noexcept {
+    scope_unread |= other.scope_unread;
+    scope_changed |= other.scope_changed;
+    pose_repeated |= other.pose_repeated;
+    picture_repeated |= other.picture_repeated;
+    still |= other.still;
+    setup_doubted |= other.setup_doubted;
+    setup_variance_mm2 = std::max(setup_variance_mm2, other.setup_variance_mm2);
+  }
+};
+
+}  // namespace perimap
