@@ -7,6 +7,7 @@
 
 // A command is one file in a folder `commands`, which defines add_NAME_command(), and one line here, in the order of
 // perimap --help.
+// NOLINTBEGIN(cppcoreguidelines-macro-usage): only the preprocessor makes names.
 #define PERIMAP_COMMANDS(COMMAND) \
   COMMAND(simulate)               \
   COMMAND(replay)                 \
@@ -45,6 +46,7 @@ int run(int argc, char** argv) {
 #define PERIMAP_ADD(NAME) add_##NAME##_command(commands);
   PERIMAP_COMMANDS(PERIMAP_ADD)
 #undef PERIMAP_ADD
+  // NOLINTEND(cppcoreguidelines-macro-usage)
   return commands.run(argc, argv);
 }
 

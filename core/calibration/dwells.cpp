@@ -20,7 +20,7 @@ std::vector<Vector3d> averaged(const std::vector<TimedPoint>& points) {
   for (const TimedPoint& point : points) {
     while (end < points.size() && points[end].t_s <= point.t_s + 0.5 * kAveraged_s) sum += points[end++].p;
     while (points[begin].t_s < point.t_s - 0.5 * kAveraged_s) sum -= points[begin++].p;
-    smooth.push_back(sum / static_cast<double>(end - begin));
+    smooth.emplace_back(sum / static_cast<double>(end - begin));
   }
   return smooth;
 }

@@ -103,6 +103,6 @@ struct PairContext {
   double before_sharpness = 0.0;
   double sharpness = 0.0;
 };
-void add_pair(const PairContext& pair, EvidenceOf<BeatEvidence>& evidence) noexcept;
+void add_pair(const PairContext& pair, EvidenceOf<BeatEvidence>& v) noexcept;
 
 }  // namespace perimap

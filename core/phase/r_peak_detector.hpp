@@ -30,6 +30,7 @@ class RPeakDetector {
   explicit RPeakDetector(const RPeakDetectorSettings& settings = {}) noexcept;
   RPeakDetector(const RPeakDetector&) = delete;  // its parts refer to each other
   RPeakDetector& operator=(const RPeakDetector&) = delete;
+  ~RPeakDetector() = default;
 
   // The next sample, evenly stamped. A stamp that does not advance is ignored; a value that is not finite is a missing
   // sample. At most one peak a call; when several become known at once, the next calls give the others.

@@ -29,7 +29,10 @@ using Outcome = tl::expected<void, Refusal>;
 
 // Of an error that tells itself whether it is the configuration that is wrong.
 template <class Setup>
-requires requires(const Setup& setup) { setup.configuration ? setup.error : setup.error; }
+requires requires(const Setup& setup) {
+  setup.error;
+  setup.configuration;
+}
 [[nodiscard]] tl::unexpected<Refusal> refuse(const Setup& setup) {
   return refuse(setup.error, setup.configuration ? ExitCode::kWrongUsage : ExitCode::kFailed);
 }

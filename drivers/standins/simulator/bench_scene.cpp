@@ -159,7 +159,7 @@ Vector3d BenchScene::touched_W(double t_s) const noexcept {
   const double of_each_s = kDwell_s + kMove_s;
   const auto at = std::min(kLandmarks - 1, static_cast<std::size_t>(t_s / of_each_s));
   const double within_s = t_s - static_cast<double>(at) * of_each_s;
-  const Vector3d here = X_WI * landmarks_[at].p_I;
+  Vector3d here = X_WI * landmarks_[at].p_I;
   if (within_s <= kDwell_s || at + 1 == kLandmarks) return here;
   const double s = smooth((within_s - kDwell_s) / kMove_s);
   const Vector3d next = X_WI * landmarks_[at + 1].p_I;
