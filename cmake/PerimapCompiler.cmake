@@ -61,7 +61,3 @@ target_compile_options(perimap_warnings INTERFACE -Wall -Wextra -Wpedantic -Wsha
 # GCC 12's flow analysis reports uninitialised values inside Eigen's fixed-capacity types, at -O3 and with sanitizers, that
 # are not there.
 target_compile_options(perimap_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
-if(PERIMAP_SANITIZE)
-  # Likewise accesses beyond a short string that is moved (GCC 12, ThreadSanitizer).
-  target_compile_options(perimap_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>)
-endif()

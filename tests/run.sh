@@ -76,9 +76,11 @@ trap stop INT TERM
 
 # What ninja and ctest print, "[12/340] ..." and "12/340 Test ...", or how many files clang-tidy has begun.
 progress() {
-  local counted
+  local counted files
   counted=$(grep -aoE '^ *\[?[0-9]+/[0-9]+\]?' "$1" | tail -n 1 | tr -d '[] ')
-  printf '%s' "${counted:-$(grep -ac '^clang-tidy' "$1") files}"
+  files=$(grep -ac '^clang-tidy' "$1")
+  if [ -z "$counted" ] && [ "$files" -gt 0 ]; then counted="$files files"; fi
+  printf '%s' "${counted:-under way}"
 }
 
 # step NAME LIMIT COMMAND...: runs the command with its output in a log; tells every 20 s how far it is.

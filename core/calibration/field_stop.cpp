@@ -236,7 +236,7 @@ Expected<FieldStopReading> read_field_stop(const GreyImage& picture) {
     return fail("the picture is smaller than 32 pixels: no field stop can be read in it");
   }
   const Levels levels = levels_of(picture);
-  const std::string no_stop =
+  const char* const no_stop =
       "no field stop is seen: the picture has no dark surround with a round edge; zoom out until its edge is in view, "
       "and look at something bright";
   if (levels.bright - levels.dark < kLeastContrast) return fail(no_stop);
