@@ -479,6 +479,13 @@ void BeatDecision::remove_at(int index) noexcept {
   --count_;
 }
 
+bool BeatDecision::ponders(Instant t, Duration near) const noexcept {
+  return std::any_of(waiting_.begin(), waiting_.begin() + count_, [&](const Waiting& waiting) {
+    const Duration apart = waiting.candidate.time - t;
+    return apart < near && -apart < near && waiting.probability > settings_.more_likely;
+  });
+}
+
 std::optional<RPeak> BeatDecision::pop() noexcept {
   if (queue_count_ == 0) return std::nullopt;
   const RPeak peak = queue_[static_cast<std::size_t>(queue_begin_)];

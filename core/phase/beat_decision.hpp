@@ -34,6 +34,8 @@ class BeatDecision {
   void burst() noexcept;        // nothing can be seen: what waits in it is no beat
 
   [[nodiscard]] std::optional<RPeak> pop() noexcept;
+  // What waits so near to `t` is more likely a beat than not.
+  [[nodiscard]] bool ponders(Instant t, Duration near) const noexcept;
   [[nodiscard]] const BeatLevels& beats() const noexcept { return beats_; }
   [[nodiscard]] const QrsClusters& clusters() const noexcept { return clusters_; }
   // Nothing like beats is known, or none has come for some time.

@@ -1,13 +1,15 @@
-// From the samples of one ECG lead to its beats: R peaks, each with its class.
+// From the samples of one or two ECG leads to the heart's beats: R peaks, each with its class.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 
 #include "core/phase/beat_classer.hpp"
+#include "core/phase/lead_pair.hpp"
 #include "core/phase/r_peak.hpp"
-#include "core/phase/r_peak_detector.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
@@ -15,20 +17,23 @@ namespace perimap {
 // What the ECG thread makes of its samples, and whoever goes through a recording.
 class BeatFinder {
  public:
-  // As RPeakDetector's.
-  [[nodiscard]] std::optional<RPeak> push(Instant t, float mV) noexcept { return classed(detector_.push(t, mV)); }
+  // As LeadPair's.
+  [[nodiscard]] std::optional<RPeak> push(Instant t, float mV) noexcept { return classed(leads_.push(t, mV)); }
+  [[nodiscard]] std::optional<RPeak> push(Instant t, float first_mV, float second_mV) noexcept {
+    return classed(leads_.push(t, first_mV, second_mV));
+  }
   void lead_off(Instant t) noexcept {
-    detector_.lead_off(t);
+    leads_.lead_off(t);
     note_interruption();
   }
-  [[nodiscard]] std::optional<RPeak> flush() noexcept { return classed(detector_.flush()); }
-  [[nodiscard]] EcgSignal signal() const noexcept { return detector_.signal(); }
+  [[nodiscard]] std::optional<RPeak> flush() noexcept { return classed(leads_.flush()); }
+  [[nodiscard]] EcgSignal signal() const noexcept { return leads_.signal(); }
 
-  // All is forgotten, as if it were new. The detector's parts refer to each other, so it is made anew in its place.
+  // All is forgotten, as if it were new. The detectors' parts refer to each other, so they are made anew in place.
   void restart() noexcept {
-    std::destroy_at(&detector_);
-    std::construct_at(&detector_);
-    classer_ = BeatClasser();
+    std::destroy_at(&leads_);
+    std::construct_at(&leads_);
+    classers_ = {};
     interruptions_ = 0;
     interrupted_ = false;
   }
@@ -41,21 +46,30 @@ class BeatFinder {
   }
 
  private:
-  // What was found before the signal broke off is classed before.
-  [[nodiscard]] std::optional<RPeak> classed(std::optional<RPeak> peak) noexcept {
-    if (peak) *peak = classer_.classify(*peak);
+  // What was found before the signal broke off is classed before. Each lead has shapes of its own, so each has a
+  // classer, and both hear of every beat; the class is that of the lead which gives the time.
+  [[nodiscard]] std::optional<RPeak> classed(const std::optional<LeadBeat>& beat) noexcept {
+    std::optional<RPeak> peak;
+    if (beat) {
+      for (std::size_t lead = 0; lead < classers_.size(); ++lead) {
+        RPeak seen = beat->peak;
+        seen.shape = beat->shapes[lead];
+        seen = classers_[lead].classify(seen);
+        if (static_cast<int>(lead) == beat->lead) peak = seen;
+      }
+    }
     note_interruption();
     return peak;
   }
   void note_interruption() noexcept {
-    if (detector_.interruptions() == interruptions_) return;
-    interruptions_ = detector_.interruptions();
+    if (leads_.interruptions() == interruptions_) return;
+    interruptions_ = leads_.interruptions();
     interrupted_ = true;
-    classer_.interrupt();
+    for (BeatClasser& classer : classers_) classer.interrupt();
   }
 
-  RPeakDetector detector_;
-  BeatClasser classer_;
+  LeadPair leads_;
+  std::array<BeatClasser, 2> classers_;
   std::uint64_t interruptions_ = 0;
   bool interrupted_ = false;
 };

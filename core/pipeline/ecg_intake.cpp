@@ -1,5 +1,7 @@
 #include "core/pipeline/ecg_intake.hpp"
 
+#include <cstddef>
+#include <limits>
 #include <optional>
 
 #include "core/realtime/realtime_scope.hpp"
@@ -29,16 +31,19 @@ void EcgIntake::count(const EcgBlock& block) noexcept {
     counters_.ecg_delay.add(block.arrival - last);
     counters_.last_ecg_ns.set(static_cast<std::uint64_t>(to_ns(last)));
   }
-  if (block.lead_off) counters_.ecg_lead_off.add(block.count);
+  if (block.nothing_heard()) counters_.ecg_lead_off.add(block.count);
 }
 
 void EcgIntake::hear(const EcgBlock& block) noexcept {
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
   std::uint64_t flat = 0;
   Instant t = block.first_sample_time;
-  if (block.lead_off) beats_.lead_off(t);
-  for (const float mV : block.samples()) {
-    if (block.lead_off) break;
-    if (const std::optional<RPeak> peak = beats_.push(t, mV)) tracker_.on_r_peak(*peak);
+  if (block.nothing_heard()) beats_.lead_off(t);
+  for (std::size_t i = 0; i < block.count && !block.nothing_heard(); ++i) {
+    const float mV = block.lead_off ? kNone : block.mV[i];
+    const float second_mV = block.second_off ? kNone : block.second_mV[i];
+    const std::optional<RPeak> peak = block.has_second ? beats_.push(t, mV, second_mV) : beats_.push(t, mV);
+    if (peak) tracker_.on_r_peak(*peak);
     if (beats_.take_interruption()) tracker_.interrupt();
     if (beats_.signal() == EcgSignal::kFlat) ++flat;
     t += block.sample_period;

@@ -22,7 +22,7 @@ namespace perimap {
 namespace {
 
 constexpr std::string_view kMagic = "PERIMAPC";
-constexpr std::uint32_t kFormat = 6;
+constexpr std::uint32_t kFormat = 7;
 constexpr std::size_t kHeader = 16;
 constexpr std::size_t kLongestText = 4096;
 constexpr std::uint32_t kMostFeatures = 4096;
@@ -190,6 +190,10 @@ EcgBlock read_block(Reader& in) {
   in.expect(block.count <= EcgBlock::kCapacity && block.sample_period > Duration(0), "an ECG block");
   if (!in.good()) return {};
   for (std::uint32_t i = 0; i < block.count; ++i) block.mV[i] = in.float32("an ECG sample");
+  block.has_second = in.flag("whether there is a second lead");
+  if (!block.has_second || !in.good()) return block;
+  block.second_off = in.flag("whether the second lead was off");
+  for (std::uint32_t i = 0; i < block.count; ++i) block.second_mV[i] = in.float32("a sample of the second lead");
   return block;
 }
 
@@ -305,6 +309,10 @@ std::string serialize(const Checkpoint& checkpoint, std::span<const std::string>
     body.add(block.first_sample_time).add(std::int64_t{block.sample_period.count()});
     body.add(static_cast<std::uint8_t>(block.lead_off)).add(block.count);
     for (const float mV : block.samples()) body.add(mV);
+    body.add(static_cast<std::uint8_t>(block.has_second));
+    if (!block.has_second) continue;
+    body.add(static_cast<std::uint8_t>(block.second_off));
+    for (const float mV : block.second_samples()) body.add(mV);
   }
   add_respiration(body, memory.respiration);
   add_law(body, memory.law);

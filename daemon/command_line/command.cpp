@@ -37,6 +37,11 @@ Option* Option::delimiter(char separator) {
   return this;
 }
 
+Option* Option::one_at_a_time() {
+  option_->allow_extra_args(false);
+  return this;
+}
+
 Option* Option::excludes(const Option* other) {
   option_->excludes(other->option_);
   return this;

@@ -55,6 +55,8 @@ class Option {
   Option* expected(int count);
   // Several values in one, with this between them.
   Option* delimiter(char separator);
+  // One value each time that it is given; what comes after is another's.
+  Option* one_at_a_time();
   // Not both.
   Option* excludes(const Option* other);
   // What it does is done when it is met, not when all is parsed.

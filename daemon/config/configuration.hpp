@@ -93,6 +93,7 @@ struct EcgConfiguration {
   Protocol protocol = Protocol::kNone;
   std::optional<std::string> port;  // as parse_endpoint() takes it
   int channel = 0;                  // of BITalino and Cyton; 0: the protocol's usual one
+  int second_channel = 0;           // of these, with a second lead; 0: none
   double count_mV = 0.0;            // of Medlab and CAN; 0: the protocol's usual scale
   double can_sample_rate_hz = 360.0;
   int can_identifier = 0x2E0;

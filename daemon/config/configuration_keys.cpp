@@ -191,6 +191,8 @@ void add_ecg(std::vector<ConfigurationKey>& keys) {
       .optional_text("port", std::string(kPort), &is_endpoint, PERIMAP_MEMBER(ecg.port), "where the ECG device is")
       .integer("channel", 0, 8, PERIMAP_MEMBER(ecg.channel),
                "input of a bitalino (1 to 6) or cyton (1 to 8) that carries the ECG; 0: the usual one, 2 and 1")
+      .integer("second_channel", 0, 8, PERIMAP_MEMBER(ecg.second_channel),
+               "its input with a second lead of the same heart, of which one is enough at any time; 0: none")
       .number("count_mV", 0, 1000, PERIMAP_MEMBER(ecg.count_mV),
               "mV of one count of medlab and can; 0: the usual, 0.02 and 0.005")
       .number("can_sample_rate_hz", 100, 1000, PERIMAP_MEMBER(ecg.can_sample_rate_hz), "samples a second over can")

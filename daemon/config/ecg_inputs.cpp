@@ -19,8 +19,11 @@ std::optional<WrongInput> wrong_respiration(const Configuration& c) {
   if (channel == 0) return std::nullopt;
   const auto spare = [&](int inputs, std::string_view name) -> std::optional<WrongInput> {
     const int taken = ecg_input(c.ecg);
-    if (channel <= inputs && channel != taken) return std::nullopt;
-    return wrong(fmt::format("1 to {} of a {}, but for {}, which carries the ECG", inputs, name, taken));
+    const int second = c.ecg.second_channel;
+    if (channel <= inputs && channel != taken && channel != second) return std::nullopt;
+    const std::string carry =
+        second > 0 ? fmt::format("{} and {}, which carry", taken, second) : fmt::format("{}, which carries", taken);
+    return wrong(fmt::format("1 to {} of a {}, but for {} the ECG", inputs, name, carry));
   };
   switch (c.ecg.protocol) {
     case Protocol::kBitalino:
@@ -36,6 +39,21 @@ std::optional<WrongInput> wrong_respiration(const Configuration& c) {
       break;
   }
   return wrong("0 without an ECG device in 'ecg.protocol'");
+}
+
+std::optional<WrongInput> wrong_second_lead(const EcgConfiguration& ecg) {
+  if (ecg.second_channel == 0) return std::nullopt;
+  const auto wrong = [&](std::string expected) {
+    return WrongInput{"ecg", "second_channel", std::move(expected), fmt::format("{}", ecg.second_channel)};
+  };
+  const bool bitalino = ecg.protocol == Protocol::kBitalino;
+  if (!bitalino && ecg.protocol != Protocol::kCyton)
+    return wrong("0 but with a bitalino or a cyton, which have inputs");
+  const int inputs = bitalino ? BitalinoProtocol::kChannels : CytonProtocol::kChannels;
+  const int first = ecg_input(ecg);
+  if (ecg.second_channel <= inputs && ecg.second_channel != first) return std::nullopt;
+  return wrong(fmt::format("1 to {} of a {}, but for {}, which carries the first lead", inputs,
+                           bitalino ? "bitalino" : "cyton", first));
 }
 
 }  // namespace
@@ -54,6 +72,7 @@ std::optional<WrongInput> wrong_input(const Configuration& c) {
   if (c.ecg.r_trigger && c.ecg.r_trigger_port && c.ecg.r_trigger_port == c.ecg.port) {
     return WrongInput{"ecg", "r_trigger_port", "a serial port of its own", *c.ecg.r_trigger_port};
   }
+  if (auto wrong = wrong_second_lead(c.ecg)) return wrong;
   return wrong_respiration(c);
 }
 

@@ -27,11 +27,13 @@ SerialEcg serial_ecg(const EcgDevice& device, EcgSinks sinks, DeviceHealth& heal
   const EcgConfiguration& c = device.settings;
   using Protocol = EcgConfiguration::Protocol;
   if (c.protocol == Protocol::kBitalino) {
-    const BitalinoSettings settings{.channel = ecg_input(c), .respiration_channel = device.respiration_channel};
+    const BitalinoSettings settings{
+        .channel = ecg_input(c), .second_channel = c.second_channel, .respiration_channel = device.respiration_channel};
     return {std::make_unique<BitalinoProtocol>(settings, std::move(sinks), health), BitalinoProtocol::kBaud};
   }
   if (c.protocol == Protocol::kCyton) {
-    const CytonSettings settings{.channel = ecg_input(c), .respiration_channel = device.respiration_channel};
+    const CytonSettings settings{
+        .channel = ecg_input(c), .second_channel = c.second_channel, .respiration_channel = device.respiration_channel};
     return {std::make_unique<CytonProtocol>(settings, std::move(sinks), health), CytonProtocol::kBaud};
   }
   MedlabSettings settings;

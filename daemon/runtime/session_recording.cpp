@@ -38,6 +38,7 @@ SensorRecordingFacts recording_facts(const Configuration& configuration, const s
   for (const std::string& tool : tracked_tool_names(configuration.tracker)) {
     facts.tools.push_back(tool.empty() ? tool : std::string(channels::kTrackedTools) + tool);
   }
+  facts.second_lead = configuration.ecg.second_channel > 0;
   facts.respiration = configuration.respiration.device_channel > 0;
   return facts;
 }

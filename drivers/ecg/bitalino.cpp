@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -30,7 +31,8 @@ bool passes_check(std::span<const std::byte> frame) {
 bool at_rail(int value) { return value == 0 || value == kFullScale; }
 
 std::size_t frame_bytes(const BitalinoSettings& settings) {
-  return bitalino_frame_bytes(settings.respiration_channel > 0 ? 2 : 1);
+  return bitalino_frame_bytes(1U + (settings.second_channel > 0 ? 1U : 0U) +
+                              (settings.respiration_channel > 0 ? 1U : 0U));
 }
 
 FrameShape shape(const BitalinoSettings& settings) {
@@ -44,6 +46,16 @@ FrameShape shape(const BitalinoSettings& settings) {
 
 // Of the channel, from 1.
 unsigned mask(int channel) { return channel > 0 ? 1U << static_cast<unsigned>(channel - 1) : 0U; }
+unsigned mask(const BitalinoSettings& settings) {
+  return mask(settings.channel) | mask(settings.second_channel) | mask(settings.respiration_channel);
+}
+
+// Where a channel's sample stands among those of a frame: they are in order of channel.
+std::size_t place_of(int channel, const BitalinoSettings& settings) {
+  return static_cast<std::size_t>(std::popcount(mask(settings) & (mask(channel) - 1U)));
+}
+
+float ecg_mV(int value) { return static_cast<float>((value - 512) * kCount_mV / kSensorGain); }
 
 }  // namespace
 
@@ -59,10 +71,12 @@ std::uint8_t bitalino_crc(std::span<const std::byte> frame) noexcept {
   return kTable[crc];
 }
 
-std::array<int, 2> bitalino_samples(std::span<const std::byte> frame) noexcept {
+std::array<int, 3> bitalino_samples(std::span<const std::byte> frame) noexcept {
   const auto byte = [&frame](std::size_t from_end) { return std::to_integer<int>(frame[frame.size() - 1 - from_end]); };
   const int first = (byte(1) & 0xF) << 6 | byte(2) >> 2;
-  return {first, frame.size() == bitalino_frame_bytes(2) ? (byte(2) & 0x3) << 8 | byte(3) : 0};
+  const int second = frame.size() >= bitalino_frame_bytes(2) ? (byte(2) & 0x3) << 8 | byte(3) : 0;
+  const int third = frame.size() >= bitalino_frame_bytes(3) ? byte(4) << 2 | byte(5) >> 6 : 0;
+  return {first, second, third};
 }
 
 // A frame waits for the next to agree with it.
@@ -75,12 +89,12 @@ BitalinoProtocol::BitalinoProtocol(const BitalinoSettings& settings, EcgSinks si
 void BitalinoProtocol::start() {
   framer_.restart();
   lead_.restart();
+  second_lead_.restart();
   breath_sensor_.restart();
   named_ = false;
   begun_.clear();
-  const unsigned channels = mask(settings_.channel) | mask(settings_.respiration_channel);
   const std::array<std::byte, 4> commands{std::byte{0x00}, std::byte{0x07}, std::byte{0xC3},
-                                          static_cast<std::byte>(channels << 2U | 0x01U)};
+                                          static_cast<std::byte>(mask(settings_) << 2U | 0x01U)};
   for (std::size_t i = 0; i < commands.size(); ++i) {
     send_in(i == 0 ? Duration(0) : kBetweenCommands, std::span(commands).subspan(i, 1));
   }
@@ -102,18 +116,22 @@ std::span<const std::byte> BitalinoProtocol::after_name(std::span<const std::byt
 }
 
 void BitalinoProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> bytes, Instant arrival) {
-  const bool breathes = settings_.respiration_channel > 0;
-  const bool ecg_second = breathes && settings_.respiration_channel < settings_.channel;
   const auto take = [&](std::span<const std::byte> frame, std::optional<unsigned> lost, std::size_t behind) {
-    const std::array<int, 2> values = bitalino_samples(frame);
-    const int ecg = values[ecg_second ? 1 : 0];
+    const std::array<int, 3> values = bitalino_samples(frame);
+    const auto value_of = [&](int channel) { return values[place_of(channel, settings_)]; };
+    const int ecg = value_of(settings_.channel);
+    std::optional<SecondLead> second;
+    if (settings_.second_channel > 0) {
+      const int value = value_of(settings_.second_channel);
+      second = {ecg_mV(value), second_lead_.off(at_rail(value))};
+    }
     std::optional<RespirationReading> respiration;
-    if (breathes) {
-      const int value = values[ecg_second ? 0 : 1];
+    if (settings_.respiration_channel > 0) {
+      const int value = value_of(settings_.respiration_channel);
       respiration = {static_cast<float>((value - 512) * kCount_mV), breath_sensor_.off(at_rail(value))};
     }
-    samples().add(static_cast<float>((ecg - 512) * kCount_mV / kSensorGain), lead_.off(at_rail(ecg)),
-                  lost ? samples().lost_samples(*lost, kSequenceModulus, behind, arrival) : 0, respiration);
+    samples().add(ecg_mV(ecg), lead_.off(at_rail(ecg)),
+                  lost ? samples().lost_samples(*lost, kSequenceModulus, behind, arrival) : 0, respiration, second);
   };
   health().damaged.add(framer_.feed(after_name(bytes), take));
 }

@@ -66,6 +66,7 @@ void CytonProtocol::start() {
   heard_.clear();
   framer_.restart();
   lead_.restart();
+  second_lead_.restart();
   breath_sensor_.restart();
   // The board may be streaming still, from a session that ended without a word. Opening the port resets its dongle,
   // which then hears nothing for a while: who is not answered asks again.
@@ -152,9 +153,14 @@ void CytonProtocol::decode(LinkControl& link, std::span<const std::byte> bytes, 
       const std::int32_t counts = counts_of(packet, settings_.respiration_channel);
       respiration = {static_cast<float>(counts * count_mV), breath_sensor_.off(at_rail(counts))};
     }
+    std::optional<SecondLead> second;
+    if (settings_.second_channel > 0) {
+      const std::int32_t counts = counts_of(packet, settings_.second_channel);
+      second = {static_cast<float>(counts * count_mV), second_lead_.off(at_rail(counts))};
+    }
     const std::int32_t counts = counts_of(packet, settings_.channel);
     samples().add(static_cast<float>(counts * count_mV), lead_.off(at_rail(counts)),
-                  lost ? samples().lost_samples(*lost, kCountModulus, behind, arrival) : 0, respiration);
+                  lost ? samples().lost_samples(*lost, kCountModulus, behind, arrival) : 0, respiration, second);
   };
   health().damaged.add(framer_.feed(bytes, take));
 }

@@ -28,6 +28,7 @@ namespace perimap {
 
 struct CytonSettings {
   int channel = 1;              // 1 to 8
+  int second_channel = 0;       // 1 to 8, another: a second lead of the ECG; 0: none
   int respiration_channel = 0;  // 1 to 8, another; 0: none
   double gain = 24.0;           // of the board's amplifier
 };
@@ -64,6 +65,7 @@ class CytonProtocol final : public EcgProtocol {
   std::string heard_;              // since the last prompt
   CountedFramer framer_;
   RailWatch lead_{kSampleRate_hz, RailWatch::kLeadOff_s};
+  RailWatch second_lead_{kSampleRate_hz, RailWatch::kLeadOff_s};
   RailWatch breath_sensor_{kSampleRate_hz, RailWatch::kSensorOff_s};
 };
 

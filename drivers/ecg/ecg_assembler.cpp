@@ -5,6 +5,23 @@
 #include <utility>
 
 namespace perimap {
+namespace {
+
+void begin_second(EcgBlock& block, const std::optional<SecondLead>& second) noexcept {
+  block.has_second = second.has_value();
+  block.second_off = second && second->off;
+}
+void add_second(EcgBlock& block, const std::optional<SecondLead>& second) noexcept {
+  if (second) block.second_mV[block.count] = second->mV;
+}
+void begin_second(RespirationBlock& /*block*/, const std::optional<SecondLead>& /*second*/) noexcept {}
+void add_second(RespirationBlock& /*block*/, const std::optional<SecondLead>& /*second*/) noexcept {}
+
+bool same_state(const std::optional<SecondLead>& a, const std::optional<SecondLead>& b) noexcept {
+  return a.has_value() == b.has_value() && (!a || a->off == b->off);
+}
+
+}  // namespace
 
 EcgAssembler::EcgAssembler(const ArrivalClockSettings& clock, EcgSinks sinks, DeviceHealth& health)
     : clock_(clock), sinks_(std::move(sinks)), health_(health) {}
@@ -16,10 +33,11 @@ void EcgAssembler::restart() noexcept {
   any_ = false;
 }
 
-void EcgAssembler::add(float mV, bool lead_off, std::uint64_t lost, std::optional<RespirationReading> respiration) {
+void EcgAssembler::add(float mV, bool lead_off, std::uint64_t lost, std::optional<RespirationReading> respiration,
+                       std::optional<SecondLead> second) {
   next_count_ += static_cast<std::int64_t>(lost);
   health_.lost.add(lost);
-  ecg_.chunk.push_back({next_count_, mV, lead_off});
+  ecg_.chunk.push_back({next_count_, mV, lead_off, second});
   if (respiration && sinks_.respiration) {
     respiration_.chunk.push_back({next_count_, respiration->value, respiration->sensor_off});
   }
@@ -48,11 +66,13 @@ void EcgAssembler::give(Lane& lane, Instant arrival, std::array<float, Block::kC
       block.first_sample_time = std::min(std::max(clock_.stamp(sample.count), lane.last_stamp + Duration(1)), arrival);
       block.device_sequence = static_cast<std::uint32_t>(sample.count);
       block.*off = sample.off;
+      begin_second(block, sample.second);
     }
+    add_second(block, sample.second);
     (block.*values)[block.count++] = sample.value;
     const bool last = i + 1 == lane.chunk.size();
     if (last || block.count == Block::kCapacity || lane.chunk[i + 1].count != sample.count + 1 ||
-        lane.chunk[i + 1].off != sample.off) {
+        lane.chunk[i + 1].off != sample.off || !same_state(lane.chunk[i + 1].second, sample.second)) {
       lane.last_stamp = block.last_sample_time();
       sink(block);
       block.count = 0;

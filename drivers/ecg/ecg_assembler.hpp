@@ -34,8 +34,15 @@ struct RespirationReading {
   bool sensor_off = false;
 };
 
+// What a second lead measured together with a sample of the first.
+struct SecondLead {
+  float mV = 0.0F;
+  bool off = false;
+};
+
 // A protocol gives the samples of one read, then ends the chunk; only then is it known when the newest arrived. A gap
-// in the count, or lead-off beginning or ending, begins a new block. Respiration has the ECG's count and stamps.
+// in the count, or lead-off beginning or ending, begins a new block. Respiration has the ECG's count and stamps, and a
+// second lead is in the first's blocks.
 class EcgAssembler {
  public:
   EcgAssembler(const ArrivalClockSettings& clock, EcgSinks sinks, DeviceHealth& health);
@@ -44,7 +51,8 @@ class EcgAssembler {
   void restart() noexcept;
 
   // The sample that follows the last one, or comes `lost` samples after it.
-  void add(float mV, bool lead_off, std::uint64_t lost = 0, std::optional<RespirationReading> respiration = {});
+  void add(float mV, bool lead_off, std::uint64_t lost = 0, std::optional<RespirationReading> respiration = {},
+           std::optional<SecondLead> second = {});
   // How many samples were lost before one that was read at `now` together with `behind` later ones, when the device's
   // count tells it modulo `modulus`: the time that has passed says how often the count went round.
   [[nodiscard]] std::uint64_t lost_samples(std::uint64_t lost_modulo, std::uint64_t modulus, std::size_t behind,
@@ -63,6 +71,7 @@ class EcgAssembler {
     std::int64_t count;
     float value;
     bool off;
+    std::optional<SecondLead> second = {};
   };
   // One signal's samples of this chunk.
   struct Lane {

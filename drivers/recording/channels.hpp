@@ -13,6 +13,9 @@ inline constexpr std::string_view kTrackerPose = "tracker/pose";  // perimap::Tr
 inline constexpr std::string_view kTrackedTools = "tracker/";
 inline constexpr std::string_view kTrackerViewer = "tracker/viewer";  // foxglove::PoseInFrame, metres, valid poses only
 inline constexpr std::string_view kEcgSamples = "ecg/samples";        // perimap::EcgSamples
+// Of the same device, measured together with those and with their count and stamps: each message stands right before
+// that of the first lead.
+inline constexpr std::string_view kEcgSecondLead = "ecg/second_lead";  // perimap::EcgSamples; optional
 inline constexpr std::string_view kRTrigger = "ecg/r_trigger";  // perimap::RTriggerPulse, where there is a trigger
 inline constexpr std::string_view kRespirationSamples = "respiration/samples";  // perimap::RespirationSamples; optional
 

@@ -26,15 +26,6 @@ Expected<std::optional<ReplayEvent>> pose_event(const RecordingReader& reader, c
   return *sample;
 }
 
-Expected<std::optional<ReplayEvent>> ecg_event(const RecordingReader& reader, const RecordedMessage& message) {
-  const auto ecg = reader.decode<perimap_EcgSamples>(message);
-  if (!ecg) return tl::unexpected(ecg.error());
-  auto block = to_ecg_block(**ecg);
-  if (!block) return reader.wrong(message, block.error().message);
-  block->arrival = message.arrival;
-  return *block;
-}
-
 Expected<std::optional<ReplayEvent>> r_trigger_event(const RecordingReader& reader, const RecordedMessage& message) {
   const auto recorded = reader.decode<perimap_RTriggerPulse>(message);
   if (!recorded) return tl::unexpected(recorded.error());
@@ -123,7 +114,8 @@ Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode
   if (!reader) return tl::unexpected(reader.error());
   std::vector<std::string_view> wanted(kSensorChannels.begin(), kSensorChannels.end());
   for (const RecordedChannel& channel : reader->channels()) {
-    for (const std::string_view optional : {channels::kRTrigger, channels::kRespirationSamples}) {
+    for (const std::string_view optional :
+         {channels::kEcgSecondLead, channels::kRTrigger, channels::kRespirationSamples}) {
       if (channel.name == optional) wanted.push_back(optional);
     }
   }
@@ -178,6 +170,22 @@ Expected<std::optional<ReplayEvent>> ReplayReader::frame_event(const RecordedMes
   return event;
 }
 
+// Of both leads at once.
+Expected<std::optional<ReplayEvent>> ReplayReader::ecg_event(const RecordedMessage& message) {
+  const auto ecg = reader_.decode<perimap_EcgSamples>(message);
+  if (!ecg) return tl::unexpected(ecg.error());
+  auto block = to_ecg_block(**ecg);
+  if (!block) return reader_.wrong(message, block.error().message);
+  if (message.channel == channels::kEcgSecondLead) {
+    second_lead_ = *block;
+    return std::optional<ReplayEvent>();
+  }
+  block->arrival = message.arrival;
+  join_second_lead(second_lead_, *block);
+  second_lead_ = {};
+  return *block;
+}
+
 std::vector<Error> ReplayReader::damage() const {
   std::vector<Error> all = reader_.damage();
   if (undecoded_ > 0) {
@@ -206,11 +214,11 @@ Expected<std::optional<ReplayEvent>> ReplayReader::event_of(const RecordedMessag
         m, fmt::format("arrival {} ns lies before its own source time {} ns", to_ns(m.arrival), to_ns(m.source_time)));
   }
   last_arrival_ = m.arrival;
-  return m.channel == channels::kCameraImage   ? frame_event(m)
-         : m.channel == channels::kTrackerPose ? pose_event(reader_, m)
-         : m.channel == channels::kEcgSamples  ? ecg_event(reader_, m)
-         : m.channel == channels::kRTrigger    ? r_trigger_event(reader_, m)
-                                               : respiration_event(reader_, m);
+  return m.channel == channels::kCameraImage                                           ? frame_event(m)
+         : m.channel == channels::kTrackerPose                                         ? pose_event(reader_, m)
+         : m.channel == channels::kEcgSamples || m.channel == channels::kEcgSecondLead ? ecg_event(m)
+         : m.channel == channels::kRTrigger                                            ? r_trigger_event(reader_, m)
+                                                                                       : respiration_event(reader_, m);
 }
 
 }  // namespace perimap

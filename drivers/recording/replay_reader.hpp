@@ -93,9 +93,11 @@ class ReplayReader {
                                                      std::span<const std::string_view> channels);
   [[nodiscard]] Expected<std::optional<ReplayEvent>> event_of(const RecordedMessage& message);
   [[nodiscard]] Expected<std::optional<ReplayEvent>> frame_event(const RecordedMessage& message);
+  [[nodiscard]] Expected<std::optional<ReplayEvent>> ecg_event(const RecordedMessage& message);
 
   RecordingReader reader_;
   RecordedFrame frame_;
+  EcgBlock second_lead_;  // the last one; it waits for the first lead's
   bool keeps_frames_ = false;
   std::uint64_t undecoded_ = 0;
   Error first_undecoded_;

@@ -69,6 +69,14 @@ perimap_EcgSamples borrow_ecg_samples(const EcgBlock& block) noexcept {
   return message;
 }
 
+perimap_EcgSamples borrow_second_lead(const EcgBlock& block) noexcept {
+  perimap_EcgSamples message{};
+  lend_samples(block, message, message.ecg_mV);
+  message.ecg_mV._buffer = const_cast<float*>(block.second_samples().data());
+  message.lead_off = block.second_off;
+  return message;
+}
+
 perimap_RTriggerPulse to_r_trigger_message(const RTriggerPulse& pulse) noexcept {
   return {to_ns(pulse.time), pulse.device_count};
 }
@@ -104,6 +112,16 @@ Expected<EcgBlock> to_ecg_block(const perimap_EcgSamples& message) {
   if (auto taken = take_samples(message, message.ecg_mV, block, block.mV); !taken) return tl::unexpected(taken.error());
   block.lead_off = message.lead_off;
   return block;
+}
+
+void join_second_lead(const EcgBlock& second, EcgBlock& first) noexcept {
+  if (second.first_sample_time != first.first_sample_time || second.device_sequence != first.device_sequence ||
+      second.count != first.count) {
+    return;
+  }
+  first.has_second = true;
+  first.second_off = second.lead_off;
+  first.second_mV = second.mV;
 }
 
 RTriggerPulse to_r_trigger_pulse(const perimap_RTriggerPulse& message) noexcept {

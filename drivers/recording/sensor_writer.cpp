@@ -54,6 +54,9 @@ Expected<void> SensorWriter::begin(const SensorRecordingFacts& facts, Instant be
           .map(keep(viewer_))
           .and_then([&] { return writer_.add_channel<perimap_EcgSamples>(channels::kEcgSamples); })
           .map(keep(ecg_))
+          .and_then([&] {
+            return add_optional<perimap_EcgSamples>(facts.second_lead, channels::kEcgSecondLead, second_lead_);
+          })
           .and_then(
               [&] { return add_optional<perimap_RTriggerPulse>(facts.r_trigger, channels::kRTrigger, r_trigger_); })
           .and_then([&] {
@@ -107,6 +110,12 @@ Expected<void> SensorWriter::write(const ToolSample& sample, Instant arrival) {
 }
 
 Expected<void> SensorWriter::write(const EcgBlock& block, Instant arrival) {
+  if (block.has_second) {
+    if (!second_lead_) return fail("a second lead came, and the recording has no channel for one");
+    auto written = writer_.write(*second_lead_, borrow_second_lead(block), arrival, block.first_sample_time,
+                                 block.device_sequence);
+    if (!written) return written;
+  }
   return writer_.write(ecg_, borrow_ecg_samples(block), arrival, block.first_sample_time, block.device_sequence);
 }
 

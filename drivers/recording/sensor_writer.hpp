@@ -28,6 +28,7 @@ struct SensorRecordingFacts {
   std::optional<std::string> turned_scope{};  // where the scope is turned in its camera head, as calibrated
   bool r_trigger = false;                     // there is a trigger whose pulses may come
   bool respiration = false;                   // there is a respiration channel
+  bool second_lead = false;                   // the ECG has two leads
   std::vector<std::string> tools = {};  // channels of other tracked tools, by ToolSample::tool; empty: not recorded
 };
 
@@ -44,6 +45,7 @@ class SensorWriter {
   [[nodiscard]] Expected<void> write(const TrackerSample& sample, Instant arrival);
   // Only of a tool that the facts named.
   [[nodiscard]] Expected<void> write(const ToolSample& sample, Instant arrival);
+  // A second lead only where the facts named one.
   [[nodiscard]] Expected<void> write(const EcgBlock& block, Instant arrival);
   // Only of a trigger that the facts named.
   [[nodiscard]] Expected<void> write(const RTriggerPulse& pulse, Instant arrival);
@@ -71,7 +73,7 @@ class SensorWriter {
   bool compressed_ = false;
   ChannelId tracker_, viewer_, ecg_;
   std::vector<std::optional<ChannelId>> tools_;  // by ToolSample::tool
-  std::optional<ChannelId> r_trigger_, respiration_;
+  std::optional<ChannelId> second_lead_, r_trigger_, respiration_;
 };
 
 }  // namespace perimap

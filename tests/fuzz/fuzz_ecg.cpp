@@ -66,19 +66,22 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto input = std::as_bytes(std::span(data, size)).subspan(2);
   Checked checked;
   std::unique_ptr<EcgProtocol> protocol;
-  // In half of the trials the device has a respiration channel.
+  // In half of the trials the device has a respiration channel, in half a second lead.
   const int breathes = data[0] % 8 < 4 ? 0 : 1;
+  const int two = data[0] % 16 < 8 ? 0 : 1;
   switch (data[0] % 4) {
     case 0:
       protocol = std::make_unique<MedlabProtocol>(MedlabSettings{}, checked.sink(), checked.health);
       break;
     case 1:
-      protocol = std::make_unique<BitalinoProtocol>(BitalinoSettings{.respiration_channel = breathes * 3},
-                                                    checked.sink(), checked.health);
+      protocol = std::make_unique<BitalinoProtocol>(
+          BitalinoSettings{.second_channel = two * 4, .respiration_channel = breathes * 3}, checked.sink(),
+          checked.health);
       break;
     case 2:
-      protocol = std::make_unique<CytonProtocol>(CytonSettings{.respiration_channel = breathes * 8}, checked.sink(),
-                                                 checked.health);
+      protocol =
+          std::make_unique<CytonProtocol>(CytonSettings{.second_channel = two * 2, .respiration_channel = breathes * 8},
+                                          checked.sink(), checked.health);
       break;
     default:
       feed_can(input);

@@ -1,6 +1,7 @@
 // `perimap ecg`: beats, classes and predictions of an ECG.
 #include <fmt/format.h>
 
+#include <cstddef>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -90,7 +91,7 @@ Outcome find_beats(const EcgOptions& options, const Console& console) {
   std::optional<BeatScore> score;
   if (!reference.beats.empty()) score = score_beats(reference.beats, *analysis, input->trace);
   if (!options.json) {
-    if (input->signal) fmt::print("signal      {} of the record: {}\n", input->signal->number, input->signal->name);
+    for (const EcgLead& lead : input->signals) fmt::print("signal      {} of the record: {}\n", lead.number, lead.name);
     fmt::print("{}{}", to_text(*analysis, errors), score ? to_text(*score, reference.left_out) : "");
     return {};
   }
@@ -98,7 +99,10 @@ Outcome find_beats(const EcgOptions& options, const Console& console) {
   json["input"] = options.ecg.path;
   json["input_damage"] = nlohmann::json::array();
   for (const Error& damage : input->damage) json["input_damage"].push_back(damage.message);
-  if (input->signal) json["signal"] = {{"number", input->signal->number}, {"name", input->signal->name}};
+  for (std::size_t i = 0; i < input->signals.size(); ++i) {
+    const EcgLead& lead = input->signals[i];
+    json[i == 0 ? "signal" : "second_signal"] = {{"number", lead.number}, {"name", lead.name}};
+  }
   if (!reference.beats.empty()) json["reference_ends_s"] = reference.beats.back().time_s;
   if (score) json["score"] = to_json(*score, reference.left_out);
   fmt::print("{}\n", json.dump(2));
@@ -128,13 +132,19 @@ void add_ecg_command(Commands& commands) {
                   "first sample is at 0 s")
       ->check(Range(1.0, 100000.0));
   command
-      .add_option("--column", options->ecg.column,
+      .add_option("--column", options->ecg.columns,
                   "Column of the table that holds the ECG, from 1 [2 beside times, 1 of values alone; several "
-                  "columns without times need it]; of a WFDB record the number of its signal, as --signal")
+                  "columns without times need it]; of a WFDB record the number of its signal, as --signal. With two, "
+                  "as 2,3 or given twice, two leads of the heart are heard, of which one is enough at any time")
+      ->delimiter(',')
+      ->one_at_a_time()
       ->check(Range(1, 10000));
-  command.add_option("--signal", options->ecg.signal,
-                     "Signal of a WFDB record, by its name in the header or its number from 1 [the first that is named "
-                     "as a lead of an ECG is]");
+  command
+      .add_option("--signal", options->ecg.signals,
+                  "Signal of a WFDB record, by its name in the header or its number from 1 [the first that is named "
+                  "as a lead of an ECG is]. Given twice, or as MLII,V5: two leads. Of a recording with two both are "
+                  "heard")
+      ->one_at_a_time();
   command.add_option("--gain", options->ecg.gain, "mV a unit of the input; the beats do not depend on it [1]");
   command.add_option("--reference", options->reference,
                      "Score against these beats: a table of time_s, or with a kind in a column that the heading calls "

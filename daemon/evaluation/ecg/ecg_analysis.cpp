@@ -59,7 +59,8 @@ EcgAnalysis analyse(const EcgTrace& trace, const std::function<bool(std::size_t)
   for (std::size_t i = 0; i < trace.mV.size(); ++i) {
     if (i % kProgressEvery == 0 && !progress(i)) break;
     const double step_s = i > 0 ? trace.time_s[i] - trace.time_s[i - 1] : 0.0;
-    take(finder->push(Instant(from_seconds(trace.time_s[i])), trace.mV[i]));
+    const Instant t(from_seconds(trace.time_s[i]));
+    take(trace.second_mV.empty() ? finder->push(t, trace.mV[i]) : finder->push(t, trace.mV[i], trace.second_mV[i]));
     const bool interrupted = finder->take_interruption();
     if (interrupted) {
       predictions.interrupt();

@@ -32,6 +32,18 @@ cmp first beats || fail "signal 1 is not the first"
 "$perimap" ecg r100 --column 2 --beats second > text
 [ "$(wc -l < second)" -eq 1 ] && grep -q 'unusable for [1-9]' text || fail "signal 2 is not the flat one" text
 
+# Two leads: beside the flat one the beats are those of the first, and what was read is said.
+for two in '--signal 1 --signal 2' '--signal 1,2' '--column 1,2' '--column 1 --column 2' '--column 2,1'; do
+  # shellcheck disable=SC2086
+  "$perimap" ecg $two r100 --beats two > text
+  [ "$(grep -c '^signal      [12] of the record' text)" -eq 2 ] || fail "two signals were not read: $two" text
+  awk -F, 'NR == FNR { t[FNR] = $1; next } FNR > 1 && ($1 - t[FNR]) ^ 2 > 1e-6 { wrong = 1 } END { exit wrong || FNR < 30 }' \
+    beats two || fail "other beats with $two" beats two
+done
+awk -F, 'NR > 1 { print $1 "," $2 ",0" }' same.csv > leads.csv
+"$perimap" ecg leads.csv --column 2,3 --beats two > /dev/null
+cut -d, -f1,2 same > plain
+cut -d, -f1,2 two | cmp - plain || fail "other beats beside a column of nothing"
 # ends EXIT_CODE PATTERN ARGUMENT...
 ends() {
   code=$1 pattern=$2
@@ -42,6 +54,9 @@ ends() {
 }
 ends 1 'r100.hea: there is no signal 3; it has 2' r100 --column 3
 ends 2 'knows its rate' r100 --rate 360
+ends 1 'signal 1 is asked for twice' r100 --signal 1,1
+ends 2 'one lead or two are taken' r100 --signal 1 --signal 2 --signal 1
+ends 2 'two leads lie in two columns' leads.csv --column 2,2
 ends 1 'nothing.hea: expected a readable WFDB header' nothing.dat
 head -c 43000 r100.dat > short.dat
 sed s/r100/short/ r100.hea > short.hea

@@ -42,6 +42,10 @@ TEST(CheckpointFile, IsReadBackAsItWasWritten) {
   EXPECT_EQ(read->memory.frame_period, written.memory.frame_period);
   ASSERT_EQ(read->memory.ecg.size(), 2U);
   EXPECT_EQ(read->memory.ecg[1].mV, written.memory.ecg[1].mV);
+  EXPECT_FALSE(read->memory.ecg[0].has_second);
+  EXPECT_TRUE(read->memory.ecg[1].has_second);
+  EXPECT_TRUE(read->memory.ecg[1].second_off);
+  EXPECT_EQ(read->memory.ecg[1].second_mV, written.memory.ecg[1].second_mV);
   EXPECT_EQ(read->memory.ecg[1].first_sample_time, written.memory.ecg[1].first_sample_time);
   const RespirationMemory& r = read->memory.respiration;
   const RespirationMemory s = respiration_sample();

@@ -66,7 +66,11 @@ Checkpoint checkpoint_sample() {
   block.sample_period = std::chrono::milliseconds(4);
   block.count = 3;
   block.mV = {0.5F, -0.25F, 1.5F};
-  c.memory.ecg = {block, block};
+  EcgBlock two = block;
+  two.has_second = true;
+  two.second_off = true;
+  two.second_mV = {-1.0F, 2.0F, -3.0F};
+  c.memory.ecg = {block, two};
   c.memory.respiration = respiration_sample();
   c.memory.law = {PhaseLaw::kWarped, Seconds(0.8), 12.5, {40.0, 12.0, 20.0}, {-9.0, -3.0, -6.0}};
   return c;

@@ -338,6 +338,19 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"InputOfNoDevice", "version = 1\n[respiration]\ndevice_channel = 1\n",
               "test.toml:3:18: key 'respiration.device_channel': expected 0 without an ECG device in 'ecg.protocol', "
               "got 1"},
+        Wrong{"InputOfTheSecondLead",
+              "version = 1\n[ecg]\nprotocol = \"cyton\"\nsecond_channel = 2\n[respiration]\ndevice_channel = 2\n",
+              "test.toml:6:18: key 'respiration.device_channel': expected 1 to 8 of a cyton, but for 1 and 2, which "
+              "carry the ECG, got 2"},
+        Wrong{"SecondLeadOfOneInput", "version = 1\n[ecg]\nprotocol = \"cyton\"\nsecond_channel = 1\n",
+              "test.toml:4:18: key 'ecg.second_channel': expected 1 to 8 of a cyton, but for 1, which carries the "
+              "first lead, got 1"},
+        Wrong{"SecondLeadThatABitalinoHasNot", "version = 1\n[ecg]\nprotocol = \"bitalino\"\nsecond_channel = 7\n",
+              "test.toml:4:18: key 'ecg.second_channel': expected 1 to 6 of a bitalino, but for 2, which carries the "
+              "first lead, got 7"},
+        Wrong{"SecondLeadOfAMedlab", "version = 1\n[ecg]\nprotocol = \"medlab\"\nsecond_channel = 2\n",
+              "test.toml:4:18: key 'ecg.second_channel': expected 0 but with a bitalino or a cyton, which have inputs, "
+              "got 2"},
         Wrong{"EcgInputThatABitalinoHasNot", "version = 1\n[ecg]\nchannel = 8\nprotocol = \"bitalino\"\n",
               "test.toml:3:11: key 'ecg.channel': expected 1 to 6 of a bitalino, got 8"},
         Wrong{"TriggerOnTheEcgsPort",

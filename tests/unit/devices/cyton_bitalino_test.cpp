@@ -261,5 +261,87 @@ TEST(Bitalino, ABreathSensorIsOffAfterFiveSecondsAtARailAndTheLeadIsOn) {
   for (const EcgBlock& block : received.blocks) EXPECT_FALSE(block.lead_off);
 }
 
+// Of a BITalino's frame in counts from its middle.
+std::vector<int> second_counts(const Received& received, double count_mV) {
+  std::vector<int> all;
+  for (const EcgBlock& block : received.blocks) {
+    for (const float mV : block.second_samples()) all.push_back(static_cast<int>(std::lround(mV / count_mV)));
+  }
+  return all;
+}
+
+constexpr double kBitalinoCount_mV = 3300.0 / 1024 / 1100;
+
+TEST(Bitalino, ASecondLeadComesWithTheFirstWhicheverHasTheLowerNumber) {
+  for (const auto& [first, second] : {std::pair(2, 5), std::pair(5, 2)}) {
+    Received received;
+    BitalinoProtocol protocol({.channel = first, .second_channel = second}, received.sink(), received.health);
+    ScriptedLink link;
+    protocol.on_open(link, kStart);
+    EXPECT_THAT(commands_until(protocol, link, kStart + seconds(1)),
+                ElementsAre(Pair(milliseconds(150), ::testing::_), Pair(milliseconds(300), ::testing::_),
+                            Pair(milliseconds(450), "\x49")));
+    for (unsigned i = 0; i < 6; ++i) protocol.on_bytes(link, bitalino_frame_of_two(i, 612, 300), kStart);
+    const std::vector<int> low(5, 100);
+    const std::vector<int> high(5, -212);
+    EXPECT_EQ(received.counts(kBitalinoCount_mV), first < second ? low : high);
+    EXPECT_EQ(second_counts(received, kBitalinoCount_mV), first < second ? high : low);
+  }
+}
+
+TEST(Bitalino, TwoLeadsAndRespirationAreThreeInputs) {
+  Received received;
+  BitalinoProtocol protocol({.channel = 4, .second_channel = 1, .respiration_channel = 2}, received.sink(),
+                            received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  for (unsigned i = 0; i < 6; ++i) {
+    protocol.on_bytes(link, bitalino_frame_of_three(i, {1022, 513, 301}), kStart);  // A1, A2, A4
+  }
+  EXPECT_EQ(received.health.damaged.get(), 0U);
+  EXPECT_EQ(received.counts(kBitalinoCount_mV), std::vector<int>(5, -211));
+  EXPECT_EQ(second_counts(received, kBitalinoCount_mV), std::vector<int>(5, 510));
+  ASSERT_FALSE(received.breaths.empty());
+  EXPECT_NEAR(received.breaths[0].samples()[0], 3300.0 / 1024, 1e-4);
+}
+
+TEST(Bitalino, OneLeadMayBeOffWithoutTheOther) {
+  Received received;
+  BitalinoProtocol protocol({.channel = 2, .second_channel = 3}, received.sink(), received.health);
+  ScriptedLink link;
+  protocol.on_open(link, kStart);
+  for (unsigned i = 0; i < 3000; ++i) {
+    const bool open = i >= 1000 && i < 2000;
+    protocol.on_bytes(link, bitalino_frame_of_two(i, 512 + i % 7, open ? 1023 : 500), kStart + i * milliseconds(1));
+  }
+  std::vector<unsigned> changes;
+  for (std::size_t i = 0; i < received.blocks.size(); ++i) {
+    const EcgBlock& block = received.blocks[i];
+    EXPECT_TRUE(block.has_second);
+    EXPECT_FALSE(block.lead_off);
+    EXPECT_FALSE(block.nothing_heard());
+    if (i > 0 && block.second_off != received.blocks[i - 1].second_off) changes.push_back(block.device_sequence);
+  }
+  EXPECT_THAT(changes, ElementsAre(1099, 2499));
+}
+
+TEST(Cyton, ASecondLeadComesWithTheFirst) {
+  Received received;
+  CytonProtocol protocol({.channel = 1, .second_channel = 5, .gain = 24.0}, received.sink(), received.health);
+  ScriptedLink link;
+  open_cyton(protocol, link);
+  for (unsigned i = 0; i < 4; ++i) protocol.on_bytes(link, cyton_packet(i, 77, -40), kStart + i * milliseconds(4));
+  constexpr double kCount_mV = 4500.0 / 24 / 0x7FFFFF;
+  EXPECT_EQ(received.counts(kCount_mV), std::vector<int>(4, 77));
+  EXPECT_EQ(second_counts(received, kCount_mV), std::vector<int>(4, -40));
+  Received alone;
+  CytonProtocol one({.channel = 1}, alone.sink(), alone.health);
+  open_cyton(one, link);
+  for (unsigned i = 0; i < 4; ++i) one.on_bytes(link, cyton_packet(i, 77, -40), kStart + i * milliseconds(4));
+  ASSERT_FALSE(alone.blocks.empty());
+  EXPECT_FALSE(alone.blocks[0].has_second);
+  EXPECT_TRUE(alone.blocks[0].second_samples().empty());
+}
+
 }  // namespace
 }  // namespace perimap

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <fstream>
 #include <map>
 #include <numeric>
@@ -75,6 +76,16 @@ inline std::vector<std::byte> bitalino_frame_of_two(unsigned sequence, unsigned 
   auto frame = bytes_of({static_cast<int>(high & 0xFFU), static_cast<int>((low << 2U | high >> 8U) & 0xFFU),
                          static_cast<int>(low >> 6U), static_cast<int>(sequence % 16 << 4U)});
   frame[3] |= static_cast<std::byte>(bitalino_crc(frame));
+  return frame;
+}
+
+// With three inputs taken, in order of their numbers.
+inline std::vector<std::byte> bitalino_frame_of_three(unsigned sequence, std::array<unsigned, 3> values) {
+  const auto [low, middle, high] = values;
+  auto frame = bytes_of({static_cast<int>(high << 6U & 0xFFU), static_cast<int>(high >> 2U),
+                         static_cast<int>(middle & 0xFFU), static_cast<int>((low << 2U | middle >> 8U) & 0xFFU),
+                         static_cast<int>(low >> 6U), static_cast<int>(sequence % 16 << 4U)});
+  frame[5] |= static_cast<std::byte>(bitalino_crc(frame));
   return frame;
 }
 

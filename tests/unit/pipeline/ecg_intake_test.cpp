@@ -56,6 +56,40 @@ struct Intake : ::testing::Test {
 
 constexpr Instant kMidCycle{milliseconds(20'000)};  // 0.4 s after a beat
 
+TEST_F(Intake, OneOfTwoLeadsIsEnough) {
+  const auto blocks_until = [&](Instant until, bool first_off, bool second_off) {
+    while (t < until) {
+      EcgBlock block;
+      block.device_sequence = sequence;
+      sequence += kBlock;
+      block.sample_period = kPeriod;
+      block.first_sample_time = t;
+      block.count = kBlock;
+      block.lead_off = first_off;
+      block.has_second = true;
+      block.second_off = second_off;
+      for (std::size_t i = 0; i < kBlock; ++i) {
+        block.mV[i] = lead_mV(t);
+        block.second_mV[i] = -0.5F * lead_mV(t);
+        t += kPeriod;
+      }
+      block.arrival = t;
+      intake->push(block);
+    }
+  };
+  blocks_until(kMidCycle, false, false);
+  ASSERT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
+  blocks_until(kMidCycle + milliseconds(8000), true, false);
+  EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
+  EXPECT_TRUE(cycle_taught(kMidCycle + milliseconds(4000)));
+  blocks_until(kMidCycle + milliseconds(16000), false, true);
+  EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
+  EXPECT_EQ(counters->ecg_lead_off.get(), 0U);
+  blocks_until(kMidCycle + milliseconds(18000), true, true);
+  EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kFreeRunning);
+  EXPECT_EQ(counters->ecg_lead_off.get(), 1000U);
+}
+
 TEST_F(Intake, ALineThatGoesFlatIsCountedAndSaid) {
   hear(kMidCycle, lead_mV);
   ASSERT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
