@@ -21,6 +21,8 @@ constexpr double kPriorMemory = 6.0;         // beats over which it fades: some 
 constexpr double kPriorDeviation = 0.05;     // of the interval: resting sinus rhythm
 constexpr double kLargestScoredError = 0.5;  // of the prediction: a missed beat must not count as a whole cycle's error
 
+constexpr int kChangedAfter = 4;  // intervals beyond the clip, on one side of the median
+
 constexpr double kNormalDeviation = 1.4826;  // a normal distribution's deviation, in median absolute deviations
 
 // Of a copy, for the order is lost.
@@ -87,6 +89,12 @@ void RrPredictor::predict_autoregressive(std::span<Seconds> next) const noexcept
     Window distance = (y.array() - median).abs();
     const double reach =
         autoregression_.clip * (kNormalDeviation * median_of(distance.data(), count_) + kLeastDeviation_s);
+    // So many in a row are no errors: the rhythm has changed, and what came before is no guide.
+    const auto recent = y.tail<kChangedAfter>().array();
+    if ((recent > median + reach).all() || (recent < median - reach).all()) {
+      std::fill(next.begin(), next.end(), Seconds(recent.mean()));
+      return;
+    }
     y = y.array().max(median - reach).min(median + reach);
   }
   const double mean = y.mean();

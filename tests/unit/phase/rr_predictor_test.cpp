@@ -134,5 +134,31 @@ TEST(RrPredictor, SurvivesOutliers) {
   EXPECT_LT(std::sqrt(robust_squares), 0.75 * std::sqrt(plain_squares));
 }
 
+// A junctional rhythm takes over, or atrial fibrillation ends.
+TEST(RrPredictor, FourIntervalsInARowFarToOneSideAreANewRhythm) {
+  std::mt19937 generator(6);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  for (const double changed_s : {1.6, 0.45}) {
+    RrPredictor predictor;
+    for (int i = 0; i < 60; ++i) predictor.push(Seconds(0.8 + noise(generator)));
+    for (int i = 0; i < 3; ++i) predictor.push(Seconds(changed_s));
+    EXPECT_NEAR(next_of(predictor).count(), 0.8, 0.1) << "these may be errors";
+    predictor.push(Seconds(changed_s + 0.04));
+    EXPECT_NEAR(next_of(predictor).count(), changed_s + 0.01, 1e-9);
+    std::array<Seconds, 2> both{};
+    predictor.predict(both);
+    EXPECT_EQ(both[0], both[1]);
+    predictor.push(Seconds(0.8));
+    EXPECT_NEAR(next_of(predictor).count(), 0.8, 0.1) << "that was all";
+  }
+}
+
+TEST(RrPredictor, OutliersToBothSidesAreNoNewRhythm) {
+  RrPredictor predictor;
+  for (int i = 0; i < 60; ++i) predictor.push(Seconds(0.8 + 0.01 * std::sin(i * 1.1)));
+  for (const double rr_s : {1.6, 0.4, 1.6, 0.4}) predictor.push(Seconds(rr_s));
+  EXPECT_NEAR(next_of(predictor).count(), 0.8, 0.1);
+}
+
 }  // namespace
 }  // namespace perimap
