@@ -109,7 +109,7 @@ TEST(CheckpointFile, AnotherFormatIsRefusedByName) {
   old[8] = 1;  // the least byte of the format
   const auto read = parse_checkpoint(old);
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().message, HasSubstr("expected format 6; it is of format 1"));
+  EXPECT_THAT(read.error().message, HasSubstr("expected format 7; it is of format 1"));
 }
 
 TEST(CheckpointFile, AChangedByteIsNoticed) {

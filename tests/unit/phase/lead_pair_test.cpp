@@ -21,6 +21,8 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr double kRate_hz = 360.0;
 constexpr double kLater_s = 0.015;  // the second lead's R wave
 
+std::size_t sample(double t_s) { return static_cast<std::size_t>(t_s * kRate_hz); }
+
 struct Heart {
   std::vector<float> first;
   std::vector<float> second;
@@ -190,7 +192,7 @@ void add_arcs(std::vector<float>& mV, std::uint64_t seed) {
     for (double at_s = burst_s; at_s < burst_s + 10.0; at_s += uniform(0.05, 0.5)) {
       const double height = uniform(0.5, 4.0) * (uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0);
       const double sigma_s = uniform(0.005, 0.02);
-      for (std::size_t i = static_cast<std::size_t>((at_s - 0.1) * kRate_hz); i < (at_s + 0.1) * kRate_hz; ++i) {
+      for (std::size_t i = sample(at_s - 0.1); i < sample(at_s + 0.1); ++i) {
         const double x = (static_cast<double>(i) / kRate_hz - at_s) / sigma_s;
         mV[i] += static_cast<float>(height * std::exp(-0.5 * x * x));
       }
@@ -305,7 +307,7 @@ TEST(LeadPair, ClassesGoByTheShapeInTheLeadThatGivesTheTime) {
   for (std::size_t k = 30; k + 1 < h.beats_s.size(); k += 9) {
     const double at_s = h.beats_s[k];
     wide_s.push_back(at_s);
-    for (std::size_t i = static_cast<std::size_t>((at_s - 0.2) * kRate_hz); i < (at_s + 0.2) * kRate_hz; ++i) {
+    for (std::size_t i = sample(at_s - 0.2); i < sample(at_s + 0.2); ++i) {
       const double x = static_cast<double>(i) / kRate_hz - at_s;
       h.first[i] = static_cast<float>(0.2 * h.first[i] - 1.8 * std::exp(-0.5 * std::pow(x / 0.045, 2)));
       h.second[i] = static_cast<float>(0.2 * h.second[i] + 1.2 * std::exp(-0.5 * std::pow((x - kLater_s) / 0.045, 2)));

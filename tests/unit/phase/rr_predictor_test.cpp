@@ -134,6 +134,38 @@ TEST(RrPredictor, SurvivesOutliers) {
   EXPECT_LT(std::sqrt(robust_squares), 0.75 * std::sqrt(plain_squares));
 }
 
+// Of a rhythm whose pattern it knows well it foretells nothing beyond 0.7 and 1.3 of the mean.
+TEST(RrPredictor, StaysWithinBoundsAboutTheMean) {
+  RrPredictor predictor(RrMethod::kAutoregressive,
+                        {.ridge = 1e-4, .pull = 0.0, .clip = std::numeric_limits<double>::infinity()});
+  for (int i = 0; i < 60; ++i) predictor.push(Seconds(i % 4 == 3 ? 1.6 : 0.4));
+  std::array<Seconds, 4> next{};
+  predictor.predict(next);
+  EXPECT_NEAR(next[0].count(), 0.7 * 0.7, 1e-9);
+  RrPredictor longer(RrMethod::kAutoregressive,
+                     {.ridge = 1e-4, .pull = 0.0, .clip = std::numeric_limits<double>::infinity()});
+  for (int i = 0; i < 59; ++i) longer.push(Seconds(i % 4 == 3 ? 1.6 : 0.4));
+  longer.predict(next);
+  EXPECT_NEAR(next[0].count(), 1.3 * (45 * 0.4 + 14 * 1.6) / 59, 1e-9);
+}
+
+// At first 5 % of the interval, worth four beats; then the errors seen, of which none counts for more than half a
+// prediction, and which fade within thirty beats.
+TEST(RrPredictor, ItsDeviationIsThatOfPastErrorsWhichFade) {
+  RrPredictor predictor(RrMethod::kPrevious);
+  predictor.push(Seconds(0.8));
+  EXPECT_NEAR(predictor.deviation().count(), 0.05 * 0.8, 1e-12);
+  predictor.push(Seconds(0.8));
+  // The prior's weight has faded from 4 by a sixth.
+  const double prior = 4.0 * 5.0 / 6.0;
+  EXPECT_NEAR(predictor.deviation().count(), 0.04 * std::sqrt(prior / (prior + 1.0)), 1e-12);
+  for (int i = 0; i < 400; ++i) predictor.push(Seconds(0.8));
+  predictor.score(Seconds(2.4));
+  EXPECT_NEAR(predictor.deviation().count(), 0.4 / std::sqrt(30.0), 1e-4);
+  for (int i = 0; i < 30; ++i) predictor.push(Seconds(0.8));
+  EXPECT_NEAR(predictor.deviation().count(), 0.4 / std::sqrt(30.0) * std::sqrt(std::pow(29.0 / 30.0, 30)), 1e-4);
+}
+
 // A junctional rhythm takes over, or atrial fibrillation ends.
 TEST(RrPredictor, FourIntervalsInARowFarToOneSideAreANewRhythm) {
   std::mt19937 generator(6);
