@@ -55,7 +55,7 @@ std::size_t place_of(int channel, const BitalinoSettings& settings) {
   return static_cast<std::size_t>(std::popcount(mask(settings) & (mask(channel) - 1U)));
 }
 
-float ecg_mV(int value) { return static_cast<float>((value - 512) * kCount_mV / kSensorGain); }
+float lead_value(int value) { return static_cast<float>((value - 512) * kCount_mV / kSensorGain); }
 
 }  // namespace
 
@@ -123,14 +123,14 @@ void BitalinoProtocol::decode(LinkControl& /*link*/, std::span<const std::byte> 
     std::optional<SecondLead> second;
     if (settings_.second_channel > 0) {
       const int value = value_of(settings_.second_channel);
-      second = {ecg_mV(value), second_lead_.off(at_rail(value))};
+      second = {lead_value(value), second_lead_.off(at_rail(value))};
     }
     std::optional<RespirationReading> respiration;
     if (settings_.respiration_channel > 0) {
       const int value = value_of(settings_.respiration_channel);
       respiration = {static_cast<float>((value - 512) * kCount_mV), breath_sensor_.off(at_rail(value))};
     }
-    samples().add(ecg_mV(ecg), lead_.off(at_rail(ecg)),
+    samples().add(lead_value(ecg), lead_.off(at_rail(ecg)),
                   lost ? samples().lost_samples(*lost, kSequenceModulus, behind, arrival) : 0, respiration, second);
   };
   health().damaged.add(framer_.feed(after_name(bytes), take));

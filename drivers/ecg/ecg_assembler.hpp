@@ -68,9 +68,9 @@ class EcgAssembler {
 
  private:
   struct Sample {
-    std::int64_t count;
-    float value;
-    bool off;
+    std::int64_t count = 0;
+    float value = 0.0F;
+    bool off = false;
     std::optional<SecondLead> second = {};
   };
   // One signal's samples of this chunk.
