@@ -219,7 +219,6 @@ Expected<LiveRecording> record_live(const LiveOptions& options, const std::strin
         if (!reason.empty()) line += "; " + reason;
       }
       lines.show(elapsed_s, line);
-      if (playback && playback->ended()) break;
       if (stopped || guide.enough() || elapsed_s >= options.longest_s || (*recorder)->summary().stopped) break;
     }
   }

@@ -44,7 +44,7 @@ nothing_left() { [ -z "$(ls temporary)" ] || fail "$1 left something behind: $(l
 # ---- the lens: which part of the picture has not seen the board
 play
 live calibrate camera --live devices.toml --square-mm 8 --output camera.yaml --configuration devices.toml \
-  --html camera.html --json > camera.json || fail "calibrate camera --live: $(cat told)"
+  --html camera.html --json --seconds 52 > camera.json || fail "calibrate camera --live: $(cat told)"
 grep -q 'no board is seen: bring all of it into view' told || fail "it was not told that no board is seen: $(cat told)"
 grep -qE '[0-9]+ views' told || fail "the views were not told: $(cat told)"
 grep -qE 'show it .*(left|right|middle)' told || fail "it was not told where the board is missing: $(cat told)"
@@ -59,7 +59,7 @@ done
 
 # ---- hand-eye: which turn is missing, and what is left over by now
 play
-live calibrate hand-eye --live devices.toml --square-mm 8 --configuration devices.toml --keep kept.mcap --json \
+live calibrate hand-eye --live devices.toml --square-mm 8 --configuration devices.toml --keep kept.mcap --json --seconds 52 \
   > hand-eye.json || fail "calibrate hand-eye --live: $(cat told)"
 grep -qE 'AX - XB [0-9.]+ mm, held aside [0-9.]+ mm' told || fail "what is left over was not told: $(cat told)"
 told_lines 4
@@ -78,7 +78,7 @@ near "time offset, ms" "$(number ours.json time_offset_ms)" "$(number truth.json
 [ "$(nth hand-eye.json translation_mm 1)" = "$(nth kept.json translation_mm 1)" ] || fail "the kept recording says otherwise"
 grep -q '"sensor": "0A"' kept.json || fail "the recording does not say of which sensor it is"
 
-# ---- the pointer
+# ---- the pointer, which goes on when the camera's playback has ended
 live calibrate tool --live devices.toml --output pointer.json > out || fail "calibrate tool --live: $(cat told)"
 grep -qE 'turned [0-9]+ [0-9]+ [0-9]+ degrees about three axes; .*tip within' told || fail "the tip so far was not told: $(cat told)"
 grep -q '"tool": "0C"' pointer.json || fail "the tip does not say of which tool it is"
