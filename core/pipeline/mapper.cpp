@@ -17,12 +17,16 @@ HeartPhaseSettings heart_settings(const PipelineSettings& settings) noexcept {
 
 // Bit for bit: a sensor has noise, so what it gives twice is old.
 bool same_pose(const Pose& a, const Pose& b) noexcept { return a.t == b.t && a.R == b.R; }
+// But where it shows nothing at all: a lens that is covered is black, and all its noise is cut off.
 bool same_picture(const GreyImage& a, const GreyImage& b) noexcept {
   if (a.data == nullptr || b.data == nullptr || a.width != b.width || a.height != b.height) return false;
+  bool plain = true;
   for (int y = 0; y < a.height; ++y) {
     if (std::memcmp(a.row(y), b.row(y), static_cast<std::size_t>(a.width)) != 0) return false;
+    const auto differs = [first = *a.row(0)](std::uint8_t pixel) { return pixel != first; };
+    plain = plain && std::none_of(a.row(y), a.row(y) + a.width, differs);
   }
-  return true;
+  return !plain;
 }
 
 }  // namespace
