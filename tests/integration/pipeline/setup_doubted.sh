@@ -3,6 +3,7 @@
 # good from then on; the same bytes come of any number of workers. The right set-up is not doubted.
 # setup_doubted.sh PERIMAP WORK_FOLDER
 set -euo pipefail
+. "$(dirname "$0")/../figures.sh"
 perimap=$1 work=$2
 rm -rf "$work"
 mkdir -p "$work"
@@ -28,7 +29,6 @@ grep -q '"number": "hand_eye_turn' "$work/turned1.json"
 grep '^set-up  *doubted, positions are off by' "$work/turned1.txt"
 
 # The report counts from 15 s on, long after the doubt: none of its surfaces is good, nor a position.
-number() { tr -d ' \n' < "$1" | grep -o "\"$2\":[0-9.]*" | head -1 | cut -d: -f2; }
 not_good=$(($(number "$work/turned1.json" surfaces_degraded) + $(number "$work/turned1.json" surfaces_invalid)))
 [ "$not_good" -ge $((30 * (22 - 15))) ] || { echo "FAILED: only $not_good surfaces after 15 s are not good"; exit 1; }
 [ "$(number "$work/turned1.json" good_positions)" -eq 0 ] || { echo "FAILED: positions are good though doubted"; exit 1; }

@@ -3,6 +3,7 @@
 # good again when they have recovered.
 # stuck_devices.sh PERIMAP WORK_FOLDER
 set -euo pipefail
+. "$(dirname "$0")/../figures.sh"
 perimap=$1 work=$2
 rm -rf "$work"
 mkdir -p "$work"
@@ -17,18 +18,17 @@ session() {  # NAME ARGUMENT...
     { cat "$work/stderr"; exit 1; }
   rm "$work/$name.mcap"
 }
-number() { tr -d ' \n' < "$work/$1.json" | grep -o "\"$2\":[0-9.]*" | head -1 | cut -d: -f2; }
 
 session well
 session tracker --tracker-stuck 16:4
 session camera --camera-stuck 16:4
 session slow --camera-repeats 2
 for name in tracker camera; do
-  more=$(($(number $name surfaces_degraded) - $(number well surfaces_degraded)))
+  more=$(($(number "$work/$name.json" surfaces_degraded) - $(number "$work/well.json" surfaces_degraded)))
   [ $more -ge 100 ] && [ $more -le 130 ] || { echo "FAILED: $name: $more more surfaces are degraded"; exit 1; }
-  [ "$(number $name good_positions_off)" -eq 0 ] || { echo "FAILED: $name: good positions are off"; exit 1; }
-  [ "$(number $name good_positions)" -gt $(($(number well good_positions) / 3)) ] ||
+  [ "$(number "$work/$name.json" good_positions_off)" -eq 0 ] || { echo "FAILED: $name: good positions are off"; exit 1; }
+  [ "$(number "$work/$name.json" good_positions)" -gt $(($(number "$work/well.json" good_positions) / 3)) ] ||
     { echo "FAILED: $name: hardly anything is good"; exit 1; }
 done
-[ "$(number slow frames_repeated)" -ge 350 ] || { echo "FAILED: pictures that come twice are not counted"; exit 1; }
-[ "$(number slow good_positions_off)" -eq 0 ] || { echo "FAILED: pictures that come twice are learnt from twice"; exit 1; }
+[ "$(number "$work/slow.json" frames_repeated)" -ge 350 ] || { echo "FAILED: pictures that come twice are not counted"; exit 1; }
+[ "$(number "$work/slow.json" good_positions_off)" -eq 0 ] || { echo "FAILED: pictures that come twice are learnt from twice"; exit 1; }

@@ -3,6 +3,7 @@
 # as good by the measured function of the turn, within 1.5 times, as by the true one.
 # a_turned_scope_is_measured.sh PERIMAP PERIMAPD WORK_FOLDER SEED
 set -euo pipefail
+. "$(dirname "$0")/../figures.sh"
 perimap=$1 perimapd=$2 work=$3 seed=$4
 rm -rf "$work"
 mkdir -p "$work"
@@ -14,13 +15,7 @@ fail() {
   exit 1
 }
 quiet() { "$perimap" "$@" > out 2> errors || fail "perimap $*: $(cat out errors)"; }
-number() { tr -d ' \n' < "$1" | grep -o "\"$2\":\[*-*[0-9.e+-]*" | head -1 | sed 's/.*[:[]//'; }
 settled() { tr -d ' \n' < "$1" | grep -o '"settled_error":{[^}]*' | grep -o "\"$2\":[0-9.e-]*" | cut -d: -f2; }
-# at_most WHAT VALUE BOUND
-at_most() {
-  awk -v v="$2" -v b="$3" 'BEGIN { exit !(v != "" && v + 0 <= b + 0) }' || fail "$1: $2, expected at most $3"
-  echo "$1: $2 (at most $3)"
-}
 times() { awk -v a="$1" -v b="$2" 'BEGIN { print a * b }'; }
 
 common=(--setup-seed "$seed" --size 640x480)

@@ -3,6 +3,7 @@
 # map a heart. Positions must be as good, within 1.3 times, as the true set-up makes them.
 # from_nothing_to_a_session.sh PERIMAP WORK_FOLDER SEED
 set -euo pipefail
+. "$(dirname "$0")/../figures.sh"
 perimap=$1 work=$2 seed=$3
 rm -rf "$work"
 mkdir -p "$work"
@@ -14,21 +15,6 @@ fail() {
   exit 1
 }
 quiet() { "$perimap" "$@" > out 2> errors || fail "perimap $*: $(cat out errors)"; }
-# number FILE KEY: the first number of a key in JSON.
-number() { tr -d ' \n' < "$1" | grep -o "\"$2\":\[*-*[0-9.e+-]*" | head -1 | sed 's/.*[:[]//'; }
-# nth FILE KEY N: the Nth number of a key's first list.
-nth() { tr -d ' \n' < "$1" | grep -o "\"$2\":\[[^]]*" | head -1 | cut -d'[' -f2 | cut -d, -f"$3"; }
-# near WHAT VALUE TRUTH TOLERANCE
-near() {
-  awk -v v="$2" -v t="$3" -v e="$4" 'BEGIN { d = v - t; if (d < 0) d = -d; exit !(v != "" && t != "" && d <= e) }' ||
-    fail "$1: $2, expected $3 within $4"
-  echo "$1: $2 (truth $3)"
-}
-# at_most WHAT VALUE BOUND
-at_most() {
-  awk -v v="$2" -v b="$3" 'BEGIN { exit !(v != "" && v + 0 <= b + 0) }' || fail "$1: $2, expected at most $3"
-  echo "$1: $2 (at most $3)"
-}
 
 # ---- what is there: a bench with a board, the scope at rest, landmarks, and then the heart
 common=(--setup-seed "$seed" --size 640x480)

@@ -6,19 +6,10 @@
 set -uo pipefail
 perimap=$1 work=$2 seed=$3
 . "$(dirname "$0")/../emulated_devices.sh"
+. "$(dirname "$0")/../figures.sh"
 cd "$work" || exit 1
 mkdir temporary
 
-# number FILE KEY: the first number of a key in JSON.
-number() { tr -d ' \n' < "$1" | grep -o "\"$2\":\[*-*[0-9.e+-]*" | head -1 | sed 's/.*[:[]//'; }
-# nth FILE KEY N: the Nth number of a key's first list.
-nth() { tr -d ' \n' < "$1" | grep -o "\"$2\":\[[^]]*" | head -1 | cut -d'[' -f2 | cut -d, -f"$3"; }
-# near WHAT VALUE TRUTH TOLERANCE
-near() {
-  awk -v v="$2" -v t="$3" -v e="$4" 'BEGIN { d = v - t; if (d < 0) d = -d; exit !(v != "" && t != "" && d <= e) }' ||
-    fail "$1: $2, expected $3 within $4"
-  echo "$1: $2 (truth $3)"
-}
 # play: tracker and pointer anew, from the recording's beginning; the camera's playback begins with them
 play() {
   if [ -n "${emulators:-}" ]; then

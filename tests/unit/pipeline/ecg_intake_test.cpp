@@ -28,9 +28,9 @@ struct Intake : ::testing::Test {
   Instant t{milliseconds(0)};
   std::uint32_t sequence = 0;
 
-  // Blocks until `until`, each sample's value by its time.
-  template <class Value>
-  void hear(Instant until, Value&& value) {
+  // Blocks until `until`; fill(block, i, t) says what its sample i of that time is.
+  template <class Fill>
+  void send(Instant until, Fill&& fill) {
     while (t < until) {
       EcgBlock block;
       block.device_sequence = sequence;
@@ -39,12 +39,17 @@ struct Intake : ::testing::Test {
       block.first_sample_time = t;
       block.count = kBlock;
       for (std::size_t i = 0; i < kBlock; ++i) {
-        block.mV[i] = value(t);
+        fill(block, i, t);
         t += kPeriod;
       }
       block.arrival = t;
       intake->push(block);
     }
+  }
+  // Of one lead, each sample's value by its time.
+  template <class Value>
+  void hear(Instant until, Value&& value) {
+    send(until, [&](EcgBlock& block, std::size_t i, Instant at) { block.mV[i] = value(at); });
   }
   const CardiacClock& clock() {
     static_cast<void>(cells->mapper.update());
@@ -58,24 +63,13 @@ constexpr Instant kMidCycle{milliseconds(20'000)};  // 0.4 s after a beat
 
 TEST_F(Intake, OneOfTwoLeadsIsEnough) {
   const auto blocks_until = [&](Instant until, bool first_off, bool second_off) {
-    while (t < until) {
-      EcgBlock block;
-      block.device_sequence = sequence;
-      sequence += kBlock;
-      block.sample_period = kPeriod;
-      block.first_sample_time = t;
-      block.count = kBlock;
+    send(until, [&](EcgBlock& block, std::size_t i, Instant at) {
       block.lead_off = first_off;
       block.has_second = true;
       block.second_off = second_off;
-      for (std::size_t i = 0; i < kBlock; ++i) {
-        block.mV[i] = lead_mV(t);
-        block.second_mV[i] = -0.5F * lead_mV(t);
-        t += kPeriod;
-      }
-      block.arrival = t;
-      intake->push(block);
-    }
+      block.mV[i] = lead_mV(at);
+      block.second_mV[i] = -0.5F * lead_mV(at);
+    });
   };
   blocks_until(kMidCycle, false, false);
   ASSERT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
