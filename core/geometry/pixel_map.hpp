@@ -35,4 +35,14 @@ struct PixelMap {
   return map;
 }
 
+// Of one picture.
+struct PictureLens {
+  Vector2d focal_px = Vector2d::Zero();
+  Vector2d principal_px = Vector2d::Zero();
+};
+
+[[nodiscard]] inline PictureLens lens_of(const PixelMap& picture, const CameraModel& lens) noexcept {
+  return {picture.scale.cwiseProduct(Vector2d(lens.fx, lens.fy)), picture.to_picture(Vector2d(lens.cx, lens.cy))};
+}
+
 }  // namespace perimap

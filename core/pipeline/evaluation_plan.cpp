@@ -32,12 +32,12 @@ void plan_releases(const FrameHistory& history, const FrameRecord& newest, std::
 }
 
 void tell_cameras(const FrameHistory& history, const FrameRecord& newest, std::uint64_t oldest,
-                  EvaluationPlan& plan) noexcept {
+                  const CameraModel& camera, EvaluationPlan& plan) noexcept {
   const std::uint64_t first = oldest - std::min<std::uint64_t>(oldest, kCamerasBefore);
   for (std::size_t i = 0; i < kCamerasKept && first + i <= newest.index; ++i) {
     const FrameRecord* record = history.find(first + i);
     if (record == nullptr) continue;
-    plan.cameras[i] = {record->stamp.sequence, {record->pose.valid(), record->pose.X_WC}};
+    plan.cameras[i] = {record->stamp.sequence, camera_place(*record, camera)};
   }
 }
 
@@ -53,6 +53,11 @@ void plan_instants(const FrameHistory& history, const FrameRecord& newest, Insta
 }
 
 }  // namespace
+
+CameraPlace camera_place(const FrameRecord& frame, const CameraModel& camera) noexcept {
+  if (!frame.pose.valid()) return {};
+  return {true, frame.pose.X_WC, lens_of(frame.picture, camera)};
+}
 
 Duration period_before(const FrameHistory& history, const FrameRecord& frame) noexcept {
   const FrameRecord* before = history.find(frame.index - std::min<std::uint64_t>(frame.index, 1));
@@ -80,7 +85,7 @@ EvaluationPlan plan_evaluation(const FrameHistory& history, const FrameRecord& n
   if (settings.frame_stream) {
     const std::uint64_t oldest = oldest_unreleased(history, newest, known, settings.latency);
     plan_releases(history, newest, oldest, settings, plan);
-    tell_cameras(history, newest, oldest, plan);
+    tell_cameras(history, newest, oldest, settings.camera, plan);
   }
   if (on_clock) plan_instants(history, newest, known, settings, plan);
   return plan;

@@ -28,6 +28,9 @@ struct EvaluationPlan {
 [[nodiscard]] EvaluationPlan plan_evaluation(const FrameHistory& history, const FrameRecord& newest, Instant known,
                                              const PipelineSettings& settings) noexcept;
 
+// Where the camera was at that frame, and what its lens was then. `camera`: as calibrated.
+[[nodiscard]] CameraPlace camera_place(const FrameRecord& frame, const CameraModel& camera) noexcept;
+
 // From frame to frame, as the last two were; at most so long as a snapshot's instants can cover, also where there is
 // no frame before, or its stamp is not before this one's.
 [[nodiscard]] Duration period_before(const FrameHistory& history, const FrameRecord& frame) noexcept;

@@ -76,7 +76,7 @@ void ShardStages::evaluate_shard(int worker) noexcept {
     snapshot.capture = job_.frame->stamp.capture;
     snapshot.instants = job_.plan.instants;
     snapshot.cameras = job_.plan.cameras;
-    snapshot.camera = {job_.frame->pose.valid(), job_.frame->pose.X_WC};
+    snapshot.camera = camera_place(*job_.frame, settings_.camera);
     snapshot.pose_missing = !job_.frame->pose.valid();
     snapshot.doubts = job_.doubts;
     snapshot.features.clear();

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/geometry/pixel_map.hpp"
 #include "core/geometry/pose.hpp"
 #include "core/pipeline/release_schedule.hpp"
 #include "core/time/instant.hpp"
@@ -50,10 +51,11 @@ struct SurfaceFeature {
   Instant last_observed;                            // capture of the last match that agreed with the map
 };
 
-// Where the camera was, when that is known.
+// Where the camera was, when that is known, and how its picture was scaled and moved.
 struct CameraPlace {
   bool known = false;
   Pose X_WC;
+  PictureLens lens = {};
 };
 
 struct SurfaceSample {

@@ -46,6 +46,8 @@ const perimap_Surface& WireSurface::fill(const SurfaceSample& sample, Duration u
   wire_.camera_pose_known = sample.camera.known;
   std::copy_n(sample.camera.X_WC.t.data(), 3, wire_.translation_WC_mm);
   rotation_to_wxyz(sample.camera.X_WC.R, wire_.rotation_WC_wxyz);
+  std::copy_n(sample.camera.lens.focal_px.data(), 2, wire_.camera_focal_px);
+  std::copy_n(sample.camera.lens.principal_px.data(), 2, wire_.camera_principal_point_px);
   const std::size_t count = std::min(sample.features.size(), features_.size());
   wire_.features._length = static_cast<std::uint32_t>(count);
   for (std::size_t i = 0; i < count; ++i) {

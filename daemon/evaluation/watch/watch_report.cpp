@@ -189,6 +189,8 @@ std::string surface_json(const perimap_Surface& surface, Instant receipt) {
   if (surface.camera_pose_known) {
     json["translation_WC_mm"] = surface.translation_WC_mm;
     json["rotation_WC_wxyz"] = surface.rotation_WC_wxyz;
+    json["camera_focal_px"] = surface.camera_focal_px;
+    json["camera_principal_point_px"] = surface.camera_principal_point_px;
   }
   Json features = Json::array();
   for (std::uint32_t i = 0; i < surface.features._length; ++i) {

@@ -1,18 +1,12 @@
 // Draws the predicted surface over the video, frame by frame as perimapd releases them.
 //
-//   overlay VIDEO CALIBRATION OUTPUT [--domain N] [--first-sequence N] [--seconds S] [--held]
+//   overlay VIDEO CALIBRATION OUTPUT [--domain N] [--first-sequence N] [--seconds S]
 //
 // VIDEO is what the camera of that perimapd sees, from its frame --first-sequence on (0). OUTPUT is a video (.avi), or
-// a picture
-// (.png) of the last frame that was drawn. CALIBRATION is the camera's, as OpenCV writes it. It ends with the video,
-// after
-// --seconds, or when perimapd has been silent for ten seconds. Each frame is told on standard output, as JSON in a
-// line.
-//
-// An angled scope that is turned in its camera head, or zoomed, has another principal point and focal length than
-// CALIBRATION, and no sample tells them. Where the status says that a field stop is seen nothing is drawn, therefore,
-// unless
-// --held says that the scope is held as it was calibrated; and nothing any more once it has been turned or zoomed.
+// a picture (.png) of the last frame that was drawn. CALIBRATION is the camera's, as OpenCV writes it: its distortion
+// alone is taken, for focal length and principal point are those that each surface tells of its own picture (an angled
+// scope is turned in its camera head and zoomed). It ends with the video, after --seconds, or when perimapd has been
+// silent for ten seconds. Each frame is told on standard output, as JSON in a line.
 //
 // For each released frame there is a sample of `surface`, which tells when it was captured and where the camera was.
 // The newest `surface_model` says where each feature was at that very instant: perimap_client.hpp evaluates it, or
@@ -45,7 +39,6 @@ struct Options {
   int domain = 0;
   std::uint64_t first_sequence = 0;
   double seconds = 1e9;
-  bool held = false;  // the scope is turned and zoomed as in CALIBRATION
 };
 
 std::int64_t monotonic_ns() {
@@ -59,14 +52,13 @@ class Camera {
   explicit Camera(const std::string& calibration) {
     const cv::FileStorage file(calibration, cv::FileStorage::READ);
     if (!file.isOpened()) throw std::runtime_error(calibration + ": cannot be read");
-    file["camera_matrix"] >> matrix_;
     file["distortion_coefficients"] >> distortion_;
     const auto model = static_cast<std::string>(file["distortion_model"]);
     fisheye_ = model == "fisheye" || model == "equidistant";
-    if (matrix_.empty()) throw std::runtime_error(calibration + ": has no camera_matrix");
+    if (distortion_.empty()) throw std::runtime_error(calibration + ": has no distortion_coefficients");
   }
 
-  // False: not before the camera. p_W in mm; the surface tells where the camera was.
+  // False: not before the camera. p_W in mm; the surface tells where the camera was, and what its lens was then.
   bool project(const perimap_Surface& at, const std::array<double, 3>& p_W, cv::Point2d& px) const {
     const double* q = at.rotation_WC_wxyz;
     const cv::Matx33d R_WC(
@@ -77,19 +69,22 @@ class Camera {
     const cv::Vec3d p_C = R_WC.t() * cv::Vec3d(p_W[0] - t[0], p_W[1] - t[1], p_W[2] - t[2]);
     if (!(p_C[2] > 1.0)) return false;
     const std::vector<cv::Point3d> points{{p_C[0], p_C[1], p_C[2]}};
+    const double* f = at.camera_focal_px;
+    const double* c = at.camera_principal_point_px;
+    const cv::Matx33d matrix(f[0], 0, c[0], 0, f[1], c[1], 0, 0, 1);
     std::vector<cv::Point2d> projected;
     const cv::Vec3d none(0, 0, 0);
     if (fisheye_) {
-      cv::fisheye::projectPoints(points, projected, none, none, matrix_, distortion_);
+      cv::fisheye::projectPoints(points, projected, none, none, matrix, distortion_);
     } else {
-      cv::projectPoints(points, none, none, matrix_, distortion_, projected);
+      cv::projectPoints(points, none, none, matrix, distortion_, projected);
     }
     px = projected[0];
     return true;
   }
 
  private:
-  cv::Mat matrix_, distortion_;
+  cv::Mat distortion_;
   bool fisheye_ = false;
 };
 
@@ -200,26 +195,16 @@ const char* name_of(perimap_FeatureState state) {
   }
 }
 
-// Why CALIBRATION may not be the picture's; null: it is.
-const char* lens_doubt(const perimap_Status* status, bool held) {
-  if (status == nullptr) return "no status yet: it is not known how the scope is held";
-  if (status->scope_turns > 0) return "the scope was turned or zoomed: its lens is not told";
-  if (status->scope_turn != perimap_SCOPE_TURN_UNREAD && !held) {
-    return "the scope may be turned: its lens is not told (--held: it is as calibrated)";
-  }
-  return nullptr;
-}
-
 // Draws what is predicted for this frame and tells it; what is refused is written over the picture instead.
 void draw(const perimap_Surface& frame, const perimap_SurfaceModel* model, const perimap_SurfaceMesh* newest_mesh,
-          const Camera& camera, const char* doubt, PredictedSurface& surface, PredictedMesh& mesh, cv::Mat& picture) {
-  const char* refused = doubt;
-  if (refused != nullptr) {
-    // The predictions are as good as ever; where they are in the picture is not known.
-  } else if (model == nullptr) {
+          const Camera& camera, PredictedSurface& surface, PredictedMesh& mesh, cv::Mat& picture) {
+  const char* refused = nullptr;
+  if (model == nullptr) {
     refused = "no model yet";
   } else if (!frame.camera_pose_known) {
     refused = "it is not known where the camera was";
+  } else if (!(frame.camera_focal_px[0] > 0)) {
+    refused = "this perimapd is too old to tell what the lens was";
   } else if (!perimap::client::predict(*model, frame.capture_time_ns, monotonic_ns(), {}, surface)) {
     refused = describe(surface);
   }
@@ -259,7 +244,6 @@ int run(const Options& options) {
   Subscriber<perimap_Surface> surfaces(participant, perimap_Surface_desc, "perimap/surface", false, 16);
   Subscriber<perimap_SurfaceModel> models(participant, perimap_SurfaceModel_desc, "perimap/surface_model", true, 1);
   Subscriber<perimap_SurfaceMesh> meshes(participant, perimap_SurfaceMesh_desc, "perimap/surface_mesh", true, 1);
-  Subscriber<perimap_Status> states(participant, perimap_Status_desc, "perimap/status", true, 1);
 
   PredictedSurface surface;
   PredictedMesh mesh;
@@ -271,14 +255,12 @@ int run(const Options& options) {
          static_cast<double>(monotonic_ns() - begun) < 1e9 * options.seconds) {
     models.take([](const perimap_SurfaceModel&) {});
     meshes.take([](const perimap_SurfaceMesh&) {});
-    states.take([](const perimap_Status&) {});
     surfaces.take([&](const perimap_Surface& frame) {
       heard = monotonic_ns();
       // A surface of a frame that never came has no picture.
       cv::Mat picture;
       if (frame.reason == perimap_SURFACE_REASON_FRAME_MISSING || !video.read(frame.frame_sequence, picture)) return;
-      const char* doubt = lens_doubt(states.newest(), options.held);
-      draw(frame, models.newest(), meshes.newest(), camera, doubt, surface, mesh, picture);
+      draw(frame, models.newest(), meshes.newest(), camera, surface, mesh, picture);
       output.add(picture);
     });
     dds_sleepfor(DDS_MSECS(2));
@@ -288,7 +270,7 @@ int run(const Options& options) {
 }
 
 int usage() {
-  std::fprintf(stderr, "overlay VIDEO CALIBRATION OUTPUT [--domain N] [--first-sequence N] [--seconds S] [--held]\n");
+  std::fprintf(stderr, "overlay VIDEO CALIBRATION OUTPUT [--domain N] [--first-sequence N] [--seconds S]\n");
   return 2;
 }
 
@@ -301,12 +283,8 @@ int main(int argc, char** argv) {
   options.calibration = argv[2];
   options.output = argv[3];
   for (int i = 4; i < argc; i += 2) {
-    if (std::strcmp(argv[i], "--held") == 0) {
-      options.held = true;
-      --i;  // it has no value
-    } else if (i + 1 == argc) {
-      return usage();
-    } else if (std::strcmp(argv[i], "--domain") == 0) {
+    if (i + 1 == argc) return usage();
+    if (std::strcmp(argv[i], "--domain") == 0) {
       options.domain = std::atoi(argv[i + 1]);
     } else if (std::strcmp(argv[i], "--first-sequence") == 0) {
       options.first_sequence = std::strtoull(argv[i + 1], nullptr, 10);

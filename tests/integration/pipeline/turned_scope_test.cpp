@@ -37,6 +37,9 @@ struct Session {
   std::uint64_t frames_unread = 0;
   // Of features called converged in good surfaces of the time, mm.
   std::vector<double> errors_mm;
+  // Of those surfaces: how far off what they tell of their picture's lens is, the larger of focal lengths and principal
+  // point, px.
+  double lens_error_px = 0.0;
 
   [[nodiscard]] double error_mm(double share) const {
     std::vector<double> sorted = errors_mm;
@@ -121,15 +124,22 @@ Session session_of(const Trial& trial) {
     constexpr Duration kSettledAgain = std::chrono::seconds(3);
     if (surface.head.state != perimap_SURFACE_GOOD) continue;
     if (!session.within(surface, kTurnedAt + kSettledAgain, kLength)) continue;
+    const ScopeLens lens = simulation.setup_at(from_ns(surface.head.capture_time_ns) - simulation.start()).lens;
+    if (surface.head.camera_pose_known) {
+      const Vector2d focal(surface.head.camera_focal_px);
+      const Vector2d principal(surface.head.camera_principal_point_px);
+      session.lens_error_px = std::max({session.lens_error_px, (focal - Vector2d(lens.fx, lens.fy)).norm(),
+                                        (principal - Vector2d(lens.cx, lens.cy)).norm()});
+    }
     for (const perimap_SurfaceFeature& feature : surface.features) {
       if (feature.state != perimap_FEATURE_CONVERGED) continue;
       const auto error = origins.error_mm(feature, from_ns(surface.head.valid_time_ns));
       if (error) session.errors_mm.push_back(*error);
     }
   }
-  std::printf("good positions %zu, error %.3f mm, 95 %% %.3f mm; turns %d, frames unread %d\n",
+  std::printf("good positions %zu, error %.3f mm, 95 %% %.3f mm; turns %d, frames unread %d, lens off by %.2f px\n",
               session.errors_mm.size(), session.error_mm(0.5), session.error_mm(0.95), static_cast<int>(session.turns),
-              static_cast<int>(session.frames_unread));
+              static_cast<int>(session.frames_unread), session.lens_error_px);
   return session;
 }
 
@@ -152,6 +162,7 @@ TEST(TurnedScope, ZoomedTooItStaysRight) {
   const Session zoomed = session_of({ScopeHeld{70.0 * kDegree, 1.08}});
   EXPECT_GE(zoomed.turns, 1U);
   EXPECT_LT(zoomed.error_mm(0.5), 1.3 * held().error_mm(0.5));
+  EXPECT_LT(zoomed.lens_error_px, 1.0) << "whoever draws over the picture is told what the lens was";
 }
 
 TEST(TurnedScope, NoSurfaceIsGoodWhereNobodyCalibratedThat) {

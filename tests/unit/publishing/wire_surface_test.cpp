@@ -30,7 +30,7 @@ TEST(WireSurface, CarriesEveryFieldOfTheSample) {
   sample.cardiac_phase_rad = 1.5;
   sample.cardiac_phase_deviation_rad = 0.1;
   sample.cardiac_phase_rate_rad_per_s = 7.5;
-  sample.camera = {true, pose_from_wxyz(Vector3d(7, 8, 9), {0.0, 0.0, 1.0, 0.0})};
+  sample.camera = {true, pose_from_wxyz(Vector3d(7, 8, 9), {0.0, 0.0, 1.0, 0.0}), {{640.0, 641.0}, {315.0, 235.0}}};
   SurfaceFeature feature;
   feature.id = 9;
   feature.state = FeatureState::kConverged;
@@ -62,6 +62,8 @@ TEST(WireSurface, CarriesEveryFieldOfTheSample) {
   EXPECT_TRUE(out.camera_pose_known);
   EXPECT_EQ(out.translation_WC_mm[2], 9.0);
   EXPECT_EQ(std::abs(out.rotation_WC_wxyz[2]), 1.0);
+  EXPECT_EQ(out.camera_focal_px[1], 641.0);
+  EXPECT_EQ(out.camera_principal_point_px[0], 315.0);
   ASSERT_EQ(out.features._length, 1U);
   const perimap_SurfaceFeature& f = out.features._buffer[0];
   EXPECT_EQ(f.id, 9U);

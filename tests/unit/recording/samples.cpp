@@ -86,6 +86,8 @@ void fill(Filler& next, perimap_Surface& s) {
   next(s.camera_pose_known);
   next(s.translation_WC_mm);
   next(s.rotation_WC_wxyz);
+  next(s.camera_focal_px);
+  next(s.camera_principal_point_px);
 }
 
 void fill(Filler& next, perimap_PhaseClock& s) {

@@ -76,7 +76,9 @@ json to_json(const perimap_Surface& s) {
           MEMBER(features),
           MEMBER(camera_pose_known),
           MEMBER(translation_WC_mm),
-          MEMBER(rotation_WC_wxyz)};
+          MEMBER(rotation_WC_wxyz),
+          MEMBER(camera_focal_px),
+          MEMBER(camera_principal_point_px)};
 }
 template <>
 json to_json(const perimap_PhaseClock& s) {
