@@ -217,10 +217,11 @@ Expected<MeasuredNoise> measure_tracker_noise(const std::vector<TimedPose>& all)
   noise.drifts = lasts && tau > 0.1 * still_s;
   noise.position_deviation_mm = std::sqrt(3.0 * best.position_variance);
   noise.rotation_deviation_deg = std::sqrt(3.0 * best.rotation_variance) / kDegree;
-  // An error that lasts tau tells as much in 2 tau as one independent pose.
-  const double independent =
-      3.0 / ((1.0 - noise.lasting_share) / static_cast<double>(poses.size()) +
-             noise.lasting_share * std::min(1.0, std::max(1.0 / static_cast<double>(poses.size()), tau / still_s)));
+  // Of an error that lasts, what it is driven by is known from each pose; the variance that this makes goes with tau,
+  // which all six numbers of a pose tell together: its variance is 2 tau / (6 still_s) of its square.
+  const double of_poses = 1.0 / (3.0 * static_cast<double>(poses.size()));
+  const double of_tau = lasts ? noise.lasting_share * std::min(1.0, tau / still_s) / 6.0 : 0.0;
+  const double independent = 1.0 / (of_poses + of_tau);
   const double relative = 1.0 / std::sqrt(2.0 * std::max(1.0, independent));
   noise.position_deviation_mm_deviation = relative * noise.position_deviation_mm;
   noise.rotation_deviation_deg_deviation = relative * noise.rotation_deviation_deg;
