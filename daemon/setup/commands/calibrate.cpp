@@ -69,6 +69,7 @@ Expected<Measurement> measure_tool(const PosesOptions& options) {
   const auto tool = tool_of(options);
   if (!tool) return tl::unexpected(tool.error());
   measured.json["tool"] = *tool;
+  measured.keys = {{"pointer_calibration", output_key(options.common)}};
   measured.plots = plots_of(*result, *poses);
   return measured;
 }
@@ -92,8 +93,8 @@ struct FromPoses {
   const char* name;
   const char* description;
   const char* poses;
-  const char* tool;  // of a recording, where none is named
-  bool has_keys;
+  const char* tool;   // of a recording, where none is named
+  bool names_output;  // the configuration is to name the file, and has no keys of the result
   Expected<Measurement> (*measure)(const PosesOptions&);
   std::unique_ptr<LiveGuide> (*guide)(double least_s);
   double least_s;  // live
@@ -106,6 +107,10 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
         if (auto able = check_outputs(options->common, {options->poses, options->recording}); !able) return able;
         if (!options->poses.empty() && options->input() != options->poses) {
           return refuse(options->poses + ": not read beside --from or --live; expected one of them",
+                        ExitCode::kWrongUsage);
+        }
+        if (what.names_output && !options->common.configuration.empty() && options->common.output.empty()) {
+          return refuse("--configuration: expected --output too, the file that the configuration is to name",
                         ExitCode::kWrongUsage);
         }
         const std::string made_from = options->input();
@@ -123,7 +128,7 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
           "The tracked tool: with --from or --live one of the recording's, scope being the scope's sensor; with a "
           "file what it is written down as")
       ->capture_default_str();
-  add_common(command, options->common, true, what.has_keys);
+  add_common(command, options->common, true, true);
 }
 
 }  // namespace
@@ -140,12 +145,12 @@ void add_calibrate_command(Commands& commands) {
   add_calibrate_scope(commands, calibrate);
   add_from_poses(commands, calibrate,
                  {"tool", "A tracked tool's tip, from poses while it turned about its resting tip",
-                  "The tool in the tracker's frame: t_s,x,y,z,qx,qy,qz,qw, or a time and a matrix", "pointer", false,
+                  "The tool in the tracker's frame: t_s,x,y,z,qx,qy,qz,qw, or a time and a matrix", "pointer", true,
                   measure_tool, pivot_guide, 20.0});
   add_from_poses(
       commands, calibrate,
       {"tracker", "A tracker's noise and how long its errors last, from poses of a sensor that is held still",
-       "The sensor in the tracker's frame: t_s,x,y,z,qx,qy,qz,qw, or a time and a matrix", kScopeTool, true,
+       "The sensor in the tracker's frame: t_s,x,y,z,qx,qy,qz,qw, or a time and a matrix", kScopeTool, false,
        measure_tracker, still_guide, 60.0});
 }
 

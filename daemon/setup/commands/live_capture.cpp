@@ -14,6 +14,7 @@
 #include "daemon/command_line/command.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/tracked_tools.hpp"
+#include "daemon/process/saved_signal_mask.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/device_setup.hpp"
@@ -145,10 +146,16 @@ LiveRecording::~LiveRecording() {
 
 Expected<LiveRecording> record_live(const LiveOptions& options, const std::string& tool, LiveGuide& guide,
                                     const Console& console) {
+  const SavedSignalMask as_before;  // what is measured after this may be interrupted
   auto stop = StopSignal::install();
   if (!stop) return tl::unexpected(stop.error());
-  const auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
+  auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
   if (!configuration) return tl::unexpected(configuration.error());
+  if (options.unregistered) {
+    const TrackerConfiguration untold;
+    std::copy_n(untold.translation_IW_mm, 3, configuration->tracker.translation_IW_mm);
+    std::copy_n(untold.rotation_IW_wxyz, 4, configuration->tracker.rotation_IW_wxyz);
+  }
   auto devices = named_devices(*configuration, options.configuration);
   if (!devices) return fail(options.configuration + ": " + devices.error().message);
   if (!devices->tracker && !devices->camera) {
@@ -242,7 +249,14 @@ Outcome with_recording(const LiveOptions& options, const std::string& tool, Live
   const auto recorded = record_live(options, tool, guide, console);
   if (!recorded) return refuse(recorded.error());
   recording = recorded->file();
-  return measure();
+  Outcome measured = measure();
+  if (!measured && options.keep.empty()) {
+    std::string& told = measured.error().error.message;
+    for (auto at = told.find(recording); at != std::string::npos; at = told.find(recording)) {
+      told.replace(at, recording.size(), options.configuration);
+    }
+  }
+  return measured;
 }
 
 }  // namespace perimap

@@ -21,7 +21,8 @@ class Command;
 struct LiveOptions {
   std::string configuration;  // empty: not live
   double longest_s = 120.0;
-  std::string keep;  // where the recording stays; empty: it is taken away
+  std::string keep;           // where the recording stays; empty: it is taken away
+  bool unregistered = false;  // poses are recorded as without the configuration's registration, which is to be measured
 };
 
 // --live, --seconds and --keep.
@@ -57,7 +58,8 @@ class LiveRecording {
 [[nodiscard]] Expected<LiveRecording> record_live(const LiveOptions& options, const std::string& tool, LiveGuide& guide,
                                                   const Console& console);
 
-// Does `measure` with the recording that --from names or, live, that is made now: `recording` is then that.
+// Does `measure` with the recording that --from names or, live, that is made now: `recording` is then that. In what is
+// told of one that is taken away again the configuration's name stands for it.
 [[nodiscard]] Outcome with_recording(const LiveOptions& options, const std::string& tool, LiveGuide& guide,
                                      const Console& console, std::string& recording,
                                      const std::function<Outcome()>& measure);

@@ -7,11 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "core/calibration/dwells.hpp"
-#include "core/calibration/touched_landmarks.hpp"
 #include "daemon/command_line/commands.hpp"
+#include "daemon/setup/commands/live_capture.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
+#include "daemon/setup/commands/touch_guide.hpp"
+#include "daemon/setup/commands/touched_points.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/setup_plots.hpp"
 #include "daemon/setup/setup_report.hpp"
@@ -28,12 +29,16 @@ struct RegisterOptions {
   std::string recording;  // in place of `touched`
   std::string tool = "pointer";
   std::string tip;
-  double touch_s = 1.5;
-  double touch_radius_mm = 4.0;
+  TouchRule touch;
+  LiveOptions live;  // in place of a recording
   std::vector<std::vector<double>> targets;
   double tolerance_mm = 10.0;
 
-  [[nodiscard]] std::vector<std::string> inputs() const { return {model, recording.empty() ? touched : recording}; }
+  // What the result is made from.
+  [[nodiscard]] std::vector<std::string> inputs() const {
+    if (!live.configuration.empty()) return {model, live.configuration};
+    return {model, recording.empty() ? touched : recording};
+  }
 };
 
 // Of each landmark of the model, in the order of the table, where the tip was held still.
@@ -46,34 +51,25 @@ Expected<std::vector<NamedPoint>> touched_in_recording(const RegisterOptions& op
   if (!tip) return tl::unexpected(tip.error());
   const auto poses = read_recorded_poses(options.recording, options.tool);
   if (!poses) return tl::unexpected(poses.error());
-  std::vector<TimedPoint> points;
-  for (const TimedPose& pose : *poses) points.push_back({pose.t_s, pose.X * tip->tip_T});
-  const std::vector<Dwell> touches = find_dwells(points, options.touch_s, options.touch_radius_mm);
-  std::vector<Vector3d> landmarks_I;
-  for (const NamedPoint& point : model) landmarks_I.push_back(point.p);
-  std::vector<Vector3d> places_W;
-  for (const Dwell& touch : touches) places_W.push_back(touch.p);
-  const auto chosen = touched_landmarks(landmarks_I, places_W);
-  if (!chosen) {
-    std::string when;
-    for (const Dwell& touch : touches) {
-      when += fmt::format("{}{:.1f}", when.empty() ? " at " : ", ", touch.begin_s - points.front().t_s);
-    }
-    return fail(
-        fmt::format("{}: {} touches of {:g} s and more are found{} s, and {} has {} landmarks: touch each once, "
-                    "in the order of the table, hold the tip still for two seconds, and lift it in between",
-                    options.recording, touches.size(), options.touch_s, when, options.model, model.size()));
+  const TouchedPoints touched = touched_points(*poses, tip->tip_T, model, options.touch);
+  if (touched.landmarks_W) return *touched.landmarks_W;
+  std::string when;
+  for (const Dwell& touch : touched.touches) {
+    when += fmt::format("{}{:.1f}", when.empty() ? " at " : ", ", touch.begin_s - poses->front().t_s);
   }
-  std::vector<NamedPoint> touched;
-  for (std::size_t i = 0; i < model.size(); ++i) touched.push_back({model[i].name, places_W[chosen->at(i)]});
-  return touched;
+  return fail(fmt::format(
+      "{}: {} touches of {:g} s and more are found{} s, and {} has {} landmarks: touch each once, in the "
+      "order of the table, hold the tip still for two seconds, and lift it in between",
+      options.recording, touched.touches.size(), options.touch.shortest_s, when, options.model, model.size()));
 }
 
 Expected<std::vector<Landmark>> landmarks_of(const RegisterOptions& options) {
   const auto model = read_point_table(options.model, options.common.length_unit());
   if (!model) return tl::unexpected(model.error());
   if (options.touched.empty() == options.recording.empty()) {
-    return fail("expected either touched landmarks with --touched or a recording of the touches with --from");
+    return fail(
+        "expected either touched landmarks with --touched or a recording of the touches with --from, or "
+        "--live");
   }
   const auto touched = options.recording.empty() ? read_point_table(options.touched, options.common.length_unit())
                                                  : touched_in_recording(options, *model);
@@ -111,28 +107,56 @@ Expected<Measurement> measure(const RegisterOptions& options) {
   return measured;
 }
 
+// Before anything is recorded: what a live registration needs besides.
+Expected<std::unique_ptr<LiveGuide>> guide_of(const RegisterOptions& options) {
+  if (options.tip.empty()) {
+    return fail("--tip: expected the file of the pointer's tip that perimap calibrate tool --output wrote");
+  }
+  const auto tip = read_tool_tip(options.tip);
+  if (!tip) return tl::unexpected(tip.error());
+  auto model = read_point_table(options.model, options.common.length_unit());
+  if (!model) return tl::unexpected(model.error());
+  return touch_guide(*std::move(model), tip->tip_T, options.touch, options.tolerance_mm);
+}
+
+Outcome run(RegisterOptions& options, const Console& console) {
+  const std::vector<std::string> inputs = options.inputs();
+  if (auto able = check_outputs(options.common, {options.model, options.touched, options.recording, options.tip});
+      !able) {
+    return able;
+  }
+  const auto registered = [&] { return finish(measure(options), options.common, joined(inputs)); };
+  if (options.live.configuration.empty()) return registered();
+  if (!options.touched.empty()) {
+    return refuse("--live and --touched: expected one of them", ExitCode::kWrongUsage);
+  }
+  const auto guide = guide_of(options);
+  if (!guide) return refuse(guide.error());
+  options.live.unregistered = true;
+  return with_recording(options.live, options.tool, **guide, console, options.recording, registered);
+}
+
 }  // namespace
 
 void add_register_command(Commands& commands) {
   const auto options = std::make_shared<RegisterOptions>();
   Command& command = commands.add(
       "register", "The place of the tracker's frame in the image's, by landmarks touched with a calibrated tool",
-      [options](const Console&) -> Outcome {
-        const std::vector<std::string> inputs = options->inputs();
-        std::vector<std::string> read = inputs;
-        read.push_back(options->tip);
-        if (auto able = check_outputs(options->common, read); !able) return able;
-        return finish(measure(*options), options->common, joined(inputs));
-      });
+      [options](const Console& console) { return run(*options, console); });
   command.add_option("--model", options->model, "The landmarks in the image's frame: name,x,y,z")->required();
   command.add_option("--touched", options->touched, "The same, as touched, in the tracker's frame");
   add_from(command, options->recording);
-  command.add_option("--tip", options->tip, "With --from: the tip of the tool that touches, by perimap calibrate tool");
-  command.add_option("--tool", options->tool, "With --from: the tool that touches")->capture_default_str();
-  command.add_option("--touch-s", options->touch_s, "With --from: what is held still for so long is a touch")
+  add_live(command, options->live);
+  command.add_option("--tip", options->tip,
+                     "With --from or --live: the tip of the tool that touches, by perimap calibrate tool");
+  command.add_option("--tool", options->tool, "With --from or --live: the tool that touches")->capture_default_str();
+  command
+      .add_option("--touch-s", options->touch.shortest_s,
+                  "With --from or --live: what is held still for so long is a touch")
       ->check(Range(0.5, 60.0))
       ->capture_default_str();
-  command.add_option("--touch-radius-mm", options->touch_radius_mm, "With --from: within this it is held still")
+  command
+      .add_option("--touch-radius-mm", options->touch.radius_mm, "With --from or --live: within this it is held still")
       ->check(Range(0.1, 50.0))
       ->capture_default_str();
   command

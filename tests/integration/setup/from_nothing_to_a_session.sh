@@ -39,10 +39,13 @@ quiet setup --output devices.toml --camera none --tracker none --ecg none --seco
 shown camera calibrate camera --from board.mcap --square-mm 8 --output camera.yaml --configuration devices.toml
 shown hand-eye calibrate hand-eye --from board.mcap --square-mm 8 --configuration devices.toml
 shown time calibrate time --from board.mcap --square-mm 8 --configuration devices.toml
-shown tool calibrate tool --from board.mcap --output pointer.json
+shown tool calibrate tool --from board.mcap --output pointer.json --configuration devices.toml
 shown tracker calibrate tracker --from still.mcap --configuration devices.toml
 shown scope calibrate scope --from stop.mcap
-shown register register --model image.csv --from landmarks.mcap --tip pointer.json --output registration.json
+shown register register --model image.csv --from landmarks.mcap --tip pointer.json --output registration.json \
+  --configuration devices.toml
+grep -q '^pointer_calibration = "pointer.json"' devices.toml || fail "the configuration does not name the tip"
+grep -q '^registration_translation_IW_mm' devices.toml || fail "the configuration has no registration"
 quiet check devices.toml
 # Without what OpenCV's solvers make of it.
 tr -d ' \n' < hand-eye.json | sed 's/"opencv":.*}},//' > ours.json

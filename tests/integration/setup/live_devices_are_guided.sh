@@ -94,6 +94,34 @@ live verify devices.toml --live --square-mm 8 --bound-mm 3 --output verified.jso
 grep -q '"passed": true' verified.json || fail "verify passed, and its record says otherwise"
 grep -q 'rest the tip of a calibrated pointer' out || fail "what is not seen without a touched point was not told: $(cat out)"
 
+# ---- the patient's image: which landmark is next; what was registered before is left aside
+kill "$emulators"
+wait "$emulators"
+ended "$emulators"
+"$perimap" simulate landmarks.mcap --scene landmarks --setup-seed "$seed" --seed "$seed" --landmarks image.csv > out 2>&1 ||
+  fail "no recording: $(cat out)"
+printf '{"tip_mm": [%s, %s, %s], "covariance": [[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01]]}' \
+  "$(nth truth.json tip_mm 1)" "$(nth truth.json tip_mm 2)" "$(nth truth.json tip_mm 3)" > tip.json
+printf 'version = 1\n[tracker]\nprotocol = "ndi"\nport = "tcp:127.0.0.1:%s"\nsensor = "0A"\npointer = "0C"\nframe_rate_hz = 100\n' \
+  $port > touched.toml
+printf 'registration_translation_IW_mm = [1000.0, 0.0, 0.0]\n' >> touched.toml
+emulate landmarks.mcap --ndi-tools 1
+live register --live touched.toml --model image.csv --tip tip.json --configuration touched.toml --json --seconds 60 \
+  > registration.json || fail "register --live: $(cat told)"
+grep -q 'landmarks touched; touch landmark' told || fail "it was not told which landmark is next: $(cat told)"
+if grep -q 'ended before' told; then fail "it did not end by itself: $(cat told)"; fi
+nothing_left "register"
+at_most "registration, mm left over" "$(number registration.json fre_mm)" 0.6
+grep -q '^registration_translation_IW_mm = \[1000' touched.toml && fail "the registration was not written"
+# Another image: the words are of the configuration, and not of what was recorded meanwhile.
+awk -F, 'NR == 1 { print } NR > 1 { print $1 "," $2 * 1.5 "," $3 "," $4 }' image.csv > other.csv
+emulate_anew() { kill "$emulators"; wait "$emulators"; ended "$emulators"; emulate landmarks.mcap --ndi-tools 1; }
+emulate_anew
+live register --live touched.toml --model other.csv --tip tip.json --seconds 20 > out
+[ $? -eq 1 ] || fail "another image is registered: $(cat out told)"
+if grep -q 'perimap-calibrate-' told; then fail "a file is named that nobody knows: $(cat told)"; fi
+nothing_left "a registration that failed"
+
 # ---- a signal ends it; what came until then does not do, and nothing is changed
 play
 cp devices.toml before.toml

@@ -5,6 +5,8 @@
 #include <csignal>
 #include <thread>
 
+#include "daemon/process/saved_signal_mask.hpp"
+
 namespace perimap {
 namespace {
 
@@ -31,6 +33,26 @@ TEST(StopSignal, AWaitEndsAfterItsTimeWithoutASignal) {
   const Instant start = MonotonicClock::now();
   EXPECT_FALSE(stop->wait_for(std::chrono::milliseconds(20)));
   EXPECT_GE(MonotonicClock::now() - start, std::chrono::milliseconds(20));
+}
+
+TEST(SavedSignalMask, LetsSignalsThroughAsBefore) {
+  const auto blocked = [] {
+    sigset_t mask;
+    pthread_sigmask(SIG_SETMASK, nullptr, &mask);
+    return sigismember(&mask, SIGINT) == 1;
+  };
+  std::jthread([&] {
+    sigset_t all;
+    sigemptyset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, nullptr);
+    {
+      const SavedSignalMask as_before;
+      const auto stop = StopSignal::install();
+      ASSERT_TRUE(stop);
+      EXPECT_TRUE(blocked());
+    }
+    EXPECT_FALSE(blocked());
+  }).join();
 }
 
 }  // namespace
