@@ -174,6 +174,31 @@ std::vector<double> swept(const Profile& profile, std::ptrdiff_t half, double no
   return sums;
 }
 
+// By what the notch's own estimator makes of the rest of the circle, where there is no notch: windows that half
+// overlap, a few of which may hold something else.
+double edge_density(const Profile& profile, std::ptrdiff_t half, std::size_t notch, double least_deviation_px) {
+  const auto n = static_cast<std::ptrdiff_t>(profile.depth_px.size());
+  std::vector<double> moments;
+  double squares = 0.0;
+  for (std::ptrdiff_t k = -half; k <= half; ++k) squares += static_cast<double>(k * k);
+  for (std::ptrdiff_t away = 3 * half; away <= n - 3 * half; away += half) {
+    double moment = 0.0;
+    bool seen = true;
+    for (std::ptrdiff_t k = -half; seen && k <= half; ++k) {
+      const double depth = profile.at(notch, away + k);
+      seen = !std::isnan(depth);
+      moment += static_cast<double>(k) * depth;
+    }
+    if (seen) moments.push_back(std::abs(moment));
+  }
+  // Of a circle that is mostly cut off too few say: two and a half places in a row share pixels at least.
+  constexpr std::size_t kFewest = 8;
+  constexpr double kShared = 2.5;
+  const double least = moments.size() < kFewest ? std::sqrt(kShared) * least_deviation_px : least_deviation_px;
+  const double deviation = 1.4826 * median_of(moments) / std::sqrt(squares);
+  return profile.step_rad * std::pow(std::max(deviation, least), 2.0);
+}
+
 Expected<void> find_notch(const Profile& profile, FieldStopReading& reading) {
   const double noise = std::max(1.0, 4.0 * reading.edge_deviation_px);
   constexpr double kHalf_rad = 0.10;  // wider than half a notch
@@ -219,10 +244,9 @@ Expected<void> find_notch(const Profile& profile, FieldStopReading& reading) {
   const double angle = profile.angle(top) + offset * profile.step_rad;
   reading.notch_rad = std::remainder(angle, kTwoPi);
   reading.notch_depth_px = deepest;
-  // Neighbouring places of the edge share pixels: two and a half in a row count as one, as 400 drawn pictures have it.
+  reading.edge_density_px2_rad = edge_density(profile, half, top, reading.edge_deviation_px);
   // The centre's error turns it too.
-  constexpr double kShared = 2.5;
-  const double by_edge = profile.step_rad * reading.edge_deviation_px * std::sqrt(kShared * squares) / area;
+  const double by_edge = std::sqrt(reading.edge_density_px2_rad * profile.step_rad * squares) / area;
   reading.notch_deviation_rad = std::hypot(by_edge, reading.centre_deviation_px / reading.radius_px);
   return {};
 }

@@ -11,8 +11,11 @@ namespace perimap {
 struct FieldStopReading {
   Vector2d centre_px = Vector2d::Zero();
   double radius_px = 0.0;
-  double edge_level = 0.0;           // grey level at which the picture begins behind the dark surround
-  double edge_deviation_px = 0.0;    // of one place of the edge about the circle, along the radius
+  double edge_level = 0.0;         // grey level at which the picture begins behind the dark surround
+  double edge_deviation_px = 0.0;  // of one place of the edge about the circle, along the radius
+  // How far the edge is off over an arc as wide as the notch: the variance of its mean over an arc, times that arc
+  // (px^2 rad). Places side by side share pixels and what stands behind the stop, which moves the edge by its light.
+  double edge_density_px2_rad = 0.0;
   double centre_deviation_px = 0.0;  // standard deviation per axis
   double seen_share = 0.0;           // of the circle, inside the picture
   double notch_rad = 0.0;            // from the centre: from x (right) towards y (down), -pi to pi

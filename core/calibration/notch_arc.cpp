@@ -71,8 +71,8 @@ bool lies_on_circle(const Depths& depths, const Window& notch, double noise_px) 
 
 }  // namespace
 
-std::optional<NotchReading> read_notch_near(const GreyImage& picture, const FieldStopReading& stop,
-                                            double near_rad) noexcept {
+std::optional<TurnReading> read_notch_near(const GreyImage& picture, const FieldStopReading& stop,
+                                           double near_rad) noexcept {
   const Depths depths = depths_of(picture, stop, near_rad);
   const double noise_px = std::max(1.5, 4.0 * stop.edge_deviation_px);
   const Window notch = largest_window(depths, noise_px);
@@ -97,10 +97,8 @@ std::optional<NotchReading> read_notch_near(const GreyImage& picture, const Fiel
     if (!(area > 0.0)) return std::nullopt;
     offset = std::clamp(moment / area, offset - 0.5 * kNotchHalf, offset + 0.5 * kNotchHalf);
   }
-  // Neighbouring places of the edge share pixels, two and a half in a row (see read_field_stop()).
-  const double shared = std::max(1.0, 2.5 / (kStep_rad * stop.radius_px));
-  const double by_edge = kStep_rad * stop.edge_deviation_px * std::sqrt(shared * squares) / area;
-  NotchReading reading;
+  const double by_edge = std::sqrt(stop.edge_density_px2_rad * kStep_rad * squares) / area;
+  TurnReading reading;
   reading.rotation_rad = std::remainder(near_rad + (notch.middle - kHalf + offset) * kStep_rad, kTwoPi);
   reading.deviation_rad = std::hypot(by_edge, stop.centre_deviation_px / stop.radius_px);
   return reading;

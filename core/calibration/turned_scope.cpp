@@ -40,7 +40,7 @@ Expected<void> fit_axis(const std::vector<Turns>& turns, TurnedScope& scope) {
     if (std::abs(w.norm() - std::abs(turn.angle)) > kTolerance_rad) {
       return fail("the set-ups do not turn with the scope: " + std::to_string(w.norm() / kDegree) +
                   " degrees of hand-eye for " + std::to_string(std::abs(turn.angle) / kDegree) +
-                  " of the notch; measure each with the scope held at its turn, and the sensor fast on the head");
+                  " of the scope; measure each with the scope held at its turn, and the sensor fast on the head");
     }
     axis += (turn.angle > 0.0 ? 1.0 : -1.0) * w;
   }
@@ -146,10 +146,25 @@ Vector2d reference_principal(const std::vector<SetupAtRotation>& setups, const T
   return scope.turn_px + arm;
 }
 
-Expected<TurnedScope> fitted(const std::vector<SetupAtRotation>& setups, const Vector2d& turn_px) {
+// About which the principal points go: each is the centre plus one arm, turned; by least squares.
+Vector2d centre_of_turning(const std::vector<SetupAtRotation>& setups) {
+  Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d b = Eigen::Vector4d::Zero();
+  for (const SetupAtRotation& setup : setups) {
+    const double c = std::cos(setup.rotation_rad);
+    const double s = std::sin(setup.rotation_rad);
+    Eigen::Matrix<double, 2, 4> row;
+    row << 1.0, 0.0, c, -s, 0.0, 1.0, s, c;
+    A += row.transpose() * row;
+    b += row.transpose() * setup.principal_px;
+  }
+  return A.ldlt().solve(b).head<2>();
+}
+
+Expected<TurnedScope> fitted(const std::vector<SetupAtRotation>& setups, const std::optional<Vector2d>& turn_px) {
   constexpr double kLeastTurn_rad = 20.0 * kDegree;
   TurnedScope scope;
-  scope.turn_px = turn_px;
+  scope.turn_px = turn_px ? *turn_px : centre_of_turning(setups);
   std::vector<Turns> turns;
   double widest = 0.0;
   for (const SetupAtRotation& setup : setups) {
@@ -234,8 +249,33 @@ class Deviations {
   std::array<Vector2d, kTurns> principal_;
 };
 
+// Each set-up by the others, where those alone make a function.
+void hold_aside(const std::vector<SetupAtRotation>& setups, const std::optional<Vector2d>& turn_px,
+                TurnedScope& scope) {
+  constexpr std::size_t kFewest = 3;
+  if (setups.size() < kFewest) return;
+  double rotation = 0.0;
+  double translation = 0.0;
+  double tried = 0.0;
+  for (std::size_t i = 0; i < setups.size(); ++i) {
+    std::vector<SetupAtRotation> others = setups;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    // The centre does nothing to the hand-eye, and two principal points tell it badly.
+    const auto by_others = fitted(others, turn_px ? turn_px : std::optional(scope.turn_px));
+    if (!by_others) continue;
+    const Pose error = by_others->at(setups[i].rotation_rad).X_SC.inverse() * setups[i].X_SC;
+    rotation += std::pow(so3_log(error.R).norm() / kDegree, 2.0);
+    translation += error.t.squaredNorm();
+    tried += 1.0;
+  }
+  if (tried == 0.0) return;
+  scope.aside_rotation_rms_deg = std::sqrt(rotation / tried);
+  scope.aside_translation_rms_mm = std::sqrt(translation / tried);
+}
+
 // Each independent part of each set-up's error in turn, one deviation large.
-void tell_deviations(const std::vector<SetupAtRotation>& setups, const Vector2d& turn_px, TurnedScope& scope) {
+void tell_deviations(const std::vector<SetupAtRotation>& setups, const std::optional<Vector2d>& turn_px,
+                     TurnedScope& scope) {
   Deviations deviations(scope);
   for (std::size_t i = 0; i < setups.size(); ++i) {
     const Eigen::SelfAdjointEigenSolver<Matrix6d> parts(setups[i].covariance_C);
@@ -259,7 +299,12 @@ void tell_deviations(const std::vector<SetupAtRotation>& setups, const Vector2d&
 
 }  // namespace
 
-Expected<TurnedScope> fit_turned_scope(const std::vector<SetupAtRotation>& setups, const Vector2d& turn_px) {
+Expected<TurnedScope> fit_turned_scope(const std::vector<SetupAtRotation>& setups,
+                                       const std::optional<Vector2d>& turn_px) {
+  constexpr std::size_t kFewestForCentre = 3;
+  if (!turn_px && setups.size() < kFewestForCentre) {
+    return fail("set-ups at three turns of the scope are needed to tell about which point of the picture it turns");
+  }
   auto scope = fitted(setups, turn_px);
   if (!scope) return scope;
   if (const auto one = check_zooms(setups); !one) return tl::unexpected(one.error());
@@ -277,6 +322,7 @@ Expected<TurnedScope> fit_turned_scope(const std::vector<SetupAtRotation>& setup
                 " mm RMS are left over): measure each with the scope held at its turn, and the sensor fast");
   }
   tell_deviations(setups, turn_px, *scope);
+  hold_aside(setups, turn_px, *scope);
   return scope;
 }
 

@@ -15,6 +15,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/calibration/second_sensor.hpp"
 #include "core/error/expected.hpp"
 #include "core/geometry/pose.hpp"
 
@@ -22,7 +23,7 @@ namespace perimap {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-// One calibration, and how far the scope was turned then, as read_field_stop() reads it.
+// One calibration, and how far the scope was turned then, as read_field_stop() or a second sensor tells it.
 struct SetupAtRotation {
   double rotation_rad = 0.0;
   Pose X_SC;
@@ -58,10 +59,14 @@ struct TurnedScope {
   Vector2d turn_px = Vector2d::Zero();  // about which the principal point goes
   int width = 0;                        // px, of the pictures; 0: not told
   int height = 0;
-  std::vector<FocalAtRadius> focals;  // of rising radius; empty: zoom and focus are not told of
+  std::vector<FocalAtRadius> focals;          // of rising radius; empty: zoom and focus are not told of
+  std::optional<SecondSensor> second_sensor;  // tells the rotation; none: the field stop does
   // What is left of the set-ups that it was made from; 0 with two.
   double rotation_rms_deg = 0.0;
   double translation_rms_mm = 0.0;
+  // Each of three set-ups and more held against the function that the others alone make; 0: not tried.
+  double aside_rotation_rms_deg = 0.0;
+  double aside_translation_rms_mm = 0.0;
   // Standard deviations by those of the set-ups: of the axis, of its point across it, and of the whole set-up at the
   // turn where it is known worst (3-D norms; px per axis, the larger).
   double axis_deviation_rad = 0.0;
@@ -79,9 +84,10 @@ struct TurnedScope {
 // A table of what was measured at several zooms, for TurnedScope::focals: of one zoom the mean.
 [[nodiscard]] std::vector<FocalAtRadius> focal_table(std::vector<FocalAtRadius> measured);
 
-// From calibrations at two turns and more, 20 degrees apart and more, at one zoom. `turn_px`: of the field stop. Fails,
-// and says what is missing, when they are too near to each other, do not turn as a scope does, or are of several zooms.
+// From calibrations at two turns and more, 20 degrees apart and more, at one zoom. `turn_px`: of the field stop; none:
+// of three set-ups and more, the point about which their principal points go. Fails, and says what is missing, when
+// they are too near to each other, do not turn as a scope does, or are of several zooms.
 [[nodiscard]] Expected<TurnedScope> fit_turned_scope(const std::vector<SetupAtRotation>& setups,
-                                                     const Vector2d& turn_px);
+                                                     const std::optional<Vector2d>& turn_px);
 
 }  // namespace perimap

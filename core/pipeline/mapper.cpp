@@ -72,6 +72,12 @@ void Mapper::add_pose(const TrackerSample& sample) noexcept {
   last_reading_ = valid ? std::optional(sample.X_WS) : std::nullopt;
   if (!poses_.add(sample)) counters_.poses_refused.add();
   last_pose_arrival_ = std::max(last_pose_arrival_, sample.arrival);
+  if (scope_ != nullptr) scope_->add_pose(sample);
+}
+
+void Mapper::add_second_pose(const TrackerSample& sample) noexcept {
+  const RealtimeScope realtime;
+  if (scope_ != nullptr) scope_->add_second_pose(sample);
 }
 
 void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const GreyImage& before,
@@ -152,8 +158,9 @@ void Mapper::set_pose(FrameRecord& frame, const GreyImage& image) noexcept {
   bool known = !job_.doubts.pose_repeated;
   double turn_deviation_rad = 0.0;
   if (scope_ != nullptr) {
-    const ScopeWatch::Frame scope = scope_->begin_frame(frame.index, image);
+    const ScopeWatch::Frame scope = scope_->begin_frame(frame.index, frame.stamp.capture, image);
     if (scope.mistaken_since) disown_poses(*scope.mistaken_since);
+    if (scope.mistaken_from) disown_poses(history_->first_since(*scope.mistaken_from));
     job_.doubts.scope_unread = scope.unread;
     job_.doubts.scope_changed = scope.changed;
     known = known && !scope.unread && !scope.changed;

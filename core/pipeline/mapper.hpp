@@ -51,11 +51,15 @@ class Mapper {
          ScopeWatch* scope, PhaseCells& phase_cells, PipelineCounters& counters);
 
   void add_pose(const TrackerSample& sample) noexcept;
+  // Of the second tracked sensor that tells how the scope is turned.
+  void add_second_pose(const TrackerSample& sample) noexcept;
   // Before process(): what the respiration channel told until that capture, or later.
   void hear_breath(const BreathSignal& signal, Instant capture) noexcept { breathing_.hear(signal, capture); }
 
   // The tracker has told all about instant t that it will: no need to wait longer.
-  [[nodiscard]] bool pose_reached(Instant t) const noexcept { return poses_.reached(t); }
+  [[nodiscard]] bool pose_reached(Instant t) const noexcept {
+    return poses_.reached(t) && (scope_ == nullptr || scope_->reached(t));
+  }
 
   // Stages A, B and C; then D is begun: the workers learn until the next frame, or whatever else is called here. The
   // images are not used after the return; `before` is the frame processed before, without pixels at first, and `colour`

@@ -130,6 +130,7 @@ void Pipeline::drain_poses() noexcept {
   const RealtimeScope realtime;
   TrackerSample sample;
   while (parts_->entrance.pop_pose(sample)) parts_->mapper.add_pose(sample);
+  while (parts_->entrance.pop_second_pose(sample)) parts_->mapper.add_second_pose(sample);
 }
 
 void Pipeline::map(const FrameHandle& frame) noexcept {

@@ -39,8 +39,9 @@ struct EstimatorSettings {
 struct PipelineSettings {
   CameraModel camera;
   PoseHistorySettings pose;
-  // Of an angled scope, whose turn and zoom are read from its field stop in the pictures: the hand-eye, the focal
-  // length and the principal point then go by it, in place of pose.X_SC and the camera's.
+  // Of an angled scope, whose turn and zoom are read from its field stop in the pictures, or whose turn a second sensor
+  // tells: the hand-eye, the focal length and the principal point then go by it, in place of pose.X_SC and the
+  // camera's.
   std::optional<TurnedScope> turned_scope;
   bool watch_scope = false;  // without that: look in the pictures whether the scope is turned or zoomed meanwhile
   CardiacClockSettings clock;

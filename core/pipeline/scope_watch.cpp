@@ -31,29 +31,45 @@ ScopeWatch::ScopeWatch(const PipelineSettings& settings, PipelineCounters& count
       hand_over_(settings.lockstep),
       counters_(counters),
       pixels_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {
-  if (settings.turned_scope) turn_.emplace(*settings.turned_scope, settings.camera);
+  if (!settings.turned_scope) return;
+  if (settings.turned_scope->second_sensor) {
+    sensed_.emplace(*settings.turned_scope, settings.camera, settings.pose);
+  } else {
+    turn_.emplace(*settings.turned_scope, settings.camera);
+  }
 }
 
-ScopeWatch::Frame ScopeWatch::begin_frame(std::uint64_t frame_index, const GreyImage& image) noexcept {
+void ScopeWatch::add_pose(const TrackerSample& sample) noexcept {
+  if (sensed_) sensed_->add(sample);
+}
+
+void ScopeWatch::add_second_pose(const TrackerSample& sample) noexcept {
+  if (sensed_) sensed_->add_second(sample);
+}
+
+ScopeWatch::Frame ScopeWatch::begin_frame(std::uint64_t frame_index, Instant capture, const GreyImage& image) noexcept {
   Frame frame;
   frame.mistaken_since = adopt(frame_index);
   if (turn_) {
     turn_->look(image);
     frame.state = turn_->state();
-    frame.unread = !frame.state;
+  } else if (sensed_) {
+    frame.mistaken_from = sensed_->take_stuck_since();
+    frame.state = sensed_->at(capture);
   } else {
     frame.changed = unchanged_.changed();
   }
+  frame.unread = calibrated() && !frame.state;
   count(frame);
   return frame;
 }
 
 void ScopeWatch::count(const Frame& frame) noexcept {
-  if (turn_) {
+  if (calibrated()) {
     counters_.scope_read.set(frame.state ? 1 : 0);
     if (frame.state) counters_.scope_rotation_urad.set(microradians(frame.state->rotation_rad));
     if (frame.unread) counters_.scope_frames_unread.add();
-    counters_.scope_turns.set(turn_->turns());
+    counters_.scope_turns.set(turn_ ? turn_->turns() : sensed_->turns());
   } else {
     counters_.scope_read.set(unchanged_.is_read() ? 1 : 0);
     counters_.scope_rotation_urad.set(microradians(unchanged_.rotation_rad()));
@@ -63,7 +79,7 @@ void ScopeWatch::count(const Frame& frame) noexcept {
 }
 
 void ScopeWatch::offer(std::uint64_t frame_index, const FrameRate& rate, const GreyImage& image) noexcept {
-  if (hand_over_.under_way() || frame_index < next_at_) return;
+  if (sensed_ || hand_over_.under_way() || frame_index < next_at_) return;
   begun_at_ = frame_index;
   adopted_at_ = frame_index + rate.frames(kAdoptedAfter);
   next_at_ = std::max(frame_index + rate.frames(turn_ ? kReadEvery : kLookedEvery), adopted_at_ + 1);

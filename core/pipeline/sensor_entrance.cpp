@@ -23,6 +23,7 @@ SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& e
       mapper_frames_(kFrameBuffers),
       publisher_stamps_(kStampRing),
       poses_(kPoseRing),
+      second_poses_(kPoseRing),
       ecg_(ecg, ecg_clocks_, counters),
       breath_settings_(breath),
       breath_(breath) {}
@@ -85,6 +86,15 @@ void SensorEntrance::push_pose(const TrackerSample& sample) noexcept {
     counters_.poses_invalid.add();
   }
   if (!poses_.push(sample)) {
+    counters_.poses_dropped.add();
+    return;
+  }
+  mapper_wakeup_.post();
+}
+
+void SensorEntrance::push_second_pose(const TrackerSample& sample) noexcept {
+  const RealtimeScope realtime;
+  if (!second_poses_.push(sample)) {
     counters_.poses_dropped.add();
     return;
   }

@@ -54,24 +54,26 @@ struct TrackerConfiguration {
   enum class Protocol { kNone, kNdi, kIgtl };
 
   Protocol protocol = Protocol::kNone;
-  std::optional<std::string> port;                            // as parse_endpoint() takes it
-  std::optional<std::string> sensor;                          // NDI: port handle; OpenIGTLink: name
-  std::optional<std::string> reference;                       // likewise
-  std::optional<std::string> pointer;                         // likewise
-  std::vector<std::string> instruments;                       // likewise
-  std::optional<std::filesystem::path> sensor_definition;     // NDI, uploaded
-  std::optional<std::filesystem::path> reference_definition;  // NDI, uploaded
-  std::optional<std::filesystem::path> pointer_definition;    // NDI, uploaded
-  std::vector<std::filesystem::path> instrument_definitions;  // NDI, uploaded; beside `instruments`
-  std::optional<std::filesystem::path> pointer_calibration;   // its tip
-  bool igtl_stamps_by_arrival = false;                        // not by the server's stamps
-  double frame_rate_hz = 60.0;                                // of NDI's frame numbers
-  double translation_IW_mm[3] = {0.0, 0.0, 0.0};              // registration X_IW
-  double rotation_IW_wxyz[4] = {1.0, 0.0, 0.0, 0.0};          // registration X_IW, unit quaternion
-  double position_deviation_mm = 0.0;                         // RMS of the 3-D norm
-  double rotation_deviation_rad = 0.0;                        // RMS of the 3-D norm
-  Duration error_correlation{0};                              // in which the error falls to 1/e; 0: white
-  Duration time_offset{0};                                    // added to the tracker's stamps to get the camera's time
+  std::optional<std::string> port;                                // as parse_endpoint() takes it
+  std::optional<std::string> sensor;                              // NDI: port handle; OpenIGTLink: name
+  std::optional<std::string> reference;                           // likewise
+  std::optional<std::string> pointer;                             // likewise
+  std::optional<std::string> second_sensor;                       // likewise
+  std::vector<std::string> instruments;                           // likewise
+  std::optional<std::filesystem::path> sensor_definition;         // NDI, uploaded
+  std::optional<std::filesystem::path> reference_definition;      // NDI, uploaded
+  std::optional<std::filesystem::path> pointer_definition;        // NDI, uploaded
+  std::optional<std::filesystem::path> second_sensor_definition;  // NDI, uploaded
+  std::vector<std::filesystem::path> instrument_definitions;      // NDI, uploaded; beside `instruments`
+  std::optional<std::filesystem::path> pointer_calibration;       // its tip
+  bool igtl_stamps_by_arrival = false;                            // not by the server's stamps
+  double frame_rate_hz = 60.0;                                    // of NDI's frame numbers
+  double translation_IW_mm[3] = {0.0, 0.0, 0.0};                  // registration X_IW
+  double rotation_IW_wxyz[4] = {1.0, 0.0, 0.0, 0.0};              // registration X_IW, unit quaternion
+  double position_deviation_mm = 0.0;                             // RMS of the 3-D norm
+  double rotation_deviation_rad = 0.0;                            // RMS of the 3-D norm
+  Duration error_correlation{0};                                  // in which the error falls to 1/e; 0: white
+  Duration time_offset{0};  // added to the tracker's stamps to get the camera's time
   Duration maximum_extrapolation = std::chrono::milliseconds(20);
   double translation_SC_mm[3] = {0.0, 0.0, 0.0};      // hand-eye X_SC
   double rotation_SC_wxyz[4] = {1.0, 0.0, 0.0, 0.0};  // hand-eye X_SC, unit quaternion

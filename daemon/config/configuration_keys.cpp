@@ -77,8 +77,8 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
             "calibration as OpenCV writes it, from this file's folder; none: the recording's own")
       .file("turned_scope", PERIMAP_MEMBER(camera.turned_scope),
             "of a scope that is turned in its camera head, as `perimap calibrate scope` writes it: hand-eye and "
-            "principal "
-            "point then go by the notch in the pictures; none: the recording's own")
+            "principal point then go by the notch in the pictures, or by tracker.second_sensor; none: the recording's "
+            "own")
       .file("playback", PERIMAP_MEMBER(camera.playback), "a recording whose frames stand in for a camera")
       .number("playback_start_s", 0, 1e9, PERIMAP_MEMBER(camera.playback_start_s),
               "when that recording begins, CLOCK_MONOTONIC; 0: when perimapd starts");
@@ -132,6 +132,9 @@ void add_tracker(std::vector<ConfigurationKey>& keys) {
                      "the patient's reference tool, likewise; W is its frame; none: W is the tracker's")
       .optional_text("pointer", tool, &is_tool_name, PERIMAP_MEMBER(tracker.pointer),
                      "the tool that touches landmarks, likewise; recorded as tracker/pointer")
+      .optional_text("second_sensor", tool, &is_tool_name, PERIMAP_MEMBER(tracker.second_sensor),
+                     "the tool that tells how an angled scope is turned in its camera head, likewise: on the scope "
+                     "where the sensor is on the head, or the other way round; recorded as tracker/second_sensor")
       .texts("instruments", kMostInstruments, "texts of 1 to 20 printable characters", &is_tool_name,
              PERIMAP_MEMBER(tracker.instruments), "further tools, likewise; each recorded as tracker/instrument/NAME")
       .file("sensor_definition", PERIMAP_MEMBER(tracker.sensor_definition),
@@ -139,6 +142,8 @@ void add_tracker(std::vector<ConfigurationKey>& keys) {
       .file("reference_definition", PERIMAP_MEMBER(tracker.reference_definition),
             "the reference's tool definition, likewise")
       .file("pointer_definition", PERIMAP_MEMBER(tracker.pointer_definition), "the pointer's tool definition, likewise")
+      .file("second_sensor_definition", PERIMAP_MEMBER(tracker.second_sensor_definition),
+            "the second sensor's tool definition, likewise")
       .files("instrument_definitions", kMostInstruments, PERIMAP_MEMBER(tracker.instrument_definitions),
              "tool definitions, likewise, of further instruments; each has the name of its file")
       .file("pointer_calibration", PERIMAP_MEMBER(tracker.pointer_calibration),

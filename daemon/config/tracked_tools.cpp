@@ -28,10 +28,17 @@ std::vector<std::string> tracked_tool_names(const TrackerConfiguration& c) {
   std::vector<std::string> names;
   names.emplace_back(c.reference || (uploads && c.reference_definition) ? "reference" : "");
   if (c.pointer || (uploads && c.pointer_definition)) names.emplace_back("pointer");
+  if (c.second_sensor || (uploads && c.second_sensor_definition)) names.emplace_back(kSecondSensorTool);
   for (const std::string& instrument : c.instruments) names.push_back("instrument/" + instrument);
   if (!uploads) return names;
   for (const auto& definition : c.instrument_definitions) names.push_back("instrument/" + definition.stem().string());
   return names;
+}
+
+std::optional<std::size_t> second_sensor_of(const std::vector<std::string>& names) {
+  const auto found = std::find(names.begin(), names.end(), kSecondSensorTool);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - names.begin());
 }
 
 std::optional<ToolTwice> tool_named_twice(const TrackerConfiguration& c) {
@@ -43,6 +50,7 @@ std::optional<ToolTwice> tool_named_twice(const TrackerConfiguration& c) {
   add("tracker.sensor", c.sensor, c.sensor_definition.has_value());
   add("tracker.reference", c.reference, c.reference_definition.has_value());
   add("tracker.pointer", c.pointer, c.pointer_definition.has_value());
+  add("tracker.second_sensor", c.second_sensor, c.second_sensor_definition.has_value());
   for (const std::string& instrument : c.instruments) named.emplace_back("tracker.instruments", instrument);
   std::map<std::string, std::string> seen;  // spelling, key
   for (const auto& [key, tool] : named) {

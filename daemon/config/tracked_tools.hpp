@@ -1,6 +1,7 @@
 // The tools that a configuration names beside the tracked sensor.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,10 +10,16 @@
 
 namespace perimap {
 
-// By ToolSample::tool: "reference" (empty where there is none), "pointer" where there is one, then "instrument/NAME".
+// The tool that tells how an angled scope is turned, by its name of those below.
+inline constexpr const char* kSecondSensorTool = "second_sensor";
+
+// By ToolSample::tool: "reference" (empty where there is none), "pointer" and "second_sensor" where there is one, then
+// "instrument/NAME".
 // The names are those of messages, and of a recording's channels below channels::kTrackedTools. An instrument of a
 // definition has the file's name without its extension.
 [[nodiscard]] std::vector<std::string> tracked_tool_names(const TrackerConfiguration& configuration);
+// Which of these is the second sensor.
+[[nodiscard]] std::optional<std::size_t> second_sensor_of(const std::vector<std::string>& names);
 
 // Whether the two name one tool. Of an NDI tracker handles are numbers, so that "a" is "0A".
 [[nodiscard]] bool same_tool(const std::string& a, const std::string& b, TrackerConfiguration::Protocol protocol);

@@ -36,18 +36,21 @@ struct NamedSizes {
   std::optional<TurnedScope> scope;
 };
 
+Expected<void> scope_of_size(int width, int height, const NamedSizes& named, const std::string& played) {
+  const auto& scope = named.scope;
+  if (!scope || (width == scope->width && height == scope->height)) return {};
+  return wrong("camera.turned_scope", fmt::format("one of pictures of {}x{}, as {} has", width, height, played),
+               fmt::format("one of {}x{}", scope->width, scope->height),
+               "measure that scope with `perimap calibrate scope`, or play what it was measured of");
+}
+
 Expected<void> of_size(int width, int height, const NamedSizes& named, const std::string& played) {
   if (const auto& camera = named.camera; camera && (width != camera->width || height != camera->height)) {
     return wrong("camera.calibration", fmt::format("one for frames of {}x{}, as {} has", width, height, played),
                  fmt::format("one for {}x{}", camera->width, camera->height),
                  "measure that camera with `perimap calibrate camera`, or play what the calibration is of");
   }
-  if (const auto& scope = named.scope; scope && (width != scope->width || height != scope->height)) {
-    return wrong("camera.turned_scope", fmt::format("one of pictures of {}x{}, as {} has", width, height, played),
-                 fmt::format("one of {}x{}", scope->width, scope->height),
-                 "measure that scope with `perimap calibrate scope`, or play what it was measured of");
-  }
-  return {};
+  return scope_of_size(width, height, named, played);
 }
 
 Expected<void> video_fits(const std::string& file, const NamedSizes& named) {
@@ -96,7 +99,7 @@ Expected<void> size_fits(const CameraConfiguration& c, const NamedSizes& named) 
                  fmt::format("{}x{}", c.width, c.height),
                  "measure the camera with `perimap calibrate camera` as it is used");
   }
-  return of_size(c.width, c.height, named, "the key 'camera.width'");
+  return scope_of_size(c.width, c.height, named, "the key 'camera.width'");
 }
 
 Expected<NamedSizes> named_sizes(const CameraConfiguration& c) {
@@ -114,6 +117,23 @@ Expected<NamedSizes> named_sizes(const CameraConfiguration& c) {
   return named;
 }
 
+// Where a second sensor tells the turn it must be named, and be the one that it was measured of.
+Expected<void> second_sensor_fits(const Configuration& configuration, const TurnedScope& scope) {
+  const TrackerConfiguration& tracker = configuration.tracker;
+  // Recorded poses say themselves whether there are such.
+  if (!scope.second_sensor || tracker.protocol == TrackerConfiguration::Protocol::kNone) return {};
+  const auto own = calibration_fact(*configuration.camera.turned_scope, "second_sensor");
+  const auto& named = tracker.second_sensor;
+  if (named && (!own || same_tool(*own, *named, tracker.protocol))) return {};
+  // One that is uploaded is given a handle.
+  if (!named && second_sensor_of(tracked_tool_names(tracker))) return {};
+  return wrong("tracker.second_sensor",
+               own ? fmt::format("\"{}\", as 'camera.turned_scope' is of", *own)
+                   : "the sensor that tells how the scope of 'camera.turned_scope' is turned",
+               named ? fmt::format("\"{}\"", *named) : "nothing",
+               "name it, or measure the scope with `perimap calibrate scope`");
+}
+
 // Of the camera's picture, and of the tracker's sensor where it says of which it is.
 Expected<void> scope_fits(const Configuration& configuration, const NamedSizes& named) {
   const CameraConfiguration& c = configuration.camera;
@@ -122,6 +142,7 @@ Expected<void> scope_fits(const Configuration& configuration, const NamedSizes& 
   if (named.camera) {
     if (const auto scope = configured_scope(configuration, *named.camera); !scope) return tl::unexpected(scope.error());
   }
+  if (const auto second = second_sensor_fits(configuration, *named.scope); !second) return second;
   const auto sensor = calibration_fact(*c.turned_scope, "sensor");
   if (!sensor) return {};
   // Where there is no tracker, a sensor that is named says of which one the recorded poses are.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daemon/config/ecg_inputs.hpp"
+#include "daemon/config/tracked_tools.hpp"
 #include "daemon/runtime/camera_intake.hpp"
 #include "drivers/camera/v4l2_camera.hpp"
 #include "drivers/device/device_link.hpp"
@@ -89,6 +90,7 @@ Expected<void> serve_camera(const CameraDevice& device, const CameraSink& sink, 
 
 DeviceFeeder::DeviceFeeder(Devices devices, SensorEntrance* entrance, DeviceRecording recording)
     : devices_(std::move(devices)), recording_(std::move(recording)), intake_{entrance, recording_.recorder.get()} {
+  if (devices_.tracker) intake_.second_sensor = second_sensor_of(devices_.tracker->tools);
   if (!devices_.camera) return;
   if (auto* playback = std::get_if<CameraPlayback>(&*devices_.camera)) {
     playback_ = std::make_unique<ReplayFeeder>(std::move(playback->reader), intake_, playback->offset);

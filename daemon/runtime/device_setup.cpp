@@ -86,6 +86,9 @@ Expected<NdiSettings> ndi_settings(const TrackerConfiguration& c) {
   if (c.pointer || c.pointer_definition) {
     added = ndi_tool("tracker.pointer", c.pointer, c.pointer_definition).map(add("pointer"));
   }
+  if (added && (c.second_sensor || c.second_sensor_definition)) {
+    added = ndi_tool("tracker.second_sensor", c.second_sensor, c.second_sensor_definition).map(add("second sensor"));
+  }
   for (const std::string& instrument : c.instruments) {
     if (added) added = ndi_tool("tracker.instruments", instrument, std::nullopt).map(add("instrument " + instrument));
   }
@@ -172,6 +175,7 @@ Expected<TrackerDevice> tracker_device(const TrackerConfiguration& c) {
     IgtlSettings settings{c.sensor.value_or(""), c.reference, world, {}};
     settings.stamps_by_arrival = c.igtl_stamps_by_arrival;
     if (c.pointer) settings.tools.push_back(*c.pointer);
+    if (c.second_sensor) settings.tools.push_back(*c.second_sensor);
     settings.tools.insert(settings.tools.end(), c.instruments.begin(), c.instruments.end());
     return TrackerDevice{std::move(*endpoint), std::move(settings), tracked_tool_names(c)};
   }
@@ -279,6 +283,11 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
     basis.turned_scope = *scope;
   }
   Configuration& configuration = basis.configuration;
+  const bool by_second = basis.turned_scope && basis.turned_scope->second_sensor;
+  if (by_second && !second_sensor_of(tracked_tool_names(configuration.tracker))) {
+    return wrong_configuration(
+        {"key 'tracker.second_sensor': expected the sensor that tells how the turned scope is turned, got nothing"});
+  }
   if (const auto fits = calibrations_fit(configuration); !fits) return wrong_configuration(fits.error());
   auto devices = named_devices(configuration, configuration_file);
   // A map takes camera, tracker and R peaks: one that is not named is asked for as it would be.

@@ -147,6 +147,7 @@ tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& record
     basis.sensor = std::move(configuration.tracker.sensor);
     configuration.tracker.sensor.reset();
     configuration.tracker.pointer.reset();
+    configuration.tracker.second_sensor.reset();
     basis.passed_over = std::move(own->passed_over);
   }
   if (configuration_file) {
@@ -197,6 +198,14 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
     return tl::unexpected(
         SetupError{{fmt::format("{}: key 'ecg.r_trigger': expected false, since {} holds no channel {}, got true",
                                 where, recording, channels::kRTrigger)},
+                   true});
+  }
+  if (basis->turned_scope && basis->turned_scope->second_sensor && !reader->has_second_sensor()) {
+    const std::string where = configuration_file ? configuration_file->string() : recording;
+    return tl::unexpected(
+        SetupError{{fmt::format("{}: key 'camera.turned_scope': expected one that is read in the pictures, since {} "
+                                "holds no channel {}, got one whose turn a second sensor tells",
+                                where, recording, channels::kSecondSensor)},
                    true});
   }
   reader->require_frame_size(basis->camera.width, basis->camera.height);

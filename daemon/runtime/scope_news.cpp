@@ -33,15 +33,17 @@ void ScopeNews::tell_of_reading(const PipelineCounters& counters, Instant now) {
     unread_told_ = true;
     known_ = false;
     spdlog::warn(
-        "how the scope is turned in its camera head is not read in the pictures ({} frames so far): they have no pose "
-        "until the field stop with its notch is seen, at a zoom that was calibrated",
+        "how the scope is turned in its camera head is not known ({} frames so far): they have no pose until the field "
+        "stop with its notch is seen, at a zoom that was calibrated; or, where a second sensor tells, until the "
+        "tracker "
+        "sees both sensors, fast where they were",
         unread);
   }
   const std::uint64_t turns = counters.scope_turns.get();
   const double rotation_deg = 1e-6 * static_cast<double>(counters.scope_rotation_urad.get()) / kDegree;
   const bool calibrated = unread > 0;  // the first frames are never read
   if (calibrated && read && (!known_ || turns != turns_)) {
-    spdlog::info("the scope's notch is at {:.1f} degrees: hand-eye and lens are as calibrated for that", rotation_deg);
+    spdlog::info("the scope is turned by {:.1f} degrees: hand-eye and lens are as calibrated for that", rotation_deg);
     known_ = true;
     unread_told_ = false;
   }

@@ -1,6 +1,9 @@
 // Where the sources' threads put what they have got: the pipeline, a recording, and whoever else looks at the frames.
 #pragma once
 
+#include <cstddef>
+#include <optional>
+
 #include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/runtime/session_recorder.hpp"
 #include "drivers/image/camera_frame.hpp"
@@ -22,6 +25,7 @@ struct SensorIntake {
   SensorEntrance* entrance = nullptr;
   SessionRecorder* recorder = nullptr;
   FrameObserver* observer = nullptr;
+  std::optional<std::size_t> second_sensor = std::nullopt;  // which ToolSample::tool tells how the scope is turned
 
   // To the pipeline first: it is the one in a hurry.
   void frame(const CameraFrame& as_it_came, const GreyImage& grey, const ColourImage& colour) const noexcept {
@@ -33,9 +37,14 @@ struct SensorIntake {
     if (entrance != nullptr) entrance->push_pose(sample);
     if (recorder != nullptr) recorder->pose(sample);
   }
-  // The pipeline has no use for them.
+  // Of them the pipeline takes the second sensor alone.
   void tool(const ToolSample& sample) const noexcept {
+    if (sample.tool == second_sensor) second_pose(sample);
     if (recorder != nullptr) recorder->tool(sample);
+  }
+  // Of a recording; not recorded again.
+  void second_pose(const TrackerSample& sample) const noexcept {
+    if (entrance != nullptr) entrance->push_second_pose(sample);
   }
   void ecg(const EcgBlock& block) const noexcept {
     if (entrance != nullptr) entrance->push_ecg(block);

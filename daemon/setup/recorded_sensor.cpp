@@ -25,6 +25,7 @@ Expected<std::optional<std::string>> recorded_handle(const std::string& recordin
   const TrackerConfiguration& tracker = recorded->configuration.tracker;
   if (tool == kScopeTool) return tracker.sensor;
   if (tool == "pointer") return tracker.pointer;
+  if (tool == kSecondSensorTool) return tracker.second_sensor;
   return std::nullopt;
 }
 

@@ -197,6 +197,14 @@ std::string text_of(const TurnedScope& scope) {
     text += fmt::format("  focal length   {:.2f} {:.2f} px where the field stop's radius is {:.1f} px\n",
                         row.focal_px.x(), row.focal_px.y(), row.radius_px);
   }
+  if (scope.second_sensor) {
+    text += fmt::format("  second sensor  turns about one axis but for {:.2f} degrees RMS; zoom must stay as it was\n",
+                        scope.second_sensor->left_over_rad / kDegree);
+  }
+  if (scope.aside_translation_rms_mm > 0.0) {
+    text += fmt::format("  held aside     {:.2f} mm and {:.2f} degrees RMS of each set-up by the others' function\n",
+                        scope.aside_translation_rms_mm, scope.aside_rotation_rms_deg);
+  }
   if (scope.translation_rms_mm > 0.0) {
     text += fmt::format("  left over      {:.2f} mm and {:.2f} degrees RMS of the set-ups\n", scope.translation_rms_mm,
                         scope.rotation_rms_deg);

@@ -18,7 +18,7 @@ namespace {
 // The numbers of one object, each within bounds; the first key that is wrong is remembered.
 class Numbers {
  public:
-  explicit Numbers(const nlohmann::json& object) : object_(object) {}
+  Numbers(const nlohmann::json& object, const char* path) : object_(object), path_(path) {}
 
   void list(const char* key, std::span<double> values, double largest) {
     const auto found = object_.find(key);
@@ -66,12 +66,13 @@ class Numbers {
     if (!good) refuse(key, "rows of a radius and two focal lengths, px, the radii rising");
   }
   void refuse(const char* key, const std::string& expected) {
-    if (!wrong_) wrong_ = fmt::format("key 'turned_scope.{}': expected {}", key, expected);
+    if (!wrong_) wrong_ = fmt::format("key '{}{}': expected {}", path_, key, expected);
   }
   [[nodiscard]] const std::optional<std::string>& wrong() const { return wrong_; }
 
  private:
   const nlohmann::json& object_;
+  const char* path_;  // of the object, before its keys
   std::optional<std::string> wrong_;
 };
 
@@ -79,6 +80,28 @@ double norm_of(std::initializer_list<double> values) {
   double squares = 0.0;
   for (const double value : values) squares += value * value;
   return std::sqrt(squares);
+}
+
+constexpr double kUnit = 1e-3;  // so far may the norm be from 1
+
+// Returns what is wrong.
+std::optional<std::string> read_second_sensor(const nlohmann::json& object, SecondSensor& second) {
+  Numbers numbers(object, "turned_scope.second_sensor.");
+  double q[4]{};
+  double axis[3]{};
+  double left_over_deg = 0.0;
+  numbers.list("reference_rotation_wxyz", q, 1.001);
+  numbers.list("axis", axis, 1.001);
+  numbers.number("left_over_deg", left_over_deg, 180.0);
+  if (std::abs(norm_of({q[0], q[1], q[2], q[3]}) - 1.0) > kUnit) {
+    numbers.refuse("reference_rotation_wxyz", "a unit quaternion");
+  }
+  if (std::abs(norm_of({axis[0], axis[1], axis[2]}) - 1.0) > kUnit) numbers.refuse("axis", "a unit vector");
+  if (numbers.wrong()) return numbers.wrong();
+  second.reference_S2 = pose_from_wxyz(Vector3d::Zero(), q).R;
+  second.axis_S = Vector3d(axis[0], axis[1], axis[2]).normalized();
+  second.left_over_rad = left_over_deg * kDegree;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -100,7 +123,7 @@ Expected<TurnedScope> parse_turned_scope(std::string_view text, std::string_view
   if (found == json.end() || !found->is_object()) return wrong("has no key 'turned_scope'");
   constexpr double kFarthest_mm = 10'000.0;
   constexpr double kFarthest_px = 100'000.0;
-  Numbers numbers(*found);
+  Numbers numbers(*found, "turned_scope.");
   double rotation_deg = 0.0;
   double t[3]{};
   double q[4]{};
@@ -122,13 +145,19 @@ Expected<TurnedScope> parse_turned_scope(std::string_view text, std::string_view
   numbers.list("picture_px", size, 16384.0);
   numbers.list("reference_focal_px", focal, kFarthest_px);
   numbers.table("focal_px_by_field_stop_radius_px", scope.focals);
-  constexpr double kUnit = 1e-3;
   if (std::abs(norm_of({q[0], q[1], q[2], q[3]}) - 1.0) > kUnit) {
     numbers.refuse("reference_rotation_wxyz", "a unit quaternion");
   }
   if (std::abs(norm_of({axis[0], axis[1], axis[2]}) - 1.0) > kUnit) numbers.refuse("axis", "a unit vector");
   if (size[0] < 1.0 || size[1] < 1.0) numbers.refuse("picture_px", "the pictures' width and height");
   if (!(focal[0] > 0.0 && focal[1] > 0.0)) numbers.refuse("reference_focal_px", "focal lengths above 0");
+  // None: the field stop tells the turn.
+  if (const auto second = found->find("second_sensor"); second != found->end() && !second->is_null()) {
+    if (!second->is_object()) numbers.refuse("second_sensor", "an object, or null");
+    const auto bad = second->is_object() ? read_second_sensor(*second, scope.second_sensor.emplace()) : std::nullopt;
+    if (bad && !numbers.wrong()) return wrong(*bad);
+    if (!scope.focals.empty()) numbers.refuse("focal_px_by_field_stop_radius_px", "no rows beside 'second_sensor'");
+  }
   if (numbers.wrong()) return wrong(*numbers.wrong());
   scope.reference.focal_px = {focal[0], focal[1]};
   scope.reference.rotation_rad = rotation_deg * kDegree;
@@ -149,6 +178,14 @@ std::string format_turned_scope(const TurnedScope& scope) {
   rotation_to_wxyz(scope.reference.X_SC.R, q);
   nlohmann::json table = nlohmann::json::array();
   for (const FocalAtRadius& row : scope.focals) table.push_back({row.radius_px, row.focal_px.x(), row.focal_px.y()});
+  nlohmann::json second;
+  if (scope.second_sensor) {
+    double q_S2[4];
+    rotation_to_wxyz(scope.second_sensor->reference_S2, q_S2);
+    second = {{"reference_rotation_wxyz", {q_S2[0], q_S2[1], q_S2[2], q_S2[3]}},
+              {"axis", three(scope.second_sensor->axis_S)},
+              {"left_over_deg", scope.second_sensor->left_over_rad / kDegree}};
+  }
   const nlohmann::json json = {{"reference_rotation_deg", scope.reference.rotation_rad / kDegree},
                                {"reference_translation_mm", three(scope.reference.X_SC.t)},
                                {"reference_rotation_wxyz", {q[0], q[1], q[2], q[3]}},
@@ -166,7 +203,10 @@ std::string format_turned_scope(const TurnedScope& scope) {
                                {"translation_mm_deviation", scope.translation_deviation_mm},
                                {"principal_point_px_deviation", scope.principal_deviation_px},
                                {"left_over_mm", scope.translation_rms_mm},
-                               {"left_over_deg", scope.rotation_rms_deg}};
+                               {"left_over_deg", scope.rotation_rms_deg},
+                               {"aside_mm", scope.aside_translation_rms_mm},
+                               {"aside_deg", scope.aside_rotation_rms_deg},
+                               {"second_sensor", second}};
   return nlohmann::json{{"turned_scope", json}}.dump(2) + "\n";
 }
 

@@ -17,13 +17,23 @@ namespace {
 constexpr std::array<std::string_view, 3> kSensorChannels = {channels::kCameraImage, channels::kTrackerPose,
                                                              channels::kEcgSamples};
 
-Expected<std::optional<ReplayEvent>> pose_event(const RecordingReader& reader, const RecordedMessage& message) {
+Expected<TrackerSample> pose_of(const RecordingReader& reader, const RecordedMessage& message) {
   const auto pose = reader.decode<perimap_TrackerPose>(message);
   if (!pose) return tl::unexpected(pose.error());
   auto sample = to_tracker_sample(**pose);
   if (!sample) return reader.wrong(message, sample.error().message);
   sample->arrival = message.arrival;
   return *sample;
+}
+
+Expected<std::optional<ReplayEvent>> pose_event(const RecordingReader& reader, const RecordedMessage& message) {
+  return pose_of(reader, message).map([](const TrackerSample& sample) { return std::optional<ReplayEvent>(sample); });
+}
+
+Expected<std::optional<ReplayEvent>> second_pose_event(const RecordingReader& reader, const RecordedMessage& message) {
+  return pose_of(reader, message).map([](const TrackerSample& sample) {
+    return std::optional<ReplayEvent>(SecondPose{sample});
+  });
 }
 
 Expected<std::optional<ReplayEvent>> r_trigger_event(const RecordingReader& reader, const RecordedMessage& message) {
@@ -58,6 +68,7 @@ struct EachTime {
     instant(pose.source_time);
     instant(pose.arrival);
   }
+  void operator()(SecondPose& pose) const { (*this)(pose.sample); }
   void operator()(SampleBlock& block) const {  // of the ECG or of respiration
     instant(block.first_sample_time);
     instant(block.arrival);
@@ -73,6 +84,7 @@ EachTime(OnInstant, OnPeriod) -> EachTime<OnInstant, OnPeriod>;
 
 struct ArrivalOf {
   Instant operator()(const FrameEvent& frame) const noexcept { return frame.stamp.arrival; }
+  Instant operator()(const SecondPose& pose) const noexcept { return pose.sample.arrival; }
   template <class Event>
   Instant operator()(const Event& event) const noexcept {
     return event.arrival;
@@ -115,7 +127,7 @@ Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode
   std::vector<std::string_view> wanted(kSensorChannels.begin(), kSensorChannels.end());
   for (const RecordedChannel& channel : reader->channels()) {
     for (const std::string_view optional :
-         {channels::kEcgSecondLead, channels::kRTrigger, channels::kRespirationSamples}) {
+         {channels::kSecondSensor, channels::kEcgSecondLead, channels::kRTrigger, channels::kRespirationSamples}) {
       if (channel.name == optional) wanted.push_back(optional);
     }
   }
@@ -216,6 +228,7 @@ Expected<std::optional<ReplayEvent>> ReplayReader::event_of(const RecordedMessag
   last_arrival_ = m.arrival;
   return m.channel == channels::kCameraImage                                           ? frame_event(m)
          : m.channel == channels::kTrackerPose                                         ? pose_event(reader_, m)
+         : m.channel == channels::kSecondSensor                                        ? second_pose_event(reader_, m)
          : m.channel == channels::kEcgSamples || m.channel == channels::kEcgSecondLead ? ecg_event(m)
          : m.channel == channels::kRTrigger                                            ? r_trigger_event(reader_, m)
                                                                                        : respiration_event(reader_, m);

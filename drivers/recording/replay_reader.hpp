@@ -47,7 +47,12 @@ struct FrameEvent {
   [[nodiscard]] CameraFrame as_it_came() const noexcept;
 };
 
-using ReplayEvent = std::variant<FrameEvent, TrackerSample, EcgBlock, RTriggerPulse, RespirationBlock>;
+// Of the second tracked sensor that tells how an angled scope is turned.
+struct SecondPose {
+  TrackerSample sample;
+};
+
+using ReplayEvent = std::variant<FrameEvent, TrackerSample, SecondPose, EcgBlock, RTriggerPulse, RespirationBlock>;
 
 [[nodiscard]] Instant arrival_of(const ReplayEvent& event);
 // The same event with all its instants moved by `offset`.
@@ -60,14 +65,16 @@ void speed_up(ReplayEvent& event, Instant origin, double speed);
 // that cannot be decoded is left out, as it was when it was recorded: a gap in the count.
 class ReplayReader {
  public:
-  // Fails when the recording has no camera, tracker or ECG channel. Triggers and breaths are given where there are any.
+  // Fails when the recording has no camera, tracker or ECG channel. A second sensor's poses, triggers and breaths are
+  // given where there are any.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode);
   // Of these of the sensors' channels alone; fails when one of them is not there.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode,
                                                    std::span<const std::string_view> channels);
 
-  // Whether a trigger was recorded, were it without a pulse; a respiration channel, likewise.
+  // Whether a trigger was recorded, were it without a pulse; a second sensor or a respiration channel, likewise.
   [[nodiscard]] bool has_r_trigger() const { return has(channels::kRTrigger); }
+  [[nodiscard]] bool has_second_sensor() const { return has(channels::kSecondSensor); }
   [[nodiscard]] bool has_respiration() const { return has(channels::kRespirationSamples); }
 
   // The next event; nullopt at the end. Channels other than the sensors' are passed over.

@@ -64,6 +64,9 @@ void deliver(LockstepRuntime& runtime, const Simulation& simulation, const Simul
       break;
     case Simulation::Source::kTracker:
       runtime.deliver(simulation.tracker_sample(arrival.index, noise));
+      if (simulation.settings().second_sensor) {
+        runtime.deliver(SecondPose{simulation.second_sample(arrival.index, noise)});
+      }
       break;
     case Simulation::Source::kEcg:
       runtime.deliver(simulation.ecg()[arrival.index]);

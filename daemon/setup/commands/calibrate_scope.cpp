@@ -9,12 +9,15 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration/fit_by_second_sensor.hpp"
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/tracked_tools.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/pictures.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
+#include "daemon/setup/recorded_relation.hpp"
+#include "daemon/setup/recorded_sensor.hpp"
 #include "daemon/setup/scope_rotation.hpp"
 #include "drivers/calibration/calibration_facts.hpp"
 #include "drivers/calibration/calibration_file.hpp"
@@ -28,6 +31,7 @@ struct CalibrateScopeOptions {
   std::string recording;
   std::vector<std::vector<std::string>> setups;  // picture or recording, hand-eye, camera
   std::vector<std::vector<std::string>> zooms;   // picture or recording, camera
+  bool by_second_sensor = false;
 
   [[nodiscard]] std::vector<std::string> inputs() const {
     return recording.empty() ? pictures : std::vector{recording};
@@ -69,6 +73,30 @@ Expected<void> same_size(const CameraModel& lens, const std::string& lens_file, 
                   lens_file, lens.width, lens.height, first.width, first.height));
 }
 
+// The set-up as a function of the rotation, from those that --at names, where a second sensor tells that.
+Expected<TurnedScope> scope_by_second_sensor(const CalibrateScopeOptions& options) {
+  std::vector<SetupAtRotation> setups;
+  std::vector<HeldRelation> held;
+  std::optional<CameraModel> first;
+  for (const std::vector<std::string>& files : options.setups) {
+    const auto relation = relation_in_recording(files.at(0));
+    if (!relation) return tl::unexpected(relation.error());
+    const auto lens = read_calibration(files.at(2));
+    if (!lens) return tl::unexpected(lens.error());
+    if (!first) first = *lens;
+    if (const auto same = same_size(*lens, files.at(2), *first); !same) return tl::unexpected(same.error());
+    const auto setup = read_setup(files.at(1), files.at(2));
+    if (!setup) return tl::unexpected(setup.error());
+    setups.push_back(*setup);
+    held.push_back(*relation);
+  }
+  auto scope = fit_by_second_sensor(std::move(setups), held);
+  if (!scope) return scope;
+  scope->width = first->width;
+  scope->height = first->height;
+  return scope;
+}
+
 // The set-up as a function of the rotation, from those that --at names, and of the zoom, from those of --zoom too.
 Expected<TurnedScope> turned_scope(const CalibrateScopeOptions& options) {
   std::vector<SetupAtRotation> setups;
@@ -101,6 +129,33 @@ Expected<TurnedScope> turned_scope(const CalibrateScopeOptions& options) {
   return scope;
 }
 
+// Of which tool the turn was told, as the recordings say, or the configuration; none: nobody says. Fails where one says
+// otherwise.
+Expected<std::optional<std::string>> second_sensor_named(const CalibrateScopeOptions& options) {
+  std::optional<std::string> tool;
+  std::string said_by;
+  TrackerConfiguration::Protocol protocol = TrackerConfiguration::Protocol::kNone;
+  if (!options.common.configuration.empty()) {
+    const auto configuration = load_configuration(options.common.configuration, {}, NamedFiles::kMayBeMissing);
+    if (!configuration) return tl::unexpected(configuration.error());
+    tool = configuration->tracker.second_sensor;
+    said_by = options.common.configuration;
+    protocol = configuration->tracker.protocol;
+  }
+  for (const std::vector<std::string>& files : options.setups) {
+    const auto own = recorded_handle(files.at(0), kSecondSensorTool);
+    if (!own) return tl::unexpected(own.error());
+    if (!*own) continue;
+    if (tool && !same_tool(*tool, **own, protocol)) {
+      return fail(
+          fmt::format("{}: its second sensor is \"{}\", and that of {} \"{}\": expected one that stays where it is",
+                      files.at(0), **own, said_by, *tool));
+    }
+    if (!tool) said_by = files.at(0), tool = *own;
+  }
+  return tool;
+}
+
 // Of which sensor the hand-eyes are, as they say, or the configuration; none: nobody says. Fails where one says
 // otherwise.
 Expected<std::optional<std::string>> sensor_of(const CalibrateScopeOptions& options) {
@@ -129,7 +184,7 @@ Expected<std::optional<std::string>> sensor_of(const CalibrateScopeOptions& opti
 Expected<Measurement> measure(const CalibrateScopeOptions& options) {
   Measurement measured{"", nlohmann::json::object(), {}};
   if (!options.setups.empty()) {
-    const auto scope = turned_scope(options);
+    const auto scope = options.by_second_sensor ? scope_by_second_sensor(options) : turned_scope(options);
     if (!scope) return tl::unexpected(scope.error());
     measured.text += text_of(*scope);
     measured.json["turned_scope"] = json_of(*scope);
@@ -137,6 +192,11 @@ Expected<Measurement> measure(const CalibrateScopeOptions& options) {
     const auto sensor = sensor_of(options);
     if (!sensor) return tl::unexpected(sensor.error());
     if (*sensor) measured.json["sensor"] = **sensor;
+    if (options.by_second_sensor) {
+      const auto second = second_sensor_named(options);
+      if (!second) return tl::unexpected(second.error());
+      if (*second) measured.json["second_sensor"] = **second;
+    }
     measured.section = "camera";
     measured.keys = {{"turned_scope", output_key(options.common)}};
     if (options.pictures.empty() && options.recording.empty()) return measured;
@@ -157,6 +217,9 @@ Outcome run(const CalibrateScopeOptions& options) {
   if (!options.zooms.empty() && options.setups.empty()) {
     return refuse("--zoom: expected --at too, the set-ups at several turns", ExitCode::kWrongUsage);
   }
+  if (options.by_second_sensor && (options.setups.empty() || !options.zooms.empty())) {
+    return refuse("--by-second-sensor: expected --at, and no --zoom, of which it does not tell", ExitCode::kWrongUsage);
+  }
   if (!options.common.configuration.empty() && (options.common.output.empty() || options.setups.empty())) {
     return refuse("--configuration: expected --at and --output too, the file that the configuration is to name",
                   ExitCode::kWrongUsage);
@@ -173,13 +236,16 @@ Outcome run(const CalibrateScopeOptions& options) {
 
 void add_calibrate_scope(Commands& commands, Command& calibrate) {
   const auto options = std::make_shared<CalibrateScopeOptions>();
-  Command& command = commands.add(
-      calibrate, "scope",
-      "How far an angled scope is turned in its camera head, by its field stop's notch; and the set-up by it",
-      [options](const Console&) { return run(*options); });
+  Command& command = commands.add(calibrate, "scope",
+                                  "How far an angled scope is turned in its camera head, by its field stop's notch or "
+                                  "a second tracked sensor; and the "
+                                  "set-up by it",
+                                  [options](const Console&) { return run(*options); });
   command.footer(
       "What --at and --output write goes into a configuration as camera.turned_scope: perimapd, replay and verify then "
-      "read turn and zoom from the field stop in the pictures, and take hand-eye and lens by them.");
+      "read turn and zoom from the field stop in the pictures, or the turn from tracker.second_sensor, and take "
+      "hand-eye and "
+      "lens by them.");
   command.add_option("IMAGES", options->pictures, "Pictures with the field stop, folders of them, or a video");
   add_from(command, options->recording);
   command
@@ -198,6 +264,11 @@ void add_calibrate_scope(Commands& commands, Command& calibrate) {
           "along a line")
       ->expected(2)
       ->trigger_on_parse();
+  command.add_flag(
+      "--by-second-sensor", options->by_second_sensor,
+      "With --at, three times and more, each a recording: the turn is told by a second tracked sensor, "
+      "recorded as tracker/second_sensor, on the scope where the sensor is on the camera head or the other "
+      "way round; the pictures need no field stop, and the zoom must stay as it was");
   add_common(command, options->common, false, true);
 }
 

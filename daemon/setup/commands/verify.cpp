@@ -17,6 +17,7 @@
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
 #include "daemon/setup/recorded_poses.hpp"
+#include "daemon/setup/recorded_relation.hpp"
 #include "daemon/setup/recorded_sensor.hpp"
 #include "daemon/setup/scope_rotation.hpp"
 #include "daemon/setup/verification.hpp"
@@ -95,6 +96,19 @@ struct SetupAsTurned {
 Expected<SetupAsTurned> setup_as_turned(const std::filesystem::path& file, const std::string& recording) {
   const auto scope = read_turned_scope(file);
   if (!scope) return tl::unexpected(scope.error());
+  if (scope->second_sensor) {
+    const auto relation = relation_in_recording(recording);
+    if (!relation) return tl::unexpected(relation.error());
+    const double rotation_rad = scope->second_sensor->rotation_rad(relation->R_S2);
+    constexpr double kSlipped_rad = 2.0 * kDegree;
+    if (const double aside_rad = scope->second_sensor->aside_rad(relation->R_S2); aside_rad > kSlipped_rad) {
+      return fail(
+          fmt::format("{}: the two sensors are {:.1f} degrees from every turn about the shaft that {} has: one "
+                      "has slipped; fasten it, and measure the scope anew",
+                      recording, aside_rad / kDegree, file.string()));
+    }
+    return SetupAsTurned{scope->at(rotation_rad).X_SC, *scope->lens_at(rotation_rad, 0.0)};
+  }
   const auto rotation = rotation_in_recording(recording);
   if (!rotation) return tl::unexpected(rotation.error());
   constexpr double kHeld_rad = 2.0 * kDegree;

@@ -43,6 +43,7 @@ struct SimulateOptions {
   std::optional<double> turn_to_deg, zoom_to;
   double turn_at_s = 10.0;
   bool scope_uncalibrated = false;
+  bool second_sensor = false;
   std::filesystem::path truth;
   std::filesystem::path landmarks;
 
@@ -72,6 +73,7 @@ Outcome simulate_bench(const SimulateOptions& options) {
   settings->board = *std::move(board);
   if (options.notch_deg) settings->notch_rad = *options.notch_deg * kDegree;
   settings->zoom = options.zoom;
+  settings->second_sensor = options.second_sensor;
   const auto scene = BenchScene::create(*settings);
   if (!scene) return refuse(scene.error(), ExitCode::kWrongUsage);
   if (const auto apart = check_apart({{"OUT", options.out.string()},
@@ -128,6 +130,12 @@ Outcome simulate(const SimulateOptions& options) {
   if (options.zoom != 1.0 && !options.notch_deg) {
     return refuse("--zoom: expected --field-stop, which tells of it", ExitCode::kWrongUsage);
   }
+  if (options.second_sensor && !options.notch_deg) {
+    return refuse("--second-sensor: expected --field-stop, how the scope is turned", ExitCode::kWrongUsage);
+  }
+  if (options.second_sensor && options.zoom_to) {
+    return refuse("--second-sensor: expected no --zoom-to, of which it does not tell", ExitCode::kWrongUsage);
+  }
   if (options.act && !options.tracker_noises_mm.empty()) {
     return refuse("--tracker-noises: expected --scene heart; a bench has one, --tracker-noise", ExitCode::kWrongUsage);
   }
@@ -137,6 +145,7 @@ Outcome simulate(const SimulateOptions& options) {
   if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
   if (options.notch_deg) settings->held = ScopeHeld{*options.notch_deg * kDegree, options.zoom};
   settings->scope_calibrated = !options.scope_uncalibrated;
+  settings->second_sensor = options.second_sensor;
   if (options.turn_to_deg || options.zoom_to) {
     const ScopeHeld to{options.turn_to_deg.value_or(*options.notch_deg) * kDegree,
                        options.zoom_to.value_or(options.zoom)};
@@ -211,6 +220,9 @@ void add_simulate_command(Commands& commands) {
   command.add_option("--zoom", options->zoom, "With --field-stop: so many times larger are picture and field stop")
       ->check(Range(0.5, 2.0))
       ->capture_default_str();
+  command.add_flag("--second-sensor", options->second_sensor,
+                   "With --field-stop: a second tracked sensor, on the scope, tells how that is turned; the field stop "
+                   "lies outside the picture then");
   command.add_flag("--scope-uncalibrated", options->scope_uncalibrated,
                    "Of a heart with --field-stop: the recording has hand-eye and lens of its start alone, and not what "
                    "follows when the scope is turned");

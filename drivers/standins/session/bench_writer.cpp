@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -86,6 +87,11 @@ class BenchWriter {
     for (const auto* channel : {&info, &scope, &pointer, &viewer, &image, &ecg}) {
       if (!*channel) return tl::unexpected(channel->error());
     }
+    if (scene_.settings().second_sensor) {
+      const auto second = writer_.add_channel<perimap_TrackerPose>(channels::kSecondSensor);
+      if (!second) return tl::unexpected(second.error());
+      second_ = *second;
+    }
     scope_ = *scope, pointer_ = *pointer, viewer_ = *viewer, image_ = *image, ecg_ = *ecg;
     std::string generator = fmt::format("perimap simulate {}", PERIMAP_VERSION);
     std::string text = description_of(scene_, noise_);
@@ -113,12 +119,19 @@ class BenchWriter {
           return writer_.write(pointer_, to_tracker_pose(pointer), pointer.arrival, pointer.source_time,
                                pointer.device_frame);
         })
+        .and_then([&] { return write_second_sensor(index); })
         .and_then([&] { return write_ecg(scope.arrival); });
   }
 
   Expected<void> finish() { return writer_.finish(); }
 
  private:
+  Expected<void> write_second_sensor(std::size_t index) {
+    if (!second_) return {};
+    const TrackerSample second = scene_.reading(BenchScene::Tool::kSecondSensor, index, noise_);
+    return writer_.write(*second_, to_tracker_pose(second), second.arrival, second.source_time, second.device_frame);
+  }
+
   // Of a device whose electrodes nobody wears; whoever plays a recording asks for one. Blocks that have come by then.
   Expected<void> write_ecg(Instant now) {
     EcgBlock block;
@@ -144,6 +157,7 @@ class BenchWriter {
   TrackerNoise noise_;
   RecordingWriter writer_;
   ChannelId image_, scope_, pointer_, viewer_, ecg_;
+  std::optional<ChannelId> second_;
   std::int64_t ecg_samples_ = 0;
   std::vector<std::uint8_t> packed_;
 };

@@ -80,6 +80,10 @@ class SessionWriter {
     });
   }
 
+  Expected<void> write_second_sensor(const TrackerSample& sample) {
+    return writer_.write(second_, to_tracker_pose(sample), sample.arrival, sample.source_time, sample.device_frame);
+  }
+
   Expected<void> write_tracker(const TrackerSample& sample) {
     const perimap_TrackerPose message = to_tracker_pose(sample);
     auto written = writer_.write(tracker_, message, sample.arrival, sample.source_time, sample.device_frame);
@@ -127,6 +131,11 @@ class SessionWriter {
     tracker_ = *tracker;
     viewer_ = *viewer;
     ecg_ = *ecg;
+    if (simulation_.settings().second_sensor) {
+      const auto second = writer_.add_channel<perimap_TrackerPose>(channels::kSecondSensor);
+      if (!second) return tl::unexpected(second.error());
+      second_ = *second;
+    }
     if (simulation_.settings().respiration_channel) {
       const auto respiration = writer_.add_channel<perimap_RespirationSamples>(channels::kRespirationSamples);
       if (!respiration) return tl::unexpected(respiration.error());
@@ -167,7 +176,7 @@ class SessionWriter {
   SimulatedRecording recording_;
   WholeFile file_;  // goes after what writes to it
   RecordingWriter writer_;
-  ChannelId image_, truth_camera_, tracker_, viewer_, ecg_, respiration_;
+  ChannelId image_, truth_camera_, tracker_, second_, viewer_, ecg_, respiration_;
   std::vector<std::uint8_t> packed_;
 };
 
@@ -214,6 +223,9 @@ Expected<bool> write_simulation(const Simulation& simulation, const std::vector<
           break;
         case Simulation::Source::kTracker:
           written = writers[i]->write_tracker(simulation.tracker_sample(arrival.index, recordings[i].noise));
+          if (written && simulation.settings().second_sensor) {
+            written = writers[i]->write_second_sensor(simulation.second_sample(arrival.index, recordings[i].noise));
+          }
           break;
         case Simulation::Source::kEcg:
           written = writers[i]->write_ecg(simulation.ecg()[arrival.index]);

@@ -26,7 +26,8 @@ enum BenchStream : std::uint64_t {
   kScopeError,
   kPointerError,
   kBenchImage,
-  kLandmark
+  kLandmark,
+  kSecondError
 };
 
 constexpr double kDistance_mm = 150.0;  // of the scope from the board, at rest
@@ -47,6 +48,7 @@ Expected<void> check_bench(const BenchSettings& s) {
         outside("swing", s.swing, 0.0, 3.0, "times the usual")}) {
     if (!result) return result;
   }
+  if (s.second_sensor && !s.notch_rad) return fail("second sensor: expected a scope that is turned by some angle");
   return {};
 }
 
@@ -54,6 +56,14 @@ double smooth(double s) { return s * s * (3.0 - 2.0 * s); }
 
 FieldStop field_stop_of(const BenchSettings& s) {
   return s.notch_rad ? drawn_field_stop(s.setup_seed, s.width, s.height, {*s.notch_rad, s.zoom}) : FieldStop{};
+}
+
+FieldStop seen_field_stop_of(const BenchSettings& s) { return s.second_sensor ? FieldStop{} : field_stop_of(s); }
+
+BenchStream error_stream(BenchScene::Tool tool) {
+  return tool == BenchScene::Tool::kScope     ? kScopeError
+         : tool == BenchScene::Tool::kPointer ? kPointerError
+                                              : kSecondError;
 }
 
 Vector3d drawn_vector(const CounterNoise& noise, std::uint64_t index, double half) {
@@ -92,7 +102,8 @@ Expected<BenchScene> BenchScene::create(const BenchSettings& settings) {
   scene.time_devices();
   scene.draw_errors();
   if (settings.act == BenchAct::kBoard) {
-    scene.renderer_ = std::make_shared<const BoardRenderer>(scene.setup_.lens, settings.board, field_stop_of(settings));
+    scene.renderer_ =
+        std::make_shared<const BoardRenderer>(scene.setup_.lens, settings.board, seen_field_stop_of(settings));
   }
   return scene;
 }
@@ -128,8 +139,8 @@ void BenchScene::time_devices() {
 void BenchScene::draw_errors() {
   const double correlation_s = to_seconds(settings_.tracker_correlation);
   const double rho = correlation_s > 0.0 ? std::exp(-1.0 / (settings_.tracker_rate_hz * correlation_s)) : 0.0;
-  for (const Tool tool : {Tool::kScope, Tool::kPointer}) {
-    const CounterNoise noise(settings_.seed, tool == Tool::kScope ? kScopeError : kPointerError);
+  for (const Tool tool : {Tool::kScope, Tool::kPointer, Tool::kSecondSensor}) {
+    const CounterNoise noise(settings_.seed, error_stream(tool));
     const auto normal3 = [&](std::uint64_t index) {
       return Vector3d(noise.normal(3 * index), noise.normal(3 * index + 1), noise.normal(3 * index + 2));
     };
@@ -173,9 +184,15 @@ Pose BenchScene::X_WT(Duration since) const noexcept {
   return {R, touched_W(t_s) - R * setup_.tip_T};
 }
 
+Pose BenchScene::true_pose(Tool tool, Duration since) const noexcept {
+  if (tool == Tool::kPointer) return X_WT(since);
+  const Pose X_WS = X_WC(since) * setup_.X_SC.inverse();
+  return tool == Tool::kScope ? X_WS : X_WS * setup_.X_SS2;
+}
+
 TrackerSample BenchScene::reading(Tool tool, std::size_t index, const TrackerNoise& noise) const noexcept {
   const Duration since = times_[index] - start_;
-  const Pose truth = tool == Tool::kScope ? X_WC(since) * setup_.X_SC.inverse() : X_WT(since);
+  const Pose truth = true_pose(tool, since);
   const Error& error = errors_[static_cast<std::size_t>(tool)][index];
   const double per_axis = 1.0 / std::numbers::sqrt3;
   TrackerSample sample;

@@ -44,6 +44,8 @@ struct BenchSettings {
   // scope is turned then (turned_setup()). None: all of the picture is seen, and the scope is as at 0.
   std::optional<double> notch_rad;
   double zoom = 1.0;  // of the picture and the field stop, likewise
+  // A second tracked sensor, on the scope, tells how that is turned: the field stop lies outside the picture then.
+  bool second_sensor = false;
 };
 
 struct BenchLandmark {
@@ -53,7 +55,7 @@ struct BenchLandmark {
 
 class BenchScene {
  public:
-  enum class Tool : std::uint8_t { kScope, kPointer };
+  enum class Tool : std::uint8_t { kScope, kPointer, kSecondSensor };
 
   // Errors name the setting that is out of range, in words of the command line.
   [[nodiscard]] static Expected<BenchScene> create(const BenchSettings& settings);
@@ -68,7 +70,7 @@ class BenchScene {
   // Safe from several threads.
   void render(std::size_t index, std::span<std::uint8_t> image) const;
 
-  // Of both tools at the same times, in order of their arrival.
+  // Of all tools at the same times, in order of their arrival.
   [[nodiscard]] std::size_t reading_count() const noexcept { return arrivals_.size(); }
   [[nodiscard]] TrackerSample reading(Tool tool, std::size_t index, const TrackerNoise& noise) const noexcept;
 
@@ -84,6 +86,7 @@ class BenchScene {
   void time_devices();
   void draw_errors();
   [[nodiscard]] Vector3d touched_W(double t_s) const noexcept;
+  [[nodiscard]] Pose true_pose(Tool tool, Duration since) const noexcept;
 
   // Of unit variance per axis.
   struct Error {
@@ -102,7 +105,7 @@ class BenchScene {
   std::vector<FrameStamp> frames_;
   std::vector<Instant> times_;  // true, of each reading
   std::vector<Instant> arrivals_;
-  std::vector<Error> errors_[2];  // of each tool
+  std::vector<Error> errors_[3];  // of each tool
 };
 
 }  // namespace perimap

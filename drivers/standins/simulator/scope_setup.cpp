@@ -39,6 +39,7 @@ ScopeSetup drawn_setup(std::uint64_t seed, int width_px, int height_px) noexcept
   setup.tracker_offset = from_seconds(uniform(0.005, 0.040));
   setup.tip_T = vector(8.0) + Vector3d(0.0, 0.0, uniform(100.0, 200.0));
   setup.X_IW = {so3_exp(vector(1.5)), vector(250.0)};
+  setup.X_HS2 = {so3_exp(vector(1.2)), vector(20.0) - Vector3d(0.0, 0.0, uniform(30.0, 90.0))};
   return setup;
 }
 
@@ -51,6 +52,7 @@ ScopeSetup turned_setup(const ScopeSetup& setup, const ScopeHeld& held, const Ve
   const Pose X_OC = turned.inverse();
   ScopeSetup result = setup;
   result.X_SC = X_SH * turned * X_HO * X_OC;
+  result.X_SS2 = X_SH * turned * setup.X_HS2;
   const Vector2d arm = held.zoom * (Vector2d(setup.lens.cx, setup.lens.cy) - centre_px);
   const Vector2d place = centre_px + Vector3d(turned.R * Vector3d(arm.x(), arm.y(), 0.0)).head<2>();
   result.lens.fx *= held.zoom;

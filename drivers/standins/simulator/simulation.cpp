@@ -30,7 +30,9 @@ enum Stream : std::uint64_t {
   kTrackerPosition,
   kTrackerRotation,
   kTrackerDropout,
-  kImage
+  kImage,
+  kSecondPosition,
+  kSecondRotation
 };
 
 constexpr std::size_t kBeatsBefore = 8;
@@ -84,6 +86,7 @@ Expected<void> check(const SimulationSettings& s) {
   };
   if (s.width % 2 != 0 || s.height % 2 != 0)
     return fail(fmt::format("size: {}x{} is not even in both directions", s.width, s.height));
+  if (s.second_sensor && !s.held) return fail("second sensor: expected a scope that is turned by some angle");
   if (s.turn && !s.held) return fail("turn: expected a field stop, whose notch tells of it");
   if (s.turn && (s.turn->at < Duration(0) || s.turn->length <= Duration(0))) {
     return fail("turn: expected a time since the start, and a length above 0");
@@ -237,9 +240,13 @@ ScopeSetup Simulation::setup_at(Duration since) const noexcept {
   return held ? turned_setup(setup_, *held, field_stop_at(since).centre_px) : setup_;
 }
 
+FieldStop Simulation::seen_field_stop_at(Duration since) const noexcept {
+  return settings_.second_sensor ? FieldStop{} : field_stop_at(since);
+}
+
 std::unique_ptr<const SceneRenderer> Simulation::renderer_at(Duration since) const {
   return std::make_unique<const SceneRenderer>(setup_at(since).lens, truth_.mesh().triangles, *texture_,
-                                               field_stop_at(since));
+                                               seen_field_stop_at(since));
 }
 
 // Its own period wavers a little.
@@ -274,6 +281,33 @@ void Simulation::read_tracker() {
                                position_error, rotation_error});
     kept = correlation;
     drive = std::sqrt(1.0 - kept * kept);
+  }
+}
+
+// Together with the sensor, and as far off.
+void Simulation::read_second_sensor() {
+  if (!settings_.second_sensor) return;
+  const CounterNoise position(settings_.seed, kSecondPosition);
+  const CounterNoise rotation(settings_.seed, kSecondRotation);
+  const double correlation =
+      settings_.tracker_correlation > Duration(0)
+          ? std::exp(-1.0 / (settings_.tracker_rate_hz * to_seconds(settings_.tracker_correlation)))
+          : 0.0;
+  const double drive = std::sqrt(1.0 - correlation * correlation);
+  for (std::size_t k = 0; k < tracker_stamps_.size(); ++k) {
+    TrackerStamp stamp = tracker_stamps_[k];
+    const Duration since = stamp.source_time + setup_.tracker_offset - start_;
+    const bool stuck = k > 0 && stretch_of(settings_.second_stuck, since) != nullptr;
+    stamp.reads = stuck ? second_stamps_.back().reads : k;
+    stamp.missing = stretch_of(settings_.second_lost, since) != nullptr;
+    stamp.X_WS = stamp.X_WS * setup_at(since).X_SS2;
+    stamp.position_error = normal3(position, k);
+    stamp.rotation_error = normal3(rotation, k);
+    if (k > 0) {
+      stamp.position_error = correlation * second_stamps_[k - 1].position_error + drive * stamp.position_error;
+      stamp.rotation_error = correlation * second_stamps_[k - 1].rotation_error + drive * stamp.rotation_error;
+    }
+    second_stamps_.push_back(stamp);
   }
 }
 
@@ -361,6 +395,7 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   Simulation simulation(settings, start, *std::move(truth), setup, view->surface_W, path);
   simulation.frames_ = std::move(frames);
   simulation.read_tracker();
+  simulation.read_second_sensor();
   simulation.read_ecg(*record, *first_sample);
   simulation.read_respiration();
   simulation.order_arrivals();
@@ -379,11 +414,20 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
 
 TrackerSample Simulation::tracker_sample(std::size_t index, const TrackerNoise& noise) const noexcept {
   const TrackerStamp& stamp = tracker_stamps_[index];
+  return sample_of(stamp, tracker_stamps_[stamp.reads], index, noise);
+}
+
+TrackerSample Simulation::second_sample(std::size_t index, const TrackerNoise& noise) const noexcept {
+  const TrackerStamp& stamp = second_stamps_[index];
+  return sample_of(stamp, second_stamps_[stamp.reads], index, noise);
+}
+
+TrackerSample Simulation::sample_of(const TrackerStamp& stamp, const TrackerStamp& reading, std::size_t index,
+                                    const TrackerNoise& noise) noexcept {
   TrackerSample sample;
   sample.source_time = stamp.source_time;
   sample.arrival = stamp.arrival;
   sample.device_frame = static_cast<std::uint32_t>(index);
-  const TrackerStamp& reading = tracker_stamps_[stamp.reads];
   if (reading.missing) {
     sample.state = ToolState::kMissing;
     sample.X_WS.R.setConstant(std::numeric_limits<double>::quiet_NaN());

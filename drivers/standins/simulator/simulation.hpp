@@ -71,6 +71,10 @@ struct SimulationSettings {
     Duration length = std::chrono::seconds(1);
   };
   std::optional<Turn> turn;
+  // A second tracked sensor, on the scope, tells of the turn: the field stop lies outside the picture then.
+  bool second_sensor = false;
+  std::vector<Stretch> second_lost;   // the tracker does not see it
+  std::vector<Stretch> second_stuck;  // its last reading comes again and again
   bool scope_calibrated =
       true;  // the recording says what follows from a turn, as `perimap calibrate scope` measures it
 };
@@ -127,6 +131,9 @@ class Simulation {
   // While the tool is missing the pose is not a number.
   [[nodiscard]] TrackerSample tracker_sample(std::size_t index, const TrackerNoise& noise) const noexcept;
 
+  // Of the second sensor at the same time, with errors of its own; where there is one.
+  [[nodiscard]] TrackerSample second_sample(std::size_t index, const TrackerNoise& noise) const noexcept;
+
   // All that is true of a frame's camera, its lens as it was held then too.
   [[nodiscard]] CameraTruth camera_truth(const Frame& frame) const noexcept;
 
@@ -148,6 +155,8 @@ class Simulation {
     Vector3d position_error = Vector3d::Zero();  // of unit variance per axis
     Vector3d rotation_error = Vector3d::Zero();
   };
+  [[nodiscard]] static TrackerSample sample_of(const TrackerStamp& stamp, const TrackerStamp& reading,
+                                               std::size_t index, const TrackerNoise& noise) noexcept;
 
   Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeSetup setup, Vector3d surface_W,
              const ScopePath& path);
@@ -155,10 +164,12 @@ class Simulation {
   // The frame whose picture frames()[index] shows: its own, but for a camera that is stuck.
   [[nodiscard]] std::size_t pictured(std::size_t index) const noexcept;
   [[nodiscard]] FieldStop field_stop_at(Duration since) const noexcept;
+  [[nodiscard]] FieldStop seen_field_stop_at(Duration since) const noexcept;
   [[nodiscard]] std::unique_ptr<const SceneRenderer> renderer_at(Duration since) const;
 
   // What the devices deliver, in the order of arrival at the end.
   void read_tracker();
+  void read_second_sensor();
   void read_ecg(const EcgRecord& record, std::uint32_t first_sample);
   void read_respiration();
   void order_arrivals();
@@ -175,6 +186,7 @@ class Simulation {
   std::unique_ptr<const SceneRenderer> turned_renderer_;  // after the turn, if there is one
   std::vector<Frame> frames_;
   std::vector<TrackerStamp> tracker_stamps_;
+  std::vector<TrackerStamp> second_stamps_;  // at the same times
   std::vector<EcgBlock> ecg_;
   std::vector<RespirationBlock> respiration_;
   std::vector<Arrival> arrivals_;

@@ -68,10 +68,11 @@ Expected<std::unique_ptr<PlayedFrames>> Theatre::frames() const {
   });
 }
 
-// A recorded pointer is in the third port, where the example of the guide has it, and an instrument where its name
-// says.
+// A recorded pointer is in the third port, where the example of the guide has it, a second sensor in the fourth, and an
+// instrument where its name says.
 Expected<NdiEmulatorSettings> Theatre::ndi_settings() const {
   constexpr std::uint16_t kPointerPort = 0x0C;
+  constexpr std::uint16_t kSecondSensorPort = 0x0D;
   constexpr std::string_view kInstrument = "instrument/";
   NdiEmulatorSettings ndi = settings_.ndi;
   for (const EmulatedTool& tool : settings_.tools) {
@@ -83,6 +84,7 @@ Expected<NdiEmulatorSettings> Theatre::ndi_settings() const {
   for (auto& [name, track] : session_->tools(start_)) {
     Expected<std::uint16_t> handle = fail("no port");
     if (name == "pointer") handle = kPointerPort;
+    if (name == "second_sensor") handle = kSecondSensorPort;
     if (name.starts_with(kInstrument)) handle = port_handle_of(name.substr(kInstrument.size()));
     if (handle) ndi.tools.try_emplace(*handle, std::move(track));  // a tool that was asked for comes first
   }

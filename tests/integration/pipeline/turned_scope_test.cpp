@@ -87,6 +87,8 @@ struct Trial {
   std::optional<ScopeHeld> turn_to;
   bool calibrated = true;
   int workers = 1;
+  bool second_sensor = false;  // tells the turn, in place of a field stop
+  std::vector<SimulationSettings::Stretch> second_lost = {};
 };
 
 Session session_of(const Trial& trial) {
@@ -99,6 +101,8 @@ Session session_of(const Trial& trial) {
   scene.held = kHeld;
   if (trial.turn_to) scene.turn = SimulationSettings::Turn{kTurnedAt, *trial.turn_to, kTurnTakes};
   scene.scope_calibrated = trial.calibrated;
+  scene.second_sensor = trial.second_sensor;
+  scene.second_lost = trial.second_lost;
   const Simulation simulation = test::simulation_of(scene);
   const TrackerNoise noise{0.5, 0.2 * kDegree};
   PipelineSettings settings = test::settings_for(simulation, noise);
@@ -163,6 +167,29 @@ TEST(TurnedScope, ZoomedTooItStaysRight) {
   EXPECT_GE(zoomed.turns, 1U);
   EXPECT_LT(zoomed.error_mm(0.5), 1.3 * held().error_mm(0.5));
   EXPECT_LT(zoomed.lens_error_px, 1.0) << "whoever draws over the picture is told what the lens was";
+}
+
+TEST(TurnedScope, ASecondSensorTellsItAsWellAndNothingWhileItIsNotSeen) {
+  constexpr Duration kLost = std::chrono::seconds(21);
+  constexpr Duration kSeen = std::chrono::seconds(24);
+  Trial trial{ScopeHeld{95.0 * kDegree, 1.0}};
+  trial.second_sensor = true;
+  trial.second_lost = {{kLost, kSeen - kLost}};
+  const Session turned = session_of(trial);
+  EXPECT_GE(turned.turns, 1U);
+  EXPECT_GT(turned.count(perimap_SURFACE_GOOD, kTurnedAt + std::chrono::seconds(4), kLost), 60);
+  EXPECT_LT(turned.error_mm(0.5), 1.3 * held().error_mm(0.5));
+  EXPECT_LT(turned.error_mm(0.95), 1.3 * held().error_mm(0.95));
+  EXPECT_LT(turned.lens_error_px, 1.0);
+  // But for the poses that are carried on by 20 ms from the last ones.
+  const Duration gone = kLost + std::chrono::milliseconds(100);
+  // The last ones are released when it is seen again.
+  EXPECT_EQ(turned.count(perimap_SURFACE_GOOD, gone, kSeen - std::chrono::milliseconds(100)), 0);
+  for (const CollectedSurface& surface : turned.surfaces) {
+    if (!turned.within(surface, gone, kSeen)) continue;
+    EXPECT_FALSE(surface.head.camera_pose_known);
+  }
+  EXPECT_GT(turned.count(perimap_SURFACE_GOOD, kSeen + std::chrono::seconds(1), kLength), 60) << "seen again";
 }
 
 TEST(TurnedScope, NoSurfaceIsGoodWhereNobodyCalibratedThat) {

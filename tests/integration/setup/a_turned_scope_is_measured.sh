@@ -1,10 +1,11 @@
 #!/bin/bash
 # An angled scope, calibrated at three turns through pictures and verified at a fourth; a session in which it is turned is
-# as good by the measured function of the turn, within 1.5 times, as by the true one.
-# a_turned_scope_is_measured.sh PERIMAP PERIMAPD WORK_FOLDER SEED
+# as good by the measured function of the turn, within 1.5 times, as by the true one. The turn is told by the field stop in
+# the pictures, or by a second tracked sensor.
+# a_turned_scope_is_measured.sh PERIMAP PERIMAPD WORK_FOLDER SEED field-stop|second-sensor
 set -euo pipefail
 . "$(dirname "$0")/../figures.sh"
-perimap=$1 perimapd=$2 work=$3 seed=$4
+perimap=$1 perimapd=$2 work=$3 seed=$4 told_by=$5
 rm -rf "$work"
 mkdir -p "$work"
 cd "$work"
@@ -19,6 +20,11 @@ settled() { tr -d ' \n' < "$1" | grep -o '"settled_error":{[^}]*' | grep -o "\"$
 times() { awk -v a="$1" -v b="$2" 'BEGIN { print a * b }'; }
 
 common=(--setup-seed "$seed" --size 640x480)
+by=()
+if [ "$told_by" = second-sensor ]; then
+  common+=(--second-sensor)
+  by=(--by-second-sensor)
+fi
 
 # ---- measured through pictures
 quiet setup --output devices.toml --camera none --tracker none --ecg none --seconds 0
@@ -33,9 +39,10 @@ done
 quiet calibrate camera --from board0.mcap --square-mm 8 --output camera.yaml --configuration devices.toml
 quiet calibrate hand-eye --from board0.mcap --square-mm 8 --configuration devices.toml
 sed -i 's/^# *position_deviation_mm = .*/position_deviation_mm = 1.4/; s/^# *rotation_deviation_deg = .*/rotation_deviation_deg = 0.5/' devices.toml
-quiet calibrate scope "${at[@]}" --output scope.json --configuration devices.toml --json
+quiet calibrate scope "${at[@]}" "${by[@]}" --output scope.json --configuration devices.toml --json
 grep -q '^turned_scope = "scope.json"' devices.toml || fail "the configuration does not name the scope: $(cat devices.toml)"
 at_most "left over, degrees" "$(number scope.json left_over_deg)" 0.4
+at_most "held aside, mm" "$(number scope.json aside_mm)" 3
 at_most "deviation of the hand-eye, mm" "$(number scope.json translation_mm_deviation)" 1.5
 quiet check devices.toml
 quiet simulate heart.mcap "${common[@]}" --seed "$seed" --duration 40 --field-stop 40 --turn-to 95 --turn-at 20
@@ -50,6 +57,23 @@ quiet verify devices.toml --from check.mcap --square-mm 8 --bound-mm 2.5
 sed '/^turned_scope/d' devices.toml > as_it_was.toml
 if "$perimap" verify as_it_was.toml --from check.mcap --square-mm 8 --bound-mm 2.5 > out 2> errors; then
   fail "verify lets the hand-eye of another turn pass: $(cat out)"
+fi
+
+if [ "$told_by" = second-sensor ]; then
+  # ---- without the sensor that tells the turn: refused
+  quiet simulate alone.mcap --setup-seed "$seed" --size 640x480 --seed "$seed" --duration 5
+  if "$perimap" replay alone.mcap --lockstep -c devices.toml > out 2> errors; then fail "a recording without it is replayed"; fi
+  grep -q "devices.toml: key 'camera.turned_scope': expected one that is read in the pictures" errors || fail "$(cat errors)"
+  sed 's/^protocol = "none"/protocol = "ndi"\nport = "tcp:127.0.0.1:9"/' devices.toml > unnamed.toml
+  if "$perimap" check unnamed.toml > out 2> errors; then fail "check takes a tracker without it"; fi
+  grep -q "unnamed.toml: key 'tracker.second_sensor': expected" errors || fail "$(cat errors)"
+  # Two at the same turn.
+  if "$perimap" calibrate scope --by-second-sensor --at board0.mcap hand-eye0.json camera0.yaml --at board0.mcap \
+    hand-eye0.json camera0.yaml --at board0.mcap hand-eye0.json camera0.yaml > out 2> errors; then
+    fail "three calibrations at one turn are taken: $(cat out)"
+  fi
+  grep -q "the second sensor turned by 0.*at most" errors || fail "$(cat errors)"
+  exit 0
 fi
 
 # ---- of another camera, or of another sensor: refused, also by a configuration that names no devices

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <string>
 
 namespace perimap {
@@ -39,6 +40,53 @@ TEST(TurnedScopeFile, IsReadBackAsItWasWritten) {
     EXPECT_LT((before.principal_px - after.principal_px).norm(), 1e-9);
     EXPECT_LT((made().lens_at(turn, 214.0)->focal_px - read->lens_at(turn, 214.0)->focal_px).norm(), 1e-9);
   }
+}
+
+TurnedScope sensed() {
+  TurnedScope scope = made();
+  scope.focals.clear();
+  scope.second_sensor = SecondSensor{so3_exp({0.4, 0.2, -0.9}), Vector3d(0.3, -0.2, 0.9).normalized(), 0.002};
+  return scope;
+}
+
+TEST(TurnedScopeFile, ASecondSensorIsReadBack) {
+  const auto read = parse_turned_scope(format_turned_scope(sensed()), "scope.json");
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_TRUE(read->second_sensor);
+  const Matrix3d R_S2 = so3_exp(1.2 * sensed().second_sensor->axis_S) * sensed().second_sensor->reference_S2;
+  EXPECT_NEAR(read->second_sensor->rotation_rad(R_S2), 1.2, 1e-9);
+  EXPECT_FALSE(parse_turned_scope(format_turned_scope(made()), "scope.json")->second_sensor);
+}
+
+TEST(TurnedScopeFile, GarbledSecondSensorsAreRefusedByFileAndKey) {
+  const nlohmann::json good = nlohmann::json::parse(format_turned_scope(sensed()));
+  struct Garbled {
+    const char* key;
+    const char* value;
+  };
+  for (const Garbled& garbled : {Garbled{"reference_rotation_wxyz", "[1, 0, 0]"},
+                                 {"reference_rotation_wxyz", "[0.5, 0, 0, 0]"},
+                                 {"reference_rotation_wxyz", "[\"1\", 0, 0, 0]"},
+                                 {"axis", "[0, 0, 0]"},
+                                 {"axis", "[1e300, 0, 0]"},
+                                 {"axis", "null"},
+                                 {"left_over_deg", "\"0\""}}) {
+    nlohmann::json text = good;
+    text["turned_scope"]["second_sensor"][garbled.key] = nlohmann::json::parse(garbled.value);
+    const auto read = parse_turned_scope(text.dump(), "scope.json");
+    ASSERT_FALSE(read) << garbled.key << " " << garbled.value;
+    EXPECT_THAT(read.error().message,
+                HasSubstr(std::string("scope.json: key 'turned_scope.second_sensor.") + garbled.key + "'"));
+  }
+  for (const char* value : {"3", "[]", "true", "\"second\""}) {
+    nlohmann::json text = good;
+    text["turned_scope"]["second_sensor"] = nlohmann::json::parse(value);
+    EXPECT_THAT(parse_turned_scope(text.dump(), "scope.json").error().message, HasSubstr("second_sensor")) << value;
+  }
+  nlohmann::json text = nlohmann::json::parse(format_turned_scope(made()));
+  text["turned_scope"]["second_sensor"] = good["turned_scope"]["second_sensor"];
+  EXPECT_THAT(parse_turned_scope(text.dump(), "scope.json").error().message, HasSubstr("no rows beside"))
+      << "zoom is read where the field stop is";
 }
 
 TEST(TurnedScopeFile, GarbledOnesAreRefusedByFileAndKey) {

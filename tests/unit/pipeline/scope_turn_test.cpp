@@ -57,7 +57,7 @@ struct Turned : ::testing::Test {
     return reading;
   }
   bool frame(double deg) {
-    turn.take(NotchReading{deg * kDegree, kRead_rad});
+    turn.take(TurnReading{deg * kDegree, kRead_rad});
     return turn.state().has_value();
   }
   bool unread() {
@@ -245,7 +245,7 @@ struct Watched : ::testing::Test {
   int frames(int count, const std::vector<std::uint8_t>& pixels) {
     int known = 0;
     for (int i = 0; i < count; ++i) {
-      last = watch.begin_frame(frame, {pixels.data(), 320, 240, 320});
+      last = watch.begin_frame(frame, Instant(), {pixels.data(), 320, 240, 320});
       known += last.state ? 1 : 0;
       watch.offer(frame++, rate, {pixels.data(), 320, 240, 320});
     }

@@ -80,6 +80,30 @@ TEST_F(CalibrationFit, AHandEyeOfAnotherSensorIsRefused) {
   EXPECT_FALSE(calibrations_fit(configuration_)) << "names are names";
 }
 
+TEST_F(CalibrationFit, AScopeWhoseTurnASecondSensorTellsTakesThatSensor) {
+  TurnedScope scope;
+  scope.reference.focal_px = {80.0, 80.0};
+  scope.width = 64, scope.height = 48;
+  scope.second_sensor.emplace();
+  std::string text = format_turned_scope(scope);
+  text.insert(text.find('{') + 1, R"("second_sensor": "0C",)");
+  configuration_.camera.calibration = write("camera.yaml", format_calibration(lens()));
+  configuration_.camera.turned_scope = write("scope.json", text);
+  const auto unnamed = calibrations_fit(configuration_);
+  ASSERT_FALSE(unnamed) << "no frame would have a pose";
+  EXPECT_THAT(unnamed.error().message, HasSubstr("key 'tracker.second_sensor': expected \"0C\""));
+  configuration_.tracker.second_sensor = "0D";
+  const auto other = calibrations_fit(configuration_);
+  ASSERT_FALSE(other);
+  EXPECT_THAT(other.error().message, HasSubstr("got \"0D\""));
+  configuration_.tracker.second_sensor = "c";
+  const auto fits = calibrations_fit(configuration_);
+  EXPECT_TRUE(fits) << fits.error().message;
+  configuration_.tracker.second_sensor.reset();
+  configuration_.tracker.protocol = TrackerConfiguration::Protocol::kNone;
+  EXPECT_TRUE(calibrations_fit(configuration_)) << "a recording says itself whether it has one";
+}
+
 TEST_F(CalibrationFit, AScopeOfAnotherSensorOrOfOtherPicturesIsRefused) {
   TurnedScope scope;
   scope.reference.focal_px = {80.0, 80.0};

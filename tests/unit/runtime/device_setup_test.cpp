@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "daemon/config/tracked_tools.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/video/video_module.hpp"
 
@@ -54,6 +55,30 @@ TEST(DeviceSetup, AHandEyeOfAnotherSensorIsRefused) {
   ASSERT_FALSE(setup);
   EXPECT_TRUE(setup.error().error.message.starts_with("devices.toml: key 'tracker.hand_eye_sensor': "))
       << setup.error().error.message;
+}
+
+// Their readings come by where they stand among those that the driver was asked for.
+TEST(DeviceSetup, ASecondSensorIsAmongTheToolsInTheirOrder) {
+  TrackerConfiguration tracker;
+  tracker.protocol = TrackerConfiguration::Protocol::kNdi;
+  tracker.port = "tcp:127.0.0.1:1";
+  tracker.sensor = "0A";
+  tracker.pointer = "0C";
+  tracker.second_sensor = "0D";
+  tracker.instruments = {"0E"};
+  const auto ndi = tracker_device(tracker);
+  ASSERT_TRUE(ndi) << ndi.error().message;
+  const auto second = second_sensor_of(ndi->tools);
+  ASSERT_EQ(second, 2U);
+  EXPECT_EQ(std::get<NdiSettings>(ndi->settings).tools.at(*second - 1).handle, 0x0D);
+  tracker.protocol = TrackerConfiguration::Protocol::kIgtl;
+  const auto igtl = tracker_device(tracker);
+  ASSERT_TRUE(igtl) << igtl.error().message;
+  EXPECT_EQ(std::get<IgtlSettings>(igtl->settings).tools.at(*second_sensor_of(igtl->tools) - 1), "0D");
+  tracker.second_sensor = "0C";
+  const auto twice = tracker_device(tracker);
+  ASSERT_FALSE(twice);
+  EXPECT_TRUE(twice.error().message.starts_with("key 'tracker.second_sensor': expected another tool than"));
 }
 
 TEST(DeviceSetup, OneToolIsNotTwo) {

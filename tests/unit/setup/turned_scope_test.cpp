@@ -33,7 +33,7 @@ struct Built {
 
 TEST(TurnedScope, IsKnownAtTurnsThatNobodyMeasured) {
   const Built scope;
-  const auto fitted = fit_turned_scope({scope.at(0.1), scope.at(1.2)}, {320.0, 240.0});
+  const auto fitted = fit_turned_scope({scope.at(0.1), scope.at(1.2)}, Vector2d(320.0, 240.0));
   ASSERT_TRUE(fitted) << fitted.error().message;
   EXPECT_FALSE(fitted->sensor_on_scope);
   EXPECT_NEAR(fitted->axis_S.dot(scope.X_SH.R.col(2)), 1.0, 1e-9);
@@ -50,7 +50,7 @@ TEST(TurnedScope, PrincipalPointIsThatOfAllSetUps) {
   const Built scope;
   SetupAtRotation off = scope.at(0.1);
   off.principal_px += Vector2d(3.0, 0.0);
-  const auto fitted = fit_turned_scope({off, scope.at(1.2), scope.at(2.5)}, {320.0, 240.0});
+  const auto fitted = fit_turned_scope({off, scope.at(1.2), scope.at(2.5)}, Vector2d(320.0, 240.0));
   ASSERT_TRUE(fitted) << fitted.error().message;
   EXPECT_NEAR((fitted->at(0.7).principal_px - scope.at(0.7).principal_px).norm(), 1.0, 1e-9) << "a third of it";
 }
@@ -59,10 +59,10 @@ TEST(TurnedScope, HalfATurnIsFittedTheRightWayRound) {
   const Built scope;
   SetupAtRotation half = scope.at(3.14);
   half.rotation_rad = -3.14;  // as the notch may say it
-  const auto fitted = fit_turned_scope({scope.at(0.0), scope.at(1.5), half}, {320.0, 240.0});
+  const auto fitted = fit_turned_scope({scope.at(0.0), scope.at(1.5), half}, Vector2d(320.0, 240.0));
   ASSERT_TRUE(fitted) << fitted.error().message;
   EXPECT_GT(fitted->axis_S.dot(scope.X_SH.R.col(2)), 0.999);
-  const auto alone = fit_turned_scope({scope.at(0.0), half}, {320.0, 240.0});
+  const auto alone = fit_turned_scope({scope.at(0.0), half}, Vector2d(320.0, 240.0));
   ASSERT_FALSE(alone);
   EXPECT_THAT(alone.error().message, HasSubstr("which way"));
 }
@@ -72,7 +72,7 @@ TEST(TurnedScope, SensorOnTheScopeIsTold) {
   const auto at = [&](double theta) {
     return SetupAtRotation{theta, X_SO * Pose{so3_exp(Vector3d(0.0, 0.0, -theta)), Vector3d::Zero()}, {320.0, 240.0}};
   };
-  const auto fitted = fit_turned_scope({at(0.0), at(0.9), at(-1.1)}, {320.0, 240.0});
+  const auto fitted = fit_turned_scope({at(0.0), at(0.9), at(-1.1)}, Vector2d(320.0, 240.0));
   ASSERT_TRUE(fitted) << fitted.error().message;
   EXPECT_TRUE(fitted->sensor_on_scope);
   EXPECT_LT((fitted->at(2.0).X_SC.R - at(2.0).X_SC.R).norm(), 1e-9);
@@ -81,12 +81,14 @@ TEST(TurnedScope, SensorOnTheScopeIsTold) {
 
 TEST(TurnedScope, WhatIsMissingIsSaid) {
   const Built scope;
-  EXPECT_THAT(fit_turned_scope({scope.at(0.1)}, {}).error().message, HasSubstr("two turns"));
-  EXPECT_THAT(fit_turned_scope({scope.at(0.1), scope.at(0.2)}, {}).error().message, HasSubstr("20 degrees apart"));
+  EXPECT_THAT(fit_turned_scope({scope.at(0.1)}, Vector2d(320.0, 240.0)).error().message, HasSubstr("two turns"));
+  EXPECT_THAT(fit_turned_scope({scope.at(0.1), scope.at(0.2)}, Vector2d(320.0, 240.0)).error().message,
+              HasSubstr("20 degrees apart"));
   // As of a sensor that came loose: the picture turned by 0.5 rad more than the notch.
   SetupAtRotation other = scope.at(2.0);
   other.X_SC.R = other.X_SC.R * so3_exp({0.0, 0.0, 0.5});
-  EXPECT_THAT(fit_turned_scope({scope.at(0.1), other}, {}).error().message, HasSubstr("do not turn with the scope"));
+  EXPECT_THAT(fit_turned_scope({scope.at(0.1), other}, Vector2d(320.0, 240.0)).error().message,
+              HasSubstr("do not turn with the scope"));
 }
 
 // Set-ups that are off by their own deviations leave a function that is off by those that it tells.
@@ -115,7 +117,7 @@ TEST(TurnedScope, DeviationsAreThoseOfWhatIsTold) {
           Vector3d::Constant(kTranslation_mm * kTranslation_mm);
       setups.push_back(setup);
     }
-    const auto fitted = fit_turned_scope(setups, {320.0, 240.0});
+    const auto fitted = fit_turned_scope(setups, Vector2d(320.0, 240.0));
     ASSERT_TRUE(fitted) << fitted.error().message;
     told = *fitted;
     axis += (fitted->axis_S - scope.X_SH.R.col(2)).squaredNorm() / kTrials;

@@ -1,0 +1,151 @@
+#include "core/calibration/fit_by_second_sensor.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "core/angle/angle.hpp"
+#include "core/calibration/residual_correlation.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr double kLeastTurn_rad = 20.0 * kDegree;
+
+Matrix3d mean_of(const std::vector<Matrix3d>& rotations) {
+  Matrix3d mean = rotations.front();
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds; ++round) {
+    Vector3d off = Vector3d::Zero();
+    for (const Matrix3d& R : rotations) off += so3_log(mean.transpose() * R) / static_cast<double>(rotations.size());
+    mean = mean * so3_exp(off);
+  }
+  return mean;
+}
+
+// Of what the pairs of readings tell within each second.
+struct Seconds {
+  std::vector<Matrix3d> R_S2;
+  std::size_t pairs = 0;
+};
+
+Seconds means_over_seconds(const std::vector<TimedPose>& sensor, const std::vector<TimedPose>& second) {
+  constexpr double kLong_s = 1.0;
+  constexpr std::size_t kFewestPairs = 5;
+  const double gap_s = longest_gap_s(sensor);
+  Seconds seconds;
+  std::vector<Matrix3d> within;
+  double begin_s = 0.0;
+  const auto end_second = [&] {
+    if (within.size() >= kFewestPairs) seconds.R_S2.push_back(mean_of(within));
+    within.clear();
+  };
+  for (const TimedPose& pose : second) {
+    const auto at = pose_at(sensor, pose.t_s, gap_s);
+    if (!at) continue;
+    if (!within.empty() && pose.t_s >= begin_s + kLong_s) end_second();
+    if (within.empty()) begin_s = pose.t_s;
+    within.emplace_back(at->X.R.transpose() * pose.X.R);
+    ++seconds.pairs;
+  }
+  end_second();
+  return seconds;
+}
+
+// The axis of all turns from the first relation, those that turn farther counting more.
+Expected<SecondSensor> axis_of(const std::vector<HeldRelation>& held) {
+  SecondSensor second;
+  second.reference_S2 = held.front().R_S2;
+  Matrix3d products = Matrix3d::Zero();
+  double widest_rad = 0.0;
+  for (const HeldRelation& relation : held) {
+    const Vector3d turn = so3_log(relation.R_S2 * second.reference_S2.transpose());
+    products += turn * turn.transpose();
+    widest_rad = std::max(widest_rad, turn.norm());
+  }
+  if (widest_rad < kLeastTurn_rad) {
+    return fail("the second sensor turned by " + std::to_string(widest_rad / kDegree) +
+                " degrees at most in the frame of the first: one must be fast on the camera head and the other one on "
+                "the scope, and the scope be held at turns 20 degrees apart and more, better 60");
+  }
+  second.axis_S = Eigen::SelfAdjointEigenSolver<Matrix3d>(products).eigenvectors().col(2);
+  double squares = 0.0;
+  for (const HeldRelation& relation : held) squares += std::pow(second.aside_rad(relation.R_S2), 2.0);
+  second.left_over_rad = std::sqrt(squares / static_cast<double>(held.size() - 1));
+  constexpr double kMost_rad = 2.0 * kDegree;
+  if (second.left_over_rad > kMost_rad) {
+    return fail("the second sensor does not turn about one axis in the frame of the first (" +
+                std::to_string(second.left_over_rad / kDegree) +
+                " degrees RMS are left over): one must be fast on the camera head, the other one on the scope");
+  }
+  return second;
+}
+
+}  // namespace
+
+Expected<HeldRelation> held_relation(const std::vector<TimedPose>& sensor, const std::vector<TimedPose>& second) {
+  constexpr std::size_t kFewest = 5;
+  const Seconds seconds = means_over_seconds(sensor, second);
+  HeldRelation held;
+  held.pairs = seconds.pairs;
+  if (seconds.R_S2.size() < kFewest) {
+    return fail("the two sensors are seen together for " + std::to_string(seconds.R_S2.size()) +
+                " seconds only: keep both in sight of the tracker for five and more");
+  }
+  held.R_S2 = mean_of(seconds.R_S2);
+  std::vector<double> off_axis[3];
+  double squares = 0.0;
+  double farthest_rad = 0.0;
+  for (const Matrix3d& R : seconds.R_S2) {
+    const Vector3d off = so3_log(held.R_S2.transpose() * R);
+    for (int k = 0; k < 3; ++k) off_axis[k].push_back(off[k]);
+    squares += off.squaredNorm();
+    farthest_rad = std::max(farthest_rad, off.norm());
+  }
+  const auto count = static_cast<double>(seconds.R_S2.size());
+  held.spread_rad = std::sqrt(squares / (3.0 * (count - 1.0)));
+  // Slow errors are common to seconds that follow each other.
+  double length = 0.0;
+  for (const std::vector<double>& off : off_axis) length += correlation_length(off) / 3.0;
+  held.deviation_rad = held.spread_rad * std::sqrt(std::max(1.0, length) / count);
+  constexpr double kHeld_rad = 3.0 * kDegree;
+  if (farthest_rad > kHeld_rad) {
+    return fail("the scope was turned in its camera head meanwhile, or a sensor is loose (" +
+                std::to_string(farthest_rad / kDegree) +
+                " degrees off the mean for a second): hold it at one turn, and record again");
+  }
+  return held;
+}
+
+Expected<TurnedScope> fit_by_second_sensor(std::vector<SetupAtRotation> setups, const std::vector<HeldRelation>& held) {
+  constexpr std::size_t kFewest = 3;
+  if (setups.size() < kFewest || setups.size() != held.size()) {
+    return fail(
+        "set-ups at three turns of the scope are needed, 20 degrees apart and more, better 60: turn the scope in its "
+        "camera head, and measure lens and hand-eye again");
+  }
+  auto second = axis_of(held);
+  if (!second) return tl::unexpected(second.error());
+  Expected<TurnedScope> best = fail("");
+  for (const double way : {1.0, -1.0}) {
+    SecondSensor turned = *second;
+    turned.axis_S *= way;
+    for (std::size_t i = 0; i < setups.size(); ++i) {
+      setups[i].rotation_rad = turned.rotation_rad(held[i].R_S2);
+      setups[i].rotation_deviation_rad = held[i].deviation_rad;
+      setups[i].radius_px = 0.0;  // nobody looks for a field stop
+    }
+    auto scope = fit_turned_scope(setups, std::nullopt);
+    if (scope && (!best || scope->rotation_rms_deg < best->rotation_rms_deg)) {
+      scope->second_sensor = turned;
+      best = *std::move(scope);
+    } else if (!scope && !best && best.error().message.empty()) {
+      best = tl::unexpected(scope.error());
+    }
+  }
+  return best;
+}
+
+}  // namespace perimap
