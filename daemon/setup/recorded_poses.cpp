@@ -27,15 +27,27 @@ std::string tools_of(const RecordingReader& reader) {
   return tools.empty() ? "of no tool" : tools;
 }
 
+std::string channel_of(const std::string& tool) {
+  return tool == kScopeTool ? std::string(channels::kTrackerPose) : std::string(channels::kTrackedTools) + tool;
+}
+
+bool has_channel(const RecordingReader& reader, const std::string& channel) {
+  const auto recorded = reader.channels();
+  return std::any_of(recorded.begin(), recorded.end(), [&](const RecordedChannel& c) { return c.name == channel; });
+}
+
 }  // namespace
+
+Expected<bool> has_recorded_poses(const std::string& recording, const std::string& tool) {
+  return RecordingReader::open(recording).map(
+      [&](const RecordingReader& reader) { return has_channel(reader, channel_of(tool)); });
+}
 
 Expected<std::vector<TimedPose>> read_recorded_poses(const std::string& recording, const std::string& tool) {
   auto reader = RecordingReader::open(recording);
   if (!reader) return tl::unexpected(reader.error());
-  const std::string channel =
-      tool == kScopeTool ? std::string(channels::kTrackerPose) : std::string(channels::kTrackedTools) + tool;
-  const auto recorded = reader->channels();
-  if (std::none_of(recorded.begin(), recorded.end(), [&](const RecordedChannel& c) { return c.name == channel; })) {
+  const std::string channel = channel_of(tool);
+  if (!has_channel(*reader, channel)) {
     return fail(fmt::format("{}: has no poses of '{}' (it has those of: {}); name the tool with --tool, or record it",
                             recording, tool, tools_of(*reader)));
   }

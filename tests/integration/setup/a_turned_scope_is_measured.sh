@@ -64,7 +64,7 @@ if [ "$told_by" = second-sensor ]; then
   quiet simulate alone.mcap --setup-seed "$seed" --size 640x480 --seed "$seed" --duration 5
   if "$perimap" replay alone.mcap --lockstep -c devices.toml > out 2> errors; then fail "a recording without it is replayed"; fi
   grep -q "devices.toml: key 'camera.turned_scope': expected one that is read in the pictures" errors || fail "$(cat errors)"
-  sed 's/^protocol = "none"/protocol = "ndi"\nport = "tcp:127.0.0.1:9"/' devices.toml > unnamed.toml
+  sed '/^\[tracker\]/,/^\[/ s/^protocol = "none"/protocol = "ndi"\nport = "tcp:127.0.0.1:9"/' devices.toml > unnamed.toml
   if "$perimap" check unnamed.toml > out 2> errors; then fail "check takes a tracker without it"; fi
   grep -q "unnamed.toml: key 'tracker.second_sensor': expected" errors || fail "$(cat errors)"
   # Two at the same turn.
