@@ -101,8 +101,19 @@ Samples read_samples(const std::string& file, const RecordedTruth& truth) {
 // How far from the truth each position of a printed frame is, in px.
 struct Off {
   std::vector<double> px;
-  double camera_mm = 0.0;  // the largest
+  std::vector<double> converged_px;  // of those that are converged; others may be what moves otherwise, as a field stop
+  double camera_mm = 0.0;            // the largest
 };
+
+// As the scope was turned and zoomed then.
+CameraModel lens_at(const RecordedTruth& truth, Instant capture) {
+  CameraModel lens = truth.camera;
+  const CameraTruth* camera = truth.truth.camera(capture);
+  if (camera == nullptr || !(camera->focal_px.x() > 0.0)) return lens;
+  lens.fx = camera->focal_px.x(), lens.fy = camera->focal_px.y();
+  lens.cx = camera->principal_px.x(), lens.cy = camera->principal_px.y();
+  return lens;
+}
 
 void judge_frame(const nlohmann::json& frame, const RecordedTruth& truth, const Samples& samples, Off& off) {
   const auto sequence = frame["frame_sequence"].get<std::uint64_t>();
@@ -117,13 +128,14 @@ void judge_frame(const nlohmann::json& frame, const RecordedTruth& truth, const 
     const Instant seen = first->second.first + *samples.to_recording;
     const auto seen_from = truth.truth.camera_pose(seen);
     Vector3d ray_C;
-    if (!seen_from || !truth.camera.unproject(first->second.second, ray_C)) continue;
+    if (!seen_from || !lens_at(truth, seen).unproject(first->second.second, ray_C)) continue;
     const auto point = truth.truth.first_hit(*seen_from, ray_C, seen);
     if (!point) continue;
     Vector2d px;
-    if (truth.camera.project(X_WC.inverse() * truth.truth.position(*point, capture), px) != ProjectionStatus::kOk)
-      continue;
+    const Vector3d p_C = X_WC.inverse() * truth.truth.position(*point, capture);
+    if (lens_at(truth, capture).project(p_C, px) != ProjectionStatus::kOk) continue;
     off.px.push_back((px - Vector2d(feature["u"].get<double>(), feature["v"].get<double>())).norm());
+    if (feature["state"] == "converged") off.converged_px.push_back(off.px.back());
   }
 }
 
@@ -159,13 +171,16 @@ int judge(const std::string& recording, const std::string& samples_file, const s
       judge_frame(last, truth, samples, off);
     }
   }
-  std::sort(off.px.begin(), off.px.end());
-  if (off.px.size() < 200)
-    throw std::runtime_error(fmt::format("only {} positions were drawn in {} frames", off.px.size(), frames));
+  for (auto* px : {&off.px, &off.converged_px}) std::sort(px->begin(), px->end());
+  if (off.converged_px.size() < 200) {
+    throw std::runtime_error(fmt::format("only {} positions were drawn in {} frames, {} of them converged",
+                                         off.px.size(), frames, off.converged_px.size()));
+  }
   const double median = off.px[off.px.size() / 2];
-  const double most = off.px[off.px.size() * 95 / 100];
+  const double most = off.converged_px[off.converged_px.size() * 95 / 100];
   fmt::print(
-      "{} frames, {} refused, {} positions, off by {:.2f} px (median), {:.2f} px (95 %), camera by {:.1f} mm at most\n",
+      "{} frames, {} refused, {} positions, off by {:.2f} px (median), {:.2f} px (95 % of converged ones), camera by "
+      "{:.1f} mm at most\n",
       frames, refused, off.px.size(), median, most, off.camera_mm);
   if (refused == 0 || refused == frames)
     throw std::runtime_error("it must refuse until there is a map, and draw from then on");
