@@ -59,9 +59,8 @@ bool BeatDecision::chaotic(Instant now) const noexcept {
 
 bool BeatDecision::in_burst(Instant now) const noexcept {
   if (!beats_.known() || !clusters_.any_settled()) return false;
-  const double noise = disturbed(now);
   const bool beats_come = now - familiar_at_ < settings_.beats_come;
-  return noise > (beats_come ? settings_.much_noise : settings_.burst);
+  return disturbed(now) > (beats_come ? settings_.much_noise : settings_.burst);
 }
 
 bool BeatDecision::noisy(Instant now) const noexcept {
@@ -84,14 +83,14 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
     const Duration apart = candidate.time - other.time;
     if (apart >= one_complex || -apart >= one_complex) continue;
     if (candidate.energy < settings_.larger * other.energy) return;
-    remove_at(i--);
+    remove(i--, 1);
   }
   if (count_ == BeatPath::kMost) {
     const auto least = std::min_element(waiting_.begin(), waiting_.end(), [](const Waiting& a, const Waiting& b) {
       return a.probability < b.probability;
     });
     refuse(*least);
-    remove_at(static_cast<int>(least - waiting_.begin()));
+    remove(static_cast<int>(least - waiting_.begin()), 1);
   }
   Waiting waiting;
   waiting.candidate = candidate;
@@ -208,9 +207,13 @@ bool BeatDecision::unknown_in_noise(const Waiting& waiting) const noexcept {
 }
 
 // Like a settled kind that looks like a QRS complex.
-bool BeatDecision::familiar(const Waiting& waiting) const noexcept {
+bool BeatDecision::of_settled_beats(const Waiting& waiting) const noexcept {
   return clusters_.settled(waiting.cluster) && waiting.correlation >= settings_.familiar &&
-         clusters_.log_odds(waiting.cluster) > 0.0 && !unlike_any_beat(waiting.candidate);
+         clusters_.log_odds(waiting.cluster) > 0.0;
+}
+
+bool BeatDecision::familiar(const Waiting& waiting) const noexcept {
+  return of_settled_beats(waiting) && !unlike_any_beat(waiting.candidate);
 }
 
 // The line goes to another level, or what is too fast for a heart is nearly as large: an electrode that moves, arcs.
@@ -358,7 +361,7 @@ void BeatDecision::decide(Instant now, bool ending) noexcept {
   }
   while (count_ > 0 && (ending || now - waiting_[0].candidate.time > settings_.too_late)) {
     refuse(waiting_[0]);
-    remove_first(1);
+    remove(0, 1);
   }
 }
 
@@ -378,7 +381,7 @@ void BeatDecision::accept(int index, Instant now) noexcept {
     }
   }
   tell(accepted, now);
-  remove_first(index + 1);
+  remove(0, index + 1);
   weigh(now);
 }
 
@@ -391,26 +394,24 @@ void BeatDecision::note_disturbance(Instant t, double weight) noexcept {
   disturbed_at_ = std::max(t, disturbed_at_);
 }
 
-// What is seen for the first time or in a burst may be anything, however much it looks like a beat.
-double BeatDecision::confidence(const Waiting& waiting, bool familiar, Instant now) const noexcept {
-  const double noise = disturbed(now);
-  const bool settled = familiar && now - clusters_.born(waiting.cluster) > settings_.longer_than_bursts &&
-                       clusters_.settled(waiting.cluster);
-  const bool young = !settled && now - since_ > settings_.longer_than_bursts;
-  // An arc that looks like a beat comes at any time, and hardly as large as one.
-  const double rr_s = has_last_ ? to_seconds(waiting.candidate.time - last_.time) : rhythm_.cycle_s;
-  const bool another = waiting.correlation < settings_.very_familiar ||
-                       std::abs(std::log(std::max(waiting.gain, 1e-3))) > settings_.same_gain;
-  const bool out_of_place = rr_s < (another ? settings_.early : settings_.very_early) * rhythm_.cycle_s;
-  const bool early_in_noise = another && noise > settings_.much_noise && rr_s < settings_.before_due * rhythm_.cycle_s;
-  if (early_in_noise) return std::min(waiting.probability, settings_.early_in_noise);
-  if (unknown_in_noise(waiting)) return std::min(waiting.probability, settings_.lost_in_noise);
-  // A P wave that is not conducted, where every second one is.
-  const bool may_be_followed = clusters_.followers(waiting.cluster) >= settings_.followed_by_chance;
-  const bool doubtful = young || may_be_followed || unlike_any_beat(waiting.candidate) ||
-                        (!familiar && clusters_.any_recurs()) || noise > settings_.burst || out_of_place ||
-                        (noise > settings_.some_noise && !settled);
-  return doubtful ? std::min(waiting.probability, settings_.doubtful) : waiting.probability;
+BeatCircumstances BeatDecision::circumstances(const Waiting& waiting, bool familiar, Instant now) const noexcept {
+  BeatCircumstances beat;
+  beat.probability = waiting.probability;
+  beat.correlation = waiting.correlation;
+  beat.gain = waiting.gain;
+  if (has_last_ && rhythm_.cycle_s > 0.0) {
+    beat.of_cycle = to_seconds(waiting.candidate.time - last_.time) / rhythm_.cycle_s;
+  }
+  beat.spread = rhythm_.spread;
+  beat.disturbed = disturbed(now);
+  beat.familiar = familiar;
+  beat.long_known = familiar && now - clusters_.born(waiting.cluster) > settings_.longer_than_bursts;
+  beat.any_known = clusters_.any_recurs();
+  beat.heard_for_long = now - since_ > settings_.longer_than_bursts;
+  beat.unlike_any_beat = unlike_any_beat(waiting.candidate);
+  beat.may_be_followed = clusters_.followers(waiting.cluster) >= settings_.followed_by_chance;
+  beat.lost_in_noise = unknown_in_noise(waiting);
+  return beat;
 }
 
 // Beats in a row that are alike, and of no kind known from before: the gain or the conduction has changed, or the
@@ -440,7 +441,7 @@ void BeatDecision::tell(const Waiting& waiting, Instant now) noexcept {
   peak.shape = candidate.shape;
   peak.deviation = candidate.deviation;
   if (unknown_in_noise(waiting)) peak.deviation = from_seconds(settings_.doubtful_deviation_s);
-  peak.confidence = confidence(waiting, familiar, now);
+  peak.confidence = confidence(circumstances(waiting, familiar, now), settings_);
   if (strange(waiting) && !waiting.noted) note_disturbance(candidate.time, 0.5);
   if (familiar) familiar_at_ = candidate.time;
   if (peak.time <= now && queue_count_ < kQueue) {
@@ -469,21 +470,21 @@ void BeatDecision::learn_rhythm(const Waiting& waiting) noexcept {
   rhythm_.spread = std::clamp(1.25 * rr_deviation_, 0.06, 0.4);
 }
 
-void BeatDecision::remove_first(int count) noexcept {
-  std::copy(waiting_.begin() + count, waiting_.begin() + count_, waiting_.begin());
+void BeatDecision::remove(int index, int count) noexcept {
+  std::copy(waiting_.begin() + index + count, waiting_.begin() + count_, waiting_.begin() + index);
   count_ -= count;
 }
 
-void BeatDecision::remove_at(int index) noexcept {
-  std::copy(waiting_.begin() + index + 1, waiting_.begin() + count_, waiting_.begin() + index);
-  --count_;
-}
-
-bool BeatDecision::ponders(Instant t, Duration near) const noexcept {
-  return std::any_of(waiting_.begin(), waiting_.begin() + count_, [&](const Waiting& waiting) {
+Pondered BeatDecision::ponders(Instant t, Duration near) const noexcept {
+  Pondered pondered = Pondered::kNothing;
+  for (int i = 0; i < count_; ++i) {
+    const Waiting& waiting = waiting_[static_cast<std::size_t>(i)];
     const Duration apart = waiting.candidate.time - t;
-    return apart < near && -apart < near && waiting.probability > settings_.more_likely;
-  });
+    if (apart >= near || -apart >= near || waiting.probability <= settings_.more_likely) continue;
+    if (of_settled_beats(waiting)) return Pondered::kBeat;
+    pondered = Pondered::kStranger;
+  }
+  return pondered;
 }
 
 std::optional<RPeak> BeatDecision::pop() noexcept {

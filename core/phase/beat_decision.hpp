@@ -7,9 +7,11 @@
 #include <array>
 #include <optional>
 
+#include "core/phase/beat_confidence.hpp"
 #include "core/phase/beat_levels.hpp"
 #include "core/phase/beat_path.hpp"
 #include "core/phase/ecg_levels.hpp"
+#include "core/phase/pondered.hpp"
 #include "core/phase/qrs_candidate.hpp"
 #include "core/phase/qrs_clusters.hpp"
 #include "core/phase/qrs_evidence.hpp"
@@ -34,8 +36,8 @@ class BeatDecision {
   void burst() noexcept;        // nothing can be seen: what waits in it is no beat
 
   [[nodiscard]] std::optional<RPeak> pop() noexcept;
-  // What waits so near to `t` is more likely a beat than not.
-  [[nodiscard]] bool ponders(Instant t, Duration near) const noexcept;
+  // Of what waits so near to `t` and is more likely a beat than not.
+  [[nodiscard]] Pondered ponders(Instant t, Duration near) const noexcept;
   [[nodiscard]] const BeatLevels& beats() const noexcept { return beats_; }
   [[nodiscard]] const QrsClusters& clusters() const noexcept { return clusters_; }
   // Nothing like beats is known, or none has come for some time.
@@ -86,6 +88,7 @@ class BeatDecision {
   [[nodiscard]] double like(const Waiting& waiting) const noexcept;  // to its cluster, where that recurs
   [[nodiscard]] bool followed_by_none(const Waiting& waiting) const noexcept;
   [[nodiscard]] bool unknown_in_noise(const Waiting& waiting) const noexcept;
+  [[nodiscard]] bool of_settled_beats(const Waiting& waiting) const noexcept;
   [[nodiscard]] bool familiar(const Waiting& waiting) const noexcept;
   [[nodiscard]] bool unlike_any_beat(const QrsCandidate& candidate) const noexcept;
   [[nodiscard]] bool strange(const Waiting& waiting) const noexcept;
@@ -97,9 +100,8 @@ class BeatDecision {
   void tell(const Waiting& waiting, Instant now) noexcept;
   void refuse(const Waiting& waiting) noexcept;
   void note_disturbance(Instant t, double weight) noexcept;
-  [[nodiscard]] double confidence(const Waiting& waiting, bool familiar, Instant now) const noexcept;
-  void remove_first(int count) noexcept;
-  void remove_at(int index) noexcept;
+  [[nodiscard]] BeatCircumstances circumstances(const Waiting& waiting, bool familiar, Instant now) const noexcept;
+  void remove(int index, int count) noexcept;
   void learn_rhythm(const Waiting& waiting) noexcept;
   void follow_change(const Waiting& waiting, bool familiar) noexcept;
   [[nodiscard]] double disturbed(Instant t) const noexcept;

@@ -27,7 +27,12 @@ class BeatFinder {
     note_interruption();
   }
   [[nodiscard]] std::optional<RPeak> flush() noexcept { return classed(leads_.flush()); }
+  // Of the lead that is heard better, of two.
   [[nodiscard]] EcgSignal signal() const noexcept { return leads_.signal(); }
+  // Of that lead, 0 or 1.
+  [[nodiscard]] EcgSignal signal(int lead) const noexcept { return leads_.signal(lead); }
+  // A second lead has been heard.
+  [[nodiscard]] bool two_leads() const noexcept { return leads_.two(); }
 
   // All is forgotten, as if it were new. The detectors' parts refer to each other, so they are made anew in place.
   void restart() noexcept {
@@ -50,13 +55,12 @@ class BeatFinder {
   // classer, and both hear of every beat; the class is that of the lead which gives the time.
   [[nodiscard]] std::optional<RPeak> classed(const std::optional<LeadBeat>& beat) noexcept {
     std::optional<RPeak> peak;
-    if (beat) {
-      for (std::size_t lead = 0; lead < classers_.size(); ++lead) {
-        RPeak seen = beat->peak;
-        seen.shape = beat->shapes[lead];
-        seen = classers_[lead].classify(seen);
-        if (static_cast<int>(lead) == beat->lead) peak = seen;
-      }
+    const std::size_t heard = leads_.two() ? classers_.size() : 1;
+    for (std::size_t lead = 0; beat && lead < heard; ++lead) {
+      RPeak seen = beat->peak;
+      seen.shape = beat->shapes[lead];
+      seen = classers_[lead].classify(seen);
+      if (static_cast<int>(lead) == beat->lead) peak = seen;
     }
     note_interruption();
     return peak;

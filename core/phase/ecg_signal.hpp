@@ -13,4 +13,21 @@ enum class EcgSignal : std::uint8_t {
   kLeadOff,  // said by the device, samples that are missing, or a line that swings as no heart does
 };
 
+// 0 to 4: what is heard better has a higher one.
+[[nodiscard]] constexpr int rank(EcgSignal signal) noexcept {
+  switch (signal) {
+    case EcgSignal::kGood:
+      return 4;
+    case EcgSignal::kNoisy:
+      return 3;
+    case EcgSignal::kLearning:
+      return 2;
+    case EcgSignal::kFlat:
+      return 1;
+    case EcgSignal::kLeadOff:
+      break;
+  }
+  return 0;
+}
+
 }  // namespace perimap

@@ -43,8 +43,8 @@ class RPeakDetector {
   [[nodiscard]] std::optional<RPeak> flush() noexcept;
 
   [[nodiscard]] EcgSignal signal() const noexcept;
-  // It has seen what may be a beat so near to `t`, and waits for what speaks against it.
-  [[nodiscard]] bool ponders(Instant t, Duration near) const noexcept { return decision_.ponders(t, near); }
+  // What it has seen so near to `t` and not told yet.
+  [[nodiscard]] Pondered ponders(Instant t, Duration near) const noexcept { return decision_.ponders(t, near); }
   // How often the signal has broken off; in each of them beats may be hidden, and those of the 0.1 s before.
   [[nodiscard]] std::uint64_t interruptions() const noexcept { return line_.interruptions(); }
 

@@ -84,12 +84,14 @@ struct DecisionSettings {
   double chaos = 2.2;       // and so many a lead that is off,
   Duration chaos_after = std::chrono::milliseconds(900);  // when no known beat has come for so long
   Duration beats_come = std::chrono::milliseconds(1500);  // since the last of a known kind; else less noise is a burst
-  double early = 0.7;                                     // of the usual cycle: what comes so early and
-  double very_early = 0.40;                               // (or what comes so early, whatever it is like)
-  double very_familiar = 0.92;  // is less like a cluster than that, or of another size, may be an arc
-  double doubtful = 0.5;        // confidence that nothing in them exceeds,
-  double lost_in_noise = 0.25;  // and nothing that is unlike the beats among disturbances,
-  double early_in_noise = 0.1;  // nor what comes early there: BeatClasser takes them for noise
+  double very_familiar = 0.92;                            // correlation of a beat that is like its kind
+  double unlike_by_size =
+      0.1;  // of a beat to its kind: 1 - correlation and the difference in size, logarithm, times this
+  double unlike_in_noise = 4.0;  // times 1 and the disturbances times this, and 1 and how early it comes:
+  double suspicious = 0.17;      // from which on it may be an arc (dev; see beat_confidence)
+  double doubtful = 0.5;         // confidence that nothing in them exceeds,
+  double lost_in_noise = 0.25;   // and nothing that is unlike the beats among disturbances,
+  double early_in_noise = 0.1;   // nor what comes early there: BeatClasser takes them for noise
   Duration longer_than_bursts = std::chrono::seconds(25);
   Duration around = std::chrono::milliseconds(500);  // what is strange so near makes a strange one less likely
   Duration pr_shortest = std::chrono::milliseconds(100);

@@ -393,6 +393,16 @@ TEST(RhythmMonitor, PatternsAndBreathingAreNot) {
   }
 }
 
+// A heart that varies by 8 %, beat for beat at random, is as hard to predict as the border has it.
+TEST(RhythmMonitor, TheBorderIsAVariationOfATwelfth) {
+  const auto varies = [](double variation) {
+    return unpredictable([&](int, std::mt19937& g) { return 0.8 * (1.0 + normal(g, variation)); });
+  };
+  EXPECT_LT(varies(0.06), 0.03);
+  EXPECT_NEAR(varies(0.08), 0.27, 0.06);
+  EXPECT_GT(varies(0.12), 0.95);
+}
+
 TEST(RhythmMonitor, KnowsNothingAtFirst) {
   RhythmMonitor monitor;
   for (int i = 0; i < 20; ++i) monitor.push(Seconds(0.8));

@@ -205,13 +205,10 @@ TEST(BeatDecision, AnEarlyBeatIsDoubtful) {
     patient.see(beat_s, shaped(shape));
     return patient.confidence(beat_s);
   };
-  EXPECT_GT(confidence(0.44, kBeat), 0.5);
-  EXPECT_LE(confidence(0.36, kBeat), 0.5) << "whatever it is like";
-  EXPECT_GT(confidence(0.75, like_beat(0.88)), 0.5);
-  EXPECT_LE(confidence(0.65, like_beat(0.88)), 0.5) << "where it is less like the others";
-  EXPECT_GT(confidence(0.6, like_beat(0.95)), 0.5);
-  EXPECT_GT(confidence(0.6, like_beat(1.0, std::exp(0.26))), 0.5);
-  EXPECT_LE(confidence(0.6, like_beat(1.0, std::exp(0.34))), 0.5) << "or of another size";
+  EXPECT_GT(confidence(0.75, like_beat(0.98)), 0.5);
+  EXPECT_LE(confidence(0.75, like_beat(0.94)), 0.5) << "where it is less like the others";
+  EXPECT_GT(confidence(0.75, like_beat(1.0, std::exp(0.22))), 0.5);
+  EXPECT_LE(confidence(0.75, like_beat(1.0, std::exp(0.4))), 0.5) << "or of another size";
 }
 
 TEST(BeatDecision, WhatIsUnlikeTheBeatsIsDoubtful) {
@@ -221,8 +218,8 @@ TEST(BeatDecision, WhatIsUnlikeTheBeatsIsDoubtful) {
     patient.see(beat_s, change);
     return patient.confidence(beat_s);
   };
-  EXPECT_GT(confidence(shaped(like_beat(0.83))), 0.5);
-  EXPECT_NEAR(confidence(shaped(like_beat(0.77))), 0.5, 1e-9);
+  EXPECT_GT(confidence(shaped(like_beat(0.86))), 0.5);
+  EXPECT_NEAR(confidence(shaped(like_beat(0.80))), 0.5, 1e-9);
   EXPECT_GT(confidence([](QrsCandidate& c) { c.step = 0.68; }), 0.5);
   EXPECT_NEAR(confidence([](QrsCandidate& c) { c.step = 0.82; }), 0.5, 1e-9);
   EXPECT_GT(confidence([](QrsCandidate& c) { c.rough = 0.45 * c.energy; }), 0.5);

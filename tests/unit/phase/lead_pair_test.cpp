@@ -294,7 +294,7 @@ TEST(LeadPair, BeatsComeInOrderOfTimeAndNoNearerThanVentriclesContract) {
   const Heard heard = listen(h.first, h.second);
   ASSERT_GT(heard.beats.size(), 100U);
   for (std::size_t i = 1; i < heard.beats.size(); ++i) {
-    EXPECT_GE(heard.beats[i].peak.time - heard.beats[i - 1].peak.time, LeadPairSettings{}.refractory);
+    EXPECT_GE(heard.beats[i].peak.time - heard.beats[i - 1].peak.time, LeadAgreementSettings{}.refractory);
     EXPECT_GE(heard.beats[i].peak.detected_at, heard.beats[i - 1].peak.detected_at);
   }
   EXPECT_LT(score(heard, h.beats_s, 0.0, 150.0).largest_delay_s, 1.2);
