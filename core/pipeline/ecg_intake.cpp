@@ -49,6 +49,7 @@ void EcgIntake::hear(const EcgBlock& block) noexcept {
     t += block.sample_period;
   }
   if (flat > 0) counters_.ecg_lead_off.add(flat);
+  tell_of_leads(block);
   const EcgSignal signal = beats_.signal();
   if (signal == EcgSignal::kFlat || signal == EcgSignal::kLeadOff) {
     tracker_.interrupt();
@@ -58,6 +59,14 @@ void EcgIntake::hear(const EcgBlock& block) noexcept {
     counters_.last_good_ecg_ns.set(static_cast<std::uint64_t>(to_ns(until)));
   }
   publish();
+}
+
+void EcgIntake::tell_of_leads(const EcgBlock& block) noexcept {
+  const auto told = [](EcgSignal signal) { return 1 + static_cast<std::uint64_t>(signal); };
+  counters_.ecg_leads[0].set(told(beats_.signal(0)));
+  // A second one that has never been heard has no detector that could say so.
+  const EcgSignal second = beats_.two_leads() ? beats_.signal(1) : EcgSignal::kLeadOff;
+  counters_.ecg_leads[1].set(block.has_second ? told(second) : 0);
 }
 
 void EcgIntake::push(const RTriggerPulse& pulse) noexcept {

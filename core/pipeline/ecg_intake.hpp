@@ -58,6 +58,7 @@ class EcgIntake {
   void forget_when_asked() noexcept;
   void count(const EcgBlock& block) noexcept;
   void hear(const EcgBlock& block) noexcept;
+  void tell_of_leads(const EcgBlock& block) noexcept;
   void publish() noexcept;
 
   EcgIntakeSettings settings_;

@@ -52,6 +52,7 @@ struct PipelineCounters {
   LatencyHistogram ecg_delay;
   Counter last_ecg_ns;
   Counter last_good_ecg_ns;
+  std::array<Counter, 2> ecg_leads;  // what the first and the second are good for: 1 + EcgSignal; 0: there is none
   // respiration thread
   Counter respiration_samples;
   Counter respiration_off;      // samples that mean nothing: the sensor is off

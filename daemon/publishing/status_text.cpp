@@ -51,6 +51,16 @@ Json stage_json(const perimap_StageLatency& stage) {
             {"max", ms(stage.recent_max_ns)}}}};
 }
 
+// Which of two leads of the ECG.
+std::string leads_off(const perimap_Status& status) {
+  if (status.ecg_second_lead == perimap_ECG_LEAD_NONE) return {};
+  const auto off = [](perimap_EcgLead lead) { return lead == perimap_ECG_LEAD_FLAT || lead == perimap_ECG_LEAD_OFF; };
+  std::string text;
+  if (off(status.ecg_first_lead)) text += fmt::format(", first lead of the ECG {}", name_of(status.ecg_first_lead));
+  if (off(status.ecg_second_lead)) text += fmt::format(", second lead of the ECG {}", name_of(status.ecg_second_lead));
+  return text;
+}
+
 }  // namespace
 
 Json stream_counts_json(const perimap_Status& status) {
@@ -113,6 +123,7 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
       {"scope_turn", name_of(status.scope_turn)},
       {"scope_rotation_deg",
        status.scope_turn == perimap_SCOPE_TURN_UNREAD ? Json(nullptr) : Json(status.scope_rotation_rad / kDegree)},
+      {"ecg_leads", {name_of(status.ecg_first_lead), name_of(status.ecg_second_lead)}},
       {"recording", name_of(status.recording)},
       {"messages_recorded", status.messages_recorded},
       {"frames_not_recorded", status.frames_not_recorded},
@@ -151,6 +162,7 @@ std::string status_line(const perimap_Status& status) {
     if (count > 0) line += fmt::format(", {} {} were the ones before bit for bit", count, what);
   }
   if (status.setup.state == perimap_SETUP_DOUBTED) line += ", set-up " + setup_words(status.setup);
+  line += leads_off(status);
   for (const perimap_SourceStatus& source : std::span(status.sources._buffer, status.sources._length)) {
     if (source.state != perimap_SOURCE_OK) line += fmt::format(", {} {}", name_of(source.kind), name_of(source.state));
   }

@@ -88,6 +88,10 @@ std::string_view name_of(perimap_ScopeTurn turn) noexcept {
   return name_in<3>({"unread", "read", "changed"}, static_cast<int>(turn));
 }
 
+std::string_view name_of(perimap_EcgLead lead) noexcept {
+  return name_in<6>({"none", "learning", "good", "noisy", "flat", "off"}, static_cast<int>(lead));
+}
+
 std::string_view name_of(perimap_SourceKind kind) noexcept {
   return name_in<5>({"camera", "tracker", "ecg", "r_trigger", "respiration"}, static_cast<int>(kind));
 }

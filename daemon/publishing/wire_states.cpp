@@ -1,6 +1,7 @@
 #include "daemon/publishing/wire_states.hpp"
 
 #include "core/phase/cardiac_clock.hpp"
+#include "core/phase/ecg_signal.hpp"
 #include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/surface_sample.hpp"
 #include "core/setup_watch/setup_verdict.hpp"
@@ -131,6 +132,22 @@ perimap_Rhythm to_wire(Rhythm rhythm) noexcept {
       break;
   }
   return perimap_RHYTHM_UNKNOWN;
+}
+
+perimap_EcgLead to_wire(EcgSignal signal) noexcept {
+  switch (signal) {
+    case EcgSignal::kLearning:
+      return perimap_ECG_LEAD_LEARNING;
+    case EcgSignal::kGood:
+      return perimap_ECG_LEAD_GOOD;
+    case EcgSignal::kNoisy:
+      return perimap_ECG_LEAD_NOISY;
+    case EcgSignal::kFlat:
+      return perimap_ECG_LEAD_FLAT;
+    case EcgSignal::kLeadOff:
+      return perimap_ECG_LEAD_OFF;
+  }
+  return perimap_ECG_LEAD_OFF;
 }
 
 perimap_PhaseLaw to_wire(PhaseLaw law) noexcept {

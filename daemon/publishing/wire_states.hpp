@@ -9,6 +9,7 @@ namespace perimap {
 
 enum class FeatureReason : std::uint8_t;
 enum class FeatureState : std::uint8_t;
+enum class EcgSignal : std::uint8_t;
 enum class PhaseLaw : std::uint8_t;
 enum class PhaseState : std::uint8_t;
 enum class RespirationSource : std::uint8_t;
@@ -20,6 +21,7 @@ enum class SurfaceState : std::uint8_t;
 
 [[nodiscard]] perimap_FeatureReason to_wire(FeatureReason reason) noexcept;
 [[nodiscard]] perimap_FeatureState to_wire(FeatureState state) noexcept;
+[[nodiscard]] perimap_EcgLead to_wire(EcgSignal signal) noexcept;
 [[nodiscard]] perimap_PhaseLaw to_wire(PhaseLaw law) noexcept;
 [[nodiscard]] perimap_PhaseState to_wire(PhaseState state) noexcept;
 [[nodiscard]] perimap_RespirationSource to_wire(RespirationSource source) noexcept;

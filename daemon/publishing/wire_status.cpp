@@ -118,6 +118,11 @@ perimap_SetupWatch to_wire(const SetupBelief& belief) noexcept {
   return wire;
 }
 
+// 1 + EcgSignal, as it is counted; 0: no such lead.
+perimap_EcgLead ecg_lead(std::uint64_t counted) noexcept {
+  return counted == 0 ? perimap_ECG_LEAD_NONE : to_wire(static_cast<EcgSignal>(counted - 1));
+}
+
 }  // namespace
 
 SourceStates source_states(const PipelineCounters& counters, const StatusFacts& facts, Instant now) noexcept {
@@ -194,6 +199,8 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.scope_rotation_rad = 1e-6 * static_cast<double>(c.scope_rotation_urad.get());
   wire_.scope_turns = c.scope_turns.get();
   wire_.scope_frames_unread = c.scope_frames_unread.get();
+  wire_.ecg_first_lead = ecg_lead(c.ecg_leads[0].get());
+  wire_.ecg_second_lead = ecg_lead(c.ecg_leads[1].get());
 
   std::uint32_t sources = 0;
   for_each_source(c, facts, [&](const SourceFacts& source) noexcept {

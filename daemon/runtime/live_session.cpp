@@ -134,6 +134,9 @@ Expected<void> LiveSession::run(StopSignal& stop) {
     tell_of_shedding();
     tell_of_setup();
     if (pipeline_.scope() != nullptr) scope_news_.tell(pipeline_.counters(), MonotonicClock::now());
+    if (const auto line = ecg_lead_news_.next(pipeline_.counters(), MonotonicClock::now())) {
+      spdlog::log(line->warning ? spdlog::level::warn : spdlog::level::info, "{}", line->text);
+    }
     if (!told_end && feeder_->ended()) {
       runtime_.end_of_sources();
       told_end = true;

@@ -9,6 +9,7 @@
 #include "core/error/expected.hpp"
 #include "daemon/publishing/identity.hpp"
 #include "daemon/publishing/wire_status.hpp"
+#include "daemon/runtime/ecg_lead_news.hpp"
 #include "daemon/runtime/live_runtime.hpp"
 #include "daemon/runtime/scope_news.hpp"
 #include "drivers/transport/interrupt.hpp"
@@ -93,6 +94,7 @@ class LiveSession {
   std::uint64_t setup_ticks_ = 0;
   bool setup_told_ = false;
   ScopeNews scope_news_;
+  EcgLeadNews ecg_lead_news_;
 };
 
 }  // namespace perimap

@@ -2,20 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 namespace perimap {
 namespace {
 
-void begin_second(EcgBlock& block, const std::optional<SecondLead>& second) noexcept {
-  block.has_second = second.has_value();
-  block.second_off = second && second->off;
-}
-void add_second(EcgBlock& block, const std::optional<SecondLead>& second) noexcept {
-  if (second) block.second_mV[block.count] = second->mV;
-}
-void begin_second(RespirationBlock& /*block*/, const std::optional<SecondLead>& /*second*/) noexcept {}
-void add_second(RespirationBlock& /*block*/, const std::optional<SecondLead>& /*second*/) noexcept {}
+// Breathing is measured once.
+template <class Block>
+constexpr bool kHasSecondLead = std::is_same_v<Block, EcgBlock>;
 
 bool same_state(const std::optional<SecondLead>& a, const std::optional<SecondLead>& b) noexcept {
   return a.has_value() == b.has_value() && (!a || a->off == b->off);
@@ -66,9 +61,14 @@ void EcgAssembler::give(Lane& lane, Instant arrival, std::array<float, Block::kC
       block.first_sample_time = std::min(std::max(clock_.stamp(sample.count), lane.last_stamp + Duration(1)), arrival);
       block.device_sequence = static_cast<std::uint32_t>(sample.count);
       block.*off = sample.off;
-      begin_second(block, sample.second);
+      if constexpr (kHasSecondLead<Block>) {
+        block.has_second = sample.second.has_value();
+        block.second_off = sample.second && sample.second->off;
+      }
     }
-    add_second(block, sample.second);
+    if constexpr (kHasSecondLead<Block>) {
+      if (sample.second) block.second_mV[block.count] = sample.second->mV;
+    }
     (block.*values)[block.count++] = sample.value;
     const bool last = i + 1 == lane.chunk.size();
     if (last || block.count == Block::kCapacity || lane.chunk[i + 1].count != sample.count + 1 ||

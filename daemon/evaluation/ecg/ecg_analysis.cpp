@@ -39,6 +39,12 @@ class Predictions {
       tracker(kPredictionMethods[0]), tracker(kPredictionMethods[1]), tracker(kPredictionMethods[2])};
 };
 
+void add(EcgSignal signal, double step_s, LeadUse& use) {
+  if (signal == EcgSignal::kLeadOff || signal == EcgSignal::kFlat) use.unusable_s += step_s;
+  if (signal == EcgSignal::kLearning) use.without_beats_s += step_s;
+  if (signal == EcgSignal::kNoisy) use.noisy_s += step_s;
+}
+
 }  // namespace
 
 EcgAnalysis analyse(const EcgTrace& trace, const std::function<bool(std::size_t)>& progress) {
@@ -46,6 +52,7 @@ EcgAnalysis analyse(const EcgTrace& trace, const std::function<bool(std::size_t)
   const auto finder = std::make_unique<BeatFinder>();
   Predictions predictions;
   bool unheard = false;
+  if (!trace.second_mV.empty()) analysis.leads.resize(2);
   const auto take = [&](const std::optional<RPeak>& peak) {
     if (!peak) return;
     AnalysedBeat beat;
@@ -76,6 +83,9 @@ EcgAnalysis analyse(const EcgTrace& trace, const std::function<bool(std::size_t)
       unheard = true;
     }
     if (signal == EcgSignal::kNoisy) analysis.noisy_s += step_s;
+    for (std::size_t lead = 0; lead < analysis.leads.size(); ++lead) {
+      add(finder->signal(static_cast<int>(lead)), step_s, analysis.leads[lead]);
+    }
     if (predictions.rhythm() == Rhythm::kUnpredictable) analysis.unpredictable_s += step_s;
   }
   while (const auto peak = finder->flush()) take(peak);

@@ -24,6 +24,13 @@ struct AnalysedBeat {
 inline constexpr std::array<RrMethod, 3> kPredictionMethods{RrMethod::kPrevious, RrMethod::kMeanOf8,
                                                             RrMethod::kAutoregressive};
 
+// What a lead was good for.
+struct LeadUse {
+  double unusable_s = 0.0;  // off or flat, or samples missing
+  double without_beats_s = 0.0;
+  double noisy_s = 0.0;
+};
+
 struct EcgAnalysis {
   std::vector<AnalysedBeat> beats;  // in order of time
   double duration_s = 0.0;
@@ -32,6 +39,7 @@ struct EcgAnalysis {
   double without_beats_s = 0.0;     // nothing like beats was known in it
   double noisy_s = 0.0;             // disturbances of a beat's size
   double unpredictable_s = 0.0;     // the rhythm was atrial fibrillation or the like
+  std::vector<LeadUse> leads;       // of each of two, none of one: the figures above are of what was heard better
 };
 
 // The trace begins at instant 0 of the result's clock. `progress` is told how many samples are done and answers whether

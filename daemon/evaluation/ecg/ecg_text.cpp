@@ -88,6 +88,10 @@ nlohmann::json to_json(const EcgAnalysis& analysis, const PredictionErrors& erro
       {"noisy_s", analysis.noisy_s},
       {"unpredictable_s", analysis.unpredictable_s},
       {"prediction", {{"cycles", errors.cycles}}}};
+  for (const LeadUse& lead : analysis.leads) {
+    json["leads"].push_back(
+        {{"unusable_s", lead.unusable_s}, {"without_beats_s", lead.without_beats_s}, {"noisy_s", lead.noisy_s}});
+  }
   for (std::size_t i = 0; i < kPredictionMethods.size(); ++i) {
     json["prediction"][std::string(name_of(kPredictionMethods[i])) + "_rms_ms"] =
         errors.rms_s ? milliseconds((*errors.rms_s)[i]) : nlohmann::json(nullptr);
@@ -133,6 +137,11 @@ std::string to_text(const EcgAnalysis& analysis, const PredictionErrors& errors)
       "unpredictable for {:.1f} s\n",
       analysis.unusable_s, analysis.interruptions, analysis.without_beats_s, analysis.noisy_s,
       analysis.unpredictable_s);
+  for (std::size_t lead = 0; lead < analysis.leads.size(); ++lead) {
+    const LeadUse& use = analysis.leads[lead];
+    text += fmt::format("            {} lead: unusable for {:.1f} s, without beats for {:.1f} s, noisy for {:.1f} s\n",
+                        lead == 0 ? "first" : "second", use.unusable_s, use.without_beats_s, use.noisy_s);
+  }
   if (!errors.rms_s) return text + "prediction  next cycle: none, there are no normal cycles to tell it from\n";
   const auto& rms_s = *errors.rms_s;
   return text + fmt::format(

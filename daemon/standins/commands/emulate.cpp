@@ -247,6 +247,9 @@ void add_emulate_command(Commands& commands) {
       ->expected(2)
       ->check(seconds);
   add_tracker_options(command, *options);
+  command.add_flag("--second-lead", theatre.second_lead,
+                   "A BITalino has a second lead, made of the first, on A3, a Cyton on input 2 "
+                   "(ecg.second_channel); --missing then takes off the first alone");
   command.add_flag("--cyton-daisy", theatre.cyton_daisy, "The Cyton has a Daisy module, as its greeting says");
   options->can_options = {
       command.add_option("--can-identifier", theatre.can.identifier, "Of the frames over CAN, as 736 or 0x2E0")

@@ -28,7 +28,8 @@ class MedlabEmulator final : public EcgEmulator {
     run(true, now());
   }
 
-  void sample(LinkControl& link, float mV, float /*respiration*/) override {
+  void sample(LinkControl& link, const Measured& measured) override {
+    const float mV = measured.mV;
     // Once a second a pulse, or that the lead is off, and then the wave marker; also when the one becomes the other.
     const bool off = std::isnan(mV);
     const bool due = since_marker_ >= kSamplesToMarker || off != off_;
@@ -65,35 +66,40 @@ class BitalinoEmulator final : public EcgEmulator {
     if (byte == 0x07) link.send(std::string_view("BITalino_v5.2\n"));
     if ((byte & 0x03U) != 0x01U) return;
     const unsigned mask = byte >> 2U;
-    ecg_asked_ = (mask & kEcgInput) != 0;
-    respiration_asked_ = (mask & ~kEcgInput) != 0;
-    ecg_second_ = (mask & (kEcgInput - 1)) != 0;
-    // Frames of three channels and more have another shape, which no driver asks for.
+    // Frames of more than three channels have another shape, which no driver asks for.
     const int channels = std::popcount(mask);
-    if (channels < 1 || channels > 2 || (channels == 2 && !ecg_asked_)) return;
+    if (channels < 1 || channels > 3) return;
+    asked_ = mask;
     set_line_time(line_time(static_cast<std::size_t>(channels)));
     run(true, now());
   }
 
-  void sample(LinkControl& link, float mV, float respiration) override {
-    const unsigned ecg = counts(512.0 + 1024.0 * mV * 1100.0 / 3300.0);
-    const unsigned breath = counts(512.0 + 400.0 * respiration);
-    const bool both = ecg_asked_ && respiration_asked_;
-    const unsigned first = !ecg_asked_ || (both && ecg_second_) ? breath : ecg;
-    const unsigned second = ecg_second_ ? ecg : breath;
-    std::array<std::byte, bitalino_frame_bytes(2)> bytes{
-        static_cast<std::byte>(second & 0xFFU), static_cast<std::byte>((first << 2U | second >> 8U) & 0xFFU),
-        static_cast<std::byte>(first >> 6U), static_cast<std::byte>(sequence_ << 4U)};
-    if (!both) bytes[1] &= std::byte{0xFC};
-    const std::span frame = std::span(bytes).subspan(both ? 0 : 1);
+  void sample(LinkControl& link, const Measured& measured) override {
+    std::array<unsigned, 3> values{};  // in order of input
+    std::size_t channels = 0;
+    for (int input = 1; input <= BitalinoProtocol::kChannels; ++input) {
+      if ((asked_ >> static_cast<unsigned>(input - 1) & 1U) == 0U) continue;
+      values[channels++] = counts_of(measured, input);
+    }
+    const auto byte = [](unsigned value) { return static_cast<std::byte>(value & 0xFFU); };
+    std::array<std::byte, bitalino_frame_bytes(3)> bytes{byte(values[2] << 6U), byte(values[2] >> 2U),
+                                                         byte(values[1]),       byte(values[0] << 2U | values[1] >> 8U),
+                                                         byte(values[0] >> 6U), byte(sequence_ << 4U)};
+    const std::span frame = std::span(bytes).last(bitalino_frame_bytes(channels));
     frame.back() |= static_cast<std::byte>(bitalino_crc(frame));
     sequence_ = (sequence_ + 1) % 16;
     sender().send(link, frame, frame.size() - 1);
   }
 
  private:
-  static constexpr unsigned kEcgInput = 1U << static_cast<unsigned>(BitalinoSettings{}.channel - 1);
+  static constexpr int kEcgInput = BitalinoSettings{}.channel;
 
+  static unsigned counts_of(const Measured& measured, int input) {
+    const auto ecg = [](float mV) { return counts(512.0 + 1024.0 * mV * 1100.0 / 3300.0); };
+    if (input == kEcgInput) return ecg(measured.mV);
+    if (input == kEcgInput + 1 && measured.second_mV) return ecg(*measured.second_mV);
+    return counts(512.0 + 400.0 * measured.respiration);
+  }
   static Duration line_time(std::size_t channels) {
     return time_on_line(bitalino_frame_bytes(channels), BitalinoProtocol::kBaud);
   }
@@ -106,9 +112,7 @@ class BitalinoEmulator final : public EcgEmulator {
 
   Instant last_command_{};
   unsigned sequence_ = 0;
-  bool ecg_asked_ = false;
-  bool respiration_asked_ = false;
-  bool ecg_second_ = false;
+  unsigned asked_ = 0;  // inputs, the first in the lowest bit
 };
 
 class CytonEmulator final : public EcgEmulator {
@@ -130,14 +134,14 @@ class CytonEmulator final : public EcgEmulator {
     }
   }
 
-  void sample(LinkControl& link, float mV, float respiration) override {
+  void sample(LinkControl& link, const Measured& measured) override {
     std::array<std::byte, CytonProtocol::kPacketBytes> packet{};
     packet.front() = std::byte{0xA0};
     packet[1] = static_cast<std::byte>(count_++);
     for (int channel = 1; channel <= CytonProtocol::kChannels; ++channel) {
       // Packets of even numbers are the Daisy's, to which nothing is wired.
       const bool of_daisy = daisy_ && (count_ - 1) % 2 == 0;
-      const float input_mV = of_daisy ? 0.0F : channel == CytonSettings{}.channel ? mV : respiration;
+      const float input_mV = of_daisy ? 0.0F : input(measured, channel);
       const std::size_t at = 2 + 3 * static_cast<std::size_t>(channel - 1);
       for (unsigned i = 0; i < 3; ++i) packet[at + i] = static_cast<std::byte>(counts(input_mV) >> (16U - 8U * i));
     }
@@ -146,6 +150,11 @@ class CytonEmulator final : public EcgEmulator {
   }
 
  private:
+  static float input(const Measured& measured, int channel) {
+    if (channel == CytonSettings{}.channel) return measured.mV;
+    if (channel == CytonSettings{}.channel + 1 && measured.second_mV) return *measured.second_mV;
+    return measured.respiration;
+  }
   // In its lowest 24 bits; an open input rests at the upper rail.
   static std::uint32_t counts(float mV) {
     constexpr double kFullScale = 0x7FFFFF;
@@ -201,7 +210,8 @@ void EcgEmulator::on_time(LinkControl& link, Instant now) {
       return;
     }
     const bool off = faults_.missing(t - signals_.ecg_mV.start());
-    sample(link, off ? std::numeric_limits<float>::quiet_NaN() : *mV, signals_.respiration_at(t));
+    sample(link,
+           {off ? std::numeric_limits<float>::quiet_NaN() : *mV, signals_.second_at(t), signals_.respiration_at(t)});
   }
 }
 

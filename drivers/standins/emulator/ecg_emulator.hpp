@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "drivers/device/device_protocol.hpp"
@@ -28,8 +29,14 @@ class EcgEmulator : public DeviceProtocol {
  protected:
   // A byte from the host.
   virtual void command(LinkControl& link, std::uint8_t byte) = 0;
-  // A sample is due; not a number while the lead or the sensor is off. Respiration is from -1 to 1.
-  virtual void sample(LinkControl& link, float mV, float respiration) = 0;
+  // What is measured at one instant; not a number while the lead or the sensor is off.
+  struct Measured {
+    float mV = 0.0F;
+    std::optional<float> second_mV;  // where there is a second lead
+    float respiration = 0.0F;        // from -1 to 1
+  };
+  // A sample is due.
+  virtual void sample(LinkControl& link, const Measured& measured) = 0;
 
   void run(bool running, Instant now) noexcept;
   void set_line_time(Duration line_time) noexcept { line_time_ = line_time; }
@@ -47,7 +54,8 @@ class EcgEmulator : public DeviceProtocol {
   Instant now_{};
 };
 
-// The ECG is on the input that the drivers take by default; respiration, which a Medlab does not send, on all others.
+// The ECG is on the input that the drivers take by default and, where there is a second lead, on the next; respiration,
+// which a Medlab does not send, on all others. Faults take the first lead off, and leave the second.
 [[nodiscard]] std::unique_ptr<EcgEmulator> emulate_medlab(EcgDeviceSignals signals, const EmulatorFaults& faults);
 [[nodiscard]] std::unique_ptr<EcgEmulator> emulate_bitalino(EcgDeviceSignals signals, const EmulatorFaults& faults);
 [[nodiscard]] std::unique_ptr<EcgEmulator> emulate_cyton(EcgDeviceSignals signals, const EmulatorFaults& faults);

@@ -1,5 +1,6 @@
 #include "drivers/standins/emulator/played_session.hpp"
 
+#include <algorithm>
 #include <utility>
 #include <variant>
 
@@ -86,6 +87,9 @@ std::vector<std::pair<std::string, PoseTrack>> PlayedSession::tools(Instant star
 EcgDeviceSignals PlayedSession::ecg_device(Instant start) const {
   const Duration offset = start - first_arrival_;
   EcgDeviceSignals signals{SampledWaveform(ecg_, offset)};
+  if (std::any_of(ecg_.begin(), ecg_.end(), [](const EcgBlock& block) { return block.has_second; })) {
+    signals.second_mV = SampledWaveform::second_lead(ecg_, offset);
+  }
   if (!respiration_.empty()) signals.respiration.emplace(respiration_, offset);
   return signals;
 }

@@ -40,6 +40,22 @@ SampledWaveform::SampledWaveform(std::span<const EcgBlock> blocks, Duration offs
   }
 }
 
+SampledWaveform SampledWaveform::second_lead(std::span<const EcgBlock> blocks, Duration offset) {
+  std::vector<EcgBlock> second(blocks.begin(), blocks.end());
+  for (EcgBlock& block : second) {
+    block.mV = block.second_mV;
+    block.lead_off = block.second_off || !block.has_second;
+  }
+  return {second, offset};
+}
+
+SampledWaveform SampledWaveform::seen_elsewhere(float times, Duration later) const {
+  SampledWaveform seen = *this;
+  seen.start_ += later;
+  for (Point& point : seen.points_) point.value *= times;
+  return seen;
+}
+
 SampledWaveform::SampledWaveform(std::span<const RespirationBlock> blocks, Duration offset)
     : start_(blocks.front().first_sample_time + offset) {
   float lowest = std::numeric_limits<float>::infinity();

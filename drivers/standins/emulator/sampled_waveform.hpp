@@ -21,6 +21,8 @@ class SampledWaveform {
   // As recorded, `offset` later than then. What is missing between two blocks is as if the electrode were off. At least
   // one block.
   SampledWaveform(std::span<const EcgBlock> blocks, Duration offset);
+  // Likewise, the second lead of these blocks.
+  [[nodiscard]] static SampledWaveform second_lead(std::span<const EcgBlock> blocks, Duration offset);
   // Likewise; the values from -1 to 1, whatever they were.
   SampledWaveform(std::span<const RespirationBlock> blocks, Duration offset);
 
@@ -28,6 +30,9 @@ class SampledWaveform {
   [[nodiscard]] static Expected<SampledWaveform> ecg_of_record(std::string_view name, Instant start);
   // One breath as the simulator has it, from -1 to 1, repeated for ever.
   [[nodiscard]] static SampledWaveform breathing(Duration period, Instant start);
+
+  // As another lead might see it: so many times as large, and later.
+  [[nodiscard]] SampledWaveform seen_elsewhere(float times, Duration later) const;
 
   [[nodiscard]] Instant start() const noexcept { return start_; }
   // None before the beginning and after the end.

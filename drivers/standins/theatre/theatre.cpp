@@ -53,7 +53,15 @@ PoseTrack Theatre::poses() const {
 }
 
 Expected<EcgDeviceSignals> Theatre::ecg_device() const {
-  if (session_) return session_->ecg_device(start_);
+  auto signals = session_ ? Expected<EcgDeviceSignals>(session_->ecg_device(start_)) : simulated_ecg();
+  // Turned over and smaller, and its R wave peaks later.
+  if (signals && settings_.second_lead && !signals->second_mV) {
+    signals->second_mV = signals->ecg_mV.seen_elsewhere(-0.6F, std::chrono::milliseconds(12));
+  }
+  return signals;
+}
+
+Expected<EcgDeviceSignals> Theatre::simulated_ecg() const {
   auto ecg = SampledWaveform::ecg_of_record(settings_.heart.ecg_record, start_);
   if (!ecg) return tl::unexpected(std::move(ecg.error()));
   EcgDeviceSignals signals{std::move(*ecg)};

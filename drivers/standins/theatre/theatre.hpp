@@ -32,6 +32,7 @@ struct TheatreSettings {
   SimulationSettings heart;
   TrackerNoise noise;
   std::optional<Duration> breath;  // of a respiration channel
+  bool second_lead = false;        // of a BITalino or Cyton, made of the first where the recording has none
   EmulatorFaults faults;
   NdiEmulatorSettings ndi{.wired_tools = 1};
   IgtlEmulatorSettings igtl;
@@ -63,6 +64,7 @@ class Theatre {
   [[nodiscard]] Expected<NdiEmulatorSettings> ndi_settings() const;
   [[nodiscard]] IgtlEmulatorSettings igtl_settings() const;
   [[nodiscard]] Expected<EcgDeviceSignals> ecg_device() const;
+  [[nodiscard]] Expected<EcgDeviceSignals> simulated_ecg() const;
   [[nodiscard]] Expected<std::unique_ptr<PlayedFrames>> frames() const;
   [[nodiscard]] Expected<std::unique_ptr<DeviceProtocol>> protocol_of(const EmulatedDevice& device) const;
 

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 
 namespace perimap {
 namespace {
@@ -55,6 +57,16 @@ struct Intake : ::testing::Test {
     static_cast<void>(cells->mapper.update());
     return cells->mapper.front();
   }
+  // What the leads are good for, as it is told; of one that is not there nothing.
+  using Signals = std::array<std::optional<EcgSignal>, 2>;
+  [[nodiscard]] Signals signals() const {
+    Signals told;
+    for (std::size_t i = 0; i < told.size(); ++i) {
+      const std::uint64_t counted = counters->ecg_leads[i].get();
+      if (counted > 0) told[i] = static_cast<EcgSignal>(counted - 1);
+    }
+    return told;
+  }
   // The running cycle is no guide to others once it has ended.
   bool cycle_taught(Instant in_it) { return clock().at(in_it).teaches; }
 };
@@ -73,19 +85,32 @@ TEST_F(Intake, OneOfTwoLeadsIsEnough) {
   };
   blocks_until(kMidCycle, false, false);
   ASSERT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
+  EXPECT_EQ(signals(), (Signals{EcgSignal::kGood, EcgSignal::kGood}));
   blocks_until(kMidCycle + milliseconds(8000), true, false);
   EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
+  EXPECT_EQ(signals(), (Signals{EcgSignal::kLeadOff, EcgSignal::kGood})) << "which of them is off is told";
   EXPECT_TRUE(cycle_taught(kMidCycle + milliseconds(4000)));
   blocks_until(kMidCycle + milliseconds(16000), false, true);
   EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
+  EXPECT_EQ(signals(), (Signals{EcgSignal::kGood, EcgSignal::kLeadOff}));
   EXPECT_EQ(counters->ecg_lead_off.get(), 0U);
   blocks_until(kMidCycle + milliseconds(18000), true, true);
   EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kFreeRunning);
   EXPECT_EQ(counters->ecg_lead_off.get(), 1000U);
 }
 
+TEST_F(Intake, ASecondLeadThatIsOffFromTheStartIsTold) {
+  send(kMidCycle, [&](EcgBlock& block, std::size_t i, Instant at) {
+    block.has_second = true;
+    block.second_off = true;
+    block.mV[i] = lead_mV(at);
+  });
+  EXPECT_EQ(signals(), (Signals{EcgSignal::kGood, EcgSignal::kLeadOff}));
+}
+
 TEST_F(Intake, ALineThatGoesFlatIsCountedAndSaid) {
   hear(kMidCycle, lead_mV);
+  EXPECT_EQ(signals(), (Signals{EcgSignal::kGood, std::nullopt}));
   ASSERT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
   const std::uint64_t heard = counters->last_good_ecg_ns.get();
   hear(kMidCycle + milliseconds(1500), [](Instant) { return 4.0F; });

@@ -280,6 +280,8 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.scope_rotation_rad);
   next(s.scope_turns);
   next(s.scope_frames_unread);
+  next(s.ecg_first_lead);
+  next(s.ecg_second_lead);
 }
 
 void fill(Filler& next, perimap_SurfaceMesh& s) {

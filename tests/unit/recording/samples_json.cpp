@@ -278,7 +278,9 @@ json to_json(const perimap_Status& s) {
           MEMBER(scope_turn),
           MEMBER(scope_rotation_rad),
           MEMBER(scope_turns),
-          MEMBER(scope_frames_unread)};
+          MEMBER(scope_frames_unread),
+          MEMBER(ecg_first_lead),
+          MEMBER(ecg_second_lead)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {
