@@ -1,13 +1,12 @@
 #include "core/vision/feature_follower.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/geometry/symmetric_matrix2.hpp"
 #include "core/statistics/upper_median.hpp"
+#include "core/vision/feature_places.hpp"
 #include "core/vision/grey_histogram.hpp"
 
 namespace perimap {
@@ -15,19 +14,9 @@ namespace {
 
 constexpr double kFirstDeviation_px = 6.0;
 constexpr std::size_t kEnoughDisplacements = 4;
-constexpr std::size_t kMostOverlays = 512;
-// Of a trail: half a second and a fifth.
-constexpr Duration kTrailEvery = std::chrono::microseconds(33333);
-constexpr std::size_t kOverlayWindow = FollowedFeature::kTrail - 1;
-constexpr std::size_t kCandidateWindow = 6;
 
 bool is_sought(const FollowedFeature& feature) noexcept {
   return feature.state == FollowState::kCandidate || feature.state == FollowState::kTracked;
-}
-
-void let_go(FollowedFeature& feature) noexcept {
-  feature.state = FollowState::kEmpty;
-  feature.found = feature.swept = false;
 }
 
 double largest_deviation(const Matrix2d& C) noexcept { return std::sqrt(larger_eigenvalue(C)); }
@@ -43,22 +32,17 @@ bool shows_anything(const GreyImage& image) noexcept {
 
 }  // namespace
 
-bool FollowedFeature::fills_place() const noexcept {
-  return state == FollowState::kCandidate || state == FollowState::kTracked ||
-         (state == FollowState::kOccluded && !swept && !is_away);
-}
-
 FeatureFollower::FeatureFollower(const FollowerSettings& settings)
     : settings_(settings),
-      trail_stride_(settings.rate.frames(kTrailEvery)),
+      trails_(settings.rate),
       tracker_({.min_correlation = settings.min_correlation}),
       // Twice as many may be away, here and where the lens has been meanwhile; and as many as are on trial.
       features_(static_cast<std::size_t>((3 + settings.candidates_per_place) * std::max(settings.maximum, 0))),
       motion_(features_.size()),
       validity_(settings.rate),
+      overlays_(features_.size(), settings.rate, settings.overlay),
       deviation_px_(kFirstDeviation_px) {
   scratch_.reserve(features_.size());
-  overlays_.reserve(kMostOverlays);
 }
 
 int FeatureFollower::frames(Duration time, int least) const noexcept {
@@ -66,14 +50,15 @@ int FeatureFollower::frames(Duration time, int least) const noexcept {
 }
 
 std::size_t FeatureFollower::frames_to_judge() const noexcept {
-  return std::max(static_cast<std::size_t>(FollowedFeature::kTrail * trail_stride_),
+  return std::max(static_cast<std::size_t>(FollowedFeature::kTrail * trails_.stride()),
                   static_cast<std::size_t>(frames(settings_.candidate, settings_.candidate_frames)));
 }
 
 int FeatureFollower::free() const noexcept {
   const auto filled = std::count_if(features_.begin(), features_.end(),
                                     [](const FollowedFeature& feature) { return feature.fills_place(); });
-  return filled_by_features() >= settings_.maximum ? 0 : std::max(0, most_candidates() - static_cast<int>(filled));
+  return filled_by_features(features_) >= settings_.maximum ? 0
+                                                            : std::max(0, most_candidates() - static_cast<int>(filled));
 }
 
 std::vector<Vector2d> FeatureFollower::occupied() const {
@@ -81,7 +66,7 @@ std::vector<Vector2d> FeatureFollower::occupied() const {
   for (const FollowedFeature& feature : features_) {
     if (feature.fills_place()) places.push_back(feature.px);
   }
-  for (const Overlay& overlay : overlays_) places.push_back(overlay.px);
+  for (const OverlayWatch::Overlay& overlay : overlays_.overlays()) places.push_back(overlay.px);
   return places;
 }
 
@@ -139,7 +124,7 @@ void FeatureFollower::track_into(const GreyImage& image) noexcept {
     for (FollowedFeature& feature : features_) feature.velocity_px.setZero();
     return;
   }
-  ++frame_;
+  trails_.next_frame();
   validity_.look_at(image);
   if (blind_frames_ > 0) {
     constexpr double kDrift_px_per_s = 15.0;
@@ -185,10 +170,11 @@ void FeatureFollower::track_into(const GreyImage& image) noexcept {
   }
   find_again(image);
   judge(image);
-  drop_doubles();
-  promote_the_surest();
-  keep_to_maximum();
-  let_overlays_go();
+  drop_doubles(features_);
+  promote_the_surest(features_, settings_.maximum);
+  keep_to_maximum(features_, settings_.maximum);
+  overlays_.let_go(features_, trails_);
+  if (trails_.is_due()) trails_.note(features_);
   note_picture(image);
   blind_frames_ = 0;
   remember(image);
@@ -215,8 +201,8 @@ bool FeatureFollower::has_lately_been_lost(const FollowedFeature& feature) const
 // A third to half a second ago there is always one.
 void FeatureFollower::note_picture(const GreyImage& image) noexcept {
   constexpr std::uint64_t kPlacesApart = 5;
-  const std::uint64_t place = frame_ / trail_stride_;
-  if (frame_ % (kPlacesApart * trail_stride_) != 0) return;
+  const std::uint64_t place = trails_.place();
+  if (trails_.frame() % (kPlacesApart * trails_.stride()) != 0) return;
   recent_[place / kPlacesApart % recent_.size()] = {thumbnail_of(image), place};
 }
 
@@ -231,13 +217,13 @@ void FeatureFollower::sweep() noexcept {
   const Recent& then = *std::min_element(
       recent_.begin(), recent_.end(), [](const Recent& a, const Recent& b) { return a.trail_place < b.trail_place; });
   const int place = places_.remember(then.picture);
-  const std::uint64_t ago = frame_ / trail_stride_ - then.trail_place;
+  const std::uint64_t ago = trails_.place() - then.trail_place;
   for (FollowedFeature& feature : features_) {
-    if (feature.state == FollowState::kCandidate) let_go(feature);
+    if (feature.state == FollowState::kCandidate) feature.let_go();
     if (feature.state != FollowState::kTracked && !has_lately_been_lost(feature)) continue;
     disbelieve(feature);
     if (ago > 0 && ago <= feature.trail_length && ago < FollowedFeature::kTrail) {
-      feature.px = feature.last_px = trailed(feature, static_cast<std::size_t>(ago));
+      feature.px = feature.last_px = trails_.at(feature, static_cast<std::size_t>(ago));
     }
     feature.velocity_px.setZero();
     feature.swept = true;
@@ -293,7 +279,7 @@ bool FeatureFollower::recall_place(const GreyImage& image, int place, const Thum
   if (swept == 0) return false;
   const Vector2d coarse = displacement_between(places_[place], now).value_or(Vector2d::Zero());
   const std::size_t stride = (swept + kProbes - 1) / kProbes;
-  std::size_t nth = frame_ % stride, probed = 0;
+  std::size_t nth = trails_.frame() % stride, probed = 0;
   for (FollowedFeature& feature : features_) {
     if (!is_of_place(feature) || nth++ % stride != 0) continue;
     ++probed;
@@ -364,7 +350,7 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
       if (is_candidate && feature.misses <= misses_of_candidate) continue;
       const int missed = feature.misses - feature.hidden;
       if (is_candidate || missed > occluded || feature.hidden > hidden || (is_outside && missed > occluded / 4)) {
-        let_go(feature);
+        feature.let_go();
       } else {
         feature.state = FollowState::kOccluded;
       }
@@ -386,19 +372,16 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
 
     const bool is_candidate = feature.state == FollowState::kCandidate;
     if (!moves_with_neighbours(feature, is_back)) {
-      let_go(feature);
+      feature.let_go();
       continue;
     }
-    // One that stands still while the camera moves has to wait for the proof that it is an overlay, or none.
-    constexpr double kMoved_px = 1.5;
-    const bool may_be_overlay =
-        camera_lately_.at(feature.px).norm() > kMoved_px && has_stood_still(feature, kCandidateWindow);
-    if (is_candidate && feature.frames >= candidate && !may_be_overlay) {
+    if (is_candidate && feature.frames >= candidate && !overlays_.may_be_overlay(feature, trails_)) {
       feature.is_ripe = true;
     }
     if (is_candidate) feature.doubt_px += largest_deviation(feature.match.covariance_px2) + feature.patch.back_px();
     feature.patch.keep_view(image, feature.match, tracker_.kernels());
-    if (frame_ % view_stride == 0 && validity_.at(feature.px) == RegionFault::kNone) feature.patch.settle_view();
+    if (trails_.frame() % view_stride == 0 && validity_.at(feature.px) == RegionFault::kNone)
+      feature.patch.settle_view();
   }
   if (scratch_.size() >= kEnoughDisplacements) {
     constexpr double kShareOfNew = 0.2, kLeast_px = 0.4;
@@ -431,175 +414,12 @@ bool FeatureFollower::moves_with_neighbours(FollowedFeature& feature, bool is_ba
          kMostAstray_px + kMostAstrayOfStrangeness * strangeness_px_ + kStrain * neighbours.distance_px;
 }
 
-// Two features at one place follow the same tissue, one of them wrongly: the older one stays.
-void FeatureFollower::drop_doubles() noexcept {
-  constexpr double kApart_px = 3.0;
-  for (std::size_t i = 0; i < features_.size(); ++i) {
-    if (!features_[i].found) continue;
-    for (std::size_t k = i + 1; k < features_.size(); ++k) {
-      if (!features_[k].found || (features_[i].px - features_[k].px).squaredNorm() > kApart_px * kApart_px) continue;
-      let_go(features_[i].frames < features_[k].frames ? features_[i] : features_[k]);
-      if (!features_[i].found) break;
-    }
-  }
-}
-
-std::ptrdiff_t FeatureFollower::filled_by_features() const noexcept {
-  return std::count_if(features_.begin(), features_.end(), [](const FollowedFeature& feature) {
-    return feature.state != FollowState::kCandidate && feature.fills_place();
-  });
-}
-
-// Of the candidates that are ripe, as many as there is room for; the others are let go.
-void FeatureFollower::promote_the_surest() noexcept {
-  std::ptrdiff_t room = settings_.maximum - filled_by_features();
-  for (;; --room) {
-    FollowedFeature* surest = nullptr;
-    for (FollowedFeature& feature : features_) {
-      if (feature.state != FollowState::kCandidate || !feature.is_ripe) continue;
-      if (surest == nullptr || feature.doubt_px < surest->doubt_px) surest = &feature;
-    }
-    if (surest == nullptr) return;
-    if (room > 0) {
-      surest->state = FollowState::kTracked;
-    } else {
-      let_go(*surest);
-    }
-  }
-}
-
-// The youngest give way to those that came back.
-void FeatureFollower::keep_to_maximum() noexcept {
-  for (std::ptrdiff_t filled = filled_by_features(); filled > settings_.maximum; --filled) {
-    FollowedFeature* youngest = nullptr;
-    for (FollowedFeature& feature : features_) {
-      if (feature.state == FollowState::kCandidate || !feature.fills_place()) continue;
-      if (youngest == nullptr || feature.frames < youngest->frames) youngest = &feature;
-    }
-    let_go(*youngest);
-  }
-}
-
 // For the ways back.
 void FeatureFollower::remember(const GreyImage& image) noexcept {
   before_pixels_.resize(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
   std::uint8_t* to = before_pixels_.data();
   for (int y = 0; y < image.height; ++y) to = std::copy_n(image.row(y), image.width, to);
   before_ = {before_pixels_.data(), image.width, image.height, image.width};
-}
-
-const Vector2d& FeatureFollower::trailed(const FollowedFeature& feature, std::size_t places_ago) const noexcept {
-  return feature.trail[(frame_ / trail_stride_ - places_ago) % FollowedFeature::kTrail];
-}
-
-// Before this frame's own place is noted, from `places` places before it on.
-bool FeatureFollower::has_stood_still(const FollowedFeature& feature, std::size_t places) const noexcept {
-  constexpr double kStill_px = 0.4;
-  if (feature.trail_length < places) return false;
-  for (std::size_t ago = 1; ago <= places; ++ago) {
-    if ((feature.px - trailed(feature, ago)).squaredNorm() > kStill_px * kStill_px) return false;
-  }
-  return true;
-}
-
-// By what moves; known where that is most of all there is and nearly all of it goes together. Then it is the camera
-// that has moved; a beating part moves beside what stands still, by more and less.
-std::optional<FeatureFollower::CameraMotion> FeatureFollower::camera_motion(std::size_t places) noexcept {
-  constexpr std::size_t kEnoughToTell = 8;
-  constexpr double kMost = 0.6, kAlike = 0.3, kAlike_px = 1.0, kOutlier = 2.5;
-  std::size_t trailing = 0;
-  CameraMotion camera;
-  double most_px = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < 2; ++round) {
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
-    std::size_t moving = 0;
-    trailing = 0;
-    for_each_trail(places, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
-      ++trailing;
-      const Vector2d by = feature.px - from;
-      if (stood_still || (round > 0 && (by - camera.at(from)).norm() > most_px)) return;
-      ++moving;
-      const Eigen::Vector3d terms = CameraMotion::terms(from);
-      normal += terms * terms.transpose();
-      right += terms * by.transpose();
-    });
-    if (moving < kEnoughToTell || static_cast<double>(moving) < kMost * static_cast<double>(trailing)) {
-      return std::nullopt;
-    }
-    camera.coefficients = normal.ldlt().solve(right);
-    scratch_.clear();
-    for_each_trail(places, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
-      if (!stood_still) scratch_.push_back((feature.px - from - camera.at(from)).norm());
-    });
-    most_px = kOutlier * upper_median(scratch_.begin(), scratch_.end());
-  }
-  std::size_t alike = 0;
-  for_each_trail(places, [&](const FollowedFeature& feature, const Vector2d& from, bool stood_still) {
-    const Vector2d by = camera.at(from);
-    const bool is_alike = (feature.px - from - by).norm() <= kAlike * by.norm() + kAlike_px;
-    alike += !stood_still && is_alike ? 1 : 0;
-  });
-  if (!camera.coefficients.allFinite() || static_cast<double>(alike) < kMost * static_cast<double>(trailing)) {
-    return std::nullopt;
-  }
-  return camera;
-}
-
-// Tissue that stands still is joined to what moves: what is next to it moves little.
-bool FeatureFollower::is_overlay(const FollowedFeature& feature, const CameraMotion& camera) const noexcept {
-  constexpr double kMoved_px = 3.0;
-  const Vector2d by = camera.at(feature.px);
-  if (!feature.found || by.norm() < kMoved_px || !has_stood_still(feature, kOverlayWindow)) return false;
-  double nearest = std::numeric_limits<double>::infinity();
-  Vector2d beside = Vector2d::Zero();
-  for_each_trail(kOverlayWindow, [&](const FollowedFeature& other, const Vector2d& from, bool stood_still) {
-    const double distance = (other.px - feature.px).squaredNorm();
-    if (stood_still || distance >= nearest) return;
-    nearest = distance;
-    beside = other.px - from;
-  });
-  return (beside - by).norm() < 0.5 * by.norm();
-}
-
-void FeatureFollower::let_overlays_go() noexcept {
-  std::erase_if(overlays_, [&](const Overlay& overlay) { return overlay.until_frame <= frame_; });
-  if (frame_ % trail_stride_ != 0) return;
-  const auto lately = camera_motion(kCandidateWindow);
-  camera_lately_ = lately.value_or(CameraMotion{});
-  if (const auto camera = camera_motion(kOverlayWindow)) {
-    for (FollowedFeature& feature : features_) {
-      if (!is_overlay(feature, *camera)) continue;
-      bar(feature.px);
-      let_go(feature);
-      feature.is_overlay = true;
-    }
-  }
-  for (FollowedFeature& feature : features_) {
-    feature.trail[frame_ / trail_stride_ % FollowedFeature::kTrail] = feature.px;
-    feature.trail_length = std::min(feature.trail_length + 1, FollowedFeature::kTrail);
-  }
-}
-
-void FeatureFollower::bar(const Vector2d& px) noexcept {
-  const Overlay overlay{px, frame_ + settings_.rate.frames(settings_.overlay)};
-  if (overlays_.size() < kMostOverlays) {
-    overlays_.push_back(overlay);
-    return;
-  }
-  *std::min_element(overlays_.begin(), overlays_.end(),
-                    [](const Overlay& a, const Overlay& b) { return a.until_frame < b.until_frame; }) = overlay;
-}
-
-// An empty place, or that of what has been away longest.
-FollowedFeature* FeatureFollower::place_for_new() noexcept {
-  FollowedFeature* longest_away = nullptr;
-  for (FollowedFeature& feature : features_) {
-    if (feature.is_overlay || feature.fills_place()) continue;
-    if (feature.state == FollowState::kEmpty) return &feature;
-    if (longest_away == nullptr || feature.misses > longest_away->misses) longest_away = &feature;
-  }
-  return longest_away;
 }
 
 void FeatureFollower::add(const GreyImage& image, std::span<const Vector2d> corners,
@@ -612,7 +432,7 @@ void FeatureFollower::add(const GreyImage& image, std::span<const Vector2d> corn
     if (make_patch_template(image, px, settings, tracker_.kernels(), patch) != TemplateVerdict::kGood) {
       continue;
     }
-    FollowedFeature* const place = place_for_new();
+    FollowedFeature* const place = place_for_new(features_);
     if (place == nullptr) return;
     --wanted;
     *place = FollowedFeature{};
@@ -626,8 +446,7 @@ void FeatureFollower::add(const GreyImage& image, std::span<const Vector2d> corn
     place->match.px = px;
     place->match.correlation = 1;
     place->frames = 1;
-    place->trail[frame_ / trail_stride_ % FollowedFeature::kTrail] = px;
-    place->trail_length = 1;
+    trails_.begin(*place);
   }
 }
 

@@ -2,7 +2,6 @@
 // those, the pipeline predicts each feature from its map instead.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <chrono>
 #include <cstddef>
@@ -15,8 +14,10 @@
 #include "core/sensors/grey_image.hpp"
 #include "core/time/frame_rate.hpp"
 #include "core/time/instant.hpp"
-#include "core/vision/followed_patch.hpp"
+#include "core/vision/feature_trails.hpp"
+#include "core/vision/followed_feature.hpp"
 #include "core/vision/neighbour_motion.hpp"
+#include "core/vision/overlay_watch.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
 #include "core/vision/picture_validity.hpp"
@@ -49,44 +50,6 @@ struct FollowerSettings {
   double candidates_per_place = 1.0;
 };
 
-enum class FollowState : std::uint8_t {
-  kEmpty,
-  kCandidate,  // new: may be a highlight, an instrument, the rim of the view or what is laid over the picture
-  kTracked,
-  kOccluded,  // was tracked and is not found at present; its place is carried along with its neighbours
-};
-
-struct FollowedFeature {
-  static constexpr std::size_t kTrail = 16;  // places kept, about a 30th of a second apart
-
-  FollowState state = FollowState::kEmpty;
-  std::uint32_t id = 0;
-  bool found = false;                       // in the last frame
-  Vector2d px = Vector2d::Zero();           // where it was found, else where it is expected
-  Vector2d velocity_px = Vector2d::Zero();  // per frame
-  FollowedPatch patch;
-  PatchMatch match;                     // of the last frame
-  Vector2d last_px = Vector2d::Zero();  // in the frame before
-  int frames = 0;                       // found in
-  int misses = 0;                       // in a row
-  int hidden = 0;                       // of them, those in which its region showed no tissue
-  bool is_away = false;                 // missed for more than a moment
-  int strange = 0;  // frames in which it moved otherwise than its neighbours, less those in which not
-  Vector2d astray_px = Vector2d::Zero();  // how far it has lately gone another way than its neighbours
-  double doubt_px = 0;                   // deviations of its matches and misses of the ways back, summed over its trial
-  bool is_ripe = false;                  // a candidate that has stood its trial
-  bool is_overlay = false;               // let go in the last frame because it is laid over the picture
-  bool swept = false;                    // it vanished together with nearly all others
-  int place = 0;                         // SeenPlaces' number of the picture that they vanished from
-  bool is_recalled = false;              // it has come back with them in the last frame
-  FollowedPatch::Places last_places;     // in the frame before: what is not believed is taken back
-  std::array<Vector2d, kTrail> trail{};  // where it was, by the number of the place
-  std::size_t trail_length = 0;
-
-  // False for what has been away for more than a moment: another may take its place then.
-  [[nodiscard]] bool fills_place() const noexcept;
-};
-
 // How a feature is predicted: by its own last displacement (constant velocity); where that fails, by the displacement
 // of the features around it in this very frame; where most fail at once, the camera has jerked, and all are sought
 // widely. The deviation of a prediction is what predictions have lately been off by.
@@ -97,11 +60,9 @@ struct FollowedFeature {
 // missed in a region that shows no tissue (picture_validity.hpp) counts as hidden. A frame without contrast (black,
 // faded) is no look at anything: nothing is sought and nothing is missed.
 //
-// What stands still to a few tenths of a pixel while the whole picture moves beside it is no tissue but laid over the
-// picture: text, a logo. It is let go, and its place is not taken again for long.
-//
-// How a feature's looks are kept is in followed_patch.hpp. More candidates are tried than there are places; those whose
-// matches were surest become features. A match's deviation refuses nothing.
+// What is laid over the picture is let go (overlay_watch.hpp). How a feature's looks are kept is in followed_patch.hpp.
+// More candidates are tried than there are places; those whose matches were surest become features. A match's deviation
+// refuses nothing.
 class FeatureFollower {
  public:
   explicit FeatureFollower(const FollowerSettings& settings);
@@ -130,14 +91,6 @@ class FeatureFollower {
   [[nodiscard]] std::size_t frames_to_judge() const noexcept;
 
  private:
-  // What the whole picture has gone by over some frames, as an affine function of the place.
-  struct CameraMotion {
-    Eigen::Matrix<double, 3, 2> coefficients = Eigen::Matrix<double, 3, 2>::Zero();
-    static Eigen::Vector3d terms(const Vector2d& px) noexcept { return {1.0, kScale * px.x(), kScale * px.y()}; }
-    [[nodiscard]] Vector2d at(const Vector2d& px) const noexcept { return coefficients.transpose() * terms(px); }
-    static constexpr double kScale = 1e-3;  // so that all terms are of one size
-  };
-
   [[nodiscard]] bool seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
                           double deviation_px, double min_correlation, bool is_vouched_for = false) const noexcept;
   [[nodiscard]] bool seek_vouched_for(const GreyImage& image, FollowedFeature& feature, const Vector2d& expected,
@@ -161,35 +114,17 @@ class FeatureFollower {
   [[nodiscard]] std::optional<Vector2d> displacement_of_swept(int place) noexcept;
   void judge(const GreyImage& image) noexcept;
   [[nodiscard]] bool moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept;
-  void drop_doubles() noexcept;
-  void keep_to_maximum() noexcept;
-  [[nodiscard]] const Vector2d& trailed(const FollowedFeature& feature, std::size_t places_ago) const noexcept;
-  [[nodiscard]] bool has_stood_still(const FollowedFeature& feature, std::size_t places) const noexcept;
-  // Of those found that have so long a trail: feature, where it was then, whether it has stayed there.
-  template <class Function>
-  void for_each_trail(std::size_t places, Function&& function) const {
-    for (const FollowedFeature& feature : features_) {
-      if (!feature.found || feature.trail_length < places) continue;
-      function(feature, trailed(feature, places), has_stood_still(feature, places));
-    }
-  }
-  [[nodiscard]] std::optional<CameraMotion> camera_motion(std::size_t places) noexcept;
-  [[nodiscard]] bool is_overlay(const FollowedFeature& feature, const CameraMotion& camera) const noexcept;
-  void let_overlays_go() noexcept;
-  void bar(const Vector2d& px) noexcept;
-  [[nodiscard]] FollowedFeature* place_for_new() noexcept;
-  void promote_the_surest() noexcept;
-  [[nodiscard]] std::ptrdiff_t filled_by_features() const noexcept;
   void remember(const GreyImage& image) noexcept;
 
   FollowerSettings settings_;
-  std::uint64_t trail_stride_;  // frames from one place of a trail to the next
+  FeatureTrails trails_;
   PatchTracker tracker_;
   std::vector<FollowedFeature> features_;
   std::vector<std::uint8_t> before_pixels_;
   GreyImage before_;        // the frame before; without pixels until there was one
   NeighbourMotion motion_;  // of this frame
   PictureValidity validity_;
+  OverlayWatch overlays_;
   SeenPlaces places_;
   struct Recent {
     Thumbnail picture;
@@ -200,14 +135,7 @@ class FeatureFollower {
   double deviation_px_;
   double strangeness_px_ = 1.0;  // how far a displacement usually is from that of the neighbours
   std::uint32_t next_id_ = 1;
-  std::uint64_t frame_ = 0;  // of those that show anything
-  int blind_frames_ = 0;     // in a row
-  CameraMotion camera_lately_;
-  struct Overlay {
-    Vector2d px;
-    std::uint64_t until_frame;
-  };
-  std::vector<Overlay> overlays_;
+  int blind_frames_ = 0;  // in a row
 };
 
 }  // namespace perimap

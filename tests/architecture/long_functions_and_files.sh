@@ -32,7 +32,7 @@ found=$(awk '
     if (!index(substr($0, RSTART + RLENGTH), ")" mark "\"")) { raw = 1; ended = 1; next }
   }
   /^ *\/\/ Long: / { reason = 1; if (in_head) file_reason = 1; ended = 1; next }
-  /^ *\/\// { ended = 1; next }
+  /^ *\/\// { next }  # also in the middle of a statement
   /^ *$/ { ended = 1; reason = 0; next }
   /^#/ { ended = 1; next }
   {

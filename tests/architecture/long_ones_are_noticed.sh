@@ -30,6 +30,14 @@ refuse "a long member function"
 refuse "a long test"
 { echo 'namespace {'; echo; lines 300 | sed 's/^ *work\(.*\);/int x\1;/'; echo '}'; } > "$folder/x.cpp"
 accept "a long namespace"
+{
+  printf '%s\n' 'S::S()' '    : a_(1),' '      // Twice that.' '      b_(2) {' '  work();' '}' 'void f() {'
+  lines 60
+  printf '%s\n' '  const S s = {' '      1};' '}' 'void g() {'
+  lines 60
+  printf '%s\n' '  for (int i : {' '           1}) {' '      }' '}'
+} > "$folder/x.cpp"
+accept "a comment among the initializers of a short constructor"
 { echo 'int a;'; lines 500; } > "$folder/x.cpp"
 refuse "a file of 501 lines"
 { echo '// A file.'; echo '// Long: for a reason.'; echo 'int a;'; lines 500; } > "$folder/x.cpp"
