@@ -91,11 +91,14 @@ double residual_variance(const PatchTemplate::Level& level, const PatchSamples& 
 }
 
 // The projected steepest-descent images times the image, divided by the gain: the right-hand side of the normal
-// equations (Baker & Matthews 2004, section 3.2, with the projection of Part 3).
+// equations (Baker & Matthews 2004, section 3.2, with the projection of Part 3), but for the gain.
+//
+// The projection takes the gain by least squares, which the template's own noise makes too small: a template that is as
+// noisy as the image would then move against its own slope, each time by the same. The ratio of the deviations is not
+// made smaller, as both are noisy alike; where the two fit it is the same.
 Vector6 right_hand_side(const PatchTemplate::Level& level, const Sums& sums, double gain) noexcept {
-  const double covariance_sum = sums.with_template - level.mean * sums.grey;
   return (sums.with_sd - Vector6::Map(level.sd_mean.data()) * sums.grey -
-          Vector6::Map(level.sd_on_grey.data()) * covariance_sum) /
+          Vector6::Map(level.sd_on_grey.data()) * (gain * level.sum_squares)) /
          gain;
 }
 
@@ -159,7 +162,7 @@ AlignmentResult iterate(const GreyImage& image, const PatchTemplate::Level& leve
     const Sums sums = in_grey_levels(level, raw);
     result = compare(level, sums);
     if (!(result.gain > kMinGain)) return result;
-    const double moved = step.apply(right_hand_side(level, sums, result.gain), warp);
+    const double moved = step.apply(right_hand_side(level, sums, result.gain / result.correlation), warp);
     if (!((warp.centre - start).norm() <= limits.max_travel)) return result;
     // Still creeping at the last step: near enough for the next stage, which has its own test.
     constexpr double kNearlyAtRest = 10;
