@@ -112,6 +112,26 @@ NeighbourMotion::Around FeatureFollower::around(const Vector2d& px, const Follow
   return result;
 }
 
+// All that was not found at once is sought widely. What was found at once and does not go with what is found then, came
+// upon something else where it was expected.
+void FeatureFollower::follow_jerk(const GreyImage& image) noexcept {
+  for (FollowedFeature& feature : features_) {
+    feature.was_found_at_once = feature.found;
+    if (!is_sought(feature) || feature.found) continue;
+    (void)seek(image, feature, feature.last_px + displacement_around(feature.last_px, &feature),
+               settings_.widest_deviation_px, settings_.recovered_correlation);
+  }
+  note_displacements();
+  for (FollowedFeature& feature : features_) {
+    if (!is_sought(feature) || !feature.was_found_at_once) continue;
+    const NeighbourMotion::Around neighbours = around(feature.last_px, &feature);
+    if (!neighbours.known || !is_strange(feature.px - feature.last_px - neighbours.by, neighbours)) continue;
+    disbelieve(feature);
+    (void)seek(image, feature, feature.last_px + neighbours.by, kFirstDeviation_px, settings_.recovered_correlation);
+  }
+  note_displacements();
+}
+
 void FeatureFollower::track_into(const GreyImage& image) noexcept {
   std::size_t sought = 0, found = 0;
   for (FollowedFeature& feature : features_) {
@@ -139,15 +159,7 @@ void FeatureFollower::track_into(const GreyImage& image) noexcept {
   }
   note_displacements();
 
-  const bool has_jerked = 2 * found < sought;
-  if (has_jerked) {
-    for (FollowedFeature& feature : features_) {
-      if (!is_sought(feature) || feature.found) continue;
-      (void)seek(image, feature, feature.last_px + displacement_around(feature.last_px, &feature),
-                 settings_.widest_deviation_px, settings_.recovered_correlation);
-    }
-    note_displacements();
-  }
+  if (2 * found < sought) follow_jerk(image);
   if (has_vanished()) {
     sweep();
     note_displacements();
@@ -390,25 +402,28 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
   }
 }
 
+// In one frame.
+bool FeatureFollower::is_strange(const Vector2d& astray, const NeighbourMotion::Around& neighbours) const noexcept {
+  constexpr double kStrainOfFrame = 0.06;  // of the distance to the neighbours: what a beat strains the tissue by
+  return astray.norm() > 4 * strangeness_px_ + 0.25 * neighbours.by.norm() +
+                             settings_.rate.of_usual() * kStrainOfFrame * neighbours.distance_px;
+}
+
 // Jumps and steady sliding: along an edge, on an instrument, with a highlight. Tissue strains, so neighbours differ
 // within bounds.
 bool FeatureFollower::moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept {
   const NeighbourMotion::Around neighbours = around(feature.last_px, &feature);
   const Vector2d astray = feature.px - feature.last_px - neighbours.by;
   scratch_.push_back(astray.norm());
-  // Of the distance to the neighbours: what a beat strains the tissue by, in a frame and in all.
-  constexpr double kStrainOfFrame = 0.06, kStrain = 0.35;
-  const double usual = settings_.rate.of_usual();
-  const bool is_strange = astray.norm() > 4 * strangeness_px_ + 0.25 * neighbours.by.norm() +
-                                              usual * kStrainOfFrame * neighbours.distance_px;
-  feature.strange = std::max(0, feature.strange + (is_strange ? 2 : -1));
+  feature.strange = std::max(0, feature.strange + (is_strange(astray, neighbours) ? 2 : -1));
   // It counts up by two: three strange frames, and a third of a second of them.
   constexpr Duration kStrangeCandidate = std::chrono::milliseconds(167), kStrange = std::chrono::milliseconds(667);
   const bool is_candidate = feature.state == FollowState::kCandidate;
   if (feature.strange > (is_candidate ? frames(kStrangeCandidate, 5) : frames(kStrange, 20))) return false;
   // What comes back makes up for a place that was only guessed.
   constexpr double kForgetting = 0.03, kMostAstray_px = 4, kMostAstrayOfStrangeness = 6;
-  const double kept = 1 - usual * kForgetting;
+  constexpr double kStrain = 0.35;  // of the distance to the neighbours: what beats strain the tissue by
+  const double kept = 1 - settings_.rate.of_usual() * kForgetting;
   feature.astray_px = is_back ? Vector2d::Zero() : Vector2d(kept * feature.astray_px + astray);
   return feature.astray_px.norm() <=
          kMostAstray_px + kMostAstrayOfStrangeness * strangeness_px_ + kStrain * neighbours.distance_px;

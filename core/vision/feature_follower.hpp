@@ -101,6 +101,7 @@ class FeatureFollower {
     return around(px, but).by;
   }
   void note_displacements() noexcept;
+  void follow_jerk(const GreyImage& image) noexcept;
   void find_again(const GreyImage& image) noexcept;
   // As many as take so long, but not fewer than there must be to tell anything.
   [[nodiscard]] int frames(Duration time, int least) const noexcept;
@@ -113,6 +114,8 @@ class FeatureFollower {
   [[nodiscard]] bool recall_place(const GreyImage& image, int place, const Thumbnail& now) noexcept;
   [[nodiscard]] std::optional<Vector2d> displacement_of_swept(int place) noexcept;
   void judge(const GreyImage& image) noexcept;
+  // `astray`: by how much it moved otherwise than its neighbours.
+  [[nodiscard]] bool is_strange(const Vector2d& astray, const NeighbourMotion::Around& neighbours) const noexcept;
   [[nodiscard]] bool moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept;
   void remember(const GreyImage& image) noexcept;
 

@@ -25,6 +25,7 @@ struct FollowedFeature {
   FollowState state = FollowState::kEmpty;
   std::uint32_t id = 0;
   bool found = false;                       // in the last frame
+  bool was_found_at_once = false;           // in the last frame in which most were not: where it was expected
   Vector2d px = Vector2d::Zero();           // where it was found, else where it is expected
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   FollowedPatch patch;
