@@ -9,9 +9,8 @@
 namespace perimap {
 namespace {
 
-// Of the first view: where the last one did not find the place, and where it did. One that fits worse tells no better
-// than the last one where it is.
-constexpr double kFirstViewFinds = 0.98, kFirstViewCorrects = 0.99;
+// Of the first view, where it may take over: one that fits worse tells no better than the last one where it is.
+constexpr double kFirstViewFits = 0.98;
 
 }  // namespace
 
@@ -57,7 +56,7 @@ PatchMatch FollowedPatch::find(const PatchTracker& tracker, const GreyImage& ima
   PatchState first = first_state_;
   const PatchMatch again = tracker.track(image, first_, first, search.predicted_px, covariance);
   const double fits =
-      search.is_vouched_for ? search.min_correlation : std::max(search.min_correlation, kFirstViewFinds);
+      search.is_vouched_for ? search.min_correlation : std::max(search.min_correlation, kFirstViewFits);
   if (again.state == MatchState::kFound && again.correlation >= fits) {
     first_state_ = first;
     drift_px2_ = 0;
@@ -87,7 +86,7 @@ void FollowedPatch::correct_by_first_view(const PatchTracker& tracker, const Gre
   PatchState state = first_state_;
   const double variance = drift_px2_ + kLeast_px * kLeast_px;
   const PatchMatch first = tracker.track(image, first_, state, match.px, variance * Matrix2d::Identity());
-  if (first.state != MatchState::kFound || first.correlation < kFirstViewCorrects) return;
+  if (first.state != MatchState::kFound || first.correlation < kFirstViewFits) return;
   first_state_ = state;
   drift_px2_ = 0;
   match = first;
