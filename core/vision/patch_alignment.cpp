@@ -93,8 +93,8 @@ double residual_variance(const PatchTemplate::Level& level, const PatchSamples& 
 // The projected steepest-descent images times the image, divided by the gain: the right-hand side of the normal
 // equations (Baker & Matthews 2004, section 3.2, with the projection of Part 3), but for the gain.
 //
-// The projection takes the gain by least squares, which the template's own noise makes too small: a template that is as
-// noisy as the image would then move against its own slope, each time by the same. The ratio of the deviations is not
+// With the gain of least squares it is the projection's own. A template that is as noisy as the image would then move
+// against its own slope, each time by the same: its noise makes that gain too small. The ratio of the deviations is not
 // made smaller, as both are noisy alike; where the two fit it is the same.
 Vector6 right_hand_side(const PatchTemplate::Level& level, const Sums& sums, double gain) noexcept {
   return (sums.with_sd - Vector6::Map(level.sd_mean.data()) * sums.grey -
@@ -162,7 +162,8 @@ AlignmentResult iterate(const GreyImage& image, const PatchTemplate::Level& leve
     const Sums sums = in_grey_levels(level, raw);
     result = compare(level, sums);
     if (!(result.gain > kMinGain)) return result;
-    const double moved = step.apply(right_hand_side(level, sums, result.gain / result.correlation), warp);
+    const double gain = limits.gain_is_ratio ? result.gain / result.correlation : result.gain;
+    const double moved = step.apply(right_hand_side(level, sums, gain), warp);
     if (!((warp.centre - start).norm() <= limits.max_travel)) return result;
     // Still creeping at the last step: near enough for the next stage, which has its own test.
     constexpr double kNearlyAtRest = 10;

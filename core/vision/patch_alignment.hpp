@@ -42,6 +42,9 @@ struct AlignmentLimits {
   double at_rest = 0.01;  // level pixels: a step below this ends the iteration
   double max_travel = 4;  // level pixels from the start of the iteration
   bool wants_residual = false;
+  // The gain that moves the warp is the ratio of the windows' deviations instead of that by least squares, which the
+  // template's noise makes too small: for a template that is as noisy as the image.
+  bool gain_is_ratio = false;
 };
 
 // Moves warp.centre only. level must be usable.

@@ -59,7 +59,8 @@ struct PatchTemplate {
   alignas(64) std::array<Pixels, 4> gradient_moments{};
 
   std::array<Level, kLevels> levels;
-  bool affine_usable = false;                                      // level 0 determines all six parameters
+  bool is_of_frame_before = false;  // and so as noisy as the image that it is held against, and looks like it
+  bool affine_usable = false;       // level 0 determines all six parameters
   std::array<double, kParameters * kParameters> affine_inverse{};  // inverse of level 0's projected Hessian
 };
 

@@ -62,11 +62,17 @@ class Attempts {
   }
 
  private:
+  [[nodiscard]] AlignmentLimits usual_limits() const noexcept {
+    AlignmentLimits limits;
+    limits.gain_is_ratio = patch_.is_of_frame_before;
+    return limits;
+  }
+
   // A coarse level that fails is passed over: the finer ones decide.
   void align_coarse(int l, PatchWarp& warp) const noexcept {
     const PatchTemplate::Level& level = patch_.levels[static_cast<std::size_t>(l)];
     if (!level.usable) return;
-    AlignmentLimits limits;
+    AlignmentLimits limits = usual_limits();
     limits.at_rest = 0.1;
     const Vector2d centre = to_level(warp.centre, l);
     const double reach = (level.half() + 1) * warp.A.cwiseAbs().rowwise().sum().maxCoeff() + limits.max_travel + 3;
@@ -78,7 +84,7 @@ class Attempts {
 
   void align_finest(Attempt& attempt) const noexcept {
     const PatchTemplate::Level& level = patch_.levels[0];
-    AlignmentLimits limits;
+    AlignmentLimits limits = usual_limits();
     limits.wants_residual = true;
     if (patch_.affine_usable && approach(attempt)) {
       PatchWarp warp = attempt.warp;
@@ -99,7 +105,7 @@ class Attempts {
   // Translation to within what affine alignment finishes. While the shape is near the template's own, the image's own
   // grid will do, which is several times quicker than a warped one.
   [[nodiscard]] bool approach(Attempt& attempt) const noexcept {
-    AlignmentLimits limits;
+    AlignmentLimits limits = usual_limits();
     limits.at_rest = 0.3;
     constexpr double kNear = 0.06;  // moves the window's rim by about half a pixel
     const Matrix2d shape = attempt.warp.A;

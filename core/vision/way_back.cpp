@@ -10,6 +10,7 @@ bool make_view(const GreyImage& image, const Vector2d& px, const PatchKernels& k
   any_texture.max_saturated_share = 1;
   if (make_patch_template(image, px, any_texture, kernels, view) != TemplateVerdict::kGood) return false;
   view.affine_usable = false;
+  view.is_of_frame_before = true;
   return true;
 }
 
