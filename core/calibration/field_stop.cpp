@@ -272,7 +272,7 @@ Expected<FieldStopReading> read_field_stop(const GreyImage& picture) {
   for (int k = 0; k < kRays; ++k) {
     const double angle = kTwoPi * k / kRays;
     const auto r = edge_on_ray(picture, low, middle, angle, 0.5 * diagonal, 0.1 * diagonal);
-    if (r) edge.push_back(middle + *r * direction_of(angle));
+    if (r) edge.emplace_back(middle + *r * direction_of(angle));
   }
   constexpr std::size_t kFewest = kRays / 5;
   if (edge.size() < kFewest) return fail(no_stop);
@@ -293,7 +293,7 @@ Expected<FieldStopReading> read_field_stop(const GreyImage& picture) {
     std::vector<Vector2d> near;
     for (std::size_t i = 0; i < profile.depth_px.size(); ++i) {
       if (!(std::abs(profile.depth_px[i]) < 4.0 * reading.edge_deviation_px)) continue;
-      near.push_back(fitted.centre + (fitted.radius - profile.depth_px[i]) * direction_of(profile.angle(i)));
+      near.emplace_back(fitted.centre + (fitted.radius - profile.depth_px[i]) * direction_of(profile.angle(i)));
     }
     if (const auto again = circle_through(near)) fitted = *again;
     reading.centre_deviation_px = reading.edge_deviation_px *

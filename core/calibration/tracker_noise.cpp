@@ -202,12 +202,15 @@ Expected<MeasuredNoise> measure_tracker_noise(const std::vector<TimedPose>& all)
   for (int k = 0; k <= 24; ++k) {
     for (const double share : {0.1, 0.5, 0.9, 1.0}) consider(std::log(shortest) + step * k, share);
   }
-  for (double d_tau = step / 2.0, d_share = 0.2; d_tau > 0.02; d_tau /= 2.0, d_share /= 2.0) {
+  double d_tau = step / 2.0, d_share = 0.2;
+  while (d_tau > 0.02) {
     const double log_tau = best_log_tau;
     const double share = best_share;
     for (const double a : {-1.0, 0.0, 1.0}) {
       for (const double b : {-1.0, 0.0, 1.0}) consider(log_tau + a * d_tau, share + b * d_share);
     }
+    d_tau /= 2.0;
+    d_share /= 2.0;
   }
   const double tau = std::exp(best_log_tau);
   // What does not last from one pose to the next is white.

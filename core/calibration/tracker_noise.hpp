@@ -34,6 +34,6 @@ struct MeasuredNoise {
 // restricted likelihood of a first-order Gauss-Markov error of one correlation time and a white one beside it, over the
 // six axes together (a Kalman filter's innovations; Harvey 1989), maximised over both. Fails when the sensor was not
 // still for at least ten seconds and two hundred poses.
-[[nodiscard]] Expected<MeasuredNoise> measure_tracker_noise(const std::vector<TimedPose>& poses);
+[[nodiscard]] Expected<MeasuredNoise> measure_tracker_noise(const std::vector<TimedPose>& all);
 
 }  // namespace perimap

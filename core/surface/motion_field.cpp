@@ -41,10 +41,10 @@ std::optional<MotionField> MotionField::fit(const ChartedMotion& motion, const E
   field.across_.kernel = kernels.across;
   field.along_.kernel = kernels.along;
   // Of one coefficient: a band's share of the position's variance is that of its cosine.
-  const auto bands = static_cast<double>(motion.along_mm.cols() / 2);
+  const Eigen::Index bands = motion.along_mm.cols() / 2;
   const Eigen::VectorXd across =
-      (motion.noise_A_mm2.row(kXx) + motion.noise_A_mm2.row(kYy)).transpose() * (0.5 / bands);
-  const Eigen::VectorXd along = motion.noise_A_mm2.row(kZz).transpose() / bands;
+      (motion.noise_A_mm2.row(kXx) + motion.noise_A_mm2.row(kYy)).transpose() * (0.5 / static_cast<double>(bands));
+  const Eigen::VectorXd along = motion.noise_A_mm2.row(kZz).transpose() / static_cast<double>(bands);
   if (!fit(field.across_, motion.across_mm, 4, across, r_mm, learn)) return std::nullopt;
   if (!fit(field.along_, motion.along_mm, 2, along, r_mm, learn)) return std::nullopt;
   field.kernels_ = {field.across_.kernel, field.along_.kernel};

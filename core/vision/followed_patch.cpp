@@ -54,9 +54,8 @@ PatchMatch FollowedPatch::find(const PatchTracker& tracker, const GreyImage& ima
   if (!has_last_) return match;
   // What has been covered, or has gone and come back, may look as it did at first.
   PatchState first = first_state_;
-  const PatchMatch again = tracker.track(image, first_, first, search.predicted_px, covariance);
-  const double fits =
-      search.is_vouched_for ? search.min_correlation : std::max(search.min_correlation, kFirstViewFits);
+  PatchMatch again = tracker.track(image, first_, first, search.predicted_px, covariance);
+  const double fits = search.is_vouched_for ? search.min_correlation : std::max(search.min_correlation, kFirstViewFits);
   if (again.state == MatchState::kFound && again.correlation >= fits) {
     first_state_ = first;
     drift_px2_ = 0;
@@ -64,7 +63,7 @@ PatchMatch FollowedPatch::find(const PatchTracker& tracker, const GreyImage& ima
   }
   if (search.before != nullptr || settled_views_ < settled_.size()) return match;
   PatchState settled;
-  const PatchMatch back = tracker.track(image, settled_.back(), settled, search.predicted_px, covariance);
+  PatchMatch back = tracker.track(image, settled_.back(), settled, search.predicted_px, covariance);
   if (back.state != MatchState::kFound || back.correlation < search.min_correlation) return match;
   last_state_ = settled;
   drift_px2_ += larger_eigenvalue(back.covariance_px2);

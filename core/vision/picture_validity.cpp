@@ -38,7 +38,8 @@ void PictureValidity::look_at(const GreyImage& image) noexcept {
     for (int column = 0; column < kColumns; ++column) {
       const int left = column * width_ / kColumns, right = std::min((column + 1) * width_ / kColumns, width_ - step);
       const int top = row * height_ / kRows, bottom = std::min((row + 1) * height_ / kRows, height_ - step);
-      double sum = 0, differences = 0, count = 0;
+      double sum = 0, differences = 0;
+      int count = 0;
       for (int y = top; y < bottom; y += step) {
         const std::uint8_t* const here = image.row(y);
         const std::uint8_t* const below = image.row(y + step);

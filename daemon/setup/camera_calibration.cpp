@@ -127,7 +127,7 @@ Certainty certainty_of(const Fit& fit, const Problem& problem, const Points& poi
     // What the pose can not take up.
     const Eigen::MatrixXd left = Ji - Jp * (Jp.transpose() * Jp).ldlt().solve(Jp.transpose() * Ji);
     S += left.transpose() * left;
-    scores.push_back(left.transpose() * r);
+    scores.emplace_back(left.transpose() * r);
     squares += r.squaredNorm(), count += static_cast<double>(r.size());
   }
   const double parameters = static_cast<double>(n) + 6.0 * static_cast<double>(points.board.size());

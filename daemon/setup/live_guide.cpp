@@ -38,7 +38,7 @@ std::vector<TimedPose> thinned(const std::vector<TimedPose>& poses, std::size_t 
 class BoardGuide final : public LiveGuide {
  public:
   BoardGuide(const BoardWish& wish, std::optional<CameraModel> camera, double least_s)
-      : wish_(wish), camera_(std::move(camera)), least_s_(least_s) {}
+      : wish_(wish), camera_(camera), least_s_(least_s) {}
 
   void see(double t_s, const GreyImage& grey) override {
     ++frames_;
@@ -186,7 +186,7 @@ class StillGuide final : public LiveGuide {
 }  // namespace
 
 std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<CameraModel> camera, double least_s) {
-  return std::make_unique<BoardGuide>(wish, std::move(camera), least_s);
+  return std::make_unique<BoardGuide>(wish, camera, least_s);
 }
 
 std::unique_ptr<LiveGuide> pivot_guide(double least_s) { return std::make_unique<PivotGuide>(least_s); }

@@ -15,7 +15,10 @@ cv::Mat to_cv(const Matrix3d& R) {
   return m;
 }
 
-cv::Mat to_cv(const Vector3d& t) { return (cv::Mat_<double>(3, 1) << t.x(), t.y(), t.z()); }
+cv::Mat to_cv(const Vector3d& t) {
+  const cv::Mat_<double> m = (cv::Mat_<double>(3, 1) << t.x(), t.y(), t.z());
+  return m;
+}
 
 }  // namespace
 

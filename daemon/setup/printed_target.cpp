@@ -17,10 +17,10 @@ constexpr double kRuler_mm = 100.0;
 }  // namespace
 
 Expected<PaperSize> paper_named(const std::string& name) {
-  static const std::array<PaperSize, 4> kPapers{
+  static const std::array<PaperSize, 4> papers{
       {{"A4", 210.0, 297.0}, {"A3", 297.0, 420.0}, {"A2", 420.0, 594.0}, {"letter", 215.9, 279.4}}};
   std::string names;
-  for (const PaperSize& paper : kPapers) {
+  for (const PaperSize& paper : papers) {
     if (paper.name == name) return paper;
     names += (names.empty() ? "" : ", ") + paper.name;
   }

@@ -22,7 +22,7 @@ struct EcgCsvOptions {
 // (`is_time_name`) says that there are times to pass over; several columns without such a heading are an error unless
 // `column` tells which is meant. An empty field, `nan`, `NA` and the like are a sample without value. Times may count
 // from 1970. Errors: "NAME:LINE:COLUMN: what is wrong".
-[[nodiscard]] Expected<EcgTrace> parse_ecg_csv(std::string_view text, const std::string& name,
+[[nodiscard]] Expected<EcgTrace> parse_ecg_csv(std::string_view written, const std::string& name,
                                                const EcgCsvOptions& options);
 
 }  // namespace perimap

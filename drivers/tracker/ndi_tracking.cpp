@@ -41,7 +41,7 @@ tl::unexpected<Error> truncated(const char* command) { return fail(fmt::format("
 struct Transform {
   double wxyz[4];
   Vector3d t;
-  double error_mm;  // RMS of the fit; of an electromagnetic tracker its indicator value
+  double error_mm = 0;  // RMS of the fit; of an electromagnetic tracker its indicator value
 };
 
 Transform read_transform(Cursor& cursor) noexcept {

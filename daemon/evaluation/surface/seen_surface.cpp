@@ -39,7 +39,7 @@ void SeenSurface::draw_points() {
   std::vector<Vector3d>& means = mean_vertices_;
   for (std::size_t vertex = 0; vertex < mesh.vertex_count; ++vertex) {
     const double* c = mesh.coefficients_mm.data() + vertex * 3 * n;
-    means.push_back(Vector3d(c[0], c[n], c[2 * n]) + breath);
+    means.emplace_back(Vector3d(c[0], c[n], c[2 * n]) + breath);
   }
   std::vector<double> areas;
   for (std::size_t i = 0; i < mesh.triangles.size(); i += 3) {
@@ -60,7 +60,7 @@ void SeenSurface::draw_points() {
     point.triangle = static_cast<std::uint32_t>(std::min(triangle, areas.size() - 1));
     point.barycentric = {1.0 - root, root * (1.0 - share), root * share};
     points_.push_back(point);
-    mean_places_.push_back(Vector3d::Zero());
+    mean_places_.emplace_back(Vector3d::Zero());
     mean_places_.back() = position(i, means);
   }
 }

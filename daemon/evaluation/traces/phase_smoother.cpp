@@ -11,13 +11,12 @@
 namespace perimap {
 namespace {
 
-// What hearts under surgery and ventilators do, Hz.
+// What hearts under surgery and ventilators do: 0.7 to 2.6 Hz and 0.1 to 0.6 Hz.
 constexpr double kSlowestHeart = 0.7;
-constexpr double kFastestHeart = 2.6;
 constexpr double kSlowestBreath = 0.1;
-constexpr double kFastestBreath = 0.6;
 constexpr double kStep = 0.01;
-constexpr int kCardiac = 3;  // harmonics that the search looks at
+constexpr int kHearts = 190, kBreaths = 50;  // steps
+constexpr int kCardiac = 3;                  // harmonics that the search looks at
 constexpr int kRespiratory = 2;
 
 // Before anything is seen: rad, rad/s.
@@ -25,10 +24,10 @@ constexpr double kPhase = 0.7;
 constexpr double kCardiacRate = 0.55;
 constexpr double kRespiratoryRate = 0.22;
 
-Eigen::MatrixXd harmonics(double rate_hz, int count, double period_s, Eigen::Index samples) {
-  Eigen::MatrixXd columns(samples, 2 * count);
+Eigen::MatrixXd harmonics(double rate_hz, int how_many, double period_s, Eigen::Index samples) {
+  Eigen::MatrixXd columns(samples, 2 * how_many);
   for (Eigen::Index i = 0; i < samples; ++i) {
-    for (int k = 1; k <= count; ++k) {
+    for (int k = 1; k <= how_many; ++k) {
       const double phase = k * kTwoPi * rate_hz * static_cast<double>(i) * period_s;
       columns(i, 2 * k - 2) = std::cos(phase);
       columns(i, 2 * k - 1) = std::sin(phase);
@@ -65,9 +64,11 @@ PhaseRates find_rates(const Eigen::MatrixXd& samples, double period_s, const Eig
   double most = -std::numeric_limits<double>::infinity();
   Eigen::MatrixXd B(count, 1 + 2 * (kCardiac + kRespiratory));
   B.col(0).setOnes();
-  for (double breath = kSlowestBreath; breath < kFastestBreath; breath += kStep) {
+  for (int slower = 0; slower < kBreaths; ++slower) {
+    const double breath = kSlowestBreath + slower * kStep;
     B.rightCols(2 * kRespiratory) = harmonics(breath, kRespiratory, period_s, count);
-    for (double heart = kSlowestHeart; heart < kFastestHeart; heart += kStep) {
+    for (int slow = 0; slow < kHearts; ++slow) {
+      const double heart = kSlowestHeart + slow * kStep;
       B.middleCols(1, 2 * kCardiac) = harmonics(heart, kCardiac, period_s, count);
       const Eigen::MatrixXd by_channel = B.transpose() * Z;
       const Eigen::MatrixXd normal = B.transpose() * B + 1e-3 * Eigen::MatrixXd::Identity(B.cols(), B.cols());

@@ -102,21 +102,21 @@ ToolReading PoseTrack::at(std::int64_t frame) const noexcept {
 
 ToolReading PoseTrack::at(Duration since) const noexcept { return reading_at(static_cast<double>(since.count())); }
 
-ToolReading PoseTrack::reading_at(double t_ns) const noexcept {
+ToolReading PoseTrack::reading_at(double since_ns) const noexcept {
   const double period_ns = 1e9 / rate_hz_;
   if (readings_.empty()) return {};
-  const std::size_t before = index_at(Duration(std::llround(t_ns)));
+  const std::size_t before = index_at(Duration(std::llround(since_ns)));
   const std::size_t after = std::min(before + 1, readings_.size() - 1);
   const auto time_ns = [this](std::size_t i) { return static_cast<double>(readings_[i].since.count()); };
-  const auto distance = [&](std::size_t i) { return std::abs(t_ns - time_ns(i)) / period_ns; };
+  const auto distance = [&](std::size_t i) { return std::abs(since_ns - time_ns(i)) / period_ns; };
   const std::size_t nearest = distance(after) < distance(before) ? after : before;
   const ToolReading& r_0 = readings_[before].reading;
   const ToolReading& r_1 = readings_[after].reading;
   const double step_ns = time_ns(after) - time_ns(before);
-  const bool between = t_ns > time_ns(before) && step_ns > 0.0 && step_ns <= kGap * period_ns &&
+  const bool between = since_ns > time_ns(before) && step_ns > 0.0 && step_ns <= kGap * period_ns &&
                        r_0.state == ToolState::kOk && r_1.state == ToolState::kOk;
   if (between && distance(nearest) > kOwn) {
-    return {ToolState::kOk, interpolate(r_0.X_TO, r_1.X_TO, (t_ns - time_ns(before)) / step_ns)};
+    return {ToolState::kOk, interpolate(r_0.X_TO, r_1.X_TO, (since_ns - time_ns(before)) / step_ns)};
   }
   return distance(nearest) < 0.5 ? readings_[nearest].reading : ToolReading{};
 }

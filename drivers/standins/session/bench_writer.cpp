@@ -143,7 +143,7 @@ class BenchWriter {
       block.device_sequence = static_cast<std::uint32_t>(ecg_samples_);
       block.arrival = now;
       ecg_samples_ += block.count;
-      const auto written =
+      auto written =
           writer_.write(ecg_, borrow_ecg_samples(block), now, block.first_sample_time, block.device_sequence);
       if (!written) return written;
     }
@@ -173,7 +173,7 @@ Expected<void> write_bench(const BenchScene& scene, const std::filesystem::path&
   auto recording = RecordingWriter::create(*std::move(sink));
   if (!recording) return tl::unexpected(recording.error());
   BenchWriter writer(scene, noise, *std::move(recording));
-  if (const auto begun = writer.begin(); !begun) return begun;
+  if (auto begun = writer.begin(); !begun) return begun;
   RenderedFrames rendered(scene, threads);
   // Whatever arrives first; both in the order of their arrival.
   std::size_t frame = 0;
@@ -183,7 +183,7 @@ Expected<void> write_bench(const BenchScene& scene, const std::filesystem::path&
         frame < scene.frames().size() &&
         (reading == scene.reading_count() ||
          scene.frames()[frame].arrival <= scene.reading(BenchScene::Tool::kScope, reading, noise).arrival);
-    const auto written = frame_is_next ? writer.write_frame(frame, rendered.of(frame)) : writer.write_reading(reading);
+    auto written = frame_is_next ? writer.write_frame(frame, rendered.of(frame)) : writer.write_reading(reading);
     if (!written) return written;
     frame_is_next ? ++frame : ++reading;
     if (frame_is_next) progress(frame);
