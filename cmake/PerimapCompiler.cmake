@@ -33,7 +33,7 @@ if(PERIMAP_SANITIZE OR PERIMAP_FUZZ)
   endif()
 endif()
 # gold, a part of binutils, links in half of the time that its elder brother takes.
-if(CMAKE_BUILD_TYPE STREQUAL RelWithDebInfo AND CMAKE_CXX_COMPILER_ID STREQUAL GNU AND PROJECT_IS_TOP_LEVEL)
+if(CMAKE_BUILD_TYPE STREQUAL RelWithDebInfo AND PROJECT_IS_TOP_LEVEL AND NOT PERIMAP_FUZZ)
   find_program(PERIMAP_GOLD ld.gold)
   if(PERIMAP_GOLD)
     add_link_options(-fuse-ld=gold)
