@@ -12,8 +12,6 @@
 namespace perimap {
 namespace {
 
-constexpr double kLeastTurn_rad = 20.0 * kDegree;
-
 Matrix3d mean_of(const std::vector<Matrix3d>& rotations) {
   Matrix3d mean = rotations.front();
   constexpr int kRounds = 4;
@@ -65,7 +63,7 @@ Expected<SecondSensor> axis_of(const std::vector<HeldRelation>& held) {
     products += turn * turn.transpose();
     widest_rad = std::max(widest_rad, turn.norm());
   }
-  if (widest_rad < kLeastTurn_rad) {
+  if (widest_rad < kLeastTurnOfSetups_deg * kDegree) {
     return fail("the second sensor turned by " + std::to_string(widest_rad / kDegree) +
                 " degrees at most in the frame of the first: one must be fast on the camera head and the other one on "
                 "the scope, and the scope be held at turns 20 degrees apart and more, better 60");

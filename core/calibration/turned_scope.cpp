@@ -162,7 +162,6 @@ Vector2d centre_of_turning(const std::vector<SetupAtRotation>& setups) {
 }
 
 Expected<TurnedScope> fitted(const std::vector<SetupAtRotation>& setups, const std::optional<Vector2d>& turn_px) {
-  constexpr double kLeastTurn_rad = 20.0 * kDegree;
   TurnedScope scope;
   scope.turn_px = turn_px ? *turn_px : centre_of_turning(setups);
   std::vector<Turns> turns;
@@ -176,7 +175,7 @@ Expected<TurnedScope> fitted(const std::vector<SetupAtRotation>& setups, const s
     turns.push_back({carried(setup, scope.reference, angle), angle});
     widest = std::max(widest, std::abs(angle));
   }
-  if (turns.empty() || widest < kLeastTurn_rad) {
+  if (turns.empty() || widest < kLeastTurnOfSetups_deg * kDegree) {
     return fail(
         "set-ups at two turns of the scope are needed, 20 degrees apart and more, better three: turn the scope in its "
         "camera head, and measure lens and hand-eye again");

@@ -23,6 +23,9 @@ namespace perimap {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
+// Between the set-ups that the function is fitted to, at least, degrees: less does not tell the shaft's axis.
+inline constexpr double kLeastTurnOfSetups_deg = 20.0;
+
 // One calibration, and how far the scope was turned then, as read_field_stop() or a second sensor tells it.
 struct SetupAtRotation {
   double rotation_rad = 0.0;

@@ -9,7 +9,7 @@
 namespace perimap {
 namespace {
 
-constexpr std::size_t kMost = 512;
+constexpr std::size_t kMostOverlays = 512;
 // Places of a trail: half a second and a fifth.
 constexpr std::size_t kWindow = FeatureTrails::kLongest;
 constexpr std::size_t kCandidateWindow = 6;
@@ -18,7 +18,7 @@ constexpr std::size_t kCandidateWindow = 6;
 
 OverlayWatch::OverlayWatch(std::size_t features, FrameRate rate, Duration barred)
     : barred_frames_(rate.frames(barred)) {
-  overlays_.reserve(kMost);
+  overlays_.reserve(kMostOverlays);
   scratch_.reserve(features);
 }
 
@@ -106,7 +106,7 @@ bool OverlayWatch::is_overlay(const FollowedFeature& feature, std::span<const Fo
 
 void OverlayWatch::bar(const Vector2d& px, std::uint64_t frame) noexcept {
   const Overlay overlay{px, frame + barred_frames_};
-  if (overlays_.size() < kMost) {
+  if (overlays_.size() < kMostOverlays) {
     overlays_.push_back(overlay);
     return;
   }
