@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <numbers>
 #include <random>
 #include <sstream>
 #include <string>
@@ -21,7 +20,6 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr double kPi = std::numbers::pi;
 
 struct Poses {
   std::vector<TimedPose> camera;
