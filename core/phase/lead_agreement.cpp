@@ -6,9 +6,10 @@
 namespace perimap {
 namespace {
 
-constexpr double kSurest = 0.995;     // no lead is as sure as to rule the other out
-constexpr double kCycleMemory = 8.0;  // beats
-constexpr int kOffsetKnownAfter = 8;  // beats
+constexpr double kSurest = 0.995;        // no lead is as sure as to rule the other out
+constexpr double kCycleMemory = 8.0;     // beats
+constexpr double kLongestCycle_s = 3.0;  // what is longer is a gap, not the first cycle
+constexpr int kOffsetKnownAfter = 8;     // beats
 
 Duration distance(Instant a, Instant b) noexcept { return a > b ? a - b : b - a; }
 
@@ -204,7 +205,7 @@ void LeadAgreement::learn(const Told& told) noexcept {
   const double rr_s = to_seconds(told.time - both_at_);
   if (cycle_s_ > 0.0) {
     cycle_s_ += (std::min(rr_s, 2.0 * cycle_s_) - cycle_s_) / kCycleMemory;
-  } else if (known_to_both_) {
+  } else if (known_to_both_ && rr_s < kLongestCycle_s) {
     cycle_s_ = rr_s;
   }
   known_to_both_ = true;

@@ -95,7 +95,7 @@ class LeadAgreement {
     Instant disturbed_at;  // it was last called anything but good
     double heard = 0.0;    // fading share of the time
     double sure = 1.0;     // fading mean of its confidence in beats
-    double misses = 0.0;   // fading share of sure beats
+    double misses = 0.0;   // fading share of beats, each by its probability
 
     [[nodiscard]] double worth() const noexcept { return heard * sure; }
   };

@@ -35,9 +35,13 @@ void HeldTurn::forget() noexcept {
 
 std::optional<TurnReading> HeldTurn::take(const TurnReading& reading) noexcept {
   if (readings_ > 0.0 && agree(reading, held_)) {
+    lead_rad_ += (turn_between(reading.rotation_rad, held_.rotation_rad) - lead_rad_) / kReadingsInMean;
     return settle(mean(held_, readings_, reading), std::min(readings_ + 1.0, kReadingsInMean));
   }
-  if (candidate_ && agree(reading, *candidate_)) return settle(mean(*candidate_, 1.0, reading), 2.0);
+  if (candidate_ && agree(reading, *candidate_)) {
+    lead_rad_ = turn_between(reading.rotation_rad, candidate_->rotation_rad);
+    return settle(mean(*candidate_, 1.0, reading), 2.0);
+  }
   candidate_ = reading;
   readings_ = 0.0;
   return std::nullopt;
@@ -47,7 +51,8 @@ TurnReading HeldTurn::settle(const TurnReading& mean, double readings) noexcept 
   candidate_.reset();
   held_ = mean;
   readings_ = readings;
-  return {mean.rotation_rad, mean.deviation_rad * std::max(common_share_, 1.0 / std::sqrt(readings))};
+  const double of_mean = mean.deviation_rad * std::max(common_share_, 1.0 / std::sqrt(readings));
+  return {mean.rotation_rad, std::hypot(of_mean, lead_rad_)};
 }
 
 }  // namespace perimap

@@ -104,6 +104,7 @@ void FollowedPatch::settle_view() noexcept {
   if (!has_last_) return;
   settled_.back() = settled_.front();
   settled_.front() = last_;
+  settled_.front().is_of_frame_before = false;
   settled_views_ = std::min(settled_views_ + 1, settled_.size());
 }
 

@@ -119,8 +119,10 @@ perimap_SetupWatch to_wire(const SetupBelief& belief) noexcept {
 }
 
 // 1 + EcgSignal, as it is counted; 0: no such lead.
-perimap_EcgLead ecg_lead(std::uint64_t counted) noexcept {
-  return counted == 0 ? perimap_ECG_LEAD_NONE : to_wire(static_cast<EcgSignal>(counted - 1));
+// Of a source of which nothing comes any more, what was heard last says nothing.
+perimap_EcgLead ecg_lead(std::uint64_t counted, bool comes) noexcept {
+  if (counted == 0) return perimap_ECG_LEAD_NONE;
+  return comes ? to_wire(static_cast<EcgSignal>(counted - 1)) : perimap_ECG_LEAD_OFF;
 }
 
 }  // namespace
@@ -199,13 +201,15 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.scope_rotation_rad = 1e-6 * static_cast<double>(c.scope_rotation_urad.get());
   wire_.scope_turns = c.scope_turns.get();
   wire_.scope_frames_unread = c.scope_frames_unread.get();
-  wire_.ecg_first_lead = ecg_lead(c.ecg_leads[0].get());
-  wire_.ecg_second_lead = ecg_lead(c.ecg_leads[1].get());
 
   std::uint32_t sources = 0;
+  bool ecg_comes = false;
   for_each_source(c, facts, [&](const SourceFacts& source) noexcept {
-    sources_[sources++] = source_status(source, facts.sources_ended, now);
+    const perimap_SourceStatus& told = sources_[sources++] = source_status(source, facts.sources_ended, now);
+    if (source.kind == perimap_SOURCE_ECG) ecg_comes = told.state == perimap_SOURCE_OK;
   });
+  wire_.ecg_first_lead = ecg_lead(c.ecg_leads[0].get(), ecg_comes);
+  wire_.ecg_second_lead = ecg_lead(c.ecg_leads[1].get(), ecg_comes);
   wire_.sources = {sources, sources, sources_, false};
 
   const std::optional<CountsThen> then = facts.recent != nullptr ? facts.recent->then() : std::nullopt;

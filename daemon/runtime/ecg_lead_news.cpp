@@ -16,6 +16,15 @@ constexpr std::array<const char*, 2> kWhich{"first", "second"};
 
 bool counted_as(EcgSignal signal, std::uint64_t counted) { return counted == 1 + static_cast<std::uint64_t>(signal); }
 
+// What that means for the beats, by how the other lead is heard.
+const char* consequence(std::uint64_t other) {
+  if (counted_as(EcgSignal::kGood, other) || counted_as(EcgSignal::kNoisy, other)) {
+    return ": beats are found in the other alone";
+  }
+  const bool is_off = counted_as(EcgSignal::kFlat, other) || counted_as(EcgSignal::kLeadOff, other);
+  return is_off ? ", and so is the other: no beats are found" : "";
+}
+
 }  // namespace
 
 std::optional<EcgLeadNews::Line> EcgLeadNews::next(const PipelineCounters& counters, Instant now) {
@@ -29,9 +38,8 @@ std::optional<EcgLeadNews::Line> EcgLeadNews::next(const PipelineCounters& count
     if (off == lead.told_off || now - lead.since < kLasts) continue;
     lead.told_off = off;
     if (!off) return Line{false, fmt::format("the {} lead of the ECG is heard again", kWhich[i])};
-    return Line{true,
-                fmt::format("the {} lead of the ECG is {}: beats are found in the other alone; look at its electrodes",
-                            kWhich[i], flat ? "flat" : "off")};
+    return Line{true, fmt::format("the {} lead of the ECG is {}{}; look at its electrodes", kWhich[i],
+                                  flat ? "flat" : "off", consequence(counters.ecg_leads[1 - i].get()))};
   }
   return std::nullopt;
 }

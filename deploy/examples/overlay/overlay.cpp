@@ -5,8 +5,9 @@
 // VIDEO is what the camera of that perimapd sees, from its frame --first-sequence on (0). OUTPUT is a video (.avi), or
 // a picture (.png) of the last frame that was drawn. CALIBRATION is the camera's, as OpenCV writes it: its distortion
 // alone is taken, for focal length and principal point are those that each surface tells of its own picture (an angled
-// scope is turned in its camera head and zoomed). It ends with the video, after --seconds, or when perimapd has been
-// silent for ten seconds. Each frame is told on standard output, as JSON in a line.
+// scope is turned in its camera head and zoomed; perimapd knows that only where `camera.turned_scope` is calibrated).
+// It ends with the video, after --seconds, or when perimapd has been silent for ten seconds. Each frame is told on
+// standard output, as JSON in a line.
 //
 // For each released frame there is a sample of `surface`, which tells when it was captured and where the camera was.
 // The newest `surface_model` says where each feature was at that very instant: perimap_client.hpp evaluates it, or

@@ -349,6 +349,15 @@ TEST(LeadAgreement, ALeadWhoseEarlyBeatsTheOtherDoesNotKnowIsWorthLessAndTheOthe
   EXPECT_NEAR(leads.alone(0, 1.0), 0.666, 0.01) << "the other has missed none";
 }
 
+TEST(LeadAgreement, AGapBeforeTheSecondCommonBeatIsNoCycle) {
+  Leads leads;
+  leads.both(leads.last_s, 0.0);
+  for (int i = 0; i < 12; ++i) leads.both(leads.last_s + (i == 0 ? 20.0 : 0.8), 0.0);
+  const double at_s = leads.last_s + 0.7;
+  leads.tells(1, at_s, 1.0);
+  EXPECT_TRUE(leads.told_at(at_s)) << "a beat of a cycle of 0.8 s is not early";
+}
+
 TEST(LeadAgreement, TheCycleFollowsTheHeartWithinSomeBeatsAndNoPause) {
   const auto early = [](Leads& leads, double after_s) {
     const double at_s = leads.last_s + after_s;

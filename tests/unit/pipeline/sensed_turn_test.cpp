@@ -85,6 +85,27 @@ class TwoSensors : public testing::Test {
   int frames_ = 0;
 };
 
+// The state is a mean of what was told lately, and lags behind a scope that is being turned.
+TEST_F(TwoSensors, WhileTheScopeIsTurnedTheStateIsOffByNoMoreThanItSays) {
+  for (const double rate : {1.0, 3.0, 5.0, 15.0, 25.0}) {
+    double turn_rad = 0.6;
+    run(now_ + std::chrono::seconds(2), turn_rad);
+    int told = 0, beyond = 0;
+    double squares = 0.0;
+    for (const Duration until = now_ + std::chrono::seconds(2); now_ < until;) {
+      turn_rad += rate * kDegree * 0.01;
+      run(now_ + std::chrono::milliseconds(10), turn_rad);
+      if (!state_) continue;
+      ++told;
+      const double off = std::remainder(state_->rotation_rad - turn_rad, kTwoPi) / state_->rotation_deviation_rad;
+      squares += off * off;
+      beyond += std::abs(off) > 4.0 ? 1 : 0;
+    }
+    EXPECT_LE(beyond, told / 50) << rate << " degrees a second, of " << told;
+    EXPECT_LT(squares, 4.0 * told) << rate << " degrees a second, of " << told;
+  }
+}
+
 TEST_F(TwoSensors, EachFrameHasTheSetUpOfItsTurn) {
   run(std::chrono::seconds(1), 0.6);
   ASSERT_TRUE(state_);

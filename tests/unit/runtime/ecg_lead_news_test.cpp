@@ -49,6 +49,25 @@ TEST_F(LeadNews, ALeadThatIsOffIsSaidOnceAndSoIsThatItIsBack) {
   }
 }
 
+TEST_F(LeadNews, WhereBothAreOffNoBeatsAreFoundInTheOther) {
+  lead(0, EcgSignal::kLeadOff);
+  lead(1, EcgSignal::kFlat);
+  const auto lines = said_in(5.0);
+  ASSERT_EQ(lines.size(), 2U);
+  for (const auto& line : lines) {
+    EXPECT_NE(line.text.find("no beats are found"), std::string::npos) << line.text;
+    EXPECT_EQ(line.text.find("in the other alone"), std::string::npos) << line.text;
+  }
+}
+
+TEST_F(LeadNews, OfALeadThatIsStillLearntNothingIsPromised) {
+  lead(0, EcgSignal::kLeadOff);
+  lead(1, EcgSignal::kLearning);
+  const auto lines = said_in(5.0);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0].text.find("beats are found"), std::string::npos) << lines[0].text;
+}
+
 TEST_F(LeadNews, WhatDoesNotLastIsNotSaid) {
   lead(0, EcgSignal::kGood);
   lead(1, EcgSignal::kGood);

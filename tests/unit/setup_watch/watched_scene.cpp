@@ -81,8 +81,14 @@ WatchedWindow watch(const Scene& scene, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
+  // Each number by a statement of its own: in which order arguments are drawn is the compiler's choice.
+  const auto normal_pair = [&] {
+    const double y = normal(random), x = normal(random);
+    return Vector2d(x, y);
+  };
   const auto drawn = [&](double deviation) {
-    return Vector3d(deviation * normal(random), deviation * normal(random), deviation * normal(random));
+    const double z = normal(random), y = normal(random), x = normal(random);
+    return Vector3d(deviation * Vector3d(x, y, z));
   };
   const BasisLayout of = layout(scene);
   const Path path(scene.sway, random);
@@ -133,8 +139,8 @@ WatchedWindow watch(const Scene& scene, std::uint32_t seed) {
       Vector2d px;
       const Vector3d q = true_X_WC.inverse() * position_of(truth[static_cast<std::size_t>(i)], frame.b);
       if (true_camera.project(q, px) != ProjectionStatus::kOk || !true_camera.contains(px)) continue;
-      px += scene.pixel_deviation_px * Vector2d(normal(random), normal(random));
-      if (uniform(random) < scene.outliers) px += 30.0 * Vector2d(normal(random), normal(random));
+      px += scene.pixel_deviation_px * normal_pair();
+      if (uniform(random) < scene.outliers) px += 30.0 * normal_pair();
       const double variance_px2 = std::max(1e-4, scene.pixel_deviation_px * scene.pixel_deviation_px);
       frame.matches.push_back({i, px, variance_px2 * Matrix2d::Identity()});
     }
