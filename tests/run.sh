@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 usage() {
   cat << 'END'
 tests/run.sh [--full [PART...]] [--jobs N]
-  Installs the packages, builds the presets quick and asan, runs their tests. About a quarter of an hour on two cores.
+  Installs the packages, builds the presets dev and asan, runs their tests. About 20 minutes on two cores.
   Whole programs are tested without sanitizers, a unit test in one of the two, mostly under AddressSanitizer.
   --full    everything, or the parts named. About three hours on two cores that do nothing else.
               dev    whole programs, and unit tests that count allocations or compute much, without sanitizers
@@ -121,7 +121,6 @@ fi
 configure() { # PRESET
   local preset=$1 tests=all undefined=all quick=OFF
   if [ $full = no ]; then quick=ON; fi
-  if [ "$preset" = quick ]; then tests=plain; fi
   # Which tests: see perimap_test in cmake/PerimapLibrary.cmake. A unit test once is enough for a quick run.
   case $preset in
     dev) tests=plain ;;
@@ -203,9 +202,9 @@ if [ $full = yes ]; then packages=--full; fi
 deploy/install-packages.sh $packages || exit 1
 
 if [ $full = no ]; then
-  if build quick; then
+  if build dev; then
     if configure asan; then compile_ahead asan; fi
-    run_tests "quick tests" quick -LE long
+    run_tests "dev tests" dev -LE long
     stop_ahead
   fi
   if build asan; then run_tests "asan tests" asan -LE long; fi
