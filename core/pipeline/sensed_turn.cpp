@@ -56,9 +56,11 @@ std::optional<SensedTurn::Reading> SensedTurn::read(Instant capture) const noexc
   if (!sensor_now.valid() || !second_now.valid() || stuck()) return std::nullopt;
   // About what it is now, so that small turns are averaged.
   const Matrix3d now_S2 = sensor_now.X_WC.R.transpose() * second_now.X_WC.R;
-  Vector3d sum = Vector3d::Zero();
+  struct Half {
+    Vector3d sum = Vector3d::Zero();
+    double readings = 0.0;
+  } older, newer;
   double variance_rad2 = 0.0;
-  double readings = 0.0;
   for (std::uint64_t i = count_; i > 0 && count_ - i < kTimes; --i) {
     const Instant t = times_[(i - 1) % kTimes];
     if (t > capture) continue;
@@ -66,13 +68,15 @@ std::optional<SensedTurn::Reading> SensedTurn::read(Instant capture) const noexc
     const CameraPose sensor = sensor_.poses.at(t);
     const CameraPose second = second_.poses.at(t);
     if (!sensor.valid() || !second.valid()) continue;
-    sum += so3_log(now_S2.transpose() * sensor.X_WC.R.transpose() * second.X_WC.R);
+    Half& half = t > capture - kWindow / 2 ? newer : older;
+    half.sum += so3_log(now_S2.transpose() * sensor.X_WC.R.transpose() * second.X_WC.R);
+    half.readings += 1.0;
     variance_rad2 += sensor.rotation_variance_rad2 + second.rotation_variance_rad2;
-    readings += 1.0;
   }
+  const double readings = older.readings + newer.readings;
   if (readings == 0.0) return std::nullopt;
   variance_rad2 /= readings;
-  const Matrix3d R_S2 = now_S2 * so3_exp(sum / readings);
+  const Matrix3d R_S2 = now_S2 * so3_exp((older.sum + newer.sum) / readings);
   // What of an error outlasts the window frames have in common; what does not is averaged as far as it is new.
   const double lasts_s = to_seconds(settings_.error_correlation);
   const double common = lasts_s > 0.0 ? std::exp(-to_seconds(kWindow) / lasts_s) : 0.0;
@@ -83,7 +87,15 @@ std::optional<SensedTurn::Reading> SensedTurn::read(Instant capture) const noexc
   constexpr double kDeviations = 5.0;
   const double deviation_rad = std::sqrt(own_variance_rad2 + common * variance_rad2);
   if (!(calibrated.aside_rad(R_S2) <= kSlipped_rad + kDeviations * deviation_rad)) return std::nullopt;
-  return Reading{{calibrated.rotation_rad(R_S2), std::sqrt(own_variance_rad2)}, common * variance_rad2};
+  // While the scope is turned, the window's middle is behind the frame by what its halves are apart.
+  double lag_rad2 = 0.0;
+  if (older.readings > 0.0 && newer.readings > 0.0) {
+    const Vector3d apart = newer.sum / newer.readings - older.sum / older.readings;
+    const double along_rad = apart.dot(R_S2.transpose() * states_.scope().axis_S);
+    const double of_noise_rad2 = variance_rad2 * (1.0 / older.readings + 1.0 / newer.readings);
+    lag_rad2 = std::max(0.0, along_rad * along_rad - of_noise_rad2);
+  }
+  return Reading{{calibrated.rotation_rad(R_S2), std::sqrt(own_variance_rad2)}, common * variance_rad2 + lag_rad2};
 }
 
 std::optional<ScopeState> SensedTurn::at(Instant capture) noexcept {

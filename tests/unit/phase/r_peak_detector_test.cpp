@@ -427,7 +427,7 @@ TEST(RPeakDetector, AnAmplifierAtItsLimitIsFlatThoughItsLastBitIsNot) {
 }
 
 // Of `record` from sample `from` on, at `rate` and with stamps of milliseconds where asked for.
-EcgRecord resampled(const EcgRecord& record, double from_s, double to_s, double rate, bool milliseconds) {
+EcgRecord resampled(const EcgRecord& record, double from_s, double to_s, double rate, bool in_milliseconds) {
   EcgRecord result;
   std::size_t i = 0;
   for (int k = 0;; ++k) {
@@ -435,7 +435,7 @@ EcgRecord resampled(const EcgRecord& record, double from_s, double to_s, double 
     if (t >= to_s) break;
     while (i + 2 < record.t_s.size() && record.t_s[i + 1] <= t) ++i;
     const double share = (t - record.t_s[i]) / (record.t_s[i + 1] - record.t_s[i]);
-    result.t_s.push_back(milliseconds ? 1e-3 * std::round(1e3 * t) : t);
+    result.t_s.push_back(in_milliseconds ? 1e-3 * std::round(1e3 * t) : t);
     result.mV.push_back((1.0 - share) * record.mV[i] + share * record.mV[i + 1]);
   }
   return result;
