@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/simulator/slow_error.hpp"
 #include "drivers/standins/simulator/transport_delay.hpp"
 
 namespace perimap {
@@ -137,20 +138,13 @@ void BenchScene::time_devices() {
 }
 
 void BenchScene::draw_errors() {
-  const double correlation_s = to_seconds(settings_.tracker_correlation);
-  const double rho = correlation_s > 0.0 ? std::exp(-1.0 / (settings_.tracker_rate_hz * correlation_s)) : 0.0;
   for (const Tool tool : {Tool::kScope, Tool::kPointer, Tool::kSecondSensor}) {
     const CounterNoise noise(settings_.seed, error_stream(tool));
-    const auto normal3 = [&](std::uint64_t index) {
-      return Vector3d(noise.normal(3 * index), noise.normal(3 * index + 1), noise.normal(3 * index + 2));
-    };
-    Error error;
+    SlowError position(settings_.tracker_rate_hz, settings_.tracker_correlation);
+    SlowError rotation = position;
     for (std::uint64_t k = 0; k < times_.size(); ++k) {
-      const double kept = k == 0 ? 0.0 : rho;
-      const double drive = std::sqrt(1.0 - kept * kept);
-      error.position = kept * error.position + drive * normal3(2 * k);
-      error.rotation = kept * error.rotation + drive * normal3(2 * k + 1);
-      errors_[static_cast<std::size_t>(tool)].push_back(error);
+      errors_[static_cast<std::size_t>(tool)].push_back(
+          {position.next(normal3(noise, 2 * k)), rotation.next(normal3(noise, 2 * k + 1))});
     }
   }
 }

@@ -12,6 +12,7 @@
 #include "drivers/standins/simulator/ecg_record.hpp"
 #include "drivers/standins/simulator/embedded_data.hpp"
 #include "drivers/standins/simulator/scope_path.hpp"
+#include "drivers/standins/simulator/slow_error.hpp"
 #include "drivers/standins/simulator/transport_delay.hpp"
 
 namespace perimap {
@@ -73,10 +74,6 @@ std::vector<Interval> dropouts(std::uint64_t seed, Duration duration, double per
     intervals.push_back({from_seconds(begin), from_seconds(begin + length)});
   }
   return intervals;
-}
-
-Vector3d normal3(const CounterNoise& noise, std::uint64_t index) noexcept {
-  return {noise.normal(3 * index), noise.normal(3 * index + 1), noise.normal(3 * index + 2)};
 }
 
 Expected<void> check(const SimulationSettings& s) {
@@ -256,15 +253,8 @@ void Simulation::read_tracker() {
   const CounterNoise period(settings_.seed, kTrackerPeriod);
   const CounterNoise position(settings_.seed, kTrackerPosition);
   const CounterNoise rotation(settings_.seed, kTrackerRotation);
-  const double correlation =
-      settings_.tracker_correlation > Duration(0)
-          ? std::exp(-1.0 / (settings_.tracker_rate_hz * to_seconds(settings_.tracker_correlation)))
-          : 0.0;
-  Vector3d position_error = Vector3d::Zero();
-  Vector3d rotation_error = Vector3d::Zero();
-  // The first reading's error is all its own.
-  double kept = 0.0;
-  double drive = 1.0;
+  SlowError position_error(settings_.tracker_rate_hz, settings_.tracker_correlation);
+  SlowError rotation_error = position_error;
   TransportDelay tracker(CounterNoise(settings_.seed, kTrackerDelay), milliseconds(7), microseconds(1000));
   const auto reading_count = static_cast<std::uint64_t>(to_seconds(settings_.duration) * settings_.tracker_rate_hz);
   for (std::uint64_t k = 0; k < reading_count; ++k) {
@@ -272,15 +262,11 @@ void Simulation::read_tracker() {
         from_seconds((static_cast<double>(k) + period.uniform(k, -0.02, 0.02) + 0.5) / settings_.tracker_rate_hz);
     const bool missing = std::any_of(gaps.begin(), gaps.end(),
                                      [&](const Interval& gap) { return since >= gap.begin && since < gap.end; });
-    position_error = kept * position_error + drive * normal3(position, k);
-    rotation_error = kept * rotation_error + drive * normal3(rotation, k);
     const bool stuck = k > 0 && stretch_of(settings_.tracker_stuck, since) != nullptr;
     tracker_stamps_.push_back({start_ + since - setup_.tracker_offset, tracker.arrival(start_ + since, k),
                                stuck ? tracker_stamps_.back().reads : static_cast<std::size_t>(k), missing,
                                path_.X_WC(since) * (settings_.turn ? setup_at(since).X_SC.inverse() : X_CS),
-                               position_error, rotation_error});
-    kept = correlation;
-    drive = std::sqrt(1.0 - kept * kept);
+                               position_error.next(normal3(position, k)), rotation_error.next(normal3(rotation, k))});
   }
 }
 
@@ -289,11 +275,8 @@ void Simulation::read_second_sensor() {
   if (!settings_.second_sensor) return;
   const CounterNoise position(settings_.seed, kSecondPosition);
   const CounterNoise rotation(settings_.seed, kSecondRotation);
-  const double correlation =
-      settings_.tracker_correlation > Duration(0)
-          ? std::exp(-1.0 / (settings_.tracker_rate_hz * to_seconds(settings_.tracker_correlation)))
-          : 0.0;
-  const double drive = std::sqrt(1.0 - correlation * correlation);
+  SlowError position_error(settings_.tracker_rate_hz, settings_.tracker_correlation);
+  SlowError rotation_error = position_error;
   for (std::size_t k = 0; k < tracker_stamps_.size(); ++k) {
     TrackerStamp stamp = tracker_stamps_[k];
     const Duration since = stamp.source_time + setup_.tracker_offset - start_;
@@ -301,12 +284,8 @@ void Simulation::read_second_sensor() {
     stamp.reads = stuck ? second_stamps_.back().reads : k;
     stamp.missing = stretch_of(settings_.second_lost, since) != nullptr;
     stamp.X_WS = stamp.X_WS * setup_at(since).X_SS2;
-    stamp.position_error = normal3(position, k);
-    stamp.rotation_error = normal3(rotation, k);
-    if (k > 0) {
-      stamp.position_error = correlation * second_stamps_[k - 1].position_error + drive * stamp.position_error;
-      stamp.rotation_error = correlation * second_stamps_[k - 1].rotation_error + drive * stamp.rotation_error;
-    }
+    stamp.position_error = position_error.next(normal3(position, k));
+    stamp.rotation_error = rotation_error.next(normal3(rotation, k));
     second_stamps_.push_back(stamp);
   }
 }
