@@ -37,9 +37,9 @@ std::optional<TurnReading> HeldTurn::take(const TurnReading& reading) noexcept {
   if (readings_ > 0.0) {
     const double ahead_rad = turn_between(reading.rotation_rad, held_.rotation_rad);
     lead_rad_ += (std::clamp(ahead_rad, -kSame_rad, kSame_rad) - lead_rad_) / kReadingsInMean;
-  }
-  if (readings_ > 0.0 && agree(reading, held_)) {
-    return settle(mean(held_, readings_, reading), std::min(readings_ + 1.0, kReadingsInMean));
+    if (agree(reading, held_)) {
+      return settle(mean(held_, readings_, reading), std::min(readings_ + 1.0, kReadingsInMean));
+    }
   }
   if (candidate_ && agree(reading, *candidate_)) return settle(mean(*candidate_, 1.0, reading), 2.0);
   candidate_ = reading;

@@ -103,7 +103,7 @@ std::optional<ScopeState> SensedTurn::at(Instant capture) noexcept {
   if (!reading) return std::nullopt;
   auto held = held_.take(reading->own);
   if (!held) return std::nullopt;
-  held->deviation_rad = std::sqrt(held->deviation_rad * held->deviation_rad + reading->common_variance_rad2);
+  held->deviation_rad = std::sqrt(held->deviation_rad * held->deviation_rad + reading->lasting_variance_rad2);
   return states_.at(*held, 0.0);
 }
 

@@ -48,10 +48,10 @@ class SensedTurn {
     std::optional<Pose> last;  // reading; none where it was not valid
   };
 
-  // Of one frame, with the part of its variance that frames have in common.
+  // Of one frame, with what no mean of frames takes from its variance: the error they have in common, and the lag.
   struct Reading {
     TurnReading own;
-    double common_variance_rad2 = 0.0;
+    double lasting_variance_rad2 = 0.0;
   };
 
   static constexpr std::uint64_t kTimes = 256;  // a tenth of a second of any tracker, and more

@@ -8,6 +8,7 @@
 #include <thread>
 #include <vector>
 
+#include "angled_scope.hpp"
 #include "core/angle/angle.hpp"
 #include "core/pipeline/scope_watch.hpp"
 #include "core/pipeline/unchanged_scope.hpp"
@@ -18,24 +19,8 @@ namespace {
 
 constexpr double kRead_rad = 0.1 * kDegree;  // deviation of a reading
 
-CameraModel lens() {
-  CameraModel camera;
-  camera.width = 320;
-  camera.height = 240;
-  camera.fx = camera.fy = 300.0;
-  camera.cx = 170.0;
-  camera.cy = 118.0;
-  return camera;
-}
-
 TurnedScope angled() {
-  TurnedScope scope;
-  scope.reference.X_SC = {so3_exp({0.5, 0.1, 0.2}), {3.0, -4.0, 60.0}};
-  scope.reference.principal_px = {170.0, 118.0};
-  scope.reference.focal_px = {300.0, 300.0};
-  scope.axis_S = Vector3d(0.1, 0.2, 1.0).normalized();
-  scope.point_S = {2.0, -3.0, 0.0};
-  scope.turn_px = {161.0, 119.0};
+  TurnedScope scope = test::angled_scope();
   scope.width = 320;
   scope.height = 240;
   scope.focals = {{105.0, {300.0, 300.0}}, {116.0, {332.0, 332.0}}};
@@ -45,7 +30,7 @@ TurnedScope angled() {
 // ---- the turn, by what is read
 
 struct Turned : ::testing::Test {
-  ScopeTurn turn{angled(), lens()};
+  ScopeTurn turn{angled(), test::angled_lens()};
 
   static FieldStopReading whole(double deg, double radius_px = 105.0) {
     FieldStopReading reading;
@@ -235,7 +220,7 @@ struct Watched : ::testing::Test {
   }
   static PipelineSettings settings(bool calibrated) {
     PipelineSettings s;
-    s.camera = lens();
+    s.camera = test::angled_lens();
     s.lockstep = true;
     s.watch_scope = true;
     if (calibrated) s.turned_scope = angled();

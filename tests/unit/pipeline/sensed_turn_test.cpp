@@ -7,6 +7,7 @@
 #include <optional>
 #include <random>
 
+#include "angled_scope.hpp"
 #include "core/angle/angle.hpp"
 #include "counted_allocations.hpp"
 
@@ -15,24 +16,8 @@ namespace {
 
 constexpr double kNoise_rad = 0.2 * kDegree;  // per axis
 
-CameraModel lens() {
-  CameraModel camera;
-  camera.width = 320;
-  camera.height = 240;
-  camera.fx = camera.fy = 300.0;
-  camera.cx = 170.0;
-  camera.cy = 118.0;
-  return camera;
-}
-
 TurnedScope angled() {
-  TurnedScope scope;
-  scope.reference.X_SC = {so3_exp({0.5, 0.1, 0.2}), {3.0, -4.0, 60.0}};
-  scope.reference.principal_px = {170.0, 118.0};
-  scope.reference.focal_px = {300.0, 300.0};
-  scope.axis_S = Vector3d(0.1, 0.2, 1.0).normalized();
-  scope.point_S = {2.0, -3.0, 0.0};
-  scope.turn_px = {161.0, 119.0};
+  TurnedScope scope = test::angled_scope();
   scope.second_sensor = SecondSensor{so3_exp({-0.7, 0.4, 0.3}), scope.axis_S, 0.0};
   return scope;
 }
@@ -74,7 +59,7 @@ class TwoSensors : public testing::Test {
   }
 
   TurnedScope scope_ = angled();
-  SensedTurn turn_{scope_, lens(), tracker()};
+  SensedTurn turn_{scope_, test::angled_lens(), tracker()};
   std::mt19937 generator_{5077};
   std::normal_distribution<double> normal_;
   Duration now_{0};
@@ -121,7 +106,7 @@ TEST_F(TwoSensors, EachFrameHasTheSetUpOfItsTurn) {
   ASSERT_TRUE(state_);
   EXPECT_NEAR(state_->rotation_rad, 1.4, 4.0 * state_->rotation_deviation_rad);
   EXPECT_EQ(turn_.turns(), 1U);
-  const Vector2d told = state_->picture.to_picture(Vector2d(lens().cx, lens().cy));
+  const Vector2d told = state_->picture.to_picture(Vector2d(test::angled_lens().cx, test::angled_lens().cy));
   EXPECT_LT((told - scope_.at(1.4).principal_px).norm(), 0.2) << "and the principal point with it";
 }
 
