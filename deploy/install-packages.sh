@@ -37,6 +37,7 @@ build=(
   libtomlplusplus-dev libcli11-dev libspdlog-dev nlohmann-json3-dev  # daemon
   libsystemd-dev                             # daemon/process: readiness, watchdog
   librsvg2-dev fonts-dejavu-core             # daemon/evaluation/report: figures as PNG
+  dpkg-dev                                   # deploy/debian: what the package depends on
 )
 tests=(
   libgtest-dev libgmock-dev
@@ -49,7 +50,7 @@ full=(
   qemu-system-x86 busybox-static cpio zstd kmod udev iproute2 v4l-utils  # tests/vm: CAN, V4L2 and systemd on Debian's own kernels
   chromium                                   # the pages that perimap writes, opened
   stress-ng                                  # perimap bench: latencies under load
-  dpkg-dev lintian systemd man-db            # the Debian package and its service, checked
+  lintian systemd man-db                     # the Debian package and its service, checked
 )
 
 wanted=test

@@ -4,7 +4,7 @@
 # deploy/install-packages.sh --full installs; without them the row, or the comparison, is left out.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-cmake --preset release > /dev/null
+cmake --preset release -DPERIMAP_TESTS=all > /dev/null
 cmake --build --preset release --target update_bench -j "${1:-$(nproc)}"
 build/release/tests/bench/update_bench
 cmake --build --preset release --target recording_bench -j "${1:-$(nproc)}"
