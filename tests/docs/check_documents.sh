@@ -6,7 +6,7 @@
 #     `tests/run.sh --full`, `drivers/ecg/*.cpp`
 #   - each key of the configuration in backticks (`phase.law`) is one of config/replay.toml
 #   - each file of a folder with an index (README.md) is linked from that index
-#   - each folder of the sources that has a header stands in the table of docs/design/architecture.md
+#   - each folder of the sources that has a header stands in the table of docs/design/targets.md
 #   - each document that a comment of the sources names exists
 #
 # What it finds is printed as FILE:LINE: what; exit code 1 then. No network: links to elsewhere are passed over.
@@ -138,7 +138,7 @@ for index in docs/README.md docs/*/README.md; do
 done
 
 # The table of targets has every folder of the sources that has a header.
-table=docs/design/architecture.md
+table=docs/design/targets.md
 if [ -e $table ]; then
   while read -r folder; do
     grep -qF "| \`$folder\`" $table || grep -qE "^\|.*, \`$folder\`" $table || fault "$table: there is no row for $folder"

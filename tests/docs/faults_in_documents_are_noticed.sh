@@ -78,8 +78,8 @@ fi
 fresh
 mkdir -p docs/design core/time
 touch core/time/instant.hpp
-printf '# Architecture\n\n| target |\n|---|\n| `core/time` |\n' > docs/design/architecture.md
-if bash "$check" . > out 2>&1 || ! grep -qF 'docs/design/architecture.md: there is no row for core/phase' out ||
+printf '# Targets\n\n| target |\n|---|\n| `core/time` |\n' > docs/design/targets.md
+if bash "$check" . > out 2>&1 || ! grep -qF 'docs/design/targets.md: there is no row for core/phase' out ||
   grep -qF 'core/time' out; then
   echo "FAILED: a folder without a row in the table of targets is not noticed:"
   cat out
