@@ -5,7 +5,7 @@
 #     <!-- made: NAME -->
 #     <!-- end: NAME -->
 # What lies between them is replaced by the table, and by a line that says by which command, commit and machine it was
-# made. Everything else in the pages is written by hand.
+# made. Everything else in the pages is written by hand. A table without such lines in any page is printed.
 set -uo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -13,6 +13,7 @@ usage() {
   cat << 'END'
 docs/evidence/make.sh [--build FOLDER] [--keep FOLDER] [--list] [NAME...]
   Runs the commands of the tables NAME (all of them when none is named) and writes the tables into docs/evidence/*.md.
+  A table that has no place in a page (setups, latency: their pages put several runs beside each other) is printed.
   --build  where the programs are: build/release (the default) or another preset's folder
   --keep   keeps recordings and reports in FOLDER; without it they go when the script ends
   --list   prints the names, with about how long each takes on two cores that do nothing else
@@ -28,7 +29,6 @@ experiment-2    1 minute    the paper's second experiment
 displayed       3 minutes   what is displayed, 0, 100 and 300 ms ahead
 image           9 minutes   what the image brings beside the ECG alone, by rhythm and law
 breathing       7 minutes   breathing of 10 mm, on and off
-set-up          3 minutes   a lens, a hand-eye transform or a delay that is wrong
 slow-tracker    4 minutes   a tracker whose errors are slow, told and not told
 precision       3 minutes   the map in single precision
 lost            5 minutes   statistics --long lost
@@ -275,28 +275,6 @@ distortion_coefficients: !!opencv-matrix
 END
 }
 
-# The numbers are those of the simulated scope at 320x240, slightly or grossly wrong.
-make_set_up() {
-  command='perimap simulate --duration 36 --size 320x240 --seed 1 --tracker-noise 1.4; perimap replay --lockstep with another calibration, tracker.hand_eye_..., tracker.time_offset_ms'
-  echo '| wrong by | error, median / 95 % | NEES/3 | called good, off by more than 3 mm |'
-  echo '|---|---|---|---|'
-  simulate set-up --duration 36 --size 320x240 --seed 1 --tracker-noise 1.4 || return 1
-  local stem focal settings name
-  while IFS='|' read -r stem focal settings name; do
-    stem=set-up-$stem
-    lens "$stem" "$focal" 0
-    replay set-up "$stem" <<< "$(printf '[camera]\ncalibration = "%s.yaml"\n[tracker]\n%s' "$stem" "$settings")" || return 1
-    echo "| $name | $(figure "$stem" median) / $(figure "$stem" p95) mm | $(figure "$stem" nees) | $(figure "$stem" off) |"
-  done << 'END'
-none|1||nothing
-focal-2|1.02||focal length, 2 %
-focal-5|1.05||focal length, 5 %
-across|1|hand_eye_translation_SC_mm = [14.2, -6.8, 14.5]|hand-eye, 10 mm
-roll|1|hand_eye_rotation_SC_wxyz = [0.7961381, 0.0724649, -0.0438691, 0.5991565]|hand-eye, 5 degrees
-late|1|time_offset_ms = 33.3|tracker late by a frame
-END
-}
-
 make_precision() {
   command='perimap simulate --duration 40; perimap replay --lockstep with estimation.precision'
   echo '| tracker, precision | RMS | median | 95 % | largest, mm | NEES/3 |'
@@ -428,12 +406,16 @@ make_latency() {
   "$perimap" bench "$work/latency.mcap" 2> /dev/null | as_printed
 }
 
-# put NAME FILE: the text of FILE into the place of NAME.
+# put NAME FILE: the text of FILE into the place of NAME, or to standard output where it has none.
 put() {
   local page
   page=$(grep -lF "<!-- made: $1 -->" docs/evidence/*.md)
+  if [ -z "$page" ]; then
+    cat "$2"
+    return 0
+  fi
   if [ "$(wc -w <<< "$page")" != 1 ]; then
-    echo "make.sh: $1 has a place in these pages, expected one: ${page:-none}" >&2
+    echo "make.sh: $1 has a place in these pages, expected one: $page" >&2
     return 1
   fi
   awk -v name="$1" -v text="$2" '
