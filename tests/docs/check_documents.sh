@@ -8,6 +8,10 @@
 #   - each file of a folder with an index (README.md) is linked from that index
 #   - each folder of the sources that has a header stands in the table of docs/design/targets.md
 #   - each document that a comment of the sources names exists
+#   - each section of docs/evidence with a table names in one paragraph a commit and a machine of docs/evidence/README.md
+#     ("at commit 1a2b3c4 of 2026-11-26, shared"; "2 processors", as make.sh writes, is a machine too; so is "machine was
+#     not recorded"), or says "commit not recorded"
+#   - each commit that a document names is one of the history, where there is one that is whole
 #
 # What it finds is printed as FILE:LINE: what; exit code 1 then. No network: links to elsewhere are passed over.
 set -uo pipefail
@@ -145,6 +149,67 @@ if [ -e $table ]; then
   done < <(find core drivers daemon -name '*.hpp' -printf '%h\n' 2> /dev/null | sort -u)
 fi
 
+# FILE -> lines "NUMBER<tab>HASH" of what follows the word commit: "commit A", "commits A, B and C".
+commits_of() {
+  awk '
+    function told(   text, word) {
+      text = paragraph
+      while (match(text, /[Cc]ommits? [0-9a-f]+/)) {
+        text = substr(text, RSTART); sub(/^[Cc]ommits? /, "", text)
+        while (match(text, /^[0-9a-f]+/)) {
+          word = substr(text, 1, RLENGTH); text = substr(text, RLENGTH + 1)
+          if (length(word) >= 7) print first "\t" word
+          if (!sub(/^(, and |, | and )/, "", text)) break
+        }
+      }
+      paragraph = ""
+    }
+    /^```/ { code = !code; told(); next }
+    code { next }
+    /^[ \t]*$/ { told(); next }
+    { if (paragraph == "") first = NR; sub(/^ +/, ""); paragraph = paragraph (paragraph == "" ? "" : " ") $0 }
+    END { told() }' "$1"
+}
+
+# Figures without commit and machine cannot be made again. The first column of the index' table has the machines.
+machines=$(sed -n '/^## Machines/,/^## [^M]/s/^| \([a-z]*\) |.*/\1/p' docs/evidence/README.md 2> /dev/null | grep -vx name | paste -sd '|')
+for page in docs/evidence/*.md; do
+  [ -e "$page" ] && [ "$page" != docs/evidence/README.md ] || continue
+  while IFS=$'\t' read -r number heading; do
+    fault "$page:$number: the section \"$heading\" has a table, and names no commit with its machine"
+  done < <(awk -v machine="(^|[^a-z])(${machines:-no machine}|[0-9]+ processors|machine was not recorded)([^a-z]|\$)" '
+    function paragraph_ends() {
+      if (paragraph ~ /[Cc]ommits? [0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f]/ && paragraph ~ machine) told = 1
+      if (paragraph ~ /commit not recorded/) told = 1
+      paragraph = ""
+    }
+    function section_ends() {
+      paragraph_ends()
+      if (table && !told) print first "\t" heading
+      table = told = 0
+    }
+    /^```/ { code = !code; next }
+    code { next }
+    /^#+ / { section_ends(); first = NR; heading = $0; sub(/^#+ /, "", heading); next }
+    /^[ \t]*$/ { paragraph_ends(); next }
+    /^ *\|/ { table = 1; next }
+    { sub(/^ +/, ""); paragraph = paragraph (paragraph == "" ? "" : " ") $0 }
+    END { section_ends() }' "$page")
+done
+
+# A clone that is not whole lacks old commits, and a release has no history at all.
+history="no history here to look commits up in"
+if [ "$(git rev-parse --show-toplevel 2> /dev/null)" = "$(pwd -P)" ] && [ "$(git rev-parse --is-shallow-repository)" = false ]; then
+  looked_up=0
+  for document in "${documents[@]}"; do
+    while IFS=$'\t' read -r number hash; do
+      looked_up=$((looked_up + 1))
+      git cat-file -e "$hash^{commit}" 2> /dev/null || fault "$document:$number: the history has no commit $hash"
+    done < <(commits_of "$document")
+  done
+  history="$looked_up times a commit of the history"
+fi
+
 # Not idl/: its text, comments included, is part of every recording, so it changes with its next version alone.
 while IFS=: read -r file number name; do
   [ -e "$name" ] || fault "$file:$number: there is no $name"
@@ -155,4 +220,4 @@ if [ $faults -gt 0 ]; then
   echo "$faults faults in ${#documents[@]} documents"
   exit 1
 fi
-echo "${#documents[@]} documents: every link, path and key is there"
+echo "${#documents[@]} documents: every link, path and key is there; $history"

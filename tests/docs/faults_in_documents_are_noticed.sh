@@ -85,4 +85,53 @@ if bash "$check" . > out 2>&1 || ! grep -qF 'docs/design/targets.md: there is no
   cat out
   status=1
 fi
+# evidence TEXT...: a page of evidence whose second section has a table, and then these lines.
+evidence() {
+  fresh
+  mkdir -p docs/evidence
+  printf '# Evidence\n\n[page](page.md)\n\n## Machines\n\n| name | what |\n|---|---|\n| quick | one |\n' > docs/evidence/README.md
+  printf '# Page\n\nNo table.\n\n## Figures\n\n| a | b |\n|---|---|\n| 1 | 2 |\n\n' > docs/evidence/page.md
+  printf '%s\n' "$@" '' '## No figures' '' 'At commit 1234567, quick.' >> docs/evidence/page.md
+}
+told=('At commit 1234567 of 2026-11-26, quick.'
+  'By commits 89abcde and
+1234567: 2 processors.'
+  'At commit 1234567; the machine was not recorded.'
+  'By hand; commit not recorded.')
+for text in "${told[@]}"; do
+  evidence "$text"
+  if ! bash "$check" . > out 2>&1; then
+    echo "FAILED: a section of the evidence that says '$text' is refused:"
+    cat out
+    status=1
+  fi
+done
+untold=('Measured.' 'Measured, quick.' 'At commit 1234567.' 'At commit 1234567, quicker.' $'At commit 1234567.\n\nOn quick.' 'At commit 12345, quick.')
+for text in "${untold[@]}"; do
+  evidence "$text"
+  if bash "$check" . > out 2>&1 ||
+    ! grep -qF 'docs/evidence/page.md:5: the section "Figures" has a table, and names no commit with its machine' out; then
+    echo "FAILED: a section of the evidence that says '$text' is not noticed:"
+    cat out
+    status=1
+  fi
+done
+
+# With a history: its commits are known, others are not.
+fresh
+git init -q . && git -c user.name=Nobody -c user.email=nobody@example.org -c commit.gpgsign=false commit -q --allow-empty -m First
+known=$(git rev-parse --short=7 HEAD)
+printf '\nAt commit %s, at commits %s and\n%s.\n' "$known" "$known" "$known" >> README.md
+if ! bash "$check" . > out 2>&1 || ! grep -qF '3 times a commit of the history' out; then
+  echo "FAILED: commits of the history are refused, or are not looked up:"
+  cat out
+  status=1
+fi
+printf '\nAt commits %s and 0123456.\n' "$known" >> README.md
+line=$(wc -l < README.md)
+if bash "$check" . > out 2>&1 || ! grep -qF "README.md:$line: the history has no commit 0123456" out; then
+  echo "FAILED: a commit that the history does not have is not noticed:"
+  cat out
+  status=1
+fi
 exit $status
