@@ -11,6 +11,7 @@
 #   - each section of docs/evidence with a table names in one paragraph a commit and a machine of docs/evidence/README.md
 #     ("at commit 1a2b3c4 of 2026-11-26, shared"; "2 processors", as make.sh writes, is a machine too; so is "machine was
 #     not recorded"), or says "commit not recorded"
+#   - between the marks of docs/evidence/make.sh there is a table, and the script knows its name
 #   - each commit that a document names is one of the history, where there is one that is whole
 #
 # What it finds is printed as FILE:LINE: what; exit code 1 then. No network: links to elsewhere are passed over.
@@ -195,6 +196,19 @@ for page in docs/evidence/*.md; do
     /^ *\|/ { table = 1; next }
     { sub(/^ +/, ""); paragraph = paragraph (paragraph == "" ? "" : " ") $0 }
     END { section_ends() }' "$page")
+done
+
+# Between marks that hold nothing nobody sees that a table is missing.
+for page in docs/evidence/*.md; do
+  [ -e "$page" ] || continue
+  while IFS=$'\t' read -r number name filled; do
+    [ "$filled" = yes ] || fault "$page:$number: there is no table between the marks of $name"
+    [ ! -e docs/evidence/make.sh ] || bash docs/evidence/make.sh --list | grep -q "^$name " ||
+      fault "$page:$number: docs/evidence/make.sh makes no $name"
+  done < <(awk '
+    /^<!-- made: .* -->$/ { name = $3; first = NR; filled = "no"; next }
+    name != "" && /^(\||```)/ { filled = "yes" }
+    /^<!-- end: .* -->$/ { print first "\t" name "\t" filled; name = "" }' "$page")
 done
 
 # A clone that is not whole lacks old commits, and a release has no history at all.

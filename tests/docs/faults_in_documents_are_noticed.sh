@@ -117,6 +117,28 @@ for text in "${untold[@]}"; do
   fi
 done
 
+# Marks of make.sh with nothing between them, and a name that the script does not know.
+evidence 'At commit 1234567, quick.' '<!-- made: speed -->' '' 'No table.' '<!-- end: speed -->'
+line=$(grep -n '^<!-- made: speed' docs/evidence/page.md | cut -d : -f 1)
+if bash "$check" . > out 2>&1 || ! grep -qF "docs/evidence/page.md:$line: there is no table between the marks of speed" out; then
+  echo "FAILED: marks with nothing between them are not noticed:"
+  cat out
+  status=1
+fi
+evidence 'At commit 1234567, quick.' '<!-- made: speed -->' '| a |' '|---|' '| 1 |' '<!-- end: speed -->'
+printf 'echo "speed 1 minute"\n' > docs/evidence/make.sh
+if ! bash "$check" . > out 2>&1; then
+  echo "FAILED: a table between marks is refused:"
+  cat out
+  status=1
+fi
+printf 'echo "speeds 1 minute"\n' > docs/evidence/make.sh
+if bash "$check" . > out 2>&1 || ! grep -qF "docs/evidence/page.md:$line: docs/evidence/make.sh makes no speed" out; then
+  echo "FAILED: marks of a table that the script does not make are not noticed:"
+  cat out
+  status=1
+fi
+
 # With a history: its commits are known, others are not.
 fresh
 git init -q . && git -c user.name=Nobody -c user.email=nobody@example.org -c commit.gpgsign=false commit -q --allow-empty -m First
