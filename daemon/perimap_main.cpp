@@ -12,6 +12,7 @@
   COMMAND(simulate)               \
   COMMAND(replay)                 \
   COMMAND(watch)                  \
+  COMMAND(view)                   \
   COMMAND(report)                 \
   COMMAND(ecg)                    \
   COMMAND(bench)                  \

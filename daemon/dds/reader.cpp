@@ -51,4 +51,12 @@ int UntypedReader::matched_writers() const noexcept {
   return dds_get_subscription_matched_status(reader_.get(), &status) < 0 ? 0 : static_cast<int>(status.current_count);
 }
 
+std::optional<std::uint64_t> UntypedReader::participant_of(dds_instance_handle_t writer) const noexcept {
+  dds_builtintopic_endpoint_t* const endpoint = dds_get_matched_publication_data(reader_.get(), writer);
+  if (endpoint == nullptr) return std::nullopt;
+  const std::uint64_t participant = endpoint->participant_instance_handle;
+  dds_builtintopic_free_endpoint(endpoint);
+  return participant;
+}
+
 }  // namespace perimap::dds

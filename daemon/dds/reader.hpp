@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 
 #include "core/error/expected.hpp"
 #include "daemon/dds/entity.hpp"
@@ -48,6 +50,9 @@ class UntypedReader {
   [[nodiscard]] dds_entity_t condition() const noexcept { return condition_.get(); }
   // Writers that are connected now.
   [[nodiscard]] int matched_writers() const noexcept;
+  // Whose writer it is (dds_sample_info_t::publication_handle): the same number for all writers of one participant.
+  // None when the writer has gone.
+  [[nodiscard]] std::optional<std::uint64_t> participant_of(dds_instance_handle_t writer) const noexcept;
 
  private:
   UntypedReader(Entity topic, Entity reader, Entity condition) noexcept
@@ -91,6 +96,9 @@ class Reader {
   }
   [[nodiscard]] dds_entity_t condition() const noexcept { return reader_.condition(); }
   [[nodiscard]] int matched_writers() const noexcept { return reader_.matched_writers(); }
+  [[nodiscard]] std::optional<std::uint64_t> participant_of(dds_instance_handle_t writer) const noexcept {
+    return reader_.participant_of(writer);
+  }
 
  private:
   explicit Reader(UntypedReader reader) noexcept : reader_(std::move(reader)) {}

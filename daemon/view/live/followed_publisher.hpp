@@ -1,0 +1,34 @@
+// Which perimapd and which of its streams a page shows, where there are several.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+// The first one heard, for as long as it publishes: two are never mixed. Of the streams of one perimapd the frames', if
+// there is one. One thread.
+class FollowedPublisher {
+ public:
+  // So long must it have been silent before another is followed.
+  static constexpr Duration kSilence = std::chrono::seconds(1);
+
+  // A surface came; whether it is to be shown. `publisher` tells perimapds of one domain apart.
+  [[nodiscard]] bool surface(std::uint64_t publisher, std::string_view stream, Instant receipt);
+  // Whether what else came is of the one that is followed; of a stream, where it has one of its own.
+  [[nodiscard]] bool follows(std::uint64_t publisher) const noexcept { return followed_ == publisher; }
+  [[nodiscard]] bool follows(std::uint64_t publisher, std::string_view stream) const noexcept {
+    return follows(publisher) && stream == stream_;
+  }
+
+ private:
+  std::optional<std::uint64_t> followed_;
+  std::string stream_;
+  Instant last_;
+};
+
+}  // namespace perimap

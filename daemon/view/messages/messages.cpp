@@ -1,0 +1,53 @@
+#include "daemon/view/messages/messages.hpp"
+
+#include <cmath>
+#include <memory>
+#include <span>
+
+#include "daemon/publishing/status_text.hpp"
+#include "daemon/publishing/wire_names.hpp"
+#include "daemon/view/messages/milliseconds.hpp"
+
+namespace perimap {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+}  // namespace
+
+Json phase_json(const perimap_Phase& phase) {
+  return {{"kind", "phase"},
+          {"state", name_of(phase.state)},
+          {"time_ms", page_ms(phase.time_ns)},
+          {"phase_rad", phase.cardiac_phase_rad},
+          {"deviation_rad", phase.cardiac_phase_deviation_rad},
+          {"rate_rad_per_s", phase.cardiac_phase_rate_rad_per_s},
+          {"last_r_ms", page_ms(phase.last_r_peak_time_ns)},
+          {"next_r_ms", page_ms(phase.predicted_r_peak_time_ns)},
+          {"next_r_deviation_ms", page_ms(phase.predicted_r_peak_deviation_ns)},
+          {"beats", phase.beats}};
+}
+
+Json status_message_json(const perimap_Status& status) {
+  return {{"kind", "status"}, {"time_ms", page_ms(status.time_ns)}, {"status", full_status_json(status)}};
+}
+
+Json ecg_json(const perimap_EcgSamples& block) {
+  Json values = Json::array();
+  for (const float value : std::span(block.ecg_mV._buffer, block.ecg_mV._length)) {
+    values.push_back(std::isfinite(value) ? Json(std::round(static_cast<double>(value) * 1e4) / 1e4) : Json(nullptr));
+  }
+  return {{"kind", "ecg"},
+          {"first_ms", page_ms(block.first_sample_time_ns)},
+          {"period_ms", page_ms(block.sample_period_ns)},
+          {"lead_off", block.lead_off},
+          {"mV", std::move(values)}};
+}
+
+PageMessage text_message(const Json& json, bool replaceable) {
+  // Text of a publisher may be no UTF-8.
+  return {std::make_shared<const std::string>(json.dump(-1, ' ', false, Json::error_handler_t::replace)), false,
+          replaceable};
+}
+
+}  // namespace perimap

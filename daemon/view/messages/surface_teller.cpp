@@ -1,0 +1,127 @@
+#include "daemon/view/messages/surface_teller.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <perimap_client.hpp>
+#include <span>
+#include <string>
+
+#include "daemon/publishing/wire_names.hpp"
+#include "daemon/view/messages/advice.hpp"
+#include "daemon/view/messages/milliseconds.hpp"
+
+namespace perimap {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// To 0.01, which is finer than a page draws, so that messages stay small. No number is null.
+Json rounded(double value) { return std::isfinite(value) ? Json(std::round(value * 100.0) / 100.0) : Json(nullptr); }
+
+double largest_deviation_mm(const double (&c)[6]) {
+  Eigen::Matrix3d covariance;
+  covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+  if (!covariance.allFinite()) return std::nan("");
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()(2)));
+}
+
+// Where the scope was; with its lens where that is told (an older perimapd does not).
+Json camera_json(const perimap_Surface& surface) {
+  if (!surface.camera_pose_known) return nullptr;
+  const auto list = [](const auto& values) {
+    Json json = Json::array();
+    for (const double value : values) json.push_back(value);
+    return json;
+  };
+  Json json = {{"translation_mm", list(surface.translation_WC_mm)},
+               {"rotation_wxyz", list(surface.rotation_WC_wxyz)},
+               {"focal_px", nullptr},
+               {"principal_point_px", nullptr}};
+  if (surface.camera_focal_px[0] > 0 && surface.camera_focal_px[1] > 0) {
+    json["focal_px"] = list(surface.camera_focal_px);
+    json["principal_point_px"] = list(surface.camera_principal_point_px);
+  }
+  return json;
+}
+
+void put_features(const perimap_Surface& surface, Json& json) {
+  Json ids = Json::array(), positions = Json::array(), states = Json::array(), deviations = Json::array();
+  for (const perimap_SurfaceFeature& feature : std::span(surface.features._buffer, surface.features._length)) {
+    if (feature.state == perimap_FEATURE_INVALID) continue;
+    const double deviation_mm = largest_deviation_mm(feature.covariance_W_mm2);
+    const double* p = feature.position_W_mm;
+    if (!std::isfinite(p[0] + p[1] + p[2]) || !std::isfinite(deviation_mm)) continue;
+    ids.push_back(feature.id);
+    for (std::size_t axis = 0; axis < 3; ++axis) positions.push_back(rounded(p[axis]));
+    states.push_back(static_cast<int>(feature.state));
+    deviations.push_back(rounded(deviation_mm));
+  }
+  json["features"] = {{"ids", std::move(ids)},
+                      {"positions_mm", std::move(positions)},
+                      {"states", std::move(states)},
+                      {"deviations_mm", std::move(deviations)}};
+}
+
+std::size_t converged_in(const perimap_Surface& surface) {
+  std::size_t count = 0;
+  for (const perimap_SurfaceFeature& feature : std::span(surface.features._buffer, surface.features._length)) {
+    if (feature.state == perimap_FEATURE_CONVERGED) ++count;
+  }
+  return count;
+}
+
+}  // namespace
+
+void SurfaceTeller::forget() {
+  model_.reset();
+  mesh_.reset();
+}
+
+Json SurfaceTeller::mesh_at(const perimap_Surface& surface, Instant receipt) {
+  if (!model_ || !mesh_) return {{"words", "no surface has come yet"}};
+  if (!client::predict(**mesh_, **model_, surface.valid_time_ns, to_ns(receipt), {true}, predicted_)) {
+    return {{"words", client::describe(predicted_)}};
+  }
+  Json positions = Json::array(), deviations = Json::array(), triangles = Json::array();
+  for (const auto& position : predicted_.positions_W_mm) {
+    for (const double coordinate : position) positions.push_back(rounded(coordinate));
+  }
+  for (const double deviation : predicted_.deviations_mm) deviations.push_back(rounded(deviation));
+  for (const auto& triangle : predicted_.triangles) {
+    for (const std::uint32_t corner : triangle) triangles.push_back(corner);
+  }
+  return {{"words", ""},
+          {"positions_mm", std::move(positions)},
+          {"deviations_mm", std::move(deviations)},
+          {"triangles", std::move(triangles)}};
+}
+
+Json SurfaceTeller::tell(const perimap_Surface& surface, Instant receipt) {
+  const bool usable = surface.state == perimap_SURFACE_GOOD || surface.state == perimap_SURFACE_DEGRADED;
+  Json json = {{"kind", "surface"},
+               {"source", surface.source},
+               {"stream", surface.stream},
+               {"sequence", surface.sample_sequence},
+               {"frame", surface.frame_sequence},
+               {"state", name_of(surface.state)},
+               {"reason", name_of(surface.reason)},
+               {"permission", permission_of(surface.state)},
+               {"why", surface.reason == perimap_SURFACE_REASON_NONE ? "" : client::describe(surface.reason)},
+               {"remedy", remedy_of(surface.reason)},
+               {"converged", converged_in(surface)},
+               {"known", surface.features._length},
+               {"valid_ms", page_ms(surface.valid_time_ns)},
+               {"capture_ms", page_ms(surface.capture_time_ns)},
+               {"received_ms", page_ms(to_ns(receipt))},
+               {"expired", to_ns(receipt) > surface.valid_until_ns},
+               {"phase_rad", rounded(surface.cardiac_phase_rad)},
+               {"phase_deviation_rad", rounded(surface.cardiac_phase_deviation_rad)}};
+  if (!usable) return json;
+  json["camera"] = camera_json(surface);
+  put_features(surface, json);
+  json["mesh"] = mesh_at(surface, receipt);
+  return json;
+}
+
+}  // namespace perimap

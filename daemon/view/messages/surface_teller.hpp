@@ -1,0 +1,36 @@
+// A surface as the page gets it: what may be used, and no position of what may not.
+#pragma once
+
+#include <perimap.h>
+#include <perimap_mesh.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <perimap_mesh_client.hpp>
+
+#include "core/time/instant.hpp"
+#include "drivers/recording/cdr.hpp"
+
+namespace perimap {
+
+// Keeps the newest model and mesh of one perimapd, and moves the mesh to the instant of each surface. One thread.
+class SurfaceTeller {
+ public:
+  void take(Sample<perimap_SurfaceModel> model) { model_.emplace(std::move(model)); }
+  void take(Sample<perimap_SurfaceMesh> mesh) { mesh_.emplace(std::move(mesh)); }
+  // Another perimapd, or another instant of a recording.
+  void forget();
+
+  // `receipt` is when it came, on its publisher's clock. Lengths in mm, times in ms of that clock. Positions of an
+  // invalid surface are left out, and so is a mesh that the client of idl/perimap_mesh_client.hpp refuses.
+  [[nodiscard]] nlohmann::ordered_json tell(const perimap_Surface& surface, Instant receipt);
+
+ private:
+  [[nodiscard]] nlohmann::ordered_json mesh_at(const perimap_Surface& surface, Instant receipt);
+
+  std::optional<Sample<perimap_SurfaceModel>> model_;
+  std::optional<Sample<perimap_SurfaceMesh>> mesh_;
+  client::PredictedMesh predicted_;
+};
+
+}  // namespace perimap

@@ -1,0 +1,144 @@
+// The page: takes what perimap view sends, judges what may be trusted, draws.
+import {Connection} from "./connection.mjs";
+import {Delays} from "./delays.mjs";
+import {Scene} from "./scene.mjs";
+import {showFacts, showSources} from "./sources.mjs";
+import {Strip} from "./strip.mjs";
+import {Timeline} from "./timeline.mjs";
+import {Held, judge} from "./trust.mjs";
+
+const $ = (id) => document.getElementById(id);
+const kJudgeMs = 50;
+// A status comes each second.
+const kStatusMs = 2500;
+
+// The token is in a cookie now; the address without it can be shown to others.
+if (location.search) history.replaceState(null, "", "/");
+
+const scene = new Scene($("scene")), strip = new Strip($("strip")), delays = new Delays($("delays"));
+const seen = {recorded: false, domain: 0, publishers: null, surface: null, cameAt: 0, quickest: Infinity, lagMs: 0, ageMs: Infinity};
+const held = new Held();
+let judged = {state: "invalid"};
+
+const timeline = new Timeline(
+  {footer: $("timeline"), button: $("play"), slider: $("time"), clock: $("clock"), states: $("states")},
+  (question) => {
+    if (!question.from_here) {
+      strip.forget();
+      seen.surface = null;
+    }
+    connection.say(question);
+  });
+
+const take = {
+  hello(message) {
+    seen.recorded = message.mode === "recording";
+    seen.domain = message.domain;
+    seen.surface = null;
+    seen.quickest = Infinity;
+    strip.forget();
+    delays.forget();
+    document.title = seen.recorded ? `perimap: ${message.name}` : "perimap";
+    document.querySelector("section.delays").hidden = seen.recorded;
+    warn(message.warnings ?? []);
+    if (seen.recorded) timeline.begin(message);
+  },
+  publishers(message) {
+    seen.publishers = message.count;
+    warn(message.count > 1 ? [`${message.count} perimapds publish in DDS domain ${message.domain}: one of them is shown. End the others.`] : []);
+  },
+  surface(message) {
+    seen.surface = message;
+    seen.cameAt = performance.now();
+    if (message.sent_ms !== undefined) {
+      const under_way = seen.cameAt - message.sent_ms;
+      seen.quickest = Math.min(seen.quickest, under_way);
+      seen.lagMs = under_way - seen.quickest;
+      delays.add(seen.cameAt, message.late_ms, message.lost);
+    }
+    strip.surface(message);
+  },
+  phase(message) {
+    strip.phase(message);
+  },
+  status({status}) {
+    seen.status = status;
+    seen.statusAt = performance.now();
+    tellStatus();
+  },
+  ecg(message) {
+    strip.ecg(message);
+  },
+  at(message) {
+    timeline.answered();
+    seen.atMs = message.at_ms;
+    seen.ageMs = message.surface_age_ms ?? Infinity;
+    if (message.surface_age_ms === null) seen.surface = null;
+  },
+};
+
+const connection = new Connection((message) => take[message.kind]?.(message));
+
+function warn(texts) {
+  $("warning").textContent = texts.join(" ");
+  $("warning").hidden = texts.length === 0;
+}
+
+// Written only when it changes, so that a screen reader does not read it ten times a second.
+function set(id, text) {
+  if ($(id).textContent !== text) $(id).textContent = text;
+}
+
+function tell() {
+  const now = performance.now(), ageMs = seen.recorded ? seen.ageMs : now - seen.cameAt;
+  const latest = judge({...seen, link: connection.link, ageMs});
+  judged = seen.recorded ? latest : held.take(latest, now);
+  if ($("trust").dataset.state !== judged.state) $("trust").dataset.state = judged.state;
+  for (const part of ["state", "permission", "why", "remedy"]) set(part, judged[part]);
+  const {surface} = judged;
+  set("converged", `${surface?.converged ?? 0} converged`);
+  set("known", surface ? `of ${surface.known}` : "");
+  const words = surface?.mesh?.words || (surface?.mesh ? `mesh of ${surface.mesh.triangles.length / 3} triangles` : "");
+  set("surface-words", words);
+}
+
+// How the sources are now, or that it is not known.
+function tellStatus() {
+  if (!seen.status) return;
+  const known = connection.link.open && (seen.recorded || performance.now() - seen.statusAt < kStatusMs);
+  if (seen.told === seen.status && seen.toldKnown === known) return;
+  Object.assign(seen, {told: seen.status, toldKnown: known});
+  showSources($("sources"), seen.status.sources, known);
+  if (known) showFacts($("facts"), seen.status);
+  else $("facts").replaceChildren();
+}
+
+// The publisher's clock now, from the surface that came last.
+function nowMs() {
+  if (seen.recorded) return seen.atMs ?? null;
+  return seen.surface ? seen.surface.received_ms + performance.now() - seen.cameAt : null;
+}
+
+function draw() {
+  timeline.advance();
+  tell();
+  scene.draw(judged.state === "invalid" ? null : seen.surface, judged.state);
+  strip.draw(nowMs(), judged.state === "invalid");
+  timeline.draw();
+  requestAnimationFrame(draw);
+}
+
+addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.altKey || event.metaKey || event.target !== document.body) return;
+  if (timeline.key(event.key) || scene.key(event.key)) event.preventDefault();
+});
+// Judged without drawing too: a page that is covered draws nothing.
+setInterval(tell, kJudgeMs);
+setInterval(() => {
+  tellStatus();
+  delays.draw();
+  set("delay-words", delays.words());
+  set("heart-words", strip.samples.length || !strip.phases.length ? "" :
+    seen.recorded ? "" : "beats and phase; the ECG itself is not published");
+}, 500);
+requestAnimationFrame(draw);

@@ -1,0 +1,59 @@
+// What the page says may be trusted: node --test trust_test.mjs
+import assert from "node:assert/strict";
+import {test} from "node:test";
+
+import {Held, judge, kHeldMs, kSilenceMs} from "../../../daemon/view/page/trust.mjs";
+
+const good = {state: "good", permission: "may be used", why: "", remedy: "", expired: false};
+const sentence = ({permission, why, remedy}) => `${permission}: ${why}; ${remedy}`;
+const live = {link: {open: true, words: ""}, domain: 3, publishers: 1, surface: good, ageMs: 10, lagMs: 0, recorded: false};
+
+test("a new surface is what it says", () => {
+  assert.equal(judge(live).state, "good");
+  const degraded = {...good, state: "degraded", permission: "use with care", why: "no pose of the scope", remedy: "look at the tracker"};
+  const judged = judge({...live, surface: degraded});
+  assert.equal(judged.state, "degraded");
+  assert.equal(sentence(judged), "use with care: no pose of the scope; look at the tracker");
+});
+
+test("half a second without one and nothing may be used", () => {
+  assert.ok(kSilenceMs < 500);
+  assert.equal(judge({...live, ageMs: kSilenceMs}).state, "good");
+  const silent = judge({...live, ageMs: 450});
+  assert.equal(silent.state, "invalid");
+  assert.match(sentence(silent), /use no position: nothing has come from perimapd for 0\.[45] s/);
+});
+
+test("an old, late or unknown surface is never good", () => {
+  assert.equal(judge({...live, lagMs: 450}).state, "invalid");
+  assert.equal(judge({...live, surface: {...good, expired: true}}).state, "invalid");
+  for (const state of ["invalid", "unknown", "", undefined]) {
+    assert.equal(judge({...live, surface: {...good, state}}).state, "invalid");
+  }
+});
+
+test("nobody there, no link and no surface are told apart", () => {
+  assert.match(sentence(judge({...live, surface: null, publishers: 0})), /nobody publishes in DDS domain 3/);
+  assert.match(sentence(judge({...live, surface: null})), /no surface has come yet/);
+  const link = {open: false, words: "16 pages are open already"};
+  assert.match(sentence(judge({...live, link})), /16 pages are open already/);
+  assert.equal(judge({...live, link}).state, "invalid");
+});
+
+test("a recording's gap is one", () => {
+  const recorded = {...live, recorded: true, publishers: null};
+  assert.equal(judge(recorded).state, "good");
+  assert.match(sentence(judge({...recorded, ageMs: 2000})), /nothing was published for 2.0 s/);
+  assert.match(sentence(judge({...recorded, surface: null})), /no surface here/);
+});
+
+test("what is worse stays on the page until it can be read", () => {
+  const held = new Held();
+  const [well, care, none] = ["good", "degraded", "invalid"].map((state) => ({state}));
+  assert.equal(held.take(well, 0), well);
+  assert.equal(held.take(care, 10), care);
+  assert.equal(held.take(well, 10 + kHeldMs), care);
+  assert.equal(held.take(none, 20), none);
+  assert.equal(held.take(care, 30), none);
+  assert.equal(held.take(well, 21 + kHeldMs), well);
+});

@@ -1,0 +1,146 @@
+#include "daemon/view/messages/messages.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "daemon/publishing/wire_names.hpp"
+#include "daemon/view/live/followed_publisher.hpp"
+#include "daemon/view/messages/advice.hpp"
+#include "daemon/view/messages/page_request.hpp"
+#include "daemon/view/messages/surface_teller.hpp"
+
+namespace perimap {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(PageRequest, IsAnInstantOfTheRecording) {
+  const auto request = parse_page_request(R"({"at_s": 12.5, "from_here": true})");
+  ASSERT_TRUE(request) << request.error().message;
+  EXPECT_EQ(request->at_s, 12.5);
+  EXPECT_TRUE(request->from_here);
+  EXPECT_FALSE(parse_page_request(R"({"at_s": 0})")->from_here);
+}
+
+TEST(PageRequest, WhatIsGarbledIsRefused) {
+  for (const std::string text :
+       {"", "{", "null", "[]", "12.5", "{}", R"({"at_s": "1"})", R"({"at_s": 1e999})", R"({"at_s": -1e300})",
+        R"({"at_s": 1, "from_here": 1})", R"({"at_s": 1} {)", "\xFF\xFE", R"({"at_s": null})"}) {
+    EXPECT_FALSE(parse_page_request(text)) << text;
+  }
+  EXPECT_FALSE(parse_page_request(std::string(1000, '[')));
+}
+
+TEST(Advice, EveryReasonOfTheIdlHasAWayOutAndNoneButNoneHasNone) {
+  EXPECT_EQ(remedy_of(perimap_SURFACE_REASON_NONE), "");
+  int reasons = 0;
+  for (int i = 1; name_of(static_cast<perimap_SurfaceReason>(i)) != "unknown"; ++i, ++reasons) {
+    const auto remedy = remedy_of(static_cast<perimap_SurfaceReason>(i));
+    EXPECT_NE(remedy, "") << i;
+    EXPECT_NE(remedy, remedy_of(static_cast<perimap_SurfaceReason>(31))) << i;
+  }
+  EXPECT_GE(reasons, 22);
+}
+
+TEST(Advice, OnlyKnownStatesPermitAnything) {
+  EXPECT_EQ(permission_of(perimap_SURFACE_GOOD), "may be used");
+  EXPECT_EQ(permission_of(perimap_SURFACE_DEGRADED), "use with care");
+  EXPECT_EQ(permission_of(perimap_SURFACE_INVALID), "use no position");
+  EXPECT_EQ(permission_of(static_cast<perimap_SurfaceState>(3)), "use no position");
+}
+
+perimap_SurfaceFeature feature_at(std::uint32_t id, perimap_FeatureState state, double x) {
+  perimap_SurfaceFeature feature{};
+  feature.id = id;
+  feature.state = state;
+  feature.position_W_mm[0] = x;
+  feature.covariance_W_mm2[0] = 0.04;
+  feature.covariance_W_mm2[3] = feature.covariance_W_mm2[5] = 0.01;
+  return feature;
+}
+
+struct Told {
+  explicit Told(perimap_SurfaceState state) {
+    features = {feature_at(3, perimap_FEATURE_CONVERGED, 1.0), feature_at(4, perimap_FEATURE_INVALID, 2.0),
+                feature_at(7, perimap_FEATURE_CONVERGED, std::numeric_limits<double>::quiet_NaN()),
+                feature_at(9, perimap_FEATURE_CONVERGING, 4.0)};
+    surface.state = state;
+    surface.reason = perimap_SURFACE_REASON_POSE_MISSING;
+    surface.features._buffer = features.data();
+    surface.features._length = surface.features._maximum = static_cast<std::uint32_t>(features.size());
+    surface.valid_until_ns = 100;
+  }
+  std::vector<perimap_SurfaceFeature> features;
+  perimap_Surface surface{};
+};
+
+TEST(SurfaceTeller, TellsUsableFeaturesWithTheirLargestDeviation) {
+  Told told(perimap_SURFACE_DEGRADED);
+  const auto json = SurfaceTeller().tell(told.surface, from_ns(50));
+  EXPECT_EQ(json["state"], "degraded");
+  EXPECT_EQ(json["reason"], "pose_missing");
+  EXPECT_EQ(json["converged"], 2);
+  EXPECT_EQ(json["known"], 4);
+  EXPECT_EQ(json["expired"], false);
+  EXPECT_EQ(json["features"]["ids"], nlohmann::ordered_json({3, 9}));
+  EXPECT_EQ(json["features"]["positions_mm"], nlohmann::ordered_json({1.0, 0.0, 0.0, 4.0, 0.0, 0.0}));
+  EXPECT_EQ(json["features"]["deviations_mm"][0], 0.2);
+  EXPECT_EQ(json["camera"], nullptr);
+  EXPECT_EQ(json["mesh"]["words"], "no surface has come yet");
+  EXPECT_EQ(SurfaceTeller().tell(told.surface, from_ns(101))["expired"], true);
+}
+
+TEST(SurfaceTeller, OfAnInvalidSurfaceNoPositionLeaves) {
+  for (const auto state : {perimap_SURFACE_INVALID, static_cast<perimap_SurfaceState>(3)}) {
+    Told told(state);
+    told.surface.camera_pose_known = true;
+    const auto json = SurfaceTeller().tell(told.surface, from_ns(50));
+    EXPECT_FALSE(json.contains("features"));
+    EXPECT_FALSE(json.contains("mesh"));
+    EXPECT_FALSE(json.contains("camera"));
+    EXPECT_EQ(json["permission"], "use no position");
+  }
+}
+
+TEST(Messages, TextOfAPublisherThatIsNoUtf8IsStillJson) {
+  Told told(perimap_SURFACE_GOOD);
+  told.surface.source[0] = '\xFF';
+  const PageMessage message = text_message(SurfaceTeller().tell(told.surface, from_ns(50)));
+  EXPECT_TRUE(nlohmann::json::accept(*message.bytes));
+}
+
+TEST(FollowedPublisher, TwoAreNeverMixed) {
+  FollowedPublisher followed;
+  EXPECT_FALSE(followed.follows(1));
+  EXPECT_TRUE(followed.surface(1, "frame", from_ns(0)));
+  EXPECT_FALSE(followed.surface(2, "frame", from_ns(0) + 10ms));
+  EXPECT_TRUE(followed.surface(1, "frame", from_ns(0) + 33ms));
+  EXPECT_TRUE(followed.follows(1));
+  EXPECT_FALSE(followed.follows(2));
+}
+
+TEST(FollowedPublisher, AnotherIsFollowedOnceTheFirstIsSilent) {
+  FollowedPublisher followed;
+  EXPECT_TRUE(followed.surface(1, "frame", from_ns(0)));
+  EXPECT_FALSE(followed.surface(2, "frame", from_ns(0) + 900ms));
+  EXPECT_TRUE(followed.surface(2, "frame", from_ns(0) + 1100ms));
+  EXPECT_FALSE(followed.surface(1, "frame", from_ns(0) + 1200ms));
+  EXPECT_TRUE(followed.follows(2, "frame"));
+}
+
+TEST(FollowedPublisher, OfTwoStreamsTheFramesIsShown) {
+  FollowedPublisher followed;
+  EXPECT_TRUE(followed.surface(1, "clock", from_ns(0)));
+  EXPECT_TRUE(followed.surface(1, "frame", from_ns(0) + 1ms));
+  EXPECT_FALSE(followed.surface(1, "clock", from_ns(0) + 2ms));
+  EXPECT_TRUE(followed.follows(1, "frame"));
+  EXPECT_FALSE(followed.follows(1, "clock"));
+}
+
+}  // namespace
+}  // namespace perimap
