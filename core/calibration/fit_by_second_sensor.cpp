@@ -81,6 +81,21 @@ Expected<SecondSensor> axis_of(const std::vector<HeldRelation>& held) {
   return second;
 }
 
+// How far the set-ups are from the function in all, squared: by the lens's direction, and by where the principal point
+// has gone, as an angle too. The hand-eye of a scope that looks straight ahead fits either way round of the axis; its
+// principal point does not.
+double left_over_rad2(const TurnedScope& scope, const std::vector<SetupAtRotation>& setups) {
+  constexpr double kUsualFocal_px = 1000.0;  // where none is told
+  double squares = 0.0;
+  for (const SetupAtRotation& setup : setups) {
+    const SetupAtRotation expected = scope.at(setup.rotation_rad);
+    const double focal_px = setup.focal_px.x() > 0.0 ? setup.focal_px.x() : kUsualFocal_px;
+    squares += so3_log(expected.X_SC.R.transpose() * setup.X_SC.R).squaredNorm();
+    squares += (expected.principal_px - setup.principal_px).squaredNorm() / (focal_px * focal_px);
+  }
+  return squares;
+}
+
 }  // namespace
 
 Expected<HeldRelation> held_relation(const std::vector<TimedPose>& sensor, const std::vector<TimedPose>& second) {
@@ -127,6 +142,7 @@ Expected<TurnedScope> fit_by_second_sensor(std::vector<SetupAtRotation> setups, 
   auto second = axis_of(held);
   if (!second) return tl::unexpected(second.error());
   Expected<TurnedScope> best = fail("");
+  double least_rad2 = 0.0;
   for (const double way : {1.0, -1.0}) {
     SecondSensor turned = *second;
     turned.axis_S *= way;
@@ -136,12 +152,15 @@ Expected<TurnedScope> fit_by_second_sensor(std::vector<SetupAtRotation> setups, 
       setups[i].radius_px = 0.0;  // nobody looks for a field stop
     }
     auto scope = fit_turned_scope(setups, std::nullopt);
-    if (scope && (!best || scope->rotation_rms_deg < best->rotation_rms_deg)) {
-      scope->second_sensor = turned;
-      best = *std::move(scope);
-    } else if (!scope && !best && best.error().message.empty()) {
-      best = tl::unexpected(scope.error());
+    if (!scope) {
+      if (!best && best.error().message.empty()) best = tl::unexpected(scope.error());
+      continue;
     }
+    const double rad2 = left_over_rad2(*scope, setups);
+    if (best && rad2 >= least_rad2) continue;
+    scope->second_sensor = turned;
+    least_rad2 = rad2;
+    best = *std::move(scope);
   }
   return best;
 }

@@ -120,13 +120,13 @@ Expected<NamedSizes> named_sizes(const CameraConfiguration& c) {
 // Where a second sensor tells the turn it must be named, and be the one that it was measured of.
 Expected<void> second_sensor_fits(const Configuration& configuration, const TurnedScope& scope) {
   const TrackerConfiguration& tracker = configuration.tracker;
-  // Recorded poses say themselves whether there are such.
-  if (!scope.second_sensor || tracker.protocol == TrackerConfiguration::Protocol::kNone) return {};
+  if (!scope.second_sensor) return {};
   const auto own = calibration_fact(*configuration.camera.turned_scope, "second_sensor");
   const auto& named = tracker.second_sensor;
   if (named && (!own || same_tool(*own, *named, tracker.protocol))) return {};
-  // One that is uploaded is given a handle.
-  if (!named && second_sensor_of(tracked_tool_names(tracker))) return {};
+  // Recorded poses say themselves whether there are such; one that is uploaded is given a handle.
+  const bool recorded = tracker.protocol == TrackerConfiguration::Protocol::kNone;
+  if (!named && (recorded || second_sensor_of(tracked_tool_names(tracker)))) return {};
   return wrong("tracker.second_sensor",
                own ? fmt::format("\"{}\", as 'camera.turned_scope' is of", *own)
                    : "the sensor that tells how the scope of 'camera.turned_scope' is turned",

@@ -145,6 +145,7 @@ tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& record
     if (!own) return wrong_recording(std::move(own.error()));
     configuration = std::move(own->configuration);
     basis.sensor = std::move(configuration.tracker.sensor);
+    basis.second_sensor = std::move(configuration.tracker.second_sensor);
     configuration.tracker.sensor.reset();
     configuration.tracker.pointer.reset();
     configuration.tracker.second_sensor.reset();
@@ -186,6 +187,7 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
   if (!basis) return tl::unexpected(std::move(basis.error()));
   if (configuration_file) {
     if (basis->sensor) basis->configuration.tracker.sensor = basis->sensor;
+    if (basis->second_sensor) basis->configuration.tracker.second_sensor = basis->second_sensor;
     if (const auto fits = calibrations_fit(basis->configuration); !fits) {
       return tl::unexpected(
           SetupError{{fmt::format("{}: {}", configuration_file->string(), fits.error().message)}, true});

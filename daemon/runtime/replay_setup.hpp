@@ -36,9 +36,10 @@ struct RecordedBasis {
   // Effective: defaults, then the recording's own, then the file's. Which tools a tracker has is the file's to say
   // alone.
   Configuration configuration;
-  std::optional<std::string> sensor;        // whose poses the recording has, where it says so
-  CameraModel camera;                       // of the file's calibration, or the recording's own
-  std::optional<TurnedScope> turned_scope;  // likewise
+  std::optional<std::string> sensor;         // whose poses the recording has, where it says so
+  std::optional<std::string> second_sensor;  // and whose tell how the scope is turned
+  CameraModel camera;                        // of the file's calibration, or the recording's own
+  std::optional<TurnedScope> turned_scope;   // likewise
   Duration utc_minus_monotonic{0};
   std::vector<Error> passed_over;  // keys of its configuration that do not describe the session (ReadMode::kWhole)
 };

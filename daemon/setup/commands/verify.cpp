@@ -12,6 +12,7 @@
 #include "core/angle/angle.hpp"
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/config/tracked_tools.hpp"
 #include "daemon/runtime/calibration_fit.hpp"
 #include "daemon/setup/commands/live_capture.hpp"
 #include "daemon/setup/commands/measurement.hpp"
@@ -123,12 +124,15 @@ Expected<SetupAsTurned> setup_as_turned(const std::filesystem::path& file, const
   return SetupAsTurned{scope->at(rotation->rotation_rad).X_SC, *lens};
 }
 
-// What is on trial must be of the sensor whose poses were recorded. Lens and tip may be others than the
+// What is on trial must be of the sensors whose poses were recorded. Lens and tip may be others than the
 // configuration's.
 Expected<void> sensor_fits(Configuration configuration, const VerifyOptions& options) {
   auto sensor = calibrated_sensor(options.recorded.recording, configuration, options.configuration);
   if (!sensor) return tl::unexpected(sensor.error());
   configuration.tracker.sensor = *std::move(sensor);
+  auto second = recorded_handle(options.recorded.recording, kSecondSensorTool);
+  if (!second) return tl::unexpected(second.error());
+  if (*second) configuration.tracker.second_sensor = *std::move(second);
   configuration.tracker.pointer_calibration.reset();
   configuration.camera.calibration.reset();
   configuration.camera.width = configuration.camera.height = 0;

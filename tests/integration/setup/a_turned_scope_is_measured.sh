@@ -67,6 +67,13 @@ if [ "$told_by" = second-sensor ]; then
   sed '/^\[tracker\]/,/^\[/ s/^protocol = "none"/protocol = "ndi"\nport = "tcp:127.0.0.1:9"/' devices.toml > unnamed.toml
   if "$perimap" check unnamed.toml > out 2> errors; then fail "check takes a tracker without it"; fi
   grep -q "unnamed.toml: key 'tracker.second_sensor': expected" errors || fail "$(cat errors)"
+  # Another sensor than the one that it was measured of.
+  sed 's/^{/{ "second_sensor": "0C",/' scope.json > second.json
+  sed 's/^turned_scope = .*/turned_scope = "second.json"/; s/^\[tracker\]/[tracker]\nsecond_sensor = "0D"/' devices.toml > second.toml
+  if "$perimap" replay heart.mcap --lockstep -c second.toml > out 2> errors; then fail "another second sensor's turn is taken"; fi
+  grep -q "second.toml: key 'tracker.second_sensor': expected \"0C\"" errors || fail "$(cat errors)"
+  if "$perimap" verify second.toml --from check.mcap --square-mm 8 > out 2> errors; then fail "verify takes another second sensor"; fi
+  grep -q "second.toml: key 'tracker.second_sensor': expected \"0C\"" errors || fail "$(cat errors)"
   # Two at the same turn.
   if "$perimap" calibrate scope --by-second-sensor --at board0.mcap hand-eye0.json camera0.yaml --at board0.mcap \
     hand-eye0.json camera0.yaml --at board0.mcap hand-eye0.json camera0.yaml > out 2> errors; then

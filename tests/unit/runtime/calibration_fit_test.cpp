@@ -102,6 +102,8 @@ TEST_F(CalibrationFit, AScopeWhoseTurnASecondSensorTellsTakesThatSensor) {
   configuration_.tracker.second_sensor.reset();
   configuration_.tracker.protocol = TrackerConfiguration::Protocol::kNone;
   EXPECT_TRUE(calibrations_fit(configuration_)) << "a recording says itself whether it has one";
+  configuration_.tracker.second_sensor = "0D";
+  EXPECT_FALSE(calibrations_fit(configuration_)) << "and where it says which one, it is to be the scope's";
 }
 
 TEST_F(CalibrationFit, AScopeOfAnotherSensorOrOfOtherPicturesIsRefused) {

@@ -99,6 +99,29 @@ TEST_P(ScopeBySecondSensor, IsKnownAtTurnsThatNobodyMeasured) {
   }
 }
 
+TEST_P(ScopeBySecondSensor, TellsWhichWayRoundAStraightScopesPrincipalPointGoes) {
+  // Its hand-eye fits either way round: which one better is the measurements' errors' doing.
+  scope_.X_OL = {Matrix3d::Identity(), Vector3d(0.0, 0.0, 310.0)};
+  std::mt19937 generator(78125);
+  std::normal_distribution<double> off_rad(0.0, 0.1 * kDegree);
+  for (int trial = 0; trial < 20; ++trial) {
+    const std::vector<double> thetas =
+        trial % 2 == 0 ? std::vector<double>{0.3, 1.5, 2.9} : std::vector<double>{2.9, 1.5, 0.3};
+    auto measured = setups(scope_, thetas);
+    for (SetupAtRotation& setup : measured) {
+      const double x = off_rad(generator);
+      const double y = off_rad(generator);
+      setup.X_SC.R = setup.X_SC.R * so3_exp(Vector3d(x, y, 0.0));
+    }
+    const auto fitted = fit_by_second_sensor(measured, relations(scope_, thetas));
+    ASSERT_TRUE(fitted) << fitted.error().message;
+    for (const double theta : {-2.5, 0.9}) {
+      const double told = fitted->second_sensor->rotation_rad(scope_.R_S2(theta));
+      EXPECT_LT((fitted->at(told).principal_px - scope_.at(theta).principal_px).norm(), 1e-6) << theta;
+    }
+  }
+}
+
 TEST_P(ScopeBySecondSensor, WhatIsMissingIsSaid) {
   const auto error = [](const Expected<TurnedScope>& fitted) { return fitted ? "" : fitted.error().message; };
   const std::vector<double> two = {0.1, 1.5};
