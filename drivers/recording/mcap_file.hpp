@@ -22,6 +22,12 @@ namespace perimap::mcap {
 
 using Buffer = std::vector<std::byte>;
 
+// Whether these are the bytes that a recording begins and ends with.
+[[nodiscard]] inline bool is_magic(std::span<const std::byte> bytes) {
+  return std::equal(bytes.begin(), bytes.end(), kMagic.begin(), kMagic.end(),
+                    [](std::byte a, std::uint8_t b) { return std::to_integer<std::uint8_t>(a) == b; });
+}
+
 // Every length is held against the size of the file before anything is allocated.
 class McapFile {
  public:

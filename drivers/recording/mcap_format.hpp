@@ -7,9 +7,11 @@
 // strings, maps and arrays have a 4-byte length in bytes in front. CRCs are CRC-32 (that of zlib); 0 means none.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <span>
 #include <string>
@@ -48,6 +50,19 @@ inline constexpr std::string_view kZstd = "zstd";
 
 // A chunk unpacked is never larger than this, so that a damaged size cannot ask for the machine's memory.
 inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{256} << 20;
+
+// The first and the last log time of some messages.
+struct LogTimes {
+  std::uint64_t first_ns = std::numeric_limits<std::uint64_t>::max();
+  std::uint64_t last_ns = 0;
+
+  [[nodiscard]] bool any() const noexcept { return first_ns <= last_ns; }
+  void add(std::uint64_t time_ns) noexcept { add(LogTimes{time_ns, time_ns}); }
+  void add(const LogTimes& other) noexcept {
+    first_ns = std::min(first_ns, other.first_ns);
+    last_ns = std::max(last_ns, other.last_ns);
+  }
+};
 
 }  // namespace mcap
 

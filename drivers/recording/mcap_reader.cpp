@@ -12,33 +12,19 @@
 #include "drivers/recording/mcap_data_crc.hpp"
 #include "drivers/recording/mcap_fields.hpp"
 #include "drivers/recording/mcap_file.hpp"
+#include "drivers/recording/mcap_segment.hpp"
 
 namespace perimap {
 namespace {
 
+using mcap::AttachmentEntry;
 using mcap::Buffer;
 using mcap::Cursor;
 using mcap::fail_at;
+using mcap::is_magic;
 using mcap::Opcode;
 using mcap::RecordHeader;
-
-bool is_magic(std::span<const std::byte> bytes) {
-  return std::equal(bytes.begin(), bytes.end(), mcap::kMagic.begin(), mcap::kMagic.end(),
-                    [](std::byte a, std::uint8_t b) { return std::to_integer<std::uint8_t>(a) == b; });
-}
-
-// Where messages are: a chunk, or a message record outside of any.
-struct Segment {
-  std::uint64_t offset = 0;
-  std::uint64_t length = 0;                // of the whole record
-  std::vector<std::uint16_t> channel_ids;  // empty: not known
-};
-
-struct AttachmentEntry {
-  std::uint64_t offset = 0;
-  std::uint64_t length = 0;
-  std::string name;
-};
+using mcap::Segment;
 
 // Damage beyond this many places is not listed one by one.
 constexpr std::size_t kMaxDamage = 1000;
@@ -110,6 +96,21 @@ class McapReader::Impl {
     chunk_.clear();
     chunk_at_ = 0;
     data_crc_.restart();
+  }
+
+  void seek(std::uint64_t log_time_ns) {
+    const auto from = std::find_if(segments_.begin(), segments_.end(),
+                                   [&](const Segment& segment) { return segment.times.last_ns >= log_time_ns; });
+    next_segment_ = static_cast<std::size_t>(from - segments_.begin());
+    chunk_.clear();
+    chunk_at_ = 0;
+    data_crc_.give_up();
+  }
+
+  mcap::LogTimes times() const noexcept {
+    mcap::LogTimes times;
+    for (const Segment& segment : segments_) times.add(segment.times);
+    return times;
   }
 
   Expected<McapAttachment> read_attachment(std::string_view name) {
@@ -260,8 +261,9 @@ class McapReader::Impl {
 
   bool add_chunk_index(std::span<const std::byte> content) {
     Cursor cursor(content);
-    cursor.take_bytes(8 + 8);  // first and last message time
     Segment segment;
+    segment.times.first_ns = cursor.take<std::uint64_t>();
+    segment.times.last_ns = cursor.take<std::uint64_t>();
     segment.offset = cursor.take<std::uint64_t>();
     segment.length = cursor.take<std::uint64_t>();
     Cursor channels(cursor.take_bytes(cursor.take<std::uint32_t>()));
@@ -320,8 +322,9 @@ class McapReader::Impl {
       }
       case Opcode::kChunk:
       case Opcode::kMessage: {
-        Segment segment{offset, length, {}};
+        Segment segment{offset, length, {}, {}};
         if (auto loaded = load_segment(segment); !loaded) return damaged_record(offset, length, loaded.error());
+        segment.times = loaded_times_;
         segments_.push_back(std::move(segment));
         return following;
       }
@@ -392,6 +395,7 @@ class McapReader::Impl {
   }
 
   Expected<void> examine_chunk(std::uint64_t offset) {
+    loaded_times_ = {};
     Cursor records(chunk_);
     while (records.left() > 0) {
       const std::size_t at = records.at();
@@ -404,6 +408,7 @@ class McapReader::Impl {
       if (header.opcode == Opcode::kMessage) {
         const auto message = mcap::parse_message(content);
         parsed = message.has_value();
+        if (parsed) loaded_times_.add(message->log_time_ns);
         if (parsed && !channels_.contains(message->channel_id)) {
           // Its channel's record was damaged; the chunk's other messages are well.
           const auto unknown =
@@ -460,9 +465,10 @@ class McapReader::Impl {
   std::optional<std::set<std::uint16_t>> selected_;
   std::size_t next_segment_ = 0;
   std::uint64_t position_ = 0;
-  Buffer record_;             // the segment as it stands in the file
-  Buffer chunk_;              // its records, unpacked
-  std::size_t chunk_at_ = 0;  // next record in chunk_
+  Buffer record_;                // the segment as it stands in the file
+  Buffer chunk_;                 // its records, unpacked
+  std::size_t chunk_at_ = 0;     // next record in chunk_
+  mcap::LogTimes loaded_times_;  // of the segment loaded last
 
   mcap::DataSectionCrc data_crc_;
 };
@@ -484,6 +490,8 @@ const std::map<std::uint16_t, McapChannel>& McapReader::channels() const noexcep
 Expected<std::optional<McapMessage>> McapReader::next() { return impl_->next(); }
 std::uint64_t McapReader::position() const noexcept { return impl_->position(); }
 void McapReader::select(std::optional<std::set<std::uint16_t>> channel_ids) { impl_->select(std::move(channel_ids)); }
+void McapReader::seek(std::uint64_t log_time_ns) { impl_->seek(log_time_ns); }
+mcap::LogTimes McapReader::times() const noexcept { return impl_->times(); }
 std::vector<std::string> McapReader::attachment_names() const { return impl_->attachment_names(); }
 Expected<McapAttachment> McapReader::read_attachment(std::string_view name) { return impl_->read_attachment(name); }
 const std::vector<Error>& McapReader::damage() const noexcept { return impl_->damage(); }

@@ -50,6 +50,12 @@ class McapReader {
   // them are not read, where the index tells; the CRC over the whole data section is then left out.
   void select(std::optional<std::set<std::uint16_t>> channel_ids);
 
+  // Goes on with the first chunk that has a message logged then or later; its first ones may be earlier. What is
+  // selected stays; the CRC over the whole data section is left out.
+  void seek(std::uint64_t log_time_ns);
+  // Of all messages, as the index has them.
+  [[nodiscard]] mcap::LogTimes times() const noexcept;
+
   [[nodiscard]] std::vector<std::string> attachment_names() const;
   // The first of that name.
   [[nodiscard]] Expected<McapAttachment> read_attachment(std::string_view name);

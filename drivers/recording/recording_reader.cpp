@@ -69,6 +69,14 @@ Expected<void> RecordingReader::select(std::span<const std::string_view> channel
   return {};
 }
 
+std::optional<std::pair<Instant, Instant>> RecordingReader::times() const {
+  const auto times = mcap_.times();
+  if (!times.any()) return std::nullopt;
+  static constexpr auto kLatest = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  const auto instant = [](std::uint64_t ns) { return from_ns(static_cast<std::int64_t>(std::min(ns, kLatest))); };
+  return std::pair(instant(times.first_ns), instant(times.last_ns));
+}
+
 Expected<std::string> RecordingReader::attachment(std::string_view name) {
   const auto attachment = mcap_.read_attachment(name);
   if (!attachment) return in_file(attachment.error());

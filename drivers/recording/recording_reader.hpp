@@ -3,12 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/error/expected.hpp"
@@ -53,6 +55,11 @@ class RecordingReader {
   [[nodiscard]] Expected<void> select(std::span<const std::string_view> channel_names);
   // Starts over and gives all messages.
   void select_all() { mcap_.select(std::nullopt); }
+
+  // Goes on near there: with the first chunk that has a message that arrived then or later.
+  void seek(Instant arrival) { mcap_.seek(static_cast<std::uint64_t>(std::max<std::int64_t>(to_ns(arrival), 0))); }
+  // When the first and the last message arrived; nullopt where there are none.
+  [[nodiscard]] std::optional<std::pair<Instant, Instant>> times() const;
 
   // Fails when the message is of another type or its bytes are not valid.
   template <class T>

@@ -4,18 +4,22 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/view/live/live_view.hpp"
+#include "daemon/view/recorded/recorded_view.hpp"
 #include "daemon/view/web/web_server.hpp"
 
 namespace perimap {
 namespace {
 
 struct ViewOptions {
+  RecordedView::Files files;  // without a recording: live
   int domain = 0;
   std::string address = "127.0.0.1";
   int port = 7374;
@@ -26,18 +30,29 @@ void print_address(const WebServer& server) {
   (void)std::fflush(stdout);
 }
 
+Expected<std::unique_ptr<PageHandler>> open_view(const ViewOptions& options, WebServer& server,
+                                                 const std::function<void(const std::string&)>& say) {
+  const auto as_handler = [](auto view) { return std::unique_ptr<PageHandler>(std::move(view)); };
+  if (!options.files.recording.empty()) return RecordedView::open(options.files, server, say).map(as_handler);
+  return LiveView::create(options.domain, server, say).map(as_handler);
+}
+
 Outcome view(const ViewOptions& options, const Console& console) {
+  if (options.files.recording.empty() && !options.files.samples.empty()) {
+    return refuse("--samples goes with a RECORDING of the devices; by itself it is the RECORDING",
+                  ExitCode::kWrongUsage);
+  }
   Expected<StopSignal> stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
   // What predicts comes before what shows.
   (void)setpriority(PRIO_PROCESS, 0, 5);
   Expected<WebServer> server = WebServer::listen({options.address, static_cast<std::uint16_t>(options.port)});
   if (!server) return refuse(server.error());
-  const auto live =
-      LiveView::create(options.domain, *server, [&console](const std::string& what) { console.complain(what); });
-  if (!live) return refuse(live.error());
+  const auto say = [&console](const std::string& what) { console.complain(what); };
+  const auto handler = open_view(options, *server, say);
+  if (!handler) return refuse(handler.error());
   print_address(*server);
-  server->run(**live, stop->descriptor());
+  server->run(**handler, stop->descriptor());
   return {};
 }
 
@@ -47,9 +62,14 @@ void add_view_command(Commands& commands) {
   const auto options = std::make_shared<ViewOptions>();
   Command& command = commands.add(
       "view",
-      "Serves a page that shows what a running perimapd publishes: what may be trusted and why not, the surface as it "
-      "moves, the heart's phase, the sources and delays. Prints the address to open in a browser",
+      "Serves a page that shows what a running perimapd publishes, or what a recording holds: what may be trusted and "
+      "why not, the surface as it moves, the heart's phase, the sources and delays. Prints the address to open in a "
+      "browser",
       [options](const Console& console) { return view(*options, console); });
+  command.add_option("RECORDING", options->files.recording,
+                     "Show this recording (MCAP), with a time line to drag; without one, what is published now");
+  command.add_option("--samples", options->files.samples,
+                     "What was published of it (perimap watch --record, perimap replay --samples)");
   command.add_option("--domain", options->domain, "DDS domain")->check(Range(0, 230))->capture_default_str();
   command.add_option("--port", options->port, "Where the page is served; 0: any port that is free")
       ->check(Range(0, 65535))

@@ -18,8 +18,11 @@ class SurfaceTeller {
  public:
   void take(Sample<perimap_SurfaceModel> model) { model_.emplace(std::move(model)); }
   void take(Sample<perimap_SurfaceMesh> mesh) { mesh_.emplace(std::move(mesh)); }
-  // Another perimapd, or another instant of a recording.
+  // Another instant of a recording: both are to come anew.
   void forget();
+  // Null: none has come.
+  [[nodiscard]] const perimap_SurfaceModel* model() const noexcept { return model_ ? &**model_ : nullptr; }
+  [[nodiscard]] const perimap_SurfaceMesh* mesh() const noexcept { return mesh_ ? &**mesh_ : nullptr; }
 
   // `receipt` is when it came, on its publisher's clock. Lengths in mm, times in ms of that clock. Positions of an
   // invalid surface are left out, and so is a mesh that the client of idl/perimap_mesh_client.hpp refuses.

@@ -1,6 +1,7 @@
 // The page: takes what perimap view sends, judges what may be trusted, draws.
 import {Connection} from "./connection.mjs";
 import {Delays} from "./delays.mjs";
+import {Picture} from "./picture.mjs";
 import {Scene} from "./scene.mjs";
 import {showFacts, showSources} from "./sources.mjs";
 import {Strip} from "./strip.mjs";
@@ -16,6 +17,7 @@ const kStatusMs = 2500;
 if (location.search) history.replaceState(null, "", "/");
 
 const scene = new Scene($("scene")), strip = new Strip($("strip")), delays = new Delays($("delays"));
+const picture = new Picture($("picture"));
 const seen = {recorded: false, domain: 0, publishers: null, surface: null, cameAt: 0, quickest: Infinity, lagMs: 0, ageMs: Infinity};
 const held = new Held();
 let judged = {state: "invalid"};
@@ -25,7 +27,6 @@ const timeline = new Timeline(
   (question) => {
     if (!question.from_here) {
       strip.forget();
-      seen.surface = null;
     }
     connection.say(question);
   });
@@ -40,6 +41,11 @@ const take = {
     delays.forget();
     document.title = seen.recorded ? `perimap: ${message.name}` : "perimap";
     document.querySelector("section.delays").hidden = seen.recorded;
+    document.querySelector("section.sources").hidden = seen.recorded && !message.statuses;
+    document.body.classList.toggle("bare", seen.recorded && !message.statuses);
+    document.querySelector("section.picture").hidden = !message.pictures;
+    document.body.classList.toggle("pictures", Boolean(message.pictures));
+    document.body.classList.toggle("recording", seen.recorded);
     warn(message.warnings ?? []);
     if (seen.recorded) timeline.begin(message);
   },
@@ -65,6 +71,22 @@ const take = {
     seen.status = status;
     seen.statusAt = performance.now();
     tellStatus();
+  },
+  moment({messages}) {
+    for (const message of messages) take[message.kind]?.(message);
+  },
+  // A surface before the one that is shown.
+  past(message) {
+    strip.surface(message);
+  },
+  picture({blob}) {
+    picture.blob(blob);
+  },
+  overlay(message) {
+    picture.overlay(message);
+  },
+  damage({words}) {
+    warn([words]);
   },
   ecg(message) {
     strip.ecg(message);
@@ -123,6 +145,7 @@ function draw() {
   timeline.advance();
   tell();
   scene.draw(judged.state === "invalid" ? null : seen.surface, judged.state);
+  picture.draw(judged.state);
   strip.draw(nowMs(), judged.state === "invalid");
   timeline.draw();
   requestAnimationFrame(draw);

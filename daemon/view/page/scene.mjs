@@ -39,6 +39,12 @@ function facing(points, triangles, camera) {
   return [cross(down, z), down, z];
 }
 
+// Of a triangle, by its corners' deviations: none is seen through, 2 mm are the faintest.
+export function opacityOf(corners, deviationsMm) {
+  const mean = corners.reduce((sum, corner) => sum + (deviationsMm[corner] ?? kFaintMm), 0) / corners.length;
+  return clamp(1 - mean / kFaintMm, 0.15, 1);
+}
+
 export function pointsOf(flat) {
   const points = [];
   for (let i = 0; i + 2 < flat.length; i += 3) points.push([flat[i], flat[i + 1], flat[i + 2]]);
@@ -151,9 +157,8 @@ export class Scene {
       const lift = (a) => [a[0], a[1], a[2] * p[3]];
       const n = cross(sub(lift(q), lift(p)), sub(lift(s), lift(p)));
       const straight = Math.abs(n[2]) / (norm(n) || 1);
-      const deviation = corners.reduce((sum, corner) => sum + (mesh.deviations_mm[corner] ?? kFaintMm), 0) / 3;
       triangles.push({corners: [p, q, s], depth: p[2] + q[2] + s[2], light: 0.35 + 0.65 * straight,
-                      opacity: clamp(1 - deviation / kFaintMm, 0.15, 1)});
+                      opacity: opacityOf(corners, mesh.deviations_mm)});
     }
     triangles.sort((a, b) => b.depth - a.depth);
     context.lineWidth = 0.8;
