@@ -61,25 +61,25 @@ function(perimap_prelude NAME)
   endif()
 endfunction()
 
-# perimap_test(NAME [UNITY [ALONE f...]] [PLAIN] [ALWAYS] [THREADS] [LONG] SOURCES f... DEPENDS target...)
+# perimap_test(NAME [UNITY [ALONE f...]] [OUTSIDE] [THREADS] [LONG] SOURCES f... DEPENDS target...)
 #
 # A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. In the two builds of a
 # quick tests/run.sh CTest runs each program in four parts instead: starting a program with AddressSanitizer and its libraries
 # for each case takes longer than most cases. ALONE: as above.
 #
-# A quick tests/run.sh makes two builds. `plain`: the programs, the tests of whole programs, and the unit tests marked
-# PLAIN (counting allocations, very long to compile with a sanitizer, or of much that no other unit test needs).
-# `other`, under AddressSanitizer: the rest of the unit tests. ALWAYS: in both. `threads`, for ThreadSanitizer: the tests
-# of whole programs, and the unit tests marked THREADS, in which more than one runs. Elsewhere PERIMAP_TESTS is `all`.
+# A quick tests/run.sh makes two builds. `outside`, under AddressSanitizer: the unit tests marked OUTSIDE, of what reads the
+# bytes of others (files, devices, messages) and of the rings that they go through. `plain`: all the rest. `threads`, for
+# ThreadSanitizer: the tests of whole programs, and the unit tests marked THREADS, in which more than one runs. Elsewhere
+# PERIMAP_TESTS is `all`.
 set(tests OFF)
 if(PROJECT_IS_TOP_LEVEL)
   set(tests all)
 endif()
-set(PERIMAP_TESTS ${tests} CACHE STRING "Tests to build: all, plain, other, threads, or OFF")
+set(PERIMAP_TESTS ${tests} CACHE STRING "Tests to build: all, plain, outside, threads, or OFF")
 function(perimap_test NAME)
-  cmake_parse_arguments(ARG "UNITY;PLAIN;ALWAYS;THREADS;LONG" "" "ALONE;SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "UNITY;OUTSIDE;THREADS;LONG" "" "ALONE;SOURCES;DEPENDS" ${ARGN})
   set(wanted ON)
-  if(NOT ARG_ALWAYS AND ((PERIMAP_TESTS STREQUAL plain AND NOT ARG_PLAIN) OR (PERIMAP_TESTS STREQUAL other AND ARG_PLAIN)))
+  if((PERIMAP_TESTS STREQUAL plain AND ARG_OUTSIDE) OR (PERIMAP_TESTS STREQUAL outside AND NOT ARG_OUTSIDE))
     set(wanted OFF)
   elseif(PERIMAP_TESTS STREQUAL threads AND NOT ARG_THREADS)
     set(wanted OFF)
@@ -106,7 +106,7 @@ function(perimap_test NAME)
     endif()
   endif()
   target_compile_definitions(${NAME} PRIVATE PERIMAP_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
-  if(wanted AND PERIMAP_TESTS MATCHES "^(plain|other)$")
+  if(wanted AND PERIMAP_TESTS MATCHES "^(plain|outside)$")
     foreach(part RANGE 3)
       add_test(NAME ${NAME}.part_${part} COMMAND ${NAME})
       set_tests_properties(${NAME}.part_${part} PROPERTIES

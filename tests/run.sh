@@ -6,13 +6,14 @@ cd "$(dirname "$0")/.."
 usage() {
   cat << 'END'
 tests/run.sh [--full [PART...]] [--jobs N]
-  Installs the packages, builds the presets dev and asan, runs their tests. About 20 minutes on two cores.
-  Whole programs are tested without sanitizers, a unit test in one of the two, mostly under AddressSanitizer.
+  Installs the packages, builds the presets dev and asan, runs their tests. About a quarter of an hour on two cores.
+  Each test but those labelled `long` runs once: what reads the bytes of files, devices and messages under
+  AddressSanitizer, all else without sanitizers.
   --full    everything, or the parts named. About three hours on two cores that do nothing else.
-              dev    whole programs, and unit tests that count allocations or compute much, without sanitizers
-              asan   every test under AddressSanitizer and all of UndefinedBehaviorSanitizer
+              dev    every test but the long ones, without sanitizers
+              asan   the same under AddressSanitizer and all of UndefinedBehaviorSanitizer
               tsan   whole programs, and unit tests with threads, under ThreadSanitizer
-              long   the tests labelled `long`, without sanitizers
+              long   the tests labelled `long`, and statistics over many seeds, without sanitizers
               fuzz   a minute of each fuzz target
               lint   a release build, which has no precompiled headers; format; clang-tidy
   --jobs N  parallel compilations; all processors when not given
@@ -123,11 +124,11 @@ configure() { # PRESET
   if [ $full = no ]; then quick=ON; fi
   # Which tests: see perimap_test in cmake/PerimapLibrary.cmake. A unit test once is enough for a quick run.
   case $preset in
-    dev) tests=plain ;;
+    dev) if [ $full = no ]; then tests=plain; fi ;;
     tsan) tests=threads ;;
     asan)
       if [ $full = no ]; then
-        tests=other
+        tests=outside
         undefined=some
       fi
       ;;
