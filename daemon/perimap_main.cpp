@@ -27,7 +27,9 @@
   COMMAND(calibrate)              \
   COMMAND(register)               \
   COMMAND(verify)                 \
-  COMMAND(ctl)
+  COMMAND(ctl)                    \
+  COMMAND(keys)                   \
+  COMMAND(forget)
 
 namespace perimap {
 

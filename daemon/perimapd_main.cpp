@@ -18,6 +18,8 @@
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/surface_traffic.hpp"
+#include "daemon/keys/expiry_news.hpp"
+#include "daemon/keys/key_folder.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/reload_signal.hpp"
 #include "daemon/process/service_folder.hpp"
@@ -52,14 +54,33 @@ Outcome run_session(const std::string& configuration_file, const Configuration& 
     return refuse(fmt::format("{}: key 'dds.enabled': expected true, since nothing else publishes", configuration_file),
                   ExitCode::kWrongUsage);
   }
-  auto publication = DdsPublication::create(
-      {configuration.dds.domain, configuration.dds.surface_deadline, configuration.dds.surface_lifespan});
+  RuntimeSettings runtime = runtime_settings(configuration, identity);
+  ExpiryNews expiry;
+  if (configuration.dds.security) {
+    // With words, before DDS looks at them: it would say no more than that it is not allowed.
+    const auto keys = check_keys(*configuration.dds.security, seconds_now());
+    if (!keys) {
+      return refuse(fmt::format("{}: key 'dds.security': {}", configuration_file, keys.error().message),
+                    ExitCode::kWrongUsage);
+    }
+    runtime.keys_expire_utc_ns = std::chrono::nanoseconds(keys->ends.time_since_epoch()).count();
+    spdlog::info("DDS Security: keys of '{}' ({}), until {}", keys->certificate.name, keys->certificate.role,
+                 utc_text(keys->ends));
+    expiry = ExpiryNews(*keys);
+  }
+  DdsSettings dds;
+  dds.membership = {configuration.dds.domain, configuration.dds.security};
+  dds.surface_deadline = configuration.dds.surface_deadline;
+  dds.surface_lifespan = configuration.dds.surface_lifespan;
+  dds.identity = runtime.identity;
+  auto publication = DdsPublication::create(dds);
   if (!publication) return refuse(publication.error());
 
   Pipeline pipeline(settings);
-  const RuntimeSettings runtime = runtime_settings(configuration, identity);
   ConfigurationReload reload(configuration_file, given);
-  LiveSession session(pipeline, runtime, **publication, make_feeder(pipeline.entrance()));
+  LiveSession session(pipeline, runtime, **publication, make_feeder(pipeline.entrance()), [&expiry] {
+    if (const auto line = expiry.next(seconds_now())) spdlog::warn("{}", *line);
+  });
   ServiceManager service;
   session.report_to(service);
   if (const auto file = configuration.checkpoint.file ? configuration.checkpoint.file

@@ -36,6 +36,7 @@ build=(
   libyaml-cpp-dev                            # drivers: calibration files
   libtomlplusplus-dev libcli11-dev libspdlog-dev nlohmann-json3-dev  # daemon
   libsystemd-dev                             # daemon/process: readiness, watchdog
+  libssl-dev                                 # daemon/keys: certificates, signed documents
   librsvg2-dev fonts-dejavu-core             # daemon/evaluation/report: figures as PNG
   dpkg-dev                                   # deploy/debian: what the package depends on
 )

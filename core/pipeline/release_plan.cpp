@@ -47,6 +47,18 @@ MissedReleases ReleasePlan::leave_out_missed(Instant now) noexcept {
   return std::exchange(missed_, {});
 }
 
+std::uint64_t ReleasePlan::pass_over(Instant now) noexcept {
+  const std::uint64_t frames = frames_.pass_over(now);
+  std::uint64_t passed = settings_.frame_stream ? frames : 0;
+  const std::optional<Instant> grid = next_on_grid();
+  if (grid && grid_begun_ && now >= *grid) {
+    const auto of_clock = (now - *grid) / settings_.clock_period + 1;
+    last_on_grid_ += of_clock * settings_.clock_period;
+    passed += static_cast<std::uint64_t>(of_clock);
+  }
+  return passed;
+}
+
 bool ReleasePlan::missed(const std::optional<Release>& frame, Instant now) const noexcept {
   if (!frame) return false;
   const Duration period = frames_.period();

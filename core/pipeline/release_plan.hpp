@@ -52,6 +52,9 @@ class ReleasePlan {
   // Leaves out what it is too late for: the clock's releases after which another one has come due as well; of the
   // frames' those that are stale, and the oldest of more than kMostTogether. Returns how many since the last call.
   MissedReleases leave_out_missed(Instant now) noexcept;
+  // Through a gap in a recording, at once however long it is: as ReleaseSchedule::pass_over(), and the clock's
+  // likewise. Returns how many releases of the published streams are passed over.
+  std::uint64_t pass_over(Instant now) noexcept;
   // Where the frames' releases are not published: lets those that have come due by `now` come due, so that last_due()
   // and last_owed() are no older than this call, however slow the clock is.
   void let_come_due(Instant now) noexcept;

@@ -71,6 +71,15 @@ void ReleaseSchedule::resume(Instant last_capture, Duration period, Instant now)
   period_ = period;
 }
 
+std::uint64_t ReleaseSchedule::pass_over(Instant now) noexcept {
+  if (pending() || !have_last_ || period_ <= Duration(0) || now <= last_capture_ + latency_) return 0;
+  const auto passed = (now - latency_ - last_capture_) / period_;
+  last_missing_ = last_missing_ || passed > 0;
+  last_capture_ += passed * period_;
+  if (numbered_) last_sequence_ += static_cast<std::uint64_t>(passed);
+  return static_cast<std::uint64_t>(passed);
+}
+
 std::optional<Release> ReleaseSchedule::next() const noexcept {
   if (have_last_ && period_ > Duration(0)) {
     const Instant expected = last_capture_ + period_;

@@ -38,6 +38,10 @@ class ReleaseSchedule {
   // have no numbers: this run counts its own frames.
   void resume(Instant last_capture, Duration period, Instant now) noexcept;
 
+  // No frame has come for a long time, and nobody waits for what is due until `now`: the next release is the first
+  // after it, at once however long that is. Returns how many were passed over. Does nothing while frames are pending.
+  std::uint64_t pass_over(Instant now) noexcept;
+
   // The next release; none before the first frame. With frame_missing it is provisional: a frame that arrives before
   // its deadline may replace it.
   [[nodiscard]] std::optional<Release> next() const noexcept;

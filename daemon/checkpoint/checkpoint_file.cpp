@@ -270,6 +270,15 @@ LawMemory read_law(Reader& in) {
   return law;
 }
 
+std::filesystem::path part_of(const std::filesystem::path& file) { return file.string() + ".part"; }
+
+// What its folder lists is on the disk. A file system that cannot do that has done what it can.
+void synchronise_folder(const std::filesystem::path& file) {
+  const Descriptor folder(
+      open(file.has_parent_path() ? file.parent_path().c_str() : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder) static_cast<void>(fsync(folder.get()));
+}
+
 std::string system_message() { return std::generic_category().message(errno); }
 
 }  // namespace
@@ -389,7 +398,7 @@ Expected<Checkpoint> parse_checkpoint_body(std::string_view body) {
 }
 
 Expected<void> replace_file(const std::filesystem::path& file, std::string_view bytes) {
-  const std::filesystem::path part = file.string() + ".part";
+  const std::filesystem::path part = part_of(file);
   const auto failed = [&part](std::string_view what) {
     return fail(fmt::format("{}: cannot {}: {}", part.string(), what, system_message()));
   };
@@ -406,10 +415,19 @@ Expected<void> replace_file(const std::filesystem::path& file, std::string_view 
     if (fsync(out.get()) != 0) return failed("be written");
   }
   if (rename(part.c_str(), file.c_str()) != 0) return failed("take its place");
-  const Descriptor folder(
-      open(file.has_parent_path() ? file.parent_path().c_str() : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (folder) static_cast<void>(fsync(folder.get()));
+  synchronise_folder(file);
   return {};
+}
+
+Expected<void> remove_file(const std::filesystem::path& file) {
+  Expected<void> removed;
+  for (const std::filesystem::path& path : {file, part_of(file)}) {
+    if (unlink(path.c_str()) != 0 && errno != ENOENT) {
+      removed = fail(fmt::format("{}: cannot be removed: {}", path.string(), system_message()));
+    }
+  }
+  synchronise_folder(file);
+  return removed;
 }
 
 }  // namespace perimap

@@ -49,7 +49,12 @@ struct Checkpoint {
 // What follows the CRC; for fuzzing.
 [[nodiscard]] Expected<Checkpoint> parse_checkpoint_body(std::string_view body);
 
-// Replaces the file as a whole or not at all, also when the machine stops meanwhile. Error names the path.
+// Replaces the file as a whole or not at all, also when the machine stops meanwhile. Its owner alone may read it. Error
+// names the path.
 [[nodiscard]] Expected<void> replace_file(const std::filesystem::path& file, std::string_view bytes);
+
+// Takes away the file and what an interrupted replace_file() may have left beside it; gone also when the machine stops
+// right after. No error where there is none. Error names the path.
+[[nodiscard]] Expected<void> remove_file(const std::filesystem::path& file);
 
 }  // namespace perimap

@@ -124,9 +124,9 @@ void CheckpointKeeper::let_go() {
   respiration_ = {};
   law_ = {};
   ecg_.clear();
-  std::error_code error;
-  std::filesystem::remove(file_, error);
-  if (error) spdlog::error("{}: the old patient's checkpoint cannot be removed: {}", file_.string(), error.message());
+  if (const auto removed = remove_file(file_); !removed) {
+    spdlog::error("the old patient's checkpoint stays: {}", removed.error().message);
+  }
 }
 
 }  // namespace perimap

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/command_line/arguments.hpp"
+#include "daemon/command_line/open_files.hpp"
 
 namespace perimap {
 namespace {
@@ -47,6 +48,7 @@ Command& Commands::add(Command& group, const std::string& name, const std::strin
   command->callback([this, command, run = std::move(run)] {
     chosen_ = [command, &run] {
       const Console console(full_name(*command));
+      if (const auto enough = ensure_open_files(); !enough) return console.end(refuse(enough.error()));
       return console.end(run(console));
     };
   });
@@ -67,6 +69,7 @@ int run_program(const std::string& name, const std::string& version, const std::
   add_options(options);
   if (const auto ended = parse_arguments(app, argc, argv)) return *ended;
   const Console console(name);
+  if (const auto enough = ensure_open_files(); !enough) return console.end(refuse(enough.error()));
   return console.end(run(console));
 }
 

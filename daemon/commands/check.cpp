@@ -8,6 +8,8 @@
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/configuration_text.hpp"
 #include "daemon/config/surface_traffic.hpp"
+#include "daemon/keys/key_folder.hpp"
+#include "daemon/keys/role.hpp"
 #include "daemon/runtime/calibration_fit.hpp"
 #include "daemon/runtime/device_setup.hpp"
 #include "daemon/runtime/setup_warnings.hpp"
@@ -52,6 +54,16 @@ Outcome check(const std::string& file, const Console& console) {
   fmt::print("{}\n", to_toml(*configuration));
   for (const std::string& line : traffic_lines(*configuration)) fmt::print("# {}\n", line);
   for (const std::string& line : setup_warnings(*configuration)) console.complain("warning: " + line);
+  if (configuration->dds.security) {
+    const auto keys = check_keys(*configuration->dds.security, seconds_now());
+    if (!keys) return refuse(file + ": key 'dds.security': " + keys.error().message, ExitCode::kWrongUsage);
+    if (keys->certificate.role != rights_of(KeyRole::kPublisher).name) {
+      return refuse(fmt::format("{}: key 'dds.security': expected keys of a publisher, got those of a {}", file,
+                                keys->certificate.role),
+                    ExitCode::kWrongUsage);
+    }
+    if (const auto warning = expiry_warning(*keys, seconds_now())) console.complain("warning: " + *warning);
+  }
   tell_refused_privileges(configuration->realtime, console);
   return {};
 }

@@ -186,15 +186,17 @@ struct DdsConfiguration {
   Duration surface_deadline = std::chrono::milliseconds(200);  // offered period of `surface`; 0: none
   Duration surface_lifespan = std::chrono::milliseconds(200);  // 0: none
   Duration surface_model_interval = std::chrono::milliseconds(500);
-  double maximum_MB_per_s = 50.0;  // of surfaces and surface models to one reader, 1e6 bytes
+  double maximum_MB_per_s = 50.0;                 // of surfaces and surface models to one reader, 1e6 bytes
+  std::optional<std::filesystem::path> security;  // a folder of keys; none: without DDS Security
 
   bool operator==(const DdsConfiguration&) const = default;
 };
 
 struct RecordingConfiguration {
   bool record = false;
-  std::string folder = ".";  // from the configuration's folder
-  int memory_MB = 256;       // for frames on their way to the disk
+  std::string folder = ".";          // from the configuration's folder
+  int memory_MB = 256;               // for frames on their way to the disk
+  std::optional<std::string> group;  // may read them beside their owner
 
   bool operator==(const RecordingConfiguration&) const = default;
 };

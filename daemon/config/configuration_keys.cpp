@@ -327,6 +327,10 @@ bool is_socket_path(const std::string& text) {
   return text.starts_with('/') && text.size() <= kLongest && text.find('\0') == std::string::npos;
 }
 
+bool is_group_name(const std::string& text) {
+  return !text.empty() && text.size() <= 64 && text.find_first_of(std::string_view("\0:/ \n", 5)) == std::string::npos;
+}
+
 bool is_absolute_path(const std::string& text) { return text.starts_with('/') && text.find('\0') == std::string::npos; }
 
 void add_running(std::vector<ConfigurationKey>& keys) {
@@ -369,12 +373,17 @@ void add_running(std::vector<ConfigurationKey>& keys) {
       .number(
           "maximum_MB_per_s", 0.1, 10000, PERIMAP_MEMBER(dds.maximum_MB_per_s),
           "of surfaces and surface models with features.maximum features, to one reader (or any number by multicast); "
-          "rates that come to more are refused");
+          "rates that come to more are refused")
+      .folder("security", PERIMAP_MEMBER(dds.security),
+              "keys for DDS Security, as `perimap keys issue` makes them, from this file's folder; none: whoever is on "
+              "the network can listen, and publish under this name");
   Section("recording", keys)
       .flag("record", PERIMAP_MEMBER(recording.record),
             "what the devices give is recorded as it came, to perimap-DATE-TIME.mcap")
       .text("folder", 4096, PERIMAP_MEMBER(recording.folder), "where to, from this file's folder")
-      .integer("memory_MB", 1, 65536, PERIMAP_MEMBER(recording.memory_MB), "for frames on their way to the disk");
+      .integer("memory_MB", 1, 65536, PERIMAP_MEMBER(recording.memory_MB), "for frames on their way to the disk")
+      .optional_text("group", "the name of a group of this machine", is_group_name, PERIMAP_MEMBER(recording.group),
+                     "may read the recordings; none: their owner alone");
   Section("status", keys)
       .duration("interval_s", s, 0.1, 3600, PERIMAP_MEMBER(status.interval), "from one status to the next");
   using Level = LogConfiguration::Level;

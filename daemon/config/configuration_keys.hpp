@@ -21,9 +21,9 @@ using ConfigurationValue = std::variant<bool, std::int64_t, double, std::string,
 struct ConfigurationKey {
   std::string section;
   std::string name;
-  std::string meaning;   // one line, with the unit
-  std::string expected;  // "a number from 0 to 100"
-  bool names_file = false;
+  std::string meaning;      // one line, with the unit
+  std::string expected;     // "a number from 0 to 100"
+  bool names_file = false;  // of files that must be there
 
   // Puts the value into the configuration; false when it has the wrong type or is out of range.
   std::function<bool(const ConfigurationValue&, Configuration&)> read;
@@ -31,6 +31,7 @@ struct ConfigurationKey {
   std::function<std::optional<ConfigurationValue>(const Configuration&)> write;
   // Another key has taken its place: read, so that files that have it go on to work, and neither written nor offered.
   bool is_former = false;
+  bool names_folder = false;  // the file is a folder
 };
 
 // In the order in which they are printed; the keys of a section stand together.

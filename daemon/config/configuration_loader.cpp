@@ -250,7 +250,7 @@ class Overlay {
     }
     std::optional<ConfigurationValue> value = value_of(node);
     if (value && key->names_file) {
-      if (const auto wrong = place_files(*value)) {
+      if (const auto wrong = place_files(*key, *value)) {
         refuse(node.source().begin, full_name(section, name.str()), key->expected,
                fmt::format("{} ({})", describe(node), *wrong));
         return;
@@ -262,7 +262,7 @@ class Overlay {
   }
 
   // Names of files as paths from this file's folder; what is wrong with one of them.
-  [[nodiscard]] std::optional<std::string> place_files(ConfigurationValue& value) const {
+  [[nodiscard]] std::optional<std::string> place_files(const ConfigurationKey& key, ConfigurationValue& value) const {
     std::vector<std::string*> names;
     if (auto* name = std::get_if<std::string>(&value)) names.push_back(name);
     if (auto* list = std::get_if<std::vector<std::string>>(&value)) {
@@ -272,8 +272,13 @@ class Overlay {
       std::error_code code;
       const std::filesystem::path folder = std::filesystem::absolute(file_, code).parent_path();
       const std::filesystem::path path = (folder / *name).lexically_normal();
-      if (named_files_ == NamedFiles::kMustExist && !std::filesystem::is_regular_file(path, code)) {
-        return fmt::format("{} is {}", path.string(), std::filesystem::exists(path, code) ? "not a file" : "not there");
+      const bool there =
+          key.names_folder ? std::filesystem::is_directory(path, code) : std::filesystem::is_regular_file(path, code);
+      if (named_files_ == NamedFiles::kMustExist && !there) {
+        return fmt::format("{} is {}", path.string(),
+                           !std::filesystem::exists(path, code) ? "not there"
+                           : key.names_folder                   ? "not a folder"
+                                                                : "not a file");
       }
       // An empty name stays empty, so that the key refuses it.
       if (!name->empty()) *name = path.string();

@@ -279,6 +279,15 @@ class Section {
         orientation);
   }
 
+  // A folder that must be there.
+  template <class Member>
+  Section& folder(const std::string& name, Member member, const std::string& meaning) {
+    file(name, member, meaning);
+    keys_.back().expected = "the name of an existing folder";
+    keys_.back().names_folder = true;
+    return *this;
+  }
+
   template <class Member>
   Section& file(const std::string& name, Member member, const std::string& meaning) {
     add(
@@ -348,7 +357,7 @@ class Section {
                std::function<bool(const ConfigurationValue&, Configuration&)> read,
                std::function<std::optional<ConfigurationValue>(const Configuration&)> write) {
     keys_.push_back({name_, std::move(name), std::move(meaning), std::move(expected), false, std::move(read),
-                     std::move(write), false});
+                     std::move(write), false, false});
     return *this;
   }
 

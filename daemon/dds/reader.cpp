@@ -14,12 +14,12 @@ UntypedLoan::~UntypedLoan() {
 }
 
 Expected<UntypedReader> UntypedReader::create(const Participant& participant, const TopicDescription& description,
-                                              int depth) {
+                                              int depth, Hears hears) {
   Entity topic(dds_create_topic(participant.handle(), description.descriptor, description.name, nullptr, nullptr));
   if (topic.get() < 0) {
     return fail(fmt::format("DDS topic {}: cannot create: {}", description.name, dds_strretcode(topic.get())));
   }
-  const Qos qos = reader_qos(description, depth);
+  const Qos qos = reader_qos(description, depth, hears);
   Entity reader(dds_create_reader(participant.handle(), topic.get(), qos.get(), nullptr));
   if (reader.get() < 0) {
     return fail(

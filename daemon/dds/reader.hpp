@@ -43,7 +43,7 @@ class UntypedLoan {
 class UntypedReader {
  public:
   [[nodiscard]] static Expected<UntypedReader> create(const Participant& participant,
-                                                      const TopicDescription& description, int depth);
+                                                      const TopicDescription& description, int depth, Hears hears);
 
   [[nodiscard]] Expected<UntypedLoan> take();
   // A condition that holds while there is something to take: for a WaitSet.
@@ -84,8 +84,9 @@ class Loan {
 template <class T>
 class Reader {
  public:
-  [[nodiscard]] static Expected<Reader> create(const Participant& participant, int depth = kReaderDepth) {
-    return UntypedReader::create(participant, topic_of<T>(), depth).map([](UntypedReader reader) {
+  [[nodiscard]] static Expected<Reader> create(const Participant& participant, int depth = kReaderDepth,
+                                               Hears hears = Hears::kAll) {
+    return UntypedReader::create(participant, topic_of<T>(), depth, hears).map([](UntypedReader reader) {
       return Reader(std::move(reader));
     });
   }

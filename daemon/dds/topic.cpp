@@ -59,8 +59,9 @@ Qos writer_qos(const TopicDescription& topic, const WriterPromise& promise) {
   return qos;
 }
 
-Qos reader_qos(const TopicDescription& topic, int depth) {
+Qos reader_qos(const TopicDescription& topic, int depth, Hears hears) {
   Qos qos = topic_qos(topic);
+  if (hears == Hears::kOthers) dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
   return qos;
 }

@@ -49,7 +49,10 @@ struct WriterPromise {
 
 // Keep last 1.
 [[nodiscard]] Qos writer_qos(const TopicDescription& topic, const WriterPromise& promise);
+// Whose samples a reader gets: everyone's, or those of other participants alone.
+enum class Hears { kAll, kOthers };
+
 // Keep last `depth` (of each key).
-[[nodiscard]] Qos reader_qos(const TopicDescription& topic, int depth);
+[[nodiscard]] Qos reader_qos(const TopicDescription& topic, int depth, Hears hears = Hears::kAll);
 
 }  // namespace perimap::dds

@@ -5,7 +5,7 @@
 namespace perimap {
 
 Expected<std::unique_ptr<DdsPublication>> DdsPublication::create(const DdsSettings& settings) {
-  auto participant = dds::Participant::create(settings.domain);
+  auto participant = dds::Participant::create(settings.membership);
   if (!participant) return tl::unexpected(participant.error());
   auto surface =
       dds::Writer<perimap_Surface>::create(*participant, {settings.surface_deadline, settings.surface_lifespan});
@@ -18,9 +18,27 @@ Expected<std::unique_ptr<DdsPublication>> DdsPublication::create(const DdsSettin
   if (!phase) return tl::unexpected(phase.error());
   auto status = dds::Writer<perimap_Status>::create(*participant);
   if (!status) return tl::unexpected(status.error());
+  std::optional<NameWatch> name_watch;
+  if (!settings.identity.source.empty()) {
+    auto watch = NameWatch::create(*participant, settings.identity);
+    if (!watch) return tl::unexpected(watch.error());
+    name_watch.emplace(std::move(*watch));
+  }
+  if (participant->without_index()) {
+    spdlog::warn(
+        "other processes have every participant index of DDS domain {}: publishing without one; subscribers that have "
+        "one are found, others are not",
+        settings.membership.domain);
+  }
   return std::unique_ptr<DdsPublication>(new DdsPublication(settings, std::move(*participant), std::move(*surface),
                                                             std::move(*model), std::move(*mesh), std::move(*phase),
-                                                            std::move(*status)));
+                                                            std::move(*status), std::move(name_watch)));
+}
+
+// Ten times a second.
+void DdsPublication::phase(const perimap_Phase& phase) {
+  count(phase_.write(phase));
+  tell_another_publisher();
 }
 
 void DdsPublication::status(const perimap_Status& status) {
@@ -32,6 +50,24 @@ void DdsPublication::count(dds_return_t written) noexcept {
   if (written >= 0) return;
   last_error_.store(written, std::memory_order_relaxed);
   failures_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void DdsPublication::tell_another_publisher() {
+  if (!name_watch_) return;
+  const Instant now = MonotonicClock::now();
+  name_watch_->look(now);
+  const bool another = name_watch_->another(now);
+  if (another == another_publisher_.load(std::memory_order_relaxed)) return;
+  another_publisher_.store(another, std::memory_order_relaxed);
+  if (another) {
+    spdlog::error(
+        "TWO PUBLISHERS: another program publishes as source '{}' in DDS domain {}; subscribers must use neither. Stop "
+        "it, "
+        "or give one of them another source.name",
+        settings_.identity.source, settings_.membership.domain);
+  } else {
+    spdlog::info("nobody else publishes as source '{}' any more", settings_.identity.source);
+  }
 }
 
 void DdsPublication::tell_failures() {

@@ -5,22 +5,27 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
 #include "daemon/dds/participant.hpp"
 #include "daemon/dds/writer.hpp"
+#include "daemon/publishing/identity.hpp"
+#include "daemon/publishing/name_watch.hpp"
 #include "daemon/publishing/publication.hpp"
 
 namespace perimap {
 
 struct DdsSettings {
-  int domain = 0;
+  dds::Membership membership = 0;
   Duration surface_deadline{0};  // offered period of `surface`; 0: none
   Duration surface_lifespan{0};  // 0: none
   // So long without a failure: writes succeed again, for the log.
   Duration writes_well_after = std::chrono::seconds(5);
+  // Who publishes: another that does under this name is told. Without a source nobody is looked for.
+  Identity identity{};
 };
 
 // A write that fails is counted: the next sample is a new chance. The log has a line when it begins and when it ends,
@@ -32,8 +37,11 @@ class DdsPublication final : public Publication {
   void surface(const perimap_Surface& sample) override { count(surface_.write(sample)); }
   void surface_model(const perimap_SurfaceModel& model) override { count(model_.write(model)); }
   void surface_mesh(const perimap_SurfaceMesh& mesh) override { count(mesh_.write(mesh)); }
-  void phase(const perimap_Phase& phase) override { count(phase_.write(phase)); }
+  void phase(const perimap_Phase& phase) override;
   void status(const perimap_Status& status) override;
+  [[nodiscard]] bool another_publisher() const noexcept override {
+    return another_publisher_.load(std::memory_order_relaxed);
+  }
 
   // Samples that could not be written.
   [[nodiscard]] std::uint64_t failures() const noexcept { return failures_.load(std::memory_order_relaxed); }
@@ -41,17 +49,20 @@ class DdsPublication final : public Publication {
  private:
   DdsPublication(const DdsSettings& settings, dds::Participant participant, dds::Writer<perimap_Surface> surface,
                  dds::Writer<perimap_SurfaceModel> model, dds::Writer<perimap_SurfaceMesh> mesh,
-                 dds::Writer<perimap_Phase> phase, dds::Writer<perimap_Status> status)
+                 dds::Writer<perimap_Phase> phase, dds::Writer<perimap_Status> status,
+                 std::optional<NameWatch> name_watch)
       : settings_(settings),
         participant_(std::move(participant)),
         surface_(std::move(surface)),
         model_(std::move(model)),
         mesh_(std::move(mesh)),
         phase_(std::move(phase)),
-        status_(std::move(status)) {}
+        status_(std::move(status)),
+        name_watch_(std::move(name_watch)) {}
 
   void count(dds_return_t written) noexcept;
   void tell_failures();
+  void tell_another_publisher();
 
   DdsSettings settings_;
   dds::Participant participant_;
@@ -60,6 +71,9 @@ class DdsPublication final : public Publication {
   dds::Writer<perimap_SurfaceMesh> mesh_;
   dds::Writer<perimap_Phase> phase_;
   dds::Writer<perimap_Status> status_;
+  std::optional<NameWatch> name_watch_;  // the status thread's own
+  // Relaxed: a statistic that orders nothing.
+  std::atomic<bool> another_publisher_{false};
   // Relaxed: a statistic that orders nothing. Two threads publish, so it is added to atomically.
   std::atomic<std::uint64_t> failures_{0};
   std::atomic<dds_return_t> last_error_{DDS_RETCODE_OK};

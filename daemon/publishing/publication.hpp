@@ -21,6 +21,9 @@ class Publication {
   virtual void surface_mesh(const perimap_SurfaceMesh& /*mesh*/) {}
   virtual void phase(const perimap_Phase& phase) = 0;
   virtual void status(const perimap_Status& status) = 0;
+
+  // Another program publishes under this one's name. Any thread but the real-time ones.
+  [[nodiscard]] virtual bool another_publisher() const noexcept { return false; }
 };
 
 }  // namespace perimap

@@ -13,7 +13,7 @@ std::uint32_t short_sequence(std::uint64_t sequence) { return static_cast<std::u
 
 Expected<SampleRecorder> SampleRecorder::create(const std::filesystem::path& file, std::string generator,
                                                 Unfinished unfinished) {
-  auto whole = WholeFile::create(file);
+  auto whole = WholeFile::create(file, WholeFile::Name::kPart, WholeFile::Readers::kOwner);
   if (!whole) return tl::unexpected(whole.error());
   auto sink = create_file(whole->path().string(), file.string());
   if (!sink) return tl::unexpected(sink.error());

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <string>
 #include <utility>
 
@@ -114,6 +115,8 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
       {"memory_locked", name_of(status.memory_locked)},
       {"latency_ms", ms(status.latency_ns)},
       {"latency_short", status.latency_short},
+      {"two_publishers", status.two_publishers},
+      {"keys_expire_utc_ns", status.keys_expire_utc_ns == 0 ? Json(nullptr) : Json(status.keys_expire_utc_ns)},
       {"phase", name_of(status.phase_state)},
       {"rhythm", name_of(status.rhythm)},
       {"respiration", name_of(status.respiration)},
@@ -162,6 +165,12 @@ std::string status_line(const perimap_Status& status) {
     if (count > 0) line += fmt::format(", {} {} were the ones before bit for bit", count, what);
   }
   if (status.setup.state == perimap_SETUP_DOUBTED) line += ", set-up " + setup_words(status.setup);
+  if (status.keys_expire_utc_ns != 0) {
+    // DDS takes who has no valid keys any more out of the domain without a word.
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    if (std::chrono::nanoseconds(status.keys_expire_utc_ns) <= now) line += ", KEYS HAVE ENDED: nothing is published";
+  }
+  if (status.two_publishers) line += ", TWO PUBLISHERS of this source";
   line += leads_off(status);
   for (const perimap_SourceStatus& source : std::span(status.sources._buffer, status.sources._length)) {
     if (source.state != perimap_SOURCE_OK) line += fmt::format(", {} {}", name_of(source.kind), name_of(source.state));

@@ -192,6 +192,8 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.phase_state = to_wire(facts.phase);
   wire_.rhythm = to_wire(facts.rhythm);
   wire_.latency_short = facts.latency_short;
+  wire_.two_publishers = facts.two_publishers;
+  wire_.keys_expire_utc_ns = facts.keys_expire_utc_ns;
   wire_.setup = to_wire(facts.setup);
   wire_.poses_repeated = c.poses_repeated.get();
   wire_.frames_repeated = c.frames_repeated.get();

@@ -46,10 +46,12 @@ struct StatusFacts {
   RecordingFacts recording;
   PhaseState phase = PhaseState::kUnknown;
   Rhythm rhythm = Rhythm::kUnknown;
-  bool latency_short = false;        // see idl/perimap.idl
-  bool r_trigger = false;            // R peaks come from a trigger line
-  bool ecg_device = true;            // beside the trigger there need be none
-  bool respiration_channel = false;  // one is listened to, or a device has one
+  bool latency_short = false;           // see idl/perimap.idl
+  bool two_publishers = false;          // likewise
+  std::int64_t keys_expire_utc_ns = 0;  // likewise
+  bool r_trigger = false;               // R peaks come from a trigger line
+  bool ecg_device = true;               // beside the trigger there need be none
+  bool respiration_channel = false;     // one is listened to, or a device has one
   // As they are without a device: open, and without jitter.
   SourceLink camera, tracker, ecg, r_trigger_line, respiration_link;
   const RecentCounts* recent = nullptr;  // none: nothing is told of the last seconds

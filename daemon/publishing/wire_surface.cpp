@@ -11,8 +11,7 @@
 namespace perimap {
 
 WireSurface::WireSurface(const Identity& identity, std::size_t maximum_features) : features_(maximum_features) {
-  copy_text(identity.source, wire_.source);
-  copy_text(name_of(identity.stream), wire_.stream);
+  name_as(wire_, identity);
   copy_text(identity.frame_id, wire_.frame_id);
   wire_.features._buffer = features_.data();
   wire_.features._maximum = static_cast<std::uint32_t>(features_.size());

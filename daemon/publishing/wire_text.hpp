@@ -17,11 +17,12 @@ void copy_text(std::string_view text, char (&out)[N]) noexcept {
   out[n] = '\0';
 }
 
-// Who publishes the message, and on which stream.
+// Who publishes the message, in which of its runs, and on which stream.
 template <class Message>
 void name_as(Message& message, const Identity& identity) noexcept {
   copy_text(identity.source, message.source);
   copy_text(name_of(identity.stream), message.stream);
+  std::copy(identity.run_id.begin(), identity.run_id.end(), message.run_id);
 }
 
 }  // namespace perimap

@@ -101,6 +101,8 @@ StatusFacts LiveRuntime::facts() const {
   facts.r_trigger = pipeline_.settings().r_trigger.has_value();
   facts.respiration_channel = pipeline_.settings().respiration.channel;
   facts.sources_ended = sources_ended_.load(std::memory_order_relaxed);
+  facts.two_publishers = publication_.another_publisher();
+  facts.keys_expire_utc_ns = settings_.keys_expire_utc_ns;
   const std::lock_guard lock(beliefs_mutex_);
   facts.phase = beliefs_.phase;
   facts.rhythm = beliefs_.rhythm;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -34,6 +35,7 @@ struct RuntimeSettings {
   Duration model_interval = std::chrono::milliseconds(500);
   Duration status_interval = std::chrono::seconds(1);
   Duration stalled_after = std::chrono::milliseconds(500);
+  std::int64_t keys_expire_utc_ns = 0;  // of DDS Security; 0: there are none
 };
 
 inline constexpr Duration kLongestPublisherRound = std::chrono::milliseconds(100);

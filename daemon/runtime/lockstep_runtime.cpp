@@ -57,6 +57,8 @@ LockstepRuntime::~LockstepRuntime() {
 
 void LockstepRuntime::deliver(const ReplayEvent& event) {
   const Instant arrival = arrival_of(event);
+  if (delivered_any_ && arrival - now_ > kLongestReplayedGap) pass_over_gap(arrival);
+  delivered_any_ = true;
   advance_to(arrival);
   now_ = std::max(now_, arrival);
   SensorEntrance& entrance = pipeline_.entrance();
@@ -107,6 +109,13 @@ void LockstepRuntime::advance_to(Instant t) {
       release();
     }
   }
+}
+
+// Its beginning as any other silence: until then all that was known has lost its meaning, and says so.
+void LockstepRuntime::pass_over_gap(Instant until) {
+  advance_to(now_ + kLongestReplayedGap);
+  ++gaps_;
+  releases_passed_over_ += pipeline_.plan().pass_over(until);
 }
 
 void LockstepRuntime::map_ready_frame() {

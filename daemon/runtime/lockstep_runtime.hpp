@@ -1,6 +1,7 @@
 // The pipeline over a recording in virtual time: as fast as it goes, and the same samples every time.
 #pragma once
 
+#include <cstdint>
 #include <thread>
 #include <vector>
 
@@ -30,11 +31,16 @@ class LockstepRuntime {
   // In order of arrival.
   void deliver(const ReplayEvent& event);
 
+  // Gaps of the recording that were longer than kLongestReplayedGap, and the releases that were passed over in them.
+  [[nodiscard]] std::uint64_t gaps() const noexcept { return gaps_; }
+  [[nodiscard]] std::uint64_t releases_passed_over() const noexcept { return releases_passed_over_; }
+
   // After the last event: the releases that are still owed, then the final model and status.
   void finish();
 
  private:
   void advance_to(Instant t);
+  void pass_over_gap(Instant until);
   void map_ready_frame();
   void release();
   void publish_reports(Instant now);
@@ -52,6 +58,9 @@ class LockstepRuntime {
   FrameHandle frame_;
   Instant now_;
   Instant next_reports_;
+  bool delivered_any_ = false;
+  std::uint64_t gaps_ = 0;
+  std::uint64_t releases_passed_over_ = 0;
 };
 
 }  // namespace perimap

@@ -1,5 +1,7 @@
 #include "daemon/runtime/replay_feeder.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <utility>
 #include <variant>
 
@@ -70,8 +72,18 @@ void ReplayFeeder::deliver() {
   std::optional<Duration> offset = offset_;
   const Instant begun = MonotonicClock::now();
   std::vector<std::uint8_t> passed_over;  // the last colour
+  std::optional<Instant> before;          // as recorded
   while (auto event = next_event()) {
-    if (!offset) offset = MonotonicClock::now() + kLead - arrival_of(*event);
+    const Instant recorded = arrival_of(*event);
+    if (!offset) offset = MonotonicClock::now() + kLead - recorded;
+    // What is played beside other devices keeps its time.
+    if (before && !offset_ && recorded - *before > kLongestReplayedGap) {
+      const Duration gap = recorded - *before;
+      spdlog::warn("the recording has a gap of {:.0f} s, of which {:.0f} s are played", to_seconds(gap),
+                   to_seconds(kLongestReplayedGap));
+      *offset -= gap - kLongestReplayedGap;
+    }
+    before = recorded;
     shift(*event, *offset);
     const Instant arrival = arrival_of(*event);
     // As from a device: what came before there was anyone to take it is gone; but that there is colour is known from

@@ -31,6 +31,7 @@ SensorRecordingFacts recording_facts(const Configuration& configuration, const s
   facts.generator = std::move(generator);
   facts.description = "recorded from devices";
   facts.world_frame = configuration.source.world_frame;
+  facts.readers = configuration.recording.group.value_or("");
   facts.utc_minus_monotonic = utc_minus_monotonic();
   if (camera) facts.calibration = format_calibration(*camera);
   facts.configuration = session_toml(configuration);

@@ -60,7 +60,7 @@ bool is_special(const std::filesystem::path& file) {
   return !std::filesystem::is_regular_file(file, error) || is_open_already(file);
 }
 
-Expected<WholeFile> WholeFile::create(const std::filesystem::path& file, Name name) {
+Expected<WholeFile> WholeFile::create(const std::filesystem::path& file, Name name, Readers readers) {
   if (is_special(file)) {
     std::error_code error;
     if (std::filesystem::is_directory(file, error)) return cannot_write(file, EISDIR);
@@ -77,10 +77,12 @@ Expected<WholeFile> WholeFile::create(const std::filesystem::path& file, Name na
     partial = target;
     partial += number == 1 ? ".part" : ".part-" + std::to_string(number);
     if (name == Name::kPartWithEnding) partial += target.extension();
-    descriptor = ::open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    descriptor =
+        ::open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, readers == Readers::kOwner ? 0600 : 0666);
     if (descriptor < 0 && (errno != EEXIST || number == kMostPartial)) return cannot_write(file, errno);
   }
   ::close(descriptor);
+  if (readers == Readers::kOwner) return WholeFile(file, std::move(target), std::move(partial));
   std::error_code error;
   const auto before = std::filesystem::status(target, error);
   if (std::filesystem::exists(before)) std::filesystem::permissions(partial, before.permissions(), error);

@@ -18,9 +18,12 @@ class WholeFile {
   // How the other name is made: FILE.part, or FILE.part.mkv for those who tell the kind of file by its ending;
   // FILE.part-2 and so on where there is one already, which is left alone.
   enum class Name { kPart, kPartWithEnding };
+  // Who may read it: as the process's mask and the file before have it, or the owner alone.
+  enum class Readers { kAsBefore, kOwner };
 
   // Makes the file under its other name, empty, so that a folder that takes none is found before the work begins.
-  [[nodiscard]] static Expected<WholeFile> create(const std::filesystem::path& file, Name name = Name::kPart);
+  [[nodiscard]] static Expected<WholeFile> create(const std::filesystem::path& file, Name name = Name::kPart,
+                                                  Readers readers = Readers::kAsBefore);
 
   WholeFile(WholeFile&& other) noexcept;
   WholeFile& operator=(WholeFile&&) = delete;

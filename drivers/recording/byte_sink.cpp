@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -71,7 +72,7 @@ class FileSink final : public ByteSink {
 
 Expected<std::unique_ptr<ByteSink>> create_file(const std::string& path, const std::string& told_as) {
   const std::string& name = told_as.empty() ? path : told_as;
-  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (fd < 0) return fail(fmt::format("{}: cannot create: {}", name, errno_text(errno)));
   return std::make_unique<FileSink>(fd, name);
 }

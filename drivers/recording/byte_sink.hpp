@@ -19,7 +19,8 @@ class ByteSink {
   [[nodiscard]] virtual Expected<void> close() = 0;
 };
 
-// Creates the file, or empties it. Errors call it `told_as`, or else by its path.
+// Creates the file, or empties it; a new one is for its owner alone, since what is recorded is a patient's. Errors call
+// it `told_as`, or else by its path.
 [[nodiscard]] Expected<std::unique_ptr<ByteSink>> create_file(const std::string& path, const std::string& told_as = "");
 
 }  // namespace perimap

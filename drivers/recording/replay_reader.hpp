@@ -1,6 +1,7 @@
 // The sensors' messages of a recording as the values that sources push into the pipeline, in order of arrival.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -53,6 +54,10 @@ struct SecondPose {
 };
 
 using ReplayEvent = std::variant<FrameEvent, TrackerSample, SecondPose, EcgBlock, RTriggerPulse, RespirationBlock>;
+
+// A silence of all devices that is longer is a break in the session, however long: a replay goes on after so much of
+// it. Of what was known before nothing holds then; a phase is lost within seconds.
+inline constexpr Duration kLongestReplayedGap = std::chrono::seconds(60);
 
 [[nodiscard]] Instant arrival_of(const ReplayEvent& event);
 // The same event with all its instants moved by `offset`.

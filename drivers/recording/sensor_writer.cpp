@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "drivers/file/group_access.hpp"
 #include "drivers/recording/channels.hpp"
 #include "drivers/recording/foxglove_image.hpp"
 #include "drivers/recording/foxglove_pose.hpp"
@@ -15,6 +16,9 @@ namespace perimap {
 Expected<SensorWriter> SensorWriter::create(const std::string& path, const SensorRecordingFacts& facts, Instant begin) {
   auto writer = RecordingWriter::create(path);
   if (!writer) return tl::unexpected(std::move(writer.error()));
+  if (!facts.readers.empty()) {
+    if (auto shared = let_group_read(path, facts.readers); !shared) return tl::unexpected(std::move(shared.error()));
+  }
   SensorWriter sensors(std::move(*writer), facts.world_frame);
   if (auto begun = sensors.begin(facts, begin); !begun) return tl::unexpected(std::move(begun.error()));
   return sensors;

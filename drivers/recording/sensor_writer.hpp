@@ -22,6 +22,7 @@ struct SensorRecordingFacts {
   std::string generator;    // program and version
   std::string description;  // where it comes from
   std::string world_frame;
+  std::string readers;  // a group that may read the file beside its owner; empty: none
   Duration utc_minus_monotonic{0};
   std::optional<std::string> calibration;     // the camera's, as OpenCV writes it
   std::optional<std::string> configuration;   // of perimapd, TOML

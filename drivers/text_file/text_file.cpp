@@ -10,7 +10,6 @@
 
 #include "core/error/one_line.hpp"
 #include "drivers/file/regular_file.hpp"
-#include "drivers/file/whole_file.hpp"
 
 namespace perimap {
 
@@ -35,8 +34,8 @@ Expected<std::string> read_text_file(const std::filesystem::path& file, std::siz
   return text;
 }
 
-Expected<void> write_text_file(const std::filesystem::path& file, std::string_view text) {
-  auto whole = WholeFile::create(file);
+Expected<void> write_text_file(const std::filesystem::path& file, std::string_view text, WholeFile::Readers readers) {
+  auto whole = WholeFile::create(file, WholeFile::Name::kPart, readers);
   if (!whole) return tl::unexpected(whole.error());
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(whole->path().c_str(), "wb"), &std::fclose);
   const bool written = stream && std::fwrite(text.data(), 1, text.size(), stream.get()) == text.size();

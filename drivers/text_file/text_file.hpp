@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/error/expected.hpp"
+#include "drivers/file/whole_file.hpp"
 
 namespace perimap {
 
@@ -18,6 +19,7 @@ namespace perimap {
 
 // Replaces the file by the text, byte for byte, or leaves it as it was (WholeFile). Error: "FILE: cannot be written: No
 // space left on device".
-[[nodiscard]] Expected<void> write_text_file(const std::filesystem::path& file, std::string_view text);
+[[nodiscard]] Expected<void> write_text_file(const std::filesystem::path& file, std::string_view text,
+                                             WholeFile::Readers readers = WholeFile::Readers::kAsBefore);
 
 }  // namespace perimap

@@ -35,6 +35,11 @@ std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_real
     for (const int priority : {0, settings.priority}) add("live", fmt::format("run {}", run), priority, nothing);
   }
   const int best = may_be_realtime ? settings.priority : 0;
+  // In turn as well: what security costs is the difference within one run of the benchmark.
+  for (int run = 1; run <= settings.runs; ++run) {
+    add(kSecurityPart, fmt::format("without keys, run {}", run), best, nothing);
+    add(kSecurityPart, fmt::format("with keys, run {}", run), best, [](LiveCase& one) { one.secured = true; });
+  }
   for (const int subscribers : {5, 20}) {
     add("subscribers", fmt::format("{} subscribers", subscribers), best,
         [&](LiveCase& one) { one.subscribers = subscribers; });

@@ -19,11 +19,13 @@ namespace perimap::bench {
 // The parts, in the order in which they are run.
 inline const std::vector<std::string> kParts = {"live", "ddsperf", "subscribers", "recording", "load",  "workers",
                                                 "rate", "clock",   "features",    "cost",      "memory"};
+// Run when it is asked for: it needs Cyclone's security plugins.
+inline constexpr const char* kSecurityPart = "security";
 
 struct BenchSettings {
   BenchInput input;
-  std::set<std::string> parts;  // of kParts
-  int runs = 3;                 // of the part `live`
+  std::set<std::string> parts;  // of kParts, and kSecurityPart
+  int runs = 3;                 // of the parts `live` and `security`
   std::uint64_t frames = 6000;  // of the part `memory`
   int features = 200;
   int workers = 2;

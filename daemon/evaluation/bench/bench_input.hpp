@@ -15,9 +15,11 @@ struct BenchInput {
   std::string recording;
   std::optional<std::filesystem::path> configuration;  // over the recording's own
   int domain = 0;
-  Duration settle{0};             // from the first release to the first that counts
-  Duration measure{0};            // from there to the last; both are shortened for a recording that ends sooner
-  std::filesystem::path scratch;  // a folder for what is recorded, and for the disk's load
+  Duration settle{0};   // from the first release to the first that counts
+  Duration measure{0};  // from there to the last; both are shortened for a recording that ends sooner
+  std::optional<std::filesystem::path> publisher_keys;   // of secured runs
+  std::optional<std::filesystem::path> subscriber_keys;  // likewise
+  std::filesystem::path scratch;                         // a folder for what is recorded, and for the disk's load
 };
 
 // The recording at its first event, with so many features at most and so many workers. More features than the

@@ -96,10 +96,12 @@ Expected<ChildProcess> begin_stress(const std::filesystem::path& scratch) {
 }
 
 // The subscribers in the order of their start, the slow one last.
-Expected<std::vector<Subscriber>> begin_subscribers(int domain, const LiveCase& live_case) {
+Expected<std::vector<Subscriber>> begin_subscribers(const BenchInput& input, const LiveCase& live_case) {
   std::vector<Subscriber> subscribers;
+  const dds::Membership membership{input.domain, live_case.secured ? input.subscriber_keys : std::nullopt};
   for (int i = 0; i < live_case.subscribers + (live_case.slow_subscriber ? 1 : 0); ++i) {
-    auto subscriber = Subscriber::start(domain, live_case.stream, i < live_case.subscribers ? Duration(0) : kSlowPause);
+    auto subscriber =
+        Subscriber::start(membership, live_case.stream, i < live_case.subscribers ? Duration(0) : kSlowPause);
     if (!subscriber) return tl::unexpected(subscriber.error());
     subscribers.push_back(std::move(*subscriber));
   }
@@ -212,10 +214,12 @@ Expected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case
     if (!created) return tl::unexpected(created.error());
     recorder = std::move(*created);
   }
-  auto subscribers = begin_subscribers(input.domain, live_case);
+  auto subscribers = begin_subscribers(input, live_case);
   if (!subscribers) return tl::unexpected(subscribers.error());
   const DdsConfiguration& dds = setup->configuration.dds;
-  auto publication = DdsPublication::create({dds.domain, dds.surface_deadline, dds.surface_lifespan});
+  auto publication = DdsPublication::create({{dds.domain, live_case.secured ? input.publisher_keys : std::nullopt},
+                                             dds.surface_deadline,
+                                             dds.surface_lifespan});
   if (!publication) return tl::unexpected(publication.error());
 
   Pipeline pipeline(setup->pipeline);

@@ -28,6 +28,7 @@ struct LiveCase {
   int subscribers = 1;
   bool slow_subscriber = false;  // one more, which does something else for 200 ms after each take
   bool recording = false;        // while it publishes
+  bool secured = false;          // publisher and subscribers have keys
   bool stress = false;           // beside stress-ng on all processors, memory and disk
 };
 

@@ -29,8 +29,9 @@ void wait_for_the_end_of_input() {
 
 }  // namespace
 
-Expected<void> subscribe_until_input_ends(int domain, const std::string& stream, Duration pause) {
-  auto participant = dds::Participant::create(domain);
+Expected<void> subscribe_until_input_ends(const dds::Membership& membership, const std::string& stream,
+                                          Duration pause) {
+  auto participant = dds::Participant::create(membership);
   if (!participant) return tl::unexpected(participant.error());
   auto reader = dds::Reader<perimap_Surface>::create(*participant);
   if (!reader) return tl::unexpected(reader.error());
@@ -84,14 +85,20 @@ Expected<Receipt> parse_receipt(const std::string& line) {
   return fail(fmt::format("subscriber: expected a sequence number and a time, got '{}'", line));
 }
 
-Expected<Subscriber> Subscriber::start(int domain, ReleaseStream stream, Duration pause) {
+Expected<Subscriber> Subscriber::start(const dds::Membership& membership, ReleaseStream stream, Duration pause) {
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
   if (error) return fail("/proc/self/exe: " + error.message());
-  auto child = ChildProcess::start(
-      program.string(),
-      {kSubscriberCommand, "--domain", std::to_string(domain), "--stream", std::string(name_of(stream)), "--pause-ms",
-       std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(pause).count())});
+  std::vector<std::string> arguments = {
+      kSubscriberCommand,
+      "--domain",
+      std::to_string(membership.domain),
+      "--stream",
+      std::string(name_of(stream)),
+      "--pause-ms",
+      std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(pause).count())};
+  if (membership.security) arguments.insert(arguments.end(), {"--security", membership.security->string()});
+  auto child = ChildProcess::start(program.string(), arguments);
   if (!child) return tl::unexpected(child.error());
   const auto line = child->read_line();
   if (!line || *line != kReady) {

@@ -8,6 +8,7 @@
 #include "core/error/expected.hpp"
 #include "core/pipeline/release_stream.hpp"
 #include "core/time/instant.hpp"
+#include "daemon/dds/participant.hpp"
 #include "daemon/evaluation/bench/child_process.hpp"
 
 namespace perimap::bench {
@@ -19,13 +20,15 @@ struct Receipt {
 
 // The child's side: receives a stream's surfaces until its standard input ends, then prints them. `pause`: how long it
 // does something else after each time it has taken samples.
-[[nodiscard]] Expected<void> subscribe_until_input_ends(int domain, const std::string& stream, Duration pause);
+[[nodiscard]] Expected<void> subscribe_until_input_ends(const dds::Membership& membership, const std::string& stream,
+                                                        Duration pause);
 
 // The parent's side. The program is this one, run again with the arguments that lead to subscribe_until_input_ends().
 class Subscriber {
  public:
   // Returns when its reader is there.
-  [[nodiscard]] static Expected<Subscriber> start(int domain, ReleaseStream stream, Duration pause);
+  [[nodiscard]] static Expected<Subscriber> start(const dds::Membership& membership, ReleaseStream stream,
+                                                  Duration pause);
   // Ends it; what it received, in order.
   [[nodiscard]] Expected<std::vector<Receipt>> finish();
 

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,8 @@
 #include "daemon/command_line/outputs.hpp"
 #include "daemon/evaluation/bench/bench_text.hpp"
 #include "daemon/evaluation/bench/subscriber.hpp"
+#include "daemon/keys/authority.hpp"
+#include "daemon/keys/key_folder.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "drivers/text_file/text_file.hpp"
@@ -29,24 +32,47 @@ struct BenchOptions {
   std::string configuration;
   std::vector<std::string> only;
   std::string scratch;
+  bool security = false;
   double seconds = 10.0;
   double settle = 8.0;
   std::string json;
   std::string html;
 };
 
-// On this host alone, and apart from every other participant whatever its domain: a surface of a benchmark must not
-// reach those who navigate by another. Cyclone DDS reads it when the first participant is made, children inherit it.
+// Where the environment has no settings of Cyclone DDS: on this host alone.
+constexpr const char* kThisHost =
+    "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces>"
+    "<AllowMulticast>false</AllowMulticast><MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
+    "</General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+    "<MaxAutoParticipantIndex>40</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>"
+    "<Internal><SocketReceiveBufferSize max=\"8MB\"/></Internal></Domain></CycloneDDS>";
+
+// What the user has set holds, so that it is measured; but apart from every other participant, whatever its domain: a
+// surface of a benchmark must not reach those who navigate by another. Cyclone DDS reads it when the first participant
+// is made, children inherit it.
 void keep_to_ourselves() {
-  const std::string settings = fmt::format(
-      "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces>"
-      "<AllowMulticast>false</AllowMulticast><MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
-      "</General><Discovery><Tag>perimap-bench-{}</Tag><ParticipantIndex>auto</ParticipantIndex>"
-      "<MaxAutoParticipantIndex>40</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>"
-      "<Internal><SocketReceiveBufferSize max=\"8MB\"/></Internal></Domain></CycloneDDS>",
-      getpid());
   // NOLINTNEXTLINE(concurrency-mt-unsafe): before the other threads begin
+  const char* given = std::getenv("CYCLONEDDS_URI");
+  const std::string settings = fmt::format(
+      "{},<CycloneDDS><Domain Id=\"any\"><Discovery><Tag>perimap-bench-{}</Tag></Discovery></Domain></CycloneDDS>",
+      given == nullptr || *given == '\0' ? kThisHost : given, getpid());
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): likewise
   setenv("CYCLONEDDS_URI", settings.c_str(), 1);
+}
+
+// An authority for this benchmark alone, with keys for those who take part.
+Expected<void> make_keys(const std::filesystem::path& scratch, bench::BenchInput& input) {
+  const std::chrono::sys_seconds now = seconds_now();
+  const Validity validity{now - std::chrono::minutes(5), now + std::chrono::days(1)};
+  auto authority = Authority::create(scratch / "keys", "perimap bench", validity);
+  if (!authority) return tl::unexpected(authority.error());
+  auto publisher = authority->issue(KeyRole::kPublisher, "publisher", validity, false);
+  if (!publisher) return tl::unexpected(publisher.error());
+  auto subscriber = authority->issue(KeyRole::kDisplay, "subscriber", validity, false);
+  if (!subscriber) return tl::unexpected(subscriber.error());
+  input.publisher_keys = std::move(*publisher);
+  input.subscriber_keys = std::move(*subscriber);
+  return {};
 }
 
 // A folder for what the runs write, gone when this is.
@@ -91,14 +117,20 @@ Outcome measure(const BenchOptions& options) {
   const Logging logging(LogConfiguration::Level::kError);
 
   bench::BenchSettings settings = options.settings;
-  const std::vector<std::string>& chosen = options.only.empty() ? bench::kParts : options.only;
-  settings.parts.insert(chosen.begin(), chosen.end());
+  if (options.security) settings.parts.insert(bench::kSecurityPart);
+  if (!options.security || !options.only.empty()) {
+    const std::vector<std::string>& chosen = options.only.empty() ? bench::kParts : options.only;
+    settings.parts.insert(chosen.begin(), chosen.end());
+  }
   if (settings.parts.contains("ddsperf")) settings.parts.insert("live");  // it is held beside those
   if (!options.configuration.empty()) settings.input.configuration = options.configuration;
   settings.input.domain = kDomain;
   settings.input.settle = from_seconds(options.settle);
   settings.input.measure = from_seconds(options.seconds);
   settings.input.scratch = scratch->path();
+  if (options.security) {
+    if (const auto made = make_keys(scratch->path(), settings.input); !made) return refuse(made.error());
+  }
   const auto report = bench::run_bench(settings, *stop, [](int number, int all, const std::string& name) {
     fmt::print(stderr, "{:3}/{} {}\n", number, all, name);
     (void)std::fflush(stderr);
@@ -119,18 +151,20 @@ void add_subscriber_command(Commands& commands) {
     int domain = 0;
     std::string stream = "frame";
     int pause_ms = 0;
+    std::optional<std::string> security;
   };
   const auto options = std::make_shared<SubscriberOptions>();
-  Command& command = commands.add(bench::kSubscriberCommand, "What perimap bench runs in another process",
-                                  [options](const Console&) -> Outcome {
-                                    const auto done = bench::subscribe_until_input_ends(
-                                        options->domain, options->stream, std::chrono::milliseconds(options->pause_ms));
-                                    if (!done) return refuse(done.error());
-                                    return {};
-                                  });
+  Command& command = commands.add(
+      bench::kSubscriberCommand, "What perimap bench runs in another process", [options](const Console&) -> Outcome {
+        const auto done = bench::subscribe_until_input_ends({options->domain, options->security}, options->stream,
+                                                            std::chrono::milliseconds(options->pause_ms));
+        if (!done) return refuse(done.error());
+        return {};
+      });
   command.group("");
   command.add_option("--domain", options->domain)->check(Range(0, 230));
   command.add_option("--stream", options->stream);
+  command.add_option("--security", options->security);
   command.add_option("--pause-ms", options->pause_ms)->check(Range(0, 10'000));
 }
 
@@ -151,11 +185,14 @@ void add_bench_command(Commands& commands) {
   command.add_option("--only", options->only, "These parts alone; ddsperf runs after each run of 'live'")
       ->check(OneOf(bench::kParts))
       ->delimiter(',');
+  command.add_flag(
+      "--security", options->security,
+      "What DDS Security costs: runs with keys and without in turn, and no other parts but those of --only");
   command.add_option("--seconds", options->seconds, "Measured a run")->check(Range(0.5, 1e6))->capture_default_str();
   command.add_option("--settle", options->settle, "Played before, for the map to grow; not measured")
       ->check(Range(0.0, 1e6))
       ->capture_default_str();
-  command.add_option("--runs", settings.runs, "How often the part 'live' is run")
+  command.add_option("--runs", settings.runs, "How often the part 'live', and those of --security, are run")
       ->check(Range(1, 1000))
       ->capture_default_str();
   command.add_option("--frames", settings.frames, "Frames of the part 'memory'")

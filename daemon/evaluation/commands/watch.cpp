@@ -9,6 +9,7 @@
 #include "daemon/command_line/commands.hpp"
 #include "daemon/evaluation/watch/sample_receiver.hpp"
 #include "daemon/evaluation/watch/watch_report.hpp"
+#include "daemon/keys/key_folder.hpp"
 #include "daemon/process/stop_signal.hpp"
 
 namespace perimap {
@@ -26,6 +27,7 @@ struct WatchOptions {
   std::uint64_t surfaces = 0;  // 0: no limit
   double wait_s = 0.0;         // 0: no limit
   std::string recording;
+  std::optional<std::string> security;
 };
 
 void print(const std::string& line) {
@@ -33,10 +35,15 @@ void print(const std::string& line) {
   (void)std::fflush(stdout);
 }
 
+// Who has no keys finds nobody in a secured domain, and is not told so by anyone.
+std::string hint(const WatchOptions& options) {
+  return options.security ? "" : "; a secured one shows itself to keys alone (--security)";
+}
+
 void print_interval(const WatchOptions& options, const std::vector<StreamReport>& reports) {
   if (reports.empty()) {
     print(options.json ? std::string(R"({"kind":"waiting"})")
-                       : "waiting for a publisher in DDS domain " + std::to_string(options.domain));
+                       : "waiting for a publisher in DDS domain " + std::to_string(options.domain) + hint(options));
   }
   for (const StreamReport& report : reports) {
     print(options.json ? report_json(report, ReportKind::kInterval) : report_line(report));
@@ -66,7 +73,12 @@ void print_until_ended(const WatchOptions& options, StopSignal& stop, SampleRece
   }
 }
 
-Outcome watch(const WatchOptions& options) {
+Outcome watch(const WatchOptions& options, const Console& console) {
+  if (options.security) {
+    const auto keys = check_keys(*options.security, seconds_now());
+    if (!keys) return refuse(Error{"--security: " + keys.error().message}, ExitCode::kWrongUsage);
+    if (const auto warning = expiry_warning(*keys, seconds_now())) console.complain("warning: " + *warning);
+  }
   Expected<StopSignal> stop = StopSignal::install();
   if (!stop) {
     return refuse(stop.error());
@@ -80,7 +92,7 @@ Outcome watch(const WatchOptions& options) {
     }
     recorder.emplace(std::move(*created));
   }
-  Expected<SampleReaders> readers = SampleReaders::create(options.domain, recorder.has_value());
+  Expected<SampleReaders> readers = SampleReaders::create({options.domain, options.security}, recorder.has_value());
   if (!readers) {
     return refuse(readers.error());
   }
@@ -100,7 +112,7 @@ Outcome watch(const WatchOptions& options) {
     return refuse(finished.error());
   }
   if (receiver.surfaces() == 0) {
-    return refuse("no surface was received in DDS domain " + std::to_string(options.domain));
+    return refuse("no surface was received in DDS domain " + std::to_string(options.domain) + hint(options));
   }
   return {};
 }
@@ -113,8 +125,10 @@ void add_watch_command(Commands& commands) {
       "watch",
       "Subscribes to a publishing perimapd and prints a line a second: rate and lost samples, latency (receipt minus "
       "capture, on the publisher's host only), lateness (receipt minus release), jitter, phase, features, state",
-      [options](const Console&) { return watch(*options); });
+      [options](const Console& console) { return watch(*options, console); });
   command.add_option("--domain", options->domain, "DDS domain")->check(Range(0, 230))->capture_default_str();
+  command.add_option("--security", options->security,
+                     "Keys for DDS Security, as perimap keys issue makes them (a folder), where the domain is secured");
   command.add_flag("--json", options->json, "One JSON object a line");
   Option* once = command.add_flag("--once", options->once, "Print the first surface and end");
   command.add_option("--duration", options->duration_s, "End so many seconds after the first surface")

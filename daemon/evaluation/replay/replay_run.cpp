@@ -1,5 +1,7 @@
 #include "daemon/evaluation/replay/replay_run.hpp"
 
+#include <fmt/format.h>
+
 #include <memory>
 #include <optional>
 #include <utility>
@@ -83,6 +85,12 @@ Expected<bool> run_lockstep(Pipeline& pipeline, ReplaySetup& setup, Publication&
     if (stop.requested()) return true;
   }
   runtime.finish();
+  if (runtime.gaps() > 0) {
+    damage.push_back(
+        {fmt::format("{} gaps of more than {:.0f} s: the {} surfaces that would be of the rest of them are "
+                     "left out",
+                     runtime.gaps(), to_seconds(kLongestReplayedGap), runtime.releases_passed_over())});
+  }
   const auto found = setup.reader.damage();
   damage.insert(damage.end(), found.begin(), found.end());
   return false;
@@ -147,7 +155,7 @@ tl::expected<ReplayReport, SetupError> run_replay(
   std::unique_ptr<DdsPublication> dds;
   if (options.dds) {
     const DdsConfiguration& c = setup->configuration.dds;
-    auto created = DdsPublication::create({c.domain, c.surface_deadline, c.surface_lifespan});
+    auto created = DdsPublication::create({{c.domain, c.security}, c.surface_deadline, c.surface_lifespan});
     if (!created) return failed(created.error());
     dds = std::move(*created);
   }

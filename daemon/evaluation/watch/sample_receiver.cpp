@@ -8,8 +8,8 @@
 
 namespace perimap {
 
-Expected<SampleReaders> SampleReaders::create(int domain, bool all_topics) {
-  auto participant = dds::Participant::create(domain);
+Expected<SampleReaders> SampleReaders::create(const dds::Membership& membership, bool all_topics) {
+  auto participant = dds::Participant::create(membership);
   if (!participant) {
     return tl::unexpected(participant.error());
   }
@@ -92,7 +92,7 @@ void SampleReceiver::receive_samples(dds::Reader<T>& reader, Instant receipt, Us
     if (sample == nullptr) {
       continue;
     }
-    use(*sample);
+    use(*sample, loan->info(i).publication_handle);
     if (recorder_) {
       result_ = recorder_->write(*sample, receipt);
     }
@@ -104,17 +104,18 @@ void SampleReceiver::receive() {
   while (readers_.wait_set.wait()) {
     const Instant receipt = MonotonicClock::now();
     const std::lock_guard lock(mutex_);
-    receive_samples(readers_.surfaces, receipt, [&](const perimap_Surface& surface) {
+    receive_samples(readers_.surfaces, receipt, [&](const perimap_Surface& surface, std::uint64_t writer) {
       if (limits_.keep_first_surface && statistics_.surfaces() == 0) {
         first_surface_ = surface_json(surface, receipt);
       }
-      statistics_.add(surface, receipt);
+      statistics_.add(surface, receipt, writer);
     });
-    receive_samples(readers_.statuses, receipt, [&](const perimap_Status& status) { statistics_.add(status); });
+    receive_samples(readers_.statuses, receipt,
+                    [&](const perimap_Status& status, std::uint64_t /*writer*/) { statistics_.add(status); });
     if (recorder_) {
-      receive_samples(readers_.models, receipt, [](const perimap_SurfaceModel&) {});
-      receive_samples(readers_.meshes, receipt, [](const perimap_SurfaceMesh&) {});
-      receive_samples(readers_.phases, receipt, [](const perimap_Phase&) {});
+      receive_samples(readers_.models, receipt, [](const perimap_SurfaceModel&, std::uint64_t) {});
+      receive_samples(readers_.meshes, receipt, [](const perimap_SurfaceMesh&, std::uint64_t) {});
+      receive_samples(readers_.phases, receipt, [](const perimap_Phase&, std::uint64_t) {});
     }
     if (limit_reached() || !result_) {
       break;

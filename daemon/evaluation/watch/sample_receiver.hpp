@@ -27,7 +27,7 @@ struct SampleReaders {
   dds::WaitSet wait_set;
 
   // Without `all_topics` only surfaces and statuses wake the thread; the others are not read.
-  [[nodiscard]] static Expected<SampleReaders> create(int domain, bool all_topics);
+  [[nodiscard]] static Expected<SampleReaders> create(const dds::Membership& membership, bool all_topics);
 };
 
 // Starts its thread when made and ends it when destroyed. Samples are stamped when the thread wakes up.

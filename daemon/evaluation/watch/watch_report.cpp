@@ -84,6 +84,26 @@ std::string stage_table(const StatusDigest& status) {
   return text;
 }
 
+bool at_odds(client::Hearing hearing) {
+  return hearing == client::Hearing::kTwoPublishers || hearing == client::Hearing::kImplausible;
+}
+
+std::string_view publishers_of(client::Hearing hearing) {
+  switch (hearing) {
+    case client::Hearing::kUse:
+      return "one";
+    case client::Hearing::kListening:
+      return "listening";
+    case client::Hearing::kAnotherBegan:
+      return "another began";
+    case client::Hearing::kTwoPublishers:
+      return "two";
+    case client::Hearing::kImplausible:
+      return "at odds";
+  }
+  return "not known";
+}
+
 // On one line whatever bytes the publisher put into its names.
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
@@ -103,7 +123,8 @@ std::string report_line(const StreamReport& report) {
     line += fmt::format(" | latency {} ms | late {} ms | jitter {} ms", spread_text(report.latency),
                         spread_text(report.lateness), spread_text(report.jitter));
   }
-  if (report.received > 0 && report.last) {
+  if (at_odds(report.hearing)) line += fmt::format(" | {}", client::describe(report.hearing));
+  if (report.received > 0 && report.last && !at_odds(report.hearing)) {
     const SurfaceDigest& last = *report.last;
     line += fmt::format(" | phase {:.0f} +- {:.1f} deg, {:.1f}/min | {} | {}", last.cardiac_phase_rad / kDegree,
                         last.cardiac_phase_deviation_rad / kDegree,
@@ -125,6 +146,10 @@ std::string summary_text(const StreamReport& report) {
   text += fmt::format("  latency, receipt minus capture   {} ms\n", spread_text(report.latency));
   text += fmt::format("  late, receipt minus release      {} ms\n", spread_text(report.lateness));
   text += fmt::format("  jitter as received               {} ms\n", spread_text(report.jitter));
+  if (report.contested > 0) {
+    text += fmt::format("  NOT TO BE USED: {} surfaces of two publishers, or at odds with those before\n",
+                        report.contested);
+  }
   if (report.last) {
     text += fmt::format("  last surface: {}; {}\n", state_text(*report.last), features_text(*report.last));
   }
@@ -142,6 +167,8 @@ std::string report_json(const StreamReport& report, ReportKind kind) {
                {"missing", report.missing},
                {"restarts", report.restarts},
                {"expired", report.expired},
+               {"contested", report.contested},
+               {"publishers", publishers_of(report.hearing)},
                {"rate_hz", rate_hz(report, kind)},
                {"latency_ms", spread_json(report.latency)},
                {"lateness_ms", spread_json(report.lateness)},

@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "core/statistics/upper_median.hpp"
 
@@ -46,17 +47,24 @@ SurfaceDigest digest(const perimap_Surface& surface) {
 
 }  // namespace
 
-void WatchStatistics::add(const perimap_Surface& surface, Instant receipt) {
+void WatchStatistics::add(const perimap_Surface& surface, Instant receipt, std::uint64_t writer) {
   Stream& stream = streams_[{surface.source, surface.stream}];
   ++surfaces_;
+  stream.hearing = publishers_[surface.source].hear(surface, writer, to_ns(receipt));
+  const bool contested =
+      stream.hearing == client::Hearing::kTwoPublishers || stream.hearing == client::Hearing::kImplausible;
   const Instant release = from_ns(surface.release_time_ns);
   const bool first = !stream.last;
-  const bool restarted = !first && surface.sample_sequence <= stream.last->sample_sequence;
+  const bool another_run = std::memcmp(stream.last_run.data(), surface.run_id, stream.last_run.size()) != 0;
+  const bool restarted = !first && (another_run || surface.sample_sequence <= stream.last->sample_sequence);
   for (Tally* tally : {&stream.interval, &stream.total}) {
     ++tally->received;
     tally->expired += receipt > from_ns(surface.valid_until_ns) ? 1 : 0;
     tally->latency.add(receipt - from_ns(surface.capture_time_ns));
     tally->lateness.add(std::max(receipt - release, Duration(0)));
+    tally->contested += contested ? 1 : 0;
+    // Of two at once, what is missing or began anew would mean nothing.
+    if (stream.hearing == client::Hearing::kTwoPublishers) continue;
     if (restarted) {
       ++tally->restarts;
     } else if (!first) {
@@ -69,6 +77,7 @@ void WatchStatistics::add(const perimap_Surface& surface, Instant receipt) {
   }
   stream.last_receipt = receipt;
   stream.last_release = release;
+  std::copy_n(surface.run_id, stream.last_run.size(), stream.last_run.begin());
   stream.last = digest(surface);
 }
 
@@ -90,6 +99,8 @@ StreamReport WatchStatistics::report(const Key& key, const Stream& stream, const
           tally.missing,
           tally.restarts,
           tally.expired,
+          tally.contested,
+          stream.hearing,
           tally.latency.spread(),
           tally.lateness.spread(),
           tally.jitter.spread(),

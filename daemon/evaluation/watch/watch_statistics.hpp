@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <perimap_publisher_watch.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -42,12 +43,14 @@ struct StreamReport {
   std::string stream;
   Duration length{0};
   std::uint64_t received = 0;
-  std::uint64_t missing = 0;   // sequence numbers that never came, between samples that did
-  std::uint64_t restarts = 0;  // the sequence began anew
-  std::uint64_t expired = 0;   // received after their own valid_until_ns
-  DurationSpread latency;      // receipt minus capture
-  DurationSpread lateness;     // receipt minus release deadline; early counts as zero
-  DurationSpread jitter;       // |receipt interval minus release interval| of neighbouring samples
+  std::uint64_t missing = 0;    // sequence numbers that never came, between samples that did
+  std::uint64_t restarts = 0;   // the sequence began anew
+  std::uint64_t expired = 0;    // received after their own valid_until_ns
+  std::uint64_t contested = 0;  // of two publishers, or at odds with those before: their positions are not to be used
+  client::Hearing hearing = client::Hearing::kListening;  // of the last
+  DurationSpread latency;                                 // receipt minus capture
+  DurationSpread lateness;                                // receipt minus release deadline; early counts as zero
+  DurationSpread jitter;  // |receipt interval minus release interval| of neighbouring samples
   std::optional<SurfaceDigest> last;
   std::optional<StatusDigest> status;
 };
@@ -55,7 +58,8 @@ struct StreamReport {
 // One thread at a time. Latencies make sense on the publisher's host only, whose CLOCK_MONOTONIC the samples carry.
 class WatchStatistics {
  public:
-  void add(const perimap_Surface& surface, Instant receipt);
+  // `writer`: what tells one from another, as dds_sample_info_t::publication_handle.
+  void add(const perimap_Surface& surface, Instant receipt, std::uint64_t writer = 0);
   void add(const perimap_Status& status);
 
   [[nodiscard]] std::uint64_t surfaces() const noexcept { return surfaces_; }
@@ -72,6 +76,7 @@ class WatchStatistics {
     std::uint64_t missing = 0;
     std::uint64_t restarts = 0;
     std::uint64_t expired = 0;
+    std::uint64_t contested = 0;
     DurationCounts latency;
     DurationCounts lateness;
     DurationCounts jitter;
@@ -82,6 +87,8 @@ class WatchStatistics {
     Instant first_receipt;
     Instant last_receipt;
     Instant last_release;
+    std::array<std::uint8_t, 16> last_run{};
+    client::Hearing hearing = client::Hearing::kListening;
     std::optional<SurfaceDigest> last;
     std::optional<StatusDigest> status;
   };
@@ -90,6 +97,7 @@ class WatchStatistics {
   static StreamReport report(const Key& key, const Stream& stream, const Tally& tally, Duration length);
 
   std::map<Key, Stream> streams_;
+  std::map<std::string, client::PublisherWatch> publishers_;  // by source
   std::uint64_t surfaces_ = 0;
 };
 

@@ -6,10 +6,12 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "daemon/command_line/commands.hpp"
+#include "daemon/keys/key_folder.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/view/live/live_view.hpp"
 #include "daemon/view/recorded/recorded_view.hpp"
@@ -23,6 +25,7 @@ struct ViewOptions {
   int domain = 0;
   std::string address = "127.0.0.1";
   int port = 7374;
+  std::optional<std::string> security;
 };
 
 void print_address(const WebServer& server) {
@@ -34,13 +37,18 @@ Expected<std::unique_ptr<PageHandler>> open_view(const ViewOptions& options, Web
                                                  const std::function<void(const std::string&)>& say) {
   const auto as_handler = [](auto view) { return std::unique_ptr<PageHandler>(std::move(view)); };
   if (!options.files.recording.empty()) return RecordedView::open(options.files, server, say).map(as_handler);
-  return LiveView::create(options.domain, server, say).map(as_handler);
+  return LiveView::create({options.domain, options.security}, server, say).map(as_handler);
 }
 
 Outcome view(const ViewOptions& options, const Console& console) {
   if (options.files.recording.empty() && !options.files.samples.empty()) {
     return refuse("--samples goes with a RECORDING of the devices; by itself it is the RECORDING",
                   ExitCode::kWrongUsage);
+  }
+  if (options.security) {
+    const auto keys = check_keys(*options.security, seconds_now());
+    if (!keys) return refuse(Error{"--security: " + keys.error().message}, ExitCode::kWrongUsage);
+    if (const auto warning = expiry_warning(*keys, seconds_now())) console.complain("warning: " + *warning);
   }
   Expected<StopSignal> stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
@@ -71,6 +79,8 @@ void add_view_command(Commands& commands) {
   command.add_option("--samples", options->files.samples,
                      "What was published of it (perimap watch --record, perimap replay --samples)");
   command.add_option("--domain", options->domain, "DDS domain")->check(Range(0, 230))->capture_default_str();
+  command.add_option("--security", options->security,
+                     "Keys for DDS Security, as perimap keys issue makes them (a folder), where the domain is secured");
   command.add_option("--port", options->port, "Where the page is served; 0: any port that is free")
       ->check(Range(0, 65535))
       ->capture_default_str();

@@ -32,8 +32,8 @@ std::optional<Sample<T>> copy_of(const T& sample) {
 
 }  // namespace
 
-Expected<LiveView::Readers> LiveView::subscribe(int domain) {
-  auto participant = dds::Participant::create(domain);
+Expected<LiveView::Readers> LiveView::subscribe(const dds::Membership& membership) {
+  auto participant = dds::Participant::create(membership);
   if (!participant) return tl::unexpected(participant.error());
   auto surfaces = dds::Reader<perimap_Surface>::create(*participant);
   auto models = dds::Reader<perimap_SurfaceModel>::create(*participant);
@@ -54,10 +54,10 @@ Expected<LiveView::Readers> LiveView::subscribe(int domain) {
                  std::move(*phases),      std::move(*statuses), std::move(*wait_set)};
 }
 
-Expected<std::unique_ptr<LiveView>> LiveView::create(int domain, WebServer& server, Say say) {
-  auto readers = subscribe(domain);
+Expected<std::unique_ptr<LiveView>> LiveView::create(const dds::Membership& membership, WebServer& server, Say say) {
+  auto readers = subscribe(membership);
   if (!readers) return tl::unexpected(readers.error());
-  return std::unique_ptr<LiveView>(new LiveView(domain, std::move(*readers), server, std::move(say)));
+  return std::unique_ptr<LiveView>(new LiveView(membership.domain, std::move(*readers), server, std::move(say)));
 }
 
 LiveView::LiveView(int domain, Readers readers, WebServer& server, Say say)

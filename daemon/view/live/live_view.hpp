@@ -28,7 +28,8 @@ class LiveView final : public PageHandler {
   using Say = std::function<void(const std::string&)>;
 
   // The server must outlive this.
-  [[nodiscard]] static Expected<std::unique_ptr<LiveView>> create(int domain, WebServer& server, Say say);
+  [[nodiscard]] static Expected<std::unique_ptr<LiveView>> create(const dds::Membership& membership, WebServer& server,
+                                                                  Say say);
   LiveView(const LiveView&) = delete;
   LiveView& operator=(const LiveView&) = delete;
   ~LiveView() override;
@@ -56,7 +57,7 @@ class LiveView final : public PageHandler {
   };
 
   LiveView(int domain, Readers readers, WebServer& server, Say say);
-  [[nodiscard]] static Expected<Readers> subscribe(int domain);
+  [[nodiscard]] static Expected<Readers> subscribe(const dds::Membership& membership);
 
   void receive();
   template <class T, class Use>

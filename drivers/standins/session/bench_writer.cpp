@@ -166,7 +166,7 @@ class BenchWriter {
 
 Expected<void> write_bench(const BenchScene& scene, const std::filesystem::path& path, const TrackerNoise& noise,
                            unsigned threads, const std::function<void(std::uint64_t done)>& progress) {
-  auto file = WholeFile::create(path);
+  auto file = WholeFile::create(path, WholeFile::Name::kPart, WholeFile::Readers::kOwner);
   if (!file) return tl::unexpected(file.error());
   auto sink = create_file(file->path().string(), path.string());
   if (!sink) return tl::unexpected(sink.error());

@@ -53,7 +53,7 @@ class SessionWriter {
  public:
   static Expected<std::unique_ptr<SessionWriter>> create(const Simulation& simulation,
                                                          const SimulatedRecording& recording) {
-    auto file = WholeFile::create(recording.path);
+    auto file = WholeFile::create(recording.path, WholeFile::Name::kPart, WholeFile::Readers::kOwner);
     if (!file) return tl::unexpected(file.error());
     auto sink = create_file(file->path().string(), recording.path.string());
     if (!sink) return tl::unexpected(sink.error());

@@ -327,6 +327,28 @@ TEST(ReplaceFile, ReplacesAWholeFileAndLeavesTheOldOneWhenItCannot) {
   fs::remove_all(folder);
 }
 
+TEST(RemoveFile, TakesAwayTheFileAndWhatAnInterruptedWriteHasLeftBesideIt) {
+  std::string folder = (fs::temp_directory_path() / "perimap-checkpoint-XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  const fs::path file = fs::path(folder) / "checkpoint";
+  ASSERT_TRUE(replace_file(file, "a patient's"));
+  EXPECT_EQ(fs::status(file).permissions(), fs::perms(0600));
+  std::ofstream(file.string() + ".part") << "the same patient's, half";
+  std::ofstream(fs::path(folder) / "checkpoint.other") << "another's";
+  ASSERT_TRUE(remove_file(file));
+  EXPECT_FALSE(fs::exists(file));
+  EXPECT_FALSE(fs::exists(file.string() + ".part"));
+  EXPECT_TRUE(fs::exists(fs::path(folder) / "checkpoint.other"));
+  EXPECT_TRUE(remove_file(file)) << "where there is none";
+  fs::create_directory(file);
+  std::ofstream(file.string() + ".part") << "half";
+  const auto failed = remove_file(file);
+  ASSERT_FALSE(failed);
+  EXPECT_THAT(failed.error().message, HasSubstr(file.string() + ": cannot be removed"));
+  EXPECT_FALSE(fs::exists(file.string() + ".part")) << "all the same";
+  fs::remove_all(folder);
+}
+
 // A block of half a second.
 EcgBlock block_at(Instant first) {
   EcgBlock block;

@@ -1,6 +1,7 @@
 #include "drivers/file/whole_file.hpp"
 
 #include <fcntl.h>
+#include <grp.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -10,6 +11,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "drivers/file/group_access.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -180,6 +182,32 @@ TEST_F(WholeFileTest, WhatNobodyCouldMakeAgainMayBeKept) {
   }
   EXPECT_EQ(content(partial), "what came");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "a.txt"));
+}
+
+TEST_F(WholeFileTest, ForItsOwnerAloneIsReadByNobodyElseWhateverWasThereBefore) {
+  const std::filesystem::path file = folder_ / "patient.mcap";
+  std::ofstream(file) << "old";
+  std::filesystem::permissions(file, std::filesystem::perms(0644));
+  auto whole = WholeFile::create(file, WholeFile::Name::kPart, WholeFile::Readers::kOwner);
+  ASSERT_TRUE(whole);
+  EXPECT_EQ(std::filesystem::status(whole->path()).permissions(), std::filesystem::perms(0600)) << "from the beginning on";
+  std::ofstream(whole->path()) << "new";
+  ASSERT_TRUE(whole->finish());
+  EXPECT_EQ(std::filesystem::status(file).permissions(), std::filesystem::perms(0600));
+}
+
+TEST_F(WholeFileTest, AGroupMayReadWhatItIsGivenAndAGroupThatIsNotThereIsTold) {
+  const std::filesystem::path file = folder_ / "patient.mcap";
+  std::ofstream(file) << "x";
+  std::filesystem::permissions(file, std::filesystem::perms(0600));
+  const ::group* own = ::getgrgid(::getegid());
+  ASSERT_NE(own, nullptr);
+  ASSERT_TRUE(let_group_read(file, own->gr_name));
+  EXPECT_EQ(std::filesystem::status(file).permissions(), std::filesystem::perms(0640));
+  const auto unknown = let_group_read(file, "no-such-group");
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().message,
+            file.string() + ": cannot be given to the group 'no-such-group': there is no such group on this machine");
 }
 
 }  // namespace

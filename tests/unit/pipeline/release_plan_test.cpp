@@ -210,5 +210,20 @@ TEST(ReleasePlan, AfterARestartNoReleaseHasANumberUntilAFrameHasOne) {
   EXPECT_EQ(of_frames, (std::vector<std::uint64_t>{0, 3, 4})) << "that at 150, the frame, and one that is missing";
 }
 
+TEST(ReleasePlan, AYearIsPassedOverAtOnce) {
+  for (const Duration clock_period : {Duration(0), Duration(milliseconds(10))}) {
+    ReleasePlan plan({kLatency, true, clock_period});
+    run(plan, 20, 30 * 20 + 60);
+    const Instant later = at_ms(30 * 20 + 60) + std::chrono::days(365);
+    const std::uint64_t passed = plan.pass_over(later);
+    EXPECT_GT(passed, std::uint64_t{365} * 86400 * 30);
+    const auto next = plan.next();
+    ASSERT_TRUE(next);
+    EXPECT_GT(next->deadline, later - milliseconds(1));
+    EXPECT_LE(next->deadline, later + milliseconds(31));
+    EXPECT_EQ(plan.pass_over(later), 0U) << "and not again";
+  }
+}
+
 }  // namespace
 }  // namespace perimap

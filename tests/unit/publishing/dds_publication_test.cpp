@@ -41,7 +41,7 @@ class FailingWrites : public ::testing::Test {
 
   std::unique_ptr<DdsPublication> publication(Duration writes_well_after) {
     DdsSettings settings;
-    settings.domain = kDomain;
+    settings.membership = kDomain;
     settings.writes_well_after = writes_well_after;
     auto made = DdsPublication::create(settings);
     if (!made) throw std::runtime_error(made.error().message);

@@ -88,6 +88,7 @@ void fill(Filler& next, perimap_Surface& s) {
   next(s.rotation_WC_wxyz);
   next(s.camera_focal_px);
   next(s.camera_principal_point_px);
+  next(s.run_id);
 }
 
 void fill(Filler& next, perimap_PhaseClock& s) {
@@ -161,6 +162,7 @@ void fill(Filler& next, perimap_SurfaceModel& s) {
   next(s.expected_until_ns);
   next(s.valid_until_ns);
   next.sequence(s.cardiac_cycles, 2, [&](auto& cycle) { fill(next, cycle); });
+  next(s.run_id);
 }
 
 void fill(Filler& next, perimap_Phase& s) {
@@ -176,6 +178,7 @@ void fill(Filler& next, perimap_Phase& s) {
   next(s.predicted_r_peak_time_ns);
   next(s.predicted_r_peak_deviation_ns);
   next(s.beats);
+  next(s.run_id);
 }
 
 void fill(Filler& next, perimap_SourceStatus& s) {
@@ -282,6 +285,9 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.scope_frames_unread);
   next(s.ecg_first_lead);
   next(s.ecg_second_lead);
+  next(s.run_id);
+  next(s.two_publishers);
+  next(s.keys_expire_utc_ns);
 }
 
 void fill(Filler& next, perimap_SurfaceMesh& s) {

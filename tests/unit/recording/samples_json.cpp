@@ -78,7 +78,8 @@ json to_json(const perimap_Surface& s) {
           MEMBER(translation_WC_mm),
           MEMBER(rotation_WC_wxyz),
           MEMBER(camera_focal_px),
-          MEMBER(camera_principal_point_px)};
+          MEMBER(camera_principal_point_px),
+          MEMBER(run_id)};
 }
 template <>
 json to_json(const perimap_PhaseClock& s) {
@@ -143,7 +144,8 @@ json to_json(const perimap_SurfaceModel& s) {
           MEMBER(valid_from_ns),
           MEMBER(expected_until_ns),
           MEMBER(valid_until_ns),
-          MEMBER(cardiac_cycles)};
+          MEMBER(cardiac_cycles),
+          MEMBER(run_id)};
 }
 template <>
 json to_json(const perimap_SurfaceMesh& s) {
@@ -182,7 +184,8 @@ json to_json(const perimap_Phase& s) {
           MEMBER(last_r_peak_time_ns),
           MEMBER(predicted_r_peak_time_ns),
           MEMBER(predicted_r_peak_deviation_ns),
-          MEMBER(beats)};
+          MEMBER(beats),
+          MEMBER(run_id)};
 }
 template <>
 json to_json(const perimap_SourceStatus& s) {
@@ -280,7 +283,10 @@ json to_json(const perimap_Status& s) {
           MEMBER(scope_turns),
           MEMBER(scope_frames_unread),
           MEMBER(ecg_first_lead),
-          MEMBER(ecg_second_lead)};
+          MEMBER(ecg_second_lead),
+          MEMBER(run_id),
+          MEMBER(two_publishers),
+          MEMBER(keys_expire_utc_ns)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {

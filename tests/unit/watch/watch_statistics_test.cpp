@@ -190,5 +190,51 @@ TEST(WatchReport, TheLineTellsRateLossesStateAndReason) {
   EXPECT_THAT(line, HasSubstr("degraded (phase_free_running)"));
 }
 
+// One source, heard twice: from the fifth second on another writes under its name, 60 a second both.
+class TwoPublishers : public ::testing::Test {
+ protected:
+  void hear(std::uint8_t run, std::uint64_t writer, std::uint64_t sequence, Instant receipt) {
+    perimap_Surface sample = surface(sequence, "perimapd");
+    sample.run_id[0] = run;
+    sample.release_time_ns = to_ns(receipt - milliseconds(1));
+    sample.capture_time_ns = sample.release_time_ns - 50'000'000;
+    sample.valid_until_ns = sample.release_time_ns + 200'000'000;
+    statistics_.add(sample, receipt, writer);
+  }
+  [[nodiscard]] StreamReport totals() const { return statistics_.totals().at(0); }
+
+  WatchStatistics statistics_;
+  const Instant begin_{seconds(1000)};
+};
+
+TEST_F(TwoPublishers, AreToldAsSuchAndNotAsLossesAndRestarts) {
+  for (int i = 0; i < 300; ++i) hear(1, 11, static_cast<std::uint64_t>(i), begin_ + milliseconds(16 * i));
+  EXPECT_EQ(totals().hearing, client::Hearing::kUse);
+  EXPECT_EQ(totals().contested, 0U);
+  for (int i = 300; i < 600; ++i) {
+    hear(2, 22, static_cast<std::uint64_t>(14'000'000 + i), begin_ + milliseconds(16 * i + 4));
+    hear(1, 11, static_cast<std::uint64_t>(i), begin_ + milliseconds(16 * i + 8));
+  }
+  const StreamReport report = totals();
+  EXPECT_EQ(report.hearing, client::Hearing::kTwoPublishers);
+  EXPECT_EQ(report.received, 900U);
+  EXPECT_EQ(report.contested, 599U) << "all but the first of the second one, which may have been a restart";
+  EXPECT_LE(report.missing, 0U);
+  EXPECT_LE(report.restarts, 1U);
+  EXPECT_THAT(report_line(report), HasSubstr("TWO PUBLISHERS of this source: use neither"));
+  EXPECT_THAT(report_line(report), ::testing::Not(HasSubstr("phase")));
+  EXPECT_THAT(summary_text(report), HasSubstr("NOT TO BE USED: 599 surfaces"));
+  EXPECT_THAT(report_json(report, ReportKind::kSummary), HasSubstr("\"contested\":599,\"publishers\":\"two\""));
+}
+
+TEST_F(TwoPublishers, ARestartIsARestart) {
+  for (int i = 0; i < 300; ++i) hear(1, 11, static_cast<std::uint64_t>(i), begin_ + milliseconds(16 * i));
+  for (int i = 400; i < 700; ++i) hear(2, 22, static_cast<std::uint64_t>(i - 400), begin_ + milliseconds(16 * i));
+  EXPECT_EQ(totals().restarts, 1U);
+  EXPECT_EQ(totals().missing, 0U);
+  EXPECT_EQ(totals().contested, 0U);
+  EXPECT_EQ(totals().hearing, client::Hearing::kUse);
+}
+
 }  // namespace
 }  // namespace perimap

@@ -1,0 +1,68 @@
+// `perimap forget`: recordings and checkpoints that are older than they may be kept.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/command_line/commands.hpp"
+#include "daemon/retention/old_files.hpp"
+
+namespace perimap {
+namespace {
+
+struct ForgetOptions {
+  std::vector<std::string> folders;
+  std::string older_than;
+  bool dry = false;
+};
+
+Outcome forget(const ForgetOptions& options, const Console& console) {
+  const auto age = parse_age(options.older_than);
+  if (!age) return refuse(Error{"--older-than: " + age.error().message}, ExitCode::kWrongUsage);
+  std::size_t gone = 0;
+  std::uintmax_t bytes = 0;
+  bool failed = false;
+  for (const std::string& folder : options.folders) {
+    const auto found = old_files(folder, *age, std::filesystem::file_time_type::clock::now());
+    if (!found) {
+      console.complain(found.error());
+      failed = true;
+      continue;
+    }
+    for (const OldFile& file : *found) {
+      if (!options.dry) {
+        if (const auto removed = remove_old(file); !removed) {
+          console.complain(removed.error());
+          failed = true;
+          continue;
+        }
+      }
+      ++gone;
+      bytes += file.bytes;
+      fmt::print("{}{} ({:.1f} MB, {} days old)\n", options.dry ? "would remove " : "removed ", file.path.string(),
+                 static_cast<double>(file.bytes) / 1e6,
+                 std::chrono::duration_cast<std::chrono::days>(file.age).count());
+    }
+    if (!options.dry) synchronise_folder(folder);
+  }
+  fmt::print("{} files, {:.1f} MB{}\n", gone, static_cast<double>(bytes) / 1e6, options.dry ? " would be removed" : "");
+  if (failed) return refuse("");
+  return {};
+}
+
+}  // namespace
+
+void add_forget_command(Commands& commands) {
+  const auto options = std::make_shared<ForgetOptions>();
+  Command& command = commands.add(
+      "forget", "Removes recordings and checkpoints that have not been written for so long: what is known of patients",
+      [options](const Console& console) { return forget(*options, console); });
+  command.add_option("FOLDER", options->folders, "Where they are, as recording.folder has it; not the folders in it")
+      ->required();
+  command.add_option("--older-than", options->older_than, "As 30d (days), 12h (hours) or 8w (weeks)")->required();
+  command.add_flag("--dry-run", options->dry, "Only tell what would go");
+}
+
+}  // namespace perimap

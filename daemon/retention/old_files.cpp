@@ -1,0 +1,82 @@
+#include "daemon/retention/old_files.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+
+namespace perimap {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What the project's own files begin with: MCAP (mcap.dev/spec, magic), and a checkpoint.
+constexpr std::string_view kRecording("\x89MCAP0\r\n", 8);
+constexpr std::string_view kCheckpoint("PERIMAPC");
+
+bool is_of_patients(const fs::path& file) {
+  std::array<char, 8> begin{};
+  std::ifstream in(file, std::ios::binary);
+  if (!in.read(begin.data(), begin.size())) {
+    // Begun, and stopped before there was anything in it.
+    return in.gcount() == 0 && (file.extension() == ".mcap" || file.string().find(".mcap.part") != std::string::npos);
+  }
+  const std::string_view head(begin.data(), begin.size());
+  return head == kRecording || head == kCheckpoint;
+}
+
+}  // namespace
+
+Expected<std::chrono::seconds> parse_age(const std::string& text) {
+  constexpr long kMost = 100'000;
+  long count = 0;
+  const char* end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, count);
+  const std::string_view unit(rest, static_cast<std::size_t>(end - rest));
+  if (error == std::errc() && count > 0 && count <= kMost) {
+    if (unit == "h") return std::chrono::hours(count);
+    if (unit == "d") return std::chrono::days(count);
+    if (unit == "w") return std::chrono::weeks(count);
+  }
+  return fail(
+      fmt::format("expected a number of hours, days or weeks from 1 to {}, as 12h, 30d or 8w, got '{}'", kMost, text));
+}
+
+Expected<std::vector<OldFile>> old_files(const fs::path& folder, std::chrono::seconds age, fs::file_time_type now) {
+  std::error_code error;
+  std::vector<OldFile> found;
+  fs::directory_iterator entries(folder, error);
+  if (error) return fail(fmt::format("{}: cannot be read: {}", folder.string(), error.message()));
+  for (const fs::directory_entry& entry : entries) {
+    std::error_code ignored;
+    if (entry.is_symlink(ignored) || !entry.is_regular_file(ignored)) continue;
+    const auto written = entry.last_write_time(ignored);
+    if (ignored || now - written < age || !is_of_patients(entry.path())) continue;
+    found.push_back(
+        {entry.path(), std::chrono::duration_cast<std::chrono::seconds>(now - written), entry.file_size(ignored)});
+  }
+  std::sort(found.begin(), found.end(), [](const OldFile& a, const OldFile& b) { return a.age > b.age; });
+  return found;
+}
+
+Expected<void> remove_old(const OldFile& file) {
+  std::error_code error;
+  fs::remove(file.path, error);
+  if (error) return fail(fmt::format("{}: cannot be removed: {}", file.path.string(), error.message()));
+  return {};
+}
+
+void synchronise_folder(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  static_cast<void>(::fsync(descriptor));
+  ::close(descriptor);
+}
+
+}  // namespace perimap

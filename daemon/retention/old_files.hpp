@@ -1,0 +1,33 @@
+// Which files of a folder hold what is known of patients, and are older than they may be kept.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/error/expected.hpp"
+
+namespace perimap {
+
+struct OldFile {
+  std::filesystem::path path;
+  std::chrono::seconds age{0};  // since it was written last
+  std::uintmax_t bytes = 0;
+};
+
+// "30d", "12h", "8w". Error: what was expected.
+[[nodiscard]] Expected<std::chrono::seconds> parse_age(const std::string& text);
+
+// Recordings and checkpoints, told by what they begin with and not by their names, and what is left of one that was not
+// finished (.part), in this folder alone, oldest first. A link is not followed, and what is no regular file is left.
+[[nodiscard]] Expected<std::vector<OldFile>> old_files(const std::filesystem::path& folder, std::chrono::seconds age,
+                                                       std::filesystem::file_time_type now);
+
+[[nodiscard]] Expected<void> remove_old(const OldFile& file);
+
+// What the folder lists is on the disk: what was removed is gone, also when the machine stops right after.
+void synchronise_folder(const std::filesystem::path& folder);
+
+}  // namespace perimap

@@ -1,0 +1,231 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "perimap_publisher_watch.hpp"
+
+namespace perimap::client {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kPeriod = 16 * kMs;
+
+// What one program publishes.
+class Program {
+ public:
+  Program(std::uint8_t run, std::uint64_t writer) : writer_(writer) {
+    surface_.run_id[0] = run;
+    surface_.features = {1, 1, &feature_, false};
+  }
+
+  Hearing speak(PublisherWatch& watch, std::int64_t now_ns) {
+    ++surface_.sample_sequence;
+    surface_.capture_time_ns = now_ns - 50 * kMs;
+    surface_.release_time_ns = now_ns - kMs;
+    surface_.valid_until_ns = now_ns + 200 * kMs;
+    return watch.hear(surface_, writer_, now_ns);
+  }
+  // From `from` to `until`; the last answer.
+  Hearing speak_for(PublisherWatch& watch, std::int64_t from, std::int64_t until) {
+    Hearing heard = Hearing::kListening;
+    for (std::int64_t t = from; t <= until; t += kPeriod) heard = speak(watch, t);
+    return heard;
+  }
+  perimap_Surface& surface() { return surface_; }
+  perimap_SurfaceFeature& feature() { return feature_; }
+
+ private:
+  std::uint64_t writer_;
+  perimap_SurfaceFeature feature_{};
+  perimap_Surface surface_{};
+};
+
+class Watching : public ::testing::Test {
+ protected:
+  // A program that has been heard for five seconds, and is used.
+  Watching() { begun_ = a_.speak_for(watch_, 0, 5'000 * kMs); }
+
+  PublisherWatch watch_;
+  Program a_{1, 11};
+  Hearing begun_ = Hearing::kListening;
+  std::int64_t now_ = 5'000 * kMs;
+};
+
+TEST(PublisherWatchBegin, NothingIsUsedInTheFirstSecond) {
+  PublisherWatch watch;
+  Program a(1, 11);
+  for (std::int64_t t = 0; t < 1'000 * kMs; t += kPeriod) ASSERT_EQ(a.speak(watch, t), Hearing::kListening) << t;
+  EXPECT_EQ(a.speak(watch, 1'000 * kMs), Hearing::kUse);
+}
+
+TEST_F(Watching, OnePublisherIsUsed) {
+  EXPECT_EQ(begun_, Hearing::kUse);
+  EXPECT_EQ(watch_.state(now_), Hearing::kUse);
+}
+
+TEST_F(Watching, ARestartIsUsedOneSecondAfterTheRunBeforeWasHeardLast) {
+  Program again(2, 22);
+  EXPECT_EQ(again.speak(watch_, now_ + 400 * kMs), Hearing::kAnotherBegan);
+  EXPECT_EQ(again.speak_for(watch_, now_ + 416 * kMs, now_ + 960 * kMs), Hearing::kAnotherBegan);
+  EXPECT_EQ(again.speak(watch_, now_ + 1'010 * kMs), Hearing::kUse);
+}
+
+TEST_F(Watching, ARestartAfterALongSilenceIsUsedAtOnce) {
+  Program again(2, 22);
+  EXPECT_EQ(again.speak(watch_, now_ + 5'000 * kMs), Hearing::kUse);
+}
+
+// Whatever the second one copies: its own run, the run of the first, its sequence numbers.
+TEST_F(Watching, TwoPublishersAreToldWithinTwoSamplesAndNeitherIsUsedIn100Of100Tries) {
+  std::mt19937 random(std::random_device{}());
+  for (int trial = 0; trial < 100; ++trial) {
+    PublisherWatch watch;
+    Program a(1, 11);
+    ASSERT_EQ(a.speak_for(watch, 0, 2'000 * kMs), Hearing::kUse);
+    Program b(trial % 2 == 0 ? 7 : 1, 77);
+    b.surface().sample_sequence = trial % 4 < 2 ? a.surface().sample_sequence : 14'000'000;
+    const std::int64_t phase = static_cast<std::int64_t>(random() % kPeriod);
+    const std::int64_t period = kPeriod / 2 + static_cast<std::int64_t>(random() % (8 * kPeriod));
+    std::int64_t next_a = 2'000 * kMs + kPeriod;
+    std::int64_t next_b = next_a + phase;
+    int heard_since_b = -1;
+    int told_after = -1;
+    for (int i = 0; i < 500; ++i) {
+      const bool of_b = next_b < next_a;
+      const std::int64_t now = of_b ? next_b : next_a;
+      const Hearing heard = (of_b ? b : a).speak(watch, now);
+      (of_b ? next_b : next_a) += of_b ? period : kPeriod;
+      if (of_b && heard_since_b < 0) heard_since_b = 0;
+      if (heard_since_b < 0) continue;
+      ++heard_since_b;
+      ASSERT_NE(heard, Hearing::kUse) << "trial " << trial << ", sample " << heard_since_b << " since the second began";
+      if (heard == Hearing::kTwoPublishers && told_after < 0) told_after = heard_since_b;
+    }
+    EXPECT_GT(told_after, 0) << trial;
+    // Its own first one, those of its own that come before the first's next, and that.
+    EXPECT_LE(told_after, 2 + kPeriod / period) << trial;
+  }
+}
+
+TEST_F(Watching, OneThatGoesOnAloneIsUsedAfterASecond) {
+  Program b(2, 22);
+  for (int i = 1; i <= 100; ++i) {
+    EXPECT_NE(b.speak(watch_, now_ + i * kPeriod), Hearing::kUse);
+    EXPECT_NE(a_.speak(watch_, now_ + i * kPeriod + kMs), Hearing::kUse);
+  }
+  const std::int64_t since = now_ + 100 * kPeriod;
+  EXPECT_EQ(a_.speak_for(watch_, since + kPeriod, since + 990 * kMs), Hearing::kTwoPublishers);
+  EXPECT_EQ(a_.speak(watch_, since + 1'020 * kMs), Hearing::kUse);
+}
+
+TEST(PublisherWatchBegin, ASubscriberThatComesToTwoUsesNeitherFromTheBeginning) {
+  PublisherWatch watch;
+  Program a(1, 11);
+  Program b(2, 22);
+  for (int i = 0; i < 1000; ++i) {
+    ASSERT_NE(b.speak(watch, i * kPeriod), Hearing::kUse);
+    ASSERT_NE(a.speak(watch, i * kPeriod + 8 * kMs), Hearing::kUse);
+  }
+}
+
+TEST_F(Watching, OneThatSpeaksOnceASecondKeepsBothFromBeingUsed) {
+  Program b(2, 22);
+  int used = 0;
+  for (int i = 1; i < 600; ++i) {
+    used += a_.speak(watch_, now_ + i * kPeriod) == Hearing::kUse ? 1 : 0;
+    if (i % 60 != 1) continue;
+    EXPECT_NE(b.speak(watch_, now_ + i * kPeriod + kMs), Hearing::kUse);
+  }
+  EXPECT_LE(used, 1) << "the one before the second was heard";
+}
+
+TEST_F(Watching, SequenceJumpsAndStepsBackAreRefusedAndGapsOfAPauseAreNot) {
+  a_.surface().sample_sequence += 100;
+  EXPECT_EQ(a_.speak(watch_, now_ + 1'600 * kMs), Hearing::kUse) << "a pause of the reader";
+  a_.surface().sample_sequence += 14'000'000;
+  EXPECT_EQ(a_.speak(watch_, now_ + 1'616 * kMs), Hearing::kImplausible);
+  EXPECT_EQ(a_.speak_for(watch_, now_ + 1'632 * kMs, now_ + 2'600 * kMs), Hearing::kImplausible);
+  EXPECT_EQ(a_.speak(watch_, now_ + 2'630 * kMs), Hearing::kUse) << "it has gone on from there for a second";
+  a_.surface().sample_sequence -= 5;
+  EXPECT_EQ(a_.speak(watch_, now_ + 2'646 * kMs), Hearing::kImplausible);
+}
+
+TEST_F(Watching, TimeJumpsAreRefused) {
+  perimap_Surface& surface = a_.surface();
+  for (const std::int64_t jump :
+       {std::int64_t{6'000}, std::int64_t{-6'000}, std::int64_t{31'536'000'000}, std::int64_t{-9'223'372'036'854}}) {
+    PublisherWatch watch;
+    Program a(1, 1);
+    ASSERT_EQ(a.speak_for(watch, 0, 2'000 * kMs), Hearing::kUse);
+    surface = a.surface();
+    ++surface.sample_sequence;
+    surface.release_time_ns += jump * kMs;
+    surface.capture_time_ns = surface.release_time_ns - 1;
+    surface.valid_until_ns = surface.release_time_ns + 1;
+    EXPECT_EQ(watch.hear(surface, 1, 2'016 * kMs), Hearing::kImplausible) << jump;
+  }
+}
+
+TEST_F(Watching, FiguresThatAreNoNumbersAreRefused) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinite = std::numeric_limits<double>::infinity();
+  std::vector<double*> figures = {&a_.feature().position_W_mm[2], &a_.feature().velocity_W_mm_per_s[0],
+                                  &a_.feature().covariance_W_mm2[5], &a_.surface().cardiac_phase_rad};
+  std::int64_t t = now_;
+  for (double* figure : figures) {
+    for (const double wrong : {nan, infinite, -infinite}) {
+      ASSERT_EQ(a_.speak_for(watch_, t + kPeriod, t + 1'100 * kMs), Hearing::kUse);
+      t += 1'100 * kMs;
+      *figure = wrong;
+      EXPECT_EQ(a_.speak(watch_, t + kPeriod), Hearing::kImplausible);
+      *figure = 1.0;
+      t += kPeriod;
+    }
+  }
+}
+
+// Each topic has a writer of its own; the run is one.
+TEST_F(Watching, TheTopicsOfOneProgramAreOnePublisherAndAForgedModelIsNoticedBesideThem) {
+  perimap_SurfaceModel model{};
+  model.run_id[0] = 1;
+  perimap_Status status{};
+  status.run_id[0] = 1;
+  perimap_SurfaceMesh mesh{};
+  mesh.run_id[0] = 1;
+  const auto next = [&](std::int64_t now) {
+    ++model.sample_sequence;
+    ++status.sample_sequence;
+    ++mesh.sample_sequence;
+    model.time_ns = status.time_ns = mesh.time_ns = now;
+    model.valid_from_ns = now;
+    model.valid_until_ns = now + 1;
+  };
+  for (int i = 1; i < 50; ++i) {
+    const std::int64_t now = now_ + i * 10 * kMs;
+    next(now);
+    EXPECT_EQ(a_.speak(watch_, now), Hearing::kUse);
+    EXPECT_EQ(watch_.hear(model, 12, now), Hearing::kUse);
+    EXPECT_EQ(watch_.hear(status, 13, now), Hearing::kUse);
+    EXPECT_EQ(watch_.hear(mesh, 14, now), Hearing::kUse);
+  }
+  next(now_ + 500 * kMs);
+  perimap_SurfaceModel forged = model;
+  EXPECT_NE(watch_.hear(forged, 99, now_ + 500 * kMs), Hearing::kUse);
+  EXPECT_NE(watch_.hear(model, 12, now_ + 501 * kMs), Hearing::kUse);
+  EXPECT_EQ(watch_.state(now_ + 502 * kMs), Hearing::kTwoPublishers);
+}
+
+TEST(PublisherWatchWords, AreThereForEveryAnswer) {
+  for (const Hearing hearing :
+       {Hearing::kUse, Hearing::kListening, Hearing::kAnotherBegan, Hearing::kTwoPublishers, Hearing::kImplausible}) {
+    EXPECT_GT(std::string(describe(hearing)).size(), 8U);
+  }
+}
+
+}  // namespace
+}  // namespace perimap::client
