@@ -33,6 +33,8 @@ mount --rbind /dev "$root/system/dev"
 mount -t tmpfs tmpfs "$root/system/tmp"
 chmod 1777 "$root/system/tmp"
 cp "$package" "$recording" "$root/system/tmp"
+# Made by root, a recording is for root alone.
+chmod 644 "$root/system/tmp/$(basename "$recording")"
 inside() { chroot "$root/system" "$@"; }
 # What there is of perimap, dpkg's own notes left out.
 left() { (cd "$root/upper" && find . -path ./tmp -prune -o \( -path '*perimap*' ! -type c \) -print | grep -v -e var/lib/dpkg/ -e var/log/); }
