@@ -22,24 +22,15 @@ void FeatureIntake::adopt(std::uint64_t frame_index, int room) noexcept {
   for (const FoundFeature& found : finder_.adopt(frame_index)) {
     slot = std::find_if(slot, slots_.end(), [](const FeatureSlot& s) { return s.state == SlotState::kEmpty; });
     if (slot == slots_.end() || room-- <= 0) return;
-    slot->state = SlotState::kTracked;
-    slot->id = next_id_++;
-    slot->first_observed = found.first_observed;
-    slot->first_observed_px = found.first_observed_px;
-    slot->patch = found.patch;
-    slot->patch_state = found.patch_state;
-    slot->carried_px = found.patch_state.px;
-    slot->looks = found.looks;
-    slot->last_view.forget();
-    slot->velocity_px = found.velocity_px;
-    slot->last_found_frame = frame_index - 1;
-    slot->stale_matches = 0;
-    slot->refused_in_a_row = 0;
-    slot->held.clear();
-    slot->failed_starts = 0;
-    slot->converged = false;
-    slot->shed = false;
-    slot->in_view = true;
+    slot->follow({.id = next_id_++,
+                  .first_observed = found.first_observed,
+                  .first_observed_px = found.first_observed_px,
+                  .patch = found.patch,
+                  .patch_state = found.patch_state,
+                  .carried_px = found.patch_state.px,
+                  .looks = found.looks,
+                  .velocity_px = found.velocity_px,
+                  .last_found_frame = frame_index - 1});
   }
 }
 

@@ -76,7 +76,6 @@ class Step {
     // history or lost its phase is dealt with below.)
     const FrameRecord* last = job_.history->find(slot_.held[wanted - 1].frame_index);
     if (last != nullptr && last->measurable && !last->phase.exact) return LifeEvent::kNone;
-    slot_.forgotten = false;
     return request_start();
   }
 
@@ -107,21 +106,12 @@ class Step {
       slot_.state = SlotState::kTracked;
       return LifeEvent::kStartFailed;
     }
-    if (const FrameRecord* last = job_.history->find(slot_.held[used - 1].frame_index)) {
-      slot_.last_observed = last->stamp.capture;
-    }
     slot_.held.drop(used);
     bank_.set(feature_, slot_.start.outcome.estimate);
     // It is not worth what its covariance says: what is seen from now on shall win.
     if (slot_.start.outcome.contradicted()) bank_.diffuse(feature_, kInflation_mm);
-    slot_.last_learnt = slot_.last_observed;
-    slot_.health.reset();
-    slot_.updates = 0;
-    slot_.refused_in_a_row = 0;
-    slot_.follows_something_else = false;
-    slot_.unseen_frames = 0;
-    slot_.recalled_converged = false;
-    slot_.state = SlotState::kMapped;
+    const Instant last = slot_.start.captures[used - 1];
+    slot_.map({.last_observed = last, .last_learnt = last});
     check_convergence();
     return LifeEvent::kNone;
   }
@@ -167,7 +157,7 @@ class Step {
   }
 
   LifeEvent give_up(LifeEvent why) noexcept {
-    slot_.state = SlotState::kEmpty;
+    slot_.clear();
     bank_.clear(feature_);
     return why;
   }
@@ -175,10 +165,7 @@ class Step {
   // The estimate explains nothing any more: gather the observations of a new start. The feature keeps its patch and its
   // id.
   LifeEvent start_anew() noexcept {
-    slot_.state = SlotState::kTracked;
-    slot_.held.clear();
-    slot_.failed_starts = 0;
-    slot_.converged = false;
+    slot_.gather_anew();
     bank_.clear(feature_);
     return LifeEvent::kStartedAnew;
   }

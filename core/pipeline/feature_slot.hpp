@@ -114,8 +114,8 @@ struct BatchStartExchange {
   bool due = false;  // the mapper has seen it ready at the frame of its adoption, or later
 };
 
-struct FeatureSlot {
-  SlotState state = SlotState::kEmpty;
+// A feature as it is followed in the images. Another one is another value.
+struct FollowedFeature {
   std::uint32_t id = 0;
   Instant first_observed;
   Vector2d first_observed_px = Vector2d::Zero();
@@ -123,42 +123,77 @@ struct FeatureSlot {
   bool shed = false;    // not looked for, so that the frame's time suffices for the others; see LoadShedding
   bool in_view = true;  // the map has it in the image, when it could tell last
 
-  // following
-  PatchTemplate patch;
-  PatchState patch_state;          // when it was found last
-  PatchState seen;                 // of this frame's match, until that is believed
+  PatchTemplate patch{};
+  PatchState patch_state{};        // when it was found last
+  PatchState seen{};               // of this frame's match, until that is believed
   bool seen_by_last_view = false;  // likewise: the first view fits nowhere
-  LastView last_view;
+  LastView last_view{};
   Vector2d carried_px = Vector2d::Zero();  // patch_state.px, moved since then with the features around it
-  PatchContinuity looks;
+  PatchContinuity looks{};
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   std::uint64_t last_found_frame = 0;
-  std::uint64_t unseen_frames = 0;      // since then, in which it could have been searched for where the map has it
-  std::uint64_t stale_matches = 0;      // in a row, of a template that fits the view badly
-  std::uint64_t refused_in_a_row = 0;   // found, but at learning the estimate's gate said no
-  bool follows_something_else = false;  // refused so often that the patch must be let go
-  PatchMatch match;                     // of this frame
-  bool match_agrees = false;            // it lies where the map predicted it
-  bool is_scout = false;                // of this frame: see scouts.hpp
-  Vector2d off_px = Vector2d::Zero();   // the last match of stage A, from where map and tracker have it
-  double pose_deviation_px = 0.0;       // largest, of what pose and model add to that prediction; 0 without a map
+  std::uint64_t stale_matches = 0;     // in a row, of a template that fits the view badly
+  PatchMatch match{};                  // of this frame
+  bool match_agrees = false;           // it lies where the map predicted it
+  bool is_scout = false;               // of this frame: see scouts.hpp
+  Vector2d off_px = Vector2d::Zero();  // the last match of stage A, from where map and tracker have it
+  double pose_deviation_px = 0.0;      // largest, of what pose and model add to that prediction; 0 without a map
+};
 
-  // learning
-  HeldMatches held;
+// What waits to be learnt from; and what came of it as long as there is no estimate.
+struct GatheredMatches {
+  HeldMatches held{};
   int failed_starts = 0;
-  bool forgotten = false;  // while starting: to be emptied when housekeeping has given it back
-  BatchStartExchange start;
-  FeatureHealth health;
+};
+
+// What is known of a feature's estimate. Another estimate is another value.
+struct MappedFeature {
+  FeatureHealth health{};
+  Instant last_observed;         // found where the map has it
   Instant last_learnt;           // capture time of the last update, for process noise
   double last_learnt_rad = 0.0;  // its phase
   int updates = 0;
-  // What a slow error of the tracker adds to the estimate's covariance; null where that error is white. Belongs to
-  // housekeeping while the batch start is under way, which begins it.
-  std::unique_ptr<CorrelatedPoseNoise> slow_error;
   double largest_deviation_mm = 0.0;
   bool converged = false;
-  bool recalled_converged = false;  // it was before a restart: believed until the innovations tell
-  Instant last_observed;
+  bool recalled_converged = false;      // it was before a restart: believed until the innovations tell
+  std::uint64_t unseen_frames = 0;      // since it was found, in which it could have been searched for
+  std::uint64_t refused_in_a_row = 0;   // matches, found, but at learning the estimate's gate said no
+  bool follows_something_else = false;  // refused so often that the patch must be let go
+};
+
+// What a slot knows of its feature is in the three values, and the slot passes from one state to the next by assigning
+// them whole: what one of them comes to hold later can not be left behind by the feature before.
+struct FeatureSlot : FollowedFeature, GatheredMatches, MappedFeature {
+  SlotState state = SlotState::kEmpty;
+  bool forgotten = false;  // while starting: to be emptied when housekeeping has given the start back
+
+  // These two are housekeeping's while the batch start is under way, and no part of what is assigned.
+  BatchStartExchange start;
+  // What a slow error of the tracker adds to the estimate's covariance; null where that error is white. The batch start
+  // begins it.
+  std::unique_ptr<CorrelatedPoseNoise> slow_error;
+
+  // Not while a batch start is under way.
+  void clear() noexcept {
+    follow({});
+    state = SlotState::kEmpty;
+  }
+  void follow(const FollowedFeature& feature) noexcept {
+    static_cast<FollowedFeature&>(*this) = feature;
+    gather_anew();
+    forgotten = false;
+  }
+  // The feature is followed on, and of its estimate and what that was learnt from nothing is kept.
+  void gather_anew() noexcept {
+    static_cast<GatheredMatches&>(*this) = {};
+    static_cast<MappedFeature&>(*this) = {};
+    state = SlotState::kTracked;
+  }
+  // The bank has an estimate of it.
+  void map(const MappedFeature& feature) noexcept {
+    static_cast<MappedFeature&>(*this) = feature;
+    state = SlotState::kMapped;
+  }
 };
 
 }  // namespace perimap

@@ -116,10 +116,7 @@ std::size_t LoadShedding::apply(int limit) noexcept {
   std::size_t shed = 0;
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     FeatureSlot& slot = slots_[i];
-    if (slot.state == SlotState::kEmpty) {
-      slot.shed = false;
-      continue;
-    }
+    if (slot.state == SlotState::kEmpty) continue;
     order_.push_back({&slot, &watches_[i], sight_of(slot, watches_[i])});
     shed += slot.shed ? 1 : 0;
   }

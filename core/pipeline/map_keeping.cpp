@@ -55,22 +55,20 @@ std::uint32_t MapKeeping::recall(std::span<const FeatureMemory> features, const 
 }
 
 void MapKeeping::recall(FeatureSlot& slot, const FeatureMemory& feature) noexcept {
-  slot.state = SlotState::kMapped;
-  slot.id = feature.id;
-  slot.first_observed = feature.first_observed;
-  slot.first_observed_px = feature.first_observed_px;
-  slot.last_observed = feature.last_observed;
-  slot.last_learnt = feature.last_observed;
-  slot.patch = feature.patch;
-  slot.patch_state = feature.patch_state;
-  slot.carried_px = feature.patch_state.px;
-  slot.last_view.forget();
-  // So that the map alone tells where to look.
-  slot.last_found_frame = std::uint64_t{0} - kFramesLongAgo;
-  slot.updates = feature.updates;
-  slot.converged = feature.converged;
-  slot.recalled_converged = feature.converged;
-  slot.largest_deviation_mm = feature.largest_deviation_mm;
+  slot.follow({.id = feature.id,
+               .first_observed = feature.first_observed,
+               .first_observed_px = feature.first_observed_px,
+               .patch = feature.patch,
+               .patch_state = feature.patch_state,
+               .carried_px = feature.patch_state.px,
+               // So that the map alone tells where to look.
+               .last_found_frame = std::uint64_t{0} - kFramesLongAgo});
+  slot.map({.last_observed = feature.last_observed,
+            .last_learnt = feature.last_observed,
+            .updates = feature.updates,
+            .largest_deviation_mm = feature.largest_deviation_mm,
+            .converged = feature.converged,
+            .recalled_converged = feature.converged});
 }
 
 void MapKeeping::forget() noexcept {
@@ -79,7 +77,7 @@ void MapKeeping::forget() noexcept {
     if (slot.state == SlotState::kStarting) {
       slot.forgotten = true;
     } else if (slot.state != SlotState::kEmpty) {
-      slot.state = SlotState::kEmpty;
+      slot.clear();
       bank_.clear(static_cast<int>(index));
     }
   }

@@ -29,12 +29,9 @@ void SurfaceKeeper::on_frame(const FrameRecord& frame, PhaseLaw law, double setu
     asked_ = !maker_.adopt();
     if (asked_ && due) counters_.adoptions_late.add();
   }
-  if (frame.pose.valid()) {
-    cameras_ = std::min(cameras_ + 1, frame.rate.frames(kCameraMemory));
-    camera_W_mm_ += (frame.pose.X_WC.t - camera_W_mm_) / static_cast<double>(cameras_);
-  }
+  if (frame.pose.valid()) camera_.add(frame.pose.X_WC.t, frame.rate.frames(kCameraMemory));
   gather(frame);
-  if (frame.index >= next_request_at_ && fresh_ >= slots_.size() && cameras_ > 0)
+  if (frame.index >= next_request_at_ && fresh_ >= slots_.size() && camera_.frames > 0)
     request(frame, law, setup_variance_mm2);
 }
 
@@ -67,7 +64,7 @@ void SurfaceKeeper::request(const FrameRecord& frame, PhaseLaw law, double setup
       job->evidence.push_back(gathered.evidence);
     }
   }
-  job->camera_W_mm = camera_W_mm_;
+  job->camera_W_mm = camera_.W_mm;
   job->law = law;
   job->anew = std::exchange(anew_, false);
   job->setup_variance_mm2 = setup_variance_mm2;
@@ -83,13 +80,13 @@ void SurfaceKeeper::request(const FrameRecord& frame, PhaseLaw law, double setup
 void SurfaceKeeper::begin_again() noexcept {
   maker_.withdraw();
   anew_ = true;
-  for (Gathered& gathered : gathered_) gathered.usable = false;
+  std::fill(gathered_.begin(), gathered_.end(), Gathered());
   fresh_ = 0;
 }
 
 void SurfaceKeeper::forget() noexcept {
   begin_again();
-  cameras_ = 0;
+  camera_ = MeanCamera();
 }
 
 }  // namespace perimap

@@ -1,6 +1,7 @@
 // The mapper's part of the surface: gathers what it is made of, a few features a frame, asks for it, and adopts it.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -30,10 +31,21 @@ class SurfaceKeeper {
   void forget() noexcept;
 
  private:
+  // Of one feature.
   struct Gathered {
     bool usable = false;
     Instant last_observed;
     SurfaceEvidence evidence;
+  };
+  // Where the features were seen from.
+  struct MeanCamera {
+    Vector3d W_mm = Vector3d::Zero();
+    std::uint64_t frames = 0;  // that it is the mean of, up to its memory
+
+    void add(const Vector3d& centre_W_mm, std::uint64_t memory_frames) noexcept {
+      frames = std::min(frames + 1, memory_frames);
+      W_mm += (centre_W_mm - W_mm) / static_cast<double>(frames);
+    }
   };
 
   void gather(const FrameRecord& frame) noexcept;
@@ -49,8 +61,7 @@ class SurfaceKeeper {
   FeatureEstimate estimate_;
   std::size_t next_slot_ = 0;
   std::size_t fresh_ = 0;  // slots that were gathered since the last request
-  Vector3d camera_W_mm_ = Vector3d::Zero();
-  std::uint64_t cameras_ = 0;  // that the mean is of, up to its memory
+  MeanCamera camera_;
   std::uint64_t next_request_at_ = 0;
   std::uint64_t adopt_at_ = 0;
   bool asked_ = false;

@@ -186,6 +186,7 @@ class Learner {
       std::uint32_t used = 0;
       while (used < slot.held.size() && slot.held[used].frame_index <= last) ++used;
       slot.start.count = static_cast<int>(used);
+      if (used > 0) slot.start.captures[used - 1] = history_->find(last)->stamp.capture;
       slot.start.outcome = theirs.start.outcome;
       slot.start.adopt_at_frame = theirs.start.adopt_at_frame;
       slot.start.due = true;

@@ -203,6 +203,44 @@ TEST_F(Keeping, TheReaderIsNotHurried) {
   EXPECT_EQ(feed().entries[0].slot, MapFeed::kSlotsABatch);
 }
 
+TEST_F(Keeping, AFeatureHasNothingOfTheOneThatTheSlotHadBefore) {
+  static_cast<void>(keeping->recall(features(kSlots), *breathing));
+  FeatureSlot& slot = slots[4];
+  slot.shed = slot.seen_by_last_view = slot.is_scout = slot.match_agrees = slot.follows_something_else = true;
+  slot.in_view = false;
+  slot.velocity_px = slot.off_px = Vector2d(3.0, 4.0);
+  slot.pose_deviation_px = slot.last_learnt_rad = 5.0;
+  slot.stale_matches = slot.refused_in_a_row = slot.unseen_frames = 6;
+  slot.failed_starts = 2;
+  slot.held.push({});
+  static_cast<void>(slot.health.add(9.0, true));
+  keeping->forget();
+  slot.follow({.id = 77});
+  const FeatureSlot fresh;
+  EXPECT_EQ(slot.state, SlotState::kTracked);
+  EXPECT_EQ(slot.id, 77U);
+  EXPECT_EQ(slot.first_observed, fresh.first_observed);
+  EXPECT_EQ(slot.first_observed_px, fresh.first_observed_px);
+  EXPECT_FALSE(slot.shed || slot.seen_by_last_view || slot.is_scout || slot.match_agrees ||
+               slot.follows_something_else || slot.converged || slot.recalled_converged);
+  EXPECT_TRUE(slot.in_view);
+  EXPECT_EQ(slot.patch.levels[0].mean, fresh.patch.levels[0].mean);
+  EXPECT_EQ(slot.patch_state.px, fresh.patch_state.px);
+  EXPECT_EQ(slot.carried_px, fresh.carried_px);
+  EXPECT_EQ(slot.velocity_px, fresh.velocity_px);
+  EXPECT_EQ(slot.off_px, fresh.off_px);
+  EXPECT_EQ(slot.pose_deviation_px, fresh.pose_deviation_px);
+  EXPECT_EQ(slot.last_found_frame, fresh.last_found_frame);
+  EXPECT_EQ(slot.stale_matches + slot.refused_in_a_row + slot.unseen_frames, 0U);
+  EXPECT_EQ(slot.held.size(), 0U);
+  EXPECT_EQ(slot.failed_starts + slot.updates, 0);
+  EXPECT_EQ(slot.health.monitor().count(), fresh.health.monitor().count());
+  EXPECT_EQ(slot.last_observed, fresh.last_observed);
+  EXPECT_EQ(slot.last_learnt, fresh.last_learnt);
+  EXPECT_EQ(slot.last_learnt_rad, fresh.last_learnt_rad);
+  EXPECT_EQ(slot.largest_deviation_mm, fresh.largest_deviation_mm);
+}
+
 TEST_F(Keeping, WhatIsForgottenIsGoneButForStartsThatAreUnderWay) {
   static_cast<void>(keeping->recall(features(kSlots), *breathing));
   slots[5].state = SlotState::kStarting;
