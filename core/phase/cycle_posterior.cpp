@@ -129,13 +129,13 @@ void CyclePosterior::begin_grid() noexcept {
       candidate(i, j) = {-0.5 * (b * b + l * l), 0.0};
     }
   }
-  for (std::uint64_t k = oldest_kept(); k < kept_count_; ++k) {
-    if (kept_[k % kKept].time >= r_peak_) weigh(kept_[k % kKept]);
+  for (std::size_t k = 0; k < kept_.size(); ++k) {
+    if (kept_[k].time >= r_peak_) weigh(kept_[k]);
   }
 }
 
 void CyclePosterior::add(const ObservedPhase& observed) noexcept {
-  kept_[kept_count_++ % kKept] = observed;
+  kept_.add(observed);
   any_observed_ = true;
   last_observed_ = observed.time;
   contradicted_ = false;
@@ -173,8 +173,8 @@ CyclePhase CyclePosterior::phase_of(Instant t, double begin_s, double length_s, 
 double CyclePosterior::contradiction_s(double begin_s, double length_s,
                                        const CycleCorrection& correction) const noexcept {
   if (contradicted_) return kContradicted_s;
-  if (kept_count_ == 0) return 0.0;
-  const ObservedPhase& newest = kept_[(kept_count_ - 1) % kKept];
+  if (kept_.size() == 0) return 0.0;
+  const ObservedPhase& newest = kept_.newest();
   if (newest.time < r_peak_) return 0.0;
   const double next_s = correction.next_length > Duration::zero() ? to_seconds(correction.next_length) : next_length_s_;
   const CyclePhase phase = phase_of(newest.time, begin_s, length_s, next_s);
@@ -333,8 +333,8 @@ void CyclePosterior::correct_next(double begin_s, double length_s, double end_va
   const Instant end = r_peak_ + from_seconds(begin_s + length_s);
   double log_weights[kLengths] = {};
   bool any = false;
-  for (std::uint64_t k = kept_count_; k > oldest_kept() && kept_[(k - 1) % kKept].time > end; --k) {
-    const ObservedPhase& observed = kept_[(k - 1) % kKept];
+  for (std::size_t k = kept_.size(); k > 0 && kept_[k - 1].time > end; --k) {
+    const ObservedPhase& observed = kept_[k - 1];
     any = true;
     for (int j = 0; j < kLengths; ++j) {
       const double next = next_length_s_ + length_deviation_s_ * step_of(j, kLengths, kLengthSpan);

@@ -40,12 +40,14 @@
 
 #include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cycle_correction.hpp"
 #include "core/phase/end_trust.hpp"
+#include "core/phase/kept_phases.hpp"
 #include "core/phase/observed_phase.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/time/instant.hpp"
@@ -74,7 +76,7 @@ class CyclePosterior {
  private:
   static constexpr int kLengths = 81;
   static constexpr int kBeginnings = 7;
-  static constexpr int kKept = 128;  // observations: two seconds at 60 frames/s
+  static constexpr std::size_t kKept = 128;  // observations: of 1.8 s at least, and a beat may be told 0.95 s late
 
   struct Candidate {
     double log_likelihood = 0.0;
@@ -115,7 +117,6 @@ class CyclePosterior {
                     CycleCorrection& correction) const noexcept;
   [[nodiscard]] double begin_s(int i) const noexcept;  // after the R peak of the ECG
   [[nodiscard]] double length_s(int j) const noexcept;
-  [[nodiscard]] std::uint64_t oldest_kept() const noexcept { return kept_count_ > kKept ? kept_count_ - kKept : 0; }
   [[nodiscard]] EndTrust& trust() noexcept { return trust_[index_of(law_.law)]; }
   [[nodiscard]] const EndTrust& trust() const noexcept { return trust_[index_of(law_.law)]; }
   // Of the end of the running cycle by the ECG alone.
@@ -148,8 +149,7 @@ class CyclePosterior {
   Instant seen_until_;                               // the newest instant observed in the running cycle
   std::array<EndTrust, kPhaseLaws.size()> trust_{};  // under each law
   std::array<Candidate, kLengths * kBeginnings> grid_{};
-  std::array<ObservedPhase, kKept> kept_{};
-  std::uint64_t kept_count_ = 0;
+  KeptPhases<kKept> kept_;
 };
 
 }  // namespace perimap

@@ -110,9 +110,8 @@ void LawChoice::scale(Seconds usual) noexcept {
 void LawChoice::weigh(const CardiacCycle& cycle) noexcept {
   int seen = 0;
   std::array<double, kLaws> squares{};
-  const std::uint64_t oldest = kept_count_ > kKept ? kept_count_ - kKept : 0;
-  for (std::uint64_t k = oldest; k < kept_count_; ++k) {
-    const ObservedPhase& observed = kept_[k % kKept];
+  for (std::size_t k = 0; k < kept_.size(); ++k) {
+    const ObservedPhase& observed = kept_[k];
     if (observed.time < cycle.begin || observed.time >= cycle.begin + cycle.length) continue;
     if (!(observed.deviation_rad > 0.0)) continue;
     if (seen++ == 0) {

@@ -18,10 +18,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "core/phase/cardiac_clock.hpp"
+#include "core/phase/kept_phases.hpp"
 #include "core/phase/law_memory.hpp"
 #include "core/phase/law_trial.hpp"
 #include "core/phase/observed_phase.hpp"
@@ -39,7 +41,7 @@ class LawChoice {
   static constexpr std::size_t kFewestTrials = 8;
 
   // In order of time.
-  void add(const ObservedPhase& observed) noexcept { kept_[kept_count_++ % kKept] = observed; }
+  void add(const ObservedPhase& observed) noexcept { kept_.add(observed); }
   // A beat has become known: what was seen in the cycle before it is weighed, unless that one teaches nothing. True
   // when another law is taken.
   bool on_beat(const CardiacClock& clock) noexcept;
@@ -64,7 +66,7 @@ class LawChoice {
   static constexpr std::uint64_t kCyclesForScale = 6;
   static constexpr std::uint64_t kRhythmicCyclesForScale = 2;  // or so many that no premature beat cut short
   static constexpr std::uint64_t kLengths = 12;                // the last ones, whose mean is the usual one
-  static constexpr std::uint64_t kKept = 256;
+  static constexpr std::size_t kKept = 256;  // observations: of 3.6 s at least, more than the slowest heart's cycle
 
   struct Part {
     double weight = 0.0;
@@ -91,8 +93,7 @@ class LawChoice {
   std::array<double, kLaws> log_likelihoods_{};
   std::array<double, kLaws> trial_log_likelihoods_{};  // and an earlier run's; fading likewise, whatever the scale
   Instant tried_until_;
-  std::array<ObservedPhase, kKept> kept_{};
-  std::uint64_t kept_count_ = 0;
+  KeptPhases<kKept> kept_;
 };
 
 }  // namespace perimap

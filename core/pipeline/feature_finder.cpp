@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/geometry/symmetric_matrix2.hpp"
+#include "core/pipeline/unmapped_motion.hpp"
 #include "core/realtime/realtime_scope.hpp"
 #include "core/vision/feature_detector.hpp"
 #include "core/vision/instrument_mask.hpp"
@@ -16,8 +17,6 @@
 namespace perimap {
 namespace {
 
-// As wide as the search for a feature that has no map yet.
-constexpr double kMotion_px_per_s = 300.0;
 constexpr Duration kTakenEvery = std::chrono::microseconds(33333);
 
 // Not all that is found lives through the round, least of all where the heart moves fastest; what is over is let go.
@@ -211,7 +210,7 @@ bool FeatureFinder::add_corners(const Frame& frame, const DetectorSettings& dete
 
 // As later in its life: by its first view, or as it looked in the frame before.
 PatchMatch FeatureFinder::find_candidate(FoundFeature& feature, const Frame& frame, const Frame& before) noexcept {
-  const double deviation_px = kMotion_px_per_s * stride_s_;
+  const double deviation_px = kUnmappedMotion_px_per_s * stride_s_;
   const Matrix2d covariance = deviation_px * deviation_px * Matrix2d::Identity();
   const PatchState last = feature.patch_state;
   const Vector2d predicted_px = last.px + feature.velocity_px;

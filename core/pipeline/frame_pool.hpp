@@ -1,7 +1,9 @@
 // Camera frames on their way from the camera thread to the mapper.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -36,9 +38,15 @@ class FramePool {
         in_use_(std::make_unique<std::atomic<bool>[]>(static_cast<std::size_t>(buffers))),
         buffers_(buffers) {}
 
-  // Camera thread: a free buffer, or -1.
-  [[nodiscard]] int acquire() noexcept {
-    for (int i = 0; i < buffers_; ++i) {
+  // Of one buffer.
+  [[nodiscard]] static std::size_t bytes(int width, int height) noexcept {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height) +
+           reduced_row_bytes(width) * static_cast<std::size_t>(reduced_side(height));
+  }
+
+  // Camera thread: a free buffer of the first so many, or -1.
+  [[nodiscard]] int acquire(int most) noexcept {
+    for (int i = 0; i < std::min(most, buffers_); ++i) {
       auto& in_use = in_use_[static_cast<std::size_t>(i)];
       // Acquire: the consumer's reads of the old pixels happen before the camera overwrites them (pairs with
       // give_back).

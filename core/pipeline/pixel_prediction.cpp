@@ -4,13 +4,10 @@
 
 #include "core/geometry/symmetric_matrix2.hpp"
 #include "core/pipeline/pose_noise.hpp"
+#include "core/pipeline/unmapped_motion.hpp"
 
 namespace perimap {
 namespace {
-
-// Image motion changes by about this much from frame to frame where no map predicts it (systole begins at up to
-// 750 px/s at 640x480).
-constexpr double kUnmappedMotion_px_per_s = 300.0;
 
 // One pixel more on each axis: what the model does not know about the tissue.
 Matrix2d of_the_model() noexcept { return Matrix2d::Identity(); }

@@ -14,9 +14,8 @@ namespace {
 constexpr Duration kReadEvery = std::chrono::milliseconds(250);
 constexpr Duration kLookedEvery = std::chrono::seconds(1);
 constexpr Duration kAdoptedAfter = std::chrono::milliseconds(200);
-// Two seconds of pictures without a circle: the frames' own readings, which go by the last one, are not believed
-// longer.
-constexpr int kFailuresBorne = 8;
+// Without a circle in the pictures: the frames' own readings, which go by the last one, are not believed longer.
+constexpr Duration kFailuresBorne = std::chrono::seconds(2);
 
 std::uint64_t microradians(double rotation_rad) noexcept {
   const double turn_rad = rotation_rad < 0.0 ? rotation_rad + kTwoPi : rotation_rad;
@@ -109,7 +108,7 @@ std::optional<std::uint64_t> ScopeWatch::take(const std::optional<FieldStopReadi
     return std::nullopt;
   }
   if (!reading) {
-    if (failed_ >= kFailuresBorne) turn_->give_up();
+    if (failed_ >= kFailuresBorne / kReadEvery) turn_->give_up();
     return std::nullopt;
   }
   const std::uint64_t agreed_before = agreed_at_;

@@ -1,5 +1,8 @@
 #include "core/pipeline/sensor_entrance.hpp"
 
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
 #include <cstring>
 
 #include "core/pipeline/hear_breath.hpp"
@@ -8,8 +11,18 @@
 namespace perimap {
 namespace {
 
-// A quarter of a second at 30 frames/s, and the last frame that was mapped.
-constexpr int kFrameBuffers = 9;
+// A mapper that is held up for so long loses no frame. Held up longer, it is to go on with what is new: frames that
+// wait make all updates late.
+constexpr Duration kFramesWait = std::chrono::milliseconds(267);
+// As many frames as that is at the fastest rate that the frame history keeps pace with, and the last one that was
+// mapped; of pictures that are too large, as many as have room.
+constexpr double kFastest_per_s = 280.0;
+constexpr std::size_t kFrameMemory = std::size_t{64} << 20;  // bytes
+int frames_that_wait(const FrameRate& rate) noexcept { return static_cast<int>(rate.frames(kFramesWait)) + 1; }
+int frame_buffers(int width, int height) noexcept {
+  const auto room = static_cast<int>(kFrameMemory / std::max<std::size_t>(FramePool::bytes(width, height), 1));
+  return std::clamp(room, frames_that_wait(FrameRate()), frames_that_wait(FrameRate(kFastest_per_s)));
+}
 // More than a minute at 60 frames/s: what a publisher that was held up has to know.
 constexpr std::size_t kStampRing = 4096;
 constexpr std::size_t kPoseRing = 256;  // more than a second of a fast tracker
@@ -19,8 +32,8 @@ constexpr std::size_t kPoseRing = 256;  // more than a second of a fast tracker
 SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& ecg,
                                const BreathDetectorSettings& breath, PipelineCounters& counters)
     : counters_(counters),
-      pool_(width, height, kFrameBuffers),
-      mapper_frames_(kFrameBuffers),
+      pool_(width, height, frame_buffers(width, height)),
+      mapper_frames_(static_cast<std::size_t>(frame_buffers(width, height))),
       publisher_stamps_(kStampRing),
       poses_(kPoseRing),
       second_poses_(kPoseRing),
@@ -43,6 +56,7 @@ bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image,
   }
   any_frame_ = true;
   last_sequence_ = stamp.sequence;
+  frame_rate_.add(stamp.capture);
   // The release is owed even when the pixels find no place, so the stamps go first.
   const bool told = publisher_stamps_.push(stamp);
   if (told) publisher_wakeup_.post();
@@ -53,7 +67,8 @@ bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image,
 }
 
 bool SensorEntrance::store(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour) noexcept {
-  const int buffer = image.width == pool_.width() && image.height == pool_.height() ? pool_.acquire() : -1;
+  const bool fits = image.width == pool_.width() && image.height == pool_.height();
+  const int buffer = fits ? pool_.acquire(frames_that_wait(frame_rate_.rate())) : -1;
   if (buffer < 0) return false;
   const auto width = static_cast<std::size_t>(image.width);
   for (int y = 0; y < image.height; ++y) {

@@ -16,6 +16,7 @@
 #include "core/sensors/ecg_block.hpp"
 #include "core/sensors/frame_stamp.hpp"
 #include "core/sensors/grey_image.hpp"
+#include "core/sensors/measured_frame_rate.hpp"
 #include "core/sensors/r_trigger_pulse.hpp"
 #include "core/sensors/respiration_block.hpp"
 #include "core/sensors/tracker_sample.hpp"
@@ -94,6 +95,7 @@ class SensorEntrance {
   BreathDetector breath_;
   std::atomic<bool> forget_breath_asked_{false};  // relaxed: a message by itself
   TripleBuffer<BreathSignal> breath_cell_;
+  MeasuredFrameRate frame_rate_;
   bool any_frame_ = false;
   std::uint64_t last_sequence_ = 0;
   bool any_pose_ = false;

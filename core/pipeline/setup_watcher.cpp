@@ -17,8 +17,9 @@ constexpr Duration kRoundEvery = std::chrono::seconds(3);
 constexpr Duration kRoundTakes = std::chrono::milliseconds(700);
 // Where there is too little for a round yet, until it is looked for again.
 constexpr Duration kLookAgain = std::chrono::milliseconds(300);
-// Of told frames, before the first round.
-constexpr std::size_t kFewestFrames = 80;
+// What follows is evidence, and counted: equations against unknowns. The window takes a frame in 50 ms, so that it is
+// the same at every frame rate from 20 on.
+constexpr std::size_t kFewestFrames = 80;  // told ones, before a round
 constexpr std::size_t kFewestFeatures = 6;
 // A feature's, of those in the window; below, its own motion takes up what it tells.
 constexpr std::size_t kFewestMatches = 40;

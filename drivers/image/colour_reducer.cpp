@@ -94,7 +94,8 @@ void ColourReducer::reserve(int width, int height) {
 
 void ColourReducer::reduce_colour(const CameraFrame& frame) {
   picture_ = {};
-  if (any_ && ++passed_over_ < interval_) return;
+  rate_.add(frame.stamp.capture);
+  if (any_ && ++passed_over_ < rate_.rate().frames(interval_)) return;
   any_ = true;
   passed_over_ = 0;
   if (!reduce(frame)) return;

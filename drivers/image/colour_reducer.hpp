@@ -1,10 +1,13 @@
 // A frame's colour, as coarse as it is enough to tell instruments from tissue.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <vector>
 
 #include "core/sensors/colour_image.hpp"
+#include "core/sensors/measured_frame_rate.hpp"
+#include "core/time/instant.hpp"
 #include "drivers/image/camera_frame.hpp"
 #include "drivers/image/jpeg_decoder.hpp"
 
@@ -12,10 +15,10 @@ namespace perimap {
 
 class ColourReducer {
  public:
-  // Of every so manieth frame, beginning with the first: an instrument moves slowly, and a JPEG has to be decoded
-  // again.
-  static constexpr int kUsualInterval = 3;
-  explicit ColourReducer(int interval_frames = kUsualInterval) : interval_(interval_frames) {}
+  // Of a frame in so long, by the rate measured from the frames' stamps of capture, beginning with the first: an
+  // instrument moves slowly, and a JPEG has to be decoded again. 0: of each frame.
+  static constexpr Duration kUsualInterval = std::chrono::milliseconds(100);
+  explicit ColourReducer(Duration interval = kUsualInterval) : interval_(interval) {}
 
   // Makes room, so that frames of up to this size allocate nothing; kMjpg excepted, where libjpeg does.
   void reserve(int width, int height);
@@ -29,8 +32,9 @@ class ColourReducer {
  private:
   [[nodiscard]] bool reduce(const CameraFrame& frame);
 
-  int interval_;
-  int passed_over_ = 0;  // since the last one that was looked at
+  Duration interval_;
+  MeasuredFrameRate rate_;
+  std::uint64_t passed_over_ = 0;  // since the last one that was looked at
   bool any_ = false;
   std::vector<std::uint8_t> bgr_;
   JpegDecoder jpeg_;

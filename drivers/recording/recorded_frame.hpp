@@ -15,9 +15,8 @@ namespace perimap {
 
 class RecordedFrame {
  public:
-  // Colour is looked at in every so manieth alone of the frames that are asked for it.
-  explicit RecordedFrame(int colour_interval_frames = ColourReducer::kUsualInterval)
-      : colour_(colour_interval_frames) {}
+  // Of the frames that are asked for colour, one in so long is looked at.
+  explicit RecordedFrame(Duration colour_interval = ColourReducer::kUsualInterval) : colour_(colour_interval) {}
 
   // Of either of the types that a camera's channel can have. Errors have the form of RecordingReader's. The others are
   // about the frame read last, and valid until the next one is.

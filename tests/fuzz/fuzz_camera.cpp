@@ -27,8 +27,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       frame.height = announced->height;
     }
   }
-  static ColourReducer kept(1);
-  ColourReducer fresh(1);  // whose room is the picture's own, so that nothing behind it is missed
+  static ColourReducer kept(Duration(0));
+  ColourReducer fresh(Duration(0));  // whose room is the picture's own, so that nothing behind it is missed
   ColourReducer& reducer = data[3] / 128 == 0 ? kept : fresh;
   reducer.reduce_colour(frame);
   const ColourImage& colour = reducer.picture();

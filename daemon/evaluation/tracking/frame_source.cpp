@@ -84,7 +84,7 @@ class RecordingSource final : public FrameSource {
   std::uint64_t messages_ = 0;
   std::uint64_t unusable_ = 0;
   Error first_unusable_;
-  RecordedFrame recorded_{1};
+  RecordedFrame recorded_{Duration(0)};
   VideoFrame frame_;
 };
 

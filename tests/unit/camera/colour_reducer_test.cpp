@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "tests/unit/camera/made_jpeg.hpp"
@@ -103,7 +104,7 @@ TEST(ColourReducer, ReducesThePictureThatAGreyFrameWasMadeOf) {
   frame.stride = kWidth;
   frame.bytes = grey;
   frame.colour = {bgr.data(), kWidth, kHeight, std::ptrdiff_t{3} * kWidth};
-  ColourReducer reducer(1);
+  ColourReducer reducer(Duration(0));
   reducer.reduce_colour(frame);
   ASSERT_NE(reducer.picture().bgr, nullptr);
   EXPECT_EQ(reducer.picture().width, 8);
@@ -127,7 +128,7 @@ TEST(ColourReducer, GivesTheColoursOfAJpeg) {
   const auto jpeg =
       test::make_jpeg(kWidth, kHeight, [](int, int y) { return static_cast<std::uint8_t>(y < 16 ? 40 : 100); });
   frame.bytes = jpeg;
-  ColourReducer reducer(1);
+  ColourReducer reducer(Duration(0));
   reducer.reduce_colour(frame);
   ASSERT_NE(reducer.picture().bgr, nullptr);
   EXPECT_EQ(reducer.picture().width, 13);
@@ -145,7 +146,7 @@ TEST(ColourReducer, GivesTheColoursOfAJpeg) {
 }
 
 TEST(ColourReducer, HasNoneOfGreyFramesOrOfThoseThatDoNotHoldTheirPicture) {
-  ColourReducer reducer(1);
+  ColourReducer reducer(Duration(0));
   reducer.reduce_colour(Picture(PixelFormat::kGrey, 32, 16, 16, 0).frame());
   EXPECT_EQ(reducer.picture().bgr, nullptr);
   for (const PixelFormat format : {PixelFormat::kYuyv, PixelFormat::kUyvy, PixelFormat::kNv12}) {
@@ -159,15 +160,28 @@ TEST(ColourReducer, HasNoneOfGreyFramesOrOfThoseThatDoNotHoldTheirPicture) {
   }
 }
 
-TEST(ColourReducer, LooksAtTheFirstFrameAndThenAtEveryNth) {
+TEST(ColourReducer, LooksAtTheFirstFrameAndThenAtOneInATenthOfASecondAtAnyFrameRate) {
   const Picture picture(PixelFormat::kYuyv, 32, 16, 16, 0);
-  ColourReducer reducer(3);
-  std::vector<bool> seen;
-  for (int i = 0; i < 7; ++i) {
-    reducer.reduce_colour(picture.frame());
-    seen.push_back(reducer.picture().bgr != nullptr);
+  for (const auto& [rate_per_s, every] : {std::pair{10.0, 1}, std::pair{20.0, 2}, std::pair{30.0, 3},
+                                          std::pair{60.0, 6}, std::pair{120.0, 12}, std::pair{240.0, 24}}) {
+    SCOPED_TRACE(testing::Message() << rate_per_s << " frames/s");
+    ColourReducer reducer;
+    std::vector<int> seen;
+    // The rate is known once some intervals are.
+    const int known = 3 * every + 30;
+    for (int i = 0; i < known + 5 * every; ++i) {
+      CameraFrame frame = picture.frame();
+      frame.stamp.capture = from_ns(5'000'000'000) + from_seconds(i / rate_per_s);
+      reducer.reduce_colour(frame);
+      const bool looked_at = reducer.picture().bgr != nullptr;
+      if (i == 0) {
+        EXPECT_TRUE(looked_at);
+      }
+      if (looked_at && i >= known) seen.push_back(i);
+    }
+    ASSERT_EQ(seen.size(), 5U);
+    for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_EQ(seen[i] - seen[i - 1], every);
   }
-  EXPECT_EQ(seen, (std::vector<bool>{true, false, false, true, false, false, true}));
 }
 
 }  // namespace

@@ -26,17 +26,17 @@ std::span<std::uint8_t> bgr_of(FramePool& pool, int buffer) {
 // Every buffer once, then none.
 void expect_all_free(FramePool& pool) {
   std::set<int> taken;
-  for (int i = 0; i < kBuffers; ++i) taken.insert(pool.acquire());
+  for (int i = 0; i < kBuffers; ++i) taken.insert(pool.acquire(kBuffers));
   EXPECT_EQ(taken, (std::set<int>{0, 1, 2, 3, 4, 5, 6, 7}));
-  EXPECT_EQ(pool.acquire(), -1);
+  EXPECT_EQ(pool.acquire(kBuffers), -1);
 }
 
 TEST(FramePool, GivesEachBufferOnceUntilItIsGivenBack) {
   FramePool pool(16, 12, kBuffers);
   expect_all_free(pool);
   pool.give_back(2);
-  EXPECT_EQ(pool.acquire(), 2);
-  EXPECT_EQ(pool.acquire(), -1);
+  EXPECT_EQ(pool.acquire(kBuffers), 2);
+  EXPECT_EQ(pool.acquire(kBuffers), -1);
 }
 
 TEST(FramePool, BuffersDoNotOverlap) {
@@ -62,7 +62,7 @@ TEST(FramePool, NoBufferIsFilledWhileItIsRead) {
   std::thread camera([&] {
     for (std::uint64_t sequence = 0; sequence < kFrames;) {
       FrameHandle frame;
-      while ((frame.buffer = pool.acquire()) < 0) std::this_thread::yield();
+      while ((frame.buffer = pool.acquire(kBuffers)) < 0) std::this_thread::yield();
       frame.stamp.sequence = sequence;
       std::ranges::fill(grey_of(pool, frame.buffer), value_of(sequence));
       std::ranges::fill(bgr_of(pool, frame.buffer), value_of(sequence));

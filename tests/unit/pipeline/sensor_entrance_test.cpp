@@ -97,6 +97,29 @@ TEST_F(Entrance, DropsAndCountsWhenTheMapperGivesNoBufferBackButStillAnnouncesTh
   EXPECT_EQ(stamps, 20);
 }
 
+TEST_F(Entrance, KeepsAQuarterOfASecondForAMapperThatIsHeldUpAtAnyFrameRate) {
+  for (const double rate_per_s : {15.0, 30.0, 60.0, 120.0, 240.0}) {
+    SCOPED_TRACE(rate_per_s);
+    entrance =
+        std::make_unique<SensorEntrance>(kWidth, kHeight, EcgIntakeSettings{}, BreathDetectorSettings{}, counters);
+    std::uint64_t sequence = 0;
+    const auto push = [&] {
+      const Instant capture = from_ns(1'000'000'000) + from_seconds(static_cast<double>(sequence) / rate_per_s);
+      return entrance->push_frame({sequence++, capture, capture + milliseconds(12)}, image);
+    };
+    FrameHandle frame;
+    for (int i = 0; i < 30; ++i) {
+      ASSERT_TRUE(push());
+      ASSERT_TRUE(entrance->pop_frame(frame));
+      entrance->give_back(frame);
+    }
+    int waiting = 0;
+    while (push()) ++waiting;
+    // One of them is the frame that was mapped last.
+    EXPECT_NEAR((waiting - 1) / rate_per_s, 0.267, 0.5 / rate_per_s);
+  }
+}
+
 TEST_F(Entrance, BuffersGivenBackServeAgain) {
   for (std::uint64_t i = 0; i < 100; ++i) {
     ASSERT_TRUE(entrance->push_frame(stamp(i), image));
