@@ -27,7 +27,7 @@ build=(
   libopencv-calib3d-dev                      # daemon/setup: lenses, boards, other hand-eye solutions
   libopencv-contrib-dev                      # daemon/setup: ArUco and AprilTag markers, which OpenCV 4.6 has there alone
   libceres-dev                               # daemon/setup: least squares with derivatives and covariance
-  libopencv-video-dev                        # drivers/video: Lucas-Kanade, that the tracker is held against
+  libopencv-video-dev                        # daemon/evaluation/track_judge: Lucas-Kanade, that the tracker is held against
   libjpeg62-turbo-dev                        # drivers/image: MJPG cameras
   cyclonedds-dev cyclonedds-tools            # idl, daemon: DDS and its IDL compiler
   libfmt-dev

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <system_error>
 
-#include "drivers/video/lucas_kanade.hpp"
 #include "drivers/video/video_module.hpp"
 
 namespace perimap {
@@ -47,10 +46,6 @@ Expected<std::unique_ptr<VideoReader>> VideoReader::open(const std::string& path
 Expected<std::unique_ptr<VideoWriter>> VideoWriter::create(const std::string& path, int width, int height,
                                                            double frames_per_s) {
   return module().and_then([&](const VideoModule* video) { return video->create(path, width, height, frames_per_s); });
-}
-
-Expected<std::unique_ptr<LucasKanade>> LucasKanade::create() {
-  return module().and_then([](const VideoModule* video) { return video->lucas_kanade(); });
 }
 
 Expected<PictureFile> read_picture(const std::string& path) {

@@ -18,7 +18,6 @@
 
 #include "core/vision/opencv_threads.hpp"
 #include "drivers/video/frame_times.hpp"
-#include "drivers/video/lucas_kanade_module.hpp"
 #include "drivers/video/video_file.hpp"
 
 namespace perimap {
@@ -249,8 +248,7 @@ Expected<PictureFile> read_grey(const std::string& path) {
 }  // namespace perimap
 
 const perimap::VideoModule* perimap_video_module() {
-  static constexpr perimap::VideoModule kModule{&perimap::open, &perimap::create, &perimap::read_grey,
-                                                &perimap::make_lucas_kanade};
+  static constexpr perimap::VideoModule kModule{&perimap::open, &perimap::create, &perimap::read_grey};
   perimap::keep_opencv_to_one_thread();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said here
   return &kModule;

@@ -5,7 +5,6 @@
 #include <memory>
 #include <string>
 
-#include "drivers/video/lucas_kanade.hpp"
 #include "drivers/video/picture_file.hpp"
 #include "drivers/video/video_file.hpp"
 
@@ -17,8 +16,6 @@ struct VideoModule {
   Expected<std::unique_ptr<VideoWriter>> (*create)(const std::string& path, int width, int height, double frames_per_s);
   // As read_picture().
   Expected<PictureFile> (*read_picture)(const std::string& path);
-  // As LucasKanade::create().
-  Expected<std::unique_ptr<LucasKanade>> (*lucas_kanade)();
 };
 
 inline constexpr const char* kVideoModule = "libperimap_video.so";

@@ -1,5 +1,6 @@
-// This tracker and OpenCV's Lucas-Kanade over clips that are played there and back (daemon/track_judge), a line a clip.
-// Arguments: FEATURES, then VIDEO[:FIRST[:FRAMES]] each; `events` before them: events composed on the clips instead.
+// This tracker and OpenCV's Lucas-Kanade over clips that are played there and back (daemon/evaluation/track_judge), a
+// line a clip. Arguments: FEATURES, then VIDEO[:FIRST[:FRAMES]] each; `events` before them: events composed on the
+// clips instead.
 #include <cstdio>
 #include <cstdlib>
 #include <string>

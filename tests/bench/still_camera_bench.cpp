@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "core/vision/video_tracker.hpp"
+#include "core/following/video_tracker.hpp"
 #include "drivers/video/video_file.hpp"
 #include "tests/simulated/still_camera_session.hpp"
 

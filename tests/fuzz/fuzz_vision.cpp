@@ -9,8 +9,10 @@
 #include <cstring>
 #include <vector>
 
+#include "core/following/feature_follower.hpp"
+#include "core/following/picture_validity.hpp"
+#include "core/following/seen_places.hpp"
 #include "core/vision/feature_detector.hpp"
-#include "core/vision/feature_follower.hpp"
 #include "core/vision/image_noise.hpp"
 #include "core/vision/instrument_mask.hpp"
 #include "core/vision/last_view.hpp"
@@ -18,8 +20,6 @@
 #include "core/vision/patch_continuity.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
-#include "core/vision/picture_validity.hpp"
-#include "core/vision/seen_places.hpp"
 
 namespace {
 

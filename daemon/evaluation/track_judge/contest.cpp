@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/vision/confirmed_tracks.hpp"
-#include "core/vision/video_tracker.hpp"
-#include "drivers/video/lucas_kanade.hpp"
+#include "core/following/confirmed_tracks.hpp"
+#include "core/following/video_tracker.hpp"
+#include "daemon/evaluation/track_judge/lucas_kanade.hpp"
 
 namespace perimap {
 namespace {

@@ -13,7 +13,7 @@ struct Contest {
   TripFigures our_figures, their_figures;
 };
 
-// This tracker with no new features after the first, and Lucas-Kanade (drivers/video/lucas_kanade.hpp) with its own
+// This tracker with no new features after the first, and Lucas-Kanade (lucas_kanade.hpp) with its own
 // corners, of as many features.
 [[nodiscard]] Expected<Contest> hold_contest(const Clip& clip, int features);
 

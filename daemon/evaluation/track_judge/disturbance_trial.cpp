@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "core/vision/video_tracker.hpp"
+#include "core/following/video_tracker.hpp"
 
 namespace perimap {
 namespace {

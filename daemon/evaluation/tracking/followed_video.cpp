@@ -9,9 +9,9 @@
 #include <span>
 #include <utility>
 
-#include "core/vision/confirmed_tracks.hpp"
-#include "core/vision/feature_follower.hpp"
-#include "core/vision/video_tracker.hpp"
+#include "core/following/confirmed_tracks.hpp"
+#include "core/following/feature_follower.hpp"
+#include "core/following/video_tracker.hpp"
 #include "daemon/evaluation/tracking/frame_source.hpp"
 #include "daemon/evaluation/tracking/track_table.hpp"
 #include "drivers/file/whole_file.hpp"

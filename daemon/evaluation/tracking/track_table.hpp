@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/error/expected.hpp"
-#include "core/vision/confirmed_tracks.hpp"
+#include "core/following/confirmed_tracks.hpp"
 #include "drivers/file/whole_file.hpp"
 
 namespace perimap {

@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "core/vision/video_tracker.hpp"
+#include "core/following/video_tracker.hpp"
 #include "tests/simulated/still_camera_session.hpp"
 #include "tests/simulated/wet_tissue.hpp"
 

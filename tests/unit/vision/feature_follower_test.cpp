@@ -1,4 +1,4 @@
-#include "core/vision/feature_follower.hpp"
+#include "core/following/feature_follower.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "core/vision/seen_places.hpp"
+#include "core/following/seen_places.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "core/vision/feature_trails.hpp"
+#include "core/following/feature_trails.hpp"
 
 #include <algorithm>
 #include <chrono>

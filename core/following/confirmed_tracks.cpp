@@ -1,4 +1,4 @@
-#include "core/vision/confirmed_tracks.hpp"
+#include "core/following/confirmed_tracks.hpp"
 
 #include <algorithm>
 #include <iterator>

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "core/following/feature_follower.hpp"
 #include "core/geometry/pose.hpp"
-#include "core/vision/feature_follower.hpp"
 
 namespace perimap {
 

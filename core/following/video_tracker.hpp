@@ -6,9 +6,9 @@
 #include <span>
 
 #include "core/error/expected.hpp"
+#include "core/following/feature_follower.hpp"
 #include "core/sensors/colour_image.hpp"
 #include "core/sensors/grey_image.hpp"
-#include "core/vision/feature_follower.hpp"
 
 namespace perimap {
 

@@ -1,4 +1,4 @@
-#include "core/vision/overlay_watch.hpp"
+#include "core/following/overlay_watch.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/following/followed_patch.hpp"
 #include "core/geometry/pose.hpp"
-#include "core/vision/followed_patch.hpp"
 #include "core/vision/patch_tracker.hpp"
 
 namespace perimap {

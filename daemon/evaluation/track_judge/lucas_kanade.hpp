@@ -1,5 +1,5 @@
 // What users would otherwise take to follow features: OpenCV's corners and pyramidal Lucas-Kanade, to be held against.
-// Part of the module that video_file.hpp loads.
+// In a module that is loaded when it is asked for, since it brings so much.
 #pragma once
 
 #include <memory>
@@ -16,7 +16,7 @@ namespace perimap {
 // (cv::calcOpticalFlowPyrLK); a point counts as found when the way back ends within 1 px of where it began.
 class LucasKanade {
  public:
-  // Fails as load_video_support() does.
+  // Fails where the module is not there.
   [[nodiscard]] static Expected<std::unique_ptr<LucasKanade>> create();
   LucasKanade() = default;
   LucasKanade(LucasKanade&&) = delete;

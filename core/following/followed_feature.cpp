@@ -1,4 +1,4 @@
-#include "core/vision/followed_feature.hpp"
+#include "core/following/followed_feature.hpp"
 
 namespace perimap {
 

@@ -1,4 +1,4 @@
-#include "core/vision/feature_places.hpp"
+#include "core/following/feature_places.hpp"
 
 #include <algorithm>
 

@@ -10,18 +10,18 @@
 #include <span>
 #include <vector>
 
+#include "core/following/feature_trails.hpp"
+#include "core/following/followed_feature.hpp"
+#include "core/following/overlay_watch.hpp"
+#include "core/following/picture_validity.hpp"
+#include "core/following/seen_places.hpp"
 #include "core/geometry/pose.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "core/time/frame_rate.hpp"
 #include "core/time/instant.hpp"
-#include "core/vision/feature_trails.hpp"
-#include "core/vision/followed_feature.hpp"
 #include "core/vision/neighbour_motion.hpp"
-#include "core/vision/overlay_watch.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
-#include "core/vision/picture_validity.hpp"
-#include "core/vision/seen_places.hpp"
 
 namespace perimap {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <span>
 
-#include "core/vision/followed_feature.hpp"
+#include "core/following/followed_feature.hpp"
 
 namespace perimap {
 

@@ -1,4 +1,4 @@
-#include "core/vision/picture_validity.hpp"
+#include "core/following/picture_validity.hpp"
 
 #include <algorithm>
 #include <cmath>

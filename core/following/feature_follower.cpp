@@ -1,12 +1,12 @@
-#include "core/vision/feature_follower.hpp"
+#include "core/following/feature_follower.hpp"
 
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "core/following/feature_places.hpp"
 #include "core/geometry/symmetric_matrix2.hpp"
 #include "core/statistics/upper_median.hpp"
-#include "core/vision/feature_places.hpp"
 #include "core/vision/grey_histogram.hpp"
 
 namespace perimap {

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <span>
 
+#include "core/following/followed_feature.hpp"
 #include "core/geometry/pose.hpp"
 #include "core/time/frame_rate.hpp"
-#include "core/vision/followed_feature.hpp"
 
 namespace perimap {
 

@@ -8,11 +8,11 @@
 #include <span>
 #include <vector>
 
+#include "core/following/feature_trails.hpp"
+#include "core/following/followed_feature.hpp"
 #include "core/geometry/pose.hpp"
 #include "core/time/frame_rate.hpp"
 #include "core/time/instant.hpp"
-#include "core/vision/feature_trails.hpp"
-#include "core/vision/followed_feature.hpp"
 
 namespace perimap {
 

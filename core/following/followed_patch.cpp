@@ -1,4 +1,4 @@
-#include "core/vision/followed_patch.hpp"
+#include "core/following/followed_patch.hpp"
 
 #include <algorithm>
 #include <cmath>

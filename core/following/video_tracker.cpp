@@ -1,4 +1,4 @@
-#include "core/vision/video_tracker.hpp"
+#include "core/following/video_tracker.hpp"
 
 #include <chrono>
 #include <utility>

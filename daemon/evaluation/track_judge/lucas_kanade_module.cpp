@@ -1,4 +1,4 @@
-#include "drivers/video/lucas_kanade_module.hpp"
+#include "daemon/evaluation/track_judge/lucas_kanade_module.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <string>
+
+#include "core/vision/opencv_threads.hpp"
 
 namespace perimap {
 namespace {
@@ -70,8 +72,13 @@ class OpenCvLucasKanade final : public LucasKanade {
   }
 };
 
+Expected<std::unique_ptr<LucasKanade>> create() { return std::make_unique<OpenCvLucasKanade>(); }
+
 }  // namespace
-
-Expected<std::unique_ptr<LucasKanade>> make_lucas_kanade() { return std::make_unique<OpenCvLucasKanade>(); }
-
 }  // namespace perimap
+
+const perimap::LucasKanadeModule* perimap_lucas_kanade_module() {
+  static constexpr perimap::LucasKanadeModule kModule{&perimap::create};
+  perimap::keep_opencv_to_one_thread();
+  return &kModule;
+}
