@@ -8,10 +8,6 @@
 namespace perimap {
 namespace {
 constexpr double kUsual = 0.9;          // correlation with the usual shape from which on a beat is of it
-constexpr double kOfItsOwn = 0.2;       // 1 - correlation with the usual shape: no usual beat that noise has bent
-constexpr double kAtAnyTime = 1.0;      // log odds that it takes more where beats come at any time
-constexpr double kAreaMemory = 16.0;    // beats
-constexpr double kRecurs = 3.0;         // of a kind, from which on a ventricular beat may come on time
 constexpr int kConductionChanged = 4;   // beats in a row
 constexpr int kDisplaced = 4;           // steps, 20 ms
 constexpr double kDoubtful = 0.3;       // confidence below which an unusual shape is thought noise,
@@ -23,11 +19,9 @@ constexpr double kInRhythm = 0.15;      // of the rhythm's cycle, either way
 constexpr double kPause = 1.5;          // rhythm's cycles
 constexpr double kGap = 4.0;            // beyond, beats were missed
 constexpr double kLongest = 1.35;       // cycles
-
-// 0 where one of the two is not known.
-double log_ratio(double value, double usual) noexcept {
-  return value > 0.0 && usual > 0.0 ? std::log(value / usual) : 0.0;
-}
+constexpr int kStale = 8;               // beats in a row that taught the cycle nothing: it may be another by now
+constexpr double kFarOff = 0.5;         // log of an interval to the cycle: whatever is farther counts as much
+constexpr double kSpreadMemory = 24.0;  // beats
 
 }  // namespace
 
@@ -38,20 +32,22 @@ double BeatClasser::strangeness(const QrsShape& shape) const noexcept {
   return 1.0 - templates_.likeness_to(usual, shape, kDisplaced);
 }
 
-bool BeatClasser::ventricular(const RPeak& peak, double strange) const noexcept {
+// log(interval / the rhythm's cycle); 0 where one of the two is not known.
+double BeatClasser::log_of_cycle(double rr_s) const noexcept {
+  return rr_s > 0.0 && normal_rr_s_.count() > 0 ? std::log(rr_s / normal_rr_s_.median()) : 0.0;
+}
+
+bool BeatClasser::ventricular(const RPeak& peak, const BeatKinds::Comparison& compared) const noexcept {
   if (!has_last_ || normal_rr_s_.count() == 0 || peak.shape.points == 0) return false;
-  const double cycle_s = normal_rr_s_.median();
-  const double rr_s = to_seconds(peak.time - last_);
-  const int kind = templates_.kind_of(peak.shape);
-  const KindArea known = kind < 0 ? KindArea{} : areas_[static_cast<std::size_t>(kind)];
-  if (rr_s >= kEarly * cycle_s && (known.members < kRecurs || strange < kOfItsOwn)) return false;
+  if (peak.confidence < kDoubtful) return false;
   VentricularEvidence evidence;
-  evidence.log_area = log_ratio(area(peak.shape), usual_area_);
-  evidence.log_kind_area = known.log_area;
-  evidence.strangeness = strange;
-  evidence.log_rr = log_ratio(rr_s, cycle_s);
-  evidence.log_rr_before = log_ratio(raw_rr_s_, cycle_s);
-  return log_odds(evidence) > (rhythm_.rhythm() == Rhythm::kUnpredictable ? kAtAnyTime : 0.0);
+  evidence.unlike = compared.unlike;
+  evidence.log_rr = log_of_cycle(to_seconds(peak.time - last_));
+  evidence.spread = spread_;
+  evidence.log_rr_before = log_of_cycle(raw_rr_s_);
+  evidence.apart = compared.apart;
+  evidence.coupled = compared.coupled;
+  return log_odds(evidence) > 0.0;
 }
 
 BeatClass BeatClasser::by_interval(const RPeak& peak, bool unusual) const noexcept {
@@ -84,19 +80,20 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
   if (gap) interrupt();
   const double strange = strangeness(peak.shape);
   const bool unusual = strange > 1.0 - kUsual;
-  const bool ventricular = this->ventricular(peak, strange);
+  const BeatKinds::Comparison compared = kinds_.compare(peak.shape);
   const bool early =
       has_last_ && normal_rr_s_.count() > 0 && to_seconds(peak.time - last_) < kEarly * normal_rr_s_.median();
-  on_time_in_another_shape_ =
-      ventricular && !early ? std::min(on_time_in_another_shape_ + 1, kConductionChanged + 1) : 0;
-  peak.beat_class = ventricular && on_time_in_another_shape_ <= kConductionChanged ? BeatClass::kPremature
-                                                                                   : by_interval(peak, unusual);
+  const bool again = compared.kind >= 0 && compared.kind == last_kind_ && !early;
+  on_time_in_one_shape_ = again ? std::min(on_time_in_one_shape_ + 1, kConductionChanged + 1) : 0;
+  const bool ventricular = on_time_in_one_shape_ < kConductionChanged && this->ventricular(peak, compared);
+  peak.beat_class = ventricular ? BeatClass::kPremature : by_interval(peak, unusual);
   if (peak.confidence < (unusual ? kDoubtful : kMostDoubtful) && !is_due(peak, kUnseen))
     peak.beat_class = BeatClass::kNoise;
   peak.unusual_shape = unusual || ventricular;
   if (peak.beat_class == BeatClass::kNoise) return peak;  // as if it had not been
 
-  learn_shape(peak.shape, unusual);
+  templates_.learn(peak.shape);
+  learn_kind(peak, compared);
   if (has_last_) learn_rhythm(peak, unusual);
   last_unusual_ = peak.unusual_shape;
   last_ = peak.time;
@@ -109,16 +106,14 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
   return peak;
 }
 
-void BeatClasser::learn_shape(const QrsShape& shape, bool unusual) noexcept {
-  const int known = templates_.kind_of(shape);
-  const int kind = templates_.learn(shape);
-  if (kind < 0) return;
-  KindArea& of_kind = areas_[static_cast<std::size_t>(kind)];
-  if (known < 0) of_kind = {};
-  const double covered = area(shape);
-  of_kind.members = std::min(of_kind.members + 1.0, kAreaMemory);
-  of_kind.log_area += (log_ratio(covered, usual_area_) - of_kind.log_area) / of_kind.members;
-  if (!unusual) usual_area_ += (covered - usual_area_) / (usual_area_ > 0.0 ? kAreaMemory : 1.0);
+void BeatClasser::learn_kind(const RPeak& peak, const BeatKinds::Comparison& compared) noexcept {
+  const double log_rr = has_last_ ? log_of_cycle(to_seconds(peak.time - last_)) : 0.0;
+  const int learnt = kinds_.learn(peak.shape, compared, log_rr);
+  if (compared.usual && last_usual_kind_ && has_last_) {
+    spread_ += (std::min(std::abs(log_rr), kFarOff) - spread_) / kSpreadMemory;
+  }
+  last_usual_kind_ = compared.usual;
+  last_kind_ = learnt;
 }
 
 // The rhythm's cycle: intervals between beats in rhythm; from one over a premature beat, as it tells when every second
@@ -128,19 +123,31 @@ void BeatClasser::learn_rhythm(const RPeak& peak, bool unusual) noexcept {
   const double before_s = raw_rr_s_;
   raw_rr_s_ = to_seconds(peak.time - last_);
   if (!peak.unusual_shape && !last_unusual_) rhythm_.push(Seconds(raw_rr_s_));
-  if (peak.beat_class == BeatClass::kPremature || unusual) return;
   const double rr_s = raw_rr_s_;
+  ++untaught_;
+  if (peak.beat_class == BeatClass::kPremature || unusual) {
+    if (untaught_ > kStale && normal_rr_s_.count() > 0) push_cycle(rr_s);
+    return;
+  }
   const bool again = !last_unusual_ && std::abs(rr_s - before_s) < kInRhythm * before_s;
   if (last_class_ != BeatClass::kPremature || again) {
     if (last_unusual_) return;
     last_rr_s_ = rr_s;
-    normal_rr_s_.push(normal_rr_s_.count() == 0 ? rr_s : std::min(rr_s, kLongest * normal_rr_s_.median()));
+    push_cycle(rr_s);
+    untaught_ = 0;
     return;
   }
   if (!has_normal_ || normal_rr_s_.count() == 0) return;
   const double half_s = 0.5 * to_seconds(peak.time - last_normal_);
   const double cycle_s = normal_rr_s_.median();
-  if (std::abs(half_s - cycle_s) < kInRhythm * cycle_s) normal_rr_s_.push(half_s);
+  if (std::abs(half_s - cycle_s) < kInRhythm * cycle_s) {
+    normal_rr_s_.push(half_s);
+    untaught_ = 0;
+  }
+}
+
+void BeatClasser::push_cycle(double rr_s) noexcept {
+  normal_rr_s_.push(normal_rr_s_.count() == 0 ? rr_s : std::min(rr_s, kLongest * normal_rr_s_.median()));
 }
 
 }  // namespace perimap

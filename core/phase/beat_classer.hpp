@@ -7,8 +7,7 @@
 // the last normal beat as well, so that neither an interpolated beat nor a compensatory pause makes it irregular.
 #pragma once
 
-#include <array>
-
+#include "core/phase/beat_kinds.hpp"
 #include "core/phase/qrs_shape.hpp"
 #include "core/phase/r_peak.hpp"
 #include "core/phase/recent_values.hpp"
@@ -27,38 +26,38 @@ class BeatClasser {
     has_last_ = false;
     has_normal_ = false;
     raw_rr_s_ = 0.0;
+    last_kind_ = -1;
   }
 
  private:
   static constexpr int kRhythm = 8;
 
   [[nodiscard]] double strangeness(const QrsShape& shape) const noexcept;
-  [[nodiscard]] bool ventricular(const RPeak& peak, double strange) const noexcept;
+  [[nodiscard]] bool ventricular(const RPeak& peak, const BeatKinds::Comparison& compared) const noexcept;
   [[nodiscard]] BeatClass by_interval(const RPeak& peak, bool unusual) const noexcept;
   [[nodiscard]] bool is_due(const RPeak& peak, int most_cycles) const noexcept;
-  void learn_shape(const QrsShape& shape, bool unusual) noexcept;
+  [[nodiscard]] double log_of_cycle(double rr_s) const noexcept;
+  void learn_kind(const RPeak& peak, const BeatKinds::Comparison& compared) noexcept;
   void learn_rhythm(const RPeak& peak, bool unusual) noexcept;
-
-  // Of a kind of beats, to the usual ones.
-  struct KindArea {
-    double log_area = 0.0;  // fading mean
-    double members = 0.0;   // bounded
-  };
+  void push_cycle(double rr_s) noexcept;
 
   ShapeTemplates templates_;
-  std::array<KindArea, ShapeTemplates::kTemplates> areas_{};
-  double usual_area_ = 0.0;            // of the beats of usual shape, fading mean
-  RhythmMonitor rhythm_;               // of these
+  BeatKinds kinds_;
+  RhythmMonitor rhythm_;               // of beats of usual shape
   RecentValues<kRhythm> normal_rr_s_;  // between beats in rhythm
   bool has_last_ = false;
   bool has_normal_ = false;
+  double spread_ = 0.1;  // mean deviation of log(interval / cycle), between beats of the usual kind
+  bool last_usual_kind_ = false;
   bool last_unusual_ = false;
-  int on_time_in_another_shape_ = 0;  // in a row
+  int on_time_in_one_shape_ = 0;  // in a row, after the first
+  int last_kind_ = -1;
   BeatClass last_class_ = BeatClass::kNormal;
   Instant last_;
   double raw_rr_s_ = 0.0;   // the last interval, between whatever beats
   double last_rr_s_ = 0.0;  // when both its beats were normal, else 0
   Instant last_normal_;
+  int untaught_ = 0;  // beats in a row that taught the cycle nothing
 };
 
 }  // namespace perimap

@@ -25,7 +25,7 @@ ShapeMatch match_displaced(const QrsShape& shape, const QrsShape& reference, int
     yy += y * y;
   }
   if (!(xx > 0.0) || !(yy > 0.0)) return {};
-  return {xy / std::sqrt(xx * yy), xy / yy};
+  return {xy / std::sqrt(xx * yy), xy / yy, displaced};
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ struct QrsShape {
 struct ShapeMatch {
   double correlation = 0.0;  // -1 to 1
   double gain = 0.0;         // the shape is so many times the other one
+  int displaced = 0;         // the shape is so many points later
 };
 
 [[nodiscard]] ShapeMatch match(const QrsShape& shape, const QrsShape& reference) noexcept;

@@ -6,30 +6,29 @@
 namespace perimap {
 namespace {
 
-constexpr double kAlways = -7.7;
-constexpr double kArea = 1.3;
-constexpr double kKindArea = 5.3;
-constexpr double kOtherShape = 6.9;
-constexpr double kInterval = -9.2;
-constexpr double kIntervalBefore = 5.2;
-constexpr double kBent = 0.1;  // strangeness, from which on a shape is another and more says no more
+constexpr double kAlways = -12.75;
+constexpr double kUnlike = 3.1;        // a unit of the logarithm,
+constexpr double kLeast = 1.0;         // from here
+constexpr double kMost = 4.0;          // to here: noise has no upper end
+constexpr double kEarly = 1.35;        // a deviation of the rhythm,
+constexpr double kLate = -1.0;         // from here, deviations,
+constexpr double kFarEarly = 4.0;      // to here
+constexpr double kLeastSpread = 0.03;  // of any rhythm
+constexpr double kIntervalBefore = 2.8;
+constexpr double kCoupled = 3.1;
+constexpr double kApart = 1.8;
+constexpr double kLongestBefore = 0.7;  // log
 
 }  // namespace
 
 double log_odds(const VentricularEvidence& evidence) noexcept {
-  return kAlways + kArea * evidence.log_area + kKindArea * evidence.log_kind_area +
-         kOtherShape * std::min(evidence.strangeness / kBent, 1.0) + kInterval * evidence.log_rr +
-         kIntervalBefore * evidence.log_rr_before;
-}
-
-double area(const QrsShape& shape) noexcept {
-  double value = 0.0;
-  double covered = 0.0;
-  for (int i = 0; i < shape.points; ++i) {
-    value += static_cast<double>(shape.slope[static_cast<std::size_t>(i)]);
-    covered += std::abs(value);
-  }
-  return covered;
+  const double early = -evidence.log_rr / (evidence.spread + kLeastSpread);
+  return kAlways + kUnlike * std::clamp(std::log(evidence.unlike), kLeast, kMost) +
+         kEarly * std::clamp(early, kLate, kFarEarly) +
+         kIntervalBefore * std::clamp(evidence.log_rr_before, -1.0, kLongestBefore) +
+         (evidence.coupled ? kCoupled
+          : evidence.apart ? kApart
+                           : 0.0);
 }
 
 }  // namespace perimap

@@ -8,55 +8,67 @@
 namespace perimap {
 namespace {
 
-// Twice as large as usual, in another shape, early.
-VentricularEvidence early_and_large() {
+// As unlike as usual beats are from each other, on time, in a rhythm that scatters by 3 %.
+VentricularEvidence usual() {
   VentricularEvidence evidence;
-  evidence.log_area = std::log(2.0);
-  evidence.log_kind_area = std::log(2.0);
-  evidence.strangeness = 0.4;
-  evidence.log_rr = std::log(0.65);
+  evidence.unlike = 0.9;
+  evidence.spread = 0.03;
   return evidence;
 }
 
-TEST(VentricularEvidence, AnEarlyLargeComplexOfAnotherShapeIsVentricularAndAUsualOneIsNot) {
-  EXPECT_GT(log_odds(early_and_large()), 4.0);
-  EXPECT_LT(log_odds(VentricularEvidence{}), -6.0);
+TEST(VentricularEvidence, AnEarlyComplexThatIsUnlikeTheUsualOnesIsVentricularAndAUsualOneIsNot) {
+  VentricularEvidence ventricular = usual();
+  ventricular.unlike = 30.0;
+  ventricular.log_rr = std::log(0.65);
+  EXPECT_GT(log_odds(ventricular), 3.0);
+  EXPECT_LT(log_odds(usual()), -8.0);
+}
+
+TEST(VentricularEvidence, WhatIsFarFromUsualIsVentricularOnTimeOnlyWhereItsKindHasRecurred) {
+  VentricularEvidence on_time = usual();
+  on_time.unlike = 60.0;
+  EXPECT_LT(log_odds(on_time), 0.0);
+  on_time.apart = true;
+  EXPECT_GT(log_odds(on_time), 0.0);
+}
+
+TEST(VentricularEvidence, NothingIsVentricularByOneMeasureAlone) {
+  VentricularEvidence unlike = usual();
+  unlike.unlike = 1e6;
+  EXPECT_LT(log_odds(unlike), 0.0) << "noise";
+  VentricularEvidence early = usual();
+  early.log_rr = std::log(0.4);
+  early.coupled = true;
+  EXPECT_LT(log_odds(early), 0.0) << "atrial";
 }
 
 // In natural units of log odds, as fitted to the development records.
 TEST(VentricularEvidence, IsWorthWhatTheRecordsSay) {
-  const double usual = log_odds(VentricularEvidence{});
-  EXPECT_NEAR(usual, -7.7, 0.5);
+  const double base = log_odds(usual());
+  EXPECT_NEAR(base, -9.6, 0.3);
   struct {
     const char* name;
     std::function<void(VentricularEvidence&)> change;
     double log_odds;
   } const all[] = {
-      {"twice the area", [](auto& e) { e.log_area = std::log(2.0); }, 0.9},
-      {"of a kind of twice the area", [](auto& e) { e.log_kind_area = std::log(2.0); }, 3.7},
-      {"of another shape", [](auto& e) { e.strangeness = 0.12; }, 6.9},
-      {"of a shape that is like none", [](auto& e) { e.strangeness = 1.3; }, 6.9},
-      {"half as like", [](auto& e) { e.strangeness = 0.05; }, 3.45},
-      {"after two thirds of a cycle", [](auto& e) { e.log_rr = std::log(2.0 / 3.0); }, 3.7},
-      {"after a cycle that was as short", [](auto& e) { e.log_rr_before = std::log(2.0 / 3.0); }, -2.1},
+      {"less unlike than most usual ones", [](auto& e) { e.unlike = 0.1; }, 0.0},
+      {"four times e as unlike", [](auto& e) { e.unlike = 4.0 * std::exp(1.0); }, 4.3},
+      {"as noise is", [](auto& e) { e.unlike = 60.0; }, 9.3},
+      {"more than that", [](auto& e) { e.unlike = 1e5; }, 9.3},
+      {"early by two deviations", [](auto& e) { e.log_rr = -0.12; }, 2.7},
+      {"by six", [](auto& e) { e.log_rr = -0.36; }, 5.4},
+      {"as early, where the rhythm scatters", [](auto& e) { e.log_rr = -0.36, e.spread = 0.21; }, 2.0},
+      {"late", [](auto& e) { e.log_rr = 0.5; }, -1.35},
+      {"after a cycle that was as short", [](auto& e) { e.log_rr_before = std::log(2.0 / 3.0); }, -1.14},
+      {"after a pause", [](auto& e) { e.log_rr_before = 1.5; }, 1.96},
+      {"of another kind that has recurred", [](auto& e) { e.apart = true; }, 1.8},
+      {"of a kind that comes so", [](auto& e) { e.coupled = true; }, 3.1},
   };
   for (const auto& worth : all) {
-    VentricularEvidence evidence;
+    VentricularEvidence evidence = usual();
     worth.change(evidence);
-    EXPECT_NEAR(log_odds(evidence) - usual, worth.log_odds, 0.1 * std::abs(worth.log_odds)) << worth.name;
+    EXPECT_NEAR(log_odds(evidence) - base, worth.log_odds, 0.1 * std::abs(worth.log_odds) + 1e-9) << worth.name;
   }
-}
-
-// Of a triangle that rises by 1 in ten points and falls again.
-TEST(VentricularEvidence, TheAreaIsWhatTheComplexCoversOnEitherSideOfTheLine) {
-  QrsShape up;
-  up.points = 20;
-  for (int i = 0; i < 20; ++i) up.slope[static_cast<std::size_t>(i)] = i < 10 ? 0.1F : -0.1F;
-  QrsShape down = up;
-  for (float& slope : down.slope) slope = -slope;
-  EXPECT_NEAR(area(up), 10.0, 1e-5);
-  EXPECT_NEAR(area(down), 10.0, 1e-5);
-  EXPECT_EQ(area(QrsShape{}), 0.0);
 }
 
 }  // namespace
