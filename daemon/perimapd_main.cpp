@@ -46,10 +46,10 @@ struct Signals {
 
 // A session over whatever `make_feeder` gives for the pipeline's entrance. `given`: the file as loaded by itself.
 template <class MakeFeeder>
-Outcome run_session(const std::string& configuration_file, const Configuration& given,
+Outcome run_session(const Console& console, const std::string& configuration_file, const Configuration& given,
                     const Configuration& configuration, const PipelineSettings& settings, const Identity& identity,
                     Signals& signals, const MakeFeeder& make_feeder) {
-  const Logging logging(configuration.log.level);
+  const Logging logging(console.name(), configuration.log.level);
   if (!configuration.dds.enabled) {
     return refuse(fmt::format("{}: key 'dds.enabled': expected true, since nothing else publishes", configuration_file),
                   ExitCode::kWrongUsage);
@@ -134,7 +134,7 @@ DeviceRecording prepare_recording(const std::string& configuration_file, const D
   return recording;
 }
 
-Outcome run(const std::string& configuration_file) {
+Outcome run(const std::string& configuration_file, const Console& console) {
   auto stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
   auto reload = ReloadSignal::install();
@@ -149,8 +149,8 @@ Outcome run(const std::string& configuration_file) {
   if (!given->replay.recording && names_devices(*given)) {
     auto setup = prepare_devices(configuration_file, *given);
     if (!setup) return refuse(setup.error());
-    return run_session(configuration_file, *given, setup->configuration, setup->pipeline, setup->identity, signals,
-                       [&setup, &configuration_file](SensorEntrance& entrance) {
+    return run_session(console, configuration_file, *given, setup->configuration, setup->pipeline, setup->identity,
+                       signals, [&setup, &configuration_file](SensorEntrance& entrance) {
                          return std::make_unique<DeviceFeeder>(std::move(setup->devices), &entrance,
                                                                prepare_recording(configuration_file, *setup));
                        });
@@ -170,8 +170,8 @@ Outcome run(const std::string& configuration_file) {
   }
   auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
   if (!setup) return refuse(setup.error());
-  return run_session(configuration_file, *given, setup->configuration, setup->pipeline, setup->identity, signals,
-                     [&setup](SensorEntrance& entrance) {
+  return run_session(console, configuration_file, *given, setup->configuration, setup->pipeline, setup->identity,
+                     signals, [&setup](SensorEntrance& entrance) {
                        return std::make_unique<ReplayFeeder>(std::move(setup->reader), SensorIntake{&entrance});
                      });
 }
@@ -186,7 +186,7 @@ int parse_and_run(int argc, char** argv) {
         command.add_option("-c,--config", configuration_file, "Configuration file (TOML; see config/replay.toml)")
             ->required();
       },
-      [&](const Console&) { return run(configuration_file); }, argc, argv);
+      [&](const Console& console) { return run(configuration_file, console); }, argc, argv);
 }
 
 }  // namespace

@@ -8,8 +8,9 @@
 
 namespace perimap {
 
-// Results go to standard output; everything else goes through this to standard error, the program's name before each
-// line, so that it can be told from what other programs of a script say. Any thread may call it: lines stay whole.
+// Results go to standard output; everything else goes to standard error through this, StatusLine or Logging, the
+// program's name before each line, so that it can be told from what other programs of a script say. (The journal knows
+// the program itself.) Any thread may call it: lines stay whole.
 class Console {
  public:
   // `name`: "perimapd", "perimap replay".

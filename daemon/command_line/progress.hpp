@@ -5,23 +5,21 @@
 #include <cstdint>
 #include <string>
 
+#include "daemon/command_line/status_line.hpp"
+
 namespace perimap {
 
 class Progress {
  public:
   // `unit`: what is counted, such as "frames".
-  Progress(std::string unit, std::uint64_t total);
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
-  ~Progress();  // leaves the terminal's line
+  Progress(const Console& console, std::string unit, std::uint64_t total);
 
   void update(std::uint64_t done);
 
  private:
   std::string unit_;
   std::uint64_t total_;
-  bool terminal_;
-  bool line_open_ = false;
+  StatusLine line_;
   std::uint64_t tenth_ = 0;
   std::chrono::steady_clock::time_point begin_;
   std::chrono::steady_clock::time_point shown_{};

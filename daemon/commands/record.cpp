@@ -98,7 +98,7 @@ Outcome record(const RecordOptions& options, const Console& console) {
                                           static_cast<std::size_t>(basis->configuration.recording.memory_MB) << 20U);
   if (!recorder) return refuse(recorder.error());
 
-  const Logging logging(basis->configuration.log.level);
+  const Logging logging(console.name(), basis->configuration.log.level);
   const Instant start = MonotonicClock::now();
   DeviceFeeder feeder(std::move(*devices), nullptr, {std::move(*recorder), {}});
   ThreadLauncher threads({});

@@ -58,7 +58,7 @@ bool standard_error_is_the_journal() {
 
 }  // namespace
 
-Logging::Logging(LogConfiguration::Level level) {
+Logging::Logging(std::string_view name, LogConfiguration::Level level) {
   spdlog::init_thread_pool(kQueuedLines, 1, [] { pthread_setname_np(pthread_self(), "log"); });
   auto logger =
       std::make_shared<spdlog::async_logger>("perimap", std::make_shared<spdlog::sinks::stderr_sink_mt>(),
@@ -67,7 +67,7 @@ Logging::Logging(LogConfiguration::Level level) {
   if (standard_error_is_the_journal()) {
     formatter->add_flag<JournalSeverity>('*').set_pattern("%*%v");
   } else {
-    formatter->set_pattern("%Y-%m-%d %H:%M:%S.%e %l: %v");
+    formatter->set_pattern(std::string(name) + ": %Y-%m-%d %H:%M:%S.%e %l: %v");
   }
   logger->set_formatter(std::move(formatter));
   logger->set_level(to_spdlog(level));

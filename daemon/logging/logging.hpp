@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string_view>
 
 #include "daemon/config/configuration.hpp"
 
@@ -9,11 +10,12 @@ namespace perimap {
 
 // While it lives, spdlog's default logger (spdlog::info(...) and so on) puts lines into a bounded queue; when the queue
 // is full the oldest line is dropped and counted, so that no caller waits for a slow terminal. On the journal each
-// line carries its severity (sd-daemon(3)), elsewhere time and severity. Not for the real-time path: it locks and
-// formats. One at a time.
+// line carries its severity (sd-daemon(3)), elsewhere the program's name, time and severity. Not for the real-time
+// path: it locks and formats. One at a time.
 class Logging {
  public:
-  explicit Logging(LogConfiguration::Level level);
+  // `name`: the program's, as Console has it.
+  Logging(std::string_view name, LogConfiguration::Level level);
   Logging(const Logging&) = delete;
   Logging& operator=(const Logging&) = delete;
   // Writes what is queued.

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -99,7 +98,7 @@ class Scratch {
   std::filesystem::path path_;
 };
 
-Outcome measure(const BenchOptions& options) {
+Outcome measure(const BenchOptions& options, const Console& console) {
   const std::string& recording = options.settings.input.recording;
   if (auto apart =
           check_apart({{"--json", options.json}, {"--html", options.html}}, {{"the recording itself", recording}});
@@ -114,7 +113,7 @@ Outcome measure(const BenchOptions& options) {
                                                                : std::filesystem::path(options.scratch));
   if (!scratch) return refuse(scratch.error());
   keep_to_ourselves();
-  const Logging logging(LogConfiguration::Level::kError);
+  const Logging logging(console.name(), LogConfiguration::Level::kError);
 
   bench::BenchSettings settings = options.settings;
   if (options.security) settings.parts.insert(bench::kSecurityPart);
@@ -131,9 +130,8 @@ Outcome measure(const BenchOptions& options) {
   if (options.security) {
     if (const auto made = make_keys(scratch->path(), settings.input); !made) return refuse(made.error());
   }
-  const auto report = bench::run_bench(settings, *stop, [](int number, int all, const std::string& name) {
-    fmt::print(stderr, "{:3}/{} {}\n", number, all, name);
-    (void)std::fflush(stderr);
+  const auto report = bench::run_bench(settings, *stop, [&](int number, int all, const std::string& name) {
+    console.complain(fmt::format("{:3}/{} {}", number, all, name));
   });
   if (!report) return refuse(report.error());
   if (!options.json.empty()) {
@@ -175,7 +173,7 @@ void add_bench_command(Commands& commands) {
   Command& command = commands.add(
       "bench",
       "Measure latencies by replaying a recording through the whole runtime, with subscribers in other processes",
-      [options](const Console&) { return measure(*options); });
+      [options](const Console& console) { return measure(*options, console); });
   bench::BenchSettings& settings = options->settings;
   command.add_option("RECORDING", settings.input.recording, "The recording (MCAP)")->required();
   command.add_option("-c,--config", options->configuration,

@@ -43,9 +43,9 @@ std::string misuse(const EcgOptions& options) {
 }
 
 // None: a signal came.
-std::optional<EcgAnalysis> analyse_until_stopped(const EcgTrace& trace, StopSignal& stop) {
+std::optional<EcgAnalysis> analyse_until_stopped(const EcgTrace& trace, StopSignal& stop, const Console& console) {
   std::optional<Progress> progress;
-  if (trace.mV.size() > kLongWithoutProgress) progress.emplace("samples", trace.mV.size());
+  if (trace.mV.size() > kLongWithoutProgress) progress.emplace(console, "samples", trace.mV.size());
   bool stopped = false;
   EcgAnalysis analysis = analyse(trace, [&](std::size_t done) {
     if (progress) progress->update(done);
@@ -81,7 +81,7 @@ Outcome find_beats(const EcgOptions& options, const Console& console) {
   for (const Error& damage : input->damage) console.complain(damage);
   console.complain(input->whole_until);
   console.complain(reference_ends_early(options, reference, input->trace));
-  const auto analysis = analyse_until_stopped(input->trace, *stop);
+  const auto analysis = analyse_until_stopped(input->trace, *stop, console);
   if (!analysis) return refuse("stopped by a signal; nothing was written");
 
   if (!options.beats.empty()) {

@@ -76,7 +76,7 @@ Expected<void> write_files(const TraceExperiment& experiment, const std::filesys
   return {};
 }
 
-Outcome predict_trace(const ExperimentOptions& options) {
+Outcome predict_trace(const ExperimentOptions& options, const Console& console) {
   if (options.trace.empty()) return refuse(Error{"experiment 3: needs a motion trace: --trace FILE"});
   const auto trace = read_motion_trace(options.trace);
   if (!trace) return refuse(trace.error());
@@ -89,7 +89,7 @@ Outcome predict_trace(const ExperimentOptions& options) {
   Expected<TraceExperiment> experiment = tl::unexpected(Error{});
   {
     const int starts = std::max(options.of_trace.to - options.of_trace.from + 1, 1);
-    Progress progress("starts", static_cast<std::uint64_t>(starts));
+    Progress progress(console, "starts", static_cast<std::uint64_t>(starts));
     experiment = run_trace_experiment(options.of_trace, *trace, r_peaks_s,
                                       [&](int done) { progress.update(static_cast<std::uint64_t>(done)); });
   }
@@ -101,14 +101,14 @@ Outcome predict_trace(const ExperimentOptions& options) {
   return {};
 }
 
-Outcome repeat(const ExperimentOptions& options) {
+Outcome repeat(const ExperimentOptions& options, const Console& console) {
   if (!options.out.empty()) {
     if (const auto able = prepare_folder(options.out); !able) return refuse(able.error());
   }
-  if (options.settings.number == 3) return predict_trace(options);
+  if (options.settings.number == 3) return predict_trace(options, console);
   Expected<Experiment> experiment = tl::unexpected(Error{});
   {
-    Progress progress("trials", static_cast<std::uint64_t>(options.settings.trials));
+    Progress progress(console, "trials", static_cast<std::uint64_t>(options.settings.trials));
     experiment =
         run_experiment(options.settings, [&](int trials) { progress.update(static_cast<std::uint64_t>(trials)); });
   }
@@ -127,7 +127,7 @@ void add_experiment_command(Commands& commands) {
   Command& command = commands.add("experiment",
                                   "Repeat an experiment of the paper: static EKF, EKF on the Fourier state, the "
                                   "paper's filter, ours, batch MAP and the Cramer-Rao bound on simulated trials",
-                                  [options](const Console&) { return repeat(*options); });
+                                  [options](const Console& console) { return repeat(*options, console); });
   command
       .add_option(
           "NUMBER", options->settings.number,

@@ -26,6 +26,7 @@ Outcome replay(const ReplayCommandOptions& options, const Console& console) {
   ReplayOptions wanted = options.replay;
   if (!options.configuration.empty()) wanted.configuration = options.configuration;
   if (options.whole) wanted.mode = ReadMode::kWhole;
+  wanted.program = console.name();
   wanted.generator = "perimap replay " PERIMAP_VERSION;
   const Output json{"--json", options.json};
   if (auto apart = check_apart({json, {"--samples", wanted.samples}}, {{"the recording itself", wanted.recording}});
@@ -36,8 +37,8 @@ Outcome replay(const ReplayCommandOptions& options, const Console& console) {
   auto stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
   std::optional<Progress> progress;
-  const auto report = run_replay(wanted, *stop, [&progress](std::uint64_t frames, std::uint64_t all) {
-    if (!progress) progress.emplace("frames", all);
+  const auto report = run_replay(wanted, *stop, [&](std::uint64_t frames, std::uint64_t all) {
+    if (!progress) progress.emplace(console, "frames", all);
     progress->update(frames);
   });
   progress.reset();

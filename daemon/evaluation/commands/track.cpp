@@ -24,9 +24,9 @@ Outcome track(const FollowSettings& settings, const Console& console) {
   auto stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
   std::optional<Progress> progress;
-  const auto summary = follow_features(settings, *stop, [&progress](std::uint64_t frames, std::uint64_t all) {
+  const auto summary = follow_features(settings, *stop, [&](std::uint64_t frames, std::uint64_t all) {
     if (all == 0) return;
-    if (!progress) progress.emplace("frames", all);
+    if (!progress) progress.emplace(console, "frames", all);
     progress->update(frames);
   });
   progress.reset();

@@ -144,7 +144,7 @@ tl::expected<ReplayReport, SetupError> run_replay(
   if (*truth) beats = load_beats(options.recording, options.mode);
   if (!beats) return failed(beats.error());
 
-  const Logging logging(setup->configuration.log.level);
+  const Logging logging(options.program, setup->configuration.log.level);
   std::unique_ptr<PublicationRecorder> recorder;
   if (!options.samples.empty()) {
     auto created = PublicationRecorder::create(options.samples, options.generator, options.lockstep,

@@ -20,6 +20,7 @@ struct ReplayOptions {
   bool lockstep = false;                               // virtual time, or else real time
   int workers = 0;                                     // 0: the configuration's
   std::string samples;                                 // a recording of what is published; empty: none
+  std::string program = "perimap replay";              // before each line of the log
   std::string generator;                               // what it says to have written it
   bool dds = false;                                    // publish, too
   ReadMode mode = ReadMode::kStrict;

@@ -67,11 +67,11 @@ Expected<SeenBoard> seen_in_pictures(const CameraOptions& options, const BoardWi
   return seen;
 }
 
-Expected<SeenBoard> seen_in_recording(const CameraOptions& options, const BoardWish& wish) {
+Expected<SeenBoard> seen_in_recording(const CameraOptions& options, const BoardWish& wish, const Console& console) {
   constexpr double kFrames_per_s = 2.0;
   std::optional<Progress> progress;
   auto found = find_recorded_board(options.recording, wish, kFrames_per_s, [&](std::uint64_t done, std::uint64_t all) {
-    if (!progress) progress.emplace("frames", all);
+    if (!progress) progress.emplace(console, "frames", all);
     progress->update(done);
   });
   progress.reset();
@@ -81,10 +81,11 @@ Expected<SeenBoard> seen_in_recording(const CameraOptions& options, const BoardW
   return seen;
 }
 
-Expected<Measurement> measure(const CameraOptions& options) {
+Expected<Measurement> measure(const CameraOptions& options, const Console& console) {
   const auto wish = wish_of(options.board);
   if (!wish) return tl::unexpected(wish.error());
-  const auto seen = options.recording.empty() ? seen_in_pictures(options, *wish) : seen_in_recording(options, *wish);
+  const auto seen =
+      options.recording.empty() ? seen_in_pictures(options, *wish) : seen_in_recording(options, *wish, console);
   if (!seen) return tl::unexpected(seen.error());
   CameraCalibrationSettings settings;
   if (options.lens == "fisheye") settings.lens = Lens::kKannalaBrandt;
@@ -130,7 +131,7 @@ Outcome run(CameraOptions& options, const Console& console) {
   constexpr double kLeast_s = 20.0;
   const auto guide = board_guide(*wish, std::nullopt, kLeast_s);
   return with_recording(options.live, kScopeTool, *guide, console, options.recording,
-                        [&] { return finish(measure(options), options.common, from); });
+                        [&] { return finish(measure(options, console), options.common, from); });
 }
 
 }  // namespace

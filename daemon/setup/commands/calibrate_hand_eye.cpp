@@ -44,8 +44,8 @@ struct HandEyeOptions {
 };
 
 Expected<HandEyeCalibration> by_recording(const RecordedOptions& recorded, const CommonOptions& common,
-                                          const HandEyeSettings& settings) {
-  auto motion = recorded_motion(recorded, common.configuration);
+                                          const HandEyeSettings& settings, const Console& console) {
+  auto motion = recorded_motion(recorded, common.configuration, console);
   if (!motion) return tl::unexpected(motion.error());
   auto result = calibrate_hand_eye(std::move(motion->camera_poses), std::move(motion->sensor_poses), settings);
   if (!result) return fail(recorded.recording + ": " + result.error().message);
@@ -76,9 +76,9 @@ Expected<std::optional<std::string>> sensor_of(const HandEyeOptions& options) {
   return calibrated_sensor(options.recorded.recording, configuration, file);
 }
 
-Expected<Measurement> measure(const HandEyeOptions& options) {
-  const auto result =
-      options.is_recorded() ? by_recording(options.recorded, options.common, options.settings) : by_files(options);
+Expected<Measurement> measure(const HandEyeOptions& options, const Console& console) {
+  const auto result = options.is_recorded() ? by_recording(options.recorded, options.common, options.settings, console)
+                                            : by_files(options);
   if (!result) return tl::unexpected(result.error());
   Measurement measured{text_of(*result), json_of(*result), {}};
   measured.keys = {{"hand_eye_translation_SC_mm", list_of(measured.json["translation_mm"])},
@@ -114,10 +114,10 @@ struct TimeOptions {
 };
 
 // By the motion of a board in view: what hand-eye calibration says of the clocks.
-Expected<Measurement> measure_recorded(const TimeOptions& options) {
+Expected<Measurement> measure_recorded(const TimeOptions& options, const Console& console) {
   HandEyeSettings settings;
   settings.largest_offset_s = options.largest_offset_s;
-  const auto result = by_recording(options.recorded, options.common, settings);
+  const auto result = by_recording(options.recorded, options.common, settings, console);
   if (!result) return tl::unexpected(result.error());
   if (!result->offset_measured) {
     return fail(options.recorded.recording +
@@ -137,8 +137,8 @@ Expected<Measurement> measure_recorded(const TimeOptions& options) {
   return measured;
 }
 
-Expected<Measurement> measure(const TimeOptions& options) {
-  if (options.is_recorded()) return measure_recorded(options);
+Expected<Measurement> measure(const TimeOptions& options, const Console& console) {
+  if (options.is_recorded()) return measure_recorded(options, console);
   if (options.signals.size() != 2) {
     return fail("calibrate time takes two signals, --signal A.csv --signal B.csv, or a recording with --from");
   }
@@ -175,7 +175,7 @@ Outcome run(Options& options, const Console& console) {
   const auto guide = live_board_guide(options.live, options.recorded, options.common.configuration, kLeast_s);
   if (!guide) return refuse(guide.error());
   return with_recording(options.live, kScopeTool, **guide, console, options.recorded.recording,
-                        [&] { return finish(measure(options), options.common, made_from); });
+                        [&] { return finish(measure(options, console), options.common, made_from); });
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <mutex>
 #include <system_error>
 #include <thread>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "daemon/command_line/command.hpp"
+#include "daemon/command_line/status_line.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/tracked_tools.hpp"
 #include "daemon/process/saved_signal_mask.hpp"
@@ -84,26 +84,16 @@ class Shown final : public FrameObserver {
 // A line on a terminal, or one every five seconds elsewhere.
 class Lines {
  public:
+  explicit Lines(const Console& console) : line_(console) {}
   void show(double elapsed_s, const std::string& line) {
-    if (::isatty(STDERR_FILENO) != 0) {
-      fmt::print(stderr, "\r\x1b[K{:.0f} s: {}", elapsed_s, line);
-      (void)std::fflush(stderr);
-      open_ = true;
-    } else if (elapsed_s >= next_s_) {
-      fmt::print(stderr, "{:.0f} s: {}\n", elapsed_s, line);
-      constexpr double kEvery_s = 5.0;
-      next_s_ = elapsed_s + kEvery_s;
-    }
+    if (!line_.on_terminal() && elapsed_s < next_s_) return;
+    line_.show(fmt::format("{:.0f} s: {}", elapsed_s, line));
+    constexpr double kEvery_s = 5.0;
+    next_s_ = elapsed_s + kEvery_s;
   }
-  ~Lines() {
-    if (open_) fmt::print(stderr, "\n");
-  }
-  Lines() = default;
-  Lines(const Lines&) = delete;
-  Lines& operator=(const Lines&) = delete;
 
  private:
-  bool open_ = false;
+  StatusLine line_;
   double next_s_ = 0.0;
 };
 
@@ -214,7 +204,7 @@ Expected<LiveRecording> record_live(const LiveOptions& options, const std::strin
   const Instant begin = MonotonicClock::now();
   constexpr Duration kTick = std::chrono::milliseconds(200);
   {
-    Lines lines;
+    Lines lines(console);
     for (;;) {
       const bool stopped = stop->wait_for(kTick);
       const double elapsed_s = to_seconds(MonotonicClock::now() - begin);

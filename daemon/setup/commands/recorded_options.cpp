@@ -47,7 +47,8 @@ Expected<void> check_motion_options(const RecordedOptions& options, const std::s
   return {};
 }
 
-Expected<RecordedMotion> recorded_motion(const RecordedOptions& options, const std::string& configuration) {
+Expected<RecordedMotion> recorded_motion(const RecordedOptions& options, const std::string& configuration,
+                                         const Console& console) {
   if (const auto able = check_motion_options(options, configuration); !able) return tl::unexpected(able.error());
   const auto wish = wish_of(options.board);
   auto camera = lens_of(options, configuration);
@@ -61,7 +62,7 @@ Expected<RecordedMotion> recorded_motion(const RecordedOptions& options, const s
   constexpr double kFrames_per_s = 15.0;
   std::optional<Progress> progress;
   auto board = find_recorded_board(options.recording, *wish, kFrames_per_s, [&](std::uint64_t done, std::uint64_t all) {
-    if (!progress) progress.emplace("frames", all);
+    if (!progress) progress.emplace(console, "frames", all);
     progress->update(done);
   });
   progress.reset();

@@ -9,6 +9,7 @@
 #include "core/calibration/turned_scope.hpp"
 #include "core/error/expected.hpp"
 #include "core/geometry/camera_model.hpp"
+#include "daemon/command_line/console.hpp"
 #include "daemon/setup/commands/board_options.hpp"
 #include "daemon/setup/recorded_board.hpp"
 
@@ -44,7 +45,7 @@ struct RecordedMotion {
 
 // The scope's motion as camera and tracker saw it. Fails when the board's size is not told, with which lengths would be
 // in squares.
-[[nodiscard]] Expected<RecordedMotion> recorded_motion(const RecordedOptions& options,
-                                                       const std::string& configuration);
+[[nodiscard]] Expected<RecordedMotion> recorded_motion(const RecordedOptions& options, const std::string& configuration,
+                                                       const Console& console);
 
 }  // namespace perimap

@@ -142,7 +142,7 @@ Expected<void> sensor_fits(Configuration configuration, const VerifyOptions& opt
   return {};
 }
 
-Expected<Verification> verify(const VerifyOptions& options) {
+Expected<Verification> verify(const VerifyOptions& options, const Console& console) {
   const auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
   if (!configuration) return tl::unexpected(configuration.error());
   if (const auto fits = sensor_fits(*configuration, options); !fits) return tl::unexpected(fits.error());
@@ -160,7 +160,7 @@ Expected<Verification> verify(const VerifyOptions& options) {
   }
   const auto touch = touch_of(options);
   if (!touch) return tl::unexpected(touch.error());
-  const auto motion = recorded_motion(recorded, options.configuration);
+  const auto motion = recorded_motion(recorded, options.configuration, console);
   if (!motion) return tl::unexpected(motion.error());
   auto result = verify_setup(motion->camera_poses, motion->sensor_poses, middle_of(motion->board.views), setup, *touch,
                              options.bound_mm);
@@ -187,8 +187,8 @@ std::string advice_of(const Verification& result) {
          "whether the point touched is the one named";
 }
 
-Outcome verified(const VerifyOptions& options, const std::string& made_from) {
-  const auto result = verify(options);
+Outcome verified(const VerifyOptions& options, const std::string& made_from, const Console& console) {
+  const auto result = verify(options, console);
   if (!result) return refuse(result.error());
   Measurement measured{text_of(*result), json_of(*result, options), {}};
   measured.plots = plots_of(*result);
@@ -218,7 +218,7 @@ Outcome run(VerifyOptions& options, const Console& console) {
   const auto guide = live_board_guide(live, options.recorded, options.configuration, kLeast_s);
   if (!guide) return refuse(guide.error());
   return with_recording(live, kScopeTool, **guide, console, options.recorded.recording,
-                        [&] { return verified(options, made_from); });
+                        [&] { return verified(options, made_from, console); });
 }
 
 }  // namespace

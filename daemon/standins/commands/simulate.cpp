@@ -64,7 +64,7 @@ Outcome check_new(const std::filesystem::path& path, const SimulateOptions& opti
   return refuse(path.string() + ": the file exists; --force overwrites it", ExitCode::kWrongUsage);
 }
 
-Outcome simulate_bench(const SimulateOptions& options) {
+Outcome simulate_bench(const SimulateOptions& options, const Console& console) {
   const auto begin = std::chrono::steady_clock::now();
   auto settings = options.simulation.bench(*options.act);
   if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
@@ -89,7 +89,7 @@ Outcome simulate_bench(const SimulateOptions& options) {
   }
   const TrackerNoise noise = options.simulation.noise();
   {
-    Progress progress("frames", scene->frames().size());
+    Progress progress(console, "frames", scene->frames().size());
     const auto written = write_bench(*scene, options.out, noise, options.thread_count(),
                                      [&](std::uint64_t frames) { progress.update(frames); });
     if (!written) return refuse(written.error());
@@ -118,7 +118,7 @@ std::vector<SimulatedRecording> planned(const SimulateOptions& options) {
   return recordings;
 }
 
-Outcome simulate(const SimulateOptions& options) {
+Outcome simulate(const SimulateOptions& options, const Console& console) {
   const bool of_bench = !options.truth.empty() || !options.landmarks.empty();
   if (!options.act && of_bench) {
     return refuse("--truth, --landmarks: expected --scene board, still or landmarks", ExitCode::kWrongUsage);
@@ -139,7 +139,7 @@ Outcome simulate(const SimulateOptions& options) {
   if (options.act && !options.tracker_noises_mm.empty()) {
     return refuse("--tracker-noises: expected --scene heart; a bench has one, --tracker-noise", ExitCode::kWrongUsage);
   }
-  if (options.act) return simulate_bench(options);
+  if (options.act) return simulate_bench(options, console);
   const auto begin = std::chrono::steady_clock::now();
   auto settings = options.simulation.settings();
   if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
@@ -163,7 +163,7 @@ Outcome simulate(const SimulateOptions& options) {
   const auto simulation = Simulation::create(*settings, threaded_for(threads));
   if (!simulation) return refuse(simulation.error(), ExitCode::kWrongUsage);
   {
-    Progress progress("frames", simulation->frames().size());
+    Progress progress(console, "frames", simulation->frames().size());
     const auto written = write_simulation(*simulation, recordings, threads, [&](std::uint64_t frames) {
       progress.update(frames);
       return !stop->requested();
@@ -190,7 +190,7 @@ void add_simulate_command(Commands& commands) {
                                   "Write a recording of a beating heart with its ground truth: real motion, real ECG, "
                                   "rendered images; or of a bench "
                                   "on which a set-up is measured",
-                                  [options](const Console&) { return simulate(*options); });
+                                  [options](const Console& console) { return simulate(*options, console); });
   command.add_option("OUT", options->out, "The recording to write (.mcap)")->required();
   Option* noise = options->simulation.add_to(command);
   command

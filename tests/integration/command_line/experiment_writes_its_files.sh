@@ -19,7 +19,7 @@ for number in 1 2; do
   done
   [ "$(grep -cE '^(static EKF|EKF, Fourier|iterated|delayed|batch|Cramer-Rao)' "$out.table")" -eq 6 ] ||
     fail "experiment $number: not six methods in the table"
-  grep -q '^100%' "$out.progress" || fail "experiment $number: no progress on standard error"
+  grep -q '^perimap experiment: 100%' "$out.progress" || fail "experiment $number: no progress on standard error"
   for page in "$out/a/experiment-$number.html" "$out/a/experiment-$number.json" "$out/a/experiment-$number.csv"; do
     [ -s "$page" ] || fail "$page is missing"
   done

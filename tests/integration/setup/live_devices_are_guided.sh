@@ -26,7 +26,7 @@ play() {
 }
 live() { TMPDIR=$work/temporary "$perimap" "$@" 2> told; }
 # told_lines N: that so many lines, one every five seconds, told how it goes
-told_lines() { [ "$(grep -cE '^[0-9]+ s: ' told)" -ge "$1" ] || fail "how it goes was hardly told: $(cat told)"; }
+told_lines() { [ "$(grep -cE '^perimap [a-z -]+: [0-9]+ s: ' told)" -ge "$1" ] || fail "how it goes was hardly told: $(cat told)"; }
 nothing_left() { [ -z "$(ls temporary)" ] || fail "$1 left something behind: $(ls temporary)"; }
 
 "$perimap" simulate board.mcap --scene board --setup-seed "$seed" --seed "$seed" --size 640x480 --duration 45 --fps 15 \

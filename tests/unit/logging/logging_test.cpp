@@ -13,18 +13,19 @@ namespace perimap {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 using ::testing::Not;
 
 TEST(Logging, WritesTheLevelsAskedForAndLeavesTheOthersOut) {
   ::testing::internal::CaptureStderr();
   {
-    const Logging logging(LogConfiguration::Level::kWarning);
+    const Logging logging("perimapd", LogConfiguration::Level::kWarning);
     spdlog::info("unheard");
     spdlog::warn("camera {} gone", 3);
     EXPECT_EQ(logging.overruns(), 0U);
   }
   const std::string output = ::testing::internal::GetCapturedStderr();
-  EXPECT_THAT(output, HasSubstr(" warning: camera 3 gone\n"));
+  EXPECT_THAT(output, MatchesRegex("perimapd: [-0-9]+ [0-9:.]+ warning: camera 3 gone\n"));
   EXPECT_THAT(output, Not(HasSubstr("unheard")));
 }
 
@@ -34,7 +35,7 @@ TEST(Logging, MarksSeverityWhenStandardErrorIsTheJournal) {
   ASSERT_EQ(fstat(STDERR_FILENO, &status), 0);
   setenv("JOURNAL_STREAM", (std::to_string(status.st_dev) + ":" + std::to_string(status.st_ino)).c_str(), 1);
   {
-    const Logging logging(LogConfiguration::Level::kInfo);
+    const Logging logging("perimapd", LogConfiguration::Level::kInfo);
     spdlog::error("lead off");
   }
   unsetenv("JOURNAL_STREAM");
