@@ -10,6 +10,7 @@
 #include "core/geometry/camera_model.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "daemon/config/configuration.hpp"
+#include "daemon/config/setup_error.hpp"
 #include "daemon/publishing/identity.hpp"
 #include "daemon/runtime/live_runtime.hpp"
 #include "drivers/recording/replay_reader.hpp"
@@ -23,12 +24,6 @@ struct ReplaySetup {
   Duration utc_minus_monotonic{0};  // of the recording
   std::vector<Error> passed_over;   // keys of its configuration that do not describe the session (ReadMode::kWhole)
   ReplayReader reader;              // at the first event
-};
-
-// `configuration` tells whether it is the configuration that is wrong, or the recording.
-struct SetupError {
-  Error error;
-  bool configuration = false;
 };
 
 // What a recording and a configuration file over it come to.

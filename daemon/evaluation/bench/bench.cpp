@@ -72,8 +72,8 @@ std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_real
   return cases;
 }
 
-Expected<BenchReport> run_bench(const BenchSettings& settings, StopSignal& stop,
-                                const std::function<void(int, int, const std::string&)>& on_run) {
+SetupExpected<BenchReport> run_bench(const BenchSettings& settings, StopSignal& stop,
+                                     const std::function<void(int, int, const std::string&)>& on_run) {
   BenchReport report;
   report.settings = settings;
   report.machine = this_machine();

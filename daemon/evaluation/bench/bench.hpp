@@ -45,8 +45,8 @@ struct BenchReport {
 };
 
 // `on_run(number, all, name)` is called before each run, the first of which is number 1.
-[[nodiscard]] Expected<BenchReport> run_bench(const BenchSettings& settings, StopSignal& stop,
-                                              const std::function<void(int, int, const std::string&)>& on_run);
+[[nodiscard]] SetupExpected<BenchReport> run_bench(const BenchSettings& settings, StopSignal& stop,
+                                                   const std::function<void(int, int, const std::string&)>& on_run);
 
 // The runs that the settings ask for. `may_be_realtime`: without it those with SCHED_FIFO are left out.
 [[nodiscard]] std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_realtime);

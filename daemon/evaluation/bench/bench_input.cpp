@@ -9,9 +9,9 @@
 
 namespace perimap::bench {
 
-Expected<ReplaySetup> prepare_run(const BenchInput& input, int features, int workers) {
+SetupExpected<ReplaySetup> prepare_run(const BenchInput& input, int features, int workers) {
   auto setup = prepare_replay(input.recording, input.configuration, ReadMode::kStrict);
-  if (!setup) return tl::unexpected(std::move(setup.error().error));
+  if (!setup) return setup;
   PipelineSettings& pipeline = setup->pipeline;
   const double pixels = static_cast<double>(pipeline.camera.width) * pipeline.camera.height;
   pipeline.features.maximum = features;

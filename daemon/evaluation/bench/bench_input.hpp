@@ -24,7 +24,7 @@ struct BenchInput {
 
 // The recording at its first event, with so many features at most and so many workers. More features than the
 // configuration's stand closer together: so that twice as many would find room in the image.
-[[nodiscard]] Expected<ReplaySetup> prepare_run(const BenchInput& input, int features, int workers);
+[[nodiscard]] SetupExpected<ReplaySetup> prepare_run(const BenchInput& input, int features, int workers);
 
 // Plays every n-th frame alone and all clocks `speed` times as fast; ends when `length` is played.
 [[nodiscard]] ReplayEdit paced(int every_frame, double speed, Duration length);

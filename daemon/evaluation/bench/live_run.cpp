@@ -187,7 +187,7 @@ Expected<void> add_receipts(std::vector<Subscriber>& subscribers, bool last_is_s
 
 }  // namespace
 
-Expected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case, StopSignal& stop) {
+SetupExpected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case, StopSignal& stop) {
   LiveResult result{live_case, {}, {}};
   LiveFigures& figures = result.figures;
   figures.load_before = load_1_min();

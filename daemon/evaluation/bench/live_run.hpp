@@ -71,6 +71,6 @@ struct LiveResult {
 };
 
 // `stop` ends the run early; what was measured until then counts.
-[[nodiscard]] Expected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case, StopSignal& stop);
+[[nodiscard]] SetupExpected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case, StopSignal& stop);
 
 }  // namespace perimap::bench

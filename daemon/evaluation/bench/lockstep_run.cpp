@@ -64,7 +64,7 @@ std::uint64_t mapped(const PipelineCounters& c) {
 
 }  // namespace
 
-Expected<CostResult> run_cost(const BenchInput& input, int features, StopSignal& stop) {
+SetupExpected<CostResult> run_cost(const BenchInput& input, int features, StopSignal& stop) {
   auto setup = prepare_run(input, features, 1);
   if (!setup) return tl::unexpected(setup.error());
   LockstepSession session(*setup);
@@ -137,8 +137,8 @@ void Rounds::next_round() {
   }
 }
 
-Expected<MemoryResult> run_memory(const BenchInput& input, int features, int workers, std::uint64_t frames,
-                                  StopSignal& stop) {
+SetupExpected<MemoryResult> run_memory(const BenchInput& input, int features, int workers, std::uint64_t frames,
+                                       StopSignal& stop) {
   auto setup = prepare_run(input, features, workers);
   if (!setup) return tl::unexpected(setup.error());
   LockstepSession session(*setup);

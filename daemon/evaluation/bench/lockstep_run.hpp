@@ -22,7 +22,7 @@ struct CostResult {
   LatencyHistogram::Summary compute;  // a frame from A to D, as long as it took
   LatencyHistogram::Summary find;     // A of it
 };
-[[nodiscard]] Expected<CostResult> run_cost(const BenchInput& input, int features, StopSignal& stop);
+[[nodiscard]] SetupExpected<CostResult> run_cost(const BenchInput& input, int features, StopSignal& stop);
 
 struct MemoryReading {
   std::uint64_t frames = 0;
@@ -37,8 +37,8 @@ struct MemoryResult {
 };
 // The recording again and again, until so many frames are mapped. At the seam all sources are silent for a second,
 // which their counts show; all clocks go on, and the map is kept.
-[[nodiscard]] Expected<MemoryResult> run_memory(const BenchInput& input, int features, int workers,
-                                                std::uint64_t frames, StopSignal& stop);
+[[nodiscard]] SetupExpected<MemoryResult> run_memory(const BenchInput& input, int features, int workers,
+                                                     std::uint64_t frames, StopSignal& stop);
 
 // Moves a recording's events on, round after round; between two rounds all sources are silent for kSeam.
 class Rounds {

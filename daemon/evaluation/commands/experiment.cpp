@@ -77,7 +77,6 @@ Expected<void> write_files(const TraceExperiment& experiment, const std::filesys
 }
 
 Outcome predict_trace(const ExperimentOptions& options, const Console& console) {
-  if (options.trace.empty()) return refuse(Error{"experiment 3: needs a motion trace: --trace FILE"});
   const auto trace = read_motion_trace(options.trace);
   if (!trace) return refuse(trace.error());
   std::vector<double> r_peaks_s;
@@ -101,7 +100,16 @@ Outcome predict_trace(const ExperimentOptions& options, const Console& console) 
   return {};
 }
 
+// What is wrong with the options; empty when nothing is.
+std::string misuse(const ExperimentOptions& options) {
+  if (options.settings.number != 3) return {};
+  if (options.trace.empty()) return "experiment 3: needs a motion trace: --trace FILE";
+  if (options.of_trace.to < options.of_trace.from) return "--to: before --from: there is nothing to predict from";
+  return {};
+}
+
 Outcome repeat(const ExperimentOptions& options, const Console& console) {
+  if (const std::string wrong = misuse(options); !wrong.empty()) return refuse(wrong, ExitCode::kWrongUsage);
   if (!options.out.empty()) {
     if (const auto able = prepare_folder(options.out); !able) return refuse(able.error());
   }

@@ -38,7 +38,7 @@ void add_board(Command& command, BoardOptions& options) {
   command.add_option("--dictionary", options.dictionary, "Of the markers, such as 4X4_250 or APRILTAG_36h11");
 }
 
-Expected<BoardWish> wish_of(const BoardOptions& options) {
+SetupExpected<BoardWish> wish_of(const BoardOptions& options) {
   BoardWish wish;
   wish.square_mm = options.square_mm;
   wish.marker_mm = options.marker_mm;
@@ -55,7 +55,7 @@ Expected<BoardWish> wish_of(const BoardOptions& options) {
   const std::string_view size = options.size;
   if (cross == std::string::npos || !side(size.substr(0, cross), wish.columns) ||
       !side(size.substr(cross + 1), wish.rows)) {
-    return fail("--size: expected COLUMNSxROWS, such as 9x6, got " + options.size);
+    return wrong_setup("--size: expected COLUMNSxROWS, such as 9x6, got " + options.size);
   }
   return wish;
 }

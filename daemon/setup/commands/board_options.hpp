@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "core/error/expected.hpp"
+#include "daemon/config/setup_error.hpp"
 #include "daemon/setup/board.hpp"
 
 namespace perimap {
@@ -20,6 +20,6 @@ struct BoardOptions {
 // --board, --size, --square-mm, --marker-mm and --dictionary.
 void add_board(Command& command, BoardOptions& options);
 
-[[nodiscard]] Expected<BoardWish> wish_of(const BoardOptions& options);
+[[nodiscard]] SetupExpected<BoardWish> wish_of(const BoardOptions& options);
 
 }  // namespace perimap

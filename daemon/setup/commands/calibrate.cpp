@@ -41,9 +41,9 @@ struct PosesOptions {
   }
 };
 
-Expected<std::vector<TimedPose>> poses_of(const PosesOptions& options) {
+SetupExpected<std::vector<TimedPose>> poses_of(const PosesOptions& options) {
   if (options.poses.empty() && options.recording.empty()) {
-    return fail("expected a file of poses, a recording with --from, or devices with --live");
+    return wrong_setup("expected a file of poses, a recording with --from, or devices with --live");
   }
   if (!options.recording.empty()) return read_recorded_poses(options.recording, options.tool);
   const auto table = read_pose_table(options.poses, options.common.length_unit());
@@ -60,7 +60,7 @@ Expected<std::string> tool_of(const PosesOptions& options) {
   return handle->value_or(options.tool);
 }
 
-Expected<Measurement> measure_tool(const PosesOptions& options) {
+SetupExpected<Measurement> measure_tool(const PosesOptions& options) {
   const auto poses = poses_of(options);
   if (!poses) return tl::unexpected(poses.error());
   const auto result = calibrate_pivot(*poses);
@@ -74,7 +74,7 @@ Expected<Measurement> measure_tool(const PosesOptions& options) {
   return measured;
 }
 
-Expected<Measurement> measure_tracker(const PosesOptions& options) {
+SetupExpected<Measurement> measure_tracker(const PosesOptions& options) {
   const auto poses = poses_of(options);
   if (!poses) return tl::unexpected(poses.error());
   const auto result = measure_tracker_noise(*poses);
@@ -95,7 +95,7 @@ struct FromPoses {
   const char* poses;
   const char* tool;   // of a recording, where none is named
   bool names_output;  // the configuration is to name the file, and has no keys of the result
-  Expected<Measurement> (*measure)(const PosesOptions&);
+  SetupExpected<Measurement> (*measure)(const PosesOptions&);
   std::unique_ptr<LiveGuide> (*guide)(double least_s);
   double least_s;  // live
 };

@@ -81,7 +81,7 @@ Expected<SeenBoard> seen_in_recording(const CameraOptions& options, const BoardW
   return seen;
 }
 
-Expected<Measurement> measure(const CameraOptions& options, const Console& console) {
+SetupExpected<Measurement> measure(const CameraOptions& options, const Console& console) {
   const auto wish = wish_of(options.board);
   if (!wish) return tl::unexpected(wish.error());
   const auto seen =
@@ -123,10 +123,10 @@ Outcome run(CameraOptions& options, const Console& console) {
                    (options.live.configuration.empty() ? 0 : 1);
   if (ways != 1) {
     return refuse("expected pictures of a board, a recording with --from, or devices with --live",
-                  ways == 0 ? ExitCode::kFailed : ExitCode::kWrongUsage);
+                  ExitCode::kWrongUsage);
   }
   const auto wish = wish_of(options.board);
-  if (!wish) return refuse(wish.error(), ExitCode::kWrongUsage);
+  if (!wish) return refuse(wish.error());
   const std::string from = made_from(options);
   constexpr double kLeast_s = 20.0;
   const auto guide = board_guide(*wish, std::nullopt, kLeast_s);

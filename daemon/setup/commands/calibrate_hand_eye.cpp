@@ -43,18 +43,18 @@ struct HandEyeOptions {
   [[nodiscard]] std::vector<std::string> files() const { return {camera, tracker}; }
 };
 
-Expected<HandEyeCalibration> by_recording(const RecordedOptions& recorded, const CommonOptions& common,
-                                          const HandEyeSettings& settings, const Console& console) {
+SetupExpected<HandEyeCalibration> by_recording(const RecordedOptions& recorded, const CommonOptions& common,
+                                               const HandEyeSettings& settings, const Console& console) {
   auto motion = recorded_motion(recorded, common.configuration, console);
   if (!motion) return tl::unexpected(motion.error());
   auto result = calibrate_hand_eye(std::move(motion->camera_poses), std::move(motion->sensor_poses), settings);
   if (!result) return fail(recorded.recording + ": " + result.error().message);
-  return result;
+  return *std::move(result);
 }
 
-Expected<HandEyeCalibration> by_files(const HandEyeOptions& options) {
+SetupExpected<HandEyeCalibration> by_files(const HandEyeOptions& options) {
   if (options.camera.empty() || options.tracker.empty()) {
-    return fail("expected --camera-poses and --tracker-poses, or a recording with --from");
+    return wrong_setup("expected --camera-poses and --tracker-poses, or a recording with --from");
   }
   const auto camera = read_pose_table(options.camera, options.common.length_unit());
   if (!camera) return tl::unexpected(camera.error());
@@ -64,19 +64,19 @@ Expected<HandEyeCalibration> by_files(const HandEyeOptions& options) {
 }
 
 // None where neither the recording nor the configuration says.
-Expected<std::optional<std::string>> sensor_of(const HandEyeOptions& options) {
+SetupExpected<std::optional<std::string>> sensor_of(const HandEyeOptions& options) {
   Configuration configuration;
   const std::string& file = options.common.configuration;
   if (!file.empty()) {
     auto loaded = load_configuration(file, {}, NamedFiles::kMayBeMissing);
-    if (!loaded) return tl::unexpected(loaded.error());
+    if (!loaded) return wrong_setup(loaded.error());
     configuration = *std::move(loaded);
   }
   if (!options.is_recorded()) return configuration.tracker.sensor;
   return calibrated_sensor(options.recorded.recording, configuration, file);
 }
 
-Expected<Measurement> measure(const HandEyeOptions& options, const Console& console) {
+SetupExpected<Measurement> measure(const HandEyeOptions& options, const Console& console) {
   const auto result = options.is_recorded() ? by_recording(options.recorded, options.common, options.settings, console)
                                             : by_files(options);
   if (!result) return tl::unexpected(result.error());
@@ -114,7 +114,7 @@ struct TimeOptions {
 };
 
 // By the motion of a board in view: what hand-eye calibration says of the clocks.
-Expected<Measurement> measure_recorded(const TimeOptions& options, const Console& console) {
+SetupExpected<Measurement> measure_recorded(const TimeOptions& options, const Console& console) {
   HandEyeSettings settings;
   settings.largest_offset_s = options.largest_offset_s;
   const auto result = by_recording(options.recorded, options.common, settings, console);
@@ -137,10 +137,10 @@ Expected<Measurement> measure_recorded(const TimeOptions& options, const Console
   return measured;
 }
 
-Expected<Measurement> measure(const TimeOptions& options, const Console& console) {
+SetupExpected<Measurement> measure(const TimeOptions& options, const Console& console) {
   if (options.is_recorded()) return measure_recorded(options, console);
   if (options.signals.size() != 2) {
-    return fail("calibrate time takes two signals, --signal A.csv --signal B.csv, or a recording with --from");
+    return wrong_setup("calibrate time takes two signals, --signal A.csv --signal B.csv, or a recording with --from");
   }
   const auto first = read_signal_table(options.signals[0]);
   if (!first) return tl::unexpected(first.error());

@@ -131,13 +131,13 @@ Expected<TurnedScope> turned_scope(const CalibrateScopeOptions& options) {
 
 // Of which tool the turn was told, as the recordings say, or the configuration; none: nobody says. Fails where one says
 // otherwise.
-Expected<std::optional<std::string>> second_sensor_named(const CalibrateScopeOptions& options) {
+SetupExpected<std::optional<std::string>> second_sensor_named(const CalibrateScopeOptions& options) {
   std::optional<std::string> tool;
   std::string said_by;
   TrackerConfiguration::Protocol protocol = TrackerConfiguration::Protocol::kNone;
   if (!options.common.configuration.empty()) {
     const auto configuration = load_configuration(options.common.configuration, {}, NamedFiles::kMayBeMissing);
-    if (!configuration) return tl::unexpected(configuration.error());
+    if (!configuration) return wrong_setup(configuration.error());
     tool = configuration->tracker.second_sensor;
     said_by = options.common.configuration;
     protocol = configuration->tracker.protocol;
@@ -158,13 +158,13 @@ Expected<std::optional<std::string>> second_sensor_named(const CalibrateScopeOpt
 
 // Of which sensor the hand-eyes are, as they say, or the configuration; none: nobody says. Fails where one says
 // otherwise.
-Expected<std::optional<std::string>> sensor_of(const CalibrateScopeOptions& options) {
+SetupExpected<std::optional<std::string>> sensor_of(const CalibrateScopeOptions& options) {
   std::optional<std::string> sensor;
   std::string said_by;
   TrackerConfiguration::Protocol protocol = TrackerConfiguration::Protocol::kNone;
   if (!options.common.configuration.empty()) {
     const auto configuration = load_configuration(options.common.configuration, {}, NamedFiles::kMayBeMissing);
-    if (!configuration) return tl::unexpected(configuration.error());
+    if (!configuration) return wrong_setup(configuration.error());
     sensor = configuration->tracker.sensor;
     said_by = options.common.configuration;
     protocol = configuration->tracker.protocol;
@@ -181,7 +181,7 @@ Expected<std::optional<std::string>> sensor_of(const CalibrateScopeOptions& opti
   return sensor;
 }
 
-Expected<Measurement> measure(const CalibrateScopeOptions& options) {
+SetupExpected<Measurement> measure(const CalibrateScopeOptions& options) {
   Measurement measured{"", nlohmann::json::object(), {}};
   if (!options.setups.empty()) {
     const auto scope = options.by_second_sensor ? scope_by_second_sensor(options) : turned_scope(options);
@@ -202,7 +202,7 @@ Expected<Measurement> measure(const CalibrateScopeOptions& options) {
     if (options.pictures.empty() && options.recording.empty()) return measured;
   }
   if (options.pictures.empty() == options.recording.empty()) {
-    return fail("expected pictures of the field stop, a recording with --from, or set-ups with --at");
+    return wrong_setup("expected pictures of the field stop, a recording with --from, or set-ups with --at");
   }
   const auto rotation =
       options.recording.empty() ? rotation_in_pictures(options.pictures) : rotation_in_recording(options.recording);

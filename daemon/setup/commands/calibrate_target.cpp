@@ -23,7 +23,7 @@ struct CalibrateTargetOptions {
 
 Expected<BoardPattern> pattern_of(const CalibrateTargetOptions& options) {
   const auto wish = wish_of(options.board);
-  if (!wish) return tl::unexpected(wish.error());
+  if (!wish) return tl::unexpected(wish.error().error);
   const bool sized = wish->columns > 0;
   if (wish->kind == BoardKind::kChessboard) {
     return chessboard_pattern(sized ? wish->columns : 9, sized ? wish->rows : 6, wish->square_mm);

@@ -118,8 +118,8 @@ void add_live(Command& command, LiveOptions& options) {
                      "With --live: where the recording stays; it must not be there yet [nowhere]");
 }
 
-Expected<std::unique_ptr<LiveGuide>> live_board_guide(const LiveOptions& options, const RecordedOptions& recorded,
-                                                      const std::string& configuration, double least_s) {
+SetupExpected<std::unique_ptr<LiveGuide>> live_board_guide(const LiveOptions& options, const RecordedOptions& recorded,
+                                                           const std::string& configuration, double least_s) {
   const auto wish = wish_of(recorded.board);
   if (!wish) return tl::unexpected(wish.error());
   std::optional<CameraModel> camera;
@@ -134,26 +134,27 @@ LiveRecording::~LiveRecording() {
   if (!kept_) std::filesystem::remove(file_, ignored);
 }
 
-Expected<LiveRecording> record_live(const LiveOptions& options, const std::string& tool, LiveGuide& guide,
-                                    const Console& console) {
+SetupExpected<LiveRecording> record_live(const LiveOptions& options, const std::string& tool, LiveGuide& guide,
+                                         const Console& console) {
   const SavedSignalMask as_before;  // what is measured after this may be interrupted
   auto stop = StopSignal::install();
   if (!stop) return tl::unexpected(stop.error());
   auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
-  if (!configuration) return tl::unexpected(configuration.error());
+  if (!configuration) return wrong_setup(configuration.error());
   if (options.unregistered) {
     const TrackerConfiguration untold;
     std::copy_n(untold.translation_IW_mm, 3, configuration->tracker.translation_IW_mm);
     std::copy_n(untold.rotation_IW_wxyz, 4, configuration->tracker.rotation_IW_wxyz);
   }
   auto devices = named_devices(*configuration, options.configuration);
-  if (!devices) return fail(options.configuration + ": " + devices.error().message);
+  if (!devices) return wrong_setup(options.configuration + ": " + devices.error().message);
   if (!devices->tracker && !devices->camera) {
-    return fail(options.configuration + ": names neither a camera nor a tracker; perimap setup writes one that does");
+    return wrong_setup(options.configuration +
+                       ": names neither a camera nor a tracker; perimap setup writes one that does");
   }
   const std::vector<std::string> names = tracked_tool_names(configuration->tracker);
   if (tool != kScopeTool && std::find(names.begin(), names.end(), tool) == names.end()) {
-    return fail(
+    return wrong_setup(
         fmt::format("{}: names no tool '{}' beside the sensor: name it as tracker.pointer or in "
                     "tracker.instruments",
                     options.configuration, tool));

@@ -9,9 +9,9 @@
 #include <string>
 #include <utility>
 
-#include "core/error/expected.hpp"
 #include "daemon/command_line/console.hpp"
 #include "daemon/command_line/outcome.hpp"
+#include "daemon/config/setup_error.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
 #include "daemon/setup/live_guide.hpp"
 
@@ -30,9 +30,10 @@ void add_live(Command& command, LiveOptions& options);
 
 // For a board; with the lens, where it is known, it tells what is left over by now. One that guides nobody when the
 // options are not live. `configuration`: as lens_of() takes it.
-[[nodiscard]] Expected<std::unique_ptr<LiveGuide>> live_board_guide(const LiveOptions& options,
-                                                                    const RecordedOptions& recorded,
-                                                                    const std::string& configuration, double least_s);
+[[nodiscard]] SetupExpected<std::unique_ptr<LiveGuide>> live_board_guide(const LiveOptions& options,
+                                                                         const RecordedOptions& recorded,
+                                                                         const std::string& configuration,
+                                                                         double least_s);
 
 // The recording of a capture; taken away with it, unless it is to be kept.
 class LiveRecording {
@@ -55,8 +56,8 @@ class LiveRecording {
 
 // Records what the configuration's devices give until the guide has enough, the longest time is over, or a signal
 // comes. `tool`: whose poses the guide follows. Fails when the configuration names no such device, or nothing comes.
-[[nodiscard]] Expected<LiveRecording> record_live(const LiveOptions& options, const std::string& tool, LiveGuide& guide,
-                                                  const Console& console);
+[[nodiscard]] SetupExpected<LiveRecording> record_live(const LiveOptions& options, const std::string& tool,
+                                                       LiveGuide& guide, const Console& console);
 
 // Does `measure` with the recording that --from names or, live, that is made now: `recording` is then that. In what is
 // told of one that is taken away again the configuration's name stands for it.

@@ -8,6 +8,7 @@
 
 #include "daemon/command_line/outputs.hpp"
 #include "daemon/command_line/same_file.hpp"
+#include "daemon/config/configuration_loader.hpp"
 #include "daemon/setup/setup_plots.hpp"
 
 namespace perimap {
@@ -42,6 +43,10 @@ Outcome check_outputs(const CommonOptions& options, const std::vector<std::strin
       }
     }
   }
+  if (!options.configuration.empty()) {
+    const auto sound = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
+    if (!sound) return refuse(sound.error(), ExitCode::kWrongUsage);
+  }
   if (const auto able = check_writable(outputs); !able) return refuse(able.error());
   return {};
 }
@@ -49,18 +54,20 @@ Outcome check_outputs(const CommonOptions& options, const std::vector<std::strin
 namespace {
 
 // The configuration last: it names the others.
-Expected<void> write_results(const Measurement& measured, const CommonOptions& options, const nlohmann::json& json,
-                             const std::string& date, const std::string& made_from) {
+SetupExpected<void> write_results(const Measurement& measured, const CommonOptions& options, const nlohmann::json& json,
+                                  const std::string& date, const std::string& made_from) {
   KeptResults results;
   if (!options.output.empty()) {
     const std::string text = measured.file.empty() ? json.dump(2) + "\n" : measured.file;
-    if (auto added = results.add(options.output, text); !added) return added;
+    if (auto added = results.add(options.output, text); !added) return tl::unexpected(added.error());
   }
   if (!options.html.empty()) {
     // The text's first line says what it is.
     const std::string heading = measured.text.substr(0, measured.text.find('\n'));
     const std::string text = fmt::format("measured {} from {}\n{}", date, made_from, measured.text);
-    if (auto added = results.add(options.html, setup_page(heading, text, measured.plots)); !added) return added;
+    if (auto added = results.add(options.html, setup_page(heading, text, measured.plots)); !added) {
+      return tl::unexpected(added.error());
+    }
   }
   if (!options.configuration.empty()) {
     const std::string comment = fmt::format("measured {} from {}", date, made_from);
@@ -68,15 +75,16 @@ Expected<void> write_results(const Measurement& measured, const CommonOptions& o
     const bool files_may_be_missing = !options.output.empty();
     const auto text =
         configuration_with_keys(options.configuration, measured.section, measured.keys, comment, files_may_be_missing);
-    if (!text) return tl::unexpected(text.error());
-    if (auto added = results.add(options.configuration, *text); !added) return added;
+    if (!text) return wrong_setup(text.error());
+    if (auto added = results.add(options.configuration, *text); !added) return tl::unexpected(added.error());
   }
-  return results.put_in_place();
+  if (const auto placed = results.put_in_place(); !placed) return tl::unexpected(placed.error());
+  return {};
 }
 
 }  // namespace
 
-Outcome finish(const Expected<Measurement>& measured, const CommonOptions& options, const std::string& made_from) {
+Outcome finish(const SetupExpected<Measurement>& measured, const CommonOptions& options, const std::string& made_from) {
   if (!measured) return refuse(measured.error());
   const std::string date = date_now();
   nlohmann::json json = measured->json;

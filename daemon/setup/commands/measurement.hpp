@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "core/error/expected.hpp"
 #include "daemon/command_line/command.hpp"
 #include "daemon/command_line/outcome.hpp"
+#include "daemon/config/setup_error.hpp"
 #include "daemon/pages/svg_plot.hpp"
 #include "daemon/setup/kept_result.hpp"
 #include "drivers/pose_file/pose_table.hpp"
@@ -35,12 +35,13 @@ struct Measurement {
   std::string file{};         // what --output writes; empty: the JSON
 };
 
-// Before the work begins: that what is to be written can be, and is nothing that is read, nor another of them.
+// Before the work begins: that what is to be written can be, and is nothing that is read, nor another of them, and that
+// the configuration that is to take keys is sound.
 // `inputs`: every file that an option may name; those without a name do not count.
 [[nodiscard]] Outcome check_outputs(const CommonOptions& options, const std::vector<std::string>& inputs);
 
 // Prints the measurement, and writes what is to be written; refuses with its error when there is none.
-[[nodiscard]] Outcome finish(const Expected<Measurement>& measured, const CommonOptions& options,
+[[nodiscard]] Outcome finish(const SetupExpected<Measurement>& measured, const CommonOptions& options,
                              const std::string& made_from);
 
 // --unit, --json, --output, --html and --configuration, for results that have them.

@@ -20,35 +20,36 @@ void add_lens_and_board(Command& command, RecordedOptions& options) {
   add_board(command, options.board);
 }
 
-Expected<CameraModel> lens_of(const RecordedOptions& options, const std::string& configuration) {
-  std::string file = options.calibration;
+SetupExpected<CameraModel> lens_of(const RecordedOptions& options, const std::string& configuration) {
+  if (!options.calibration.empty()) return read_calibration(options.calibration);
   for (const std::string& from : {configuration, options.live}) {
-    if (!file.empty() || from.empty()) continue;
+    if (from.empty()) continue;
     const auto loaded = load_configuration(from, {}, NamedFiles::kMayBeMissing);
-    if (!loaded) return tl::unexpected(loaded.error());
-    if (loaded->camera.calibration) file = loaded->camera.calibration->string();
+    if (!loaded) return wrong_setup(loaded.error());
+    if (!loaded->camera.calibration) continue;
+    auto lens = read_calibration(*loaded->camera.calibration);
+    if (!lens) return wrong_setup(lens.error());
+    return *lens;
   }
-  if (file.empty()) {
-    return fail(
-        "the lens is not known: name its calibration with --calibration, or a configuration that has one with "
-        "--configuration; perimap calibrate camera makes one");
-  }
-  return read_calibration(file);
+  return wrong_setup(
+      "the lens is not known: name its calibration with --calibration, or a configuration that has one with "
+      "--configuration; perimap calibrate camera makes one");
 }
 
-Expected<void> check_motion_options(const RecordedOptions& options, const std::string& configuration) {
+SetupExpected<void> check_motion_options(const RecordedOptions& options, const std::string& configuration) {
   const auto wish = wish_of(options.board);
   if (!wish) return tl::unexpected(wish.error());
   if (wish->square_mm <= 0.0) {
-    return fail("--square-mm: expected the side of the board's squares, without which its distance is not known");
+    return wrong_setup(
+        "--square-mm: expected the side of the board's squares, without which its distance is not known");
   }
   const auto camera = lens_of(options, configuration);
   if (!camera) return tl::unexpected(camera.error());
   return {};
 }
 
-Expected<RecordedMotion> recorded_motion(const RecordedOptions& options, const std::string& configuration,
-                                         const Console& console) {
+SetupExpected<RecordedMotion> recorded_motion(const RecordedOptions& options, const std::string& configuration,
+                                              const Console& console) {
   if (const auto able = check_motion_options(options, configuration); !able) return tl::unexpected(able.error());
   const auto wish = wish_of(options.board);
   auto camera = lens_of(options, configuration);

@@ -7,9 +7,9 @@
 
 #include "core/calibration/timed_poses.hpp"
 #include "core/calibration/turned_scope.hpp"
-#include "core/error/expected.hpp"
 #include "core/geometry/camera_model.hpp"
 #include "daemon/command_line/console.hpp"
+#include "daemon/config/setup_error.hpp"
 #include "daemon/setup/commands/board_options.hpp"
 #include "daemon/setup/recorded_board.hpp"
 
@@ -31,10 +31,11 @@ void add_from(Command& command, std::string& recording);
 void add_lens_and_board(Command& command, RecordedOptions& options);
 
 // By --calibration, else by what the configuration names; empty: there is none. Fails when neither says it.
-[[nodiscard]] Expected<CameraModel> lens_of(const RecordedOptions& options, const std::string& configuration);
+[[nodiscard]] SetupExpected<CameraModel> lens_of(const RecordedOptions& options, const std::string& configuration);
 
 // What recorded_motion() needs besides the recording: the board's size and the lens.
-[[nodiscard]] Expected<void> check_motion_options(const RecordedOptions& options, const std::string& configuration);
+[[nodiscard]] SetupExpected<void> check_motion_options(const RecordedOptions& options,
+                                                       const std::string& configuration);
 
 struct RecordedMotion {
   RecordedBoard board;
@@ -45,7 +46,7 @@ struct RecordedMotion {
 
 // The scope's motion as camera and tracker saw it. Fails when the board's size is not told, with which lengths would be
 // in squares.
-[[nodiscard]] Expected<RecordedMotion> recorded_motion(const RecordedOptions& options, const std::string& configuration,
-                                                       const Console& console);
+[[nodiscard]] SetupExpected<RecordedMotion> recorded_motion(const RecordedOptions& options,
+                                                            const std::string& configuration, const Console& console);
 
 }  // namespace perimap

@@ -42,10 +42,10 @@ struct RegisterOptions {
 };
 
 // Of each landmark of the model, in the order of the table, where the tip was held still.
-Expected<std::vector<NamedPoint>> touched_in_recording(const RegisterOptions& options,
-                                                       const std::vector<NamedPoint>& model) {
+SetupExpected<std::vector<NamedPoint>> touched_in_recording(const RegisterOptions& options,
+                                                            const std::vector<NamedPoint>& model) {
   if (options.tip.empty()) {
-    return fail("--tip: expected the file of the pointer's tip that perimap calibrate tool --output wrote");
+    return wrong_setup("--tip: expected the file of the pointer's tip that perimap calibrate tool --output wrote");
   }
   const auto tip = read_tool_tip(options.tip);
   if (!tip) return tl::unexpected(tip.error());
@@ -63,16 +63,18 @@ Expected<std::vector<NamedPoint>> touched_in_recording(const RegisterOptions& op
       options.recording, touched.touches.size(), options.touch.shortest_s, when, options.model, model.size()));
 }
 
-Expected<std::vector<Landmark>> landmarks_of(const RegisterOptions& options) {
-  const auto model = read_point_table(options.model, options.common.length_unit());
-  if (!model) return tl::unexpected(model.error());
+SetupExpected<std::vector<Landmark>> landmarks_of(const RegisterOptions& options) {
   if (options.touched.empty() == options.recording.empty()) {
-    return fail(
+    return wrong_setup(
         "expected either touched landmarks with --touched or a recording of the touches with --from, or "
         "--live");
   }
-  const auto touched = options.recording.empty() ? read_point_table(options.touched, options.common.length_unit())
-                                                 : touched_in_recording(options, *model);
+  const auto model = read_point_table(options.model, options.common.length_unit());
+  if (!model) return tl::unexpected(model.error());
+  using Touched = SetupExpected<std::vector<NamedPoint>>;
+  const auto touched = options.recording.empty()
+                           ? Touched(read_point_table(options.touched, options.common.length_unit()))
+                           : touched_in_recording(options, *model);
   if (!touched) return tl::unexpected(touched.error());
   std::vector<Landmark> landmarks;
   for (const NamedPoint& point : *touched) {
@@ -86,7 +88,7 @@ Expected<std::vector<Landmark>> landmarks_of(const RegisterOptions& options) {
   return landmarks;
 }
 
-Expected<Measurement> measure(const RegisterOptions& options) {
+SetupExpected<Measurement> measure(const RegisterOptions& options) {
   const auto landmarks = landmarks_of(options);
   if (!landmarks) return tl::unexpected(landmarks.error());
   const auto result = register_landmarks(*landmarks, options.tolerance_mm);
@@ -108,9 +110,9 @@ Expected<Measurement> measure(const RegisterOptions& options) {
 }
 
 // Before anything is recorded: what a live registration needs besides.
-Expected<std::unique_ptr<LiveGuide>> guide_of(const RegisterOptions& options) {
+SetupExpected<std::unique_ptr<LiveGuide>> guide_of(const RegisterOptions& options) {
   if (options.tip.empty()) {
-    return fail("--tip: expected the file of the pointer's tip that perimap calibrate tool --output wrote");
+    return wrong_setup("--tip: expected the file of the pointer's tip that perimap calibrate tool --output wrote");
   }
   const auto tip = read_tool_tip(options.tip);
   if (!tip) return tl::unexpected(tip.error());

@@ -94,9 +94,9 @@ struct SetupAsTurned {
   LensAtTurn lens;
 };
 
-Expected<SetupAsTurned> setup_as_turned(const std::filesystem::path& file, const std::string& recording) {
+SetupExpected<SetupAsTurned> setup_as_turned(const std::filesystem::path& file, const std::string& recording) {
   const auto scope = read_turned_scope(file);
-  if (!scope) return tl::unexpected(scope.error());
+  if (!scope) return wrong_setup(scope.error());
   if (scope->second_sensor) {
     const auto relation = relation_in_recording(recording);
     if (!relation) return tl::unexpected(relation.error());
@@ -126,7 +126,7 @@ Expected<SetupAsTurned> setup_as_turned(const std::filesystem::path& file, const
 
 // What is on trial must be of the sensors whose poses were recorded. Lens and tip may be others than the
 // configuration's.
-Expected<void> sensor_fits(Configuration configuration, const VerifyOptions& options) {
+SetupExpected<void> sensor_fits(Configuration configuration, const VerifyOptions& options) {
   auto sensor = calibrated_sensor(options.recorded.recording, configuration, options.configuration);
   if (!sensor) return tl::unexpected(sensor.error());
   configuration.tracker.sensor = *std::move(sensor);
@@ -137,14 +137,14 @@ Expected<void> sensor_fits(Configuration configuration, const VerifyOptions& opt
   configuration.camera.calibration.reset();
   configuration.camera.width = configuration.camera.height = 0;
   if (const auto fits = calibrations_fit(configuration); !fits) {
-    return fail(options.configuration + ": " + fits.error().message);
+    return wrong_setup(options.configuration + ": " + fits.error().message);
   }
   return {};
 }
 
-Expected<Verification> verify(const VerifyOptions& options, const Console& console) {
+SetupExpected<Verification> verify(const VerifyOptions& options, const Console& console) {
   const auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
-  if (!configuration) return tl::unexpected(configuration.error());
+  if (!configuration) return wrong_setup(configuration.error());
   if (const auto fits = sensor_fits(*configuration, options); !fits) return tl::unexpected(fits.error());
   const TrackerConfiguration& tracker = configuration->tracker;
   SetupOnTrial setup{
@@ -165,7 +165,7 @@ Expected<Verification> verify(const VerifyOptions& options, const Console& conso
   auto result = verify_setup(motion->camera_poses, motion->sensor_poses, middle_of(motion->board.views), setup, *touch,
                              options.bound_mm);
   if (!result) return fail(options.recorded.recording + ": " + result.error().message);
-  return result;
+  return *std::move(result);
 }
 
 std::string advice_of(const Verification& result) {

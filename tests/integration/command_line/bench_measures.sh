@@ -18,6 +18,8 @@ fail() {
   --scratch "$out/scratch" --json "$out/bench.json" --html "$out/bench.html" > "$out/table" 2> "$out/progress" ||
   fail "exit code $?: $(cat "$out/progress")"
 
+if grep -v '^perimap bench: ' "$out/progress"; then fail "a line without the program's name"; fi
+
 node - "$out/bench.json" << 'END' || fail "the figures do not go together"
 const json = JSON.parse(require('fs').readFileSync(process.argv[2]));
 let failed = 0;

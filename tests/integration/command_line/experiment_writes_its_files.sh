@@ -73,7 +73,9 @@ for ending in csv json html svg png; do
 done
 [ "$("$perimap" experiment 3 --trace "$out/motion.csv" --from 300 --to 301 --json 2> /dev/null | grep -c '"name": "ours"')" -eq 10 ] ||
   fail "experiment 3 --json: not five horizons of the point and of all"
-expect 1 3
+expect 2 3 --out "$out/nowhere"
+[ ! -e "$out/nowhere" ] || fail "a folder is made for an experiment that lacks its trace"
+expect 2 3 --trace "$out/motion.csv" --from 320 --to 300
 expect 1 3 --trace "$out/no-such-file"
 expect 1 3 --trace "$out/r-peaks.txt"
 expect 1 3 --trace "$out/motion.csv" --to 339

@@ -146,9 +146,9 @@ nothing_left "a signal"
 
 # ---- refused before anything is recorded, and when nothing came
 live calibrate tool --live devices.toml --tool instrument/drill --keep none.mcap > out
-[ $? -eq 1 ] && grep -q "names no tool 'instrument/drill' beside the sensor" told || fail "another tool: $(cat out told)"
+[ $? -eq 2 ] && grep -q "names no tool 'instrument/drill' beside the sensor" told || fail "another tool: $(cat out told)"
 live calibrate hand-eye --live devices.toml --keep none.mcap > out
-[ $? -eq 1 ] && grep -q -e '--square-mm: expected' told || fail "a board of no size: $(cat out told)"
+[ $? -eq 2 ] && grep -q -e '--square-mm: expected' told || fail "a board of no size: $(cat out told)"
 [ ! -e none.mcap ] || fail "a recording was begun"
 kill "$emulators"
 wait "$emulators"
