@@ -18,6 +18,7 @@
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/surface_traffic.hpp"
+#include "daemon/config/wrong_key.hpp"
 #include "daemon/keys/expiry_news.hpp"
 #include "daemon/keys/key_folder.hpp"
 #include "daemon/logging/logging.hpp"
@@ -51,7 +52,7 @@ Outcome run_session(const Console& console, const std::string& configuration_fil
                     Signals& signals, const MakeFeeder& make_feeder) {
   const Logging logging(console.name(), configuration.log.level);
   if (!configuration.dds.enabled) {
-    return refuse(fmt::format("{}: key 'dds.enabled': expected true, since nothing else publishes", configuration_file),
+    return refuse(told_in(configuration_file, {{"dds.enabled", "expected true, since nothing else publishes"}}),
                   ExitCode::kWrongUsage);
   }
   RuntimeSettings runtime = runtime_settings(configuration, identity);
@@ -156,17 +157,17 @@ Outcome run(const std::string& configuration_file, const Console& console) {
                        });
   }
   if (!given->replay.recording) {
-    return refuse(fmt::format("{}: key 'replay.recording': expected the recording to replay, or devices in [camera], "
-                              "[tracker] and [ecg], got nothing",
-                              configuration_file),
+    return refuse(told_in(configuration_file,
+                          {{"replay.recording",
+                            "expected the recording to replay, or devices in [camera], [tracker] and [ecg], got "
+                            "nothing"}}),
                   ExitCode::kWrongUsage);
   }
   if (given->recording.record) {
-    return refuse(
-        fmt::format("{}: key 'recording.record': expected false with 'replay.recording', which is a recording "
-                    "already, got true",
-                    configuration_file),
-        ExitCode::kWrongUsage);
+    return refuse(told_in(configuration_file,
+                          {{"recording.record",
+                            "expected false with 'replay.recording', which is a recording already, got true"}}),
+                  ExitCode::kWrongUsage);
   }
   auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
   if (!setup) return refuse(setup.error());

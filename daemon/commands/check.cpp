@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
@@ -39,12 +40,12 @@ void tell_refused_privileges(const RealtimeConfiguration& realtime, const Consol
 Expected<Configuration> load_whole(const std::string& file) {
   auto configuration = load_configuration(file);
   if (!configuration) return configuration;
-  if (const auto fits = frames_fit(*configuration, file); !fits) return fail(file + ": " + fits.error().message);
-  if (const auto fits = calibrations_fit(*configuration); !fits) return fail(file + ": " + fits.error().message);
-  if (configuration->replay.recording || !names_devices(*configuration)) return configuration;
-  if (const auto devices = named_devices(*configuration, file); !devices) {
-    return fail(file + ": " + devices.error().message);
+  WrongKeys wrong = wrong_frames(*configuration, file);
+  append(wrong, wrong_calibrations(*configuration));
+  if (!configuration->replay.recording && names_devices(*configuration)) {
+    if (auto devices = named_devices(*configuration, file); !devices) append(wrong, std::move(devices.error()));
   }
+  if (!wrong.empty()) return tl::unexpected(told_in(file, std::move(wrong)));
   return configuration;
 }
 

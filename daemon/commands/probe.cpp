@@ -38,7 +38,7 @@ Outcome probe(const ProbeOptions& options, const Console& console) {
   // A playback is no device.
   configuration->camera.playback.reset();
   const auto devices = named_devices(*configuration, options.file);
-  if (!devices) return refuse(options.file + ": " + devices.error().message, ExitCode::kWrongUsage);
+  if (!devices) return refuse(told_in(options.file, devices.error()), ExitCode::kWrongUsage);
   if (!devices->camera && !devices->tracker && !devices->ecg && !devices->r_trigger) {
     return refuse(
         options.file + ": names no device; expected keys 'camera.device', 'tracker.protocol' or 'ecg.protocol'",

@@ -46,7 +46,7 @@ struct Basis {
 
 tl::expected<Basis, SetupError> basis_of(const RecordOptions& options) {
   auto given = load_configuration(options.configuration);
-  if (!given) return tl::unexpected(SetupError{std::move(given.error()), true});
+  if (!given) return wrong_setup(std::move(given.error()));
   if (given->camera.playback) {
     auto recorded = recorded_basis(given->camera.playback->string(), options.configuration, ReadMode::kStrict);
     if (!recorded) return tl::unexpected(std::move(recorded.error()));
@@ -55,10 +55,12 @@ tl::expected<Basis, SetupError> basis_of(const RecordOptions& options) {
   Basis basis{std::move(*given), std::nullopt, std::nullopt};
   if (basis.configuration.camera.calibration) {
     auto camera = read_calibration(*basis.configuration.camera.calibration);
-    if (!camera) return tl::unexpected(SetupError{std::move(camera.error()), true});
+    if (!camera) {
+      return wrong_setup(told_in(options.configuration, {{"camera.calibration", camera.error().message}}));
+    }
     basis.camera = *camera;
     auto scope = configured_scope(basis.configuration, *camera);
-    if (!scope) return tl::unexpected(SetupError{std::move(scope.error()), true});
+    if (!scope) return wrong_setup(told_in(options.configuration, std::move(scope.error())));
     basis.turned_scope = *scope;
   }
   return basis;
@@ -87,7 +89,7 @@ Outcome record(const RecordOptions& options, const Console& console) {
   auto basis = basis_of(options);
   if (!basis) return refuse(basis.error());
   auto devices = named_devices(basis->configuration, options.configuration);
-  if (!devices) return refuse(options.configuration + ": " + devices.error().message, ExitCode::kWrongUsage);
+  if (!devices) return refuse(told_in(options.configuration, devices.error()), ExitCode::kWrongUsage);
   if (!devices->tracker && !devices->ecg && !devices->r_trigger && !devices->camera) {
     return refuse(options.configuration + ": names no device; expected [camera], [tracker] or [ecg]",
                   ExitCode::kWrongUsage);

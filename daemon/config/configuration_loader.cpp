@@ -1,14 +1,6 @@
 #include "daemon/config/configuration_loader.hpp"
 
-// toml++ as headers, so that the fuzzer and the sanitizers see into it, and with its internal assertions off: one of
-// version 3.3 fails on a wrong file ("[(a]"), which the code behind it reports well. With NDEBUG it would become an
-// assumption of the optimiser, so that has to go here too.
-#undef NDEBUG
-#define TOML_ASSERT(expression) static_assert(true)
-#define TOML_HEADER_ONLY 1
-#define TOML_EXCEPTIONS 1
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cmath>
@@ -24,6 +16,7 @@
 #include "daemon/config/ecg_inputs.hpp"
 #include "daemon/config/session_keys.hpp"
 #include "daemon/config/surface_traffic.hpp"
+#include "daemon/config/toml_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -33,10 +26,6 @@ namespace {
 // session alone. What else one says is refused, or passed over.
 enum class Source { kFile, kRecording, kRecordingPassedOver };
 
-// A generous bound for a file written by hand. It also bounds the recursion of the TOML library, which is as deep as
-// a dotted key is long.
-constexpr std::size_t kLargestFile = std::size_t{64} * 1024;
-constexpr int kMostDots = 200;             // on one line: a hundred numbers and more
 constexpr std::size_t kLongestQuote = 60;  // bytes of a wrong value that a message repeats
 
 std::string quote(std::string_view text) {
@@ -122,62 +111,6 @@ std::optional<ConfigurationValue> value_of(const toml::node& node) {
   return numbers;
 }
 
-// The first character that toml++ 3.3 must not see, if there is one: it has undefined behaviour on some letters outside
-// of strings and comments (its is_non_ascii_horizontal_whitespace, U+3001 for one), where TOML allows ASCII alone. On a
-// malformed line it may not take for a string what looks like one ("a = 1x='..."), so letters beyond ASCII may stand
-// only in comments and where nothing but strings follows the line's first "=".
-// Strings over several lines, which no key takes, are refused too, so that a string always ends with its line.
-// So are keys of very many parts: its tables nest as deep as a key is long, and it walks them by recursion.
-std::optional<std::string> refused_character(std::string_view text) {
-  int line = 1;
-  int column = 0;  // in characters, as toml++ counts
-  char quote = 0;  // of the string we are in
-  bool comment = false;
-  bool escaped = false;
-  int dots = 0;  // of this line, outside of strings and comments
-  enum class Place : std::uint8_t { kBeforeEquals, kStringsAfterEquals, kOtherAfterEquals };
-  Place place = Place::kBeforeEquals;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if ((static_cast<unsigned char>(c) & 0xC0) != 0x80) {
-      ++column;
-    }
-    if (c == '\n') {
-      ++line;
-      column = 0;
-      quote = 0;
-      comment = false;
-      escaped = false;
-      dots = 0;
-      place = Place::kBeforeEquals;
-    } else if (comment) {
-      continue;
-    } else if (quote == 0 && c == '.' && ++dots > kMostDots) {
-      return fmt::format("{}:{}: expected TOML, got: a line of more than {} dots", line, column, kMostDots);
-    } else if (static_cast<unsigned char>(c) >= 0x80 && (quote == 0 || place != Place::kStringsAfterEquals)) {
-      return fmt::format("{}:{}: expected TOML, got: a letter beyond ASCII outside of strings and comments", line,
-                         column);
-    } else if (quote != 0) {
-      const bool closes = c == quote && !escaped;
-      escaped = c == '\\' && quote == '"' && !escaped;
-      quote = closes ? '\0' : quote;
-    } else if (text.substr(i, 3) == R"(""")" || text.substr(i, 3) == "'''") {
-      return fmt::format("{}:{}: expected a string on one line, got: one over several lines", line, column);
-    } else if (c == '"' || c == '\'') {
-      quote = c;
-    } else {
-      comment = c == '#';
-      constexpr std::string_view kBetweenStrings = " \t\r,[]";
-      if (place == Place::kBeforeEquals) {
-        place = c == '=' ? Place::kStringsAfterEquals : place;
-      } else if (!comment && kBetweenStrings.find(c) == std::string_view::npos) {
-        place = Place::kOtherAfterEquals;
-      }
-    }
-  }
-  return std::nullopt;
-}
-
 // Walks one parsed file, keeps what is good and remembers what is wrong.
 class Overlay {
  public:
@@ -196,18 +129,16 @@ class Overlay {
         }
       } else {
         refuse(node.source().begin, key.str(), "a table", describe(node));
+        untold_.emplace_back(key.str());
       }
     }
     if (!root.contains("version")) {
       refuse({1, 1}, "version", find("", "version")->expected, "nothing");
     }
-    // Whether values go together can be told of good values alone.
-    if (errors_.empty()) {
-      check_budget(root);
-      check_frames_underway(root);
-      check_inputs(root);
-      check_traffic(root);
-    }
+    check_budget(root);
+    check_frames_underway(root);
+    check_inputs(root);
+    check_traffic(root);
     if (!errors_.empty()) return fail(told());
     return configuration_;
   }
@@ -253,11 +184,13 @@ class Overlay {
       if (const auto wrong = place_files(*key, *value)) {
         refuse(node.source().begin, full_name(section, name.str()), key->expected,
                fmt::format("{} ({})", describe(node), *wrong));
+        untold_.push_back(full_name(section, name.str()));
         return;
       }
     }
     if (!value || !key->read(*value, configuration_)) {
       refuse(node.source().begin, full_name(section, name.str()), key->expected, describe(node));
+      untold_.push_back(full_name(section, name.str()));
     }
   }
 
@@ -302,6 +235,7 @@ class Overlay {
         elsewhere.empty() ? did_you_mean(name.str(), known) : fmt::format("; did you mean '{}'?", elsewhere);
     refuse(name.source().begin, full_name(section, name.str()), fmt::format("one of {}", fmt::join(known, ", ")),
            "an unknown key" + meant);
+    untold_.emplace_back(section);  // it may stand for any of them
   }
 
   void refuse_of_recording(const std::string& key, const toml::key& name) {
@@ -318,8 +252,19 @@ class Overlay {
     return {1, 1};
   }
 
+  // Whether values go together can be told of good values alone: none of these keys was refused, nor stands what may be
+  // one of them misspelt where it would.
+  [[nodiscard]] bool are_good(std::initializer_list<std::string_view> keys) const {
+    return std::none_of(untold_.begin(), untold_.end(), [&](const std::string& untold) {
+      return std::any_of(keys.begin(), keys.end(), [&](std::string_view key) {
+        return untold.empty() || key == untold || key.substr(0, key.find('.')) == untold;
+      });
+    });
+  }
+
   // Without a latency longer than the budget no release can be on time.
   void check_budget(const toml::table& root) {
+    if (!are_good({"pipeline.budget_ms", "pipeline.latency_ms"})) return;
     const PipelineConfiguration& pipeline = configuration_.pipeline;
     if (pipeline.budget < pipeline.latency) {
       return;
@@ -331,6 +276,7 @@ class Overlay {
 
   // What is between capture and release is kept for so many frames.
   void check_frames_underway(const toml::table& root) {
+    if (!are_good({"pipeline.latency_ms", "camera.frame_rate_hz"})) return;
     const double rate_hz = configuration_.camera.frame_rate_hz;
     const double latency_s = to_seconds(configuration_.pipeline.latency);
     if (latency_s * rate_hz <= kMostFramesUnderway) return;
@@ -342,17 +288,25 @@ class Overlay {
 
   // What an ECG device has no input for is refused where it is asked for, or else where the device is named.
   void check_inputs(const toml::table& root) {
-    const std::optional<WrongInput> wrong = wrong_input(configuration_);
-    if (!wrong) return;
-    toml::source_position where{1, 1};
-    for (const toml::node* node : {root["ecg"]["protocol"].node(), root[wrong->section][wrong->key].node()}) {
-      if (node != nullptr) where = node->source().begin;
+    if (!are_good({"ecg.protocol", "ecg.port", "ecg.channel", "ecg.second_channel", "ecg.r_trigger",
+                   "ecg.r_trigger_port", "respiration.device_channel"})) {
+      return;
     }
-    refuse(where, full_name(wrong->section, wrong->key), wrong->expected, wrong->got);
+    for (const WrongInput& wrong : wrong_inputs(configuration_)) {
+      toml::source_position where{1, 1};
+      for (const toml::node* node : {root["ecg"]["protocol"].node(), root[wrong.section][wrong.key].node()}) {
+        if (node != nullptr) where = node->source().begin;
+      }
+      refuse(where, full_name(wrong.section, wrong.key), wrong.expected, wrong.got);
+    }
   }
 
   // What is to be published must fit: a network that is flooded loses samples of all streams, and nobody chose which.
   void check_traffic(const toml::table& root) {
+    if (!are_good({"pipeline.release", "pipeline.clock_rate_hz", "features.maximum", "camera.frame_rate_hz",
+                   "estimation.harmonics", "respiration.enabled", "dds.maximum_MB_per_s"})) {
+      return;
+    }
     const SurfaceTraffic traffic = surface_traffic(configuration_);
     const double most_MB_per_s = configuration_.dds.maximum_MB_per_s;
     if (traffic.MB_per_s() <= most_MB_per_s) return;
@@ -407,31 +361,17 @@ class Overlay {
   Configuration configuration_;
   std::vector<Wrong> errors_;
   std::vector<Wrong> passed_over_;
+  std::vector<std::string> untold_;  // keys that were refused, and sections (empty: all) with what is no key
 };
 
 Expected<RecordedConfiguration> parse(std::string_view text, const std::filesystem::path& file,
                                       const Configuration& base, NamedFiles named_files, Source source) {
-  if (text.size() > kLargestFile) {
-    return fail(on_one_line(
-        fmt::format("{}:1:1: expected at most {} bytes of TOML, got {}", file.string(), kLargestFile, text.size())));
-  }
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  if (text.starts_with(kByteOrderMark)) {
-    text.remove_prefix(kByteOrderMark.size());
-  }
-  if (const std::optional<std::string> refused = refused_character(text)) {
-    return fail(on_one_line(fmt::format("{}:{}", file.string(), *refused)));
-  }
-  try {
-    Overlay overlay(file, base, named_files, source);
-    auto configuration = overlay.apply(toml::parse(text));
-    if (!configuration) return tl::unexpected(std::move(configuration.error()));
-    return RecordedConfiguration{std::move(*configuration), overlay.passed_over()};
-  } catch (const toml::parse_error& error) {
-    const toml::source_position where = error.source().begin;
-    return fail(on_one_line(
-        fmt::format("{}:{}:{}: expected TOML, got: {}", file.string(), where.line, where.column, error.description())));
-  }
+  const auto root = parse_toml(text, file);
+  if (!root) return tl::unexpected(root.error());
+  Overlay overlay(file, base, named_files, source);
+  auto configuration = overlay.apply(*root);
+  if (!configuration) return tl::unexpected(std::move(configuration.error()));
+  return RecordedConfiguration{std::move(*configuration), overlay.passed_over()};
 }
 
 }  // namespace
@@ -451,7 +391,7 @@ Expected<RecordedConfiguration> parse_recorded_configuration(std::string_view te
 
 Expected<Configuration> load_configuration(const std::filesystem::path& file, const Configuration& base,
                                            NamedFiles named_files) {
-  const Expected<std::string> text = read_text_file(file, kLargestFile, "configuration file");
+  const Expected<std::string> text = read_text_file(file, kLargestConfiguration, "configuration file");
   if (!text) return tl::unexpected(text.error());
   return parse_configuration(*text, file, base, named_files);
 }

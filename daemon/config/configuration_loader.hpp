@@ -2,7 +2,7 @@
 //
 // Unknown keys, wrong types, values out of range and named files that do not exist are errors. All of them are told, in
 // the order of the file, a line each: `FILE:LINE:COL: key 'a.b': expected ..., got ...`, and of an unknown key which
-// one may have been meant. Where all values are good, the same is told of values that do not go together.
+// one may have been meant. Of good values the same is told where they do not go together.
 #pragma once
 
 #include <filesystem>

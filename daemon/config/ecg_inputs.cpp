@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+#include <utility>
+
 #include "drivers/ecg/bitalino.hpp"
 #include "drivers/ecg/can_ecg.hpp"
 #include "drivers/ecg/cyton.hpp"
@@ -64,16 +67,18 @@ int ecg_input(const EcgConfiguration& ecg) noexcept {
   return 0;
 }
 
-std::optional<WrongInput> wrong_input(const Configuration& c) {
+std::vector<WrongInput> wrong_inputs(const Configuration& c) {
+  std::vector<WrongInput> all;
   if (c.ecg.protocol == Protocol::kBitalino && c.ecg.channel > BitalinoProtocol::kChannels) {
-    return WrongInput{"ecg", "channel", fmt::format("1 to {} of a bitalino", BitalinoProtocol::kChannels),
-                      fmt::format("{}", c.ecg.channel)};
+    all.push_back({"ecg", "channel", fmt::format("1 to {} of a bitalino", BitalinoProtocol::kChannels),
+                   fmt::format("{}", c.ecg.channel)});
   }
   if (c.ecg.r_trigger && c.ecg.r_trigger_port && c.ecg.r_trigger_port == c.ecg.port) {
-    return WrongInput{"ecg", "r_trigger_port", "a serial port of its own", *c.ecg.r_trigger_port};
+    all.push_back({"ecg", "r_trigger_port", "a serial port of its own", *c.ecg.r_trigger_port});
   }
-  if (auto wrong = wrong_second_lead(c.ecg)) return wrong;
-  return wrong_respiration(c);
+  if (auto wrong = wrong_second_lead(c.ecg)) all.push_back(*std::move(wrong));
+  if (auto wrong = wrong_respiration(c)) all.push_back(*std::move(wrong));
+  return all;
 }
 
 }  // namespace perimap

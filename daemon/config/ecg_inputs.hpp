@@ -1,9 +1,9 @@
 // Which inputs of the ECG device carry what, as far as one key tells what another may say.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "daemon/config/configuration.hpp"
 
@@ -18,7 +18,7 @@ struct WrongInput {
 };
 
 // None when the device that the configuration names has these inputs.
-[[nodiscard]] std::optional<WrongInput> wrong_input(const Configuration& configuration);
+[[nodiscard]] std::vector<WrongInput> wrong_inputs(const Configuration& configuration);
 
 // The input with the ECG: the configured one, or the protocol's usual one; 0 where the protocol leaves no choice.
 [[nodiscard]] int ecg_input(const EcgConfiguration& ecg) noexcept;

@@ -21,9 +21,8 @@
 namespace perimap {
 namespace {
 
-tl::unexpected<Error> wrong(std::string_view key, const std::string& expected, const std::string& got,
-                            std::string_view do_next) {
-  return fail(fmt::format("key '{}': expected {}, got {}: {}", key, expected, got, do_next));
+WrongKey wrong(std::string_view key, const std::string& expected, const std::string& got, std::string_view do_next) {
+  return {std::string(key), fmt::format("expected {}, got {}: {}", expected, got, do_next)};
 }
 
 std::optional<std::string> pointer_fact(const TrackerConfiguration& tracker, const char* key) {
@@ -36,38 +35,39 @@ struct NamedSizes {
   std::optional<TurnedScope> scope;
 };
 
-Expected<void> scope_of_size(int width, int height, const NamedSizes& named, const std::string& played) {
+WrongKeys scope_of_size(int width, int height, const NamedSizes& named, const std::string& played) {
   const auto& scope = named.scope;
   if (!scope || (width == scope->width && height == scope->height)) return {};
-  return wrong("camera.turned_scope", fmt::format("one of pictures of {}x{}, as {} has", width, height, played),
-               fmt::format("one of {}x{}", scope->width, scope->height),
-               "measure that scope with `perimap calibrate scope`, or play what it was measured of");
+  return {wrong("camera.turned_scope", fmt::format("one of pictures of {}x{}, as {} has", width, height, played),
+                fmt::format("one of {}x{}", scope->width, scope->height),
+                "measure that scope with `perimap calibrate scope`, or play what it was measured of")};
 }
 
-Expected<void> of_size(int width, int height, const NamedSizes& named, const std::string& played) {
+WrongKeys of_size(int width, int height, const NamedSizes& named, const std::string& played) {
+  WrongKeys all = scope_of_size(width, height, named, played);
   if (const auto& camera = named.camera; camera && (width != camera->width || height != camera->height)) {
-    return wrong("camera.calibration", fmt::format("one for frames of {}x{}, as {} has", width, height, played),
-                 fmt::format("one for {}x{}", camera->width, camera->height),
-                 "measure that camera with `perimap calibrate camera`, or play what the calibration is of");
+    all.push_back(wrong("camera.calibration", fmt::format("one for frames of {}x{}, as {} has", width, height, played),
+                        fmt::format("one for {}x{}", camera->width, camera->height),
+                        "measure that camera with `perimap calibrate camera`, or play what the calibration is of"));
   }
-  return scope_of_size(width, height, named, played);
+  return all;
 }
 
-Expected<void> video_fits(const std::string& file, const NamedSizes& named) {
+WrongKeys wrong_video(const std::string& key, const std::string& file, const NamedSizes& named) {
   auto reader = VideoReader::open(file);
-  if (!reader) return tl::unexpected(std::move(reader.error()));
+  if (!reader) return {{key, reader.error().message}};
   const auto frame = (*reader)->next();
-  if (!frame) return tl::unexpected(frame.error());
+  if (!frame) return {{key, frame.error().message}};
   if (*frame == nullptr) return {};
   return of_size((*frame)->grey.width, (*frame)->grey.height, named, file);
 }
 
-Expected<void> recording_fits(const std::string& file, const NamedSizes& named) {
+WrongKeys wrong_recording(const std::string& key, const std::string& file, const NamedSizes& named) {
   constexpr std::array<std::string_view, 1> kFrames{channels::kCameraImage};
   auto reader = ReplayReader::open(file, ReadMode::kWhole, kFrames);
-  if (!reader) return tl::unexpected(std::move(reader.error()));
+  if (!reader) return {{key, reader.error().message}};
   const auto event = reader->next();
-  if (!event) return tl::unexpected(event.error());
+  if (!event) return {{key, event.error().message}};
   if (!*event) return {};
   const auto& frame = std::get<FrameEvent>(**event);
   return of_size(frame.width, frame.height, named, file);
@@ -92,33 +92,39 @@ std::optional<CalibrationDate> date_of(const std::optional<std::string>& text) {
 }
 
 // The size that the configuration says itself, which is a camera's to deliver.
-Expected<void> size_fits(const CameraConfiguration& c, const NamedSizes& named) {
+WrongKeys wrong_size(const CameraConfiguration& c, const NamedSizes& named) {
   if (c.width == 0 || c.height == 0) return {};
+  WrongKeys all = scope_of_size(c.width, c.height, named, "the key 'camera.width'");
   if (const auto& camera = named.camera; camera && (c.width != camera->width || c.height != camera->height)) {
-    return wrong("camera.width", fmt::format("the calibration's {}x{}", camera->width, camera->height),
-                 fmt::format("{}x{}", c.width, c.height),
-                 "measure the camera with `perimap calibrate camera` as it is used");
+    all.push_back(wrong("camera.width", fmt::format("the calibration's {}x{}", camera->width, camera->height),
+                        fmt::format("{}x{}", c.width, c.height),
+                        "measure the camera with `perimap calibrate camera` as it is used"));
   }
-  return scope_of_size(c.width, c.height, named, "the key 'camera.width'");
+  return all;
 }
 
-Expected<NamedSizes> named_sizes(const CameraConfiguration& c) {
+// Those that can be read; of the others why not is added to what is wrong.
+NamedSizes named_sizes(const CameraConfiguration& c, WrongKeys& all) {
   NamedSizes named;
   if (c.calibration) {
-    auto camera = read_calibration(*c.calibration);
-    if (!camera) return tl::unexpected(std::move(camera.error()));
-    named.camera = *camera;
+    if (auto camera = read_calibration(*c.calibration)) {
+      named.camera = *camera;
+    } else {
+      all.push_back({"camera.calibration", camera.error().message});
+    }
   }
   if (c.turned_scope) {
-    auto scope = read_turned_scope(*c.turned_scope);
-    if (!scope) return tl::unexpected(std::move(scope.error()));
-    named.scope = *std::move(scope);
+    if (auto scope = read_turned_scope(*c.turned_scope)) {
+      named.scope = *std::move(scope);
+    } else {
+      all.push_back({"camera.turned_scope", scope.error().message});
+    }
   }
   return named;
 }
 
 // Where a second sensor tells the turn it must be named, and be the one that it was measured of.
-Expected<void> second_sensor_fits(const Configuration& configuration, const TurnedScope& scope) {
+WrongKeys wrong_second_sensor(const Configuration& configuration, const TurnedScope& scope) {
   const TrackerConfiguration& tracker = configuration.tracker;
   if (!scope.second_sensor) return {};
   const auto own = calibration_fact(*configuration.camera.turned_scope, "second_sensor");
@@ -127,76 +133,83 @@ Expected<void> second_sensor_fits(const Configuration& configuration, const Turn
   // Recorded poses say themselves whether there are such; one that is uploaded is given a handle.
   const bool recorded = tracker.protocol == TrackerConfiguration::Protocol::kNone;
   if (!named && (recorded || second_sensor_of(tracked_tool_names(tracker)))) return {};
-  return wrong("tracker.second_sensor",
-               own ? fmt::format("\"{}\", as 'camera.turned_scope' is of", *own)
-                   : "the sensor that tells how the scope of 'camera.turned_scope' is turned",
-               named ? fmt::format("\"{}\"", *named) : "nothing",
-               "name it, or measure the scope with `perimap calibrate scope`");
+  return {wrong("tracker.second_sensor",
+                own ? fmt::format("\"{}\", as 'camera.turned_scope' is of", *own)
+                    : "the sensor that tells how the scope of 'camera.turned_scope' is turned",
+                named ? fmt::format("\"{}\"", *named) : "nothing",
+                "name it, or measure the scope with `perimap calibrate scope`")};
 }
 
 // Of the camera's picture, and of the tracker's sensor where it says of which it is.
-Expected<void> scope_fits(const Configuration& configuration, const NamedSizes& named) {
+WrongKeys wrong_scope(const Configuration& configuration, const NamedSizes& named) {
   const CameraConfiguration& c = configuration.camera;
   const TrackerConfiguration& tracker = configuration.tracker;
-  if (!c.turned_scope) return {};
+  if (!named.scope) return {};
+  WrongKeys all;
   if (named.camera) {
-    if (const auto scope = configured_scope(configuration, *named.camera); !scope) return tl::unexpected(scope.error());
+    if (auto scope = configured_scope(configuration, *named.camera); !scope) append(all, std::move(scope.error()));
   }
-  if (const auto second = second_sensor_fits(configuration, *named.scope); !second) return second;
+  append(all, wrong_second_sensor(configuration, *named.scope));
   const auto sensor = calibration_fact(*c.turned_scope, "sensor");
-  if (!sensor) return {};
+  if (!sensor) return all;
   // Where there is no tracker, a sensor that is named says of which one the recorded poses are.
-  if (!tracker.sensor && tracker.protocol == TrackerConfiguration::Protocol::kNone) return {};
-  if (tracker.sensor && same_tool(*sensor, *tracker.sensor, tracker.protocol)) return {};
-  return wrong("camera.turned_scope",
-               tracker.sensor ? fmt::format("one of \"{}\", the tracker.sensor", *tracker.sensor)
-                              : "a tracker.sensor that is named, for it is of one sensor",
-               fmt::format("one of \"{}\"", *sensor),
-               "its hand-eye is that sensor's; name it, or measure the scope with `perimap calibrate scope`");
+  if (!tracker.sensor && tracker.protocol == TrackerConfiguration::Protocol::kNone) return all;
+  if (tracker.sensor && same_tool(*sensor, *tracker.sensor, tracker.protocol)) return all;
+  all.push_back(wrong("camera.turned_scope",
+                      tracker.sensor ? fmt::format("one of \"{}\", the tracker.sensor", *tracker.sensor)
+                                     : "a tracker.sensor that is named, for it is of one sensor",
+                      fmt::format("one of \"{}\"", *sensor),
+                      "its hand-eye is that sensor's; name it, or measure the scope with `perimap calibrate scope`"));
+  return all;
 }
 
 }  // namespace
 
-Expected<void> calibrations_fit(const Configuration& configuration) {
+WrongKeys wrong_calibrations(const Configuration& configuration) {
   const TrackerConfiguration& c = configuration.tracker;
-  const auto named = named_sizes(configuration.camera);
-  if (!named) return tl::unexpected(named.error());
-  if (const auto size = size_fits(configuration.camera, *named); !size) return size;
-  if (const auto scope = scope_fits(configuration, *named); !scope) return scope;
+  WrongKeys all;
+  const NamedSizes named = named_sizes(configuration.camera, all);
+  append(all, wrong_size(configuration.camera, named));
+  append(all, wrong_scope(configuration, named));
   if (c.hand_eye_sensor && !c.sensor && c.protocol != TrackerConfiguration::Protocol::kNone) {
-    return wrong("tracker.sensor", fmt::format("\"{}\", as 'tracker.hand_eye_sensor' says", *c.hand_eye_sensor),
-                 "nothing", "without it any other sensor would be taken for that one; name the sensor");
+    all.push_back(wrong("tracker.sensor", fmt::format("\"{}\", as 'tracker.hand_eye_sensor' says", *c.hand_eye_sensor),
+                        "nothing", "without it any other sensor would be taken for that one; name the sensor"));
   }
   if (c.hand_eye_sensor && c.sensor && !same_tool(*c.hand_eye_sensor, *c.sensor, c.protocol)) {
-    return wrong("tracker.hand_eye_sensor", fmt::format("\"{}\", the tracker.sensor", *c.sensor),
-                 fmt::format("\"{}\"", *c.hand_eye_sensor),
-                 "the hand-eye is another sensor's; measure it with `perimap calibrate hand-eye`");
+    all.push_back(wrong("tracker.hand_eye_sensor", fmt::format("\"{}\", the tracker.sensor", *c.sensor),
+                        fmt::format("\"{}\"", *c.hand_eye_sensor),
+                        "the hand-eye is another sensor's; measure it with `perimap calibrate hand-eye`"));
   }
   if (c.pointer_calibration) {
-    if (const auto tip = read_tool_tip(*c.pointer_calibration); !tip) return tl::unexpected(tip.error());
+    if (const auto tip = read_tool_tip(*c.pointer_calibration); !tip) {
+      all.push_back({"tracker.pointer_calibration", tip.error().message});
+    }
   }
   const auto tool = pointer_fact(c, "tool");
   // Recordings have it by its role, which says nothing of which tool it was.
   if (tool && *tool != "pointer" && c.pointer && !same_tool(*tool, *c.pointer, c.protocol)) {
-    return wrong("tracker.pointer_calibration", fmt::format("one of \"{}\", the tracker.pointer", *c.pointer),
-                 fmt::format("one of \"{}\"", *tool),
-                 "the tip is another tool's; measure it with `perimap calibrate tool`");
+    all.push_back(wrong("tracker.pointer_calibration", fmt::format("one of \"{}\", the tracker.pointer", *c.pointer),
+                        fmt::format("one of \"{}\"", *tool),
+                        "the tip is another tool's; measure it with `perimap calibrate tool`"));
   }
-  return {};
+  return all;
 }
 
-Expected<void> frames_fit(const Configuration& configuration, const std::filesystem::path& configuration_file) {
+WrongKeys wrong_frames(const Configuration& configuration, const std::filesystem::path& configuration_file) {
   const CameraConfiguration& c = configuration.camera;
-  const auto named = named_sizes(c);
-  if (!named) return tl::unexpected(named.error());
-  if (!named->camera && !named->scope) return {};
-  if (configuration.replay.recording) return recording_fits(configuration.replay.recording->string(), *named);
-  if (c.playback) return recording_fits(c.playback->string(), *named);
-  if (!c.device) return {};
+  WrongKeys unread;
+  const NamedSizes named = named_sizes(c, unread);
+  if (!named.camera && !named.scope) return unread;
+  if (const auto& played = configuration.replay.recording) {
+    return wrong_recording("replay.recording", played->string(), named);
+  }
+  if (c.playback) return wrong_recording("camera.playback", c.playback->string(), named);
+  if (!c.device) return unread;
   const auto endpoint = parse_camera_endpoint(*c.device);
   const auto* video = endpoint ? std::get_if<VideoEndpoint>(&*endpoint) : nullptr;
-  if (video == nullptr) return {};
-  return video_fits((configuration_file.parent_path() / video->file).lexically_normal().string(), *named);
+  if (video == nullptr) return unread;
+  return wrong_video("camera.device", (configuration_file.parent_path() / video->file).lexically_normal().string(),
+                     named);
 }
 
 std::vector<std::string> old_calibrations(const Configuration& configuration,

@@ -6,22 +6,21 @@
 #include <string>
 #include <vector>
 
-#include "core/error/expected.hpp"
 #include "daemon/config/configuration.hpp"
+#include "daemon/config/wrong_key.hpp"
 
 namespace perimap {
 
 // A hand-eye or turned scope of another sensor, a tip of another tool, or a lens or turned scope for pictures of
-// another size than the configuration says, or one that cannot be read: one line that names the key or file and says
-// what to do. What does not say what it is of fits; where a hand-eye or scope says so, the tracker's sensor must be
-// named. Whether devices are named or not.
-[[nodiscard]] Expected<void> calibrations_fit(const Configuration& configuration);
+// another size than the configuration says, or one that cannot be read: each with what to do. What does not say what it
+// is of fits; where a hand-eye or scope says so, the tracker's sensor must be named. Whether devices are named or not.
+[[nodiscard]] WrongKeys wrong_calibrations(const Configuration& configuration);
 
-// Whether the frames of a video or recording that the configuration plays are as large as those that its calibration
+// Where the frames of a video or recording that the configuration plays are not as large as those that its calibration
 // and its turned scope are for. Of a camera only the camera can tell. `configuration_file`: names of videos start at
 // its folder.
-[[nodiscard]] Expected<void> frames_fit(const Configuration& configuration,
-                                        const std::filesystem::path& configuration_file);
+[[nodiscard]] WrongKeys wrong_frames(const Configuration& configuration,
+                                     const std::filesystem::path& configuration_file);
 
 // One line for each that is older than setup.maximum_age_days, or of a day to come.
 [[nodiscard]] std::vector<std::string> old_calibrations(const Configuration& configuration,

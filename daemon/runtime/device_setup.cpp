@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdint>
@@ -21,13 +22,22 @@
 namespace perimap {
 namespace {
 
-tl::unexpected<Error> wrong(std::string_view key, std::string_view expected, std::string_view got) {
-  return fail(fmt::format("key '{}': expected {}, got {}", key, expected, got));
+WrongKey wrong_key(std::string_view key, std::string_view expected, std::string_view got) {
+  return {std::string(key), fmt::format("expected {}, got {}", expected, got)};
 }
 
-Expected<Endpoint> endpoint_of(std::string_view key, const std::optional<std::string>& text) {
-  if (!text) return wrong(key, "where the device is", "nothing");
-  return parse_endpoint(*text);
+// None: what is wrong is added.
+std::optional<Endpoint> endpoint_of(const char* key, const std::optional<std::string>& text, WrongKeys& wrong) {
+  if (!text) {
+    wrong.push_back(wrong_key(key, "where the device is", "nothing"));
+    return std::nullopt;
+  }
+  auto endpoint = parse_endpoint(*text);
+  if (!endpoint) {
+    wrong.push_back({key, endpoint.error().message});
+    return std::nullopt;
+  }
+  return *std::move(endpoint);
 }
 
 // A file is a few hundred bytes; NDI gives it 1024, rounded up here for later formats.
@@ -42,62 +52,58 @@ Expected<std::vector<std::byte>> read_definition(const std::filesystem::path& fi
   return std::vector<std::byte>(bytes.begin(), bytes.end());
 }
 
-Expected<NdiTool> ndi_tool(std::string_view key, const std::optional<std::string>& handle,
-                           const std::optional<std::filesystem::path>& definition) {
+struct NdiKeys {
+  const char* handle;
+  const char* definition;
+};
+
+NdiTool ndi_tool(const NdiKeys& keys, const std::optional<std::string>& handle,
+                 const std::optional<std::filesystem::path>& definition, WrongKeys& wrong) {
   NdiTool tool;
   if (definition) {
-    auto bytes = read_definition(*definition);
-    if (!bytes) return tl::unexpected(std::move(bytes.error()));
-    tool.definition = std::move(*bytes);
+    if (auto bytes = read_definition(*definition)) {
+      tool.definition = std::move(*bytes);
+    } else {
+      wrong.push_back({keys.definition, bytes.error().message});
+    }
   }
   if (handle) {
     std::uint16_t value = 0;
     const auto [end, error] = std::from_chars(handle->data(), handle->data() + handle->size(), value, 16);
     if (error != std::errc{} || end != handle->data() + handle->size() || handle->size() > 2) {
-      return wrong(key, "a port handle of two hexadecimal digits", fmt::format("\"{}\"", *handle));
+      wrong.push_back(
+          wrong_key(keys.handle, "a port handle of two hexadecimal digits", fmt::format("\"{}\"", *handle)));
     }
     tool.handle = value;
   }
   return tool;
 }
 
-// A tool seen from itself stands still where it is: a pose that looks well and says nothing.
-tl::unexpected<Error> refuse_twice(const ToolTwice& twice) {
-  return wrong(twice.key, fmt::format("another tool than '{}'", twice.also), fmt::format("\"{}\"", twice.tool));
-}
-
-Expected<NdiSettings> ndi_settings(const TrackerConfiguration& c) {
+NdiSettings ndi_settings(const TrackerConfiguration& c, WrongKeys& wrong) {
   NdiSettings settings;
-  auto sensor = ndi_tool("tracker.sensor", c.sensor, c.sensor_definition);
-  if (!sensor) return tl::unexpected(std::move(sensor.error()));
-  settings.sensor = std::move(*sensor);
+  settings.sensor = ndi_tool({"tracker.sensor", "tracker.sensor_definition"}, c.sensor, c.sensor_definition, wrong);
   if (c.reference || c.reference_definition) {
-    auto reference = ndi_tool("tracker.reference", c.reference, c.reference_definition);
-    if (!reference) return tl::unexpected(std::move(reference.error()));
-    settings.reference = std::move(*reference);
+    settings.reference =
+        ndi_tool({"tracker.reference", "tracker.reference_definition"}, c.reference, c.reference_definition, wrong);
   }
-  const auto add = [&settings](std::string name) {
-    return [&settings, name = std::move(name)](NdiTool tool) mutable {
-      tool.name = std::move(name);
-      settings.tools.push_back(std::move(tool));
-    };
+  const auto add = [&settings](std::string name, NdiTool tool) {
+    tool.name = std::move(name);
+    settings.tools.push_back(std::move(tool));
   };
-  Expected<void> added;
   if (c.pointer || c.pointer_definition) {
-    added = ndi_tool("tracker.pointer", c.pointer, c.pointer_definition).map(add("pointer"));
+    add("pointer", ndi_tool({"tracker.pointer", "tracker.pointer_definition"}, c.pointer, c.pointer_definition, wrong));
   }
-  if (added && (c.second_sensor || c.second_sensor_definition)) {
-    added = ndi_tool("tracker.second_sensor", c.second_sensor, c.second_sensor_definition).map(add("second sensor"));
+  if (c.second_sensor || c.second_sensor_definition) {
+    add("second sensor", ndi_tool({"tracker.second_sensor", "tracker.second_sensor_definition"}, c.second_sensor,
+                                  c.second_sensor_definition, wrong));
   }
+  constexpr NdiKeys kInstruments{"tracker.instruments", "tracker.instrument_definitions"};
   for (const std::string& instrument : c.instruments) {
-    if (added) added = ndi_tool("tracker.instruments", instrument, std::nullopt).map(add("instrument " + instrument));
+    add("instrument " + instrument, ndi_tool(kInstruments, instrument, std::nullopt, wrong));
   }
   for (const std::filesystem::path& definition : c.instrument_definitions) {
-    if (!added) break;
-    added = ndi_tool("tracker.instrument_definitions", std::nullopt, definition)
-                .map(add("instrument " + definition.stem().string()));
+    add("instrument " + definition.stem().string(), ndi_tool(kInstruments, std::nullopt, definition, wrong));
   }
-  if (!added) return tl::unexpected(std::move(added.error()));
   settings.frame_rate_hz = c.frame_rate_hz;
   return settings;
 }
@@ -108,18 +114,24 @@ struct FrameSize {
 };
 
 // Of the keys or of the calibration, which must agree; zeros when neither says.
-Expected<FrameSize> frame_size(const CameraConfiguration& c) {
+FrameSize frame_size(const CameraConfiguration& c, WrongKeys& wrong) {
+  const FrameSize given{c.width, c.height};
   if ((c.width > 0) != (c.height > 0)) {
-    return wrong(c.width > 0 ? "camera.height" : "camera.width", "one, since the other is given", "0");
+    wrong.push_back(wrong_key(c.width > 0 ? "camera.height" : "camera.width", "one, since the other is given", "0"));
+    return given;
   }
-  if (!c.calibration) return FrameSize{c.width, c.height};
+  if (!c.calibration) return given;
   const auto calibration = read_calibration(*c.calibration);
-  if (!calibration) return tl::unexpected(calibration.error());
-  if (c.width > 0 && (c.width != calibration->width || c.height != calibration->height)) {
-    return wrong("camera.width", fmt::format("the calibration's {}x{}", calibration->width, calibration->height),
-                 fmt::format("{}x{}", c.width, c.height));
+  if (!calibration) {
+    wrong.push_back({"camera.calibration", calibration.error().message});
+    return given;
   }
-  return FrameSize{calibration->width, calibration->height};
+  if (c.width > 0 && (c.width != calibration->width || c.height != calibration->height)) {
+    wrong.push_back(wrong_key("camera.width",
+                              fmt::format("the calibration's {}x{}", calibration->width, calibration->height),
+                              fmt::format("{}x{}", c.width, c.height)));
+  }
+  return {calibration->width, calibration->height};
 }
 
 V4l2Settings v4l2_settings(const CameraConfiguration& c, const std::string& path, const FrameSize& size) {
@@ -159,19 +171,25 @@ bool names_devices(const Configuration& configuration) noexcept {
          configuration.camera.device.has_value() || configuration.ecg.r_trigger_port.has_value();
 }
 
-Expected<TrackerDevice> tracker_device(const TrackerConfiguration& c) {
-  if (c.protocol == TrackerConfiguration::Protocol::kNone)
-    return wrong("tracker.protocol", R"("ndi" or "igtl")", R"("none")");
-  auto endpoint = endpoint_of("tracker.port", c.port);
-  if (!endpoint) return tl::unexpected(std::move(endpoint.error()));
-  if (std::holds_alternative<CanEndpoint>(*endpoint)) {
-    return wrong("tracker.port", "a serial port or tcp:HOST:PORT", format_endpoint(*endpoint));
+tl::expected<TrackerDevice, WrongKeys> tracker_device(const TrackerConfiguration& c) {
+  if (c.protocol == TrackerConfiguration::Protocol::kNone) {
+    return tl::unexpected(WrongKeys{wrong_key("tracker.protocol", R"("ndi" or "igtl")", R"("none")")});
+  }
+  WrongKeys wrong;
+  auto endpoint = endpoint_of("tracker.port", c.port, wrong);
+  if (endpoint && std::holds_alternative<CanEndpoint>(*endpoint)) {
+    wrong.push_back(wrong_key("tracker.port", "a serial port or tcp:HOST:PORT", format_endpoint(*endpoint)));
   }
   const double(&t)[3] = c.translation_IW_mm;
   WorldSettings world;
   world.X_IW = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), c.rotation_IW_wxyz);
-  if (const auto twice = tool_named_twice(c)) return refuse_twice(*twice);
+  // A tool seen from itself stands still where it is: a pose that looks well and says nothing.
+  if (const auto twice = tool_named_twice(c)) {
+    wrong.push_back(
+        wrong_key(twice->key, fmt::format("another tool than '{}'", twice->also), fmt::format("\"{}\"", twice->tool)));
+  }
   if (c.protocol == TrackerConfiguration::Protocol::kIgtl) {
+    if (!wrong.empty()) return tl::unexpected(std::move(wrong));
     IgtlSettings settings{c.sensor.value_or(""), c.reference, world, {}};
     settings.stamps_by_arrival = c.igtl_stamps_by_arrival;
     if (c.pointer) settings.tools.push_back(*c.pointer);
@@ -179,35 +197,42 @@ Expected<TrackerDevice> tracker_device(const TrackerConfiguration& c) {
     settings.tools.insert(settings.tools.end(), c.instruments.begin(), c.instruments.end());
     return TrackerDevice{std::move(*endpoint), std::move(settings), tracked_tool_names(c)};
   }
-  auto settings = ndi_settings(c);
-  if (!settings) return tl::unexpected(std::move(settings.error()));
-  settings->world = world;
-  return TrackerDevice{std::move(*endpoint), std::move(*settings), tracked_tool_names(c)};
+  NdiSettings settings = ndi_settings(c, wrong);
+  if (!wrong.empty()) return tl::unexpected(std::move(wrong));
+  settings.world = world;
+  return TrackerDevice{std::move(*endpoint), std::move(settings), tracked_tool_names(c)};
 }
 
-Expected<EcgDevice> ecg_device(const Configuration& configuration) {
+tl::expected<EcgDevice, WrongKeys> ecg_device(const Configuration& configuration) {
   const EcgConfiguration& c = configuration.ecg;
   using Protocol = EcgConfiguration::Protocol;
-  if (c.protocol == Protocol::kNone) return wrong("ecg.protocol", "an ECG device", "\"none\"");
-  auto endpoint = endpoint_of("ecg.port", c.port);
-  if (!endpoint) return tl::unexpected(std::move(endpoint.error()));
-  if (std::holds_alternative<CanEndpoint>(*endpoint) != (c.protocol == Protocol::kCan)) {
-    return wrong("ecg.port", c.protocol == Protocol::kCan ? "can:INTERFACE" : "a serial port or tcp:HOST:PORT",
-                 format_endpoint(*endpoint));
+  if (c.protocol == Protocol::kNone) {
+    return tl::unexpected(WrongKeys{wrong_key("ecg.protocol", "an ECG device", "\"none\"")});
   }
-  if (const auto input = wrong_input(configuration)) {
-    return wrong(fmt::format("{}.{}", input->section, input->key), input->expected, input->got);
+  WrongKeys wrong;
+  auto endpoint = endpoint_of("ecg.port", c.port, wrong);
+  if (endpoint && std::holds_alternative<CanEndpoint>(*endpoint) != (c.protocol == Protocol::kCan)) {
+    wrong.push_back(wrong_key("ecg.port",
+                              c.protocol == Protocol::kCan ? "can:INTERFACE" : "a serial port or tcp:HOST:PORT",
+                              format_endpoint(*endpoint)));
+  }
+  for (const WrongInput& input : wrong_inputs(configuration)) {
+    wrong.push_back(wrong_key(fmt::format("{}.{}", input.section, input.key), input.expected, input.got));
   }
   constexpr std::uint32_t kLargest = CanEcgSettings::kLargestStandardIdentifier;
   if (!c.can_extended && static_cast<std::uint32_t>(c.can_identifier) > kLargest) {
-    return wrong("ecg.can_identifier", fmt::format("at most {} with 11 bits", kLargest),
-                 fmt::format("{}", c.can_identifier));
+    wrong.push_back(wrong_key("ecg.can_identifier", fmt::format("at most {} with 11 bits", kLargest),
+                              fmt::format("{}", c.can_identifier)));
   }
+  if (!wrong.empty()) return tl::unexpected(std::move(wrong));
   return EcgDevice{std::move(*endpoint), c, configuration.respiration.device_channel};
 }
 
-Expected<RTriggerDevice> r_trigger_device(const EcgConfiguration& c) {
-  if (!c.r_trigger_port) return wrong("ecg.r_trigger_port", "the serial port with the trigger's line", "nothing");
+tl::expected<RTriggerDevice, WrongKeys> r_trigger_device(const EcgConfiguration& c) {
+  if (!c.r_trigger_port) {
+    return tl::unexpected(
+        WrongKeys{wrong_key("ecg.r_trigger_port", "the serial port with the trigger's line", "nothing")});
+  }
   RTriggerDevice device;
   device.settings.path = *c.r_trigger_port;
   device.settings.line = c.r_trigger_line;
@@ -215,53 +240,95 @@ Expected<RTriggerDevice> r_trigger_device(const EcgConfiguration& c) {
   return device;
 }
 
-Expected<CameraDevice> camera_device(const CameraConfiguration& c, const std::filesystem::path& configuration_file) {
-  if (c.device && c.playback) return wrong("camera.playback", "nothing beside 'camera.device'", c.playback->string());
-  if (c.playback) {
-    return camera_playback(c.playback->string(), c.playback_start_s).map([](CameraPlayback playback) {
-      return CameraDevice(std::move(playback));
-    });
+tl::expected<CameraDevice, WrongKeys> camera_device(const CameraConfiguration& c,
+                                                    const std::filesystem::path& configuration_file) {
+  WrongKeys wrong;
+  if (c.device && c.playback) {
+    wrong.push_back(wrong_key("camera.playback", "nothing beside 'camera.device'", c.playback->string()));
+  } else if (c.playback) {
+    auto playback = camera_playback(c.playback->string(), c.playback_start_s);
+    if (playback) return CameraDevice(*std::move(playback));
+    wrong.push_back({"camera.playback", playback.error().message});
   }
-  if (!c.device) return wrong("camera.device", "a camera, or a recording in 'camera.playback'", "nothing");
+  if (!c.device && !c.playback) {
+    wrong.push_back(wrong_key("camera.device", "a camera, or a recording in 'camera.playback'", "nothing"));
+  }
+  if (!c.device) return tl::unexpected(std::move(wrong));
+  const FrameSize size = frame_size(c, wrong);
   const auto endpoint = parse_camera_endpoint(*c.device);
-  if (!endpoint) return tl::unexpected(endpoint.error());
-  const auto size = frame_size(c);
-  if (!size) return tl::unexpected(size.error());
-  if (const auto* v4l2 = std::get_if<V4l2Endpoint>(&*endpoint)) return v4l2_settings(c, v4l2->path, *size);
+  if (!endpoint) wrong.push_back({"camera.device", endpoint.error().message});
+  const auto* video = endpoint ? std::get_if<VideoEndpoint>(&*endpoint) : nullptr;
   const std::filesystem::path file =
-      (configuration_file.parent_path() / std::get<VideoEndpoint>(*endpoint).file).lexically_normal();
+      video != nullptr ? (configuration_file.parent_path() / video->file).lexically_normal() : "";
   std::error_code code;
-  if (!std::filesystem::is_regular_file(file, code)) {
-    return wrong("camera.device", "a video file", fmt::format("{}, which is not there", file.string()));
+  if (video != nullptr && !std::filesystem::is_regular_file(file, code)) {
+    wrong.push_back(wrong_key("camera.device", "a video file", fmt::format("{}, which is not there", file.string())));
   }
-  return VideoCameraSettings{file.string(), c.frame_rate_hz, c.loop, size->width, size->height};
+  if (!wrong.empty()) return tl::unexpected(std::move(wrong));
+  if (video != nullptr) return VideoCameraSettings{file.string(), c.frame_rate_hz, c.loop, size.width, size.height};
+  return v4l2_settings(c, std::get<V4l2Endpoint>(*endpoint).path, size);
 }
 
-Expected<Devices> named_devices(const Configuration& configuration, const std::filesystem::path& configuration_file) {
+tl::expected<Devices, WrongKeys> named_devices(const Configuration& configuration,
+                                               const std::filesystem::path& configuration_file) {
   Devices devices;
-  const auto keep = [](auto& place) { return [&place](auto device) { place.emplace(std::move(device)); }; };
-  Expected<void> named;
+  WrongKeys wrong;
+  const auto keep = [&wrong](auto device, auto& place) {
+    if (device) {
+      place.emplace(*std::move(device));
+    } else {
+      append(wrong, std::move(device.error()));
+    }
+  };
   if (configuration.tracker.protocol != TrackerConfiguration::Protocol::kNone) {
-    named = tracker_device(configuration.tracker).map(keep(devices.tracker));
+    keep(tracker_device(configuration.tracker), devices.tracker);
   }
-  if (named && configuration.ecg.protocol != EcgConfiguration::Protocol::kNone) {
-    named = ecg_device(configuration).map(keep(devices.ecg));
+  if (configuration.ecg.protocol != EcgConfiguration::Protocol::kNone) keep(ecg_device(configuration), devices.ecg);
+  if (configuration.ecg.r_trigger) keep(r_trigger_device(configuration.ecg), devices.r_trigger);
+  if (configuration.camera.device || configuration.camera.playback) {
+    keep(camera_device(configuration.camera, configuration_file), devices.camera);
   }
-  if (named && configuration.ecg.r_trigger) {
-    named = r_trigger_device(configuration.ecg).map(keep(devices.r_trigger));
-  }
-  if (named && (configuration.camera.device || configuration.camera.playback)) {
-    named = camera_device(configuration.camera, configuration_file).map(keep(devices.camera));
-  }
-  if (!named) return tl::unexpected(std::move(named.error()));
+  if (!wrong.empty()) return tl::unexpected(std::move(wrong));
   return devices;
 }
 
+namespace {
+
+// What a map takes and the configuration does not name: camera, tracker, and R peaks by ECG or trigger.
+WrongKeys missing_devices(const Configuration& configuration) {
+  WrongKeys missing;
+  if (configuration.tracker.protocol == TrackerConfiguration::Protocol::kNone) {
+    append(missing, tracker_device(configuration.tracker).error());
+  }
+  if (configuration.ecg.protocol == EcgConfiguration::Protocol::kNone && !configuration.ecg.r_trigger) {
+    append(missing, ecg_device(configuration).error());
+  }
+  const CameraConfiguration& camera = configuration.camera;
+  if (!camera.device && !camera.playback) append(missing, camera_device(camera, "").error());
+  return missing;
+}
+
+// The camera, hand-eye and scope that a session begins with. Of what cannot be read it is told elsewhere why
+// (wrong_calibrations).
+RecordedBasis basis_of_file(const Configuration& given, WrongKeys& wrong) {
+  RecordedBasis basis;
+  basis.configuration = given;
+  if (given.camera.device && !given.camera.calibration) {
+    wrong.push_back(wrong_key("camera.calibration", "the camera's calibration", "nothing"));
+  }
+  if (!given.camera.calibration) return basis;
+  const auto calibration = read_calibration(*given.camera.calibration);
+  if (!calibration) return basis;
+  basis.camera = *calibration;
+  if (const auto scope = configured_scope(given, basis.camera)) basis.turned_scope = *scope;
+  return basis;
+}
+
+}  // namespace
+
 tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::path& configuration_file,
                                                       const Configuration& given) {
-  const auto wrong_configuration = [&configuration_file](const Error& error) {
-    return tl::unexpected(SetupError{{fmt::format("{}: {}", configuration_file.string(), error.message)}, true});
-  };
+  WrongKeys wrong;
   RecordedBasis basis;
   if (given.camera.playback) {
     // The recording brings its camera's calibration and hand-eye along.
@@ -269,40 +336,26 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
     if (!recorded) return tl::unexpected(std::move(recorded.error()));
     basis = std::move(*recorded);
   } else {
-    basis.configuration = given;
-    if (given.camera.device && !given.camera.calibration) {
-      return wrong_configuration({"key 'camera.calibration': expected the camera's calibration, got nothing"});
-    }
-    if (given.camera.calibration) {
-      const auto calibration = read_calibration(*given.camera.calibration);
-      if (!calibration) return tl::unexpected(SetupError{calibration.error(), true});
-      basis.camera = *calibration;
-    }
-    auto scope = configured_scope(given, basis.camera);
-    if (!scope) return wrong_configuration(scope.error());
-    basis.turned_scope = *scope;
+    basis = basis_of_file(given, wrong);
   }
   Configuration& configuration = basis.configuration;
+  append(wrong, wrong_calibrations(configuration));
   const bool by_second = basis.turned_scope && basis.turned_scope->second_sensor;
-  if (by_second && !second_sensor_of(tracked_tool_names(configuration.tracker))) {
-    return wrong_configuration(
-        {"key 'tracker.second_sensor': expected the sensor that tells how the turned scope is turned, got nothing"});
+  if (by_second && !second_sensor_of(tracked_tool_names(configuration.tracker)) &&
+      std::none_of(wrong.begin(), wrong.end(),
+                   [](const WrongKey& one) { return one.key == "tracker.second_sensor"; })) {
+    wrong.push_back(
+        wrong_key("tracker.second_sensor", "the sensor that tells how the turned scope is turned", "nothing"));
   }
-  if (const auto fits = calibrations_fit(configuration); !fits) return wrong_configuration(fits.error());
   auto devices = named_devices(configuration, configuration_file);
-  // A map takes camera, tracker and R peaks: one that is not named is asked for as it would be.
-  if (devices && !devices->tracker) devices = tl::unexpected(tracker_device(configuration.tracker).error());
-  if (devices && !devices->ecg && !devices->r_trigger) devices = tl::unexpected(ecg_device(configuration).error());
-  if (devices && !devices->camera) {
-    devices = tl::unexpected(camera_device(configuration.camera, configuration_file).error());
-  }
-  if (!devices) return wrong_configuration(devices.error());
+  if (!devices) append(wrong, std::move(devices.error()));
+  append(wrong, missing_devices(configuration));
+  if (!wrong.empty()) return wrong_setup(told_in(configuration_file, std::move(wrong)));
   if (auto* playback = std::get_if<CameraPlayback>(&*devices->camera)) {
     playback->reader.require_frame_size(basis.camera.width, basis.camera.height);
   }
   if (std::holds_alternative<VideoCameraSettings>(*devices->camera)) {
-    if (auto loaded = load_video_support(); !loaded)
-      return tl::unexpected(SetupError{std::move(loaded.error()), false});
+    if (auto loaded = load_video_support(); !loaded) return tl::unexpected(std::move(loaded.error()));
   }
   PipelineSettings pipeline = pipeline_settings(configuration, basis.camera);
   pipeline.turned_scope = basis.turned_scope;

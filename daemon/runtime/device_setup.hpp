@@ -4,12 +4,13 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <tl/expected.hpp>
 #include <variant>
 #include <vector>
 
-#include "core/error/expected.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "daemon/config/configuration.hpp"
+#include "daemon/config/wrong_key.hpp"
 #include "daemon/publishing/identity.hpp"
 #include "daemon/runtime/replay_setup.hpp"
 #include "drivers/camera/v4l2_stream.hpp"
@@ -64,16 +65,16 @@ struct DeviceSetup {
 // Whether the configuration names devices; otherwise it is for a replay.
 [[nodiscard]] bool names_devices(const Configuration& configuration) noexcept;
 
-// Errors name the key and what it should be. Devices are not opened yet: they may come later.
-[[nodiscard]] Expected<TrackerDevice> tracker_device(const TrackerConfiguration& configuration);
-[[nodiscard]] Expected<EcgDevice> ecg_device(const Configuration& configuration);
-[[nodiscard]] Expected<RTriggerDevice> r_trigger_device(const EcgConfiguration& configuration);
+// All that is wrong with the device's keys. Devices are not opened yet: they may come later.
+[[nodiscard]] tl::expected<TrackerDevice, WrongKeys> tracker_device(const TrackerConfiguration& configuration);
+[[nodiscard]] tl::expected<EcgDevice, WrongKeys> ecg_device(const Configuration& configuration);
+[[nodiscard]] tl::expected<RTriggerDevice, WrongKeys> r_trigger_device(const EcgConfiguration& configuration);
 // Of `device`, or of `playback` and its start. The frames' size is that of the keys or of the calibration, or any.
-[[nodiscard]] Expected<CameraDevice> camera_device(const CameraConfiguration& configuration,
-                                                   const std::filesystem::path& configuration_file);
-// Those that the configuration names.
-[[nodiscard]] Expected<Devices> named_devices(const Configuration& configuration,
-                                              const std::filesystem::path& configuration_file);
+[[nodiscard]] tl::expected<CameraDevice, WrongKeys> camera_device(const CameraConfiguration& configuration,
+                                                                  const std::filesystem::path& configuration_file);
+// Those that the configuration names, or all that is wrong with any of them.
+[[nodiscard]] tl::expected<Devices, WrongKeys> named_devices(const Configuration& configuration,
+                                                             const std::filesystem::path& configuration_file);
 // `given`: the file as loaded by itself.
 [[nodiscard]] tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::path& configuration_file,
                                                                     const Configuration& given);

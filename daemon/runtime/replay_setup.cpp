@@ -8,6 +8,7 @@
 
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/surface_traffic.hpp"
+#include "daemon/config/wrong_key.hpp"
 #include "daemon/runtime/calibration_fit.hpp"
 #include "daemon/runtime/configured_scope.hpp"
 #include "drivers/calibration/calibration_file.hpp"
@@ -61,6 +62,12 @@ Expected<RecordingFacts> read_facts(const std::string& path, ReadMode mode) {
   facts.utc_minus_monotonic = Duration((*info)->utc_minus_monotonic_ns);
   if ((*info)->world_frame_id != nullptr) facts.world_frame = (*info)->world_frame_id;
   return facts;
+}
+
+// In the file, or where there is none in the recording's own configuration.
+Error told_of(const std::optional<std::filesystem::path>& configuration_file, const std::string& recording,
+              WrongKeys wrong) {
+  return configuration_file ? told_in(*configuration_file, std::move(wrong)) : told_in(recording, "", std::move(wrong));
 }
 
 }  // namespace
@@ -128,10 +135,6 @@ tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& record
                                                        ReadMode mode) {
   const auto wrong_recording = [](Error error) { return tl::unexpected(SetupError{std::move(error), false}); };
   const auto wrong_configuration = [](Error error) { return tl::unexpected(SetupError{std::move(error), true}); };
-  const auto in_file = [&configuration_file](const Error& error) {
-    return configuration_file ? Error{fmt::format("{}: {}", configuration_file->string(), error.message)} : error;
-  };
-
   auto facts = read_facts(recording, mode);
   if (!facts) return wrong_recording(std::move(facts.error()));
   RecordedBasis basis;
@@ -170,7 +173,7 @@ tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& record
   }
   basis.camera = *camera;
   auto scope = configured_scope(configuration, *camera);
-  if (!scope) return wrong_configuration(in_file(scope.error()));
+  if (!scope) return wrong_configuration(told_of(configuration_file, recording, std::move(scope.error())));
   basis.turned_scope = *scope;
   if (!basis.turned_scope && facts->turned_scope) {
     auto own = parse_turned_scope(*facts->turned_scope, fmt::format("{}:{}", recording, attachments::kTurnedScope));
@@ -185,31 +188,25 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
                                                      ReadMode mode) {
   auto basis = recorded_basis(recording, configuration_file, mode);
   if (!basis) return tl::unexpected(std::move(basis.error()));
+  WrongKeys wrong;
   if (configuration_file) {
     if (basis->sensor) basis->configuration.tracker.sensor = basis->sensor;
     if (basis->second_sensor) basis->configuration.tracker.second_sensor = basis->second_sensor;
-    if (const auto fits = calibrations_fit(basis->configuration); !fits) {
-      return tl::unexpected(
-          SetupError{{fmt::format("{}: {}", configuration_file->string(), fits.error().message)}, true});
-    }
+    wrong = wrong_calibrations(basis->configuration);
   }
   auto reader = ReplayReader::open(recording, mode);
-  if (!reader) return tl::unexpected(SetupError{std::move(reader.error()), false});
+  if (!reader) return tl::unexpected(std::move(reader.error()));
   if (basis->configuration.ecg.r_trigger && !reader->has_r_trigger()) {
-    const std::string where = configuration_file ? configuration_file->string() : recording;
-    return tl::unexpected(
-        SetupError{{fmt::format("{}: key 'ecg.r_trigger': expected false, since {} holds no channel {}, got true",
-                                where, recording, channels::kRTrigger)},
-                   true});
+    wrong.push_back({"ecg.r_trigger", fmt::format("expected false, since {} holds no channel {}, got true", recording,
+                                                  channels::kRTrigger)});
   }
   if (basis->turned_scope && basis->turned_scope->second_sensor && !reader->has_second_sensor()) {
-    const std::string where = configuration_file ? configuration_file->string() : recording;
-    return tl::unexpected(
-        SetupError{{fmt::format("{}: key 'camera.turned_scope': expected one that is read in the pictures, since {} "
-                                "holds no channel {}, got one whose turn a second sensor tells",
-                                where, recording, channels::kSecondSensor)},
-                   true});
+    wrong.push_back({"camera.turned_scope",
+                     fmt::format("expected one that is read in the pictures, since {} holds no channel {}, got one "
+                                 "whose turn a second sensor tells",
+                                 recording, channels::kSecondSensor)});
   }
+  if (!wrong.empty()) return wrong_setup(told_of(configuration_file, recording, std::move(wrong)));
   reader->require_frame_size(basis->camera.width, basis->camera.height);
   PipelineSettings pipeline = pipeline_settings(basis->configuration, basis->camera);
   pipeline.turned_scope = basis->turned_scope;

@@ -147,7 +147,7 @@ SetupExpected<LiveRecording> record_live(const LiveOptions& options, const std::
     std::copy_n(untold.rotation_IW_wxyz, 4, configuration->tracker.rotation_IW_wxyz);
   }
   auto devices = named_devices(*configuration, options.configuration);
-  if (!devices) return wrong_setup(options.configuration + ": " + devices.error().message);
+  if (!devices) return wrong_setup(told_in(options.configuration, devices.error()));
   if (!devices->tracker && !devices->camera) {
     return wrong_setup(options.configuration +
                        ": names neither a camera nor a tracker; perimap setup writes one that does");

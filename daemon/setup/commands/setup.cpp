@@ -130,7 +130,7 @@ Expected<std::string> probed(const std::string& text, const SetupOptions& option
   const auto configuration = parse_configuration(text, options.output, {}, NamedFiles::kMayBeMissing);
   if (!configuration) return tl::unexpected(configuration.error());
   const auto devices = named_devices(*configuration, options.output);
-  if (!devices) return fail(options.output + ": " + devices.error().message);
+  if (!devices) return tl::unexpected(told_in(options.output, text, devices.error()));
   if (options.seconds <= 0.0 || (!devices->camera && !devices->tracker && !devices->ecg)) return std::string();
   auto stop = StopSignal::install();
   if (!stop) return tl::unexpected(stop.error());

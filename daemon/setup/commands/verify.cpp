@@ -136,8 +136,8 @@ SetupExpected<void> sensor_fits(Configuration configuration, const VerifyOptions
   configuration.tracker.pointer_calibration.reset();
   configuration.camera.calibration.reset();
   configuration.camera.width = configuration.camera.height = 0;
-  if (const auto fits = calibrations_fit(configuration); !fits) {
-    return wrong_setup(options.configuration + ": " + fits.error().message);
+  if (auto wrong = wrong_calibrations(configuration); !wrong.empty()) {
+    return wrong_setup(told_in(options.configuration, std::move(wrong)));
   }
   return {};
 }
@@ -206,6 +206,9 @@ Outcome run(VerifyOptions& options, const Console& console) {
   if (options.live == !options.recorded.recording.empty()) {
     return refuse("expected a recording with --from, or --live for the configuration's own devices",
                   ExitCode::kWrongUsage);
+  }
+  if (const auto sound = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing); !sound) {
+    return refuse(sound.error(), ExitCode::kWrongUsage);
   }
   if (const auto able = check_motion_options(options.recorded, options.configuration); !able) {
     return refuse(able.error());

@@ -70,7 +70,7 @@ sed 's/^sensor = "0B"/sensor = "0A"/' "$scratch/tracker.toml" >"$scratch/other.t
 "$perimap" check "$scratch/other.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "a hand-eye of another sensor must end with 2"
 [ "$(wc -l <"$scratch/error")" -eq 1 ] || fail "not one line: $(cat "$scratch/error")"
-grep -q "other.toml: key 'tracker.hand_eye_sensor': .*perimap calibrate hand-eye" "$scratch/error" || fail "$(cat "$scratch/error")"
+grep -q "other.toml:9:19: key 'tracker.hand_eye_sensor': .*perimap calibrate hand-eye" "$scratch/error" || fail "$(cat "$scratch/error")"
 
 # A lens of a picture half as large has its principal point on the corner.
 lens=$(cd "$(dirname "$0")/../../data/refused_once" && pwd)/k_half.yaml
@@ -81,7 +81,7 @@ grep -q '^perimap check: warning: camera.calibration: the principal point 320 24
 sed 's/^calibration/width = 640\nheight = 480\ncalibration/' "$scratch/half.toml" >"$scratch/wide.toml"
 "$perimap" check "$scratch/wide.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "a lens of another size must end with 2"
-grep -q "wide.toml: key 'camera.width': expected the calibration's 320x240, got 640x480" "$scratch/error" || fail "$(cat "$scratch/error")"
+grep -q "wide.toml:3:9: key 'camera.width': expected the calibration's 320x240, got 640x480" "$scratch/error" || fail "$(cat "$scratch/error")"
 
 # What calibrate writes is what check compares.
 awk 'BEGIN {
@@ -99,7 +99,7 @@ sed 's/^sensor = "0B"/sensor = "0B"\npointer = "0D"\npointer_calibration = "tip.
 sed 's/^pointer = "0D"/pointer = "0C"/' "$scratch/pointer.toml" >"$scratch/other.toml"
 "$perimap" check "$scratch/other.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "a tip of another tool must end with 2"
-grep -q "other.toml: key 'tracker.pointer_calibration': .*perimap calibrate tool" "$scratch/error" || fail "$(cat "$scratch/error")"
+grep -q "other.toml:[0-9]*:[0-9]*: key 'tracker.pointer_calibration': .*perimap calibrate tool" "$scratch/error" || fail "$(cat "$scratch/error")"
 
 printf 'version = 1\n[phase]\nlaw = 3\n' >"$scratch/wrong.toml"
 "$perimap" check "$scratch/wrong.toml" >"$scratch/out" 2>"$scratch/error"
@@ -110,7 +110,7 @@ grep -q "^perimap check: $scratch/wrong.toml:3:7: key 'phase.law': expected " "$
 printf 'version = 1\n[ecg]\nr_trigger = true\nprotocol = "cyton"\nport = "/dev/ttyUSB0"\n' >"$scratch/trigger.toml"
 "$perimap" check "$scratch/trigger.toml" >"$scratch/out" 2>"$scratch/error"
 [ $? -eq 2 ] || fail "a trigger without a port must end with 2"
-grep -q "trigger.toml: key 'ecg.r_trigger_port': expected the serial port" "$scratch/error" || fail "$(cat "$scratch/error")"
+grep -q "trigger.toml:2:1: key 'ecg.r_trigger_port': expected the serial port" "$scratch/error" || fail "$(cat "$scratch/error")"
 echo 'r_trigger_port = "/dev/ttyS0"' >>"$scratch/trigger.toml"
 "$perimap" check "$scratch/trigger.toml" 2>"$scratch/error" | grep -q '^r_trigger_line = "dcd"' || fail "a trigger's line: $(cat "$scratch/error")"
 printf 'version = 1\n[ecg]\nprotocol = "bitalino"\nport = "/dev/ttyUSB0"\n[respiration]\ndevice_channel = 7\n' >"$scratch/breath.toml"
@@ -121,8 +121,17 @@ for tools in 'protocol = "ndi" sensor = "A" reference = "0a"' 'protocol = "igtl"
   printf 'version = 1\n[tracker]\nport = "tcp:127.0.0.1:1"\n%s\n' "${tools//\" /\"$'\n'}" >"$scratch/tools.toml"
   "$perimap" check "$scratch/tools.toml" >"$scratch/out" 2>"$scratch/error"
   [ $? -eq 2 ] || fail "a tool that is its own reference must end with 2"
-  grep -q "tools.toml: key 'tracker.reference': expected another tool" "$scratch/error" || fail "$(cat "$scratch/error")"
+  grep -q "tools.toml:6:13: key 'tracker.reference': expected another tool" "$scratch/error" || fail "$(cat "$scratch/error")"
 done
+# All that is wrong in one run, each with its place.
+printf 'version = 1\n[tracker]\nprotocol = "ndi"\nsensor = "0A"\nhand_eye_sensor = "0B"\n[ecg]\nprotocol = "cyton"\n[pipeline]\n' \
+  >"$scratch/many.toml"
+"$perimap" check "$scratch/many.toml" >"$scratch/out" 2>"$scratch/error"
+[ $? -eq 2 ] || fail "many faults must end with 2"
+told=$(sed "s|^perimap check: $scratch/||; s|: expected.*||" "$scratch/error")
+[ "$told" = "many.toml:2:1: key 'tracker.port'
+many.toml:5:19: key 'tracker.hand_eye_sensor'
+many.toml:6:1: key 'ecg.port'" ] || fail "not all that is wrong, in its order: $(cat "$scratch/error")"
 "$perimap" check /nowhere/x.toml 2>/dev/null
 [ $? -eq 2 ] || fail "a missing configuration must end with 2"
 "$perimap" check 2>/dev/null

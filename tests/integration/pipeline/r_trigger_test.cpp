@@ -145,7 +145,7 @@ TEST_F(RTriggerReplay, OfARecordingWithoutATriggerIsRefused) {
   ASSERT_FALSE(setup);
   EXPECT_TRUE(setup.error().configuration);
   EXPECT_THAT(setup.error().error.message,
-              AllOf(HasSubstr("trigger.toml: key 'ecg.r_trigger'"), HasSubstr("holds no channel ecg/r_trigger")));
+              AllOf(HasSubstr("trigger.toml:3:13: key 'ecg.r_trigger'"), HasSubstr("holds no channel ecg/r_trigger")));
 }
 
 }  // namespace

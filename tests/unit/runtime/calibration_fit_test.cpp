@@ -31,6 +31,22 @@ CameraModel lens() {
   return camera;
 }
 
+// What is wrong, a line each.
+Expected<void> fit_of(const WrongKeys& wrong) {
+  std::string all;
+  for (const WrongKey& one : wrong) {
+    all += (all.empty() ? "" : "\n") + ("key '" + one.key + "': " + one.what);
+  }
+  if (all.empty()) return {};
+  return fail(all);
+}
+Expected<void> calibrations_fit(const Configuration& configuration) {
+  return fit_of(wrong_calibrations(configuration));
+}
+Expected<void> frames_fit(const Configuration& configuration, const std::filesystem::path& file) {
+  return fit_of(wrong_frames(configuration, file));
+}
+
 class CalibrationFit : public ::testing::Test {
  protected:
   CalibrationFit() {

@@ -1,11 +1,13 @@
 #include "daemon/runtime/device_setup.hpp"
 
 #include <dlfcn.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
 
+#include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/tracked_tools.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/video/video_module.hpp"
@@ -67,18 +69,42 @@ TEST(DeviceSetup, ASecondSensorIsAmongTheToolsInTheirOrder) {
   tracker.second_sensor = "0D";
   tracker.instruments = {"0E"};
   const auto ndi = tracker_device(tracker);
-  ASSERT_TRUE(ndi) << ndi.error().message;
+  ASSERT_TRUE(ndi) << ndi.error().front().what;
   const auto second = second_sensor_of(ndi->tools);
   ASSERT_EQ(second, 2U);
   EXPECT_EQ(std::get<NdiSettings>(ndi->settings).tools.at(*second - 1).handle, 0x0D);
   tracker.protocol = TrackerConfiguration::Protocol::kIgtl;
   const auto igtl = tracker_device(tracker);
-  ASSERT_TRUE(igtl) << igtl.error().message;
+  ASSERT_TRUE(igtl) << igtl.error().front().what;
   EXPECT_EQ(std::get<IgtlSettings>(igtl->settings).tools.at(*second_sensor_of(igtl->tools) - 1), "0D");
   tracker.second_sensor = "0C";
   const auto twice = tracker_device(tracker);
   ASSERT_FALSE(twice);
-  EXPECT_TRUE(twice.error().message.starts_with("key 'tracker.second_sensor': expected another tool than"));
+  EXPECT_EQ(twice.error().front().key, "tracker.second_sensor");
+  EXPECT_TRUE(twice.error().front().what.starts_with("expected another tool than"));
+}
+
+// Of all devices, each at its place: a missing port of the tracker and of the ECG is one run, not two.
+TEST(DeviceSetup, AllThatIsWrongIsToldAtOnceInTheOrderOfTheFile) {
+  const std::filesystem::path file = testing::TempDir() + "device_setup_wrong.toml";
+  std::ofstream(file) << "version = 1\n[ecg]\nprotocol = \"cyton\"\n[tracker]\nprotocol = \"ndi\"\n"
+                         "sensor = \"0A\"\ninstruments = [\"GG\"]\nhand_eye_sensor = \"0B\"\n"
+                         "[camera]\ndevice = \"nothing\"\n";
+  const auto configuration = load_configuration(file);
+  ASSERT_TRUE(configuration) << configuration.error().message;
+  const auto setup = prepare_devices(file, *configuration);
+  ASSERT_FALSE(setup);
+  EXPECT_TRUE(setup.error().configuration);
+  const std::string name = file.string();
+  EXPECT_THAT(
+      setup.error().error.message,
+      testing::MatchesRegex(name + ":2:[0-9]+: key 'ecg.port': expected where the device is, got nothing\n" +  //
+                            name + ":4:[0-9]+: key 'tracker.port': expected where the device is, got nothing\n" + name +
+                            ":7:[0-9]+: key 'tracker.instruments': expected a port handle[^\n]*\n" +      //
+                            name + ":8:[0-9]+: key 'tracker.hand_eye_sensor': expected \"0A\"[^\n]*\n" +  //
+                            name + ":9:[0-9]+: key 'camera.calibration': expected [^\n]*\n" +             //
+                            name + ":10:[0-9]+: key 'camera.device': expected [^\n]*"));
+  std::filesystem::remove(file);
 }
 
 TEST(DeviceSetup, OneToolIsNotTwo) {
@@ -90,7 +116,7 @@ TEST(DeviceSetup, OneToolIsNotTwo) {
   tracker.pointer = "0C";
   tracker.instruments = {"0D", "E"};
   const auto device = tracker_device(tracker);
-  ASSERT_TRUE(device) << device.error().message;
+  ASSERT_TRUE(device) << device.error().front().what;
   const std::vector<std::string> names{"reference", "pointer", "instrument/0D", "instrument/E"};
   EXPECT_EQ(device->tools, names);
   EXPECT_EQ(std::get<NdiSettings>(device->settings).tools.at(2).handle, 0x0E);
@@ -98,7 +124,8 @@ TEST(DeviceSetup, OneToolIsNotTwo) {
     tracker.instruments = {"0D", same};
     const auto twice = tracker_device(tracker);
     ASSERT_FALSE(twice) << same;
-    EXPECT_TRUE(twice.error().message.starts_with("key 'tracker.instruments': expected another tool than 'tracker."));
+    EXPECT_EQ(twice.error().front().key, "tracker.instruments");
+    EXPECT_TRUE(twice.error().front().what.starts_with("expected another tool than 'tracker."));
   }
   tracker.instruments = {"GG"};
   EXPECT_FALSE(tracker_device(tracker)) << "no port handle";

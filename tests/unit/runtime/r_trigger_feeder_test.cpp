@@ -52,7 +52,7 @@ TEST(RTriggerDevice, IsAsTheConfigurationNamesIt) {
   configuration.ecg = triggered();
   EXPECT_TRUE(names_devices(configuration));
   const auto devices = named_devices(configuration, "perimap.toml");
-  ASSERT_TRUE(devices) << devices.error().message;
+  ASSERT_TRUE(devices) << devices.error().front().what;
   ASSERT_TRUE(devices->r_trigger);
   EXPECT_FALSE(devices->ecg) << "a trigger needs no ECG device";
   EXPECT_EQ(devices->r_trigger->settings.path, "/dev/ttyS4");
@@ -66,7 +66,9 @@ TEST(RTriggerDevice, WithoutAPortSaysWhichKeyIsMissing) {
   configuration.ecg.r_trigger_port.reset();
   const auto devices = named_devices(configuration, "perimap.toml");
   ASSERT_FALSE(devices);
-  EXPECT_THAT(devices.error().message, HasSubstr("key 'ecg.r_trigger_port': expected the serial port"));
+  ASSERT_EQ(devices.error().size(), 1U);
+  EXPECT_EQ(devices.error().front().key, "ecg.r_trigger_port");
+  EXPECT_THAT(devices.error().front().what, HasSubstr("expected the serial port"));
 }
 
 // Plugged in, unplugged and plugged in again.

@@ -37,7 +37,8 @@ TEST(RespirationDevice, AChannelThatTheDeviceHasNotIsRefused) {
   configuration.respiration.device_channel = 8;
   const auto devices = named_devices(configuration, "perimap.toml");
   ASSERT_FALSE(devices);
-  EXPECT_THAT(devices.error().message, HasSubstr("key 'respiration.device_channel': expected 1 to 6 of a bitalino"));
+  EXPECT_EQ(devices.error().front().key, "respiration.device_channel");
+  EXPECT_THAT(devices.error().front().what, HasSubstr("expected 1 to 6 of a bitalino"));
 }
 
 TEST(RespirationFeeder, GivesTheChannelToPipelineStatusAndRecording) {
@@ -60,7 +61,7 @@ TEST(RespirationFeeder, GivesTheChannelToPipelineStatusAndRecording) {
     EXPECT_TRUE(done) << done.error().message;
   });
   auto devices = named_devices(configuration, "perimap.toml");
-  ASSERT_TRUE(devices) << devices.error().message;
+  ASSERT_TRUE(devices) << devices.error().front().what;
   PipelineCounters counters;
   const auto entrance = std::make_unique<SensorEntrance>(4, 4, EcgIntakeSettings{}, BreathDetectorSettings{}, counters);
   DeviceFeeder feeder(std::move(*devices), entrance.get(), {std::move(recorder), nullptr});

@@ -54,7 +54,7 @@ TEST_P(SecondLeadFeeder, GivesBothLeadsToPipelineAndRecording) {
     EXPECT_TRUE(done) << done.error().message;
   });
   auto devices = named_devices(configuration, "perimap.toml");
-  ASSERT_TRUE(devices) << devices.error().message;
+  ASSERT_TRUE(devices) << devices.error().front().what;
   PipelineCounters counters;
   const auto entrance = std::make_unique<SensorEntrance>(4, 4, EcgIntakeSettings{}, BreathDetectorSettings{}, counters);
   DeviceFeeder feeder(std::move(*devices), entrance.get(), {std::move(recorder), nullptr});
