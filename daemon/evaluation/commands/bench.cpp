@@ -2,9 +2,7 @@
 #include "daemon/evaluation/bench/bench.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -14,6 +12,8 @@
 #include "daemon/command_line/commands.hpp"
 #include "daemon/command_line/outputs.hpp"
 #include "daemon/evaluation/bench/bench_text.hpp"
+#include "daemon/evaluation/bench/own_network.hpp"
+#include "daemon/evaluation/bench/scratch_folder.hpp"
 #include "daemon/evaluation/bench/subscriber.hpp"
 #include "daemon/keys/authority.hpp"
 #include "daemon/keys/key_folder.hpp"
@@ -38,27 +38,6 @@ struct BenchOptions {
   std::string html;
 };
 
-// Where the environment has no settings of Cyclone DDS: on this host alone.
-constexpr const char* kThisHost =
-    "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces>"
-    "<AllowMulticast>false</AllowMulticast><MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
-    "</General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
-    "<MaxAutoParticipantIndex>40</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>"
-    "<Internal><SocketReceiveBufferSize max=\"8MB\"/></Internal></Domain></CycloneDDS>";
-
-// What the user has set holds, so that it is measured; but apart from every other participant, whatever its domain: a
-// surface of a benchmark must not reach those who navigate by another. Cyclone DDS reads it when the first participant
-// is made, children inherit it.
-void keep_to_ourselves() {
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): before the other threads begin
-  const char* given = std::getenv("CYCLONEDDS_URI");
-  const std::string settings = fmt::format(
-      "{},<CycloneDDS><Domain Id=\"any\"><Discovery><Tag>perimap-bench-{}</Tag></Discovery></Domain></CycloneDDS>",
-      given == nullptr || *given == '\0' ? kThisHost : given, getpid());
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): likewise
-  setenv("CYCLONEDDS_URI", settings.c_str(), 1);
-}
-
 // An authority for this benchmark alone, with keys for those who take part.
 Expected<void> make_keys(const std::filesystem::path& scratch, bench::BenchInput& input) {
   const std::chrono::sys_seconds now = seconds_now();
@@ -74,30 +53,6 @@ Expected<void> make_keys(const std::filesystem::path& scratch, bench::BenchInput
   return {};
 }
 
-// A folder for what the runs write, gone when this is.
-class Scratch {
- public:
-  static Expected<Scratch> create(const std::filesystem::path& in) {
-    std::string path = (in / "perimap-bench-XXXXXX").string();
-    if (mkdtemp(path.data()) == nullptr) return fail(in.string() + ": a folder cannot be made there");
-    return Scratch(path);
-  }
-  Scratch(Scratch&& other) noexcept : path_(std::move(other.path_)) { other.path_.clear(); }
-  Scratch& operator=(Scratch&&) = delete;
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  ~Scratch() {
-    std::error_code ignored;
-    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
-  }
-  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-
- private:
-  explicit Scratch(std::filesystem::path path) : path_(std::move(path)) {}
-
-  std::filesystem::path path_;
-};
-
 Outcome measure(const BenchOptions& options, const Console& console) {
   const std::string& recording = options.settings.input.recording;
   if (auto apart =
@@ -109,10 +64,10 @@ Outcome measure(const BenchOptions& options, const Console& console) {
     return refuse(able.error());
   auto stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
-  const auto scratch = Scratch::create(options.scratch.empty() ? std::filesystem::temp_directory_path()
-                                                               : std::filesystem::path(options.scratch));
+  const auto scratch = bench::ScratchFolder::create(options.scratch.empty() ? std::filesystem::temp_directory_path()
+                                                                            : std::filesystem::path(options.scratch));
   if (!scratch) return refuse(scratch.error());
-  keep_to_ourselves();
+  bench::keep_to_ourselves();
   const Logging logging(console.name(), LogConfiguration::Level::kError);
 
   bench::BenchSettings settings = options.settings;

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -14,13 +13,10 @@
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/command_line/progress.hpp"
+#include "daemon/evaluation/experiment/experiment_files.hpp"
 #include "daemon/evaluation/experiment/experiment_text.hpp"
 #include "daemon/evaluation/traces/motion_trace.hpp"
 #include "daemon/evaluation/traces/trace_text.hpp"
-#include "daemon/pages/html_page.hpp"
-#include "daemon/pages/png_picture.hpp"
-#include "drivers/file/whole_file.hpp"
-#include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
 namespace {
@@ -33,48 +29,6 @@ struct ExperimentOptions {
   std::filesystem::path out;
   bool json = false;
 };
-
-Expected<void> write_files(const Experiment& experiment, const std::filesystem::path& folder) {
-  const std::string stem = "experiment-" + std::to_string(experiment.number);
-  const auto path = [&](const std::string& rest) { return folder / (stem + rest); };
-  for (const ExperimentFigure& figure : experiment.figures) {
-    const std::string svg = svg_document(figure.plots, figure.title);
-    const auto png = png_of_svg(svg);
-    if (!png) return tl::unexpected(png.error());
-    for (const auto& [rest, text] : {std::pair{".svg", &svg}, std::pair{".png", &*png}}) {
-      if (auto done = write_text_file(path("-" + figure.name + rest), *text); !done) return done;
-    }
-    if (auto done = write_text_file(path("-" + figure.name + ".csv"), to_csv(figure)); !done) return done;
-  }
-  return write_text_file(path(".csv"), to_csv(experiment))
-      .and_then([&] { return write_text_file(path(".json"), to_json(experiment).dump(2) + "\n"); })
-      .and_then([&] { return write_text_file(path(".html"), to_html(experiment)); });
-}
-
-// Before the trials, which may take hours.
-Expected<void> prepare_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return fail(folder.string() + ": " + error.message());
-  return check_writable(folder / "experiment.csv");
-}
-
-Expected<void> write_files(const TraceExperiment& experiment, const std::filesystem::path& folder) {
-  const std::string title = "Experiment 3: motion of a real heart, predicted";
-  const std::string svg = svg_document(to_plots(experiment), title);
-  const auto png = png_of_svg(svg);
-  if (!png) return tl::unexpected(png.error());
-  const std::pair<const char*, std::string> files[] = {
-      {".svg", svg},
-      {".png", *png},
-      {".csv", to_csv(experiment)},
-      {".json", to_json(experiment).dump(2) + "\n"},
-      {".html", html_page(title, svg + "<pre>" + escaped(to_table(experiment)) + "</pre>\n")}};
-  for (const auto& [ending, text] : files) {
-    if (auto done = write_text_file(folder / (std::string("experiment-3") + ending), text); !done) return done;
-  }
-  return {};
-}
 
 Outcome predict_trace(const ExperimentOptions& options, const Console& console) {
   const auto trace = read_motion_trace(options.trace);
@@ -111,7 +65,8 @@ std::string misuse(const ExperimentOptions& options) {
 Outcome repeat(const ExperimentOptions& options, const Console& console) {
   if (const std::string wrong = misuse(options); !wrong.empty()) return refuse(wrong, ExitCode::kWrongUsage);
   if (!options.out.empty()) {
-    if (const auto able = prepare_folder(options.out); !able) return refuse(able.error());
+    if (const auto able = prepare_experiment_files(options.settings.number, options.out); !able)
+      return refuse(able.error());
   }
   if (options.settings.number == 3) return predict_trace(options, console);
   Expected<Experiment> experiment = tl::unexpected(Error{});

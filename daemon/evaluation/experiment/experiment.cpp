@@ -16,6 +16,11 @@ namespace {
 constexpr double kFirstDepth_mm = 90.0;
 // Earlier errors, tens of millimetres in depth, would flatten the curves.
 constexpr double kErrorsFrom_s = 2.0;
+// The figures, as their files are named.
+constexpr const char* kCycle = "cycle";
+constexpr const char* kPaths = "paths";
+constexpr const char* kInnovation = "innovation";
+constexpr const char* kError = "error";
 constexpr const char* kTruthColor = "#9a9a9a";
 constexpr const char* kBoundColor = "#222222";
 
@@ -94,7 +99,7 @@ Plot cycle_plot(const Scene& scene, const SceneFeature& feature, MethodKind kind
 ExperimentFigure cycle_figure(const Scene& scene, const MethodSetting& setting, const MethodOptions& options) {
   const SceneFeature& feature = scene.features.front();
   const int all = static_cast<int>(feature.sightings.size());
-  return {"cycle",
+  return {kCycle,
           "One feature's cycle at the start and after convergence",
           {cycle_plot(scene, feature, MethodKind::kIterated, setting, options, 10),
            cycle_plot(scene, feature, MethodKind::kDelayed, setting, options, options.buffered),
@@ -120,7 +125,7 @@ Plot error_plot(const Comparison& comparison, const std::vector<MethodKind>& kin
 }
 
 ExperimentFigure error_figure(const Comparison& comparison) {
-  return {"error",
+  return {kError,
           "Median error over time",
           {error_plot(comparison,
                       {MethodKind::kStaticEkf, MethodKind::kFourierEkf, MethodKind::kIterated, MethodKind::kDelayed},
@@ -165,7 +170,7 @@ ExperimentFigure paths_figure(const Scene& scene, const MethodSetting& setting, 
     }
     first = false;
   }
-  return {"paths", "Bird's-eye view of the motion paths", {plot}};
+  return {kPaths, "Bird's-eye view of the motion paths", {plot}};
 }
 
 // Least squares of y = a + b exp(-t / tau); tau from a grid.
@@ -224,12 +229,16 @@ Plot innovation_plot(const Comparison& comparison, MethodKind kind) {
 }
 
 ExperimentFigure innovation_figure(const Comparison& comparison) {
-  return {"innovation",
+  return {kInnovation,
           "What the moving model predicts better: difference of the innovations, static less dynamic",
           {innovation_plot(comparison, MethodKind::kIterated), innovation_plot(comparison, MethodKind::kDelayed)}};
 }
 
 }  // namespace
+
+std::vector<const char*> experiment_figures(int number) {
+  return number == 1 ? std::vector{kCycle, kError} : std::vector{kPaths, kInnovation, kError};
+}
 
 Expected<Experiment> run_experiment(const ExperimentSettings& settings,
                                     const std::function<void(int trials)>& progress) {

@@ -18,7 +18,7 @@
 namespace perimap {
 
 struct ExperimentFigure {
-  std::string name;   // of its files
+  std::string name;   // of its files, one of experiment_figures()
   std::string title;  // one line
   std::vector<Plot> plots;
 };
@@ -39,6 +39,9 @@ struct ExperimentSettings {
   int trials = 100;
   MethodOptions methods;
 };
+
+// The figures that experiment 1 or 2 has, in their order.
+[[nodiscard]] std::vector<const char*> experiment_figures(int number);
 
 // Calls `progress` with the number of trials done. Deterministic but for the times.
 [[nodiscard]] Expected<Experiment> run_experiment(const ExperimentSettings& settings,

@@ -53,6 +53,18 @@ expect 2
 touch "$out/file"
 expect 1 1 --trials 1 --out "$out/file"
 grep -q "^perimap experiment: .*$out/file" "$out.error" || fail "the error does not name the folder"
+# Each file that it writes is tried before the trials, which would take hours.
+for file in "$out"/a/experiment-[12]*; do
+  number=${file#"$out"/a/experiment-} number=${number:0:1}
+  rm "$file"
+  mkdir "$file"
+  timeout 20 "$perimap" experiment "$number" --trials 100000 --out "$out/a" > /dev/null 2> "$out.error"
+  got=$?
+  [ $got -eq 1 ] || fail "$file can not be written, and 'experiment $number' ended with $got"
+  grep -qF "$file: cannot be written" "$out.error" || fail "the error does not name $file: $(cat "$out.error")"
+  rmdir "$file"
+  touch "$file"
+done
 
 # ---- recorded motion
 awk 'BEGIN {
