@@ -309,4 +309,48 @@ std::vector<Plot> plots_of(const Verification& result) {
   return {plot};
 }
 
+nlohmann::json json_of(const Verification& result) {
+  nlohmann::json json = {{"passed", result.passed()},
+                         {"bound_mm", result.bound_mm},
+                         {"latency_ms", 0},
+                         {"board_error_mm", result.error_mm},
+                         {"board_error_mm_deviation", result.error_mm_deviation},
+                         {"clock_error_ms", result.clock_error_ms},
+                         {"clock_error_ms_deviation", result.clock_error_ms_deviation},
+                         {"scatter_mm", result.scatter_mm},
+                         {"views", result.views},
+                         {"views_left_out", result.views_left_out},
+                         {"watched_s", result.watched_s},
+                         {"unseen_mm", nullptr},
+                         {"touch_error_mm", nullptr},
+                         {"touch_error_mm_deviation", nullptr}};
+  if (result.touch) {
+    json["touch_error_mm"] = result.touch->error_mm;
+    json["touch_error_mm_deviation"] = result.touch->error_mm_deviation;
+    const Vector3d& e = result.touch->error_W_mm;
+    json["touch_error_W_mm"] = {e.x(), e.y(), e.z()};
+  }
+  if (!result.touch && result.board_passed()) json["unseen_mm"] = result.unseen_mm;
+  return json;
+}
+
+std::string advice_of(const Verification& result) {
+  if (!result.clock_passed()) {
+    constexpr double kUnknown = 2.0;  // deviations within which it may as well be right
+    if (std::abs(result.clock_error_ms) < kUnknown * result.clock_error_ms_deviation) {
+      return "the scope was swung too slowly to tell whether the time offset is right: swing it briskly, and for "
+             "longer";
+    }
+    return fmt::format(
+        "the clocks of camera and tracker are {:.1f} ms off: measure the time offset anew (perimap calibrate time)",
+        result.clock_error_ms);
+  }
+  if (!result.board_passed()) {
+    return "the board wanders as the scope moves: measure lens, hand-eye and time offset anew (perimap calibrate), and "
+           "look whether the sensor is loose on the scope";
+  }
+  return "camera and pointer disagree: measure the pointer's tip and the hand-eye anew (perimap calibrate), and look "
+         "whether the point touched is the one named";
+}
+
 }  // namespace perimap

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -78,6 +79,9 @@ struct Verification {
                                                   double bound_mm);
 
 [[nodiscard]] std::string text_of(const Verification& result);
+[[nodiscard]] nlohmann::json json_of(const Verification& result);
+// Of one that did not pass: what to do.
+[[nodiscard]] std::string advice_of(const Verification& result);
 [[nodiscard]] std::vector<Plot> plots_of(const Verification& result);
 
 }  // namespace perimap

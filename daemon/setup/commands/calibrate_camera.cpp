@@ -11,16 +11,16 @@
 #include <vector>
 
 #include "daemon/command_line/commands.hpp"
-#include "daemon/command_line/progress.hpp"
 #include "daemon/setup/board.hpp"
 #include "daemon/setup/camera_calibration.hpp"
 #include "daemon/setup/camera_report.hpp"
 #include "daemon/setup/commands/board_options.hpp"
+#include "daemon/setup/commands/frame_progress.hpp"
 #include "daemon/setup/commands/live_capture.hpp"
 #include "daemon/setup/commands/measurement.hpp"
-#include "daemon/setup/commands/pictures.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
 #include "daemon/setup/live_guide.hpp"
+#include "daemon/setup/pictures.hpp"
 #include "daemon/setup/recorded_board.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/setup_plots.hpp"
@@ -69,12 +69,7 @@ Expected<SeenBoard> seen_in_pictures(const CameraOptions& options, const BoardWi
 
 Expected<SeenBoard> seen_in_recording(const CameraOptions& options, const BoardWish& wish, const Console& console) {
   constexpr double kFrames_per_s = 2.0;
-  std::optional<Progress> progress;
-  auto found = find_recorded_board(options.recording, wish, kFrames_per_s, [&](std::uint64_t done, std::uint64_t all) {
-    if (!progress) progress.emplace(console, "frames", all);
-    progress->update(done);
-  });
-  progress.reset();
+  auto found = find_recorded_board(options.recording, wish, kFrames_per_s, FrameProgress(console));
   if (!found) return tl::unexpected(found.error());
   SeenBoard seen{found->board, {}, {}, found->frames, found->width, found->height};
   for (TimedView& view : found->views) seen.views.push_back(std::move(view.view));

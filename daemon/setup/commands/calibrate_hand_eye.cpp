@@ -45,7 +45,7 @@ struct HandEyeOptions {
 
 SetupExpected<HandEyeCalibration> by_recording(const RecordedOptions& recorded, const CommonOptions& common,
                                                const HandEyeSettings& settings, const Console& console) {
-  auto motion = recorded_motion(recorded, common.configuration, console);
+  auto motion = motion_of(recorded, common.configuration, console);
   if (!motion) return tl::unexpected(motion.error());
   auto result = calibrate_hand_eye(std::move(motion->camera_poses), std::move(motion->sensor_poses), settings);
   if (!result) return fail(recorded.recording + ": " + result.error().message);

@@ -11,11 +11,11 @@
 #include "daemon/setup/commands/live_capture.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
-#include "daemon/setup/commands/touch_guide.hpp"
-#include "daemon/setup/commands/touched_points.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/setup_plots.hpp"
 #include "daemon/setup/setup_report.hpp"
+#include "daemon/setup/touch_guide.hpp"
+#include "daemon/setup/touched_points.hpp"
 #include "drivers/calibration/tool_tip.hpp"
 #include "drivers/pose_file/point_table.hpp"
 

@@ -1,4 +1,4 @@
-#include "daemon/setup/commands/touched_points.hpp"
+#include "daemon/setup/touched_points.hpp"
 
 #include "core/calibration/touched_landmarks.hpp"
 

@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "daemon/setup/commands/touched_points.hpp"
 #include "daemon/setup/live_guide.hpp"
+#include "daemon/setup/touched_points.hpp"
 
 namespace perimap {
 

@@ -1,4 +1,4 @@
-#include "daemon/setup/commands/pictures.hpp"
+#include "daemon/setup/pictures.hpp"
 
 #include <fmt/format.h>
 

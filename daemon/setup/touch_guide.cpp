@@ -1,4 +1,4 @@
-#include "daemon/setup/commands/touch_guide.hpp"
+#include "daemon/setup/touch_guide.hpp"
 
 #include <fmt/format.h>
 

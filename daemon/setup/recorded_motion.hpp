@@ -1,0 +1,47 @@
+// A scope's motion as camera and tracker recorded it, before a board.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/calibration/timed_poses.hpp"
+#include "core/calibration/turned_scope.hpp"
+#include "core/geometry/camera_model.hpp"
+#include "daemon/config/setup_error.hpp"
+#include "daemon/setup/board.hpp"
+#include "daemon/setup/recorded_board.hpp"
+
+namespace perimap {
+
+// Where the lens and the motion come from.
+struct MotionSource {
+  std::string recording;
+  std::string calibration;                  // the lens; empty: that of the first configuration which names one
+  std::vector<std::string> configurations;  // files; those without a name do not count
+  BoardWish board;
+  // In place of the lens's own focal length and principal point: the scope is turned or zoomed otherwise now.
+  std::optional<LensAtTurn> lens_as_turned = std::nullopt;
+};
+
+// Fails when neither the calibration nor a configuration says it.
+[[nodiscard]] SetupExpected<CameraModel> lens_of(const MotionSource& source);
+
+// What recorded_motion() needs besides the recording: the board's size, without which lengths would be in squares, and
+// the lens.
+[[nodiscard]] SetupExpected<void> check_source(const MotionSource& source);
+
+struct RecordedMotion {
+  RecordedBoard board;
+  CameraModel camera;
+  std::vector<TimedPose> camera_poses;  // X_BC, on the camera's clock
+  std::vector<TimedPose> sensor_poses;  // X_WS, on the tracker's
+};
+
+// `progress` hears of the frames that were looked at, of all that will be.
+[[nodiscard]] SetupExpected<RecordedMotion> recorded_motion(
+    const MotionSource& source, const std::function<void(std::uint64_t done, std::uint64_t all)>& progress);
+
+}  // namespace perimap
