@@ -14,7 +14,6 @@
 #include "daemon/config/configuration_text.hpp"
 #include "daemon/config/session_keys.hpp"
 #include "daemon/config/surface_traffic.hpp"
-#include "daemon/config/wrong_key.hpp"
 
 namespace perimap {
 namespace {
@@ -265,50 +264,6 @@ TEST(ConfigurationLoader, AllErrorsAreToldInTheOrderOfTheFile) {
     EXPECT_THAT(line, StartsWith(told));
   }
   EXPECT_EQ(lines.peek(), EOF);
-}
-
-// The default latency is 50 ms: the budget would be more than that.
-TEST(ConfigurationLoader, WhetherValuesGoTogetherIsNotToldOfWrongOnes) {
-  EXPECT_EQ(error_of("version = 1\n[pipeline]\nlatency_ms = \"80\"\nbudget_ms = 60\n"),
-            "test.toml:3:14: key 'pipeline.latency_ms': expected a number from 1 to 1000, got \"80\"");
-}
-
-TEST(ConfigurationLoader, WhetherGoodValuesGoTogetherIsToldBesideOtherErrors) {
-  std::istringstream lines(
-      error_of("[pipeline]\nbudget_ms = 60\n[ecg]\nprotocol = \"bitalino\"\nchannel = 8\nsecond_channel = 7\n[phase]\n"
-               "law = 3\n"));
-  for (const char* told :
-       {"test.toml:1:1: key 'version': expected ", "test.toml:2:13: key 'pipeline.budget_ms': expected less than ",
-        "test.toml:5:11: key 'ecg.channel': expected 1 to 6 ",
-        "test.toml:6:18: key 'ecg.second_channel': expected 1 to 6 ", "test.toml:8:7: key 'phase.law': expected "}) {
-    std::string line;
-    ASSERT_TRUE(std::getline(lines, line)) << told;
-    EXPECT_THAT(line, StartsWith(told));
-  }
-  EXPECT_EQ(lines.peek(), EOF);
-}
-
-// Which key is misspelt nobody knows.
-TEST(ConfigurationLoader, WhatMayBeMisspeltIsNotHeldAgainstOthers) {
-  EXPECT_EQ(error_of("version = 1\n[pipeline]\nlatncy_ms = 80\nbudget_ms = 60\n").find("budget_ms': expected less"),
-            std::string::npos);
-}
-
-TEST(WrongKeys, AreToldAtTheirKeyOrSectionInTheOrderOfTheFile) {
-  const std::string text = "version = 1\n[ecg]\nprotocol = \"cyton\"\n[tracker]\n  sensor = \"0A\"\n";
-  EXPECT_EQ(told_in("a.toml", text,
-                    {{"camera.device", "expected a camera"},
-                     {"tracker.sensor", "expected another, got \"0A\""},
-                     {"tracker.port", "expected where the device is, got nothing"},
-                     {"ecg.port", "expected where the device is, got nothing"},
-                     {"tracker.sensor", "expected another, got \"0A\": measure it"}})
-                .message,
-            "a.toml:2:1: key 'ecg.port': expected where the device is, got nothing\n"
-            "a.toml:4:1: key 'tracker.port': expected where the device is, got nothing\n"
-            "a.toml:5:12: key 'tracker.sensor': expected another, got \"0A\": measure it\n"
-            "a.toml: key 'camera.device': expected a camera");
-  EXPECT_EQ(told_in("nowhere/a.toml", {{"tracker.port", "expected\nno line"}}).message,
-            "nowhere/a.toml: key 'tracker.port': expected no line");
 }
 
 TEST(ConfigurationLoader, AFileOfAnotherKindIsNotToldToItsEnd) {
