@@ -61,8 +61,7 @@ Outcome run_session(const Console& console, const std::string& configuration_fil
     // With words, before DDS looks at them: it would say no more than that it is not allowed.
     const auto keys = check_keys(*configuration.dds.security, seconds_now());
     if (!keys) {
-      return refuse(fmt::format("{}: key 'dds.security': {}", configuration_file, keys.error().message),
-                    ExitCode::kWrongUsage);
+      return refuse(told_in(configuration_file, {{"dds.security", keys.error().message}}), ExitCode::kWrongUsage);
     }
     runtime.keys_expire_utc_ns = std::chrono::nanoseconds(keys->ends.time_since_epoch()).count();
     spdlog::info("DDS Security: keys of '{}' ({}), until {}", keys->certificate.name, keys->certificate.role,

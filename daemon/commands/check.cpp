@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -36,12 +37,21 @@ void tell_refused_privileges(const RealtimeConfiguration& realtime, const Consol
   }
 }
 
+WrongKeys wrong_security(const Configuration& configuration) {
+  if (!configuration.dds.security) return {};
+  const auto keys = check_keys(*configuration.dds.security, seconds_now());
+  if (!keys) return {{"dds.security", keys.error().message}};
+  if (keys->certificate.role == rights_of(KeyRole::kPublisher).name) return {};
+  return {{"dds.security", "expected keys of a publisher, got those of a " + std::string(keys->certificate.role)}};
+}
+
 // The devices that it names, each with all its keys.
 Expected<Configuration> load_whole(const std::string& file) {
   auto configuration = load_configuration(file);
   if (!configuration) return configuration;
   WrongKeys wrong = wrong_frames(*configuration, file);
   append(wrong, wrong_calibrations(*configuration));
+  append(wrong, wrong_security(*configuration));
   if (!configuration->replay.recording && names_devices(*configuration)) {
     if (auto devices = named_devices(*configuration, file); !devices) append(wrong, std::move(devices.error()));
   }
@@ -57,13 +67,8 @@ Outcome check(const std::string& file, const Console& console) {
   for (const std::string& line : setup_warnings(*configuration)) console.complain("warning: " + line);
   if (configuration->dds.security) {
     const auto keys = check_keys(*configuration->dds.security, seconds_now());
-    if (!keys) return refuse(file + ": key 'dds.security': " + keys.error().message, ExitCode::kWrongUsage);
-    if (keys->certificate.role != rights_of(KeyRole::kPublisher).name) {
-      return refuse(fmt::format("{}: key 'dds.security': expected keys of a publisher, got those of a {}", file,
-                                keys->certificate.role),
-                    ExitCode::kWrongUsage);
-    }
-    if (const auto warning = expiry_warning(*keys, seconds_now())) console.complain("warning: " + *warning);
+    const auto warning = keys ? expiry_warning(*keys, seconds_now()) : std::nullopt;
+    if (warning) console.complain("warning: " + *warning);
   }
   tell_refused_privileges(configuration->realtime, console);
   return {};
