@@ -54,7 +54,7 @@ struct DecisionSettings {
   double more_likely = 0.5;                                  // and when it has had its time: more likely than not
   Duration time_to_decide = std::chrono::milliseconds(330);  // when a P wave's own QRS complex would have been measured
   Duration time_if_known = std::chrono::milliseconds(180);   // of a kind that is known to be none
-  Duration time_of_strangers = std::chrono::milliseconds(240);  // what is like nothing: the beat itself may yet come,
+  Duration time_of_strangers = std::chrono::milliseconds(195);  // what is like nothing: the beat itself may yet come,
   double before_due = 0.85;                                     // unless it comes so early, in usual cycles
   Duration cut_off = std::chrono::milliseconds(49);    // before the signal's end: half the shape is made up, and a beat
   double certain = 0.99;                               // must be as probable as that
