@@ -50,17 +50,22 @@ Outcome view(const ViewOptions& options, const Console& console) {
     if (!keys) return refuse(Error{"--security: " + keys.error().message}, ExitCode::kWrongUsage);
     if (const auto warning = expiry_warning(*keys, seconds_now())) console.complain("warning: " + *warning);
   }
+  if (options.address == "0.0.0.0" || options.address == "::") {
+    return refuse("--bind: expected one address of this host, which others can open, got " + options.address,
+                  ExitCode::kWrongUsage);
+  }
   Expected<StopSignal> stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
   // What predicts comes before what shows.
-  (void)setpriority(PRIO_PROCESS, 0, 5);
+  (void)setpriority(PRIO_PROCESS, 0, 2);
   Expected<WebServer> server = WebServer::listen({options.address, static_cast<std::uint16_t>(options.port)});
   if (!server) return refuse(server.error());
   const auto say = [&console](const std::string& what) { console.complain(what); };
   const auto handler = open_view(options, *server, say);
   if (!handler) return refuse(handler.error());
   print_address(*server);
-  server->run(**handler, stop->descriptor());
+  if (const auto ran = server->run(**handler, stop->descriptor()); !ran) return refuse(ran.error());
+  if (const auto result = (*handler)->result(); !result) return refuse(result.error());
   return {};
 }
 

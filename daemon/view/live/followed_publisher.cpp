@@ -2,14 +2,16 @@
 
 namespace perimap {
 
-bool FollowedPublisher::surface(std::uint64_t publisher, std::string_view stream, Instant receipt) {
+FollowedPublisher::Verdict FollowedPublisher::surface(std::uint64_t publisher, std::string_view stream,
+                                                      Instant receipt) {
+  const bool same = follows(publisher, stream);
   const bool silent = !followed_ || receipt - last_ > kSilence;
   const bool of_frames = followed_ == publisher && stream == "frame";
-  if (!silent && !of_frames && !follows(publisher, stream)) return false;
+  if (!same && !silent && !of_frames) return Verdict::kOther;
   followed_ = publisher;
   stream_ = stream;
   last_ = receipt;
-  return true;
+  return same ? Verdict::kSame : Verdict::kNew;
 }
 
 }  // namespace perimap

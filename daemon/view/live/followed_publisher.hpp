@@ -17,8 +17,10 @@ class FollowedPublisher {
   // So long must it have been silent before another is followed.
   static constexpr Duration kSilence = std::chrono::seconds(1);
 
-  // A surface came; whether it is to be shown. `publisher` tells perimapds of one domain apart.
-  [[nodiscard]] bool surface(std::uint64_t publisher, std::string_view stream, Instant receipt);
+  enum class Verdict : std::uint8_t { kOther, kSame, kNew };  // kNew: shown from now on; what was shown is another's
+
+  // A surface came. `publisher` tells perimapds of one domain apart.
+  [[nodiscard]] Verdict surface(std::uint64_t publisher, std::string_view stream, Instant receipt);
   // Whether what else came is of the one that is followed; of a stream, where it has one of its own.
   [[nodiscard]] bool follows(std::uint64_t publisher) const noexcept { return followed_ == publisher; }
   [[nodiscard]] bool follows(std::uint64_t publisher, std::string_view stream) const noexcept {

@@ -16,6 +16,12 @@ using Json = nlohmann::ordered_json;
 // A page draws no faster; of a stream of hundreds a second it gets every so manieth.
 constexpr Duration kShortestPause = std::chrono::milliseconds(24);
 constexpr Duration kSilence = std::chrono::milliseconds(500);
+constexpr Duration kPublishes = std::chrono::seconds(2);  // who was heard so lately
+constexpr Duration kForgotten = std::chrono::minutes(1);
+constexpr Duration kStatusIsNew = std::chrono::seconds(2);
+constexpr Duration kAfterAnError = std::chrono::milliseconds(100);
+// No surface of this host's is so late or early.
+constexpr Duration kOtherClock = std::chrono::seconds(5);
 
 double ms(Duration duration) { return std::chrono::duration<double, std::milli>(duration).count(); }
 
@@ -66,6 +72,7 @@ LiveView::LiveView(int domain, Readers readers, WebServer& server, Say say)
 }
 
 LiveView::~LiveView() {
+  stopping_.store(true, std::memory_order_relaxed);
   readers_.wait_set.stop();
   thread_.join();
 }
@@ -75,90 +82,140 @@ void LiveView::take(dds::Reader<T>& reader, Use use) {
   const Expected<dds::Loan<T>> loan = reader.take();
   if (!loan) {
     if (!std::exchange(failing_, true)) say_(loan.error().message);
+    std::this_thread::sleep_for(kAfterAnError);  // what is there to take stays there
     return;
   }
   for (std::size_t i = 0; i < loan->size(); ++i) {
     const T* sample = loan->sample(i);
     if (sample == nullptr) continue;
-    const dds_instance_handle_t publication = loan->info(i).publication_handle;
-    auto known = publishers_.find(publication);
-    if (known == publishers_.end()) {
-      const auto publisher = reader.participant_of(publication);
-      if (!publisher) continue;  // its writer has gone
-      known = publishers_.emplace(publication, *publisher).first;
+    const dds_instance_handle_t writer = loan->info(i).publication_handle;
+    auto known = writers_.find(writer);
+    if (known == writers_.end()) {
+      const auto publisher = reader.participant_of(writer);
+      if (!publisher) continue;  // it has gone
+      known = writers_.emplace(writer, *publisher).first;
     }
-    use(*sample, known->second);
+    const T* next = i + 1 < loan->size() ? loan->sample(i + 1) : nullptr;
+    use(*sample, known->second, next);
   }
 }
 
 void LiveView::receive() {
   pthread_setname_np(pthread_self(), "view");
   while (readers_.wait_set.wait()) {
-    const Instant receipt = MonotonicClock::now();
     // Models and meshes first: a surface is told with the newest.
-    take(readers_.models, [this](const perimap_SurfaceModel& model, std::uint64_t publisher) {
-      if (auto copy = copy_of(model)) tellers_[publisher].take(std::move(*copy));
+    take(readers_.models, [this](const perimap_SurfaceModel& model, std::uint64_t publisher, const auto*) {
+      if (auto copy = copy_of(model)) publishers_[publisher].teller.take(std::move(*copy));
     });
-    take(readers_.meshes, [this](const perimap_SurfaceMesh& mesh, std::uint64_t publisher) {
-      if (auto copy = copy_of(mesh)) tellers_[publisher].take(std::move(*copy));
+    take(readers_.meshes, [this](const perimap_SurfaceMesh& mesh, std::uint64_t publisher, const auto*) {
+      if (auto copy = copy_of(mesh)) publishers_[publisher].teller.take(std::move(*copy));
     });
-    take(readers_.surfaces, [this, receipt](const perimap_Surface& sample, std::uint64_t publisher) {
-      surface(sample, publisher, receipt);
+    const Instant receipt = MonotonicClock::now();
+    take(readers_.surfaces, [&](const perimap_Surface& surface, std::uint64_t publisher, const perimap_Surface* next) {
+      publishers_[publisher].heard = receipt;
+      const auto verdict = followed_.surface(publisher, surface.stream, receipt);
+      {
+        const std::lock_guard lock(mutex_);
+        heard_[publisher] = receipt;
+      }
+      if (verdict == FollowedPublisher::Verdict::kOther) return;
+      if (verdict == FollowedPublisher::Verdict::kNew) follow_anew(surface);
+      count(surface, publisher, receipt);
+      // Of several that have come together the last of each state is told, not the first.
+      const bool same_next = next != nullptr && next->state == surface.state && next->reason == surface.reason;
+      if (!same_next) tell(surface, publisher, receipt);
     });
-    take(readers_.phases, [this](const perimap_Phase& phase, std::uint64_t publisher) {
+    take(readers_.phases, [this](const perimap_Phase& phase, std::uint64_t publisher, const auto*) {
       if (followed_.follows(publisher) && server_.pages() > 0) send(text_message(phase_json(phase)));
     });
-    take(readers_.statuses, [this](const perimap_Status& status, std::uint64_t publisher) {
-      if (followed_.follows(publisher, status.stream)) send_status(text_message(status_message_json(status)));
+    take(readers_.statuses, [this](const perimap_Status& status, std::uint64_t publisher, const auto*) {
+      if (!followed_.follows(publisher, status.stream)) return;
+      server_.post([this, message = text_message(status_message_json(status))] {
+        status_ = message;
+        status_came_ = MonotonicClock::now();
+        server_.send_to_all(message);
+      });
     });
+    forget_old(receipt);
   }
+  if (stopping_.load(std::memory_order_relaxed)) return;
+  failed_.store(true, std::memory_order_relaxed);
+  server_.post([this] { server_.end(); });
 }
 
-void LiveView::surface(const perimap_Surface& surface, std::uint64_t publisher, Instant receipt) {
-  if (!followed_.surface(publisher, surface.stream, receipt)) return;
-  last_surface_ns_.store(to_ns(receipt), std::memory_order_relaxed);
+Expected<void> LiveView::result() const {
+  if (failed_.load(std::memory_order_relaxed)) return fail("DDS can not be waited for any more");
+  return {};
+}
+
+// Another perimapd, another run of it, or another stream: nothing of what was shown is of this one.
+void LiveView::follow_anew(const perimap_Surface& surface) {
+  last_sequence_.reset();
+  since_ = {};
+  state_.reset();
+  const PageMessage message =
+      text_message(Json{{"kind", "following"}, {"source", surface.source}, {"stream", surface.stream}});
+  server_.post([this, message] {
+    status_.reset();
+    following_ = message;
+    server_.send_to_all(message);
+  });
+}
+
+void LiveView::count(const perimap_Surface& surface, std::uint64_t /*publisher*/, Instant receipt) {
   if (last_sequence_ && surface.sample_sequence > *last_sequence_) {
     since_.lost += surface.sample_sequence - *last_sequence_ - 1;
   }
   last_sequence_ = surface.sample_sequence;
-  if (server_.pages() == 0) {
-    since_ = {};
-    return;
-  }
-  since_.delays_ms.push_back(ms(receipt - from_ns(surface.capture_time_ns)));
   since_.late_ms.push_back(ms(receipt - from_ns(surface.release_time_ns)));
-  const std::string state = fmt::format("{} {}", static_cast<int>(surface.state), static_cast<int>(surface.reason));
-  if (receipt - sent_ < kShortestPause && state == last_state_) return;
-  Json json = tellers_[publisher].tell(surface, receipt);
-  json["delays_ms"] = std::move(since_.delays_ms);
+  if (server_.pages() == 0) since_ = {};
+}
+
+void LiveView::tell(const perimap_Surface& surface, std::uint64_t publisher, Instant receipt) {
+  const bool changed = state_ != surface.state || reason_ != surface.reason;
+  if (server_.pages() == 0 || (!changed && receipt - sent_ < kShortestPause)) return;
+  Json json = publishers_[publisher].teller.tell(surface, receipt);
+  if (std::chrono::abs(receipt - from_ns(surface.release_time_ns)) > kOtherClock) {
+    // CLOCK_MONOTONIC of another host begins elsewhere: what is too old cannot be told from what is not.
+    json.update({{"state", "invalid"},
+                 {"why", "perimapd runs on another host, whose clock is not this one's"},
+                 {"remedy", "run perimap view on perimapd's host, and open its page from here (--bind, or ssh -L)"}});
+    since_.late_ms.clear();
+  }
+  const Instant now = MonotonicClock::now();
   json["late_ms"] = std::move(since_.late_ms);
   json["lost"] = since_.lost;
+  json["valid_for_ms"] = ms(from_ns(surface.valid_until_ns) - now);
+  json["sent_ms"] = ms(now.time_since_epoch());
   since_ = {};
   sent_ = receipt;
-  last_state_ = state;
-  json["sent_ms"] = ms(MonotonicClock::now().time_since_epoch());
-  send(text_message(json, true));
+  state_ = surface.state;
+  reason_ = surface.reason;
+  // A change of the state is told, however slowly a page reads.
+  send(text_message(json, changed ? PageMessage::Replaces::kNothing : PageMessage::Replaces::kSurface));
+}
+
+// So that perimapds that come and go leave nothing.
+void LiveView::forget_old(Instant now) {
+  const auto old = [now](Instant heard) { return heard != Instant() && now - heard > kForgotten; };
+  if (std::erase_if(publishers_, [&](const auto& entry) { return old(entry.second.heard); }) == 0) return;
+  std::erase_if(writers_, [this](const auto& entry) { return !publishers_.contains(entry.second); });
 }
 
 void LiveView::send(const PageMessage& message) {
   server_.post([this, message] { server_.send_to_all(message); });
 }
 
-void LiveView::send_status(const PageMessage& message) {
-  server_.post([this, message] {
-    status_ = message;
-    server_.send_to_all(message);
-  });
-}
-
 PageMessage LiveView::publishers_message() const {
-  return text_message(Json{{"kind", "publishers"}, {"domain", domain_}, {"count", std::max(count_, 0)}});
+  return text_message(
+      Json{{"kind", "publishers"}, {"domain", domain_}, {"count", count_ ? Json(*count_) : Json(nullptr)}});
 }
 
 void LiveView::opened(PageId page) {
   server_.send(page, text_message(Json{{"kind", "hello"}, {"mode", "live"}, {"domain", domain_}}));
   server_.send(page, publishers_message());
-  if (status_) server_.send(page, *status_);
+  if (following_) server_.send(page, *following_);
+  if (status_ && MonotonicClock::now() - status_came_ < kStatusIsNew) server_.send(page, *status_);
 }
 
 Expected<void> LiveView::said(PageId /*page*/, std::string_view /*text*/) {
@@ -166,8 +223,20 @@ Expected<void> LiveView::said(PageId /*page*/, std::string_view /*text*/) {
 }
 
 void LiveView::tick() {
-  const int count = readers_.surfaces.matched_writers();
-  if (std::exchange(count_, count) != count) {
+  const Instant now = MonotonicClock::now();
+  std::size_t count = 0;
+  std::optional<Instant> last;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [publisher, heard] : heard_) {
+      if (now - heard < kPublishes) ++count;
+      if (!last || heard > *last) last = heard;
+    }
+    std::erase_if(heard_, [now](const auto& entry) { return now - entry.second > kForgotten; });
+  }
+  // Those that are there are found within a second or two.
+  if (count != count_ && (count > 0 || now - begun_ > kPublishes)) {
+    count_ = count;
     server_.send_to_all(publishers_message());
     if (count == 0) {
       say_(fmt::format("nobody publishes in DDS domain {}: start perimapd, or name its domain by --domain", domain_));
@@ -178,8 +247,7 @@ void LiveView::tick() {
                        domain_));
     }
   }
-  const std::int64_t last_ns = last_surface_ns_.load(std::memory_order_relaxed);
-  const bool silent = last_ns != 0 && MonotonicClock::now() - from_ns(last_ns) > kSilence;
+  const bool silent = last && now - *last > kSilence;
   if (std::exchange(silent_, silent) != silent) {
     say_(silent ? "nothing has come from perimapd for half a second" : "surfaces come again");
   }

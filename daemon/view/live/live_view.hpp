@@ -2,9 +2,11 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -38,6 +40,8 @@ class LiveView final : public PageHandler {
   // Nothing can be asked of what is live.
   [[nodiscard]] Expected<void> said(PageId page, std::string_view text) override;
   void tick() override;
+  // Of the receiving thread: it has ended by itself, and so has the server.
+  [[nodiscard]] Expected<void> result() const override;
 
  private:
   struct Readers {
@@ -51,44 +55,60 @@ class LiveView final : public PageHandler {
   };
   // What came since the last surface that was sent.
   struct Since {
-    std::vector<double> delays_ms;  // receipt minus capture
-    std::vector<double> late_ms;    // receipt minus release
-    std::uint64_t lost = 0;         // by the sequence
+    std::vector<double> late_ms;  // receipt minus release
+    std::uint64_t lost = 0;       // by the sequence
+  };
+  // One perimapd, as the receiving thread knows it.
+  struct Publisher {
+    SurfaceTeller teller;
+    Instant heard;
   };
 
   LiveView(int domain, Readers readers, WebServer& server, Say say);
   [[nodiscard]] static Expected<Readers> subscribe(const dds::Membership& membership);
 
   void receive();
+  // Gives each sample with its publisher and whether it is the last of those that have come.
   template <class T, class Use>
   void take(dds::Reader<T>& reader, Use use);
-  void surface(const perimap_Surface& surface, std::uint64_t publisher, Instant receipt);
+  void count(const perimap_Surface& surface, std::uint64_t publisher, Instant receipt);
+  void tell(const perimap_Surface& surface, std::uint64_t publisher, Instant receipt);
+  void follow_anew(const perimap_Surface& surface);
+  void forget_old(Instant now);
   void send(const PageMessage& message);
-  void send_status(const PageMessage& message);
   [[nodiscard]] PageMessage publishers_message() const;
 
   const int domain_;
   Readers readers_;
   WebServer& server_;
   const Say say_;
+  const Instant begun_ = MonotonicClock::now();
 
   // Of the receiving thread.
   FollowedPublisher followed_;
-  std::map<std::uint64_t, SurfaceTeller> tellers_;             // by publisher
-  std::map<dds_instance_handle_t, std::uint64_t> publishers_;  // of writers
+  std::map<std::uint64_t, Publisher> publishers_;
+  std::map<dds_instance_handle_t, std::uint64_t> writers_;  // whose they are
+  std::optional<perimap_SurfaceState> state_;               // of the last surface that was followed
+  std::optional<perimap_SurfaceReason> reason_;
   Since since_;
   Instant sent_;
-  std::string last_state_;
   std::optional<std::uint64_t> last_sequence_;
   bool failing_ = false;
 
-  // Relaxed: by itself, when a surface last came; 0: never.
-  std::atomic<std::int64_t> last_surface_ns_{0};
+  // Of both threads: when each perimapd's last surface came.
+  std::mutex mutex_;
+  std::map<std::uint64_t, Instant> heard_;
+
+  // Relaxed: each is a message by itself.
+  std::atomic<bool> stopping_{false};
+  std::atomic<bool> failed_{false};
 
   // Of the server's thread.
-  int count_ = -1;  // perimapds in the domain; -1: not told yet
+  std::optional<std::size_t> count_;  // perimapds that publish; none: not told yet
   bool silent_ = false;
   std::optional<PageMessage> status_;
+  Instant status_came_;
+  std::optional<PageMessage> following_;
 
   std::thread thread_;
 };

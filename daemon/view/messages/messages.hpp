@@ -16,6 +16,7 @@ namespace perimap {
 [[nodiscard]] nlohmann::ordered_json status_message_json(const perimap_Status& status);
 [[nodiscard]] nlohmann::ordered_json ecg_json(const perimap_EcgSamples& block);
 
-[[nodiscard]] PageMessage text_message(const nlohmann::ordered_json& json, bool replaceable = false);
+[[nodiscard]] PageMessage text_message(const nlohmann::ordered_json& json,
+                                       PageMessage::Replaces replaces = PageMessage::Replaces::kNothing);
 
 }  // namespace perimap

@@ -1,7 +1,9 @@
 #include "daemon/view/messages/surface_teller.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <perimap_client.hpp>
 #include <span>
 #include <string>
@@ -28,7 +30,12 @@ double largest_deviation_mm(const double (&c)[6]) {
 
 // Where the scope was; with its lens where that is told (an older perimapd does not).
 Json camera_json(const perimap_Surface& surface) {
-  if (!surface.camera_pose_known) return nullptr;
+  const auto finite = [](const auto& values) {
+    return std::all_of(std::begin(values), std::end(values), [](double value) { return std::isfinite(value); });
+  };
+  if (!surface.camera_pose_known || !finite(surface.translation_WC_mm) || !finite(surface.rotation_WC_wxyz)) {
+    return nullptr;
+  }
   const auto list = [](const auto& values) {
     Json json = Json::array();
     for (const double value : values) json.push_back(value);
@@ -38,37 +45,39 @@ Json camera_json(const perimap_Surface& surface) {
                {"rotation_wxyz", list(surface.rotation_WC_wxyz)},
                {"focal_px", nullptr},
                {"principal_point_px", nullptr}};
-  if (surface.camera_focal_px[0] > 0 && surface.camera_focal_px[1] > 0) {
+  if (surface.camera_focal_px[0] > 0 && surface.camera_focal_px[1] > 0 && finite(surface.camera_focal_px) &&
+      finite(surface.camera_principal_point_px)) {
     json["focal_px"] = list(surface.camera_focal_px);
     json["principal_point_px"] = list(surface.camera_principal_point_px);
   }
   return json;
 }
 
-void put_features(const perimap_Surface& surface, Json& json) {
+struct Told {
+  Json features;
+  std::size_t converged = 0;  // of them
+};
+
+// Those whose numbers can be drawn.
+Told features_of(const perimap_Surface& surface) {
+  Told told;
   Json ids = Json::array(), positions = Json::array(), states = Json::array(), deviations = Json::array();
   for (const perimap_SurfaceFeature& feature : std::span(surface.features._buffer, surface.features._length)) {
     if (feature.state == perimap_FEATURE_INVALID) continue;
     const double deviation_mm = largest_deviation_mm(feature.covariance_W_mm2);
     const double* p = feature.position_W_mm;
     if (!std::isfinite(p[0] + p[1] + p[2]) || !std::isfinite(deviation_mm)) continue;
+    if (feature.state == perimap_FEATURE_CONVERGED) ++told.converged;
     ids.push_back(feature.id);
     for (std::size_t axis = 0; axis < 3; ++axis) positions.push_back(rounded(p[axis]));
     states.push_back(static_cast<int>(feature.state));
     deviations.push_back(rounded(deviation_mm));
   }
-  json["features"] = {{"ids", std::move(ids)},
-                      {"positions_mm", std::move(positions)},
-                      {"states", std::move(states)},
-                      {"deviations_mm", std::move(deviations)}};
-}
-
-std::size_t converged_in(const perimap_Surface& surface) {
-  std::size_t count = 0;
-  for (const perimap_SurfaceFeature& feature : std::span(surface.features._buffer, surface.features._length)) {
-    if (feature.state == perimap_FEATURE_CONVERGED) ++count;
-  }
-  return count;
+  told.features = {{"ids", std::move(ids)},
+                   {"positions_mm", std::move(positions)},
+                   {"states", std::move(states)},
+                   {"deviations_mm", std::move(deviations)}};
+  return told;
 }
 
 }  // namespace
@@ -91,7 +100,10 @@ Json SurfaceTeller::mesh_at(const perimap_Surface& surface, Instant receipt) {
   for (const auto& triangle : predicted_.triangles) {
     for (const std::uint32_t corner : triangle) triangles.push_back(corner);
   }
-  return {{"words", ""},
+  // Its own verdict may be worse than the surface's: a beat that is due by then.
+  const bool good = predicted_.state == perimap_SURFACE_GOOD;
+  return {{"words", good ? "" : client::describe(predicted_.reason)},
+          {"state", name_of(predicted_.state)},
           {"positions_mm", std::move(positions)},
           {"deviations_mm", std::move(deviations)},
           {"triangles", std::move(triangles)}};
@@ -99,6 +111,7 @@ Json SurfaceTeller::mesh_at(const perimap_Surface& surface, Instant receipt) {
 
 Json SurfaceTeller::tell(const perimap_Surface& surface, Instant receipt) {
   const bool usable = surface.state == perimap_SURFACE_GOOD || surface.state == perimap_SURFACE_DEGRADED;
+  Told told = features_of(surface);
   Json json = {{"kind", "surface"},
                {"source", surface.source},
                {"stream", surface.stream},
@@ -109,17 +122,17 @@ Json SurfaceTeller::tell(const perimap_Surface& surface, Instant receipt) {
                {"permission", permission_of(surface.state)},
                {"why", surface.reason == perimap_SURFACE_REASON_NONE ? "" : client::describe(surface.reason)},
                {"remedy", remedy_of(surface.reason)},
-               {"converged", converged_in(surface)},
+               {"converged", told.converged},
                {"known", surface.features._length},
                {"valid_ms", page_ms(surface.valid_time_ns)},
                {"capture_ms", page_ms(surface.capture_time_ns)},
                {"received_ms", page_ms(to_ns(receipt))},
-               {"expired", to_ns(receipt) > surface.valid_until_ns},
+               {"valid_for_ms", page_ms(surface.valid_until_ns) - page_ms(to_ns(receipt))},
                {"phase_rad", rounded(surface.cardiac_phase_rad)},
                {"phase_deviation_rad", rounded(surface.cardiac_phase_deviation_rad)}};
   if (!usable) return json;
   json["camera"] = camera_json(surface);
-  put_features(surface, json);
+  json["features"] = std::move(told.features);
   json["mesh"] = mesh_at(surface, receipt);
   return json;
 }

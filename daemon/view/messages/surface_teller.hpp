@@ -24,7 +24,8 @@ class SurfaceTeller {
   [[nodiscard]] const perimap_SurfaceModel* model() const noexcept { return model_ ? &**model_ : nullptr; }
   [[nodiscard]] const perimap_SurfaceMesh* mesh() const noexcept { return mesh_ ? &**mesh_ : nullptr; }
 
-  // `receipt` is when it came, on its publisher's clock. Lengths in mm, times in ms of that clock. Positions of an
+  // `receipt` is when it came; on the publisher's clock, which is this host's or a recording's. "valid_for_ms" counts
+  // from there, and is not above zero when it came too late. Lengths in mm, times in ms of that clock. Positions of an
   // invalid surface are left out, and so is a mesh that the client of idl/perimap_mesh_client.hpp refuses.
   [[nodiscard]] nlohmann::ordered_json tell(const perimap_Surface& surface, Instant receipt);
 

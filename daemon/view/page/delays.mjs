@@ -18,6 +18,10 @@ export class Delays {
   add(nowMs, lateMs, lost) {
     for (const late of lateMs) this.kept.push({at: nowMs, late});
     this.lost += lost;
+    this.drop(nowMs);
+  }
+
+  drop(nowMs) {
     const first = this.kept.findIndex(({at}) => at > nowMs - kKeptMs);
     this.kept.splice(0, first < 0 ? this.kept.length : first);
   }
@@ -31,11 +35,12 @@ export class Delays {
 
   words() {
     const q = this.quantiles();
-    if (!q) return "nothing received yet";
-    return `half ${q.p50.toFixed(1)}, 99 % ${q.p99.toFixed(1)}, most ${q.most.toFixed(1)} ms in the last minute; ${this.lost} lost`;
+    if (!q) return "nothing received in the last minute";
+    return `half ${q.p50.toFixed(1)}, 99 % ${q.p99.toFixed(1)}, most ${q.most.toFixed(1)} ms; ${this.lost} lost since it was opened`;
   }
 
-  draw() {
+  draw(nowMs) {
+    this.drop(nowMs);
     const cleared = clear(this.canvas);
     if (!cleared || !this.kept.length) return;
     const {context, width, height} = cleared;

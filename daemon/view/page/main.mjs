@@ -6,7 +6,7 @@ import {Scene} from "./scene.mjs";
 import {showFacts, showSources} from "./sources.mjs";
 import {Strip} from "./strip.mjs";
 import {Timeline} from "./timeline.mjs";
-import {Held, judge} from "./trust.mjs";
+import {Held, judge, Lag} from "./trust.mjs";
 
 const $ = (id) => document.getElementById(id);
 const kJudgeMs = 50;
@@ -18,9 +18,23 @@ if (location.search) history.replaceState(null, "", "/");
 
 const scene = new Scene($("scene")), strip = new Strip($("strip")), delays = new Delays($("delays"));
 const picture = new Picture($("picture"));
-const seen = {recorded: false, domain: 0, publishers: null, surface: null, cameAt: 0, quickest: Infinity, lagMs: 0, ageMs: Infinity};
-const held = new Held();
+const seen = {};
+// Nothing of what was shown is of what comes now.
+function forget() {
+  Object.assign(seen, {surface: null, status: null, told: null, cameAt: -Infinity, lagMs: 0, ageMs: Infinity, source: ""});
+  lag = new Lag();
+  held = new Held();
+  strip.forget();
+  delays.forget();
+  scene.reset();
+  picture.forget();
+  $("sources").innerHTML = '<tr><td colspan="4">no status has come yet</td></tr>';
+  $("facts").replaceChildren();
+}
+let lag, held, failed = null;
 let judged = {state: "invalid"};
+forget();
+Object.assign(seen, {recorded: false, domain: 0, publishers: null});
 
 const timeline = new Timeline(
   {footer: $("timeline"), button: $("play"), slider: $("time"), clock: $("clock"), states: $("states")},
@@ -33,17 +47,14 @@ const timeline = new Timeline(
 
 const take = {
   hello(message) {
+    forget();
     seen.recorded = message.mode === "recording";
     seen.domain = message.domain;
-    seen.surface = null;
-    seen.quickest = Infinity;
-    strip.forget();
-    delays.forget();
     document.title = seen.recorded ? `perimap: ${message.name}` : "perimap";
     document.querySelector("section.delays").hidden = seen.recorded;
     document.querySelector("section.sources").hidden = seen.recorded && !message.statuses;
-    document.body.classList.toggle("bare", seen.recorded && !message.statuses);
     document.querySelector("section.picture").hidden = !message.pictures;
+    document.body.classList.toggle("bare", seen.recorded && !message.statuses);
     document.body.classList.toggle("pictures", Boolean(message.pictures));
     document.body.classList.toggle("recording", seen.recorded);
     warn(message.warnings ?? []);
@@ -53,16 +64,20 @@ const take = {
     seen.publishers = message.count;
     warn(message.count > 1 ? [`${message.count} perimapds publish in DDS domain ${message.domain}: one of them is shown. End the others.`] : []);
   },
+  following({source, stream}) {
+    forget();
+    seen.source = `${source}, by ${stream === "frame" ? "frames" : "a clock"}`;
+  },
   surface(message) {
     seen.surface = message;
-    seen.cameAt = performance.now();
-    if (message.sent_ms !== undefined) {
-      const under_way = seen.cameAt - message.sent_ms;
-      seen.quickest = Math.min(seen.quickest, under_way);
-      seen.lagMs = under_way - seen.quickest;
+    if (!seen.recorded) {
+      seen.cameAt = performance.now();
+      seen.lagMs = lag.take(message.sent_ms, seen.cameAt);
       delays.add(seen.cameAt, message.late_ms, message.lost);
     }
     strip.surface(message);
+    // Also of one that the next has replaced before the page draws.
+    if (!seen.recorded) tell();
   },
   phase(message) {
     strip.phase(message);
@@ -113,15 +128,17 @@ function set(id, text) {
 
 function tell() {
   const now = performance.now(), ageMs = seen.recorded ? seen.ageMs : now - seen.cameAt;
-  const latest = judge({...seen, link: connection.link, ageMs});
+  const latest = failed ?? judge({...seen, link: connection.link, ageMs});
   judged = seen.recorded ? latest : held.take(latest, now);
   if ($("trust").dataset.state !== judged.state) $("trust").dataset.state = judged.state;
   for (const part of ["state", "permission", "why", "remedy"]) set(part, judged[part]);
   const {surface} = judged;
   set("converged", `${surface?.converged ?? 0} converged`);
   set("known", surface ? `of ${surface.known}` : "");
-  const words = surface?.mesh?.words || (surface?.mesh ? `mesh of ${surface.mesh.triangles.length / 3} triangles` : "");
-  set("surface-words", words);
+  const mesh = surface?.mesh?.triangles ? `mesh of ${surface.mesh.triangles.length / 3} triangles` : "";
+  set("surface-words", [surface ? seen.source : "", mesh, surface?.mesh?.words].filter(Boolean).join(" \u00b7 "));
+  // Drawn by this very program, so that a page that stands still is seen to.
+  set("life", connection.link.open ? "|/\u2013\\"[Math.floor(now / 250) % 4] : "\u00d7");
 }
 
 // How the sources are now, or that it is not known.
@@ -129,10 +146,10 @@ function tellStatus() {
   if (!seen.status) return;
   const known = connection.link.open && (seen.recorded || performance.now() - seen.statusAt < kStatusMs);
   if (seen.told === seen.status && seen.toldKnown === known) return;
-  Object.assign(seen, {told: seen.status, toldKnown: known});
   showSources($("sources"), seen.status.sources, known);
   if (known) showFacts($("facts"), seen.status);
   else $("facts").replaceChildren();
+  Object.assign(seen, {told: seen.status, toldKnown: known});
 }
 
 // The publisher's clock now, from the surface that came last.
@@ -142,14 +159,23 @@ function nowMs() {
 }
 
 function draw() {
+  requestAnimationFrame(draw);
   timeline.advance();
   tell();
   scene.draw(judged.state === "invalid" ? null : seen.surface, judged.state);
   picture.draw(judged.state);
   strip.draw(nowMs(), judged.state === "invalid");
   timeline.draw();
-  requestAnimationFrame(draw);
 }
+
+// What a page that has failed still shows is not to be believed.
+function fail() {
+  failed = {state: "invalid", permission: "use no position", why: "this page has failed", remedy: "reload it"};
+  document.querySelectorAll("canvas").forEach((canvas) => { canvas.width = canvas.width; });
+  tell();
+}
+addEventListener("error", fail);
+addEventListener("unhandledrejection", fail);
 
 addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target !== document.body) return;
@@ -159,7 +185,7 @@ addEventListener("keydown", (event) => {
 setInterval(tell, kJudgeMs);
 setInterval(() => {
   tellStatus();
-  delays.draw();
+  delays.draw(performance.now());
   set("delay-words", delays.words());
   set("heart-words", strip.samples.length || !strip.phases.length ? "" :
     seen.recorded ? "" : "beats and phase; the ECG itself is not published");

@@ -1,6 +1,7 @@
 // The surface in three dimensions, to turn: features, mesh and scope. Canvas 2D: a few hundred triangles, from the back to
 // the front (docs/decisions/0089).
 import {clear, kFont} from "./canvas.mjs";
+import {worse} from "./trust.mjs";
 
 export const kMeshColours = {good: [63, 208, 164], degraded: [242, 182, 50]};
 const kConverged = 2, kInconsistent = 3;  // FeatureState of perimap.idl
@@ -113,23 +114,23 @@ export class Scene {
     const cleared = clear(this.canvas);
     if (!cleared) return;
     const {context, width, height} = cleared;
-    if (!surface?.features || state === "invalid") return this.say(context, width, height);
+    if (!surface?.features || state === "invalid") return this.say(context, width, height, "no position may be used");
     const features = pointsOf(surface.features.positions_mm);
     const vertices = pointsOf(surface.mesh?.positions_mm ?? []);
     this.adopt(vertices.length ? vertices : features, surface.camera, surface.mesh?.triangles ?? []);
-    if (!this.frame) return this.say(context, width, height);
+    if (!this.frame) return this.say(context, width, height, "too few features to draw yet");
     const look = this.projection(width, height);
-    this.drawMesh(context, surface.mesh, vertices.map(look), state);
+    this.drawMesh(context, surface.mesh, vertices.map(look), worse(state, surface.mesh?.state ?? "invalid"));
     this.drawFeatures(context, surface.features, features.map(look));
     if (surface.camera) this.drawScope(context, surface.camera, look);
     this.drawScaleBar(context, height, look);
   }
 
-  say(context, width, height) {
+  say(context, width, height, words) {
     context.font = '22px system-ui, "DejaVu Sans", sans-serif';
     context.fillStyle = "#a9b8c2";
     context.textAlign = "center";
-    context.fillText("no position may be used", width / 2, height / 2);
+    context.fillText(words, width / 2, height / 2);
   }
 
   // World to [x, y, depth in mm, pixels a mm].
@@ -147,7 +148,7 @@ export class Scene {
   }
 
   drawMesh(context, mesh, at, state) {
-    if (!at.length) return;
+    if (!at.length || state === "invalid") return;
     const [r, g, b] = kMeshColours[state];
     const triangles = [];
     for (let i = 0; i + 2 < mesh.triangles.length; i += 3) {

@@ -3,6 +3,9 @@
 const kMarks = {ok: "\u2713", starting: "\u2026", ended: "\u25a0"};
 const kNames = {r_trigger: "R trigger", ecg: "ECG"};
 
+// A number that is none is null in JSON.
+const figure = (value) => (Number.isFinite(value) ? value.toFixed(1) : "?");
+
 const cell = (text) => {
   const element = document.createElement("td");
   element.textContent = text;
@@ -18,8 +21,8 @@ export function showSources(body, sources, known) {
     row.dataset.source = name;
     row.dataset.state = known ? source.state : "unknown";
     row.append(cell(kNames[name] ?? name), cell(known ? `${kMarks[source.state] ?? "\u2715"} ${source.state}` : "? not known"),
-               cell(known ? `${source.rate_hz.toFixed(1)} Hz` : ""),
-               cell(known ? `${source.delay_p50_ms.toFixed(1)}, ${source.delay_p99_ms.toFixed(1)} ms` : ""));
+               cell(known ? `${figure(source.rate_hz)} Hz` : ""),
+               cell(known ? `${figure(source.delay_p50_ms)}, ${figure(source.delay_p99_ms)} ms` : ""));
     return row;
   }));
 }

@@ -35,6 +35,7 @@ export class Strip {
     if (last && message.valid_ms <= last.at) return;
     this.phases.push({at: message.valid_ms, rad: message.phase_rad, deviation: message.phase_deviation_rad,
                       usable: message.state !== "invalid"});
+    this.drop(message.valid_ms);
   }
 
   ecg(message) {

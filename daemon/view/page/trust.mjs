@@ -1,34 +1,44 @@
-// What may be trusted: from the newest surface and from what does not come.
+// What may be trusted: from the newest surface and from what does not come. What is not known is not trusted.
 
 // After so long without a surface nothing of the last one is shown any more.
 export const kSilenceMs = 400;
 
 const invalid = (why, remedy = "") => ({state: "invalid", permission: "use no position", why, remedy});
+const seconds = (ms) => (ms < 10000 ? `${(ms / 1000).toFixed(1)} s` : `${Math.round(ms / 1000)} s`);
 
-// link: {open, words}: the WebSocket, and why it is not open.
-// publishers: how many perimapds are in the domain; null: not told yet. Of a recording: null.
+// link: {open, words, remedy}: the WebSocket, and why it is not open.
+// publishers: how many perimapds publish in the domain; null: not told yet.
 // surface: the newest one, as the server tells it; null: none.
-// ageMs: since it came. lagMs: how much longer than the quickest the newest was under way to this page.
+// ageMs: since it came. lagMs: how much longer than others it was under way to this page.
 export function judge({link, domain, publishers, surface, ageMs, lagMs, recorded}) {
-  if (!link.open) return invalid(link.words, "is perimap view still running?");
+  if (!link.open) return invalid(link.words, link.remedy ?? "is perimap view still running?");
   if (recorded && !surface) return invalid("the recording has no surface here");
   if (!surface && publishers === 0) {
     return invalid(`nobody publishes in DDS domain ${domain}`, "start perimapd, or give perimap view its --domain");
   }
   if (!surface) return invalid("no surface has come yet");
-  if (ageMs > kSilenceMs) {
-    const since = ageMs < 10000 ? `${(ageMs / 1000).toFixed(1)} s` : `${Math.round(ageMs / 1000)} s`;
-    return invalid(recorded ? `nothing was published for ${since}` : `nothing has come from perimapd for ${since}`,
-                   recorded ? "" : "look whether perimapd still runs");
+  const oldMs = ageMs + (recorded ? 0 : lagMs);
+  if (!(ageMs <= kSilenceMs)) {
+    const told = Number.isFinite(ageMs) ? ` for ${seconds(ageMs)}` : "";
+    return recorded ? invalid(`nothing was published${told}`)
+                    : invalid(`nothing has come from perimapd${told}`, "look whether perimapd still runs");
   }
-  if (lagMs > kSilenceMs) return invalid(`this page is ${(lagMs / 1000).toFixed(1)} s behind`, "close other pages");
-  if (surface.expired) return invalid("the surface came after its time", "is the network, or this computer, too slow?");
+  if (!(oldMs <= kSilenceMs)) return invalid("this page is behind", "close other pages; is the network, or this computer, too slow?");
+  if (!(oldMs <= surface.valid_for_ms)) {
+    return surface.valid_for_ms > 0 ? invalid("the next surface is late: the last one may not be used any more")
+                                    : invalid("the surface came after its time", "is the network, or this computer, too slow?");
+  }
   const {state, permission, why, remedy} = surface;
   if (state !== "good" && state !== "degraded") return {...invalid(why || "perimapd says so", remedy), surface};
+  if (publishers > 1) {
+    return {state: "degraded", permission: "use with care", why: `${publishers} perimapds publish here: '${surface.source}' is shown`,
+            remedy: "end the others", surface};
+  }
   return {state, permission, why, remedy, surface};
 }
 
-const kOrder = {invalid: 0, degraded: 1, good: 2};
+export const kOrder = {invalid: 0, degraded: 1, good: 2};
+export const worse = (a, b) => ((kOrder[a] ?? 0) <= (kOrder[b] ?? 0) ? a : b);
 // So long what is worse stays on the page, for what lasts one frame is not read else.
 export const kHeldMs = 800;
 
@@ -37,10 +47,30 @@ export class Held {
   constructor() { this.shown = null; }
 
   take(judged, nowMs) {
-    if (!this.shown || kOrder[judged.state] <= kOrder[this.shown.state] || nowMs - this.at > kHeldMs) {
+    if (!this.shown || kOrder[judged.state] <= kOrder[this.shown.state] || !(nowMs - this.at <= kHeldMs)) {
       this.shown = judged;
       this.at = nowMs;
     }
     return this.shown;
+  }
+}
+
+// How much longer than the quickest of the last minutes a message was under way: two clocks that begin and run a little
+// differently tell that, and no more.
+export class Lag {
+  static kMinuteMs = 60000;
+
+  constructor() {
+    this.quickest = [Infinity, Infinity];  // of this minute and the one before
+    this.begun = -Infinity;
+  }
+
+  take(sentMs, nowMs) {
+    if (nowMs - this.begun > Lag.kMinuteMs) {
+      this.quickest = [Infinity, this.quickest[0]];
+      this.begun = nowMs;
+    }
+    this.quickest[0] = Math.min(this.quickest[0], nowMs - sentMs);
+    return nowMs - sentMs - Math.min(...this.quickest);
   }
 }

@@ -213,7 +213,7 @@ void RecordedView::send_picture(PageId page, Json& told) {
   message.bytes = picture.bytes;
   if (const auto read = frame_.read(players_.front().reader(), message); !read) return;
   const CameraFrame& frame = frame_.as_it_came();
-  PageMessage jpeg{nullptr, true, false};
+  PageMessage jpeg{nullptr, true};
   if (frame.format == PixelFormat::kMjpg) {
     jpeg.bytes =
         std::make_shared<const std::string>(reinterpret_cast<const char*>(frame.bytes.data()), frame.bytes.size());

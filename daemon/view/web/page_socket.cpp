@@ -72,10 +72,9 @@ void PageSocket::heard(std::size_t size) {
 
 void PageSocket::send(const PageMessage& message) {
   if (ended_ || closing_) return;
-  if (message.replaceable) {
-    const auto old = std::find_if(waiting_.begin(), waiting_.end(), [&message](const PageMessage& other) {
-      return other.replaceable && other.binary == message.binary;
-    });
+  if (message.replaces != PageMessage::Replaces::kNothing) {
+    const auto old = std::find_if(waiting_.begin(), waiting_.end(),
+                                  [&message](const PageMessage& other) { return other.replaces == message.replaces; });
     if (old != waiting_.end()) waiting_.erase(old);
   }
   if (waiting_.size() >= kMostWaiting) return drop();
@@ -100,7 +99,10 @@ void PageSocket::write() {
 
 bool PageSocket::stuck(Instant now) const noexcept { return busy_ && now - writing_since_ > kLongestWrite; }
 
-void PageSocket::say_goodbye() { close(websocket::close_code::going_away, "perimap view has ended"); }
+void PageSocket::say_goodbye() {
+  if (!open_) return end();  // its beginning is being written still
+  close(websocket::close_code::going_away, "perimap view has ended");
+}
 
 void PageSocket::close(websocket::close_code code, std::string_view why) {
   if (ended_ || closing_) return;

@@ -26,6 +26,8 @@ using boost::system::error_code;
 // Connections that are no page (yet): a browser opens six at once.
 constexpr std::size_t kMostConnections = 64;
 constexpr auto kTick = std::chrono::milliseconds(100);
+// Every so manieth tick pages get a sign of life, so that silence is known from a server that has gone.
+constexpr int kTicksToSign = 2;
 // Pages are told that the server goes; one that does not answer is not waited for.
 constexpr auto kGoodbye = std::chrono::milliseconds(500);
 
@@ -68,20 +70,26 @@ class WebServer::Impl {
     return url;
   }
 
-  void run(PageHandler& handler, int stop_descriptor) {
+  Expected<void> run(PageHandler& handler, int stop_descriptor) {
     handler_ = &handler;
     error_code error;
     stop_.assign(stop_descriptor, error);
+    if (error) return fail(fmt::format("cannot wait for a signal to end: {}", error.message()));
     stop_.async_wait(asio::posix::descriptor_base::wait_read, [this](error_code failed) {
-      if (!failed) say_goodbye();
+      if (!failed) end();
     });
     accept();
     tick();
     context_.run();
+    return {};
   }
 
   void post(std::function<void()> work) { asio::post(context_, std::move(work)); }
   std::size_t pages() const noexcept { return count_.load(std::memory_order_relaxed); }
+
+  void end() {
+    if (!ending_) say_goodbye();
+  }
 
   void send(PageId page, const PageMessage& message) {
     const auto found = pages_.find(page);
@@ -165,6 +173,9 @@ class WebServer::Impl {
         if (page->stuck(now)) page->drop();
       }
       if (std::exchange(accept_again_, false)) accept();
+      if (++ticks_ % kTicksToSign == 0) {
+        send_to_all({std::make_shared<const std::string>(R"({"kind":"tick"})"), false, PageMessage::Replaces::kTick});
+      }
       handler_->tick();
       tick();
     });
@@ -191,6 +202,7 @@ class WebServer::Impl {
   PageId last_id_ = 0;
   std::atomic<std::size_t> count_{0};
   std::shared_ptr<std::size_t> connections_ = std::make_shared<std::size_t>(0);
+  int ticks_ = 0;
   bool ending_ = false;
   bool accept_again_ = false;
 };
@@ -207,7 +219,10 @@ Expected<WebServer> WebServer::listen(const Settings& settings) {
 }
 
 std::string WebServer::url() const { return impl_->url(); }
-void WebServer::run(PageHandler& handler, int stop_descriptor) { impl_->run(handler, stop_descriptor); }
+Expected<void> WebServer::run(PageHandler& handler, int stop_descriptor) {
+  return impl_->run(handler, stop_descriptor);
+}
+void WebServer::end() { impl_->end(); }
 void WebServer::post(std::function<void()> work) { impl_->post(std::move(work)); }
 std::size_t WebServer::pages() const noexcept { return impl_->pages(); }
 void WebServer::send(PageId page, const PageMessage& message) { impl_->send(page, message); }

@@ -27,6 +27,8 @@ class PageHandler {
   [[nodiscard]] virtual Expected<void> said(PageId page, std::string_view text) = 0;
   // Ten times a second.
   virtual void tick() {}
+  // After the server has run: why it ended by itself, if it did.
+  [[nodiscard]] virtual Expected<void> result() const { return {}; }
 };
 
 class WebServer {
@@ -50,7 +52,8 @@ class WebServer {
   [[nodiscard]] std::string url() const;
 
   // Until the descriptor becomes readable (a StopSignal's). Pages are then told that the server goes.
-  void run(PageHandler& handler, int stop_descriptor);
+  // Five times a second each page gets {"kind":"tick"}.
+  [[nodiscard]] Expected<void> run(PageHandler& handler, int stop_descriptor);
 
   // From any thread: `work` is done on the server's, while it runs.
   void post(std::function<void()> work);
@@ -58,6 +61,7 @@ class WebServer {
   [[nodiscard]] std::size_t pages() const noexcept;
 
   // On the server's thread.
+  void end();
   void send(PageId page, const PageMessage& message);
   void send_to_all(const PageMessage& message);
 

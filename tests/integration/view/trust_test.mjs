@@ -2,9 +2,9 @@
 import assert from "node:assert/strict";
 import {test} from "node:test";
 
-import {Held, judge, kHeldMs, kSilenceMs} from "../../../daemon/view/page/trust.mjs";
+import {Held, judge, kHeldMs, kSilenceMs, Lag, worse} from "../../../daemon/view/page/trust.mjs";
 
-const good = {state: "good", permission: "may be used", why: "", remedy: "", expired: false};
+const good = {state: "good", permission: "may be used", why: "", remedy: "", source: "perimapd", valid_for_ms: 1000};
 const sentence = ({permission, why, remedy}) => `${permission}: ${why}; ${remedy}`;
 const live = {link: {open: true, words: ""}, domain: 3, publishers: 1, surface: good, ageMs: 10, lagMs: 0, recorded: false};
 
@@ -26,7 +26,9 @@ test("half a second without one and nothing may be used", () => {
 
 test("an old, late or unknown surface is never good", () => {
   assert.equal(judge({...live, lagMs: 450}).state, "invalid");
-  assert.equal(judge({...live, surface: {...good, expired: true}}).state, "invalid");
+  assert.equal(judge({...live, lagMs: 250, ageMs: 250}).state, "invalid", "late and old together");
+  assert.equal(judge({...live, surface: {...good, valid_for_ms: 9}}).state, "invalid", "not to be used any more");
+  assert.equal(judge({...live, surface: {...good, valid_for_ms: -1}}).state, "invalid", "came after its time");
   for (const state of ["invalid", "unknown", "", undefined]) {
     assert.equal(judge({...live, surface: {...good, state}}).state, "invalid");
   }
@@ -56,4 +58,38 @@ test("what is worse stays on the page until it can be read", () => {
   assert.equal(held.take(none, 20), none);
   assert.equal(held.take(care, 30), none);
   assert.equal(held.take(well, 21 + kHeldMs), well);
+});
+
+test("what is missing is not trusted", () => {
+  for (const missing of ["ageMs", "lagMs"]) {
+    assert.equal(judge({...live, [missing]: undefined}).state, "invalid", missing);
+    assert.equal(judge({...live, [missing]: NaN}).state, "invalid", missing);
+  }
+  for (const missing of ["valid_for_ms", "state"]) {
+    assert.equal(judge({...live, surface: {...good, [missing]: undefined}}).state, "invalid", missing);
+    assert.equal(judge({...live, surface: {...good, [missing]: null}}).state, "invalid", missing);
+  }
+});
+
+test("of two perimapds no surface is good", () => {
+  const judged = judge({...live, publishers: 2});
+  assert.equal(judged.state, "degraded");
+  assert.match(judged.why, /2 perimapds publish here: 'perimapd' is shown/);
+  assert.equal(judge({...live, publishers: 2, surface: {...good, state: "invalid"}}).state, "invalid");
+});
+
+test("lag is what is beyond the quickest, and clocks that drift are no lag", () => {
+  const lag = new Lag();
+  assert.equal(lag.take(1000, 5010), 0);
+  assert.equal(lag.take(1100, 5200), 90);
+  // A second in ten minutes, a hundred times what clocks drift.
+  let most = 0;
+  for (let at = 0; at < 6e5; at += 33) most = Math.max(most, lag.take(1100 + at, 5200 + at * (1 + 1 / 600)));
+  assert.ok(most < 400, `${most} ms`);
+});
+
+test("a mesh is no better than its surface, nor the surface's mesh than itself", () => {
+  assert.equal(worse("good", "degraded"), "degraded");
+  assert.equal(worse("degraded", "good"), "degraded");
+  assert.equal(worse("good", undefined), undefined);
 });

@@ -84,15 +84,18 @@ TEST(SurfaceTeller, TellsUsableFeaturesWithTheirLargestDeviation) {
   const auto json = SurfaceTeller().tell(told.surface, from_ns(50));
   EXPECT_EQ(json["state"], "degraded");
   EXPECT_EQ(json["reason"], "pose_missing");
-  EXPECT_EQ(json["converged"], 2);
+  EXPECT_EQ(json["converged"], 1);  // the other one has no position
   EXPECT_EQ(json["known"], 4);
-  EXPECT_EQ(json["expired"], false);
+  EXPECT_NEAR(json["valid_for_ms"].get<double>(), 50e-6, 1e-9);
   EXPECT_EQ(json["features"]["ids"], nlohmann::ordered_json({3, 9}));
   EXPECT_EQ(json["features"]["positions_mm"], nlohmann::ordered_json({1.0, 0.0, 0.0, 4.0, 0.0, 0.0}));
   EXPECT_EQ(json["features"]["deviations_mm"][0], 0.2);
   EXPECT_EQ(json["camera"], nullptr);
   EXPECT_EQ(json["mesh"]["words"], "no surface has come yet");
-  EXPECT_EQ(SurfaceTeller().tell(told.surface, from_ns(101))["expired"], true);
+  EXPECT_LT(SurfaceTeller().tell(told.surface, from_ns(101))["valid_for_ms"], 0.0);
+  told.surface.camera_pose_known = true;
+  told.surface.rotation_WC_wxyz[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(SurfaceTeller().tell(told.surface, from_ns(50))["camera"], nullptr);
 }
 
 TEST(SurfaceTeller, OfAnInvalidSurfaceNoPositionLeaves) {
@@ -114,30 +117,32 @@ TEST(Messages, TextOfAPublisherThatIsNoUtf8IsStillJson) {
   EXPECT_TRUE(nlohmann::json::accept(*message.bytes));
 }
 
+using Verdict = FollowedPublisher::Verdict;
+
 TEST(FollowedPublisher, TwoAreNeverMixed) {
   FollowedPublisher followed;
   EXPECT_FALSE(followed.follows(1));
-  EXPECT_TRUE(followed.surface(1, "frame", from_ns(0)));
-  EXPECT_FALSE(followed.surface(2, "frame", from_ns(0) + 10ms));
-  EXPECT_TRUE(followed.surface(1, "frame", from_ns(0) + 33ms));
+  EXPECT_EQ(followed.surface(1, "frame", from_ns(0)), Verdict::kNew);
+  EXPECT_EQ(followed.surface(2, "frame", from_ns(0) + 10ms), Verdict::kOther);
+  EXPECT_EQ(followed.surface(1, "frame", from_ns(0) + 33ms), Verdict::kSame);
   EXPECT_TRUE(followed.follows(1));
   EXPECT_FALSE(followed.follows(2));
 }
 
 TEST(FollowedPublisher, AnotherIsFollowedOnceTheFirstIsSilent) {
   FollowedPublisher followed;
-  EXPECT_TRUE(followed.surface(1, "frame", from_ns(0)));
-  EXPECT_FALSE(followed.surface(2, "frame", from_ns(0) + 900ms));
-  EXPECT_TRUE(followed.surface(2, "frame", from_ns(0) + 1100ms));
-  EXPECT_FALSE(followed.surface(1, "frame", from_ns(0) + 1200ms));
+  EXPECT_EQ(followed.surface(1, "frame", from_ns(0)), Verdict::kNew);
+  EXPECT_EQ(followed.surface(2, "frame", from_ns(0) + 900ms), Verdict::kOther);
+  EXPECT_EQ(followed.surface(2, "frame", from_ns(0) + 1100ms), Verdict::kNew);
+  EXPECT_EQ(followed.surface(1, "frame", from_ns(0) + 1200ms), Verdict::kOther);
   EXPECT_TRUE(followed.follows(2, "frame"));
 }
 
 TEST(FollowedPublisher, OfTwoStreamsTheFramesIsShown) {
   FollowedPublisher followed;
-  EXPECT_TRUE(followed.surface(1, "clock", from_ns(0)));
-  EXPECT_TRUE(followed.surface(1, "frame", from_ns(0) + 1ms));
-  EXPECT_FALSE(followed.surface(1, "clock", from_ns(0) + 2ms));
+  EXPECT_EQ(followed.surface(1, "clock", from_ns(0)), Verdict::kNew);
+  EXPECT_EQ(followed.surface(1, "frame", from_ns(0) + 1ms), Verdict::kNew);
+  EXPECT_EQ(followed.surface(1, "clock", from_ns(0) + 2ms), Verdict::kOther);
   EXPECT_TRUE(followed.follows(1, "frame"));
   EXPECT_FALSE(followed.follows(1, "clock"));
 }

@@ -27,8 +27,8 @@ namespace websocket = beast::websocket;
 using asio::ip::tcp;
 using testing::HasSubstr;
 
-PageMessage text(std::string bytes, bool replaceable = false) {
-  return {std::make_shared<const std::string>(std::move(bytes)), false, replaceable};
+PageMessage text(std::string bytes, PageMessage::Replaces replaces = PageMessage::Replaces::kNothing) {
+  return {std::make_shared<const std::string>(std::move(bytes)), false, replaces};
 }
 
 // Greets pages, and takes "ok" from them and nothing else.
@@ -54,7 +54,7 @@ class Greeter final : public PageHandler {
 struct Running {
   explicit Running(WebServer served, std::uint16_t served_port)
       : server(std::move(served)), port(served_port), greeter(server), stop(eventfd(0, 0)), thread([this] {
-          server.run(greeter, stop);
+          EXPECT_TRUE(server.run(greeter, stop));
         }) {}
   Running(const Running&) = delete;
   Running& operator=(const Running&) = delete;
@@ -114,6 +114,8 @@ std::string get(const Running& running, const std::string& target, const std::st
                 "\r\nConnection: close\r\n" + fields + "\r\n");
 }
 
+constexpr const char* kTick = R"({"kind":"tick"})";
+
 struct Page {
   explicit Page(std::uint16_t port, const std::string& origin = "") : stream(context) {
     const std::string host = "127.0.0.1:" + std::to_string(port);
@@ -123,11 +125,15 @@ struct Page {
     }));
     stream.handshake(host, "/live", error);
   }
-  // Empty: it was closed.
+  // The next message that is no sign of life; empty: it was closed.
   std::string read() {
-    beast::flat_buffer buffer;
-    stream.read(buffer, error);
-    return error ? "" : beast::buffers_to_string(buffer.data());
+    for (;;) {
+      beast::flat_buffer buffer;
+      stream.read(buffer, error);
+      if (error) return "";
+      const std::string message = beast::buffers_to_string(buffer.data());
+      if (message != kTick) return message;
+    }
   }
   asio::io_context context;
   websocket::stream<tcp::socket> stream;
@@ -175,6 +181,17 @@ TEST(WebServer, APageIsGreetedAndHearsWhatIsSentToAll) {
   EXPECT_EQ(page.read(), "hello");
   running->server.post([&] { running->server.send_to_all(text("news")); });
   EXPECT_EQ(page.read(), "news");
+}
+
+TEST(WebServer, GivesSignsOfLife) {
+  const auto running = run_server();
+  Page page(running->port);
+  EXPECT_EQ(page.read(), "hello");
+  for (int i = 0; i < 2; ++i) {
+    beast::flat_buffer buffer;
+    page.stream.read(buffer, page.error);
+    EXPECT_EQ(beast::buffers_to_string(buffer.data()), kTick);
+  }
 }
 
 TEST(WebServer, MoreThanSixteenPagesAreTurnedAwayWithAReason) {
@@ -228,7 +245,8 @@ TEST(WebServer, APageThatDoesNotReadGetsWhatIsNewOrIsDropped) {
   // More than all buffers on the way hold: what is replaceable waits as one message, so that nobody is dropped.
   const std::string large(1 << 20, 'x');
   for (int i = 0; i < 40; ++i) {
-    running->server.post([&, i] { running->server.send_to_all(text(std::to_string(i) + large, true)); });
+    running->server.post(
+        [&, i] { running->server.send_to_all(text(std::to_string(i) + large, PageMessage::Replaces::kSurface)); });
     EXPECT_FALSE(well.read().empty());
   }
   EXPECT_EQ(running->server.pages(), 2U);
