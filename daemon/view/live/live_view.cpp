@@ -4,6 +4,7 @@
 #include <pthread.h>
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "daemon/view/messages/messages.hpp"
@@ -116,7 +117,7 @@ void LiveView::receive() {
       const auto verdict = followed_.surface(publisher, surface.stream, receipt);
       {
         const std::lock_guard lock(mutex_);
-        heard_[publisher] = receipt;
+        heard_[publisher] = {receipt, surface.source};
       }
       if (verdict == FollowedPublisher::Verdict::kOther) return;
       if (verdict == FollowedPublisher::Verdict::kNew) follow_anew(surface);
@@ -207,8 +208,10 @@ void LiveView::send(const PageMessage& message) {
 }
 
 PageMessage LiveView::publishers_message() const {
-  return text_message(
-      Json{{"kind", "publishers"}, {"domain", domain_}, {"count", count_ ? Json(*count_) : Json(nullptr)}});
+  return text_message(Json{{"kind", "publishers"},
+                           {"domain", domain_},
+                           {"count", count_ ? Json(*count_) : Json(nullptr)},
+                           {"same_source", same_source_}});
 }
 
 void LiveView::opened(PageId page) {
@@ -225,18 +228,24 @@ Expected<void> LiveView::said(PageId /*page*/, std::string_view /*text*/) {
 void LiveView::tick() {
   const Instant now = MonotonicClock::now();
   std::size_t count = 0;
+  bool same_source = false;
   std::optional<Instant> last;
   {
     const std::lock_guard lock(mutex_);
+    std::set<std::string> sources;
     for (const auto& [publisher, heard] : heard_) {
-      if (now - heard < kPublishes) ++count;
-      if (!last || heard > *last) last = heard;
+      if (!last || heard.at > *last) last = heard.at;
+      if (now - heard.at >= kPublishes) continue;
+      ++count;
+      same_source = same_source || !sources.insert(heard.source).second;
     }
-    std::erase_if(heard_, [now](const auto& entry) { return now - entry.second > kForgotten; });
+    std::erase_if(heard_, [now](const auto& entry) { return now - entry.second.at > kForgotten; });
   }
   // Those that are there are found within a second or two.
-  if (count != count_ && (count > 0 || now - begun_ > kPublishes)) {
+  const bool changed = count != count_ || same_source != same_source_;
+  if (changed && (count > 0 || now - begun_ > kPublishes)) {
     count_ = count;
+    same_source_ = same_source;
     server_.send_to_all(publishers_message());
     if (count == 0) {
       say_(fmt::format("nobody publishes in DDS domain {}: start perimapd, or name its domain by --domain", domain_));

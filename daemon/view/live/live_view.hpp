@@ -95,9 +95,13 @@ class LiveView final : public PageHandler {
   std::optional<std::uint64_t> last_sequence_;
   bool failing_ = false;
 
-  // Of both threads: when each perimapd's last surface came.
+  // Of both threads: when each perimapd's last surface came, and of which source it was.
+  struct Heard {
+    Instant at;
+    std::string source;
+  };
   std::mutex mutex_;
-  std::map<std::uint64_t, Instant> heard_;
+  std::map<std::uint64_t, Heard> heard_;
 
   // Relaxed: each is a message by itself.
   std::atomic<bool> stopping_{false};
@@ -105,6 +109,7 @@ class LiveView final : public PageHandler {
 
   // Of the server's thread.
   std::optional<std::size_t> count_;  // perimapds that publish; none: not told yet
+  bool same_source_ = false;          // two of them under one name
   bool silent_ = false;
   std::optional<PageMessage> status_;
   Instant status_came_;

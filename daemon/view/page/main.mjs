@@ -62,6 +62,7 @@ const take = {
   },
   publishers(message) {
     seen.publishers = message.count;
+    seen.sameSource = message.same_source;
     warn(message.count > 1 ? [`${message.count} perimapds publish in DDS domain ${message.domain}: one of them is shown. End the others.`] : []);
   },
   following({source, stream}) {

@@ -7,10 +7,10 @@ const invalid = (why, remedy = "") => ({state: "invalid", permission: "use no po
 const seconds = (ms) => (ms < 10000 ? `${(ms / 1000).toFixed(1)} s` : `${Math.round(ms / 1000)} s`);
 
 // link: {open, words, remedy}: the WebSocket, and why it is not open.
-// publishers: how many perimapds publish in the domain; null: not told yet.
+// publishers: how many perimapds publish in the domain; null: not told yet. sameSource: two of them under one name.
 // surface: the newest one, as the server tells it; null: none.
 // ageMs: since it came. lagMs: how much longer than others it was under way to this page.
-export function judge({link, domain, publishers, surface, ageMs, lagMs, recorded}) {
+export function judge({link, domain, publishers, sameSource, surface, ageMs, lagMs, recorded}) {
   if (!link.open) return invalid(link.words, link.remedy ?? "is perimap view still running?");
   if (recorded && !surface) return invalid("the recording has no surface here");
   if (!surface && publishers === 0) {
@@ -30,6 +30,7 @@ export function judge({link, domain, publishers, surface, ageMs, lagMs, recorded
   }
   const {state, permission, why, remedy} = surface;
   if (state !== "good" && state !== "degraded") return {...invalid(why || "perimapd says so", remedy), surface};
+  if (sameSource) return invalid(`two perimapds publish as '${surface.source}'`, "end one of them, or give each a source.name of its own");
   if (publishers > 1) {
     return {state: "degraded", permission: "use with care", why: `${publishers} perimapds publish here: '${surface.source}' is shown`,
             remedy: "end the others", surface};

@@ -76,6 +76,9 @@ test("of two perimapds no surface is good", () => {
   assert.equal(judged.state, "degraded");
   assert.match(judged.why, /2 perimapds publish here: 'perimapd' is shown/);
   assert.equal(judge({...live, publishers: 2, surface: {...good, state: "invalid"}}).state, "invalid");
+  const same = judge({...live, publishers: 2, sameSource: true});
+  assert.equal(same.state, "invalid");
+  assert.match(same.why, /two perimapds publish as 'perimapd'/);
 });
 
 test("lag is what is beyond the quickest, and clocks that drift are no lag", () => {
