@@ -8,7 +8,7 @@
 namespace perimap::dds {
 
 std::string plugin_path(const std::string& plugin) {
-  const std::string file = fmt::format("libdds_security_{}.so", plugin);
+  std::string file = fmt::format("libdds_security_{}.so", plugin);
   Dl_info here{};
   if (dladdr(reinterpret_cast<const void*>(&dds_create_participant), &here) == 0 || here.dli_fname == nullptr) {
     return file;
