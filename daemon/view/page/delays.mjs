@@ -36,7 +36,7 @@ export class Delays {
   words() {
     const q = this.quantiles();
     if (!q) return "nothing received in the last minute";
-    return `half ${q.p50.toFixed(1)}, 99 % ${q.p99.toFixed(1)}, most ${q.most.toFixed(1)} ms; ${this.lost} lost since it was opened`;
+    return `half ${q.p50.toFixed(1)}, 99 % ${q.p99.toFixed(1)}, most ${q.most.toFixed(1)} ms; ${this.lost} lost`;
   }
 
   draw(nowMs) {
