@@ -16,8 +16,8 @@
 #include "daemon/config/ecg_inputs.hpp"
 #include "daemon/config/session_keys.hpp"
 #include "daemon/config/surface_traffic.hpp"
-#include "daemon/config/toml_text.hpp"
 #include "drivers/text_file/text_file.hpp"
+#include "drivers/toml/toml_text.hpp"
 
 namespace perimap {
 namespace {
@@ -26,48 +26,8 @@ namespace {
 // session alone. What else one says is refused, or passed over.
 enum class Source { kFile, kRecording, kRecordingPassedOver };
 
-constexpr std::size_t kLongestQuote = 60;  // bytes of a wrong value that a message repeats
-
-std::string quote(std::string_view text) {
-  std::size_t end = std::min(text.size(), kLongestQuote);
-  while (end < text.size() && end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) {
-    --end;  // not in the middle of a UTF-8 sequence
-  }
-  return fmt::format("\"{}{}\"", text.substr(0, end), end < text.size() ? "..." : "");
-}
-
 std::string full_name(std::string_view section, std::string_view key) {
   return section.empty() ? std::string(key) : fmt::format("{}.{}", section, key);
-}
-
-// What a message says it got.
-std::string describe(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::boolean:
-      return node.as_boolean()->get() ? "true" : "false";
-    case toml::node_type::integer:
-      return fmt::format("{}", node.as_integer()->get());
-    case toml::node_type::floating_point:
-      return fmt::format("{}", node.as_floating_point()->get());
-    case toml::node_type::string:
-      return quote(node.as_string()->get());
-    case toml::node_type::array: {
-      std::string elements;
-      for (const toml::node& element : *node.as_array()) {
-        if (elements.size() > kLongestQuote) {
-          elements += ", ...";
-          break;
-        }
-        elements +=
-            fmt::format("{}{}", elements.empty() ? "" : ", ", element.is_array() ? "an array" : describe(element));
-      }
-      return fmt::format("[{}]", elements);
-    }
-    case toml::node_type::table:
-      return "a table";
-    default:
-      return "a date or time";
-  }
 }
 
 // The node as one of the types that keys can have; none for all others.
@@ -391,7 +351,7 @@ Expected<RecordedConfiguration> parse_recorded_configuration(std::string_view te
 
 Expected<Configuration> load_configuration(const std::filesystem::path& file, const Configuration& base,
                                            NamedFiles named_files) {
-  const Expected<std::string> text = read_text_file(file, kLargestConfiguration, "configuration file");
+  const Expected<std::string> text = read_text_file(file, kLargestToml, "configuration file");
   if (!text) return tl::unexpected(text.error());
   return parse_configuration(*text, file, base, named_files);
 }

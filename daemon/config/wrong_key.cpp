@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "core/error/one_line.hpp"
-#include "daemon/config/toml_text.hpp"
 #include "drivers/text_file/text_file.hpp"
+#include "drivers/toml/toml_text.hpp"
 
 namespace perimap {
 namespace {
@@ -69,7 +69,7 @@ Error told_in(const std::filesystem::path& file, std::string_view text, WrongKey
 }
 
 Error told_in(const std::filesystem::path& file, WrongKeys wrong) {
-  const auto text = read_text_file(file, kLargestConfiguration, "configuration file");
+  const auto text = read_text_file(file, kLargestToml, "configuration file");
   return told_in(file, text ? std::string_view(*text) : std::string_view(), std::move(wrong));
 }
 

@@ -1,17 +1,26 @@
-#include "daemon/config/toml_text.hpp"
+#include "drivers/toml/toml_text.hpp"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
-#include <string>
 
 #include "core/error/one_line.hpp"
 
 namespace perimap {
 namespace {
 
-constexpr int kMostDots = 200;  // on one line: a hundred numbers and more
+constexpr int kMostDots = 200;             // on one line: a hundred numbers and more
+constexpr std::size_t kLongestQuote = 60;  // bytes of a wrong value that a message repeats
+
+std::string quote(std::string_view text) {
+  std::size_t end = std::min(text.size(), kLongestQuote);
+  while (end < text.size() && end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) {
+    --end;  // not in the middle of a UTF-8 sequence
+  }
+  return fmt::format("\"{}{}\"", text.substr(0, end), end < text.size() ? "..." : "");
+}
 
 // The first character that toml++ 3.3 must not see, if there is one: it has undefined behaviour on some letters outside
 // of strings and comments (its is_non_ascii_horizontal_whitespace, U+3001 for one), where TOML allows ASCII alone. On a
@@ -71,15 +80,42 @@ std::optional<std::string> refused_character(std::string_view text) {
 
 }  // namespace
 
+std::string describe(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::boolean:
+      return node.as_boolean()->get() ? "true" : "false";
+    case toml::node_type::integer:
+      return fmt::format("{}", node.as_integer()->get());
+    case toml::node_type::floating_point:
+      return fmt::format("{}", node.as_floating_point()->get());
+    case toml::node_type::string:
+      return quote(node.as_string()->get());
+    case toml::node_type::array: {
+      std::string elements;
+      for (const toml::node& element : *node.as_array()) {
+        if (elements.size() > kLongestQuote) {
+          elements += ", ...";
+          break;
+        }
+        elements +=
+            fmt::format("{}{}", elements.empty() ? "" : ", ", element.is_array() ? "an array" : describe(element));
+      }
+      return fmt::format("[{}]", elements);
+    }
+    case toml::node_type::table:
+      return "a table";
+    default:
+      return "a date or time";
+  }
+}
+
 Expected<toml::table> parse_toml(std::string_view text, const std::filesystem::path& file) {
-  if (text.size() > kLargestConfiguration) {
-    return fail(on_one_line(fmt::format("{}:1:1: expected at most {} bytes of TOML, got {}", file.string(),
-                                        kLargestConfiguration, text.size())));
+  if (text.size() > kLargestToml) {
+    return fail(on_one_line(
+        fmt::format("{}:1:1: expected at most {} bytes of TOML, got {}", file.string(), kLargestToml, text.size())));
   }
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  if (text.starts_with(kByteOrderMark)) {
-    text.remove_prefix(kByteOrderMark.size());
-  }
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   if (const std::optional<std::string> refused = refused_character(text)) {
     return fail(on_one_line(fmt::format("{}:{}", file.string(), *refused)));
   }
