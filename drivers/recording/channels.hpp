@@ -25,9 +25,11 @@ inline constexpr std::string_view kRespirationSamples = "respiration/samples";  
 inline constexpr std::string_view kRecordingInfo = "recording/info";  // perimap::RecordingInfo
 
 // Ground truth of a simulated heart.
-inline constexpr std::string_view kTruthMesh = "truth/mesh";      // perimap::TruthMesh
-inline constexpr std::string_view kTruthMotion = "truth/motion";  // perimap::TruthMotion
-inline constexpr std::string_view kTruthCamera = "truth/camera";  // perimap::TruthCamera
+inline constexpr std::string_view kTruthMesh = "truth/mesh";            // perimap::TruthMesh
+inline constexpr std::string_view kTruthMotion = "truth/motion";        // perimap::TruthMotion
+inline constexpr std::string_view kTruthCamera = "truth/camera";        // perimap::TruthCamera
+inline constexpr std::string_view kTruthProcedure = "truth/procedure";  // perimap::TruthProcedure, with a procedure
+inline constexpr std::string_view kTruthEvent = "truth/event";          // perimap::TruthEvent, likewise
 
 // What was published.
 inline constexpr std::string_view kSurface = "surface";             // perimap::Surface
@@ -42,6 +44,7 @@ namespace perimap::attachments {
 
 inline constexpr std::string_view kCalibration = "calibration.yaml";
 inline constexpr std::string_view kConfiguration = "configuration.toml";
+inline constexpr std::string_view kProcedure = "procedure.toml";  // of a simulation
 inline constexpr std::string_view kTurnedScope = "turned_scope.json";
 
 }  // namespace perimap::attachments

@@ -57,6 +57,14 @@ TopicType topic_type<perimap_TruthCamera>() noexcept {
   return {&perimap_TruthCamera_desc, kPerimapSchemaText};
 }
 template <>
+TopicType topic_type<perimap_TruthEvent>() noexcept {
+  return {&perimap_TruthEvent_desc, kPerimapProcedureSchemaText};
+}
+template <>
+TopicType topic_type<perimap_TruthProcedure>() noexcept {
+  return {&perimap_TruthProcedure_desc, kPerimapProcedureSchemaText};
+}
+template <>
 TopicType topic_type<foxglove_RawImage>() noexcept {
   return {&foxglove_RawImage_desc, kFoxgloveSchemaText};
 }

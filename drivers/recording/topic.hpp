@@ -4,6 +4,7 @@
 #include <foxglove.h>
 #include <perimap.h>
 #include <perimap_mesh.h>
+#include <perimap_procedure.h>
 
 #include <string_view>
 
@@ -51,6 +52,10 @@ template <>
 [[nodiscard]] TopicType topic_type<perimap_TruthMotion>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<perimap_TruthCamera>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_TruthEvent>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_TruthProcedure>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<foxglove_RawImage>() noexcept;
 template <>

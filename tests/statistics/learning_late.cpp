@@ -30,7 +30,7 @@
 #include "core/pipeline/image_phase.hpp"
 #include "daemon/evaluation/experiment/accuracy_figures.hpp"
 #include "daemon/evaluation/experiment/scene.hpp"
-#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
 #include "drivers/standins/simulator/simulation.hpp"
 #include "goals.hpp"
 #include "motion_laws.hpp"

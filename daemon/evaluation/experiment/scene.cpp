@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "core/angle/angle.hpp"
-#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
 #include "drivers/standins/simulator/ecg_record.hpp"
 #include "drivers/standins/simulator/embedded_data.hpp"
 #include "drivers/standins/simulator/scope_path.hpp"

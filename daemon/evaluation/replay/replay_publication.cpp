@@ -46,6 +46,19 @@ void ReplayPublication::status(const perimap_Status& status) {
   if (dds_ != nullptr) dds_->status(status);
 }
 
+std::optional<ProcedureScore> ReplayPublication::procedure(ReleaseStream stream) {
+  if (accuracies_.empty() || !to_recording_ || truth_->events.empty()) return std::nullopt;
+  const Instant first = truth_->captures.begin()->second;
+  const auto since = [first](Instant t) { return to_seconds(t - first); };
+  std::vector<ProcedureSpan> events;
+  for (const RecordedEvent& event : truth_->events) {
+    events.push_back({event.kind, event.words, since(event.begin), since(event.end), event.hides});
+  }
+  std::vector<double> r_peaks_s;
+  for (const Instant r : truth_->truth.motion().r_peaks) r_peaks_s.push_back(since(r));
+  return score_procedure(accuracies_[index_of(stream)].judged(*to_recording_), events, r_peaks_s);
+}
+
 std::optional<AccuracyReport> ReplayPublication::report(ReleaseStream stream) {
   if (accuracies_.empty() || !to_recording_) return std::nullopt;
   return accuracies_[index_of(stream)].report(*to_recording_);

@@ -6,6 +6,7 @@
 
 #include "core/phase/r_peak.hpp"
 #include "core/pipeline/release_stream.hpp"
+#include "daemon/evaluation/procedure/procedure_score.hpp"
 #include "daemon/evaluation/report/accuracy.hpp"
 #include "daemon/evaluation/report/recorded_truth.hpp"
 #include "daemon/publishing/publication.hpp"
@@ -28,6 +29,8 @@ class ReplayPublication final : public Publication {
 
   // After every thread that publishes has ended; none without a truth.
   [[nodiscard]] std::optional<AccuracyReport> report(ReleaseStream stream);
+  // Likewise; none without a procedure.
+  [[nodiscard]] std::optional<ProcedureScore> procedure(ReleaseStream stream);
 
  private:
   PublicationRecorder* recorder_;

@@ -5,6 +5,7 @@
 #include <chrono>
 
 #include "core/pipeline/pipeline.hpp"
+#include "daemon/evaluation/procedure/procedure_text.hpp"
 #include "daemon/evaluation/report/accuracy_text.hpp"
 #include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
@@ -69,6 +70,7 @@ std::string to_text(const ReplayReport& report) {
     if (!s.accuracy) continue;
     if (report.streams.size() > 1) text += fmt::format("stream {}\n", name_of(s.stream));
     text += to_text(*s.accuracy) + "\n";
+    if (s.procedure) text += to_text(*s.procedure);
   }
   if (report.surface) text += to_text(*report.surface) + "\n";
   if (!report.has_truth) {
@@ -83,7 +85,9 @@ nlohmann::json to_json(const ReplayReport& report) {
     nlohmann::json& told = json["streams"][std::string(name_of(s.stream))] = s.counts;
     if (!s.accuracy) continue;
     // The first stream's in its old place, for who knows of no other.
-    (&s == &report.streams.front() ? json : told)["accuracy"] = to_json(*s.accuracy);
+    nlohmann::json& place = &s == &report.streams.front() ? json : told;
+    place["accuracy"] = to_json(*s.accuracy);
+    if (s.procedure) place["procedure"] = to_json(*s.procedure);
   }
   if (report.surface) json["surface"] = to_json(*report.surface);
   json["setup"] = setup_json(report.setup);

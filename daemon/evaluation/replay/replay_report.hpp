@@ -13,6 +13,7 @@
 #include "core/phase/respiratory_clock.hpp"
 #include "core/pipeline/release_stream.hpp"
 #include "core/realtime/latency_histogram.hpp"
+#include "daemon/evaluation/procedure/procedure_score.hpp"
 #include "daemon/evaluation/report/accuracy.hpp"
 #include "daemon/evaluation/surface/surface_figures.hpp"
 
@@ -22,8 +23,9 @@ struct ReplayReport {
   struct Stream {
     ReleaseStream stream{};
     std::uint64_t samples = 0, without_frame = 0, from_late_update = 0, missed = 0, late = 0;
-    nlohmann::json counts;                   // of the status, what belongs to this stream
-    std::optional<AccuracyReport> accuracy;  // where there is a truth
+    nlohmann::json counts;                    // of the status, what belongs to this stream
+    std::optional<AccuracyReport> accuracy;   // where there is a truth
+    std::optional<ProcedureScore> procedure;  // where it has a procedure
   };
   struct Stage {
     std::string name;

@@ -117,7 +117,8 @@ ReplayReport report_of(Pipeline& pipeline, const Identity& identity, ReplayPubli
     const StreamCounters& c = counters.of(stream);
     report.streams.push_back({stream, c.samples.get(), c.samples_without_frame.get(), c.samples_from_late_update.get(),
                               c.releases_missed.get(), c.releases_late.get(),
-                              stream_counts_json(counted(identity, stream, counters)), publication.report(stream)});
+                              stream_counts_json(counted(identity, stream, counters)), publication.report(stream),
+                              publication.procedure(stream)});
   }
   report.stages = stages(counters, settings);
   report.breathing = pipeline.status_respiration();

@@ -218,8 +218,8 @@ void Accuracy::add(const perimap_Surface& sample) {
   }
   // Surfaces that the clock releases repeat a frame's, which does not tell.
   frames_.add(from_ns(sample.capture_time_ns));
-  samples_.push_back(
-      {from_ns(sample.valid_time_ns), from_ns(sample.release_time_ns), sample.state, begin, published_.size()});
+  samples_.push_back({from_ns(sample.valid_time_ns), from_ns(sample.release_time_ns), sample.state, sample.reason,
+                      begin, published_.size()});
 }
 
 void Accuracy::add(const perimap_SurfaceModel& model) {
@@ -243,7 +243,8 @@ std::map<std::uint32_t, SurfacePoint> Accuracy::resolve_origins(Duration to_reco
     }
     Vector3d ray_C;
     if (!lens.unproject(origin.px, ray_C)) continue;
-    if (const auto point = truth_.first_hit(camera->X_WC, ray_C, first_observed)) points.emplace(id, *point);
+    if (const auto point = truth_.first_hit(camera->X_WC, ray_C, truth_.taken_at(first_observed)))
+      points.emplace(id, *point);
   }
   return points;
 }
@@ -256,6 +257,36 @@ bool Accuracy::before_premature_beat_is_known(Instant released) const {
     if (released >= beats_[i - 1].time && released <= beats_[i].detected_at + frame) return true;
   }
   return false;
+}
+
+std::vector<JudgedSurface> Accuracy::judged(Duration to_recording) const {
+  const auto points = resolve_origins(to_recording);
+  std::set<std::uint32_t> once_converged;
+  std::vector<JudgedSurface> all;
+  all.reserve(samples_.size());
+  for (const SampleRange& sample : samples_) {
+    JudgedSurface surface;
+    surface.released_s = to_seconds(sample.released + to_recording - first_frame_);
+    surface.state = sample.state;
+    surface.reason = sample.reason;
+    surface.before_known = before_premature_beat_is_known(sample.released + to_recording);
+    for (std::size_t i = sample.begin; i < sample.end; ++i) {
+      const Published& feature = published_[i];
+      if (feature.converged) once_converged.insert(feature.id);
+      const auto point = points.find(feature.id);
+      if (point == points.end() || !once_converged.contains(feature.id)) continue;
+      const double error_mm =
+          (feature.p_W_mm - truth_.position(point->second, sample.valid_time + to_recording)).norm();
+      ++surface.once_converged;
+      surface.once_converged_off += error_mm > kOff_mm ? 1 : 0;
+      if (!feature.converged || sample.state != perimap_SURFACE_GOOD) continue;
+      ++surface.good;
+      surface.largest_good_mm = std::max(surface.largest_good_mm, error_mm);
+      if (error_mm > kOff_mm) surface.good_ids_off.push_back(feature.id);
+    }
+    all.push_back(std::move(surface));
+  }
+  return all;
 }
 
 AccuracyReport Accuracy::report(Duration to_recording) const {

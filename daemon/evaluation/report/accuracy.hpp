@@ -14,6 +14,7 @@
 #include "core/phase/r_peak.hpp"
 #include "core/sensors/measured_frame_rate.hpp"
 #include "core/time/instant.hpp"
+#include "daemon/evaluation/report/judged_surface.hpp"
 #include "drivers/standins/truth/ground_truth.hpp"
 
 namespace perimap {
@@ -99,6 +100,9 @@ class Accuracy {
   // Published instants are brought to the recording's clock by adding `to_recording`.
   [[nodiscard]] AccuracyReport report(Duration to_recording) const;
 
+  // Each surface by itself, likewise. Features without a truth are left out.
+  [[nodiscard]] std::vector<JudgedSurface> judged(Duration to_recording) const;
+
  private:
   struct Published {
     std::uint32_t id = 0;
@@ -110,6 +114,7 @@ class Accuracy {
     Instant valid_time;
     Instant released;
     perimap_SurfaceState state = perimap_SURFACE_INVALID;
+    perimap_SurfaceReason reason = perimap_SURFACE_REASON_NONE;
     std::size_t begin = 0;  // in published_
     std::size_t end = 0;
   };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -16,24 +17,29 @@ namespace perimap {
 Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, ReadMode mode) {
   constexpr std::array<std::string_view, 3> kTruth = {channels::kTruthMesh, channels::kTruthMotion,
                                                       channels::kTruthCamera};
+  // Of a procedure, where there was one.
+  constexpr std::array<std::string_view, 2> kProcedure = {channels::kTruthProcedure, channels::kTruthEvent};
   auto reader = RecordingReader::open(recording, mode);
   if (!reader) return tl::unexpected(reader.error());
   const auto recorded = reader->channels();
-  for (const std::string_view name : kTruth) {
-    const bool there =
-        std::any_of(recorded.begin(), recorded.end(), [name](const RecordedChannel& c) { return c.name == name; });
-    if (!there) return std::optional<RecordedTruth>();
-  }
+  const auto is_there = [&recorded](std::string_view name) {
+    return std::any_of(recorded.begin(), recorded.end(), [name](const RecordedChannel& c) { return c.name == name; });
+  };
+  if (!std::all_of(kTruth.begin(), kTruth.end(), is_there)) return std::optional<RecordedTruth>();
+  std::vector<std::string_view> wanted(kTruth.begin(), kTruth.end());
+  std::copy_if(kProcedure.begin(), kProcedure.end(), std::back_inserter(wanted), is_there);
   const auto calibration = reader->attachment(attachments::kCalibration);
   if (!calibration) return tl::unexpected(calibration.error());
   const auto camera = parse_calibration(*calibration, fmt::format("{}:{}", recording, attachments::kCalibration));
   if (!camera) return tl::unexpected(camera.error());
 
-  if (auto selected = reader->select(kTruth); !selected) return tl::unexpected(selected.error());
+  if (auto selected = reader->select(wanted); !selected) return tl::unexpected(selected.error());
   std::optional<HeartMesh> mesh;
   std::optional<HeartMotion> motion;
   std::vector<CameraTruth> cameras;
   std::map<std::uint64_t, Instant> captures;
+  std::optional<Sample<perimap_TruthProcedure>> procedure;
+  std::vector<RecordedEvent> events;
   for (;;) {
     const auto message = reader->next();
     if (!message) return tl::unexpected(message.error());
@@ -51,6 +57,17 @@ Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, 
       auto value = heart_motion(**sample);
       if (!value) return tl::unexpected(value.error());
       motion = std::move(*value);
+    } else if (m.channel == channels::kTruthProcedure) {
+      auto sample = reader->decode<perimap_TruthProcedure>(m);
+      if (!sample) return tl::unexpected(sample.error());
+      procedure = *std::move(sample);
+    } else if (m.channel == channels::kTruthEvent) {
+      const auto sample = reader->decode<perimap_TruthEvent>(m);
+      if (!sample) return tl::unexpected(sample.error());
+      const perimap_TruthEvent& event = **sample;
+      if (event.end_time_ns < event.begin_time_ns) return reader->wrong(m, "the event ends before it begins");
+      events.push_back(
+          {event.kind, event.words, from_ns(event.begin_time_ns), from_ns(event.end_time_ns), event.hides});
     } else {
       const auto sample = reader->decode<perimap_TruthCamera>(m);
       if (!sample) return tl::unexpected(sample.error());
@@ -63,7 +80,13 @@ Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, 
   if (!mesh || !motion || cameras.empty()) return fail(fmt::format("{}: its ground truth is not complete", recording));
   auto truth = GroundTruth::create(std::move(*mesh), std::move(*motion), std::move(cameras));
   if (!truth) return fail(fmt::format("{}: {}", recording, truth.error().message));
-  return std::optional<RecordedTruth>(RecordedTruth{std::move(*truth), *camera, std::move(captures)});
+  if (procedure) {
+    if (const auto good = set_procedure(**procedure, *truth); !good) {
+      return fail(fmt::format("{}: {}", recording, good.error().message));
+    }
+  }
+  return std::optional<RecordedTruth>(
+      RecordedTruth{std::move(*truth), *camera, std::move(captures), std::move(events)});
 }
 
 }  // namespace perimap

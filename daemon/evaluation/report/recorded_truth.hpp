@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/error/expected.hpp"
 #include "core/geometry/camera_model.hpp"
@@ -16,10 +17,19 @@
 
 namespace perimap {
 
+// What happened in a simulated procedure.
+struct RecordedEvent {
+  std::string kind;
+  std::string words;  // what it was, for people
+  Instant begin, end;
+  bool hides = false;  // meanwhile the organ could hardly be seen
+};
+
 struct RecordedTruth {
   GroundTruth truth;
   CameraModel camera;
   std::map<std::uint64_t, Instant> captures;  // by frame sequence
+  std::vector<RecordedEvent> events;          // in order; none without a procedure
 
   // What to add to the instants of samples to come to the recording's clock, told by one published frame. Nothing when
   // the recording has no such frame.

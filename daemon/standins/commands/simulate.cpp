@@ -21,6 +21,7 @@
 #include "daemon/command_line/progress.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/standins/commands/simulation_options.hpp"
+#include "drivers/standins/procedure/procedure_text.hpp"
 #include "drivers/standins/session/bench_writer.hpp"
 #include "drivers/standins/session/session_writer.hpp"
 #include "drivers/standins/simulator/frame_renderer.hpp"
@@ -46,6 +47,7 @@ struct SimulateOptions {
   bool second_sensor = false;
   std::filesystem::path truth;
   std::filesystem::path landmarks;
+  std::filesystem::path procedure;  // to write the one that is simulated to
 
   [[nodiscard]] unsigned thread_count() const {
     return threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
@@ -136,6 +138,12 @@ Outcome simulate(const SimulateOptions& options, const Console& console) {
   if (options.second_sensor && options.zoom_to) {
     return refuse("--second-sensor: expected no --zoom-to, of which it does not tell", ExitCode::kWrongUsage);
   }
+  if (options.act && options.simulation.has_procedure()) {
+    return refuse("--procedure: expected --scene heart", ExitCode::kWrongUsage);
+  }
+  if (!options.procedure.empty() && !options.simulation.has_procedure()) {
+    return refuse("--write-procedure: expected --procedure, whose script it writes", ExitCode::kWrongUsage);
+  }
   if (options.act && !options.tracker_noises_mm.empty()) {
     return refuse("--tracker-noises: expected --scene heart; a bench has one, --tracker-noise", ExitCode::kWrongUsage);
   }
@@ -151,9 +159,27 @@ Outcome simulate(const SimulateOptions& options, const Console& console) {
                        options.zoom_to.value_or(options.zoom)};
     settings->turn = SimulationSettings::Turn{from_seconds(options.turn_at_s), to};
   }
+  if (options.simulation.has_procedure()) {
+    auto procedure = options.simulation.procedure(*settings);
+    if (!procedure) return refuse(procedure.error(), ExitCode::kWrongUsage);
+    settings->procedure = *std::move(procedure);
+  }
   const std::vector<SimulatedRecording> recordings = planned(options);
   for (const SimulatedRecording& recording : recordings) {
     if (auto is_new = check_new(recording.path, options); !is_new) return is_new;
+  }
+  if (!options.procedure.empty()) {
+    if (auto is_new = check_new(options.procedure, options); !is_new) return is_new;
+    for (const SimulatedRecording& recording : recordings) {
+      if (const auto apart =
+              check_apart({{"OUT", recording.path.string()}, {"--write-procedure", options.procedure.string()}}, {});
+          !apart) {
+        return refuse(apart.error(), ExitCode::kWrongUsage);
+      }
+    }
+    if (const auto written = write_text_file(options.procedure, to_toml(settings->procedure)); !written) {
+      return refuse(written.error());
+    }
   }
   const unsigned threads = options.thread_count();
 
@@ -193,6 +219,7 @@ void add_simulate_command(Commands& commands) {
                                   [options](const Console& console) { return simulate(*options, console); });
   command.add_option("OUT", options->out, "The recording to write (.mcap)")->required();
   Option* noise = options->simulation.add_to(command);
+  options->simulation.add_procedure_to(command);
   command
       .add_option_function<std::string>(
           "--scene",
@@ -235,6 +262,8 @@ void add_simulate_command(Commands& commands) {
   command.add_option("--truth", options->truth, "Of such a scene: write to this file what is to be found (JSON)");
   command.add_option("--landmarks", options->landmarks,
                      "Of such a scene: write the landmarks of the patient's image to this file, for perimap register");
+  command.add_option("--write-procedure", options->procedure,
+                     "With --procedure: write its script to this file, as when it was drawn");
   command
       .add_option("--tracker-noises", options->tracker_noises_mm,
                   "Several position noises, mm, from one rendering: OUT-0mm.mcap, OUT-1.4mm.mcap for 0,1.4")

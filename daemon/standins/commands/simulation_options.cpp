@@ -6,6 +6,8 @@
 #include <map>
 #include <numbers>
 
+#include "drivers/standins/procedure/procedure_draw.hpp"
+#include "drivers/standins/procedure/procedure_text.hpp"
 #include "drivers/standins/simulator/ecg_record.hpp"
 
 namespace perimap {
@@ -49,6 +51,23 @@ Expected<void> parse_size(const std::string& text, SimulationSettings& settings)
 }
 
 }  // namespace
+
+Expected<Procedure> SimulationOptions::procedure(const SimulationSettings& settings) const {
+  constexpr std::string_view kDraw = "draw:";
+  if (!procedure_.starts_with(kDraw)) return load_procedure(procedure_);
+  ProcedureDrawing drawing;
+  const char* const begin = procedure_.data() + kDraw.size();
+  const char* const end = procedure_.data() + procedure_.size();
+  const auto seed = std::from_chars(begin, end, drawing.seed);
+  if (seed.ec != std::errc{} || seed.ptr != end) {
+    return fail(fmt::format("procedure: expected draw:SEED, such as draw:1, found '{}'", procedure_));
+  }
+  drawing.duration = settings.duration;
+  drawing.electromagnetic = electromagnetic_;
+  drawing.turns_scope = settings.held.has_value();
+  if (settings.held) drawing.held_deg = settings.held->notch_rad / kRadians_per_degree;
+  return draw_procedure(drawing);
+}
 
 Option* SimulationOptions::add_to(Command& command) {
   command
@@ -119,6 +138,14 @@ Option* SimulationOptions::add_to(Command& command) {
                   "Each picture comes so often, as of a camera that is slower than its stamps say")
       ->capture_default_str();
   return noise;
+}
+
+void SimulationOptions::add_procedure_to(Command& command) {
+  command.add_option("--procedure", procedure_,
+                     "What happens meanwhile: a script of events (TOML), or draw:SEED for one that is drawn over the "
+                     "whole length; the session may be an hour long then");
+  command.add_flag("--electromagnetic", electromagnetic_,
+                   "With --procedure draw:SEED: metal and electrosurgery disturb the tracker");
 }
 
 Expected<BenchSettings> SimulationOptions::bench(BenchAct act) const {

@@ -16,6 +16,7 @@
 #include "drivers/recording/foxglove_pose.hpp"
 #include "drivers/recording/recording_writer.hpp"
 #include "drivers/recording/sensor_messages.hpp"
+#include "drivers/standins/procedure/procedure_text.hpp"
 #include "drivers/standins/session/calibrated_scope.hpp"
 #include "drivers/standins/simulator/frame_renderer.hpp"
 #include "drivers/standins/truth/truth_messages.hpp"
@@ -42,10 +43,11 @@ std::string description(const Simulation& simulation, const TrackerNoise& noise)
   const double correlation_s = to_seconds(s.tracker_correlation);
   return fmt::format(
       "simulated heart: seed {}, {} s, {}x{} at {} Hz, ECG record {}, motion {}, respiration {} mm, tracker {} Hz with "
-      "{} mm and {:.3g} deg RMS{}",
+      "{} mm and {:.3g} deg RMS{}{}",
       s.seed, to_seconds(s.duration), s.width, s.height, s.frames_per_s, s.ecg_record, law_name(s.law),
       s.respiration_mm, s.tracker_rate_hz, noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
-      correlation_s > 0.0 ? fmt::format(", correlated over {} s", correlation_s) : "");
+      correlation_s > 0.0 ? fmt::format(", correlated over {} s", correlation_s) : "",
+      s.procedure.empty() ? "" : fmt::format(", a procedure of {} events", s.procedure.events.size()));
 }
 
 // One recording under way.
@@ -102,7 +104,24 @@ class SessionWriter {
     return writer_.write(respiration_, message, block.arrival, block.first_sample_time, block.device_sequence);
   }
 
+  // The events that have begun by then.
+  Expected<void> write_events(Instant until) {
+    const std::vector<ProcedureEvent>& events = simulation_.settings().procedure.events;
+    for (; events_written_ < events.size(); ++events_written_) {
+      const ProcedureEvent& event = events[events_written_];
+      const Instant begin = simulation_.start() + event.at;
+      if (begin > until) break;
+      std::string kind(kind_of(event.what)), words = words_of(event);
+      const perimap_TruthEvent message{kind.data(), words.data(), to_ns(begin),
+                                       to_ns(simulation_.start() + event.end()), hides_the_organ(event.what)};
+      const auto number = static_cast<std::uint32_t>(events_written_);
+      if (auto written = writer_.write(truth_event_, message, begin, begin, number); !written) return written;
+    }
+    return {};
+  }
+
   Expected<void> finish() {
+    if (auto written = write_events(Instant::max()); !written) return written;
     return writer_.finish().and_then([this] { return file_.finish(); });
   }
 
@@ -142,6 +161,8 @@ class SessionWriter {
       respiration_ = *respiration;
     }
 
+    if (auto begun = begin_procedure(); !begun) return begun;
+
     std::string generator = fmt::format("perimap simulate {}", PERIMAP_VERSION);
     std::string text = description(simulation_, recording_.noise);
     std::string world = kWorldFrame;
@@ -162,6 +183,23 @@ class SessionWriter {
         .and_then([&] { return writer_.write(*motion, truth_motion, start, start, 0); });
   }
 
+  // Its script, and where it moves the organ; its events follow in their time.
+  Expected<void> begin_procedure() {
+    const Procedure& procedure = simulation_.settings().procedure;
+    if (procedure.empty()) return {};
+    const auto organ = writer_.add_channel<perimap_TruthProcedure>(channels::kTruthProcedure);
+    if (!organ) return tl::unexpected(organ.error());
+    const auto event = writer_.add_channel<perimap_TruthEvent>(channels::kTruthEvent);
+    if (!event) return tl::unexpected(event.error());
+    truth_event_ = *event;
+    ProcedureBuffers buffers;
+    const auto message = borrow_truth_procedure(simulation_.truth(), buffers);
+    const Instant start = simulation_.start();
+    return writer_.write(*organ, message, start, start, 0).and_then([&] {
+      return attach(attachments::kProcedure, "application/toml", to_toml(procedure));
+    });
+  }
+
   Expected<void> attach_turned_scope() {
     const auto scope = calibrated_scope(simulation_);
     if (!scope) return tl::unexpected(scope.error());
@@ -176,6 +214,8 @@ class SessionWriter {
   SimulatedRecording recording_;
   WholeFile file_;  // goes after what writes to it
   RecordingWriter writer_;
+  std::size_t events_written_ = 0;
+  ChannelId truth_event_;
   ChannelId image_, truth_camera_, tracker_, second_, viewer_, ecg_, respiration_;
   std::vector<std::uint8_t> packed_;
 };
@@ -216,7 +256,8 @@ Expected<bool> write_simulation(const Simulation& simulation, const std::vector<
     std::span<const std::uint8_t> pixels;
     if (arrival.source == Simulation::Source::kCamera) pixels = frames.next();
     for (std::size_t i = 0; i < writers.size(); ++i) {
-      Expected<void> written;
+      Expected<void> written = writers[i]->write_events(arrival.arrival);
+      if (!written) return tl::unexpected(written.error());
       switch (arrival.source) {
         case Simulation::Source::kCamera:
           written = writers[i]->write_frame(simulation.frames()[arrival.index], pixels);

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
 #include "drivers/standins/simulator/slow_error.hpp"
 #include "drivers/standins/simulator/transport_delay.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
 
 namespace perimap {
 namespace {

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "core/geometry/pose.hpp"
-#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
 
 namespace perimap {
 

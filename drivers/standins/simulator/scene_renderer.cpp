@@ -5,7 +5,7 @@
 #include <cstring>
 #include <limits>
 
-#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
 #include "drivers/standins/truth/triangle_rays.hpp"
 
 namespace perimap {

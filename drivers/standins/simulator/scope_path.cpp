@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "core/angle/angle.hpp"
-#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
 
 namespace perimap {
 namespace {

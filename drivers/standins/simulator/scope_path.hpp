@@ -18,6 +18,8 @@ class ScopePath {
 
   // Pose of the camera, time since the path's start.
   [[nodiscard]] Pose X_WC(Duration since_start) const noexcept;
+  // Where it rests, looking at the target.
+  [[nodiscard]] const Pose& X_WR() const noexcept { return X_WR_; }
 
  private:
   // Sum of two sinusoids whose periods have no common multiple within any recording.

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/angle/angle.hpp"
-#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
 
 namespace perimap {
 

@@ -8,10 +8,14 @@
 #include <limits>
 #include <numbers>
 
-#include "drivers/standins/simulator/counter_noise.hpp"
-#include "drivers/standins/simulator/ecg_record.hpp"
+#include "core/angle/angle.hpp"
+#include "drivers/standins/procedure/procedure_effects.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
+#include "drivers/standins/simulator/ecg_script.hpp"
 #include "drivers/standins/simulator/embedded_data.hpp"
+#include "drivers/standins/simulator/procedure_truth.hpp"
 #include "drivers/standins/simulator/scope_path.hpp"
+#include "drivers/standins/simulator/session_ecg.hpp"
 #include "drivers/standins/simulator/slow_error.hpp"
 #include "drivers/standins/simulator/transport_delay.hpp"
 
@@ -33,11 +37,10 @@ enum Stream : std::uint64_t {
   kTrackerDropout,
   kImage,
   kSecondPosition,
-  kSecondRotation
+  kSecondRotation,
+  kTrackerDisturbance
 };
 
-constexpr std::size_t kBeatsBefore = 8;
-constexpr std::size_t kBeatsAfter = 3;
 constexpr std::size_t kEcgSamplesPerBlock = 4;
 
 // The heart (frame H of its table: x left, y posterior, z superior) as it lies in the tracker's frame.
@@ -76,75 +79,10 @@ std::vector<Interval> dropouts(std::uint64_t seed, Duration duration, double per
   return intervals;
 }
 
-Expected<void> check(const SimulationSettings& s) {
-  const auto outside = [](const char* what, double value, double low, double high, const char* unit) -> Expected<void> {
-    if (value >= low && value <= high) return {};
-    return fail(fmt::format("{}: {} is outside {} to {} {}", what, value, low, high, unit));
-  };
-  if (s.width % 2 != 0 || s.height % 2 != 0)
-    return fail(fmt::format("size: {}x{} is not even in both directions", s.width, s.height));
-  if (s.second_sensor && !s.held) return fail("second sensor: expected a scope that is turned by some angle");
-  if (s.turn && !s.held) return fail("turn: expected a field stop, whose notch tells of it");
-  if (s.turn && (s.turn->at < Duration(0) || s.turn->length <= Duration(0))) {
-    return fail("turn: expected a time since the start, and a length above 0");
-  }
-  for (const Expected<void>& result :
-       {outside("duration", to_seconds(s.duration), 1.0, 1700.0, "s"), outside("width", s.width, 64, 4096, "px"),
-        outside("height", s.height, 64, 4096, "px"), outside("fps", s.frames_per_s, 1.0, 1000.0, "Hz"),
-        outside("respiration", s.respiration_mm, 0.0, 50.0, "mm"),
-        outside("respiration period", to_seconds(s.respiration_period), 0.5, 60.0, "s"),
-        outside("tracker rate", s.tracker_rate_hz, 1.0, 1000.0, "Hz"),
-        outside("tracker correlation", to_seconds(s.tracker_correlation), 0.0, 1000.0, "s"),
-        outside("tracker dropouts", s.tracker_dropouts_per_min, 0.0, 60.0, "a minute"),
-        outside("camera repeats", s.camera_repeats, 1, 100, "times"),
-        outside("scope sweep", s.scope_sweep, 0.0, 20.0, "times the usual"),
-        outside("exposure", s.exposure_share, 0.0, 1.0, "of the frame period"),
-        outside("glints", s.glints, 0, 1000, ""), outside("smoke", s.smoke, 0.0, 10.0, "")})
-    if (!result) return result;
-  return {};
-}
-
-// The record's sample at which the session starts.
-Expected<std::uint32_t> start_sample(const SimulationSettings& s, const EcgRecord& record) {
-  const auto samples = [&](Duration d) { return to_seconds(d) * record.sample_rate_hz; };
-  const double first = record.beat_samples[kBeatsBefore];
-  const double last = record.beat_samples[record.beat_samples.size() - 1 - kBeatsAfter] - samples(s.duration);
-  if (last < first)
-    return fail(fmt::format("duration: ECG record {} holds no {} s", record.name, to_seconds(s.duration)));
-  if (!s.ecg_start) return static_cast<std::uint32_t>(CounterNoise(s.seed, kSession).uniform(0, first, last));
-  const double asked = samples(*s.ecg_start);
-  if (asked < first || asked > last) {
-    return fail(fmt::format("ECG start: {} s is outside {:.1f} to {:.1f} s of record {}", to_seconds(*s.ecg_start),
-                            first / record.sample_rate_hz, last / record.sample_rate_hz, record.name));
-  }
-  return static_cast<std::uint32_t>(asked);
-}
-
-// When the ECG record's samples were taken.
-class SampleTimes {
- public:
-  SampleTimes(Instant start, std::uint32_t first_sample, double rate_hz) noexcept
-      : start_(start), first_sample_(first_sample), rate_hz_(rate_hz) {}
-
-  [[nodiscard]] Instant operator()(std::int64_t sample) const noexcept {
-    return start_ + from_seconds(static_cast<double>(sample - first_sample_) / rate_hz_);
-  }
-
- private:
-  Instant start_;
-  std::int64_t first_sample_;
-  double rate_hz_;
-};
-
-HeartMotion heart_motion(const SimulationSettings& settings, const EcgRecord& record, const SampleTimes& sample_time,
-                         Instant start) {
+HeartMotion heart_motion(const SimulationSettings& settings, const EcgScript& script, Instant start) {
   HeartMotion motion;
   motion.law = settings.law;
-  for (const std::uint32_t beat : record.beat_samples) motion.r_peaks.push_back(sample_time(beat));
-  const auto after_start = std::upper_bound(motion.r_peaks.begin(), motion.r_peaks.end(), start);
-  const auto after_end = std::upper_bound(after_start, motion.r_peaks.end(), start + settings.duration);
-  motion.r_peaks.erase(after_end + kBeatsAfter, motion.r_peaks.end());
-  motion.r_peaks.erase(motion.r_peaks.begin(), after_start - kBeatsBefore);
+  motion.r_peaks = r_peaks_of(script, start, settings.duration);
   if (settings.respiration_mm > 0.0) {
     motion.respiration_mm = settings.respiration_mm * (X_WH().R * inspiration_H());
     motion.respiration_period = settings.respiration_period;
@@ -176,15 +114,25 @@ Expected<View> view_of(const HeartMesh& mesh_W, const HeartMotion& motion) {
   return view;
 }
 
-// Frame times of a free-running sensor, with the jitter of its stamps' quantisation.
+// Where the camera is when the scope is drawn back along its axis.
+Pose drawn_back(Pose X_WC, const Procedure& procedure, Duration since) noexcept {
+  if (!procedure.empty()) X_WC.t -= drawn_back_mm(procedure, since) * X_WC.R.col(2);
+  return X_WC;
+}
+
+// Frame times of a free-running sensor, with the jitter of its stamps' quantisation; the camera as it was when they
+// were taken.
 std::vector<Simulation::Frame> frames_of(const SimulationSettings& settings, Instant start, const ScopePath& path) {
+  const std::vector<Drift> delays = camera_delays(settings.procedure, start);
   std::vector<Simulation::Frame> frames;
   const auto count = static_cast<std::uint64_t>(to_seconds(settings.duration) * settings.frames_per_s);
   TransportDelay camera(CounterNoise(settings.seed, kCameraDelay), milliseconds(11), microseconds(1000));
   const double offset_s = 0.5 / settings.frames_per_s;
   for (std::uint64_t k = 0; k < count; ++k) {
     const Duration since = from_seconds(offset_s + static_cast<double>(k) / settings.frames_per_s);
-    frames.push_back({{k, start + since, camera.arrival(start + since, k)}, path.X_WC(since)});
+    const Duration taken = since - drifted(delays, start + since);
+    frames.push_back({{k, start + since, camera.arrival(start + since, k)},
+                      drawn_back(path.X_WC(taken), settings.procedure, taken)});
   }
   return frames;
 }
@@ -200,12 +148,30 @@ Simulation::Simulation(SimulationSettings settings, Instant start, GroundTruth t
       path_(path),
       obstacles_(settings_.seed, setup_.lens.width, setup_.lens.height, settings_.instrument, settings_.glints,
                  settings_.smoke),
+      procedure_view_(settings_.seed, {path_.X_WR().R, surface_W}, setup_.lens.width, setup_.lens.height),
       surface_W_(std::move(surface_W)) {}
 
 std::int64_t Simulation::utc_minus_monotonic_ns() const noexcept { return 1'750'000'000'000'000'000; }
 
+Pose Simulation::X_WC_at(Duration since) const noexcept {
+  return drawn_back(path_.X_WC(since), settings_.procedure, since);
+}
+
+bool Simulation::scope_turns() const noexcept { return settings_.turn || settings_.procedure.has<ScopeTurn>(); }
+
+ScopeTurning Simulation::turning_at(Duration since) const noexcept {
+  if (!settings_.turn) return scope_turning(settings_.procedure, since);
+  const bool over = since >= settings_.turn->at + settings_.turn->length;
+  return {!over && since > settings_.turn->at, over ? 1U : 0U};
+}
+
 // Turned as a hand does: it begins and ends gently.
 std::optional<ScopeHeld> Simulation::held_at(Duration since) const noexcept {
+  if (settings_.held && settings_.procedure.has<ScopeTurn>()) {
+    const ScopeState first{settings_.held->notch_rad / kDegree, settings_.held->zoom};
+    const ScopeState now = turned_scope(settings_.procedure, first, since);
+    return ScopeHeld{now.notch_deg * kDegree, now.zoom};
+  }
   if (!settings_.held || !settings_.turn) return settings_.held;
   const SimulationSettings::Turn& turn = *settings_.turn;
   const double s = std::clamp(to_seconds(since - turn.at) / to_seconds(turn.length), 0.0, 1.0);
@@ -217,7 +183,7 @@ std::optional<ScopeHeld> Simulation::held_at(Duration since) const noexcept {
 
 CameraTruth Simulation::camera_truth(const Frame& frame) const noexcept {
   CameraTruth truth{frame.stamp.capture, frame.X_WC};
-  const Duration since = frame.stamp.capture - start_;
+  const Duration since = truth_.taken_at(frame.stamp.capture) - start_;
   if (const auto held = held_at(since)) {
     const ScopeLens lens = setup_at(since).lens;
     truth.focal_px = {lens.fx, lens.fy};
@@ -253,6 +219,8 @@ void Simulation::read_tracker() {
   const CounterNoise period(settings_.seed, kTrackerPeriod);
   const CounterNoise position(settings_.seed, kTrackerPosition);
   const CounterNoise rotation(settings_.seed, kTrackerRotation);
+  const CounterNoise disturbance(settings_.seed, kTrackerDisturbance);
+  const std::vector<Drift> delays = tracker_delays(settings_.procedure, start_);
   SlowError position_error(settings_.tracker_rate_hz, settings_.tracker_correlation);
   SlowError rotation_error = position_error;
   TransportDelay tracker(CounterNoise(settings_.seed, kTrackerDelay), milliseconds(7), microseconds(1000));
@@ -260,12 +228,22 @@ void Simulation::read_tracker() {
   for (std::uint64_t k = 0; k < reading_count; ++k) {
     const Duration since =
         from_seconds((static_cast<double>(k) + period.uniform(k, -0.02, 0.02) + 0.5) / settings_.tracker_rate_hz);
-    const bool missing = std::any_of(gaps.begin(), gaps.end(),
-                                     [&](const Interval& gap) { return since >= gap.begin && since < gap.end; });
+    bool missing = std::any_of(gaps.begin(), gaps.end(),
+                               [&](const Interval& gap) { return since >= gap.begin && since < gap.end; });
     const bool stuck = k > 0 && stretch_of(settings_.tracker_stuck, since) != nullptr;
-    tracker_stamps_.push_back({start_ + since - setup_.tracker_offset, tracker.arrival(start_ + since, k),
-                               stuck ? tracker_stamps_.back().reads : static_cast<std::size_t>(k), missing,
-                               path_.X_WC(since) * (settings_.turn ? setup_at(since).X_SC.inverse() : X_CS),
+    Pose X_WS = X_WC_at(since) * (scope_turns() ? setup_at(since).X_SC.inverse() : X_CS);
+    Duration late{0};
+    if (!settings_.procedure.empty()) {
+      const TrackerTrouble trouble = tracker_trouble(settings_.procedure, since);
+      missing = missing || trouble.hidden;
+      X_WS.t += trouble.shift_mm + trouble.deviation_mm * normal3(disturbance, k);
+      X_WS.R = so3_exp(Vector3d(0.0, 0.0, trouble.turn_rad)) * X_WS.R;
+      late = drifted(delays, start_ + since);
+    }
+    // Data that come sooner than usual still come after they were measured.
+    const Duration sent = since + std::max(late, Duration(-milliseconds(6)));
+    tracker_stamps_.push_back({start_ + since + late - setup_.tracker_offset, tracker.arrival(start_ + sent, k),
+                               stuck ? tracker_stamps_.back().reads : static_cast<std::size_t>(k), missing, X_WS,
                                position_error.next(normal3(position, k)), rotation_error.next(normal3(rotation, k))});
   }
 }
@@ -291,21 +269,23 @@ void Simulation::read_second_sensor() {
 }
 
 // Small blocks, sent when their last sample is there.
-void Simulation::read_ecg(const EcgRecord& record, std::uint32_t first_sample) {
+void Simulation::read_ecg(const EcgScript& script) {
   TransportDelay ecg(CounterNoise(settings_.seed, kEcgDelay), milliseconds(4), microseconds(800));
-  const SampleTimes sample_time(start_, first_sample, record.sample_rate_hz);
-  const auto sample_count = static_cast<std::uint32_t>(to_seconds(settings_.duration) * record.sample_rate_hz);
+  const auto sample_count = static_cast<std::uint32_t>(to_seconds(settings_.duration) * script.sample_rate_hz());
   for (std::uint32_t k = 0; k + kEcgSamplesPerBlock <= sample_count; k += kEcgSamplesPerBlock) {
     EcgBlock block;
-    const std::uint32_t from = first_sample + k;
-    block.first_sample_time = sample_time(from);
-    block.sample_period = from_seconds(1.0 / record.sample_rate_hz);
-    block.arrival = ecg.arrival(sample_time(from + kEcgSamplesPerBlock - 1), k);
+    block.first_sample_time = script.time_of(start_, k);
+    block.sample_period = from_seconds(1.0 / script.sample_rate_hz());
+    block.arrival = ecg.arrival(script.time_of(start_, k + kEcgSamplesPerBlock - 1), k);
     block.device_sequence = k;
     block.count = kEcgSamplesPerBlock;
     const Duration since = block.first_sample_time - start_;
-    block.lead_off = stretch_of(settings_.ecg_off, since) != nullptr;
-    for (std::uint32_t i = 0; i < block.count && !block.lead_off; ++i) block.mV[i] = record.mV(from + i);
+    block.lead_off = stretch_of(settings_.ecg_off, since) != nullptr || leads_off(settings_.procedure, since);
+    for (std::uint32_t i = 0; i < block.count && !block.lead_off; ++i) {
+      block.mV[i] = script.mV(k + i);
+      if (!settings_.procedure.empty())
+        block.mV[i] += static_cast<float>(arc_mV(settings_.procedure, settings_.seed, since, k + i));
+    }
     ecg_.push_back(block);
   }
 }
@@ -347,18 +327,15 @@ void Simulation::order_arrivals() {
 
 Expected<Simulation> Simulation::create(const SimulationSettings& settings, const ParallelFor& parallel_for) {
   if (const auto good = check(settings); !good) return tl::unexpected(good.error());
-  const auto record = load_ecg_record(settings.ecg_record);
-  if (!record) return tl::unexpected(record.error());
-  const auto first_sample = start_sample(settings, *record);
-  if (!first_sample) return tl::unexpected(first_sample.error());
+  const auto script = session_ecg(settings);
+  if (!script) return tl::unexpected(script.error());
   auto mesh_H = parse_heart_mesh(embedded_epicardium_fourier_csv(), embedded_epicardium_faces_csv());
   if (!mesh_H) return tl::unexpected(mesh_H.error());
   const HeartMesh mesh_W = transformed(X_WH(), *std::move(mesh_H));
 
   // A host that has been up for an hour or two.
   const Instant start{from_seconds(CounterNoise(settings.seed, kSession).uniform(1, 3600.0, 7200.0))};
-  const HeartMotion motion =
-      heart_motion(settings, *record, SampleTimes(start, *first_sample, record->sample_rate_hz), start);
+  const HeartMotion motion = heart_motion(settings, *script, start);
   const auto view = view_of(mesh_W, motion);
   if (!view) return tl::unexpected(view.error());
   const ScopePath path(settings.seed, view->surface_W + kScopeDistance_mm * view->axis_W, view->centre_W,
@@ -369,13 +346,18 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   for (const Frame& frame : frames) cameras.push_back({frame.stamp.capture, frame.X_WC});
   auto truth = GroundTruth::create(mesh_W, motion, std::move(cameras));
   if (!truth) return tl::unexpected(truth.error());
+  if (!settings.procedure.empty()) {
+    auto organ = OrganMotion::create(organ_moves(settings.procedure, start, {path.X_WR().R, view->surface_W}));
+    if (!organ) return tl::unexpected(organ.error());
+    truth->set_procedure(*std::move(organ), camera_delays(settings.procedure, start));
+  }
   const ScopeSetup setup = settings.setup_seed != 0 ? drawn_setup(settings.setup_seed, settings.width, settings.height)
                                                     : usual_setup(settings.width, settings.height);
   Simulation simulation(settings, start, *std::move(truth), setup, view->surface_W, path);
   simulation.frames_ = std::move(frames);
   simulation.read_tracker();
   simulation.read_second_sensor();
-  simulation.read_ecg(*record, *first_sample);
+  simulation.read_ecg(*script);
   simulation.read_respiration();
   simulation.order_arrivals();
 
@@ -386,8 +368,13 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   const auto& triangles = simulation.truth_.mesh().triangles;
   simulation.texture_ = std::make_unique<const TissueTexture>(view->material_W, triangles, view->centre_W, view->axis_W,
                                                               texture_size, texture_seed, parallel_for);
-  simulation.renderer_ = simulation.renderer_at(Duration(0));
-  if (settings.turn) simulation.turned_renderer_ = simulation.renderer_at(settings.turn->at + settings.turn->length);
+  simulation.renderers_.push_back(simulation.renderer_at(Duration(0)));
+  if (settings.turn) simulation.renderers_.push_back(simulation.renderer_at(settings.turn->at + settings.turn->length));
+  for (const ProcedureEvent& event : settings.procedure.events) {
+    if (std::holds_alternative<ScopeTurn>(event.what)) {
+      simulation.renderers_.push_back(simulation.renderer_at(event.end()));
+    }
+  }
   return simulation;
 }
 
@@ -429,13 +416,13 @@ std::size_t Simulation::pictured(std::size_t index) const noexcept {
 void Simulation::render(std::size_t frame_index, RenderWorkspace& workspace, std::span<std::uint8_t> image) const {
   const std::size_t index = pictured(frame_index);
   const Frame& frame = frames_[index];
-  const Duration since = frame.stamp.capture - start_;
+  const Instant taken = truth_.taken_at(frame.stamp.capture);
+  const Duration since = taken - start_;
   // While it is turned each frame has a lens of its own.
-  const SceneRenderer* held = renderer_.get();
+  const ScopeTurning turns = turning_at(since);
+  const SceneRenderer* held = renderers_[turns.turns].get();
   std::unique_ptr<const SceneRenderer> turning;
-  if (settings_.turn && since >= settings_.turn->at + settings_.turn->length) {
-    held = turned_renderer_.get();
-  } else if (settings_.turn && since > settings_.turn->at) {
+  if (turns.under_way) {
     turning = renderer_at(since);
     held = turning.get();
   }
@@ -446,11 +433,15 @@ void Simulation::render(std::size_t frame_index, RenderWorkspace& workspace, std
   const int instants = settings_.exposure_share > 0.0 ? kInstants : 1;
   const double exposure_s = settings_.exposure_share / settings_.frames_per_s;
   for (int k = 0; k < instants; ++k) {
-    const Instant t = frame.stamp.capture + from_seconds(exposure_s * ((k + 0.5) / instants - 0.5));
-    const Pose X_WC = instants == 1 ? frame.X_WC : path_.X_WC(t - start_);
+    const Instant t = taken + from_seconds(exposure_s * ((k + 0.5) / instants - 0.5));
+    const Pose X_WC = instants == 1 ? frame.X_WC : X_WC_at(t - start_);
     truth_.vertices_at(t, vertices_W);
     renderer.light(X_WC, vertices_W, (frame.X_WC.t - surface_W_).norm(), workspace);
     obstacles_.draw(t - start_, workspace.radiance);
+    if (!settings_.procedure.empty()) {
+      procedure_view_.draw(picture_state(settings_.procedure, t - start_),
+                           {t - start_, X_WC, setup_at(since).lens, index}, workspace.blurred, workspace.radiance);
+    }
     if (instants == 1) break;
     if (k == 0) workspace.exposure.assign(workspace.radiance.size(), 0.0F);
     for (std::size_t i = 0; i < workspace.radiance.size(); ++i) {

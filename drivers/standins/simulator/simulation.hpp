@@ -7,7 +7,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "core/error/expected.hpp"
@@ -18,66 +17,18 @@
 #include "core/time/instant.hpp"
 #include "drivers/standins/simulator/lens.hpp"
 #include "drivers/standins/simulator/parallel_for.hpp"
+#include "drivers/standins/simulator/procedure_view.hpp"
 #include "drivers/standins/simulator/scene_renderer.hpp"
 #include "drivers/standins/simulator/scope_path.hpp"
 #include "drivers/standins/simulator/scope_setup.hpp"
+#include "drivers/standins/simulator/simulation_settings.hpp"
 #include "drivers/standins/simulator/tissue_texture.hpp"
 #include "drivers/standins/simulator/view_obstacles.hpp"
 #include "drivers/standins/truth/ground_truth.hpp"
 
 namespace perimap {
 
-struct EcgRecord;
-
-struct SimulationSettings {
-  std::uint64_t seed = 1;
-  std::uint64_t setup_seed = 0;  // draws scope, tracker and sensor (drawn_setup()); 0: the usual ones
-  Duration duration = std::chrono::seconds(60);
-  int width = 640;   // px
-  int height = 480;  // px
-  double frames_per_s = 30.0;
-  std::string ecg_record = "100";
-  std::optional<Duration> ecg_start;  // of the session, from the record's start; chosen by the seed when not given
-  MotionLaw law = MotionLaw::kLinear;
-  double respiration_mm = 0.0;
-  Duration respiration_period = std::chrono::seconds(4);
-  bool respiration_channel = false;  // a volume channel tells of the breathing
-  double tracker_rate_hz = 100.0;
-  // Time in which the tracker's error falls to 1/e of what it was (Gauss-Markov); 0: new at each reading.
-  Duration tracker_correlation{0};
-  double tracker_dropouts_per_min = 3.0;
-  // From the session's start to begin, and for how long.
-  struct Stretch {
-    Duration begin, length;
-  };
-  std::vector<Stretch> ecg_off;  // the electrode is off, and the device says so
-  // The device gives its last reading, or picture, again and again, with stamps and numbers that go on.
-  std::vector<Stretch> tracker_stuck;
-  std::vector<Stretch> camera_stuck;
-  int camera_repeats = 1;  // each picture comes so often, as of a camera that is slower than its stamps say
-  // What makes seeing hard.
-  double scope_sweep = 1.0;     // see ScopePath
-  double exposure_share = 0.0;  // of the frame period, about the capture: motion blur
-  bool instrument = false;      // see ViewObstacles
-  int glints = 0;
-  double smoke = 0.0;
-  // A field stop leaves a round of the picture: how the scope is held in its camera head at first, and to where it is
-  // turned and zoomed during the session. The objective looks aside as it is turned (turned_setup()). None: all of the
-  // picture is seen.
-  std::optional<ScopeHeld> held;
-  struct Turn {
-    Duration at;  // begins, since the start
-    ScopeHeld to;
-    Duration length = std::chrono::seconds(1);
-  };
-  std::optional<Turn> turn;
-  // A second tracked sensor, on the scope, tells of the turn: the field stop lies outside the picture then.
-  bool second_sensor = false;
-  std::vector<Stretch> second_lost;   // the tracker does not see it
-  std::vector<Stretch> second_stuck;  // its last reading comes again and again
-  bool scope_calibrated =
-      true;  // the recording says what follows from a turn, as `perimap calibrate scope` measures it
-};
+class EcgScript;
 
 // Norms in three dimensions: the standard deviation of one axis is 1 / sqrt(3) of them.
 struct TrackerNoise {
@@ -151,7 +102,7 @@ class Simulation {
     Instant arrival;
     std::size_t reads = 0;  // the stamp whose pose it gives: its own, but for a tracker that is stuck
     bool missing = false;
-    Pose X_WS;                                   // true
+    Pose X_WS;                                   // true, but for what metal or electrosurgery makes of it
     Vector3d position_error = Vector3d::Zero();  // of unit variance per axis
     Vector3d rotation_error = Vector3d::Zero();
   };
@@ -160,6 +111,12 @@ class Simulation {
 
   Simulation(SimulationSettings settings, Instant start, GroundTruth truth, ScopeSetup setup, Vector3d surface_W,
              const ScopePath& path);
+
+  // Where the camera is, whatever its stamps say.
+  [[nodiscard]] Pose X_WC_at(Duration since) const noexcept;
+  // How often the scope has been turned until then, and whether it is being turned.
+  [[nodiscard]] ScopeTurning turning_at(Duration since) const noexcept;
+  [[nodiscard]] bool scope_turns() const noexcept;
 
   // The frame whose picture frames()[index] shows: its own, but for a camera that is stuck.
   [[nodiscard]] std::size_t pictured(std::size_t index) const noexcept;
@@ -170,7 +127,7 @@ class Simulation {
   // What the devices deliver, in the order of arrival at the end.
   void read_tracker();
   void read_second_sensor();
-  void read_ecg(const EcgRecord& record, std::uint32_t first_sample);
+  void read_ecg(const EcgScript& script);
   void read_respiration();
   void order_arrivals();
 
@@ -180,10 +137,11 @@ class Simulation {
   ScopeSetup setup_;
   ScopePath path_;
   ViewObstacles obstacles_;
+  ProcedureView procedure_view_;
   Vector3d surface_W_;  // the point about which the scope moves; exposure is right there
   std::unique_ptr<const TissueTexture> texture_;
-  std::unique_ptr<const SceneRenderer> renderer_;
-  std::unique_ptr<const SceneRenderer> turned_renderer_;  // after the turn, if there is one
+  std::vector<std::unique_ptr<const SceneRenderer>>
+      renderers_;  // of each turn of the scope: before the first, after it ...
   std::vector<Frame> frames_;
   std::vector<TrackerStamp> tracker_stamps_;
   std::vector<TrackerStamp> second_stamps_;  // at the same times

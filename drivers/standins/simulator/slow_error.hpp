@@ -6,7 +6,7 @@
 
 #include "core/geometry/pose.hpp"
 #include "core/time/instant.hpp"
-#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
 
 namespace perimap {
 

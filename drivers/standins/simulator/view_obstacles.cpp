@@ -4,10 +4,10 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <vector>
 
 #include "core/angle/angle.hpp"
-#include "drivers/standins/simulator/counter_noise.hpp"
+#include "drivers/standins/random/counter_noise.hpp"
+#include "drivers/standins/simulator/view_drawing.hpp"
 
 namespace perimap {
 namespace {
@@ -15,19 +15,6 @@ namespace {
 constexpr std::uint64_t kStream = 0x6f627374;
 constexpr double kPeriod_s = 6.0;
 constexpr double kComes_s = 2.0, kGoes_s = 5.0;  // within the period
-
-struct OnShaft {
-  double along = 0.0;   // 0 at its beginning, 1 at the tip
-  double across = 0.0;  // px from its axis, with a sign; beyond the tip the distance from it
-};
-
-OnShaft on_shaft(const Vector2d& from, const Vector2d& tip, const Vector2d& px) noexcept {
-  const Vector2d axis = tip - from;
-  const Vector2d d = px - from;
-  const double along = d.dot(axis) / axis.squaredNorm();
-  if (along > 1.0) return {along, (px - tip).norm()};
-  return {along, (axis.x() * d.y() - axis.y() * d.x()) / axis.norm()};
-}
 
 }  // namespace
 
@@ -67,8 +54,7 @@ ViewObstacles::Shaft ViewObstacles::shaft(double t_s) const noexcept {
 bool ViewObstacles::instrument_covers(const Vector2d& px, Duration since_start, double margin_px) const noexcept {
   const Shaft now = shaft(to_seconds(since_start));
   if (!now.is_in_view) return false;
-  const OnShaft place = on_shaft(now.from, now.tip, px);
-  return place.along >= 0.0 && std::abs(place.across) <= half_width_px_ + margin_px;
+  return ShaftPlace{now.from, now.tip, half_width_px_}.covers(px, margin_px);
 }
 
 void ViewObstacles::draw(Duration since_start, std::span<float> radiance) const {
@@ -78,21 +64,9 @@ void ViewObstacles::draw(Duration since_start, std::span<float> radiance) const 
   draw_smoke(t_s, radiance);
 }
 
-// A cylinder of brushed steel: bright along a line, darker towards its sides.
 void ViewObstacles::draw_shaft(double t_s, std::span<float> radiance) const {
   const Shaft now = shaft(t_s);
-  if (!now.is_in_view) return;
-  for (int row = 0; row < height_; ++row) {
-    for (int column = 0; column < width_; ++column) {
-      const OnShaft place = on_shaft(now.from, now.tip, Vector2d(column, row));
-      const double side = place.across / half_width_px_;
-      if (place.along < 0.0 || std::abs(side) > 1.0) continue;
-      const double round = std::sqrt(1.0 - side * side);
-      const double shine = std::exp(-40.0 * (side + 0.3) * (side + 0.3));
-      radiance[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)] =
-          static_cast<float>(25.0 + 90.0 * round + 150.0 * shine);
-    }
-  }
+  if (now.is_in_view) ViewDrawing(width_, height_).shaft({now.from, now.tip, half_width_px_}, radiance);
 }
 
 void ViewObstacles::draw_glints(double t_s, std::span<float> radiance) const {
@@ -121,51 +95,12 @@ void ViewObstacles::draw_glints(double t_s, std::span<float> radiance) const {
   }
 }
 
-// Scatters the scope's own light back, and dims what lies behind (Koschmieder's law). Clouds are a sum of drifting
-// waves, smooth enough to be worked out on a coarse grid.
 void ViewObstacles::draw_smoke(double t_s, std::span<float> radiance) const {
   constexpr double kSmokePeriod_s = 8.0, kSmoke_s = 5.0;
   const double within = t_s - std::floor(t_s / kSmokePeriod_s) * kSmokePeriod_s;
   if (!(smoke_ > 0.0) || t_s < 0.0 || within > kSmoke_s) return;
   const double strength = smoke_ * std::pow(std::sin(std::numbers::pi * within / kSmoke_s), 2.0);
-  const CounterNoise noise(seed_, kStream + 2);
-  const auto depth_at = [&](double x, double y) {
-    constexpr int kWaves = 6;
-    double sum = 0.0;
-    for (int wave = 0; wave < kWaves; ++wave) {
-      const auto index = 4 * static_cast<std::uint64_t>(wave);
-      const double direction = noise.uniform(index, 0.0, kTwoPi);
-      const double length_px = noise.uniform(index + 1, 0.2, 0.8) * width_;
-      const double rate_hz = noise.uniform(index + 2, 0.1, 0.5);
-      sum += std::sin(kTwoPi * ((std::cos(direction) * x + std::sin(direction) * y) / length_px + rate_hz * t_s) +
-                      noise.uniform(index + 3, 0.0, kTwoPi));
-    }
-    return strength * std::clamp(0.5 + sum / kWaves, 0.0, 1.0);
-  };
-  constexpr int kGrid_px = 16;
-  const int columns = (width_ + kGrid_px - 1) / kGrid_px + 1, rows = (height_ + kGrid_px - 1) / kGrid_px + 1;
-  std::vector<float> transmission;
-  transmission.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      transmission.push_back(static_cast<float>(std::exp(-depth_at(column * kGrid_px, row * kGrid_px))));
-    }
-  }
-  constexpr float kScattered = 190.0F;  // grey levels, of smoke that nothing shines through
-  for (int row = 0; row < height_; ++row) {
-    const float* const above = transmission.data() + static_cast<std::size_t>(row / kGrid_px) * columns;
-    const float* const below = above + columns;
-    const float down = static_cast<float>(row % kGrid_px) / kGrid_px;
-    for (int column = 0; column < width_; ++column) {
-      const int c = column / kGrid_px;
-      const float right = static_cast<float>(column % kGrid_px) / kGrid_px;
-      const float share = (1 - down) * ((1 - right) * above[c] + right * above[c + 1]) +
-                          down * ((1 - right) * below[c] + right * below[c + 1]);
-      float& seen =
-          radiance[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)];
-      seen = share * seen + (1 - share) * kScattered;
-    }
-  }
+  ViewDrawing(width_, height_).clouds(seed_, strength, t_s, radiance);
 }
 
 }  // namespace perimap

@@ -31,6 +31,22 @@ void GroundTruth::vertices_at(Instant t, std::span<Vector3d> out) const {
   vertex_positions(mesh_, basis, out);
   const Vector3d breathing = respiration_displacement(motion_, t);
   for (Vector3d& p : out) p += breathing;
+  if (organ_.empty()) return;
+  const OrganPlace place = organ_.at(t);
+  for (std::uint32_t vertex = 0; vertex < mesh_.vertex_count; ++vertex) {
+    out[vertex] = place.of(out[vertex], rest(vertex));
+  }
+}
+
+void GroundTruth::set_procedure(OrganMotion organ, std::vector<Drift> camera_delays) {
+  organ_ = std::move(organ);
+  camera_delays_ = std::move(camera_delays);
+}
+
+Vector3d GroundTruth::rest(std::uint32_t vertex) const noexcept {
+  const std::size_t axis = mesh_.coefficients_per_axis();
+  const double* const series = mesh_.coefficients_mm.data() + 3 * axis * vertex;
+  return {series[0], series[axis], series[2 * axis]};
 }
 
 SurfaceView GroundTruth::view(const Pose& X_WC, Instant t) const {
@@ -47,10 +63,20 @@ std::optional<SurfacePoint> GroundTruth::first_hit(const Pose& X_WC, const Vecto
 
 Vector3d GroundTruth::position(const SurfacePoint& point, Instant t) const {
   const auto basis = fourier_basis(phase(t).phase_rad, mesh_.harmonics);
-  Vector3d p = respiration_displacement(motion_, t);
+  const Vector3d breathing = respiration_displacement(motion_, t);
+  const std::uint32_t* const corners = mesh_.triangles.data() + 3 * std::size_t{point.triangle};
+  if (organ_.empty()) {
+    Vector3d p = breathing;
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      p += point.barycentric[corner] * vertex_position(mesh_, basis, corners[corner]);
+    }
+    return p;
+  }
+  const OrganPlace place = organ_.at(t);
+  Vector3d p = Vector3d::Zero();
   for (std::size_t corner = 0; corner < 3; ++corner) {
-    p += point.barycentric[corner] *
-         vertex_position(mesh_, basis, mesh_.triangles[3 * std::size_t{point.triangle} + corner]);
+    const Vector3d beating = vertex_position(mesh_, basis, corners[corner]) + breathing;
+    p += point.barycentric[corner] * place.of(beating, rest(corners[corner]));
   }
   return p;
 }

@@ -9,8 +9,10 @@
 #include "core/error/expected.hpp"
 #include "core/geometry/pose.hpp"
 #include "core/time/instant.hpp"
+#include "drivers/standins/truth/drift.hpp"
 #include "drivers/standins/truth/heart_mesh.hpp"
 #include "drivers/standins/truth/heart_motion.hpp"
+#include "drivers/standins/truth/organ_motion.hpp"
 #include "drivers/standins/truth/surface_view.hpp"
 
 namespace perimap {
@@ -31,12 +33,20 @@ class GroundTruth {
   [[nodiscard]] static Expected<GroundTruth> create(HeartMesh mesh_W, HeartMotion motion,
                                                     std::vector<CameraTruth> cameras = {});
 
+  // What is done to the organ, and to the camera's delay; nothing at first.
+  void set_procedure(OrganMotion organ, std::vector<Drift> camera_delays);
+
   [[nodiscard]] const HeartMesh& mesh() const noexcept { return mesh_; }
   [[nodiscard]] const HeartMotion& motion() const noexcept { return motion_; }
   [[nodiscard]] MotionPhase phase(Instant t) const noexcept { return motion_phase(motion_, t); }
 
   // True pose of the camera in the frame captured at exactly this instant.
   [[nodiscard]] std::optional<Pose> camera_pose(Instant capture) const noexcept;
+  [[nodiscard]] const OrganMotion& organ() const noexcept { return organ_; }
+  [[nodiscard]] const std::vector<Drift>& camera_delays() const noexcept { return camera_delays_; }
+  // When the picture was really taken that is stamped so: of that instant is what it shows, and its camera's pose.
+  [[nodiscard]] Instant taken_at(Instant capture) const noexcept { return capture - drifted(camera_delays_, capture); }
+
   // All that is true of it; null where there was no frame.
   [[nodiscard]] const CameraTruth* camera(Instant capture) const noexcept;
 
@@ -56,9 +66,14 @@ class GroundTruth {
   GroundTruth(HeartMesh mesh_W, HeartMotion motion, std::vector<CameraTruth> cameras) noexcept
       : mesh_(std::move(mesh_W)), motion_(std::move(motion)), cameras_(std::move(cameras)) {}
 
+  // Of a vertex without its beating.
+  [[nodiscard]] Vector3d rest(std::uint32_t vertex) const noexcept;
+
   HeartMesh mesh_;
   HeartMotion motion_;
   std::vector<CameraTruth> cameras_;
+  OrganMotion organ_;
+  std::vector<Drift> camera_delays_;
 };
 
 }  // namespace perimap

@@ -1,6 +1,8 @@
 #include "drivers/standins/truth/truth_messages.hpp"
 
 #include <cmath>
+#include <string>
+#include <utility>
 
 namespace perimap {
 
@@ -57,6 +59,59 @@ perimap_TruthCamera to_truth_camera(const CameraTruth& camera) noexcept {
   for (int axis = 0; axis < 2; ++axis) message.principal_point_px[axis] = camera.principal_px[axis];
   message.scope_rotation_rad = camera.scope_rotation_rad;
   return message;
+}
+
+perimap_TruthProcedure borrow_truth_procedure(const GroundTruth& truth, ProcedureBuffers& buffers) {
+  buffers = {};
+  for (const OrganMove& move : truth.organ().moves()) {
+    perimap_TruthOrganMove message{};
+    message.kind = static_cast<std::uint8_t>(move.kind);
+    message.begin_time_ns = to_ns(move.begin);
+    message.end_time_ns = to_ns(move.end);
+    message.stretch = move.stretch;
+    message.radius_mm = move.radius_mm;
+    for (int axis = 0; axis < 3; ++axis) {
+      message.translation_W_mm[axis] = move.translation_mm[axis];
+      message.rotation_W_rad[axis] = move.rotation_rad[axis];
+      message.pivot_W_mm[axis] = move.pivot_mm[axis];
+    }
+    buffers.moves.push_back(message);
+  }
+  for (const Drift& drift : truth.camera_delays()) {
+    buffers.delays.push_back({to_ns(drift.begin), to_ns(drift.end), drift.to.count()});
+  }
+  perimap_TruthProcedure message{};
+  message.organ_moves._buffer = buffers.moves.data();
+  message.organ_moves._length = message.organ_moves._maximum = static_cast<std::uint32_t>(buffers.moves.size());
+  message.camera_delays._buffer = buffers.delays.data();
+  message.camera_delays._length = message.camera_delays._maximum = static_cast<std::uint32_t>(buffers.delays.size());
+  return message;
+}
+
+Expected<void> set_procedure(const perimap_TruthProcedure& message, GroundTruth& truth) {
+  std::vector<OrganMove> moves;
+  for (std::uint32_t i = 0; i < message.organ_moves._length; ++i) {
+    const perimap_TruthOrganMove& recorded = message.organ_moves._buffer[i];
+    if (recorded.kind >= OrganMove::kKinds) return fail("organ motion: move " + std::to_string(i) + " is of no kind");
+    moves.push_back({static_cast<OrganMove::Kind>(recorded.kind), from_ns(recorded.begin_time_ns),
+                     from_ns(recorded.end_time_ns), Vector3d(recorded.translation_W_mm),
+                     Vector3d(recorded.rotation_W_rad), recorded.stretch, Vector3d(recorded.pivot_W_mm),
+                     recorded.radius_mm});
+  }
+  auto organ = OrganMotion::create(std::move(moves));
+  if (!organ) return tl::unexpected(organ.error());
+  std::vector<Drift> delays;
+  for (std::uint32_t i = 0; i < message.camera_delays._length; ++i) {
+    const perimap_TruthDelay& recorded = message.camera_delays._buffer[i];
+    const Drift drift{from_ns(recorded.begin_time_ns), from_ns(recorded.end_time_ns), Duration(recorded.to_ns)};
+    const bool in_order = drift.end > drift.begin && (delays.empty() || drift.begin >= delays.back().end);
+    if (!in_order || std::abs(to_seconds(drift.to)) > 1.0) {
+      return fail("camera delay " + std::to_string(i) + ": it is not in order, or more than a second");
+    }
+    delays.push_back(drift);
+  }
+  truth.set_procedure(std::move(*organ), std::move(delays));
+  return {};
 }
 
 Expected<HeartMesh> heart_mesh(const perimap_TruthMesh& message) {

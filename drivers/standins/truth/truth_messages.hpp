@@ -2,6 +2,7 @@
 #pragma once
 
 #include <perimap.h>
+#include <perimap_procedure.h>
 
 #include <cstdint>
 #include <vector>
@@ -18,6 +19,17 @@ namespace perimap {
 [[nodiscard]] perimap_TruthMotion borrow_truth_motion(const HeartMotion& motion, std::vector<std::int64_t>& r_peaks_ns);
 
 [[nodiscard]] perimap_TruthCamera to_truth_camera(const CameraTruth& camera) noexcept;
+
+// What TruthProcedure borrows: it must outlive the message, which must not be freed.
+struct ProcedureBuffers {
+  std::vector<perimap_TruthOrganMove> moves;
+  std::vector<perimap_TruthDelay> delays;
+};
+[[nodiscard]] perimap_TruthProcedure borrow_truth_procedure(const GroundTruth& truth, ProcedureBuffers& buffers);
+
+// Into a truth that has its mesh and motion. Checked as an organ's motion must be; delays are in order and below a
+// second.
+[[nodiscard]] Expected<void> set_procedure(const perimap_TruthProcedure& message, GroundTruth& truth);
 
 // Checked as a mesh or motion must be; the error names what is wrong.
 [[nodiscard]] Expected<HeartMesh> heart_mesh(const perimap_TruthMesh& message);
