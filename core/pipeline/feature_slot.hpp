@@ -115,7 +115,7 @@ struct BatchStartExchange {
 };
 
 // A feature as it is followed in the images. Another one is another value.
-struct FollowedFeature {
+struct TrackedFeature {
   std::uint32_t id = 0;
   Instant first_observed;
   Vector2d first_observed_px = Vector2d::Zero();
@@ -163,7 +163,7 @@ struct MappedFeature {
 
 // What a slot knows of its feature is in the three values, and the slot passes from one state to the next by assigning
 // them whole: what one of them comes to hold later can not be left behind by the feature before.
-struct FeatureSlot : FollowedFeature, GatheredMatches, MappedFeature {
+struct FeatureSlot : TrackedFeature, GatheredMatches, MappedFeature {
   SlotState state = SlotState::kEmpty;
   bool forgotten = false;  // while starting: to be emptied when housekeeping has given the start back
 
@@ -178,8 +178,8 @@ struct FeatureSlot : FollowedFeature, GatheredMatches, MappedFeature {
     follow({});
     state = SlotState::kEmpty;
   }
-  void follow(const FollowedFeature& feature) noexcept {
-    static_cast<FollowedFeature&>(*this) = feature;
+  void follow(const TrackedFeature& feature) noexcept {
+    static_cast<TrackedFeature&>(*this) = feature;
     gather_anew();
     forgotten = false;
   }

@@ -215,7 +215,9 @@ TEST_F(Keeping, AFeatureHasNothingOfTheOneThatTheSlotHadBefore) {
   slot.held.push({});
   static_cast<void>(slot.health.add(9.0, true));
   keeping->forget();
-  slot.follow({.id = 77});
+  TrackedFeature begun;
+  begun.id = 77;
+  slot.follow(begun);
   const FeatureSlot fresh;
   EXPECT_EQ(slot.state, SlotState::kTracked);
   EXPECT_EQ(slot.id, 77U);

@@ -46,7 +46,7 @@ class SessionRecording : public ::testing::Test {
 
   std::unique_ptr<SessionRecorder> recorder(std::size_t memory = kMemory) const {
     auto created =
-        SessionRecorder::create(file_, {"test", "test", "tracker", {}, "camera_matrix", "version = 1\n"}, memory);
+        SessionRecorder::create(file_, {"test", "test", "tracker", {}, {}, "camera_matrix", "version = 1\n"}, memory);
     EXPECT_TRUE(created) << created.error().message;
     return std::move(*created);
   }
@@ -120,7 +120,7 @@ Counts read(const std::filesystem::path& file, ReadMode mode = ReadMode::kStrict
 }
 
 TEST_F(SessionRecording, OtherToolsHaveChannelsOfTheirOwnThatAReplayPassesOver) {
-  SensorRecordingFacts facts{"test", "test", "tracker", {}, "camera_matrix", "version = 1\n"};
+  SensorRecordingFacts facts{"test", "test", "tracker", {}, {}, "camera_matrix", "version = 1\n"};
   facts.tools = {"tracker/reference", "tracker/pointer"};
   {
     auto session = SessionRecorder::create(file_, facts, kMemory);
@@ -382,7 +382,7 @@ TEST_F(SessionRecording, ACrashLeavesWhatWasWrittenReadable) {
 }
 
 TEST_F(SessionRecording, IsEndedWholeAndBegunAnewInAnotherFileWhileTheDevicesGoOn) {
-  const SensorRecordingFacts facts{"test", "test", "tracker", {}, "camera_matrix", "version = 1\n"};
+  const SensorRecordingFacts facts{"test", "test", "tracker", {}, {}, "camera_matrix", "version = 1\n"};
   SessionRecorder session(kMemory);
   session.start(threads);
   EXPECT_FALSE(session.summary().asked);
