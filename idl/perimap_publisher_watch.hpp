@@ -11,8 +11,11 @@
 // (dds_sample_info_t::publication_handle; 0 where it is not known), and by the run that each sample names. Nothing is
 // used until for one second all that was heard was of one writer and one run, with sequence numbers and times that
 // follow upon each other: not at the beginning, not after a restart, and not of either of two publishers, however long
-// both of them go on. A false publisher that is alone from the beginning can not be told from a true one by this: for
-// that there is DDS Security.
+// both of them go on; nor for a second after perimapd has said itself that there are two. A topic that is heard for the
+// first time is listened to by itself.
+//
+// A false publisher that is alone from the beginning can not be told from a true one by this, nor one that forges DDS' own
+// identities (GUIDs) below DDS: for that there is DDS Security.
 #pragma once
 
 #include <perimap.h>
@@ -76,8 +79,14 @@ class PublisherWatch {
                 std::isfinite(sample.cardiac_phase_rad) && std::isfinite(sample.cardiac_phase_rate_rad_per_s), now_ns);
   }
   Hearing hear(const perimap_Status& sample, std::uint64_t writer, std::int64_t now_ns) noexcept {
-    return hear({sample.run_id, kStatuses, writer}, {of_clock(sample.stream), sample.sample_sequence, sample.time_ns},
-                true, now_ns);
+    hear({sample.run_id, kStatuses, writer}, {of_clock(sample.stream), sample.sample_sequence, sample.time_ns}, true,
+         now_ns);
+    // What perimapd itself has noticed, be it in a topic that is not listened to here.
+    if (sample.two_publishers) {
+      alone_since_ns_ = now_ns;
+      why_not_ = Hearing::kTwoPublishers;
+    }
+    return state(now_ns);
   }
 
   // What holds at `now_ns`, without another sample.
@@ -87,6 +96,7 @@ class PublisherWatch {
 
  private:
   enum Topic : std::size_t { kSurfaces, kModels, kMeshes, kPhases, kStatuses, kTopics };
+  static constexpr std::int64_t kMeshAlone_ns = 3 * kAlone_ns;  // one comes a second
   static constexpr std::size_t kRemembered = 4;
   static constexpr std::int64_t kForgotten_ns = 60 * kAlone_ns;
   static constexpr std::int64_t kTimeSlack_ns = 5'000'000'000;
@@ -200,12 +210,17 @@ class PublisherWatch {
     } else if (!current_.is(sender)) {
       change_to(sender, now_ns);
     }
+    // Whoever knows the run can be the first to send in a topic of it.
+    if (current_.writers[sender.topic] == 0) topic_since_ns_[sender.topic] = now_ns;
     current_.take(sender, now_ns);
     if (!follows(sender.topic, place, now_ns) || !plausible_by_itself) {
       if (why_not_ != Hearing::kTwoPublishers || state(now_ns) == Hearing::kUse) why_not_ = Hearing::kImplausible;
       alone_since_ns_ = now_ns;
     }
-    return state(now_ns);
+    const Hearing heard = state(now_ns);
+    const std::int64_t alone_ns = sender.topic == kMeshes ? kMeshAlone_ns : kAlone_ns;
+    if (heard == Hearing::kUse && now_ns - topic_since_ns_[sender.topic] < alone_ns) return Hearing::kListening;
+    return heard;
   }
 
   void change_to(const Sender& sender, std::int64_t now_ns) noexcept {
@@ -224,8 +239,8 @@ class PublisherWatch {
     } else if (settled || why_not_ != Hearing::kTwoPublishers) {
       why_not_ = Hearing::kAnotherBegan;
     }
-    // Until then it was not this one that was heard.
-    if (current_.heard_ns > alone_since_ns_) alone_since_ns_ = current_.heard_ns;
+    // Not since the other one was heard last: who asks may have paused, and that one have gone on.
+    alone_since_ns_ = now_ns;
     others_[next_other_++ % kRemembered] = current_;
     current_ = next;
     lanes_.fill({});
@@ -237,6 +252,7 @@ class PublisherWatch {
   std::size_t next_other_ = 0;
   std::int64_t alone_since_ns_ = 0;  // since then all that was heard was of the current one, and followed
   Hearing why_not_ = Hearing::kListening;
+  std::array<std::int64_t, kTopics> topic_since_ns_{};  // since then its writer is known
   std::array<Lane, 2 * kTopics> lanes_{};
 };
 

@@ -229,6 +229,16 @@ Expected<fs::path> Authority::issue(KeyRole role, const std::string& name, const
     return fail(fmt::format("{}: is there already (--renew makes new keys there)", folder.string()));
   }
   const RoleRights& rights = rights_of(role);
+  const auto before = fs::exists(folder, error) ? issued() : std::vector<Issued>();
+  if (!before) return tl::unexpected(before.error());
+  for (const Issued& one : *before) {
+    // What it could do before it could go on to do.
+    if (one.facts.name == name && one.facts.role != rights.name && !one.revoked &&
+        one.facts.validity.until > validity.from) {
+      return fail(fmt::format("'{}': has keys of a {} that hold; revoke them first (perimap keys revoke {})", name,
+                              one.facts.role, name));
+    }
+  }
   const Validity own = facts().validity;
   if (validity.from >= own.until) return fail(fmt::format("the authority itself has ended {}", utc_text(own.until)));
   const Validity held{validity.from, std::min(validity.until, own.until)};
@@ -289,8 +299,11 @@ Expected<std::size_t> Authority::revoke(const std::string& name, std::chrono::sy
   if (error) return fail(fmt::format("{}: {}", (folder_ / kOwnFolder / kIssued).string(), error.message()));
   if (known == 0)
     return fail(fmt::format("'{}': nothing was issued under this name (perimap keys show tells what was)", name));
-  if (added == 0) return added;
-  if (X509_CRL_set1_lastUpdate(revoked_.get(), asn1_time(now).get()) != 1 || !sign_revocations(*revoked_, *key_)) {
+  // Written all the same: the time before it may not have come to an end.
+  if (added == 0) return write_revoked().map([] { return std::size_t{0}; });
+  // Clocks of two machines differ.
+  if (X509_CRL_set1_lastUpdate(revoked_.get(), asn1_time(now - std::chrono::minutes(5)).get()) != 1 ||
+      !sign_revocations(*revoked_, *key_)) {
     return openssl::failure("the list of revoked certificates cannot be signed");
   }
   return write_revoked().map([added] { return added; });
@@ -321,8 +334,10 @@ Expected<void> Authority::write_revoked() const {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder_, error)) {
     const fs::path list = entry.path() / dds::key_files::kRevoked;
-    if (written && fs::exists(list, error)) written = write_text_file(list, *pem);
+    std::error_code ignored;
+    if (written && fs::exists(list, ignored)) written = write_text_file(list, *pem);
   }
+  if (error) return fail(fmt::format("{}: {}", folder_.string(), error.message()));
   return written;
 }
 

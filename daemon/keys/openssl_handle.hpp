@@ -35,6 +35,11 @@ using SignedMessage = std::unique_ptr<PKCS7, Free<&PKCS7_free>>;
 using Extension = std::unique_ptr<X509_EXTENSION, Free<&X509_EXTENSION_free>>;
 using Revoked = std::unique_ptr<X509_REVOKED, Free<&X509_REVOKED_free>>;
 using Number = std::unique_ptr<BIGNUM, Free<&BN_free>>;
+// Not of the certificates in it.
+struct FreeList {
+  void operator()(STACK_OF(X509) * list) const noexcept { sk_X509_free(list); }
+};
+using Certificates = std::unique_ptr<STACK_OF(X509), FreeList>;
 using Time = std::unique_ptr<ASN1_TIME, Free<&ASN1_TIME_free>>;
 
 // Of the call before, in OpenSSL's words.

@@ -43,9 +43,9 @@ std::string governance_xml() {
          std::string(kDomains) +
          "      <allow_unauthenticated_participants>false</allow_unauthenticated_participants>\n"
          "      <enable_join_access_control>true</enable_join_access_control>\n"
-         "      <discovery_protection_kind>ENCRYPT</discovery_protection_kind>\n"
-         "      <liveliness_protection_kind>ENCRYPT</liveliness_protection_kind>\n"
-         "      <rtps_protection_kind>ENCRYPT</rtps_protection_kind>\n"
+         "      <discovery_protection_kind>ENCRYPT_WITH_ORIGIN_AUTHENTICATION</discovery_protection_kind>\n"
+         "      <liveliness_protection_kind>ENCRYPT_WITH_ORIGIN_AUTHENTICATION</liveliness_protection_kind>\n"
+         "      <rtps_protection_kind>ENCRYPT_WITH_ORIGIN_AUTHENTICATION</rtps_protection_kind>\n"
          "      <topic_access_rules>\n"
          "        <topic_rule>\n"
          "          <topic_expression>*</topic_expression>\n"

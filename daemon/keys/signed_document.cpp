@@ -26,8 +26,12 @@ Expected<std::string> verified_document(std::string_view message, X509& authorit
   X509_STORE_add_cert(store.get(), &authority);
   // Whether the authority's own certificate has expired is told by itself.
   X509_STORE_set_flags(store.get(), X509_V_FLAG_NO_CHECK_TIME);
+  // By the authority itself: whom it has let in must not sign in its name, whatever the message brings along.
+  const openssl::Certificates signers(sk_X509_new_null());
+  if (!signers || sk_X509_push(signers.get(), &authority) <= 0) return openssl::failure(told_as);
   const openssl::Bio document = openssl::memory();
-  if (PKCS7_verify(signed_message.get(), nullptr, store.get(), clear.get(), document.get(), PKCS7_TEXT) != 1) {
+  if (PKCS7_verify(signed_message.get(), signers.get(), store.get(), clear.get(), document.get(),
+                   PKCS7_TEXT | PKCS7_NOINTERN) != 1) {
     return openssl::failure(told_as + ": is not signed by this authority, or was changed since");
   }
   return openssl::text_of(document);

@@ -110,8 +110,10 @@ void SampleReceiver::receive() {
       }
       statistics_.add(surface, receipt, writer);
     });
-    receive_samples(readers_.statuses, receipt,
-                    [&](const perimap_Status& status, std::uint64_t /*writer*/) { statistics_.add(status); });
+    receive_samples(readers_.statuses, receipt, [&](const perimap_Status& status, std::uint64_t writer) {
+      statistics_.hear(status, receipt, writer);
+      statistics_.add(status);
+    });
     if (recorder_) {
       receive_samples(readers_.models, receipt, [](const perimap_SurfaceModel&, std::uint64_t) {});
       receive_samples(readers_.meshes, receipt, [](const perimap_SurfaceMesh&, std::uint64_t) {});

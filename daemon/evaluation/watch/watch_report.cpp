@@ -85,7 +85,8 @@ std::string stage_table(const StatusDigest& status) {
 }
 
 bool at_odds(client::Hearing hearing) {
-  return hearing == client::Hearing::kTwoPublishers || hearing == client::Hearing::kImplausible;
+  return hearing == client::Hearing::kTwoPublishers || hearing == client::Hearing::kImplausible ||
+         hearing == client::Hearing::kAnotherBegan;
 }
 
 std::string_view publishers_of(client::Hearing hearing) {

@@ -63,8 +63,8 @@ void WatchStatistics::add(const perimap_Surface& surface, Instant receipt, std::
     tally->latency.add(receipt - from_ns(surface.capture_time_ns));
     tally->lateness.add(std::max(receipt - release, Duration(0)));
     tally->contested += contested ? 1 : 0;
-    // Of two at once, what is missing or began anew would mean nothing.
-    if (stream.hearing == client::Hearing::kTwoPublishers) continue;
+    // Of two at once, what is missing or began anew would mean nothing; nor do numbers that jump.
+    if (stream.hearing == client::Hearing::kTwoPublishers || (contested && !restarted)) continue;
     if (restarted) {
       ++tally->restarts;
     } else if (!first) {
@@ -79,6 +79,10 @@ void WatchStatistics::add(const perimap_Surface& surface, Instant receipt, std::
   stream.last_release = release;
   std::copy_n(surface.run_id, stream.last_run.size(), stream.last_run.begin());
   stream.last = digest(surface);
+}
+
+void WatchStatistics::hear(const perimap_Status& status, Instant receipt, std::uint64_t writer) {
+  static_cast<void>(publishers_[status.source].hear(status, writer, to_ns(receipt)));
 }
 
 void WatchStatistics::add(const perimap_Status& status) {

@@ -61,6 +61,8 @@ class WatchStatistics {
   // `writer`: what tells one from another, as dds_sample_info_t::publication_handle.
   void add(const perimap_Surface& surface, Instant receipt, std::uint64_t writer = 0);
   void add(const perimap_Status& status);
+  // What it says of its publisher: in which run, and whether there are two.
+  void hear(const perimap_Status& status, Instant receipt, std::uint64_t writer);
 
   [[nodiscard]] std::uint64_t surfaces() const noexcept { return surfaces_; }
 

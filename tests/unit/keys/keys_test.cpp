@@ -14,6 +14,7 @@
 #include "daemon/keys/authority.hpp"
 #include "daemon/keys/expiry_news.hpp"
 #include "daemon/keys/key_folder.hpp"
+#include "daemon/keys/signed_document.hpp"
 
 namespace perimap {
 namespace {
@@ -163,6 +164,40 @@ TEST_F(Keys, AreRenewedOnRequestAlone) {
   EXPECT_NE(text(keys / dds::key_files::kCertificate), before);
   EXPECT_EQ(refusal(keys), "in order");
   EXPECT_EQ(by.revoke("d", kNow).value_or(0), 2U) << "both of that name";
+}
+
+TEST_F(Keys, OfAnotherRoleAreMadeWhenThoseOfBeforeAreRevoked) {
+  Authority by = authority();
+  const fs::path keys = issued(by, KeyRole::kPublisher, "p");
+  EXPECT_THAT(by.issue(KeyRole::kDisplay, "p", lasting(days(5)), true).error().message,
+              HasSubstr("has keys of a publisher that hold; revoke them first"));
+  ASSERT_TRUE(by.revoke("p", kNow));
+  ASSERT_TRUE(by.issue(KeyRole::kDisplay, "p", lasting(days(5)), true));
+  EXPECT_EQ(refusal(keys), "in order");
+}
+
+TEST_F(Keys, ARevocationThatIsRepeatedIsWrittenAgain) {
+  Authority by = authority();
+  const fs::path lost = issued(by, KeyRole::kDisplay, "lost");
+  const std::string before = text(lost / dds::key_files::kRevoked);
+  ASSERT_TRUE(by.revoke("lost", kNow));
+  std::ofstream(lost / dds::key_files::kRevoked, std::ios::binary) << before;  // as after half of it
+  ASSERT_EQ(refusal(lost), "in order");
+  EXPECT_EQ(by.revoke("lost", kNow).value_or(9), 0U);
+  EXPECT_THAT(refusal(lost), HasSubstr("is revoked"));
+}
+
+// Governance by somebody whom the authority has let in: a chain that ends there is not enough.
+TEST_F(Keys, ADocumentThatAMemberHasSignedIsRefused) {
+  Authority by = authority();
+  const fs::path keys = issued(by, KeyRole::kDisplay, "d");
+  const auto certificate = parse_certificate(text(keys / dds::key_files::kCertificate), "d");
+  const auto key = parse_key(text(keys / dds::key_files::kKey), "d");
+  ASSERT_TRUE(certificate && key);
+  const auto forged = sign_document(governance_xml(), **certificate, **key);
+  ASSERT_TRUE(forged);
+  std::ofstream(keys / dds::key_files::kGovernance, std::ios::binary) << *forged;
+  EXPECT_THAT(refusal(keys), HasSubstr("governance.p7s: is not signed by this authority"));
 }
 
 TEST_F(Keys, OfAnotherAuthorityAreRefusedFileByFile) {

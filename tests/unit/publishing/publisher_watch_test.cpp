@@ -68,16 +68,62 @@ TEST_F(Watching, OnePublisherIsUsed) {
   EXPECT_EQ(watch_.state(now_), Hearing::kUse);
 }
 
-TEST_F(Watching, ARestartIsUsedOneSecondAfterTheRunBeforeWasHeardLast) {
+TEST_F(Watching, ARestartIsUsedASecondAfterItBegan) {
   Program again(2, 22);
   EXPECT_EQ(again.speak(watch_, now_ + 400 * kMs), Hearing::kAnotherBegan);
-  EXPECT_EQ(again.speak_for(watch_, now_ + 416 * kMs, now_ + 960 * kMs), Hearing::kAnotherBegan);
-  EXPECT_EQ(again.speak(watch_, now_ + 1'010 * kMs), Hearing::kUse);
+  EXPECT_EQ(again.speak_for(watch_, now_ + 416 * kMs, now_ + 1'390 * kMs), Hearing::kAnotherBegan);
+  EXPECT_EQ(again.speak(watch_, now_ + 1'410 * kMs), Hearing::kUse);
 }
 
-TEST_F(Watching, ARestartAfterALongSilenceIsUsedAtOnce) {
-  Program again(2, 22);
-  EXPECT_EQ(again.speak(watch_, now_ + 5'000 * kMs), Hearing::kUse);
+// Who asks may have been busy: that nothing was heard does not say that nothing was sent.
+TEST_F(Watching, AfterAPauseAnotherIsNotUsedAtOnce) {
+  Program b(2, 22);
+  EXPECT_EQ(b.speak(watch_, now_ + 30'000 * kMs), Hearing::kAnotherBegan);
+  EXPECT_EQ(a_.speak(watch_, now_ + 30'001 * kMs), Hearing::kTwoPublishers);
+}
+
+// A reader of depth 16, taken once in two seconds: the samples of both at one instant, in turn.
+TEST_F(Watching, OfTwoThatComeInOneBatchNoneOfTheSecondIsUsed) {
+  Program b(2, 22);
+  for (int batch = 1; batch < 20; ++batch) {
+    const std::int64_t t = now_ + batch * 2'000 * kMs;
+    for (int i = 0; i < 16; ++i) {
+      EXPECT_NE(b.speak(watch_, t), Hearing::kUse) << batch << ", " << i;
+      EXPECT_NE(a_.speak(watch_, t), Hearing::kUse) << batch << ", " << i;
+    }
+  }
+}
+
+// The run is public: whoever copies it can be the first in a topic that has not been heard yet.
+TEST_F(Watching, AForgedFirstSampleOfANewTopicIsNotUsedAndToldWhenTheTrueOneComes) {
+  perimap_SurfaceMesh forged{};
+  forged.run_id[0] = 1;
+  perimap_SurfaceMesh mesh = forged;
+  for (int i = 1; i < 60; ++i) {
+    const std::int64_t now = now_ + i * kPeriod;
+    EXPECT_EQ(a_.speak(watch_, now), Hearing::kUse) << "what was known goes on";
+    if (i % 10 != 0) continue;
+    ++forged.sample_sequence;
+    forged.time_ns = now;
+    EXPECT_EQ(watch_.hear(forged, 99, now), Hearing::kListening);
+  }
+  ++mesh.sample_sequence;
+  mesh.time_ns = now_ + 961 * kMs;
+  EXPECT_NE(watch_.hear(mesh, 14, now_ + 961 * kMs), Hearing::kUse);
+  EXPECT_NE(watch_.hear(forged, 99, now_ + 962 * kMs), Hearing::kUse);
+  EXPECT_EQ(watch_.state(now_ + 962 * kMs), Hearing::kTwoPublishers);
+}
+
+TEST_F(Watching, WhatPerimapdItselfSaysOfTwoCounts) {
+  perimap_Status status{};
+  status.run_id[0] = 1;
+  status.sample_sequence = 1;
+  status.time_ns = now_;
+  status.two_publishers = true;
+  EXPECT_EQ(watch_.hear(status, 13, now_), Hearing::kTwoPublishers);
+  EXPECT_EQ(a_.speak(watch_, now_ + kPeriod), Hearing::kTwoPublishers);
+  EXPECT_EQ(a_.speak_for(watch_, now_ + 2 * kPeriod, now_ + 990 * kMs), Hearing::kTwoPublishers);
+  EXPECT_EQ(a_.speak(watch_, now_ + 1'010 * kMs), Hearing::kUse);
 }
 
 // Whatever the second one copies: its own run, the run of the first, its sequence numbers.
@@ -205,19 +251,22 @@ TEST_F(Watching, TheTopicsOfOneProgramAreOnePublisherAndAForgedModelIsNoticedBes
     model.valid_from_ns = now;
     model.valid_until_ns = now + 1;
   };
-  for (int i = 1; i < 50; ++i) {
+  for (int i = 1; i <= 400; ++i) {
     const std::int64_t now = now_ + i * 10 * kMs;
     next(now);
+    const auto settled = [&](std::int64_t since_ms) {
+      return 10 * (i - 1) >= since_ms ? Hearing::kUse : Hearing::kListening;
+    };
     EXPECT_EQ(a_.speak(watch_, now), Hearing::kUse);
-    EXPECT_EQ(watch_.hear(model, 12, now), Hearing::kUse);
-    EXPECT_EQ(watch_.hear(status, 13, now), Hearing::kUse);
-    EXPECT_EQ(watch_.hear(mesh, 14, now), Hearing::kUse);
+    EXPECT_EQ(watch_.hear(model, 12, now), settled(1'000)) << i;
+    EXPECT_EQ(watch_.hear(status, 13, now), Hearing::kUse) << "it has no positions";
+    EXPECT_EQ(watch_.hear(mesh, 14, now), settled(3'000)) << i;
   }
-  next(now_ + 500 * kMs);
+  next(now_ + 4'005 * kMs);
   perimap_SurfaceModel forged = model;
-  EXPECT_NE(watch_.hear(forged, 99, now_ + 500 * kMs), Hearing::kUse);
-  EXPECT_NE(watch_.hear(model, 12, now_ + 501 * kMs), Hearing::kUse);
-  EXPECT_EQ(watch_.state(now_ + 502 * kMs), Hearing::kTwoPublishers);
+  EXPECT_NE(watch_.hear(forged, 99, now_ + 4'005 * kMs), Hearing::kUse);
+  EXPECT_NE(watch_.hear(model, 12, now_ + 4'006 * kMs), Hearing::kUse);
+  EXPECT_EQ(watch_.state(now_ + 4'007 * kMs), Hearing::kTwoPublishers);
 }
 
 TEST(PublisherWatchWords, AreThereForEveryAnswer) {

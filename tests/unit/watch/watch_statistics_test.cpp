@@ -227,6 +227,26 @@ TEST_F(TwoPublishers, AreToldAsSuchAndNotAsLossesAndRestarts) {
   EXPECT_THAT(report_json(report, ReportKind::kSummary), HasSubstr("\"contested\":599,\"publishers\":\"two\""));
 }
 
+TEST_F(TwoPublishers, OneSequenceNumberThatJumpsIsNoLossOfMillions) {
+  for (int i = 0; i < 300; ++i) hear(1, 11, static_cast<std::uint64_t>(i), begin_ + milliseconds(16 * i));
+  hear(1, 11, 14'000'000, begin_ + milliseconds(16 * 300));
+  EXPECT_EQ(totals().missing, 0U);
+  EXPECT_EQ(totals().contested, 1U);
+  EXPECT_EQ(totals().hearing, client::Hearing::kImplausible);
+}
+
+TEST_F(TwoPublishers, WhatAStatusSaysOfThemCounts) {
+  for (int i = 0; i < 300; ++i) hear(1, 11, static_cast<std::uint64_t>(i), begin_ + milliseconds(16 * i));
+  perimap_Status status{};
+  dds::assign(status.source, "perimapd");
+  dds::assign(status.stream, "frame");
+  status.run_id[0] = 1;
+  status.two_publishers = true;
+  statistics_.hear(status, begin_ + milliseconds(16 * 300), 12);
+  hear(1, 11, 301, begin_ + milliseconds(16 * 301));
+  EXPECT_EQ(totals().hearing, client::Hearing::kTwoPublishers);
+}
+
 TEST_F(TwoPublishers, ARestartIsARestart) {
   for (int i = 0; i < 300; ++i) hear(1, 11, static_cast<std::uint64_t>(i), begin_ + milliseconds(16 * i));
   for (int i = 400; i < 700; ++i) hear(2, 22, static_cast<std::uint64_t>(i - 400), begin_ + milliseconds(16 * i));
