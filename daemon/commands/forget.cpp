@@ -59,7 +59,10 @@ void add_forget_command(Commands& commands) {
   Command& command = commands.add(
       "forget", "Removes recordings and checkpoints that have not been written for so long: what is known of patients",
       [options](const Console& console) { return forget(*options, console); });
-  command.add_option("FOLDER", options->folders, "Where they are, as recording.folder has it; not the folders in it")
+  command
+      .add_option("FOLDER", options->folders,
+                  "Where they are, as recording.folder has it; not the folders in it. Every MCAP file counts as a "
+                  "recording, a ROS bag too")
       ->required();
   command.add_option("--older-than", options->older_than, "As 30d (days), 12h (hours) or 8w (weeks)")->required();
   command.add_flag("--dry-run", options->dry, "Only tell what would go");

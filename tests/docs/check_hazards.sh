@@ -51,9 +51,9 @@ while IFS=$'\t' read -r number tests; do
     built "$file" || fault "$table:$number: nothing makes a test of $file"
     [ -n "$what" ] || continue
     if [[ $what == *.* ]]; then
-      grep -qE "TEST(_F|_P)?\(${what%%.*}, ${what#*.}\)" "$file" || fault "$table:$number: $file has no test $what"
+      grep -qE "^TEST(_F|_P)?\(${what%%.*}, ${what#*.}\)" "$file" || fault "$table:$number: $file has no test $what"
     else
-      grep -qE "TEST(_F|_P)?\($what, " "$file" || fault "$table:$number: $file has no tests of $what"
+      grep -E "^TEST(_F|_P)?\($what, " "$file" | grep -qv DISABLED_ || fault "$table:$number: $file has no tests of $what"
     fi
   done < <(grep -oE '`[^`]+`' <<< "$tests" | tr -d '\140')
   [ $found -gt 0 ] || fault "$table:$number: this hazard names no test"

@@ -8,6 +8,7 @@ trap 'rm -rf "$work"' EXIT
 status=0
 mkdir -p "$work/docs/design" "$work/tests/unit"
 echo 'TEST_F(Suite, Name) {}' > "$work/tests/unit/a_test.cpp"
+printf '// TEST(Commented, Name) {}\nTEST(Disabled, DISABLED_Name) {}\n' >> "$work/tests/unit/a_test.cpp"
 echo 'TEST(Other, Name) {}' > "$work/tests/unit/unbuilt_test.cpp"
 echo 'perimap_test(unit_a SOURCES a_test.cpp)' > "$work/tests/unit/CMakeLists.txt"
 
@@ -28,6 +29,8 @@ tried '`tests/unit/gone_test.cpp`' 'there is no test tests/unit/gone_test.cpp'
 tried '`tests/unit/unbuilt_test.cpp`' 'nothing makes a test of tests/unit/unbuilt_test.cpp'
 tried '`tests/unit/a_test.cpp: Suite.Gone`' 'tests/unit/a_test.cpp has no test Suite.Gone'
 tried '`tests/unit/a_test.cpp: Gone`' 'tests/unit/a_test.cpp has no tests of Gone'
+tried '`tests/unit/a_test.cpp: Commented.Name`' 'tests/unit/a_test.cpp has no test Commented.Name'
+tried '`tests/unit/a_test.cpp: Disabled`' 'tests/unit/a_test.cpp has no tests of Disabled'
 printf '# Hazards\n' > "$work/docs/design/hazards.md"
 bash "$check" "$work" > "$work/out" 2>&1 && { echo 'FAILED: an empty table passes'; status=1; }
 exit $status
