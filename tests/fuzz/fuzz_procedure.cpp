@@ -1,5 +1,5 @@
-// Any bytes as a procedure's file: errors of a line each that name the file, or a procedure that prints and reads back as
-// itself, of whose events the effects are finite.
+// Any bytes as a procedure's file: errors of a line each that name the file, or a procedure that prints and reads back
+// as itself, of whose events the effects are finite.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -25,7 +25,7 @@ bool is_finite(const perimap::Procedure& procedure, perimap::Duration since) {
   using namespace perimap;
   const PictureState picture = picture_state(procedure, since);
   const TrackerTrouble tracker = tracker_trouble(procedure, since);
-  const ScopeState scope = turned_scope(procedure, {}, since);
+  const ScopeAsHeld scope = turned_scope(procedure, {}, since);
   return std::isfinite(picture.trocar + picture.cloth + picture.fog + picture.smoke + picture.bands_levels) &&
          tracker.shift_mm.allFinite() && std::isfinite(tracker.turn_rad + tracker.deviation_mm) &&
          std::isfinite(scope.notch_deg + scope.zoom) && std::isfinite(drawn_back_mm(procedure, since)) &&

@@ -47,7 +47,7 @@ struct Touch : Dent {};
 // ---- the scope
 
 // It is turned in its camera head and zoomed, and stays so.
-struct ScopeTurn {
+struct ScopeTurnedInHead {
   double to_deg = 0.0;
   double zoom = 1.0;
 };
@@ -108,9 +108,9 @@ struct TrackerDelay {
   double to_ms = 0.0;
 };
 
-using Happening =
-    std::variant<Retraction, TableTilt, Insufflation, Dent, Touch, ScopeTurn, Withdrawn, Wiped, Fogged, Blood, Smoke,
-                 InstrumentSeen, Electrosurgery, Metal, ToolHidden, EctopicRun, LeadsOff, CameraDelay, TrackerDelay>;
+using Happening = std::variant<Retraction, TableTilt, Insufflation, Dent, Touch, ScopeTurnedInHead, Withdrawn, Wiped,
+                               Fogged, Blood, Smoke, InstrumentSeen, Electrosurgery, Metal, ToolHidden, EctopicRun,
+                               LeadsOff, CameraDelay, TrackerDelay>;
 
 struct ProcedureEvent {
   Duration at{0};      // since the session's start

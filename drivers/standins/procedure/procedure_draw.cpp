@@ -139,7 +139,7 @@ class Drawing {
   ProcedureEvent turn() {
     scope_deg_ = rounded(scope_deg_ + about(10.0, 60.0));
     if (std::abs(scope_deg_ - drawing_.held_deg) > 100.0) scope_deg_ = drawing_.held_deg;
-    return lasting(0.7, 3.0, ScopeTurn{scope_deg_, 1.0});
+    return lasting(0.7, 3.0, ScopeTurnedInHead{scope_deg_, 1.0});
   }
 
   const ProcedureDrawing& drawing_;

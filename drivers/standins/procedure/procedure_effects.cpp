@@ -56,10 +56,10 @@ double drawn_back_mm(const Procedure& procedure, Duration since) noexcept {
   return far_mm;
 }
 
-ScopeState turned_scope(const Procedure& procedure, const ScopeState& first, Duration since) noexcept {
-  ScopeState state = first;
+ScopeAsHeld turned_scope(const Procedure& procedure, const ScopeAsHeld& first, Duration since) noexcept {
+  ScopeAsHeld state = first;
   for (const ProcedureEvent& event : procedure.events) {
-    const auto* turn = std::get_if<ScopeTurn>(&event.what);
+    const auto* turn = std::get_if<ScopeTurnedInHead>(&event.what);
     if (turn == nullptr) continue;
     const double share = come(event, since);
     state.notch_deg += share * (turn->to_deg - state.notch_deg);
@@ -71,7 +71,7 @@ ScopeState turned_scope(const Procedure& procedure, const ScopeState& first, Dur
 ScopeTurning scope_turning(const Procedure& procedure, Duration since) noexcept {
   ScopeTurning turning;
   for (const ProcedureEvent& event : procedure.events) {
-    if (!std::holds_alternative<ScopeTurn>(event.what)) continue;
+    if (!std::holds_alternative<ScopeTurnedInHead>(event.what)) continue;
     if (since >= event.end()) ++turning.turns;
     turning.under_way = turning.under_way || is_under_way(event, since);
   }

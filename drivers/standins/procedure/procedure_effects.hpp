@@ -20,11 +20,11 @@ namespace perimap {
 [[nodiscard]] double drawn_back_mm(const Procedure& procedure, Duration since) noexcept;
 
 // How the scope is turned and zoomed, from how it was held at first.
-struct ScopeState {
+struct ScopeAsHeld {
   double notch_deg = 0.0;
   double zoom = 1.0;
 };
-[[nodiscard]] ScopeState turned_scope(const Procedure& procedure, const ScopeState& first, Duration since) noexcept;
+[[nodiscard]] ScopeAsHeld turned_scope(const Procedure& procedure, const ScopeAsHeld& first, Duration since) noexcept;
 // Whether it is being turned just then; the state after `turns` turns otherwise.
 struct ScopeTurning {
   bool under_way = false;

@@ -35,7 +35,7 @@ void visit_keys(Event& event, Visit&& visit) {
     visit(ProcedureKey{"place_mm", -60.0, 60.0}, event.place_mm);
     visit(ProcedureKey{"depth_mm", -20.0, 20.0}, event.depth_mm);
     visit(ProcedureKey{"radius_mm", 1.0, 60.0}, event.radius_mm);
-  } else if constexpr (std::is_same_v<Kind, ScopeTurn>) {
+  } else if constexpr (std::is_same_v<Kind, ScopeTurnedInHead>) {
     visit(ProcedureKey{"to_deg", -360.0, 360.0}, event.to_deg);
     visit(ProcedureKey{"zoom", 0.5, 2.0}, event.zoom);
   } else if constexpr (std::is_same_v<Kind, Fogged> || std::is_same_v<Kind, Smoke>) {

@@ -157,7 +157,7 @@ Pose Simulation::X_WC_at(Duration since) const noexcept {
   return drawn_back(path_.X_WC(since), settings_.procedure, since);
 }
 
-bool Simulation::scope_turns() const noexcept { return settings_.turn || settings_.procedure.has<ScopeTurn>(); }
+bool Simulation::scope_turns() const noexcept { return settings_.turn || settings_.procedure.has<ScopeTurnedInHead>(); }
 
 ScopeTurning Simulation::turning_at(Duration since) const noexcept {
   if (!settings_.turn) return scope_turning(settings_.procedure, since);
@@ -167,9 +167,9 @@ ScopeTurning Simulation::turning_at(Duration since) const noexcept {
 
 // Turned as a hand does: it begins and ends gently.
 std::optional<ScopeHeld> Simulation::held_at(Duration since) const noexcept {
-  if (settings_.held && settings_.procedure.has<ScopeTurn>()) {
-    const ScopeState first{settings_.held->notch_rad / kDegree, settings_.held->zoom};
-    const ScopeState now = turned_scope(settings_.procedure, first, since);
+  if (settings_.held && settings_.procedure.has<ScopeTurnedInHead>()) {
+    const ScopeAsHeld first{settings_.held->notch_rad / kDegree, settings_.held->zoom};
+    const ScopeAsHeld now = turned_scope(settings_.procedure, first, since);
     return ScopeHeld{now.notch_deg * kDegree, now.zoom};
   }
   if (!settings_.held || !settings_.turn) return settings_.held;
@@ -371,7 +371,7 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   simulation.renderers_.push_back(simulation.renderer_at(Duration(0)));
   if (settings.turn) simulation.renderers_.push_back(simulation.renderer_at(settings.turn->at + settings.turn->length));
   for (const ProcedureEvent& event : settings.procedure.events) {
-    if (std::holds_alternative<ScopeTurn>(event.what)) {
+    if (std::holds_alternative<ScopeTurnedInHead>(event.what)) {
       simulation.renderers_.push_back(simulation.renderer_at(event.end()));
     }
   }

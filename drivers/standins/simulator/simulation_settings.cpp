@@ -35,7 +35,7 @@ Expected<void> check(const SimulationSettings& s) {
     return fail(fmt::format("size: {}x{} is not even in both directions", s.width, s.height));
   if (s.second_sensor && !s.held) return fail("second sensor: expected a scope that is turned by some angle");
   if (s.turn && !s.held) return fail("turn: expected a field stop, whose notch tells of it");
-  if (s.procedure.has<ScopeTurn>()) {
+  if (s.procedure.has<ScopeTurnedInHead>()) {
     if (!s.held) return fail("scope-turn: expected a field stop, whose notch tells of it");
     if (s.turn) return fail("turn: expected none beside the procedure's, scope-turn");
   }

@@ -11,6 +11,7 @@ tried() { # LIMIT COMMAND...: what it says, with its code in $code
   local limit=$1
   shift
   told=$(
+    exec 3>&- 4>&- 5>&- 6>&- 7>&- 8>&- 9>&-  # what the caller had open counts
     ulimit -n "$limit"
     timeout 20 "$@" 2>&1
   )

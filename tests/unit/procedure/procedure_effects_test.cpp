@@ -58,9 +58,9 @@ TEST(ProcedureEffects, AWithdrawnScopeSeesNothingButItsTrocar) {
 }
 
 TEST(ProcedureEffects, AScopeStaysAsItWasTurnedLast) {
-  Procedure procedure = one(ScopeTurn{40.0, 1.0});
-  procedure.events.push_back({seconds(30), seconds(2), ScopeTurn{-10.0, 1.5}});
-  const ScopeState first{90.0, 1.0};
+  Procedure procedure = one(ScopeTurnedInHead{40.0, 1.0});
+  procedure.events.push_back({seconds(30), seconds(2), ScopeTurnedInHead{-10.0, 1.5}});
+  const ScopeAsHeld first{90.0, 1.0};
   EXPECT_EQ(turned_scope(procedure, first, seconds(5)).notch_deg, 90.0);
   EXPECT_EQ(turned_scope(procedure, first, seconds(20)).notch_deg, 40.0);
   EXPECT_EQ(turned_scope(procedure, first, seconds(40)).notch_deg, -10.0);

@@ -89,7 +89,7 @@ TEST(DeviceSetup, AllThatIsWrongIsToldAtOnceInTheOrderOfTheFile) {
   const std::filesystem::path file = testing::TempDir() + "device_setup_wrong.toml";
   std::ofstream(file) << "version = 1\n[ecg]\nprotocol = \"cyton\"\n[tracker]\nprotocol = \"ndi\"\n"
                          "sensor = \"0A\"\ninstruments = [\"GG\"]\nhand_eye_sensor = \"0B\"\n"
-                         "[camera]\ndevice = \"nothing\"\n";
+                         "[camera]\ndevice = \"video:nothing.mkv\"\n";
   const auto configuration = load_configuration(file);
   ASSERT_TRUE(configuration) << configuration.error().message;
   const auto setup = prepare_devices(file, *configuration);

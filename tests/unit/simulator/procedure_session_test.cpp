@@ -231,8 +231,8 @@ TEST(ProcedureSession, ATrackerWhoseDelayGrewStampsItsPosesLate) {
 }
 
 TEST(ProcedureSession, AScopeThatIsTurnedTwiceIsSeenSo) {
-  SimulationSettings settings =
-      settings_with({{seconds(5), seconds(1), ScopeTurn{60.0, 1.0}}, {seconds(12), seconds(1), ScopeTurn{90.0, 1.0}}});
+  SimulationSettings settings = settings_with({{seconds(5), seconds(1), ScopeTurnedInHead{60.0, 1.0}},
+                                               {seconds(12), seconds(1), ScopeTurnedInHead{90.0, 1.0}}});
   settings.held = ScopeHeld{90.0 * 3.14159265358979 / 180.0, 1.0};
   const Simulation session = simulate(settings);
   EXPECT_NEAR(session.camera_truth(session.frames()[kWithin]).scope_rotation_rad, 1.0472, 1e-3);
@@ -249,7 +249,7 @@ TEST(ProcedureSession, RefusesWhatCanNotBe) {
     const auto simulation = Simulation::create(settings);
     return simulation ? std::string("accepted") : simulation.error().message;
   };
-  EXPECT_EQ(error_of(settings_with({{seconds(5), seconds(1), ScopeTurn{}}})),
+  EXPECT_EQ(error_of(settings_with({{seconds(5), seconds(1), ScopeTurnedInHead{}}})),
             "scope-turn: expected a field stop, whose notch tells of it");
   EXPECT_EQ(error_of(settings_with({{seconds(30), seconds(1), LeadsOff{}}})),
             "procedure: leads-off begins at 30 s, expected before the end at 20 s");
