@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "core/error/nearest_name.hpp"
-#include "core/error/one_line.hpp"
 #include "core/pipeline/release_schedule.hpp"
 #include "daemon/config/configuration_keys.hpp"
 #include "daemon/config/ecg_inputs.hpp"
@@ -18,6 +17,7 @@
 #include "daemon/config/surface_traffic.hpp"
 #include "drivers/text_file/text_file.hpp"
 #include "drivers/toml/toml_text.hpp"
+#include "drivers/toml/wrong_toml_keys.hpp"
 
 namespace perimap {
 namespace {
@@ -99,16 +99,12 @@ class Overlay {
     check_frames_underway(root);
     check_inputs(root);
     check_traffic(root);
-    if (!errors_.empty()) return fail(told());
+    if (!wrong_.empty()) return tl::unexpected(wrong_.told());
     return configuration_;
   }
 
   // The keys that a recording may not set, and that were passed over.
-  [[nodiscard]] std::vector<Error> passed_over() const {
-    std::vector<Error> all;
-    for (const Wrong& wrong : passed_over_) all.push_back({wrong.message});
-    return all;
-  }
+  [[nodiscard]] std::vector<Error> passed_over() const { return passed_over_.each(); }
 
  private:
   static const ConfigurationKey* find(std::string_view section, std::string_view name) {
@@ -199,9 +195,9 @@ class Overlay {
   }
 
   void refuse_of_recording(const std::string& key, const toml::key& name) {
-    refuse(name.source().begin, key, "of a recording what describes its session, and nothing else",
-           "a key that only a configuration file may set (perimap replay --whole passes over it)",
-           source_ == Source::kRecordingPassedOver ? passed_over_ : errors_);
+    WrongTomlKeys& wrong = source_ == Source::kRecordingPassedOver ? passed_over_ : wrong_;
+    wrong.add(name.source().begin, key, "of a recording what describes its session, and nothing else",
+              "a key that only a configuration file may set (perimap replay --whole passes over it)");
   }
 
   // Where the file has the first of these keys, as "section.name"; its beginning when it has none.
@@ -285,42 +281,16 @@ class Overlay {
         key, fmt::format("what dds.maximum_MB_per_s = {:.6g} allows ({})", most_MB_per_s, fits), got);
   }
 
-  struct Wrong {
-    toml::source_position where;
-    std::string message;
-  };
-
   void refuse(toml::source_position where, std::string_view key, std::string_view expected, std::string_view got) {
-    refuse(where, key, expected, got, errors_);
-  }
-  void refuse(toml::source_position where, std::string_view key, std::string_view expected, std::string_view got,
-              std::vector<Wrong>& wrong) const {
-    wrong.push_back({where, on_one_line(fmt::format("{}:{}:{}: key '{}': expected {}, got {}", file_.string(),
-                                                    where.line, where.column, key, expected, got))});
-  }
-
-  // All that is wrong, a line each, as it stands in the file.
-  [[nodiscard]] std::string told() {
-    constexpr std::size_t kMost = 20;  // what is wrong more often is another kind of file
-    std::stable_sort(errors_.begin(), errors_.end(), [](const Wrong& a, const Wrong& b) {
-      return std::pair(a.where.line, a.where.column) < std::pair(b.where.line, b.where.column);
-    });
-    std::string all;
-    for (std::size_t i = 0; i < std::min(kMost, errors_.size()); ++i) {
-      all += fmt::format("{}{}", i > 0 ? "\n" : "", errors_[i].message);
-    }
-    if (errors_.size() > kMost) {
-      all += fmt::format("\n{}: and {} more wrong keys", on_one_line(file_.string()), errors_.size() - kMost);
-    }
-    return all;
+    wrong_.add(where, key, expected, got);
   }
 
   const std::filesystem::path& file_;
   NamedFiles named_files_;
   Source source_;
   Configuration configuration_;
-  std::vector<Wrong> errors_;
-  std::vector<Wrong> passed_over_;
+  WrongTomlKeys wrong_{file_.string()};
+  WrongTomlKeys passed_over_{file_.string()};
   std::vector<std::string> untold_;  // keys that were refused, and sections (empty: all) with what is no key
 };
 

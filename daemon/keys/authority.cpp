@@ -133,6 +133,27 @@ Expected<std::string> read(const fs::path& file, std::string_view what) {
   return read_text_file(file, kLargestFile, what);
 }
 
+struct CertificateFile {
+  fs::path file;
+  openssl::Certificate certificate;
+};
+
+// All that were issued.
+Expected<std::vector<CertificateFile>> read_issued(const fs::path& folder) {
+  std::vector<CertificateFile> all;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() != ".pem") continue;
+    const auto pem = read(entry.path(), "certificate");
+    if (!pem) return tl::unexpected(pem.error());
+    auto certificate = parse_certificate(*pem, entry.path().string());
+    if (!certificate) return tl::unexpected(certificate.error());
+    all.push_back({entry.path(), *std::move(certificate)});
+  }
+  if (error) return fail(fmt::format("{}: {}", folder.string(), error.message()));
+  return all;
+}
+
 // For programs that know nothing of perimap's configuration.
 std::string cyclonedds_xml() {
   const auto library = [](const char* element, const char* plugin, const char* name) {
@@ -275,28 +296,23 @@ Expected<fs::path> Authority::issue(KeyRole role, const std::string& name, const
 }
 
 Expected<std::size_t> Authority::revoke(const std::string& name, std::chrono::sys_seconds now) {
-  std::error_code error;
+  const auto certificates = read_issued(folder_ / kOwnFolder / kIssued);
+  if (!certificates) return tl::unexpected(certificates.error());
   std::size_t known = 0;
   std::size_t added = 0;
-  for (const auto& file : fs::directory_iterator(folder_ / kOwnFolder / kIssued, error)) {
-    if (file.path().extension() != ".pem") continue;
-    const auto pem = read(file.path(), "certificate");
-    if (!pem) return tl::unexpected(pem.error());
-    const auto certificate = parse_certificate(*pem, file.path().string());
-    if (!certificate) return tl::unexpected(certificate.error());
-    if (facts_of(**certificate).name != name) continue;
+  for (const auto& [file, certificate] : *certificates) {
+    if (facts_of(*certificate).name != name) continue;
     ++known;
-    if (is_revoked(*revoked_, **certificate)) continue;
+    if (is_revoked(*revoked_, *certificate)) continue;
     openssl::Revoked entry(X509_REVOKED_new());
     const bool well = entry &&
-                      X509_REVOKED_set_serialNumber(entry.get(), X509_get_serialNumber(certificate->get())) == 1 &&
+                      X509_REVOKED_set_serialNumber(entry.get(), X509_get_serialNumber(certificate.get())) == 1 &&
                       X509_REVOKED_set_revocationDate(entry.get(), asn1_time(now).get()) == 1 &&
                       X509_CRL_add0_revoked(revoked_.get(), entry.get()) == 1;
-    if (!well) return openssl::failure(file.path().string() + ": cannot be revoked");
+    if (!well) return openssl::failure(file.string() + ": cannot be revoked");
     static_cast<void>(entry.release());  // the list's now
     ++added;
   }
-  if (error) return fail(fmt::format("{}: {}", (folder_ / kOwnFolder / kIssued).string(), error.message()));
   if (known == 0)
     return fail(fmt::format("'{}': nothing was issued under this name (perimap keys show tells what was)", name));
   // Written all the same: the time before it may not have come to an end.
@@ -310,17 +326,12 @@ Expected<std::size_t> Authority::revoke(const std::string& name, std::chrono::sy
 }
 
 Expected<std::vector<Issued>> Authority::issued() const {
+  const auto certificates = read_issued(folder_ / kOwnFolder / kIssued);
+  if (!certificates) return tl::unexpected(certificates.error());
   std::vector<Issued> all;
-  std::error_code error;
-  for (const auto& file : fs::directory_iterator(folder_ / kOwnFolder / kIssued, error)) {
-    if (file.path().extension() != ".pem") continue;
-    const auto pem = read(file.path(), "certificate");
-    if (!pem) return tl::unexpected(pem.error());
-    const auto certificate = parse_certificate(*pem, file.path().string());
-    if (!certificate) return tl::unexpected(certificate.error());
-    all.push_back({facts_of(**certificate), is_revoked(*revoked_, **certificate)});
+  for (const auto& [file, certificate] : *certificates) {
+    all.push_back({facts_of(*certificate), is_revoked(*revoked_, *certificate)});
   }
-  if (error) return fail(fmt::format("{}: {}", (folder_ / kOwnFolder / kIssued).string(), error.message()));
   std::sort(all.begin(), all.end(), [](const Issued& a, const Issued& b) {
     return std::pair(a.facts.name, a.facts.validity.from) < std::pair(b.facts.name, b.facts.validity.from);
   });

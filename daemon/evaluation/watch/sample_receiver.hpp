@@ -1,4 +1,4 @@
-// The receiving side of `perimap watch`: readers of all topics and the thread that empties them.
+// The receiving side of `perimap watch`: the thread that empties its readers.
 #pragma once
 
 #include <memory>
@@ -9,26 +9,11 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
-#include "daemon/dds/reader.hpp"
-#include "daemon/dds/wait_set.hpp"
+#include "daemon/dds/sample_readers.hpp"
 #include "daemon/evaluation/watch/watch_statistics.hpp"
 #include "daemon/publishing/sample_recorder.hpp"
 
 namespace perimap {
-
-// Readers in one participant.
-struct SampleReaders {
-  dds::Participant participant;
-  dds::Reader<perimap_Surface> surfaces;
-  dds::Reader<perimap_SurfaceModel> models;
-  dds::Reader<perimap_SurfaceMesh> meshes;
-  dds::Reader<perimap_Phase> phases;
-  dds::Reader<perimap_Status> statuses;
-  dds::WaitSet wait_set;
-
-  // Without `all_topics` only surfaces and statuses wake the thread; the others are not read.
-  [[nodiscard]] static Expected<SampleReaders> create(const dds::Membership& membership, bool all_topics);
-};
 
 // Starts its thread when made and ends it when destroyed. Samples are stamped when the thread wakes up.
 class SampleReceiver {

@@ -39,35 +39,13 @@ std::optional<Sample<T>> copy_of(const T& sample) {
 
 }  // namespace
 
-Expected<LiveView::Readers> LiveView::subscribe(const dds::Membership& membership) {
-  auto participant = dds::Participant::create(membership);
-  if (!participant) return tl::unexpected(participant.error());
-  auto surfaces = dds::Reader<perimap_Surface>::create(*participant);
-  auto models = dds::Reader<perimap_SurfaceModel>::create(*participant);
-  auto meshes = dds::Reader<perimap_SurfaceMesh>::create(*participant);
-  auto phases = dds::Reader<perimap_Phase>::create(*participant);
-  auto statuses = dds::Reader<perimap_Status>::create(*participant);
-  auto wait_set = dds::WaitSet::create(*participant);
-  const auto error_of = [](const auto& result) { return result ? Error{} : result.error(); };
-  for (const Error& error : {error_of(surfaces), error_of(models), error_of(meshes), error_of(phases),
-                             error_of(statuses), error_of(wait_set)}) {
-    if (!error.message.empty()) return tl::unexpected(error);
-  }
-  for (const dds_entity_t condition :
-       {surfaces->condition(), models->condition(), meshes->condition(), phases->condition(), statuses->condition()}) {
-    if (auto attached = wait_set->attach(condition); !attached) return tl::unexpected(attached.error());
-  }
-  return Readers{std::move(*participant), std::move(*surfaces), std::move(*models),  std::move(*meshes),
-                 std::move(*phases),      std::move(*statuses), std::move(*wait_set)};
-}
-
 Expected<std::unique_ptr<LiveView>> LiveView::create(const dds::Membership& membership, WebServer& server, Say say) {
-  auto readers = subscribe(membership);
+  auto readers = SampleReaders::create(membership, true);
   if (!readers) return tl::unexpected(readers.error());
   return std::unique_ptr<LiveView>(new LiveView(membership.domain, std::move(*readers), server, std::move(say)));
 }
 
-LiveView::LiveView(int domain, Readers readers, WebServer& server, Say say)
+LiveView::LiveView(int domain, SampleReaders readers, WebServer& server, Say say)
     : domain_(domain), readers_(std::move(readers)), server_(server), say_(std::move(say)) {
   thread_ = std::thread([this] { receive(); });
 }

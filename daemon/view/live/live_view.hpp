@@ -15,8 +15,7 @@
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
-#include "daemon/dds/reader.hpp"
-#include "daemon/dds/wait_set.hpp"
+#include "daemon/dds/sample_readers.hpp"
 #include "daemon/view/live/followed_publisher.hpp"
 #include "daemon/view/messages/surface_teller.hpp"
 #include "daemon/view/web/web_server.hpp"
@@ -44,15 +43,6 @@ class LiveView final : public PageHandler {
   [[nodiscard]] Expected<void> result() const override;
 
  private:
-  struct Readers {
-    dds::Participant participant;
-    dds::Reader<perimap_Surface> surfaces;
-    dds::Reader<perimap_SurfaceModel> models;
-    dds::Reader<perimap_SurfaceMesh> meshes;
-    dds::Reader<perimap_Phase> phases;
-    dds::Reader<perimap_Status> statuses;
-    dds::WaitSet wait_set;
-  };
   // What came since the last surface that was sent.
   struct Since {
     std::vector<double> late_ms;  // receipt minus release
@@ -64,8 +54,7 @@ class LiveView final : public PageHandler {
     Instant heard;
   };
 
-  LiveView(int domain, Readers readers, WebServer& server, Say say);
-  [[nodiscard]] static Expected<Readers> subscribe(const dds::Membership& membership);
+  LiveView(int domain, SampleReaders readers, WebServer& server, Say say);
 
   void receive();
   // Gives each sample with its publisher and whether it is the last of those that have come.
@@ -79,7 +68,7 @@ class LiveView final : public PageHandler {
   [[nodiscard]] PageMessage publishers_message() const;
 
   const int domain_;
-  Readers readers_;
+  SampleReaders readers_;
   WebServer& server_;
   const Say say_;
   const Instant begun_ = MonotonicClock::now();

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "core/error/nearest_name.hpp"
-#include "core/error/one_line.hpp"
 #include "drivers/standins/procedure/procedure_keys.hpp"
 #include "drivers/text_file/text_file.hpp"
 #include "drivers/toml/toml_text.hpp"
+#include "drivers/toml/wrong_toml_keys.hpp"
 
 namespace perimap {
 namespace {
@@ -33,7 +33,7 @@ std::optional<double> number_of(const toml::node& node) {
 // Walks one parsed file, keeps what is good and remembers what is wrong.
 class ProcedureFile {
  public:
-  explicit ProcedureFile(const std::string& file) : file_(file) {}
+  explicit ProcedureFile(const std::string& file) : wrong_(file) {}
 
   Expected<Procedure> read(const toml::table& root) {
     const toml::node* version = root.get("version");
@@ -58,8 +58,8 @@ class ProcedureFile {
       }
       for (std::size_t i = 0; i < events->size(); ++i) read_event(*events->get(i)->as_table(), i + 1);
     }
-    if (errors_.empty()) refuse_overlaps();
-    if (!errors_.empty()) return fail(told());
+    if (wrong_.empty()) refuse_overlaps();
+    if (!wrong_.empty()) return tl::unexpected(wrong_.told());
     Procedure procedure;
     std::stable_sort(read_.begin(), read_.end(), [](const Read& a, const Read& b) { return a.event.at < b.event.at; });
     for (Read& read : read_) procedure.events.push_back(std::move(read.event));
@@ -71,10 +71,6 @@ class ProcedureFile {
     ProcedureEvent event;
     toml::source_position where;
     std::size_t number = 0;  // in the file
-  };
-  struct Wrong {
-    toml::source_position where;
-    std::string message;
   };
 
   static bool all_are_tables(const toml::array& array) {
@@ -185,28 +181,11 @@ class ProcedureFile {
   }
 
   void refuse(toml::source_position where, std::string_view key, std::string_view wanted, std::string_view got) {
-    errors_.push_back({where, on_one_line(fmt::format("{}:{}:{}: key '{}': expected {}, got {}", file_, where.line,
-                                                      where.column, key, wanted, got))});
+    wrong_.add(where, key, wanted, got);
   }
 
-  [[nodiscard]] std::string told() {
-    constexpr std::size_t kMost = 20;  // what is wrong more often is another kind of file
-    std::stable_sort(errors_.begin(), errors_.end(), [](const Wrong& a, const Wrong& b) {
-      return std::pair(a.where.line, a.where.column) < std::pair(b.where.line, b.where.column);
-    });
-    std::string all;
-    for (std::size_t i = 0; i < std::min(kMost, errors_.size()); ++i) {
-      all += fmt::format("{}{}", i > 0 ? "\n" : "", errors_[i].message);
-    }
-    if (errors_.size() > kMost) {
-      all += fmt::format("\n{}: and {} more wrong keys", on_one_line(file_), errors_.size() - kMost);
-    }
-    return all;
-  }
-
-  const std::string& file_;
   std::vector<Read> read_;
-  std::vector<Wrong> errors_;
+  WrongTomlKeys wrong_;
 };
 
 }  // namespace
