@@ -11,11 +11,13 @@ cd "$(dirname "$0")/../.."
 
 usage() {
   cat << 'END'
-docs/evidence/make.sh [--build FOLDER] [--keep FOLDER] [--list] [NAME...]
+docs/evidence/make.sh [--build FOLDER] [--keep FOLDER] [--records FOLDER] [--list] [NAME...]
   Runs the commands of the tables NAME (all of them when none is named) and writes the tables into docs/evidence/*.md.
   A table that has no place in a page (setups, latency: their pages put several runs beside each other) is printed.
   --build  where the programs are: build/release (the default) or another preset's folder
   --keep   keeps recordings and reports in FOLDER; without it they go when the script ends
+  --records  records of the MIT-BIH Arrhythmia Database, as statistics_ecg --help says; tables that need them are left
+             out without it, unless they are named
   --list   prints the names, with about how long each takes on two cores that do nothing else
 Exit code 0 when all were made, 1 when one failed, 2 for a wrong command line.
 END
@@ -38,6 +40,11 @@ harmonics       5 minutes   statistics --long harmonics
 drift           5 minutes   statistics --long drift
 pose           30 minutes   statistics --long pose
 ecg            20 minutes   statistics --long ecg
+ecg-made        2 minutes   statistics_ecg made: leads that are drawn
+ecg-paced       1 minute    statistics_ecg paced: paced leads with ventricular beats
+ecg-records     1 minute    statistics_ecg records peak-times ventricular prediction starts, of --records
+ecg-disturbed   1 minute    statistics_ecg disturbed, of --records
+ecg-two-leads   2 minutes   statistics_ecg two-leads, of --records
 horizons       30 minutes   statistics --long horizons
 late            5 minutes   statistics --long late
 ventilated     20 minutes   statistics --long ventilated
@@ -54,6 +61,7 @@ END
 
 build=build/release
 keep=
+records=
 names=()
 while [ $# -gt 0 ]; do
   case $1 in
@@ -63,6 +71,10 @@ while [ $# -gt 0 ]; do
       ;;
     --keep)
       keep=${2:?--keep needs a folder}
+      shift
+      ;;
+    --records)
+      records=${2:?--records needs a folder}
       shift
       ;;
     --list)
@@ -88,7 +100,9 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-[ ${#names[@]} -gt 0 ] || mapfile -t names < <(list | cut -d ' ' -f 1)
+if [ ${#names[@]} -eq 0 ]; then
+  mapfile -t names < <(list | { if [ -n "$records" ]; then cat; else grep -v 'of --records$'; fi; } | cut -d ' ' -f 1)
+fi
 
 if [ -n "$keep" ]; then
   mkdir -p "$keep"
@@ -302,6 +316,21 @@ make_harmonics() { of_statistics harmonics; }
 make_drift() { of_statistics drift; }
 make_pose() { of_statistics pose; }
 make_ecg() { of_statistics ecg; }
+# The seed was drawn after the detector was chosen.
+of_statistics_ecg() {
+  command="statistics_ecg $*"
+  "$build/tests/statistics/statistics_ecg" "$@" 2> /dev/null | as_printed
+}
+of_records() {
+  [ -n "$records" ] || { echo "make.sh: --records names the folder of the records" >&2; return 1; }
+  command="statistics_ecg $* --records FOLDER"
+  "$build/tests/statistics/statistics_ecg" "$@" --records "$records" | as_printed
+}
+make_ecg_made() { of_statistics_ecg made --draws 3000 --seed 2050050581; }
+make_ecg_paced() { of_statistics_ecg paced --draws 200 --seed 2050050581; }
+make_ecg_records() { of_records records peak-times ventricular prediction starts; }
+make_ecg_disturbed() { of_records disturbed --seed 2050050581; }
+make_ecg_two_leads() { of_records two-leads --seed 2050050581; }
 make_horizons() { of_statistics horizons; }
 make_late() { of_statistics late; }
 make_ventilated() { of_statistics ventilated; }

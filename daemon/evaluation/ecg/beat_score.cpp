@@ -22,39 +22,6 @@ bool is_timed(const ReferenceBeat& beat, bool kinds, const RPeak& peak) {
   return (!kinds || beat.kind == ReferenceBeat::Kind::kNormal) && peak.beat_class != BeatClass::kNoise;
 }
 
-// For each reference beat the detection that is it, or -1.
-std::vector<int> match(const std::vector<ReferenceBeat>& reference, const EcgAnalysis& analysis) {
-  struct Pair {
-    double apart_s;
-    int reference;
-    int detected;
-  };
-  std::vector<Pair> pairs;
-  const auto& beats = analysis.beats;
-  std::size_t from = 0;
-  for (std::size_t i = 0; i < reference.size(); ++i) {
-    const double t = reference[i].time_s;
-    while (from < beats.size() && seconds_of(beats[from].peak.time) < t - BeatScore::kWindow_s) ++from;
-    for (std::size_t j = from; j < beats.size(); ++j) {
-      const double apart = seconds_of(beats[j].peak.time) - t;
-      if (apart > BeatScore::kWindow_s) break;
-      if (apart < -BeatScore::kWindow_s) continue;
-      pairs.push_back({std::abs(apart), static_cast<int>(i), static_cast<int>(j)});
-    }
-  }
-  std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.apart_s < b.apart_s; });
-  std::vector<int> matched(reference.size(), -1);
-  std::vector<bool> used(beats.size(), false);
-  for (const Pair& pair : pairs) {
-    const auto i = static_cast<std::size_t>(pair.reference);
-    const auto j = static_cast<std::size_t>(pair.detected);
-    if (matched[i] >= 0 || used[j]) continue;
-    matched[i] = pair.detected;
-    used[j] = true;
-  }
-  return matched;
-}
-
 // The local peak farthest from the signal's median within 60 ms of t. The end of that stretch is none: there the signal
 // may be on its way to a larger excursion outside.
 std::optional<double> peak_near(const EcgTrace& trace, double t) {
@@ -90,9 +57,40 @@ double root_mean_square(const std::vector<double>& values) {
 
 }  // namespace
 
+std::vector<int> match_beats(const std::vector<ReferenceBeat>& reference, const std::vector<AnalysedBeat>& beats) {
+  struct Pair {
+    double apart_s;
+    int reference;
+    int detected;
+  };
+  std::vector<Pair> pairs;
+  std::size_t from = 0;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    const double t = reference[i].time_s;
+    while (from < beats.size() && seconds_of(beats[from].peak.time) < t - BeatScore::kWindow_s) ++from;
+    for (std::size_t j = from; j < beats.size(); ++j) {
+      const double apart = seconds_of(beats[j].peak.time) - t;
+      if (apart > BeatScore::kWindow_s) break;
+      if (apart < -BeatScore::kWindow_s) continue;
+      pairs.push_back({std::abs(apart), static_cast<int>(i), static_cast<int>(j)});
+    }
+  }
+  std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.apart_s < b.apart_s; });
+  std::vector<int> matched(reference.size(), -1);
+  std::vector<bool> used(beats.size(), false);
+  for (const Pair& pair : pairs) {
+    const auto i = static_cast<std::size_t>(pair.reference);
+    const auto j = static_cast<std::size_t>(pair.detected);
+    if (matched[i] >= 0 || used[j]) continue;
+    matched[i] = pair.detected;
+    used[j] = true;
+  }
+  return matched;
+}
+
 BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnalysis& analysis, const EcgTrace& trace) {
   const auto& beats = analysis.beats;
-  const std::vector<int> matched = match(reference, analysis);
+  const std::vector<int> matched = match_beats(reference, analysis.beats);
   BeatScore score;
   score.has_kinds = has_kinds(reference);
   std::vector<bool> used(beats.size(), false);
@@ -161,7 +159,7 @@ PredictionErrors prediction_errors(const EcgAnalysis& analysis, const std::vecto
       last = &beat;
     }
   } else {
-    const std::vector<int> matched = match(reference, analysis);
+    const std::vector<int> matched = match_beats(reference, analysis.beats);
     const bool kinds = has_kinds(reference);
     const AnalysedBeat* last = nullptr;
     for (std::size_t i = 0; i < reference.size(); ++i) {

@@ -49,7 +49,10 @@ struct BeatScore {
   std::map<std::string, std::array<int, 5>> symbols;  // as normal, premature, pause, noise; missed
 };
 
-// Each reference beat is matched with at most one detection and the other way, nearest first.
+// For each reference beat the index of the detection that is it, or -1: at most one each way, nearest first.
+[[nodiscard]] std::vector<int> match_beats(const std::vector<ReferenceBeat>& reference,
+                                           const std::vector<AnalysedBeat>& beats);
+
 [[nodiscard]] BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnalysis& analysis,
                                     const EcgTrace& trace);
 

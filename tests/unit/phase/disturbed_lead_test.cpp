@@ -3,14 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
-#include <functional>
 #include <memory>
-#include <numbers>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "core/phase/r_peak_detector.hpp"
+#include "lead_disturbances.hpp"
 #include "made_lead.hpp"
 
 namespace perimap::test {
@@ -25,71 +26,6 @@ struct Stretch {
 
 double uniform(double from, double to, Generator& generator) {
   return std::uniform_real_distribution<double>(from, to)(generator);
-}
-
-// Puts a disturbance in the lead's place, or on top of it.
-using Disturb = std::function<void(MadeLead& lead, std::size_t begin, std::size_t end, Generator& generator)>;
-
-void arcs(MadeLead& lead, std::size_t begin, std::size_t end, Generator& generator) {
-  for (double at_s = static_cast<double>(begin) / lead.rate_hz; at_s < static_cast<double>(end) / lead.rate_hz;
-       at_s += uniform(0.05, 0.5, generator)) {
-    const double height = uniform(0.5, 4.0, generator) * (uniform(0.0, 1.0, generator) < 0.5 ? -1.0 : 1.0);
-    const double sigma_s = uniform(0.005, 0.02, generator);
-    const bool biphasic = uniform(0.0, 1.0, generator) < 0.5;
-    for (std::size_t i = begin; i < end; ++i) {
-      const double x = (static_cast<double>(i) / lead.rate_hz - at_s) / sigma_s;
-      if (std::abs(x) > 5.0) continue;
-      lead.mV[i] += static_cast<float>(height * (biphasic ? -x * std::exp(0.5 - 0.5 * x * x) : std::exp(-0.5 * x * x)));
-    }
-  }
-}
-
-// The line is at one rail or another, for so long each.
-Disturb rails(double shortest_s, double longest_s, bool any_level) {
-  return [=](MadeLead& lead, std::size_t begin, std::size_t end, Generator& generator) {
-    std::normal_distribution<double> noise(0.0, 0.01);
-    double level = 5.0;
-    auto next = static_cast<double>(begin);
-    for (std::size_t i = begin; i < end; ++i) {
-      if (static_cast<double>(i) >= next) {
-        level = any_level ? uniform(-5.0, 5.0, generator) : uniform(0.0, 1.0, generator) < 0.5 ? -5.0 : 5.0;
-        next += 1.0 + uniform(shortest_s, longest_s, generator) * lead.rate_hz;
-      }
-      lead.mV[i] = static_cast<float>(level + noise(generator));
-    }
-  };
-}
-
-void wide_band(MadeLead& lead, std::size_t begin, std::size_t end, Generator& generator) {
-  std::normal_distribution<double> noise(0.0, uniform(1.0, 6.0, generator));
-  for (std::size_t i = begin; i < end; ++i) {
-    lead.mV[i] = static_cast<float>(std::clamp(static_cast<double>(lead.mV[i]) + noise(generator), -5.0, 5.0));
-  }
-}
-
-void blanking(MadeLead& lead, std::size_t begin, std::size_t end, Generator& generator) {
-  std::normal_distribution<double> bits(0.0, 0.3);
-  const double time_s = uniform(0.3, 1.2, generator);
-  const double off_mV = uniform(-4.0, 4.0, generator);
-  for (std::size_t i = begin; i < end; ++i) lead.mV[i] = static_cast<float>(0.005 * std::round(bits(generator)));
-  for (std::size_t i = end; i < lead.mV.size(); ++i) {
-    lead.mV[i] += static_cast<float>(off_mV * std::exp(-static_cast<double>(i - end) / lead.rate_hz / time_s));
-  }
-}
-
-void hum_and_drift(MadeLead& lead, std::size_t begin, std::size_t end, Generator& generator) {
-  const double amplitude_mV = uniform(0.3, 2.0, generator);
-  const double frequency_hz = uniform(49.0, 61.0, generator);
-  for (std::size_t i = begin; i < end; ++i) {
-    const double t = 2.0 * std::numbers::pi * static_cast<double>(i - begin) / lead.rate_hz;
-    lead.mV[i] = static_cast<float>(amplitude_mV * std::sin(frequency_hz * t) + 3.0 * std::sin(0.13 * t));
-  }
-}
-
-// A line of an amplifier without a patient.
-void still(MadeLead& lead, std::size_t begin, std::size_t end, Generator& generator) {
-  std::normal_distribution<double> bits(0.0, 1.0);
-  for (std::size_t i = begin; i < end; ++i) lead.mV[i] = static_cast<float>(0.004 * std::round(bits(generator)));
 }
 
 struct Outcome {
@@ -179,10 +115,7 @@ class Disturbed {
 };
 
 struct Kind {
-  const char* name;
-  Disturb disturb;
-  double shortest_s;
-  double longest_s;
+  DisturbedStretches stretches;
   int late_one_in;  // stretches, at most
   double most_unsaid = 1.0;
 };
@@ -191,7 +124,7 @@ struct DisturbedLead : testing::TestWithParam<Kind> {};
 
 TEST_P(DisturbedLead, NoBeatIsBelievedAndTheNextAreRight) {
   const Kind& kind = GetParam();
-  const Outcome outcome = Disturbed(kind.disturb).run(kind.shortest_s, kind.longest_s);
+  const Outcome outcome = Disturbed(kind.stretches.disturb).run(kind.stretches.shortest_s, kind.stretches.longest_s);
   std::printf("%d stretches, %d bad, %d late, %d unsaid; of %d beats outside %d missed, %d extra\n", outcome.stretches,
               outcome.bad, outcome.late, outcome.unsaid, outcome.outside, outcome.missed, outcome.extra);
   EXPECT_GE(outcome.stretches, 25);
@@ -201,19 +134,23 @@ TEST_P(DisturbedLead, NoBeatIsBelievedAndTheNextAreRight) {
   EXPECT_LE(outcome.missed + outcome.extra, outcome.outside * 2 / (kind.late_one_in * 5));
 }
 
+std::string name_of(const testing::TestParamInfo<Kind>& kind) {
+  std::string name;
+  for (const char c : kind.param.stretches.name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) name += c;
+  }
+  return name;
+}
+
 INSTANTIATE_TEST_SUITE_P(Electrosurgery, DisturbedLead,
-                         testing::Values(Kind{"Arcs", arcs, 1.0, 20.0, 50},
-                                         Kind{"Rails", rails(0.003, 0.3, false), 1.0, 20.0, 50},
-                                         Kind{"Noise", wide_band, 1.0, 20.0, 50},
-                                         Kind{"Blanking", blanking, 1.0, 20.0, 50}),
-                         [](const auto& kind) { return std::string(kind.param.name); });
+                         testing::Values(Kind{electrosurgery()[0], 50}, Kind{electrosurgery()[1], 50},
+                                         Kind{electrosurgery()[2], 50}, Kind{electrosurgery()[3], 50}),
+                         name_of);
 INSTANTIATE_TEST_SUITE_P(LeadOff, DisturbedLead,
-                         testing::Values(Kind{"Rails", rails(0.02, 0.8, false), 5.0, 30.0, 12, 0.05},
-                                         Kind{"Steps", rails(0.1, 1.5, true), 5.0, 30.0, 50, 0.2},
-                                         Kind{"Noise", wide_band, 5.0, 30.0, 12, 0.05},
-                                         Kind{"HumAndDrift", hum_and_drift, 5.0, 30.0, 50, 0.05},
-                                         Kind{"Still", still, 5.0, 30.0, 50, 0.05}),
-                         [](const auto& kind) { return std::string(kind.param.name); });
+                         testing::Values(Kind{leads_off()[0], 12, 0.05}, Kind{leads_off()[1], 50, 0.2},
+                                         Kind{leads_off()[2], 12, 0.05}, Kind{leads_off()[3], 50, 0.05},
+                                         Kind{leads_off()[4], 50, 0.05}),
+                         name_of);
 
 }  // namespace
 }  // namespace perimap::test
