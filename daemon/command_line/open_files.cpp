@@ -13,9 +13,10 @@ Expected<void> ensure_open_files(unsigned least) {
   limit.rlim_cur = std::min<rlim_t>(least, limit.rlim_max);
   static_cast<void>(setrlimit(RLIMIT_NOFILE, &limit));
   if (limit.rlim_cur >= least) return {};
-  return fail(fmt::format("at most {} files may be open at a time: expected a limit of at least {} (ulimit -n, "
-                          "LimitNOFILE=)",
-                          limit.rlim_max, least));
+  return fail(
+      fmt::format("at most {} files may be open at a time: expected a limit of at least {} (ulimit -n, "
+                  "LimitNOFILE=)",
+                  limit.rlim_max, least));
 }
 
 }  // namespace perimap

@@ -190,7 +190,8 @@ TEST_F(WholeFileTest, ForItsOwnerAloneIsReadByNobodyElseWhateverWasThereBefore) 
   std::filesystem::permissions(file, std::filesystem::perms(0644));
   auto whole = WholeFile::create(file, WholeFile::Name::kPart, WholeFile::Readers::kOwner);
   ASSERT_TRUE(whole);
-  EXPECT_EQ(std::filesystem::status(whole->path()).permissions(), std::filesystem::perms(0600)) << "from the beginning on";
+  EXPECT_EQ(std::filesystem::status(whole->path()).permissions(), std::filesystem::perms(0600))
+      << "from the beginning on";
   std::ofstream(whole->path()) << "new";
   ASSERT_TRUE(whole->finish());
   EXPECT_EQ(std::filesystem::status(file).permissions(), std::filesystem::perms(0600));

@@ -79,7 +79,8 @@ TEST(RecordedConfiguration, AHandEyeOfAnotherSensorThanWasRecordedIsRefused) {
     std::ofstream(file) << "version = 1\n[tracker]\n" << tracker;
     const auto refused = prepare_replay(recording.file(), file, ReadMode::kStrict);
     ASSERT_FALSE(refused) << tracker;
-    EXPECT_THAT(refused.error().error.message, HasSubstr("other.toml:3:19: key 'tracker.hand_eye_sensor': expected \"0A\""));
+    EXPECT_THAT(refused.error().error.message,
+                HasSubstr("other.toml:3:19: key 'tracker.hand_eye_sensor': expected \"0A\""));
   }
   std::ofstream(file) << "version = 1\n[tracker]\nhand_eye_sensor = \"0A\"\n";
   const auto fits = prepare_replay(recording.file(), file, ReadMode::kStrict);

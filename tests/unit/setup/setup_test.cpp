@@ -20,7 +20,6 @@ namespace {
 
 using testing::HasSubstr;
 
-
 struct Poses {
   std::vector<TimedPose> camera;
   std::vector<TimedPose> tracker;
