@@ -15,9 +15,8 @@ constexpr std::uint64_t kStream = 0x70726f63;
 
 class Drawing {
  public:
-  explicit Drawing(const ProcedureDrawing& drawing) : drawing_(drawing), noise_(drawing.seed, kStream) {
-    scope_deg_ = drawing.held_deg;
-  }
+  explicit Drawing(const ProcedureDrawing& drawing)
+      : drawing_(drawing), noise_(drawing.seed, kStream), scope_deg_(drawing.held_deg) {}
 
   Procedure procedure() {
     constexpr double kFirst_s = 40.0, kLast_s = 20.0;
@@ -147,7 +146,7 @@ class Drawing {
   std::uint64_t index_ = 0;
   std::vector<Make> deck_;
   bool retracted_ = false, tilted_ = false, risen_ = false, delayed_ = false, camera_delayed_ = false;
-  double scope_deg_ = 0.0;
+  double scope_deg_;
 };
 
 }  // namespace

@@ -22,7 +22,7 @@ struct ProcedureKey {
 template <class Event, class Visit>
 void visit_keys(Event& event, Visit&& visit) {
   using Kind = std::remove_const_t<Event>;
-  if constexpr (std::is_same_v<Kind, Retraction>) {
+  if constexpr (std::is_same_v<Kind, Retraction> || std::is_same_v<Kind, Metal>) {
     visit(ProcedureKey{"shift_mm", -60.0, 60.0}, event.shift_mm);
     visit(ProcedureKey{"turn_deg", -45.0, 45.0}, event.turn_deg);
   } else if constexpr (std::is_same_v<Kind, TableTilt>) {
@@ -47,9 +47,6 @@ void visit_keys(Event& event, Visit&& visit) {
     visit(ProcedureKey{"picture_levels", 0.0, 255.0}, event.picture_levels);
     visit(ProcedureKey{"smoke_density", 0.0, 10.0}, event.smoke_density);
     visit(ProcedureKey{"tracker_mm", 0.0, 100.0}, event.tracker_mm);
-  } else if constexpr (std::is_same_v<Kind, Metal>) {
-    visit(ProcedureKey{"shift_mm", -60.0, 60.0}, event.shift_mm);
-    visit(ProcedureKey{"turn_deg", -45.0, 45.0}, event.turn_deg);
   } else if constexpr (std::is_same_v<Kind, CameraDelay> || std::is_same_v<Kind, TrackerDelay>) {
     visit(ProcedureKey{"to_ms", -100.0, 100.0}, event.to_ms);
   }

@@ -36,12 +36,12 @@ bool ShaftPlace::covers(const Vector2d& px, double margin_px) const noexcept {
   return place.along >= 0.0 && std::abs(place.across) <= half_width_px + margin_px;
 }
 
-void ViewDrawing::shaft(const ShaftPlace& now, std::span<float> radiance) const {
+void ViewDrawing::shaft(const ShaftPlace& place, std::span<float> radiance) const {
   for (int row = 0; row < height_; ++row) {
     for (int column = 0; column < width_; ++column) {
-      const OnShaft place = on_shaft(now.from, now.tip, Vector2d(column, row));
-      const double side = place.across / now.half_width_px;
-      if (place.along < 0.0 || std::abs(side) > 1.0) continue;
+      const OnShaft pixel = on_shaft(place.from, place.tip, Vector2d(column, row));
+      const double side = pixel.across / place.half_width_px;
+      if (pixel.along < 0.0 || std::abs(side) > 1.0) continue;
       const double round = std::sqrt(1.0 - side * side);
       const double shine = std::exp(-40.0 * (side + 0.3) * (side + 0.3));
       radiance[at(row, column)] = static_cast<float>(25.0 + 90.0 * round + 150.0 * shine);
