@@ -181,15 +181,23 @@ DetectorSettings detector_settings_for(int width, int height, double noise, int 
   return settings;
 }
 
-DetectorSettings detector_settings_for(const GreyImage& image, int how_many) {
-  const PictureLight light = estimate_light(image);
+namespace {
+
+DetectorSettings settings_by(const GreyImage& image, const PictureLight& light, int how_many) {
   // In a dim picture hardly anything is above the grey that counts as dark elsewhere.
   const int dark_grey = std::min(kDark_grey, static_cast<int>(0.5 * light.lit_grey));
   return detector_settings_for(image.width, image.height, estimate_noise(image, dark_grey), how_many, light);
 }
 
+}  // namespace
+
+DetectorSettings detector_settings_for(const GreyImage& image, int how_many) {
+  return settings_by(image, estimate_light(image), how_many);
+}
+
 DetectorSettings detector_settings_for_trial(const GreyImage& image, int how_many) {
-  DetectorSettings settings = detector_settings_for(image, how_many);
+  const PictureLight light = estimate_light(image);
+  DetectorSettings settings = settings_by(image, light, how_many);
   // A template of level 0 fits with its gradients; coarser ones are done without where they do not.
   settings.border_px = PatchTemplate::kSide[0] / 2 + 2;
   constexpr double kShareOfCorner = 0.1, kRoundness = 0.03, kWidth = 1280, kSmallest = 0.25;
@@ -198,6 +206,10 @@ DetectorSettings detector_settings_for_trial(const GreyImage& image, int how_man
   const double scale = std::clamp(image.width / kWidth, kSmallest, 1.0);
   settings.highlight_clearance_px *= scale;
   settings.background_clearance_px *= scale;
+  // The edge of a round view goes with the scope, and stands out of all that is in the picture: what is followed must
+  // not have it in its template.
+  constexpr double kTemplate_px = PatchTemplate::kSide[0] / 2 + 2;
+  if (light.has_surround) settings.background_clearance_px = std::max(settings.background_clearance_px, kTemplate_px);
   const double spacing = std::sqrt(static_cast<double>(image.width) * image.height / std::max(how_many, 1));
   constexpr double kOfSpacing = 0.3, kLeast_px = 7, kMost_px = 40;
   settings.min_distance_px = std::clamp(kOfSpacing * spacing, kLeast_px, kMost_px);

@@ -27,8 +27,8 @@ std::optional<double> flat_corner(const GreyImage& image, bool right, bool botto
   return mean;
 }
 
-// What at least two flat corners agree upon; 0 when there is no such thing.
-double surround_of(const GreyImage& image) {
+// What at least two flat corners agree upon.
+std::optional<double> surround_of(const GreyImage& image) {
   constexpr double kAlike_grey = 5;
   std::vector<double> corners;
   for (const bool right : {false, true}) {
@@ -40,7 +40,7 @@ double surround_of(const GreyImage& image) {
   for (std::size_t i = 0; i + 1 < corners.size(); ++i) {
     if (corners[i + 1] - corners[i] <= kAlike_grey) return corners[i + 1];
   }
-  return 0;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -61,9 +61,12 @@ PictureLight estimate_light(const GreyImage& image) {
   constexpr int kBeyondLimited_grey = 241, kLimitedWhite_grey = 235;
   constexpr double kNextToNothing = 1e-3;
   if (counts.share_from(kBeyondLimited_grey) < kNextToNothing) light.white_grey = kLimitedWhite_grey;
-  light.surround_grey = surround_of(image);
+  const auto surround = surround_of(image);
+  light.has_surround = surround.has_value();
+  light.surround_grey = surround.value_or(0);
   light.lit_grey = lit_above(light.surround_grey);
   if (light.surround_grey > kSurroundOfLit * light.lit_grey) {
+    light.has_surround = false;
     light.surround_grey = 0;
     light.lit_grey = lit_above(0);
   }

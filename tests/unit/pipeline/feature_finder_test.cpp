@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <thread>
 #include <vector>
 
@@ -158,6 +159,32 @@ TEST_F(ColouredFinder, BeginsARoundAtAFrameWithColourWhereThereAreAny) {
   }
   ASSERT_GE(adopted_at.size(), 2U);
   for (const std::uint64_t frame : adopted_at) EXPECT_EQ((frame - kFinderFrames) % 7, 0U);
+}
+
+// A scope's field stop leaves a round of the picture; what is on its edge goes with the scope.
+TEST(FinderOfARoundPicture, FindsNothingWhoseTemplateHasTheEdgeInIt) {
+  constexpr int kWidth = 320, kHeight = 240;
+  const Vector2d centre(163.0, 117.0);
+  constexpr double kRadius = 104.0, kTemplateReach = PatchTemplate::kSide[0] / 2 + 1;
+  for (const int surround : {0, 8, 24}) {
+    Still still(kWidth, kHeight);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const double passed = std::clamp((kRadius - (Vector2d(x, y) - centre).norm()) / 1.5 + 0.5, 0.0, 1.0);
+        auto& grey = still.image.at(x, y);
+        grey = static_cast<std::uint8_t>(std::lround(passed * grey + (1.0 - passed) * surround));
+      }
+    }
+    std::size_t found = 0, near_edge = 0;
+    while (still.frame < 120) {
+      for (const Vector2d& px : still.next_frame({}, 60)) {
+        ++found;
+        near_edge += (px - centre).norm() > kRadius - kTemplateReach ? 1 : 0;
+      }
+    }
+    EXPECT_EQ(near_edge, 0U) << surround << " grey around it, of " << found;
+    EXPECT_GE(found, 30U) << surround << " grey around it";
+  }
 }
 
 TEST(FinderOfALargePicture, SearchesABandOfItInEachRoundUntilAllHaveTheirShare) {
