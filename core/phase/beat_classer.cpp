@@ -20,8 +20,6 @@ constexpr double kPause = 1.5;          // rhythm's cycles
 constexpr double kGap = 4.0;            // beyond, beats were missed
 constexpr double kLongest = 1.35;       // cycles
 constexpr int kStale = 8;               // beats in a row that taught the cycle nothing: it may be another by now
-constexpr double kFarOff = 0.5;         // log of an interval to the cycle: whatever is farther counts as much
-constexpr double kSpreadMemory = 24.0;  // beats
 
 }  // namespace
 
@@ -43,7 +41,7 @@ bool BeatClasser::ventricular(const RPeak& peak, const BeatKinds::Comparison& co
   VentricularEvidence evidence;
   evidence.unlike = compared.unlike;
   evidence.log_rr = log_of_cycle(to_seconds(peak.time - last_));
-  evidence.spread = spread_;
+  evidence.spread = scatter_.mean();
   evidence.log_rr_before = log_of_cycle(raw_rr_s_);
   evidence.apart = compared.apart;
   evidence.coupled = compared.coupled;
@@ -109,9 +107,7 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
 void BeatClasser::learn_kind(const RPeak& peak, const BeatKinds::Comparison& compared) noexcept {
   const double log_rr = has_last_ ? log_of_cycle(to_seconds(peak.time - last_)) : 0.0;
   const int learnt = kinds_.learn(peak.shape, compared, log_rr);
-  if (compared.usual && last_usual_kind_ && has_last_) {
-    spread_ += (std::min(std::abs(log_rr), kFarOff) - spread_) / kSpreadMemory;
-  }
+  if (compared.usual && last_usual_kind_ && has_last_) scatter_.learn(log_rr);
   last_usual_kind_ = compared.usual;
   last_kind_ = learnt;
 }

@@ -12,6 +12,7 @@
 #include "core/phase/r_peak.hpp"
 #include "core/phase/recent_values.hpp"
 #include "core/phase/rhythm_monitor.hpp"
+#include "core/phase/rhythm_scatter.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
@@ -47,7 +48,7 @@ class BeatClasser {
   RecentValues<kRhythm> normal_rr_s_;  // between beats in rhythm
   bool has_last_ = false;
   bool has_normal_ = false;
-  double spread_ = 0.1;  // mean deviation of log(interval / cycle), between beats of the usual kind
+  RhythmScatter scatter_;  // of intervals between beats of the usual kind
   bool last_usual_kind_ = false;
   bool last_unusual_ = false;
   int on_time_in_one_shape_ = 0;  // in a row, after the first

@@ -138,6 +138,7 @@ Duration BeatDecision::within_cycle(Duration longest, double share) const noexce
 // A complex as sharp as others before it, within a PR interval: those may be P waves.
 void BeatDecision::note_followers(const QrsCandidate& candidate, int cluster) noexcept {
   const Duration longest = within_cycle(settings_.pr_longest, settings_.pr_of_cycle);
+  int before = -1;
   for (Seen& seen : seen_) {
     if (!seen.waits) continue;
     const Duration apart = candidate.time - seen.time;
@@ -146,7 +147,9 @@ void BeatDecision::note_followers(const QrsCandidate& candidate, int cluster) no
     if (candidate.sharpness < sharper * seen.sharpness) continue;
     clusters_.followed(seen.cluster, true);
     seen.waits = false;
+    before = seen.cluster;
   }
+  clusters_.preceded(cluster, before);
   seen_[static_cast<std::size_t>(next_seen_)] = {candidate.time, candidate.sharpness, cluster, true, -10.0};
   next_seen_ = (next_seen_ + 1) % kSeen;
 }
@@ -244,8 +247,9 @@ EvidenceOf<ComplexEvidence> BeatDecision::complex_evidence(const Waiting& waitin
   context.top_sharpness = levels_.top_sharpness();
   context.quiet_energy = levels_.quiet();
   if (clusters_.recurs(waiting.cluster)) {
-    context.followed =
-        likeness(waiting.correlation, std::max(waiting.gain, 1.0)) * clusters_.followers(waiting.cluster);
+    // A P wave is one whether it is conducted or not.
+    const double share = clusters_.leads(waiting.cluster) ? 1.0 : clusters_.followers(waiting.cluster);
+    context.followed = likeness(waiting.correlation, std::max(waiting.gain, 1.0)) * share;
   }
   context.sharpest_before = waiting.sharpest_before;
   return evidence_of(waiting.candidate, context);

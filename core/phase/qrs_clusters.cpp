@@ -13,10 +13,13 @@ constexpr double kSameSize = 2.0;
 constexpr int kAgree = 3;            // sizes
 constexpr double kLeastGain = 0.25;  // of a beat whose shape is looked for: ten times less is not seen in noise
 constexpr double kSlowestLearning = 1.0 / 8.0;
-constexpr int kDisplaced = 3;         // steps, 15 ms
-constexpr double kMemory = 12.0;      // members that shares are of
-constexpr double kLongMemory = 60.0;  // a burst of 20 s must not outweigh the beats before it
-constexpr double kCaution = 2.0;      // members
+constexpr int kDisplaced = 3;            // steps, 15 ms
+constexpr double kMemory = 12.0;         // members that shares are of
+constexpr double kLongMemory = 60.0;     // a burst of 20 s must not outweigh the beats before it
+constexpr double kCaution = 2.0;         // members
+constexpr double kOften = 0.4;           // share of P waves that are conducted: in 2:1 block half of them
+constexpr double kHardlyWithout = 0.85;  // share of QRS complexes that a P wave precedes
+constexpr int kEnough = 2;               // members
 
 }  // namespace
 
@@ -57,6 +60,9 @@ int QrsClusters::learn(const QrsShape& shape, bool upward, bool calm, Instant se
     rarest->upward = upward;
     rarest->born = seen;
     same.of = static_cast<int>(rarest - clusters_.begin());
+    for (Cluster& c : clusters_) {
+      if (c.before == same.of) c.before = -1;
+    }
   }
   Cluster& c = clusters_[static_cast<std::size_t>(same.of)];
   c.weight += 1.0;
@@ -91,6 +97,21 @@ void QrsClusters::followed(int of, bool by_sharper) noexcept {
   Cluster& c = clusters_[static_cast<std::size_t>(of)];
   c.followed_known = std::min(c.followed_known + 1.0, kMemory);
   c.followed += ((by_sharper ? 1.0 : 0.0) - c.followed) / c.followed_known;
+}
+
+void QrsClusters::preceded(int of, int by) noexcept {
+  if (of < 0) return;
+  Cluster& c = clusters_[static_cast<std::size_t>(of)];
+  c.preceded_known = std::min(c.preceded_known + 1.0, kMemory);
+  if (by >= 0 && by != c.before && c.preceded <= 1.0 - kHardlyWithout) c.before = by;
+  c.preceded += ((by >= 0 && by == c.before ? 1.0 : 0.0) - c.preceded) / c.preceded_known;
+}
+
+bool QrsClusters::leads(int i) const noexcept {
+  if (i < 0 || at(i).followed < kOften) return false;
+  return std::any_of(clusters_.begin(), clusters_.end(), [&](const Cluster& c) {
+    return &c != &at(i) && c.before == i && c.preceded_known >= kEnough && c.preceded >= kHardlyWithout;
+  });
 }
 
 void QrsClusters::settle(int of) noexcept {

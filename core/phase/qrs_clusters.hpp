@@ -32,6 +32,8 @@ class QrsClusters {
   void judged(int of, double log_odds) noexcept;
   // Whether a complex as sharp or sharper followed it within a PR interval.
   void followed(int of, bool by_sharper) noexcept;
+  // Which blunter complex came within a PR interval before it; -1: none.
+  void preceded(int of, int by) noexcept;
   // Its members are beats, though they were seen among disturbances.
   void settle(int of) noexcept;
   void clear() noexcept { clusters_.fill({}); }
@@ -46,6 +48,9 @@ class QrsClusters {
   [[nodiscard]] double followers(int i) const noexcept { return i < 0 ? 0.0 : at(i).followed; }  // share
   // How many of its members it is known of whether something followed them, bounded.
   [[nodiscard]] double followers_known(int i) const noexcept { return i < 0 ? 0.0 : at(i).followed_known; }
+  // Its members are P waves, of which not all are conducted: sharper ones follow many of them, and there is a kind that
+  // hardly ever comes without one of these before it.
+  [[nodiscard]] bool leads(int i) const noexcept;
   [[nodiscard]] Instant born(int i) const noexcept { return at(i).born; }  // its first member was seen
   [[nodiscard]] bool upward(int i) const noexcept { return at(i).upward; }
 
@@ -62,6 +67,9 @@ class QrsClusters {
     double judged = 0.0;  // members that it is of, bounded
     double followed = 0.0;
     double followed_known = 0.0;
+    int before = -1;        // the cluster that precedes it,
+    double preceded = 0.0;  // for this share of its members,
+    double preceded_known = 0.0;
     double calm = 0.0;
     double calm_known = 0.0;
     bool upward = true;

@@ -22,6 +22,7 @@ struct Outcome {
   int stretches = 0;
   int bad = 0;
   int late = 0;
+  int late_only_so = 0;  // of these, without the burst the beat is found
   int unsaid = 0;
   int outside = 0;
   int missed = 0;
@@ -105,9 +106,14 @@ void judge(const RecordedLead& record, const DisturbedStretches& kind, bool off,
     });
     auto beat = std::lower_bound(lead.beats_s.begin(), lead.beats_s.end(), stretch.end_s + 0.2);
     bool late = false;
-    for (int n = 0; n < 6 && beat != lead.beats_s.end(); ++n, ++beat)
-      late = late || (n >= 3 && !found(heard.peaks, *beat));
+    bool only_so = false;
+    for (int n = 0; n < 6 && beat != lead.beats_s.end(); ++n, ++beat) {
+      if (n < 3 || found(heard.peaks, *beat)) continue;
+      late = true;
+      only_so = only_so || found(undisturbed.peaks, *beat);
+    }
     outcome.late += late ? 1 : 0;
+    outcome.late_only_so += only_so ? 1 : 0;
     if (late) late_ones += " " + record.name;
   }
   for (const double beat_s : lead.beats_s) {
@@ -123,9 +129,9 @@ void judge(const RecordedLead& record, const DisturbedStretches& kind, bool off,
 }
 
 void print_row(const std::string& name, const Outcome& o, const std::string& late_ones) {
-  fmt::print("| {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} |\n", name, o.stretches, o.bad, o.late, o.unsaid,
-             Outcome::f1(o.outside, o.missed, o.extra), Outcome::f1(o.outside, o.missed_without, o.extra_without),
-             late_ones);
+  fmt::print("| {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {} |\n", name, o.stretches, o.bad, o.late,
+             o.late_only_so, o.unsaid, Outcome::f1(o.outside, o.missed, o.extra),
+             Outcome::f1(o.outside, o.missed_without, o.extra_without), late_ones);
 }
 
 }  // namespace
@@ -135,8 +141,9 @@ void print_disturbed(const std::vector<RecordedLead>& records, std::uint64_t see
     const std::vector<RecordedLead> part = part_of(records, aside, false);
     if (part.empty()) continue;
     fmt::print(
-        "| {} | stretches | bad | late | called good after 1 s | F1 outside, % | the same beats without, % | late "
-        "in records |\n|---|---|---|---|---|---|---|---|\n",
+        "| {} | stretches | bad | late | of these not without it | called good after 1 s | F1 outside, % | the same "
+        "beats without, % | late "
+        "in records |\n|---|---|---|---|---|---|---|---|---|\n",
         aside ? "aside" : "development");
     std::mt19937_64 generator(seed);
     const auto run = [&](const DisturbedStretches& kind, bool off, int times) {

@@ -311,8 +311,9 @@ TEST_F(Steady, WhereNoBeatHasTaughtTheCycleForEightTheCycleIsThatOfTheLatest) {
     for (int i = 0; i < beats; ++i) see(560 + i % 3, i % 2 == 0 ? shape(0.4) : like_usual(0.3));
     return see(600, usual_beat());
   };
-  EXPECT_EQ(after_run(8), BeatClass::kPremature) << "0.75 of the cycle before";
-  EXPECT_EQ(after_run(20), BeatClass::kNormal);
+  // From the ninth on the cycle learns, and half of the eight that it is the median of must be of the run.
+  EXPECT_EQ(after_run(11), BeatClass::kPremature) << "0.75 of the cycle before";
+  EXPECT_EQ(after_run(14), BeatClass::kNormal);
 }
 
 TEST_F(Classed, OnlyNormalCyclesTeach) {

@@ -153,6 +153,25 @@ TEST(BeatDecision, AKindThatMayBeAPWaveWaitsForItsQrsComplex) {
   EXPECT_LT(longest_s(4), 0.12) << "so many are followed by chance";
 }
 
+// Every second P wave is conducted, after 0.16 s.
+TEST(BeatDecision, APWaveWithoutAQrsComplexIsNoBeatOnceTwoHaveBeenConducted) {
+  Patient patient;
+  std::vector<double> blocked_s;
+  std::vector<double> beats_s;
+  double p_s = 0.2;
+  for (int i = 0; i < 24; ++i, p_s += 0.8) {
+    patient.see(p_s, [](QrsCandidate& c) { c.shape = kWide, c.energy *= 0.7, c.sharpness *= 0.5; });
+    if (i % 2 == 0) {
+      blocked_s.push_back(p_s);
+      continue;
+    }
+    patient.see(p_s + 0.16);
+    beats_s.push_back(p_s + 0.16);
+  }
+  for (std::size_t i = 2; i + 1 < blocked_s.size(); ++i) EXPECT_FALSE(patient.told_at(blocked_s[i])) << i;
+  for (std::size_t i = 1; i < beats_s.size(); ++i) EXPECT_TRUE(patient.told_at(beats_s[i])) << i;
+}
+
 // ---- two of one complex, and two beats
 
 TEST(BeatDecision, OfTwoMeasuresOfOneComplexTheFarLargerIsItsMiddle) {

@@ -126,7 +126,7 @@ TEST(MadeLeads, BeatsAreFoundWhateverTheirWavesAreLike) {
   const Swept swept = sweep(asked != nullptr ? std::atoi(asked) : 150);
   ASSERT_GT(swept.calm, 10);
   EXPECT_LE(swept.calm_failed, 0.01 * swept.calm);
-  EXPECT_LE(swept.failed, 0.15 * swept.plain);
+  EXPECT_LE(swept.failed, 0.12 * swept.plain);
   EXPECT_LE(swept.wrong, 0.02 * swept.plain);
 }
 

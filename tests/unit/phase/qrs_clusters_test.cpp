@@ -85,6 +85,45 @@ TEST(QrsClusters, KnowsTheShareThatASharperOneFollows) {
   EXPECT_EQ(clusters.followers_known(wave), 8.0);
 }
 
+// Of ten P waves so many are conducted, and of ten QRS complexes so many come after one.
+bool leads(int conducted, int with_p_wave, int qrs_complexes = 10) {
+  QrsClusters clusters;
+  const int wave = clusters.learn(kOther, true, true, kNow);
+  const int beat = clusters.learn(kBeat, true, true, kNow);
+  for (int i = 0; i < 10; ++i) clusters.followed(wave, i < conducted);
+  for (int i = 0; i < qrs_complexes; ++i) clusters.preceded(beat, i < with_p_wave ? wave : -1);
+  EXPECT_FALSE(clusters.leads(beat));
+  return clusters.leads(wave);
+}
+
+TEST(QrsClusters, AWaveThatHalfOfTheTimeLeadsAComplexWhichNeverComesWithoutItIsAPWave) {
+  EXPECT_TRUE(leads(5, 10)) << "2:1 block";
+  EXPECT_TRUE(leads(10, 10));
+  EXPECT_FALSE(leads(3, 10)) << "chance";
+  EXPECT_TRUE(leads(5, 9)) << "one ventricular beat among them";
+  EXPECT_FALSE(leads(5, 7)) << "what follows comes without it as well: an ectopic beat after a normal one";
+  EXPECT_FALSE(leads(5, 1, 1));
+  EXPECT_TRUE(leads(5, 2, 2)) << "two are enough: each that is not known as a P wave is told as a beat";
+}
+
+TEST(QrsClusters, WhatComesBeforeIsOfOneKind) {
+  QrsClusters clusters;
+  const int wave = clusters.learn(kOther, true, true, kNow);
+  const int other = clusters.learn(shape(0.4, 2.5), true, true, kNow);
+  const int beat = clusters.learn(kBeat, true, true, kNow);
+  for (int i = 0; i < 12; ++i) {
+    clusters.followed(wave, true);
+    clusters.followed(other, true);
+    clusters.preceded(beat, i % 2 == 0 ? wave : other);
+  }
+  EXPECT_FALSE(clusters.leads(wave));
+  EXPECT_FALSE(clusters.leads(other));
+  // The P wave's shape has changed for good.
+  for (int i = 0; i < 60; ++i) clusters.preceded(beat, other);
+  EXPECT_TRUE(clusters.leads(other));
+  EXPECT_FALSE(clusters.leads(wave));
+}
+
 TEST(QrsClusters, JudgesByTheMeanOfItsMembersAndCautiouslyWhereTheyAreFew) {
   QrsClusters clusters;
   const int beat = clusters.learn(kBeat, true, true, kNow);
