@@ -14,6 +14,7 @@
   COMMAND(watch)                  \
   COMMAND(view)                   \
   COMMAND(report)                 \
+  COMMAND(session)                \
   COMMAND(ecg)                    \
   COMMAND(bench)                  \
   COMMAND(experiment)             \

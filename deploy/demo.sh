@@ -173,4 +173,11 @@ for name in 0mm 1.4mm; do
     --picture "$output/heart-$name.svg" || fail "report on heart-$name.mcap"
 done
 
-say "Done. Pictures: $output/heart-0mm.svg, $output/heart-1.4mm.svg"
+for name in 0mm 1.4mm; do
+  say "The same session without its truth, as after a real one: tracker noise ${name%mm} mm"
+  run "$perimap" session "$output/heart-$name.mcap" --samples "$output/heart-$name.received.mcap" \
+    --html "$output/session-$name.html" || fail "page of heart-$name.mcap"
+done
+
+say "Pictures: $output/heart-0mm.svg, $output/heart-1.4mm.svg"
+say "Done. Session reports: file://$PWD/$output/session-0mm.html, file://$PWD/$output/session-1.4mm.html"

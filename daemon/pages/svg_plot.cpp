@@ -78,7 +78,7 @@ std::string plot_group(const Plot& plot, double x_px, double y_px, double width_
       y.include(p.y);
     }
   }
-  x = padded(x);
+  x = plot.x_range ? Range{plot.x_range->first, plot.x_range->second} : padded(x);
   y = padded(y);
   if (plot.y_from_zero) y.low = 0.0;
   const double inner_width = width_px - kMarginLeft - kMarginRight;

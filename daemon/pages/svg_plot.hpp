@@ -1,7 +1,9 @@
 // Line plots as SVG text.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace perimap {
@@ -25,6 +27,8 @@ struct Plot {
   std::vector<PlotLine> lines;
   bool equal_aspect = false;  // a unit of x is as long as a unit of y
   bool y_from_zero = false;
+  std::optional<std::pair<double, double>> x_range =
+      std::nullopt;  // what the axis shows; none: the data and a little room
 };
 
 // One plot of this size with axes, ticks and legend, as an SVG group whose corner is at (x_px, y_px).

@@ -20,6 +20,8 @@ double largest_deviation_mm(const double (&covariance)[6]) {
   return std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
 }
 
+}  // namespace
+
 SurfaceDigest digest(const perimap_Surface& surface) {
   SurfaceDigest digest;
   digest.sample_sequence = surface.sample_sequence;
@@ -44,8 +46,6 @@ SurfaceDigest digest(const perimap_Surface& surface) {
   }
   return digest;
 }
-
-}  // namespace
 
 void WatchStatistics::add(const perimap_Surface& surface, Instant receipt, std::uint64_t writer) {
   Stream& stream = streams_[{surface.source, surface.stream}];

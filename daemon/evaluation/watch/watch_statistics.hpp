@@ -30,6 +30,8 @@ struct SurfaceDigest {
   std::optional<double> median_deviation_mm;
 };
 
+[[nodiscard]] SurfaceDigest digest(const perimap_Surface& surface);
+
 // The last status of a stream.
 struct StatusDigest {
   perimap_Status status{};  // its sequences are empty

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "daemon/publishing/wire_names.hpp"
-#include "daemon/view/messages/advice.hpp"
+#include "daemon/publishing/advice.hpp"
 #include "daemon/view/messages/milliseconds.hpp"
 
 namespace perimap {

@@ -1,4 +1,4 @@
-#include "daemon/view/messages/advice.hpp"
+#include "daemon/publishing/advice.hpp"
 
 namespace perimap {
 
