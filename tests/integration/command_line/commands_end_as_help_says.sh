@@ -55,6 +55,8 @@ ends 1 "nothing.mcap" replay nothing.mcap
 ends 2 "--domain" watch --domain 999
 ends 1 "none/x.mcap" watch --record none/x.mcap
 ends 2 "--picture: expected" report r.mcap --samples r.mcap --picture p.jpg
+ends 1 "nothing.mcap" session nothing.mcap
+ends 1 "holds no published surface" session r.mcap
 ends 1 "nothing.mcap" report nothing.mcap --samples nothing.mcap
 ends 2 "a recording knows its rate" ecg r.mcap --rate 250
 ends 1 "nothing.csv" ecg nothing.csv

@@ -1,5 +1,5 @@
 #!/bin/sh
-# perimap replay and perimap report write over nothing that they read.
+# perimap replay, perimap report and perimap session write over nothing that they read.
 set -eu
 perimap=$1
 recording=$2
@@ -21,5 +21,7 @@ refuses() {
 for name in r.mcap link.mcap "$work/r.mcap"; do
   for option in --json --samples; do refuses replay --lockstep r.mcap "$option" "$name"; done
   for option in --json --picture; do refuses report r.mcap --samples s.mcap "$option" "$name"; done
+  option=--html
+  refuses session r.mcap --samples s.mcap --html "$name"
 done
 for option in --json --picture; do refuses report r.mcap --samples s.mcap "$option" s.mcap; done
