@@ -23,35 +23,6 @@ Matrix3d mean_of(const std::vector<Matrix3d>& rotations) {
   return mean;
 }
 
-// Of what the pairs of readings tell within each second.
-struct Seconds {
-  std::vector<Matrix3d> R_S2;
-  std::size_t pairs = 0;
-};
-
-Seconds means_over_seconds(const std::vector<TimedPose>& sensor, const std::vector<TimedPose>& second) {
-  constexpr double kLong_s = 1.0;
-  constexpr std::size_t kFewestPairs = 5;
-  const double gap_s = longest_gap_s(sensor);
-  Seconds seconds;
-  std::vector<Matrix3d> within;
-  double begin_s = 0.0;
-  const auto end_second = [&] {
-    if (within.size() >= kFewestPairs) seconds.R_S2.push_back(mean_of(within));
-    within.clear();
-  };
-  for (const TimedPose& pose : second) {
-    const auto at = pose_at(sensor, pose.t_s, gap_s);
-    if (!at) continue;
-    if (!within.empty() && pose.t_s >= begin_s + kLong_s) end_second();
-    if (within.empty()) begin_s = pose.t_s;
-    within.emplace_back(at->X.R.transpose() * pose.X.R);
-    ++seconds.pairs;
-  }
-  end_second();
-  return seconds;
-}
-
 // The axis of all turns from the first relation, those that turn farther counting more.
 Expected<SecondSensor> axis_of(const std::vector<HeldRelation>& held) {
   SecondSensor second;
@@ -98,26 +69,50 @@ double left_over_rad2(const TurnedScope& scope, const std::vector<SetupAtRotatio
 
 }  // namespace
 
+std::vector<TimedTurn> relations_over(const std::vector<TimedPose>& sensor, const std::vector<TimedPose>& second,
+                                      double each_s) {
+  constexpr std::size_t kFewestPairs = 5;
+  const double gap_s = longest_gap_s(sensor);
+  std::vector<TimedTurn> relations;
+  std::vector<Matrix3d> within;
+  double begin_s = 0.0, last_s = 0.0;
+  const auto end_stretch = [&] {
+    if (within.size() >= kFewestPairs) relations.push_back({0.5 * (begin_s + last_s), mean_of(within)});
+    within.clear();
+  };
+  for (const TimedPose& pose : second) {
+    const auto at = pose_at(sensor, pose.t_s, gap_s);
+    if (!at) continue;
+    if (!within.empty() && pose.t_s >= begin_s + each_s) end_stretch();
+    if (within.empty()) begin_s = pose.t_s;
+    last_s = pose.t_s;
+    within.emplace_back(at->X.R.transpose() * pose.X.R);
+  }
+  end_stretch();
+  return relations;
+}
+
 Expected<HeldRelation> held_relation(const std::vector<TimedPose>& sensor, const std::vector<TimedPose>& second) {
   constexpr std::size_t kFewest = 5;
-  const Seconds seconds = means_over_seconds(sensor, second);
-  HeldRelation held;
-  held.pairs = seconds.pairs;
-  if (seconds.R_S2.size() < kFewest) {
-    return fail("the two sensors are seen together for " + std::to_string(seconds.R_S2.size()) +
+  constexpr double kSecond_s = 1.0;
+  std::vector<Matrix3d> seconds;
+  for (const TimedTurn& relation : relations_over(sensor, second, kSecond_s)) seconds.push_back(relation.R);
+  if (seconds.size() < kFewest) {
+    return fail("the two sensors are seen together for " + std::to_string(seconds.size()) +
                 " seconds only: keep both in sight of the tracker for five and more");
   }
-  held.R_S2 = mean_of(seconds.R_S2);
+  HeldRelation held;
+  held.R_S2 = mean_of(seconds);
   std::vector<double> off_axis[3];
   double squares = 0.0;
   double farthest_rad = 0.0;
-  for (const Matrix3d& R : seconds.R_S2) {
+  for (const Matrix3d& R : seconds) {
     const Vector3d off = so3_log(held.R_S2.transpose() * R);
     for (int k = 0; k < 3; ++k) off_axis[k].push_back(off[k]);
     squares += off.squaredNorm();
     farthest_rad = std::max(farthest_rad, off.norm());
   }
-  const auto count = static_cast<double>(seconds.R_S2.size());
+  const auto count = static_cast<double>(seconds.size());
   held.spread_rad = std::sqrt(squares / (3.0 * (count - 1.0)));
   // Slow errors are common to seconds that follow each other.
   double length = 0.0;

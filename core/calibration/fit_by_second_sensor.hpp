@@ -1,9 +1,9 @@
 // The set-up of an angled scope as a function of its turn, where a second tracked sensor tells that turn.
 #pragma once
 
-#include <cstddef>
 #include <vector>
 
+#include "core/calibration/held_stretches.hpp"
 #include "core/calibration/timed_poses.hpp"
 #include "core/calibration/turned_scope.hpp"
 #include "core/error/expected.hpp"
@@ -15,10 +15,14 @@ struct HeldRelation {
   Matrix3d R_S2 = Matrix3d::Identity();
   double deviation_rad = 0.0;  // standard deviation per axis, of the mean, by the means over a second
   double spread_rad = 0.0;     // RMS of the means over a second about it, per axis
-  std::size_t pairs = 0;
 };
 
-// Each of both in the order of its times, on one clock. Fails, and says what is missing, when they are hardly seen
+// The second sensor's orientation in the frame of the first, by the mean of each so many seconds in which both are
+// seen. Each of both in the order of its times, on one clock.
+[[nodiscard]] std::vector<TimedTurn> relations_over(const std::vector<TimedPose>& sensor,
+                                                    const std::vector<TimedPose>& second, double each_s);
+
+// Likewise of all of the time. Fails, and says what is missing, when they are hardly seen
 // together, or one turned against the other meanwhile.
 [[nodiscard]] Expected<HeldRelation> held_relation(const std::vector<TimedPose>& sensor,
                                                    const std::vector<TimedPose>& second);

@@ -37,8 +37,8 @@ std::vector<TimedPose> thinned(const std::vector<TimedPose>& poses, std::size_t 
 
 class BoardGuide final : public LiveGuide {
  public:
-  BoardGuide(const BoardWish& wish, std::optional<CameraModel> camera, double least_s)
-      : wish_(wish), camera_(camera), least_s_(least_s) {}
+  BoardGuide(const BoardWish& wish, std::optional<CameraModel> camera, double least_s, Turning turning)
+      : wish_(wish), camera_(camera), least_s_(least_s), turned_(camera || turning == Turning::kWanted) {}
 
   void see(double t_s, const GreyImage& grey) override {
     ++frames_;
@@ -79,7 +79,7 @@ class BoardGuide final : public LiveGuide {
     const std::string missing = missing_ninths();
     if (!missing.empty()) {
       text += "; show it " + missing;
-    } else if (camera_ && turned_deg_.minCoeff() < kWanted_deg) {
+    } else if (turned_ && turned_deg_.minCoeff() < kWanted_deg) {
       text += fmt::format("; turned {:.0f} {:.0f} {:.0f} degrees about three axes: tilt and turn the scope further",
                           turned_deg_[0], turned_deg_[1], turned_deg_[2]);
     } else {
@@ -90,7 +90,7 @@ class BoardGuide final : public LiveGuide {
 
   [[nodiscard]] bool enough() const override {
     return views_.size() >= kWantedViews && last_s_ - first_s_.value_or(last_s_) >= least_s_ &&
-           missing_ninths().empty() && (!camera_ || (turned_deg_.minCoeff() >= kWanted_deg && determined_));
+           missing_ninths().empty() && (!turned_ || turned_deg_.minCoeff() >= kWanted_deg) && (!camera_ || determined_);
   }
 
  private:
@@ -109,6 +109,7 @@ class BoardGuide final : public LiveGuide {
   BoardWish wish_;
   std::optional<CameraModel> camera_;
   double least_s_;
+  bool turned_;  // wanted
   std::optional<Board> board_;
   std::vector<TimedView> views_;
   std::array<int, 9> coverage_{};
@@ -185,8 +186,9 @@ class StillGuide final : public LiveGuide {
 
 }  // namespace
 
-std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<CameraModel> camera, double least_s) {
-  return std::make_unique<BoardGuide>(wish, camera, least_s);
+std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<CameraModel> camera, double least_s,
+                                       Turning turning) {
+  return std::make_unique<BoardGuide>(wish, camera, least_s, turning);
 }
 
 std::unique_ptr<LiveGuide> pivot_guide(double least_s) { return std::make_unique<PivotGuide>(least_s); }

@@ -27,16 +27,21 @@ class LiveGuide {
   virtual void see(double t_s, const GreyImage& grey) = 0;
   // All poses so far of the tool that matters.
   virtual void follow(const std::vector<TimedPose>& poses) = 0;
+  // Likewise of a second sensor, where the configuration names one.
+  virtual void follow_second(const std::vector<TimedPose>& /*poses*/) {}
   // One line.
   [[nodiscard]] virtual std::string line() const = 0;
   // Whether there is enough of everything.
   [[nodiscard]] virtual bool enough() const = 0;
 };
 
-// The board from all sides: in which ninths of the picture it was, and, where the lens is known, how far the tracked
-// scope was turned and what a hand-eye calibration would leave over by now.
+// Whether the tracked scope must be turned about the board for what is measured.
+enum class Turning { kNotWanted, kWanted };
+
+// The board from all sides: in which ninths of the picture it was, and, where that is wanted or the lens is known, how
+// far the tracked scope was turned; by the lens, what a hand-eye calibration would leave over by now.
 [[nodiscard]] std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<CameraModel> camera,
-                                                     double least_s);
+                                                     double least_s, Turning turning = Turning::kNotWanted);
 // A tool swung about its tip: how far it was turned, and what a calibration would leave over by now.
 [[nodiscard]] std::unique_ptr<LiveGuide> pivot_guide(double least_s);
 // A sensor that lies still: for how long.

@@ -32,7 +32,8 @@
 namespace perimap {
 namespace {
 
-// What the devices' threads leave for the guide: the newest frame, and all poses of the tool that matters.
+// What the devices' threads leave for the guide: the newest frame, and all poses of the tool that matters and of a
+// second sensor.
 class Shown final : public FrameObserver {
  public:
   void frame(const CameraFrame& frame) override {
@@ -49,11 +50,8 @@ class Shown final : public FrameObserver {
     t_s_ = to_seconds(frame.stamp.capture.time_since_epoch());
     fresh_ = true;
   }
-  void pose(const TrackerSample& sample) {
-    if (sample.state != ToolState::kOk) return;
-    const std::scoped_lock lock(mutex_);
-    poses_.push_back({to_seconds(sample.source_time.time_since_epoch()), sample.X_WS});
-  }
+  void pose(const TrackerSample& sample) { add(sample, poses_); }
+  void second_pose(const TrackerSample& sample) { add(sample, second_poses_); }
   void tell(LiveGuide& guide) {
     std::vector<std::uint8_t> pixels;
     {
@@ -65,15 +63,23 @@ class Shown final : public FrameObserver {
       const std::scoped_lock lock(mutex_);
       fresh_ = false;
     }
-    std::vector<TimedPose> poses;
+    std::vector<TimedPose> poses, second_poses;
     {
       const std::scoped_lock lock(mutex_);
       poses = poses_;
+      second_poses = second_poses_;
     }
     if (!poses.empty()) guide.follow(in_order(std::move(poses)));
+    if (!second_poses.empty()) guide.follow_second(in_order(std::move(second_poses)));
   }
 
  private:
+  void add(const TrackerSample& sample, std::vector<TimedPose>& poses) {
+    if (sample.state != ToolState::kOk) return;
+    const std::scoped_lock lock(mutex_);
+    poses.push_back({to_seconds(sample.source_time.time_since_epoch()), sample.X_WS});
+  }
+
   GreyConverter converter_;  // of the camera's thread
   std::mutex mutex_;
   bool fresh_ = false;
@@ -82,6 +88,7 @@ class Shown final : public FrameObserver {
   int height_ = 0;
   std::vector<std::uint8_t> pixels_;
   std::vector<TimedPose> poses_;
+  std::vector<TimedPose> second_poses_;
 };
 
 Expected<std::filesystem::path> recording_file(const LiveSettings& settings) {
@@ -178,7 +185,9 @@ SetupExpected<LiveRecording> record_live(const LiveSettings& settings, const std
       };
       const ToolSink tools = [&](const ToolSample& sample) {
         (*recorder)->tool(sample);
-        if (sample.tool < names.size() && names[sample.tool] == tool) shown.pose(sample);
+        if (sample.tool >= names.size()) return;
+        if (names[sample.tool] == tool) shown.pose(sample);
+        if (names[sample.tool] == kSecondSensorTool) shown.second_pose(sample);
       };
       serve_tracker(*devices.tracker, sink, tools, tracker_health, interrupt);
     });

@@ -9,6 +9,7 @@
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/tracked_tools.hpp"
 #include "daemon/setup/pictures.hpp"
+#include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/recorded_relation.hpp"
 #include "daemon/setup/recorded_sensor.hpp"
 #include "drivers/calibration/calibration_facts.hpp"
@@ -52,60 +53,81 @@ Expected<void> same_size(const CameraModel& lens, const std::string& lens_file, 
                   lens_file, lens.width, lens.height, first.width, first.height));
 }
 
-// The set-up as a function of the rotation, from those at which it was calibrated, where a second sensor tells that.
-Expected<TurnedScope> scope_by_second_sensor(const ScopeCalibrationSource& source) {
-  std::vector<SetupAtRotation> setups;
-  std::vector<HeldRelation> held;
-  std::optional<CameraModel> first;
-  for (const ScopeAtTurn& files : source.setups) {
+// One set-up of files, its turn by a second sensor or by the field stop.
+Expected<MeasuredTurn> measured_turn(const ScopeAtTurn& files, bool by_second_sensor) {
+  MeasuredTurn turn;
+  std::optional<ScopeRotation> stop;
+  if (by_second_sensor) {
     const auto relation = relation_in_recording(files.seen);
     if (!relation) return tl::unexpected(relation.error());
+    turn.relation = *relation;
     const auto lens = read_calibration(files.camera);
     if (!lens) return tl::unexpected(lens.error());
-    if (!first) first = *lens;
-    if (const auto same = same_size(*lens, files.camera, *first); !same) return tl::unexpected(same.error());
-    const auto setup = read_setup(files.hand_eye, files.camera);
-    if (!setup) return tl::unexpected(setup.error());
-    setups.push_back(*setup);
-    held.push_back(*relation);
+    turn.lens = *lens;
+  } else {
+    auto seen = seen_with_lens(files.seen, files.camera);
+    if (!seen) return tl::unexpected(seen.error());
+    turn.lens = seen->lens;
+    stop = std::move(seen->stop);
   }
-  auto scope = fit_by_second_sensor(std::move(setups), held);
-  if (!scope) return scope;
-  scope->width = first->width;
-  scope->height = first->height;
-  return scope;
+  const auto setup = read_setup(files.hand_eye, files.camera);
+  if (!setup) return tl::unexpected(setup.error());
+  turn.setup = *setup;
+  if (!stop) return turn;
+  turn.stop_centre_px = stop->centre_px;
+  turn.setup.rotation_rad = stop->rotation_rad;
+  turn.setup.rotation_deviation_rad = stop->rotation_deviation_rad;
+  turn.setup.radius_px = stop->radius_px;
+  return turn;
+}
+
+Expected<std::vector<MeasuredTurn>> measured_turns(const ScopeCalibrationSource& source) {
+  std::vector<MeasuredTurn> turns;
+  for (const ScopeAtTurn& files : source.setups) {
+    auto turn = measured_turn(files, source.by_second_sensor);
+    if (!turn) return tl::unexpected(turn.error());
+    if (!turns.empty()) {
+      if (const auto same = same_size(turn->lens, files.camera, turns.front().lens); !same) {
+        return tl::unexpected(same.error());
+      }
+    }
+    turns.push_back(*std::move(turn));
+  }
+  return turns;
 }
 
 // The set-up as a function of the rotation, from those at which it was calibrated, and of the zoom.
-Expected<TurnedScope> turned_scope(const ScopeCalibrationSource& source) {
+Expected<TurnedScope> turned_scope(const ScopeCalibrationSource& source, const std::vector<MeasuredTurn>& turns) {
   std::vector<SetupAtRotation> setups;
-  std::optional<CameraModel> first;
+  std::vector<HeldRelation> held;
   Vector2d turn_px = Vector2d::Zero();
-  for (const ScopeAtTurn& files : source.setups) {
-    const auto seen = seen_with_lens(files.seen, files.camera);
-    if (!seen) return tl::unexpected(seen.error());
-    auto setup = read_setup(files.hand_eye, files.camera);
-    if (!setup) return tl::unexpected(setup.error());
-    if (!first) first = seen->lens;
-    if (const auto same = same_size(seen->lens, files.camera, *first); !same) return tl::unexpected(same.error());
-    setup->rotation_rad = seen->stop.rotation_rad;
-    setup->rotation_deviation_rad = seen->stop.rotation_deviation_rad;
-    setup->radius_px = seen->stop.radius_px;
-    setups.push_back(*setup);
-    turn_px += seen->stop.centre_px / static_cast<double>(source.setups.size());
+  for (const MeasuredTurn& turn : turns) {
+    setups.push_back(turn.setup);
+    if (turn.relation) held.push_back(*turn.relation);
+    if (turn.stop_centre_px) turn_px += *turn.stop_centre_px / static_cast<double>(turns.size());
   }
-  auto scope = fit_turned_scope(setups, turn_px);
+  auto scope =
+      source.by_second_sensor ? fit_by_second_sensor(std::move(setups), held) : fit_turned_scope(setups, turn_px);
   if (!scope) return scope;
-  scope->width = first->width;
-  scope->height = first->height;
+  const CameraModel& first = turns.front().lens;
+  scope->width = first.width;
+  scope->height = first.height;
   for (const ScopeAtZoom& files : source.zooms) {
     const auto seen = seen_with_lens(files.seen, files.camera);
     if (!seen) return tl::unexpected(seen.error());
-    if (const auto same = same_size(seen->lens, files.camera, *first); !same) return tl::unexpected(same.error());
+    if (const auto same = same_size(seen->lens, files.camera, first); !same) return tl::unexpected(same.error());
     scope->focals.push_back({seen->stop.radius_px, {seen->lens.fx, seen->lens.fy}});
   }
-  scope->focals = focal_table(std::move(scope->focals));
+  if (!source.zooms.empty()) scope->focals = focal_table(std::move(scope->focals));
   return scope;
+}
+
+// Those of the turns.
+std::vector<std::string> recordings_of(const ScopeCalibrationSource& source) {
+  if (source.setups.empty()) return {source.recording};
+  std::vector<std::string> recordings;
+  for (const ScopeAtTurn& files : source.setups) recordings.push_back(files.seen);
+  return recordings;
 }
 
 // Of which tool the turn was told, as the recordings say, or the configuration; none: nobody says. Fails where one says
@@ -121,16 +143,16 @@ SetupExpected<std::optional<std::string>> second_sensor_named(const ScopeCalibra
     said_by = source.configuration;
     protocol = configuration->tracker.protocol;
   }
-  for (const ScopeAtTurn& files : source.setups) {
-    const auto own = recorded_handle(files.seen, kSecondSensorTool);
+  for (const std::string& recording : recordings_of(source)) {
+    const auto own = recorded_handle(recording, kSecondSensorTool);
     if (!own) return tl::unexpected(own.error());
     if (!*own) continue;
     if (tool && !same_tool(*tool, **own, protocol)) {
       return fail(
           fmt::format("{}: its second sensor is \"{}\", and that of {} \"{}\": expected one that stays where it is",
-                      files.seen, **own, said_by, *tool));
+                      recording, **own, said_by, *tool));
     }
-    if (!tool) said_by = files.seen, tool = *own;
+    if (!tool) said_by = recording, tool = *own;
   }
   return tool;
 }
@@ -147,7 +169,9 @@ SetupExpected<std::optional<std::string>> sensor_of(const ScopeCalibrationSource
     sensor = configuration->tracker.sensor;
     said_by = source.configuration;
     protocol = configuration->tracker.protocol;
+    if (source.setups.empty()) return calibrated_sensor(source.recording, *configuration, source.configuration);
   }
+  if (source.setups.empty()) return recorded_handle(source.recording, kScopeTool);
   for (const ScopeAtTurn& files : source.setups) {
     const auto own = calibration_fact(files.hand_eye, "sensor");
     if (!own) continue;
@@ -162,12 +186,35 @@ SetupExpected<std::optional<std::string>> sensor_of(const ScopeCalibrationSource
 
 }  // namespace
 
-SetupExpected<ScopeCalibration> calibrate_scope(const ScopeCalibrationSource& source) {
+SetupExpected<ScopeCalibration> calibrate_scope(
+    const ScopeCalibrationSource& source, const std::function<void(std::uint64_t done, std::uint64_t all)>& progress) {
   ScopeCalibration result;
-  if (!source.setups.empty()) {
-    auto scope = source.by_second_sensor ? scope_by_second_sensor(source) : turned_scope(source);
-    if (!scope) return tl::unexpected(scope.error());
+  const bool of_one_recording = source.setups.empty() && source.board.square_mm > 0.0;
+  if (of_one_recording || !source.setups.empty()) {
+    std::vector<MeasuredTurn> turns;
+    if (of_one_recording) {
+      auto recorded = turns_in_recording(source.recording, source.board, source.by_second_sensor, progress);
+      if (!recorded) return tl::unexpected(recorded.error());
+      for (const RecordedTurn& turn : recorded->turns) turns.push_back(turn.measured);
+      result.turns = *std::move(recorded);
+    } else {
+      auto measured = measured_turns(source);
+      if (!measured) return tl::unexpected(measured.error());
+      turns = *std::move(measured);
+    }
+    auto scope = turned_scope(source, turns);
+    if (!scope) {
+      const std::string told = result.turns ? source.recording + ": " : "";
+      const auto& left_out = result.turns ? result.turns->left_out : std::vector<std::string>{};
+      return fail(told + scope.error().message + (left_out.empty() ? "" : " (not measured: " + left_out.front() + ")"));
+    }
     result.scope = *std::move(scope);
+    for (const MeasuredTurn& turn : turns) {
+      result.setups.push_back(turn.setup);
+      if (turn.relation) {
+        result.setups.back().rotation_rad = result.scope->second_sensor->rotation_rad(turn.relation->R_S2);
+      }
+    }
     auto sensor = sensor_of(source);
     if (!sensor) return tl::unexpected(sensor.error());
     result.sensor = *std::move(sensor);
@@ -176,10 +223,12 @@ SetupExpected<ScopeCalibration> calibrate_scope(const ScopeCalibrationSource& so
       if (!second) return tl::unexpected(second.error());
       result.second_sensor = *std::move(second);
     }
-    if (source.pictures.empty() && source.recording.empty()) return result;
+    if (of_one_recording || (source.pictures.empty() && source.recording.empty())) return result;
   }
   if (source.pictures.empty() == source.recording.empty()) {
-    return wrong_setup("expected pictures of the field stop, a recording with --from, or set-ups with --at");
+    return wrong_setup(
+        "expected pictures of the field stop, a recording with --from, devices with --live, or set-ups "
+        "with --at");
   }
   auto rotation =
       source.recording.empty() ? rotation_in_pictures(source.pictures) : rotation_in_recording(source.recording);

@@ -239,4 +239,32 @@ std::vector<Plot> plots_of(const ScopeRotation& rotation) {
   return {plot};
 }
 
+std::vector<Plot> plots_of(const TurnedScope& scope, const std::vector<SetupAtRotation>& setups) {
+  constexpr double kNoPoint = std::numeric_limits<double>::quiet_NaN();
+  const auto plot_of = [&](const char* title, const char* unit, auto left_over) {
+    Plot plot;
+    plot.title = title;
+    plot.x_label = "turn of the scope, degrees";
+    plot.y_label = unit;
+    PlotLine line;
+    line.width_px = 2.0;
+    for (const SetupAtRotation& setup : setups) {
+      const double x = setup.rotation_rad / kDegree;
+      const double y = left_over(setup, scope.at(setup.rotation_rad));
+      line.points.insert(line.points.end(), {{x, 0.0}, {x, y}, {kNoPoint, kNoPoint}});
+    }
+    line.label = "each set-up";
+    plot.lines = {line};
+    return plot;
+  };
+  return {plot_of("Hand-eye translation of each set-up, off the function", "mm",
+                  [](const SetupAtRotation& is, const SetupAtRotation& expected) {
+                    return (expected.X_SC.inverse() * is.X_SC).t.norm();
+                  }),
+          plot_of("Principal point of each set-up, off the function", "px",
+                  [](const SetupAtRotation& is, const SetupAtRotation& expected) {
+                    return (is.principal_px - expected.principal_px).norm();
+                  })};
+}
+
 }  // namespace perimap

@@ -61,5 +61,7 @@ class NotchReadings {
 [[nodiscard]] std::string text_of(const TurnedScope& scope);
 [[nodiscard]] nlohmann::json json_of(const TurnedScope& scope);
 [[nodiscard]] std::vector<Plot> plots_of(const ScopeRotation& rotation);
+// What the function leaves over of the set-ups that it was made from, by their turn.
+[[nodiscard]] std::vector<Plot> plots_of(const TurnedScope& scope, const std::vector<SetupAtRotation>& setups);
 
 }  // namespace perimap

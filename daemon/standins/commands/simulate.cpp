@@ -41,8 +41,8 @@ struct SimulateOptions {
   std::string board = "charuco";
   std::optional<double> notch_deg;
   double zoom = 1.0;
-  std::optional<double> turn_to_deg, zoom_to;
-  double turn_at_s = 10.0;
+  std::vector<double> turn_to_deg, turn_at_s;
+  std::optional<double> zoom_to;
   bool scope_uncalibrated = false;
   bool second_sensor = false;
   std::filesystem::path truth;
@@ -76,6 +76,9 @@ Outcome simulate_bench(const SimulateOptions& options, const Console& console) {
   if (options.notch_deg) settings->notch_rad = *options.notch_deg * kDegree;
   settings->zoom = options.zoom;
   settings->second_sensor = options.second_sensor;
+  for (std::size_t i = 0; i < options.turn_to_deg.size(); ++i) {
+    settings->turns.push_back({from_seconds(options.turn_at_s.at(i)), options.turn_to_deg[i] * kDegree});
+  }
   const auto scene = BenchScene::create(*settings);
   if (!scene) return refuse(scene.error(), ExitCode::kWrongUsage);
   if (const auto apart = check_apart({{"OUT", options.out.string()},
@@ -120,15 +123,27 @@ std::vector<SimulatedRecording> planned(const SimulateOptions& options) {
   return recordings;
 }
 
+Outcome check_turns(const SimulateOptions& options) {
+  const std::size_t turns = options.turn_to_deg.size();
+  if ((turns > 0 || options.zoom_to) && !options.notch_deg) {
+    return refuse("--turn-to, --zoom-to: expected --field-stop, where the notch is before", ExitCode::kWrongUsage);
+  }
+  if (options.zoom_to && options.act) return refuse("--zoom-to: expected --scene heart", ExitCode::kWrongUsage);
+  if (options.act && options.act != BenchAct::kBoard && turns > 0) {
+    return refuse("--turn-to: expected --scene heart or board", ExitCode::kWrongUsage);
+  }
+  if (!options.act && turns > 1) return refuse("--turn-to: a heart is turned once", ExitCode::kWrongUsage);
+  const bool as_many = options.act ? options.turn_at_s.size() == turns : options.turn_at_s.size() <= 1;
+  if (!as_many) return refuse("--turn-at: expected one of each --turn-to, when it begins", ExitCode::kWrongUsage);
+  return {};
+}
+
 Outcome simulate(const SimulateOptions& options, const Console& console) {
   const bool of_bench = !options.truth.empty() || !options.landmarks.empty();
   if (!options.act && of_bench) {
     return refuse("--truth, --landmarks: expected --scene board, still or landmarks", ExitCode::kWrongUsage);
   }
-  if ((options.turn_to_deg || options.zoom_to) && (options.act || !options.notch_deg)) {
-    return refuse("--turn-to, --zoom-to: expected --scene heart and --field-stop, where the notch is before",
-                  ExitCode::kWrongUsage);
-  }
+  if (const auto sound = check_turns(options); !sound) return sound;
   if (options.zoom != 1.0 && !options.notch_deg) {
     return refuse("--zoom: expected --field-stop, which tells of it", ExitCode::kWrongUsage);
   }
@@ -154,10 +169,12 @@ Outcome simulate(const SimulateOptions& options, const Console& console) {
   if (options.notch_deg) settings->held = ScopeHeld{*options.notch_deg * kDegree, options.zoom};
   settings->scope_calibrated = !options.scope_uncalibrated;
   settings->second_sensor = options.second_sensor;
-  if (options.turn_to_deg || options.zoom_to) {
-    const ScopeHeld to{options.turn_to_deg.value_or(*options.notch_deg) * kDegree,
-                       options.zoom_to.value_or(options.zoom)};
-    settings->turn = SimulationSettings::Turn{from_seconds(options.turn_at_s), to};
+  if (!options.turn_to_deg.empty() || options.zoom_to) {
+    constexpr double kUsualTurn_s = 10.0;
+    const double to_deg = options.turn_to_deg.empty() ? *options.notch_deg : options.turn_to_deg.front();
+    const ScopeHeld to{to_deg * kDegree, options.zoom_to.value_or(options.zoom)};
+    const double at_s = options.turn_at_s.empty() ? kUsualTurn_s : options.turn_at_s.front();
+    settings->turn = SimulationSettings::Turn{from_seconds(at_s), to};
   }
   if (options.simulation.has_procedure()) {
     auto procedure = options.simulation.procedure(*settings);
@@ -242,7 +259,9 @@ void add_simulate_command(Commands& commands) {
       ->check(Range(-360.0, 360.0));
   command
       .add_option("--turn-to", options->turn_to_deg,
-                  "Of a heart: the scope is turned in its camera head during the session, until its notch is there")
+                  "The scope is turned in its camera head meanwhile, until its notch is there; of a board also several "
+                  "times, each within two seconds")
+      ->one_at_a_time()
       ->check(Range(-360.0, 360.0));
   command.add_option("--zoom", options->zoom, "With --field-stop: so many times larger are picture and field stop")
       ->check(Range(0.5, 2.0))
@@ -256,9 +275,10 @@ void add_simulate_command(Commands& commands) {
   command.add_option("--zoom-to", options->zoom_to, "Of a heart: the scope is zoomed to that during the session")
       ->check(Range(0.5, 2.0));
   command
-      .add_option("--turn-at", options->turn_at_s, "With --turn-to and --zoom-to: when that begins, s; it takes one")
-      ->check(Range(0.0, 1700.0))
-      ->capture_default_str();
+      .add_option("--turn-at", options->turn_at_s,
+                  "With --turn-to and --zoom-to: when each begins, s; of a heart it takes one [10]")
+      ->one_at_a_time()
+      ->check(Range(0.0, 1700.0));
   command.add_option("--truth", options->truth, "Of such a scene: write to this file what is to be found (JSON)");
   command.add_option("--landmarks", options->landmarks,
                      "Of such a scene: write the landmarks of the patient's image to this file, for perimap register");

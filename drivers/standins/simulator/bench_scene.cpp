@@ -35,6 +35,7 @@ constexpr double kDistance_mm = 150.0;  // of the scope from the board, at rest
 constexpr double kDwell_s = 2.5;        // on each landmark
 constexpr double kMove_s = 1.5;         // from one to the next
 constexpr std::size_t kLandmarks = 6;
+constexpr double kTurnTakes_s = 2.0;
 
 Expected<void> check_bench(const BenchSettings& s) {
   const auto outside = [](const char* what, double value, double low, double high, const char* unit) -> Expected<void> {
@@ -50,16 +51,20 @@ Expected<void> check_bench(const BenchSettings& s) {
     if (!result) return result;
   }
   if (s.second_sensor && !s.notch_rad) return fail("second sensor: expected a scope that is turned by some angle");
+  if (!s.turns.empty() && !s.notch_rad) return fail("turns: expected a scope that is turned by some angle at first");
+  Duration free{0};
+  for (const BenchSettings::Turn& turn : s.turns) {
+    if (turn.at < free) return fail("turns: expected each to begin two seconds after the one before and later");
+    free = turn.at + from_seconds(kTurnTakes_s);
+  }
   return {};
 }
 
 double smooth(double s) { return s * s * (3.0 - 2.0 * s); }
 
-FieldStop field_stop_of(const BenchSettings& s) {
-  return s.notch_rad ? drawn_field_stop(s.setup_seed, s.width, s.height, {*s.notch_rad, s.zoom}) : FieldStop{};
+FieldStop field_stop_of(const BenchSettings& s, double notch_rad) {
+  return drawn_field_stop(s.setup_seed, s.width, s.height, {notch_rad, s.zoom});
 }
-
-FieldStop seen_field_stop_of(const BenchSettings& s) { return s.second_sensor ? FieldStop{} : field_stop_of(s); }
 
 BenchStream error_stream(BenchScene::Tool tool) {
   return tool == BenchScene::Tool::kScope     ? kScopeError
@@ -75,11 +80,9 @@ Vector3d drawn_vector(const CounterNoise& noise, std::uint64_t index, double hal
 }  // namespace
 
 BenchScene::BenchScene(const BenchSettings& settings) : settings_(settings) {
-  setup_ = settings.setup_seed != 0 ? drawn_setup(settings.setup_seed, settings.width, settings.height)
-                                    : usual_setup(settings.width, settings.height);
-  if (settings.notch_rad) {
-    setup_ = turned_setup(setup_, {*settings.notch_rad, settings.zoom}, field_stop_of(settings).centre_px);
-  }
+  unturned_ = settings.setup_seed != 0 ? drawn_setup(settings.setup_seed, settings.width, settings.height)
+                                       : usual_setup(settings.width, settings.height);
+  setup_ = setup_at(Duration(0));
   const CounterNoise bench(settings.seed, kBench);
   start_ = Instant(from_seconds(bench.uniform(0, 3600.0, 7200.0)));
   X_WB_ = {so3_exp(drawn_vector(bench, 1, 1.2)), Vector3d(80.0, -40.0, -950.0) + drawn_vector(bench, 2, 120.0)};
@@ -103,10 +106,36 @@ Expected<BenchScene> BenchScene::create(const BenchSettings& settings) {
   scene.time_devices();
   scene.draw_errors();
   if (settings.act == BenchAct::kBoard) {
-    scene.renderer_ =
-        std::make_shared<const BoardRenderer>(scene.setup_.lens, settings.board, seen_field_stop_of(settings));
+    scene.renderers_.push_back(scene.renderer_at(Duration(0)));
+    for (const BenchSettings::Turn& turn : settings.turns) {
+      scene.renderers_.push_back(scene.renderer_at(turn.at + from_seconds(kTurnTakes_s)));
+    }
   }
   return scene;
+}
+
+BenchScene::Turned BenchScene::turned_at(Duration since) const noexcept {
+  Turned turned{settings_.notch_rad.value_or(0.0), 0U};
+  for (std::size_t i = 0; i < settings_.turns.size(); ++i) {
+    const BenchSettings::Turn& turn = settings_.turns[i];
+    if (since <= turn.at) break;
+    const double s = std::min(1.0, to_seconds(since - turn.at) / kTurnTakes_s);
+    turned.notch_rad += smooth(s) * (turn.notch_rad - turned.notch_rad);
+    turned.times = s < 1.0 ? std::nullopt : std::optional(i + 1);
+  }
+  return turned;
+}
+
+ScopeSetup BenchScene::setup_at(Duration since) const noexcept {
+  if (!settings_.notch_rad) return unturned_;
+  const double notch_rad = turned_at(since).notch_rad;
+  return turned_setup(unturned_, {notch_rad, settings_.zoom}, field_stop_of(settings_, notch_rad).centre_px);
+}
+
+std::shared_ptr<const BoardRenderer> BenchScene::renderer_at(Duration since) const {
+  const bool stop_is_seen = settings_.notch_rad && !settings_.second_sensor;
+  const FieldStop stop = stop_is_seen ? field_stop_of(settings_, turned_at(since).notch_rad) : FieldStop{};
+  return std::make_shared<const BoardRenderer>(setup_at(since).lens, settings_.board, stop);
 }
 
 // Spread over a chest, no three on a line.
@@ -180,8 +209,9 @@ Pose BenchScene::X_WT(Duration since) const noexcept {
 
 Pose BenchScene::true_pose(Tool tool, Duration since) const noexcept {
   if (tool == Tool::kPointer) return X_WT(since);
-  const Pose X_WS = X_WC(since) * setup_.X_SC.inverse();
-  return tool == Tool::kScope ? X_WS : X_WS * setup_.X_SS2;
+  const ScopeSetup setup = settings_.turns.empty() ? setup_ : setup_at(since);
+  const Pose X_WS = X_WC(since) * setup.X_SC.inverse();
+  return tool == Tool::kScope ? X_WS : X_WS * setup.X_SS2;
 }
 
 TrackerSample BenchScene::reading(Tool tool, std::size_t index, const TrackerNoise& noise) const noexcept {
@@ -200,8 +230,12 @@ TrackerSample BenchScene::reading(Tool tool, std::size_t index, const TrackerNoi
 }
 
 void BenchScene::render(std::size_t index, std::span<std::uint8_t> image) const {
-  const Pose X_CB = X_WC(frames_[index].capture - start_).inverse() * X_WB_;
-  renderer_->render(X_CB, CounterNoise(settings_.seed, kBenchImage).bits(index), image);
+  const Duration since = frames_[index].capture - start_;
+  const Pose X_CB = X_WC(since).inverse() * X_WB_;
+  // While it is turned each frame has a lens of its own.
+  const auto held = turned_at(since).times;
+  const auto renderer = held ? renderers_[*held] : renderer_at(since);
+  renderer->render(X_CB, CounterNoise(settings_.seed, kBenchImage).bits(index), image);
 }
 
 }  // namespace perimap

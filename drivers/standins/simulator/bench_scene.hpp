@@ -44,6 +44,13 @@ struct BenchSettings {
   // scope is turned then (turned_setup()). None: all of the picture is seen, and the scope is as at 0.
   std::optional<double> notch_rad;
   double zoom = 1.0;  // of the picture and the field stop, likewise
+  // In the order of their times: from then on the scope is turned in its camera head, within two seconds, until its
+  // notch is there, and held so.
+  struct Turn {
+    Duration at{0};
+    double notch_rad = 0.0;
+  };
+  std::vector<Turn> turns;
   // A second tracked sensor, on the scope, tells how that is turned: the field stop lies outside the picture then.
   bool second_sensor = false;
 };
@@ -61,7 +68,10 @@ class BenchScene {
   [[nodiscard]] static Expected<BenchScene> create(const BenchSettings& settings);
 
   [[nodiscard]] const BenchSettings& settings() const noexcept { return settings_; }
+  // As at the start.
   [[nodiscard]] const ScopeSetup& setup() const noexcept { return setup_; }
+  // As the scope is turned then.
+  [[nodiscard]] ScopeSetup setup_at(Duration since) const noexcept;
   [[nodiscard]] Instant start() const noexcept { return start_; }
   // Those of the patient's image; the same whatever the act.
   [[nodiscard]] const std::vector<BenchLandmark>& landmarks() const noexcept { return landmarks_; }
@@ -82,6 +92,14 @@ class BenchScene {
  private:
   explicit BenchScene(const BenchSettings& settings);
 
+  // Where the notch is, and how often the scope was turned until then; none while it is being turned.
+  struct Turned {
+    double notch_rad = 0.0;
+    std::optional<std::size_t> times;
+  };
+  [[nodiscard]] Turned turned_at(Duration since) const noexcept;
+  [[nodiscard]] std::shared_ptr<const BoardRenderer> renderer_at(Duration since) const;
+
   void draw_landmarks();
   void time_devices();
   void draw_errors();
@@ -95,13 +113,15 @@ class BenchScene {
   };
 
   BenchSettings settings_;
+  ScopeSetup unturned_;  // at a notch of 0 and a zoom of 1
   ScopeSetup setup_;
   Instant start_;
   Pose X_WB_;
   Matrix3d pointer_rest_ = Matrix3d::Identity();
   HandSway3 scope_turn_, scope_place_, pointer_turn_;
   std::vector<BenchLandmark> landmarks_;
-  std::shared_ptr<const BoardRenderer> renderer_;  // none where the camera is off
+  // As it is held at first, and after each turn; none where the camera is off.
+  std::vector<std::shared_ptr<const BoardRenderer>> renderers_;
   std::vector<FrameStamp> frames_;
   std::vector<Instant> times_;  // true, of each reading
   std::vector<Instant> arrivals_;

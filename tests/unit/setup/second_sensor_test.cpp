@@ -38,7 +38,7 @@ struct Built {
 
 std::vector<HeldRelation> relations(const Built& scope, const std::vector<double>& thetas) {
   std::vector<HeldRelation> held;
-  for (const double theta : thetas) held.push_back({scope.R_S2(theta), 0.1 * kDegree, 0.1 * kDegree, 1000});
+  for (const double theta : thetas) held.push_back({scope.R_S2(theta), 0.1 * kDegree, 0.1 * kDegree});
   return held;
 }
 

@@ -1,0 +1,196 @@
+#include "daemon/setup/recorded_turns.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "core/angle/angle.hpp"
+#include "core/calibration/held_stretches.hpp"
+#include "daemon/config/tracked_tools.hpp"
+#include "daemon/setup/camera_calibration.hpp"
+#include "daemon/setup/hand_eye.hpp"
+#include "daemon/setup/recorded_board.hpp"
+#include "daemon/setup/recorded_poses.hpp"
+
+namespace perimap {
+namespace {
+
+// All that the recording holds, of which each stretch takes its part.
+struct Recorded {
+  RecordedBoard board;
+  std::vector<TimedPose> sensor;
+  std::vector<TimedPose> second;   // where a second sensor tells the turn
+  std::vector<ReadPicture> stops;  // where the field stop does
+  std::vector<TimedTurn> turns;
+};
+
+template <typename Timed>
+std::vector<Timed> between(const std::vector<Timed>& all, double from_s, double to_s) {
+  std::vector<Timed> part;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(part),
+               [&](const Timed& one) { return one.t_s >= from_s && one.t_s <= to_s; });
+  return part;
+}
+
+Expected<void> read_second_sensor(const std::string& recording, Recorded& recorded) {
+  if (const auto has = has_recorded_poses(recording, kSecondSensorTool); !has || !*has) {
+    return fail(has ? recording + ": has no second sensor: name it as tracker.second_sensor, and record again"
+                    : has.error().message);
+  }
+  auto second = read_recorded_poses(recording, kSecondSensorTool);
+  if (!second) return tl::unexpected(second.error());
+  recorded.second = *std::move(second);
+  constexpr double kEach_s = 0.5;
+  recorded.turns = relations_over(recorded.sensor, recorded.second, kEach_s);
+  return {};
+}
+
+Expected<void> read_field_stops(const std::string& recording, Recorded& recorded) {
+  constexpr double kFrames_per_s = 4.0;
+  std::string why = "it has no frames";
+  const auto read = for_each_recorded_frame(recording, kFrames_per_s, [&](double t_s, const GreyImage& grey) {
+    const auto reading = read_field_stop(grey);
+    if (!reading) {
+      why = reading.error().message;
+      return;
+    }
+    recorded.stops.push_back({fmt::format("frame at {:.3f} s", t_s), t_s, *reading});
+    recorded.turns.push_back({t_s, orientation_of_notch(reading->notch_rad)});
+  });
+  if (!read) return tl::unexpected(read.error());
+  if (recorded.turns.empty()) return fail(fmt::format("{}: no field stop is read: {}", recording, why));
+  return {};
+}
+
+Expected<Recorded> read_all(const std::string& recording, const BoardWish& wish, bool by_second_sensor,
+                            const std::function<void(std::uint64_t done, std::uint64_t all)>& progress) {
+  Recorded recorded;
+  auto sensor = read_recorded_poses(recording, kScopeTool);
+  if (!sensor) return tl::unexpected(sensor.error());
+  recorded.sensor = *std::move(sensor);
+  const auto read = by_second_sensor ? read_second_sensor(recording, recorded) : read_field_stops(recording, recorded);
+  if (!read) return tl::unexpected(read.error());
+  constexpr double kFrames_per_s = 15.0;
+  auto board = find_recorded_board(recording, wish, kFrames_per_s, progress);
+  if (!board) return tl::unexpected(board.error());
+  recorded.board = *std::move(board);
+  return recorded;
+}
+
+// The lens by two views a second, as `perimap calibrate camera` takes them.
+std::vector<BoardView> thinned(const std::vector<TimedView>& views) {
+  constexpr double kInterval_s = 0.5 - 1e-3;
+  std::vector<BoardView> few;
+  double due_s = -1e18;
+  for (const TimedView& seen : views) {
+    if (seen.t_s < due_s) continue;
+    due_s = seen.t_s + kInterval_s;
+    few.push_back(seen.view);
+  }
+  return few;
+}
+
+Expected<RecordedTurn> measured(const Recorded& recorded, double from_s, double to_s) {
+  const std::vector<TimedView> views = between(recorded.board.views, from_s, to_s);
+  RecordedTurn turn;
+  turn.views = views.size();
+  const auto lens = calibrate_camera(thinned(views), recorded.board.width, recorded.board.height, {});
+  if (!lens) return tl::unexpected(lens.error());
+  // The clocks may differ by so much.
+  const double apart_s = HandEyeSettings{}.largest_offset_s;
+  const std::vector<TimedPose> sensor = between(recorded.sensor, from_s - apart_s, to_s + apart_s);
+  const auto hand_eye = calibrate_hand_eye(camera_poses_of(views, lens->camera), sensor, {});
+  if (!hand_eye) return tl::unexpected(hand_eye.error());
+  turn.lens_rms_px = lens->rms_px;
+  turn.hand_eye_rms_mm = hand_eye->held_aside_rms_mm;
+  turn.offset_s = hand_eye->offset_s;
+  turn.measured.lens = lens->camera;
+  SetupAtRotation& setup = turn.measured.setup;
+  setup.X_SC = hand_eye->X_SC;
+  setup.covariance_C = hand_eye->covariance.topLeftCorner<6, 6>();
+  setup.principal_px = {lens->camera.cx, lens->camera.cy};
+  setup.principal_deviation_px = {lens->deviations[2], lens->deviations[3]};
+  setup.focal_px = {lens->camera.fx, lens->camera.fy};
+  if (!recorded.second.empty()) {
+    const auto relation = held_relation(between(recorded.sensor, from_s, to_s), between(recorded.second, from_s, to_s));
+    if (!relation) return tl::unexpected(relation.error());
+    turn.measured.relation = *relation;
+    return turn;
+  }
+  const auto stop = rotation_of(between(recorded.stops, from_s, to_s), {});
+  if (!stop) return tl::unexpected(stop.error());
+  turn.measured.stop_centre_px = stop->centre_px;
+  setup.rotation_rad = stop->rotation_rad;
+  setup.rotation_deviation_rad = stop->rotation_deviation_rad;
+  setup.radius_px = stop->radius_px;
+  return turn;
+}
+
+}  // namespace
+
+Expected<RecordedTurns> turns_in_recording(const std::string& recording, const BoardWish& board, bool by_second_sensor,
+                                           const std::function<void(std::uint64_t done, std::uint64_t all)>& progress) {
+  const auto recorded = read_all(recording, board, by_second_sensor, progress);
+  if (!recorded) return tl::unexpected(recorded.error());
+  HeldStretches held;
+  for (const TimedTurn& turn : recorded->turns) held.add(turn);
+  if (held.stretches().empty()) {
+    return fail(recording + ": the scope was held at no turn: hold it at each while the board is looked at");
+  }
+  RecordedTurns result;
+  const double first_s = recorded->turns.front().t_s;
+  for (const HeldStretch& stretch : held.stretches()) {
+    // The scope is let go a little before it stands out that it turns.
+    constexpr double kMargin_s = 0.75;
+    constexpr double kShortest_s = 10.0;
+    const double from_s = stretch.from_s + kMargin_s, to_s = stretch.to_s - kMargin_s;
+    const std::string when = fmt::format("{:.1f} to {:.1f} s", stretch.from_s - first_s, stretch.to_s - first_s);
+    if (to_s - from_s < kShortest_s) {
+      result.left_out.push_back(when + ": held for less than ten seconds");
+      continue;
+    }
+    auto turn = measured(*recorded, from_s, to_s);
+    if (!turn) {
+      result.left_out.push_back(when + ": " + turn.error().message);
+      continue;
+    }
+    turn->from_s = from_s - first_s;
+    turn->to_s = to_s - first_s;
+    result.turns.push_back(*std::move(turn));
+  }
+  if (result.turns.empty()) return fail(fmt::format("{}: no turn is measured: {}", recording, result.left_out.front()));
+  return result;
+}
+
+std::string text_of(const RecordedTurns& recorded) {
+  std::string text;
+  for (const RecordedTurn& turn : recorded.turns) {
+    text += fmt::format(
+        "  held           {:.1f} to {:.1f} s{}: {} views, lens {:.2f} px RMS, hand-eye {:.2f} mm RMS held "
+        "aside, clocks {:.1f} ms\n",
+        turn.from_s, turn.to_s,
+        turn.measured.relation ? ""
+                               : fmt::format(", notch at {:.1f} degrees", turn.measured.setup.rotation_rad / kDegree),
+        turn.views, turn.lens_rms_px, turn.hand_eye_rms_mm, 1e3 * turn.offset_s);
+  }
+  for (const std::string& why : recorded.left_out) text += "  not measured   " + why + "\n";
+  return text;
+}
+
+nlohmann::json json_of(const RecordedTurns& recorded) {
+  nlohmann::json json = {{"turns", nlohmann::json::array()}, {"turns_not_measured", recorded.left_out}};
+  for (const RecordedTurn& turn : recorded.turns) {
+    json["turns"].push_back({{"from_s", turn.from_s},
+                             {"to_s", turn.to_s},
+                             {"views", turn.views},
+                             {"lens_rms_px", turn.lens_rms_px},
+                             {"hand_eye_held_aside_mm", turn.hand_eye_rms_mm},
+                             {"time_offset_ms", 1e3 * turn.offset_s}});
+    if (!turn.measured.relation) json["turns"].back()["rotation_deg"] = turn.measured.setup.rotation_rad / kDegree;
+  }
+  return json;
+}
+
+}  // namespace perimap
