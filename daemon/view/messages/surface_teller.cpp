@@ -8,8 +8,8 @@
 #include <span>
 #include <string>
 
-#include "daemon/publishing/wire_names.hpp"
 #include "daemon/publishing/advice.hpp"
+#include "daemon/publishing/wire_names.hpp"
 #include "daemon/view/messages/milliseconds.hpp"
 
 namespace perimap {
