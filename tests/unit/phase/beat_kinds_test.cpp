@@ -87,6 +87,18 @@ TEST_F(Kinds, AKindIsCoupledOnceItHasComeEarlyByTheSameTimeThreeTimes) {
   EXPECT_TRUE(see(other, -0.3).coupled);
 }
 
+// As if another interval, three tenths beside the others, had been among them.
+TEST_F(Kinds, TheFirstIntervalsOfAKindAreTakenToScatter) {
+  const auto coupled = [&](double second) {
+    kinds_ = {};
+    usual_beats(40, 0.05);
+    for (const double log_rr : {-0.3, second, -0.3}) see(beat(0.0, 0.55), log_rr);
+    return kinds_.compare(beat(0.0, 0.55)).coupled;
+  };
+  EXPECT_TRUE(coupled(-0.24));
+  EXPECT_FALSE(coupled(-0.18));
+}
+
 TEST_F(Kinds, AKindIsNotCoupledOnTimeNorAtAnyTimeNorWhenItIsHardlyAnother) {
   const auto coupled = [&](const QrsShape& other, double log_rr, double scatter, double noise) {
     kinds_ = {};
