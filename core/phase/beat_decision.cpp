@@ -9,11 +9,6 @@ namespace {
 
 constexpr double kNever = -std::numeric_limits<double>::infinity();  // log odds
 
-// Whatever its size: where that is another, the gain has changed.
-bool has_a_beats_shape(const QrsCandidate& candidate, const QrsClusters& clusters, double correlation) noexcept {
-  return clusters.nearest_beat(candidate.shape).correlation > correlation;
-}
-
 }  // namespace
 
 void BeatDecision::forget() noexcept {
@@ -112,7 +107,7 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
   clusters_.judged(learnt, waiting.log_odds);
   if (learnt >= 0) note_crowding(waiting);
   const bool too_large = beats_.known() && candidate.energy > settings_.too_large * beats_.energy();
-  if (too_large && !has_a_beats_shape(candidate, clusters_, settings_.very_familiar)) {
+  if (too_large && !clusters_.has_a_beats_shape(candidate.shape, settings_.very_familiar)) {
     note_disturbance(candidate.time, 1.0);
   }
   // Where a step is large it is no beat, whatever follows; the lead may be off within the second.
@@ -226,7 +221,7 @@ bool BeatDecision::unlike_any_beat(const QrsCandidate& candidate) const noexcept
 
 bool BeatDecision::strange(const Waiting& waiting) const noexcept {
   const bool another = waiting.correlation < settings_.familiar &&
-                       !has_a_beats_shape(waiting.candidate, clusters_, settings_.very_familiar);
+                       !clusters_.has_a_beats_shape(waiting.candidate.shape, settings_.very_familiar);
   return beats_.known() && beats_.size(waiting.candidate) > settings_.size_of_disturbance &&
          (another || (unlike_any_beat(waiting.candidate) && !of_known_kind(waiting)));
 }

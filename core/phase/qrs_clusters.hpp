@@ -25,6 +25,10 @@ class QrsClusters {
   // The cluster that a shape is most like, of all or of those that look like beats.
   [[nodiscard]] ClusterMatch nearest(const QrsShape& shape, int most_displaced) const noexcept;
   [[nodiscard]] ClusterMatch nearest_beat(const QrsShape& shape) const noexcept;
+  // Whatever its size: where that is another, the gain has changed.
+  [[nodiscard]] bool has_a_beats_shape(const QrsShape& shape, double correlation) const noexcept {
+    return nearest_beat(shape).correlation > correlation;
+  }
 
   // A complex was seen. Gives the cluster that it now belongs to. `calm`: no disturbance was near.
   int learn(const QrsShape& shape, bool upward, bool calm, Instant seen) noexcept;
