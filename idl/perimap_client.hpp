@@ -413,6 +413,8 @@ inline const char* describe(perimap_SurfaceReason reason) noexcept {
       return "the tracker gives the same pose again and again";
     case perimap_SURFACE_REASON_PICTURE_REPEATED:
       return "the camera gives the same picture again and again";
+    case perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED:
+      return "the organ has been moved, or the tracker errs";
     default:
       return "a reason that this client does not know";
   }

@@ -118,7 +118,16 @@ MapPrediction FeatureGroup::prediction(std::size_t lane) const noexcept {
   return {true, p, at_capture_.covariance_of(l) + phase_spread(p, earlier_.position_of(l), later_.position_of(l))};
 }
 
-void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double>* breath, bool converged,
+bool is_asked(const FeatureSlot& slot, Asked asked) noexcept {
+  // In a window of innovations that are too high the deviation grows before anything else is said of a feature.
+  constexpr double kWellKnown_mm = 2.0;
+  constexpr int kFewestUpdates = 30;
+  if (slot.state != SlotState::kMapped) return false;
+  if (asked == Asked::kMapped || slot.converged) return true;
+  return asked == Asked::kWellKnown && slot.updates >= kFewestUpdates && slot.largest_deviation_mm <= kWellKnown_mm;
+}
+
+void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double>* breath, Asked asked,
                            double pixel_deviation_px, const PixelMap& picture, std::vector<CommonMatch>& matches,
                            std::vector<FeatureSlot*>& owners) noexcept {
   if (plan_.capture < 0) return;
@@ -129,7 +138,7 @@ void FeatureGroup::collect(const SweepPhase<double>& at, const SweepPhase<double
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
     FeatureSlot& slot = slots_[lane];
     if (slot.state != SlotState::kMapped || slot.match.state != MatchState::kFound) continue;
-    if (converged && !slot.converged) continue;
+    if (!is_asked(slot, asked)) continue;
     const auto l = static_cast<int>(lane);
     CommonMatch match;
     match.z = picture.to_lens(slot.match.px);

@@ -30,6 +30,15 @@ struct SweepPlan {
   std::array<int, kCovariances> evaluated{};
 };
 
+// Whose matches are asked for what all have in common.
+enum class Asked : std::uint8_t {
+  kMapped,
+  kConverged,
+  kWellKnown  // those too that have been converged, or would be, were their innovations not too high
+};
+
+[[nodiscard]] bool is_asked(const FeatureSlot& slot, Asked asked) noexcept;
+
 class FeatureGroup {
  public:
   // Slot l of at most kLanes is lane l of the bank's group `index`. Both must outlive this.
@@ -47,9 +56,8 @@ class FeatureGroup {
   // B: appends what the features that were found say of the frame's pose, and of its phases near `at`: the velocity
   // (mm/s) there, and that of breathing at `breath` unless it is null, are the appended motions. Only converged
   // features are asked when `converged`. `picture`: the frame's. owners[k] becomes the slot of matches[k].
-  void collect(const SweepPhase<double>& at, const SweepPhase<double>* breath, bool converged,
-               double pixel_deviation_px, const PixelMap& picture, std::vector<CommonMatch>& matches,
-               std::vector<FeatureSlot*>& owners) noexcept;
+  void collect(const SweepPhase<double>& at, const SweepPhase<double>* breath, Asked asked, double pixel_deviation_px,
+               const PixelMap& picture, std::vector<CommonMatch>& matches, std::vector<FeatureSlot*>& owners) noexcept;
   // The breathing's phase has become known: all mapped features take the motion that they have in common with it and,
   // when `again`, learn once more what the frame history still has, by that phase. As long as it was not known a match
   // was worth hardly anything beside what it is now, so that none counts twice.

@@ -186,9 +186,9 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   const PixelPrediction from_map = predict_from_map(map, *job.frame, model);
   if (map.valid && job.frame->measurable) slot.in_view = from_map.valid && settings.camera.contains(from_map.px);
   if (slot.shed) return;
-  const PixelPrediction wide = surer(from_map, predict_from_velocity(slot, job));
+  const PixelPrediction wide = surer(widened(from_map, map, *job.frame, model), predict_from_velocity(slot, job));
   Looks looks = Looks::kAskedInDoubt;
-  if (job.shift.known && from_map.valid) {
+  if (job.shift.known && from_map.valid && job.frame->search_deviation_mm == 0.0) {
     const PixelPrediction near = predict_from_map(map, *job.frame, model, job.shift);
     if (near.valid && near.covariance_px2.trace() < wide.covariance_px2.trace()) {
       seek(slot, near, looks, Hurry::kRelease, job, settings);

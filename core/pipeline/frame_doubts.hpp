@@ -13,6 +13,7 @@ struct FrameDoubts {
   bool picture_repeated = false;    // likewise the camera one picture
   bool still = false;               // the camera has lately been in one place
   bool setup_doubted = false;       // see SetupBelief
+  bool displaced = false;           // the organ is not where the map has it, or the tracker errs, see OrganWatch
   double setup_variance_mm2 = 0.0;  // per axis, of what the set-up may be off by
 
   // What is doubted in either.
@@ -23,6 +24,7 @@ struct FrameDoubts {
     picture_repeated |= other.picture_repeated;
     still |= other.still;
     setup_doubted |= other.setup_doubted;
+    displaced |= other.displaced;
     setup_variance_mm2 = std::max(setup_variance_mm2, other.setup_variance_mm2);
   }
 };

@@ -36,8 +36,10 @@ struct FrameRecord {
   // How the whole surface is displaced from where the map has it, going by the frames before; for the search alone.
   Vector3d displacement_mm = Vector3d::Zero();
   double displacement_deviation_mm = 0.0;  // per axis
-  PhaseEstimate phase;                     // at capture, as known at the last refresh
-  CardiacCycle cycle;                      // that the capture lies in, once the phase is exact
+  // So much farther around that its features are searched for, per axis; what is found there agrees no better with it.
+  double search_deviation_mm = 0.0;
+  PhaseEstimate phase;  // at capture, as known at the last refresh
+  CardiacCycle cycle;   // that the capture lies in, once the phase is exact
   Basis b;
   Basis b_rate;
 };

@@ -20,19 +20,26 @@ constexpr double kLargestShift_s = 0.15;
 // The same for breathing, of which the phase is looked for within this.
 constexpr double kBreathPriorDeviation_rad = 0.5;
 constexpr double kLargestBreathShift = 2.0;  // prior deviations
+// Of what a feature's covariance says, so much is common to all that were learnt from the same poses: by far the most
+// of it is the features' own. Errors of the tracker that last are told beside it, and common.
+constexpr double kCommonShare = 0.1;
 // Breathing displaces the heart by up to 2 cm.
 constexpr double kDisplacementDeviation_mm = 15.0;
 
 }  // namespace
 
-CommonInformation pose_prior(const CameraPose& pose) noexcept {
+Matrix6d camera_error_covariance(const CameraPose& pose) noexcept {
   // The sensor turns by theta_W about itself and moves by d: the camera turns by -R_CW theta_W in its own frame and its
   // centre moves by theta_W x lever + d.
   Matrix6d A = Matrix6d::Zero();
   A.topLeftCorner<3, 3>() = -pose.X_WC.R.transpose();
   A.bottomLeftCorner<3, 3>() = -cross_matrix(pose.lever_W_mm);
   A.bottomRightCorner<3, 3>().setIdentity();
-  const Matrix6d covariance = A * pose_error_covariance(pose) * A.transpose();
+  return A * pose_error_covariance(pose) * A.transpose();
+}
+
+CommonInformation pose_prior(const CameraPose& pose) noexcept {
+  const Matrix6d covariance = camera_error_covariance(pose);
   CommonInformation prior = CommonInformation::zero(kPoseUnknowns);
   const Matrix6d Lambda = covariance.llt().solve(Matrix6d::Identity());
   prior.Lambda = 0.5 * (Lambda + Lambda.transpose());
@@ -40,7 +47,7 @@ CommonInformation pose_prior(const CameraPose& pose) noexcept {
 }
 
 void ImagePhase::collect(std::span<FeatureGroup> groups, const FrameRecord& frame, const EstimatorSettings& settings,
-                         const Shifts& shifts, bool converged) noexcept {
+                         const Shifts& shifts, Asked asked) noexcept {
   const BasisLayout& layout = settings.layout;
   const double phase_rad = frame.phase.phase_rad + shifts.cardiac * frame.phase.rate_rad_per_s;
   RespiratoryPhase respiration = frame.respiration;
@@ -54,7 +61,7 @@ void ImagePhase::collect(std::span<FeatureGroup> groups, const FrameRecord& fram
   owners_.clear();
   const std::size_t stride = (groups.size() + kMostGroups - 1) / kMostGroups;
   for (std::size_t g = frame.index % stride; g < groups.size(); g += stride) {
-    groups[g].collect(at, respiration.known ? &breath : nullptr, converged, settings.pixel_deviation_px, frame.picture,
+    groups[g].collect(at, respiration.known ? &breath : nullptr, asked, settings.pixel_deviation_px, frame.picture,
                       matches_, owners_);
   }
   used_.assign(matches_.size(), 0);
@@ -63,6 +70,7 @@ void ImagePhase::collect(std::span<FeatureGroup> groups, const FrameRecord& fram
 ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
                                 const EstimatorSettings& settings) noexcept {
   agreed_ = CommonEstimate();
+  observed_ = {};
   const ImagePhases can_not_tell;
   const ImagePhases contradicts{{ImagePhaseOutcome::kContradicts, {}}, {ImagePhaseOutcome::kContradicts, {}}};
   if (!frame.measurable || groups.empty()) return can_not_tell;
@@ -75,7 +83,7 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
   const double breath_prior_s2 = breath_deviation_s * breath_deviation_s;
   CommonInformation prior = with_appended(pose_prior(frame.pose), kPriorVariance_s2);
   if (frame.respiration.known) prior = with_appended(prior, breath_prior_s2);
-  collect(groups, frame, settings, {}, true);
+  collect(groups, frame, settings, {}, Asked::kConverged);
   const bool converged = matches_.size() >= static_cast<std::size_t>(kFewestMatches);
   const ImagePhases nothing_near = converged ? contradicts : can_not_tell;
   double shift_s = 0.0;
@@ -84,7 +92,7 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
   Shifts solved_at;
   for (int pass = 0; pass < kPasses; ++pass) {
     solved_at = {shift_s, breath_shift_s};
-    collect(groups, frame, settings, solved_at, converged);
+    collect(groups, frame, settings, solved_at, converged ? Asked::kConverged : Asked::kMapped);
     if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return can_not_tell;
     prior.eta(kShift) = -shift_s / kPriorVariance_s2;
     if (frame.respiration.known) prior.eta(kBreathShift) = -breath_shift_s / breath_prior_s2;
@@ -100,6 +108,7 @@ ImagePhases ImagePhase::observe(std::span<FeatureGroup> groups, const FrameRecor
     if (!(std::abs(breath_shift_s) <= kLargestBreathShift * breath_deviation_s)) return nothing_near;
   }
   if (converged) {
+    observed_ = {shift_s, breath_shift_s};
     agreed_ = solved;
     refuse_what_disagrees(groups, frame, model, settings, solved_at, solved);
   }
@@ -131,7 +140,8 @@ void ImagePhase::refuse_what_disagrees(std::span<FeatureGroup> groups, const Fra
                                        const PixelModel& model, const EstimatorSettings& settings, const Shifts& shifts,
                                        const CommonEstimate& solved) noexcept {
   for (std::size_t first = 0; first < groups.size(); first += kMostGroups) {
-    collect(groups.subspan(first, std::min(kMostGroups, groups.size() - first)), frame, settings, shifts, false);
+    collect(groups.subspan(first, std::min(kMostGroups, groups.size() - first)), frame, settings, shifts,
+            Asked::kMapped);
     for (std::size_t k = 0; k < matches_.size(); ++k) {
       const CommonTerm term = linearise(model, solved, matches_[k]);
       if (!term.visible || term.squared_residual > settings.update.gate) refuse_match(*owners_[k], frame);
@@ -139,12 +149,47 @@ void ImagePhase::refuse_what_disagrees(std::span<FeatureGroup> groups, const Fra
   }
 }
 
+ImagePhase::Together ImagePhase::together(std::span<FeatureGroup> groups, const FrameRecord& frame,
+                                          const CameraPose& searched, const PixelModel& model,
+                                          const EstimatorSettings& settings) noexcept {
+  Together told;
+  if (!frame.measurable || groups.empty()) return told;
+  collect(groups, frame, settings, observed_, Asked::kWellKnown);
+  if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return told;
+  // The phases are those observed; what the frame's matches say of them beside is no displacement.
+  CommonInformation prior = with_appended(pose_prior(searched), kPriorDeviation_s * kPriorDeviation_s);
+  prior.eta(kPoseUnknowns) = -observed_.cardiac / (kPriorDeviation_s * kPriorDeviation_s);
+  if (frame.respiration.known) {
+    const double breath_deviation_s = kBreathPriorDeviation_rad / frame.respiration.rate_rad_per_s;
+    prior = with_appended(prior, breath_deviation_s * breath_deviation_s);
+    prior.eta(kPoseUnknowns) = -observed_.cardiac / (kPriorDeviation_s * kPriorDeviation_s);
+    prior.eta(kPoseUnknowns + 1) = -observed_.breath / (breath_deviation_s * breath_deviation_s);
+  }
+  const SharedPose shared =
+      estimate_shared_pose(model, frame.X_CW, prior, std::span<const CommonMatch>(matches_), std::span(used_));
+  const bool most = 2 * static_cast<std::size_t>(shared.used) >= matches_.size();
+  if (!shared.estimate.ok || shared.used < kFewestMatches || !most) return told;
+  told.told = true;
+  told.estimate = shared.estimate;
+  const auto n = static_cast<double>(matches_.size());
+  for (std::size_t k = 0; k < matches_.size(); ++k) {
+    told.centre_W_mm += matches_[k].p_WF / n;
+    Matrix3d common = kCommonShare * matches_[k].S;
+    if (const auto& slow_error = owners_[k]->slow_error) common += slow_error->position_covariance(frame.b);
+    told.map_variance_mm2 += common.trace() / (3.0 * n);
+  }
+  double spread_mm2 = 0.0;
+  for (const CommonMatch& match : matches_) spread_mm2 += (match.p_WF - told.centre_W_mm).squaredNorm() / n;
+  told.spread_mm = std::sqrt(spread_mm2);
+  return told;
+}
+
 bool ImagePhase::displacement(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
                               const EstimatorSettings& settings, Vector3d& displacement_mm) noexcept {
   if (!frame.measurable || groups.empty()) return false;
   CameraPose pose = frame.pose;
   pose.position_variance_mm2 += kDisplacementDeviation_mm * kDisplacementDeviation_mm;
-  collect(groups, frame, settings, {}, false);
+  collect(groups, frame, settings, {}, Asked::kMapped);
   // The features' own motions are not asked.
   for (CommonMatch& match : matches_) match.D.resize(3, 0);
   if (matches_.size() < static_cast<std::size_t>(kFewestMatches)) return false;

@@ -53,6 +53,20 @@ class ImagePhase {
   // The pose that the converged features' matches of the frame observed last agree on; null when they did not tell it.
   [[nodiscard]] const CommonEstimate* shared_pose() const noexcept { return agreed_.ok ? &agreed_ : nullptr; }
 
+  // The camera pose that the converged features' matches tell together, beside that of the frame, whose error is taken
+  // for as wide as `searched` has it. After observe().
+  struct Together {
+    bool told = false;  // false: too few, or most of them do not agree on any
+    CommonEstimate estimate;
+    // Of those features: their middle, their root mean square distance from it, and how far off each axis the map is
+    // said to be there.
+    Vector3d centre_W_mm = Vector3d::Zero();
+    double spread_mm = 0.0;
+    double map_variance_mm2 = 0.0;
+  };
+  [[nodiscard]] Together together(std::span<FeatureGroup> groups, const FrameRecord& frame, const CameraPose& searched,
+                                  const PixelModel& model, const EstimatorSettings& settings) noexcept;
+
   // By how much the whole surface is displaced from where the map has it (mm, frame W), which may be much more than the
   // tracker's error. False when the matches can not tell.
   [[nodiscard]] bool displacement(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
@@ -65,19 +79,22 @@ class ImagePhase {
     double breath = 0.0;
   };
   void collect(std::span<FeatureGroup> groups, const FrameRecord& frame, const EstimatorSettings& settings,
-               const Shifts& shifts, bool converged) noexcept;
+               const Shifts& shifts, Asked asked) noexcept;
   // `solved`: of what was collected at `shifts`.
   void refuse_what_disagrees(std::span<FeatureGroup> groups, const FrameRecord& frame, const PixelModel& model,
                              const EstimatorSettings& settings, const Shifts& shifts,
                              const CommonEstimate& solved) noexcept;
 
   CommonEstimate agreed_;
+  Shifts observed_;  // of the frame observed last; zero where it told none
   std::vector<CommonMatch> matches_;
   std::vector<FeatureSlot*> owners_;  // of matches_
   std::vector<std::uint8_t> used_;
 };
 
-// The prior of a camera pose's error as estimate_shared_pose() has it: that of the sensor, carried over to the camera.
+// The covariance of a camera pose's error [theta, delta_c] as estimate_shared_pose() has it: that of the sensor,
+// carried over to the camera. And what it is as a prior.
+[[nodiscard]] Matrix6d camera_error_covariance(const CameraPose& pose) noexcept;
 [[nodiscard]] CommonInformation pose_prior(const CameraPose& pose) noexcept;
 
 }  // namespace perimap

@@ -24,7 +24,7 @@ class MapFeed {
     FeatureMemory feature;
   };
   struct Batch {
-    std::uint64_t maps_forgotten = 0;  // the count of then: what is of a map that was forgotten since is void
+    std::uint64_t maps_ended = 0;  // forgotten or moved by then: what is of a map that has ended since is void
     std::array<Entry, kSlotsABatch> entries{};
     RespirationMemory respiration;
     LawMemory law;

@@ -4,10 +4,10 @@
 
 namespace perimap {
 
-void MapKeeping::fill_feed(const Breathing& breathing, const HeartPhase& heart, std::uint64_t maps_forgotten) noexcept {
+void MapKeeping::fill_feed(const Breathing& breathing, const HeartPhase& heart, std::uint64_t maps_ended) noexcept {
   MapFeed::Batch* batch = feed_.back();
   if (batch == nullptr) return;
-  batch->maps_forgotten = maps_forgotten;
+  batch->maps_ended = maps_ended;
   batch->respiration = breathing.memory();
   batch->law = heart.law_memory();
   for (MapFeed::Entry& entry : batch->entries) {
@@ -69,6 +69,33 @@ void MapKeeping::recall(FeatureSlot& slot, const FeatureMemory& feature) noexcep
             .largest_deviation_mm = feature.largest_deviation_mm,
             .converged = feature.converged,
             .recalled_converged = feature.converged});
+}
+
+void MapKeeping::displace(const Pose& X) noexcept {
+  constexpr double kDoubt_mm = 0.5;
+  const int n = bank_.layout().size();
+  FeatureEstimate estimate;
+  for (std::size_t index = 0; index < slots_.size(); ++index) {
+    FeatureSlot& slot = slots_[index];
+    if (slot.state == SlotState::kStarting) slot.forgotten = true;
+    if (slot.state != SlotState::kMapped) continue;
+    const int feature = static_cast<int>(index);
+    bank_.get(feature, estimate);
+    const auto axes = [n](int i) { return Eigen::seqN(i, 3, n); };
+    for (int i = 0; i < n; ++i) estimate.x(axes(i)) = Vector3d(X.R * Vector3d(estimate.x(axes(i))));
+    estimate.x(axes(0)) += X.t;
+    for (int i = 0; i < n; ++i) {
+      // Both halves from one product, so that it stays symmetric bit by bit.
+      for (int j = 0; j <= i; ++j) {
+        const Matrix3d block = X.R * Matrix3d(estimate.P(axes(i), axes(j))) * X.R.transpose();
+        const Matrix3d kept = i == j ? Matrix3d(0.5 * (block + block.transpose())) : block;
+        estimate.P(axes(i), axes(j)) = kept;
+        estimate.P(axes(j), axes(i)) = kept.transpose();
+      }
+    }
+    bank_.set(feature, estimate);
+    bank_.diffuse(feature, kDoubt_mm);
+  }
 }
 
 void MapKeeping::forget() noexcept {

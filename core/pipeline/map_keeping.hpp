@@ -26,11 +26,15 @@ class MapKeeping {
   // Whoever keeps the mapped features, the breathing and the law reads them here.
   [[nodiscard]] MapFeed& feed() noexcept { return feed_; }
   // Once a frame, before the workers learn from it: the next few slots, where the reader has done with the last.
-  void fill_feed(const Breathing& breathing, const HeartPhase& heart, std::uint64_t maps_forgotten) noexcept;
+  void fill_feed(const Breathing& breathing, const HeartPhase& heart, std::uint64_t maps_ended) noexcept;
 
   // Before the first frame: takes the features of an earlier run, as many as there is room for and whose estimates are
   // of this layout. `breathing` is recalled. Returns the largest id taken; 0: none.
   std::uint32_t recall(std::span<const FeatureMemory> features, const Breathing& breathing) noexcept;
+
+  // Moves every feature with what it lies on, its motion and all: a point p is where X p was. By how little it may be
+  // off then, each is less certain. One whose batch start is under way is emptied when housekeeping has given it back.
+  void displace(const Pose& X) noexcept;
 
   // Forgets every feature. One whose batch start is under way is emptied when housekeeping has given it back.
   void forget() noexcept;

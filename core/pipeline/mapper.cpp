@@ -18,6 +18,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, W
       counters_(outputs.counters),
       trust_(settings.pose, housekeeping.scope, outputs.counters),
       phases_(settings_, outputs.phase_cells, outputs.counters),
+      organ_(settings_),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())},
             settings.estimator.precision),
@@ -79,6 +80,7 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage&
   job_.frame = &frame;
   job_.doubts = trust_.doubts();
   job_.doubts.setup_doubted = watcher_.belief().doubted();
+  job_.doubts.displaced = organ_.displaced();
   job_.doubts.setup_variance_mm2 = watcher_.belief().variance_mm2();
   job_.starts_fail_alike = starts_fail_alike(slots_);
   job_.law = phases_.heart().clock().law_belief();
@@ -131,7 +133,8 @@ void Mapper::set_pose(FrameRecord& frame, const GreyImage& image, const GreyImag
     history_->disown_poses(*told.mistaken_since);
     watcher_.disown_poses(*told.mistaken_since);
   }
-  FrameHistory::set_pose(frame, told.pose);
+  FrameHistory::set_pose(frame, organ_.pose_by_map(told.pose));
+  frame.search_deviation_mm = organ_.search_deviation_mm();
 }
 
 void Mapper::plan_evaluation(const FrameRecord& frame) noexcept {
@@ -163,11 +166,30 @@ void Mapper::hand_on(const FrameRecord& frame, const GreyImage& image, const Col
   watcher_.take(*history_, slots_, bank_);
   intake_.offer(frame, image, colour, room());
   trust_.offer(frame, image);
-  keeping_.fill_feed(phases_.breathing(), phases_.heart(), counters_.maps_forgotten.get());
+  keeping_.fill_feed(phases_.breathing(), phases_.heart(), counters_.maps_ended());
   surface_.on_frame(frame, phases_.heart().clock().law().law, job_.doubts.setup_variance_mm2);
   counters_.frames.add();
   if (!frame.pose.valid()) counters_.frames_without_pose.add();
   if (frame.pose.valid() && !frame.measurable) counters_.frames_without_phase.add();
+  watch_organ(frame);
+}
+
+// Nothing is learnt, from the time on at which the organ may have begun to move: what the map has is to be kept.
+void Mapper::watch_organ(const FrameRecord& frame) noexcept {
+  const bool before = organ_.displaced();
+  organ_.watch(phases_.image(), stages_.groups(), frame);
+  if (organ_.displaced() && !before) counters_.times_displaced.add();
+  tell_displacement();
+  if (!organ_.displaced_since()) return;
+  const std::uint64_t from_index = history_->first_since(*organ_.displaced_since());
+  history_->disown_poses(from_index);
+  watcher_.disown_poses(from_index);
+}
+
+void Mapper::tell_displacement() noexcept {
+  constexpr double kMicrometres = 1000.0;
+  counters_.displaced.set(organ_.displaced() ? 1 : 0);
+  counters_.displaced_um.set(static_cast<std::uint64_t>(kMicrometres * organ_.size_mm()));
 }
 
 void Mapper::settle_matches(const FrameRecord& frame) noexcept {
@@ -237,9 +259,26 @@ void Mapper::forget() noexcept {
   surface_.forget();
   intake_.discard_round();
   watcher_.begin_window_anew();
+  organ_ = OrganWatch(settings_);
+  tell_displacement();
   stages_.hand_over_nothing();
   phases_.publish();
   counters_.maps_forgotten.add();
+}
+
+bool Mapper::move_map() noexcept {
+  const RealtimeScope realtime;
+  finish_learning();
+  if (!organ_.displaced()) return false;
+  keeping_.displace(organ_.displacement());
+  // What is held was seen of the organ where it was.
+  history_->disown_poses(0);
+  surface_.begin_again();
+  watcher_.begin_window_anew();
+  organ_.settle();
+  counters_.maps_moved.add();
+  tell_displacement();
+  return true;
 }
 
 void Mapper::recall(const MapMemory& memory, Instant now) {

@@ -16,6 +16,7 @@
 #include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/map_keeping.hpp"
 #include "core/pipeline/map_memory.hpp"
+#include "core/pipeline/organ_watch.hpp"
 #include "core/pipeline/patient_phases.hpp"
 #include "core/pipeline/phase_cells.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
@@ -82,6 +83,10 @@ class Mapper {
   // running cycle and of the heart's law; and publishes that nothing of it is known, with no frame needed for it.
   void forget() noexcept;
 
+  // Whoever knows says that the organ has been moved: where the images show it displaced the map is moved with it, with
+  // the motions that are known. False where they do not.
+  bool move_map() noexcept;
+
   // Before the first frame: takes the features of an earlier run, as many as there is room for and whose estimates are
   // of this layout, and what it knew of breathing, carried on to `now`; and publishes them.
   void recall(const MapMemory& memory, Instant now);
@@ -98,6 +103,8 @@ class Mapper {
   void find_features(const FrameRecord& frame) noexcept;
   void hand_on(const FrameRecord& frame, const GreyImage& image, const ColourImage& colour) noexcept;
   void settle_matches(const FrameRecord& frame) noexcept;
+  void watch_organ(const FrameRecord& frame) noexcept;
+  void tell_displacement() noexcept;
   void begin_learning(const FrameRecord& frame) noexcept;
   void finish_learning() noexcept;
   void shed_load(bool put_off) noexcept;
@@ -113,6 +120,7 @@ class Mapper {
   // What is known at a frame's capture. (What the map leaves unexplained belongs here.)
   PoseTrust trust_;
   PatientPhases phases_;
+  OrganWatch organ_;
   std::unique_ptr<FrameHistory> history_;
 
   // The features, and what is done with them.

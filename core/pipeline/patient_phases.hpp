@@ -50,6 +50,9 @@ class PatientPhases {
   [[nodiscard]] const CommonEstimate* settle(std::span<FeatureGroup> groups, const FrameRecord& frame) noexcept;
   void publish() noexcept;
 
+  // What asks a frame's matches for what they have in common.
+  [[nodiscard]] ImagePhase& image() noexcept { return image_; }
+
   // Another patient.
   void forget() noexcept;
   // Before the first frame: what an earlier run knew, carried on to `now`.

@@ -66,6 +66,7 @@ struct Pipeline::Parts {
   std::array<SurfaceComposer, kReleaseStreams.size()> composers;  // one a stream
   // Relaxed: a message by itself; the mapper's wake-up follows it.
   std::atomic<bool> forget_asked{false};
+  std::atomic<bool> move_asked{false};
   std::vector<const ShardSnapshot*> publisher_view;
   std::vector<const ShardSnapshot*> model_view;
   std::uint64_t model_owes = 0;  // the frame whose update the snapshots of model_view ought to have
@@ -158,6 +159,15 @@ void Pipeline::ask_to_forget() noexcept {
 
 void Pipeline::forget_if_asked() noexcept {
   if (parts_->forget_asked.exchange(false, std::memory_order_relaxed)) parts_->mapper.forget();
+}
+
+void Pipeline::ask_to_move_map() noexcept {
+  parts_->move_asked.store(true, std::memory_order_relaxed);
+  parts_->entrance.mapper_wakeup().post();
+}
+
+void Pipeline::move_map_if_asked() noexcept {
+  if (parts_->move_asked.exchange(false, std::memory_order_relaxed)) parts_->mapper.move_map();
 }
 
 void Pipeline::recall(const MapMemory& memory, Instant now) {

@@ -64,6 +64,12 @@ class Pipeline {
   // Mapper thread, between frames.
   void forget_if_asked() noexcept;
 
+  // Any thread: whoever knows says that the organ has been moved. Where the images show it displaced the mapper moves
+  // the map with it when it runs next; counters().maps_moved tells when that is done.
+  void ask_to_move_map() noexcept;
+  // Mapper thread, between frames.
+  void move_map_if_asked() noexcept;
+
   // Before any thread runs: what an earlier run knew. Publishing goes on from it at once, before any source is back.
   void recall(const MapMemory& memory, Instant now);
   // One housekeeping thread: the mapped features, a few at a time, and the breathing.

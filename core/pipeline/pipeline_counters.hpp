@@ -94,7 +94,11 @@ struct PipelineCounters {
   Counter start_matches_needed;                       // K
   Counter start_matches_most;                         // see StartProgress
   Counter start_matches_mean;
-  Counter maps_forgotten;         // by command, for a new patient
+  Counter maps_forgotten;  // by command, for a new patient
+  Counter maps_moved;      // by command, with the organ
+  Counter displaced;       // 1: the organ is not where the map has it, or the tracker errs; see OrganWatch
+  Counter displaced_um;    // by how much then, root mean square over the features
+  Counter times_displaced;
   Counter features_started_anew;  // inconsistent, also after inflation
   LatencyHistogram predict_and_find;
   LatencyHistogram phase_and_pose;
@@ -111,6 +115,8 @@ struct PipelineCounters {
   Counter frame_period_ns;
   std::array<StreamCounters, kReleaseStreams.size()> streams;
 
+  // What was kept of the map before is void.
+  [[nodiscard]] std::uint64_t maps_ended() const noexcept { return maps_forgotten.get() + maps_moved.get(); }
   [[nodiscard]] std::uint64_t features_lost() const noexcept {
     return features_lost_unseen.get() + features_lost_refused.get() + features_lost_unstarted.get();
   }

@@ -40,6 +40,20 @@ PixelPrediction predict_from_map(const MapPrediction& map, const FrameRecord& fr
   return prediction;
 }
 
+PixelPrediction widened(const PixelPrediction& from_map, const MapPrediction& map, const FrameRecord& frame,
+                        const PixelModel& model) noexcept {
+  PixelPrediction prediction = from_map;
+  Vector2d px;
+  Matrix23d J_C;
+  if (!from_map.valid || frame.search_deviation_mm == 0.0 ||
+      model.camera.project(frame.X_CW * map.p_WF, px, &J_C) != ProjectionStatus::kOk) {
+    return prediction;
+  }
+  const Matrix23d J = frame.picture.scale.asDiagonal() * J_C;
+  prediction.covariance_px2 += frame.search_deviation_mm * frame.search_deviation_mm * J * J.transpose();
+  return prediction;
+}
+
 PixelPrediction predict_from_shared_pose(const MapPrediction& map, const CommonEstimate& shared,
                                          const FrameRecord& frame, const PixelModel& model) noexcept {
   PixelPrediction prediction;

@@ -25,6 +25,9 @@ struct PixelPrediction {
 // By map and tracker; where the shift that all predictions of the frame have in common is known, with that.
 [[nodiscard]] PixelPrediction predict_from_map(const MapPrediction& map, const FrameRecord& frame,
                                                const PixelModel& model, const CommonShift& shift = {}) noexcept;
+// As far around it as the frame says that the map is looked for.
+[[nodiscard]] PixelPrediction widened(const PixelPrediction& from_map, const MapPrediction& map,
+                                      const FrameRecord& frame, const PixelModel& model) noexcept;
 
 // From the pose that the frame's matches agree on: far narrower than the tracker's where that is noisy.
 [[nodiscard]] PixelPrediction predict_from_shared_pose(const MapPrediction& map, const CommonEstimate& shared,

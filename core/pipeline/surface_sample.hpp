@@ -36,7 +36,8 @@ enum class SurfaceReason : std::uint8_t {
   kScopeUnread,
   kScopeChanged,
   kPoseRepeated,
-  kPictureRepeated
+  kPictureRepeated,
+  kOrganOrTrackerMoved
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost, kShed };

@@ -33,10 +33,12 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (phase.state == PhaseState::kUnknown) return SurfaceReason::kPhaseUnknown;
   if (phase.state == PhaseState::kLost) return SurfaceReason::kPhaseLost;
   if (!footing.mapped) return SurfaceReason::kNothingMapped;
-  // A set-up that is off displaces the surface as breathing may.
-  if (footing.breath_doubtful && !footing.doubts.setup_doubted) return SurfaceReason::kRespirationUnknown;
+  // A set-up that is off displaces the surface as breathing may, and so does whoever moves the organ.
+  const bool displaced_otherwise = footing.doubts.setup_doubted || footing.doubts.displaced;
+  if (footing.breath_doubtful && !displaced_otherwise) return SurfaceReason::kRespirationUnknown;
   if (phase.state == PhaseState::kFreeRunning) return SurfaceReason::kPhaseFreeRunning;
-  if (phase.contradicted) return SurfaceReason::kPhaseContradicted;
+  // The images show another phase than the map has where they show the map elsewhere.
+  if (phase.contradicted && !footing.doubts.displaced) return SurfaceReason::kPhaseContradicted;
   if (phase.state == PhaseState::kFromImage) return SurfaceReason::kPhaseFromImage;
   if (footing.frame_missing) return SurfaceReason::kFrameMissing;
   if (footing.update_late) return SurfaceReason::kUpdateLate;
@@ -46,6 +48,7 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (footing.doubts.pose_repeated) return SurfaceReason::kPoseRepeated;
   if (footing.pose_missing) return SurfaceReason::kPoseMissing;
   if (footing.doubts.setup_doubted) return SurfaceReason::kSetupDoubted;
+  if (footing.doubts.displaced) return SurfaceReason::kOrganOrTrackerMoved;
   if (footing.not_seen) return SurfaceReason::kNotSeen;
   if (footing.no_parallax) return SurfaceReason::kNoParallax;
   if (!footing.converged) return SurfaceReason::kNothingConverged;
@@ -72,7 +75,8 @@ SurfaceState state_of(SurfaceReason reason) noexcept {
 FeatureVerdict verdict_of(const FeatureVerdict& own, PhaseState phase, const SurfaceFooting& footing) noexcept {
   if (!usable(phase)) return {FeatureState::kInvalid, FeatureReason::kPhaseLost};
   FeatureVerdict verdict = own;
-  if ((footing.breath_doubtful || footing.doubts.setup_doubted) && verdict.state == FeatureState::kConverged) {
+  const bool elsewhere = footing.breath_doubtful || footing.doubts.setup_doubted || footing.doubts.displaced;
+  if (elsewhere && verdict.state == FeatureState::kConverged) {
     verdict = {FeatureState::kConverging, FeatureReason::kDeviationLarge};
   }
   if (verdict.reason == FeatureReason::kNone && (footing.frame_missing || footing.update_late)) {

@@ -65,6 +65,9 @@ void CheckpointKeeper::run() {
 
 void CheckpointKeeper::notice_forgotten_map() {
   const std::uint64_t forgotten = pipeline_.counters().maps_forgotten.get();
+  const std::uint64_t moved = pipeline_.counters().maps_moved.get();
+  if (moved != maps_moved_) features_.clear();
+  maps_moved_ = moved;
   if (forgotten == maps_forgotten_) return;
   maps_forgotten_ = forgotten;
   forgetting_ = false;
@@ -74,7 +77,7 @@ void CheckpointKeeper::notice_forgotten_map() {
 void CheckpointKeeper::take_map() {
   const MapFeed::Batch* batch = pipeline_.map_feed().front();
   if (batch == nullptr) return;
-  const bool of_this_map = !forgetting_ && batch->maps_forgotten == pipeline_.counters().maps_forgotten.get();
+  const bool of_this_map = !forgetting_ && batch->maps_ended == pipeline_.counters().maps_ended();
   respiration_ = of_this_map ? batch->respiration : RespirationMemory{};
   law_ = of_this_map ? batch->law : LawMemory{};
   for (const MapFeed::Entry& entry : batch->entries) {

@@ -56,6 +56,7 @@ class CheckpointKeeper {
   RespirationMemory respiration_;
   LawMemory law_;
   RecentEcg ecg_;
+  std::uint64_t maps_moved_ = 0;
   std::uint64_t maps_forgotten_ = 0;  // before the map that is kept
   bool forgetting_ = false;           // that map is to go, and the pipeline still has it: nothing is kept
   bool write_failed_ = false;

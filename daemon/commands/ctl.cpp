@@ -53,6 +53,8 @@ void add_ctl_command(Commands& commands) {
   commands.add(ctl, "status", "What it publishes, its sources, and how long each stage takes", telling("status"))
       .add_flag("--json", options->json, "Machine-readable, one line");
   commands.add(ctl, "new-patient", "Clears the map, and what is known of the heart's rhythm", telling("new-patient"));
+  commands.add(ctl, "organ-moved", "Moves the map, with its motions, to where the images show the organ now",
+               telling("organ-moved"));
   Command& record = commands.add_group(ctl, "record", "Begins to record what the devices give, or ends the recording");
   commands.add(record, "on", "Into a new file of recording.folder", telling("record on"));
   commands.add(record, "off", "Once all that has come is in the file", telling("record off"));

@@ -8,9 +8,10 @@
 namespace perimap {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, ControlCommand>, 5> kCommands{
+constexpr std::array<std::pair<std::string_view, ControlCommand>, 6> kCommands{
     {{"status", ControlCommand::kStatus},
      {"new-patient", ControlCommand::kNewPatient},
+     {"organ-moved", ControlCommand::kOrganMoved},
      {"record on", ControlCommand::kRecordOn},
      {"record off", ControlCommand::kRecordOff},
      {"reload", ControlCommand::kReload}}};
@@ -47,8 +48,8 @@ Expected<ControlCommand> parse_control_request(std::string_view request) {
   for (const auto& [name, command] : kCommands) {
     if (word == name) return command;
   }
-  return fail(
-      fmt::format("expected one of status, new-patient, record on, record off, reload, got '{}'", printable(word)));
+  return fail(fmt::format("expected one of status, new-patient, organ-moved, record on, record off, reload, got '{}'",
+                          printable(word)));
 }
 
 }  // namespace perimap

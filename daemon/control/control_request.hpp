@@ -15,7 +15,7 @@ namespace perimap {
 
 inline constexpr std::size_t kLongestRequest = 64;
 
-enum class ControlCommand : std::uint8_t { kStatus, kNewPatient, kRecordOn, kRecordOff, kReload };
+enum class ControlCommand : std::uint8_t { kStatus, kNewPatient, kOrganMoved, kRecordOn, kRecordOff, kReload };
 
 [[nodiscard]] std::string_view name_of(ControlCommand command) noexcept;
 

@@ -58,6 +58,8 @@ std::string_view remedy_of(perimap_SurfaceReason reason) noexcept {
       return "restart the tracker, or look at its cable";
     case perimap_SURFACE_REASON_PICTURE_REPEATED:
       return "look at the camera: the picture stands still";
+    case perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED:
+      return "let the organ go back, or see what disturbs the tracker; if the organ was moved: perimap ctl organ-moved";
   }
   return "update perimap view: perimapd is newer";
 }

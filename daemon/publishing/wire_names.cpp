@@ -19,7 +19,7 @@ std::string_view name_of(perimap_SurfaceState state) noexcept {
 }
 
 std::string_view name_of(perimap_SurfaceReason reason) noexcept {
-  return name_in<23>({"none",
+  return name_in<24>({"none",
                       "nothing_mapped",
                       "phase_unknown",
                       "phase_free_running",
@@ -41,7 +41,8 @@ std::string_view name_of(perimap_SurfaceReason reason) noexcept {
                       "scope_unread",
                       "scope_changed",
                       "pose_repeated",
-                      "picture_repeated"},
+                      "picture_repeated",
+                      "organ_or_tracker_moved"},
                      static_cast<int>(reason));
 }
 

@@ -68,6 +68,8 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_POSE_REPEATED;
     case SurfaceReason::kPictureRepeated:
       return perimap_SURFACE_REASON_PICTURE_REPEATED;
+    case SurfaceReason::kOrganOrTrackerMoved:
+      return perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }

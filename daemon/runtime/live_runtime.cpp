@@ -122,6 +122,7 @@ void LiveRuntime::run_mapper() noexcept {
     entrance.mapper_wakeup().clear();
     if (stopping_.load(std::memory_order_relaxed)) return;
     pipeline_.forget_if_asked();
+    pipeline_.move_map_if_asked();
     pipeline_.drain_poses();
     FrameHandle frame;
     if (!entrance.pop_frame(frame)) {

@@ -1,5 +1,7 @@
 #include "daemon/runtime/session_commands.hpp"
 
+#include <fmt/format.h>
+
 #include <thread>
 #include <utility>
 
@@ -31,6 +33,8 @@ Expected<std::string> SessionCommands::answer(ControlCommand command) {
       return tell_status();
     case ControlCommand::kNewPatient:
       return forget_patient();
+    case ControlCommand::kOrganMoved:
+      return move_map();
     case ControlCommand::kRecordOn:
     case ControlCommand::kRecordOff:
       return record_(command == ControlCommand::kRecordOn);
@@ -64,6 +68,21 @@ Expected<std::string> SessionCommands::forget_patient() {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   return "the map is cleared\n";
+}
+
+// Said to be done only when it is: until then surfaces are where the organ was.
+Expected<std::string> SessionCommands::move_map() {
+  const PipelineCounters& counters = pipeline_.counters();
+  if (counters.displaced.get() == 0) return fail("the images show the organ where it is mapped: nothing was moved");
+  const std::uint64_t before = counters.maps_moved.get();
+  const double mm = static_cast<double>(counters.displaced_um.get()) / 1000.0;
+  pipeline_.ask_to_move_map();
+  const Instant until = MonotonicClock::now() + kMapperPatience;
+  while (counters.maps_moved.get() == before) {
+    if (MonotonicClock::now() > until) return fail("the mapper does not answer: the map is not moved");
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return fmt::format("the map is moved with the organ, by {:.1f} mm\n", mm);
 }
 
 }  // namespace perimap

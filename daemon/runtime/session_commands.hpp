@@ -30,6 +30,7 @@ class SessionCommands {
  private:
   [[nodiscard]] std::string tell_status();
   [[nodiscard]] Expected<std::string> forget_patient();
+  [[nodiscard]] Expected<std::string> move_map();
 
   Pipeline& pipeline_;
   std::vector<WireStatus> statuses_;  // of the streams that are published

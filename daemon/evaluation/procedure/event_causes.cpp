@@ -14,14 +14,15 @@ EventCauses causes_of(std::string_view kind, bool hides) {
                                                   perimap_SURFACE_REASON_RHYTHM_ECTOPIC};
   std::vector<perimap_SurfaceReason> arcs = no_beats;
   arcs.insert(arcs.end(), seen.begin(), seen.end());
-  // NOT_SEEN says that the organ may have been moved, or that something else is seen, or nothing: it names no organ
-  // that is seen well and has moved. SETUP_DOUBTED blames what was measured before the session: neither the organ nor
-  // the tracker's field.
+  // The organ or the tracker: the same data. NOT_SEEN says that the organ may have been moved, or that something else
+  // is seen, or nothing: it names no organ that is seen well and has moved. SETUP_DOUBTED blames what was measured
+  // before the session: neither the organ nor the tracker's field.
+  const std::vector<perimap_SurfaceReason> moved{perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED};
   const std::map<std::string_view, EventCauses> causes = {
-      {"retraction", {{}, true}},
-      {"table-tilt", {{}, true}},
-      {"insufflation", {{}, true}},
-      {"metal", {{}, true}},
+      {"retraction", {moved, true}},
+      {"table-tilt", {moved, true}},
+      {"insufflation", {moved, true}},
+      {"metal", {moved, true}},
       // One place alone: its features are no longer converged, and the surface need not say anything.
       {"dent", {{}, false}},
       {"touch", {seen, false}},

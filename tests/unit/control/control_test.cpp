@@ -22,8 +22,8 @@ using namespace std::string_literals;
 using testing::HasSubstr;
 
 TEST(ControlRequest, EachCommandIsReadBackByItsName) {
-  for (const auto command : {ControlCommand::kStatus, ControlCommand::kNewPatient, ControlCommand::kRecordOn,
-                             ControlCommand::kRecordOff, ControlCommand::kReload}) {
+  for (const auto command : {ControlCommand::kStatus, ControlCommand::kNewPatient, ControlCommand::kOrganMoved,
+                             ControlCommand::kRecordOn, ControlCommand::kRecordOff, ControlCommand::kReload}) {
     const auto read = parse_control_request(std::string(name_of(command)) + "\n");
     ASSERT_TRUE(read) << read.error().message;
     EXPECT_EQ(*read, command);

@@ -13,7 +13,7 @@ namespace {
 
 // All that is written of a batch is its number.
 void fill(MapFeed::Batch& batch, int number) {
-  batch.maps_forgotten = static_cast<std::uint64_t>(number);
+  batch.maps_ended = static_cast<std::uint64_t>(number);
   for (MapFeed::Entry& entry : batch.entries) {
     entry.slot = static_cast<std::size_t>(number);
     entry.feature.updates = number;
@@ -26,7 +26,7 @@ void fill(MapFeed::Batch& batch, int number) {
 }
 
 bool is_whole(const MapFeed::Batch& batch, int number) {
-  return batch.maps_forgotten == static_cast<std::uint64_t>(number) && batch.respiration.offset_rad == number &&
+  return batch.maps_ended == static_cast<std::uint64_t>(number) && batch.respiration.offset_rad == number &&
          batch.law.cycles == number && std::ranges::all_of(batch.entries, [number](const MapFeed::Entry& entry) {
            const FeatureMemory& f = entry.feature;
            return entry.slot == static_cast<std::size_t>(number) && f.updates == number &&
@@ -42,11 +42,11 @@ TEST(MapFeed, ABatchIsTheMappersOrTheReadersNeverBoth) {
   const auto feed = std::make_unique<MapFeed>();
   EXPECT_EQ(feed->front(), nullptr);
   ASSERT_NE(feed->back(), nullptr);
-  feed->back()->maps_forgotten = 3;
+  feed->back()->maps_ended = 3;
   feed->hand_over();
   EXPECT_EQ(feed->back(), nullptr);
   ASSERT_NE(feed->front(), nullptr);
-  EXPECT_EQ(feed->front()->maps_forgotten, 3U);
+  EXPECT_EQ(feed->front()->maps_ended, 3U);
   feed->give_back();
   EXPECT_EQ(feed->front(), nullptr);
   EXPECT_NE(feed->back(), nullptr);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -71,8 +72,8 @@ struct Keeping : ::testing::Test {
     return of;
   }
   // The next batch, as its reader gets it.
-  [[nodiscard]] MapFeed::Batch feed(std::uint64_t maps_forgotten = 0) {
-    keeping->fill_feed(*breathing, heart, maps_forgotten);
+  [[nodiscard]] MapFeed::Batch feed(std::uint64_t maps_ended = 0) {
+    keeping->fill_feed(*breathing, heart, maps_ended);
     const MapFeed::Batch* batch = keeping->feed().front();
     EXPECT_NE(batch, nullptr);
     const MapFeed::Batch copy = *batch;
@@ -166,7 +167,7 @@ TEST_F(Keeping, TheFeedGoesRoundAllSlotsTwoAtATime) {
   for (std::size_t round = 0; round < 2; ++round) {
     for (std::size_t slot = 0; slot < kSlots; slot += MapFeed::kSlotsABatch) {
       const MapFeed::Batch batch = feed(7);
-      EXPECT_EQ(batch.maps_forgotten, 7U);
+      EXPECT_EQ(batch.maps_ended, 7U);
       for (std::size_t i = 0; i < MapFeed::kSlotsABatch; ++i) {
         EXPECT_EQ(batch.entries[i].slot, slot + i);
         EXPECT_EQ(batch.entries[i].mapped, slot + i != 4);
@@ -241,6 +242,29 @@ TEST_F(Keeping, AFeatureHasNothingOfTheOneThatTheSlotHadBefore) {
   EXPECT_EQ(slot.last_learnt, fresh.last_learnt);
   EXPECT_EQ(slot.last_learnt_rad, fresh.last_learnt_rad);
   EXPECT_EQ(slot.largest_deviation_mm, fresh.largest_deviation_mm);
+}
+
+// Every coefficient of the motion, and how uncertain it is in each direction.
+TEST_F(Keeping, AMapThatIsMovedKeepsItsMotions) {
+  FeatureMemory memory = feature(50);
+  const int n = settings.estimator.layout.size();
+  for (int i = 0; i < memory.estimate.x.size(); ++i) memory.estimate.x(i) += std::sin(i);
+  for (int i = 0; i < n; ++i) memory.estimate.P(i, i) *= 4.0;
+  ASSERT_EQ(keeping->recall(std::vector{memory}, *breathing), 50U);
+  const Pose X{so3_exp(Vector3d(0.1, -0.2, 0.3)), Vector3d(5.0, -4.0, 3.0)};
+  keeping->displace(X);
+  FeatureEstimate moved;
+  bank->get(0, moved);
+  EXPECT_EQ((moved.P - moved.P.transpose()).norm(), 0.0);
+  for (const double phase : {0.0, 1.0, 3.0}) {
+    const Basis b = basis_at(settings.estimator.layout, phase, 0.5 * phase);
+    EXPECT_LT((moved.position(b) - X * memory.estimate.position(b)).norm(), 1e-9);
+    const Matrix3d more = moved.position_covariance(b) - X.R * memory.estimate.position_covariance(b) * X.R.transpose();
+    // Less certain alike in every direction, by less than a millimetre.
+    EXPECT_LT((more - more(0, 0) * Matrix3d::Identity()).norm(), 1e-9);
+    EXPECT_GT(more(0, 0), 0.1);
+    EXPECT_LT(more(0, 0), 1.0);
+  }
 }
 
 TEST_F(Keeping, WhatIsForgottenIsGoneButForStartsThatAreUnderWay) {

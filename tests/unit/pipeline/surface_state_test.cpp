@@ -72,6 +72,29 @@ TEST(SurfaceState, IsDegradedWhileTheSetUpIsDoubtedAndNothingIsCalledConverged) 
             FeatureState::kConverging);
 }
 
+TEST(SurfaceState, IsDegradedWhileTheOrganIsNotWhereTheMapHasItAndNothingIsCalledConverged) {
+  ShardSnapshot shard;
+  shard.doubts.displaced = true;
+  shard.features.resize(1);
+  shard.features[0].state = FeatureState::kConverged;
+  shard.features[0].expected = true;
+  const ShardSnapshot other;
+  const ShardSnapshot* const shards[] = {&other, &shard};
+  SurfaceFooting footing = footing_of(shards);
+  EXPECT_TRUE(footing.not_seen);
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing), SurfaceReason::kOrganOrTrackerMoved)
+      << "which says more than that it is not seen";
+  PhaseEstimate contradicted = locked();
+  contradicted.contradicted = true;
+  EXPECT_EQ(reason_of(contradicted, Rhythm::kPredictable, footing), SurfaceReason::kOrganOrTrackerMoved);
+  EXPECT_EQ(state_of(SurfaceReason::kOrganOrTrackerMoved), SurfaceState::kDegraded);
+  EXPECT_EQ(verdict_of({FeatureState::kConverged, FeatureReason::kNone}, PhaseState::kLocked, footing).state,
+            FeatureState::kConverging);
+  footing.doubts.setup_doubted = true;
+  EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing), SurfaceReason::kSetupDoubted)
+      << "which says which number is off";
+}
+
 TEST(SurfaceState, IsDegradedWhileTheTrackerOrTheCameraRepeatsItself) {
   ShardSnapshot shard;
   shard.doubts.pose_repeated = true;

@@ -1,0 +1,124 @@
+#include "core/pipeline/organ_watch.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace perimap {
+namespace {
+
+// What a frame's matches are asked for: displacements of about so much, beside the tracker's error.
+constexpr double kSearchedShift_mm = 10.0;
+constexpr double kSearchedTurn_rad = 0.05;
+// No tracker and no map is better than that.
+constexpr double kLeastTracker_mm = 0.1;
+constexpr double kLeastTracker_rad = 3e-4;
+constexpr double kLeastMap_mm = 0.2;
+
+// Beyond chance: see docs/decisions/0097. And what makes it the organ's place again.
+constexpr double kDoubt_chi2 = 35.0;
+constexpr double kDoubt_mm = 1.2;
+constexpr double kBack_mm = 1.0;
+constexpr double kBack_chi2 = 25.0;
+constexpr std::size_t kFollowedWindow = 0;  // of CommonDisplacement::kWindows
+constexpr std::size_t kBackWindows[] = {1, 2};
+
+// So much the organ may move until the next frames tell; and so far the map is looked for where it is not found.
+constexpr double kMoving_mm = 1.5;
+constexpr double kLost_mm = 5.0;
+constexpr int kFewestExpected = 8;
+
+CameraPose wider(const CameraPose& pose, double shift_mm, double turn_rad) noexcept {
+  CameraPose wide = pose;
+  wide.position_variance_mm2 += shift_mm * shift_mm;
+  wide.rotation_variance_rad2 += turn_rad * turn_rad;
+  return wide;
+}
+
+}  // namespace
+
+CameraPose OrganWatch::pose_by_map(const CameraPose& told) noexcept {
+  told_ = told;
+  if (!displaced() || !told.valid()) return told;
+  CameraPose pose = told;
+  const Pose X_MW = displacement().inverse();
+  pose.X_WC = X_MW * told.X_WC;
+  pose.lever_W_mm = X_MW.R * told.lever_W_mm;
+  pose.position_variance_mm2 += kMoving_mm * kMoving_mm;
+  return pose;
+}
+
+double OrganWatch::search_deviation_mm() const noexcept { return frames_lost_ > 0 ? kLost_mm : 0.0; }
+
+void OrganWatch::count_sight(std::span<FeatureGroup> groups) noexcept {
+  int expected = 0;
+  int agreeing = 0;
+  for (FeatureGroup& group : groups) {
+    for (const FeatureSlot& slot : group.slots()) {
+      if (!is_asked(slot, Asked::kWellKnown) || slot.shed || !slot.in_view) continue;
+      ++expected;
+      agreeing += slot.match_agrees ? 1 : 0;
+    }
+  }
+  const bool lost = expected >= kFewestExpected && 2 * agreeing < expected;
+  frames_lost_ = lost ? frames_lost_ + 1 : 0;
+}
+
+void OrganWatch::watch(ImagePhase& image, std::span<FeatureGroup> groups, const FrameRecord& frame) noexcept {
+  if (!frame.measurable) return;
+  count_sight(groups);
+  CameraPose told = frame.pose;
+  told.position_variance_mm2 = told_.position_variance_mm2;
+  told.rotation_variance_rad2 = told_.rotation_variance_rad2;
+  CameraPose tracker = wider(told, kLeastTracker_mm, kLeastTracker_rad);
+  // Breathing that is not known is an error of the pose too.
+  tracker.position_variance_mm2 += frame.respiration.deviation_mm * frame.respiration.deviation_mm;
+  const CameraPose searched = wider(tracker, kSearchedShift_mm, kSearchedTurn_rad);
+  const ImagePhase::Together together = image.together(groups, frame, searched, model_, estimator_);
+  if (!together.told) return;
+  if (!pivoted_) pivot_W_mm_ = together.centre_W_mm;
+  pivoted_ = true;
+  surface_.spread_mm = std::max(together.spread_mm, 5.0);
+  surface_.map_variance_mm2 = together.map_variance_mm2 + kLeastMap_mm * kLeastMap_mm;
+  const auto& s = together.estimate;
+  DisplacementEvidence evidence = displacement_evidence(
+      s.s.head<kPoseUnknowns>(), s.covariance.topLeftCorner<kPoseUnknowns, kPoseUnknowns>(),
+      camera_error_covariance(searched), camera_error_covariance(tracker), frame.pose.X_WC, pivot_W_mm_);
+  // Against the map where it was learnt.
+  if (displaced()) evidence.g += evidence.W * d_;
+  evidence_.add(frame.stamp.capture, evidence);
+  judge(frame);
+}
+
+void OrganWatch::judge(const FrameRecord& frame) noexcept {
+  const Instant now = frame.stamp.capture;
+  if (!displaced()) {
+    for (std::size_t window = 0; window < CommonDisplacement::kWindows.size(); ++window) {
+      const MeanDisplacement mean = evidence_.mean(window, now, surface_);
+      if (!mean.told || mean.chi2 < kDoubt_chi2 || mean.size_mm < kDoubt_mm) continue;
+      displaced_since_ = now - CommonDisplacement::kWindows[window] - std::chrono::milliseconds(500);
+      break;
+    }
+  }
+  if (!displaced()) return;
+  const MeanDisplacement newest = evidence_.mean(kFollowedWindow, now, surface_);
+  if (newest.told) {
+    d_ = newest.d;
+    size_mm_ = newest.size_mm;
+  }
+  const bool back = std::all_of(std::begin(kBackWindows), std::end(kBackWindows), [&](std::size_t window) {
+    const MeanDisplacement mean = evidence_.mean(window, now, surface_);
+    return mean.told && mean.size_mm < kBack_mm && mean.chi2 < kBack_chi2;
+  });
+  if (back) settle();
+}
+
+void OrganWatch::settle() noexcept {
+  displaced_since_.reset();
+  d_.setZero();
+  size_mm_ = 0.0;
+  evidence_.clear();
+  frames_lost_ = 0;
+}
+
+}  // namespace perimap

@@ -1,0 +1,71 @@
+// Whether the organ is where the map has it, as far as the tracker's own error lets the matches tell.
+//
+// A common shift and turn of the features against the map is the same data whether the organ has been moved or the
+// tracker errs by more than it was said to. Both mean that nothing is good; which of the two it is, the matches do not
+// tell.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "core/estimation/common_displacement.hpp"
+#include "core/pipeline/feature_group.hpp"
+#include "core/pipeline/frame_history.hpp"
+#include "core/pipeline/image_phase.hpp"
+#include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/pose_history.hpp"
+#include "core/time/instant.hpp"
+
+namespace perimap {
+
+//              a window's mean is beyond chance, and too large
+//   at its place ───────────────────────────────────────────▶ displaced: nothing is learnt, the poses of frames are
+//       ▲  ▲                                                   │     │   told as of the map that moves with the organ
+//       │  └─ it is back: two windows' means are small again ──┘     │
+//       └──── whoever knows says that the organ has been moved, and the map is moved with it
+//
+// All members are called by the mapper thread; nothing is allocated.
+class OrganWatch {
+ public:
+  explicit OrganWatch(const PipelineSettings& settings) noexcept
+      : model_{settings.camera}, estimator_(settings.estimator), evidence_(settings.pose.error_correlation) {}
+
+  // At a frame's beginning: the camera's pose by the map, which is displaced as was seen last; and how far around its
+  // predictions the frame's features are searched for.
+  [[nodiscard]] CameraPose pose_by_map(const CameraPose& told) noexcept;
+  [[nodiscard]] double search_deviation_mm() const noexcept;
+
+  // When a frame's matches are settled and no worker learns.
+  void watch(ImagePhase& image, std::span<FeatureGroup> groups, const FrameRecord& frame) noexcept;
+
+  [[nodiscard]] bool displaced() const noexcept { return displaced_since_.has_value(); }
+  // Captures from this one on are not to be learnt from; none: all are.
+  [[nodiscard]] const std::optional<Instant>& displaced_since() const noexcept { return displaced_since_; }
+  // Maps the map's points to where they are now.
+  [[nodiscard]] Pose displacement() const noexcept { return perimap::displaced(d_, pivot_W_mm_); }
+
+  // By how much, root mean square over the features; 0 where it is not.
+  [[nodiscard]] double size_mm() const noexcept { return size_mm_; }
+
+  // The map is where it was said to be, or another.
+  void settle() noexcept;
+
+ private:
+  void count_sight(std::span<FeatureGroup> groups) noexcept;
+  void judge(const FrameRecord& frame) noexcept;
+
+  PixelModel model_;
+  EstimatorSettings estimator_;
+  CommonDisplacement evidence_;
+
+  CameraPose told_;  // of the frame at hand
+  bool pivoted_ = false;
+  Vector3d pivot_W_mm_ = Vector3d::Zero();
+  DisplacedSurface surface_;
+  Vector6d d_ = Vector6d::Zero();
+  double size_mm_ = 0.0;
+  std::optional<Instant> displaced_since_;
+  int frames_lost_ = 0;  // in a row, of which most of the map was not found where it is
+};
+
+}  // namespace perimap
