@@ -18,6 +18,9 @@ constexpr double kLeastMap_mm = 0.2;
 // Beyond chance: see docs/decisions/0097. And what makes it the organ's place again.
 constexpr double kDoubt_chi2 = 35.0;
 constexpr double kDoubt_mm = 1.2;
+// Half a second is less than a heart beat: what the map errs by at one phase does not average out in it.
+constexpr double kWithinABeat = 2.0;  // times the chi-squared
+constexpr double kUnsurePhase_s = 0.02;
 constexpr double kBack_mm = 1.0;
 constexpr double kBack_chi2 = 25.0;
 constexpr std::size_t kFollowedWindow = 0;  // of CommonDisplacement::kWindows
@@ -74,6 +77,8 @@ void OrganWatch::watch(ImagePhase& image, std::span<FeatureGroup> groups, const 
   // Breathing that is not known is an error of the pose too.
   tracker.position_variance_mm2 += frame.respiration.deviation_mm * frame.respiration.deviation_mm;
   const CameraPose searched = wider(tracker, kSearchedShift_mm, kSearchedTurn_rad);
+  // A premature beat moves the heart otherwise, and a phase that is not known puts it elsewhere in its motion.
+  if (frame.phase.ectopic || frame.phase.deviation_s > kUnsurePhase_s) return;
   const ImagePhase::Together together = image.together(groups, frame, searched, model_, estimator_);
   if (!together.told) return;
   if (!pivoted_) pivot_W_mm_ = together.centre_W_mm;
@@ -95,7 +100,8 @@ void OrganWatch::judge(const FrameRecord& frame) noexcept {
   if (!displaced()) {
     for (std::size_t window = 0; window < CommonDisplacement::kWindows.size(); ++window) {
       const MeanDisplacement mean = evidence_.mean(window, now, surface_);
-      if (!mean.told || mean.chi2 < kDoubt_chi2 || mean.size_mm < kDoubt_mm) continue;
+      if (!mean.told || mean.chi2 < (window == 0 ? kWithinABeat : 1.0) * kDoubt_chi2 || mean.size_mm < kDoubt_mm)
+        continue;
       displaced_since_ = now - CommonDisplacement::kWindows[window] - std::chrono::milliseconds(500);
       break;
     }
