@@ -131,7 +131,7 @@ run "$perimap" simulate "$output/heart.mcap" --duration "$duration" --tracker-no
 
 # perimapd and its subscriber find each other on the loopback interface alone, in a domain of their own.
 domain=$((20 + $$ % 100))
-CYCLONEDDS_URI="file://$PWD/deploy/cyclonedds-loopback.xml"
+CYCLONEDDS_URI="deploy/cyclonedds-loopback.xml"
 export CYCLONEDDS_URI
 
 follow() { # NAME: replays heart-NAME.mcap in real time; received samples go to heart-NAME.received.mcap
@@ -180,4 +180,4 @@ for name in 0mm 1.4mm; do
 done
 
 say "Pictures: $output/heart-0mm.svg, $output/heart-1.4mm.svg"
-say "Done. Session reports: file://$PWD/$output/session-0mm.html, file://$PWD/$output/session-1.4mm.html"
+say "Done. Session reports: $output/session-0mm.html, $output/session-1.4mm.html"

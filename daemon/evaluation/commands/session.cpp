@@ -18,10 +18,10 @@ struct SessionOptions {
   std::string page;
 };
 
-// Beside what was published, under its name.
+// Beside what was published, under a name that no other command gives.
 std::string page_beside(const SessionFiles& files) {
   std::filesystem::path page = files.published.empty() ? files.recording : files.published;
-  return page.replace_extension(".html");
+  return page.replace_extension(".session.html");
 }
 
 Outcome session(const SessionOptions& options) {
@@ -52,8 +52,9 @@ void add_session_command(Commands& commands) {
                   "the devices, with --samples")
       ->required();
   command.add_option("--samples", options->files.published, "What was published, where that is a file of its own");
-  command.add_option("--html", options->page,
-                     "Write the page to this file; without it beside the samples, with the ending .html");
+  command.add_option(
+      "--html", options->page,
+      "Write the page to this file; without it beside the file that has the surfaces, with the ending .session.html");
   command.add_option("--source", options->files.source, "Which perimapd, where there are several");
   command.add_option("--stream", options->files.stream, "Which stream, where there are several: frame or clock");
 }

@@ -1,6 +1,7 @@
 #include "daemon/evaluation/session/published_session.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
@@ -91,18 +92,44 @@ Tone tone_of(perimap_RecordingState state) {
 
 double seconds_of(Instant instant) { return to_seconds(instant.time_since_epoch()); }
 
-// Of what was said before the first surface nothing is kept.
-SessionStrip moved(const SessionStrip& strip, double begin_s) {
-  SessionStrip from_begin(strip.name(), 0.0);
-  for (const SessionSpan& span : strip.spans()) {
-    if (span.end_s < begin_s) continue;
-    from_begin.say(std::max(span.begin_s - begin_s, 0.0), span.what, span.tone);
-    from_begin.prolong(span.end_s - begin_s);
-  }
-  return from_begin;
+double seconds_of(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+
+// For how long from its receipt on the surface may be used. Where the receiver's clock is another than the publisher's,
+// by the publisher's times alone.
+double holds_s(const perimap_Surface& surface, double receipt_s) {
+  constexpr double kSameClock_s = 10.0;
+  const double release_s = seconds_of(surface.release_time_ns);
+  const bool same_clock = std::abs(receipt_s - release_s) < kSameClock_s;
+  return seconds_of(surface.valid_until_ns) - (same_clock ? receipt_s : release_s);
 }
 
+StatusCounters counters_of(const perimap_Status& status) {
+  StatusCounters counters;
+  std::copy_n(status.run_id, counters.run_id.size(), counters.run_id.begin());
+  counters.counts = {status.samples_from_late_update,
+                     status.releases_missed,
+                     status.releases_late,
+                     status.frames_without_pose,
+                     status.frames_without_phase,
+                     status.frames_not_recorded + status.other_not_recorded};
+  for (std::uint32_t i = 0; i < status.sources._length; ++i) {
+    const perimap_SourceStatus& source = status.sources._buffer[i];
+    counters.sources[source.kind] = {source.received, source.dropped};
+  }
+  return counters;
+}
+
+// What came after `before`: all of it where perimapd began anew.
+std::uint64_t since(std::uint64_t now, std::uint64_t before) { return now >= before ? now - before : now; }
+
 }  // namespace
+
+double PublishedSession::Interval::holds_s(double at_s) noexcept {
+  constexpr double kLeast_s = 1.0, kIntervals = 2.5;
+  const double interval_s = last_s_ >= 0.0 ? std::max(at_s - last_s_, kLeast_s) : kLeast_s;
+  last_s_ = at_s;
+  return kIntervals * interval_s;
+}
 
 void PublishedSession::add(const perimap_Surface& surface, Instant receipt) {
   const double at_s = seconds_of(receipt);
@@ -112,9 +139,13 @@ void PublishedSession::add(const perimap_Surface& surface, Instant receipt) {
   }
   std::string what = words(name_of(surface.state));
   if (surface.reason != perimap_SURFACE_REASON_NONE) what += ": " + words(name_of(surface.reason));
-  reasons_.emplace(what, surface.reason);
-  surface_.say(at_s, what, tone_of(surface.state));
-  if (surface.state == perimap_SURFACE_GOOD && !first_good_s_) first_good_s_ = at_s - begin_s_;
+  const double holds = holds_s(surface, at_s);
+  // What must not be used any more when it comes is not good, whatever it says.
+  if (!(holds > 0.0)) what = "received too late";
+  reasons_.emplace(what, holds > 0.0 ? surface.reason : perimap_SURFACE_REASON_NONE);
+  surface_.say(at_s, what, holds > 0.0 ? tone_of(surface.state) : Tone::kBad, holds);
+  if (surface.state == perimap_SURFACE_GOOD && holds > 0.0 && !first_good_s_) first_good_s_ = at_s - begin_s_;
+  virtual_time_ = virtual_time_ && to_ns(receipt) == surface.release_time_ns;
 
   const SurfaceDigest brief = digest(surface);
   SurfaceMoment moment;
@@ -122,17 +153,17 @@ void PublishedSession::add(const perimap_Surface& surface, Instant receipt) {
   moment.converged = brief.features[perimap_FEATURE_CONVERGED];
   moment.others = brief.features[perimap_FEATURE_CONVERGING] + brief.features[perimap_FEATURE_INCONSISTENT];
   moment.deviation_mm = brief.median_deviation_mm;
-  moment.capture_to_receipt_ms = 1e3 * to_seconds(receipt - from_ns(surface.capture_time_ns));
+  moment.capture_to_receipt_ms = 1e3 * (at_s - seconds_of(surface.capture_time_ns));
   surfaces_.push_back(moment);
 }
 
 void PublishedSession::add(const perimap_Phase& phase, Instant receipt) {
   const double at_s = seconds_of(receipt);
-  phase_.say(at_s, words(name_of(phase.state)), tone_of(phase.state));
+  phase_.say(at_s, words(name_of(phase.state)), tone_of(phase.state), phases_.holds_s(at_s));
   // Of two beats between samples the interval is not known.
   if (phase.beats == last_beats_) return;
   if (phase.beats == last_beats_ + 1 && last_r_peak_ns_ != 0 && phase.last_r_peak_time_ns > last_r_peak_ns_) {
-    rhythm_.push_back({at_s, 1e-9 * static_cast<double>(phase.last_r_peak_time_ns - last_r_peak_ns_)});
+    rhythm_.push_back({at_s, seconds_of(phase.last_r_peak_time_ns) - seconds_of(last_r_peak_ns_)});
   }
   last_beats_ = phase.beats;
   last_r_peak_ns_ = phase.last_r_peak_time_ns;
@@ -140,19 +171,40 @@ void PublishedSession::add(const perimap_Phase& phase, Instant receipt) {
 
 void PublishedSession::add(const perimap_Status& status, Instant receipt) {
   const double at_s = seconds_of(receipt);
-  set_up_.say(at_s, words(name_of(status.setup.state)), tone_of(status.setup.state));
-  recording_.say(at_s, words(name_of(status.recording)), tone_of(status.recording));
-  if (status.ecg_first_lead != perimap_ECG_LEAD_NONE) {
-    lead_.say(at_s, words(name_of(status.ecg_first_lead)), tone_of(status.ecg_first_lead));
-  }
-  if (status.ecg_second_lead != perimap_ECG_LEAD_NONE) {
-    second_lead_.say(at_s, words(name_of(status.ecg_second_lead)), tone_of(status.ecg_second_lead));
-  }
+  const double holds = statuses_.holds_s(at_s);
+  const auto say = [at_s, holds](SessionStrip& strip, auto state) {
+    strip.say(at_s, words(name_of(state)), tone_of(state), holds);
+  };
+  say(set_up_, status.setup.state);
+  say(recording_, status.recording);
+  if (status.ecg_first_lead != perimap_ECG_LEAD_NONE) say(lead_, status.ecg_first_lead);
+  if (status.ecg_second_lead != perimap_ECG_LEAD_NONE) say(second_lead_, status.ecg_second_lead);
   for (std::uint32_t i = 0; i < status.sources._length; ++i) {
     const perimap_SourceStatus& source = status.sources._buffer[i];
-    const auto strip = sources_.try_emplace(source.kind, words(name_of(source.kind)), 2.5).first;
-    strip->second.say(at_s, words(name_of(source.state)), tone_of(source.state));
+    say(sources_.try_emplace(source.kind, words(name_of(source.kind))).first->second, source.state);
   }
+  count(status);
+}
+
+void PublishedSession::count(const perimap_Status& status) {
+  const StatusCounters now = counters_of(status);
+  counters_.latency_short |= status.latency_short;
+  counters_.respiration_suspected |= status.respiration_suspected;
+  counters_.recording_stopped |= status.recording == perimap_RECORDING_STOPPED;
+  counters_.priority_refused |= status.realtime_priority == perimap_PRIVILEGE_REFUSED;
+  counters_.memory_refused |= status.memory_locked == perimap_PRIVILEGE_REFUSED;
+  if (last_counters_) {
+    const bool another_run = now.run_id != last_counters_->run_id;
+    const StatusCounters before = another_run ? StatusCounters{} : *last_counters_;
+    for (std::size_t i = 0; i < now.counts.size(); ++i) counters_.counts[i] += since(now.counts[i], before.counts[i]);
+    for (const auto& [kind, source] : now.sources) {
+      const auto known = before.sources.find(kind);
+      const SourceCounters last = known != before.sources.end() ? known->second : SourceCounters{};
+      counters_.sources[kind].received += since(source.received, last.received);
+      counters_.sources[kind].lost += since(source.lost, last.lost);
+    }
+  }
+  last_counters_ = now;
 }
 
 SessionRecord PublishedSession::record() const {
@@ -161,16 +213,20 @@ SessionRecord PublishedSession::record() const {
   record.length_s = surfaces_.empty() ? 0.0 : surfaces_.back().at_s;
   record.first_good_s = first_good_s_;
   record.surfaces = surfaces_;
+  record.virtual_time = virtual_time_;
+  record.counters = counters_;
   for (RhythmMoment moment : rhythm_) {
     moment.at_s -= begin_s_;
     if (moment.at_s >= 0.0) record.rhythm.push_back(moment);
   }
-  record.strips.push_back(moved(surface_, begin_s_));
-  record.strips.push_back(moved(phase_, begin_s_));
-  for (const auto& [kind, strip] : sources_) record.strips.push_back(moved(strip, begin_s_));
-  for (const SessionStrip* strip : {&lead_, &second_lead_, &set_up_, &recording_}) {
-    record.strips.push_back(moved(*strip, begin_s_));
-  }
+  const auto show = [this, &record](SessionStrip strip) {
+    strip.end(begin_s_ + record.length_s);
+    record.strips.push_back(strip.from(begin_s_));
+  };
+  show(surface_);
+  show(phase_);
+  for (const auto& [kind, strip] : sources_) show(strip);
+  for (const SessionStrip* strip : {&lead_, &second_lead_, &set_up_, &recording_}) show(*strip);
   for (const SessionSpan& span : record.strips.front().spans()) {
     auto share = std::find_if(record.shares.begin(), record.shares.end(),
                               [&span](const StateShare& known) { return known.what == span.what; });

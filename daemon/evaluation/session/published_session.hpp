@@ -30,21 +30,36 @@ class PublishedSession {
   [[nodiscard]] SessionRecord record() const;
 
  private:
+  // What comes at intervals that nobody told holds for two and a half of them.
+  class Interval {
+   public:
+    [[nodiscard]] double holds_s(double at_s) noexcept;
+
+   private:
+    double last_s_ = -1.0;
+  };
+
+  void count(const perimap_Status& status);
+
   double begin_s_ = 0.0;
   std::int64_t begin_utc_ns_ = 0;
   std::optional<double> first_good_s_;
+  bool virtual_time_ = true;                              // as far as surfaces tell
   std::map<std::string, perimap_SurfaceReason> reasons_;  // by the words of the strip
   std::vector<SurfaceMoment> surfaces_;
   std::vector<RhythmMoment> rhythm_;
   std::int64_t last_r_peak_ns_ = 0;
   std::uint64_t last_beats_ = 0;
-  SessionStrip surface_{"surface", 0.4};
-  SessionStrip phase_{"heart's phase", 0.5};
-  SessionStrip lead_{"ECG lead", 2.5};
-  SessionStrip second_lead_{"second ECG lead", 2.5};
-  SessionStrip set_up_{"set-up watch", 2.5};
-  SessionStrip recording_{"recording", 2.5};
+  SessionStrip surface_{"surface"};
+  SessionStrip phase_{"heart's phase"};
+  SessionStrip lead_{"ECG lead"};
+  SessionStrip second_lead_{"second ECG lead"};
+  SessionStrip set_up_{"set-up watch"};
+  SessionStrip recording_{"recording"};
   std::map<perimap_SourceKind, SessionStrip> sources_;
+  Interval phases_, statuses_;
+  std::optional<StatusCounters> last_counters_;
+  StatusCounters counters_;
 };
 
 }  // namespace perimap

@@ -27,30 +27,27 @@ struct At {
   double value = 0.0;  // not finite: there is none
 };
 
-// What is drawn of many values: of each stretch of time the least and the largest, so that nothing short is hidden. The
-// line is interrupted where nothing came for `pause_s`.
+// What is drawn of many values: of each stretch of time the least and the largest, so that what was short is seen. The
+// line is interrupted where a value is missing, and where nothing came for `pause_s`.
 std::vector<PlotPoint> drawn(const std::vector<At>& values, double length_s, double pause_s) {
   std::vector<PlotPoint> points;
   const double bin_s = length_s / static_cast<double>(kMostPoints);
-  double last_s = -std::numeric_limits<double>::infinity();
   for (std::size_t begin = 0; begin < values.size();) {
+    double least = values[begin].value, most = least;
+    const bool missing = !std::isfinite(least);
+    bool broken = missing;
     std::size_t end = begin + 1;
-    while (end < values.size() && values[end].at_s < values[begin].at_s + bin_s) ++end;
-    double least = std::numeric_limits<double>::infinity(), most = -least;
-    for (std::size_t i = begin; i < end; ++i) {
-      if (!std::isfinite(values[i].value)) continue;
-      least = std::min(least, values[i].value);
-      most = std::max(most, values[i].value);
+    for (; end < values.size() && values[end].at_s < values[begin].at_s + bin_s; ++end) {
+      broken = !std::isfinite(values[end].value) || values[end].at_s - values[end - 1].at_s > pause_s;
+      if (broken || missing) break;
+      least = std::min(least, values[end].value);
+      most = std::max(most, values[end].value);
     }
+    broken = broken || (end < values.size() && values[end].at_s - values[end - 1].at_s > pause_s);
     const double at_s = values[begin].at_s;
-    if (at_s - last_s > pause_s + bin_s) points.push_back({at_s, kNone});
-    last_s = values[end - 1].at_s;
-    if (least > most) {
-      points.push_back({at_s, kNone});
-    } else {
-      points.push_back({at_s, least});
-      if (most > least) points.push_back({at_s, most});
-    }
+    if (!missing) points.push_back({at_s, least});
+    if (most > least) points.push_back({at_s, most});
+    if (broken) points.push_back({at_s, kNone});
     begin = end;
   }
   return points;
@@ -168,6 +165,9 @@ std::string stage_rows(const std::vector<perimap_StageLatency>& stages) {
 }
 
 std::string latency_section(const SessionRecord& record) {
+  if (record.virtual_time) {
+    return "<h2>Delays</h2>\n<p>Surfaces were made by a replay in virtual time, which has none.</p>\n";
+  }
   std::string out = "<h2>Delays, ms</h2>\n<table><tr><th></th><th>median</th><th>99 %</th><th>largest</th></tr>\n";
   out += spread_row("capture to receipt", record.counts.latency);
   out += spread_row("receipt after the release's deadline", record.counts.lateness);
@@ -190,7 +190,8 @@ std::string set_up_section(const SessionRecord& record) {
 std::string sources_section(const SessionRecord& record) {
   if (!record.counts.status || record.counts.status->sources.empty()) return {};
   std::string out =
-      "<h2>Devices</h2>\n<table><tr><th></th><th>at the end</th><th>a second</th><th>received</th><th>lost</th>"
+      "<h2>Devices</h2>\n<table><tr><th></th><th>at the end</th><th>a second</th><th>received since its "
+      "start</th><th>lost</th>"
       "<th>invalid</th><th>delay: median, ms</th><th>99 %</th><th>largest</th></tr>\n";
   for (const perimap_SourceStatus& source : record.counts.status->sources) {
     out += fmt::format(
@@ -212,7 +213,8 @@ std::string file_section(const RecordedFile& file) {
   for (const RecordedFile::Channel& channel : file.channels) {
     out += fmt::format("<tr><td>{}</td><td class=\"words\">{}</td><td>{}</td><td>{:.2f}</td><td>{:.1f}</td></tr>\n",
                        escaped(channel.name), escaped(channel.type), channel.messages,
-                       1e-6 * static_cast<double>(channel.bytes), to_seconds(channel.last - channel.first));
+                       1e-6 * static_cast<double>(channel.bytes),
+                       to_seconds(channel.last.time_since_epoch()) - to_seconds(channel.first.time_since_epoch()));
   }
   out += "</table>\n";
   if (!file.configuration.empty()) {

@@ -1,7 +1,10 @@
 // What a session's recordings tell of it, without any truth.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -52,6 +55,33 @@ struct StateShare {
   double longest_begin_s = 0.0;
 };
 
+struct SourceCounters {
+  std::uint64_t received = 0;
+  std::uint64_t lost = 0;
+};
+
+// What perimapd counted.
+struct StatusCounters {
+  enum Count : std::size_t {
+    kLateUpdates,
+    kReleasesMissed,
+    kReleasesLate,
+    kWithoutPose,
+    kWithoutPhase,
+    kNotRecorded,
+    kCounts
+  };
+
+  std::array<std::uint8_t, 16> run_id{};
+  std::array<std::uint64_t, kCounts> counts{};
+  std::map<perimap_SourceKind, SourceCounters> sources;
+  bool latency_short = false;
+  bool respiration_suspected = false;
+  bool recording_stopped = false;
+  bool priority_refused = false;
+  bool memory_refused = false;
+};
+
 struct RecordedFile {
   struct Channel {
     std::string name;
@@ -71,6 +101,7 @@ struct RecordedFile {
 
 struct SessionRecord {
   std::string source, stream;
+  bool virtual_time = false;               // replayed so: receipts are no more than releases, and no delay is told
   std::vector<std::string> other_streams;  // "SOURCE, STREAM", of which nothing below tells
   std::int64_t begin_utc_ns = 0;           // release of the first surface
   double length_s = 0.0;                   // from the first surface's receipt to the last one's
@@ -81,11 +112,12 @@ struct SessionRecord {
   std::vector<RhythmMoment> rhythm;
   std::vector<MeshMoment> mesh;
   StreamReport counts;
+  StatusCounters counters;  // from the first status to the last, over all runs; a flag is set that was set in any
   std::vector<RecordedFile> files;
 };
 
-// Reads both files once, of a damaged one what is whole. An error says which file holds no surface, and how to come by
-// one that does.
+// Reads both files once, of a damaged one what is whole; where both are given what was published is taken from the
+// second alone. An error says which file holds no surface, and how to come by one that does.
 [[nodiscard]] Expected<SessionRecord> read_session(const SessionFiles& files);
 
 }  // namespace perimap

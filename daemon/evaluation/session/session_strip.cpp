@@ -16,6 +16,7 @@ constexpr double kStripWidth = 930.0;
 constexpr double kWidth = kLabelWidth + kStripWidth + 30.0;
 constexpr double kRow = 30.0;
 constexpr double kBar = 20.0;
+constexpr double kLeastBar = 1.2;  // so that what lasted for one sample alone is seen, too
 constexpr double kLegend = 26.0;
 constexpr double kAxis = 40.0;
 
@@ -54,6 +55,42 @@ std::string text(double x, double y, std::string_view anchor, const std::string&
   return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", x, y, anchor, escaped(words));
 }
 
+// Worse, the larger.
+int badness(Tone tone) {
+  switch (tone) {
+    case Tone::kNeutral:
+      return 0;
+    case Tone::kWell:
+      return 1;
+    case Tone::kDoubtful:
+      return 2;
+    case Tone::kBad:
+      break;
+  }
+  return 3;
+}
+
+template <class Px>
+std::string bars_of(const std::vector<SessionSpan>& spans, const Px& px, double y) {
+  std::string out;
+  for (std::size_t begin = 0; begin < spans.size();) {
+    std::size_t end = begin + 1;
+    Tone tone = spans[begin].tone;
+    while (end < spans.size() && px(spans[end].end_s) - px(spans[begin].begin_s) < kLeastBar) {
+      if (badness(spans[end].tone) > badness(tone)) tone = spans[end].tone;
+      ++end;
+    }
+    const double from_s = spans[begin].begin_s, to_s = spans[end - 1].end_s;
+    const std::string what = end - begin > 1 ? fmt::format("{} changes", end - begin) : spans[begin].what;
+    out += fmt::format(
+        "<rect x=\"{:.2f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}: {:.2f} s to {:.2f} "
+        "s</title></rect>\n",
+        px(from_s), y, std::max(px(to_s) - px(from_s), kLeastBar), kBar, fill_of(tone), escaped(what), from_s, to_s);
+    begin = end;
+  }
+  return out;
+}
+
 std::string legend(double y) {
   std::string out;
   double x = kLabelWidth;
@@ -74,15 +111,27 @@ std::string legend(double y) {
 
 }  // namespace
 
-void SessionStrip::say(double at_s, std::string_view what, Tone tone) {
-  const bool goes_on = !spans_.empty() && at_s >= spans_.back().end_s && at_s - spans_.back().end_s <= pause_s_;
-  if (goes_on) spans_.back().end_s = at_s;
-  if (goes_on && spans_.back().what == what) return;
-  spans_.push_back({at_s, at_s, std::string(what), tone});
+void SessionStrip::end(double at_s) {
+  if (!spans_.empty()) spans_.back().end_s = std::max(spans_.back().begin_s, std::min(at_s, until_s_));
 }
 
-void SessionStrip::prolong(double until_s) {
-  if (!spans_.empty()) spans_.back().end_s = std::max(spans_.back().end_s, until_s);
+void SessionStrip::say(double at_s, std::string_view what, Tone tone, double holds_s) {
+  if (!std::isfinite(at_s) || (!spans_.empty() && at_s < last_s_)) return;
+  constexpr double kRounding_s = 1e-6;
+  const bool held = !spans_.empty() && at_s <= until_s_ + kRounding_s;
+  end(at_s);
+  if (!held || spans_.back().what != what) spans_.push_back({at_s, at_s, std::string(what), tone});
+  last_s_ = at_s;
+  until_s_ = at_s + std::max(holds_s, 0.0);
+}
+
+SessionStrip SessionStrip::from(double begin_s) const {
+  SessionStrip moved(name_);
+  for (const SessionSpan& span : spans_) {
+    if (span.end_s < begin_s) continue;
+    moved.spans_.push_back({std::max(span.begin_s - begin_s, 0.0), span.end_s - begin_s, span.what, span.tone});
+  }
+  return moved;
 }
 
 std::string strips_svg(const std::vector<SessionStrip>& strips, double length_s) {
@@ -106,14 +155,7 @@ std::string strips_svg(const std::vector<SessionStrip>& strips, double length_s)
   for (const SessionStrip& strip : strips) {
     if (strip.spans().empty()) continue;
     out += text(kLabelWidth - 8, y + 19, "end", strip.name());
-    for (const SessionSpan& span : strip.spans()) {
-      // What lasted for one sample alone is seen, too.
-      const double width = std::max(px(span.end_s) - px(span.begin_s), 1.2);
-      out += fmt::format(
-          "<rect x=\"{:.2f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}: {:.2f} s "
-          "to {:.2f} s</title></rect>\n",
-          px(span.begin_s), y + 5, width, kBar, fill_of(span.tone), escaped(span.what), span.begin_s, span.end_s);
-    }
+    out += bars_of(strip.spans(), px, y + 5);
     y += kRow;
   }
   return out + "</svg>\n";

@@ -22,26 +22,31 @@ struct SessionSpan {
 
 class SessionStrip {
  public:
-  // `pause`: what was said holds for so long, unless something else is said; after that nothing is known.
-  SessionStrip(std::string name, double pause_s) : name_(std::move(name)), pause_s_(pause_s) {}
+  explicit SessionStrip(std::string name) : name_(std::move(name)) {}
 
-  // In the order of time.
-  void say(double at_s, std::string_view what, Tone tone);
-
-  // What was said last still holds.
-  void prolong(double until_s);
+  // In the order of time; what comes out of order is left out. It holds for so long, unless something else is said:
+  // after that nothing is known.
+  void say(double at_s, std::string_view what, Tone tone, double holds_s);
+  // Nothing is told beyond this.
+  void end(double at_s);
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  // Of the last one the end is known once end() was called.
   [[nodiscard]] const std::vector<SessionSpan>& spans() const noexcept { return spans_; }
+
+  // The same with its time counted from `begin_s`; what ended before is left out.
+  [[nodiscard]] SessionStrip from(double begin_s) const;
 
  private:
   std::string name_;
-  double pause_s_;
   std::vector<SessionSpan> spans_;
+  double last_s_ = 0.0;   // when something was said last
+  double until_s_ = 0.0;  // so long it holds
 };
 
 // Strips below each other over one axis from 0 to `length_s`, as SVG: a colour and a hatch for each tone, and the words
-// of a span where a pointer rests on it. Empty where no strip has a span.
+// of a span where a pointer rests on it. What is narrower than a pixel is drawn together, as bad as the worst of it.
+// Empty where no strip has a span.
 [[nodiscard]] std::string strips_svg(const std::vector<SessionStrip>& strips, double length_s);
 
 }  // namespace perimap

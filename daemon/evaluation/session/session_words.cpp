@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "daemon/evaluation/session/session_page.hpp"
-#include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 
 namespace perimap {
@@ -33,31 +32,28 @@ void add_counts(const StreamReport& counts, std::vector<std::string>& concerns) 
   add(counts.expired, "surfaces were received after the instant until which they hold");
 }
 
-void add_status(const perimap_Status& status, std::vector<std::string>& concerns) {
-  const auto add = [&concerns](std::uint64_t count, std::string_view what) {
-    if (count > 0) concerns.push_back(fmt::format("{} {}", count, what));
+void add_status(const StatusCounters& counters, std::vector<std::string>& concerns) {
+  const auto add = [&](StatusCounters::Count of, std::string_view what) {
+    if (counters.counts[of] > 0) concerns.push_back(fmt::format("{} {}", counters.counts[of], what));
   };
-  add(status.samples_from_late_update, "surfaces rest on the state before, because their update was late");
-  add(status.releases_missed, "releases were left out");
-  add(status.releases_late, "releases began more than half a millisecond after their deadline");
-  add(status.frames_without_pose, "frames had no pose");
-  add(status.frames_without_phase, "frames had no phase");
-  add(status.frames_not_recorded + status.other_not_recorded, "frames and other messages were not recorded");
-  if (status.recording == perimap_RECORDING_STOPPED) concerns.emplace_back("The recording stopped: the log says why");
-  if (status.realtime_priority == perimap_PRIVILEGE_REFUSED) concerns.emplace_back("Real-time priority was refused");
-  if (status.memory_locked == perimap_PRIVILEGE_REFUSED) concerns.emplace_back("Locking of memory was refused");
-  if (status.latency_short) concerns.emplace_back("The latency is shorter than frames and their poses take to arrive");
-  if (status.respiration_suspected) {
-    concerns.emplace_back("The surface moves as by breathing, which is not a part of the model (respiration.enabled)");
+  add(StatusCounters::kLateUpdates, "surfaces rest on the state before, because their update was late");
+  add(StatusCounters::kReleasesMissed, "releases were left out");
+  add(StatusCounters::kReleasesLate, "releases began more than half a millisecond after their deadline");
+  add(StatusCounters::kWithoutPose, "frames had no pose");
+  add(StatusCounters::kWithoutPhase, "frames had no phase");
+  add(StatusCounters::kNotRecorded, "frames and other messages were not recorded");
+  if (counters.recording_stopped) concerns.emplace_back("The recording stopped: the log says why");
+  if (counters.priority_refused) concerns.emplace_back("Real-time priority was refused");
+  if (counters.memory_refused) concerns.emplace_back("Locking of memory was refused");
+  if (counters.latency_short)
+    concerns.emplace_back("The latency is shorter than frames and their poses take to arrive");
+  if (counters.respiration_suspected) {
+    concerns.emplace_back("The surface moved as by breathing, which is not a part of the model (respiration.enabled)");
   }
-  if (status.setup.state == perimap_SETUP_DOUBTED) concerns.push_back(setup_words(status.setup));
-}
-
-void add_sources(const std::vector<perimap_SourceStatus>& sources, std::vector<std::string>& concerns) {
-  for (const perimap_SourceStatus& source : sources) {
-    if (source.dropped == 0) continue;
-    concerns.push_back(fmt::format("{}: {} of {} samples were lost on the way", name_of(source.kind), source.dropped,
-                                   source.dropped + source.received));
+  for (const auto& [kind, source] : counters.sources) {
+    if (source.lost == 0) continue;
+    concerns.push_back(fmt::format("{}: {} of {} samples were lost on the way", name_of(kind), source.lost,
+                                   source.lost + source.received));
   }
 }
 
@@ -65,6 +61,7 @@ void add_sources(const std::vector<perimap_SourceStatus>& sources, std::vector<s
 
 std::string session_verdict(const SessionRecord& record) {
   const double length = record.length_s;
+  if (!(length > 0.0)) return "There is one surface alone: of a session nothing can be told.";
   const double good = seconds_of(record, Tone::kWell);
   const double degraded = seconds_of(record, Tone::kDoubtful);
   const double invalid = seconds_of(record, Tone::kBad);
@@ -85,8 +82,7 @@ std::vector<std::string> session_concerns(const SessionRecord& record) {
   }
   add_counts(record.counts, concerns);
   if (record.counts.status) {
-    add_status(record.counts.status->status, concerns);
-    add_sources(record.counts.status->sources, concerns);
+    add_status(record.counters, concerns);
   } else {
     concerns.emplace_back("No status was recorded: nothing is known of devices, delays within perimapd, and set-up");
   }
@@ -96,7 +92,7 @@ std::vector<std::string> session_concerns(const SessionRecord& record) {
     if (doubted > 0) concerns.push_back(fmt::format("The set-up was doubted ({} times)", doubted));
   }
   const auto contradicting = std::count_if(record.mesh.begin(), record.mesh.end(), [](const MeshMoment& moment) {
-    return moment.leave_one_out_nees > kMostNees;
+    return !(moment.leave_one_out_nees <= kMostNees);
   });
   if (contradicting > 0) {
     concerns.push_back(

@@ -91,7 +91,7 @@ grep -q '<svg' p.svg || fail "--picture p.svg is no SVG"
 ends 2 "--picture: expected a file that ends in .svg or .png, got p.jpg" \
   "$perimap" report r.mcap --samples samples.mcap --picture p.jpg
 "$perimap" session r.mcap --samples samples.mcap > out 2> error || fail "session"
-grep -q '^Surfaces were good for' out && grep -q 'degraded\|invalid' samples.html || fail "session tells nothing"
+grep -q '^Surfaces were good for' out && grep -q 'degraded\|invalid' samples.session.html || fail "session tells nothing"
 ends 1 "--html: none/x.html: cannot be written" "$perimap" session samples.mcap --html none/x.html
 ls | grep -q '\.part' && fail "left behind: $(ls)"
 
