@@ -69,6 +69,11 @@ double left_over_rad2(const TurnedScope& scope, const std::vector<SetupAtRotatio
 
 }  // namespace
 
+double relation_window_s(const std::vector<TimedPose>& second) {
+  constexpr double kShortest_s = 0.5, kIntervals = 6.0;
+  return std::max(kShortest_s, kIntervals * median_interval_s(second));
+}
+
 std::vector<TimedTurn> relations_over(const std::vector<TimedPose>& sensor, const std::vector<TimedPose>& second,
                                       double each_s) {
   constexpr std::size_t kFewestPairs = 5;

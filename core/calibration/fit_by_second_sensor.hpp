@@ -17,6 +17,10 @@ struct HeldRelation {
   double spread_rad = 0.0;     // RMS of the means over a second about it, per axis
 };
 
+// Over which a mean of both is taken, to follow the turn: half a second, or as long as a slow tracker needs for six
+// poses.
+[[nodiscard]] double relation_window_s(const std::vector<TimedPose>& second);
+
 // The second sensor's orientation in the frame of the first, by the mean of each so many seconds in which both are
 // seen. Each of both in the order of its times, on one clock.
 [[nodiscard]] std::vector<TimedTurn> relations_over(const std::vector<TimedPose>& sensor,

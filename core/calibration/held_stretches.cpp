@@ -1,6 +1,7 @@
 #include "core/calibration/held_stretches.hpp"
 
 #include <algorithm>
+#include <cstddef>
 
 #include "core/angle/angle.hpp"
 
@@ -16,8 +17,10 @@ Matrix3d orientation_of_notch(double notch_rad) { return so3_exp(Vector3d(0.0, 0
 
 double angle_between(const Matrix3d& a, const Matrix3d& b) { return so3_log(a.transpose() * b).norm(); }
 
+bool is_same_turn(const Matrix3d& a, const Matrix3d& b) { return angle_between(a, b) <= kSame_rad; }
+
 void HeldStretches::add(const TimedTurn& reading) {
-  held_ = !stretches_.empty() && angle_between(stretches_.back().R, reading.R) <= kSame_rad;
+  held_ = open_ && is_same_turn(stretches_.back().R, reading.R);
   if (held_) {
     HeldStretch& stretch = stretches_.back();
     readings_ += 1.0;
@@ -28,16 +31,18 @@ void HeldStretches::add(const TimedTurn& reading) {
   }
   others_.push_back(reading);
   if (others_.size() > kAlikeInARow) others_.erase(others_.begin());
-  const bool alike = std::all_of(others_.begin(), others_.end(), [&](const TimedTurn& other) {
-    return angle_between(other.R, others_.front().R) <= kSame_rad;
-  });
-  if (alike && others_.size() == kAlikeInARow) begin();
+  if (others_.size() < kAlikeInARow) return;
+  open_ = false;
+  const bool alike = std::all_of(others_.begin(), others_.end(),
+                                 [&](const TimedTurn& other) { return is_same_turn(other.R, others_.front().R); });
+  if (alike) begin();
 }
 
 void HeldStretches::begin() {
   stretches_.push_back({others_.front().t_s, others_.back().t_s, others_[kAlikeInARow / 2].R});
   readings_ = static_cast<double>(others_.size());
   others_.clear();
+  open_ = true;
   held_ = true;
 }
 

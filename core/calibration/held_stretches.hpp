@@ -1,7 +1,6 @@
 // When an angled scope was held at one turn, and at which, in a recording in which it is turned in between.
 #pragma once
 
-#include <cstddef>
 #include <vector>
 
 #include "core/geometry/pose.hpp"
@@ -24,11 +23,15 @@ struct HeldStretch {
 // The orientation of a notch that is seen at this angle.
 [[nodiscard]] Matrix3d orientation_of_notch(double notch_rad);
 
+// Within three degrees of each other: of one turn, as far as a reading tells.
+[[nodiscard]] bool is_same_turn(const Matrix3d& a, const Matrix3d& b);
+
 // Radians from one orientation to the other.
 [[nodiscard]] double angle_between(const Matrix3d& a, const Matrix3d& b);
 
-// Follows readings in the order of their times. Those within three degrees of a stretch's mean belong to it. One that
-// does not may be misread: three in a row that are alike begin the next stretch.
+// Follows readings in the order of their times. Those within three degrees of a stretch's mean belong to it. One or two
+// in a row that do not may be misread; three end it, also where the scope comes back to the same turn. Three in a row
+// that are alike begin the next stretch.
 class HeldStretches {
  public:
   void add(const TimedTurn& reading);
@@ -43,7 +46,8 @@ class HeldStretches {
 
   std::vector<HeldStretch> stretches_;
   double readings_ = 0.0;          // of the last stretch
-  std::vector<TimedTurn> others_;  // since the last reading that belonged to it
+  bool open_ = false;              // it may go on
+  std::vector<TimedTurn> others_;  // the last ones since those that belonged to it
   bool held_ = false;
 };
 

@@ -1,8 +1,10 @@
 #include "daemon/setup/recorded_turns.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
 
@@ -42,8 +44,10 @@ Expected<void> read_second_sensor(const std::string& recording, Recorded& record
   auto second = read_recorded_poses(recording, kSecondSensorTool);
   if (!second) return tl::unexpected(second.error());
   recorded.second = *std::move(second);
-  constexpr double kEach_s = 0.5;
-  recorded.turns = relations_over(recorded.sensor, recorded.second, kEach_s);
+  recorded.turns = relations_over(recorded.sensor, recorded.second, relation_window_s(recorded.second));
+  if (recorded.turns.empty()) {
+    return fail(recording + ": the two sensors are hardly seen together: keep both in sight of the tracker");
+  }
   return {};
 }
 
@@ -92,7 +96,7 @@ std::vector<BoardView> thinned(const std::vector<TimedView>& views) {
   return few;
 }
 
-Expected<RecordedTurn> measured(const Recorded& recorded, double from_s, double to_s) {
+Expected<RecordedTurn> measured(const Recorded& recorded, const Matrix3d& R, double from_s, double to_s) {
   const std::vector<TimedView> views = between(recorded.board.views, from_s, to_s);
   RecordedTurn turn;
   turn.views = views.size();
@@ -119,14 +123,27 @@ Expected<RecordedTurn> measured(const Recorded& recorded, double from_s, double 
     turn.measured.relation = *relation;
     return turn;
   }
-  const auto stop = rotation_of(between(recorded.stops, from_s, to_s), {});
+  std::vector<ReadPicture> stops = between(recorded.stops, from_s, to_s);
+  // A notch that was misread is none.
+  std::erase_if(stops, [&](const ReadPicture& picture) {
+    return !is_same_turn(R, orientation_of_notch(picture.reading.notch_rad));
+  });
+  const auto stop = rotation_of(std::move(stops), {});
   if (!stop) return tl::unexpected(stop.error());
+  constexpr double kHeld_rad = 2.0 * kDegree;
+  if (stop->spread_rad > kHeld_rad) {
+    return fail(fmt::format("the notch goes to and fro by {:.1f} degrees RMS: hold the scope at its turn",
+                            stop->spread_rad / kDegree));
+  }
   turn.measured.stop_centre_px = stop->centre_px;
   setup.rotation_rad = stop->rotation_rad;
   setup.rotation_deviation_rad = stop->rotation_deviation_rad;
   setup.radius_px = stop->radius_px;
   return turn;
 }
+
+// Without a sign where there is nothing.
+double tenths_of(double value) { return std::round(10.0 * value) / 10.0 + 0.0; }
 
 }  // namespace
 
@@ -151,7 +168,7 @@ Expected<RecordedTurns> turns_in_recording(const std::string& recording, const B
       result.left_out.push_back(when + ": held for less than ten seconds");
       continue;
     }
-    auto turn = measured(*recorded, from_s, to_s);
+    auto turn = measured(*recorded, stretch.R, from_s, to_s);
     if (!turn) {
       result.left_out.push_back(when + ": " + turn.error().message);
       continue;
@@ -160,7 +177,9 @@ Expected<RecordedTurns> turns_in_recording(const std::string& recording, const B
     turn->to_s = to_s - first_s;
     result.turns.push_back(*std::move(turn));
   }
-  if (result.turns.empty()) return fail(fmt::format("{}: no turn is measured: {}", recording, result.left_out.front()));
+  if (result.turns.empty()) {
+    return fail(fmt::format("{}: no turn is measured: {}", recording, fmt::join(result.left_out, "; ")));
+  }
   return result;
 }
 
@@ -171,8 +190,9 @@ std::string text_of(const RecordedTurns& recorded) {
         "  held           {:.1f} to {:.1f} s{}: {} views, lens {:.2f} px RMS, hand-eye {:.2f} mm RMS held "
         "aside, clocks {:.1f} ms\n",
         turn.from_s, turn.to_s,
-        turn.measured.relation ? ""
-                               : fmt::format(", notch at {:.1f} degrees", turn.measured.setup.rotation_rad / kDegree),
+        turn.measured.relation
+            ? ""
+            : fmt::format(", notch at {:.1f} degrees", tenths_of(turn.measured.setup.rotation_rad / kDegree)),
         turn.views, turn.lens_rms_px, turn.hand_eye_rms_mm, 1e3 * turn.offset_s);
   }
   for (const std::string& why : recorded.left_out) text += "  not measured   " + why + "\n";

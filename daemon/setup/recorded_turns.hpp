@@ -2,8 +2,10 @@
 // lens and hand-eye at each turn at which it was held.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>

@@ -1,6 +1,7 @@
 #include "daemon/setup/scope_calibration.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <utility>
@@ -189,7 +190,7 @@ SetupExpected<std::optional<std::string>> sensor_of(const ScopeCalibrationSource
 SetupExpected<ScopeCalibration> calibrate_scope(
     const ScopeCalibrationSource& source, const std::function<void(std::uint64_t done, std::uint64_t all)>& progress) {
   ScopeCalibration result;
-  const bool of_one_recording = source.setups.empty() && source.board.square_mm > 0.0;
+  const bool of_one_recording = source.setups.empty() && source.board.square_mm > 0.0 && !source.recording.empty();
   if (of_one_recording || !source.setups.empty()) {
     std::vector<MeasuredTurn> turns;
     if (of_one_recording) {
@@ -206,7 +207,8 @@ SetupExpected<ScopeCalibration> calibrate_scope(
     if (!scope) {
       const std::string told = result.turns ? source.recording + ": " : "";
       const auto& left_out = result.turns ? result.turns->left_out : std::vector<std::string>{};
-      return fail(told + scope.error().message + (left_out.empty() ? "" : " (not measured: " + left_out.front() + ")"));
+      return fail(told + scope.error().message +
+                  (left_out.empty() ? "" : fmt::format(" (not measured: {})", fmt::join(left_out, "; "))));
     }
     result.scope = *std::move(scope);
     for (const MeasuredTurn& turn : turns) {

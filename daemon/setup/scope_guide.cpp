@@ -60,20 +60,25 @@ class ScopeGuide final : public LiveGuide {
 
   void follow_second(const std::vector<TimedPose>& poses) override {
     if (!settings_.by_second_sensor) return;
-    constexpr double kEach_s = 0.5;
+    second_s_ = poses.back().t_s;
+    const double each_s = relation_window_s(poses);
     const auto since = [&](const std::vector<TimedPose>& all) {
       return std::vector<TimedPose>(
           std::find_if(all.begin(), all.end(), [&](const TimedPose& p) { return p.t_s > related_s_; }), all.end());
     };
-    std::vector<TimedTurn> relations = relations_over(since(sensor_), since(poses), kEach_s);
+    std::vector<TimedTurn> relations = relations_over(since(sensor_), since(poses), each_s);
     if (relations.size() < 2) return;
     relations.pop_back();  // it is not over
     for (const TimedTurn& relation : relations) take(relation);
-    related_s_ = relations.back().t_s + 0.5 * kEach_s;
+    related_s_ = relations.back().t_s + 0.5 * each_s;
   }
 
   [[nodiscard]] std::string line() const override {
     if (!unread_.empty()) return "the field stop is not read: " + unread_;
+    constexpr double kUnseen_s = 1.0;
+    if (settings_.by_second_sensor && !sensor_.empty() && second_s_ + kUnseen_s < sensor_.back().t_s) {
+      return "the second sensor is not seen: bring both into sight of the tracker";
+    }
     if (!near_.empty()) return near_;
     if (now_ == nullptr || !held_.is_held()) {
       return fmt::format("{} of {} turns are enough; hold the scope at one turn", done(), settings_.turns);
@@ -136,6 +141,7 @@ class ScopeGuide final : public LiveGuide {
   std::vector<TimedPose> sensor_;
   double due_s_ = -1e18;
   double related_s_ = -1e18;
+  double second_s_ = -1e18;  // its last pose
   std::string unread_;
   std::string near_;
 };

@@ -36,12 +36,14 @@ for file in README.md docs/guide/*.md; do
     commands=$((commands + 1))
     if [ -z "${help[$name]:-}" ]; then
       # shellcheck disable=SC2086
-      help[$name]=$("$perimap" $name --help 2>&1) || fault "$file: perimap $name: is no command"
+      help[$name]=$("$perimap" $name --help 2>&1)
+      # Of a word that is no command the help is that of what stands before it.
+      grep -q "^Usage: perimap $name " <<< "${help[$name]} " || fault "$file: perimap $name: is no command"
     fi
     for word in "${words[@]:2}"; do
       [[ $word == --[a-z]* ]] || continue
       option=${word%%=*}
-      grep -qE -- "(^|[ ,])$option([ ,=]|\$)" <<< "${help[$name]}" || fault "$file: perimap $name: $option is no option of it"
+      grep -qE -- "^ +(-[a-zA-Z],)?$option([ ,=]|\$)" <<< "${help[$name]}" || fault "$file: perimap $name: $option is no option of it"
     done
   done < <(commands_of "$file")
 done

@@ -32,7 +32,8 @@ struct CalibrateScopeOptions {
 
   [[nodiscard]] bool is_live() const { return !live.configuration.empty(); }
   [[nodiscard]] bool by_one_recording() const {
-    return source.setups.empty() && board.square_mm > 0.0 && (is_live() || !source.recording.empty());
+    return source.setups.empty() && source.pictures.empty() && board.square_mm > 0.0 &&
+           (is_live() || !source.recording.empty());
   }
   // The function of the turn, and not how far the scope is turned alone.
   [[nodiscard]] bool makes_function() const { return !source.setups.empty() || by_one_recording(); }
@@ -77,6 +78,12 @@ Outcome check_options(const CalibrateScopeOptions& options) {
   const auto wrong = [](const std::string& what) { return refuse(what, ExitCode::kWrongUsage); };
   if (options.is_live() && !(source.setups.empty() && source.pictures.empty())) {
     return wrong("--live: expected no pictures and no --at beside it; it records every turn itself");
+  }
+  if (options.board.square_mm > 0.0 && !options.by_one_recording()) {
+    return wrong("--square-mm: expected --live or --from beside it, and no pictures and no --at");
+  }
+  if (source.by_second_sensor && options.is_live() && options.turns < 3) {
+    return wrong("--turns: expected three and more with --by-second-sensor");
   }
   if (!source.zooms.empty() && !options.makes_function()) {
     return wrong("--zoom: expected --at too, the set-ups at several turns, or --square-mm");
@@ -134,7 +141,7 @@ void add_calibrate_scope(Commands& commands, Command& calibrate) {
       "lens by them.");
   command.add_option("IMAGES", options->source.pictures, "Pictures with the field stop, folders of them, or a video");
   add_from(command, options->source.recording);
-  constexpr double kLongest_s = 300.0;
+  constexpr double kLongest_s = 600.0;
   options->live.longest_s = kLongest_s;
   add_live(command, options->live);
   command.add_option("--turns", options->turns, "With --live and --square-mm: at so many turns")

@@ -53,6 +53,16 @@ TEST_F(Readings, OneThatIsMisreadEndsNoStretch) {
   EXPECT_NEAR(stretches_.stretches()[0].to_s, t_s_ - 0.25, 1e-9);
 }
 
+TEST_F(Readings, TurnedAwayAndBackItIsHeldTwice) {
+  hold(10.0, 15.0);
+  turn(10.0, 90.0, 3.0);
+  turn(90.0, 10.0, 3.0);
+  hold(10.0, 15.0);
+  ASSERT_EQ(stretches_.stretches().size(), 2U);
+  EXPECT_NEAR(stretches_.stretches()[0].to_s, 115.0, 0.6);
+  EXPECT_NEAR(stretches_.stretches()[1].from_s, 121.0, 0.6);
+}
+
 TEST_F(Readings, WhileTheScopeIsTurnedItIsNotHeld) {
   hold(10.0, 5.0);
   turn(10.0, 40.0, 0.5);
