@@ -93,13 +93,18 @@ MeanDisplacement CommonDisplacement::mean(std::size_t window, Instant now,
   Matrix6d covariance = sum.W.llt().solve(Matrix6d::Identity());
   mean.d = covariance * sum.g;
   covariance *= variance_of_mean(n, rho);
+  // Of the surface that is seen, which may be far from the pivot: a turn moves it by its lever.
+  Matrix6d to_centre = Matrix6d::Identity();
+  to_centre.bottomLeftCorner<3, 3>() = -cross_matrix(surface.centre_mm);
+  const Vector6d d = to_centre * mean.d;
+  covariance = Matrix6d(to_centre * covariance * to_centre.transpose());
   const double spread_mm2 = surface.spread_mm * surface.spread_mm;
   covariance.diagonal().head<3>().array() += surface.map_variance_mm2 / spread_mm2;
   covariance.diagonal().tail<3>().array() += surface.map_variance_mm2;
-  mean.chi2 = mean.d.dot(covariance.llt().solve(mean.d));
+  mean.chi2 = d.dot(covariance.llt().solve(d));
   // A turn moves a feature by its distance from the axis.
   const double turned_mm2 = spread_mm2 * 2.0 / 3.0;
-  mean.size_mm = std::sqrt(mean.d.tail<3>().squaredNorm() + turned_mm2 * mean.d.head<3>().squaredNorm());
+  mean.size_mm = std::sqrt(d.tail<3>().squaredNorm() + turned_mm2 * d.head<3>().squaredNorm());
   mean.deviation_mm =
       std::sqrt(covariance.diagonal().tail<3>().sum() + turned_mm2 * covariance.diagonal().head<3>().sum());
   mean.told = std::isfinite(mean.chi2) && std::isfinite(mean.size_mm);

@@ -48,17 +48,18 @@ struct DisplacementEvidence {
 // Maps a point of the map to where it is when the surface is displaced.
 [[nodiscard]] Pose displaced(const Vector6d& d, const Vector3d& pivot_W_mm) noexcept;
 
-// The surface as far as a displacement concerns it.
+// The surface that is seen, as far as a displacement concerns it.
 struct DisplacedSurface {
-  double spread_mm = 20.0;        // root mean square distance of the features from the pivot
-  double map_variance_mm2 = 0.0;  // per axis, of what the whole map is off by
+  Vector3d centre_mm = Vector3d::Zero();  // of the features that are seen, from the pivot
+  double spread_mm = 20.0;                // their root mean square distance from it
+  double map_variance_mm2 = 0.0;          // per axis, of what the whole map is off by
 };
 
 // Over one window.
 struct MeanDisplacement {
   bool told = false;  // false: too few frames; the rest means nothing
   Vector6d d = Vector6d::Zero();
-  double size_mm = 0.0;       // root mean square over the surface
+  double size_mm = 0.0;       // root mean square over the surface that is seen
   double deviation_mm = 0.0;  // likewise of its error
   double chi2 = 0.0;          // of the hypothesis that there is none, 6 degrees of freedom
 };

@@ -7,13 +7,14 @@
 namespace perimap {
 
 struct FrameDoubts {
-  bool scope_unread = false;        // how the scope is turned is not known
-  bool scope_changed = false;       // it is turned otherwise than at first, and nothing tells what follows
-  bool pose_repeated = false;       // the tracker gives one reading again and again, after the camera had moved
-  bool picture_repeated = false;    // likewise the camera one picture
-  bool still = false;               // the camera has lately been in one place
-  bool setup_doubted = false;       // see SetupBelief
-  bool displaced = false;           // the organ is not where the map has it, or the tracker errs, see OrganWatch
+  bool scope_unread = false;      // how the scope is turned is not known
+  bool scope_changed = false;     // it is turned otherwise than at first, and nothing tells what follows
+  bool pose_repeated = false;     // the tracker gives one reading again and again, after the camera had moved
+  bool picture_repeated = false;  // likewise the camera one picture
+  bool still = false;             // the camera has lately been in one place
+  bool setup_doubted = false;     // see SetupBelief
+  bool displaced = false;         // the organ is not where the map has it, or the tracker errs, see OrganWatch
+  bool unproven = false;  // nothing has told since it was out of sight, or moved, that it is where the map has it
   double setup_variance_mm2 = 0.0;  // per axis, of what the set-up may be off by
 
   // What is doubted in either.
@@ -25,6 +26,7 @@ struct FrameDoubts {
     still |= other.still;
     setup_doubted |= other.setup_doubted;
     displaced |= other.displaced;
+    unproven |= other.unproven;
     setup_variance_mm2 = std::max(setup_variance_mm2, other.setup_variance_mm2);
   }
 };

@@ -71,8 +71,9 @@ void MapKeeping::recall(FeatureSlot& slot, const FeatureMemory& feature) noexcep
             .recalled_converged = feature.converged});
 }
 
-void MapKeeping::displace(const Pose& X) noexcept {
-  constexpr double kDoubt_mm = 0.5;
+void MapKeeping::displace(const Pose& X, double deviation_mm) noexcept {
+  constexpr double kLeastDoubt_mm = 0.5;
+  const double doubt_mm = std::max(kLeastDoubt_mm, deviation_mm);
   const int n = bank_.layout().size();
   FeatureEstimate estimate;
   for (std::size_t index = 0; index < slots_.size(); ++index) {
@@ -94,7 +95,7 @@ void MapKeeping::displace(const Pose& X) noexcept {
       }
     }
     bank_.set(feature, estimate);
-    bank_.diffuse(feature, kDoubt_mm);
+    bank_.diffuse(feature, doubt_mm);
   }
 }
 

@@ -34,7 +34,7 @@ class MapKeeping {
 
   // Moves every feature with what it lies on, its motion and all: a point p is where X p was. By how little it may be
   // off then, each is less certain. One whose batch start is under way is emptied when housekeeping has given it back.
-  void displace(const Pose& X) noexcept;
+  void displace(const Pose& X, double deviation_mm) noexcept;
 
   // Forgets every feature. One whose batch start is under way is emptied when housekeeping has given it back.
   void forget() noexcept;

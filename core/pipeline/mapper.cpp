@@ -81,6 +81,7 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage&
   job_.doubts = trust_.doubts();
   job_.doubts.setup_doubted = watcher_.belief().doubted();
   job_.doubts.displaced = organ_.displaced();
+  job_.doubts.unproven = organ_.unproven();
   job_.doubts.setup_variance_mm2 = watcher_.belief().variance_mm2();
   job_.starts_fail_alike = starts_fail_alike(slots_);
   job_.law = phases_.heart().clock().law_belief();
@@ -259,7 +260,7 @@ void Mapper::forget() noexcept {
   surface_.forget();
   intake_.discard_round();
   watcher_.begin_window_anew();
-  organ_ = OrganWatch(settings_);
+  organ_.forget();
   tell_displacement();
   stages_.hand_over_nothing();
   phases_.publish();
@@ -269,13 +270,19 @@ void Mapper::forget() noexcept {
 bool Mapper::move_map() noexcept {
   const RealtimeScope realtime;
   finish_learning();
-  if (!organ_.displaced()) return false;
-  keeping_.displace(organ_.displacement());
+  const std::optional<RestingOrgan> organ = organ_.resting();
+  if (!organ) {
+    counters_.moves_refused.add();
+    return false;
+  }
+  keeping_.displace(organ->X, organ->deviation_mm);
   // What is held was seen of the organ where it was.
   history_->disown_poses(0);
   surface_.begin_again();
   watcher_.begin_window_anew();
-  organ_.settle();
+  organ_.begin_anew();
+  constexpr double kMicrometres = 1000.0;
+  counters_.moved_um.set(static_cast<std::uint64_t>(kMicrometres * organ->size_mm));
   counters_.maps_moved.add();
   tell_displacement();
   return true;

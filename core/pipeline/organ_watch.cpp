@@ -25,11 +25,21 @@ constexpr double kBack_mm = 1.0;
 constexpr double kBack_chi2 = 25.0;
 constexpr std::size_t kFollowedWindow = 0;  // of CommonDisplacement::kWindows
 constexpr std::size_t kBackWindows[] = {1, 2};
+constexpr std::size_t kProofWindow = 1;
 
 // So much the organ may move until the next frames tell; and so far the map is looked for where it is not found.
 constexpr double kMoving_mm = 1.5;
 constexpr double kLost_mm = 5.0;
 constexpr int kFewestExpected = 8;
+constexpr int kFewestSeen = 5;
+constexpr Duration kOutOfSight = std::chrono::seconds(2);
+
+// A map is moved by what two seconds tell so well, where four and half a second tell the same.
+constexpr std::size_t kRestWindow = 2;
+constexpr std::size_t kBeforeRestWindow = 3;
+constexpr double kRest_mm = 1.0;
+constexpr double kRestsWithin_deviations = 1.5;
+constexpr Duration kRestIsOld = std::chrono::milliseconds(300);
 
 CameraPose wider(const CameraPose& pose, double shift_mm, double turn_rad) noexcept {
   CameraPose wide = pose;
@@ -53,7 +63,7 @@ CameraPose OrganWatch::pose_by_map(const CameraPose& told) noexcept {
 
 double OrganWatch::search_deviation_mm() const noexcept { return frames_lost_ > 0 ? kLost_mm : 0.0; }
 
-void OrganWatch::count_sight(std::span<FeatureGroup> groups) noexcept {
+void OrganWatch::count_sight(std::span<FeatureGroup> groups, Instant capture) noexcept {
   int expected = 0;
   int agreeing = 0;
   for (FeatureGroup& group : groups) {
@@ -65,11 +75,19 @@ void OrganWatch::count_sight(std::span<FeatureGroup> groups) noexcept {
   }
   const bool lost = expected >= kFewestExpected && 2 * agreeing < expected;
   frames_lost_ = lost ? frames_lost_ + 1 : 0;
+  if (agreeing < kFewestSeen) return;
+  // Whoever moved it meanwhile was not seen.
+  if (seen_ && capture - *seen_ > kOutOfSight) {
+    evidence_.clear();
+    unproven_ = true;
+  }
+  seen_ = capture;
 }
 
 void OrganWatch::watch(ImagePhase& image, std::span<FeatureGroup> groups, const FrameRecord& frame) noexcept {
+  if (frame.stamp.capture - judged_ > kRestIsOld) resting_.reset();
   if (!frame.measurable) return;
-  count_sight(groups);
+  count_sight(groups, frame.stamp.capture);
   CameraPose told = frame.pose;
   told.position_variance_mm2 = told_.position_variance_mm2;
   told.rotation_variance_rad2 = told_.rotation_variance_rad2;
@@ -83,6 +101,7 @@ void OrganWatch::watch(ImagePhase& image, std::span<FeatureGroup> groups, const 
   if (!together.told) return;
   if (!pivoted_) pivot_W_mm_ = together.centre_W_mm;
   pivoted_ = true;
+  surface_.centre_mm = together.centre_W_mm - pivot_W_mm_;
   surface_.spread_mm = std::max(together.spread_mm, 5.0);
   surface_.map_variance_mm2 = together.map_variance_mm2 + kLeastMap_mm * kLeastMap_mm;
   const auto& s = together.estimate;
@@ -106,7 +125,10 @@ void OrganWatch::judge(const FrameRecord& frame) noexcept {
       break;
     }
   }
-  if (!displaced()) return;
+  if (!displaced()) {
+    unproven_ = unproven_ && !evidence_.mean(kProofWindow, now, surface_).told;
+    return;
+  }
   const MeanDisplacement newest = evidence_.mean(kFollowedWindow, now, surface_);
   if (newest.told) {
     d_ = newest.d;
@@ -116,13 +138,51 @@ void OrganWatch::judge(const FrameRecord& frame) noexcept {
     const MeanDisplacement mean = evidence_.mean(window, now, surface_);
     return mean.told && mean.size_mm < kBack_mm && mean.chi2 < kBack_chi2;
   });
-  if (back) settle();
+  if (back) {
+    settle();
+  } else {
+    look_for_rest(now);
+  }
+}
+
+void OrganWatch::look_for_rest(Instant now) noexcept {
+  judged_ = now;
+  resting_.reset();
+  // Seconds that began before it was moved tell of neither place.
+  if (now - *displaced_since_ < CommonDisplacement::kWindows[kBeforeRestWindow] + std::chrono::seconds(1)) return;
+  const MeanDisplacement rest = evidence_.mean(kRestWindow, now, surface_);
+  if (!rest.told || rest.deviation_mm > kRest_mm) return;
+  const Pose X = perimap::displaced(rest.d, pivot_W_mm_);
+  const Vector3d centre_W_mm = pivot_W_mm_ + surface_.centre_mm;
+  // What moves is elsewhere within a longer time, and what has begun to within a shorter one.
+  for (const std::size_t window : {kBeforeRestWindow, kFollowedWindow}) {
+    const MeanDisplacement other = evidence_.mean(window, now, surface_);
+    if (!other.told) return;
+    const double moved_mm = (X * centre_W_mm - perimap::displaced(other.d, pivot_W_mm_) * centre_W_mm).norm();
+    if (moved_mm > kRestsWithin_deviations * std::max(rest.deviation_mm, other.deviation_mm)) return;
+  }
+  resting_ = {X, rest.size_mm, rest.deviation_mm};
+}
+
+void OrganWatch::begin_anew() noexcept {
+  settle();
+  unproven_ = true;
+}
+
+void OrganWatch::forget() noexcept {
+  settle();
+  told_ = {};
+  pivoted_ = false;
+  surface_ = {};
+  seen_.reset();
+  unproven_ = false;
 }
 
 void OrganWatch::settle() noexcept {
   displaced_since_.reset();
   d_.setZero();
   size_mm_ = 0.0;
+  resting_.reset();
   evidence_.clear();
   frames_lost_ = 0;
 }

@@ -18,15 +18,26 @@
 
 namespace perimap {
 
+// A displaced organ that rests where it is.
+struct RestingOrgan {
+  Pose X;                     // maps the map's points to where they are
+  double size_mm = 0.0;       // by how much, root mean square over the features that are seen
+  double deviation_mm = 0.0;  // likewise of its error
+};
+
 //              a window's mean is beyond chance, and too large
 //   at its place ───────────────────────────────────────────▶ displaced: nothing is learnt, the poses of frames are
 //       ▲  ▲                                                   │     │   told as of the map that moves with the organ
 //       │  └─ it is back: two windows' means are small again ──┘     │
-//       └──── whoever knows says that the organ has been moved, and the map is moved with it
+//       └──── whoever knows says that the organ has been moved and rests: the map is moved with it
+//
+// Whether it is at its place is not known while nothing is seen: after some seconds of that, and when the map has been
+// moved, it is asked anew.
 //
 // All members are called by the mapper thread; nothing is allocated.
 class OrganWatch {
  public:
+  // The settings outlive it.
   explicit OrganWatch(const PipelineSettings& settings) noexcept
       : model_{settings.camera}, estimator_(settings.estimator), evidence_(settings.pose.error_correlation) {}
 
@@ -39,23 +50,32 @@ class OrganWatch {
   void watch(ImagePhase& image, std::span<FeatureGroup> groups, const FrameRecord& frame) noexcept;
 
   [[nodiscard]] bool displaced() const noexcept { return displaced_since_.has_value(); }
+  // Nothing has told since the map was moved, or out of sight, that the organ is where the map has it.
+  [[nodiscard]] bool unproven() const noexcept { return unproven_; }
   // Captures from this one on are not to be learnt from; none: all are.
   [[nodiscard]] const std::optional<Instant>& displaced_since() const noexcept { return displaced_since_; }
   // Maps the map's points to where they are now.
   [[nodiscard]] Pose displacement() const noexcept { return perimap::displaced(d_, pivot_W_mm_); }
 
+  // Where it is, once that is told well, by the last seconds, in which it has not moved.
+  [[nodiscard]] const std::optional<RestingOrgan>& resting() const noexcept { return resting_; }
+
   // By how much, root mean square over the features; 0 where it is not.
   [[nodiscard]] double size_mm() const noexcept { return size_mm_; }
 
-  // The map is where it was said to be, or another.
-  void settle() noexcept;
+  // The map has been moved with the organ.
+  void begin_anew() noexcept;
+  // Another map.
+  void forget() noexcept;
 
  private:
-  void count_sight(std::span<FeatureGroup> groups) noexcept;
+  void count_sight(std::span<FeatureGroup> groups, Instant capture) noexcept;
   void judge(const FrameRecord& frame) noexcept;
+  void look_for_rest(Instant now) noexcept;
+  void settle() noexcept;
 
   PixelModel model_;
-  EstimatorSettings estimator_;
+  const EstimatorSettings& estimator_;
   CommonDisplacement evidence_;
 
   CameraPose told_;  // of the frame at hand
@@ -65,7 +85,11 @@ class OrganWatch {
   Vector6d d_ = Vector6d::Zero();
   double size_mm_ = 0.0;
   std::optional<Instant> displaced_since_;
+  std::optional<RestingOrgan> resting_;
+  Instant judged_;       // the capture that resting_ goes up to
   int frames_lost_ = 0;  // in a row, of which most of the map was not found where it is
+  std::optional<Instant> seen_;
+  bool unproven_ = false;
 };
 
 }  // namespace perimap

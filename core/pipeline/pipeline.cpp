@@ -166,6 +166,8 @@ void Pipeline::ask_to_move_map() noexcept {
   parts_->entrance.mapper_wakeup().post();
 }
 
+bool Pipeline::take_back_move() noexcept { return parts_->move_asked.exchange(false, std::memory_order_relaxed); }
+
 void Pipeline::move_map_if_asked() noexcept {
   if (parts_->move_asked.exchange(false, std::memory_order_relaxed)) parts_->mapper.move_map();
 }

@@ -64,9 +64,12 @@ class Pipeline {
   // Mapper thread, between frames.
   void forget_if_asked() noexcept;
 
-  // Any thread: whoever knows says that the organ has been moved. Where the images show it displaced the mapper moves
-  // the map with it when it runs next; counters().maps_moved tells when that is done.
+  // Any thread: whoever knows says that the organ has been moved. Where the images show it displaced
+  // and at rest the mapper moves the map with it when it runs next; counters().maps_moved tells when that is done,
+  // moves_refused that it is not.
   void ask_to_move_map() noexcept;
+  // Whether what was asked had not begun; then it is not done.
+  bool take_back_move() noexcept;
   // Mapper thread, between frames.
   void move_map_if_asked() noexcept;
 

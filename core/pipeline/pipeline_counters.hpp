@@ -96,6 +96,8 @@ struct PipelineCounters {
   Counter start_matches_mean;
   Counter maps_forgotten;  // by command, for a new patient
   Counter maps_moved;      // by command, with the organ
+  Counter moved_um;        // by how much the last time
+  Counter moves_refused;   // since the organ did not rest, or was at its place
   Counter displaced;       // 1: the organ is not where the map has it, or the tracker errs; see OrganWatch
   Counter displaced_um;    // by how much then, root mean square over the features
   Counter times_displaced;

@@ -49,7 +49,7 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (footing.pose_missing) return SurfaceReason::kPoseMissing;
   if (footing.doubts.setup_doubted) return SurfaceReason::kSetupDoubted;
   if (footing.doubts.displaced) return SurfaceReason::kOrganOrTrackerMoved;
-  if (footing.not_seen) return SurfaceReason::kNotSeen;
+  if (footing.not_seen || footing.doubts.unproven) return SurfaceReason::kNotSeen;
   if (footing.no_parallax) return SurfaceReason::kNoParallax;
   if (!footing.converged) return SurfaceReason::kNothingConverged;
   if (phase.ectopic) return SurfaceReason::kEctopicBeat;

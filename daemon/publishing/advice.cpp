@@ -45,7 +45,8 @@ std::string_view remedy_of(perimap_SurfaceReason reason) noexcept {
     case perimap_SURFACE_REASON_LAW_UNDECIDED:
       return "wait for some heart beats of other lengths";
     case perimap_SURFACE_REASON_NOT_SEEN:
-      return "turn the scope back to the mapped place; if the organ was moved: perimap ctl new-patient";
+      return "turn the scope back to the mapped place, and wait a second; if that does not help: perimap ctl "
+             "new-patient";
     case perimap_SURFACE_REASON_NO_PARALLAX:
       return "move the scope sideways";
     case perimap_SURFACE_REASON_SETUP_DOUBTED:

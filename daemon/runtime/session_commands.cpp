@@ -75,14 +75,22 @@ Expected<std::string> SessionCommands::move_map() {
   const PipelineCounters& counters = pipeline_.counters();
   if (counters.displaced.get() == 0) return fail("the images show the organ where it is mapped: nothing was moved");
   const std::uint64_t before = counters.maps_moved.get();
-  const double mm = static_cast<double>(counters.displaced_um.get()) / 1000.0;
+  const std::uint64_t refused = counters.moves_refused.get();
   pipeline_.ask_to_move_map();
   const Instant until = MonotonicClock::now() + kMapperPatience;
   while (counters.maps_moved.get() == before) {
-    if (MonotonicClock::now() > until) return fail("the mapper does not answer: the map is not moved");
+    if (counters.moves_refused.get() != refused) {
+      return fail(
+          "the organ does not rest, or is not seen well enough: hold the scope on it for some seconds, and ask again");
+    }
+    // One that is being done is waited for.
+    if (MonotonicClock::now() > until && pipeline_.take_back_move()) {
+      return fail("the mapper does not answer: the map is not moved");
+    }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  return fmt::format("the map is moved with the organ, by {:.1f} mm\n", mm);
+  return fmt::format("the map is moved with the organ, by {:.1f} mm\n",
+                     1e-3 * static_cast<double>(counters.moved_um.get()));
 }
 
 }  // namespace perimap

@@ -252,7 +252,7 @@ TEST_F(Keeping, AMapThatIsMovedKeepsItsMotions) {
   for (int i = 0; i < n; ++i) memory.estimate.P(i, i) *= 4.0;
   ASSERT_EQ(keeping->recall(std::vector{memory}, *breathing), 50U);
   const Pose X{so3_exp(Vector3d(0.1, -0.2, 0.3)), Vector3d(5.0, -4.0, 3.0)};
-  keeping->displace(X);
+  keeping->displace(X, 0.1);
   FeatureEstimate moved;
   bank->get(0, moved);
   EXPECT_EQ((moved.P - moved.P.transpose()).norm(), 0.0);

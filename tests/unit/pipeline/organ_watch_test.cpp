@@ -150,18 +150,23 @@ TEST_F(Organ, ThatIsMovedIsNotBelievedByMovingThePosesWithIt) {
   EXPECT_GT((X_WM * places[0] - places[0]).norm(), 2.0);
 }
 
-TEST_F(Organ, IsAtItsPlaceOnceTheMapHasBeenMovedWithIt) {
+TEST_F(Organ, IsAtItsPlaceOnceTheMapHasBeenMovedWithItAndIsNotBelievedBefore) {
   seconds(15.0, Pose{});
-  seconds(5.0, kMoved);
-  ASSERT_TRUE(watch->displaced());
-  const Pose by = watch->displacement();
-  watch->settle();
+  seconds(8.0, kMoved);
+  ASSERT_TRUE(watch->resting().has_value());
+  const RestingOrgan organ = *watch->resting();
+  EXPECT_LE(organ.deviation_mm, 1.0);
+  double off_mm = 0.0;
+  for (const Vector3d& p : places) off_mm = std::max(off_mm, (organ.X * p - kMoved * p).norm());
+  EXPECT_LT(off_mm, 3.0 * organ.deviation_mm);
+  watch->begin_anew();
   EXPECT_FALSE(watch->displaced());
+  EXPECT_TRUE(watch->unproven());
   for (std::size_t f = 0; f < places.size(); ++f) {
     FeatureEstimate estimate;
     bank->get(static_cast<int>(f), estimate);
     const int n = settings.estimator.layout.size();
-    const Vector3d p = by * places[f];
+    const Vector3d p = organ.X * places[f];
     for (int axis = 0; axis < 3; ++axis) estimate.x(axis * n) = p(axis);
     bank->set(static_cast<int>(f), estimate);
   }
@@ -169,6 +174,35 @@ TEST_F(Organ, IsAtItsPlaceOnceTheMapHasBeenMovedWithIt) {
     seconds(1.0, kMoved);
     ASSERT_FALSE(watch->displaced()) << i;
   }
+  EXPECT_FALSE(watch->unproven());
+}
+
+TEST_F(Organ, ThatStillMovesRestsNowhere) {
+  seconds(15.0, Pose{});
+  for (int i = 0; i < 150; ++i) {
+    frame(Pose{Matrix3d::Identity(), Vector3d(0.15 * i, 0.0, 0.0)});
+    ASSERT_FALSE(watch->resting().has_value()) << i;
+  }
+  EXPECT_TRUE(watch->displaced());
+}
+
+TEST_F(Organ, OutOfSightForSecondsIsProvenAnew) {
+  seconds(15.0, Pose{});
+  frames += static_cast<std::int64_t>(5.0 * kFrames_per_s);
+  frame(Pose{});
+  EXPECT_TRUE(watch->unproven());
+  seconds(1.5, Pose{});
+  EXPECT_FALSE(watch->unproven());
+  EXPECT_FALSE(watch->displaced());
+}
+
+TEST_F(Organ, ThatTurnedAboutAPlaceFarFromWhatIsSeenIsMeasuredWhereItIsSeen) {
+  seconds(5.0, Pose{});
+  const Vector3d far(0.0, -80.0, 100.0);
+  const Matrix3d R = so3_exp(Vector3d(0.06, 0.0, 0.0));
+  seconds(6.0, Pose{R, far - R * far});
+  ASSERT_TRUE(watch->displaced());
+  EXPECT_NEAR(watch->size_mm(), 0.06 * 80.0, 1.5);
 }
 
 }  // namespace
