@@ -20,7 +20,7 @@ class ExpiryNews {
   // A line for the log when there is one to tell.
   [[nodiscard]] std::optional<std::string> next(std::chrono::sys_seconds now) {
     if (!keys_ || now < next_) return std::nullopt;
-    const auto warning = expiry_warning(*keys_, now);
+    auto warning = expiry_warning(*keys_, now);
     next_ = warning ? std::min(now + std::chrono::days(1), now < keys_->ends ? keys_->ends : now + std::chrono::days(1))
                     : std::max(now + std::chrono::minutes(1), keys_->ends - kKeysToldBefore);
     return warning;

@@ -207,8 +207,9 @@ void put_black_first(const cv::Mat& grey, const Board& board, std::vector<cv::Po
   }
   // As many of each kind, or one more of those that the first is of: an average square's level decides.
   const int squares = (board.columns - 1) * (board.rows - 1);
-  const double of_even = even / ((squares + 1) / 2);
-  const double of_odd = odd / std::max(1, squares / 2);
+  const int odd_squares = squares / 2;
+  const double of_even = even / (squares - odd_squares);
+  const double of_odd = odd / std::max(1, odd_squares);
   if (of_even > of_odd) std::reverse(corners.begin(), corners.end());
 }
 
@@ -304,7 +305,7 @@ std::optional<BoardView> find_board(const GreyImage& picture, const Board& board
   BoardView view;
   for (std::size_t i = 0; i < px.size(); ++i) {
     view.px.emplace_back(px[i].x, px[i].y - (combed ? 0.5 : 0.0));
-    view.board_mm.push_back(board.square_mm * squares[i]);
+    view.board_mm.emplace_back(board.square_mm * squares[i]);
   }
   return view;
 }

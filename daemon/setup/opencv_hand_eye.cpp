@@ -16,7 +16,7 @@ cv::Mat to_cv(const Matrix3d& R) {
 }
 
 cv::Mat to_cv(const Vector3d& t) {
-  const cv::Mat_<double> m = (cv::Mat_<double>(3, 1) << t.x(), t.y(), t.z());
+  cv::Mat_<double> m = (cv::Mat_<double>(3, 1) << t.x(), t.y(), t.z());
   return m;
 }
 

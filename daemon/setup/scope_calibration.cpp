@@ -150,7 +150,7 @@ SetupExpected<std::optional<std::string>> second_sensor_named(const ScopeCalibra
     if (!*own) continue;
     if (tool && !same_tool(*tool, **own, protocol)) {
       return fail(
-          fmt::format("{}: its second sensor is \"{}\", and that of {} \"{}\": expected one that stays where it is",
+          fmt::format(R"({}: its second sensor is "{}", and that of {} "{}": expected one that stays where it is)",
                       recording, **own, said_by, *tool));
     }
     if (!tool) said_by = recording, tool = *own;
@@ -177,7 +177,7 @@ SetupExpected<std::optional<std::string>> sensor_of(const ScopeCalibrationSource
     const auto own = calibration_fact(files.hand_eye, "sensor");
     if (!own) continue;
     if (sensor && !same_tool(*sensor, *own, protocol)) {
-      return fail(fmt::format("{}: is of the sensor \"{}\", and {} of \"{}\": expected hand-eyes of one sensor",
+      return fail(fmt::format(R"({}: is of the sensor "{}", and {} of "{}": expected hand-eyes of one sensor)",
                               files.hand_eye, *own, said_by, *sensor));
     }
     if (!sensor) said_by = files.hand_eye, sensor = own;

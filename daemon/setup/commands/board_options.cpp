@@ -12,13 +12,13 @@ namespace perimap {
 namespace {
 
 const std::vector<std::pair<std::string, BoardKind>>& kinds() {
-  static const std::vector<std::pair<std::string, BoardKind>> kKinds = {
+  static const std::vector<std::pair<std::string, BoardKind>> all = {
       {"chessboard", BoardKind::kChessboard},
       {"charuco", BoardKind::kCharuco},
       {"markers", BoardKind::kMarkers},
       {"circles", BoardKind::kCircles},
       {"asymmetric-circles", BoardKind::kAsymmetricCircles}};
-  return kKinds;
+  return all;
 }
 
 }  // namespace
