@@ -18,6 +18,14 @@ constexpr double kShiftDeviation_mm = 50.0;
 constexpr std::uint64_t kFewestFrames = 5;
 constexpr double kLeastShare = 0.6;
 
+// The information with what is known beforehand.
+Matrix6d with_prior(const Matrix6d& W) noexcept {
+  Matrix6d all = W;
+  all.diagonal().head<3>().array() += 1.0 / (kTurnDeviation_rad * kTurnDeviation_rad);
+  all.diagonal().tail<3>().array() += 1.0 / (kShiftDeviation_mm * kShiftDeviation_mm);
+  return all;
+}
+
 // Variance of a mean of n errors over that of white ones, each rho times like the one before.
 double variance_of_mean(std::uint64_t n, double rho) noexcept {
   double sum = 1.0;
@@ -60,10 +68,7 @@ void CommonDisplacement::add(Instant capture, const DisplacementEvidence& eviden
   if (count_ > 0 && capture - entry(count_ - 1).capture < kEvery) return;
   Entry& added = entries_[count_++ % kCapacity];
   added = {capture, evidence};
-  Matrix6d regular = evidence.W;
-  regular.diagonal().head<3>().array() += 1.0 / (kTurnDeviation_rad * kTurnDeviation_rad);
-  regular.diagonal().tail<3>().array() += 1.0 / (kShiftDeviation_mm * kShiftDeviation_mm);
-  const double chi2 = evidence.g.dot(regular.llt().solve(evidence.g));
+  const double chi2 = evidence.g.dot(with_prior(evidence.W).llt().solve(evidence.g));
   const double weight = std::min(1.0, kLargest_deviations / std::sqrt(std::max(chi2, 1e-12)));
   added.evidence.g *= weight;
   added.evidence.W *= weight;
@@ -85,12 +90,10 @@ MeanDisplacement CommonDisplacement::mean(std::size_t window, Instant now,
     if (n == 0) last = added.capture;
   }
   if (n < kFewestFrames || to_seconds(last - first) < kLeastShare * to_seconds(kWindows[window])) return mean;
-  sum.W.diagonal().head<3>().array() += 1.0 / (kTurnDeviation_rad * kTurnDeviation_rad);
-  sum.W.diagonal().tail<3>().array() += 1.0 / (kShiftDeviation_mm * kShiftDeviation_mm);
   const double correlation_s = to_seconds(error_correlation_);
   const double every_s = to_seconds(last - first) / static_cast<double>(n - 1);
   const double rho = correlation_s > 0.0 ? std::exp(-every_s / correlation_s) : 0.0;
-  Matrix6d covariance = sum.W.llt().solve(Matrix6d::Identity());
+  Matrix6d covariance = with_prior(sum.W).llt().solve(Matrix6d::Identity());
   mean.d = covariance * sum.g;
   covariance *= variance_of_mean(n, rho);
   // Of the surface that is seen, which may be far from the pivot: a turn moves it by its lever.

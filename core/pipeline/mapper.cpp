@@ -7,6 +7,12 @@
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
+namespace {
+
+// For a counter.
+std::uint64_t micrometres(double mm) noexcept { return static_cast<std::uint64_t>(1000.0 * mm); }
+
+}  // namespace
 
 Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, WorkerTeam& team,
                const Housekeeping& housekeeping, const MapperOutputs& outputs)
@@ -177,9 +183,7 @@ void Mapper::hand_on(const FrameRecord& frame, const GreyImage& image, const Col
 
 // Nothing is learnt, from the time on at which the organ may have begun to move: what the map has is to be kept.
 void Mapper::watch_organ(const FrameRecord& frame) noexcept {
-  const bool before = organ_.displaced();
   organ_.watch(phases_.image(), stages_.groups(), frame);
-  if (organ_.displaced() && !before) counters_.times_displaced.add();
   tell_displacement();
   if (!organ_.displaced_since()) return;
   const std::uint64_t from_index = history_->first_since(*organ_.displaced_since());
@@ -188,9 +192,8 @@ void Mapper::watch_organ(const FrameRecord& frame) noexcept {
 }
 
 void Mapper::tell_displacement() noexcept {
-  constexpr double kMicrometres = 1000.0;
   counters_.displaced.set(organ_.displaced() ? 1 : 0);
-  counters_.displaced_um.set(static_cast<std::uint64_t>(kMicrometres * organ_.size_mm()));
+  counters_.displaced_um.set(micrometres(organ_.size_mm()));
 }
 
 void Mapper::settle_matches(const FrameRecord& frame) noexcept {
@@ -281,8 +284,7 @@ bool Mapper::move_map() noexcept {
   surface_.begin_again();
   watcher_.begin_window_anew();
   organ_.begin_anew();
-  constexpr double kMicrometres = 1000.0;
-  counters_.moved_um.set(static_cast<std::uint64_t>(kMicrometres * organ->size_mm));
+  counters_.moved_um.set(micrometres(organ->size_mm));
   counters_.maps_moved.add();
   tell_displacement();
   return true;

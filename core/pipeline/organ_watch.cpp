@@ -111,20 +111,21 @@ void OrganWatch::watch(ImagePhase& image, std::span<FeatureGroup> groups, const 
   // Against the map where it was learnt.
   if (displaced()) evidence.g += evidence.W * d_;
   evidence_.add(frame.stamp.capture, evidence);
-  judge(frame);
+  judge(frame.stamp.capture);
 }
 
-void OrganWatch::judge(const FrameRecord& frame) noexcept {
-  const Instant now = frame.stamp.capture;
-  if (!displaced()) {
-    for (std::size_t window = 0; window < CommonDisplacement::kWindows.size(); ++window) {
-      const MeanDisplacement mean = evidence_.mean(window, now, surface_);
-      if (!mean.told || mean.chi2 < (window == 0 ? kWithinABeat : 1.0) * kDoubt_chi2 || mean.size_mm < kDoubt_mm)
-        continue;
-      displaced_since_ = now - CommonDisplacement::kWindows[window] - std::chrono::milliseconds(500);
-      break;
-    }
+void OrganWatch::look_for_displacement(Instant now) noexcept {
+  for (std::size_t window = 0; window < CommonDisplacement::kWindows.size(); ++window) {
+    const MeanDisplacement mean = evidence_.mean(window, now, surface_);
+    if (!mean.told || mean.chi2 < (window == 0 ? kWithinABeat : 1.0) * kDoubt_chi2 || mean.size_mm < kDoubt_mm)
+      continue;
+    displaced_since_ = now - CommonDisplacement::kWindows[window] - std::chrono::milliseconds(500);
+    return;
   }
+}
+
+void OrganWatch::judge(Instant now) noexcept {
+  if (!displaced()) look_for_displacement(now);
   if (!displaced()) {
     unproven_ = unproven_ && !evidence_.mean(kProofWindow, now, surface_).told;
     return;

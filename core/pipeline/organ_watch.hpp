@@ -70,7 +70,8 @@ class OrganWatch {
 
  private:
   void count_sight(std::span<FeatureGroup> groups, Instant capture) noexcept;
-  void judge(const FrameRecord& frame) noexcept;
+  void judge(Instant now) noexcept;
+  void look_for_displacement(Instant now) noexcept;
   void look_for_rest(Instant now) noexcept;
   void settle() noexcept;
 

@@ -100,7 +100,6 @@ struct PipelineCounters {
   Counter moves_refused;   // since the organ did not rest, or was at its place
   Counter displaced;       // 1: the organ is not where the map has it, or the tracker errs; see OrganWatch
   Counter displaced_um;    // by how much then, root mean square over the features
-  Counter times_displaced;
   Counter features_started_anew;  // inconsistent, also after inflation
   LatencyHistogram predict_and_find;
   LatencyHistogram phase_and_pose;

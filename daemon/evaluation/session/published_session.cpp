@@ -131,7 +131,7 @@ double PublishedSession::Interval::holds_s(double at_s) noexcept {
   return kIntervals * interval_s;
 }
 
-void PublishedSession::add(const perimap_Surface& surface, Instant receipt) {
+void PublishedSession::add(const perimap_Surface& surface, const SurfaceDigest& brief, Instant receipt) {
   const double at_s = seconds_of(receipt);
   if (surfaces_.empty()) {
     begin_s_ = at_s;
@@ -147,7 +147,6 @@ void PublishedSession::add(const perimap_Surface& surface, Instant receipt) {
   if (surface.state == perimap_SURFACE_GOOD && holds > 0.0 && !first_good_s_) first_good_s_ = at_s - begin_s_;
   virtual_time_ = virtual_time_ && to_ns(receipt) == surface.release_time_ns;
 
-  const SurfaceDigest brief = digest(surface);
   SurfaceMoment moment;
   moment.at_s = at_s - begin_s_;
   moment.converged = brief.features[perimap_FEATURE_CONVERGED];

@@ -18,7 +18,7 @@ namespace perimap {
 class PublishedSession {
  public:
   // In the order in which they were received, each with its receipt.
-  void add(const perimap_Surface& surface, Instant receipt);
+  void add(const perimap_Surface& surface, const SurfaceDigest& brief, Instant receipt);
   void add(const perimap_Phase& phase, Instant receipt);
   void add(const perimap_Status& status, Instant receipt);
 

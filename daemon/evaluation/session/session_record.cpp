@@ -74,8 +74,8 @@ class Reading {
     const Instant receipt = message.arrival;
     if (message.channel == channels::kSurface) {
       decode<perimap_Surface>(message, [&](const perimap_Surface& surface) {
-        published_->statistics.add(surface, receipt);
-        published_->of(surface.source, surface.stream).add(surface, receipt);
+        const SurfaceDigest brief = published_->statistics.add(surface, receipt);
+        published_->of(surface.source, surface.stream).add(surface, brief, receipt);
       });
     } else if (message.channel == channels::kPhase) {
       decode<perimap_Phase>(

@@ -20,8 +20,6 @@ double largest_deviation_mm(const double (&covariance)[6]) {
   return std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
 }
 
-}  // namespace
-
 SurfaceDigest digest(const perimap_Surface& surface) {
   SurfaceDigest digest;
   digest.sample_sequence = surface.sample_sequence;
@@ -47,7 +45,9 @@ SurfaceDigest digest(const perimap_Surface& surface) {
   return digest;
 }
 
-void WatchStatistics::add(const perimap_Surface& surface, Instant receipt, std::uint64_t writer) {
+}  // namespace
+
+SurfaceDigest WatchStatistics::add(const perimap_Surface& surface, Instant receipt, std::uint64_t writer) {
   Stream& stream = streams_[{surface.source, surface.stream}];
   ++surfaces_;
   stream.hearing = publishers_[surface.source].hear(surface, writer, to_ns(receipt));
@@ -79,6 +79,7 @@ void WatchStatistics::add(const perimap_Surface& surface, Instant receipt, std::
   stream.last_release = release;
   std::copy_n(surface.run_id, stream.last_run.size(), stream.last_run.begin());
   stream.last = digest(surface);
+  return *stream.last;
 }
 
 void WatchStatistics::hear(const perimap_Status& status, Instant receipt, std::uint64_t writer) {

@@ -30,8 +30,6 @@ struct SurfaceDigest {
   std::optional<double> median_deviation_mm;
 };
 
-[[nodiscard]] SurfaceDigest digest(const perimap_Surface& surface);
-
 // The last status of a stream.
 struct StatusDigest {
   perimap_Status status{};  // its sequences are empty
@@ -61,7 +59,8 @@ struct StreamReport {
 class WatchStatistics {
  public:
   // `writer`: what tells one from another, as dds_sample_info_t::publication_handle.
-  void add(const perimap_Surface& surface, Instant receipt, std::uint64_t writer = 0);
+  // Returns the surface in brief.
+  SurfaceDigest add(const perimap_Surface& surface, Instant receipt, std::uint64_t writer = 0);
   void add(const perimap_Status& status);
   // What it says of its publisher: in which run, and whether there are two.
   void hear(const perimap_Status& status, Instant receipt, std::uint64_t writer);
