@@ -94,12 +94,12 @@ struct PipelineCounters {
   Counter start_matches_needed;                       // K
   Counter start_matches_most;                         // see StartProgress
   Counter start_matches_mean;
-  Counter maps_forgotten;  // by command, for a new patient
-  Counter maps_moved;      // by command, with the organ
-  Counter moved_um;        // by how much the last time
-  Counter moves_refused;   // since the organ did not rest, or was at its place
-  Counter displaced;       // 1: the organ is not where the map has it, or the tracker errs; see OrganWatch
-  Counter displaced_um;    // by how much then, root mean square over the features
+  Counter maps_forgotten;         // by command, for a new patient
+  Counter maps_moved;             // by command, with the organ
+  Counter moved_um;               // by how much the last time
+  Counter moves_refused;          // since the organ did not rest, or was at its place
+  Counter displaced;              // 1: the organ is not where the map has it, or the tracker errs; see OrganWatch
+  Counter displaced_um;           // by how much then, root mean square over the features
   Counter features_started_anew;  // inconsistent, also after inflation
   LatencyHistogram predict_and_find;
   LatencyHistogram phase_and_pose;
