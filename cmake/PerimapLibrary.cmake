@@ -63,9 +63,9 @@ endfunction()
 
 # perimap_test(NAME [UNITY [ALONE f...]] [OUTSIDE] [THREADS] [LONG] SOURCES f... DEPENDS target...)
 #
-# A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. In the two builds of a
-# quick tests/run.sh CTest runs each program in four parts instead: starting a program with AddressSanitizer and its libraries
-# for each case takes longer than most cases. ALONE: as above.
+# A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. With PERIMAP_QUICK
+# CTest runs each program in four parts instead: starting a program with a sanitizer and its libraries for each case takes
+# longer than most cases. ALONE: as above.
 #
 # A quick tests/run.sh makes two builds. `outside`, under AddressSanitizer: the unit tests marked OUTSIDE, of what reads the
 # bytes of others (files, devices, messages) and of the rings that they go through. `plain`: all the rest. `threads`, for
@@ -106,7 +106,7 @@ function(perimap_test NAME)
     endif()
   endif()
   target_compile_definitions(${NAME} PRIVATE PERIMAP_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
-  if(wanted AND PERIMAP_TESTS MATCHES "^(plain|outside)$")
+  if(wanted AND PERIMAP_QUICK)
     foreach(part RANGE 3)
       add_test(NAME ${NAME}.part_${part} COMMAND ${NAME})
       set_tests_properties(${NAME}.part_${part} PROPERTIES

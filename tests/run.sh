@@ -120,9 +120,10 @@ if command -v ccache > /dev/null; then
 fi
 
 configure() { # PRESET
-  local preset=$1 tests=all undefined=all quick=OFF
-  if [ $full = no ]; then quick=ON; fi
-  # Which tests: see perimap_test in cmake/PerimapLibrary.cmake. A unit test once is enough for a quick run.
+  # Which tests: see perimap_test in cmake/PerimapLibrary.cmake. A unit test once is enough for a quick run. What compiles
+  # together in each build is compiled together, but where the long tests are built, and where headers must stand alone.
+  local preset=$1 tests=all undefined=all quick=ON
+  if [ $full = yes ] && [[ $preset =~ ^(dev|release)$ ]]; then quick=OFF; fi
   case $preset in
     dev) if [ $full = no ]; then tests=plain; fi ;;
     tsan) tests=threads ;;
