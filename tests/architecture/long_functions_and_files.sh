@@ -1,13 +1,14 @@
 #!/bin/bash
 # long_functions_and_files.sh ROOT [FILE...]: no function is longer than 100 lines and no file longer than 500, but those
 # that say why: a function in a comment right above it, a file in one before its first line of code, that begins
-# "// Long: ". FILEs (below ROOT) are passed over. Reads the text as clang-format leaves it: a function's closing brace
-# stands alone, indented as its head.
+# "// Long: ". Of scripts (.sh, .py, .mjs) the files are counted alone, and the first two begin it with "# Long: ". FILEs
+# (below ROOT) are passed over. Reads the text as clang-format leaves it: a function's closing brace stands alone,
+# indented as its head.
 root=$1
 shift
 cd "$root" || exit 1
-mapfile -t files < <(find . \( -name build -o -name .git \) -prune -o -type f \( -name '*.cpp' -o -name '*.hpp' \) -print |
-  sed 's|^\./||' | sort)
+mapfile -t files < <(find . \( -name build -o -name .git \) -prune -o -type f \( -name '*.cpp' -o -name '*.hpp' -o -name '*.sh' \
+  -o -name '*.py' -o -name '*.mjs' \) -print | sed 's|^\./||' | sort)
 [ ${#files[@]} -gt 0 ] || { echo "no sources below $root" >&2; exit 1; }
 kept=()
 for file in "${files[@]}"; do
@@ -22,9 +23,15 @@ found=$(awk '
   FNR == 1 {
     if (file != "") end_of_file()
     file = FILENAME; file_reason = 0; in_head = 1; reason = 0; ended = 1; raw = 0
+    script = file ~ /\.(sh|py|mjs)$/
     delete opened
   }
   { lines = FNR }
+  script {
+    if (in_head && /^(#|\/\/) Long: /) file_reason = 1
+    if (!/^(#|\/\/| *$)/) in_head = 0
+    next
+  }
   # Text that is no code.
   raw { if (index($0, ")" mark "\"")) raw = 0; next }
   match($0, /R"[A-Za-z_]*\(/) {
