@@ -1,4 +1,5 @@
-# A quick tests/run.sh: as little time as possible for one build. Daily work has better use for files that are compiled alone.
+# As little time as possible for one build: a quick tests/run.sh, and of --full what is built with sanitizers or for
+# clang-tidy. Daily work has better use for files that are compiled alone.
 option(PERIMAP_QUICK "Compile files together where a target allows that, and nothing for the tests labelled `long`" OFF)
 
 # perimap_library(NAME FOLDER [UNITY [ALONE f...]] [PRELUDE p] [SOURCES f...] [DEPENDS target...] [PRIVATE_DEPENDS target...])
@@ -7,8 +8,8 @@ option(PERIMAP_QUICK "Compile files together where a target allows that, and not
 # target sees a folder's headers only when it depends on that folder's target: each target carries an include root of
 # its own that holds nothing but its folder. So an include against the direction of the architecture does not build.
 #
-# PRELUDE names the precompiled headers (perimap_prelude) that its files begin with. UNITY: a quick tests/run.sh compiles
-# eight of its files as one, in four fifths to a half of the time; what is local to them must have different names then.
+# PRELUDE names the precompiled headers (perimap_prelude) that its files begin with. UNITY: with PERIMAP_QUICK
+# eight of its files are compiled as one, in four fifths to a half of the time; what is local to them must have different names then.
 # ALONE: files whose local names stand for something else in others.
 function(perimap_library NAME FOLDER)
   cmake_parse_arguments(ARG "UNITY" "PRELUDE" "ALONE;SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
@@ -46,8 +47,8 @@ endfunction()
 # perimap_prelude(NAME [FOR_PROGRAMS] HEADERS <header>... DEPENDS target...)
 #
 # Headers of others that take longer to read than most files take to compile, read once for all. Not in release builds:
-# there each file must compile with what it includes itself; nor
-# inside another project. Programs are compiled with other flags than libraries.
+# there each file must compile with what it includes itself; nor inside another project. Programs are compiled with other
+# flags than libraries.
 function(perimap_prelude NAME)
   cmake_parse_arguments(ARG "FOR_PROGRAMS" "" "HEADERS;DEPENDS" ${ARGN})
   if(CMAKE_BUILD_TYPE STREQUAL RelWithDebInfo AND PROJECT_IS_TOP_LEVEL)
@@ -119,7 +120,8 @@ endfunction()
 
 # perimap_test_program(NAME [LONG] SOURCES f... DEPENDS target...)
 #
-# A program that tests run, or that is one. LONG: only tests labelled `long` do; a quick tests/run.sh does not build it.
+# A program that tests run, or that is one. LONG: only tests labelled `long` do; with PERIMAP_QUICK
+# it is not built.
 function(perimap_test_program NAME)
   cmake_parse_arguments(ARG "LONG" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${NAME} ${ARG_SOURCES})

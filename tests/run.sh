@@ -194,7 +194,7 @@ lint() {
   # Only release builds have no precompiled headers: there each file must include what it uses.
   build release || return
   step "format" 5m bash -c \
-    "find core drivers daemon tests -name '*.cpp' -o -name '*.hpp' -o -name '*.c' | xargs clang-format --dry-run -Werror"
+    "find core drivers daemon deploy/examples idl tests -name '*.cpp' -o -name '*.hpp' -o -name '*.c' | xargs clang-format --dry-run -Werror"
   # clang-tidy spends nearly all of its time on the headers of others: those that a quick build compiles together are read
   # together. By the release preset: GCC's precompiled headers are none for clang.
   step "clang-tidy configure" 5m cmake --preset release -B build/lint -DPERIMAP_QUICK=ON || return

@@ -1,6 +1,7 @@
-# phase_of_record PROGRAM RECORD: runs the example over a minute of the record (RECORD_ch0_200perMV_360Hz.i16.gz) and holds its
-# phases against the annotated beats (RECORD_beats.csv): from 10 s on the phase of each beat's sample is within 0.5 rad of zero (it is predicted)
-# for nine beats in ten, half-way between two beats it is not, and the point moves by 3 mm to either side.
+# phase_of_record PROGRAM RECORD: runs the example over a minute of the record (RECORD_ch0_200perMV_360Hz.i16.gz) and holds
+# its phases against the annotated beats (RECORD_beats.csv): from 10 s on the phase of each beat's sample is within 0.5 rad
+# of zero (it is predicted) for nine beats in ten, half-way between two beats it is not, and the point moves by 3 mm to
+# either side.
 phase_of_record() {
   zcat "$2_ch0_200perMV_360Hz.i16.gz" | od -An -v -td2 -w2 | awk 'NR <= 21600 { print $1 / 200 }' | "$1" 360 > phases || return 1
   awk -v beats="$2_beats.csv" '
