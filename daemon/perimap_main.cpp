@@ -13,6 +13,7 @@
   COMMAND(replay)                 \
   COMMAND(watch)                  \
   COMMAND(view)                   \
+  COMMAND(bridge)                 \
   COMMAND(report)                 \
   COMMAND(session)                \
   COMMAND(ecg)                    \

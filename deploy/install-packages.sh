@@ -36,6 +36,7 @@ build=(
   libyaml-cpp-dev                            # drivers: calibration files
   libtomlplusplus-dev libcli11-dev libspdlog-dev nlohmann-json3-dev  # daemon
   libsystemd-dev                             # daemon/process: readiness, watchdog
+  libopenigtlink-dev                         # daemon/bridge: OpenIGTLink; in the tests the peer of our own reader
   libssl-dev                                 # daemon/keys: certificates, signed documents
   librsvg2-dev fonts-dejavu-core             # daemon/evaluation/report: figures as PNG
   dpkg-dev                                   # deploy/debian: what the package depends on
@@ -43,7 +44,6 @@ build=(
 tests=(
   libgtest-dev libgmock-dev
   clang-16 libclang-rt-16-dev                # AddressSanitizer, fuzzing
-  libopenigtlink-dev                         # the peer of the OpenIGTLink client
   nodejs=node npm=npm ca-certificates        # recordings are read back by the official npm packages
 )
 full=(

@@ -31,7 +31,7 @@ for file in README.md docs/guide/*.md; do
     # The command has one word, or two where the first is a group.
     name=${words[1]}
     case $name in
-      calibrate | keys | ctl) [[ ${words[2]:-} == [a-z]* ]] && name+=" ${words[2]}" ;;
+      bridge | calibrate | keys | ctl) [[ ${words[2]:-} == [a-z]* ]] && name+=" ${words[2]}" ;;
     esac
     commands=$((commands + 1))
     if [ -z "${help[$name]:-}" ]; then

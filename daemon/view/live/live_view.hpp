@@ -16,7 +16,7 @@
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
 #include "daemon/dds/sample_readers.hpp"
-#include "daemon/view/live/followed_publisher.hpp"
+#include "daemon/subscribing/followed_publisher.hpp"
 #include "daemon/view/messages/surface_teller.hpp"
 #include "daemon/view/web/web_server.hpp"
 

@@ -1,47 +1,19 @@
 #include "daemon/view/recorded/overlay.hpp"
 
-#include <array>
 #include <cmath>
-#include <optional>
 #include <perimap_mesh_client.hpp>
 #include <vector>
 
-#include "core/geometry/pose.hpp"
+#include "daemon/subscribing/picture_projector.hpp"
 
 namespace perimap {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Maps points of the world to pixels.
-class Projector {
- public:
-  Projector(const perimap_Surface& surface, const CameraModel& lens) : lens_(lens) {
-    const Vector3d t(surface.translation_WC_mm[0], surface.translation_WC_mm[1], surface.translation_WC_mm[2]);
-    X_CW_ = pose_from_wxyz(t, surface.rotation_WC_wxyz).inverse();
-    if (surface.camera_focal_px[0] > 0 && surface.camera_focal_px[1] > 0) {
-      lens_.fx = surface.camera_focal_px[0];
-      lens_.fy = surface.camera_focal_px[1];
-      lens_.cx = surface.camera_principal_point_px[0];
-      lens_.cy = surface.camera_principal_point_px[1];
-    }
-  }
-
-  [[nodiscard]] std::optional<Vector2d> operator()(const std::array<double, 3>& p_W_mm) const {
-    Vector2d px;
-    const Vector3d p_C = X_CW_ * Vector3d(p_W_mm[0], p_W_mm[1], p_W_mm[2]);
-    if (lens_.project(p_C, px) != ProjectionStatus::kOk) return std::nullopt;
-    return px;
-  }
-
- private:
-  CameraModel lens_;
-  Pose X_CW_;
-};
-
 double tenth(double value) { return std::round(value * 10.0) / 10.0; }
 
-void put_mesh(const client::PredictedMesh& mesh, const Projector& project, Json& json) {
+void put_mesh(const client::PredictedMesh& mesh, const PictureProjector& project, Json& json) {
   std::vector<bool> seen;
   Json vertices = Json::array(), deviations = Json::array(), triangles = Json::array();
   for (std::size_t v = 0; v < mesh.positions_W_mm.size(); ++v) {
@@ -60,7 +32,7 @@ void put_mesh(const client::PredictedMesh& mesh, const Projector& project, Json&
   json["triangles"] = std::move(triangles);
 }
 
-void put_features(const client::PredictedSurface& surface, const Projector& project, Json& json) {
+void put_features(const client::PredictedSurface& surface, const PictureProjector& project, Json& json) {
   Json features = Json::array(), states = Json::array();
   for (const client::PredictedFeature& feature : surface.features) {
     const auto px = project(feature.position_W_mm);
@@ -79,7 +51,7 @@ Json overlay_json(const perimap_Surface& surface, const perimap_SurfaceModel* mo
                   const CameraModel& lens, Instant now) {
   const bool usable = surface.state == perimap_SURFACE_GOOD || surface.state == perimap_SURFACE_DEGRADED;
   if (!usable || !surface.camera_pose_known || model == nullptr) return nullptr;
-  const Projector project(surface, lens);
+  const PictureProjector project(surface, lens);
   Json json = Json::object();
   client::PredictedSurface features;
   if (!client::predict(*model, surface.capture_time_ns, to_ns(now), {true}, features)) return nullptr;

@@ -12,10 +12,10 @@
 #include "core/error/expected.hpp"
 #include "core/geometry/camera_model.hpp"
 #include "core/time/instant.hpp"
+#include "daemon/recordings/published_states.hpp"
+#include "daemon/recordings/recording_player.hpp"
 #include "daemon/view/messages/page_request.hpp"
 #include "daemon/view/messages/surface_teller.hpp"
-#include "daemon/view/recorded/published_states.hpp"
-#include "daemon/view/recorded/recording_player.hpp"
 #include "daemon/view/web/web_server.hpp"
 #include "drivers/recording/recorded_frame.hpp"
 

@@ -125,6 +125,9 @@ ends 2 "key 'phase.law'" verify broken.toml --from r.mcap "${size[@]}"
 ends 1 "nothing.yaml" verify good.toml --from r.mcap "${size[@]}" --calibration nothing.yaml
 ends 2 "--port" view --port 99999
 ends 1 "192.0.2.1" view --port 0 --bind 192.0.2.1
+ends 2 "A subcommand is required" bridge
+ends 2 "--port" bridge igtl --port 99999
+ends 1 "192.0.2.1" bridge igtl --port 0 --bind 192.0.2.1
 ends 2 "A subcommand is required" keys
 ends 1 "nowhere" keys show --directory nowhere
 ends 2 "--older-than" forget --older-than x .

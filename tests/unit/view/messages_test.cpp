@@ -10,7 +10,7 @@
 
 #include "daemon/publishing/advice.hpp"
 #include "daemon/publishing/wire_names.hpp"
-#include "daemon/view/live/followed_publisher.hpp"
+#include "daemon/subscribing/followed_publisher.hpp"
 #include "daemon/view/messages/page_request.hpp"
 #include "daemon/view/messages/surface_teller.hpp"
 

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "daemon/publishing/sample_recorder.hpp"
+#include "daemon/recordings/published_states.hpp"
+#include "daemon/recordings/recording_player.hpp"
 #include "daemon/view/recorded/overlay.hpp"
-#include "daemon/view/recorded/published_states.hpp"
 #include "daemon/view/recorded/recorded_view.hpp"
-#include "daemon/view/recorded/recording_player.hpp"
 #include "drivers/image/jpeg_decoder.hpp"
 #include "drivers/image/jpeg_encoder.hpp"
 #include "drivers/recording/channels.hpp"

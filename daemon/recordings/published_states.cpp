@@ -1,4 +1,4 @@
-#include "daemon/view/recorded/published_states.hpp"
+#include "daemon/recordings/published_states.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-// Which perimapd and which of its streams a page shows, where there are several.
+// Which perimapd and which of its streams is shown, where there are several.
 #pragma once
 
 #include <cstdint>

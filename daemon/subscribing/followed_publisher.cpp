@@ -1,4 +1,4 @@
-#include "daemon/view/live/followed_publisher.hpp"
+#include "daemon/subscribing/followed_publisher.hpp"
 
 namespace perimap {
 

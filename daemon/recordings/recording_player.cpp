@@ -1,4 +1,4 @@
-#include "daemon/view/recorded/recording_player.hpp"
+#include "daemon/recordings/recording_player.hpp"
 
 #include <fmt/format.h>
 
