@@ -51,7 +51,7 @@ full=(
   qemu-system-x86 busybox-static cpio zstd kmod udev iproute2 v4l-utils  # tests/vm: CAN, V4L2 and systemd on Debian's own kernels
   chromium                                   # the pages that perimap writes, opened
   stress-ng                                  # perimap bench: latencies under load
-  lintian systemd man-db                     # the Debian package and its service, checked
+  lintian systemd man-db apparmor            # the Debian package and its service, checked
 )
 
 wanted=test

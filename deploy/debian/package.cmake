@@ -24,7 +24,8 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 
 # dpkg keeps what an administrator has changed in these.
 set(conffiles ${CMAKE_CURRENT_BINARY_DIR}/debian/conffiles)
-file(WRITE ${conffiles} "${configuration_dir}/cyclonedds-loopback.xml
+file(WRITE ${conffiles} "${CMAKE_INSTALL_FULL_SYSCONFDIR}/apparmor.d/perimapd
+${configuration_dir}/cyclonedds-loopback.xml
 ${configuration_dir}/cyclonedds-network.xml
 ${configuration_dir}/perimapd.toml.example
 ")

@@ -6,7 +6,7 @@
 
 # The commands it takes, each with the package that has it.
 vm_needs=(qemu-system-x86_64=qemu-system-x86 busybox=busybox-static cpio=cpio zstd=zstd modprobe=kmod
-  dpkg-deb=dpkg apt-get=apt systemctl=systemd udevadm=udev ip=iproute2 v4l2-ctl=v4l-utils)
+  dpkg-deb=dpkg apt-get=apt systemctl=systemd udevadm=udev ip=iproute2 v4l2-ctl=v4l-utils apparmor_parser=apparmor)
 
 # vm_missing: the packages that are missing, one a line
 vm_missing() {

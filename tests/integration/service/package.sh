@@ -44,6 +44,7 @@ inside dpkg -i "/tmp/$(basename "$package")" > "$work/dpkg" 2>&1 || fail "instal
   [ -L "$root/system/etc/systemd/system/multi-user.target.wants/perimapd.service" ] || fail "the service is not enabled"
 inside systemd-analyze verify --man=no /lib/systemd/system/perimapd.service > "$work/verify" 2>&1
 [ ! -s "$work/verify" ] || fail "the unit: $(cat "$work/verify")"
+[ -e "$root/system/etc/apparmor.d/local/perimapd" ] || fail "there is no place for additions to the AppArmor profile"
 
 printf 'version = 1\n[replay]\nrecording = "/tmp/%s"\n[dds]\ndomain = %d\n' "$(basename "$recording")" $((40 + RANDOM % 150)) \
   > "$root/system/etc/perimap/perimapd.toml"
@@ -61,7 +62,7 @@ grep -Eq '[1-9][0-9]* surfaces' "$work/log" || fail "it did not publish: $(cat "
 
 inside dpkg -r perimap > "$work/dpkg" 2>&1 || fail "removal: $(cat "$work/dpkg")"
 # Whether the service is enabled is configuration too.
-remaining=$(left | grep -v -e '^./etc/perimap' -e '^./etc/systemd/system/' -e '^./var/lib/systemd/deb-systemd-helper')
+remaining=$(left | grep -v -e '^./etc/perimap' -e '^./etc/apparmor.d/' -e '^./etc/systemd/system/' -e '^./var/lib/systemd/deb-systemd-helper')
 [ -z "$remaining" ] || fail "removal leaves: $remaining"
 inside dpkg -P perimap > "$work/dpkg" 2>&1 || fail "purge: $(cat "$work/dpkg")"
 remaining=$(left)

@@ -25,6 +25,20 @@ installed() {
 
 service_ready() {
   export CYCLONEDDS_URI=file:///etc/perimap/cyclonedds-loopback.xml
+  # Its AppArmor profile, with what an administrator would add for devices like the emulated ones.
+  aa-enabled --quiet || fail "this kernel has no AppArmor"
+  mkdir -p /etc/apparmor.d/local
+  echo '/dev/pts/[0-9]* rw,' > /etc/apparmor.d/local/perimapd
+  apparmor_parser --replace --skip-cache /etc/apparmor.d/perimapd || fail "the profile can not be loaded"
+}
+
+# It runs under its profile, and nothing that it has tried so far was denied.
+confined() {
+  local label
+  label=$(cat "/proc/$(systemctl show -P MainPID perimapd)/attr/apparmor/current")
+  [ "$label" = "perimapd (enforce)" ] || fail "it is confined by '$label'"
+  dmesg | grep 'apparmor="DENIED".*profile="perimapd"' && fail "its profile denies what it needs"
+  echo "ok: it runs under its AppArmor profile, which has denied nothing"
 }
 
 # vcan0 and /dev/video0, a camera without a heart before it: vivid draws a moving pattern.
@@ -69,6 +83,8 @@ can_identifier = 0x18FF02E0
 can_extended = true
 can_sample_rate_hz = 500
 count_mV = 0.01
+[recording]
+folder = "/var/lib/perimap"
 END
   chgrp perimap /etc/perimap/perimapd.toml /etc/perimap/camera.yaml
   perimap check /etc/perimap/perimapd.toml > /dev/null || fail "the configuration is refused"

@@ -19,6 +19,13 @@ echo "ok: each kind of device that it may open was known when it started"
 received 5 /tmp/first
 holds /tmp/first "it publishes" "x.received > 5"
 
+perimap ctl record on && sleep 2 && perimap ctl record off && perimap ctl new-patient && systemctl reload perimapd ||
+  fail "a command is refused"
+[ -n "$(find /var/lib/perimap -name '*.mcap' -size +0)" ] || fail "nothing was recorded"
+others=$(find /var/lib/perimap /run/perimap -type f -perm /077)
+[ -z "$others" ] || fail "others can read or write: $others"
+confined
+
 # One thread is held, as if it hung; the others go on.
 before=$(systemctl show -P MainPID perimapd)
 /vm/bin/hold_thread "$before" publisher &
@@ -33,6 +40,15 @@ holds /tmp/second "it publishes again" "x.received > 5"
 kill -9 "$(systemctl show -P MainPID perimapd)"
 received 5 /tmp/third
 holds /tmp/third "it publishes after kill -9" "x.received > 5"
+
+confined
+# What it does not need is denied, although its owner may read it.
+echo 'version = 2' > /srv/other.toml
+perimapd -c /srv/other.toml 2>&1 | grep -q 'version' || fail "unconfined it does not read its configuration"
+aa-exec -p perimapd -- /usr/sbin/perimapd -c /srv/other.toml 2>&1 | grep -q 'Permission denied' ||
+  fail "its profile lets it read everything"
+dmesg | grep -q 'apparmor="DENIED".*profile="perimapd" name="/srv/other.toml"' || fail "that it was denied is not told"
+echo "ok: what the profile does not name is denied"
 
 # Nothing of the package is left but configuration; tests/integration/service/package.sh looks at the whole system.
 dpkg -L perimap > /tmp/files
