@@ -46,6 +46,14 @@ inside systemd-analyze verify --man=no /lib/systemd/system/perimapd.service > "$
 [ ! -s "$work/verify" ] || fail "the unit: $(cat "$work/verify")"
 [ -e "$root/system/etc/apparmor.d/local/perimapd" ] || fail "there is no place for additions to the AppArmor profile"
 
+sbom=$root/system/usr/share/doc/perimap/perimap.spdx.json
+if command -v node > /dev/null; then
+  found=$(node "$(dirname "$0")/sbom_check.js" "$sbom" "$root"/system/usr/{bin/perimap,sbin/perimapd,lib/perimap/*.so}) ||
+    fail "the software bill of materials: $found"
+else
+  [ -s "$sbom" ] || fail "there is no software bill of materials"
+fi
+
 printf 'version = 1\n[replay]\nrecording = "/tmp/%s"\n[dds]\ndomain = %d\n' "$(basename "$recording")" $((40 + RANDOM % 150)) \
   > "$root/system/etc/perimap/perimapd.toml"
 # The module for videos is found where it was installed, and its absence is said.
