@@ -299,9 +299,10 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
       if ((outcomes.considered >> lane & 1) == 0) continue;
       if (again[lane]) continue;
-      judge(lane, outcomes.normalised_innovation_squared[lane], (outcomes.accepted >> lane & 1) != 0, common[lane],
-            frame.held_rate);
+      const bool accepted = (outcomes.accepted >> lane & 1) != 0;
+      judge(lane, outcomes.normalised_innovation_squared[lane], accepted, common[lane], frame.held_rate);
       FeatureSlot& slot = slots_[lane];
+      if (accepted) slot.aside.add(frame.pose);
       if (slot.health.process_noise() > 0.0 && frame.stamp.capture > slot.last_learnt) {
         const double elapsed_s = to_seconds(frame.stamp.capture - slot.last_learnt);
         bank_.diffuse(feature(lane), slot.health.process_noise() * std::sqrt(elapsed_s));

@@ -112,6 +112,7 @@ class Step {
     if (slot_.start.outcome.contradicted()) bank_.diffuse(feature_, kInflation_mm);
     const Instant last = slot_.start.captures[used - 1];
     slot_.map({.last_observed = last, .last_learnt = last});
+    for (std::uint32_t i = 0; i < used; ++i) slot_.aside.add(slot_.start.poses[i]);
     check_convergence();
     return LifeEvent::kNone;
   }
@@ -178,8 +179,11 @@ class Step {
         largest_deviation_mm(estimate, settings_.estimator.layout, 16, job_.frame->respiration.known);
     const InnovationMonitor& monitor = slot_.health.monitor();
     const bool recalled = slot_.recalled_converged && monitor.verdict() == InnovationVerdict::kTooFew;
+    // From one place the images say nothing of the depth, but updates by a map that is not right yet make its deviation
+    // small all the same.
     slot_.converged = slot_.largest_deviation_mm <= settings_.estimator.converged_deviation_mm &&
-                      slot_.updates >= kUpdatesBeforeConverged && (monitor.consistent() || recalled);
+                      slot_.updates >= kUpdatesBeforeConverged && slot_.aside.known() &&
+                      (monitor.consistent() || recalled);
   }
 
   FeatureSlot& slot_;

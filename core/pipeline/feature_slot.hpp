@@ -17,6 +17,7 @@
 #include "core/phase/law_trial.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/phase/respiratory_clock.hpp"
+#include "core/pipeline/parallax.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/time/frame_rate.hpp"
@@ -153,6 +154,7 @@ struct MappedFeature {
   Instant last_learnt;           // capture time of the last update, for process noise
   double last_learnt_rad = 0.0;  // its phase
   int updates = 0;
+  SeenFromAside aside{};  // of all that the estimate was made from
   double largest_deviation_mm = 0.0;
   bool converged = false;
   bool recalled_converged = false;      // it was before a restart: believed until the innovations tell

@@ -66,6 +66,7 @@ void MapKeeping::recall(FeatureSlot& slot, const FeatureMemory& feature) noexcep
   slot.map({.last_observed = feature.last_observed,
             .last_learnt = feature.last_observed,
             .updates = feature.updates,
+            .aside = SeenFromAside(feature.converged),
             .largest_deviation_mm = feature.largest_deviation_mm,
             .converged = feature.converged,
             .recalled_converged = feature.converged});

@@ -118,6 +118,23 @@ TEST_F(Stages, AnAdoptedFeatureWasLastObservedWhenItsStartsLastMatchWas) {
   EXPECT_EQ(slot->last_observed, last);
 }
 
+TEST_F(Stages, AFeatureThatIsSeenFromOnePlaceAloneIsNotCalledConverged) {
+  for (const double sway : {0.0, 5.0}) {
+    sway_mm = sway;
+    slot->clear();
+    slot->map({.last_observed = Instant(milliseconds(5000)), .last_learnt = Instant(milliseconds(5000))});
+    bank->set(0, still_feature());
+    for (int i = 0; i < 200; ++i) {
+      next_frame();
+      found_at({320 - settings.camera.fx * current->pose.X_WC.t.x() / 100, 240});
+      ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+    }
+    EXPECT_LT(slot->largest_deviation_mm, settings.estimator.converged_deviation_mm);
+    EXPECT_GT(slot->updates, 100);
+    EXPECT_EQ(slot->converged, sway > 0) << sway;
+  }
+}
+
 TEST_F(Stages, AStartUnderALawThatHasGivenWayIsSolvedOnceMore) {
   slot->state = SlotState::kTracked;
   job.law.probabilities.fill(1.0 / 3.0);

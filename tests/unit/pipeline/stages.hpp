@@ -23,10 +23,10 @@ namespace perimap {
 
 using std::chrono::milliseconds;
 
-// A still camera at the origin looking along z, beats every 800 ms, frames every 33 ms from 5 s on, or as a test says.
-// Beats are known ahead, so that every frame's phase is exact at once, but where a test says otherwise. Tests that need
-// one feature use the first slot. A match is learnt a frame after it was found, because the sweep comes before the
-// search.
+// A camera at the origin looking along z, which keeps still or sways, beats every 800 ms, frames every 33 ms from 5 s
+// on, or as a test says. Beats are known ahead, so that every frame's phase is exact at once, but where a test says
+// otherwise. Tests that need one feature use the first slot. A match is learnt a frame after it was found, because the
+// sweep comes before the search.
 struct Stages : ::testing::Test {
   PipelineSettings settings;
   PixelModel model;
@@ -43,6 +43,7 @@ struct Stages : ::testing::Test {
   int beats_known_ahead_ms = 2000;
   milliseconds beat_deviation{1};
   double pose_variance_mm2 = 0.0;
+  double sway_mm = 0.0;
   FrameRecord* current = nullptr;
 
   Stages() {
@@ -73,6 +74,7 @@ struct Stages : ::testing::Test {
     CameraPose pose;
     pose.state = CameraPose::State::kInterpolated;
     pose.position_variance_mm2 = pose_variance_mm2;
+    pose.X_WC.t.x() = sway_mm * std::sin(0.1 * n);
     FrameHistory::set_pose(frame, pose);
     history->set_phase(frame, clock.clock(), respiration);
     history->refresh_phases(clock.clock(), respiration);
