@@ -1,5 +1,6 @@
 // Videos in place of a still camera, looped, in the pipeline with a tracker that says so and an ECG of another heart;
-// beside it the tracker without a map. A line a second. Arguments: FEATURES FRAMES VIDEO...
+// beside it the tracker without a map. A line a second. Arguments: FEATURES FRAMES NOISE_mm VIDEO..., the noise that of
+// the emulated tracker.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -16,13 +17,14 @@ namespace {
 
 class Session {
  public:
-  Session(const VideoFrame& first, double rate, int features)
+  Session(const VideoFrame& first, double rate, int features, double tracker_noise_mm)
       : rate_(rate),
         session_({.width = first.grey.width,
                   .height = first.grey.height,
                   .frames_per_s = rate,
                   .features = features,
-                  .workers = 1}),
+                  .workers = 1,
+                  .tracker_noise_mm = tracker_noise_mm}),
         tracker_({.features = features, .frames_per_s = rate}) {}
 
   void take(const VideoFrame& frame) {
@@ -48,13 +50,14 @@ class Session {
     for (const FeatureSlot& slot : session_.slots()) ++states[slot.state];
     std::map<int, int> reasons;
     for (; told_ < session_.told().size(); ++told_) ++reasons[static_cast<int>(session_.told()[told_].reason)];
+    int converged = 0;
+    for (const FeatureSlot& slot : session_.slots()) converged += slot.converged ? 1 : 0;
     PipelineCounters& counters = session_.counters();
     std::printf(
-        "%4d  found %5.1f (by last view %5.1f), track %5.1f | empty %3d tracked %3d starting %3d mapped %3d | lost "
-        "unseen "
-        "%llu refused %llu unstarted %llu, ids %zu | reasons",
+        "%4d  found %5.1f (by last view %5.1f), track %5.1f | empty %3d tracked %3d starting %3d mapped %3d "
+        "converged %3d | lost unseen %llu refused %llu unstarted %llu, ids %zu | reasons",
         frames_, in_pipeline_ / rate_, by_last_view_ / rate_, in_tracker_ / rate_, states[SlotState::kEmpty],
-        states[SlotState::kTracked], states[SlotState::kStarting], states[SlotState::kMapped],
+        states[SlotState::kTracked], states[SlotState::kStarting], states[SlotState::kMapped], converged,
         static_cast<unsigned long long>(counters.features_lost_unseen.get()),
         static_cast<unsigned long long>(counters.features_lost_refused.get()),
         static_cast<unsigned long long>(counters.features_lost_unstarted.get()), lives_.size());
@@ -73,7 +76,7 @@ class Session {
   std::map<std::uint32_t, int> lives_;
 };
 
-bool run(const std::string& path, int features, int frames) {
+bool run(const std::string& path, int features, int frames, double tracker_noise_mm) {
   std::unique_ptr<Session> session;
   for (int taken = 0; taken < frames;) {
     auto reader = VideoReader::open(path);
@@ -84,7 +87,7 @@ bool run(const std::string& path, int features, int frames) {
     for (auto frame = (*reader)->next(); frame && *frame != nullptr && taken < frames; frame = (*reader)->next()) {
       if (session == nullptr) {
         const double rate = (*reader)->frames_per_s();
-        session = std::make_unique<Session>(**frame, rate > 0 ? rate : 25, features);
+        session = std::make_unique<Session>(**frame, rate > 0 ? rate : 25, features, tracker_noise_mm);
       }
       session->take(**frame);
       ++taken;
@@ -97,14 +100,14 @@ bool run(const std::string& path, int features, int frames) {
 }  // namespace perimap::bench
 
 int main(int argc, char** argv) {
-  if (argc < 4) {
-    std::fprintf(stderr, "still_camera_bench FEATURES FRAMES VIDEO...\n");
+  if (argc < 5) {
+    std::fprintf(stderr, "still_camera_bench FEATURES FRAMES NOISE_mm VIDEO...\n");
     return 2;
   }
   bool all = true;
-  for (int i = 3; i < argc; ++i) {
+  for (int i = 4; i < argc; ++i) {
     std::printf("%s\n", argv[i]);
-    all = perimap::bench::run(argv[i], std::atoi(argv[1]), std::atoi(argv[2])) && all;
+    all = perimap::bench::run(argv[i], std::atoi(argv[1]), std::atoi(argv[2]), std::atof(argv[3])) && all;
   }
   return all ? 0 : 1;
 }
