@@ -30,8 +30,8 @@ needs_of_the_unit() {
   while read -r kind; do printf 'rw\t%s\n' "$(node_of "$kind")"; done \
     < <(setting DeviceAllow | sed -n 's/^char-\([^ ]*\) rw$/\1/p')
   [ "$(setting Type)" != notify ] || printf 'w\t/run/systemd/notify\n'
-  # As the program makes them there: see daemon/process/service_folder.hpp, drivers/file/whole_file.hpp.
-  printf 'rw\t%s\n' "$state"/{checkpoint,checkpoint.part,checkpoint.part-2,perimap-20261127-100000{,.part}.mcap}
+  # As the program makes them there: daemon/process/service_folder.hpp, daemon/checkpoint/checkpoint_file.hpp.
+  printf 'rw\t%s\n' "$state"/{checkpoint,checkpoint.part,perimap-20261127-100000.mcap}
   printf 'rw\t%s\n' "$run/control"
   printf 'r\t%s/\n' "$state"
 }

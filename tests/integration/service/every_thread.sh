@@ -84,6 +84,7 @@ wait "$emulators" || fail "the emulators ended with $?: $(tail -n 40 "$work/emul
 ended "$emulators"
 grep -q ThreadSanitizer "$work/log" "$work"/watch-* && fail "a report: $(grep -h -A 40 ThreadSanitizer "$work/log" "$work"/watch-* | head -n 60)"
 grep -q 'ended with' "$work/subscribers" && fail "$(cat "$work/subscribers")"
+found=$("$(dirname "$0")/log_without_data.sh" "$work/log") || fail "$found"
 for command in "${!did[@]}"; do
   [ "${did[$command]}" -gt 0 ] || fail "$command was never done"
 done

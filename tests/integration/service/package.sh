@@ -68,6 +68,9 @@ inside env CYCLONEDDS_URI=file:///etc/perimap/cyclonedds-loopback.xml setpriv --
   perimapd -c /etc/perimap/perimapd.toml 2> "$work/log" || fail "perimapd: $(cat "$work/log")"
 grep -Eq '[1-9][0-9]* surfaces' "$work/log" || fail "it did not publish: $(cat "$work/log")"
 
+# As the service makes them, and one that an interrupted write has left.
+mkdir -p "$root/system/var/lib/perimap"
+touch "$root"/system/var/lib/perimap/checkpoint{,.part}
 inside dpkg -r perimap > "$work/dpkg" 2>&1 || fail "removal: $(cat "$work/dpkg")"
 # Whether the service is enabled is configuration too.
 remaining=$(left | grep -v -e '^./etc/perimap' -e '^./etc/apparmor.d/' -e '^./etc/systemd/system/' -e '^./var/lib/systemd/deb-systemd-helper')
