@@ -24,11 +24,13 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 
 # dpkg keeps what an administrator has changed in these.
 set(conffiles ${CMAKE_CURRENT_BINARY_DIR}/debian/conffiles)
-file(WRITE ${conffiles} "${CMAKE_INSTALL_FULL_SYSCONFDIR}/apparmor.d/perimapd
-${configuration_dir}/cyclonedds-loopback.xml
+file(WRITE ${conffiles} "${configuration_dir}/cyclonedds-loopback.xml
 ${configuration_dir}/cyclonedds-network.xml
 ${configuration_dir}/perimapd.toml.example
 ")
+if(profile_dir)
+  file(APPEND ${conffiles} "${profile_dir}/perimapd\n")
+endif()
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${conffiles}
   ${CMAKE_CURRENT_SOURCE_DIR}/debian/postinst ${CMAKE_CURRENT_SOURCE_DIR}/debian/prerm
   ${CMAKE_CURRENT_SOURCE_DIR}/debian/postrm)

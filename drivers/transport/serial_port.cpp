@@ -108,7 +108,9 @@ Expected<Descriptor> claim_serial_line(const std::string& path) {
   struct termios2 probe {};
   if (::ioctl(descriptor.get(), TCGETS2, &probe) != 0) return fail(fmt::format("{}: not a serial line", path));
   // TIOCEXCL does not keep root out, a lock does not keep out programs that take none: both together.
-  if (::flock(descriptor.get(), LOCK_EX | LOCK_NB) != 0) return fail(reason_not_opened(path, EBUSY));
+  if (::flock(descriptor.get(), LOCK_EX | LOCK_NB) != 0) {
+    return fail(reason_not_opened(path, errno == EWOULDBLOCK ? EBUSY : errno));
+  }
   (void)::ioctl(descriptor.get(), TIOCEXCL);
   return descriptor;
 }

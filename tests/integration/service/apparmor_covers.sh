@@ -14,10 +14,13 @@ fail() {
 # ---- what is needed: "MODES<tab>PATH"
 setting() { sed -n "s/^$1=//p" "$unit"; }
 state=/var/lib/$(setting StateDirectory) run=/run/$(setting RuntimeDirectory)
-node_of() { # KIND OF DEVICE
+# Whoever opens a serial line locks it, too.
+serial=rw
+! grep -rq 'flock(' "$source"/drivers/transport || serial=rwk
+node_of() { # KIND OF DEVICE: its modes and place
   case $1 in
-    ttyS | ttyUSB | ttyACM | rfcomm) echo "/dev/${1}0" ;;
-    video4linux) echo /dev/video0 ;;
+    ttyS | ttyUSB | ttyACM | rfcomm) printf '%s\t/dev/%s0\n' $serial "$1" ;;
+    video4linux) printf 'rw\t/dev/video0\n' ;;
     *) echo "where the unit's devices of the kind $1 are, is not known here" ;;
   esac
 }
@@ -27,13 +30,16 @@ needs_of_the_unit() {
   setting 'Exec[A-Za-z]*' | grep -oE ' /[^ ]+' | sed 's/^ /r\t/'
   setting Environment | sed -n 's|^CYCLONEDDS_URI=file://|r\t|p'
   local kind
-  while read -r kind; do printf 'rw\t%s\n' "$(node_of "$kind")"; done \
+  while read -r kind; do node_of "$kind"; done \
     < <(setting DeviceAllow | sed -n 's/^char-\([^ ]*\) rw$/\1/p')
   [ "$(setting Type)" != notify ] || printf 'w\t/run/systemd/notify\n'
   # As the program makes them there: daemon/process/service_folder.hpp, daemon/checkpoint/checkpoint_file.hpp.
   printf 'rw\t%s\n' "$state"/{checkpoint,checkpoint.part,perimap-20261127-100000.mcap}
   printf 'rw\t%s\n' "$run/control"
   printf 'r\t%s/\n' "$state"
+  # A module that is loaded when it is needed: where it is installed, by drivers/video and deploy/CMakeLists.txt.
+  grep -q '^set(module_dir lib/perimap)$' "$source/deploy/CMakeLists.txt" || echo "where modules are, is not known here"
+  printf 'mr\t/usr/lib/perimap/libperimap_video.so\n'
 }
 # Names that udev makes stand for the nodes that they lead to, which is what AppArmor looks at.
 resolved() { sed -e 's|/dev/v4l/by-id/.*|/dev/video0|' -e 's|/dev/serial/by-id/.*|/dev/ttyUSB0|'; }
@@ -44,6 +50,7 @@ needs_of_the_configurations() {
       case $value in
         # A pseudo-terminal of `perimap emulate`: the service has a /tmp of its own.
         /tmp/*) ;;
+        /dev/tty* | /dev/serial/*) printf '%s\t%s\n' $serial "$(resolved <<< "$value")" ;;
         /dev/*) printf 'rw\t%s\n' "$(resolved <<< "$value")" ;;
         /*) printf 'rw\t%s\n' "$value" ;;
         # "from this file's folder"
@@ -95,13 +102,15 @@ faults_of() { # PROFILE
     /^  network [a-z0-9]+ [a-z]+,$/ { given[$2] = 1 }
     /^  [\/@][^ ]* [a-z]+,$/ {
       if ($1 ~ /{,/) print "an alternative that is empty means to one awk what it does not to another: " $1
-      used = 0
+      used = ""
       for (n = 1; n <= needs; n++) {
         if (needed[n] !~ expression($1)) continue
         allowed[n] = allowed[n] $2
-        used = 1
+        used = used modes[n]
       }
-      if (!used) print "nothing needs: " $1 " " $2
+      for (i = 1; i < length($2); i++) {
+        if (!index(used, substr($2, i, 1))) print "nothing needs: " $1 " " substr($2, i, 1)
+      }
     }
     END {
       for (n = 1; n <= needs; n++) {
@@ -132,5 +141,9 @@ done
 sed '/^  network can /d' "$profile" > "$work/profile"
 [ "$(faults_of "$work/profile")" = "it lacks: network can" ] || fail "it is the same without CAN"
 sed 's|^  network can raw,|&\n  /home/** r,|' "$profile" > "$work/profile"
-[ "$(faults_of "$work/profile")" = "nothing needs: /home/** r," ] || fail "a rule for /home is not noticed"
+[ "$(faults_of "$work/profile")" = "nothing needs: /home/** r" ] || fail "a rule for /home is not noticed"
+sed 's|^  /dev/ttyUSB.* rwk,|  /dev/ttyUSB[0-9]* rw,|' "$profile" > "$work/profile"
+faults_of "$work/profile" | grep -q "it lacks: /dev/ttyUSB0 k" || fail "that a line is locked is not noticed"
+sed 's|^  /dev/video.* rw,|  /dev/video[0-9]* rwm,|' "$profile" > "$work/profile"
+[ "$(faults_of "$work/profile")" = "nothing needs: /dev/video[0-9]* m" ] || fail "a mode too many is not noticed"
 echo "$(wc -l <<< "$needs") paths are allowed by ${#lines[@]} rules of which each is needed"

@@ -28,7 +28,7 @@ service_ready() {
   # Its AppArmor profile, with what an administrator would add for devices like the emulated ones.
   aa-enabled --quiet || fail "this kernel has no AppArmor"
   mkdir -p /etc/apparmor.d/local
-  echo '/dev/pts/[0-9]* rw,' > /etc/apparmor.d/local/perimapd
+  echo '/dev/pts/[0-9]* rwk,' > /etc/apparmor.d/local/perimapd
   apparmor_parser --replace --skip-cache /etc/apparmor.d/perimapd || fail "the profile can not be loaded"
 }
 
