@@ -16,6 +16,7 @@
   COMMAND(bridge)                 \
   COMMAND(report)                 \
   COMMAND(session)                \
+  COMMAND(export_view)            \
   COMMAND(ecg)                    \
   COMMAND(bench)                  \
   COMMAND(experiment)             \

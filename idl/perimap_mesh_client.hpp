@@ -9,6 +9,7 @@
 // Needs C++17, the C types that idlc makes of perimap.idl and perimap_mesh.idl, and nothing else. Units and clocks are
 // those of perimap_client.hpp. Functions keep nothing but what is in the PredictedMesh that they are given. Once that
 // has held a mesh of its size nothing is allocated.
+// Long: a program takes one header for a mesh, and needs no more.
 #pragma once
 
 #include <perimap_mesh.h>
@@ -282,14 +283,12 @@ inline MeshRefusal mesh_refusal(const perimap_SurfaceMesh& mesh, const perimap_S
   return MeshRefusal::kNone;
 }
 
-inline bool move_mesh(const perimap_SurfaceMesh& mesh, const perimap_SurfaceModel& model, std::int64_t t_ns,
-                      PredictedMesh& out) {
-  const perimap_CardiacCycle* cycle = cycle_at(model, t_ns);
-  Phase phase;
+// Moved by a phase that is known.
+inline bool move_mesh(const perimap_SurfaceMesh& mesh, const perimap_SurfaceModel& model, const Phase& phase,
+                      std::int64_t t_ns, PredictedMesh& out) {
   // A mesh that was made before breathing was known, or without it, is not moved by a model that has it.
-  if (cycle == nullptr || !well_formed(model) || !lengths_fit(mesh) ||
-      mesh.cardiac_harmonics != model.cardiac_harmonics || mesh.respiratory_harmonics != model.respiratory_harmonics ||
-      !phase_at(model.cardiac_clock, *cycle, t_ns, phase)) {
+  if (!well_formed(model) || !lengths_fit(mesh) || mesh.cardiac_harmonics != model.cardiac_harmonics ||
+      mesh.respiratory_harmonics != model.respiratory_harmonics) {
     return false;
   }
   take_mesh(mesh, out);
@@ -297,6 +296,48 @@ inline bool move_mesh(const perimap_SurfaceMesh& mesh, const perimap_SurfaceMode
   if (!move_vertices(mesh, bases_at(model, phase, t_ns), out)) return false;
   find_normals(out);
   return true;
+}
+
+inline bool move_mesh(const perimap_SurfaceMesh& mesh, const perimap_SurfaceModel& model, std::int64_t t_ns,
+                      PredictedMesh& out) {
+  const perimap_CardiacCycle* cycle = cycle_at(model, t_ns);
+  Phase phase;
+  return cycle != nullptr && phase_at(model.cardiac_clock, *cycle, t_ns, phase) &&
+         move_mesh(mesh, model, phase, t_ns, out);
+}
+
+inline bool move_mesh(const perimap_SurfaceMesh& mesh, const perimap_SurfaceModel& model,
+                      const perimap_Surface& surface, PredictedMesh& out) {
+  const Phase phase{surface.cardiac_phase_rad, surface.cardiac_phase_rate_rad_per_s,
+                    surface.cardiac_phase_deviation_rad};
+  return std::isfinite(phase.phase_rad) && std::isfinite(phase.rate_rad_per_s) && phase.deviation_rad >= 0.0 &&
+         std::isfinite(phase.deviation_rad) && move_mesh(mesh, model, phase, surface.valid_time_ns, out);
+}
+
+inline Refusal refusal_of(const perimap_Surface& surface, const perimap_SurfaceModel& model, std::int64_t now_ns,
+                          const Acceptance& acceptance) noexcept {
+  if (now_ns > surface.valid_until_ns || now_ns > model.valid_until_ns) return Refusal::kStale;
+  if (surface.state == perimap_SURFACE_GOOD) return Refusal::kNone;
+  if (surface.state == perimap_SURFACE_DEGRADED) return acceptance.degraded ? Refusal::kNone : Refusal::kDegraded;
+  return Refusal::kInvalid;
+}
+
+inline bool of_one_run(const perimap_Surface& surface, const perimap_SurfaceModel& model,
+                       const perimap_SurfaceMesh& mesh) noexcept {
+  return std::strncmp(surface.source, model.source, sizeof surface.source) == 0 &&
+         std::memcmp(surface.run_id, model.run_id, sizeof surface.run_id) == 0 &&
+         std::memcmp(surface.run_id, mesh.run_id, sizeof surface.run_id) == 0;
+}
+
+inline bool leave_empty(PredictedMesh& out) {
+  out.of_mesh.sample_sequence = 0;
+  out.positions_W_mm.clear();
+  out.velocities_W_mm_per_s.clear();
+  out.normals_W.clear();
+  out.deviations_mm.clear();
+  out.states.clear();
+  out.triangles.clear();
+  return false;
 }
 
 // The nearest point of a triangle, as shares of its corners.
@@ -372,15 +413,30 @@ inline bool predict(const perimap_SurfaceMesh& mesh, const perimap_SurfaceModel&
   if (out.refusal == MeshRefusal::kNone && !detail::move_mesh(mesh, model, t_ns, out)) {
     out.refusal = MeshRefusal::kMalformed;
   }
-  if (out.refusal == MeshRefusal::kNone) return true;
-  out.of_mesh.sample_sequence = 0;
-  out.positions_W_mm.clear();
-  out.velocities_W_mm_per_s.clear();
-  out.normals_W.clear();
-  out.deviations_mm.clear();
-  out.states.clear();
-  out.triangles.clear();
-  return false;
+  return out.refusal == MeshRefusal::kNone || detail::leave_empty(out);
+}
+
+// The surface at the instant of `surface`, whose phase of the heart is newer than the model's: for programs that show
+// each perimap::Surface as it comes. It is worth what that one is. The model tells the law and breathing. False when
+// refused, as above; `kModel` where the surface itself is refused, with its reason, and kOtherSource where the three
+// are not of one run.
+inline bool predict(const perimap_SurfaceMesh& mesh, const perimap_SurfaceModel& model, const perimap_Surface& surface,
+                    std::int64_t now_ns, Acceptance acceptance, PredictedMesh& out) {
+  out.state = surface.state;
+  out.reason = surface.reason;
+  out.model_refusal = detail::refusal_of(surface, model, now_ns, acceptance);
+  out.time_ns = surface.valid_time_ns;
+  out.mesh_reason = mesh.reason;
+  out.refusal = MeshRefusal::kModel;
+  if (out.model_refusal == Refusal::kNone) {
+    out.refusal = detail::of_one_run(surface, model, mesh)
+                      ? detail::mesh_refusal(mesh, model, surface.valid_time_ns, now_ns)
+                      : MeshRefusal::kOtherSource;
+  }
+  if (out.refusal == MeshRefusal::kNone && !detail::move_mesh(mesh, model, surface, out)) {
+    out.refusal = MeshRefusal::kMalformed;
+  }
+  return out.refusal == MeshRefusal::kNone || detail::leave_empty(out);
 }
 
 // Where a point (mm, W) that moves with `velocity_W_mm_per_s` is beside the surface, at the mesh's instant. It says

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <iterator>
 #include <limits>
 #include <numeric>
@@ -81,12 +80,6 @@ ShownMesh supported(const client::PredictedMesh& predicted) {
   return mesh;
 }
 
-template <class Other>
-bool of_one_run(const perimap_Surface& surface, const Other& other) {
-  return std::strncmp(surface.source, other.source, sizeof surface.source) == 0 &&
-         std::memcmp(surface.run_id, other.run_id, sizeof surface.run_id) == 0;
-}
-
 }  // namespace
 
 void SurfaceGate::forget() {
@@ -99,20 +92,11 @@ void SurfaceGate::show_mesh(const perimap_Surface& surface, Instant receipt, Sho
     shown.why_no_mesh = "no mesh has come yet";
     return;
   }
-  if (!of_one_run(surface, **model_) || !of_one_run(surface, **mesh_)) {
-    shown.why_no_mesh = "the mesh is of another run of perimapd";
-    return;
-  }
-  if (!client::predict(**mesh_, **model_, surface.valid_time_ns, to_ns(receipt), {true}, predicted_)) {
+  if (!client::predict(**mesh_, **model_, surface, to_ns(receipt), {true}, predicted_)) {
     shown.why_no_mesh = client::describe(predicted_);
     return;
   }
   shown.mesh = supported(predicted_);
-  // Its own verdict may be worse than the surface's: a beat that is due by then.
-  if (predicted_.state == perimap_SURFACE_DEGRADED && shown.state == perimap_SURFACE_GOOD) {
-    shown.state = perimap_SURFACE_DEGRADED;
-    shown.reason = predicted_.reason;
-  }
 }
 
 ShownSurface SurfaceGate::show(const perimap_Surface& surface, Instant receipt) {

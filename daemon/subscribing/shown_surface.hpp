@@ -34,7 +34,7 @@ struct ShownMesh {
 
 // One surface at its valid_time. Of one that is not usable all geometry is empty, whatever was published with it.
 struct ShownSurface {
-  perimap_SurfaceState state = perimap_SURFACE_INVALID;  // never better than the mesh's that is shown with it
+  perimap_SurfaceState state = perimap_SURFACE_INVALID;  // of features and mesh alike
   perimap_SurfaceReason reason = perimap_SURFACE_REASON_NONE;
   std::string why;  // why it is not good, for people; empty where it is
   std::string remedy;

@@ -73,6 +73,79 @@ TEST(MeshClient, PutsVerticesWhereTheSurfaceIs) {
   }
 }
 
+// As perimapd publishes it for that instant, if it knows no more than the model does.
+perimap_Surface surface_at(test::MadeMesh& made, Duration ahead) {
+  const perimap_SurfaceModel& model = made.model();
+  perimap_Surface surface{};
+  std::copy(std::begin(model.source), std::end(model.source), surface.source);
+  std::copy(std::begin(model.run_id), std::end(model.run_id), surface.run_id);
+  surface.state = perimap_SURFACE_GOOD;
+  surface.valid_time_ns = to_ns(made.now() + ahead);
+  surface.valid_until_ns = surface.valid_time_ns + 200'000'000;
+  const PhaseEstimate phase = made.clock().at(made.now() + ahead);
+  surface.cardiac_phase_rad = phase.phase_rad;
+  surface.cardiac_phase_rate_rad_per_s = phase.rate_rad_per_s;
+  return surface;
+}
+
+TEST(MeshClient, MovesTheMeshByASurfacesOwnPhaseAndIsWorthWhatThatIs) {
+  test::MadeMesh made;
+  const PredictedMesh by_model = predicted(made);
+  perimap_Surface surface = surface_at(made, milliseconds(80));
+  perimap_SurfaceModel model = made.model();
+  model.expected_until_ns = to_ns(made.now());  // it expects a beat that the surface knows of
+  PredictedMesh mesh;
+  const auto predict = [&] { return client::predict(made.mesh(), model, surface, to_ns(made.now()), {true}, mesh); };
+  ASSERT_TRUE(predict()) << describe(mesh);
+  EXPECT_EQ(mesh.state, perimap_SURFACE_GOOD);
+  ASSERT_EQ(mesh.positions_W_mm.size(), by_model.positions_W_mm.size());
+  for (std::size_t v = 0; v < mesh.positions_W_mm.size(); ++v) {
+    EXPECT_LT((vector(mesh.positions_W_mm[v]) - vector(by_model.positions_W_mm[v])).norm(), 1e-4);
+    EXPECT_LT((vector(mesh.normals_W[v]) - vector(by_model.normals_W[v])).norm(), 1e-4);
+  }
+  surface.cardiac_phase_rad += 1.0;
+  surface.state = perimap_SURFACE_DEGRADED;
+  surface.reason = perimap_SURFACE_REASON_POSE_MISSING;
+  ASSERT_TRUE(predict());
+  EXPECT_EQ(mesh.state, perimap_SURFACE_DEGRADED);
+  EXPECT_EQ(mesh.reason, perimap_SURFACE_REASON_POSE_MISSING);
+  const std::uint32_t v = inner_vertex(mesh);
+  EXPECT_GT((vector(mesh.positions_W_mm[v]) - vector(by_model.positions_W_mm[v])).norm(), 0.1);
+}
+
+TEST(MeshClient, IsRefusedWithTheSurfaceThatItIsShownWith) {
+  test::MadeMesh made;
+  struct Row {
+    std::function<void(perimap_Surface&)> change;
+    MeshRefusal refusal;
+    client::Refusal of_surface;
+  };
+  const double no_number = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<Row> rows = {
+      {[](auto& s) { s.state = perimap_SURFACE_INVALID; }, MeshRefusal::kModel, client::Refusal::kInvalid},
+      {[](auto& s) { s.state = static_cast<perimap_SurfaceState>(3); }, MeshRefusal::kModel, client::Refusal::kInvalid},
+      {[](auto& s) { s.state = perimap_SURFACE_DEGRADED; }, MeshRefusal::kModel, client::Refusal::kDegraded},
+      {[](auto& s) { s.valid_until_ns = 0; }, MeshRefusal::kModel, client::Refusal::kStale},
+      {[](auto& s) { s.source[0] ^= 1; }, MeshRefusal::kOtherSource, client::Refusal::kNone},
+      {[](auto& s) { s.run_id[3] ^= 1; }, MeshRefusal::kOtherSource, client::Refusal::kNone},
+      {[](auto& s) { s.valid_time_ns += 60'000'000'000; }, MeshRefusal::kStale, client::Refusal::kNone},
+      {[=](auto& s) { s.cardiac_phase_rad = no_number; }, MeshRefusal::kMalformed, client::Refusal::kNone},
+      {[=](auto& s) { s.cardiac_phase_rate_rad_per_s = no_number; }, MeshRefusal::kMalformed, client::Refusal::kNone},
+      {[](auto& s) { s.cardiac_phase_deviation_rad = -1.0; }, MeshRefusal::kMalformed, client::Refusal::kNone},
+  };
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    SCOPED_TRACE(i);
+    perimap_Surface surface = surface_at(made, milliseconds(80));
+    rows[i].change(surface);
+    PredictedMesh mesh;
+    EXPECT_FALSE(client::predict(made.mesh(), made.model(), surface, to_ns(made.now()), {}, mesh));
+    EXPECT_EQ(mesh.refusal, rows[i].refusal);
+    EXPECT_EQ(mesh.model_refusal, rows[i].of_surface);
+    EXPECT_TRUE(mesh.positions_W_mm.empty());
+    EXPECT_TRUE(mesh.triangles.empty());
+  }
+}
+
 TEST(MeshClient, TurnsNormalsToWhereTheCameraWas) {
   test::MadeMesh made;
   const PredictedMesh mesh = predicted(made);

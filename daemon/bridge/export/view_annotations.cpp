@@ -1,0 +1,99 @@
+#include "daemon/bridge/export/view_annotations.hpp"
+
+#include <fmt/format.h>
+
+#include "daemon/bridge/export/lent.hpp"
+#include "daemon/bridge/export/view_colours.hpp"
+#include "daemon/publishing/wire_names.hpp"
+#include "drivers/recording/foxglove_image.hpp"
+
+namespace perimap {
+namespace {
+
+constexpr double kCircle_px = 7.0;
+constexpr double kLine_px = 1.5;
+constexpr double kText_px = 14.0;
+constexpr foxglove_Point2 kWordsAt{6.0, 20.0};
+constexpr foxglove_Color kWhite{1.0, 1.0, 1.0, 1.0};
+constexpr foxglove_Color kBackground{0.0, 0.0, 0.0, 0.6};
+constexpr foxglove_Color kNone{0.0, 0.0, 0.0, 0.0};
+
+// Ours has its centre at integers.
+foxglove_Point2 pixel(const Vector2d& px) { return {px.x() + 0.5, px.y() + 0.5}; }
+
+}  // namespace
+
+void ViewAnnotations::add_words(const ShownSurface& shown, Instant utc) {
+  words_ = name_of(shown.state);
+  if (!shown.why.empty()) words_ += fmt::format(": {}", shown.why);
+  auto& text = texts_.emplace_back();
+  text.timestamp = to_foxglove_time(utc);
+  text.position = kWordsAt;
+  text.text = lent(words_);
+  text.font_size = kText_px;
+  text.text_color = shown.usable() ? colour_of(shown.state, 0.0) : kWhite;
+  text.background_color = kBackground;
+}
+
+void ViewAnnotations::add_features(const PictureProjector& project, Instant utc) {
+  for (const client::PredictedFeature& feature : features_.features) {
+    const auto px = project(feature.position_W_mm);
+    if (!px || feature.state == perimap_FEATURE_INVALID || !project.lens().contains(*px)) continue;
+    auto& circle = circles_.emplace_back();
+    circle.timestamp = to_foxglove_time(utc);
+    circle.position = pixel(*px);
+    circle.diameter = kCircle_px;
+    circle.thickness = kLine_px;
+    circle.fill_color = kNone;
+    circle.outline_color = colour_of(feature.state);
+  }
+}
+
+void ViewAnnotations::add_outline(const PictureProjector& project, const ShownSurface& shown, Instant utc) {
+  for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+    const auto& corners = mesh_.triangles[t];
+    for (std::size_t k = 0; k < 3; ++k) {
+      if ((mesh_.of_mesh.border_edges[t] >> k & 1U) == 0) continue;
+      const auto from = project(mesh_.positions_W_mm[corners[k]]);
+      const auto to = project(mesh_.positions_W_mm[corners[(k + 1) % 3]]);
+      if (!from || !to) continue;
+      outline_.push_back(pixel(*from));
+      outline_.push_back(pixel(*to));
+    }
+  }
+  if (outline_.empty()) return;
+  auto& lines = lines_.emplace_back();
+  lines.timestamp = to_foxglove_time(utc);
+  lines.type = foxglove_POINTS_LINE_LIST;
+  lend(outline_, lines.points);
+  lines.outline_color = colour_of(shown.state, 0.0);
+  lines.fill_color = kNone;
+  lines.thickness = kLine_px;
+}
+
+const foxglove_ImageAnnotations& ViewAnnotations::of(const perimap_Surface& surface, const ShownSurface& shown,
+                                                     const SurfaceGate& gate, const std::optional<CameraModel>& lens,
+                                                     Instant receipt, Instant utc) {
+  annotations_ = {};
+  circles_.clear();
+  lines_.clear();
+  outline_.clear();
+  texts_.clear();
+  add_words(shown, utc);
+  const perimap_SurfaceModel* model = gate.model();
+  if (shown.usable() && shown.X_WC && lens && model != nullptr) {
+    const PictureProjector project(surface, *lens);
+    const std::int64_t capture = surface.capture_time_ns;
+    if (client::predict(*model, capture, to_ns(receipt), {true}, features_)) add_features(project, utc);
+    if (!shown.mesh.triangles.empty() &&
+        client::predict(*gate.mesh(), *model, capture, to_ns(receipt), {true}, mesh_)) {
+      add_outline(project, shown, utc);
+    }
+  }
+  lend(circles_, annotations_.circles);
+  lend(lines_, annotations_.points);
+  lend(texts_, annotations_.texts);
+  return annotations_;
+}
+
+}  // namespace perimap
