@@ -2,12 +2,12 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <utility>
 
+#include "drivers/file/output_file.hpp"
 #include "drivers/recording/errno_text.hpp"
 
 namespace perimap {
@@ -72,9 +72,9 @@ class FileSink final : public ByteSink {
 
 Expected<std::unique_ptr<ByteSink>> create_file(const std::string& path, const std::string& told_as) {
   const std::string& name = told_as.empty() ? path : told_as;
-  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, S_IRUSR | S_IWUSR);
-  if (fd < 0) return fail(fmt::format("{}: cannot create: {}", name, errno_text(errno)));
-  return std::make_unique<FileSink>(fd, name);
+  const auto fd = open_output_file(path);
+  if (!fd) return fail(fmt::format("{}: cannot create: {}", name, fd.error()));
+  return std::make_unique<FileSink>(*fd, name);
 }
 
 }  // namespace perimap

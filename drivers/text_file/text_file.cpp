@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "core/error/one_line.hpp"
+#include "drivers/file/output_file.hpp"
 #include "drivers/file/regular_file.hpp"
 
 namespace perimap {
@@ -37,12 +38,14 @@ Expected<std::string> read_text_file(const std::filesystem::path& file, std::siz
 Expected<void> write_text_file(const std::filesystem::path& file, std::string_view text, WholeFile::Readers readers) {
   auto whole = WholeFile::create(file, WholeFile::Name::kPart, readers);
   if (!whole) return tl::unexpected(whole.error());
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(whole->path().c_str(), "wb"), &std::fclose);
+  const auto refuse = [&](std::string_view reason) {
+    return fail(on_one_line(fmt::format("{}: cannot be written: {}", file.string(), reason)));
+  };
+  const auto opened = open_output_file(whole->path());
+  if (!opened) return refuse(opened.error());
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(::fdopen(*opened, "wb"), &std::fclose);
   const bool written = stream && std::fwrite(text.data(), 1, text.size(), stream.get()) == text.size();
-  if (!written || std::fclose(stream.release()) != 0) {
-    return fail(
-        on_one_line(fmt::format("{}: cannot be written: {}", file.string(), std::generic_category().message(errno))));
-  }
+  if (!written || std::fclose(stream.release()) != 0) return refuse(std::generic_category().message(errno));
   return whole->finish();
 }
 

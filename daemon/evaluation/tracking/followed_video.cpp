@@ -1,6 +1,7 @@
 #include "daemon/evaluation/tracking/followed_video.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -14,6 +15,7 @@
 #include "core/following/video_tracker.hpp"
 #include "daemon/evaluation/tracking/frame_source.hpp"
 #include "daemon/evaluation/tracking/track_table.hpp"
+#include "drivers/file/output_file.hpp"
 #include "drivers/file/whole_file.hpp"
 #include "drivers/video/video_file.hpp"
 
@@ -96,7 +98,11 @@ class MarkedVideo {
     if (!writer_) {
       auto whole = WholeFile::create(path_, WholeFile::Name::kPartWithEnding);
       if (!whole) return tl::unexpected(whole.error());
+      // The writer would open a pipe that nobody reads from for ever; and the reader of one is to find it open.
+      const auto opened = open_output_file(whole->path());
+      if (!opened) return fail(path_ + ": cannot be written: " + opened.error());
       auto writer = VideoWriter::create(whole->path().string(), frame.grey.width, frame.grey.height, frames_per_s_);
+      ::close(*opened);
       if (!writer) return told(std::move(writer.error()), whole->path());
       whole_.emplace(std::move(*whole));
       writer_ = *std::move(writer);

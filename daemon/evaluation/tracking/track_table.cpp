@@ -6,12 +6,16 @@
 #include <system_error>
 #include <utility>
 
+#include "drivers/file/output_file.hpp"
+
 namespace perimap {
 
 Expected<TrackTable> TrackTable::create(const std::string& path) {
   auto whole = WholeFile::create(path);
   if (!whole) return tl::unexpected(whole.error());
-  File file(std::fopen(whole->path().c_str(), "w"));
+  const auto opened = open_output_file(whole->path());
+  if (!opened) return fail(path + ": cannot be written: " + opened.error());
+  File file(::fdopen(*opened, "w"));
   if (file == nullptr) return fail(path + ": cannot be written: " + std::generic_category().message(errno));
   fmt::print(file.get(), "frame,id,x,y,state\n");
   return TrackTable(path, std::move(*whole), std::move(file));

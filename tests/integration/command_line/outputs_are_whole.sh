@@ -44,6 +44,11 @@ ends 1 "--picture: none/x.png: cannot be written" "$perimap" report r.mcap --sam
 ends 1 "--video: none/x.mkv: cannot be written" "$perimap" track r.mcap --csv tracks.csv --video none/x.mkv
 ends 1 "none/x.mcap: cannot be written" "$perimap" replay --lockstep r.mcap --samples none/x.mcap
 ends 1 "none/x.mcap: cannot be written" "$perimap" watch --record none/x.mcap
+# An output that nobody reads is waited for by no command that only SIGKILL could end then.
+ends 1 "pipe: cannot create: a pipe that nobody reads from" "$perimap" replay --lockstep r.mcap --samples pipe
+ends 1 "pipe: cannot be written: a pipe that nobody reads from" "$perimap" replay --lockstep r.mcap --json pipe
+ends 1 "pipe: cannot create: a pipe that nobody reads from" "$perimap" watch --record pipe
+ends 1 "pipe: cannot be written: a pipe that nobody reads from" "$perimap" track r.mcap --csv pipe
 touch file
 ends 1 "file/sub" "$perimap" experiment 1 --trials 100000 --out file/sub
 [ ! -e tracks.csv ] || fail "a table of nothing"
