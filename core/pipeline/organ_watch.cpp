@@ -51,7 +51,7 @@ CameraPose wider(const CameraPose& pose, double shift_mm, double turn_rad) noexc
 }  // namespace
 
 CameraPose OrganWatch::pose_by_map(const CameraPose& told) noexcept {
-  told_ = told;
+  known_.told = told;
   if (!displaced() || !told.valid()) return told;
   CameraPose pose = told;
   const Pose X_MW = displacement().inverse();
@@ -61,7 +61,7 @@ CameraPose OrganWatch::pose_by_map(const CameraPose& told) noexcept {
   return pose;
 }
 
-double OrganWatch::search_deviation_mm() const noexcept { return frames_lost_ > 0 ? kLost_mm : 0.0; }
+double OrganWatch::search_deviation_mm() const noexcept { return displaced_.frames_lost > 0 ? kLost_mm : 0.0; }
 
 void OrganWatch::count_sight(std::span<FeatureGroup> groups, Instant capture) noexcept {
   int expected = 0;
@@ -74,23 +74,23 @@ void OrganWatch::count_sight(std::span<FeatureGroup> groups, Instant capture) no
     }
   }
   const bool lost = expected >= kFewestExpected && 2 * agreeing < expected;
-  frames_lost_ = lost ? frames_lost_ + 1 : 0;
+  displaced_.frames_lost = lost ? displaced_.frames_lost + 1 : 0;
   if (agreeing < kFewestSeen) return;
   // Whoever moved it meanwhile was not seen.
-  if (seen_ && capture - *seen_ > kOutOfSight) {
+  if (known_.seen && capture - *known_.seen > kOutOfSight) {
     evidence_.clear();
-    unproven_ = true;
+    known_.unproven = true;
   }
-  seen_ = capture;
+  known_.seen = capture;
 }
 
 void OrganWatch::watch(ImagePhase& image, std::span<FeatureGroup> groups, const FrameRecord& frame) noexcept {
-  if (frame.stamp.capture - judged_ > kRestIsOld) resting_.reset();
+  if (frame.stamp.capture - displaced_.judged > kRestIsOld) displaced_.resting.reset();
   if (!frame.measurable) return;
   count_sight(groups, frame.stamp.capture);
   CameraPose told = frame.pose;
-  told.position_variance_mm2 = told_.position_variance_mm2;
-  told.rotation_variance_rad2 = told_.rotation_variance_rad2;
+  told.position_variance_mm2 = known_.told.position_variance_mm2;
+  told.rotation_variance_rad2 = known_.told.rotation_variance_rad2;
   CameraPose tracker = wider(told, kLeastTracker_mm, kLeastTracker_rad);
   // Breathing that is not known is an error of the pose too.
   tracker.position_variance_mm2 += frame.respiration.deviation_mm * frame.respiration.deviation_mm;
@@ -99,27 +99,27 @@ void OrganWatch::watch(ImagePhase& image, std::span<FeatureGroup> groups, const 
   if (frame.phase.ectopic || frame.phase.deviation_s > kUnsurePhase_s) return;
   const ImagePhase::Together together = image.together(groups, frame, searched, model_, estimator_);
   if (!together.told) return;
-  if (!pivoted_) pivot_W_mm_ = together.centre_W_mm;
-  pivoted_ = true;
-  surface_.centre_mm = together.centre_W_mm - pivot_W_mm_;
-  surface_.spread_mm = std::max(together.spread_mm, 5.0);
-  surface_.map_variance_mm2 = together.map_variance_mm2 + kLeastMap_mm * kLeastMap_mm;
+  if (!known_.pivoted) known_.pivot_W_mm = together.centre_W_mm;
+  known_.pivoted = true;
+  known_.surface.centre_mm = together.centre_W_mm - known_.pivot_W_mm;
+  known_.surface.spread_mm = std::max(together.spread_mm, 5.0);
+  known_.surface.map_variance_mm2 = together.map_variance_mm2 + kLeastMap_mm * kLeastMap_mm;
   const auto& s = together.estimate;
   DisplacementEvidence evidence = displacement_evidence(
       s.s.head<kPoseUnknowns>(), s.covariance.topLeftCorner<kPoseUnknowns, kPoseUnknowns>(),
-      camera_error_covariance(searched), camera_error_covariance(tracker), frame.pose.X_WC, pivot_W_mm_);
+      camera_error_covariance(searched), camera_error_covariance(tracker), frame.pose.X_WC, known_.pivot_W_mm);
   // Against the map where it was learnt.
-  if (displaced()) evidence.g += evidence.W * d_;
+  if (displaced()) evidence.g += evidence.W * displaced_.d;
   evidence_.add(frame.stamp.capture, evidence);
   judge(frame.stamp.capture);
 }
 
 void OrganWatch::look_for_displacement(Instant now) noexcept {
   for (std::size_t window = 0; window < CommonDisplacement::kWindows.size(); ++window) {
-    const MeanDisplacement mean = evidence_.mean(window, now, surface_);
+    const MeanDisplacement mean = evidence_.mean(window, now, known_.surface);
     if (!mean.told || mean.chi2 < (window == 0 ? kWithinABeat : 1.0) * kDoubt_chi2 || mean.size_mm < kDoubt_mm)
       continue;
-    displaced_since_ = now - CommonDisplacement::kWindows[window] - std::chrono::milliseconds(500);
+    displaced_.since = now - CommonDisplacement::kWindows[window] - std::chrono::milliseconds(500);
     return;
   }
 }
@@ -127,16 +127,16 @@ void OrganWatch::look_for_displacement(Instant now) noexcept {
 void OrganWatch::judge(Instant now) noexcept {
   if (!displaced()) look_for_displacement(now);
   if (!displaced()) {
-    unproven_ = unproven_ && !evidence_.mean(kProofWindow, now, surface_).told;
+    known_.unproven = known_.unproven && !evidence_.mean(kProofWindow, now, known_.surface).told;
     return;
   }
-  const MeanDisplacement newest = evidence_.mean(kFollowedWindow, now, surface_);
+  const MeanDisplacement newest = evidence_.mean(kFollowedWindow, now, known_.surface);
   if (newest.told) {
-    d_ = newest.d;
-    size_mm_ = newest.size_mm;
+    displaced_.d = newest.d;
+    displaced_.size_mm = newest.size_mm;
   }
   const bool back = std::all_of(std::begin(kBackWindows), std::end(kBackWindows), [&](std::size_t window) {
-    const MeanDisplacement mean = evidence_.mean(window, now, surface_);
+    const MeanDisplacement mean = evidence_.mean(window, now, known_.surface);
     return mean.told && mean.size_mm < kBack_mm && mean.chi2 < kBack_chi2;
   });
   if (back) {
@@ -147,45 +147,37 @@ void OrganWatch::judge(Instant now) noexcept {
 }
 
 void OrganWatch::look_for_rest(Instant now) noexcept {
-  judged_ = now;
-  resting_.reset();
+  displaced_.judged = now;
+  displaced_.resting.reset();
   // Seconds that began before it was moved tell of neither place.
-  if (now - *displaced_since_ < CommonDisplacement::kWindows[kBeforeRestWindow] + std::chrono::seconds(1)) return;
-  const MeanDisplacement rest = evidence_.mean(kRestWindow, now, surface_);
+  if (now - *displaced_.since < CommonDisplacement::kWindows[kBeforeRestWindow] + std::chrono::seconds(1)) return;
+  const MeanDisplacement rest = evidence_.mean(kRestWindow, now, known_.surface);
   if (!rest.told || rest.deviation_mm > kRest_mm) return;
-  const Pose X = perimap::displaced(rest.d, pivot_W_mm_);
-  const Vector3d centre_W_mm = pivot_W_mm_ + surface_.centre_mm;
+  const Pose X = perimap::displaced(rest.d, known_.pivot_W_mm);
+  const Vector3d centre_W_mm = known_.pivot_W_mm + known_.surface.centre_mm;
   // What moves is elsewhere within a longer time, and what has begun to within a shorter one.
   for (const std::size_t window : {kBeforeRestWindow, kFollowedWindow}) {
-    const MeanDisplacement other = evidence_.mean(window, now, surface_);
+    const MeanDisplacement other = evidence_.mean(window, now, known_.surface);
     if (!other.told) return;
-    const double moved_mm = (X * centre_W_mm - perimap::displaced(other.d, pivot_W_mm_) * centre_W_mm).norm();
+    const double moved_mm = (X * centre_W_mm - perimap::displaced(other.d, known_.pivot_W_mm) * centre_W_mm).norm();
     if (moved_mm > kRestsWithin_deviations * std::max(rest.deviation_mm, other.deviation_mm)) return;
   }
-  resting_ = {X, rest.size_mm, rest.deviation_mm};
+  displaced_.resting = {X, rest.size_mm, rest.deviation_mm};
 }
 
 void OrganWatch::begin_anew() noexcept {
   settle();
-  unproven_ = true;
+  known_.unproven = true;
 }
 
 void OrganWatch::forget() noexcept {
   settle();
-  told_ = {};
-  pivoted_ = false;
-  surface_ = {};
-  seen_.reset();
-  unproven_ = false;
+  known_ = {};
 }
 
 void OrganWatch::settle() noexcept {
-  displaced_since_.reset();
-  d_.setZero();
-  size_mm_ = 0.0;
-  resting_.reset();
+  displaced_ = {};
   evidence_.clear();
-  frames_lost_ = 0;
 }
 
 }  // namespace perimap

@@ -49,19 +49,19 @@ class OrganWatch {
   // When a frame's matches are settled and no worker learns.
   void watch(ImagePhase& image, std::span<FeatureGroup> groups, const FrameRecord& frame) noexcept;
 
-  [[nodiscard]] bool displaced() const noexcept { return displaced_since_.has_value(); }
+  [[nodiscard]] bool displaced() const noexcept { return displaced_.since.has_value(); }
   // Nothing has told since the map was moved, or out of sight, that the organ is where the map has it.
-  [[nodiscard]] bool unproven() const noexcept { return unproven_; }
+  [[nodiscard]] bool unproven() const noexcept { return known_.unproven; }
   // Captures from this one on are not to be learnt from; none: all are.
-  [[nodiscard]] const std::optional<Instant>& displaced_since() const noexcept { return displaced_since_; }
+  [[nodiscard]] const std::optional<Instant>& displaced_since() const noexcept { return displaced_.since; }
   // Maps the map's points to where they are now.
-  [[nodiscard]] Pose displacement() const noexcept { return perimap::displaced(d_, pivot_W_mm_); }
+  [[nodiscard]] Pose displacement() const noexcept { return perimap::displaced(displaced_.d, known_.pivot_W_mm); }
 
   // Where it is, once that is told well, by the last seconds, in which it has not moved.
-  [[nodiscard]] const std::optional<RestingOrgan>& resting() const noexcept { return resting_; }
+  [[nodiscard]] const std::optional<RestingOrgan>& resting() const noexcept { return displaced_.resting; }
 
   // By how much, root mean square over the features; 0 where it is not.
-  [[nodiscard]] double size_mm() const noexcept { return size_mm_; }
+  [[nodiscard]] double size_mm() const noexcept { return displaced_.size_mm; }
 
   // The map has been moved with the organ.
   void begin_anew() noexcept;
@@ -79,18 +79,26 @@ class OrganWatch {
   const EstimatorSettings& estimator_;
   CommonDisplacement evidence_;
 
-  CameraPose told_;  // of the frame at hand
-  bool pivoted_ = false;
-  Vector3d pivot_W_mm_ = Vector3d::Zero();
-  DisplacedSurface surface_;
-  Vector6d d_ = Vector6d::Zero();
-  double size_mm_ = 0.0;
-  std::optional<Instant> displaced_since_;
-  std::optional<RestingOrgan> resting_;
-  Instant judged_;       // the capture that resting_ goes up to
-  int frames_lost_ = 0;  // in a row, of which most of the map was not found where it is
-  std::optional<Instant> seen_;
-  bool unproven_ = false;
+  // Of this map.
+  struct Known {
+    CameraPose told;  // of the frame at hand
+    bool pivoted = false;
+    Vector3d pivot_W_mm = Vector3d::Zero();
+    DisplacedSurface surface;
+    std::optional<Instant> seen;
+    bool unproven = false;
+  };
+  // Since the organ was last where the map has it.
+  struct Displaced {
+    Vector6d d = Vector6d::Zero();
+    double size_mm = 0.0;
+    std::optional<Instant> since;
+    std::optional<RestingOrgan> resting;
+    Instant judged;       // the capture that `resting` goes up to
+    int frames_lost = 0;  // in a row, of which most of the map was not found where it is
+  };
+  Known known_;
+  Displaced displaced_;
 };
 
 }  // namespace perimap
