@@ -14,8 +14,8 @@
 // both of them go on; nor for a second after perimapd has said itself that there are two. A topic that is heard for the
 // first time is listened to by itself.
 //
-// A false publisher that is alone from the beginning can not be told from a true one by this, nor one that forges DDS' own
-// identities (GUIDs) below DDS: for that there is DDS Security.
+// A false publisher that is alone from the beginning can not be told from a true one by this, nor one that forges DDS'
+// own identities (GUIDs) below DDS: for that there is DDS Security.
 #pragma once
 
 #include <perimap.h>
@@ -121,7 +121,7 @@ class PublisherWatch {
       return known && std::memcmp(run.data(), sender.run_id, run.size()) == 0 &&
              (writer == 0 || writer == sender.writer);
     }
-    void take(const Sender& sender, std::int64_t now_ns) noexcept {
+    void hear(const Sender& sender, std::int64_t now_ns) noexcept {
       std::memcpy(run.data(), sender.run_id, run.size());
       writers[sender.topic] = sender.writer;
       heard_ns = now_ns;
@@ -212,7 +212,7 @@ class PublisherWatch {
     }
     // Whoever knows the run can be the first to send in a topic of it.
     if (current_.writers[sender.topic] == 0) topic_since_ns_[sender.topic] = now_ns;
-    current_.take(sender, now_ns);
+    current_.hear(sender, now_ns);
     if (!follows(sender.topic, place, now_ns) || !plausible_by_itself) {
       if (why_not_ != Hearing::kTwoPublishers || state(now_ns) == Hearing::kUse) why_not_ = Hearing::kImplausible;
       alone_since_ns_ = now_ns;

@@ -33,7 +33,7 @@ void HeldTurn::forget() noexcept {
   readings_ = 0.0;
 }
 
-std::optional<TurnReading> HeldTurn::take(const TurnReading& reading) noexcept {
+std::optional<TurnReading> HeldTurn::hold(const TurnReading& reading) noexcept {
   if (readings_ > 0.0) {
     const double ahead_rad = turn_between(reading.rotation_rad, held_.rotation_rad);
     lead_rad_ += (std::clamp(ahead_rad, -kSame_rad, kSame_rad) - lead_rad_) / kReadingsInMean;

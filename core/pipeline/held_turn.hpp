@@ -16,7 +16,7 @@ class HeldTurn {
   explicit HeldTurn(double common_share) noexcept : common_share_(common_share) {}
 
   // One frame's. None: it agrees with nothing yet.
-  [[nodiscard]] std::optional<TurnReading> take(const TurnReading& reading) noexcept;
+  [[nodiscard]] std::optional<TurnReading> hold(const TurnReading& reading) noexcept;
   // What was read so far says nothing any more.
   void forget() noexcept;
 

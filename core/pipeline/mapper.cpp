@@ -170,7 +170,7 @@ void Mapper::find_features(const FrameRecord& frame) noexcept {
 void Mapper::hand_on(const FrameRecord& frame, const GreyImage& image, const ColourImage& colour) noexcept {
   settle_matches(frame);
   stopwatch_.matches_settled();
-  watcher_.take(*history_, slots_, bank_);
+  watcher_.keep(*history_, slots_, bank_);
   intake_.offer(frame, image, colour, room());
   trust_.offer(frame, image);
   keeping_.fill_feed(phases_.breathing(), phases_.heart(), counters_.maps_ended());

@@ -47,15 +47,15 @@ void ScopeTurn::give_up() noexcept {
 }
 
 void ScopeTurn::look(const GreyImage& picture) noexcept {
-  take(stop_ ? read_notch_near(picture, *stop_, near_rad_) : std::nullopt);
+  follow(stop_ ? read_notch_near(picture, *stop_, near_rad_) : std::nullopt);
 }
 
-void ScopeTurn::take(const std::optional<TurnReading>& reading) noexcept {
+void ScopeTurn::follow(const std::optional<TurnReading>& reading) noexcept {
   state_.reset();
   seen_ = reading;
   if (!reading || !stop_) return;
   near_rad_ = reading->rotation_rad;
-  const auto held = held_.take(*reading);
+  const auto held = held_.hold(*reading);
   if (!held) return;
   near_rad_ = held->rotation_rad;
   state_ = states_.at(*held, stop_->radius_px);

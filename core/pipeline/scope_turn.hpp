@@ -19,7 +19,7 @@ class ScopeTurn {
   // `lens`: as calibrated.
   ScopeTurn(const TurnedScope& scope, const CameraModel& lens) : states_(scope, lens) {}
 
-  // Of a picture some frames ago, in which take() was given `seen_then`. True when what was seen then was another
+  // Of a picture some frames ago, in which follow() was given `seen_then`. True when what was seen then was another
   // thing: the frames since were told a wrong turn.
   bool adopt(const FieldStopReading& reading, const std::optional<TurnReading>& seen_then) noexcept;
   // No whole reading for so long that the circle is not to be trusted any more.
@@ -27,9 +27,9 @@ class ScopeTurn {
 
   // One frame's picture, or what was read in it: none where no notch was.
   void look(const GreyImage& picture) noexcept;
-  void take(const std::optional<TurnReading>& reading) noexcept;
+  void follow(const std::optional<TurnReading>& reading) noexcept;
 
-  // Of the frame that was taken last.
+  // Of the frame that was followed last.
   [[nodiscard]] const std::optional<ScopeState>& state() const noexcept { return state_; }
   [[nodiscard]] const std::optional<TurnReading>& seen() const noexcept { return seen_; }
   // How often it was known to be turned or zoomed otherwise than before.

@@ -97,10 +97,10 @@ std::optional<std::uint64_t> ScopeWatch::adopt(std::uint64_t frame_index) noexce
   if (due && !done) counters_.adoptions_late.add();
   if (!done) return std::nullopt;
   // One that came late is lost, and makes room for the next.
-  return due ? take(reading_) : std::nullopt;
+  return due ? adopt_reading(reading_) : std::nullopt;
 }
 
-std::optional<std::uint64_t> ScopeWatch::take(const std::optional<FieldStopReading>& reading) noexcept {
+std::optional<std::uint64_t> ScopeWatch::adopt_reading(const std::optional<FieldStopReading>& reading) noexcept {
   failed_ = reading ? 0 : failed_ + 1;
   if (!turn_) {
     if (reading) unchanged_.read(*reading);

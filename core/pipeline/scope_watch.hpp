@@ -53,7 +53,7 @@ class ScopeWatch {
  private:
   [[nodiscard]] bool calibrated() const noexcept { return turn_ || sensed_; }
   [[nodiscard]] std::optional<std::uint64_t> adopt(std::uint64_t frame_index) noexcept;
-  [[nodiscard]] std::optional<std::uint64_t> take(const std::optional<FieldStopReading>& reading) noexcept;
+  [[nodiscard]] std::optional<std::uint64_t> adopt_reading(const std::optional<FieldStopReading>& reading) noexcept;
   void count(const Frame& frame) noexcept;
 
   int width_;

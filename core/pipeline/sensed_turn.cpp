@@ -101,7 +101,7 @@ std::optional<SensedTurn::Reading> SensedTurn::read(Instant capture) const noexc
 std::optional<ScopeState> SensedTurn::at(Instant capture) noexcept {
   const auto reading = read(capture);
   if (!reading) return std::nullopt;
-  auto held = held_.take(reading->own);
+  auto held = held_.hold(reading->own);
   if (!held) return std::nullopt;
   held->deviation_rad = std::sqrt(held->deviation_rad * held->deviation_rad + reading->lasting_variance_rad2);
   return states_.at(*held, 0.0);

@@ -39,7 +39,7 @@ SetupWatcher::SetupWatcher(const PipelineSettings& settings)
   chosen_.reserve(seen_.size());
 }
 
-void SetupWatcher::take(const FrameHistory& history, std::span<const FeatureSlot> slots, const MapBank& bank) noexcept {
+void SetupWatcher::keep(const FrameHistory& history, std::span<const FeatureSlot> slots, const MapBank& bank) noexcept {
   const FrameRecord& frame = *history.newest();
   window_.tell(history);
   window_.add(frame, slots);

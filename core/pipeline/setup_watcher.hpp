@@ -23,7 +23,7 @@ namespace perimap {
 
 // A round: the features that have most matches in the window are copied here with them, judged, and the verdict is
 // adopted a stated number of frames after the round began; where it is not there by then, at the first frame that has
-// it, but never so in lockstep. One round at a time. take(), adopt() and what voids frames belong to the mapper,
+// it, but never so in lockstep. One round at a time. keep(), adopt() and what voids frames belong to the mapper,
 // serve() to the housekeeping thread.
 class SetupWatcher {
  public:
@@ -33,7 +33,7 @@ class SetupWatcher {
 
   // Mapper, once a frame, when its matches are believed and no worker learns: keeps them, and begins a round when one
   // is due.
-  void take(const FrameHistory& history, std::span<const FeatureSlot> slots, const MapBank& bank) noexcept;
+  void keep(const FrameHistory& history, std::span<const FeatureSlot> slots, const MapBank& bank) noexcept;
   // Mapper, once a frame before that: what a round has come to, at the frame stated when it began.
   void adopt(const FrameRecord& frame) noexcept;
   // Mapper, before adopt(): the phases of completed cycles are told by another law, or breathing otherwise. What is

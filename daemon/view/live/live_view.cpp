@@ -57,7 +57,7 @@ LiveView::~LiveView() {
 }
 
 template <class T, class Use>
-void LiveView::take(dds::Reader<T>& reader, Use use) {
+void LiveView::hear(dds::Reader<T>& reader, Use use) {
   const Expected<dds::Loan<T>> loan = reader.take();
   if (!loan) {
     if (!std::exchange(failing_, true)) say_(loan.error().message);
@@ -83,14 +83,14 @@ void LiveView::receive() {
   pthread_setname_np(pthread_self(), "view");
   while (readers_.wait_set.wait()) {
     // Models and meshes first: a surface is told with the newest.
-    take(readers_.models, [this](const perimap_SurfaceModel& model, std::uint64_t publisher, const auto*) {
-      if (auto copy = copy_of(model)) publishers_[publisher].teller.take(std::move(*copy));
+    hear(readers_.models, [this](const perimap_SurfaceModel& model, std::uint64_t publisher, const auto*) {
+      if (auto copy = copy_of(model)) publishers_[publisher].teller.hear(std::move(*copy));
     });
-    take(readers_.meshes, [this](const perimap_SurfaceMesh& mesh, std::uint64_t publisher, const auto*) {
-      if (auto copy = copy_of(mesh)) publishers_[publisher].teller.take(std::move(*copy));
+    hear(readers_.meshes, [this](const perimap_SurfaceMesh& mesh, std::uint64_t publisher, const auto*) {
+      if (auto copy = copy_of(mesh)) publishers_[publisher].teller.hear(std::move(*copy));
     });
     const Instant receipt = MonotonicClock::now();
-    take(readers_.surfaces, [&](const perimap_Surface& surface, std::uint64_t publisher, const perimap_Surface* next) {
+    hear(readers_.surfaces, [&](const perimap_Surface& surface, std::uint64_t publisher, const perimap_Surface* next) {
       publishers_[publisher].heard = receipt;
       const auto verdict = followed_.surface(publisher, surface.stream, receipt);
       {
@@ -104,10 +104,10 @@ void LiveView::receive() {
       const bool same_next = next != nullptr && next->state == surface.state && next->reason == surface.reason;
       if (!same_next) tell(surface, publisher, receipt);
     });
-    take(readers_.phases, [this](const perimap_Phase& phase, std::uint64_t publisher, const auto*) {
+    hear(readers_.phases, [this](const perimap_Phase& phase, std::uint64_t publisher, const auto*) {
       if (followed_.follows(publisher) && server_.pages() > 0) send(text_message(phase_json(phase)));
     });
-    take(readers_.statuses, [this](const perimap_Status& status, std::uint64_t publisher, const auto*) {
+    hear(readers_.statuses, [this](const perimap_Status& status, std::uint64_t publisher, const auto*) {
       if (!followed_.follows(publisher, status.stream)) return;
       server_.post([this, message = text_message(status_message_json(status))] {
         status_ = message;

@@ -59,7 +59,7 @@ class LiveView final : public PageHandler {
   void receive();
   // Gives each sample with its publisher and whether it is the last of those that have come.
   template <class T, class Use>
-  void take(dds::Reader<T>& reader, Use use);
+  void hear(dds::Reader<T>& reader, Use use);
   void count(const perimap_Surface& surface, std::uint64_t publisher, Instant receipt);
   void tell(const perimap_Surface& surface, std::uint64_t publisher, Instant receipt);
   void follow_anew(const perimap_Surface& surface);

@@ -16,8 +16,8 @@ namespace perimap {
 // Keeps the newest model and mesh of one perimapd, and moves the mesh to the instant of each surface. One thread.
 class SurfaceTeller {
  public:
-  void take(Sample<perimap_SurfaceModel> model) { model_.emplace(std::move(model)); }
-  void take(Sample<perimap_SurfaceMesh> mesh) { mesh_.emplace(std::move(mesh)); }
+  void hear(Sample<perimap_SurfaceModel> model) { model_.emplace(std::move(model)); }
+  void hear(Sample<perimap_SurfaceMesh> mesh) { mesh_.emplace(std::move(mesh)); }
   // Another instant of a recording: both are to come anew.
   void forget();
   // Null: none has come.

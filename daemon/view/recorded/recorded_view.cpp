@@ -162,9 +162,9 @@ void RecordedView::use(RecordingPlayer& player, const RecordedMessage& message, 
   if (message.channel == channels::kSurface) {
     if (auto surface = reader.decode<perimap_Surface>(message)) use_surface(std::move(*surface), message.arrival, told);
   } else if (message.channel == channels::kSurfaceModel) {
-    if (auto model = reader.decode<perimap_SurfaceModel>(message)) teller_.take(std::move(*model));
+    if (auto model = reader.decode<perimap_SurfaceModel>(message)) teller_.hear(std::move(*model));
   } else if (message.channel == channels::kSurfaceMesh) {
-    if (auto mesh = reader.decode<perimap_SurfaceMesh>(message)) teller_.take(std::move(*mesh));
+    if (auto mesh = reader.decode<perimap_SurfaceMesh>(message)) teller_.hear(std::move(*mesh));
   } else if (message.channel == channels::kPhase) {
     const auto phase = reader.decode<perimap_Phase>(message);
     if (phase && states_.stream == (*phase)->stream) told.push_back(phase_json(**phase));

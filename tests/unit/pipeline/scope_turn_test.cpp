@@ -42,11 +42,11 @@ struct Turned : ::testing::Test {
     return reading;
   }
   bool frame(double deg) {
-    turn.take(TurnReading{deg * kDegree, kRead_rad});
+    turn.follow(TurnReading{deg * kDegree, kRead_rad});
     return turn.state().has_value();
   }
   bool unread() {
-    turn.take(std::nullopt);
+    turn.follow(std::nullopt);
     return turn.state().has_value();
   }
 };
