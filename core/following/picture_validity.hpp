@@ -19,7 +19,6 @@ enum class RegionFault : std::uint8_t {
   kStained,  // darker than usual and without its contrast: blood, which takes the green light
   kBlurred   // as bright as usual and without its contrast: a wet or a dirty lens, wiping
 };
-inline constexpr std::size_t kRegionFaults = 6;
 
 // Each region is held against what it usually shows: its mean and its contrast, over the last seconds in which it was
 // seen. The camera moves on, so that what it usually shows follows after a while whatever it shows now.

@@ -25,8 +25,7 @@ class EcgLevels {
   [[nodiscard]] double quiet() const noexcept { return quiet_level_; }                  // energy
   [[nodiscard]] double top_energy() const noexcept { return top(energies_, energy_); }  // of the largest complexes
   [[nodiscard]] double top_sharpness() const noexcept { return top(sharpnesses_, sharpness_); }
-  // Nothing can be seen, for the line is too rough, from then to then; of the last such stretch.
-  [[nodiscard]] Instant rough_since() const noexcept { return rough_since_; }
+  // Nothing can be seen, for the line is too rough; of the last such stretch, and its end.
   [[nodiscard]] Instant rough_until() const noexcept { return rough_until_; }
   [[nodiscard]] bool rough(Instant t) const noexcept { return t > rough_since_ && t < rough_until_; }
   // The line has been several times as rough as usual for longer than a QRS complex, however small that is beside it.

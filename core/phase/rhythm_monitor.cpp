@@ -20,8 +20,6 @@ constexpr double kUsualSurprise = 0.08;
 
 void RhythmMonitor::clear() noexcept {
   count_ = 0;
-  entropy_ = 0.0;
-  surprise_ = 0.0;
   predictor_ = RrPredictor();
   rhythm_ = Rhythm::kUnknown;
 }
@@ -49,7 +47,8 @@ void RhythmMonitor::push(Seconds rr) noexcept {
   }
   const double mean = sum / count_;
   const int scored = std::min(count_, std::max(predictor_.count() - kWarm, 1));
-  surprise_ = std::sqrt(squares / scored) / mean;
+  // Root mean square of the errors of predicting each interval from those before it.
+  const double surprise = std::sqrt(squares / scored) / mean;
 
   // Pairs of similar intervals, and those of them whose successors are similar as well.
   double tolerance = kTolerance_s;
@@ -68,10 +67,12 @@ void RhythmMonitor::push(Seconds rr) noexcept {
     if (followed >= kLeastMatches || tolerance > mean) break;
     tolerance *= kWiden;
   }
-  entropy_ = std::log(static_cast<double>(similar) / std::max(followed, 1)) + std::log(2.0 * tolerance / mean);
+  // Coefficient of sample entropy, natural logarithm.
+  const double entropy =
+      std::log(static_cast<double>(similar) / std::max(followed, 1)) + std::log(2.0 * tolerance / mean);
   const bool was = rhythm_ == Rhythm::kUnpredictable;
   const bool unpredictable =
-      entropy_ > (was ? kPredictableFrom : kUnpredictableFrom) && surprise_ > (was ? kUsualSurprise : kLeastSurprise);
+      entropy > (was ? kPredictableFrom : kUnpredictableFrom) && surprise > (was ? kUsualSurprise : kLeastSurprise);
   rhythm_ = unpredictable ? Rhythm::kUnpredictable : Rhythm::kPredictable;
 }
 

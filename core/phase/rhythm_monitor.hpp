@@ -33,19 +33,12 @@ class RhythmMonitor {
   void clear() noexcept;
 
   [[nodiscard]] Rhythm rhythm() const noexcept { return rhythm_; }
-  // Coefficient of sample entropy of the window, natural logarithm; 0 while the rhythm is unknown.
-  [[nodiscard]] double entropy() const noexcept { return entropy_; }
-  // Root mean square of the errors of predicting each interval of the window from those before it, to the mean
-  // interval.
-  [[nodiscard]] double surprise() const noexcept { return surprise_; }
 
  private:
   std::array<double, kWindow> rr_s_{};  // oldest first
   std::array<double, kWindow> error_s_{};
   int count_ = 0;
   RrPredictor predictor_;
-  double entropy_ = 0.0;
-  double surprise_ = 0.0;
   Rhythm rhythm_ = Rhythm::kUnknown;
 };
 

@@ -46,10 +46,11 @@ EvidenceSupport::EvidenceSupport(std::vector<Vector2d> places) : places_(std::mo
   for (const Vector2d& place : places_) distances.push_back(third_nearest(places_, place));
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   std::nth_element(distances.begin(), middle, distances.end());
-  spacing_mm_ = *middle;
-  reach_mm_ = std::clamp(kReach * spacing_mm_, 8.0, 20.0);
-  margin_mm_ = std::clamp(kMargin * spacing_mm_, 1.0, 8.0);
-  edge_mm_ = std::clamp(kEdge * spacing_mm_, 1.0, 3.0);
+  // The middle distance of the third nearest.
+  const double spacing_mm = *middle;
+  reach_mm_ = std::clamp(kReach * spacing_mm, 8.0, 20.0);
+  margin_mm_ = std::clamp(kMargin * spacing_mm, 1.0, 8.0);
+  edge_mm_ = std::clamp(kEdge * spacing_mm, 1.0, 3.0);
 }
 
 double EvidenceSupport::nearest_mm(const Vector2d& s) const {

@@ -29,7 +29,6 @@ class EvidenceSupport {
   // near. How the surface goes on there is a guess.
   [[nodiscard]] double beyond_mm(const Vector2d& s) const;
 
-  [[nodiscard]] double spacing_mm() const noexcept { return spacing_mm_; }  // the middle distance of the third nearest
   [[nodiscard]] double reach_mm() const noexcept { return reach_mm_; }
   // Beyond the last features: so far at most, and so far in any case.
   [[nodiscard]] double margin_mm() const noexcept { return margin_mm_; }
@@ -41,7 +40,6 @@ class EvidenceSupport {
   [[nodiscard]] bool is_beyond(const Vector2d& s) const;
 
   std::vector<Vector2d> places_;
-  double spacing_mm_ = 0.0;
   double reach_mm_ = 0.0;
   double margin_mm_ = 0.0;
   double edge_mm_ = 0.0;

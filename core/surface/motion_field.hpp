@@ -34,8 +34,6 @@ class MotionField {
                                                       const Kernels& kernels, bool learn);
 
   [[nodiscard]] const Kernels& kernels() const noexcept { return kernels_; }
-  [[nodiscard]] double noise_scale_across() const noexcept { return across_.scale; }
-  [[nodiscard]] double noise_scale_along() const noexcept { return along_.scale; }
 
   struct Prediction {
     Eigen::MatrixXd across_mm;   // V x 4 B, as in ChartedMotion

@@ -69,9 +69,6 @@ class DeviceFeeder final : public SensorFeeder {
   [[nodiscard]] const std::optional<Error>& error() const noexcept override;
   [[nodiscard]] std::vector<Error> damage() const override;
 
-  [[nodiscard]] const DeviceHealth& tracker_health() const noexcept { return tracker_health_; }
-  [[nodiscard]] const DeviceHealth& ecg_health() const noexcept { return ecg_health_; }
-  [[nodiscard]] const DeviceHealth& camera_health() const noexcept { return camera_health_; }
   // Null when nothing is recorded.
   [[nodiscard]] const SessionRecorder* recorder() const noexcept { return recording_.recorder.get(); }
 

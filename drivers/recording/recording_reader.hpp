@@ -53,8 +53,6 @@ class RecordingReader {
 
   // Starts over and gives only messages of these channels. Fails when there is no channel of such a name.
   [[nodiscard]] Expected<void> select(std::span<const std::string_view> channel_names);
-  // Starts over and gives all messages.
-  void select_all() { mcap_.select(std::nullopt); }
 
   // Goes on near there: with the first chunk that has a message that arrived then or later.
   void seek(Instant arrival) { mcap_.seek(static_cast<std::uint64_t>(std::max<std::int64_t>(to_ns(arrival), 0))); }

@@ -18,7 +18,6 @@ struct HeartMesh {
   std::vector<double> coefficients_mm;   // per vertex: axis x, y, z: DC, a_1..a_H, b_1..b_H
   std::vector<std::uint32_t> triangles;  // vertex indices, three a triangle, outward side counter-clockwise
 
-  [[nodiscard]] std::size_t triangle_count() const noexcept { return triangles.size() / 3; }
   [[nodiscard]] std::size_t coefficients_per_axis() const noexcept { return 1 + 2 * std::size_t{harmonics}; }
 };
 

@@ -28,17 +28,17 @@ std::vector<Vector3d> positions(const HeartMesh& mesh, double phase) {
 TEST(HeartMesh, HoldsTheWholeEpicardium) {
   const HeartMesh mesh = epicardium();
   EXPECT_EQ(mesh.vertex_count, 2502U);
-  EXPECT_EQ(mesh.triangle_count(), 4864U);
+  EXPECT_EQ(mesh.triangles.size(), 3 * 4864U);
   EXPECT_EQ(mesh.harmonics, 4U);
 }
 
 TEST(HeartMesh, TrianglesAreOrientedAlikeAndOutward) {
   const HeartMesh mesh = epicardium();
   std::set<std::pair<std::uint32_t, std::uint32_t>> edges;
-  for (std::size_t t = 0; t < mesh.triangle_count(); ++t)
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += 3)
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto from = mesh.triangles[3 * t + i];
-      const auto to = mesh.triangles[3 * t + (i + 1) % 3];
+      const auto from = mesh.triangles[t + i];
+      const auto to = mesh.triangles[t + (i + 1) % 3];
       EXPECT_TRUE(edges.emplace(from, to).second) << "edge " << from << " -> " << to << " is walked twice the same way";
     }
   // Outward: the volume between the surface and a point inside is positive at every phase.
