@@ -50,7 +50,7 @@ template <class MakeFeeder>
 Outcome run_session(const Console& console, const std::string& configuration_file, const Configuration& given,
                     const Configuration& configuration, const PipelineSettings& settings, const Identity& identity,
                     Signals& signals, const MakeFeeder& make_feeder) {
-  const Logging logging(console.name(), configuration.log.level);
+  Logging logging(console.name(), configuration.log.level);
   if (!configuration.dds.enabled) {
     return refuse(told_in(configuration_file, {{"dds.enabled", "expected true, since nothing else publishes"}}),
                   ExitCode::kWrongUsage);
@@ -78,8 +78,9 @@ Outcome run_session(const Console& console, const std::string& configuration_fil
 
   Pipeline pipeline(settings);
   ConfigurationReload reload(configuration_file, given);
-  LiveSession session(pipeline, runtime, **publication, make_feeder(pipeline.entrance()), [&expiry] {
+  LiveSession session(pipeline, runtime, **publication, make_feeder(pipeline.entrance()), [&] {
     if (const auto line = expiry.next(seconds_now())) spdlog::warn("{}", *line);
+    if (const auto line = logging.next_loss()) spdlog::error("{}", *line);
   });
   ServiceManager service;
   session.report_to(service);

@@ -64,7 +64,7 @@ int run_program(const std::string& name, const std::string& version, const std::
                 const std::function<void(Command&)>& add_options, const Commands::Run& run, int argc,
                 const char* const* argv) {
   CLI::App app(description, name);
-  app.set_version_flag("--version", version);
+  app.set_version_flag("--version", name + " " + version);
   Command options(app);
   add_options(options);
   if (const auto ended = parse_arguments(app, argc, argv)) return *ended;

@@ -78,6 +78,11 @@ Logging::~Logging() { spdlog::shutdown(); }
 
 void Logging::set_level(LogConfiguration::Level level) { spdlog::set_level(to_spdlog(level)); }
 
-std::size_t Logging::overruns() const { return spdlog::thread_pool()->overrun_counter(); }
+std::optional<std::string> Logging::next_loss() {
+  const std::size_t dropped = spdlog::thread_pool()->overrun_counter();
+  const std::size_t more = dropped - std::exchange(told_, dropped);
+  if (more == 0) return std::nullopt;
+  return std::to_string(more) + " lines of this log were dropped, since standard error takes them too slowly";
+}
 
 }  // namespace perimap

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
+#include <string>
 #include <string_view>
 
 #include "daemon/config/configuration.hpp"
@@ -24,8 +26,11 @@ class Logging {
   // Any thread.
   static void set_level(LogConfiguration::Level level);
 
-  // Lines dropped so far.
-  [[nodiscard]] std::size_t overruns() const;
+  // A line for the log when lines were dropped since this was asked last. One thread.
+  [[nodiscard]] std::optional<std::string> next_loss();
+
+ private:
+  std::size_t told_ = 0;  // dropped lines
 };
 
 }  // namespace perimap

@@ -137,3 +137,4 @@ many.toml:6:1: key 'ecg.port'" ] || fail "not all that is wrong, in its order: $
 "$perimap" check 2>/dev/null
 [ $? -eq 2 ] || fail "wrong usage must end with 2"
 "$perimap" --version | grep -q '^perimap [0-9]' || fail "no version"
+"$perimapd" --version | grep -q '^perimapd [0-9]' || fail "perimapd: no version"

@@ -7,7 +7,9 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <optional>
 #include <string>
+#include <thread>
 
 namespace perimap {
 namespace {
@@ -19,14 +21,46 @@ using ::testing::Not;
 TEST(Logging, WritesTheLevelsAskedForAndLeavesTheOthersOut) {
   ::testing::internal::CaptureStderr();
   {
-    const Logging logging("perimapd", LogConfiguration::Level::kWarning);
+    Logging logging("perimapd", LogConfiguration::Level::kWarning);
     spdlog::info("unheard");
     spdlog::warn("camera {} gone", 3);
-    EXPECT_EQ(logging.overruns(), 0U);
+    EXPECT_FALSE(logging.next_loss());
   }
   const std::string output = ::testing::internal::GetCapturedStderr();
   EXPECT_THAT(output, MatchesRegex("perimapd: [-0-9]+ [0-9:.]+ warning: camera 3 gone\n"));
   EXPECT_THAT(output, Not(HasSubstr("unheard")));
+}
+
+// Standard error that takes nothing: a pipe that nobody reads from.
+TEST(Logging, TellsOnceHowManyLinesWereDropped) {
+  constexpr int kLines = 10'000;  // more than the queue and the pipe hold
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  const int standard_error = dup(STDERR_FILENO);
+  ASSERT_EQ(dup2(ends[1], STDERR_FILENO), STDERR_FILENO);
+  close(ends[1]);
+  std::optional<std::string> first, second;
+  std::thread reader;
+  {
+    Logging logging("perimapd", LogConfiguration::Level::kInfo);
+    for (int i = 0; i < kLines; ++i) spdlog::info("line {}", i);
+    first = logging.next_loss();
+    second = logging.next_loss();
+    reader = std::thread([&] {
+      char taken[4096];
+      while (read(ends[0], taken, sizeof taken) > 0) {
+      }
+    });
+  }
+  dup2(standard_error, STDERR_FILENO);  // the last of the pipe's writers
+  reader.join();
+  close(standard_error);
+  close(ends[0]);
+  ASSERT_TRUE(first);
+  EXPECT_THAT(*first,
+              MatchesRegex("[0-9]+ lines of this log were dropped, since standard error takes them too slowly"));
+  EXPECT_GT(std::stoi(*first), kLines - 8000);
+  EXPECT_FALSE(second);
 }
 
 TEST(Logging, MarksSeverityWhenStandardErrorIsTheJournal) {
