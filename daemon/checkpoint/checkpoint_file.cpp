@@ -397,6 +397,8 @@ Expected<Checkpoint> parse_checkpoint_body(std::string_view body) {
   return checkpoint;
 }
 
+// Not a WholeFile, which leaves a name that is taken to whoever took it: this is written again every few seconds, and
+// what a killed process leaves beside it, a patient's, is to be overwritten by the next one or found by remove_file().
 Expected<void> replace_file(const std::filesystem::path& file, std::string_view bytes) {
   const std::filesystem::path part = part_of(file);
   const auto failed = [&part](std::string_view what) {

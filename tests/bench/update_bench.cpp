@@ -276,7 +276,6 @@ void bench_updates(int harmonics) {
       (void)iterated_update(scalar, scene.observation(frame++, 0), test::kPixelModel, settings);
     }
   });
-#ifdef PERIMAP_BENCH_CERES
   std::vector<Observation> window;
   for (int i = 0; i < kWindow; ++i) window.push_back(scene.observation(i, 0));
   StateVector x = scene.estimates[0].x;
@@ -284,7 +283,6 @@ void bench_updates(int harmonics) {
     x(0) += 0.1;
     (void)window_solution(x, scene.estimates[0], window, test::kPixelModel);
   });
-#endif
   Fed<double> one(scene, 1, 0);
   Fed<double> one_settled(scene, 1, 0);
   one_settled.settings = UpdateSettings{};
@@ -427,9 +425,6 @@ int main() {
   using namespace perimap;
   using namespace perimap::bench;
   print_machine(PERIMAP_REVISION);
-#ifndef PERIMAP_BENCH_CERES
-  std::printf("Ceres was not found at configure time (libceres-dev): its row is left out.\n");
-#endif
   for (const int harmonics : {3, 5, 8, 10}) bench_updates(harmonics);
   std::printf(
       "\nOne frame at H = 5, 3 iterations an update; 60 fps leave 16.7 ms. The daemon's worst frame: %d learnt phases "
