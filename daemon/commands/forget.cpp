@@ -1,7 +1,7 @@
 // `perimap forget`: recordings and checkpoints that are older than they may be kept.
 #include <fmt/format.h>
 
-#include <filesystem>
+#include <chrono>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,34 +21,17 @@ struct ForgetOptions {
 Outcome forget(const ForgetOptions& options, const Console& console) {
   const auto age = parse_age(options.older_than);
   if (!age) return refuse(Error{"--older-than: " + age.error().message}, ExitCode::kWrongUsage);
-  std::size_t gone = 0;
-  std::uintmax_t bytes = 0;
-  bool failed = false;
-  for (const std::string& folder : options.folders) {
-    const auto found = old_files(folder, *age, std::filesystem::file_time_type::clock::now());
-    if (!found) {
-      console.complain(found.error());
-      failed = true;
-      continue;
-    }
-    for (const OldFile& file : *found) {
-      if (!options.dry) {
-        if (const auto removed = remove_old(file); !removed) {
-          console.complain(removed.error());
-          failed = true;
-          continue;
-        }
-      }
-      ++gone;
-      bytes += file.bytes;
-      fmt::print("{}{} ({:.1f} MB, {} days old)\n", options.dry ? "would remove " : "removed ", file.path.string(),
-                 static_cast<double>(file.bytes) / 1e6,
-                 std::chrono::duration_cast<std::chrono::days>(file.age).count());
-    }
-    if (!options.dry) synchronise_folder(folder);
-  }
-  fmt::print("{} files, {:.1f} MB{}\n", gone, static_cast<double>(bytes) / 1e6, options.dry ? " would be removed" : "");
-  if (failed) return refuse("");
+  const Forgotten forgotten = forget_old(
+      options.folders, *age, options.dry,
+      [&](const OldFile& file) {
+        fmt::print("{}{} ({:.1f} MB, {} days old)\n", options.dry ? "would remove " : "removed ", file.path.string(),
+                   static_cast<double>(file.bytes) / 1e6,
+                   std::chrono::duration_cast<std::chrono::days>(file.age).count());
+      },
+      [&](const Error& error) { console.complain(error); });
+  fmt::print("{} files, {:.1f} MB{}\n", forgotten.files, static_cast<double>(forgotten.bytes) / 1e6,
+             options.dry ? " would be removed" : "");
+  if (forgotten.failed) return refuse("");
   return {};
 }
 

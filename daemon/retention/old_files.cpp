@@ -72,6 +72,35 @@ Expected<void> remove_old(const OldFile& file) {
   return {};
 }
 
+Forgotten forget_old(const std::vector<std::string>& folders, std::chrono::seconds age, bool dry,
+                     const std::function<void(const OldFile&)>& tell,
+                     const std::function<void(const Error&)>& complain) {
+  Forgotten forgotten;
+  const auto fault = [&](const Error& error) {
+    complain(error);
+    forgotten.failed = true;
+  };
+  for (const std::string& folder : folders) {
+    const auto found = old_files(folder, age, fs::file_time_type::clock::now());
+    if (!found) {
+      fault(found.error());
+      continue;
+    }
+    for (const OldFile& file : *found) {
+      const auto removed = dry ? Expected<void>() : remove_old(file);
+      if (!removed) {
+        fault(removed.error());
+        continue;
+      }
+      ++forgotten.files;
+      forgotten.bytes += file.bytes;
+      tell(file);
+    }
+    if (!dry) synchronise_folder(folder);
+  }
+  return forgotten;
+}
+
 void synchronise_folder(const fs::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,18 @@ struct OldFile {
                                                        std::filesystem::file_time_type now);
 
 [[nodiscard]] Expected<void> remove_old(const OldFile& file);
+
+struct Forgotten {
+  std::size_t files = 0;
+  std::uintmax_t bytes = 0;
+  bool failed = false;  // something could not be read or removed, which `complain` was given
+};
+
+// Removes what old_files() finds in each of the folders, and makes sure that it is gone; `dry`: only counts it. `tell`
+// is given each file that is gone, or would be; a fault ends neither the folder nor the others.
+Forgotten forget_old(const std::vector<std::string>& folders, std::chrono::seconds age, bool dry,
+                     const std::function<void(const OldFile&)>& tell,
+                     const std::function<void(const Error&)>& complain);
 
 // What the folder lists is on the disk: what was removed is gone, also when the machine stops right after.
 void synchronise_folder(const std::filesystem::path& folder);

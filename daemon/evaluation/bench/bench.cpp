@@ -15,6 +15,14 @@ const std::vector<int> kCosts = {50, 100, 200, 500, 1000, 2000, 5000};
 
 }  // namespace
 
+std::set<std::string> chosen_parts(const std::vector<std::string>& only, bool security) {
+  std::set<std::string> parts(only.begin(), only.end());
+  if (security) parts.insert(kSecurityPart);
+  if (parts.empty()) parts.insert(kParts.begin(), kParts.end());
+  if (parts.contains("ddsperf")) parts.insert("live");
+  return parts;
+}
+
 std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_realtime) {
   std::vector<LiveCase> cases;
   const auto add = [&](const std::string& part, const std::string& name, int priority, const auto& change) {

@@ -22,6 +22,10 @@ inline const std::vector<std::string> kParts = {"live", "ddsperf", "subscribers"
 // Run when it is asked for: it needs Cyclone's security plugins.
 inline constexpr const char* kSecurityPart = "security";
 
+// Of `only`, where any are named; else all, or with security that part alone. What another part is held beside comes
+// with it.
+[[nodiscard]] std::set<std::string> chosen_parts(const std::vector<std::string>& only, bool security);
+
 struct BenchSettings {
   BenchInput input;
   std::set<std::string> parts;  // of kParts, and kSecurityPart

@@ -11,12 +11,11 @@
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/command_line/outputs.hpp"
+#include "daemon/evaluation/bench/bench_keys.hpp"
 #include "daemon/evaluation/bench/bench_text.hpp"
 #include "daemon/evaluation/bench/own_network.hpp"
 #include "daemon/evaluation/bench/scratch_folder.hpp"
 #include "daemon/evaluation/bench/subscriber.hpp"
-#include "daemon/keys/authority.hpp"
-#include "daemon/keys/key_folder.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "drivers/text_file/text_file.hpp"
@@ -38,21 +37,6 @@ struct BenchOptions {
   std::string html;
 };
 
-// An authority for this benchmark alone, with keys for those who take part.
-Expected<void> make_keys(const std::filesystem::path& scratch, bench::BenchInput& input) {
-  const std::chrono::sys_seconds now = seconds_now();
-  const Validity validity{now - std::chrono::minutes(5), now + std::chrono::days(1)};
-  auto authority = Authority::create(scratch / "keys", "perimap bench", validity);
-  if (!authority) return tl::unexpected(authority.error());
-  auto publisher = authority->issue(KeyRole::kPublisher, "publisher", validity, false);
-  if (!publisher) return tl::unexpected(publisher.error());
-  auto subscriber = authority->issue(KeyRole::kDisplay, "subscriber", validity, false);
-  if (!subscriber) return tl::unexpected(subscriber.error());
-  input.publisher_keys = std::move(*publisher);
-  input.subscriber_keys = std::move(*subscriber);
-  return {};
-}
-
 Outcome measure(const BenchOptions& options, const Console& console) {
   const std::string& recording = options.settings.input.recording;
   if (auto apart =
@@ -71,19 +55,14 @@ Outcome measure(const BenchOptions& options, const Console& console) {
   const Logging logging(console.name(), LogConfiguration::Level::kError);
 
   bench::BenchSettings settings = options.settings;
-  if (options.security) settings.parts.insert(bench::kSecurityPart);
-  if (!options.security || !options.only.empty()) {
-    const std::vector<std::string>& chosen = options.only.empty() ? bench::kParts : options.only;
-    settings.parts.insert(chosen.begin(), chosen.end());
-  }
-  if (settings.parts.contains("ddsperf")) settings.parts.insert("live");  // it is held beside those
+  settings.parts = bench::chosen_parts(options.only, options.security);
   if (!options.configuration.empty()) settings.input.configuration = options.configuration;
   settings.input.domain = kDomain;
   settings.input.settle = from_seconds(options.settle);
   settings.input.measure = from_seconds(options.seconds);
   settings.input.scratch = scratch->path();
   if (options.security) {
-    if (const auto made = make_keys(scratch->path(), settings.input); !made) return refuse(made.error());
+    if (const auto made = bench::make_keys(settings.input); !made) return refuse(made.error());
   }
   const auto report = bench::run_bench(settings, *stop, [&](int number, int all, const std::string& name) {
     console.complain(fmt::format("{:3}/{} {}", number, all, name));

@@ -2,22 +2,21 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/evaluation/watch/sample_receiver.hpp"
 #include "daemon/evaluation/watch/watch_report.hpp"
+#include "daemon/evaluation/watch/watch_run.hpp"
 #include "daemon/keys/key_folder.hpp"
 #include "daemon/process/stop_signal.hpp"
 
 namespace perimap {
 namespace {
-
-// How soon the end of a watch (its limit, its duration, its wait) is noticed. Signals are noticed at once.
-constexpr Duration kSlice = std::chrono::milliseconds(20);
-constexpr Duration kReportInterval = std::chrono::seconds(1);
 
 struct WatchOptions {
   int domain = 0;
@@ -50,29 +49,6 @@ void print_interval(const WatchOptions& options, const std::vector<StreamReport>
   }
 }
 
-// Until a signal, a limit or an error ends it.
-void print_until_ended(const WatchOptions& options, StopSignal& stop, SampleReceiver& receiver) {
-  const Instant start = MonotonicClock::now();
-  std::optional<Instant> first;  // when the first surface was seen
-  Instant last_report = start;
-  while (!stop.wait_for(kSlice) && !receiver.ended()) {
-    const Instant now = MonotonicClock::now();
-    if (!first && receiver.surfaces() > 0) {
-      first = now;
-    }
-    if (!first && options.wait_s > 0 && now - start >= from_seconds(options.wait_s)) {
-      return;
-    }
-    if (now - last_report >= kReportInterval && !options.once) {
-      print_interval(options, receiver.take_interval(now - last_report));
-      last_report = now;
-    }
-    if (first && options.duration_s > 0 && now - *first >= from_seconds(options.duration_s)) {
-      return;
-    }
-  }
-}
-
 Outcome watch(const WatchOptions& options, const Console& console) {
   if (options.security) {
     const auto keys = check_keys(*options.security, seconds_now());
@@ -98,7 +74,10 @@ Outcome watch(const WatchOptions& options, const Console& console) {
   }
   SampleReceiver receiver(std::move(*readers), std::move(recorder),
                           {options.once ? 1 : options.surfaces, options.once && options.json});
-  print_until_ended(options, *stop, receiver);
+  std::function<void(const std::vector<StreamReport>&)> tell;
+  if (!options.once) tell = [&](const std::vector<StreamReport>& reports) { print_interval(options, reports); };
+  const auto limit = [](double seconds) { return seconds > 0.0 ? std::optional(from_seconds(seconds)) : std::nullopt; };
+  watch_until_ended(receiver, *stop, {limit(options.wait_s), limit(options.duration_s)}, tell);
   const Expected<void> finished = receiver.finish();
 
   for (const StreamReport& report : receiver.totals()) {

@@ -1,7 +1,4 @@
 // `perimap register`: where the tracker's frame is in the image's.
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -11,7 +8,7 @@
 #include "daemon/setup/commands/live_capture.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
-#include "daemon/setup/recorded_poses.hpp"
+#include "daemon/setup/model_landmarks.hpp"
 #include "daemon/setup/setup_plots.hpp"
 #include "daemon/setup/setup_report.hpp"
 #include "daemon/setup/touch_guide.hpp"
@@ -41,51 +38,14 @@ struct RegisterOptions {
   }
 };
 
-// Of each landmark of the model, in the order of the table, where the tip was held still.
-SetupExpected<std::vector<NamedPoint>> touched_in_recording(const RegisterOptions& options,
-                                                            const std::vector<NamedPoint>& model) {
-  if (options.tip.empty()) {
-    return wrong_setup("--tip: expected the file of the pointer's tip that perimap calibrate tool --output wrote");
-  }
-  const auto tip = read_tool_tip(options.tip);
-  if (!tip) return tl::unexpected(tip.error());
-  const auto poses = read_recorded_poses(options.recording, options.tool);
-  if (!poses) return tl::unexpected(poses.error());
-  const TouchedPoints touched = touched_points(*poses, tip->tip_T, model, options.touch);
-  if (touched.landmarks_W) return *touched.landmarks_W;
-  std::string when;
-  for (const Dwell& touch : touched.touches) {
-    when += fmt::format("{}{:.1f}", when.empty() ? " at " : ", ", touch.begin_s - poses->front().t_s);
-  }
-  return fail(fmt::format(
-      "{}: {} touches of {:g} s and more are found{} s, and {} has {} landmarks: touch each once, in the "
-      "order of the table, hold the tip still for two seconds, and lift it in between",
-      options.recording, touched.touches.size(), options.touch.shortest_s, when, options.model, model.size()));
-}
-
 SetupExpected<std::vector<Landmark>> landmarks_of(const RegisterOptions& options) {
   if (options.touched.empty() == options.recording.empty()) {
     return wrong_setup(
         "expected either touched landmarks with --touched or a recording of the touches with --from, or "
         "--live");
   }
-  const auto model = read_point_table(options.model, options.common.length_unit());
-  if (!model) return tl::unexpected(model.error());
-  using Touched = SetupExpected<std::vector<NamedPoint>>;
-  const auto touched = options.recording.empty()
-                           ? Touched(read_point_table(options.touched, options.common.length_unit()))
-                           : touched_in_recording(options, *model);
-  if (!touched) return tl::unexpected(touched.error());
-  std::vector<Landmark> landmarks;
-  for (const NamedPoint& point : *touched) {
-    const auto found =
-        std::find_if(model->begin(), model->end(), [&](const NamedPoint& p) { return p.name == point.name; });
-    if (found == model->end()) {
-      return fail(fmt::format("{}: landmark '{}' is not in {}", options.touched, point.name, options.model));
-    }
-    landmarks.push_back({point.name, found->p, point.p});
-  }
-  return landmarks;
+  return read_landmarks({options.model, options.common.length_unit(), options.touched, options.recording, options.tool,
+                         options.tip, options.touch});
 }
 
 SetupExpected<Measurement> measure(const RegisterOptions& options) {

@@ -1,12 +1,9 @@
 // `perimap setup`: a configuration for the devices that are there.
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <charconv>
 #include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -21,6 +18,7 @@
 #include "daemon/probe/probe_report.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/setup/attached_devices.hpp"
+#include "daemon/setup/device_choice.hpp"
 #include "daemon/setup/first_configuration.hpp"
 #include "daemon/setup/kept_result.hpp"
 
@@ -36,13 +34,8 @@ struct SetupOptions {
   double seconds = 3.0;
 };
 
-struct Choice {
-  std::string value;  // as the option takes it
-  std::string what;   // as it is shown
-};
-
 // One of the choices by its number, or what is typed; empty at the end of the input, and for 0.
-std::string ask(const std::string& question, const std::vector<Choice>& choices) {
+std::string ask(const std::string& question, const std::vector<DeviceChoice>& choices) {
   fmt::print("{}\n  0: none\n", question);
   for (std::size_t i = 0; i < choices.size(); ++i) fmt::print("  {}: {}\n", i + 1, choices[i].what);
   fmt::print("A number, or what else it is [{}]: ", choices.empty() ? 0 : 1);
@@ -58,71 +51,37 @@ std::string ask(const std::string& question, const std::vector<Choice>& choices)
   return line;
 }
 
-std::vector<Choice> camera_choices() {
-  std::vector<Choice> choices;
-  for (const std::string& path : attached_cameras()) choices.push_back({"v4l2:" + path, path});
-  return choices;
-}
-
-// Those whose name suggests the kind first, then all other ports as each of the protocols.
-std::vector<Choice> port_choices(const std::vector<std::string>& protocols, std::string AttachedPort::*guess,
-                                 bool only_guessed) {
-  std::vector<Choice> choices;
-  const std::vector<AttachedPort> ports = attached_ports();
-  for (const AttachedPort& port : ports) {
-    if (!(port.*guess).empty()) {
-      choices.push_back({port.*guess + "=" + port.path, fmt::format("{} at {}", port.*guess, port.path)});
-    }
-  }
-  for (const AttachedPort& port : ports) {
-    if (only_guessed || !(port.*guess).empty()) continue;
-    for (const std::string& protocol : protocols) {
-      choices.push_back({protocol + "=" + port.path, fmt::format("{} at {}", protocol, port.path)});
-    }
-  }
-  return choices;
-}
-
-Expected<void> split(const std::string& option, const std::string& text, const std::vector<std::string>& protocols,
-                     std::string& protocol, std::string& port) {
-  if (text.empty() || text == "none") return {};
-  const std::size_t equals = text.find('=');
-  protocol = text.substr(0, equals);
-  if (equals == std::string::npos || equals + 1 == text.size() ||
-      std::find(protocols.begin(), protocols.end(), protocol) == protocols.end()) {
-    return fail(
-        fmt::format("{}: expected PROTOCOL=PORT with a protocol of {}, such as {}=tcp:192.168.1.10:8765, got "
-                    "'{}'",
-                    option, fmt::join(protocols, ", "), protocols.front(), text));
-  }
-  port = text.substr(equals + 1);
-  return {};
-}
-
-const std::vector<std::string> kTrackers{"ndi", "igtl"};
-const std::vector<std::string> kEcgs{"cyton", "bitalino", "medlab", "can"};
-
 // What was given; else, at a terminal, what is asked, and elsewhere the only one that is plausible.
 Expected<SetupAnswers> answers_of(const SetupOptions& options, bool interactive) {
-  const auto chosen = [&](const std::string& given, const std::string& question, const std::vector<Choice>& all,
-                          const std::vector<Choice>& plausible) {
+  const auto chosen = [&](const std::string& given, const std::string& question, const std::vector<DeviceChoice>& all,
+                          const std::vector<DeviceChoice>& plausible) {
     if (!given.empty()) return given == "none" ? std::string() : given;
     if (interactive) return ask(question, all);
     return plausible.size() == 1 ? plausible.front().value : std::string();
   };
   SetupAnswers answers;
-  const auto cameras = camera_choices();
+  const auto cameras = camera_choices(attached_cameras());
   answers.camera = chosen(options.camera, "Which is the scope's camera?", cameras, cameras);
   answers.calibration = options.calibration;
-  const std::string tracker =
-      chosen(options.tracker, "Which is the tracker? (ndi=PORT, or igtl=tcp:HOST:18944)",
-             port_choices(kTrackers, &AttachedPort::tracker, false), port_choices({}, &AttachedPort::tracker, true));
-  const std::string ecg =
-      chosen(options.ecg, "Which is the ECG device? (cyton=PORT, bitalino=PORT, medlab=PORT, can=can:INTERFACE)",
-             port_choices(kEcgs, &AttachedPort::ecg, false), port_choices({}, &AttachedPort::ecg, true));
-  return split("--tracker", tracker, kTrackers, answers.tracker_protocol, answers.tracker_port)
-      .and_then([&] { return split("--ecg", ecg, kEcgs, answers.ecg_protocol, answers.ecg_port); })
-      .map([&] { return answers; });
+  const std::vector<AttachedPort> ports = attached_ports();
+  const auto port = [&](const std::string& given, const std::string& question, std::string AttachedPort::*guess,
+                        const std::vector<std::string>& protocols) {
+    return chosen(given, question, port_choices(ports, guess, protocols), port_choices(ports, guess, {}));
+  };
+  const std::string tracker_text = port(options.tracker, "Which is the tracker? (ndi=PORT, or igtl=tcp:HOST:18944)",
+                                        &AttachedPort::tracker, kTrackerProtocols);
+  const std::string ecg_text =
+      port(options.ecg, "Which is the ECG device? (cyton=PORT, bitalino=PORT, medlab=PORT, can=can:INTERFACE)",
+           &AttachedPort::ecg, kEcgProtocols);
+  const auto tracker = parse_named_port("--tracker", tracker_text, kTrackerProtocols);
+  if (!tracker) return tl::unexpected(tracker.error());
+  const auto ecg = parse_named_port("--ecg", ecg_text, kEcgProtocols);
+  if (!ecg) return tl::unexpected(ecg.error());
+  answers.tracker_protocol = tracker->protocol;
+  answers.tracker_port = tracker->port;
+  answers.ecg_protocol = ecg->protocol;
+  answers.ecg_port = ecg->port;
+  return answers;
 }
 
 // What the devices say of themselves, as comments below the text.

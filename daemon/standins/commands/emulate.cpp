@@ -2,13 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <cmath>
+#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -16,7 +14,9 @@
 #include "daemon/command_line/commands.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/standins/commands/simulation_options.hpp"
+#include "drivers/standins/theatre/served_devices.hpp"
 #include "drivers/standins/theatre/theatre.hpp"
+#include "drivers/standins/theatre/theatre_words.hpp"
 
 namespace perimap {
 namespace {
@@ -29,12 +29,7 @@ struct EmulateOptions {
   std::string setup;                 // folder
   SimulationOptions simulation{600.0};
   std::optional<double> start_s;
-  std::vector<double> missing_s;
-  std::vector<double> unplug_s;
-  std::vector<double> ndi_reference;  // translation, then rotation wxyz
-  std::vector<std::string> tools;     // NAME=MOTION
-  std::vector<std::string> broken;    // port handles
-  std::vector<double> frame_jump;     // s, frames
+  TheatreWords words;
   TheatreSettings theatre;
   std::vector<const Option*> can_options = {};
   [[nodiscard]] bool can_given() const {
@@ -42,68 +37,15 @@ struct EmulateOptions {
   }
 };
 
-Expected<void> check_can_frame(const EmulateOptions& options, const std::vector<EmulatedDevice>& devices) {
-  const auto is_can = [](const EmulatedDevice& device) { return device.name == "can-ecg"; };
-  if (options.can_given() && std::none_of(devices.begin(), devices.end(), is_can)) {
-    return fail("--can-...: expected the device 'can-ecg'");
-  }
-  constexpr std::uint32_t kLargest = CanEcgSettings::kLargestStandardIdentifier;
-  if (!options.theatre.can.extended && options.theatre.can.identifier > kLargest) {
-    return fail(fmt::format("--can-identifier: expected at most 0x{:X} without --can-extended, got 0x{:X}", kLargest,
-                            options.theatre.can.identifier));
-  }
-  return {};
-}
-
-Expected<std::vector<EmulatedDevice>> devices_of(const EmulateOptions& options) {
-  std::vector<EmulatedDevice> devices;
-  for (const std::string& text : options.devices) {
-    auto device = parse_emulated_device(text);
-    if (!device) return tl::unexpected(device.error());
-    if (auto able = check_faults(*device, options.theatre.faults); !able) return tl::unexpected(able.error());
-    devices.push_back(std::move(*device));
-  }
-  if (auto frame = check_can_frame(options, devices); !frame) return tl::unexpected(frame.error());
-  return devices;
-}
-
-// With all that the options say in their own words.
 Expected<TheatreSettings> settings_of(const EmulateOptions& options) {
-  TheatreSettings settings = options.theatre;
-  const auto spans = [](const std::vector<double>& given, Duration& every, Duration& lasting) {
-    if (given.size() != 2) return;
-    every = from_seconds(given[0]);
-    lasting = from_seconds(given[1]);
-  };
-  spans(options.missing_s, settings.faults.missing_every, settings.faults.missing_for);
-  spans(options.unplug_s, settings.faults.unplug_every, settings.faults.unplug_for);
-  settings.faults.seed = options.simulation.seed();
-  if (!options.ndi_reference.empty()) {
-    const auto reference = parse_place(options.ndi_reference, "--ndi-reference");
-    if (!reference) return tl::unexpected(reference.error());
-    settings.ndi.reference = *reference;
-    // Where tools are wired the reference is, too.
-    if (settings.ndi.wired_tools == 1) settings.ndi.wired_tools = 2;
-  }
-  for (const std::string& text : options.tools) {
-    auto tool = parse_emulated_tool(text);
-    if (!tool) return tl::unexpected(tool.error());
-    settings.tools.push_back(std::move(*tool));
-  }
-  for (const std::string& text : options.broken) {
-    const auto handle = port_handle_of(text);
-    if (!handle) return tl::unexpected(handle.error());
-    settings.ndi.broken.insert(*handle);
-  }
-  if (options.frame_jump.size() == 2) {
-    settings.ndi.jump_every = from_seconds(std::max(options.frame_jump[0], 0.01));
-    settings.ndi.jump_by = std::llround(options.frame_jump[1]);
-  }
+  auto settings = with_words(options.theatre, options.words);
+  if (!settings) return settings;
   auto heart = options.simulation.settings();
   if (!heart) return tl::unexpected(heart.error());
-  settings.heart = std::move(*heart);
-  settings.noise = options.simulation.noise();
-  settings.breath = options.simulation.breath();
+  settings->faults.seed = options.simulation.seed();
+  settings->heart = std::move(*heart);
+  settings->noise = options.simulation.noise();
+  settings->breath = options.simulation.breath();
   return settings;
 }
 
@@ -112,32 +54,8 @@ void tell(const std::string& line) {
   (void)std::fflush(stdout);
 }
 
-// Each device on a thread of its own, until a signal comes or one of them fails.
-Outcome serve(const Theatre& theatre, const std::vector<EmulatedDevice>& devices, StopSignal& stop,
-              const Console& console) {
-  Interrupt interrupt;
-  std::atomic<bool> failed{false};  // relaxed would do: it is a message by itself
-  std::vector<std::jthread> threads;
-  threads.reserve(devices.size());
-  for (const EmulatedDevice& device : devices) {
-    threads.emplace_back([&] {
-      const auto served = theatre.serve(device, tell, interrupt);
-      if (served) return;
-      console.complain(fmt::format("{}: {}", device.name, served.error().message));
-      failed = true;
-    });
-  }
-  constexpr Duration kTick = std::chrono::milliseconds(100);
-  while (!failed && !stop.wait_for(kTick)) {
-  }
-  interrupt.request();
-  threads.clear();
-  if (failed) return refuse("");  // which device, and why, has been told
-  return {};
-}
-
 Outcome emulate(const EmulateOptions& options, const Console& console) {
-  const auto devices = devices_of(options);
+  const auto devices = parse_emulated_devices(options.devices, options.theatre, options.can_given());
   if (!devices) return refuse(devices.error(), ExitCode::kWrongUsage);
   const auto settings = settings_of(options);
   if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
@@ -156,7 +74,10 @@ Outcome emulate(const EmulateOptions& options, const Console& console) {
     if (auto written = theatre->write_setup(options.setup); !written) return refuse(written.error());
   }
   theatre->set_start(options.start_s ? Instant(from_seconds(*options.start_s)) : MonotonicClock::now());
-  return serve(*theatre, *devices, *stop, console);
+  constexpr Duration kTick = std::chrono::milliseconds(100);
+  const auto complain = [&](const std::string& line) { console.complain(line); };
+  if (serve_devices(*theatre, *devices, tell, complain, [&] { return stop->wait_for(kTick); })) return {};
+  return refuse("");  // which device, and why, has been told
 }
 
 void add_tracker_options(Command& command, EmulateOptions& options) {
@@ -168,19 +89,20 @@ void add_tracker_options(Command& command, EmulateOptions& options) {
       ->check(Range(0, 8))
       ->capture_default_str();
   command
-      .add_option("--ndi-reference", options.ndi_reference,
+      .add_option("--ndi-reference", options.words.ndi_reference,
                   "TX TY TZ W X Y Z, mm and unit quaternion: where the second tool of the NDI tracker is, the "
                   "patient's reference; it stays there [missing]")
       ->expected(7);
-  command.add_option("--tool", options.tools,
+  command.add_option("--tool", options.words.tools,
                      "NAME=MOTION: a further tool of the tracker, by its port handle (NDI: 0B, ...) or name "
                      "(OpenIGTLink): sway, pivot[:X,Y,Z] about a tip in the tool's frame, still:TX,TY,TZ,W,X,Y,Z, or a "
                      "file of poses in metres, t_s,x,y,z,qx,qy,qz,qw; once for each tool");
-  command.add_option("--ndi-broken", options.broken, "Port handle of a tool that cannot be initialised (ERROR13)");
+  command.add_option("--ndi-broken", options.words.broken,
+                     "Port handle of a tool that cannot be initialised (ERROR13)");
   command.add_option("--ndi-error", theatre.ndi.error_mm, "RMS error that the NDI tracker says its poses have, mm")
       ->check(Range(0.0, 9.0));
   command
-      .add_option("--ndi-frame-jump", options.frame_jump,
+      .add_option("--ndi-frame-jump", options.words.frame_jump,
                   "EVERY BY: every so many seconds the frame numbers jump by so many, or go back")
       ->expected(2)
       ->check(Range(-1e6, 1e6));
@@ -240,10 +162,10 @@ void add_emulate_command(Commands& commands) {
   command.add_option("--drift", faults.drift_ppm, "How much the device's clock runs fast, ppm")
       ->check(Range(-5000.0, 5000.0));
   const auto seconds = Range(0.01, 86400.0);
-  command.add_option("--missing", options->missing_s, "EVERY FOR, s: the tool is out of sight, the lead is off")
+  command.add_option("--missing", options->words.missing_s, "EVERY FOR, s: the tool is out of sight, the lead is off")
       ->expected(2)
       ->check(seconds);
-  command.add_option("--unplug", options->unplug_s, "EVERY FOR, s: the device is unplugged")
+  command.add_option("--unplug", options->words.unplug_s, "EVERY FOR, s: the device is unplugged")
       ->expected(2)
       ->check(seconds);
   add_tracker_options(command, *options);

@@ -80,6 +80,32 @@ TEST_F(OldFiles, AreRemovedAndNothingElseIs) {
   EXPECT_TRUE(fs::exists(folder_ / "young.mcap"));
 }
 
+TEST_F(OldFiles, OfSeveralFoldersGoWhateverOneOfThemDoes) {
+  write("a.mcap", recording_, days(31));
+  write("young.mcap", recording_, days(1));
+  std::vector<std::string> told;
+  std::vector<std::string> faults;
+  const auto forget = [&](bool dry) {
+    told.clear();
+    faults.clear();
+    return forget_old(
+        {"/nowhere/at/all", folder_.string()}, days(30), dry,
+        [&](const OldFile& file) { told.push_back(file.path.filename().string()); },
+        [&](const Error& error) { faults.push_back(error.message); });
+  };
+  for (const bool dry : {true, false}) {
+    const Forgotten forgotten = forget(dry);
+    EXPECT_EQ(forgotten.files, 1U);
+    EXPECT_EQ(forgotten.bytes, recording_.size());
+    EXPECT_TRUE(forgotten.failed);
+    EXPECT_THAT(told, ElementsAre("a.mcap"));
+    EXPECT_THAT(faults, ElementsAre(HasSubstr("/nowhere/at/all: cannot be read")));
+    EXPECT_EQ(fs::exists(folder_ / "a.mcap"), dry);
+  }
+  EXPECT_EQ(forget(false).files, 0U);
+  EXPECT_TRUE(fs::exists(folder_ / "young.mcap"));
+}
+
 TEST(Age, IsReadInHoursDaysAndWeeks) {
   EXPECT_EQ(parse_age("12h").value_or(std::chrono::seconds(0)), std::chrono::hours(12));
   EXPECT_EQ(parse_age("30d").value_or(std::chrono::seconds(0)), days(30));
