@@ -22,6 +22,7 @@ struct BeatCircumstances {
   bool heard_for_long = false;   // beats have been looked for for longer than a burst lasts
   bool unlike_any_beat = false;  // the line stays at another level, or is rough
   bool may_be_followed = false;  // sharper complexes often follow its kind: a P wave that is not conducted
+  bool rivalled = false;         // another in its cycle looks as much like a QRS complex
   bool lost_in_noise = false;    // unlike the beats, among disturbances
 };
 

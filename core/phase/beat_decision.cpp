@@ -33,7 +33,7 @@ void BeatDecision::restart(Instant now) noexcept {
   count_ = 0;
   has_last_ = false;
   since_ = now;
-  seen_.fill({});
+  complexes_.clear();
 }
 
 void BeatDecision::burst() noexcept { count_ = 0; }
@@ -100,11 +100,19 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
     learnt = clusters_.learn(candidate.shape, candidate.points_up, disturbed(candidate.time) < settings_.some_noise,
                              candidate.time);
     if (waiting.cluster >= 0 && learnt != waiting.cluster && !clusters_.recurs(waiting.cluster)) waiting.cluster = -1;
-    note_followers(candidate, learnt);
   }
-  waiting.sharpest_before = sharpest_before(candidate.time);
+  // What is too small to be learnt of, but like what recurs, is one of its kind: a P wave among larger ones.
+  const bool of_a_kind = clusters_.recurs(waiting.cluster) && waiting.correlation >= settings_.familiar;
+  const int kind = learnt < 0 && of_a_kind ? waiting.cluster : learnt;
+  if (kind >= 0) {
+    complexes_.note(candidate, kind, learnt >= 0, within_cycle(settings_.pr_longest, settings_.pr_of_cycle), clusters_);
+  }
+  waiting.sharpest_before = complexes_.sharpest_before(candidate.time);
   waiting.log_odds = by_itself(waiting);
   clusters_.judged(learnt, waiting.log_odds);
+  if (kind >= 0) {
+    complexes_.judge(waiting.log_odds, candidate.time - since_ < settings_.longer_than_bursts, clusters_);
+  }
   if (learnt >= 0) note_crowding(waiting);
   const bool too_large = beats_.known() && candidate.energy > settings_.too_large * beats_.energy();
   if (too_large && !clusters_.has_a_beats_shape(candidate.shape, settings_.very_familiar)) {
@@ -130,58 +138,13 @@ Duration BeatDecision::within_cycle(Duration longest, double share) const noexce
   return std::min(longest, from_seconds(share * std::min(rhythm_.cycle_s, rr_s_.mean())));
 }
 
-// A complex as sharp as others before it, within a PR interval: those may be P waves.
-void BeatDecision::note_followers(const QrsCandidate& candidate, int cluster) noexcept {
-  const Duration longest = within_cycle(settings_.pr_longest, settings_.pr_of_cycle);
-  int before = -1;
-  for (Seen& seen : seen_) {
-    if (!seen.waits) continue;
-    const Duration apart = candidate.time - seen.time;
-    if (apart < settings_.pr_shortest || apart > longest) continue;
-    const double sharper = seen.cluster == cluster ? settings_.sharper_of_one_kind : settings_.as_sharp;
-    if (candidate.sharpness < sharper * seen.sharpness) continue;
-    clusters_.followed(seen.cluster, true);
-    seen.waits = false;
-    before = seen.cluster;
-  }
-  clusters_.preceded(cluster, before);
-  seen_[static_cast<std::size_t>(next_seen_)] = {candidate.time, candidate.sharpness, cluster, true, -10.0};
-  next_seen_ = (next_seen_ + 1) % kSeen;
-}
-
 // Two complexes that each look like a QRS by themselves, closer than ventricles can contract: arcs, a loose cable.
 void BeatDecision::note_crowding(const Waiting& waiting) noexcept {
-  Seen& newest = seen_[static_cast<std::size_t>((next_seen_ + kSeen - 1) % kSeen)];
-  newest.log_odds = waiting.log_odds;
   // Before any kind is settled a P wave looks like a QRS complex as well.
   if (waiting.log_odds < settings_.qrs_like || !clusters_.any_settled()) return;
-  const Duration longest = within_cycle(settings_.crowd_to, settings_.crowd_of_cycle);
-  for (const Seen& seen : seen_) {
-    const Duration apart = newest.time - seen.time;
-    if (seen.log_odds < settings_.qrs_like || apart < settings_.crowd_from || apart > longest) continue;
-    note_disturbance(newest.time, 0.7);
-    return;
+  if (complexes_.crowded(within_cycle(settings_.crowd_to, settings_.crowd_of_cycle))) {
+    note_disturbance(waiting.candidate.time, 0.7);
   }
-}
-
-void BeatDecision::expire_followers(Instant now) noexcept {
-  for (Seen& seen : seen_) {
-    if (!seen.waits || now - seen.time < settings_.time_to_decide + settings_.pr_longest / 2) continue;
-    clusters_.followed(seen.cluster, false);
-    seen.waits = false;
-  }
-}
-
-// Of the complexes within the T wave's time before.
-double BeatDecision::sharpest_before(Instant t) const noexcept {
-  double sharpest = 0.0;
-  for (const Seen& seen : seen_) {
-    const Duration apart = t - seen.time;
-    if (seen.sharpness > 0.0 && apart > settings_.t_wave_begins && apart < settings_.t_wave_ends) {
-      sharpest = std::max(sharpest, seen.sharpness);
-    }
-  }
-  return sharpest;
 }
 
 double BeatDecision::like(const Waiting& waiting) const noexcept {
@@ -346,7 +309,7 @@ bool BeatDecision::known(const Waiting& waiting, Instant now, bool ending) const
 }
 
 void BeatDecision::decide(Instant now, bool ending) noexcept {
-  expire_followers(now);
+  complexes_.expire(now, clusters_);
   if (count_ == 0) return;
   if (now - evaluated_at_ >= settings_.evaluate_every || ending) weigh(now);
   for (bool again = true; again && count_ > 0;) {
@@ -409,6 +372,7 @@ BeatCircumstances BeatDecision::circumstances(const Waiting& waiting, bool famil
   beat.heard_for_long = now - since_ > settings_.longer_than_bursts;
   beat.unlike_any_beat = unlike_any_beat(waiting.candidate);
   beat.may_be_followed = clusters_.followers(waiting.cluster) >= settings_.followed_by_chance;
+  beat.rivalled = clusters_.rivals(waiting.cluster) >= settings_.rivalled;
   beat.lost_in_noise = unknown_in_noise(waiting);
   return beat;
 }

@@ -17,6 +17,7 @@
 #include "core/phase/qrs_evidence.hpp"
 #include "core/phase/r_peak.hpp"
 #include "core/phase/r_peak_detector_settings.hpp"
+#include "core/phase/recent_complexes.hpp"
 #include "core/phase/recent_values.hpp"
 
 namespace perimap {
@@ -24,7 +25,7 @@ namespace perimap {
 class BeatDecision {
  public:
   BeatDecision(const DecisionSettings& settings, const EcgLevels& levels) noexcept
-      : settings_(settings), levels_(levels) {}
+      : settings_(settings), levels_(levels), complexes_(settings) {}
 
   // A complex was measured. `one_complex`: what is nearer to another is the same.
   void consider(const QrsCandidate& candidate, Duration one_complex, Instant now) noexcept;
@@ -52,7 +53,6 @@ class BeatDecision {
   [[nodiscard]] bool chaotic(Instant now) const noexcept;
 
  private:
-  static constexpr int kSeen = 8;
   static constexpr int kQueue = BeatPath::kMost + 4;
 
   struct Waiting {
@@ -67,24 +67,12 @@ class BeatDecision {
     bool noted = false;                   // as a disturbance
     EvidenceOf<BeatEvidence> evidence{};  // but for that of pairs
   };
-  // For what follows complexes.
-  struct Seen {
-    Instant time;
-    double sharpness = 0.0;
-    int cluster = -1;
-    bool waits = false;
-    double log_odds = -10.0;  // by itself
-  };
-
   // No longer than this share of the cycle, where that is known: the usual one, or the mean where beats come in pairs.
   [[nodiscard]] Duration within_cycle(Duration longest, double share) const noexcept;
-  void note_followers(const QrsCandidate& candidate, int cluster) noexcept;
   void note_crowding(const Waiting& waiting) noexcept;
-  void expire_followers(Instant now) noexcept;
   [[nodiscard]] EvidenceOf<ComplexEvidence> complex_evidence(const Waiting& waiting) const noexcept;
   [[nodiscard]] double by_itself(const Waiting& waiting) const noexcept;
   void weigh(Instant now) noexcept;
-  [[nodiscard]] double sharpest_before(Instant t) const noexcept;
   [[nodiscard]] double like(const Waiting& waiting) const noexcept;  // to its cluster, where that recurs
   [[nodiscard]] bool followed_by_none(const Waiting& waiting) const noexcept;
   [[nodiscard]] bool unknown_in_noise(const Waiting& waiting) const noexcept;
@@ -117,8 +105,7 @@ class BeatDecision {
   BeatPath path_;
   std::array<Waiting, BeatPath::kMost> waiting_{};  // in order of time
   int count_ = 0;
-  std::array<Seen, kSeen> seen_{};
-  int next_seen_ = 0;
+  RecentComplexes complexes_;
   bool has_last_ = false;
   QrsCandidate last_;  // the last beat
   double last_probability_ = 0.0;

@@ -20,6 +20,7 @@ constexpr double kCaution = 2.0;         // members
 constexpr double kOften = 0.4;           // share of P waves that are conducted: in 2:1 block half of them
 constexpr double kHardlyWithout = 0.85;  // share of QRS complexes that a P wave precedes
 constexpr int kEnough = 2;               // members
+constexpr double kFollow = 0.2;          // share of a new distance in that of rivals
 
 }  // namespace
 
@@ -61,7 +62,13 @@ int QrsClusters::learn(const QrsShape& shape, bool upward, bool calm, Instant se
     rarest->born = seen;
     same.of = static_cast<int>(rarest - clusters_.begin());
     for (Cluster& c : clusters_) {
-      if (c.before == same.of) c.before = -1;
+      if (c.before == same.of) {
+        c.before = -1;
+        c.preceded = 0.0;
+        c.preceded_known = 0.0;
+      }
+      if (c.rival_before.by == same.of) c.rival_before = {};
+      if (c.rival_after.by == same.of) c.rival_after = {};
     }
   }
   Cluster& c = clusters_[static_cast<std::size_t>(same.of)];
@@ -112,6 +119,24 @@ bool QrsClusters::leads(int i) const noexcept {
   return std::any_of(clusters_.begin(), clusters_.end(), [&](const Cluster& c) {
     return &c != &at(i) && c.before == i && c.preceded_known >= kEnough && c.preceded >= kHardlyWithout;
   });
+}
+
+bool QrsClusters::beside(int of, int by, double after_s, double scatter_s, bool at_first) noexcept {
+  Cluster& c = clusters_[static_cast<std::size_t>(of)];
+  Rival& rival = after_s > 0.0 ? c.rival_after : c.rival_before;
+  const bool known = rival.apart_s > 0.0;
+  const bool same_kind = rival.by == by && recurs(by);
+  const double off_s = std::abs(after_s) - rival.apart_s;
+  rival.by = by;
+  rival.apart_s = known ? rival.apart_s + kFollow * off_s : std::abs(after_s);
+  return known ? std::abs(off_s) < scatter_s && (same_kind || at_first) : at_first;
+}
+
+void QrsClusters::rivalled(int of, bool by_another) noexcept {
+  if (of < 0) return;
+  Cluster& c = clusters_[static_cast<std::size_t>(of)];
+  c.rivalled_known = std::min(c.rivalled_known + 1.0, kMemory);
+  c.rivalled += ((by_another ? 1.0 : 0.0) - c.rivalled) / c.rivalled_known;
 }
 
 void QrsClusters::settle(int of) noexcept {

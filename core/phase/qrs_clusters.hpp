@@ -38,6 +38,11 @@ class QrsClusters {
   void followed(int of, bool by_sharper) noexcept;
   // Which blunter complex came within a PR interval before it; -1: none.
   void preceded(int of, int by) noexcept;
+  // Another of cluster `by` that looks as much like a QRS comes so long after it, or before: at the same distance,
+  // within `scatter_s`, as the last time? `at_first`: whatever the last one was.
+  bool beside(int of, int by, double after_s, double scatter_s, bool at_first) noexcept;
+  // Whether one came beside a member.
+  void rivalled(int of, bool by_another) noexcept;
   // Its members are beats, though they were seen among disturbances.
   void settle(int of) noexcept;
   void clear() noexcept { clusters_.fill({}); }
@@ -55,6 +60,8 @@ class QrsClusters {
   // Its members are P waves, of which not all are conducted: sharper ones follow many of them, and there is a kind that
   // hardly ever comes without one of these before it.
   [[nodiscard]] bool leads(int i) const noexcept;
+  // Share of its members beside which, within one cycle, another comes that looks as much like a QRS.
+  [[nodiscard]] double rivals(int i) const noexcept { return i < 0 ? 0.0 : at(i).rivalled; }
   [[nodiscard]] Instant born(int i) const noexcept { return at(i).born; }  // its first member was seen
   [[nodiscard]] bool upward(int i) const noexcept { return at(i).upward; }
 
@@ -62,6 +69,10 @@ class QrsClusters {
   static constexpr double kRecurs = 2.5;
   static constexpr double kCalm = 0.5;  // share of its members
 
+  struct Rival {
+    int by = -1;  // the cluster seen last
+    double apart_s = 0.0;
+  };
   struct Cluster {
     QrsShape shape;  // root mean square 1
     RecentValues<8> sizes;
@@ -74,6 +85,10 @@ class QrsClusters {
     int before = -1;        // the cluster that precedes it,
     double preceded = 0.0;  // for this share of its members,
     double preceded_known = 0.0;
+    Rival rival_before;
+    Rival rival_after;
+    double rivalled = 0.0;
+    double rivalled_known = 0.0;
     double calm = 0.0;
     double calm_known = 0.0;
     bool upward = true;

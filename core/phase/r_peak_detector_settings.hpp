@@ -103,9 +103,14 @@ struct DecisionSettings {
   double as_sharp = 1.0;              // times another, from which on it is the QRS complex of a P wave,
   double sharper_of_one_kind = 1.15;  // and so much sharper where both have one shape
   double followed_by_chance = 0.3;    // share of its kind, from which on a complex may be a P wave
-  double cluster_of_quiet = 2.5;      // times the quiet level, from which on a complex is learnt as one that recurs
-  double cluster_of_top = 0.1;        // and this share of the largest
-  int displaced = 3;                  // steps; the peaks of unknown shapes are found so far apart
+  Duration rt_longest = std::chrono::milliseconds(440);  // from R to the peak of T; longer than any PR interval
+  double rival_odds = 2.0;  // log odds by which another complex in the cycle may be the less likely one, and a rival
+  Duration rival_scatter = std::chrono::milliseconds(20);  // of its distance, from one cycle to the next (dev)
+  Duration even = std::chrono::milliseconds(40);           // of three intervals that are of one length: a fast heart's
+  double rivalled = 0.6;                                   // share of its kind, from which on a complex is doubtful
+  double cluster_of_quiet = 2.5;  // times the quiet level, from which on a complex is learnt as one that recurs
+  double cluster_of_top = 0.1;    // and this share of the largest
+  int displaced = 3;              // steps; the peaks of unknown shapes are found so far apart
   double familiar = 0.8;
   double most_step = 0.75;              // change of level to the excursions: of clean beats one in a thousand has more,
   double pure_step = 0.9;               // of it, from which on a complex is a disturbance as soon as it is seen,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics/nearest_pairs.hpp"
 #include "core/statistics/upper_median.hpp"
 
 namespace perimap {
@@ -58,34 +59,11 @@ double root_mean_square(const std::vector<double>& values) {
 }  // namespace
 
 std::vector<int> match_beats(const std::vector<ReferenceBeat>& reference, const std::vector<AnalysedBeat>& beats) {
-  struct Pair {
-    double apart_s;
-    int reference;
-    int detected;
-  };
-  std::vector<Pair> pairs;
-  std::size_t from = 0;
-  for (std::size_t i = 0; i < reference.size(); ++i) {
-    const double t = reference[i].time_s;
-    while (from < beats.size() && seconds_of(beats[from].peak.time) < t - BeatScore::kWindow_s) ++from;
-    for (std::size_t j = from; j < beats.size(); ++j) {
-      const double apart = seconds_of(beats[j].peak.time) - t;
-      if (apart > BeatScore::kWindow_s) break;
-      if (apart < -BeatScore::kWindow_s) continue;
-      pairs.push_back({std::abs(apart), static_cast<int>(i), static_cast<int>(j)});
-    }
-  }
-  std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.apart_s < b.apart_s; });
-  std::vector<int> matched(reference.size(), -1);
-  std::vector<bool> used(beats.size(), false);
-  for (const Pair& pair : pairs) {
-    const auto i = static_cast<std::size_t>(pair.reference);
-    const auto j = static_cast<std::size_t>(pair.detected);
-    if (matched[i] >= 0 || used[j]) continue;
-    matched[i] = pair.detected;
-    used[j] = true;
-  }
-  return matched;
+  std::vector<double> reference_s;
+  std::vector<double> found_s;
+  for (const ReferenceBeat& beat : reference) reference_s.push_back(beat.time_s);
+  for (const AnalysedBeat& beat : beats) found_s.push_back(seconds_of(beat.peak.time));
+  return nearest_pairs(reference_s, found_s, BeatScore::kWindow_s);
 }
 
 BeatScore score_beats(const std::vector<ReferenceBeat>& reference, const EcgAnalysis& analysis, const EcgTrace& trace) {

@@ -19,7 +19,8 @@ struct Options {
   int draws = 3000;
 };
 
-void print(const std::string& table, const Options& options) {
+// False where a table has bounds and they are not kept to.
+bool print(const std::string& table, const Options& options) {
   using perimap::test::RecordedLead;
   if (table == "made") return perimap::test::print_made(options.draws, options.seed);
   if (table == "paced") return perimap::test::print_paced(options.draws, options.seed);
@@ -31,9 +32,14 @@ void print(const std::string& table, const Options& options) {
       {"ventricular", perimap::test::print_ventricular},
       {"prediction", perimap::test::print_prediction},
       {"starts", perimap::test::print_starts}};
-  if (const auto found = whole.find(table); found != whole.end()) return found->second(records);
-  if (table == "disturbed") return perimap::test::print_disturbed(records, options.seed);
-  perimap::test::print_two_leads(records, options.seed);
+  if (const auto found = whole.find(table); found != whole.end()) {
+    found->second(records);
+  } else if (table == "disturbed") {
+    perimap::test::print_disturbed(records, options.seed);
+  } else {
+    perimap::test::print_two_leads(records, options.seed);
+  }
+  return true;
 }
 
 }  // namespace
@@ -54,8 +60,13 @@ int main(int argc, char** argv) {
   app.add_option("--draws", options.draws, "made, paced: so many leads")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {
-    for (const std::string& table : options.tables) print(table, options);
-    return 0;
+    bool kept = true;
+    for (const std::string& table : options.tables) {
+      if (print(table, options)) continue;
+      std::fprintf(stderr, "statistics_ecg: %s: beyond its bounds\n", table.c_str());
+      kept = false;
+    }
+    return kept ? 0 : 1;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "statistics_ecg: %s\n", error.what());
     return 1;

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/phase/beat_finder.hpp"
+#include "core/statistics/nearest_pairs.hpp"
 #include "tables.hpp"
 
 namespace perimap::test {
@@ -14,6 +15,8 @@ namespace {
 
 constexpr double kMatch_s = 0.15;
 constexpr double kDuration_s = 300.0;
+constexpr double kLeast = 0.9;            // sensitivity and precision
+constexpr double kMostWrongBeats = 0.01;  // missed or false
 
 struct PacedBeat {
   double at_s = 0.0;  // of the R peak
@@ -124,7 +127,7 @@ class PacedHeart {
 
 }  // namespace
 
-void print_paced(int draws, std::uint64_t seed) {
+bool print_paced(int draws, std::uint64_t seed) {
   PacedHeart heart(seed);
   int beats = 0;
   int missed = 0;
@@ -143,33 +146,28 @@ void print_paced(int draws, std::uint64_t seed) {
       if (const auto peak = finder.push(t, static_cast<float>(lead.mV[i]))) peaks.push_back(*peak);
     }
     while (const auto peak = finder.flush()) peaks.push_back(*peak);
-    std::vector<bool> used(peaks.size(), false);
+    std::vector<double> beats_s;
+    std::vector<double> told_s;
+    for (const PacedBeat& beat : lead.beats) beats_s.push_back(beat.at_s);
+    for (const RPeak& peak : peaks) told_s.push_back(to_seconds(peak.time.time_since_epoch()));
+    const std::vector<int> matched = nearest_pairs(beats_s, told_s, kMatch_s);
+    std::vector<bool> ventricular_ones(peaks.size(), false);
     int of_lead = 0;
+    int found = 0;
+    for (std::size_t i = 0; i < matched.size(); ++i) {
+      of_lead += lead.beats[i].ventricular ? 1 : 0;
+      found += matched[i] >= 0 ? 1 : 0;
+      if (matched[i] >= 0) ventricular_ones[static_cast<std::size_t>(matched[i])] = lead.beats[i].ventricular;
+    }
     int hits_here = 0;
     int false_here = 0;
-    for (const PacedBeat& beat : lead.beats) {
-      ++beats;
-      of_lead += beat.ventricular ? 1 : 0;
-      std::size_t nearest = peaks.size();
-      double least_s = kMatch_s;
-      for (std::size_t i = 0; i < peaks.size(); ++i) {
-        const double apart_s = std::abs(to_seconds(peaks[i].time.time_since_epoch()) - beat.at_s);
-        if (used[i] || apart_s > least_s) continue;
-        nearest = i;
-        least_s = apart_s;
-      }
-      if (nearest == peaks.size()) {
-        ++missed;
-        continue;
-      }
-      used[nearest] = true;
-      if (peaks[nearest].beat_class != BeatClass::kPremature) continue;
-      (beat.ventricular ? hits_here : false_here) += 1;
-    }
     for (std::size_t i = 0; i < peaks.size(); ++i) {
-      extra += used[i] ? 0 : 1;
-      false_here += !used[i] && peaks[i].beat_class == BeatClass::kPremature ? 1 : 0;
+      if (peaks[i].beat_class != BeatClass::kPremature) continue;
+      (ventricular_ones[i] ? hits_here : false_here) += 1;
     }
+    beats += static_cast<int>(lead.beats.size());
+    missed += static_cast<int>(lead.beats.size()) - found;
+    extra += static_cast<int>(peaks.size()) - found;
     ventricular += of_lead;
     hits += hits_here;
     false_ones += false_here;
@@ -188,6 +186,8 @@ void print_paced(int draws, std::uint64_t seed) {
              100.0 * missed / std::max(beats, 1), 100.0 * extra / std::max(beats, 1), ventricular,
              100.0 * hits / std::max(ventricular, 1), 100.0 * hits / std::max(hits + false_ones, 1), below_sensitivity,
              below_precision);
+  return missed + extra <= kMostWrongBeats * beats && hits >= kLeast * ventricular &&
+         hits >= kLeast * (hits + false_ones);
 }
 
 }  // namespace perimap::test

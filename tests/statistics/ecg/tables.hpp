@@ -23,9 +23,9 @@ void print_starts(const std::vector<RecordedLead>& records);
 void print_disturbed(const std::vector<RecordedLead>& records, std::uint64_t seed);
 // Two leads, of which one or both are disturbed, on stretches of 120 s.
 void print_two_leads(const std::vector<RecordedLead>& records, std::uint64_t seed);
-// So many leads that are made of bell-shaped waves.
-void print_made(int draws, std::uint64_t seed);
-// So many leads of paced hearts with ventricular beats.
-void print_paced(int draws, std::uint64_t seed);
+// So many leads that are made of bell-shaped waves. Whether the detector keeps to its bounds.
+[[nodiscard]] bool print_made(int draws, std::uint64_t seed);
+// So many leads of paced hearts with ventricular beats. Likewise.
+[[nodiscard]] bool print_paced(int draws, std::uint64_t seed);
 
 }  // namespace perimap::test

@@ -33,6 +33,10 @@ TEST(BeatConfidence, AUsualBeatIsAsSureAsItIsProbable) {
   EXPECT_EQ(told([](BeatCircumstances& b) { b.probability = 0.3, b.unlike_any_beat = true; }), 0.3);
 }
 
+TEST(BeatConfidence, ABeatBesideWhichAnotherLooksAsMuchLikeAQrsComplexIsDoubtful) {
+  EXPECT_EQ(told([](BeatCircumstances& b) { b.rivalled = true; }), kDoubtful);
+}
+
 TEST(BeatConfidence, OnTimeAndInCalmABeatMayDifferAsBeatsDo) {
   EXPECT_EQ(told([](BeatCircumstances& b) { b.correlation = 0.84; }), 0.99);
   EXPECT_EQ(told([](BeatCircumstances& b) { b.correlation = 0.82; }), kDoubtful);

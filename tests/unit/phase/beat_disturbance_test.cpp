@@ -246,6 +246,38 @@ TEST(BeatDecision, WhatOftenHasASharperOneAfterItIsDoubtful) {
   EXPECT_LE(most(2), 0.5);
 }
 
+// Of four beats so many have a second complex in their cycle that looks as much like a QRS.
+double told_with_rivals(int of_four) {
+  Patient patient;
+  double at_s = 0.0;
+  for (int i = 0; i < 60; ++i) {
+    patient.see(at_s = 1.0 + 1.0 * i);
+    if (i % 4 >= of_four) continue;
+    patient.see(at_s + 0.3, [](QrsCandidate& c) { c.shape = kWide, c.sharpness *= 0.7; });
+  }
+  return patient.confidence(at_s);
+}
+
+TEST(BeatDecision, WhereMostCyclesHaveAnotherThatLooksAsMuchLikeAQrsComplexABeatIsDoubtful) {
+  EXPECT_GT(told_with_rivals(2), 0.9);
+  EXPECT_EQ(told_with_rivals(3), 0.5);
+}
+
+// A P wave, too small to be learnt of, has the shape of the beats.
+TEST(BeatDecision, ASmallWaveOfTheBeatsShapeBeforeEachIsNoted) {
+  const auto told = [](bool with_waves) {
+    Known patient;
+    for (int i = 0; i < 20; ++i) {
+      const double at_s = patient.last_s + 0.8;
+      if (with_waves) patient.see(at_s - 0.16, weaker(0.09));
+      patient.see(at_s);
+    }
+    return patient.confidence(patient.last_s);
+  };
+  EXPECT_GT(told(false), 0.9);
+  EXPECT_EQ(told(true), 0.5) << "some of its kind are followed by sharper ones";
+}
+
 TEST(BeatDecision, PeaksOfOneKindAreFoundUpToThreeStepsApart) {
   const auto confidence = [](double steps) {
     Patient patient;

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <sstream>
 
+#include "core/statistics/nearest_pairs.hpp"
+
 namespace perimap::test {
 namespace {
 
@@ -85,6 +87,39 @@ MadeLead make_lead(const MadeLeadSettings& s) {
     lead.mV.push_back(static_cast<float>(s.sign * trace.mV[i] + noise + wander));
   }
   return lead;
+}
+
+double MadeOutcome::f1_percent() const noexcept {
+  const int found = beats - missed;
+  return 200.0 * found / std::max(2 * found + missed + extra, 1);
+}
+
+bool MadeOutcome::confidently_wrong() const noexcept {
+  constexpr double kMostWrong = 0.02;
+  return wrong > std::max(1.0, kMostWrong * beats);
+}
+
+MadeOutcome scored(const MadeLead& lead, const std::vector<RPeak>& told) {
+  constexpr double kMatch_s = 0.15;
+  std::vector<double> told_s;
+  for (const RPeak& peak : told) told_s.push_back(to_seconds(peak.time.time_since_epoch()));
+  std::vector<bool> extra(told.size(), true);
+  MadeOutcome outcome;
+  outcome.beats = static_cast<int>(lead.beats_s.size());
+  for (const int i : nearest_pairs(lead.beats_s, told_s, kMatch_s)) {
+    if (i < 0) {
+      ++outcome.missed;
+    } else {
+      extra[static_cast<std::size_t>(i)] = false;
+    }
+  }
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    const bool doubted = told[i].confidence <= MadeOutcome::kWrong;
+    outcome.extra += extra[i] ? 1 : 0;
+    outcome.wrong += extra[i] && !doubted ? 1 : 0;
+    outcome.doubted += doubted ? 1 : 0;
+  }
+  return outcome;
 }
 
 MadeLeadSettings draw_lead(std::mt19937_64& generator) {

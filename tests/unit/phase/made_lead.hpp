@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/phase/r_peak.hpp"
+
 namespace perimap::test {
 
 struct MadeLead {
@@ -36,6 +38,22 @@ struct MadeLeadSettings {
 };
 
 [[nodiscard]] MadeLead make_lead(const MadeLeadSettings& settings);
+
+struct MadeOutcome {
+  static constexpr double kWrong = 0.7;  // a confidence above which a false beat is told without doubt
+
+  int beats = 0;
+  int missed = 0;
+  int extra = 0;
+  int wrong = 0;    // of the extra, told without doubt
+  int doubted = 0;  // of all that were told
+
+  [[nodiscard]] double f1_percent() const noexcept;
+  // In more than one beat, and in more than two of a hundred.
+  [[nodiscard]] bool confidently_wrong() const noexcept;
+};
+// What was told of a lead, one to one within 150 ms.
+[[nodiscard]] MadeOutcome scored(const MadeLead& lead, const std::vector<RPeak>& told);
 
 // P/R 0.1 to 1, T/R 0.2 to 2, PR 100 to 260 ms, QRS 60 to 180 ms, rate of the ventricles 28 to 240, either polarity,
 // 100 to 1000 Hz, noise to 0.2 mV, 2:1 block, pacing; waves that do not fit in the cycle are drawn again.

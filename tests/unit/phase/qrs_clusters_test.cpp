@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 namespace perimap {
 namespace {
@@ -122,6 +123,57 @@ TEST(QrsClusters, WhatComesBeforeIsOfOneKind) {
   for (int i = 0; i < 60; ++i) clusters.preceded(beat, other);
   EXPECT_TRUE(clusters.leads(other));
   EXPECT_FALSE(clusters.leads(wave));
+}
+
+QrsShape unlike_others(unsigned number) {
+  std::mt19937 generator(number);
+  std::normal_distribution<float> normal(0.0F, 0.4F);
+  QrsShape s;
+  s.points = 28;
+  for (int i = 0; i < s.points; ++i) s.slope[static_cast<std::size_t>(i)] = normal(generator);
+  return s;
+}
+
+// So many new kinds that the one is forgotten.
+void forget_all_but_newest(QrsClusters& clusters, int kept, const QrsShape& kept_shape) {
+  for (int i = 0; i < QrsClusters::kClusters; ++i) {
+    clusters.learn(unlike_others(static_cast<unsigned>(i)), true, true, kNow);
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(clusters.learn(kept_shape, true, true, kNow), kept);
+  }
+}
+
+TEST(QrsClusters, AKindThatTakesThePlaceOfPWavesIsNotTakenForThem) {
+  QrsClusters clusters;
+  const int wave = clusters.learn(kOther, true, true, kNow);
+  const int beat = clusters.learn(kBeat, true, true, kNow);
+  for (int i = 0; i < 12; ++i) clusters.preceded(beat, wave);
+  forget_all_but_newest(clusters, beat, kBeat);
+  for (int i = 0; i < 10; ++i) clusters.followed(wave, true);  // another kind now
+  clusters.preceded(beat, wave);
+  EXPECT_FALSE(clusters.leads(wave)) << "one is not enough";
+  clusters.preceded(beat, wave);
+  EXPECT_TRUE(clusters.leads(wave));
+}
+
+TEST(QrsClusters, AKindThatTakesThePlaceOfARivalIsANewOne) {
+  QrsClusters clusters;
+  const int wave = clusters.learn(kOther, true, true, kNow);
+  const int beat = clusters.learn(kBeat, true, true, kNow);
+  EXPECT_TRUE(clusters.beside(beat, wave, 0.3, 0.02, true));
+  EXPECT_FALSE(clusters.beside(beat, wave, 0.4, 0.02, true)) << "its distance is another";
+  EXPECT_TRUE(clusters.beside(beat, wave, -0.4, 0.02, true)) << "before it is another matter";
+  forget_all_but_newest(clusters, beat, kBeat);
+  EXPECT_TRUE(clusters.beside(beat, wave, 0.4, 0.02, true));
+}
+
+TEST(QrsClusters, TheDistanceOfRivalsIsFollowedByAFifth) {
+  QrsClusters clusters;
+  int wave = -1;
+  for (int i = 0; i < 4; ++i) wave = clusters.learn(kOther, true, true, kNow);
+  clusters.beside(wave, wave, 0.300, 0.02, false);
+  EXPECT_FALSE(clusters.beside(wave, wave, 0.340, 0.02, false));  // now 0.308
+  EXPECT_TRUE(clusters.beside(wave, wave, 0.327, 0.02, false));   // 0.3118
+  EXPECT_FALSE(clusters.beside(wave, wave, 0.333, 0.02, false));
 }
 
 TEST(QrsClusters, JudgesByTheMeanOfItsMembersAndCautiouslyWhereTheyAreFew) {
