@@ -27,6 +27,24 @@ bool stronger(const Corner& a, const Corner& b) {
   return std::tuple(-a.strength, a.y, a.x) < std::tuple(-b.strength, b.y, b.x);
 }
 
+// What of it is joined to the border: about a round view, and not a shadow within it.
+cv::Mat joined_to_border(const cv::Mat& background) {
+  constexpr std::uint8_t kJoined = 128;
+  cv::Mat marked = background.clone();
+  const auto mark = [&marked](int x, int y) {
+    if (marked.at<std::uint8_t>(y, x) == 255) cv::floodFill(marked, {x, y}, cv::Scalar(kJoined));
+  };
+  for (int x = 0; x < marked.cols; ++x) {
+    mark(x, 0);
+    mark(x, marked.rows - 1);
+  }
+  for (int y = 0; y < marked.rows; ++y) {
+    mark(0, y);
+    mark(marked.cols - 1, y);
+  }
+  return marked == kJoined;
+}
+
 // 255 where no feature may be.
 cv::Mat forbidden(const cv::Mat& image, const DetectorSettings& settings) {
   const cv::Mat highlight = widened(image >= settings.highlight_grey, settings.highlight_clearance_px);
@@ -34,9 +52,11 @@ cv::Mat forbidden(const cv::Mat& image, const DetectorSettings& settings) {
   cv::Mat mean;
   cv::blur(image, mean, {settings.background_size_px, settings.background_size_px});
   // The mean turns dark only half a window inside the background.
-  const cv::Mat background =
-      widened(mean < settings.background_grey, settings.background_clearance_px + 0.5 * settings.background_size_px);
-  return highlight | background;
+  const double inside_px = 0.5 * settings.background_size_px;
+  const cv::Mat background = mean < settings.background_grey;
+  const cv::Mat barred = highlight | widened(background, settings.background_clearance_px + inside_px);
+  if (settings.surround_clearance_px <= settings.background_clearance_px) return barred;
+  return barred | widened(joined_to_border(background), settings.surround_clearance_px + inside_px);
 }
 
 // The smaller eigenvalue of the gradient product's mean over a patch, (grey levels / px)^2 (Shi & Tomasi, "Good
@@ -82,7 +102,8 @@ int border_of(const DetectorSettings& settings) { return std::max(settings.borde
 // As far as a pixel's verdict looks.
 int reach_of(const DetectorSettings& settings) {
   const double highlight = settings.highlight_clearance_px;
-  const double background = settings.background_clearance_px + settings.background_size_px;
+  const double background =
+      std::max(settings.background_clearance_px, settings.surround_clearance_px) + settings.background_size_px;
   return std::max(border_of(settings), static_cast<int>(std::ceil(std::max(highlight, background))));
 }
 
@@ -209,7 +230,7 @@ DetectorSettings detector_settings_for_trial(const GreyImage& image, int how_man
   // The edge of a round view goes with the scope, and stands out of all that is in the picture: what is followed must
   // not have it in its template.
   constexpr double kTemplate_px = PatchTemplate::kSide[0] / 2 + 2;
-  if (light.has_surround) settings.background_clearance_px = std::max(settings.background_clearance_px, kTemplate_px);
+  if (light.has_surround) settings.surround_clearance_px = kTemplate_px;
   const double spacing = std::sqrt(static_cast<double>(image.width) * image.height / std::max(how_many, 1));
   constexpr double kOfSpacing = 0.3, kLeast_px = 7, kMost_px = 40;
   settings.min_distance_px = std::clamp(kOfSpacing * spacing, kLeast_px, kMost_px);

@@ -24,6 +24,7 @@ struct DetectorSettings {
   int background_grey = 18;  // mean over background_size_px below: no tissue, or none that is lit
   int background_size_px = 13;
   double background_clearance_px = 16;  // silhouettes slide over the tissue
+  double surround_clearance_px = 0;     // likewise, of background that reaches the picture's border
 };
 
 // For how_many features spread over an image of this size, this noise and this light, whatever they are. A corner must

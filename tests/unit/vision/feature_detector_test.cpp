@@ -258,5 +258,29 @@ TEST(FeatureDetector, KeepsClearOfTheRimOfAViewWhoseSurroundIsNotBlack) {
   for (const Vector2d& px : found) EXPECT_LT((px - Vector2d(160, 120)).norm(), kRadius - 8);
 }
 
+// A view that does not fill the picture leaves a dark surround, whose edge goes with the scope; a shadow is tissue's.
+TEST(FeatureDetector, KeepsATemplateFromTheSurroundAndGoesNearerToAShadow) {
+  constexpr int kSide = 256;
+  constexpr double kView_px = 115, kShadow_px = 25, kTemplate_px = PatchTemplate::kSide[0] / 2 + 1;
+  const Vector2d centre(128, 128), shadow(140, 120);
+  std::mt19937 random(1);
+  test::ImageBuffer image = test::render(test::Texture(3, 15, 6, 60), {}, kSide, kSide, 1.5, random);
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      const Vector2d px(x, y);
+      if ((px - centre).norm() > kView_px || (px - shadow).norm() < kShadow_px) image.at(x, y) = 4;
+    }
+  }
+  const auto found = find_features(image.view(), {}, detector_settings_for_trial(image.view(), 600), 600);
+  ASSERT_TRUE(found);
+  double nearest_to_edge = kSide, nearest_to_shadow = kSide;
+  for (const Vector2d& px : *found) {
+    nearest_to_edge = std::min(nearest_to_edge, kView_px - (px - centre).norm());
+    nearest_to_shadow = std::min(nearest_to_shadow, (px - shadow).norm() - kShadow_px);
+  }
+  EXPECT_GE(nearest_to_edge, kTemplate_px);
+  EXPECT_LT(nearest_to_shadow, kTemplate_px - 2);
+}
+
 }  // namespace
 }  // namespace perimap
