@@ -7,6 +7,9 @@
 #include <limits>
 #include <optional>
 
+#include "core/estimation/batch_problem.hpp"
+#include "core/estimation/feature_prior.hpp"
+#include "core/estimation/prior_start.hpp"
 #include "core/estimation/student_t_loss.hpp"
 
 namespace perimap {
@@ -16,33 +19,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-enum class Loss : std::uint8_t { kQuadratic, kHuber, kStudentT };
-
-// rho(s) of the squared Mahalanobis residual s, and its derivative, the observation's weight.
-struct LossValue {
-  double rho;
-  double weight;
-};
-
-LossValue loss_of(Loss loss, double s, double huber_deviations) noexcept {
-  switch (loss) {
-    case Loss::kQuadratic:
-      break;
-    case Loss::kHuber: {
-      const double radius = std::sqrt(s);
-      if (radius <= huber_deviations) break;
-      return {huber_deviations * (2.0 * radius - huber_deviations), huber_deviations / radius};
-    }
-    case Loss::kStudentT:
-      return {student_t_loss(s), student_t_weight(s)};
-  }
-  return {s, 1.0};
-}
-
-// A squared residual stands in for an observation in which the feature can't be seen from where it is supposed to be: a
-// thousand deviations, without a gradient. So a start on the wrong side of one camera is bad but not lost.
-constexpr double kInvisible = 1e6;
-
 // Mean of the Student-t loss beside that of residuals which are as large as they are said to be: (nu + 2) e^a E_1(a)
 // with a = nu / 2. Some gross outliers do not add much to it.
 double misfit_of(std::span<const double> residual2) {
@@ -51,154 +27,6 @@ double misfit_of(std::span<const double> residual2) {
   for (const double s : residual2) sum += student_t_loss(s);
   return sum / (kExpected * static_cast<double>(residual2.size()));
 }
-
-// The cost J(y) = |y|^2 + sum_k rho_k in coordinates whitened by the prior, x = x_0 + sigma y. There the Hessian is I +
-// sum_k w_k B_k^T G_k B_k with G = J^T R^-1 J (3x3): six scalars an observation times b b^T.
-template <class Model>
-class BatchProblem {
- public:
-  BatchProblem(std::span<const Observation> observations, const Model& model, const Basis& deviations,
-               const Vector3d& prior_mean, double huber_deviations)
-      : observations_(observations),
-        model_(model),
-        prior_mean_(prior_mean),
-        huber_deviations_(huber_deviations),
-        n_(deviations.size()),
-        deviations_(deviations),
-        scaled_basis_(n_, static_cast<Index>(observations.size())),
-        R_(observations.size()),
-        R_inverse_(observations.size()),
-        used_(observations.size(), 1),
-        residual2_(observations.size(), 0.0),
-        weight_(observations.size(), 0.0) {
-    for (Index k = 0; k < count(); ++k) {
-      const Observation& observation = observations_[static_cast<std::size_t>(k)];
-      scaled_basis_.col(k) = deviations.cwiseProduct(observation.b);
-      set_covariance(k, observation.R);
-    }
-    g_.resize(count(), 3);
-    G_.resize(count(), 6);
-    weighted_basis_.resize(6 * n_, count());
-  }
-
-  [[nodiscard]] Index count() const noexcept { return scaled_basis_.cols(); }
-  [[nodiscard]] Index dimension() const noexcept { return 3 * n_; }
-
-  // What the phases' deviations make of each observation of the feature that moves as at y comes to its R.
-  void widen(const VectorXd& y) {
-    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>> coefficients(y.data(), n_, 3);
-    for (Index k = 0; k < count(); ++k) {
-      const Observation& observation = observations_[static_cast<std::size_t>(k)];
-      if (observation.b_deviation.size() != n_) continue;
-      Vector2d z;
-      Matrix23d dz_dq;
-      const Vector3d p = prior_mean_ + coefficients.transpose() * scaled_basis_.col(k);
-      if (model_.predict(observation.X_CW * p, z, &dz_dq) != ProjectionStatus::kOk) continue;
-      const Vector3d displaced = coefficients.transpose() * deviations_.cwiseProduct(observation.b_deviation);
-      const Vector2d spread = dz_dq * (observation.X_CW.R * displaced);
-      set_covariance(k, observation.R + spread * spread.transpose());
-    }
-  }
-
-  // What each observation counts with, without the variance scale.
-  [[nodiscard]] const std::vector<Matrix2d>& R() const noexcept { return R_; }
-  // Every R times this; 1 at first.
-  void set_variance_scale(double scale) noexcept { variance_scale_ = scale; }
-  // Which observations count, 1 or 0; the caller decides.
-  [[nodiscard]] std::vector<std::uint8_t>& used() noexcept { return used_; }
-  // At the y last evaluated:
-  [[nodiscard]] const std::vector<double>& residual2() const noexcept { return residual2_; }
-  [[nodiscard]] const std::vector<double>& weight() const noexcept { return weight_; }
-  [[nodiscard]] int visible() const noexcept { return visible_; }
-
-  // J(y); leaves residuals, weights and, for normal_equations(), the first derivatives at y.
-  double evaluate(const VectorXd& y, Loss loss) {
-    double cost = y.squaredNorm();
-    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>> coefficients(y.data(), n_, 3);
-    visible_ = 0;
-    for (Index k = 0; k < count(); ++k) {
-      const auto index = static_cast<std::size_t>(k);
-      const Observation& observation = observations_[index];
-      const Vector3d p = prior_mean_ + coefficients.transpose() * scaled_basis_.col(k);
-      Vector2d z;
-      Matrix23d dz_dq;
-      const bool seen = model_.predict(observation.X_CW * p, z, &dz_dq) == ProjectionStatus::kOk;
-      visible_ += seen ? 1 : 0;
-      double s = kInvisible;
-      Vector2d Wr = Vector2d::Zero();
-      if (seen) {
-        const Vector2d r = model_.residual(observation.z, z);
-        Wr = R_inverse_[index] * r;
-        s = r.dot(Wr);
-      }
-      residual2_[index] = s;
-      if (used_[index] == 0) {
-        g_.row(k).setZero();
-        G_.row(k).setZero();
-        continue;
-      }
-      const LossValue value = loss_of(loss, s / variance_scale_, huber_deviations_);
-      cost += value.rho;
-      weight_[index] = value.weight / variance_scale_;
-      if (!seen) {
-        g_.row(k).setZero();
-        G_.row(k).setZero();
-        continue;
-      }
-      const Matrix23d J = dz_dq * observation.X_CW.R;
-      const Matrix23d WJ = weight_[index] * (R_inverse_[index] * J);
-      const Matrix3d G = J.transpose() * WJ;
-      g_.row(k) = weight_[index] * (J.transpose() * Wr).transpose();
-      G_.row(k) << G(0, 0), G(1, 0), G(2, 0), G(1, 1), G(2, 1), G(2, 2);
-    }
-    return cost;
-  }
-
-  // Half the Hessian (Gauss-Newton, lower triangle) and minus half the gradient at the y last evaluated.
-  void normal_equations(const VectorXd& y, MatrixXd& A, VectorXd& descent) {
-    // The six n x n blocks by one matrix product.
-    for (Index block = 0; block < 6; ++block) {
-      weighted_basis_.middleRows(block * n_, n_).noalias() = scaled_basis_ * G_.col(block).asDiagonal();
-    }
-    blocks_.noalias() = weighted_basis_ * scaled_basis_.transpose();
-    A.resize(dimension(), dimension());
-    Index block = 0;
-    for (Index column = 0; column < 3; ++column) {
-      for (Index row = column; row < 3; ++row, ++block) {
-        A.block(row * n_, column * n_, n_, n_) = blocks_.middleRows(block * n_, n_);
-      }
-    }
-    A.diagonal().array() += 1.0;
-    descent = -y;
-    for (Index axis = 0; axis < 3; ++axis) descent.segment(axis * n_, n_) += scaled_basis_ * g_.col(axis);
-  }
-
- private:
-  void set_covariance(Index k, const Matrix2d& R) {
-    const auto index = static_cast<std::size_t>(k);
-    R_[index] = R;
-    R_inverse_[index] = R.inverse();
-  }
-
-  std::span<const Observation> observations_;
-  const Model& model_;
-  Vector3d prior_mean_;
-  double huber_deviations_;
-  Index n_;
-  Basis deviations_;
-  MatrixXd scaled_basis_;  // n x K: sigma o b of each observation
-  std::vector<Matrix2d> R_;
-  std::vector<Matrix2d> R_inverse_;
-  Eigen::Matrix<double, Eigen::Dynamic, 3> g_;  // J^T R^-1 r w
-  Eigen::Matrix<double, Eigen::Dynamic, 6> G_;  // xx, yx, zx, yy, zy, zz of J^T R^-1 J w
-  MatrixXd weighted_basis_;
-  MatrixXd blocks_;
-  double variance_scale_ = 1.0;
-  std::vector<std::uint8_t> used_;
-  std::vector<double> residual2_;
-  std::vector<double> weight_;
-  int visible_ = 0;
-};
 
 struct Solution {
   VectorXd y;
@@ -379,11 +207,10 @@ BatchStatus refine(BatchProblem<Model>& problem, const BatchSettings& settings, 
   return BatchStatus::kOk;
 }
 
-// State and covariance at the solution, out of the whitened coordinates. False when they are no numbers.
+// State and covariance at the solution, out of the whitened coordinates. False when they are no numbers. Tells
+// PriorStart::prior_misfit.
 template <class Model>
-bool estimate_at(BatchProblem<Model>& problem, const VectorXd& y, const Basis& deviations, const Vector3d& prior_mean,
-                 BatchOutcome& outcome) {
-  const Index n = deviations.size();
+bool estimate_at(BatchProblem<Model>& problem, const VectorXd& y, BatchOutcome& outcome, double& prior_misfit) {
   const Index d = problem.dimension();
   MatrixXd A;
   VectorXd descent;
@@ -392,18 +219,37 @@ bool estimate_at(BatchProblem<Model>& problem, const VectorXd& y, const Basis& d
   const Eigen::LLT<MatrixXd> factor(A);
   if (factor.info() != Eigen::Success) return false;
   const MatrixXd P = factor.solve(MatrixXd::Identity(d, d));
-  VectorXd sigma(d);
-  for (Index axis = 0; axis < 3; ++axis) sigma.segment(axis * n, n) = deviations;
-  FeatureEstimate& estimate = outcome.estimate;
-  estimate.x = sigma.cwiseProduct(y);
-  for (Index axis = 0; axis < 3; ++axis) estimate.x(axis * n) += prior_mean(axis);
-  estimate.P.resize(d, d);
-  for (Index j = 0; j < d; ++j) {
-    for (Index i = j; i < d; ++i) {
-      estimate.P(i, j) = estimate.P(j, i) = 0.5 * (P(i, j) + P(j, i)) * sigma(i) * sigma(j);
-    }
+  // y^ = (I - P) (what the observations say of y), whose expected square is the trace of I - P where the prior is true.
+  prior_misfit = y.squaredNorm() / std::max(static_cast<double>(d) - P.trace(), 1e-9);
+  outcome.estimate.x = problem.state_at(y);
+  outcome.estimate.P = problem.covariance_of_state(P);
+  return outcome.estimate.x.allFinite() && outcome.estimate.P.allFinite();
+}
+
+template <class Model>
+BatchStatus check(std::span<const Observation> observations, const Model& model, int n, const BatchSettings& settings) {
+  if (observations.empty() || static_cast<int>(observations.size()) < settings.min_observations) {
+    return BatchStatus::kTooFewObservations;
   }
-  return estimate.x.allFinite() && estimate.P.allFinite();
+  const bool all_usable = std::all_of(observations.begin(), observations.end(),
+                                      [&](const Observation& observation) { return usable(observation, model, n); });
+  return all_usable ? BatchStatus::kOk : BatchStatus::kBadObservation;
+}
+
+// From a robust solution to what the recursion goes on from. Returns PriorStart::prior_misfit.
+template <class Model>
+double finish(BatchProblem<Model>& problem, Solution& solution, const BatchSettings& settings, BatchOutcome& outcome) {
+  double prior_misfit = 0.0;
+  outcome.status = refine(problem, settings, solution, outcome);
+  if (!outcome.ok()) return prior_misfit;
+  if (!estimate_at(problem, solution.y, outcome, prior_misfit)) {
+    outcome.status = BatchStatus::kDiverged;
+    return prior_misfit;
+  }
+  outcome.inlier = problem.used();
+  outcome.inliers = count_inliers(problem);
+  outcome.R = problem.R();
+  return prior_misfit;
 }
 
 }  // namespace
@@ -412,42 +258,52 @@ template <class Model>
 BatchOutcome batch_start(std::span<const Observation> observations, const Model& model, const BasisLayout& layout,
                          const Prior& prior, const BatchSettings& settings) {
   BatchOutcome outcome;
-  const auto refuse = [&outcome](BatchStatus status) {
-    outcome.status = status;
-    return outcome;
-  };
-  if (observations.empty() || static_cast<int>(observations.size()) < settings.min_observations) {
-    return refuse(BatchStatus::kTooFewObservations);
-  }
-  const int n = layout.size();
-  for (const Observation& observation : observations) {
-    if (!usable(observation, model, n)) return refuse(BatchStatus::kBadObservation);
-  }
+  outcome.status = check(observations, model, layout.size(), settings);
+  if (!outcome.ok()) return outcome;
   Vector3d ray_C;
-  if (!model.ray(observations.front().z, ray_C)) return refuse(BatchStatus::kBadObservation);
+  if (!model.ray(observations.front().z, ray_C)) {
+    outcome.status = BatchStatus::kBadObservation;
+    return outcome;
+  }
   const Pose X_WC = observations.front().X_CW.inverse();
   const Vector3d prior_mean = X_WC * (settings.prior_depth_mm * ray_C);
-  const Basis deviations = prior_deviations(layout, prior);
-  BatchProblem<Model> problem(observations, model, deviations, prior_mean, settings.huber_deviations);
+  const FeaturePrior wide = wide_prior(layout, prior, prior_mean);
+  BatchProblem<Model> problem(observations, model, wide, settings.huber_deviations);
 
   const auto offset_of = [&](double depth_mm) { return Vector3d(X_WC * (depth_mm * ray_C) - prior_mean); };
   Solution solution;
-  const BatchStatus started =
-      best_of_starts(problem, offset_of, deviations(0), n, settings, outcome.iterations, solution);
-  if (started != BatchStatus::kOk) return refuse(started);
-  const BatchStatus refined = refine(problem, settings, solution, outcome);
-  if (refined != BatchStatus::kOk) return refuse(refined);
-  if (!estimate_at(problem, solution.y, deviations, prior_mean, outcome)) return refuse(BatchStatus::kDiverged);
-  outcome.inlier = problem.used();
-  outcome.inliers = count_inliers(problem);
-  outcome.R = problem.R();
-  outcome.status = BatchStatus::kOk;
+  outcome.status =
+      best_of_starts(problem, offset_of, prior.dc_mm, layout.size(), settings, outcome.iterations, solution);
+  if (outcome.ok()) static_cast<void>(finish(problem, solution, settings, outcome));
   return outcome;
+}
+
+template <class Model>
+PriorStart start_from_prior(std::span<const Observation> observations, const Model& model, const FeaturePrior& prior,
+                            const BatchSettings& settings) {
+  PriorStart start;
+  BatchOutcome& outcome = start.outcome;
+  outcome.status = check(observations, model, static_cast<int>(prior.x.size() / 3), settings);
+  if (!outcome.ok()) return start;
+  BatchProblem<Model> problem(observations, model, prior, settings.huber_deviations);
+  std::vector<Solution> rough_solutions;
+  std::optional<Solution> solution =
+      descend(problem, VectorXd::Zero(problem.dimension()), settings, rough_solutions, outcome.iterations);
+  if (!solution || !solution->converged) {
+    outcome.status = problem.visible() == 0 ? BatchStatus::kBehindCamera : BatchStatus::kDiverged;
+    return start;
+  }
+  start.prior_misfit = finish(problem, *solution, settings, outcome);
+  return start;
 }
 
 template BatchOutcome batch_start(std::span<const Observation>, const PixelModel&, const BasisLayout&, const Prior&,
                                   const BatchSettings&);
 template BatchOutcome batch_start(std::span<const Observation>, const BearingModel&, const BasisLayout&, const Prior&,
                                   const BatchSettings&);
+template PriorStart start_from_prior(std::span<const Observation>, const PixelModel&, const FeaturePrior&,
+                                     const BatchSettings&);
+template PriorStart start_from_prior(std::span<const Observation>, const BearingModel&, const FeaturePrior&,
+                                     const BatchSettings&);
 
 }  // namespace perimap

@@ -1,6 +1,7 @@
 #include "core/pipeline/batch_starter.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/pipeline/pose_noise.hpp"
 #include "core/pipeline/try_laws.hpp"
@@ -15,12 +16,13 @@ constexpr std::size_t kTrials = 40;
 
 }  // namespace
 
-BatchStarter::BatchStarter(const PipelineSettings& settings, std::span<FeatureSlot> slots)
+BatchStarter::BatchStarter(const PipelineSettings& settings, std::span<FeatureSlot> slots, SurfaceMaker& surfaces)
     : model_{settings.camera},
       layout_(settings.estimator.layout),
       prior_(settings.estimator.prior),
       batch_(settings.estimator.batch),
       slots_(slots),
+      surfaces_(surfaces),
       trial_stride_((slots.size() + kTrials - 1) / kTrials) {
   for (int i = 0; i < settings.workers; ++i) lanes_.push_back(std::make_unique<Lane>(slots.size()));
 }
@@ -61,17 +63,30 @@ void BatchStarter::wait_until_done() noexcept {
 void BatchStarter::solve(FeatureSlot& slot) noexcept {
   const std::span<const Observation> observations(slot.start.observations.data(),
                                                   static_cast<std::size_t>(slot.start.count));
-  slot.start.outcome = batch_start(observations, model_, layout_, prior_, batch_);
+  const StartAsked asked = slot.start.asked;
+  slot.start.on_surface = SurfaceStartKind::kNotThere;
+  if (asked != StartAsked::kAlone) start_on_newest_surface(slot.start, observations);
+  const bool alone = asked != StartAsked::kOnSurface && slot.start.on_surface != SurfaceStartKind::kStarted;
+  if (alone) slot.start.outcome = batch_start(observations, model_, layout_, prior_, batch_);
   slot.start.trial.reset();
   const auto number = static_cast<std::size_t>(&slot - slots_.data());
   // A tracker's slow error is no noise that a wrong law could be told from.
-  if (slot.start.law.laws().undecided() && slot.slow_error == nullptr && number % trial_stride_ == 0) {
+  if (alone && slot.start.law.laws().undecided() && slot.slow_error == nullptr && number % trial_stride_ == 0) {
     slot.start.trial = try_laws(slot.start, model_, layout_, prior_, batch_);
   }
   if (slot.slow_error != nullptr && slot.start.outcome.ok()) begin_slow_error(slot);
   // Release: the outcome is complete before the worker can see the flag (pairs with the acquire in feature_life).
   slot.start.ready.store(true, std::memory_order_release);
   solved_.post();
+}
+
+// In lockstep, that which was adopted when the start was asked for: the mapper waits for the starts of each frame.
+void BatchStarter::start_on_newest_surface(BatchStartExchange& start, std::span<const Observation> observations) {
+  const std::shared_ptr<const MadeSurface> made = surfaces_.newest();
+  if (made == nullptr || !made->surface) return;
+  SurfaceStart begun = start_on_surface(*made->surface, observations, model_, batch_);
+  start.on_surface = begun.kind;
+  start.outcome = std::move(begun.outcome);
 }
 
 void BatchStarter::begin_slow_error(FeatureSlot& slot) const noexcept {

@@ -9,6 +9,7 @@
 #include "core/estimation/measurement_model.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
+#include "core/pipeline/surface_maker.hpp"
 #include "core/realtime/spsc_ring.hpp"
 #include "core/realtime/wakeup.hpp"
 
@@ -18,7 +19,8 @@ namespace perimap {
 // the mapper while no worker runs.
 class BatchStarter {
  public:
-  BatchStarter(const PipelineSettings& settings, std::span<FeatureSlot> slots);
+  // All but the settings must outlive it.
+  BatchStarter(const PipelineSettings& settings, std::span<FeatureSlot> slots, SurfaceMaker& surfaces);
 
   // Never refused: the rings hold every slot, and a slot has at most one request under way.
   void request(int worker, int slot) noexcept;
@@ -32,6 +34,7 @@ class BatchStarter {
 
  private:
   void solve(FeatureSlot& slot) noexcept;
+  void start_on_newest_surface(BatchStartExchange& start, std::span<const Observation> observations);
   void begin_slow_error(FeatureSlot& slot) const noexcept;
 
   PixelModel model_;
@@ -39,6 +42,7 @@ class BatchStarter {
   Prior prior_;
   BatchSettings batch_;
   std::span<FeatureSlot> slots_;
+  SurfaceMaker& surfaces_;
   std::size_t trial_stride_;  // of slots, with whose starts the laws are tried
   struct Lane {
     explicit Lane(std::size_t capacity) : ring(capacity) {}

@@ -18,19 +18,19 @@ constexpr double kVagueDeviations = 3.0;  // of a converged feature's largest
 constexpr Duration kUnobservedVagueBeforeLost = std::chrono::seconds(1);
 constexpr int kFailedStartsBeforeLost = 3;
 constexpr Duration kConvergenceCheck = std::chrono::milliseconds(500);
-constexpr double kSamePhase_rad = 0.01;      // of a breath
-constexpr int kUpdatesBeforeConverged = 30;  // beyond the start, so that the innovation statistic means something
+constexpr double kSamePhase_rad = 0.01;         // of a breath
+constexpr std::uint32_t kFewestOnSurface = 20;  // matches, so that they can contradict it
+constexpr int kUpdatesBeforeConverged = 30;     // beyond the start, so that the innovation statistic means something
 
-// Fills slot.start from the first held matches. False when one of them can not be used (its frame has left the history
-// or has no phase any more, or its pixel has no ray); the held matches up to it are then dropped.
-bool prepare_start(FeatureSlot& slot, const FrameJob& job, const PixelModel& model,
+// Fills slot.start from the first `count` held matches. False when one of them can not be used (its frame has left the
+// history or has no phase any more, or its pixel has no ray); the held matches up to it are then dropped.
+bool prepare_start(FeatureSlot& slot, std::uint32_t count, const FrameJob& job, const PixelModel& model,
                    const EstimatorSettings& settings) noexcept {
   const auto& depths = settings.batch.start_depths_mm;
   const double depth_mm = depths[depths.size() / 2];  // only scales the pose noise; the start finds the true depth
   slot.start.count = 0;
   slot.start.law = job.law;
-  for (int i = 0; i < settings.start_observations; ++i) {
-    const auto k = static_cast<std::uint32_t>(i);
+  for (std::uint32_t k = 0; k < count; ++k) {
     const HeldMatch& held = slot.held[k];
     const FrameRecord* frame = job.history->find(held.frame_index);
     Vector3d ray_C;
@@ -71,12 +71,17 @@ class Step {
       return frame == nullptr || (frame->phase.exact && !frame->phase.teaches);
     });
     const auto wanted = static_cast<std::uint32_t>(settings_.estimator.start_observations);
-    if (slot_.held.size() < wanted) return LifeEvent::kNone;
-    // The start waits for the end of the last observation's cycle, as all learning does. (A frame that has left the
-    // history or lost its phase is dealt with below.)
-    const FrameRecord* last = job_.history->find(slot_.held[wanted - 1].frame_index);
-    if (last != nullptr && last->measurable && !last->phase.exact) return LifeEvent::kNone;
-    return request_start();
+    const bool surface = job_.surface_there && !slot_.starts_alone;
+    // The start waits for the end of the last observation's cycle, as all learning does.
+    if (slot_.held.size() >= wanted && is_told(wanted - 1)) {
+      return request_start(wanted, surface ? StartAsked::kOnSurfaceOrAlone : StartAsked::kAlone);
+    }
+    if (!surface || slot_.surface_asked || slot_.held.size() < kFewestOnSurface || !is_told(kFewestOnSurface - 1)) {
+      return LifeEvent::kNone;
+    }
+    std::uint32_t told = kFewestOnSurface;
+    while (told < std::min(slot_.held.size(), wanted) && is_told(told)) ++told;
+    return request_start(told, StartAsked::kOnSurface);
   }
 
   LifeEvent starting() noexcept {
@@ -96,8 +101,17 @@ class Step {
         first != nullptr && first->respiration.known &&
         (!breath_before.known || std::abs(std::remainder(first->respiration.phase_rad - breath_before.phase_rad,
                                                          2.0 * std::numbers::pi)) > kSamePhase_rad);
-    if (first != nullptr && (law_told || breath_told)) return request_start();
     const auto used = static_cast<std::uint32_t>(slot_.start.count);
+    if (first != nullptr && (law_told || breath_told)) return request_start(used, slot_.start.asked);
+    const bool asked_surface = slot_.start.asked != StartAsked::kAlone;
+    const bool begun_on_surface = asked_surface && slot_.start.on_surface == SurfaceStartKind::kStarted;
+    const bool contradicts = asked_surface && slot_.start.on_surface == SurfaceStartKind::kContradicts;
+    slot_.starts_alone = slot_.starts_alone || contradicts;
+    if (slot_.start.asked == StartAsked::kOnSurface && !begun_on_surface) {
+      slot_.surface_asked = true;
+      slot_.state = SlotState::kTracked;
+      return contradicts ? LifeEvent::kOffSurface : LifeEvent::kNone;
+    }
     if (!slot_.start.outcome.ok()) {
       // What no start explains is a highlight or an instrument; but not where hardly any feature can be started.
       const bool tried_enough = ++slot_.failed_starts >= kFailedStartsBeforeLost;
@@ -111,10 +125,11 @@ class Step {
     // It is not worth what its covariance says: what is seen from now on shall win.
     if (slot_.start.outcome.contradicted()) bank_.diffuse(feature_, kInflation_mm);
     const Instant last = slot_.start.captures[used - 1];
-    slot_.map({.last_observed = last, .last_learnt = last});
+    slot_.map({.last_observed = last, .last_learnt = last, .began_on_surface = begun_on_surface});
     for (std::uint32_t i = 0; i < used; ++i) slot_.aside.add(slot_.start.poses[i]);
     check_convergence();
-    return LifeEvent::kNone;
+    if (begun_on_surface) return LifeEvent::kBegunOnSurface;
+    return contradicts ? LifeEvent::kOffSurface : LifeEvent::kNone;
   }
 
   LifeEvent mapped() noexcept {
@@ -145,10 +160,18 @@ class Step {
   [[nodiscard]] std::uint64_t now() const noexcept { return job_.frame->index; }
   [[nodiscard]] const FrameRate& rate() const noexcept { return job_.frame->rate; }
 
-  // Of the matches that are held, if all their frames are there.
-  LifeEvent request_start() noexcept {
+  // Whether the phase of that held match is known for good; and where it has none any more, or its frame has left the
+  // history, which prepare_start() deals with.
+  [[nodiscard]] bool is_told(std::uint32_t held) const noexcept {
+    const FrameRecord* frame = job_.history->find(slot_.held[held].frame_index);
+    return frame == nullptr || !frame->measurable || frame->phase.exact;
+  }
+
+  // Of the first `count` matches that are held, if all their frames are there.
+  LifeEvent request_start(std::uint32_t count, StartAsked asked) noexcept {
     slot_.state = SlotState::kTracked;
-    if (!prepare_start(slot_, job_, model_, settings_.estimator)) return LifeEvent::kNone;
+    if (!prepare_start(slot_, count, job_, model_, settings_.estimator)) return LifeEvent::kNone;
+    slot_.start.asked = asked;
     slot_.start.adopt_at_frame = now() + rate().frames(settings_.adoption_delay);
     // Relaxed: housekeeping touches the flag only after it has popped this slot's request, and the ring orders that.
     slot_.start.ready.store(false, std::memory_order_relaxed);
@@ -167,6 +190,7 @@ class Step {
   // id.
   LifeEvent start_anew() noexcept {
     slot_.gather_anew();
+    slot_.starts_alone = true;
     bank_.clear(feature_);
     return LifeEvent::kStartedAnew;
   }

@@ -16,6 +16,8 @@ enum class LifeEvent : std::uint8_t {
   kStartRequested,  // slot.start is filled: hand it to housekeeping
   kAdoptionLate,    // the batch start was due at this frame and is not there
   kStartFailed,     // slot.start.outcome says why; it is tried again with newer observations
+  kBegunOnSurface,  // mapped, by few matches and the surface through the others
+  kOffSurface,      // its matches contradict the surface: it starts alone
   kStartedAnew,     // innovations stayed high: the observations of a new start are being gathered
   // The feature was given up; the slot is empty.
   kLostUnseen,    // not found for too long

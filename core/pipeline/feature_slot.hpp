@@ -20,6 +20,7 @@
 #include "core/pipeline/parallax.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
+#include "core/surface/surface_start.hpp"
 #include "core/time/frame_rate.hpp"
 #include "core/time/instant.hpp"
 #include "core/vision/last_view.hpp"
@@ -97,6 +98,12 @@ struct ObservedCycle {
   RespiratoryPhase respiration;
 };
 
+enum class StartAsked : std::uint8_t {
+  kAlone,            // by its own matches, all that a start takes
+  kOnSurface,        // by few, on the surface that the others have made, or not at all
+  kOnSurfaceOrAlone  // by all that a start takes: on the surface, or where it is not of that, alone
+};
+
 // The hand-over to housekeeping and back: the worker fills `observations`, raises `requested` through its ring, and
 // does not touch the rest before `ready`.
 struct BatchStartExchange {
@@ -106,10 +113,12 @@ struct BatchStartExchange {
   std::array<ObservedCycle, kMaxStartObservations> cycles{};
   LawBelief law;  // by which the observations have their bases
   int count = 0;
+  StartAsked asked = StartAsked::kAlone;
   std::uint64_t adopt_at_frame = 0;
   BatchOutcome outcome;
-  std::optional<LawTrial> trial;  // where more than one law was possible
-  // Housekeeping stores true with release after writing `outcome` and `trial`; the mapper's acquire load then sees all
+  SurfaceStartKind on_surface = SurfaceStartKind::kNotThere;  // what came of that, where it was asked
+  std::optional<LawTrial> trial;                              // where more than one law was possible
+  // Housekeeping stores true with release after writing what comes of it; the mapper's acquire load then sees all
   // of it, and so does a worker, whose stage begins after that.
   std::atomic<bool> ready{false};
   bool due = false;  // the mapper has seen it ready at the frame of its adoption, or later
@@ -145,6 +154,8 @@ struct TrackedFeature {
 struct GatheredMatches {
   HeldMatches held{};
   int failed_starts = 0;
+  bool surface_asked = false;  // and has told nothing of it: next time with all matches that a start takes
+  bool starts_alone = false;   // its matches have contradicted the surface, or the estimate that began on it
 };
 
 // What is known of a feature's estimate. Another estimate is another value.
@@ -156,6 +167,7 @@ struct MappedFeature {
   int updates = 0;
   SeenFromAside aside{};  // of all that the estimate was made from
   double largest_deviation_mm = 0.0;
+  bool began_on_surface = false;
   bool converged = false;
   bool recalled_converged = false;      // it was before a restart: believed until the innovations tell
   std::uint64_t unseen_frames = 0;      // since it was found, in which it could have been searched for

@@ -41,6 +41,7 @@ struct FrameJob {
   const CommonEstimate* shared_pose = nullptr;
   FrameDoubts doubts;
   bool starts_fail_alike = false;  // of more features than have an estimate: it is not the single feature's fault
+  bool surface_there = false;      // made of the mapped features, and good: others can start on it
   LawBelief law;                   // by which the history's phases are told
   Instant learn_until;             // learning that has not begun by then is put off; never in lockstep
 };

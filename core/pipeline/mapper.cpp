@@ -90,6 +90,7 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage&
   job_.doubts.unproven = organ_.unproven();
   job_.doubts.setup_variance_mm2 = watcher_.belief().variance_mm2();
   job_.starts_fail_alike = starts_fail_alike(slots_);
+  job_.surface_there = surface_.there();
   job_.law = phases_.heart().clock().law_belief();
   job_.about_capture = bases_about(settings_.estimator.layout, frame.phase, frame.respiration);
   plan_evaluation(frame);
@@ -234,6 +235,7 @@ void Mapper::finish_learning() noexcept {
   counters_.features_lost_unstarted.add(tally.lost_unstarted);
   for (std::size_t i = 0; i < kBatchStatuses; ++i) counters_.starts_failed[i].add(tally.starts_failed[i]);
   counters_.features_started_anew.add(tally.started_anew);
+  surface_.count_starts(tally.begun_on_surface, tally.off_surface);
   counters_.adoptions_late.add(tally.adoptions_late);
   if (tally.put_off) counters_.learning_put_off.add();
   if (stopwatch_.learnt(tally.ended)) shed_load(tally.put_off);

@@ -55,9 +55,9 @@ struct Pipeline::Parts {
   SensorEntrance entrance;
   WorkerTeam team;
   FeatureFinder finder;
+  SurfaceMaker surface_maker;
   BatchStarter starter;
   SetupWatcher watcher;
-  SurfaceMaker surface_maker;
   std::unique_ptr<ScopeWatch> scope;  // null where pictures are not asked how the scope is turned
   PhaseCells phase_cells;
   Mapper mapper;
@@ -80,9 +80,9 @@ Pipeline::Parts::Parts(const PipelineSettings& of)
                {settings.respiration.search.shortest_period, settings.respiration.search.longest_period}, counters),
       team(settings.workers),
       finder(settings, counters),
-      starter(settings, slots),
-      watcher(settings),
       surface_maker(settings.estimator.layout, slots.size(), kMeshVertices, settings.lockstep),
+      starter(settings, slots, surface_maker),
+      watcher(settings),
       scope(settings.turned_scope || settings.watch_scope ? std::make_unique<ScopeWatch>(settings, counters) : nullptr),
       mapper(settings, slots, team, {finder, starter, watcher, surface_maker, scope.get()},
              {cells, phase_cells, counters}),

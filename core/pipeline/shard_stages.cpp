@@ -13,6 +13,8 @@ void LearningTally::add(const LearningTally& other) noexcept {
   lost_refused += other.lost_refused;
   lost_unstarted += other.lost_unstarted;
   for (std::size_t i = 0; i < kBatchStatuses; ++i) starts_failed[i] += other.starts_failed[i];
+  begun_on_surface += other.begun_on_surface;
+  off_surface += other.off_surface;
   started_anew += other.started_anew;
   adoptions_late += other.adoptions_late;
   put_off = put_off || other.put_off;
@@ -164,6 +166,12 @@ void ShardStages::advance_slot(FeatureGroup& group, std::size_t lane, int worker
       break;
     case LifeEvent::kAdoptionLate:
       ++tally.adoptions_late;
+      break;
+    case LifeEvent::kBegunOnSurface:
+      ++tally.begun_on_surface;
+      break;
+    case LifeEvent::kOffSurface:
+      ++tally.off_surface;
       break;
     case LifeEvent::kStartedAnew:
       ++tally.started_anew;

@@ -25,6 +25,8 @@ struct LearningTally {
   std::uint64_t lost_refused = 0;
   std::uint64_t lost_unstarted = 0;
   std::array<std::uint64_t, kBatchStatuses> starts_failed{};
+  std::uint64_t begun_on_surface = 0;
+  std::uint64_t off_surface = 0;
   std::uint64_t started_anew = 0;
   std::uint64_t adoptions_late = 0;
   bool put_off = false;  // some of it, for want of time

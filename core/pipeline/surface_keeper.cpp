@@ -8,6 +8,7 @@
 namespace perimap {
 namespace {
 
+constexpr int kUpdatesOfItsOwn = 150;
 constexpr Duration kMadeEvery = std::chrono::seconds(1);
 // As long as a feature is believed that nobody sees: the mean camera is where they were seen from.
 constexpr Duration kCameraMemory = kBelievedUnseen;
@@ -27,6 +28,7 @@ void SurfaceKeeper::on_frame(const FrameRecord& frame, PhaseLaw law, double setu
   if (asked_ && frame.index >= adopt_at_) {
     const bool due = frame.index == adopt_at_;
     asked_ = !maker_.adopt();
+    if (!asked_) there_ = maker_.there();
     if (asked_ && due) counters_.adoptions_late.add();
   }
   if (frame.pose.valid()) camera_.add(frame.pose.X_WC.t, frame.rate.frames(kCameraMemory));
@@ -41,8 +43,10 @@ void SurfaceKeeper::gather(const FrameRecord& frame) noexcept {
   for (std::size_t i = 0; i < count; ++i) {
     const FeatureSlot& slot = slots_[next_slot_];
     Gathered& gathered = gathered_[next_slot_];
-    gathered.usable =
-        slot.state == SlotState::kMapped && slot.converged && slot.health.state() != HealthState::kInconsistent;
+    // What began on the surface tells of itself at first what that said.
+    const bool its_own = !slot.began_on_surface || slot.updates >= kUpdatesOfItsOwn;
+    gathered.usable = slot.state == SlotState::kMapped && slot.converged && its_own &&
+                      slot.health.state() != HealthState::kInconsistent;
     if (gathered.usable) {
       bank_.get(static_cast<int>(next_slot_), estimate_);
       if (slot.slow_error != nullptr) estimate_.P += slot.slow_error->covariance();
@@ -79,6 +83,7 @@ void SurfaceKeeper::request(const FrameRecord& frame, PhaseLaw law, double setup
 
 void SurfaceKeeper::begin_again() noexcept {
   maker_.withdraw();
+  there_ = false;
   anew_ = true;
   std::fill(gathered_.begin(), gathered_.end(), Gathered());
   fresh_ = 0;

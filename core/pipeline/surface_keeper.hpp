@@ -25,6 +25,15 @@ class SurfaceKeeper {
   // Once a frame, after its matches are settled. `setup_variance_mm2`: of each published position, by the set-up.
   void on_frame(const FrameRecord& frame, PhaseLaw law, double setup_variance_mm2) noexcept;
 
+  // A surface was adopted, and was not refused or withdrawn since.
+  [[nodiscard]] bool there() const noexcept { return there_; }
+
+  // So many more features have begun on it, and have contradicted it.
+  void count_starts(std::uint64_t begun, std::uint64_t contradicting) noexcept {
+    maker_.starts().begun.add(begun);
+    maker_.starts().contradicting.add(contradicting);
+  }
+
   // What the features are known to do has changed: what was made of it, and is being made, is void.
   void begin_again() noexcept;
   // Likewise, and the camera may be elsewhere: another patient.
@@ -65,6 +74,7 @@ class SurfaceKeeper {
   std::uint64_t next_request_at_ = 0;
   std::uint64_t adopt_at_ = 0;
   bool asked_ = false;
+  bool there_ = false;
   bool anew_ = false;  // since the last request
 };
 

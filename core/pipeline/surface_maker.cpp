@@ -28,6 +28,11 @@ bool SurfaceMaker::adopt() noexcept {
   return true;
 }
 
+bool SurfaceMaker::there() const noexcept {
+  const std::uint64_t adopted = adopted_.load(std::memory_order_relaxed);
+  return made_ && adopted > withdrawn_.load(std::memory_order_relaxed);
+}
+
 void SurfaceMaker::withdraw() noexcept { withdrawn_.store(job_.number, std::memory_order_relaxed); }
 
 void SurfaceMaker::serve() {
@@ -46,9 +51,10 @@ void SurfaceMaker::make() {
     fits_ = 0;
     kernels_ = {};
   }
-  const bool learn = fits_ % kFitsAKernel == 0;
-  auto surface = PeriodicSurface::fit(layout_, job_.evidence, job_.camera_W_mm, {},
-                                      learn ? std::nullopt : std::optional(kernels_), kernels_);
+  KernelSearch search = fits_ % kFitsAKernel == 0 ? KernelSearch::kNearby : KernelSearch::kNone;
+  if (fits_ == 0) search = KernelSearch::kAnew;
+  auto surface = PeriodicSurface::fit(layout_, job_.evidence, job_.camera_W_mm, {}, kernels_, search);
+  made_ = surface.has_value();
   if (surface) {
     ++fits_;
     kernels_ = surface->kernels();

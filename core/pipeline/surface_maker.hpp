@@ -11,6 +11,7 @@
 #include "core/periodic/basis.hpp"
 #include "core/phase/phase_law.hpp"
 #include "core/realtime/background_round.hpp"
+#include "core/realtime/counter.hpp"
 #include "core/surface/periodic_surface.hpp"
 #include "core/surface/surface_mesh.hpp"
 #include "core/time/instant.hpp"
@@ -40,6 +41,12 @@ struct MadeSurface {
   SurfaceMesh mesh;
 };
 
+// Of new features, since start. Written by the mapper thread.
+struct StartsOnSurface {
+  Counter begun;          // by few matches and the surface through the others
+  Counter contradicting;  // its matches are not of that: an instrument, a reflection; it starts alone
+};
+
 // The mapper thread asks and adopts; one job at a time. serve() is the housekeeping thread's; newest() may be called by
 // any thread that is not of the real-time path.
 class SurfaceMaker {
@@ -52,8 +59,12 @@ class SurfaceMaker {
   void request() noexcept;
   // Mapper: takes what was made, from when on newest() gives it. False while it is not there; in lockstep it waits.
   bool adopt() noexcept;
+  // Mapper: what was adopted last is a surface, not a refusal, and has not been withdrawn.
+  [[nodiscard]] bool there() const noexcept;
   // Mapper: all that was asked for so far is not to be used.
   void withdraw() noexcept;
+
+  [[nodiscard]] StartsOnSurface& starts() noexcept { return starts_; }
 
   // Until dismiss().
   void serve();
@@ -69,8 +80,10 @@ class SurfaceMaker {
 
   BasisLayout layout_;
   std::size_t vertices_;
+  StartsOnSurface starts_;
   BackgroundRound hand_over_;
-  SurfaceJob job_;  // handed over: the maker's while one is under way
+  SurfaceJob job_;     // handed over: the maker's while one is under way
+  bool made_ = false;  // likewise: a surface came of it
   // Up to which number the surfaces are adopted and withdrawn. Relaxed: each is a message by itself, the surfaces are
   // guarded by the mutex.
   std::atomic<std::uint64_t> adopted_{0};

@@ -50,7 +50,7 @@ double depth_variance(const SurfaceChart& chart, const ChartedPlaces& places, Ei
 }  // namespace
 
 std::optional<DepthField> DepthField::fit(const SurfaceChart& chart, const ChartedPlaces& places, const Kernel& kernel,
-                                          bool learn) {
+                                          KernelSearch search) {
   DepthField field;
   field.s_mm_ = places.s_mm;
   field.mean_mm_ = places.depth_mm.mean();
@@ -62,7 +62,7 @@ std::optional<DepthField> DepthField::fit(const SurfaceChart& chart, const Chart
   const Eigen::MatrixXd Y = (places.depth_mm.array() - field.mean_mm_).matrix();
   const std::vector<OutputBand> bands = {{0, 1}};
   const KernelProblem problem{r_mm, K_free, 3, field.noise_mm2_, Y, bands};
-  field.kernel_ = learn ? learn_kernel(problem, kernel) : kernel;
+  field.kernel_ = search == KernelSearch::kNone ? kernel : learn_kernel(problem, kernel, search);
   field.process_ = process_with(problem, field.kernel_);
   if (!field.process_) return std::nullopt;
   field.scale_ = perimap::noise_scale(problem, field.kernel_, *field.process_);

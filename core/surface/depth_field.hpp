@@ -21,9 +21,9 @@ struct ChartedPlaces {
 
 class DepthField {
  public:
-  // With `learn` the kernel is learnt from the one given. Nothing when none explains the depths.
+  // The kernel is the one given, or learnt from it. Nothing when none explains the depths.
   [[nodiscard]] static std::optional<DepthField> fit(const SurfaceChart& chart, const ChartedPlaces& places,
-                                                     const Kernel& kernel, bool learn);
+                                                     const Kernel& kernel, KernelSearch search);
 
   [[nodiscard]] const Kernel& kernel() const noexcept { return kernel_; }
   [[nodiscard]] double noise_scale() const noexcept { return scale_; }

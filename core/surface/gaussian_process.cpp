@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace perimap {
 
@@ -21,6 +22,23 @@ Eigen::ArrayXXd distances(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return squared.sqrt();
 }
 
+SignalFit fit_signal(const Eigen::MatrixXd& L, const Eigen::MatrixXd& Z, const std::vector<OutputBand>& bands,
+                     Eigen::Index known) {
+  const double half_log_determinant = L.diagonal().array().log().sum();
+  const double told = static_cast<double>(Z.rows() - known);
+  SignalFit fit;
+  fit.likeliest.resize(static_cast<Eigen::Index>(bands.size()));
+  for (std::size_t b = 0; b < bands.size(); ++b) {
+    const auto [first, count] = bands[b];
+    const auto outputs = static_cast<double>(count);
+    // Below it no output of a heart differs from another.
+    const double likeliest = std::max(Z.middleCols(first, count).squaredNorm() / (told * outputs), 1e-12);
+    fit.cost += outputs * (0.5 * told * std::log(likeliest) + half_log_determinant);
+    fit.likeliest[static_cast<Eigen::Index>(b)] = likeliest;
+  }
+  return fit;
+}
+
 std::optional<GaussianProcess> GaussianProcess::create(const Eigen::MatrixXd& K, const Eigen::VectorXd& nu,
                                                        Eigen::MatrixXd Y, std::vector<OutputBand> bands,
                                                        Eigen::Index known) {
@@ -29,23 +47,17 @@ std::optional<GaussianProcess> GaussianProcess::create(const Eigen::MatrixXd& K,
   process.L_.diagonal() += nu;
   Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> cholesky(process.L_);
   if (cholesky.info() != Eigen::Success) return std::nullopt;
-  process.alpha_ = cholesky.solve(Y);
-  const double half_log_determinant = process.L_.diagonal().array().log().sum();
-  const auto N = static_cast<double>(Y.rows());
-  const double told = N - static_cast<double>(known);
-  process.signal_variances_.resize(static_cast<Eigen::Index>(bands.size()));
+  process.alpha_ = cholesky.matrixL().solve(Y);
+  SignalFit fit = fit_signal(process.L_, process.alpha_, bands, known);
+  if (!std::isfinite(fit.cost)) return std::nullopt;
+  cholesky.matrixU().solveInPlace(process.alpha_);
+  process.cost_ = fit.cost;
+  process.signal_variances_ = std::move(fit.likeliest);
   for (std::size_t b = 0; b < bands.size(); ++b) {
-    const auto [first, count] = bands[b];
-    const auto outputs = static_cast<double>(count);
-    const double squares = (Y.middleCols(first, count).array() * process.alpha_.middleCols(first, count).array()).sum();
-    // Below it no output of a heart differs from another.
-    const double likeliest = std::max(squares / (told * outputs), 1e-12);
-    process.cost_ += outputs * (0.5 * told * std::log(likeliest) + half_log_determinant);
     // Student's t has this variance where the scale was told by so many numbers.
-    const double degrees = told * outputs;
-    process.signal_variances_[static_cast<Eigen::Index>(b)] = likeliest * degrees / std::max(degrees - 2.0, 1.0);
+    const double degrees = static_cast<double>((Y.rows() - known) * bands[b].count);
+    process.signal_variances_[static_cast<Eigen::Index>(b)] *= degrees / std::max(degrees - 2.0, 1.0);
   }
-  if (!std::isfinite(process.cost_)) return std::nullopt;
   process.Y_ = std::move(Y);
   process.nu_ = nu;
   process.bands_ = std::move(bands);

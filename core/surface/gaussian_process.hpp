@@ -24,6 +24,17 @@ struct OutputBand {
   Eigen::Index count = 0;
 };
 
+// The likeliest variances of the signal, and how likely that makes the data.
+struct SignalFit {
+  Eigen::VectorXd likeliest;  // sigma_b^2, of the outputs' unit squared
+  double cost = 0.0;          // minus the logarithm of the marginal likelihood, but for constants
+};
+
+// L: lower triangle of the Cholesky factor of K + diag(nu), whose upper one is not looked at; Z = L^-1 Y. `known` as in
+// GaussianProcess::create().
+[[nodiscard]] SignalFit fit_signal(const Eigen::MatrixXd& L, const Eigen::MatrixXd& Z,
+                                   const std::vector<OutputBand>& bands, Eigen::Index known);
+
 class GaussianProcess {
  public:
   // K: N x N, symmetric; nu: N, not negative; Y: N x C. Nothing when K + diag(nu) is not positive definite to rounding.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
 #include "core/surface/gaussian_process.hpp"
@@ -32,9 +33,17 @@ struct KernelProblem {
 // How many times the claimed variances the observations are off by, as the kernel and the process have it.
 [[nodiscard]] double noise_scale(const KernelProblem& problem, const Kernel& kernel, const GaussianProcess& process);
 
+// Whether kernels are learnt, and how.
+enum class KernelSearch : std::uint8_t {
+  kNone,
+  kNearby,  // from what was learnt of nearly the same places
+  kAnew     // from anywhere
+};
+
 // From `start` down to the minimum of the cost, by a pattern search in the logarithms; the same on every machine that
-// rounds alike. Weak priors, which matter for a handful of places alone: the length is about 40 mm, the claimed
-// variances are about right.
-[[nodiscard]] Kernel learn_kernel(const KernelProblem& problem, const Kernel& start);
+// rounds alike. Where there are more than 128 places, by 128 that are spread over them. Weak priors, which matter for a
+// handful of places alone: the length is about 40 mm, the claimed variances are about right.
+[[nodiscard]] Kernel learn_kernel(const KernelProblem& problem, const Kernel& start,
+                                  KernelSearch search = KernelSearch::kAnew);
 
 }  // namespace perimap

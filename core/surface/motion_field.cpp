@@ -20,14 +20,14 @@ Eigen::MatrixXd with_free_mean(const Eigen::ArrayXXd& r_mm, double length_mm) {
 }  // namespace
 
 bool MotionField::fit(Direction& direction, const Eigen::MatrixXd& outputs_mm, Eigen::Index outputs_a_band,
-                      const Eigen::VectorXd& noise_mm2, const Eigen::ArrayXXd& r_mm, bool learn) {
+                      const Eigen::VectorXd& noise_mm2, const Eigen::ArrayXXd& r_mm, KernelSearch search) {
   direction.offset_mm = outputs_mm.colwise().mean();
   const Eigen::MatrixXd Y = outputs_mm.rowwise() - direction.offset_mm;
   const Eigen::MatrixXd K_free = Eigen::MatrixXd::Constant(r_mm.rows(), r_mm.cols(), kFreeMean);
   std::vector<OutputBand> bands;
   for (Eigen::Index first = 0; first < Y.cols(); first += outputs_a_band) bands.push_back({first, outputs_a_band});
   const KernelProblem problem{r_mm, K_free, 1, noise_mm2, Y, bands};
-  if (learn) direction.kernel = learn_kernel(problem, direction.kernel);
+  if (search != KernelSearch::kNone) direction.kernel = learn_kernel(problem, direction.kernel, search);
   direction.process = process_with(problem, direction.kernel);
   if (!direction.process) return false;
   direction.scale = noise_scale(problem, direction.kernel, *direction.process);
@@ -35,7 +35,7 @@ bool MotionField::fit(Direction& direction, const Eigen::MatrixXd& outputs_mm, E
 }
 
 std::optional<MotionField> MotionField::fit(const ChartedMotion& motion, const Eigen::ArrayXXd& r_mm,
-                                            const Kernels& kernels, bool learn) {
+                                            const Kernels& kernels, KernelSearch search) {
   MotionField field;
   field.noise_A_mm2_ = motion.noise_A_mm2;
   field.across_.kernel = kernels.across;
@@ -45,18 +45,28 @@ std::optional<MotionField> MotionField::fit(const ChartedMotion& motion, const E
   const Eigen::VectorXd across =
       (motion.noise_A_mm2.row(kXx) + motion.noise_A_mm2.row(kYy)).transpose() * (0.5 / static_cast<double>(bands));
   const Eigen::VectorXd along = motion.noise_A_mm2.row(kZz).transpose() / static_cast<double>(bands);
-  if (!fit(field.across_, motion.across_mm, 4, across, r_mm, learn)) return std::nullopt;
-  if (!fit(field.along_, motion.along_mm, 2, along, r_mm, learn)) return std::nullopt;
+  if (!fit(field.across_, motion.across_mm, 4, across, r_mm, search)) return std::nullopt;
+  if (!fit(field.along_, motion.along_mm, 2, along, r_mm, search)) return std::nullopt;
   field.kernels_ = {field.across_.kernel, field.along_.kernel};
   return field;
 }
 
-MotionField::Prediction MotionField::at(const Eigen::ArrayXXd& r_mm) const {
+MotionField::Weights MotionField::weights(const Eigen::ArrayXXd& r_mm) const {
   const Eigen::ArrayXd own = Eigen::ArrayXd::Constant(r_mm.cols(), 1.0 + kFreeMean);
   const Eigen::MatrixXd K_across = with_free_mean(r_mm, across_.kernel.length_mm);
   const Eigen::MatrixXd K_along = with_free_mean(r_mm, along_.kernel.length_mm);
-  const Eigen::MatrixXd W_across = across_.process->weights(K_across);
-  const Eigen::MatrixXd W_along = along_.process->weights(K_along);
+  Weights weights;
+  weights.across = across_.process->weights(K_across);
+  weights.along = along_.process->weights(K_along);
+  weights.unexplained_across = across_.process->unexplained(K_across, weights.across, own);
+  weights.unexplained_along = along_.process->unexplained(K_along, weights.along, own);
+  return weights;
+}
+
+MotionField::Prediction MotionField::at(const Eigen::ArrayXXd& r_mm) const {
+  const Weights weights = this->weights(r_mm);
+  const Eigen::MatrixXd& W_across = weights.across;
+  const Eigen::MatrixXd& W_along = weights.along;
 
   Prediction prediction;
   prediction.across_mm = (W_across.transpose() * across_.process->Y()).rowwise() + across_.offset_mm;
@@ -89,10 +99,8 @@ MotionField::Prediction MotionField::at(const Eigen::ArrayXXd& r_mm) const {
   covariance.row(kZz).array() += share_along * common.col(kZz).transpose();
 
   // What interpolating leaves.
-  const Eigen::ArrayXd left_across =
-      across_.process->signal_variances().sum() * across_.process->unexplained(K_across, W_across, own);
-  const Eigen::ArrayXd left_along =
-      along_.process->signal_variances().sum() * along_.process->unexplained(K_along, W_along, own);
+  const Eigen::ArrayXd left_across = variances_across().sum() * weights.unexplained_across;
+  const Eigen::ArrayXd left_along = variances_along().sum() * weights.unexplained_along;
   covariance.row(kXx).array() += left_across.transpose();
   covariance.row(kYy).array() += left_across.transpose();
   covariance.row(kZz).array() += left_along.transpose();

@@ -28,12 +28,25 @@ class MotionField {
     Kernel along;
   };
 
-  // r_mm: N x N, distances of the mean places in space. With `learn` the kernels are learnt from those given. Nothing
-  // when none explains the motion.
+  // r_mm: N x N, distances of the mean places in space. The kernels are those given, or learnt from them.
+  // Nothing when none explains the motion.
   [[nodiscard]] static std::optional<MotionField> fit(const ChartedMotion& motion, const Eigen::ArrayXXd& r_mm,
-                                                      const Kernels& kernels, bool learn);
+                                                      const Kernels& kernels, KernelSearch search);
 
   [[nodiscard]] const Kernels& kernels() const noexcept { return kernels_; }
+
+  // How the features' coefficients make those of V places, and what that leaves of each place's own.
+  struct Weights {
+    Eigen::MatrixXd across;             // N x V
+    Eigen::MatrixXd along;              // N x V
+    Eigen::ArrayXd unexplained_across;  // V; times a band's variance
+    Eigen::ArrayXd unexplained_along;
+  };
+  // r_mm: N x V, distances of the features' mean places from V others.
+  [[nodiscard]] Weights weights(const Eigen::ArrayXXd& r_mm) const;
+  // Of one coefficient of each band, mm^2.
+  [[nodiscard]] const Eigen::VectorXd& variances_across() const noexcept { return across_.process->signal_variances(); }
+  [[nodiscard]] const Eigen::VectorXd& variances_along() const noexcept { return along_.process->signal_variances(); }
 
   struct Prediction {
     Eigen::MatrixXd across_mm;   // V x 4 B, as in ChartedMotion
@@ -62,7 +75,7 @@ class MotionField {
 
   MotionField() = default;
   [[nodiscard]] static bool fit(Direction& direction, const Eigen::MatrixXd& outputs_mm, Eigen::Index outputs_a_band,
-                                const Eigen::VectorXd& noise_mm2, const Eigen::ArrayXXd& r_mm, bool learn);
+                                const Eigen::VectorXd& noise_mm2, const Eigen::ArrayXXd& r_mm, KernelSearch search);
 
   Kernels kernels_;
   Direction across_;

@@ -10,20 +10,6 @@ namespace {
 
 constexpr int kLowHarmonics = 2;
 
-// Bands of a group, first and behind the last, as surface_evidence.hpp counts them.
-std::pair<int, int> bands_of(const BasisLayout& layout, HarmonicGroup group) {
-  const int cardiac = layout.cardiac_harmonics;
-  switch (group) {
-    case HarmonicGroup::kLow:
-      return {0, std::min(kLowHarmonics, cardiac)};
-    case HarmonicGroup::kHigh:
-      return {std::min(kLowHarmonics, cardiac), cardiac};
-    case HarmonicGroup::kBreath:
-      break;
-  }
-  return {cardiac, bands(layout)};
-}
-
 tl::unexpected<SurfaceRefusal> refuse(SurfaceRefusalKind kind, std::string message) {
   return tl::unexpected(SurfaceRefusal{kind, std::move(message)});
 }
@@ -49,36 +35,52 @@ std::string of_feature(std::uint32_t id) { return "feature " + std::to_string(id
 
 }  // namespace
 
-tl::expected<PeriodicSurface, SurfaceRefusal> PeriodicSurface::fit(
-    const BasisLayout& layout, std::span<const SurfaceEvidence> evidence, const Vector3d& camera_W,
-    const SurfaceSettings& settings, const std::optional<SurfaceKernels>& kernels, const SurfaceKernels& start) {
+std::pair<int, int> bands_of(const BasisLayout& layout, HarmonicGroup group) noexcept {
+  const int cardiac = layout.cardiac_harmonics;
+  switch (group) {
+    case HarmonicGroup::kLow:
+      return {0, std::min(kLowHarmonics, cardiac)};
+    case HarmonicGroup::kHigh:
+      return {std::min(kLowHarmonics, cardiac), cardiac};
+    case HarmonicGroup::kBreath:
+      break;
+  }
+  return {cardiac, bands(layout)};
+}
+
+tl::expected<PeriodicSurface, SurfaceRefusal> PeriodicSurface::fit(const BasisLayout& layout,
+                                                                   std::span<const SurfaceEvidence> evidence,
+                                                                   const Vector3d& camera_W,
+                                                                   const SurfaceSettings& settings,
+                                                                   const SurfaceKernels& kernels, KernelSearch search) {
   PeriodicSurface surface;
   surface.layout_ = layout;
   surface.settings_ = settings;
-  surface.kernels_ = kernels.value_or(start);
+  surface.kernels_ = kernels;
   surface.evidence_.assign(evidence.begin(), evidence.end());
   // What contradicts the others is left out, and they are asked again: it may have hidden a second one.
   constexpr int kRounds = 3;
   for (int round = 0; round < kRounds; ++round) {
-    if (auto fitted = surface.fit_to_evidence(camera_W, !kernels.has_value()); !fitted) {
+    if (auto fitted = surface.fit_to_evidence(camera_W, search); !fitted) {
       return tl::unexpected(std::move(fitted.error()));
     }
     if (!surface.leave_out_contradicted()) break;
+    if (search == KernelSearch::kAnew) search = KernelSearch::kNearby;
   }
   return surface;
 }
 
-tl::expected<void, SurfaceRefusal> PeriodicSurface::fit_to_evidence(const Vector3d& camera_W, bool learn) {
+tl::expected<void, SurfaceRefusal> PeriodicSurface::fit_to_evidence(const Vector3d& camera_W, KernelSearch search) {
   if (auto placed = place_features(camera_W); !placed) return placed;
-  depth_ = DepthField::fit(chart_, places_, kernels_.depth, learn);
+  depth_ = DepthField::fit(chart_, places_, kernels_.depth, search);
   if (!depth_) return refuse(SurfaceRefusalKind::kNoKernel, "the depths of the features fit no smooth surface");
   kernels_.depth = depth_->kernel();
   const Eigen::ArrayXXd r_mm = distances(p_W_mm_, p_W_mm_);
-  for (const HarmonicGroup group : {HarmonicGroup::kLow, HarmonicGroup::kHigh, HarmonicGroup::kBreath}) {
+  for (const HarmonicGroup group : kEveryHarmonicGroup) {
     const auto [first, end] = bands_of(layout_, group);
     if (first == end) continue;
     const auto g = static_cast<std::size_t>(group);
-    motion_[g] = MotionField::fit(charted_motion(group), r_mm, kernels_.motion[g], learn);
+    motion_[g] = MotionField::fit(charted_motion(group), r_mm, kernels_.motion[g], search);
     if (!motion_[g]) return refuse(SurfaceRefusalKind::kNoKernel, "the motions of the features fit no smooth surface");
     kernels_.motion[g] = motion_[g]->kernels();
   }
@@ -220,10 +222,12 @@ bool PeriodicSurface::leave_out_contradicted() {
   return true;
 }
 
-// Of the depth at a place beyond the last features, so far from the nearest: what is not known there of how the surface
-// curves. An organ may begin to turn away within any millimetre.
-double PeriodicSurface::turning_away_mm(const Vector2d& s, double depth_mm, double beyond_mm) const {
+// So far from the nearest feature, what is not known there of how the surface curves. An organ may begin to turn away
+// within any millimetre.
+double PeriodicSurface::turning_variance_mm2(const Vector2d& s, double depth_mm) const {
   constexpr double kRadius_mm = 40.0;  // as a heart's
+  const double beyond_mm = support_->beyond_mm(s);
+  if (!(beyond_mm > 0.0)) return 0.0;
   // Tangents of depth (s / d, 1).
   const Vector2d slope = depth_->slope_at(s);
   const Vector3d ray(s.x() / chart_.depth_mm, s.y() / chart_.depth_mm, 1.0);
@@ -231,7 +235,8 @@ double PeriodicSurface::turning_away_mm(const Vector2d& s, double depth_mm, doub
   const Vector3d along_y = slope.y() * ray + depth_mm / chart_.depth_mm * Vector3d::UnitY();
   const Vector3d normal = along_x.cross(along_y);
   const double cosine = std::max(std::abs(normal.dot(ray)) / (normal.norm() * ray.norm()), 0.05);
-  return beyond_mm * beyond_mm / (2.0 * kRadius_mm * cosine * cosine * cosine);
+  const double turning_mm = beyond_mm * beyond_mm / (2.0 * kRadius_mm * cosine * cosine * cosine);
+  return turning_mm * turning_mm;
 }
 
 PredictedPlaces PeriodicSurface::predict(std::span<const Vector2d> places) const {
@@ -261,16 +266,11 @@ void PeriodicSurface::predict_block(std::span<const Vector2d> places, Eigen::Ind
     p_W_mm.col(v) = chart_.point_at(s_mm.col(v), depth.depth_mm(v));
     out.coefficients_W_mm.block<3, 1>(3 * (first + v), 0) = p_W_mm.col(v);
     const Vector3d ray_A(s_mm(0, v) / chart_.depth_mm, s_mm(1, v) / chart_.depth_mm, 1.0);
-    double variance_mm2 = depth.variance_mm2(v);
-    const Vector2d& place = places[static_cast<std::size_t>(v)];
-    if (const double beyond_mm = support_->beyond_mm(place); beyond_mm > 0.0) {
-      const double turning_mm = turning_away_mm(place, depth.depth_mm(v), beyond_mm);
-      variance_mm2 += turning_mm * turning_mm;
-    }
+    const double variance_mm2 = depth.variance_mm2(v) + turning_variance_mm2(s_mm.col(v), depth.depth_mm(v));
     covariance_A_mm2.col(v) = variance_mm2 * to_six(ray_A * ray_A.transpose());
   }
   const Eigen::ArrayXXd r_mm = distances(p_W_mm_, p_W_mm);
-  for (const HarmonicGroup group : {HarmonicGroup::kLow, HarmonicGroup::kHigh, HarmonicGroup::kBreath}) {
+  for (const HarmonicGroup group : kEveryHarmonicGroup) {
     const auto& motion = motion_[static_cast<std::size_t>(group)];
     if (!motion) continue;
     const MotionField::Prediction predicted = motion->at(r_mm);

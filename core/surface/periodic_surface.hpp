@@ -15,6 +15,7 @@
 #include <span>
 #include <string>
 #include <tl/expected.hpp>
+#include <utility>
 #include <vector>
 
 #include "core/periodic/basis.hpp"
@@ -34,7 +35,10 @@ struct SurfaceSettings {
 
 // Harmonics that have their kernels in common.
 enum class HarmonicGroup : std::uint8_t { kLow, kHigh, kBreath };
+inline constexpr std::array kEveryHarmonicGroup = {HarmonicGroup::kLow, HarmonicGroup::kHigh, HarmonicGroup::kBreath};
 inline constexpr std::size_t kHarmonicGroups = 3;
+// The bands of a group, first and behind the last, as surface_evidence.hpp counts them.
+[[nodiscard]] std::pair<int, int> bands_of(const BasisLayout& layout, HarmonicGroup group) noexcept;
 struct SurfaceKernels {
   Kernel depth;
   std::array<MotionField::Kernels, kHarmonicGroups> motion;
@@ -68,12 +72,14 @@ struct SurfaceAgreement {
 
 class PeriodicSurface {
  public:
-  // `camera_W` (mm): where the camera has been in the mean. With `kernels` those are used, else they are learnt, from
-  // `start`. The result is a function of the arguments alone.
-  [[nodiscard]] static tl::expected<PeriodicSurface, SurfaceRefusal> fit(
-      const BasisLayout& layout, std::span<const SurfaceEvidence> evidence, const Vector3d& camera_W,
-      const SurfaceSettings& settings = {}, const std::optional<SurfaceKernels>& kernels = std::nullopt,
-      const SurfaceKernels& start = {});
+  // `camera_W` (mm): where the camera has been in the mean. The kernels are those given, or learnt from them. The
+  // result is a function of the arguments alone.
+  [[nodiscard]] static tl::expected<PeriodicSurface, SurfaceRefusal> fit(const BasisLayout& layout,
+                                                                         std::span<const SurfaceEvidence> evidence,
+                                                                         const Vector3d& camera_W,
+                                                                         const SurfaceSettings& settings = {},
+                                                                         const SurfaceKernels& kernels = {},
+                                                                         KernelSearch search = KernelSearch::kAnew);
 
   [[nodiscard]] const BasisLayout& layout() const noexcept { return layout_; }
   [[nodiscard]] const SurfaceChart& chart() const noexcept { return chart_; }
@@ -84,6 +90,11 @@ class PeriodicSurface {
   [[nodiscard]] const std::array<std::optional<MotionField>, kHarmonicGroups>& motion() const noexcept {
     return motion_;
   }
+
+  // What one feature makes of a place goes by their distance; mean places of the features, 3 x N, mm, W.
+  [[nodiscard]] const Eigen::Matrix3Xd& mean_places() const noexcept { return p_W_mm_; }
+  // Of the depth at a place beyond the last features: by what the organ may have begun to turn away there. 0 elsewhere.
+  [[nodiscard]] double turning_variance_mm2(const Vector2d& s, double depth_mm) const;
 
   // At places of the chart (mm). Those without support have figures all the same, and are to be refused.
   [[nodiscard]] PredictedPlaces predict(std::span<const Vector2d> places) const;
@@ -98,13 +109,12 @@ class PeriodicSurface {
  private:
   PeriodicSurface() = default;
 
-  [[nodiscard]] tl::expected<void, SurfaceRefusal> fit_to_evidence(const Vector3d& camera_W, bool learn);
+  [[nodiscard]] tl::expected<void, SurfaceRefusal> fit_to_evidence(const Vector3d& camera_W, KernelSearch search);
   [[nodiscard]] tl::expected<void, SurfaceRefusal> place_features(const Vector3d& camera_W);
   [[nodiscard]] ChartedMotion charted_motion(HarmonicGroup group) const;
   // By how many deviations each feature is off what all others make of it; sets agreement_.
   [[nodiscard]] std::vector<double> leave_one_out();
   [[nodiscard]] bool leave_out_contradicted();
-  [[nodiscard]] double turning_away_mm(const Vector2d& s, double depth_mm, double beyond_mm) const;
   void predict_block(std::span<const Vector2d> places, Eigen::Index first, PredictedPlaces& out) const;
 
   BasisLayout layout_;

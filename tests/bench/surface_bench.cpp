@@ -57,20 +57,23 @@ std::vector<SurfaceEvidence> features(std::size_t count) {
 }
 
 void run() {
-  std::printf("| features | learn kernels and fit, ms | fit, ms | 1000 vertices, ms |\n|---|---|---|---|\n");
+  std::printf(
+      "| features | learn kernels anew and fit, ms | from nearby, ms | fit, ms | 1000 vertices, ms "
+      "|\n|---|---|---|---|---|\n");
   for (const std::size_t count : {20U, 50U, 100U, 200U, 500U}) {
     const auto evidence = features(count);
     const int rounds = count > 200 ? 3 : 11;
     std::optional<PeriodicSurface> surface;
-    const auto fit = [&](const std::optional<SurfaceKernels>& kernels) {
-      surface.emplace(PeriodicSurface::fit(kEightHarmonics, evidence, Vector3d::Zero(), {}, kernels).value());
+    const auto fit = [&](const SurfaceKernels& kernels, KernelSearch search) {
+      surface.emplace(PeriodicSurface::fit(kEightHarmonics, evidence, Vector3d::Zero(), {}, kernels, search).value());
     };
-    const double learnt = milliseconds(rounds, [&] { fit(std::nullopt); });
+    const double learnt = milliseconds(rounds, [&] { fit({}, KernelSearch::kAnew); });
     const SurfaceKernels kernels = surface->kernels();
-    const double fitted = milliseconds(rounds, [&] { fit(kernels); });
+    const double near = milliseconds(rounds, [&] { fit(kernels, KernelSearch::kNearby); });
+    const double fitted = milliseconds(rounds, [&] { fit(kernels, KernelSearch::kNone); });
     SurfaceMesh mesh;
     const double meshed = milliseconds(rounds, [&] { mesh = mesh_of(*surface, 1200); });
-    std::printf("| %zu | %.1f | %.2f | %.2f (%d) |\n", count, learnt, fitted, meshed,
+    std::printf("| %zu | %.1f | %.1f | %.2f | %.2f (%d) |\n", count, learnt, near, fitted, meshed,
                 static_cast<int>(mesh.vertices()));
   }
   std::printf("\n| vertices | evaluate, ms |\n|---|---|\n");

@@ -41,6 +41,8 @@ void motion_that_breathes(const Extent& extent, const HeartMesh& heart, GoalRepo
 void pose_errors(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Path error and covariance of maps that learn with the phase of completed cycles, beside maps that learn at once.
 void learning_late(const Extent& extent, const HeartMesh& heart, GoalReport& report);
+// New features beside a map: started from the surface through it, and from their own prior.
+void starts_on_the_surface(const Extent& extent, const HeartMesh& heart, GoalReport& report);
 // Beats found in real ECG records with disturbances added, and which rhythms are called unpredictable;
 // docs/evidence/ecg.md.
 void beats_under_disturbances(const Extent& extent, const HeartMesh& heart, GoalReport& report);

@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
                                           {"harmonics", perimap::test::motion_with_many_harmonics},
                                           {"pose", perimap::test::pose_errors},
                                           {"late", perimap::test::learning_late},
+                                          {"surface", perimap::test::starts_on_the_surface},
                                           {"ecg", perimap::test::beats_under_disturbances},
                                           {"horizons", perimap::test::displayed_ahead},
                                           {"ventilated", perimap::test::ventilated}};
@@ -30,11 +31,11 @@ int main(int argc, char** argv) {
       "and of what the whole pipeline displays");
   Extent extent;
   std::vector<std::string> chosen;
-  app.add_option(
-         "GOALS", chosen,
-         "lost, optimal, drift, breath, harmonics, pose, late, ecg, horizons, ventilated; all when none is named")
-      ->check(CLI::IsMember(
-          {"lost", "optimal", "drift", "breath", "harmonics", "pose", "late", "ecg", "horizons", "ventilated"}));
+  app.add_option("GOALS", chosen,
+                 "lost, optimal, drift, breath, harmonics, pose, late, surface, ecg, horizons, ventilated; all when "
+                 "none is named")
+      ->check(CLI::IsMember({"lost", "optimal", "drift", "breath", "harmonics", "pose", "late", "surface", "ecg",
+                             "horizons", "ventilated"}));
   app.add_flag("--long", extent.whole, "As many trials as the figures in docs/evidence");
   app.add_option("--seed", extent.seed, "Another seed, other trials")->capture_default_str();
   HorizonScenes& scenes = extent.horizons;
@@ -51,7 +52,8 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   for (const std::string& name : law_names) scenes.laws.push_back(laws.at(name));
   if (chosen.empty())
-    chosen = {"lost", "optimal", "drift", "breath", "harmonics", "pose", "late", "ecg", "horizons", "ventilated"};
+    chosen = {"lost", "optimal", "drift", "breath",   "harmonics", "pose",
+              "late", "surface", "ecg",   "horizons", "ventilated"};
   try {
     const auto heart = perimap::load_heart();
     if (!heart) throw std::runtime_error(heart.error().message);

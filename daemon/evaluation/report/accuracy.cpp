@@ -67,6 +67,47 @@ class Spans {
   std::vector<std::size_t> last_;
 };
 
+// Of features that are seen for the first time.
+class NewTally {
+ public:
+  // Of each published position. `seen_s`: when the feature was first seen, `t_s`: of the sample.
+  void add(std::uint32_t id, double seen_s, double t_s, bool converged) {
+    if (seen_s < kMapAfter_s) return;
+    to_published_s_.try_emplace(id, t_s - seen_s);
+    if (converged) to_converged_s_.try_emplace(id, t_s - seen_s);
+  }
+  void add_error(double seen_s, double t_s, bool converged, double error_mm, double nees) {
+    if (seen_s < kMapAfter_s || t_s - seen_s > kYoung_s || !converged) return;
+    errors_mm_.push_back(error_mm);
+    nees_ += nees;
+  }
+  [[nodiscard]] NewFeatures figures() const {
+    NewFeatures figures;
+    figures.published = to_published_s_.size();
+    figures.converged = to_converged_s_.size();
+    figures.to_published_s = middle(to_published_s_);
+    figures.to_converged_s = middle(to_converged_s_);
+    figures.young = figures_of(errors_mm_);
+    if (!errors_mm_.empty()) figures.young_nees = nees_ / static_cast<double>(errors_mm_.size());
+    return figures;
+  }
+
+ private:
+  static constexpr double kMapAfter_s = 5.0;
+  static constexpr double kYoung_s = 5.0;
+
+  static double middle(const std::map<std::uint32_t, double>& seconds) {
+    std::vector<double> values;
+    for (const auto& [id, value] : seconds) values.push_back(value);
+    return figures_of(std::move(values)).median_mm;
+  }
+
+  std::map<std::uint32_t, double> to_published_s_;
+  std::map<std::uint32_t, double> to_converged_s_;
+  std::vector<double> errors_mm_;
+  double nees_ = 0.0;
+};
+
 // One published position beside the true one.
 struct Compared {
   std::uint32_t id = 0;
@@ -74,6 +115,12 @@ struct Compared {
   Vector3d published;
   Vector3d truth;
   Matrix3d P_mm2;
+
+  [[nodiscard]] double error_mm() const { return (published - truth).norm(); }
+  [[nodiscard]] double nees() const {
+    const Vector3d e = published - truth;
+    return e.dot(P_mm2.ldlt().solve(e)) / 3.0;
+  }
 };
 
 // What the samples say, taken in one after the other.
@@ -107,9 +154,8 @@ class Tally {
   void add_without_truth(std::uint32_t id) { without_truth_.insert(id); }
 
   void add(const Compared& feature, bool on_path) {
-    const Vector3d e = feature.published - feature.truth;
-    const double error = e.norm();
-    const double nees = e.dot(feature.P_mm2.ldlt().solve(e)) / 3.0;
+    const double error = feature.error_mm();
+    const double nees = feature.nees();
     seconds_.add_error(t_s_, error, nees);
     cycles_.add_error(t_s_, error, nees);
     feature_errors_[feature.id].push_back(error);
@@ -302,12 +348,16 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
     if (const double t = since_start(r); t >= 0.0 && t <= end_s) cycle_edges.push_back(t);
   }
   Tally tally(second_edges, cycle_edges);
+  NewTally new_tally;
   for (const SampleRange& sample : samples_) {
     const Instant valid_time = sample.valid_time + to_recording;
     const double t = since_start(valid_time);
     tally.begin_sample(t, sample.state, before_premature_beat_is_known(sample.released + to_recording));
     for (std::size_t i = sample.begin; i < sample.end; ++i) {
       const Published& feature = published_[i];
+      const auto origin = origins_.find(feature.id);
+      const double seen_s = origin != origins_.end() ? since_start(origin->second.first_observed + to_recording) : 0.0;
+      new_tally.add(feature.id, seen_s, t, feature.converged);
       if (!tally.counts(feature.id, feature.converged)) continue;
       const auto point = points.find(feature.id);
       if (point == points.end()) {
@@ -315,12 +365,15 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
         continue;
       }
       const Vector3d p_true = truth_.position(point->second, valid_time);
-      tally.add({feature.id, feature.converged, feature.p_W_mm, p_true, feature.P_mm2}, t >= end_s - kPathLength_s);
+      const Compared compared{feature.id, feature.converged, feature.p_W_mm, p_true, feature.P_mm2};
+      new_tally.add_error(seen_s, t, feature.converged, compared.error_mm(), compared.nees());
+      tally.add(compared, t >= end_s - kPathLength_s);
     }
     tally.end_sample();
   }
   AccuracyReport report = tally.report();
   report.samples = samples_.size();
+  report.new_features = new_tally.figures();
   report.good.premature_beats = static_cast<std::size_t>(std::count_if(
       beats_.begin(), beats_.end(), [](const RPeak& beat) { return beat.beat_class == BeatClass::kPremature; }));
   return report;

@@ -62,6 +62,16 @@ struct GoodPositions {
   double mean_nees = kNoFigure;  // of all, as AccuracyReport::mean_nees
 };
 
+// Features that were first seen from 5 s on, when there is a map of others.
+struct NewFeatures {
+  std::size_t published = 0;
+  std::size_t converged = 0;
+  double to_published_s = kNoFigure;  // from first sight, the middle one of those that were
+  double to_converged_s = kNoFigure;  // likewise
+  ErrorFigures young;                 // called converged, until 5 s after they were first seen
+  double young_nees = kNoFigure;      // as AccuracyReport::mean_nees
+};
+
 struct AccuracyReport {
   std::size_t samples = 0;
   std::size_t features_published = 0;
@@ -76,6 +86,7 @@ struct AccuracyReport {
   std::size_t invalid = 0;
   std::size_t settled_samples = 0;
   GoodPositions good;
+  NewFeatures new_features;
   std::vector<ErrorSpan> seconds;
   std::vector<ErrorSpan> cycles;   // from R peak to R peak
   std::vector<FeaturePath> paths;  // in order of id

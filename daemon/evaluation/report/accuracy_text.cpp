@@ -35,6 +35,15 @@ nlohmann::json to_json(const std::vector<ErrorSpan>& spans) {
   return out;
 }
 
+nlohmann::json to_json(const NewFeatures& features) {
+  return {{"published", features.published},
+          {"converged", features.converged},
+          {"to_published_s", json_number(features.to_published_s)},
+          {"to_converged_s", json_number(features.to_converged_s)},
+          {"young_error", to_json(features.young)},
+          {"young_mean_nees", json_number(features.young_nees)}};
+}
+
 }  // namespace
 
 std::string to_text(const AccuracyReport& report) {
@@ -82,6 +91,7 @@ nlohmann::json to_json(const AccuracyReport& report) {
           {"good_positions_rms_mm", json_number(report.good.rms_mm)},
           {"good_positions_mean_nees", json_number(report.good.mean_nees)},
           {"premature_beats", report.good.premature_beats},
+          {"new_features", to_json(report.new_features)},
           {"seconds", to_json(report.seconds)},
           {"cycles", to_json(report.cycles)},
           {"features", features}};

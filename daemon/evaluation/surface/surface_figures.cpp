@@ -137,6 +137,8 @@ nlohmann::json to_json(const SurfaceFigures& figures) {
                          {"agreement_nees", json_number(figures.agreement_nees)},
                          {"features", figures.features},
                          {"features_contradicted", figures.contradicted},
+                         {"features_begun", figures.begun},
+                         {"features_contradicting", figures.contradicting},
                          {"refusal", figures.refusal}};
   for (std::size_t h = 1; h < kSurfaceHorizons_ms.size(); ++h) {
     json[fmt::format("rms_{}_ms_mm", kSurfaceHorizons_ms[h])] = json_number(figures.horizons[h].rms_mm);

@@ -38,9 +38,11 @@ struct SurfaceFigures {
   Compared thin_plate;
   double agreement_rms_mm = kNoFigure;  // leave-one-out, of the last surface
   double agreement_nees = kNoFigure;
-  std::size_t features = 0;      // that the last surface rests on
-  std::size_t contradicted = 0;  // that it left out
-  std::string refusal;           // of the last instant at which there was none
+  std::size_t features = 0;         // that the last surface rests on
+  std::size_t contradicted = 0;     // that it left out
+  std::uint64_t begun = 0;          // new features that started on it, over the session
+  std::uint64_t contradicting = 0;  // and whose matches contradicted it
+  std::string refusal;              // of the last instant at which there was none
 };
 
 // Takes what was predicted at instants that follow one another, and what was true.

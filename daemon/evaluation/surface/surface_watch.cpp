@@ -138,6 +138,8 @@ void SurfaceWatch::score_instant(const Scene& scene, std::size_t horizon, Instan
 SurfaceFigures SurfaceWatch::figures() const {
   SurfaceFigures figures = tally_.figures();
   figures.refusal = refusal_;
+  figures.begun = pipeline_.surface_maker().starts().begun.get();
+  figures.contradicting = pipeline_.surface_maker().starts().contradicting.get();
   if (surface() == nullptr) return figures;
   figures.agreement_rms_mm = surface()->agreement().rms_mm;
   figures.agreement_nees = surface()->agreement().nees;

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "core/estimation/iterated_update.hpp"
+#include "core/estimation/prior_start.hpp"
 #include "simulated_feature.hpp"
 
 namespace perimap {
@@ -311,6 +312,74 @@ TEST(BatchStart, SaysWhenTheFeatureLiesBehindTheCamera) {
   settings.start_depths_mm = {-50.0, -90.0};
   EXPECT_EQ(batch_start(feature.observations, kPixelModel, kLayout, Prior{}, settings).status,
             BatchStatus::kBehindCamera);
+}
+
+// The same minimum, whichever way the prior is said.
+TEST(BatchStart, FromAPriorThatKnowsNothingIsTheSameAsAlone) {
+  std::mt19937 generator(41);
+  const SimulatedFeature feature = simulate_feature(kPixelModel, kLayout, Prior{}, 90, kPixelDeviation, 0.0, generator);
+  const BatchOutcome alone = batch_start(first(feature, 90), kPixelModel, kLayout, Prior{});
+  ASSERT_TRUE(alone.ok());
+  const Pose X_WC = feature.observations.front().X_CW.inverse();
+  Vector3d ray_C;
+  ASSERT_TRUE(kPixelModel.ray(feature.observations.front().z, ray_C));
+  const FeaturePrior wide = wide_prior(kLayout, Prior{}, X_WC * (BatchSettings{}.prior_depth_mm * ray_C));
+  const BatchOutcome told = start_from_prior(first(feature, 90), kPixelModel, wide).outcome;
+  ASSERT_TRUE(told.ok());
+  EXPECT_LT((told.estimate.x - alone.estimate.x).norm(), 1e-3);
+  EXPECT_LT((told.estimate.P - alone.estimate.P).norm(), 1e-3 * alone.estimate.P.norm());
+}
+
+// An elongated, tilted covariance of each element, beside the normal equations written down whole.
+TEST(BatchStart, CountsWhatAPriorSaysInEachDirection) {
+  std::mt19937 generator(42);
+  std::normal_distribution<double> normal;
+  const SimulatedFeature feature = simulate_feature(kPixelModel, kLayout, Prior{}, 40, kPixelDeviation, 0.0, generator);
+  const int n = kLayout.size();
+  FeaturePrior prior;
+  prior.x = feature.x_true;
+  MatrixXd information = MatrixXd::Zero(3 * n, 3 * n);
+  for (int k = 0; k < n; ++k) {
+    Matrix3d random;
+    for (int i = 0; i < 9; ++i) random(i) = 0.5 * normal(generator);
+    const Matrix3d P = random * random.transpose() + 0.01 * Matrix3d::Identity();
+    prior.factors_mm[static_cast<std::size_t>(k)] = P.llt().matrixL();
+    const Matrix3d inverse = P.inverse();
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) information(i * n + k, j * n + k) = inverse(i, j);
+    }
+  }
+  BatchSettings plain;
+  plain.robust = false;
+  const BatchOutcome start = start_from_prior(first(feature, 40), kPixelModel, prior, plain).outcome;
+  ASSERT_TRUE(start.ok());
+  MatrixXd posterior = information;
+  Eigen::VectorXd gradient = information * (start.estimate.x - prior.x);
+  for (const Observation& o : feature.observations) {
+    MatrixXd B = MatrixXd::Zero(3, 3 * n);
+    for (int axis = 0; axis < 3; ++axis) B.block(axis, axis * n, 1, n) = o.b.transpose();
+    Vector2d z;
+    MeasurementJacobians J;
+    ASSERT_EQ(measure(kPixelModel, o.X_CW, B * start.estimate.x, z, &J), ProjectionStatus::kOk);
+    const MatrixXd H = J.dz_dp * B;
+    posterior += H.transpose() * o.R.inverse() * H;
+    gradient -= H.transpose() * o.R.inverse() * (o.z - z);
+  }
+  const MatrixXd P = posterior.inverse();
+  EXPECT_LT((start.estimate.P - P).norm(), 1e-6 * P.norm());
+  EXPECT_LT(std::sqrt(gradient.dot(P * gradient)), 1e-3) << "deviations from the minimum";
+  EXPECT_EQ(start.estimate.P, start.estimate.P.transpose());
+}
+
+TEST(BatchStart, TellsAPriorThatIsWrong) {
+  std::mt19937 generator(43);
+  const SimulatedFeature feature = simulate_feature(kPixelModel, kLayout, Prior{}, 40, kPixelDeviation, 0.0, generator);
+  FeaturePrior prior;
+  prior.x = feature.x_true;
+  for (Matrix3d& L : prior.factors_mm) L = 0.1 * Matrix3d::Identity();
+  EXPECT_LT(start_from_prior(first(feature, 40), kPixelModel, prior).prior_misfit, 2.0);
+  prior.x(2 * kLayout.size()) += 6.0;
+  EXPECT_GT(start_from_prior(first(feature, 40), kPixelModel, prior).prior_misfit, 4.0);
 }
 
 }  // namespace

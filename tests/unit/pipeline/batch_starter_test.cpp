@@ -54,7 +54,8 @@ struct Start : ::testing::Test {
   }
 
   void solve() {
-    BatchStarter starter(settings, slots);
+    SurfaceMaker surfaces(settings.estimator.layout, slots.size(), 100, true);
+    BatchStarter starter(settings, slots, surfaces);
     std::thread housekeeping([&] { starter.serve(); });
     starter.request(0, 0);
     starter.wait_until_done();

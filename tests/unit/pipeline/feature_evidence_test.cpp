@@ -155,7 +155,8 @@ TEST_F(SlowPoseError, OfTheBatchStartIsCountedToo) {
   std::mt19937 generator(3);
   std::normal_distribution<double> normal(0.0, 0.3);
   settings.workers = 1;
-  BatchStarter starter(settings, slots);
+  SurfaceMaker surfaces(settings.estimator.layout, slots.size(), 100, true);
+  BatchStarter starter(settings, slots, surfaces);
   std::thread housekeeping([&] { starter.serve(); });
   for (int i = 0; slot->state != SlotState::kMapped && i < 200; ++i) {
     next_frame();

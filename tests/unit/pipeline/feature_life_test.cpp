@@ -252,6 +252,87 @@ TEST_F(Stages, AFeatureWhoseStartsFailIsGivenUpForThat) {
   EXPECT_EQ(slot->state, SlotState::kEmpty);
 }
 
+class StagesOnSurface : public Stages {
+ protected:
+  StagesOnSurface() {
+    slot->state = SlotState::kTracked;
+    job.surface_there = true;
+  }
+
+  // Frames with a match each, until something comes of it.
+  LifeEvent follow() {
+    LifeEvent event = LifeEvent::kNone;
+    while (event == LifeEvent::kNone && frames < 300) {
+      next_frame();
+      found_at({320, 240});
+      event = learn_frame();
+      ++frames;
+    }
+    return event;
+  }
+  // What housekeeping made of the start.
+  void solved(SurfaceStartKind kind) {
+    slot->start.on_surface = kind;
+    slot->start.outcome.status = BatchStatus::kOk;
+    slot->start.outcome.estimate = still_feature();
+    slot->start.due = true;
+  }
+
+  int frames = 0;
+};
+
+TEST_F(StagesOnSurface, AFeatureAsksForAStartOnTheSurfaceByAThirdOfTheMatches) {
+  ASSERT_EQ(follow(), LifeEvent::kStartRequested);
+  EXPECT_EQ(frames, settings.estimator.start_observations / 3);
+  EXPECT_EQ(slot->start.count, frames);
+  EXPECT_EQ(slot->start.asked, StartAsked::kOnSurface);
+  solved(SurfaceStartKind::kStarted);
+  EXPECT_EQ(follow(), LifeEvent::kBegunOnSurface);
+  EXPECT_EQ(slot->state, SlotState::kMapped);
+  EXPECT_TRUE(slot->began_on_surface);
+}
+
+TEST_F(StagesOnSurface, WhatIsBesideTheSurfaceWaitsForAllMatchesAndIsTriedOnceMore) {
+  ASSERT_EQ(follow(), LifeEvent::kStartRequested);
+  solved(SurfaceStartKind::kNotThere);
+  ASSERT_EQ(follow(), LifeEvent::kStartRequested);
+  EXPECT_EQ(frames, settings.estimator.start_observations);
+  EXPECT_EQ(slot->start.count, settings.estimator.start_observations);
+  EXPECT_EQ(slot->start.asked, StartAsked::kOnSurfaceOrAlone);
+  solved(SurfaceStartKind::kNotThere);
+  while (slot->state == SlotState::kStarting) {
+    next_frame();
+    ASSERT_EQ(learn_frame(), LifeEvent::kNone);
+  }
+  EXPECT_EQ(slot->state, SlotState::kMapped);
+  EXPECT_FALSE(slot->began_on_surface);
+}
+
+TEST_F(StagesOnSurface, WhatContradictsTheSurfaceIsToldOnceAndStartsAlone) {
+  ASSERT_EQ(follow(), LifeEvent::kStartRequested);
+  solved(SurfaceStartKind::kContradicts);
+  EXPECT_EQ(follow(), LifeEvent::kOffSurface);
+  EXPECT_EQ(slot->state, SlotState::kTracked);
+  ASSERT_EQ(follow(), LifeEvent::kStartRequested);
+  EXPECT_EQ(slot->start.count, settings.estimator.start_observations);
+  EXPECT_EQ(slot->start.asked, StartAsked::kAlone);
+}
+
+TEST_F(StagesOnSurface, AFeatureThatIsStartedAnewStartsAlone) {
+  map_feature();
+  std::mt19937 generator(1);
+  std::normal_distribution<double> normal(0.0, 3.0);
+  LifeEvent event = LifeEvent::kNone;
+  for (int i = 0; event != LifeEvent::kStartedAnew && i < 600; ++i) {
+    next_frame();
+    found_at({320 + normal(generator), 240 + normal(generator)});
+    event = learn_frame();
+  }
+  ASSERT_EQ(event, LifeEvent::kStartedAnew);
+  ASSERT_EQ(follow(), LifeEvent::kStartRequested);
+  EXPECT_EQ(slot->start.asked, StartAsked::kAlone);
+}
+
 TEST_F(Stages, AFeatureThatIsForgottenWhileItStartsIsNotLost) {
   slot->state = SlotState::kStarting;
   slot->forgotten = true;

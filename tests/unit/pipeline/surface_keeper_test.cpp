@@ -95,6 +95,33 @@ TEST_F(Kept, IsMadeOfWhatIsConvergedAndBelieved) {
   EXPECT_EQ(maker_.newest()->surface->features() + maker_.newest()->surface->contradicted().size(), kSlots - 3);
 }
 
+// Its own matches have told little yet beside what the surface did.
+TEST_F(Kept, IsNotMadeOfWhatBeganOnItUntilThatIsKnownByItself) {
+  see_all();
+  for (std::size_t i = 0; i < 5; ++i) slots_[i].began_on_surface = true;
+  slots_[4].updates = 200;
+  frames(36);
+  ASSERT_NE(maker_.newest(), nullptr);
+  EXPECT_EQ(maker_.newest()->surface->features() + maker_.newest()->surface->contradicted().size(), kSlots - 4);
+}
+
+TEST_F(Kept, SaysWhetherThereIsOne) {
+  see_all();
+  EXPECT_FALSE(keeper_.there());
+  frames(36);
+  EXPECT_TRUE(keeper_.there());
+  keeper_.begin_again();
+  EXPECT_FALSE(keeper_.there());
+}
+
+TEST_F(Kept, IsNotThereWhereItIsRefused) {
+  for (std::size_t i = 7; i < kSlots; ++i) slots_[i].state = SlotState::kEmpty;
+  see_all();
+  frames(36);
+  ASSERT_NE(maker_.newest(), nullptr);
+  EXPECT_FALSE(keeper_.there());
+}
+
 TEST_F(Kept, IsAsUncertainAsTheSetUpMakesEveryPosition) {
   see_all();
   frames(36);

@@ -191,7 +191,7 @@ TEST(PeriodicSurface, UsesTheKernelsThatItIsGiven) {
   const auto evidence = test::evidence_on(test::places_on_disc(40, 35.0, 4.0, random), 0.2, random);
   SurfaceKernels kernels;
   kernels.depth = {55.0, 0.02};
-  const auto surface = PeriodicSurface::fit(kLayout, evidence, kCamera, {}, kernels);
+  const auto surface = PeriodicSurface::fit(kLayout, evidence, kCamera, {}, kernels, KernelSearch::kNone);
   ASSERT_TRUE(surface.has_value());
   EXPECT_EQ(surface->kernels().depth.length_mm, 55.0);
   EXPECT_EQ(surface->kernels().depth.noise, 0.02);
