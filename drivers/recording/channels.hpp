@@ -29,6 +29,7 @@ inline constexpr std::string_view kTruthMesh = "truth/mesh";            // perim
 inline constexpr std::string_view kTruthMotion = "truth/motion";        // perimap::TruthMotion
 inline constexpr std::string_view kTruthCamera = "truth/camera";        // perimap::TruthCamera
 inline constexpr std::string_view kTruthProcedure = "truth/procedure";  // perimap::TruthProcedure, with a procedure
+inline constexpr std::string_view kTruthTrace = "truth/trace";          // perimap::TruthTrace, with a motion trace
 inline constexpr std::string_view kTruthEvent = "truth/event";          // perimap::TruthEvent, likewise
 
 // What was published.

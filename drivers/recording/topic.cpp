@@ -65,6 +65,10 @@ TopicType topic_type<perimap_TruthProcedure>() noexcept {
   return {&perimap_TruthProcedure_desc, kPerimapProcedureSchemaText};
 }
 template <>
+TopicType topic_type<perimap_TruthTrace>() noexcept {
+  return {&perimap_TruthTrace_desc, kPerimapTraceSchemaText};
+}
+template <>
 TopicType topic_type<foxglove_RawImage>() noexcept {
   return {&foxglove_RawImage_desc, kFoxgloveSchemaText};
 }

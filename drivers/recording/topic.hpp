@@ -5,6 +5,7 @@
 #include <perimap.h>
 #include <perimap_mesh.h>
 #include <perimap_procedure.h>
+#include <perimap_trace.h>
 
 #include <string_view>
 
@@ -56,6 +57,8 @@ template <>
 [[nodiscard]] TopicType topic_type<perimap_TruthEvent>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<perimap_TruthProcedure>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_TruthTrace>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<foxglove_RawImage>() noexcept;
 template <>

@@ -6,11 +6,11 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "daemon/evaluation/traces/motion_trace.hpp"
 #include "drivers/calibration/tool_tip.hpp"
 #include "drivers/calibration/turned_scope_file.hpp"
 #include "drivers/pose_file/point_table.hpp"
 #include "drivers/pose_file/pose_table.hpp"
+#include "drivers/standins/trace/motion_trace.hpp"
 
 namespace {
 

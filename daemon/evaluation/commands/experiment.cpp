@@ -15,8 +15,8 @@
 #include "daemon/command_line/progress.hpp"
 #include "daemon/evaluation/experiment/experiment_files.hpp"
 #include "daemon/evaluation/experiment/experiment_text.hpp"
-#include "daemon/evaluation/traces/motion_trace.hpp"
 #include "daemon/evaluation/traces/trace_text.hpp"
+#include "drivers/standins/trace/motion_trace.hpp"
 
 namespace perimap {
 namespace {

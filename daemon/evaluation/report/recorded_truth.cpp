@@ -17,8 +17,9 @@ namespace perimap {
 Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, ReadMode mode) {
   constexpr std::array<std::string_view, 3> kTruth = {channels::kTruthMesh, channels::kTruthMotion,
                                                       channels::kTruthCamera};
-  // Of a procedure, where there was one.
-  constexpr std::array<std::string_view, 2> kProcedure = {channels::kTruthProcedure, channels::kTruthEvent};
+  // Of a procedure, and of a motion trace, where there was one.
+  constexpr std::array<std::string_view, 3> kSometimes = {channels::kTruthProcedure, channels::kTruthEvent,
+                                                          channels::kTruthTrace};
   auto reader = RecordingReader::open(recording, mode);
   if (!reader) return tl::unexpected(reader.error());
   const auto recorded = reader->channels();
@@ -27,7 +28,7 @@ Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, 
   };
   if (!std::all_of(kTruth.begin(), kTruth.end(), is_there)) return std::optional<RecordedTruth>();
   std::vector<std::string_view> wanted(kTruth.begin(), kTruth.end());
-  std::copy_if(kProcedure.begin(), kProcedure.end(), std::back_inserter(wanted), is_there);
+  std::copy_if(kSometimes.begin(), kSometimes.end(), std::back_inserter(wanted), is_there);
   const auto calibration = reader->attachment(attachments::kCalibration);
   if (!calibration) return tl::unexpected(calibration.error());
   const auto camera = parse_calibration(*calibration, fmt::format("{}:{}", recording, attachments::kCalibration));
@@ -40,6 +41,7 @@ Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, 
   std::map<std::uint64_t, Instant> captures;
   std::optional<Sample<perimap_TruthProcedure>> procedure;
   std::vector<RecordedEvent> events;
+  SurfaceTrace trace;
   for (;;) {
     const auto message = reader->next();
     if (!message) return tl::unexpected(message.error());
@@ -61,6 +63,12 @@ Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, 
       auto sample = reader->decode<perimap_TruthProcedure>(m);
       if (!sample) return tl::unexpected(sample.error());
       procedure = *std::move(sample);
+    } else if (m.channel == channels::kTruthTrace) {
+      const auto sample = reader->decode<perimap_TruthTrace>(m);
+      if (!sample) return tl::unexpected(sample.error());
+      auto value = surface_trace(**sample);
+      if (!value) return tl::unexpected(value.error());
+      trace = *std::move(value);
     } else if (m.channel == channels::kTruthEvent) {
       const auto sample = reader->decode<perimap_TruthEvent>(m);
       if (!sample) return tl::unexpected(sample.error());
@@ -80,6 +88,9 @@ Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, 
   if (!mesh || !motion || cameras.empty()) return fail(fmt::format("{}: its ground truth is not complete", recording));
   auto truth = GroundTruth::create(std::move(*mesh), std::move(*motion), std::move(cameras));
   if (!truth) return fail(fmt::format("{}: {}", recording, truth.error().message));
+  if (const auto good = truth->set_trace(std::move(trace)); !good) {
+    return fail(fmt::format("{}: {}", recording, good.error().message));
+  }
   if (procedure) {
     if (const auto good = set_procedure(**procedure, *truth); !good) {
       return fail(fmt::format("{}: {}", recording, good.error().message));

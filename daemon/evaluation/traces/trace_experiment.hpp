@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
-#include "daemon/evaluation/traces/motion_trace.hpp"
 #include "daemon/evaluation/traces/trace_prediction.hpp"
+#include "drivers/standins/trace/motion_trace.hpp"
 
 namespace perimap {
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "daemon/evaluation/traces/cycle_lengths.hpp"
-#include "daemon/evaluation/traces/phase_smoother.hpp"
-#include "daemon/evaluation/traces/two_phase_map.hpp"
 #include "daemon/evaluation/traces/vector_autoregression.hpp"
+#include "drivers/standins/trace/phase_smoother.hpp"
+#include "drivers/standins/trace/two_phase_map.hpp"
 
 namespace perimap {
 

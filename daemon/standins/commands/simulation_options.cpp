@@ -9,6 +9,8 @@
 #include "drivers/standins/procedure/procedure_draw.hpp"
 #include "drivers/standins/procedure/procedure_text.hpp"
 #include "drivers/standins/simulator/ecg_record.hpp"
+#include "drivers/standins/trace/hindsight.hpp"
+#include "drivers/standins/trace/motion_trace.hpp"
 
 namespace perimap {
 namespace {
@@ -95,6 +97,11 @@ Option* SimulationOptions::add_to(Command& command) {
           "How motion runs between R peaks: linear, warped (systole keeps its length), time-locked (diastasis "
           "stretches) [linear]")
       ->check(OneOf({"linear", "warped", "time-locked"}));
+  command.add_option(
+      "--motion-trace", motion_trace_,
+      "A recorded heart moves the surface in the place of --motion, and its beats are in the ECG: a CSV "
+      "with a time in seconds and x, y, z in mm of each point, as a camera has them; it begins anew where "
+      "it ends");
   command.add_option("--respiration", settings_.respiration_mm, "Breathing displacement at full inspiration, mm")
       ->capture_default_str();
   command.add_flag("--respiration-channel", settings_.respiration_channel,
@@ -174,6 +181,13 @@ Expected<SimulationSettings> SimulationOptions::settings() const {
                              parse_stretches("tracker stuck", tracker_stuck_, settings.tracker_stuck),
                              parse_stretches("camera stuck", camera_stuck_, settings.camera_stuck)}) {
     if (!parsed) return tl::unexpected(parsed.error());
+  }
+  if (!motion_trace_.empty()) {
+    auto motion = read_motion_trace(motion_trace_);
+    if (!motion) return tl::unexpected(motion.error());
+    auto hindsight = in_hindsight(*motion);
+    if (!hindsight) return tl::unexpected(hindsight.error());
+    settings.trace = std::make_shared<const HeartTrace>(HeartTrace{*std::move(motion), *std::move(hindsight)});
   }
   if (ecg_start_s_) settings.ecg_start = from_seconds(*ecg_start_s_);
   return settings;

@@ -47,6 +47,7 @@ class SimulationOptions {
   std::vector<std::string> tracker_stuck_;
   std::vector<std::string> camera_stuck_;
   std::string procedure_;
+  std::string motion_trace_;
   bool electromagnetic_ = false;
   double respiration_period_s_ = 4.0;
   double tracker_correlation_s_ = 0.0;

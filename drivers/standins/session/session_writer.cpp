@@ -44,8 +44,9 @@ std::string description(const Simulation& simulation, const TrackerNoise& noise)
   return fmt::format(
       "simulated heart: seed {}, {} s, {}x{} at {} Hz, ECG record {}, motion {}, respiration {} mm, tracker {} Hz with "
       "{} mm and {:.3g} deg RMS{}{}",
-      s.seed, to_seconds(s.duration), s.width, s.height, s.frames_per_s, s.ecg_record, law_name(s.law),
-      s.respiration_mm, s.tracker_rate_hz, noise.position_rms_mm, noise.rotation_rms_rad / kRadians_per_degree,
+      s.seed, to_seconds(s.duration), s.width, s.height, s.frames_per_s, s.trace ? "made" : s.ecg_record,
+      s.trace ? "of a trace" : law_name(s.law), s.respiration_mm, s.tracker_rate_hz, noise.position_rms_mm,
+      noise.rotation_rms_rad / kRadians_per_degree,
       correlation_s > 0.0 ? fmt::format(", correlated over {} s", correlation_s) : "",
       s.procedure.empty() ? "" : fmt::format(", a procedure of {} events", s.procedure.events.size()));
 }
@@ -162,6 +163,7 @@ class SessionWriter {
     }
 
     if (auto begun = begin_procedure(); !begun) return begun;
+    if (auto begun = begin_trace(); !begun) return begun;
 
     std::string generator = fmt::format("perimap simulate {}", PERIMAP_VERSION);
     std::string text = description(simulation_, recording_.noise);
@@ -198,6 +200,17 @@ class SessionWriter {
     return writer_.write(*organ, message, start, start, 0).and_then([&] {
       return attach(attachments::kProcedure, "application/toml", to_toml(procedure));
     });
+  }
+
+  // What moves the surface, where a recorded trace does.
+  Expected<void> begin_trace() {
+    const SurfaceTrace& trace = simulation_.truth().trace();
+    if (trace.empty()) return {};
+    const auto channel = writer_.add_channel<perimap_TruthTrace>(channels::kTruthTrace);
+    if (!channel) return tl::unexpected(channel.error());
+    TraceBuffers buffers;
+    const auto message = borrow_truth_trace(trace, buffers);
+    return writer_.write(*channel, message, simulation_.start(), simulation_.start(), 0);
   }
 
   Expected<void> attach_turned_scope() {

@@ -5,6 +5,8 @@
 #include <algorithm>
 
 #include "drivers/standins/random/counter_noise.hpp"
+#include "drivers/standins/simulator/made_ecg.hpp"
+#include "drivers/standins/simulator/played_trace.hpp"
 
 namespace perimap {
 namespace {
@@ -30,9 +32,29 @@ Expected<std::uint32_t> start_sample(const SimulationSettings& s, const EcgRecor
   return static_cast<std::uint32_t>(asked);
 }
 
+// Of a trace, with beats enough before and after the session.
+Expected<EcgScript> traced_ecg(const SimulationSettings& s) {
+  constexpr double kBefore_s = 20.0, kAfter_s = 10.0;
+  const auto played = PlayedTrace::create(s.trace, s.seed);
+  if (!played) return tl::unexpected(played.error());
+  std::vector<double> beats_s = played->beats_s(kBefore_s, to_seconds(s.duration) + kAfter_s);
+  const auto before = std::count_if(beats_s.begin(), beats_s.end(), [](double beat_s) { return beat_s < 0.0; });
+  const auto after =
+      std::count_if(beats_s.begin(), beats_s.end(), [&](double beat_s) { return beat_s > to_seconds(s.duration); });
+  if (before <= static_cast<std::ptrdiff_t>(kBeatsBefore) || after <= static_cast<std::ptrdiff_t>(kBeatsAfter)) {
+    return fail("motion trace: its heart beats too seldom");
+  }
+  for (double& beat_s : beats_s) beat_s += kBefore_s;
+  EcgRecord record = made_ecg(beats_s, s.seed);
+  const auto first_sample = static_cast<std::uint32_t>(kBefore_s * record.sample_rate_hz);
+  if (s.procedure.empty()) return EcgScript::plain(std::move(record), first_sample);
+  return EcgScript::with_runs(std::move(record), first_sample, s.procedure, s.duration, s.seed);
+}
+
 }  // namespace
 
 Expected<EcgScript> session_ecg(const SimulationSettings& s) {
+  if (s.trace) return traced_ecg(s);
   auto record = load_ecg_record(s.ecg_record);
   if (!record) return tl::unexpected(record.error());
   const auto first_sample = start_sample(s, *record);

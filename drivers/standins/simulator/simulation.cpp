@@ -331,7 +331,8 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   if (!script) return tl::unexpected(script.error());
   auto mesh_H = parse_heart_mesh(embedded_epicardium_fourier_csv(), embedded_epicardium_faces_csv());
   if (!mesh_H) return tl::unexpected(mesh_H.error());
-  const HeartMesh mesh_W = transformed(X_WH(), *std::move(mesh_H));
+  HeartMesh mesh_W = transformed(X_WH(), *std::move(mesh_H));
+  if (settings.trace) mesh_W = at_rest(mesh_W);
 
   // A host that has been up for an hour or two.
   const Instant start{from_seconds(CounterNoise(settings.seed, kSession).uniform(1, 3600.0, 7200.0))};
@@ -346,6 +347,14 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   for (const Frame& frame : frames) cameras.push_back({frame.stamp.capture, frame.X_WC});
   auto truth = GroundTruth::create(mesh_W, motion, std::move(cameras));
   if (!truth) return tl::unexpected(truth.error());
+  if (settings.trace) {
+    const auto played = PlayedTrace::create(settings.trace, settings.seed);
+    if (!played) return tl::unexpected(played.error());
+    constexpr double kMargin_s = 1.0;
+    auto moved = truth->set_trace(
+        played->surface({path.X_WR().R, view->surface_W}, start, kMargin_s, to_seconds(settings.duration) + kMargin_s));
+    if (!moved) return tl::unexpected(moved.error());
+  }
   if (!settings.procedure.empty()) {
     auto organ = OrganMotion::create(organ_moves(settings.procedure, start, {path.X_WR().R, view->surface_W}));
     if (!organ) return tl::unexpected(organ.error());

@@ -33,6 +33,10 @@ Expected<void> check(const SimulationSettings& s) {
   };
   if (s.width % 2 != 0 || s.height % 2 != 0)
     return fail(fmt::format("size: {}x{} is not even in both directions", s.width, s.height));
+  if (s.trace && (s.respiration_mm > 0.0 || s.respiration_channel)) {
+    return fail("motion trace: expected no respiration beside it, it has its own");
+  }
+  if (s.trace && s.ecg_start) return fail("motion trace: expected no ECG start, its ECG is made");
   if (s.second_sensor && !s.held) return fail("second sensor: expected a scope that is turned by some angle");
   if (s.turn && !s.held) return fail("turn: expected a field stop, whose notch tells of it");
   if (s.procedure.has<ScopeTurnedInHead>()) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "core/time/instant.hpp"
 #include "drivers/standins/procedure/procedure.hpp"
 #include "drivers/standins/simulator/field_stop.hpp"
+#include "drivers/standins/simulator/played_trace.hpp"
 #include "drivers/standins/truth/heart_motion.hpp"
 
 namespace perimap {
@@ -23,6 +25,8 @@ struct SimulationSettings {
   double frames_per_s = 30.0;
   std::string ecg_record = "100";
   std::optional<Duration> ecg_start;  // of the session, from the record's start; chosen by the seed when not given
+  // A recorded heart, whose motion and beats take the place of the mesh's and the ECG record's; none: null.
+  std::shared_ptr<const HeartTrace> trace;
   MotionLaw law = MotionLaw::kLinear;
   double respiration_mm = 0.0;
   Duration respiration_period = std::chrono::seconds(4);

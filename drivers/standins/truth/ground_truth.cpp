@@ -1,6 +1,7 @@
 #include "drivers/standins/truth/ground_truth.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace perimap {
 
@@ -31,6 +32,12 @@ void GroundTruth::vertices_at(Instant t, std::span<Vector3d> out) const {
   vertex_positions(mesh_, basis, out);
   const Vector3d breathing = respiration_displacement(motion_, t);
   for (Vector3d& p : out) p += breathing;
+  if (!trace_.empty()) {
+    const TracedPlace traced(trace_, t);
+    for (std::uint32_t vertex = 0; vertex < mesh_.vertex_count; ++vertex) {
+      out[vertex] += traced.displacement(rest(vertex));
+    }
+  }
   if (organ_.empty()) return;
   const OrganPlace place = organ_.at(t);
   for (std::uint32_t vertex = 0; vertex < mesh_.vertex_count; ++vertex) {
@@ -41,6 +48,12 @@ void GroundTruth::vertices_at(Instant t, std::span<Vector3d> out) const {
 void GroundTruth::set_procedure(OrganMotion organ, std::vector<Drift> camera_delays) {
   organ_ = std::move(organ);
   camera_delays_ = std::move(camera_delays);
+}
+
+Expected<void> GroundTruth::set_trace(SurfaceTrace trace) {
+  if (const auto good = check(trace); !good) return good;
+  trace_ = std::move(trace);
+  return {};
 }
 
 Vector3d GroundTruth::rest(std::uint32_t vertex) const noexcept {
@@ -65,19 +78,20 @@ Vector3d GroundTruth::position(const SurfacePoint& point, Instant t) const {
   const auto basis = fourier_basis(phase(t).phase_rad, mesh_.harmonics);
   const Vector3d breathing = respiration_displacement(motion_, t);
   const std::uint32_t* const corners = mesh_.triangles.data() + 3 * std::size_t{point.triangle};
-  if (organ_.empty()) {
-    Vector3d p = breathing;
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      p += point.barycentric[corner] * vertex_position(mesh_, basis, corners[corner]);
-    }
-    return p;
-  }
-  const OrganPlace place = organ_.at(t);
-  Vector3d p = Vector3d::Zero();
+  std::array<Vector3d, 3> moved;
   for (std::size_t corner = 0; corner < 3; ++corner) {
-    const Vector3d beating = vertex_position(mesh_, basis, corners[corner]) + breathing;
-    p += point.barycentric[corner] * place.of(beating, rest(corners[corner]));
+    moved[corner] = vertex_position(mesh_, basis, corners[corner]) + breathing;
   }
+  if (!trace_.empty()) {
+    const TracedPlace traced(trace_, t);
+    for (std::size_t corner = 0; corner < 3; ++corner) moved[corner] += traced.displacement(rest(corners[corner]));
+  }
+  if (!organ_.empty()) {
+    const OrganPlace place = organ_.at(t);
+    for (std::size_t corner = 0; corner < 3; ++corner) moved[corner] = place.of(moved[corner], rest(corners[corner]));
+  }
+  Vector3d p = Vector3d::Zero();
+  for (std::size_t corner = 0; corner < 3; ++corner) p += point.barycentric[corner] * moved[corner];
   return p;
 }
 

@@ -13,6 +13,7 @@
 #include "drivers/standins/truth/heart_mesh.hpp"
 #include "drivers/standins/truth/heart_motion.hpp"
 #include "drivers/standins/truth/organ_motion.hpp"
+#include "drivers/standins/truth/surface_trace.hpp"
 #include "drivers/standins/truth/surface_view.hpp"
 
 namespace perimap {
@@ -36,6 +37,10 @@ class GroundTruth {
   // What is done to the organ, and to the camera's delay; nothing at first.
   void set_procedure(OrganMotion organ, std::vector<Drift> camera_delays);
 
+  // What moves the surface beside its own beating and breathing; nothing at first. The error names what is wrong with
+  // it.
+  [[nodiscard]] Expected<void> set_trace(SurfaceTrace trace);
+
   [[nodiscard]] const HeartMesh& mesh() const noexcept { return mesh_; }
   [[nodiscard]] const HeartMotion& motion() const noexcept { return motion_; }
   [[nodiscard]] MotionPhase phase(Instant t) const noexcept { return motion_phase(motion_, t); }
@@ -43,6 +48,7 @@ class GroundTruth {
   // True pose of the camera in the frame captured at exactly this instant.
   [[nodiscard]] std::optional<Pose> camera_pose(Instant capture) const noexcept;
   [[nodiscard]] const OrganMotion& organ() const noexcept { return organ_; }
+  [[nodiscard]] const SurfaceTrace& trace() const noexcept { return trace_; }
   [[nodiscard]] const std::vector<Drift>& camera_delays() const noexcept { return camera_delays_; }
   // When the picture was really taken that is stamped so: of that instant is what it shows, and its camera's pose.
   [[nodiscard]] Instant taken_at(Instant capture) const noexcept { return capture - drifted(camera_delays_, capture); }
@@ -72,6 +78,7 @@ class GroundTruth {
   HeartMesh mesh_;
   HeartMotion motion_;
   std::vector<CameraTruth> cameras_;
+  SurfaceTrace trace_;
   OrganMotion organ_;
   std::vector<Drift> camera_delays_;
 };

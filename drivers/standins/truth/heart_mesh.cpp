@@ -47,6 +47,15 @@ HeartMesh transformed(const Pose& X_AB, HeartMesh mesh_B) {
   return mesh_B;
 }
 
+HeartMesh at_rest(const HeartMesh& mesh) {
+  HeartMesh still{mesh.vertex_count, 0, {}, mesh.triangles};
+  const std::size_t axis = mesh.coefficients_per_axis();
+  for (std::size_t i = 0; i < mesh.coefficients_mm.size(); i += axis) {
+    still.coefficients_mm.push_back(mesh.coefficients_mm[i]);
+  }
+  return still;
+}
+
 Expected<void> check(const HeartMesh& mesh) {
   const std::size_t expected = std::size_t{mesh.vertex_count} * 3 * mesh.coefficients_per_axis();
   if (mesh.coefficients_mm.size() != expected) {

@@ -34,6 +34,9 @@ void vertex_positions(const HeartMesh& mesh, std::span<const double> basis, std:
 // The same mesh with its coordinates mapped by X_AB from frame B to frame A.
 [[nodiscard]] HeartMesh transformed(const Pose& X_AB, HeartMesh mesh_B);
 
+// The same mesh as it is without its beating: the series' constant terms.
+[[nodiscard]] HeartMesh at_rest(const HeartMesh& mesh);
+
 // Sizes agree and every index names a vertex; the error names what does not.
 [[nodiscard]] Expected<void> check(const HeartMesh& mesh);
 

@@ -114,6 +114,39 @@ Expected<void> set_procedure(const perimap_TruthProcedure& message, GroundTruth&
   return {};
 }
 
+perimap_TruthTrace borrow_truth_trace(const SurfaceTrace& trace, TraceBuffers& buffers) {
+  buffers = {};
+  for (const Vector3d& p : trace.places_W) buffers.places.insert(buffers.places.end(), p.begin(), p.end());
+  for (const Vector3d& p : trace.displacements_W) {
+    buffers.displacements.insert(buffers.displacements.end(), p.begin(), p.end());
+  }
+  perimap_TruthTrace message{};
+  message.first_time_ns = to_ns(trace.first);
+  message.period_ns = trace.period.count();
+  message.reach_mm = trace.reach_mm;
+  const auto lend = [](auto& sequence, std::vector<double>& numbers) {
+    sequence._buffer = numbers.data();
+    sequence._length = sequence._maximum = static_cast<std::uint32_t>(numbers.size());
+  };
+  lend(message.place_W_mm, buffers.places);
+  lend(message.displacement_W_mm, buffers.displacements);
+  return message;
+}
+
+Expected<SurfaceTrace> surface_trace(const perimap_TruthTrace& message) {
+  SurfaceTrace trace{from_ns(message.first_time_ns), Duration(message.period_ns), message.reach_mm, {}, {}};
+  if (message.place_W_mm._length == 0 || message.displacement_W_mm._length == 0 ||
+      message.place_W_mm._length % 3 != 0 || message.displacement_W_mm._length % 3 != 0) {
+    return fail("motion trace: expected x, y, z of each point");
+  }
+  const auto threes = [](const auto& sequence, std::vector<Vector3d>& points) {
+    for (std::uint32_t i = 0; i < sequence._length; i += 3) points.emplace_back(sequence._buffer + i);
+  };
+  threes(message.place_W_mm, trace.places_W);
+  threes(message.displacement_W_mm, trace.displacements_W);
+  return trace;
+}
+
 Expected<HeartMesh> heart_mesh(const perimap_TruthMesh& message) {
   HeartMesh mesh;
   mesh.vertex_count = message.vertex_count;

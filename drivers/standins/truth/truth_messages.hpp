@@ -3,6 +3,7 @@
 
 #include <perimap.h>
 #include <perimap_procedure.h>
+#include <perimap_trace.h>
 
 #include <cstdint>
 #include <vector>
@@ -30,6 +31,15 @@ struct ProcedureBuffers {
 // Into a truth that has its mesh and motion. Checked as an organ's motion must be; delays are in order and below a
 // second.
 [[nodiscard]] Expected<void> set_procedure(const perimap_TruthProcedure& message, GroundTruth& truth);
+
+// What TruthTrace borrows: it must outlive the message, which must not be freed.
+struct TraceBuffers {
+  std::vector<double> places, displacements;
+};
+[[nodiscard]] perimap_TruthTrace borrow_truth_trace(const SurfaceTrace& trace, TraceBuffers& buffers);
+
+// Of a trace that is there; GroundTruth::set_trace() checks it. Numbers that do not come in threes are refused here.
+[[nodiscard]] Expected<SurfaceTrace> surface_trace(const perimap_TruthTrace& message);
 
 // Checked as a mesh or motion must be; the error names what is wrong.
 [[nodiscard]] Expected<HeartMesh> heart_mesh(const perimap_TruthMesh& message);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/angle/angle.hpp"
-#include "daemon/evaluation/traces/motion_trace.hpp"
+#include "drivers/standins/trace/motion_trace.hpp"
 
 namespace perimap::test {
 

@@ -1,4 +1,4 @@
-#include "daemon/evaluation/traces/phase_smoother.hpp"
+#include "drivers/standins/trace/phase_smoother.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>

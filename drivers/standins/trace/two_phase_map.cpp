@@ -1,4 +1,4 @@
-#include "daemon/evaluation/traces/two_phase_map.hpp"
+#include "drivers/standins/trace/two_phase_map.hpp"
 
 #include <Eigen/Cholesky>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "daemon/evaluation/traces/motion_trace.hpp"
+#include "drivers/standins/trace/motion_trace.hpp"
 
 #include <fmt/format.h>
 

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "daemon/evaluation/traces/two_phase_map.hpp"
+#include "drivers/standins/trace/two_phase_map.hpp"
 
 namespace perimap {
 
