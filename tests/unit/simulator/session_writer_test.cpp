@@ -3,11 +3,15 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "daemon/command_line/commands.hpp"
+#include "drivers/recording/channels.hpp"
+#include "drivers/recording/recording_reader.hpp"
 #include "drivers/standins/truth/truth_messages.hpp"
 
 namespace perimap {
@@ -106,6 +110,42 @@ TEST_F(WriteSimulation, CommandWritesSeveralNoisesFromOneRendering) {
             std::string::npos);
   EXPECT_NE(bytes(folder_ / "heart-1.4mm.mcap").find("position_deviation_mm = 1.4\nrotation_deviation_deg = 0.5\n"),
             std::string::npos);
+}
+
+TEST_F(WriteSimulation, CommandMovesTheSurfaceAsATraceDoesAndRecordsIt) {
+  const std::string trace = (folder_ / "trace.csv").string();
+  std::ofstream written(trace);
+  written << "t,a_x,a_y,a_z\n";
+  for (int i = 0; i < 300; ++i) {
+    const double t = 0.04 * i;
+    written << t << ',' << 2.0 * std::sin(6.5 * t) << ',' << std::cos(6.5 * t) << ',' << 40.0 + std::sin(1.2 * t)
+            << '\n';
+  }
+  written.close();
+  const std::string out = (folder_ / "heart.mcap").string();
+  ASSERT_EQ(command({out, "--size", "64x64", "--duration", "2", "--motion-trace", trace}), 0);
+  auto reader = RecordingReader::open(out, ReadMode::kStrict);
+  ASSERT_TRUE(reader) << reader.error().message;
+  ASSERT_TRUE(reader->select(std::array{channels::kTruthTrace}));
+  const auto message = reader->next();
+  ASSERT_TRUE(message && *message);
+  const auto sample = reader->decode<perimap_TruthTrace>(**message);
+  ASSERT_TRUE(sample);
+  const auto moved = surface_trace(**sample);
+  ASSERT_TRUE(moved);
+  EXPECT_TRUE(check(*moved));
+  EXPECT_EQ(moved->places_W.size(), 1U);
+  // Two seconds, and one more on either side.
+  EXPECT_GE(moved->displacements_W.size(), 100U);
+}
+
+TEST_F(WriteSimulation, CommandRefusesATraceThatIsNone) {
+  const std::string trace = (folder_ / "trace.csv").string();
+  std::ofstream(trace) << "0,1,2,3\n0.04,1,2,x\n";
+  const std::string out = (folder_ / "heart.mcap").string();
+  EXPECT_EQ(command({out, "--motion-trace", trace}), 2);
+  EXPECT_EQ(command({out, "--motion-trace", trace + ".gone"}), 2);
+  EXPECT_FALSE(std::filesystem::exists(out));
 }
 
 TEST_F(WriteSimulation, CommandOverwritesOnlyWhenForced) {
