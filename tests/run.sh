@@ -199,7 +199,7 @@ lint() {
   # together. By the release preset: GCC's precompiled headers are none for clang.
   step "clang-tidy configure" 5m cmake --preset release -B build/lint -DPERIMAP_QUICK=ON || return
   step "clang-tidy generated headers" 15m cmake --build build/lint -j "$jobs" \
-    --target perimap_idl perimap_mesh_idl perimap_procedure_idl foxglove_idl || return
+    --target perimap_idl perimap_mesh_idl perimap_procedure_idl perimap_trace_idl foxglove_idl || return
   # What is compiled together is a file that includes .cpp files, which nothing else may.
   step "no source is included" 1m bash -c "! grep -rnE '#include.*\.(cpp|c)[>\"]' core drivers daemon"
   step "clang-tidy" 180m run-clang-tidy-14 -quiet -checks=-bugprone-suspicious-include \
