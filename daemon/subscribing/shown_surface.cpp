@@ -21,6 +21,7 @@ bool all_finite(const Values& values) {
 
 ShownSurface facts_of(const perimap_Surface& surface) {
   ShownSurface shown;
+  shown.source = surface.source;
   shown.frame_id = surface.frame_id;
   shown.sample_sequence = surface.sample_sequence;
   shown.frame_sequence = surface.frame_sequence;
@@ -45,10 +46,15 @@ std::optional<Pose> camera_of(const perimap_Surface& surface) {
   return pose_from_wxyz(Vector3d(t[0], t[1], t[2]), surface.rotation_WC_wxyz);
 }
 
+bool may_be_shown(perimap_FeatureState state) {
+  return state == perimap_FEATURE_CONVERGING || state == perimap_FEATURE_CONVERGED ||
+         state == perimap_FEATURE_INCONSISTENT;
+}
+
 std::vector<ShownFeature> features_of(const perimap_Surface& surface) {
   std::vector<ShownFeature> features;
   for (const perimap_SurfaceFeature& feature : std::span(surface.features._buffer, surface.features._length)) {
-    if (feature.state == perimap_FEATURE_INVALID || !all_finite(feature.position_W_mm)) continue;
+    if (!may_be_shown(feature.state) || !all_finite(feature.position_W_mm)) continue;
     std::array<double, 6> covariance{};
     std::copy_n(feature.covariance_W_mm2, covariance.size(), covariance.begin());
     if (!all_finite(covariance) || std::min({covariance[0], covariance[3], covariance[5]}) < 0.0) continue;

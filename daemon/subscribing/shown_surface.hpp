@@ -20,7 +20,7 @@ namespace perimap {
 
 struct ShownFeature {
   std::uint32_t id = 0;
-  perimap_FeatureState state = perimap_FEATURE_INVALID;  // never invalid where it is shown
+  perimap_FeatureState state = perimap_FEATURE_INVALID;  // of those that this program knows, but invalid
   std::array<double, 3> position_W_mm{};
   double deviation_mm = 0.0;  // the largest of the position, in any direction
 };
@@ -40,6 +40,7 @@ struct ShownSurface {
   std::string remedy;
   std::string why_no_mesh;  // empty where there is one, or nothing is shown
 
+  std::string source;
   std::string frame_id;  // the name of W
   std::uint64_t sample_sequence = 0;
   std::uint64_t frame_sequence = 0;

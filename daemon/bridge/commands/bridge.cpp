@@ -30,6 +30,10 @@ Outcome bridge_igtl(const BridgeOptions& options, const Console& console) {
     if (!keys) return refuse(Error{"--security: " + keys.error().message}, ExitCode::kWrongUsage);
     if (const auto warning = expiry_warning(*keys, seconds_now())) console.complain("warning: " + *warning);
   }
+  if (options.address == "0.0.0.0" || options.address == "::") {
+    return refuse("--bind: expected one address of this host, which others can reach, got " + options.address,
+                  ExitCode::kWrongUsage);
+  }
   Expected<StopSignal> stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
   // What predicts comes before what shows.

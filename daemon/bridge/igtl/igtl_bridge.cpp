@@ -57,6 +57,8 @@ IgtlBridge::Told IgtlBridge::told_of(const ShownSurface& surface) {
 
 void IgtlBridge::tell(const Told& told) {
   heard_ = true;
+  // It has waited for this thread until it may not be shown any more.
+  if (MonotonicClock::now() > told.until) return silent();
   if (std::exchange(silent_, false)) say_("surfaces come again");
   server_.send(told.surface);
   if (told.camera) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <boost/asio/ip/tcp.hpp>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -23,13 +24,20 @@ class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
   void send(const IgtlOutgoing& message);
   // What waits of the subject is not sent.
   void forget(IgtlOutgoing::Subject subject);
-  // Whether it does not read: a message has been under way for so long, or too many wait.
-  [[nodiscard]] bool stuck(Instant now, Duration longest) const noexcept;
+  // Whether it does not read: a message has been under way for so long, its system has not taken in for so long what
+  // was sent, or too many wait. To be asked regularly.
+  [[nodiscard]] bool stuck(Instant now, Duration longest);
   [[nodiscard]] bool idle() const noexcept { return !busy_ && waiting_.empty(); }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   void drop();
 
  private:
+  // So much had been written by then.
+  struct Mark {
+    Instant at;
+    std::uint64_t written = 0;
+  };
+
   void read();
   void write();
 
@@ -40,6 +48,8 @@ class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
   std::deque<IgtlOutgoing> waiting_;
   IgtlOutgoing writing_;
   Instant writing_since_;
+  std::uint64_t written_ = 0;  // bytes, that the kernel has taken
+  std::deque<Mark> marks_;     // of what the client's system has not
   bool busy_ = false;
   bool ended_ = false;
   bool too_many_ = false;

@@ -63,17 +63,17 @@ void add_mesh(const ShownMesh& mesh, igtl::PolyDataMessage& message) {
 
 void add_features(const std::vector<ShownFeature>& features, igtl::PolyDataMessage& message) {
   std::vector<std::array<double, 3>> positions;
-  std::vector<float> deviations, states;
+  std::vector<float> deviations;
   for (const ShownFeature& feature : features) {
+    if (feature.state != perimap_FEATURE_CONVERGED) continue;
     auto vertex = static_cast<igtlUint32>(positions.size());
     message.GetVertices()->AddCell(1, &vertex);
     positions.push_back(feature.position_W_mm);
     deviations.push_back(static_cast<float>(feature.deviation_mm));
-    states.push_back(static_cast<float>(feature.state));
   }
+  if (positions.empty()) return;
   add_points(positions, *message.GetPoints());
   add_scalars("deviation_mm", std::move(deviations), message);
-  add_scalars("feature_state", std::move(states), message);
 }
 
 // libopenigtlink 1.11 leaves the body of a message without points as it was allocated, whatever was there before. What
@@ -118,8 +118,9 @@ IgtlState surface_state_of(const ShownSurface& surface) {
     if (!more.empty()) state.words += fmt::format("; {}", more);
   }
   if (surface.usable() && !surface.why_no_mesh.empty()) {
-    state.words += fmt::format("; features alone: {}", surface.why_no_mesh);
+    state.words += fmt::format("; converged features alone: {}", surface.why_no_mesh);
   }
+  state.words += fmt::format("; source {}, frame {}", surface.source, surface.frame_id);
   return state;
 }
 

@@ -48,14 +48,14 @@ struct IgtlState {
 };
 
 // What the surface is worth: kOk where it is good, kNotReady degraded, kDisabled invalid. Words say what may be done
-// with it, and why not more.
+// with it, why not more, and of which source it is.
 [[nodiscard]] IgtlState surface_state_of(const ShownSurface& surface);
 // kOk where its pose is known, else kNotFound.
 [[nodiscard]] IgtlState camera_state_of(const ShownSurface& surface);
 
 // POLYDATA, in mm of the frame W, stamped with the UTC of its valid_time: the mesh's vertices and triangles, or where
-// there is none each feature as a vertex. Scalars of the points are "deviation_mm" (the largest of the position) and,
-// of features, "feature_state" (perimap::FeatureState). Empty where nothing may be shown.
+// there is none each converged feature as a vertex. The points' scalars "deviation_mm" are the largest of the position.
+// Empty where nothing may be shown.
 [[nodiscard]] IgtlOutgoing pack_surface(const ShownSurface& surface);
 // The same without anything in it, for when no surface is there.
 [[nodiscard]] IgtlOutgoing pack_no_surface();

@@ -25,6 +25,7 @@ using boost::system::error_code;
 constexpr auto kTick = std::chrono::milliseconds(100);
 // Clients are told that the server goes; one that does not read is not waited for.
 constexpr auto kGoodbye = std::chrono::milliseconds(500);
+constexpr Duration kLine = std::chrono::seconds(1);
 constexpr auto kGoodbyeLook = std::chrono::milliseconds(5);
 
 }  // namespace
@@ -48,6 +49,9 @@ class IgtlServer::Impl {
     if (!error) acceptor_.bind(endpoint, error);
     if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
     if (error) return fail(why_not(settings, error));
+    if (!address.is_loopback()) {
+      say_(fmt::format("whoever reaches {} gets the surface: OpenIGTLink knows no keys", settings.address));
+    }
     return {};
   }
 
@@ -75,20 +79,24 @@ class IgtlServer::Impl {
   void post(std::function<void()> work) { asio::post(context_, std::move(work)); }
 
   void send(const IgtlOutgoing& message) {
+    if (closed_) return;
     newest_[static_cast<std::size_t>(message.subject)] = message;
     for (const auto& client : all()) client->send(message);
   }
 
   void forget(IgtlOutgoing::Subject subject) {
+    if (closed_) return;
     newest_[static_cast<std::size_t>(subject)] = {};
     for (const auto& client : all()) client->forget(subject);
   }
 
   void at(Instant instant, std::function<void()> work) {
+    if (closed_) return;
     // Both clocks are CLOCK_MONOTONIC.
     alarm_.expires_at(std::chrono::steady_clock::time_point(instant.time_since_epoch()));
-    alarm_.async_wait([work = std::move(work)](error_code error) {
-      if (!error) work();
+    // One that was due already may be called although another was set.
+    alarm_.async_wait([this, number = ++alarms_, work = std::move(work)](error_code error) {
+      if (!error && number == alarms_ && !closed_) work();
     });
   }
 
@@ -98,6 +106,7 @@ class IgtlServer::Impl {
     acceptor_.close(ignored);
     alarm_.cancel();
     if (ending_call_) ending_call_();
+    closed_ = true;  // that was the last word
     goodbye_until_ = MonotonicClock::now() + kGoodbye;
     say_goodbye();
   }
@@ -137,7 +146,8 @@ class IgtlServer::Impl {
 
   void take(tcp::socket socket) {
     if (clients_.size() >= kMostClients) {
-      return say_(fmt::format("{} clients are connected already: another one was turned away", kMostClients));
+      ++turned_away_;
+      return;
     }
     const std::uint64_t id = ++last_id_;
     auto client = std::make_shared<IgtlClient>(std::move(socket), [this, id] { clients_.erase(id); });
@@ -155,12 +165,28 @@ class IgtlServer::Impl {
       const Instant now = MonotonicClock::now();
       for (const auto& client : all()) {
         if (!client->stuck(now, kLongestWrite)) continue;
-        say_(fmt::format("{} does not read what it is sent, and was dropped", client->name()));
+        ++dropped_;
+        last_dropped_ = client->name();
         client->drop();
       }
+      tell_of_clients(now);
       if (std::exchange(accept_again_, false)) accept();
       tick();
     });
+  }
+
+  // Whatever clients do, a line of each kind a second at most.
+  void tell_of_clients(Instant now) {
+    if (now - told_of_clients_ < kLine) return;
+    if (dropped_ > 0) {
+      say_(fmt::format("{} does not read what it is sent, and was dropped{}", last_dropped_,
+                       dropped_ > 1 ? fmt::format(", as were {} others", dropped_ - 1) : ""));
+    }
+    if (turned_away_ > 0) {
+      say_(fmt::format("{} clients are connected already: {} more turned away", kMostClients, turned_away_));
+    }
+    if (dropped_ + turned_away_ > 0) told_of_clients_ = now;
+    dropped_ = turned_away_ = 0;
   }
 
   void say_goodbye() {
@@ -182,6 +208,12 @@ class IgtlServer::Impl {
   std::array<IgtlOutgoing, IgtlOutgoing::kSubjects> newest_;
   std::uint64_t last_id_ = 0;
   Instant goodbye_until_;
+  Instant told_of_clients_;
+  std::size_t dropped_ = 0;
+  std::size_t turned_away_ = 0;
+  std::string last_dropped_;
+  std::uint64_t alarms_ = 0;  // that were set
+  bool closed_ = false;
   bool ending_ = false;
   bool accept_again_ = false;
 };

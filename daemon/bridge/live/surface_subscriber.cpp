@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <pthread.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "daemon/subscribing/any_time.hpp"
@@ -16,8 +15,9 @@ using client::Hearing;
 constexpr Duration kAfterAnError = std::chrono::milliseconds(100);
 // No surface of this host's is so late or early.
 constexpr Duration kOtherClock = std::chrono::seconds(5);
-// Sources are remembered by name; whoever publishes under ever new names is not followed.
+// Sources are remembered by name, for a minute: whoever publishes under ever new names keeps others out for no longer.
 constexpr std::size_t kMostSources = 64;
+constexpr Duration kForgotten = std::chrono::minutes(1);
 
 // A copy that owns its sequences; none when it is not valid.
 template <class T>
@@ -87,23 +87,29 @@ void SurfaceSubscriber::receive() {
   if (!stopping_.load(std::memory_order_relaxed)) calls_.failed();
 }
 
-std::uint64_t SurfaceSubscriber::number_of(std::string_view source) {
-  const auto known = std::find(sources_.begin(), sources_.end(), source);
-  if (known == sources_.end() && sources_.size() < kMostSources) {
-    sources_.emplace_back(source);
-    if (sources_.size() > 1) {
-      calls_.say(fmt::format("another source, {:?}, publishes too: one at a time is followed", source));
-    }
-    return sources_.size() - 1;
+std::optional<std::uint64_t> SurfaceSubscriber::number_of(std::string_view source, Instant receipt) {
+  const auto known = sources_.find(source);
+  if (known != sources_.end()) {
+    known->second.heard = receipt;
+    return known->second.number;
   }
-  return static_cast<std::uint64_t>(known - sources_.begin());
+  if (sources_.size() >= kMostSources) {
+    std::erase_if(sources_, [receipt](const auto& entry) { return receipt - entry.second.heard > kForgotten; });
+  }
+  if (sources_.size() >= kMostSources) return std::nullopt;
+  if (!sources_.empty()) {
+    calls_.say(fmt::format("another source, {:?}, publishes too: one at a time is followed", source));
+  }
+  const std::uint64_t number = ++last_number_;
+  sources_.emplace(source, Source{number, receipt});
+  return number;
 }
 
 // What the watch has to hear, and of it what a mesh is moved by.
 template <class T>
 void SurfaceSubscriber::keep(const T& sample, dds_instance_handle_t writer, Instant receipt) {
-  const auto known = std::find(sources_.begin(), sources_.end(), std::string_view(sample.source));
-  if (known == sources_.end() || !followed_.follows(static_cast<std::uint64_t>(known - sources_.begin()))) return;
+  const auto known = sources_.find(std::string_view(sample.source));
+  if (known == sources_.end() || !followed_.follows(known->second.number)) return;
   if (watch_.hear(sample, writer, to_ns(receipt)) != Hearing::kUse) return;
   if constexpr (std::is_same_v<T, perimap_SurfaceModel> || std::is_same_v<T, perimap_SurfaceMesh>) {
     if (auto copy = owned_copy_of(sample)) gate_.take(std::move(*copy));
@@ -112,18 +118,20 @@ void SurfaceSubscriber::keep(const T& sample, dds_instance_handle_t writer, Inst
 
 void SurfaceSubscriber::hear(const perimap_Surface& surface, dds_instance_handle_t writer, Instant receipt,
                              const perimap_Surface* next) {
-  const std::uint64_t source = number_of(surface.source);
-  if (source >= kMostSources) return;
-  const auto verdict = followed_.surface(source, surface.stream, receipt);
+  const auto source = number_of(surface.source, receipt);
+  if (!source) return;
+  const auto verdict = followed_.surface(*source, surface.stream, receipt);
   if (verdict == FollowedPublisher::Verdict::kNew) follow_anew(surface);
   // A publisher of the other stream, or of another name, is none of this one's; but the watch knows streams by itself.
-  if (!followed_.follows(source)) return;
+  if (!followed_.follows(*source)) return;
   const Hearing hearing = watch_.hear(surface, writer, to_ns(receipt));
-  if (!followed_.follows(source, surface.stream)) return;
+  if (!followed_.follows(*source, surface.stream)) return;
   const bool changed = hearing != hearing_ || surface.state != state_ || surface.reason != reason_;
   // Of several that have come together the last of each state is told, not the first.
-  const bool same_next = next != nullptr && next->state == surface.state && next->reason == surface.reason;
-  if (!changed && (same_next || receipt - told_ < kShortestPause)) return;
+  const bool same_next = next != nullptr && next->state == surface.state && next->reason == surface.reason &&
+                         std::string_view(next->source) == surface.source &&
+                         std::string_view(next->stream) == surface.stream;
+  if (same_next || (!changed && receipt - told_ < kShortestPause)) return;
   hearing_ = hearing;
   state_ = surface.state;
   reason_ = surface.reason;

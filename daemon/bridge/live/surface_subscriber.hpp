@@ -3,13 +3,13 @@
 
 #include <atomic>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <perimap_publisher_watch.hpp>
 #include <string>
 #include <string_view>
 #include <thread>
-#include <vector>
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
@@ -43,6 +43,11 @@ class SurfaceSubscriber {
   ~SurfaceSubscriber();
 
  private:
+  struct Source {
+    std::uint64_t number = 0;
+    Instant heard;
+  };
+
   SurfaceSubscriber(SampleReaders readers, Calls calls);
 
   void receive();
@@ -52,13 +57,14 @@ class SurfaceSubscriber {
   template <class T>
   void keep(const T& sample, dds_instance_handle_t writer, Instant receipt);
   void hear(const perimap_Surface& surface, dds_instance_handle_t writer, Instant receipt, const perimap_Surface* next);
-  // By which FollowedPublisher tells sources apart.
-  [[nodiscard]] std::uint64_t number_of(std::string_view source);
+  // By which FollowedPublisher tells sources apart; none: there are too many.
+  [[nodiscard]] std::optional<std::uint64_t> number_of(std::string_view source, Instant receipt);
   void follow_anew(const perimap_Surface& surface);
 
   SampleReaders readers_;
   const Calls calls_;
-  std::vector<std::string> sources_;  // that were heard; the number is the place
+  std::map<std::string, Source, std::less<>> sources_;  // that were heard lately, by name
+  std::uint64_t last_number_ = 0;
   FollowedPublisher followed_;
   client::PublisherWatch watch_;  // of the followed one
   SurfaceGate gate_;

@@ -51,14 +51,27 @@ TEST(IgtlMessages, AMeshIsItsVerticesTrianglesAndDeviations) {
   EXPECT_EQ(got.scalars.size(), 1U);
 }
 
-TEST(IgtlMessages, WithoutAMeshFeaturesAreVerticesWithTheirStates) {
-  const auto got = surface_in(pack_surface(good()));
-  ASSERT_EQ(got.points.size(), 2U);
-  EXPECT_THAT(got.points[1], ElementsAre(4.0F, 5.0F, 6.0F));
+TEST(IgtlMessages, WithoutAMeshConvergedFeaturesAreVertices) {
+  ShownSurface shown = good();
+  shown.features.push_back({12, perimap_FEATURE_CONVERGED, {7, 8, 9}, 0.5});
+  shown.features.push_back({13, perimap_FEATURE_INCONSISTENT, {0, 0, 0}, 0.5});
+  const auto got = surface_in(pack_surface(shown));
+  ASSERT_EQ(got.points.size(), 2U);  // converging and inconsistent ones are not for others
+  EXPECT_THAT(got.points[0], ElementsAre(1.0F, 2.0F, 3.0F));
+  EXPECT_THAT(got.points[1], ElementsAre(7.0F, 8.0F, 9.0F));
   EXPECT_THAT(got.triangles, IsEmpty());
   EXPECT_THAT(got.vertices, ElementsAre(0U, 1U));
-  EXPECT_THAT(got.scalars.at("deviation_mm"), ElementsAre(0.25F, 1.5F));
-  EXPECT_THAT(got.scalars.at("feature_state"), ElementsAre(2.0F, 1.0F));
+  EXPECT_THAT(got.scalars.at("deviation_mm"), ElementsAre(0.25F, 0.5F));
+  shown.features = {{9, perimap_FEATURE_CONVERGING, {4, 5, 6}, 1.5}};
+  EXPECT_THAT(surface_in(pack_surface(shown)).points, IsEmpty());
+}
+
+TEST(IgtlMessages, AnotherSourceIsAnotherState) {
+  ShownSurface shown = good(), other = good();
+  shown.source = "left";
+  other.source = "right";
+  EXPECT_FALSE(surface_state_of(shown) == surface_state_of(other));
+  EXPECT_THAT(surface_state_of(shown).words, HasSubstr("source left"));
 }
 
 TEST(IgtlMessages, OfNothingAllArraysAreEmpty) {

@@ -47,7 +47,13 @@ class IgtlServers : public testing::Test {
     server_ = std::make_unique<IgtlServer>(std::move(*server));
     const std::string endpoint = server_->endpoint();
     port_ = std::stoi(endpoint.substr(endpoint.rfind(':') + 1));
-    thread_ = std::thread([this] { EXPECT_TRUE(server_->run(stop_[0], [this] { server_->send(state_of("gone")); })); });
+    thread_ = std::thread([this] {
+      EXPECT_TRUE(server_->run(stop_[0], [this] {
+        server_->send(state_of("gone"));
+        // As by a thread that has not heard of the end: nothing comes after the last word.
+        server_->post([this] { server_->send(surface_of(99, 3)); });
+      }));
+    });
   }
   void TearDown() override {
     stop();
@@ -136,6 +142,28 @@ TEST_F(IgtlServers, AClientThatDoesNotReadIsDroppedAndTheOthersGoOn) {
   EXPECT_EQ(again.next()->points.at(0)[0], static_cast<float>(number));
 }
 
+// As many bytes as a real surface has, thirty times a second.
+TEST_F(IgtlServers, AClientThatDoesNotReadSmallSurfacesIsDroppedSoonAfterItsSystemIsFull) {
+  test::IgtlReceiver slow, quick;
+  ASSERT_TRUE(slow.connect(port_));
+  ASSERT_TRUE(quick.connect(port_));
+  int number = 0;
+  bool dropped = false;
+  for (; !dropped && number < 400; ++number) {
+    send(surface_of(number, 200));
+    ASSERT_TRUE(quick.next());
+    std::this_thread::sleep_for(33ms);
+    const std::lock_guard lock(mutex_);
+    dropped = !said_.empty();
+  }
+  EXPECT_TRUE(dropped);
+  // What it could still read is what its own system has taken in, not what has waited here.
+  int old = 0;
+  while (const auto got = slow.next(100ms)) ++old;
+  RecordProperty("surfaces_taken_in", old);
+  EXPECT_LT(old, number - 10);
+}
+
 TEST_F(IgtlServers, WhatAClientSaysMeansNothing) {
   test::IgtlReceiver client;
   ASSERT_TRUE(client.connect(port_));
@@ -181,6 +209,7 @@ TEST_F(IgtlServers, WhatIsSentAtTheEndStillGoesOut) {
   const auto last = client.next();
   ASSERT_TRUE(last);
   EXPECT_EQ(last->name, "gone");
+  EXPECT_FALSE(client.next(1s));
 }
 
 TEST_F(IgtlServers, AnAlarmThatWasSetAnewComesOnce) {
