@@ -65,12 +65,14 @@ needs_of_the_sources() {
     "$source"/drivers "$source"/daemon/{checkpoint,config,control,dds,keys,logging,process,publishing,runtime} |
     tr -d '"' | sort -u | sed 's/^/r\t/'
 }
-# As seen by strace of a run with keys: the C library's look-up of users, groups and hosts; Cyclone DDS; thread names.
+# As strace shows of a run with keys, and a kernel with the profile: the C library's look-up of users, groups and hosts;
+# Cyclone DDS; oneTBB's allocator; thread names.
 needs_of_libraries() {
   printf 'r\t/etc/%s\n' nsswitch.conf passwd group hosts host.conf gai.conf resolv.conf services
   printf 'r\t/run/%s\n' systemd/resolve/stub-resolv.conf systemd/resolve/resolv.conf NetworkManager/resolv.conf \
     resolvconf/resolv.conf connman/resolv.conf
-  printf 'r\t/proc/12/net/wireless\n'
+  printf 'r\t%s\n' /proc/12/net/wireless /proc/12/cmdline /proc/sys/vm/nr_hugepages \
+    /sys/kernel/mm/transparent_hugepage/enabled
   printf 'rw\t/proc/12/task/13/comm\n'
 }
 needs=$(needs_of_the_unit; needs_of_the_configurations; needs_of_the_sources; needs_of_libraries)
@@ -88,6 +90,7 @@ faults_of() { # PROFILE
       gsub(/[.+]/, "\\\\&", path)
       gsub(/@{run}/, "/run", path)
       gsub(/@{PROC}/, "/proc", path)
+      gsub(/@{sys}/, "/sys", path)
       gsub(/@{[pt]id}/, "[0-9]+", path)
       gsub(/{/, "(", path)
       gsub(/}/, ")", path)
