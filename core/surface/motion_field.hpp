@@ -34,6 +34,9 @@ class MotionField {
                                                       const Kernels& kernels, KernelSearch search);
 
   [[nodiscard]] const Kernels& kernels() const noexcept { return kernels_; }
+  // By how many times their claimed variances the features scatter about their neighbours.
+  [[nodiscard]] double noise_scale_across() const noexcept { return across_.scale; }
+  [[nodiscard]] double noise_scale_along() const noexcept { return along_.scale; }
 
   // How the features' coefficients make those of V places, and what that leaves of each place's own.
   struct Weights {
