@@ -1,8 +1,8 @@
 #!/bin/bash
 # `perimap check`: exit codes, one line on an error, and an effective configuration that checks again to the same.
-#   check_names_what_is_wrong.sh PERIMAP
+#   check_names_what_is_wrong.sh PERIMAP PERIMAPD
 set -u
-perimap=$1
+perimap=$1 perimapd=$2
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 

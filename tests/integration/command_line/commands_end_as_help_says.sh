@@ -129,7 +129,7 @@ ends 2 "A subcommand is required" bridge
 ends 2 "--port" bridge igtl --port 99999
 ends 1 "192.0.2.1" bridge igtl --port 0 --bind 192.0.2.1
 ends 2 "expected one address of this host" bridge igtl --port 0 --bind 0.0.0.0
-ends 2 "OUT is the recording itself" export-view r.mcap r.mcap
+ends 2 "OUT: is the recording itself" export-view r.mcap r.mcap
 ends 1 "nothing.mcap" export-view nothing.mcap o.mcap
 ends 2 "A subcommand is required" keys
 ends 1 "nowhere" keys show --directory nowhere
