@@ -43,4 +43,14 @@ Expected<void> RecordingPlayer::advance(Instant until, std::optional<Instant> fr
   return {};
 }
 
+Expected<std::vector<RecordingPlayer>> open_players(const std::vector<std::string>& files) {
+  std::vector<RecordingPlayer> players;
+  for (const std::string& file : files) {
+    auto player = RecordingPlayer::open(file);
+    if (!player) return tl::unexpected(player.error());
+    players.push_back(std::move(*player));
+  }
+  return players;
+}
+
 }  // namespace perimap

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
@@ -39,5 +40,8 @@ class RecordingPlayer {
   std::optional<RecordedMessage> next_;  // read, and later than was asked for
   bool ended_ = false;
 };
+
+// One of each file. Fails with the first that fails.
+[[nodiscard]] Expected<std::vector<RecordingPlayer>> open_players(const std::vector<std::string>& files);
 
 }  // namespace perimap

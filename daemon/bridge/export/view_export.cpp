@@ -276,14 +276,10 @@ Expected<Facts> read_facts(const ViewExportFiles& files) {
 }  // namespace
 
 Expected<ViewExportSummary> export_view(const ViewExportFiles& files, const std::string& generator) {
-  std::vector<RecordingPlayer> players;
   std::vector<std::string> names{files.recording};
   if (!files.samples.empty()) names.push_back(files.samples);
-  for (const std::string& name : names) {
-    auto player = RecordingPlayer::open(name);
-    if (!player) return tl::unexpected(player.error());
-    players.push_back(std::move(*player));
-  }
+  auto players = open_players(names);
+  if (!players) return tl::unexpected(players.error());
   const auto states = read_published_states(names.back());
   if (!states) return tl::unexpected(states.error());
   Duration offset{0};
@@ -298,7 +294,7 @@ Expected<ViewExportSummary> export_view(const ViewExportFiles& files, const std:
   if (!facts) return tl::unexpected(facts.error());
   auto writer = ViewWriter::create(files.output, generator);
   if (!writer) return tl::unexpected(writer.error());
-  auto summary = Exporter(std::move(players), states->stream, offset, std::move(*facts), std::move(*writer)).run();
+  auto summary = Exporter(std::move(*players), states->stream, offset, std::move(*facts), std::move(*writer)).run();
   if (!summary) return summary;
   if (auto written = write_text_file(files.layout, view_layout(summary->world_frame)); !written) {
     return tl::unexpected(written.error());

@@ -124,7 +124,7 @@ class IgtlServer::Impl {
     return where + "; --bind takes an address of this host";
   }
 
-  // Since sending may drop a client.
+  // A copy, since one that is dropped leaves clients_ at once.
   std::vector<std::shared_ptr<IgtlClient>> all() const {
     std::vector<std::shared_ptr<IgtlClient>> all;
     for (const auto& [id, client] : clients_) all.push_back(client);

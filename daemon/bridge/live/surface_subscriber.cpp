@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "daemon/subscribing/any_time.hpp"
+#include "drivers/recording/owned_copy.hpp"
 
 namespace perimap {
 namespace {
@@ -18,17 +19,6 @@ constexpr Duration kOtherClock = std::chrono::seconds(5);
 // Sources are remembered by name, for a minute: whoever publishes under ever new names keeps others out for no longer.
 constexpr std::size_t kMostSources = 64;
 constexpr Duration kForgotten = std::chrono::minutes(1);
-
-// A copy that owns its sequences; none when it is not valid.
-template <class T>
-std::optional<Sample<T>> owned_copy_of(const T& sample) {
-  CdrSerializer serializer;
-  const auto bytes = serializer.serialize(sample);
-  if (!bytes) return std::nullopt;
-  auto copy = deserialize<T>(*bytes);
-  if (!copy) return std::nullopt;
-  return std::move(*copy);
-}
 
 bool of_another_clock(std::int64_t release_ns, Instant receipt) {
   const std::int64_t late_ns = wrapped_difference(to_ns(receipt), release_ns);

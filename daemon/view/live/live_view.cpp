@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "daemon/view/messages/messages.hpp"
+#include "drivers/recording/owned_copy.hpp"
 
 namespace perimap {
 namespace {
@@ -25,17 +26,6 @@ constexpr Duration kAfterAnError = std::chrono::milliseconds(100);
 constexpr Duration kOtherClock = std::chrono::seconds(5);
 
 double ms(Duration duration) { return std::chrono::duration<double, std::milli>(duration).count(); }
-
-// A copy that owns its sequences; none when it is not valid.
-template <class T>
-std::optional<Sample<T>> copy_of(const T& sample) {
-  CdrSerializer serializer;
-  const auto bytes = serializer.serialize(sample);
-  if (!bytes) return std::nullopt;
-  auto copy = deserialize<T>(*bytes);
-  if (!copy) return std::nullopt;
-  return std::move(*copy);
-}
 
 }  // namespace
 
@@ -84,10 +74,10 @@ void LiveView::receive() {
   while (readers_.wait_set.wait()) {
     // Models and meshes first: a surface is told with the newest.
     hear(readers_.models, [this](const perimap_SurfaceModel& model, std::uint64_t publisher, const auto*) {
-      if (auto copy = copy_of(model)) publishers_[publisher].teller.hear(std::move(*copy));
+      if (auto copy = owned_copy_of(model)) publishers_[publisher].teller.hear(std::move(*copy));
     });
     hear(readers_.meshes, [this](const perimap_SurfaceMesh& mesh, std::uint64_t publisher, const auto*) {
-      if (auto copy = copy_of(mesh)) publishers_[publisher].teller.hear(std::move(*copy));
+      if (auto copy = owned_copy_of(mesh)) publishers_[publisher].teller.hear(std::move(*copy));
     });
     const Instant receipt = MonotonicClock::now();
     hear(readers_.surfaces, [&](const perimap_Surface& surface, std::uint64_t publisher, const perimap_Surface* next) {

@@ -28,19 +28,15 @@ constexpr std::size_t kMostDamage = 3;  // that is told one by one
 }  // namespace
 
 Expected<std::unique_ptr<RecordedView>> RecordedView::open(const Files& files, WebServer& server, Say say) {
-  std::vector<RecordingPlayer> players;
   std::vector<std::string> names{files.recording};
   if (!files.samples.empty()) names.push_back(files.samples);
-  for (const std::string& name : names) {
-    auto player = RecordingPlayer::open(name);
-    if (!player) return tl::unexpected(player.error());
-    players.push_back(std::move(*player));
-  }
+  auto players = open_players(names);
+  if (!players) return tl::unexpected(players.error());
   auto states = read_published_states(names.back());
   if (!states) return tl::unexpected(states.error());
   if (names.size() > 1 && states->stream.empty()) return fail(fmt::format("{}: has no surfaces", names.back()));
   std::unique_ptr<RecordedView> view(
-      new RecordedView(files.recording, std::move(players), std::move(*states), server, std::move(say)));
+      new RecordedView(files.recording, std::move(*players), std::move(*states), server, std::move(say)));
   if (names.size() > 1) {
     const auto offset = offset_to(view->states_, files.recording);
     if (!offset) return tl::unexpected(offset.error());
