@@ -28,9 +28,9 @@ bool stronger(const Corner& a, const Corner& b) {
 }
 
 // What of it is joined to the border: about a round view, and not a shadow within it.
-cv::Mat joined_to_border(const cv::Mat& background) {
+cv::Mat joined_to_border(const cv::Mat& dark) {
   constexpr std::uint8_t kJoined = 128;
-  cv::Mat marked = background.clone();
+  cv::Mat marked = dark.clone();
   const auto mark = [&marked](int x, int y) {
     if (marked.at<std::uint8_t>(y, x) == 255) cv::floodFill(marked, {x, y}, cv::Scalar(kJoined));
   };
@@ -45,6 +45,8 @@ cv::Mat joined_to_border(const cv::Mat& background) {
   return marked == kJoined;
 }
 
+constexpr int kSurroundWindow_px = 5;
+
 // 255 where no feature may be.
 cv::Mat forbidden(const cv::Mat& image, const DetectorSettings& settings) {
   const cv::Mat highlight = widened(image >= settings.highlight_grey, settings.highlight_clearance_px);
@@ -53,10 +55,12 @@ cv::Mat forbidden(const cv::Mat& image, const DetectorSettings& settings) {
   cv::blur(image, mean, {settings.background_size_px, settings.background_size_px});
   // The mean turns dark only half a window inside the background.
   const double inside_px = 0.5 * settings.background_size_px;
-  const cv::Mat background = mean < settings.background_grey;
-  const cv::Mat barred = highlight | widened(background, settings.background_clearance_px + inside_px);
-  if (settings.surround_clearance_px <= settings.background_clearance_px) return barred;
-  return barred | widened(joined_to_border(background), settings.surround_clearance_px + inside_px);
+  const cv::Mat barred =
+      highlight | widened(mean < settings.background_grey, settings.background_clearance_px + inside_px);
+  if (settings.surround_grey < 0) return barred;
+  cv::blur(image, mean, {kSurroundWindow_px, kSurroundWindow_px});
+  const cv::Mat surround = joined_to_border(mean <= settings.surround_grey);
+  return barred | widened(surround, settings.surround_clearance_px + 0.5 * kSurroundWindow_px);
 }
 
 // The smaller eigenvalue of the gradient product's mean over a patch, (grey levels / px)^2 (Shi & Tomasi, "Good
@@ -101,10 +105,10 @@ int border_of(const DetectorSettings& settings) { return std::max(settings.borde
 
 // As far as a pixel's verdict looks.
 int reach_of(const DetectorSettings& settings) {
-  const double highlight = settings.highlight_clearance_px;
-  const double background =
-      std::max(settings.background_clearance_px, settings.surround_clearance_px) + settings.background_size_px;
-  return std::max(border_of(settings), static_cast<int>(std::ceil(std::max(highlight, background))));
+  const double furthest =
+      std::max({settings.highlight_clearance_px, settings.background_clearance_px + settings.background_size_px,
+                settings.surround_clearance_px + kSurroundWindow_px});
+  return std::max(border_of(settings), static_cast<int>(std::ceil(furthest)));
 }
 
 struct Tile {
@@ -227,12 +231,14 @@ DetectorSettings detector_settings_for_trial(const GreyImage& image, int how_man
   const double scale = std::clamp(image.width / kWidth, kSmallest, 1.0);
   settings.highlight_clearance_px *= scale;
   settings.background_clearance_px *= scale;
-  // The edge of a round view goes with the scope, and stands out of all that is in the picture: what is followed must
-  // not have it in its template.
-  constexpr double kTemplate_px = PatchTemplate::kSide[0] / 2 + 2;
-  if (light.has_surround) settings.surround_clearance_px = kTemplate_px;
+  if (light.has_surround) {
+    // A surround shows how dark it is where nothing is seen: what is a little brighter is dim tissue.
+    constexpr int kSurroundMargin_grey = 3;
+    settings.surround_grey = settings.background_grey =
+        static_cast<int>(std::lround(light.surround_grey)) + kSurroundMargin_grey;
+  }
   const double spacing = std::sqrt(static_cast<double>(image.width) * image.height / std::max(how_many, 1));
-  constexpr double kOfSpacing = 0.3, kLeast_px = 7, kMost_px = 40;
+  constexpr double kOfSpacing = 0.3, kLeast_px = 5, kMost_px = 40;
   settings.min_distance_px = std::clamp(kOfSpacing * spacing, kLeast_px, kMost_px);
   return settings;
 }

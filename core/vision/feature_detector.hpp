@@ -24,7 +24,11 @@ struct DetectorSettings {
   int background_grey = 18;  // mean over background_size_px below: no tissue, or none that is lit
   int background_size_px = 13;
   double background_clearance_px = 16;  // silhouettes slide over the tissue
-  double surround_clearance_px = 0;     // likewise, of background that reaches the picture's border
+  // Mean over a few pixels, at or below, and joined to the picture's border: the surround of a view that does not fill
+  // the picture; -1 where it does. Its edge goes with the scope and stands out of all that is in the picture: what is
+  // followed must not have it in its template.
+  int surround_grey = -1;
+  double surround_clearance_px = PatchTemplate::kSide[0] / 2 + 2;
 };
 
 // For how_many features spread over an image of this size, this noise and this light, whatever they are. A corner must

@@ -282,5 +282,33 @@ TEST(FeatureDetector, KeepsATemplateFromTheSurroundAndGoesNearerToAShadow) {
   EXPECT_LT(nearest_to_shadow, kTemplate_px - 2);
 }
 
+// What is dim beside a surround is tissue that has little light, right to where templates reach into the surround.
+TEST(FeatureDetector, FindsDimTissueWhereASurroundShowsWhatIsDark) {
+  constexpr int kSide = 256;
+  constexpr double kView_px = 115, kTemplate_px = PatchTemplate::kSide[0] / 2 + 1, kDimmed = 0.1;
+  const Vector2d centre(128, 128);
+  std::mt19937 random(1);
+  test::ImageBuffer image = test::render(test::Texture(3, 15, 6, 60), {}, kSide, kSide, 1.0, random);
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      auto& grey = image.at(x, y);
+      if (x < kSide / 2) grey = static_cast<std::uint8_t>(std::lround(kDimmed * grey));
+      if ((Vector2d(x, y) - centre).norm() > kView_px) grey = 0;
+    }
+  }
+  const DetectorSettings settings = detector_settings_for_trial(image.view(), 600);
+  const auto found = find_features(image.view(), {}, settings, 600);
+  ASSERT_TRUE(found);
+  int dim = 0, lit = 0;
+  double nearest_to_edge = kSide;
+  for (const Vector2d& px : *found) {
+    ++(px.x() < kSide / 2 - kTemplate_px ? dim : lit);
+    nearest_to_edge = std::min(nearest_to_edge, kView_px - (px - centre).norm());
+  }
+  EXPECT_GE(dim, 20) << "beside " << lit;
+  EXPECT_GE(nearest_to_edge, kTemplate_px);
+  EXPECT_LE(nearest_to_edge, kTemplate_px + 5);
+}
+
 }  // namespace
 }  // namespace perimap
