@@ -19,6 +19,8 @@ bool is_sought(const FollowedFeature& feature) noexcept {
   return feature.state == FollowState::kCandidate || feature.state == FollowState::kTracked;
 }
 
+bool is_away(const FollowedFeature& feature, int place) noexcept { return feature.swept && feature.place == place; }
+
 double largest_deviation(const Matrix2d& C) noexcept { return std::sqrt(larger_eigenvalue(C)); }
 
 // False for a picture without contrast, but for the noise: black, faded, one colour.
@@ -39,6 +41,7 @@ FeatureFollower::FeatureFollower(const FollowerSettings& settings)
       // Twice as many may be away, here and where the lens has been meanwhile; and as many as are on trial.
       features_(static_cast<std::size_t>((3 + settings.candidates_per_place) * std::max(settings.maximum, 0))),
       motion_(features_.size()),
+      return_(features_.size()),
       validity_(settings.rate),
       overlays_(features_.size(), settings.rate, settings.overlay),
       deviation_px_(kFirstDeviation_px) {
@@ -71,7 +74,8 @@ std::vector<Vector2d> FeatureFollower::occupied() const {
 }
 
 bool FeatureFollower::seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
-                           double deviation_px, double min_correlation, bool is_vouched_for) const noexcept {
+                           double deviation_px, double min_correlation, bool is_vouched_for,
+                           const Matrix2d& reshaped_by) const noexcept {
   const bool has_way_back = before_.data != nullptr && feature.misses == 0;
   feature.match = feature.patch.find(tracker_, image,
                                      {.predicted_px = predicted,
@@ -79,7 +83,8 @@ bool FeatureFollower::seek(const GreyImage& image, FollowedFeature& feature, con
                                       .min_correlation = min_correlation,
                                       .is_vouched_for = is_vouched_for,
                                       .before = has_way_back ? &before_ : nullptr,
-                                      .before_px = feature.last_px});
+                                      .before_px = feature.last_px,
+                                      .reshaped_by = reshaped_by});
   feature.found = feature.match.state == MatchState::kFound;
   if (feature.found) feature.px = feature.match.px;
   return feature.found;
@@ -243,34 +248,6 @@ void FeatureFollower::sweep() noexcept {
   }
 }
 
-// By how much those found of a place's have moved, if a good share of them has moved alike.
-std::optional<Vector2d> FeatureFollower::displacement_of_swept(int place) noexcept {
-  std::size_t found = 0, alike = 0;
-  Vector2d middle = Vector2d::Zero();
-  for (int axis = 0; axis < 2; ++axis) {
-    scratch_.clear();
-    for (const FollowedFeature& feature : features_) {
-      if (feature.swept && feature.place == place && feature.found) {
-        scratch_.push_back((feature.px - feature.last_px)[axis]);
-      }
-    }
-    found = scratch_.size();
-    if (found < kEnoughDisplacements) return std::nullopt;
-    middle[axis] = upper_median(scratch_.begin(), scratch_.end());
-  }
-  const double tolerance_px = 3 + 0.15 * middle.norm();
-  for (FollowedFeature& feature : features_) {
-    if (!feature.swept || feature.place != place || !feature.found) continue;
-    if ((feature.px - feature.last_px - middle).norm() <= tolerance_px) {
-      ++alike;
-    } else {
-      disbelieve(feature);
-    }
-  }
-  if (alike < kEnoughDisplacements || 2 * alike < found) return std::nullopt;
-  return middle;
-}
-
 void FeatureFollower::recall_swept(const GreyImage& image) noexcept {
   const auto is_swept = [](const FollowedFeature& feature) { return feature.swept; };
   if (std::none_of(features_.begin(), features_.end(), is_swept)) return;
@@ -282,37 +259,72 @@ void FeatureFollower::recall_swept(const GreyImage& image) noexcept {
   }
 }
 
-// A share of a place's features is sought widely, where the coarse picture has them; only when those are there, the
-// rest is sought near.
-bool FeatureFollower::recall_place(const GreyImage& image, int place, const Thumbnail& now) noexcept {
-  constexpr std::size_t kProbes = 40, kShareAlike = 4;  // one in so many at least
-  const auto is_of_place = [place](const FollowedFeature& feature) { return feature.swept && feature.place == place; };
-  const auto swept = static_cast<std::size_t>(std::count_if(features_.begin(), features_.end(), is_of_place));
-  if (swept == 0) return false;
-  const Vector2d coarse = displacement_between(places_[place], now).value_or(Vector2d::Zero());
-  const std::size_t stride = (swept + kProbes - 1) / kProbes;
-  std::size_t nth = trails_.frame() % stride, probed = 0;
+// Widely, in this frame a share of a place's features. Returns how many those are.
+std::size_t FeatureFollower::probe(const GreyImage& image, int place) noexcept {
+  constexpr std::size_t kProbes = 40;
+  const auto away = static_cast<std::size_t>(std::count_if(
+      features_.begin(), features_.end(), [&](const FollowedFeature& feature) { return is_away(feature, place); }));
+  const std::size_t stride = (away + kProbes - 1) / kProbes;
+  std::size_t nth = stride > 0 ? trails_.frame() % stride : 0, probed = 0;
   for (FollowedFeature& feature : features_) {
-    if (!is_of_place(feature) || nth++ % stride != 0) continue;
+    if (!is_away(feature, place) || nth++ % stride != 0) continue;
     ++probed;
-    (void)seek(image, feature, feature.last_px + coarse, settings_.widest_deviation_px, settings_.vouched_correlation,
-               true);
+    (void)seek(image, feature, return_.at(feature.last_px), settings_.widest_deviation_px,
+               settings_.vouched_correlation, true, return_.shape());
   }
-  const std::optional<Vector2d> displacement = displacement_of_swept(place);
-  const auto found =
-      static_cast<std::size_t>(std::count_if(features_.begin(), features_.end(), [&](const FollowedFeature& feature) {
-        return is_of_place(feature) && feature.found;
-      }));
-  const bool are_back = displacement && kShareAlike * found >= probed;
+  return probed;
+}
+
+// How many of those found have moved alike.
+std::size_t FeatureFollower::agree_on_return(const GreyImage& image, int place) noexcept {
+  constexpr double kAlike_px = 3, kAlikeOfWidth = 0.006;
+  return_.clear();
+  for (const FollowedFeature& feature : features_) {
+    if (is_away(feature, place) && feature.found) return_.add(feature.last_px, feature.px);
+  }
+  return return_.agree(kAlike_px + kAlikeOfWidth * image.width);
+}
+
+// What goes with those around it. The looks alone would lead many to a place beside their own.
+void FeatureFollower::take_back(const GreyImage& image, int place) noexcept {
+  constexpr double kOff_px = 1.5;
   for (FollowedFeature& feature : features_) {
-    if (!is_of_place(feature)) continue;
-    if (!are_back || !feature.found) disbelieve(feature);
-    feature.swept = !are_back;
-    feature.is_recalled = are_back;
-    if (are_back && !feature.found) {
-      const Vector2d expected = feature.last_px + *displacement;
-      if (!seek_vouched_for(image, feature, expected, kFirstDeviation_px)) feature.px = expected;
+    if (!is_away(feature, place) || feature.found) continue;
+    (void)seek(image, feature, return_.at(feature.last_px), kFirstDeviation_px, settings_.recalled_correlation, true,
+               return_.shape());
+  }
+  if (agree_on_return(image, place) < CommonMotion::kFewest) return;
+  for (FollowedFeature& feature : features_) {
+    if (!is_away(feature, place)) continue;
+    if (feature.found && (feature.px - return_.at(feature.last_px, &feature.last_px)).norm() <= kOff_px) {
+      feature.is_recalled = true;
+    } else {
+      disbelieve(feature);
     }
+  }
+  for (FollowedFeature& feature : features_) feature.swept = feature.swept && !feature.is_recalled;
+}
+
+// When a good share of what is sought has moved alike, all are. What is nearer to the lens than other tissue has moved
+// otherwise: those that do not go with the first motion are asked for another.
+bool FeatureFollower::recall_place(const GreyImage& image, int place, const Thumbnail& now) noexcept {
+  constexpr std::size_t kFewestAlike = 6, kShareAlike = 4;  // one in so many at least
+  constexpr int kMotions = 3;
+  const auto is_of_place = [place](const FollowedFeature& feature) { return is_away(feature, place); };
+  if (std::none_of(features_.begin(), features_.end(), is_of_place)) return false;
+  return_.begin_with(displacement_between(places_[place], now).value_or(Vector2d::Zero()));
+  const std::size_t probed = probe(image, place);
+  std::size_t alike = agree_on_return(image, place);
+  const bool are_back = alike >= kFewestAlike && kShareAlike * alike >= probed;
+  for (int motion = 0; are_back && motion < kMotions && alike >= kFewestAlike; ++motion) {
+    take_back(image, place);
+    probe(image, place);
+    alike = agree_on_return(image, place);
+  }
+  for (FollowedFeature& feature : features_) {
+    if (!is_away(feature, place)) continue;
+    disbelieve(feature);
+    feature.swept = !are_back;
   }
   return are_back;
 }

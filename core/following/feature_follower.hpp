@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "core/following/common_motion.hpp"
 #include "core/following/feature_trails.hpp"
 #include "core/following/followed_feature.hpp"
 #include "core/following/overlay_watch.hpp"
@@ -44,6 +45,7 @@ struct FollowerSettings {
   double recovered_correlation = 0.97;  // asked of a feature that comes back, for which there is no way back
   // Of one that comes back where others have it that come back with it, or that were never away.
   double vouched_correlation = 0.9;
+  double recalled_correlation = 0.85;  // where nearly all come back, moved alike
   // A place that shows what was laid over the picture takes no feature so long.
   Duration overlay = std::chrono::seconds(30);
   // Candidates that may be on trial beside as many features as are wanted, of the maximum; the best become features.
@@ -56,9 +58,10 @@ struct FollowerSettings {
 //
 // Where nearly all fail even so, the picture is another one: a cut, smoke, a leap. The few that something was found for
 // are not believed. All are kept where they were, and taken back only together, when a good share of them is found
-// moved alike; by how much is told beforehand by a coarse picture of where they vanished (seen_places.hpp). What is
-// missed in a region that shows no tissue (picture_validity.hpp) counts as hidden. A frame without contrast (black,
-// faded) is no look at anything: nothing is sought and nothing is missed.
+// moved alike (common_motion.hpp); where to is told beforehand by a coarse picture of where they vanished
+// (seen_places.hpp). What does not go with what comes back around it is not taken back. What is missed in a region that
+// shows no tissue (picture_validity.hpp) counts as hidden. A frame without contrast (black, faded) is no look at
+// anything: nothing is sought and nothing is missed.
 //
 // What is laid over the picture is let go (overlay_watch.hpp). How a feature's looks are kept is in followed_patch.hpp.
 // More candidates are tried than there are places; those whose matches were surest become features. A match's deviation
@@ -92,7 +95,8 @@ class FeatureFollower {
 
  private:
   [[nodiscard]] bool seek(const GreyImage& image, FollowedFeature& feature, const Vector2d& predicted,
-                          double deviation_px, double min_correlation, bool is_vouched_for = false) const noexcept;
+                          double deviation_px, double min_correlation, bool is_vouched_for = false,
+                          const Matrix2d& reshaped_by = Matrix2d::Identity()) const noexcept;
   [[nodiscard]] bool seek_vouched_for(const GreyImage& image, FollowedFeature& feature, const Vector2d& expected,
                                       double deviation_px) const noexcept;
   // Of the features around `px`, without `but`; its own velocity where there are too few.
@@ -112,7 +116,9 @@ class FeatureFollower {
   void sweep() noexcept;
   void recall_swept(const GreyImage& image) noexcept;
   [[nodiscard]] bool recall_place(const GreyImage& image, int place, const Thumbnail& now) noexcept;
-  [[nodiscard]] std::optional<Vector2d> displacement_of_swept(int place) noexcept;
+  std::size_t probe(const GreyImage& image, int place) noexcept;
+  [[nodiscard]] std::size_t agree_on_return(const GreyImage& image, int place) noexcept;
+  void take_back(const GreyImage& image, int place) noexcept;
   void judge(const GreyImage& image) noexcept;
   // `astray`: by how much it moved otherwise than its neighbours.
   [[nodiscard]] bool is_strange(const Vector2d& astray, const NeighbourMotion::Around& neighbours) const noexcept;
@@ -126,6 +132,7 @@ class FeatureFollower {
   std::vector<std::uint8_t> before_pixels_;
   GreyImage before_;        // the frame before; without pixels until there was one
   NeighbourMotion motion_;  // of this frame
+  CommonMotion return_;     // of those of a place that come back
   PictureValidity validity_;
   OverlayWatch overlays_;
   SeenPlaces places_;

@@ -34,6 +34,7 @@ void FollowedPatch::put_back(const Places& places) noexcept {
 PatchMatch FollowedPatch::find(const PatchTracker& tracker, const GreyImage& image, const Search& search) noexcept {
   const Matrix2d covariance = search.deviation_px * search.deviation_px * Matrix2d::Identity();
   PatchState state = has_last_ ? last_state_ : first_state_;
+  state.A = search.reshaped_by * state.A;
   PatchMatch match = tracker.track(image, has_last_ ? last_ : first_, state, search.predicted_px, covariance);
   if (match.state == MatchState::kFound && match.correlation < search.min_correlation) {
     match.state = MatchState::kLowCorrelation;
@@ -54,6 +55,7 @@ PatchMatch FollowedPatch::find(const PatchTracker& tracker, const GreyImage& ima
   if (!has_last_) return match;
   // What has been covered, or has gone and come back, may look as it did at first.
   PatchState first = first_state_;
+  first.A = search.reshaped_by * first.A;
   PatchMatch again = tracker.track(image, first_, first, search.predicted_px, covariance);
   const double fits = search.is_vouched_for ? search.min_correlation : std::max(search.min_correlation, kFirstViewFits);
   if (again.state == MatchState::kFound && again.correlation >= fits) {
@@ -63,6 +65,7 @@ PatchMatch FollowedPatch::find(const PatchTracker& tracker, const GreyImage& ima
   }
   if (search.before != nullptr || settled_views_ < settled_.size()) return match;
   PatchState settled;
+  settled.A = search.reshaped_by;
   PatchMatch back = tracker.track(image, settled_.back(), settled, search.predicted_px, covariance);
   if (back.state != MatchState::kFound || back.correlation < search.min_correlation) return match;
   last_state_ = settled;

@@ -31,6 +31,7 @@ class FollowedPatch {
     // The frame before and where the feature was found in it; null when it was not: then there is no way back.
     const GreyImage* before = nullptr;
     Vector2d before_px = Vector2d::Zero();
+    Matrix2d reshaped_by = Matrix2d::Identity();  // since it was last found
   };
   // Where it is in the image. Places are noted with MatchState::kFound alone.
   [[nodiscard]] PatchMatch find(const PatchTracker& tracker, const GreyImage& image, const Search& search) noexcept;

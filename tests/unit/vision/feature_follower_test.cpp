@@ -241,6 +241,59 @@ TEST_F(FeatureFollowerTest, FindsItsFeaturesAgainAfterABlackoutInWhichTheCameraM
   EXPECT_LT(worst_px(), 0.5);
 }
 
+// All of it vanishes behind another picture; the camera has turned and come nearer when it is back.
+TEST_F(FeatureFollowerTest, FindsItsFeaturesAgainWhereTheCameraHasTurnedMeanwhile) {
+  track_ten_frames(0.5);
+  const int before = count(FollowState::kTracked);
+  ASSERT_GE(before, 25);
+  for (int k = 0; k < 8; ++k) {
+    image_ = render(Texture(8), View{}, kWidth, kHeight, 1, random_, 5);
+    follower_.track_into(image_.view());
+  }
+  View view;
+  view.A << 1.06, -0.08, 0.08, 1.06;
+  view.t = Vector2d(160, 120) - view.A * Vector2d(160, 120) + Vector2d(5, -3);
+  int back = 0, wrong = 0;
+  for (int k = 0; k < 3; ++k) {
+    image_ = render(Texture(3), view, kWidth, kHeight, 1, random_, 5);
+    follower_.track_into(image_.view());
+  }
+  for (const FollowedFeature& feature : follower_.features()) {
+    if (!feature.found || feature.state != FollowState::kTracked) continue;
+    ++((feature.px - view.A * places_.at(feature.id) - view.t).norm() < 1 ? back : wrong);
+  }
+  EXPECT_GE(back, before * 6 / 10);  // some leave the view
+  EXPECT_EQ(wrong, 0);
+}
+
+// What is nearer to the lens has moved otherwise than what is behind it.
+TEST_F(FeatureFollowerTest, FindsFeaturesOfTwoDepthsAgain) {
+  track_ten_frames(0.5);
+  for (int k = 0; k < 8; ++k) {
+    image_ = render(Texture(8), View{}, kWidth, kHeight, 1, random_, 5);
+    follower_.track_into(image_.view());
+  }
+  const std::array<Vector2d, 2> shifts = {Vector2d(5, 2), Vector2d(16, -9)};
+  std::array<int, 2> back{};
+  int wrong = 0;
+  for (int k = 0; k < 3; ++k) {
+    const ImageBuffer near = render(Texture(3), view_at(shifts[1]), kWidth, kHeight, 1, random_, 5);
+    show(shifts[0]);
+    for (int v = 0; v < kHeight; ++v) {
+      std::copy_n(near.pixels.begin() + v * near.stride, kWidth / 2, image_.pixels.begin() + v * image_.stride);
+    }
+    follower_.track_into(image_.view());
+  }
+  for (const FollowedFeature& feature : follower_.features()) {
+    if (!feature.found || feature.state != FollowState::kTracked) continue;
+    const std::size_t side = feature.px.x() < kWidth / 2.0 ? 1 : 0;
+    ++((feature.px - shifts[side] - places_.at(feature.id)).norm() < 1 ? back[side] : wrong);
+  }
+  EXPECT_GE(back[0], 10);
+  EXPECT_GE(back[1], 10);
+  EXPECT_EQ(wrong, 0);
+}
+
 // A chequered sign over the picture.
 void lay_sign_over(ImageBuffer& image, int left, int top) {
   constexpr int kSide = 72, kField = 9;

@@ -1,0 +1,116 @@
+#include "core/following/common_motion.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/statistics/upper_median.hpp"
+
+namespace perimap {
+
+CommonMotion::CommonMotion(std::size_t most) { pairs_.reserve(most); }
+
+void CommonMotion::add(const Vector2d& from_px, const Vector2d& to_px) noexcept {
+  if (pairs_.size() < pairs_.capacity()) pairs_.push_back({from_px, to_px, false});
+}
+
+void CommonMotion::begin_with(const Vector2d& displacement_px) noexcept {
+  clear();
+  shape_.setIdentity();
+  from_px_.setZero();
+  to_px_ = displacement_px;
+}
+
+std::size_t CommonMotion::count(const Similarity& motion, double tolerance_px) const noexcept {
+  return static_cast<std::size_t>(std::count_if(pairs_.begin(), pairs_.end(), [&](const Pair& pair) {
+    return (motion.shape * pair.from + motion.offset_px - pair.to).squaredNorm() <= tolerance_px * tolerance_px;
+  }));
+}
+
+// By all pairs of two pairs, each of which determines a similarity; of many pairs, by a share of them.
+std::size_t CommonMotion::agree(double tolerance_px) noexcept {
+  constexpr std::size_t kMostTried = 40;
+  constexpr double kLeastApart = 8;  // of the tolerance
+  constexpr double kMostTurn_rad = 0.5, kMostScale = 1.5;
+  const std::size_t stride = (pairs_.size() + kMostTried - 1) / kMostTried;
+  Similarity best;
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < pairs_.size(); i += stride) {
+    for (std::size_t k = i + stride; k < pairs_.size(); k += stride) {
+      const Vector2d before = pairs_[k].from - pairs_[i].from, after = pairs_[k].to - pairs_[i].to;
+      if (before.norm() < kLeastApart * tolerance_px) continue;
+      const double along = before.dot(after) / before.squaredNorm();
+      const double across = (before.x() * after.y() - before.y() * after.x()) / before.squaredNorm();
+      const double scale = std::hypot(along, across);
+      if (scale > kMostScale || scale * kMostScale < 1 || std::abs(std::atan2(across, along)) > kMostTurn_rad) continue;
+      Similarity motion;
+      motion.shape << along, -across, across, along;
+      motion.offset_px = 0.5 * (pairs_[i].to + pairs_[k].to - motion.shape * (pairs_[i].from + pairs_[k].from));
+      const std::size_t alike = count(motion, tolerance_px);
+      if (alike <= most) continue;
+      most = alike;
+      best = motion;
+    }
+  }
+  if (most >= kFewest) fit(best, tolerance_px);
+  return most;
+}
+
+// Affine, by least squares over those that agree. What they do not determine stays as the similarity has it.
+void CommonMotion::fit(const Similarity& motion, double tolerance_px) noexcept {
+  from_px_.setZero();
+  Vector2d off_px = Vector2d::Zero();
+  double agreeing = 0;
+  for (Pair& pair : pairs_) {
+    const Vector2d off = pair.to - motion.shape * pair.from - motion.offset_px;
+    pair.agrees = off.squaredNorm() <= tolerance_px * tolerance_px;
+    if (!pair.agrees) continue;
+    from_px_ += pair.from;
+    off_px += off;
+    ++agreeing;
+  }
+  from_px_ /= agreeing;
+  off_px /= agreeing;
+  to_px_ = motion.shape * from_px_ + motion.offset_px + off_px;
+  // As if each had been seen to go with the similarity as well, over this distance.
+  constexpr double kOver_px = 20;
+  Matrix2d normal = agreeing * kOver_px * kOver_px * Matrix2d::Identity(), right = Matrix2d::Zero();
+  for (const Pair& pair : pairs_) {
+    if (!pair.agrees) continue;
+    const Vector2d from = pair.from - from_px_;
+    normal += from * from.transpose();
+    right += from * (pair.to - to_px_ - motion.shape * from).transpose();
+  }
+  shape_ = motion.shape + normal.ldlt().solve(right).transpose();
+}
+
+Vector2d CommonMotion::at(const Vector2d& from_px, const Vector2d* but) const noexcept {
+  constexpr std::size_t kAround = 6, kEnough = 4;
+  struct Near {
+    double distance_squared = 0;
+    Vector2d off = Vector2d::Zero();
+  };
+  std::array<Near, kAround> nearest;
+  std::size_t count = 0;
+  for (const Pair& pair : pairs_) {
+    if (!pair.agrees || (but != nullptr && pair.from == *but)) continue;
+    const double distance_squared = (pair.from - from_px).squaredNorm();
+    if (count == kAround && distance_squared >= nearest[count - 1].distance_squared) continue;
+    std::size_t place = count < kAround ? count++ : count - 1;
+    for (; place > 0 && nearest[place - 1].distance_squared > distance_squared; --place) {
+      nearest[place] = nearest[place - 1];
+    }
+    nearest[place] = {distance_squared, pair.to - to_px_ - shape_ * (pair.from - from_px_)};
+  }
+  Vector2d at = to_px_ + shape_ * (from_px - from_px_);
+  if (count < kEnough) return at;
+  std::array<double, kAround> values{};
+  for (int axis = 0; axis < 2; ++axis) {
+    for (std::size_t i = 0; i < count; ++i) values[i] = nearest[i].off[axis];
+    at[axis] += upper_median(values.begin(), values.begin() + count);
+  }
+  return at;
+}
+
+}  // namespace perimap
