@@ -273,7 +273,7 @@ TEST_F(FeatureFollowerTest, FindsFeaturesOfTwoDepthsAgain) {
     image_ = render(Texture(8), View{}, kWidth, kHeight, 1, random_, 5);
     follower_.track_into(image_.view());
   }
-  const std::array<Vector2d, 2> shifts = {Vector2d(5, 2), Vector2d(16, -9)};
+  const std::array<Vector2d, 2> shifts = {Vector2d(5, 2), Vector2d(30, -18)};
   std::array<int, 2> back{};
   int wrong = 0;
   for (int k = 0; k < 3; ++k) {
