@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/following/birth_layout.hpp"
 #include "core/following/feature_places.hpp"
 #include "core/geometry/symmetric_matrix2.hpp"
 #include "core/statistics/upper_median.hpp"
@@ -186,6 +187,7 @@ void FeatureFollower::track_into(const GreyImage& image) noexcept {
     deviation_px_ += (lately > deviation_px_ ? 1.0 : kShareOfNew) * (lately - deviation_px_);
   }
   find_again(image);
+  hold_against_others(image);
   judge(image);
   drop_doubles(features_);
   promote_the_surest(features_, settings_.maximum);
@@ -350,6 +352,16 @@ void FeatureFollower::find_again(const GreyImage& image) noexcept {
   }
 }
 
+// What was away and has come back alone: many places look like one that has not been seen for long.
+void FeatureFollower::hold_against_others(const GreyImage& image) noexcept {
+  constexpr double kAlikeOfWidth = 0.03, kOff_px = 3, kOffOfWidth = 0.015;
+  for (FollowedFeature& feature : features_) {
+    if (!feature.found || !feature.is_away || feature.is_recalled) continue;
+    const auto off_px = off_among_its_own(features_, feature, kAlikeOfWidth * image.width, return_);
+    if (off_px && *off_px > kOff_px + kOffOfWidth * image.width) disbelieve(feature);
+  }
+}
+
 void FeatureFollower::judge(const GreyImage& image) noexcept {
   // A candidate that is not found again at once was none; a feature may be covered for a while.
   constexpr Duration kMissesOfCandidate = std::chrono::milliseconds(67), kBriefly = std::chrono::milliseconds(100);
@@ -473,6 +485,8 @@ void FeatureFollower::add(const GreyImage& image, std::span<const Vector2d> corn
     place->match.px = px;
     place->match.correlation = 1;
     place->frames = 1;
+    place->first_px = px;
+    place->first_frame = trails_.frame();
     trails_.begin(*place);
   }
 }

@@ -61,7 +61,8 @@ struct FollowerSettings {
 // moved alike (common_motion.hpp); where to is told beforehand by a coarse picture of where they vanished
 // (seen_places.hpp). What does not go with what comes back around it is not taken back. What is missed in a region that
 // shows no tissue (picture_validity.hpp) counts as hidden. A frame without contrast (black, faded) is no look at
-// anything: nothing is sought and nothing is missed.
+// anything: nothing is sought and nothing is missed. What comes back alone is held against those that began with it
+// (birth_layout.hpp).
 //
 // What is laid over the picture is let go (overlay_watch.hpp). How a feature's looks are kept is in followed_patch.hpp.
 // More candidates are tried than there are places; those whose matches were surest become features. A match's deviation
@@ -119,6 +120,7 @@ class FeatureFollower {
   std::size_t probe(const GreyImage& image, int place) noexcept;
   [[nodiscard]] std::size_t agree_on_return(const GreyImage& image, int place) noexcept;
   void take_back(const GreyImage& image, int place) noexcept;
+  void hold_against_others(const GreyImage& image) noexcept;
   void judge(const GreyImage& image) noexcept;
   // `astray`: by how much it moved otherwise than its neighbours.
   [[nodiscard]] bool is_strange(const Vector2d& astray, const NeighbourMotion::Around& neighbours) const noexcept;

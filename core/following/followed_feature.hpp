@@ -29,13 +29,15 @@ struct FollowedFeature {
   Vector2d px = Vector2d::Zero();           // where it was found, else where it is expected
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   FollowedPatch patch;
-  PatchMatch match;                     // of the last frame
-  Vector2d last_px = Vector2d::Zero();  // in the frame before
-  int frames = 0;                       // found in
-  int misses = 0;                       // in a row
-  int hidden = 0;                       // of them, those in which its region showed no tissue
-  bool is_away = false;                 // missed for more than a moment
-  int strange = 0;  // frames in which it moved otherwise than its neighbours, less those in which not
+  PatchMatch match;                      // of the last frame
+  Vector2d last_px = Vector2d::Zero();   // in the frame before
+  Vector2d first_px = Vector2d::Zero();  // where it began, and in which frame
+  std::uint64_t first_frame = 0;
+  int frames = 0;        // found in
+  int misses = 0;        // in a row
+  int hidden = 0;        // of them, those in which its region showed no tissue
+  bool is_away = false;  // missed for more than a moment
+  int strange = 0;       // frames in which it moved otherwise than its neighbours, less those in which not
   Vector2d astray_px = Vector2d::Zero();  // how far it has lately gone another way than its neighbours
   double doubt_px = 0;                   // deviations of its matches and misses of the ways back, summed over its trial
   bool is_ripe = false;                  // a candidate that has stood its trial
