@@ -15,6 +15,7 @@ std::optional<double> off_among_its_own(std::span<const FollowedFeature> feature
     ++others;
   }
   if (others < kEnoughToTell || 2 * scratch.agree(alike_px) < others) return std::nullopt;
+  if (!scratch.holds_around(feature.first_px)) return std::nullopt;
   return (feature.px - scratch.at(feature.first_px)).norm();
 }
 

@@ -113,4 +113,24 @@ Vector2d CommonMotion::at(const Vector2d& from_px, const Vector2d* but) const no
   return at;
 }
 
+bool CommonMotion::holds_around(const Vector2d& from_px) const noexcept {
+  constexpr std::size_t kAround = 6, kMostOthers = 1;
+  std::array<double, kAround> nearest{};
+  std::array<bool, kAround> agrees{};
+  std::size_t count = 0;
+  for (const Pair& pair : pairs_) {
+    const double distance_squared = (pair.from - from_px).squaredNorm();
+    if (count == kAround && distance_squared >= nearest[count - 1]) continue;
+    std::size_t place = count < kAround ? count++ : count - 1;
+    for (; place > 0 && nearest[place - 1] > distance_squared; --place) {
+      nearest[place] = nearest[place - 1];
+      agrees[place] = agrees[place - 1];
+    }
+    nearest[place] = distance_squared;
+    agrees[place] = pair.agrees;
+  }
+  const auto others = static_cast<std::size_t>(std::count(agrees.begin(), agrees.begin() + count, false));
+  return count == kAround && others <= kMostOthers;
+}
+
 }  // namespace perimap

@@ -29,6 +29,8 @@ class CommonMotion {
 
   // Where it takes a place; what came from `but` itself is not asked how far it is off.
   [[nodiscard]] Vector2d at(const Vector2d& from_px, const Vector2d* but = nullptr) const noexcept;
+  // Whether nearly all of the nearest pairs agree; else what is there goes another way, or several do.
+  [[nodiscard]] bool holds_around(const Vector2d& from_px) const noexcept;
   // What it makes of a small shape.
   [[nodiscard]] const Matrix2d& shape() const noexcept { return shape_; }
 

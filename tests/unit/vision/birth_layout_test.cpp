@@ -60,5 +60,10 @@ TEST_F(BirthLayoutTest, SaysNothingWhereTheOthersAreFewOrDoNotAgree) {
   EXPECT_FALSE(off_px());
 }
 
+TEST_F(BirthLayoutTest, SaysNothingWhereWhatIsAroundItLiesAtAnotherDepth) {
+  for (const std::size_t i : {6U, 7U, 8U, 11U, 13U}) features_[i].px += Vector2d(0, 40);
+  EXPECT_FALSE(off_px());
+}
+
 }  // namespace
 }  // namespace perimap
