@@ -220,14 +220,19 @@ PatchMatch FeatureFinder::find_candidate(FoundFeature& feature, const Frame& fra
   if (match.state == MatchState::kFound &&
       feature.looks.is_plausible(last, feature.patch_state, match.correlation, usual_frames)) {
     feature.looks.add(match.correlation);
+    feature.place_px2 = larger_eigenvalue(match.covariance_px2);
     return match;
   }
   feature.patch_state = last;
   LastView view;
   view.make(image_before, 0, last.px, tracker_.kernels());
   if (!view.is_of(0)) return {};
+  view.begin_at(feature.place_px2);
   match = view.follow(view_tracker_, image, image_before, last.px, predicted_px, covariance);
-  if (match.state == MatchState::kFound) feature.patch_state.px = match.px;
+  if (match.state == MatchState::kFound) {
+    feature.patch_state.px = match.px;
+    feature.place_px2 = larger_eigenvalue(match.covariance_px2);
+  }
   return match;
 }
 

@@ -34,6 +34,7 @@ struct FoundFeature {
   PatchState patch_state;  // in the round's last frame
   PatchContinuity looks;
   Vector2d velocity_px = Vector2d::Zero();  // per frame; while the round lasts, from one that is taken to the next
+  double place_px2 = 0;                     // variance of patch_state.px per axis, with what it has drifted by
   double doubt_px = 0;                      // deviations of its matches, summed over the round
 };
 

@@ -132,7 +132,9 @@ bool hold_against_last_view(FeatureSlot& slot, const PixelPrediction& prediction
   const PatchMatch followed = follow_last_view(slot, prediction, Hurry::kNone, job);
   if (followed.state != MatchState::kFound) return false;
   const Vector2d off_px = slot.match.px - followed.px;
-  const Matrix2d C = slot.match.covariance_px2 + followed.covariance_px2 + kSlide_px * kSlide_px * Matrix2d::Identity();
+  // By how much the first view was off a frame ago it is off now.
+  const double besides_px2 = kSlide_px * kSlide_px - slot.last_view.began_px2();
+  const Matrix2d C = slot.match.covariance_px2 + followed.covariance_px2 + besides_px2 * Matrix2d::Identity();
   if (off_px.dot(C.inverse() * off_px) <= kSamePlaceGate) return false;
   take_last_view(slot, followed);
   return true;
@@ -154,7 +156,7 @@ void believe(FeatureSlot& slot, const FrameJob& job) noexcept {
   if (slot.seen_by_last_view) {
     slot.last_view.drift_to(slot.match);
   } else {
-    slot.last_view.end_drift();
+    slot.last_view.begin_at(larger_eigenvalue(slot.match.covariance_px2));
     slot.looks.add(slot.match.correlation);
     renew_stale_template(slot, job);
   }
@@ -166,7 +168,9 @@ void believe(FeatureSlot& slot, const FrameJob& job) noexcept {
 bool moves_otherwise(const FeatureSlot& slot, const PixelPrediction& from_neighbours, double gate) noexcept {
   if (slot.converged || !from_neighbours.valid) return false;
   PatchMatch since_last = slot.match;
-  if (slot.seen_by_last_view) since_last.covariance_px2 -= slot.last_view.drift_px2() * Matrix2d::Identity();
+  if (slot.seen_by_last_view) {
+    since_last.covariance_px2 -= (slot.last_view.began_px2() + slot.last_view.drift_px2()) * Matrix2d::Identity();
+  }
   return !agrees(since_last, from_neighbours, gate);
 }
 

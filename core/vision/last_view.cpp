@@ -1,5 +1,6 @@
 #include "core/vision/last_view.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/geometry/symmetric_matrix2.hpp"
@@ -23,7 +24,7 @@ PatchMatch LastView::follow(const PatchTracker& tracker, const GreyImage& image,
   const double deviation_px = std::sqrt(larger_eigenvalue(prediction_covariance_px2));
   const auto off_px = off_on_way_back(tracker, image, match.px, {before, px, predicted_px, deviation_px});
   if (!off_px || *off_px >= kMostOffOnWayBack_px) match.state = MatchState::kTooFar;
-  match.covariance_px2 += drift_px2_ * Matrix2d::Identity();
+  match.covariance_px2 += (began_px2_ + drift_px2_) * Matrix2d::Identity();
   return match;
 }
 
@@ -34,11 +35,13 @@ PatchMatch LastView::find_again(const PatchTracker& tracker, const GreyImage& im
   if (match.state == MatchState::kFound && match.correlation < kLeastCorrelationOfReturn) {
     match.state = MatchState::kLowCorrelation;
   }
-  match.covariance_px2 += drift_px2_ * Matrix2d::Identity();
+  match.covariance_px2 += (began_px2_ + drift_px2_) * Matrix2d::Identity();
   return match;
 }
 
 // Its covariance has what had been before.
-void LastView::drift_to(const PatchMatch& match) noexcept { drift_px2_ = larger_eigenvalue(match.covariance_px2); }
+void LastView::drift_to(const PatchMatch& match) noexcept {
+  drift_px2_ = std::max(0.0, larger_eigenvalue(match.covariance_px2) - began_px2_);
+}
 
 }  // namespace perimap

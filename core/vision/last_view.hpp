@@ -26,7 +26,7 @@ class LastView {
   // Of a new feature: there is none yet.
   void forget() noexcept {
     is_there_ = false;
-    drift_px2_ = 0;
+    began_px2_ = drift_px2_ = 0;
   }
 
   // Of the frame with this number, in which the feature was found at px. Nothing is done where it is of that frame.
@@ -34,7 +34,8 @@ class LastView {
   [[nodiscard]] bool is_of(std::uint64_t frame) const noexcept { return is_there_ && frame_ == frame; }
 
   // In the frame after that of the view, with a way back into it; px is where the feature was found there. The match's
-  // covariance is that of the followed point: with what it has drifted by since the first view fitted.
+  // covariance is that of the followed point: with that of the first view's last match, from which it is followed, and
+  // what it has drifted by since.
   [[nodiscard]] PatchMatch follow(const PatchTracker& tracker, const GreyImage& image, const GreyImage& before,
                                   const Vector2d& px, const Vector2d& predicted_px,
                                   const Matrix2d& prediction_covariance_px2) const noexcept;
@@ -44,14 +45,19 @@ class LastView {
 
   // A match that one of the two gave is believed, or one of the first view.
   void drift_to(const PatchMatch& match) noexcept;
-  void end_drift() noexcept { drift_px2_ = 0; }
-  // Variance, per axis.
+  void begin_at(double of_first_view_px2) noexcept {
+    began_px2_ = of_first_view_px2;
+    drift_px2_ = 0;
+  }
+  // Variances, per axis: of where the first view fitted last, and of what was drifted by since.
+  [[nodiscard]] double began_px2() const noexcept { return began_px2_; }
   [[nodiscard]] double drift_px2() const noexcept { return drift_px2_; }
 
  private:
   PatchTemplate view_;
   std::uint64_t frame_ = 0;
   bool is_there_ = false;
+  double began_px2_ = 0;
   double drift_px2_ = 0;
 };
 

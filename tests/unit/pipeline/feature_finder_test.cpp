@@ -80,6 +80,33 @@ TEST_F(Finder, WhatARoundFindsIsAdoptedAtItsFrame) {
   EXPECT_GT(next_frame(), 0U);
 }
 
+// The largest variance of a place (px^2) after a round in which tissue turns into another one by such a share.
+double largest_place_px2(double faded) {
+  constexpr int kWidth = 160, kHeight = 120;
+  Still still(kWidth, kHeight);
+  const test::ImageBuffer before = still.image;
+  const test::ImageBuffer other = test::render(test::Texture{9}, test::View{}, kWidth, kHeight, 1, still.random);
+  double largest_px2 = 0.0;
+  for (int i = 0; i <= kFinderFrames; ++i) {
+    for (const FoundFeature& found : still.finder.adopt(still.frame)) {
+      largest_px2 = std::max(largest_px2, found.place_px2);
+    }
+    const double share = faded * i / kFinderFrames;
+    for (std::size_t p = 0; p < before.pixels.size(); ++p) {
+      const double grey = (1 - share) * before.pixels[p] + share * other.pixels[p];
+      still.image.pixels[p] = static_cast<std::uint8_t>(std::lround(grey));
+    }
+    still.finder.offer(still.frame++, {}, still.rate, still.image.view(), {}, {}, 8);
+  }
+  return largest_px2;
+}
+
+TEST(FoundFeatures, ThatTheirLastViewHasFollowedSayHowFarTheyMayHaveDrifted) {
+  const double by_first_view_px2 = largest_place_px2(0.0);
+  EXPECT_GT(by_first_view_px2, 0.0);
+  EXPECT_GT(largest_place_px2(0.6), 4 * by_first_view_px2);
+}
+
 TEST_F(Finder, ARoundLastsAsLongWhereTheCameraIsFaster) {
   for (const double per_s : {60.0, 120.0, 240.0}) {
     Still fast(kWidth, kHeight);

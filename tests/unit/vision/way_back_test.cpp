@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/geometry/symmetric_matrix2.hpp"
 #include "core/vision/last_view.hpp"
 #include "tests/unit/vision/synthetic_scene.hpp"
 
@@ -50,8 +51,17 @@ TEST_F(WayBack, OfALastViewCountsWithItsDrift) {
   const PatchMatch again = view.find_again(tracker, after.view(), from, test::isotropic(3));
   ASSERT_EQ(again.state, MatchState::kFound);
   EXPECT_GT(again.covariance_px2(0, 0), 1.5 * first.covariance_px2(0, 0));
+  view.begin_at(0.7);
+  EXPECT_EQ(view.drift_px2(), 0);
+  const PatchMatch from_there = view.follow(tracker, after.view(), before.view(), from, from, test::isotropic(3));
+  ASSERT_EQ(from_there.state, MatchState::kFound);
+  EXPECT_NEAR(from_there.covariance_px2(0, 0), first.covariance_px2(0, 0) + 0.7, 1e-9)
+      << "it is followed from where that was";
+  view.drift_to(from_there);
+  EXPECT_NEAR(view.drift_px2(), larger_eigenvalue(first.covariance_px2), 1e-9);
   view.forget();
   EXPECT_FALSE(view.is_of(4));
+  EXPECT_EQ(view.began_px2(), 0);
   EXPECT_EQ(view.drift_px2(), 0);
 }
 
