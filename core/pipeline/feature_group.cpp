@@ -192,13 +192,19 @@ void FeatureGroup::learn_again() noexcept {
     estimate.P *= kForgotten;
     bank_.set(feature(lane), estimate);
     bank_.diffuse(feature(lane), kFirstBreath_mm);
+    slot.repeated = {};
   }
 }
 
 void FeatureGroup::doubt() noexcept {
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
-    if (slots_[lane].state == SlotState::kMapped) bank_.diffuse(feature(lane), kDoubt_mm);
+    if (slots_[lane].state == SlotState::kMapped) diffuse(lane, kDoubt_mm);
   }
+}
+
+void FeatureGroup::diffuse(std::size_t lane, double deviation_mm) noexcept {
+  bank_.diffuse(feature(lane), deviation_mm);
+  slots_[lane].repeated.fade(slots_[lane].largest_deviation_mm, deviation_mm);
 }
 
 void FeatureGroup::evaluate(const FrameJob& job, ShardSnapshot& publisher, ShardSnapshot& model) noexcept {
@@ -214,7 +220,8 @@ void FeatureGroup::evaluate(const FrameJob& job, ShardSnapshot& publisher, Shard
     describe(slots_[lane], job.frame->stamp.capture, snapshot);
     bank_.get(feature(lane), snapshot.x);
     for (std::size_t i = begin; i < end; ++i) {
-      snapshot.covariances_W_mm2[i] = evaluated[i].covariance_of(static_cast<int>(lane));
+      snapshot.covariances_W_mm2[i] =
+          slots_[lane].repeated.factor() * evaluated[i].covariance_of(static_cast<int>(lane));
       if (const auto& slow_error = slots_[lane].slow_error) {
         snapshot.covariances_W_mm2[i] += slow_error->position_covariance(job.evaluated_b[i]);
       }
@@ -249,7 +256,7 @@ void FeatureGroup::judge(std::size_t lane, double nis, bool accepted, double com
                          const FrameRate& held_rate) noexcept {
   FeatureSlot& slot = slots_[lane];
   if (slot.health.add(nis, accepted, common, held_rate) == HealthAction::kInflate) {
-    bank_.diffuse(feature(lane), kInflation_mm);
+    diffuse(lane, kInflation_mm);
   }
   count_update(slot, accepted, held_rate);
 }
@@ -261,6 +268,8 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
     bank_.motion(index_, plan_.phases, k, motions);
     LaneObservations<double> observations;
     std::array<Matrix2d, kLanes> R;
+    std::array<Matrix2d, kLanes> own;  // px^2, of each match without its pose and phase
+    const double alike = matches_alike(frame.held_rate);
     std::array<double, kLanes> common{};
     std::array<bool, kLanes> again{};  // learnt before, and judged then
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
@@ -280,7 +289,7 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
       }
       const Matrix23d J_p = J_C * frame.X_CW.R;
       const Vector2d phase_spread = J_p * motions.velocity_of(l) * frame.phase.deviation_s;
-      R[lane] = match_covariance(held, frame, p_WF, J_p, settings.pixel_deviation_px, matches_alike(frame.held_rate)) +
+      R[lane] = match_covariance(held, frame, p_WF, J_p, settings.pixel_deviation_px, alike) +
                 phase_spread * phase_spread.transpose();
       // All of a cycle's phases err with its R peaks.
       common[lane] = phase_spread.dot(R[lane].inverse() * phase_spread);
@@ -291,6 +300,7 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
         }
         slot.last_learnt_rad = frame.phase.phase_rad;
       }
+      own[lane] = alike * held.covariance_px2;
       observations.set(l, held.px, R[lane]);
     }
     LaneOutcomes<double> outcomes;
@@ -298,14 +308,15 @@ void FeatureGroup::learn(const PixelModel& model, const EstimatorSettings& setti
     follow_slow_errors(model, k, outcomes, R);
     for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
       if ((outcomes.considered >> lane & 1) == 0) continue;
-      if (again[lane]) continue;
       const bool accepted = (outcomes.accepted >> lane & 1) != 0;
+      if (accepted) slots_[lane].repeated.add(own[lane], R[lane], kMatchesAlike / alike);
+      if (again[lane]) continue;
       judge(lane, outcomes.normalised_innovation_squared[lane], accepted, common[lane], frame.held_rate);
       FeatureSlot& slot = slots_[lane];
       if (accepted) slot.aside.add(frame.pose);
       if (slot.health.process_noise() > 0.0 && frame.stamp.capture > slot.last_learnt) {
         const double elapsed_s = to_seconds(frame.stamp.capture - slot.last_learnt);
-        bank_.diffuse(feature(lane), slot.health.process_noise() * std::sqrt(elapsed_s));
+        diffuse(lane, slot.health.process_noise() * std::sqrt(elapsed_s));
       }
       slot.last_learnt = std::max(slot.last_learnt, frame.stamp.capture);
     }

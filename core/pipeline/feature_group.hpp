@@ -82,6 +82,8 @@ class FeatureGroup {
   void plan(const FrameJob& job) noexcept;
   void follow_slow_errors(const PixelModel& model, int k, const LaneOutcomes<double>& outcomes,
                           const std::array<Matrix2d, kLanes>& R) noexcept;
+  // More is to be learnt of the lane's feature than its covariance says.
+  void diffuse(std::size_t lane, double deviation_mm) noexcept;
   void judge(std::size_t lane, double nis, bool accepted, double common, const FrameRate& held_rate) noexcept;
 
   MapBank& bank_;

@@ -29,6 +29,7 @@ bool prepare_start(FeatureSlot& slot, std::uint32_t count, const FrameJob& job, 
   const auto& depths = settings.batch.start_depths_mm;
   const double depth_mm = depths[depths.size() / 2];  // only scales the pose noise; the start finds the true depth
   slot.start.count = 0;
+  slot.start.repeated = {};
   slot.start.law = job.law;
   for (std::uint32_t k = 0; k < count; ++k) {
     const HeldMatch& held = slot.held[k];
@@ -47,8 +48,10 @@ bool prepare_start(FeatureSlot& slot, std::uint32_t count, const FrameJob& job, 
     observation.X_CW = frame->X_CW;
     observation.b = frame->b;
     observation.b_deviation = frame->b_rate * (frame->phase.rate_rad_per_s * frame->phase.deviation_s);
+    const double alike = matches_alike(rate_of_starts(frame->held_rate));
     observation.R = match_covariance(held, *frame, frame->pose.X_WC * (depth_mm * ray_C), J_C * frame->X_CW.R,
-                                     settings.pixel_deviation_px, matches_alike(rate_of_starts(frame->held_rate)));
+                                     settings.pixel_deviation_px, alike);
+    slot.start.repeated.add(alike * held.covariance_px2, observation.R, kMatchesAlike / alike);
     slot.start.captures[k] = frame->stamp.capture;
     slot.start.cycles[k] = {frame->cycle, frame->respiration};
     slot.start.poses[k] = frame->pose;
@@ -122,10 +125,16 @@ class Step {
     }
     slot_.held.drop(used);
     bank_.set(feature_, slot_.start.outcome.estimate);
-    // It is not worth what its covariance says: what is seen from now on shall win.
-    if (slot_.start.outcome.contradicted()) bank_.diffuse(feature_, kInflation_mm);
     const Instant last = slot_.start.captures[used - 1];
-    slot_.map({.last_observed = last, .last_learnt = last, .began_on_surface = begun_on_surface});
+    slot_.map({.last_observed = last,
+               .last_learnt = last,
+               .repeated = slot_.start.repeated,
+               .began_on_surface = begun_on_surface});
+    // It is not worth what its covariance says: what is seen from now on shall win.
+    if (slot_.start.outcome.contradicted()) {
+      bank_.diffuse(feature_, kInflation_mm);
+      slot_.repeated = {};
+    }
     for (std::uint32_t i = 0; i < used; ++i) slot_.aside.add(slot_.start.poses[i]);
     check_convergence();
     if (begun_on_surface) return LifeEvent::kBegunOnSurface;
@@ -198,7 +207,7 @@ class Step {
   void check_convergence() noexcept {
     FeatureEstimate estimate;
     bank_.get(feature_, estimate);
-    if (slot_.slow_error != nullptr) estimate.P += slot_.slow_error->covariance();
+    add_lasting_errors(slot_, estimate.P);
     slot_.largest_deviation_mm =
         largest_deviation_mm(estimate, settings_.estimator.layout, 16, job_.frame->respiration.known);
     const InnovationMonitor& monitor = slot_.health.monitor();

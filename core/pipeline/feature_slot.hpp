@@ -20,6 +20,7 @@
 #include "core/pipeline/parallax.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
+#include "core/pipeline/repeated_errors.hpp"
 #include "core/surface/surface_start.hpp"
 #include "core/time/frame_rate.hpp"
 #include "core/time/instant.hpp"
@@ -111,7 +112,8 @@ struct BatchStartExchange {
   std::array<Instant, kMaxStartObservations> captures{};
   std::array<CameraPose, kMaxStartObservations> poses{};  // with their noise
   std::array<ObservedCycle, kMaxStartObservations> cycles{};
-  LawBelief law;  // by which the observations have their bases
+  RepeatedErrors repeated;  // of the observations
+  LawBelief law;            // by which the observations have their bases
   int count = 0;
   StartAsked asked = StartAsked::kAlone;
   std::uint64_t adopt_at_frame = 0;
@@ -165,7 +167,8 @@ struct MappedFeature {
   Instant last_learnt;           // capture time of the last update, for process noise
   double last_learnt_rad = 0.0;  // its phase
   int updates = 0;
-  SeenFromAside aside{};  // of all that the estimate was made from
+  SeenFromAside aside{};      // of all that the estimate was made from
+  RepeatedErrors repeated{};  // likewise
   double largest_deviation_mm = 0.0;
   bool began_on_surface = false;
   bool converged = false;

@@ -269,6 +269,11 @@ bool is_called_converged(const FeatureSlot& slot, Instant now) noexcept {
   return slot.match_agrees || now - slot.last_observed <= kBelievedUnseen;
 }
 
+void add_lasting_errors(const FeatureSlot& slot, StateMatrix& P) noexcept {
+  P *= slot.repeated.factor();
+  if (slot.slow_error != nullptr) P += slot.slow_error->covariance();
+}
+
 namespace {
 
 bool is_wanted_for_start(const FeatureSlot& slot, const FrameJob& job) noexcept {

@@ -36,6 +36,10 @@ inline constexpr Duration kBelievedUnseen = std::chrono::seconds(30);
 // C: all of a mapped feature's snapshot but its coefficients and covariances, which the bank has. `now`: the capture.
 void describe(const FeatureSlot& slot, Instant now, FeatureSnapshot& snapshot) noexcept;
 
+// What the bank's covariance of its estimate leaves out: errors of its matches that come again, and slow ones of the
+// tracker.
+void add_lasting_errors(const FeatureSlot& slot, StateMatrix& P) noexcept;
+
 // D, first part, never put off: takes this frame's match into the queue of what is to be learnt.
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept;
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/pipeline/feature_stages.hpp"
+
 namespace perimap {
 
 void MapKeeping::fill_feed(const Breathing& breathing, const HeartPhase& heart, std::uint64_t maps_ended) noexcept {
@@ -18,7 +20,7 @@ void MapKeeping::fill_feed(const Breathing& breathing, const HeartPhase& heart, 
     if (!entry.mapped) continue;
     remember(slot, entry.feature);
     bank_.get(static_cast<int>(entry.slot), entry.feature.estimate);
-    if (slot.slow_error != nullptr) entry.feature.estimate.P += slot.slow_error->covariance();
+    add_lasting_errors(slot, entry.feature.estimate.P);
     entry.feature.breathing = breathing.begun();
   }
   feed_.hand_over();
@@ -97,6 +99,7 @@ void MapKeeping::displace(const Pose& X, double deviation_mm) noexcept {
     }
     bank_.set(feature, estimate);
     bank_.diffuse(feature, doubt_mm);
+    slot.repeated.fade(slot.largest_deviation_mm, doubt_mm);
   }
 }
 

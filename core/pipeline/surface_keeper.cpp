@@ -49,7 +49,7 @@ void SurfaceKeeper::gather(const FrameRecord& frame) noexcept {
                       slot.health.state() != HealthState::kInconsistent;
     if (gathered.usable) {
       bank_.get(static_cast<int>(next_slot_), estimate_);
-      if (slot.slow_error != nullptr) estimate_.P += slot.slow_error->covariance();
+      add_lasting_errors(slot, estimate_.P);
       gathered.evidence = surface_evidence(slot.id, bank_.layout(), estimate_);
       gathered.last_observed = slot.last_observed;
       gathered.usable = is_usable(gathered.evidence, bank_.layout());

@@ -280,6 +280,15 @@ TEST_F(Breathing, AStartOfBeforeItWasFoundIsSolvedOnceMore) {
   EXPECT_EQ(slot->state, SlotState::kMapped);
 }
 
+TEST_F(Stages, WhatIsInflatedIsToldByWhatComesFromThenOn) {
+  map_feature();
+  slot->largest_deviation_mm = 0.1;
+  for (int i = 0; i < 1000; ++i) slot->repeated.add(Matrix2d::Identity(), Matrix2d::Identity(), 1.0);
+  ASSERT_NEAR(slot->repeated.factor(), 2.0, 1e-6);
+  group->doubt();
+  EXPECT_EQ(slot->repeated.factor(), 1.0);
+}
+
 TEST_F(Stages, NothingIsShownOfAFeatureBeforeItsStart) {
   for (const SlotState state : {SlotState::kEmpty, SlotState::kTracked, SlotState::kStarting}) {
     slot->state = state;
@@ -302,6 +311,7 @@ TEST_F(Stages, AMappedFeatureThatIsNotMatchedSaysSo) {
 
 TEST_F(Stages, WhatIsPredictedAndShownIsWhatTheBankHolds) {
   map_feature();
+  for (int i = 0; i < 600; ++i) slot->repeated.add(Matrix2d::Identity(), Matrix2d::Identity(), 1.0);
   for (int i = 0; i < 5; ++i) {
     next_frame();
     found_at({320.5, 239.5});
@@ -320,8 +330,10 @@ TEST_F(Stages, WhatIsPredictedAndShownIsWhatTheBankHolds) {
   const std::vector<FeatureSnapshot> snapshots = shown();
   ASSERT_EQ(snapshots.size(), 1U);
   EXPECT_EQ(snapshots[0].x, estimate.x);
+  const double repeated = slot->repeated.factor();
+  EXPECT_GT(repeated, 1.2) << "with five more matches";
   for (const Matrix3d& covariance : snapshots[0].covariances_W_mm2) {
-    EXPECT_LT((covariance - estimate.position_covariance(job.evaluated_b[0])).norm(), 1e-12);
+    EXPECT_LT((covariance - repeated * estimate.position_covariance(job.evaluated_b[0])).norm(), 1e-12);
   }
 }
 

@@ -195,6 +195,12 @@ TEST_F(Keeping, WhatIsFedIsAsUncertainAsASlowErrorOfTheTrackerMakesIt) {
   EXPECT_EQ(feed().entries[0].feature.estimate.P, estimate(0).P + slots[0].slow_error->covariance());
 }
 
+TEST_F(Keeping, WhatIsFedIsAsUncertainAsErrorsThatComeAgainMakeIt) {
+  static_cast<void>(keeping->recall(features(1), *breathing));
+  slots[0].repeated.add(Matrix2d::Identity(), Matrix2d::Identity(), 1000.0);
+  EXPECT_LT((feed().entries[0].feature.estimate.P - 2.0 * estimate(0).P).norm(), 1e-9);
+}
+
 TEST_F(Keeping, TheReaderIsNotHurried) {
   static_cast<void>(keeping->recall(features(kSlots), *breathing));
   keeping->fill_feed(*breathing, heart, 0);
