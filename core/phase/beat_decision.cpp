@@ -27,6 +27,8 @@ void BeatDecision::forget() noexcept {
 void BeatDecision::fall_silent() noexcept {
   beats_.forget_size();
   told_since_silence_ = 0;
+  as_before_ = false;
+  hidden_ = true;
 }
 
 void BeatDecision::restart(Instant now) noexcept {
@@ -36,12 +38,17 @@ void BeatDecision::restart(Instant now) noexcept {
   complexes_.clear();
 }
 
-void BeatDecision::burst() noexcept { count_ = 0; }
+void BeatDecision::burst() noexcept {
+  count_ = 0;
+  hidden_ = true;
+}
 
 bool BeatDecision::learning(Instant now) const noexcept {
   if (beats_told_ == 0) return true;
   const double since_s = to_seconds(now - (has_last_ ? last_.time : since_));
-  return since_s > settings_.silence_s && since_s > settings_.silence_cycles * rhythm_.cycle_s;
+  if (since_s <= settings_.silence_s || since_s <= settings_.silence_cycles * rhythm_.cycle_s) return false;
+  // What hides the beats says nothing of them, unless it lasts for longer than it would.
+  return !in_burst(now) || since_s > to_seconds(settings_.longer_than_bursts);
 }
 
 double BeatDecision::disturbed(Instant t) const noexcept {
@@ -97,8 +104,10 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
                      candidate.energy > settings_.cluster_of_top * levels_.top_energy();
   int learnt = -1;
   if (large) {
-    learnt = clusters_.learn(candidate.shape, candidate.points_up, disturbed(candidate.time) < settings_.some_noise,
-                             candidate.time);
+    const Surroundings around = in_burst(now)                                      ? Surroundings::kBurst
+                                : disturbed(candidate.time) < settings_.some_noise ? Surroundings::kCalm
+                                                                                   : Surroundings::kDisturbed;
+    learnt = clusters_.learn(candidate.shape, candidate.points_up, around, candidate.time);
     if (waiting.cluster >= 0 && learnt != waiting.cluster && !clusters_.recurs(waiting.cluster)) waiting.cluster = -1;
   }
   // What is too small to be learnt of, but like what recurs, is one of its kind: a P wave among larger ones.
@@ -310,6 +319,7 @@ bool BeatDecision::known(const Waiting& waiting, Instant now, bool ending) const
 
 void BeatDecision::decide(Instant now, bool ending) noexcept {
   complexes_.expire(now, clusters_);
+  hidden_ = hidden_ || in_burst(now);
   if (count_ == 0) return;
   if (now - evaluated_at_ >= settings_.evaluate_every || ending) weigh(now);
   for (bool again = true; again && count_ > 0;) {
@@ -407,6 +417,7 @@ void BeatDecision::tell(const Waiting& waiting, Instant now) noexcept {
   peak.confidence = confidence(circumstances(waiting, familiar, now), settings_);
   if (strange(waiting) && !waiting.noted) note_disturbance(candidate.time, 0.5);
   if (familiar) familiar_at_ = candidate.time;
+  as_before_ = as_before_ || (familiar && std::abs(std::log(waiting.gain)) < settings_.same_gain);
   if (peak.time <= now && queue_count_ < kQueue) {
     peak.detected_at = now;
     queue_[static_cast<std::size_t>((queue_begin_ + queue_count_) % kQueue)] = peak;
@@ -416,12 +427,13 @@ void BeatDecision::tell(const Waiting& waiting, Instant now) noexcept {
   last_ = candidate;
   last_probability_ = waiting.probability;
   has_last_ = true;
+  hidden_ = false;
   ++beats_told_;
   ++told_since_silence_;
 }
 
 void BeatDecision::learn_rhythm(const Waiting& waiting) noexcept {
-  if (!has_last_ || std::min(waiting.probability, last_probability_) < settings_.learnt) return;
+  if (!has_last_ || hidden_ || std::min(waiting.probability, last_probability_) < settings_.learnt) return;
   const double rr_s = to_seconds(waiting.candidate.time - last_.time);
   if (rhythm_.cycle_s > 0.0) {
     const double off = std::min(std::abs(std::log(rr_s / rhythm_.cycle_s)), 0.7);

@@ -43,6 +43,9 @@ class BeatDecision {
   [[nodiscard]] const QrsClusters& clusters() const noexcept { return clusters_; }
   // Nothing like beats is known, or none has come for some time.
   [[nodiscard]] bool learning(Instant now) const noexcept;
+  // Since the last silence: beats enough to be known by, and one of a kind and a size known from before.
+  [[nodiscard]] bool beats_came() const noexcept { return told_since_silence_ >= settings_.beats_at_start; }
+  [[nodiscard]] bool as_before() const noexcept { return as_before_; }
   // Disturbances of late, or, where the next beat is overdue, since the last one of a known kind.
   [[nodiscard]] bool noisy(Instant now) const noexcept;
   // Beats of a known kind came, and the next ought to be there.
@@ -109,9 +112,11 @@ class BeatDecision {
   bool has_last_ = false;
   QrsCandidate last_;  // the last beat
   double last_probability_ = 0.0;
-  Instant since_;  // beats have been looked for
+  bool hidden_ = false;  // since then others may have come that were not seen
+  Instant since_;        // beats have been looked for
   int beats_told_ = 0;
   int told_since_silence_ = 0;
+  bool as_before_ = false;
   int changed_to_ = -1;    // the cluster of the last beat, when it was of no settled kind,
   int changed_count_ = 0;  // and how many in a row were of it
   double disturbances_ = 0.0;

@@ -25,9 +25,15 @@ void EcgLevels::forget() noexcept {
   rough_level_ = 0.0;
   energies_.clear();
   sharpnesses_.clear();
+  kept_energies_.clear();
+  kept_sharpnesses_.clear();
 }
 
-void EcgLevels::forget_top() noexcept {
+void EcgLevels::forget_top(bool keep) noexcept {
+  if (keep) {
+    kept_energies_ = energies_;
+    kept_sharpnesses_ = sharpnesses_;
+  }
   const double energy = energies_.count() > 0 ? energies_.newest() : 0.0;
   const double sharpness = sharpnesses_.count() > 0 ? sharpnesses_.newest() : 0.0;
   energies_.clear();
@@ -35,6 +41,14 @@ void EcgLevels::forget_top() noexcept {
   if (!(energy > 0.0)) return;
   energies_.push(energy);
   sharpnesses_.push(sharpness);
+}
+
+void EcgLevels::recall_top() noexcept {
+  if (kept_energies_.count() == 0) return;
+  energies_ = kept_energies_;
+  sharpnesses_ = kept_sharpnesses_;
+  kept_energies_.clear();
+  kept_sharpnesses_.clear();
 }
 
 void EcgLevels::follow(const EcgFilter& filter, double beat_slope, bool burst) noexcept {

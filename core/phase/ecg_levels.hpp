@@ -20,7 +20,10 @@ class EcgLevels {
   void follow(const EcgFilter& filter, double beat_slope, bool burst) noexcept;
   void restart() noexcept;  // the line was broken off
   void forget() noexcept;
-  void forget_top() noexcept;  // but for that of the last window: no complex of late is as large as those before
+  // But for that of the last window: no complex of late is as large as those before. `keep`: those were beats, which
+  // may come again as they were.
+  void forget_top(bool keep) noexcept;
+  void recall_top() noexcept;  // what was kept, once
 
   [[nodiscard]] double quiet() const noexcept { return quiet_level_; }                  // energy
   [[nodiscard]] double top_energy() const noexcept { return top(energies_, energy_); }  // of the largest complexes
@@ -46,6 +49,8 @@ class EcgLevels {
   double quiet_level_ = 0.0;
   RecentValues<kWindows> energies_;
   RecentValues<kWindows> sharpnesses_;
+  RecentValues<kWindows> kept_energies_;  // of before a silence
+  RecentValues<kWindows> kept_sharpnesses_;
   double energy_ = 0.0;  // largest of the current window
   double sharpness_ = 0.0;
   Instant window_began_;

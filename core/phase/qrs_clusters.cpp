@@ -20,6 +20,7 @@ constexpr double kCaution = 2.0;         // members
 constexpr double kOften = 0.4;           // share of P waves that are conducted: in 2:1 block half of them
 constexpr double kHardlyWithout = 0.85;  // share of QRS complexes that a P wave precedes
 constexpr int kEnough = 2;               // members
+constexpr int kSurelyTwo = 3;            // members, after which one kind is taken to be two
 constexpr double kFollow = 0.2;          // share of a new distance in that of rivals
 
 }  // namespace
@@ -48,33 +49,45 @@ ClusterMatch QrsClusters::nearest_beat(const QrsShape& shape) const noexcept {
   return nearest;
 }
 
-int QrsClusters::learn(const QrsShape& shape, bool upward, bool calm, Instant seen) noexcept {
+int QrsClusters::make_room(bool frozen, int but) noexcept {
+  int room = -1;
+  const auto spared = [&](int i) { return frozen && settled(i); };
+  for (int i = 0; i < kClusters; ++i) {
+    if (i == but) continue;
+    if (room < 0 || (spared(i) != spared(room) ? spared(room) : at(i).weight < at(room).weight)) room = i;
+  }
+  clusters_[static_cast<std::size_t>(room)] = {};
+  for (Cluster& c : clusters_) {
+    if (c.before == room) {
+      c.before = -1;
+      c.preceded = 0.0;
+      c.preceded_known = 0.0;
+    }
+    if (c.rival_before.by == room) c.rival_before = {};
+    if (c.rival_after.by == room) c.rival_after = {};
+  }
+  return room;
+}
+
+int QrsClusters::learn(const QrsShape& shape, bool upward, Surroundings around, Instant seen) noexcept {
   const double size = root_mean_square(shape);
   if (!(size > 0.0)) return -1;
-  for (Cluster& c : clusters_) c.weight *= kKeep;
+  const bool frozen = around == Surroundings::kBurst;
+  for (int i = 0; i < kClusters; ++i) {
+    if (!frozen || !settled(i)) clusters_[static_cast<std::size_t>(i)].weight *= kKeep;
+  }
   ClusterMatch same = nearest(shape, kDisplaced);
   if (same.correlation < kSame) {
-    const auto rarest = std::min_element(clusters_.begin(), clusters_.end(),
-                                         [](const Cluster& a, const Cluster& b) { return a.weight < b.weight; });
-    *rarest = {};
-    rarest->shape.points = shape.points;
-    rarest->upward = upward;
-    rarest->born = seen;
-    same.of = static_cast<int>(rarest - clusters_.begin());
-    for (Cluster& c : clusters_) {
-      if (c.before == same.of) {
-        c.before = -1;
-        c.preceded = 0.0;
-        c.preceded_known = 0.0;
-      }
-      if (c.rival_before.by == same.of) c.rival_before = {};
-      if (c.rival_after.by == same.of) c.rival_after = {};
-    }
+    same.of = make_room(frozen, -1);
+    Cluster& anew = clusters_[static_cast<std::size_t>(same.of)];
+    anew.shape.points = shape.points;
+    anew.upward = upward;
+    anew.born = seen;
   }
   Cluster& c = clusters_[static_cast<std::size_t>(same.of)];
   c.weight += 1.0;
   c.calm_known = std::min(c.calm_known + 1.0, kLongMemory);
-  c.calm += ((calm ? 1.0 : 0.0) - c.calm) / c.calm_known;
+  c.calm += ((around == Surroundings::kCalm ? 1.0 : 0.0) - c.calm) / c.calm_known;
   const double rate = std::max(1.0 / c.weight, kSlowestLearning);
   for (int i = 0; i < shape.points; ++i) {
     float& mean = c.shape.slope[static_cast<std::size_t>(i)];
@@ -99,11 +112,37 @@ void QrsClusters::judged(int of, double log_odds) noexcept {
 
 double QrsClusters::log_odds(int i) const noexcept { return at(i).log_odds * at(i).judged / (at(i).judged + kCaution); }
 
-void QrsClusters::followed(int of, bool by_sharper) noexcept {
+void QrsClusters::followed(int of, int by) noexcept {
   if (of < 0) return;
   Cluster& c = clusters_[static_cast<std::size_t>(of)];
   c.followed_known = std::min(c.followed_known + 1.0, kMemory);
-  c.followed += ((by_sharper ? 1.0 : 0.0) - c.followed) / c.followed_known;
+  c.followed += ((by >= 0 ? 1.0 : 0.0) - c.followed) / c.followed_known;
+  c.by_own += ((by == of ? 1.0 : 0.0) - c.by_own) / c.followed_known;
+}
+
+bool QrsClusters::is_two(int i) const noexcept {
+  return i >= 0 && at(i).followed_known >= kSurelyTwo && at(i).by_own >= kOften;
+}
+
+void QrsClusters::part(int of, const QrsShape& blunter) noexcept {
+  Cluster& sharp = clusters_[static_cast<std::size_t>(of)];
+  Cluster& blunt = clusters_[static_cast<std::size_t>(make_room(false, of))];
+  blunt.size = root_mean_square(blunter);
+  blunt.sizes.push(blunt.size);
+  blunt.shape = blunter;
+  for (float& slope : blunt.shape.slope) slope /= static_cast<float>(blunt.size);
+  blunt.upward = sharp.upward;
+  blunt.born = sharp.born;
+  blunt.calm = sharp.calm;
+  blunt.calm_known = sharp.calm_known;
+  blunt.followed = 1.0;
+  blunt.followed_known = kCaution;
+  // Both recur: what was seen were members of both.
+  blunt.weight = std::max(sharp.by_own * sharp.weight, kRecurs);
+  sharp.weight = std::max((1.0 - sharp.by_own) * sharp.weight, kRecurs);
+  sharp.followed = 0.0;
+  sharp.followed_known = kCaution;
+  sharp.by_own = 0.0;
 }
 
 void QrsClusters::preceded(int of, int by) noexcept {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "core/phase/qrs_shape.hpp"
 #include "core/phase/recent_values.hpp"
@@ -18,6 +19,9 @@ struct ClusterMatch {
   double gain = 1.0;  // to the size that its members have had lately
 };
 
+// What a complex was seen among. In a burst what is settled neither fades nor gives way to what is new.
+enum class Surroundings : std::uint8_t { kCalm, kDisturbed, kBurst };
+
 class QrsClusters {
  public:
   static constexpr int kClusters = 8;
@@ -30,12 +34,16 @@ class QrsClusters {
     return nearest_beat(shape).correlation > correlation;
   }
 
-  // A complex was seen. Gives the cluster that it now belongs to. `calm`: no disturbance was near.
-  int learn(const QrsShape& shape, bool upward, bool calm, Instant seen) noexcept;
+  // A complex was seen. Gives the cluster that it now belongs to.
+  int learn(const QrsShape& shape, bool upward, Surroundings around, Instant seen) noexcept;
   // How much it looked like a QRS by itself.
   void judged(int of, double log_odds) noexcept;
-  // Whether a complex as sharp or sharper followed it within a PR interval.
-  void followed(int of, bool by_sharper) noexcept;
+  // Of which cluster a complex as sharp or sharper was that followed it within a PR interval; -1: none did.
+  void followed(int of, int by) noexcept;
+  // Sharper ones of its own kind follow so many of its members that they are two kinds, P waves and QRS complexes.
+  [[nodiscard]] bool is_two(int i) const noexcept;
+  // The blunter ones of it are a kind of their own from now on, of which this is one.
+  void part(int of, const QrsShape& blunter) noexcept;
   // Which blunter complex came within a PR interval before it; -1: none.
   void preceded(int of, int by) noexcept;
   // Another of cluster `by` that looks as much like a QRS comes so long after it, or before: at the same distance,
@@ -81,6 +89,7 @@ class QrsClusters {
     double log_odds = 0.0;
     double judged = 0.0;  // members that it is of, bounded
     double followed = 0.0;
+    double by_own = 0.0;  // share that others of it followed
     double followed_known = 0.0;
     int before = -1;        // the cluster that precedes it,
     double preceded = 0.0;  // for this share of its members,
@@ -94,6 +103,8 @@ class QrsClusters {
     bool upward = true;
     Instant born;
   };
+  // Clears the rarest cluster, but for one; `frozen`: none that is settled, while there is another.
+  int make_room(bool frozen, int but) noexcept;
   [[nodiscard]] const Cluster& at(int i) const noexcept { return clusters_[static_cast<std::size_t>(i)]; }
 
   std::array<Cluster, kClusters> clusters_{};

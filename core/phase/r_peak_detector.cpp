@@ -32,9 +32,10 @@ void RPeakDetector::take_sample(Instant t, double mV, bool made_up) noexcept {
   filter_.push(t, mV, made_up);
   const bool learning = decision_.learning(newest_);
   if (learning && !learning_) {
-    levels_.forget_top();
+    levels_.forget_top(decision_.beats_came());
     decision_.fall_silent();
   }
+  if (decision_.as_before()) levels_.recall_top();
   learning_ = learning;
   levels_.follow(filter_, decision_.beats().slope(), decision_.in_burst(newest_));
   if (t < levels_.rough_until()) decision_.burst();

@@ -354,7 +354,59 @@ TEST(BeatDecision, FiveBeatsInARowOfOneNewKindAreTheUsualOnes) {
   EXPECT_TRUE(settled(7));
 }
 
+// ---- what a burst hides
+
+// Complexes that are too large for beats follow each other, so that none is told, for so long.
+bool learns_after(double length_s) {
+  Known patient;
+  const double familiar_s = patient.last_s;
+  while (patient.last_s < familiar_s + length_s) {
+    patient.see(patient.last_s + 0.2, [&](QrsCandidate& c) {
+      c.shape = strange_shape(patient.number++);
+      c.step = 1.0;
+      c.energy *= 8.0;
+    });
+  }
+  return patient.decision.learning(at(patient.now_s));
+}
+
+TEST(BeatDecision, NoBeatInABurstIsNoSilenceUntilItLastsLongerThanBursts) {
+  EXPECT_FALSE(learns_after(8.0));
+  EXPECT_FALSE(learns_after(24.0));
+  EXPECT_TRUE(learns_after(27.0));
+}
+
+TEST(BeatDecision, BeatsAreAsBeforeWhenOneOfAKnownKindAndSizeCame) {
+  const auto as_before = [](double gain) {
+    Known patient;
+    patient.run(patient.last_s + 0.5);
+    patient.decision.fall_silent();
+    EXPECT_FALSE(patient.decision.as_before());
+    patient.see(patient.last_s + 0.8, shaped(like_beat(1.0, gain)));
+    patient.run(patient.last_s + 0.6);
+    return patient.decision.as_before();
+  };
+  EXPECT_TRUE(as_before(1.0));
+  EXPECT_TRUE(as_before(0.8));
+  EXPECT_FALSE(as_before(0.65));
+}
+
 // ---- rhythm
+
+TEST(BeatDecision, IntervalsInWhichABurstMayHaveHiddenBeatsTeachNoRhythm) {
+  const auto taught = [](bool burst) {
+    Known patient;
+    for (int i = 0; i < 12; ++i) {
+      patient.run(patient.last_s + 0.5);
+      if (burst) patient.decision.burst();
+      patient.see(patient.last_s + 1.5);
+    }
+    patient.run(patient.last_s + 0.3);
+    return !patient.decision.learning(at(patient.last_s + 3.5));  // how long it is waited for the next tells
+  };
+  EXPECT_TRUE(taught(false));
+  EXPECT_FALSE(taught(true));
+}
 
 TEST(BeatDecision, OnlyBeatsThatAreLikelyEnoughTeachTheRhythm) {
   // Every second beat is so weak; the interval is long, so that how long it is waited for the next tells whether it

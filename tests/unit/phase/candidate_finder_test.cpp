@@ -141,7 +141,7 @@ struct Fitting : Finder {
     Finder before;
     before.hear(1.5, qrs);
     const QrsShape shape = before.found.at(0).candidate.shape;
-    for (int i = 0; i < 10; ++i) clusters.judged(clusters.learn(shape, true, true, Instant{}), 3.0);
+    for (int i = 0; i < 10; ++i) clusters.judged(clusters.learn(shape, true, Surroundings::kCalm, Instant{}), 3.0);
     quiet = 1e6;
   }
 };

@@ -64,7 +64,30 @@ TEST_F(EcgLevelsTest, OfATopThatIsForgottenTheLastWindowStays) {
   hear(15.0, [&](double t) { return beats_mV(t, 1.0); });
   const double before = levels.top_energy();
   hear(3.2, [&](double t) { return beats_mV(t, 0.1); });
-  levels.forget_top();
+  levels.forget_top(false);
+  EXPECT_NEAR(levels.top_energy(), 0.1 * before, 0.02 * before);
+}
+
+TEST_F(EcgLevelsTest, TheTopOfTheBeatsIsRecalledWhenTheyComeAsBefore) {
+  hear(15.0, [&](double t) { return beats_mV(t, 1.0); });
+  const double before = levels.top_energy();
+  levels.forget_top(true);
+  hear(20.0, [&](double t) { return beats_mV(t, 0.1); });
+  levels.forget_top(false);  // what came in between were none
+  hear(20.0, [&](double t) { return beats_mV(t, 0.1); });
+  EXPECT_NEAR(levels.top_energy(), 0.1 * before, 0.02 * before);
+  levels.recall_top();
+  hear(0.8, [&](double t) { return beats_mV(t, 1.0); });
+  EXPECT_NEAR(levels.top_energy(), before, 0.02 * before);
+}
+
+TEST_F(EcgLevelsTest, ATopIsRecalledOnce) {
+  hear(15.0, [&](double t) { return beats_mV(t, 1.0); });
+  const double before = levels.top_energy();
+  levels.forget_top(true);
+  levels.recall_top();
+  hear(15.0, [&](double t) { return beats_mV(t, 0.1); });
+  levels.recall_top();
   EXPECT_NEAR(levels.top_energy(), 0.1 * before, 0.02 * before);
 }
 

@@ -9,6 +9,8 @@ namespace perimap {
 namespace {
 
 constexpr Instant kNow{Duration(0)};
+constexpr int kNone = -1;  // of what follows
+constexpr int kAnother = 7;
 
 // The slope of a wave of that height and width in steps.
 QrsShape shape(double height, double width, double middle = 18.0) {
@@ -26,25 +28,26 @@ const QrsShape kOther = shape(1.0, 7.0, 12.0);
 
 TEST(QrsClusters, AShapeRecursWhenItWasSeenThreeTimes) {
   QrsClusters clusters;
-  const int first = clusters.learn(kBeat, true, true, kNow);
-  EXPECT_EQ(clusters.learn(kBeat, true, true, kNow), first);
+  const int first = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+  EXPECT_EQ(clusters.learn(kBeat, true, Surroundings::kCalm, kNow), first);
   EXPECT_FALSE(clusters.any_recurs());
-  EXPECT_EQ(clusters.learn(kBeat, true, true, kNow), first);
+  EXPECT_EQ(clusters.learn(kBeat, true, Surroundings::kCalm, kNow), first);
   EXPECT_TRUE(clusters.recurs(first));
 }
 
 TEST(QrsClusters, ShapesAndSizesAreToldApart) {
   QrsClusters clusters;
-  const int beat = clusters.learn(kBeat, true, true, kNow);
-  EXPECT_NE(clusters.learn(kOther, true, true, kNow), beat);
-  EXPECT_NE(clusters.learn(shape(0.4, 2.5), true, true, kNow), beat) << "a P wave may have a QRS complex's shape";
-  EXPECT_EQ(clusters.learn(shape(1.4, 2.5), true, true, kNow), beat);
+  const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+  EXPECT_NE(clusters.learn(kOther, true, Surroundings::kCalm, kNow), beat);
+  EXPECT_NE(clusters.learn(shape(0.4, 2.5), true, Surroundings::kCalm, kNow), beat)
+      << "a P wave may have a QRS complex's shape";
+  EXPECT_EQ(clusters.learn(shape(1.4, 2.5), true, Surroundings::kCalm, kNow), beat);
 }
 
 TEST(QrsClusters, FindsTheNearestAndItsGain) {
   QrsClusters clusters;
-  const int beat = clusters.learn(kBeat, true, true, kNow);
-  clusters.learn(kOther, true, true, kNow);
+  const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+  clusters.learn(kOther, true, Surroundings::kCalm, kNow);
   const ClusterMatch match = clusters.nearest(shape(1.5, 2.6), 3);
   EXPECT_EQ(match.of, beat);
   EXPECT_GT(match.correlation, 0.95);
@@ -54,34 +57,34 @@ TEST(QrsClusters, FindsTheNearestAndItsGain) {
 TEST(QrsClusters, WhatRecursInBurstsAloneIsNotSettled) {
   QrsClusters clusters;
   int beat = -1;
-  for (int i = 0; i < 10; ++i) beat = clusters.learn(kBeat, true, false, kNow);
+  for (int i = 0; i < 10; ++i) beat = clusters.learn(kBeat, true, Surroundings::kDisturbed, kNow);
   EXPECT_TRUE(clusters.recurs(beat));
   EXPECT_FALSE(clusters.settled(beat));
   EXPECT_FALSE(clusters.any_settled());
-  for (int i = 0; i < 12; ++i) clusters.learn(kBeat, true, true, kNow);
+  for (int i = 0; i < 12; ++i) clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
   EXPECT_TRUE(clusters.settled(beat));
 }
 
 TEST(QrsClusters, ABurstDoesNotUnsettleTheBeatsBeforeIt) {
   QrsClusters clusters;
   int beat = -1;
-  for (int i = 0; i < 60; ++i) beat = clusters.learn(kBeat, true, true, kNow);
-  for (int i = 0; i < 25; ++i) clusters.learn(kBeat, true, false, kNow);
+  for (int i = 0; i < 60; ++i) beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+  for (int i = 0; i < 25; ++i) clusters.learn(kBeat, true, Surroundings::kDisturbed, kNow);
   EXPECT_TRUE(clusters.settled(beat));
 }
 
 TEST(QrsClusters, CanBeSettledAtOnce) {
   QrsClusters clusters;
   int beat = -1;
-  for (int i = 0; i < 6; ++i) beat = clusters.learn(kBeat, true, false, kNow);
+  for (int i = 0; i < 6; ++i) beat = clusters.learn(kBeat, true, Surroundings::kDisturbed, kNow);
   clusters.settle(beat);
   EXPECT_TRUE(clusters.settled(beat));
 }
 
 TEST(QrsClusters, KnowsTheShareThatASharperOneFollows) {
   QrsClusters clusters;
-  const int wave = clusters.learn(kOther, true, true, kNow);
-  for (int i = 0; i < 8; ++i) clusters.followed(wave, i % 2 == 0);
+  const int wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
+  for (int i = 0; i < 8; ++i) clusters.followed(wave, i % 2 == 0 ? kAnother : kNone);
   EXPECT_NEAR(clusters.followers(wave), 0.5, 0.07);
   EXPECT_EQ(clusters.followers_known(wave), 8.0);
 }
@@ -89,9 +92,9 @@ TEST(QrsClusters, KnowsTheShareThatASharperOneFollows) {
 // Of ten P waves so many are conducted, and of ten QRS complexes so many come after one.
 bool leads(int conducted, int with_p_wave, int qrs_complexes = 10) {
   QrsClusters clusters;
-  const int wave = clusters.learn(kOther, true, true, kNow);
-  const int beat = clusters.learn(kBeat, true, true, kNow);
-  for (int i = 0; i < 10; ++i) clusters.followed(wave, i < conducted);
+  const int wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
+  const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+  for (int i = 0; i < 10; ++i) clusters.followed(wave, i < conducted ? kAnother : kNone);
   for (int i = 0; i < qrs_complexes; ++i) clusters.preceded(beat, i < with_p_wave ? wave : -1);
   EXPECT_FALSE(clusters.leads(beat));
   return clusters.leads(wave);
@@ -109,12 +112,12 @@ TEST(QrsClusters, AWaveThatHalfOfTheTimeLeadsAComplexWhichNeverComesWithoutItIsA
 
 TEST(QrsClusters, WhatComesBeforeIsOfOneKind) {
   QrsClusters clusters;
-  const int wave = clusters.learn(kOther, true, true, kNow);
-  const int other = clusters.learn(shape(0.4, 2.5), true, true, kNow);
-  const int beat = clusters.learn(kBeat, true, true, kNow);
+  const int wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
+  const int other = clusters.learn(shape(0.4, 2.5), true, Surroundings::kCalm, kNow);
+  const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
   for (int i = 0; i < 12; ++i) {
-    clusters.followed(wave, true);
-    clusters.followed(other, true);
+    clusters.followed(wave, kAnother);
+    clusters.followed(other, kAnother);
     clusters.preceded(beat, i % 2 == 0 ? wave : other);
   }
   EXPECT_FALSE(clusters.leads(wave));
@@ -123,6 +126,60 @@ TEST(QrsClusters, WhatComesBeforeIsOfOneKind) {
   for (int i = 0; i < 60; ++i) clusters.preceded(beat, other);
   EXPECT_TRUE(clusters.leads(other));
   EXPECT_FALSE(clusters.leads(wave));
+}
+
+// One kind of P waves and QRS complexes, so many of which are known to be followed by another of it or by none.
+bool is_two(int followed, int alone) {
+  QrsClusters clusters;
+  const int both = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+  for (int i = 0; i < alone; ++i) clusters.followed(both, kNone);
+  for (int i = 0; i < followed; ++i) clusters.followed(both, both);
+  return clusters.is_two(both);
+}
+
+TEST(QrsClusters, AKindWhoseMembersFollowEachOtherIsTwo) {
+  EXPECT_TRUE(is_two(3, 3)) << "the P wave and the QRS complex";
+  EXPECT_FALSE(is_two(3, 6)) << "a beat in three that comes early";
+  EXPECT_TRUE(is_two(2, 1));
+  EXPECT_FALSE(is_two(1, 1)) << "that may be chance";
+}
+
+TEST(QrsClusters, OfAKindThatIsTwoTheBlunterOnesAreWavesThatAreFollowed) {
+  QrsClusters clusters;
+  const QrsShape blunt = shape(0.7, 3.2);
+  int both = -1;
+  for (int i = 0; i < 6; ++i) {
+    both = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+    EXPECT_EQ(clusters.learn(blunt, true, Surroundings::kCalm, kNow), both);
+  }
+  clusters.part(both, blunt);
+  const int waves = clusters.learn(blunt, true, Surroundings::kCalm, kNow);
+  EXPECT_NE(waves, both);
+  EXPECT_EQ(clusters.learn(kBeat, true, Surroundings::kCalm, kNow), both);
+  EXPECT_TRUE(clusters.settled(waves));
+  EXPECT_TRUE(clusters.settled(both));
+  EXPECT_GT(clusters.followers(waves), 0.9);
+  EXPECT_EQ(clusters.followers(both), 0.0);
+}
+
+// So many strange complexes, each unlike the others: is the kind that was known before them still?
+bool still_known(Surroundings around) {
+  QrsClusters clusters;
+  int beat = -1;
+  for (int i = 0; i < 4; ++i) beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+  std::mt19937 generator(0x5b0e71c3U);
+  std::normal_distribution<float> normal(0.0F, 0.4F);
+  for (int i = 0; i < 150; ++i) {
+    QrsShape strange = kBeat;
+    for (float& slope : strange.slope) slope = normal(generator);
+    clusters.learn(strange, true, around, kNow);
+  }
+  return clusters.nearest(kBeat, 0).of == beat && clusters.settled(beat);
+}
+
+TEST(QrsClusters, InABurstWhatIsSettledNeitherFadesNorGivesWay) {
+  EXPECT_TRUE(still_known(Surroundings::kBurst));
+  EXPECT_FALSE(still_known(Surroundings::kDisturbed));
 }
 
 QrsShape unlike_others(unsigned number) {
@@ -137,18 +194,18 @@ QrsShape unlike_others(unsigned number) {
 // So many new kinds that the one is forgotten.
 void forget_all_but_newest(QrsClusters& clusters, int kept, const QrsShape& kept_shape) {
   for (int i = 0; i < QrsClusters::kClusters; ++i) {
-    clusters.learn(unlike_others(static_cast<unsigned>(i)), true, true, kNow);
-    for (int k = 0; k < 3; ++k) EXPECT_EQ(clusters.learn(kept_shape, true, true, kNow), kept);
+    clusters.learn(unlike_others(static_cast<unsigned>(i)), true, Surroundings::kCalm, kNow);
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(clusters.learn(kept_shape, true, Surroundings::kCalm, kNow), kept);
   }
 }
 
 TEST(QrsClusters, AKindThatTakesThePlaceOfPWavesIsNotTakenForThem) {
   QrsClusters clusters;
-  const int wave = clusters.learn(kOther, true, true, kNow);
-  const int beat = clusters.learn(kBeat, true, true, kNow);
+  const int wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
+  const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
   for (int i = 0; i < 12; ++i) clusters.preceded(beat, wave);
   forget_all_but_newest(clusters, beat, kBeat);
-  for (int i = 0; i < 10; ++i) clusters.followed(wave, true);  // another kind now
+  for (int i = 0; i < 10; ++i) clusters.followed(wave, kAnother);  // another kind now
   clusters.preceded(beat, wave);
   EXPECT_FALSE(clusters.leads(wave)) << "one is not enough";
   clusters.preceded(beat, wave);
@@ -157,8 +214,8 @@ TEST(QrsClusters, AKindThatTakesThePlaceOfPWavesIsNotTakenForThem) {
 
 TEST(QrsClusters, AKindThatTakesThePlaceOfARivalIsANewOne) {
   QrsClusters clusters;
-  const int wave = clusters.learn(kOther, true, true, kNow);
-  const int beat = clusters.learn(kBeat, true, true, kNow);
+  const int wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
+  const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
   EXPECT_TRUE(clusters.beside(beat, wave, 0.3, 0.02, true));
   EXPECT_FALSE(clusters.beside(beat, wave, 0.4, 0.02, true)) << "its distance is another";
   EXPECT_TRUE(clusters.beside(beat, wave, -0.4, 0.02, true)) << "before it is another matter";
@@ -169,7 +226,7 @@ TEST(QrsClusters, AKindThatTakesThePlaceOfARivalIsANewOne) {
 TEST(QrsClusters, TheDistanceOfRivalsIsFollowedByAFifth) {
   QrsClusters clusters;
   int wave = -1;
-  for (int i = 0; i < 4; ++i) wave = clusters.learn(kOther, true, true, kNow);
+  for (int i = 0; i < 4; ++i) wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
   clusters.beside(wave, wave, 0.300, 0.02, false);
   EXPECT_FALSE(clusters.beside(wave, wave, 0.340, 0.02, false));  // now 0.308
   EXPECT_TRUE(clusters.beside(wave, wave, 0.327, 0.02, false));   // 0.3118
@@ -178,7 +235,7 @@ TEST(QrsClusters, TheDistanceOfRivalsIsFollowedByAFifth) {
 
 TEST(QrsClusters, JudgesByTheMeanOfItsMembersAndCautiouslyWhereTheyAreFew) {
   QrsClusters clusters;
-  const int beat = clusters.learn(kBeat, true, true, kNow);
+  const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
   clusters.judged(beat, 3.0);
   EXPECT_GT(clusters.log_odds(beat), 0.0);
   EXPECT_LT(clusters.log_odds(beat), 1.5);
@@ -208,15 +265,15 @@ QrsShape mixed(double correlation) {
 
 QrsClusters knowing_beats(int count = 10) {
   QrsClusters clusters;
-  for (int i = 0; i < count; ++i) clusters.judged(clusters.learn(kBeat, true, true, kNow), 3.0);
+  for (int i = 0; i < count; ++i) clusters.judged(clusters.learn(kBeat, true, Surroundings::kCalm, kNow), 3.0);
   return clusters;
 }
 
 TEST(QrsClusters, AShapeIsOfAKindFromACorrelationOfEightyFivePercentOn) {
   QrsClusters clusters = knowing_beats();
   const int beat = clusters.nearest(kBeat, 0).of;
-  EXPECT_EQ(clusters.learn(mixed(0.90), true, true, kNow), beat);
-  EXPECT_NE(knowing_beats().learn(mixed(0.78), true, true, kNow), beat);
+  EXPECT_EQ(clusters.learn(mixed(0.90), true, Surroundings::kCalm, kNow), beat);
+  EXPECT_NE(knowing_beats().learn(mixed(0.78), true, Surroundings::kCalm, kNow), beat);
 }
 
 TEST(QrsClusters, AKindIsOfSizesUpToTwiceAndDownToHalf) {
@@ -228,13 +285,13 @@ TEST(QrsClusters, AKindIsOfSizesUpToTwiceAndDownToHalf) {
 TEST(QrsClusters, AGainThatFallsFromBeatToBeatIsFollowed) {
   const auto kinds = [](double by) {
     QrsClusters clusters;
-    for (int i = 0; i < 8; ++i) clusters.learn(kBeat, true, true, kNow);
+    for (int i = 0; i < 8; ++i) clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
     double height = 1.0;
     const int beat = clusters.nearest(kBeat, 0).of;
     int others = 0;
     for (int i = 0; i < 12; ++i) {
       height *= by;
-      others += clusters.learn(shape(height, 2.5), true, true, kNow) == beat ? 0 : 1;
+      others += clusters.learn(shape(height, 2.5), true, Surroundings::kCalm, kNow) == beat ? 0 : 1;
     }
     return others;
   };
@@ -251,8 +308,8 @@ TEST(QrsClusters, ABeatIsLookedForDownToAQuarterOfItsSize) {
 TEST(QrsClusters, PeaksOfOneKindAreFoundUpToFifteenMillisecondsApart) {
   for (const double apart : {3.0, 4.0}) {
     QrsClusters clusters;
-    const int narrow = clusters.learn(shape(1.0, 1.2, 14.0), true, true, kNow);
-    EXPECT_EQ(clusters.learn(shape(1.0, 1.2, 14.0 + apart), true, true, kNow) == narrow, apart == 3.0);
+    const int narrow = clusters.learn(shape(1.0, 1.2, 14.0), true, Surroundings::kCalm, kNow);
+    EXPECT_EQ(clusters.learn(shape(1.0, 1.2, 14.0 + apart), true, Surroundings::kCalm, kNow) == narrow, apart == 3.0);
   }
 }
 
@@ -261,7 +318,7 @@ TEST(QrsClusters, PeaksOfOneKindAreFoundUpToFifteenMillisecondsApart) {
 TEST(QrsClusters, ATemplateFollowsItsMembersByAnEighthEach) {
   QrsClusters clusters = knowing_beats(100);
   const QrsShape bent = mixed(0.88);
-  for (int i = 0; i < 4; ++i) clusters.learn(bent, true, true, kNow);
+  for (int i = 0; i < 4; ++i) clusters.learn(bent, true, Surroundings::kCalm, kNow);
   const double share = 1.0 - std::pow(7.0 / 8.0, 4.0);
   const double along = 1.0 - share + 0.88 * share;
   const double across = std::sqrt(1.0 - 0.88 * 0.88) * share;
@@ -270,9 +327,9 @@ TEST(QrsClusters, ATemplateFollowsItsMembersByAnEighthEach) {
 
 TEST(QrsClusters, SharesAreOfTheLastTwelveMembers) {
   QrsClusters clusters;
-  const int wave = clusters.learn(kOther, true, true, kNow);
-  for (int i = 0; i < 40; ++i) clusters.followed(wave, true);
-  for (int i = 0; i < 8; ++i) clusters.followed(wave, false);
+  const int wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
+  for (int i = 0; i < 40; ++i) clusters.followed(wave, kAnother);
+  for (int i = 0; i < 8; ++i) clusters.followed(wave, kNone);
   EXPECT_NEAR(clusters.followers(wave), std::pow(11.0 / 12.0, 8.0), 0.02);
 }
 
@@ -280,7 +337,7 @@ TEST(QrsClusters, ABurstOfTwentySecondsDoesNotOutweighTheBeatsBeforeItAndALonger
   const auto settled_after = [](int in_burst) {
     QrsClusters clusters = knowing_beats(200);
     int beat = -1;
-    for (int i = 0; i < in_burst; ++i) beat = clusters.learn(kBeat, true, false, kNow);
+    for (int i = 0; i < in_burst; ++i) beat = clusters.learn(kBeat, true, Surroundings::kDisturbed, kNow);
     return clusters.settled(beat);
   };
   EXPECT_TRUE(settled_after(36));
@@ -291,7 +348,8 @@ TEST(QrsClusters, AKindIsSettledWhenMostOfItsMembersWereSeenInCalm) {
   const auto settled = [](int calm) {
     QrsClusters clusters;
     int beat = -1;
-    for (int i = 0; i < 20; ++i) beat = clusters.learn(kBeat, true, i < calm, kNow);
+    for (int i = 0; i < 20; ++i)
+      beat = clusters.learn(kBeat, true, i < calm ? Surroundings::kCalm : Surroundings::kDisturbed, kNow);
     return clusters.settled(beat);
   };
   EXPECT_FALSE(settled(8));
@@ -300,18 +358,18 @@ TEST(QrsClusters, AKindIsSettledWhenMostOfItsMembersWereSeenInCalm) {
 
 TEST(QrsClusters, OneMemberIsJudgedAsIfTwoOthersHadSaidNothing) {
   QrsClusters clusters;
-  const int beat = clusters.learn(kBeat, true, true, kNow);
+  const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
   clusters.judged(beat, 3.0);
   EXPECT_NEAR(clusters.log_odds(beat), 1.0, 0.05);
 }
 
 TEST(QrsClusters, WhatIsSeenAgainOutweighsWhatIsNotInAHundredComplexes) {
   QrsClusters clusters;
-  const int beat = clusters.learn(kBeat, true, true, kNow);
-  for (int i = 0; i < 5; ++i) clusters.learn(kBeat, true, true, kNow);
-  for (int i = 0; i < 60; ++i) clusters.learn(kOther, true, true, kNow);
+  const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+  for (int i = 0; i < 5; ++i) clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+  for (int i = 0; i < 60; ++i) clusters.learn(kOther, true, Surroundings::kCalm, kNow);
   EXPECT_TRUE(clusters.recurs(beat));
-  for (int i = 0; i < 60; ++i) clusters.learn(kOther, true, true, kNow);
+  for (int i = 0; i < 60; ++i) clusters.learn(kOther, true, Surroundings::kCalm, kNow);
   EXPECT_FALSE(clusters.recurs(beat));
 }
 

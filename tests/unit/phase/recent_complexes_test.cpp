@@ -14,7 +14,7 @@ namespace {
 struct Lead {
   int kind(const QrsShape& shape) {
     int of = -1;
-    for (int i = 0; i < 4; ++i) of = clusters.learn(shape, true, true, at(0.0));
+    for (int i = 0; i < 4; ++i) of = clusters.learn(shape, true, Surroundings::kCalm, at(0.0));
     return of;
   }
   void see(double at_s, int of, double log_odds = 3.0, double sharpness = 1.0, bool at_first = false) {
