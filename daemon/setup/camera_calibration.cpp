@@ -43,8 +43,9 @@ Fit fit_of(const Points& points, const Problem& problem, bool k3_is_free) {
     cv::fisheye::calibrate(points.board, points.image, problem.size, fit.K, fit.d, fit.rvecs, fit.tvecs,
                            cv::fisheye::CALIB_RECOMPUTE_EXTRINSIC | cv::fisheye::CALIB_FIX_SKEW, criteria);
   } else {
+    // Its steps are solved by singular values where nothing else is said: of 60 views, of 369 unknowns, minutes.
     cv::calibrateCamera(points.board, points.image, problem.size, fit.K, fit.d, fit.rvecs, fit.tvecs,
-                        k3_is_free ? 0 : cv::CALIB_FIX_K3, criteria);
+                        cv::CALIB_USE_QR | (k3_is_free ? 0 : cv::CALIB_FIX_K3), criteria);
   }
   return fit;
 }
