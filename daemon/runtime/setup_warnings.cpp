@@ -27,7 +27,7 @@ void warn_of_tracker(const TrackerConfiguration& tracker, bool has_scope, std::v
         "tracker.hand_eye_translation_SC_mm, tracker.hand_eye_rotation_SC_wxyz: the camera is said to be the tracked "
         "sensor itself; measure where it is with `perimap calibrate hand-eye`");
   }
-  if (tracker.position_deviation_mm == 0.0 && tracker.rotation_deviation_rad == 0.0) {
+  if (tracker.position_deviation_mm == 0.0 || tracker.rotation_deviation_rad == 0.0) {
     warnings.emplace_back(
         "tracker.position_deviation_mm, tracker.rotation_deviation_deg: the tracker is said to be exact, which no real "
         "one is; nothing converges then, or too much is believed; measure its noise with `perimap calibrate tracker`");

@@ -49,6 +49,8 @@ TEST(SetupWarnings, NameATrackerThatIsSaidToBeExact) {
   Configuration configuration = measured();
   configuration.tracker.position_deviation_mm = configuration.tracker.rotation_deviation_rad = 0.0;
   EXPECT_THAT(setup_warnings(configuration, lens()), ElementsAre(HasSubstr("tracker.position_deviation_mm")));
+  configuration.tracker.position_deviation_mm = 1.0;
+  EXPECT_THAT(setup_warnings(configuration, lens()), ElementsAre(HasSubstr("tracker.rotation_deviation_deg")));
 }
 
 TEST(SetupWarnings, NameAPrincipalPointFarFromTheMiddle) {
