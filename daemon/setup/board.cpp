@@ -243,6 +243,41 @@ Points grid_points(const cv::Mat& grey, const Board& board) {
   return points;
 }
 
+Points points_of(const cv::Mat& grey, const Board& board) {
+  return board.kind == BoardKind::kCharuco   ? charuco_points(grey, board)
+         : board.kind == BoardKind::kMarkers ? marker_points(grey, board)
+                                             : grid_points(grey, board);
+}
+
+std::optional<Board> recognise(const std::vector<cv::Mat>& pictures, const BoardWish& wish) {
+  const auto wants = [&](std::initializer_list<BoardKind> kinds) {
+    return !wish.kind || std::find(kinds.begin(), kinds.end(), *wish.kind) != kinds.end();
+  };
+  std::optional<Board> board;
+  if (wants({BoardKind::kCharuco, BoardKind::kMarkers})) board = recognise_markers(pictures, wish);
+  if (!board && wants({BoardKind::kChessboard})) board = recognise_chessboard(pictures, wish);
+  if (!board && wants({BoardKind::kCircles, BoardKind::kAsymmetricCircles})) board = recognise_circles(pictures, wish);
+  return board;
+}
+
+// Another board than the one that the wish names, where these pictures show that and none shows the one that is named.
+std::optional<Board> another_board(const std::vector<cv::Mat>& pictures, const BoardWish& wish,
+                                   const std::optional<Board>& board) {
+  const bool is_named = wish.kind || wish.columns > 0 || !wish.dictionary.empty();
+  if (!is_named) return std::nullopt;
+  // A chessboard whose size is named is taken for that unseen.
+  if (board && (board->kind != BoardKind::kChessboard || wish.columns == 0)) return std::nullopt;
+  if (board && std::any_of(pictures.begin(), pictures.end(), [&](const cv::Mat& picture) {
+        return points_of(picture, *board).first.size() >= kFewestPoints;
+      })) {
+    return std::nullopt;
+  }
+  const auto other = recognise(pictures, {});
+  const bool is_same = board && other && other->kind == board->kind &&
+                       std::minmax(other->columns, other->rows) == std::minmax(board->columns, board->rows);
+  return is_same ? std::nullopt : other;
+}
+
 std::string size_of(const Board& board) { return fmt::format("{}x{}", board.columns, board.rows); }
 
 }  // namespace
@@ -276,16 +311,15 @@ Expected<Board> recognise_board(const std::vector<GreyImage>& pictures, const Bo
     const cv::Mat grey = to_cv(pictures[k * pictures.size() / count]);
     looked.push_back(is_combed(grey) ? first_field(grey) : grey);
   }
-  const auto wants = [&](std::initializer_list<BoardKind> kinds) {
-    return !wish.kind || std::find(kinds.begin(), kinds.end(), *wish.kind) != kinds.end();
-  };
-  std::optional<Board> board;
-  if (wants({BoardKind::kCharuco, BoardKind::kMarkers})) board = recognise_markers(looked, wish);
-  if (!board && wants({BoardKind::kChessboard})) board = recognise_chessboard(looked, wish);
-  if (!board && wants({BoardKind::kCircles, BoardKind::kAsymmetricCircles})) board = recognise_circles(looked, wish);
+  std::optional<Board> board = recognise(looked, wish);
+  if (const auto other = another_board(looked, wish, board)) {
+    return fail(fmt::format(
+        "the pictures show a {}, and not the board that --board, --size and --dictionary name: mend or leave out those",
+        name_of(*other)));
+  }
   if (!board) {
     return fail(
-        fmt::format("no board is seen in {} of the {} pictures that were looked at: is it whole in the picture, sharp "
+        fmt::format("no board is seen in the {} of {} pictures that were looked at: is it whole in the picture, sharp "
                     "and evenly lit? "
                     "If it is, say what it is with --board, --size and, for markers, --dictionary",
                     looked.size(), pictures.size()));
@@ -298,9 +332,7 @@ std::optional<BoardView> find_board(const GreyImage& picture, const Board& board
   const cv::Mat whole = to_cv(picture);
   const bool combed = is_combed(whole);
   const cv::Mat grey = combed ? first_field(whole) : whole;
-  const auto [px, squares] = board.kind == BoardKind::kCharuco   ? charuco_points(grey, board)
-                             : board.kind == BoardKind::kMarkers ? marker_points(grey, board)
-                                                                 : grid_points(grey, board);
+  const auto [px, squares] = points_of(grey, board);
   if (px.size() < kFewestPoints) return std::nullopt;
   BoardView view;
   for (std::size_t i = 0; i < px.size(); ++i) {

@@ -363,6 +363,29 @@ void disagree(HandEyeCalibration& result, double camera_interval_s) {
   for (OtherHandEye& other : result.others) other.residual_median_mm = median_of(all_of(other.X_SC));
 }
 
+// Lengths that are off by a few hundredths fit nearly as well, with another place of the camera: they are refused, or
+// what that place may be off is told as a deviation.
+Expected<void> check_scale(HandEyeCalibration& result, const HandEyeSettings& settings) {
+  result.scale = board_scale(result.pairs, result.used, result.X_SC, result.X_WB, result.error_covariance,
+                             result.correlation_length, result.offset_measured);
+  constexpr double kByChance = 3.0;
+  constexpr double kSure = 5.0;
+  const double off = std::abs(result.scale.ratio - 1.0);
+  if (off > settings.largest_scale_error && off > kSure * result.scale.deviation) {
+    return fail(fmt::format(
+        "by the tracker the board is {:.3f} times as large as was said (standard deviation {:.3f}): measure its "
+        "squares and say them with --square-mm; of tables, look at the unit of each; if both are right, the lens is "
+        "not",
+        result.scale.ratio, result.scale.deviation));
+  }
+  if (off > kByChance * result.scale.deviation) {
+    const double share = 1.0 - kByChance * result.scale.deviation / off;
+    const Vector6d untold = share * result.scale.change_C;
+    result.covariance.topLeftCorner<6, 6>() += untold * untold.transpose();
+  }
+  return {};
+}
+
 std::string direction_of(const Vector3d& v) { return fmt::format("({:.2f}, {:.2f}, {:.2f})", v.x(), v.y(), v.z()); }
 
 // Refuses what the motion leaves open, and says which direction.
@@ -417,6 +440,12 @@ Expected<void> check_spread(HandEyeCalibration& result) {
 
 }  // namespace
 
+double HandEyeCalibration::target_deviation_mm() const {
+  Eigen::Matrix<double, 3, 6> J;
+  J << -cross_matrix({0.0, 0.0, kTargetAhead_mm}), Matrix3d::Identity();
+  return std::sqrt((J * covariance.topLeftCorner<6, 6>() * J.transpose()).trace());
+}
+
 Expected<HandEyeCalibration> calibrate_hand_eye(std::vector<TimedPose> camera, std::vector<TimedPose> tracker,
                                                 const HandEyeSettings& settings) {
   const std::vector<PosePair> in_rows = pair_rows(camera, tracker);
@@ -459,6 +488,7 @@ Expected<HandEyeCalibration> calibrate_hand_eye(std::vector<TimedPose> camera, s
     if (const auto refined = refine_offset(result, camera, tracker); !refined) return tl::unexpected(refined.error());
     result.brisk_rad_per_s = brisk_speed(result.pairs, result.X_SC.R);
   }
+  if (const auto sound = check_scale(result, settings); !sound) return tl::unexpected(sound.error());
   if (const auto certain = check_certainty(result, settings); !certain) return tl::unexpected(certain.error());
   judge(result);
   disagree(result, median_interval_s(camera));

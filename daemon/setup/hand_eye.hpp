@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/board_scale.hpp"
 #include "core/calibration/timed_poses.hpp"
 #include "core/error/expected.hpp"
 #include "daemon/setup/hand_eye_adjustment.hpp"
@@ -17,6 +18,8 @@ struct HandEyeSettings {
   // A result that is less certain than this in any direction is refused.
   double largest_translation_deviation_mm = 5.0;
   double largest_rotation_deviation_deg = 2.0;
+  // A board whose lengths are off by more than this by the tracker, and by more than five deviations, is refused.
+  double largest_scale_error = 0.04;
 };
 
 // What another solver makes of the same pairs.
@@ -32,6 +35,8 @@ struct HandEyeCalibration {
   Eigen::Matrix<double, 7, 7>
       covariance;             // as HandEyeAdjustment has it, for errors that last `correlation_length` poses
   Matrix6d error_covariance;  // of one pose, at the sensor
+  // Of the camera's lengths beside the tracker's. What it is off beyond three deviations is in `covariance`.
+  BoardScale scale;
   double correlation_length = 1.0;
   bool offset_measured = false;  // false: there is no motion with times of its own to measure it by
   double offset_s = 0.0;         // added to the tracker's times to get the camera's
@@ -54,6 +59,12 @@ struct HandEyeCalibration {
   double held_aside_rms_deg = 0.0;
   std::vector<OtherHandEye> others;
 
+  // Where a heart is: what the errors of rotation and place together make of it.
+  static constexpr double kTargetAhead_mm = 90.0;
+  // Standard deviation of a target there as a 3-D norm: 95 % of such targets are within a millimetre and less then.
+  static constexpr double kWellKnownTarget_mm = 0.4;
+  [[nodiscard]] double target_deviation_mm() const;
+
   // Whether something moved fast enough for the offset's deviation to be trusted; the errors of a lens, or of a board
   // seen from one side, last, and without fast motion they pass for time.
   static constexpr double kLeastBrisk_rad_per_s = 0.2;
@@ -61,8 +72,8 @@ struct HandEyeCalibration {
 };
 
 // X_WS of the tracker and X_BC of the camera, each with times of its own clock, in any order. Fails, and says what is
-// missing, when they never overlap or do not move alike, when there are too few, or when their motion does not
-// determine the result.
+// missing, when they never overlap or do not move alike, when there are too few, when their motion does not determine
+// the result, or when their lengths are of two scales.
 [[nodiscard]] Expected<HandEyeCalibration> calibrate_hand_eye(std::vector<TimedPose> camera,
                                                               std::vector<TimedPose> tracker,
                                                               const HandEyeSettings& settings);

@@ -82,6 +82,14 @@ nlohmann::json offset_json_of(const HandEyeCalibration& result) {
           {"brisk", result.is_brisk()}};
 }
 
+std::string scale_text_of(const BoardScale& scale) {
+  if (!std::isfinite(scale.deviation))
+    return "  scale          of the board beside the tracker: not told by this motion\n";
+  return fmt::format(
+      "  scale          the board is {:.4f} times as large by the tracker as was said, deviation {:.4f}\n", scale.ratio,
+      scale.deviation);
+}
+
 std::string text_of(const HandEyeCalibration& result) {
   const QuaternionFigures q = quaternion_figures(result.X_SC.R, result.covariance.topLeftCorner<3, 3>());
   const Eigen::Matrix<double, 7, 1> deviation = result.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -91,6 +99,8 @@ std::string text_of(const HandEyeCalibration& result) {
                       three(deviation.segment<3>(3), 2));
   text += fmt::format("  rotation       {:.6f} (w x y z), deviations {} degrees about the camera's axes\n",
                       fmt::join(q.wxyz, " "), three(deviation.head<3>() / kDegree, 3));
+  text += fmt::format("  a target       {:.0f} mm ahead is known within {:.2f} mm by that (standard deviation)\n",
+                      HandEyeCalibration::kTargetAhead_mm, result.target_deviation_mm());
   if (result.offset_measured) {
     text += offset_text_of(result);
   } else if (result.paired_by_rows) {
@@ -108,6 +118,7 @@ std::string text_of(const HandEyeCalibration& result) {
   text +=
       fmt::format("  held aside     each fifth by the others: {:.2f} mm and {:.2f} degrees RMS ({:.2f} mm fitted)\n",
                   result.held_aside_rms_mm, result.held_aside_rms_deg, result.fitted_rms_mm);
+  text += scale_text_of(result.scale);
   text +=
       fmt::format("  turned         {} degrees (standard deviation about three axes)\n", three(result.spread_deg, 1));
   text += fmt::format("  left out       {} of {} poses off; {} where the tracker has none\n",
@@ -126,6 +137,7 @@ nlohmann::json json_of(const HandEyeCalibration& result) {
       {"rotation_wxyz", list(q.wxyz)},
       {"rotation_wxyz_deviation", list(q.deviation)},
       {"rotation_deg_deviation", list(Vector3d(deviation.head<3>() / kDegree))},
+      {"target_mm_deviation", result.target_deviation_mm()},
       {"time_offset_ms", nullptr},
       {"time_offset_ms_deviation", nullptr},
       {"residual_median_mm", result.residual_median_mm},
@@ -143,6 +155,10 @@ nlohmann::json json_of(const HandEyeCalibration& result) {
       {"poses_without_tracker", result.without_tracker_pose},
       {"paired_by_rows", result.paired_by_rows},
       {"correlation_length", result.correlation_length}};
+  if (std::isfinite(result.scale.deviation)) {
+    json["board_scale"] = result.scale.ratio;
+    json["board_scale_deviation"] = result.scale.deviation;
+  }
   if (result.offset_measured) {
     json.update(offset_json_of(result));
   }

@@ -71,7 +71,8 @@ TEST(Board, ACharucoBoardIsRecognisedWithSizeAndDictionary) {
   }
 }
 
-TEST(Board, AChessboardIsRecognisedWithItsSize) {
+// Of 9x6 inner corners.
+std::vector<cv::Mat> chessboard_pictures() {
   cv::Mat drawn(8 * 80, 11 * 80, CV_8UC1, cv::Scalar(255));
   for (int y = 0; y < 7; ++y) {
     for (int x = 0; x < 10; ++x) {
@@ -79,8 +80,31 @@ TEST(Board, AChessboardIsRecognisedWithItsSize) {
     }
   }
   std::vector<cv::Mat> pictures;
-  std::vector<GreyImage> greys;
   for (const Vector3d& turn : kTurns) pictures.push_back(picture_of(drawn, turn, 1.4));
+  return pictures;
+}
+
+TEST(Board, AnotherThanTheOneThatIsNamedIsRefusedByItsName) {
+  std::vector<GreyImage> greys;
+  const auto pictures = chessboard_pictures();
+  for (const cv::Mat& picture : pictures) greys.push_back(grey_of(picture));
+  BoardWish wish;
+  wish.kind = BoardKind::kChessboard;
+  wish.columns = 8, wish.rows = 5;
+  for (const BoardKind kind : {BoardKind::kChessboard, BoardKind::kCharuco, BoardKind::kCircles}) {
+    wish.kind = kind;
+    const auto board = recognise_board(greys, wish);
+    ASSERT_FALSE(board);
+    EXPECT_THAT(board.error().message, HasSubstr("the pictures show a chessboard of 9x6 inner corners, and not"));
+  }
+  wish.kind = BoardKind::kChessboard;
+  wish.columns = 6, wish.rows = 9;
+  EXPECT_TRUE(recognise_board(greys, wish));
+}
+
+TEST(Board, AChessboardIsRecognisedWithItsSize) {
+  std::vector<GreyImage> greys;
+  const auto pictures = chessboard_pictures();
   for (const cv::Mat& picture : pictures) greys.push_back(grey_of(picture));
   const auto board = recognise_board(greys, {});
   ASSERT_TRUE(board) << board.error().message;

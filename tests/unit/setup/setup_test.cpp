@@ -60,6 +60,41 @@ TEST(HandEye, IsFoundWithTheClocksOffset) {
   EXPECT_LT(result->residual_median_mm, 1.0);
 }
 
+// Squares that are smaller than was said: camera poses with longer lengths.
+Poses with_longer_camera_lengths(Poses poses, double factor) {
+  for (TimedPose& pose : poses.camera) pose.X.t *= factor;
+  return poses;
+}
+
+TEST(HandEye, OfABoardOfAnotherSizeIsRefused) {
+  for (const double factor : {0.8, 1.06, 1.25}) {
+    const Poses poses = with_longer_camera_lengths(swung(3, 0.1, kX_SC), factor);
+    const auto result = calibrate_hand_eye(poses.camera, poses.tracker, {});
+    ASSERT_FALSE(result) << factor;
+    EXPECT_THAT(result.error().message, HasSubstr("times as large as was said"));
+    EXPECT_THAT(result.error().message, HasSubstr("--square-mm"));
+  }
+}
+
+TEST(HandEye, OfABoardThatIsALittleSmallerIsAsUncertainAsItIsWrong) {
+  const Poses poses = with_longer_camera_lengths(swung(3, 0.1, kX_SC), 1.02);
+  const auto result = calibrate_hand_eye(poses.camera, poses.tracker, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_NEAR(result->scale.ratio, 1.0 / 1.02, 0.002);
+  const Vector3d error = result->X_SC.R.transpose() * (kX_SC.t - result->X_SC.t);
+  EXPECT_GT(error.norm(), 0.1);
+  const Matrix3d covariance = result->covariance.block<3, 3>(3, 3);
+  EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 16.0) << error.transpose() << "\n" << covariance;
+}
+
+TEST(HandEye, OfARightBoardHasItsScaleWithinItsDeviation) {
+  const Poses poses = swung(3, 0.1, kX_SC);
+  const auto result = calibrate_hand_eye(poses.camera, poses.tracker, {});
+  ASSERT_TRUE(result);
+  EXPECT_LT(std::abs(result->scale.ratio - 1.0), 4.0 * result->scale.deviation);
+  EXPECT_LT(result->scale.deviation, 0.002);
+}
+
 TEST(HandEye, OfPosesAtRestIsFoundWithoutAnOffset) {
   const Poses all = swung(3, 0.0, kX_SC);
   Poses few;
