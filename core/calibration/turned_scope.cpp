@@ -102,6 +102,10 @@ std::optional<LensAtTurn> TurnedScope::lens_at(double rotation_rad, double radiu
   return LensAtTurn{focal, turn_px + grown.cwiseProduct(setup.principal_px - turn_px)};
 }
 
+bool is_same_zoom(double a_px, double b_px) noexcept {
+  return std::max(a_px, b_px) <= std::min(a_px, b_px) * (1.0 + TurnedScope::kSameZoom);
+}
+
 std::vector<FocalAtRadius> focal_table(std::vector<FocalAtRadius> measured) {
   std::sort(measured.begin(), measured.end(),
             [](const FocalAtRadius& a, const FocalAtRadius& b) { return a.radius_px < b.radius_px; });
@@ -130,7 +134,7 @@ Expected<void> check_zooms(const std::vector<SetupAtRotation>& setups) {
   const auto [least, most] =
       std::minmax_element(setups.begin(), setups.end(),
                           [](const SetupAtRotation& a, const SetupAtRotation& b) { return a.radius_px < b.radius_px; });
-  if (most->radius_px <= least->radius_px * (1.0 + TurnedScope::kSameZoom)) return {};
+  if (is_same_zoom(least->radius_px, most->radius_px)) return {};
   return fail("the set-ups are of several zooms (the field stop's radius is " + std::to_string(least->radius_px) +
               " to " + std::to_string(most->radius_px) +
               " px): turn the scope at one zoom, and tell of other zooms by --zoom");

@@ -84,6 +84,9 @@ struct TurnedScope {
   [[nodiscard]] std::optional<LensAtTurn> lens_at(double rotation_rad, double radius_px) const noexcept;
 };
 
+// Whether a field stop of these radii is of one zoom, as far as they tell.
+[[nodiscard]] bool is_same_zoom(double a_px, double b_px) noexcept;
+
 // A table of what was measured at several zooms, for TurnedScope::focals: of one zoom the mean.
 [[nodiscard]] std::vector<FocalAtRadius> focal_table(std::vector<FocalAtRadius> measured);
 

@@ -67,11 +67,15 @@ class BoardGuide final : public LiveGuide {
     if (!camera_ || views_.size() < 50 || views_.back().t_s - judged_s_ < kEvery_s) return;
     judged_s_ = views_.back().t_s;
     const auto result = calibrate_hand_eye(camera_poses_of(views_, *camera_), poses, {});
-    residual_ = result ? fmt::format("AX - XB {:.2f} mm, held aside {:.2f} mm", result->residual_median_mm,
-                                     result->held_aside_rms_mm)
-                       : result.error().message;
-    determined_ = result.has_value();
+    residual_ = result
+                    ? fmt::format("AX - XB {:.2f} mm, held aside {:.2f} mm, a target {:.0f} mm ahead within {:.2f} mm",
+                                  result->residual_median_mm, result->held_aside_rms_mm,
+                                  HandEyeCalibration::kTargetAhead_mm, result->target_deviation_mm())
+                    : result.error().message;
+    determined_ = result && result->target_deviation_mm() <= HandEyeCalibration::kWellKnownTarget_mm;
   }
+
+  [[nodiscard]] Followed followed() const override { return turned_ ? Followed::kTool : Followed::kNone; }
 
   [[nodiscard]] std::string line() const override {
     if (!board_) return "no board is seen: bring all of it into view, sharp and evenly lit";
@@ -79,7 +83,7 @@ class BoardGuide final : public LiveGuide {
     const std::string missing = missing_ninths();
     if (!missing.empty()) {
       text += "; show it " + missing;
-    } else if (turned_ && turned_deg_.minCoeff() < kWanted_deg) {
+    } else if (turned_ && !is_turned()) {
       text += fmt::format("; turned {:.0f} {:.0f} {:.0f} degrees about three axes: tilt and turn the scope further",
                           turned_deg_[0], turned_deg_[1], turned_deg_[2]);
     } else {
@@ -90,12 +94,18 @@ class BoardGuide final : public LiveGuide {
 
   [[nodiscard]] bool enough() const override {
     return views_.size() >= kWantedViews && last_s_ - first_s_.value_or(last_s_) >= least_s_ &&
-           missing_ninths().empty() && (!turned_ || turned_deg_.minCoeff() >= kWanted_deg) && (!camera_ || determined_);
+           missing_ninths().empty() && (!turned_ || is_turned()) && (!camera_ || determined_);
   }
 
  private:
-  static constexpr std::size_t kWantedViews = 100;
-  static constexpr double kWanted_deg = 8.0;  // standard deviation about each axis
+  static constexpr std::size_t kWantedViews = 60;
+
+  // About two axes, which tell the camera's place in the sensor; a hand turns about the third as well.
+  [[nodiscard]] bool is_turned() const {
+    constexpr double kWanted_deg = 8.0;  // standard deviation
+    constexpr double kWantedOfThird_deg = 3.0;
+    return turned_deg_[1] >= kWanted_deg && turned_deg_[2] >= kWantedOfThird_deg;
+  }
 
   [[nodiscard]] std::string missing_ninths() const {
     constexpr int kFewest = 30;  // points

@@ -15,6 +15,9 @@
 
 namespace perimap {
 
+// Of which tools a guide needs the poses: of none, of the one that matters, or of that and a second sensor.
+enum class Followed { kNone, kTool, kBothSensors };
+
 // Of one thread.
 class LiveGuide {
  public:
@@ -29,6 +32,7 @@ class LiveGuide {
   virtual void follow(const std::vector<TimedPose>& poses) = 0;
   // Likewise of a second sensor, where the configuration names one.
   virtual void follow_second(const std::vector<TimedPose>& /*poses*/) {}
+  [[nodiscard]] virtual Followed followed() const { return Followed::kTool; }
   // One line.
   [[nodiscard]] virtual std::string line() const = 0;
   // Whether there is enough of everything.

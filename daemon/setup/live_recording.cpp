@@ -26,16 +26,28 @@
 #include "daemon/runtime/session_recorder.hpp"
 #include "daemon/runtime/session_recording.hpp"
 #include "daemon/setup/recorded_poses.hpp"
+#include "daemon/setup/sight_of_tools.hpp"
 #include "drivers/image/grey_converter.hpp"
 #include "drivers/transport/interrupt.hpp"
 
 namespace perimap {
 namespace {
 
+// In the words for the user, those that the guide follows.
+std::vector<std::string> followed_tools(const LiveGuide& guide, const std::string& tool) {
+  if (guide.followed() == Followed::kNone) return {};
+  std::vector<std::string> named{tool == kScopeTool ? "the sensor" : fmt::format("the tool '{}'", tool)};
+  if (guide.followed() == Followed::kBothSensors) named.emplace_back("the second sensor");
+  return named;
+}
+
 // What the devices' threads leave for the guide: the newest frame, and all poses of the tool that matters and of a
 // second sensor.
 class Shown final : public FrameObserver {
  public:
+  explicit Shown(std::vector<std::string> followed)
+      : followed_(followed.size()), sight_(std::move(followed), MonotonicClock::now()) {}
+
   void frame(const CameraFrame& frame) override {
     const auto grey = converter_.convert(frame);
     if (!grey) return;
@@ -50,8 +62,12 @@ class Shown final : public FrameObserver {
     t_s_ = to_seconds(frame.stamp.capture.time_since_epoch());
     fresh_ = true;
   }
-  void pose(const TrackerSample& sample) { add(sample, poses_); }
-  void second_pose(const TrackerSample& sample) { add(sample, second_poses_); }
+  void pose(const TrackerSample& sample) { add(sample, 0, poses_); }
+  void second_pose(const TrackerSample& sample) { add(sample, 1, second_poses_); }
+  [[nodiscard]] std::string unseen_tools() {
+    const std::scoped_lock lock(mutex_);
+    return sight_.missing(MonotonicClock::now());
+  }
   void tell(LiveGuide& guide) {
     std::vector<std::uint8_t> pixels;
     {
@@ -74,9 +90,10 @@ class Shown final : public FrameObserver {
   }
 
  private:
-  void add(const TrackerSample& sample, std::vector<TimedPose>& poses) {
-    if (sample.state != ToolState::kOk) return;
+  void add(const TrackerSample& sample, std::size_t tool, std::vector<TimedPose>& poses) {
     const std::scoped_lock lock(mutex_);
+    if (tool < followed_) sight_.take(tool, sample);
+    if (sample.state != ToolState::kOk) return;
     poses.push_back({to_seconds(sample.source_time.time_since_epoch()), sample.X_WS});
   }
 
@@ -89,6 +106,8 @@ class Shown final : public FrameObserver {
   std::vector<std::uint8_t> pixels_;
   std::vector<TimedPose> poses_;
   std::vector<TimedPose> second_poses_;
+  std::size_t followed_;
+  SightOfTools sight_;
 };
 
 Expected<std::filesystem::path> recording_file(const LiveSettings& settings) {
@@ -155,7 +174,7 @@ SetupExpected<LiveRecording> record_live(const LiveSettings& settings, const std
   if (!recorder) return tl::unexpected(recorder.error());
   LiveRecording recording(*file, !settings.keep.empty());
 
-  Shown shown;
+  Shown shown(devices.tracker ? followed_tools(guide, tool) : std::vector<std::string>{});
   Interrupt interrupt;
   DeviceHealth camera_health;
   DeviceHealth tracker_health;
@@ -204,7 +223,8 @@ SetupExpected<LiveRecording> record_live(const LiveSettings& settings, const std
       const std::string reason = health->state() == DeviceState::kStreaming ? "" : health->reason();
       if (!reason.empty()) line += "; " + reason;
     }
-    told(elapsed_s, line);
+    const std::string unseen = tracker_health.state() == DeviceState::kStreaming ? shown.unseen_tools() : "";
+    told(elapsed_s, unseen.empty() ? line : unseen + "; " + line);
     if (stopped || guide.enough() || elapsed_s >= settings.longest_s || (*recorder)->summary().stopped) break;
   }
   interrupt.request();

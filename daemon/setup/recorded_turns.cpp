@@ -61,7 +61,7 @@ Expected<void> read_field_stops(const std::string& recording, Recorded& recorded
       return;
     }
     recorded.stops.push_back({fmt::format("frame at {:.3f} s", t_s), t_s, *reading});
-    recorded.turns.push_back({t_s, orientation_of_notch(reading->notch_rad)});
+    recorded.turns.push_back({t_s, orientation_of_notch(reading->notch_rad), reading->radius_px});
   });
   if (!read) return tl::unexpected(read.error());
   if (recorded.turns.empty()) return fail(fmt::format("{}: no field stop is read: {}", recording, why));
@@ -96,18 +96,23 @@ std::vector<BoardView> thinned(const std::vector<TimedView>& views) {
   return few;
 }
 
-Expected<RecordedTurn> measured(const Recorded& recorded, const Matrix3d& R, double from_s, double to_s) {
+Expected<CameraCalibration> measured_lens(const Recorded& recorded, const std::vector<TimedView>& views) {
+  return calibrate_camera(thinned(views), recorded.board.width, recorded.board.height, {});
+}
+
+Expected<RecordedTurn> measured_turn(const Recorded& recorded, const HeldStretch& stretch) {
+  const double from_s = stretch.from_s, to_s = stretch.to_s;
   const std::vector<TimedView> views = between(recorded.board.views, from_s, to_s);
   RecordedTurn turn;
-  turn.views = views.size();
-  const auto lens = calibrate_camera(thinned(views), recorded.board.width, recorded.board.height, {});
+  const auto lens = measured_lens(recorded, views);
   if (!lens) return tl::unexpected(lens.error());
   // The clocks may differ by so much.
   const double apart_s = HandEyeSettings{}.largest_offset_s;
   const std::vector<TimedPose> sensor = between(recorded.sensor, from_s - apart_s, to_s + apart_s);
   const auto hand_eye = calibrate_hand_eye(camera_poses_of(views, lens->camera), sensor, {});
   if (!hand_eye) return tl::unexpected(hand_eye.error());
-  turn.lens_rms_px = lens->rms_px;
+  turn.held.views = views.size();
+  turn.held.lens_rms_px = lens->rms_px;
   turn.hand_eye_rms_mm = hand_eye->held_aside_rms_mm;
   turn.offset_s = hand_eye->offset_s;
   turn.measured.lens = lens->camera;
@@ -126,7 +131,7 @@ Expected<RecordedTurn> measured(const Recorded& recorded, const Matrix3d& R, dou
   std::vector<ReadPicture> stops = between(recorded.stops, from_s, to_s);
   // A notch that was misread is none.
   std::erase_if(stops, [&](const ReadPicture& picture) {
-    return !is_same_turn(R, orientation_of_notch(picture.reading.notch_rad));
+    return !is_same_turn(stretch.R, orientation_of_notch(picture.reading.notch_rad));
   });
   const auto stop = rotation_of(std::move(stops), {});
   if (!stop) return tl::unexpected(stop.error());
@@ -142,6 +147,63 @@ Expected<RecordedTurn> measured(const Recorded& recorded, const Matrix3d& R, dou
   return turn;
 }
 
+Expected<RecordedZoom> measured_zoom(const Recorded& recorded, const HeldStretch& stretch) {
+  const std::vector<TimedView> views = between(recorded.board.views, stretch.from_s, stretch.to_s);
+  const auto lens = measured_lens(recorded, views);
+  if (!lens) return tl::unexpected(lens.error());
+  RecordedZoom zoom;
+  zoom.measured = {stretch.radius_px, {lens->camera.fx, lens->camera.fy}};
+  zoom.focal_deviation_px = {lens->deviations[0], lens->deviations[1]};
+  zoom.held.views = views.size();
+  zoom.held.lens_rms_px = lens->rms_px;
+  return zoom;
+}
+
+// The stretch without its ends: the scope is let go a little before it stands out that it moves.
+HeldStretch well_inside(HeldStretch stretch) {
+  constexpr double kMargin_s = 0.75;
+  stretch.from_s += kMargin_s;
+  stretch.to_s -= kMargin_s;
+  return stretch;
+}
+
+// Stretches one after the other, into the result.
+class MeasuredStretches {
+ public:
+  MeasuredStretches(const Recorded& recorded, double radius_of_turns_px)
+      : recorded_(recorded), first_s_(recorded.turns.front().t_s), radius_of_turns_px_(radius_of_turns_px) {}
+
+  void add(const HeldStretch& whole) {
+    if (whole.to_s - whole.from_s < kLeastHeld_s) return leave_out(whole, "held for less than twelve seconds");
+    const HeldStretch stretch = well_inside(whole);
+    if (is_same_zoom(radius_of_turns_px_, stretch.radius_px)) {
+      keep(whole, stretch, measured_turn(recorded_, stretch), result_.turns);
+    } else {
+      keep(whole, stretch, measured_zoom(recorded_, stretch), result_.zooms);
+    }
+  }
+  [[nodiscard]] RecordedTurns result() && { return std::move(result_); }
+
+ private:
+  template <typename Measured>
+  void keep(const HeldStretch& whole, const HeldStretch& stretch, Expected<Measured> measured,
+            std::vector<Measured>& all) {
+    if (!measured) return leave_out(whole, measured.error().message);
+    measured->held.from_s = stretch.from_s - first_s_;
+    measured->held.to_s = stretch.to_s - first_s_;
+    all.push_back(*std::move(measured));
+  }
+  void leave_out(const HeldStretch& stretch, const std::string& why) {
+    result_.left_out.push_back(
+        fmt::format("{:.1f} to {:.1f} s: {}", stretch.from_s - first_s_, stretch.to_s - first_s_, why));
+  }
+
+  const Recorded& recorded_;
+  double first_s_;
+  double radius_of_turns_px_;
+  RecordedTurns result_;
+};
+
 // Without a sign where there is nothing.
 double tenths_of(double value) { return std::round(10.0 * value) / 10.0 + 0.0; }
 
@@ -156,27 +218,9 @@ Expected<RecordedTurns> turns_in_recording(const std::string& recording, const B
   if (held.stretches().empty()) {
     return fail(recording + ": the scope was held at no turn: hold it at each while the board is looked at");
   }
-  RecordedTurns result;
-  const double first_s = recorded->turns.front().t_s;
-  for (const HeldStretch& stretch : held.stretches()) {
-    // The scope is let go a little before it stands out that it turns.
-    constexpr double kMargin_s = 0.75;
-    constexpr double kShortest_s = 10.0;
-    const double from_s = stretch.from_s + kMargin_s, to_s = stretch.to_s - kMargin_s;
-    const std::string when = fmt::format("{:.1f} to {:.1f} s", stretch.from_s - first_s, stretch.to_s - first_s);
-    if (to_s - from_s < kShortest_s) {
-      result.left_out.push_back(when + ": held for less than ten seconds");
-      continue;
-    }
-    auto turn = measured(*recorded, stretch.R, from_s, to_s);
-    if (!turn) {
-      result.left_out.push_back(when + ": " + turn.error().message);
-      continue;
-    }
-    turn->from_s = from_s - first_s;
-    turn->to_s = to_s - first_s;
-    result.turns.push_back(*std::move(turn));
-  }
+  MeasuredStretches stretches(*recorded, radius_of_turns_px(held.stretches()));
+  for (const HeldStretch& stretch : held.stretches()) stretches.add(stretch);
+  RecordedTurns result = std::move(stretches).result();
   if (result.turns.empty()) {
     return fail(fmt::format("{}: no turn is measured: {}", recording, fmt::join(result.left_out, "; ")));
   }
@@ -189,26 +233,45 @@ std::string text_of(const RecordedTurns& recorded) {
     text += fmt::format(
         "  held           {:.1f} to {:.1f} s{}: {} views, lens {:.2f} px RMS, hand-eye {:.2f} mm RMS held "
         "aside, clocks {:.1f} ms\n",
-        turn.from_s, turn.to_s,
+        turn.held.from_s, turn.held.to_s,
         turn.measured.relation
             ? ""
             : fmt::format(", notch at {:.1f} degrees", tenths_of(turn.measured.setup.rotation_rad / kDegree)),
-        turn.views, turn.lens_rms_px, turn.hand_eye_rms_mm, 1e3 * turn.offset_s);
+        turn.held.views, turn.held.lens_rms_px, turn.hand_eye_rms_mm, 1e3 * turn.offset_s);
+  }
+  for (const RecordedZoom& zoom : recorded.zooms) {
+    text += fmt::format(
+        "  zoomed         {:.1f} to {:.1f} s, field stop of {:.1f} px: {} views, lens {:.2f} px RMS, focal length "
+        "{:.2f} {:.2f} px, deviation {:.2f} {:.2f}\n",
+        zoom.held.from_s, zoom.held.to_s, zoom.measured.radius_px, zoom.held.views, zoom.held.lens_rms_px,
+        zoom.measured.focal_px.x(), zoom.measured.focal_px.y(), zoom.focal_deviation_px.x(),
+        zoom.focal_deviation_px.y());
   }
   for (const std::string& why : recorded.left_out) text += "  not measured   " + why + "\n";
   return text;
 }
 
 nlohmann::json json_of(const RecordedTurns& recorded) {
-  nlohmann::json json = {{"turns", nlohmann::json::array()}, {"turns_not_measured", recorded.left_out}};
+  nlohmann::json json = {{"turns", nlohmann::json::array()},
+                         {"zooms", nlohmann::json::array()},
+                         {"turns_not_measured", recorded.left_out}};
+  const auto of_held = [](const HeldViews& held) {
+    return nlohmann::json{
+        {"from_s", held.from_s}, {"to_s", held.to_s}, {"views", held.views}, {"lens_rms_px", held.lens_rms_px}};
+  };
   for (const RecordedTurn& turn : recorded.turns) {
-    json["turns"].push_back({{"from_s", turn.from_s},
-                             {"to_s", turn.to_s},
-                             {"views", turn.views},
-                             {"lens_rms_px", turn.lens_rms_px},
-                             {"hand_eye_held_aside_mm", turn.hand_eye_rms_mm},
-                             {"time_offset_ms", 1e3 * turn.offset_s}});
-    if (!turn.measured.relation) json["turns"].back()["rotation_deg"] = turn.measured.setup.rotation_rad / kDegree;
+    nlohmann::json told = of_held(turn.held);
+    told["hand_eye_held_aside_mm"] = turn.hand_eye_rms_mm;
+    told["time_offset_ms"] = 1e3 * turn.offset_s;
+    if (!turn.measured.relation) told["rotation_deg"] = turn.measured.setup.rotation_rad / kDegree;
+    json["turns"].push_back(std::move(told));
+  }
+  for (const RecordedZoom& zoom : recorded.zooms) {
+    nlohmann::json told = of_held(zoom.held);
+    told["radius_px"] = zoom.measured.radius_px;
+    told["focal_px"] = {zoom.measured.focal_px.x(), zoom.measured.focal_px.y()};
+    told["focal_px_deviation"] = {zoom.focal_deviation_px.x(), zoom.focal_deviation_px.y()};
+    json["zooms"].push_back(std::move(told));
   }
   return json;
 }

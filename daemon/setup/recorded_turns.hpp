@@ -1,5 +1,5 @@
-// What one recording of an angled scope tells, that is swung about a board and turned in its camera head in between:
-// lens and hand-eye at each turn at which it was held.
+// What one recording of an angled scope tells, that is swung about a board, and turned in its camera head and zoomed in
+// between: lens and hand-eye at each turn at which it was held, and the lens at other zooms.
 #pragma once
 
 #include <cstddef>
@@ -27,23 +27,36 @@ struct MeasuredTurn {
   std::optional<HeldRelation> relation;    // the second sensor does
 };
 
-struct RecordedTurn {
-  MeasuredTurn measured;
+// While the scope was held.
+struct HeldViews {
   double from_s = 0.0;  // since the recording's first frame
   double to_s = 0.0;
   std::size_t views = 0;  // of the board
   double lens_rms_px = 0.0;
+};
+
+struct RecordedTurn {
+  MeasuredTurn measured;
+  HeldViews held;
   double hand_eye_rms_mm = 0.0;  // held aside
   double offset_s = 0.0;         // of the clocks
 };
 
+// At another zoom or focus than that of the turns.
+struct RecordedZoom {
+  FocalAtRadius measured;
+  Vector2d focal_deviation_px = Vector2d::Zero();
+  HeldViews held;
+};
+
 struct RecordedTurns {
   std::vector<RecordedTurn> turns;
+  std::vector<RecordedZoom> zooms;
   std::vector<std::string> left_out;  // stretches that tell nothing, each with why
 };
 
-// `board` needs the size of its squares. Fails when the recording has no frames or no poses, or the scope was held at
-// no turn for ten seconds.
+// `board` needs the size of its squares. The zoom of the turns is the first one at which the scope was held for
+// twelve seconds. Fails when the recording has no frames or no poses, or the scope was held at no turn for as long.
 [[nodiscard]] Expected<RecordedTurns> turns_in_recording(
     const std::string& recording, const BoardWish& board, bool by_second_sensor,
     const std::function<void(std::uint64_t done, std::uint64_t all)>& progress);

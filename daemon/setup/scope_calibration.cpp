@@ -97,8 +97,10 @@ Expected<std::vector<MeasuredTurn>> measured_turns(const ScopeCalibrationSource&
   return turns;
 }
 
-// The set-up as a function of the rotation, from those at which it was calibrated, and of the zoom.
-Expected<TurnedScope> turned_scope(const ScopeCalibrationSource& source, const std::vector<MeasuredTurn>& turns) {
+// The set-up as a function of the rotation, from those at which it was calibrated, and of the zoom. `zooms`: of the
+// recording.
+Expected<TurnedScope> turned_scope(const ScopeCalibrationSource& source, const std::vector<MeasuredTurn>& turns,
+                                   const std::vector<RecordedZoom>& zooms) {
   std::vector<SetupAtRotation> setups;
   std::vector<HeldRelation> held;
   Vector2d turn_px = Vector2d::Zero();
@@ -119,7 +121,8 @@ Expected<TurnedScope> turned_scope(const ScopeCalibrationSource& source, const s
     if (const auto same = same_size(seen->lens, files.camera, first); !same) return tl::unexpected(same.error());
     scope->focals.push_back({seen->stop.radius_px, {seen->lens.fx, seen->lens.fy}});
   }
-  if (!source.zooms.empty()) scope->focals = focal_table(std::move(scope->focals));
+  for (const RecordedZoom& zoom : zooms) scope->focals.push_back(zoom.measured);
+  scope->focals = focal_table(std::move(scope->focals));
   return scope;
 }
 
@@ -203,7 +206,7 @@ SetupExpected<ScopeCalibration> calibrate_scope(
       if (!measured) return tl::unexpected(measured.error());
       turns = *std::move(measured);
     }
-    auto scope = turned_scope(source, turns);
+    auto scope = turned_scope(source, turns, result.turns ? result.turns->zooms : std::vector<RecordedZoom>{});
     if (!scope) {
       const std::string told = result.turns ? source.recording + ": " : "";
       const auto& left_out = result.turns ? result.turns->left_out : std::vector<std::string>{};

@@ -124,7 +124,7 @@ std::vector<TimedPose> until(const std::vector<TimedPose>& poses, double t_s) {
 // 40 s of it; of errors that last as much more, of `longest_s` at most, as the guide of a live calibration asks for.
 Expected<HandEyeCalibration> guided(const std::vector<TimedPose>& seen, const std::vector<TimedPose>& tracked,
                                     double offset_s, double longest_s, double& duration_s) {
-  constexpr double kEvery_s = 10.0;
+  constexpr double kEvery_s = 40.0;
   for (duration_s = 40.0;; duration_s += kEvery_s) {
     auto result = calibrate_hand_eye(until(seen, duration_s), until(tracked, duration_s + 1.0 - offset_s), {});
     const bool enough = result && result->target_deviation_mm() <= HandEyeCalibration::kWellKnownTarget_mm;
@@ -426,7 +426,7 @@ int main(int argc, char** argv) {
   CLI::App app("Set-ups drawn at random, measured: errors and whether the deviations are right");
   int trials = 50;
   std::uint64_t seed = 1;
-  std::size_t views = 40;
+  std::size_t views = 60;
   std::vector<std::string> chosen;
   app.add_option("WHAT", chosen, "hand-eye, slow, camera, tool, tracker, scope; all but slow when none is named");
   app.add_option("--trials", trials)->capture_default_str();

@@ -123,7 +123,8 @@ Outcome run(CameraOptions& options, const Console& console) {
   const auto wish = wish_of(options.board);
   if (!wish) return refuse(wish.error());
   const std::string from = made_from(options);
-  constexpr double kLeast_s = 20.0;
+  // Sixty views, of two a second.
+  constexpr double kLeast_s = 30.0;
   const auto guide = board_guide(*wish, std::nullopt, kLeast_s);
   return with_recording(options.live, kScopeTool, *guide, console, options.recording,
                         [&] { return finish(measure(options, console), options.common, from); });

@@ -29,6 +29,7 @@ struct CalibrateScopeOptions {
   BoardOptions board;
   LiveOptions live;
   unsigned turns = 3;  // live
+  unsigned zooms = 0;  // likewise, others than that of the turns
 
   [[nodiscard]] bool is_live() const { return !live.configuration.empty(); }
   [[nodiscard]] bool by_one_recording() const {
@@ -85,6 +86,9 @@ Outcome check_options(const CalibrateScopeOptions& options) {
   if (source.by_second_sensor && options.is_live() && options.turns < 3) {
     return wrong("--turns: expected three and more with --by-second-sensor");
   }
+  if (options.zooms > 0 && (!options.is_live() || !options.by_one_recording() || source.by_second_sensor)) {
+    return wrong("--zooms: expected --live and --square-mm beside it, and no --by-second-sensor, which tells no zoom");
+  }
   if (!source.zooms.empty() && !options.makes_function()) {
     return wrong("--zoom: expected --at too, the set-ups at several turns, or --square-mm");
   }
@@ -113,10 +117,10 @@ Outcome run(CalibrateScopeOptions& options, const Console& console) {
   const std::string made_from = options.is_live() ? options.live.configuration : joined(options.inputs());
   if (auto able = check_outputs(options.common, options.inputs()); !able) return able;
   options.source.configuration = options.common.configuration;
-  const auto guide =
-      options.by_one_recording()
-          ? scope_guide({*board, options.turns, ScopeGuideSettings{}.least_s, options.source.by_second_sensor})
-          : notch_guide();
+  const auto guide = options.by_one_recording()
+                         ? scope_guide({*board, options.turns, options.zooms, ScopeGuideSettings{}.least_s,
+                                        options.source.by_second_sensor})
+                         : notch_guide();
   return with_recording(options.live, kScopeTool, *guide, console, options.source.recording,
                         [&] { return finish(measure(options, console), options.common, made_from); });
 }
@@ -134,6 +138,9 @@ void add_calibrate_scope(Commands& commands, Command& calibrate) {
       "With --square-mm, --from takes one recording of a scope that is swung about a board, turned in its camera head "
       "by "
       "60 degrees and more, held there while it is swung again, and so on; --live makes it and says what is missing. "
+      "The turns are of one zoom, the first; while the scope is held at another one the lens alone is measured, for "
+      "the "
+      "table of focal lengths by the field stop's radius. "
       "What --output then writes, or of --at, goes into a configuration as camera.turned_scope: perimapd, replay and "
       "verify then "
       "read turn and zoom from the field stop in the pictures, or the turn from tracker.second_sensor, and take "
@@ -146,6 +153,12 @@ void add_calibrate_scope(Commands& commands, Command& calibrate) {
   add_live(command, options->live);
   command.add_option("--turns", options->turns, "With --live and --square-mm: at so many turns")
       ->check(Range(2U, 12U))
+      ->capture_default_str();
+  command
+      .add_option("--zooms", options->zooms,
+                  "With --live and --square-mm: and at so many zooms or foci other than that of the turns, as at both "
+                  "ends and between")
+      ->check(Range(0U, 12U))
       ->capture_default_str();
   add_board(command, options->board);
   command

@@ -42,7 +42,7 @@ struct SimulateOptions {
   std::optional<double> notch_deg;
   double zoom = 1.0;
   std::vector<double> turn_to_deg, turn_at_s;
-  std::optional<double> zoom_to;
+  std::vector<double> zoom_to, zoom_at_s;
   bool scope_uncalibrated = false;
   bool second_sensor = false;
   std::filesystem::path truth;
@@ -66,6 +66,31 @@ Outcome check_new(const std::filesystem::path& path, const SimulateOptions& opti
   return refuse(path.string() + ": the file exists; --force overwrites it", ExitCode::kWrongUsage);
 }
 
+// How a scope that is swung about a board is turned and zoomed meanwhile, in the order of the times.
+std::vector<BenchSettings::Turn> bench_turns(const SimulateOptions& options) {
+  struct Change {
+    double at_s;
+    std::optional<double> turn_to_deg;
+    std::optional<double> zoom_to;
+  };
+  std::vector<Change> changes;
+  for (std::size_t i = 0; i < options.turn_to_deg.size(); ++i) {
+    changes.push_back({options.turn_at_s.at(i), options.turn_to_deg[i], std::nullopt});
+  }
+  for (std::size_t i = 0; i < options.zoom_to.size(); ++i) {
+    changes.push_back({options.zoom_at_s.at(i), std::nullopt, options.zoom_to[i]});
+  }
+  std::stable_sort(changes.begin(), changes.end(), [](const Change& a, const Change& b) { return a.at_s < b.at_s; });
+  std::vector<BenchSettings::Turn> turns;
+  ScopeHeld held{options.notch_deg.value_or(0.0) * kDegree, options.zoom};
+  for (const Change& change : changes) {
+    if (change.turn_to_deg) held.notch_rad = *change.turn_to_deg * kDegree;
+    held.zoom = change.zoom_to.value_or(held.zoom);
+    turns.push_back({from_seconds(change.at_s), held});
+  }
+  return turns;
+}
+
 Outcome simulate_bench(const SimulateOptions& options, const Console& console) {
   const auto begin = std::chrono::steady_clock::now();
   auto settings = options.simulation.bench(*options.act);
@@ -76,9 +101,7 @@ Outcome simulate_bench(const SimulateOptions& options, const Console& console) {
   if (options.notch_deg) settings->notch_rad = *options.notch_deg * kDegree;
   settings->zoom = options.zoom;
   settings->second_sensor = options.second_sensor;
-  for (std::size_t i = 0; i < options.turn_to_deg.size(); ++i) {
-    settings->turns.push_back({from_seconds(options.turn_at_s.at(i)), options.turn_to_deg[i] * kDegree});
-  }
+  settings->turns = bench_turns(options);
   const auto scene = BenchScene::create(*settings);
   if (!scene) return refuse(scene.error(), ExitCode::kWrongUsage);
   if (const auto apart = check_apart({{"OUT", options.out.string()},
@@ -124,17 +147,22 @@ std::vector<SimulatedRecording> planned(const SimulateOptions& options) {
 }
 
 Outcome check_turns(const SimulateOptions& options) {
-  const std::size_t turns = options.turn_to_deg.size();
-  if ((turns > 0 || options.zoom_to) && !options.notch_deg) {
-    return refuse("--turn-to, --zoom-to: expected --field-stop, where the notch is before", ExitCode::kWrongUsage);
+  const std::size_t turns = options.turn_to_deg.size(), zooms = options.zoom_to.size();
+  const auto wrong = [](const char* what) { return refuse(what, ExitCode::kWrongUsage); };
+  if (turns + zooms > 0 && !options.notch_deg) {
+    return wrong("--turn-to, --zoom-to: expected --field-stop, where the notch is before");
   }
-  if (options.zoom_to && options.act) return refuse("--zoom-to: expected --scene heart", ExitCode::kWrongUsage);
-  if (options.act && options.act != BenchAct::kBoard && turns > 0) {
-    return refuse("--turn-to: expected --scene heart or board", ExitCode::kWrongUsage);
+  if (options.act && options.act != BenchAct::kBoard && turns + zooms > 0) {
+    return wrong("--turn-to, --zoom-to: expected --scene heart or board");
   }
-  if (!options.act && turns > 1) return refuse("--turn-to: a heart is turned once", ExitCode::kWrongUsage);
-  const bool as_many = options.act ? options.turn_at_s.size() == turns : options.turn_at_s.size() <= 1;
-  if (!as_many) return refuse("--turn-at: expected one of each --turn-to, when it begins", ExitCode::kWrongUsage);
+  if (!options.act && (turns > 1 || zooms > 1)) {
+    return wrong("--turn-to, --zoom-to: before a heart the scope is turned and zoomed once");
+  }
+  const bool turned_as_often = options.act ? options.turn_at_s.size() == turns : options.turn_at_s.size() <= 1;
+  if (!turned_as_often) return wrong("--turn-at: expected one of each --turn-to, when it begins");
+  if (options.zoom_at_s.size() != (options.act ? zooms : 0)) {
+    return wrong("--zoom-at: expected --scene board, and one of each --zoom-to, when it begins");
+  }
   return {};
 }
 
@@ -150,7 +178,7 @@ Outcome simulate(const SimulateOptions& options, const Console& console) {
   if (options.second_sensor && !options.notch_deg) {
     return refuse("--second-sensor: expected --field-stop, how the scope is turned", ExitCode::kWrongUsage);
   }
-  if (options.second_sensor && options.zoom_to) {
+  if (options.second_sensor && !options.zoom_to.empty()) {
     return refuse("--second-sensor: expected no --zoom-to, of which it does not tell", ExitCode::kWrongUsage);
   }
   if (options.act && options.simulation.has_procedure()) {
@@ -169,10 +197,10 @@ Outcome simulate(const SimulateOptions& options, const Console& console) {
   if (options.notch_deg) settings->held = ScopeHeld{*options.notch_deg * kDegree, options.zoom};
   settings->scope_calibrated = !options.scope_uncalibrated;
   settings->second_sensor = options.second_sensor;
-  if (!options.turn_to_deg.empty() || options.zoom_to) {
+  if (!options.turn_to_deg.empty() || !options.zoom_to.empty()) {
     constexpr double kUsualTurn_s = 10.0;
     const double to_deg = options.turn_to_deg.empty() ? *options.notch_deg : options.turn_to_deg.front();
-    const ScopeHeld to{to_deg * kDegree, options.zoom_to.value_or(options.zoom)};
+    const ScopeHeld to{to_deg * kDegree, options.zoom_to.empty() ? options.zoom : options.zoom_to.front()};
     const double at_s = options.turn_at_s.empty() ? kUsualTurn_s : options.turn_at_s.front();
     settings->turn = SimulationSettings::Turn{from_seconds(at_s), to};
   }
@@ -272,11 +300,17 @@ void add_simulate_command(Commands& commands) {
   command.add_flag("--scope-uncalibrated", options->scope_uncalibrated,
                    "Of a heart with --field-stop: the recording has hand-eye and lens of its start alone, and not what "
                    "follows when the scope is turned");
-  command.add_option("--zoom-to", options->zoom_to, "Of a heart: the scope is zoomed to that during the session")
+  command
+      .add_option("--zoom-to", options->zoom_to,
+                  "The scope is zoomed to that meanwhile; of a board also several times, each within two seconds")
+      ->one_at_a_time()
       ->check(Range(0.5, 2.0));
+  command.add_option("--zoom-at", options->zoom_at_s, "Of a board: when each of --zoom-to begins, s")
+      ->one_at_a_time()
+      ->check(Range(0.0, 1700.0));
   command
       .add_option("--turn-at", options->turn_at_s,
-                  "With --turn-to and --zoom-to: when each begins, s; of a heart it takes one [10]")
+                  "When each of --turn-to begins, s; of a heart, which is turned and zoomed at once, it takes one [10]")
       ->one_at_a_time()
       ->check(Range(0.0, 1700.0));
   command.add_option("--truth", options->truth, "Of such a scene: write to this file what is to be found (JSON)");

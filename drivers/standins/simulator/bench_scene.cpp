@@ -62,8 +62,8 @@ Expected<void> check_bench(const BenchSettings& s) {
 
 double smooth(double s) { return s * s * (3.0 - 2.0 * s); }
 
-FieldStop field_stop_of(const BenchSettings& s, double notch_rad) {
-  return drawn_field_stop(s.setup_seed, s.width, s.height, {notch_rad, s.zoom});
+FieldStop field_stop_of(const BenchSettings& s, const ScopeHeld& held) {
+  return drawn_field_stop(s.setup_seed, s.width, s.height, held);
 }
 
 BenchStream error_stream(BenchScene::Tool tool) {
@@ -115,12 +115,13 @@ Expected<BenchScene> BenchScene::create(const BenchSettings& settings) {
 }
 
 BenchScene::Turned BenchScene::turned_at(Duration since) const noexcept {
-  Turned turned{settings_.notch_rad.value_or(0.0), 0U};
+  Turned turned{{settings_.notch_rad.value_or(0.0), settings_.zoom}, 0U};
   for (std::size_t i = 0; i < settings_.turns.size(); ++i) {
     const BenchSettings::Turn& turn = settings_.turns[i];
     if (since <= turn.at) break;
     const double s = std::min(1.0, to_seconds(since - turn.at) / kTurnTakes_s);
-    turned.notch_rad += smooth(s) * (turn.notch_rad - turned.notch_rad);
+    turned.held.notch_rad += smooth(s) * (turn.to.notch_rad - turned.held.notch_rad);
+    turned.held.zoom += smooth(s) * (turn.to.zoom - turned.held.zoom);
     turned.times = s < 1.0 ? std::nullopt : std::optional(i + 1);
   }
   return turned;
@@ -128,13 +129,13 @@ BenchScene::Turned BenchScene::turned_at(Duration since) const noexcept {
 
 ScopeSetup BenchScene::setup_at(Duration since) const noexcept {
   if (!settings_.notch_rad) return unturned_;
-  const double notch_rad = turned_at(since).notch_rad;
-  return turned_setup(unturned_, {notch_rad, settings_.zoom}, field_stop_of(settings_, notch_rad).centre_px);
+  const ScopeHeld held = turned_at(since).held;
+  return turned_setup(unturned_, held, field_stop_of(settings_, held).centre_px);
 }
 
 std::shared_ptr<const BoardRenderer> BenchScene::renderer_at(Duration since) const {
   const bool stop_is_seen = settings_.notch_rad && !settings_.second_sensor;
-  const FieldStop stop = stop_is_seen ? field_stop_of(settings_, turned_at(since).notch_rad) : FieldStop{};
+  const FieldStop stop = stop_is_seen ? field_stop_of(settings_, turned_at(since).held) : FieldStop{};
   return std::make_shared<const BoardRenderer>(setup_at(since).lens, settings_.board, stop);
 }
 

@@ -44,11 +44,11 @@ struct BenchSettings {
   // scope is turned then (turned_setup()). None: all of the picture is seen, and the scope is as at 0.
   std::optional<double> notch_rad;
   double zoom = 1.0;  // of the picture and the field stop, likewise
-  // In the order of their times: from then on the scope is turned in its camera head, within two seconds, until its
-  // notch is there, and held so.
+  // In the order of their times: from then on the scope is turned in its camera head and zoomed, within two seconds,
+  // until it is as said, and held so.
   struct Turn {
     Duration at{0};
-    double notch_rad = 0.0;
+    ScopeHeld to;
   };
   std::vector<Turn> turns;
   // A second tracked sensor, on the scope, tells how that is turned: the field stop lies outside the picture then.
@@ -92,9 +92,9 @@ class BenchScene {
  private:
   explicit BenchScene(const BenchSettings& settings);
 
-  // Where the notch is, and how often the scope was turned until then; none while it is being turned.
+  // How the scope is held, and how often it was turned or zoomed until then; none while it is being turned.
   struct Turned {
-    double notch_rad = 0.0;
+    ScopeHeld held;
     std::optional<std::size_t> times;
   };
   [[nodiscard]] Turned turned_at(Duration since) const noexcept;

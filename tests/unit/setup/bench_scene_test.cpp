@@ -114,6 +114,26 @@ TEST(BenchScene, TurnedScopeHasItsNotchAndItsPrincipalPointInThePictures) {
   EXPECT_GT(std::hypot(setups[0].lens.cx - setups[1].lens.cx, setups[0].lens.cy - setups[1].lens.cy), 1.0);
 }
 
+TEST(BenchScene, ZoomedScopeHasALargerFieldStopAndALongerFocalLength) {
+  const auto board = charuco_pattern(12, 9, 8.0, 6.0, 1);
+  ASSERT_TRUE(board);
+  BenchSettings settings = settings_with(*board);
+  settings.notch_rad = 0.0;
+  settings.duration = std::chrono::seconds(5);
+  settings.turns = {{std::chrono::seconds(1), {0.0, 1.1}}};
+  const auto scene = BenchScene::create(settings);
+  ASSERT_TRUE(scene) << scene.error().message;
+  const auto radius_px = [&](std::size_t frame) {
+    std::vector<std::uint8_t> pixels(std::size_t{640} * 480);
+    scene->render(frame, pixels);
+    const auto read = read_field_stop({pixels.data(), 640, 480, 640});
+    EXPECT_TRUE(read) << read.error().message;
+    return read ? read->radius_px : 0.0;
+  };
+  EXPECT_NEAR(radius_px(scene->frames().size() - 1) / radius_px(0), 1.1, 0.005);
+  EXPECT_NEAR(scene->setup_at(std::chrono::seconds(4)).lens.fx / scene->setup().lens.fx, 1.1, 1e-9);
+}
+
 TEST(BenchScene, PointerRestsOnTheBoardsOrigin) {
   const auto board = chessboard_pattern(9, 6, 8.0);
   const auto scene = BenchScene::create(settings_with(*board));

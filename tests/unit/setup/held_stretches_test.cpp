@@ -12,6 +12,14 @@ class Readings : public testing::Test {
  protected:
   // Four a second.
   void hold(double notch_deg, double for_s) { turn(notch_deg, notch_deg, for_s); }
+  void zoom(double from_px, double to_px, double within_s) {
+    const int count = static_cast<int>(4.0 * within_s);
+    for (int i = 0; i < count; ++i) {
+      const double radius_px = from_px + (i + 1.0) / count * (to_px - from_px) + (i % 2 == 0 ? 0.3 : -0.3);
+      stretches_.add({t_s_, orientation_of_notch(0.2), radius_px});
+      t_s_ += 0.25;
+    }
+  }
   void turn(double from_deg, double to_deg, double within_s) {
     const int count = static_cast<int>(4.0 * within_s);
     for (int i = 0; i < count; ++i) {
@@ -61,6 +69,27 @@ TEST_F(Readings, TurnedAwayAndBackItIsHeldTwice) {
   ASSERT_EQ(stretches_.stretches().size(), 2U);
   EXPECT_NEAR(stretches_.stretches()[0].to_s, 115.0, 0.6);
   EXPECT_NEAR(stretches_.stretches()[1].from_s, 121.0, 0.6);
+}
+
+TEST_F(Readings, AnotherZoomAtTheSameTurnIsAStretchOfItsOwn) {
+  zoom(200.0, 200.0, 15.0);
+  zoom(200.0, 230.0, 2.0);
+  EXPECT_FALSE(stretches_.is_held());
+  zoom(230.0, 230.0, 15.0);
+  ASSERT_EQ(stretches_.stretches().size(), 2U);
+  EXPECT_NEAR(stretches_.stretches()[0].radius_px, 200.0, 0.2);
+  EXPECT_NEAR(stretches_.stretches()[1].radius_px, 230.0, 0.2);
+}
+
+TEST_F(Readings, TheZoomOfTheTurnsIsTheFirstThatIsHeldLongEnough) {
+  EXPECT_EQ(radius_of_turns_px(stretches_.stretches()), 0.0);
+  zoom(230.0, 230.0, 3.0);
+  EXPECT_NEAR(radius_of_turns_px(stretches_.stretches()), 230.0, 0.3) << "the last one, while none is long enough";
+  zoom(230.0, 200.0, 2.0);
+  zoom(200.0, 200.0, 15.0);
+  zoom(200.0, 230.0, 2.0);
+  zoom(230.0, 230.0, 20.0);
+  EXPECT_NEAR(radius_of_turns_px(stretches_.stretches()), 200.0, 0.3);
 }
 
 TEST_F(Readings, WhileTheScopeIsTurnedItIsNotHeld) {
