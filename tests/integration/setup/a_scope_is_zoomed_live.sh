@@ -56,7 +56,7 @@ quiet simulate board.mcap --scene board "${common[@]}" --seed "$((seed + 1))" --
 quiet setup --output session.toml --camera none --tracker none --ecg none --seconds 0
 quiet calibrate camera --from board.mcap --square-mm 8 --output camera.yaml --configuration session.toml
 quiet calibrate hand-eye --from board.mcap --square-mm 8 --configuration session.toml
-sed -i 's/^# *position_deviation_mm = .*/position_deviation_mm = 0.5/; s/^# *rotation_deviation_deg = .*/rotation_deviation_deg = 0.2/' session.toml
+sed -i 's/^# *position_deviation_mm = .*/position_deviation_mm = 0.5/; s/^# *rotation_deviation_deg = .*/rotation_deviation_deg = 0.5/' session.toml
 sed -i 's/^\[camera\]/[camera]\nturned_scope = "scope.json"/' session.toml
 quiet check session.toml
 quiet simulate heart.mcap "${common[@]}" --seed "$seed" --duration 32 --fps 15 --tracker-noise 0.5 --turn-to 40 \
