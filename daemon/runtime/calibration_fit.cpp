@@ -35,9 +35,10 @@ struct NamedSizes {
   std::optional<TurnedScope> scope;
 };
 
+// A scope beside a camera's calibration is held against that one (wrong_scope), which is held against these.
 WrongKeys scope_of_size(int width, int height, const NamedSizes& named, const std::string& played) {
   const auto& scope = named.scope;
-  if (!scope || (width == scope->width && height == scope->height)) return {};
+  if (!scope || named.camera || (width == scope->width && height == scope->height)) return {};
   return {wrong("camera.turned_scope", fmt::format("one of pictures of {}x{}, as {} has", width, height, played),
                 fmt::format("one of {}x{}", scope->width, scope->height),
                 "measure that scope with `perimap calibrate scope`, or play what it was measured of")};

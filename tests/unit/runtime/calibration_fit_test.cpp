@@ -226,6 +226,10 @@ TEST_F(CalibrationFit, ACalibrationForFramesOfAnotherSizeIsRefused) {
   const auto turned = frames_fit(configuration_, folder_ / "devices.toml");
   ASSERT_FALSE(turned);
   EXPECT_THAT(turned.error().message, HasSubstr("key 'camera.turned_scope': expected one of pictures of 64x48"));
+  ASSERT_TRUE(write_calibration(folder_ / "camera.yaml", lens()));
+  configuration_.camera.calibration = folder_ / "camera.yaml";
+  EXPECT_TRUE(frames_fit(configuration_, folder_ / "devices.toml")) << "it is told beside the calibration, once";
+  EXPECT_THAT(calibrations_fit(configuration_).error().message, HasSubstr("expected one of pictures of 64x48"));
 }
 
 TEST_F(CalibrationFit, WhatIsOlderThanItMayBeIsWarnedOf) {
