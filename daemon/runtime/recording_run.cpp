@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -11,13 +12,28 @@
 #include "daemon/runtime/configured_scope.hpp"
 #include "daemon/runtime/replay_setup.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/recording/channels.hpp"
+#include "drivers/recording/recording_reader.hpp"
 
 namespace perimap {
+namespace {
+
+// One in which a board is seen by a lens that is yet to be measured has no calibration.
+bool is_without_calibration(const std::string& recording) {
+  const auto reader = RecordingReader::open(recording, ReadMode::kStrict);
+  if (!reader) return false;  // which is said where it is read
+  const auto names = reader->attachment_names();
+  return std::find(names.begin(), names.end(), attachments::kCalibration) == names.end();
+}
+
+}  // namespace
 
 SetupExpected<RecordingBasis> recording_basis(const std::string& configuration_file) {
   auto given = load_configuration(configuration_file);
   if (!given) return wrong_setup(std::move(given.error()));
-  if (given->camera.playback) {
+  const auto& played = given->camera.playback;
+  // What is played without a lens is recorded as a camera's frames are of which none is named.
+  if (played && (given->camera.calibration || !is_without_calibration(played->string()))) {
     auto recorded = recorded_basis(given->camera.playback->string(), configuration_file, ReadMode::kStrict);
     if (!recorded) return tl::unexpected(std::move(recorded.error()));
     return RecordingBasis{std::move(recorded->configuration), recorded->camera, recorded->turned_scope};

@@ -32,6 +32,12 @@ nothing_left() { [ -z "$(ls temporary)" ] || fail "$1 left something behind: $(l
 "$perimap" simulate board.mcap --scene board --setup-seed "$seed" --seed "$seed" --size 640x480 --duration 45 --fps 15 \
   --truth truth.json > out 2>&1 || fail "no recording: $(cat out)"
 
+# ---- recorded while nobody knows the lens
+play
+"$perimap" record -c devices.toml unmeasured.mcap --seconds 12 > out 2>&1 || fail "record without a lens: $(cat out)"
+"$perimap" calibrate tool --from unmeasured.mcap --json > out 2> told || grep -q 'turned about' told ||
+  fail "the recording has no pointer: $(cat told)"
+
 # ---- the lens: which part of the picture has not seen the board
 play
 live calibrate camera --live devices.toml --square-mm 8 --output camera.yaml --configuration devices.toml \
