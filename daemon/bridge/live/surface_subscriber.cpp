@@ -14,16 +14,9 @@ namespace {
 using client::Hearing;
 
 constexpr Duration kAfterAnError = std::chrono::milliseconds(100);
-// No surface of this host's is so late or early.
-constexpr Duration kOtherClock = std::chrono::seconds(5);
 // Sources are remembered by name, for a minute: whoever publishes under ever new names keeps others out for no longer.
 constexpr std::size_t kMostSources = 64;
 constexpr Duration kForgotten = std::chrono::minutes(1);
-
-bool of_another_clock(std::int64_t release_ns, Instant receipt) {
-  const std::int64_t late_ns = wrapped_difference(to_ns(receipt), release_ns);
-  return late_ns > Duration(kOtherClock).count() || late_ns < -Duration(kOtherClock).count();
-}
 
 }  // namespace
 
@@ -129,7 +122,6 @@ void SurfaceSubscriber::hear(const perimap_Surface& surface, dds_instance_handle
   if (hearing != Hearing::kUse) {
     calls_.surface(show_nothing(surface, client::describe(hearing), ""));
   } else if (of_another_clock(surface.release_time_ns, receipt)) {
-    // CLOCK_MONOTONIC of another host begins elsewhere: what is too old cannot be told from what is not.
     calls_.surface(show_nothing(surface, "perimapd runs on another host, whose clock is not this one's",
                                 "run the bridge on perimapd's host, and let others connect to it there"));
   } else {

@@ -7,7 +7,9 @@
 #include <set>
 #include <utility>
 
+#include "daemon/subscribing/any_time.hpp"
 #include "daemon/view/messages/messages.hpp"
+#include "daemon/view/messages/milliseconds.hpp"
 #include "drivers/recording/owned_copy.hpp"
 
 namespace perimap {
@@ -22,10 +24,17 @@ constexpr Duration kPublishes = std::chrono::seconds(2);  // who was heard so la
 constexpr Duration kForgotten = std::chrono::minutes(1);
 constexpr Duration kStatusIsNew = std::chrono::seconds(2);
 constexpr Duration kAfterAnError = std::chrono::milliseconds(100);
-// No surface of this host's is so late or early.
-constexpr Duration kOtherClock = std::chrono::seconds(5);
 
-double ms(Duration duration) { return std::chrono::duration<double, std::milli>(duration).count(); }
+// Of those that have come together, the next one of the same writer; null: sample i was its last.
+template <class T>
+const T* next_of_writer(const dds::Loan<T>& loan, std::size_t i) {
+  for (std::size_t k = i + 1; k < loan.size(); ++k) {
+    if (loan.sample(k) != nullptr && loan.info(k).publication_handle == loan.info(i).publication_handle) {
+      return loan.sample(k);
+    }
+  }
+  return nullptr;
+}
 
 }  // namespace
 
@@ -64,8 +73,7 @@ void LiveView::hear(dds::Reader<T>& reader, Use use) {
       if (!publisher) continue;  // it has gone
       known = writers_.emplace(writer, *publisher).first;
     }
-    const T* next = i + 1 < loan->size() ? loan->sample(i + 1) : nullptr;
-    use(*sample, known->second, next);
+    use(*sample, known->second, next_of_writer(*loan, i));
   }
 }
 
@@ -91,7 +99,8 @@ void LiveView::receive() {
       if (verdict == FollowedPublisher::Verdict::kNew) follow_anew(surface);
       count(surface, publisher, receipt);
       // Of several that have come together the last of each state is told, not the first.
-      const bool same_next = next != nullptr && next->state == surface.state && next->reason == surface.reason;
+      const bool same_next = next != nullptr && next->state == surface.state && next->reason == surface.reason &&
+                             std::string_view(next->stream) == surface.stream;
       if (!same_next) tell(surface, publisher, receipt);
     });
     hear(readers_.phases, [this](const perimap_Phase& phase, std::uint64_t publisher, const auto*) {
@@ -136,7 +145,7 @@ void LiveView::count(const perimap_Surface& surface, std::uint64_t /*publisher*/
     since_.lost += surface.sample_sequence - *last_sequence_ - 1;
   }
   last_sequence_ = surface.sample_sequence;
-  since_.late_ms.push_back(ms(receipt - from_ns(surface.release_time_ns)));
+  since_.late_ms.push_back(page_ms(wrapped_difference(to_ns(receipt), surface.release_time_ns)));
   if (server_.pages() == 0) since_ = {};
 }
 
@@ -144,8 +153,7 @@ void LiveView::tell(const perimap_Surface& surface, std::uint64_t publisher, Ins
   const bool changed = state_ != surface.state || reason_ != surface.reason;
   if (server_.pages() == 0 || (!changed && receipt - sent_ < kShortestPause)) return;
   Json json = publishers_[publisher].teller.tell(surface, receipt);
-  if (std::chrono::abs(receipt - from_ns(surface.release_time_ns)) > kOtherClock) {
-    // CLOCK_MONOTONIC of another host begins elsewhere: what is too old cannot be told from what is not.
+  if (of_another_clock(surface.release_time_ns, receipt)) {
     json.update({{"state", "invalid"},
                  {"why", "perimapd runs on another host, whose clock is not this one's"},
                  {"remedy", "run perimap view on perimapd's host, and open its page from here (--bind, or ssh -L)"}});
@@ -154,8 +162,8 @@ void LiveView::tell(const perimap_Surface& surface, std::uint64_t publisher, Ins
   const Instant now = MonotonicClock::now();
   json["late_ms"] = std::move(since_.late_ms);
   json["lost"] = since_.lost;
-  json["valid_for_ms"] = ms(from_ns(surface.valid_until_ns) - now);
-  json["sent_ms"] = ms(now.time_since_epoch());
+  json["valid_for_ms"] = page_ms(wrapped_difference(surface.valid_until_ns, to_ns(now)));
+  json["sent_ms"] = page_ms(to_ns(now));
   since_ = {};
   sent_ = receipt;
   state_ = surface.state;

@@ -57,7 +57,7 @@ class LiveView final : public PageHandler {
   LiveView(int domain, SampleReaders readers, WebServer& server, Say say);
 
   void receive();
-  // Gives each sample with its publisher and whether it is the last of those that have come.
+  // Gives each sample with its publisher, and the next one of the same writer that has come with it (or null).
   template <class T, class Use>
   void hear(dds::Reader<T>& reader, Use use);
   void count(const perimap_Surface& surface, std::uint64_t publisher, Instant receipt);

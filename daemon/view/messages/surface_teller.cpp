@@ -89,7 +89,7 @@ void SurfaceTeller::forget() {
 
 Json SurfaceTeller::mesh_at(const perimap_Surface& surface, Instant receipt) {
   if (!model_ || !mesh_) return {{"words", "no surface has come yet"}};
-  if (!client::predict(**mesh_, **model_, surface.valid_time_ns, to_ns(receipt), {true}, predicted_)) {
+  if (!client::predict(**mesh_, **model_, surface, to_ns(receipt), {true}, predicted_)) {
     return {{"words", client::describe(predicted_)}};
   }
   Json positions = Json::array(), deviations = Json::array(), triangles = Json::array();
@@ -100,7 +100,6 @@ Json SurfaceTeller::mesh_at(const perimap_Surface& surface, Instant receipt) {
   for (const auto& triangle : predicted_.triangles) {
     for (const std::uint32_t corner : triangle) triangles.push_back(corner);
   }
-  // Its own verdict may be worse than the surface's: a beat that is due by then.
   const bool good = predicted_.state == perimap_SURFACE_GOOD;
   return {{"words", good ? "" : client::describe(predicted_.reason)},
           {"state", name_of(predicted_.state)},

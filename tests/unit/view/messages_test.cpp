@@ -13,6 +13,7 @@
 #include "daemon/subscribing/followed_publisher.hpp"
 #include "daemon/view/messages/page_request.hpp"
 #include "daemon/view/messages/surface_teller.hpp"
+#include "made_publication.hpp"
 
 namespace perimap {
 namespace {
@@ -108,6 +109,22 @@ TEST(SurfaceTeller, OfAnInvalidSurfaceNoPositionLeaves) {
     EXPECT_FALSE(json.contains("camera"));
     EXPECT_EQ(json["permission"], "use no position");
   }
+}
+
+// The model was made 0.3 s after a beat that it knows; the surface has heard of a newer one.
+TEST(SurfaceTeller, MovesTheMeshByTheSurfacesOwnPhase) {
+  const Instant now = from_ns(0) + 100s + 300ms;
+  test::MadePublication made;
+  SurfaceTeller teller;
+  teller.hear(test::owned(made.model_at(now, 1)));
+  teller.hear(test::owned(made.mesh_at(now, 1)));
+  perimap_Surface& surface = made.surface_at(now, 7);
+  surface.cardiac_phase_rad = 0.0;
+  const auto json = teller.tell(surface, now);
+  EXPECT_EQ(json["mesh"]["state"], "good") << json["mesh"];
+  const double z_mm = json["mesh"]["positions_mm"][5];
+  EXPECT_NEAR(z_mm, test::MadePublication::vertex_at(1, from_ns(0) + 100s)[2], 0.01);
+  EXPECT_GT(std::abs(z_mm - test::MadePublication::vertex_at(1, now)[2]), 1.0);
 }
 
 TEST(Messages, TextOfAPublisherThatIsNoUtf8IsStillJson) {
