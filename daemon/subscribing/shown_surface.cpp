@@ -25,6 +25,7 @@ ShownSurface facts_of(const perimap_Surface& surface) {
   shown.frame_id = surface.frame_id;
   shown.sample_sequence = surface.sample_sequence;
   shown.frame_sequence = surface.frame_sequence;
+  shown.phase_rad = surface.cardiac_phase_rad;
   shown.capture = from_ns(surface.capture_time_ns);
   shown.valid = from_ns(surface.valid_time_ns);
   shown.valid_until = from_ns(surface.valid_until_ns);

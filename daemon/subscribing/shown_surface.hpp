@@ -44,6 +44,7 @@ struct ShownSurface {
   std::string frame_id;  // the name of W
   std::uint64_t sample_sequence = 0;
   std::uint64_t frame_sequence = 0;
+  double phase_rad = 0.0;               // of the heart, at valid
   Instant capture, valid, valid_until;  // on the publisher's clock
   Duration utc_minus_monotonic{0};      // of that clock; zero: not told
 

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "daemon/view/messages/page_request.hpp"
-#include "daemon/view/web/access.hpp"
+#include "daemon/web/access.hpp"
 
 namespace {
 
@@ -34,7 +34,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
   static const std::string token = make_token().value();
-  for (const Access& access : {Access{true, 7374, ""}, Access{false, 7374, token}}) {
+  for (const Access& access : {Access{true, 7374, "", {}}, Access{false, 7374, token, {"https://app.example"}}}) {
     const auto target = admit(access, {fields[0], fields[1], fields[2], fields[3]});
     if (!target) {
       check_printable(target.error().message);

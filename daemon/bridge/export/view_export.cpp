@@ -9,14 +9,13 @@
 
 #include "core/geometry/camera_model.hpp"
 #include "core/time/instant.hpp"
-#include "daemon/bridge/export/lent.hpp"
-#include "daemon/bridge/export/view_annotations.hpp"
-#include "daemon/bridge/export/view_camera.hpp"
-#include "daemon/bridge/export/view_layout.hpp"
-#include "daemon/bridge/export/view_names.hpp"
-#include "daemon/bridge/export/view_scene.hpp"
 #include "daemon/bridge/export/view_writer.hpp"
-#include "daemon/publishing/wire_names.hpp"
+#include "daemon/bridge/messages/view_annotations.hpp"
+#include "daemon/bridge/messages/view_camera.hpp"
+#include "daemon/bridge/messages/view_layout.hpp"
+#include "daemon/bridge/messages/view_names.hpp"
+#include "daemon/bridge/messages/view_scene.hpp"
+#include "daemon/bridge/messages/view_worth.hpp"
 #include "daemon/recordings/published_states.hpp"
 #include "daemon/recordings/recording_player.hpp"
 #include "daemon/subscribing/any_time.hpp"
@@ -152,22 +151,7 @@ class Exporter {
     }
     write(scene_.of(shown, valid, facts_.world_frame, lens), valid);
     write(annotations_.of(surface, shown, gate_, facts_.lens, receipt, capture), capture);
-    write_worth(shown, surface.cardiac_phase_rad, valid);
-  }
-
-  void write_worth(const ShownSurface& shown, double phase_rad, Instant at) {
-    const std::string state(name_of(shown.state));
-    const std::string reason(name_of(shown.reason));
-    perimap_view_SurfaceWorth worth{};
-    worth.timestamp = to_foxglove_time(at);
-    worth.state = lent(state);
-    worth.reason = lent(reason);
-    worth.features = static_cast<std::uint32_t>(shown.features.size());
-    worth.converged = static_cast<std::uint32_t>(
-        std::count_if(shown.features.begin(), shown.features.end(),
-                      [](const ShownFeature& feature) { return feature.state == perimap_FEATURE_CONVERGED; }));
-    worth.phase_rad = phase_rad;
-    write(worth, at);
+    write(worth_.of(shown, valid), valid);
   }
 
   void use_ecg(const perimap_EcgSamples& block, Duration offset) {
@@ -217,7 +201,7 @@ class Exporter {
           "the recording has no calibration of its camera: nothing is drawn over the picture");
     }
     if (summary_.surfaces == 0) {
-      summary_.warnings.push_back(
+      summary_.warnings.emplace_back(
           "there are no surfaces; perimap replay RECORDING --samples SAMPLES makes some, and perimap export-view "
           "RECORDING "
           "OUT --samples SAMPLES exports both");
@@ -232,6 +216,7 @@ class Exporter {
   SurfaceGate gate_;
   ViewScene scene_;
   ViewAnnotations annotations_;
+  ViewWorth worth_;
   RecordedFrame frame_;
   std::vector<std::uint8_t> packed_;
   std::vector<double> coefficients_;

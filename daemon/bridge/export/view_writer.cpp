@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "daemon/bridge/export/view_names.hpp"
+#include "daemon/bridge/messages/view_names.hpp"
 
 namespace perimap {
 

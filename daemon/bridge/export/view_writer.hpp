@@ -10,7 +10,7 @@
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
-#include "daemon/bridge/export/view_topics.hpp"
+#include "daemon/bridge/messages/view_topics.hpp"
 #include "drivers/file/whole_file.hpp"
 #include "drivers/recording/recording_writer.hpp"
 

@@ -14,8 +14,9 @@
 #include "daemon/keys/key_folder.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/view/live/live_view.hpp"
+#include "daemon/view/page/view_page.hpp"
 #include "daemon/view/recorded/recorded_view.hpp"
-#include "daemon/view/web/web_server.hpp"
+#include "daemon/web/web_server.hpp"
 
 namespace perimap {
 namespace {
@@ -58,7 +59,8 @@ Outcome view(const ViewOptions& options, const Console& console) {
   if (!stop) return refuse(stop.error());
   // What predicts comes before what shows.
   (void)setpriority(PRIO_PROCESS, 0, 2);
-  Expected<WebServer> server = WebServer::listen({options.address, static_cast<std::uint16_t>(options.port)});
+  Expected<WebServer> server =
+      WebServer::listen({options.address, static_cast<std::uint16_t>(options.port)}, view_page());
   if (!server) return refuse(server.error());
   const auto say = [&console](const std::string& what) { console.complain(what); };
   const auto handler = open_view(options, *server, say);

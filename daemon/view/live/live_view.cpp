@@ -19,6 +19,7 @@ using Json = nlohmann::ordered_json;
 
 // A page draws no faster; of a stream of hundreds a second it gets every so manieth.
 constexpr Duration kShortestPause = std::chrono::milliseconds(24);
+constexpr std::uint8_t kSurfaceLane = 1;
 constexpr Duration kSilence = std::chrono::milliseconds(500);
 constexpr Duration kPublishes = std::chrono::seconds(2);  // who was heard so lately
 constexpr Duration kForgotten = std::chrono::minutes(1);
@@ -169,7 +170,7 @@ void LiveView::tell(const perimap_Surface& surface, std::uint64_t publisher, Ins
   state_ = surface.state;
   reason_ = surface.reason;
   // A change of the state is told, however slowly a page reads.
-  send(text_message(json, changed ? PageMessage::Replaces::kNothing : PageMessage::Replaces::kSurface));
+  send(text_message(json, changed ? PageMessage::kNoLane : kSurfaceLane));
 }
 
 // So that perimapds that come and go leave nothing.

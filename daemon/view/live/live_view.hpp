@@ -18,7 +18,7 @@
 #include "daemon/dds/sample_readers.hpp"
 #include "daemon/subscribing/followed_publisher.hpp"
 #include "daemon/view/messages/surface_teller.hpp"
-#include "daemon/view/web/web_server.hpp"
+#include "daemon/web/web_server.hpp"
 
 namespace perimap {
 

@@ -44,10 +44,9 @@ Json ecg_json(const perimap_EcgSamples& block) {
           {"mV", std::move(values)}};
 }
 
-PageMessage text_message(const Json& json, PageMessage::Replaces replaces) {
+PageMessage text_message(const Json& json, std::uint8_t lane) {
   // Text of a publisher may be no UTF-8.
-  return {std::make_shared<const std::string>(json.dump(-1, ' ', false, Json::error_handler_t::replace)), false,
-          replaces};
+  return {std::make_shared<const std::string>(json.dump(-1, ' ', false, Json::error_handler_t::replace)), false, lane};
 }
 
 }  // namespace perimap

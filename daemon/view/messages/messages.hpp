@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "daemon/view/web/page_message.hpp"
+#include "daemon/web/page_message.hpp"
 
 namespace perimap {
 
@@ -16,7 +16,6 @@ namespace perimap {
 [[nodiscard]] nlohmann::ordered_json status_message_json(const perimap_Status& status);
 [[nodiscard]] nlohmann::ordered_json ecg_json(const perimap_EcgSamples& block);
 
-[[nodiscard]] PageMessage text_message(const nlohmann::ordered_json& json,
-                                       PageMessage::Replaces replaces = PageMessage::Replaces::kNothing);
+[[nodiscard]] PageMessage text_message(const nlohmann::ordered_json& json, std::uint8_t lane = PageMessage::kNoLane);
 
 }  // namespace perimap

@@ -16,7 +16,7 @@
 #include "daemon/recordings/recording_player.hpp"
 #include "daemon/view/messages/page_request.hpp"
 #include "daemon/view/messages/surface_teller.hpp"
-#include "daemon/view/web/web_server.hpp"
+#include "daemon/web/web_server.hpp"
 #include "drivers/recording/recorded_frame.hpp"
 
 namespace perimap {

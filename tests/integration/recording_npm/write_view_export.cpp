@@ -7,7 +7,7 @@
 #include <string>
 
 #include "daemon/bridge/export/view_export.hpp"
-#include "daemon/bridge/export/view_topics.hpp"
+#include "daemon/bridge/messages/view_topics.hpp"
 #include "drivers/recording/recording_reader.hpp"
 #include "made_recording.hpp"
 

@@ -11,9 +11,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "daemon/bridge/export/view_layout.hpp"
-#include "daemon/bridge/export/view_names.hpp"
-#include "daemon/bridge/export/view_topics.hpp"
+#include "daemon/bridge/messages/view_layout.hpp"
+#include "daemon/bridge/messages/view_names.hpp"
+#include "daemon/bridge/messages/view_topics.hpp"
 #include "drivers/recording/recording_reader.hpp"
 #include "made_recording.hpp"
 

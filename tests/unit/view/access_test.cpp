@@ -1,4 +1,4 @@
-#include "daemon/view/web/access.hpp"
+#include "daemon/web/access.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <string>
 
-#include "daemon/view/web/request_target.hpp"
+#include "daemon/web/request_target.hpp"
 
 namespace perimap {
 namespace {
@@ -79,8 +79,8 @@ TEST(Host, IsLoopbackAnotherAddressOrAName) {
   EXPECT_EQ(parse_host("localhost")->port, 80);
 }
 
-const Access kAtHome{true, 7374, ""};
-const Access kAbroad{false, 7374, "00112233445566778899aabbccddeeff"};
+const Access kAtHome{true, 7374, "", {}};
+const Access kAbroad{false, 7374, "00112233445566778899aabbccddeeff", {}};
 
 TEST(Access, OnLoopbackAsksForNoTokenButForTheRightHost) {
   EXPECT_TRUE(admit(kAtHome, {"/", "127.0.0.1:7374", "", ""}));
@@ -103,13 +103,22 @@ TEST(Access, APageOfElsewhereIsRefusedWhateverItAsks) {
   }
 }
 
+TEST(Access, APageOfElsewhereMayAskWhenItsOriginIsAllowed) {
+  const Access allowed{true, 7374, "", {"https://app.example"}};
+  EXPECT_TRUE(admit(allowed, {"/", "localhost:7374", "https://app.example", ""}));
+  EXPECT_FALSE(admit(allowed, {"/", "localhost:7374", "http://app.example", ""}));
+  EXPECT_FALSE(admit(allowed, {"/", "localhost:7374", "https://app.example.elsewhere", ""}));
+  EXPECT_FALSE(admit(allowed, {"/", "rebound.example:7374", "https://app.example", ""}));
+  EXPECT_TRUE(admit(allowed, {"/", "localhost:7374", "http://localhost:7374", ""}));
+}
+
 TEST(Access, ElsewhereTheTokenIsAskedForInTheAddressOrTheCookie) {
   EXPECT_FALSE(admit(kAbroad, {"/", "192.168.1.20:7374", "", ""}));
   EXPECT_TRUE(admit(kAbroad, {"/?token=" + kAbroad.token, "192.168.1.20:7374", "", ""}));
   EXPECT_TRUE(admit(kAbroad, {"/view.css", "192.168.1.20:7374", "", "a=b; " + token_cookie(kAbroad)}));
   EXPECT_FALSE(admit(kAbroad, {"/?token=" + kAbroad.token.substr(1), "192.168.1.20:7374", "", ""}));
-  EXPECT_FALSE(admit(kAbroad, {"/?token=", "192.168.1.20:7374", "", "perimap_view_7374="}));
-  EXPECT_FALSE(admit(kAbroad, {"/", "192.168.1.20:7374", "", "perimap_view_7375=" + kAbroad.token}));
+  EXPECT_FALSE(admit(kAbroad, {"/?token=", "192.168.1.20:7374", "", "perimap_7374="}));
+  EXPECT_FALSE(admit(kAbroad, {"/", "192.168.1.20:7374", "", "perimap_7375=" + kAbroad.token}));
   EXPECT_FALSE(admit(kAbroad, {"/?token=" + kAbroad.token, "name.example:7374", "", ""}));
 }
 

@@ -10,6 +10,7 @@
 #include "daemon/publishing/sample_recorder.hpp"
 #include "daemon/recordings/published_states.hpp"
 #include "daemon/recordings/recording_player.hpp"
+#include "daemon/view/page/view_page.hpp"
 #include "daemon/view/recorded/overlay.hpp"
 #include "daemon/view/recorded/recorded_view.hpp"
 #include "drivers/image/jpeg_decoder.hpp"
@@ -112,7 +113,7 @@ TEST_F(Recorded, IsReadToAnInstantForwardsAndFromElsewhere) {
 TEST_F(Recorded, WhatIsCutOffIsShownAsFarAsItIsWholeAndSaid) {
   const std::string file = write();
   fs::resize_file(file, fs::file_size(file) * 2 / 3);
-  auto server = WebServer::listen({"127.0.0.1", 0});
+  auto server = WebServer::listen({"127.0.0.1", 0}, view_page());
   ASSERT_TRUE(server);
   std::vector<std::string> told;
   const auto view = RecordedView::open({file, ""}, *server, [&told](const std::string& what) { told.push_back(what); });
@@ -126,7 +127,7 @@ TEST_F(Recorded, WhatIsCutOffIsShownAsFarAsItIsWholeAndSaid) {
 }
 
 TEST_F(Recorded, WhatIsNoRecordingIsRefusedByName) {
-  auto server = WebServer::listen({"127.0.0.1", 0});
+  auto server = WebServer::listen({"127.0.0.1", 0}, view_page());
   ASSERT_TRUE(server);
   const auto say = [](const std::string&) {};
   const auto none = RecordedView::open({(folder_ / "none.mcap").string(), ""}, *server, say);

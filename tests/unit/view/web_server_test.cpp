@@ -1,4 +1,4 @@
-#include "daemon/view/web/web_server.hpp"
+#include "daemon/web/web_server.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,6 +18,8 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/view/page/view_page.hpp"
+
 namespace perimap {
 namespace {
 
@@ -27,8 +29,8 @@ namespace websocket = beast::websocket;
 using asio::ip::tcp;
 using testing::HasSubstr;
 
-PageMessage text(std::string bytes, PageMessage::Replaces replaces = PageMessage::Replaces::kNothing) {
-  return {std::make_shared<const std::string>(std::move(bytes)), false, replaces};
+PageMessage text(std::string bytes, std::uint8_t lane = PageMessage::kNoLane) {
+  return {std::make_shared<const std::string>(std::move(bytes)), false, lane};
 }
 
 // Greets pages, and takes "ok" from them and nothing else.
@@ -80,7 +82,7 @@ struct Running {
 };
 
 std::unique_ptr<Running> run_server() {
-  auto server = WebServer::listen({"127.0.0.1", 0});
+  auto server = WebServer::listen({"127.0.0.1", 0}, view_page());
   EXPECT_TRUE(server) << server.error().message;
   const std::string url = server->url();
   EXPECT_THAT(url, testing::MatchesRegex("http://127.0.0.1:[0-9]+/"));
@@ -245,8 +247,7 @@ TEST(WebServer, APageThatDoesNotReadGetsWhatIsNewOrIsDropped) {
   // More than all buffers on the way hold: what is replaceable waits as one message, so that nobody is dropped.
   const std::string large(1 << 20, 'x');
   for (int i = 0; i < 40; ++i) {
-    running->server.post(
-        [&, i] { running->server.send_to_all(text(std::to_string(i) + large, PageMessage::Replaces::kSurface)); });
+    running->server.post([&, i] { running->server.send_to_all(text(std::to_string(i) + large, 1)); });
     EXPECT_FALSE(well.read().empty());
   }
   EXPECT_EQ(running->server.pages(), 2U);
@@ -279,22 +280,22 @@ TEST(WebServer, ADeadPageDoesNotKeepItFromEnding) {
 }
 
 TEST(WebServer, SaysWhyItCannotListen) {
-  const auto first = WebServer::listen({"127.0.0.1", 0});
+  const auto first = WebServer::listen({"127.0.0.1", 0}, view_page());
   ASSERT_TRUE(first);
   const std::string url = first->url();
   const auto port = static_cast<std::uint16_t>(std::stoi(url.substr(url.rfind(':') + 1)));
-  const auto second = WebServer::listen({"127.0.0.1", port});
+  const auto second = WebServer::listen({"127.0.0.1", port}, view_page());
   ASSERT_FALSE(second);
   EXPECT_THAT(second.error().message, HasSubstr("another perimap view"));
   EXPECT_THAT(second.error().message, HasSubstr("--port"));
-  const auto elsewhere = WebServer::listen({"192.0.2.1", 0});
+  const auto elsewhere = WebServer::listen({"192.0.2.1", 0}, view_page());
   ASSERT_FALSE(elsewhere);
   EXPECT_THAT(elsewhere.error().message, HasSubstr("192.0.2.1"));
-  EXPECT_FALSE(WebServer::listen({"localhost", 0}));
+  EXPECT_FALSE(WebServer::listen({"localhost", 0}, view_page()));
 }
 
 TEST(WebServer, ElsewhereTheAddressHasAToken) {
-  const auto server = WebServer::listen({"0.0.0.0", 0});
+  const auto server = WebServer::listen({"0.0.0.0", 0}, view_page());
   ASSERT_TRUE(server);
   EXPECT_THAT(server->url(), testing::MatchesRegex("http://0.0.0.0:[0-9]+/\\?token=[0-9a-f]+"));
 }

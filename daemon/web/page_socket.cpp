@@ -1,4 +1,4 @@
-#include "daemon/view/web/page_socket.hpp"
+#include "daemon/web/page_socket.hpp"
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
@@ -12,8 +12,8 @@ namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 using boost::system::error_code;
 
-// A page only ever says which instant of a recording it wants.
-constexpr std::size_t kMostSaidBytes = 1024;
+// Pages say which instant of a recording, or which channels they want.
+constexpr std::size_t kMostSaidBytes = 4096;
 // Messages that wait beside the replaceable ones: seconds of status.
 constexpr std::size_t kMostWaiting = 64;
 constexpr Duration kLongestWrite = std::chrono::seconds(5);
@@ -22,8 +22,8 @@ constexpr int kKernelBytes = 1 << 18;
 
 }  // namespace
 
-PageSocket::PageSocket(beast::tcp_stream stream, Events events)
-    : stream_(std::move(stream)), events_(std::move(events)) {}
+PageSocket::PageSocket(beast::tcp_stream stream, std::string_view command, Events events)
+    : stream_(std::move(stream)), command_(command), events_(std::move(events)) {}
 
 void PageSocket::configure() {
   // The WebSocket has time limits of its own.
@@ -36,8 +36,13 @@ void PageSocket::configure() {
   stream_.read_message_max(kMostSaidBytes);
 }
 
-void PageSocket::accept(const Request& request) {
+void PageSocket::accept(const Request& request, const std::string& subprotocol) {
   configure();
+  if (!subprotocol.empty()) {
+    stream_.set_option(websocket::stream_base::decorator([subprotocol](websocket::response_type& response) {
+      response.set(beast::http::field::sec_websocket_protocol, subprotocol);
+    }));
+  }
   stream_.async_accept(request, [self = shared_from_this()](error_code error) {
     if (error || self->ended_) return self->end();
     self->open_ = true;
@@ -72,9 +77,9 @@ void PageSocket::heard(std::size_t size) {
 
 void PageSocket::send(const PageMessage& message) {
   if (ended_ || closing_) return;
-  if (message.replaces != PageMessage::Replaces::kNothing) {
+  if (message.lane != PageMessage::kNoLane) {
     const auto old = std::find_if(waiting_.begin(), waiting_.end(),
-                                  [&message](const PageMessage& other) { return other.replaces == message.replaces; });
+                                  [&message](const PageMessage& other) { return other.lane == message.lane; });
     if (old != waiting_.end()) waiting_.erase(old);
   }
   if (waiting_.size() >= kMostWaiting) return drop();
@@ -101,7 +106,7 @@ bool PageSocket::stuck(Instant now) const noexcept { return busy_ && now - writi
 
 void PageSocket::say_goodbye() {
   if (!open_) return end();  // its beginning is being written still
-  close(websocket::close_code::going_away, "perimap view has ended");
+  close(websocket::close_code::going_away, command_ + " has ended");
 }
 
 void PageSocket::close(websocket::close_code code, std::string_view why) {

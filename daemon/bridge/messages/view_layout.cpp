@@ -1,8 +1,8 @@
-#include "daemon/bridge/export/view_layout.hpp"
+#include "daemon/bridge/messages/view_layout.hpp"
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/bridge/export/view_names.hpp"
+#include "daemon/bridge/messages/view_names.hpp"
 
 namespace perimap {
 namespace {

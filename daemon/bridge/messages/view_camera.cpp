@@ -1,11 +1,11 @@
-#include "daemon/bridge/export/view_camera.hpp"
+#include "daemon/bridge/messages/view_camera.hpp"
 
 #include <algorithm>
 #include <array>
 
-#include "daemon/bridge/export/lent.hpp"
-#include "daemon/bridge/export/view_names.hpp"
-#include "daemon/bridge/export/view_units.hpp"
+#include "daemon/bridge/messages/lent.hpp"
+#include "daemon/bridge/messages/view_names.hpp"
+#include "daemon/bridge/messages/view_units.hpp"
 #include "drivers/recording/foxglove_image.hpp"
 
 namespace perimap {

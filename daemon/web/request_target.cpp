@@ -1,4 +1,4 @@
-#include "daemon/view/web/request_target.hpp"
+#include "daemon/web/request_target.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-// Who may see the page: whose request is answered.
+// Whose request is answered.
 //
 // A page of another site, open in a browser of this host, can send requests here too. It cannot make the browser lie
 // about `Host` (the name it believes to talk to: another's, when that name was made to point here) or `Origin` (whose
@@ -9,9 +9,10 @@
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <vector>
 
 #include "core/error/expected.hpp"
-#include "daemon/view/web/request_target.hpp"
+#include "daemon/web/request_target.hpp"
 
 namespace perimap {
 
@@ -31,7 +32,8 @@ struct HostName {
 struct Access {
   bool loopback = true;
   std::uint16_t port = 0;
-  std::string token;  // empty: none is asked for
+  std::string token;                 // empty: none is asked for
+  std::vector<std::string> origins;  // of pages of elsewhere that may ask too
 };
 
 // The parts of a request that decide. Views are empty where a field is not there.

@@ -1,4 +1,4 @@
-// HTTP and WebSocket for the pages of `perimap view`: by Boost.Beast (docs/decisions/0089), on one thread.
+// HTTP and WebSocket: by Boost.Beast (docs/decisions/0089), on one thread.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,8 @@
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
-#include "daemon/view/web/page_message.hpp"
+#include "daemon/web/page_message.hpp"
+#include "daemon/web/web_service.hpp"
 
 namespace perimap {
 
@@ -23,6 +24,7 @@ class PageHandler {
   virtual ~PageHandler() = default;
 
   virtual void opened(PageId page) = 0;
+  virtual void closed(PageId /*page*/) {}
   // An error drops that page.
   [[nodiscard]] virtual Expected<void> said(PageId page, std::string_view text) = 0;
   // Ten times a second.
@@ -41,18 +43,17 @@ class WebServer {
   };
 
   // Elsewhere than on loopback a token is drawn. An error says which address it is, and what to do.
-  [[nodiscard]] static Expected<WebServer> listen(const Settings& settings);
+  [[nodiscard]] static Expected<WebServer> listen(const Settings& settings, WebService service);
   WebServer(WebServer&&) noexcept;
   WebServer& operator=(WebServer&&) noexcept;
   WebServer(const WebServer&) = delete;
   WebServer& operator=(const WebServer&) = delete;
   ~WebServer();
 
-  // What to open in a browser, its token included.
+  // What clients open, the token included.
   [[nodiscard]] std::string url() const;
 
   // Until the descriptor becomes readable (a StopSignal's). Pages are then told that the server goes.
-  // Five times a second each page gets {"kind":"tick"}.
   [[nodiscard]] Expected<void> run(PageHandler& handler, int stop_descriptor);
 
   // From any thread: `work` is done on the server's, while it runs.

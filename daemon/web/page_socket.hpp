@@ -15,7 +15,7 @@
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
-#include "daemon/view/web/page_message.hpp"
+#include "daemon/web/page_message.hpp"
 
 namespace perimap {
 
@@ -29,9 +29,11 @@ class PageSocket : public std::enable_shared_from_this<PageSocket> {
     std::function<void()> closed;  // once, whatever came before
   };
 
-  PageSocket(boost::beast::tcp_stream stream, Events events);
+  // `command` is what serves.
+  PageSocket(boost::beast::tcp_stream stream, std::string_view command, Events events);
 
-  void accept(const Request& request);
+  // `subprotocol` is named in the answer; empty: none is.
+  void accept(const Request& request, const std::string& subprotocol);
   // Instead: accepts only to say why not, since a browser shows no page what a refusal says.
   void turn_away(const Request& request, std::string_view why);
 
@@ -55,6 +57,7 @@ class PageSocket : public std::enable_shared_from_this<PageSocket> {
   void end();
 
   Stream stream_;
+  const std::string command_;
   Events events_;
   boost::beast::flat_buffer buffer_;
   std::deque<PageMessage> waiting_;

@@ -1,4 +1,4 @@
-#include "daemon/bridge/export/view_colours.hpp"
+#include "daemon/bridge/messages/view_colours.hpp"
 
 #include <algorithm>
 

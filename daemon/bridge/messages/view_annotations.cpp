@@ -1,9 +1,9 @@
-#include "daemon/bridge/export/view_annotations.hpp"
+#include "daemon/bridge/messages/view_annotations.hpp"
 
 #include <fmt/format.h>
 
-#include "daemon/bridge/export/lent.hpp"
-#include "daemon/bridge/export/view_colours.hpp"
+#include "daemon/bridge/messages/lent.hpp"
+#include "daemon/bridge/messages/view_colours.hpp"
 #include "daemon/publishing/wire_names.hpp"
 #include "drivers/recording/foxglove_image.hpp"
 

@@ -1,4 +1,4 @@
-// One connection of a browser: files of the page, or the beginning of a page's WebSocket.
+// One connection of a browser, or of another client: files of the page, or the beginning of a WebSocket.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -12,19 +12,19 @@
 #include <optional>
 #include <string>
 
-#include "daemon/view/web/access.hpp"
-#include "daemon/view/web/page_file.hpp"
+#include "daemon/web/access.hpp"
+#include "daemon/web/web_service.hpp"
 
 namespace perimap {
 
 class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
   using Request = boost::beast::http::request<boost::beast::http::empty_body>;
-  // Takes over the connection of a request for the page's WebSocket that was admitted.
-  using Upgrade = std::function<void(boost::beast::tcp_stream, Request)>;
+  // Takes over the connection of a request for the WebSocket that was admitted.
+  using Upgrade = std::function<void(boost::beast::tcp_stream, Request, const std::string& subprotocol)>;
 
-  // `open` counts the connections that there are. `access` must outlive this.
-  HttpConnection(boost::asio::ip::tcp::socket socket, const Access& access, Upgrade upgrade,
+  // `open` counts the connections that there are. `access` and `service` must outlive this.
+  HttpConnection(boost::asio::ip::tcp::socket socket, const Access& access, const WebService& service, Upgrade upgrade,
                  std::shared_ptr<std::size_t> open);
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
@@ -36,12 +36,14 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   using Text = boost::beast::http::response<boost::beast::http::string_body>;
 
   void answer();
+  void upgrade();
   void answer_with(const PageFile& file);
   void refuse(unsigned status, std::string_view why);
   void send(Text response);
 
   boost::beast::tcp_stream stream_;
   const Access& access_;
+  const WebService& service_;
   Upgrade upgrade_;
   std::shared_ptr<std::size_t> open_;
   boost::beast::flat_buffer buffer_;

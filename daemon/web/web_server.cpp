@@ -1,4 +1,4 @@
-#include "daemon/view/web/web_server.hpp"
+#include "daemon/web/web_server.hpp"
 
 #include <fmt/format.h>
 
@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/view/web/access.hpp"
-#include "daemon/view/web/http_connection.hpp"
-#include "daemon/view/web/page_socket.hpp"
+#include "daemon/web/access.hpp"
+#include "daemon/web/http_connection.hpp"
+#include "daemon/web/page_socket.hpp"
 
 namespace perimap {
 namespace {
@@ -35,7 +35,10 @@ constexpr auto kGoodbye = std::chrono::milliseconds(500);
 
 class WebServer::Impl {
  public:
-  Impl() : acceptor_(context_), timer_(context_), stop_(context_) {}
+  explicit Impl(WebService service)
+      : service_(std::move(service)), acceptor_(context_), timer_(context_), stop_(context_) {
+    access_.origins = service_.origins;
+  }
   ~Impl() {
     // The descriptor is its owner's.
     if (stop_.is_open()) (void)stop_.release();
@@ -65,7 +68,8 @@ class WebServer::Impl {
 
   std::string url() const {
     const bool v6 = address_.find(':') != std::string::npos;
-    std::string url = fmt::format("http://{}:{}/", v6 ? "[" + address_ + "]" : address_, access_.port);
+    std::string url = fmt::format("{}://{}:{}{}", service_.scheme, v6 ? "[" + address_ + "]" : address_, access_.port,
+                                  service_.files.empty() ? service_.socket_path : "/");
     if (!access_.token.empty()) url += "?token=" + access_.token;
     return url;
   }
@@ -103,11 +107,12 @@ class WebServer::Impl {
  private:
   using Pages = std::map<PageId, std::shared_ptr<PageSocket>>;
 
-  static std::string why_not(const Settings& settings, const error_code& error) {
+  std::string why_not(const Settings& settings, const error_code& error) const {
     const std::string where =
         fmt::format("cannot listen on {} port {}: {}", settings.address, settings.port, error.message());
     if (error == asio::error::address_in_use) {
-      return where + "; is another perimap view running? Else choose another --port, or 0 for any that is free";
+      return fmt::format("{}; is another {} running? Else choose another --port, or 0 for any that is free", where,
+                         service_.command);
     }
     if (error == asio::error::access_denied) return where + "; ports below 1024 are root's: choose another --port";
     return where + "; --bind takes an address of this host";
@@ -130,10 +135,9 @@ class WebServer::Impl {
       }
       if (*connections_ < kMostConnections) {
         std::make_shared<HttpConnection>(
-            std::move(socket), access_,
-            [this](boost::beast::tcp_stream stream, const HttpConnection::Request& request) {
-              open_page(std::move(stream), request);
-            },
+            std::move(socket), access_, service_,
+            [this](boost::beast::tcp_stream stream, const HttpConnection::Request& request,
+                   const std::string& subprotocol) { open_page(std::move(stream), request, subprotocol); },
             connections_)
             ->read();
       }
@@ -141,24 +145,27 @@ class WebServer::Impl {
     });
   }
 
-  void open_page(boost::beast::tcp_stream stream, const HttpConnection::Request& request) {
+  void open_page(boost::beast::tcp_stream stream, const HttpConnection::Request& request,
+                 const std::string& subprotocol) {
     if (ending_) return;
     if (pages_.size() >= kMostPages) {
-      return std::make_shared<PageSocket>(std::move(stream), PageSocket::Events{})
+      return std::make_shared<PageSocket>(std::move(stream), service_.command, PageSocket::Events{})
           ->turn_away(request, fmt::format("{} pages are open already: close one of them", kMostPages));
     }
     const PageId id = ++last_id_;
     auto page = std::make_shared<PageSocket>(
-        std::move(stream), PageSocket::Events{[this, id] { handler_->opened(id); },
-                                              [this, id](std::string_view text) { return handler_->said(id, text); },
-                                              [this, id] { forget(id); }});
+        std::move(stream), service_.command,
+        PageSocket::Events{[this, id] { handler_->opened(id); },
+                           [this, id](std::string_view text) { return handler_->said(id, text); },
+                           [this, id] { forget(id); }});
     pages_.emplace(id, page);
     count_.store(pages_.size(), std::memory_order_relaxed);
-    page->accept(request);
+    page->accept(request, subprotocol);
   }
 
   void forget(PageId id) {
     pages_.erase(id);
+    handler_->closed(id);
     // Relaxed: a hint of whether anything has to be made.
     count_.store(pages_.size(), std::memory_order_relaxed);
     if (ending_ && pages_.empty()) context_.stop();
@@ -173,8 +180,8 @@ class WebServer::Impl {
         if (page->stuck(now)) page->drop();
       }
       if (std::exchange(accept_again_, false)) accept();
-      if (++ticks_ % kTicksToSign == 0) {
-        send_to_all({std::make_shared<const std::string>(R"({"kind":"tick"})"), false, PageMessage::Replaces::kTick});
+      if (!service_.sign_of_life.empty() && ++ticks_ % kTicksToSign == 0) {
+        send_to_all({std::make_shared<const std::string>(service_.sign_of_life), false, PageMessage::kSignOfLife});
       }
       handler_->tick();
       tick();
@@ -191,6 +198,7 @@ class WebServer::Impl {
     timer_.async_wait([this](error_code) { context_.stop(); });
   }
 
+  const WebService service_;
   asio::io_context context_{1};
   tcp::acceptor acceptor_;
   asio::steady_timer timer_;
@@ -212,8 +220,8 @@ WebServer::WebServer(WebServer&&) noexcept = default;
 WebServer& WebServer::operator=(WebServer&&) noexcept = default;
 WebServer::~WebServer() = default;
 
-Expected<WebServer> WebServer::listen(const Settings& settings) {
-  auto impl = std::make_unique<Impl>();
+Expected<WebServer> WebServer::listen(const Settings& settings, WebService service) {
+  auto impl = std::make_unique<Impl>(std::move(service));
   if (auto listening = impl->listen(settings); !listening) return tl::unexpected(listening.error());
   return WebServer(std::move(impl));
 }

@@ -9,13 +9,14 @@ namespace perimap {
 
 // One made for all pages that get it.
 struct PageMessage {
-  // What a newer message may take the place of while it waits: a page that reads slowly gets what is new, not what is
-  // old.
-  enum class Replaces : std::uint8_t { kNothing, kSurface, kTick };
+  // A newer message takes the place of one of the same lane that waits still: a page that reads slowly gets what is
+  // new, not what is old. Which lanes there are is the sender's; what is of none waits until it is sent.
+  static constexpr std::uint8_t kNoLane = 0;
+  static constexpr std::uint8_t kSignOfLife = 255;
 
   std::shared_ptr<const std::string> bytes;
   bool binary = false;
-  Replaces replaces = Replaces::kNothing;
+  std::uint8_t lane = kNoLane;
 };
 
 // A page that is open in a browser; no two of a server have the same.

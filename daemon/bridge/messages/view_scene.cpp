@@ -1,12 +1,12 @@
-#include "daemon/bridge/export/view_scene.hpp"
+#include "daemon/bridge/messages/view_scene.hpp"
 
 #include <algorithm>
 
-#include "daemon/bridge/export/lent.hpp"
-#include "daemon/bridge/export/view_camera.hpp"
-#include "daemon/bridge/export/view_colours.hpp"
-#include "daemon/bridge/export/view_names.hpp"
-#include "daemon/bridge/export/view_units.hpp"
+#include "daemon/bridge/messages/lent.hpp"
+#include "daemon/bridge/messages/view_camera.hpp"
+#include "daemon/bridge/messages/view_colours.hpp"
+#include "daemon/bridge/messages/view_names.hpp"
+#include "daemon/bridge/messages/view_units.hpp"
 #include "daemon/subscribing/any_time.hpp"
 #include "drivers/recording/foxglove_image.hpp"
 

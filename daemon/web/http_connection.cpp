@@ -1,6 +1,11 @@
-#include "daemon/view/web/http_connection.hpp"
+#include "daemon/web/http_connection.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <boost/beast/http/read.hpp>
+#include <boost/beast/http/rfc7230.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <string_view>
@@ -13,7 +18,6 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 using boost::system::error_code;
 
-constexpr std::string_view kSocketPath = "/live";
 constexpr std::uint32_t kMostHeadBytes = 8192;
 constexpr auto kLongestExchange = std::chrono::seconds(10);
 
@@ -26,9 +30,13 @@ std::string_view view(boost::beast::string_view text) { return {text.data(), tex
 
 }  // namespace
 
-HttpConnection::HttpConnection(boost::asio::ip::tcp::socket socket, const Access& access, Upgrade upgrade,
-                               std::shared_ptr<std::size_t> open)
-    : stream_(std::move(socket)), access_(access), upgrade_(std::move(upgrade)), open_(std::move(open)) {
+HttpConnection::HttpConnection(boost::asio::ip::tcp::socket socket, const Access& access, const WebService& service,
+                               Upgrade upgrade, std::shared_ptr<std::size_t> open)
+    : stream_(std::move(socket)),
+      access_(access),
+      service_(service),
+      upgrade_(std::move(upgrade)),
+      open_(std::move(open)) {
   ++*open_;
 }
 
@@ -61,14 +69,29 @@ void HttpConnection::answer() {
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
     return refuse(405, "nothing can be changed here");
   }
-  if (target->path == kSocketPath) {
-    if (!beast::websocket::is_upgrade(request)) return refuse(426, "this is for the page's own WebSocket");
-    stream_.expires_never();
-    return upgrade_(std::move(stream_), request);
-  }
-  const PageFile* file = find_page_file(target->path);
-  if (file == nullptr) return refuse(404, "the page has no such file");
+  if (target->path == service_.socket_path) return upgrade();
+  const auto file = std::find_if(service_.files.begin(), service_.files.end(),
+                                 [&target](const PageFile& served) { return served.path == target->path; });
+  if (file == service_.files.end()) return refuse(404, "there is no such file");
   answer_with(*file);
+}
+
+void HttpConnection::upgrade() {
+  const Request& request = parser_->get();
+  if (!beast::websocket::is_upgrade(request)) return refuse(426, "this is for a WebSocket");
+  std::string chosen;
+  if (!service_.subprotocols.empty()) {
+    for (const auto& wanted : http::token_list(request[http::field::sec_websocket_protocol])) {
+      if (!chosen.empty()) break;
+      const auto known = std::find(service_.subprotocols.begin(), service_.subprotocols.end(), view(wanted));
+      if (known != service_.subprotocols.end()) chosen = *known;
+    }
+    if (chosen.empty()) {
+      return refuse(400, fmt::format("here a client speaks {}", fmt::join(service_.subprotocols, " or ")));
+    }
+  }
+  stream_.expires_never();
+  upgrade_(std::move(stream_), request, chosen);
 }
 
 void HttpConnection::answer_with(const PageFile& file) {

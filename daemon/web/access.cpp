@@ -1,4 +1,4 @@
-#include "daemon/view/web/access.hpp"
+#include "daemon/web/access.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -42,7 +42,7 @@ bool same_token(std::string_view a, std::string_view b) {
   return different == 0;
 }
 
-std::string cookie_name(const Access& access) { return fmt::format("perimap_view_{}=", access.port); }
+std::string cookie_name(const Access& access) { return fmt::format("perimap_{}=", access.port); }
 
 // Empty: there is none of ours.
 std::string_view token_in(std::string_view cookies, const std::string& name) {
@@ -104,17 +104,19 @@ tl::expected<RequestTarget, Denial> admit(const Access& access, const RequestHea
   if (!host) return deny(400, host.error().message);
   if (host->port != access.port || host->kind == HostName::Kind::kName ||
       (access.loopback && host->kind != HostName::Kind::kLoopback)) {
-    return deny(403, "this page is not served under that name: open the address that perimap view printed");
+    return deny(403, "nothing is served under that name: open the address that was printed");
   }
-  if (!head.origin.empty() && (head.origin.substr(0, kOriginScheme.size()) != kOriginScheme ||
-                               head.origin.substr(kOriginScheme.size()) != head.host)) {
+  const bool own = head.origin.substr(0, kOriginScheme.size()) == kOriginScheme &&
+                   head.origin.substr(kOriginScheme.size()) == head.host;
+  if (!head.origin.empty() && !own &&
+      std::find(access.origins.begin(), access.origins.end(), head.origin) == access.origins.end()) {
     return deny(403, "a page of elsewhere may not ask this");
   }
   auto target = parse_request_target(head.target);
   if (!target) return deny(head.target.size() > kLongestTarget ? 414 : 400, target.error().message);
   if (!access.token.empty() && !same_token(target->token, access.token) &&
       !same_token(token_in(head.cookie, cookie_name(access)), access.token)) {
-    return deny(403, "the token is missing or wrong: open the address that perimap view printed, with its token");
+    return deny(403, "the token is missing or wrong: open the address that was printed, with its token");
   }
   return *target;
 }
