@@ -1,5 +1,5 @@
 // What a server and its clients say to each other on a WebSocket of the viewers Foxglove and Lichtblick:
-// https://github.com/foxglove/ws-protocol (docs/spec.md), which names its subprotocol foxglove.websocket.v1, and
+// https://github.com/foxglove/ws-protocol, which names its subprotocol foxglove.websocket.v1, and
 // foxglove.sdk.v1 with the same messages.
 #pragma once
 
