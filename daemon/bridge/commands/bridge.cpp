@@ -2,8 +2,11 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <charconv>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +15,7 @@
 #include "daemon/bridge/foxglove/foxglove_bridge.hpp"
 #include "daemon/bridge/igtl/igtl_bridge.hpp"
 #include "daemon/bridge/igtl/igtl_server.hpp"
+#include "daemon/bridge/ros2/ros2_bridge.hpp"
 #include "daemon/command_line/commands.hpp"
 #include "daemon/keys/key_folder.hpp"
 #include "daemon/process/stop_signal.hpp"
@@ -26,6 +30,7 @@ struct BridgeOptions {
   int port = 0;
   std::optional<std::string> security;
   std::vector<std::string> origins;  // of foxglove
+  int ros_domain = 0;                // of ros2
 };
 
 // What all bridges ask before they serve.
@@ -83,10 +88,33 @@ Outcome bridge_foxglove(const BridgeOptions& options, const Console& console) {
   return {};
 }
 
-void add_options(Command& command, BridgeOptions& options, const char* bind_help) {
+// Of the environment, as ROS 2 itself goes by it; 0 where there is none.
+int ros_domain() {
+  const char* const text = std::getenv("ROS_DOMAIN_ID");
+  int domain = 0;
+  if (text != nullptr) (void)std::from_chars(text, text + std::strlen(text), domain);
+  return domain;
+}
+
+Outcome bridge_ros2(const BridgeOptions& options, const Console& console) {
+  Expected<StopSignal> stop = begin(options, console);
+  if (!stop) return refuse(stop.error());
+  const auto bridge = Ros2Bridge::create({options.domain, options.security}, options.ros_domain,
+                                         [&console](const std::string& what) { console.complain(what); });
+  if (!bridge) return refuse(bridge.error());
+  print_endpoint(fmt::format("ROS 2 domain {}: /perimap/points, /perimap/mesh, /tf, /diagnostics", options.ros_domain));
+  if (const auto ran = (*bridge)->run(stop->descriptor()); !ran) return refuse(ran.error());
+  return {};
+}
+
+void add_domain_options(Command& command, BridgeOptions& options) {
   command.add_option("--domain", options.domain, "DDS domain")->check(Range(0, 230))->capture_default_str();
   command.add_option("--security", options.security,
                      "Keys for DDS Security, as perimap keys issue makes them (a folder), where the domain is secured");
+}
+
+void add_options(Command& command, BridgeOptions& options, const char* bind_help) {
+  add_domain_options(command, options);
   command.add_option("--port", options.port, "TCP port that clients connect to; 0: any that is free")
       ->check(Range(0, 65535))
       ->capture_default_str();
@@ -123,6 +151,17 @@ void add_bridge_command(Commands& commands) {
   foxglove.add_option("--allow-origin", for_foxglove->origins,
                       "A viewer that runs in a browser may connect when its page came from here, as "
                       "https://app.foxglove.dev; may be given several times");
+  const auto for_ros2 = std::make_shared<BridgeOptions>();
+  for_ros2->ros_domain = ros_domain();
+  Command& ros2 = commands.add(
+      group, "ros2",
+      "Publishes standard messages of ROS 2 (Humble and later) in its DDS domain, without ROS: points and mesh of the "
+      "surface, the camera's pose, diagnostics with what may be trusted and why not. Prints the topics",
+      [for_ros2](const Console& console) { return bridge_ros2(*for_ros2, console); });
+  add_domain_options(ros2, *for_ros2);
+  ros2.add_option("--ros-domain", for_ros2->ros_domain, "DDS domain of ROS 2: ROS_DOMAIN_ID where that is set")
+      ->check(Range(0, 230))
+      ->capture_default_str();
 }
 
 }  // namespace perimap
