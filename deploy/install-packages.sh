@@ -50,6 +50,7 @@ full=(
   clang-tidy clang-format
   qemu-system-x86 busybox-static cpio zstd kmod udev iproute2 v4l-utils  # tests/vm: CAN, V4L2 and systemd on Debian's own kernels
   chromium                                   # the pages that perimap writes, opened
+  fastddsgen libfastrtps-dev libfastcdr-dev  # another vendor's DDS reads what is published
   stress-ng                                  # perimap bench: latencies under load
   lintian systemd man-db apparmor            # the Debian package and its service, checked
 )
