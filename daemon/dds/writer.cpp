@@ -24,4 +24,10 @@ int UntypedWriter::matched_readers() const noexcept {
   return dds_get_publication_matched_status(writer_.get(), &status) < 0 ? 0 : static_cast<int>(status.current_count);
 }
 
+RefusedReaders UntypedWriter::refused_readers() const noexcept {
+  dds_offered_incompatible_qos_status_t status{};
+  if (dds_get_offered_incompatible_qos_status(writer_.get(), &status) < 0) return {};
+  return {status.total_count, static_cast<dds_qos_policy_id_t>(status.last_policy_id)};
+}
+
 }  // namespace perimap::dds

@@ -1,12 +1,20 @@
 // Publishes samples of one topic.
 #pragma once
 
+#include <cstdint>
+
 #include "core/error/expected.hpp"
 #include "daemon/dds/entity.hpp"
 #include "daemon/dds/participant.hpp"
 #include "daemon/dds/topic.hpp"
 
 namespace perimap::dds {
+
+// Readers that asked for what a writer does not offer, and therefore get nothing.
+struct RefusedReaders {
+  std::uint32_t ever = 0;
+  dds_qos_policy_id_t policy = DDS_INVALID_QOS_POLICY_ID;  // of the last one: what did not fit
+};
 
 // What does not depend on the type of the samples.
 class UntypedWriter {
@@ -21,6 +29,8 @@ class UntypedWriter {
   [[nodiscard]] dds_return_t write(const void* sample) noexcept { return dds_write(writer_.get(), sample); }
   // Readers that are connected now.
   [[nodiscard]] int matched_readers() const noexcept;
+  // On one thread, which need not be the one that writes.
+  [[nodiscard]] RefusedReaders refused_readers() const noexcept;
 
  private:
   UntypedWriter(Entity topic, Entity writer) noexcept : topic_(std::move(topic)), writer_(std::move(writer)) {}
@@ -41,6 +51,7 @@ class Writer {
 
   [[nodiscard]] dds_return_t write(const T& sample) noexcept { return writer_.write(&sample); }
   [[nodiscard]] int matched_readers() const noexcept { return writer_.matched_readers(); }
+  [[nodiscard]] RefusedReaders refused_readers() const noexcept { return writer_.refused_readers(); }
 
  private:
   explicit Writer(UntypedWriter writer) noexcept : writer_(std::move(writer)) {}

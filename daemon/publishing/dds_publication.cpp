@@ -44,6 +44,7 @@ void DdsPublication::phase(const perimap_Phase& phase) {
 void DdsPublication::status(const perimap_Status& status) {
   count(status_.write(status));
   tell_failures();
+  tell_refused_readers();
 }
 
 void DdsPublication::count(dds_return_t written) noexcept {
@@ -68,6 +69,18 @@ void DdsPublication::tell_another_publisher() {
   } else {
     spdlog::info("nobody else publishes as source '{}' any more", settings_.identity.source);
   }
+}
+
+void DdsPublication::tell_refused_readers() {
+  const Instant now = MonotonicClock::now();
+  auto look_at = [&, watch = reader_watches_.begin()](const auto& writer, const dds::TopicDescription& topic) mutable {
+    (watch++)->look(topic.name, writer.refused_readers(), now);
+  };
+  look_at(surface_, dds::topic_of<perimap_Surface>());
+  look_at(model_, dds::topic_of<perimap_SurfaceModel>());
+  look_at(mesh_, dds::topic_of<perimap_SurfaceMesh>());
+  look_at(phase_, dds::topic_of<perimap_Phase>());
+  look_at(status_, dds::topic_of<perimap_Status>());
 }
 
 void DdsPublication::tell_failures() {

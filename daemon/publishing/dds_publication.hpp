@@ -1,6 +1,7 @@
 // Publishes over DDS.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -15,6 +16,7 @@
 #include "daemon/publishing/identity.hpp"
 #include "daemon/publishing/name_watch.hpp"
 #include "daemon/publishing/publication.hpp"
+#include "daemon/publishing/reader_watch.hpp"
 
 namespace perimap {
 
@@ -63,6 +65,7 @@ class DdsPublication final : public Publication {
   void count(dds_return_t written) noexcept;
   void tell_failures();
   void tell_another_publisher();
+  void tell_refused_readers();
 
   DdsSettings settings_;
   dds::Participant participant_;
@@ -78,6 +81,7 @@ class DdsPublication final : public Publication {
   std::atomic<std::uint64_t> failures_{0};
   std::atomic<dds_return_t> last_error_{DDS_RETCODE_OK};
   // The status thread's own.
+  std::array<ReaderWatch, 5> reader_watches_;  // one a topic
   bool failing_ = false;
   Instant last_seen_;  // that one had failed
   std::uint64_t failures_seen_ = 0;

@@ -13,6 +13,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -102,6 +103,66 @@ TEST_F(FailingWrites, AreLoggedOnceByTheStatusThreadAndAtTheirEndWithTheirNumber
   EXPECT_EQ(begun.find("again"), std::string::npos);
   publishing->status(status);
   EXPECT_THAT(log(), HasSubstr("DDS writes succeed again; 6 failed"));
+}
+
+// A reader that asks for more than `topic` offers.
+class WrongReader {
+ public:
+  explicit WrongReader(dds_durability_kind_t durability) {
+    participant_ = dds_create_participant(kDomain, nullptr, nullptr);
+    const auto& description = dds::topic_of<perimap_Surface>();
+    const dds_entity_t topic =
+        dds_create_topic(participant_, description.descriptor, description.name, nullptr, nullptr);
+    dds_qos_t* qos = dds_create_qos();
+    dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, 0);
+    dds_qset_durability(qos, durability);
+    EXPECT_GT(dds_create_reader(participant_, topic, qos, nullptr), 0);
+    dds_delete_qos(qos);
+  }
+  WrongReader(const WrongReader&) = delete;
+  WrongReader& operator=(const WrongReader&) = delete;
+  ~WrongReader() { dds_delete(participant_); }
+
+ private:
+  dds_entity_t participant_ = 0;
+};
+
+// FailingWrites has the log.
+using ReadersThatGetNothing = FailingWrites;
+
+TEST_F(ReadersThatGetNothing, AreToldOnceWithWhatDoesNotFit) {
+  const auto publishing = publication(std::chrono::hours(1));
+  const perimap_Status status{};
+  publishing->status(status);
+  EXPECT_EQ(log(), "");
+  const WrongReader reader(DDS_DURABILITY_VOLATILE);
+  for (int i = 0; i < 200 && log().empty(); ++i) {
+    publishing->status(status);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  EXPECT_THAT(log(), HasSubstr("a reader of perimap/surface gets nothing: it asks for a reliable topic"));
+  const std::string told = log();
+  const WrongReader another(DDS_DURABILITY_VOLATILE);
+  publishing->status(status);
+  EXPECT_EQ(log(), told) << "once a minute";
+}
+
+TEST(ReaderWatchTest, SaysAgainAfterAMinuteHowManyCame) {
+  std::ostringstream log;
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(
+      std::make_shared<spdlog::logger>("", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
+  ReaderWatch watch;
+  const Instant begin = from_ns(0) + std::chrono::hours(1);
+  watch.look("topic", {0, DDS_INVALID_QOS_POLICY_ID}, begin);
+  EXPECT_EQ(log.str(), "");
+  watch.look("topic", {1, DDS_DATA_REPRESENTATION_QOS_POLICY_ID}, begin);
+  EXPECT_THAT(log.str(), HasSubstr("a reader of topic gets nothing: it reads another representation"));
+  watch.look("topic", {4, DDS_DATA_REPRESENTATION_QOS_POLICY_ID}, begin + std::chrono::seconds(59));
+  EXPECT_THAT(log.str(), testing::Not(HasSubstr("3 readers")));
+  watch.look("topic", {4, DDS_DEADLINE_QOS_POLICY_ID}, begin + std::chrono::seconds(60));
+  EXPECT_THAT(log.str(), HasSubstr("3 readers of topic get nothing: it asks for samples more often"));
+  spdlog::set_default_logger(before);
 }
 
 }  // namespace
