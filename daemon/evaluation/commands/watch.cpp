@@ -1,7 +1,10 @@
 // `perimap watch`: a subscriber in the terminal.
 #include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -12,6 +15,7 @@
 #include "daemon/evaluation/watch/sample_receiver.hpp"
 #include "daemon/evaluation/watch/watch_report.hpp"
 #include "daemon/evaluation/watch/watch_run.hpp"
+#include "daemon/evaluation/watch/watch_screen.hpp"
 #include "daemon/keys/key_folder.hpp"
 #include "daemon/process/stop_signal.hpp"
 
@@ -22,6 +26,7 @@ struct WatchOptions {
   int domain = 0;
   bool json = false;
   bool once = false;
+  bool lines = false;
   double duration_s = 0.0;     // 0: no limit
   std::uint64_t surfaces = 0;  // 0: no limit
   double wait_s = 0.0;         // 0: no limit
@@ -37,6 +42,32 @@ void print(const std::string& line) {
 // Who has no keys finds nobody in a secured domain, and is not told so by anyone.
 std::string hint(const WatchOptions& options) {
   return options.security ? "" : "; a secured one shows itself to keys alone (--security)";
+}
+
+// Whether one screen is drawn anew each second, in the place of a line each.
+bool on_screen(const WatchOptions& options) { return !options.json && !options.lines && isatty(STDOUT_FILENO) == 1; }
+
+void draw(const WatchOptions& options, const std::vector<StreamReport>& reports) {
+  constexpr const char* kHome = "\x1b[H";
+  constexpr const char* kRestOfLine = "\x1b[K";
+  constexpr const char* kRestOfScreen = "\x1b[J";
+  constexpr const char* kCutOff = "\x1b[?7l";
+  constexpr const char* kWrap = "\x1b[?7h";
+  WatchScreenStyle style{fmt::format("perimap watch, DDS domain {}; Ctrl+C ends", options.domain), true};
+  style.colours = std::getenv("NO_COLOR") == nullptr;
+  std::string text = watch_screen(reports, style);
+  if (reports.empty()) text += fmt::format("waiting for a publisher{}\n", hint(options));
+  // Line by line over what was there, so that nothing flickers; as many as there is room for, each cut off at the edge.
+  winsize window{};
+  int room = ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_row > 0 ? window.ws_row : 24;
+  std::string screen = kHome;
+  for (const char c : text) {
+    if (c == '\n') screen += kRestOfLine;
+    if (c == '\n' && --room == 0) break;
+    screen += c;
+  }
+  fmt::print("{}{}{}{}", kCutOff, screen, kRestOfScreen, kWrap);
+  (void)std::fflush(stdout);
 }
 
 void print_interval(const WatchOptions& options, const std::vector<StreamReport>& reports) {
@@ -75,7 +106,12 @@ Outcome watch(const WatchOptions& options, const Console& console) {
   SampleReceiver receiver(std::move(*readers), std::move(recorder),
                           {options.once ? 1 : options.surfaces, options.once && options.json});
   std::function<void(const std::vector<StreamReport>&)> tell;
-  if (!options.once) tell = [&](const std::vector<StreamReport>& reports) { print_interval(options, reports); };
+  if (!options.once && on_screen(options)) {
+    fmt::print("\x1b[2J");
+    tell = [&](const std::vector<StreamReport>& reports) { draw(options, reports); };
+  } else if (!options.once) {
+    tell = [&](const std::vector<StreamReport>& reports) { print_interval(options, reports); };
+  }
   const auto limit = [](double seconds) { return seconds > 0.0 ? std::optional(from_seconds(seconds)) : std::nullopt; };
   watch_until_ended(receiver, *stop, {limit(options.wait_s), limit(options.duration_s)}, tell);
   const Expected<void> finished = receiver.finish();
@@ -102,13 +138,17 @@ void add_watch_command(Commands& commands) {
   const auto options = std::make_shared<WatchOptions>();
   Command& command = commands.add(
       "watch",
-      "Subscribes to a publishing perimapd and prints a line a second: rate and lost samples, latency (receipt minus "
-      "capture, on the publisher's host only), lateness (receipt minus release), jitter, phase, features, state",
+      "Subscribes to a publishing perimapd and shows what may be trusted and why not, sources, features, phase, rate "
+      "and "
+      "lost samples, latency (receipt minus capture, on the publisher's host only), lateness (receipt minus release), "
+      "jitter: on a terminal one screen that is drawn anew each second, elsewhere a line a second",
       [options](const Console& console) { return watch(*options, console); });
   command.add_option("--domain", options->domain, "DDS domain")->check(Range(0, 230))->capture_default_str();
   command.add_option("--security", options->security,
                      "Keys for DDS Security, as perimap keys issue makes them (a folder), where the domain is secured");
   command.add_flag("--json", options->json, "One JSON object a line");
+  command.add_flag("--lines", options->lines,
+                   "A line a second on a terminal, too, where else one screen is drawn anew");
   Option* once = command.add_flag("--once", options->once, "Print the first surface and end");
   command.add_option("--duration", options->duration_s, "End so many seconds after the first surface")
       ->check(Range(0.001, 1e9))

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <string>
 
 #include "core/angle/angle.hpp"
+#include "daemon/evaluation/watch/watch_text.hpp"
 #include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/status_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
@@ -16,38 +16,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kPerMinutePerRadian = 60.0 / (2.0 * std::numbers::pi);  // rad/s to cycles a minute
-
 double ms(Duration duration) { return to_seconds(duration) * 1e3; }
-
-double rate_hz(const StreamReport& report, ReportKind kind) {
-  // From the first sample of a watch to its last there is one interval less than there are samples.
-  const std::uint64_t intervals =
-      kind == ReportKind::kSummary && report.received > 0 ? report.received - 1 : report.received;
-  return report.length > Duration(0) ? static_cast<double>(intervals) / to_seconds(report.length) : 0.0;
-}
-
-std::string spread_text(const DurationSpread& spread) {
-  return spread.count == 0
-             ? "-"
-             : fmt::format("{:.2f} (p99 {:.2f}, max {:.2f})", ms(spread.p50), ms(spread.p99), ms(spread.max));
-}
 
 Json spread_json(const DurationSpread& spread) {
   if (spread.count == 0) {
     return nullptr;
   }
   return {{"p50", ms(spread.p50)}, {"p99", ms(spread.p99)}, {"max", ms(spread.max)}};
-}
-
-std::string features_text(const SurfaceDigest& last) {
-  std::string text = fmt::format("{} converged, {} converging, {} inconsistent, {} invalid",
-                                 last.features[perimap_FEATURE_CONVERGED], last.features[perimap_FEATURE_CONVERGING],
-                                 last.features[perimap_FEATURE_INCONSISTENT], last.features[perimap_FEATURE_INVALID]);
-  if (last.median_deviation_mm) {
-    text += fmt::format(", median deviation {:.2f} mm", *last.median_deviation_mm);
-  }
-  return text;
 }
 
 std::string state_text(const SurfaceDigest& last) {
@@ -82,11 +57,6 @@ std::string stage_table(const StatusDigest& status) {
                     in_ms(s.recent_p50_ns), in_ms(s.recent_p99_ns), in_ms(s.recent_p999_ns), in_ms(s.recent_max_ns));
   }
   return text;
-}
-
-bool at_odds(client::Hearing hearing) {
-  return hearing == client::Hearing::kTwoPublishers || hearing == client::Hearing::kImplausible ||
-         hearing == client::Hearing::kAnotherBegan;
 }
 
 std::string_view publishers_of(client::Hearing hearing) {
