@@ -145,7 +145,7 @@ recording = "heart-$1.mcap"
 [dds]
 domain = $domain
 END
-  "$perimap" watch --domain "$domain" --wait 60 --record "$stem.received.mcap" &
+  "$perimap" watch --lines --domain "$domain" --wait 60 --record "$stem.received.mcap" &
   local watch=$!
   "$perimapd" -c "$stem.toml" > "$stem.log" 2>&1 &
   local daemon=$!
