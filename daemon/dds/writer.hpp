@@ -1,7 +1,9 @@
 // Publishes samples of one topic.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <memory>
 
 #include "core/error/expected.hpp"
 #include "daemon/dds/entity.hpp"
@@ -29,12 +31,19 @@ class UntypedWriter {
   [[nodiscard]] dds_return_t write(const void* sample) noexcept { return dds_write(writer_.get(), sample); }
   // Readers that are connected now.
   [[nodiscard]] int matched_readers() const noexcept;
-  // On one thread, which need not be the one that writes.
+  // Any thread; takes no lock of the writer's.
   [[nodiscard]] RefusedReaders refused_readers() const noexcept;
 
  private:
-  UntypedWriter(Entity topic, Entity writer) noexcept : topic_(std::move(topic)), writer_(std::move(writer)) {}
+  // Relaxed: each is a hint by itself. Written by a thread of DDS.
+  struct Refused {
+    std::atomic<std::uint32_t> ever{0};
+    std::atomic<std::uint32_t> policy{DDS_INVALID_QOS_POLICY_ID};
+  };
+  UntypedWriter(std::unique_ptr<Refused> refused, Entity topic, Entity writer) noexcept
+      : refused_(std::move(refused)), topic_(std::move(topic)), writer_(std::move(writer)) {}
 
+  std::unique_ptr<Refused> refused_;  // goes after the writer, whose thread writes it
   Entity topic_;
   Entity writer_;
 };

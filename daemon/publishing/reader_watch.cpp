@@ -10,9 +10,11 @@ constexpr Duration kSayAgain = std::chrono::minutes(1);
 
 }  // namespace
 
-std::string refusal_words(dds_qos_policy_id_t policy) {
+std::string refusal_words(std::string_view topic, dds_qos_policy_id_t policy) {
   switch (policy) {
     case DDS_DATA_REPRESENTATION_QOS_POLICY_ID:
+      if (topic == dds::topic_of<perimap_SurfaceMesh>().name)
+        return "it reads another representation than this topic's, XCDR1";
       return "it reads another representation (XCDR1 alone, as Fast DDS 2 does) than this topic's, XCDR2: take "
              "perimap/surface_mesh, which all vendors read, or perimap bridge ros2";
     case DDS_RELIABILITY_QOS_POLICY_ID:
@@ -35,7 +37,7 @@ void ReaderWatch::look(const char* topic, const dds::RefusedReaders& refused, In
   said_ = true;
   last_said_ = now;
   spdlog::warn("{} of {} {} nothing: {}", fresh == 1 ? "a reader" : fmt::format("{} readers", fresh), topic,
-               fresh == 1 ? "gets" : "get", refusal_words(refused.policy));
+               fresh == 1 ? "gets" : "get", refusal_words(topic, refused.policy));
 }
 
 }  // namespace perimap

@@ -3,14 +3,15 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "core/time/instant.hpp"
 #include "daemon/dds/writer.hpp"
 
 namespace perimap {
 
-// What does not fit, and what to do; one line.
-[[nodiscard]] std::string refusal_words(dds_qos_policy_id_t policy);
+// What does not fit of a topic, and what to do; one line.
+[[nodiscard]] std::string refusal_words(std::string_view topic, dds_qos_policy_id_t policy);
 
 // Of one topic. One thread.
 class ReaderWatch {

@@ -65,7 +65,11 @@ void HttpConnection::answer() {
   }
   const auto target = admit(access_, {view(request.target()), field(http::field::host), field(http::field::origin),
                                       field(http::field::cookie)});
-  if (!target) return refuse(target.error().status, target.error().message);
+  if (!target) {
+    const std::string_view origin = field(http::field::origin);
+    if (!origin.empty() && service_.origin_refused) service_.origin_refused(origin);
+    return refuse(target.error().status, target.error().message);
+  }
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
     return refuse(405, "nothing can be changed here");
   }

@@ -25,7 +25,12 @@ constexpr int kKernelBytes = 1 << 18;
 PageSocket::PageSocket(beast::tcp_stream stream, std::string_view command, Events events)
     : stream_(std::move(stream)), command_(command), events_(std::move(events)) {}
 
-void PageSocket::configure() {
+void PageSocket::configure(const std::string& subprotocol) {
+  if (!subprotocol.empty()) {
+    stream_.set_option(websocket::stream_base::decorator([subprotocol](websocket::response_type& response) {
+      response.set(beast::http::field::sec_websocket_protocol, subprotocol);
+    }));
+  }
   // The WebSocket has time limits of its own.
   beast::get_lowest_layer(stream_).expires_never();
   error_code ignored;
@@ -37,12 +42,7 @@ void PageSocket::configure() {
 }
 
 void PageSocket::accept(const Request& request, const std::string& subprotocol) {
-  configure();
-  if (!subprotocol.empty()) {
-    stream_.set_option(websocket::stream_base::decorator([subprotocol](websocket::response_type& response) {
-      response.set(beast::http::field::sec_websocket_protocol, subprotocol);
-    }));
-  }
+  configure(subprotocol);
   stream_.async_accept(request, [self = shared_from_this()](error_code error) {
     if (error || self->ended_) return self->end();
     self->open_ = true;
@@ -52,10 +52,11 @@ void PageSocket::accept(const Request& request, const std::string& subprotocol) 
   });
 }
 
-void PageSocket::turn_away(const Request& request, std::string_view why) {
-  configure();
+void PageSocket::turn_away(const Request& request, const std::string& subprotocol, std::string_view why) {
+  configure(subprotocol);
   stream_.async_accept(request, [self = shared_from_this(), why = std::string(why)](error_code error) {
-    if (error) return self->end();
+    if (error || self->ended_) return self->end();
+    self->open_ = true;
     self->close(websocket::close_code::try_again_later, why);
   });
 }
@@ -68,10 +69,16 @@ void PageSocket::read() {
 }
 
 void PageSocket::heard(std::size_t size) {
-  const auto bytes = beast::buffers_front(buffer_.data());
-  const auto said = events_.said(std::string_view(static_cast<const char*>(bytes.data()), bytes.size()));
+  if (ended_) return;
+  if (!closing_) {
+    const auto bytes = beast::buffers_front(buffer_.data());
+    const auto said = events_.said(std::string_view(static_cast<const char*>(bytes.data()), bytes.size()));
+    if (!said) {
+      waiting_.clear();
+      close(websocket::close_code::policy_error, said.error().message);
+    }
+  }
   buffer_.consume(size);
-  if (!said) close(websocket::close_code::policy_error, said.error().message);
   if (!ended_) read();  // also while closing: the other side's answer is read
 }
 
@@ -88,7 +95,11 @@ void PageSocket::send(const PageMessage& message) {
 }
 
 void PageSocket::write() {
-  if (!open_ || busy_ || ended_ || closing_ || waiting_.empty()) return;
+  if (!open_ || busy_ || ended_) return;
+  if (waiting_.empty()) {
+    if (closing_) finish_closing();
+    return;
+  }
   writing_ = std::move(waiting_.front());
   waiting_.pop_front();
   busy_ = true;
@@ -97,7 +108,6 @@ void PageSocket::write() {
   stream_.async_write(boost::asio::buffer(*writing_.bytes), [self = shared_from_this()](error_code error, std::size_t) {
     self->busy_ = false;
     if (error) return self->end();
-    if (self->closing_) return self->finish_closing();
     self->write();
   });
 }
@@ -112,15 +122,15 @@ void PageSocket::say_goodbye() {
 void PageSocket::close(websocket::close_code code, std::string_view why) {
   if (ended_ || closing_) return;
   closing_ = true;
-  waiting_.clear();
   reason_ = websocket::close_reason(code);
   // A reason has at most 123 bytes, RFC 6455 section 5.5.
   const std::string_view told = why.substr(0, 120);
   reason_.reason.assign(told.data(), told.size());
-  if (!busy_) finish_closing();  // what is under way ends first
+  write();  // what waits, and is under way, goes first
 }
 
 void PageSocket::finish_closing() {
+  if (std::exchange(finishing_, true)) return;
   stream_.async_close(reason_, [self = shared_from_this()](error_code) { self->end(); });
 }
 

@@ -35,12 +35,12 @@ class PageSocket : public std::enable_shared_from_this<PageSocket> {
   // `subprotocol` is named in the answer; empty: none is.
   void accept(const Request& request, const std::string& subprotocol);
   // Instead: accepts only to say why not, since a browser shows no page what a refusal says.
-  void turn_away(const Request& request, std::string_view why);
+  void turn_away(const Request& request, const std::string& subprotocol, std::string_view why);
 
   void send(const PageMessage& message);
   // A message has been under way for too long.
   [[nodiscard]] bool stuck(Instant now) const noexcept;
-  // Says that the server goes.
+  // Says that the server goes, after what waits still.
   void say_goodbye();
   // At once.
   void drop();
@@ -48,7 +48,7 @@ class PageSocket : public std::enable_shared_from_this<PageSocket> {
  private:
   using Stream = boost::beast::websocket::stream<boost::beast::tcp_stream>;
 
-  void configure();
+  void configure(const std::string& subprotocol);
   void read();
   void heard(std::size_t size);
   void write();
@@ -66,7 +66,8 @@ class PageSocket : public std::enable_shared_from_this<PageSocket> {
   bool open_ = false;
   bool ended_ = false;
   bool busy_ = false;     // writing_ is under way
-  bool closing_ = false;  // nothing more is sent
+  bool closing_ = false;  // nothing more is taken to be sent
+  bool finishing_ = false;
   boost::beast::websocket::close_reason reason_;
 };
 

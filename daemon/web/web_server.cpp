@@ -150,7 +150,7 @@ class WebServer::Impl {
     if (ending_) return;
     if (pages_.size() >= kMostPages) {
       return std::make_shared<PageSocket>(std::move(stream), service_.command, PageSocket::Events{})
-          ->turn_away(request, fmt::format("{} pages are open already: close one of them", kMostPages));
+          ->turn_away(request, subprotocol, fmt::format("{} pages are open already: close one of them", kMostPages));
     }
     const PageId id = ++last_id_;
     auto page = std::make_shared<PageSocket>(
@@ -192,6 +192,7 @@ class WebServer::Impl {
     ending_ = true;
     error_code ignored;
     acceptor_.close(ignored);
+    handler_->ending();
     if (pages_.empty()) return context_.stop();
     for (const auto& page : all()) page->say_goodbye();
     timer_.expires_after(kGoodbye);

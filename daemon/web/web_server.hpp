@@ -25,6 +25,8 @@ class PageHandler {
 
   virtual void opened(PageId page) = 0;
   virtual void closed(PageId /*page*/) {}
+  // The server goes: what is sent now is the last that pages get.
+  virtual void ending() {}
   // An error drops that page.
   [[nodiscard]] virtual Expected<void> said(PageId page, std::string_view text) = 0;
   // Ten times a second.

@@ -1,6 +1,7 @@
 // What a web server is there for.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,6 +21,8 @@ struct WebService {
   std::vector<std::string> subprotocols;
   // Of pages of elsewhere that may connect too, as browsers tell it: "https://app.example".
   std::vector<std::string> origins;
+  // On the server's thread: a page of this origin was refused. Any bytes.
+  std::function<void(std::string_view)> origin_refused;
   // Text that pages get five times a second, so that silence is known from a server that has gone; empty: they do not.
   std::string sign_of_life;
 };

@@ -10,6 +10,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "daemon/bridge/foxglove/foxglove_bridge.hpp"
@@ -30,7 +32,7 @@ struct BridgeOptions {
   int port = 0;
   std::optional<std::string> security;
   std::vector<std::string> origins;  // of foxglove
-  int ros_domain = 0;                // of ros2
+  std::optional<int> ros_domain;     // of ros2
 };
 
 // What all bridges ask before they serve.
@@ -88,21 +90,28 @@ Outcome bridge_foxglove(const BridgeOptions& options, const Console& console) {
   return {};
 }
 
-// Of the environment, as ROS 2 itself goes by it; 0 where there is none.
-int ros_domain() {
+// By --ros-domain, or by the environment, as ROS 2 itself goes by it; 0 where neither tells one.
+Expected<int> ros_domain(const BridgeOptions& options) {
   const char* const text = std::getenv("ROS_DOMAIN_ID");
-  int domain = 0;
-  if (text != nullptr) (void)std::from_chars(text, text + std::strlen(text), domain);
+  if (options.ros_domain || text == nullptr || *text == '\0') return options.ros_domain.value_or(0);
+  int domain = -1;
+  const char* const end = text + std::strlen(text);
+  const auto [read, error] = std::from_chars(text, end, domain);
+  if (error != std::errc() || read != end || domain < 0 || domain > 230) {
+    return fail(fmt::format("ROS_DOMAIN_ID: expected a number from 0 to 230, got {:?}", std::string_view(text)));
+  }
   return domain;
 }
 
 Outcome bridge_ros2(const BridgeOptions& options, const Console& console) {
   Expected<StopSignal> stop = begin(options, console);
   if (!stop) return refuse(stop.error());
-  const auto bridge = Ros2Bridge::create({options.domain, options.security}, options.ros_domain,
+  const auto domain = ros_domain(options);
+  if (!domain) return refuse(domain.error(), ExitCode::kWrongUsage);
+  const auto bridge = Ros2Bridge::create({options.domain, options.security}, *domain,
                                          [&console](const std::string& what) { console.complain(what); });
   if (!bridge) return refuse(bridge.error());
-  print_endpoint(fmt::format("ROS 2 domain {}: /perimap/points, /perimap/mesh, /tf, /diagnostics", options.ros_domain));
+  print_endpoint(fmt::format("ROS 2 domain {}: /perimap/points, /perimap/mesh, /tf, /diagnostics", *domain));
   if (const auto ran = (*bridge)->run(stop->descriptor()); !ran) return refuse(ran.error());
   return {};
 }
@@ -149,19 +158,17 @@ void add_bridge_command(Commands& commands) {
               "An address of this host, in numbers, under which viewers elsewhere may connect too; the address that is "
               "printed then has a token");
   foxglove.add_option("--allow-origin", for_foxglove->origins,
-                      "A viewer that runs in a browser may connect when its page came from here, as "
-                      "https://app.foxglove.dev; may be given several times");
+                      "A viewer may connect when its page came from here: https://app.foxglove.dev, or file:// for the "
+                      "viewers' desktop programs; what is refused is told. May be given several times");
   const auto for_ros2 = std::make_shared<BridgeOptions>();
-  for_ros2->ros_domain = ros_domain();
   Command& ros2 = commands.add(
       group, "ros2",
       "Publishes standard messages of ROS 2 (Humble and later) in its DDS domain, without ROS: points and mesh of the "
       "surface, the camera's pose, diagnostics with what may be trusted and why not. Prints the topics",
       [for_ros2](const Console& console) { return bridge_ros2(*for_ros2, console); });
   add_domain_options(ros2, *for_ros2);
-  ros2.add_option("--ros-domain", for_ros2->ros_domain, "DDS domain of ROS 2: ROS_DOMAIN_ID where that is set")
-      ->check(Range(0, 230))
-      ->capture_default_str();
+  ros2.add_option("--ros-domain", for_ros2->ros_domain, "DDS domain of ROS 2; by default ROS_DOMAIN_ID, else 0")
+      ->check(Range(0, 230));
 }
 
 }  // namespace perimap

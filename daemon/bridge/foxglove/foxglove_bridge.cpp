@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <set>
 #include <utility>
 
+#include "daemon/publishing/advice.hpp"
 #include "daemon/web/access.hpp"
 
 namespace perimap {
@@ -14,8 +16,18 @@ namespace {
 
 // Those that are there are found within a second or two.
 constexpr Duration kNobody = std::chrono::seconds(2);
-// Each channel once, and again by a viewer that takes them before it gives others back.
-constexpr std::size_t kMostSubscriptions = 16;
+
+constexpr std::size_t kMostToldOrigins = 16;
+
+// RFC 6454 section 6.2, as browsers write it; "null" is anyone's.
+bool is_origin(std::string_view text) {
+  const std::size_t end = text.find("://");
+  if (end == std::string_view::npos || end == 0 || text.size() > 256) return false;
+  const auto small = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-' || c == '.'; };
+  const std::string_view scheme = text.substr(0, end), rest = text.substr(end + 3);
+  return std::all_of(scheme.begin(), scheme.end(), small) &&
+         std::all_of(rest.begin(), rest.end(), [&](char c) { return small(c) || c == ':' || c == '[' || c == ']'; });
+}
 
 Instant now_utc() {
   const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
@@ -28,12 +40,24 @@ PageMessage text_message(std::string text) {
 
 }  // namespace
 
-WebService FoxgloveBridge::service(std::vector<std::string> origins) {
+Expected<WebService> FoxgloveBridge::service(std::vector<std::string> origins, Say say) {
+  for (const std::string& origin : origins) {
+    if (!is_origin(origin)) {
+      return fail(
+          fmt::format("expected an origin as browsers tell it, such as https://app.foxglove.dev or file://, in small "
+                      "letters and without a path, got {:?}",
+                      origin));
+    }
+  }
   WebService service;
   service.command = "perimap bridge foxglove";
   service.scheme = "ws";
   service.subprotocols.assign(std::begin(kFoxgloveSubprotocols), std::end(kFoxgloveSubprotocols));
   service.origins = std::move(origins);
+  service.origin_refused = [say = std::move(say), told = std::set<std::string>()](std::string_view origin) mutable {
+    if (!is_origin(origin) || told.size() >= kMostToldOrigins || !told.emplace(origin).second) return;
+    say(fmt::format("a page of {} was refused; --allow-origin {} lets it in", origin, origin));
+  };
   return service;
 }
 
@@ -60,6 +84,7 @@ Expected<std::unique_ptr<FoxgloveBridge>> FoxgloveBridge::create(const dds::Memb
 FoxgloveBridge::FoxgloveBridge(int domain, WebServer& server, std::string name, std::string session, Say say)
     : domain_(domain), server_(server), name_(std::move(name)), session_(std::move(session)), say_(std::move(say)) {
   clear();
+  words_ = {FoxgloveLevel::kWarning, "use no position: no surface has come yet"};
 }
 
 // The subscriber's thread.
@@ -68,34 +93,40 @@ void FoxgloveBridge::hear(const ShownSurface& surface) {
   if (!messages) return say_(messages.error().message);
   Instant until = MonotonicClock::now() + kSilence;
   if (surface.usable()) until = std::min(until, surface.valid_until);
-  server_.post([this, told = std::move(*messages), until, frame_id = surface.frame_id] {
+  Words words{surface.usable() ? FoxgloveLevel::kInfo : FoxgloveLevel::kWarning,
+              std::string(permission_of(surface.state))};
+  if (!surface.why.empty()) words.text += ": " + surface.why;
+  if (!surface.remedy.empty()) words.text += "; " + surface.remedy;
+  server_.post([this, told = std::move(*messages), words = std::move(words), until, frame_id = surface.frame_id] {
     frame_id_ = frame_id;
-    tell(told, until);
+    tell(told, words, until);
   });
 }
 
-void FoxgloveBridge::tell(const SurfaceMessages& messages, Instant until) {
+void FoxgloveBridge::tell(const SurfaceMessages& messages, const Words& words, Instant until) {
   until_ = until;
   // It has waited for this thread until it may not be shown any more.
   if (MonotonicClock::now() > until) return tick();
-  if (std::exchange(silent_, false)) say_status(FoxgloveLevel::kInfo, "surfaces come again");
+  if (std::exchange(silent_, false)) say_("surfaces come again");
   newest_ = messages;
   send_all();
+  say(words);
 }
 
 // Sending may drop a viewer.
 void FoxgloveBridge::send_all() {
   for (const auto& [viewer, subscriptions] : std::map(viewers_)) {
-    for (const auto& [subscription, channel] : subscriptions) send(viewer, subscription, channel);
+    for (std::size_t channel = 0; channel < subscriptions.size(); ++channel) {
+      if (subscriptions[channel]) send(viewer, *subscriptions[channel], channel);
+    }
   }
 }
 
 // A message of a channel takes the place of an older one that waits still.
-void FoxgloveBridge::send(PageId viewer, std::uint32_t subscription, SurfaceChannel channel) {
-  const auto index = static_cast<std::size_t>(channel);
-  const SurfaceMessage& message = newest_[index];
+void FoxgloveBridge::send(PageId viewer, std::uint32_t subscription, std::size_t channel) {
+  const SurfaceMessage& message = newest_[channel];
   if (message.cdr.empty()) return;
-  const auto lane = static_cast<std::uint8_t>(1 + index);
+  const auto lane = static_cast<std::uint8_t>(1 + channel);
   server_.send(viewer, {std::make_shared<const std::string>(foxglove_message(subscription, message.utc, message.cdr)),
                         true, lane});
 }
@@ -109,29 +140,36 @@ void FoxgloveBridge::clear() {
   send_all();
 }
 
-void FoxgloveBridge::say_status(FoxgloveLevel level, const std::string& what) {
-  say_(what);
-  server_.send_to_all(text_message(foxglove_status(level, what)));
+// Viewers are told what is new; those that come later hear the last.
+void FoxgloveBridge::say(const Words& words) {
+  if (words == words_) return;
+  words_ = words;
+  server_.send_to_all(text_message(foxglove_status(words.level, words.text)));
 }
 
 void FoxgloveBridge::opened(PageId viewer) {
   viewers_[viewer];
   server_.send(viewer, text_message(foxglove_server_info(name_, session_)));
   server_.send(viewer, text_message(foxglove_advertise(surface_channels())));
+  server_.send(viewer, text_message(foxglove_status(words_.level, words_.text)));
 }
 
 Expected<void> FoxgloveBridge::said(PageId viewer, std::string_view text) {
+  const auto known = viewers_.find(viewer);
+  if (known == viewers_.end()) return {};
   const auto request = parse_foxglove_request(text);
   if (!request) return tl::unexpected(request.error());
-  Subscriptions& subscriptions = viewers_[viewer];
-  for (const std::uint32_t id : request->unsubscribe) subscriptions.erase(id);
+  Subscriptions& subscriptions = known->second;
+  for (const std::uint32_t id : request->unsubscribe) {
+    std::replace(subscriptions.begin(), subscriptions.end(), std::optional(id), std::optional<std::uint32_t>());
+  }
   for (const auto& [id, channel] : request->subscribe) {
     if (channel >= kSurfaceChannels) return fail("there is no such channel");
-    subscriptions[id] = static_cast<SurfaceChannel>(channel);
+    subscriptions[channel] = id;
   }
-  if (subscriptions.size() > kMostSubscriptions) return fail("a viewer has 16 subscriptions at most");
+  tick();  // what is shown may hold no more
   // What holds now is there at once. Sending may drop the viewer.
-  for (const auto& [id, channel] : request->subscribe) send(viewer, id, static_cast<SurfaceChannel>(channel));
+  for (const auto& [id, channel] : request->subscribe) send(viewer, id, channel);
   return {};
 }
 
@@ -140,15 +178,19 @@ void FoxgloveBridge::tick() {
   if (until_ == Instant()) {
     if (nobody_ || now - begun_ < kNobody) return;
     nobody_ = true;
-    return say_status(
-        FoxgloveLevel::kWarning,
-        fmt::format("nobody publishes in DDS domain {}: start perimapd, or name its domain by --domain", domain_));
+    const std::string what = fmt::format("nobody publishes in DDS domain {}", domain_);
+    say_(what + ": start perimapd, or name its domain by --domain");
+    return say({FoxgloveLevel::kWarning, "use no position: " + what});
   }
   if (now <= until_ || std::exchange(silent_, true)) return;
   clear();
-  say_status(FoxgloveLevel::kWarning,
-             "use no position: nothing has come from perimapd for so long that what came last "
-             "holds no more");
+  say_("nothing has come from perimapd for so long that what came last holds no more");
+  say({FoxgloveLevel::kWarning, "use no position: nothing comes from perimapd"});
+}
+
+void FoxgloveBridge::ending() {
+  clear();
+  say({FoxgloveLevel::kWarning, "use no position: perimap bridge foxglove has ended"});
 }
 
 Expected<void> FoxgloveBridge::result() const {

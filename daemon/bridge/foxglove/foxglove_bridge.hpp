@@ -1,9 +1,11 @@
 // What is published, to the viewers Foxglove and Lichtblick.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,8 +28,9 @@ class FoxgloveBridge final : public PageHandler {
   // For a person at the terminal; any thread.
   using Say = std::function<void(const std::string&)>;
 
-  // What the server has to be made for. `origins`: of pages of elsewhere that may connect.
-  [[nodiscard]] static WebService service(std::vector<std::string> origins);
+  // What the server has to be made for. `origins`: of pages of elsewhere that may connect; an error says which is none.
+  // `say` is told of the first ones that were refused.
+  [[nodiscard]] static Expected<WebService> service(std::vector<std::string> origins, Say say);
 
   // Joins the domain. The server must outlive this; `name` is what viewers call it.
   [[nodiscard]] static Expected<std::unique_ptr<FoxgloveBridge>> create(const dds::Membership& membership,
@@ -40,20 +43,28 @@ class FoxgloveBridge final : public PageHandler {
   void closed(PageId viewer) override { viewers_.erase(viewer); }
   [[nodiscard]] Expected<void> said(PageId viewer, std::string_view text) override;
   void tick() override;
+  void ending() override;
   [[nodiscard]] Expected<void> result() const override;
 
  private:
-  using Subscriptions = std::map<std::uint32_t, SurfaceChannel>;  // by the viewer's numbers
+  // Of each channel the viewer's number; a later subscription takes the place of one before.
+  using Subscriptions = std::array<std::optional<std::uint32_t>, kSurfaceChannels>;
+  // What a viewer is to be told in words, beside the messages.
+  struct Words {
+    FoxgloveLevel level = FoxgloveLevel::kInfo;
+    std::string text;
+    [[nodiscard]] bool operator==(const Words&) const = default;
+  };
 
   FoxgloveBridge(int domain, WebServer& server, std::string name, std::string session, Say say);
 
   void hear(const ShownSurface& surface);
   // Of the server's thread.
-  void tell(const SurfaceMessages& messages, Instant until);
-  void send(PageId viewer, std::uint32_t subscription, SurfaceChannel channel);
+  void tell(const SurfaceMessages& messages, const Words& words, Instant until);
+  void send(PageId viewer, std::uint32_t subscription, std::size_t channel);
   void send_all();
   void clear();
-  void say_status(FoxgloveLevel level, const std::string& what);
+  void say(const Words& words);
 
   const int domain_;
   WebServer& server_;
@@ -67,6 +78,7 @@ class FoxgloveBridge final : public PageHandler {
   std::map<PageId, Subscriptions> viewers_;
   SurfaceMessageMaker clearing_maker_;
   SurfaceMessages newest_;
+  Words words_;
   std::string frame_id_ = "tracker";
   Instant until_;  // what is shown may be shown; the clock's epoch: nothing has come
   bool silent_ = false;

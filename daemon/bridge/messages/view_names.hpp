@@ -1,4 +1,4 @@
-// Topics and frames of what is exported for viewers; the layout names them too.
+// Topics and frames of what viewers get; the layout names them too.
 #pragma once
 
 namespace perimap::view_names {

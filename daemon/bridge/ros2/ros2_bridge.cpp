@@ -87,23 +87,37 @@ void Ros2Bridge::tell(const ShownSurface& surface) {
   const Instant now_utc = utc_now();
   until_ = MonotonicClock::now() + kSilence;
   if (surface.usable()) until_ = std::min(until_, surface.valid_until);
+  // It has waited until it may not be shown any more.
+  if (MonotonicClock::now() > until_) return look_at_the_clock(MonotonicClock::now());
   nothing_ = {};
   nothing_.source = surface.source;
   nothing_.frame_id = surface.frame_id;
   if (std::exchange(silent_, false)) say_("surfaces come again");
   write(writers_.points, &messages_.points(surface, now_utc), ros2_topics::kPoints);
   write(writers_.mesh, &messages_.mesh(surface, now_utc), ros2_topics::kMesh);
-  if (surface.X_WC) write(writers_.transforms, &messages_.transforms(surface, now_utc), ros2_topics::kTransforms);
-  const std::string words = surface.why.empty() ? std::string("may be used") : surface.why;
-  write(writers_.diagnostics, &messages_.diagnostics(surface, ros2_level(surface), words, now_utc),
-        ros2_topics::kDiagnostics);
+  // Several surfaces may rest on one frame; tf takes an instant once.
+  if (surface.X_WC && surface.capture != transformed_) {
+    transformed_ = surface.capture;
+    write(writers_.transforms, &messages_.transforms(surface, now_utc), ros2_topics::kTransforms);
+  }
+  diagnose(surface, ros2_level(surface), surface.why.empty() ? "may be used" : surface.why);
+}
+
+// On a change, and else once a second.
+void Ros2Bridge::diagnose(const ShownSurface& surface, Ros2Level level, const std::string& words) {
+  const Instant now = MonotonicClock::now();
+  if (level == level_ && words == words_ && now - diagnosed_ < kSayAgain) return;
+  level_ = level;
+  words_ = words;
+  diagnosed_ = now;
+  write(writers_.diagnostics, &messages_.diagnostics(surface, level, words, utc_now()), ros2_topics::kDiagnostics);
 }
 
 void Ros2Bridge::clear(Ros2Level level, std::string_view words) {
   const Instant now_utc = utc_now();
   write(writers_.points, &messages_.points(nothing_, now_utc), ros2_topics::kPoints);
   write(writers_.mesh, &messages_.mesh(nothing_, now_utc), ros2_topics::kMesh);
-  write(writers_.diagnostics, &messages_.diagnostics(nothing_, level, words, now_utc), ros2_topics::kDiagnostics);
+  diagnose(nothing_, level, std::string(words));
 }
 
 void Ros2Bridge::look_at_the_clock(Instant now) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -44,11 +45,14 @@ class Ros2Bridge {
   };
 
   Ros2Bridge(int domain, Writers writers, Say say)
-      : domain_(domain), writers_(std::move(writers)), say_(std::move(say)) {}
+      : domain_(domain), writers_(std::move(writers)), say_(std::move(say)) {
+    nothing_.frame_id = "tracker";
+  }
 
   // Each of them with the lock.
   void tell(const ShownSurface& surface);
   void clear(Ros2Level level, std::string_view words);
+  void diagnose(const ShownSurface& surface, Ros2Level level, const std::string& words);
   void look_at_the_clock(Instant now);
   void write(dds::UntypedWriter& writer, const void* message, const char* topic);
 
@@ -59,8 +63,12 @@ class Ros2Bridge {
   const Say say_;
   Ros2Messages messages_;
   ShownSurface nothing_;  // of the last source and frame
-  Instant until_;         // what was sent may be used; the clock's epoch: nothing has come
-  Instant cleared_;       // when it was said last that nothing comes
+  Instant transformed_;   // the last capture whose camera was told
+  std::optional<Ros2Level> level_;
+  std::string words_;  // of the last diagnostics
+  Instant diagnosed_;
+  Instant until_;    // what was sent may be used; the clock's epoch: nothing has come
+  Instant cleared_;  // when it was said last that nothing comes
   bool silent_ = false;
   bool nobody_ = false;
   bool failed_ = false;

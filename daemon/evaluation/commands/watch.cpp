@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/command_line/commands.hpp"
@@ -45,7 +46,11 @@ std::string hint(const WatchOptions& options) {
 }
 
 // Whether one screen is drawn anew each second, in the place of a line each.
-bool on_screen(const WatchOptions& options) { return !options.json && !options.lines && isatty(STDOUT_FILENO) == 1; }
+bool on_screen(const WatchOptions& options) {
+  const char* const terminal = std::getenv("TERM");
+  return !options.json && !options.lines && isatty(STDOUT_FILENO) == 1 && terminal != nullptr &&
+         std::string_view(terminal) != "dumb";
+}
 
 void draw(const WatchOptions& options, const std::vector<StreamReport>& reports) {
   constexpr const char* kHome = "\x1b[H";
@@ -59,12 +64,13 @@ void draw(const WatchOptions& options, const std::vector<StreamReport>& reports)
   if (reports.empty()) text += fmt::format("waiting for a publisher{}\n", hint(options));
   // Line by line over what was there, so that nothing flickers; as many as there is room for, each cut off at the edge.
   winsize window{};
-  int room = ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_row > 0 ? window.ws_row : 24;
+  // The last row stays free for what is printed next.
+  int room = ioctl(STDOUT_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_row > 0 ? window.ws_row - 1 : 23;
   std::string screen = kHome;
   for (const char c : text) {
     if (c == '\n') screen += kRestOfLine;
-    if (c == '\n' && --room == 0) break;
     screen += c;
+    if (c == '\n' && --room <= 0) break;
   }
   fmt::print("{}{}{}{}", kCutOff, screen, kRestOfScreen, kWrap);
   (void)std::fflush(stdout);

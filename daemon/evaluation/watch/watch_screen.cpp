@@ -51,6 +51,9 @@ Trust trust_of(const StreamReport& report) {
     return {perimap_SURFACE_INVALID, at_odds(report.hearing) ? "USE NONE" : "LISTENING",
             client::describe(report.hearing), ""};
   }
+  if (report.expired == report.received) {
+    return {perimap_SURFACE_INVALID, "TOO LATE", "surfaces come after their own validity", ""};
+  }
   const SurfaceDigest& last = *report.last;
   if (last.reason == perimap_SURFACE_REASON_NONE) return {last.state, upper(name_of(last.state)), "", ""};
   return {last.state, upper(name_of(last.state)), client::describe(last.reason), remedy_of(last.reason)};
@@ -77,8 +80,9 @@ std::string sources(const StatusDigest& status) {
     const perimap_SourceStatus& s = status.sources[i];
     const double age_ms =
         1e-6 * (static_cast<double>(status.status.time_ns) - static_cast<double>(s.last_source_time_ns));
-    text += fmt::format("  {:<12}{:<10}{:>9.1f}{:>10.0f}{:>10}{:>10}{:>14.1f}\n", name_of(s.kind), name_of(s.state),
-                        s.rate_hz, age_ms, s.dropped, s.invalid, 1e-6 * static_cast<double>(s.delay_p99_ns));
+    const std::string age = s.last_source_time_ns > 0 ? fmt::format("{:.0f}", age_ms) : "-";
+    text += fmt::format("  {:<12}{:<10}{:>9.1f}{:>10}{:>10}{:>10}{:>14.1f}\n", name_of(s.kind), name_of(s.state),
+                        s.rate_hz, age, s.dropped, s.invalid, 1e-6 * static_cast<double>(s.delay_p99_ns));
   }
   return text;
 }
@@ -86,7 +90,7 @@ std::string sources(const StatusDigest& status) {
 std::string stream_text(const StreamReport& report, bool colours) {
   std::string text = fmt::format("{} / {}\n\n", printable(report.source), printable(report.stream));
   text += trust_text(report, colours) + "\n";
-  if (report.last && !at_odds(report.hearing)) {
+  if (report.received > 0 && report.last && !at_odds(report.hearing)) {
     const SurfaceDigest& last = *report.last;
     text += row("features", features_text(last));
     text += row("heart", fmt::format("phase {:.0f} +- {:.1f} deg, {:.1f}/min", last.cardiac_phase_rad / kDegree,
@@ -99,7 +103,7 @@ std::string stream_text(const StreamReport& report, bool colours) {
   text += row("latency", spread_text(report.latency) + " ms, receipt minus capture");
   text += row("late", spread_text(report.lateness) + " ms, receipt minus release");
   text += row("jitter", spread_text(report.jitter) + " ms");
-  if (!report.status) return text;
+  if (!report.status || report.received == 0) return text;
   const perimap_Status& status = report.status->status;
   text += row("set-up", setup_words(status.setup));
   if (status.recording != perimap_RECORDING_OFF) {

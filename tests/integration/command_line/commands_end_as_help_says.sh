@@ -129,6 +129,14 @@ ends 2 "A subcommand is required" bridge
 ends 2 "--port" bridge igtl --port 99999
 ends 1 "192.0.2.1" bridge igtl --port 0 --bind 192.0.2.1
 ends 2 "expected one address of this host" bridge igtl --port 0 --bind 0.0.0.0
+ends 2 "--port" bridge foxglove --port 99999
+ends 1 "192.0.2.1" bridge foxglove --port 0 --bind 192.0.2.1
+ends 2 "expected an origin" bridge foxglove --port 0 --allow-origin https://app.foxglove.dev/
+ends 2 "expected an origin" bridge foxglove --port 0 --allow-origin null
+ends 2 "--ros-domain" bridge ros2 --ros-domain 231
+export ROS_DOMAIN_ID=7x
+ends 2 "ROS_DOMAIN_ID: expected a number from 0 to 230" bridge ros2
+unset ROS_DOMAIN_ID
 ends 2 "OUT: is the recording itself" export-view r.mcap r.mcap
 ends 1 "nothing.mcap" export-view nothing.mcap o.mcap
 ends 2 "A subcommand is required" keys

@@ -85,7 +85,7 @@ const ended = new Promise((resolve, reject) => {
   });
   client.on("status", ({ message }) => {
     seen.statuses.push(message);
-    if (!message.includes("nothing has come from perimapd")) return;
+    if (!message.includes("nothing comes from perimapd")) return;
     clearTimeout(late);
     setTimeout(resolve, 500);
   });
@@ -93,6 +93,9 @@ const ended = new Promise((resolve, reject) => {
 await ended;
 // It listens for a second whether there is one publisher, and three to its meshes.
 assert.deepEqual(seen.states, ["invalid", "good", "degraded", "invalid", "good", "invalid"]);
+for (const words of ["no surface has come yet", "may be used", "no pose of the scope", "no heart beat for too long"]) {
+  assert.ok(seen.statuses.some((told) => told.includes(words)), `${words}: ${seen.statuses}`);
+}
 assert.ok(seen.features > 20 && seen.meshes > 10 && seen.cleared > 5 && seen.transforms > 20, JSON.stringify(seen));
 console.log(`as published: ${seen.features} surfaces, ${seen.meshes} with a mesh, ${seen.transforms} poses of the camera`);
 process.exit(0);

@@ -108,14 +108,13 @@ TEST_F(FailingWrites, AreLoggedOnceByTheStatusThreadAndAtTheirEndWithTheirNumber
 // A reader that asks for more than `topic` offers.
 class WrongReader {
  public:
-  explicit WrongReader(dds_durability_kind_t durability) {
+  WrongReader() {
     participant_ = dds_create_participant(kDomain, nullptr, nullptr);
     const auto& description = dds::topic_of<perimap_Surface>();
     const dds_entity_t topic =
         dds_create_topic(participant_, description.descriptor, description.name, nullptr, nullptr);
     dds_qos_t* qos = dds_create_qos();
     dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, 0);
-    dds_qset_durability(qos, durability);
     EXPECT_GT(dds_create_reader(participant_, topic, qos, nullptr), 0);
     dds_delete_qos(qos);
   }
@@ -135,14 +134,14 @@ TEST_F(ReadersThatGetNothing, AreToldOnceWithWhatDoesNotFit) {
   const perimap_Status status{};
   publishing->status(status);
   EXPECT_EQ(log(), "");
-  const WrongReader reader(DDS_DURABILITY_VOLATILE);
+  const WrongReader reader;
   for (int i = 0; i < 200 && log().empty(); ++i) {
     publishing->status(status);
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   EXPECT_THAT(log(), HasSubstr("a reader of perimap/surface gets nothing: it asks for a reliable topic"));
   const std::string told = log();
-  const WrongReader another(DDS_DURABILITY_VOLATILE);
+  const WrongReader another;
   publishing->status(status);
   EXPECT_EQ(log(), told) << "once a minute";
 }

@@ -66,7 +66,12 @@ TEST(WatchScreen, OfWhatMayNotBeUsedNothingIsShownAsGood) {
   StreamReport silent = report();
   silent.received = 0;
   EXPECT_THAT(screen(silent), HasSubstr("NOTHING COMES  use no position"));
-  for (const StreamReport& bad : {two, listening, silent}) EXPECT_THAT(screen(bad), Not(HasSubstr("GOOD")));
+  EXPECT_THAT(screen(silent), Not(HasSubstr("converged")));
+  EXPECT_THAT(screen(silent), Not(HasSubstr("stalled")));
+  StreamReport late = report();
+  late.expired = late.received;
+  EXPECT_THAT(screen(late), HasSubstr("TOO LATE  use no position"));
+  for (const StreamReport& bad : {two, listening, silent, late}) EXPECT_THAT(screen(bad), Not(HasSubstr("GOOD")));
 }
 
 TEST(WatchScreen, NamesOfAPublisherMoveNoCursor) {
