@@ -168,7 +168,7 @@ void NdiSession::enter(LinkControl& link, Step step, Instant now) {
       return command(link, "PHSR:02", kReplyTime, now);
     case Step::kFindToEnable:
       return command(link, "PHSR:03", kReplyTime, now);
-    case Step::kStart:
+    case Step::kStartTracking:
       return command(link, "TSTART:80", kLongReplyTime, now);
     case Step::kQuiet:
       quiet_until_ = now + kQuietTime;
@@ -313,7 +313,7 @@ void NdiSession::on_text(LinkControl& link, const std::string& text, Instant now
     case Step::kEnablePort:
       if (!okay) break;
       return next_port(link, Step::kFindToEnable, now);
-    case Step::kStart:
+    case Step::kStartTracking:
       if (!okay) break;
       last_reading_ = last_pose_ = now;
       reference_ = {};
@@ -361,7 +361,7 @@ void NdiSession::next_port(LinkControl& link, Step search, Instant now) {
     enabled_.clear();
     return enter(link, Step::kFindToEnable, now);
   }
-  if (choose_tools(link)) enter(link, Step::kStart, now);
+  if (choose_tools(link)) enter(link, Step::kStartTracking, now);
 }
 
 // The next block of a definition, the next definition, or on to the initialisation of all ports.

@@ -85,7 +85,7 @@ class NdiSession final : public DeviceProtocol {
     kInitialisePort,
     kFindToEnable,
     kEnablePort,
-    kStart,
+    kStartTracking,
     kStream,
     kQuiet,  // a damaged reply: what is still coming belongs to it
   };

@@ -77,12 +77,14 @@ Outcome bridge_foxglove(const BridgeOptions& options, const Console& console) {
   if (const auto wrong = wrong_address(options.address)) return refuse(*wrong, ExitCode::kWrongUsage);
   Expected<StopSignal> stop = begin(options, console);
   if (!stop) return refuse(stop.error());
-  Expected<WebServer> server = WebServer::listen({options.address, static_cast<std::uint16_t>(options.port)},
-                                                 FoxgloveBridge::service(options.origins));
+  const auto say = [&console](const std::string& what) { console.complain(what); };
+  auto service = FoxgloveBridge::service(options.origins, say);
+  if (!service) return refuse(Error{"--allow-origin: " + service.error().message}, ExitCode::kWrongUsage);
+  Expected<WebServer> server =
+      WebServer::listen({options.address, static_cast<std::uint16_t>(options.port)}, std::move(*service));
   if (!server) return refuse(server.error());
-  const auto bridge =
-      FoxgloveBridge::create({options.domain, options.security}, *server, fmt::format("perimap {}", PERIMAP_VERSION),
-                             [&console](const std::string& what) { console.complain(what); });
+  const auto bridge = FoxgloveBridge::create({options.domain, options.security}, *server,
+                                             fmt::format("perimap {}", PERIMAP_VERSION), say);
   if (!bridge) return refuse(bridge.error());
   print_endpoint(server->url());
   if (const auto ran = server->run(**bridge, stop->descriptor()); !ran) return refuse(ran.error());

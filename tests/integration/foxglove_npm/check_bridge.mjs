@@ -61,7 +61,11 @@ const client = new FoxgloveClient({ ws: new WebSocket(address, [FoxgloveClient.S
 const ended = new Promise((resolve, reject) => {
   const late = setTimeout(() => reject(new Error(`not done in time: ${JSON.stringify(seen)}`)), 100000);
   client.on("error", reject);
-  client.on("close", () => reject(new Error("the bridge closed the connection")));
+  // run.sh ends the bridge once perimapd is silent; its last word comes before.
+  client.on("close", () => {
+    clearTimeout(late);
+    resolve();
+  });
   client.on("serverInfo", ({ name }) => assert.match(name, /^perimap /));
   client.on("advertise", (channels) => {
     assert.deepEqual(channels.map(({ topic }) => topic).sort(), ["/surface/scene", "/surface/worth", "/transforms"]);
@@ -85,17 +89,15 @@ const ended = new Promise((resolve, reject) => {
   });
   client.on("status", ({ message }) => {
     seen.statuses.push(message);
-    if (!message.includes("nothing comes from perimapd")) return;
-    clearTimeout(late);
-    setTimeout(resolve, 500);
   });
 });
 await ended;
 // It listens for a second whether there is one publisher, and three to its meshes.
 assert.deepEqual(seen.states, ["invalid", "good", "degraded", "invalid", "good", "invalid"]);
-for (const words of ["no surface has come yet", "may be used", "no pose of the scope", "no heart beat for too long"]) {
-  assert.ok(seen.statuses.some((told) => told.includes(words)), `${words}: ${seen.statuses}`);
-}
+const words = ["may be used", "no pose of the scope", "no heart beat for too long", "may be used", "nothing comes", "has ended"];
+let next = 0;
+for (const told of seen.statuses) if (next < words.length && told.includes(words[next])) next += 1;
+assert.equal(next, words.length, `${words[next]} is missing in ${seen.statuses}`);
 assert.ok(seen.features > 20 && seen.meshes > 10 && seen.cleared > 5 && seen.transforms > 20, JSON.stringify(seen));
 console.log(`as published: ${seen.features} surfaces, ${seen.meshes} with a mesh, ${seen.transforms} poses of the camera`);
 process.exit(0);

@@ -12,8 +12,9 @@ tag=foxglove-$$
 domain=$((20 + $$ % 100))
 export CYCLONEDDS_URI="file://$xml,<CycloneDDS><Domain><Discovery><Tag>$tag</Tag></Discovery></Domain></CycloneDDS>"
 
-cleanup() { kill "$bridge" "$published" 2> /dev/null || true; }
-bridge= published=
+cleanup() { kill "$bridge" "$published" "$judge" 2> /dev/null || true; }
+bridge= published= judge=
+rm -f address said
 trap cleanup EXIT
 "$perimap" bridge foxglove --domain $domain --port 0 > address 2> said &
 bridge=$!
@@ -32,8 +33,13 @@ case $address in
 esac
 "$publisher" $domain &
 published=$!
-node check_bridge.mjs "$address"
-# An end of its own, when it is asked to.
+node check_bridge.mjs "$address" &
+judge=$!
+for _ in $(seq 1200); do
+  if grep -q "nothing has come from perimapd" said || ! kill -0 $judge 2> /dev/null; then break; fi
+  sleep 0.1
+done
+# An end of its own, when it is asked to: its viewers hear a last word.
 kill -INT $bridge
+wait $judge
 wait $bridge
-grep -q "nothing has come from perimapd" said
