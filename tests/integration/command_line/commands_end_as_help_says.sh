@@ -26,7 +26,7 @@ ends() {
   got=$?
   [ $got -eq "$code" ] || fail "'$*' ended with $got in place of $code"
   grep -qF -e "$text" error || fail "'$*' does not say: $text"
-  if grep -vE "^perimap $1( [a-z-]+)*: " error; then fail "'$*': a line without the command's name"; fi
+  if grep -vE "^perimap $1( [a-z0-9-]+)*: " error; then fail "'$*': a line without the command's name"; fi
 }
 
 printf 'version = 1\n[realtime]\nlock_memory = false\n' > good.toml
