@@ -20,7 +20,6 @@ constexpr double kCaution = 2.0;         // members
 constexpr double kOften = 0.4;           // share of P waves that are conducted: in 2:1 block half of them
 constexpr double kHardlyWithout = 0.85;  // share of QRS complexes that a P wave precedes
 constexpr int kEnough = 2;               // members
-constexpr int kSurelyTwo = 3;            // members, after which one kind is taken to be two
 constexpr double kFollow = 0.2;          // share of a new distance in that of rivals
 
 }  // namespace
@@ -49,11 +48,10 @@ ClusterMatch QrsClusters::nearest_beat(const QrsShape& shape) const noexcept {
   return nearest;
 }
 
-int QrsClusters::make_room(bool frozen, int but) noexcept {
+int QrsClusters::make_room(bool frozen) noexcept {
   int room = -1;
   const auto spared = [&](int i) { return frozen && settled(i); };
   for (int i = 0; i < kClusters; ++i) {
-    if (i == but) continue;
     if (room < 0 || (spared(i) != spared(room) ? spared(room) : at(i).weight < at(room).weight)) room = i;
   }
   clusters_[static_cast<std::size_t>(room)] = {};
@@ -78,7 +76,7 @@ int QrsClusters::learn(const QrsShape& shape, bool upward, Surroundings around, 
   }
   ClusterMatch same = nearest(shape, kDisplaced);
   if (same.correlation < kSame) {
-    same.of = make_room(frozen, -1);
+    same.of = make_room(frozen);
     Cluster& anew = clusters_[static_cast<std::size_t>(same.of)];
     anew.shape.points = shape.points;
     anew.upward = upward;
@@ -112,37 +110,11 @@ void QrsClusters::judged(int of, double log_odds) noexcept {
 
 double QrsClusters::log_odds(int i) const noexcept { return at(i).log_odds * at(i).judged / (at(i).judged + kCaution); }
 
-void QrsClusters::followed(int of, int by) noexcept {
+void QrsClusters::followed(int of, bool by_sharper) noexcept {
   if (of < 0) return;
   Cluster& c = clusters_[static_cast<std::size_t>(of)];
   c.followed_known = std::min(c.followed_known + 1.0, kMemory);
-  c.followed += ((by >= 0 ? 1.0 : 0.0) - c.followed) / c.followed_known;
-  c.by_own += ((by == of ? 1.0 : 0.0) - c.by_own) / c.followed_known;
-}
-
-bool QrsClusters::is_two(int i) const noexcept {
-  return i >= 0 && at(i).followed_known >= kSurelyTwo && at(i).by_own >= kOften;
-}
-
-void QrsClusters::part(int of, const QrsShape& blunter) noexcept {
-  Cluster& sharp = clusters_[static_cast<std::size_t>(of)];
-  Cluster& blunt = clusters_[static_cast<std::size_t>(make_room(false, of))];
-  blunt.size = root_mean_square(blunter);
-  blunt.sizes.push(blunt.size);
-  blunt.shape = blunter;
-  for (float& slope : blunt.shape.slope) slope /= static_cast<float>(blunt.size);
-  blunt.upward = sharp.upward;
-  blunt.born = sharp.born;
-  blunt.calm = sharp.calm;
-  blunt.calm_known = sharp.calm_known;
-  blunt.followed = 1.0;
-  blunt.followed_known = kCaution;
-  // Both recur: what was seen were members of both.
-  blunt.weight = std::max(sharp.by_own * sharp.weight, kRecurs);
-  sharp.weight = std::max((1.0 - sharp.by_own) * sharp.weight, kRecurs);
-  sharp.followed = 0.0;
-  sharp.followed_known = kCaution;
-  sharp.by_own = 0.0;
+  c.followed += ((by_sharper ? 1.0 : 0.0) - c.followed) / c.followed_known;
 }
 
 void QrsClusters::preceded(int of, int by) noexcept {

@@ -38,12 +38,8 @@ class QrsClusters {
   int learn(const QrsShape& shape, bool upward, Surroundings around, Instant seen) noexcept;
   // How much it looked like a QRS by itself.
   void judged(int of, double log_odds) noexcept;
-  // Of which cluster a complex as sharp or sharper was that followed it within a PR interval; -1: none did.
-  void followed(int of, int by) noexcept;
-  // Sharper ones of its own kind follow so many of its members that they are two kinds, P waves and QRS complexes.
-  [[nodiscard]] bool is_two(int i) const noexcept;
-  // The blunter ones of it are a kind of their own from now on, of which this is one.
-  void part(int of, const QrsShape& blunter) noexcept;
+  // Whether a complex as sharp or sharper followed it within a PR interval.
+  void followed(int of, bool by_sharper) noexcept;
   // Which blunter complex came within a PR interval before it; -1: none.
   void preceded(int of, int by) noexcept;
   // Another of cluster `by` that looks as much like a QRS comes so long after it, or before: at the same distance,
@@ -89,7 +85,6 @@ class QrsClusters {
     double log_odds = 0.0;
     double judged = 0.0;  // members that it is of, bounded
     double followed = 0.0;
-    double by_own = 0.0;  // share that others of it followed
     double followed_known = 0.0;
     int before = -1;        // the cluster that precedes it,
     double preceded = 0.0;  // for this share of its members,
@@ -103,8 +98,8 @@ class QrsClusters {
     bool upward = true;
     Instant born;
   };
-  // Clears the rarest cluster, but for one; `frozen`: none that is settled, while there is another.
-  int make_room(bool frozen, int but) noexcept;
+  // Clears the rarest cluster; `frozen`: none that is settled, while there is another.
+  int make_room(bool frozen) noexcept;
   [[nodiscard]] const Cluster& at(int i) const noexcept { return clusters_[static_cast<std::size_t>(i)]; }
 
   std::array<Cluster, kClusters> clusters_{};

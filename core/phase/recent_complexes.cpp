@@ -14,17 +14,12 @@ void RecentComplexes::note(const QrsCandidate& candidate, int cluster, bool lear
     if (apart < settings_.pr_shortest || apart > longest_pr) continue;
     const double sharper = seen.cluster == cluster ? settings_.sharper_of_one_kind : settings_.as_sharp;
     if (candidate.sharpness < sharper * seen.sharpness) continue;
-    clusters.followed(seen.cluster, cluster);
+    clusters.followed(seen.cluster, true);
     seen.waits_for_follower = false;
     if (nearest == nullptr || seen.time > nearest->time) nearest = &seen;
-    if (!clusters.is_two(seen.cluster)) continue;
-    // What has one shape cannot be told apart, and stays doubtful.
-    const double alike = best_match(candidate.shape, seen.shape, settings_.displaced).correlation;
-    if (alike < settings_.exactly_alike) clusters.part(seen.cluster, seen.shape);
   }
   clusters.preceded(cluster, nearest == nullptr ? -1 : nearest->cluster);
-  seen_[static_cast<std::size_t>(next_)] = {
-      candidate.time, candidate.shape, candidate.sharpness, -10.0, cluster, learnt, true, true};
+  seen_[static_cast<std::size_t>(next_)] = {candidate.time, candidate.sharpness, -10.0, cluster, learnt, true, true};
   next_ = (next_ + 1) % kSeen;
 }
 
@@ -88,7 +83,7 @@ void RecentComplexes::expire(Instant now, QrsClusters& clusters) noexcept {
   for (Seen& seen : seen_) {
     const Duration age = now - seen.time;
     if (seen.waits_for_follower && age >= settings_.time_to_decide + settings_.pr_longest / 2) {
-      clusters.followed(seen.cluster, -1);
+      clusters.followed(seen.cluster, false);
       seen.waits_for_follower = false;
     }
     if (seen.waits_for_rival && age >= settings_.rt_longest + settings_.time_if_known) {

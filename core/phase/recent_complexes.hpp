@@ -33,7 +33,6 @@ class RecentComplexes {
 
   struct Seen {
     Instant time;
-    QrsShape shape;
     double sharpness = 0.0;
     double log_odds = -10.0;  // by itself
     int cluster = -1;         // -1: none was seen

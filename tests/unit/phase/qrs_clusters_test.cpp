@@ -9,8 +9,6 @@ namespace perimap {
 namespace {
 
 constexpr Instant kNow{Duration(0)};
-constexpr int kNone = -1;  // of what follows
-constexpr int kAnother = 7;
 
 // The slope of a wave of that height and width in steps.
 QrsShape shape(double height, double width, double middle = 18.0) {
@@ -84,7 +82,7 @@ TEST(QrsClusters, CanBeSettledAtOnce) {
 TEST(QrsClusters, KnowsTheShareThatASharperOneFollows) {
   QrsClusters clusters;
   const int wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
-  for (int i = 0; i < 8; ++i) clusters.followed(wave, i % 2 == 0 ? kAnother : kNone);
+  for (int i = 0; i < 8; ++i) clusters.followed(wave, i % 2 == 0);
   EXPECT_NEAR(clusters.followers(wave), 0.5, 0.07);
   EXPECT_EQ(clusters.followers_known(wave), 8.0);
 }
@@ -94,7 +92,7 @@ bool leads(int conducted, int with_p_wave, int qrs_complexes = 10) {
   QrsClusters clusters;
   const int wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
   const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
-  for (int i = 0; i < 10; ++i) clusters.followed(wave, i < conducted ? kAnother : kNone);
+  for (int i = 0; i < 10; ++i) clusters.followed(wave, i < conducted);
   for (int i = 0; i < qrs_complexes; ++i) clusters.preceded(beat, i < with_p_wave ? wave : -1);
   EXPECT_FALSE(clusters.leads(beat));
   return clusters.leads(wave);
@@ -116,8 +114,8 @@ TEST(QrsClusters, WhatComesBeforeIsOfOneKind) {
   const int other = clusters.learn(shape(0.4, 2.5), true, Surroundings::kCalm, kNow);
   const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
   for (int i = 0; i < 12; ++i) {
-    clusters.followed(wave, kAnother);
-    clusters.followed(other, kAnother);
+    clusters.followed(wave, true);
+    clusters.followed(other, true);
     clusters.preceded(beat, i % 2 == 0 ? wave : other);
   }
   EXPECT_FALSE(clusters.leads(wave));
@@ -126,40 +124,6 @@ TEST(QrsClusters, WhatComesBeforeIsOfOneKind) {
   for (int i = 0; i < 60; ++i) clusters.preceded(beat, other);
   EXPECT_TRUE(clusters.leads(other));
   EXPECT_FALSE(clusters.leads(wave));
-}
-
-// One kind of P waves and QRS complexes, so many of which are known to be followed by another of it or by none.
-bool is_two(int followed, int alone) {
-  QrsClusters clusters;
-  const int both = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
-  for (int i = 0; i < alone; ++i) clusters.followed(both, kNone);
-  for (int i = 0; i < followed; ++i) clusters.followed(both, both);
-  return clusters.is_two(both);
-}
-
-TEST(QrsClusters, AKindWhoseMembersFollowEachOtherIsTwo) {
-  EXPECT_TRUE(is_two(3, 3)) << "the P wave and the QRS complex";
-  EXPECT_FALSE(is_two(3, 6)) << "a beat in three that comes early";
-  EXPECT_TRUE(is_two(2, 1));
-  EXPECT_FALSE(is_two(1, 1)) << "that may be chance";
-}
-
-TEST(QrsClusters, OfAKindThatIsTwoTheBlunterOnesAreWavesThatAreFollowed) {
-  QrsClusters clusters;
-  const QrsShape blunt = shape(0.7, 3.2);
-  int both = -1;
-  for (int i = 0; i < 6; ++i) {
-    both = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
-    EXPECT_EQ(clusters.learn(blunt, true, Surroundings::kCalm, kNow), both);
-  }
-  clusters.part(both, blunt);
-  const int waves = clusters.learn(blunt, true, Surroundings::kCalm, kNow);
-  EXPECT_NE(waves, both);
-  EXPECT_EQ(clusters.learn(kBeat, true, Surroundings::kCalm, kNow), both);
-  EXPECT_TRUE(clusters.settled(waves));
-  EXPECT_TRUE(clusters.settled(both));
-  EXPECT_GT(clusters.followers(waves), 0.9);
-  EXPECT_EQ(clusters.followers(both), 0.0);
 }
 
 // So many strange complexes, each unlike the others: is the kind that was known before them still?
@@ -205,7 +169,7 @@ TEST(QrsClusters, AKindThatTakesThePlaceOfPWavesIsNotTakenForThem) {
   const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
   for (int i = 0; i < 12; ++i) clusters.preceded(beat, wave);
   forget_all_but_newest(clusters, beat, kBeat);
-  for (int i = 0; i < 10; ++i) clusters.followed(wave, kAnother);  // another kind now
+  for (int i = 0; i < 10; ++i) clusters.followed(wave, true);  // another kind now
   clusters.preceded(beat, wave);
   EXPECT_FALSE(clusters.leads(wave)) << "one is not enough";
   clusters.preceded(beat, wave);
@@ -328,8 +292,8 @@ TEST(QrsClusters, ATemplateFollowsItsMembersByAnEighthEach) {
 TEST(QrsClusters, SharesAreOfTheLastTwelveMembers) {
   QrsClusters clusters;
   const int wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
-  for (int i = 0; i < 40; ++i) clusters.followed(wave, kAnother);
-  for (int i = 0; i < 8; ++i) clusters.followed(wave, kNone);
+  for (int i = 0; i < 40; ++i) clusters.followed(wave, true);
+  for (int i = 0; i < 8; ++i) clusters.followed(wave, false);
   EXPECT_NEAR(clusters.followers(wave), std::pow(11.0 / 12.0, 8.0), 0.02);
 }
 
