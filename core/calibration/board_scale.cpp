@@ -7,14 +7,14 @@
 namespace perimap {
 namespace {
 
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using ScaleMatrix = Eigen::Matrix<double, 6, 6>;
 
 constexpr int kScale = 12;  // after X_SC and X_WB
 constexpr int kOffset = 13;
 
 // How (rotation, translation) of a small step in the frame B looks in the frame A.
-Matrix6d carried(const Pose& X_AB) {
-  Matrix6d by = Matrix6d::Zero();
+ScaleMatrix carried(const Pose& X_AB) {
+  ScaleMatrix by = ScaleMatrix::Zero();
   by.topLeftCorner<3, 3>() = X_AB.R;
   by.bottomRightCorner<3, 3>() = X_AB.R;
   by.bottomLeftCorner<3, 3>() = cross_matrix(X_AB.t) * X_AB.R;
@@ -24,12 +24,12 @@ Matrix6d carried(const Pose& X_AB) {
 }  // namespace
 
 BoardScale board_scale(const std::vector<PosePair>& pairs, const std::vector<char>& used, const Pose& X_SC,
-                       const Pose& X_WB, const Matrix6d& error_covariance, double correlation_length,
+                       const Pose& X_WB, const ScaleMatrix& error_covariance, double correlation_length,
                        bool with_offset) {
   const int count = with_offset ? kOffset + 1 : kScale + 1;
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(count, count);
   Eigen::VectorXd b = Eigen::VectorXd::Zero(count);
-  const Eigen::LLT<Matrix6d> weight(error_covariance);
+  const Eigen::LLT<ScaleMatrix> weight(error_covariance);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (used[i] == 0) continue;
     const PosePair& pair = pairs[i];
