@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/statistics/nearest_few.hpp"
 #include "core/statistics/upper_median.hpp"
 
 namespace perimap {
@@ -87,50 +88,33 @@ void CommonMotion::fit(const Similarity& motion, double tolerance_px) noexcept {
 
 Vector2d CommonMotion::at(const Vector2d& from_px, const Vector2d* but) const noexcept {
   constexpr std::size_t kAround = 6, kEnough = 4;
-  struct Near {
-    double distance_squared = 0;
-    Vector2d off = Vector2d::Zero();
-  };
-  std::array<Near, kAround> nearest;
-  std::size_t count = 0;
+  NearestFew<Vector2d, kAround> nearest;
   for (const Pair& pair : pairs_) {
     if (!pair.agrees || (but != nullptr && pair.from == *but)) continue;
     const double distance_squared = (pair.from - from_px).squaredNorm();
-    if (count == kAround && distance_squared >= nearest[count - 1].distance_squared) continue;
-    std::size_t place = count < kAround ? count++ : count - 1;
-    for (; place > 0 && nearest[place - 1].distance_squared > distance_squared; --place) {
-      nearest[place] = nearest[place - 1];
-    }
-    nearest[place] = {distance_squared, pair.to - to_px_ - shape_ * (pair.from - from_px_)};
+    if (!nearest.takes(distance_squared)) continue;
+    nearest.add(distance_squared, pair.to - to_px_ - shape_ * (pair.from - from_px_));
   }
   Vector2d at = to_px_ + shape_ * (from_px - from_px_);
-  if (count < kEnough) return at;
+  if (nearest.size() < kEnough) return at;
   std::array<double, kAround> values{};
   for (int axis = 0; axis < 2; ++axis) {
-    for (std::size_t i = 0; i < count; ++i) values[i] = nearest[i].off[axis];
-    at[axis] += upper_median(values.begin(), values.begin() + count);
+    for (std::size_t i = 0; i < nearest.size(); ++i) values[i] = nearest[i].value[axis];
+    at[axis] += upper_median(values.begin(), values.begin() + nearest.size());
   }
   return at;
 }
 
 bool CommonMotion::holds_around(const Vector2d& from_px) const noexcept {
-  constexpr std::size_t kAround = 6, kMostOthers = 1;
-  std::array<double, kAround> nearest{};
-  std::array<bool, kAround> agrees{};
-  std::size_t count = 0;
+  constexpr std::size_t kAround = 6;
+  constexpr std::ptrdiff_t kMostOthers = 1;
+  NearestFew<bool, kAround> agree;
   for (const Pair& pair : pairs_) {
     const double distance_squared = (pair.from - from_px).squaredNorm();
-    if (count == kAround && distance_squared >= nearest[count - 1]) continue;
-    std::size_t place = count < kAround ? count++ : count - 1;
-    for (; place > 0 && nearest[place - 1] > distance_squared; --place) {
-      nearest[place] = nearest[place - 1];
-      agrees[place] = agrees[place - 1];
-    }
-    nearest[place] = distance_squared;
-    agrees[place] = pair.agrees;
+    if (agree.takes(distance_squared)) agree.add(distance_squared, pair.agrees);
   }
-  const auto others = static_cast<std::size_t>(std::count(agrees.begin(), agrees.begin() + count, false));
-  return count == kAround && others <= kMostOthers;
+  const auto others = std::count_if(agree.begin(), agree.end(), [](const auto& near) { return !near.value; });
+  return agree.size() == kAround && others <= kMostOthers;
 }
 
 }  // namespace perimap

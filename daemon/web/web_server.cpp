@@ -14,6 +14,7 @@
 
 #include "daemon/web/access.hpp"
 #include "daemon/web/http_connection.hpp"
+#include "daemon/web/listen.hpp"
 #include "daemon/web/page_socket.hpp"
 
 namespace perimap {
@@ -53,14 +54,10 @@ class WebServer::Impl {
       if (!token) return tl::unexpected(token.error());
       access_.token = std::move(*token);
     }
+    if (auto listening = listen_on(acceptor_, settings.address, settings.port, service_.command); !listening) {
+      return listening;
+    }
     error_code error;
-    const tcp::endpoint endpoint(asio::ip::make_address(settings.address, error), settings.port);
-    if (!error) acceptor_.open(endpoint.protocol(), error);
-    // Connections of a page that was open before do not keep the port.
-    if (!error) acceptor_.set_option(asio::socket_base::reuse_address(true), error);
-    if (!error) acceptor_.bind(endpoint, error);
-    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
-    if (error) return fail(why_not(settings, error));
     access_.port = acceptor_.local_endpoint(error).port();
     address_ = settings.address;
     return {};
@@ -106,17 +103,6 @@ class WebServer::Impl {
 
  private:
   using Pages = std::map<PageId, std::shared_ptr<PageSocket>>;
-
-  std::string why_not(const Settings& settings, const error_code& error) const {
-    const std::string where =
-        fmt::format("cannot listen on {} port {}: {}", settings.address, settings.port, error.message());
-    if (error == asio::error::address_in_use) {
-      return fmt::format("{}; is another {} running? Else choose another --port, or 0 for any that is free", where,
-                         service_.command);
-    }
-    if (error == asio::error::access_denied) return where + "; ports below 1024 are root's: choose another --port";
-    return where + "; --bind takes an address of this host";
-  }
 
   // Since sending may drop a page.
   std::vector<std::shared_ptr<PageSocket>> all() const {

@@ -3,19 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <iterator>
 #include <set>
 #include <utility>
 
+#include "daemon/bridge/live/shown_time.hpp"
 #include "daemon/publishing/advice.hpp"
 #include "daemon/web/access.hpp"
 
 namespace perimap {
 namespace {
-
-// Those that are there are found within a second or two.
-constexpr Duration kNobody = std::chrono::seconds(2);
 
 constexpr std::size_t kMostToldOrigins = 16;
 
@@ -27,11 +24,6 @@ bool is_origin(std::string_view text) {
   const std::string_view scheme = text.substr(0, end), rest = text.substr(end + 3);
   return std::all_of(scheme.begin(), scheme.end(), small) &&
          std::all_of(rest.begin(), rest.end(), [&](char c) { return small(c) || c == ':' || c == '[' || c == ']'; });
-}
-
-Instant now_utc() {
-  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
-  return Instant(std::chrono::duration_cast<Duration>(since_1970));
 }
 
 PageMessage text_message(std::string text) {
@@ -89,10 +81,9 @@ FoxgloveBridge::FoxgloveBridge(int domain, WebServer& server, std::string name, 
 
 // The subscriber's thread.
 void FoxgloveBridge::hear(const ShownSurface& surface) {
-  auto messages = maker_.of(surface, now_utc());
+  auto messages = maker_.of(surface, utc_now());
   if (!messages) return say_(messages.error().message);
-  Instant until = MonotonicClock::now() + kSilence;
-  if (surface.usable()) until = std::min(until, surface.valid_until);
+  const Instant until = shown_until(surface, MonotonicClock::now());
   Words words{surface.usable() ? FoxgloveLevel::kInfo : FoxgloveLevel::kWarning,
               std::string(permission_of(surface.state))};
   if (!surface.why.empty()) words.text += ": " + surface.why;
@@ -134,7 +125,7 @@ void FoxgloveBridge::send(PageId viewer, std::uint32_t subscription, std::size_t
 void FoxgloveBridge::clear() {
   ShownSurface nothing;
   nothing.frame_id = frame_id_;
-  auto messages = clearing_maker_.of(nothing, now_utc());
+  auto messages = clearing_maker_.of(nothing, utc_now());
   if (!messages) return say_(messages.error().message);
   newest_ = std::move(*messages);
   send_all();
@@ -176,7 +167,7 @@ Expected<void> FoxgloveBridge::said(PageId viewer, std::string_view text) {
 void FoxgloveBridge::tick() {
   const Instant now = MonotonicClock::now();
   if (until_ == Instant()) {
-    if (nobody_ || now - begun_ < kNobody) return;
+    if (nobody_ || now - begun_ < kNobodyAfter) return;
     nobody_ = true;
     const std::string what = fmt::format("nobody publishes in DDS domain {}", domain_);
     say_(what + ": start perimapd, or name its domain by --domain");

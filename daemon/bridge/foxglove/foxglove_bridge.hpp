@@ -22,9 +22,6 @@ namespace perimap {
 // take what was shown away, and say why.
 class FoxgloveBridge final : public PageHandler {
  public:
-  // So long without a surface is silence.
-  static constexpr Duration kSilence = std::chrono::milliseconds(500);
-
   // For a person at the terminal; any thread.
   using Say = std::function<void(const std::string&)>;
 

@@ -1,22 +1,17 @@
 #include "daemon/bridge/foxglove/surface_messages.hpp"
 
-#include <algorithm>
+#include <utility>
 
+#include "daemon/bridge/live/shown_time.hpp"
 #include "daemon/bridge/messages/view_camera.hpp"
 #include "daemon/bridge/messages/view_names.hpp"
 #include "daemon/bridge/messages/view_topics.hpp"
-#include "daemon/subscribing/any_time.hpp"
 
 namespace perimap {
 namespace {
 
-// None lies before 1970, nor beyond what a viewer's stamp can tell.
-Instant utc_of(const ShownSurface& surface, Instant on_publishers_clock, Instant now_utc) {
-  constexpr std::int64_t kLast_ns = 4'000'000'000'000'000'000;
-  if (surface.utc_minus_monotonic == Duration(0)) return now_utc;
-  const std::int64_t utc_ns = wrapped_sum(to_ns(on_publishers_clock), surface.utc_minus_monotonic.count());
-  return from_ns(std::clamp<std::int64_t>(utc_ns, 0, kLast_ns));
-}
+// What a viewer's stamp can tell.
+constexpr Instant kLast = from_ns(4'000'000'000'000'000'000);
 
 template <class T>
 Expected<std::string> bytes_of(CdrSerializer& serializer, const T& message) {
@@ -42,11 +37,11 @@ Expected<SurfaceMessages> SurfaceMessageMaker::of(const ShownSurface& surface, I
     made.utc = utc;
     return bytes_of(serializer_, message).map([&made](std::string bytes) { made.cdr = std::move(bytes); });
   };
-  const Instant valid = utc_of(surface, surface.valid, now_utc);
+  const Instant valid = utc_of(surface, surface.valid, now_utc, kLast);
   auto done = put(SurfaceChannel::kScene, valid, scene_.of(surface, valid, surface.frame_id, std::nullopt));
   if (done) done = put(SurfaceChannel::kWorth, valid, worth_.of(surface, valid));
   if (done && surface.X_WC) {
-    const Instant capture = utc_of(surface, surface.capture, now_utc);
+    const Instant capture = utc_of(surface, surface.capture, now_utc, kLast);
     done = put(SurfaceChannel::kTransforms, capture,
                borrow_frame_transform(*surface.X_WC, capture, surface.frame_id, view_names::kCameraFrame));
   }

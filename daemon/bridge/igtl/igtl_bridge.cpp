@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/bridge/live/shown_time.hpp"
+
 namespace perimap {
 namespace {
 
 using Subject = IgtlOutgoing::Subject;
 using Code = IgtlState::Code;
-
-// Those that are there are found within a second or two.
-constexpr Duration kNobody = std::chrono::seconds(2);
 
 }  // namespace
 
@@ -20,7 +19,7 @@ Expected<std::unique_ptr<IgtlBridge>> IgtlBridge::create(const dds::Membership& 
                                                          Say say) {
   std::unique_ptr<IgtlBridge> bridge(new IgtlBridge(membership.domain, server, std::move(say)));
   bridge->clear({Code::kNotPresent, 0, "invalid", "no surface has come yet"});
-  server.at(MonotonicClock::now() + kNobody, [self = bridge.get()] { self->nobody(); });
+  server.at(MonotonicClock::now() + kNobodyAfter, [self = bridge.get()] { self->nobody(); });
   auto subscriber = SurfaceSubscriber::create(
       membership, {[self = bridge.get()](const ShownSurface& surface) {
                      self->server_.post([self, told = told_of(surface)] { self->tell(told); });
@@ -50,8 +49,7 @@ Expected<void> IgtlBridge::run(int stop_descriptor) {
 IgtlBridge::Told IgtlBridge::told_of(const ShownSurface& surface) {
   Told told{pack_surface(surface), std::nullopt, surface_state_of(surface), camera_state_of(surface), {}};
   if (surface.X_WC) told.camera = pack_camera(surface);
-  told.until = MonotonicClock::now() + kSilence;
-  if (surface.usable()) told.until = std::min(told.until, surface.valid_until);
+  told.until = shown_until(surface, MonotonicClock::now());
   return told;
 }
 

@@ -17,9 +17,6 @@ namespace perimap {
 // leave an empty POLYDATA, and a STATUS that says why.
 class IgtlBridge {
  public:
-  // So long without a surface is silence.
-  static constexpr Duration kSilence = std::chrono::milliseconds(500);
-
   // For a person at the terminal; any thread.
   using Say = std::function<void(const std::string&)>;
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "daemon/bridge/igtl/igtl_client.hpp"
+#include "daemon/web/listen.hpp"
 
 namespace perimap {
 namespace {
@@ -42,13 +43,9 @@ class IgtlServer::Impl {
     error_code error;
     const auto address = asio::ip::make_address(settings.address, error);
     if (error) return fail(fmt::format("--bind: expected an address in numbers, got {:?}", settings.address));
-    const tcp::endpoint endpoint(address, settings.port);
-    acceptor_.open(endpoint.protocol(), error);
-    // Connections of clients that were there before do not keep the port.
-    if (!error) acceptor_.set_option(asio::socket_base::reuse_address(true), error);
-    if (!error) acceptor_.bind(endpoint, error);
-    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
-    if (error) return fail(why_not(settings, error));
+    if (auto listening = listen_on(acceptor_, settings.address, settings.port, "perimap bridge igtl"); !listening) {
+      return listening;
+    }
     if (!address.is_loopback()) {
       say_(fmt::format("whoever reaches {} gets the surface: OpenIGTLink knows no keys", settings.address));
     }
@@ -113,16 +110,6 @@ class IgtlServer::Impl {
 
  private:
   using Clients = std::map<std::uint64_t, std::shared_ptr<IgtlClient>>;
-
-  static std::string why_not(const Settings& settings, const error_code& error) {
-    const std::string where =
-        fmt::format("cannot listen on {} port {}: {}", settings.address, settings.port, error.message());
-    if (error == asio::error::address_in_use) {
-      return where + "; is another perimap bridge igtl running? Else choose another --port, or 0 for any that is free";
-    }
-    if (error == asio::error::access_denied) return where + "; ports below 1024 are root's: choose another --port";
-    return where + "; --bind takes an address of this host";
-  }
 
   // A copy, since one that is dropped leaves clients_ at once.
   std::vector<std::shared_ptr<IgtlClient>> all() const {

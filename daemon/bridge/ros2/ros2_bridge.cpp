@@ -9,11 +9,11 @@
 #include <cstring>
 #include <utility>
 
+#include "daemon/bridge/live/shown_time.hpp"
+
 namespace perimap {
 namespace {
 
-// Those that are there are found within a second or two.
-constexpr Duration kNobody = std::chrono::seconds(2);
 // While nothing comes it is said again, for readers that are new.
 constexpr Duration kSayAgain = std::chrono::seconds(1);
 // So late at most is silence seen, and the end.
@@ -22,11 +22,6 @@ constexpr int kLook_ms = 20;
 constexpr std::string_view kNotCome = "use no position: no surface has come yet";
 constexpr std::string_view kSilent = "use no position: nothing comes from perimapd";
 constexpr std::string_view kEnded = "use no position: perimap bridge ros2 has ended";
-
-Instant utc_now() {
-  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
-  return Instant(std::chrono::duration_cast<Duration>(since_1970));
-}
 
 // Readers of ROS 2 ask for reliable topics or for less.
 dds::TopicDescription topic(const char* name, const dds_topic_descriptor_t& descriptor) {
@@ -85,8 +80,7 @@ Expected<void> Ros2Bridge::run(int stop_descriptor) {
 
 void Ros2Bridge::tell(const ShownSurface& surface) {
   const Instant now_utc = utc_now();
-  until_ = MonotonicClock::now() + kSilence;
-  if (surface.usable()) until_ = std::min(until_, surface.valid_until);
+  until_ = shown_until(surface, MonotonicClock::now());
   // It has waited until it may not be shown any more.
   if (MonotonicClock::now() > until_) return look_at_the_clock(MonotonicClock::now());
   nothing_ = {};
@@ -123,7 +117,7 @@ void Ros2Bridge::clear(Ros2Level level, std::string_view words) {
 void Ros2Bridge::look_at_the_clock(Instant now) {
   const bool came = until_ != Instant();
   if (came && now <= until_) return;
-  if (!came && !nobody_ && now - begun_ >= kNobody) {
+  if (!came && !nobody_ && now - begun_ >= kNobodyAfter) {
     nobody_ = true;
     say_(fmt::format("nobody publishes in DDS domain {}: start perimapd, or name its domain by --domain", domain_));
   }

@@ -22,9 +22,6 @@ namespace perimap {
 // and diagnostics that say why.
 class Ros2Bridge {
  public:
-  // So long without a surface is silence.
-  static constexpr Duration kSilence = std::chrono::milliseconds(500);
-
   // For a person at the terminal; any thread.
   using Say = std::function<void(const std::string&)>;
 

@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstring>
 
+#include "daemon/bridge/live/shown_time.hpp"
 #include "daemon/bridge/messages/lent.hpp"
 #include "daemon/bridge/messages/view_colours.hpp"
 #include "daemon/bridge/messages/view_units.hpp"
@@ -57,15 +58,10 @@ Ros2Level ros2_level(const ShownSurface& surface) noexcept {
   return surface.usable() ? Ros2Level::kWarning : Ros2Level::kError;
 }
 
-// None lies before 1970, nor beyond what a stamp can tell.
 Ros2Header Ros2Messages::header(const ShownSurface& surface, Instant on_publishers_clock, Instant now_utc) {
-  constexpr std::int64_t kLast_ns = std::int64_t{0x7FFFFFFF} * kSecond_ns;
-  std::int64_t utc_ns = to_ns(now_utc);
-  if (surface.utc_minus_monotonic != Duration(0)) {
-    utc_ns = wrapped_sum(to_ns(on_publishers_clock), surface.utc_minus_monotonic.count());
-  }
+  constexpr Instant kLast = from_ns(std::int64_t{0x7FFFFFFF} * kSecond_ns);
   names_.frame = surface.frame_id;
-  return {stamp_of(from_ns(std::clamp<std::int64_t>(utc_ns, 0, kLast_ns))), lent(names_.frame)};
+  return {stamp_of(utc_of(surface, on_publishers_clock, now_utc, kLast)), lent(names_.frame)};
 }
 
 const Ros2Points& Ros2Messages::points(const ShownSurface& surface, Instant now_utc) {

@@ -145,9 +145,8 @@ void add_watch_command(Commands& commands) {
   Command& command = commands.add(
       "watch",
       "Subscribes to a publishing perimapd and shows what may be trusted and why not, sources, features, phase, rate "
-      "and "
-      "lost samples, latency (receipt minus capture, on the publisher's host only), lateness (receipt minus release), "
-      "jitter: on a terminal one screen that is drawn anew each second, elsewhere a line a second",
+      "and lost samples, latency (receipt minus capture, on the publisher's host only), lateness (receipt minus "
+      "release), jitter: on a terminal one screen that is drawn anew each second, elsewhere a line a second",
       [options](const Console& console) { return watch(*options, console); });
   command.add_option("--domain", options->domain, "DDS domain")->check(Range(0, 230))->capture_default_str();
   command.add_option("--security", options->security,
