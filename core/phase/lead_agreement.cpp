@@ -39,7 +39,7 @@ void LeadAgreement::hear(Instant now, const std::array<EcgSignal, 2>& signals) n
   if (usable(other) && (better || !usable(leading_))) leading_ = other;
 }
 
-void LeadAgreement::take(int lead, const RPeak& peak) noexcept {
+void LeadAgreement::hear(int lead, const RPeak& peak) noexcept {
   const auto at = static_cast<std::size_t>(lead);
   const Instant time = lead == 0 ? peak.time : peak.time - from_seconds(offset_s_);
   if (join_told(lead, peak, time)) return;

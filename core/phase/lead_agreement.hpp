@@ -57,7 +57,7 @@ class LeadAgreement {
   // Time has passed, and what each lead is good for now.
   void hear(Instant now, const std::array<EcgSignal, 2>& signals) noexcept;
   // Lead 0 or 1 tells a beat, now.
-  void take(int lead, const RPeak& peak) noexcept;
+  void hear(int lead, const RPeak& peak) noexcept;
   // The next beat that is agreed upon, in order of time, no two nearer than `refractory`; call until it gives none.
   // `ending`: nothing more will come. `ponders(lead, t, near)` is what that lead makes of what is so near to t.
   template <class Ponders>

@@ -33,7 +33,7 @@ std::optional<LeadBeat> LeadPair::push(Instant t, float first_mV, float second_m
   const std::array<std::optional<RPeak>, 2> peaks{detectors_[0].push(t, first_mV), detectors_[1].push(t, second_mV)};
   hear(t);
   for (int lead = 0; lead < 2; ++lead) {
-    if (const auto& peak = peaks[static_cast<std::size_t>(lead)]) agreement_.take(lead, *peak);
+    if (const auto& peak = peaks[static_cast<std::size_t>(lead)]) agreement_.hear(lead, *peak);
   }
   return decide(false);
 }
@@ -55,7 +55,7 @@ std::optional<LeadBeat> LeadPair::flush() noexcept {
     return of_one_lead(*peak);
   }
   for (int lead = 0; lead < 2; ++lead) {
-    while (const auto peak = detectors_[static_cast<std::size_t>(lead)].flush()) agreement_.take(lead, *peak);
+    while (const auto peak = detectors_[static_cast<std::size_t>(lead)].flush()) agreement_.hear(lead, *peak);
   }
   return decide(true);
 }

@@ -13,6 +13,7 @@
 #include "daemon/setup/commands/calibrate_hand_eye.hpp"
 #include "daemon/setup/commands/calibrate_scope.hpp"
 #include "daemon/setup/commands/calibrate_target.hpp"
+#include "daemon/setup/commands/calibrate_time.hpp"
 #include "daemon/setup/commands/live_capture.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"

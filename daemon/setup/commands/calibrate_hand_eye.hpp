@@ -1,4 +1,4 @@
-// perimap calibrate hand-eye, perimap calibrate time.
+// perimap calibrate hand-eye.
 #pragma once
 
 namespace perimap {
@@ -7,6 +7,5 @@ class Command;
 class Commands;
 
 void add_calibrate_hand_eye(Commands& commands, Command& calibrate);
-void add_calibrate_time(Commands& commands, Command& calibrate);
 
 }  // namespace perimap

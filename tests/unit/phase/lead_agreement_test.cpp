@@ -56,7 +56,7 @@ struct Leads {
     peak.time = at(at_s);
     peak.confidence = confidence;
     peak.shape.points = 28;
-    agreement.take(lead, peak);
+    agreement.hear(lead, peak);
   }
   // Both tell a beat, the second one's peak later, when both are known.
   void both(double at_s, double later_s, std::array<double, 2> confidence = {0.99, 0.99}) {
