@@ -1,6 +1,7 @@
-# As little time as possible for one build: a quick tests/run.sh, and of --full what is built with sanitizers or for
-# clang-tidy. Daily work has better use for files that are compiled alone.
-option(PERIMAP_QUICK "Compile files together where a target allows that, and nothing for the tests labelled `long`" OFF)
+# As little time as possible for a whole build, as tests/run.sh makes them. Daily work has better use for files that are
+# compiled alone.
+option(PERIMAP_TOGETHER "Compile files together where a target allows that" OFF)
+option(PERIMAP_LONG "Build what only tests labelled `long` and statistics need" ON)
 
 # perimap_library(NAME FOLDER [UNITY [ALONE f...]] [PRELUDE p] [SOURCES f...] [DEPENDS target...] [PRIVATE_DEPENDS target...])
 #
@@ -8,7 +9,7 @@ option(PERIMAP_QUICK "Compile files together where a target allows that, and not
 # target sees a folder's headers only when it depends on that folder's target: each target carries an include root of
 # its own that holds nothing but its folder. So an include against the direction of the architecture does not build.
 #
-# PRELUDE names the precompiled headers (perimap_prelude) that its files begin with. UNITY: with PERIMAP_QUICK
+# PRELUDE names the precompiled headers (perimap_prelude) that its files begin with. UNITY: with PERIMAP_TOGETHER
 # eight of its files are compiled as one, in four fifths to a half of the time; what is local to them must have different names then.
 # ALONE: files whose local names stand for something else in others.
 function(perimap_library NAME FOLDER)
@@ -27,7 +28,7 @@ function(perimap_library NAME FOLDER)
       target_precompile_headers(${NAME} REUSE_FROM ${ARG_PRELUDE})
     endif()
     if(ARG_UNITY)
-      set_target_properties(${NAME} PROPERTIES UNITY_BUILD ${PERIMAP_QUICK})
+      set_target_properties(${NAME} PROPERTIES UNITY_BUILD ${PERIMAP_TOGETHER})
       if(ARG_ALONE)
         set_source_files_properties(${ARG_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
       endif()
@@ -64,7 +65,7 @@ endfunction()
 
 # perimap_test(NAME [UNITY [ALONE f...]] [OUTSIDE] [THREADS] [LONG] SOURCES f... DEPENDS target...)
 #
-# A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. With PERIMAP_QUICK
+# A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. With PERIMAP_TOGETHER
 # CTest runs each program in four parts instead: starting a program with a sanitizer and its libraries for each case takes
 # longer than most cases. ALONE: as above.
 #
@@ -88,7 +89,7 @@ function(perimap_test NAME)
   set(label "")
   if(ARG_LONG)
     set(label long)
-    if(PERIMAP_QUICK)
+    if(NOT PERIMAP_LONG)
       set(wanted OFF)
     endif()
   endif()
@@ -101,13 +102,13 @@ function(perimap_test NAME)
     target_precompile_headers(${NAME} REUSE_FROM test_prelude)
   endif()
   if(ARG_UNITY)
-    set_target_properties(${NAME} PROPERTIES UNITY_BUILD ${PERIMAP_QUICK})
+    set_target_properties(${NAME} PROPERTIES UNITY_BUILD ${PERIMAP_TOGETHER})
     if(ARG_ALONE)
       set_source_files_properties(${ARG_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     endif()
   endif()
   target_compile_definitions(${NAME} PRIVATE PERIMAP_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
-  if(wanted AND PERIMAP_QUICK)
+  if(wanted AND PERIMAP_TOGETHER)
     foreach(part RANGE 3)
       add_test(NAME ${NAME}.part_${part} COMMAND ${NAME})
       set_tests_properties(${NAME}.part_${part} PROPERTIES
@@ -120,8 +121,8 @@ endfunction()
 
 # perimap_test_program(NAME [LONG] SOURCES f... DEPENDS target...)
 #
-# A program that tests run, or that is one. LONG: only tests labelled `long` do; with PERIMAP_QUICK
-# it is not built.
+# A program that tests run, or that is one. LONG: only tests labelled `long` do; without PERIMAP_LONG it
+# is not built.
 function(perimap_test_program NAME)
   cmake_parse_arguments(ARG "LONG" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${NAME} ${ARG_SOURCES})
@@ -129,7 +130,7 @@ function(perimap_test_program NAME)
   if(TARGET test_prelude AND ARG_DEPENDS MATCHES GTest)
     target_precompile_headers(${NAME} REUSE_FROM test_prelude)
   endif()
-  if(ARG_LONG AND PERIMAP_QUICK)
+  if(ARG_LONG AND NOT PERIMAP_LONG)
     set_target_properties(${NAME} PROPERTIES EXCLUDE_FROM_ALL ON)
   endif()
 endfunction()

@@ -15,7 +15,7 @@ tests/run.sh [--full [PART...]] [--jobs N]
               tsan   whole programs, and unit tests with threads, under ThreadSanitizer
               long   the tests labelled `long`, and statistics over many seeds, without sanitizers
               fuzz   a minute of each fuzz target
-              lint   a release build, which has no precompiled headers; format; clang-tidy
+              lint   each file compiled alone, without precompiled headers; format; clang-tidy
   --jobs N  parallel compilations; all processors when not given
 A test that fails is run once more, alone; the end names those that needed it.
 Exit code 0 when everything passed, 1 when something failed, 2 for a wrong command line. Logs: build/logs/.
@@ -121,9 +121,9 @@ fi
 
 configure() { # PRESET
   # Which tests: see perimap_test in cmake/PerimapLibrary.cmake. A unit test once is enough for a quick run. What compiles
-  # together in each build is compiled together, but where the long tests are built, and where headers must stand alone.
-  local preset=$1 tests=all undefined=all quick=ON
-  if [ $full = yes ] && [[ $preset =~ ^(dev|release)$ ]]; then quick=OFF; fi
+  # together is compiled together; that each file compiles alone is asked by lint.
+  local preset=$1 tests=all undefined=all long=OFF
+  if [ $full = yes ] && [ "$preset" = dev ]; then long=ON; fi
   case $preset in
     dev) if [ $full = no ]; then tests=plain; fi ;;
     tsan) tests=threads ;;
@@ -135,7 +135,7 @@ configure() { # PRESET
       ;;
   esac
   step "$preset configure" 5m cmake --preset "$preset" -DPERIMAP_TESTS=$tests -DPERIMAP_UNDEFINED=$undefined \
-    -DPERIMAP_QUICK=$quick "${launcher[@]}"
+    -DPERIMAP_TOGETHER=ON -DPERIMAP_LONG=$long "${launcher[@]}"
 }
 
 # Compiles all that compiles (-k 0): one run tells every error.
@@ -190,18 +190,18 @@ fuzz_smoke() {
   step "fuzz targets, $jobs at once" 60m tests/fuzz/run_targets.sh "$jobs" "$programs" "$corpus" "$logs"
 }
 
+# By the release preset: GCC's precompiled headers are none for clang, and would lend a file what it does not include.
 lint() {
-  # Only release builds have no precompiled headers: there each file must include what it uses.
-  build release || return
   step "format" 5m bash -c \
     "find core drivers daemon deploy/examples idl tests -name '*.cpp' -o -name '*.hpp' -o -name '*.c' | xargs clang-format --dry-run -Werror"
-  # clang-tidy spends nearly all of its time on the headers of others: those that a quick build compiles together are read
-  # together. By the release preset: GCC's precompiled headers are none for clang.
-  step "clang-tidy configure" 5m cmake --preset release -B build/lint -DPERIMAP_QUICK=ON || return
-  step "clang-tidy generated headers" 15m cmake --build build/lint -j "$jobs" \
-    --target perimap_idl perimap_mesh_idl perimap_procedure_idl perimap_trace_idl foxglove_idl || return
   # What is compiled together is a file that includes .cpp files, which nothing else may.
   step "no source is included" 1m bash -c "! grep -rnE '#include.*\.(cpp|c)[>\"]' core drivers daemon"
+  step "files alone configure" 5m cmake --preset release -B build/alone || return
+  step "files alone generated headers" 15m cmake --build build/alone -j "$jobs" --target generated_headers || return
+  step "files alone" 60m tests/architecture/files_compile_alone.py build/alone "$jobs" core drivers daemon
+  # clang-tidy spends nearly all of its time on the headers of others: what is compiled together is read together.
+  step "clang-tidy configure" 5m cmake --preset release -B build/lint -DPERIMAP_TOGETHER=ON || return
+  step "clang-tidy generated headers" 15m cmake --build build/lint -j "$jobs" --target generated_headers || return
   step "clang-tidy" 180m run-clang-tidy-14 -quiet -checks=-bugprone-suspicious-include \
     -extra-arg=-Wno-unknown-warning-option -p build/lint -j "$jobs" "^$PWD/(build/lint/)?(core|drivers|daemon)/"
 }

@@ -28,7 +28,7 @@ struct DetectorSettings {
   // the picture; -1 where it does. Its edge goes with the scope and stands out of all that is in the picture: what is
   // followed must not have it in its template.
   int surround_grey = -1;
-  double surround_clearance_px = PatchTemplate::kSide[0] / 2 + 2;
+  double surround_clearance_px = PatchTemplate::kReach + 2.0;
 };
 
 // For how_many features spread over an image of this size, this noise and this light, whatever they are. A corner must

@@ -62,11 +62,11 @@ std::string progress_line(const SessionRecorder& recorder, Duration elapsed) {
 
 void record_until_ended(DeviceFeeder& feeder, StopSignal& stop, std::optional<Duration> limit,
                         const std::function<void(const std::string&)>& tell) {
-  constexpr Duration kTick = std::chrono::milliseconds(100);
+  constexpr Duration kRecordingTick = std::chrono::milliseconds(100);
   constexpr Duration kReport = std::chrono::seconds(5);
   const Instant start = MonotonicClock::now();
   Instant reported = start;
-  while (!stop.wait_for(kTick) && !feeder.ended()) {
+  while (!stop.wait_for(kRecordingTick) && !feeder.ended()) {
     feeder.tick();
     const Instant now = MonotonicClock::now();
     if (feeder.recorder()->summary().stopped) return;

@@ -1,5 +1,5 @@
-// What the commands have in common that measure by a motion which camera and tracker both recorded: of a recording or of
-// live devices, in which a board is in view, or of files.
+// What the commands have in common that measure by a motion which camera and tracker both recorded: of a recording or
+// of live devices, in which a board is in view, or of files.
 #pragma once
 
 #include <functional>
