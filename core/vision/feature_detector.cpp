@@ -224,7 +224,7 @@ DetectorSettings detector_settings_for_trial(const GreyImage& image, int how_man
   const PictureLight light = estimate_light(image);
   DetectorSettings settings = settings_by(image, light, how_many);
   // A template of level 0 fits with its gradients; coarser ones are done without where they do not.
-  settings.border_px = PatchTemplate::kSide[0] / 2 + 2;
+  settings.border_px = PatchTemplate::kReach + 2;
   constexpr double kShareOfCorner = 0.1, kRoundness = 0.03, kWidth = 1280, kSmallest = 0.25;
   settings.min_corner *= kShareOfCorner;
   settings.min_roundness = kRoundness;

@@ -192,7 +192,7 @@ TEST_F(ColouredFinder, BeginsARoundAtAFrameWithColourWhereThereAreAny) {
 TEST(FinderOfARoundPicture, FindsNothingWhoseTemplateHasTheEdgeInIt) {
   constexpr int kWidth = 320, kHeight = 240;
   const Vector2d centre(163.0, 117.0);
-  constexpr double kRadius = 104.0, kTemplateReach = PatchTemplate::kSide[0] / 2 + 1;
+  constexpr double kRadius = 104.0, kTemplateReach = PatchTemplate::kReach + 1;
   for (const int surround : {0, 8, 24}) {
     Still still(kWidth, kHeight);
     for (int y = 0; y < kHeight; ++y) {

@@ -261,7 +261,7 @@ TEST(FeatureDetector, KeepsClearOfTheRimOfAViewWhoseSurroundIsNotBlack) {
 // A view that does not fill the picture leaves a dark surround, whose edge goes with the scope; a shadow is tissue's.
 TEST(FeatureDetector, KeepsATemplateFromTheSurroundAndGoesNearerToAShadow) {
   constexpr int kSide = 256;
-  constexpr double kView_px = 115, kShadow_px = 25, kTemplate_px = PatchTemplate::kSide[0] / 2 + 1;
+  constexpr double kView_px = 115, kShadow_px = 25, kTemplate_px = PatchTemplate::kReach + 1;
   const Vector2d centre(128, 128), shadow(140, 120);
   std::mt19937 random(1);
   test::ImageBuffer image = test::render(test::Texture(3, 15, 6, 60), {}, kSide, kSide, 1.5, random);
@@ -285,7 +285,7 @@ TEST(FeatureDetector, KeepsATemplateFromTheSurroundAndGoesNearerToAShadow) {
 // What is dim beside a surround is tissue that has little light, right to where templates reach into the surround.
 TEST(FeatureDetector, FindsDimTissueWhereASurroundShowsWhatIsDark) {
   constexpr int kSide = 256;
-  constexpr double kView_px = 115, kTemplate_px = PatchTemplate::kSide[0] / 2 + 1, kDimmed = 0.1;
+  constexpr double kView_px = 115, kTemplate_px = PatchTemplate::kReach + 1, kDimmed = 0.1;
   const Vector2d centre(128, 128);
   std::mt19937 random(1);
   test::ImageBuffer image = test::render(test::Texture(3, 15, 6, 60), {}, kSide, kSide, 1.0, random);
