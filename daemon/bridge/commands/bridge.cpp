@@ -94,6 +94,7 @@ Outcome bridge_foxglove(const BridgeOptions& options, const Console& console) {
 
 // By --ros-domain, or by the environment, as ROS 2 itself goes by it; 0 where neither tells one.
 Expected<int> ros_domain(const BridgeOptions& options) {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing here writes the environment
   const char* const text = std::getenv("ROS_DOMAIN_ID");
   if (options.ros_domain || text == nullptr || *text == '\0') return options.ros_domain.value_or(0);
   int domain = -1;

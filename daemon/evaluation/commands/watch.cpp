@@ -47,6 +47,7 @@ std::string hint(const WatchOptions& options) {
 
 // Whether one screen is drawn anew each second, in the place of a line each.
 bool on_screen(const WatchOptions& options) {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing here writes the environment
   const char* const terminal = std::getenv("TERM");
   return !options.json && !options.lines && isatty(STDOUT_FILENO) == 1 && terminal != nullptr &&
          std::string_view(terminal) != "dumb";
@@ -59,6 +60,7 @@ void draw(const WatchOptions& options, const std::vector<StreamReport>& reports)
   constexpr const char* kCutOff = "\x1b[?7l";
   constexpr const char* kWrap = "\x1b[?7h";
   WatchScreenStyle style{fmt::format("perimap watch, DDS domain {}; Ctrl+C ends", options.domain), true};
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): likewise
   style.colours = std::getenv("NO_COLOR") == nullptr;
   std::string text = watch_screen(reports, style);
   if (reports.empty()) text += fmt::format("waiting for a publisher{}\n", hint(options));

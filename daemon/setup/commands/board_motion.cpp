@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "daemon/setup/live_guide.hpp"
+#include "daemon/setup/recorded_poses.hpp"
 
 namespace perimap {
 
