@@ -30,7 +30,9 @@ std::optional<double> edge_on_ray(const GreyImage& picture, double level, const 
   while (outer > inner_px && !inside(picture, centre_px + outer * along)) outer -= 1.0;
   double before = value_at(picture, centre_px + outer * along);
   if (before > level) return std::nullopt;
-  for (double r = outer - 1.0; r >= inner_px; r -= 1.0) {
+  const int steps = static_cast<int>(outer - inner_px);
+  for (int step = 1; step <= steps; ++step) {
+    const double r = outer - step;
     const double here = value_at(picture, centre_px + r * along);
     // Noise alone does not last for two more pixels.
     if (here > level && value_at(picture, centre_px + (r - 1.5) * along) > level) {
