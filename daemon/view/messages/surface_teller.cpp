@@ -53,6 +53,7 @@ Json camera_json(const perimap_Surface& surface) {
   return json;
 }
 
+// NOLINTNEXTLINE(bugprone-exception-escape): the move constructor of nlohmann::json only asserts
 struct Told {
   Json features;
   std::size_t converged = 0;  // of them
