@@ -83,7 +83,7 @@ void RecordedView::say_what_is_missing() {
       if (std::none_of(damage.begin(), damage.end(), same)) damage.push_back(error);
     }
   }
-  for (std::size_t i = 0; i < std::min(damage.size(), kMostDamage); ++i) warnings_.push_back(damage[i].message);
+  for (std::size_t i = 0; i < std::min(damage.size(), kMostDamage); ++i) warnings_.emplace_back(damage[i].message);
   if (damage.size() > kMostDamage) {
     warnings_.push_back(fmt::format("{} places more are damaged", damage.size() - kMostDamage));
   }
