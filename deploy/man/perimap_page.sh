@@ -7,7 +7,7 @@ perimap=$1
 template=$2
 
 commands_of() { # COMMAND...: those that its help names
-  "$perimap" "$@" --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z][a-z-]*\) .*/\1/p'
+  "$perimap" "$@" --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z][a-z0-9-]*\) .*/\1/p'
 }
 
 describe() { # COMMAND...

@@ -8,7 +8,7 @@ fail() {
   echo "FAILED: $1"
   exit 1
 }
-commands() { sed -n '/^Subcommands:/,/^$/s/^  \([a-z][a-z-]*\) .*/\1/p'; }
+commands() { sed -n '/^Subcommands:/,/^$/s/^  \([a-z][a-z0-9-]*\) .*/\1/p'; }
 [ "$("$perimap" --help | commands | wc -l)" -gt 5 ] || fail "the help names no commands"
 # Every command's help, its option names, and what man(1) shows of the page for it.
 every_command() { # COMMAND...
@@ -18,7 +18,8 @@ every_command() { # COMMAND...
     every_command "$@" "$inner"
   done
 }
-options() { grep -oE '^ +(-[a-zA-Z],)?--[a-z][a-z-]*' | grep -oE -e '--[a-z-]+' | sort; }
+options() { grep -oE '^ +(-[a-zA-Z],)?--[a-z][a-z0-9-]*' | grep -oE -e '--[a-z0-9-]+' | sort; }
+every_command | grep -x 'bridge ros2' > /dev/null || fail "a command with a digit in its name is passed over"
 sed 's/\\-/-/g' "$build/deploy/perimap.1" > "$build/deploy/perimap.1.plain"
 while read -r -a command; do
   told=$("$perimap" "${command[@]}" --help | options)
@@ -27,6 +28,9 @@ while read -r -a command; do
     sed -n 's/^\.B /  /p' | options)
   [ "$told" = "$shown" ] || fail "perimap(1) on ${command[*]}: $(diff <(echo "$told") <(echo "$shown"))"
 done < <(every_command)
+perimapd=$(dirname "$perimap")/perimapd
+[ "$("$perimapd" --help | options)" = "$(sed -n '/^\.SH OPTIONS$/,/^\.SH /s/\\-/-/gp' "$build/deploy/perimapd.8" |
+  grep -E '^\.B' | grep -oE -e '--[a-z0-9-]+' | sort)" ] || fail "perimapd(8) has other options than perimapd --help"
 # Sections, keys with their defaults, and below each key the whole of its comment.
 in_the_configuration() {
   awk '/^\[/ { print }
@@ -58,6 +62,35 @@ while read -r -a command; do
   diff <("$perimap" "${command[@]}" --help | options) <(printf '%s\n' "${COMPREPLY[@]}" | sort) ||
     fail "completion of 'perimap ${command[*]} --'"
 done < <(every_command)
+# OPTION WORDS, a line for each option whose value is one of some words
+values() { sed -nE 's/^ +(-[a-zA-Z],)?(--[a-z0-9-]+) TEXT:\{([^}]*)\}.*/\2 \3/p'; }
+of_some_words=0
+while read -r -a command; do
+  while read -r option words; do
+    of_some_words=$((of_some_words + 1))
+    COMP_WORDS=(perimap "${command[@]}" "$option" '') COMP_CWORD=$((${#command[@]} + 2)) COMPREPLY=()
+    _perimap 2> /dev/null
+    diff <(tr , '\n' <<< "$words" | sort) <(printf '%s\n' "${COMPREPLY[@]}" | sort) ||
+      fail "completion of 'perimap ${command[*]} $option'"
+  done < <("$perimap" "${command[@]}" --help | values)
+done < <(every_command)
+[ $of_some_words -ge 10 ] || fail "only $of_some_words options are one of some words"
+completes fisheye perimap calibrate camera --lens fi
+completes fisheye perimap calibrate camera --lens = fi
+completes brown-conrady perimap calibrate camera --lens =
+completes live,ddsperf perimap bench --only live,dd
+completes ros2 perimap bridge r
+cd "$source" || exit 1
+completes README.md perimap bench --html READ
+completes README.md perimap bench -c READ
+completes README.md perimap bench --security READ
+completes README.md perimap bench READ
+COMP_WORDS=(perimap bench --runs '') COMP_CWORD=3 COMPREPLY=()
+_perimap 2> /dev/null
+[ ${#COMPREPLY[@]} -eq 0 ] || fail "a number is completed by ${COMPREPLY[*]}"
+COMP_WORDS=(perimapd --) COMP_CWORD=1 COMPREPLY=()
+_perimapd 2> /dev/null
+diff <("$perimapd" --help | options) <(printf '%s\n' "${COMPREPLY[@]}" | sort) || fail "completion of 'perimapd --'"
 completes simulate perimap sim
 completes --duration perimap simulate --dur
 completes new-patient perimap ctl new
