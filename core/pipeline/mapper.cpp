@@ -28,12 +28,12 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, W
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())},
             settings.estimator.precision),
-      stages_(settings_, slots, bank_, outputs.cells, job_, team, housekeeping.starter),
+      stages_(settings_, slots, bank_, outputs.cells, job_, team, housekeeping.starter, outputs.trace),
       motion_(slots.size()),
       intake_(slots, housekeeping.finder),
       keeping_(slots, bank_, stages_.groups()),
       surface_(slots, bank_, housekeeping.surface_maker, settings.adoption_delay, outputs.counters),
-      stopwatch_(outputs.counters, !settings.lockstep),
+      stopwatch_(outputs.counters, !settings.lockstep, outputs.trace != nullptr ? &outputs.trace->mapper : nullptr),
       shedding_decision_(static_cast<int>(slots.size()), settings.budget),
       shedding_(slots) {
   job_.history = history_.get();
@@ -56,7 +56,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
                      const ColourImage& colour, const CardiacClock& ecg) noexcept {
   const RealtimeScope realtime;
   finish_learning();
-  stopwatch_.begin();
+  stopwatch_.begin(stamp.sequence);
   const FrameRecord& frame = begin_frame(stamp, image, before, ecg);
   // A
   find_features(frame);

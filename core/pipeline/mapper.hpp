@@ -12,6 +12,7 @@
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/frame_job.hpp"
 #include "core/pipeline/frame_stopwatch.hpp"
+#include "core/pipeline/frame_trace.hpp"
 #include "core/pipeline/load_shedding.hpp"
 #include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/map_keeping.hpp"
@@ -50,6 +51,7 @@ struct MapperOutputs {
   std::span<ShardCells> cells;
   PhaseCells& phase_cells;
   PipelineCounters& counters;
+  FrameTrace* trace;  // null where none is kept
 };
 
 // One frame: A (workers sweep, predict and find), B (the mapper joins phase and pose), C (workers evaluate), then D

@@ -44,12 +44,13 @@ ComposerSettings composer_settings(const PipelineSettings& settings) {
 
 // In the order in which they are made: each may refer to those before it.
 struct Pipeline::Parts {
-  explicit Parts(const PipelineSettings& of);
+  Parts(const PipelineSettings& of, FrameTrace* kept_trace);
 
   void tell_due() noexcept;
 
   PipelineSettings settings;
   PipelineCounters counters;
+  FrameTrace* trace;  // null where none is kept
   std::vector<FeatureSlot> slots;
   std::vector<ShardCells> cells;
   SensorEntrance entrance;
@@ -72,12 +73,14 @@ struct Pipeline::Parts {
   std::uint64_t model_owes = 0;  // the frame whose update the snapshots of model_view ought to have
 };
 
-Pipeline::Parts::Parts(const PipelineSettings& of)
+Pipeline::Parts::Parts(const PipelineSettings& of, FrameTrace* kept_trace)
     : settings(of),
+      trace(kept_trace),
       slots(static_cast<std::size_t>(settings.features.maximum)),
       cells(static_cast<std::size_t>(settings.workers)),
       entrance(settings.camera.width, settings.camera.height, {settings.clock, settings.r_trigger},
-               {settings.respiration.search.shortest_period, settings.respiration.search.longest_period}, counters),
+               {settings.respiration.search.shortest_period, settings.respiration.search.longest_period}, counters,
+               trace),
       team(settings.workers),
       finder(settings, counters),
       surface_maker(settings.estimator.layout, slots.size(), kMeshVertices, settings.lockstep),
@@ -85,7 +88,7 @@ Pipeline::Parts::Parts(const PipelineSettings& of)
       watcher(settings),
       scope(settings.turned_scope || settings.watch_scope ? std::make_unique<ScopeWatch>(settings, counters) : nullptr),
       mapper(settings, slots, team, {finder, starter, watcher, surface_maker, scope.get()},
-             {cells, phase_cells, counters}),
+             {cells, phase_cells, counters, trace}),
       plan({settings.latency, settings.frame_stream, settings.clock_period, settings.lead + settings.validity}),
       composers{SurfaceComposer(composer_settings(settings)), SurfaceComposer(composer_settings(settings))},
       publisher_view(cells.size()),
@@ -108,7 +111,8 @@ Pipeline::Parts::Parts(const PipelineSettings& of)
   }
 }
 
-Pipeline::Pipeline(const PipelineSettings& settings) : parts_(std::make_unique<Parts>(settings)) {
+Pipeline::Pipeline(const PipelineSettings& settings, FrameTrace* trace)
+    : parts_(std::make_unique<Parts>(settings, trace)) {
   static_cast<void>(model_snapshots());  // so that model_view holds no null
 }
 
@@ -116,6 +120,7 @@ Pipeline::~Pipeline() = default;
 
 const PipelineSettings& Pipeline::settings() const noexcept { return parts_->settings; }
 PipelineCounters& Pipeline::counters() noexcept { return parts_->counters; }
+FrameTrace* Pipeline::trace() noexcept { return parts_->trace; }
 SensorEntrance& Pipeline::entrance() noexcept { return parts_->entrance; }
 WorkerTeam& Pipeline::team() noexcept { return parts_->team; }
 FeatureFinder& Pipeline::finder() noexcept { return parts_->finder; }

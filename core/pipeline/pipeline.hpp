@@ -21,6 +21,7 @@ class SurfaceMaker;
 class WorkerTeam;
 struct FeatureSlot;
 struct FrameHandle;
+struct FrameTrace;
 struct MapMemory;
 struct PipelineCounters;
 struct PipelineSettings;
@@ -33,13 +34,16 @@ struct SurfaceSample;
 // on compile without any. The parts are made once, so that this costs the real-time path a pointer.
 class Pipeline {
  public:
-  explicit Pipeline(const PipelineSettings& settings);
+  // Where a trace is given, which must outlive it, the threads write there what became of each frame.
+  explicit Pipeline(const PipelineSettings& settings, FrameTrace* trace = nullptr);
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
   ~Pipeline();
 
   [[nodiscard]] const PipelineSettings& settings() const noexcept;
   [[nodiscard]] PipelineCounters& counters() noexcept;
+  // Null where none is kept.
+  [[nodiscard]] FrameTrace* trace() noexcept;
   [[nodiscard]] SensorEntrance& entrance() noexcept;
   [[nodiscard]] WorkerTeam& team() noexcept;
   [[nodiscard]] FeatureFinder& finder() noexcept;

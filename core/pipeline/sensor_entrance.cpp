@@ -30,8 +30,9 @@ constexpr std::size_t kPoseRing = 256;  // more than a second of a fast tracker
 }  // namespace
 
 SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& ecg,
-                               const BreathDetectorSettings& breath, PipelineCounters& counters)
+                               const BreathDetectorSettings& breath, PipelineCounters& counters, FrameTrace* trace)
     : counters_(counters),
+      trace_(trace),
       pool_(width, height, frame_buffers(width, height)),
       mapper_frames_(static_cast<std::size_t>(frame_buffers(width, height))),
       publisher_stamps_(kStampRing),
@@ -43,6 +44,14 @@ SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& e
 
 bool SensorEntrance::push_frame(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour) noexcept {
   const RealtimeScope realtime;
+  if (trace_ == nullptr) return take_over(stamp, image, colour);
+  const Instant begin = MonotonicClock::now();
+  const bool taken = take_over(stamp, image, colour);
+  trace_->arrivals.add({stamp, begin, MonotonicClock::now()});
+  return taken;
+}
+
+bool SensorEntrance::take_over(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour) noexcept {
   counters_.frames_received.add();
   // A capture after its own arrival is a broken stamp; on it the release times of all that follows would be fitted.
   if (stamp.capture > stamp.arrival) {

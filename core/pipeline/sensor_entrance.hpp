@@ -7,6 +7,7 @@
 #include "core/phase/breath_detector.hpp"
 #include "core/pipeline/ecg_intake.hpp"
 #include "core/pipeline/frame_pool.hpp"
+#include "core/pipeline/frame_trace.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/realtime/spsc_ring.hpp"
 #include "core/realtime/triple_buffer.hpp"
@@ -28,8 +29,9 @@ namespace perimap {
 // thread may be all of them. None of them blocks or allocates. What does not fit is counted, never waited for.
 class SensorEntrance {
  public:
+  // `counters` and `trace`, null where none is kept, must outlive it.
   SensorEntrance(int width, int height, const EcgIntakeSettings& ecg, const BreathDetectorSettings& breath,
-                 PipelineCounters& counters);
+                 PipelineCounters& counters, FrameTrace* trace = nullptr);
 
   // Copies the pixels. `colour`, of this frame or the one before, may be left out; it is passed over unless it is
   // reduced as colour_image.hpp says. False when the mapper does not get the frame: no free buffer, or another size
@@ -78,10 +80,12 @@ class SensorEntrance {
   [[nodiscard]] EcgClockCells& ecg_clocks() noexcept { return ecg_clocks_; }
 
  private:
+  bool take_over(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour) noexcept;
   [[nodiscard]] bool store(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour) noexcept;
   void count(const RespirationBlock& block) noexcept;
 
   PipelineCounters& counters_;
+  FrameTrace* trace_;
   FramePool pool_;
   SpscRing<FrameHandle> mapper_frames_;
   SpscRing<FrameStamp> publisher_stamps_;

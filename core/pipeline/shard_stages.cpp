@@ -22,7 +22,8 @@ void LearningTally::add(const LearningTally& other) noexcept {
 }
 
 ShardStages::ShardStages(const PipelineSettings& settings, std::span<FeatureSlot> slots, MapBank& bank,
-                         std::span<ShardCells> cells, const FrameJob& job, WorkerTeam& team, BatchStarter& starter)
+                         std::span<ShardCells> cells, const FrameJob& job, WorkerTeam& team, BatchStarter& starter,
+                         FrameTrace* trace)
     : settings_(settings),
       model_{settings.camera},
       bank_(bank),
@@ -30,6 +31,7 @@ ShardStages::ShardStages(const PipelineSettings& settings, std::span<FeatureSlot
       job_(job),
       team_(team),
       starter_(starter),
+      trace_(trace),
       tallies_(static_cast<std::size_t>(team.size())) {
   for (int g = 0; g < bank.groups(); ++g) {
     const auto first = static_cast<std::size_t>(g) * kLanes;

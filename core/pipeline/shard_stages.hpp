@@ -11,6 +11,7 @@
 #include "core/pipeline/feature_group.hpp"
 #include "core/pipeline/feature_slot.hpp"
 #include "core/pipeline/frame_job.hpp"
+#include "core/pipeline/frame_trace.hpp"
 #include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/shard_snapshot.hpp"
@@ -40,22 +41,23 @@ struct LearningTally {
 // it. The job is read by the workers during stages, and must not change then. Nothing is allocated after construction.
 class ShardStages {
  public:
-  // Everything must outlive it.
+  // Everything must outlive it; `trace` is null where none is kept.
   ShardStages(const PipelineSettings& settings, std::span<FeatureSlot> slots, MapBank& bank,
-              std::span<ShardCells> cells, const FrameJob& job, WorkerTeam& team, BatchStarter& starter);
+              std::span<ShardCells> cells, const FrameJob& job, WorkerTeam& team, BatchStarter& starter,
+              FrameTrace* trace);
 
   [[nodiscard]] std::span<FeatureGroup> groups() noexcept { return groups_; }
 
   // A: features are predicted, and searched for; only the scouts where the job has any.
-  void predict_and_find() noexcept { run<&ShardStages::predict_and_find_shard>(); }
+  void predict_and_find() noexcept { run<&ShardStages::predict_and_find_shard, FramePart::kPredictAndFind>(); }
   // A, after the scouts: the others.
-  void find_others() noexcept { run<&ShardStages::find_others_shard>(); }
+  void find_others() noexcept { run<&ShardStages::find_others_shard, FramePart::kFindOthers>(); }
   // C: the snapshots are evaluated and handed over.
-  void evaluate() noexcept { run<&ShardStages::evaluate_shard>(); }
+  void evaluate() noexcept { run<&ShardStages::evaluate_shard, FramePart::kEvaluate>(); }
   // After the hand-over: what was not found is searched for again.
-  void settle_matches() noexcept { run<&ShardStages::settle_matches_shard>(); }
+  void settle_matches() noexcept { run<&ShardStages::settle_matches_shard, FramePart::kSettleMatches>(); }
   // D: the workers learn until join().
-  void begin_learning() noexcept { team_.start(&run_shard<&ShardStages::learn_shard>, this); }
+  void begin_learning() noexcept { team_.start(&run_shard<&ShardStages::learn_shard, FramePart::kLearn>, this); }
   // Since the last join(); empty when they have not learnt.
   [[nodiscard]] LearningTally join() noexcept;
 
@@ -65,13 +67,18 @@ class ShardStages {
   void hand_over_recalled(Instant last_capture) noexcept;
 
  private:
-  template <void (ShardStages::*Stage)(int) noexcept>
+  template <void (ShardStages::*Stage)(int) noexcept, FramePart part>
   static void run_shard(void* self, int worker) noexcept {
-    (static_cast<ShardStages*>(self)->*Stage)(worker);
+    ShardStages& stages = *static_cast<ShardStages*>(self);
+    const FrameSpan span(stages.log_of(worker), part, stages.job_.frame->stamp.sequence);
+    (stages.*Stage)(worker);
   }
-  template <void (ShardStages::*Stage)(int) noexcept>
+  template <void (ShardStages::*Stage)(int) noexcept, FramePart part>
   void run() noexcept {
-    team_.run(&run_shard<Stage>, this);
+    team_.run(&run_shard<Stage, part>, this);
+  }
+  [[nodiscard]] FixedLog<FrameSlice>* log_of(int worker) noexcept {
+    return trace_ != nullptr ? &trace_->workers[static_cast<std::size_t>(worker)] : nullptr;
   }
   // The groups of one worker.
   template <class Function>
@@ -98,6 +105,7 @@ class ShardStages {
   const FrameJob& job_;
   WorkerTeam& team_;
   BatchStarter& starter_;
+  FrameTrace* trace_;
   std::vector<FeatureGroup> groups_;
   std::vector<WorkerTally> tallies_;
 };

@@ -5,6 +5,7 @@
 
 #include "core/pipeline/batch_starter.hpp"
 #include "core/pipeline/feature_finder.hpp"
+#include "core/pipeline/frame_trace.hpp"
 #include "core/pipeline/pipeline.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
@@ -129,11 +130,15 @@ void LiveRuntime::run_mapper() noexcept {
       entrance.mapper_wakeup().wait();
       continue;
     }
-    // The named wait: for the tracker to reach the capture, at most until the budget before the release.
-    const Instant latest = frame.stamp.capture + settings.latency - settings.budget;
-    while (!pipeline_.pose_reached(frame.stamp.capture) && entrance.mapper_wakeup().wait_until(latest)) {
-      pipeline_.drain_poses();
-      if (stopping_.load(std::memory_order_relaxed)) break;
+    {
+      FrameTrace* const trace = pipeline_.trace();
+      const FrameSpan span(trace != nullptr ? &trace->mapper : nullptr, FramePart::kAwaitPose, frame.stamp.sequence);
+      // The named wait: for the tracker to reach the capture, at most until the budget before the release.
+      const Instant latest = frame.stamp.capture + settings.latency - settings.budget;
+      while (!pipeline_.pose_reached(frame.stamp.capture) && entrance.mapper_wakeup().wait_until(latest)) {
+        pipeline_.drain_poses();
+        if (stopping_.load(std::memory_order_relaxed)) break;
+      }
     }
     pipeline_.map(frame);
   }
@@ -162,8 +167,10 @@ void LiveRuntime::run_publisher() {
     sleep_until(next->deadline - kComposing);
     const Release release = pipeline_.plan().take_release();
     WireSurface& wire = wire_surfaces_[index_of(release.stream)];
+    const Instant begin = MonotonicClock::now();
     const SurfaceSample& surface = pipeline_.compose(release);
     const perimap_Surface& sample = wire.fill(surface, utc_minus_monotonic());
+    const Instant composed = MonotonicClock::now();
     wait_until_exactly(release.deadline);
     const Instant ready = MonotonicClock::now();
     if (pipeline_.plan().stale(release, ready)) {
@@ -174,9 +181,13 @@ void LiveRuntime::run_publisher() {
     // surface is made of was made before.
     publication_.surface(sample);
     StreamCounters& stream = counters.of(release.stream);
-    stream.dds_write.add(MonotonicClock::now() - ready);
+    const Instant written = MonotonicClock::now();
+    stream.dds_write.add(written - ready);
     pipeline_.sent(surface);
     stream.count_tardiness(ready - release.deadline);
+    if (FrameTrace* const trace = pipeline_.trace()) {
+      trace->releases.add({release, surface.update_late, begin, composed, ready, written});
+    }
   }
 }
 

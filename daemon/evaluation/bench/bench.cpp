@@ -11,7 +11,27 @@ namespace perimap::bench {
 namespace {
 
 constexpr Duration kLongestDdsperf = std::chrono::seconds(10);
+// What is played before and after what is asked for, and the fastest camera that the pipeline keeps pace with.
+constexpr double kTracedBeside_s = 5.0;
+constexpr double kFastest_per_s = 280.0;
+constexpr double kMostTracedFrames = 100'000.0;
+constexpr int kPages = 4;
 const std::vector<int> kCosts = {50, 100, 200, 500, 1000, 2000, 5000};
+
+std::size_t traced_frames(const BenchInput& input) {
+  const double seconds = to_seconds(input.settle) + to_seconds(input.measure) + kTracedBeside_s;
+  return static_cast<std::size_t>(std::min(kFastest_per_s * seconds, kMostTracedFrames));
+}
+
+SetupExpected<LiveResult> run_traced(const BenchInput& input, const LiveCase& live_case, StopSignal& stop,
+                                     TraceFile& file) {
+  FrameTrace trace(traced_frames(input), live_case.workers);
+  auto result = run_live(input, live_case, stop, &trace);
+  if (!result) return result;
+  if (auto added = file.add(live_case.part + ": " + live_case.name, trace, result->figures.counted_from); !added)
+    return tl::unexpected(SetupError{added.error()});
+  return result;
+}
 
 }  // namespace
 
@@ -74,6 +94,11 @@ std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_real
       });
     }
   }
+  // In turn, as with keys: what looking costs is the difference.
+  for (int run = 1; run <= settings.runs; ++run) {
+    add("pages", fmt::format("nobody looks, run {}", run), best, nothing);
+    add("pages", fmt::format("{} pages, run {}", kPages, run), best, [](LiveCase& one) { one.pages = kPages; });
+  }
   for (const int features : {50, 100, 200, 400, 1000}) {
     add("features", fmt::format("{} features", features), best, [&](LiveCase& one) { one.features = features; });
   }
@@ -81,7 +106,8 @@ std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_real
 }
 
 SetupExpected<BenchReport> run_bench(const BenchSettings& settings, StopSignal& stop,
-                                     const std::function<void(int, int, const std::string&)>& on_run) {
+                                     const std::function<void(int, int, const std::string&)>& on_run,
+                                     TraceFile* trace) {
   BenchReport report;
   report.settings = settings;
   report.machine = this_machine();
@@ -94,7 +120,8 @@ SetupExpected<BenchReport> run_bench(const BenchSettings& settings, StopSignal& 
   int number = 0;
   for (const LiveCase& one : cases) {
     on_run(++number, all, one.part + ": " + one.name);
-    auto result = run_live(settings.input, one, stop);
+    auto result =
+        trace != nullptr ? run_traced(settings.input, one, stop, *trace) : run_live(settings.input, one, stop, nullptr);
     if (!result) return tl::unexpected(result.error());
     report.live.push_back(std::move(*result));
     const LiveFigures& figures = report.live.back().figures;

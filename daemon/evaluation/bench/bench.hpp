@@ -13,12 +13,13 @@
 #include "daemon/evaluation/bench/live_run.hpp"
 #include "daemon/evaluation/bench/lockstep_run.hpp"
 #include "daemon/evaluation/bench/machine.hpp"
+#include "daemon/evaluation/bench/trace_file.hpp"
 
 namespace perimap::bench {
 
 // The parts, in the order in which they are run.
-inline const std::vector<std::string> kParts = {"live", "ddsperf", "subscribers", "recording", "load",  "workers",
-                                                "rate", "clock",   "features",    "cost",      "memory"};
+inline const std::vector<std::string> kParts = {"live", "ddsperf", "subscribers", "recording", "load", "workers",
+                                                "rate", "clock",   "features",    "pages",     "cost", "memory"};
 // Run when it is asked for: it needs Cyclone's security plugins.
 inline constexpr const char* kSecurityPart = "security";
 
@@ -29,7 +30,7 @@ inline constexpr const char* kSecurityPart = "security";
 struct BenchSettings {
   BenchInput input;
   std::set<std::string> parts;  // of kParts, and kSecurityPart
-  int runs = 3;                 // of the parts `live` and `security`
+  int runs = 3;                 // of the parts `live`, `pages` and `security`
   std::uint64_t frames = 6000;  // of the part `memory`
   int features = 200;
   int workers = 2;
@@ -48,9 +49,11 @@ struct BenchReport {
   bool stopped = false;  // before its end
 };
 
-// `on_run(number, all, name)` is called before each run, the first of which is number 1.
+// `on_run(number, all, name)` is called before each run, the first of which is number 1. `trace`, which may be null,
+// gets the live runs.
 [[nodiscard]] SetupExpected<BenchReport> run_bench(const BenchSettings& settings, StopSignal& stop,
-                                                   const std::function<void(int, int, const std::string&)>& on_run);
+                                                   const std::function<void(int, int, const std::string&)>& on_run,
+                                                   TraceFile* trace);
 
 // The runs that the settings ask for. `may_be_realtime`: without it those with SCHED_FIFO are left out.
 [[nodiscard]] std::vector<LiveCase> live_cases(const BenchSettings& settings, bool may_be_realtime);

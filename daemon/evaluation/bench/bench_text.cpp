@@ -43,7 +43,8 @@ Json json_of_run(const LiveResult& result) {
                {"subscribers", c.subscribers},
                {"slow_subscriber", c.slow_subscriber},
                {"recording", c.recording},
-               {"stress", c.stress}};
+               {"stress", c.stress},
+               {"pages", c.pages}};
   if (!result.not_run.empty()) json["not_run"] = result.not_run;
   const LiveFigures& f = result.figures;
   if (f.sent == 0) return json;
@@ -70,6 +71,7 @@ Json json_of_run(const LiveResult& result) {
   json["releases_late"] = f.releases_late;
   json["learning_put_off"] = f.learning_put_off;
   json["frames_not_recorded"] = f.frames_not_recorded;
+  if (c.pages > 0) json["pages_open"] = f.pages_open;
   return json;
 }
 

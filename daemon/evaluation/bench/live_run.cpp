@@ -17,6 +17,7 @@
 #include "daemon/evaluation/bench/bare_loop.hpp"
 #include "daemon/evaluation/bench/child_process.hpp"
 #include "daemon/evaluation/bench/machine.hpp"
+#include "daemon/evaluation/bench/open_pages.hpp"
 #include "daemon/evaluation/bench/release_log.hpp"
 #include "daemon/evaluation/bench/subscriber.hpp"
 #include "daemon/process/stop_signal.hpp"
@@ -95,6 +96,27 @@ Expected<ChildProcess> begin_stress(const std::filesystem::path& scratch) {
                                         "128M", "--temp-path", scratch.string(), "--quiet"});
 }
 
+// What else the machine does meanwhile.
+struct Beside {
+  std::optional<ChildProcess> stress;
+  std::optional<OpenPages> pages;
+};
+
+Expected<Beside> begin_beside(const BenchInput& input, const LiveCase& live_case) {
+  Beside beside;
+  if (live_case.stress) {
+    auto stress = begin_stress(input.scratch);
+    if (!stress) return tl::unexpected(stress.error());
+    beside.stress.emplace(std::move(*stress));
+  }
+  if (live_case.pages > 0) {
+    auto pages = OpenPages::open(input.domain, live_case.pages, input.scratch);
+    if (!pages) return tl::unexpected(pages.error());
+    beside.pages.emplace(std::move(*pages));
+  }
+  return beside;
+}
+
 // The subscribers in the order of their start, the slow one last.
 Expected<std::vector<Subscriber>> begin_subscribers(const BenchInput& input, const LiveCase& live_case) {
   std::vector<Subscriber> subscribers;
@@ -128,6 +150,7 @@ Figures over(const std::vector<LoggedRelease>& releases, Of of) {
 }
 
 void add_releases(const std::vector<LoggedRelease>& releases, LiveFigures& figures) {
+  if (!releases.empty()) figures.counted_from = releases.front().deadline;
   figures.tardiness = over(releases, [](const auto& r) { return r.ready - r.deadline; });
   figures.dds_write = over(releases, [](const auto& r) { return r.written - r.ready; });
   figures.capture_to_release = over(releases, [](const auto& r) { return r.ready - r.capture; });
@@ -187,7 +210,8 @@ Expected<void> add_receipts(std::vector<Subscriber>& subscribers, bool last_is_s
 
 }  // namespace
 
-SetupExpected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case, StopSignal& stop) {
+SetupExpected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case, StopSignal& stop,
+                                   FrameTrace* trace) {
   LiveResult result{live_case, {}, {}};
   LiveFigures& figures = result.figures;
   figures.load_before = load_1_min();
@@ -198,14 +222,10 @@ SetupExpected<LiveResult> run_live(const BenchInput& input, const LiveCase& live
   setup->pipeline.clock_period =
       live_case.clock_rate_hz > 0.0 ? from_seconds(1.0 / live_case.clock_rate_hz) : Duration(0);
 
-  std::optional<ChildProcess> stress;
-  if (live_case.stress) {
-    auto started = begin_stress(input.scratch);
-    if (!started) {
-      result.not_run = started.error().message;
-      return result;
-    }
-    stress.emplace(std::move(*started));
+  auto beside = begin_beside(input, live_case);
+  if (!beside) {
+    result.not_run = beside.error().message;
+    return result;
   }
   std::unique_ptr<SessionRecorder> recorder;
   const std::filesystem::path recorded = input.scratch / "perimap-bench.mcap";
@@ -222,7 +242,7 @@ SetupExpected<LiveResult> run_live(const BenchInput& input, const LiveCase& live
                                              dds.surface_lifespan});
   if (!publication) return tl::unexpected(publication.error());
 
-  Pipeline pipeline(setup->pipeline);
+  Pipeline pipeline(setup->pipeline, trace);
   RuntimeSettings runtime = runtime_settings(setup->configuration, setup->identity);
   runtime.scheduling = {live_case.priority, live_case.cpus};
   ReleaseLog log(**publication, live_case.stream, kMostReleases);
@@ -249,6 +269,7 @@ SetupExpected<LiveResult> run_live(const BenchInput& input, const LiveCase& live
                         tick);
     ended = session.run(stop);
     bare.stop();
+    if (beside->pages) figures.pages_open = beside->pages->connected();
     munlockall();  // the session locked what it could; the next run begins as this one did
     figures.priority_granted = threads.priority() == perimap_PRIVILEGE_GRANTED;
     const std::vector<LoggedRelease> releases = those_that_count(log.releases(), input.settle);
@@ -279,6 +300,8 @@ SetupExpected<LiveResult> run_live(const BenchInput& input, const LiveCase& live
     std::error_code error;
     std::filesystem::remove(recorded, error);
   }
+  if (figures.pages_open < live_case.pages)
+    result.not_run = fmt::format("{} of {} pages were open", figures.pages_open, live_case.pages);
   const auto bytes = surface_bytes(static_cast<std::size_t>(std::lround(figures.features)));
   if (!bytes) return tl::unexpected(bytes.error());
   figures.surface_bytes = *bytes;

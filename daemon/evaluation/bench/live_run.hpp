@@ -1,10 +1,12 @@
 // One live run over the recording: the whole runtime, DDS, and subscribers in processes of their own.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "core/pipeline/frame_trace.hpp"
 #include "core/pipeline/release_stream.hpp"
 #include "core/realtime/latency_histogram.hpp"
 #include "daemon/evaluation/bench/bench_input.hpp"
@@ -30,6 +32,7 @@ struct LiveCase {
   bool recording = false;        // while it publishes
   bool secured = false;          // publisher and subscribers have keys
   bool stress = false;           // beside stress-ng on all processors, memory and disk
+  int pages = 0;                 // of perimap view, open in browsers beside it
 };
 
 struct StageFigures {
@@ -39,12 +42,13 @@ struct StageFigures {
 
 // Of the time that counts, but for the counts, which are of the whole run.
 struct LiveFigures {
-  Figures tardiness;           // deadline to just before the write
-  Figures bare;                // deadline to wake-up of the loop beside it
-  Figures dds_write;           // by itself
-  Figures capture_to_release;  // capture to just before the write
-  Figures capture_to_receipt;  // at the first subscriber
-  Figures write_to_receipt;    // from just before the write, likewise
+  std::optional<Instant> counted_from;  // the first release that counts
+  Figures tardiness;                    // deadline to just before the write
+  Figures bare;                         // deadline to wake-up of the loop beside it
+  Figures dds_write;                    // by itself
+  Figures capture_to_release;           // capture to just before the write
+  Figures capture_to_receipt;           // at the first subscriber
+  Figures write_to_receipt;             // from just before the write, likewise
   std::vector<StageFigures> stages;
   std::uint64_t sent = 0;
   std::uint64_t missing = 0;          // at the worst of the subscribers that are not slow
@@ -60,6 +64,7 @@ struct LiveFigures {
   std::uint64_t releases_late = 0;
   std::uint64_t learning_put_off = 0;
   std::uint64_t frames_not_recorded = 0;
+  int pages_open = 0;  // when the last surface had been released
   bool priority_granted = false;
   double load_before = 0.0;  // of the machine, 1 min
 };
@@ -70,7 +75,8 @@ struct LiveResult {
   LiveFigures figures;
 };
 
-// `stop` ends the run early; what was measured until then counts.
-[[nodiscard]] SetupExpected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case, StopSignal& stop);
+// `stop` ends the run early; what was measured until then counts. `trace`, which may be null, gets each frame's life.
+[[nodiscard]] SetupExpected<LiveResult> run_live(const BenchInput& input, const LiveCase& live_case, StopSignal& stop,
+                                                 FrameTrace* trace);
 
 }  // namespace perimap::bench

@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/command_line/commands.hpp"
@@ -16,6 +18,7 @@
 #include "daemon/evaluation/bench/own_network.hpp"
 #include "daemon/evaluation/bench/scratch_folder.hpp"
 #include "daemon/evaluation/bench/subscriber.hpp"
+#include "daemon/evaluation/bench/trace_file.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "drivers/text_file/text_file.hpp"
@@ -35,17 +38,16 @@ struct BenchOptions {
   double settle = 8.0;
   std::string json;
   std::string html;
+  std::string trace;
 };
 
 Outcome measure(const BenchOptions& options, const Console& console) {
   const std::string& recording = options.settings.input.recording;
-  if (auto apart =
-          check_apart({{"--json", options.json}, {"--html", options.html}}, {{"the recording itself", recording}});
-      !apart) {
+  const std::initializer_list<Output> outputs = {
+      {"--json", options.json}, {"--html", options.html}, {"--trace", options.trace}};
+  if (auto apart = check_apart(outputs, {{"the recording itself", recording}}); !apart)
     return refuse(apart.error(), ExitCode::kWrongUsage);
-  }
-  if (auto able = check_writable({{"--json", options.json}, {"--html", options.html}}); !able)
-    return refuse(able.error());
+  if (auto able = check_writable(outputs); !able) return refuse(able.error());
   auto stop = StopSignal::install();
   if (!stop) return refuse(stop.error());
   const auto scratch = bench::ScratchFolder::create(options.scratch.empty() ? std::filesystem::temp_directory_path()
@@ -64,10 +66,24 @@ Outcome measure(const BenchOptions& options, const Console& console) {
   if (options.security) {
     if (const auto made = bench::make_keys(settings.input); !made) return refuse(made.error());
   }
-  const auto report = bench::run_bench(settings, *stop, [&](int number, int all, const std::string& name) {
-    console.complain(fmt::format("{:3}/{} {}", number, all, name));
-  });
+  std::optional<bench::TraceFile> trace;
+  if (!options.trace.empty()) {
+    auto created = bench::TraceFile::create(options.trace);
+    if (!created) return refuse(created.error());
+    trace.emplace(std::move(*created));
+  }
+  const auto report = bench::run_bench(
+      settings, *stop,
+      [&](int number, int all, const std::string& name) {
+        console.complain(fmt::format("{:3}/{} {}", number, all, name));
+      },
+      trace ? &*trace : nullptr);
   if (!report) return refuse(report.error());
+  if (trace) {
+    if (auto done = trace->finish(); !done) return refuse(done.error());
+    if (trace->left_out() > 0)
+      console.complain(fmt::format("the trace had no room for {} entries, the last of their runs", trace->left_out()));
+  }
   if (!options.json.empty()) {
     if (auto done = write_text_file(options.json, to_json(*report).dump(2) + "\n"); !done) return refuse(done.error());
   }
@@ -114,6 +130,9 @@ void add_bench_command(Commands& commands) {
                      "Configuration file; without it the recording's own configuration over the defaults");
   command.add_option("--json", options->json, "Write the figures as JSON to this file");
   command.add_option("--html", options->html, "Write one self-contained page to this file");
+  command.add_option("--trace", options->trace,
+                     "Write to this file when each part of each frame's life happened, on which thread, in the parts "
+                     "that run live; JSON that Perfetto (ui.perfetto.dev) and chrome://tracing open");
   command.add_option("--only", options->only, "These parts alone; ddsperf runs after each run of 'live'")
       ->check(OneOf(bench::kParts))
       ->delimiter(',');
@@ -124,7 +143,8 @@ void add_bench_command(Commands& commands) {
   command.add_option("--settle", options->settle, "Played before, for the map to grow; not measured")
       ->check(Range(0.0, 1e6))
       ->capture_default_str();
-  command.add_option("--runs", settings.runs, "How often the part 'live', and those of --security, are run")
+  command
+      .add_option("--runs", settings.runs, "How often the parts 'live' and 'pages', and those of --security, are run")
       ->check(Range(1, 1000))
       ->capture_default_str();
   command.add_option("--frames", settings.frames, "Frames of the part 'memory'")

@@ -15,12 +15,12 @@ fail() {
 }
 
 "$perimap" bench "$recording" --only live,memory --runs 1 --settle 0.5 --seconds 1.5 --features 40 --frames 400 \
-  --scratch "$out/scratch" --json "$out/bench.json" --html "$out/bench.html" > "$out/table" 2> "$out/progress" ||
+  --scratch "$out/scratch" --json "$out/bench.json" --html "$out/bench.html" --trace "$out/trace.json" > "$out/table" 2> "$out/progress" ||
   fail "exit code $?: $(cat "$out/progress")"
 
 if grep -v '^perimap bench: ' "$out/progress"; then fail "a line without the program's name"; fi
 
-node - "$out/bench.json" << 'END' || fail "the figures do not go together"
+node - "$out/bench.json" "$out/trace.json" << 'END' || fail "the figures do not go together"
 const json = JSON.parse(require('fs').readFileSync(process.argv[2]));
 let failed = 0;
 function expect(holds, text) {
@@ -48,12 +48,32 @@ for (const run of json.live) {
   expect(run.capture_to_release.p50_us >= 50000, `${name}: released before capture + 50 ms`);
   expect(run.stages['predict and find'].count > 0, `${name}: no stage was measured`);
 }
+// Each run is a process of the trace; the surfaces from where the figures begin are those that they count.
+const trace = JSON.parse(require('fs').readFileSync(process.argv[3])).traceEvents;
+const runs = trace.filter((event) => event.name === 'process_name');
+expect(runs.length === json.live.length, `${runs.length} runs in the trace`);
+for (const [i, run] of json.live.entries()) {
+  const own = trace.filter(({ pid }) => pid === runs[i].pid);
+  expect(runs[i].args.name === `${run.part}: ${run.name}`, `a run is called ${runs[i].args.name}`);
+  const from = own.find(({ name }) => name === 'counted from here').ts;
+  const written = own.filter(({ ph, name, ts, args }) => ph === 'X' && name === 'write' && ts - args.after_deadline_us >= from - 0.002);
+  expect(written.length === run.sent, `${written.length} surfaces in the trace, ${run.sent} counted`);
+  const total = written.reduce((sum, { dur }) => sum + dur, 0);
+  expect(total >= run.sent * run.dds_write.p50_us / 2, `the writes of the trace take ${total} us`);
+  const lateness = written.map(({ args }) => args.after_deadline_us).sort((a, b) => a - b)[Math.floor((written.length - 1) / 2)];
+  expect(Math.abs(lateness - run.release_tardiness.p50_us) < 20, `half of them are ${lateness} us late or less`);
+}
 // 180 frames a round.
 expect(json.memory.frames >= 400 && json.memory.frames <= 402, `${json.memory.frames} frames in lockstep`);
 expect(json.memory.rounds === 3, `${json.memory.rounds} rounds`);
 expect(json.memory.readings.every((r) => r.resident_kB > 1000), 'memory was not read');
 process.exit(failed === 0 ? 0 : 1);
 END
+"$perimap" bench "$recording" --trace "$out/no-such-folder/trace.json" > /dev/null 2> "$out/error" &&
+  fail "a trace that cannot be written is no error"
+grep -q 'no-such-folder' "$out/error" || fail "the error does not name the trace"
+"$perimap" bench "$recording" --json "$out/one" --trace "$out/one" > /dev/null 2>&1
+[ $? -eq 2 ] || fail "one file for two outputs is no wrong usage"
 grep -q 'do not prove' "$out/table" || fail "the table does not say what it does not prove"
 grep -q '</html>' "$out/bench.html" || fail "the page is not whole"
 if grep -oE '(src|href)=' "$out/bench.html"; then fail "the page refers to something outside"; fi

@@ -23,6 +23,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/pipeline/frame_trace.hpp"
 #include "core/pipeline/pipeline.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
@@ -191,12 +192,13 @@ TEST(RealtimePath, NeitherAllocatesNorBlocksWhileTheSetUpIsJudged) {
   EXPECT_GT(pipeline.setup_watcher().status_belief().judged(), 0U);
 }
 
-// With the shortest of budgets, so that features are shed.
+// With the shortest of budgets, so that features are shed, and while a trace is kept.
 TEST(RealtimePath, NeitherAllocatesNorBlocksLiveWithAllThreads) {
   ReplaySetup s = setup();
   s.pipeline.clock_period = std::chrono::milliseconds(2);
   s.pipeline.budget = std::chrono::microseconds(100);
-  Pipeline pipeline(s.pipeline);
+  FrameTrace trace(1000, s.pipeline.workers);
+  Pipeline pipeline(s.pipeline, &trace);
   LastSurface publication;
   RuntimeSettings settings;
   settings.lock_memory = false;
@@ -212,6 +214,9 @@ TEST(RealtimePath, NeitherAllocatesNorBlocksLiveWithAllThreads) {
   runtime.stop();
   EXPECT_FALSE(feeder.error().has_value());
   expect_none();
+  EXPECT_GT(trace.arrivals.entries().size(), 100U);
+  EXPECT_GT(trace.mapper.entries().size(), 700U);
+  for (const FixedLog<FrameSlice>& worker : trace.workers) EXPECT_GT(worker.entries().size(), 300U);
   EXPECT_GT(publication.surfaces, 100);
   EXPECT_GT(publication.clock_surfaces, 100);
   EXPECT_GT(publication.features + pipeline.counters().features_shed.get(), 0U)
