@@ -13,12 +13,15 @@
 #include <vector>
 
 #include "daemon/command_line/commands.hpp"
+#include "daemon/command_line/outputs.hpp"
+#include "daemon/evaluation/session/session_page.hpp"
 #include "daemon/evaluation/watch/sample_receiver.hpp"
 #include "daemon/evaluation/watch/watch_report.hpp"
 #include "daemon/evaluation/watch/watch_run.hpp"
 #include "daemon/evaluation/watch/watch_screen.hpp"
 #include "daemon/keys/key_folder.hpp"
 #include "daemon/process/stop_signal.hpp"
+#include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
 namespace {
@@ -32,6 +35,7 @@ struct WatchOptions {
   std::uint64_t surfaces = 0;  // 0: no limit
   double wait_s = 0.0;         // 0: no limit
   std::string recording;
+  std::string page;  // of the session, at its end
   std::optional<std::string> security;
 };
 
@@ -88,7 +92,29 @@ void print_interval(const WatchOptions& options, const std::vector<StreamReport>
   }
 }
 
+// Nobody wants to hear at the end of a session that its page can not be written.
+Outcome check_page(const WatchOptions& options) {
+  if (options.page.empty()) return {};
+  if (options.recording.empty())
+    return refuse("--session: expected --record too, whose file the page tells of", ExitCode::kWrongUsage);
+  const Output page{"--session", options.page};
+  if (auto apart = check_apart({{"--record", options.recording}, page}, {}); !apart)
+    return refuse(apart.error(), ExitCode::kWrongUsage);
+  if (auto able = check_writable({page}); !able) return refuse(able.error());
+  return {};
+}
+
+// As perimap session does.
+Expected<void> write_session_page(const WatchOptions& options) {
+  SessionFiles files;
+  files.recording = options.recording;
+  const auto record = read_session(files);
+  if (!record) return tl::unexpected(record.error());
+  return write_text_file(options.page, session_page(*record));
+}
+
 Outcome watch(const WatchOptions& options, const Console& console) {
+  if (auto able = check_page(options); !able) return able;
   if (options.security) {
     const auto keys = check_keys(*options.security, seconds_now());
     if (!keys) return refuse(Error{"--security: " + keys.error().message}, ExitCode::kWrongUsage);
@@ -137,6 +163,9 @@ Outcome watch(const WatchOptions& options, const Console& console) {
   if (receiver.surfaces() == 0) {
     return refuse("no surface was received in DDS domain " + std::to_string(options.domain) + hint(options));
   }
+  if (options.page.empty()) return {};
+  if (auto written = write_session_page(options); !written) return refuse(written.error());
+  console.complain("page: " + options.page);
   return {};
 }
 
@@ -166,6 +195,10 @@ void add_watch_command(Commands& commands) {
   command.add_option("--wait", options->wait_s, "End with exit code 1 when no surface has come after so many seconds")
       ->check(Range(0.001, 1e9));
   command.add_option("--record", options->recording, "Write every received sample of all topics to this MCAP file");
+  command.add_option(
+      "--session", options->page,
+      "With --record: at the end write one HTML page to this file that tells what could be trusted when, "
+      "as perimap session does");
 }
 
 }  // namespace perimap

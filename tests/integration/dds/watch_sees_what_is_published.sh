@@ -21,7 +21,14 @@ grep -q "no surface was received in DDS domain $DOMAIN" "$scratch/nobody" || fai
 [ $? -eq 1 ] || fail "a recording that cannot be written must end with 1"
 grep -q "/nowhere/x.mcap" "$scratch/unwritable" || fail "the error does not name the recording"
 
-"$perimap" watch --domain "$DOMAIN" --wait 60 --json --count 120 --record "$scratch/x.mcap" >"$scratch/counted" &
+"$perimap" watch --domain "$DOMAIN" --wait 0.1 --session "$scratch/x.html" 2>"$scratch/unrecorded"
+[ $? -eq 2 ] || fail "a page of what is not recorded must end with 2"
+"$perimap" watch --domain "$DOMAIN" --wait 0.1 --record "$scratch/x.mcap" --session /nowhere/x.html 2>"$scratch/unwritable"
+[ $? -eq 1 ] || fail "a page that cannot be written must end with 1"
+grep -q "/nowhere/x.html" "$scratch/unwritable" || fail "the error does not name the page"
+[ ! -e "$scratch/x.mcap" ] || fail "it recorded before it said so"
+"$perimap" watch --domain "$DOMAIN" --wait 60 --json --count 120 --record "$scratch/x.mcap" --session "$scratch/x.html" \
+  >"$scratch/counted" &
 counted=$!
 "$perimap" watch --domain "$DOMAIN" --wait 60 --json --once >"$scratch/once" &
 once=$!
@@ -39,4 +46,5 @@ tail -n 1 "$scratch/counted" | grep -q '^{"kind":"summary".*"received":120,"miss
 grep -q '^{"kind":"surface".*"sample_sequence":0,.*"id":49,' "$scratch/once" || fail "watch --once: $(cut -c 1-300 "$scratch/once")"
 grep -q '150 surfaces in .* 0 lost' "$scratch/stopped" || fail "summary after SIGINT: $(cat "$scratch/stopped")"
 [ -s "$scratch/x.mcap" ] || fail "no recording"
+grep -q '</html>' "$scratch/x.html" || fail "no page of the session"
 [ "$(tail -c 8 "$scratch/x.mcap" | od -An -tx1 | tr -d ' ')" = 894d434150300d0a ] || fail "the recording is not whole"
