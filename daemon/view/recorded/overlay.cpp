@@ -33,15 +33,17 @@ void put_mesh(const client::PredictedMesh& mesh, const PictureProjector& project
 }
 
 void put_features(const client::PredictedSurface& surface, const PictureProjector& project, Json& json) {
-  Json features = Json::array(), states = Json::array();
+  Json features = Json::array(), ids = Json::array(), states = Json::array();
   for (const client::PredictedFeature& feature : surface.features) {
     const auto px = project(feature.position_W_mm);
     if (!px || feature.state == perimap_FEATURE_INVALID) continue;
     features.push_back(tenth(px->x()));
     features.push_back(tenth(px->y()));
+    ids.push_back(feature.id);
     states.push_back(static_cast<int>(feature.state));
   }
   json["features_px"] = std::move(features);
+  json["feature_ids"] = std::move(ids);
   json["feature_states"] = std::move(states);
 }
 

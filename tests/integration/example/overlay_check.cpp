@@ -4,15 +4,12 @@
 //   overlay_check prepare RECORDING VIDEO CALIBRATION     writes the recording's frames and its camera
 //   overlay_check judge RECORDING SAMPLES LINES PICTURE   LINES, PICTURE: what the example printed, and drew last
 //
-// The judge knows the simulated heart: a feature is the material point that the ray of its first detection meets, and
-// where that was in each frame is the truth. SAMPLES (perimap watch --record) tell the first detections.
+// The judge knows the simulated heart, by true_places.hpp. SAMPLES are of perimap watch --record.
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <fstream>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
@@ -21,23 +18,22 @@
 
 #include "daemon/evaluation/report/recorded_truth.hpp"
 #include "drivers/calibration/calibration_file.hpp"
-#include "drivers/recording/channels.hpp"
 #include "drivers/recording/replay_reader.hpp"
 #include "drivers/video/video_file.hpp"
+#include "tests/integration/example/true_places.hpp"
 
 namespace perimap {
 namespace {
+
+using test::PublishedPlaces;
+using test::read_published_places;
+using test::true_pixel;
+using test::truth_of;
 
 template <class T>
 T value_of(Expected<T> made) {
   if (!made) throw std::runtime_error(made.error().message);
   return std::move(*made);
-}
-
-RecordedTruth truth_of(const std::string& recording) {
-  auto truth = value_of(load_truth(recording, ReadMode::kStrict));
-  if (!truth) throw std::runtime_error(recording + ": has no ground truth");
-  return std::move(*truth);
 }
 
 int prepare(const std::string& recording, const std::string& video, const std::string& calibration) {
@@ -59,45 +55,6 @@ int prepare(const std::string& recording, const std::string& video, const std::s
   return 0;
 }
 
-struct Samples {
-  std::map<std::uint32_t, std::pair<Instant, Vector2d>> first_views;  // by id
-  std::map<std::uint64_t, Pose> cameras;                              // by frame sequence
-  std::optional<Duration> to_recording;
-  int models_for_a_turn =
-      0;  // that came before it was time for the next: a beat has become known, or the state is another
-};
-
-Samples read_samples(const std::string& file, const RecordedTruth& truth) {
-  auto reader = value_of(RecordingReader::open(file, ReadMode::kStrict));
-  constexpr std::array<std::string_view, 2> kPublished = {channels::kSurface, channels::kSurfaceModel};
-  if (auto selected = reader.select(kPublished); !selected) throw std::runtime_error(selected.error().message);
-  Samples samples;
-  Instant last_model;
-  while (const auto message = value_of(reader.next())) {
-    if (message->channel == channels::kSurfaceModel) {
-      const auto model = value_of(reader.decode<perimap_SurfaceModel>(*message));
-      const Instant made = from_ns(model->time_ns);
-      samples.models_for_a_turn += made - last_model < std::chrono::milliseconds(450) ? 1 : 0;
-      last_model = made;
-      for (std::uint32_t i = 0; i < model->features._length; ++i) {
-        const perimap_ModelFeature& feature = model->features._buffer[i];
-        samples.first_views[feature.id] = {from_ns(feature.first_observed_time_ns),
-                                           {feature.first_observed_px[0], feature.first_observed_px[1]}};
-      }
-    } else {
-      const auto surface = value_of(reader.decode<perimap_Surface>(*message));
-      if (surface->camera_pose_known) {
-        const double* t = surface->translation_WC_mm;
-        samples.cameras[surface->frame_sequence] = pose_from_wxyz({t[0], t[1], t[2]}, surface->rotation_WC_wxyz);
-      }
-      if (!samples.to_recording && rests_on_its_frame(surface->reason)) {
-        samples.to_recording = truth.to_recording(surface->frame_sequence, from_ns(surface->capture_time_ns));
-      }
-    }
-  }
-  return samples;
-}
-
 // How far from the truth each position of a printed frame is, in px.
 struct Off {
   std::vector<double> px;
@@ -105,36 +62,17 @@ struct Off {
   double camera_mm = 0.0;            // the largest
 };
 
-// As the scope was turned and zoomed then.
-CameraModel lens_at(const RecordedTruth& truth, Instant capture) {
-  CameraModel lens = truth.camera;
-  const CameraTruth* camera = truth.truth.camera(capture);
-  if (camera == nullptr || !(camera->focal_px.x() > 0.0)) return lens;
-  lens.fx = camera->focal_px.x(), lens.fy = camera->focal_px.y();
-  lens.cx = camera->principal_px.x(), lens.cy = camera->principal_px.y();
-  return lens;
-}
-
-void judge_frame(const nlohmann::json& frame, const RecordedTruth& truth, const Samples& samples, Off& off) {
+void judge_frame(const nlohmann::json& frame, const RecordedTruth& truth, const PublishedPlaces& published, Off& off) {
   const auto sequence = frame["frame_sequence"].get<std::uint64_t>();
   const Instant capture = truth.captures.at(sequence);
   const auto true_X_WC = truth.truth.camera_pose(capture);
   if (!true_X_WC) throw std::runtime_error("no true pose of a frame");
-  const Pose X_WC = samples.cameras.at(sequence);
+  const Pose X_WC = published.cameras.at(sequence);
   off.camera_mm = std::max(off.camera_mm, (X_WC.t - true_X_WC->t).norm());
   for (const auto& feature : frame["features"]) {
-    const auto first = samples.first_views.find(feature["id"].get<std::uint32_t>());
-    if (first == samples.first_views.end()) throw std::runtime_error("a feature was drawn that no model had");
-    const Instant seen = first->second.first + *samples.to_recording;
-    const auto seen_from = truth.truth.camera_pose(seen);
-    Vector3d ray_C;
-    if (!seen_from || !lens_at(truth, seen).unproject(first->second.second, ray_C)) continue;
-    const auto point = truth.truth.first_hit(*seen_from, ray_C, seen);
-    if (!point) continue;
-    Vector2d px;
-    const Vector3d p_C = X_WC.inverse() * truth.truth.position(*point, capture);
-    if (lens_at(truth, capture).project(p_C, px) != ProjectionStatus::kOk) continue;
-    off.px.push_back((px - Vector2d(feature["u"].get<double>(), feature["v"].get<double>())).norm());
+    const auto px = true_pixel(truth, published, feature["id"].get<std::uint32_t>(), capture, X_WC);
+    if (!px) continue;
+    off.px.push_back((*px - Vector2d(feature["u"].get<double>(), feature["v"].get<double>())).norm());
     if (feature["state"] == "converged") off.converged_px.push_back(off.px.back());
   }
 }
@@ -156,8 +94,7 @@ int circles_missing(const nlohmann::json& frame, const cv::Mat& picture) {
 int judge(const std::string& recording, const std::string& samples_file, const std::string& lines,
           const std::string& drawn) {
   const RecordedTruth truth = truth_of(recording);
-  const Samples samples = read_samples(samples_file, truth);
-  if (!samples.to_recording) throw std::runtime_error(samples_file + ": no surface of a frame");
+  const PublishedPlaces published = read_published_places(samples_file, truth);
   std::ifstream file(lines);
   Off off;
   nlohmann::json last;
@@ -168,7 +105,7 @@ int judge(const std::string& recording, const std::string& samples_file, const s
     if (last.contains("refused")) {
       ++refused;
     } else {
-      judge_frame(last, truth, samples, off);
+      judge_frame(last, truth, published, off);
     }
   }
   for (auto* px : {&off.px, &off.converged_px}) std::sort(px->begin(), px->end());
@@ -185,7 +122,7 @@ int judge(const std::string& recording, const std::string& samples_file, const s
   if (refused == 0 || refused == frames)
     throw std::runtime_error("it must refuse until there is a map, and draw from then on");
   if (!(median < 1.0) || !(most < 4.0)) throw std::runtime_error("that is too far");
-  if (samples.models_for_a_turn < 5) throw std::runtime_error("no model was made for a beat that had become known");
+  if (published.models_for_a_turn < 5) throw std::runtime_error("no model was made for a beat that had become known");
   if (last.contains("refused")) throw std::runtime_error("the last frame was refused");
   const cv::Mat picture = cv::imread(drawn);
   if (picture.empty()) throw std::runtime_error(drawn + ": no picture");
