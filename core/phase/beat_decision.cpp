@@ -401,6 +401,29 @@ void BeatDecision::follow_change(const Waiting& waiting, bool familiar) noexcept
   disturbances_ = 0.0;
 }
 
+// What is told in a beat's place may be something else: like no kind, and in noise, where the line stays away, or more
+// likely none by itself.
+bool BeatDecision::anywhere(const Waiting& waiting) const noexcept {
+  if (unknown_in_noise(waiting)) return true;
+  if (!clusters_.any_settled() || familiar(waiting) || of_known_kind(waiting)) return false;
+  return unlike_any_beat(waiting.candidate) || waiting.log_odds < 0.0;
+}
+
+// A complex has its R peak where its kind has, but one that is not exactly like it where its largest wave is. In noise,
+// where what is largest is often no heart's, it is the wave that points as the beats do and is as large.
+QrsWave BeatDecision::r_wave(const Waiting& waiting) const noexcept {
+  const QrsCandidate& candidate = waiting.candidate;
+  const QrsWave own{candidate.time, candidate.deviation, candidate.peak_mV};
+  const bool lost = unknown_in_noise(waiting);
+  const QrsWave& other = lost ? candidate.upright : candidate.larger;
+  const double least_mV =
+      lost ? settings_.height_of_beat * beats_.height() : settings_.larger_wave * std::abs(candidate.peak_mV);
+  const bool exact = waiting.correlation >= settings_.exactly_alike && clusters_.recurs(waiting.cluster);
+  if (exact && !lost) return own;
+  if (other.mV == 0.0 || std::abs(other.mV) < least_mV) return own;
+  return has_last_ && other.time - last_.time < settings_.refractory ? own : other;
+}
+
 void BeatDecision::tell(const Waiting& waiting, Instant now) noexcept {
   const QrsCandidate& candidate = waiting.candidate;
   const bool familiar = this->familiar(waiting);
@@ -410,10 +433,10 @@ void BeatDecision::tell(const Waiting& waiting, Instant now) noexcept {
   beats_.turn(candidate, settings_);
 
   RPeak peak;
-  peak.time = candidate.time;
+  const QrsWave r = r_wave(waiting);
+  peak.time = r.time;
   peak.shape = candidate.shape;
-  peak.deviation = candidate.deviation;
-  if (unknown_in_noise(waiting)) peak.deviation = from_seconds(settings_.doubtful_deviation_s);
+  peak.deviation = anywhere(waiting) ? from_seconds(settings_.doubtful_deviation_s) : r.deviation;
   peak.confidence = confidence(circumstances(waiting, familiar, now), settings_);
   if (strange(waiting) && !waiting.noted) note_disturbance(candidate.time, 0.5);
   if (familiar) familiar_at_ = candidate.time;

@@ -89,6 +89,8 @@ class BeatDecision {
   [[nodiscard]] bool known(const Waiting& waiting, Instant now, bool ending) const noexcept;
   void accept(int index, Instant now) noexcept;
   void tell(const Waiting& waiting, Instant now) noexcept;
+  [[nodiscard]] bool anywhere(const Waiting& waiting) const noexcept;
+  [[nodiscard]] QrsWave r_wave(const Waiting& waiting) const noexcept;
   void refuse(const Waiting& waiting) noexcept;
   void note_disturbance(Instant t, double weight) noexcept;
   [[nodiscard]] BeatCircumstances circumstances(const Waiting& waiting, bool familiar, Instant now) const noexcept;

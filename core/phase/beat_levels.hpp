@@ -20,6 +20,7 @@ class BeatLevels {
   [[nodiscard]] double slope() const noexcept { return known() ? slope_.median() : 0.0; }
   [[nodiscard]] Polarity polarity() const noexcept { return {upward_ > 0.0 || downward_ > 0.0, points_up_}; }
   [[nodiscard]] double excursions() const noexcept { return upward_ + downward_; }
+  [[nodiscard]] double height() const noexcept { return points_up_ ? upward_ : downward_; }
   // 1 for the usual beat.
   [[nodiscard]] double size(const QrsCandidate& candidate) const noexcept;
 

@@ -56,7 +56,7 @@ void CandidateFinder::follow(const QrsClusters& clusters, Polarity polarity, dou
   if (follow_energy() && crest_count_ < kPending) crests_[static_cast<std::size_t>(crest_count_++)] = crest_at_;
   if (filter_.now() % meter_.step() == 0) {
     if (const auto fit = follow_templates(clusters)) {
-      const QrsCandidate candidate = meter_.about_fit(fit->at, clusters.upward(fit->of), quiet);
+      const QrsCandidate candidate = meter_.about_fit(fit->at, clusters.upward(fit->of), polarity, quiet);
       if (candidate.energy > settings_.quanta * filter_.quantum_mV()) each(candidate);
     }
   }

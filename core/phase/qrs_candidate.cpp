@@ -43,13 +43,13 @@ QrsCandidate QrsMeter::about_crest(std::int64_t energy_peak, Polarity polarity, 
                                       : candidate.upward >= settings_.opposite * candidate.downward;
   }
   const std::int64_t peak = candidate.points_up ? top : bottom;
-  refine_peak(peak, noise_mV, candidate);
+  measure_waves(peak, polarity, noise_mV, candidate);
   if (!begins_before(peak)) candidate.shape = shape_at(peak);
   measure_step(peak, candidate);
   return candidate;
 }
 
-QrsCandidate QrsMeter::about_fit(std::int64_t centre, bool upward, double noise_mV) const noexcept {
+QrsCandidate QrsMeter::about_fit(std::int64_t centre, bool upward, Polarity polarity, double noise_mV) const noexcept {
   QrsCandidate candidate;
   candidate.points_up = upward;
   measure_about(centre, candidate);
@@ -71,7 +71,7 @@ QrsCandidate QrsMeter::about_fit(std::int64_t centre, bool upward, double noise_
   if (settings_.opposite * excursion < std::max(candidate.upward, candidate.downward)) candidate.shape.points = 0;
   if (begins_before(peak)) candidate.shape.points = 0;
   measure_step(peak, candidate);
-  refine_peak(peak, noise_mV, candidate);
+  measure_waves(peak, polarity, noise_mV, candidate);
   return candidate;
 }
 
@@ -134,8 +134,52 @@ void QrsMeter::measure_excursions(std::int64_t centre, QrsCandidate& candidate, 
   candidate.downward = std::max(baseline - smooth_at(bottom), 0.0);
 }
 
+// The peak, and other waves that may be meant: which one is R is not known before it is known what the complex is like.
+void QrsMeter::measure_waves(std::int64_t peak, Polarity polarity, double noise_mV,
+                             QrsCandidate& candidate) const noexcept {
+  const QrsWave own = refined(peak, candidate.points_up, noise_mV);
+  candidate.time = own.time;
+  candidate.deviation = own.deviation;
+  const double baseline = baseline_about(peak);
+  const auto half = static_cast<int>(settings_.wave_half / filter_.period());
+  const std::int64_t last = filter_.now() - filter_.despiked_delay() - half;
+  const auto height = [&](std::int64_t i) {
+    double sum = 0.0;
+    for (std::int64_t k = i - half; k <= i + half; ++k) sum += filter_.at(k + filter_.despiked_delay()).despiked;
+    return sum / (2 * half + 1) - baseline;
+  };
+  candidate.peak_mV = height(std::min(peak, last));
+  const int beside = filter_.samples_in(settings_.waves_beside);
+  const bool opposite = polarity.known && candidate.points_up != polarity.up;
+  double larger_mV = candidate.peak_mV;
+  double upright_mV = 0.0;
+  std::int64_t larger = peak;
+  std::int64_t upright = peak;
+  const std::int64_t from = peak - filter_.samples_in(opposite ? settings_.waves_before : settings_.waves_beside);
+  for (std::int64_t i = std::max<std::int64_t>(from, half + 1); i <= std::min(peak + beside, last - 1); ++i) {
+    const double mV = height(i);
+    const double side = mV < 0.0 ? -1.0 : 1.0;
+    if (side * mV < side * height(i - 1) || side * mV <= side * height(i + 1)) continue;
+    if (i >= peak - beside && std::abs(mV) > std::abs(larger_mV)) {
+      larger_mV = mV;
+      larger = i;
+    }
+    if (opposite && (mV > 0.0) == polarity.up && std::abs(mV) > std::abs(upright_mV)) {
+      upright_mV = mV;
+      upright = i;
+    }
+  }
+  const auto wave = [&](std::int64_t at, double mV) {
+    QrsWave other = refined(at, mV > 0.0, noise_mV);
+    other.mV = mV;
+    return other;
+  };
+  if (larger != peak) candidate.larger = wave(larger, larger_mV);
+  if (upright != peak) candidate.upright = wave(upright, upright_mV);
+}
+
 // Parabola a + b u + c u^2 by least squares, fitted again around its own vertex once.
-void QrsMeter::refine_peak(std::int64_t peak, double noise_mV, QrsCandidate& candidate) const noexcept {
+QrsWave QrsMeter::refined(std::int64_t peak, bool upward, double noise_mV) const noexcept {
   const double step_s = to_seconds(filter_.period());
   const int reach = filter_.samples_in(settings_.parabola);
   const int delay = filter_.despiked_delay();
@@ -166,7 +210,7 @@ void QrsMeter::refine_peak(std::int64_t peak, double noise_mV, QrsCandidate& can
     const double b = sum_uy / sum_u2;
     const double c = (n * sum_u2y - sum_u2 * sum_y) / (n * sum_u4 - sum_u2 * sum_u2);
     const double a = (sum_y - c * sum_u2) / n;
-    if (candidate.points_up ? c >= 0.0 : c <= 0.0) break;
+    if (upward ? c >= 0.0 : c <= 0.0) break;
     const double limit = static_cast<double>(reach) * step_s;
     vertex_s = std::clamp(-b / (2.0 * c), -limit, limit);
     double squares = 0.0;
@@ -189,9 +233,11 @@ void QrsMeter::refine_peak(std::int64_t peak, double noise_mV, QrsCandidate& can
   for (std::int64_t i = peak - reach; i <= peak + reach; ++i) made_up += filter_.at(i).made_up ? 1 : 0;
   // Where the peak lies among samples that are missing: uniform.
   deviation_s = std::hypot(deviation_s, made_up * step_s / std::sqrt(12.0));
-  candidate.time = filter_.at(peak).time + from_seconds(vertex_s);
-  candidate.deviation =
+  QrsWave wave;
+  wave.time = filter_.at(peak).time + from_seconds(vertex_s);
+  wave.deviation =
       from_seconds(std::min(std::hypot(deviation_s, settings_.deviation_floor_s), settings_.deviation_cap_s));
+  return wave;
 }
 
 }  // namespace perimap

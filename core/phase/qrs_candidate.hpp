@@ -12,6 +12,13 @@
 
 namespace perimap {
 
+// A local extremum of the line.
+struct QrsWave {
+  Instant time;  // finer than the sample period
+  Duration deviation{0};
+  double mV = 0.0;  // from the baseline; 0: there is none
+};
+
 struct QrsCandidate {
   Instant time;  // of the local peak, finer than the sample period
   Duration deviation{0};
@@ -24,6 +31,9 @@ struct QrsCandidate {
   double step = 0.0;   // change of level from before to after, to the excursions
   double rough = 0.0;  // mV, of what is too fast for a QRS complex
   bool points_up = true;
+  double peak_mV = 0.0;  // from the baseline
+  QrsWave larger;        // the largest wave of the complex beside the peak, where that exceeds it
+  QrsWave upright;       // the largest that points as the beats do, where the peak does not; a little before it, too
 };
 
 // Which way the beats point: the excursions of those so far.
@@ -45,7 +55,8 @@ class QrsMeter {
   [[nodiscard]] QrsCandidate about_crest(std::int64_t energy_peak, Polarity polarity, double noise_mV) const noexcept;
   // Where the shape is known to within some samples; the peak points the way it does there. The shape has no points
   // when another wave of the complex is so much larger that this is not its R peak.
-  [[nodiscard]] QrsCandidate about_fit(std::int64_t centre, bool upward, double noise_mV) const noexcept;
+  [[nodiscard]] QrsCandidate about_fit(std::int64_t centre, bool upward, Polarity polarity,
+                                       double noise_mV) const noexcept;
   // Of no points while its end is not known.
   [[nodiscard]] QrsShape shape_at(std::int64_t centre) const noexcept;
 
@@ -56,7 +67,8 @@ class QrsMeter {
                           std::int64_t& bottom) const noexcept;
   void measure_about(std::int64_t centre, QrsCandidate& candidate) const noexcept;
   void measure_step(std::int64_t peak, QrsCandidate& candidate) const noexcept;
-  void refine_peak(std::int64_t peak, double noise_mV, QrsCandidate& candidate) const noexcept;
+  [[nodiscard]] QrsWave refined(std::int64_t peak, bool upward, double noise_mV) const noexcept;
+  void measure_waves(std::int64_t peak, Polarity polarity, double noise_mV, QrsCandidate& candidate) const noexcept;
 
   const CandidateSettings& settings_;
   const EcgFilter& filter_;

@@ -44,6 +44,9 @@ struct CandidateSettings {
   Duration baseline_before = std::chrono::milliseconds(200);  // so that the complex is the smaller part of the stretch
   Duration step_reach = std::chrono::milliseconds(100);       // each side, outside the complex
   Duration parabola = std::chrono::milliseconds(10);          // each side of the peak: an R wave is a parabola so far
+  Duration wave_half = std::chrono::milliseconds(4);  // of the mean in which a wave is an extremum: no last bit is one
+  Duration waves_beside = std::chrono::milliseconds(45);   // other waves of one complex, each side of its peak,
+  Duration waves_before = std::chrono::milliseconds(110);  // and a QRS complex before an artefact that hides its end
   double opposite = 2.0;             // a beat points the other way when its other excursion is larger by this factor
   double deviation_floor_s = 0.001;  // clean beats scatter by that about their peaks (docs/design/phase.md)
   double deviation_cap_s = 0.020;    // where there is no vertex: uniform over the complex's top
@@ -120,6 +123,8 @@ struct DecisionSettings {
   double learnt = 0.8;                  // probability from which on a beat teaches rhythm and levels
   double polarity_hysteresis = 1.3;     // an RS complex of equal parts must not change sides with each beat
   double polarity_memory = 8.0;         // beats, as the levels
+  double larger_wave = 1.2;             // times the peak: of a complex that is not exactly like its kind it is R (dev)
+  double height_of_beat = 0.5;          // of the usual excursion, from which on a wave in noise may be the beat's
   double doubtful_deviation_s = 0.087;  // uniform over the 150 ms of a match
   double silence_s = 3.0;               // without a beat: longer than a compensatory pause,
   double silence_cycles = 3.0;          // and usual cycles

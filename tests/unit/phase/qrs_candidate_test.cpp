@@ -26,14 +26,14 @@ double qrs_mV(double t_s) { return wave(t_s, 0.012); }
 // A complex in the middle of two seconds, as measured about the sample that is nearest to it.
 struct Measured {
   explicit Measured(const std::function<double(double)>& value_mV, Polarity polarity = {}, double off_s = 0.0,
-                    double noise_mV = 0.0) {
-    const Duration period = from_seconds(1.0 / kRate_hz);
+                    double noise_mV = 0.0, double rate_hz = kRate_hz) {
+    const Duration period = from_seconds(1.0 / rate_hz);
     filter.restart(period);
     meter.set_period(period);
-    for (int i = 0; i < static_cast<int>(1.4 * kRate_hz); ++i) {
-      filter.push(Instant(i * period), value_mV(i / kRate_hz), false);
+    for (int i = 0; i < static_cast<int>(1.4 * rate_hz); ++i) {
+      filter.push(Instant(i * period), value_mV(i / rate_hz), false);
     }
-    centre = static_cast<std::int64_t>(std::lround((kPeak_s + off_s) * kRate_hz));
+    centre = static_cast<std::int64_t>(std::lround((kPeak_s + off_s) * rate_hz));
     candidate = meter.about_crest(centre + filter.energy_delay(), polarity, noise_mV);
   }
 
@@ -128,7 +128,7 @@ TEST(QrsMeter, ThePeakIsSoughtWithinEightyMillisecondsOfTheEnergysMiddle) {
 TEST(QrsMeter, ThePeakOfAShapeThatFitsIsSoughtWithinFifteenMillisecondsOfIt) {
   const auto found = [](double apart_s) {
     const Measured measured([=](double t_s) { return wave(t_s, 0.004) + 1.3 * wave(t_s - apart_s, 0.004); });
-    return seconds(measured.meter.about_fit(measured.centre, true, 0.0)) - kPeak_s;
+    return seconds(measured.meter.about_fit(measured.centre, true, {}, 0.0)) - kPeak_s;
   };
   EXPECT_GT(found(0.0145), 0.008);
   EXPECT_LT(found(0.021), 0.004);
@@ -173,10 +173,54 @@ TEST(QrsMeter, WithoutNoiseTheDeviationIsThatOfCleanBeatsAndWithoutAVertexUnifor
 TEST(QrsMeter, AFitIsNoBeatWhereAnotherWaveOfTheComplexIsTwiceAsLarge) {
   const auto points = [](double down) {
     const Measured measured([=](double t_s) { return wave(t_s, 0.008) - down * wave(t_s - 0.045, 0.012); });
-    return measured.meter.about_fit(measured.centre, true, 0.0).shape.points;
+    return measured.meter.about_fit(measured.centre, true, {}, 0.0).shape.points;
   };
   EXPECT_GT(points(1.6), 0);
   EXPECT_EQ(points(2.4), 0);
+}
+
+// ---- other waves that may be the R peak
+
+double after_peak_s(const QrsWave& wave) { return to_seconds(wave.time.time_since_epoch()) - kPeak_s; }
+
+// Upward at the peak, and downward by so much so long after it.
+QrsCandidate biphasic(double down, double apart_s) {
+  const Measured measured([=](double t_s) { return wave(t_s, 0.008) - down * wave(t_s - apart_s, 0.008); });
+  return measured.meter.about_fit(measured.centre, true, {}, 0.0);
+}
+
+TEST(QrsMeter, TheLargestWaveOfAComplexIsMeasuredWhereItIsNotThePeak) {
+  for (const double apart_s : {-0.040, 0.030, 0.040}) {
+    const QrsCandidate candidate = biphasic(1.4, apart_s);
+    EXPECT_NEAR(candidate.larger.mV, -1.4, 0.2);
+    EXPECT_NEAR(after_peak_s(candidate.larger), apart_s, 2e-3);
+    EXPECT_NEAR(candidate.peak_mV, 1.0, 0.2);
+  }
+  EXPECT_EQ(biphasic(0.8, 0.030).larger.mV, 0.0) << "the peak is the largest";
+  EXPECT_EQ(biphasic(1.4, 0.053).larger.mV, 0.0) << "that is another complex's";
+}
+
+// In the mean of 8 ms: of a wave that is no wider there is less.
+TEST(QrsMeter, AWaveIsAsHighAsItsMeanOfEightMilliseconds) {
+  const Measured measured([](double t_s) { return wave(t_s, 0.006); }, {}, 0.0, 0.0, 1000.0);
+  double mean = 0.0;
+  for (int i = -4; i <= 4; ++i) mean += wave(kPeak_s + 1e-3 * i, 0.006) / 9.0;
+  EXPECT_NEAR(measured.candidate.peak_mV, mean, 0.03);
+}
+
+TEST(QrsMeter, WhereThePeakPointsTheOtherWayAWaveThatPointsAsTheBeatsDoIsMeasured) {
+  const Polarity up{.known = true, .up = true};
+  const auto upright = [&](double at_s, bool peak_up) {
+    const double sign = peak_up ? 1.0 : -1.0;
+    const Measured measured([=](double t_s) { return 2.6 * sign * wave(t_s, 0.012) + wave(t_s - at_s, 0.008); }, up);
+    return measured.candidate.upright;
+  };
+  for (const double at_s : {-0.105, -0.070, 0.040}) {
+    EXPECT_NEAR(upright(at_s, false).mV, 1.0, 0.25);
+    EXPECT_NEAR(after_peak_s(upright(at_s, false)), at_s, 3e-3);
+  }
+  EXPECT_LT(upright(-0.122, false).mV, 0.3);
+  EXPECT_EQ(upright(-0.070, true).mV, 0.0) << "the peak is one itself";
 }
 
 }  // namespace
