@@ -19,7 +19,7 @@ std::vector<Vector6d> without_slow(const std::vector<Vector6d>& values, const st
   for (std::size_t i = 0; i < values.size(); ++i) {
     while (end < values.size() && times_s[end] <= times_s[i] + 0.5 * window_s) sum += values[end++];
     while (times_s[begin] < times_s[i] - 0.5 * window_s) sum -= values[begin++];
-    fast.push_back(values[i] - sum / static_cast<double>(end - begin));
+    fast.emplace_back(values[i] - sum / static_cast<double>(end - begin));
   }
   return fast;
 }

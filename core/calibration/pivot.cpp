@@ -17,6 +17,9 @@ namespace {
 
 constexpr std::size_t kFewestPoses = 10;
 constexpr double kFewestSpread_deg = 3.0;  // about the second axis
+// RMS of the poses about the tip: a tracker 1.4 mm and 0.5 degrees off has 3.5 mm with a tool of 40 cm.
+constexpr double kLargestResidual_mm = 5.0;
+constexpr double kLongestTool_mm = 1000.0;
 
 struct Solution {
   Vector3d tip_T;
@@ -176,6 +179,15 @@ Expected<PivotCalibration> calibrate_pivot(const std::vector<TimedPose>& poses) 
   result.tip_T = s.tip_T;
   result.pivot_W = s.pivot_W;
   result.rms_mm = rms(poses, result.used, s, &result.worst_mm);
+  // A tip that slides leaves no pose out: the arm takes up what turning and sliding have in common, whatever its
+  // length.
+  const double length_mm = result.tip_T.norm();
+  if (!(result.rms_mm <= kLargestResidual_mm) || !(length_mm <= kLongestTool_mm)) {
+    return fail("the poses agree on no tip: they lie " + std::to_string(std::lround(std::min(1e9, result.rms_mm))) +
+                " mm RMS about one " + std::to_string(std::lround(std::min(1e9, length_mm))) +
+                " mm away, and within 5 mm RMS of one within 1000 mm was expected: it slid meanwhile; rest it in a "
+                "dimple and record again");
+  }
   result.held_aside_mm = held_aside_rms(poses, result.used, W);
   double length = 0.0;
   for (int axis = 0; axis < 3; ++axis) {

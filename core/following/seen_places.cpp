@@ -29,13 +29,14 @@ void leave_what_differs(Thumbnail& small) noexcept {
   const auto given = small.grey;
   for (int y = 0; y < small.height; ++y) {
     for (int x = 0; x < small.width; ++x) {
-      float sum = 0, count = 0;
+      float sum = 0;
+      int count = 0;
       for (int v = std::max(0, y - kAround); v <= std::min(small.height - 1, y + kAround); ++v) {
         for (int u = std::max(0, x - kAround); u <= std::min(small.width - 1, x + kAround); ++u, ++count) {
           sum += given[static_cast<std::size_t>(v * small.width + u)];
         }
       }
-      small.grey[static_cast<std::size_t>(y * small.width + x)] -= sum / count;
+      small.grey[static_cast<std::size_t>(y * small.width + x)] -= sum / static_cast<float>(count);
     }
   }
 }

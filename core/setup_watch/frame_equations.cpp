@@ -138,7 +138,7 @@ FrameEquations stack(const std::vector<Linearised>& matches, const std::vector<d
     const Matrix2d R_inverse = weights[i] * match.R_inverse;
     e.features.push_back(match.feature);
     e.J_p.push_back(match.J_p);
-    e.R.push_back(R_inverse.inverse());
+    e.R.emplace_back(R_inverse.inverse());
     e.J_d.middleRows<2>(row) = match.J_d;
     e.J_s.middleRows<2>(row) = match.J_s;
     e.r.segment<2>(row) = match.r;

@@ -17,7 +17,7 @@ constexpr double kMargin = 1.0;
 constexpr double kEdge = 0.25;
 
 double third_nearest(std::span<const Vector2d> places, const Vector2d& s) {
-  std::array<double, 4> nearest;  // itself too
+  std::array<double, 4> nearest{};  // itself too
   nearest.fill(std::numeric_limits<double>::infinity());
   for (const Vector2d& place : places) {
     const double d2 = (place - s).squaredNorm();

@@ -119,7 +119,7 @@ tl::expected<void, SurfaceRefusal> PeriodicSurface::place_features(const Vector3
     }
     places_.s_mm.col(column) = place.s;
     places_.depth_mm(column) = place.depth_mm;
-    places_.covariances_A_mm2.push_back(chart_.X_WA.R.transpose() * evidence_[i].mean_mm2 * chart_.X_WA.R);
+    places_.covariances_A_mm2.emplace_back(chart_.X_WA.R.transpose() * evidence_[i].mean_mm2 * chart_.X_WA.R);
     charted.push_back(place.s);
   }
   const Eigen::Matrix2Xd about = places_.s_mm.colwise() - places_.s_mm.rowwise().mean();

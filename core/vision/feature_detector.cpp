@@ -55,8 +55,7 @@ cv::Mat forbidden(const cv::Mat& image, const DetectorSettings& settings) {
   cv::blur(image, mean, {settings.background_size_px, settings.background_size_px});
   // The mean turns dark only half a window inside the background.
   const double inside_px = 0.5 * settings.background_size_px;
-  const cv::Mat barred =
-      highlight | widened(mean < settings.background_grey, settings.background_clearance_px + inside_px);
+  cv::Mat barred = highlight | widened(mean < settings.background_grey, settings.background_clearance_px + inside_px);
   if (settings.surround_grey < 0) return barred;
   cv::blur(image, mean, {kSurroundWindow_px, kSurroundWindow_px});
   const cv::Mat surround = joined_to_border(mean <= settings.surround_grey);

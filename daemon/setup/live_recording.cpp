@@ -224,7 +224,8 @@ SetupExpected<LiveRecording> record_live(const LiveSettings& settings, const std
       if (!reason.empty()) line += "; " + reason;
     }
     const std::string unseen = tracker_health.state() == DeviceState::kStreaming ? shown.unseen_tools() : "";
-    told(elapsed_s, unseen.empty() ? line : unseen + "; " + line);
+    if (!unseen.empty()) line.insert(0, unseen + "; ");
+    told(elapsed_s, line);
     if (stopped || guide.enough() || elapsed_s >= settings.longest_s || (*recorder)->summary().stopped) break;
   }
   interrupt.request();

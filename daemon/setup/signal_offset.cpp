@@ -24,6 +24,7 @@ double median_interval_s(const std::vector<TimedValue>& signal) {
 std::optional<FittedOffset> fit(const std::vector<TimedValue>& first, const std::vector<TimedValue>& second,
                                 double offset_s, double gap_first_s, double gap_second_s) {
   if (gap_second_s <= gap_first_s) return fit_offset(first, second, offset_s, gap_second_s);
+  // NOLINTNEXTLINE(readability-suspicious-call-argument): turned round, by the one that has fewer samples
   auto turned = fit_offset(second, first, -offset_s, gap_first_s);
   if (turned) {
     turned->offset_s = -turned->offset_s;

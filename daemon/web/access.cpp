@@ -6,9 +6,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
-#include <cstring>
 #include <optional>
+#include <system_error>
 
 namespace perimap {
 namespace {
@@ -126,7 +127,7 @@ std::string token_cookie(const Access& access) { return cookie_name(access) + ac
 Expected<std::string> make_token() {
   std::array<unsigned char, 16> bytes{};
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    return fail(fmt::format("cannot draw a random token: {}", std::strerror(errno)));
+    return fail(fmt::format("cannot draw a random token: {}", std::generic_category().message(errno)));
   }
   std::string token;
   for (const unsigned char byte : bytes) token += fmt::format("{:02x}", static_cast<unsigned>(byte));

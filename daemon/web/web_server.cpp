@@ -40,6 +40,8 @@ class WebServer::Impl {
       : service_(std::move(service)), acceptor_(context_), timer_(context_), stop_(context_) {
     access_.origins = service_.origins;
   }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
   ~Impl() {
     // The descriptor is its owner's.
     if (stop_.is_open()) (void)stop_.release();

@@ -31,6 +31,6 @@ struct BeatTable {
 // alone, and normal; the annotations that PhysioNet lists as no beats, [ ! ] x ( ) p t u ` ' ^ | ~ + s T D = " @, are
 // left out. (It lists `*` too, the systole of a pressure, which an ECG has none of.) Further columns are passed over.
 // Errors: "NAME:LINE:COLUMN: what is wrong".
-[[nodiscard]] Expected<BeatTable> parse_beat_table(std::string_view text, const std::string& name);
+[[nodiscard]] Expected<BeatTable> parse_beat_table(std::string_view written, const std::string& name);
 
 }  // namespace perimap

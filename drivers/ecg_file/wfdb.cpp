@@ -229,7 +229,7 @@ std::size_t samples_in(const Format& format, std::size_t bytes) {
 }
 
 // Of a unit of the signal, in mV.
-std::optional<double> mV_a_unit(std::string_view units) {
+std::optional<double> millivolts_a_unit(std::string_view units) {
   if (units == "mV" || units == "mv") return 1.0;
   if (units == "uV" || units == "\u00B5V" || units == "\u03BCV") return 1e-3;
   if (units == "V") return 1e3;
@@ -308,7 +308,7 @@ Expected<EcgTrace> decode_wfdb_signal(const WfdbHeader& header, std::size_t sign
     return fail(fmt::format("{}: signal {} is of format {}; 16, 24, 32, 61, 80 and 212 are read", name, signal + 1,
                             wanted.format));
   }
-  const auto unit_mV = mV_a_unit(wanted.units);
+  const auto unit_mV = millivolts_a_unit(wanted.units);
   if (!unit_mV) {
     return fail(on_one_line(fmt::format("{}: signal {} is in {}, which is no voltage: choose another", name, signal + 1,
                                         wanted.units.substr(0, 20))));
@@ -363,10 +363,11 @@ Expected<std::size_t> choose_wfdb_signal(const WfdbHeader& header, const std::st
     return static_cast<std::size_t>(found - signals.begin());
   };
   if (wanted.empty()) {
-    if (const auto lead = first([](const WfdbSignal& s) { return is_lead(s.description) && mV_a_unit(s.units); }))
+    if (const auto lead =
+            first([](const WfdbSignal& s) { return is_lead(s.description) && millivolts_a_unit(s.units); }))
       return *lead;
-    if (const auto other =
-            first([](const WfdbSignal& s) { return !is_something_else(s.description) && mV_a_unit(s.units); })) {
+    if (const auto other = first(
+            [](const WfdbSignal& s) { return !is_something_else(s.description) && millivolts_a_unit(s.units); })) {
       return *other;
     }
     return fail(on_one_line(fmt::format("{}: none of its signals looks like an ECG; say which by --signal: {}", name,

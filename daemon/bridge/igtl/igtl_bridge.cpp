@@ -37,7 +37,7 @@ Expected<std::unique_ptr<IgtlBridge>> IgtlBridge::create(const dds::Membership& 
 }
 
 Expected<void> IgtlBridge::run(int stop_descriptor) {
-  const auto ran = server_.run(stop_descriptor, [this] {
+  auto ran = server_.run(stop_descriptor, [this] {
     clear({Code::kShutDown, 0, "invalid", "perimap bridge igtl has ended"});
   });
   subscriber_.reset();

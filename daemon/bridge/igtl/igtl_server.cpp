@@ -34,6 +34,8 @@ constexpr auto kGoodbyeLook = std::chrono::milliseconds(5);
 class IgtlServer::Impl {
  public:
   explicit Impl(Say say) : say_(std::move(say)) {}
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
   ~Impl() {
     // The descriptor is its owner's.
     if (stop_.is_open()) (void)stop_.release();

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <cstring>
+#include <system_error>
 #include <utility>
 
 #include "daemon/bridge/live/shown_time.hpp"
@@ -66,7 +66,8 @@ Expected<void> Ros2Bridge::run(int stop_descriptor) {
   for (;;) {
     pollfd stop{stop_descriptor, POLLIN, 0};
     const int ready = poll(&stop, 1, kLook_ms);
-    if (ready < 0 && errno != EINTR) return fail(fmt::format("cannot wait for a signal: {}", std::strerror(errno)));
+    if (ready < 0 && errno != EINTR)
+      return fail(fmt::format("cannot wait for a signal: {}", std::generic_category().message(errno)));
     const std::lock_guard lock(mutex_);
     if (failed_) return fail("DDS can not be waited for any more");
     if (ready > 0) break;

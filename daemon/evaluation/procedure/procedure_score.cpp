@@ -153,7 +153,10 @@ class Scoring {
     worst.begin_s = score_.begin_s;
     std::size_t first = 0;
     const double last_s = surfaces_.back().released_s - kWindow_s;
-    for (double begin_s = std::floor(score_.begin_s); begin_s <= std::max(last_s, score_.begin_s); begin_s += 1.0) {
+    const double first_begin_s = std::floor(score_.begin_s);
+    const int windows = 1 + static_cast<int>(std::max(last_s, score_.begin_s) - first_begin_s);
+    for (int window = 0; window < windows; ++window) {
+      const double begin_s = first_begin_s + window;
       while (first < surfaces_.size() && surfaces_[first].released_s < begin_s) ++first;
       double wrong_s = 0.0, largest_mm = 0.0;
       for (std::size_t i = first; i < surfaces_.size() && surfaces_[i].released_s < begin_s + kWindow_s; ++i) {

@@ -111,7 +111,7 @@ std::string time_section(const SessionRecord& record) {
 
 std::string features_section(const SessionRecord& record) {
   const double length = record.length_s;
-  const auto line = [length](std::vector<At> values, double pause_s, const char* color, const char* label) {
+  const auto line = [length](const std::vector<At>& values, double pause_s, const char* color, const char* label) {
     return PlotLine{drawn(values, length, pause_s), color, 1.5, label};
   };
   Plot counts{"Published features", "s", "features", {}, false, true};

@@ -164,7 +164,8 @@ tl::unexpected<Error> nothing_published(const RecordedFile& file, const Publishe
   const std::string& path = file.path;
   std::string there;
   for (const auto& [source, stream] : published.order) {
-    if (has_surfaces(published, {source, stream})) there += (there.empty() ? "" : "; ") + source + ", " + stream;
+    if (has_surfaces(published, {source, stream}))
+      there += fmt::format("{}{}, {}", there.empty() ? "" : "; ", source, stream);
   }
   if (!there.empty()) {
     return fail(path + ": holds no surface of that source and stream; it has " + there);

@@ -27,7 +27,9 @@ CycleLengths::CycleLengths(std::vector<double> peaks_s, double now_s, double sys
   auto sorted = lengths_s;
   usual_s_ = upper_median(sorted.begin(), sorted.end());
   double sum = 0.0;
-  for (double length_s = kShortest * usual_s_; length_s < kLongest * usual_s_; length_s += kStep_s) {
+  const auto steps = static_cast<int>(std::ceil((kLongest - kShortest) * usual_s_ / kStep_s));
+  for (int step = 0; step < steps; ++step) {
+    const double length_s = kShortest * usual_s_ + step * kStep_s;
     if (peaks_s_.back() + length_s <= now_s) continue;
     double weight = kAnything;
     for (std::size_t k = 0; k < lengths_s.size(); ++k) {

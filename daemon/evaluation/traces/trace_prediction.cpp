@@ -24,7 +24,7 @@ TwoPhaseMap fitted(const TracePredictionSettings& settings, const Eigen::MatrixX
     if (first && i < kCautiousIterations) smoother.caution *= kMoreCaution;
     smooth_phases(smoother, map, samples, period_s, cardiac_known, tracks);
   }
-  return TwoPhaseMap(settings.map, samples, period_s, tracks);
+  return {settings.map, samples, period_s, tracks};
 }
 
 Eigen::MatrixXd residuals(const TwoPhaseMap& map, const Eigen::MatrixXd& samples, const PhaseTracks& tracks) {

@@ -171,9 +171,8 @@ Outcome simulate_heart(const SimulateOptions& options, const Console& console) {
 // That the options go together.
 Expected<void> check(const SimulateOptions& options) {
   const bool of_bench = options.bench.act().has_value();
-  for (const auto& sound : {options.bench.check(), options.scope.check(options.bench.act())}) {
-    if (!sound) return sound;
-  }
+  if (auto sound = options.bench.check(); !sound) return sound;
+  if (auto sound = options.scope.check(options.bench.act()); !sound) return sound;
   if (of_bench && options.simulation.has_procedure()) return fail("--procedure: expected --scene heart");
   if (!options.procedure.empty() && !options.simulation.has_procedure()) {
     return fail("--write-procedure: expected --procedure, whose script it writes");

@@ -71,7 +71,7 @@ Eigen::RowVectorXd PlayedTrace::at(Eigen::Index place) const {
   const MotionTrace& motion = trace_->motion;
   const Eigen::Index overlap = overlap_of(motion);
   const Eigen::Index within = ((place % length_) + length_) % length_;
-  const Eigen::RowVectorXd here = motion.positions.row(first_ + within);
+  Eigen::RowVectorXd here = motion.positions.row(first_ + within);
   if (within >= overlap) return here;
   const double s = smooth_step((static_cast<double>(within) + 0.5) / static_cast<double>(overlap));
   return s * here + (1.0 - s) * motion.positions.row(first_ + length_ + within);
@@ -84,7 +84,8 @@ std::vector<double> PlayedTrace::beats_s(double before_s, double until_s) const 
   const double loop_s = motion.first_s + static_cast<double>(first_) * motion.period_s;
   const double begins_s = static_cast<double>(begins_) * motion.period_s;
   std::vector<double> beats;
-  for (double turn = std::floor((begins_s - before_s) / length_s); turn * length_s - begins_s < until_s; ++turn) {
+  const auto first_turn = static_cast<int>(std::floor((begins_s - before_s) / length_s));
+  for (int turn = first_turn; turn * length_s - begins_s < until_s; ++turn) {
     for (const double beat_s : trace_->hindsight.beats_s) {
       const double within_s = beat_s - loop_s;
       const double since_s = turn * length_s + within_s - begins_s;
@@ -120,7 +121,7 @@ SurfaceTrace PlayedTrace::surface(const Pose& X_WV, Instant start, double before
   for (Eigen::Index place = -before; place <= until; ++place) {
     const Eigen::RowVectorXd moved = at(begins_ + place) - mean;
     for (Eigen::Index p = 0; p < points; ++p) {
-      surface.displacements_W.push_back(X_WV.R * moved.segment<3>(3 * p).transpose());
+      surface.displacements_W.emplace_back(X_WV.R * moved.segment<3>(3 * p).transpose());
     }
   }
   return surface;

@@ -51,7 +51,7 @@ void GroundTruth::set_procedure(OrganMotion organ, std::vector<Drift> camera_del
 }
 
 Expected<void> GroundTruth::set_trace(SurfaceTrace trace) {
-  if (const auto good = check(trace); !good) return good;
+  if (auto good = check(trace); !good) return good;
   trace_ = std::move(trace);
   return {};
 }

@@ -228,6 +228,18 @@ TEST(Pivot, RefusesAMotionAboutOneAxis) {
   EXPECT_THAT(result.error().message, HasSubstr("one axis only"));
 }
 
+// It leaves no pose out: the arm takes up what turning and sliding have in common.
+TEST(Pivot, RefusesATipThatSlides) {
+  for (const double mm_per_s : {2.0, 5.0, 20.0}) {
+    Draw draw(8);
+    auto poses = pivoting(draw, {0.0, 10.0, 120.0}, 400, 0.3, 0.1);
+    for (TimedPose& pose : poses) pose.X.t.x() += mm_per_s * pose.t_s;
+    const auto result = calibrate_pivot(poses);
+    ASSERT_FALSE(result) << mm_per_s;
+    EXPECT_THAT(result.error().message, HasSubstr("slid")) << mm_per_s;
+  }
+}
+
 std::vector<Landmark> landmarks_of(Draw& draw, std::size_t count, double fle_mm) {
   const Pose X_IW{draw.rotation(), draw.vector(300.0)};
   std::vector<Landmark> landmarks;
