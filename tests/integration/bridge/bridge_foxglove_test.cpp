@@ -5,23 +5,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <set>
 
-#include "bridge_program.hpp"
+#include "bridge_test.hpp"
 #include "daemon/bridge/messages/view_topics.hpp"
 #include "drivers/recording/cdr.hpp"
-#include "scripted_perimapd.hpp"
 #include "viewer_client.hpp"
 
 namespace perimap {
 namespace {
 
-namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using test::MadePublication;
-using test::ScriptedPerimapd;
 using test::ViewerClient;
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -32,18 +28,10 @@ Instant instant_of(const foxglove_Time& t) {
   return from_ns(std::int64_t{1'000'000'000} * t.sec + std::int64_t{t.nsec});
 }
 
-class BridgeFoxglove : public testing::Test {
+class BridgeFoxglove : public test::BridgeTest {
  protected:
   void SetUp() override {
-    std::string folder = (fs::temp_directory_path() / "perimap-foxglove-XXXXXX").string();
-    ASSERT_NE(mkdtemp(folder.data()), nullptr);
-    folder_ = folder;
-    // Test runs on one host do not hear each other.
-    domain_ = 20 + static_cast<int>(getpid() % 100);
-    const std::string uri = "file://" PERIMAP_CYCLONEDDS_XML ",<CycloneDDS><Domain><Discovery><Tag>" +
-                            folder_.filename().string() + "</Tag></Discovery></Domain></CycloneDDS>";
-    setenv("CYCLONEDDS_URI", uri.c_str(), 1);
-    program_ = std::make_unique<test::BridgeProgram>((folder_ / "log").string());
+    ASSERT_NO_FATAL_FAILURE(BridgeTest::SetUp());
     program_->start({"bridge", "foxglove", "--domain", std::to_string(domain_), "--port", "0"});
     const std::string address = program_->first_line();
     ASSERT_THAT(address, StartsWith("ws://127.0.0.1:")) << program_->said();
@@ -51,8 +39,7 @@ class BridgeFoxglove : public testing::Test {
   }
   void TearDown() override {
     viewer_.reset();
-    program_.reset();
-    fs::remove_all(folder_);
+    BridgeTest::TearDown();
   }
 
   // Connects, and subscribes to all that is offered.
@@ -169,11 +156,7 @@ class BridgeFoxglove : public testing::Test {
     });
   }
 
-  fs::path folder_;
-  int domain_ = 0;
   std::uint16_t port_ = 0;
-  std::unique_ptr<test::BridgeProgram> program_;
-  ScriptedPerimapd perimapd_;
   std::unique_ptr<ViewerClient> viewer_;
   std::map<std::uint32_t, std::string> topics_;              // by subscription
   std::map<std::string, std::string> types_;                 // by topic

@@ -3,16 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
-
-#include "bridge_program.hpp"
+#include "bridge_test.hpp"
 #include "igtl_receiver.hpp"
-#include "scripted_perimapd.hpp"
 
 namespace perimap {
 namespace {
 
-namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using test::IgtlReceived;
 using test::MadePublication;
@@ -23,24 +19,8 @@ using Code = igtl::StatusMessage;
 // What a machine that is loaded adds to a time limit.
 constexpr Duration kLoaded = std::chrono::milliseconds(1500);
 
-class BridgeIgtl : public testing::Test {
+class BridgeIgtl : public test::BridgeTest {
  protected:
-  void SetUp() override {
-    std::string folder = (fs::temp_directory_path() / "perimap-bridge-XXXXXX").string();
-    ASSERT_NE(mkdtemp(folder.data()), nullptr);
-    folder_ = folder;
-    // Test runs on one host do not hear each other.
-    domain_ = 20 + static_cast<int>(getpid() % 100);
-    const std::string uri = "file://" PERIMAP_CYCLONEDDS_XML ",<CycloneDDS><Domain><Discovery><Tag>" +
-                            folder_.filename().string() + "</Tag></Discovery></Domain></CycloneDDS>";
-    setenv("CYCLONEDDS_URI", uri.c_str(), 1);
-    program_ = std::make_unique<test::BridgeProgram>((folder_ / "log").string());
-  }
-  void TearDown() override {
-    program_.reset();
-    fs::remove_all(folder_);
-  }
-
   void start() {
     program_->start({"bridge", "igtl", "--domain", std::to_string(domain_), "--port", "0"});
     endpoint_ = program_->first_line();
@@ -114,13 +94,9 @@ class BridgeIgtl : public testing::Test {
     }
   }
 
-  fs::path folder_;
-  int domain_ = 0;
-  std::unique_ptr<test::BridgeProgram> program_;
   std::string endpoint_;
   int port_ = 0;
   test::IgtlReceiver client_;
-  ScriptedPerimapd perimapd_;
   int surfaces_ = 0, with_mesh_ = 0, without_mesh_ = 0, cameras_ = 0;
 };
 

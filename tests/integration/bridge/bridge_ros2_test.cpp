@@ -4,21 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <filesystem>
 #include <map>
 #include <span>
 
-#include "bridge_program.hpp"
+#include "bridge_test.hpp"
 #include "daemon/bridge/ros2/ros2_types.hpp"
-#include "scripted_perimapd.hpp"
 
 namespace perimap {
 namespace {
 
-namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using test::MadePublication;
-using test::ScriptedPerimapd;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -73,29 +69,17 @@ std::int64_t utc_ns(const Ros2Header& header) {
   return std::int64_t{header.stamp.sec} * 1'000'000'000 + header.stamp.nanosec;
 }
 
-class BridgeRos2 : public testing::Test {
+class BridgeRos2 : public test::BridgeTest {
  protected:
   void SetUp() override {
-    std::string folder = (fs::temp_directory_path() / "perimap-ros2-XXXXXX").string();
-    ASSERT_NE(mkdtemp(folder.data()), nullptr);
-    folder_ = folder;
-    // Test runs on one host do not hear each other.
-    domain_ = 20 + static_cast<int>(getpid() % 100);
+    ASSERT_NO_FATAL_FAILURE(BridgeTest::SetUp());
     ros_domain_ = domain_ + 100;
-    const std::string uri = "file://" PERIMAP_CYCLONEDDS_XML ",<CycloneDDS><Domain><Discovery><Tag>" +
-                            folder_.filename().string() + "</Tag></Discovery></Domain></CycloneDDS>";
-    setenv("CYCLONEDDS_URI", uri.c_str(), 1);
     auto ros = dds::Participant::create(ros_domain_);
     ASSERT_TRUE(ros) << ros.error().message;
     ros_.emplace(std::move(*ros));
-    program_ = std::make_unique<test::BridgeProgram>((folder_ / "log").string());
     program_->start(
         {"bridge", "ros2", "--domain", std::to_string(domain_), "--ros-domain", std::to_string(ros_domain_)});
     ASSERT_THAT(program_->first_line(), HasSubstr("ROS 2 domain " + std::to_string(ros_domain_))) << program_->said();
-  }
-  void TearDown() override {
-    program_.reset();
-    fs::remove_all(folder_);
   }
 
   // Reads points until some have come, each held against what was published for the instant of its stamp.
@@ -124,11 +108,8 @@ class BridgeRos2 : public testing::Test {
     }));
   }
 
-  fs::path folder_;
-  int domain_ = 0, ros_domain_ = 0;
+  int ros_domain_ = 0;
   std::optional<dds::Participant> ros_;
-  std::unique_ptr<test::BridgeProgram> program_;
-  ScriptedPerimapd perimapd_;
 };
 
 TEST_F(BridgeRos2, WhatIsReceivedIsWhatWasPublishedAndAnInvalidSurfaceClearsIt) {

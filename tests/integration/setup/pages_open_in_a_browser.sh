@@ -5,12 +5,8 @@
 # Exit code 77: skipped, with the reason on standard output.
 set -uo pipefail
 pages=$1 work=$2
-for program in chromium node; do
-  if ! command -v $program > /dev/null; then
-    echo "SKIPPED: $program is not installed"
-    exit 77
-  fi
-done
+. "$(dirname "$0")/../needed_programs.sh"
+need_programs chromium node
 rm -rf "$work"
 mkdir -p "$work"
 

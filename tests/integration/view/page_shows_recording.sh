@@ -4,12 +4,8 @@
 set -uo pipefail
 perimap=$1 recording=$2 work=$3
 here=$(cd "$(dirname "$0")" && pwd)
-for program in chromium node; do
-  if ! command -v $program > /dev/null; then
-    echo "SKIPPED: $program is not installed"
-    exit 77
-  fi
-done
+. "$here/../needed_programs.sh"
+need_programs chromium node
 rm -rf "$work"
 mkdir -p "$work"
 "$perimap" replay "$recording" --lockstep --samples "$work/samples.mcap" > "$work/replay" 2>&1 || exit 1

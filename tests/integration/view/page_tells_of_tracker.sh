@@ -6,12 +6,8 @@ set -uo pipefail
 perimap=$1 perimapd=$2 recording=$3 work=$4
 export CYCLONEDDS_URI=file://$5
 here=$(cd "$(dirname "$0")" && pwd)
-for program in chromium node; do
-  if ! command -v $program > /dev/null; then
-    echo "SKIPPED: $program is not installed"
-    exit 77
-  fi
-done
+. "$here/../needed_programs.sh"
+need_programs chromium node
 source "$here/../emulated_devices.sh"
 # Each device is a program of its own, so that one can be taken away.
 start=$(awk '{printf "%.3f", $1 + 8}' /proc/uptime)
