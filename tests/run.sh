@@ -9,7 +9,7 @@ tests/run.sh [--full [PART...]] [--jobs N]
   Installs the packages, builds the presets dev and asan, runs their tests. About twenty minutes on two cores.
   Each test but those labelled `long` runs once: what reads the bytes of files, devices and messages under
   AddressSanitizer, all else without sanitizers.
-  --full    everything, or the parts named. About three hours on two cores that do nothing else.
+  --full    everything, or the parts named. Some hours on two cores that do nothing else.
               dev    every test but the long ones, without sanitizers
               asan   the same under AddressSanitizer and all of UndefinedBehaviorSanitizer
               tsan   whole programs, and unit tests with threads, under ThreadSanitizer

@@ -25,8 +25,8 @@ struct PivotCalibration {
 // R_i tip + t_i = pivot over poses X_WT in the order of their times, by least squares over the samples that a search
 // for the least median of squared distances calls good (Rousseeuw 1984), weighted by the errors' covariance in the
 // tool's frame. Fails, and says what is missing, with fewer than ten poses, with a motion about one axis, when fewer
-// than half of the poses agree on a point, when those that do lie more than 5 mm RMS about it, or when it is more than a
-// metre away.
+// than half of the poses agree on a point, when those that do lie more than 5 mm RMS about it, or when it is more than
+// a metre away.
 [[nodiscard]] Expected<PivotCalibration> calibrate_pivot(const std::vector<TimedPose>& poses);
 
 }  // namespace perimap
