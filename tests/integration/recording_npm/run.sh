@@ -1,4 +1,4 @@
-#!/bin/sh
+#!/bin/bash
 # run.sh SOURCE_FOLDER WORK_FOLDER SCRIPT RECORDING EXPECTED PROGRAM
 # Installs the packages of package-lock.json into the work folder, lets the program write a recording and what is expected
 # of it, and checks it by the script with them.
