@@ -415,6 +415,10 @@ inline const char* describe(perimap_SurfaceReason reason) noexcept {
       return "the camera gives the same picture again and again";
     case perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED:
       return "the organ has been moved, or the tracker errs";
+    case perimap_SURFACE_REASON_ORGAN_MOVED:
+      return "the organ has been moved, and does not rest yet";
+    case perimap_SURFACE_REASON_TRACKER_ERRS:
+      return "the tracker errs: the patient's tool has not moved as the surface seems to";
     default:
       return "a reason that this client does not know";
   }

@@ -63,6 +63,22 @@ Pose displaced(const Vector6d& d, const Vector3d& pivot_W_mm) noexcept {
   return {R, pivot_W_mm + d.tail<3>() - R * pivot_W_mm};
 }
 
+Matrix6d map_covariance(const DisplacedSurface& surface) noexcept {
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal().head<3>().setConstant(surface.map_variance_mm2 / (surface.spread_mm * surface.spread_mm));
+  covariance.diagonal().tail<3>().setConstant(surface.map_variance_mm2);
+  return covariance;
+}
+
+DisplacementSize size_of(const Vector6d& d, const Matrix6d& covariance, const DisplacedSurface& surface) noexcept {
+  const Matrix6d all = covariance + map_covariance(surface);
+  // A turn moves a feature by its distance from the axis.
+  const double turned_mm2 = surface.spread_mm * surface.spread_mm * 2.0 / 3.0;
+  return {std::sqrt(d.tail<3>().squaredNorm() + turned_mm2 * d.head<3>().squaredNorm()),
+          std::sqrt(all.diagonal().tail<3>().sum() + turned_mm2 * all.diagonal().head<3>().sum()),
+          d.dot(all.llt().solve(d))};
+}
+
 void CommonDisplacement::add(Instant capture, const DisplacementEvidence& evidence) noexcept {
   if (!evidence.g.allFinite() || !evidence.W.allFinite()) return;
   if (count_ > 0 && capture - entry(count_ - 1).capture < kEvery) return;
@@ -99,17 +115,9 @@ MeanDisplacement CommonDisplacement::mean(std::size_t window, Instant now,
   // Of the surface that is seen, which may be far from the pivot: a turn moves it by its lever.
   Matrix6d to_centre = Matrix6d::Identity();
   to_centre.bottomLeftCorner<3, 3>() = -cross_matrix(surface.centre_mm);
-  const Vector6d d = to_centre * mean.d;
-  covariance = Matrix6d(to_centre * covariance * to_centre.transpose());
-  const double spread_mm2 = surface.spread_mm * surface.spread_mm;
-  covariance.diagonal().head<3>().array() += surface.map_variance_mm2 / spread_mm2;
-  covariance.diagonal().tail<3>().array() += surface.map_variance_mm2;
-  mean.chi2 = d.dot(covariance.llt().solve(d));
-  // A turn moves a feature by its distance from the axis.
-  const double turned_mm2 = spread_mm2 * 2.0 / 3.0;
-  mean.size_mm = std::sqrt(d.tail<3>().squaredNorm() + turned_mm2 * d.head<3>().squaredNorm());
-  mean.deviation_mm =
-      std::sqrt(covariance.diagonal().tail<3>().sum() + turned_mm2 * covariance.diagonal().head<3>().sum());
+  mean.at_centre = to_centre * mean.d;
+  mean.covariance = to_centre * covariance * to_centre.transpose();
+  static_cast<DisplacementSize&>(mean) = size_of(mean.at_centre, mean.covariance, surface);
   mean.told = std::isfinite(mean.chi2) && std::isfinite(mean.size_mm);
   return mean;
 }

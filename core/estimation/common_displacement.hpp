@@ -55,13 +55,26 @@ struct DisplacedSurface {
   double map_variance_mm2 = 0.0;          // per axis, of what the whole map is off by
 };
 
-// Over one window.
-struct MeanDisplacement {
-  bool told = false;  // false: too few frames; the rest means nothing
-  Vector6d d = Vector6d::Zero();
+// How much a displacement is.
+struct DisplacementSize {
   double size_mm = 0.0;       // root mean square over the surface that is seen
   double deviation_mm = 0.0;  // likewise of its error
   double chi2 = 0.0;          // of the hypothesis that there is none, 6 degrees of freedom
+};
+
+// Of d about the middle of the surface, whose covariance is without what the map is off by.
+[[nodiscard]] DisplacementSize size_of(const Vector6d& d, const Matrix6d& covariance,
+                                       const DisplacedSurface& surface) noexcept;
+
+// What the map as a whole is off by, about the middle of the surface.
+[[nodiscard]] Matrix6d map_covariance(const DisplacedSurface& surface) noexcept;
+
+// Over one window.
+struct MeanDisplacement : DisplacementSize {
+  bool told = false;                           // false: too few frames; the rest means nothing
+  Vector6d d = Vector6d::Zero();               // about the pivot
+  Vector6d at_centre = Vector6d::Zero();       // the same about the middle of the surface that is seen
+  Matrix6d covariance = Matrix6d::Identity();  // of that, without what the map is off by
 };
 
 class CommonDisplacement {

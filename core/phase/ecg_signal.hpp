@@ -11,6 +11,7 @@ enum class EcgSignal : std::uint8_t {
   kNoisy,    // disturbances of a beat's size within the last seconds
   kFlat,     // the value has hardly changed: a lead that is off, or an amplifier at its limit
   kLeadOff,  // said by the device, samples that are missing, or a line that swings as no heart does
+  kRepeated  // what was heard seconds before comes again bit for bit
 };
 
 // 0 to 4: what is heard better has a higher one.
@@ -25,6 +26,7 @@ enum class EcgSignal : std::uint8_t {
     case EcgSignal::kFlat:
       return 1;
     case EcgSignal::kLeadOff:
+    case EcgSignal::kRepeated:
       break;
   }
   return 0;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include "core/realtime/realtime_scope.hpp"
 
@@ -15,7 +16,7 @@ void EcgIntake::push(const EcgBlock& block) noexcept {
   if (trigger_) return;
   // What does not fit is missing after a restart alone.
   static_cast<void>(heard_.push(block));
-  hear(block);
+  hear(without_repeated(block));
 }
 
 void EcgIntake::recall(const EcgBlock& block) noexcept {
@@ -32,6 +33,20 @@ void EcgIntake::count(const EcgBlock& block) noexcept {
     counters_.last_ecg_ns.set(static_cast<std::uint64_t>(to_ns(last)));
   }
   if (block.nothing_heard()) counters_.ecg_lead_off.add(block.count);
+}
+
+// A lead that gives what it gave seconds before is off.
+EcgBlock EcgIntake::without_repeated(const EcgBlock& block) noexcept {
+  const auto hear_lead = [&block](RepeatedSamples& lead, std::span<const float> samples, bool off) {
+    if (off) lead.interrupt();
+    for (std::size_t i = 0; i < samples.size() && !off; ++i) lead.add(samples[i], block.sample_period);
+    return off || lead.told();
+  };
+  EcgBlock believed = block;
+  believed.lead_off = hear_lead(repeated_[0], block.samples(), block.lead_off);
+  believed.second_off = hear_lead(repeated_[1], block.second_samples(), block.second_off);
+  counters_.ecg_repeated.set(repeated_[0].count());
+  return believed;
 }
 
 void EcgIntake::hear(const EcgBlock& block) noexcept {
@@ -63,10 +78,13 @@ void EcgIntake::hear(const EcgBlock& block) noexcept {
 
 void EcgIntake::tell_of_leads(const EcgBlock& block) noexcept {
   const auto told = [](EcgSignal signal) { return 1 + static_cast<std::uint64_t>(signal); };
-  counters_.ecg_leads[0].set(told(beats_.signal(0)));
+  const auto told_of = [this](std::size_t lead, EcgSignal signal) {
+    return repeated_[lead].told() ? EcgSignal::kRepeated : signal;
+  };
+  counters_.ecg_leads[0].set(told(told_of(0, beats_.signal(0))));
   // A second one that has never been heard has no detector that could say so.
   const EcgSignal second = beats_.two_leads() ? beats_.signal(1) : EcgSignal::kLeadOff;
-  counters_.ecg_leads[1].set(block.has_second ? told(second) : 0);
+  counters_.ecg_leads[1].set(block.has_second ? told(told_of(1, second)) : 0);
 }
 
 void EcgIntake::push(const RTriggerPulse& pulse) noexcept {

@@ -1,6 +1,7 @@
 // From ECG samples or R triggers to the phase clock: what the ECG thread does with each block or pulse.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/cardiac_clock_tracker.hpp"
 #include "core/phase/r_trigger.hpp"
+#include "core/phase/repeated_samples.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/realtime/spsc_ring.hpp"
 #include "core/realtime/triple_buffer.hpp"
@@ -57,11 +59,13 @@ class EcgIntake {
 
   void forget_when_asked() noexcept;
   void count(const EcgBlock& block) noexcept;
+  [[nodiscard]] EcgBlock without_repeated(const EcgBlock& block) noexcept;
   void hear(const EcgBlock& block) noexcept;
   void tell_of_leads(const EcgBlock& block) noexcept;
   void publish() noexcept;
 
   EcgIntakeSettings settings_;
+  std::array<RepeatedSamples, 2> repeated_;  // by lead
   BeatFinder beats_;
   std::optional<RTrigger> trigger_;
   BeatClasser trigger_classer_;

@@ -3,8 +3,12 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 
 namespace perimap {
+
+// What displaces all that is found, as far as the patient's reference tool tells.
+enum class DisplacedCause : std::uint8_t { kUnknown, kOrgan, kTracker };
 
 struct FrameDoubts {
   bool scope_unread = false;      // how the scope is turned is not known
@@ -14,6 +18,7 @@ struct FrameDoubts {
   bool still = false;             // the camera has lately been in one place
   bool setup_doubted = false;     // see SetupBelief
   bool displaced = false;         // the organ is not where the map has it, or the tracker errs, see OrganWatch
+  DisplacedCause cause = DisplacedCause::kUnknown;
   bool unproven = false;  // nothing has told since it was out of sight, or moved, that it is where the map has it
   double setup_variance_mm2 = 0.0;  // per axis, of what the set-up may be off by
 
@@ -25,6 +30,7 @@ struct FrameDoubts {
     picture_repeated |= other.picture_repeated;
     still |= other.still;
     setup_doubted |= other.setup_doubted;
+    if (other.displaced) cause = displaced && cause != other.cause ? DisplacedCause::kUnknown : other.cause;
     displaced |= other.displaced;
     unproven |= other.unproven;
     setup_variance_mm2 = std::max(setup_variance_mm2, other.setup_variance_mm2);

@@ -22,7 +22,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, W
       starter_(housekeeping.starter),
       watcher_(housekeeping.watcher),
       counters_(outputs.counters),
-      trust_(settings.pose, housekeeping.scope, outputs.counters),
+      trust_(settings.pose, housekeeping.scope, outputs.counters, settings.pictures_may_loop),
       phases_(settings_, outputs.phase_cells, outputs.counters),
       organ_(settings_),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
@@ -47,9 +47,16 @@ void Mapper::add_pose(const TrackerSample& sample) noexcept {
   trust_.add(sample);
 }
 
-void Mapper::add_second_pose(const TrackerSample& sample) noexcept {
+void Mapper::add_tool_pose(const ToolPose& pose) noexcept {
   const RealtimeScope realtime;
-  trust_.add_second(sample);
+  switch (pose.role) {
+    case ToolRole::kSecondSensor:
+      trust_.add_second(pose.sample);
+      break;
+    case ToolRole::kPatient:
+      organ_.add_tool(pose.sample);
+      break;
+  }
 }
 
 void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const GreyImage& before,
@@ -57,6 +64,7 @@ void Mapper::process(const FrameStamp& stamp, const GreyImage& image, const Grey
   const RealtimeScope realtime;
   finish_learning();
   stopwatch_.begin(stamp.sequence);
+  follow_organ();
   const FrameRecord& frame = begin_frame(stamp, image, before, ecg);
   // A
   find_features(frame);
@@ -87,6 +95,7 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage&
   job_.doubts = trust_.doubts();
   job_.doubts.setup_doubted = watcher_.belief().doubted();
   job_.doubts.displaced = organ_.displaced();
+  job_.doubts.cause = organ_.cause();
   job_.doubts.unproven = organ_.unproven();
   job_.doubts.setup_variance_mm2 = watcher_.belief().variance_mm2();
   job_.starts_fail_alike = starts_fail_alike(slots_);
@@ -193,7 +202,9 @@ void Mapper::watch_organ(const FrameRecord& frame) noexcept {
 }
 
 void Mapper::tell_displacement() noexcept {
+  if (organ_.displaced() && counters_.displaced.get() == 0) counters_.times_displaced.add();
   counters_.displaced.set(organ_.displaced() ? 1 : 0);
+  counters_.displaced_cause.set(static_cast<std::uint64_t>(organ_.cause()));
   counters_.displaced_um.set(micrometres(organ_.size_mm()));
 }
 
@@ -280,16 +291,25 @@ bool Mapper::move_map() noexcept {
     counters_.moves_refused.add();
     return false;
   }
-  keeping_.displace(organ->X, organ->deviation_mm);
+  move_map_with(*organ);
+  return true;
+}
+
+// Its tool has told that it was moved, and it rests.
+void Mapper::follow_organ() noexcept {
+  if (const std::optional<RestingOrgan> organ = organ_.carried()) move_map_with(*organ);
+}
+
+void Mapper::move_map_with(const RestingOrgan& organ) noexcept {
+  keeping_.displace(organ.X, organ.deviation_mm);
   // What is held was seen of the organ where it was.
   history_->disown_poses(0);
   surface_.begin_again();
   watcher_.begin_window_anew();
   organ_.begin_anew();
-  counters_.moved_um.set(micrometres(organ->size_mm));
+  counters_.moved_um.set(micrometres(organ.size_mm));
   counters_.maps_moved.add();
   tell_displacement();
-  return true;
 }
 
 void Mapper::recall(const MapMemory& memory, Instant now) {

@@ -64,8 +64,7 @@ class Mapper {
          const Housekeeping& housekeeping, const MapperOutputs& outputs);
 
   void add_pose(const TrackerSample& sample) noexcept;
-  // Of the second tracked sensor that tells how the scope is turned.
-  void add_second_pose(const TrackerSample& sample) noexcept;
+  void add_tool_pose(const ToolPose& pose) noexcept;
   // Before process(): what the respiration channel told until that capture, or later.
   void hear_breath(const BreathSignal& signal, Instant capture) noexcept { phases_.hear(signal, capture); }
 
@@ -107,6 +106,8 @@ class Mapper {
   void settle_matches(const FrameRecord& frame) noexcept;
   void watch_organ(const FrameRecord& frame) noexcept;
   void tell_displacement() noexcept;
+  void follow_organ() noexcept;
+  void move_map_with(const RestingOrgan& organ) noexcept;
   void begin_learning(const FrameRecord& frame) noexcept;
   void finish_learning() noexcept;
   void shed_load(bool put_off) noexcept;

@@ -41,6 +41,11 @@ constexpr double kRest_mm = 1.0;
 constexpr double kRestsWithin_deviations = 1.5;
 constexpr Duration kRestIsOld = std::chrono::milliseconds(300);
 
+// The tool is asked over these windows, shorter ones first: what moves is told by them, what is small by longer ones.
+constexpr std::size_t kToolWindows[] = {1, 2, 3};
+// A tool rests that has lately moved by less than that.
+constexpr double kToolRests_mm = 0.5;
+
 CameraPose wider(const CameraPose& pose, double shift_mm, double turn_rad) noexcept {
   CameraPose wide = pose;
   wide.position_variance_mm2 += shift_mm * shift_mm;
@@ -80,6 +85,7 @@ void OrganWatch::count_sight(std::span<FeatureGroup> groups, Instant capture) no
   if (known_.seen && capture - *known_.seen > kOutOfSight) {
     evidence_.clear();
     known_.unproven = true;
+    tool_.heed_organ(false, capture);
   }
   known_.seen = capture;
 }
@@ -126,10 +132,9 @@ void OrganWatch::look_for_displacement(Instant now) noexcept {
 
 void OrganWatch::judge(Instant now) noexcept {
   if (!displaced()) look_for_displacement(now);
-  if (!displaced()) {
-    known_.unproven = known_.unproven && !evidence_.mean(kProofWindow, now, known_.surface).told;
-    return;
-  }
+  if (!displaced()) known_.unproven = known_.unproven && !evidence_.mean(kProofWindow, now, known_.surface).told;
+  tool_.heed_organ(!displaced() && !known_.unproven, now);
+  if (!displaced()) return;
   const MeanDisplacement newest = evidence_.mean(kFollowedWindow, now, known_.surface);
   if (newest.told) {
     displaced_.d = newest.d;
@@ -141,9 +146,55 @@ void OrganWatch::judge(Instant now) noexcept {
   });
   if (back) {
     settle();
-  } else {
-    look_for_rest(now);
+    return;
   }
+  look_for_rest(now);
+  ask_tool(now);
+  look_for_rest_with_tool(now);
+}
+
+// Whether it has moved as all that is seen, or not at all: each is a hypothesis that its movement's chi-squared is
+// asked of. Where both hold a longer window is asked, and where none tells, what was told before stays.
+void OrganWatch::ask_tool(Instant now) noexcept {
+  for (const std::size_t window : kToolWindows) {
+    const MeanDisplacement seen = evidence_.mean(window, now, known_.surface);
+    const ToolMovement tool = tool_.moved(CommonDisplacement::kWindows[window], now, centre_W_mm());
+    if (!seen.told || !tool.told) continue;
+    const bool rests = size_of(tool.d, tool.covariance, known_.surface).chi2 < kBack_chi2;
+    const Vector6d apart = seen.at_centre - tool.d;
+    const bool goes_with_it = size_of(apart, seen.covariance + tool.covariance, known_.surface).chi2 < kBack_chi2;
+    if (rests && goes_with_it) continue;
+    displaced_.cause = rests          ? DisplacedCause::kTracker
+                       : goes_with_it ? DisplacedCause::kOrgan
+                                      : DisplacedCause::kUnknown;
+    return;
+  }
+}
+
+// What the features and the tool tell together, weighted by their covariances.
+void OrganWatch::look_for_rest_with_tool(Instant now) noexcept {
+  displaced_.carried.reset();
+  if (displaced_.cause != DisplacedCause::kOrgan) return;
+  const Duration length = CommonDisplacement::kWindows[kRestWindow];
+  const MeanDisplacement seen = evidence_.mean(kRestWindow, now, known_.surface);
+  const MeanDisplacement lately = evidence_.mean(kFollowedWindow, now, known_.surface);
+  const ToolMovement tool = tool_.moved(length, now, centre_W_mm());
+  const ToolMovement tool_lately = tool_.moved(CommonDisplacement::kWindows[kFollowedWindow], now, centre_W_mm());
+  if (!seen.told || !lately.told || !tool.told || !tool_lately.told) return;
+  const Matrix6d of_both = seen.covariance + tool.covariance;
+  if (size_of(seen.at_centre - tool.d, of_both, known_.surface).chi2 >= kBack_chi2) return;
+  const double tool_deviation_mm = size_of(tool_lately.d, tool_lately.covariance, known_.surface).deviation_mm;
+  const double tool_moved_mm = (tool.d - tool_lately.d).tail<3>().norm();
+  const double moved_mm = (seen.at_centre - lately.at_centre).tail<3>().norm();
+  if (tool_moved_mm > std::max(kToolRests_mm, tool_deviation_mm)) return;
+  if (moved_mm > kRestsWithin_deviations * std::max(seen.deviation_mm, lately.deviation_mm)) return;
+  const Matrix6d identity = Matrix6d::Identity();
+  const Matrix6d by_seen = Matrix6d(seen.covariance + map_covariance(known_.surface)).llt().solve(identity);
+  const Matrix6d by_tool = tool.covariance.llt().solve(identity);
+  const Matrix6d covariance = Matrix6d(by_seen + by_tool).llt().solve(identity);
+  const Vector6d d = covariance * (by_seen * seen.at_centre + by_tool * tool.d);
+  const DisplacementSize size = size_of(d, covariance, known_.surface);
+  displaced_.carried = {perimap::displaced(d, centre_W_mm()), size.size_mm, size.deviation_mm};
 }
 
 void OrganWatch::look_for_rest(Instant now) noexcept {
@@ -154,12 +205,12 @@ void OrganWatch::look_for_rest(Instant now) noexcept {
   const MeanDisplacement rest = evidence_.mean(kRestWindow, now, known_.surface);
   if (!rest.told || rest.deviation_mm > kRest_mm) return;
   const Pose X = perimap::displaced(rest.d, known_.pivot_W_mm);
-  const Vector3d centre_W_mm = known_.pivot_W_mm + known_.surface.centre_mm;
+  const Vector3d centre = centre_W_mm();
   // What moves is elsewhere within a longer time, and what has begun to within a shorter one.
   for (const std::size_t window : {kBeforeRestWindow, kFollowedWindow}) {
     const MeanDisplacement other = evidence_.mean(window, now, known_.surface);
     if (!other.told) return;
-    const double moved_mm = (X * centre_W_mm - perimap::displaced(other.d, known_.pivot_W_mm) * centre_W_mm).norm();
+    const double moved_mm = (X * centre - perimap::displaced(other.d, known_.pivot_W_mm) * centre).norm();
     if (moved_mm > kRestsWithin_deviations * std::max(rest.deviation_mm, other.deviation_mm)) return;
   }
   displaced_.resting = {X, rest.size_mm, rest.deviation_mm};
@@ -168,10 +219,12 @@ void OrganWatch::look_for_rest(Instant now) noexcept {
 void OrganWatch::begin_anew() noexcept {
   settle();
   known_.unproven = true;
+  tool_.move_home();
 }
 
 void OrganWatch::forget() noexcept {
   settle();
+  tool_.forget();
   known_ = {};
 }
 

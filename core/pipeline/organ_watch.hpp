@@ -2,7 +2,7 @@
 //
 // A common shift and turn of the features against the map is the same data whether the organ has been moved or the
 // tracker errs by more than it was said to. Both mean that nothing is good; which of the two it is, the matches do not
-// tell.
+// tell. Where the patient's reference tool is tracked, its own movement does.
 #pragma once
 
 #include <optional>
@@ -12,6 +12,7 @@
 #include "core/pipeline/feature_group.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/image_phase.hpp"
+#include "core/pipeline/patient_tool.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/time/instant.hpp"
@@ -29,7 +30,7 @@ struct RestingOrgan {
 //   at its place ───────────────────────────────────────────▶ displaced: nothing is learnt, the poses of frames are
 //       ▲  ▲                                                   │     │   told as of the map that moves with the organ
 //       │  └─ it is back: two windows' means are small again ──┘     │
-//       └──── whoever knows says that the organ has been moved and rests: the map is moved with it
+//       └──── its tool, or whoever knows, says that the organ has been moved and rests: the map is moved with it
 //
 // Whether it is at its place is not known while nothing is seen: after some seconds of that, and when the map has been
 // moved, it is asked anew.
@@ -39,7 +40,13 @@ class OrganWatch {
  public:
   // The settings outlive it.
   explicit OrganWatch(const PipelineSettings& settings) noexcept
-      : model_{settings.camera}, estimator_(settings.estimator), evidence_(settings.pose.error_correlation) {}
+      : model_{settings.camera},
+        estimator_(settings.estimator),
+        evidence_(settings.pose.error_correlation),
+        tool_(settings.pose) {}
+
+  // A reading of the patient's reference tool.
+  void add_tool(const TrackerSample& sample) noexcept { tool_.add(sample); }
 
   // At a frame's beginning: the camera's pose by the map, which is displaced as was seen last; and how far around its
   // predictions the frame's features are searched for.
@@ -60,6 +67,11 @@ class OrganWatch {
   // Where it is, once that is told well, by the last seconds, in which it has not moved.
   [[nodiscard]] const std::optional<RestingOrgan>& resting() const noexcept { return displaced_.resting; }
 
+  // What the patient's tool tells of it.
+  [[nodiscard]] DisplacedCause cause() const noexcept { return displaced_.cause; }
+  // Where the organ is, once its tool has told that it was moved, and both rest: the map is to be moved there.
+  [[nodiscard]] const std::optional<RestingOrgan>& carried() const noexcept { return displaced_.carried; }
+
   // By how much, root mean square over the features; 0 where it is not.
   [[nodiscard]] double size_mm() const noexcept { return displaced_.size_mm; }
 
@@ -73,11 +85,15 @@ class OrganWatch {
   void judge(Instant now) noexcept;
   void look_for_displacement(Instant now) noexcept;
   void look_for_rest(Instant now) noexcept;
+  void ask_tool(Instant now) noexcept;
+  void look_for_rest_with_tool(Instant now) noexcept;
+  [[nodiscard]] Vector3d centre_W_mm() const noexcept { return known_.pivot_W_mm + known_.surface.centre_mm; }
   void settle() noexcept;
 
   PixelModel model_;
   const EstimatorSettings& estimator_;
   CommonDisplacement evidence_;
+  PatientTool tool_;
 
   // Of this map.
   struct Known {
@@ -94,6 +110,8 @@ class OrganWatch {
     double size_mm = 0.0;
     std::optional<Instant> since;
     std::optional<RestingOrgan> resting;
+    std::optional<RestingOrgan> carried;
+    DisplacedCause cause = DisplacedCause::kUnknown;
     Instant judged;       // the capture that `resting` goes up to
     int frames_lost = 0;  // in a row, of which most of the map was not found where it is
   };

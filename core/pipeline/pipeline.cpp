@@ -36,6 +36,7 @@ ComposerSettings composer_settings(const PipelineSettings& settings) {
   composer.layout = settings.estimator.layout;
   composer.lead = settings.lead;
   composer.validity = settings.validity;
+  composer.use_within_mm = settings.use_within_mm;
   composer.maximum_features = static_cast<std::size_t>(settings.features.maximum);
   return composer;
 }
@@ -137,7 +138,8 @@ void Pipeline::drain_poses() noexcept {
   const RealtimeScope realtime;
   TrackerSample sample;
   while (parts_->entrance.pop_pose(sample)) parts_->mapper.add_pose(sample);
-  while (parts_->entrance.pop_second_pose(sample)) parts_->mapper.add_second_pose(sample);
+  ToolPose tool;
+  while (parts_->entrance.pop_tool_pose(tool)) parts_->mapper.add_tool_pose(tool);
 }
 
 void Pipeline::map(const FrameHandle& frame) noexcept {

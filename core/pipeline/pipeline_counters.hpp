@@ -49,6 +49,7 @@ struct PipelineCounters {
   Counter ecg_samples;
   Counter ecg_lead_off;  // samples that mean nothing: the device said so, or the line was flat for a second
   Counter ecg_dropped;   // gaps in the device's sequence
+  Counter ecg_repeated;  // samples of the first lead that came before, see RepeatedSamples
   LatencyHistogram ecg_delay;
   Counter last_ecg_ns;
   Counter last_good_ecg_ns;
@@ -94,12 +95,14 @@ struct PipelineCounters {
   Counter start_matches_needed;                       // K
   Counter start_matches_most;                         // see StartProgress
   Counter start_matches_mean;
-  Counter maps_forgotten;         // by command, for a new patient
-  Counter maps_moved;             // by command, with the organ
-  Counter moved_um;               // by how much the last time
-  Counter moves_refused;          // since the organ did not rest, or was at its place
-  Counter displaced;              // 1: the organ is not where the map has it, or the tracker errs; see OrganWatch
-  Counter displaced_um;           // by how much then, root mean square over the features
+  Counter maps_forgotten;   // by command, for a new patient
+  Counter maps_moved;       // with the organ, by its tool or by command
+  Counter moved_um;         // by how much the last time
+  Counter moves_refused;    // since the organ did not rest, or was at its place
+  Counter displaced;        // 1: the organ is not where the map has it, or the tracker errs; see OrganWatch
+  Counter displaced_um;     // by how much then, root mean square over the features
+  Counter displaced_cause;  // DisplacedCause
+  Counter times_displaced;
   Counter features_started_anew;  // inconsistent, also after inflation
   LatencyHistogram predict_and_find;
   LatencyHistogram phase_and_pose;

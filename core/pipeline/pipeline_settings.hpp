@@ -15,6 +15,7 @@
 #include "core/phase/respiratory_tracker.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/pipeline/release_stream.hpp"
+#include "core/pipeline/surface_sample.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
@@ -43,7 +44,8 @@ struct PipelineSettings {
   // tells: the hand-eye, the focal length and the principal point then go by it, in place of pose.X_SC and the
   // camera's.
   std::optional<TurnedScope> turned_scope;
-  bool watch_scope = false;  // without that: look in the pictures whether the scope is turned or zoomed meanwhile
+  bool watch_scope = false;        // without that: look in the pictures whether the scope is turned or zoomed meanwhile
+  bool pictures_may_loop = false;  // the camera is a video that is played in a loop
   CardiacClockSettings clock;
   std::optional<RTriggerSettings> r_trigger;  // R peaks come from a trigger, not from the ECG's samples
   RespirationSettings respiration;
@@ -57,6 +59,7 @@ struct PipelineSettings {
   Duration budget = std::chrono::milliseconds(12);   // kept free for A to C before the release
   bool shedding = true;  // of features that the budget does not suffice for; not in lockstep
   Duration validity = std::chrono::milliseconds(200);
+  UseBounds use_within_mm{5.0, 3.0, 2.0};
   bool phase_from_image = true;
   bool law_from_image = false;                      // clock.law holds until the images show another
   Duration image_alone = std::chrono::seconds(10);  // the images carry the phase on so long without the ECG

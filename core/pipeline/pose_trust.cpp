@@ -47,7 +47,8 @@ void PoseTrust::add_second(const TrackerSample& sample) noexcept {
 PoseTrust::Told PoseTrust::begin_frame(FrameRecord& frame, const FrameHistory& history, const GreyImage& image,
                                        const GreyImage& before) noexcept {
   Told told;
-  frame.repeated = same_picture(image, before);
+  const bool came_lately = !may_loop_ && loop_.seen_before(image, frame.stamp.capture);
+  frame.repeated = came_lately || same_picture(image, before);
   heed_repeats(frame, history, told);
   bool known = !doubts_.pose_repeated;
   double turn_deviation_rad = 0.0;

@@ -7,6 +7,7 @@
 #include "core/pipeline/frame_doubts.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/parallax.hpp"
+#include "core/pipeline/picture_loop.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pose_history.hpp"
 #include "core/pipeline/repeats.hpp"
@@ -29,8 +30,10 @@ class PoseTrust {
   };
 
   // `scope`: null where pictures are not asked how the scope is turned; it and the counters must outlive this.
-  PoseTrust(const PoseHistorySettings& settings, ScopeWatch* scope, PipelineCounters& counters) noexcept
-      : poses_(settings), scope_(scope), counters_(counters) {}
+  // `may_loop`: the camera is a video that is played in a loop, as whoever set it up knows.
+  PoseTrust(const PoseHistorySettings& settings, ScopeWatch* scope, PipelineCounters& counters,
+            bool may_loop = false) noexcept
+      : poses_(settings), scope_(scope), counters_(counters), may_loop_(may_loop) {}
 
   void add(const TrackerSample& sample) noexcept;
   // Of the second tracked sensor that tells how the scope is turned.
@@ -66,6 +69,8 @@ class PoseTrust {
   std::optional<Pose> last_reading_;  // of the tracker; none where it was not valid
   Repeats pose_repeats_;
   Repeats picture_repeats_;
+  PictureLoop loop_;
+  bool may_loop_;
   Parallax parallax_;
   FrameDoubts doubts_;
 };

@@ -37,7 +37,7 @@ SensorEntrance::SensorEntrance(int width, int height, const EcgIntakeSettings& e
       mapper_frames_(static_cast<std::size_t>(frame_buffers(width, height))),
       publisher_stamps_(kStampRing),
       poses_(kPoseRing),
-      second_poses_(kPoseRing),
+      tool_poses_(kToolRoles * kPoseRing),
       ecg_(ecg, ecg_clocks_, counters),
       breath_settings_(breath),
       breath_(breath) {}
@@ -116,9 +116,9 @@ void SensorEntrance::push_pose(const TrackerSample& sample) noexcept {
   mapper_wakeup_.post();
 }
 
-void SensorEntrance::push_second_pose(const TrackerSample& sample) noexcept {
+void SensorEntrance::push_tool_pose(const ToolPose& pose) noexcept {
   const RealtimeScope realtime;
-  if (!second_poses_.push(sample)) {
+  if (!tool_poses_.push(pose)) {
     counters_.poses_dropped.add();
     return;
   }

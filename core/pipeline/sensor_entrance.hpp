@@ -24,7 +24,7 @@
 
 namespace perimap {
 
-// push_frame() belongs to the camera thread, push_pose() and push_second_pose() to the tracker thread, push_ecg() to
+// push_frame() belongs to the camera thread, push_pose() and push_tool_pose() to the tracker thread, push_ecg() to
 // the ECG thread, push_r_trigger() to that of a trigger line, push_respiration() to that of a respiration channel; one
 // thread may be all of them. None of them blocks or allocates. What does not fit is counted, never waited for.
 class SensorEntrance {
@@ -38,8 +38,7 @@ class SensorEntrance {
   // than the pipeline's.
   bool push_frame(const FrameStamp& stamp, const GreyImage& image, const ColourImage& colour = {}) noexcept;
   void push_pose(const TrackerSample& sample) noexcept;
-  // Of the second tracked sensor that tells how the scope is turned.
-  void push_second_pose(const TrackerSample& sample) noexcept;
+  void push_tool_pose(const ToolPose& pose) noexcept;
   void push_ecg(const EcgBlock& block) noexcept { ecg_.push(block); }
   void push_r_trigger(const RTriggerPulse& pulse) noexcept { ecg_.push(pulse); }
 
@@ -59,7 +58,7 @@ class SensorEntrance {
   // Mapper side.
   [[nodiscard]] bool pop_frame(FrameHandle& frame) noexcept { return mapper_frames_.pop(frame); }
   [[nodiscard]] bool pop_pose(TrackerSample& sample) noexcept { return poses_.pop(sample); }
-  [[nodiscard]] bool pop_second_pose(TrackerSample& sample) noexcept { return second_poses_.pop(sample); }
+  [[nodiscard]] bool pop_tool_pose(ToolPose& pose) noexcept { return tool_poses_.pop(pose); }
   [[nodiscard]] GreyImage image(const FrameHandle& frame) noexcept { return pool_.image(frame.buffer); }
   // Without pixels when the frame came without colour.
   [[nodiscard]] ColourImage colour(const FrameHandle& frame) noexcept {
@@ -90,7 +89,7 @@ class SensorEntrance {
   SpscRing<FrameHandle> mapper_frames_;
   SpscRing<FrameStamp> publisher_stamps_;
   SpscRing<TrackerSample> poses_;
-  SpscRing<TrackerSample> second_poses_;
+  SpscRing<ToolPose> tool_poses_;
   Wakeup mapper_wakeup_;
   Wakeup publisher_wakeup_;
   EcgClockCells ecg_clocks_;

@@ -5,11 +5,13 @@
 #include "core/periodic/periodic_motion.hpp"
 #include "core/pipeline/phase_spread.hpp"
 #include "core/pipeline/surface_state.hpp"
+#include "core/pipeline/surface_use.hpp"
 #include "core/realtime/realtime_scope.hpp"
 
 namespace perimap {
 SurfaceComposer::SurfaceComposer(const ComposerSettings& settings) : settings_(settings) {
   sample_.features.reserve(settings.maximum_features);
+  sample_.use_within_mm = settings.use_within_mm;
   order_.reserve(settings.maximum_features);
 }
 
@@ -119,6 +121,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
     feature.reason = verdict.reason;
     sample_.features.push_back(feature);
   }
+  sample_.uses = verdicts_by_use(sample_.state, sample_.reason, sample_.features, sample_.use_within_mm);
   return sample_;
 }
 

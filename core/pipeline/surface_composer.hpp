@@ -18,6 +18,7 @@ struct ComposerSettings {
   Duration lead{0};                                    // valid time minus release
   Duration validity = std::chrono::milliseconds(200);  // a sample must not be used longer after its valid time
   std::size_t maximum_features = 0;
+  UseBounds use_within_mm{};
 };
 
 // Belongs to the publisher; one for each stream, whose samples it counts. Positions and velocities are evaluated anew

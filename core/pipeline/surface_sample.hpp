@@ -1,6 +1,8 @@
 // One published surface, as the pipeline makes it; the daemon puts it into the wire type of idl/perimap.idl.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -37,10 +39,23 @@ enum class SurfaceReason : std::uint8_t {
   kScopeChanged,
   kPoseRepeated,
   kPictureRepeated,
-  kOrganOrTrackerMoved
+  kOrganOrTrackerMoved,
+  kOrganMoved,
+  kTrackerErrs
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost, kShed };
+
+// To show it, to measure in it, to act in contact with it.
+enum class SurfaceUse : std::uint8_t { kDisplay, kMeasure, kContact };
+inline constexpr std::size_t kUses = 3;
+// By SurfaceUse: 95 % of errors are to be within so much, mm.
+using UseBounds = std::array<double, kUses>;
+struct UseVerdict {
+  SurfaceState state = SurfaceState::kInvalid;
+  std::uint32_t features = 0;  // that are converged and within the bound
+};
+using UseVerdicts = std::array<UseVerdict, kUses>;
 
 struct SurfaceFeature {
   std::uint32_t id = 0;
@@ -71,7 +86,9 @@ struct SurfaceSample {
   double cardiac_phase_rad = 0.0;
   double cardiac_phase_deviation_rad = 0.0;
   double cardiac_phase_rate_rad_per_s = 0.0;
-  CameraPlace camera;                    // at the release's capture
+  CameraPlace camera;  // at the release's capture
+  UseBounds use_within_mm{};
+  UseVerdicts uses;                      // see surface_use.hpp
   std::vector<SurfaceFeature> features;  // in order of id; capacity reserved at start
 };
 

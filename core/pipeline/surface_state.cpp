@@ -8,6 +8,18 @@ namespace perimap {
 
 namespace {
 
+SurfaceReason reason_of(DisplacedCause cause) noexcept {
+  switch (cause) {
+    case DisplacedCause::kOrgan:
+      return SurfaceReason::kOrganMoved;
+    case DisplacedCause::kTracker:
+      return SurfaceReason::kTrackerErrs;
+    case DisplacedCause::kUnknown:
+      break;
+  }
+  return SurfaceReason::kOrganOrTrackerMoved;
+}
+
 bool is_converged(const FeatureSnapshot& feature) noexcept { return feature.state == FeatureState::kConverged; }
 
 }  // namespace
@@ -48,7 +60,7 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (footing.doubts.pose_repeated) return SurfaceReason::kPoseRepeated;
   if (footing.pose_missing) return SurfaceReason::kPoseMissing;
   if (footing.doubts.setup_doubted) return SurfaceReason::kSetupDoubted;
-  if (footing.doubts.displaced) return SurfaceReason::kOrganOrTrackerMoved;
+  if (footing.doubts.displaced) return reason_of(footing.doubts.cause);
   if (footing.not_seen || footing.doubts.unproven) return SurfaceReason::kNotSeen;
   if (footing.no_parallax) return SurfaceReason::kNoParallax;
   if (!footing.converged) return SurfaceReason::kNothingConverged;

@@ -20,6 +20,16 @@ struct TrackerSample {
   double error_mm = 0.0;  // the device's own figure of how far off this pose is, RMS; 0: it gives none
 };
 
+// What the pipeline asks of tools that are tracked beside the sensor: how an angled scope is turned in its camera head,
+// and whether what holds the organ has been moved.
+enum class ToolRole : std::uint8_t { kSecondSensor, kPatient };
+inline constexpr std::size_t kToolRoles = 2;
+// A reading of one of them, with the tool's pose X_WO in the place of the sensor's.
+struct ToolPose {
+  ToolRole role = ToolRole::kSecondSensor;
+  TrackerSample sample;
+};
+
 // One reading of another tool O that the tracker sees beside the sensor, with the tool's pose X_WO in the place of the
 // sensor's.
 struct ToolSample : TrackerSample {

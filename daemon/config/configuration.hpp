@@ -59,11 +59,13 @@ struct TrackerConfiguration {
   std::optional<std::string> reference;                           // likewise
   std::optional<std::string> pointer;                             // likewise
   std::optional<std::string> second_sensor;                       // likewise
+  std::optional<std::string> patient_tool;                        // likewise
   std::vector<std::string> instruments;                           // likewise
   std::optional<std::filesystem::path> sensor_definition;         // NDI, uploaded
   std::optional<std::filesystem::path> reference_definition;      // NDI, uploaded
   std::optional<std::filesystem::path> pointer_definition;        // NDI, uploaded
   std::optional<std::filesystem::path> second_sensor_definition;  // NDI, uploaded
+  std::optional<std::filesystem::path> patient_tool_definition;   // NDI, uploaded
   std::vector<std::filesystem::path> instrument_definitions;      // NDI, uploaded; beside `instruments`
   std::optional<std::filesystem::path> pointer_calibration;       // its tip
   bool igtl_stamps_by_arrival = false;                            // not by the server's stamps
@@ -172,6 +174,15 @@ struct EstimationConfiguration {
   bool operator==(const EstimationConfiguration&) const = default;
 };
 
+// 95 % of errors are to be within so much.
+struct UseConfiguration {
+  double display_mm = 5.0;
+  double measure_mm = 3.0;
+  double contact_mm = 2.0;
+
+  bool operator==(const UseConfiguration&) const = default;
+};
+
 struct RealtimeConfiguration {
   int priority = 0;  // SCHED_FIFO; 0: not requested
   bool lock_memory = true;
@@ -241,6 +252,7 @@ struct Configuration {
   PipelineConfiguration pipeline;
   FeaturesConfiguration features;
   EstimationConfiguration estimation;
+  UseConfiguration use;
   RealtimeConfiguration realtime;
   DdsConfiguration dds;
   RecordingConfiguration recording;

@@ -135,6 +135,9 @@ void add_tracker(std::vector<ConfigurationKey>& keys) {
       .optional_text("second_sensor", tool, &is_tool_name, PERIMAP_MEMBER(tracker.second_sensor),
                      "the tool that tells how an angled scope is turned in its camera head, likewise: on the scope "
                      "where the sensor is on the head, or the other way round; recorded as tracker/second_sensor")
+      .optional_text("patient_tool", tool, &is_tool_name, PERIMAP_MEMBER(tracker.patient_tool),
+                     "the tool that is fixed to what holds the organ, and is moved as the organ is moved, likewise: it "
+                     "tells a moved organ from a tracker that errs; recorded as tracker/patient_tool")
       .texts("instruments", kMostInstruments, "texts of 1 to 20 printable characters", &is_tool_name,
              PERIMAP_MEMBER(tracker.instruments), "further tools, likewise; each recorded as tracker/instrument/NAME")
       .file("sensor_definition", PERIMAP_MEMBER(tracker.sensor_definition),
@@ -144,6 +147,8 @@ void add_tracker(std::vector<ConfigurationKey>& keys) {
       .file("pointer_definition", PERIMAP_MEMBER(tracker.pointer_definition), "the pointer's tool definition, likewise")
       .file("second_sensor_definition", PERIMAP_MEMBER(tracker.second_sensor_definition),
             "the second sensor's tool definition, likewise")
+      .file("patient_tool_definition", PERIMAP_MEMBER(tracker.patient_tool_definition),
+            "the patient tool's tool definition, likewise")
       .files("instrument_definitions", kMostInstruments, PERIMAP_MEMBER(tracker.instrument_definitions),
              "tool definitions, likewise, of further instruments; each has the name of its file")
       .file("pointer_calibration", PERIMAP_MEMBER(tracker.pointer_calibration),
@@ -336,6 +341,11 @@ bool is_absolute_path(const std::string& text) { return text.starts_with('/') &&
 void add_running(std::vector<ConfigurationKey>& keys) {
   const auto ms = std::chrono::milliseconds(1);
   const auto s = std::chrono::seconds(1);
+  Section("use", keys)
+      .number("display_mm", 0.1, 100, PERIMAP_MEMBER(use.display_mm),
+              "a surface may be shown where 95 % of errors are within so much; each surface says whether they are")
+      .number("measure_mm", 0.1, 100, PERIMAP_MEMBER(use.measure_mm), "likewise, to measure in it")
+      .number("contact_mm", 0.1, 100, PERIMAP_MEMBER(use.contact_mm), "likewise, to act in contact with it");
   Section("realtime", keys)
       .integer("priority", 0, 98, PERIMAP_MEMBER(realtime.priority), "SCHED_FIFO priority; 0: not requested")
       .flag("lock_memory", PERIMAP_MEMBER(realtime.lock_memory), "keeps all memory in RAM")

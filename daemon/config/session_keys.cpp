@@ -9,7 +9,7 @@ namespace {
 
 struct SessionSection {
   std::string_view section;
-  std::array<std::string_view, 10> keys;  // empty: all but `except`
+  std::array<std::string_view, 11> keys;  // empty: all but `except`
   std::string_view except;
 };
 
@@ -19,7 +19,7 @@ constexpr std::array<SessionSection, 7> kSessionSections{
      {"tracker",
       {"position_deviation_mm", "rotation_deviation_deg", "error_correlation_s", "time_offset_ms",
        "maximum_extrapolation_ms", "hand_eye_translation_SC_mm", "hand_eye_rotation_SC_wxyz", "sensor", "pointer",
-       "second_sensor"},
+       "second_sensor", "patient_tool"},
       ""},
      {"ecg", {"r_trigger", "r_trigger_delay_ms", "r_trigger_deviation_ms"}, ""},
      {"phase", {}, ""},

@@ -17,6 +17,12 @@ std::string spelling(const std::string& tool, TrackerConfiguration::Protocol pro
   return capitals;
 }
 
+std::optional<std::size_t> tool_of(const std::vector<std::string>& names, const char* tool) {
+  const auto found = std::find(names.begin(), names.end(), tool);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - names.begin());
+}
+
 }  // namespace
 
 bool same_tool(const std::string& a, const std::string& b, TrackerConfiguration::Protocol protocol) {
@@ -29,6 +35,7 @@ std::vector<std::string> tracked_tool_names(const TrackerConfiguration& c) {
   names.emplace_back(c.reference || (uploads && c.reference_definition) ? "reference" : "");
   if (c.pointer || (uploads && c.pointer_definition)) names.emplace_back("pointer");
   if (c.second_sensor || (uploads && c.second_sensor_definition)) names.emplace_back(kSecondSensorTool);
+  if (c.patient_tool || (uploads && c.patient_tool_definition)) names.emplace_back(kPatientTool);
   for (const std::string& instrument : c.instruments) names.push_back("instrument/" + instrument);
   if (!uploads) return names;
   for (const auto& definition : c.instrument_definitions) names.push_back("instrument/" + definition.stem().string());
@@ -36,9 +43,11 @@ std::vector<std::string> tracked_tool_names(const TrackerConfiguration& c) {
 }
 
 std::optional<std::size_t> second_sensor_of(const std::vector<std::string>& names) {
-  const auto found = std::find(names.begin(), names.end(), kSecondSensorTool);
-  if (found == names.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - names.begin());
+  return tool_of(names, kSecondSensorTool);
+}
+
+std::array<std::optional<std::size_t>, kToolRoles> roles_of(const std::vector<std::string>& names) {
+  return {tool_of(names, kSecondSensorTool), tool_of(names, kPatientTool)};
 }
 
 std::optional<ToolTwice> tool_named_twice(const TrackerConfiguration& c) {
@@ -51,6 +60,7 @@ std::optional<ToolTwice> tool_named_twice(const TrackerConfiguration& c) {
   add("tracker.reference", c.reference, c.reference_definition.has_value());
   add("tracker.pointer", c.pointer, c.pointer_definition.has_value());
   add("tracker.second_sensor", c.second_sensor, c.second_sensor_definition.has_value());
+  add("tracker.patient_tool", c.patient_tool, c.patient_tool_definition.has_value());
   for (const std::string& instrument : c.instruments) named.emplace_back("tracker.instruments", instrument);
   std::map<std::string, std::string> seen;  // spelling, key
   for (const auto& [key, tool] : named) {

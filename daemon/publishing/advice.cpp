@@ -61,6 +61,10 @@ std::string_view remedy_of(perimap_SurfaceReason reason) noexcept {
       return "look at the camera: the picture stands still";
     case perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED:
       return "let the organ go back, or see what disturbs the tracker; if the organ was moved: perimap ctl organ-moved";
+    case perimap_SURFACE_REASON_ORGAN_MOVED:
+      return "let the organ come to rest: the map is then moved with it";
+    case perimap_SURFACE_REASON_TRACKER_ERRS:
+      return "see what disturbs the tracker: metal, a sensor that has slipped, its line of sight";
   }
   return "update perimap view: perimapd is newer";
 }

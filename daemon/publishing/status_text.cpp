@@ -55,11 +55,25 @@ Json stage_json(const perimap_StageLatency& stage) {
 // Which of two leads of the ECG.
 std::string leads_off(const perimap_Status& status) {
   if (status.ecg_second_lead == perimap_ECG_LEAD_NONE) return {};
-  const auto off = [](perimap_EcgLead lead) { return lead == perimap_ECG_LEAD_FLAT || lead == perimap_ECG_LEAD_OFF; };
+  const auto off = [](perimap_EcgLead lead) {
+    return lead == perimap_ECG_LEAD_FLAT || lead == perimap_ECG_LEAD_OFF || lead == perimap_ECG_LEAD_REPEATED;
+  };
   std::string text;
   if (off(status.ecg_first_lead)) text += fmt::format(", first lead of the ECG {}", name_of(status.ecg_first_lead));
   if (off(status.ecg_second_lead)) text += fmt::format(", second lead of the ECG {}", name_of(status.ecg_second_lead));
   return text;
+}
+
+std::string_view displaced_words(perimap_DisplacedCause cause) {
+  switch (cause) {
+    case perimap_DISPLACED_CAUSE_ORGAN:
+      return "the organ was moved";
+    case perimap_DISPLACED_CAUSE_TRACKER:
+      return "the tracker errs";
+    case perimap_DISPLACED_CAUSE_UNKNOWN:
+      break;
+  }
+  return "the organ or the tracker";
 }
 
 }  // namespace
@@ -79,6 +93,9 @@ Json counts_json(const perimap_Status& status) {
                {"frames_without_phase", status.frames_without_phase},
                {"poses_repeated", status.poses_repeated},
                {"frames_repeated", status.frames_repeated},
+               {"ecg_samples_repeated", status.ecg_samples_repeated},
+               {"times_displaced", status.times_displaced},
+               {"maps_moved", status.maps_moved},
                {"phases_from_image", status.phases_from_image}};
   json.update(stream_counts_json(status));
   json.update({{"learning_put_off", status.learning_put_off},
@@ -123,6 +140,8 @@ Json status_json(const perimap_Status& status, std::span<const perimap_StageLate
       {"respiration_suspected", status.respiration_suspected},
       {"respiration_source", name_of(status.respiration_source)},
       {"setup", setup_json(status.setup)},
+      {"displaced_mm", status.displaced_mm},
+      {"displaced_cause", name_of(status.displaced_cause)},
       {"scope_turn", name_of(status.scope_turn)},
       {"scope_rotation_deg",
        status.scope_turn == perimap_SCOPE_TURN_UNREAD ? Json(nullptr) : Json(status.scope_rotation_rad / kDegree)},
@@ -161,8 +180,14 @@ std::string status_line(const perimap_Status& status) {
     line += fmt::format(", {} followed with {} of the {} matches of a start", status.features_tracked,
                         status.start_matches_mean, status.start_matches_needed);
   }
-  for (const auto& [count, what] : {std::pair(status.poses_repeated, "poses"), {status.frames_repeated, "pictures"}}) {
-    if (count > 0) line += fmt::format(", {} {} were the ones before bit for bit", count, what);
+  for (const auto& [count, what] : {std::pair(status.poses_repeated, "poses"),
+                                    {status.frames_repeated, "pictures"},
+                                    {status.ecg_samples_repeated, "ECG samples"}}) {
+    if (count > 0) line += fmt::format(", {} {} were ones before bit for bit", count, what);
+  }
+  if (status.displaced_mm > 0.0) {
+    line += fmt::format(", the surface is displaced by {:.1f} mm ({})", status.displaced_mm,
+                        displaced_words(status.displaced_cause));
   }
   if (status.setup.state == perimap_SETUP_DOUBTED) line += ", set-up " + setup_words(status.setup);
   if (status.keys_expire_utc_ns != 0) {

@@ -19,7 +19,7 @@ std::string_view name_of(perimap_SurfaceState state) noexcept {
 }
 
 std::string_view name_of(perimap_SurfaceReason reason) noexcept {
-  return name_in<24>({"none",
+  return name_in<26>({"none",
                       "nothing_mapped",
                       "phase_unknown",
                       "phase_free_running",
@@ -42,7 +42,9 @@ std::string_view name_of(perimap_SurfaceReason reason) noexcept {
                       "scope_changed",
                       "pose_repeated",
                       "picture_repeated",
-                      "organ_or_tracker_moved"},
+                      "organ_or_tracker_moved",
+                      "organ_moved",
+                      "tracker_errs"},
                      static_cast<int>(reason));
 }
 
@@ -90,7 +92,11 @@ std::string_view name_of(perimap_ScopeTurn turn) noexcept {
 }
 
 std::string_view name_of(perimap_EcgLead lead) noexcept {
-  return name_in<6>({"none", "learning", "good", "noisy", "flat", "off"}, static_cast<int>(lead));
+  return name_in<7>({"none", "learning", "good", "noisy", "flat", "off", "repeated"}, static_cast<int>(lead));
+}
+
+std::string_view name_of(perimap_DisplacedCause cause) noexcept {
+  return name_in<3>({"unknown", "organ", "tracker"}, static_cast<int>(cause));
 }
 
 std::string_view name_of(perimap_SourceKind kind) noexcept {

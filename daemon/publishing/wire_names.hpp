@@ -21,6 +21,7 @@ namespace perimap {
 [[nodiscard]] std::string_view name_of(perimap_RecordingState state) noexcept;
 [[nodiscard]] std::string_view name_of(perimap_ScopeTurn turn) noexcept;
 [[nodiscard]] std::string_view name_of(perimap_EcgLead lead) noexcept;
+[[nodiscard]] std::string_view name_of(perimap_DisplacedCause cause) noexcept;
 [[nodiscard]] std::string_view name_of(perimap_SourceKind kind) noexcept;
 [[nodiscard]] std::string_view name_of(perimap_SourceState state) noexcept;
 

@@ -3,6 +3,7 @@
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/ecg_signal.hpp"
 #include "core/phase/respiratory_clock.hpp"
+#include "core/pipeline/frame_doubts.hpp"
 #include "core/pipeline/surface_sample.hpp"
 #include "core/setup_watch/setup_verdict.hpp"
 
@@ -70,6 +71,10 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_PICTURE_REPEATED;
     case SurfaceReason::kOrganOrTrackerMoved:
       return perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED;
+    case SurfaceReason::kOrganMoved:
+      return perimap_SURFACE_REASON_ORGAN_MOVED;
+    case SurfaceReason::kTrackerErrs:
+      return perimap_SURFACE_REASON_TRACKER_ERRS;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }
@@ -148,8 +153,22 @@ perimap_EcgLead to_wire(EcgSignal signal) noexcept {
       return perimap_ECG_LEAD_FLAT;
     case EcgSignal::kLeadOff:
       return perimap_ECG_LEAD_OFF;
+    case EcgSignal::kRepeated:
+      return perimap_ECG_LEAD_REPEATED;
   }
   return perimap_ECG_LEAD_OFF;
+}
+
+perimap_DisplacedCause to_wire(DisplacedCause cause) noexcept {
+  switch (cause) {
+    case DisplacedCause::kOrgan:
+      return perimap_DISPLACED_CAUSE_ORGAN;
+    case DisplacedCause::kTracker:
+      return perimap_DISPLACED_CAUSE_TRACKER;
+    case DisplacedCause::kUnknown:
+      break;
+  }
+  return perimap_DISPLACED_CAUSE_UNKNOWN;
 }
 
 perimap_PhaseLaw to_wire(PhaseLaw law) noexcept {

@@ -9,6 +9,7 @@ namespace perimap {
 
 enum class FeatureReason : std::uint8_t;
 enum class FeatureState : std::uint8_t;
+enum class DisplacedCause : std::uint8_t;
 enum class EcgSignal : std::uint8_t;
 enum class PhaseLaw : std::uint8_t;
 enum class PhaseState : std::uint8_t;
@@ -21,6 +22,7 @@ enum class SurfaceState : std::uint8_t;
 
 [[nodiscard]] perimap_FeatureReason to_wire(FeatureReason reason) noexcept;
 [[nodiscard]] perimap_FeatureState to_wire(FeatureState state) noexcept;
+[[nodiscard]] perimap_DisplacedCause to_wire(DisplacedCause cause) noexcept;
 [[nodiscard]] perimap_EcgLead to_wire(EcgSignal signal) noexcept;
 [[nodiscard]] perimap_PhaseLaw to_wire(PhaseLaw law) noexcept;
 [[nodiscard]] perimap_PhaseState to_wire(PhaseState state) noexcept;

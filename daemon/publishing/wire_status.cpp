@@ -194,6 +194,11 @@ const perimap_Status& WireStatus::fill(const PipelineCounters& c, const StatusFa
   wire_.latency_short = facts.latency_short;
   wire_.two_publishers = facts.two_publishers;
   wire_.keys_expire_utc_ns = facts.keys_expire_utc_ns;
+  wire_.displaced_mm = c.displaced.get() != 0 ? 1e-3 * static_cast<double>(c.displaced_um.get()) : 0.0;
+  wire_.displaced_cause = to_wire(static_cast<DisplacedCause>(c.displaced_cause.get()));
+  wire_.times_displaced = c.times_displaced.get();
+  wire_.maps_moved = c.maps_moved.get();
+  wire_.ecg_samples_repeated = c.ecg_repeated.get();
   wire_.setup = to_wire(facts.setup);
   wire_.poses_repeated = c.poses_repeated.get();
   wire_.frames_repeated = c.frames_repeated.get();

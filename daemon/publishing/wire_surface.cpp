@@ -47,6 +47,13 @@ const perimap_Surface& WireSurface::fill(const SurfaceSample& sample, Duration u
   rotation_to_wxyz(sample.camera.X_WC.R, wire_.rotation_WC_wxyz);
   std::copy_n(sample.camera.lens.focal_px.data(), 2, wire_.camera_focal_px);
   std::copy_n(sample.camera.lens.principal_px.data(), 2, wire_.camera_principal_point_px);
+  wire_.display_state = to_wire(sample.uses[0].state);
+  wire_.measure_state = to_wire(sample.uses[1].state);
+  wire_.contact_state = to_wire(sample.uses[2].state);
+  for (std::size_t use = 0; use < kUses; ++use) {
+    wire_.use_within_mm[use] = sample.use_within_mm[use];
+    wire_.use_features[use] = sample.uses[use].features;
+  }
   const std::size_t count = std::min(sample.features.size(), features_.size());
   wire_.features._length = static_cast<std::uint32_t>(count);
   for (std::size_t i = 0; i < count; ++i) {

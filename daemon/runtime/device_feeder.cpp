@@ -90,7 +90,7 @@ Expected<void> serve_camera(const CameraDevice& device, const CameraSink& sink, 
 
 DeviceFeeder::DeviceFeeder(Devices devices, SensorEntrance* entrance, DeviceRecording recording)
     : devices_(std::move(devices)), recording_(std::move(recording)), intake_{entrance, recording_.recorder.get()} {
-  if (devices_.tracker) intake_.second_sensor = second_sensor_of(devices_.tracker->tools);
+  if (devices_.tracker) intake_.roles = roles_of(devices_.tracker->tools);
   if (!devices_.camera) return;
   if (auto* playback = std::get_if<CameraPlayback>(&*devices_.camera)) {
     playback_ = std::make_unique<ReplayFeeder>(std::move(playback->reader), intake_, playback->offset);

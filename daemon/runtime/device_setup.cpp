@@ -97,6 +97,10 @@ NdiSettings ndi_settings(const TrackerConfiguration& c, WrongKeys& wrong) {
     add("second sensor", ndi_tool({"tracker.second_sensor", "tracker.second_sensor_definition"}, c.second_sensor,
                                   c.second_sensor_definition, wrong));
   }
+  if (c.patient_tool || c.patient_tool_definition) {
+    add("patient tool", ndi_tool({"tracker.patient_tool", "tracker.patient_tool_definition"}, c.patient_tool,
+                                 c.patient_tool_definition, wrong));
+  }
   constexpr NdiKeys kInstruments{"tracker.instruments", "tracker.instrument_definitions"};
   for (const std::string& instrument : c.instruments) {
     add("instrument " + instrument, ndi_tool(kInstruments, instrument, std::nullopt, wrong));
@@ -194,6 +198,7 @@ tl::expected<TrackerDevice, WrongKeys> tracker_device(const TrackerConfiguration
     settings.stamps_by_arrival = c.igtl_stamps_by_arrival;
     if (c.pointer) settings.tools.push_back(*c.pointer);
     if (c.second_sensor) settings.tools.push_back(*c.second_sensor);
+    if (c.patient_tool) settings.tools.push_back(*c.patient_tool);
     settings.tools.insert(settings.tools.end(), c.instruments.begin(), c.instruments.end());
     return TrackerDevice{std::move(*endpoint), std::move(settings), tracked_tool_names(c)};
   }

@@ -21,7 +21,8 @@ const char* consequence(std::uint64_t other) {
   if (counted_as(EcgSignal::kGood, other) || counted_as(EcgSignal::kNoisy, other)) {
     return ": beats are found in the other alone";
   }
-  const bool is_off = counted_as(EcgSignal::kFlat, other) || counted_as(EcgSignal::kLeadOff, other);
+  const bool is_off = counted_as(EcgSignal::kFlat, other) || counted_as(EcgSignal::kLeadOff, other) ||
+                      counted_as(EcgSignal::kRepeated, other);
   return is_off ? ", and so is the other: no beats are found" : "";
 }
 
@@ -32,14 +33,18 @@ std::optional<EcgLeadNews::Line> EcgLeadNews::next(const PipelineCounters& count
   for (std::size_t i = 0; i < leads_.size(); ++i) {
     Lead& lead = leads_[i];
     const bool flat = counted_as(EcgSignal::kFlat, counters.ecg_leads[i].get());
-    const bool off = flat || counted_as(EcgSignal::kLeadOff, counters.ecg_leads[i].get());
+    const bool repeated = counted_as(EcgSignal::kRepeated, counters.ecg_leads[i].get());
+    const bool off = flat || repeated || counted_as(EcgSignal::kLeadOff, counters.ecg_leads[i].get());
     if (off != lead.off) lead.since = now;
     lead.off = off;
     if (off == lead.told_off || now - lead.since < kLasts) continue;
     lead.told_off = off;
     if (!off) return Line{false, fmt::format("the {} lead of the ECG is heard again", kWhich[i])};
     return Line{true, fmt::format("the {} lead of the ECG is {}{}; look at its electrodes", kWhich[i],
-                                  flat ? "flat" : "off", consequence(counters.ecg_leads[1 - i].get()))};
+                                  flat       ? "flat"
+                                  : repeated ? "giving the same again and again"
+                                             : "off",
+                                  consequence(counters.ecg_leads[1 - i].get()))};
   }
   return std::nullopt;
 }

@@ -71,8 +71,8 @@ void LockstepRuntime::deliver(const ReplayEvent& event) {
   } else if (const auto* pose = std::get_if<TrackerSample>(&event)) {
     entrance.push_pose(*pose);
     pipeline_.drain_poses();
-  } else if (const auto* second = std::get_if<SecondPose>(&event)) {
-    entrance.push_second_pose(second->sample);
+  } else if (const auto* tool = std::get_if<ToolPose>(&event)) {
+    entrance.push_tool_pose(*tool);
     pipeline_.drain_poses();
   } else if (const auto* ecg = std::get_if<EcgBlock>(&event)) {
     entrance.push_ecg(*ecg);

@@ -107,8 +107,8 @@ void ReplayFeeder::deliver() {
       intake_.frame(frame->as_it_came(), frame->image(), frame->colour());
     } else if (const auto* pose = std::get_if<TrackerSample>(&*event)) {
       intake_.pose(*pose);
-    } else if (const auto* second = std::get_if<SecondPose>(&*event)) {
-      intake_.second_pose(second->sample);
+    } else if (const auto* tool = std::get_if<ToolPose>(&*event)) {
+      intake_.tool_pose(*tool);
     } else if (const auto* ecg = std::get_if<EcgBlock>(&*event)) {
       intake_.ecg(*ecg);
     } else if (const auto* respiration = std::get_if<RespirationBlock>(&*event)) {

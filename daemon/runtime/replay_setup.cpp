@@ -76,6 +76,7 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   PipelineSettings s;
   s.camera = camera;
   s.watch_scope = true;
+  s.pictures_may_loop = c.camera.device && c.camera.device->starts_with("video:") && c.camera.loop;
   const double(&t)[3] = c.tracker.translation_SC_mm;
   s.pose.X_SC = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), c.tracker.rotation_SC_wxyz);
   s.pose.position_deviation_mm = c.tracker.position_deviation_mm / std::numbers::sqrt3;
@@ -118,6 +119,7 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   constexpr double kUsual_mm = 1.0;  // what 0 means
   s.estimator.converged_deviation_mm =
       c.estimation.converged_deviation_mm > 0.0 ? c.estimation.converged_deviation_mm : kUsual_mm;
+  s.use_within_mm = {c.use.display_mm, c.use.measure_mm, c.use.contact_mm};
   s.workers = c.pipeline.workers;
   s.latency = c.pipeline.latency;
   s.lead = c.pipeline.lead;
@@ -152,6 +154,7 @@ tl::expected<RecordedBasis, SetupError> recorded_basis(const std::string& record
     configuration.tracker.sensor.reset();
     configuration.tracker.pointer.reset();
     configuration.tracker.second_sensor.reset();
+    configuration.tracker.patient_tool.reset();
     basis.passed_over = std::move(own->passed_over);
   }
   if (configuration_file) {

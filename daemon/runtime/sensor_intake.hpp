@@ -1,6 +1,7 @@
 // Where the sources' threads put what they have got: the pipeline, a recording, and whoever else looks at the frames.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 
@@ -25,7 +26,7 @@ struct SensorIntake {
   SensorEntrance* entrance = nullptr;
   SessionRecorder* recorder = nullptr;
   FrameObserver* observer = nullptr;
-  std::optional<std::size_t> second_sensor = std::nullopt;  // which ToolSample::tool tells how the scope is turned
+  std::array<std::optional<std::size_t>, kToolRoles> roles{};  // by ToolRole: which ToolSample::tool has it
 
   // To the pipeline first: it is the one in a hurry.
   void frame(const CameraFrame& as_it_came, const GreyImage& grey, const ColourImage& colour) const noexcept {
@@ -37,14 +38,16 @@ struct SensorIntake {
     if (entrance != nullptr) entrance->push_pose(sample);
     if (recorder != nullptr) recorder->pose(sample);
   }
-  // Of them the pipeline takes the second sensor alone.
+  // The pipeline takes those that have a role.
   void tool(const ToolSample& sample) const noexcept {
-    if (sample.tool == second_sensor) second_pose(sample);
+    for (std::size_t role = 0; role < roles.size(); ++role) {
+      if (sample.tool == roles[role]) tool_pose({static_cast<ToolRole>(role), sample});
+    }
     if (recorder != nullptr) recorder->tool(sample);
   }
   // Of a recording; not recorded again.
-  void second_pose(const TrackerSample& sample) const noexcept {
-    if (entrance != nullptr) entrance->push_second_pose(sample);
+  void tool_pose(const ToolPose& pose) const noexcept {
+    if (entrance != nullptr) entrance->push_tool_pose(pose);
   }
   void ecg(const EcgBlock& block) const noexcept {
     if (entrance != nullptr) entrance->push_ecg(block);

@@ -10,9 +10,10 @@ inline constexpr std::string_view kCameraImage = "camera/image";  // foxglove::R
 inline constexpr std::string_view kTrackerPose = "tracker/pose";  // perimap::TrackerPose
 // Of other tracked tools each a channel of its own below this: perimap::TrackerPose, likewise in the frame W, but of
 // the reference in the tracker's own. "tracker/reference", "tracker/pointer", "tracker/second_sensor",
-// "tracker/instrument/NAME".
+// "tracker/patient_tool", "tracker/instrument/NAME".
 inline constexpr std::string_view kTrackedTools = "tracker/";
 inline constexpr std::string_view kSecondSensor = "tracker/second_sensor";  // that tells how the scope is turned
+inline constexpr std::string_view kPatientTool = "tracker/patient_tool";    // that is moved as the organ is moved
 inline constexpr std::string_view kTrackerViewer = "tracker/viewer";  // foxglove::PoseInFrame, metres, valid poses only
 inline constexpr std::string_view kEcgSamples = "ecg/samples";        // perimap::EcgSamples
 // Of the same device, measured together with those and with their count and stamps: each message stands right before

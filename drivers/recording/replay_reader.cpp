@@ -30,9 +30,10 @@ Expected<std::optional<ReplayEvent>> pose_event(const RecordingReader& reader, c
   return pose_of(reader, message).map([](const TrackerSample& sample) { return std::optional<ReplayEvent>(sample); });
 }
 
-Expected<std::optional<ReplayEvent>> second_pose_event(const RecordingReader& reader, const RecordedMessage& message) {
-  return pose_of(reader, message).map([](const TrackerSample& sample) {
-    return std::optional<ReplayEvent>(SecondPose{sample});
+Expected<std::optional<ReplayEvent>> tool_event(const RecordingReader& reader, const RecordedMessage& message,
+                                                ToolRole role) {
+  return pose_of(reader, message).map([role](const TrackerSample& sample) {
+    return std::optional<ReplayEvent>(ToolPose{role, sample});
   });
 }
 
@@ -68,7 +69,7 @@ struct EachTime {
     instant(pose.source_time);
     instant(pose.arrival);
   }
-  void operator()(SecondPose& pose) const { (*this)(pose.sample); }
+  void operator()(ToolPose& pose) const { (*this)(pose.sample); }
   void operator()(SampleBlock& block) const {  // of the ECG or of respiration
     instant(block.first_sample_time);
     instant(block.arrival);
@@ -84,7 +85,7 @@ EachTime(OnInstant, OnPeriod) -> EachTime<OnInstant, OnPeriod>;
 
 struct ArrivalOf {
   Instant operator()(const FrameEvent& frame) const noexcept { return frame.stamp.arrival; }
-  Instant operator()(const SecondPose& pose) const noexcept { return pose.sample.arrival; }
+  Instant operator()(const ToolPose& pose) const noexcept { return pose.sample.arrival; }
   template <class Event>
   Instant operator()(const Event& event) const noexcept {
     return event.arrival;
@@ -126,8 +127,8 @@ Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode
   if (!reader) return tl::unexpected(reader.error());
   std::vector<std::string_view> wanted(kSensorChannels.begin(), kSensorChannels.end());
   for (const RecordedChannel& channel : reader->channels()) {
-    for (const std::string_view optional :
-         {channels::kSecondSensor, channels::kEcgSecondLead, channels::kRTrigger, channels::kRespirationSamples}) {
+    for (const std::string_view optional : {channels::kSecondSensor, channels::kPatientTool, channels::kEcgSecondLead,
+                                            channels::kRTrigger, channels::kRespirationSamples}) {
       if (channel.name == optional) wanted.push_back(optional);
     }
   }
@@ -226,9 +227,10 @@ Expected<std::optional<ReplayEvent>> ReplayReader::event_of(const RecordedMessag
         m, fmt::format("arrival {} ns lies before its own source time {} ns", to_ns(m.arrival), to_ns(m.source_time)));
   }
   last_arrival_ = m.arrival;
-  return m.channel == channels::kCameraImage                                           ? frame_event(m)
-         : m.channel == channels::kTrackerPose                                         ? pose_event(reader_, m)
-         : m.channel == channels::kSecondSensor                                        ? second_pose_event(reader_, m)
+  return m.channel == channels::kCameraImage    ? frame_event(m)
+         : m.channel == channels::kTrackerPose  ? pose_event(reader_, m)
+         : m.channel == channels::kSecondSensor ? tool_event(reader_, m, ToolRole::kSecondSensor)
+         : m.channel == channels::kPatientTool  ? tool_event(reader_, m, ToolRole::kPatient)
          : m.channel == channels::kEcgSamples || m.channel == channels::kEcgSecondLead ? ecg_event(m)
          : m.channel == channels::kRTrigger                                            ? r_trigger_event(reader_, m)
                                                                                        : respiration_event(reader_, m);

@@ -48,12 +48,7 @@ struct FrameEvent {
   [[nodiscard]] CameraFrame as_it_came() const noexcept;
 };
 
-// Of the second tracked sensor that tells how an angled scope is turned.
-struct SecondPose {
-  TrackerSample sample;
-};
-
-using ReplayEvent = std::variant<FrameEvent, TrackerSample, SecondPose, EcgBlock, RTriggerPulse, RespirationBlock>;
+using ReplayEvent = std::variant<FrameEvent, TrackerSample, ToolPose, EcgBlock, RTriggerPulse, RespirationBlock>;
 
 // A silence of all devices that is longer is a break in the session, however long: a replay goes on after so much of
 // it. Of what was known before nothing holds then; a phase is lost within seconds.
@@ -70,8 +65,8 @@ void speed_up(ReplayEvent& event, Instant origin, double speed);
 // that cannot be decoded is left out, as it was when it was recorded: a gap in the count.
 class ReplayReader {
  public:
-  // Fails when the recording has no camera, tracker or ECG channel. A second sensor's poses, triggers and breaths are
-  // given where there are any.
+  // Fails when the recording has no camera, tracker or ECG channel. Poses of tools that have a role, triggers and
+  // breaths are given where there are any.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode);
   // Of these of the sensors' channels alone; fails when one of them is not there.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode,

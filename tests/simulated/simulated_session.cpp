@@ -64,8 +64,11 @@ void deliver(LockstepRuntime& runtime, const Simulation& simulation, const Simul
       break;
     case Simulation::Source::kTracker:
       runtime.deliver(simulation.tracker_sample(arrival.index, noise));
+      if (simulation.settings().patient_tool) {
+        runtime.deliver(ToolPose{ToolRole::kPatient, simulation.patient_sample(arrival.index, noise)});
+      }
       if (simulation.settings().second_sensor) {
-        runtime.deliver(SecondPose{simulation.second_sample(arrival.index, noise)});
+        runtime.deliver(ToolPose{ToolRole::kSecondSensor, simulation.second_sample(arrival.index, noise)});
       }
       break;
     case Simulation::Source::kEcg:

@@ -17,12 +17,16 @@ EventCauses causes_of(std::string_view kind, bool hides) {
   // The organ or the tracker: the same data. NOT_SEEN says that the organ may have been moved, or that something else
   // is seen, or nothing: it names no organ that is seen well and has moved. SETUP_DOUBTED blames what was measured
   // before the session: neither the organ nor the tracker's field.
-  const std::vector<perimap_SurfaceReason> moved{perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED};
+  // Where the patient's tool tells which of the two it is, the other is wrong.
+  const std::vector<perimap_SurfaceReason> moved{perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED,
+                                                 perimap_SURFACE_REASON_ORGAN_MOVED};
+  const std::vector<perimap_SurfaceReason> erring{perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED,
+                                                  perimap_SURFACE_REASON_TRACKER_ERRS};
   const std::map<std::string_view, EventCauses> causes = {
       {"retraction", {moved, true}},
       {"table-tilt", {moved, true}},
       {"insufflation", {moved, true}},
-      {"metal", {moved, true}},
+      {"metal", {erring, true}},
       // One place alone: its features are no longer converged, and the surface need not say anything.
       {"dent", {{}, false}},
       {"touch", {seen, false}},

@@ -130,8 +130,13 @@ class Tally {
       : seconds_(second_edges), cycles_(cycle_edges) {}
 
   // `early`: released before a premature beat could be known.
-  void begin_sample(double t_s, perimap_SurfaceState state, bool early) {
+  void begin_sample(double t_s, perimap_SurfaceState state, const ToldUses& uses, bool early) {
     t_s_ = t_s;
+    uses_ = uses;
+    for (std::size_t i = 0; i < uses.size(); ++i) {
+      report_.uses[i].within_mm = uses[i].within_mm;
+      report_.uses[i].surfaces += uses[i].state == perimap_SURFACE_GOOD ? 1 : 0;
+    }
     good_ = state == perimap_SURFACE_GOOD;
     early_ = early;
     converged_ = 0;
@@ -160,6 +165,7 @@ class Tally {
     cycles_.add_error(t_s_, error, nees);
     feature_errors_[feature.id].push_back(error);
     if (feature.converged && good_) add_good(feature.id, error, nees);
+    if (feature.converged) add_used(feature, error);
     if (t_s_ >= kSettledAfter_s) {
       settled_.push_back(error);
       nees_sum_ += nees;
@@ -207,6 +213,15 @@ class Tally {
   }
 
  private:
+  void add_used(const Compared& feature, double error) {
+    const double within_mm = 2.0 * std::sqrt(feature.P_mm2.trace());
+    for (std::size_t i = 0; i < uses_.size(); ++i) {
+      if (uses_[i].state != perimap_SURFACE_GOOD || within_mm > uses_[i].within_mm) continue;
+      ++report_.uses[i].count;
+      report_.uses[i].off += error > uses_[i].within_mm ? 1 : 0;
+    }
+  }
+
   void add_good(std::uint32_t id, double error, double nees) {
     GoodPositions& good = report_.good;
     ++good.count;
@@ -226,6 +241,7 @@ class Tally {
   double t_s_ = 0.0;
   bool good_ = false;
   bool early_ = false;
+  ToldUses uses_{};
   std::size_t converged_ = 0;
   // Of all:
   std::set<std::uint32_t> seen_;
@@ -265,7 +281,7 @@ void Accuracy::add(const perimap_Surface& sample) {
   // Surfaces that the clock releases repeat a frame's, which does not tell.
   frames_.add(from_ns(sample.capture_time_ns));
   samples_.push_back({from_ns(sample.valid_time_ns), from_ns(sample.release_time_ns), sample.state, sample.reason,
-                      begin, published_.size()});
+                      uses_of(sample).value_or(ToldUses{}), begin, published_.size()});
 }
 
 void Accuracy::add(const perimap_SurfaceModel& model) {
@@ -352,7 +368,7 @@ AccuracyReport Accuracy::report(Duration to_recording) const {
   for (const SampleRange& sample : samples_) {
     const Instant valid_time = sample.valid_time + to_recording;
     const double t = since_start(valid_time);
-    tally.begin_sample(t, sample.state, before_premature_beat_is_known(sample.released + to_recording));
+    tally.begin_sample(t, sample.state, sample.uses, before_premature_beat_is_known(sample.released + to_recording));
     for (std::size_t i = sample.begin; i < sample.end; ++i) {
       const Published& feature = published_[i];
       const auto origin = origins_.find(feature.id);

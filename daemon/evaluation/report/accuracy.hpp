@@ -3,6 +3,7 @@
 
 #include <perimap.h>
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -15,6 +16,7 @@
 #include "core/sensors/measured_frame_rate.hpp"
 #include "core/time/instant.hpp"
 #include "daemon/evaluation/report/judged_surface.hpp"
+#include "daemon/publishing/use_text.hpp"
 #include "drivers/standins/truth/ground_truth.hpp"
 
 namespace perimap {
@@ -62,6 +64,15 @@ struct GoodPositions {
   double mean_nees = kNoFigure;  // of all, as AccuracyReport::mean_nees
 };
 
+// Positions of converged features that may be used so: in a surface whose state for the use is good, and within the
+// use's bound by their own covariance.
+struct UsedPositions {
+  double within_mm = 0.0;    // the bound, within which 95 % of errors are to be; 0: not told
+  std::size_t surfaces = 0;  // whose state for the use is good
+  std::size_t count = 0;
+  std::size_t off = 0;  // by more than the bound
+};
+
 // Features that were first seen from 5 s on, when there is a map of others.
 struct NewFeatures {
   std::size_t published = 0;
@@ -86,6 +97,7 @@ struct AccuracyReport {
   std::size_t invalid = 0;
   std::size_t settled_samples = 0;
   GoodPositions good;
+  std::array<UsedPositions, 3> uses;  // display, measure, contact
   NewFeatures new_features;
   std::vector<ErrorSpan> seconds;
   std::vector<ErrorSpan> cycles;   // from R peak to R peak
@@ -126,6 +138,7 @@ class Accuracy {
     Instant released;
     perimap_SurfaceState state = perimap_SURFACE_INVALID;
     perimap_SurfaceReason reason = perimap_SURFACE_REASON_NONE;
+    ToldUses uses{};
     std::size_t begin = 0;  // in published_
     std::size_t end = 0;
   };

@@ -35,6 +35,10 @@ nlohmann::json to_json(const std::vector<ErrorSpan>& spans) {
   return out;
 }
 
+nlohmann::json to_json(const UsedPositions& used) {
+  return {{"within_mm", used.within_mm}, {"surfaces", used.surfaces}, {"positions", used.count}, {"off", used.off}};
+}
+
 nlohmann::json to_json(const NewFeatures& features) {
   return {{"published", features.published},
           {"converged", features.converged},
@@ -47,6 +51,7 @@ nlohmann::json to_json(const NewFeatures& features) {
 }  // namespace
 
 std::string to_text(const AccuracyReport& report) {
+  const auto& [show, measure, contact] = report.uses;
   if (report.settled.count == 0) {
     return fmt::format(
         "features    {} mapped, {} converged, {} without truth\nerror       none: no converged position after 15 s",
@@ -61,13 +66,16 @@ std::string to_text(const AccuracyReport& report) {
       "good        {} of {} positions of state good off by more than 3 mm, largest {}, of {} features\n"
       "            all of state good: RMS {}, mean NEES/3 {}\n"
       "            {} more, largest {}, before the ECG could tell of the premature beat that ended their cycle "
-      "({} such beats)",
+      "({} such beats)\n"
+      "uses        to show {} of {} positions off by more than {:g} mm, to measure {} of {} by more than {:g} mm, "
+      "in contact {} of {} by more than {:g} mm",
       report.features_published, report.features_converged, report.converged_by_15_s, report.converged_at_15_s,
       report.features_without_truth, report.settled.rms_mm, report.settled.median_mm, report.settled.p95_mm,
       report.settled.max_mm, 100.0 * report.share_above_3_mm, report.settled.count, report.mean_nees, report.degraded,
       report.settled_samples, report.invalid, report.good.off, report.good.count, in_mm(report.good.largest_mm),
       report.good.features_off, in_mm(report.good.rms_mm), plain(report.good.mean_nees), report.good.off_before_known,
-      in_mm(report.good.largest_before_known_mm), report.good.premature_beats);
+      in_mm(report.good.largest_before_known_mm), report.good.premature_beats, show.off, show.count, show.within_mm,
+      measure.off, measure.count, measure.within_mm, contact.off, contact.count, contact.within_mm);
 }
 
 nlohmann::json to_json(const AccuracyReport& report) {
@@ -91,6 +99,10 @@ nlohmann::json to_json(const AccuracyReport& report) {
           {"good_positions_rms_mm", json_number(report.good.rms_mm)},
           {"good_positions_mean_nees", json_number(report.good.mean_nees)},
           {"premature_beats", report.good.premature_beats},
+          {"uses",
+           {{"display", to_json(report.uses[0])},
+            {"measure", to_json(report.uses[1])},
+            {"contact", to_json(report.uses[2])}}},
           {"new_features", to_json(report.new_features)},
           {"seconds", to_json(report.seconds)},
           {"cycles", to_json(report.cycles)},

@@ -67,6 +67,7 @@ Tone tone_of(perimap_EcgLead lead) {
     case perimap_ECG_LEAD_NONE:
     case perimap_ECG_LEAD_FLAT:
     case perimap_ECG_LEAD_OFF:
+    case perimap_ECG_LEAD_REPEATED:
       break;
   }
   return Tone::kBad;

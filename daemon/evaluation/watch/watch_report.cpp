@@ -123,6 +123,7 @@ std::string summary_text(const StreamReport& report) {
   }
   if (report.last) {
     text += fmt::format("  last surface: {}; {}\n", state_text(*report.last), features_text(*report.last));
+    if (report.last->uses) text += fmt::format("  it may be used to: {}\n", uses_words(*report.last->uses));
   }
   if (report.status) text += fmt::format("  set-up: {}\n", setup_words(report.status->status.setup));
   if (report.status && !report.status->stages.empty()) text += stage_table(*report.status);
@@ -157,6 +158,7 @@ std::string report_json(const StreamReport& report, ReportKind kind) {
       features[std::string(name_of(static_cast<perimap_FeatureState>(state)))] = last.features[state];
     }
     json["features"] = std::move(features);
+    if (last.uses) json["uses"] = uses_json(*last.uses);
     json["median_deviation_mm"] = last.median_deviation_mm ? Json(*last.median_deviation_mm) : Json(nullptr);
   }
   if (report.status) {
@@ -184,6 +186,7 @@ std::string surface_json(const perimap_Surface& surface, Instant receipt) {
                {"cardiac_phase_rad", surface.cardiac_phase_rad},
                {"cardiac_phase_deviation_rad", surface.cardiac_phase_deviation_rad},
                {"cardiac_phase_rate_rad_per_s", surface.cardiac_phase_rate_rad_per_s}};
+  if (const auto uses = uses_of(surface)) json["uses"] = uses_json(*uses);
   if (surface.camera_pose_known) {
     json["translation_WC_mm"] = surface.translation_WC_mm;
     json["rotation_WC_wxyz"] = surface.rotation_WC_wxyz;

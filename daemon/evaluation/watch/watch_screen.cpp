@@ -93,6 +93,7 @@ std::string stream_text(const StreamReport& report, bool colours) {
   if (report.received > 0 && report.last && !at_odds(report.hearing)) {
     const SurfaceDigest& last = *report.last;
     text += row("features", features_text(last));
+    if (last.uses) text += row("may", uses_words(*last.uses));
     text += row("heart", fmt::format("phase {:.0f} +- {:.1f} deg, {:.1f}/min", last.cardiac_phase_rad / kDegree,
                                      last.cardiac_phase_deviation_rad / kDegree,
                                      last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian));

@@ -28,6 +28,7 @@ SurfaceDigest digest(const perimap_Surface& surface) {
   digest.cardiac_phase_rad = surface.cardiac_phase_rad;
   digest.cardiac_phase_deviation_rad = surface.cardiac_phase_deviation_rad;
   digest.cardiac_phase_rate_rad_per_s = surface.cardiac_phase_rate_rad_per_s;
+  digest.uses = uses_of(surface);
   std::vector<double> deviations_mm;
   for (std::uint32_t i = 0; i < surface.features._length; ++i) {
     const perimap_SurfaceFeature& feature = surface.features._buffer[i];

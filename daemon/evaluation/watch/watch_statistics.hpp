@@ -14,6 +14,7 @@
 
 #include "core/time/instant.hpp"
 #include "daemon/evaluation/watch/duration_counts.hpp"
+#include "daemon/publishing/use_text.hpp"
 
 namespace perimap {
 
@@ -28,6 +29,7 @@ struct SurfaceDigest {
   std::array<std::uint32_t, 4> features{};  // by FeatureState
   // Median over all features that are not invalid of the largest standard deviation in any direction.
   std::optional<double> median_deviation_mm;
+  std::optional<ToldUses> uses;  // none of an older perimapd
 };
 
 // The last status of a stream.

@@ -140,6 +140,10 @@ Option* SimulationOptions::add_to(Command& command) {
   command.add_option("--tracker-stuck", tracker_stuck_,
                      "The tracker gives its last reading again and again, BEGIN:LENGTH in s; may be repeated");
   command.add_option("--camera-stuck", camera_stuck_, "Likewise the camera its last picture");
+  command.add_option("--camera-loop", camera_loops_, "Likewise the camera the pictures of its last two seconds");
+  command.add_option("--ecg-loop", ecg_loops_, "Likewise the ECG its last second");
+  command.add_flag("--patient-tool", settings_.patient_tool,
+                   "A tool that is fixed to the organ is tracked too, and tells whether that has been moved");
   command
       .add_option("--camera-repeats", settings_.camera_repeats,
                   "Each picture comes so often, as of a camera that is slower than its stamps say")
@@ -179,7 +183,9 @@ Expected<SimulationSettings> SimulationOptions::settings() const {
   settings.tracker_correlation = from_seconds(tracker_correlation_s_);
   for (const auto& parsed : {parse_stretches("ECG off", ecg_off_, settings.ecg_off),
                              parse_stretches("tracker stuck", tracker_stuck_, settings.tracker_stuck),
-                             parse_stretches("camera stuck", camera_stuck_, settings.camera_stuck)}) {
+                             parse_stretches("camera stuck", camera_stuck_, settings.camera_stuck),
+                             parse_stretches("camera loop", camera_loops_, settings.camera_loops),
+                             parse_stretches("ECG loop", ecg_loops_, settings.ecg_loops)}) {
     if (!parsed) return tl::unexpected(parsed.error());
   }
   if (!motion_trace_.empty()) {

@@ -46,6 +46,8 @@ class SimulationOptions {
   std::vector<std::string> ecg_off_;
   std::vector<std::string> tracker_stuck_;
   std::vector<std::string> camera_stuck_;
+  std::vector<std::string> ecg_loops_;
+  std::vector<std::string> camera_loops_;
   std::string procedure_;
   std::string motion_trace_;
   bool electromagnetic_ = false;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "daemon/publishing/advice.hpp"
+#include "daemon/publishing/use_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 #include "daemon/view/messages/milliseconds.hpp"
 
@@ -112,6 +113,7 @@ Json SurfaceTeller::mesh_at(const perimap_Surface& surface, Instant receipt) {
 Json SurfaceTeller::tell(const perimap_Surface& surface, Instant receipt) {
   const bool usable = surface.state == perimap_SURFACE_GOOD || surface.state == perimap_SURFACE_DEGRADED;
   Told told = features_of(surface);
+  const std::optional<ToldUses> uses = uses_of(surface);
   Json json = {{"kind", "surface"},
                {"source", surface.source},
                {"stream", surface.stream},
@@ -122,6 +124,7 @@ Json SurfaceTeller::tell(const perimap_Surface& surface, Instant receipt) {
                {"permission", permission_of(surface.state)},
                {"why", surface.reason == perimap_SURFACE_REASON_NONE ? "" : client::describe(surface.reason)},
                {"remedy", remedy_of(surface.reason)},
+               {"uses", uses ? uses_words(*uses) : ""},
                {"converged", told.converged},
                {"known", surface.features._length},
                {"valid_ms", page_ms(surface.valid_time_ns)},

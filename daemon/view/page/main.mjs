@@ -137,7 +137,7 @@ function tell() {
   set("converged", `${surface?.converged ?? 0} converged`);
   set("known", surface ? `of ${surface.known}` : "");
   const mesh = surface?.mesh?.triangles ? `mesh of ${surface.mesh.triangles.length / 3} triangles` : "";
-  set("surface-words", [surface ? seen.source : "", mesh, surface?.mesh?.words].filter(Boolean).join(" \u00b7 "));
+  set("surface-words", [surface ? seen.source : "", surface?.uses, mesh, surface?.mesh?.words].filter(Boolean).join(" \u00b7 "));
   // Drawn by this very program, so that a page that stands still is seen to.
   set("life", connection.link.open ? "|/\u2013\\"[Math.floor(now / 250) % 4] : "\u00d7");
 }

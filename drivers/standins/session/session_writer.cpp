@@ -87,6 +87,10 @@ class SessionWriter {
     return writer_.write(second_, to_tracker_pose(sample), sample.arrival, sample.source_time, sample.device_frame);
   }
 
+  Expected<void> write_patient_tool(const TrackerSample& sample) {
+    return writer_.write(patient_, to_tracker_pose(sample), sample.arrival, sample.source_time, sample.device_frame);
+  }
+
   Expected<void> write_tracker(const TrackerSample& sample) {
     const perimap_TrackerPose message = to_tracker_pose(sample);
     auto written = writer_.write(tracker_, message, sample.arrival, sample.source_time, sample.device_frame);
@@ -155,6 +159,11 @@ class SessionWriter {
       const auto second = writer_.add_channel<perimap_TrackerPose>(channels::kSecondSensor);
       if (!second) return tl::unexpected(second.error());
       second_ = *second;
+    }
+    if (simulation_.settings().patient_tool) {
+      const auto patient = writer_.add_channel<perimap_TrackerPose>(channels::kPatientTool);
+      if (!patient) return tl::unexpected(patient.error());
+      patient_ = *patient;
     }
     if (simulation_.settings().respiration_channel) {
       const auto respiration = writer_.add_channel<perimap_RespirationSamples>(channels::kRespirationSamples);
@@ -229,7 +238,7 @@ class SessionWriter {
   RecordingWriter writer_;
   std::size_t events_written_ = 0;
   ChannelId truth_event_;
-  ChannelId image_, truth_camera_, tracker_, second_, viewer_, ecg_, respiration_;
+  ChannelId image_, truth_camera_, tracker_, second_, patient_, viewer_, ecg_, respiration_;
   std::vector<std::uint8_t> packed_;
 };
 
@@ -279,6 +288,9 @@ Expected<bool> write_simulation(const Simulation& simulation, const std::vector<
           written = writers[i]->write_tracker(simulation.tracker_sample(arrival.index, recordings[i].noise));
           if (written && simulation.settings().second_sensor) {
             written = writers[i]->write_second_sensor(simulation.second_sample(arrival.index, recordings[i].noise));
+          }
+          if (written && simulation.settings().patient_tool) {
+            written = writers[i]->write_patient_tool(simulation.patient_sample(arrival.index, recordings[i].noise));
           }
           break;
         case Simulation::Source::kEcg:

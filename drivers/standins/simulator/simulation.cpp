@@ -17,6 +17,7 @@
 #include "drivers/standins/simulator/scope_path.hpp"
 #include "drivers/standins/simulator/session_ecg.hpp"
 #include "drivers/standins/simulator/slow_error.hpp"
+#include "drivers/standins/simulator/stretches.hpp"
 #include "drivers/standins/simulator/transport_delay.hpp"
 
 namespace perimap {
@@ -38,10 +39,15 @@ enum Stream : std::uint64_t {
   kImage,
   kSecondPosition,
   kSecondRotation,
-  kTrackerDisturbance
+  kTrackerDisturbance,
+  kPatientPosition,
+  kPatientRotation
 };
 
 constexpr std::size_t kEcgSamplesPerBlock = 4;
+// What comes again and again in a loop.
+constexpr Duration kEcgLoop = std::chrono::seconds(1);
+constexpr Duration kCameraLoop = std::chrono::seconds(2);
 
 // The heart (frame H of its table: x left, y posterior, z superior) as it lies in the tracker's frame.
 Pose X_WH() noexcept { return {so3_exp(Vector3d(0.4, -0.7, 1.1)), Vector3d(140.0, -75.0, -230.0)}; }
@@ -55,15 +61,6 @@ constexpr double kScopeDistance_mm = 120.0;  // from the heart's surface, at res
 struct Interval {
   Duration begin, end;
 };
-
-// The stretch that it lies in; null: none.
-const SimulationSettings::Stretch* stretch_of(const std::vector<SimulationSettings::Stretch>& stretches,
-                                              Duration since) noexcept {
-  const auto found = std::find_if(stretches.begin(), stretches.end(), [&](const auto& stretch) {
-    return since >= stretch.begin && since < stretch.begin + stretch.length;
-  });
-  return found == stretches.end() ? nullptr : &*found;
-}
 
 // At most one dropout in each equal part of the session, so that they are spread and as many as asked for.
 std::vector<Interval> dropouts(std::uint64_t seed, Duration duration, double per_min) {
@@ -268,6 +265,26 @@ void Simulation::read_second_sensor() {
   }
 }
 
+// Fixed to the organ beside what the scope looks at, and measured together with the sensor; metal about the scope does
+// not reach it.
+void Simulation::read_patient_tool() {
+  if (!settings_.patient_tool) return;
+  const CounterNoise position(settings_.seed, kPatientPosition);
+  const CounterNoise rotation(settings_.seed, kPatientRotation);
+  const Pose at_first{path_.X_WR().R, surface_W_ + path_.X_WR().R * Vector3d(45.0, 20.0, 10.0)};
+  SlowError position_error(settings_.tracker_rate_hz, settings_.tracker_correlation);
+  SlowError rotation_error = position_error;
+  for (std::size_t k = 0; k < tracker_stamps_.size(); ++k) {
+    TrackerStamp stamp = tracker_stamps_[k];
+    stamp.reads = k;
+    stamp.missing = false;
+    stamp.X_WS = truth_.organ().at(stamp.source_time + setup_.tracker_offset).carried(at_first);
+    stamp.position_error = position_error.next(normal3(position, k));
+    stamp.rotation_error = rotation_error.next(normal3(rotation, k));
+    patient_stamps_.push_back(stamp);
+  }
+}
+
 // Small blocks, sent when their last sample is there.
 void Simulation::read_ecg(const EcgScript& script) {
   TransportDelay ecg(CounterNoise(settings_.seed, kEcgDelay), milliseconds(4), microseconds(800));
@@ -282,7 +299,8 @@ void Simulation::read_ecg(const EcgScript& script) {
     const Duration since = block.first_sample_time - start_;
     block.lead_off = stretch_of(settings_.ecg_off, since) != nullptr || leads_off(settings_.procedure, since);
     for (std::uint32_t i = 0; i < block.count && !block.lead_off; ++i) {
-      block.mV[i] = script.mV(k + i);
+      const std::size_t sample = looped(settings_.ecg_loops, k + i, script.sample_rate_hz(), kEcgLoop);
+      block.mV[i] = script.mV(static_cast<std::uint32_t>(sample));
       if (!settings_.procedure.empty())
         block.mV[i] += static_cast<float>(arc_mV(settings_.procedure, settings_.seed, since, k + i));
     }
@@ -366,6 +384,7 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
   simulation.frames_ = std::move(frames);
   simulation.read_tracker();
   simulation.read_second_sensor();
+  simulation.read_patient_tool();
   simulation.read_ecg(*script);
   simulation.read_respiration();
   simulation.order_arrivals();
@@ -397,6 +416,11 @@ TrackerSample Simulation::second_sample(std::size_t index, const TrackerNoise& n
   return sample_of(stamp, second_stamps_[stamp.reads], index, noise);
 }
 
+TrackerSample Simulation::patient_sample(std::size_t index, const TrackerNoise& noise) const noexcept {
+  const TrackerStamp& stamp = patient_stamps_[index];
+  return sample_of(stamp, stamp, index, noise);
+}
+
 TrackerSample Simulation::sample_of(const TrackerStamp& stamp, const TrackerStamp& reading, std::size_t index,
                                     const TrackerNoise& noise) noexcept {
   TrackerSample sample;
@@ -419,6 +443,7 @@ TrackerSample Simulation::sample_of(const TrackerStamp& stamp, const TrackerStam
 std::size_t Simulation::pictured(std::size_t index) const noexcept {
   const auto* stuck = stretch_of(settings_.camera_stuck, frames_[index].stamp.capture - start_);
   while (stuck != nullptr && index > 0 && frames_[index].stamp.capture - start_ >= stuck->begin) --index;
+  index = looped(settings_.camera_loops, index, settings_.frames_per_s, kCameraLoop);
   return index - index % static_cast<std::size_t>(settings_.camera_repeats);
 }
 

@@ -85,6 +85,9 @@ class Simulation {
   // Of the second sensor at the same time, with errors of its own; where there is one.
   [[nodiscard]] TrackerSample second_sample(std::size_t index, const TrackerNoise& noise) const noexcept;
 
+  // Of the patient's tool, likewise.
+  [[nodiscard]] TrackerSample patient_sample(std::size_t index, const TrackerNoise& noise) const noexcept;
+
   // All that is true of a frame's camera, its lens as it was held then too.
   [[nodiscard]] CameraTruth camera_truth(const Frame& frame) const noexcept;
 
@@ -127,6 +130,7 @@ class Simulation {
   // What the devices deliver, in the order of arrival at the end.
   void read_tracker();
   void read_second_sensor();
+  void read_patient_tool();
   void read_ecg(const EcgScript& script);
   void read_respiration();
   void order_arrivals();
@@ -144,7 +148,8 @@ class Simulation {
       renderers_;  // of each turn of the scope: before the first, after it ...
   std::vector<Frame> frames_;
   std::vector<TrackerStamp> tracker_stamps_;
-  std::vector<TrackerStamp> second_stamps_;  // at the same times
+  std::vector<TrackerStamp> second_stamps_;   // at the same times
+  std::vector<TrackerStamp> patient_stamps_;  // likewise
   std::vector<EcgBlock> ecg_;
   std::vector<RespirationBlock> respiration_;
   std::vector<Arrival> arrivals_;

@@ -43,6 +43,9 @@ struct SimulationSettings {
   // The device gives its last reading, or picture, again and again, with stamps and numbers that go on.
   std::vector<Stretch> tracker_stuck;
   std::vector<Stretch> camera_stuck;
+  // The last second of the ECG comes again and again; of the pictures the last two seconds.
+  std::vector<Stretch> ecg_loops;
+  std::vector<Stretch> camera_loops;
   int camera_repeats = 1;  // each picture comes so often, as of a camera that is slower than its stamps say
   // What makes seeing hard.
   double scope_sweep = 1.0;     // see ScopePath
@@ -62,6 +65,7 @@ struct SimulationSettings {
   std::optional<Turn> turn;
   // A second tracked sensor, on the scope, tells of the turn: the field stop lies outside the picture then.
   bool second_sensor = false;
+  bool patient_tool = false;          // a tool that is fixed to the organ, and tracked too
   std::vector<Stretch> second_lost;   // the tracker does not see it
   std::vector<Stretch> second_stuck;  // its last reading comes again and again
   bool scope_calibrated =

@@ -34,6 +34,11 @@ Vector3d OrganPlace::of(const Vector3d& p_W, const Vector3d& rest_W) const noexc
   return A_ * p + b_;
 }
 
+// A_ is a rotation times a stretch.
+Pose OrganPlace::carried(const Pose& X_WO) const noexcept {
+  return {A_ * X_WO.R / std::cbrt(A_.determinant()), A_ * X_WO.t + b_};
+}
+
 Expected<OrganMotion> OrganMotion::create(std::vector<OrganMove> moves) {
   std::array<const OrganMove*, OrganMove::kKinds> last{};
   for (std::size_t i = 0; i < moves.size(); ++i) {

@@ -33,6 +33,8 @@ class OrganPlace {
  public:
   // Of a point that is at p_W by its beating and breathing, and at rest_W at rest.
   [[nodiscard]] Vector3d of(const Vector3d& p_W, const Vector3d& rest_W) const noexcept;
+  // Of what is fixed to the organ as a whole, which dents do not move: where it is, that was at X_WO at rest.
+  [[nodiscard]] Pose carried(const Pose& X_WO) const noexcept;
 
  private:
   friend class OrganMotion;

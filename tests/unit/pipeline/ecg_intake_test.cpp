@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -17,10 +18,12 @@ constexpr Duration kPeriod = milliseconds(2);
 constexpr int kBlock = 10;
 constexpr Duration kCycle = milliseconds(800);
 
-// One QRS complex each 0.8 s, at 0.4, 1.2, ... s.
+// One QRS complex each 0.8 s, at 0.4, 1.2, ... s, with a noise of some 0.1 uV, so that no stretch comes twice.
 float lead_mV(Instant t) {
   const double x = std::remainder(to_seconds(t.time_since_epoch()) - 0.4, 0.8) / 0.012;
-  return static_cast<float>(std::exp(-0.5 * x * x));
+  const auto number = static_cast<std::uint64_t>(t.time_since_epoch() / kPeriod);
+  const std::uint64_t drawn = (number + 1) * 0x9E3779B97F4A7C15ULL >> 40U;
+  return static_cast<float>(std::exp(-0.5 * x * x) + 1e-4 * static_cast<double>(drawn) / 16777216.0);
 }
 
 struct Intake : ::testing::Test {
@@ -117,6 +120,22 @@ TEST_F(Intake, ALineThatGoesFlatIsCountedAndSaid) {
   EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kFreeRunning);
   EXPECT_NEAR(static_cast<double>(counters->ecg_lead_off.get()), 300.0, 15.0) << "from 0.9 s on: a beat is overdue";
   EXPECT_LT(counters->last_good_ecg_ns.get(), heard + 1'100'000'000U);
+}
+
+TEST_F(Intake, ALeadThatGivesItsLastSecondAgainAndAgainIsSaidToBeRepeatedAndIsNotListenedTo) {
+  hear(kMidCycle, lead_mV);
+  ASSERT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
+  const auto last_second = [](Instant at) {
+    return lead_mV(kMidCycle - milliseconds(1000) + (at - kMidCycle) % milliseconds(1000));
+  };
+  hear(kMidCycle + milliseconds(2000), last_second);
+  EXPECT_EQ(signals(), (Signals{EcgSignal::kRepeated, std::nullopt}));
+  EXPECT_GE(counters->ecg_repeated.get(), 500U);
+  hear(kMidCycle + milliseconds(6000), last_second);
+  EXPECT_NE(clock().as_of(t).at(t).state, PhaseState::kLocked);
+  hear(kMidCycle + milliseconds(16000), lead_mV);
+  EXPECT_EQ(signals(), (Signals{EcgSignal::kGood, std::nullopt}));
+  EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
 }
 
 TEST_F(Intake, AShortStretchOfMissingSamplesInterruptsNothing) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -28,8 +29,12 @@ struct Organ : ::testing::Test {
   std::unique_ptr<OrganWatch> watch;
   std::mt19937 generator{17};
   std::int64_t frames = 0;
+  std::optional<Pose> tool;  // by how much the patient's tool has been moved; none: there is none
+  std::int64_t readings = 0;
 
   Organ() {
+    settings.pose.position_deviation_mm = 1.4 / std::sqrt(3.0);
+    settings.pose.rotation_deviation_rad = 0.5 / 57.3 / std::sqrt(3.0);
     settings.estimator.layout = {1, 0};
     settings.camera = model.camera = {640, 480, 500, 500, 320, 240, 0, 0, 0, 0, 0};
     bank = std::make_unique<MapBank>(BankSettings{.layout = settings.estimator.layout, .features = kFeatures},
@@ -58,9 +63,26 @@ struct Organ : ::testing::Test {
     return {x, y, normal(generator)};
   }
 
+  // The patient's tool, 60 mm beside the organ, as the tracker reads it where it has been moved by `tool`: 50 readings
+  // a second until t.
+  void read_tool(double t) {
+    if (!tool) return;
+    const double per_axis = 1.0 / std::sqrt(3.0);
+    for (; static_cast<double>(readings) / 50.0 <= t; ++readings) {
+      TrackerSample sample;
+      sample.source_time = sample.arrival = Instant(std::chrono::milliseconds(20 * readings));
+      sample.state = ToolState::kOk;
+      sample.X_WS = *tool * Pose{so3_exp(Vector3d(0.3, 0.0, 0.0)), Vector3d(60.0, 10.0, 110.0)};
+      sample.X_WS.t += 1.4 * per_axis * normal3();
+      sample.X_WS.R = so3_exp(0.5 / 57.3 * per_axis * normal3()) * sample.X_WS.R;
+      watch->add_tool(sample);
+    }
+  }
+
   // A frame that shows the organ where X maps its points to.
   void frame(const Pose& X) {
     const double t = static_cast<double>(++frames) / kFrames_per_s;
+    read_tool(t);
     const Pose X_WC{so3_exp(0.05 * Vector3d(std::sin(t), std::cos(0.6 * t), 0.0)),
                     Vector3d(15.0 * std::sin(0.9 * t), 10.0 * std::sin(0.5 * t), 5.0 * std::sin(0.3 * t))};
     FrameStamp stamp;
@@ -96,6 +118,19 @@ struct Organ : ::testing::Test {
       slots[f].match_agrees = true;
     }
     watch->watch(image, groups, record);
+  }
+
+  // As the mapper does.
+  void move_map(const Pose& X) {
+    for (std::size_t f = 0; f < places.size(); ++f) {
+      FeatureEstimate estimate;
+      bank->get(static_cast<int>(f), estimate);
+      const int n = settings.estimator.layout.size();
+      const Vector3d p = X * Vector3d(estimate.x(0), estimate.x(n), estimate.x(2 * n));
+      for (int axis = 0; axis < 3; ++axis) estimate.x(axis * n) = p(axis);
+      bank->set(static_cast<int>(f), estimate);
+    }
+    watch->begin_anew();
   }
 
   void seconds(double s, const Pose& X) {
@@ -159,22 +194,112 @@ TEST_F(Organ, IsAtItsPlaceOnceTheMapHasBeenMovedWithItAndIsNotBelievedBefore) {
   double off_mm = 0.0;
   for (const Vector3d& p : places) off_mm = std::max(off_mm, (organ.X * p - kMoved * p).norm());
   EXPECT_LT(off_mm, 3.0 * organ.deviation_mm);
-  watch->begin_anew();
+  move_map(organ.X);
   EXPECT_FALSE(watch->displaced());
   EXPECT_TRUE(watch->unproven());
-  for (std::size_t f = 0; f < places.size(); ++f) {
-    FeatureEstimate estimate;
-    bank->get(static_cast<int>(f), estimate);
-    const int n = settings.estimator.layout.size();
-    const Vector3d p = organ.X * places[f];
-    for (int axis = 0; axis < 3; ++axis) estimate.x(axis * n) = p(axis);
-    bank->set(static_cast<int>(f), estimate);
-  }
   for (int i = 0; i < 30; ++i) {
     seconds(1.0, kMoved);
     ASSERT_FALSE(watch->displaced()) << i;
   }
   EXPECT_FALSE(watch->unproven());
+}
+
+// The two twins: the images show the same.
+TEST_F(Organ, ThatItsToolHasMovedWithWasMoved) {
+  tool = Pose{};
+  seconds(15.0, Pose{});
+  tool = kMoved;
+  seconds(3.0, kMoved);
+  ASSERT_TRUE(watch->displaced());
+  EXPECT_EQ(watch->cause(), DisplacedCause::kOrgan);
+  seconds(3.0, kMoved);
+  ASSERT_TRUE(watch->carried().has_value());
+  const RestingOrgan organ = *watch->carried();
+  EXPECT_LE(organ.deviation_mm, 0.7);
+  double off_mm = 0.0;
+  for (const Vector3d& p : places) off_mm = std::max(off_mm, (organ.X * p - kMoved * p).norm());
+  EXPECT_LT(off_mm, 3.0 * organ.deviation_mm);
+}
+
+TEST_F(Organ, WhoseToolHasNotMovedIsSeenByATrackerThatErrs) {
+  tool = Pose{};
+  seconds(15.0, Pose{});
+  for (int i = 0; i < 20; ++i) {
+    seconds(1.0, kMoved);
+    ASSERT_FALSE(watch->carried().has_value());
+    if (i <= 2) continue;
+    ASSERT_EQ(watch->cause(), DisplacedCause::kTracker) << i;
+  }
+  seconds(4.0, Pose{});
+  EXPECT_FALSE(watch->displaced());
+}
+
+TEST_F(Organ, WhoseToolMovesOtherwiseMayBeEither) {
+  tool = Pose{};
+  seconds(15.0, Pose{});
+  tool = kMoved.inverse();
+  for (int i = 0; i < 10; ++i) {
+    seconds(1.0, kMoved);
+    ASSERT_FALSE(watch->carried().has_value());
+    ASSERT_EQ(watch->cause(), DisplacedCause::kUnknown) << i;
+  }
+  EXPECT_TRUE(watch->displaced());
+}
+
+TEST_F(Organ, WhoseToolIsHiddenOrRepeatsItselfMayBeEither) {
+  tool = Pose{};
+  seconds(15.0, Pose{});
+  tool.reset();
+  seconds(4.0, kMoved);
+  ASSERT_TRUE(watch->displaced());
+  EXPECT_EQ(watch->cause(), DisplacedCause::kUnknown);
+  TrackerSample stuck;
+  stuck.state = ToolState::kOk;
+  for (int i = 0; i < 60; ++i) {
+    stuck.source_time = stuck.arrival = job.frame->stamp.capture + std::chrono::milliseconds(60);
+    watch->add_tool(stuck);
+    frame(kMoved);
+  }
+  EXPECT_EQ(watch->cause(), DisplacedCause::kUnknown);
+}
+
+TEST_F(Organ, ThatMovesWithItsToolIsNotFollowedBeforeItRests) {
+  tool = Pose{};
+  seconds(15.0, Pose{});
+  for (int i = 0; i < 90; ++i) {
+    tool = Pose{Matrix3d::Identity(), Vector3d(0.15 * i, 0.0, 0.0)};
+    frame(*tool);
+    ASSERT_FALSE(watch->carried().has_value()) << i;
+  }
+  EXPECT_EQ(watch->cause(), DisplacedCause::kOrgan);
+}
+
+TEST_F(Organ, ThatWasMovedOutOfSightWithItsToolIsToldByTheToolsPlaceBefore) {
+  tool = Pose{};
+  seconds(15.0, Pose{});
+  tool = kMoved;
+  read_tool(static_cast<double>(frames) / kFrames_per_s + 30.0);
+  frames += static_cast<std::int64_t>(30.0 * kFrames_per_s);
+  seconds(4.0, kMoved);
+  ASSERT_TRUE(watch->displaced());
+  EXPECT_EQ(watch->cause(), DisplacedCause::kOrgan);
+}
+
+TEST_F(Organ, ThatWasMovedTwiceWithItsToolIsToldEachTime) {
+  tool = Pose{};
+  seconds(15.0, Pose{});
+  Pose X;
+  for (int move = 0; move < 2; ++move) {
+    X = kMoved * X;
+    tool = X;
+    seconds(5.0, X);
+    ASSERT_TRUE(watch->carried().has_value()) << move;
+    EXPECT_EQ(watch->cause(), DisplacedCause::kOrgan);
+    move_map(watch->carried()->X);
+    seconds(3.0, X);
+    ASSERT_FALSE(watch->displaced()) << move;
+    ASSERT_FALSE(watch->unproven()) << move;
+  }
 }
 
 TEST_F(Organ, ThatStillMovesRestsNowhere) {

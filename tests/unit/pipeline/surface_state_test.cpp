@@ -95,6 +95,25 @@ TEST(SurfaceState, IsDegradedWhileTheOrganIsNotWhereTheMapHasItAndNothingIsCalle
       << "which says which number is off";
 }
 
+TEST(SurfaceState, SaysOrganOrTrackerWhereThePatientsToolTellsThemApart) {
+  const auto reason_with = [](DisplacedCause first, DisplacedCause second) {
+    ShardSnapshot shards[2];
+    shards[0].doubts.displaced = shards[1].doubts.displaced = true;
+    shards[0].doubts.cause = first;
+    shards[1].doubts.cause = second;
+    shards[0].features.resize(1);
+    const ShardSnapshot still;
+    const ShardSnapshot* const all[] = {&still, &shards[0], &shards[1]};
+    return reason_of(locked(), Rhythm::kPredictable, footing_of(all));
+  };
+  EXPECT_EQ(reason_with(DisplacedCause::kOrgan, DisplacedCause::kOrgan), SurfaceReason::kOrganMoved);
+  EXPECT_EQ(reason_with(DisplacedCause::kTracker, DisplacedCause::kTracker), SurfaceReason::kTrackerErrs);
+  EXPECT_EQ(reason_with(DisplacedCause::kOrgan, DisplacedCause::kTracker), SurfaceReason::kOrganOrTrackerMoved)
+      << "of two frames";
+  EXPECT_EQ(state_of(SurfaceReason::kOrganMoved), SurfaceState::kDegraded);
+  EXPECT_EQ(state_of(SurfaceReason::kTrackerErrs), SurfaceState::kDegraded);
+}
+
 TEST(SurfaceState, IsDegradedWhileTheTrackerOrTheCameraRepeatsItself) {
   ShardSnapshot shard;
   shard.doubts.pose_repeated = true;

@@ -40,6 +40,8 @@ TEST(WireSurface, CarriesEveryFieldOfTheSample) {
   feature.covariance_W_mm2 << 1, 2, 3, 2, 4, 5, 3, 5, 6;
   feature.last_observed = Instant(milliseconds(90));
   sample.features = {feature};
+  sample.use_within_mm = {5.0, 3.0, 1.5};
+  sample.uses = {UseVerdict{SurfaceState::kGood, 31}, {SurfaceState::kDegraded, 30}, {SurfaceState::kInvalid, 4}};
 
   WireSurface wire({"theatre 3", ReleaseStream::kFrame, "tracker"}, 4);
   const perimap_Surface& out = wire.fill(sample, std::chrono::seconds(1000));
@@ -56,6 +58,11 @@ TEST(WireSurface, CarriesEveryFieldOfTheSample) {
   EXPECT_EQ(out.state, perimap_SURFACE_DEGRADED);
   EXPECT_EQ(out.reason, perimap_SURFACE_REASON_UPDATE_LATE);
   EXPECT_EQ(out.oldest_shard_frame_sequence, 41U);
+  EXPECT_EQ(out.display_state, perimap_SURFACE_GOOD);
+  EXPECT_EQ(out.measure_state, perimap_SURFACE_DEGRADED);
+  EXPECT_EQ(out.contact_state, perimap_SURFACE_INVALID);
+  EXPECT_EQ(out.use_within_mm[2], 1.5);
+  EXPECT_EQ(out.use_features[0], 31U);
   EXPECT_EQ(out.cardiac_phase_rad, 1.5);
   EXPECT_EQ(out.cardiac_phase_deviation_rad, 0.1);
   EXPECT_EQ(out.cardiac_phase_rate_rad_per_s, 7.5);

@@ -89,6 +89,11 @@ void fill(Filler& next, perimap_Surface& s) {
   next(s.camera_focal_px);
   next(s.camera_principal_point_px);
   next(s.run_id);
+  next(s.display_state);
+  next(s.measure_state);
+  next(s.contact_state);
+  next(s.use_within_mm);
+  next(s.use_features);
 }
 
 void fill(Filler& next, perimap_PhaseClock& s) {
@@ -288,6 +293,11 @@ void fill(Filler& next, perimap_Status& s) {
   next(s.run_id);
   next(s.two_publishers);
   next(s.keys_expire_utc_ns);
+  next(s.displaced_mm);
+  next(s.displaced_cause);
+  next(s.times_displaced);
+  next(s.maps_moved);
+  next(s.ecg_samples_repeated);
 }
 
 void fill(Filler& next, perimap_SurfaceMesh& s) {

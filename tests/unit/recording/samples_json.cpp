@@ -79,7 +79,12 @@ json to_json(const perimap_Surface& s) {
           MEMBER(rotation_WC_wxyz),
           MEMBER(camera_focal_px),
           MEMBER(camera_principal_point_px),
-          MEMBER(run_id)};
+          MEMBER(run_id),
+          MEMBER(display_state),
+          MEMBER(measure_state),
+          MEMBER(contact_state),
+          MEMBER(use_within_mm),
+          MEMBER(use_features)};
 }
 template <>
 json to_json(const perimap_PhaseClock& s) {
@@ -286,7 +291,12 @@ json to_json(const perimap_Status& s) {
           MEMBER(ecg_second_lead),
           MEMBER(run_id),
           MEMBER(two_publishers),
-          MEMBER(keys_expire_utc_ns)};
+          MEMBER(keys_expire_utc_ns),
+          MEMBER(displaced_mm),
+          MEMBER(displaced_cause),
+          MEMBER(times_displaced),
+          MEMBER(maps_moved),
+          MEMBER(ecg_samples_repeated)};
 }
 template <>
 json to_json(const perimap_TrackerPose& s) {

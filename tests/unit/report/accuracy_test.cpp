@@ -141,6 +141,29 @@ TEST(Accuracy, CountsApartWhatWasReleasedBeforeThePrematureBeatWasKnown) {
   EXPECT_EQ(report.good.features_off, 1U);
 }
 
+// Twice the square root of 3 mm^2 is 3.46 mm.
+TEST(Accuracy, CountsWhatMayBeUsedByTheBoundOfEachUse) {
+  const GroundTruth truth = still_triangle();
+  Accuracy accuracy(truth, camera(), kFirstFrame);
+  tell_origin(accuracy, 1);
+  for (const double off_mm : {1.0, 4.5, 6.0}) {
+    perimap_SurfaceFeature converged = feature(1, perimap_FEATURE_CONVERGED, off_mm);
+    perimap_Surface sample{};
+    sample.display_state = sample.measure_state = perimap_SURFACE_GOOD;
+    const double within_mm[3] = {5.0, 4.0, 2.0};
+    for (int i = 0; i < 3; ++i) sample.use_within_mm[i] = within_mm[i];
+    sample.valid_time_ns = sample.release_time_ns = static_cast<std::int64_t>(16e9);
+    sample.features = {1, 1, &converged, false};
+    accuracy.add(sample);
+  }
+  const AccuracyReport report = accuracy.report(Duration(0));
+  EXPECT_EQ(report.uses[0].count, 3U);
+  EXPECT_EQ(report.uses[0].off, 1U);
+  EXPECT_EQ(report.uses[1].off, 2U);
+  EXPECT_EQ(report.uses[2].count, 0U) << "the surface is not good for it";
+  EXPECT_EQ(nlohmann::json::parse(to_json(report).dump())["uses"]["display"]["positions"], 3);
+}
+
 TEST(Accuracy, BringsPublishedInstantsToTheRecordingsClock) {
   const GroundTruth truth = still_triangle();
   Accuracy accuracy(truth, camera(), kFirstFrame);
