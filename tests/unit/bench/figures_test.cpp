@@ -199,8 +199,9 @@ TEST(Paced, MovesEveryInstantOfEveryKindOfEvent) {
   respiration.first_sample_time = measured;
   respiration.arrival = arrival;
   respiration.sample_period = milliseconds(40);
-  std::vector<ReplayEvent> events = {frame(0, milliseconds(2000)),     pose,       SecondPose{pose}, ecg,
-                                     RTriggerPulse{measured, arrival}, respiration};
+  std::vector<ReplayEvent> events = {
+      frame(0, milliseconds(2000)),     pose,       ToolPose{ToolRole::kSecondSensor, pose}, ecg,
+      RTriggerPulse{measured, arrival}, respiration};
   ASSERT_EQ(events.size(), std::variant_size_v<ReplayEvent>);
 
   const ReplayEdit edit = paced(1, 2.0, std::chrono::seconds(10));
@@ -216,7 +217,7 @@ TEST(Paced, MovesEveryInstantOfEveryKindOfEvent) {
   }
   EXPECT_EQ(std::get<FrameEvent>(events[0]).stamp.capture, measured_then);
   EXPECT_EQ(std::get<TrackerSample>(events[1]).source_time, measured_then);
-  EXPECT_EQ(std::get<SecondPose>(events[2]).sample.source_time, measured_then);
+  EXPECT_EQ(std::get<ToolPose>(events[2]).sample.source_time, measured_then);
   EXPECT_EQ(std::get<EcgBlock>(events[3]).first_sample_time, measured_then);
   EXPECT_EQ(std::get<EcgBlock>(events[3]).sample_period, milliseconds(2));
   EXPECT_EQ(std::get<RTriggerPulse>(events[4]).time, measured_then);
