@@ -13,7 +13,7 @@ namespace perimap {
 
 // A surface as it goes over the wire (XCDR2, names of full length): the surface itself, and each feature of it. A test
 // holds them against the serialiser.
-inline constexpr std::size_t kSurfaceBytes = 528;
+inline constexpr std::size_t kSurfaceBytes = 560;
 inline constexpr std::size_t kSurfaceFeatureBytes = 124;
 // Likewise a surface model (with the cycles of half a minute), each feature of it, and each coefficient of an axis.
 inline constexpr std::size_t kModelBytes = 4096;
