@@ -21,8 +21,8 @@ if(PERIMAP_SANITIZE)
   # -O1: instrumented Eigen code takes several times as long to compile at -O2 and hardly runs faster.
   string(REPLACE "-O2" "-O1" CMAKE_CXX_FLAGS_RELWITHDEBINFO "${CMAKE_CXX_FLAGS_RELWITHDEBINFO}")
   add_compile_options(-fsanitize=${PERIMAP_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
-  # Their runtimes call dlopen() in the program's place, so that glibc looks at their run path; at a program's DT_RPATH, the
-  # older tag, it looks for whoever calls.
+  # Their runtimes call dlopen() in the program's place, so that glibc looks at their run path; at a program's DT_RPATH,
+  # the older tag, it looks for whoever calls.
   add_link_options(-fsanitize=${PERIMAP_SANITIZE} LINKER:--disable-new-dtags)
 endif()
 # Compilers name the sanitizers in different ways.
@@ -54,10 +54,12 @@ if(PERIMAP_FUZZ)
   add_link_options(-fsanitize=address,undefined)
 endif()
 
-# Warnings, as errors unless it is a part of another project, for the project's own code only (generated code is not linked to this).
+# Warnings, as errors unless it is a part of another project, for the project's own code only (generated code is not
+# linked to this).
 add_library(perimap_warnings INTERFACE)
 target_compile_options(perimap_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
-  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast> $<$<BOOL:${PERIMAP_WARNINGS_AS_ERRORS}>:-Werror>)
-# GCC 12's flow analysis reports uninitialised values inside Eigen's fixed-capacity types, at -O3 and with sanitizers, that
-# are not there.
+  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast>
+  $<$<BOOL:${PERIMAP_WARNINGS_AS_ERRORS}>:-Werror>)
+# GCC 12's flow analysis reports uninitialised values inside Eigen's fixed-capacity types, at -O3 and with sanitizers,
+# that are not there.
 target_compile_options(perimap_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)

@@ -3,15 +3,16 @@
 option(PERIMAP_TOGETHER "Compile files together where a target allows that" OFF)
 option(PERIMAP_LONG "Build what only tests labelled `long` and statistics need" ON)
 
-# perimap_library(NAME FOLDER [UNITY [ALONE f...]] [PRELUDE p] [SOURCES f...] [DEPENDS target...] [PRIVATE_DEPENDS target...])
+# perimap_library(NAME FOLDER [UNITY [ALONE f...]] [PRELUDE p] [SOURCES f...] [DEPENDS target...] [PRIVATE_DEPENDS
+# target...])
 #
 # One target per folder. Headers are included by their path from the project's root ("core/time/instant.hpp"), but a
 # target sees a folder's headers only when it depends on that folder's target: each target carries an include root of
 # its own that holds nothing but its folder. So an include against the direction of the architecture does not build.
 #
-# PRELUDE names the precompiled headers (perimap_prelude) that its files begin with. UNITY: with PERIMAP_TOGETHER
-# eight of its files are compiled as one, in four fifths to a half of the time; what is local to them must have different names then.
-# ALONE: files whose local names stand for something else in others.
+# PRELUDE names the precompiled headers (perimap_prelude) that its files begin with. UNITY: with PERIMAP_TOGETHER eight
+# of its files are compiled as one, in four fifths to a half of the time; what is local to them must have different
+# names then. ALONE: files whose local names stand for something else in others.
 function(perimap_library NAME FOLDER)
   cmake_parse_arguments(ARG "UNITY" "PRELUDE" "ALONE;SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
   set(root ${PROJECT_BINARY_DIR}/include_roots/${NAME})
@@ -48,8 +49,8 @@ endfunction()
 # perimap_prelude(NAME [FOR_PROGRAMS] HEADERS <header>... DEPENDS target...)
 #
 # Headers of others that take longer to read than most files take to compile, read once for all. Not in release builds:
-# there each file must compile with what it includes itself; nor inside another project. Programs are compiled with other
-# flags than libraries.
+# there each file must compile with what it includes itself; nor inside another project. Programs are compiled with
+# other flags than libraries.
 function(perimap_prelude NAME)
   cmake_parse_arguments(ARG "FOR_PROGRAMS" "" "HEADERS;DEPENDS" ${ARGN})
   if(CMAKE_BUILD_TYPE STREQUAL RelWithDebInfo AND PROJECT_IS_TOP_LEVEL)
@@ -65,14 +66,14 @@ endfunction()
 
 # perimap_test(NAME [UNITY [ALONE f...]] [OUTSIDE] [THREADS] [LONG] SOURCES f... DEPENDS target...)
 #
-# A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. With PERIMAP_TOGETHER
-# CTest runs each program in four parts instead: starting a program with a sanitizer and its libraries for each case takes
-# longer than most cases. ALONE: as above.
+# A GoogleTest program whose cases CTest lists one by one. Test data is found through PERIMAP_TEST_DATA. With
+# PERIMAP_TOGETHER CTest runs each program in four parts instead: starting a program with a sanitizer and its libraries
+# for each case takes longer than most cases. ALONE: as above.
 #
-# A quick tests/run.sh makes two builds. `outside`, under AddressSanitizer: the unit tests marked OUTSIDE, of what reads the
-# bytes of others (files, devices, messages) and of the rings that they go through. `plain`: all the rest. `threads`, for
-# ThreadSanitizer: the tests of whole programs, and the unit tests marked THREADS, in which more than one runs. Elsewhere
-# PERIMAP_TESTS is `all`.
+# A quick tests/run.sh makes two builds. `outside`, under AddressSanitizer: the unit tests marked OUTSIDE, of what reads
+# the bytes of others (files, devices, messages) and of the rings that they go through. `plain`: all the rest.
+# `threads`, for ThreadSanitizer: the tests of whole programs, and the unit tests marked THREADS, in which more than one
+# runs. Elsewhere PERIMAP_TESTS is `all`.
 set(tests OFF)
 if(PROJECT_IS_TOP_LEVEL)
   set(tests all)

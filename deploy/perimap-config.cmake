@@ -1,8 +1,9 @@
 # find_package(perimap [COMPONENTS client core]) gives
-#   perimap::client  the C types of perimap.idl and perimap_mesh.idl, made by Cyclone DDS' compiler for the project that asks,
+# perimap::client the C types of perimap.idl and perimap_mesh.idl, made by Cyclone DDS' compiler for the project that
+# asks,
 #                    with perimap_client.hpp, perimap_mesh_client.hpp, perimap_publisher_watch.hpp and perimap_use.hpp;
 #                    the project's languages must be C and CXX
-#   perimap::core    what perimapd computes with, without devices, files and DDS; its parts are perimap::core_phase and so on
+# perimap::core what perimapd computes with, without devices, files and DDS; its parts are perimap::core_phase and so on
 # A component that is named must be there. Without names: each whose own dependencies are installed.
 foreach(part client core)
   set(perimap_${part}_lacks "")
@@ -43,7 +44,8 @@ foreach(part client core)
   set(perimap_${part}_FOUND ON)
   if(perimap_${part}_lacks)
     set(perimap_${part}_FOUND OFF)
-    string(APPEND perimap_NOT_FOUND_MESSAGE "perimap::${part} needs packages that are not found: ${perimap_${part}_lacks}. ")
+    string(APPEND perimap_NOT_FOUND_MESSAGE
+      "perimap::${part} needs packages that are not found: ${perimap_${part}_lacks}. ")
   endif()
 endforeach()
 foreach(part IN LISTS perimap_FIND_COMPONENTS)

@@ -1,7 +1,8 @@
 # The Debian package: cpack --config build/release/CPackConfig.cmake
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME perimap)
-# A place-holder, here and in changelog.in: whoever gives the package to others fills in an address that is read (SECURITY.md).
+# A place-holder, here and in changelog.in: whoever gives the package to others fills in an address that is read
+# (SECURITY.md).
 set(CPACK_PACKAGE_CONTACT "perimap maintainers <maintainers@perimap.example>")
 set(CPACK_PACKAGING_INSTALL_PREFIX ${CMAKE_INSTALL_PREFIX})
 set(CPACK_STRIP_FILES ON)

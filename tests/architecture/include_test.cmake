@@ -19,7 +19,8 @@ foreach(header IN LISTS SEES REFUSES)
   if(header MATCHES "^(core|drivers|daemon)/" AND NOT EXISTS ${SOURCE_ROOT}/${header})
     list(APPEND failures "${header} does not exist")
   endif()
-  string(APPEND text "#if __has_include(\"${header}\")\nin_sight \"${header}\"\n#else\nno_sight \"${header}\"\n#endif\n")
+  string(APPEND text
+    "#if __has_include(\"${header}\")\nin_sight \"${header}\"\n#else\nno_sight \"${header}\"\n#endif\n")
 endforeach()
 file(WRITE ${SOURCE} "${text}")
 execute_process(COMMAND ${CMAKE_COMMAND} -E env LC_ALL=C ${COMPILER} -std=c++20 -E -P ${options} ${SOURCE}
