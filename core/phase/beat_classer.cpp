@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/phase/ventricular_evidence.hpp"
-
 namespace perimap {
 namespace {
 constexpr double kUsual = 0.9;          // correlation with the usual shape from which on a beat is of it
@@ -19,6 +17,7 @@ constexpr double kInRhythm = 0.15;      // of the rhythm's cycle, either way
 constexpr double kPause = 1.5;          // rhythm's cycles
 constexpr double kGap = 4.0;            // beyond, beats were missed
 constexpr double kLongest = 1.35;       // cycles
+constexpr double kOwn = 0.5;            // from which on a beat is the heart's own beside paced ones
 constexpr int kStale = 8;               // beats in a row that taught the cycle nothing: it may be another by now
 
 }  // namespace
@@ -35,20 +34,26 @@ double BeatClasser::log_of_cycle(double rr_s) const noexcept {
   return rr_s > 0.0 && normal_rr_s_.count() > 0 ? std::log(rr_s / normal_rr_s_.median()) : 0.0;
 }
 
-bool BeatClasser::ventricular(const RPeak& peak, const BeatKinds::Comparison& compared) const noexcept {
-  if (!has_last_ || normal_rr_s_.count() == 0 || peak.shape.points == 0) return false;
-  if (peak.confidence < kDoubtful) return false;
+VentricularEvidence BeatClasser::evidence_of(const RPeak& peak, const BeatKinds::Comparison& compared) const noexcept {
   VentricularEvidence evidence;
+  if (!has_last_) return evidence;
   evidence.unlike = compared.unlike;
   evidence.log_rr = log_of_cycle(to_seconds(peak.time - last_));
   evidence.spread = scatter_.mean();
   evidence.log_rr_before = log_of_cycle(raw_rr_s_);
+  evidence.narrower = compared.narrower;
+  evidence.paced = scatter_.like_clockwork();
   evidence.apart = compared.apart;
   evidence.coupled = compared.coupled;
-  return log_odds(evidence) > 0.0;
+  return evidence;
 }
 
-BeatClass BeatClasser::by_interval(const RPeak& peak, bool unusual) const noexcept {
+bool BeatClasser::ventricular(const RPeak& peak, const VentricularEvidence& evidence) const noexcept {
+  if (!has_last_ || normal_rr_s_.count() == 0 || peak.shape.points == 0) return false;
+  return peak.confidence >= kDoubtful && log_odds(evidence) > 0.0;
+}
+
+BeatClass BeatClasser::by_interval(const RPeak& peak, bool unusual, bool at_any_time) const noexcept {
   if (!has_last_ || normal_rr_s_.count() == 0) return BeatClass::kNormal;
   const double cycle_s = normal_rr_s_.median();
   const double rr_s = to_seconds(peak.time - last_);
@@ -58,7 +63,6 @@ BeatClass BeatClasser::by_interval(const RPeak& peak, bool unusual) const noexce
   const bool again = last_class_ == BeatClass::kPremature && !last_unusual_ && raw_rr_s_ > 0.0 &&
                      std::abs(rr_s - raw_rr_s_) < kInRhythm * raw_rr_s_;
   if (!unusual && again) return BeatClass::kNormal;
-  const bool at_any_time = rhythm_.rhythm() == Rhythm::kUnpredictable;
   if (!at_any_time && rr_s < kMuchTooEarly * usual_s && !is_due(peak, 1)) return BeatClass::kPremature;
   if (rr_s > kPause * cycle_s && last_class_ != BeatClass::kPremature) return BeatClass::kPause;
   return BeatClass::kNormal;
@@ -83,8 +87,12 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
       has_last_ && normal_rr_s_.count() > 0 && to_seconds(peak.time - last_) < kEarly * normal_rr_s_.median();
   const bool again = compared.kind >= 0 && compared.kind == last_kind_ && !early;
   on_time_in_one_shape_ = again ? std::min(on_time_in_one_shape_ + 1, kConductionChanged + 1) : 0;
-  const bool ventricular = on_time_in_one_shape_ < kConductionChanged && this->ventricular(peak, compared);
-  peak.beat_class = ventricular ? BeatClass::kPremature : by_interval(peak, unusual);
+  const VentricularEvidence evidence = evidence_of(peak, compared);
+  const bool ventricular = on_time_in_one_shape_ < kConductionChanged && this->ventricular(peak, evidence);
+  // In fibrillation beats come at any time, and so do those of a heart that a pacemaker waits for.
+  const bool own = own_of_paced(evidence) > kOwn;
+  const bool at_any_time = rhythm_.rhythm() == Rhythm::kUnpredictable || own;
+  peak.beat_class = ventricular ? BeatClass::kPremature : by_interval(peak, unusual, at_any_time);
   if (peak.confidence < (unusual ? kDoubtful : kMostDoubtful) && !is_due(peak, kUnseen))
     peak.beat_class = BeatClass::kNoise;
   peak.unusual_shape = unusual || ventricular;
@@ -92,7 +100,7 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
 
   templates_.learn(peak.shape);
   learn_kind(peak, compared);
-  if (has_last_) learn_rhythm(peak, unusual);
+  if (has_last_) learn_rhythm(peak, unusual || own);
   last_unusual_ = peak.unusual_shape;
   last_ = peak.time;
   last_class_ = peak.beat_class;

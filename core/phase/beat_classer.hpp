@@ -13,6 +13,7 @@
 #include "core/phase/recent_values.hpp"
 #include "core/phase/rhythm_monitor.hpp"
 #include "core/phase/rhythm_scatter.hpp"
+#include "core/phase/ventricular_evidence.hpp"
 #include "core/time/instant.hpp"
 
 namespace perimap {
@@ -34,8 +35,10 @@ class BeatClasser {
   static constexpr int kRhythm = 8;
 
   [[nodiscard]] double strangeness(const QrsShape& shape) const noexcept;
-  [[nodiscard]] bool ventricular(const RPeak& peak, const BeatKinds::Comparison& compared) const noexcept;
-  [[nodiscard]] BeatClass by_interval(const RPeak& peak, bool unusual) const noexcept;
+  [[nodiscard]] VentricularEvidence evidence_of(const RPeak& peak,
+                                                const BeatKinds::Comparison& compared) const noexcept;
+  [[nodiscard]] bool ventricular(const RPeak& peak, const VentricularEvidence& evidence) const noexcept;
+  [[nodiscard]] BeatClass by_interval(const RPeak& peak, bool unusual, bool at_any_time) const noexcept;
   [[nodiscard]] bool is_due(const RPeak& peak, int most_cycles) const noexcept;
   [[nodiscard]] double log_of_cycle(double rr_s) const noexcept;
   void learn_kind(const RPeak& peak, const BeatKinds::Comparison& compared) noexcept;

@@ -31,6 +31,16 @@ double difference(const QrsShape& shape, const QrsShape& kind) noexcept {
   return 2.0 * (1.0 - best_match(shape, kind, kDisplaced).correlation) + square(std::log(size / of_kind));
 }
 
+// How fast the slope changes from point to point, beside how large it is: a narrow complex changes faster.
+double quickness(const QrsShape& shape) noexcept {
+  double changes = 0.0;
+  for (std::size_t i = 1; i < static_cast<std::size_t>(shape.points); ++i) {
+    changes += square(static_cast<double>(shape.slope[i] - shape.slope[i - 1]));
+  }
+  const double size = root_mean_square(shape);
+  return size > 0.0 ? std::sqrt(changes / shape.points) / size : 0.0;
+}
+
 // Where two shapes overlap, one displaced by so many steps: what(point of the shape, index in the reference).
 template <class What>
 void overlap(const QrsShape& shape, int displaced, What&& what) noexcept {
@@ -72,7 +82,12 @@ BeatKinds::Comparison BeatKinds::compare(const QrsShape& shape) const noexcept {
     compared.kind = i;
   }
   compared.usual = compared.kind == usual;
-  if (at(usual).members >= kEnough) compared.unlike = unlike(shape, at(usual));
+  if (at(usual).members >= kEnough) {
+    compared.unlike = unlike(shape, at(usual));
+    const double own = quickness(shape);
+    const double of_usual = quickness(at(usual).shape);
+    if (own > 0.0 && of_usual > 0.0) compared.narrower = std::log(own / of_usual);
+  }
   if (compared.kind < 0 || compared.usual) return compared;
   const Kind& kind = at(compared.kind);
   if (kind.members < kEnough) return compared;

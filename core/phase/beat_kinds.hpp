@@ -18,9 +18,10 @@ class BeatKinds {
     int kind = -1;       // that it is of; -1: it begins one
     bool usual = false;  // it is of the usual kind
     double unlike =
-        0.0;             // mean square of the differences from the usual beat, in the usual variances; 0: none is known
-    bool apart = false;  // its kind has recurred, and is far from the usual one
-    bool coupled = false;  // its kind is another than the usual one, and comes early by about the same time
+        0.0;  // mean square of the differences from the usual beat, in the usual variances; 0: none is known
+    double narrower = 0.0;  // than the usual beat: logarithm of how fast its slope changes, to that; 0: none is known
+    bool apart = false;     // its kind has recurred, and is far from the usual one
+    bool coupled = false;   // its kind is another than the usual one, and comes early by about the same time
   };
   [[nodiscard]] Comparison compare(const QrsShape& shape) const noexcept;
 

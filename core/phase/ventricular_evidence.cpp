@@ -6,7 +6,7 @@
 namespace perimap {
 namespace {
 
-constexpr double kAlways = -12.75;
+constexpr double kAlways = -12.45;
 constexpr double kUnlike = 3.1;        // a unit of the logarithm,
 constexpr double kLeast = 1.0;         // from here
 constexpr double kMost = 4.0;          // to here: noise has no upper end
@@ -18,14 +18,32 @@ constexpr double kIntervalBefore = 2.8;
 constexpr double kCoupled = 3.1;
 constexpr double kApart = 1.8;
 constexpr double kLongestBefore = 0.7;  // log
+constexpr double kNarrower = -3.2;      // a unit of the logarithm,
+constexpr double kNarrowest = 0.5;      // to here
+constexpr double kOwn = -8.0;           // of a paced heart's own beat, which is narrower by more than
+constexpr double kOwnFrom = 0.0;        // this,
+constexpr double kOwnFully = 0.15;      // fully from here on,
+constexpr double kOwnTooEarly = -0.5;   // and comes no earlier than here: log of the interval to the cycle,
+constexpr double kOwnInTime = -0.3;     // likewise
+
+// From 0 to 1 between two limits.
+double rising(double value, double from, double to) noexcept {
+  return std::clamp((value - from) / (to - from), 0.0, 1.0);
+}
 
 }  // namespace
+
+double own_of_paced(const VentricularEvidence& evidence) noexcept {
+  if (!evidence.paced) return 0.0;
+  return rising(evidence.narrower, kOwnFrom, kOwnFully) * rising(evidence.log_rr, kOwnTooEarly, kOwnInTime);
+}
 
 double log_odds(const VentricularEvidence& evidence) noexcept {
   const double early = -evidence.log_rr / (evidence.spread + kLeastSpread);
   return kAlways + kUnlike * std::clamp(std::log(evidence.unlike), kLeast, kMost) +
          kEarly * std::clamp(early, kLate, kFarEarly) +
          kIntervalBefore * std::clamp(evidence.log_rr_before, -1.0, kLongestBefore) +
+         kNarrower * std::clamp(evidence.narrower, 0.0, kNarrowest) + kOwn * own_of_paced(evidence) +
          (evidence.coupled ? kCoupled
           : evidence.apart ? kApart
                            : 0.0);

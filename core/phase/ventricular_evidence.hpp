@@ -4,6 +4,9 @@
 // patient's usual one by more than usual ones are unlike each other; it comes early, beside how the rhythm scatters,
 // and beside the interval before it: in fibrillation every second beat comes early. Where its kind has come early by
 // about the same time before (fixed coupling), it takes less, and a little less where its kind has recurred.
+// What the ventricles conduct is narrow: a beat that is narrower than the usual one is less likely a ventricular one,
+// and where a pacemaker makes the usual beats, which then come like clockwork, it is the heart's own, unless it is
+// early.
 #pragma once
 
 namespace perimap {
@@ -13,9 +16,14 @@ struct VentricularEvidence {
   double log_rr = 0.0;         // of the interval to the rhythm's cycle
   double spread = 0.0;         // mean deviation of that, of usual beats
   double log_rr_before = 0.0;  // of the interval before; 0 where it is not known
+  double narrower = 0.0;       // than the usual beat, as BeatKinds has it
+  bool paced = false;          // usual beats come like clockwork
   bool apart = false;          // as BeatKinds has it,
   bool coupled = false;        // likewise
 };
+
+// How far a beat is the own one of a heart in which a pacemaker makes the usual beats, 0 to 1.
+[[nodiscard]] double own_of_paced(const VentricularEvidence& evidence) noexcept;
 
 // 0: as likely as not.
 [[nodiscard]] double log_odds(const VentricularEvidence& evidence) noexcept;

@@ -60,6 +60,19 @@ TEST_F(Classed, VentricularBeatIsPrematureAndTheBeatAfterItsPauseIsNormal) {
   EXPECT_FALSE(last_.unusual_shape);
 }
 
+// They are narrow, come before the pacemaker's, and keep it still; ventricular ones are wide or come too early.
+TEST_F(Classed, APacedHeartsOwnBeatsAreNormalAndItsVentricularOnesAreNot) {
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal);
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(beat(690, 1.0), BeatClass::kNormal) << i;
+    EXPECT_EQ(beat(615, 1.0), BeatClass::kNormal) << i;
+    EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal) << i;
+    EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal) << i;
+    EXPECT_EQ(beat(590, 0.3), BeatClass::kPremature) << i;
+    EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal) << i;
+  }
+}
+
 TEST_F(Classed, BigeminyStaysBigeminy) {
   settle();
   for (int i = 0; i < 200; ++i) {

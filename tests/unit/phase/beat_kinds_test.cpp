@@ -53,6 +53,20 @@ TEST_F(Kinds, WhatIsFarFromUsualWhereBeatsAreAlikeIsNotWhereTheyScatter) {
   EXPECT_LT(where_not, 3.0);
 }
 
+// A sine of twice the frequency changes twice as fast.
+TEST_F(Kinds, WhatIsNarrowerChangesFaster) {
+  QrsShape narrow;
+  narrow.points = 29;
+  for (std::size_t i = 0; i < 29; ++i)
+    narrow.slope[i] = static_cast<float>(2.5 * std::sin(0.44 * static_cast<double>(i)));
+  usual_beats(2, 0.0);
+  EXPECT_EQ(kinds_.compare(narrow).narrower, 0.0) << "nothing is known yet";
+  usual_beats(5, 0.0);
+  EXPECT_NEAR(kinds_.compare(narrow).narrower, std::log(2.0), 0.05);
+  EXPECT_NEAR(kinds_.compare(beat(0.0, 3.0)).narrower, 0.0, 1e-3) << "whatever its size";
+  EXPECT_EQ(kinds_.compare(QrsShape{}).narrower, 0.0);
+}
+
 // 3 % of the shape's size at least.
 TEST_F(Kinds, BeatsWithoutAnyNoiseAreAllowedAFewPerCent) {
   usual_beats(300, 0.0);
