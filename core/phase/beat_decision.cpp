@@ -21,7 +21,7 @@ void BeatDecision::forget() noexcept {
   changed_count_ = 0;
   disturbances_ = 0.0;
   count_ = 0;
-  has_last_ = false;
+  has_last_ = has_sure_ = false;
 }
 
 void BeatDecision::fall_silent() noexcept {
@@ -33,7 +33,7 @@ void BeatDecision::fall_silent() noexcept {
 
 void BeatDecision::restart(Instant now) noexcept {
   count_ = 0;
-  has_last_ = false;
+  has_last_ = has_sure_ = false;
   since_ = now;
   complexes_.clear();
 }
@@ -264,12 +264,9 @@ void BeatDecision::weigh(Instant now) noexcept {
   for (int i = 0; i < count_; ++i) waiting_[static_cast<std::size_t>(i)].probability = path_.probability(i);
 }
 
-// With what the beat before tells: another that waits, or with -1 the last one told.
-EvidenceOf<BeatEvidence> BeatDecision::paired(int before, int candidate) const noexcept {
-  const Waiting& waiting = waiting_[static_cast<std::size_t>(candidate)];
-  EvidenceOf<BeatEvidence> evidence = waiting.evidence;
-  if (before < 0 && !has_last_) return evidence;
-  const QrsCandidate& last = before < 0 ? last_ : waiting_[static_cast<std::size_t>(before)].candidate;
+// With what it tells that the beat before was `last`.
+double BeatDecision::odds_after(const QrsCandidate& last, const Waiting& waiting) const noexcept {
+  if (waiting.candidate.time - last.time < settings_.refractory) return kNever;
   PairContext pair;
   pair.rr_s = to_seconds(waiting.candidate.time - last.time);
   pair.cycle_s = rhythm_.cycle_s > 0.0 ? rhythm_.cycle_s : 0.8;
@@ -277,22 +274,26 @@ EvidenceOf<BeatEvidence> BeatDecision::paired(int before, int candidate) const n
   pair.disturbed = waiting.disturbed;
   pair.before_sharpness = last.sharpness;
   pair.sharpness = waiting.candidate.sharpness;
+  EvidenceOf<BeatEvidence> evidence = waiting.evidence;
   add_pair(pair, evidence);
-  return evidence;
+  return log_odds(evidence, weights_.beat);
 }
 
 double BeatDecision::odds(int before, int candidate) const noexcept {
   const Waiting& waiting = waiting_[static_cast<std::size_t>(candidate)];
-  const bool follows = before >= 0 || has_last_;
-  const QrsCandidate& last = before >= 0 ? waiting_[static_cast<std::size_t>(before)].candidate : last_;
-  if (follows && waiting.candidate.time - last.time < settings_.refractory) return kNever;
   // The filters see a step where the line begins.
   if (waiting.candidate.time - since_ < settings_.begins && clusters_.any_recurs() &&
       (waiting.correlation < settings_.very_familiar || waiting.cluster < 0 ||
        clusters_.log_odds(waiting.cluster) < settings_.qrs_like)) {
     return kNever;
   }
-  return log_odds(paired(before, candidate), weights_.beat);
+  if (before >= 0) return odds_after(waiting_[static_cast<std::size_t>(before)].candidate, waiting);
+  if (!has_last_) return log_odds(waiting.evidence, weights_.beat);
+  const double after = odds_after(last_, waiting);
+  // What was told with doubt may have been a P wave. What is like the beats is then weighed after the one before, too.
+  if (last_probability_ > settings_.sure || !has_sure_ || !familiar(waiting)) return after;
+  return std::log(last_probability_ * std::exp(after) +
+                  (1.0 - last_probability_) * std::exp(odds_after(sure_, waiting)));
 }
 
 // It is a beat, and what comes after it would hardly change that.
@@ -447,6 +448,8 @@ void BeatDecision::tell(const Waiting& waiting, Instant now) noexcept {
     ++queue_count_;
   }
   learn_rhythm(waiting);
+  has_sure_ = has_sure_ || (has_last_ && last_probability_ > settings_.sure);
+  if (has_last_ && last_probability_ > settings_.sure) sure_ = last_;
   last_ = candidate;
   last_probability_ = waiting.probability;
   has_last_ = true;

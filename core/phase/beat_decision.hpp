@@ -84,7 +84,7 @@ class BeatDecision {
   [[nodiscard]] bool unlike_any_beat(const QrsCandidate& candidate) const noexcept;
   [[nodiscard]] bool strange(const Waiting& waiting) const noexcept;
   [[nodiscard]] bool of_known_kind(const Waiting& waiting) const noexcept;
-  [[nodiscard]] EvidenceOf<BeatEvidence> paired(int before, int candidate) const noexcept;
+  [[nodiscard]] double odds_after(const QrsCandidate& last, const Waiting& waiting) const noexcept;
   [[nodiscard]] double odds(int before, int candidate) const noexcept;
   [[nodiscard]] bool known(const Waiting& waiting, Instant now, bool ending) const noexcept;
   void accept(int index, Instant now) noexcept;
@@ -114,6 +114,8 @@ class BeatDecision {
   bool has_last_ = false;
   QrsCandidate last_;  // the last beat
   double last_probability_ = 0.0;
+  bool has_sure_ = false;
+  QrsCandidate sure_;    // the last of those before it that were told without doubt
   bool hidden_ = false;  // since then others may have come that were not seen
   Instant since_;        // beats have been looked for
   int beats_told_ = 0;

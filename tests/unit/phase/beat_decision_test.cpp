@@ -153,6 +153,16 @@ TEST(BeatDecision, AKindThatMayBeAPWaveWaitsForItsQrsComplex) {
   EXPECT_LT(longest_s(4), 0.12) << "so many are followed by chance";
 }
 
+// A P wave that is like nothing is told with doubt before its own QRS complex is measured.
+TEST(BeatDecision, WhatWasToldWithDoubtHidesNoBeatOfAKnownKind) {
+  Known patient;
+  const double p_s = patient.last_s + 0.6;
+  patient.see(p_s, [](QrsCandidate& c) { c.shape = strange_shape(7), c.energy *= 0.5, c.sharpness *= 0.3; });
+  patient.see(p_s + 0.24);
+  EXPECT_NEAR(patient.confidence(p_s), 0.5, 0.01);
+  EXPECT_GT(patient.confidence(p_s + 0.24), 0.9);
+}
+
 // Every second P wave is conducted, after 0.16 s.
 TEST(BeatDecision, APWaveWithoutAQrsComplexIsNoBeatOnceTwoHaveBeenConducted) {
   Patient patient;
