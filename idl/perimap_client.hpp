@@ -416,7 +416,7 @@ inline const char* describe(perimap_SurfaceReason reason) noexcept {
     case perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED:
       return "the organ has been moved, or the tracker errs";
     case perimap_SURFACE_REASON_ORGAN_MOVED:
-      return "the organ has been moved, and does not rest yet";
+      return "the organ has been moved, and the map is not with it yet";
     case perimap_SURFACE_REASON_TRACKER_ERRS:
       return "the tracker errs: the patient's tool has not moved as the surface seems to";
     default:

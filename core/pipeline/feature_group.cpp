@@ -217,7 +217,7 @@ void FeatureGroup::evaluate(const FrameJob& job, ShardSnapshot& publisher, Shard
   FeatureSnapshot snapshot;
   for (std::size_t lane = 0; lane < slots_.size(); ++lane) {
     if (slots_[lane].state != SlotState::kMapped) continue;
-    describe(slots_[lane], job.frame->stamp.capture, snapshot);
+    describe(slots_[lane], job.frame->stamp.capture, job.doubts, snapshot);
     bank_.get(feature(lane), snapshot.x);
     for (std::size_t i = begin; i < end; ++i) {
       snapshot.covariances_W_mm2[i] =

@@ -241,7 +241,16 @@ void refuse_match(FeatureSlot& slot, const FrameRecord& frame) noexcept {
   let_go(slot, frame);
 }
 
-void describe(const FeatureSlot& slot, Instant now, FeatureSnapshot& snapshot) noexcept {
+namespace {
+
+// Of itself, and of the set-up that it was seen by.
+bool is_certain(const FeatureSlot& slot, const FrameDoubts& doubts) noexcept {
+  return slot.converged && slot.largest_deviation_mm <= doubts.converged_within_mm;
+}
+
+}  // namespace
+
+void describe(const FeatureSlot& slot, Instant now, const FrameDoubts& doubts, FeatureSnapshot& snapshot) noexcept {
   snapshot.id = slot.id;
   snapshot.last_observed = slot.last_observed;
   snapshot.expected = slot.in_view && !slot.shed;
@@ -254,18 +263,18 @@ void describe(const FeatureSlot& slot, Instant now, FeatureSnapshot& snapshot) n
     snapshot.reason = FeatureReason::kInnovationsHigh;
     return;
   }
-  snapshot.state = is_called_converged(slot, now) ? FeatureState::kConverged : FeatureState::kConverging;
+  snapshot.state = is_called_converged(slot, now, doubts) ? FeatureState::kConverged : FeatureState::kConverging;
   if (slot.shed) {
     snapshot.reason = FeatureReason::kShed;
-  } else if (!slot.converged) {
+  } else if (!is_certain(slot, doubts)) {
     snapshot.reason = FeatureReason::kDeviationLarge;
   } else {
     snapshot.reason = slot.match_agrees ? FeatureReason::kNone : FeatureReason::kNotObserved;
   }
 }
 
-bool is_called_converged(const FeatureSlot& slot, Instant now) noexcept {
-  if (!slot.converged || slot.health.state() == HealthState::kInconsistent) return false;
+bool is_called_converged(const FeatureSlot& slot, Instant now, const FrameDoubts& doubts) noexcept {
+  if (!is_certain(slot, doubts) || slot.health.state() == HealthState::kInconsistent) return false;
   return slot.match_agrees || now - slot.last_observed <= kBelievedUnseen;
 }
 

@@ -30,11 +30,11 @@ void settle_match(FeatureSlot& slot, const MapPrediction& from_map, const FrameJ
 // So long a feature is still called converged after it was last observed. One that is looked for is mostly given up
 // before, see kUnobservedFramesBeforeLost; one that is shed is not.
 inline constexpr Duration kBelievedUnseen = std::chrono::seconds(30);
-// What surfaces and the status say of a mapped feature. `now`: the capture.
-[[nodiscard]] bool is_called_converged(const FeatureSlot& slot, Instant now) noexcept;
+// What surfaces and the status say of a mapped feature. `now`: the capture, with its doubts.
+[[nodiscard]] bool is_called_converged(const FeatureSlot& slot, Instant now, const FrameDoubts& doubts) noexcept;
 
 // C: all of a mapped feature's snapshot but its coefficients and covariances, which the bank has. `now`: the capture.
-void describe(const FeatureSlot& slot, Instant now, FeatureSnapshot& snapshot) noexcept;
+void describe(const FeatureSlot& slot, Instant now, const FrameDoubts& doubts, FeatureSnapshot& snapshot) noexcept;
 
 // What the bank's covariance of its estimate leaves out: errors of its matches that come again, and slow ones of the
 // tracker.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 
 namespace perimap {
 
@@ -19,8 +20,12 @@ struct FrameDoubts {
   bool setup_doubted = false;     // see SetupBelief
   bool displaced = false;         // the organ is not where the map has it, or the tracker errs, see OrganWatch
   DisplacedCause cause = DisplacedCause::kUnknown;
+  bool settling = false;  // the map was moved with the organ, and has not converged there since
   bool unproven = false;  // nothing has told since it was out of sight, or moved, that it is where the map has it
   double setup_variance_mm2 = 0.0;  // per axis, of what the set-up may be off by
+  // What a feature's own largest deviation may be for it to be called converged: below the configured bound by what the
+  // set-up may be off by; nothing is while no window has told of the set-up.
+  double converged_within_mm = std::numeric_limits<double>::infinity();
 
   // What is doubted in either.
   void add(const FrameDoubts& other) noexcept {
@@ -32,8 +37,10 @@ struct FrameDoubts {
     setup_doubted |= other.setup_doubted;
     if (other.displaced) cause = displaced && cause != other.cause ? DisplacedCause::kUnknown : other.cause;
     displaced |= other.displaced;
+    settling |= other.settling;
     unproven |= other.unproven;
     setup_variance_mm2 = std::max(setup_variance_mm2, other.setup_variance_mm2);
+    converged_within_mm = std::min(converged_within_mm, other.converged_within_mm);
   }
 };
 

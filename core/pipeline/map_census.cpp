@@ -7,7 +7,7 @@
 
 namespace perimap {
 
-void count_states(std::span<const FeatureSlot> slots, Instant seen, int matches_needed,
+void count_states(std::span<const FeatureSlot> slots, Instant seen, const FrameDoubts& doubts, int matches_needed,
                   PipelineCounters& counters) noexcept {
   std::uint64_t starting = 0;
   std::uint64_t converging = 0;
@@ -18,7 +18,7 @@ void count_states(std::span<const FeatureSlot> slots, Instant seen, int matches_
     if (slot.state != SlotState::kMapped) continue;
     if (slot.health.state() == HealthState::kInconsistent) {
       ++inconsistent;
-    } else if (is_called_converged(slot, seen)) {
+    } else if (is_called_converged(slot, seen, doubts)) {
       ++converged;
     } else {
       ++converging;

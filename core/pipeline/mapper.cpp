@@ -96,8 +96,10 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage&
   job_.doubts.setup_doubted = watcher_.belief().doubted();
   job_.doubts.displaced = organ_.displaced();
   job_.doubts.cause = organ_.cause();
+  job_.doubts.settling = organ_.settling();
   job_.doubts.unproven = organ_.unproven();
   job_.doubts.setup_variance_mm2 = watcher_.belief().variance_mm2();
+  job_.doubts.converged_within_mm = watcher_.within_mm(settings_.estimator.converged_deviation_mm);
   job_.starts_fail_alike = starts_fail_alike(slots_);
   job_.surface_there = surface_.there();
   job_.law = phases_.heart().clock().law_belief();
@@ -251,7 +253,8 @@ void Mapper::finish_learning() noexcept {
   if (tally.put_off) counters_.learning_put_off.add();
   if (stopwatch_.learnt(tally.ended)) shed_load(tally.put_off);
   const Instant seen = job_.frame != nullptr ? job_.frame->stamp.capture : Instant{};
-  count_states(slots_, seen, settings_.estimator.start_observations, counters_);
+  count_states(slots_, seen, job_.doubts, settings_.estimator.start_observations, counters_);
+  organ_.note_converged(counters_.features_converged.get() > 0);
 }
 
 // By the time that the last frame took. What a machine takes differs from run to run, so never in lockstep.
@@ -314,6 +317,7 @@ void Mapper::move_map_with(const RestingOrgan& organ) noexcept {
 
 void Mapper::recall(const MapMemory& memory, Instant now) {
   phases_.recall(memory, now);
+  watcher_.recall();
   const std::uint32_t largest_id = keeping_.recall(memory.features, phases_.breathing());
   if (largest_id > 0) intake_.go_on_from(largest_id, now - memory.last_capture);
   stages_.hand_over_recalled(memory.last_capture);

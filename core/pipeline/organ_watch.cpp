@@ -219,6 +219,7 @@ void OrganWatch::look_for_rest(Instant now) noexcept {
 void OrganWatch::begin_anew() noexcept {
   settle();
   known_.unproven = true;
+  known_.settling = true;
   tool_.move_home();
 }
 

@@ -59,6 +59,9 @@ class OrganWatch {
   [[nodiscard]] bool displaced() const noexcept { return displaced_.since.has_value(); }
   // Nothing has told since the map was moved, or out of sight, that the organ is where the map has it.
   [[nodiscard]] bool unproven() const noexcept { return known_.unproven; }
+  // The map has been moved with the organ, and nothing has converged there since: that is why nothing is good.
+  [[nodiscard]] bool settling() const noexcept { return known_.settling; }
+  void note_converged(bool some) noexcept { known_.settling = known_.settling && (known_.unproven || !some); }
   // Captures from this one on are not to be learnt from; none: all are.
   [[nodiscard]] const std::optional<Instant>& displaced_since() const noexcept { return displaced_.since; }
   // Maps the map's points to where they are now.
@@ -103,6 +106,7 @@ class OrganWatch {
     DisplacedSurface surface;
     std::optional<Instant> seen;
     bool unproven = false;
+    bool settling = false;
   };
   // Since the organ was last where the map has it.
   struct Displaced {

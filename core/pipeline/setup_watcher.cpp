@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "core/pipeline/match_covariance.hpp"
@@ -17,6 +18,8 @@ constexpr Duration kRoundEvery = std::chrono::seconds(3);
 constexpr Duration kRoundTakes = std::chrono::milliseconds(700);
 // Where there is too little for a round yet, until it is looked for again.
 constexpr Duration kLookAgain = std::chrono::milliseconds(300);
+// Where too few features have matches enough by then, as in a scene that has few, no round is waited for.
+constexpr Duration kWaitsForFeatures = std::chrono::seconds(4);
 // What follows is evidence, and counted: equations against unknowns. The window takes a frame in 50 ms, so that it is
 // the same at every frame rate from 20 on.
 constexpr std::size_t kFewestFrames = 80;  // told ones, before a round
@@ -44,6 +47,8 @@ void SetupWatcher::keep(const FrameHistory& history, std::span<const FeatureSlot
   window_.tell(history);
   window_.add(frame, slots);
   if (!first_capture_) first_capture_ = frame.stamp.capture;
+  if (!enough_ && window_.told() >= kFewestFrames) enough_ = frame.stamp.capture;
+  if (enough_ && !hand_over_.under_way() && frame.stamp.capture - *enough_ > kWaitsForFeatures) asked_ = true;
   if (hand_over_.under_way() || frame.index < next_round_at_) return;
   next_round_at_ = frame.index + frame.rate.frames(kLookAgain);
   // What was judged already tells nothing new: a tool that is hidden, a phase that is lost.
@@ -64,6 +69,7 @@ void SetupWatcher::adopt(const FrameRecord& frame) noexcept {
   if (frame.index < adopted_at_ || !hand_over_.finish()) return;
   if (std::exchange(discarded_, false)) return;
   belief_.add(verdict_, frame.stamp.capture - *first_capture_);
+  asked_ = true;
   status_.write(belief_);
 }
 
@@ -136,6 +142,13 @@ void SetupWatcher::copy_window(const MapBank& bank, const FrameRate& rate) noexc
     }
     if (count >= kFewestFeatures) round.frames[round.frame_count++] = frame;
   }
+}
+
+double SetupWatcher::within_mm(double bound_mm) const noexcept {
+  if (!asked_) return -1.0;
+  // All of it may lie in the direction in which the feature is least certain.
+  const double widening_mm = belief_.widening_mm();
+  return std::sqrt(std::max(0.0, bound_mm * bound_mm - widening_mm * widening_mm));
 }
 
 void SetupWatcher::serve() noexcept {

@@ -115,7 +115,7 @@ void ShardStages::hand_over_recalled(Instant last_capture) noexcept {
         for (std::size_t lane = 0; lane < group.slots().size(); ++lane) {
           if (group.slots()[lane].state != SlotState::kMapped) continue;
           FeatureSnapshot& feature = snapshot.features.emplace_back();
-          describe(group.slots()[lane], last_capture, feature);
+          describe(group.slots()[lane], last_capture, FrameDoubts{}, feature);
           bank_.get(group.feature(lane), feature.x);
         }
       });

@@ -61,9 +61,12 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   if (footing.pose_missing) return SurfaceReason::kPoseMissing;
   if (footing.doubts.setup_doubted) return SurfaceReason::kSetupDoubted;
   if (footing.doubts.displaced) return reason_of(footing.doubts.cause);
-  if (footing.not_seen || footing.doubts.unproven) return SurfaceReason::kNotSeen;
+  if (footing.not_seen) return SurfaceReason::kNotSeen;
+  // What a map lacks that was just moved with the organ, it lacks for that.
+  const bool settling = footing.doubts.settling;
+  if (footing.doubts.unproven) return settling ? SurfaceReason::kOrganMoved : SurfaceReason::kNotSeen;
   if (footing.no_parallax) return SurfaceReason::kNoParallax;
-  if (!footing.converged) return SurfaceReason::kNothingConverged;
+  if (!footing.converged) return settling ? SurfaceReason::kOrganMoved : SurfaceReason::kNothingConverged;
   if (phase.ectopic) return SurfaceReason::kEctopicBeat;
   if (rhythm == Rhythm::kUnpredictable) return SurfaceReason::kRhythmUnpredictable;
   if (rhythm == Rhythm::kEctopic) return SurfaceReason::kRhythmEctopic;

@@ -27,11 +27,16 @@ class SetupBelief {
     const bool doubts = verdict.state == SetupState::kDoubted;
     const bool again = doubts && newest_.state == SetupState::kDoubted && blame_alike(verdict, newest_);
     const bool certain = doubts && verdict.certainty >= kCertain;
-    // A window that is undetermined, the scope at rest, neither ends a doubt nor takes a count or a widening back.
+    // A window that is undetermined, the scope at rest, neither ends a doubt nor takes a count back, nor what a window
+    // that knew more has widened.
     if (doubts) consistent_ = 0;
     if (verdict.state == SetupState::kConsistent) ++consistent_;
-    const bool tells = doubts || verdict.state == SetupState::kConsistent;
-    widening_mm_ = tells ? verdict.widening_mm : std::max(widening_mm_, verdict.widening_mm);
+    const bool knows = doubts || verdict.state == SetupState::kConsistent ||
+                       (verdict.matches > 0 && verdict.surface_deviation_mm <= widened_at_mm_);
+    if (knows || verdict.widening_mm > widening_mm_) {
+      widening_mm_ = verdict.widening_mm;
+      widened_at_mm_ = verdict.surface_deviation_mm;
+    }
     newest_ = verdict;
     if (again || certain || (doubts && doubted_)) {
       if (!first_doubted_) first_doubted_ = after;
@@ -78,6 +83,7 @@ class SetupBelief {
   int consistent_ = 0;  // windows since the last one that doubts
   int unknown_ = 0;     // windows in a row
   double widening_mm_ = 0.0;
+  double widened_at_mm_ = 0.0;  // the surface's deviation in the window that it is of
   std::uint64_t judged_ = 0;
   std::optional<Duration> first_doubted_;
 };

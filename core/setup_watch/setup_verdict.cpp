@@ -104,8 +104,9 @@ SetupVerdict judge_setup(const SetupFit& fit, const SetupVerdictSettings& settin
     blamed = more;
   }
   if (!blamed.numbers.empty()) verdict.surface_mm = surface_mm(fit, blamed.deviation);
-  const double by_chance = caution * settings.chance_chi2;
-  if (verdict.explained > by_chance) verdict.widening_mm = verdict.surface_mm * (1.0 - by_chance / verdict.explained);
+  if (verdict.explained > settings.chance_chi2) {
+    verdict.widening_mm = verdict.surface_mm * std::sqrt(1.0 - settings.chance_chi2 / verdict.explained);
+  }
   if (!blamed.numbers.empty() && verdict.surface_mm > settings.doubted_mm) {
     verdict.state = SetupState::kDoubted;
     verdict.blamed = blamed.parts;

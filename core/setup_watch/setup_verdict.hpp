@@ -53,9 +53,9 @@ struct SetupVerdictSettings {
   double doubted_chi2 = 25.0;
   double doubted_chi2_per_number = 3.0;
   double undetermined_mm = 1.5;  // deviation of the surface
-  // So much of chi-squared is explained in hardly any window of a right set-up (docs/evidence/setup-watch.md): what is
-  // explained beyond widens, in the way of James and Stein (Proc. 4th Berkeley Symp. 1961).
-  double chance_chi2 = 16.0;
+  // So much of chi-squared is explained by chance (docs/evidence/setup-watch.md): what is explained beyond widens, in
+  // the way of James and Stein (Proc. 4th Berkeley Symp. 1961). Without caution: what widens by chance is taken back.
+  double chance_chi2 = 8.0;
 };
 
 // Parts are blamed one after the other, each time that which explains most of what is left.

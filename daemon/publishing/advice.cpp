@@ -62,7 +62,7 @@ std::string_view remedy_of(perimap_SurfaceReason reason) noexcept {
     case perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED:
       return "let the organ go back, or see what disturbs the tracker; if the organ was moved: perimap ctl organ-moved";
     case perimap_SURFACE_REASON_ORGAN_MOVED:
-      return "let the organ come to rest: the map is then moved with it";
+      return "let the organ come to rest and look at it: the map is moved with it";
     case perimap_SURFACE_REASON_TRACKER_ERRS:
       return "see what disturbs the tracker: metal, a sensor that has slipped, its line of sight";
   }

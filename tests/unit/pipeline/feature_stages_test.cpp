@@ -302,5 +302,23 @@ TEST_F(Candidate, WhosePlaceIsHardlyToldIsNotFound) {
   EXPECT_NE(slot.match.state, MatchState::kFound);
 }
 
+TEST(Feature, IsCalledConvergedOnlyAsFarAsTheSetUpThatItWasSeenByIsKnown) {
+  FeatureSlot slot;
+  slot.state = SlotState::kMapped;
+  slot.converged = slot.match_agrees = true;
+  slot.largest_deviation_mm = 0.5;
+  FeatureSnapshot snapshot;
+  FrameDoubts doubts;
+  doubts.converged_within_mm = 0.6;
+  describe(slot, slot.last_observed, doubts, snapshot);
+  EXPECT_EQ(snapshot.state, FeatureState::kConverged);
+  for (const double within_mm : {0.4, -1.0}) {
+    doubts.converged_within_mm = within_mm;
+    describe(slot, slot.last_observed, doubts, snapshot);
+    EXPECT_EQ(snapshot.state, FeatureState::kConverging);
+    EXPECT_EQ(snapshot.reason, FeatureReason::kDeviationLarge);
+  }
+}
+
 }  // namespace
 }  // namespace perimap

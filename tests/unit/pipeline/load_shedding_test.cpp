@@ -306,10 +306,10 @@ TEST_F(Shedding, AShedFeatureSaysSoAndIsNotCalledConvergedForEver) {
   slot.last_observed = Instant(std::chrono::seconds(100));
   slot.shed = true;
   FeatureSnapshot snapshot;
-  describe(slot, slot.last_observed + kBelievedUnseen, snapshot);
+  describe(slot, slot.last_observed + kBelievedUnseen, FrameDoubts{}, snapshot);
   EXPECT_EQ(snapshot.state, FeatureState::kConverged);
   EXPECT_EQ(snapshot.reason, FeatureReason::kShed);
-  describe(slot, slot.last_observed + kBelievedUnseen + milliseconds(1), snapshot);
+  describe(slot, slot.last_observed + kBelievedUnseen + milliseconds(1), FrameDoubts{}, snapshot);
   EXPECT_EQ(snapshot.state, FeatureState::kConverging);
   EXPECT_EQ(snapshot.reason, FeatureReason::kShed);
 }
@@ -319,11 +319,11 @@ TEST_F(Shedding, TakenBackAFeatureIsCalledConvergedOnlyWhenItHasBeenObserved) {
   slot.last_observed = Instant(std::chrono::seconds(100));
   FeatureSnapshot snapshot;
   const Instant now = slot.last_observed + 2 * kBelievedUnseen;
-  describe(slot, now, snapshot);
+  describe(slot, now, FrameDoubts{}, snapshot);
   EXPECT_EQ(snapshot.state, FeatureState::kConverging);
   EXPECT_EQ(snapshot.reason, FeatureReason::kNotObserved);
   slot.match_agrees = true;
-  describe(slot, now, snapshot);
+  describe(slot, now, FrameDoubts{}, snapshot);
   EXPECT_EQ(snapshot.state, FeatureState::kConverged);
   EXPECT_EQ(snapshot.reason, FeatureReason::kNone);
 }
@@ -331,14 +331,14 @@ TEST_F(Shedding, TakenBackAFeatureIsCalledConvergedOnlyWhenItHasBeenObserved) {
 TEST_F(Shedding, AShedFeatureIsNotExpectedToBeSeenNorIsOneOutOfView) {
   FeatureSlot& slot = add(1, SlotState::kMapped, true, 0.5);
   FeatureSnapshot snapshot;
-  describe(slot, slot.last_observed, snapshot);
+  describe(slot, slot.last_observed, FrameDoubts{}, snapshot);
   EXPECT_TRUE(snapshot.expected);
   slot.shed = true;
-  describe(slot, slot.last_observed, snapshot);
+  describe(slot, slot.last_observed, FrameDoubts{}, snapshot);
   EXPECT_FALSE(snapshot.expected);
   slot.shed = false;
   slot.in_view = false;
-  describe(slot, slot.last_observed, snapshot);
+  describe(slot, slot.last_observed, FrameDoubts{}, snapshot);
   EXPECT_FALSE(snapshot.expected);
 }
 

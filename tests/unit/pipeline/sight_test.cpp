@@ -83,7 +83,7 @@ TEST(Sight, AFeatureIsInSightForHalfASecondAfterItAgreedWithTheMap) {
   slot.last_observed = Instant(std::chrono::seconds(100));
   const auto in_sight = [&](Duration later) {
     FeatureSnapshot snapshot;
-    describe(slot, slot.last_observed + later, snapshot);
+    describe(slot, slot.last_observed + later, FrameDoubts{}, snapshot);
     return snapshot.in_sight;
   };
   EXPECT_TRUE(in_sight(milliseconds(500)));

@@ -114,6 +114,23 @@ TEST(SurfaceState, SaysOrganOrTrackerWhereThePatientsToolTellsThemApart) {
   EXPECT_EQ(state_of(SurfaceReason::kTrackerErrs), SurfaceState::kDegraded);
 }
 
+TEST(SurfaceState, SaysOfAMapThatWasMovedWithTheOrganThatThatIsWhyNothingHasConverged) {
+  ShardSnapshot shard;
+  shard.features.resize(1);
+  const ShardSnapshot* const shards[] = {&shard};
+  const auto reason = [&] { return reason_of(locked(), Rhythm::kPredictable, footing_of(shards)); };
+  EXPECT_EQ(reason(), SurfaceReason::kNothingConverged);
+  shard.doubts.settling = true;
+  EXPECT_EQ(reason(), SurfaceReason::kOrganMoved);
+  shard.features[0].state = FeatureState::kConverged;
+  shard.features[0].expected = shard.features[0].in_sight = true;
+  EXPECT_EQ(reason(), SurfaceReason::kNone);
+  shard.doubts.unproven = true;
+  EXPECT_EQ(reason(), SurfaceReason::kOrganMoved);
+  shard.doubts.settling = false;
+  EXPECT_EQ(reason(), SurfaceReason::kNotSeen);
+}
+
 TEST(SurfaceState, IsDegradedWhileTheTrackerOrTheCameraRepeatsItself) {
   ShardSnapshot shard;
   shard.doubts.pose_repeated = true;

@@ -127,6 +127,23 @@ TEST(SetupBelief, WidensByTheNewestWindow) {
   EXPECT_EQ(belief.variance_mm2(), 0.0);
 }
 
+TEST(SetupBelief, WhatAWindowWidenedThatKnewLittleIsTakenBackByOneThatKnowsMore) {
+  SetupBelief belief;
+  SetupVerdict told = verdict(SetupState::kUndetermined);
+  told.matches = 500;
+  told.surface_deviation_mm = 4.0;
+  told.widening_mm = 1.5;
+  belief.add(told, seconds(3));
+  EXPECT_NEAR(belief.widening_mm(), 1.5, 1e-12);
+  told.widening_mm = 0.0;
+  told.surface_deviation_mm = 5.0;
+  belief.add(told, seconds(5));
+  EXPECT_NEAR(belief.widening_mm(), 1.5, 1e-12) << "it knows less";
+  told.surface_deviation_mm = 3.0;
+  belief.add(told, seconds(6));
+  EXPECT_EQ(belief.widening_mm(), 0.0);
+}
+
 TEST(SetupBelief, StaysWideWhileTheScopeRests) {
   SetupBelief belief;
   SetupVerdict told = verdict(SetupState::kConsistent);
