@@ -23,8 +23,8 @@ constexpr double kNarrowest = 0.5;      // to here
 constexpr double kOwn = -8.0;           // of a paced heart's own beat, which is narrower by more than
 constexpr double kOwnFrom = 0.0;        // this,
 constexpr double kOwnFully = 0.15;      // fully from here on,
-constexpr double kOwnTooEarly = -0.5;   // and comes no earlier than here: log of the interval to the cycle,
-constexpr double kOwnInTime = -0.3;     // likewise
+constexpr double kOwnTooEarly = -0.4;   // and comes no earlier than here: log of the interval to the cycle,
+constexpr double kOwnInTime = -0.2;     // likewise
 
 // From 0 to 1 between two limits.
 double rising(double value, double from, double to) noexcept {

@@ -65,11 +65,20 @@ TEST_F(Classed, APacedHeartsOwnBeatsAreNormalAndItsVentricularOnesAreNot) {
   for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal);
   for (int i = 0; i < 10; ++i) {
     EXPECT_EQ(beat(690, 1.0), BeatClass::kNormal) << i;
-    EXPECT_EQ(beat(615, 1.0), BeatClass::kNormal) << i;
+    EXPECT_EQ(beat(670, 1.0), BeatClass::kNormal) << i;
     EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal) << i;
     EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal) << i;
     EXPECT_EQ(beat(590, 0.3), BeatClass::kPremature) << i;
     EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal) << i;
+  }
+}
+
+// From three quarters of the cycle on.
+TEST_F(Classed, APacedHeartsOwnBeatIsPrematureWhenItComesFarTooEarly) {
+  for (const int after_ms : {560, 600}) {
+    classer_ = {};
+    for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal);
+    EXPECT_EQ(beat(after_ms, 1.0), after_ms < 580 ? BeatClass::kPremature : BeatClass::kNormal) << after_ms;
   }
 }
 
