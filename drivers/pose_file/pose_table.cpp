@@ -50,6 +50,14 @@ bool is_dropout(const std::vector<double>& row, bool quaternion) {
   return std::all_of(row.begin() + (quaternion ? 4 : 1), row.end(), [](double v) { return v == 0.0; });
 }
 
+// The first column in seconds.
+Expected<std::vector<double>> times_of(const NumberTable& table, std::optional<TimeUnit> unit, std::string_view name) {
+  std::vector<double> times;
+  for (const std::vector<double>& row : table.rows) times.push_back(row[0]);
+  if (const auto made = make_seconds(times, unit, name); !made) return tl::unexpected(made.error());
+  return times;
+}
+
 Expected<std::string> read_table(const std::filesystem::path& file, std::string_view what) {
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
@@ -59,7 +67,8 @@ Expected<std::string> read_table(const std::filesystem::path& file, std::string_
 
 }  // namespace
 
-Expected<PoseTable> parse_pose_table(std::string_view text, std::string_view name, LengthUnit unit) {
+Expected<PoseTable> parse_pose_table(std::string_view text, std::string_view name, LengthUnit unit,
+                                     std::optional<TimeUnit> times) {
   const auto table = parse_number_table(text, name);
   if (!table) return tl::unexpected(table.error());
   const std::size_t columns = table->rows.front().size();
@@ -68,6 +77,8 @@ Expected<PoseTable> parse_pose_table(std::string_view text, std::string_view nam
         "{}:{}: expected 8 columns t_s,x,y,z,qx,qy,qz,qw (or a time and the 12 or 16 numbers of a matrix), got {}",
         name, table->lines.front(), columns)));
   }
+  const auto t_s = times_of(*table, times, name);
+  if (!t_s) return tl::unexpected(t_s.error());
   const double mm = unit == LengthUnit::kMetre ? 1000.0 : 1.0;
   PoseTable result;
   for (std::size_t i = 0; i < table->rows.size(); ++i) {
@@ -83,19 +94,19 @@ Expected<PoseTable> parse_pose_table(std::string_view text, std::string_view nam
           on_one_line(fmt::format("{}:{}: a position {:.0f} m away{}", name, table->lines[i], 1e-3 * pose->t.norm(),
                                   unit == LengthUnit::kMetre ? ": are its lengths in mm? Then say --unit mm" : "")));
     }
-    result.poses.push_back({row[0], *pose});
+    result.poses.push_back({(*t_s)[i], *pose});
   }
   if (result.poses.empty()) return fail(on_one_line(fmt::format("{}: there is no pose in it", name)));
   return result;
 }
 
-Expected<PoseTable> read_pose_table(const std::filesystem::path& file, LengthUnit unit) {
+Expected<PoseTable> read_pose_table(const std::filesystem::path& file, LengthUnit unit, std::optional<TimeUnit> times) {
   const auto text = read_table(file, "table of poses");
   if (!text) return tl::unexpected(text.error());
-  return parse_pose_table(*text, file.string(), unit);
+  return parse_pose_table(*text, file.string(), unit, times);
 }
 
-Expected<SignalTable> parse_signal_table(std::string_view text, std::string_view name) {
+Expected<SignalTable> parse_signal_table(std::string_view text, std::string_view name, std::optional<TimeUnit> times) {
   const auto table = parse_number_table(text, name);
   if (!table) return tl::unexpected(table.error());
   const std::size_t columns = table->rows.front().size();
@@ -103,11 +114,13 @@ Expected<SignalTable> parse_signal_table(std::string_view text, std::string_view
     return fail(
         on_one_line(fmt::format("{}:{}: expected two columns, time and value, got one", name, table->lines.front())));
   }
+  const auto t_s = times_of(*table, times, name);
+  if (!t_s) return tl::unexpected(t_s.error());
   SignalTable result;
   result.several_columns = columns > 2;
-  std::vector<const std::vector<double>*> rows;
-  for (const std::vector<double>& row : table->rows) {
-    if (is_finite(row)) rows.push_back(&row);
+  std::vector<std::size_t> rows;
+  for (std::size_t i = 0; i < table->rows.size(); ++i) {
+    if (is_finite(table->rows[i])) rows.push_back(i);
   }
   result.dropouts = table->rows.size() - rows.size();
   if (rows.empty()) return fail(on_one_line(fmt::format("{}: there is no value in it", name)));
@@ -115,7 +128,8 @@ Expected<SignalTable> parse_signal_table(std::string_view text, std::string_view
   const auto width = static_cast<Eigen::Index>(columns - 1);
   Eigen::MatrixXd values(n, width);
   for (Eigen::Index i = 0; i < n; ++i) {
-    values.row(i) = Eigen::Map<const Eigen::RowVectorXd>(rows[static_cast<std::size_t>(i)]->data() + 1, width);
+    const std::vector<double>& row = table->rows[rows[static_cast<std::size_t>(i)]];
+    values.row(i) = Eigen::Map<const Eigen::RowVectorXd>(row.data() + 1, width);
   }
   Eigen::VectorXd along = values.col(0);
   if (width > 1) {
@@ -124,7 +138,7 @@ Expected<SignalTable> parse_signal_table(std::string_view text, std::string_view
     along = values * eigen.eigenvectors().col(width - 1);
   }
   for (Eigen::Index i = 0; i < n; ++i) {
-    result.values.push_back({(*rows[static_cast<std::size_t>(i)])[0], along[i]});
+    result.values.push_back({(*t_s)[rows[static_cast<std::size_t>(i)]], along[i]});
   }
   const auto earlier = [](const TimedValue& a, const TimedValue& b) { return a.t_s < b.t_s; };
   const auto same = [](const TimedValue& a, const TimedValue& b) { return a.t_s == b.t_s; };
@@ -133,10 +147,10 @@ Expected<SignalTable> parse_signal_table(std::string_view text, std::string_view
   return result;
 }
 
-Expected<SignalTable> read_signal_table(const std::filesystem::path& file) {
+Expected<SignalTable> read_signal_table(const std::filesystem::path& file, std::optional<TimeUnit> times) {
   const auto text = read_table(file, "table of a signal");
   if (!text) return tl::unexpected(text.error());
-  return parse_signal_table(*text, file.string());
+  return parse_signal_table(*text, file.string(), times);
 }
 
 }  // namespace perimap

@@ -43,6 +43,8 @@ void IgtlSession::on_open(LinkControl& link, Instant now) {
   clock_.reset();
   stamps_.restart();
   stamps_told_.clear();  // what is still wrong is told again
+  missing_told_ = false;
+  health_.set_notice("");
   reference_ = {};
   reference_follows_ = false;
   held_.reset();
@@ -181,7 +183,17 @@ Instant IgtlSession::stamped(const Told& told) const noexcept {
   return std::min(clock_.stamp(told.time_ns), told.arrival);
 }
 
+void IgtlSession::note_missing_stamp(const Told& sensor) {
+  if (sensor.sent_stamp != 0 || settings_.stamps_by_arrival || missing_told_) return;
+  missing_told_ = true;
+  health_.set_notice(
+      "the server sends poses without time stamps: each is stamped by its arrival, later than it was measured by the "
+      "server's and the network's delay, which perimap calibrate time measures where it is constant; let the server "
+      R"(stamp them, or set tracker.igtl_stamps = "arrival" if that is meant)");
+}
+
 bool IgtlSession::stamps_wrong(const Told& sensor) {
+  note_missing_stamp(sensor);
   if (sensor.stamp == 0) return false;
   stamps_.observe(sensor.stamp, sensor.arrival);
   if (stamps_.fault() != stamps_told_) {

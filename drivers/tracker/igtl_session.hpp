@@ -41,8 +41,8 @@ struct IgtlSettings {
 // after that the server is listened to for a second before one tool counts as the only one.
 //
 // The protocol has no common clock: stamps are the sender's, fitted to the host's by their arrival; a message without a
-// stamp is stamped by its arrival. So is what comes before the stamps have been watched for a second (StampCheck);
-// where they are wrong no pose is given, and the reason says what they are.
+// stamp is stamped by its arrival, which the notice says of the sensor's. So is what comes before the stamps have been
+// watched for a second (StampCheck); where they are wrong no pose is given, and the reason says what they are.
 class IgtlSession final : public DeviceProtocol {
  public:
   IgtlSession(IgtlSettings settings, TrackerSink sink, DeviceHealth& health, ToolSink tool_sink = {});
@@ -69,6 +69,8 @@ class IgtlSession final : public DeviceProtocol {
   };
   // Whether the sensor's stamp is wrong, as all are then; tells when that changes.
   [[nodiscard]] bool stamps_wrong(const Told& sensor);
+  // Notes a sensor whose messages have none, which nobody said are not to be looked at.
+  void note_missing_stamp(const Told& sensor);
   [[nodiscard]] Instant stamped(const Told& told) const noexcept;
   // The same pose with the same stamp: some servers repeat their last message, also while the tool is out of sight. A
   // sensor has noise, so another pose is another reading, whatever its stamp.
@@ -97,7 +99,8 @@ class IgtlSession final : public DeviceProtocol {
   IgtlFramer framer_;
   ArrivalClock clock_{{.period_ns = 1.0}};
   StampCheck stamps_;
-  std::string stamps_told_;  // what is wrong with them
+  std::string stamps_told_;    // what is wrong with them
+  bool missing_told_ = false;  // that there are none, in this connection
   Told reference_;
   // Servers that send the sensor before the reference of the same instant: the sensor then waits for it.
   bool reference_follows_ = false;

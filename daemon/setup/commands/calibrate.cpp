@@ -47,7 +47,7 @@ SetupExpected<std::vector<TimedPose>> poses_of(const PosesOptions& options) {
     return wrong_setup("expected a file of poses, a recording with --from, or devices with --live");
   }
   if (!options.recording.empty()) return read_recorded_poses(options.recording, options.tool);
-  const auto table = read_pose_table(options.poses, options.common.length_unit());
+  const auto table = read_pose_table(options.poses, options.common.length_unit(), options.common.unit_of_times());
   if (!table) return tl::unexpected(table.error());
   return in_order(table->poses);
 }
@@ -129,6 +129,7 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
           "The tracked tool: with --from or --live one of the recording's, scope being the scope's sensor; with a "
           "file what it is written down as")
       ->capture_default_str();
+  add_time_unit(command, options->common);
   add_common(command, options->common, true, true);
 }
 

@@ -33,9 +33,10 @@ SetupExpected<HandEyeCalibration> by_files(const HandEyeOptions& options) {
   if (options.camera.empty() || options.tracker.empty()) {
     return wrong_setup("expected --camera-poses and --tracker-poses, or a recording with --from");
   }
-  const auto camera = read_pose_table(options.camera, options.motion.common.length_unit());
+  const CommonOptions& common = options.motion.common;
+  const auto camera = read_pose_table(options.camera, common.length_unit(), common.unit_of_times());
   if (!camera) return tl::unexpected(camera.error());
-  const auto tracker = read_pose_table(options.tracker, options.motion.common.length_unit());
+  const auto tracker = read_pose_table(options.tracker, common.length_unit(), common.unit_of_times());
   if (!tracker) return tl::unexpected(tracker.error());
   return calibrate_hand_eye(camera->poses, tracker->poses, options.settings);
 }
@@ -91,6 +92,7 @@ void add_calibrate_hand_eye(Commands& commands, Command& calibrate) {
   command.add_option("--largest-offset-s", options->settings.largest_offset_s, "The clocks differ by no more")
       ->check(Range(0.0, 3600.0))
       ->capture_default_str();
+  add_time_unit(command, options->motion.common);
   add_common(command, options->motion.common, true, true);
 }
 

@@ -52,9 +52,9 @@ SetupExpected<Measurement> measure(const TimeOptions& options, const Console& co
   if (options.signals.size() != 2) {
     return wrong_setup("calibrate time takes two signals, --signal A.csv --signal B.csv, or a recording with --from");
   }
-  const auto first = read_signal_table(options.signals[0]);
+  const auto first = read_signal_table(options.signals[0], options.motion.common.unit_of_times());
   if (!first) return tl::unexpected(first.error());
-  const auto second = read_signal_table(options.signals[1]);
+  const auto second = read_signal_table(options.signals[1], options.motion.common.unit_of_times());
   if (!second) return tl::unexpected(second.error());
   const auto result = measure_signal_offset(first->values, second->values, options.largest_offset_s);
   if (!result) return tl::unexpected(result.error());
@@ -78,6 +78,7 @@ void add_calibrate_time(Commands& commands, Command& calibrate) {
   command.add_option("--largest-offset-s", options->largest_offset_s, "The clocks differ by no more")
       ->check(Range(0.0, 3600.0))
       ->capture_default_str();
+  add_time_unit(command, options->motion.common);
   add_common(command, options->motion.common, false, true);
 }
 

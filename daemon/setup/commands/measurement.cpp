@@ -120,6 +120,13 @@ void add_common(Command& command, CommonOptions& options, bool has_unit, bool ha
   }
 }
 
+void add_time_unit(Command& command, CommonOptions& options) {
+  command
+      .add_option("--time-unit", options.time_unit,
+                  "Unit of the files' times. Without it they are seconds, and refused where they cannot be")
+      ->check(OneOf({"s", "ms", "us", "ns"}));
+}
+
 std::string joined(const std::vector<std::string>& files) { return fmt::format("{}", fmt::join(files, ", ")); }
 
 std::vector<std::string> named(std::vector<std::string> files) {

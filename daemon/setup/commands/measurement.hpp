@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,12 +18,14 @@ namespace perimap {
 // What every calibration is told besides its input.
 struct CommonOptions {
   std::string unit = "m";
+  std::string time_unit;  // of the files' times; empty: seconds, and what cannot be seconds is refused
   bool json = false;
   std::string output;         // the result as a file
   std::string html;           // a page with pictures
   std::string configuration;  // whose keys the result becomes
 
   [[nodiscard]] LengthUnit length_unit() const { return unit == "mm" ? LengthUnit::kMillimetre : LengthUnit::kMetre; }
+  [[nodiscard]] std::optional<TimeUnit> unit_of_times() const { return time_unit_named(time_unit); }
 };
 
 // What a calibration gives.
@@ -46,6 +49,9 @@ struct Measurement {
 
 // --unit, --json, --output, --html and --configuration, for results that have them.
 void add_common(Command& command, CommonOptions& options, bool has_unit, bool has_keys);
+
+// --time-unit, for what reads tables over time.
+void add_time_unit(Command& command, CommonOptions& options);
 
 // --output as a value of --configuration, whose folder names start from; empty without one.
 [[nodiscard]] std::string output_key(const CommonOptions& options);

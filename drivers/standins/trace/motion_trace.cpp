@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <cstddef>
+#include <optional>
 
 #include "drivers/pose_file/number_table.hpp"
+#include "drivers/pose_file/table_times.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -19,6 +21,13 @@ std::string point_name(const NumberTable& table, std::size_t point) {
   if (table.heading.empty()) return std::to_string(point + 1);
   const std::string& x = table.heading[1 + 3 * point];
   return x.size() > 2 && (x[x.size() - 2] == '_' || x[x.size() - 2] == '.') ? x.substr(0, x.size() - 2) : x;
+}
+
+// That the first column can be seconds.
+Expected<void> check_seconds(const NumberTable& table, std::string_view name) {
+  std::vector<double> times;
+  for (const std::vector<double>& row : table.rows) times.push_back(row.front());
+  return make_seconds(times, std::nullopt, name);
 }
 
 template <class Parse>
@@ -40,6 +49,7 @@ Expected<MotionTrace> parse_motion_trace(std::string_view text, std::string_view
   if (columns < 4 || columns % 3 != 1) {
     return fail(fmt::format("{}: expected a time and x, y, z of each point, got {} columns", name, columns));
   }
+  if (const auto seconds = check_seconds(*table, name); !seconds) return tl::unexpected(seconds.error());
   MotionTrace trace;
   trace.first_s = rows.front().front();
   trace.period_s = (rows.back().front() - trace.first_s) / static_cast<double>(rows.size() - 1);
@@ -70,6 +80,7 @@ Expected<MotionTrace> read_motion_trace(const std::filesystem::path& file) {
 Expected<std::vector<double>> parse_r_peaks(std::string_view text, std::string_view name) {
   const auto table = parse_number_table(text, name);
   if (!table) return tl::unexpected(table.error());
+  if (const auto seconds = check_seconds(*table, name); !seconds) return tl::unexpected(seconds.error());
   std::vector<double> peaks_s;
   for (std::size_t i = 0; i < table->rows.size(); ++i) {
     const double t = table->rows[i].front();

@@ -41,6 +41,29 @@ TEST(IgtlSession, TellsWhosePosesTheServerSends) {
   EXPECT_EQ(health.identity(), "sends poses of Probe, Scope");
 }
 
+TEST(IgtlSession, NotesPosesWithoutStampsOnceUnlessArrivalsAreAskedFor) {
+  for (const bool by_arrival : {false, true}) {
+    for (const bool stamped : {false, true}) {
+      DeviceHealth health;
+      std::size_t samples = 0;
+      IgtlSession session(
+          {.sensor = "Scope", .reference = std::nullopt, .world = {}, .stamps_by_arrival = by_arrival},
+          [&](const TrackerSample&) { ++samples; }, health);
+      ScriptedLink link;
+      session.on_open(link, kStart);
+      Pose X = kPose;
+      for (std::uint64_t i = 1; i <= 3; ++i) {
+        X.t.x() += 0.1;  // another reading
+        session.on_bytes(link,
+                         encode_igtl({1, "TRANSFORM", "Scope", stamped ? i << 32U : 0, encode_igtl_transform(X), {}}),
+                         kStart + seconds(i));
+      }
+      EXPECT_EQ(samples, 3U);
+      EXPECT_EQ(health.notice().find("without time stamps") != std::string::npos, !stamped && !by_arrival);
+    }
+  }
+}
+
 TEST(IgtlSession, AToolLeftOutOfTdataOrMarkedSoIsMissing) {
   using Message = IgtlEmulatorSettings::Message;
   EmulatorFaults faults;

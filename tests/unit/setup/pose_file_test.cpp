@@ -1,9 +1,12 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "drivers/pose_file/number_table.hpp"
 #include "drivers/pose_file/point_table.hpp"
@@ -58,6 +61,51 @@ TEST(PoseTable, NamesLineAndFault) {
   EXPECT_THAT(pose_error("0,800,0,0,0,0,0,1\n"), HasSubstr("--unit mm"));
   EXPECT_THAT(pose_error(""), HasSubstr("no numbers"));
   EXPECT_THAT(pose_error("t,x,y,z,qx,qy,qz,qw\n"), HasSubstr("no numbers"));
+}
+
+// As a device writes them: `rate` times a second from `first`, in `unit`ths of a second.
+std::string timed_rows(double first, double rate, std::size_t count, double unit, std::string_view rest) {
+  std::string text;
+  for (std::size_t i = 0; i < count; ++i) {
+    text += fmt::format("{:.0f}{}\n", (first + static_cast<double>(i) / rate) * unit, rest);
+  }
+  return text;
+}
+
+TEST(TableTimes, ThatAreNoSecondsAreRefusedByTheUnitThatTheyLookLike) {
+  constexpr std::string_view kPose = ",0,0,0,0,0,0,1";
+  constexpr double kToday = 1764244800.0;
+  for (const double first : {0.0, kToday}) {
+    for (const auto& [name, unit] : {std::pair("ns", 1e9), std::pair("us", 1e6), std::pair("ms", 1e3)}) {
+      for (const double rate : {15.0, 30.0, 100.0}) {
+        const std::string text = timed_rows(first, rate, 4000, unit, kPose);
+        EXPECT_THAT(pose_error(text), testing::AllOf(HasSubstr("poses.csv: "), HasSubstr("seconds"),
+                                                     HasSubstr(fmt::format("--time-unit {}", name))));
+        const auto signal = parse_signal_table(timed_rows(first, rate, 4000, unit, ",1"), "signal.csv");
+        ASSERT_FALSE(signal);
+        EXPECT_THAT(signal.error().message, HasSubstr(fmt::format("are they {}?", name)));
+      }
+    }
+  }
+}
+
+TEST(TableTimes, AreSecondsOfTheUnitThatIsSaid) {
+  const auto table = parse_pose_table(timed_rows(0.0, 100.0, 3, 1e9, ",0,0,0,0,0,0,1"), "poses.csv", LengthUnit::kMetre,
+                                      TimeUnit::kNanosecond);
+  ASSERT_TRUE(table) << table.error().message;
+  EXPECT_NEAR(table->poses[2].t_s, 0.02, 1e-9);
+  const auto signal = parse_signal_table("0,1\n30,2\n", "signal.csv", TimeUnit::kMillisecond);
+  ASSERT_TRUE(signal);
+  EXPECT_NEAR(signal->values[1].t_s, 0.03, 1e-12);
+}
+
+TEST(TableTimes, OfARobotsStopsOfRowsAndOfOurYearsAreSeconds) {
+  constexpr std::string_view kPose = ",0,0,0,0,0,0,1";
+  for (const std::string& text : {timed_rows(0.0, 1.0 / 60.0, 150, 1.0, kPose),       // a stop a minute
+                                  timed_rows(0.0, 1.0, 5000, 1.0, kPose),             // numbers of rows
+                                  timed_rows(1764244800.0, 0.2, 300, 1.0, kPose)}) {  // since 1970
+    EXPECT_EQ(pose_error(text), "accepted");
+  }
 }
 
 TEST(SignalTable, TakesTheDirectionOfMostMotion) {
