@@ -1,6 +1,7 @@
 #include "core/calibration/motion_offset.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -56,7 +57,11 @@ std::optional<MotionOffset> offset_by_motion(const std::vector<PosePair>& pairs,
   for (std::size_t i = 0; i < times_s.size(); ++i) {
     scores.push_back(fast_twists[i].dot(fast_errors[i] + result.change_s * fast_twists[i]));
   }
-  result.deviation_s = std::sqrt(variance_of_sum(scores)) / H;
+  // Never less than of white errors: of several windows the one whose deviation came out smallest by chance would be
+  // taken for the surest.
+  double alone = 0.0;
+  for (const double score : scores) alone += score * score;
+  result.deviation_s = std::sqrt(std::max(alone, variance_of_sum(scores))) / H;
   return result;
 }
 

@@ -1,6 +1,8 @@
 #include "core/calibration/tracker_noise.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -116,6 +118,18 @@ AxisLikelihood likelihood_of(const std::vector<TimedPose>& poses, const Errors& 
   return result;
 }
 
+// Of rotation, then of position.
+std::array<AxisLikelihood, 2> likelihoods_of(const std::vector<TimedPose>& poses, const Errors& errors,
+                                             double correlation_s, double lasting) {
+  std::array<AxisLikelihood, 2> sums;
+  for (int axis = 0; axis < 6; ++axis) {
+    const AxisLikelihood one = likelihood_of(poses, errors, axis, correlation_s, lasting);
+    AxisLikelihood& sum = sums[axis < 3 ? 0 : 1];
+    sum.sum_squares += one.sum_squares, sum.log_variances += one.log_variances, sum.count += one.count;
+  }
+  return sums;
+}
+
 struct Fit {
   double log_likelihood = -std::numeric_limits<double>::infinity();
   double rotation_variance = 0.0;  // of an axis
@@ -125,17 +139,71 @@ struct Fit {
 Fit fit_of(const std::vector<TimedPose>& poses, const Errors& errors, double correlation_s, double lasting) {
   Fit fit;
   fit.log_likelihood = 0.0;
-  for (int kind = 0; kind < 2; ++kind) {
-    AxisLikelihood sum;
-    for (int axis = 3 * kind; axis < 3 * kind + 3; ++axis) {
-      const AxisLikelihood one = likelihood_of(poses, errors, axis, correlation_s, lasting);
-      sum.sum_squares += one.sum_squares, sum.log_variances += one.log_variances, sum.count += one.count;
-    }
+  const auto sums = likelihoods_of(poses, errors, correlation_s, lasting);
+  for (std::size_t kind = 0; kind < 2; ++kind) {
+    const AxisLikelihood& sum = sums[kind];
     const double variance = std::max(1e-18, sum.sum_squares / sum.count);
     (kind == 0 ? fit.rotation_variance : fit.position_variance) = variance;
     fit.log_likelihood -= 0.5 * (sum.count * std::log(variance) + sum.log_variances);
   }
   return fit;
+}
+
+// Variances of the logarithms of what is fitted.
+struct FitCertainty {
+  double rotation_variance = 0.0;  // of the variance's logarithm
+  double position_variance = 0.0;
+  double correlation = 0.0;  // of the time's
+};
+
+// By how the likelihood bends about its top (the observed information) in the logarithms of both variances and of the
+// time, and in the share that lasts, where that is not at its end.
+FitCertainty certainty_of(const std::vector<TimedPose>& poses, const Errors& errors, const Fit& best, double log_tau,
+                          double lasting) {
+  constexpr double kTauStep = 0.05;
+  constexpr double kShareStep = 0.02;
+  const bool share_is_free = lasting + kShareStep <= 1.0 && lasting - kShareStep >= 0.0;
+  const std::array variances{best.rotation_variance, best.position_variance};
+  using Bends = Eigen::Matrix4d;
+  // Minus twice the log-likelihood at fixed variances, and the squares that these divide.
+  struct At {
+    double loss = 0.0;
+    std::array<double, 2> squares{};
+  };
+  const auto at = [&](int tau_steps, int share_steps) {
+    const auto sums =
+        likelihoods_of(poses, errors, std::exp(log_tau + kTauStep * tau_steps), lasting + kShareStep * share_steps);
+    At result;
+    for (std::size_t kind = 0; kind < 2; ++kind) {
+      result.squares[kind] = sums[kind].sum_squares / variances[kind];
+      result.loss += sums[kind].log_variances + result.squares[kind];
+    }
+    return result;
+  };
+  Bends H = Bends::Identity();  // variances of rotation and position, time, share
+  const At middle = at(0, 0), later = at(1, 0), sooner = at(-1, 0);
+  for (int kind = 0; kind < 2; ++kind) {
+    const auto k = static_cast<std::size_t>(kind);
+    H(kind, kind) = 0.5 * middle.squares[k];
+    H(kind, 2) = H(2, kind) = -0.5 * (later.squares[k] - sooner.squares[k]) / (2.0 * kTauStep);
+  }
+  H(2, 2) = 0.5 * (later.loss - 2.0 * middle.loss + sooner.loss) / (kTauStep * kTauStep);
+  if (share_is_free) {
+    const At more = at(0, 1), less = at(0, -1);
+    for (int kind = 0; kind < 2; ++kind) {
+      const auto k = static_cast<std::size_t>(kind);
+      H(kind, 3) = H(3, kind) = -0.5 * (more.squares[k] - less.squares[k]) / (2.0 * kShareStep);
+    }
+    H(3, 3) = 0.5 * (more.loss - 2.0 * middle.loss + less.loss) / (kShareStep * kShareStep);
+    H(2, 3) = H(3, 2) =
+        0.5 * (at(1, 1).loss - at(1, -1).loss - at(-1, 1).loss + at(-1, -1).loss) / (4.0 * kTauStep * kShareStep);
+  }
+  const Eigen::LLT<Bends> llt(H);
+  // No top: as good as nothing is known of the time.
+  constexpr double kOpen = 9.0;
+  if (llt.info() != Eigen::Success) return {2.0 / middle.squares[0], 2.0 / middle.squares[1], kOpen};
+  const Bends C = llt.solve(Bends::Identity());
+  return {C(0, 0), C(1, 1), std::min(kOpen, C(2, 2))};
 }
 
 std::vector<AllanPoint> allan_of(const std::vector<TimedPose>& poses, const Errors& errors) {
@@ -203,12 +271,15 @@ Expected<MeasuredNoise> measure_tracker_noise(const std::vector<TimedPose>& all)
     for (const double share : {0.1, 0.5, 0.9, 1.0}) consider(std::log(shortest) + step * k, share);
   }
   double d_tau = step / 2.0, d_share = 0.2;
-  while (d_tau > 0.02) {
+  constexpr double kFinest = 0.003;  // a tenth of what is known of it in a minute
+  while (d_tau > kFinest) {
     const double log_tau = best_log_tau;
     const double share = best_share;
     for (const double a : {-1.0, 0.0, 1.0}) {
       for (const double b : {-1.0, 0.0, 1.0}) consider(log_tau + a * d_tau, share + b * d_share);
     }
+    // Time and share go together: along their ridge it takes many steps of one length.
+    if (best_log_tau != log_tau || best_share != share) continue;
     d_tau /= 2.0;
     d_share /= 2.0;
   }
@@ -220,22 +291,13 @@ Expected<MeasuredNoise> measure_tracker_noise(const std::vector<TimedPose>& all)
   noise.drifts = lasts && tau > 0.1 * still_s;
   noise.position_deviation_mm = std::sqrt(3.0 * best.position_variance);
   noise.rotation_deviation_deg = std::sqrt(3.0 * best.rotation_variance) / kDegree;
-  // Of an error that lasts, what it is driven by is known from each pose; the variance that this makes goes with tau,
-  // which all six numbers of a pose tell together: its variance is 2 tau / (6 still_s) of its square.
-  const double of_poses = 1.0 / (3.0 * static_cast<double>(poses.size()));
-  const double of_tau = lasts ? noise.lasting_share * std::min(1.0, tau / still_s) / 6.0 : 0.0;
-  const double independent = 1.0 / (of_poses + of_tau);
-  const double relative = 1.0 / std::sqrt(2.0 * std::max(1.0, independent));
-  noise.position_deviation_mm_deviation = relative * noise.position_deviation_mm;
-  noise.rotation_deviation_deg_deviation = relative * noise.rotation_deviation_deg;
-  if (lasts) {
-    const auto at = [&](double d) {
-      return fit_of(poses, errors, std::exp(best_log_tau + d), best_share).log_likelihood;
-    };
-    constexpr double kStep = 0.1;
-    const double bend = (2.0 * at(0.0) - at(kStep) - at(-kStep)) / (kStep * kStep);
-    noise.correlation_s_factor = bend > 0.0 ? std::exp(std::min(3.0, 1.0 / std::sqrt(bend))) : std::exp(3.0);
-  }
+  const double of_poses = 2.0 / (3.0 * static_cast<double>(poses.size()));
+  FitCertainty certainty{of_poses, of_poses, 0.0};
+  if (lasts) certainty = certainty_of(poses, errors, best, best_log_tau, best_share);
+  // A deviation is half as uncertain as its square.
+  noise.position_deviation_mm_deviation = 0.5 * std::sqrt(certainty.position_variance) * noise.position_deviation_mm;
+  noise.rotation_deviation_deg_deviation = 0.5 * std::sqrt(certainty.rotation_variance) * noise.rotation_deviation_deg;
+  noise.correlation_s_factor = std::exp(std::sqrt(certainty.correlation));
   return noise;
 }
 
