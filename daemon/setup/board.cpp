@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "daemon/setup/board_markers.hpp"
+#include "daemon/setup/chessboard_evidence.hpp"
 #include "daemon/setup/marker_dictionary.hpp"
 
 namespace perimap {
@@ -56,6 +57,9 @@ std::optional<Board> recognise_chessboard(const std::vector<cv::Mat>& pictures, 
     const bool found = cv::findChessboardCornersSB(
         picture, {3, 3}, corners, cv::CALIB_CB_LARGER | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE, cells);
     if (!found || cells.rows < 2 || cells.cols < 2) continue;
+    if (cells.rows * cells.cols <= kMostCornersByChance && !is_chessboard(picture, corners, cells.cols, cells.rows)) {
+      continue;
+    }
     ++votes[{std::max(cells.cols, cells.rows), std::min(cells.cols, cells.rows)}];
   }
   if (votes.empty()) return std::nullopt;
@@ -226,6 +230,8 @@ Points grid_points(const cv::Mat& grey, const Board& board) {
           cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
       if (found) refine(grey, points.first);
     }
+    found = found && (board.columns * board.rows > kMostCornersByChance ||
+                      is_chessboard(grey, points.first, board.columns, board.rows));
     if (found) put_black_first(grey, board, points.first);
   } else {
     found = find_circles(grey, board, points.first);

@@ -82,6 +82,12 @@ SetupExpected<Measurement> measure(const CameraOptions& options, const Console& 
   const auto seen =
       options.recording.empty() ? seen_in_pictures(options, *wish) : seen_in_recording(options, *wish, console);
   if (!seen) return tl::unexpected(seen.error());
+  if (seen->views.empty()) {
+    return fail(
+        fmt::format("no board is seen in any of the {} pictures (looked for: {}): is it whole in the picture, sharp "
+                    "and evenly lit?",
+                    seen->pictures, name_of(seen->board)));
+  }
   CameraCalibrationSettings settings;
   if (options.lens == "fisheye") settings.lens = Lens::kKannalaBrandt;
   const auto result = calibrate_camera(seen->views, seen->width, seen->height, settings);

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <opencv2/aruco/charuco.hpp>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
 #include <string>
@@ -46,8 +47,8 @@ GreyImage grey_of(const cv::Mat& picture) {
   return {picture.data, picture.cols, picture.rows, static_cast<std::ptrdiff_t>(picture.step)};
 }
 
-const std::vector<Vector3d> kTurns{{0.0, 0.0, 0.0},  {0.5, 0.0, 0.1},  {0.0, 0.5, -0.2},
-                                   {-0.4, 0.3, 0.4}, {0.3, -0.5, 0.2}, {-0.5, -0.2, -0.3}};
+const std::vector<Vector3d> kTurns{{0.0, 0.0, 0.0},  {0.5, 0.0, 0.1},    {0.0, 0.5, -0.2}, {-0.4, 0.3, 0.4},
+                                   {0.3, -0.5, 0.2}, {-0.5, -0.2, -0.3}, {0.2, 0.5, 0.3},  {0.4, -0.3, -0.4}};
 
 TEST(Board, ACharucoBoardIsRecognisedWithSizeAndDictionary) {
   for (const auto& [columns, rows] : {std::pair(9, 7), std::pair(8, 5), std::pair(10, 6)}) {
@@ -121,6 +122,63 @@ TEST(Board, AChessboardIsRecognisedWithItsSize) {
   EXPECT_NEAR(result->camera.fx, 1000.0, 5.0);
   EXPECT_NEAR(result->camera.cx, 640.0, 5.0);
   EXPECT_LT(result->rms_px, 0.2);
+}
+
+// Folds and vessels: noise of a few sizes, with gloss.
+cv::Mat texture(std::uint64_t seed) {
+  cv::RNG rng(seed);
+  cv::Mat sum(480, 640, CV_32F, cv::Scalar(110));
+  for (const double size : {4.0, 9.0, 25.0}) {
+    cv::Mat noise(sum.size(), CV_32F);
+    rng.fill(noise, cv::RNG::NORMAL, 0.0, 1.0);
+    cv::GaussianBlur(noise, noise, {}, size);
+    cv::Scalar mean, deviation;
+    cv::meanStdDev(noise, mean, deviation);
+    sum += noise * (24.0 / deviation[0]);
+  }
+  cv::Mat picture;
+  sum.convertTo(picture, CV_8U);
+  return picture;
+}
+
+TEST(Board, TextureInWhichCornersAreFoundIsNoBoard) {
+  std::vector<cv::Mat> pictures;
+  std::vector<GreyImage> greys;
+  std::size_t taken_for_corners = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) pictures.push_back(texture(seed));
+  for (const cv::Mat& picture : pictures) {
+    std::vector<cv::Point2f> corners;
+    taken_for_corners +=
+        cv::findChessboardCornersSB(picture, {3, 3}, corners,
+                                    cv::CALIB_CB_LARGER | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE)
+            ? 1
+            : 0;
+    greys.push_back(grey_of(picture));
+  }
+  ASSERT_GE(taken_for_corners, 1U);  // else the textures try nothing
+  const auto board = recognise_board(greys, {});
+  ASSERT_FALSE(board) << name_of(*board);
+  EXPECT_THAT(board.error().message, HasSubstr("no board is seen"));
+}
+
+TEST(Board, AChessboardOfFewSquaresIsOne) {
+  cv::Mat drawn(6 * 80, 6 * 80, CV_8UC1, cv::Scalar(255));
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 5; ++x) {
+      if ((x + y) % 2 == 0) drawn(cv::Rect(40 + 80 * x, 60 + 80 * y, 80, 80)).setTo(0);
+    }
+  }
+  std::vector<cv::Mat> pictures;
+  std::vector<GreyImage> greys;
+  for (const Vector3d& turn : kTurns) pictures.push_back(picture_of(drawn, turn, 1.8));
+  for (const cv::Mat& picture : pictures) greys.push_back(grey_of(picture));
+  const auto board = recognise_board(greys, {});
+  ASSERT_TRUE(board) << board.error().message;
+  EXPECT_EQ(name_of(*board), "chessboard of 4x3 inner corners");
+  // The finder takes other corners for it in one or two.
+  std::size_t seen = 0;
+  for (const GreyImage& grey : greys) seen += find_board(grey, *board) ? 1 : 0;
+  EXPECT_GE(seen, 6U);
 }
 
 TEST(Board, PicturesWithoutOneAreRefused) {
