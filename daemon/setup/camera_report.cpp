@@ -49,6 +49,15 @@ std::string text_of(const CameraCalibration& result, const Board& board, const s
   std::string text =
       fmt::format("Lens of {}x{} pictures, by {} views of a {}\n", c.width, c.height, used_of(result), name_of(board));
   text += fmt::format("  focal length     {:.2f} {:.2f} px, deviations {:.2f} {:.2f}\n", c.fx, c.fy, s[0], s[1]);
+  // 95 % of a normal axis lie within 1.96 deviations.
+  constexpr double kWantedFocal = 0.003 / 1.96;
+  const double focal = std::max(s[0] / c.fx, s[1] / c.fy);
+  if (focal > kWantedFocal) {
+    text += fmt::format(
+        "                   within {:.2f} % (95 %): tilt the board by 30 degrees and more to all sides, fill the "
+        "picture, and take some {:.0f} views more to make it 0.3 %\n",
+        196.0 * focal, std::ceil((std::pow(focal / kWantedFocal, 2.0) - 1.0) * static_cast<double>(used_of(result))));
+  }
   text += fmt::format("  principal point  {:.2f} {:.2f} px, deviations {:.2f} {:.2f}\n", c.cx, c.cy, s[2], s[3]);
   // 95 % of two normal axes lie within 2.45 deviations.
   constexpr double kWanted_px = 2.0 / 2.45;
@@ -92,7 +101,10 @@ nlohmann::json json_of(const CameraCalibration& result, const Board& board, cons
   const CameraModel& c = result.camera;
   const std::vector<double>& s = result.deviations;
   nlohmann::json covariance = nlohmann::json::array();
-  for (const auto& row : result.covariance) covariance.push_back(row);
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    covariance.push_back(
+        {result.covariance(i, 0), result.covariance(i, 1), result.covariance(i, 2), result.covariance(i, 3)});
+  }
   nlohmann::json views = nlohmann::json::array();
   for (const ViewResult& view : result.views) {
     views.push_back({{"name", view.name}, {"used", view.used}, {"rms_px", view.rms_px}});
@@ -130,7 +142,8 @@ std::string calibration_text_of(const CameraCalibration& result, const Board& bo
              "calibration_time: \"{}\"\nnr_of_frames: {}\navg_reprojection_error: {}\nheld_aside_reprojection_error: "
              "{}\n"
              "focal_length_deviation: [ {}, {} ]\nprincipal_point_deviation: [ {}, {} ]\nboard: \"{}\"\n",
-             date, used_of(result), result.rms_px, result.held_aside_rms_px, s[0], s[1], s[2], s[3], name_of(board));
+             date, used_of(result), result.rms_px, result.held_aside_rms_px, s[0], s[1], s[2], s[3], name_of(board)) +
+         format_lens_covariance(result.covariance);
 }
 
 }  // namespace perimap

@@ -443,7 +443,9 @@ Expected<void> check_spread(HandEyeCalibration& result) {
 double HandEyeCalibration::target_deviation_mm() const {
   Eigen::Matrix<double, 3, 6> J;
   J << -cross_matrix({0.0, 0.0, kTargetAhead_mm}), Matrix3d::Identity();
-  return std::sqrt((J * covariance.topLeftCorner<6, 6>() * J.transpose()).trace());
+  Matrix6d alone = covariance.topLeftCorner<6, 6>();
+  if (covariance_by_lens) alone -= covariance_by_lens->topLeftCorner<6, 6>();
+  return std::hypot(std::sqrt((J * alone * J.transpose()).trace()), target_deviation_by_lens_mm);
 }
 
 Expected<HandEyeCalibration> calibrate_hand_eye(std::vector<TimedPose> camera, std::vector<TimedPose> tracker,

@@ -33,7 +33,9 @@ struct HandEyeCalibration {
   Pose X_SC;
   Pose X_WB;
   Eigen::Matrix<double, 7, 7>
-      covariance;             // as HandEyeAdjustment has it, for errors that last `correlation_length` poses
+      covariance;  // as HandEyeAdjustment has it, for errors that last `correlation_length` poses
+  // What of it the lens's own uncertainty makes; none: the lens was taken for exact.
+  std::optional<Eigen::Matrix<double, 7, 7>> covariance_by_lens;
   Matrix6d error_covariance;  // of one pose, at the sensor
   // Of the camera's lengths beside the tracker's. What it is off beyond three deviations is in `covariance`.
   BoardScale scale;
@@ -64,6 +66,9 @@ struct HandEyeCalibration {
   // Standard deviation of a target there as a 3-D norm: 95 % of such targets are within a millimetre and less then.
   static constexpr double kWellKnownTarget_mm = 0.4;
   [[nodiscard]] double target_deviation_mm() const;
+  // Of a target there by the lens's uncertainty: what the picture and the hand-eye that go with another lens make of it
+  // together, which is less than either.
+  double target_deviation_by_lens_mm = 0.0;
 
   // Whether something moved fast enough for the offset's deviation to be trusted; the errors of a lens, or of a board
   // seen from one side, last, and without fast motion they pass for time.

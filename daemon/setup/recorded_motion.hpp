@@ -13,6 +13,7 @@
 #include "daemon/config/setup_error.hpp"
 #include "daemon/setup/board.hpp"
 #include "daemon/setup/recorded_board.hpp"
+#include "drivers/calibration/lens_covariance.hpp"
 
 namespace perimap {
 
@@ -26,8 +27,13 @@ struct MotionSource {
   std::optional<LensAtTurn> lens_as_turned = std::nullopt;
 };
 
+struct KnownLens {
+  CameraModel camera;
+  std::optional<LensCovariance> covariance;  // none: its calibration says none
+};
+
 // Fails when neither the calibration nor a configuration says it.
-[[nodiscard]] SetupExpected<CameraModel> lens_of(const MotionSource& source);
+[[nodiscard]] SetupExpected<KnownLens> lens_of(const MotionSource& source);
 
 // What recorded_motion() needs besides the recording: the board's size, without which lengths would be in squares, and
 // the lens.
@@ -35,7 +41,7 @@ struct MotionSource {
 
 struct RecordedMotion {
   RecordedBoard board;
-  CameraModel camera;
+  KnownLens lens;
   std::vector<TimedPose> camera_poses;  // X_BC, on the camera's clock
   std::vector<TimedPose> sensor_poses;  // X_WS, on the tracker's
 };

@@ -13,6 +13,7 @@
 #include "daemon/config/tracked_tools.hpp"
 #include "daemon/setup/camera_calibration.hpp"
 #include "daemon/setup/hand_eye.hpp"
+#include "daemon/setup/lens_in_hand_eye.hpp"
 #include "daemon/setup/recorded_board.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 
@@ -109,8 +110,9 @@ Expected<RecordedTurn> measured_turn(const Recorded& recorded, const HeldStretch
   // The clocks may differ by so much.
   const double apart_s = HandEyeSettings{}.largest_offset_s;
   const std::vector<TimedPose> sensor = between(recorded.sensor, from_s - apart_s, to_s + apart_s);
-  const auto hand_eye = calibrate_hand_eye(camera_poses_of(views, lens->camera), sensor, {});
+  auto hand_eye = calibrate_hand_eye(camera_poses_of(views, lens->camera), sensor, {});
   if (!hand_eye) return tl::unexpected(hand_eye.error());
+  add_lens_uncertainty(*hand_eye, views, lens->camera, lens->covariance);
   turn.held.views = views.size();
   turn.held.lens_rms_px = lens->rms_px;
   turn.hand_eye_rms_mm = hand_eye->held_aside_rms_mm;

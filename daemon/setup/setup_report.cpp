@@ -101,6 +101,14 @@ std::string text_of(const HandEyeCalibration& result) {
                       fmt::join(q.wxyz, " "), three(deviation.head<3>() / kDegree, 3));
   text += fmt::format("  a target       {:.0f} mm ahead is known within {:.2f} mm by that (standard deviation)\n",
                       HandEyeCalibration::kTargetAhead_mm, result.target_deviation_mm());
+  if (const auto& by_lens = result.covariance_by_lens) {
+    const Eigen::Matrix<double, 7, 1> of_lens = by_lens->diagonal().cwiseMax(0.0).cwiseSqrt();
+    text += fmt::format("  the lens       makes {} mm and {} degrees of these deviations, {:.2f} mm of the target's\n",
+                        three(of_lens.segment<3>(3), 2), three(of_lens.head<3>() / kDegree, 3),
+                        result.target_deviation_by_lens_mm);
+  } else {
+    text += "  the lens       is taken for exact: how well it is known was not told\n";
+  }
   if (result.offset_measured) {
     text += offset_text_of(result);
   } else if (result.paired_by_rows) {
@@ -138,6 +146,8 @@ nlohmann::json json_of(const HandEyeCalibration& result) {
       {"rotation_wxyz_deviation", list(q.deviation)},
       {"rotation_deg_deviation", list(Vector3d(deviation.head<3>() / kDegree))},
       {"target_mm_deviation", result.target_deviation_mm()},
+      {"target_mm_deviation_by_lens", result.target_deviation_by_lens_mm},
+      {"lens_is_taken_for_exact", !result.covariance_by_lens.has_value()},
       {"time_offset_ms", nullptr},
       {"time_offset_ms_deviation", nullptr},
       {"residual_median_mm", result.residual_median_mm},

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "daemon/setup/lens_in_hand_eye.hpp"
 #include "daemon/setup/live_guide.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 
@@ -19,6 +20,9 @@ SetupExpected<HandEyeCalibration> hand_eye_of(const BoardMotionOptions& options,
   if (!motion) return tl::unexpected(motion.error());
   auto result = calibrate_hand_eye(std::move(motion->camera_poses), std::move(motion->sensor_poses), settings);
   if (!result) return fail(options.recorded.recording + ": " + result.error().message);
+  if (const auto& covariance = motion->lens.covariance) {
+    add_lens_uncertainty(*result, motion->board.views, motion->lens.camera, *covariance);
+  }
   return *std::move(result);
 }
 

@@ -52,7 +52,7 @@ SetupExpected<std::unique_ptr<LiveGuide>> live_board_guide(const LiveOptions& op
   if (!source) return tl::unexpected(source.error());
   std::optional<CameraModel> camera;
   if (!options.configuration.empty()) {
-    if (const auto lens = lens_of(*source)) camera = *lens;
+    if (const auto lens = lens_of(*source)) camera = lens->camera;
   }
   return board_guide(source->board, camera, least_s);
 }

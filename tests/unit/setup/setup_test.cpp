@@ -232,10 +232,68 @@ TEST(Camera, IsRefusedWithTooFewViewsAndWithViewsFromTheFront) {
     }
     views.push_back(view);
   }
-  EXPECT_THAT(calibrate_camera({views[0], views[1]}, 1280, 720, {}).error().message, HasSubstr("at least 4"));
+  EXPECT_THAT(calibrate_camera({views[0], views[1]}, 1280, 720, {}).error().message, HasSubstr("at least 7"));
   const auto flat = calibrate_camera(views, 1280, 720, {});
   ASSERT_FALSE(flat);
   EXPECT_THAT(flat.error().message, HasSubstr("tilt"));
+}
+
+// Of a board of 9x6 corners, all over the picture, or only in its middle and small.
+std::vector<BoardView> drawn_views(std::size_t count, double distance, double aside) {
+  std::mt19937 generator(11);
+  std::normal_distribution<double> normal(0.0, 0.3);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  CameraModel camera;
+  camera.width = 1280, camera.height = 720;
+  camera.fx = camera.fy = 1000.0, camera.cx = 640.0, camera.cy = 360.0, camera.k1 = -0.2;
+  std::vector<BoardView> views;
+  while (views.size() < count) {
+    const Pose X_CB{so3_exp({0.7 * uniform(generator), 0.7 * uniform(generator), 1.6 * uniform(generator)}),
+                    Vector3d(25.0 * aside * uniform(generator), 15.0 * aside * uniform(generator), distance)};
+    BoardView view;
+    bool whole = true;
+    for (int y = 0; y < 6; ++y) {
+      for (int x = 0; x < 9; ++x) {
+        Vector2d px;
+        const Vector3d p_B(8.0 * x, 8.0 * y, 0.0);
+        whole = whole && camera.project(X_CB * (p_B - Vector3d(32.0, 20.0, 0.0)), px) == ProjectionStatus::kOk &&
+                camera.contains(px);
+        view.board_mm.push_back(p_B);
+        view.px.push_back(px + Vector2d(normal(generator), normal(generator)));
+      }
+    }
+    if (whole) views.push_back(view);
+  }
+  return views;
+}
+
+TEST(Camera, IsMeasuredBySevenViewsAndRefusedWithSix) {
+  const auto seven = calibrate_camera(drawn_views(7, 110.0, 1.0), 1280, 720, {});
+  ASSERT_TRUE(seven) << seven.error().message;
+  EXPECT_NEAR(seven->camera.fx, 1000.0, 4.0 * seven->deviations[0]);
+  const auto six = calibrate_camera(drawn_views(6, 110.0, 1.0), 1280, 720, {});
+  ASSERT_FALSE(six);
+  EXPECT_THAT(six.error().message, HasSubstr("at least 7 are needed"));
+}
+
+TEST(Camera, OfABoardThatIsSmallAndInTheMiddleIsRefusedUntilThereAreManyViews) {
+  const auto few = calibrate_camera(drawn_views(8, 380.0, 0.2), 1280, 720, {});
+  ASSERT_FALSE(few);
+  EXPECT_THAT(few.error().message, HasSubstr("stays open"));
+  EXPECT_THAT(few.error().message, HasSubstr("nothing of the board was seen"));
+  const auto many = calibrate_camera(drawn_views(60, 380.0, 0.2), 1280, 720, {});
+  EXPECT_TRUE(many);
+}
+
+TEST(Camera, OfWhichTooFewViewsFitTogetherIsRefused) {
+  auto views = drawn_views(8, 110.0, 1.0);
+  for (std::size_t v = 0; v < 2; ++v) {
+    for (std::size_t i = 0; i < views[v].px.size(); ++i)
+      views[v].px[i].x() += 12.0 * std::sin(7.0 * static_cast<double>(i));
+  }
+  const auto result = calibrate_camera(views, 1280, 720, {});
+  ASSERT_FALSE(result);
+  EXPECT_THAT(result.error().message, HasSubstr("only 6 of 8 views of the board fit together"));
 }
 
 TEST(ConfigurationKeys, AreSetInTheirPlace) {
