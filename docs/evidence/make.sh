@@ -13,7 +13,8 @@ usage() {
   cat << 'END'
 docs/evidence/make.sh [--build FOLDER] [--keep FOLDER] [--records FOLDER] [--list] [NAME...]
   Runs the commands of the tables NAME (all of them when none is named) and writes the tables into docs/evidence/*.md.
-  A table that has no place in a page (setups, latency: their pages put several runs beside each other) is printed.
+  A table that has no place in a page (setups, setups-noise, latency: their pages put several runs beside each other)
+  is printed.
   --build  where the programs are: build/release (the default) or another preset's folder. The release preset leaves the
            tests out, and with them the programs of most tables:
              cmake --preset release -DPERIMAP_TESTS=all
@@ -53,6 +54,7 @@ horizons       30 minutes   statistics --long horizons
 late            5 minutes   statistics --long late
 ventilated     20 minutes   statistics --long ventilated
 setups         15 minutes   statistics_setups: 50 set-ups drawn at random, measured
+setups-noise    5 minutes   statistics_setups: tips of tools and noise of trackers, 200 of each
 watched-setups  2 minutes   statistics_watched_setups: what the watch says of right and wrong set-ups
 watched-lies   15 minutes   what the watch says in sessions whose set-up is wrong
 watched-truth  20 minutes   what it says in sessions whose set-up is right

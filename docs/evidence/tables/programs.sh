@@ -31,7 +31,12 @@ make_late() { of_statistics late; }
 make_ventilated() { of_statistics ventilated; }
 
 make_setups() {
-  command='statistics_setups --seed 996341 --trials 50 hand-eye slow tool tracker scope camera'
+  command='statistics_setups --seed 3392693524 --trials 50 hand-eye slow scope camera whole few'
+  # shellcheck disable=SC2086
+  run "$build/tests/statistics/"$command | as_printed
+}
+make_setups_noise() {
+  command='statistics_setups --seed 3734371284 --trials 200 tool tracker'
   # shellcheck disable=SC2086
   run "$build/tests/statistics/"$command | as_printed
 }
