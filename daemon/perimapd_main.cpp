@@ -30,6 +30,7 @@
 #include "daemon/runtime/configuration_reload.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/device_setup.hpp"
+#include "daemon/runtime/last_verification.hpp"
 #include "daemon/runtime/live_session.hpp"
 #include "daemon/runtime/replay_feeder.hpp"
 #include "daemon/runtime/replay_setup.hpp"
@@ -113,16 +114,21 @@ Outcome run_session(const Console& console, const std::string& configuration_fil
   return {};
 }
 
-// Guidance does not wait for a disk: without a recording the session goes on, and says so.
+// Guidance does not wait for a disk: without a recording the session goes on, and says so. What was verified of the
+// set-up is told here, and goes with each recording.
 DeviceRecording prepare_recording(const std::string& configuration_file, const DeviceSetup& setup) {
+  const LastVerification last = last_verification(configuration_file, setup.configuration, setup.pipeline.camera);
+  if (!last.line.empty()) spdlog::log(last.doubtful ? spdlog::level::warn : spdlog::level::info, "{}", last.line);
   const RecordingConfiguration& c = setup.configuration.recording;
   DeviceRecording recording;
   recording.recorder = std::make_unique<SessionRecorder>(static_cast<std::size_t>(c.memory_MB) << 20U);
-  recording.next = [folder = std::filesystem::path(configuration_file).parent_path() / c.folder,
+  recording.next = [file = std::filesystem::path(configuration_file),
+                    folder = std::filesystem::path(configuration_file).parent_path() / c.folder,
                     configuration = setup.configuration, camera = setup.pipeline.camera,
                     scope = setup.pipeline.turned_scope]() -> DeviceRecording::Next {
     SensorRecordingFacts facts = recording_facts(configuration, camera, "perimapd " PERIMAP_VERSION);
     if (scope) facts.turned_scope = format_turned_scope(*scope);
+    facts.verification = last_verification(file, configuration, camera).text;
     return {recording_path(folder, std::chrono::system_clock::now()), std::move(facts)};
   };
   if (!c.record) return recording;

@@ -14,6 +14,7 @@
 #include "daemon/keys/role.hpp"
 #include "daemon/runtime/calibration_fit.hpp"
 #include "daemon/runtime/device_setup.hpp"
+#include "daemon/runtime/last_verification.hpp"
 #include "daemon/runtime/setup_warnings.hpp"
 #include "daemon/runtime/thread_launcher.hpp"
 
@@ -65,6 +66,11 @@ Outcome check(const std::string& file, const Console& console) {
   fmt::print("{}\n", to_toml(*configuration));
   for (const std::string& line : traffic_lines(*configuration)) fmt::print("# {}\n", line);
   for (const std::string& line : setup_warnings(*configuration)) console.complain("warning: " + line);
+  if (const LastVerification last = last_verification(file, *configuration); last.doubtful) {
+    console.complain("warning: " + last.line);
+  } else if (!last.line.empty()) {
+    fmt::print("# {}\n", last.line);
+  }
   if (configuration->dds.security) {
     const auto keys = check_keys(*configuration->dds.security, seconds_now());
     const auto warning = keys ? expiry_warning(*keys, seconds_now()) : std::nullopt;

@@ -12,6 +12,7 @@
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/runtime/device_feeder.hpp"
 #include "daemon/runtime/device_setup.hpp"
+#include "daemon/runtime/last_verification.hpp"
 #include "daemon/runtime/recording_run.hpp"
 #include "daemon/runtime/session_recorder.hpp"
 #include "daemon/runtime/session_recording.hpp"
@@ -39,6 +40,7 @@ Outcome record(const RecordOptions& options, const Console& console) {
   }
   SensorRecordingFacts facts = recording_facts(basis->configuration, basis->camera, "perimap record " PERIMAP_VERSION);
   if (basis->turned_scope) facts.turned_scope = format_turned_scope(*basis->turned_scope);
+  facts.verification = last_verification(options.configuration, basis->configuration, basis->camera).text;
   auto recorder = SessionRecorder::create(options.out, facts,
                                           static_cast<std::size_t>(basis->configuration.recording.memory_MB) << 20U);
   if (!recorder) return refuse(recorder.error());

@@ -48,5 +48,6 @@ inline constexpr std::string_view kCalibration = "calibration.yaml";
 inline constexpr std::string_view kConfiguration = "configuration.toml";
 inline constexpr std::string_view kProcedure = "procedure.toml";  // of a simulation
 inline constexpr std::string_view kTurnedScope = "turned_scope.json";
+inline constexpr std::string_view kVerification = "verification.json";  // what perimap verify said last before it
 
 }  // namespace perimap::attachments

@@ -27,6 +27,7 @@ struct SensorRecordingFacts {
   std::optional<std::string> calibration;     // the camera's, as OpenCV writes it
   std::optional<std::string> configuration;   // of perimapd, TOML
   std::optional<std::string> turned_scope{};  // where the scope is turned in its camera head, as calibrated
+  std::optional<std::string> verification{};  // what perimap verify said last of the set-up, JSON
   bool r_trigger = false;                     // there is a trigger whose pulses may come
   bool respiration = false;                   // there is a respiration channel
   bool second_lead = false;                   // the ECG has two leads

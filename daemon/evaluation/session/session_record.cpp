@@ -135,10 +135,12 @@ Expected<RecordedFile> read_file(const std::string& path, Published* published) 
   for (const Error& error : reader->damage()) file.damage.push_back(error.message);
   reading.tell_unread();
   file.attachments = reader->attachment_names();
-  if (std::find(file.attachments.begin(), file.attachments.end(), attachments::kConfiguration) !=
-      file.attachments.end()) {
-    if (auto text = reader->attachment(attachments::kConfiguration)) file.configuration = *std::move(text);
-  }
+  const auto attached = [&](std::string_view name, std::string& place) {
+    if (std::find(file.attachments.begin(), file.attachments.end(), name) == file.attachments.end()) return;
+    if (auto text = reader->attachment(name)) place = *std::move(text);
+  };
+  attached(attachments::kConfiguration, file.configuration);
+  attached(attachments::kVerification, file.verification);
   return file;
 }
 

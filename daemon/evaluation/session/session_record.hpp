@@ -95,6 +95,7 @@ struct RecordedFile {
   std::string generator;  // program and version
   std::string description;
   std::string configuration;  // as it is attached; empty: it is not
+  std::string verification;   // likewise, what perimap verify said last before it
   std::vector<std::string> attachments;
   std::vector<std::string> damage;
 };

@@ -5,6 +5,7 @@
 
 #include "daemon/evaluation/session/session_page.hpp"
 #include "daemon/publishing/wire_names.hpp"
+#include "drivers/calibration/verification_record.hpp"
 
 namespace perimap {
 namespace {
@@ -79,6 +80,12 @@ std::vector<std::string> session_concerns(const SessionRecord& record) {
   std::vector<std::string> concerns;
   for (const RecordedFile& file : record.files) {
     for (const std::string& damage : file.damage) concerns.push_back("A file is damaged: " + damage);
+    if (file.verification.empty()) continue;
+    const auto verified = parse_verification(file.verification, file.path);
+    if (!verified || verified->is_doubtful()) {
+      concerns.push_back("The set-up was verified before: " +
+                         (verified ? words_of(*verified) : verified.error().message));
+    }
   }
   add_counts(record.counts, concerns);
   if (record.counts.status) {

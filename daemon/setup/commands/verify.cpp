@@ -9,10 +9,12 @@
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/runtime/last_verification.hpp"
 #include "daemon/setup/commands/frame_progress.hpp"
 #include "daemon/setup/commands/live_capture.hpp"
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
+#include "daemon/setup/kept_result.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/recorded_verification.hpp"
 
@@ -31,18 +33,45 @@ struct VerifyOptions {
   double bound_mm = 2.0;
 };
 
+// What it is of: the configuration's hand-eye and clocks, and the lens that it was verified with.
+SetupExpected<VerifiedSetUp> set_up_of(const VerifyOptions& options, const MotionSource& motion) {
+  const auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
+  if (!configuration) return wrong_setup(configuration.error());
+  const auto lens = lens_of(motion);
+  if (!lens) return tl::unexpected(lens.error());
+  return verified_set_up_of(*configuration, *lens);
+}
+
+// Beside the configuration, for check, perimapd and each recording; passed or not. Where that folder is not this user's
+// the result holds all the same.
+void keep_record(const VerifyOptions& options, const MotionSource& motion, nlohmann::json result,
+                 const Console& console) {
+  const auto set_up = set_up_of(options, motion);
+  result["date"] = date_now();
+  const auto file = verification_file_of(options.configuration);
+  const auto written = set_up ? write_kept(file, format_verification(result.dump(), *set_up))
+                              : Expected<void>(tl::unexpected(set_up.error().error));
+  if (!written) {
+    console.complain(fmt::format("note: not kept with the set-up, so that recordings will not tell of it: {}",
+                                 written.error().message));
+  } else if (!options.common.json) {
+    fmt::print("kept as {}\n", file.string());
+  }
+}
+
 Outcome verified(const VerifyOptions& options, const std::string& made_from, const Console& console) {
   auto motion = source_of(options.recorded, options.configuration);
   if (!motion) return refuse(motion.error());
   const Vector3d touched_B(options.touched_mm.at(0), options.touched_mm.at(1), 0.0);
   const auto result = verify_recording(
-      {options.configuration, *std::move(motion), options.tip, options.tool, touched_B, options.bound_mm},
-      FrameProgress(console));
+      {options.configuration, *motion, options.tip, options.tool, touched_B, options.bound_mm}, FrameProgress(console));
   if (!result) return refuse(result.error());
   Measurement measured{text_of(*result), json_of(*result), {}};
   measured.json["configuration"] = options.configuration;
   measured.plots = plots_of(*result);
   if (auto finished = finish(measured, options.common, made_from); !finished) return finished;
+  measured.json["made_from"] = made_from;
+  keep_record(options, *motion, measured.json, console);
   if (!result->passed()) {
     return refuse(fmt::format("not within {:g} mm: {}", options.bound_mm, advice_of(*result)));
   }
@@ -84,7 +113,9 @@ void add_verify_command(Commands& commands) {
   command.footer(
       "Swing the scope about a board that stays where it is, by 20 degrees and more about all axes, for ten seconds; "
       "with the tip of a calibrated pointer resting on a point of the board the error is absolute. Exit code 1: not "
-      "within the bound, or not determined.");
+      "within the bound, or not determined. What it says is kept beside the configuration, as NAME.verified.json, and "
+      "goes "
+      "with what perimapd and perimap record write; perimap check tells it.");
   command.add_option("CONFIGURATION", options->configuration, "The configuration on trial (TOML)")->required();
   command.add_option("--from", options->recorded.recording, "A recording of perimap record (MCAP)");
   command.add_flag("--live", options->live, "Of the configuration's own devices, now");
