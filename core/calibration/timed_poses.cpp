@@ -42,4 +42,13 @@ std::optional<PoseWithTwist> pose_at(const std::vector<TimedPose>& poses, double
   return result;
 }
 
+std::vector<TimedPose> in_frame_of(const std::vector<TimedPose>& tool, const std::vector<TimedPose>& poses) {
+  const double gap_s = longest_gap_s(tool);
+  std::vector<TimedPose> relative;
+  for (const TimedPose& pose : poses) {
+    if (const auto at = pose_at(tool, pose.t_s, gap_s)) relative.push_back({pose.t_s, at->X.inverse() * pose.X});
+  }
+  return relative;
+}
+
 }  // namespace perimap

@@ -26,6 +26,11 @@ struct PoseWithTwist {
   Vector6d twist = Vector6d::Zero();  // in the moving frame: angular velocity, rad/s, then velocity, mm/s
 };
 
+// In the frame of a tool that moves itself (X_TS of X_WS and X_WT), at the times of `poses`; those at which the tool
+// was not seen are left out. Both as in_order() gives them.
+[[nodiscard]] std::vector<TimedPose> in_frame_of(const std::vector<TimedPose>& tool,
+                                                 const std::vector<TimedPose>& poses);
+
 // Between the two poses around t (constant angular velocity, translation linear); none outside, or in a gap that is
 // longer. `poses` as in_order() gives them.
 [[nodiscard]] std::optional<PoseWithTwist> pose_at(const std::vector<TimedPose>& poses, double t_s,

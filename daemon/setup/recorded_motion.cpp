@@ -41,6 +41,22 @@ SetupExpected<void> check_source(const MotionSource& source) {
   return {};
 }
 
+Expected<std::vector<TimedPose>> poses_beside_board(const MotionSource& source, const std::string& tool) {
+  auto poses = read_recorded_poses(source.recording, tool);
+  if (!poses || source.board_tool.empty()) return poses;
+  if (source.board_tool == tool) {
+    return fail(fmt::format("--board-tool: expected a tool that is fast on the board, got '{}' itself", tool));
+  }
+  const auto board = read_recorded_poses(source.recording, source.board_tool);
+  if (!board) return tl::unexpected(board.error());
+  auto relative = in_frame_of(*board, *poses);
+  if (relative.empty()) {
+    return fail(fmt::format("{}: '{}' and '{}' are never seen at the same time: bring both into sight of the tracker",
+                            source.recording, tool, source.board_tool));
+  }
+  return relative;
+}
+
 SetupExpected<RecordedMotion> recorded_motion(
     const MotionSource& source, const std::function<void(std::uint64_t done, std::uint64_t all)>& progress) {
   if (const auto able = check_source(source); !able) return tl::unexpected(able.error());
@@ -51,7 +67,7 @@ SetupExpected<RecordedMotion> recorded_motion(
     camera.fx = turned->focal_px.x(), camera.fy = turned->focal_px.y();
     camera.cx = turned->principal_px.x(), camera.cy = turned->principal_px.y();
   }
-  auto sensor = read_recorded_poses(source.recording, kScopeTool);
+  auto sensor = poses_beside_board(source, kScopeTool);
   if (!sensor) return tl::unexpected(sensor.error());
   constexpr double kFrames_per_s = 15.0;
   auto board = find_recorded_board(source.recording, source.board, kFrames_per_s, progress);

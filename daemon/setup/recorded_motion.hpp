@@ -23,6 +23,8 @@ struct MotionSource {
   std::string calibration;                  // the lens; empty: that of the first configuration which names one
   std::vector<std::string> configurations;  // files; those without a name do not count
   BoardWish board;
+  std::string
+      board_tool;  // the tracked tool that is fast on the board, which then may move; empty: the board lies still
   // In place of the lens's own focal length and principal point: the scope is turned or zoomed otherwise now.
   std::optional<LensAtTurn> lens_as_turned = std::nullopt;
 };
@@ -39,11 +41,15 @@ struct KnownLens {
 // the lens.
 [[nodiscard]] SetupExpected<void> check_source(const MotionSource& source);
 
+// The poses of a tool of the recording in the frame in which the board lies still: the tracker's, or that of the tool
+// on the board.
+[[nodiscard]] Expected<std::vector<TimedPose>> poses_beside_board(const MotionSource& source, const std::string& tool);
+
 struct RecordedMotion {
   RecordedBoard board;
   KnownLens lens;
   std::vector<TimedPose> camera_poses;  // X_BC, on the camera's clock
-  std::vector<TimedPose> sensor_poses;  // X_WS, on the tracker's
+  std::vector<TimedPose> sensor_poses;  // X_WS, on the tracker's; W is the board's tool where it has one
 };
 
 // `progress` hears of the frames that were looked at, of all that will be.

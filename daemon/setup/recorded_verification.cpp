@@ -28,7 +28,7 @@ Expected<std::optional<TouchOnTrial>> touch_of(const VerificationSource& source)
   if (source.tip.empty()) return std::nullopt;
   const auto tip = read_tool_tip(source.tip);
   if (!tip) return tl::unexpected(tip.error());
-  const auto poses = read_recorded_poses(source.motion.recording, source.tool);
+  const auto poses = poses_beside_board(source.motion, source.tool);
   if (!poses) return tl::unexpected(poses.error());
   TouchOnTrial touch;
   for (const TimedPose& pose : *poses) touch.tip_W.push_back({pose.t_s, pose.X * tip->tip_T});

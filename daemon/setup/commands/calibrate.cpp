@@ -5,7 +5,9 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/command_line/commands.hpp"
@@ -19,6 +21,7 @@
 #include "daemon/setup/commands/recorded_options.hpp"
 #include "daemon/setup/kept_result.hpp"
 #include "daemon/setup/live_guide.hpp"
+#include "daemon/setup/moved_noise.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/recorded_sensor.hpp"
 #include "daemon/setup/setup_plots.hpp"
@@ -35,6 +38,7 @@ struct PosesOptions {
   std::string recording;  // or this
   LiveOptions live;       // or this
   std::string tool;
+  RecordedOptions moved;  // of a tracker: the same sensor, moved before a board
 
   [[nodiscard]] const std::string& input() const {
     if (!live.configuration.empty()) return live.configuration;
@@ -61,7 +65,7 @@ Expected<std::string> tool_of(const PosesOptions& options) {
   return handle->value_or(options.tool);
 }
 
-SetupExpected<Measurement> measure_tool(const PosesOptions& options) {
+SetupExpected<Measurement> measure_tool(const PosesOptions& options, const Console& /*console*/) {
   const auto poses = poses_of(options);
   if (!poses) return tl::unexpected(poses.error());
   const auto result = calibrate_pivot(*poses);
@@ -75,18 +79,41 @@ SetupExpected<Measurement> measure_tool(const PosesOptions& options) {
   return measured;
 }
 
-SetupExpected<Measurement> measure_tracker(const PosesOptions& options) {
+SetupExpected<MeasuredNoise> moved_noise_of(const PosesOptions& options, const Console& console) {
+  auto motion = motion_of(options.moved, options.common.configuration, console);
+  if (!motion) return tl::unexpected(motion.error());
+  const auto hand_eye = calibrate_hand_eye(std::move(motion->camera_poses), std::move(motion->sensor_poses), {});
+  if (!hand_eye) return fail(options.moved.recording + ": " + hand_eye.error().message);
+  auto noise = noise_while_moved(*hand_eye);
+  if (!noise) return fail(options.moved.recording + ": its poses before the board: " + noise.error().message);
+  return *std::move(noise);
+}
+
+SetupExpected<Measurement> measure_tracker(const PosesOptions& options, const Console& console) {
   const auto poses = poses_of(options);
   if (!poses) return tl::unexpected(poses.error());
-  const auto result = measure_tracker_noise(*poses);
-  if (!result) return fail(options.input() + ": " + result.error().message);
-  Measurement measured{text_of(*result),
-                       json_of(*result),
-                       {{"position_deviation_mm", number_of(result->position_deviation_mm)},
-                        {"rotation_deviation_deg", number_of(result->rotation_deviation_deg)},
-                        {"error_correlation_s", number_of(result->correlation_s)}}};
-  measured.plots = plots_of(*result);
+  auto still = measure_tracker_noise(*poses);
+  if (!still) return fail(options.input() + ": " + still.error().message);
+  TrackerErrors errors{*std::move(still), std::nullopt};
+  if (!options.moved.recording.empty()) {
+    auto moved = moved_noise_of(options, console);
+    if (!moved) return tl::unexpected(moved.error());
+    errors.moved = *std::move(moved);
+  }
+  Measurement measured{text_of(errors),
+                       json_of(errors),
+                       {{"position_deviation_mm", number_of(errors.position_deviation_mm())},
+                        {"rotation_deviation_deg", number_of(errors.rotation_deviation_deg())},
+                        {"error_correlation_s", number_of(errors.correlation_s())}}};
+  measured.plots = plots_of(errors);
   return measured;
+}
+
+// Before anything is recorded.
+SetupExpected<void> check_moved(PosesOptions& options) {
+  if (options.moved.recording.empty()) return {};
+  options.moved.live = options.live.configuration;
+  return check_motion_options(options.moved, options.common.configuration);
 }
 
 // What is measured from poses of one sensor alone.
@@ -96,7 +123,8 @@ struct FromPoses {
   const char* poses;
   const char* tool;   // of a recording, where none is named
   bool names_output;  // the configuration is to name the file, and has no keys of the result
-  SetupExpected<Measurement> (*measure)(const PosesOptions&);
+  bool has_moved;     // the same sensor may have been moved before a board
+  SetupExpected<Measurement> (*measure)(const PosesOptions&, const Console&);
   std::unique_ptr<LiveGuide> (*guide)(double least_s);
   double least_s;  // live
 };
@@ -105,7 +133,9 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
   const auto options = std::make_shared<PosesOptions>();
   Command& command =
       commands.add(calibrate, what.name, what.description, [options, what](const Console& console) -> Outcome {
-        if (auto able = check_outputs(options->common, {options->poses, options->recording}); !able) return able;
+        const std::vector<std::string> inputs = {options->poses, options->recording, options->moved.recording,
+                                                 options->moved.calibration};
+        if (auto able = check_outputs(options->common, inputs); !able) return able;
         if (!options->poses.empty() && options->input() != options->poses) {
           return refuse(options->poses + ": not read beside --from or --live; expected one of them",
                         ExitCode::kWrongUsage);
@@ -114,10 +144,11 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
           return refuse("--configuration: expected --output too, the file that the configuration is to name",
                         ExitCode::kWrongUsage);
         }
-        const std::string made_from = options->input();
+        if (const auto able = check_moved(*options); !able) return refuse(able.error());
+        const std::string made_from = joined(named({options->input(), options->moved.recording}));
         const auto guide = what.guide(what.least_s);
         return with_recording(options->live, options->tool, *guide, console, options->recording,
-                              [&] { return finish(what.measure(*options), options->common, made_from); });
+                              [&] { return finish(what.measure(*options, console), options->common, made_from); });
       });
   options->tool = what.tool;
   command.add_option("POSES", options->poses, what.poses);
@@ -130,6 +161,12 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
           "file what it is written down as")
       ->capture_default_str();
   add_time_unit(command, options->common);
+  if (what.has_moved) {
+    command.add_option("--moved", options->moved.recording,
+                       "A recording (MCAP) of the same sensor, on the scope, moved before a board: what it errs then "
+                       "counts where it is more");
+    add_lens_and_board(command, options->moved);
+  }
   add_common(command, options->common, true, true);
 }
 
@@ -148,11 +185,11 @@ void add_calibrate_command(Commands& commands) {
   add_from_poses(commands, calibrate,
                  {"tool", "A tracked tool's tip, from poses while it turned about its resting tip",
                   "The tool in the tracker's frame: t_s,x,y,z,qx,qy,qz,qw, or a time and a matrix", "pointer", true,
-                  measure_tool, pivot_guide, 20.0});
+                  false, measure_tool, pivot_guide, 20.0});
   add_from_poses(
       commands, calibrate,
       {"tracker", "A tracker's noise and how long its errors last, from poses of a sensor that is held still",
-       "The sensor in the tracker's frame: t_s,x,y,z,qx,qy,qz,qw, or a time and a matrix", kScopeTool, false,
+       "The sensor in the tracker's frame: t_s,x,y,z,qx,qy,qz,qw, or a time and a matrix", kScopeTool, false, true,
        measure_tracker, still_guide, 60.0});
 }
 

@@ -16,6 +16,7 @@ struct RecordedOptions {
   std::string calibration;  // the lens; empty: the configuration's
   std::string live;         // the configuration of live devices, whose lens it is where no other says it
   BoardOptions board;
+  std::string board_tool;  // fast on the board; empty: the board lies still
 };
 
 // --from.

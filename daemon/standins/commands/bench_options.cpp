@@ -20,6 +20,9 @@ void BenchOptions::add_to(Command& command) {
   command.add_option("--board", board_, "The board of such a scene: squares of 8 mm, 10x7 or 12x9 of them")
       ->check(OneOf({"chessboard", "charuco"}))
       ->capture_default_str();
+  command.add_flag("--board-held", board_is_held_,
+                   "Of --scene board: another hand holds the board, on which there is a tracked sensor, "
+                   "instrument/board [it lies still]");
   command.add_option("--truth", truth_, "Of such a scene: write to this file what is to be found (JSON)");
   command.add_option("--landmarks", landmarks_,
                      "Of such a scene: write the landmarks of the patient's image to this file, for perimap register");
@@ -29,6 +32,7 @@ Expected<void> BenchOptions::check() const {
   if (!act_ && (!truth_.empty() || !landmarks_.empty())) {
     return fail("--truth, --landmarks: expected --scene board, still or landmarks");
   }
+  if (board_is_held_ && act_ != BenchAct::kBoard) return fail("--board-held: expected --scene board");
   return {};
 }
 

@@ -21,6 +21,7 @@ class BenchOptions {
   [[nodiscard]] Expected<void> check() const;
   // A4 paper takes either; a scope at 15 cm sees most of it.
   [[nodiscard]] Expected<BoardPattern> board() const;
+  [[nodiscard]] bool board_is_held() const noexcept { return board_is_held_; }
 
   // To be written; empty: not asked for.
   [[nodiscard]] const std::filesystem::path& truth() const noexcept { return truth_; }
@@ -29,6 +30,7 @@ class BenchOptions {
  private:
   std::optional<BenchAct> act_;
   std::string board_ = "charuco";
+  bool board_is_held_ = false;
   std::filesystem::path truth_;
   std::filesystem::path landmarks_;
 };

@@ -92,6 +92,12 @@ class BenchWriter {
       if (!second) return tl::unexpected(second.error());
       second_ = *second;
     }
+    if (scene_.settings().board_is_held) {
+      const auto board =
+          writer_.add_channel<perimap_TrackerPose>(std::string(channels::kTrackedTools) + "instrument/board");
+      if (!board) return tl::unexpected(board.error());
+      board_ = *board;
+    }
     scope_ = *scope, pointer_ = *pointer, viewer_ = *viewer, image_ = *image, ecg_ = *ecg;
     std::string generator = fmt::format("perimap simulate {}", PERIMAP_VERSION);
     std::string text = description_of(scene_, noise_);
@@ -119,17 +125,19 @@ class BenchWriter {
           return writer_.write(pointer_, to_tracker_pose(pointer), pointer.arrival, pointer.source_time,
                                pointer.device_frame);
         })
-        .and_then([&] { return write_second_sensor(index); })
+        .and_then([&] { return write_also(second_, BenchScene::Tool::kSecondSensor, index); })
+        .and_then([&] { return write_also(board_, BenchScene::Tool::kBoard, index); })
         .and_then([&] { return write_ecg(scope.arrival); });
   }
 
   Expected<void> finish() { return writer_.finish(); }
 
  private:
-  Expected<void> write_second_sensor(std::size_t index) {
-    if (!second_) return {};
-    const TrackerSample second = scene_.reading(BenchScene::Tool::kSecondSensor, index, noise_);
-    return writer_.write(*second_, to_tracker_pose(second), second.arrival, second.source_time, second.device_frame);
+  // A tool that not every bench has.
+  Expected<void> write_also(const std::optional<ChannelId>& channel, BenchScene::Tool tool, std::size_t index) {
+    if (!channel) return {};
+    const TrackerSample sample = scene_.reading(tool, index, noise_);
+    return writer_.write(*channel, to_tracker_pose(sample), sample.arrival, sample.source_time, sample.device_frame);
   }
 
   // Of a device whose electrodes nobody wears; whoever plays a recording asks for one. Blocks that have come by then.
@@ -157,7 +165,7 @@ class BenchWriter {
   TrackerNoise noise_;
   RecordingWriter writer_;
   ChannelId image_, scope_, pointer_, viewer_, ecg_;
-  std::optional<ChannelId> second_;
+  std::optional<ChannelId> second_, board_;
   std::int64_t ecg_samples_ = 0;
   std::vector<std::uint8_t> packed_;
 };

@@ -28,7 +28,10 @@ enum BenchStream : std::uint64_t {
   kPointerError,
   kBenchImage,
   kLandmark,
-  kSecondError
+  kSecondError,
+  kBoardError,
+  kBoardTurn,
+  kBoardPlace
 };
 
 constexpr double kDistance_mm = 150.0;  // of the scope from the board, at rest
@@ -69,6 +72,7 @@ FieldStop field_stop_of(const BenchSettings& s, const ScopeHeld& held) {
 BenchStream error_stream(BenchScene::Tool tool) {
   return tool == BenchScene::Tool::kScope     ? kScopeError
          : tool == BenchScene::Tool::kPointer ? kPointerError
+         : tool == BenchScene::Tool::kBoard   ? kBoardError
                                               : kSecondError;
 }
 
@@ -92,6 +96,10 @@ BenchScene::BenchScene(const BenchSettings& settings) : settings_(settings) {
                           swing * Vector3d(0.10, 0.10, 0.12));
   scope_place_ = HandSway3(CounterNoise(settings.seed, kScopePlace), 0, swing * Vector3d(14.0, 10.0, 30.0),
                            swing * Vector3d(2.0, 2.0, 3.0));
+  board_turn_ =
+      HandSway3(CounterNoise(settings.seed, kBoardTurn), 0, Vector3d(0.15, 0.15, 0.2), Vector3d(0.03, 0.03, 0.03));
+  board_place_ =
+      HandSway3(CounterNoise(settings.seed, kBoardPlace), 0, Vector3d(25.0, 25.0, 15.0), Vector3d(3.0, 3.0, 2.0));
   pointer_turn_ =
       HandSway3(CounterNoise(settings.seed, kPointerTurn), 0, Vector3d(0.6, 0.6, 0.6), Vector3d(0.1, 0.1, 0.1));
 }
@@ -168,7 +176,7 @@ void BenchScene::time_devices() {
 }
 
 void BenchScene::draw_errors() {
-  for (const Tool tool : {Tool::kScope, Tool::kPointer, Tool::kSecondSensor}) {
+  for (const Tool tool : {Tool::kScope, Tool::kPointer, Tool::kSecondSensor, Tool::kBoard}) {
     const CounterNoise noise(settings_.seed, error_stream(tool));
     SlowError position(settings_.tracker_rate_hz, settings_.tracker_correlation);
     SlowError rotation = position;
@@ -208,10 +216,23 @@ Pose BenchScene::X_WT(Duration since) const noexcept {
   return {R, touched_W(t_s) - R * setup_.tip_T};
 }
 
+// Camera and pointer are about the board wherever it is held, so that no picture changes.
+Pose BenchScene::X_WW(Duration since) const noexcept {
+  if (!settings_.board_is_held) return {};
+  const double t_s = to_seconds(since);
+  const Pose about{so3_exp(board_turn_.at(t_s)), board_place_.at(t_s)};
+  return X_WB_ * about * X_WB_.inverse();
+}
+
 Pose BenchScene::true_pose(Tool tool, Duration since) const noexcept {
-  if (tool == Tool::kPointer) return X_WT(since);
+  const Pose moved = X_WW(since);
+  if (tool == Tool::kPointer) return moved * X_WT(since);
+  if (tool == Tool::kBoard) {
+    const Pose X_BT{so3_exp(Vector3d(0.2, -0.3, 0.9)), Vector3d(-35.0, 20.0, 12.0)};  // its sensor, beside the squares
+    return moved * X_WB_ * X_BT;
+  }
   const ScopeSetup setup = settings_.turns.empty() ? setup_ : setup_at(since);
-  const Pose X_WS = X_WC(since) * setup.X_SC.inverse();
+  const Pose X_WS = moved * X_WC(since) * setup.X_SC.inverse();
   return tool == Tool::kScope ? X_WS : X_WS * setup.X_SS2;
 }
 

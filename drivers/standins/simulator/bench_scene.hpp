@@ -53,6 +53,8 @@ struct BenchSettings {
   std::vector<Turn> turns;
   // A second tracked sensor, on the scope, tells how that is turned: the field stop lies outside the picture then.
   bool second_sensor = false;
+  // The board has a tracked sensor of its own, and another hand holds it; the pointer rests on it all the same.
+  bool board_is_held = false;
 };
 
 struct BenchLandmark {
@@ -62,7 +64,7 @@ struct BenchLandmark {
 
 class BenchScene {
  public:
-  enum class Tool : std::uint8_t { kScope, kPointer, kSecondSensor };
+  enum class Tool : std::uint8_t { kScope, kPointer, kSecondSensor, kBoard };
 
   // Errors name the setting that is out of range, in words of the command line.
   [[nodiscard]] static Expected<BenchScene> create(const BenchSettings& settings);
@@ -84,7 +86,7 @@ class BenchScene {
   [[nodiscard]] std::size_t reading_count() const noexcept { return arrivals_.size(); }
   [[nodiscard]] TrackerSample reading(Tool tool, std::size_t index, const TrackerNoise& noise) const noexcept;
 
-  // True poses, since the start.
+  // True poses, since the start; of the scope, the pointer and the board as if that were not moved.
   [[nodiscard]] Pose X_WC(Duration since) const noexcept;
   [[nodiscard]] Pose X_WT(Duration since) const noexcept;
   [[nodiscard]] const Pose& X_WB() const noexcept { return X_WB_; }
@@ -105,6 +107,8 @@ class BenchScene {
   void draw_errors();
   [[nodiscard]] Vector3d touched_W(double t_s) const noexcept;
   [[nodiscard]] Pose true_pose(Tool tool, Duration since) const noexcept;
+  // How a held board, and all that is about it, is elsewhere than at rest.
+  [[nodiscard]] Pose X_WW(Duration since) const noexcept;
 
   // Of unit variance per axis.
   struct Error {
@@ -118,14 +122,14 @@ class BenchScene {
   Instant start_;
   Pose X_WB_;
   Matrix3d pointer_rest_ = Matrix3d::Identity();
-  HandSway3 scope_turn_, scope_place_, pointer_turn_;
+  HandSway3 scope_turn_, scope_place_, pointer_turn_, board_turn_, board_place_;
   std::vector<BenchLandmark> landmarks_;
   // As it is held at first, and after each turn; none where the camera is off.
   std::vector<std::shared_ptr<const BoardRenderer>> renderers_;
   std::vector<FrameStamp> frames_;
   std::vector<Instant> times_;  // true, of each reading
   std::vector<Instant> arrivals_;
-  std::vector<Error> errors_[3];  // of each tool
+  std::vector<Error> errors_[4];  // of each tool
 };
 
 }  // namespace perimap

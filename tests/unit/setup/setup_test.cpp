@@ -9,9 +9,11 @@
 #include <sstream>
 #include <string>
 
+#include "core/angle/angle.hpp"
 #include "daemon/setup/camera_calibration.hpp"
 #include "daemon/setup/hand_eye.hpp"
 #include "daemon/setup/kept_result.hpp"
+#include "daemon/setup/moved_noise.hpp"
 #include "daemon/setup/setup_report.hpp"
 #include "daemon/setup/signal_offset.hpp"
 
@@ -64,6 +66,65 @@ TEST(HandEye, IsFoundWithTheClocksOffset) {
 Poses with_longer_camera_lengths(Poses poses, double factor) {
   for (TimedPose& pose : poses.camera) pose.X.t *= factor;
   return poses;
+}
+
+TEST(HandEye, OfABoardThatIsMovedIsFoundBesideItsOwnSensor) {
+  Poses poses = swung(3, 0.1, kX_SC);
+  const Pose X_WT{so3_exp({0.4, -0.2, 0.1}), {120.0, 40.0, -880.0}};  // the board's sensor, at rest
+  std::vector<TimedPose> board;
+  for (TimedPose& pose : poses.tracker) {
+    const double t = pose.t_s;
+    const Pose moved{so3_exp(0.2 * Vector3d(std::sin(0.7 * t), std::cos(1.1 * t), std::sin(0.4 * t))),
+                     Vector3d(30.0 * std::sin(0.5 * t), 20.0 * std::cos(0.8 * t), 10.0)};
+    pose.X = moved * pose.X;
+    board.push_back({t, moved * X_WT});
+  }
+  // The board's sensor is not seen for a while.
+  board.erase(board.begin() + 300, board.begin() + 400);
+  const auto relative = in_frame_of(board, poses.tracker);
+  EXPECT_NEAR(static_cast<double>(relative.size()), 1100.0, 2.0);
+  const auto result = calibrate_hand_eye(poses.camera, relative, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_LT((result->X_SC.t - kX_SC.t).norm(), 0.5);
+  EXPECT_NEAR(result->offset_s, 0.1, 0.001);
+  // As if it lay still: refused, or tens of millimetres wrong.
+  const auto still = calibrate_hand_eye(poses.camera, poses.tracker, {});
+  EXPECT_TRUE(!still || still->residual_median_mm > 10.0);
+}
+
+TEST(TrackerErrors, ThatGoWithThePlaceShowWhileTheSensorIsMoved) {
+  Poses poses = swung(3, 0.1, kX_SC, 0.2);
+  std::mt19937 generator(8);
+  std::normal_distribution<double> normal(0.0, 0.1 * kDegree / std::sqrt(3.0));
+  for (TimedPose& pose : poses.tracker) {
+    pose.X.R = pose.X.R * so3_exp(Vector3d(normal(generator), normal(generator), normal(generator)));
+  }
+  const auto white = calibrate_hand_eye(poses.camera, poses.tracker, {});
+  ASSERT_TRUE(white);
+  TrackerErrors errors{MeasuredNoise{}, std::nullopt};
+  errors.still.position_deviation_mm = 0.2 * std::sqrt(3.0);
+  errors.still.rotation_deviation_deg = 0.1;
+  errors.moved = *noise_while_moved(*white);
+  EXPECT_FALSE(errors.larger_while_moved());
+  EXPECT_EQ(errors.correlation_s(), 0.0);
+  EXPECT_THAT(text_of(errors), HasSubstr("no more than at rest"));
+  // A field that is bent over a few centimetres.
+  for (TimedPose& pose : poses.tracker) {
+    const Vector3d& p = pose.X.t;
+    pose.X.t += 2.0 * Vector3d(std::sin(p.y() / 12.0), std::cos(p.z() / 15.0), std::sin(p.x() / 10.0));
+  }
+  const auto bent = calibrate_hand_eye(poses.camera, poses.tracker, {});
+  ASSERT_TRUE(bent) << bent.error().message;
+  errors.moved = *noise_while_moved(*bent);
+  EXPECT_TRUE(errors.larger_while_moved());
+  // Of 2.4 mm; a part looks like another hand-eye.
+  EXPECT_GT(errors.position_deviation_mm(), 1.4);
+  EXPECT_LT(errors.position_deviation_mm(), 2.6);
+  EXPECT_GT(errors.correlation_s(), 0.05);
+  EXPECT_LT(errors.correlation_s(), 2.0);
+  EXPECT_GE(errors.rotation_deviation_deg(), 0.1);
+  EXPECT_THAT(text_of(errors), HasSubstr("more than at rest"));
+  EXPECT_EQ(json_of(errors)["position_deviation_mm"], errors.position_deviation_mm());
 }
 
 TEST(HandEye, OfABoardOfAnotherSizeIsRefused) {
