@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "daemon/setup/commands/measurement.hpp"
 #include "daemon/setup/commands/recorded_options.hpp"
 #include "daemon/setup/kept_result.hpp"
+#include "daemon/setup/live_guide.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/recorded_verification.hpp"
 
@@ -97,9 +99,11 @@ Outcome run(VerifyOptions& options, const Console& console) {
   live.longest_s = options.longest_s;
   const std::string made_from = options.live ? options.configuration : options.recorded.recording;
   constexpr double kLeast_s = 10.0;
-  const auto guide = live_board_guide(live, options.recorded, options.configuration, kLeast_s);
-  if (!guide) return refuse(guide.error());
-  return with_recording(live, kScopeTool, **guide, console, options.recorded.recording,
+  // What is on trial is not measured anew, which would take longer.
+  const auto source = source_of(options.recorded, options.configuration);
+  if (!source) return refuse(source.error());
+  const auto guide = board_guide(source->board, std::nullopt, kLeast_s, Turning::kWanted);
+  return with_recording(live, kScopeTool, *guide, console, options.recorded.recording,
                         [&] { return verified(options, made_from, console); });
 }
 
