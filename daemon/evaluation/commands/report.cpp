@@ -1,9 +1,12 @@
 // `perimap report`: received samples against the truth.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/command_line/outputs.hpp"
@@ -22,7 +25,19 @@ struct ReportOptions {
   std::string picture;
   std::string json;
   bool whole = false;
+  std::vector<double> registration;  // empty: the samples are in the recording's frame
 };
+
+// Into the frame of the patient's image.
+Expected<std::optional<Pose>> registration_of(const ReportOptions& options) {
+  const std::vector<double>& given = options.registration;
+  if (given.empty()) return std::optional<Pose>();
+  const double wxyz[4] = {given.at(3), given.at(4), given.at(5), given.at(6)};
+  if (std::abs(std::hypot(std::hypot(wxyz[0], wxyz[1]), std::hypot(wxyz[2], wxyz[3])) - 1.0) > 1e-3) {
+    return fail("--registration: expected a translation and a unit quaternion, TX TY TZ W X Y Z");
+  }
+  return std::optional(pose_from_wxyz(Vector3d(given.at(0), given.at(1), given.at(2)), wxyz));
+}
 
 bool is_png(const std::string& picture) { return std::filesystem::path(picture).extension() == ".png"; }
 
@@ -46,9 +61,11 @@ Outcome report(const ReportOptions& options) {
                                                     {"a file that is read", options.samples}})
                           .and_then([&options] { return check_picture(options.picture); });
   if (!usable) return refuse(usable.error(), ExitCode::kWrongUsage);
+  const auto X_IW = registration_of(options);
+  if (!X_IW) return refuse(X_IW.error(), ExitCode::kWrongUsage);
   if (auto able = check_writable({json, picture}); !able) return refuse(able.error());
   const auto result = report_samples(options.recording, options.samples, options.stream,
-                                     options.whole ? ReadMode::kWhole : ReadMode::kStrict);
+                                     options.whole ? ReadMode::kWhole : ReadMode::kStrict, *X_IW);
   if (!result) return refuse(result.error());
   fmt::print("{}", to_text(*result));
   if (!options.picture.empty()) {
@@ -76,6 +93,11 @@ void add_report_command(Commands& commands) {
   command.add_option("--picture", options->picture,
                      "Write motion paths and error over time to this picture (.svg or .png)");
   command.add_option("--json", options->json, "Write the report as JSON to this file");
+  command
+      .add_option("--registration", options->registration,
+                  "TX TY TZ W X Y Z, mm and unit quaternion: the true place of the recording's frame in the patient's "
+                  "image, where the samples are in that [they are in the recording's]")
+      ->expected(7);
   command.add_flag("--whole", options->whole, "Use what is whole of damaged files");
 }
 

@@ -14,7 +14,8 @@
 
 namespace perimap {
 
-Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, ReadMode mode) {
+Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, ReadMode mode,
+                                                  const std::optional<Pose>& X_IW) {
   constexpr std::array<std::string_view, 3> kTruth = {channels::kTruthMesh, channels::kTruthMotion,
                                                       channels::kTruthCamera};
   // Of a procedure, and of a motion trace, where there was one.
@@ -86,6 +87,17 @@ Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, 
     }
   }
   if (!mesh || !motion || cameras.empty()) return fail(fmt::format("{}: its ground truth is not complete", recording));
+  if (X_IW) {
+    if (procedure || !trace.empty()) {
+      return fail(
+          fmt::format("{}: is moved by a procedure or a trace in the tracker's frame; expected a registration "
+                      "of none",
+                      recording));
+    }
+    mesh = transformed(*X_IW, std::move(*mesh));
+    motion->respiration_mm = X_IW->R * motion->respiration_mm;
+    for (CameraTruth& seen : cameras) seen.X_WC = *X_IW * seen.X_WC;
+  }
   auto truth = GroundTruth::create(std::move(*mesh), std::move(*motion), std::move(cameras));
   if (!truth) return fail(fmt::format("{}: {}", recording, truth.error().message));
   if (const auto good = truth->set_trace(std::move(trace)); !good) {

@@ -50,7 +50,10 @@ struct RecordedTruth {
          reason == perimap_SURFACE_REASON_ORGAN_MOVED || reason == perimap_SURFACE_REASON_TRACKER_ERRS;
 }
 
-// Nothing when the recording has no ground truth (it is not a simulated one).
-[[nodiscard]] Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, ReadMode mode);
+// Nothing when the recording has no ground truth (it is not a simulated one). `X_IW`: the registration, where positions
+// are to be held against it in the frame of the patient's image; refused of a heart that is moved by a procedure or a
+// trace, which are told in the tracker's frame.
+[[nodiscard]] Expected<std::optional<RecordedTruth>> load_truth(const std::string& recording, ReadMode mode,
+                                                                const std::optional<Pose>& X_IW = std::nullopt);
 
 }  // namespace perimap

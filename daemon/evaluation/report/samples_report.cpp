@@ -29,8 +29,8 @@ DurationFigures figures_of(std::vector<Duration> durations) {
 }  // namespace
 
 Expected<SamplesReport> report_samples(const std::string& recording, const std::string& samples,
-                                       const std::string& stream, ReadMode mode) {
-  const auto truth = load_truth(recording, mode);
+                                       const std::string& stream, ReadMode mode, const std::optional<Pose>& X_IW) {
+  const auto truth = load_truth(recording, mode, X_IW);
   if (!truth) return tl::unexpected(truth.error());
   if (!*truth) return fail(fmt::format("{}: has no ground truth to compare with", recording));
   auto reader = RecordingReader::open(samples, mode);

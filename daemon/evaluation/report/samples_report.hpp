@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "core/error/expected.hpp"
+#include "core/geometry/pose.hpp"
 #include "core/time/instant.hpp"
 #include "daemon/evaluation/report/accuracy.hpp"
 #include "drivers/recording/recording_reader.hpp"
@@ -30,8 +32,9 @@ struct SamplesReport {
 };
 
 // Of one stream; with an empty name of the only one there is. Fails when the recording has no ground truth, the samples
-// are not of this recording, or which stream is meant is not told.
+// are not of this recording, or which stream is meant is not told. `X_IW` as load_truth() has it.
 [[nodiscard]] Expected<SamplesReport> report_samples(const std::string& recording, const std::string& samples,
-                                                     const std::string& stream, ReadMode mode);
+                                                     const std::string& stream, ReadMode mode,
+                                                     const std::optional<Pose>& X_IW = std::nullopt);
 
 }  // namespace perimap

@@ -38,6 +38,7 @@ struct SimulateOptions {
   unsigned threads = 0;
   bool force = false;
   std::filesystem::path procedure;  // to write the one that is simulated to
+  std::filesystem::path untold;     // a second recording of the same, without its set-up; empty: none
 
   [[nodiscard]] unsigned thread_count() const {
     return threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
@@ -69,6 +70,7 @@ Expected<BenchScene> bench_scene(const SimulateOptions& options) {
   auto board = options.bench.board();
   if (!board) return tl::unexpected(board.error());
   settings->board = *std::move(board);
+  settings->board_is_held = options.bench.board_is_held();
   options.scope.apply(*settings);
   return BenchScene::create(*settings);
 }
@@ -103,8 +105,9 @@ Outcome simulate_bench(const SimulateOptions& options, const Console& console) {
 }
 
 std::vector<SimulatedRecording> planned(const SimulateOptions& options) {
-  if (options.tracker_noises_mm.empty()) return {{options.out, options.simulation.noise()}};
   std::vector<SimulatedRecording> recordings;
+  if (!options.untold.empty()) recordings.push_back({options.untold, options.simulation.noise(), false});
+  if (options.tracker_noises_mm.empty()) recordings.push_back({options.out, options.simulation.noise()});
   for (const double noise_mm : options.tracker_noises_mm) {
     std::filesystem::path path = options.out;
     path.replace_filename(
@@ -132,9 +135,11 @@ Outcome simulate_heart(const SimulateOptions& options, const Console& console) {
   if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
   const std::vector<SimulatedRecording> recordings = planned(options);
   for (const SimulatedRecording& recording : recordings) {
-    for (const auto& sound :
-         {check_new({recording.path, options.procedure}, options),
-          check_apart({{"OUT", recording.path.string()}, {"--write-procedure", options.procedure.string()}}, {})}) {
+    for (const auto& sound : {check_new({recording.path, options.procedure}, options),
+                              check_apart({{"OUT", options.out.string()},
+                                           {"--untold", options.untold.string()},
+                                           {"--write-procedure", options.procedure.string()}},
+                                          {})}) {
       if (!sound) return refuse(sound.error(), ExitCode::kWrongUsage);
     }
   }
@@ -174,6 +179,9 @@ Expected<void> check(const SimulateOptions& options) {
   if (auto sound = options.bench.check(); !sound) return sound;
   if (auto sound = options.scope.check(options.bench.act()); !sound) return sound;
   if (of_bench && options.simulation.has_procedure()) return fail("--procedure: expected --scene heart");
+  if (of_bench && !options.untold.empty()) {
+    return fail("--untold: expected --scene heart; a bench's recording never tells its set-up");
+  }
   if (!options.procedure.empty() && !options.simulation.has_procedure()) {
     return fail("--write-procedure: expected --procedure, whose script it writes");
   }
@@ -204,6 +212,10 @@ void add_simulate_command(Commands& commands) {
   options->scope.add_to(command);
   command.add_option("--write-procedure", options->procedure,
                      "With --procedure: write its script to this file, as when it was drawn");
+  command.add_option(
+      "--untold", options->untold,
+      "Of a heart: write a second recording of the same, without the set-up that OUT has attached (lens, "
+      "hand-eye, clocks, noise), as what devices give that nobody has measured");
   command
       .add_option("--tracker-noises", options->tracker_noises_mm,
                   "Several position noises, mm, from one rendering: OUT-0mm.mcap, OUT-1.4mm.mcap for 0,1.4")

@@ -183,15 +183,20 @@ class SessionWriter {
     const auto truth_mesh = borrow_truth_mesh(simulation_.truth().mesh());
     const auto truth_motion = borrow_truth_motion(simulation_.truth().motion(), r_peaks_ns);
     const Instant start = simulation_.start();
+    return attach_set_up()
+        .and_then([&] { return writer_.write(*info, facts, start, start, 0); })
+        .and_then([&] { return writer_.write(*mesh, truth_mesh, start, start, 0); })
+        .and_then([&] { return writer_.write(*motion, truth_motion, start, start, 0); });
+  }
+
+  Expected<void> attach_set_up() {
+    if (!recording_.set_up_told) return {};
     return attach(attachments::kCalibration, "application/yaml", simulation_.setup_at(Duration(0)).lens.opencv_yaml())
         .and_then([&] {
           return attach(attachments::kConfiguration, "application/toml",
                         simulated_configuration(simulation_, recording_.noise));
         })
-        .and_then([&] { return attach_turned_scope(); })
-        .and_then([&] { return writer_.write(*info, facts, start, start, 0); })
-        .and_then([&] { return writer_.write(*mesh, truth_mesh, start, start, 0); })
-        .and_then([&] { return writer_.write(*motion, truth_motion, start, start, 0); });
+        .and_then([&] { return attach_turned_scope(); });
   }
 
   // Its script, and where it moves the organ; its events follow in their time.

@@ -15,12 +15,14 @@ namespace perimap {
 struct SimulatedRecording {
   std::filesystem::path path;
   TrackerNoise noise;
+  // Whether lens, hand-eye, clocks and noise are attached; where not, it is as of devices that nobody has measured.
+  bool set_up_told = true;
 };
 
 // What perimapd needs to know about this session, as a configuration file.
 [[nodiscard]] std::string simulated_configuration(const Simulation& simulation, const TrackerNoise& noise);
 
-// Renders the simulation once, on so many threads, and writes one recording for each tracker noise. Equal simulations
+// Renders the simulation once, on so many threads, and writes so many recordings of it. Equal simulations
 // give equal bytes, whatever the number of threads. Each file gets its name only when it is whole. `progress` hears of
 // every frame and says whether to go on; where not, nothing is left and false is returned.
 [[nodiscard]] Expected<bool> write_simulation(const Simulation& simulation,

@@ -7,6 +7,8 @@
 
 namespace perimap {
 
+Vector3d heart_place_W() noexcept { return {140.0, -75.0, -230.0}; }
+
 ScopeSetup usual_setup(int width_px, int height_px) noexcept {
   ScopeSetup setup;
   setup.lens = scope_lens(width_px, height_px);
@@ -38,7 +40,9 @@ ScopeSetup drawn_setup(std::uint64_t seed, int width_px, int height_px) noexcept
   setup.X_SC.t = vector(15.0) + Vector3d(0.0, 0.0, uniform(20.0, 80.0));
   setup.tracker_offset = from_seconds(uniform(0.005, 0.040));
   setup.tip_T = vector(8.0) + Vector3d(0.0, 0.0, uniform(100.0, 200.0));
-  setup.X_IW = {so3_exp(vector(1.5)), vector(250.0)};
+  // The patient's image is about the heart, and so are its landmarks.
+  const Matrix3d R_IW = so3_exp(vector(1.5));
+  setup.X_IW = {R_IW, vector(40.0) - R_IW * heart_place_W()};
   setup.X_HS2 = {so3_exp(vector(1.2)), vector(20.0) - Vector3d(0.0, 0.0, uniform(30.0, 90.0))};
   return setup;
 }

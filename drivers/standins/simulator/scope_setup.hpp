@@ -22,6 +22,9 @@ struct ScopeSetup {
   Pose X_IW = {Matrix3d::Identity(), Vector3d::Zero()};  // the tracker's frame in the patient's image
 };
 
+// Where a simulated heart lies in the tracker's frame, mm.
+[[nodiscard]] Vector3d heart_place_W() noexcept;
+
 // The scope as it is where nothing is drawn.
 [[nodiscard]] ScopeSetup usual_setup(int width_px, int height_px) noexcept;
 

@@ -15,6 +15,7 @@
 #include "drivers/standins/simulator/embedded_data.hpp"
 #include "drivers/standins/simulator/procedure_truth.hpp"
 #include "drivers/standins/simulator/scope_path.hpp"
+#include "drivers/standins/simulator/scope_setup.hpp"
 #include "drivers/standins/simulator/session_ecg.hpp"
 #include "drivers/standins/simulator/slow_error.hpp"
 #include "drivers/standins/simulator/stretches.hpp"
@@ -50,7 +51,7 @@ constexpr Duration kEcgLoop = std::chrono::seconds(1);
 constexpr Duration kCameraLoop = std::chrono::seconds(2);
 
 // The heart (frame H of its table: x left, y posterior, z superior) as it lies in the tracker's frame.
-Pose X_WH() noexcept { return {so3_exp(Vector3d(0.4, -0.7, 1.1)), Vector3d(140.0, -75.0, -230.0)}; }
+Pose X_WH() noexcept { return {so3_exp(Vector3d(0.4, -0.7, 1.1)), heart_place_W()}; }
 // From the heart towards the scope: the anterior and left lateral wall faces it, the valves do not.
 Vector3d view_axis_H() noexcept { return Vector3d(0.45, -0.80, -0.38).normalized(); }
 Vector3d up_H() noexcept { return {0.0, 0.0, 1.0}; }
