@@ -41,7 +41,7 @@ SetupExpected<VerifiedSetUp> set_up_of(const VerifyOptions& options, const Motio
   if (!configuration) return wrong_setup(configuration.error());
   const auto lens = lens_of(motion);
   if (!lens) return tl::unexpected(lens.error());
-  return verified_set_up_of(*configuration, *lens);
+  return verified_set_up_of(*configuration, lens->camera);
 }
 
 // Beside the configuration, for check, perimapd and each recording; passed or not. Where that folder is not this user's

@@ -41,7 +41,7 @@ drawn() {
   wait $overlay || fail "the example ended with $?: $(cat "$work/error")"
   "$check" judge "$recording" "$work/received.mcap" "$work/lines" "$work/overlay.png" || fail "see above"
 }
-drawn exact --duration 8
+drawn exact --duration 10
 # An angled scope that is turned meanwhile: the lens is each surface's own, and nothing is drawn while its turn is not known.
 drawn turned --duration 12 --field-stop 40 --turn-to 95 --turn-at 6
 grep -q 'it is not known where the camera was' "$work/lines" || fail "it drew while the scope was being turned"
