@@ -317,7 +317,7 @@ void Mapper::move_map_with(const RestingOrgan& organ) noexcept {
 
 void Mapper::recall(const MapMemory& memory, Instant now) {
   phases_.recall(memory, now);
-  watcher_.recall();
+  if (!memory.features.empty()) watcher_.recall();
   const std::uint32_t largest_id = keeping_.recall(memory.features, phases_.breathing());
   if (largest_id > 0) intake_.go_on_from(largest_id, now - memory.last_capture);
   stages_.hand_over_recalled(memory.last_capture);

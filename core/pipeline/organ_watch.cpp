@@ -85,6 +85,7 @@ void OrganWatch::count_sight(std::span<FeatureGroup> groups, Instant capture) no
   if (known_.seen && capture - *known_.seen > kOutOfSight) {
     evidence_.clear();
     known_.unproven = true;
+    known_.settling = false;
     tool_.heed_organ(false, capture);
   }
   known_.seen = capture;
@@ -120,6 +121,14 @@ void OrganWatch::watch(ImagePhase& image, std::span<FeatureGroup> groups, const 
   judge(frame.stamp.capture);
 }
 
+void OrganWatch::note_converged(bool some) noexcept {
+  if (!some) return;
+  if (!known_.unproven) known_.settling = false;
+  // What was seen before was held against a map that was still moving to its place.
+  if (!known_.converged) evidence_.clear();
+  known_.converged = true;
+}
+
 void OrganWatch::look_for_displacement(Instant now) noexcept {
   for (std::size_t window = 0; window < CommonDisplacement::kWindows.size(); ++window) {
     const MeanDisplacement mean = evidence_.mean(window, now, known_.surface);
@@ -131,7 +140,7 @@ void OrganWatch::look_for_displacement(Instant now) noexcept {
 }
 
 void OrganWatch::judge(Instant now) noexcept {
-  if (!displaced()) look_for_displacement(now);
+  if (!displaced() && known_.converged) look_for_displacement(now);
   if (!displaced()) known_.unproven = known_.unproven && !evidence_.mean(kProofWindow, now, known_.surface).told;
   tool_.heed_organ(!displaced() && !known_.unproven, now);
   if (!displaced()) return;

@@ -61,7 +61,9 @@ class OrganWatch {
   [[nodiscard]] bool unproven() const noexcept { return known_.unproven; }
   // The map has been moved with the organ, and nothing has converged there since: that is why nothing is good.
   [[nodiscard]] bool settling() const noexcept { return known_.settling; }
-  void note_converged(bool some) noexcept { known_.settling = known_.settling && (known_.unproven || !some); }
+  // Mapper, once a frame: whether some feature is called converged. Until one was, the map is no place yet that the
+  // organ could have left.
+  void note_converged(bool some) noexcept;
   // Captures from this one on are not to be learnt from; none: all are.
   [[nodiscard]] const std::optional<Instant>& displaced_since() const noexcept { return displaced_.since; }
   // Maps the map's points to where they are now.
@@ -107,6 +109,7 @@ class OrganWatch {
     std::optional<Instant> seen;
     bool unproven = false;
     bool settling = false;
+    bool converged = false;  // some feature was, once
   };
   // Since the organ was last where the map has it.
   struct Displaced {

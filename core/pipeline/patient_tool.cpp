@@ -108,6 +108,7 @@ void PatientTool::move_home() noexcept {
 
 void PatientTool::forget() noexcept {
   home_.reset();
+  bins_ = {};
   at_its_place_since_.reset();
 }
 

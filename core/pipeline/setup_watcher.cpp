@@ -18,8 +18,9 @@ constexpr Duration kRoundEvery = std::chrono::seconds(3);
 constexpr Duration kRoundTakes = std::chrono::milliseconds(700);
 // Where there is too little for a round yet, until it is looked for again.
 constexpr Duration kLookAgain = std::chrono::milliseconds(300);
-// Where too few features have matches enough by then, as in a scene that has few, no round is waited for.
-constexpr Duration kWaitsForFeatures = std::chrono::seconds(4);
+// From the first frame that is told. No round is waited for that has told nothing by then, for want of features, frames
+// or processor time, because the scope rests or nothing explains its window.
+constexpr Duration kWaitsForRound = std::chrono::seconds(10);
 // What follows is evidence, and counted: equations against unknowns. The window takes a frame in 50 ms, so that it is
 // the same at every frame rate from 20 on.
 constexpr std::size_t kFewestFrames = 80;  // told ones, before a round
@@ -47,8 +48,8 @@ void SetupWatcher::keep(const FrameHistory& history, std::span<const FeatureSlot
   window_.tell(history);
   window_.add(frame, slots);
   if (!first_capture_) first_capture_ = frame.stamp.capture;
-  if (!enough_ && window_.told() >= kFewestFrames) enough_ = frame.stamp.capture;
-  if (enough_ && !hand_over_.under_way() && frame.stamp.capture - *enough_ > kWaitsForFeatures) asked_ = true;
+  if (!first_told_ && window_.told() > 0) first_told_ = frame.stamp.capture;
+  if (first_told_ && frame.stamp.capture - *first_told_ > kWaitsForRound) asked_ = true;
   if (hand_over_.under_way() || frame.index < next_round_at_) return;
   next_round_at_ = frame.index + frame.rate.frames(kLookAgain);
   // What was judged already tells nothing new: a tool that is hidden, a phase that is lost.
@@ -69,7 +70,8 @@ void SetupWatcher::adopt(const FrameRecord& frame) noexcept {
   if (frame.index < adopted_at_ || !hand_over_.finish()) return;
   if (std::exchange(discarded_, false)) return;
   belief_.add(verdict_, frame.stamp.capture - *first_capture_);
-  asked_ = true;
+  // A window of a scope at rest has no matches in its verdict.
+  if (verdict_.state != SetupState::kUnknown && verdict_.matches > 0) asked_ = true;
   status_.write(belief_);
 }
 

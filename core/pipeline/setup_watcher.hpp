@@ -40,7 +40,7 @@ class SetupWatcher {
   // being judged was told by the old ones and counts for nothing.
   void retell_phases(const CardiacClock& clock) noexcept;
   void retell_respiration(const RespiratoryClock& respiration) noexcept;
-  // Mapper: the map is that of an earlier run, in which its set-up was asked.
+  // Mapper: the map is that of an earlier run, and is believed as it was in that.
   void recall() noexcept { asked_ = true; }
   // Mapper: another patient. What is believed of the set-up stays.
   void begin_window_anew() noexcept;
@@ -50,8 +50,8 @@ class SetupWatcher {
   // Mapper: what is believed as of the last adopt().
   [[nodiscard]] const SetupBelief& belief() const noexcept { return belief_; }
   // Mapper: what a feature's own largest deviation may be, so that with what the set-up may be off by it is within
-  // `bound_mm`. Below zero, so that none is, until a round has told of the set-up or there was none for want of
-  // features.
+  // `bound_mm`. Below zero, so that none is, until a round has told of the set-up or was waited for in
+  // vain.
   [[nodiscard]] double within_mm(double bound_mm) const noexcept;
   // Status thread: the same, valid until the next call.
   [[nodiscard]] const SetupBelief& status_belief() noexcept;
@@ -94,12 +94,12 @@ class SetupWatcher {
   SetupBelief belief_;
   TripleBuffer<SetupBelief> status_;
   std::optional<Instant> first_capture_;
-  std::vector<Seen> seen_;           // by slot
-  std::vector<std::size_t> chosen_;  // slots
-  bool discarded_ = false;           // the round that is under way
-  bool asked_ = false;               // of the set-up, once or in vain
-  std::optional<Instant> enough_;    // the capture with which the window first had frames enough for a round
-  std::uint64_t judged_frame_ = 0;   // the newest that the last round knew all of
+  std::vector<Seen> seen_;             // by slot
+  std::vector<std::size_t> chosen_;    // slots
+  bool discarded_ = false;             // the round that is under way
+  bool asked_ = false;                 // of the set-up, once or in vain
+  std::optional<Instant> first_told_;  // the capture with which the window first had a frame whose cycle had ended
+  std::uint64_t judged_frame_ = 0;     // the newest that the last round knew all of
   std::uint64_t adopted_at_ = 0;
   std::uint64_t next_round_at_ = 0;
 

@@ -121,7 +121,8 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
     feature.reason = verdict.reason;
     sample_.features.push_back(feature);
   }
-  sample_.uses = verdicts_by_use(sample_.state, sample_.reason, sample_.features, sample_.use_within_mm);
+  const bool accounted_for = is_accounted_for(phase, clock.rhythm(), footing);
+  sample_.uses = verdicts_by_use(sample_.state, accounted_for, sample_.features, sample_.use_within_mm);
   return sample_;
 }
 

@@ -74,6 +74,14 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   return SurfaceReason::kNone;
 }
 
+bool is_accounted_for(const PhaseEstimate& phase, Rhythm rhythm, SurfaceFooting footing) noexcept {
+  PhaseEstimate carried = phase;
+  const bool predicted = phase.state == PhaseState::kFreeRunning || phase.state == PhaseState::kFromImage;
+  if (predicted) carried.state = PhaseState::kLocked;
+  footing.frame_missing = footing.update_late = footing.pose_missing = false;
+  return reason_of(carried, rhythm, footing) == SurfaceReason::kNone;
+}
+
 SurfaceState state_of(SurfaceReason reason) noexcept {
   switch (reason) {
     case SurfaceReason::kNone:

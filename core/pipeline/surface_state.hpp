@@ -32,6 +32,10 @@ struct SurfaceFooting {
 
 [[nodiscard]] SurfaceState state_of(SurfaceReason reason) noexcept;
 
+// Nothing is wrong but that what is published is predicted from before, which makes it as much less certain as it says.
+// Not by its reason, which is the first of several.
+[[nodiscard]] bool is_accounted_for(const PhaseEstimate& phase, Rhythm rhythm, SurfaceFooting footing) noexcept;
+
 struct FeatureVerdict {
   FeatureState state = FeatureState::kInvalid;
   FeatureReason reason = FeatureReason::kNone;

@@ -4,28 +4,10 @@
 #include <cstddef>
 
 namespace perimap {
-namespace {
-
-// What is published is predicted from before, and as much less certain as it says.
-bool is_accounted_for(SurfaceReason reason) noexcept {
-  switch (reason) {
-    case SurfaceReason::kNone:
-    case SurfaceReason::kFrameMissing:
-    case SurfaceReason::kUpdateLate:
-    case SurfaceReason::kPoseMissing:
-    case SurfaceReason::kPhaseFreeRunning:
-    case SurfaceReason::kPhaseFromImage:
-      return true;
-    default:
-      return false;
-  }
-}
-
-}  // namespace
 
 double within_mm(const Matrix3d& covariance_mm2) noexcept { return 2.0 * std::sqrt(covariance_mm2.trace()); }
 
-UseVerdicts verdicts_by_use(SurfaceState state, SurfaceReason reason, std::span<const SurfaceFeature> features,
+UseVerdicts verdicts_by_use(SurfaceState state, bool accounted_for, std::span<const SurfaceFeature> features,
                             const UseBounds& within) noexcept {
   UseVerdicts verdicts;
   std::uint32_t converged = 0;
@@ -38,7 +20,7 @@ UseVerdicts verdicts_by_use(SurfaceState state, SurfaceReason reason, std::span<
   if (state == SurfaceState::kInvalid) return verdicts;
   for (std::size_t use = 0; use < kUses; ++use) {
     const bool shown = use == static_cast<std::size_t>(SurfaceUse::kDisplay);
-    const bool nothing_wrong = shown ? is_accounted_for(reason) : reason == SurfaceReason::kNone;
+    const bool nothing_wrong = state == SurfaceState::kGood || (shown && accounted_for);
     const std::uint32_t enough = verdicts[use].features;
     const bool good = nothing_wrong && enough > 0 && 2 * enough >= converged;
     verdicts[use].state = good ? SurfaceState::kGood : SurfaceState::kDegraded;

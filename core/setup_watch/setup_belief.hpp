@@ -33,9 +33,12 @@ class SetupBelief {
     if (verdict.state == SetupState::kConsistent) ++consistent_;
     const bool knows = doubts || verdict.state == SetupState::kConsistent ||
                        (verdict.matches > 0 && verdict.surface_deviation_mm <= widened_at_mm_);
-    if (knows || verdict.widening_mm > widening_mm_) {
-      widening_mm_ = verdict.widening_mm;
+    if (knows || widening_mm_ == 0.0) {
       widened_at_mm_ = verdict.surface_deviation_mm;
+      widening_mm_ = verdict.widening_mm;
+    } else {
+      // What knew more is not taken back later by what knows as little as this.
+      widening_mm_ = std::max(widening_mm_, verdict.widening_mm);
     }
     newest_ = verdict;
     if (again || certain || (doubts && doubted_)) {

@@ -114,6 +114,29 @@ TEST(SurfaceState, SaysOrganOrTrackerWhereThePatientsToolTellsThemApart) {
   EXPECT_EQ(state_of(SurfaceReason::kTrackerErrs), SurfaceState::kDegraded);
 }
 
+TEST(SurfaceState, IsAccountedForWhereItIsPredictedFromBeforeAndNotWhereSomethingElseIsWrongAsWell) {
+  PhaseEstimate free_running = locked();
+  free_running.state = PhaseState::kFreeRunning;
+  SurfaceFooting missing;
+  missing.mapped = missing.frame_missing = missing.update_late = missing.pose_missing = true;
+  EXPECT_TRUE(is_accounted_for(locked(), Rhythm::kPredictable, missing));
+  EXPECT_TRUE(is_accounted_for(free_running, Rhythm::kPredictable, missing));
+  EXPECT_FALSE(is_accounted_for(free_running, Rhythm::kEctopic, missing));
+  for (bool FrameDoubts::*doubt :
+       {&FrameDoubts::picture_repeated, &FrameDoubts::scope_unread, &FrameDoubts::scope_changed,
+        &FrameDoubts::pose_repeated, &FrameDoubts::setup_doubted, &FrameDoubts::displaced, &FrameDoubts::unproven}) {
+    SurfaceFooting both = missing;
+    both.doubts.*doubt = true;
+    EXPECT_FALSE(is_accounted_for(free_running, Rhythm::kPredictable, both));
+  }
+  SurfaceFooting unseen = missing;
+  unseen.not_seen = true;
+  EXPECT_FALSE(is_accounted_for(locked(), Rhythm::kPredictable, unseen));
+  PhaseEstimate ectopic = free_running;
+  ectopic.ectopic = true;
+  EXPECT_FALSE(is_accounted_for(ectopic, Rhythm::kPredictable, missing));
+}
+
 TEST(SurfaceState, SaysOfAMapThatWasMovedWithTheOrganThatThatIsWhyNothingHasConverged) {
   ShardSnapshot shard;
   shard.features.resize(1);

@@ -17,11 +17,8 @@ SurfaceFeature feature_within(double mm, FeatureState state = FeatureState::kCon
   return feature;
 }
 
-UseVerdicts verdicts(SurfaceReason reason, const std::vector<SurfaceFeature>& features) {
-  const SurfaceState state = reason == SurfaceReason::kNone            ? SurfaceState::kGood
-                             : reason == SurfaceReason::kNothingMapped ? SurfaceState::kInvalid
-                                                                       : SurfaceState::kDegraded;
-  return verdicts_by_use(state, reason, features, kBounds);
+UseVerdicts verdicts(SurfaceState state, bool accounted_for, const std::vector<SurfaceFeature>& features) {
+  return verdicts_by_use(state, accounted_for, features, kBounds);
 }
 
 SurfaceState state_for(SurfaceUse use, const UseVerdicts& verdicts) {
@@ -36,7 +33,7 @@ TEST(SurfaceUse, AnErrorsBoundIsTwiceItsRootMeanSquareWhateverItsDirection) {
 }
 
 TEST(SurfaceUse, EachUseHasABoundOfItsOwn) {
-  const UseVerdicts verdict = verdicts(SurfaceReason::kNone, {feature_within(2.5), feature_within(2.7)});
+  const UseVerdicts verdict = verdicts(SurfaceState::kGood, true, {feature_within(2.5), feature_within(2.7)});
   EXPECT_EQ(state_for(SurfaceUse::kDisplay, verdict), SurfaceState::kGood);
   EXPECT_EQ(state_for(SurfaceUse::kMeasure, verdict), SurfaceState::kGood);
   EXPECT_EQ(state_for(SurfaceUse::kContact, verdict), SurfaceState::kDegraded);
@@ -46,33 +43,27 @@ TEST(SurfaceUse, EachUseHasABoundOfItsOwn) {
 
 TEST(SurfaceUse, HalfOfTheConvergedFeaturesAreEnoughAndFewerAreNot) {
   const SurfaceFeature sure = feature_within(1.5), unsure = feature_within(2.5);
-  EXPECT_EQ(state_for(SurfaceUse::kContact, verdicts(SurfaceReason::kNone, {sure, unsure})), SurfaceState::kGood);
-  EXPECT_EQ(state_for(SurfaceUse::kContact, verdicts(SurfaceReason::kNone, {sure, unsure, unsure})),
+  EXPECT_EQ(state_for(SurfaceUse::kContact, verdicts(SurfaceState::kGood, true, {sure, unsure})), SurfaceState::kGood);
+  EXPECT_EQ(state_for(SurfaceUse::kContact, verdicts(SurfaceState::kGood, true, {sure, unsure, unsure})),
             SurfaceState::kDegraded);
   const SurfaceFeature starting = feature_within(1.5, FeatureState::kConverging);
-  EXPECT_EQ(state_for(SurfaceUse::kDisplay, verdicts(SurfaceReason::kNone, {starting})), SurfaceState::kDegraded)
+  EXPECT_EQ(state_for(SurfaceUse::kDisplay, verdicts(SurfaceState::kGood, true, {starting})), SurfaceState::kDegraded)
       << "what has not converged does not count";
 }
 
-TEST(SurfaceUse, WhatIsPredictedFromBeforeMayBeShownAsFarAsItSaysAndNoMore) {
-  for (const SurfaceReason reason : {SurfaceReason::kFrameMissing, SurfaceReason::kUpdateLate,
-                                     SurfaceReason::kPhaseFreeRunning, SurfaceReason::kPoseMissing}) {
-    const UseVerdicts verdict = verdicts(reason, {feature_within(1.0)});
-    EXPECT_EQ(state_for(SurfaceUse::kDisplay, verdict), SurfaceState::kGood);
-    EXPECT_EQ(state_for(SurfaceUse::kMeasure, verdict), SurfaceState::kDegraded);
-    EXPECT_EQ(state_for(SurfaceUse::kDisplay, verdicts(reason, {feature_within(6.0)})), SurfaceState::kDegraded);
-  }
+TEST(SurfaceUse, WhatItsCovariancesAccountForMayBeShownAsFarAsTheySayAndNoMore) {
+  const UseVerdicts verdict = verdicts(SurfaceState::kDegraded, true, {feature_within(1.0)});
+  EXPECT_EQ(state_for(SurfaceUse::kDisplay, verdict), SurfaceState::kGood);
+  EXPECT_EQ(state_for(SurfaceUse::kMeasure, verdict), SurfaceState::kDegraded);
+  EXPECT_EQ(state_for(SurfaceUse::kDisplay, verdicts(SurfaceState::kDegraded, true, {feature_within(6.0)})),
+            SurfaceState::kDegraded);
 }
 
 TEST(SurfaceUse, WhatNoCovarianceTellsIsGoodForNothing) {
-  for (const SurfaceReason reason :
-       {SurfaceReason::kOrganOrTrackerMoved, SurfaceReason::kSetupDoubted, SurfaceReason::kNotSeen,
-        SurfaceReason::kRespirationUnknown, SurfaceReason::kEctopicBeat, SurfaceReason::kPictureRepeated}) {
-    for (const UseVerdict& verdict : verdicts(reason, {feature_within(1.0)})) {
-      EXPECT_EQ(verdict.state, SurfaceState::kDegraded);
-    }
+  for (const UseVerdict& verdict : verdicts(SurfaceState::kDegraded, false, {feature_within(1.0)})) {
+    EXPECT_EQ(verdict.state, SurfaceState::kDegraded);
   }
-  for (const UseVerdict& verdict : verdicts(SurfaceReason::kNothingMapped, {feature_within(1.0)})) {
+  for (const UseVerdict& verdict : verdicts(SurfaceState::kInvalid, false, {feature_within(1.0)})) {
     EXPECT_EQ(verdict.state, SurfaceState::kInvalid);
   }
 }

@@ -144,6 +144,23 @@ TEST(SetupBelief, WhatAWindowWidenedThatKnewLittleIsTakenBackByOneThatKnowsMore)
   EXPECT_EQ(belief.widening_mm(), 0.0);
 }
 
+TEST(SetupBelief, WhatAWindowHasWidenedThatKnewMuchIsNotTakenBackByTwoThatKnowLittle) {
+  SetupBelief belief;
+  SetupVerdict told = verdict(SetupState::kConsistent);
+  told.matches = 500;
+  told.surface_deviation_mm = 0.5;
+  told.widening_mm = 0.8;
+  belief.add(told, seconds(3));
+  told.state = SetupState::kUndetermined;
+  told.surface_deviation_mm = 3.0;
+  told.widening_mm = 0.9;
+  belief.add(told, seconds(6));
+  told.surface_deviation_mm = 2.9;
+  told.widening_mm = 0.0;
+  belief.add(told, seconds(9));
+  EXPECT_NEAR(belief.widening_mm(), 0.9, 1e-12);
+}
+
 TEST(SetupBelief, StaysWideWhileTheScopeRests) {
   SetupBelief belief;
   SetupVerdict told = verdict(SetupState::kConsistent);
