@@ -31,6 +31,7 @@ struct Organ : ::testing::Test {
   std::int64_t frames = 0;
   std::optional<Pose> tool;  // by how much the patient's tool has been moved; none: there is none
   std::int64_t readings = 0;
+  bool converged = true;  // some feature is called so
 
   Organ() {
     settings.pose.position_deviation_mm = 1.4 / std::sqrt(3.0);
@@ -83,6 +84,7 @@ struct Organ : ::testing::Test {
   void frame(const Pose& X) {
     const double t = static_cast<double>(++frames) / kFrames_per_s;
     read_tool(t);
+    watch->note_converged(converged);
     const Pose X_WC{so3_exp(0.05 * Vector3d(std::sin(t), std::cos(0.6 * t), 0.0)),
                     Vector3d(15.0 * std::sin(0.9 * t), 10.0 * std::sin(0.5 * t), 5.0 * std::sin(0.3 * t))};
     FrameStamp stamp;
@@ -157,6 +159,18 @@ TEST_F(Organ, ThatIsMovedIsDoubtedWithinTwoSecondsAndForAsLongAsItStaysThere) {
     seconds(1.0, kMoved);
     ASSERT_TRUE(watch->displaced()) << i;
   }
+}
+
+TEST_F(Organ, IsNotAskedOfBeforeAFeatureHasConverged) {
+  converged = false;
+  seconds(5.0, Pose{});
+  seconds(10.0, kMoved);
+  EXPECT_FALSE(watch->displaced()) << "it has no place yet";
+  converged = true;
+  frame(kMoved);
+  EXPECT_FALSE(watch->displaced()) << "what was seen before counts for nothing";
+  seconds(3.0, kMoved);
+  EXPECT_TRUE(watch->displaced());
 }
 
 TEST_F(Organ, ThatIsMovedIsFollowed) {
