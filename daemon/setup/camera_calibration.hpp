@@ -16,7 +16,7 @@ struct CameraCalibrationSettings {
   Lens lens = Lens::kBrownConrady;
   // A result that is less certain is refused: beyond it errors are larger than their deviations say.
   double largest_focal_deviation = 0.01;   // of the focal length
-  double largest_centre_deviation = 0.01;  // of the picture's width
+  double largest_centre_deviation = 0.02;  // of the picture's width
 };
 
 struct ViewResult {

@@ -108,6 +108,13 @@ TEST(TableTimes, OfARobotsStopsOfRowsAndOfOurYearsAreSeconds) {
   }
 }
 
+TEST(TableTimes, AreSecondsThoughARowOfZerosStandsWhereTheToolWasHidden) {
+  std::string text = timed_rows(1764244800.0, 5.0, 300, 1.0, ",0,0,0,0,0,0,1");
+  text += "0,0,0,0,0,0,0,0\n";
+  const auto table = parse_pose_table(text, "poses.csv", LengthUnit::kMetre);
+  EXPECT_TRUE(table) << table.error().message;
+}
+
 TEST(SignalTable, TakesTheDirectionOfMostMotion) {
   std::string text = "t,x,y,z\n";
   for (int i = 0; i < 100; ++i)
