@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/angle/angle.hpp"
+#include "core/geometry/nearest_rotation.hpp"
 #include "core/statistics/upper_median.hpp"
 
 namespace perimap {
@@ -71,9 +72,7 @@ Matrix3d rotation_of(const std::vector<Motion>& motions) {
     for (std::size_t i = 0; i < motions.size(); ++i) {
       if (used[i] != 0) M += motions[i].alpha * motions[i].beta.transpose();
     }
-    const Eigen::JacobiSVD<Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-    R = svd.matrixU() * Vector3d(1.0, 1.0, sign).asDiagonal() * svd.matrixV().transpose();
+    R = nearest_rotation(M);
     for (std::size_t i = 0; i < motions.size(); ++i) errors[i] = (motions[i].alpha - R * motions[i].beta).norm();
   }
   return R;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/calibration/one_decimal.hpp"
+#include "core/geometry/nearest_rotation.hpp"
 
 namespace perimap {
 namespace {
@@ -81,9 +82,7 @@ Pose rigid_fit(const std::vector<Vector3d>& to, const std::vector<Vector3d>& fro
   const Vector3d mean_from = mean_of(from);
   Matrix3d M = Matrix3d::Zero();
   for (std::size_t i = 0; i < to.size(); ++i) M += (to[i] - mean_to) * (from[i] - mean_from).transpose();
-  const Eigen::JacobiSVD<Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-  const Matrix3d R = svd.matrixU() * Vector3d(1.0, 1.0, sign).asDiagonal() * svd.matrixV().transpose();
+  const Matrix3d R = nearest_rotation(M);
   return {R, mean_to - R * mean_from};
 }
 

@@ -1,9 +1,10 @@
 #include "core/pipeline/patient_tool.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+
+#include "core/geometry/nearest_rotation.hpp"
 
 namespace perimap {
 namespace {
@@ -23,14 +24,6 @@ constexpr double kLeastShare = 0.6;
 constexpr double kFewestReadings = 5.0;
 
 std::int64_t number_of(Instant t, Duration bin) noexcept { return t.time_since_epoch() / bin; }
-
-// The rotation nearest to a sum of rotations.
-Matrix3d nearest_rotation(const Matrix3d& sum) noexcept {
-  const Eigen::JacobiSVD<Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Matrix3d U = svd.matrixU();
-  if ((U * svd.matrixV().transpose()).determinant() < 0.0) U.col(2) = -U.col(2);
-  return U * svd.matrixV().transpose();
-}
 
 // Variance of the mean of n readings over T s, over that of one: white errors, or ones that fall to 1/e within tau.
 double variance_of_mean(double n, double T, double tau) noexcept {
