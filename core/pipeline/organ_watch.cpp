@@ -166,9 +166,10 @@ void OrganWatch::judge(Instant now) noexcept {
 // asked of. Where both hold a longer window is asked, and where none tells, what was told before stays.
 void OrganWatch::ask_tool(Instant now) noexcept {
   for (const std::size_t window : kToolWindows) {
-    const MeanDisplacement seen = evidence_.mean(window, now, known_.surface);
     const ToolMovement tool = tool_.moved(CommonDisplacement::kWindows[window], now, centre_W_mm());
-    if (!seen.told || !tool.told) continue;
+    if (!tool.told) continue;
+    const MeanDisplacement seen = evidence_.mean(window, now, known_.surface);
+    if (!seen.told) continue;
     const bool rests = size_of(tool.d, tool.covariance, known_.surface).chi2 < kBack_chi2;
     const Vector6d apart = seen.at_centre - tool.d;
     const bool goes_with_it = size_of(apart, seen.covariance + tool.covariance, known_.surface).chi2 < kBack_chi2;
