@@ -13,7 +13,6 @@
 #include "daemon/publishing/advice.hpp"
 #include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
-#include "drivers/calibration/verification_record.hpp"
 
 namespace perimap {
 namespace {
@@ -185,10 +184,9 @@ std::string latency_section(const SessionRecord& record) {
 std::string set_up_section(const SessionRecord& record) {
   std::string out;
   for (const RecordedFile& file : record.files) {
-    if (file.verification.empty()) continue;
-    const auto verified = parse_verification(file.verification, file.path);
-    out += fmt::format("<p>Verified before it: {}</p>\n",
-                       escaped(verified ? words_of(*verified) : verified.error().message));
+    if (const auto verified = verification_of(file)) {
+      out += fmt::format("<p>Verified before it: {}</p>\n", escaped(verified->words));
+    }
   }
   if (record.counts.status) {
     out += fmt::format("<p>At the end: {}</p>\n", escaped(setup_words(record.counts.status->status.setup)));

@@ -1,7 +1,9 @@
 // A session on one page: what could be trusted when, and what is known of why not.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/evaluation/session/session_record.hpp"
 
@@ -12,6 +14,14 @@ namespace perimap {
 
 // What somebody should look at, a sentence each; none where nothing is amiss.
 [[nodiscard]] std::vector<std::string> session_concerns(const SessionRecord& record);
+
+// What perimap verify said last before a file was recorded.
+struct ToldVerification {
+  std::string words;      // or why the attachment cannot be read
+  bool doubtful = false;  // to be looked at
+};
+// None where nothing is attached.
+[[nodiscard]] std::optional<ToldVerification> verification_of(const RecordedFile& file);
 
 // Self-contained HTML.
 [[nodiscard]] std::string session_page(const SessionRecord& record);

@@ -76,16 +76,19 @@ std::string session_verdict(const SessionRecord& record) {
   return out;
 }
 
+std::optional<ToldVerification> verification_of(const RecordedFile& file) {
+  if (file.verification.empty()) return std::nullopt;
+  const auto record = parse_verification(file.verification, file.path);
+  if (!record) return ToldVerification{record.error().message, true};
+  return ToldVerification{words_of(*record), record->is_doubtful()};
+}
+
 std::vector<std::string> session_concerns(const SessionRecord& record) {
   std::vector<std::string> concerns;
   for (const RecordedFile& file : record.files) {
     for (const std::string& damage : file.damage) concerns.push_back("A file is damaged: " + damage);
-    if (file.verification.empty()) continue;
-    const auto verified = parse_verification(file.verification, file.path);
-    if (!verified || verified->is_doubtful()) {
-      concerns.push_back("The set-up was verified before: " +
-                         (verified ? words_of(*verified) : verified.error().message));
-    }
+    const auto verified = verification_of(file);
+    if (verified && verified->doubtful) concerns.push_back("The set-up was verified before: " + verified->words);
   }
   add_counts(record.counts, concerns);
   if (record.counts.status) {
