@@ -117,14 +117,12 @@ while read -r -u 3 command; do
   count=$((count + 1))
   # On a busy machine the guide sees few of the frames, and asks for longer than the playback lasts.
   grep 'ended before' told || true
-  case $command in 'perimap calibrate hand-eye'*) cp out hand-eye.txt ;; 'perimap verify'*) cp out verified.txt ;; esac
   echo "$(($(cut -d. -f1 /proc/uptime) - begin_s)) s: $command"
 done 3<<< "$commands"
 echo "$count commands of the guide"
 
 # ---- what they measured
 value() { sed -n "s/^$1 = \[*//p" devices.toml | tr -d ']' | sed 's/ *#.*//' | cut -d, -f"${2:-1}"; }
-measured() { sed -n "/$1/,\$p" camera.yaml | grep -oE '[-+0-9.]+(e[-+0-9]+)?' | sed -n "$2p"; }
 for i in 1 2 3; do
   near "hand-eye translation $i, mm" "$(value hand_eye_translation_SC_mm $i)" "$(nth truth.json translation_mm $i)" 0.7
   near "pointer's tip $i, mm" "$(nth pointer.json tip_mm $i)" "$(nth truth.json tip_mm $i)" 0.5

@@ -46,6 +46,11 @@ std::vector<BoardView> shown(Draw& draw, const CameraModel& camera, std::size_t 
   return views;
 }
 
+// Of fx, fy, cx, cy.
+Eigen::Vector4d lens_error(const CameraModel& told, const CameraModel& truth) {
+  return {told.fx - truth.fx, told.fy - truth.fy, told.cx - truth.cx, told.cy - truth.cy};
+}
+
 struct CameraTrial {
   bool refused = true;
   double focal_percent = 99.0;
@@ -64,19 +69,24 @@ CameraTrial camera_trial(std::uint64_t seed, std::size_t view_count, const Showi
     return {};
   }
   const CameraModel& c = result->camera;
-  const Eigen::Vector4d e(c.fx - camera.fx, c.fy - camera.fy, c.cx - camera.cx, c.cy - camera.cy);
-  const Eigen::Matrix4d C = result->covariance.topLeftCorner<4, 4>();
+  const Eigen::Vector4d e = lens_error(c, camera);
   CameraTrial trial;
   trial.refused = false;
   trial.focal_percent = 100.0 * std::max(std::abs(e[0]) / camera.fx, std::abs(e[1]) / camera.fy);
   trial.centre_px = e.tail<2>().norm();
-  trial.nees = e.dot(C.ldlt().solve(e)) / 4.0;
+  trial.nees = lens_nees_of(*result, camera);
   trial.focal_deviation_percent = 100.0 * std::max(result->deviations[0] / c.fx, result->deviations[1] / c.fy);
   trial.centre_deviation_px = std::hypot(result->deviations[2], result->deviations[3]);
   return trial;
 }
 
 }  // namespace
+
+double lens_nees_of(const CameraCalibration& result, const CameraModel& truth) {
+  const Eigen::Vector4d e = lens_error(result.camera, truth);
+  const Eigen::Matrix4d C = result.covariance.topLeftCorner<4, 4>();
+  return e.dot(C.ldlt().solve(e)) / 4.0;
+}
 
 void cameras(std::uint64_t seed, int trials, std::size_t view_count, GoalReport& report) {
   std::vector<double> focal, centre;

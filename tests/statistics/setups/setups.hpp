@@ -4,12 +4,15 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "daemon/setup/camera_calibration.hpp"
 #include "goal_report.hpp"
 
 namespace perimap::test {
 
 // `correlation_s`: how long the tracker's error lasts; 0: each pose's is new.
 void hand_eyes(std::uint64_t seed, int trials, double correlation_s, GoalReport& report);
+// Of focal lengths and principal point, over four.
+[[nodiscard]] double lens_nees_of(const CameraCalibration& result, const CameraModel& truth);
 void cameras(std::uint64_t seed, int trials, std::size_t view_count, GoalReport& report);
 // A table of what few views, and views of a part of the picture, tell; only the deviations are judged.
 void few_views(std::uint64_t seed, int trials, GoalReport& report);

@@ -148,13 +148,6 @@ struct WholeTrial {
   double target_ratio = 99.0;
 };
 
-double lens_nees_of(const CameraCalibration& result, const CameraModel& truth) {
-  const Eigen::Matrix4d C = result.covariance.topLeftCorner<4, 4>();
-  const CameraModel& c = result.camera;
-  const Eigen::Vector4d e(c.fx - truth.fx, c.fy - truth.fy, c.cx - truth.cx, c.cy - truth.cy);
-  return e.dot(C.ldlt().solve(e)) / 4.0;
-}
-
 // A target 90 mm ahead, somewhere in the middle four fifths of the picture.
 void judge_target(Draw& draw, const TrueSetup& setup, const MeasuredSetup& measured, const Pose& X_WS0,
                   WholeTrial& trial) {

@@ -16,6 +16,14 @@ SetupVerdict verdict(SetupState state) {
   return verdict;
 }
 
+SetupVerdict widening(SetupState state, double surface_deviation_mm, double widening_mm) {
+  SetupVerdict told = verdict(state);
+  told.matches = 500;
+  told.surface_deviation_mm = surface_deviation_mm;
+  told.widening_mm = widening_mm;
+  return told;
+}
+
 SetupVerdict doubt_of(SetupPart part) {
   SetupVerdict doubt = verdict(SetupState::kDoubted);
   doubt.blamed[index_of(part)] = true;
@@ -129,35 +137,19 @@ TEST(SetupBelief, WidensByTheNewestWindow) {
 
 TEST(SetupBelief, WhatAWindowWidenedThatKnewLittleIsTakenBackByOneThatKnowsMore) {
   SetupBelief belief;
-  SetupVerdict told = verdict(SetupState::kUndetermined);
-  told.matches = 500;
-  told.surface_deviation_mm = 4.0;
-  told.widening_mm = 1.5;
-  belief.add(told, seconds(3));
+  belief.add(widening(SetupState::kUndetermined, 4.0, 1.5), seconds(3));
   EXPECT_NEAR(belief.widening_mm(), 1.5, 1e-12);
-  told.widening_mm = 0.0;
-  told.surface_deviation_mm = 5.0;
-  belief.add(told, seconds(5));
+  belief.add(widening(SetupState::kUndetermined, 5.0, 0.0), seconds(5));
   EXPECT_NEAR(belief.widening_mm(), 1.5, 1e-12) << "it knows less";
-  told.surface_deviation_mm = 3.0;
-  belief.add(told, seconds(6));
+  belief.add(widening(SetupState::kUndetermined, 3.0, 0.0), seconds(6));
   EXPECT_EQ(belief.widening_mm(), 0.0);
 }
 
 TEST(SetupBelief, WhatAWindowHasWidenedThatKnewMuchIsNotTakenBackByTwoThatKnowLittle) {
   SetupBelief belief;
-  SetupVerdict told = verdict(SetupState::kConsistent);
-  told.matches = 500;
-  told.surface_deviation_mm = 0.5;
-  told.widening_mm = 0.8;
-  belief.add(told, seconds(3));
-  told.state = SetupState::kUndetermined;
-  told.surface_deviation_mm = 3.0;
-  told.widening_mm = 0.9;
-  belief.add(told, seconds(6));
-  told.surface_deviation_mm = 2.9;
-  told.widening_mm = 0.0;
-  belief.add(told, seconds(9));
+  belief.add(widening(SetupState::kConsistent, 0.5, 0.8), seconds(3));
+  belief.add(widening(SetupState::kUndetermined, 3.0, 0.9), seconds(6));
+  belief.add(widening(SetupState::kUndetermined, 2.9, 0.0), seconds(9));
   EXPECT_NEAR(belief.widening_mm(), 0.9, 1e-12);
 }
 
