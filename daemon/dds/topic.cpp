@@ -47,6 +47,12 @@ const TopicDescription& topic_of<perimap_Status>() noexcept {
   return topic;
 }
 
+template <>
+const TopicDescription& topic_of<perimap_Guidance>() noexcept {
+  static const TopicDescription topic{"perimap/guidance", &perimap_Guidance_desc, false};
+  return topic;
+}
+
 Qos writer_qos(const TopicDescription& topic, const WriterPromise& promise) {
   Qos qos = topic_qos(topic);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);

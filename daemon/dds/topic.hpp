@@ -9,6 +9,7 @@
 
 extern "C" {
 #include "perimap.h"
+#include "perimap_guidance.h"
 #include "perimap_mesh.h"
 }
 
@@ -35,6 +36,8 @@ template <>
 [[nodiscard]] const TopicDescription& topic_of<perimap_Phase>() noexcept;
 template <>
 [[nodiscard]] const TopicDescription& topic_of<perimap_Status>() noexcept;
+template <>
+[[nodiscard]] const TopicDescription& topic_of<perimap_Guidance>() noexcept;
 
 struct DeleteQos {
   void operator()(dds_qos_t* qos) const noexcept { dds_delete_qos(qos); }

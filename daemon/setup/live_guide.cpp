@@ -92,6 +92,12 @@ class BoardGuide final : public LiveGuide {
     return residual_.empty() ? text : text + "; " + residual_;
   }
 
+  [[nodiscard]] std::vector<double> seen_of_ninths() const override {
+    std::vector<double> seen;
+    for (const int points : coverage_) seen.push_back(std::min(1.0, static_cast<double>(points) / kFewestInNinth));
+    return seen;
+  }
+
   [[nodiscard]] bool enough() const override {
     return views_.size() >= kWantedViews && last_s_ - first_s_.value_or(last_s_) >= least_s_ &&
            missing_ninths().empty() && (!turned_ || is_turned()) && (!camera_ || determined_);
@@ -99,6 +105,7 @@ class BoardGuide final : public LiveGuide {
 
  private:
   static constexpr std::size_t kWantedViews = 60;
+  static constexpr int kFewestInNinth = 30;  // points
 
   // About two axes, which tell the camera's place in the sensor; a hand turns about the third as well.
   [[nodiscard]] bool is_turned() const {
@@ -108,10 +115,9 @@ class BoardGuide final : public LiveGuide {
   }
 
   [[nodiscard]] std::string missing_ninths() const {
-    constexpr int kFewest = 30;  // points
     std::string missing;
     for (std::size_t i = 0; i < coverage_.size(); ++i) {
-      if (coverage_[i] < kFewest) missing += fmt::format("{}{}", missing.empty() ? "" : ", ", kNinths[i]);
+      if (coverage_[i] < kFewestInNinth) missing += fmt::format("{}{}", missing.empty() ? "" : ", ", kNinths[i]);
     }
     return missing;
   }

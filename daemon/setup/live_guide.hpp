@@ -35,6 +35,9 @@ class LiveGuide {
   [[nodiscard]] virtual Followed followed() const { return Followed::kTool; }
   // One line.
   [[nodiscard]] virtual std::string line() const = 0;
+  // How much of what is wanted of each ninth of the picture was seen, 0 to 1, row by row. Empty: it does not matter
+  // where in the picture.
+  [[nodiscard]] virtual std::vector<double> seen_of_ninths() const { return {}; }
   // Whether there is enough of everything.
   [[nodiscard]] virtual bool enough() const = 0;
 };

@@ -69,13 +69,15 @@ class Shown final : public FrameObserver {
     return sight_.missing(MonotonicClock::now());
   }
   void tell(LiveGuide& guide) {
-    std::vector<std::uint8_t> pixels;
+    bool fresh = false;
     {
       const std::scoped_lock lock(mutex_);
-      if (fresh_) pixels = pixels_;
+      fresh = fresh_;
+      if (fresh) told_pixels_ = pixels_;
     }
-    if (!pixels.empty()) {
-      guide.see(t_s_, {pixels.data(), width_, height_, width_});
+    if (fresh) {
+      told_ = {told_pixels_.data(), width_, height_, width_};
+      guide.see(t_s_, told_);
       const std::scoped_lock lock(mutex_);
       fresh_ = false;
     }
@@ -88,6 +90,8 @@ class Shown final : public FrameObserver {
     if (!poses.empty()) guide.follow(in_order(std::move(poses)));
     if (!second_poses.empty()) guide.follow_second(in_order(std::move(second_poses)));
   }
+  // The newest that was told.
+  [[nodiscard]] const GreyImage& picture() const { return told_; }
 
  private:
   void add(const TrackerSample& sample, std::size_t tool, std::vector<TimedPose>& poses) {
@@ -108,6 +112,9 @@ class Shown final : public FrameObserver {
   std::vector<TimedPose> second_poses_;
   std::size_t followed_;
   SightOfTools sight_;
+  // Of the guide's thread.
+  std::vector<std::uint8_t> told_pixels_;
+  GreyImage told_;
 };
 
 Expected<std::filesystem::path> recording_file(const LiveSettings& settings) {
@@ -225,7 +232,7 @@ SetupExpected<LiveRecording> record_live(const LiveSettings& settings, const std
     }
     const std::string unseen = tracker_health.state() == DeviceState::kStreaming ? shown.unseen_tools() : "";
     if (!unseen.empty()) line.insert(0, unseen + "; ");
-    told(elapsed_s, line);
+    told({elapsed_s, std::move(line), guide.seen_of_ninths(), shown.picture()});
     if (stopped || guide.enough() || elapsed_s >= settings.longest_s || (*recorder)->summary().stopped) break;
   }
   interrupt.request();

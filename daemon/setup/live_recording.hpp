@@ -5,7 +5,9 @@
 #include <functional>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "core/sensors/grey_image.hpp"
 #include "daemon/config/setup_error.hpp"
 #include "daemon/setup/live_guide.hpp"
 
@@ -37,8 +39,16 @@ class LiveRecording {
   bool kept_;
 };
 
-// Several times a second: for how long it goes on by now, and a line of how it goes.
-using LiveTold = std::function<void(double elapsed_s, const std::string& line)>;
+// How it goes, for those who look.
+struct LiveMoment {
+  double elapsed_s = 0.0;
+  std::string line;
+  std::vector<double> seen_of_ninths;  // LiveGuide's
+  GreyImage picture;                   // the newest frame that the guide has seen, borrowed; none: empty
+};
+
+// Several times a second.
+using LiveTold = std::function<void(const LiveMoment&)>;
 
 // Records what the configuration's devices give until the guide has enough, the longest time is over, or a signal
 // comes. `tool`: whose poses the guide follows. Fails when the configuration names no such device, or nothing comes.

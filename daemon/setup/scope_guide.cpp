@@ -129,6 +129,12 @@ class ScopeGuide final : public LiveGuide {
                        kind.wanted(), now_->guide->line());
   }
 
+  // Of the whole picture: by the field stop they are ninths of its square.
+  [[nodiscard]] std::vector<double> seen_of_ninths() const override {
+    if (!settings_.by_second_sensor || now_ == nullptr) return {};
+    return now_->guide->seen_of_ninths();
+  }
+
   [[nodiscard]] bool enough() const override { return turns_.enough() && zooms_.enough(); }
 
  private:

@@ -3,9 +3,13 @@
 #include <fmt/format.h>
 
 #include <optional>
+#include <string_view>
+#include <utility>
 
 #include "daemon/command_line/command.hpp"
 #include "daemon/command_line/status_line.hpp"
+#include "daemon/config/configuration_loader.hpp"
+#include "daemon/setup/commands/guidance_writer.hpp"
 
 namespace perimap {
 namespace {
@@ -26,11 +30,53 @@ class Lines {
   double next_s_ = 0.0;
 };
 
+// For pages. What does not work is said once, and hinders no calibration.
+class Guidance {
+ public:
+  Guidance(const LiveOptions& options, const Console& console) : console_(console) {
+    // One that can not be loaded is told by the recording.
+    const auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
+    if (!configuration) return;
+    constexpr std::string_view kProgram = "perimap ";
+    std::string what = console.name();
+    if (what.starts_with(kProgram)) what.erase(0, kProgram.size());
+    auto writer = GuidanceWriter::create({configuration->dds.domain, configuration->dds.security}, std::move(what),
+                                         options.longest_s);
+    if (writer) {
+      writer_.emplace(std::move(*writer));
+    } else {
+      complain(writer.error());
+    }
+  }
+  void tell(const LiveMoment& moment) {
+    if (writer_) check(writer_->tell(moment));
+  }
+  void recorded() {
+    if (writer_) check(writer_->recorded());
+  }
+
+ private:
+  void check(const Expected<void>& written) {
+    if (written) return;
+    complain(written.error());
+    writer_.reset();
+  }
+  void complain(const Error& error) { console_.complain("perimap view is told nothing of this: " + error.message); }
+
+  const Console& console_;
+  std::optional<GuidanceWriter> writer_;
+};
+
 SetupExpected<LiveRecording> told_while_recording(const LiveOptions& options, const std::string& tool, LiveGuide& guide,
                                                   const Console& console) {
   Lines lines(console);
-  return record_live(options, tool, guide,
-                     [&](double elapsed_s, const std::string& line) { lines.show(elapsed_s, line); });
+  Guidance guidance(options, console);
+  auto recording = record_live(options, tool, guide, [&](const LiveMoment& moment) {
+    lines.show(moment.elapsed_s, moment.line);
+    guidance.tell(moment);
+  });
+  if (recording) guidance.recorded();
+  return recording;
 }
 
 }  // namespace

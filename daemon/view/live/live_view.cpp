@@ -20,6 +20,8 @@ using Json = nlohmann::ordered_json;
 // A page draws no faster; of a stream of hundreds a second it gets every so manieth.
 constexpr Duration kShortestPause = std::chrono::milliseconds(24);
 constexpr std::uint8_t kSurfaceLane = 1;
+constexpr std::uint8_t kGuidanceLane = 2;
+constexpr std::uint8_t kGuidancePictureLane = 3;
 constexpr Duration kSilence = std::chrono::milliseconds(500);
 constexpr Duration kPublishes = std::chrono::seconds(2);  // who was heard so lately
 constexpr Duration kForgotten = std::chrono::minutes(1);
@@ -42,11 +44,27 @@ const T* next_of_writer(const dds::Loan<T>& loan, std::size_t i) {
 Expected<std::unique_ptr<LiveView>> LiveView::create(const dds::Membership& membership, WebServer& server, Say say) {
   auto readers = SampleReaders::create(membership, true);
   if (!readers) return tl::unexpected(readers.error());
-  return std::unique_ptr<LiveView>(new LiveView(membership.domain, std::move(*readers), server, std::move(say)));
+  std::optional<GuidanceReader> guidance;
+  if (auto reader = GuidanceReader::create(readers->participant)) {
+    if (auto attached = readers->wait_set.attach(reader->condition()); !attached) {
+      return tl::unexpected(attached.error());
+    }
+    guidance.emplace(std::move(*reader));
+  } else {
+    // Keys of before there was such a topic.
+    say("calibrations are not shown: " + reader.error().message);
+  }
+  return std::unique_ptr<LiveView>(
+      new LiveView(membership.domain, std::move(*readers), std::move(guidance), server, std::move(say)));
 }
 
-LiveView::LiveView(int domain, SampleReaders readers, WebServer& server, Say say)
-    : domain_(domain), readers_(std::move(readers)), server_(server), say_(std::move(say)) {
+LiveView::LiveView(int domain, SampleReaders readers, std::optional<GuidanceReader> guidance, WebServer& server,
+                   Say say)
+    : domain_(domain),
+      readers_(std::move(readers)),
+      guidance_(std::move(guidance)),
+      server_(server),
+      say_(std::move(say)) {
   thread_ = std::thread([this] { receive(); });
 }
 
@@ -115,6 +133,7 @@ void LiveView::receive() {
         server_.send_to_all(message);
       });
     });
+    hear_guidance();
     forget_old(receipt);
   }
   if (stopping_.load(std::memory_order_relaxed)) return;
@@ -171,6 +190,20 @@ void LiveView::tell(const perimap_Surface& surface, std::uint64_t publisher, Ins
   reason_ = surface.reason;
   // A change of the state is told, however slowly a page reads.
   send(text_message(json, changed ? PageMessage::kNoLane : kSurfaceLane));
+}
+
+void LiveView::hear_guidance() {
+  if (!guidance_) return;
+  hear(*guidance_, [this](const perimap_Guidance& guidance, std::uint64_t /*publisher*/, const auto*) {
+    if (server_.pages() == 0) return;
+    // Its last is told, however slowly a page reads.
+    const bool last = guidance.stage == perimap_GUIDANCE_RECORDED;
+    send(text_message(guidance_json(guidance), last ? PageMessage::kNoLane : kGuidanceLane));
+    const auto& picture = guidance.picture;
+    if (picture._length == 0) return;
+    auto bytes = std::make_shared<const std::string>(picture._buffer, picture._buffer + picture._length);
+    send({std::move(bytes), true, kGuidancePictureLane});
+  });
 }
 
 // So that perimapds that come and go leave nothing.

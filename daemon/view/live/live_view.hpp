@@ -1,4 +1,4 @@
-// What a running perimapd publishes, for the pages: a subscriber like any other.
+// What a running perimapd publishes, and how a calibration goes, for the pages: a subscriber like any other.
 #pragma once
 
 #include <atomic>
@@ -54,7 +54,9 @@ class LiveView final : public PageHandler {
     Instant heard;
   };
 
-  LiveView(int domain, SampleReaders readers, WebServer& server, Say say);
+  using GuidanceReader = dds::Reader<perimap_Guidance>;
+
+  LiveView(int domain, SampleReaders readers, std::optional<GuidanceReader> guidance, WebServer& server, Say say);
 
   void receive();
   // Gives each sample with its publisher, and the next one of the same writer that has come with it (or null).
@@ -63,12 +65,14 @@ class LiveView final : public PageHandler {
   void count(const perimap_Surface& surface, std::uint64_t publisher, Instant receipt);
   void tell(const perimap_Surface& surface, std::uint64_t publisher, Instant receipt);
   void follow_anew(const perimap_Surface& surface);
+  void hear_guidance();
   void forget_old(Instant now);
   void send(const PageMessage& message);
   [[nodiscard]] PageMessage publishers_message() const;
 
   const int domain_;
   SampleReaders readers_;
+  std::optional<GuidanceReader> guidance_;  // none: the keys do not allow it
   WebServer& server_;
   const Say say_;
   const Instant begun_ = MonotonicClock::now();

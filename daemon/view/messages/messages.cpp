@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "daemon/publishing/status_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
@@ -42,6 +43,20 @@ Json ecg_json(const perimap_EcgSamples& block) {
           {"period_ms", page_ms(block.sample_period_ns)},
           {"lead_off", block.lead_off},
           {"mV", std::move(values)}};
+}
+
+Json guidance_json(const perimap_Guidance& guidance) {
+  const std::span seen(guidance.seen_percent._buffer, guidance.seen_percent._length);
+  const bool whole = seen.size() == std::size_t{guidance.columns} * guidance.rows;
+  return {{"kind", "guidance"},
+          {"what", guidance.what},
+          {"line", guidance.line != nullptr ? guidance.line : ""},
+          {"elapsed_s", guidance.elapsed_s},
+          {"longest_s", guidance.longest_s},
+          {"stage", guidance.stage == perimap_GUIDANCE_RECORDED ? "recorded" : "recording"},
+          {"columns", whole ? guidance.columns : 0},
+          {"rows", whole ? guidance.rows : 0},
+          {"seen_percent", whole ? std::vector<int>(seen.begin(), seen.end()) : std::vector<int>()}};
 }
 
 PageMessage text_message(const Json& json, std::uint8_t lane) {

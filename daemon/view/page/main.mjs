@@ -1,6 +1,7 @@
 // The page: takes what perimap view sends, judges what may be trusted, draws.
 import {Connection} from "./connection.mjs";
 import {Delays} from "./delays.mjs";
+import {Guidance} from "./guidance.mjs";
 import {Picture} from "./picture.mjs";
 import {Scene} from "./scene.mjs";
 import {showFacts, showSources} from "./sources.mjs";
@@ -18,6 +19,8 @@ if (location.search) history.replaceState(null, "", "/");
 
 const scene = new Scene($("scene")), strip = new Strip($("strip")), delays = new Delays($("delays"));
 const picture = new Picture($("picture"));
+const guidance = new Guidance({section: document.querySelector("section.guidance"), what: $("guided-what"), line: $("guided-line"),
+                               clock: $("guided-clock"), bar: $("guided-bar"), canvas: $("guided-picture")});
 const seen = {};
 // Nothing of what was shown is of what comes now.
 function forget() {
@@ -95,8 +98,13 @@ const take = {
   past(message) {
     strip.surface(message);
   },
+  // Live there is none but that of a calibration.
   picture({blob}) {
-    picture.blob(blob);
+    if (seen.recorded) picture.blob(blob);
+    else guidance.picture(blob);
+  },
+  guidance(message) {
+    guidance.take(message, performance.now());
   },
   overlay(message) {
     picture.overlay(message);
@@ -129,7 +137,7 @@ function set(id, text) {
 
 function tell() {
   const now = performance.now(), ageMs = seen.recorded ? seen.ageMs : now - seen.cameAt;
-  const latest = failed ?? judge({...seen, link: connection.link, ageMs});
+  const latest = failed ?? judge({...seen, link: connection.link, ageMs, calibrating: guidance.what(now)});
   judged = seen.recorded ? latest : held.take(latest, now);
   if ($("trust").dataset.state !== judged.state) $("trust").dataset.state = judged.state;
   for (const part of ["state", "permission", "why", "remedy"]) set(part, judged[part]);
@@ -165,6 +173,8 @@ function draw() {
   tell();
   scene.draw(judged.state === "invalid" ? null : seen.surface, judged.state);
   picture.draw(judged.state);
+  guidance.draw(performance.now());
+  document.body.classList.toggle("guided", Boolean(guidance.told) && !seen.surface);
   strip.draw(nowMs(), judged.state === "invalid");
   timeline.draw();
 }

@@ -9,10 +9,12 @@ const seconds = (ms) => (ms < 10000 ? `${(ms / 1000).toFixed(1)} s` : `${Math.ro
 // link: {open, words, remedy}: the WebSocket, and why it is not open.
 // publishers: how many perimapds publish in the domain; null: not told yet. sameSource: two of them under one name.
 // surface: the newest one, as the server tells it; null: none.
+// calibrating: what is being calibrated; empty: nothing.
 // ageMs: since it came. lagMs: how much longer than others it was under way to this page.
-export function judge({link, domain, publishers, sameSource, surface, ageMs, lagMs, recorded}) {
+export function judge({link, domain, publishers, sameSource, surface, ageMs, lagMs, recorded, calibrating}) {
   if (!link.open) return invalid(link.words, link.remedy ?? "is perimap view still running?");
   if (recorded && !surface) return invalid("the recording has no surface here");
+  if (!surface && calibrating) return invalid(`the set-up is being measured: ${calibrating}`, "follow what is said below");
   if (!surface && publishers === 0) {
     return invalid(`nobody publishes in DDS domain ${domain}`, "start perimapd, or give perimap view its --domain");
   }

@@ -42,6 +42,14 @@ test("nobody there, no link and no surface are told apart", () => {
   assert.equal(judge({...live, link}).state, "invalid");
 });
 
+test("while the set-up is measured that is why there is no surface, and a surface is judged by itself", () => {
+  const measured = judge({...live, surface: null, publishers: 0, calibrating: "calibrate camera"});
+  assert.equal(measured.state, "invalid");
+  assert.match(sentence(measured), /the set-up is being measured: calibrate camera/);
+  assert.equal(judge({...live, calibrating: "calibrate camera"}).state, "good");
+  assert.match(sentence(judge({...live, ageMs: 450, calibrating: "calibrate camera"})), /nothing has come from perimapd/);
+});
+
 test("a recording's gap is one", () => {
   const recorded = {...live, recorded: true, publishers: null};
   assert.equal(judge(recorded).state, "good");

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/dds/bounded_string.hpp"
 #include "daemon/publishing/advice.hpp"
 #include "daemon/publishing/wire_names.hpp"
 #include "daemon/subscribing/followed_publisher.hpp"
@@ -35,6 +36,31 @@ TEST(PageRequest, WhatIsGarbledIsRefused) {
     EXPECT_FALSE(parse_page_request(text)) << text;
   }
   EXPECT_FALSE(parse_page_request(std::string(1000, '[')));
+}
+
+TEST(Guidance, IsToldWithThePartsOfThePicture) {
+  std::string line = "12 views; show it left";
+  std::vector<std::uint8_t> seen{0, 100, 40, 100, 100, 100};
+  perimap_Guidance guidance{};
+  dds::assign(guidance.what, "calibrate camera");
+  guidance.line = line.data();
+  guidance.columns = 3, guidance.rows = 2;
+  guidance.seen_percent._buffer = seen.data();
+  guidance.seen_percent._length = static_cast<std::uint32_t>(seen.size());
+  auto told = guidance_json(guidance);
+  EXPECT_EQ(told["what"], "calibrate camera");
+  EXPECT_EQ(told["line"], line);
+  EXPECT_EQ(told["stage"], "recording");
+  EXPECT_EQ(told["seen_percent"], (std::vector<int>{0, 100, 40, 100, 100, 100}));
+  guidance.stage = perimap_GUIDANCE_RECORDED;
+  EXPECT_EQ(guidance_json(guidance)["stage"], "recorded");
+
+  // Another's sample: as many parts as are not there.
+  guidance.rows = 200;
+  told = guidance_json(guidance);
+  EXPECT_EQ(told["columns"], 0);
+  EXPECT_TRUE(told["seen_percent"].empty());
+  EXPECT_EQ(guidance_json({})["line"], "");
 }
 
 TEST(Advice, EveryReasonOfTheIdlHasAWayOutAndNoneButNoneHasNone) {
