@@ -33,22 +33,11 @@ class Lines {
 // For pages. What does not work is said once, and hinders no calibration.
 class Guidance {
  public:
-  Guidance(const LiveOptions& options, const Console& console) : console_(console) {
-    // One that can not be loaded is told by the recording.
-    const auto configuration = load_configuration(options.configuration, {}, NamedFiles::kMayBeMissing);
-    if (!configuration) return;
-    constexpr std::string_view kProgram = "perimap ";
-    std::string what = console.name();
-    if (what.starts_with(kProgram)) what.erase(0, kProgram.size());
-    auto writer = GuidanceWriter::create({configuration->dds.domain, configuration->dds.security}, std::move(what),
-                                         options.longest_s);
-    if (writer) {
-      writer_.emplace(std::move(*writer));
-    } else {
-      complain(writer.error());
-    }
-  }
+  Guidance(const LiveOptions& options, const Console& console) : options_(options), console_(console) {}
+
   void tell(const LiveMoment& moment) {
+    // Not before the recording has begun: the threads of DDS must not get the signals that it waits for.
+    if (!std::exchange(begun_, true)) begin();
     if (writer_) check(writer_->tell(moment));
   }
   void recorded() {
@@ -56,6 +45,21 @@ class Guidance {
   }
 
  private:
+  void begin() {
+    // The recording has loaded it, too.
+    const auto configuration = load_configuration(options_.configuration, {}, NamedFiles::kMayBeMissing);
+    if (!configuration) return;
+    constexpr std::string_view kProgram = "perimap ";
+    std::string what = console_.name();
+    if (what.starts_with(kProgram)) what.erase(0, kProgram.size());
+    auto writer = GuidanceWriter::create({configuration->dds.domain, configuration->dds.security}, std::move(what),
+                                         options_.longest_s);
+    if (writer) {
+      writer_.emplace(std::move(*writer));
+    } else {
+      complain(writer.error());
+    }
+  }
   void check(const Expected<void>& written) {
     if (written) return;
     complain(written.error());
@@ -63,7 +67,9 @@ class Guidance {
   }
   void complain(const Error& error) { console_.complain("perimap view is told nothing of this: " + error.message); }
 
+  const LiveOptions& options_;
   const Console& console_;
+  bool begun_ = false;
   std::optional<GuidanceWriter> writer_;
 };
 
