@@ -24,7 +24,9 @@ void print_lines(const Json& json, const std::string& prefix) {
     if (value.is_object()) {
       print_lines(value, prefix + key + ".");
     } else {
-      fmt::print("{}{}: {}\n", prefix, key, value.is_string() ? value.get<std::string>() : value.dump());
+      fmt::print("{}{}: {}\n", prefix, key,
+                 value.is_string() ? value.get<std::string>()
+                                   : value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
     }
   }
 }

@@ -54,7 +54,7 @@ std::string SessionCommands::tell_status() {
     if (told.is_null()) told = full_status_json(wire);
     told["streams"][wire.stream] = stream_status_json(wire);
   }
-  return told.dump() + "\n";
+  return told.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 // Said to be done only when it is: until then the old patient's surface is published.

@@ -207,7 +207,7 @@ std::string format_turned_scope(const TurnedScope& scope) {
                                {"aside_mm", scope.aside_translation_rms_mm},
                                {"aside_deg", scope.aside_rotation_rms_deg},
                                {"second_sensor", second}};
-  return nlohmann::json{{"turned_scope", json}}.dump(2) + "\n";
+  return nlohmann::json{{"turned_scope", json}}.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace perimap

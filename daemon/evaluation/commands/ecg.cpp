@@ -105,7 +105,7 @@ Outcome find_beats(const EcgOptions& options, const Console& console) {
   }
   if (!reference.beats.empty()) json["reference_ends_s"] = reference.beats.back().time_s;
   if (score) json["score"] = to_json(*score, reference.left_out);
-  fmt::print("{}\n", json.dump(2));
+  fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   return {};
 }
 

@@ -50,7 +50,9 @@ Outcome predict_trace(const ExperimentOptions& options, const Console& console) 
   if (!options.out.empty()) {
     if (const auto written = write_files(*experiment, options.out); !written) return refuse(written.error());
   }
-  fmt::print("{}", options.json ? to_json(*experiment).dump(2) + "\n" : to_table(*experiment));
+  fmt::print("{}", options.json
+                       ? to_json(*experiment).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
+                       : to_table(*experiment));
   return {};
 }
 
@@ -79,7 +81,9 @@ Outcome repeat(const ExperimentOptions& options, const Console& console) {
   if (!options.out.empty()) {
     if (const auto written = write_files(*experiment, options.out); !written) return refuse(written.error());
   }
-  fmt::print("{}", options.json ? to_json(*experiment).dump(2) + "\n" : to_table(*experiment));
+  fmt::print("{}", options.json
+                       ? to_json(*experiment).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
+                       : to_table(*experiment));
   return {};
 }
 

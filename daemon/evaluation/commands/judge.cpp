@@ -38,7 +38,9 @@ Outcome judge(const JudgeOptions& options) {
   if (options.events) {
     const auto figures = try_disturbances(*clip, options.features);
     if (!figures) return refuse(fmt::format("{}: {}", options.input, figures.error().message));
-    fmt::print("{}", options.json ? to_json(*figures).dump(2) + "\n" : to_text(*figures));
+    fmt::print("{}", options.json
+                         ? to_json(*figures).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
+                         : to_text(*figures));
     return {};
   }
   const auto contest = hold_contest(*clip, options.features);
@@ -46,7 +48,9 @@ Outcome judge(const JudgeOptions& options) {
   if (!options.picture.empty()) {
     if (const auto drawn = draw_contest(*contest, *clip, options.picture); !drawn) return refuse(drawn.error());
   }
-  fmt::print("{}", options.json ? to_json(*contest, *clip).dump(2) + "\n" : to_text(*contest, *clip));
+  fmt::print("{}", options.json
+                       ? to_json(*contest, *clip).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
+                       : to_text(*contest, *clip));
   return {};
 }
 

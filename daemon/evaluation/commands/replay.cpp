@@ -48,7 +48,10 @@ Outcome replay(const ReplayCommandOptions& options, const Console& console) {
   if (options.json.empty()) return {};
   nlohmann::json figures = to_json(*report);
   figures["recording"] = wanted.recording;
-  if (auto written = write_text_file(options.json, figures.dump(2) + "\n"); !written) return refuse(written.error());
+  if (auto written =
+          write_text_file(options.json, figures.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+      !written)
+    return refuse(written.error());
   return {};
 }
 

@@ -75,7 +75,10 @@ Outcome report(const ReportOptions& options) {
   if (options.json.empty()) return {};
   nlohmann::json figures = to_json(*result);
   figures["recording"] = options.recording;
-  if (auto written = write_text_file(options.json, figures.dump(2) + "\n"); !written) return refuse(written.error());
+  if (auto written =
+          write_text_file(options.json, figures.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+      !written)
+    return refuse(written.error());
   return {};
 }
 

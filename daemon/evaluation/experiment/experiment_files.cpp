@@ -63,7 +63,10 @@ Expected<void> write_files(const Experiment& experiment, const std::filesystem::
     if (auto done = write_text_file(path("-" + figure.name + ".csv"), to_csv(figure)); !done) return done;
   }
   return write_text_file(path(".csv"), to_csv(experiment))
-      .and_then([&] { return write_text_file(path(".json"), to_json(experiment).dump(2) + "\n"); })
+      .and_then([&] {
+        return write_text_file(
+            path(".json"), to_json(experiment).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+      })
       .and_then([&] { return write_text_file(path(".html"), to_html(experiment)); });
 }
 
@@ -76,7 +79,7 @@ Expected<void> write_files(const TraceExperiment& experiment, const std::filesys
       {".svg", svg},
       {".png", *png},
       {".csv", to_csv(experiment)},
-      {".json", to_json(experiment).dump(2) + "\n"},
+      {".json", to_json(experiment).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"},
       {".html", html_page(title, svg + "<pre>" + escaped(to_table(experiment)) + "</pre>\n")}};
   for (const auto& [ending, text] : files) {
     if (auto done = write_text_file(file_of(folder, 3, ending), text); !done) return done;

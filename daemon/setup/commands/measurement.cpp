@@ -58,7 +58,9 @@ SetupExpected<void> write_results(const Measurement& measured, const CommonOptio
                                   const std::string& date, const std::string& made_from) {
   KeptResults results;
   if (!options.output.empty()) {
-    const std::string text = measured.file.empty() ? json.dump(2) + "\n" : measured.file;
+    const std::string text = measured.file.empty()
+                                 ? json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
+                                 : measured.file;
     if (auto added = results.add(options.output, text); !added) return tl::unexpected(added.error());
   }
   if (!options.html.empty()) {
@@ -94,7 +96,7 @@ Outcome finish(const SetupExpected<Measurement>& measured, const CommonOptions& 
     return refuse(written.error());
   }
   if (options.json) {
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     return {};
   }
   fmt::print("{}", measured->text);

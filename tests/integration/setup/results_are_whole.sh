@@ -37,4 +37,10 @@ rm -r page.html.new
 measure --html page.html || fail "what can be written is refused: $(cat out errors)"
 grep -q '^time_offset_ms = -*[0-9.]*  # measured' devices.toml || fail "the configuration is not written: $(cat devices.toml)"
 [ "$(ls | grep -c '^devices\|^result')" = 4 ] || fail "the ones before are not kept: $(ls)"
+
+# A name is any bytes.
+odd=$(printf 'signal\377.csv')
+cp signal0.csv "$odd"
+"$perimap" calibrate time --signal "$odd" --signal signal0.04.csv --json > odd.json || fail "a name that is no UTF-8 ends it"
+grep -q '"made_from": "signal' odd.json || fail "it is not said what it was made from: $(cat odd.json)"
 echo passed
