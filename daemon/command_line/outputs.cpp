@@ -5,19 +5,19 @@
 
 namespace perimap {
 
-Expected<void> check_apart(std::initializer_list<Output> outputs, std::initializer_list<Input> inputs) {
-  for (const Output* output = outputs.begin(); output != outputs.end(); ++output) {
+Expected<void> check_apart(const std::vector<Output>& outputs, const std::vector<Input>& inputs) {
+  for (auto output = outputs.begin(); output != outputs.end(); ++output) {
     for (const Input& input : inputs) {
       if (is_same_file(output->file, input.file)) return fail(output->option + ": is " + input.name);
     }
-    for (const Output* before = outputs.begin(); before != output; ++before) {
+    for (auto before = outputs.begin(); before != output; ++before) {
       if (is_same_file(output->file, before->file)) return fail(output->option + ": is the file of " + before->option);
     }
   }
   return {};
 }
 
-Expected<void> check_writable(std::initializer_list<Output> outputs) {
+Expected<void> check_writable(const std::vector<Output>& outputs) {
   for (const Output& output : outputs) {
     if (output.file.empty()) continue;
     if (auto writable = check_writable(std::filesystem::path(output.file)); !writable) {

@@ -1,8 +1,8 @@
 // Files that a command is to write.
 #pragma once
 
-#include <initializer_list>
 #include <string>
+#include <vector>
 
 #include "core/error/expected.hpp"
 
@@ -20,9 +20,9 @@ struct Input {
 
 // Before the work begins: that none of the outputs is what is read, by any name, nor another output. An error is wrong
 // usage.
-[[nodiscard]] Expected<void> check_apart(std::initializer_list<Output> outputs, std::initializer_list<Input> inputs);
+[[nodiscard]] Expected<void> check_apart(const std::vector<Output>& outputs, const std::vector<Input>& inputs);
 
 // Likewise, that each can be written: nobody wants to hear of that when the work is done.
-[[nodiscard]] Expected<void> check_writable(std::initializer_list<Output> outputs);
+[[nodiscard]] Expected<void> check_writable(const std::vector<Output>& outputs);
 
 }  // namespace perimap

@@ -117,6 +117,19 @@ std::vector<SimulatedRecording> planned(const SimulateOptions& options) {
   return recordings;
 }
 
+// Every file that is written, by the option that names it.
+std::vector<Output> outputs_of(const SimulateOptions& options, const std::vector<SimulatedRecording>& recordings) {
+  std::vector<Output> outputs{{"--write-procedure", options.procedure.string()}};
+  for (const SimulatedRecording& recording : recordings) {
+    const bool untold = !options.untold.empty() && &recording == &recordings.front();
+    const std::string of_noise = options.tracker_noises_mm.empty()
+                                     ? "OUT"
+                                     : fmt::format("OUT with a noise of {} mm", recording.noise.position_rms_mm);
+    outputs.push_back({untold ? "--untold" : of_noise, recording.path.string()});
+  }
+  return outputs;
+}
+
 Expected<SimulationSettings> heart_settings(const SimulateOptions& options) {
   auto settings = options.simulation.settings();
   if (!settings) return tl::unexpected(settings.error());
@@ -134,13 +147,12 @@ Outcome simulate_heart(const SimulateOptions& options, const Console& console) {
   const auto settings = heart_settings(options);
   if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
   const std::vector<SimulatedRecording> recordings = planned(options);
+  if (const auto apart = check_apart(outputs_of(options, recordings), {}); !apart) {
+    return refuse(apart.error(), ExitCode::kWrongUsage);
+  }
   for (const SimulatedRecording& recording : recordings) {
-    for (const auto& sound : {check_new({recording.path, options.procedure}, options),
-                              check_apart({{"OUT", options.out.string()},
-                                           {"--untold", options.untold.string()},
-                                           {"--write-procedure", options.procedure.string()}},
-                                          {})}) {
-      if (!sound) return refuse(sound.error(), ExitCode::kWrongUsage);
+    if (const auto sound = check_new({recording.path, options.procedure}, options); !sound) {
+      return refuse(sound.error(), ExitCode::kWrongUsage);
     }
   }
   if (!options.procedure.empty()) {

@@ -112,6 +112,17 @@ TEST_F(WriteSimulation, CommandWritesSeveralNoisesFromOneRendering) {
             std::string::npos);
 }
 
+TEST_F(WriteSimulation, CommandRefusesTwoOutputsInOneFile) {
+  const std::string out = (folder_ / "heart.mcap").string();
+  const std::string of_noise = (folder_ / "heart-1.4mm.mcap").string();
+  EXPECT_NE(command({out, "--size", "64x64", "--duration", "1", "--tracker-noises", "1.4,1.4"}), 0);
+  EXPECT_NE(command({out, "--size", "64x64", "--duration", "1", "--tracker-noises", "0,1.4", "--untold", of_noise}), 0);
+  EXPECT_NE(
+      command({out, "--size", "64x64", "--duration", "1", "--tracker-noises", "1.4", "--write-procedure", of_noise}),
+      0);
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
 TEST_F(WriteSimulation, CommandMovesTheSurfaceAsATraceDoesAndRecordsIt) {
   const std::string trace = (folder_ / "trace.csv").string();
   std::ofstream written(trace);
