@@ -352,10 +352,10 @@ Expected<CameraCalibration> calibrate(const std::vector<BoardView>& views, const
     fit = fit_of(points, problem, false);
   }
   if (chosen.size() < kFewestViews) {
-    return fail(
-        fmt::format("only {} of {} views of the board fit together, and at least {} are needed, better 20: take more, "
-                    "sharp, with the board flat, tilted to all sides and in all parts of the picture",
-                    chosen.size(), views.size(), kFewestViews));
+    return fail(fmt::format(
+        "only {} of the {} views of the board that were tried fit together, and at least {} are needed, "
+        "better 20: take more, sharp, with the board flat, tilted to all sides and in all parts of the picture",
+        chosen.size(), count, kFewestViews));
   }
   if (!problem.fisheye) {
     Fit richer = fit_of(points, problem, true);

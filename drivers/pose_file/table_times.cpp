@@ -103,12 +103,18 @@ Expected<void> make_seconds(std::vector<double>& times, std::optional<TimeUnit> 
   const bool slow = spread.count >= kMany && spread.span_s > kLong_s && spread.interval_s > kSlow_s;
   if (!far && spread.span_s <= kLongest_s && !slow) return {};
   const NamedUnit& likely = likely_unit(spread);
+  // Slow and nothing else, they may well be what they are taken for.
+  const bool may_be_seconds = !far && spread.span_s <= kLongest_s;
   const std::string what = spread.span_s > kLong_s ? fmt::format("the times span {}", duration_text(spread.span_s))
                                                    : fmt::format("a time is {}", duration_text(spread.farthest_s));
   return fail(on_one_line(
-      fmt::format("{}: {} if they are seconds: are they {}? Write seconds, or say --time-unit {} (or s) to a command "
-                  "that has it",
-                  name, what, likely.name, likely.name)));
+      may_be_seconds
+          ? fmt::format("{}: {} if they are seconds, {:.3g} s from one to the next: are they {}? A command that has "
+                        "--time-unit takes them with --time-unit {}, or with --time-unit s if they are seconds",
+                        name, what, spread.interval_s, likely.name, likely.name)
+          : fmt::format("{}: {} if they are seconds: are they {}? Write seconds, or say --time-unit {} (or s) to a "
+                        "command that has it",
+                        name, what, likely.name, likely.name)));
 }
 
 }  // namespace perimap

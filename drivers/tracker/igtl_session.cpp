@@ -17,6 +17,8 @@ constexpr Duration kReopenAfter = std::chrono::seconds(2);
 constexpr Duration kListenForOthers = std::chrono::seconds(1);
 constexpr unsigned kStatusOk = 1;
 constexpr std::size_t kMostNames = 8;  // that are told
+// Poses with stamps one after the other, after some without: a server that stamps one now and then does not stamp them.
+constexpr int kStampedAgain = 50;
 // TRANSFORM messages of one instant come one by one. A reference that is farther away than this is none.
 constexpr Duration kReferenceAge = std::chrono::milliseconds(100);
 // Stamps that a server gives to tools of one instant.
@@ -184,7 +186,14 @@ Instant IgtlSession::stamped(const Told& told) const noexcept {
 }
 
 void IgtlSession::note_missing_stamp(const Told& sensor) {
-  if (sensor.sent_stamp != 0 || settings_.stamps_by_arrival || missing_told_) return;
+  if (settings_.stamps_by_arrival) return;
+  if (sensor.sent_stamp != 0) {
+    if (!missing_told_ || ++stamped_since_missing_ < kStampedAgain) return;
+    missing_told_ = false;
+    return health_.set_notice("");
+  }
+  stamped_since_missing_ = 0;
+  if (missing_told_) return;
   missing_told_ = true;
   health_.set_notice(
       "the server sends poses without time stamps: each is stamped by its arrival, later than it was measured by the "

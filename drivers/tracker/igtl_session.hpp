@@ -99,8 +99,9 @@ class IgtlSession final : public DeviceProtocol {
   IgtlFramer framer_;
   ArrivalClock clock_{{.period_ns = 1.0}};
   StampCheck stamps_;
-  std::string stamps_told_;    // what is wrong with them
-  bool missing_told_ = false;  // that there are none, in this connection
+  std::string stamps_told_;        // what is wrong with them
+  bool missing_told_ = false;      // that there are none, in this connection
+  int stamped_since_missing_ = 0;  // poses
   Told reference_;
   // Servers that send the sensor before the reference of the same instant: the sensor then waits for it.
   bool reference_follows_ = false;

@@ -64,6 +64,28 @@ TEST(IgtlSession, NotesPosesWithoutStampsOnceUnlessArrivalsAreAskedFor) {
   }
 }
 
+TEST(IgtlSession, NotesNoMissingStampsAnyMoreOnceTheyCome) {
+  DeviceHealth health;
+  IgtlSession session(
+      {.sensor = "Scope", .reference = std::nullopt, .world = {}}, [](const TrackerSample&) {}, health);
+  ScriptedLink link;
+  session.on_open(link, kStart);
+  Pose X = kPose;
+  const auto send = [&](int i, bool stamped) {
+    X.t.x() += 0.1;
+    const std::uint64_t stamp = (1ULL << 32U) + static_cast<std::uint64_t>(i) * 85899346U;  // 20 ms
+    session.on_bytes(link, encode_igtl({1, "TRANSFORM", "Scope", stamped ? stamp : 0, encode_igtl_transform(X), {}}),
+                     kStart + milliseconds(20 * i));
+  };
+  // A stamp now and then is none.
+  for (int i = 0; i < 100; ++i) send(i, i % 3 == 0);
+  EXPECT_THAT(health.notice(), testing::HasSubstr("without time stamps"));
+  for (int i = 100; i < 200; ++i) send(i, true);
+  EXPECT_EQ(health.notice(), "");
+  send(200, false);
+  EXPECT_THAT(health.notice(), testing::HasSubstr("without time stamps"));
+}
+
 TEST(IgtlSession, AToolLeftOutOfTdataOrMarkedSoIsMissing) {
   using Message = IgtlEmulatorSettings::Message;
   EmulatorFaults faults;

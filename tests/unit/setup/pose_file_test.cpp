@@ -89,6 +89,15 @@ TEST(TableTimes, ThatAreNoSecondsAreRefusedByTheUnitThatTheyLookLike) {
   }
 }
 
+TEST(TableTimes, ThatAreSlowAreAskedAboutAndMayBeSeconds) {
+  const std::string slow = timed_rows(0.0, 0.1, 3000, 1.0, ",0,0,0,0,0,0,1");  // every ten seconds, for eight hours
+  EXPECT_THAT(pose_error(slow), HasSubstr("10 s from one to the next"));
+  EXPECT_THAT(pose_error(slow), HasSubstr("or with --time-unit s if they are seconds"));
+  const auto table = parse_pose_table(slow, "poses.csv", LengthUnit::kMetre, TimeUnit::kSecond);
+  ASSERT_TRUE(table) << table.error().message;
+  EXPECT_NEAR(table->poses[1].t_s, 10.0, 1e-9);
+}
+
 TEST(TableTimes, AreSecondsOfTheUnitThatIsSaid) {
   const auto table = parse_pose_table(timed_rows(0.0, 100.0, 3, 1e9, ",0,0,0,0,0,0,1"), "poses.csv", LengthUnit::kMetre,
                                       TimeUnit::kNanosecond);

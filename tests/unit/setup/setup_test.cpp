@@ -354,7 +354,7 @@ TEST(Camera, OfWhichTooFewViewsFitTogetherIsRefused) {
   }
   const auto result = calibrate_camera(views, 1280, 720, {});
   ASSERT_FALSE(result);
-  EXPECT_THAT(result.error().message, HasSubstr("only 6 of 8 views of the board fit together"));
+  EXPECT_THAT(result.error().message, HasSubstr("only 6 of the 8 views of the board that were tried fit together"));
 }
 
 TEST(ConfigurationKeys, AreSetInTheirPlace) {
