@@ -90,18 +90,19 @@ double lens_nees_of(const CameraCalibration& result, const CameraModel& truth) {
 
 void cameras(std::uint64_t seed, int trials, std::size_t view_count, GoalReport& report) {
   std::vector<double> focal, centre;
-  double nees = 0.0;
+  MeanOfMeasured nees;
   for (int i = 0; i < trials; ++i) {
     std::string refusal;
     const CameraTrial trial = camera_trial(seed + static_cast<std::uint64_t>(i), view_count, {}, refusal);
     if (trial.refused) fmt::print("seed {}: {}\n", i, refusal);
     focal.push_back(trial.focal_percent), centre.push_back(trial.centre_px);
-    nees += trial.nees / trials;
+    if (!trial.refused) nees.add(trial.nees);
   }
   const std::string by = fmt::format(", {} views", view_count);
   report.at_most("focal length, %, 95 %" + by, 0.3, percentile(focal, 0.95));
   report.at_most("principal point, px, 95 %" + by, 2.0, percentile(centre, 0.95));
-  report.within("focal lengths and principal point, NEES/4" + by, 0.8, 1.2, nees);
+  report.at_most("lenses refused, %" + by, kMostRefused_percent, nees.refused_percent(trials));
+  report.within("focal lengths and principal point, NEES/4" + by, 0.8, 1.2, nees.mean());
 }
 
 void few_views(std::uint64_t seed, int trials, GoalReport& report) {

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "core/angle/angle.hpp"
@@ -74,6 +75,8 @@ HandEyeNees nees_of(const Vector7d& error, const Eigen::Matrix<double, 7, 7>& co
   };
   return {of(0, 3), of(3, 3), of(6, 1), of(0, 7)};
 }
+
+double MeanOfMeasured::mean() const { return count_ > 0 ? sum_ / count_ : std::numeric_limits<double>::quiet_NaN(); }
 
 double percentile(std::vector<double> values, double share) {
   std::sort(values.begin(), values.end());

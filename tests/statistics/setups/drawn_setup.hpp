@@ -72,6 +72,23 @@ struct HandEyeNees {
 };
 HandEyeNees nees_of(const Vector7d& error, const Eigen::Matrix<double, 7, 7>& covariance);
 
+// Over the trials that were not refused.
+class MeanOfMeasured {
+ public:
+  void add(double value) { sum_ += value, count_ += 1; }
+  // Not a number of none.
+  [[nodiscard]] double mean() const;
+  // Of so many trials, those that added nothing.
+  [[nodiscard]] double refused_percent(int trials) const { return 100.0 * (trials - count_) / trials; }
+
+ private:
+  double sum_ = 0.0;
+  int count_ = 0;
+};
+
+// Trials that may be refused, of which a deviation then says nothing.
+inline constexpr double kMostRefused_percent = 2.0;
+
 // Below which this share of the values lies.
 double percentile(std::vector<double> values, double share);
 
