@@ -42,7 +42,9 @@ std::vector<std::string> lines_of(std::string_view text) {
 
 }  // namespace
 
-std::string date_now() { return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr))); }
+std::string date_text_of(std::time_t time) { return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(time)); }
+
+std::string date_now() { return date_text_of(std::time(nullptr)); }
 
 KeptResults::~KeptResults() {
   std::error_code unknown;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <ctime>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -57,6 +58,7 @@ struct MeasuredKey {
                                                             bool files_may_be_missing = false);
 
 // 2026-11-25 18:30 UTC
+[[nodiscard]] std::string date_text_of(std::time_t time);
 [[nodiscard]] std::string date_now();
 
 }  // namespace perimap

@@ -51,7 +51,7 @@ Outcome measure_motion(BoardMotionOptions& options, const std::vector<std::strin
   const auto guide = live_board_guide(options.live, options.recorded, options.common.configuration, kLeast_s);
   if (!guide) return refuse(guide.error());
   return with_recording(options.live, kScopeTool, **guide, console, options.recorded.recording,
-                        [&] { return finish(measure(), options.common, made_from); });
+                        [&] { return finish(measure(), options.common, made_from, options.recorded.recording); });
 }
 
 }  // namespace perimap

@@ -147,8 +147,9 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
         if (const auto able = check_moved(*options); !able) return refuse(able.error());
         const std::string made_from = joined(named({options->input(), options->moved.recording}));
         const auto guide = what.guide(what.least_s);
-        return with_recording(options->live, options->tool, *guide, console, options->recording,
-                              [&] { return finish(what.measure(*options, console), options->common, made_from); });
+        return with_recording(options->live, options->tool, *guide, console, options->recording, [&] {
+          return finish(what.measure(*options, console), options->common, made_from, options->recording);
+        });
       });
   options->tool = what.tool;
   command.add_option("POSES", options->poses, what.poses);

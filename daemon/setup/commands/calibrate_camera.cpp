@@ -22,6 +22,7 @@
 #include "daemon/setup/live_guide.hpp"
 #include "daemon/setup/pictures.hpp"
 #include "daemon/setup/recorded_board.hpp"
+#include "daemon/setup/recorded_date.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/setup_plots.hpp"
 
@@ -99,7 +100,7 @@ SetupExpected<Measurement> measure(const CameraOptions& options, const Console& 
   measured.text = text_of(*result, seen->board, seen->without);
   measured.json = json_of(*result, seen->board, seen->without);
   measured.plots = plots_of(*result);
-  measured.file = calibration_text_of(*result, seen->board, date_now());
+  measured.file = calibration_text_of(*result, seen->board, date_of_measurement(options.recording));
   measured.section = "camera";
   measured.keys = {{"calibration", output_key(options.common)}};
   return measured;
@@ -133,7 +134,7 @@ Outcome run(CameraOptions& options, const Console& console) {
   constexpr double kLeast_s = 30.0;
   const auto guide = board_guide(*wish, std::nullopt, kLeast_s);
   return with_recording(options.live, kScopeTool, *guide, console, options.recording,
-                        [&] { return finish(measure(options, console), options.common, from); });
+                        [&] { return finish(measure(options, console), options.common, from, options.recording); });
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/setup/commands/board_motion.hpp"
 #include "daemon/setup/hand_eye.hpp"
-#include "daemon/setup/kept_result.hpp"
+#include "daemon/setup/recorded_date.hpp"
 #include "daemon/setup/recorded_sensor.hpp"
 #include "daemon/setup/setup_plots.hpp"
 #include "daemon/setup/setup_report.hpp"
@@ -62,7 +62,8 @@ SetupExpected<Measurement> measure(const HandEyeOptions& options, const Console&
   measured.keys = {{"hand_eye_translation_SC_mm", list_of(measured.json["translation_mm"])},
                    {"hand_eye_rotation_SC_wxyz", list_of(measured.json["rotation_wxyz"])}};
   // What check and perimapd look at: when it was measured, and of which sensor.
-  measured.keys.push_back({"hand_eye_date", fmt::format("{:?}", date_now())});
+  measured.keys.push_back(
+      {"hand_eye_date", fmt::format("{:?}", date_of_measurement(options.motion.recorded.recording))});
   const auto sensor = sensor_of(options);
   if (!sensor) return tl::unexpected(sensor.error());
   if (*sensor) measured.json["sensor"] = **sensor;

@@ -121,8 +121,9 @@ Outcome run(CalibrateScopeOptions& options, const Console& console) {
                          ? scope_guide({*board, options.turns, options.zooms, ScopeGuideSettings{}.least_s,
                                         options.source.by_second_sensor})
                          : notch_guide();
-  return with_recording(options.live, kScopeTool, *guide, console, options.source.recording,
-                        [&] { return finish(measure(options, console), options.common, made_from); });
+  return with_recording(options.live, kScopeTool, *guide, console, options.source.recording, [&] {
+    return finish(measure(options, console), options.common, made_from, options.source.recording);
+  });
 }
 
 }  // namespace

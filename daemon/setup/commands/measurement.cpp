@@ -9,6 +9,7 @@
 #include "daemon/command_line/outputs.hpp"
 #include "daemon/command_line/same_file.hpp"
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/setup/recorded_date.hpp"
 #include "daemon/setup/setup_plots.hpp"
 
 namespace perimap {
@@ -33,7 +34,7 @@ std::string output_key(const CommonOptions& options) {
 }
 
 Outcome check_outputs(const CommonOptions& options, const std::vector<std::string>& inputs) {
-  const std::initializer_list<Output> outputs = {
+  const std::vector<Output> outputs = {
       {"--output", options.output}, {"--html", options.html}, {"--configuration", options.configuration}};
   if (const auto apart = check_apart(outputs, {}); !apart) return refuse(apart.error(), ExitCode::kWrongUsage);
   for (const Output& output : outputs) {
@@ -86,9 +87,10 @@ SetupExpected<void> write_results(const Measurement& measured, const CommonOptio
 
 }  // namespace
 
-Outcome finish(const SetupExpected<Measurement>& measured, const CommonOptions& options, const std::string& made_from) {
+Outcome finish(const SetupExpected<Measurement>& measured, const CommonOptions& options, const std::string& made_from,
+               const std::string& recording) {
   if (!measured) return refuse(measured.error());
-  const std::string date = date_now();
+  const std::string date = date_of_measurement(recording);
   nlohmann::json json = measured->json;
   json["date"] = date;
   json["made_from"] = made_from;

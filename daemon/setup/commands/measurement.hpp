@@ -43,9 +43,10 @@ struct Measurement {
 // `inputs`: every file that an option may name; those without a name do not count.
 [[nodiscard]] Outcome check_outputs(const CommonOptions& options, const std::vector<std::string>& inputs);
 
-// Prints the measurement, and writes what is to be written; refuses with its error when there is none.
+// Prints the measurement, and writes what is to be written; refuses with its error when there is none. `recording`:
+// whose date it has; empty: now.
 [[nodiscard]] Outcome finish(const SetupExpected<Measurement>& measured, const CommonOptions& options,
-                             const std::string& made_from);
+                             const std::string& made_from, const std::string& recording);
 
 // --unit, --json, --output, --html and --configuration, for results that have them.
 void add_common(Command& command, CommonOptions& options, bool has_unit, bool has_keys);

@@ -87,7 +87,7 @@ Outcome run(RegisterOptions& options, const Console& console) {
       !able) {
     return able;
   }
-  const auto registered = [&] { return finish(measure(options), options.common, joined(inputs)); };
+  const auto registered = [&] { return finish(measure(options), options.common, joined(inputs), options.recording); };
   if (options.live.configuration.empty()) return registered();
   if (!options.touched.empty()) {
     return refuse("--live and --touched: expected one of them", ExitCode::kWrongUsage);

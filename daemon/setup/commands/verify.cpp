@@ -17,6 +17,7 @@
 #include "daemon/setup/commands/recorded_options.hpp"
 #include "daemon/setup/kept_result.hpp"
 #include "daemon/setup/live_guide.hpp"
+#include "daemon/setup/recorded_date.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/recorded_verification.hpp"
 
@@ -49,7 +50,7 @@ SetupExpected<VerifiedSetUp> set_up_of(const VerifyOptions& options, const Motio
 void keep_record(const VerifyOptions& options, const MotionSource& motion, nlohmann::json result,
                  const Console& console) {
   const auto set_up = set_up_of(options, motion);
-  result["date"] = date_now();
+  result["date"] = date_of_measurement(options.recorded.recording);
   const auto file = verification_file_of(options.configuration);
   const auto written =
       set_up ? write_kept(file, format_verification(
@@ -73,7 +74,8 @@ Outcome verified(const VerifyOptions& options, const std::string& made_from, con
   Measurement measured{text_of(*result), json_of(*result), {}};
   measured.json["configuration"] = options.configuration;
   measured.plots = plots_of(*result);
-  if (auto finished = finish(measured, options.common, made_from); !finished) return finished;
+  if (auto finished = finish(measured, options.common, made_from, options.recorded.recording); !finished)
+    return finished;
   measured.json["made_from"] = made_from;
   keep_record(options, *motion, measured.json, console);
   if (!result->passed()) {

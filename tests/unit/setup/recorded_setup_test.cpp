@@ -16,6 +16,7 @@
 #include "daemon/setup/kept_result.hpp"
 #include "daemon/setup/live_guide.hpp"
 #include "daemon/setup/printed_target.hpp"
+#include "daemon/setup/recorded_date.hpp"
 #include "daemon/setup/recorded_sensor.hpp"
 #include "drivers/board/board_pattern.hpp"
 #include "drivers/calibration/tool_tip.hpp"
@@ -226,6 +227,24 @@ TEST(KeptResults, OfWhichOneCannotBeWrittenAreNotThere) {
   }
   EXPECT_EQ(text_in(calibration), "before\n");
   EXPECT_FALSE(std::filesystem::exists(calibration.string() + ".new"));
+}
+
+// ---- when a recording was made
+
+TEST(DateOfMeasurement, IsTheRecordingsAndNotTheDayOnWhichItIsLookedAt) {
+  const Folder folder;
+  const auto date_of = [&](const std::string& name, Duration utc_minus_monotonic) {
+    const std::string file = (folder.path() / name).string();
+    SensorRecordingFacts facts;
+    facts.utc_minus_monotonic = utc_minus_monotonic;
+    auto writer = SensorWriter::create(file, facts, Instant(std::chrono::hours(1)));
+    EXPECT_TRUE(writer && writer->finish()) << file;
+    return date_of_measurement(file);
+  };
+  EXPECT_EQ(date_of("old.mcap", std::chrono::seconds(1'700'000'000)), "2023-11-14 23:13 UTC");
+  EXPECT_THAT(date_of("undated.mcap", Duration(0)), testing::EndsWith("(worked out; the recording has no date)"));
+  EXPECT_THAT(date_of_measurement((folder.path() / "gone.mcap").string()), HasSubstr("no date"));
+  EXPECT_EQ(date_of_measurement("").size(), date_now().size());
 }
 
 // ---- whose poses a recording has
