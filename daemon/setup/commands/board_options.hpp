@@ -15,6 +15,8 @@ struct BoardOptions {
   double square_mm = 0.0;
   double marker_mm = 0.0;
   std::string dictionary;
+
+  friend bool operator==(const BoardOptions&, const BoardOptions&) = default;
 };
 
 // --board, --size, --square-mm, --marker-mm and --dictionary.

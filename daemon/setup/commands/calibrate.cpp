@@ -38,7 +38,8 @@ struct PosesOptions {
   std::string recording;  // or this
   LiveOptions live;       // or this
   std::string tool;
-  RecordedOptions moved;  // of a tracker: the same sensor, moved before a board
+  RecordedOptions moved;                       // of a tracker: the same sensor, moved before a board
+  std::optional<MeasuredNoise> moved_noise{};  // by that
 
   [[nodiscard]] const std::string& input() const {
     if (!live.configuration.empty()) return live.configuration;
@@ -47,9 +48,6 @@ struct PosesOptions {
 };
 
 SetupExpected<std::vector<TimedPose>> poses_of(const PosesOptions& options) {
-  if (options.poses.empty() && options.recording.empty()) {
-    return wrong_setup("expected a file of poses, a recording with --from, or devices with --live");
-  }
   if (!options.recording.empty()) return read_recorded_poses(options.recording, options.tool);
   const auto table = read_pose_table(options.poses, options.common.length_unit(), options.common.unit_of_times());
   if (!table) return tl::unexpected(table.error());
@@ -65,7 +63,7 @@ Expected<std::string> tool_of(const PosesOptions& options) {
   return handle->value_or(options.tool);
 }
 
-SetupExpected<Measurement> measure_tool(const PosesOptions& options, const Console& /*console*/) {
+SetupExpected<Measurement> measure_tool(const PosesOptions& options) {
   const auto poses = poses_of(options);
   if (!poses) return tl::unexpected(poses.error());
   const auto result = calibrate_pivot(*poses);
@@ -89,17 +87,13 @@ SetupExpected<MeasuredNoise> moved_noise_of(const PosesOptions& options, const C
   return *std::move(noise);
 }
 
-SetupExpected<Measurement> measure_tracker(const PosesOptions& options, const Console& console) {
+SetupExpected<Measurement> measure_tracker(const PosesOptions& options) {
   const auto poses = poses_of(options);
   if (!poses) return tl::unexpected(poses.error());
   auto still = measure_tracker_noise(*poses);
   if (!still) return fail(options.input() + ": " + still.error().message);
   TrackerErrors errors{*std::move(still), std::nullopt};
-  if (!options.moved.recording.empty()) {
-    auto moved = moved_noise_of(options, console);
-    if (!moved) return tl::unexpected(moved.error());
-    errors.moved = *std::move(moved);
-  }
+  errors.moved = options.moved_noise;
   Measurement measured{text_of(errors),
                        json_of(errors),
                        {{"position_deviation_mm", number_of(errors.position_deviation_mm())},
@@ -109,11 +103,21 @@ SetupExpected<Measurement> measure_tracker(const PosesOptions& options, const Co
   return measured;
 }
 
-// Before anything is recorded.
-SetupExpected<void> check_moved(PosesOptions& options) {
-  if (options.moved.recording.empty()) return {};
+// Before anything is recorded or measured at rest, which takes a minute: what is wrong with --moved is told at once.
+Outcome measure_moved(PosesOptions& options, const Console& console) {
+  if (options.moved.recording.empty()) {
+    if (!has_lens_or_board(options.moved)) return {};
+    return refuse("--calibration, --board-tool and what tells of a board: expected --moved, whose board it is",
+                  ExitCode::kWrongUsage);
+  }
   options.moved.live = options.live.configuration;
-  return check_motion_options(options.moved, options.common.configuration);
+  if (const auto able = check_motion_options(options.moved, options.common.configuration); !able) {
+    return refuse(able.error());
+  }
+  auto noise = moved_noise_of(options, console);
+  if (!noise) return refuse(noise.error());
+  options.moved_noise = *std::move(noise);
+  return {};
 }
 
 // What is measured from poses of one sensor alone.
@@ -124,7 +128,7 @@ struct FromPoses {
   const char* tool;   // of a recording, where none is named
   bool names_output;  // the configuration is to name the file, and has no keys of the result
   bool has_moved;     // the same sensor may have been moved before a board
-  SetupExpected<Measurement> (*measure)(const PosesOptions&, const Console&);
+  SetupExpected<Measurement> (*measure)(const PosesOptions&);
   std::unique_ptr<LiveGuide> (*guide)(double least_s);
   double least_s;  // live
 };
@@ -136,6 +140,10 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
         const std::vector<std::string> inputs = {options->poses, options->recording, options->moved.recording,
                                                  options->moved.calibration};
         if (auto able = check_outputs(options->common, inputs); !able) return able;
+        if (options->input().empty()) {
+          return refuse("expected a file of poses, a recording with --from, or devices with --live",
+                        ExitCode::kWrongUsage);
+        }
         if (!options->poses.empty() && options->input() != options->poses) {
           return refuse(options->poses + ": not read beside --from or --live; expected one of them",
                         ExitCode::kWrongUsage);
@@ -144,11 +152,11 @@ void add_from_poses(Commands& commands, Command& calibrate, const FromPoses& wha
           return refuse("--configuration: expected --output too, the file that the configuration is to name",
                         ExitCode::kWrongUsage);
         }
-        if (const auto able = check_moved(*options); !able) return refuse(able.error());
+        if (auto moved = measure_moved(*options, console); !moved) return moved;
         const std::string made_from = joined(named({options->input(), options->moved.recording}));
         const auto guide = what.guide(what.least_s);
         return with_recording(options->live, options->tool, *guide, console, options->recording, [&] {
-          return finish(what.measure(*options, console), options->common, made_from, options->recording);
+          return finish(what.measure(*options), options->common, made_from, options->recording);
         });
       });
   options->tool = what.tool;

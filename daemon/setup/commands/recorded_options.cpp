@@ -20,6 +20,10 @@ void add_lens_and_board(Command& command, RecordedOptions& options) {
                      "moved then [it lies still]");
 }
 
+bool has_lens_or_board(const RecordedOptions& options) {
+  return !options.calibration.empty() || !options.board_tool.empty() || options.board != BoardOptions{};
+}
+
 SetupExpected<MotionSource> source_of(const RecordedOptions& options, const std::string& configuration) {
   auto board = wish_of(options.board);
   if (!board) return tl::unexpected(board.error());

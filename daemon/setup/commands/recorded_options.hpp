@@ -23,6 +23,8 @@ struct RecordedOptions {
 void add_from(Command& command, std::string& recording);
 // --calibration, and the board's.
 void add_lens_and_board(Command& command, RecordedOptions& options);
+// Whether one of those was given.
+[[nodiscard]] bool has_lens_or_board(const RecordedOptions& options);
 
 // `configuration`: that of --configuration, or of the command itself; its lens goes before the live devices'.
 [[nodiscard]] SetupExpected<MotionSource> source_of(const RecordedOptions& options, const std::string& configuration);
