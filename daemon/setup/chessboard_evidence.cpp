@@ -73,39 +73,69 @@ bool is_even(const CornerGrid& grid, int columns, int rows) {
   return true;
 }
 
-}  // namespace
+// From square to square, each from what is dark, if the first square is, to what is bright. Squares that are not in the
+// picture have none.
+struct Steps {
+  std::vector<double> between;   // of squares between the corners
+  std::vector<double> around;    // to and among those beyond the outer corners
+  std::vector<double> scatters;  // of each square between the corners
+};
 
-bool is_chessboard(const cv::Mat& grey, const std::vector<cv::Point2f>& corners, int columns, int rows) {
-  if (columns < 2 || rows < 2 || corners.size() != static_cast<std::size_t>(columns * rows)) return false;
-  const CornerGrid grid(corners, columns, rows);
-  if (!is_even(grid, columns, rows)) return false;
+Steps steps_of(const cv::Mat& grey, const CornerGrid& grid, int columns, int rows) {
   const int width = columns + 1;
   std::vector<Square> squares;
   for (int y = -1; y < rows; ++y) {
     for (int x = -1; x < columns; ++x) squares.push_back(square_at(grey, grid, x, y));
   }
   const auto of = [&](int x, int y) { return squares[static_cast<std::size_t>(y * width + x)]; };
-  std::vector<double> steps;  // from what is dark, if the first square is, to what is bright
-  std::vector<double> scatters;
+  const auto is_between = [&](int x, int y) { return x > 0 && y > 0 && x < columns && y < rows; };
+  Steps steps;
   for (int y = 0; y <= rows; ++y) {
     for (int x = 0; x <= columns; ++x) {
       const Square here = of(x, y);
       if (std::isnan(here.level)) continue;
-      scatters.push_back(here.scatter);
+      const bool between = is_between(x, y);
+      if (between) steps.scatters.push_back(here.scatter);
       const double sign = (x + y) % 2 == 0 ? 1.0 : -1.0;
-      if (x < columns && !std::isnan(of(x + 1, y).level)) steps.push_back(sign * (of(x + 1, y).level - here.level));
-      if (y < rows && !std::isnan(of(x, y + 1).level)) steps.push_back(sign * (of(x, y + 1).level - here.level));
+      const auto step_to = [&](int to_x, int to_y) {
+        if (to_x > columns || to_y > rows || std::isnan(of(to_x, to_y).level)) return;
+        (between && is_between(to_x, to_y) ? steps.between : steps.around)
+            .push_back(sign * (of(to_x, to_y).level - here.level));
+      };
+      step_to(x + 1, y);
+      step_to(x, y + 1);
     }
   }
-  if (steps.size() < 4) return false;
-  std::vector<double> sorted = steps;
+  return steps;
+}
+
+}  // namespace
+
+bool is_chessboard(const cv::Mat& grey, const std::vector<cv::Point2f>& corners, int columns, int rows) {
+  if (columns < 2 || rows < 2 || corners.size() != static_cast<std::size_t>(columns * rows)) return false;
+  const CornerGrid grid(corners, columns, rows);
+  if (!is_even(grid, columns, rows)) return false;
+  const Steps steps = steps_of(grey, grid, columns, rows);
+  constexpr std::size_t kFewest = 4;
+  if (steps.between.size() < kFewest) return false;
+  std::vector<double> sorted = steps.between;
   const double middle = upper_median(sorted.begin(), sorted.end());
   const double step = std::abs(middle);
   constexpr double kLeastStep = 10.0;  // grey levels
   constexpr double kMostScatter = 0.2;
   constexpr double kInTurn = 0.9;
-  const auto in_turn = std::count_if(steps.begin(), steps.end(), [&](double s) { return s * middle > 0.0; });
-  return step >= kLeastStep && static_cast<double>(in_turn) >= kInTurn * static_cast<double>(steps.size()) &&
+  // What lies over the squares around the corners, or shades them, is between dark and bright, or as dark: a step the
+  // wrong way round and half as high is another pattern's.
+  constexpr double kContradicts = 0.5;
+  constexpr double kMostContradictions = 0.1;
+  const auto share_of = [](const std::vector<double>& values, const auto& is) {
+    return static_cast<double>(std::count_if(values.begin(), values.end(), is)) /
+           static_cast<double>(std::max<std::size_t>(1, values.size()));
+  };
+  std::vector<double> scatters = steps.scatters;
+  return step >= kLeastStep && share_of(steps.between, [&](double s) { return s * middle > 0.0; }) >= kInTurn &&
+         share_of(steps.around, [&](double s) { return s * middle < -kContradicts * middle * middle; }) <=
+             kMostContradictions &&
          upper_median(scatters.begin(), scatters.end()) <= kMostScatter * step;
 }
 

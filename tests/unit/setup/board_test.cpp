@@ -15,6 +15,7 @@
 
 #include "core/geometry/pose.hpp"
 #include "daemon/setup/camera_calibration.hpp"
+#include "daemon/setup/chessboard_evidence.hpp"
 
 namespace perimap {
 namespace {
@@ -159,6 +160,55 @@ TEST(Board, TextureInWhichCornersAreFoundIsNoBoard) {
   const auto board = recognise_board(greys, {});
   ASSERT_FALSE(board) << name_of(*board);
   EXPECT_THAT(board.error().message, HasSubstr("no board is seen"));
+}
+
+// Of 5x4 inner corners, straight ahead, and where they are.
+struct FoundBoard {
+  cv::Mat picture{480, 640, CV_8UC1, cv::Scalar(235)};
+  std::vector<cv::Point2f> corners;
+};
+
+FoundBoard found_board() {
+  constexpr int kSide = 60;
+  FoundBoard found;
+  for (int y = 0; y < 5; ++y) {
+    for (int x = 0; x < 6; ++x) {
+      if ((x + y) % 2 == 0) found.picture(cv::Rect(140 + kSide * x, 90 + kSide * y, kSide, kSide)).setTo(25);
+      if (x > 0 && y > 0) {
+        found.corners.emplace_back(static_cast<float>(140 + kSide * x), static_cast<float>(90 + kSide * y));
+      }
+    }
+  }
+  return found;
+}
+
+TEST(ChessboardEvidence, SquaresAroundTheCornersMayBeInTheDarkOrHeld) {
+  const FoundBoard whole = found_board();
+  ASSERT_TRUE(is_chessboard(whole.picture, whole.corners, 5, 4));
+  const cv::Rect between(200, 150, 240, 180);
+  for (const int level : {0, 60, 150, 235}) {  // field stop, glove, finger, gloss
+    FoundBoard held = found_board();
+    held.picture.setTo(level);
+    whole.picture(between).copyTo(held.picture(between));
+    EXPECT_TRUE(is_chessboard(held.picture, held.corners, 5, 4)) << level;
+  }
+  FoundBoard half = found_board();
+  half.picture(cv::Rect(0, 0, 230, 480)).setTo(120);  // a thumb along one side
+  half.picture(cv::Rect(0, 0, 640, 150)).setTo(0);
+  whole.picture(between).copyTo(half.picture(between));
+  EXPECT_TRUE(is_chessboard(half.picture, half.corners, 5, 4));
+}
+
+TEST(ChessboardEvidence, SquaresAroundTheCornersThatAreTheOtherWayRoundAreAnotherPattern) {
+  const FoundBoard whole = found_board();
+  FoundBoard turned = found_board();
+  cv::bitwise_not(turned.picture, turned.picture);
+  const cv::Rect between(200, 150, 240, 180);
+  whole.picture(between).copyTo(turned.picture(between));
+  EXPECT_FALSE(is_chessboard(turned.picture, turned.corners, 5, 4));
+  FoundBoard grey = found_board();
+  grey.picture(between).setTo(128);
+  EXPECT_FALSE(is_chessboard(grey.picture, grey.corners, 5, 4)) << "nothing between the corners";
 }
 
 TEST(Board, AChessboardOfFewSquaresIsOne) {
