@@ -219,15 +219,21 @@ class Deviations {
   void add(const Expected<TurnedScope>& moved) {
     if (!moved) return;
     axis_ += (moved->axis_S - scope_.axis_S).squaredNorm();
-    const Vector3d point = moved->point_S - scope_.point_S;
-    point_ += (point - scope_.axis_S * scope_.axis_S.dot(point)).squaredNorm();
+    const Vector3d on_axis = moved->point_S - scope_.point_S;
+    point_ += (on_axis - scope_.axis_S * scope_.axis_S.dot(on_axis)).squaredNorm();
     for (std::size_t i = 0; i < kTurns; ++i) {
       const double angle = kTwoPi * static_cast<double>(i) / kTurns;
       const SetupAtRotation before = scope_.at(angle);
       const SetupAtRotation after = moved->at(angle);
       rotation_[i] += so3_log(before.X_SC.R.transpose() * after.X_SC.R).squaredNorm();
       translation_[i] += (after.X_SC.t - before.X_SC.t).squaredNorm();
-      principal_[i] += (after.principal_px - before.principal_px).cwiseAbs2();
+      const Vector2d point = after.principal_px - before.principal_px;
+      principal_[i] += point.cwiseAbs2();
+      if (!(scope_.reference.focal_px.minCoeff() > 0.0)) continue;
+      const Vector2d aside = -point.cwiseQuotient(scope_.reference.focal_px);
+      const Vector3d ahead_C = TurnedScope::kTargetAhead_mm * Vector3d::UnitZ();
+      const Vector3d told_C = TurnedScope::kTargetAhead_mm * Vector3d(aside.x(), aside.y(), 1.0);
+      target_[i] += (after.X_SC * told_C - before.X_SC * ahead_C).squaredNorm();
     }
   }
 
@@ -238,6 +244,7 @@ class Deviations {
       scope.rotation_deviation_rad = std::max(scope.rotation_deviation_rad, std::sqrt(rotation_[i]));
       scope.translation_deviation_mm = std::max(scope.translation_deviation_mm, std::sqrt(translation_[i]));
       scope.principal_deviation_px = std::max(scope.principal_deviation_px, std::sqrt(principal_[i].maxCoeff()));
+      scope.target_deviation_mm = std::max(scope.target_deviation_mm, std::sqrt(target_[i]));
     }
   }
 
@@ -249,6 +256,7 @@ class Deviations {
   double point_ = 0.0;
   std::array<double, kTurns> rotation_{};
   std::array<double, kTurns> translation_{};
+  std::array<double, kTurns> target_{};
   std::array<Vector2d, kTurns> principal_;
 };
 
@@ -281,21 +289,23 @@ void tell_deviations(const std::vector<SetupAtRotation>& setups, const std::opti
                      TurnedScope& scope) {
   Deviations deviations(scope);
   for (std::size_t i = 0; i < setups.size(); ++i) {
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> parts(setups[i].covariance_C);
-    for (int k = 0; k < 6; ++k) {
+    Eigen::Matrix<double, 8, 8> together;
+    together << setups[i].covariance_C, setups[i].covariance_with_principal,
+        setups[i].covariance_with_principal.transpose(),
+        Eigen::Matrix2d(setups[i].principal_deviation_px.cwiseAbs2().asDiagonal());
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 8, 8>> parts(together);
+    for (int k = 0; k < 8; ++k) {
       const double deviation = std::sqrt(std::max(0.0, parts.eigenvalues()[k]));
       if (deviation == 0.0) continue;
-      const Vector6d off = deviation * parts.eigenvectors().col(k);
+      const Eigen::Matrix<double, 8, 1> off = deviation * parts.eigenvectors().col(k);
       std::vector<SetupAtRotation> moved = setups;
-      moved[i].X_SC = moved[i].X_SC * Pose{so3_exp(off.head<3>()), off.tail<3>()};
+      moved[i].X_SC = moved[i].X_SC * Pose{so3_exp(off.head<3>()), off.segment<3>(3)};
+      moved[i].principal_px += off.tail<2>();
       deviations.add(fitted(moved, turn_px));
     }
-    for (int k = 0; k < 3; ++k) {
-      std::vector<SetupAtRotation> moved = setups;
-      if (k < 2) moved[i].principal_px[k] += setups[i].principal_deviation_px[k];
-      if (k == 2) moved[i].rotation_rad += setups[i].rotation_deviation_rad;
-      deviations.add(fitted(moved, turn_px));
-    }
+    std::vector<SetupAtRotation> moved = setups;
+    moved[i].rotation_rad += setups[i].rotation_deviation_rad;
+    deviations.add(fitted(moved, turn_px));
   }
   deviations.tell(scope);
 }

@@ -38,6 +38,8 @@ struct SetupAtRotation {
   double rotation_deviation_rad = 0.0;
   Matrix6d covariance_C = Matrix6d::Zero();  // of X_SC: rotation (rad), then translation (mm), along C's axes
   Vector2d principal_deviation_px = Vector2d::Zero();
+  // Of those errors with the principal point's: a hand-eye is measured through a lens, and turned by what that is off.
+  Eigen::Matrix<double, 6, 2> covariance_with_principal = Eigen::Matrix<double, 6, 2>::Zero();
 };
 
 // A focal length, by the field stop's radius in the picture.
@@ -77,6 +79,10 @@ struct TurnedScope {
   double rotation_deviation_rad = 0.0;
   double translation_deviation_mm = 0.0;
   double principal_deviation_px = 0.0;
+  // Likewise of a target so far ahead in the picture's middle, by hand-eye and principal point together, of which each
+  // makes good most of what the other is off for the lens; 0: the focal length is not told.
+  static constexpr double kTargetAhead_mm = 90.0;
+  double target_deviation_mm = 0.0;
 
   // At the zoom of the reference.
   [[nodiscard]] SetupAtRotation at(double rotation_rad) const noexcept;

@@ -34,8 +34,12 @@ struct HandEyeCalibration {
   Pose X_WB;
   Eigen::Matrix<double, 7, 7>
       covariance;  // as HandEyeAdjustment has it, for errors that last `correlation_length` poses
-  // What of it the lens's own uncertainty makes; none: the lens was taken for exact.
+  // What of it the lens's own uncertainty makes; none: the lens was taken for exact, because its calibration says
+  // nothing of that, or because of `lens_untold`.
   std::optional<Eigen::Matrix<double, 7, 7>> covariance_by_lens;
+  // Of the hand-eye's rotation and place with the lens's principal point, px; zero where the lens was taken for exact.
+  Eigen::Matrix<double, 6, 2> covariance_with_principal = Eigen::Matrix<double, 6, 2>::Zero();
+  std::string lens_untold = "how well it is known was not told";
   Matrix6d error_covariance;  // of one pose, at the sensor
   // Of the camera's lengths beside the tracker's. What it is off beyond three deviations is in `covariance`.
   BoardScale scale;

@@ -63,27 +63,36 @@ std::optional<Pose> measured_through(const HandEyeCalibration& result, const std
 void add_lens_uncertainty(HandEyeCalibration& result, const std::vector<TimedView>& views, const CameraModel& lens,
                           const LensCovariance& covariance) {
   const std::vector<TimedView> few = thinned(views);
+  const auto untold = [&](const char* why) { result.lens_untold = why; };
   const auto before = measured_through(result, few, lens);
-  if (!before) return;
+  if (!before) return untold("two of its views a second do not determine the hand-eye");
   Eigen::Matrix<double, 7, 7> by_lens = Eigen::Matrix<double, 7, 7>::Zero();
+  Eigen::Matrix<double, 6, 2> with_principal = Eigen::Matrix<double, 6, 2>::Zero();
   double at_target = 0.0;
   Vector2d middle_px;
   const Vector3d target_C(0.0, 0.0, HandEyeCalibration::kTargetAhead_mm);
-  if (lens.project(target_C, middle_px) != ProjectionStatus::kOk) return;
+  if (lens.project(target_C, middle_px) != ProjectionStatus::kOk) {
+    return untold("the lens does not show what is straight ahead of it");
+  }
   for (const Vector9d& change : changes_of(covariance)) {
     const CameraModel changed = changed_lens(lens, change);
     const auto after = measured_through(result, few, changed);
     Vector3d ray_C;
-    if (!after || !changed.unproject(middle_px, ray_C)) return;
+    if (!after || !changed.unproject(middle_px, ray_C)) {
+      return untold("with the lens changed by one of its deviations the views do not determine the hand-eye");
+    }
     const Pose by = before->inverse() * *after;
     Vector6d e;
     e << so3_log(by.R), by.t;
     by_lens.topLeftCorner<6, 6>() += e * e.transpose();
+    with_principal += e * change.segment<2>(2).transpose();
     at_target += (by * (target_C.z() / ray_C.z() * ray_C) - target_C).squaredNorm();
   }
   result.covariance += by_lens;
   result.covariance_by_lens = by_lens;
+  result.covariance_with_principal = with_principal;
   result.target_deviation_by_lens_mm = std::sqrt(at_target);
+  result.lens_untold.clear();
 }
 
 }  // namespace perimap

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/angle/angle.hpp"
 #include "core/calibration/pivot.hpp"
 #include "core/calibration/rotation_spread.hpp"
 #include "core/calibration/tracker_noise.hpp"
 #include "daemon/setup/hand_eye.hpp"
+#include "daemon/setup/lens_in_hand_eye.hpp"
 
 namespace perimap {
 namespace {
@@ -28,17 +30,18 @@ double span_s(const std::vector<TimedPose>& poses) {
 }
 
 // At most so many of them, evenly: what is judged while it goes on must be quick.
-std::vector<TimedPose> thinned(const std::vector<TimedPose>& poses, std::size_t most) {
-  if (poses.size() <= most) return poses;
-  std::vector<TimedPose> few;
-  for (std::size_t k = 0; k < most; ++k) few.push_back(poses[k * poses.size() / most]);
+template <typename Timed>
+std::vector<Timed> thinned(const std::vector<Timed>& all, std::size_t most) {
+  if (all.size() <= most) return all;
+  std::vector<Timed> few;
+  for (std::size_t k = 0; k < most; ++k) few.push_back(all[k * all.size() / most]);
   return few;
 }
 
 class BoardGuide final : public LiveGuide {
  public:
-  BoardGuide(const BoardWish& wish, std::optional<CameraModel> camera, double least_s, Turning turning)
-      : wish_(wish), camera_(camera), least_s_(least_s), turned_(camera || turning == Turning::kWanted) {}
+  BoardGuide(const BoardWish& wish, std::optional<KnownLens> lens, double least_s, Turning turning)
+      : wish_(wish), lens_(std::move(lens)), least_s_(least_s), turned_(lens_ || turning == Turning::kWanted) {}
 
   void see(double t_s, const GreyImage& grey) override {
     ++frames_;
@@ -64,15 +67,29 @@ class BoardGuide final : public LiveGuide {
     turned_deg_ = turned_deg(thinned(poses, 500));
     // Anew every five seconds of views.
     constexpr double kEvery_s = 5.0;
-    if (!camera_ || views_.size() < 50 || views_.back().t_s - judged_s_ < kEvery_s) return;
+    if (!lens_ || views_.size() < 50 || views_.back().t_s - judged_s_ < kEvery_s) return;
     judged_s_ = views_.back().t_s;
-    const auto result = calibrate_hand_eye(camera_poses_of(views_, *camera_), poses, {});
-    residual_ = result
-                    ? fmt::format("AX - XB {:.2f} mm, held aside {:.2f} mm, a target {:.0f} mm ahead within {:.2f} mm",
-                                  result->residual_median_mm, result->held_aside_rms_mm,
-                                  HandEyeCalibration::kTargetAhead_mm, result->target_deviation_mm())
-                    : result.error().message;
-    determined_ = result && result->target_deviation_mm() <= HandEyeCalibration::kWellKnownTarget_mm;
+    determined_ = false;
+    auto result = calibrate_hand_eye(camera_poses_of(views_, lens_->camera), poses, {});
+    if (!result) {
+      residual_ = result.error().message;
+      return;
+    }
+    // What it makes of a hand-eye goes with the motion, not with the number of views.
+    constexpr std::size_t kViewsOfLens = 40;
+    if (lens_->covariance) {
+      add_lens_uncertainty(*result, thinned(views_, kViewsOfLens), lens_->camera, *lens_->covariance);
+    }
+    const double by_lens_mm = result->target_deviation_by_lens_mm;
+    residual_ = fmt::format("AX - XB {:.2f} mm, held aside {:.2f} mm, a target {:.0f} mm ahead within {:.2f} mm, {}",
+                            result->residual_median_mm, result->held_aside_rms_mm, HandEyeCalibration::kTargetAhead_mm,
+                            result->target_deviation_mm(),
+                            result->covariance_by_lens ? fmt::format("{:.2f} mm of it by the lens", by_lens_mm)
+                                                       : "the lens being taken for exact: " + result->lens_untold);
+    // A lens that is known worse is not mended by a longer recording.
+    constexpr double kLittleMore = 1.1;
+    determined_ =
+        result->target_deviation_mm() <= std::max(HandEyeCalibration::kWellKnownTarget_mm, kLittleMore * by_lens_mm);
   }
 
   [[nodiscard]] Followed followed() const override { return turned_ ? Followed::kTool : Followed::kNone; }
@@ -100,7 +117,7 @@ class BoardGuide final : public LiveGuide {
 
   [[nodiscard]] bool enough() const override {
     return views_.size() >= kWantedViews && last_s_ - first_s_.value_or(last_s_) >= least_s_ &&
-           missing_ninths().empty() && (!turned_ || is_turned()) && (!camera_ || determined_);
+           missing_ninths().empty() && (!turned_ || is_turned()) && (!lens_ || determined_);
   }
 
  private:
@@ -123,7 +140,7 @@ class BoardGuide final : public LiveGuide {
   }
 
   BoardWish wish_;
-  std::optional<CameraModel> camera_;
+  std::optional<KnownLens> lens_;
   double least_s_;
   bool turned_;  // wanted
   std::optional<Board> board_;
@@ -202,9 +219,9 @@ class StillGuide final : public LiveGuide {
 
 }  // namespace
 
-std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<CameraModel> camera, double least_s,
+std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<KnownLens> lens, double least_s,
                                        Turning turning) {
-  return std::make_unique<BoardGuide>(wish, camera, least_s, turning);
+  return std::make_unique<BoardGuide>(wish, std::move(lens), least_s, turning);
 }
 
 std::unique_ptr<LiveGuide> pivot_guide(double least_s) { return std::make_unique<PivotGuide>(least_s); }

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "core/calibration/timed_poses.hpp"
-#include "core/geometry/camera_model.hpp"
 #include "core/sensors/grey_image.hpp"
 #include "daemon/setup/board.hpp"
 #include "daemon/setup/recorded_board.hpp"
+#include "daemon/setup/recorded_motion.hpp"
 
 namespace perimap {
 
@@ -47,7 +47,7 @@ enum class Turning { kNotWanted, kWanted };
 
 // The board from all sides: in which ninths of the picture it was, and, where that is wanted or the lens is known, how
 // far the tracked scope was turned; by the lens, what a hand-eye calibration would leave over by now.
-[[nodiscard]] std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<CameraModel> camera,
+[[nodiscard]] std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<KnownLens> lens,
                                                      double least_s, Turning turning = Turning::kNotWanted);
 // A tool swung about its tip: how far it was turned, and what a calibration would leave over by now.
 [[nodiscard]] std::unique_ptr<LiveGuide> pivot_guide(double least_s);

@@ -123,6 +123,7 @@ Expected<RecordedTurn> measured_turn(const Recorded& recorded, const HeldStretch
   setup.covariance_C = hand_eye->covariance.topLeftCorner<6, 6>();
   setup.principal_px = {lens->camera.cx, lens->camera.cy};
   setup.principal_deviation_px = {lens->deviations[2], lens->deviations[3]};
+  setup.covariance_with_principal = hand_eye->covariance_with_principal;
   setup.focal_px = {lens->camera.fx, lens->camera.fy};
   if (!recorded.second.empty()) {
     const auto relation = held_relation(between(recorded.sensor, from_s, to_s), between(recorded.second, from_s, to_s));

@@ -27,19 +27,20 @@ bool read_numbers(const nlohmann::json& json, const char* key, double* values, s
   return true;
 }
 
-// Of the rotation and the translation, as `perimap calibrate hand-eye` writes it; zeros where there is none.
-Matrix6d covariance_in(const nlohmann::json& json) {
-  Matrix6d covariance = Matrix6d::Zero();
-  if (!json.contains("covariance") || !json["covariance"].is_array() || json["covariance"].size() < 6)
-    return covariance;
+// The upper left part of rows of numbers, as `perimap calibrate hand-eye` writes them; zeros where there are none.
+template <int kColumns>
+Eigen::Matrix<double, 6, kColumns> rows_in(const nlohmann::json& json, const char* key) {
+  using Rows = Eigen::Matrix<double, 6, kColumns>;
+  Rows rows = Rows::Zero();
+  if (!json.contains(key) || !json[key].is_array() || json[key].size() < 6) return rows;
   for (std::size_t i = 0; i < 6; ++i) {
-    const nlohmann::json& row = json["covariance"][i];
-    for (std::size_t k = 0; k < 6; ++k) {
-      if (!row.is_array() || row.size() < 6 || !row[k].is_number()) return Matrix6d::Zero();
-      covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = row[k].get<double>();
+    const nlohmann::json& row = json[key][i];
+    for (std::size_t k = 0; k < kColumns; ++k) {
+      if (!row.is_array() || row.size() < kColumns || !row[k].is_number()) return Rows::Zero();
+      rows(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = row[k].get<double>();
     }
   }
-  return covariance.allFinite() ? covariance : Matrix6d(Matrix6d::Zero());
+  return rows.allFinite() ? rows : Rows(Rows::Zero());
 }
 
 // As `perimap calibrate camera` writes it; zeros where there is none.
@@ -140,7 +141,8 @@ Expected<SetupAtRotation> read_setup(const std::filesystem::path& hand_eye, cons
   setup.X_SC = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), q);
   setup.principal_px = {lens->cx, lens->cy};
   setup.focal_px = {lens->fx, lens->fy};
-  setup.covariance_C = covariance_in(json);
+  setup.covariance_C = rows_in<6>(json, "covariance");
+  setup.covariance_with_principal = rows_in<2>(json, "covariance_with_principal_point");
   setup.principal_deviation_px = principal_deviation_in(*lens_text);
   return setup;
 }
@@ -189,6 +191,10 @@ std::string text_of(const TurnedScope& scope) {
       "  deviations     {:.2f} mm and {:.2f} degrees of the hand-eye, {:.2f} px of the principal point, at the turn "
       "where they are largest\n",
       scope.translation_deviation_mm, scope.rotation_deviation_rad / kDegree, scope.principal_deviation_px);
+  if (scope.target_deviation_mm > 0.0) {
+    text += fmt::format("                 {:.2f} mm of a target {:.0f} mm ahead, by both together\n",
+                        scope.target_deviation_mm, TurnedScope::kTargetAhead_mm);
+  }
   if (!scope.sensor_on_scope) {
     text += fmt::format("                 {:.2f} degrees of the shaft's direction, {:.2f} mm of its place\n",
                         scope.axis_deviation_rad / kDegree, scope.point_deviation_mm);

@@ -107,7 +107,8 @@ std::string text_of(const HandEyeCalibration& result) {
                         three(of_lens.segment<3>(3), 2), three(of_lens.head<3>() / kDegree, 3),
                         result.target_deviation_by_lens_mm);
   } else {
-    text += "  the lens       is taken for exact: how well it is known was not told\n";
+    text += fmt::format("  the lens       is taken for exact, so that these deviations are too small: {}\n",
+                        result.lens_untold);
   }
   if (result.offset_measured) {
     text += offset_text_of(result);
@@ -148,6 +149,8 @@ nlohmann::json json_of(const HandEyeCalibration& result) {
       {"target_mm_deviation", result.target_deviation_mm()},
       {"target_mm_deviation_by_lens", result.target_deviation_by_lens_mm},
       {"lens_is_taken_for_exact", !result.covariance_by_lens.has_value()},
+      {"lens_is_taken_for_exact_because",
+       result.covariance_by_lens ? nlohmann::json() : nlohmann::json(result.lens_untold)},
       {"time_offset_ms", nullptr},
       {"time_offset_ms_deviation", nullptr},
       {"residual_median_mm", result.residual_median_mm},
@@ -156,6 +159,7 @@ nlohmann::json json_of(const HandEyeCalibration& result) {
       {"residual_interval_s", result.disagreement_interval_s},
       {"covariance", rows_of(result.covariance)},
       {"covariance_order", "rotation about C's axes (rad), translation along C's axes (mm), time offset (s)"},
+      {"covariance_with_principal_point", rows_of(result.covariance_with_principal)},
       {"fitted_rms_mm", result.fitted_rms_mm},
       {"held_aside_rms_mm", result.held_aside_rms_mm},
       {"held_aside_rms_deg", result.held_aside_rms_deg},

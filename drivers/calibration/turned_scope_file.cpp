@@ -202,6 +202,7 @@ std::string format_turned_scope(const TurnedScope& scope) {
                                {"rotation_deg_deviation", scope.rotation_deviation_rad / kDegree},
                                {"translation_mm_deviation", scope.translation_deviation_mm},
                                {"principal_point_px_deviation", scope.principal_deviation_px},
+                               {"target_mm_deviation", scope.target_deviation_mm},
                                {"left_over_mm", scope.translation_rms_mm},
                                {"left_over_deg", scope.rotation_rms_deg},
                                {"aside_mm", scope.aside_translation_rms_mm},

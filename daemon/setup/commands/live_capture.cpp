@@ -102,11 +102,11 @@ SetupExpected<std::unique_ptr<LiveGuide>> live_board_guide(const LiveOptions& op
                                                            const std::string& configuration, double least_s) {
   const auto source = source_of(recorded, configuration);
   if (!source) return tl::unexpected(source.error());
-  std::optional<CameraModel> camera;
+  std::optional<KnownLens> known;
   if (!options.configuration.empty()) {
-    if (const auto lens = lens_of(*source)) camera = lens->camera;
+    if (auto lens = lens_of(*source)) known = *std::move(lens);
   }
-  return board_guide(source->board, camera, least_s);
+  return board_guide(source->board, std::move(known), least_s);
 }
 
 Outcome with_recording(const LiveOptions& options, const std::string& tool, LiveGuide& guide, const Console& console,

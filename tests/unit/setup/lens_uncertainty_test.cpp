@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/setup/lens_in_hand_eye.hpp"
+#include "daemon/setup/setup_report.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/calibration/lens_covariance.hpp"
 
@@ -125,6 +126,21 @@ TEST(LensInHandEye, APrincipalPointThatIsOpenTurnsTheHandEyeAndHardlyMovesWhatIs
   // What is 90 mm ahead would be off by that angle, did the hand-eye not go with the lens.
   EXPECT_LT(result->target_deviation_by_lens_mm, 0.5 * 90.0 * turned_rad);
   EXPECT_GE(result->target_deviation_mm(), target_alone_mm);
+}
+
+TEST(LensInHandEye, WhatCanNotBeWorkedOutIsSaidWithItsReason) {
+  const Swung motion = swung();
+  auto result = calibrate_hand_eye(camera_poses_of(motion.views, lens()), motion.sensor, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_THAT(text_of(*result), testing::HasSubstr("how well it is known was not told"));
+  const auto alone = result->covariance;
+  // Two views determine no hand-eye.
+  add_lens_uncertainty(*result, {motion.views[0], motion.views[20]}, lens(), point_covariance(1.0));
+  EXPECT_FALSE(result->covariance_by_lens);
+  EXPECT_EQ(result->covariance, alone);
+  EXPECT_THAT(text_of(*result), testing::HasSubstr("two of its views a second do not determine the hand-eye"));
+  EXPECT_THAT(json_of(*result)["lens_is_taken_for_exact_because"].get<std::string>(),
+              testing::HasSubstr("do not determine"));
 }
 
 TEST(LensInHandEye, ALensThatIsKnownAddsNothing) {

@@ -134,5 +134,57 @@ TEST(TurnedScope, DeviationsAreThoseOfWhatIsTold) {
               0.2);
 }
 
+// A principal point that is off turns the hand-eye that is measured through it: one error, and not two.
+TEST(TurnedScope, ALensThatIsOffIsCountedOnceInATarget) {
+  const Built scope;
+  std::mt19937 generator(77);
+  std::normal_distribution<double> normal;
+  constexpr double kPoint_px = 2.0;
+  constexpr double kFocal_px = 700.0;
+  constexpr int kTrials = 400;
+  constexpr int kTurns = 12;
+  const Vector3d target_C(0.0, 0.0, TurnedScope::kTargetAhead_mm);
+  Eigen::Matrix<double, 6, 2> turned_by = Eigen::Matrix<double, 6, 2>::Zero();  // rad for each px
+  turned_by(1, 0) = 1.0 / kFocal_px;
+  turned_by(0, 1) = -1.0 / kFocal_px;
+  double squares[kTurns]{};
+  TurnedScope told;
+  TurnedScope as_two;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::vector<SetupAtRotation> setups;
+    for (const double theta : {0.0, 1.2, 2.4}) {
+      SetupAtRotation setup = scope.at(theta);
+      const Vector2d off_px(kPoint_px * normal(generator), kPoint_px * normal(generator));
+      const Vector6d off = turned_by * off_px;
+      setup.X_SC = setup.X_SC * Pose{so3_exp(off.head<3>()), off.tail<3>()};
+      setup.principal_px += off_px;
+      setup.focal_px = Vector2d::Constant(kFocal_px);
+      setup.radius_px = 200.0;
+      setup.principal_deviation_px = Vector2d::Constant(kPoint_px);
+      setup.covariance_C = kPoint_px * kPoint_px * turned_by * turned_by.transpose();
+      setup.covariance_with_principal = kPoint_px * kPoint_px * turned_by;
+      setups.push_back(setup);
+    }
+    const auto fitted = fit_turned_scope(setups, Vector2d(320.0, 240.0));
+    ASSERT_TRUE(fitted) << fitted.error().message;
+    told = *fitted;
+    for (int i = 0; i < kTurns; ++i) {
+      const double theta = kTwoPi * i / kTurns;
+      const SetupAtRotation truth = scope.at(theta);
+      const SetupAtRotation at = fitted->at(theta);
+      const Vector2d aside = (truth.principal_px - at.principal_px) / kFocal_px;
+      const Vector3d seen_C = target_C.z() * Vector3d(aside.x(), aside.y(), 1.0);
+      squares[i] += (at.X_SC * seen_C - truth.X_SC * target_C).squaredNorm() / kTrials;
+    }
+    for (SetupAtRotation& setup : setups) setup.covariance_with_principal.setZero();
+    as_two = *fit_turned_scope(setups, Vector2d(320.0, 240.0));
+  }
+  EXPECT_NEAR(told.target_deviation_mm / std::sqrt(*std::max_element(squares, squares + kTurns)), 1.0, 0.15);
+  EXPECT_NE(as_two.target_deviation_mm, told.target_deviation_mm);
+  // Each by itself is as before.
+  EXPECT_NEAR(as_two.rotation_deviation_rad, told.rotation_deviation_rad, 0.05 * told.rotation_deviation_rad);
+  EXPECT_NEAR(as_two.principal_deviation_px, told.principal_deviation_px, 0.05 * told.principal_deviation_px);
+}
+
 }  // namespace
 }  // namespace perimap
