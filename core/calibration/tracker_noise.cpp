@@ -159,7 +159,7 @@ struct FitCertainty {
 // By how the likelihood bends about its top (the observed information) in the logarithms of both variances and of the
 // time, and in the share that lasts, where that is not at its end.
 FitCertainty certainty_of(const std::vector<TimedPose>& poses, const Errors& errors, const Fit& best, double log_tau,
-                          double lasting) {
+                          double lasting, bool drifts) {
   constexpr double kTauStep = 0.05;
   constexpr double kShareStep = 0.02;
   const bool share_is_free = lasting + kShareStep <= 1.0 && lasting - kShareStep >= 0.0;
@@ -199,9 +199,12 @@ FitCertainty certainty_of(const std::vector<TimedPose>& poses, const Errors& err
         0.5 * (at(1, 1).loss - at(1, -1).loss - at(-1, 1).loss + at(-1, -1).loss) / (4.0 * kTauStep * kShareStep);
   }
   const Eigen::LLT<Bends> llt(H);
-  // No top: as good as nothing is known of the time.
+  // As good as nothing is known of the time.
   constexpr double kOpen = 9.0;
-  if (llt.info() != Eigen::Success) return {2.0 / middle.squares[0], 2.0 / middle.squares[1], kOpen};
+  // No top, or a drift: little more is told of it than variance over time, so that the variance is as open as the time.
+  if (drifts || llt.info() != Eigen::Success) {
+    return {kOpen + 2.0 / middle.squares[0], kOpen + 2.0 / middle.squares[1], kOpen};
+  }
   const Bends C = llt.solve(Bends::Identity());
   return {C(0, 0), C(1, 1), std::min(kOpen, C(2, 2))};
 }
@@ -293,7 +296,7 @@ Expected<MeasuredNoise> measure_tracker_noise(const std::vector<TimedPose>& all)
   noise.rotation_deviation_deg = std::sqrt(3.0 * best.rotation_variance) / kDegree;
   const double of_poses = 2.0 / (3.0 * static_cast<double>(poses.size()));
   FitCertainty certainty{of_poses, of_poses, 0.0};
-  if (lasts) certainty = certainty_of(poses, errors, best, best_log_tau, best_share);
+  if (lasts) certainty = certainty_of(poses, errors, best, best_log_tau, best_share, noise.drifts);
   // A deviation is half as uncertain as its square.
   noise.position_deviation_mm_deviation = 0.5 * std::sqrt(certainty.position_variance) * noise.position_deviation_mm;
   noise.rotation_deviation_deg_deviation = 0.5 * std::sqrt(certainty.rotation_variance) * noise.rotation_deviation_deg;

@@ -326,6 +326,18 @@ TEST(TrackerNoise, IsMeasuredWhiteAndSlow) {
   }
 }
 
+// Of an error that lasts for minutes half a minute shows a small part: more than that must not be said.
+TEST(TrackerNoise, OfADriftSaysThatItIsNotKnown) {
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    Draw draw(seed);
+    const auto noise = measure_tracker_noise(held_still(draw, 1.4, 0.5, 200.0, 30.0));
+    ASSERT_TRUE(noise) << noise.error().message;
+    EXPECT_TRUE(noise->drifts) << seed;
+    EXPECT_LE(std::abs(noise->position_deviation_mm - 1.4), 3.0 * noise->position_deviation_mm_deviation) << seed;
+    EXPECT_LE(std::abs(noise->rotation_deviation_deg - 0.5), 3.0 * noise->rotation_deviation_deg_deviation) << seed;
+  }
+}
+
 TEST(TrackerNoise, RefusesASensorThatMovesAndOneThatRepeatsItself) {
   Draw draw(2);
   auto poses = held_still(draw, 0.3, 0.1, 0.0, 30.0);
