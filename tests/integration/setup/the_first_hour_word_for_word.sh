@@ -34,7 +34,8 @@ settled() { tr -d ' \n' < "$1" | grep -o '"settled_error":{[^}]*' | grep -o "\"$
 common=(--setup-seed "$seed" --size 640x480 --tracker-rate 60)
 quiet simulate board.scene.mcap --scene board "${common[@]}" --seed "$seed" --duration 100 --fps 15 --truth truth.json \
   --landmarks image.csv
-quiet simulate still.scene.mcap --scene still "${common[@]}" --seed "$seed" --duration 75
+# What --moved tells is worked out while it lies there, before the minute that is asked for.
+quiet simulate still.scene.mcap --scene still "${common[@]}" --seed "$seed" --fps 5 --duration 180
 quiet simulate landmarks.scene.mcap --scene landmarks "${common[@]}" --seed "$seed"
 quiet simulate heart.mcap "${common[@]}" --seed "$seed" --duration 36 --fps 15 --untold heart.scene.mcap
 tr -d ' \n' < truth.json | sed 's/.*"registration"://; s/}.*/}/' > registration.truth.json
@@ -121,7 +122,7 @@ while read -r -u 3 command; do
 done 3<<< "$commands"
 echo "$count commands of the guide"
 
-# ---- what they measured
+# ---- what they measured, by the goals of set-ups measured for as long as the guide asks for
 value() { sed -n "s/^$1 = \[*//p" devices.toml | tr -d ']' | sed 's/ *#.*//' | cut -d, -f"${2:-1}"; }
 for i in 1 2 3; do
   near "hand-eye translation $i, mm" "$(value hand_eye_translation_SC_mm $i)" "$(nth truth.json translation_mm $i)" 0.7
@@ -129,7 +130,20 @@ for i in 1 2 3; do
 done
 near "tracker's position noise, mm" "$(value position_deviation_mm)" "$(number truth.json position_deviation_mm)" 0.21
 near "tracker's rotation noise, degrees" "$(value rotation_deviation_deg)" "$(number truth.json rotation_deviation_deg)" 0.075
-near "time offset, ms" "$(value time_offset_ms)" "$(number truth.json time_offset_ms)" 12
+near "time offset, ms" "$(value time_offset_ms)" "$(number truth.json time_offset_ms)" 2
+# Of two quaternions, whichever their signs.
+turned_deg() {
+  awk -v w="$1 $2" 'BEGIN { split(w, q, " "); for (i = 1; i <= 4; ++i) { dot += q[i] * q[i + 4] }
+    dot = dot < 0 ? -dot : dot; sine = dot < 1 ? sqrt(1 - dot * dot) : 0; print 360 / 3.14159265358979 * atan2(sine, dot) }'
+}
+rotation() { for i in 1 2 3 4; do "$@" $i; done | tr '\n' ' '; }
+at_most "hand-eye rotation, degrees" \
+  "$(turned_deg "$(rotation value hand_eye_rotation_SC_wxyz)" "$(rotation nth truth.json rotation_wxyz)")" 0.3
+focal_px() { tr -d '\n' < camera.yaml | sed 's/.*camera_matrix//; s/.*data: *\[//; s/\].*//' | cut -d, -f"$1"; }
+for i in 1 2; do
+  truth_px=$(nth truth.json focal_px $i)
+  near "focal length $i, px" "$(focal_px $((4 * i - 3)))" "$truth_px" "$(awk -v f="$truth_px" 'BEGIN { print 0.003 * f }')"
+done
 grep -q '^registration_translation_IW_mm' devices.toml || fail "no registration"
 
 # ---- what was verified goes with the session
