@@ -13,12 +13,11 @@ struct MotionOffset {
   double deviation_s = 0.0;  // with errors that last, as the errors themselves tell it
 };
 
-// Least squares over errors (hand_eye_error() of each pair, whitened by their covariance) along the sensor's twist, the
-// places of board and camera being as unknown as the offset; all less their mean over `window_s` around each pose.
-// Errors that last longer than the window, such as those of a lens or of a board seen from one side, then weigh
-// nothing, and neither do motions that slow. The deviation is Newey and West's (Econometrica 55(3), 1987), and never
-// less than that of white errors. None where fewer than twenty pairs are used or nothing moves. `pairs` in the order of
-// their times.
+// Least squares over errors (hand_eye_error() of each pair, whitened by their covariance) along the sensor's twist,
+// both less their mean over `window_s` around each pose. Errors that last longer than the window, such as those of a
+// lens or of a board seen from one side, then weigh nothing, and neither do motions that slow. The deviation is Newey
+// and West's (Econometrica 55(3), 1987), and never less than that of white errors. None where fewer than twenty pairs
+// are used or nothing moves. `pairs` in the order of their times.
 [[nodiscard]] std::optional<MotionOffset> offset_by_motion(const std::vector<PosePair>& pairs,
                                                            const std::vector<Vector6d>& errors,
                                                            const std::vector<char>& used,

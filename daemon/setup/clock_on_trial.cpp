@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/calibration/felt_in_sensor.hpp"
 #include "core/calibration/hand_eye_closed_form.hpp"
 #include "core/calibration/variance_of_sum.hpp"
 
@@ -65,6 +64,16 @@ Matrix6d noise_of(const std::vector<TimedPose>& sensor, double interval_s) {
   return sum / std::max(1.0, n) + Matrix6d(floor.asDiagonal());
 }
 
+// How an error of where W is, to the left of the board's pose, is felt in S.
+Matrix6d felt_in_sensor(const Pose& X_WS, const Vector3d& middle_W) {
+  const Matrix3d R_SW = X_WS.R.transpose();
+  Matrix6d felt = Matrix6d::Zero();
+  felt.topLeftCorner<3, 3>() = R_SW;
+  felt.bottomLeftCorner<3, 3>() = -R_SW * cross_matrix(X_WS.t - middle_W);
+  felt.bottomRightCorner<3, 3>() = R_SW;
+  return felt;
+}
+
 // Six rows of each view, of unit variance.
 struct Equations {
   Eigen::MatrixXd others;  // of the board in W, and of the hand-eye
@@ -96,7 +105,8 @@ std::optional<Equations> equations_of(const std::vector<TimedPose>& camera, cons
   e.error.resize(rows);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(6 * i);
-    e.others.middleRows<6>(row) = noise.matrixL().solve(felt_in_sensor(pairs[i].X_WS, pairs.front().X_WS.t));
+    e.others.block<6, 6>(row, 0) = noise.matrixL().solve(felt_in_sensor(pairs[i].X_WS, pairs.front().X_WS.t));
+    e.others.block<6, 6>(row, 6) = noise.matrixL().solve(Matrix6d::Identity());
     e.twist.segment<6>(row) = noise.matrixL().solve(pairs[i].twist_S);
     e.error.segment<6>(row) = noise.matrixL().solve(hand_eye_error(pairs[i], X_SC, X_WB));
   }

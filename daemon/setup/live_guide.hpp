@@ -49,7 +49,8 @@ enum class Turning { kNotWanted, kWanted };
 // far the tracked scope was turned; by the lens, what a hand-eye calibration would leave over by now.
 [[nodiscard]] std::unique_ptr<LiveGuide> board_guide(const BoardWish& wish, std::optional<KnownLens> lens,
                                                      double least_s, Turning turning = Turning::kNotWanted);
-// A tool swung about its tip: how far it was turned, and what a calibration would leave over by now.
+// A tool swung about its tip: how far it was turned, what a calibration would leave over by now, and how well it would
+// know the tip.
 [[nodiscard]] std::unique_ptr<LiveGuide> pivot_guide(double least_s);
 // A sensor that lies still: for how long.
 [[nodiscard]] std::unique_ptr<LiveGuide> still_guide(double least_s);

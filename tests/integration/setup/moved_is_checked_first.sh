@@ -18,7 +18,7 @@ refused() { # CODE ARGUMENTS
   "$perimap" calibrate tracker "$@" > out 2> errors || ended=$?
   [ $ended -eq "$code" ] || fail "calibrate tracker $* ended with $ended: $(cat out errors)"
 }
-printf '%%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 700., 0., 320., 0., 700., 240., 0., 0., 1. ]\n' > camera.yaml
+printf '%%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 700., 0., 320., 0., 700., 240., 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ 0., 0., 0., 0., 0. ]\n' > camera.yaml
 # Poses that are none: whoever looked at them first would say so.
 echo nothing > poses.csv
 refused 1 poses.csv --moved gone.mcap --square-mm 8 --calibration camera.yaml
