@@ -31,8 +31,8 @@ class RepeatedSamples {
   [[nodiscard]] std::uint64_t count() const noexcept { return counted_; }
 
  private:
-  static constexpr std::size_t kCapacity = std::size_t{1} << 15;
-  static constexpr std::size_t kPlaces = std::size_t{1} << 13;
+  static constexpr std::size_t kCapacity = std::size_t{1} << 16;  // 20 s of 3000 samples a second
+  static constexpr std::size_t kPlaces = std::size_t{1} << 16;
   static constexpr std::uint64_t kWord = 8;  // samples by which a place is known
 
   [[nodiscard]] float back(std::uint64_t samples) const noexcept { return ring_[(count_ - samples) % kCapacity]; }

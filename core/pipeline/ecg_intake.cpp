@@ -16,11 +16,13 @@ void EcgIntake::push(const EcgBlock& block) noexcept {
   if (trigger_) return;
   // What does not fit is missing after a restart alone.
   static_cast<void>(heard_.push(block));
+  const std::uint64_t before = repeated_samples();
   hear(without_repeated(block));
+  counters_.ecg_repeated.add(repeated_samples() - before);
 }
 
 void EcgIntake::recall(const EcgBlock& block) noexcept {
-  if (!trigger_) hear(block);
+  if (!trigger_) hear(without_repeated(block));
 }
 
 void EcgIntake::count(const EcgBlock& block) noexcept {
@@ -37,6 +39,7 @@ void EcgIntake::count(const EcgBlock& block) noexcept {
 
 // A lead that gives what it gave seconds before is off.
 EcgBlock EcgIntake::without_repeated(const EcgBlock& block) noexcept {
+  if (settings_.may_loop) return block;
   const auto hear_lead = [&block](RepeatedSamples& lead, std::span<const float> samples, bool off) {
     if (off) lead.interrupt();
     for (std::size_t i = 0; i < samples.size() && !off; ++i) lead.add(samples[i], block.sample_period);
@@ -45,7 +48,6 @@ EcgBlock EcgIntake::without_repeated(const EcgBlock& block) noexcept {
   EcgBlock believed = block;
   believed.lead_off = hear_lead(repeated_[0], block.samples(), block.lead_off);
   believed.second_off = hear_lead(repeated_[1], block.second_samples(), block.second_off);
-  counters_.ecg_repeated.set(repeated_[0].count());
   return believed;
 }
 

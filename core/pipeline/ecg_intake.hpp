@@ -31,6 +31,7 @@ struct EcgClockCells {
 struct EcgIntakeSettings {
   CardiacClockSettings clock;
   std::optional<RTriggerSettings> r_trigger;  // none: the beats are found in the samples
+  bool may_loop = false;                      // a record is played again and again in the patient's place
 };
 
 class EcgIntake {
@@ -60,6 +61,8 @@ class EcgIntake {
   void forget_when_asked() noexcept;
   void count(const EcgBlock& block) noexcept;
   [[nodiscard]] EcgBlock without_repeated(const EcgBlock& block) noexcept;
+  // Of both leads, since the first block.
+  [[nodiscard]] std::uint64_t repeated_samples() const noexcept { return repeated_[0].count() + repeated_[1].count(); }
   void hear(const EcgBlock& block) noexcept;
   void tell_of_leads(const EcgBlock& block) noexcept;
   void publish() noexcept;

@@ -79,9 +79,9 @@ Pipeline::Parts::Parts(const PipelineSettings& of, FrameTrace* kept_trace)
       trace(kept_trace),
       slots(static_cast<std::size_t>(settings.features.maximum)),
       cells(static_cast<std::size_t>(settings.workers)),
-      entrance(settings.camera.width, settings.camera.height, {settings.clock, settings.r_trigger},
-               {settings.respiration.search.shortest_period, settings.respiration.search.longest_period}, counters,
-               trace),
+      entrance(
+          settings.camera.width, settings.camera.height, {settings.clock, settings.r_trigger, settings.ecg_may_loop},
+          {settings.respiration.search.shortest_period, settings.respiration.search.longest_period}, counters, trace),
       team(settings.workers),
       finder(settings, counters),
       surface_maker(settings.estimator.layout, slots.size(), kMeshVertices, settings.lockstep),

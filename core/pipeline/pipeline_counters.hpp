@@ -49,7 +49,7 @@ struct PipelineCounters {
   Counter ecg_samples;
   Counter ecg_lead_off;  // samples that mean nothing: the device said so, or the line was flat for a second
   Counter ecg_dropped;   // gaps in the device's sequence
-  Counter ecg_repeated;  // samples of the first lead that came before, see RepeatedSamples
+  Counter ecg_repeated;  // samples of either lead that came before, see RepeatedSamples
   LatencyHistogram ecg_delay;
   Counter last_ecg_ns;
   Counter last_good_ecg_ns;

@@ -46,6 +46,7 @@ struct PipelineSettings {
   std::optional<TurnedScope> turned_scope;
   bool watch_scope = false;        // without that: look in the pictures whether the scope is turned or zoomed meanwhile
   bool pictures_may_loop = false;  // the camera is a video that is played in a loop
+  bool ecg_may_loop = false;       // likewise the ECG a record
   CardiacClockSettings clock;
   std::optional<RTriggerSettings> r_trigger;  // R peaks come from a trigger, not from the ECG's samples
   RespirationSettings respiration;

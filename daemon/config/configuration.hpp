@@ -42,11 +42,13 @@ struct CameraConfiguration {
   double gain = -1.0;                                 // -1: as it is
   Duration delay{0};                                  // of the picture when it is stamped
   bool loop = true;                                   // a video begins anew at its end
+  bool repeats_allowed = false;                       // pictures may come again within seconds
   std::optional<std::filesystem::path> calibration;   // none: the recording's own attachment
   std::optional<std::filesystem::path> turned_scope;  // of a scope that is turned in its camera head
   std::optional<std::filesystem::path> playback;      // a recording whose frames stand in for a camera
   double playback_start_s = 0.0;                      // CLOCK_MONOTONIC; 0: when the daemon starts
 
+  [[nodiscard]] bool plays_video_in_loop() const { return device && device->starts_with("video:") && loop; }
   bool operator==(const CameraConfiguration&) const = default;
 };
 
@@ -102,6 +104,7 @@ struct EcgConfiguration {
   double can_sample_rate_hz = 360.0;
   int can_identifier = 0x2E0;
   bool can_extended = false;
+  bool repeats_allowed = false;               // samples may come again within seconds
   bool r_trigger = false;                     // R peaks come from a trigger line, not from the samples
   std::optional<std::string> r_trigger_port;  // path of the serial port with that line
   ModemLine r_trigger_line = ModemLine::kCarrierDetect;

@@ -73,6 +73,9 @@ void add_sources(std::vector<ConfigurationKey>& keys) {
       .duration("delay_ms", std::chrono::milliseconds(1), -100, 1000, PERIMAP_MEMBER(camera.delay),
                 "how old the picture is when the camera's driver stamps it: scope processor, capture card")
       .flag("loop", PERIMAP_MEMBER(camera.loop), "a video begins anew at its end")
+      .flag("repeats_allowed", PERIMAP_MEMBER(camera.repeats_allowed),
+            "for trials: pictures may come again within 20 s, as of a video that is played in a loop in the camera's "
+            "place; a camera that has hung and gives its memory is not noticed then")
       .file("calibration", PERIMAP_MEMBER(camera.calibration),
             "calibration as OpenCV writes it, from this file's folder; none: the recording's own")
       .file("turned_scope", PERIMAP_MEMBER(camera.turned_scope),
@@ -209,6 +212,9 @@ void add_ecg(std::vector<ConfigurationKey>& keys) {
       .integer("can_identifier", 0, 0x1FFFFFFF, PERIMAP_MEMBER(ecg.can_identifier),
                "identifier of the frames of config/perimap_ecg.dbc")
       .flag("can_extended", PERIMAP_MEMBER(ecg.can_extended), "the identifier has 29 bits")
+      .flag("repeats_allowed", PERIMAP_MEMBER(ecg.repeats_allowed),
+            "for trials: samples may come again within 20 s, as of a record that is played in a loop in the patient's "
+            "place; a device that has hung and gives its memory is not noticed then")
       .flag("r_trigger", PERIMAP_MEMBER(ecg.r_trigger),
             "R peaks come from a monitor's trigger line; samples are then not looked at")
       .optional_text("r_trigger_port", "an absolute path of a serial port", &is_path,

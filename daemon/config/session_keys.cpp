@@ -15,13 +15,13 @@ struct SessionSection {
 
 constexpr std::array<SessionSection, 7> kSessionSections{
     {{"", {"version"}, ""},
-     {"camera", {"width", "height", "frame_rate_hz", "exposure_ms", "gain"}, ""},
+     {"camera", {"width", "height", "frame_rate_hz", "exposure_ms", "gain", "repeats_allowed"}, ""},
      {"tracker",
       {"position_deviation_mm", "rotation_deviation_deg", "error_correlation_s", "time_offset_ms",
        "maximum_extrapolation_ms", "hand_eye_translation_SC_mm", "hand_eye_rotation_SC_wxyz", "sensor", "pointer",
        "second_sensor", "patient_tool"},
       ""},
-     {"ecg", {"r_trigger", "r_trigger_delay_ms", "r_trigger_deviation_ms"}, ""},
+     {"ecg", {"repeats_allowed", "r_trigger", "r_trigger_delay_ms", "r_trigger_deviation_ms"}, ""},
      {"phase", {}, ""},
      {"respiration", {}, "device_channel"},
      {"estimation", {}, ""}}};

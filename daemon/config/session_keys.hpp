@@ -6,8 +6,9 @@
 namespace perimap {
 
 // Whether a recording may bring the key along: noise and place of what was seen and heard (camera, tracker, hand-eye, R
-// trigger), whose poses they are (sensor, pointer), rhythm, breathing and estimator. Not those that name files and
-// devices, or that a device's driver has applied to its samples before they were recorded.
+// trigger), whether it may come again (of what was played in a loop), whose poses they are (sensor, pointer), rhythm,
+// breathing and estimator. Not those that name files and devices, or that a device's driver has applied to its samples
+// before they were recorded.
 [[nodiscard]] bool describes_session(const ConfigurationKey& key);
 
 }  // namespace perimap

@@ -76,7 +76,8 @@ PipelineSettings pipeline_settings(const Configuration& c, const CameraModel& ca
   PipelineSettings s;
   s.camera = camera;
   s.watch_scope = true;
-  s.pictures_may_loop = c.camera.device && c.camera.device->starts_with("video:") && c.camera.loop;
+  s.pictures_may_loop = c.camera.repeats_allowed || c.camera.plays_video_in_loop();
+  s.ecg_may_loop = c.ecg.repeats_allowed;
   const double(&t)[3] = c.tracker.translation_SC_mm;
   s.pose.X_SC = pose_from_wxyz(Vector3d(t[0], t[1], t[2]), c.tracker.rotation_SC_wxyz);
   s.pose.position_deviation_mm = c.tracker.position_deviation_mm / std::numbers::sqrt3;

@@ -34,7 +34,10 @@ SensorRecordingFacts recording_facts(const Configuration& configuration, const s
   facts.readers = configuration.recording.group.value_or("");
   facts.utc_minus_monotonic = utc_minus_monotonic();
   if (camera) facts.calibration = format_calibration(*camera);
-  facts.configuration = session_toml(configuration);
+  Configuration session = configuration;
+  // Of the recording nobody can tell any more that it was a video.
+  session.camera.repeats_allowed |= configuration.camera.plays_video_in_loop();
+  facts.configuration = session_toml(session);
   facts.r_trigger = configuration.ecg.r_trigger;
   for (const std::string& tool : tracked_tool_names(configuration.tracker)) {
     facts.tools.push_back(tool.empty() ? tool : std::string(channels::kTrackedTools) + tool);

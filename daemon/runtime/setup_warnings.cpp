@@ -34,6 +34,17 @@ void warn_of_tracker(const TrackerConfiguration& tracker, bool has_scope, std::v
   }
 }
 
+void warn_of_repeats(const Configuration& configuration, std::vector<std::string>& warnings) {
+  if (configuration.camera.device && configuration.camera.repeats_allowed) {
+    warnings.emplace_back(
+        "camera.repeats_allowed: a camera that has hung and gives its memory is not noticed; for trials alone");
+  }
+  if (configuration.ecg.protocol != EcgConfiguration::Protocol::kNone && configuration.ecg.repeats_allowed) {
+    warnings.emplace_back(
+        "ecg.repeats_allowed: an ECG device that has hung and gives its memory is not noticed; for trials alone");
+  }
+}
+
 void warn_of_lens(const CameraModel& c, std::vector<std::string>& warnings) {
   // By more than a fifth of the picture from its middle.
   const double right = (c.cx - 0.5 * (c.width - 1)) / c.width;
@@ -62,6 +73,7 @@ std::vector<std::string> setup_warnings(const Configuration& configuration, cons
   std::vector<std::string> warnings;
   if (configuration.replay.recording) return warnings;
   warn_of_tracker(configuration.tracker, configuration.camera.turned_scope.has_value(), warnings);
+  warn_of_repeats(configuration, warnings);
   if (camera) warn_of_lens(*camera, warnings);
   return warnings;
 }

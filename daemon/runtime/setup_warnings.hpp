@@ -1,4 +1,5 @@
-// What a sound configuration says of the set-up that is hardly meant: defaults with real devices, an odd lens.
+// What a sound configuration says of the set-up that is hardly meant: defaults with real devices, what is for
+// trials alone, an odd lens.
 #pragma once
 
 #include <optional>

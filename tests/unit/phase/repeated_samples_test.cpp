@@ -77,6 +77,24 @@ TEST(RepeatedSamples, ThatWereHeardLongerAgoAreNotKnown) {
   EXPECT_EQ(heard(repeated, last(before, 30.0)), 0) << "30 s ago";
 }
 
+TEST(RepeatedSamples, AreKnownForTwentySecondsAtTwoThousandSamplesASecond) {
+  RepeatedSamples repeated;
+  std::mt19937 generator(3);
+  std::normal_distribution<double> noise(0.0, 0.2);
+  std::vector<float> mV(19 * 2000);
+  for (float& value : mV) value = static_cast<float>(0.005 * std::round(noise(generator) / 0.005));
+  const auto told = [&](std::size_t samples) {
+    int count = 0;
+    for (std::size_t i = 0; i < samples; ++i) {
+      repeated.add(mV[i], std::chrono::microseconds(500));
+      count += repeated.told() ? 1 : 0;
+    }
+    return count;
+  };
+  ASSERT_EQ(told(mV.size()), 0);
+  EXPECT_GT(told(3 * 2000), 1900) << "two seconds of three, from 19 s ago";
+}
+
 TEST(RepeatedSamples, AreNoneAcrossWhatIsMissingOrIsNoNumber) {
   RepeatedSamples repeated;
   const std::vector<float> before = lead(5.0);

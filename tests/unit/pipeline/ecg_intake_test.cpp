@@ -138,6 +138,57 @@ TEST_F(Intake, ALeadThatGivesItsLastSecondAgainAndAgainIsSaidToBeRepeatedAndIsNo
   EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
 }
 
+TEST_F(Intake, ASecondLeadThatIsRepeatedIsCountedToo) {
+  const auto last_second = [](Instant at) {
+    return at < kMidCycle ? at : kMidCycle - milliseconds(1000) + (at - kMidCycle) % milliseconds(1000);
+  };
+  send(kMidCycle + milliseconds(2000), [&](EcgBlock& block, std::size_t i, Instant at) {
+    block.has_second = true;
+    block.mV[i] = lead_mV(at);
+    block.second_mV[i] = -0.5F * lead_mV(last_second(at));
+  });
+  EXPECT_EQ(signals(), (Signals{EcgSignal::kGood, EcgSignal::kRepeated}));
+  EXPECT_GE(counters->ecg_repeated.get(), 500U);
+  EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked) << "by the first";
+}
+
+TEST_F(Intake, ARecordThatIsPlayedInALoopIsHeardWhereThatWasSaid) {
+  EcgIntakeSettings settings;
+  settings.may_loop = true;
+  intake = std::make_unique<EcgIntake>(settings, *cells, *counters);
+  hear(kMidCycle + milliseconds(20'000),
+       [](Instant at) { return lead_mV(Instant((at.time_since_epoch()) % (10 * kCycle))); });
+  EXPECT_EQ(signals(), (Signals{EcgSignal::kGood, std::nullopt}));
+  EXPECT_EQ(counters->ecg_repeated.get(), 0U);
+  EXPECT_EQ(clock().as_of(t).at(t).state, PhaseState::kLocked);
+}
+
+// Of a device that had hung before the crash.
+TEST_F(Intake, WhatARunBeforeHeardAgainAndAgainTeachesNoBeats) {
+  const auto last_second = [](Instant at) {
+    return lead_mV(at < kMidCycle ? at : kMidCycle - milliseconds(1000) + (at - kMidCycle) % milliseconds(1000));
+  };
+  const auto recall = [&](Instant until) {
+    for (; t < until;) {
+      EcgBlock block;
+      block.sample_period = kPeriod;
+      block.first_sample_time = t;
+      block.count = kBlock;
+      for (std::size_t i = 0; i < kBlock; ++i, t += kPeriod) block.mV[i] = last_second(t);
+      intake->recall(block);
+    }
+  };
+  recall(kMidCycle);
+  const std::uint64_t beats = clock().beats();
+  ASSERT_GT(beats, 15U);
+  recall(kMidCycle + milliseconds(20'000));
+  EXPECT_LE(clock().beats(), beats + 3) << "before it is known that they are repeated";
+  EXPECT_EQ(counters->ecg_repeated.get(), 0U) << "what was heard before is not counted again";
+  // And what comes now is known to be that, too.
+  hear(t + milliseconds(2000), last_second);
+  EXPECT_EQ(signals(), (Signals{EcgSignal::kRepeated, std::nullopt}));
+}
+
 TEST_F(Intake, AShortStretchOfMissingSamplesInterruptsNothing) {
   hear(kMidCycle, lead_mV);
   t += milliseconds(20);

@@ -62,6 +62,28 @@ TEST(RecordedConfiguration, IsWhatDescribesTheSessionAndTheCamerasCalibration) {
   EXPECT_EQ(basis->configuration, expected);
 }
 
+TEST(RecordedConfiguration, OfAVideoThatWasPlayedInALoopSaysThatItsPicturesMayComeAgain) {
+  const auto pipeline_of = [](const Configuration& live) {
+    const BegunRecording recording;
+    record(recording, recording_facts(live, camera(), "test"));
+    const auto setup = prepare_replay(recording.file(), std::nullopt, ReadMode::kStrict);
+    EXPECT_TRUE(setup) << setup.error().error.message;
+    return setup ? setup->pipeline : PipelineSettings{};
+  };
+  Configuration live;
+  live.camera.device = "v4l2:/dev/video0";
+  EXPECT_FALSE(pipeline_of(live).pictures_may_loop);
+  EXPECT_FALSE(pipeline_of(live).ecg_may_loop);
+  live.camera.repeats_allowed = live.ecg.repeats_allowed = true;
+  EXPECT_TRUE(pipeline_of(live).pictures_may_loop);
+  EXPECT_TRUE(pipeline_of(live).ecg_may_loop);
+  live = {};
+  live.camera.device = "video:/tmp/organ.mp4";
+  EXPECT_TRUE(pipeline_of(live).pictures_may_loop);
+  live.camera.loop = false;
+  EXPECT_FALSE(pipeline_of(live).pictures_may_loop);
+}
+
 TEST(RecordedConfiguration, AHandEyeOfAnotherSensorThanWasRecordedIsRefused) {
   Configuration live;
   live.tracker.protocol = TrackerConfiguration::Protocol::kNdi;

@@ -39,6 +39,16 @@ TEST(SetupWarnings, SayNothingOfAReplayAndWithoutATracker) {
   EXPECT_THAT(setup_warnings(configuration, lens()), IsEmpty());
 }
 
+TEST(SetupWarnings, NameWhatIsForTrialsAlone) {
+  Configuration configuration = measured();
+  configuration.camera.device = "v4l2:/dev/video0";
+  configuration.ecg.protocol = EcgConfiguration::Protocol::kBitalino;
+  EXPECT_THAT(setup_warnings(configuration, lens()), IsEmpty());
+  configuration.camera.repeats_allowed = configuration.ecg.repeats_allowed = true;
+  EXPECT_THAT(setup_warnings(configuration, lens()),
+              ElementsAre(HasSubstr("camera.repeats_allowed"), HasSubstr("ecg.repeats_allowed")));
+}
+
 TEST(SetupWarnings, NameAnIdentityHandEye) {
   Configuration configuration = measured();
   configuration.tracker.translation_SC_mm[2] = 0.0;
