@@ -405,6 +405,8 @@ inline const char* describe(perimap_SurfaceReason reason) noexcept {
       return "hand-eye, lens or time offset are doubted";
     case perimap_SURFACE_REASON_NOTHING_CONVERGED:
       return "no feature has converged yet";
+    case perimap_SURFACE_REASON_SETUP_UNCERTAIN:
+      return "what is seen has not confirmed hand-eye, lens and time offset yet";
     case perimap_SURFACE_REASON_SCOPE_UNREAD:
       return "how the scope is turned in its camera head cannot be read";
     case perimap_SURFACE_REASON_SCOPE_CHANGED:

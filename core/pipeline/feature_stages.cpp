@@ -258,6 +258,7 @@ void describe(const FeatureSlot& slot, Instant now, const FrameDoubts& doubts, F
   snapshot.first_observed = slot.first_observed;
   snapshot.first_observed_px = slot.first_observed_px;
   snapshot.largest_deviation_mm = slot.largest_deviation_mm;
+  snapshot.held_back = slot.converged && !is_certain(slot, doubts);
   if (slot.health.state() == HealthState::kInconsistent) {
     snapshot.state = FeatureState::kInconsistent;
     snapshot.reason = FeatureReason::kInnovationsHigh;

@@ -22,10 +22,13 @@ struct FrameDoubts {
   DisplacedCause cause = DisplacedCause::kUnknown;
   bool settling = false;  // the map was moved with the organ, and has not converged there since
   bool unproven = false;  // nothing has told since it was out of sight, or moved, that it is where the map has it
-  double setup_variance_mm2 = 0.0;  // per axis, of what the set-up may be off by
+  double setup_widening_mm = 0.0;  // what the set-up may put a position off by, RMS of the 3-D norm
   // What a feature's own largest deviation may be for it to be called converged: below the configured bound by what the
   // set-up may be off by; nothing is while no window has told of the set-up.
   double converged_within_mm = std::numeric_limits<double>::infinity();
+
+  // Per axis, by the set-up: in which direction it puts a position off is not known.
+  [[nodiscard]] double setup_variance_mm2() const noexcept { return setup_widening_mm * setup_widening_mm / 3.0; }
 
   // What is doubted in either.
   void add(const FrameDoubts& other) noexcept {
@@ -39,7 +42,7 @@ struct FrameDoubts {
     displaced |= other.displaced;
     settling |= other.settling;
     unproven |= other.unproven;
-    setup_variance_mm2 = std::max(setup_variance_mm2, other.setup_variance_mm2);
+    setup_widening_mm = std::max(setup_widening_mm, other.setup_widening_mm);
     converged_within_mm = std::min(converged_within_mm, other.converged_within_mm);
   }
 };

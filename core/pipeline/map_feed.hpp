@@ -28,6 +28,7 @@ class MapFeed {
     std::array<Entry, kSlotsABatch> entries{};
     RespirationMemory respiration;
     LawMemory law;
+    SetupMemory setup;
   };
 
   // Mapper: the batch to fill; null while the reader has it.

@@ -6,12 +6,13 @@
 
 namespace perimap {
 
-void MapKeeping::fill_feed(const Breathing& breathing, const HeartPhase& heart, std::uint64_t maps_ended) noexcept {
+void MapKeeping::fill_feed(const Known& known, std::uint64_t maps_ended) noexcept {
   MapFeed::Batch* batch = feed_.back();
   if (batch == nullptr) return;
   batch->maps_ended = maps_ended;
-  batch->respiration = breathing.memory();
-  batch->law = heart.law_memory();
+  batch->respiration = known.breathing.memory();
+  batch->law = known.heart.law_memory();
+  batch->setup = known.setup.memory();
   for (MapFeed::Entry& entry : batch->entries) {
     entry.slot = next_fed_slot_;
     next_fed_slot_ = (next_fed_slot_ + 1) % slots_.size();
@@ -21,7 +22,7 @@ void MapKeeping::fill_feed(const Breathing& breathing, const HeartPhase& heart, 
     remember(slot, entry.feature);
     bank_.get(static_cast<int>(entry.slot), entry.feature.estimate);
     add_lasting_errors(slot, entry.feature.estimate.P);
-    entry.feature.breathing = breathing.begun();
+    entry.feature.breathing = known.breathing.begun();
   }
   feed_.hand_over();
 }

@@ -12,6 +12,7 @@
 #include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/map_feed.hpp"
 #include "core/pipeline/map_memory.hpp"
+#include "core/setup_watch/setup_belief.hpp"
 
 namespace perimap {
 
@@ -23,10 +24,17 @@ class MapKeeping {
   MapKeeping(std::span<FeatureSlot> slots, MapBank& bank, std::span<FeatureGroup> groups) noexcept
       : slots_(slots), bank_(bank), groups_(groups) {}
 
-  // Whoever keeps the mapped features, the breathing and the law reads them here.
+  // What goes with the features.
+  struct Known {
+    const Breathing& breathing;
+    const HeartPhase& heart;
+    const SetupBelief& setup;
+  };
+
+  // Whoever keeps the mapped features, the breathing, the law and the belief in the set-up reads them here.
   [[nodiscard]] MapFeed& feed() noexcept { return feed_; }
   // Once a frame, before the workers learn from it: the next few slots, where the reader has done with the last.
-  void fill_feed(const Breathing& breathing, const HeartPhase& heart, std::uint64_t maps_ended) noexcept;
+  void fill_feed(const Known& known, std::uint64_t maps_ended) noexcept;
 
   // Before the first frame: takes the features of an earlier run, as many as there is room for and whose estimates are
   // of this layout. `breathing` is recalled. Returns the largest id taken; 0: none.

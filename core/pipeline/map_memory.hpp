@@ -8,6 +8,7 @@
 #include "core/phase/law_memory.hpp"
 #include "core/phase/respiration_memory.hpp"
 #include "core/sensors/ecg_block.hpp"
+#include "core/setup_watch/setup_memory.hpp"
 #include "core/time/instant.hpp"
 #include "core/vision/patch_template.hpp"
 #include "core/vision/patch_tracker.hpp"
@@ -33,6 +34,7 @@ struct MapMemory {
   std::vector<FeatureMemory> features;
   RespirationMemory respiration;
   LawMemory law;
+  SetupMemory setup;
   // The last seconds of the ECG. Heard again they teach detector, classes and clock what they knew.
   std::vector<EcgBlock> ecg;
   // Of the last release, from which the frame times go on.

@@ -93,13 +93,11 @@ const FrameRecord& Mapper::begin_frame(const FrameStamp& stamp, const GreyImage&
   job_.before = before;
   job_.frame = &frame;
   job_.doubts = trust_.doubts();
-  job_.doubts.setup_doubted = watcher_.belief().doubted();
+  watcher_.tell(job_.doubts, settings_.estimator.converged_deviation_mm);
   job_.doubts.displaced = organ_.displaced();
   job_.doubts.cause = organ_.cause();
   job_.doubts.settling = organ_.settling();
   job_.doubts.unproven = organ_.unproven();
-  job_.doubts.setup_variance_mm2 = watcher_.belief().variance_mm2();
-  job_.doubts.converged_within_mm = watcher_.within_mm(settings_.estimator.converged_deviation_mm);
   job_.starts_fail_alike = starts_fail_alike(slots_);
   job_.surface_there = surface_.there();
   job_.law = phases_.heart().clock().law_belief();
@@ -185,8 +183,8 @@ void Mapper::hand_on(const FrameRecord& frame, const GreyImage& image, const Col
   watcher_.keep(*history_, slots_, bank_);
   intake_.offer(frame, image, colour, room());
   trust_.offer(frame, image);
-  keeping_.fill_feed(phases_.breathing(), phases_.heart(), counters_.maps_ended());
-  surface_.on_frame(frame, phases_.heart().clock().law().law, job_.doubts.setup_variance_mm2);
+  keeping_.fill_feed({phases_.breathing(), phases_.heart(), watcher_.belief()}, counters_.maps_ended());
+  surface_.on_frame(frame, phases_.heart().clock().law().law, job_.doubts);
   counters_.frames.add();
   if (!frame.pose.valid()) counters_.frames_without_pose.add();
   if (frame.pose.valid() && !frame.measurable) counters_.frames_without_phase.add();
@@ -317,10 +315,12 @@ void Mapper::move_map_with(const RestingOrgan& organ) noexcept {
 
 void Mapper::recall(const MapMemory& memory, Instant now) {
   phases_.recall(memory, now);
-  if (!memory.features.empty()) watcher_.recall();
+  watcher_.recall(memory.setup);
   const std::uint32_t largest_id = keeping_.recall(memory.features, phases_.breathing());
   if (largest_id > 0) intake_.go_on_from(largest_id, now - memory.last_capture);
-  stages_.hand_over_recalled(memory.last_capture);
+  FrameDoubts doubts;
+  watcher_.tell(doubts, settings_.estimator.converged_deviation_mm);
+  stages_.hand_over_recalled(memory.last_capture, doubts);
   phases_.publish();
 }
 

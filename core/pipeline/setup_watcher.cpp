@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <utility>
 
 #include "core/pipeline/match_covariance.hpp"
@@ -18,9 +17,6 @@ constexpr Duration kRoundEvery = std::chrono::seconds(3);
 constexpr Duration kRoundTakes = std::chrono::milliseconds(700);
 // Where there is too little for a round yet, until it is looked for again.
 constexpr Duration kLookAgain = std::chrono::milliseconds(300);
-// From the first frame that is told. No round is waited for that has told nothing by then, for want of features, frames
-// or processor time, because the scope rests or nothing explains its window.
-constexpr Duration kWaitsForRound = std::chrono::seconds(10);
 // What follows is evidence, and counted: equations against unknowns. The window takes a frame in 50 ms, so that it is
 // the same at every frame rate from 20 on.
 constexpr std::size_t kFewestFrames = 80;  // told ones, before a round
@@ -48,8 +44,6 @@ void SetupWatcher::keep(const FrameHistory& history, std::span<const FeatureSlot
   window_.tell(history);
   window_.add(frame, slots);
   if (!first_capture_) first_capture_ = frame.stamp.capture;
-  if (!first_told_ && window_.told() > 0) first_told_ = frame.stamp.capture;
-  if (first_told_ && frame.stamp.capture - *first_told_ > kWaitsForRound) asked_ = true;
   if (hand_over_.under_way() || frame.index < next_round_at_) return;
   next_round_at_ = frame.index + frame.rate.frames(kLookAgain);
   // What was judged already tells nothing new: a tool that is hidden, a phase that is lost.
@@ -70,8 +64,6 @@ void SetupWatcher::adopt(const FrameRecord& frame) noexcept {
   if (frame.index < adopted_at_ || !hand_over_.finish()) return;
   if (std::exchange(discarded_, false)) return;
   belief_.add(verdict_, frame.stamp.capture - *first_capture_);
-  // A window of a scope at rest has no matches in its verdict.
-  if (verdict_.state != SetupState::kUnknown && verdict_.matches > 0) asked_ = true;
   status_.write(belief_);
 }
 
@@ -146,11 +138,15 @@ void SetupWatcher::copy_window(const MapBank& bank, const FrameRate& rate) noexc
   }
 }
 
-double SetupWatcher::within_mm(double bound_mm) const noexcept {
-  if (!asked_) return -1.0;
-  // All of it may lie in the direction in which the feature is least certain.
-  const double widening_mm = belief_.widening_mm();
-  return std::sqrt(std::max(0.0, bound_mm * bound_mm - widening_mm * widening_mm));
+void SetupWatcher::recall(const SetupMemory& memory) noexcept {
+  belief_.recall(memory);
+  status_.write(belief_);
+}
+
+void SetupWatcher::tell(FrameDoubts& doubts, double bound_mm) const noexcept {
+  doubts.setup_doubted = belief_.doubted();
+  doubts.setup_widening_mm = belief_.widening_mm();
+  doubts.converged_within_mm = belief_.within_mm(bound_mm);
 }
 
 void SetupWatcher::serve() noexcept {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/frame_doubts.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/match_window.hpp"
@@ -17,6 +18,7 @@
 #include "core/realtime/background_round.hpp"
 #include "core/realtime/triple_buffer.hpp"
 #include "core/setup_watch/setup_belief.hpp"
+#include "core/setup_watch/setup_memory.hpp"
 #include "core/setup_watch/watched_window.hpp"
 
 namespace perimap {
@@ -40,8 +42,8 @@ class SetupWatcher {
   // being judged was told by the old ones and counts for nothing.
   void retell_phases(const CardiacClock& clock) noexcept;
   void retell_respiration(const RespiratoryClock& respiration) noexcept;
-  // Mapper: the map is that of an earlier run, and is believed as it was in that.
-  void recall() noexcept { asked_ = true; }
+  // Before the first frame: the set-up is that of an earlier run, and is believed as it was in that.
+  void recall(const SetupMemory& memory) noexcept;
   // Mapper: another patient. What is believed of the set-up stays.
   void begin_window_anew() noexcept;
   // Poses from that frame on were mistaken.
@@ -49,10 +51,8 @@ class SetupWatcher {
 
   // Mapper: what is believed as of the last adopt().
   [[nodiscard]] const SetupBelief& belief() const noexcept { return belief_; }
-  // Mapper: what a feature's own largest deviation may be, so that with what the set-up may be off by it is within
-  // `bound_mm`. Below zero, so that none is, until a round has told of the set-up or was waited for in
-  // vain.
-  [[nodiscard]] double within_mm(double bound_mm) const noexcept;
+  // Mapper: the same as a frame's doubts have it. `bound_mm`: on a converged feature's largest deviation.
+  void tell(FrameDoubts& doubts, double bound_mm) const noexcept;
   // Status thread: the same, valid until the next call.
   [[nodiscard]] const SetupBelief& status_belief() noexcept;
 
@@ -94,12 +94,10 @@ class SetupWatcher {
   SetupBelief belief_;
   TripleBuffer<SetupBelief> status_;
   std::optional<Instant> first_capture_;
-  std::vector<Seen> seen_;             // by slot
-  std::vector<std::size_t> chosen_;    // slots
-  bool discarded_ = false;             // the round that is under way
-  bool asked_ = false;                 // of the set-up, once or in vain
-  std::optional<Instant> first_told_;  // the capture with which the window first had a frame whose cycle had ended
-  std::uint64_t judged_frame_ = 0;     // the newest that the last round knew all of
+  std::vector<Seen> seen_;           // by slot
+  std::vector<std::size_t> chosen_;  // slots
+  bool discarded_ = false;           // the round that is under way
+  std::uint64_t judged_frame_ = 0;   // the newest that the last round knew all of
   std::uint64_t adopted_at_ = 0;
   std::uint64_t next_round_at_ = 0;
 

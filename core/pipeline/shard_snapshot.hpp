@@ -41,8 +41,9 @@ struct FeatureSnapshot {
   Instant first_observed;
   Vector2d first_observed_px = Vector2d::Zero();
   double largest_deviation_mm = 0.0;
-  bool expected = false;  // it was looked for, and the map has it in the image
-  bool in_sight = false;  // it agreed with the map in that frame or shortly before
+  bool held_back = false;  // certain of itself, but not with what the set-up may be off by
+  bool expected = false;   // it was looked for, and the map has it in the image
+  bool in_sight = false;   // it agreed with the map in that frame or shortly before
 };
 
 struct ShardSnapshot {

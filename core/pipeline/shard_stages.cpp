@@ -101,7 +101,7 @@ void ShardStages::hand_over_nothing() noexcept {
   }
 }
 
-void ShardStages::hand_over_recalled(Instant last_capture) noexcept {
+void ShardStages::hand_over_recalled(Instant last_capture, const FrameDoubts& doubts) noexcept {
   for (int worker = 0; worker < team_.size(); ++worker) {
     ShardCells& cells = cells_[static_cast<std::size_t>(worker)];
     for (TripleBuffer<ShardSnapshot>* cell : {&cells.publisher, &cells.model}) {
@@ -110,12 +110,13 @@ void ShardStages::hand_over_recalled(Instant last_capture) noexcept {
       snapshot.recalled = true;
       snapshot.capture = last_capture;
       snapshot.instants.fill(Instant{});
+      snapshot.doubts = doubts;
       snapshot.features.clear();
       for_shard(worker, [&](FeatureGroup& group) {
         for (std::size_t lane = 0; lane < group.slots().size(); ++lane) {
           if (group.slots()[lane].state != SlotState::kMapped) continue;
           FeatureSnapshot& feature = snapshot.features.emplace_back();
-          describe(group.slots()[lane], last_capture, FrameDoubts{}, feature);
+          describe(group.slots()[lane], last_capture, doubts, feature);
           bank_.get(group.feature(lane), feature.x);
         }
       });

@@ -10,6 +10,7 @@
 #include "core/pipeline/batch_starter.hpp"
 #include "core/pipeline/feature_group.hpp"
 #include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/frame_doubts.hpp"
 #include "core/pipeline/frame_job.hpp"
 #include "core/pipeline/frame_trace.hpp"
 #include "core/pipeline/map_bank.hpp"
@@ -63,8 +64,8 @@ class ShardStages {
 
   // In the workers' place, while they are at rest; they see it by their next start. That nothing is known:
   void hand_over_nothing() noexcept;
-  // What an earlier run had mapped until then:
-  void hand_over_recalled(Instant last_capture) noexcept;
+  // What an earlier run had mapped until then, with what is doubted of it:
+  void hand_over_recalled(Instant last_capture, const FrameDoubts& doubts) noexcept;
 
  private:
   template <void (ShardStages::*Stage)(int) noexcept, FramePart part>

@@ -101,7 +101,7 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   const BasesAbout about = bases_about(settings_.layout, phase, breath);
   const Basis b_breath_rate = breath_rate(settings_.layout, breath.phase_rad);
   const Matrix3d of_breath = breath.deviation_mm * breath.deviation_mm * Matrix3d::Identity();
-  const Matrix3d of_setup = footing.doubts.setup_variance_mm2 * Matrix3d::Identity();
+  const Matrix3d of_setup = footing.doubts.setup_variance_mm2() * Matrix3d::Identity();
   const Basis b_rate = basis_rate(settings_.layout, phase.phase_rad);
   sample_.features.clear();
   for (const auto& [snapshot, covered] : order_) {

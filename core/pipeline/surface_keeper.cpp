@@ -24,7 +24,10 @@ SurfaceKeeper::SurfaceKeeper(std::span<FeatureSlot> slots, MapBank& bank, Surfac
       counters_(counters),
       gathered_(slots.size()) {}
 
-void SurfaceKeeper::on_frame(const FrameRecord& frame, PhaseLaw law, double setup_variance_mm2) noexcept {
+void SurfaceKeeper::on_frame(const FrameRecord& frame, PhaseLaw law, const FrameDoubts& doubts) noexcept {
+  // What was made of features that are no longer called converged is void at once.
+  if (doubts.setup_doubted && !setup_doubted_) begin_again();
+  setup_doubted_ = doubts.setup_doubted;
   if (asked_ && frame.index >= adopt_at_) {
     const bool due = frame.index == adopt_at_;
     asked_ = !maker_.adopt();
@@ -32,12 +35,12 @@ void SurfaceKeeper::on_frame(const FrameRecord& frame, PhaseLaw law, double setu
     if (asked_ && due) counters_.adoptions_late.add();
   }
   if (frame.pose.valid()) camera_.add(frame.pose.X_WC.t, frame.rate.frames(kCameraMemory));
-  gather(frame);
+  gather(frame, doubts);
   if (frame.index >= next_request_at_ && fresh_ >= slots_.size() && camera_.frames > 0)
-    request(frame, law, setup_variance_mm2);
+    request(frame, law, doubts.setup_variance_mm2());
 }
 
-void SurfaceKeeper::gather(const FrameRecord& frame) noexcept {
+void SurfaceKeeper::gather(const FrameRecord& frame, const FrameDoubts& doubts) noexcept {
   const std::uint64_t round = frame.rate.frames(kMadeEvery);
   const std::size_t count = (slots_.size() + round - 1) / round;
   for (std::size_t i = 0; i < count; ++i) {
@@ -45,8 +48,8 @@ void SurfaceKeeper::gather(const FrameRecord& frame) noexcept {
     Gathered& gathered = gathered_[next_slot_];
     // What began on the surface tells of itself at first what that said.
     const bool its_own = !slot.began_on_surface || slot.updates >= kUpdatesOfItsOwn;
-    gathered.usable = slot.state == SlotState::kMapped && slot.converged && its_own &&
-                      slot.health.state() != HealthState::kInconsistent;
+    gathered.usable = slot.state == SlotState::kMapped && its_own && !doubts.setup_doubted &&
+                      is_called_converged(slot, frame.stamp.capture, doubts);
     if (gathered.usable) {
       bank_.get(static_cast<int>(next_slot_), estimate_);
       add_lasting_errors(slot, estimate_.P);

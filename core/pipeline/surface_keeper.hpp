@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/pipeline/feature_slot.hpp"
+#include "core/pipeline/frame_doubts.hpp"
 #include "core/pipeline/frame_history.hpp"
 #include "core/pipeline/map_bank.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
@@ -22,8 +23,8 @@ class SurfaceKeeper {
   SurfaceKeeper(std::span<FeatureSlot> slots, MapBank& bank, SurfaceMaker& maker, Duration adopted_after,
                 PipelineCounters& counters);
 
-  // Once a frame, after its matches are settled. `setup_variance_mm2`: of each published position, by the set-up.
-  void on_frame(const FrameRecord& frame, PhaseLaw law, double setup_variance_mm2) noexcept;
+  // Once a frame, after its matches are settled. A surface is made of what is called converged with these doubts.
+  void on_frame(const FrameRecord& frame, PhaseLaw law, const FrameDoubts& doubts) noexcept;
 
   // A surface was adopted, and was not refused or withdrawn since.
   [[nodiscard]] bool there() const noexcept { return there_; }
@@ -57,7 +58,7 @@ class SurfaceKeeper {
     }
   };
 
-  void gather(const FrameRecord& frame) noexcept;
+  void gather(const FrameRecord& frame, const FrameDoubts& doubts) noexcept;
   void request(const FrameRecord& frame, PhaseLaw law, double setup_variance_mm2) noexcept;
 
   std::span<FeatureSlot> slots_;
@@ -76,6 +77,7 @@ class SurfaceKeeper {
   bool asked_ = false;
   bool there_ = false;
   bool anew_ = false;  // since the last request
+  bool setup_doubted_ = false;
 };
 
 }  // namespace perimap

@@ -41,7 +41,8 @@ enum class SurfaceReason : std::uint8_t {
   kPictureRepeated,
   kOrganOrTrackerMoved,
   kOrganMoved,
-  kTrackerErrs
+  kTrackerErrs,
+  kSetupUncertain
 };
 enum class FeatureState : std::uint8_t { kInvalid, kConverging, kConverged, kInconsistent };
 enum class FeatureReason : std::uint8_t { kNone, kNotObserved, kDeviationLarge, kInnovationsHigh, kPhaseLost, kShed };

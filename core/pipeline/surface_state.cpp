@@ -22,6 +22,8 @@ SurfaceReason reason_of(DisplacedCause cause) noexcept {
 
 bool is_converged(const FeatureSnapshot& feature) noexcept { return feature.state == FeatureState::kConverged; }
 
+bool is_held_back(const FeatureSnapshot& feature) noexcept { return feature.held_back; }
+
 }  // namespace
 
 SurfaceFooting footing_of(std::span<const ShardSnapshot* const> snapshots) noexcept {
@@ -34,6 +36,8 @@ SurfaceFooting footing_of(std::span<const ShardSnapshot* const> snapshots) noexc
     footing.doubts.add(snapshot->doubts);
     sight.add(*snapshot);
     converged = converged || std::any_of(snapshot->features.begin(), snapshot->features.end(), is_converged);
+    footing.held_back =
+        footing.held_back || std::any_of(snapshot->features.begin(), snapshot->features.end(), is_held_back);
   }
   footing.no_parallax = footing.doubts.still && !converged;
   footing.converged = converged;
@@ -66,7 +70,8 @@ SurfaceReason reason_of(const PhaseEstimate& phase, Rhythm rhythm, const Surface
   const bool settling = footing.doubts.settling;
   if (footing.doubts.unproven) return settling ? SurfaceReason::kOrganMoved : SurfaceReason::kNotSeen;
   if (footing.no_parallax) return SurfaceReason::kNoParallax;
-  if (!footing.converged) return settling ? SurfaceReason::kOrganMoved : SurfaceReason::kNothingConverged;
+  if (!footing.converged && settling) return SurfaceReason::kOrganMoved;
+  if (!footing.converged) return footing.held_back ? SurfaceReason::kSetupUncertain : SurfaceReason::kNothingConverged;
   if (phase.ectopic) return SurfaceReason::kEctopicBeat;
   if (rhythm == Rhythm::kUnpredictable) return SurfaceReason::kRhythmUnpredictable;
   if (rhythm == Rhythm::kEctopic) return SurfaceReason::kRhythmEctopic;

@@ -21,6 +21,7 @@ struct SurfaceFooting {
   bool not_seen = false;     // see Sight
   bool no_parallax = false;  // the camera keeps still, and no feature has converged
   bool converged = true;     // some of the features have
+  bool held_back = false;    // some would have, were more known of the set-up
 };
 
 // As far as the newest snapshots tell: whether there are features, poses and sight of them.

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
+#include "core/setup_watch/setup_memory.hpp"
 #include "core/setup_watch/setup_verdict.hpp"
 #include "core/time/instant.hpp"
 
@@ -24,6 +26,7 @@ class SetupBelief {
       if (unknown_ >= kToForget && !doubted_) told_ = {};
       return;
     }
+    asked_ = asked_ || verdict.matches > 0;
     const bool doubts = verdict.state == SetupState::kDoubted;
     const bool again = doubts && newest_.state == SetupState::kDoubted && blame_alike(verdict, newest_);
     const bool certain = doubts && verdict.certainty >= kCertain;
@@ -56,14 +59,32 @@ class SetupBelief {
     }
   }
 
+  // What an earlier run believed of the same set-up. Before the first window.
+  void recall(const SetupMemory& memory) noexcept {
+    asked_ = memory.asked;
+    doubted_ = memory.doubted;
+    told_ = memory.told;
+    widening_mm_ = memory.widening_mm;
+    widened_at_mm_ = memory.widened_at_mm;
+  }
+  [[nodiscard]] SetupMemory memory() const noexcept { return {asked_, doubted_, told_, widening_mm_, widened_at_mm_}; }
+
+  // Some window has told of it, right or wrong: not one of a scope at rest, nor one that nothing explains.
+  [[nodiscard]] bool asked() const noexcept { return asked_; }
   [[nodiscard]] bool doubted() const noexcept { return doubted_; }
   // Of the newest window that tells anything; while doubted, of the newest that doubts.
   [[nodiscard]] const SetupVerdict& told() const noexcept { return told_; }
-  // What is to be added to the deviation of each published position, RMS of the 3-D norm; and as a variance per axis.
+  // What is to be added to the deviation of each published position, RMS of the 3-D norm.
   [[nodiscard]] double widening_mm() const noexcept {
     return std::max(doubted_ ? told_.widening_mm : 0.0, widening_mm_);
   }
-  [[nodiscard]] double variance_mm2() const noexcept { return widening_mm() * widening_mm() / 3.0; }
+  // What a feature's own largest deviation may be, so that with what the set-up may be off by it is within `bound_mm`:
+  // all of that may lie in the direction in which the feature is least certain. Below zero, so that none is, until the
+  // set-up has been asked.
+  [[nodiscard]] double within_mm(double bound_mm) const noexcept {
+    if (!asked_) return -1.0;
+    return std::sqrt(std::max(0.0, bound_mm * bound_mm - widening_mm() * widening_mm()));
+  }
   [[nodiscard]] std::uint64_t judged() const noexcept { return judged_; }
   // Since the first frame; none: never.
   [[nodiscard]] std::optional<Duration> first_doubted() const noexcept { return first_doubted_; }
@@ -82,6 +103,7 @@ class SetupBelief {
 
   SetupVerdict newest_;
   SetupVerdict told_;
+  bool asked_ = false;
   bool doubted_ = false;
   int consistent_ = 0;  // windows since the last one that doubts
   int unknown_ = 0;     // windows in a row

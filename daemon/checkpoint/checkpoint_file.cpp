@@ -22,7 +22,7 @@ namespace perimap {
 namespace {
 
 constexpr std::string_view kMagic = "PERIMAPC";
-constexpr std::uint32_t kFormat = 7;
+constexpr std::uint32_t kFormat = 8;
 constexpr std::size_t kHeader = 16;
 constexpr std::size_t kLongestText = 4096;
 constexpr std::uint32_t kMostFeatures = 4096;
@@ -270,6 +270,48 @@ LawMemory read_law(Reader& in) {
   return law;
 }
 
+void add_setup(Bytes& out, const SetupMemory& setup) {
+  const SetupVerdict& told = setup.told;
+  out.add(static_cast<std::uint8_t>(setup.asked)).add(static_cast<std::uint8_t>(setup.doubted));
+  out.add(setup.widening_mm).add(setup.widened_at_mm);
+  out.add(static_cast<std::uint8_t>(told.state));
+  for (const bool blamed : told.blamed) out.add(static_cast<std::uint8_t>(blamed));
+  for (const SetupVector& numbers :
+       {told.deviation, told.uncertainty, told.blamed_deviation, told.blamed_uncertainty}) {
+    for (const double x : numbers) out.add(x);
+  }
+  out.add(told.surface_mm).add(told.surface_deviation_mm).add(told.widening_mm);
+}
+
+// What is not kept says how a window came to its verdict, which nobody asks later.
+SetupMemory read_setup(Reader& in) {
+  SetupMemory setup;
+  SetupVerdict& told = setup.told;
+  const auto length = [&in](std::string_view what) {
+    const auto mm = in.number<double>(what);
+    in.expect(mm >= 0.0, what);
+    return mm;
+  };
+  setup.asked = in.flag("whether the set-up was asked");
+  setup.doubted = in.flag("whether the set-up was doubted");
+  setup.widening_mm = length("what the set-up may be off by");
+  setup.widened_at_mm = length("how well the surface was known");
+  const auto state = in.number<std::uint8_t>("what is believed of the set-up");
+  in.expect(state <= static_cast<std::uint8_t>(SetupState::kDoubted) &&
+                setup.doubted == (state == static_cast<std::uint8_t>(SetupState::kDoubted)),
+            "what is believed of the set-up");
+  in.expect(setup.asked || !setup.doubted, "what is believed of the set-up");
+  if (in.good()) told.state = static_cast<SetupState>(state);
+  for (bool& blamed : told.blamed) blamed = in.flag("what of the set-up was blamed");
+  for (SetupVector* numbers : {&told.deviation, &told.uncertainty, &told.blamed_deviation, &told.blamed_uncertainty}) {
+    for (double& x : *numbers) x = in.number<double>("a number of the set-up");
+  }
+  told.surface_mm = length("how far the surface was off");
+  told.surface_deviation_mm = length("how well that was known");
+  told.widening_mm = length("what the doubt had widened");
+  return setup;
+}
+
 std::filesystem::path part_of(const std::filesystem::path& file) { return file.string() + ".part"; }
 
 // What its folder lists is on the disk. A file system that cannot do that has done what it can.
@@ -308,7 +350,7 @@ std::string serialize(const Checkpoint& checkpoint, std::span<const std::string>
   Bytes body;
   body.add(std::string(PERIMAP_VERSION)).add(static_cast<std::uint32_t>(sizeof(PatchTemplate)));
   const SetUp& set_up = checkpoint.set_up;
-  body.add(set_up.camera).add(set_up.hand_eye).add(set_up.patient_frame).add(set_up.estimator);
+  body.add(set_up.camera).add(set_up.hand_eye).add(set_up.times).add(set_up.patient_frame).add(set_up.estimator);
   body.add(checkpoint.boot).add(checkpoint.saved).add(checkpoint.utc_ns);
   body.add(std::int64_t{checkpoint.suspended.count()});
   const MapMemory& memory = checkpoint.memory;
@@ -325,6 +367,7 @@ std::string serialize(const Checkpoint& checkpoint, std::span<const std::string>
   }
   add_respiration(body, memory.respiration);
   add_law(body, memory.law);
+  add_setup(body, memory.setup);
   // Each feature is as long as its state asks for.
   constexpr std::size_t kRest = 4 + 8 + 16 + 8 + sizeof(PatchTemplate) + 64 + 4 + 1 + 1 + 8;
   int state_size = 0;
@@ -366,6 +409,7 @@ Expected<Checkpoint> parse_checkpoint_body(std::string_view body) {
   in.expect(template_size == sizeof(PatchTemplate), "a checkpoint of this build");
   checkpoint.set_up.camera = in.text("the camera");
   checkpoint.set_up.hand_eye = in.text("the hand-eye transform");
+  checkpoint.set_up.times = in.text("the time offsets");
   checkpoint.set_up.patient_frame = in.text("the patient's frame");
   checkpoint.set_up.estimator = in.text("the estimator");
   checkpoint.boot = in.text("the boot");
@@ -385,6 +429,7 @@ Expected<Checkpoint> parse_checkpoint_body(std::string_view body) {
   memory.respiration = read_respiration(in);
   in.expect(memory.respiration.clock.time <= checkpoint.saved, "a breath's phase of before it was saved");
   memory.law = read_law(in);
+  memory.setup = read_setup(in);
   const auto state_size = in.number<std::int32_t>("the size of a state");
   in.expect(state_size >= 0 && state_size <= kMaxState, "the size of a state");
   const std::uint32_t features = in.count(kMostFeatures, sizeof(PatchTemplate), "the number of features");

@@ -1,8 +1,9 @@
 // What perimapd keeps for the case that it crashes, as a file.
 //
 // "PERIMAPC", format (u32), CRC-32 of all that follows (u32), then little-endian: version of perimapd, set-up (texts as
-// length and bytes), boot, instants, frame times, ECG blocks, breathing, features. A template is kept as it lies in
-// memory, so a checkpoint is for the same build alone: another version or another size of a template is refused.
+// length and bytes), boot, instants, frame times, ECG blocks, breathing, the belief in the set-up, features. A template
+// is kept as it lies in memory, so a checkpoint is for the same build alone: another version or another size of a
+// template is refused.
 #pragma once
 
 #include <cstddef>
@@ -23,6 +24,7 @@ namespace perimap {
 struct SetUp {
   std::string camera;
   std::string hand_eye;
+  std::string times;
   std::string patient_frame;
   std::string estimator;
 

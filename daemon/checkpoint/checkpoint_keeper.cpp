@@ -37,6 +37,9 @@ std::unique_ptr<CheckpointKeeper> CheckpointKeeper::go_on_from(const std::filesy
   }
   pipeline.recall(*memory, MonotonicClock::now());
   keeper->begin_with(*memory);
+  if (!memory->setup.asked) {
+    spdlog::info("nothing was known of the set-up when it was kept: no feature is called converged until it is asked");
+  }
   spdlog::info("going on from {}: {} features", file.string(), memory->features.size());
   return keeper;
 }
@@ -46,6 +49,7 @@ void CheckpointKeeper::begin_with(const MapMemory& memory) {
   for (const FeatureMemory& feature : memory.features) features_[slot++] = serialize_feature(feature);
   respiration_ = memory.respiration;
   law_ = memory.law;
+  setup_ = memory.setup;
   for (const EcgBlock& block : memory.ecg) ecg_.add(block);
 }
 
@@ -80,6 +84,7 @@ void CheckpointKeeper::take_map() {
   const bool of_this_map = !forgetting_ && batch->maps_ended == pipeline_.counters().maps_ended();
   respiration_ = of_this_map ? batch->respiration : RespirationMemory{};
   law_ = of_this_map ? batch->law : LawMemory{};
+  setup_ = batch->setup;  // no patient's
   for (const MapFeed::Entry& entry : batch->entries) {
     if (entry.mapped && of_this_map) {
       features_[entry.slot] = serialize_feature(entry.feature);
@@ -102,6 +107,7 @@ void CheckpointKeeper::write() {
   checkpoint.memory.ecg.assign(ecg_.blocks().begin(), ecg_.blocks().end());
   checkpoint.memory.respiration = respiration_;
   checkpoint.memory.law = law_;
+  checkpoint.memory.setup = setup_;
   const PipelineCounters& counters = pipeline_.counters();
   checkpoint.memory.last_capture = from_ns(static_cast<std::int64_t>(counters.last_release_capture_ns.get()));
   checkpoint.memory.frame_period = Duration(static_cast<std::int64_t>(counters.frame_period_ns.get()));

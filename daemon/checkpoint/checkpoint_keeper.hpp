@@ -18,8 +18,8 @@ namespace perimap {
 
 class Pipeline;
 
-// run() takes the mapped features from the pipeline as they come, some a frame, breathing, and the ECG; every
-// `interval` it replaces the file. None of it is on the real-time path.
+// run() takes the mapped features from the pipeline as they come, some a frame, breathing, the belief in the set-up,
+// and the ECG; every `interval` it replaces the file. None of it is on the real-time path.
 class CheckpointKeeper {
  public:
   // Before the pipeline runs: it takes up what an earlier run left in the file, when it may; the log says what came of
@@ -55,6 +55,7 @@ class CheckpointKeeper {
   std::map<std::size_t, std::string> features_;  // by slot, serialized
   RespirationMemory respiration_;
   LawMemory law_;
+  SetupMemory setup_;
   RecentEcg ecg_;
   std::uint64_t maps_moved_ = 0;
   std::uint64_t maps_forgotten_ = 0;  // before the map that is kept

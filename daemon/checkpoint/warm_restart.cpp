@@ -44,6 +44,8 @@ SetUp set_up_of(const Configuration& configuration, const PipelineSettings& pipe
                   c.p1, c.p2, c.k3, c.k4, c.lens == Lens::kBrownConrady ? "Brown-Conrady" : "Kannala-Brandt");
   set_up.hand_eye = fmt::format("{}, sensor {}", pose_text(tracker.translation_SC_mm, tracker.rotation_SC_wxyz),
                                 tracker.sensor.value_or("any"));
+  set_up.times = fmt::format("offset {} ms, the picture's delay {} ms", to_seconds(tracker.time_offset) * 1e3,
+                             to_seconds(configuration.camera.delay) * 1e3);
   set_up.patient_frame =
       fmt::format("{}, reference {}, registered {}", configuration.source.world_frame,
                   tracker.reference.value_or("none"), pose_text(tracker.translation_IW_mm, tracker.rotation_IW_wxyz));
@@ -61,6 +63,7 @@ Expected<MapMemory> usable_memory(Checkpoint checkpoint, const SetUp& set_up, co
   const SetUp& then = checkpoint.set_up;
   if (then.camera != set_up.camera) return other("camera", then.camera, set_up.camera);
   if (then.hand_eye != set_up.hand_eye) return other("hand-eye transform", then.hand_eye, set_up.hand_eye);
+  if (then.times != set_up.times) return other("time offset", then.times, set_up.times);
   if (then.patient_frame != set_up.patient_frame) {
     return other("patient's frame", then.patient_frame, set_up.patient_frame);
   }

@@ -24,7 +24,7 @@ struct Now {
 
 // What may be used of it: everything in the same boot, unless the machine has slept since; else the map without ECG,
 // frame times and the breath's phase, its instants moved to where they are by this run's clock. An error says why
-// nothing may: another camera, hand-eye transform, patient's frame or estimator, or too old.
+// nothing may: another camera, hand-eye transform, time offset, patient's frame or estimator, or too old.
 [[nodiscard]] Expected<MapMemory> usable_memory(Checkpoint checkpoint, const SetUp& set_up, const Now& now,
                                                 Duration maximum_age);
 

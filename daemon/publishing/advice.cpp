@@ -51,6 +51,10 @@ std::string_view remedy_of(perimap_SurfaceReason reason) noexcept {
       return "move the scope sideways";
     case perimap_SURFACE_REASON_SETUP_DOUBTED:
       return "check the set-up: perimap verify";
+    case perimap_SURFACE_REASON_SETUP_UNCERTAIN:
+      return "hand-eye, lens and time offset are not checked yet: move the scope sideways by some centimetres, and "
+             "wait "
+             "for some heart beats; if that does not help: perimap verify";
     case perimap_SURFACE_REASON_SCOPE_UNREAD:
       return "the notch of the field stop must be seen, or the second sensor";
     case perimap_SURFACE_REASON_SCOPE_CHANGED:

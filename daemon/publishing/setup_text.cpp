@@ -124,6 +124,7 @@ Json setup_json(const perimap_SetupWatch& setup) {
   }
   const bool ever = setup.first_doubted_ns != 0;
   return {{"state", name_of(setup.state)},
+          {"asked", setup.asked},
           {"doubted", setup.state == perimap_SETUP_DOUBTED},
           {"number", blamed.empty() ? Json(nullptr) : Json(fmt::format("{}", fmt::join(blamed, "+")))},
           {"deviation", numbers_json(setup.numbers)},

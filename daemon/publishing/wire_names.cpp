@@ -19,7 +19,7 @@ std::string_view name_of(perimap_SurfaceState state) noexcept {
 }
 
 std::string_view name_of(perimap_SurfaceReason reason) noexcept {
-  return name_in<26>({"none",
+  return name_in<27>({"none",
                       "nothing_mapped",
                       "phase_unknown",
                       "phase_free_running",
@@ -44,7 +44,8 @@ std::string_view name_of(perimap_SurfaceReason reason) noexcept {
                       "picture_repeated",
                       "organ_or_tracker_moved",
                       "organ_moved",
-                      "tracker_errs"},
+                      "tracker_errs",
+                      "setup_uncertain"},
                      static_cast<int>(reason));
 }
 

@@ -75,6 +75,8 @@ perimap_SurfaceReason to_wire(SurfaceReason reason) noexcept {
       return perimap_SURFACE_REASON_ORGAN_MOVED;
     case SurfaceReason::kTrackerErrs:
       return perimap_SURFACE_REASON_TRACKER_ERRS;
+    case SurfaceReason::kSetupUncertain:
+      return perimap_SURFACE_REASON_SETUP_UNCERTAIN;
   }
   return perimap_SURFACE_REASON_NOTHING_MAPPED;
 }

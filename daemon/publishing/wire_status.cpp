@@ -115,6 +115,7 @@ perimap_SetupWatch to_wire(const SetupBelief& belief) noexcept {
   wire.surface_deviation_mm = told.surface_deviation_mm;
   wire.widened_mm = belief.widening_mm();
   wire.first_doubted_ns = belief.first_doubted().value_or(Duration(0)).count();
+  wire.asked = belief.asked();
   return wire;
 }
 

@@ -47,7 +47,8 @@ struct RecordedTruth {
          reason == perimap_SURFACE_REASON_LAW_UNDECIDED || reason == perimap_SURFACE_REASON_NOT_SEEN ||
          reason == perimap_SURFACE_REASON_NO_PARALLAX || reason == perimap_SURFACE_REASON_NOTHING_CONVERGED ||
          reason == perimap_SURFACE_REASON_SETUP_DOUBTED || reason == perimap_SURFACE_REASON_ORGAN_OR_TRACKER_MOVED ||
-         reason == perimap_SURFACE_REASON_ORGAN_MOVED || reason == perimap_SURFACE_REASON_TRACKER_ERRS;
+         reason == perimap_SURFACE_REASON_ORGAN_MOVED || reason == perimap_SURFACE_REASON_TRACKER_ERRS ||
+         reason == perimap_SURFACE_REASON_SETUP_UNCERTAIN;
 }
 
 // Nothing when the recording has no ground truth (it is not a simulated one). `X_IW`: the registration, where positions

@@ -26,6 +26,7 @@ class KeptMap {
       }
       respiration_ = batch->respiration;
       law_ = batch->law;
+      setup_ = batch->setup;
       pipeline.map_feed().give_back();
     }
     EcgBlock block;
@@ -36,6 +37,7 @@ class KeptMap {
     for (const auto& [slot, feature] : features_) memory.features.push_back(feature);
     memory.respiration = respiration_;
     memory.law = law_;
+    memory.setup = setup_;
     memory.ecg = ecg_;
     memory.last_capture = from_ns(static_cast<std::int64_t>(counters.last_release_capture_ns.get()));
     memory.frame_period = Duration(static_cast<std::int64_t>(counters.frame_period_ns.get()));
@@ -46,6 +48,7 @@ class KeptMap {
   std::map<std::size_t, FeatureMemory> features_;
   RespirationMemory respiration_;
   LawMemory law_;
+  SetupMemory setup_;
   std::vector<EcgBlock> ecg_;
 };
 

@@ -364,5 +364,36 @@ TEST(Recall, WhereTheBreathsPhaseIsNotKnownAnyMoreItIsSaidSo) {
   }
 }
 
+TEST(Recall, WhatIsRecalledIsHeldToWhatWasBelievedOfTheSetUp) {
+  EarlierRun earlier;
+  ASSERT_GT(earlier.memory.features.size(), 5U);
+  for (FeatureMemory& feature : earlier.memory.features) {
+    feature.converged = true;
+    feature.largest_deviation_mm = 0.5;
+  }
+  const Release release{1'000'000, earlier.memory.last_capture,
+                        earlier.memory.last_capture + earlier.s.pipeline.latency, true};
+  const auto converged = [&](const SetupMemory& setup) {
+    earlier.memory.setup = setup;
+    Pipeline later(earlier.s.pipeline);
+    later.recall(earlier.memory, earlier.memory.last_capture);
+    std::size_t count = 0;
+    for (const auto& [id, feature] : surface_at(later, release)) {
+      count += feature.state == FeatureState::kConverged ? 1 : 0;
+    }
+    return count;
+  };
+  EXPECT_EQ(converged({}), 0U) << "nothing had told of the set-up";
+  SetupMemory setup;
+  setup.asked = true;
+  EXPECT_EQ(converged(setup), earlier.memory.features.size());
+  setup.widening_mm = 0.95;
+  EXPECT_EQ(converged(setup), 0U) << "with that they are beyond the bound";
+  setup = {};
+  setup.asked = setup.doubted = true;
+  setup.told.state = SetupState::kDoubted;
+  EXPECT_EQ(converged(setup), 0U);
+}
+
 }  // namespace
 }  // namespace perimap

@@ -28,6 +28,7 @@ using test::checkpoint_sample;
 using test::feature_sample;
 using test::file_of;
 using test::respiration_sample;
+using test::setup_sample;
 
 TEST(CheckpointFile, IsReadBackAsItWasWritten) {
   const auto read = parse_checkpoint(file_of(checkpoint_sample()));
@@ -70,6 +71,21 @@ TEST(CheckpointFile, IsReadBackAsItWasWritten) {
   EXPECT_EQ(law.squares, written.memory.law.squares);
   EXPECT_EQ(law.log_likelihoods, written.memory.law.log_likelihoods);
   EXPECT_EQ(r.offset_rad, s.offset_rad);
+  const SetupMemory& setup = read->memory.setup;
+  const SetupMemory kept = setup_sample();
+  EXPECT_EQ(setup.asked, kept.asked);
+  EXPECT_EQ(setup.doubted, kept.doubted);
+  EXPECT_EQ(setup.widening_mm, kept.widening_mm);
+  EXPECT_EQ(setup.widened_at_mm, kept.widened_at_mm);
+  EXPECT_EQ(setup.told.state, kept.told.state);
+  EXPECT_EQ(setup.told.blamed, kept.told.blamed);
+  EXPECT_EQ(setup.told.deviation, kept.told.deviation);
+  EXPECT_EQ(setup.told.uncertainty, kept.told.uncertainty);
+  EXPECT_EQ(setup.told.blamed_deviation, kept.told.blamed_deviation);
+  EXPECT_EQ(setup.told.blamed_uncertainty, kept.told.blamed_uncertainty);
+  EXPECT_EQ(setup.told.surface_mm, kept.told.surface_mm);
+  EXPECT_EQ(setup.told.surface_deviation_mm, kept.told.surface_deviation_mm);
+  EXPECT_EQ(setup.told.widening_mm, kept.told.widening_mm);
   ASSERT_EQ(read->memory.features.size(), 2U);
   const FeatureMemory& f = read->memory.features[1];
   const FeatureMemory g = feature_sample(2);
@@ -109,7 +125,7 @@ TEST(CheckpointFile, AnotherFormatIsRefusedByName) {
   old[8] = 1;  // the least byte of the format
   const auto read = parse_checkpoint(old);
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().message, HasSubstr("expected format 7; it is of format 1"));
+  EXPECT_THAT(read.error().message, HasSubstr("expected format 8; it is of format 1"));
 }
 
 TEST(CheckpointFile, AChangedByteIsNoticed) {
@@ -185,6 +201,38 @@ INSTANTIATE_TEST_SUITE_P(
                     UnsoundLawMemory{"Cycles", [](LawMemory& m) { m.cycles = -1.0; }, "cycles weighed"},
                     UnsoundLawMemory{"Scatter", [](LawMemory& m) { m.squares[1] = -1.0; }, "scatter"},
                     UnsoundLawMemory{"Likelihood", [](LawMemory& m) { m.log_likelihoods[2] = kNan; }, "likelihood"}),
+    [](const auto& param) { return param.param.name; });
+
+struct UnsoundSetupMemory {
+  const char* name;
+  void (*spoil)(SetupMemory&);
+  const char* expected;
+};
+
+class UnsoundSetup : public testing::TestWithParam<UnsoundSetupMemory> {};
+
+TEST_P(UnsoundSetup, IsRefusedAndNamed) {
+  Checkpoint c = checkpoint_sample();
+  GetParam().spoil(c.memory.setup);
+  const auto read = parse_checkpoint(file_of(c));
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().message, HasSubstr(GetParam().expected));
+  EXPECT_THAT(read.error().message, HasSubstr("byte "));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Checkpoint, UnsoundSetup,
+    testing::Values(
+        UnsoundSetupMemory{"State", [](SetupMemory& m) { m.told.state = static_cast<SetupState>(4); },
+                           "believed of the set-up"},
+        UnsoundSetupMemory{"DoubtedWithoutADoubt", [](SetupMemory& m) { m.told.state = SetupState::kConsistent; },
+                           "believed of the set-up"},
+        UnsoundSetupMemory{"DoubtedUnasked", [](SetupMemory& m) { m.asked = false; }, "believed of the set-up"},
+        UnsoundSetupMemory{"Widening", [](SetupMemory& m) { m.widening_mm = -0.5; }, "may be off by"},
+        UnsoundSetupMemory{"WideningNan", [](SetupMemory& m) { m.widening_mm = kNan; }, "may be off by"},
+        UnsoundSetupMemory{"Number", [](SetupMemory& m) { m.told.blamed_deviation(9) = kNan; }, "number of the set-up"},
+        UnsoundSetupMemory{"Surface", [](SetupMemory& m) { m.told.surface_deviation_mm = -1.0; },
+                           "well that was known"}),
     [](const auto& param) { return param.param.name; });
 
 struct UnsoundBreath {
@@ -281,8 +329,19 @@ TEST(WarmRestart, AnotherSetUpIsRefusedWithTheReason) {
   };
   EXPECT_THAT(reason(&perimap::SetUp::camera), HasSubstr("another camera"));
   EXPECT_THAT(reason(&perimap::SetUp::hand_eye), HasSubstr("another hand-eye"));
+  EXPECT_THAT(reason(&perimap::SetUp::times), HasSubstr("another time offset"));
   EXPECT_THAT(reason(&perimap::SetUp::patient_frame), HasSubstr("another patient's frame"));
   EXPECT_THAT(reason(&perimap::SetUp::estimator), HasSubstr("another estimator"));
+}
+
+TEST(WarmRestart, WithAnotherTimeOffsetOrDelayTheSetUpIsAnother) {
+  const perimap::SetUp as_it_was = set_up_of(Configuration{}, {});
+  Configuration configuration;
+  configuration.tracker.time_offset = std::chrono::milliseconds(20);
+  EXPECT_NE(set_up_of(configuration, {}), as_it_was);
+  configuration = {};
+  configuration.camera.delay = std::chrono::milliseconds(33);
+  EXPECT_NE(set_up_of(configuration, {}), as_it_was);
 }
 
 TEST(WarmRestart, InAnotherPrecisionTheSetUpIsTheSame) {

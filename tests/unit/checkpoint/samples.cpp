@@ -52,9 +52,26 @@ RespirationMemory respiration_sample() {
   return r;
 }
 
+SetupMemory setup_sample() {
+  SetupMemory setup;
+  setup.asked = setup.doubted = true;
+  setup.widening_mm = 0.75;
+  setup.widened_at_mm = 1.25;
+  setup.told.state = SetupState::kDoubted;
+  setup.told.blamed[index_of(SetupPart::kFocalLength)] = true;
+  setup.told.deviation = SetupVector::LinSpaced(1.0, 10.0);
+  setup.told.uncertainty = SetupVector::LinSpaced(11.0, 20.0);
+  setup.told.blamed_deviation = SetupVector::LinSpaced(21.0, 30.0);
+  setup.told.blamed_uncertainty = SetupVector::LinSpaced(31.0, 40.0);
+  setup.told.surface_mm = 2.5;
+  setup.told.surface_deviation_mm = 0.5;
+  setup.told.widening_mm = 2.25;
+  return setup;
+}
+
 Checkpoint checkpoint_sample() {
   Checkpoint c;
-  c.set_up = {"camera", "hand-eye", "frame", "estimator"};
+  c.set_up = {"camera", "hand-eye", "times", "frame", "estimator"};
   c.boot = "boot";
   c.saved = from_ns(9'000'000'000);
   c.utc_ns = 1'700'000'000'000'000'000;
@@ -73,6 +90,7 @@ Checkpoint checkpoint_sample() {
   c.memory.ecg = {block, two};
   c.memory.respiration = respiration_sample();
   c.memory.law = {PhaseLaw::kWarped, Seconds(0.8), 12.5, {40.0, 12.0, 20.0}, {-9.0, -3.0, -6.0}};
+  c.memory.setup = setup_sample();
   return c;
 }
 

@@ -10,6 +10,7 @@ namespace perimap::test {
 
 [[nodiscard]] FeatureMemory feature_sample(std::uint32_t id);
 [[nodiscard]] RespirationMemory respiration_sample();
+[[nodiscard]] SetupMemory setup_sample();
 // Without features.
 [[nodiscard]] Checkpoint checkpoint_sample();
 

@@ -312,12 +312,17 @@ TEST(Feature, IsCalledConvergedOnlyAsFarAsTheSetUpThatItWasSeenByIsKnown) {
   doubts.converged_within_mm = 0.6;
   describe(slot, slot.last_observed, doubts, snapshot);
   EXPECT_EQ(snapshot.state, FeatureState::kConverged);
+  EXPECT_FALSE(snapshot.held_back);
   for (const double within_mm : {0.4, -1.0}) {
     doubts.converged_within_mm = within_mm;
     describe(slot, slot.last_observed, doubts, snapshot);
     EXPECT_EQ(snapshot.state, FeatureState::kConverging);
     EXPECT_EQ(snapshot.reason, FeatureReason::kDeviationLarge);
+    EXPECT_TRUE(snapshot.held_back);
   }
+  slot.converged = false;
+  describe(slot, slot.last_observed, doubts, snapshot);
+  EXPECT_FALSE(snapshot.held_back) << "it is not certain of itself";
 }
 
 }  // namespace

@@ -23,6 +23,7 @@ struct Keeping : ::testing::Test {
   std::unique_ptr<MapKeeping> keeping;
   std::unique_ptr<Breathing> breathing;
   HeartPhase heart;
+  SetupBelief setup;
 
   Keeping() {
     settings.estimator.layout = {2, 2};
@@ -73,7 +74,7 @@ struct Keeping : ::testing::Test {
   }
   // The next batch, as its reader gets it.
   [[nodiscard]] MapFeed::Batch feed(std::uint64_t maps_ended = 0) {
-    keeping->fill_feed(*breathing, heart, maps_ended);
+    keeping->fill_feed({*breathing, heart, setup}, maps_ended);
     const MapFeed::Batch* batch = keeping->feed().front();
     EXPECT_NE(batch, nullptr);
     const MapFeed::Batch copy = *batch;
@@ -201,10 +202,23 @@ TEST_F(Keeping, WhatIsFedIsAsUncertainAsErrorsThatComeAgainMakeIt) {
   EXPECT_LT((feed().entries[0].feature.estimate.P - 2.0 * estimate(0).P).norm(), 1e-9);
 }
 
+TEST_F(Keeping, WhatIsBelievedOfTheSetUpIsFedToo) {
+  EXPECT_FALSE(feed().setup.asked);
+  SetupVerdict told;
+  told.state = SetupState::kConsistent;
+  told.matches = 500;
+  told.widening_mm = 0.4;
+  setup.add(told, std::chrono::seconds(7));
+  const SetupMemory fed = feed().setup;
+  EXPECT_TRUE(fed.asked);
+  EXPECT_EQ(fed.told.state, SetupState::kConsistent);
+  EXPECT_EQ(fed.widening_mm, 0.4);
+}
+
 TEST_F(Keeping, TheReaderIsNotHurried) {
   static_cast<void>(keeping->recall(features(kSlots), *breathing));
-  keeping->fill_feed(*breathing, heart, 0);
-  for (int i = 0; i < 5; ++i) keeping->fill_feed(*breathing, heart, 0);
+  keeping->fill_feed({*breathing, heart, setup}, 0);
+  for (int i = 0; i < 5; ++i) keeping->fill_feed({*breathing, heart, setup}, 0);
   EXPECT_EQ(keeping->feed().front()->entries[0].slot, 0U);
   keeping->feed().give_back();
   EXPECT_EQ(feed().entries[0].slot, MapFeed::kSlotsABatch);

@@ -76,8 +76,8 @@ TEST(SurfaceComposer, WidensByWhatTheSetUpMayBeOffBy) {
     return composer.compose(kRelease, steady_clock(), {}, view).features.at(0).covariance_W_mm2(1, 1);
   };
   const double before = variance();
-  snapshot.doubts.setup_variance_mm2 = 0.25;
-  EXPECT_NEAR(variance(), before + 0.25, 1e-12);
+  snapshot.doubts.setup_widening_mm = 1.5;
+  EXPECT_NEAR(variance(), before + 0.75, 1e-12) << "a third of its square on each axis";
 }
 
 TEST(SurfaceComposer, EvaluatesPositionAndVelocityAtTheValidTimesPhase) {

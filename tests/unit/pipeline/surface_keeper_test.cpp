@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 #include <random>
 #include <thread>
@@ -44,12 +45,12 @@ class Kept : public ::testing::Test {
 
   [[nodiscard]] Instant capture() const { return Instant(seconds(100)) + frame_.index * milliseconds(33); }
   // So many frames more.
-  void frames(int count, double setup_variance_mm2 = 0.0) {
+  void frames(int count, const FrameDoubts& doubts = {}) {
     for (int i = 0; i < count; ++i) {
       frame_.stamp.capture = capture();
       frame_.stamp.sequence = 1000 + frame_.index;
       frame_.pose.state = CameraPose::State::kInterpolated;
-      keeper_.on_frame(frame_, PhaseLaw::kLinear, setup_variance_mm2);
+      keeper_.on_frame(frame_, PhaseLaw::kLinear, doubts);
       ++frame_.index;
     }
   }
@@ -95,6 +96,35 @@ TEST_F(Kept, IsMadeOfWhatIsConvergedAndBelieved) {
   EXPECT_EQ(maker_.newest()->surface->features() + maker_.newest()->surface->contradicted().size(), kSlots - 3);
 }
 
+TEST_F(Kept, IsNotMadeOfWhatTheSetUpHoldsBack) {
+  see_all();
+  for (std::size_t i = 0; i < kSlots; ++i) slots_[i].largest_deviation_mm = i < 5 ? 0.8 : 0.3;
+  FrameDoubts doubts;
+  doubts.converged_within_mm = -1.0;
+  frames(36, doubts);
+  ASSERT_NE(maker_.newest(), nullptr);
+  EXPECT_FALSE(maker_.newest()->surface.has_value()) << "nothing has told of the set-up yet";
+  doubts.converged_within_mm = 0.5;
+  frames(60, doubts);
+  ASSERT_TRUE(maker_.newest()->surface.has_value());
+  EXPECT_EQ(maker_.newest()->surface->features() + maker_.newest()->surface->contradicted().size(), kSlots - 5);
+}
+
+TEST_F(Kept, WithdrawsASurfaceAtOnceWhenTheSetUpIsDoubtedAndMakesNoneUntilItIsNot) {
+  see_all();
+  frames(36);
+  ASSERT_TRUE(keeper_.there());
+  FrameDoubts doubts;
+  doubts.setup_doubted = true;
+  frames(1, doubts);
+  EXPECT_EQ(maker_.newest(), nullptr);
+  EXPECT_FALSE(keeper_.there());
+  frames(90, doubts);
+  EXPECT_FALSE(keeper_.there());
+  frames(90);
+  EXPECT_TRUE(keeper_.there());
+}
+
 // Its own matches have told little yet beside what the surface did.
 TEST_F(Kept, IsNotMadeOfWhatBeganOnItUntilThatIsKnownByItself) {
   see_all();
@@ -127,7 +157,9 @@ TEST_F(Kept, IsAsUncertainAsTheSetUpMakesEveryPosition) {
   frames(36);
   const Eigen::MatrixXd certain = maker_.newest()->mesh.covariances_W_mm2;
   const auto support = maker_.newest()->mesh.support;
-  frames(30, 0.4);
+  FrameDoubts doubts;
+  doubts.setup_widening_mm = std::sqrt(1.2);
+  frames(30, doubts);
   const auto wider = maker_.newest();
   ASSERT_EQ(wider->number, 2U);
   EXPECT_EQ(wider->mesh.support, support);
@@ -164,7 +196,7 @@ TEST_F(Kept, AsksForNothingBeforeTheCameraIsKnown) {
   see_all();
   for (int i = 0; i < 60; ++i) {
     frame_.stamp.capture = capture();
-    keeper_.on_frame(frame_, PhaseLaw::kLinear, 0.0);
+    keeper_.on_frame(frame_, PhaseLaw::kLinear, {});
     ++frame_.index;
   }
   EXPECT_EQ(maker_.newest(), nullptr);

@@ -50,17 +50,35 @@ TEST(SurfaceState, IsDegradedWhileTheCameraKeepsStillAndNothingHasConverged) {
       << "it was seen before";
 }
 
+TEST(SurfaceState, SaysThatTheSetUpIsUncertainWhereThatAloneHoldsFeaturesBack) {
+  ShardSnapshot shard;
+  shard.features.resize(2);
+  for (FeatureSnapshot& feature : shard.features) {
+    feature.state = FeatureState::kConverging;
+    feature.expected = feature.in_sight = true;
+  }
+  const ShardSnapshot* const shards[] = {&shard};
+  const auto reason = [&] { return reason_of(locked(), Rhythm::kPredictable, footing_of(shards)); };
+  EXPECT_EQ(reason(), SurfaceReason::kNothingConverged);
+  shard.features[1].held_back = true;
+  EXPECT_EQ(reason(), SurfaceReason::kSetupUncertain);
+  EXPECT_EQ(state_of(SurfaceReason::kSetupUncertain), SurfaceState::kDegraded);
+  shard.features[0].state = FeatureState::kConverged;
+  EXPECT_EQ(reason(), SurfaceReason::kNone);
+}
+
 TEST(SurfaceState, IsDegradedWhileTheSetUpIsDoubtedAndNothingIsCalledConverged) {
   ShardSnapshot shard;
   shard.doubts.setup_doubted = true;
-  shard.doubts.setup_variance_mm2 = 3.0;
+  shard.doubts.setup_widening_mm = 3.0;
   shard.features.resize(1);
   shard.features[0].state = FeatureState::kConverged;
   shard.features[0].expected = shard.features[0].in_sight = true;
   const ShardSnapshot other;
   const ShardSnapshot* const shards[] = {&other, &shard};
   SurfaceFooting footing = footing_of(shards);
-  EXPECT_EQ(footing.doubts.setup_variance_mm2, 3.0);
+  EXPECT_EQ(footing.doubts.setup_widening_mm, 3.0);
+  EXPECT_EQ(footing.doubts.setup_variance_mm2(), 3.0) << "a third of its square on each axis";
   footing.breath_doubtful = true;
   EXPECT_EQ(reason_of(locked(), Rhythm::kPredictable, footing), SurfaceReason::kSetupDoubted)
       << "a set-up that is off displaces the surface as breathing may";

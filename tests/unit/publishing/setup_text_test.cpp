@@ -62,9 +62,11 @@ TEST(SetupText, BlamesNothingWhereNothingIsDoubted) {
   setup.windows = 5;
   EXPECT_NE(setup_words(setup).find("no motions explain what is seen"), std::string::npos);
   setup.state = perimap_SETUP_CONSISTENT;
+  setup.asked = false;
   const auto json = setup_json(setup);
   EXPECT_EQ(json["state"], "consistent");
   EXPECT_EQ(json["doubted"], false);
+  EXPECT_EQ(json["asked"], false);
   EXPECT_TRUE(json["number"].is_null());
   EXPECT_TRUE(json["doubted_after_s"].is_null());
 }

@@ -129,6 +129,20 @@ TEST(WireModel, TakesNoMoreBytesThanItsTrafficIsReckonedWith) {
   EXPECT_GT(bytes() - without, kFeatures * (feature - 16));
 }
 
+TEST(WireModel, AFeatureIsAsUncertainAsItIsHeldToTheBound) {
+  WireModel wire({"a", ReleaseStream::kFrame, "tracker"});
+  ShardSnapshot snapshot;
+  snapshot.features.resize(1);
+  snapshot.features[0].x = StateVector::Zero(BasisLayout{}.state_size());
+  snapshot.features[0].largest_deviation_mm = 0.6;
+  const ShardSnapshot* const view = &snapshot;
+  ModelMoment moment;
+  moment.snapshots = {&view, 1};
+  moment.footing.doubts.setup_widening_mm = 0.8;
+  EXPECT_NEAR(wire.fill(moment).features._buffer[0].largest_deviation_mm, 1.0, 1e-12)
+      << "all of what the set-up may be off by lies in one direction";
+}
+
 TEST(WireSurface, EachStreamHasItsOwnName) {
   PipelineSettings settings;
   settings.clock_period = milliseconds(10);

@@ -226,6 +226,7 @@ void fill(Filler& next, perimap_SetupWatch& s) {
   next(s.surface_deviation_mm);
   next(s.widened_mm);
   next(s.first_doubted_ns);
+  next(s.asked);
 }
 
 void fill(Filler& next, perimap_Status& s) {

@@ -224,7 +224,8 @@ json to_json(const perimap_SetupWatch& s) {
           MEMBER(surface_mm),
           MEMBER(surface_deviation_mm),
           MEMBER(widened_mm),
-          MEMBER(first_doubted_ns)};
+          MEMBER(first_doubted_ns),
+          MEMBER(asked)};
 }
 template <>
 json to_json(const perimap_Status& s) {

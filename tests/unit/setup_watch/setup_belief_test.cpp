@@ -16,7 +16,7 @@ SetupVerdict verdict(SetupState state) {
   return verdict;
 }
 
-SetupVerdict widening(SetupState state, double surface_deviation_mm, double widening_mm) {
+SetupVerdict telling(SetupState state, double surface_deviation_mm, double widening_mm) {
   SetupVerdict told = verdict(state);
   told.matches = 500;
   told.surface_deviation_mm = surface_deviation_mm;
@@ -26,6 +26,7 @@ SetupVerdict widening(SetupState state, double surface_deviation_mm, double wide
 
 SetupVerdict doubt_of(SetupPart part) {
   SetupVerdict doubt = verdict(SetupState::kDoubted);
+  doubt.matches = 500;
   doubt.blamed[index_of(part)] = true;
   return doubt;
 }
@@ -126,30 +127,30 @@ TEST(SetupBelief, StaysDoubtedWhileWindowsTellNothing) {
 
 TEST(SetupBelief, WidensByTheNewestWindow) {
   SetupBelief belief;
-  EXPECT_EQ(belief.variance_mm2(), 0.0);
+  EXPECT_EQ(belief.widening_mm(), 0.0);
   SetupVerdict told = verdict(SetupState::kConsistent);
   told.widening_mm = 0.6;
   belief.add(told, seconds(3));
-  EXPECT_NEAR(belief.variance_mm2(), 0.12, 1e-12) << "a third of its square on each axis";
+  EXPECT_NEAR(belief.widening_mm(), 0.6, 1e-12);
   belief.add(verdict(SetupState::kConsistent), seconds(6));
-  EXPECT_EQ(belief.variance_mm2(), 0.0);
+  EXPECT_EQ(belief.widening_mm(), 0.0);
 }
 
 TEST(SetupBelief, WhatAWindowWidenedThatKnewLittleIsTakenBackByOneThatKnowsMore) {
   SetupBelief belief;
-  belief.add(widening(SetupState::kUndetermined, 4.0, 1.5), seconds(3));
+  belief.add(telling(SetupState::kUndetermined, 4.0, 1.5), seconds(3));
   EXPECT_NEAR(belief.widening_mm(), 1.5, 1e-12);
-  belief.add(widening(SetupState::kUndetermined, 5.0, 0.0), seconds(5));
+  belief.add(telling(SetupState::kUndetermined, 5.0, 0.0), seconds(5));
   EXPECT_NEAR(belief.widening_mm(), 1.5, 1e-12) << "it knows less";
-  belief.add(widening(SetupState::kUndetermined, 3.0, 0.0), seconds(6));
+  belief.add(telling(SetupState::kUndetermined, 3.0, 0.0), seconds(6));
   EXPECT_EQ(belief.widening_mm(), 0.0);
 }
 
 TEST(SetupBelief, WhatAWindowHasWidenedThatKnewMuchIsNotTakenBackByTwoThatKnowLittle) {
   SetupBelief belief;
-  belief.add(widening(SetupState::kConsistent, 0.5, 0.8), seconds(3));
-  belief.add(widening(SetupState::kUndetermined, 3.0, 0.9), seconds(6));
-  belief.add(widening(SetupState::kUndetermined, 2.9, 0.0), seconds(9));
+  belief.add(telling(SetupState::kConsistent, 0.5, 0.8), seconds(3));
+  belief.add(telling(SetupState::kUndetermined, 3.0, 0.9), seconds(6));
+  belief.add(telling(SetupState::kUndetermined, 2.9, 0.0), seconds(9));
   EXPECT_NEAR(belief.widening_mm(), 0.9, 1e-12);
 }
 
@@ -162,6 +163,47 @@ TEST(SetupBelief, StaysWideWhileTheScopeRests) {
   EXPECT_NEAR(belief.widening_mm(), 0.6, 1e-12);
   belief.add(verdict(SetupState::kConsistent), seconds(9));
   EXPECT_EQ(belief.widening_mm(), 0.0);
+}
+
+TEST(SetupBelief, HoldsEverythingBackUntilAWindowHasTold) {
+  SetupBelief belief;
+  EXPECT_LT(belief.within_mm(1.0), 0.0);
+  for (int i = 0; i < 20; ++i) {
+    belief.add(verdict(SetupState::kUnknown), seconds(6 * i));           // nothing explains it
+    belief.add(verdict(SetupState::kUndetermined), seconds(6 * i + 3));  // the scope rests: no matches were judged
+  }
+  EXPECT_FALSE(belief.asked());
+  EXPECT_LT(belief.within_mm(1.0), 0.0) << "however long";
+  belief.add(telling(SetupState::kUndetermined, 3.0, 0.6), seconds(130));
+  EXPECT_TRUE(belief.asked());
+  EXPECT_NEAR(belief.within_mm(1.0), 0.8, 1e-12) << "all of the widening may lie in one direction";
+  belief.add(telling(SetupState::kUndetermined, 3.0, 1.6), seconds(133));
+  EXPECT_EQ(belief.within_mm(1.0), 0.0);
+  for (int i = 0; i < 20; ++i) belief.add(verdict(SetupState::kUnknown), seconds(136 + i));
+  EXPECT_TRUE(belief.asked()) << "what was told holds";
+}
+
+TEST(SetupBelief, GoesOnInAnotherRunAsItWasInTheFirst) {
+  SetupBelief first;
+  for (int i = 0; i < 2; ++i) first.add(doubt_of(SetupPart::kFocalLength), seconds(3 * i));
+  SetupBelief second;
+  second.recall(first.memory());
+  EXPECT_EQ(second.asked(), first.asked());
+  EXPECT_TRUE(second.doubted());
+  EXPECT_TRUE(second.told().blamed[index_of(SetupPart::kFocalLength)]);
+  EXPECT_EQ(second.within_mm(1.0), first.within_mm(1.0));
+  for (int i = 0; i < 2; ++i) second.add(verdict(SetupState::kConsistent), seconds(3 * i));
+  EXPECT_TRUE(second.doubted()) << "three would have to show nothing";
+  second.add(verdict(SetupState::kConsistent), seconds(9));
+  EXPECT_FALSE(second.doubted());
+
+  SetupBelief wide;
+  wide.add(telling(SetupState::kConsistent, 0.5, 0.8), seconds(3));
+  SetupBelief after;
+  after.recall(wide.memory());
+  EXPECT_NEAR(after.within_mm(1.0), 0.6, 1e-12);
+  after.add(telling(SetupState::kUndetermined, 3.0, 0.0), seconds(3));
+  EXPECT_NEAR(after.within_mm(1.0), 0.6, 1e-12) << "it knows less than the window that widened";
 }
 
 }  // namespace
