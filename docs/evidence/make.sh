@@ -58,6 +58,7 @@ setups-noise    5 minutes   statistics_setups: tips of tools and noise of tracke
 watched-setups  2 minutes   statistics_watched_setups: what the watch says of right and wrong set-ups
 watched-lies   15 minutes   what the watch says in sessions whose set-up is wrong
 watched-truth  20 minutes   what it says in sessions whose set-up is right
+lies            2 hours     sessions that are lied to, by set-ups and devices that are wrong, of three drawn seeds
 procedures      2 hours     procedures that are written and drawn: available, wrong, alarmed, told
 update         10 minutes   update_bench: speed of the update
 seeing          5 minutes   vision_bench: speed and accuracy of the patch tracker
