@@ -61,8 +61,14 @@ void SetupWatcher::keep(const FrameHistory& history, std::span<const FeatureSlot
 }
 
 void SetupWatcher::adopt(const FrameRecord& frame) noexcept {
-  if (frame.index < adopted_at_ || !hand_over_.finish()) return;
-  if (std::exchange(discarded_, false)) return;
+  // What is void is not waited for.
+  if ((frame.index < adopted_at_ && !discarded_) || !hand_over_.finish()) return;
+  if (std::exchange(discarded_, false)) {
+    // The same frames tell anew, as they are told now.
+    judged_frame_ = 0;
+    next_round_at_ = frame.index;
+    return;
+  }
   belief_.add(verdict_, frame.stamp.capture - *first_capture_);
   status_.write(belief_);
 }

@@ -40,8 +40,9 @@ class SetupBelief {
       widened_at_mm_ = verdict.surface_deviation_mm;
       widening_mm_ = verdict.widening_mm;
     } else {
-      // What knew more is not taken back later by what knows as little as this.
-      widening_mm_ = std::max(widening_mm_, verdict.widening_mm);
+      // What knew more is not taken back later by what knows as little as this, nor does that widen by what it does not
+      // know.
+      widening_mm_ = std::max(widening_mm_, verdict.suspected_mm);
     }
     newest_ = verdict;
     if (again || certain || (doubts && doubted_)) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -67,6 +68,46 @@ double surface_deviation_mm(const SetupFit& fit) {
   return std::sqrt(sum / static_cast<double>(fit.shift.size()));
 }
 
+// Of the surface, root mean square, if one part alone is wrong or none, each by the chance that the window leaves it:
+// the evidence for a part is its likelihood with its numbers integrated out (Bayes factors of nested Gaussian models;
+// Kass and Raftery, J. Am. Stat. Assoc. 90, 1995). A part of which the window tells nothing keeps its chance and the
+// prior's deviation.
+double expected_mm(const SetupFit& fit, const SetupMatrix& information, const SetupVector& pull,
+                   const SetupVerdictSettings& settings) {
+  const SetupVector prior = settings.wrong_by * widest_setup_deviations();
+  const double right = 1.0 - settings.wrong_probability;
+  const double each = settings.wrong_probability / static_cast<double>(kSetupParts.size());
+  double largest = std::log(right);
+  std::array<double, kSetupParts.size()> log_weights{};
+  std::array<double, kSetupParts.size()> squares_mm2{};
+  for (const SetupPart part : kSetupParts) {
+    const SetupRange range = range_of(part);
+    const Eigen::VectorXd deviations = prior.segment(range.begin, range.size);
+    const Eigen::VectorXd free_pull = pull.segment(range.begin, range.size);
+    Eigen::MatrixXd posterior = information.block(range.begin, range.begin, range.size, range.size);
+    posterior += Eigen::MatrixXd(deviations.cwiseAbs2().cwiseInverse().asDiagonal());
+    const Eigen::LLT<Eigen::MatrixXd> factor(posterior);
+    const Eigen::VectorXd value = factor.solve(free_pull);
+    const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(range.size, range.size));
+    const Eigen::VectorXd root = Eigen::MatrixXd(factor.matrixL()).diagonal();
+    const std::size_t i = index_of(part);
+    log_weights[i] = std::log(each) + 0.5 * free_pull.dot(value) - (root.array() * deviations.array()).log().sum();
+    largest = std::max(largest, log_weights[i]);
+    for (const auto& shift : fit.shift) {
+      const Eigen::MatrixXd of_part = shift.middleCols(range.begin, range.size);
+      squares_mm2[i] += (of_part * value).squaredNorm() + (of_part * covariance * of_part.transpose()).trace();
+    }
+  }
+  double weights = std::exp(std::log(right) - largest);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < kSetupParts.size(); ++i) {
+    const double weight = std::exp(log_weights[i] - largest);
+    weights += weight;
+    sum += weight * squares_mm2[i];
+  }
+  return std::sqrt(sum / (weights * static_cast<double>(fit.shift.size())));
+}
+
 }  // namespace
 
 SetupVerdict judge_setup(const SetupFit& fit, const SetupVerdictSettings& settings) {
@@ -104,8 +145,9 @@ SetupVerdict judge_setup(const SetupFit& fit, const SetupVerdictSettings& settin
     blamed = more;
   }
   if (!blamed.numbers.empty()) verdict.surface_mm = surface_mm(fit, blamed.deviation);
+  verdict.widening_mm = expected_mm(fit, information, pull, settings);
   if (verdict.explained > settings.chance_chi2) {
-    verdict.widening_mm = verdict.surface_mm * std::sqrt(1.0 - settings.chance_chi2 / verdict.explained);
+    verdict.suspected_mm = verdict.surface_mm * std::sqrt(1.0 - settings.chance_chi2 / verdict.explained);
   }
   if (!blamed.numbers.empty() && verdict.surface_mm > settings.doubted_mm) {
     verdict.state = SetupState::kDoubted;

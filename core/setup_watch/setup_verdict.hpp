@@ -33,9 +33,13 @@ struct SetupVerdict {
   double surface_deviation_mm = 0.0;
   double explained = 0.0;  // of chi-squared, by what is most to blame, doubted or not
   double certainty = 0.0;  // that, as a multiple of what a doubt needs
-  // What is to be added to the deviation of each published position, RMS of the 3-D norm: `surface_mm` as far as it is
-  // not chance. 0 of most right set-ups.
+  // What is to be added to the deviation of each published position, RMS of the 3-D norm: what the surface may be off
+  // by when one part is wrong, by the chance that it is, for all that the window tells. Of a right set-up it falls as
+  // the window tells more.
   double widening_mm = 0.0;
+  // Of that what the window has told, and not what it leaves unknown: `surface_mm` as far as it is not chance. 0 of
+  // most right set-ups.
+  double suspected_mm = 0.0;
   double chi2_with = 0.0;
   double chi2_without = 0.0;
   double freedom = 0.0;
@@ -53,9 +57,13 @@ struct SetupVerdictSettings {
   double doubted_chi2 = 25.0;
   double doubted_chi2_per_number = 3.0;
   double undetermined_mm = 1.5;  // deviation of the surface
-  // So much of chi-squared is explained by chance (docs/evidence/setup-watch.md): what is explained beyond widens, in
-  // the way of James and Stein (Proc. 4th Berkeley Symp. 1961). Without caution: what widens by chance is taken back.
+  // So much of chi-squared is explained by chance (docs/evidence/setup-watch.md): what is explained beyond is
+  // suspected, in the way of James and Stein (Proc. 4th Berkeley Symp. 1961).
   double chance_chi2 = 8.0;
+  // What is reckoned with before a window has told anything: that one part is wrong, of which each is as likely, by
+  // numbers of so much of the watch's prior deviations (3 degrees, 10 mm, 5 %, 15 px, 25 ms).
+  double wrong_probability = 0.5;
+  double wrong_by = 0.5;
 };
 
 // Parts are blamed one after the other, each time that which explains most of what is left.

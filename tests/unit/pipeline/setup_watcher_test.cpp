@@ -183,6 +183,16 @@ TEST_F(Watched, ARoundCountsForNothingWhosePhasesAreToldAnew) {
   EXPECT_GT(watcher_.belief().judged(), 0U);
 }
 
+// 0.7 s after they have been told, not after the time between two rounds.
+TEST_F(Watched, WhatWasToldAnewIsJudgedAtOnce) {
+  while (watcher_.belief().judged() == 0) seconds(0.05);
+  seconds(0.9);  // the next one is under way
+  watcher_.retell_phases(clock_.clock());
+  const std::uint64_t judged = watcher_.belief().judged();
+  seconds(0.8);
+  EXPECT_EQ(watcher_.belief().judged(), judged + 1);
+}
+
 TEST_F(Watched, GoesOnAsAnEarlierRunBelieved) {
   SetupMemory memory;
   memory.asked = true;

@@ -20,7 +20,7 @@ SetupVerdict telling(SetupState state, double surface_deviation_mm, double widen
   SetupVerdict told = verdict(state);
   told.matches = 500;
   told.surface_deviation_mm = surface_deviation_mm;
-  told.widening_mm = widening_mm;
+  told.widening_mm = told.suspected_mm = widening_mm;
   return told;
 }
 
@@ -152,6 +152,19 @@ TEST(SetupBelief, WhatAWindowHasWidenedThatKnewMuchIsNotTakenBackByTwoThatKnowLi
   belief.add(telling(SetupState::kUndetermined, 3.0, 0.9), seconds(6));
   belief.add(telling(SetupState::kUndetermined, 2.9, 0.0), seconds(9));
   EXPECT_NEAR(belief.widening_mm(), 0.9, 1e-12);
+}
+
+// As of another patient, whose window is short yet.
+TEST(SetupBelief, WhatAWindowLeavesUnknownThatWasKnownDoesNotWiden) {
+  SetupBelief belief;
+  belief.add(telling(SetupState::kConsistent, 0.7, 0.1), seconds(20));
+  SetupVerdict little = telling(SetupState::kUndetermined, 5.0, 0.8);
+  little.suspected_mm = 0.0;
+  belief.add(little, seconds(40));
+  EXPECT_NEAR(belief.widening_mm(), 0.1, 1e-12);
+  little.suspected_mm = 0.6;
+  belief.add(little, seconds(42));
+  EXPECT_NEAR(belief.widening_mm(), 0.6, 1e-12) << "but what it tells does";
 }
 
 TEST(SetupBelief, StaysWideWhileTheScopeRests) {

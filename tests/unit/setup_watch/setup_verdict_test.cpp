@@ -73,14 +73,24 @@ TEST(SetupVerdict, DoesNotDoubtWhatHardlyMovesTheSurface) {
   EXPECT_EQ(judge_setup(made_fit(found, 0.01)).state, SetupState::kConsistent);
 }
 
-TEST(SetupVerdict, WidensByWhatIsNotChanceWhetherDoubtedOrNot) {
+TEST(SetupVerdict, WidensByWhatTheSurfaceMayBeOffByWhetherDoubtedOrNot) {
   SetupVector found = SetupVector::Zero();
-  found(kFocalAt) = 0.8;
-  EXPECT_NEAR(judge_setup(made_fit(found, 0.01)).widening_mm, 0.8, 0.01) << "certain, and below the bound";
-  EXPECT_EQ(judge_setup(made_fit(found, 0.3)).widening_mm, 0.0) << "two to three deviations come by chance";
-  const double some = judge_setup(made_fit(found, 0.15)).widening_mm;
-  EXPECT_GT(some, 0.0);
-  EXPECT_LT(some, 0.8);
+  found(kMoveAt + 2) = 0.8;
+  const auto widening_mm = [&](double deviation) { return judge_setup(made_fit(found, deviation)).widening_mm; };
+  EXPECT_NEAR(widening_mm(0.01), 0.8, 0.01) << "certain, and below the bound";
+  EXPECT_GT(widening_mm(0.25), 0.4) << "three deviations are hardly chance";
+  EXPECT_LT(widening_mm(0.4), 0.25) << "two come by chance";
+  EXPECT_GT(widening_mm(0.4), 0.05) << "but not only";
+}
+
+TEST(SetupVerdict, WidensByWhatIsNotKnownToo) {
+  const auto widening_mm = [](double deviation) {
+    return judge_setup(made_fit(SetupVector::Zero(), deviation)).widening_mm;
+  };
+  EXPECT_EQ(judge_setup(made_fit(SetupVector::Zero(), 4.0)).suspected_mm, 0.0) << "that is not suspected";
+  EXPECT_LT(widening_mm(0.05), 0.02);
+  EXPECT_LT(widening_mm(0.5), 0.2);
+  EXPECT_GT(widening_mm(4.0), 0.8) << "hardly a feature is within a millimetre with that";
 }
 
 TEST(SetupVerdict, DoesNotDoubtWhatIsNotCertain) {
