@@ -105,6 +105,30 @@ Vector2d CommonMotion::at(const Vector2d& from_px, const Vector2d* but) const no
   return at;
 }
 
+std::optional<Vector2d> CommonMotion::beside(const Vector2d& from_px, double tolerance_px,
+                                             const Vector2d* but) const noexcept {
+  constexpr std::size_t kAround = 6;
+  constexpr std::ptrdiff_t kEnoughAlike = 4;
+  NearestFew<Vector2d, kAround> nearest;
+  for (const Pair& pair : pairs_) {
+    if (but != nullptr && pair.from == *but) continue;
+    const double distance_squared = (pair.from - from_px).squaredNorm();
+    if (!nearest.takes(distance_squared)) continue;
+    nearest.add(distance_squared, pair.to - to_px_ - shape_ * (pair.from - from_px_));
+  }
+  if (nearest.size() < kAround) return std::nullopt;
+  Vector2d off;
+  std::array<double, kAround> values{};
+  for (int axis = 0; axis < 2; ++axis) {
+    for (std::size_t i = 0; i < kAround; ++i) values[i] = nearest[i].value[axis];
+    off[axis] = upper_median(values.begin(), values.end());
+  }
+  std::ptrdiff_t alike = 0;
+  for (std::size_t i = 0; i < kAround; ++i) alike += (nearest[i].value - off).norm() <= tolerance_px ? 1 : 0;
+  if (alike < kEnoughAlike) return std::nullopt;
+  return to_px_ + shape_ * (from_px - from_px_) + off;
+}
+
 bool CommonMotion::holds_around(const Vector2d& from_px) const noexcept {
   constexpr std::size_t kAround = 6;
   constexpr std::ptrdiff_t kMostOthers = 1;

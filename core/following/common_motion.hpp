@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -31,6 +32,11 @@ class CommonMotion {
   [[nodiscard]] Vector2d at(const Vector2d& from_px, const Vector2d* but = nullptr) const noexcept;
   // Whether nearly all of the nearest pairs agree; else what is there goes another way, or several do.
   [[nodiscard]] bool holds_around(const Vector2d& from_px) const noexcept;
+  // Where the pairs nearest to a place take it, whether they agree with the others or not: what is nearer to the lens
+  // goes another way than what is behind it. What came from `but` itself is not asked. None where they do not agree
+  // with each other to tolerance_px.
+  [[nodiscard]] std::optional<Vector2d> beside(const Vector2d& from_px, double tolerance_px,
+                                               const Vector2d* but = nullptr) const noexcept;
   // What it makes of a small shape.
   [[nodiscard]] const Matrix2d& shape() const noexcept { return shape_; }
 

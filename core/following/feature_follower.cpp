@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/following/birth_layout.hpp"
 #include "core/following/feature_places.hpp"
 #include "core/geometry/symmetric_matrix2.hpp"
 #include "core/statistics/upper_median.hpp"
@@ -13,14 +12,11 @@
 namespace perimap {
 namespace {
 
-constexpr double kFirstDeviation_px = 6.0;
 constexpr std::size_t kEnoughDisplacements = 4;
 
 bool is_sought(const FollowedFeature& feature) noexcept {
   return feature.state == FollowState::kCandidate || feature.state == FollowState::kTracked;
 }
-
-bool is_away(const FollowedFeature& feature, int place) noexcept { return feature.swept && feature.place == place; }
 
 double largest_deviation(const Matrix2d& C) noexcept { return std::sqrt(larger_eigenvalue(C)); }
 
@@ -43,6 +39,7 @@ FeatureFollower::FeatureFollower(const FollowerSettings& settings)
       features_(static_cast<std::size_t>((3 + settings.candidates_per_place) * std::max(settings.maximum, 0))),
       motion_(features_.size()),
       return_(features_.size()),
+      layouts_(features_.size()),
       validity_(settings.rate),
       overlays_(features_.size(), settings.rate, settings.overlay),
       deviation_px_(kFirstDeviation_px) {
@@ -51,6 +48,11 @@ FeatureFollower::FeatureFollower(const FollowerSettings& settings)
 
 int FeatureFollower::frames(Duration time, int least) const noexcept {
   return std::max(static_cast<int>(settings_.rate.frames(time)), least);
+}
+
+std::uint64_t FeatureFollower::settling_frames() const noexcept {
+  constexpr Duration kSettledEvery = std::chrono::milliseconds(500);
+  return static_cast<std::uint64_t>(frames(kSettledEvery, 1));
 }
 
 std::size_t FeatureFollower::frames_to_judge() const noexcept {
@@ -91,20 +93,6 @@ bool FeatureFollower::seek(const GreyImage& image, FollowedFeature& feature, con
   return feature.found;
 }
 
-// Near where it is expected, since others vouch for that.
-bool FeatureFollower::seek_vouched_for(const GreyImage& image, FollowedFeature& feature, const Vector2d& expected,
-                                       double deviation_px) const noexcept {
-  constexpr double kOff_px = 2, kOffOfWidth = 0.006;
-  const FollowedPatch::Places places = feature.patch.places();
-  if (!seek(image, feature, expected, deviation_px, settings_.vouched_correlation, true)) return false;
-  const bool is_sure = feature.match.correlation >= settings_.recovered_correlation;
-  if (is_sure || (feature.px - expected).norm() <= kOff_px + kOffOfWidth * image.width) return true;
-  feature.patch.put_back(places);
-  feature.found = false;
-  feature.px = feature.last_px;
-  return false;
-}
-
 void FeatureFollower::note_displacements() noexcept {
   motion_.clear();
   for (const FollowedFeature& feature : features_) {
@@ -141,7 +129,7 @@ void FeatureFollower::follow_jerk(const GreyImage& image) noexcept {
 void FeatureFollower::track_into(const GreyImage& image) noexcept {
   std::size_t sought = 0, found = 0;
   for (FollowedFeature& feature : features_) {
-    feature.found = feature.is_overlay = feature.is_recalled = false;
+    feature.found = feature.is_overlay = feature.is_recalled = feature.has_layout = false;
     feature.last_px = feature.px;
     feature.last_places = feature.patch.places();
   }
@@ -194,27 +182,10 @@ void FeatureFollower::track_into(const GreyImage& image) noexcept {
   keep_to_maximum(features_, settings_.maximum);
   overlays_.let_go(features_, trails_);
   if (trails_.is_due()) trails_.note(features_);
+  if (trails_.frame() % settling_frames() == 0) layouts_.note(features_, trails_.frame());
   note_picture(image);
   blind_frames_ = 0;
   remember(image);
-}
-
-// Nearly all of what is tracked. Candidates tell nothing: many of them are none from the beginning.
-bool FeatureFollower::has_vanished() const noexcept {
-  constexpr std::size_t kEnoughToTell = 8, kNearlyAll = 5;  // one in so many is left at most
-  std::size_t tracked = 0, found = 0;
-  for (const FollowedFeature& feature : features_) {
-    if (feature.state != FollowState::kTracked && !has_lately_been_lost(feature)) continue;
-    ++tracked;
-    found += feature.found ? 1 : 0;
-  }
-  return tracked >= kEnoughToTell && kNearlyAll * found < tracked;
-}
-
-// A lens that is wiped, or withdrawn, loses them within some frames, not in one.
-bool FeatureFollower::has_lately_been_lost(const FollowedFeature& feature) const noexcept {
-  constexpr Duration kLately = std::chrono::milliseconds(400);
-  return feature.state == FollowState::kOccluded && !feature.swept && feature.misses <= frames(kLately, 5);
 }
 
 // A third to half a second ago there is always one.
@@ -231,137 +202,6 @@ void FeatureFollower::disbelieve(FollowedFeature& feature) const noexcept {
   feature.patch.put_back(feature.last_places);
 }
 
-// They are where they were before it began, as their places of then have it, and so is the picture.
-void FeatureFollower::sweep() noexcept {
-  const Recent& then = *std::min_element(
-      recent_.begin(), recent_.end(), [](const Recent& a, const Recent& b) { return a.trail_place < b.trail_place; });
-  const int place = places_.remember(then.picture);
-  const std::uint64_t ago = trails_.place() - then.trail_place;
-  for (FollowedFeature& feature : features_) {
-    if (feature.state == FollowState::kCandidate) feature.let_go();
-    if (feature.state != FollowState::kTracked && !has_lately_been_lost(feature)) continue;
-    disbelieve(feature);
-    if (ago > 0 && ago <= feature.trail_length && ago < FollowedFeature::kTrail) {
-      feature.px = feature.last_px = trails_.at(feature, static_cast<std::size_t>(ago));
-    }
-    feature.velocity_px.setZero();
-    feature.swept = true;
-    feature.place = place;
-  }
-}
-
-void FeatureFollower::recall_swept(const GreyImage& image) noexcept {
-  const auto is_swept = [](const FollowedFeature& feature) { return feature.swept; };
-  if (std::none_of(features_.begin(), features_.end(), is_swept)) return;
-  const Thumbnail now = thumbnail_of(image);
-  for (int place = 0; place < SeenPlaces::kMost; ++place) {
-    if (!recall_place(image, place, now)) continue;
-    note_displacements();
-    return;
-  }
-}
-
-// Widely, in this frame a share of a place's features. Returns how many those are.
-std::size_t FeatureFollower::probe(const GreyImage& image, int place) noexcept {
-  constexpr std::size_t kProbes = 40;
-  const auto away = static_cast<std::size_t>(std::count_if(
-      features_.begin(), features_.end(), [&](const FollowedFeature& feature) { return is_away(feature, place); }));
-  const std::size_t stride = (away + kProbes - 1) / kProbes;
-  std::size_t nth = stride > 0 ? trails_.frame() % stride : 0, probed = 0;
-  for (FollowedFeature& feature : features_) {
-    if (!is_away(feature, place) || nth++ % stride != 0) continue;
-    ++probed;
-    (void)seek(image, feature, return_.at(feature.last_px), settings_.widest_deviation_px,
-               settings_.vouched_correlation, true, return_.shape());
-  }
-  return probed;
-}
-
-// How many of those found have moved alike.
-std::size_t FeatureFollower::agree_on_return(const GreyImage& image, int place) noexcept {
-  constexpr double kAlike_px = 3, kAlikeOfWidth = 0.006;
-  return_.clear();
-  for (const FollowedFeature& feature : features_) {
-    if (is_away(feature, place) && feature.found) return_.add(feature.last_px, feature.px);
-  }
-  return return_.agree(kAlike_px + kAlikeOfWidth * image.width);
-}
-
-// What goes with those around it. The looks alone would lead many to a place beside their own.
-void FeatureFollower::take_back(const GreyImage& image, int place) noexcept {
-  constexpr double kOff_px = 1.5;
-  for (FollowedFeature& feature : features_) {
-    if (!is_away(feature, place) || feature.found) continue;
-    (void)seek(image, feature, return_.at(feature.last_px), kFirstDeviation_px, settings_.recalled_correlation, true,
-               return_.shape());
-  }
-  if (agree_on_return(image, place) < CommonMotion::kFewest) return;
-  for (FollowedFeature& feature : features_) {
-    if (!is_away(feature, place)) continue;
-    if (feature.found && (feature.px - return_.at(feature.last_px, &feature.last_px)).norm() <= kOff_px) {
-      feature.is_recalled = true;
-    } else {
-      disbelieve(feature);
-    }
-  }
-  for (FollowedFeature& feature : features_) feature.swept = feature.swept && !feature.is_recalled;
-}
-
-// When a good share of what is sought has moved alike, all are. What is nearer to the lens than other tissue has moved
-// otherwise: those that do not go with the first motion are asked for another.
-bool FeatureFollower::recall_place(const GreyImage& image, int place, const Thumbnail& now) noexcept {
-  constexpr std::size_t kFewestAlike = 6, kShareAlike = 4;  // one in so many at least
-  constexpr int kMotions = 3;
-  const auto is_of_place = [place](const FollowedFeature& feature) { return is_away(feature, place); };
-  if (std::none_of(features_.begin(), features_.end(), is_of_place)) return false;
-  return_.begin_with(displacement_between(places_[place], now).value_or(Vector2d::Zero()));
-  const std::size_t probed = probe(image, place);
-  std::size_t alike = agree_on_return(image, place);
-  const bool are_back = alike >= kFewestAlike && kShareAlike * alike >= probed;
-  for (int motion = 0; are_back && motion < kMotions && alike >= kFewestAlike; ++motion) {
-    take_back(image, place);
-    probe(image, place);
-    alike = agree_on_return(image, place);
-  }
-  for (FollowedFeature& feature : features_) {
-    if (!is_away(feature, place)) continue;
-    disbelieve(feature);
-    feature.swept = !are_back;
-  }
-  return are_back;
-}
-
-// What its own velocity did not find, and what was occluded: with the displacement of what is around it.
-void FeatureFollower::find_again(const GreyImage& image) noexcept {
-  for (FollowedFeature& feature : features_) {
-    if (feature.state == FollowState::kEmpty || feature.found || feature.swept) continue;
-    const NeighbourMotion::Around neighbours = around(feature.last_px, &feature);
-    constexpr double kShareKept = 0.5;  // of a velocity that nothing confirms
-    const Vector2d expected = feature.last_px + (neighbours.known ? 1.0 : kShareKept) * neighbours.by;
-    const bool is_occluded = feature.state == FollowState::kOccluded;
-    // Unseen for long, the place has been carried along without a measurement.
-    constexpr double kDrift_px_per_s = 3.0;
-    const double deviation_px = std::min(2 * deviation_px_ + kDrift_px_per_s / settings_.rate.per_s() * feature.misses,
-                                         settings_.widest_deviation_px);
-    // What its region hid comes back with what is around it.
-    const bool is_vouched_for = is_occluded && feature.hidden > 0 && neighbours.known;
-    const bool is_found = is_vouched_for ? seek_vouched_for(image, feature, expected, deviation_px)
-                                         : seek(image, feature, expected, deviation_px,
-                                                is_occluded ? settings_.recovered_correlation : 0);
-    if (!is_found) feature.px = expected;
-  }
-}
-
-// What was away and has come back alone: many places look like one that has not been seen for long.
-void FeatureFollower::hold_against_others(const GreyImage& image) noexcept {
-  constexpr double kAlikeOfWidth = 0.03, kOff_px = 3, kOffOfWidth = 0.015;
-  for (FollowedFeature& feature : features_) {
-    if (!feature.found || !feature.is_away || feature.is_recalled) continue;
-    const auto off_px = off_among_its_own(features_, feature, kAlikeOfWidth * image.width, return_);
-    if (off_px && *off_px > kOff_px + kOffOfWidth * image.width) disbelieve(feature);
-  }
-}
-
 void FeatureFollower::judge(const GreyImage& image) noexcept {
   // A candidate that is not found again at once was none; a feature may be covered for a while.
   constexpr Duration kMissesOfCandidate = std::chrono::milliseconds(67), kBriefly = std::chrono::milliseconds(100);
@@ -369,23 +209,26 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
   const int briefly = frames(kBriefly, 3);
   const int occluded = frames(settings_.occluded, settings_.occluded_frames);
   const int hidden = frames(settings_.hidden, settings_.occluded_frames);
+  const int remembered = frames(settings_.remembered, settings_.occluded_frames);
   const int candidate = frames(settings_.candidate, settings_.candidate_frames);
-  constexpr Duration kSettledEvery = std::chrono::milliseconds(500);
-  const auto view_stride = static_cast<std::uint64_t>(frames(kSettledEvery, 1));
+  constexpr Duration kReturning = std::chrono::milliseconds(400);
+  const int returning = frames(kReturning, 5);
   note_displacements();
   scratch_.clear();
   for (FollowedFeature& feature : features_) {
     if (feature.state == FollowState::kEmpty) continue;
     if (!feature.found) {
       feature.is_away = ++feature.misses > briefly;
+      if (feature.misses == 1) feature.layout = layout_before(feature, 0);
+      if (feature.misses == briefly + 1) feature.patch.forget_faded();
       feature.hidden += feature.swept || validity_.at(feature.px) != RegionFault::kNone ? 1 : 0;
       feature.velocity_px = feature.px - feature.last_px;
       const bool is_outside = feature.px.x() < 0 || feature.px.y() < 0 || feature.px.x() > image.width - 1 ||
                               feature.px.y() > image.height - 1;
       const bool is_candidate = feature.state == FollowState::kCandidate;
       if (is_candidate && feature.misses <= misses_of_candidate) continue;
-      const int missed = feature.misses - feature.hidden;
-      if (is_candidate || missed > occluded || feature.hidden > hidden || (is_outside && missed > occluded / 4)) {
+      const int missed = feature.misses - feature.hidden, longest = feature.has_layout ? remembered : occluded;
+      if (is_candidate || missed > longest || feature.hidden > hidden || (is_outside && missed > longest / 4)) {
         feature.let_go();
       } else {
         feature.state = FollowState::kOccluded;
@@ -400,6 +243,10 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
           feature.misses == 0 ? Vector2d(feature.px - feature.last_px) : displacement_around(feature.px, &feature);
     }
     const bool is_back = feature.misses > 0 || blind_frames_ > 0;
+    const bool is_clear = validity_.at(feature.px) == RegionFault::kNone;
+    feature.returning =
+        feature.is_away || !is_clear || blind_frames_ > 0 ? returning : std::max(0, feature.returning - 1);
+    feature.was_alone = !feature.is_recalled && (feature.was_alone || feature.is_away);
     feature.misses = feature.hidden = 0;
     feature.is_away = false;
     feature.swept = false;
@@ -408,7 +255,7 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
 
     const bool is_candidate = feature.state == FollowState::kCandidate;
     if (!moves_with_neighbours(feature, is_back)) {
-      feature.let_go();
+      if (!take_back_stray(feature, briefly)) feature.let_go();
       continue;
     }
     if (is_candidate && feature.frames >= candidate && !overlays_.may_be_overlay(feature, trails_)) {
@@ -416,8 +263,9 @@ void FeatureFollower::judge(const GreyImage& image) noexcept {
     }
     if (is_candidate) feature.doubt_px += largest_deviation(feature.match.covariance_px2) + feature.patch.back_px();
     feature.patch.keep_view(image, feature.match, tracker_.kernels());
-    if (trails_.frame() % view_stride == 0 && validity_.at(feature.px) == RegionFault::kNone)
-      feature.patch.settle_view();
+    if (trails_.frame() % settling_frames() == 0 && feature.returning == 0) {
+      feature.patch.settle_view(trails_.frame());
+    }
   }
   if (scratch_.size() >= kEnoughDisplacements) {
     constexpr double kShareOfNew = 0.2, kLeast_px = 0.4;

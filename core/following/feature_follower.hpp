@@ -14,6 +14,7 @@
 #include "core/following/feature_trails.hpp"
 #include "core/following/followed_feature.hpp"
 #include "core/following/overlay_watch.hpp"
+#include "core/following/past_layouts.hpp"
 #include "core/following/picture_validity.hpp"
 #include "core/following/seen_places.hpp"
 #include "core/geometry/pose.hpp"
@@ -35,6 +36,8 @@ struct FollowerSettings {
   // Unseen so long, and in so many frames of those that show anything, a feature is lost.
   Duration occluded = std::chrono::seconds(2);
   int occluded_frames = 15;
+  // Likewise where others tell where it ought to be.
+  Duration remembered = std::chrono::seconds(10);
   // Where the picture shows no tissue, and where nearly all features were lost together, so long.
   Duration hidden = std::chrono::seconds(120);
   double least_deviation_px = 1.0;    // of a prediction, per axis
@@ -99,7 +102,8 @@ class FeatureFollower {
                           double deviation_px, double min_correlation, bool is_vouched_for = false,
                           const Matrix2d& reshaped_by = Matrix2d::Identity()) const noexcept;
   [[nodiscard]] bool seek_vouched_for(const GreyImage& image, FollowedFeature& feature, const Vector2d& expected,
-                                      double deviation_px) const noexcept;
+                                      double deviation_px,
+                                      const Matrix2d& reshaped_by = Matrix2d::Identity()) const noexcept;
   // Of the features around `px`, without `but`; its own velocity where there are too few.
   [[nodiscard]] NeighbourMotion::Around around(const Vector2d& px, const FollowedFeature* but) const noexcept;
   [[nodiscard]] Vector2d displacement_around(const Vector2d& px, const FollowedFeature* but) const noexcept {
@@ -108,6 +112,14 @@ class FeatureFollower {
   void note_displacements() noexcept;
   void follow_jerk(const GreyImage& image) noexcept;
   void find_again(const GreyImage& image) noexcept;
+  void find_by_layouts(const GreyImage& image) noexcept;
+  void seek_by_layout(const GreyImage& image, std::uint32_t layout) noexcept;
+  void believe_by_layout(const GreyImage& image, std::uint32_t layout) noexcept;
+  [[nodiscard]] bool learn_motion_since(std::uint32_t layout, int width) noexcept;
+  [[nodiscard]] std::uint32_t layout_before(const FollowedFeature& feature, int frames_ago) const noexcept;
+  [[nodiscard]] bool take_back_stray(FollowedFeature& feature, int missed_frames) noexcept;
+  // From one settled view of a feature, and one layout, to the next.
+  [[nodiscard]] std::uint64_t settling_frames() const noexcept;
   // As many as take so long, but not fewer than there must be to tell anything.
   [[nodiscard]] int frames(Duration time, int least) const noexcept;
   [[nodiscard]] bool has_vanished() const noexcept;
@@ -127,6 +139,8 @@ class FeatureFollower {
   [[nodiscard]] bool moves_with_neighbours(FollowedFeature& feature, bool is_back) noexcept;
   void remember(const GreyImage& image) noexcept;
 
+  static constexpr double kFirstDeviation_px = 6.0;
+
   FollowerSettings settings_;
   FeatureTrails trails_;
   PatchTracker tracker_;
@@ -134,7 +148,8 @@ class FeatureFollower {
   std::vector<std::uint8_t> before_pixels_;
   GreyImage before_;        // the frame before; without pixels until there was one
   NeighbourMotion motion_;  // of this frame
-  CommonMotion return_;     // of those of a place that come back
+  CommonMotion return_;     // of those of a place that come back, or of a layout
+  PastLayouts layouts_;
   PictureValidity validity_;
   OverlayWatch overlays_;
   SeenPlaces places_;

@@ -45,6 +45,11 @@ struct FollowedFeature {
   bool swept = false;                    // it vanished together with nearly all others
   int place = 0;                         // SeenPlaces' number of the picture that they vanished from
   bool is_recalled = false;              // it has come back with them in the last frame
+  std::uint32_t layout = 0;              // PastLayouts' number of the one before it was lost; 0: none
+  bool has_layout = false;               // that told in the last frame where it should be
+  bool was_alone = false;                // it has come back without others: it tells nothing of where they should be
+  int returning = 0;                     // frames for which it counts as having just come back
+  int strays = 0;                        // how often it has gone astray and was taken back
   FollowedPatch::Places last_places;     // in the frame before: what is not believed is taken back
   std::array<Vector2d, kTrail> trail{};  // where it was, by the number of the place
   std::size_t trail_length = 0;

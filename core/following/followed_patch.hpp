@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 
 #include "core/geometry/pose.hpp"
 #include "core/sensors/grey_image.hpp"
@@ -18,6 +20,10 @@ namespace perimap {
 //
 // The last view moves without changing its shape. A place that it finds counts when the way back ends where it began
 // (way_back.hpp).
+//
+// Between them are views of half a second to a second ago. One that still fits takes back what the last views have
+// drifted since, so that drift sums up from one of those to the next, and no longer from frame to frame. They were made
+// before whatever covered the place began to, and so find what comes back.
 class FollowedPatch {
  public:
   // Of the first view, at px.
@@ -39,9 +45,12 @@ class FollowedPatch {
   // The view of the place just found becomes the last one. Without a template to be had there, the one before stays.
   void keep_view(const GreyImage& image, const PatchMatch& match, const PatchKernels& kernels) noexcept;
 
-  // The last view is kept beside those that follow, to be asked when it comes back after half a second or more: it was
-  // made before whatever covered the place began to.
-  void settle_view() noexcept;
+  // The last view, of this frame, is kept beside those that follow.
+  void settle_view(std::uint64_t frame) noexcept;
+  // Views of later frames are forgotten: they may show what covers the place.
+  void forget_since(std::uint64_t frame) noexcept;
+  // So are those that show less than an older one does: they were made through fog or in a blur.
+  void forget_faded() noexcept;
 
   // How far the way back has ended from where it began, px, when it was last gone.
   [[nodiscard]] double back_px() const noexcept { return back_px_; }
@@ -57,12 +66,35 @@ class FollowedPatch {
   void put_back(const Places& places) noexcept;
 
  private:
+  struct SettledView {
+    PatchTemplate view;
+    std::uint64_t frame = 0;
+    double drift_px2 = 0;  // up to then
+  };
+  // Where a view has it.
+  struct Sighting {
+    PatchMatch match;
+    PatchState state;
+    double drift_px2 = 0;
+    bool is_first = false;  // the first view's
+  };
+
   [[nodiscard]] bool comes_back(const PatchTracker& tracker, const GreyImage& image, const Search& search,
                                 const PatchMatch& match) noexcept;
-  void correct_by_first_view(const PatchTracker& tracker, const GreyImage& image, PatchMatch& match) noexcept;
+  void correct_drift(const PatchTracker& tracker, const GreyImage& image, PatchMatch& match) noexcept;
+  [[nodiscard]] std::optional<Sighting> by_first_view(const PatchTracker& tracker, const GreyImage& image,
+                                                      const Vector2d& px, double deviation_px,
+                                                      const Matrix2d& reshaped_by, double fits) const noexcept;
+  [[nodiscard]] std::optional<Sighting> by_settled_view(const PatchTracker& tracker, const GreyImage& image,
+                                                        const SettledView& settled, const Vector2d& px,
+                                                        double deviation_px, const Matrix2d& reshaped_by,
+                                                        double fits) const noexcept;
+  void accept(const Sighting& sighting) noexcept;
+  void forget_newest() noexcept;
+  void last_as_settled() noexcept;
 
   PatchTemplate first_, last_;
-  std::array<PatchTemplate, 2> settled_;  // the newer first
+  std::array<SettledView, 2> settled_;  // the newer first
   std::size_t settled_views_ = 0;
   PatchState first_state_, last_state_;
   bool has_last_ = false;  // else the first view is the last one

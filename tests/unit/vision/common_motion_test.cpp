@@ -17,7 +17,7 @@ class CommonMotionTest : public testing::Test {
  protected:
   Vector2d somewhere() { return {across_(random_), across_(random_)}; }
 
-  CommonMotion motion_{200};
+  CommonMotion motion_{400};
   std::mt19937 random_{5};
   std::uniform_real_distribution<double> across_{0, 400};
 };
@@ -51,6 +51,23 @@ TEST_F(CommonMotionTest, BendsWhereItsNeighboursDo) {
   EXPECT_LT(sum / 150, 1.0);  // 1.6 without the neighbours
 }
 
+// What lies behind goes another way than what lies before it, and neither is asked where the other goes.
+TEST_F(CommonMotionTest, TellsOfAPlaceWhatThoseBesideItDoUnlessTheyDoNotAgree) {
+  for (int x = 0; x < 400; x += 25) {
+    for (int y = 0; y < 400; y += 25) {
+      const Vector2d from(x, y);
+      motion_.add(from, x < 200 ? Vector2d(from + Vector2d(6, 0)) : Vector2d(from - Vector2d(20, 5)));
+    }
+  }
+  (void)motion_.agree(kTolerance_px);
+  const auto left = motion_.beside({100, 200}, kTolerance_px), right = motion_.beside({300, 200}, kTolerance_px);
+  ASSERT_TRUE(left && right);
+  EXPECT_LT((*left - Vector2d(106, 200)).norm(), 1e-6);
+  EXPECT_LT((*right - Vector2d(280, 195)).norm(), 1e-6);
+  for (int i = 0; i < 60; ++i) motion_.add(Vector2d(100 + i % 8, 200 + i / 8), somewhere());
+  EXPECT_FALSE(motion_.beside({104, 204}, kTolerance_px).has_value());
+}
+
 TEST_F(CommonMotionTest, StaysWhatItWasWhereNothingAgrees) {
   motion_.begin_with({5, 7});
   for (int i = 0; i < 20; ++i) motion_.add(somewhere(), somewhere());
@@ -61,8 +78,8 @@ TEST_F(CommonMotionTest, StaysWhatItWasWhereNothingAgrees) {
 
 TEST_F(CommonMotionTest, TakesNoMorePairsThanAnnouncedAndNothingFromTheHeap) {
   const long before = test::allocations;
-  for (int i = 0; i < 300; ++i) motion_.add(Vector2d(i, 2 * (i % 50)), Vector2d(i + 3, 2 * (i % 50)));
-  EXPECT_EQ(motion_.agree(1), 200U);
+  for (int i = 0; i < 500; ++i) motion_.add(Vector2d(i, 2 * (i % 50)), Vector2d(i + 3, 2 * (i % 50)));
+  EXPECT_EQ(motion_.agree(1), 400U);
   EXPECT_EQ(test::allocations, before);
 }
 
