@@ -45,6 +45,8 @@ VentricularEvidence BeatClasser::evidence_of(const RPeak& peak, const BeatKinds:
   evidence.paced = scatter_.like_clockwork();
   evidence.apart = compared.apart;
   evidence.coupled = compared.coupled;
+  evidence.kind_log_rr = compared.log_rr;
+  evidence.kind_scatter = compared.scatter;
   return evidence;
 }
 

@@ -14,6 +14,7 @@ constexpr double kVarianceAtFirst = 0.01;        // to the mean square of the sh
 constexpr double kLeastVariance = 0.0009;        // likewise: of 3 %, as converters and filters differ
 constexpr double kMemory = 16.0;                 // beats
 constexpr int kEnough = 3;                       // members
+constexpr int kEnoughIntervals = 4;              // of a kind, to tell how they scatter
 constexpr double kAnother = 6.0;           // unlikeness of a kind; the usual beats of a record have 1, one in 50 has 7
 constexpr double kApart = 55.0;            // likewise: what has recurred is no noise
 constexpr double kEarly = -0.08;           // log of the interval to the cycle,
@@ -90,6 +91,10 @@ BeatKinds::Comparison BeatKinds::compare(const QrsShape& shape) const noexcept {
   }
   if (compared.kind < 0 || compared.usual) return compared;
   const Kind& kind = at(compared.kind);
+  if (kind.intervals >= kEnoughIntervals) {
+    compared.log_rr = kind.log_rr;
+    compared.scatter = kind.log_rr_deviation;
+  }
   if (kind.members < kEnough) return compared;
   const double apart = unlike(kind.shape, at(usual));
   compared.apart = apart > kApart;

@@ -17,14 +17,18 @@ constexpr double kLeastSpread = 0.03;  // of any rhythm
 constexpr double kIntervalBefore = 2.8;
 constexpr double kCoupled = 3.1;
 constexpr double kApart = 1.8;
-constexpr double kLongestBefore = 0.7;  // log
-constexpr double kNarrower = -3.2;      // a unit of the logarithm,
-constexpr double kNarrowest = 0.5;      // to here
-constexpr double kOwn = -8.0;           // of a paced heart's own beat, which is narrower by more than
-constexpr double kOwnFrom = 0.0;        // this,
-constexpr double kOwnFully = 0.15;      // fully from here on,
-constexpr double kOwnTooEarly = -0.4;   // and comes no earlier than here: log of the interval to the cycle,
-constexpr double kOwnInTime = -0.2;     // likewise
+constexpr double kLongestBefore = 0.7;      // log
+constexpr double kNarrower = -3.2;          // a unit of the logarithm,
+constexpr double kNarrowest = 0.5;          // to here
+constexpr double kOwn = -8.0;               // of a paced heart's own beat, which is narrower by more than
+constexpr double kOwnFrom = 0.0;            // this,
+constexpr double kOwnFully = 0.15;          // fully from here on,
+constexpr double kOwnTooEarly = -0.4;       // and comes no earlier than here: log of the interval to the cycle,
+constexpr double kOwnInTime = -0.2;         // likewise,
+constexpr double kOwnCoupled = 0.09;        // or whose kind comes by intervals that scatter by more than this,
+constexpr double kOwnScattered = 0.12;      // fully from here on,
+constexpr double kOwnKindTooEarly = -0.45;  // and no earlier on the mean than here,
+constexpr double kOwnKindInTime = -0.3;     // likewise
 
 // From 0 to 1 between two limits.
 double rising(double value, double from, double to) noexcept {
@@ -35,7 +39,11 @@ double rising(double value, double from, double to) noexcept {
 
 double own_of_paced(const VentricularEvidence& evidence) noexcept {
   if (!evidence.paced) return 0.0;
-  return rising(evidence.narrower, kOwnFrom, kOwnFully) * rising(evidence.log_rr, kOwnTooEarly, kOwnInTime);
+  // Ventricular beats keep a distance of their own from the beat before, which fibrillation does not.
+  const double at_any_time = rising(evidence.kind_scatter, kOwnCoupled, kOwnScattered) *
+                             rising(evidence.kind_log_rr, kOwnKindTooEarly, kOwnKindInTime);
+  const double in_time = std::max(rising(evidence.log_rr, kOwnTooEarly, kOwnInTime), at_any_time);
+  return rising(evidence.narrower, kOwnFrom, kOwnFully) * in_time;
 }
 
 double log_odds(const VentricularEvidence& evidence) noexcept {

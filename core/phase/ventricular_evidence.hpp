@@ -20,6 +20,8 @@ struct VentricularEvidence {
   bool paced = false;          // usual beats come like clockwork
   bool apart = false;          // as BeatKinds has it,
   bool coupled = false;        // likewise
+  double kind_log_rr = 0.0;    // of the intervals before its kind to the cycle, mean,
+  double kind_scatter = 0.0;   // and mean deviation of that; 0: not known
 };
 
 // How far a beat is the own one of a heart in which a pacemaker makes the usual beats, 0 to 1.

@@ -75,11 +75,28 @@ TEST_F(Classed, APacedHeartsOwnBeatsAreNormalAndItsVentricularOnesAreNot) {
 
 // From three quarters of the cycle on.
 TEST_F(Classed, APacedHeartsOwnBeatIsPrematureWhenItComesFarTooEarly) {
-  for (const int after_ms : {560, 600}) {
+  for (const int after_ms : {580, 600}) {
     classer_ = {};
     for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal);
-    EXPECT_EQ(beat(after_ms, 1.0), after_ms < 580 ? BeatClass::kPremature : BeatClass::kNormal) << after_ms;
+    EXPECT_EQ(beat(after_ms, 1.0), after_ms < 590 ? BeatClass::kPremature : BeatClass::kNormal) << after_ms;
   }
+}
+
+// The atria fibrillate: after some beats it is known that this kind comes at any time.
+TEST_F(Classed, APacedHeartsOwnBeatsThatComeAtAnyTimeAreNormalWhenOneIsFarTooEarly) {
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal);
+  const auto own_beats = [&](std::initializer_list<int> after_ms) {
+    for (const int ms : after_ms) {
+      beat(ms, 1.0);
+      for (int i = 0; i < 3; ++i) beat(800, 0.7);
+    }
+  };
+  own_beats({790, 620, 750, 600, 780, 620});
+  EXPECT_EQ(beat(500, 1.0), BeatClass::kNormal);
+  classer_ = {};
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal);
+  own_beats({500, 510, 500, 490, 500, 510});
+  EXPECT_EQ(beat(500, 1.0), BeatClass::kPremature) << "coupled";
 }
 
 TEST_F(Classed, BigeminyStaysBigeminy) {

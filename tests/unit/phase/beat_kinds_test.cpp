@@ -101,6 +101,17 @@ TEST_F(Kinds, AKindIsCoupledOnceItHasComeEarlyByTheSameTimeThreeTimes) {
   EXPECT_TRUE(see(other, -0.3).coupled);
 }
 
+TEST_F(Kinds, HowTheIntervalsBeforeAKindScatterIsKnownFromFourOn) {
+  usual_beats(80, 0.05);
+  const QrsShape other = beat(0.0, 0.55);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(see(other, i % 2 == 0 ? -0.4 : -0.2).scatter, 0.0) << i;
+  EXPECT_NEAR(kinds_.compare(other).log_rr, -0.3, 0.01);
+  EXPECT_GT(kinds_.compare(other).scatter, 0.1);
+  for (int i = 0; i < 28; ++i) see(other, -0.35);
+  EXPECT_NEAR(kinds_.compare(other).log_rr, -0.35, 0.02);
+  EXPECT_LT(kinds_.compare(other).scatter, 0.03);
+}
+
 // As if another interval, three tenths beside the others, had been among them.
 TEST_F(Kinds, TheFirstIntervalsOfAKindAreTakenToScatter) {
   const auto coupled = [&](double second) {

@@ -85,6 +85,29 @@ TEST(VentricularEvidence, HowFarABeatIsTheHeartsOwnRisesWithItsWidthAndItsTime) 
   EXPECT_NEAR(own_of_paced(own), 0.5, 0.02);
 }
 
+// Fibrillation, which ventricular beats do not come by: they keep a distance of their own from the beat before.
+TEST(VentricularEvidence, AKindThatComesAtAnyTimeIsAPacedHeartsOwnHoweverEarly) {
+  VentricularEvidence own = usual();
+  own.paced = true;
+  own.narrower = 0.3;
+  own.log_rr = -0.6;
+  EXPECT_EQ(own_of_paced(own), 0.0);
+  own.kind_log_rr = -0.2;
+  own.kind_scatter = 0.15;
+  EXPECT_EQ(own_of_paced(own), 1.0);
+  own.kind_scatter = 0.105;
+  EXPECT_NEAR(own_of_paced(own), 0.5, 0.02);
+  own.kind_scatter = 0.07;
+  EXPECT_EQ(own_of_paced(own), 0.0) << "coupled";
+  own.kind_scatter = 0.15;
+  own.kind_log_rr = -0.375;
+  EXPECT_NEAR(own_of_paced(own), 0.5, 0.02);
+  own.kind_log_rr = -0.5;
+  EXPECT_EQ(own_of_paced(own), 0.0) << "its kind comes early on the mean";
+  own.log_rr = 0.0;
+  EXPECT_EQ(own_of_paced(own), 1.0) << "in time by itself";
+}
+
 // In natural units of log odds, as fitted to the development records.
 TEST(VentricularEvidence, IsWorthWhatTheRecordsSay) {
   const double base = log_odds(usual());
