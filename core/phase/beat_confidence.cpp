@@ -12,7 +12,7 @@ double size_difference(const BeatCircumstances& beat) noexcept { return std::abs
 
 double suspicion(const BeatCircumstances& beat, const DecisionSettings& settings) noexcept {
   const double unlike = 1.0 - beat.correlation + settings.unlike_by_size * size_difference(beat);
-  const double early = std::max(-std::log(std::max(beat.of_cycle, 1e-3)) / beat.spread, 0.0);
+  const double early = std::max(std::log(beat.usual_of_cycle / std::max(beat.of_cycle, 1e-3)) / beat.spread, 0.0);
   return unlike * (1.0 + early) * (1.0 + settings.unlike_in_noise * beat.disturbed);
 }
 
@@ -28,7 +28,10 @@ double confidence(const BeatCircumstances& beat, const DecisionSettings& setting
   const bool doubtful = young || in_noise || beat.may_be_followed || beat.rivalled || beat.unlike_any_beat ||
                         (!beat.familiar && beat.any_known) ||
                         (beat.familiar && suspicion(beat, settings) > settings.suspicious);
-  return doubtful ? std::min(beat.probability, settings.doubtful) : beat.probability;
+  if (doubtful) return std::min(beat.probability, settings.doubtful);
+  const bool calm = beat.disturbed <= settings.some_noise;
+  return beat.long_known && calm ? 1.0 - std::pow(1.0 - beat.probability, settings.long_known_in_calm)
+                                 : beat.probability;
 }
 
 }  // namespace perimap

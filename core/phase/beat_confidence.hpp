@@ -14,6 +14,7 @@ struct BeatCircumstances {
   double correlation = 1.0;      // with its kind
   double gain = 1.0;             // to its kind's size
   double of_cycle = 1.0;         // the interval before it, to the usual cycle
+  double usual_of_cycle = 1.0;   // the same, of its kind, where that comes early
   double spread = 0.06;          // of the logarithm of that
   double disturbed = 0.0;        // disturbances of late, fading
   bool familiar = false;         // like a settled kind that looks like a QRS complex,

@@ -151,9 +151,8 @@ Duration BeatDecision::within_cycle(Duration longest, double share) const noexce
 void BeatDecision::note_crowding(const Waiting& waiting) noexcept {
   // Before any kind is settled a P wave looks like a QRS complex as well.
   if (waiting.log_odds < settings_.qrs_like || !clusters_.any_settled()) return;
-  if (complexes_.crowded(within_cycle(settings_.crowd_to, settings_.crowd_of_cycle))) {
-    note_disturbance(waiting.candidate.time, 0.7);
-  }
+  const Duration longest = within_cycle(settings_.crowd_to, settings_.crowd_of_cycle);
+  if (complexes_.crowded(longest)) note_disturbance(waiting.candidate.time, 0.7);
 }
 
 double BeatDecision::like(const Waiting& waiting) const noexcept {
@@ -375,6 +374,7 @@ BeatCircumstances BeatDecision::circumstances(const Waiting& waiting, bool famil
   if (has_last_ && rhythm_.cycle_s > 0.0) {
     beat.of_cycle = to_seconds(waiting.candidate.time - last_.time) / rhythm_.cycle_s;
   }
+  beat.usual_of_cycle = std::min(std::exp(clusters_.log_of_cycle(waiting.cluster)), 1.0);
   beat.spread = rhythm_.spread;
   beat.disturbed = disturbed(now);
   beat.familiar = familiar;
@@ -462,8 +462,9 @@ void BeatDecision::learn_rhythm(const Waiting& waiting) noexcept {
   if (!has_last_ || hidden_ || std::min(waiting.probability, last_probability_) < settings_.learnt) return;
   const double rr_s = to_seconds(waiting.candidate.time - last_.time);
   if (rhythm_.cycle_s > 0.0) {
-    const double off = std::min(std::abs(std::log(rr_s / rhythm_.cycle_s)), 0.7);
-    rr_deviation_ += (off - rr_deviation_) / 12.0;
+    const double log_of_cycle = std::log(rr_s / rhythm_.cycle_s);
+    rr_deviation_ += (std::min(std::abs(log_of_cycle), 0.7) - rr_deviation_) / 12.0;
+    if (familiar(waiting)) clusters_.came(waiting.cluster, log_of_cycle);
   }
   rr_s_.push(rr_s);
   const double usual_s = rr_s_.count() < 8 ? std::max(rr_s_.median(), rr_s_.mean_of_last_two()) : rr_s_.median();

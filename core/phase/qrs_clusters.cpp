@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace perimap {
 namespace {
@@ -20,6 +21,7 @@ constexpr double kCaution = 2.0;         // members
 constexpr double kOften = 0.4;           // share of P waves that are conducted: in 2:1 block half of them
 constexpr double kHardlyWithout = 0.85;  // share of QRS complexes that a P wave precedes
 constexpr int kEnough = 2;               // members
+constexpr int kTimes = 3;                // that a kind came early: twice is chance
 constexpr double kFollow = 0.2;          // share of a new distance in that of rivals
 
 }  // namespace
@@ -61,8 +63,9 @@ int QrsClusters::make_room(bool frozen) noexcept {
       c.preceded = 0.0;
       c.preceded_known = 0.0;
     }
-    if (c.rival_before.by == room) c.rival_before = {};
-    if (c.rival_after.by == room) c.rival_after = {};
+    for (Rival& rival : c.rivals) {
+      if (rival.by == room) rival = {};
+    }
   }
   return room;
 }
@@ -133,14 +136,19 @@ bool QrsClusters::leads(int i) const noexcept {
 }
 
 bool QrsClusters::beside(int of, int by, double after_s, double scatter_s, bool at_first) noexcept {
-  Cluster& c = clusters_[static_cast<std::size_t>(of)];
-  Rival& rival = after_s > 0.0 ? c.rival_after : c.rival_before;
-  const bool known = rival.apart_s > 0.0;
-  const bool same_kind = rival.by == by && recurs(by);
-  const double off_s = std::abs(after_s) - rival.apart_s;
-  rival.by = by;
-  rival.apart_s = known ? rival.apart_s + kFollow * off_s : std::abs(after_s);
-  return known ? std::abs(off_s) < scatter_s && (same_kind || at_first) : at_first;
+  auto& rivals = clusters_[static_cast<std::size_t>(of)].rivals;
+  const auto same_side = [&](const Rival& rival) { return rival.after_s * after_s > 0.0; };
+  const bool first = std::none_of(rivals.begin(), rivals.end(), same_side);
+  const auto known = std::find_if(rivals.begin(), rivals.end(), [&](const Rival& rival) {
+    return same_side(rival) && std::abs(after_s - rival.after_s) < scatter_s;
+  });
+  const bool same_distance = known != rivals.end();
+  const bool same_kind = same_distance && known->by == by && recurs(by);
+  const double mean_s = same_distance ? known->after_s + kFollow * (after_s - known->after_s) : after_s;
+  std::move_backward(rivals.begin(), same_distance ? known : std::prev(rivals.end()),
+                     same_distance ? std::next(known) : rivals.end());
+  rivals.front() = {by, mean_s};
+  return same_kind || (at_first && (same_distance || first));
 }
 
 void QrsClusters::rivalled(int of, bool by_another) noexcept {
@@ -148,6 +156,17 @@ void QrsClusters::rivalled(int of, bool by_another) noexcept {
   Cluster& c = clusters_[static_cast<std::size_t>(of)];
   c.rivalled_known = std::min(c.rivalled_known + 1.0, kMemory);
   c.rivalled += ((by_another ? 1.0 : 0.0) - c.rivalled) / c.rivalled_known;
+}
+
+void QrsClusters::came(int of, double log_of_cycle) noexcept {
+  if (of < 0) return;
+  Cluster& c = clusters_[static_cast<std::size_t>(of)];
+  c.came_known = std::min(c.came_known + 1.0, kMemory);
+  c.log_of_cycle += (log_of_cycle - c.log_of_cycle) / c.came_known;
+}
+
+double QrsClusters::log_of_cycle(int i) const noexcept {
+  return i >= 0 && at(i).came_known >= kTimes ? at(i).log_of_cycle : 0.0;
 }
 
 void QrsClusters::settle(int of) noexcept {

@@ -42,11 +42,13 @@ class QrsClusters {
   void followed(int of, bool by_sharper) noexcept;
   // Which blunter complex came within a PR interval before it; -1: none.
   void preceded(int of, int by) noexcept;
-  // Another of cluster `by` that looks as much like a QRS comes so long after it, or before: at the same distance,
-  // within `scatter_s`, as the last time? `at_first`: whatever the last one was.
+  // Another of cluster `by` that looks as much like a QRS comes so long after it, or before: at a distance, within
+  // `scatter_s`, at which one of its kind came lately? `at_first`: whatever kind that was, and the first of its side.
   bool beside(int of, int by, double after_s, double scatter_s, bool at_first) noexcept;
   // Whether one came beside a member.
   void rivalled(int of, bool by_another) noexcept;
+  // A member was a beat, so long after the one before: logarithm of the interval to the usual cycle.
+  void came(int of, double log_of_cycle) noexcept;
   // Its members are beats, though they were seen among disturbances.
   void settle(int of) noexcept;
   void clear() noexcept { clusters_.fill({}); }
@@ -66,16 +68,21 @@ class QrsClusters {
   [[nodiscard]] bool leads(int i) const noexcept;
   // Share of its members beside which, within one cycle, another comes that looks as much like a QRS.
   [[nodiscard]] double rivals(int i) const noexcept { return i < 0 ? 0.0 : at(i).rivalled; }
+  // When its members usually come; 0, on time, while that is not known. Ectopic beats come early.
+  [[nodiscard]] double log_of_cycle(int i) const noexcept;
   [[nodiscard]] Instant born(int i) const noexcept { return at(i).born; }  // its first member was seen
   [[nodiscard]] bool upward(int i) const noexcept { return at(i).upward; }
 
  private:
   static constexpr double kRecurs = 2.5;
   static constexpr double kCalm = 0.5;  // share of its members
+  // At which rivals of one kind come: a P wave and the QRS complex may be of one kind, which has a rival a PR interval
+  // and the rest of the cycle away, before as well as after it.
+  static constexpr int kDistances = 4;
 
   struct Rival {
-    int by = -1;  // the cluster seen last
-    double apart_s = 0.0;
+    int by = -1;           // the cluster seen last
+    double after_s = 0.0;  // < 0: it comes before; 0: none
   };
   struct Cluster {
     QrsShape shape;  // root mean square 1
@@ -89,10 +96,11 @@ class QrsClusters {
     int before = -1;        // the cluster that precedes it,
     double preceded = 0.0;  // for this share of its members,
     double preceded_known = 0.0;
-    Rival rival_before;
-    Rival rival_after;
+    std::array<Rival, kDistances> rivals;  // those that were seen last first
     double rivalled = 0.0;
     double rivalled_known = 0.0;
+    double log_of_cycle = 0.0;
+    double came_known = 0.0;
     double calm = 0.0;
     double calm_known = 0.0;
     bool upward = true;

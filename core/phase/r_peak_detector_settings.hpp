@@ -90,11 +90,12 @@ struct DecisionSettings {
   double very_familiar = 0.92;                            // correlation of a beat that is like its kind
   double unlike_by_size =
       0.1;  // of a beat to its kind: 1 - correlation and the difference in size, logarithm, times this
-  double unlike_in_noise = 4.0;  // times 1 and the disturbances times this, and 1 and how early it comes:
-  double suspicious = 0.17;      // from which on it may be an arc (dev; see beat_confidence)
-  double doubtful = 0.5;         // confidence that nothing in them exceeds,
-  double lost_in_noise = 0.25;   // and nothing that is unlike the beats among disturbances,
-  double early_in_noise = 0.1;   // nor what comes early there: BeatClasser takes them for noise
+  double unlike_in_noise = 4.0;     // times 1 and the disturbances times this, and 1 and how early it comes:
+  double suspicious = 0.17;         // from which on it may be an arc (dev; see beat_confidence)
+  double doubtful = 0.5;            // confidence that nothing in them exceeds,
+  double long_known_in_calm = 2.0;  // power of the odds against a beat of a kind that nothing speaks against (dev)
+  double lost_in_noise = 0.25;      // and nothing that is unlike the beats among disturbances,
+  double early_in_noise = 0.1;      // nor what comes early there: BeatClasser takes them for noise
   Duration longer_than_bursts = std::chrono::seconds(25);
   Duration around = std::chrono::milliseconds(500);  // what is strange so near makes a strange one less likely
   Duration pr_shortest = std::chrono::milliseconds(100);

@@ -424,8 +424,27 @@ TEST(BeatDecision, OnlyBeatsThatAreLikelyEnoughTeachTheRhythm) {
     patient.run(patient.last_s + 0.3);
     return !patient.decision.learning(at(patient.last_s + 3.5));
   };
-  EXPECT_TRUE(taught({0.13, 0.13, 0.13, 0.13, 0.13, 0.13}, 0.84, 1.0));
-  EXPECT_FALSE(taught({0.067, 0.067, 0.08, 0.085, 0.09, 0.095}, 0.54, 0.79));
+  EXPECT_TRUE(taught({0.13, 0.13, 0.13, 0.13, 0.13, 0.13}, 0.97, 1.0));
+  EXPECT_FALSE(taught({0.067, 0.067, 0.08, 0.085, 0.09, 0.095}, 0.78, 0.96));
+}
+
+// Where one beat in ten is a ventricular one it comes early by many deviations of the rhythm, each time.
+TEST(BeatDecision, WhatComesEarlyInAKindThatDoesIsBelieved) {
+  const QrsShape ectopic = wave(-1.0, 2.5);
+  Known patient;
+  for (int i = 0; i < 8; ++i) {
+    patient.see(patient.last_s + 0.5, shaped(ectopic));
+    patient.beats(1, 1.1);
+    patient.beats(9);
+  }
+  const double early_s = patient.last_s + 0.5;
+  patient.see(early_s, shaped(between(ectopic, kWide, 0.95)));
+  patient.beats(1, 1.1);
+  patient.beats(9);
+  const double usual_s = patient.last_s + 0.5;
+  patient.see(usual_s, shaped(like_beat(0.95)));
+  EXPECT_GT(patient.confidence(early_s), 0.9);
+  EXPECT_EQ(patient.confidence(usual_s), 0.5) << "of a kind that comes on time";
 }
 
 }  // namespace

@@ -192,9 +192,39 @@ TEST(QrsClusters, TheDistanceOfRivalsIsFollowedByAFifth) {
   int wave = -1;
   for (int i = 0; i < 4; ++i) wave = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
   clusters.beside(wave, wave, 0.300, 0.02, false);
-  EXPECT_FALSE(clusters.beside(wave, wave, 0.340, 0.02, false));  // now 0.308
-  EXPECT_TRUE(clusters.beside(wave, wave, 0.327, 0.02, false));   // 0.3118
-  EXPECT_FALSE(clusters.beside(wave, wave, 0.333, 0.02, false));
+  EXPECT_TRUE(clusters.beside(wave, wave, 0.319, 0.02, false));   // now 0.3038
+  EXPECT_TRUE(clusters.beside(wave, wave, 0.3235, 0.02, false));  // 0.3077
+  EXPECT_FALSE(clusters.beside(wave, wave, 0.3280, 0.02, false));
+}
+
+// A P wave and the QRS complex are of one kind: a PR interval lies between them, and the rest of the cycle.
+TEST(QrsClusters, ARivalMayComeAtMoreThanOneDistance) {
+  QrsClusters clusters;
+  int kind = -1;
+  for (int i = 0; i < 4; ++i) kind = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
+  const auto come = [&](double a_s, double b_s) {
+    bool all = true;
+    for (const double after_s : {a_s, b_s, -a_s, -b_s}) all = clusters.beside(kind, kind, after_s, 0.02, false) && all;
+    return all;
+  };
+  EXPECT_FALSE(come(0.23, 0.43));
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(come(0.23, 0.43)) << i;
+  EXPECT_FALSE(clusters.beside(kind, kind, 0.33, 0.02, false)) << "a fifth, which takes the place of the oldest";
+  EXPECT_FALSE(clusters.beside(kind, kind, 0.23, 0.02, false));
+  EXPECT_TRUE(clusters.beside(kind, kind, -0.43, 0.02, false));
+}
+
+TEST(QrsClusters, AKindComesEarlyThatHasThreeTimes) {
+  QrsClusters clusters;
+  const int kind = clusters.learn(kOther, true, Surroundings::kCalm, kNow);
+  EXPECT_EQ(clusters.log_of_cycle(-1), 0.0);
+  for (int i = 0; i < 2; ++i) clusters.came(kind, -0.4);
+  EXPECT_EQ(clusters.log_of_cycle(kind), 0.0) << "chance";
+  clusters.came(kind, -0.4);
+  EXPECT_NEAR(clusters.log_of_cycle(kind), -0.4, 1e-9);
+  for (int i = 0; i < 20; ++i) clusters.came(kind, -0.4);
+  clusters.came(kind, 0.08);
+  EXPECT_NEAR(clusters.log_of_cycle(kind), -0.36, 1e-9) << "the last twelve count";
 }
 
 TEST(QrsClusters, JudgesByTheMeanOfItsMembersAndCautiouslyWhereTheyAreFew) {

@@ -34,16 +34,18 @@ struct Lead {
   int third = kind(wave(0.3, 2.5));
 };
 
-// Shares that are rivalled, where `second` comes so long after `first` and has so much less log odds.
+// Shares that are rivalled, where `second` comes so long after `first`, at so many distances that are twice the scatter
+// apart, and has so much less log odds.
 struct Rivalry {
   double of_first = 0.0;
   double of_second = 0.0;
 };
-Rivalry rivalry(double after_s, double less, double scatter_s = 0.0) {
+Rivalry rivalry(double after_s, double less, double scatter_s = 0.0, int distances = 2) {
   Lead lead;
   for (int i = 0; i < 60; ++i) {
     lead.see(1.0 * i, lead.first);
-    lead.see(1.0 * i + after_s + (i % 2 == 0 ? scatter_s : -scatter_s), lead.second, 3.0 - less);
+    const int offset = 2 * (5 * i % distances) - distances + 1;
+    lead.see(1.0 * i + after_s + offset * scatter_s, lead.second, 3.0 - less);
   }
   return {lead.clusters.rivals(lead.first), lead.clusters.rivals(lead.second)};
 }
@@ -63,9 +65,11 @@ TEST(RecentComplexes, RivalsAreAsFarApartAsPOrTFromR) {
   EXPECT_EQ(rivalry(0.46, 0.0).of_first, 0.0) << "an early beat";
 }
 
-TEST(RecentComplexes, RivalsAreOfOneDistance) {
+TEST(RecentComplexes, RivalsAreOfFewDistances) {
   EXPECT_GT(rivalry(0.3, 0.0, 0.015).of_first, 0.8);
-  EXPECT_LT(rivalry(0.3, 0.0, 0.022).of_first, 0.1) << "fibrillation";
+  EXPECT_GT(rivalry(0.3, 0.0, 0.05).of_first, 0.8) << "two";
+  EXPECT_LT(rivalry(0.3, 0.0, 0.011, 7).of_first, 0.1) << "fibrillation";
+  EXPECT_GT(rivalry(0.3, 0.0, 0.009, 7).of_first, 0.8);
 }
 
 TEST(RecentComplexes, RivalsAreOfOneKindUnlessLittleIsKnownYet) {
