@@ -57,15 +57,16 @@ std::optional<MotionOffset> offset_by_motion(const std::vector<PosePair>& pairs,
   for (std::size_t i = 0; i < times_s.size(); ++i) {
     scores.push_back(fast_twists[i].dot(fast_errors[i] + result.change_s * fast_twists[i]));
   }
-  // Never less than of white errors, neither as they are where it moves nor as they are everywhere: of several windows
-  // the one whose deviation came out smallest by chance would be taken for the surest.
+  // Never less than of white errors: of several windows the one whose deviation came out smallest by chance would be
+  // taken for the surest.
   double alone = 0.0;
   for (const double score : scores) alone += score * score;
+  result.deviation_s = std::sqrt(std::max(alone, variance_of_sum(scores))) / H;
   double all = 0.0;
-  for (std::size_t i = 0; i < times_s.size(); ++i)
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
     all += (fast_errors[i] + result.change_s * fast_twists[i]).squaredNorm();
-  const double everywhere = H * all / static_cast<double>(6 * times_s.size());
-  result.deviation_s = std::sqrt(std::max({alone, everywhere, variance_of_sum(scores)})) / H;
+  }
+  result.white_deviation_s = std::sqrt(all / static_cast<double>(6 * times_s.size()) / H);
   return result;
 }
 

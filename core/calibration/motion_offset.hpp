@@ -11,6 +11,8 @@ namespace perimap {
 struct MotionOffset {
   double change_s = 0.0;     // to be added to the offset that the pairs were made with
   double deviation_s = 0.0;  // with errors that last, as the errors themselves tell it
+  // What it would be if errors were new in each pose and everywhere as large as they are in the mean.
+  double white_deviation_s = 0.0;
 };
 
 // Least squares over errors (hand_eye_error() of each pair, whitened by their covariance) along the sensor's twist,

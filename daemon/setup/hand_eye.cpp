@@ -221,6 +221,7 @@ Expected<void> adjust(HandEyeCalibration& result, const std::vector<TimedPose>& 
 struct OffsetByWindow {
   double offset_s = 0.0;
   double deviation_s = 0.0;
+  double white_deviation_s = 0.0;
 };
 
 // What is left when errors that last longer than each of these are passed over; the window as well.
@@ -230,7 +231,8 @@ std::vector<std::pair<double, OffsetByWindow>> offsets_by_window(const HandEyeCa
   std::vector<std::pair<double, OffsetByWindow>> offsets;
   for (const double window_s : kWindows_s) {
     const auto told = offset_by_motion(result.pairs, errors, result.used, result.error_covariance, window_s);
-    if (told) offsets.push_back({window_s, {result.offset_s + told->change_s, told->deviation_s}});
+    if (told)
+      offsets.push_back({window_s, {result.offset_s + told->change_s, told->deviation_s, told->white_deviation_s}});
   }
   return offsets;
 }
@@ -251,7 +253,7 @@ Expected<void> refine_offset(HandEyeCalibration& result, const std::vector<Timed
     const auto told = offset_by_motion(result.pairs, errors_of(result.pairs, result.X_SC, result.X_WB), result.used,
                                        result.error_covariance, chosen->first);
     if (!told) break;
-    best = {result.offset_s + told->change_s, told->deviation_s};
+    best = {result.offset_s + told->change_s, told->deviation_s, told->white_deviation_s};
     result.offset_s = best.offset_s;
     result.pairs = pair_up(camera, tracker, result.offset_s, false);
     result.used = within(errors_of(result.pairs, result.X_SC, result.X_WB), result.error_covariance);
@@ -274,7 +276,9 @@ Expected<void> refine_offset(HandEyeCalibration& result, const std::vector<Timed
   // Given the offset, the rest is as certain as before; and it goes with the offset.
   const Eigen::Matrix<double, 7, 7> joint = result.correlation_length * together.covariance;
   const Vector6d along = joint.topRightCorner<6, 1>() / joint(6, 6);
-  const double variance = best.deviation_s * best.deviation_s + systematic_s * systematic_s;
+  // The surest of several windows is so by chance, too.
+  const double deviation_s = std::max(best.deviation_s, best.white_deviation_s);
+  const double variance = deviation_s * deviation_s + systematic_s * systematic_s;
   result.covariance = joint;
   result.covariance.topLeftCorner<6, 6>() += (variance - joint(6, 6)) * along * along.transpose();
   result.covariance.topRightCorner<6, 1>() = variance * along;

@@ -165,9 +165,7 @@ class PivotGuide final : public LiveGuide {
   void follow(const std::vector<TimedPose>& poses) override {
     span_s_ = span_s(poses);
     turned_deg_ = turned_deg(thinned(poses, 500));
-    // Anew every second. Of a few of the poses the tip would be less well known than of all.
-    if (span_s_ - judged_s_ < 1.0) return;
-    judged_s_ = span_s_;
+    // Of a few of the poses the tip would be less well known than of all.
     const auto result = calibrate_pivot(thinned(poses, 3000));
     const double within_mm = result ? std::sqrt(result->covariance_T.trace()) : 0.0;
     well_known_ = result && within_mm <= kWellKnownTip_mm;
@@ -192,7 +190,6 @@ class PivotGuide final : public LiveGuide {
 
   double least_s_;
   double span_s_ = 0.0;
-  double judged_s_ = -1e9;
   bool well_known_ = false;
   Vector3d turned_deg_ = Vector3d::Zero();
   std::string state_;
