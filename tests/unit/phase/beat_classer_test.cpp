@@ -82,6 +82,15 @@ TEST_F(Classed, APacedHeartsOwnBeatIsPrematureWhenItComesFarTooEarly) {
   }
 }
 
+// So doubtful that it is no ventricular one, and hardly another shape: its time alone tells.
+TEST_F(Classed, WhatIsHalfAPacedHeartsOwnMayComeEarly) {
+  for (const int after_ms : {585, 600}) {
+    classer_ = {};
+    for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal);
+    EXPECT_EQ(beat(after_ms, 0.98, 0.2), after_ms < 590 ? BeatClass::kPremature : BeatClass::kNormal) << after_ms;
+  }
+}
+
 // The atria fibrillate: after some beats it is known that this kind comes at any time.
 TEST_F(Classed, APacedHeartsOwnBeatsThatComeAtAnyTimeAreNormalWhenOneIsFarTooEarly) {
   for (int i = 0; i < 20; ++i) EXPECT_EQ(beat(800, 0.7), BeatClass::kNormal);
