@@ -292,5 +292,23 @@ TEST(BeatEvidence, TWavesEndWithTheCycleAndPrIntervalsAreShort) {
   EXPECT_EQ(pair(BeatEvidence::kBeforeSharper, 0.20, 0.5, 1.0, 0.4), 0.0);
 }
 
+// In a slow heart no longer than the longest usual PR interval, in a fast one than a share of the cycle.
+TEST(BeatEvidence, ABlunterBeatBeforeMayBeThePWaveWithinAPrInterval) {
+  const auto before_sharper = [](double rr_s, double cycle_s) {
+    PairContext pair;
+    pair.rr_s = rr_s;
+    pair.cycle_s = cycle_s;
+    pair.before_sharpness = 1.0;
+    pair.sharpness = 2.0;
+    EvidenceOf<BeatEvidence> evidence{};
+    add_pair(pair, evidence);
+    return part(evidence, BeatEvidence::kBeforeSharper);
+  };
+  EXPECT_GT(before_sharper(0.27, 1.0), 0.0);
+  EXPECT_EQ(before_sharper(0.29, 1.0), 0.0);
+  EXPECT_GT(before_sharper(0.21, 0.5), 0.0);
+  EXPECT_EQ(before_sharper(0.24, 0.5), 0.0);
+}
+
 }  // namespace
 }  // namespace perimap
