@@ -139,7 +139,7 @@ turned_deg() {
 rotation() { for i in 1 2 3 4; do "$@" $i; done | tr '\n' ' '; }
 at_most "hand-eye rotation, degrees" \
   "$(turned_deg "$(rotation value hand_eye_rotation_SC_wxyz)" "$(rotation nth truth.json rotation_wxyz)")" 0.3
-focal_px() { tr -d '\n' < camera.yaml | sed 's/.*camera_matrix//; s/.*data: *\[//; s/\].*//' | cut -d, -f"$1"; }
+focal_px() { tr -d '\n' < camera.yaml | sed 's/.*camera_matrix[^[]*\[//; s/\].*//' | cut -d, -f"$1"; }
 for i in 1 2; do
   truth_px=$(nth truth.json focal_px $i)
   near "focal length $i, px" "$(focal_px $((4 * i - 3)))" "$truth_px" "$(awk -v f="$truth_px" 'BEGIN { print 0.003 * f }')"
