@@ -62,7 +62,7 @@ struct SetupVerdictSettings {
   double chance_chi2 = 8.0;
   // What is reckoned with before a window has told anything: that one part is wrong, of which each is as likely, by
   // numbers of so much of the watch's prior deviations (3 degrees, 10 mm, 5 %, 15 px, 25 ms).
-  double wrong_probability = 0.5;
+  double wrong_probability = 0.3;
   double wrong_by = 0.5;
 };
 
