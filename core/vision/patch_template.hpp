@@ -22,7 +22,7 @@ struct PatchTemplate {
   // Window sides in pixels of their own level: 3 mm of tissue at level 0 in a common view; the coarse windows span up
   // to twice that.
   static constexpr std::array<int, kLevels> kSide = {21, 15, 11};
-  static constexpr int kReach = kSide[0] / 2;  // of the first level, px from its middle pixel
+  static constexpr int kReach = kSide[0] / 2;      // of the first level, px from its middle pixel
   static constexpr std::size_t kMaxSamples = 448;  // 21 x 21, row after row, then zeros up to a multiple of 32
   using Pixels = std::array<std::int16_t, kMaxSamples>;
   // Grey values are kept less this one, so that sums over a window are small, and times the other.
