@@ -9,6 +9,23 @@
 #include "core/statistics/upper_median.hpp"
 
 namespace perimap {
+namespace {
+
+constexpr std::size_t kAround = 6;
+using Offs = NearestFew<Vector2d, kAround>;
+
+// On each axis.
+Vector2d median_off(const Offs& offs) noexcept {
+  Vector2d median;
+  std::array<double, kAround> values{};
+  for (int axis = 0; axis < 2; ++axis) {
+    for (std::size_t i = 0; i < offs.size(); ++i) values[i] = offs[i].value[axis];
+    median[axis] = upper_median(values.begin(), values.begin() + offs.size());
+  }
+  return median;
+}
+
+}  // namespace
 
 CommonMotion::CommonMotion(std::size_t most) { pairs_.reserve(most); }
 
@@ -86,51 +103,38 @@ void CommonMotion::fit(const Similarity& motion, double tolerance_px) noexcept {
   shape_ = motion.shape + normal.ldlt().solve(right).transpose();
 }
 
-Vector2d CommonMotion::at(const Vector2d& from_px, const Vector2d* but) const noexcept {
-  constexpr std::size_t kAround = 6, kEnough = 4;
-  NearestFew<Vector2d, kAround> nearest;
+template <class Nearest>
+Nearest CommonMotion::offs_around(const Vector2d& from_px, const Vector2d* but, bool agreeing) const noexcept {
+  Nearest nearest;
   for (const Pair& pair : pairs_) {
-    if (!pair.agrees || (but != nullptr && pair.from == *but)) continue;
+    if ((agreeing && !pair.agrees) || (but != nullptr && pair.from == *but)) continue;
     const double distance_squared = (pair.from - from_px).squaredNorm();
     if (!nearest.takes(distance_squared)) continue;
     nearest.add(distance_squared, pair.to - to_px_ - shape_ * (pair.from - from_px_));
   }
-  Vector2d at = to_px_ + shape_ * (from_px - from_px_);
-  if (nearest.size() < kEnough) return at;
-  std::array<double, kAround> values{};
-  for (int axis = 0; axis < 2; ++axis) {
-    for (std::size_t i = 0; i < nearest.size(); ++i) values[i] = nearest[i].value[axis];
-    at[axis] += upper_median(values.begin(), values.begin() + nearest.size());
-  }
-  return at;
+  return nearest;
+}
+
+Vector2d CommonMotion::at(const Vector2d& from_px, const Vector2d* but) const noexcept {
+  constexpr std::size_t kEnough = 4;
+  const Offs offs = offs_around<Offs>(from_px, but, true);
+  const Vector2d at = to_px_ + shape_ * (from_px - from_px_);
+  return offs.size() < kEnough ? at : Vector2d(at + median_off(offs));
 }
 
 std::optional<Vector2d> CommonMotion::beside(const Vector2d& from_px, double tolerance_px,
                                              const Vector2d* but) const noexcept {
-  constexpr std::size_t kAround = 6;
   constexpr std::ptrdiff_t kEnoughAlike = 4;
-  NearestFew<Vector2d, kAround> nearest;
-  for (const Pair& pair : pairs_) {
-    if (but != nullptr && pair.from == *but) continue;
-    const double distance_squared = (pair.from - from_px).squaredNorm();
-    if (!nearest.takes(distance_squared)) continue;
-    nearest.add(distance_squared, pair.to - to_px_ - shape_ * (pair.from - from_px_));
-  }
-  if (nearest.size() < kAround) return std::nullopt;
-  Vector2d off;
-  std::array<double, kAround> values{};
-  for (int axis = 0; axis < 2; ++axis) {
-    for (std::size_t i = 0; i < kAround; ++i) values[i] = nearest[i].value[axis];
-    off[axis] = upper_median(values.begin(), values.end());
-  }
+  const Offs offs = offs_around<Offs>(from_px, but, false);
+  if (offs.size() < kAround) return std::nullopt;
+  const Vector2d off = median_off(offs);
   std::ptrdiff_t alike = 0;
-  for (std::size_t i = 0; i < kAround; ++i) alike += (nearest[i].value - off).norm() <= tolerance_px ? 1 : 0;
+  for (std::size_t i = 0; i < kAround; ++i) alike += (offs[i].value - off).norm() <= tolerance_px ? 1 : 0;
   if (alike < kEnoughAlike) return std::nullopt;
   return to_px_ + shape_ * (from_px - from_px_) + off;
 }
 
 bool CommonMotion::holds_around(const Vector2d& from_px) const noexcept {
-  constexpr std::size_t kAround = 6;
   constexpr std::ptrdiff_t kMostOthers = 1;
   NearestFew<bool, kAround> agree;
   for (const Pair& pair : pairs_) {

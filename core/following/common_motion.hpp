@@ -51,6 +51,9 @@ class CommonMotion {
   };
   [[nodiscard]] std::size_t count(const Similarity& motion, double tolerance_px) const noexcept;
   void fit(const Similarity& motion, double tolerance_px) noexcept;
+  // What the pairs nearest to a place, or those of them that agree, are off the motion by.
+  template <class Nearest>
+  [[nodiscard]] Nearest offs_around(const Vector2d& from_px, const Vector2d* but, bool agreeing) const noexcept;
 
   std::vector<Pair> pairs_;
   Matrix2d shape_ = Matrix2d::Identity();
