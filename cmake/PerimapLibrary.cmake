@@ -25,6 +25,10 @@ function(perimap_library NAME FOLDER)
     target_compile_features(${NAME} PUBLIC cxx_std_20)
     target_link_libraries(${NAME} PUBLIC ${ARG_DEPENDS}
       PRIVATE ${ARG_PRIVATE_DEPENDS} $<BUILD_INTERFACE:perimap_warnings>)
+    # What tests share is built for those that are built.
+    if(FOLDER MATCHES "^tests/")
+      set_target_properties(${NAME} PROPERTIES EXCLUDE_FROM_ALL ON)
+    endif()
     if(ARG_PRELUDE AND TARGET ${ARG_PRELUDE})
       target_precompile_headers(${NAME} REUSE_FROM ${ARG_PRELUDE})
     endif()

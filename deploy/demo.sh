@@ -122,7 +122,8 @@ launcher=()
 if command -v ccache > /dev/null; then
   launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
 fi
-run_quietly "$output/configure.log" cmake --preset release "${launcher[@]}" || fail "configuring"
+# Files together where a target allows that: half of the time, and the same program.
+run_quietly "$output/configure.log" cmake --preset release -DPERIMAP_TOGETHER=ON "${launcher[@]}" || fail "configuring"
 run_with_progress "$output/build.log" cmake --build --preset release -j "$jobs" --target perimap perimapd || fail "building"
 
 say "Simulating $duration s of a beating heart, with an exact tracker and with 1.4 mm of noise"

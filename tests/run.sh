@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 usage() {
   cat << 'END'
 tests/run.sh [--full [PART...]] [--jobs N]
-  Installs the packages, builds the presets dev and asan, runs their tests. About twenty minutes on two cores.
+  Installs the packages, builds the presets quick and asan, runs their tests. About twenty minutes on two cores.
   Each test but those labelled `long` runs once: what reads the bytes of files, devices and messages under
   AddressSanitizer, all else without sanitizers.
   --full    everything, or the parts named. Some hours on two cores that do nothing else.
@@ -123,9 +123,9 @@ configure() { # PRESET
   # Which tests: see perimap_test in cmake/PerimapLibrary.cmake. A unit test once is enough for a quick run. What compiles
   # together is compiled together; that each file compiles alone is asked by lint.
   local preset=$1 tests=all undefined=all long=OFF
-  if [ $full = yes ] && [ "$preset" = dev ]; then long=ON; fi
+  if [ "$preset" = dev ]; then long=ON; fi
   case $preset in
-    dev) if [ $full = no ]; then tests=plain; fi ;;
+    quick) tests=plain ;;
     tsan) tests=threads ;;
     asan)
       if [ $full = no ]; then
@@ -211,9 +211,9 @@ if [ $full = yes ]; then packages=--full; fi
 deploy/install-packages.sh $packages || exit 1
 
 if [ $full = no ]; then
-  if build dev; then
+  if build quick; then
     if configure asan; then compile_ahead asan; fi
-    run_tests "dev tests" dev -LE long
+    run_tests "quick tests" quick -LE long
     stop_ahead
   fi
   if build asan; then run_tests "asan tests" asan -LE long; fi

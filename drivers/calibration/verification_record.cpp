@@ -121,7 +121,7 @@ Expected<VerificationRecord> parse_verification(std::string_view text, std::stri
   keys.number("clock_error_ms", record.clocks_ms.error);
   keys.number("clock_error_ms_deviation", record.clocks_ms.deviation);
   if (const auto touch = json.find("touch_error_mm"); touch != json.end() && !touch->is_null()) {
-    record.touch_mm.emplace();
+    record.touch_mm = VerificationRecord::Figure{};
     keys.number("touch_error_mm", record.touch_mm->error);
     keys.number("touch_error_mm_deviation", record.touch_mm->deviation);
   }

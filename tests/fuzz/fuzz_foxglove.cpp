@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "daemon/bridge/foxglove/foxglove_protocol.hpp"
+#include "daemon/bridge/foxglove_protocol/foxglove_protocol.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto request = perimap::parse_foxglove_request({reinterpret_cast<const char*>(data), size});

@@ -8,7 +8,7 @@
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
-#include "daemon/bridge/foxglove/foxglove_protocol.hpp"
+#include "daemon/bridge/foxglove_protocol/foxglove_protocol.hpp"
 #include "daemon/bridge/messages/view_scene.hpp"
 #include "daemon/bridge/messages/view_worth.hpp"
 #include "daemon/subscribing/shown_surface.hpp"

@@ -1,4 +1,4 @@
-#include "daemon/bridge/foxglove/foxglove_protocol.hpp"
+#include "daemon/bridge/foxglove_protocol/foxglove_protocol.hpp"
 
 #include <fmt/format.h>
 
