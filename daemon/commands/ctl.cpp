@@ -7,6 +7,7 @@
 
 #include "daemon/command_line/commands.hpp"
 #include "daemon/control/control_server.hpp"
+#include "drivers/json/json_text.hpp"
 
 namespace perimap {
 namespace {
@@ -24,9 +25,7 @@ void print_lines(const Json& json, const std::string& prefix) {
     if (value.is_object()) {
       print_lines(value, prefix + key + ".");
     } else {
-      fmt::print("{}{}: {}\n", prefix, key,
-                 value.is_string() ? value.get<std::string>()
-                                   : value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+      fmt::print("{}{}: {}\n", prefix, key, value.is_string() ? value.get<std::string>() : json_line(value));
     }
   }
 }

@@ -10,6 +10,7 @@
 #include "daemon/probe/probe_report.hpp"
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/runtime/setup_warnings.hpp"
+#include "drivers/json/json_text.hpp"
 
 namespace perimap {
 namespace {
@@ -48,8 +49,7 @@ Outcome probe(const ProbeOptions& options, const Console& console) {
   if (!wait_for_playback(camera, *stop, console)) return refuse("stopped before it began to listen");
   const ProbedDevices probed = probe_devices(*configuration, *devices, from_seconds(options.seconds), *stop);
   if (stop->requested()) console.complain("stopped early");
-  fmt::print("{}", options.json ? to_json(probed).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
-                                : to_text(probed));
+  fmt::print("{}", options.json ? json_document(to_json(probed)) : to_text(probed));
   // What is not well has been told.
   if (!all_well(probed)) return refuse("");
   return {};

@@ -8,6 +8,7 @@
 #include "core/pipeline/pipeline.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "daemon/publishing/status_text.hpp"
+#include "drivers/json/json_text.hpp"
 
 namespace perimap {
 namespace {
@@ -54,7 +55,7 @@ std::string SessionCommands::tell_status() {
     if (told.is_null()) told = full_status_json(wire);
     told["streams"][wire.stream] = stream_status_json(wire);
   }
-  return told.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return json_line(told) + "\n";
 }
 
 // Said to be done only when it is: until then the old patient's surface is published.

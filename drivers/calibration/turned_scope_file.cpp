@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/angle/angle.hpp"
+#include "drivers/json/json_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -208,7 +209,7 @@ std::string format_turned_scope(const TurnedScope& scope) {
                                {"aside_mm", scope.aside_translation_rms_mm},
                                {"aside_deg", scope.aside_rotation_rms_deg},
                                {"second_sensor", second}};
-  return nlohmann::json{{"turned_scope", json}}.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return json_document(nlohmann::json{{"turned_scope", json}});
 }
 
 }  // namespace perimap

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "drivers/json/json_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -96,13 +97,13 @@ std::string format_verification(std::string_view result_json, const VerifiedSetU
                   {"time_offset_ms", set_up.time_offset_ms},
                   {"lens", set_up.lens},
                   {"turned_scope", set_up.turned_scope}};
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return json_document(json);
 }
 
 std::string as_changed_since(std::string_view record_json) {
   nlohmann::json json = nlohmann::json::parse(record_json);
   json[kChangedSince] = true;
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return json_document(json);
 }
 
 Expected<VerificationRecord> parse_verification(std::string_view text, std::string_view name) {

@@ -6,14 +6,14 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "drivers/json/json_text.hpp"
+
 namespace perimap {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
 constexpr std::uint8_t kMessageData = 1;
-
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 std::optional<std::uint32_t> id_of(const Json& value) {
   if (!value.is_number_unsigned()) return std::nullopt;
@@ -70,7 +70,8 @@ Expected<FoxgloveRequest> parse_foxglove_request(std::string_view text) {
 }
 
 std::string foxglove_server_info(std::string_view name, std::string_view session) {
-  return text_of({{"op", "serverInfo"}, {"name", name}, {"capabilities", Json::array()}, {"sessionId", session}});
+  return json_line(
+      Json::object({{"op", "serverInfo"}, {"name", name}, {"capabilities", Json::array()}, {"sessionId", session}}));
 }
 
 std::string foxglove_advertise(std::span<const FoxgloveChannel> channels) {
@@ -83,11 +84,11 @@ std::string foxglove_advertise(std::span<const FoxgloveChannel> channels) {
                     {"schemaEncoding", kSchemaEncoding},
                     {"schema", channel.type.schema_text}});
   }
-  return text_of({{"op", "advertise"}, {"channels", std::move(list)}});
+  return json_line(Json::object({{"op", "advertise"}, {"channels", std::move(list)}}));
 }
 
 std::string foxglove_status(FoxgloveLevel level, std::string_view message) {
-  return text_of({{"op", "status"}, {"level", static_cast<int>(level)}, {"message", message}});
+  return json_line(Json::object({{"op", "status"}, {"level", static_cast<int>(level)}, {"message", message}}));
 }
 
 std::string foxglove_message(std::uint32_t subscription, Instant utc, std::string_view cdr) {

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/bridge/messages/view_names.hpp"
+#include "drivers/json/json_text.hpp"
 
 namespace perimap {
 namespace {
@@ -78,7 +79,7 @@ std::string view_layout(const std::string& world_frame) {
       {"playbackConfig", {{"speed", 1}}},
       {"layout", {{"first", pictures}, {"second", signals}, {"direction", "column"}, {"splitPercentage", 70}}}};
   // A name of a frame may be no UTF-8.
-  return layout.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_document(layout);
 }
 
 }  // namespace perimap

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <utility>
 
+#include "drivers/json/json_text.hpp"
+
 namespace perimap::bench {
 namespace {
 
@@ -57,8 +59,7 @@ class EventLines {
   EventLines(int process, Instant zero) : process_(process), zero_(zero) {}
 
   void name_process(const std::string& name) {
-    line(R"("ph":"M","name":"process_name","args":{{"name":{}}})",
-         nlohmann::json(name).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    line(R"("ph":"M","name":"process_name","args":{{"name":{}}})", json_line(nlohmann::json(name)));
     line(R"("ph":"M","name":"process_sort_index","args":{{"sort_index":{}}})", process_);
   }
   void name_thread(int thread, std::string_view name) {

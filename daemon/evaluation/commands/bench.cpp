@@ -21,6 +21,7 @@
 #include "daemon/evaluation/bench/trace_file.hpp"
 #include "daemon/logging/logging.hpp"
 #include "daemon/process/stop_signal.hpp"
+#include "drivers/json/json_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -85,10 +86,7 @@ Outcome measure(const BenchOptions& options, const Console& console) {
       console.complain(fmt::format("the trace had no room for {} entries, the last of their runs", trace->left_out()));
   }
   if (!options.json.empty()) {
-    if (auto done = write_text_file(
-            options.json, to_json(*report).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-        !done)
-      return refuse(done.error());
+    if (auto done = write_text_file(options.json, json_document(to_json(*report))); !done) return refuse(done.error());
   }
   if (!options.html.empty()) {
     if (auto done = write_text_file(options.html, to_html(*report)); !done) return refuse(done.error());

@@ -15,6 +15,7 @@
 #include "daemon/evaluation/ecg/ecg_input.hpp"
 #include "daemon/evaluation/ecg/ecg_text.hpp"
 #include "daemon/process/stop_signal.hpp"
+#include "drivers/json/json_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -105,7 +106,7 @@ Outcome find_beats(const EcgOptions& options, const Console& console) {
   }
   if (!reference.beats.empty()) json["reference_ends_s"] = reference.beats.back().time_s;
   if (score) json["score"] = to_json(*score, reference.left_out);
-  fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  fmt::print("{}", json_document(json));
   return {};
 }
 

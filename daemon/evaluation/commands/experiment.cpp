@@ -16,6 +16,7 @@
 #include "daemon/evaluation/experiment/experiment_files.hpp"
 #include "daemon/evaluation/experiment/experiment_text.hpp"
 #include "daemon/evaluation/traces/trace_text.hpp"
+#include "drivers/json/json_text.hpp"
 #include "drivers/standins/trace/motion_trace.hpp"
 
 namespace perimap {
@@ -50,9 +51,7 @@ Outcome predict_trace(const ExperimentOptions& options, const Console& console) 
   if (!options.out.empty()) {
     if (const auto written = write_files(*experiment, options.out); !written) return refuse(written.error());
   }
-  fmt::print("{}", options.json
-                       ? to_json(*experiment).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
-                       : to_table(*experiment));
+  fmt::print("{}", options.json ? json_document(to_json(*experiment)) : to_table(*experiment));
   return {};
 }
 
@@ -81,9 +80,7 @@ Outcome repeat(const ExperimentOptions& options, const Console& console) {
   if (!options.out.empty()) {
     if (const auto written = write_files(*experiment, options.out); !written) return refuse(written.error());
   }
-  fmt::print("{}", options.json
-                       ? to_json(*experiment).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
-                       : to_table(*experiment));
+  fmt::print("{}", options.json ? json_document(to_json(*experiment)) : to_table(*experiment));
   return {};
 }
 

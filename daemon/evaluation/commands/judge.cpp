@@ -13,6 +13,7 @@
 #include "daemon/evaluation/track_judge/disturbance_trial.hpp"
 #include "daemon/evaluation/track_judge/judge_text.hpp"
 #include "daemon/evaluation/track_judge/track_picture.hpp"
+#include "drivers/json/json_text.hpp"
 
 namespace perimap {
 namespace {
@@ -38,9 +39,7 @@ Outcome judge(const JudgeOptions& options) {
   if (options.events) {
     const auto figures = try_disturbances(*clip, options.features);
     if (!figures) return refuse(fmt::format("{}: {}", options.input, figures.error().message));
-    fmt::print("{}", options.json
-                         ? to_json(*figures).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
-                         : to_text(*figures));
+    fmt::print("{}", options.json ? json_document(to_json(*figures)) : to_text(*figures));
     return {};
   }
   const auto contest = hold_contest(*clip, options.features);
@@ -48,9 +47,7 @@ Outcome judge(const JudgeOptions& options) {
   if (!options.picture.empty()) {
     if (const auto drawn = draw_contest(*contest, *clip, options.picture); !drawn) return refuse(drawn.error());
   }
-  fmt::print("{}", options.json
-                       ? to_json(*contest, *clip).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"
-                       : to_text(*contest, *clip));
+  fmt::print("{}", options.json ? json_document(to_json(*contest, *clip)) : to_text(*contest, *clip));
   return {};
 }
 

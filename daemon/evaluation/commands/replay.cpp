@@ -10,6 +10,7 @@
 #include "daemon/command_line/progress.hpp"
 #include "daemon/evaluation/replay/replay_run.hpp"
 #include "daemon/process/stop_signal.hpp"
+#include "drivers/json/json_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -48,10 +49,7 @@ Outcome replay(const ReplayCommandOptions& options, const Console& console) {
   if (options.json.empty()) return {};
   nlohmann::json figures = to_json(*report);
   figures["recording"] = wanted.recording;
-  if (auto written =
-          write_text_file(options.json, figures.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-      !written)
-    return refuse(written.error());
+  if (auto written = write_text_file(options.json, json_document(figures)); !written) return refuse(written.error());
   return {};
 }
 

@@ -13,6 +13,7 @@
 #include "daemon/evaluation/report/accuracy_picture.hpp"
 #include "daemon/evaluation/report/report_text.hpp"
 #include "daemon/pages/png_picture.hpp"
+#include "drivers/json/json_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -75,10 +76,7 @@ Outcome report(const ReportOptions& options) {
   if (options.json.empty()) return {};
   nlohmann::json figures = to_json(*result);
   figures["recording"] = options.recording;
-  if (auto written =
-          write_text_file(options.json, figures.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-      !written)
-    return refuse(written.error());
+  if (auto written = write_text_file(options.json, json_document(figures)); !written) return refuse(written.error());
   return {};
 }
 

@@ -11,6 +11,7 @@
 #include "daemon/pages/png_picture.hpp"
 #include "daemon/pages/svg_plot.hpp"
 #include "drivers/file/whole_file.hpp"
+#include "drivers/json/json_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -63,10 +64,7 @@ Expected<void> write_files(const Experiment& experiment, const std::filesystem::
     if (auto done = write_text_file(path("-" + figure.name + ".csv"), to_csv(figure)); !done) return done;
   }
   return write_text_file(path(".csv"), to_csv(experiment))
-      .and_then([&] {
-        return write_text_file(
-            path(".json"), to_json(experiment).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-      })
+      .and_then([&] { return write_text_file(path(".json"), json_document(to_json(experiment))); })
       .and_then([&] { return write_text_file(path(".html"), to_html(experiment)); });
 }
 
@@ -79,7 +77,7 @@ Expected<void> write_files(const TraceExperiment& experiment, const std::filesys
       {".svg", svg},
       {".png", *png},
       {".csv", to_csv(experiment)},
-      {".json", to_json(experiment).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"},
+      {".json", json_document(to_json(experiment))},
       {".html", html_page(title, svg + "<pre>" + escaped(to_table(experiment)) + "</pre>\n")}};
   for (const auto& [ending, text] : files) {
     if (auto done = write_text_file(file_of(folder, 3, ending), text); !done) return done;

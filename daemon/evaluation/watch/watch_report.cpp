@@ -10,6 +10,7 @@
 #include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/status_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
+#include "drivers/json/json_text.hpp"
 
 namespace perimap {
 namespace {
@@ -74,9 +75,6 @@ std::string_view publishers_of(client::Hearing hearing) {
   }
   return "not known";
 }
-
-// On one line whatever bytes the publisher put into its names.
-std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 }  // namespace
 
@@ -164,7 +162,7 @@ std::string report_json(const StreamReport& report, ReportKind kind) {
   if (report.status) {
     json["status"] = status_json(report.status->status, report.status->stages, report.status->sources);
   }
-  return dump(json);
+  return json_line(json);
 }
 
 std::string surface_json(const perimap_Surface& surface, Instant receipt) {
@@ -205,7 +203,7 @@ std::string surface_json(const perimap_Surface& surface, Instant receipt) {
                         {"last_observed_time_ns", feature.last_observed_time_ns}});
   }
   json["features"] = std::move(features);
-  return dump(json);
+  return json_line(json);
 }
 
 }  // namespace perimap

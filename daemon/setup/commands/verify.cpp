@@ -20,6 +20,7 @@
 #include "daemon/setup/recorded_date.hpp"
 #include "daemon/setup/recorded_poses.hpp"
 #include "daemon/setup/recorded_verification.hpp"
+#include "drivers/json/json_text.hpp"
 
 namespace perimap {
 namespace {
@@ -52,10 +53,8 @@ void keep_record(const VerifyOptions& options, const MotionSource& motion, nlohm
   const auto set_up = set_up_of(options, motion);
   result["date"] = date_of_measurement(options.recorded.recording);
   const auto file = verification_file_of(options.configuration);
-  const auto written =
-      set_up ? write_kept(file, format_verification(
-                                    result.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace), *set_up))
-             : Expected<void>(tl::unexpected(set_up.error().error));
+  const auto written = set_up ? write_kept(file, format_verification(json_line(result), *set_up))
+                              : Expected<void>(tl::unexpected(set_up.error().error));
   if (!written) {
     console.complain(fmt::format("note: not kept with the set-up, so that recordings will not tell of it: {}",
                                  written.error().message));

@@ -8,6 +8,7 @@
 #include "daemon/publishing/status_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 #include "daemon/view/messages/milliseconds.hpp"
+#include "drivers/json/json_text.hpp"
 
 namespace perimap {
 namespace {
@@ -61,7 +62,7 @@ Json guidance_json(const perimap_Guidance& guidance) {
 
 PageMessage text_message(const Json& json, std::uint8_t lane) {
   // Text of a publisher may be no UTF-8.
-  return {std::make_shared<const std::string>(json.dump(-1, ' ', false, Json::error_handler_t::replace)), false, lane};
+  return {std::make_shared<const std::string>(json_line(json)), false, lane};
 }
 
 }  // namespace perimap
