@@ -135,7 +135,7 @@ configure() { # PRESET
       ;;
   esac
   step "$preset configure" 5m cmake --preset "$preset" -DPERIMAP_TESTS=$tests -DPERIMAP_UNDEFINED=$undefined \
-    -DPERIMAP_TOGETHER=ON -DPERIMAP_LONG=$long "${launcher[@]}"
+    -DPERIMAP_TOGETHER=ON -DPERIMAP_LONG=$long -DPERIMAP_WARNINGS_AS_ERRORS=ON "${launcher[@]}"
 }
 
 # Compiles all that compiles (-k 0): one run tells every error.

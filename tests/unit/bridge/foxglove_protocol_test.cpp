@@ -56,7 +56,8 @@ TEST(FoxgloveRequest, WhatIsGarbledIsRefusedInOnePrintableLine) {
 
 TEST(FoxgloveMessages, OfAChannelAreItsSubscriptionTheTimeAndTheBytes) {
   EXPECT_EQ(foxglove_message(0x01020304, from_ns(0x1122334455667788), "abc"),
-            "\x01\x04\x03\x02\x01\x88\x77\x66\x55\x44\x33\x22\x11"s + "abc");
+            "\x01\x04\x03\x02\x01\x88\x77\x66\x55\x44\x33\x22\x11"
+            "abc"s);
 }
 
 }  // namespace

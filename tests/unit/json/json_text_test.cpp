@@ -18,8 +18,8 @@ TEST(JsonText, StandsForBytesThatAreNoUtf8) {
   for (const std::string& bytes : {std::string("gef\xE4\xDF"), std::string("\xE2\x82"), std::string("\xC0\xAF/etc")}) {
     const std::string line = json_line(nlohmann::json{{"path", bytes}});
     EXPECT_NE(line.find("\xEF\xBF\xBD"), std::string::npos) << line;
-    EXPECT_NO_THROW(static_cast<void>(nlohmann::json::parse(line)));
-    EXPECT_NO_THROW(static_cast<void>(nlohmann::json::parse(json_document(nlohmann::json{{"path", bytes}}))));
+    EXPECT_TRUE(nlohmann::json::accept(line));
+    EXPECT_TRUE(nlohmann::json::accept(json_document(nlohmann::json{{"path", bytes}})));
   }
 }
 
