@@ -31,11 +31,15 @@ SurfaceComposer::Covered SurfaceComposer::covered_by(const ShardSnapshot& snapsh
 }
 
 // Where the snapshot was not evaluated (the update is late, or there is no frame), the largest deviation over the cycle
-// bounds it.
-Matrix3d SurfaceComposer::map_covariance(const FeatureSnapshot& feature, const Covered& covered) noexcept {
-  if (!covered.any) return Matrix3d::Identity() * feature.largest_deviation_mm * feature.largest_deviation_mm;
+// bounds it, and in the direction of that all may lie that the set-up is off by: as the published model has it.
+Matrix3d SurfaceComposer::map_covariance(const FeatureSnapshot& feature, const Covered& covered,
+                                         const FrameDoubts& doubts) noexcept {
+  if (!covered.any) {
+    const double widening = doubts.setup_widening_mm;
+    return Matrix3d::Identity() * (feature.largest_deviation_mm * feature.largest_deviation_mm + widening * widening);
+  }
   return (1.0 - covered.share) * feature.covariances_W_mm2[covered.before] +
-         covered.share * feature.covariances_W_mm2[covered.after];
+         covered.share * feature.covariances_W_mm2[covered.after] + doubts.setup_variance_mm2() * Matrix3d::Identity();
 }
 
 // Which frame the sample belongs to, which update is its oldest, and where the camera was. Whether that update is of a
@@ -101,7 +105,6 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
   const BasesAbout about = bases_about(settings_.layout, phase, breath);
   const Basis b_breath_rate = breath_rate(settings_.layout, breath.phase_rad);
   const Matrix3d of_breath = breath.deviation_mm * breath.deviation_mm * Matrix3d::Identity();
-  const Matrix3d of_setup = footing.doubts.setup_variance_mm2() * Matrix3d::Identity();
   const Basis b_rate = basis_rate(settings_.layout, phase.phase_rad);
   sample_.features.clear();
   for (const auto& [snapshot, covered] : order_) {
@@ -112,9 +115,8 @@ const SurfaceSample& SurfaceComposer::compose(const Release& release, const Card
                                   velocity_of(snapshot->x, b_breath_rate, breath.rate_rad_per_s);
     feature.covariance_W_mm2 =
         phase_spread(feature.p_WF_mm, position_of(snapshot->x, about.earlier), position_of(snapshot->x, about.later));
-    feature.covariance_W_mm2 += map_covariance(*snapshot, covered);
+    feature.covariance_W_mm2 += map_covariance(*snapshot, covered, footing.doubts);
     feature.covariance_W_mm2 += of_breath;
-    feature.covariance_W_mm2 += of_setup;
     feature.last_observed = snapshot->last_observed;
     const FeatureVerdict verdict = verdict_of({snapshot->state, snapshot->reason}, phase.state, footing);
     feature.state = verdict.state;

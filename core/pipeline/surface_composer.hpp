@@ -23,7 +23,7 @@ struct ComposerSettings {
 
 // Belongs to the publisher; one for each stream, whose samples it counts. Positions and velocities are evaluated anew
 // from the coefficients with the phase as it is known now. To the covariance of the map comes phase_spread(), what the
-// phase's deviation makes of the motion.
+// phase's deviation makes of the motion, and what the set-up may be off by.
 //
 // A frame's surface belongs to that frame. One of the clock's belongs to the newest frame that all shards have mapped,
 // which may be newer than the one that is owed by then. Where that was mapped by an earlier run it keeps its capture,
@@ -56,7 +56,8 @@ class SurfaceComposer {
   };
   [[nodiscard]] static Covered covered_by(const ShardSnapshot& snapshot, const Release& release,
                                           Instant valid) noexcept;
-  [[nodiscard]] static Matrix3d map_covariance(const FeatureSnapshot& feature, const Covered& covered) noexcept;
+  [[nodiscard]] static Matrix3d map_covariance(const FeatureSnapshot& feature, const Covered& covered,
+                                               const FrameDoubts& doubts) noexcept;
   [[nodiscard]] bool rest_on(const Release& release, std::span<const ShardSnapshot* const> snapshots) noexcept;
 
   std::vector<Ordered> order_;

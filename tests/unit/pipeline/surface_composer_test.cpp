@@ -72,12 +72,15 @@ TEST(SurfaceComposer, WidensByWhatTheSetUpMayBeOffBy) {
   SurfaceComposer composer(settings());
   ShardSnapshot snapshot = shard(100, {feature(1, 0.0)});
   const std::array<const ShardSnapshot*, 1> view = {&snapshot};
-  const auto variance = [&] {
-    return composer.compose(kRelease, steady_clock(), {}, view).features.at(0).covariance_W_mm2(1, 1);
+  const auto variance = [&](const Release& release) {
+    return composer.compose(release, steady_clock(), {}, view).features.at(0).covariance_W_mm2(1, 1);
   };
-  const double before = variance();
+  Release missing = kRelease;
+  missing.frame_missing = true;
+  const double before = variance(kRelease), bound_before = variance(missing);
   snapshot.doubts.setup_widening_mm = 1.5;
-  EXPECT_NEAR(variance(), before + 0.75, 1e-12) << "a third of its square on each axis";
+  EXPECT_NEAR(variance(kRelease), before + 0.75, 1e-12) << "a third of its square on each axis";
+  EXPECT_NEAR(variance(missing), bound_before + 2.25, 1e-12) << "a bound holds in any direction";
 }
 
 TEST(SurfaceComposer, EvaluatesPositionAndVelocityAtTheValidTimesPhase) {
