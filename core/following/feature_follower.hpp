@@ -131,7 +131,7 @@ class FeatureFollower {
   [[nodiscard]] bool recall_place(const GreyImage& image, int place, const Thumbnail& now) noexcept;
   std::size_t probe(const GreyImage& image, int place) noexcept;
   [[nodiscard]] std::size_t agree_on_return(const GreyImage& image, int place) noexcept;
-  void take_back(const GreyImage& image, int place) noexcept;
+  [[nodiscard]] std::size_t take_back(const GreyImage& image, int place) noexcept;
   void hold_against_others(const GreyImage& image) noexcept;
   void judge(const GreyImage& image) noexcept;
   // `astray`: by how much it moved otherwise than its neighbours.

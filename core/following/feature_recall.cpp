@@ -86,46 +86,56 @@ std::size_t FeatureFollower::agree_on_return(const GreyImage& image, int place) 
   return return_.agree(kAlike_px + kAlikeOfWidth * image.width);
 }
 
-// What goes with those around it. The looks alone would lead many to a place beside their own.
-void FeatureFollower::take_back(const GreyImage& image, int place) noexcept {
+// What goes with those around it, and how many those are. The looks alone would lead many to a place beside their own.
+std::size_t FeatureFollower::take_back(const GreyImage& image, int place) noexcept {
   constexpr double kOff_px = 1.5;
   for (FollowedFeature& feature : features_) {
     if (!is_away(feature, place) || feature.found) continue;
     (void)seek(image, feature, return_.at(feature.last_px), kFirstDeviation_px, settings_.recalled_correlation, true,
                return_.shape());
   }
-  if (agree_on_return(image, place) < CommonMotion::kFewest) return;
+  if (agree_on_return(image, place) < CommonMotion::kFewest) return 0;
+  std::size_t taken = 0;
   for (FollowedFeature& feature : features_) {
     if (!is_away(feature, place)) continue;
     if (feature.found && (feature.px - return_.at(feature.last_px, &feature.last_px)).norm() <= kOff_px) {
       feature.is_recalled = true;
+      ++taken;
     } else {
       disbelieve(feature);
     }
   }
   for (FollowedFeature& feature : features_) feature.swept = feature.swept && !feature.is_recalled;
+  return taken;
 }
 
-// When a good share of what is sought has moved alike, all are. What is nearer to the lens than other tissue has moved
-// otherwise: those that do not go with the first motion are asked for another.
+// When a good share of what is sought has moved alike, all are, and a good share of them must be taken back then: in a
+// blur a few that were sought widely agree by chance. What is nearer to the lens than other tissue has moved otherwise:
+// those that do not go with the first motion are asked for another.
 bool FeatureFollower::recall_place(const GreyImage& image, int place, const Thumbnail& now) noexcept {
   constexpr std::size_t kFewestAlike = 6, kShareAlike = 4;  // one in so many at least
   constexpr int kMotions = 3;
   const auto is_of_place = [place](const FollowedFeature& feature) { return is_away(feature, place); };
-  if (std::none_of(features_.begin(), features_.end(), is_of_place)) return false;
+  const auto away = static_cast<std::size_t>(std::count_if(features_.begin(), features_.end(), is_of_place));
+  if (away == 0) return false;
   return_.begin_with(displacement_between(places_[place], now).value_or(Vector2d::Zero()));
   const std::size_t probed = probe(image, place);
   std::size_t alike = agree_on_return(image, place);
-  const bool are_back = alike >= kFewestAlike && kShareAlike * alike >= probed;
-  for (int motion = 0; are_back && motion < kMotions && alike >= kFewestAlike; ++motion) {
-    take_back(image, place);
+  const bool seem_back = alike >= kFewestAlike && kShareAlike * alike >= probed;
+  std::size_t taken = 0;
+  for (int motion = 0; seem_back && motion < kMotions && alike >= kFewestAlike; ++motion) {
+    taken += take_back(image, place);
     probe(image, place);
     alike = agree_on_return(image, place);
   }
+  const bool are_back = taken >= kFewestAlike && kShareAlike * taken >= away;
   for (FollowedFeature& feature : features_) {
-    if (!is_away(feature, place)) continue;
-    disbelieve(feature);
+    const bool is_taken = feature.place == place && feature.is_recalled;
+    if (!is_away(feature, place) && !is_taken) continue;
+    if (is_taken && are_back) continue;
+    feature.is_recalled = false;
     feature.swept = !are_back;
+    disbelieve(feature);
   }
   return are_back;
 }
