@@ -19,7 +19,7 @@ struct Reached {
   double least_found;
   double most_wrong;
 };
-constexpr Reached kReached[] = {{Disturbance::kBlood, 0.55, 0.05},
+constexpr Reached kReached[] = {{Disturbance::kBlood, 0.55, 0.08},
                                 {Disturbance::kFog, 0.9, 0.25},
                                 {Disturbance::kWiping, 0.75, 0.15},
                                 {Disturbance::kWithdrawn, 0.7, 0.35},
