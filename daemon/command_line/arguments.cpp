@@ -74,6 +74,14 @@ std::vector<std::string> unknown_arguments(const CLI::App& app) {
 
 }  // namespace
 
+std::vector<std::string> what_is_wrong(const CLI::App& command, const CLI::ParseError& error) {
+  std::vector<std::string> lines = unknown_arguments(command);
+  // What is missing is missing because of what is misspelt, as often as not.
+  if (lines.empty()) lines.emplace_back(error.what());
+  for (std::string& line : lines) line = on_one_line(line);
+  return lines;
+}
+
 std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* argv) {
   try {
     app.parse(argc, argv);
@@ -82,10 +90,7 @@ std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* a
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
     const Given given = innermost(app);
     const Console console(given.name);
-    const auto unknown = unknown_arguments(*given.command);
-    for (const std::string& line : unknown) console.complain(on_one_line(line));
-    // What is missing is missing because of what is misspelt, as often as not.
-    if (unknown.empty()) console.complain(on_one_line(error.what()));
+    for (const std::string& line : what_is_wrong(*given.command, error)) console.complain(line);
     console.complain(given.name + " --help tells how it is used");
     return static_cast<int>(ExitCode::kWrongUsage);
   }
