@@ -72,28 +72,68 @@ class SessionWriter {
   SessionWriter& operator=(const SessionWriter&) = delete;
   ~SessionWriter() = default;
 
+  // What arrives, after the events that have begun by then. Of a frame without pixels there is the truth alone.
+  Expected<void> write(const Simulation::Arrival& arrival, std::span<const std::uint8_t> pixels) {
+    if (auto written = write_events(arrival.arrival); !written) return written;
+    switch (arrival.source) {
+      case Simulation::Source::kCamera:
+        return write_frame(simulation_.frames()[arrival.index], pixels);
+      case Simulation::Source::kTracker:
+        return write_readings(arrival.index);
+      case Simulation::Source::kEcg:
+        return write_ecg(simulation_.ecg()[arrival.index]);
+      case Simulation::Source::kRespiration:
+        break;
+    }
+    return write_respiration(simulation_.respiration()[arrival.index]);
+  }
+
+  Expected<void> finish() {
+    if (auto written = write_events(Instant::max()); !written) return written;
+    return writer_.finish().and_then([this] { return file_.finish(); });
+  }
+
+ private:
+  SessionWriter(const Simulation& simulation, const SimulatedRecording& recording, WholeFile file,
+                RecordingWriter writer)
+      : simulation_(simulation), recording_(recording), file_(std::move(file)), writer_(std::move(writer)) {}
+
   Expected<void> write_frame(const Simulation::Frame& frame, std::span<const std::uint8_t> pixels) {
-    const auto sequence = static_cast<std::uint32_t>(frame.stamp.sequence);
+    if (!pixels.empty()) {
+      if (auto written = write_picture(frame.stamp, pixels); !written) return written;
+    }
+    const auto truth = to_truth_camera(simulation_.camera_truth(frame));
+    return writer_.write(truth_camera_, truth, frame.stamp.arrival, frame.stamp.capture,
+                         static_cast<std::uint32_t>(frame.stamp.sequence));
+  }
+
+  Expected<void> write_picture(const FrameStamp& stamp, std::span<const std::uint8_t> pixels) {
     const int width = simulation_.settings().width;
     const GreyImage image{pixels.data(), width, simulation_.settings().height, width};
-    const auto raw = borrow_raw_image(image, frame.stamp.capture, kCameraFrame, packed_);
-    const auto truth = to_truth_camera(simulation_.camera_truth(frame));
-    return writer_.write(image_, raw, frame.stamp.arrival, frame.stamp.capture, sequence).and_then([&] {
-      return writer_.write(truth_camera_, truth, frame.stamp.arrival, frame.stamp.capture, sequence);
-    });
+    const auto raw = borrow_raw_image(image, stamp.capture, kCameraFrame, packed_);
+    return writer_.write(image_, raw, stamp.arrival, stamp.capture, static_cast<std::uint32_t>(stamp.sequence));
   }
 
-  Expected<void> write_second_sensor(const TrackerSample& sample) {
-    return writer_.write(second_, to_tracker_pose(sample), sample.arrival, sample.source_time, sample.device_frame);
+  // Of all tools, in the order in which they are read.
+  Expected<void> write_readings(std::size_t index) {
+    const TrackerNoise& noise = recording_.noise;
+    return write_tracker(simulation_.tracker_sample(index, noise))
+        .and_then([&]() -> Expected<void> {
+          if (!simulation_.settings().second_sensor) return {};
+          return write_pose(second_, simulation_.second_sample(index, noise));
+        })
+        .and_then([&]() -> Expected<void> {
+          if (!simulation_.settings().patient_tool) return {};
+          return write_pose(patient_, simulation_.patient_sample(index, noise));
+        });
   }
 
-  Expected<void> write_patient_tool(const TrackerSample& sample) {
-    return writer_.write(patient_, to_tracker_pose(sample), sample.arrival, sample.source_time, sample.device_frame);
+  Expected<void> write_pose(ChannelId channel, const TrackerSample& sample) {
+    return writer_.write(channel, to_tracker_pose(sample), sample.arrival, sample.source_time, sample.device_frame);
   }
 
   Expected<void> write_tracker(const TrackerSample& sample) {
-    const perimap_TrackerPose message = to_tracker_pose(sample);
-    auto written = writer_.write(tracker_, message, sample.arrival, sample.source_time, sample.device_frame);
+    auto written = write_pose(tracker_, sample);
     if (!written || sample.state != ToolState::kOk) return written;
     const auto viewer = borrow_pose_in_frame(sample.X_WS, sample.source_time, kWorldFrame);
     return writer_.write(viewer_, viewer, sample.arrival, sample.source_time, sample.device_frame);
@@ -124,16 +164,6 @@ class SessionWriter {
     }
     return {};
   }
-
-  Expected<void> finish() {
-    if (auto written = write_events(Instant::max()); !written) return written;
-    return writer_.finish().and_then([this] { return file_.finish(); });
-  }
-
- private:
-  SessionWriter(const Simulation& simulation, const SimulatedRecording& recording, WholeFile file,
-                RecordingWriter writer)
-      : simulation_(simulation), recording_(recording), file_(std::move(file)), writer_(std::move(writer)) {}
 
   Expected<void> attach(std::string_view name, std::string_view media_type, const std::string& text) {
     return writer_.write_attachment(name, media_type, std::as_bytes(std::span(text)));
@@ -280,38 +310,25 @@ Expected<bool> write_simulation(const Simulation& simulation, const std::vector<
   }
   FrameRenderer frames(simulation, threads);
   for (const Simulation::Arrival& arrival : simulation.arrivals()) {
-    std::span<const std::uint8_t> pixels;
-    if (arrival.source == Simulation::Source::kCamera) pixels = frames.next();
-    for (std::size_t i = 0; i < writers.size(); ++i) {
-      Expected<void> written = writers[i]->write_events(arrival.arrival);
-      if (!written) return tl::unexpected(written.error());
-      switch (arrival.source) {
-        case Simulation::Source::kCamera:
-          written = writers[i]->write_frame(simulation.frames()[arrival.index], pixels);
-          break;
-        case Simulation::Source::kTracker:
-          written = writers[i]->write_tracker(simulation.tracker_sample(arrival.index, recordings[i].noise));
-          if (written && simulation.settings().second_sensor) {
-            written = writers[i]->write_second_sensor(simulation.second_sample(arrival.index, recordings[i].noise));
-          }
-          if (written && simulation.settings().patient_tool) {
-            written = writers[i]->write_patient_tool(simulation.patient_sample(arrival.index, recordings[i].noise));
-          }
-          break;
-        case Simulation::Source::kEcg:
-          written = writers[i]->write_ecg(simulation.ecg()[arrival.index]);
-          break;
-        case Simulation::Source::kRespiration:
-          written = writers[i]->write_respiration(simulation.respiration()[arrival.index]);
-          break;
-      }
-      if (!written) return tl::unexpected(written.error());
+    const bool is_frame = arrival.source == Simulation::Source::kCamera;
+    const std::span<const std::uint8_t> pixels = is_frame ? frames.next() : std::span<const std::uint8_t>();
+    for (const auto& writer : writers) {
+      if (auto written = writer->write(arrival, pixels); !written) return tl::unexpected(written.error());
     }
-    if (arrival.source == Simulation::Source::kCamera && !progress(arrival.index + 1)) return false;
+    if (is_frame && !progress(arrival.index + 1)) return false;
   }
   for (const auto& writer : writers)
     if (auto done = writer->finish(); !done) return tl::unexpected(done.error());
   return true;
+}
+
+Expected<void> write_without_pictures(const Simulation& simulation, const SimulatedRecording& recording) {
+  auto writer = SessionWriter::create(simulation, recording);
+  if (!writer) return tl::unexpected(writer.error());
+  for (const Simulation::Arrival& arrival : simulation.arrivals()) {
+    if (auto written = (*writer)->write(arrival, {}); !written) return written;
+  }
+  return (*writer)->finish();
 }
 
 }  // namespace perimap

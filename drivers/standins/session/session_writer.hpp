@@ -29,4 +29,8 @@ struct SimulatedRecording {
                                               const std::vector<SimulatedRecording>& recordings, unsigned threads,
                                               const std::function<bool(std::uint64_t frames)>& progress);
 
+// The same recording but for the camera's pictures, whose channel stays empty: what a replay reads that has the
+// pictures from elsewhere.
+[[nodiscard]] Expected<void> write_without_pictures(const Simulation& simulation, const SimulatedRecording& recording);
+
 }  // namespace perimap
