@@ -15,14 +15,14 @@ fault() {
   faults=$((faults + 1))
 }
 
-# commands_of FILE: its perimap commands, one a line
+# commands_of FILE: its perimap commands, one a line; options of `perimap simulate` that are another's value as one more
 commands_of() {
   awk '
     /^```/ { code = !code; next }
     !code { next }
     { line = line $0 }
     /\\$/ { sub(/\\$/, " ", line); next }
-    { print line; line = "" }' "$1" | sed 's/[ \t]#.*//; s/^\$ //' | grep -oE '^(sudo )?([^ ]*/)?perimap .*' | sed -E 's/^(sudo )?[^ ]*perimap /perimap /'
+    { print line; line = "" }' "$1" | sed 's/[ \t]#.*//; s/^\$ //' | grep -oE '^(sudo )?([^ ]*/)?perimap .*' | sed -E 's/^(sudo )?[^ ]*perimap /perimap /; s/ --simulated "([^"]*)"(.*)/ --simulated OPTIONS\2\nperimap simulate \1/'
 }
 
 for file in README.md docs/guide/*.md; do

@@ -21,6 +21,7 @@
 #include "daemon/publishing/wire_status.hpp"
 #include "daemon/runtime/live_session.hpp"
 #include "daemon/runtime/lockstep_runtime.hpp"
+#include "drivers/standins/session/unrecorded_session.hpp"
 
 namespace perimap {
 namespace {
@@ -63,17 +64,26 @@ nlohmann::json counts(const perimap_Status& status, const PipelineCounters& c) {
   return json;
 }
 
+// As a recording's reader has it.
+Expected<void> check_size(const UnrecordedSession& session, const CameraModel& camera) {
+  if (session.width() == camera.width && session.height() == camera.height) return {};
+  return fail(fmt::format("the simulated session: frames of {}x{}, the calibration is for {}x{}", session.width(),
+                          session.height(), camera.width, camera.height));
+}
+
+// The next event in order of arrival; nullopt at the end.
+using NextEvent = std::function<Expected<std::optional<ReplayEvent>>()>;
 using FrameProgress = std::function<void(std::uint64_t frames)>;
 
 // In virtual time. Whether a signal stopped it; what of the recording was not whole goes to `damage`.
 // `surface`: none without a truth.
-Expected<bool> run_lockstep(Pipeline& pipeline, ReplaySetup& setup, Publication& publication, StopSignal& stop,
-                            const FrameProgress& progress, std::vector<Error>& damage,
-                            std::optional<SurfaceWatch>& surface) {
+Expected<bool> run_lockstep(Pipeline& pipeline, const ReplaySetup& setup, const NextEvent& next,
+                            Publication& publication, StopSignal& stop, const FrameProgress& progress,
+                            std::vector<Error>& damage, std::optional<SurfaceWatch>& surface) {
   LockstepRuntime runtime(pipeline, setup.identity, setup.utc_minus_monotonic, publication);
   std::uint64_t shown = 0;
   for (;;) {
-    auto event = setup.reader.next();
+    auto event = next();
     if (!event) return tl::unexpected(event.error());
     if (!*event) break;
     runtime.deliver(**event);
@@ -139,6 +149,9 @@ tl::expected<ReplayReport, SetupError> run_replay(
   if (!setup) return tl::unexpected(std::move(setup.error()));
   setup->pipeline.lockstep = options.lockstep;
   if (options.workers > 0) setup->pipeline.workers = options.workers;
+  if (options.simulated != nullptr) {
+    if (auto fits = check_size(*options.simulated, setup->pipeline.camera); !fits) return failed(fits.error());
+  }
   const auto truth = load_truth(options.recording, options.mode);
   if (!truth) return failed(truth.error());
   Expected<std::vector<RPeak>> beats;
@@ -167,8 +180,10 @@ tl::expected<ReplayReport, SetupError> run_replay(
   std::vector<Error> damage = std::move(setup->passed_over);
   std::optional<SurfaceWatch> surface;
   if (*truth && options.lockstep) surface.emplace(pipeline, **truth);
+  const auto rendered = options.simulated != nullptr ? options.simulated->events(setup->reader) : nullptr;
+  const NextEvent next = [&] { return rendered ? rendered->next() : setup->reader.next(); };
   const auto stopped = options.lockstep
-                           ? run_lockstep(pipeline, *setup, publication, stop, frames_done, damage, surface)
+                           ? run_lockstep(pipeline, *setup, next, publication, stop, frames_done, damage, surface)
                            : run_live(pipeline, *setup, publication, stop, frames_done);
   if (!stopped) return failed(stopped.error());
   if (recorder) {

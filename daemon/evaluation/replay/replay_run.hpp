@@ -14,8 +14,12 @@
 
 namespace perimap {
 
+class UnrecordedSession;
+
 struct ReplayOptions {
   std::string recording;
+  // In lockstep: whose recording() that is; its pictures are rendered meanwhile. Outlives the run.
+  const UnrecordedSession* simulated = nullptr;
   std::optional<std::filesystem::path> configuration;  // none: the recording's own over the defaults
   bool lockstep = false;                               // virtual time, or else real time
   int workers = 0;                                     // 0: the configuration's

@@ -13,7 +13,7 @@
 #include "daemon/command_line/choice.hpp"
 #include "daemon/command_line/commands.hpp"
 #include "daemon/process/stop_signal.hpp"
-#include "daemon/standins/commands/simulation_options.hpp"
+#include "daemon/standins/options/simulation_options.hpp"
 #include "drivers/standins/theatre/served_devices.hpp"
 #include "drivers/standins/theatre/theatre.hpp"
 #include "drivers/standins/theatre/theatre_words.hpp"

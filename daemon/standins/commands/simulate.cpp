@@ -1,14 +1,12 @@
 // `perimap simulate`: a recording of a beating heart, or of a bench, with its ground truth.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -16,9 +14,10 @@
 #include "daemon/command_line/outputs.hpp"
 #include "daemon/command_line/progress.hpp"
 #include "daemon/process/stop_signal.hpp"
-#include "daemon/standins/commands/bench_options.hpp"
-#include "daemon/standins/commands/scope_options.hpp"
-#include "daemon/standins/commands/simulation_options.hpp"
+#include "daemon/standins/options/bench_options.hpp"
+#include "daemon/standins/options/heart_settings.hpp"
+#include "daemon/standins/options/scope_options.hpp"
+#include "daemon/standins/options/simulation_options.hpp"
 #include "drivers/standins/procedure/procedure_text.hpp"
 #include "drivers/standins/session/bench_writer.hpp"
 #include "drivers/standins/session/session_writer.hpp"
@@ -40,9 +39,7 @@ struct SimulateOptions {
   std::filesystem::path procedure;  // to write the one that is simulated to
   std::filesystem::path untold;     // a second recording of the same, without its set-up; empty: none
 
-  [[nodiscard]] unsigned thread_count() const {
-    return threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
-  }
+  [[nodiscard]] unsigned thread_count() const { return rendering_threads(threads); }
 };
 
 class Stopwatch {
@@ -130,21 +127,9 @@ std::vector<Output> outputs_of(const SimulateOptions& options, const std::vector
   return outputs;
 }
 
-Expected<SimulationSettings> heart_settings(const SimulateOptions& options) {
-  auto settings = options.simulation.settings();
-  if (!settings) return tl::unexpected(settings.error());
-  options.scope.apply(*settings);
-  if (options.simulation.has_procedure()) {
-    auto procedure = options.simulation.procedure(*settings);
-    if (!procedure) return tl::unexpected(procedure.error());
-    settings->procedure = *std::move(procedure);
-  }
-  return settings;
-}
-
 Outcome simulate_heart(const SimulateOptions& options, const Console& console) {
   const Stopwatch watch;
-  const auto settings = heart_settings(options);
+  const auto settings = heart_settings(options.simulation, options.scope);
   if (!settings) return refuse(settings.error(), ExitCode::kWrongUsage);
   const std::vector<SimulatedRecording> recordings = planned(options);
   if (const auto apart = check_apart(outputs_of(options, recordings), {}); !apart) {

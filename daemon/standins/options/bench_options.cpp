@@ -1,4 +1,4 @@
-#include "daemon/standins/commands/bench_options.hpp"
+#include "daemon/standins/options/bench_options.hpp"
 
 #include <map>
 

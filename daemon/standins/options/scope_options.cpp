@@ -1,4 +1,4 @@
-#include "daemon/standins/commands/scope_options.hpp"
+#include "daemon/standins/options/scope_options.hpp"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,4 +1,4 @@
-#include "daemon/standins/commands/simulation_options.hpp"
+#include "daemon/standins/options/simulation_options.hpp"
 
 #include <fmt/format.h>
 
