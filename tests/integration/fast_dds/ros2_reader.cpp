@@ -72,9 +72,9 @@ int main(int argc, char** argv) {
   const FastReader<Transforms, tf2_msgs::msg::dds_::TFMessage_PubSubType> transforms(domain, "rt/tf", judge_transforms);
   const FastReader<Diagnostics, diagnostic_msgs::msg::dds_::DiagnosticArray_PubSubType> diagnostics(
       domain, "rt/diagnostics", judge_diagnostics);
+  // What is good is said once a second, for the eight seconds that it is.
   const bool right = wait_for(std::atoi(argv[2]), [&] {
-    return points.content() >= 20 && marker.content() >= 20 && transforms.content() >= 20 &&
-           diagnostics.content() >= 20;
+    return points.content() >= 20 && marker.content() >= 20 && transforms.content() >= 20 && diagnostics.content() >= 5;
   });
   std::printf("Fast DDS read %d point clouds, %d meshes, %d transforms, %d good diagnostics; wrong: %d\n",
               points.content(), marker.content(), transforms.content(), diagnostics.content(), wrong.load());
