@@ -30,7 +30,8 @@ void FeatureIntake::adopt(std::uint64_t frame_index, int room) noexcept {
                   .carried_px = found.patch_state.px,
                   .looks = found.looks,
                   .velocity_px = found.velocity_px,
-                  .last_found_frame = frame_index - 1});
+                  .last_found_frame = frame_index - 1,
+                  .last_told_frame = frame_index - 1});
     slot->last_view.begin_at(found.place_px2);
   }
 }

@@ -16,6 +16,8 @@ constexpr Duration kUnobservedBeforeLost = std::chrono::seconds(30);
 // Of a feature whose estimate is so uncertain the map can not tell where to search: its slot serves better.
 constexpr double kVagueDeviations = 3.0;  // of a converged feature's largest
 constexpr Duration kUnobservedVagueBeforeLost = std::chrono::seconds(1);
+// Of one that is followed without being learnt from, and has no estimate that would gain by its next good view.
+constexpr Duration kUntoldBeforeLost = std::chrono::seconds(2);
 constexpr int kFailedStartsBeforeLost = 3;
 constexpr Duration kConvergenceCheck = std::chrono::milliseconds(500);
 constexpr double kSamePhase_rad = 0.01;         // of a breath
@@ -69,6 +71,7 @@ class Step {
 
   LifeEvent tracked() noexcept {
     if (now() - slot_.last_found_frame > rate().frames(kCarriedUnseen)) return give_up(LifeEvent::kLostUnseen);
+    if (now() - slot_.last_told_frame > rate().frames(kUntoldBeforeLost)) return give_up(LifeEvent::kLostUnseen);
     slot_.held.drop_if([this](const HeldMatch& held) {
       const FrameRecord* frame = job_.history->find(held.frame_index);
       return frame == nullptr || (frame->phase.exact && !frame->phase.teaches);
@@ -146,7 +149,7 @@ class Step {
     const bool refused_long = slot_.refused_in_a_row >= job_.frame->held_rate.frames(kRefusedBeforeLost);
     const bool refused = refused_long && !slot_.match_agrees;
     const bool vague = slot_.largest_deviation_mm > kVagueDeviations * settings_.estimator.converged_deviation_mm;
-    if (slot_.last_found_frame == now()) {
+    if (slot_.last_told_frame == now()) {
       slot_.unseen_frames = 0;
     } else if (job_.frame->measurable && !slot_.shed) {
       ++slot_.unseen_frames;

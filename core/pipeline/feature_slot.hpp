@@ -144,6 +144,7 @@ struct TrackedFeature {
   PatchContinuity looks{};
   Vector2d velocity_px = Vector2d::Zero();  // per frame
   std::uint64_t last_found_frame = 0;
+  std::uint64_t last_told_frame = 0;   // likewise, and its place was told well enough to be learnt from
   std::uint64_t stale_matches = 0;     // in a row, of a template that fits the view badly
   PatchMatch match{};                  // of this frame
   bool match_agrees = false;           // it lies where the map predicted it
@@ -173,7 +174,7 @@ struct MappedFeature {
   bool began_on_surface = false;
   bool converged = false;
   bool recalled_converged = false;      // it was before a restart: believed until the innovations tell
-  std::uint64_t unseen_frames = 0;      // since it was found, in which it could have been searched for
+  std::uint64_t unseen_frames = 0;      // since its place was told, in which it could have been
   std::uint64_t refused_in_a_row = 0;   // matches, found, but at learning the estimate's gate said no
   bool follows_something_else = false;  // refused so often that the patch must be let go
 };

@@ -36,11 +36,17 @@ bool agrees(const PatchMatch& match, const PixelPrediction& prediction, double g
   return r.dot(C.inverse() * r) <= gate;
 }
 
-// Blur, smoke or a weak texture have left so little that the place is hardly told; as one of many alike (see
-// match_covariance) it would count for nothing, and it leads the next searches astray.
+// The place is hardly told: blur, smoke or a weak texture have left so little, or a last view has drifted so far. As
+// one of many alike (see match_covariance) it would count for nothing: it is not learnt from.
 bool is_vague(const PatchMatch& match) noexcept {
   constexpr double kLargestDeviation_px = 1.0;
   return !(larger_eigenvalue(match.covariance_px2) <= kLargestDeviation_px * kLargestDeviation_px);
+}
+
+// Whether it is where the map has it, and tells that.
+bool agrees_with_map(const FeatureSlot& slot, const PixelPrediction& from_map, double gate) noexcept {
+  return slot.match.state == MatchState::kFound && from_map.valid && !is_vague(slot.match) &&
+         agrees(slot.match, from_map, gate);
 }
 
 // Longer than a heart's beat, which stretches the picture of its surface and lets it go again.
@@ -75,20 +81,28 @@ enum class Looks : std::uint8_t { kAskedInDoubt, kAskedAlways };
 // Whether a release waits for it.
 enum class Hurry : std::uint8_t { kNone, kRelease };
 
-// False when nothing was found by the first view that can be believed.
-bool seek_first_view(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks, const FrameJob& job) noexcept {
+// What the first view has found: the feature; a place that is vague, and would lead the next searches astray, in a
+// picture that has lost its contrast there; or nothing that can be believed.
+enum class ByFirstView : std::uint8_t { kFound, kFaded, kNothing };
+
+// Of the first view's contrast: what smoke and blur leave less of. Tissue in vivo that changes its looks keeps it.
+constexpr double kFadedGain = 0.7;
+
+ByFirstView seek_first_view(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks,
+                            const FrameJob& job) noexcept {
   slot.seen = slot.patch_state;
   slot.seen_by_last_view = false;
   slot.match = job.tracker->track(job.image, slot.patch, slot.seen, prediction.px, prediction.covariance_px2);
-  if (slot.match.state != MatchState::kFound) return false;
+  if (slot.match.state != MatchState::kFound) return ByFirstView::kNothing;
   const std::uint64_t frames = frames_since_found(slot, job);
   const bool is_asked =
       looks == Looks::kAskedAlways || is_doubtful(prediction, slot.match.px, frames, unmapped_motion_px(job));
   const double usual_frames = static_cast<double>(frames) * job.frame->rate.of_usual();
   const bool is_other =
       is_asked && !slot.looks.is_plausible(slot.patch_state, slot.seen, slot.match.correlation, usual_frames);
-  if (is_other || is_vague(slot.match)) slot.match.state = MatchState::kLowCorrelation;
-  return slot.match.state == MatchState::kFound;
+  if (!is_other && !is_vague(slot.match)) return ByFirstView::kFound;
+  slot.match.state = MatchState::kLowCorrelation;
+  return !is_other && slot.seen.gain < kFadedGain ? ByFirstView::kFaded : ByFirstView::kNothing;
 }
 
 // As it looked in the frame before; and for a while, what has come back as it looked last, which the release need not
@@ -144,7 +158,11 @@ void seek(FeatureSlot& slot, const PixelPrediction& prediction, Looks looks, Hur
           const PipelineSettings& settings) noexcept {
   slot.match = PatchMatch{};
   if (!prediction.valid || !settings.camera.contains(prediction.px)) return;
-  if (!seek_first_view(slot, prediction, looks, job)) seek_last_view(slot, prediction, hurry, job);
+  // Where the picture has faded the tissue looks as before: the frame before had faded as well, and a view of it would
+  // only drift.
+  if (seek_first_view(slot, prediction, looks, job) == ByFirstView::kNothing) {
+    seek_last_view(slot, prediction, hurry, job);
+  }
 }
 
 // What was found is believed: the next search builds on it.
@@ -161,6 +179,7 @@ void believe(FeatureSlot& slot, const FrameJob& job) noexcept {
     renew_stale_template(slot, job);
   }
   slot.last_found_frame = job.frame->index;
+  if (!is_vague(slot.match)) slot.last_told_frame = job.frame->index;
 }
 
 // A jump that what is around it did not make. What the map knows well needs no neighbours: the frame's other matches
@@ -201,7 +220,7 @@ void predict_and_find(FeatureSlot& slot, const MapPrediction& map, const FrameJo
   }
   if (slot.match.state != MatchState::kFound) seek(slot, wide, looks, Hurry::kRelease, job, settings);
   if (slot.match.state != MatchState::kFound) return;
-  slot.match_agrees = from_map.valid && agrees(slot.match, from_map, settings.estimator.update.gate);
+  slot.match_agrees = agrees_with_map(slot, from_map, settings.estimator.update.gate);
   slot.off_px = slot.match.px - from_map.px;
   slot.pose_deviation_px = from_map.pose_deviation_px;
 }
@@ -216,12 +235,12 @@ void settle_match(FeatureSlot& slot, const MapPrediction& map, const FrameJob& j
     const PixelPrediction from_map = predict_now(map, job, model);
     seek(slot, surer(from_map, from_neighbours.valid ? from_neighbours : predict_from_last_place(slot, job)),
          Looks::kAskedAlways, Hurry::kNone, job, settings);
-    slot.match_agrees = slot.match.state == MatchState::kFound && from_map.valid && agrees(slot.match, from_map, gate);
+    slot.match_agrees = agrees_with_map(slot, from_map, gate);
   }
   if (slot.match.state == MatchState::kFound) {
     if (hold_against_last_view(slot, from_neighbours.valid ? from_neighbours : predict_from_velocity(slot, job), job)) {
       const PixelPrediction from_map = predict_now(map, job, model);
-      slot.match_agrees = from_map.valid && agrees(slot.match, from_map, gate);
+      slot.match_agrees = agrees_with_map(slot, from_map, gate);
     }
     believe(slot, job);
   } else {
@@ -297,6 +316,7 @@ bool is_wanted_for_start(const FeatureSlot& slot, const FrameJob& job) noexcept 
 
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept {
   if (slot.state == SlotState::kEmpty || slot.match.state != MatchState::kFound || !job.frame->measurable) return;
+  if (is_vague(slot.match)) return;
   if (job.frame->held && (slot.state != SlotState::kTracked || is_wanted_for_start(slot, job))) {
     const PixelMap& picture = job.frame->picture;
     slot.held.push(

@@ -156,7 +156,7 @@ class Learner {
       if (matches[i] == nullptr) continue;
       slot.match.state = MatchState::kFound;
       slot.match.px = *matches[i];
-      slot.last_found_frame = job.frame->index;
+      slot.last_found_frame = slot.last_told_frame = job.frame->index;
       hold_match(slot, job);
     }
     if (learning_ == Learning::kLate) {

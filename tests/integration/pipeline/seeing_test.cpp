@@ -70,6 +70,7 @@ struct Watched {
 struct Figures {
   int returned = 0, reacquired = 0;
   int gated = 0, off = 0;
+  int gated_by_last_view = 0, off_by_last_view = 0;
   int frames = 0, frames_short_of_features = 0;
   int least_live = 1 << 30;
   std::vector<double> errors_px;   // of gated matches
@@ -126,13 +127,17 @@ class Watch {
       const Vector2d e = slot->match.px - px;
       ++figures.gated;
       figures.off += near ? 0 : 1;
+      figures.gated_by_last_view += slot->seen_by_last_view ? 1 : 0;
+      figures.off_by_last_view += slot->seen_by_last_view && !near ? 1 : 0;
       figures.errors_px.push_back(e.norm());
       figures.normalised.push_back(0.5 * e.dot(slot->match.covariance_px2.inverse() * e));
       if (!near && verbose()) {
-        std::printf("off: frame %d id %u by %.1f, %.1f px at %.0f, %.0f correlation %.3f converged %d visible %d\n",
-                    static_cast<int>(now.frame.stamp.sequence), slot->id, e.x(), e.y(), px.x(), px.y(),
-                    slot->match.correlation, static_cast<int>(slot->converged),
-                    static_cast<int>(is_visible(px, p_C, now)));
+        std::printf(
+            "off: frame %d id %u by %.1f, %.1f px at %.0f, %.0f correlation %.3f by last view %d converged %d visible "
+            "%d\n",
+            static_cast<int>(now.frame.stamp.sequence), slot->id, e.x(), e.y(), px.x(), px.y(), slot->match.correlation,
+            static_cast<int>(slot->seen_by_last_view), static_cast<int>(slot->converged),
+            static_cast<int>(is_visible(px, p_C, now)));
       }
     }
     if (slot != nullptr && slot->state == SlotState::kMapped && slot->converged && near) feature.converged = true;
@@ -220,14 +225,16 @@ class Session {
         noise_.position_rms_mm, f.reacquired, f.returned, percent(f.reacquired, f.returned), f.off, f.gated,
         percent(f.off, f.gated), f.least_live, pipeline_.slots().size(), f.frames_short_of_features, f.frames);
     std::printf(
+        "  of them by last views: %d of %d\n"
         "  error of gated matches: median %.3f px, 95 %% %.3f px; its square over the match's covariance: median "
         "%.2f (0.69 is calibrated)\n",
-        quantile(f.errors_px, 0.5), quantile(f.errors_px, 0.95), quantile(f.normalised, 0.5));
+        f.off_by_last_view, f.gated_by_last_view, quantile(f.errors_px, 0.5), quantile(f.errors_px, 0.95),
+        quantile(f.normalised, 0.5));
     EXPECT_GE(f.returned, 50);
     EXPECT_GE(f.gated, 10'000);
-    // The goals, 95 %, 0.5 % and nine tenths, are met (docs/evidence/vision.md); the bounds of the latter two leave
-    // room for one feature that follows another point for the whole session, 0.7 % of all matches, and for a frame of
-    // bad luck.
+    // The goals are 95 %, 0.5 % and nine tenths; the second is missed (docs/evidence/vision.md). The bounds of the
+    // latter two leave room for one feature that follows another point for the whole session, 0.7 % of all matches, and
+    // for a frame of bad luck.
     EXPECT_GE(f.reacquired, 0.95 * f.returned);
     EXPECT_LT(f.off, 0.01 * f.gated);
     EXPECT_LT(f.frames_short_of_features, 0.02 * f.frames);

@@ -17,6 +17,22 @@ TEST_F(Stages, ATrackedFeatureWithoutMatchesIsGivenUpSoon) {
   EXPECT_EQ(slot->state, SlotState::kEmpty);
 }
 
+// Its last view has drifted too far: it is followed, and another would serve better.
+TEST_F(Stages, ATrackedFeatureThatIsFollowedWithoutBeingLearntFromIsGivenUp) {
+  slot->state = SlotState::kTracked;
+  next_frame();
+  found_at({320, 240});
+  int frames = 0;
+  do {
+    next_frame();
+    ++frames;
+    slot->match.state = MatchState::kFound;
+    slot->last_found_frame = job.frame->index;
+  } while (learn_frame() != LifeEvent::kLostUnseen && frames < 1000);
+  EXPECT_NEAR(frames * frame_ms, 2000, 2 * frame_ms);
+  EXPECT_EQ(slot->state, SlotState::kEmpty);
+}
+
 TEST_F(Stages, ATrackedFeatureIsCarriedAsLongWhateverTheRate) {
   for (const int ms : {66, 16, 8, 4}) {
     history = std::make_unique<FrameHistory>(settings.estimator.layout);

@@ -218,6 +218,51 @@ TEST_F(ChangingLooks, AreNotMistakenForWhatLooksMoreLikeTheFirstViewBesideIt) {
   EXPECT_TRUE(slot.seen_by_last_view);
 }
 
+// Smoke: what is left of the tissue looks as before, and a view of the frame before would only drift.
+TEST_F(ChangingLooks, AreNotWhatIsFollowedWhereThePictureHasFaded) {
+  int followed = 0;
+  for (int i = 0; i <= 30; ++i) {
+    test::View smoky;
+    smoky.t = shift + Vector2d(0.5, 0);
+    smoky.gain = 1.0 - 0.96 * i / 30;
+    smoky.bias = 110 * (1.0 - smoky.gain);
+    auto image = std::make_unique<test::ImageBuffer>(test::render(texture, smoky, kWidth, kHeight, 1, random));
+    job.before = before != nullptr ? before->view() : GreyImage{};
+    next_frame({0.5, 0}, *image);
+    before = std::move(image);
+    followed += slot.match.state == MatchState::kFound && slot.seen_by_last_view ? 1 : 0;
+  }
+  EXPECT_EQ(followed, 0);
+  EXPECT_NE(slot.match.state, MatchState::kFound);
+}
+
+TEST_F(ChangingLooks, AreFollowedOnAndNotLearntFromOnceTheyHaveDriftedByAPixel) {
+  constexpr int kFrames = 30;
+  const auto hold = [this] {
+    FrameRecord told = *job.frame;
+    told.measurable = told.held = true;
+    job.frame = &told;
+    slot.held.drop(slot.held.size());
+    hold_match(slot, job);
+    job.frame = history->newest();
+    return slot.held.size();
+  };
+  for (int i = 0; i <= kFrames; ++i) next_look(static_cast<double>(i) / kFrames, {1, 0});
+  ASSERT_TRUE(slot.seen_by_last_view);
+  EXPECT_EQ(hold(), 1);
+  EXPECT_EQ(slot.last_told_frame, job.frame->index);
+
+  PatchMatch far_off;
+  far_off.covariance_px2 = 1.5 * Matrix2d::Identity();
+  slot.last_view.drift_to(far_off);
+  next_look(1, {1, 0});
+  EXPECT_EQ(slot.match.state, MatchState::kFound);
+  EXPECT_LT((slot.match.px - place()).norm(), 1.5);
+  EXPECT_FALSE(slot.match_agrees);
+  EXPECT_EQ(hold(), 0);
+  EXPECT_LT(slot.last_told_frame, job.frame->index);
+}
+
 TEST_F(ChangingLooks, AreNotFollowedWhereTheWayBackEndsElsewhere) {
   next_look(0, {1, 0});
   // All of it has been replaced: nothing of the frame before is there.

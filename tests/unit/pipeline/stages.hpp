@@ -93,7 +93,7 @@ struct Stages : ::testing::Test {
     found.match.px = px;
     found.match.covariance_px2 = 0.05 * Matrix2d::Identity();
     found.match_agrees = (px - Vector2d(320, 240)).norm() < 20.0;
-    found.last_found_frame = job.frame->index;
+    found.last_found_frame = found.last_told_frame = job.frame->index;
     hold_match(found, job);
   }
 
