@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -29,6 +30,12 @@ struct FrameDoubts {
 
   // Per axis, by the set-up: in which direction it puts a position off is not known.
   [[nodiscard]] double setup_variance_mm2() const noexcept { return setup_widening_mm * setup_widening_mm / 3.0; }
+
+  // How far a position may be off whose largest deviation over the cycle is this: in the direction of that all may lie
+  // that the set-up is off by. It is held to the bound of a feature that has converged.
+  [[nodiscard]] double largest_deviation_mm(double of_feature_mm) const noexcept {
+    return std::hypot(of_feature_mm, setup_widening_mm);
+  }
 
   // What is doubted in either.
   void add(const FrameDoubts& other) noexcept {

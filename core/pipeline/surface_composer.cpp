@@ -31,12 +31,12 @@ SurfaceComposer::Covered SurfaceComposer::covered_by(const ShardSnapshot& snapsh
 }
 
 // Where the snapshot was not evaluated (the update is late, or there is no frame), the largest deviation over the cycle
-// bounds it, and in the direction of that all may lie that the set-up is off by: as the published model has it.
+// bounds it.
 Matrix3d SurfaceComposer::map_covariance(const FeatureSnapshot& feature, const Covered& covered,
                                          const FrameDoubts& doubts) noexcept {
   if (!covered.any) {
-    const double widening = doubts.setup_widening_mm;
-    return Matrix3d::Identity() * (feature.largest_deviation_mm * feature.largest_deviation_mm + widening * widening);
+    const double largest_mm = doubts.largest_deviation_mm(feature.largest_deviation_mm);
+    return Matrix3d::Identity() * (largest_mm * largest_mm);
   }
   return (1.0 - covered.share) * feature.covariances_W_mm2[covered.before] +
          covered.share * feature.covariances_W_mm2[covered.after] + doubts.setup_variance_mm2() * Matrix3d::Identity();

@@ -1,7 +1,6 @@
 #include "daemon/publishing/wire_model.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "daemon/publishing/model_moment.hpp"
 #include "daemon/publishing/wire_states.hpp"
@@ -116,8 +115,7 @@ void WireModel::fill_features(const ModelMoment& moment) {
     out.first_observed_time_ns = to_ns(feature.first_observed);
     out.first_observed_px[0] = feature.first_observed_px.x();
     out.first_observed_px[1] = feature.first_observed_px.y();
-    // In its least certain direction, in which all that the set-up may be off by may lie: as it is held to the bound.
-    out.largest_deviation_mm = std::hypot(feature.largest_deviation_mm, moment.footing.doubts.setup_widening_mm);
+    out.largest_deviation_mm = moment.footing.doubts.largest_deviation_mm(feature.largest_deviation_mm);
     const auto n = static_cast<std::uint32_t>(coefficients_[i].size());
     out.coefficients_W_mm = {n, n, coefficients_[i].data(), false};
     out.last_observed_time_ns = to_ns(feature.last_observed);
