@@ -15,8 +15,8 @@
 #include <utility>
 
 #include "drivers/device/byte_cursor.hpp"
+#include "drivers/file/descriptor.hpp"
 #include "drivers/recording/crc32.hpp"
-#include "drivers/transport/descriptor.hpp"
 
 namespace perimap {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "core/error/expected.hpp"
 #include "daemon/control/control_request.hpp"
-#include "drivers/transport/descriptor.hpp"
+#include "drivers/file/descriptor.hpp"
 #include "drivers/transport/interrupt.hpp"
 
 namespace perimap {

@@ -1,7 +1,6 @@
 #include "daemon/process/reload_signal.hpp"
 
 #include <poll.h>
-#include <unistd.h>
 
 #include <array>
 #include <csignal>
@@ -12,21 +11,16 @@
 namespace perimap {
 
 Expected<ReloadSignal> ReloadSignal::install() {
-  return open_signal_descriptor({SIGHUP}).map([](int descriptor) { return ReloadSignal(descriptor); });
-}
-
-ReloadSignal::ReloadSignal(ReloadSignal&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
-
-ReloadSignal::~ReloadSignal() {
-  if (descriptor_ >= 0) close(descriptor_);
+  return open_signal_descriptor({SIGHUP}).map(
+      [](Descriptor descriptor) { return ReloadSignal(std::move(descriptor)); });
 }
 
 bool ReloadSignal::wait(int interrupt_descriptor) noexcept {
   for (;;) {
-    std::array<pollfd, 2> waited{{{interrupt_descriptor, POLLIN, 0}, {descriptor_, POLLIN, 0}}};
+    std::array<pollfd, 2> waited{{{interrupt_descriptor, POLLIN, 0}, {descriptor_.get(), POLLIN, 0}}};
     if (poll(waited.data(), waited.size(), -1) <= 0) continue;
     if (waited[0].revents != 0) return false;
-    if (take_signal(descriptor_)) return true;
+    if (take_signal(descriptor_.get())) return true;
   }
 }
 

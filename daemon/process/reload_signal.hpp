@@ -1,7 +1,10 @@
 // SIGHUP as something to wait for.
 #pragma once
 
+#include <utility>
+
 #include "core/error/expected.hpp"
+#include "drivers/file/descriptor.hpp"
 
 namespace perimap {
 
@@ -11,20 +14,14 @@ class ReloadSignal {
  public:
   [[nodiscard]] static Expected<ReloadSignal> install();
 
-  ReloadSignal(ReloadSignal&& other) noexcept;
-  ReloadSignal& operator=(ReloadSignal&&) = delete;
-  ReloadSignal(const ReloadSignal&) = delete;
-  ReloadSignal& operator=(const ReloadSignal&) = delete;
-  ~ReloadSignal();
-
   // True when the signal has come, false when the other descriptor can be read: it is time to end. One thread at a
   // time.
   [[nodiscard]] bool wait(int interrupt_descriptor) noexcept;
 
  private:
-  explicit ReloadSignal(int descriptor) noexcept : descriptor_(descriptor) {}
+  explicit ReloadSignal(Descriptor descriptor) noexcept : descriptor_(std::move(descriptor)) {}
 
-  int descriptor_;
+  Descriptor descriptor_;
 };
 
 }  // namespace perimap

@@ -10,14 +10,14 @@
 
 namespace perimap {
 
-Expected<int> open_signal_descriptor(std::initializer_list<int> signals) {
+Expected<Descriptor> open_signal_descriptor(std::initializer_list<int> signals) {
   sigset_t set;
   sigemptyset(&set);
   for (const int signal : signals) sigaddset(&set, signal);
   const int error = pthread_sigmask(SIG_BLOCK, &set, nullptr);
   if (error != 0) return fail(fmt::format("cannot block signals: {}", std::generic_category().message(error)));
-  const int descriptor = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-  if (descriptor < 0) {
+  Descriptor descriptor(signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK));
+  if (!descriptor) {
     return fail(fmt::format("cannot open a signal descriptor: {}", std::generic_category().message(errno)));
   }
   return descriptor;

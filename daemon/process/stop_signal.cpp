@@ -1,7 +1,6 @@
 #include "daemon/process/stop_signal.hpp"
 
 #include <poll.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
@@ -12,16 +11,9 @@
 namespace perimap {
 
 Expected<StopSignal> StopSignal::install() {
-  return open_signal_descriptor({SIGINT, SIGTERM}).map([](int descriptor) { return StopSignal(descriptor); });
-}
-
-StopSignal::StopSignal(StopSignal&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)), requested_(other.requested_) {}
-
-StopSignal::~StopSignal() {
-  if (descriptor_ >= 0) {
-    close(descriptor_);
-  }
+  return open_signal_descriptor({SIGINT, SIGTERM}).map([](Descriptor descriptor) {
+    return StopSignal(std::move(descriptor));
+  });
 }
 
 bool StopSignal::wait_for(Duration longest) noexcept {
@@ -29,9 +21,9 @@ bool StopSignal::wait_for(Duration longest) noexcept {
   while (!requested_) {
     const Duration left = std::max(deadline - MonotonicClock::now(), Duration(0));
     const std::timespec timeout{left.count() / 1'000'000'000, left.count() % 1'000'000'000};
-    pollfd waited{descriptor_, POLLIN, 0};
+    pollfd waited{descriptor_.get(), POLLIN, 0};
     if (ppoll(&waited, 1, &timeout, nullptr) > 0) {
-      requested_ = take_signal(descriptor_);
+      requested_ = take_signal(descriptor_.get());
     }
     if (MonotonicClock::now() >= deadline) {
       break;

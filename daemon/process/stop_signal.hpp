@@ -1,8 +1,11 @@
 // SIGINT and SIGTERM as something to wait for.
 #pragma once
 
+#include <utility>
+
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
+#include "drivers/file/descriptor.hpp"
 
 namespace perimap {
 
@@ -12,12 +15,6 @@ class StopSignal {
  public:
   [[nodiscard]] static Expected<StopSignal> install();
 
-  StopSignal(StopSignal&& other) noexcept;
-  StopSignal& operator=(StopSignal&&) = delete;
-  StopSignal(const StopSignal&) = delete;
-  StopSignal& operator=(const StopSignal&) = delete;
-  ~StopSignal();
-
   // Whether a signal has come. Once true, it stays so.
   [[nodiscard]] bool requested() noexcept { return wait_for(Duration(0)); }
 
@@ -25,12 +22,12 @@ class StopSignal {
   bool wait_for(Duration longest) noexcept;
 
   // Readable when a signal has come and neither of the calls above has taken it: for a poll loop of one's own.
-  [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
+  [[nodiscard]] int descriptor() const noexcept { return descriptor_.get(); }
 
  private:
-  explicit StopSignal(int descriptor) noexcept : descriptor_(descriptor) {}
+  explicit StopSignal(Descriptor descriptor) noexcept : descriptor_(std::move(descriptor)) {}
 
-  int descriptor_;
+  Descriptor descriptor_;
   bool requested_ = false;
 };
 

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "drivers/file/descriptor.hpp"
+
 namespace perimap {
 namespace {
 
@@ -102,10 +104,8 @@ Forgotten forget_old(const std::vector<std::string>& folders, std::chrono::secon
 }
 
 void synchronise_folder(const fs::path& folder) {
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  static_cast<void>(::fsync(descriptor));
-  ::close(descriptor);
+  const Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (opened) static_cast<void>(::fsync(opened.get()));
 }
 
 }  // namespace perimap

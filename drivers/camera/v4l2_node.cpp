@@ -12,7 +12,7 @@
 #include <system_error>
 #include <utility>
 
-#include "drivers/transport/descriptor.hpp"
+#include "drivers/file/descriptor.hpp"
 
 namespace perimap {
 namespace {

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "drivers/device/reopening.hpp"
-#include "drivers/transport/descriptor.hpp"
+#include "drivers/file/descriptor.hpp"
 #include "drivers/transport/serial_port.hpp"
 
 namespace perimap {

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
@@ -24,21 +23,19 @@ bool is_pipe(const std::filesystem::path& file) {
 
 }  // namespace
 
-tl::expected<int, std::string> open_output_file(const std::filesystem::path& file) {
+tl::expected<Descriptor, std::string> open_output_file(const std::filesystem::path& file) {
   // Without O_NONBLOCK this call would be what waits; on a regular file the flag does nothing.
   constexpr int kFlags = O_WRONLY | O_CREAT | O_TRUNC | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
-  int descriptor = ::open(file.c_str(), kFlags, S_IRUSR | S_IWUSR);
-  for (auto waited = kAskedEvery; descriptor < 0 && errno == ENXIO && is_pipe(file); waited += kAskedEvery) {
+  Descriptor descriptor(::open(file.c_str(), kFlags, S_IRUSR | S_IWUSR));
+  for (auto waited = kAskedEvery; !descriptor && errno == ENXIO && is_pipe(file); waited += kAskedEvery) {
     if (waited > kReaderAwaited) return tl::unexpected(std::string("a pipe that nobody reads from"));
     std::this_thread::sleep_for(kAskedEvery);
-    descriptor = ::open(file.c_str(), kFlags, S_IRUSR | S_IWUSR);
+    descriptor = Descriptor(::open(file.c_str(), kFlags, S_IRUSR | S_IWUSR));
   }
-  if (descriptor < 0) return tl::unexpected(reason(errno));
+  if (!descriptor) return tl::unexpected(reason(errno));
   // What is written waits for whoever reads.
-  if (::fcntl(descriptor, F_SETFL, O_WRONLY) == 0) return descriptor;
-  const int error = errno;
-  ::close(descriptor);
-  return tl::unexpected(reason(error));
+  if (::fcntl(descriptor.get(), F_SETFL, O_WRONLY) == 0) return descriptor;
+  return tl::unexpected(reason(errno));
 }
 
 }  // namespace perimap

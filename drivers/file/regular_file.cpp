@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <system_error>
@@ -23,15 +22,14 @@ std::string other_kind(mode_t mode) {
 
 }  // namespace
 
-tl::expected<int, std::string> open_regular_file(const std::filesystem::path& file) {
+tl::expected<Descriptor, std::string> open_regular_file(const std::filesystem::path& file) {
   // Without O_NONBLOCK this call would be what waits; on a regular file the flag does nothing.
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  Descriptor descriptor(::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
   // A socket cannot be opened at all.
-  if (descriptor < 0) return tl::unexpected(errno == ENXIO ? other_kind(S_IFSOCK) : reason(errno));
+  if (!descriptor) return tl::unexpected(errno == ENXIO ? other_kind(S_IFSOCK) : reason(errno));
   struct stat status {};
-  std::string wrong = ::fstat(descriptor, &status) != 0 ? reason(errno) : other_kind(status.st_mode);
+  std::string wrong = ::fstat(descriptor.get(), &status) != 0 ? reason(errno) : other_kind(status.st_mode);
   if (wrong.empty()) return descriptor;
-  ::close(descriptor);
   return tl::unexpected(std::move(wrong));
 }
 

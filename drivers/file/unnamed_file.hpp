@@ -2,8 +2,10 @@
 #pragma once
 
 #include <string>
+#include <utility>
 
 #include "core/error/expected.hpp"
+#include "drivers/file/descriptor.hpp"
 
 namespace perimap {
 
@@ -12,19 +14,13 @@ class UnnamedFile {
  public:
   [[nodiscard]] static Expected<UnnamedFile> create();
 
-  UnnamedFile(UnnamedFile&& other) noexcept;
-  UnnamedFile& operator=(UnnamedFile&&) = delete;
-  UnnamedFile(const UnnamedFile&) = delete;
-  UnnamedFile& operator=(const UnnamedFile&) = delete;
-  ~UnnamedFile();
-
   // Where this process opens it, to write and to read; for as long as this lives.
-  [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+  [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_.get()); }
 
  private:
-  explicit UnnamedFile(int descriptor) noexcept : descriptor_(descriptor) {}
+  explicit UnnamedFile(Descriptor descriptor) noexcept : descriptor_(std::move(descriptor)) {}
 
-  int descriptor_;
+  Descriptor descriptor_;
 };
 
 }  // namespace perimap

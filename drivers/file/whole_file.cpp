@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error/one_line.hpp"
+#include "drivers/file/descriptor.hpp"
 
 namespace perimap {
 namespace {
@@ -45,11 +46,8 @@ bool is_open_already(std::filesystem::path file) {
 
 // On the disk, whatever opened it and however it was written. 0, or the error.
 int synchronise(const std::filesystem::path& path, int flags) {
-  const int descriptor = ::open(path.c_str(), flags | O_CLOEXEC);
-  if (descriptor < 0) return errno;
-  const int error = ::fsync(descriptor) == 0 ? 0 : errno;
-  ::close(descriptor);
-  return error;
+  const Descriptor descriptor(::open(path.c_str(), flags | O_CLOEXEC));
+  return descriptor && ::fsync(descriptor.get()) == 0 ? 0 : errno;
 }
 
 }  // namespace
@@ -71,17 +69,16 @@ Expected<WholeFile> WholeFile::create(const std::filesystem::path& file, Name na
   // A new file takes the place of the old one, which may say that it is not to be written.
   if (::access(target.c_str(), W_OK) != 0 && errno != ENOENT) return cannot_write(file, errno);
   std::filesystem::path partial;
-  int descriptor = -1;
+  Descriptor made;
   // What has that name already may be all that is left of an earlier run, or another's that is under way.
-  for (int number = 1; descriptor < 0; ++number) {
+  for (int number = 1; !made; ++number) {
     partial = target;
     partial += number == 1 ? ".part" : ".part-" + std::to_string(number);
     if (name == Name::kPartWithEnding) partial += target.extension();
-    descriptor =
-        ::open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, readers == Readers::kOwner ? 0600 : 0666);
-    if (descriptor < 0 && (errno != EEXIST || number == kMostPartial)) return cannot_write(file, errno);
+    constexpr int kFlags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC;
+    made = Descriptor(::open(partial.c_str(), kFlags, readers == Readers::kOwner ? 0600 : 0666));
+    if (!made && (errno != EEXIST || number == kMostPartial)) return cannot_write(file, errno);
   }
-  ::close(descriptor);
   if (readers == Readers::kOwner) return WholeFile(file, std::move(target), std::move(partial));
   std::error_code error;
   const auto before = std::filesystem::status(target, error);

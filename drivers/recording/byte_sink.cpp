@@ -15,16 +15,11 @@ namespace {
 
 class FileSink final : public ByteSink {
  public:
-  FileSink(int fd, std::string path) noexcept : fd_(fd), path_(std::move(path)) {}
-  FileSink(const FileSink&) = delete;
-  FileSink& operator=(const FileSink&) = delete;
-  ~FileSink() override {
-    if (fd_ >= 0) ::close(fd_);
-  }
+  FileSink(Descriptor file, std::string path) noexcept : file_(std::move(file)), path_(std::move(path)) {}
 
   Expected<void> write(std::span<const std::byte> bytes) override {
     while (!bytes.empty()) {
-      const ssize_t written = ::write(fd_, bytes.data(), bytes.size());
+      const ssize_t written = ::write(file_.get(), bytes.data(), bytes.size());
       if (written < 0) {
         if (errno == EINTR) continue;
         return fail(fmt::format("{}: cannot write: {}", path_, errno_text(errno)));
@@ -36,8 +31,7 @@ class FileSink final : public ByteSink {
   }
 
   Expected<void> close() override {
-    const int fd = std::exchange(fd_, -1);
-    if (::close(fd) != 0) return fail(fmt::format("{}: cannot close: {}", path_, errno_text(errno)));
+    if (::close(file_.release()) != 0) return fail(fmt::format("{}: cannot close: {}", path_, errno_text(errno)));
     return {};
   }
 
@@ -46,10 +40,10 @@ class FileSink final : public ByteSink {
   // keeps takes the place of what others need. So it begins with each window at once, and forgets the one before.
   Expected<void> hand_on() {
     constexpr unsigned kDone = SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER;
-    bool on_disk = ::sync_file_range(fd_, begun_, written_ - begun_, SYNC_FILE_RANGE_WRITE) == 0;
+    bool on_disk = ::sync_file_range(file_.get(), begun_, written_ - begun_, SYNC_FILE_RANGE_WRITE) == 0;
     if (begun_ > forgotten_) {
-      on_disk = on_disk && ::sync_file_range(fd_, forgotten_, begun_ - forgotten_, kDone) == 0;
-      if (on_disk) (void)::posix_fadvise(fd_, forgotten_, begun_ - forgotten_, POSIX_FADV_DONTNEED);
+      on_disk = on_disk && ::sync_file_range(file_.get(), forgotten_, begun_ - forgotten_, kDone) == 0;
+      if (on_disk) (void)::posix_fadvise(file_.get(), forgotten_, begun_ - forgotten_, POSIX_FADV_DONTNEED);
     }
     // What is no file on a disk (a pipe) has nothing to hand on.
     if (!on_disk && (errno == EIO || errno == ENOSPC || errno == EDQUOT)) {
@@ -61,7 +55,7 @@ class FileSink final : public ByteSink {
   }
 
   static constexpr off_t kWindow = off_t{8} << 20;
-  int fd_;
+  Descriptor file_;
   std::string path_;
   off_t written_ = 0;    // bytes in all
   off_t begun_ = 0;      // until here they are on their way to the disk
@@ -72,9 +66,9 @@ class FileSink final : public ByteSink {
 
 Expected<std::unique_ptr<ByteSink>> create_file(const std::string& path, const std::string& told_as) {
   const std::string& name = told_as.empty() ? path : told_as;
-  const auto fd = open_output_file(path);
-  if (!fd) return fail(fmt::format("{}: cannot create: {}", name, fd.error()));
-  return std::make_unique<FileSink>(*fd, name);
+  auto opened = open_output_file(path);
+  if (!opened) return fail(fmt::format("{}: cannot create: {}", name, opened.error()));
+  return std::make_unique<FileSink>(*std::move(opened), name);
 }
 
 }  // namespace perimap

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <utility>
 
 #include "drivers/file/regular_file.hpp"
 #include "drivers/recording/errno_text.hpp"
@@ -14,17 +15,13 @@ namespace {
 
 class FileSource final : public ByteSource {
  public:
-  explicit FileSource(int fd) noexcept : fd_(fd) {}
-  FileSource(const FileSource&) = delete;
-  FileSource& operator=(const FileSource&) = delete;
-  ~FileSource() override { ::close(fd_); }
+  FileSource(Descriptor file, std::uint64_t size) noexcept : file_(std::move(file)), size_(size) {}
 
-  void set_size(std::uint64_t size) noexcept { size_ = size; }
   std::uint64_t size() const noexcept override { return size_; }
 
   Expected<void> read_at(std::uint64_t offset, std::span<std::byte> bytes) override {
     while (!bytes.empty()) {
-      const ssize_t got = ::pread(fd_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+      const ssize_t got = ::pread(file_.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
       if (got < 0) {
         if (errno == EINTR) continue;
         return fail(fmt::format("byte {}: cannot read: {}", offset, errno_text(errno)));
@@ -37,20 +34,18 @@ class FileSource final : public ByteSource {
   }
 
  private:
-  int fd_;
-  std::uint64_t size_ = 0;
+  Descriptor file_;
+  std::uint64_t size_;
 };
 
 }  // namespace
 
 Expected<std::unique_ptr<ByteSource>> open_file(const std::string& path) {
-  const auto opened = open_regular_file(path);
+  auto opened = open_regular_file(path);
   if (!opened) return fail(fmt::format("{}: cannot open: {}", path, opened.error()));
-  auto source = std::make_unique<FileSource>(*opened);
   struct stat status {};
-  if (::fstat(*opened, &status) != 0) return fail(fmt::format("{}: cannot examine: {}", path, errno_text(errno)));
-  source->set_size(static_cast<std::uint64_t>(status.st_size));
-  return source;
+  if (::fstat(opened->get(), &status) != 0) return fail(fmt::format("{}: cannot examine: {}", path, errno_text(errno)));
+  return std::make_unique<FileSource>(*std::move(opened), static_cast<std::uint64_t>(status.st_size));
 }
 
 }  // namespace perimap

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <memory>
 #include <system_error>
+#include <utility>
 
 #include "core/error/one_line.hpp"
+#include "drivers/file/c_stream.hpp"
 #include "drivers/file/output_file.hpp"
 #include "drivers/file/regular_file.hpp"
 
@@ -18,9 +19,9 @@ Expected<std::string> read_text_file(const std::filesystem::path& file, std::siz
   const auto refuse = [&](std::string_view reason) {
     return fail(on_one_line(fmt::format("{}: expected a readable {}, got: {}", file.string(), what, reason)));
   };
-  const auto opened = open_regular_file(file);
+  auto opened = open_regular_file(file);
   if (!opened) return refuse(opened.error());
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(::fdopen(*opened, "rb"), &std::fclose);
+  const CStream stream = stream_of(*std::move(opened), "rb");
   if (!stream) return refuse(std::generic_category().message(errno));
   // Piece by piece: what may be large is mostly not, and need not be asked for and cleared.
   std::string text, piece(std::min<std::size_t>(largest + 1, 1U << 16U), '\0');
@@ -41,9 +42,9 @@ Expected<void> write_text_file(const std::filesystem::path& file, std::string_vi
   const auto refuse = [&](std::string_view reason) {
     return fail(on_one_line(fmt::format("{}: cannot be written: {}", file.string(), reason)));
   };
-  const auto opened = open_output_file(whole->path());
+  auto opened = open_output_file(whole->path());
   if (!opened) return refuse(opened.error());
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(::fdopen(*opened, "wb"), &std::fclose);
+  CStream stream = stream_of(*std::move(opened), "wb");
   const bool written = stream && std::fwrite(text.data(), 1, text.size(), stream.get()) == text.size();
   if (!written || std::fclose(stream.release()) != 0) return refuse(std::generic_category().message(errno));
   return whole->finish();

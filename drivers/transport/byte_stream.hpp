@@ -5,7 +5,7 @@
 #include <span>
 
 #include "core/error/expected.hpp"
-#include "drivers/transport/descriptor.hpp"
+#include "drivers/file/descriptor.hpp"
 
 namespace perimap {
 

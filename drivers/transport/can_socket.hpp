@@ -8,7 +8,7 @@
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
-#include "drivers/transport/descriptor.hpp"
+#include "drivers/file/descriptor.hpp"
 
 namespace perimap {
 

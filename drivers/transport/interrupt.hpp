@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/time/instant.hpp"
-#include "drivers/transport/descriptor.hpp"
+#include "drivers/file/descriptor.hpp"
 
 namespace perimap {
 

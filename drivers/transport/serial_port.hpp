@@ -5,8 +5,8 @@
 #include <string>
 
 #include "core/error/expected.hpp"
+#include "drivers/file/descriptor.hpp"
 #include "drivers/transport/byte_stream.hpp"
-#include "drivers/transport/descriptor.hpp"
 
 namespace perimap {
 

@@ -15,6 +15,21 @@
 #include <utility>
 
 namespace perimap::bench {
+namespace {
+
+struct Pipe {
+  // Nothing, and errno, where the system has none left.
+  static std::optional<Pipe> make() {
+    std::array<int, 2> ends{};
+    if (pipe2(ends.data(), O_CLOEXEC) != 0) return std::nullopt;
+    return Pipe{Descriptor(ends[0]), Descriptor(ends[1])};
+  }
+
+  Descriptor read;
+  Descriptor write;
+};
+
+}  // namespace
 
 std::optional<std::string> find_program(const std::string& name) {
   // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing here writes the environment
@@ -31,19 +46,13 @@ Expected<ChildProcess> ChildProcess::start(const std::string& program, const std
   const auto failed = [&](int error) {
     return fail(fmt::format("{}: cannot be run: {}", program, std::generic_category().message(error)));
   };
-  std::array<int, 2> to{};
-  std::array<int, 2> from{};
-  if (pipe2(to.data(), O_CLOEXEC) != 0) return failed(errno);
-  if (pipe2(from.data(), O_CLOEXEC) != 0) {
-    const int error = errno;
-    close(to[0]);
-    close(to[1]);
-    return failed(error);
-  }
+  auto to = Pipe::make();
+  auto from = Pipe::make();
+  if (!to || !from) return failed(errno);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, to[0], STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, from[1], STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, to->read.get(), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, from->write.get(), STDOUT_FILENO);
   // The signals that we take by a descriptor are blocked in us; others have to be able to end a child.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
@@ -62,20 +71,14 @@ Expected<ChildProcess> ChildProcess::start(const std::string& program, const std
   const int error = posix_spawn(&process, program.c_str(), &actions, &attributes, argv.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
-  close(to[0]);
-  close(from[1]);
-  if (error != 0) {
-    close(to[1]);
-    close(from[0]);
-    return failed(error);
-  }
-  return ChildProcess(process, to[1], from[0]);
+  if (error != 0) return failed(error);
+  return ChildProcess(process, std::move(to->write), std::move(from->read));
 }
 
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept
     : process_(std::exchange(other.process_, 0)),
-      input_(std::exchange(other.input_, -1)),
-      output_(std::exchange(other.output_, -1)),
+      input_(std::move(other.input_)),
+      output_(std::move(other.output_)),
       buffer_(std::move(other.buffer_)) {}
 
 ChildProcess::~ChildProcess() {
@@ -83,13 +86,9 @@ ChildProcess::~ChildProcess() {
     terminate();
     wait();
   }
-  close_input();
-  if (output_ >= 0) close(output_);
 }
 
-void ChildProcess::close_input() noexcept {
-  if (input_ >= 0) close(std::exchange(input_, -1));
-}
+void ChildProcess::close_input() noexcept { input_.reset(); }
 
 void ChildProcess::terminate() const noexcept {
   if (process_ > 0) kill(process_, SIGTERM);
@@ -103,7 +102,7 @@ std::optional<std::string> ChildProcess::read_line() {
       return line;
     }
     std::array<char, 4096> bytes{};
-    const ssize_t n = read(output_, bytes.data(), bytes.size());
+    const ssize_t n = read(output_.get(), bytes.data(), bytes.size());
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) return std::nullopt;
     buffer_.append(bytes.data(), static_cast<std::size_t>(n));

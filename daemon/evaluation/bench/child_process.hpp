@@ -5,9 +5,11 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "drivers/file/descriptor.hpp"
 
 namespace perimap::bench {
 
@@ -38,11 +40,12 @@ class ChildProcess {
   int wait() noexcept;
 
  private:
-  ChildProcess(pid_t process, int input, int output) noexcept : process_(process), input_(input), output_(output) {}
+  ChildProcess(pid_t process, Descriptor input, Descriptor output) noexcept
+      : process_(process), input_(std::move(input)), output_(std::move(output)) {}
 
   pid_t process_;
-  int input_;
-  int output_;
+  Descriptor input_;
+  Descriptor output_;
   std::string buffer_;
 };
 

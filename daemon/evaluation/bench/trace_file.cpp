@@ -25,9 +25,9 @@ tl::unexpected<Error> cannot_write_trace(const std::string& path, const std::str
 Expected<TraceFile> TraceFile::create(const std::string& path) {
   auto whole = WholeFile::create(path);
   if (!whole) return tl::unexpected(whole.error());
-  const auto opened = open_output_file(whole->path());
+  auto opened = open_output_file(whole->path());
   if (!opened) return cannot_write_trace(path, opened.error());
-  File file(::fdopen(*opened, "w"), &std::fclose);
+  CStream file = stream_of(*std::move(opened), "w");
   if (!file) return cannot_write_trace(path, std::generic_category().message(errno));
   TraceFile trace(path, std::move(*whole), std::move(file), MonotonicClock::now() - kBefore);
   const std::string head =

@@ -2,14 +2,13 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "core/error/expected.hpp"
 #include "core/pipeline/frame_trace.hpp"
+#include "drivers/file/c_stream.hpp"
 #include "drivers/file/whole_file.hpp"
 
 namespace perimap::bench {
@@ -27,15 +26,13 @@ class TraceFile {
   [[nodiscard]] std::uint64_t left_out() const noexcept { return left_out_; }
 
  private:
-  using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
-
-  TraceFile(std::string path, WholeFile whole, File file, Instant zero)
+  TraceFile(std::string path, WholeFile whole, CStream file, Instant zero)
       : path_(std::move(path)), whole_(std::move(whole)), file_(std::move(file)), zero_(zero) {}
   [[nodiscard]] Expected<void> write(const std::string& text);
 
   std::string path_;
   WholeFile whole_;
-  File file_;
+  CStream file_;
   Instant zero_;
   int runs_ = 0;
   std::uint64_t left_out_ = 0;

@@ -102,7 +102,6 @@ class MarkedVideo {
       const auto opened = open_output_file(whole->path());
       if (!opened) return fail(path_ + ": cannot be written: " + opened.error());
       auto writer = VideoWriter::create(whole->path().string(), frame.grey.width, frame.grey.height, frames_per_s_);
-      ::close(*opened);
       if (!writer) return told(std::move(writer.error()), whole->path());
       whole_.emplace(std::move(*whole));
       writer_ = *std::move(writer);

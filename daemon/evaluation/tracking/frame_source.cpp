@@ -117,8 +117,7 @@ bool is_recording(const std::string& path) {
   char start[kMagic.size()] = {};
   const auto opened = open_regular_file(path);
   if (!opened) return false;
-  const ssize_t got = ::read(*opened, start, sizeof start);
-  ::close(*opened);
+  const ssize_t got = ::read(opened->get(), start, sizeof start);
   return got == ssize_t{sizeof start} && std::string_view(start, sizeof start) == kMagic;
 }
 

@@ -13,9 +13,9 @@ namespace perimap {
 Expected<TrackTable> TrackTable::create(const std::string& path) {
   auto whole = WholeFile::create(path);
   if (!whole) return tl::unexpected(whole.error());
-  const auto opened = open_output_file(whole->path());
+  auto opened = open_output_file(whole->path());
   if (!opened) return fail(path + ": cannot be written: " + opened.error());
-  File file(::fdopen(*opened, "w"));
+  CStream file = stream_of(*std::move(opened), "w");
   if (file == nullptr) return fail(path + ": cannot be written: " + std::generic_category().message(errno));
   fmt::print(file.get(), "frame,id,x,y,state\n");
   return TrackTable(path, std::move(*whole), std::move(file));

@@ -2,13 +2,12 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdio>
-#include <memory>
 #include <span>
 #include <string>
 
 #include "core/error/expected.hpp"
 #include "core/following/confirmed_tracks.hpp"
+#include "drivers/file/c_stream.hpp"
 #include "drivers/file/whole_file.hpp"
 
 namespace perimap {
@@ -23,17 +22,12 @@ class TrackTable {
   [[nodiscard]] Expected<void> finish();
 
  private:
-  struct Close {
-    void operator()(std::FILE* file) const noexcept { (void)std::fclose(file); }
-  };
-  using File = std::unique_ptr<std::FILE, Close>;
-
-  TrackTable(std::string path, WholeFile whole, File file)
+  TrackTable(std::string path, WholeFile whole, CStream file)
       : path_(std::move(path)), whole_(std::move(whole)), file_(std::move(file)) {}
 
   std::string path_;
   WholeFile whole_;  // goes after what writes to it
-  File file_;
+  CStream file_;
   std::size_t rows_ = 0;
 };
 

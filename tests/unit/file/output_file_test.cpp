@@ -37,8 +37,7 @@ TEST_F(OutputFile, AFileIsMadeForItsOwnerAndEmptiedWhereItIsThere) {
   for (const char* text : {"longer than", "what"}) {
     const auto opened = open_output_file(file);
     ASSERT_TRUE(opened) << opened.error();
-    EXPECT_EQ(write(*opened, text, std::strlen(text)), static_cast<ssize_t>(std::strlen(text)));
-    close(*opened);
+    EXPECT_EQ(write(opened->get(), text, std::strlen(text)), static_cast<ssize_t>(std::strlen(text)));
   }
   std::ifstream stream(file);
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(stream), {}), "what");
@@ -63,8 +62,7 @@ TEST_F(OutputFile, AReaderMayBeginALittleLater) {
   if (!opened) close(open(pipe.c_str(), O_RDWR | O_NONBLOCK));
   late.join();
   ASSERT_TRUE(opened) << opened.error();
-  EXPECT_EQ(fcntl(*opened, F_GETFL) & O_NONBLOCK, 0) << "what is written would not wait for the reader";
-  close(*opened);
+  EXPECT_EQ(fcntl(opened->get(), F_GETFL) & O_NONBLOCK, 0) << "what is written would not wait for the reader";
   close(reader);
 }
 

@@ -30,9 +30,8 @@ TEST_F(RegularFile, IsOpened) {
   const auto opened = open_regular_file(folder_ / "file");
   ASSERT_TRUE(opened) << opened.error();
   char text[4] = {};
-  EXPECT_EQ(read(*opened, text, 3), 3);
+  EXPECT_EQ(read(opened->get(), text, 3), 3);
   EXPECT_STREQ(text, "abc");
-  close(*opened);
 }
 
 // The opening of a pipe without a writer would never return.

@@ -25,9 +25,11 @@ class Descriptor {
 
   [[nodiscard]] int get() const noexcept { return fd_; }
   explicit operator bool() const noexcept { return fd_ >= 0; }
+  // Whose closing it is from here on, such as a C stream's.
+  [[nodiscard]] int release() noexcept { return std::exchange(fd_, -1); }
   // Linux frees the number even when close() is interrupted, so it is never called twice.
   void reset() noexcept {
-    if (fd_ >= 0) ::close(std::exchange(fd_, -1));
+    if (fd_ >= 0) ::close(release());
   }
 
  private:
