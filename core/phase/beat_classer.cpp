@@ -43,6 +43,7 @@ VentricularEvidence BeatClasser::evidence_of(const RPeak& peak, const BeatKinds:
   evidence.log_rr_before = log_of_cycle(raw_rr_s_);
   evidence.narrower = compared.narrower;
   evidence.paced = scatter_.like_clockwork();
+  evidence.recurs = compared.recurs;
   evidence.apart = compared.apart;
   evidence.coupled = compared.coupled;
   evidence.kind_log_rr = compared.log_rr;

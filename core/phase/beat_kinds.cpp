@@ -7,7 +7,7 @@ namespace perimap {
 namespace {
 
 constexpr double kOneKind = 0.12;  // of 2 (1 - correlation) + log(size ratio)^2, the difference's energy to the shape's
-constexpr double kKeep = 0.995;    // of a kind's weight from beat to beat: some 200 beats count
+constexpr double kKeep = 0.998;    // of a kind's weight from beat to beat: some 500 beats count
 constexpr double kSlowest = 1.0 / 8.0;           // learning of the mean,
 constexpr double kSlowestVariance = 1.0 / 32.0;  // and of the variances
 constexpr double kVarianceAtFirst = 0.01;        // to the mean square of the shape
@@ -89,13 +89,15 @@ BeatKinds::Comparison BeatKinds::compare(const QrsShape& shape) const noexcept {
     const double of_usual = quickness(at(usual).shape);
     if (own > 0.0 && of_usual > 0.0) compared.narrower = std::log(own / of_usual);
   }
-  if (compared.kind < 0 || compared.usual) return compared;
+  if (compared.kind < 0) return compared;
   const Kind& kind = at(compared.kind);
+  compared.recurs = kind.members >= kEnough;
+  if (compared.usual) return compared;
   if (kind.intervals >= kEnoughIntervals) {
     compared.log_rr = kind.log_rr;
     compared.scatter = kind.log_rr_deviation;
   }
-  if (kind.members < kEnough) return compared;
+  if (!compared.recurs) return compared;
   const double apart = unlike(kind.shape, at(usual));
   compared.apart = apart > kApart;
   compared.coupled = kind.log_rr < kEarly && kind.log_rr_deviation < kFixed && apart > kAnother;

@@ -20,7 +20,8 @@ class BeatKinds {
     double unlike =
         0.0;  // mean square of the differences from the usual beat, in the usual variances; 0: none is known
     double narrower = 0.0;  // than the usual beat: logarithm of how fast its slope changes, to that; 0: none is known
-    bool apart = false;     // its kind has recurred, and is far from the usual one
+    bool recurs = false;    // its kind has recurred,
+    bool apart = false;     // and is far from the usual one
     bool coupled = false;   // its kind is another than the usual one, and comes early by about the same time
     double log_rr = 0.0;    // of the intervals before its kind to the cycle, mean,
     double scatter = 0.0;   // and mean deviation of that; 0: not known

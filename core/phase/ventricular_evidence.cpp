@@ -6,10 +6,11 @@
 namespace perimap {
 namespace {
 
-constexpr double kAlways = -12.45;
+constexpr double kAlways = -11.85;
+constexpr double kPaced = -1.0;        // beside a pacemaker, whose patients have beats of their own as well
 constexpr double kUnlike = 3.1;        // a unit of the logarithm,
 constexpr double kLeast = 1.0;         // from here
-constexpr double kMost = 4.0;          // to here: noise has no upper end
+constexpr double kMost = 3.8;          // to here: noise has no upper end
 constexpr double kEarly = 1.35;        // a deviation of the rhythm,
 constexpr double kLate = -1.0;         // from here, deviations,
 constexpr double kFarEarly = 4.0;      // to here
@@ -19,7 +20,9 @@ constexpr double kCoupled = 3.1;
 constexpr double kApart = 1.8;
 constexpr double kLongestBefore = 0.7;      // log
 constexpr double kNarrower = -3.2;          // a unit of the logarithm,
-constexpr double kNarrowest = 0.5;          // to here
+constexpr double kNarrowest = 0.5;          // to here,
+constexpr double kWider = 3.0;              // and a unit the other way,
+constexpr double kWidest = 0.5;             // to here
 constexpr double kOwn = -8.0;               // of a paced heart's own beat, which is narrower by more than
 constexpr double kOwnFrom = 0.0;            // this,
 constexpr double kOwnFully = 0.15;          // fully from here on,
@@ -51,7 +54,9 @@ double log_odds(const VentricularEvidence& evidence) noexcept {
   return kAlways + kUnlike * std::clamp(std::log(evidence.unlike), kLeast, kMost) +
          kEarly * std::clamp(early, kLate, kFarEarly) +
          kIntervalBefore * std::clamp(evidence.log_rr_before, -1.0, kLongestBefore) +
-         kNarrower * std::clamp(evidence.narrower, 0.0, kNarrowest) + kOwn * own_of_paced(evidence) +
+         kNarrower * std::clamp(evidence.narrower, 0.0, kNarrowest) +
+         (evidence.recurs ? kWider * std::clamp(-evidence.narrower, 0.0, kWidest) : 0.0) +
+         (evidence.paced ? kPaced : 0.0) + kOwn * own_of_paced(evidence) +
          (evidence.coupled ? kCoupled
           : evidence.apart ? kApart
                            : 0.0);

@@ -5,8 +5,8 @@
 // and beside the interval before it: in fibrillation every second beat comes early. Where its kind has come early by
 // about the same time before (fixed coupling), it takes less, and a little less where its kind has recurred.
 // What the ventricles conduct is narrow: a beat that is narrower than the usual one is less likely a ventricular one,
-// and where a pacemaker makes the usual beats, which then come like clockwork, it is the heart's own, unless it is
-// early.
+// one that is wider, of a kind that has recurred (else it may be noise), the more; and where a pacemaker makes the
+// usual beats, which then come like clockwork, it is the heart's own, unless it is early.
 #pragma once
 
 namespace perimap {
@@ -18,7 +18,8 @@ struct VentricularEvidence {
   double log_rr_before = 0.0;  // of the interval before; 0 where it is not known
   double narrower = 0.0;       // than the usual beat, as BeatKinds has it
   bool paced = false;          // usual beats come like clockwork
-  bool apart = false;          // as BeatKinds has it,
+  bool recurs = false;         // as BeatKinds has it,
+  bool apart = false;          // likewise,
   bool coupled = false;        // likewise
   double kind_log_rr = 0.0;    // of the intervals before its kind to the cycle, mean,
   double kind_scatter = 0.0;   // and mean deviation of that; 0: not known

@@ -148,7 +148,9 @@ TEST_F(Kinds, AKindIsApartOnceItHasRecurredAndIsUnlikeTheUsualOneByMoreThanNoise
     return kinds_.compare(beat(0.0, 0.5)).apart;
   };
   EXPECT_FALSE(apart(2, 0.03));
+  EXPECT_FALSE(kinds_.compare(beat(0.0, 0.5)).recurs);
   EXPECT_TRUE(apart(3, 0.03));
+  EXPECT_TRUE(kinds_.compare(beat(0.0, 0.5)).recurs);
   // By 65 and by 45.
   EXPECT_TRUE(apart(3, 0.069));
   EXPECT_FALSE(apart(3, 0.085));
@@ -206,6 +208,15 @@ TEST_F(Kinds, TheUsualKindFollowsTheHeart) {
   for (int i = 0; i < 60; ++i) see(beat(1.0));
   EXPECT_TRUE(kinds_.compare(beat(1.0)).usual);
   EXPECT_FALSE(kinds_.compare(beat(0.0)).usual);
+}
+
+// Two minutes of ventricular beats do not make the usual one of what they are.
+TEST_F(Kinds, TheUsualKindIsThatOfTheLastFiveHundredBeats) {
+  usual_beats(300, 0.02);
+  for (int i = 0; i < 160; ++i) see(beat(1.0));
+  EXPECT_TRUE(kinds_.compare(beat(0.0)).usual);
+  for (int i = 0; i < 50; ++i) see(beat(1.0));
+  EXPECT_TRUE(kinds_.compare(beat(1.0)).usual);
 }
 
 }  // namespace
