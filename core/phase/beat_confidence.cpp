@@ -25,8 +25,8 @@ double confidence(const BeatCircumstances& beat, const DecisionSettings& setting
   if (beat.lost_in_noise) return std::min(beat.probability, settings.lost_in_noise);
   const bool young = !beat.long_known && beat.heard_for_long;
   const bool in_noise = !beat.long_known && beat.disturbed > settings.some_noise;
-  const bool doubtful = young || in_noise || beat.may_be_followed || beat.rivalled || beat.unlike_any_beat ||
-                        (!beat.familiar && beat.any_known) ||
+  const bool doubtful = young || in_noise || beat.in_steady_noise || beat.may_be_followed || beat.rivalled ||
+                        beat.unlike_any_beat || (!beat.familiar && beat.any_known) ||
                         (beat.familiar && suspicion(beat, settings) > settings.suspicious);
   if (doubtful) return std::min(beat.probability, settings.doubtful);
   const bool calm = beat.disturbed <= settings.some_noise;

@@ -24,6 +24,7 @@ struct BeatCircumstances {
   bool unlike_any_beat = false;  // the line stays at another level, or is rough
   bool may_be_followed = false;  // sharper complexes often follow its kind: a P wave that is not conducted
   bool rivalled = false;         // another in its cycle looks as much like a QRS complex
+  bool in_steady_noise = false;  // noise that is always there comes near to the beats
   bool lost_in_noise = false;    // unlike the beats, among disturbances
 };
 

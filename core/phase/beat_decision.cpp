@@ -38,11 +38,6 @@ void BeatDecision::restart(Instant now) noexcept {
   complexes_.clear();
 }
 
-void BeatDecision::burst() noexcept {
-  count_ = 0;
-  hidden_ = true;
-}
-
 bool BeatDecision::learning(Instant now) const noexcept {
   if (beats_told_ == 0) return true;
   const double since_s = to_seconds(now - (has_last_ ? last_.time : since_));
@@ -53,10 +48,6 @@ bool BeatDecision::learning(Instant now) const noexcept {
 
 double BeatDecision::disturbed(Instant t) const noexcept {
   return disturbances_ * std::exp(-std::max(to_seconds(t - disturbed_at_), 0.0) / settings_.disturbance_memory_s);
-}
-
-bool BeatDecision::chaotic(Instant now) const noexcept {
-  return disturbed(now) > settings_.chaos && now - familiar_at_ > settings_.chaos_after;
 }
 
 bool BeatDecision::in_burst(Instant now) const noexcept {
@@ -71,10 +62,6 @@ bool BeatDecision::noisy(Instant now) const noexcept {
   const auto waits = waiting_.begin();
   return disturbed_at_ > familiar_at_ ||
          std::any_of(waits, waits + count_, [&](const Waiting& waiting) { return strange(waiting); });
-}
-
-bool BeatDecision::overdue(Instant now) const noexcept {
-  return clusters_.any_settled() && now - familiar_at_ > std::max(settings_.chaos_after, from_seconds(rhythm_.cycle_s));
 }
 
 void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex, Instant now) noexcept {
@@ -96,7 +83,7 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
   }
   Waiting waiting;
   waiting.candidate = candidate;
-  const ClusterMatch match = clusters_.nearest(candidate.shape, settings_.displaced);
+  const ClusterMatch match = clusters_.nearest(candidate.shape, settings_.displaced, levels_.slope_noise_rms());
   waiting.correlation = match.correlation;
   waiting.gain = match.gain;
   waiting.cluster = match.correlation > 0.0 ? match.of : -1;
@@ -118,7 +105,8 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
   }
   waiting.sharpest_before = complexes_.sharpest_before(candidate.time);
   waiting.log_odds = by_itself(waiting);
-  clusters_.judged(learnt, waiting.log_odds);
+  // What stands out too little to be believed says nothing of its kind.
+  if (!lost_at_start(waiting)) clusters_.judged(learnt, waiting.log_odds);
   if (kind >= 0) {
     complexes_.judge(waiting.log_odds, candidate.time - since_ < settings_.longer_than_bursts, clusters_);
   }
@@ -157,10 +145,12 @@ void BeatDecision::note_crowding(const Waiting& waiting) noexcept {
 
 double BeatDecision::like(const Waiting& waiting) const noexcept {
   if (!clusters_.recurs(waiting.cluster)) return 0.0;
-  // A beat may be small, but a P or T wave is not suddenly large. And what recurs in bursts alone speaks for no beat.
+  // A beat may be small where no noise is, but a P or T wave is not suddenly large. And what recurs in bursts alone
+  // speaks for no beat.
   const bool of_waves = clusters_.log_odds(waiting.cluster) < 0.0;
   if (!of_waves && !clusters_.settled(waiting.cluster)) return 0.0;
-  return likeness(waiting.correlation, of_waves ? std::max(waiting.gain, 1.0) : 1.0);
+  const double small = std::pow(std::min(waiting.gain, 1.0), noisiness());
+  return likeness(waiting.correlation, of_waves ? std::max(waiting.gain, 1.0) : small);
 }
 
 // It is of a kind that is known not to be a P wave, and no noise is near that the beat might be still to come after.
@@ -187,13 +177,15 @@ bool BeatDecision::familiar(const Waiting& waiting) const noexcept {
 
 // The line goes to another level, or what is too fast for a heart is nearly as large: an electrode that moves, arcs.
 bool BeatDecision::unlike_any_beat(const QrsCandidate& candidate) const noexcept {
-  return candidate.step > settings_.most_step || candidate.rough > settings_.most_rough * candidate.energy;
+  return candidate.step > settings_.most_step ||
+         candidate.rough - levels_.usual_roughness() > settings_.most_rough * candidate.energy;
 }
 
 bool BeatDecision::strange(const Waiting& waiting) const noexcept {
   const bool another = waiting.correlation < settings_.familiar &&
                        !clusters_.has_a_beats_shape(waiting.candidate.shape, settings_.very_familiar);
   return beats_.known() && beats_.size(waiting.candidate) > settings_.size_of_disturbance &&
+         stands_out(waiting, levels_.noise()) &&
          (another || (unlike_any_beat(waiting.candidate) && !of_known_kind(waiting)));
 }
 
@@ -221,14 +213,15 @@ EvidenceOf<ComplexEvidence> BeatDecision::complex_evidence(const Waiting& waitin
   return evidence_of(waiting.candidate, context);
 }
 
+// Bare noise recurs as well as beats do, if not as exactly, and there is nothing yet to hold it against.
+bool BeatDecision::lost_at_start(const Waiting& waiting) const noexcept {
+  if (std::min(beats_told_, told_since_silence_) >= settings_.beats_at_start) return false;
+  return !familiar(waiting) && waiting.correlation < settings_.exactly_alike && !stands_out(waiting, levels_.quiet());
+}
+
 double BeatDecision::by_itself(const Waiting& waiting) const noexcept {
+  if (lost_at_start(waiting)) return -settings_.most_odds;
   const auto evidence = complex_evidence(waiting);
-  // Bare noise recurs as well as beats do, if not as exactly, and there is nothing yet to hold it against.
-  const bool learning = std::min(beats_told_, told_since_silence_) < settings_.beats_at_start;
-  if (learning && !familiar(waiting) && waiting.correlation < settings_.exactly_alike &&
-      evidence[static_cast<std::size_t>(ComplexEvidence::kQuiet)] < settings_.stand_out) {
-    return -settings_.most_odds;
-  }
   return std::clamp(log_odds(evidence, weights_.complex), -settings_.most_odds, settings_.most_odds);
 }
 
@@ -236,6 +229,7 @@ void BeatDecision::weigh(Instant now) noexcept {
   evaluated_at_ = now;
   BeatContext context;
   context.any_recurs = clusters_.any_settled();
+  const double in_noise = in_steady_noise() ? settings_.most_disturbances * noisiness() : 0.0;
   for (int i = 0; i < count_; ++i) {
     Waiting& waiting = waiting_[static_cast<std::size_t>(i)];
     waiting.log_odds = by_itself(waiting);
@@ -244,7 +238,7 @@ void BeatDecision::weigh(Instant now) noexcept {
     context.gain = waiting.gain;
     context.cluster_log_odds = context.like > 0.0 ? clusters_.log_odds(waiting.cluster) : 0.0;
     waiting.disturbed = disturbed(waiting.candidate.time);
-    context.disturbed = waiting.disturbed;
+    context.disturbed = std::max(waiting.disturbed, in_noise);
     context.strangers = 0.0;
     for (int k = 0; k < count_; ++k) {
       const Waiting& other = waiting_[static_cast<std::size_t>(k)];
@@ -289,8 +283,10 @@ double BeatDecision::odds(int before, int candidate) const noexcept {
   if (before >= 0) return odds_after(waiting_[static_cast<std::size_t>(before)].candidate, waiting);
   if (!has_last_) return log_odds(waiting.evidence, weights_.beat);
   const double after = odds_after(last_, waiting);
-  // What was told with doubt may have been a P wave. What is like the beats is then weighed after the one before, too.
-  if (last_probability_ > settings_.sure || !has_sure_ || !familiar(waiting)) return after;
+  // What was told with doubt may have been a P wave. What is like the beats is then weighed after the one before, too;
+  // but a second maximum of one wide complex is no beat in either case.
+  const bool apart = waiting.candidate.time - last_.time >= settings_.crowd_from;
+  if (last_probability_ > settings_.sure || !has_sure_ || !apart || !familiar(waiting)) return after;
   return std::log(last_probability_ * std::exp(after) +
                   (1.0 - last_probability_) * std::exp(odds_after(sure_, waiting)));
 }
@@ -384,6 +380,7 @@ BeatCircumstances BeatDecision::circumstances(const Waiting& waiting, bool famil
   beat.unlike_any_beat = unlike_any_beat(waiting.candidate);
   beat.may_be_followed = clusters_.followers(waiting.cluster) >= settings_.followed_by_chance;
   beat.rivalled = clusters_.rivals(waiting.cluster) >= settings_.rivalled;
+  beat.in_steady_noise = in_steady_noise();
   beat.lost_in_noise = unknown_in_noise(waiting);
   return beat;
 }

@@ -4,7 +4,9 @@
 // (qrs_evidence), and all that wait against each other and the rhythm (beat_path).
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include "core/phase/beat_confidence.hpp"
@@ -34,7 +36,10 @@ class BeatDecision {
   void restart(Instant now) noexcept;  // the line was broken off: what waits is lost
   void forget() noexcept;
   void fall_silent() noexcept;  // no beat has come for some time: the gain may have changed, or there are none
-  void burst() noexcept;        // nothing can be seen: what waits in it is no beat
+  void burst() noexcept {       // nothing can be seen: what waits in it is no beat
+    count_ = 0;
+    hidden_ = true;
+  }
 
   [[nodiscard]] std::optional<RPeak> pop() noexcept;
   // Of what waits so near to `t` and is more likely a beat than not.
@@ -49,11 +54,16 @@ class BeatDecision {
   // Disturbances of late, or, where the next beat is overdue, since the last one of a known kind.
   [[nodiscard]] bool noisy(Instant now) const noexcept;
   // Beats of a known kind came, and the next ought to be there.
-  [[nodiscard]] bool overdue(Instant now) const noexcept;
+  [[nodiscard]] bool overdue(Instant now) const noexcept {
+    return clusters_.any_settled() &&
+           now - familiar_at_ > std::max(settings_.chaos_after, from_seconds(rhythm_.cycle_s));
+  }
   // What is seen now is no measure of beats.
   [[nodiscard]] bool in_burst(Instant now) const noexcept;
   // So many disturbances, and no beat of a known kind among them, that the lead may be off.
-  [[nodiscard]] bool chaotic(Instant now) const noexcept;
+  [[nodiscard]] bool chaotic(Instant now) const noexcept {
+    return disturbed(now) > settings_.chaos && now - familiar_at_ > settings_.chaos_after;
+  }
 
  private:
   static constexpr int kQueue = BeatPath::kMost + 4;
@@ -74,6 +84,14 @@ class BeatDecision {
   [[nodiscard]] Duration within_cycle(Duration longest, double share) const noexcept;
   void note_crowding(const Waiting& waiting) noexcept;
   [[nodiscard]] EvidenceOf<ComplexEvidence> complex_evidence(const Waiting& waiting) const noexcept;
+  // From bare noise of that level.
+  [[nodiscard]] bool stands_out(const Waiting& waiting, double noise) const noexcept {
+    return waiting.candidate.energy >= std::exp(settings_.stand_out) * noise;
+  }
+  [[nodiscard]] bool lost_at_start(const Waiting& waiting) const noexcept;
+  // Of the noise that is always there, and whether that comes near to the beats.
+  [[nodiscard]] double noisiness() const noexcept { return beats_.noisiness(levels_.noise(), settings_); }
+  [[nodiscard]] bool in_steady_noise() const noexcept { return noisiness() > settings_.near_to_beats; }
   [[nodiscard]] double by_itself(const Waiting& waiting) const noexcept;
   void weigh(Instant now) noexcept;
   [[nodiscard]] double like(const Waiting& waiting) const noexcept;  // to its cluster, where that recurs

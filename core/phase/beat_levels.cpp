@@ -1,8 +1,14 @@
 #include "core/phase/beat_levels.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace perimap {
+namespace {
+
+constexpr double kNoisy = 0.5;  // of a beat's energy: where bare noise comes up to it a shape tells less, a size more
+
+}  // namespace
 
 void BeatLevels::learn(const QrsCandidate& beat) noexcept {
   energy_.push(beat.energy);
@@ -35,6 +41,12 @@ void BeatLevels::clear() noexcept {
 double BeatLevels::size(const QrsCandidate& candidate) const noexcept {
   if (!known()) return 1.0;
   return std::sqrt(candidate.energy / energy() * candidate.sharpness / sharpness());
+}
+
+double BeatLevels::noisiness(double noise, const DecisionSettings& settings) const noexcept {
+  if (!known()) return 0.0;
+  const double to_beat = std::exp(settings.stand_out) * noise / (kNoisy * energy());
+  return std::min(to_beat * to_beat, 1.0);
 }
 
 }  // namespace perimap

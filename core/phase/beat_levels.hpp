@@ -23,6 +23,8 @@ class BeatLevels {
   [[nodiscard]] double height() const noexcept { return points_up_ ? upward_ : downward_; }
   // 1 for the usual beat.
   [[nodiscard]] double size(const QrsCandidate& candidate) const noexcept;
+  // Power of noise of that level: 1 from where, bare, it now and then comes up to half a beat.
+  [[nodiscard]] double noisiness(double noise, const DecisionSettings& settings) const noexcept;
 
  private:
   RecentValues<8> energy_;

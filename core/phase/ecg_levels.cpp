@@ -6,9 +6,10 @@
 namespace perimap {
 namespace {
 
-constexpr int kQuietRecompute = 5;  // steps: each 0.1 s; it does not change faster
-constexpr int kFewWindows = 3;      // fewer are no distribution: the largest of all counts
-constexpr int kOfLate = 3;          // windows: where none of them reaches what was usual, the gain has fallen
+constexpr int kQuietRecompute = 5;       // steps: each 0.1 s; it does not change faster
+constexpr double kNoiseRise_s = 1000.0;  // tense muscles and a patient who moves are noisy for minutes
+constexpr int kFewWindows = 3;           // fewer are no distribution: the largest of all counts
+constexpr int kOfLate = 3;               // windows: where none of them reaches what was usual, the gain has fallen
 
 }  // namespace
 
@@ -22,6 +23,8 @@ void EcgLevels::restart() noexcept {
 void EcgLevels::forget() noexcept {
   restart();
   quiet_level_ = 0.0;
+  noise_level_ = 0.0;
+  noise_known_ = false;
   rough_level_ = 0.0;
   energies_.clear();
   sharpnesses_.clear();
@@ -69,6 +72,19 @@ void EcgLevels::follow_quiet(const EcgFilter& filter) noexcept {
       sorted.begin() + static_cast<std::int64_t>(settings_.quiet_quantile * static_cast<double>(count));
   std::nth_element(sorted.begin(), quantile, sorted.begin() + count);
   quiet_level_ = *quantile;
+  follow_noise();
+}
+
+// What the line is never quieter than. As with roughness, a burst does not become the usual.
+void EcgLevels::follow_noise() noexcept {
+  if (quiet_count_ < kQuietHistory) {
+    if (!noise_known_) noise_level_ = quiet_level_;
+    return;
+  }
+  const double step_s = to_seconds(kQuietRecompute * settings_.quiet_step);
+  const double risen = noise_level_ * (1.0 + step_s / kNoiseRise_s);
+  noise_level_ = noise_known_ ? std::min(quiet_level_, risen) : quiet_level_;
+  noise_known_ = noise_level_ > 0.0;
 }
 
 // The largest of each window, but of those in which nothing can be seen.

@@ -25,7 +25,12 @@ class EcgLevels {
   void forget_top(bool keep) noexcept;
   void recall_top() noexcept;  // what was kept, once
 
-  [[nodiscard]] double quiet() const noexcept { return quiet_level_; }                  // energy
+  [[nodiscard]] double quiet() const noexcept { return quiet_level_; }  // energy
+  // The lowest quiet level of late: of noise that is always there, and not in a burst alone.
+  [[nodiscard]] double noise() const noexcept { return noise_level_; }
+  // The same as root mean square of the slope: 1.25 times the mean magnitude where it is normal.
+  [[nodiscard]] double slope_noise_rms() const noexcept { return 1.25 * noise_level_; }
+  [[nodiscard]] double usual_roughness() const noexcept { return rough_level_; }        // mV, likewise
   [[nodiscard]] double top_energy() const noexcept { return top(energies_, energy_); }  // of the largest complexes
   [[nodiscard]] double top_sharpness() const noexcept { return top(sharpnesses_, sharpness_); }
   // Nothing can be seen, for the line is too rough; of the last such stretch, and its end.
@@ -39,6 +44,7 @@ class EcgLevels {
   static constexpr int kWindows = 8;
 
   void follow_quiet(const EcgFilter& filter) noexcept;
+  void follow_noise() noexcept;
   void follow_top(const EcgFilter& filter, bool burst) noexcept;
   void follow_roughness(const EcgFilter& filter, double beat_slope) noexcept;
   [[nodiscard]] static double top(const RecentValues<kWindows>& windows, double current) noexcept;
@@ -47,6 +53,8 @@ class EcgLevels {
   std::array<double, kQuietHistory> quiet_{};
   std::int64_t quiet_count_ = 0;
   double quiet_level_ = 0.0;
+  double noise_level_ = 0.0;
+  bool noise_known_ = false;  // of a whole history
   RecentValues<kWindows> energies_;
   RecentValues<kWindows> sharpnesses_;
   RecentValues<kWindows> kept_energies_;  // of before a silence

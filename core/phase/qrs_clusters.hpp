@@ -27,7 +27,8 @@ class QrsClusters {
   static constexpr int kClusters = 8;
 
   // The cluster that a shape is most like, of all or of those that look like beats.
-  [[nodiscard]] ClusterMatch nearest(const QrsShape& shape, int most_displaced) const noexcept;
+  // `noise`: of the line, root mean square of its slope.
+  [[nodiscard]] ClusterMatch nearest(const QrsShape& shape, int most_displaced, double noise = 0.0) const noexcept;
   [[nodiscard]] ClusterMatch nearest_beat(const QrsShape& shape) const noexcept;
   // Whatever its size: where that is another, the gain has changed.
   [[nodiscard]] bool has_a_beats_shape(const QrsShape& shape, double correlation) const noexcept {

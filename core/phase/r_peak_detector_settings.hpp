@@ -87,6 +87,7 @@ struct DecisionSettings {
   double chaos = 2.2;       // and so many a lead that is off,
   Duration chaos_after = std::chrono::milliseconds(900);  // when no known beat has come for so long
   Duration beats_come = std::chrono::milliseconds(1500);  // since the last of a known kind; else less noise is a burst
+  double near_to_beats = 0.5;                             // noisiness from which on no beat is believed (made leads)
   double very_familiar = 0.92;                            // correlation of a beat that is like its kind
   double unlike_by_size =
       0.1;  // of a beat to its kind: 1 - correlation and the difference in size, logarithm, times this

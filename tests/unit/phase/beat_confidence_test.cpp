@@ -48,6 +48,10 @@ TEST(BeatConfidence, ABeatThatNothingSpeaksAgainstIsBelievedMoreThanItIsProbable
   EXPECT_EQ(told([](BeatCircumstances& b) { b.probability = 0.7, b.rivalled = true; }), kDoubtful);
 }
 
+TEST(BeatConfidence, InNoiseThatIsAlwaysThereNothingIsBelieved) {
+  EXPECT_EQ(told([](BeatCircumstances& b) { b.in_steady_noise = true; }), kDoubtful);
+}
+
 TEST(BeatConfidence, ABeatWhoseKindComesEarlyIsNoMoreSuspiciousForThat) {
   const auto early = [](double of_cycle, double usual) {
     return told([&](BeatCircumstances& b) { b.correlation = 0.95, b.of_cycle = of_cycle, b.usual_of_cycle = usual; });

@@ -163,6 +163,17 @@ TEST(BeatDecision, WhatWasToldWithDoubtHidesNoBeatOfAKnownKind) {
   EXPECT_GT(patient.confidence(p_s + 0.24), 0.9);
 }
 
+// It has two maxima, the second of which looks more like the beats.
+TEST(BeatDecision, TheEndOfAComplexThatWasToldWithDoubtIsNoBeat) {
+  for (const double apart_s : {0.075, 0.1}) {
+    Known patient;
+    const double first_s = patient.last_s + 0.7;
+    patient.see(first_s, [](QrsCandidate& c) { c.shape = strange_shape(7), c.energy *= 0.7; });
+    patient.see(first_s + apart_s, [](QrsCandidate& c) { c.energy *= 0.8, c.sharpness *= 0.8; });
+    EXPECT_NE(patient.told_at(first_s).has_value(), patient.told_at(first_s + apart_s).has_value()) << apart_s;
+  }
+}
+
 // Every second P wave is conducted, after 0.16 s.
 TEST(BeatDecision, APWaveWithoutAQrsComplexIsNoBeatOnceTwoHaveBeenConducted) {
   Patient patient;

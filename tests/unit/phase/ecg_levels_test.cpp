@@ -45,6 +45,26 @@ TEST_F(EcgLevelsTest, TheQuietLevelIsOfTheLineBetweenBeats) {
   EXPECT_GT(with_beats, 0.0);
 }
 
+TEST_F(EcgLevelsTest, NoiseIsWhatIsAlwaysThereAndNotInABurst) {
+  const auto line = [&](double t, double noise_mV) { return beats_mV(t, 1.0) + noise_mV * noise(generator); };
+  hear(15.0, [&](double t) { return line(t, 0.02); });
+  const double before = levels.noise();
+  hear(15.0, [&](double t) { return line(t, 0.4); });
+  EXPECT_GT(levels.quiet(), 8.0 * before);
+  EXPECT_LT(levels.noise(), 2.0 * before) << "a burst";
+  hear(1000.0, [&](double t) { return line(t, 0.05); });
+  EXPECT_GT(levels.noise(), 0.5 * levels.quiet()) << "it has come to stay";
+  hear(4.0, [&](double t) { return line(t, 0.02); });
+  EXPECT_LT(levels.noise(), 2.0 * before) << "it has gone";
+}
+
+TEST_F(EcgLevelsTest, NoiseThatWasThereFromTheFirstIsKnownAtOnce) {
+  hear(1.0, [&](double t) { return beats_mV(t, 1.0) + 0.2 * noise(generator); });
+  const double early = levels.noise();
+  hear(20.0, [&](double t) { return beats_mV(t, 1.0) + 0.2 * noise(generator); });
+  EXPECT_NEAR(early, levels.noise(), 0.4 * levels.noise());
+}
+
 TEST_F(EcgLevelsTest, TheTopIsOfTheLargestComplexesAndOneThatIsLargerIsNoMeasure) {
   hear(15.0, [&](double t) { return beats_mV(t, 1.0); });
   const double usual = levels.top_energy();

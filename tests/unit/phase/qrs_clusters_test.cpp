@@ -46,10 +46,22 @@ TEST(QrsClusters, FindsTheNearestAndItsGain) {
   QrsClusters clusters;
   const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
   clusters.learn(kOther, true, Surroundings::kCalm, kNow);
-  const ClusterMatch match = clusters.nearest(shape(1.5, 2.6), 3);
+  const ClusterMatch match = clusters.nearest(shape(1.5, 2.6), 3, 0.0);
   EXPECT_EQ(match.of, beat);
   EXPECT_GT(match.correlation, 0.95);
   EXPECT_NEAR(match.gain, 1.5, 0.1);
+}
+
+// Noise has made a P wave look a little more like the QRS complex than like its own kind.
+TEST(QrsClusters, InNoiseAKindIsToldByItsSizeAsWell) {
+  QrsClusters clusters;
+  const int beat = clusters.learn(kBeat, true, Surroundings::kCalm, kNow);
+  const int wave = clusters.learn(shape(0.5, 4.5), true, Surroundings::kCalm, kNow);
+  ASSERT_NE(wave, beat);
+  const QrsShape between = shape(0.55, 3.3);
+  EXPECT_EQ(clusters.nearest(between, 3, 0.0).of, beat);
+  EXPECT_EQ(clusters.nearest(between, 3, 0.2).of, wave);
+  EXPECT_EQ(clusters.nearest(shape(0.9, 3.0), 3, 0.2).of, beat);
 }
 
 TEST(QrsClusters, WhatRecursInBurstsAloneIsNotSettled) {
