@@ -1,0 +1,129 @@
+#include "core/registration/nearest_triangle.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <boost/geometry.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <iterator>
+#include <limits>
+#include <utility>
+
+namespace perimap {
+namespace {
+
+namespace bg = boost::geometry;
+using TreePoint = bg::model::point<double, 3, bg::cs::cartesian>;
+using TreeBox = bg::model::box<TreePoint>;
+using TreeEntry = std::pair<TreeBox, std::uint32_t>;
+
+TreePoint tree_point(const Vector3d& p) { return {p.x(), p.y(), p.z()}; }
+
+// Shares of the corners a, b, c of the place that is nearest to p.
+Vector3d nearest_shares(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  const Vector3d ab = b - a, ac = c - a, ap = p - a;
+  const double bb = ab.dot(ab), bc = ab.dot(ac), cc = ac.dot(ac), pb = ap.dot(ab), pc = ap.dot(ac);
+  const double determinant = bb * cc - bc * bc;
+  if (determinant > 0.0) {
+    const double v = (cc * pb - bc * pc) / determinant;
+    const double w = (bb * pc - bc * pb) / determinant;
+    if (v >= 0.0 && w >= 0.0 && v + w <= 1.0) return {1.0 - v - w, v, w};
+  }
+  // Else on the nearest of its sides.
+  const auto along = [](double part, double whole) { return whole > 0.0 ? std::clamp(part / whole, 0.0, 1.0) : 0.0; };
+  const double on_ab = along(pb, bb), on_ac = along(pc, cc), on_bc = along((p - b).dot(c - b), (c - b).squaredNorm());
+  const std::array<Vector3d, 3> sides = {Vector3d(1.0 - on_ab, on_ab, 0.0), Vector3d(1.0 - on_ac, 0.0, on_ac),
+                                         Vector3d(0.0, 1.0 - on_bc, on_bc)};
+  const auto distance = [&](const Vector3d& s) { return (s[0] * a + s[1] * b + s[2] * c - p).squaredNorm(); };
+  return *std::min_element(sides.begin(), sides.end(),
+                           [&](const Vector3d& s, const Vector3d& t) { return distance(s) < distance(t); });
+}
+
+}  // namespace
+
+struct NearestTriangle::Tree {
+  // Built at once from all entries.
+  explicit Tree(const std::vector<TreeEntry>& entries) : of_boxes(entries.begin(), entries.end()) {}
+  bg::index::rtree<TreeEntry, bg::index::rstar<16>> of_boxes;
+};
+
+NearestTriangle::NearestTriangle(const TriangleMesh& mesh)
+    : mesh_(mesh),
+      normals_(mesh.vertices.size(), Vector3d::Zero()),
+      border_edges_(mesh.triangles.size(), 0),
+      on_border_(mesh.vertices.size(), 0) {
+  std::vector<TreeEntry> entries;
+  std::vector<std::array<std::uint32_t, 4>> edges;  // lower vertex, higher vertex, triangle, its edge
+  entries.reserve(mesh.triangles.size());
+  edges.reserve(3 * mesh.triangles.size());
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& triangle = mesh.triangles[t];
+    const Vector3d &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]], &c = mesh.vertices[triangle[2]];
+    entries.emplace_back(TreeBox(tree_point(a.cwiseMin(b).cwiseMin(c)), tree_point(a.cwiseMax(b).cwiseMax(c))), t);
+    const Vector3d normal = (b - a).cross(c - a);
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      normals_[triangle[k]] += normal;
+      const auto [low, high] = std::minmax(triangle[k], triangle[(k + 1) % 3]);
+      edges.push_back({low, high, t, k});
+    }
+  }
+  for (Vector3d& normal : normals_) normal.normalize();
+  std::sort(edges.begin(), edges.end());
+  for (std::size_t i = 0; i < edges.size();) {
+    std::size_t end = i + 1;
+    while (end < edges.size() && edges[end][0] == edges[i][0] && edges[end][1] == edges[i][1]) ++end;
+    if (end == i + 1) {
+      border_edges_[edges[i][2]] |= static_cast<std::uint8_t>(1U << edges[i][3]);
+      on_border_[edges[i][0]] = on_border_[edges[i][1]] = 1;
+    }
+    i = end;
+  }
+  tree_ = std::make_unique<const Tree>(entries);
+}
+
+NearestTriangle::~NearestTriangle() = default;
+
+NearestPlace NearestTriangle::to(const Vector3d& p) const {
+  NearestPlace best;
+  const TreePoint at = tree_point(p);
+  const auto& tree = tree_->of_boxes;
+  // The nearest boxes: no triangle is nearer than its box, so that those beyond them hold none that is nearer than one
+  // found within their distance.
+  std::vector<TreeEntry> nearest;
+  for (std::size_t count = 16;; count *= 4) {
+    nearest.clear();
+    tree.query(bg::index::nearest(at, static_cast<unsigned>(std::min(count, tree.size()))),
+               std::back_inserter(nearest));
+    double least = std::numeric_limits<double>::infinity(), furthest = 0.0;
+    for (const auto& [box, t] : nearest) {
+      furthest = std::max(furthest, bg::comparable_distance(at, box));
+      const auto& triangle = mesh_.triangles[t];
+      const Vector3d &a = mesh_.vertices[triangle[0]], &b = mesh_.vertices[triangle[1]],
+                     &c = mesh_.vertices[triangle[2]];
+      const Vector3d s = nearest_shares(p, a, b, c);
+      const Vector3d point = s[0] * a + s[1] * b + s[2] * c;
+      const double distance = (point - p).squaredNorm();
+      if (distance < least) {
+        least = distance;
+        best.triangle = t;
+        best.shares = s;
+        best.point = point;
+      }
+    }
+    if (least <= furthest || nearest.size() == tree.size()) break;
+  }
+  const auto& triangle = mesh_.triangles[best.triangle];
+  best.normal = Vector3d::Zero();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    best.normal += best.shares[i] * normals_[triangle[k]];
+    const bool at_corner = best.shares[i] >= 1.0 && on_border_[triangle[k]] != 0;
+    // The edge from corner k to the next is where the third corner has no share.
+    const bool on_edge = best.shares[static_cast<Eigen::Index>((k + 2) % 3)] <= 0.0;
+    best.on_border = best.on_border || at_corner || (on_edge && (border_edges_[best.triangle] >> k & 1U) != 0);
+  }
+  best.normal.normalize();
+  return best;
+}
+
+}  // namespace perimap

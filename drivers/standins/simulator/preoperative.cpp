@@ -1,0 +1,109 @@
+#include "drivers/standins/simulator/preoperative.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "drivers/standins/random/counter_noise.hpp"
+
+namespace perimap {
+namespace {
+
+enum PreoperativeStream : std::uint64_t { kScanFrame = 7100, kScanOffset, kScanShape };
+
+Vector3d drawn_direction(const CounterNoise& noise, std::uint64_t index) {
+  return Vector3d(noise.normal(index), noise.normal(index + 1), noise.normal(index + 2)).normalized();
+}
+
+std::vector<Vector3d> normals_of(const TriangleMesh& mesh) {
+  std::vector<Vector3d> normals(mesh.vertices.size(), Vector3d::Zero());
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vector3d normal = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
+    for (const std::uint32_t v : {a, b, c}) normals[v] += normal;
+  }
+  for (Vector3d& normal : normals) normal.normalize();
+  return normals;
+}
+
+// A smooth field of RMS 1 over the vertices: waves whose vectors are drawn from a normal distribution, so that it is
+// correlated as exp(-d^2 / 2 l^2) (Rahimi & Recht, NIPS 2007).
+std::vector<double> smooth_field(const std::vector<Vector3d>& places, double length_mm, const CounterNoise& noise) {
+  constexpr std::uint64_t kWaves = 128;
+  std::vector<double> field(places.size(), 0.0);
+  for (std::uint64_t wave = 0; wave < kWaves; ++wave) {
+    const Vector3d k =
+        Vector3d(noise.normal(4 * wave), noise.normal(4 * wave + 1), noise.normal(4 * wave + 2)) / length_mm;
+    const double phase = noise.uniform(8 * kWaves + 2 * wave, 0.0, 2.0 * std::numbers::pi);
+    for (std::size_t v = 0; v < places.size(); ++v) field[v] += std::cos(k.dot(places[v]) + phase);
+  }
+  double squares = 0.0;
+  for (const double value : field) squares += value * value;
+  const double scale = 1.0 / std::sqrt(squares / static_cast<double>(field.size()));
+  for (double& value : field) value *= scale;
+  return field;
+}
+
+std::string registration_text(const Pose& X_IW, const std::string& covariance, const Vector3d& middle_I) {
+  double q[4];
+  rotation_to_wxyz(X_IW.R, q);
+  return fmt::format(
+      "{{\n  \"translation_mm\": [{}, {}, {}],\n  \"rotation_wxyz\": [{}, {}, {}, {}],\n  \"covariance\": {},\n"
+      "  \"covariance_about_mm\": [{}, {}, {}]\n}}\n",
+      X_IW.t.x(), X_IW.t.y(), X_IW.t.z(), q[0], q[1], q[2], q[3], covariance, middle_I.x(), middle_I.y(), middle_I.z());
+}
+
+}  // namespace
+
+PreoperativeModel preoperative_model(const HeartMesh& heart_W, const PreoperativeSettings& settings) {
+  TriangleMesh mesh;
+  mesh.vertices.resize(heart_W.vertex_count);
+  vertex_positions(heart_W, fourier_basis(settings.phase_rad, heart_W.harmonics), mesh.vertices);
+  for (std::size_t i = 0; i + 2 < heart_W.triangles.size(); i += 3) {
+    mesh.triangles.push_back({heart_W.triangles[i], heart_W.triangles[i + 1], heart_W.triangles[i + 2]});
+  }
+  if (settings.shape_error_mm > 0.0) {
+    const std::vector<Vector3d> normals = normals_of(mesh);
+    const std::vector<double> field =
+        smooth_field(mesh.vertices, settings.shape_length_mm, CounterNoise(settings.seed, kScanShape));
+    for (std::size_t v = 0; v < field.size(); ++v) mesh.vertices[v] += settings.shape_error_mm * field[v] * normals[v];
+  }
+  PreoperativeModel model;
+  const CounterNoise frame(settings.seed, kScanFrame);
+  model.true_X_IW = {so3_exp(frame.uniform(30, 0.5, 2.5) * drawn_direction(frame, 0)),
+                     frame.uniform(31, 50.0, 250.0) * drawn_direction(frame, 10)};
+  for (Vector3d& vertex : mesh.vertices) {
+    vertex = model.true_X_IW * vertex;
+    model.middle_I += vertex / static_cast<double>(mesh.vertices.size());
+  }
+  model.mesh_I = std::move(mesh);
+  const CounterNoise off(settings.seed, kScanOffset);
+  const Matrix3d R = so3_exp(settings.off_rad * drawn_direction(off, 0));
+  model.start_X_IW =
+      Pose{R, model.middle_I + settings.off_mm * drawn_direction(off, 10) - R * model.middle_I} * model.true_X_IW;
+  return model;
+}
+
+std::string true_registration_of(const PreoperativeModel& model) {
+  return registration_text(model.true_X_IW, "null", model.middle_I);
+}
+
+std::string start_registration_of(const PreoperativeModel& model, const PreoperativeSettings& settings) {
+  // Of a direction that may be any, each axis has a third of the square.
+  const double rotation = settings.off_rad * settings.off_rad / 3.0;
+  const double translation = settings.off_mm * settings.off_mm / 3.0;
+  std::string rows;
+  for (int i = 0; i < 6; ++i) {
+    std::array<double, 6> row{};
+    row[static_cast<std::size_t>(i)] = i < 3 ? rotation : translation;
+    rows +=
+        fmt::format("{}[{}, {}, {}, {}, {}, {}]", i == 0 ? "" : ", ", row[0], row[1], row[2], row[3], row[4], row[5]);
+  }
+  return registration_text(model.start_X_IW, "[" + rows + "]", model.middle_I);
+}
+
+}  // namespace perimap
