@@ -29,6 +29,7 @@
   COMMAND(check)                  \
   COMMAND(calibrate)              \
   COMMAND(register)               \
+  COMMAND(refine)                 \
   COMMAND(verify)                 \
   COMMAND(ctl)                    \
   COMMAND(keys)                   \

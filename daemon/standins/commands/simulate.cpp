@@ -16,6 +16,7 @@
 #include "daemon/process/stop_signal.hpp"
 #include "daemon/standins/options/bench_options.hpp"
 #include "daemon/standins/options/heart_settings.hpp"
+#include "daemon/standins/options/preoperative_options.hpp"
 #include "daemon/standins/options/scope_options.hpp"
 #include "daemon/standins/options/simulation_options.hpp"
 #include "drivers/standins/procedure/procedure_text.hpp"
@@ -33,6 +34,7 @@ struct SimulateOptions {
   SimulationOptions simulation;
   ScopeOptions scope;
   BenchOptions bench;
+  PreoperativeOptions preoperative;
   std::vector<double> tracker_noises_mm;
   unsigned threads = 0;
   bool force = false;
@@ -117,6 +119,9 @@ std::vector<SimulatedRecording> planned(const SimulateOptions& options) {
 // Every file that is written, by the option that names it.
 std::vector<Output> outputs_of(const SimulateOptions& options, const std::vector<SimulatedRecording>& recordings) {
   std::vector<Output> outputs{{"--write-procedure", options.procedure.string()}};
+  if (options.preoperative.wanted()) {
+    for (const auto& file : options.preoperative.files()) outputs.push_back({"--preoperative", file.string()});
+  }
   for (const SimulatedRecording& recording : recordings) {
     const bool untold = !options.untold.empty() && &recording == &recordings.front();
     const std::string of_noise = options.tracker_noises_mm.empty()
@@ -140,6 +145,11 @@ Outcome simulate_heart(const SimulateOptions& options, const Console& console) {
       return refuse(sound.error(), ExitCode::kWrongUsage);
     }
   }
+  if (options.preoperative.wanted()) {
+    if (const auto sound = check_new(options.preoperative.files(), options); !sound) {
+      return refuse(sound.error(), ExitCode::kWrongUsage);
+    }
+  }
   if (!options.procedure.empty()) {
     const auto written = write_text_file(options.procedure, to_toml(settings->procedure));
     if (!written) return refuse(written.error());
@@ -151,6 +161,9 @@ Outcome simulate_heart(const SimulateOptions& options, const Console& console) {
   if (!stop) return refuse(stop.error());
   const auto simulation = Simulation::create(*settings, threaded_for(threads));
   if (!simulation) return refuse(simulation.error(), ExitCode::kWrongUsage);
+  if (options.preoperative.wanted()) {
+    if (const auto written = options.preoperative.write(*simulation); !written) return refuse(written.error());
+  }
   {
     Progress progress(console, "frames", simulation->frames().size());
     const auto written = write_simulation(*simulation, recordings, threads, [&](std::uint64_t frames) {
@@ -176,6 +189,10 @@ Expected<void> check(const SimulateOptions& options) {
   if (auto sound = options.bench.check(); !sound) return sound;
   if (auto sound = options.scope.check(options.bench.act()); !sound) return sound;
   if (of_bench && options.simulation.has_procedure()) return fail("--procedure: expected --scene heart");
+  if (auto sound = options.preoperative.check(); !sound) return sound;
+  if (options.preoperative.wanted() && (of_bench || options.simulation.has_procedure())) {
+    return fail("--preoperative: expected --scene heart, and no --procedure, which moves the heart elsewhere");
+  }
   if (of_bench && !options.untold.empty()) {
     return fail("--untold: expected --scene heart; a bench's recording never tells its set-up");
   }
@@ -207,6 +224,7 @@ void add_simulate_command(Commands& commands) {
   options->simulation.add_procedure_to(command);
   options->bench.add_to(command);
   options->scope.add_to(command);
+  options->preoperative.add_to(command);
   command.add_option("--write-procedure", options->procedure,
                      "With --procedure: write its script to this file, as when it was drawn");
   command.add_option(
