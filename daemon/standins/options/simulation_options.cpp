@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 
+#include "daemon/command_line/choice.hpp"
 #include "drivers/standins/procedure/procedure_draw.hpp"
 #include "drivers/standins/procedure/procedure_text.hpp"
 #include "drivers/standins/simulator/ecg_record.hpp"
@@ -111,6 +112,10 @@ Option* SimulationOptions::add_to(Command& command) {
       .add_option("--scope-sweep", settings_.scope_sweep,
                   "How far from its target the scope looks, times the usual: at 5 what lies off it leaves the view")
       ->capture_default_str();
+  add_choice(command, "--look", settings_.look,
+             {{name_of(Look::kRendered), Look::kRendered}, {name_of(Look::kTissue), Look::kTissue}},
+             "What the heart looks like: rendered (strong texture, easy to follow), tissue (weak and uneven texture, "
+             "wet highlights and changing light as in footage of tissue) [rendered]");
   command.add_option("--exposure", settings_.exposure_share, "Motion blur: exposure as a share of the frame period")
       ->capture_default_str();
   command.add_flag("--instrument", settings_.instrument, "An instrument comes into view for 3 s every 6 s");

@@ -43,11 +43,12 @@ std::string description(const Simulation& simulation, const TrackerNoise& noise)
   const double correlation_s = to_seconds(s.tracker_correlation);
   return fmt::format(
       "simulated heart: seed {}, {} s, {}x{} at {} Hz, ECG record {}, motion {}, respiration {} mm, tracker {} Hz with "
-      "{} mm and {:.3g} deg RMS{}{}",
+      "{} mm and {:.3g} deg RMS{}{}{}",
       s.seed, to_seconds(s.duration), s.width, s.height, s.frames_per_s, s.trace ? "made" : s.ecg_record,
       s.trace ? "of a trace" : law_name(s.law), s.respiration_mm, s.tracker_rate_hz, noise.position_rms_mm,
       noise.rotation_rms_rad / kRadians_per_degree,
       correlation_s > 0.0 ? fmt::format(", correlated over {} s", correlation_s) : "",
+      s.look == Look::kRendered ? "" : fmt::format(", look {}", name_of(s.look)),
       s.procedure.empty() ? "" : fmt::format(", a procedure of {} events", s.procedure.events.size()));
 }
 

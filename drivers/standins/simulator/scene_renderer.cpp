@@ -14,9 +14,8 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr int kSubsamples = 2;         // a side of each pixel, for what covers it; shaded once where one triangle does
-constexpr int kTile = 16;              // subsamples a side
-constexpr float kGreyLevels = 300.0F;  // of a white surface under full light
+constexpr int kSubsamples = 2;  // a side of each pixel, for what covers it; shaded once where one triangle does
+constexpr int kTile = 16;       // subsamples a side
 constexpr std::int32_t kNone = -1;
 constexpr double kNearest_mm = 5.0;  // what comes nearer to the lens than this is not drawn
 
@@ -45,8 +44,12 @@ RenderWorkspace::Plane4 plane(const Eigen::Matrix<float, 4, 3>& rows) noexcept {
 }  // namespace
 
 SceneRenderer::SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_t> triangles,
-                             const TissueTexture& texture, const FieldStop& stop)
-    : lens_(lens), triangles_(triangles), texture_(texture), stride_((kSubsamples * lens.width + 3) / 4 * 4) {
+                             const TissueTexture& texture, const PictureLook& look, const FieldStop& stop)
+    : lens_(lens),
+      triangles_(triangles),
+      texture_(texture),
+      look_(look),
+      stride_((kSubsamples * lens.width + 3) / 4 * 4) {
   const std::size_t subsamples = static_cast<std::size_t>(stride_) * kSubsamples * lens.height;
   ray_x_.resize(subsamples, 0.0F);
   ray_y_.resize(subsamples, 0.0F);
@@ -62,10 +65,9 @@ SceneRenderer::SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_
   vignetting_.resize(static_cast<std::size_t>(lens.width) * lens.height);
   for (int row = 0; row < lens.height; ++row) {
     for (int column = 0; column < lens.width; ++column) {
-      // cos^4 of the angle to the axis, and the cone of the light on top of it.
       const double cosine = 1.0 / lens.ray({column, row}).norm();
       vignetting_[static_cast<std::size_t>(row) * lens.width + column] =
-          static_cast<float>(std::pow(cosine, 6.0) * stop.passed(Vector2d(column, row)));
+          static_cast<float>(std::pow(cosine, look_.vignetting) * stop.passed(Vector2d(column, row)));
     }
   }
 }
@@ -230,7 +232,7 @@ void SceneRenderer::find_visible(RenderWorkspace& workspace) const {
   }
 }
 
-float SceneRenderer::light_at(const Eigen::Matrix3f& R_CW, float subject_distance2, float x, float y,
+float SceneRenderer::light_at(const Shot& shot, float x, float y,
                               const RenderWorkspace::Triangle& triangle) const noexcept {
   const float depth = 1.0F / triangle.weights.at(x, y)[3];
   const Float4 chart = triangle.chart.at(x, y) * depth;
@@ -246,21 +248,28 @@ float SceneRenderer::light_at(const Eigen::Matrix3f& R_CW, float subject_distanc
   normal.normalize();
   // A surface seen from its inner side is lit there.
   if (normal.dot(to_eye) < 0.0F) normal = -normal;
-  const Vector3f bumpy = (normal + R_CW * Vector3f(tissue[1], tissue[2], tissue[3])).normalized();
+  const auto with_bumps = [&](const Float4& sample) -> Vector3f {
+    return (normal + shot.R_CW * Vector3f(sample[1], sample[2], sample[3])).normalized();
+  };
+  const Vector3f bumpy = with_bumps(tissue);
 
-  const float falloff = subject_distance2 / distance2;
-  const float diffuse = 0.6F * std::max(0.0F, normal.dot(to_light)) + 0.4F * std::max(0.0F, bumpy.dot(to_light));
+  const float falloff = shot.subject_distance2 / distance2;
+  const float diffuse =
+      look_.even_light * std::max(0.0F, normal.dot(to_light)) + look_.bumpy_light * std::max(0.0F, bumpy.dot(to_light));
   float light = tissue[0] * (0.04F + diffuse * falloff);
-  // Two lobes of a spherical Gaussian about the mirror direction: the wet film and the tissue below it.
-  const float off_mirror = 1.0F - bumpy.dot((to_eye + to_light).normalized());
-  if (off_mirror < 0.08F)
-    light += falloff * (1.1F * std::exp(-1200.0F * off_mirror) + 0.10F * std::exp(-90.0F * off_mirror));
+  // Two lobes: the wet film and the tissue below it.
+  const Vector3f wet =
+      look_.film_flows
+          ? with_bumps(texture_.at(chart[0] + shot.film_texels.x(), chart[1] + shot.film_texels.y(), chart[2]))
+          : bumpy;
+  const float off_mirror = 1.0F - wet.dot((to_eye + to_light).normalized());
+  if (off_mirror < look_.off_mirror_most)
+    light += falloff * (look_.film.strength * std::exp(-look_.film.sharpness * off_mirror) +
+                        look_.tissue_below.strength * std::exp(-look_.tissue_below.sharpness * off_mirror));
   return light;
 }
 
-void SceneRenderer::shade(const Pose& X_WC, double subject_distance_mm, RenderWorkspace& workspace) const {
-  const Eigen::Matrix3f R_CW = X_WC.R.transpose().cast<float>();
-  const auto subject2 = static_cast<float>(subject_distance_mm * subject_distance_mm);
+void SceneRenderer::shade(const Shot& shot, RenderWorkspace& workspace) const {
   // The pericardial cavity behind the heart: dark and without detail.
   const auto cavity = [](float y) { return 0.075F + 0.03F * y; };
   workspace.radiance.resize(static_cast<std::size_t>(lens_.width) * lens_.height);
@@ -274,37 +283,37 @@ void SceneRenderer::shade(const Pose& X_WC, double subject_distance_mm, RenderWo
         // One triangle fills the pixel: its middle stands for all of it.
         const float x = 0.25F * (ray_x_[at[0]] + ray_x_[at[1]] + ray_x_[at[2]] + ray_x_[at[3]]);
         const float y = 0.25F * (ray_y_[at[0]] + ray_y_[at[1]] + ray_y_[at[2]] + ray_y_[at[3]]);
-        light = seen[at[0]] == kNone
-                    ? cavity(y)
-                    : light_at(R_CW, subject2, x, y, workspace.triangles[static_cast<std::size_t>(seen[at[0]])]);
+        light = seen[at[0]] == kNone ? cavity(y)
+                                     : light_at(shot, x, y, workspace.triangles[static_cast<std::size_t>(seen[at[0]])]);
       } else {
         for (const std::size_t i : at) {
           light += 0.25F * (seen[i] == kNone ? cavity(ray_y_[i])
-                                             : light_at(R_CW, subject2, ray_x_[i], ray_y_[i],
+                                             : light_at(shot, ray_x_[i], ray_y_[i],
                                                         workspace.triangles[static_cast<std::size_t>(seen[i])]));
         }
       }
-      workspace.radiance[static_cast<std::size_t>(row) * lens_.width + column] = kGreyLevels * light;
+      workspace.radiance[static_cast<std::size_t>(row) * lens_.width + column] = look_.white_grey * light;
     }
   }
 }
 
-void SceneRenderer::expose(std::uint64_t noise_seed, RenderWorkspace& workspace, std::span<std::uint8_t> image) const {
+void SceneRenderer::expose(const FrameLight& frame, std::uint64_t noise_seed, RenderWorkspace& workspace,
+                           std::span<std::uint8_t> image) const {
   const int width = lens_.width;
   const int height = lens_.height;
   const std::size_t pixels = static_cast<std::size_t>(width) * height;
   const CounterNoise noise(noise_seed, 0);
-  const auto exposure = static_cast<float>(1.0 + 0.004 * noise.normal(pixels));
+  const auto exposure =
+      static_cast<float>((1.0 + look_.exposure_deviation * noise.normal(pixels)) * static_cast<double>(frame.gain));
 
-  // The lens's blur, [s 1-2s s] along rows and columns: standard deviation sqrt(2 s) pixels.
-  constexpr float kSide = 0.11F;
+  const float side = look_.blur_side;
   workspace.blurred.resize(pixels);
   for (int row = 0; row < height; ++row) {
     const float* in = workspace.radiance.data() + static_cast<std::size_t>(row) * width;
     float* out = workspace.blurred.data() + static_cast<std::size_t>(row) * width;
     for (int column = 0; column < width; ++column) {
-      out[column] = (1.0F - 2.0F * kSide) * in[column] +
-                    kSide * (in[std::max(0, column - 1)] + in[std::min(width - 1, column + 1)]);
+      out[column] = (1.0F - 2.0F * side) * in[column] +
+                    side * (in[std::max(0, column - 1)] + in[std::min(width - 1, column + 1)]);
     }
   }
   for (int row = 0; row < height; ++row) {
@@ -313,32 +322,29 @@ void SceneRenderer::expose(std::uint64_t noise_seed, RenderWorkspace& workspace,
     const float* below = row + 1 < height ? middle + width : middle;
     for (int column = 0; column < width; ++column) {
       const std::size_t i = static_cast<std::size_t>(row) * width + column;
-      const float level = exposure * vignetting_[i] *
-                          ((1.0F - 2.0F * kSide) * middle[column] + kSide * (above[column] + below[column]));
-      // Four 16-bit uniform numbers sum to nearly a normal one; read noise 0.7 grey levels, shot noise 1 at 150.
+      const float level =
+          exposure * vignetting_[i] * ((1.0F - 2.0F * side) * middle[column] + side * (above[column] + below[column])) +
+          frame.veil;
+      // Four 16-bit uniform numbers sum to nearly a normal one.
       const std::uint64_t bits = noise.bits(i);
       const auto sum =
           static_cast<float>((bits & 0xffffU) + ((bits >> 16) & 0xffffU) + ((bits >> 32) & 0xffffU) + (bits >> 48));
       constexpr float kStandardDeviation = 37837.2F;  // of the sum: sqrt(4 (65536^2 - 1) / 12)
       const float normal = (sum - 4.0F * 32767.5F) / kStandardDeviation;
       const float clipped = std::min(level, 255.0F);
-      const float deviation = std::sqrt(0.49F + clipped / 150.0F);
+      const float deviation = std::sqrt(look_.read_variance + clipped / look_.shot_levels);
       image[i] = static_cast<std::uint8_t>(std::clamp(clipped + deviation * normal + 0.5F, 0.0F, 255.0F));
     }
   }
 }
 
 void SceneRenderer::light(const Pose& X_WC, std::span<const Vector3d> vertices_W, double subject_distance_mm,
-                          RenderWorkspace& workspace) const {
+                          const FrameLight& frame, RenderWorkspace& workspace) const {
   project(X_WC, vertices_W, workspace);
   find_visible(workspace);
-  shade(X_WC, subject_distance_mm, workspace);
-}
-
-void SceneRenderer::render(const Pose& X_WC, std::span<const Vector3d> vertices_W, double subject_distance_mm,
-                           std::uint64_t noise_seed, RenderWorkspace& workspace, std::span<std::uint8_t> image) const {
-  light(X_WC, vertices_W, subject_distance_mm, workspace);
-  expose(noise_seed, workspace, image);
+  shade({X_WC.R.transpose().cast<float>(), static_cast<float>(subject_distance_mm * subject_distance_mm),
+         frame.film * static_cast<float>(texture_.size())},
+        workspace);
 }
 
 }  // namespace perimap

@@ -9,6 +9,7 @@
 #include "core/geometry/pose.hpp"
 #include "drivers/standins/simulator/field_stop.hpp"
 #include "drivers/standins/simulator/lens.hpp"
+#include "drivers/standins/simulator/picture_look.hpp"
 #include "drivers/standins/simulator/tissue_texture.hpp"
 
 namespace perimap {
@@ -43,23 +44,21 @@ struct RenderWorkspace {
 // Rays are exact: every subsample carries the undistorted ray of its place in the distorted image and is tested against
 // each triangle in three dimensions (triangle_rays.hpp), so there is no residual of the distortion beyond that of
 // ScopeLens::ray. Light and camera move together: diffuse with fall-off, two highlight lobes, vignetting; then the
-// lens's blur, shot and read noise, 8 bits.
+// lens's blur, shot and read noise, 8 bits. How much of each is the look's.
 class SceneRenderer {
  public:
-  // `triangles` and `texture` belong to one mesh and outlive the renderer.
+  // `triangles` and `texture` belong to one mesh and outlive the renderer; the texture is the look's.
   SceneRenderer(const ScopeLens& lens, std::span<const std::uint32_t> triangles, const TissueTexture& texture,
-                const FieldStop& stop = {});
+                const PictureLook& look, const FieldStop& stop = {});
 
-  // One frame. `vertices_W`: the mesh at the frame's instant. `subject_distance_mm`: where exposure is right.
-  // `noise_seed`: one value per frame. `image`: width * height places, row by row. A function of its arguments alone.
-  void render(const Pose& X_WC, std::span<const Vector3d> vertices_W, double subject_distance_mm,
-              std::uint64_t noise_seed, RenderWorkspace& workspace, std::span<std::uint8_t> image) const;
-
-  // The two halves of render(): the light that falls on the sensor into workspace.radiance, and the image made of it.
+  // The two halves of a frame: the light that falls on the sensor into workspace.radiance, and the image made of it.
   // Between them the radiance may be changed, or averaged over the exposure.
+  // `vertices_W`: the mesh at the frame's instant. `subject_distance_mm`: where exposure is right. `noise_seed`: one
+  // value per frame. `image`: width * height places, row by row. Functions of their arguments alone.
   void light(const Pose& X_WC, std::span<const Vector3d> vertices_W, double subject_distance_mm,
-             RenderWorkspace& workspace) const;
-  void expose(std::uint64_t noise_seed, RenderWorkspace& workspace, std::span<std::uint8_t> image) const;
+             const FrameLight& frame, RenderWorkspace& workspace) const;
+  void expose(const FrameLight& frame, std::uint64_t noise_seed, RenderWorkspace& workspace,
+              std::span<std::uint8_t> image) const;
 
  private:
   void project(const Pose& X_WC, std::span<const Vector3d> vertices_W, RenderWorkspace& workspace) const;
@@ -71,13 +70,20 @@ class SceneRenderer {
   [[nodiscard]] std::optional<Bounds> bounds(std::size_t triangle, const RenderWorkspace& workspace) const;
   void draw(std::size_t triangle, RenderWorkspace& workspace, const Bounds& bounds) const;
   void find_visible(RenderWorkspace& workspace) const;
-  [[nodiscard]] float light_at(const Eigen::Matrix3f& R_CW, float subject_distance2, float ray_x, float ray_y,
+  // What is the same for all of a picture.
+  struct Shot {
+    Eigen::Matrix3f R_CW;
+    float subject_distance2;
+    Eigen::Vector2f film_texels;
+  };
+  [[nodiscard]] float light_at(const Shot& shot, float ray_x, float ray_y,
                                const RenderWorkspace::Triangle& triangle) const noexcept;
-  void shade(const Pose& X_WC, double subject_distance_mm, RenderWorkspace& workspace) const;
+  void shade(const Shot& shot, RenderWorkspace& workspace) const;
 
   ScopeLens lens_;
   std::span<const std::uint32_t> triangles_;
   const TissueTexture& texture_;
+  PictureLook look_;
   int stride_ = 0;            // subsamples a row, a multiple of 4
   std::vector<float> ray_x_;  // per subsample: the ray (x, y, 1)
   std::vector<float> ray_y_;

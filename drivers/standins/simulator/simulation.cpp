@@ -13,6 +13,7 @@
 #include "drivers/standins/random/counter_noise.hpp"
 #include "drivers/standins/simulator/ecg_script.hpp"
 #include "drivers/standins/simulator/embedded_data.hpp"
+#include "drivers/standins/simulator/picture_look.hpp"
 #include "drivers/standins/simulator/procedure_truth.hpp"
 #include "drivers/standins/simulator/scope_path.hpp"
 #include "drivers/standins/simulator/scope_setup.hpp"
@@ -207,7 +208,7 @@ FieldStop Simulation::seen_field_stop_at(Duration since) const noexcept {
 
 std::unique_ptr<const SceneRenderer> Simulation::renderer_at(Duration since) const {
   return std::make_unique<const SceneRenderer>(setup_at(since).lens, truth_.mesh().triangles, *texture_,
-                                               seen_field_stop_at(since));
+                                               picture_look(settings_.look), seen_field_stop_at(since));
 }
 
 // Its own period wavers a little.
@@ -395,8 +396,9 @@ Expected<Simulation> Simulation::create(const SimulationSettings& settings, cons
       4096, static_cast<int>(std::bit_ceil(static_cast<unsigned>(3 * std::max(settings.width, settings.height)))));
   const auto texture_seed = static_cast<std::uint32_t>(CounterNoise(settings.seed, kSession).bits(2));
   const auto& triangles = simulation.truth_.mesh().triangles;
-  simulation.texture_ = std::make_unique<const TissueTexture>(view->material_W, triangles, view->centre_W, view->axis_W,
-                                                              texture_size, texture_seed, parallel_for);
+  simulation.texture_ =
+      std::make_unique<const TissueTexture>(view->material_W, triangles, view->centre_W, view->axis_W, texture_size,
+                                            picture_look(settings.look).tissue, texture_seed, parallel_for);
   simulation.renderers_.push_back(simulation.renderer_at(Duration(0)));
   if (settings.turn) simulation.renderers_.push_back(simulation.renderer_at(settings.turn->at + settings.turn->length));
   for (const ProcedureEvent& event : settings.procedure.events) {
@@ -467,11 +469,12 @@ void Simulation::render(std::size_t frame_index, RenderWorkspace& workspace, std
   constexpr int kInstants = 3;
   const int instants = settings_.exposure_share > 0.0 ? kInstants : 1;
   const double exposure_s = settings_.exposure_share / settings_.frames_per_s;
+  const FrameLight light = frame_light(settings_.look, settings_.seed, since);
   for (int k = 0; k < instants; ++k) {
     const Instant t = taken + from_seconds(exposure_s * ((k + 0.5) / instants - 0.5));
     const Pose X_WC = instants == 1 ? frame.X_WC : X_WC_at(t - start_);
     truth_.vertices_at(t, vertices_W);
-    renderer.light(X_WC, vertices_W, (frame.X_WC.t - surface_W_).norm(), workspace);
+    renderer.light(X_WC, vertices_W, (frame.X_WC.t - surface_W_).norm(), light, workspace);
     obstacles_.draw(t - start_, workspace.radiance);
     if (!settings_.procedure.empty()) {
       procedure_view_.draw(picture_state(settings_.procedure, t - start_),
@@ -484,7 +487,7 @@ void Simulation::render(std::size_t frame_index, RenderWorkspace& workspace, std
     }
   }
   if (instants > 1) workspace.radiance.swap(workspace.exposure);
-  renderer.expose(CounterNoise(settings_.seed, kImage).bits(index), workspace, image);
+  renderer.expose(light, CounterNoise(settings_.seed, kImage).bits(index), workspace, image);
 }
 
 }  // namespace perimap

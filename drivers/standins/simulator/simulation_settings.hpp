@@ -11,6 +11,7 @@
 #include "core/time/instant.hpp"
 #include "drivers/standins/procedure/procedure.hpp"
 #include "drivers/standins/simulator/field_stop.hpp"
+#include "drivers/standins/simulator/look.hpp"
 #include "drivers/standins/simulator/played_trace.hpp"
 #include "drivers/standins/truth/heart_motion.hpp"
 
@@ -48,6 +49,7 @@ struct SimulationSettings {
   std::vector<Stretch> camera_loops;
   int camera_repeats = 1;  // each picture comes so often, as of a camera that is slower than its stamps say
   // What makes seeing hard.
+  Look look = Look::kRendered;
   double scope_sweep = 1.0;     // see ScopePath
   double exposure_share = 0.0;  // of the frame period, about the capture: motion blur
   bool instrument = false;      // see ViewObstacles

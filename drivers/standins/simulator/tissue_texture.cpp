@@ -5,8 +5,6 @@
 #include <cmath>
 #include <cstring>
 
-#include "drivers/standins/simulator/tissue.hpp"
-
 namespace perimap {
 namespace {
 
@@ -39,8 +37,8 @@ float cross(const Eigen::Vector2f& a, const Eigen::Vector2f& b) noexcept { retur
 }  // namespace
 
 TissueTexture::TissueTexture(std::span<const Vector3d> material_mm, std::span<const std::uint32_t> triangles,
-                             const Vector3d& centre, const Vector3d& axis, int size, std::uint32_t seed,
-                             const ParallelFor& parallel_for) {
+                             const Vector3d& centre, const Vector3d& axis, int size, TissueAt tissue_at,
+                             std::uint32_t seed, const ParallelFor& parallel_for) {
   const Vector3d z = axis.normalized();
   const Vector3d x = z.unitOrthogonal();
   const Vector3d y = z.cross(x);

@@ -36,8 +36,9 @@ constexpr int kAwayFrames = 5;    // out of view so long, a feature has left
 constexpr int kBackFrames = 15;   // 0.5 s
 constexpr double kOff_px = 3;
 
-SimulationSettings hard_to_see() {
+SimulationSettings hard_to_see(Look look) {
   SimulationSettings settings;
+  settings.look = look;
   settings.width = 1280;
   settings.height = 720;
   settings.duration = std::chrono::seconds(30);
@@ -251,8 +252,10 @@ class Session {
   std::uint64_t mapped_ = 0;
 };
 
-TEST(Seeing, FeaturesThatReturnToViewComeBackAndWhatPassesTheGateIsThere) {
-  const Simulation simulation = test::simulation_of(hard_to_see());
+class Seeing : public testing::TestWithParam<Look> {};
+
+TEST_P(Seeing, FeaturesThatReturnToViewComeBackAndWhatPassesTheGateIsThere) {
+  const Simulation simulation = test::simulation_of(hard_to_see(GetParam()));
   constexpr double kHalfDegree = 0.5 * std::numbers::pi / 180;
   Session exact(simulation, {});
   Session noisy(simulation, {1.4, kHalfDegree});
@@ -266,6 +269,9 @@ TEST(Seeing, FeaturesThatReturnToViewComeBackAndWhatPassesTheGateIsThere) {
   exact.check();
   noisy.check();
 }
+
+INSTANTIATE_TEST_SUITE_P(Looks, Seeing, testing::Values(Look::kRendered, Look::kTissue),
+                         [](const auto& look) { return std::string(name_of(look.param)); });
 
 }  // namespace
 }  // namespace perimap

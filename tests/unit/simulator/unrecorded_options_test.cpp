@@ -21,7 +21,7 @@ TEST(UnrecordedOptions, AreThoseOfPerimapSimulate) {
   const auto parsed = parse_unrecorded(
       "--simulated",
       "--seed 7 --size 320x240 --duration 1200 --procedure draw:7 --tracker-noise 0.5 --tracker-rotation-noise 2 "
-      "--field-stop 90 --ecg-off 30:10 --threads 3");
+      "--field-stop 90 --ecg-off 30:10 --look tissue --threads 3");
   ASSERT_TRUE(parsed) << parsed.error().message;
   EXPECT_EQ(parsed->settings.seed, 7U);
   EXPECT_EQ(parsed->settings.width, 320);
@@ -32,6 +32,7 @@ TEST(UnrecordedOptions, AreThoseOfPerimapSimulate) {
   EXPECT_EQ(parsed->settings.ecg_off.size(), 1U);
   EXPECT_EQ(parsed->noise.position_rms_mm, 0.5);
   EXPECT_NEAR(parsed->noise.rotation_rms_rad, 2.0 * kDegree, 1e-12);
+  EXPECT_EQ(parsed->settings.look, Look::kTissue);
   EXPECT_EQ(parsed->threads, 3U);
 }
 
@@ -40,6 +41,7 @@ TEST(UnrecordedOptions, WithoutAnyAreTheUsualSession) {
   ASSERT_TRUE(parsed) << parsed.error().message;
   EXPECT_EQ(parsed->settings.width, 640);
   EXPECT_EQ(parsed->settings.duration, std::chrono::seconds(60));
+  EXPECT_EQ(parsed->settings.look, Look::kRendered);
   EXPECT_EQ(parsed->noise.position_rms_mm, 1.4);
   EXPECT_GE(parsed->threads, 1U);
 }
@@ -56,6 +58,7 @@ TEST(UnrecordedOptions, OfFilesAndBenchesAreRefusedByTheirNames) {
 TEST(UnrecordedOptions, WhatIsWrongIsToldAsByPerimapSimulate) {
   EXPECT_THAT(error_of("--sead 1"), HasSubstr("--simulated: --sead: is no option; did you mean '--seed'?"));
   EXPECT_THAT(error_of("--tracker-noise 200"), HasSubstr("--simulated: --tracker-noise:"));
+  EXPECT_THAT(error_of("--look wet"), HasSubstr("--simulated: --look:"));
   EXPECT_THAT(error_of("--size 320"), HasSubstr("--simulated: size: expected WIDTHxHEIGHT"));
   EXPECT_THAT(error_of("--turn-to 20"), HasSubstr("--simulated: --turn-to, --zoom-to: expected --field-stop"));
   EXPECT_THAT(error_of("--procedure draw:x"), HasSubstr("--simulated: procedure: expected draw:SEED"));
