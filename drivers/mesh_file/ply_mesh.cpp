@@ -215,7 +215,7 @@ class PlyBody {
   }
 
   Expected<double> number(PlyType type) {
-    if (header_.format == PlyFormat::kText) return at_.real("a number");
+    if (header_.format == PlyFormat::kText) return at_.real("a property's value");
     const bool big = header_.format == PlyFormat::kBigEndian;
     std::optional<double> value;
     const auto take = [&](auto raw) {
