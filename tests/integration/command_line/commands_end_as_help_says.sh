@@ -117,6 +117,10 @@ ends 2 "--tip: expected" register --model model.csv --from r.mcap
 ends 2 "--tip: expected" register --model model.csv --live gone.toml
 ends 2 "--live and --touched" register --model model.csv --touched model.csv --live gone.toml
 ends 1 "nothing.csv" register --model nothing.csv --touched nothing.csv
+ends 2 "model is required" refine
+ends 2 "not in range" refine --model nothing.stl --from nothing.mcap --phase 2
+ends 2 "key 'phase.law'" refine --model nothing.stl --from nothing.mcap --phase 0.5 --configuration broken.toml
+ends 1 "nothing.stl" refine --model nothing.stl --from nothing.mcap --phase 0.5
 ends 2 "expected a recording with --from" verify good.toml
 ends 2 "--square-mm: expected" verify good.toml --from r.mcap
 ends 2 "the lens is not known" verify good.toml --from r.mcap "${size[@]}"

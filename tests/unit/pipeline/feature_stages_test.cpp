@@ -218,24 +218,6 @@ TEST_F(ChangingLooks, AreNotMistakenForWhatLooksMoreLikeTheFirstViewBesideIt) {
   EXPECT_TRUE(slot.seen_by_last_view);
 }
 
-// Smoke: what is left of the tissue looks as before, and a view of the frame before would only drift.
-TEST_F(ChangingLooks, AreNotWhatIsFollowedWhereThePictureHasFaded) {
-  int followed = 0;
-  for (int i = 0; i <= 30; ++i) {
-    test::View smoky;
-    smoky.t = shift + Vector2d(0.5, 0);
-    smoky.gain = 1.0 - 0.96 * i / 30;
-    smoky.bias = 110 * (1.0 - smoky.gain);
-    auto image = std::make_unique<test::ImageBuffer>(test::render(texture, smoky, kWidth, kHeight, 1, random));
-    job.before = before != nullptr ? before->view() : GreyImage{};
-    next_frame({0.5, 0}, *image);
-    before = std::move(image);
-    followed += slot.match.state == MatchState::kFound && slot.seen_by_last_view ? 1 : 0;
-  }
-  EXPECT_EQ(followed, 0);
-  EXPECT_NE(slot.match.state, MatchState::kFound);
-}
-
 TEST_F(ChangingLooks, AreFollowedOnAndNotLearntFromOnceTheyHaveDriftedByAPixel) {
   constexpr int kFrames = 30;
   const auto hold = [this] {
