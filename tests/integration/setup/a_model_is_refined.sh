@@ -3,18 +3,9 @@
 # what the guide says; another heart, a mirrored one and one in metres are not taken for it.
 # a_model_is_refined.sh PERIMAP WORK_FOLDER SEED
 set -euo pipefail
-. "$(dirname "$0")/../figures.sh"
 perimap=$1 work=$2 seed=$3
-rm -rf "$work"
-mkdir -p "$work"
-cd "$work"
-trap 'rm -f "$work"/*.mcap' EXIT
+. "$(dirname "$0")/folder.sh"
 
-fail() {
-  echo "FAILED: $1"
-  exit 1
-}
-quiet() { "$perimap" "$@" > out 2> errors || fail "perimap $*: $(cat out errors)"; }
 refused() { # EXPECTED COMMAND...
   local expected=$1
   shift

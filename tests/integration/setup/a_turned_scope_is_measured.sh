@@ -4,18 +4,9 @@
 # the pictures, or by a second tracked sensor.
 # a_turned_scope_is_measured.sh PERIMAP PERIMAPD WORK_FOLDER SEED field-stop|second-sensor
 set -euo pipefail
-. "$(dirname "$0")/../figures.sh"
 perimap=$1 perimapd=$2 work=$3 seed=$4 told_by=$5
-rm -rf "$work"
-mkdir -p "$work"
-cd "$work"
-trap 'rm -f "$work"/*.mcap' EXIT
+. "$(dirname "$0")/folder.sh"
 
-fail() {
-  echo "FAILED: $1"
-  exit 1
-}
-quiet() { "$perimap" "$@" > out 2> errors || fail "perimap $*: $(cat out errors)"; }
 settled() { tr -d ' \n' < "$1" | grep -o '"settled_error":{[^}]*' | grep -o "\"$2\":[0-9.e-]*" | cut -d: -f2; }
 times() { awk -v a="$1" -v b="$2" 'BEGIN { print a * b }'; }
 

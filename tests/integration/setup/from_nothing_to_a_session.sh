@@ -3,18 +3,8 @@
 # map a heart. Positions must be as good, within 1.3 times, as the true set-up makes them.
 # from_nothing_to_a_session.sh PERIMAP WORK_FOLDER SEED
 set -euo pipefail
-. "$(dirname "$0")/../figures.sh"
 perimap=$1 work=$2 seed=$3
-rm -rf "$work"
-mkdir -p "$work"
-cd "$work"
-trap 'rm -f "$work"/*.mcap' EXIT
-
-fail() {
-  echo "FAILED: $1"
-  exit 1
-}
-quiet() { "$perimap" "$@" > out 2> errors || fail "perimap $*: $(cat out errors)"; }
+. "$(dirname "$0")/folder.sh"
 
 # ---- what is there: a bench with a board, the scope at rest, landmarks, and then the heart
 common=(--setup-seed "$seed" --size 640x480)
