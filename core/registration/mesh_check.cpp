@@ -10,7 +10,10 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <utility>
+
+#include "core/registration/mesh_edges.hpp"
 
 namespace perimap {
 namespace {
@@ -91,43 +94,23 @@ Vector3d doubled_area(const TriangleMesh& mesh, const TriangleMesh::Triangle& tr
   return (mesh.vertices[triangle[1]] - a).cross(mesh.vertices[triangle[2]] - a);
 }
 
-struct HalfEdge {
-  std::uint32_t low = 0, high = 0;
-  bool rises = false;  // as its triangle runs along it
-
-  [[nodiscard]] bool is_of(const HalfEdge& other) const { return low == other.low && high == other.high; }
-};
-
 struct Edges {
   std::size_t all = 0, border = 0, crowded = 0, turned = 0;
-  HalfEdge first_crowded, first_turned;
+  MeshSide first_crowded, first_turned;
 };
 
 Edges count_edges(const TriangleMesh& mesh) {
-  std::vector<HalfEdge> halves;
-  halves.reserve(3 * mesh.triangles.size());
-  for (const auto& triangle : mesh.triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t a = triangle[k], b = triangle[(k + 1) % 3];
-      halves.push_back({std::min(a, b), std::max(a, b), a < b});
-    }
-  }
-  std::sort(halves.begin(), halves.end(),
-            [](const HalfEdge& a, const HalfEdge& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
   Edges edges;
-  for (std::size_t i = 0; i < halves.size();) {
-    std::size_t end = i + 1;
-    while (end < halves.size() && halves[end].is_of(halves[i])) ++end;
+  for_each_edge(mesh.triangles, [&edges](std::span<const MeshSide> sides) {
     ++edges.all;
-    if (end - i == 1) ++edges.border;
-    if (end - i > 2 && edges.crowded++ == 0) edges.first_crowded = halves[i];
-    if (end - i == 2 && halves[i].rises == halves[i + 1].rises && edges.turned++ == 0) edges.first_turned = halves[i];
-    i = end;
-  }
+    if (sides.size() == 1) ++edges.border;
+    if (sides.size() > 2 && edges.crowded++ == 0) edges.first_crowded = sides[0];
+    if (sides.size() == 2 && sides[0].rises == sides[1].rises && edges.turned++ == 0) edges.first_turned = sides[0];
+  });
   return edges;
 }
 
-std::string edge_place(const TriangleMesh& mesh, const HalfEdge& edge) {
+std::string edge_place(const TriangleMesh& mesh, const MeshSide& edge) {
   return "from " + place_text(mesh.vertices[edge.low]) + " to " + place_text(mesh.vertices[edge.high]) + " mm";
 }
 

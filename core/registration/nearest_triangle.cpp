@@ -7,7 +7,10 @@
 #include <boost/geometry/index/rtree.hpp>
 #include <iterator>
 #include <limits>
+#include <span>
 #include <utility>
+
+#include "core/registration/mesh_edges.hpp"
 
 namespace perimap {
 namespace {
@@ -53,31 +56,20 @@ NearestTriangle::NearestTriangle(const TriangleMesh& mesh)
       border_edges_(mesh.triangles.size(), 0),
       on_border_(mesh.vertices.size(), 0) {
   std::vector<TreeEntry> entries;
-  std::vector<std::array<std::uint32_t, 4>> edges;  // lower vertex, higher vertex, triangle, its edge
   entries.reserve(mesh.triangles.size());
-  edges.reserve(3 * mesh.triangles.size());
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& triangle = mesh.triangles[t];
     const Vector3d &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]], &c = mesh.vertices[triangle[2]];
     entries.emplace_back(TreeBox(tree_point(a.cwiseMin(b).cwiseMin(c)), tree_point(a.cwiseMax(b).cwiseMax(c))), t);
     const Vector3d normal = (b - a).cross(c - a);
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      normals_[triangle[k]] += normal;
-      const auto [low, high] = std::minmax(triangle[k], triangle[(k + 1) % 3]);
-      edges.push_back({low, high, t, k});
-    }
+    for (const std::uint32_t vertex : triangle) normals_[vertex] += normal;
   }
   for (Vector3d& normal : normals_) normal.normalize();
-  std::sort(edges.begin(), edges.end());
-  for (std::size_t i = 0; i < edges.size();) {
-    std::size_t end = i + 1;
-    while (end < edges.size() && edges[end][0] == edges[i][0] && edges[end][1] == edges[i][1]) ++end;
-    if (end == i + 1) {
-      border_edges_[edges[i][2]] |= static_cast<std::uint8_t>(1U << edges[i][3]);
-      on_border_[edges[i][0]] = on_border_[edges[i][1]] = 1;
-    }
-    i = end;
-  }
+  for_each_edge(mesh.triangles, [this](std::span<const MeshSide> sides) {
+    if (sides.size() != 1) return;
+    border_edges_[sides[0].triangle] |= static_cast<std::uint8_t>(1U << sides[0].side);
+    on_border_[sides[0].low] = on_border_[sides[0].high] = 1;
+  });
   tree_ = std::make_unique<const Tree>(entries);
 }
 

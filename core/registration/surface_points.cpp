@@ -3,7 +3,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <vector>
+
+#include "core/registration/mesh_edges.hpp"
 
 namespace perimap {
 namespace {
@@ -21,21 +24,10 @@ Vector3d doubled_area(const Eigen::Matrix3Xd& p, const std::array<std::uint32_t,
 
 // The ends of edges that have one triangle; each comes more than once.
 std::vector<Eigen::Index> border_of(const SurfaceMesh& mesh) {
-  std::vector<std::array<std::uint32_t, 2>> edges;
-  for (const auto& triangle : mesh.triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto [low, high] = std::minmax(triangle[k], triangle[(k + 1) % 3]);
-      edges.push_back({low, high});
-    }
-  }
-  std::sort(edges.begin(), edges.end());
   std::vector<Eigen::Index> border;
-  for (std::size_t i = 0; i < edges.size();) {
-    std::size_t end = i + 1;
-    while (end < edges.size() && edges[end] == edges[i]) ++end;
-    if (end == i + 1) border.insert(border.end(), {edges[i][0], edges[i][1]});
-    i = end;
-  }
+  for_each_edge(mesh.triangles, [&border](std::span<const MeshSide> sides) {
+    if (sides.size() == 1) border.insert(border.end(), {sides[0].low, sides[0].high});
+  });
   return border;
 }
 
