@@ -33,7 +33,8 @@
   COMMAND(verify)                 \
   COMMAND(ctl)                    \
   COMMAND(keys)                   \
-  COMMAND(forget)
+  COMMAND(forget)                 \
+  COMMAND(verify_log)
 
 namespace perimap {
 

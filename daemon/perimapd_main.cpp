@@ -14,9 +14,12 @@
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "daemon/black_box/black_box.hpp"
+#include "daemon/black_box/black_box_publication.hpp"
 #include "daemon/checkpoint/checkpoint_keeper.hpp"
 #include "daemon/command_line/commands.hpp"
 #include "daemon/config/configuration_loader.hpp"
+#include "daemon/config/configuration_text.hpp"
 #include "daemon/config/surface_traffic.hpp"
 #include "daemon/config/wrong_key.hpp"
 #include "daemon/keys/expiry_news.hpp"
@@ -45,6 +48,43 @@ struct Signals {
   StopSignal stop;
   ReloadSignal reload;
 };
+
+using black_box::BlackBox;
+
+// Told of lines of the log for as long as this lives.
+class LoggedBlackBox {
+ public:
+  LoggedBlackBox(Logging& logging, black_box::BlackBoxSettings settings)
+      : logging_(logging), box_(std::move(settings)) {
+    logging_.tell_also([this](std::string_view severity, std::string_view line) { box_.log_line(severity, line); });
+  }
+  LoggedBlackBox(const LoggedBlackBox&) = delete;
+  LoggedBlackBox& operator=(const LoggedBlackBox&) = delete;
+  ~LoggedBlackBox() { logging_.tell_also({}); }
+
+  [[nodiscard]] BlackBox& box() noexcept { return box_; }
+
+ private:
+  Logging& logging_;
+  BlackBox box_;
+};
+
+// None where there is no folder for it.
+std::unique_ptr<LoggedBlackBox> make_black_box(Logging& logging, const Configuration& configuration,
+                                               const PipelineSettings& settings, const Identity& identity) {
+  const BlackBoxConfiguration& c = configuration.blackbox;
+  const auto folder = c.folder ? c.folder : service_file("STATE_DIRECTORY", "black-box");
+  if (!folder) return nullptr;
+  const auto bytes = static_cast<std::uint64_t>(c.maximum_MB) * 1'000'000U;
+  auto logged = std::make_unique<LoggedBlackBox>(
+      logging, black_box::BlackBoxSettings{*folder,
+                                           {c.ring, c.keep, bytes},
+                                           "perimapd " PERIMAP_VERSION,
+                                           identity,
+                                           static_cast<std::size_t>(settings.features.maximum)});
+  logged->box().configuration(to_toml(configuration));
+  return logged;
+}
 
 // A session over whatever `make_feeder` gives for the pipeline's entrance. `given`: the file as loaded by itself.
 template <class MakeFeeder>
@@ -79,10 +119,15 @@ Outcome run_session(const Console& console, const std::string& configuration_fil
 
   Pipeline pipeline(settings);
   ConfigurationReload reload(configuration_file, given);
-  LiveSession session(pipeline, runtime, **publication, make_feeder(pipeline.entrance()), [&] {
+  const auto logged = make_black_box(logging, configuration, settings, runtime.identity);
+  std::optional<black_box::BlackBoxPublication> both;
+  if (logged) both.emplace(**publication, logged->box());
+  Publication& published = both ? static_cast<Publication&>(*both) : **publication;
+  LiveSession session(pipeline, runtime, published, make_feeder(pipeline.entrance()), [&] {
     if (const auto line = expiry.next(seconds_now())) spdlog::warn("{}", *line);
     if (const auto line = logging.next_loss()) spdlog::error("{}", *line);
   });
+  if (logged) session.keep_black_box(logged->box());
   ServiceManager service;
   session.report_to(service);
   if (const auto file = configuration.checkpoint.file ? configuration.checkpoint.file

@@ -1,4 +1,4 @@
-// `perimap forget`: recordings and checkpoints that are older than they may be kept.
+// `perimap forget`: recordings, checkpoints and segments of a black box that are older than they may be kept.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -39,12 +39,14 @@ Outcome forget(const ForgetOptions& options, const Console& console) {
 
 void add_forget_command(Commands& commands) {
   const auto options = std::make_shared<ForgetOptions>();
-  Command& command = commands.add(
-      "forget", "Removes recordings and checkpoints that have not been written for so long: what is known of patients",
-      [options](const Console& console) { return forget(*options, console); });
+  Command& command = commands.add("forget",
+                                  "Removes recordings, checkpoints and segments of a black box that have not been "
+                                  "written for so long: what is known of patients",
+                                  [options](const Console& console) { return forget(*options, console); });
   command
       .add_option("FOLDER", options->folders,
-                  "Where they are, as recording.folder has it; not the folders in it. Every MCAP file counts as a "
+                  "Where they are, as recording.folder and blackbox.folder have it; not the folders in it. Every MCAP "
+                  "file counts as a "
                   "recording, a ROS bag too")
       ->required();
   command.add_option("--older-than", options->older_than, "As 30d (days), 12h (hours) or 8w (weeks)")->required();

@@ -243,6 +243,15 @@ struct CheckpointConfiguration {
   bool operator==(const CheckpointConfiguration&) const = default;
 };
 
+struct BlackBoxConfiguration {
+  std::optional<std::string> folder;  // absolute; none: $STATE_DIRECTORY/black-box of the service
+  Duration ring = std::chrono::minutes(5);
+  Duration keep = std::chrono::hours(24 * 30);
+  int maximum_MB = 1024;  // of all of it, 1e6 bytes
+
+  bool operator==(const BlackBoxConfiguration&) const = default;
+};
+
 struct Configuration {
   SourceConfiguration source;
   ReplayConfiguration replay;
@@ -263,6 +272,7 @@ struct Configuration {
   LogConfiguration log;
   ControlConfiguration control;
   CheckpointConfiguration checkpoint;
+  BlackBoxConfiguration blackbox;
 
   bool operator==(const Configuration&) const = default;
 };

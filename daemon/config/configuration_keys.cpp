@@ -420,6 +420,16 @@ void add_running(std::vector<ConfigurationKey>& keys) {
       .duration("interval_s", s, 0.1, 3600, PERIMAP_MEMBER(checkpoint.interval), "from one checkpoint to the next")
       .duration("maximum_age_s", s, 0, 86400, PERIMAP_MEMBER(checkpoint.maximum_age),
                 "an older checkpoint is not gone on with");
+  Section("blackbox", keys)
+      .optional_text("folder", "an absolute path", is_absolute_path, PERIMAP_MEMBER(blackbox.folder),
+                     "where what is published and commanded is kept for `perimap verify-log`; none: nowhere, or, as a "
+                     "service, in its state directory")
+      .duration("ring_minutes", std::chrono::minutes(1), 1, 1440, PERIMAP_MEMBER(blackbox.ring),
+                "so much of everything is kept; of what lies around an event more")
+      .duration("keep_days", std::chrono::hours(24), 1, 3650, PERIMAP_MEMBER(blackbox.keep),
+                "nothing is kept longer, events neither")
+      .integer("maximum_MB", 64, 1000000, PERIMAP_MEMBER(blackbox.maximum_MB),
+               "of all of it; what no event holds goes first");
 }
 
 #undef PERIMAP_MEMBER

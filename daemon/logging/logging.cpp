@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <spdlog/async.h>
 #include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
@@ -10,6 +11,7 @@
 
 #include <cstdlib>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -58,6 +60,24 @@ bool standard_error_is_the_journal() {
 
 }  // namespace
 
+class Logging::OtherSink final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  void tell(std::function<void(std::string_view, std::string_view)> other) {
+    const std::lock_guard lock(mutex_);
+    other_ = std::move(other);
+  }
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    if (!other_) return;
+    const auto severity = spdlog::level::to_string_view(message.level);
+    other_({severity.data(), severity.size()}, {message.payload.data(), message.payload.size()});
+  }
+  void flush_() override {}
+
+  std::function<void(std::string_view, std::string_view)> other_;
+};
+
 Logging::Logging(std::string_view name, LogConfiguration::Level level) {
   spdlog::init_thread_pool(kQueuedLines, 1, [] { pthread_setname_np(pthread_self(), "log"); });
   auto logger =
@@ -70,11 +90,17 @@ Logging::Logging(std::string_view name, LogConfiguration::Level level) {
     formatter->set_pattern(std::string(name) + ": %Y-%m-%d %H:%M:%S.%e %l: %v");
   }
   logger->set_formatter(std::move(formatter));
+  other_ = std::make_shared<OtherSink>();
+  logger->sinks().push_back(other_);
   logger->set_level(to_spdlog(level));
   spdlog::set_default_logger(std::move(logger));
 }
 
 Logging::~Logging() { spdlog::shutdown(); }
+
+void Logging::tell_also(std::function<void(std::string_view, std::string_view)> other) {
+  other_->tell(std::move(other));
+}
 
 void Logging::set_level(LogConfiguration::Level level) { spdlog::set_level(to_spdlog(level)); }
 

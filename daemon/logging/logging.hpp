@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -26,10 +28,17 @@ class Logging {
   // Any thread.
   static void set_level(LogConfiguration::Level level);
 
+  // Each line from now on goes to `other`, too, on the log's thread: its severity ("info") and what it says. Any
+  // thread; nothing is told any more once tell_also({}) has returned.
+  void tell_also(std::function<void(std::string_view severity, std::string_view line)> other);
+
   // A line for the log when lines were dropped since this was asked last. One thread.
   [[nodiscard]] std::optional<std::string> next_loss();
 
  private:
+  class OtherSink;
+
+  std::shared_ptr<OtherSink> other_;
   std::size_t told_ = 0;  // dropped lines
 };
 

@@ -18,9 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the project's own files begin with: MCAP (mcap.dev/spec, magic), and a checkpoint.
+// What the project's own files begin with: MCAP (mcap.dev/spec, magic), a checkpoint, and a segment of a black box.
 constexpr std::string_view kRecording("\x89MCAP0\r\n", 8);
 constexpr std::string_view kCheckpoint("PERIMAPC");
+constexpr std::string_view kBlackBox("PERIMAPB");
 
 bool is_of_patients(const fs::path& file) {
   std::array<char, 8> begin{};
@@ -30,7 +31,7 @@ bool is_of_patients(const fs::path& file) {
     return in.gcount() == 0 && (file.extension() == ".mcap" || file.string().find(".mcap.part") != std::string::npos);
   }
   const std::string_view head(begin.data(), begin.size());
-  return head == kRecording || head == kCheckpoint;
+  return head == kRecording || head == kCheckpoint || head == kBlackBox;
 }
 
 }  // namespace

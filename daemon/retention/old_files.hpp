@@ -21,8 +21,9 @@ struct OldFile {
 // "30d", "12h", "8w". Error: what was expected.
 [[nodiscard]] Expected<std::chrono::seconds> parse_age(const std::string& text);
 
-// Recordings and checkpoints, told by what they begin with and not by their names, and what is left of one that was not
-// finished (.part), in this folder alone, oldest first. A link is not followed, and what is no regular file is left.
+// Recordings, checkpoints and a black box's segments, told by what they begin with and not by their names, and what is
+// left of one that was not finished (.part), in this folder alone, oldest first. A link is not followed, and what is no
+// regular file is left.
 [[nodiscard]] Expected<std::vector<OldFile>> old_files(const std::filesystem::path& folder, std::chrono::seconds age,
                                                        std::filesystem::file_time_type now);
 

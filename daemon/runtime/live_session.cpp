@@ -11,6 +11,7 @@
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
 #include "core/pipeline/sensor_entrance.hpp"
+#include "daemon/black_box/black_box.hpp"
 #include "daemon/checkpoint/checkpoint_keeper.hpp"
 #include "daemon/control/control_server.hpp"
 #include "daemon/process/reload_signal.hpp"
@@ -77,13 +78,21 @@ Expected<void> LiveSession::start_control() {
       [this](std::uint64_t forgotten_before) {
         if (keeper_) keeper_->forget(forgotten_before);
       });
-  auto server =
-      ControlServer::create(control_socket_, [this](ControlCommand command) { return commands_->answer(command); });
+  auto server = ControlServer::create(control_socket_, [this](ControlCommand command) { return answer(command); });
   if (!server) return tl::unexpected(std::move(server.error()));
   control_ = std::make_unique<ControlServer>(std::move(*server));
   control_thread_ =
       runtime_.threads().launch("control", ThreadRole::kHousekeeping, [this] { control_->serve(control_interrupt_); });
   return {};
+}
+
+// The thread that takes commands.
+Expected<std::string> LiveSession::answer(ControlCommand command) {
+  Expected<std::string> answer = commands_->answer(command);
+  if (box_ != nullptr) {
+    box_->command(name_of(command), answer.has_value(), answer ? *answer : answer.error().message);
+  }
+  return answer;
 }
 
 void LiveSession::stop_control() {
@@ -116,6 +125,9 @@ void LiveSession::stop_reloading() {
 Expected<void> LiveSession::run(StopSignal& stop) {
   if (auto started = start_control(); !started) return started;
   start_reloading();
+  if (box_ != nullptr) {
+    box_thread_ = runtime_.threads().launch("black-box", ThreadRole::kHousekeeping, [this] { box_->run(); });
+  }
   runtime_.describe_sources_by([this](StatusFacts& facts) { feeder_->describe(facts); });
   runtime_.start();
   feeder_->start(runtime_.threads());
@@ -152,6 +164,11 @@ Expected<void> LiveSession::run(StopSignal& stop) {
   }
   feeder_->stop();
   runtime_.stop();
+  // After the last that is published.
+  if (box_thread_.joinable()) {
+    box_->stop();
+    box_thread_.join();
+  }
   if (const auto failed = pipeline_.counters().searches_failed.get(); failed > 0) {
     spdlog::warn("{} searches for new features failed", failed);
   }

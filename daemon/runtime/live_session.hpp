@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "core/error/expected.hpp"
+#include "daemon/control/control_request.hpp"
 #include "daemon/publishing/identity.hpp"
 #include "daemon/publishing/wire_status.hpp"
 #include "daemon/runtime/ecg_lead_news.hpp"
@@ -16,6 +17,9 @@
 
 namespace perimap {
 
+namespace black_box {
+class BlackBox;
+}
 class CheckpointKeeper;
 class ControlServer;
 class Pipeline;
@@ -53,12 +57,16 @@ class LiveSession {
   // Before run(): `keeper`, over the same pipeline, keeps checkpoints while it runs.
   void keep_checkpoints(std::unique_ptr<CheckpointKeeper> keeper);
 
+  // Before run(): `box`, which must outlive this, is written while it runs, and told of commands.
+  void keep_black_box(black_box::BlackBox& box) noexcept { box_ = &box; }
+
   // Returns when every surface of the recording is released, or on a stop signal; an error when reading failed.
   [[nodiscard]] Expected<void> run(StopSignal& stop);
 
  private:
   [[nodiscard]] Expected<void> start_control();
   void stop_control();
+  [[nodiscard]] Expected<std::string> answer(ControlCommand command);
   void start_reloading();
   void stop_reloading();
   [[nodiscard]] StatusFacts facts() const;
@@ -88,6 +96,8 @@ class LiveSession {
   std::thread reload_thread_;
   std::unique_ptr<CheckpointKeeper> keeper_;
   std::thread checkpoint_thread_;
+  black_box::BlackBox* box_ = nullptr;
+  std::thread box_thread_;
   bool privileges_told_ = false;
   bool latency_checked_ = false;
   bool shedding_told_ = false;

@@ -147,6 +147,10 @@ ends 2 "A subcommand is required" keys
 ends 1 "nowhere" keys show --directory nowhere
 ends 2 "--older-than" forget --older-than x .
 ends 1 "nowhere" forget --older-than 30d nowhere
+ends 1 "nowhere" verify-log nowhere
+ends 1 "expected segments of a black box, found none" verify-log .
+ends 2 "--digest: expected 64 hexadecimal digits" verify-log --digest abc .
+ends 2 "LOG is required" verify-log
 ends 2 "A subcommand is required" ctl
 ends 1 "nowhere" ctl --socket nowhere status
 

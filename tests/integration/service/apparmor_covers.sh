@@ -33,8 +33,11 @@ needs_of_the_unit() {
   while read -r kind; do node_of "$kind"; done \
     < <(setting DeviceAllow | sed -n 's/^char-\([^ ]*\) rw$/\1/p')
   [ "$(setting Type)" != notify ] || printf 'w\t/run/systemd/notify\n'
-  # As the program makes them there: daemon/process/service_folder.hpp, daemon/checkpoint/checkpoint_file.hpp.
+  # As the program makes them there: daemon/process/service_folder.hpp, daemon/checkpoint/checkpoint_file.hpp,
+  # daemon/black_box, which locks its folder.
   printf 'rw\t%s\n' "$state"/{checkpoint,checkpoint.part,perimap-20261127-100000.mcap}
+  printf 'rw\t%s\n' "$state"/black-box/segment-00000001{,.part}
+  printf 'rwk\t%s/\n' "$state/black-box"
   printf 'rw\t%s\n' "$run/control"
   printf 'r\t%s/\n' "$state"
   # A module that is loaded when it is needed: where it is installed, by drivers/video and deploy/CMakeLists.txt.
@@ -62,7 +65,7 @@ needs_of_the_configurations() {
 # Whole paths in what perimapd is made of; a folder that is only compared with, as "/proc/", ends with a slash.
 needs_of_the_sources() {
   grep -rhoE '"/(dev|etc|proc|run|sys|usr|var)/[^" ]*[^"/ ]"' --include='*.cpp' --include='*.hpp' "$source"/core \
-    "$source"/drivers "$source"/daemon/{checkpoint,config,control,dds,keys,logging,process,publishing,runtime} |
+    "$source"/drivers "$source"/daemon/{black_box,checkpoint,config,control,dds,keys,logging,process,publishing,runtime} |
     tr -d '"' | sort -u | sed 's/^/r\t/'
 }
 # As strace shows of a run with keys, and a kernel with the profile: the C library's look-up of users, groups and hosts;

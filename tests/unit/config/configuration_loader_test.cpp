@@ -307,7 +307,7 @@ INSTANTIATE_TEST_SUITE_P(
             "UnknownSection", "version = 1\n[traker]\n",
             "test.toml:2:2: key 'traker': expected one of version, source, replay, camera, tracker, setup, ecg, phase, "
             "respiration, pipeline, features, estimation, use, realtime, dds, recording, status, log, control, "
-            "checkpoint, got an unknown key"},
+            "checkpoint, blackbox, got an unknown key"},
         Wrong{"UnknownKey", "version = 1\n[phase]\nlow = 1\n",
               "test.toml:3:1: key 'phase.low': expected one of law, lost_after_s, from_image, image_alone_s, "
               "predictor, got an unknown key"},

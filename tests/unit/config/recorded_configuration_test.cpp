@@ -47,7 +47,7 @@ TEST(RecordedConfiguration, OfNoFileNoDeviceAndNothingOfTheRunMayBeSet) {
     if (!describes_session(key)) continue;
     EXPECT_FALSE(key.names_file) << key.section << "." << key.name;
     for (const char* section : {"source", "replay", "pipeline", "features", "realtime", "dds", "recording", "status",
-                                "log", "control", "checkpoint"}) {
+                                "log", "control", "checkpoint", "blackbox"}) {
       EXPECT_NE(key.section, section) << key.name;
     }
     for (const char* name : {"device", "protocol", "port", "device_channel", "r_trigger_port"}) {

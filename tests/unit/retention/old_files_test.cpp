@@ -47,13 +47,15 @@ class OldFiles : public ::testing::Test {
   const std::string recording_ = std::string("\x89MCAP0\r\n", 8) + "rest";
 };
 
-TEST_F(OldFiles, RecordingsAndCheckpointsAreFoundByWhatTheyBeginWithOldestFirst) {
+TEST_F(OldFiles, RecordingsCheckpointsAndBlackBoxesAreFoundByWhatTheyBeginWithOldestFirst) {
   write("a.mcap", recording_, days(31));
   write("renamed.bin", recording_, days(40));
   write("checkpoint", "PERIMAPC and more", days(35));
   write("b.mcap.part", recording_, days(33));
   write("empty.mcap", "", days(50));
-  EXPECT_THAT(older_than(days(30)), ElementsAre("empty.mcap", "renamed.bin", "checkpoint", "b.mcap.part", "a.mcap"));
+  write("segment-00000001", "PERIMAPB and more", days(60));
+  EXPECT_THAT(older_than(days(30)),
+              ElementsAre("segment-00000001", "empty.mcap", "renamed.bin", "checkpoint", "b.mcap.part", "a.mcap"));
 }
 
 TEST_F(OldFiles, WhatIsYoungerOrOfSomethingElseStays) {
