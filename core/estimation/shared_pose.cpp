@@ -83,6 +83,7 @@ CommonTerm linearise(const Model& model, const CommonEstimate& at, const CommonM
       term.information.Lambda(i, j) = term.information.Lambda(j, i) = term.J_s.col(i).dot(WJ.col(j));
   }
   term.information.eta = WJ.transpose() * (r + term.J_s * at.s);
+  term.r = r;
   term.squared_residual = r.dot(residual_inverse * r);
   term.visible = true;
   return term;

@@ -86,6 +86,7 @@ struct CommonEstimate {
 struct CommonTerm {
   CommonInformation information;  // with weight 1
   CommonJacobian J_s;             // dz/ds
+  Vector2d r = Vector2d::Zero();  // the residual at the iterate
   // r^T (C + J_s covariance J_s^T)^-1 r: of the residual at the iterate, given how well s is known there.
   double squared_residual = 0.0;
   bool visible = false;  // false: the feature can't be seen from there, or a number is bad; the information is zero

@@ -123,7 +123,9 @@ bool is_asked(const FeatureSlot& slot, Asked asked) noexcept {
   constexpr double kWellKnown_mm = 2.0;
   constexpr int kFewestUpdates = 30;
   if (slot.state != SlotState::kMapped) return false;
-  if (asked == Asked::kMapped || slot.converged) return true;
+  if (asked == Asked::kMapped) return true;
+  if (slot.pressed) return false;
+  if (slot.converged) return true;
   return asked == Asked::kWellKnown && slot.updates >= kFewestUpdates && slot.largest_deviation_mm <= kWellKnown_mm;
 }
 

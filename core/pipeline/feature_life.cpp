@@ -19,6 +19,8 @@ constexpr Duration kUnobservedVagueBeforeLost = std::chrono::seconds(1);
 // Of one that is followed without being learnt from, and has no estimate that would gain by its next good view.
 constexpr Duration kUntoldBeforeLost = std::chrono::seconds(2);
 constexpr int kFailedStartsBeforeLost = 3;
+// What is pressed or pulled at for longer than an instrument does is otherwise than it was.
+constexpr Duration kPressedBeforeAnew = std::chrono::seconds(15);
 constexpr Duration kConvergenceCheck = std::chrono::milliseconds(500);
 constexpr double kSamePhase_rad = 0.01;         // of a breath
 constexpr std::uint32_t kFewestOnSurface = 20;  // matches, so that they can contradict it
@@ -163,7 +165,7 @@ class Step {
     }
     // Spread over the frames by id, so that no frame pays for all features.
     if ((now() + slot_.id) % rate().frames(kConvergenceCheck) == 0) check_convergence();
-    if (slot_.health.state() == HealthState::kFailed) return start_anew();
+    if (slot_.health.state() == HealthState::kFailed || pressed_long()) return start_anew();
     if (slot_.health.state() == HealthState::kInconsistent) slot_.converged = false;
     return LifeEvent::kNone;
   }
@@ -177,6 +179,10 @@ class Step {
   [[nodiscard]] bool is_told(std::uint32_t held) const noexcept {
     const FrameRecord* frame = job_.history->find(slot_.held[held].frame_index);
     return frame == nullptr || !frame->measurable || frame->phase.exact;
+  }
+
+  [[nodiscard]] bool pressed_long() const noexcept {
+    return slot_.pressed && job_.frame->stamp.capture - slot_.pressed_since > kPressedBeforeAnew;
   }
 
   // Of the first `count` matches that are held, if all their frames are there.

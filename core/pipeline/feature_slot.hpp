@@ -12,6 +12,7 @@
 #include "core/estimation/batch_start.hpp"
 #include "core/estimation/correlated_pose_noise.hpp"
 #include "core/estimation/feature_health.hpp"
+#include "core/estimation/local_displacement.hpp"
 #include "core/estimation/observation.hpp"
 #include "core/phase/cardiac_clock.hpp"
 #include "core/phase/law_trial.hpp"
@@ -126,6 +127,18 @@ struct BatchStartExchange {
   bool due = false;  // the mapper has seen it ready at the frame of its adoption, or later
 };
 
+// What the match that was found in a frame is off by, beside the pose and the phase that the frame's matches agree on,
+// before it is judged by them.
+struct BesideMatch {
+  bool told = false;
+  std::uint64_t frame_index = 0;
+  Vector2d r = Vector2d::Zero();       // px
+  Matrix23d J = Matrix23d::Zero();     // d px / d p_W, px/mm
+  Matrix2d R = Matrix2d::Identity();   // px^2, of the match
+  Vector3d p_W_mm = Vector3d::Zero();  // where the map has it
+  Matrix3d S = Matrix3d::Zero();       // mm^2, of the map there
+};
+
 // A feature as it is followed in the images. Another one is another value.
 struct TrackedFeature {
   std::uint32_t id = 0;
@@ -177,6 +190,16 @@ struct MappedFeature {
   std::uint64_t unseen_frames = 0;      // since its place was told, in which it could have been
   std::uint64_t refused_in_a_row = 0;   // matches, found, but at learning the estimate's gate said no
   bool follows_something_else = false;  // refused so often that the patch must be let go
+
+  BesideMatch beside{};
+  // See PatchWatch: what the last moments tell of its being off the map, up to then; where the map had it; and whether
+  // it lies in a patch that is displaced while the rest of the surface is not, and since when.
+  OffMap off_map{};
+  Instant off_map_at;
+  Vector3d place_W_mm = Vector3d::Zero();
+  bool placed = false;
+  bool pressed = false;
+  Instant pressed_since;
 };
 
 // What a slot knows of its feature is in the three values, and the slot passes from one state to the next by assigning

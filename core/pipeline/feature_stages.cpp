@@ -264,7 +264,7 @@ namespace {
 
 // Of itself, and of the set-up that it was seen by.
 bool is_certain(const FeatureSlot& slot, const FrameDoubts& doubts) noexcept {
-  return slot.converged && slot.largest_deviation_mm <= doubts.converged_within_mm;
+  return slot.converged && !slot.pressed && slot.largest_deviation_mm <= doubts.converged_within_mm;
 }
 
 }  // namespace
@@ -277,8 +277,8 @@ void describe(const FeatureSlot& slot, Instant now, const FrameDoubts& doubts, F
   snapshot.first_observed = slot.first_observed;
   snapshot.first_observed_px = slot.first_observed_px;
   snapshot.largest_deviation_mm = slot.largest_deviation_mm;
-  snapshot.held_back = slot.converged && !is_certain(slot, doubts);
-  if (slot.health.state() == HealthState::kInconsistent) {
+  snapshot.held_back = slot.converged && !slot.pressed && !is_certain(slot, doubts);
+  if (slot.pressed || slot.health.state() == HealthState::kInconsistent) {
     snapshot.state = FeatureState::kInconsistent;
     snapshot.reason = FeatureReason::kInnovationsHigh;
     return;
@@ -316,7 +316,7 @@ bool is_wanted_for_start(const FeatureSlot& slot, const FrameJob& job) noexcept 
 
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept {
   if (slot.state == SlotState::kEmpty || slot.match.state != MatchState::kFound || !job.frame->measurable) return;
-  if (is_vague(slot.match)) return;
+  if (is_vague(slot.match) || slot.pressed) return;
   if (job.frame->held && (slot.state != SlotState::kTracked || is_wanted_for_start(slot, job))) {
     const PixelMap& picture = job.frame->picture;
     slot.held.push(

@@ -144,7 +144,13 @@ void ImagePhase::refuse_what_disagrees(std::span<FeatureGroup> groups, const Fra
             Asked::kMapped);
     for (std::size_t k = 0; k < matches_.size(); ++k) {
       const CommonTerm term = linearise(model, solved, matches_[k]);
-      if (!term.visible || term.squared_residual > settings.update.gate) refuse_match(*owners_[k], frame);
+      FeatureSlot& slot = *owners_[k];
+      // A camera that moves by as much the other way sees the same.
+      slot.beside = {term.visible,  frame.index,      term.r,       -term.J_s.middleCols<3>(3),
+                     matches_[k].R, matches_[k].p_WF, matches_[k].S};
+      // What is known to be displaced is followed where it is.
+      if (slot.pressed && term.visible) continue;
+      if (!term.visible || term.squared_residual > settings.update.gate) refuse_match(slot, frame);
     }
   }
 }

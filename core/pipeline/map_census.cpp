@@ -16,7 +16,7 @@ void count_states(std::span<const FeatureSlot> slots, Instant seen, const FrameD
   for (const FeatureSlot& slot : slots) {
     if (slot.state == SlotState::kStarting) ++starting;
     if (slot.state != SlotState::kMapped) continue;
-    if (slot.health.state() == HealthState::kInconsistent) {
+    if (slot.pressed || slot.health.state() == HealthState::kInconsistent) {
       ++inconsistent;
     } else if (is_called_converged(slot, seen, doubts)) {
       ++converged;

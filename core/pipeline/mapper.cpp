@@ -25,6 +25,7 @@ Mapper::Mapper(const PipelineSettings& settings, std::span<FeatureSlot> slots, W
       trust_(settings.pose, housekeeping.scope, outputs.counters, settings.pictures_may_loop),
       phases_(settings_, outputs.phase_cells, outputs.counters),
       organ_(settings_),
+      patches_(slots),
       history_(std::make_unique<FrameHistory>(settings.estimator.layout)),
       bank_({.layout = settings.estimator.layout, .features = static_cast<int>(slots.size())},
             settings.estimator.precision),
@@ -189,6 +190,7 @@ void Mapper::hand_on(const FrameRecord& frame, const GreyImage& image, const Col
   if (!frame.pose.valid()) counters_.frames_without_pose.add();
   if (frame.pose.valid() && !frame.measurable) counters_.frames_without_phase.add();
   watch_organ(frame);
+  patches_.watch(frame, *history_);
 }
 
 // Nothing is learnt, from the time on at which the organ may have begun to move: what the map has is to be kept.
@@ -278,6 +280,7 @@ void Mapper::forget() noexcept {
   intake_.discard_round();
   watcher_.begin_window_anew();
   organ_.forget();
+  patches_.forget();
   tell_displacement();
   stages_.hand_over_nothing();
   phases_.publish();
@@ -308,6 +311,7 @@ void Mapper::move_map_with(const RestingOrgan& organ) noexcept {
   surface_.begin_again();
   watcher_.begin_window_anew();
   organ_.begin_anew();
+  patches_.forget();
   counters_.moved_um.set(micrometres(organ.size_mm));
   counters_.maps_moved.add();
   tell_displacement();

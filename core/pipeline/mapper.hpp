@@ -18,6 +18,7 @@
 #include "core/pipeline/map_keeping.hpp"
 #include "core/pipeline/map_memory.hpp"
 #include "core/pipeline/organ_watch.hpp"
+#include "core/pipeline/patch_watch.hpp"
 #include "core/pipeline/patient_phases.hpp"
 #include "core/pipeline/phase_cells.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
@@ -124,6 +125,7 @@ class Mapper {
   PoseTrust trust_;
   PatientPhases phases_;
   OrganWatch organ_;
+  PatchWatch patches_;
   std::unique_ptr<FrameHistory> history_;
 
   // The features, and what is done with them.

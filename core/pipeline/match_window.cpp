@@ -28,7 +28,7 @@ void MatchWindow::add(const FrameRecord& frame, std::span<const FeatureSlot> slo
   count = 0;
   for (std::size_t slot = 0; slot < slots.size(); ++slot) {
     const FeatureSlot& of = slots[slot];
-    if (of.state == SlotState::kEmpty || of.match.state != MatchState::kFound) continue;
+    if (of.state == SlotState::kEmpty || of.match.state != MatchState::kFound || of.pressed) continue;
     // As the lens model has it: a scope that is turned or zoomed moves the picture, and is no wrong lens.
     matches_[(end_ % kFrames) * slots_ + count++] = {slot, of.id, frame.picture.to_lens(of.match.px),
                                                      frame.picture.covariance_to_lens(of.match.covariance_px2)};

@@ -96,6 +96,25 @@ TEST_F(Stages, AMappedFeatureThatNoMotionExplainsIsStartedAnewUnderItsId) {
   EXPECT_EQ(slot->held.size(), 0U);
 }
 
+// Tissue that was cut or stitched stays otherwise.
+TEST_F(Stages, AMappedFeatureThatStaysPressedIsStartedAnewAfterAWhile) {
+  map_feature();
+  next_frame();
+  slot->pressed = true;
+  slot->pressed_since = job.frame->stamp.capture;
+  int frames = 0;
+  LifeEvent outcome = LifeEvent::kNone;
+  while (outcome == LifeEvent::kNone && frames < 600) {
+    next_frame();
+    found_at({320, 240});
+    outcome = learn_frame();
+    ++frames;
+  }
+  EXPECT_EQ(outcome, LifeEvent::kStartedAnew);
+  EXPECT_NEAR(frames * frame_ms, 15000, 2 * frame_ms);
+  EXPECT_FALSE(slot->pressed);
+}
+
 TEST_F(Stages, ATrackedFeatureAsksForItsStartOnceItHasEnoughMatches) {
   slot->state = SlotState::kTracked;
   int frames = 0;
