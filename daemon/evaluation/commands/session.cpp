@@ -33,7 +33,7 @@ Outcome session(const SessionOptions& options) {
   const auto record = read_session(options.files);
   if (!record) return refuse(record.error());
   if (auto written = write_text_file(page.file, session_page(*record)); !written) return refuse(written.error());
-  fmt::print("{}\n", session_verdict(*record));
+  fmt::print("{}\n{}\n", session_answer(*record), session_verdict(*record));
   for (const std::string& concern : session_concerns(*record)) fmt::print("- {}\n", concern);
   fmt::print("page        {}\n", page.file);
   return {};

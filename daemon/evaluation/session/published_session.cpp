@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 
 namespace perimap {
@@ -112,7 +113,8 @@ StatusCounters counters_of(const perimap_Status& status) {
                      status.releases_late,
                      status.frames_without_pose,
                      status.frames_without_phase,
-                     status.frames_not_recorded + status.other_not_recorded};
+                     status.frames_not_recorded + status.other_not_recorded,
+                     status.samples};
   for (std::uint32_t i = 0; i < status.sources._length; ++i) {
     const perimap_SourceStatus& source = status.sources._buffer[i];
     counters.sources[source.kind] = {source.received, source.dropped};
@@ -193,6 +195,7 @@ void PublishedSession::count(const perimap_Status& status) {
   counters_.recording_stopped |= status.recording == perimap_RECORDING_STOPPED;
   counters_.priority_refused |= status.realtime_priority == perimap_PRIVILEGE_REFUSED;
   counters_.memory_refused |= status.memory_locked == perimap_PRIVILEGE_REFUSED;
+  if (status.setup.state == perimap_SETUP_DOUBTED) counters_.doubt = setup_words(status.setup);
   if (last_counters_) {
     const bool another_run = now.run_id != last_counters_->run_id;
     const StatusCounters before = another_run ? StatusCounters{} : *last_counters_;

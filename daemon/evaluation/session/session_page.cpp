@@ -6,6 +6,7 @@
 #include <cmath>
 #include <ctime>
 #include <limits>
+#include <perimap_client.hpp>
 #include <utility>
 
 #include "daemon/pages/html_page.hpp"
@@ -83,7 +84,9 @@ std::string utc_text(std::int64_t utc_ns) {
 }
 
 std::string verdict_section(const SessionRecord& record) {
-  std::string out = fmt::format("<p class=\"verdict\">{}</p>\n", escaped(session_verdict(record)));
+  const std::string answer = session_answer(record), verdict = session_verdict(record);
+  std::string out = fmt::format("<p class=\"verdict\">{}</p>\n", escaped(answer));
+  if (verdict != answer) out += fmt::format("<p class=\"whole\">{}</p>\n", escaped("Of the whole session: " + verdict));
   const std::vector<std::string> concerns = session_concerns(record);
   if (concerns.empty()) return out + "<p>Nothing else is amiss in what was recorded.</p>\n";
   out += "<h2>To be looked at</h2>\n<ul>\n";
@@ -91,16 +94,22 @@ std::string verdict_section(const SessionRecord& record) {
   return out + "</ul>\n";
 }
 
+// What a reason means, and what to do.
+std::string why_words(perimap_SurfaceReason reason) {
+  if (reason == perimap_SURFACE_REASON_NONE) return {};
+  return fmt::format("{}: {}", client::describe(reason), remedy_of(reason));
+}
+
 std::string shares_section(const SessionRecord& record) {
   std::string out =
       "<h2>What surfaces were</h2>\n<table><tr><th>state</th><th>s</th><th>%</th><th>times</th><th>longest, s</th>"
-      "<th>from, s</th><th class=\"words\">what helps</th></tr>\n";
+      "<th>from, s</th><th class=\"words\">why, and what helps</th></tr>\n";
   for (const StateShare& share : record.shares) {
     out += fmt::format(
         "<tr><td>{}</td><td>{:.1f}</td><td>{:.1f}</td><td>{}</td><td>{:.2f}</td><td>{:.2f}</td>"
         "<td class=\"words\">{}</td></tr>\n",
         escaped(share.what), share.seconds, record.length_s > 0.0 ? 100.0 * share.seconds / record.length_s : 0.0,
-        share.spans, share.longest_s, share.longest_begin_s, escaped(std::string(remedy_of(share.reason))));
+        share.spans, share.longest_s, share.longest_begin_s, escaped(why_words(share.reason)));
   }
   return out + "</table>\n";
 }
@@ -119,14 +128,14 @@ std::string features_section(const SessionRecord& record) {
       line(each(record.surfaces, [](const auto& m) { return double(m.converged); }), 0.4, "#1b9e77", "converged"));
   counts.lines.push_back(line(each(record.surfaces, [](const auto& m) { return double(m.others); }), 0.4, "#d95f02",
                               "converging, or inconsistent"));
-  Plot deviations{"How uncertain positions are, by themselves", "s", "mm", {}, false, true};
+  Plot deviations{"How uncertain positions are, as perimapd says", "s", "mm", {}, false, true};
   deviations.lines.push_back(line(each(record.surfaces, [](const auto& m) { return m.deviation_mm.value_or(kNone); }),
                                   0.4, "#1f6f8b", "median over the features of the largest standard deviation"));
   std::string out = "<h2>Features</h2>\n" + svg_over(record.length_s, counts) + svg_over(record.length_s, deviations);
   if (record.mesh.empty()) return out;
-  Plot mesh{"Each feature beside what all others make of it", "s", "mm, RMS", {}, false, true};
+  Plot mesh{"How far each feature is from what all others make of it", "s", "mm, RMS", {}, false, true};
   mesh.lines.push_back(line(each(record.mesh, [](const auto& m) { return m.leave_one_out_rms_mm; }), 5.0, "#7570b3",
-                            "leave-one-out error of the mesh: what it is worth, with no truth needed"));
+                            "leave-one-out error of the mesh: the smaller, the more features agree"));
   return out + svg_over(record.length_s, mesh);
 }
 
@@ -235,15 +244,18 @@ std::string file_section(const RecordedFile& file) {
 
 std::string session_page(const SessionRecord& record) {
   std::string body =
-      "<style>.verdict{font-size:1.5em;max-width:60em}td.words,th.words{text-align:left}ul{max-width:75em}</style>\n";
+      "<style>.verdict{font-size:1.5em;max-width:50em}.whole{font-size:1.15em;max-width:65em}"
+      "td:first-child{white-space:nowrap}p{max-width:75em}td.words,th.words{text-align:left}ul{max-width:75em}</"
+      "style>\n";
   body += "<table>\n" + row("source, stream", record.source + ", " + record.stream) +
           row("begin", utc_text(record.begin_utc_ns));
   if (record.counts.status) body += row("perimapd", record.counts.status->status.version);
   body += "</table>\n";
   body += verdict_section(record);
   body +=
-      "<p>No truth is needed for this page: it has what perimapd said of itself, and what a subscriber received. How "
-      "far positions were off in fact it does not tell.</p>\n";
+      "<p>Good: positions may be used. Degraded: to be used with care, for the reason that is told. Invalid: no "
+      "position may be used. This is what perimapd said of itself, and what a subscriber received: how far positions "
+      "were off in fact nobody knows without a truth, and this page does not tell.</p>\n";
   body += time_section(record) + shares_section(record) + features_section(record) + rhythm_section(record) +
           set_up_section(record) + sources_section(record) + latency_section(record);
   body += "<h2>Files</h2>\n";

@@ -12,6 +12,9 @@ namespace perimap {
 // One sentence: for how much of the session surfaces were good.
 [[nodiscard]] std::string session_verdict(const SessionRecord& record);
 
+// What a user asks first: what of the session can be relied on; and, in a second sentence, what stood in the way most.
+[[nodiscard]] std::string session_answer(const SessionRecord& record);
+
 // What somebody should look at, a sentence each; none where nothing is amiss.
 [[nodiscard]] std::vector<std::string> session_concerns(const SessionRecord& record);
 

@@ -69,6 +69,7 @@ struct StatusCounters {
     kWithoutPose,
     kWithoutPhase,
     kNotRecorded,
+    kPublished,
     kCounts
   };
 
@@ -80,6 +81,7 @@ struct StatusCounters {
   bool recording_stopped = false;
   bool priority_refused = false;
   bool memory_refused = false;
+  std::string doubt;  // what the watch over the set-up said when it doubted last; empty: it never did
 };
 
 struct RecordedFile {

@@ -124,7 +124,7 @@ Json SurfaceTeller::tell(const perimap_Surface& surface, Instant receipt) {
                {"permission", permission_of(surface.state)},
                {"why", surface.reason == perimap_SURFACE_REASON_NONE ? "" : client::describe(surface.reason)},
                {"remedy", remedy_of(surface.reason)},
-               {"uses", uses ? uses_words(*uses) : ""},
+               {"uses", uses ? uses_json(*uses) : Json(nullptr)},
                {"converged", told.converged},
                {"known", surface.features._length},
                {"valid_ms", page_ms(surface.valid_time_ns)},

@@ -15,4 +15,10 @@ export function clear(canvas) {
   return {context, width, height};
 }
 
-export const kFont = '15px system-ui, "DejaVu Sans", sans-serif';
+// The page's own measure, which grows with the window (view.css), so that canvases grow with it.
+const kSmallestPx = 17;
+let rootPx = kSmallestPx;
+export function measure() { rootPx = parseFloat(getComputedStyle(document.documentElement).fontSize) || kSmallestPx; }
+// Of so many pixels in the smallest window.
+export const scaled = (px) => px * rootPx / kSmallestPx;
+export const font = (px = 15) => `${scaled(px)}px system-ui, "DejaVu Sans", sans-serif`;

@@ -1,5 +1,5 @@
 // How long after its deadline each surface was received, over the last minute.
-import {clear, kFont} from "./canvas.mjs";
+import {clear, font, scaled} from "./canvas.mjs";
 
 const kKeptMs = 60000;
 const kBinMs = 0.5, kBins = 40;  // the last bin has all that are later
@@ -46,13 +46,13 @@ export class Delays {
     const {context, width, height} = cleared;
     const counts = new Array(kBins).fill(0);
     for (const {late} of this.kept) ++counts[Math.min(Math.max(Math.floor(late / kBinMs), 0), kBins - 1)];
-    const most = Math.max(...counts), bottom = height - 20, step = width / kBins;
+    const most = Math.max(...counts), bottom = height - scaled(20), step = width / kBins;
     // Logarithmic, since one late surface in a thousand is what is looked for.
     const tall = (count) => count ? (bottom - 4) * Math.log(1 + count) / Math.log(1 + most) : 0;
     context.fillStyle = "#7cc4ff";
     counts.forEach((count, i) => context.fillRect(i * step + 1, bottom - tall(count), step - 2, tall(count)));
     context.fillStyle = "#a9b8c2";
-    context.font = kFont;
+    context.font = font();
     context.fillRect(0, bottom, width, 1);
     for (let ms = 0; ms < kBins * kBinMs; ms += 5) {
       context.textAlign = ms ? "center" : "left";

@@ -1,6 +1,6 @@
 // What is told while a calibration is recorded: what is missing, for how long it goes on, and in which parts of the picture
 // the board was.
-import {clear, kFont} from "./canvas.mjs";
+import {clear, font, scaled} from "./canvas.mjs";
 
 // It is told five times a second; what is older is over.
 export const kOverMs = 2000;
@@ -82,11 +82,11 @@ export class Guidance {
     context.strokeRect(x + 3, y + 3, width - 6, height - 6);
     context.setLineDash([]);
     const words = enough ? "\u2713" : `show it here: ${seen} %`;
-    context.font = kFont;
+    context.font = font();
     const room = context.measureText(words).width + 12;
     context.fillStyle = "rgba(0, 0, 0, 0.75)";
-    context.fillRect(x + 8, y + 8, room, 24);
+    context.fillRect(x + 8, y + 8, room, scaled(24));
     context.fillStyle = enough ? "#3fd0a4" : "#ffd97a";
-    context.fillText(words, x + 14, y + 25);
+    context.fillText(words, x + 14, y + 8 + scaled(17));
   }
 }

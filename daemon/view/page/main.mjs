@@ -1,4 +1,5 @@
 // The page: takes what perimap view sends, judges what may be trusted, draws.
+import {measure} from "./canvas.mjs";
 import {Connection} from "./connection.mjs";
 import {Delays} from "./delays.mjs";
 import {Guidance} from "./guidance.mjs";
@@ -14,6 +15,8 @@ const kJudgeMs = 50;
 // A status comes each second.
 const kStatusMs = 2500;
 
+measure();
+addEventListener("resize", measure);
 // The token is in a cookie now; the address without it can be shown to others.
 if (location.search) history.replaceState(null, "", "/");
 
@@ -37,7 +40,7 @@ function forget() {
 let lag, held, failed = null;
 let judged = {state: "invalid"};
 forget();
-Object.assign(seen, {recorded: false, domain: 0, publishers: null});
+Object.assign(seen, {recorded: false, domain: 0, publishers: null, contest: "", warnings: []});
 
 const timeline = new Timeline(
   {footer: $("timeline"), button: $("play"), slider: $("time"), clock: $("clock"), states: $("states")},
@@ -53,20 +56,21 @@ const take = {
     forget();
     seen.recorded = message.mode === "recording";
     seen.domain = message.domain;
+    seen.contest = "";
     document.title = seen.recorded ? `perimap: ${message.name}` : "perimap";
     document.querySelector("section.delays").hidden = seen.recorded;
-    document.querySelector("section.sources").hidden = seen.recorded && !message.statuses;
+    document.querySelector(".side").hidden = seen.recorded && !message.statuses;
     document.querySelector("section.picture").hidden = !message.pictures;
     document.body.classList.toggle("bare", seen.recorded && !message.statuses);
     document.body.classList.toggle("pictures", Boolean(message.pictures));
     document.body.classList.toggle("recording", seen.recorded);
-    warn(message.warnings ?? []);
+    seen.warnings = message.warnings ?? [];
     if (seen.recorded) timeline.begin(message);
   },
   publishers(message) {
     seen.publishers = message.count;
     seen.sameSource = message.same_source;
-    warn(message.count > 1 ? [`${message.count} perimapds publish in DDS domain ${message.domain}: one of them is shown. End the others.`] : []);
+    seen.contest = message.count > 1 ? `${message.count} perimapds publish in DDS domain ${message.domain}: one of them is shown. End the others.` : "";
   },
   following({source, stream}) {
     forget();
@@ -110,7 +114,7 @@ const take = {
     picture.overlay(message);
   },
   damage({words}) {
-    warn([words]);
+    seen.warnings = [...seen.warnings, words];
   },
   ecg(message) {
     strip.ecg(message);
@@ -125,11 +129,6 @@ const take = {
 
 const connection = new Connection((message) => take[message.kind]?.(message));
 
-function warn(texts) {
-  $("warning").textContent = texts.join(" ");
-  $("warning").hidden = texts.length === 0;
-}
-
 // Written only when it changes, so that a screen reader does not read it ten times a second.
 function set(id, text) {
   if ($(id).textContent !== text) $(id).textContent = text;
@@ -141,13 +140,31 @@ function tell() {
   judged = seen.recorded ? latest : held.take(latest, now);
   if ($("trust").dataset.state !== judged.state) $("trust").dataset.state = judged.state;
   for (const part of ["state", "permission", "why", "remedy"]) set(part, judged[part]);
+  tellUses(judged.uses ?? []);
+  // Once is enough, so that there is room for the rest.
+  const warnings = [judged.contested ? "" : seen.contest, ...seen.warnings].filter(Boolean).join(" ");
+  set("warning", warnings);
+  $("warning").hidden = !warnings;
   const {surface} = judged;
   set("converged", `${surface?.converged ?? 0} converged`);
   set("known", surface ? `of ${surface.known}` : "");
   const mesh = surface?.mesh?.triangles ? `mesh of ${surface.mesh.triangles.length / 3} triangles` : "";
-  set("surface-words", [surface ? seen.source : "", surface?.uses, mesh, surface?.mesh?.words].filter(Boolean).join(" \u00b7 "));
+  set("surface-words", [surface ? seen.source : "", mesh, surface?.mesh?.words].filter(Boolean).join(" \u00b7 "));
   // Drawn by this very program, so that a page that stands still is seen to.
-  set("life", connection.link.open ? "|/\u2013\\"[Math.floor(now / 250) % 4] : "\u00d7");
+  set("life", connection.link.open ? "\u25d0\u25d3\u25d1\u25d2"[Math.floor(now / 250) % 4] : "\u25cb");
+}
+
+let shownUses = "";
+function tellUses(uses) {
+  const now = JSON.stringify(uses);
+  if (now === shownUses) return;
+  shownUses = now;
+  $("uses").replaceChildren(...uses.map(({state, words}) => {
+    const use = document.createElement("span");
+    use.textContent = words;
+    use.className = state;
+    return use;
+  }));
 }
 
 // How the sources are now, or that it is not known.
@@ -198,7 +215,6 @@ setInterval(() => {
   tellStatus();
   delays.draw(performance.now());
   set("delay-words", delays.words());
-  set("heart-words", strip.samples.length || !strip.phases.length ? "" :
-    seen.recorded ? "" : "beats and phase; the ECG itself is not published");
+  set("heart-words", seen.recorded || strip.samples.length || !strip.phases.length ? "" : "the ECG itself is not published");
 }, 500);
 requestAnimationFrame(draw);

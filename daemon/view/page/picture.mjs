@@ -1,8 +1,7 @@
 // The camera's picture with the predicted surface over it, both of one frame.
-import {clear} from "./canvas.mjs";
+import {clear, scaled} from "./canvas.mjs";
+import {drawFeature} from "./marks.mjs";
 import {kMeshColours, opacityOf} from "./scene.mjs";
-
-const kConverged = 2;  // FeatureState of perimap.idl
 
 export class Picture {
   constructor(canvas) {
@@ -28,10 +27,16 @@ export class Picture {
     context.translate((width - scale * bitmap.width) / 2, (height - scale * bitmap.height) / 2);
     context.drawImage(bitmap, 0, 0, scale * bitmap.width, scale * bitmap.height);
     if (!drawn || state === "invalid") return;
+    // What lies outside the picture nobody can compare with it.
+    context.save();
+    context.beginPath();
+    context.rect(0, 0, scale * bitmap.width, scale * bitmap.height);
+    context.clip();
     // Pixel centres have whole numbers.
     const at = (flat, i) => [scale * (flat[2 * i] + 0.5), scale * (flat[2 * i + 1] + 0.5)];
     this.drawMesh(context, drawn, at, kMeshColours[state]);
     this.drawFeatures(context, drawn, at);
+    context.restore();
   }
 
   drawMesh(context, {vertices_px, triangles, deviations_mm}, at, [r, g, b]) {
@@ -55,11 +60,7 @@ export class Picture {
   drawFeatures(context, {features_px, feature_states}, at) {
     feature_states.forEach((state, i) => {
       const [x, y] = at(features_px, i);
-      context.beginPath();
-      context.arc(x, y, 3, 0, 2 * Math.PI);
-      context.strokeStyle = state === kConverged ? "#fff" : "#ff9d6c";
-      context.lineWidth = 1.6;
-      context.stroke();
+      drawFeature(context, x, y, state, scaled(2.6));
     });
   }
 }

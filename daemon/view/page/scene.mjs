@@ -1,10 +1,10 @@
 // The surface in three dimensions, to turn: features, mesh and scope. Canvas 2D: a few hundred triangles, from the back to
 // the front (docs/decisions/0089).
-import {clear, kFont} from "./canvas.mjs";
+import {clear, font, scaled} from "./canvas.mjs";
+import {drawFeature} from "./marks.mjs";
 import {worse} from "./trust.mjs";
 
 export const kMeshColours = {good: [63, 208, 164], degraded: [242, 182, 50]};
-const kConverged = 2, kInconsistent = 3;  // FeatureState of perimap.idl
 const kFaintMm = 2;  // a mesh of such a deviation is drawn faintest
 const kFocal = 3.5;  // of the viewer, in halves of the smaller side
 const kKeyTurn = 0.12, kKeyZoom = 1.15;
@@ -122,12 +122,12 @@ export class Scene {
     const look = this.projection(width, height);
     this.drawMesh(context, surface.mesh, vertices.map(look), worse(state, surface.mesh?.state ?? "invalid"));
     this.drawFeatures(context, surface.features, features.map(look));
-    if (surface.camera) this.drawScope(context, surface.camera, look);
+    if (surface.camera) this.drawScope(context, width, height, surface.camera, look);
     this.drawScaleBar(context, height, look);
   }
 
   say(context, width, height, words) {
-    context.font = '22px system-ui, "DejaVu Sans", sans-serif';
+    context.font = font(22);
     context.fillStyle = "#a9b8c2";
     context.textAlign = "center";
     context.fillText(words, width / 2, height / 2);
@@ -180,30 +180,12 @@ export class Scene {
 
   drawFeatures(context, {states}, at) {
     at.forEach(([x, y], i) => {
-      context.beginPath();
-      if (states[i] === kInconsistent) {
-        context.strokeStyle = "#ff9d6c";
-        context.lineWidth = 2;
-        context.moveTo(x - 4, y - 4); context.lineTo(x + 4, y + 4);
-        context.moveTo(x + 4, y - 4); context.lineTo(x - 4, y + 4);
-        context.stroke();
-        return;
-      }
-      context.arc(x, y, 2.2, 0, 2 * Math.PI);
-      context.lineWidth = 1.3;
-      if (states[i] === kConverged) {
-        context.fillStyle = "#fff";
-        context.fill();
-        context.strokeStyle = "#10161b";
-      } else {
-        context.strokeStyle = "#fff";
-      }
-      context.stroke();
+      drawFeature(context, x, y, states[i], scaled(2.2));
     });
   }
 
   // Its tip, and how it looks at the surface.
-  drawScope(context, camera, look) {
+  drawScope(context, width, height, camera, look) {
     const rows = worldToCamera(camera.rotation_wxyz), length = 0.12 * this.frame.size;
     const world = (p) => p && camera.translation_mm.map((t, i) => t + rows[0][i] * p[0] + rows[1][i] * p[1] + rows[2][i] * p[2]);
     const slopes = camera.focal_px?.map((focal, i) => camera.principal_point_px[i] / focal) ?? [0.6, 0.45];
@@ -218,18 +200,20 @@ export class Scene {
       context.lineTo(base[(i + 1) % 4][0], base[(i + 1) % 4][1]);
     });
     context.stroke();
-    context.font = kFont;
+    context.font = font();
     context.textAlign = "left";
     context.fillStyle = "#7cc4ff";
-    context.fillText("scope", tip[0] + 8, tip[1] - 4);
+    const label = context.measureText("scope").width, near = scaled(40);
+    if (tip[0] < -near || tip[0] > width + near || tip[1] < -near || tip[1] > height + near) return;
+    context.fillText("scope", clamp(tip[0] + 8, 4, width - label - 4), clamp(tip[1] - 4, scaled(16), height - 6));
   }
 
   drawScaleBar(context, height, look) {
     const scale = look(this.frame.centre)[3];
-    const length = [1, 2, 5, 10, 20, 50, 100].find((mm) => mm * scale > 60) ?? 200;
+    const length = [1, 2, 5, 10, 20, 50, 100].find((mm) => mm * scale > scaled(60)) ?? 200;
     context.fillStyle = "#e8eef2";
     context.fillRect(10, height - 12, length * scale, 3);
-    context.font = kFont;
+    context.font = font();
     context.textAlign = "left";
     context.fillText(`${length} mm`, 10, height - 18);
   }

@@ -32,7 +32,9 @@ export function factsOf(status) {
   const facts = [
     {text: `rhythm ${status.rhythm.replaceAll("_", " ")}, phase ${status.phase.replaceAll("_", " ")}, breathing ${status.respiration}`},
     {text: `set-up ${status.setup.words}`, bad: status.setup.doubted},
-    {text: `${status.features_tracked} features followed, ${status.features_starting} starting, ${status.features_converging} converging`},
+    {text: `recording ${status.recording}`, bad: status.recording === "stopped"},
+    {text: `features: ${status.features_converged} converged, ${status.features_converging} converging, ` +
+           `${status.features_tracked + status.features_starting} new`},
   ];
   if (status.latency_short) facts.push({text: "pipeline.latency_ms is too short for these sources", bad: true});
   if (status.releases_missed > 0) facts.push({text: `${status.releases_missed} releases missed`, bad: true});
@@ -43,7 +45,6 @@ export function factsOf(status) {
     }
   });
   if (status.scope_turn === "changed") facts.push({text: "the scope has been turned or zoomed", bad: true});
-  facts.push({text: `recording ${status.recording}`, bad: status.recording === "stopped"});
   return facts;
 }
 

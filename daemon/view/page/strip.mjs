@@ -1,5 +1,5 @@
 // The last seconds of the heart: the ECG where it is there, beats as they were found and as they are expected, the phase.
-import {clear, kFont} from "./canvas.mjs";
+import {clear, font, scaled} from "./canvas.mjs";
 
 const kPastMs = 8000, kComingMs = 1600;
 const kSameBeatMs = 120;  // a beat's instant is moved a little by what comes after it
@@ -82,12 +82,12 @@ export class Strip {
       context.lineTo(x(at), height);
     }
     context.stroke();
-    context.font = kFont;
+    context.font = font();
     context.fillStyle = "#a9b8c2";
     context.textAlign = "right";
-    context.fillText("now", x(nowMs) - 5, 14);
+    context.fillText("now", x(nowMs) - 5, scaled(14));
     context.textAlign = "left";
-    context.fillText("expected", x(nowMs) + 5, 14);
+    context.fillText("to come", x(nowMs) + 5, scaled(14));
   }
 
   drawSamples(context, x, bottom) {

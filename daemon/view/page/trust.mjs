@@ -32,25 +32,42 @@ export function judge({link, domain, publishers, sameSource, surface, ageMs, lag
   }
   const {state, permission, why, remedy} = surface;
   if (state !== "good" && state !== "degraded") return {...invalid(why || "perimapd says so", remedy), surface};
-  if (sameSource) return invalid(`two perimapds publish as '${surface.source}'`, "end one of them, or give each a source.name of its own");
+  if (sameSource) {
+    return {...invalid(`two perimapds publish as '${surface.source}'`, "end one of them, or give each a source.name of its own"),
+            contested: true};
+  }
   if (publishers > 1) {
     return {state: "degraded", permission: "use with care", why: `${publishers} perimapds publish here: '${surface.source}' is shown`,
-            remedy: "end the others", surface};
+            remedy: "end the others", surface, uses: usesOf(surface, "degraded"), contested: true};
   }
-  return {state, permission, why, remedy, surface};
+  return {state, permission, why, remedy, surface, uses: usesOf(surface, "good")};
 }
 
 export const kOrder = {invalid: 0, degraded: 1, good: 2};
 export const worse = (a, b) => ((kOrder[a] ?? 0) <= (kOrder[b] ?? 0) ? a : b);
+
+const kUses = {display: "show it", measure: "measure in it", contact: "touch it"};
+const kUseMarks = {good: "\u2713", degraded: "!", invalid: "\u2715"};
+
+// What a surface may be used for, as [{state, words}], none better than `atBest`. Older perimapds tell of none.
+export function usesOf({uses}, atBest) {
+  return Object.entries(uses ?? {}).filter(([use]) => use in kUses).map(([use, told]) => {
+    const state = worse(told.state in kOrder ? told.state : "invalid", atBest);
+    return {state, words: `${kUseMarks[state]} ${kUses[use]}: ${told.features} within ${told.within_mm} mm`};
+  });
+}
 // So long what is worse stays on the page, for what lasts one frame is not read else.
 export const kHeldMs = 800;
+
+// The higher, the more is allowed: of equal states the one that allows more uses.
+const rank = ({state, uses}) => 10 * kOrder[state] + (uses ?? []).reduce((sum, use) => sum + kOrder[use.state], 0);
 
 // Keeps the worst of what was judged lately.
 export class Held {
   constructor() { this.shown = null; }
 
   take(judged, nowMs) {
-    if (!this.shown || kOrder[judged.state] <= kOrder[this.shown.state] || !(nowMs - this.at <= kHeldMs)) {
+    if (!this.shown || rank(judged) <= rank(this.shown) || !(nowMs - this.at <= kHeldMs)) {
       this.shown = judged;
       this.at = nowMs;
     }

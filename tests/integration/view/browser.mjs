@@ -5,6 +5,25 @@ import {mkdtempSync, rmSync, writeFileSync} from "node:fs";
 import {tmpdir} from "node:os";
 import {join} from "node:path";
 
+// Notes in the page, by its own clock, when a message of each kind came last, and for how long its program could not run
+// at most: what a test may ask of a page holds on a machine that is as slow as it likes.
+export const watchClock = `(() => {
+  const parse = JSON.parse;
+  window.came = {};
+  JSON.parse = (text, reviver) => {
+    const message = parse(text, reviver);
+    if (message?.kind) window.came[message.kind] = performance.now();
+    return message;
+  };
+  let last = performance.now();
+  window.stoodMs = 0;
+  setInterval(() => {
+    const now = performance.now();
+    window.stoodMs = Math.max(window.stoodMs, now - last);
+    last = now;
+  }, 10);
+})()`;
+
 export const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export class Browser {

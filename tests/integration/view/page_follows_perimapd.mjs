@@ -1,12 +1,14 @@
 // node page_follows_perimapd.mjs PERIMAP PERIMAPD CONFIGURATION DOMAIN WORK_FOLDER: the page of a running `perimap view`,
-// opened in headless Chromium while perimapd starts, publishes and is killed.
+// opened in headless Chromium while perimapd starts, publishes and is killed. perimapd plays its recording again when that
+// ends: beside other work it may take more than one round until enough is mapped.
 import assert from "node:assert/strict";
 import {spawn} from "node:child_process";
 import {once} from "node:events";
 import {join} from "node:path";
 
 import {kMeshColours} from "../../../daemon/view/page/scene.mjs";
-import {Browser, pause} from "./browser.mjs";
+import {kSilenceMs} from "../../../daemon/view/page/trust.mjs";
+import {Browser, watchClock} from "./browser.mjs";
 
 const [perimap, perimapd, configuration, domain, work] = process.argv.slice(2);
 const view = spawn(perimap, ["view", "--port", "0", "--domain", domain], {stdio: ["ignore", "pipe", "pipe"]});
@@ -21,7 +23,13 @@ let daemon = null;
 process.on("exit", () => {
   for (const child of [daemon, view, browser.process]) child?.kill("SIGKILL");
 });
-const start = () => spawn(perimapd, ["-c", configuration], {stdio: ["ignore", "ignore", "ignore"]});
+const kLongMs = 150000;  // for what takes a machine's time: no promise, the end of the test's patience
+let playing = false;
+function play() {
+  playing = true;
+  const started = daemon = spawn(perimapd, ["-c", configuration], {stdio: ["ignore", "ignore", "ignore"]});
+  started.on("exit", () => { if (playing && daemon === started) play(); });
+}
 // So often as a page shows one state for another, and when, on its own clock.
 const watchStates = `(() => {
   const trust = document.getElementById("trust");
@@ -52,46 +60,59 @@ const [page] = pages;
 assert.ok(await page.until(`${text}.includes("nobody publishes in DDS domain ${domain}")`, 20000), await page.evaluate(text));
 assert.equal(await page.evaluate(state), "invalid");
 
-daemon = start();
+play();
 for (let i = 0; i < 3; ++i) pages.push(await browser.page(address));
 const converged = `Number(/(\\d+) converged/.exec(${text})?.[1] ?? 0)`;
-assert.ok(await page.until(`${converged} >= 10 && /^(good|degraded)$/.test(${state})`, 90000), await page.evaluate(text));
-for (const other of pages) {
-  assert.ok(await other.until(`/^(good|degraded)$/.test(${state}) && ${converged} >= 10`, 20000), "not all pages show it");
-}
-assert.ok(await page.until(`${meshPixels} > 2000`, 30000), `${await page.evaluate(meshPixels)} pixels of the mesh`);
-assert.ok(await page.until(`document.querySelector('[data-source="camera"]')?.dataset.state === "ok"`, 5000), "no camera");
+const usable = `/^(good|degraded)$/.test(${state})`, mapped = `${converged} >= 10 && ${usable}`;
+assert.ok(await page.until(mapped, kLongMs), await page.evaluate(text));
+for (const other of pages) assert.ok(await other.until(mapped, kLongMs), "not all pages show it");
+assert.ok(await page.until(`${meshPixels} > 2000`, kLongMs), `${await page.evaluate(meshPixels)} pixels of the mesh`);
+assert.ok(await page.until(`document.querySelector('[data-source="camera"]')?.dataset.state === "ok"`, kLongMs), "no camera");
 // The surface is drawn anew as it moves.
 const drawn = `document.getElementById("scene").toDataURL()`;
 await page.evaluate(`window.first = ${drawn}`);
-assert.ok(await page.until(`${meshPixels} > 2000 && ${drawn} !== window.first`, 20000), "the mesh stands still");
+assert.ok(await page.until(`${meshPixels} > 2000 && ${drawn} !== window.first`, kLongMs), "the mesh stands still");
 await page.screenshot(join(work, "live.png"));
 
+// Killed while a surface is shown: one that has just ended, or is not shown since the machine is busy, says nothing.
+await page.evaluate(watchClock);
 await page.evaluate(watchStates);
-const killed = Date.now();
-daemon.kill("SIGKILL");
-assert.ok(await page.until(`${state} === "invalid" && ${meshPixels} === 0`, 5000), await page.evaluate(text));
-const {changes, origin} = await page.evaluate("({changes: window.changes, origin: performance.timeOrigin})");
+let killed = 0;
+for (let shown = false; !shown;) {
+  assert.ok(await page.until(`${mapped} && ${meshPixels} > 2000`, kLongMs), await page.evaluate(text));
+  await page.evaluate("window.stoodMs = 0");
+  playing = false;
+  killed = Date.now();
+  daemon.kill("SIGKILL");
+  shown = await page.evaluate(usable);
+  if (!shown) play();
+}
+assert.ok(await page.until(`${state} === "invalid" && ${meshPixels} === 0`, kLongMs), await page.evaluate(text));
+const {changes, origin, came, stoodMs} =
+  await page.evaluate("({changes: window.changes, origin: performance.timeOrigin, came: window.came, stoodMs: window.stoodMs})");
 const change = changes.find(({at, state: shown}) => shown === "invalid" && origin + at >= killed);
 assert.ok(change, `not said: ${JSON.stringify(changes)}`);
-assert.ok(await page.until(`${text}.includes("nothing has come from perimapd for")`, 5000), await page.evaluate(text));
-const afterMs = origin + change.at - killed;
-console.log(`nothing was to be trusted any more ${afterMs.toFixed(0)} ms after perimapd was killed`);
-assert.ok(afterMs < 2000, "said late, on whatever machine");
+assert.ok(await page.until(`${text}.includes("nothing has come from perimapd for")`, kLongMs), await page.evaluate(text));
+const afterMs = change.at - came.surface;
+console.log(`nothing was to be trusted any more ${(origin + change.at - killed).toFixed(0)} ms after perimapd was killed, ` +
+            `${afterMs.toFixed(0)} ms after the last surface; the page could not run for ${stoodMs.toFixed(0)} ms at most`);
+// Half a second is promised where the page can run.
+const kAfterMs = 500;
+assert.ok(kSilenceMs < kAfterMs && afterMs <= kAfterMs + 2 * stoodMs, "said late");
 assert.equal(await page.evaluate(converged), 0, "a count that nobody tells any more");
-assert.ok(await page.until(`document.querySelector('[data-source="camera"]').dataset.state === "unknown"`, 10000));
+assert.ok(await page.until(`document.querySelector('[data-source="camera"]').dataset.state === "unknown"`, kLongMs));
 await page.screenshot(join(work, "killed.png"));
 
 // Another run of it is followed anew.
-daemon = start();
-assert.ok(await page.until(`${converged} >= 10 && /^(good|degraded)$/.test(${state})`, 90000), await page.evaluate(text));
+play();
+assert.ok(await page.until(mapped, kLongMs), await page.evaluate(text));
 assert.ok(!(await page.evaluate(text)).includes("perimapds publish"), "one that was killed counts on");
-assert.ok(await page.until(`/ms; \\d{1,3} lost/.test(${text})`, 5000), "the counts of two runs are one");
+assert.ok(await page.until(`/ms; \\d{1,3} lost/.test(${text})`, kLongMs), "the counts of two runs are one");
 // While view itself stands still the page knows.
 view.kill("SIGSTOP");
-assert.ok(await page.until(`${state} === "invalid" && ${text}.includes("perimap view does not answer")`, 5000), await page.evaluate(text));
+assert.ok(await page.until(`${state} === "invalid" && ${text}.includes("perimap view does not answer")`, kLongMs), await page.evaluate(text));
 view.kill("SIGCONT");
-assert.ok(await page.until(`/^(good|degraded)$/.test(${state})`, 20000), await page.evaluate(text));
+assert.ok(await page.until(usable, kLongMs), await page.evaluate(text));
 
 for (const {complaints, requests} of pages) {
   assert.deepEqual(complaints, [], "the console complains");
@@ -103,13 +124,15 @@ for (const {complaints, requests} of pages) {
 
 // A page whose program fails says so, and shows nothing.
 await pages[1].evaluate(`setTimeout(() => { throw new Error("planted"); }, 0)`);
-assert.ok(await pages[1].until(`${state} === "invalid" && ${text}.includes("this page has failed")`, 5000));
+assert.ok(await pages[1].until(`${state} === "invalid" && ${text}.includes("this page has failed")`, kLongMs));
 assert.equal(await pages[1].evaluate(meshPixels), 0);
 
+playing = false;
+daemon.kill("SIGKILL");
 view.kill("SIGINT");
 const [code] = await once(view, "exit");
 assert.equal(code, 0, told);
-assert.ok(await page.until(`${text}.includes("perimap view")`, 5000), await page.evaluate(text));
+assert.ok(await page.until(`${text}.includes("perimap view")`, kLongMs), await page.evaluate(text));
 assert.match(told, /nobody publishes in DDS domain/);
 assert.match(told, /a perimapd publishes in DDS domain/);
 assert.match(told, /nothing has come from perimapd for half a second/);

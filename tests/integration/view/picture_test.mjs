@@ -12,6 +12,8 @@ function canvas(width, height) {
     setTransform() { offset = [0, 0]; },
     translate(x, y) { offset = [offset[0] + x, offset[1] + y]; },
     clearRect() {}, beginPath() {}, closePath() {}, fill() {}, stroke() {},
+    save() { drawn.saved = (drawn.saved ?? 0) + 1; }, restore() { --drawn.saved; },
+    rect(x, y, w, h) { this.bounds = [x + offset[0], y + offset[1], w, h]; }, clip() { drawn.clipped = this.bounds; },
     drawImage(bitmap, x, y, w, h) { drawn.picture = [x + offset[0], y + offset[1], w, h]; },
     arc(x, y) { drawn.circles.push([x + offset[0], y + offset[1]]); },
     moveTo(x, y) { drawn.corners.push([x + offset[0], y + offset[1]]); },
@@ -40,7 +42,7 @@ const centre = ([x, y, w, h], u, v) => [x + (u + 0.5) * w / 320, y + (v + 0.5) *
 
 for (const [width, height] of [[640, 480], [800, 480], [500, 700], [321, 200]]) {
   test(`on ${width}x${height} what is drawn lies on its pixel, to a hundredth of one`, async () => {
-    const {picture, circles, corners} = await shown(width, height);
+    const {picture, circles, corners, clipped, saved} = await shown(width, height);
     assert.ok(picture[0] >= 0 && picture[1] >= 0 && picture[0] + picture[2] <= width + 1e-9);
     assert.ok(Math.abs(picture[2] / picture[3] - 320 / 240) < 1e-9, "the picture is stretched");
     const pixel = picture[2] / 320;
@@ -48,6 +50,8 @@ for (const [width, height] of [[640, 480], [800, 480], [500, 700], [321, 200]]) 
       const [cx, cy] = centre(picture, u, v);
       assert.ok(Math.hypot(x - cx, y - cy) < 0.01 * pixel, `(${u}, ${v}) is drawn at (${x}, ${y})`);
     };
+    assert.deepEqual(clipped, picture, "what lies outside the picture is drawn");
+    assert.equal(saved, 0, "what comes after it is cut off, too");
     assert.equal(circles.length, 3);
     circles.forEach((at, i) => expect(at, overlay.features_px[2 * i], overlay.features_px[2 * i + 1]));
     assert.equal(corners.length, 3);

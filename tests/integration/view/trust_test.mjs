@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import {test} from "node:test";
 
-import {Held, judge, kHeldMs, kSilenceMs, Lag, worse} from "../../../daemon/view/page/trust.mjs";
+import {Held, judge, kHeldMs, kSilenceMs, Lag, usesOf, worse} from "../../../daemon/view/page/trust.mjs";
 
 const good = {state: "good", permission: "may be used", why: "", remedy: "", source: "perimapd", valid_for_ms: 1000};
 const sentence = ({permission, why, remedy}) => `${permission}: ${why}; ${remedy}`;
@@ -68,6 +68,34 @@ test("what is worse stays on the page until it can be read", () => {
   assert.equal(held.take(well, 21 + kHeldMs), well);
 });
 
+const uses = {display: {state: "good", within_mm: 5, features: 31}, measure: {state: "good", within_mm: 3, features: 30},
+              contact: {state: "degraded", within_mm: 2, features: 4}};
+
+test("what a surface may be used for is told of each use, and a degraded surface may be good to show", () => {
+  const judged = judge({...live, surface: {...good, state: "degraded", uses}});
+  assert.deepEqual(judged.uses, [{state: "good", words: "\u2713 show it: 31 within 5 mm"},
+                                 {state: "good", words: "\u2713 measure in it: 30 within 3 mm"},
+                                 {state: "degraded", words: "! touch it: 4 within 2 mm"}]);
+  assert.deepEqual(judge({...live, publishers: 2, surface: {...good, uses}}).uses.map(({state}) => state),
+                   ["degraded", "degraded", "degraded"]);
+  assert.equal(usesOf({uses: {contact: {state: "new"}}}, "good")[0].state, "invalid");
+});
+
+test("of what is not to be trusted no use is told, and an older perimapd tells of none", () => {
+  for (const untrusted of [{ageMs: 450}, {sameSource: true}, {link: {open: false, words: ""}}, {surface: {...good, state: "invalid", uses}}]) {
+    assert.equal(judge({...live, surface: {...good, uses}, ...untrusted}).uses, undefined);
+  }
+  for (const older of [null, undefined]) assert.deepEqual(judge({...live, surface: {...good, uses: older}}).uses, []);
+});
+
+test("a use that is worse for one frame stays on the page until it can be read", () => {
+  const held = new Held(), all = {state: "good", uses: [{state: "good"}]}, less = {state: "good", uses: [{state: "degraded"}]};
+  held.take(all, 0);
+  assert.equal(held.take(less, 10), less);
+  assert.equal(held.take(all, kHeldMs), less);
+  assert.equal(held.take(all, 11 + kHeldMs), all);
+});
+
 test("what is missing is not trusted", () => {
   for (const missing of ["ageMs", "lagMs"]) {
     assert.equal(judge({...live, [missing]: undefined}).state, "invalid", missing);
@@ -83,6 +111,7 @@ test("of two perimapds no surface is good", () => {
   const judged = judge({...live, publishers: 2});
   assert.equal(judged.state, "degraded");
   assert.match(judged.why, /2 perimapds publish here: 'perimapd' is shown/);
+  assert.ok(judged.contested, "said twice");
   assert.equal(judge({...live, publishers: 2, surface: {...good, state: "invalid"}}).state, "invalid");
   const same = judge({...live, publishers: 2, sameSource: true});
   assert.equal(same.state, "invalid");

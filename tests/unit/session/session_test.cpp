@@ -15,9 +15,11 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
+using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::Not;
+using testing::StartsWith;
 
 const Instant kBegin = from_ns(0) + 100s;
 
@@ -55,7 +57,8 @@ class Session : public testing::Test {
   void TearDown() override { fs::remove_all(fs::path(file_).parent_path()); }
 
   // Eight seconds at 10 Hz, in which nothing comes between 6 s and 8 s; statuses each second, a beat each 0.8 s.
-  void write(bool statuses, const std::string& stream = "frame") const {
+  void write(bool statuses, const std::string& stream = "frame",
+             perimap_SetupState set_up = perimap_SETUP_CONSISTENT) const {
     auto recorder = SampleRecorder::create(file_, "test");
     ASSERT_TRUE(recorder) << recorder.error().message;
     for (int i = 0; i <= 80; ++i) {
@@ -75,7 +78,10 @@ class Session : public testing::Test {
       // As of a perimapd that was there before, and began anew at 4 s.
       status.run_id[0] = i < 40 ? 1 : 2;
       status.samples_from_late_update = i < 40 ? 100U + static_cast<unsigned>(i) / 10U : 4U;
-      status.setup.state = i < 30 ? perimap_SETUP_UNKNOWN : perimap_SETUP_CONSISTENT;
+      status.samples = i < 40 ? 1000U + static_cast<unsigned>(i) : 40U;
+      status.setup.state = i < 30 ? perimap_SETUP_UNKNOWN : set_up;
+      status.setup.numbers[0] = 0.035;
+      status.setup.blamed[0] = set_up == perimap_SETUP_DOUBTED;
       perimap_SourceStatus tracker{};
       tracker.kind = perimap_SOURCE_TRACKER;
       tracker.state = i >= 30 && i < 40 ? perimap_SOURCE_CLOSED : perimap_SOURCE_OK;
@@ -121,6 +127,34 @@ TEST_F(Session, TellsForHowLongSurfacesWereWhatAndWhy) {
       "none came. The first good one came after 2.0 s.");
 }
 
+TEST_F(Session, AnswersFirstWhatCanBeReliedOnAndWhatStoodInTheWay) {
+  write(true);
+  auto record = read();
+  ASSERT_TRUE(record) << record.error().message;
+  EXPECT_EQ(
+      session_answer(*record),
+      "From the first good surface on, after 2.0 s, surfaces were good for 51.7 % of 6.0 s. What stood in the way "
+      "most: no surface came, 1.9 s.");
+  EXPECT_THAT(session_page(*record), HasSubstr("class=\"verdict\">From the first good surface on"));
+  record->first_good_s.reset();
+  EXPECT_THAT(
+      session_answer(*record),
+      StartsWith("Not one surface of this session was good. What stood in the way most: invalid: nothing mapped, "
+                 "2.0 s (nothing is mapped yet; what helps: move the scope"));
+  record->length_s = 0.0;
+  EXPECT_THAT(session_answer(*record), HasSubstr("nothing can be told"));
+}
+
+TEST_F(Session, OfADoubtedSetUpSaysFirstThatAndWhatIsOff) {
+  write(true, "frame", perimap_SETUP_DOUBTED);
+  const auto record = read();
+  ASSERT_TRUE(record) << record.error().message;
+  EXPECT_THAT(session_answer(*record),
+              AllOf(StartsWith("Do not rely on positions of this session: from 3.0 s on its set-up was doubted, "),
+                    HasSubstr("the camera is turned by 2.0 deg against the hand-eye")));
+  EXPECT_THAT(session_concerns(*record).front(), StartsWith("Times that the set-up was doubted: "));
+}
+
 TEST_F(Session, ShowsDevicesHeartAndSetUpOverTheSameTime) {
   write(true);
   const auto record = read();
@@ -141,9 +175,9 @@ TEST_F(Session, NamesWhatIsToBeLookedAt) {
   const auto record = read();
   ASSERT_TRUE(record) << record.error().message;
   const auto concerns = session_concerns(*record);
-  EXPECT_THAT(concerns, Contains("19 surfaces were published and not received"));
-  EXPECT_THAT(concerns, Contains(HasSubstr("7 surfaces rest on the state before")));
-  EXPECT_THAT(concerns, Contains("tracker: 10 of 100 samples were lost on the way"));
+  EXPECT_THAT(concerns, Contains("Surfaces published and not received: 19"));
+  EXPECT_THAT(concerns, Contains(HasSubstr("rest on the state before, because their update was late: 7 of 70")));
+  EXPECT_THAT(concerns, Contains("Samples of the tracker that were lost on the way: 10 of 100"));
   EXPECT_THAT(concerns, Not(Contains(HasSubstr("No status"))));
 }
 

@@ -125,6 +125,18 @@ TEST(SurfaceTeller, TellsUsableFeaturesWithTheirLargestDeviation) {
   EXPECT_EQ(SurfaceTeller().tell(told.surface, from_ns(50))["camera"], nullptr);
 }
 
+TEST(SurfaceTeller, TellsEachUseAndOfAnOlderPerimapdNone) {
+  Told told(perimap_SURFACE_DEGRADED);
+  EXPECT_EQ(SurfaceTeller().tell(told.surface, from_ns(50))["uses"], nullptr);
+  told.surface.display_state = perimap_SURFACE_GOOD;
+  told.surface.contact_state = perimap_SURFACE_INVALID;
+  told.surface.use_within_mm[0] = 5.0;
+  told.surface.use_features[0] = 31;
+  const auto uses = SurfaceTeller().tell(told.surface, from_ns(50))["uses"];
+  EXPECT_EQ(uses["display"], (nlohmann::ordered_json{{"state", "good"}, {"within_mm", 5.0}, {"features", 31}}));
+  EXPECT_EQ(uses["contact"]["state"], "invalid");
+}
+
 TEST(SurfaceTeller, OfAnInvalidSurfaceNoPositionLeaves) {
   for (const auto state : {perimap_SURFACE_INVALID, static_cast<perimap_SurfaceState>(3)}) {
     Told told(state);
