@@ -1,6 +1,8 @@
-// check_bridge.mjs ADDRESS: connects with the official client, decodes all that comes by the schemas that come with it,
-// and holds each surface against the heart that scripted_publisher makes: z of each feature is 100 + 3 cos(phase) mm.
+// check_bridge.mjs ADDRESS SUBSCRIBED: connects with the official client, makes the file SUBSCRIBED once it has subscribed,
+// decodes all that comes by the schemas that come with it, and holds each surface against the heart that scripted_publisher
+// makes: z of each feature is 100 + 3 cos(phase) mm.
 import assert from "node:assert/strict";
+import { writeFileSync } from "node:fs";
 
 import omgidlParser from "@foxglove/omgidl-parser";
 import omgidlSerialization from "@foxglove/omgidl-serialization";
@@ -8,7 +10,7 @@ import wsProtocol from "@foxglove/ws-protocol";
 import WebSocket from "ws";
 
 const { FoxgloveClient } = wsProtocol;
-const address = process.argv[2];
+const [address, subscribed] = process.argv.slice(2);
 const readers = new Map(); // by subscription
 const scenes = new Map(); // by time, until their worth has come
 const seen = { features: 0, meshes: 0, cleared: 0, transforms: 0, states: [], statuses: [] };
@@ -78,6 +80,7 @@ const ended = new Promise((resolve, reject) => {
         messages: new omgidlSerialization.MessageReader(schemaName, definitions),
       });
     }
+    writeFileSync(subscribed, "");
   });
   client.on("message", ({ subscriptionId, timestamp, data }) => {
     try {

@@ -14,7 +14,7 @@ export CYCLONEDDS_URI="file://$xml,<CycloneDDS><Domain><Discovery><Tag>$tag</Tag
 
 cleanup() { kill "$bridge" "$published" "$judge" 2> /dev/null || true; }
 bridge= published= judge=
-rm -f address said
+rm -f address said subscribed
 trap cleanup EXIT
 "$perimap" bridge foxglove --domain $domain --port 0 > address 2> said &
 bridge=$!
@@ -31,10 +31,12 @@ case $address in
     exit 1
     ;;
 esac
+# The client is there before anything is published: a program that starts slowly would miss what comes first.
+node check_bridge.mjs "$address" subscribed &
+judge=$!
+until [ -e subscribed ] || ! kill -0 $judge 2> /dev/null; do sleep 0.1; done
 "$publisher" $domain &
 published=$!
-node check_bridge.mjs "$address" &
-judge=$!
 for _ in $(seq 1200); do
   if grep -q "nothing has come from perimapd" said || ! kill -0 $judge 2> /dev/null; then break; fi
   sleep 0.1
