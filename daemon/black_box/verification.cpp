@@ -30,7 +30,7 @@ struct Found {
 
 class Verifier {
  public:
-  explicit Verifier(const std::function<void(const Entry&)>& see) : see_(see) {}
+  Verifier(const std::function<void(const Entry&)>& see, bool of_folder) : see_(see), of_folder_(of_folder) {}
 
   Expected<void> read(const fs::path& file, std::optional<std::uint64_t> number) {
     const auto bytes = read_segment_file(file);
@@ -54,9 +54,10 @@ class Verifier {
       for (const PresentSegment& told : later->second.facts.header.present) hold(told, later->second);
     }
     for (const auto& [number, found] : found_) judge_end(number, found);
-    judge_missing();
     const Found& last = found_.rbegin()->second;
-    result_.ended = last.facts.whole() && last.run_has_ended;
+    // Of one file nothing is asked of others.
+    if (of_folder_) judge_missing();
+    result_.ended = last.facts.whole() && (last.run_has_ended || !of_folder_);
     result_.digest = last.facts.digest;
     return std::move(result_);
   }
@@ -140,6 +141,7 @@ class Verifier {
   }
 
   const std::function<void(const Entry&)>& see_;
+  bool of_folder_;
   Verification result_;
   std::map<std::uint64_t, Found> found_;
   std::set<std::uint64_t> vouched_;
@@ -149,9 +151,10 @@ class Verifier {
 }  // namespace
 
 Expected<Verification> verify(const fs::path& folder_or_file, const std::function<void(const Entry&)>& see) {
-  Verifier verifier(see);
   std::error_code error;
-  if (!fs::is_directory(folder_or_file, error)) {
+  const bool of_folder = fs::is_directory(folder_or_file, error);
+  Verifier verifier(see, of_folder);
+  if (!of_folder) {
     if (auto read = verifier.read(folder_or_file, std::nullopt); !read) return tl::unexpected(std::move(read.error()));
     return verifier.judge();
   }

@@ -31,8 +31,8 @@ struct Verification {
   [[nodiscard]] bool whole() const { return faults.empty() && ended; }
 };
 
-// Of all segments in a folder, or of one file. `see` is given each entry that is as it was written, in order; it may be
-// empty. Error: nothing is there, or it cannot be read.
+// Of all segments in a folder, or of one of them by itself. `see` is given each entry that is as it was written, in
+// order; it may be empty. Error: nothing is there, or it cannot be read.
 [[nodiscard]] Expected<Verification> verify(const std::filesystem::path& folder_or_file,
                                             const std::function<void(const Entry&)>& see);
 

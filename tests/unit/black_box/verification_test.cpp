@@ -116,6 +116,15 @@ TEST_F(Verifying, OfSegmentsThatOthersHaveRemovedTheNextRunTells) {
   EXPECT_THAT(verified().notes, ElementsAre(HasSubstr("segment 2: removed by others")));
 }
 
+TEST_F(Verifying, OfOneSegmentNothingIsAskedOfTheOthers) {
+  write_whole();
+  for (const std::uint64_t number : numbers()) {
+    const auto found = verify(segment(number), {});
+    ASSERT_TRUE(found);
+    EXPECT_TRUE(found->whole()) << number;
+  }
+}
+
 TEST_F(Verifying, SegmentsThatChangePlacesAreNoticed) {
   write_whole();
   std::filesystem::rename(segment(1), folder_ / "x");
