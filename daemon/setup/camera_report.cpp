@@ -137,13 +137,14 @@ nlohmann::json json_of(const CameraCalibration& result, const Board& board, cons
 
 std::string calibration_text_of(const CameraCalibration& result, const Board& board, const std::string& date) {
   const std::vector<double>& s = result.deviations;
-  return format_calibration(result.camera) +
-         fmt::format(
-             "calibration_time: \"{}\"\nnr_of_frames: {}\navg_reprojection_error: {}\nheld_aside_reprojection_error: "
-             "{}\n"
-             "focal_length_deviation: [ {}, {} ]\nprincipal_point_deviation: [ {}, {} ]\nboard: \"{}\"\n",
-             date, used_of(result), result.rms_px, result.held_aside_rms_px, s[0], s[1], s[2], s[3], name_of(board)) +
-         format_lens_covariance(result.covariance);
+  return sealed_calibration(
+      result.camera,
+      fmt::format(
+          "calibration_time: \"{}\"\nnr_of_frames: {}\navg_reprojection_error: {}\nheld_aside_reprojection_error: "
+          "{}\n"
+          "focal_length_deviation: [ {}, {} ]\nprincipal_point_deviation: [ {}, {} ]\nboard: \"{}\"\n",
+          date, used_of(result), result.rms_px, result.held_aside_rms_px, s[0], s[1], s[2], s[3], name_of(board)) +
+          format_lens_covariance(result.covariance));
 }
 
 }  // namespace perimap

@@ -11,10 +11,12 @@
 
 #include "core/error/one_line.hpp"
 #include "drivers/text_file/text_file.hpp"
+#include "drivers/text_file/text_seal.hpp"
 
 namespace perimap {
 namespace {
 
+constexpr std::string_view kHead = "%YAML:1.0\n---\n";
 constexpr std::size_t kLargestFile = std::size_t{1} << 20;
 constexpr int kLargestImage = 16384;         // px a side
 constexpr double kLargestFocalLength = 1e6;  // px
@@ -214,6 +216,9 @@ Expected<CameraModel> parse_calibration(std::string_view text, std::string_view 
     return fail(on_one_line(
         fmt::format("{}: expected a calibration of at most {} bytes, got {}", name, kLargestFile, text.size())));
   }
+  if (const auto whole = check_seal(text); !whole) {
+    return fail(on_one_line(fmt::format("{}: {}", name, whole.error().message)));
+  }
   // yaml-cpp reports what it cannot read by exceptions.
   try {
     const YAML::Node root = YAML::Load(std::string(text));
@@ -236,6 +241,11 @@ Expected<CameraModel> read_calibration(const std::filesystem::path& file) {
   return parse_calibration(*text, file.string());
 }
 
+std::string sealed_calibration(const CameraModel& camera, std::string_view more) {
+  const std::string text = format_calibration(camera);
+  return sealed_text(kHead, text.substr(kHead.size()) + std::string(more));
+}
+
 std::string format_calibration(const CameraModel& camera) {
   // The layout of cv::FileStorage, so that OpenCV's own tools read it.
   const auto matrix = [](std::string_view key, int rows, int columns, std::initializer_list<double> values) {
@@ -243,15 +253,15 @@ std::string format_calibration(const CameraModel& camera) {
                        fmt::join(values, ", "));
   };
   const bool fisheye = camera.lens == Lens::kKannalaBrandt;
-  return fmt::format("%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\ndistortion_model: {}\n", camera.width,
-                     camera.height, fisheye ? "equidistant" : "plumb_bob") +
+  return fmt::format("{}image_width: {}\nimage_height: {}\ndistortion_model: {}\n", kHead, camera.width, camera.height,
+                     fisheye ? "equidistant" : "plumb_bob") +
          matrix("camera_matrix", 3, 3, {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1}) +
          (fisheye ? matrix("distortion_coefficients", 1, 4, {camera.k1, camera.k2, camera.k3, camera.k4})
                   : matrix("distortion_coefficients", 1, 5, {camera.k1, camera.k2, camera.p1, camera.p2, camera.k3}));
 }
 
 Expected<void> write_calibration(const std::filesystem::path& file, const CameraModel& camera) {
-  return write_text_file(file, format_calibration(camera));
+  return write_text_file(file, sealed_calibration(camera));
 }
 
 }  // namespace perimap

@@ -25,6 +25,10 @@ namespace perimap {
 // As YAML; parsing it gives exactly the same numbers.
 [[nodiscard]] std::string format_calibration(const CameraModel& camera);
 
+// Likewise, with `more` keys behind it, and a line by which reading notices that something was changed or cut off:
+// digits alone would not show it.
+[[nodiscard]] std::string sealed_calibration(const CameraModel& camera, std::string_view more = {});
+
 [[nodiscard]] Expected<void> write_calibration(const std::filesystem::path& file, const CameraModel& camera);
 
 }  // namespace perimap

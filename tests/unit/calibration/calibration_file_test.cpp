@@ -219,6 +219,33 @@ TEST(CalibrationFile, EveryTruncationAndEveryDamagedByteEndsInAResult) {
   }
 }
 
+// Bit flips and cuts of what perimap has written: none is taken for whole, unless it says the same still, as with a
+// changed word in the line that has the sum.
+TEST(CalibrationFile, DamagedOnesThatPerimapHasWrittenAreNeverTakenForOthers) {
+  const auto camera = parse_calibration(kYaml, "cam");
+  ASSERT_TRUE(camera);
+  const std::string whole = sealed_calibration(*camera, "calibration_time: \"2026-11-28 10:00 UTC\"\n");
+  ASSERT_TRUE(parse_calibration(whole, "cam"));
+  const unsigned seed = std::random_device()();
+  SCOPED_TRACE(seed);
+  std::mt19937 random(seed);
+  for (int trial = 0; trial < 500; ++trial) {
+    std::string damaged = whole;
+    if (trial % 2 == 0) {
+      damaged[random() % damaged.size()] ^= static_cast<char>(1U << (random() % 8));
+    } else {
+      damaged.resize(random() % damaged.size());
+    }
+    const auto read = parse_calibration(damaged, "cam");
+    if (!read) continue;
+    EXPECT_EQ(format_calibration(*read), format_calibration(*camera)) << damaged;
+    EXPECT_EQ(damaged.size(), whole.size()) << "a cut is refused";
+  }
+  EXPECT_THAT(error_of(with(whole, "image_width: ", "image_width: 1")), HasSubstr("it is not as it was written"));
+  const std::string by_hand = with(with(whole, "image_width: ", "image_width: 1"), "perimap-crc32", "changed");
+  EXPECT_TRUE(parse_calibration(by_hand, "cam")) << "without the sum it is anybody's";
+}
+
 // As OpenCV's own calibration program writes a fisheye: without a model's name.
 std::string fisheye_of_opencv(std::string_view flag) {
   return with(with(with(kYaml, "rows: 5", "rows: 4"), "-2.0e-3, 0.01 ]", "-2.0e-3 ]"), "avg_reprojection_error: 0.2",

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -134,6 +135,22 @@ TEST(CheckpointFile, AChangedByteIsNoticed) {
     std::string changed = whole;
     changed[at] = static_cast<char>(changed[at] ^ 0x10);
     EXPECT_FALSE(parse_checkpoint(changed)) << at;
+  }
+}
+
+TEST(CheckpointFile, BitFlipsAndCutsAreNeverTakenForWhole) {
+  const std::string whole = file_of(checkpoint_sample());
+  const unsigned seed = std::random_device()();
+  SCOPED_TRACE(seed);
+  std::mt19937 random(seed);
+  for (int trial = 0; trial < 500; ++trial) {
+    std::string damaged = whole;
+    if (trial % 2 == 0) {
+      damaged[random() % damaged.size()] ^= static_cast<char>(1U << (random() % 8));
+    } else {
+      damaged.resize(random() % damaged.size());
+    }
+    EXPECT_FALSE(parse_checkpoint(damaged)) << trial;
   }
 }
 

@@ -477,5 +477,22 @@ TEST(McapReader, SurvivesGarbledFiles) {
   }
 }
 
+TEST(McapReader, BitFlipsAndCutsAreNeverTakenForWhole) {
+  const Written written = write_file(3, 60);
+  const unsigned seed = std::random_device()();
+  SCOPED_TRACE(seed);
+  std::mt19937 random(seed);
+  for (int trial = 0; trial < 500; ++trial) {
+    Bytes damaged = written.bytes;
+    if (trial % 2 == 0) {
+      damaged[random() % damaged.size()] ^= static_cast<std::byte>(1U << (random() % 8));
+    } else {
+      damaged.resize(random() % damaged.size());
+    }
+    const Outcome outcome = read_all(damaged, ReadMode::kStrict);
+    EXPECT_TRUE(outcome.error.has_value()) << trial << ": " << damaged.size();
+  }
+}
+
 }  // namespace
 }  // namespace perimap
