@@ -142,9 +142,10 @@ function tell() {
   for (const part of ["state", "permission", "why", "remedy"]) set(part, judged[part]);
   tellUses(judged.uses ?? []);
   // Once is enough, so that there is room for the rest.
-  const warnings = [judged.contested ? "" : seen.contest, ...seen.warnings].filter(Boolean).join(" ");
-  set("warning", warnings);
-  $("warning").hidden = !warnings;
+  const [first, ...others] = [judged.contested ? "" : seen.contest, ...seen.warnings].filter(Boolean);
+  set("warning-words", first ?? "");
+  set("warning-details", others.join(" \u00b7 "));
+  $("warning").hidden = !first;
   const {surface} = judged;
   set("converged", `${surface?.converged ?? 0} converged`);
   set("known", surface ? `of ${surface.known}` : "");

@@ -83,11 +83,11 @@ void RecordedView::say_what_is_missing() {
       if (std::none_of(damage.begin(), damage.end(), same)) damage.push_back(error);
     }
   }
+  if (!damage.empty()) warnings_.push_back("a file is damaged, or was cut off: what is whole is shown");
   for (std::size_t i = 0; i < std::min(damage.size(), kMostDamage); ++i) warnings_.emplace_back(damage[i].message);
   if (damage.size() > kMostDamage) {
     warnings_.push_back(fmt::format("{} places more are damaged", damage.size() - kMostDamage));
   }
-  if (!damage.empty()) warnings_.push_back("what is whole is shown");
   if (states_.stream.empty()) {
     warnings_.push_back(
         fmt::format("{}: has no surfaces; perimap replay {} --samples SAMPLES makes some, and perimap "

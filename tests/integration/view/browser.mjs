@@ -70,7 +70,7 @@ export class Browser {
   async page(url) {
     const {targetId} = await this.ask("Target.createTarget", {url: "about:blank", newWindow: true});
     const {sessionId} = await this.ask("Target.attachToTarget", {targetId, flatten: true});
-    const page = new Page(this, sessionId);
+    const page = new Page(this, sessionId, targetId);
     this.pages.set(sessionId, page);
     for (const domain of ["Page", "Runtime", "Log", "Network"]) await page.ask(`${domain}.enable`);
     await page.ask("Emulation.setDeviceMetricsOverride", {...this.size, deviceScaleFactor: 1, mobile: false});
@@ -88,12 +88,13 @@ export class Browser {
 }
 
 class Page {
-  constructor(browser, session) {
-    Object.assign(this, {browser, session, complaints: [], requests: []});
+  constructor(browser, session, target) {
+    Object.assign(this, {browser, session, target, complaints: [], requests: []});
     this.loaded = new Promise((resolve) => { this.load = resolve; });
   }
 
   ask(method, params) { return this.browser.ask(method, params, this.session); }
+  close() { return this.browser.ask("Target.closeTarget", {targetId: this.target}); }
 
   event(method, params) {
     if (method === "Page.loadEventFired") {

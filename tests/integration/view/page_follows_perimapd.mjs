@@ -66,6 +66,8 @@ const converged = `Number(/(\\d+) converged/.exec(${text})?.[1] ?? 0)`;
 const usable = `/^(good|degraded)$/.test(${state})`, mapped = `${converged} >= 10 && ${usable}`;
 assert.ok(await page.until(mapped, kLongMs), await page.evaluate(text));
 for (const other of pages) assert.ok(await other.until(mapped, kLongMs), "not all pages show it");
+// What they do not draw any more is left to perimapd.
+for (const other of pages.slice(1)) await other.close();
 assert.ok(await page.until(`${meshPixels} > 2000`, kLongMs), `${await page.evaluate(meshPixels)} pixels of the mesh`);
 assert.ok(await page.until(`document.querySelector('[data-source="camera"]')?.dataset.state === "ok"`, kLongMs), "no camera");
 // The surface is drawn anew as it moves.
@@ -124,9 +126,10 @@ for (const {complaints, requests} of pages) {
 }
 
 // A page whose program fails says so, and shows nothing.
-await pages[1].evaluate(`setTimeout(() => { throw new Error("planted"); }, 0)`);
-assert.ok(await pages[1].until(`${state} === "invalid" && ${text}.includes("this page has failed")`, kLongMs));
-assert.equal(await pages[1].evaluate(meshPixels), 0);
+const failing = await browser.page(address);
+await failing.evaluate(`setTimeout(() => { throw new Error("planted"); }, 0)`);
+assert.ok(await failing.until(`${state} === "invalid" && ${text}.includes("this page has failed")`, kLongMs));
+assert.equal(await failing.evaluate(meshPixels), 0);
 
 playing = false;
 daemon.kill("SIGKILL");
