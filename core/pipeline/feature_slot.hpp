@@ -195,11 +195,11 @@ struct MappedFeature {
   // See PatchWatch: what the last moments tell of its being off the map, up to then; where the map had it; and whether
   // it lies in a patch that is displaced while the rest of the surface is not, and since when.
   OffMap off_map{};
-  Instant off_map_at;
+  Instant off_map_at{};
   Vector3d place_W_mm = Vector3d::Zero();
   bool placed = false;
   bool pressed = false;
-  Instant pressed_since;
+  Instant pressed_since{};
 };
 
 // What a slot knows of its feature is in the three values, and the slot passes from one state to the next by assigning
