@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error/one_line.hpp"
+#include "drivers/json/json_seal.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -45,11 +46,12 @@ bool read_covariance(const nlohmann::json& rows, Eigen::Matrix<double, 6, 6>& co
 }  // namespace
 
 Expected<RegistrationFile> parse_registration(std::string_view text, std::string_view name) {
-  const auto wrong = [&](const char* what) {
+  const auto wrong = [&](std::string_view what) {
     return fail(on_one_line(fmt::format("{}: {}; expected a file that perimap register --output wrote", name, what)));
   };
   const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_object()) return wrong("is no JSON object");
+  if (const auto whole = check_json_seal(json); !whole) return wrong(whole.error().message);
   double t[3], q[4], middle[3];
   if (!read_numbers(json, "translation_mm", t) || Vector3d(t[0], t[1], t[2]).norm() > kFarthest_mm) {
     return wrong("key 'translation_mm' is not three numbers in mm");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "drivers/json/json_seal.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -30,10 +31,11 @@ Expected<ToolTip> read_tool_tip(const std::filesystem::path& file) {
 
 Expected<ToolTip> parse_tool_tip(std::string_view text, std::string_view name) {
   const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-  const auto wrong = [&](const char* what) {
+  const auto wrong = [&](std::string_view what) {
     return fail(fmt::format("{}: {}; expected a file that perimap calibrate tool --output wrote", name, what));
   };
   if (!json.is_object()) return wrong("is no JSON object");
+  if (const auto whole = check_json_seal(json); !whole) return wrong(whole.error().message);
   ToolTip tip;
   constexpr double kLongest_mm = 10'000.0;
   if (!json.contains("tip_mm") || !read_three(json["tip_mm"], tip.tip_T) || tip.tip_T.norm() > kLongest_mm) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/angle/angle.hpp"
+#include "drivers/json/json_seal.hpp"
 #include "drivers/json/json_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
@@ -120,6 +121,7 @@ Expected<TurnedScope> parse_turned_scope(std::string_view text, std::string_view
   };
   const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_object()) return wrong("is no JSON object");
+  if (const auto whole = check_json_seal(json); !whole) return wrong(whole.error().message);
   const auto found = json.find("turned_scope");
   if (found == json.end() || !found->is_object()) return wrong("has no key 'turned_scope'");
   constexpr double kFarthest_mm = 10'000.0;

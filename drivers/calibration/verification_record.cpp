@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <system_error>
+#include <utility>
 
+#include "drivers/json/json_seal.hpp"
 #include "drivers/json/json_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
@@ -97,13 +99,13 @@ std::string format_verification(std::string_view result_json, const VerifiedSetU
                   {"time_offset_ms", set_up.time_offset_ms},
                   {"lens", set_up.lens},
                   {"turned_scope", set_up.turned_scope}};
-  return json_document(json);
+  return json_document(sealed_json(std::move(json)));
 }
 
 std::string as_changed_since(std::string_view record_json) {
   nlohmann::json json = nlohmann::json::parse(record_json);
   json[kChangedSince] = true;
-  return json_document(json);
+  return json_document(sealed_json(std::move(json)));
 }
 
 Expected<VerificationRecord> parse_verification(std::string_view text, std::string_view name) {
@@ -112,6 +114,7 @@ Expected<VerificationRecord> parse_verification(std::string_view text, std::stri
     return fail(fmt::format("{}: {}; perimap verify writes it anew", name, what));
   };
   if (!json.is_object()) return wrong("expected what perimap verify wrote, a JSON object");
+  if (const auto whole = check_json_seal(json); !whole) return wrong(whole.error().message);
   VerificationRecord record;
   VerifiedKeys keys(json, "");
   keys.text("date", record.date);

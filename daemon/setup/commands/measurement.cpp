@@ -11,6 +11,7 @@
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/setup/recorded_date.hpp"
 #include "daemon/setup/setup_plots.hpp"
+#include "drivers/json/json_seal.hpp"
 #include "drivers/json/json_text.hpp"
 
 namespace perimap {
@@ -60,7 +61,7 @@ SetupExpected<void> write_results(const Measurement& measured, const CommonOptio
                                   const std::string& date, const std::string& made_from) {
   KeptResults results;
   if (!options.output.empty()) {
-    const std::string text = measured.file.empty() ? json_document(json) : measured.file;
+    const std::string text = measured.file.empty() ? json_document(sealed_json(json)) : measured.file;
     if (auto added = results.add(options.output, text); !added) return tl::unexpected(added.error());
   }
   if (!options.html.empty()) {

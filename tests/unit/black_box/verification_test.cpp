@@ -1,8 +1,7 @@
 // What verify-log takes for whole, and what it does not.
 #include <gmock/gmock.h>
 
-#include <random>
-
+#include "tests/unit/damage/damage.hpp"
 #include "written_log.hpp"
 
 namespace perimap::black_box::test {
@@ -135,18 +134,11 @@ TEST_F(Verifying, SegmentsThatChangePlacesAreNoticed) {
 
 TEST_F(Verifying, BitFlipsAndCutsAreNeverTakenForWhole) {
   write_whole();
-  const unsigned seed = std::random_device()();
-  SCOPED_TRACE(seed);
-  std::mt19937 random(seed);
-  for (int trial = 0; trial < 500; ++trial) {
-    const auto file = segment(1 + random() % 3);
+  perimap::test::Damage damage;
+  for (int trial = 0; trial < perimap::test::Damage::kCopies; ++trial) {
+    const auto file = segment(1 + damage.one_of(3));
     const std::string whole = bytes_of(file);
-    std::string damaged = whole;
-    if (trial % 2 == 0) {
-      damaged[random() % damaged.size()] ^= static_cast<char>(1U << (random() % 8));
-    } else {
-      damaged.resize(random() % damaged.size());
-    }
+    const std::string damaged = damage.copy_of(whole);
     put(file, damaged);
     EXPECT_FALSE(verified().whole()) << file << " " << damaged.size();
     put(file, whole);

@@ -7,6 +7,8 @@
 #include <random>
 #include <string>
 
+#include "tests/unit/damage/damage.hpp"
+
 namespace perimap {
 namespace {
 
@@ -226,16 +228,9 @@ TEST(CalibrationFile, DamagedOnesThatPerimapHasWrittenAreNeverTakenForOthers) {
   ASSERT_TRUE(camera);
   const std::string whole = sealed_calibration(*camera, "calibration_time: \"2026-11-28 10:00 UTC\"\n");
   ASSERT_TRUE(parse_calibration(whole, "cam"));
-  const unsigned seed = std::random_device()();
-  SCOPED_TRACE(seed);
-  std::mt19937 random(seed);
-  for (int trial = 0; trial < 500; ++trial) {
-    std::string damaged = whole;
-    if (trial % 2 == 0) {
-      damaged[random() % damaged.size()] ^= static_cast<char>(1U << (random() % 8));
-    } else {
-      damaged.resize(random() % damaged.size());
-    }
+  test::Damage damage;
+  for (int trial = 0; trial < test::Damage::kCopies; ++trial) {
+    const std::string damaged = damage.copy_of(whole);
     const auto read = parse_calibration(damaged, "cam");
     if (!read) continue;
     EXPECT_EQ(format_calibration(*read), format_calibration(*camera)) << damaged;

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "daemon/checkpoint/recent_ecg.hpp"
 #include "daemon/checkpoint/warm_restart.hpp"
 #include "tests/unit/checkpoint/samples.hpp"
+#include "tests/unit/damage/damage.hpp"
 
 namespace perimap {
 namespace {
@@ -140,17 +140,9 @@ TEST(CheckpointFile, AChangedByteIsNoticed) {
 
 TEST(CheckpointFile, BitFlipsAndCutsAreNeverTakenForWhole) {
   const std::string whole = file_of(checkpoint_sample());
-  const unsigned seed = std::random_device()();
-  SCOPED_TRACE(seed);
-  std::mt19937 random(seed);
-  for (int trial = 0; trial < 500; ++trial) {
-    std::string damaged = whole;
-    if (trial % 2 == 0) {
-      damaged[random() % damaged.size()] ^= static_cast<char>(1U << (random() % 8));
-    } else {
-      damaged.resize(random() % damaged.size());
-    }
-    EXPECT_FALSE(parse_checkpoint(damaged)) << trial;
+  test::Damage damage;
+  for (int trial = 0; trial < test::Damage::kCopies; ++trial) {
+    EXPECT_FALSE(parse_checkpoint(damage.copy_of(whole))) << trial;
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include "drivers/recording/mcap_reader.hpp"
 #include "drivers/recording/mcap_writer.hpp"
+#include "tests/unit/damage/damage.hpp"
 #include "tests/unit/recording/memory_file.hpp"
 
 namespace perimap {
@@ -479,16 +480,9 @@ TEST(McapReader, SurvivesGarbledFiles) {
 
 TEST(McapReader, BitFlipsAndCutsAreNeverTakenForWhole) {
   const Written written = write_file(3, 60);
-  const unsigned seed = std::random_device()();
-  SCOPED_TRACE(seed);
-  std::mt19937 random(seed);
-  for (int trial = 0; trial < 500; ++trial) {
-    Bytes damaged = written.bytes;
-    if (trial % 2 == 0) {
-      damaged[random() % damaged.size()] ^= static_cast<std::byte>(1U << (random() % 8));
-    } else {
-      damaged.resize(random() % damaged.size());
-    }
+  test::Damage damage;
+  for (int trial = 0; trial < test::Damage::kCopies; ++trial) {
+    const Bytes damaged = damage.copy_of(written.bytes);
     const Outcome outcome = read_all(damaged, ReadMode::kStrict);
     EXPECT_TRUE(outcome.error.has_value()) << trial << ": " << damaged.size();
   }
