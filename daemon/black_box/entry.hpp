@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-#include "daemon/black_box/digest.hpp"
+#include "daemon/digest/digest.hpp"
 
 namespace perimap::black_box {
 

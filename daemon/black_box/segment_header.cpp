@@ -2,57 +2,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/black_box/json_members.hpp"
 #include "drivers/json/json_text.hpp"
 
 namespace perimap::black_box {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-// Reads members of one object; the first that is wrong is remembered.
-class Members {
- public:
-  explicit Members(const Json& object) : object_(object) {}
-
-  std::uint64_t number(const char* key) {
-    const Json* found = member(key);
-    if (found == nullptr || !found->is_number_unsigned()) return wrong(key, "a whole number"), 0;
-    return found->get<std::uint64_t>();
-  }
-  std::int64_t instant(const char* key) {
-    const Json* found = member(key);
-    if (found == nullptr || !found->is_number_integer()) return wrong(key, "an instant"), 0;
-    return found->get<std::int64_t>();
-  }
-  std::string text(const char* key) {
-    const Json* found = member(key);
-    if (found == nullptr || !found->is_string()) return wrong(key, "text"), std::string();
-    return found->get<std::string>();
-  }
-  bool flag(const char* key) {
-    const Json* found = member(key);
-    if (found == nullptr || !found->is_boolean()) return wrong(key, "true or false"), false;
-    return found->get<bool>();
-  }
-  Digest digest(const char* key) {
-    const auto value = digest_of_hex(text(key));
-    if (!value) wrong(key, "a digest of 64 hexadecimal digits");
-    return value.value_or(Digest{});
-  }
-  [[nodiscard]] const std::string& fault() const { return fault_; }
-
- private:
-  const Json* member(const char* key) const {
-    const auto found = object_.is_object() ? object_.find(key) : object_.end();
-    return found == object_.end() ? nullptr : &*found;
-  }
-  void wrong(const char* key, const char* expected) {
-    if (fault_.empty()) fault_ = std::string("expected '") + key + "' in the header to be " + expected;
-  }
-
-  const Json& object_;
-  std::string fault_;
-};
 
 Json json_of(const PresentSegment& segment) {
   return {{"segment", segment.number},
@@ -77,7 +33,7 @@ std::string text_of(const SegmentHeader& header) {
 Expected<SegmentHeader> parse_header(std::string_view text) {
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object()) return fail("expected a header as JSON");
-  Members members(json);
+  JsonMembers members(json, "the header");
   SegmentHeader header;
   header.number = members.number("segment");
   header.program = members.text("program");
@@ -87,7 +43,7 @@ Expected<SegmentHeader> parse_header(std::string_view text) {
   const auto present = json.find("present");
   if (present == json.end() || !present->is_array()) return fail("expected 'present' in the header to be a list");
   for (const Json& told : *present) {
-    Members of(told);
+    JsonMembers of(told, "the header");
     PresentSegment segment;
     segment.number = of.number("segment");
     segment.entries = of.number("entries");

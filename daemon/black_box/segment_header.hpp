@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
-#include "daemon/black_box/digest.hpp"
+#include "daemon/digest/digest.hpp"
 
 namespace perimap::black_box {
 

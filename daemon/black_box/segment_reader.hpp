@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "core/error/expected.hpp"
-#include "daemon/black_box/digest.hpp"
+#include "daemon/digest/digest.hpp"
 #include "daemon/black_box/entry.hpp"
 #include "daemon/black_box/segment_header.hpp"
 

@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/black_box/json_members.hpp"
 #include "daemon/black_box/segment_folder.hpp"
 #include "daemon/black_box/segment_reader.hpp"
 #include "drivers/json/json_text.hpp"
@@ -43,18 +44,15 @@ PresentSegment present_of(std::uint64_t number, const SegmentFacts& facts, std::
 }  // namespace
 
 std::optional<std::uint64_t> let_go_number(std::string_view content) {
-  const auto json = nlohmann::json::parse(content, nullptr, false);
-  if (!json.is_object()) return std::nullopt;
-  const auto number = json.find("segment");
-  if (number == json.end() || !number->is_number_unsigned()) return std::nullopt;
-  return number->get<std::uint64_t>();
+  const auto json = nlohmann::ordered_json::parse(content, nullptr, false);
+  JsonMembers members(json, "the entry");
+  const std::uint64_t number = members.number("segment");
+  return members.fault().empty() ? std::optional(number) : std::nullopt;
 }
 
 std::string why_of(std::string_view content) {
-  const auto json = nlohmann::json::parse(content, nullptr, false);
-  if (!json.is_object()) return {};
-  const auto why = json.find("why");
-  return why != json.end() && why->is_string() ? why->get<std::string>() : std::string();
+  const auto json = nlohmann::ordered_json::parse(content, nullptr, false);
+  return JsonMembers(json, "the entry").text("why");
 }
 
 SegmentRing::SegmentRing(fs::path folder, const RingLimits& limits, SegmentHeader whose, Clock clock, Descriptor lock)

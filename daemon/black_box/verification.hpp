@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
-#include "daemon/black_box/digest.hpp"
+#include "daemon/digest/digest.hpp"
 #include "daemon/black_box/entry.hpp"
 
 namespace perimap::black_box {

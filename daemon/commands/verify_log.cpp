@@ -13,6 +13,7 @@
 #include "daemon/black_box/samples_to_recording.hpp"
 #include "daemon/black_box/verification.hpp"
 #include "daemon/command_line/commands.hpp"
+#include "daemon/digest/digest.hpp"
 
 namespace perimap {
 namespace {
@@ -38,7 +39,7 @@ bool tell(const VerifyLogOptions& options, const Verification& found, const Cons
   for (const std::string& fault : found.faults) console.complain(Error{fault});
   const auto line = fmt::format("{} segments, {} entries, {:.1f} MB, {} to {}, digest {}", found.segments,
                                 found.entries, static_cast<double>(found.bytes) / 1e6, utc(found.first_utc_ns),
-                                utc(found.last_utc_ns), black_box::hex_of(found.digest));
+                                utc(found.last_utc_ns), hex_of(found.digest));
   if (!found.faults.empty()) {
     console.complain(Error{fmt::format("{}: NOT as it was written: {}", options.log.string(), line)});
     return false;
@@ -60,9 +61,9 @@ bool tell(const VerifyLogOptions& options, const Verification& found, const Cons
 }
 
 Outcome verify_log(const VerifyLogOptions& options, const Console& console) {
-  std::optional<black_box::Digest> digest;
+  std::optional<Digest> digest;
   if (options.digest) {
-    digest = black_box::digest_of_hex(*options.digest);
+    digest = digest_of_hex(*options.digest);
     if (!digest)
       return refuse("--digest: expected 64 hexadecimal digits, as the log of perimapd has them", ExitCode::kWrongUsage);
   }

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "daemon/dds/security.hpp"
+#include "daemon/keys/key_digests.hpp"
 #include "daemon/keys/signed_document.hpp"
 #include "drivers/text_file/text_file.hpp"
 
@@ -290,6 +291,13 @@ Expected<fs::path> Authority::issue(KeyRole role, const std::string& name, const
           .and_then([&] { return write_text_file(folder / files::kRevoked, *list_pem); })
           .and_then([&] { return write_text_file(folder / files::kGovernance, *governance); })
           .and_then([&] { return write_text_file(folder / files::kPermissions, *permissions); })
+          .and_then([&] {
+            return write_text_file(folder / kKeyDigests, key_digests({{files::kAuthority, *authority_pem},
+                                                                      {files::kCertificate, *pem},
+                                                                      {files::kKey, *key_pem},
+                                                                      {files::kGovernance, *governance},
+                                                                      {files::kPermissions, *permissions}}));
+          })
           .and_then([&] { return write_text_file(folder / "cyclonedds.xml", cyclonedds_xml()); });
   if (!written) return tl::unexpected(written.error());
   return folder;

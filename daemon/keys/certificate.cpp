@@ -46,6 +46,11 @@ Expected<openssl::RevocationList> parse_revocations(std::string_view pem, const 
   const openssl::Bio bio = openssl::memory(pem);
   openssl::RevocationList list(PEM_read_bio_X509_CRL(bio.get(), nullptr, &no_passphrase, nullptr));
   if (!list) return openssl::failure(told_as + ": expected a list of revoked certificates (PEM)");
+  // It is replaced by itself and has no digest; readers of PEM pass over other line ends, bits that fill the last
+  // character, and what stands around it.
+  const auto written = to_pem(*list);
+  if (!written) return tl::unexpected(written.error());
+  if (*written != pem) return fail(told_as + ": is not as perimap keys wrote it: a byte is another, or is too many");
   return list;
 }
 

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "daemon/dds/security.hpp"
+#include "daemon/keys/key_digests.hpp"
 #include "daemon/keys/signed_document.hpp"
 #include "drivers/text_file/text_file.hpp"
 
@@ -108,6 +109,7 @@ Expected<KeyFacts> check_keys(const fs::path& folder, std::chrono::sys_seconds n
   if (permissions->find(fmt::format("<subject_name>{}</subject_name>", facts.subject)) == std::string::npos) {
     return fail(in(files::kPermissions) + ": is of another certificate than the one beside it");
   }
+  if (const auto whole = check_key_digests(folder); !whole) return tl::unexpected(whole.error());
   return KeyFacts{facts, std::min(facts.validity.until, facts_of(**authority).validity.until)};
 }
 

@@ -22,8 +22,8 @@ struct KeyFacts {
 
 // What DDS Security would look at, before it does, and with words: every file is there and can be read, the certificate
 // is of the authority, holds now and is not revoked, the key is its key and nobody's but the owner's and the group's,
-// and governance and permissions are signed by the authority and are this certificate's. An error names the first thing
-// that is wrong.
+// governance and permissions are signed by the authority and are this certificate's, and all are byte by byte as they
+// were issued. An error names the first thing that is wrong.
 [[nodiscard]] Expected<KeyFacts> check_keys(const std::filesystem::path& folder, std::chrono::sys_seconds now);
 
 // "keys of 'theatre-2' (publisher) end 2026-12-24T18:00:00Z, in 12 days: issue new ones in time"; none while that is

@@ -34,7 +34,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   read(bytes);
   // The first byte is a kind, the second the length of what follows, and so on.
   std::string segment = segment_begin();
-  perimap::black_box::Digest chain = begin_digest();
+  perimap::Digest chain = begin_digest();
   for (std::size_t i = 0; i + 2 <= size;) {
     const std::size_t length = std::size_t{data[i + 1]} << (data[i] >> 5U);
     const auto kind = static_cast<EntryKind>(data[i] & 0x1fU);

@@ -1,4 +1,4 @@
-// SHA-256 (FIPS 180-4), by which entries of the black box are chained.
+// SHA-256 (FIPS 180-4).
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-namespace perimap::black_box {
+namespace perimap {
 
 using Digest = std::array<std::uint8_t, 32>;
 
@@ -23,4 +23,4 @@ using Digest = std::array<std::uint8_t, 32>;
 [[nodiscard]] std::string hex_of(const Digest& digest);
 [[nodiscard]] std::optional<Digest> digest_of_hex(std::string_view text);
 
-}  // namespace perimap::black_box
+}  // namespace perimap

@@ -1,4 +1,4 @@
-#include "daemon/black_box/digest.hpp"
+#include "daemon/digest/digest.hpp"
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
@@ -7,7 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
-namespace perimap::black_box {
+namespace perimap {
 
 Digest digest_of(std::initializer_list<std::string_view> parts) {
   struct Free {
@@ -42,4 +42,4 @@ std::optional<Digest> digest_of_hex(std::string_view text) {
   return digest;
 }
 
-}  // namespace perimap::black_box
+}  // namespace perimap
