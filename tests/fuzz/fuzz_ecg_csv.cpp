@@ -2,20 +2,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <string>
 #include <string_view>
 
 #include "drivers/ecg_file/beat_table.hpp"
 #include "drivers/ecg_file/ecg_csv.hpp"
-
-namespace {
-
-template <class Result>
-void check(const Result& result) {
-  if (!result && result.error().message.find_first_of("\r\n") != std::string::npos) std::abort();
-}
-
-}  // namespace
+#include "tests/fuzz/one_line_error.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace perimap;
@@ -24,16 +15,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                        EcgCsvOptions{.rate_hz = 250.0, .column = 2, .gain = 1.0},
                                        EcgCsvOptions{.rate_hz = {}, .column = 3, .gain = 1.0}}) {
     const auto trace = parse_ecg_csv(text, "fuzz.csv", options);
-    check(trace);
-    if (!trace) continue;
+    if (!fuzz::is_value(trace)) continue;
     if (trace->mV.empty() || trace->mV.size() != trace->time_s.size()) std::abort();
     for (std::size_t i = 1; i < trace->time_s.size(); ++i) {
       if (!(trace->time_s[i] > trace->time_s[i - 1])) std::abort();
     }
   }
   const auto table = parse_beat_table(text, "fuzz.csv");
-  check(table);
-  if (table) {
+  if (fuzz::is_value(table)) {
     if (table->beats.empty()) std::abort();
     for (std::size_t i = 1; i < table->beats.size(); ++i) {
       if (!(table->beats[i].time_s > table->beats[i - 1].time_s)) std::abort();
