@@ -84,6 +84,7 @@ void PatchWatch::follow_patches(Instant now) noexcept {
     if (!back && seen.features >= kFewestFeatures) patch.displaced = now;
     if (back && now - patch.displaced > kBackFor) continue;
     if (now - patch.displaced > kForgotten) continue;
+    patch.chi2 = seen.chi2;
     patches_[kept++] = patch;
   }
   count_ = kept;
@@ -99,13 +100,13 @@ void PatchWatch::look_for_patches(Instant now) noexcept {
       if (seen.features < kFewestFeatures || seen.chi2 < kDoubt_chi2 || seen.chi2_of_others < kDoubtOfOthers_chi2)
         continue;
       if (seen.size_mm < kDoubt_mm || seen.size_mm > kMost_mm) continue;
-      take({place, radius_mm, now}, seen.chi2);
+      take({place, radius_mm, now, seen.chi2});
     }
   }
 }
 
 // One that overlaps it is the same, and lies where most speaks for it.
-void PatchWatch::take(const Patch& found, double chi2) noexcept {
+void PatchWatch::take(const Patch& found) noexcept {
   const auto end = patches_.begin() + static_cast<std::ptrdiff_t>(count_);
   const auto same = std::find_if(patches_.begin(), end, [&found](const Patch& patch) {
     return (patch.place_W_mm - found.place_W_mm).norm() < std::max(patch.radius_mm, found.radius_mm);
@@ -114,10 +115,10 @@ void PatchWatch::take(const Patch& found, double chi2) noexcept {
     if (count_ < kMostPatches) patches_[count_++] = found;
     return;
   }
-  if (chi2 > local_displacement(features_, same->place_W_mm, same->radius_mm).chi2) {
-    same->place_W_mm = found.place_W_mm;
-    same->radius_mm = found.radius_mm;
-  }
+  if (found.chi2 <= same->chi2) return;
+  same->place_W_mm = found.place_W_mm;
+  same->radius_mm = found.radius_mm;
+  same->chi2 = found.chi2;
 }
 
 bool PatchWatch::is_in_a_patch(const Vector3d& p_W_mm) const noexcept {

@@ -41,12 +41,13 @@ class PatchWatch {
     Vector3d place_W_mm = Vector3d::Zero();
     double radius_mm = 0.0;
     Instant displaced;  // when that was told last
+    double chi2 = 0.0;  // as this frame has it
   };
 
   void gather(const FrameRecord& frame) noexcept;
   void follow_patches(Instant now) noexcept;
   void look_for_patches(Instant now) noexcept;
-  void take(const Patch& found, double chi2) noexcept;
+  void take(const Patch& found) noexcept;
   void mark(const FrameRecord& frame, const FrameHistory& history) noexcept;
   [[nodiscard]] bool is_in_a_patch(const Vector3d& p_W_mm) const noexcept;
 
