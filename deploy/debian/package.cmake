@@ -36,6 +36,7 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${conffiles}
   ${CMAKE_CURRENT_SOURCE_DIR}/debian/postinst ${CMAKE_CURRENT_SOURCE_DIR}/debian/prerm
   ${CMAKE_CURRENT_SOURCE_DIR}/debian/postrm)
 
+install(FILES debian/lintian-overrides DESTINATION share/lintian/overrides RENAME perimap)
 install(FILES debian/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})
 string(TIMESTAMP released "%a, %d %b %Y %H:%M:%S +0000" UTC)
 configure_file(debian/changelog.in debian/changelog @ONLY)

@@ -17,7 +17,7 @@ rm -rf "$work"
 mkdir -p "$work"
 cpack --config "$build/CPackConfig.cmake" -B "$work/package" > "$work/cpack" 2>&1 || fail "$(tail "$work/cpack")"
 package=$(echo "$work"/package/*.deb)
-lintian --allow-root --fail-on error "$package" || fail "lintian found errors"
+lintian --allow-root --fail-on error,warning "$package" || fail "lintian has found what is wrong (above)"
 
 unit=$build/deploy/perimapd.service
 score=$(systemd-analyze security --offline=yes --threshold=18 --no-pager "$unit" | tail -n 1) || fail "the sandbox leaks: $score"
