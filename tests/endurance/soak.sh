@@ -20,36 +20,10 @@ start=$(awk '{printf "%.3f", $1 + 2}' /proc/uptime)
 emulators=$!
 started+=($emulators)
 mkdir "$work/recordings"
-cat > "$work/lens.yaml" << 'END'
-%YAML:1.0
----
-image_width: 360
-image_height: 288
-camera_matrix: !!opencv-matrix
-   rows: 3
-   cols: 3
-   dt: d
-   data: [ 360., 0., 180., 0., 360., 144., 0., 0., 1. ]
-distortion_coefficients: !!opencv-matrix
-   rows: 1
-   cols: 5
-   dt: d
-   data: [ 0., 0., 0., 0., 0. ]
-END
-cat > "$work/perimapd.toml" << END
-version = 1
-[camera]
-device = "video:$(realpath "$clip")"
-calibration = "lens.yaml"
-[tracker]
-protocol = "ndi"
-port = "tcp:127.0.0.1:$port"
-sensor = "0B"
-[ecg]
-protocol = "cyton"
-port = "$line"
-[dds]
-domain = $domain
+lens_yaml 360 288 > "$work/lens.yaml"
+{
+  still_toml "$clip" lens.yaml  # up to its section of DDS
+  cat << END
 security = "$work/keys/theatre"
 [recording]
 folder = "recordings"
@@ -62,6 +36,7 @@ file = "$work/checkpoint"
 folder = "$work/black-box"
 maximum_MB = 256
 END
+} > "$work/perimapd.toml"
 "$perimapd" -c "$work/perimapd.toml" 2> "$work/log" &
 daemon=$!
 started+=($daemon)

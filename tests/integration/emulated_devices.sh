@@ -34,6 +34,46 @@ emulate() {
   started+=($emulators)
 }
 
+# lens_yaml WIDTH HEIGHT: the calibration of a lens that nobody knows, for a camera that keeps still, where it does not
+# matter
+lens_yaml() {
+  cat << END
+%YAML:1.0
+---
+image_width: $1
+image_height: $2
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ $1, 0., $(($1 / 2)), 0., $1, $(($2 / 2)), 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ 0., 0., 0., 0., 0. ]
+END
+}
+
+# still_toml VIDEO CALIBRATION: a configuration with a video for a camera, before a tracker that keeps still (tool 0B)
+still_toml() {
+  cat << END
+version = 1
+[camera]
+device = "video:$(realpath "$1")"
+calibration = "$2"
+[tracker]
+protocol = "ndi"
+port = "tcp:127.0.0.1:$port"
+sensor = "0B"
+[ecg]
+protocol = "cyton"
+port = "$line"
+[dds]
+domain = $domain
+END
+}
+
 # devices_toml RECORDING: a configuration for them, with the recording's frames for a camera
 devices_toml() {
   cat << END

@@ -20,41 +20,11 @@ session() {
     > "$work/emulators" 2>&1 &
   emulators=$!
   started+=($emulators)
-  # Nobody knows its lens; with a camera that keeps still it does not matter.
-  cat > "$work/$name.yaml" << END
-%YAML:1.0
----
-image_width: $width
-image_height: $height
-camera_matrix: !!opencv-matrix
-   rows: 3
-   cols: 3
-   dt: d
-   data: [ $width, 0., $((width / 2)), 0., $width, $((height / 2)), 0., 0., 1. ]
-distortion_coefficients: !!opencv-matrix
-   rows: 1
-   cols: 5
-   dt: d
-   data: [ 0., 0., 0., 0., 0. ]
-END
-  cat > "$work/$name.toml" << END
-version = 1
-[camera]
-device = "video:$(realpath "$video")"
-calibration = "$name.yaml"
-[tracker]
-protocol = "ndi"
-port = "tcp:127.0.0.1:$port"
-sensor = "0B"
-[ecg]
-protocol = "cyton"
-port = "$line"
-[features]
-maximum = $features
-minimum_distance_px = 12
-[dds]
-domain = $domain
-END
+  lens_yaml "$width" "$height" > "$work/$name.yaml"
+  {
+    still_toml "$video" "$name.yaml"
+    printf '[features]\nmaximum = %d\nminimum_distance_px = 12\n' $features
+  } > "$work/$name.toml"
   "$perimapd" -c "$work/$name.toml" 2> "$work/$name.log" &
   daemon=$!
   started+=($daemon)

@@ -50,7 +50,7 @@ until [ "$(status features_converged)" -ge 20 ]; do
 done
 sleep 2
 for ((i = 1; i <= kills; i++)); do
-  kill -9 $daemon
+  kill -9 $daemon 2> /dev/null || fail "before kill $i it had ended by itself: $(tail -n 3 "$work/log")"
   wait $daemon 2> /dev/null
   was=$(now)
   recorded > "$work/left-$i"
