@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 
@@ -20,16 +19,12 @@ constexpr std::size_t kLargestFile = std::size_t{1} << 20U;
 constexpr std::array kDigested = {files::kAuthority, files::kCertificate, files::kKey, files::kGovernance,
                                   files::kPermissions};
 
-bool is_digested(const std::string& name) {
-  return std::find(kDigested.begin(), kDigested.end(), name) != kDigested.end();
-}
-
 }  // namespace
 
 std::string key_digests(const std::vector<std::pair<std::string, std::string>>& contents) {
   std::string text;
   for (const auto& [name, content] : contents) {
-    if (is_digested(name)) text += fmt::format("{}  {}\n", hex_of(digest_of({content})), name);
+    text += fmt::format("{}  {}\n", hex_of(digest_of({content})), name);
   }
   return text;
 }
