@@ -41,6 +41,18 @@ struct Facts {
   std::optional<CameraModel> lens;
 };
 
+// So that surface and camera are both seen.
+std::optional<ViewAim> aim_at(const ShownSurface& shown) {
+  if (!shown.usable() || !shown.X_WC || shown.features.empty()) return std::nullopt;
+  ViewAim aim;
+  for (const ShownFeature& feature : shown.features) aim.at += Eigen::Map<const Vector3d>(feature.position_W_mm.data());
+  aim.at /= static_cast<double>(shown.features.size());
+  const Vector3d way = shown.X_WC->t - aim.at;
+  const Vector3d up = -shown.X_WC->R.col(1);
+  aim.from = aim.at + 1.6 * way + 0.8 * way.norm() * up;
+  return aim;
+}
+
 class Exporter {
  public:
   Exporter(std::vector<RecordingPlayer> players, std::string stream, Duration offset, Facts facts, ViewWriter writer)
@@ -143,6 +155,7 @@ class Exporter {
     const Instant capture = utc(surface.capture_time_ns);
     ++summary_.surfaces;
     if (shown.usable()) ++summary_.shown;
+    if (const auto aim = aim_at(shown)) summary_.aim = aim;
     std::optional<CameraModel> lens = facts_.lens;
     if (shown.X_WC) {
       if (lens) lens = PictureProjector(surface, *lens).lens();
@@ -281,7 +294,7 @@ Expected<ViewExportSummary> export_view(const ViewExportFiles& files, const std:
   if (!writer) return tl::unexpected(writer.error());
   auto summary = Exporter(std::move(*players), states->stream, offset, std::move(*facts), std::move(*writer)).run();
   if (!summary) return summary;
-  if (auto written = write_text_file(files.layout, view_layout(summary->world_frame)); !written) {
+  if (auto written = write_text_file(files.layout, view_layout(summary->world_frame, summary->aim)); !written) {
     return tl::unexpected(written.error());
   }
   return summary;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
+#include "daemon/bridge/messages/view_layout.hpp"
 
 namespace perimap {
 
@@ -25,6 +26,7 @@ struct ViewExportSummary {
   std::uint64_t ecg_values = 0;
   std::uint64_t transforms = 0;
   std::string world_frame;
+  std::optional<ViewAim> aim;  // at the last surface that was shown, from behind the camera and above it
   // What is damaged, or not there; one line each. What is whole was exported.
   std::vector<std::string> warnings;
 };

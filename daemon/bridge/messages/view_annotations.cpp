@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "daemon/bridge/messages/lent.hpp"
 #include "daemon/bridge/messages/view_colours.hpp"
 #include "daemon/publishing/wire_names.hpp"
@@ -10,10 +12,13 @@
 namespace perimap {
 namespace {
 
+// Of a picture of this width; of others in proportion.
+constexpr double kWidth_px = 320.0;
 constexpr double kCircle_px = 7.0;
 constexpr double kLine_px = 1.5;
 constexpr double kText_px = 14.0;
-constexpr foxglove_Point2 kWordsAt{6.0, 20.0};
+// A letter's width by its height, as viewers write them: the words are to fit into the picture.
+constexpr double kLetter = 0.62;
 constexpr foxglove_Color kWhite{1.0, 1.0, 1.0, 1.0};
 constexpr foxglove_Color kBackground{0.0, 0.0, 0.0, 0.6};
 constexpr foxglove_Color kNone{0.0, 0.0, 0.0, 0.0};
@@ -23,33 +28,35 @@ foxglove_Point2 pixel(const Vector2d& px) { return {px.x() + 0.5, px.y() + 0.5};
 
 }  // namespace
 
-void ViewAnnotations::add_words(const ShownSurface& shown, Instant utc) {
+void ViewAnnotations::add_words(const ShownSurface& shown, double scale, Instant utc) {
   words_ = name_of(shown.state);
   if (!shown.why.empty()) words_ += fmt::format(": {}", shown.why);
   auto& text = texts_.emplace_back();
   text.timestamp = to_foxglove_time(utc);
-  text.position = kWordsAt;
+  const double fitting_px = kWidth_px / (kLetter * static_cast<double>(words_.size() + 2));
+  text.font_size = scale * std::min(kText_px, fitting_px);
+  text.position = {scale * 6.0, scale * 6.0 + text.font_size};
   text.text = lent(words_);
-  text.font_size = kText_px;
   text.text_color = shown.usable() ? colour_of(shown.state, 0.0) : kWhite;
   text.background_color = kBackground;
 }
 
-void ViewAnnotations::add_features(const PictureProjector& project, Instant utc) {
+void ViewAnnotations::add_features(const PictureProjector& project, double scale, Instant utc) {
   for (const client::PredictedFeature& feature : features_.features) {
     const auto px = project(feature.position_W_mm);
     if (!px || feature.state == perimap_FEATURE_INVALID || !project.lens().contains(*px)) continue;
     auto& circle = circles_.emplace_back();
     circle.timestamp = to_foxglove_time(utc);
     circle.position = pixel(*px);
-    circle.diameter = kCircle_px;
-    circle.thickness = kLine_px;
+    circle.diameter = scale * kCircle_px;
+    circle.thickness = scale * kLine_px;
     circle.fill_color = kNone;
     circle.outline_color = colour_of(feature.state);
   }
 }
 
-void ViewAnnotations::add_outline(const PictureProjector& project, const ShownSurface& shown, Instant utc) {
+void ViewAnnotations::add_outline(const PictureProjector& project, const ShownSurface& shown, double scale,
+                                  Instant utc) {
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
     const auto& corners = mesh_.triangles[t];
     for (std::size_t k = 0; k < 3; ++k) {
@@ -68,7 +75,7 @@ void ViewAnnotations::add_outline(const PictureProjector& project, const ShownSu
   lend(outline_, lines.points);
   lines.outline_color = colour_of(shown.state, 0.0);
   lines.fill_color = kNone;
-  lines.thickness = kLine_px;
+  lines.thickness = scale * kLine_px;
 }
 
 const foxglove_ImageAnnotations& ViewAnnotations::of(const perimap_Surface& surface, const ShownSurface& shown,
@@ -79,15 +86,16 @@ const foxglove_ImageAnnotations& ViewAnnotations::of(const perimap_Surface& surf
   lines_.clear();
   outline_.clear();
   texts_.clear();
-  add_words(shown, utc);
+  const double scale = lens ? lens->width / kWidth_px : 1.0;
+  add_words(shown, scale, utc);
   const perimap_SurfaceModel* model = gate.model();
   if (shown.usable() && shown.X_WC && lens && model != nullptr) {
     const PictureProjector project(surface, *lens);
     const std::int64_t capture = surface.capture_time_ns;
-    if (client::predict(*model, capture, to_ns(receipt), {true}, features_)) add_features(project, utc);
+    if (client::predict(*model, capture, to_ns(receipt), {true}, features_)) add_features(project, scale, utc);
     if (!shown.mesh.triangles.empty() &&
         client::predict(*gate.mesh(), *model, capture, to_ns(receipt), {true}, mesh_)) {
-      add_outline(project, shown, utc);
+      add_outline(project, shown, scale, utc);
     }
   }
   lend(circles_, annotations_.circles);

@@ -28,9 +28,10 @@ class ViewAnnotations {
                                                     Instant receipt, Instant utc);
 
  private:
-  void add_words(const ShownSurface& shown, Instant utc);
-  void add_features(const PictureProjector& project, Instant utc);
-  void add_outline(const PictureProjector& project, const ShownSurface& shown, Instant utc);
+  // `scale`: of this picture beside one of the usual width.
+  void add_words(const ShownSurface& shown, double scale, Instant utc);
+  void add_features(const PictureProjector& project, double scale, Instant utc);
+  void add_outline(const PictureProjector& project, const ShownSurface& shown, double scale, Instant utc);
 
   foxglove_ImageAnnotations annotations_{};
   std::vector<foxglove_CircleAnnotation> circles_;

@@ -1,8 +1,12 @@
 #include "daemon/bridge/messages/view_layout.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/angle/angle.hpp"
 #include "daemon/bridge/messages/view_names.hpp"
+#include "daemon/bridge/messages/view_units.hpp"
 #include "drivers/json/json_text.hpp"
 
 namespace perimap {
@@ -25,16 +29,27 @@ Json image_panel() {
           {"topics", {{view_names::kScene, {{"visible", false}}}}}};
 }
 
-Json scene_panel(const std::string& world_frame) {
+// Their angles: phi from the third axis, theta about it from the second axis' negative half, degrees.
+Json scene_panel(const std::string& world_frame, const std::optional<ViewAim>& aim) {
+  double distance_m = 0.4, phi_deg = 60.0, theta_deg = 45.0;
+  Json at = {0, 0, 0};
+  if (aim && (aim->from - aim->at).norm() > 0.0) {
+    const Vector3d way = aim->from - aim->at;
+    const Vector3d towards = way.normalized();
+    distance_m = way.norm() * kMetresPerMillimetre;
+    phi_deg = std::acos(std::clamp(towards.z(), -1.0, 1.0)) / kDegree;
+    theta_deg = -std::atan2(towards.x(), -towards.y()) / kDegree;
+    at = {aim->at.x() * kMetresPerMillimetre, aim->at.y() * kMetresPerMillimetre, aim->at.z() * kMetresPerMillimetre};
+  }
   return {{"followTf", world_frame},
           {"followMode", "follow-none"},
           {"scene", {{"transforms", {{"axisScale", 0.02}, {"labelSize", 0.01}}}}},
           {"cameraState",
            {{"perspective", true},
-            {"distance", 0.4},
-            {"phi", 60},
-            {"thetaOffset", 45},
-            {"targetOffset", {0, 0, 0}},
+            {"distance", distance_m},
+            {"phi", phi_deg},
+            {"thetaOffset", theta_deg},
+            {"targetOffset", at},
             {"target", {0, 0, 0}},
             {"targetOrientation", {0, 0, 0, 1}},
             {"fovy", 45},
@@ -64,14 +79,14 @@ Json state_panel() {
 
 }  // namespace
 
-std::string view_layout(const std::string& world_frame) {
+std::string view_layout(const std::string& world_frame, const std::optional<ViewAim>& aim) {
   const Json signals = {{"first", kEcgPanel}, {"second", kStatePanel}, {"direction", "row"}, {"splitPercentage", 60}};
   const Json pictures = {
       {"first", kImagePanel}, {"second", kScenePanel}, {"direction", "row"}, {"splitPercentage", 50}};
   const Json layout = {
       {"configById",
        {{kImagePanel, image_panel()},
-        {kScenePanel, scene_panel(world_frame)},
+        {kScenePanel, scene_panel(world_frame, aim)},
         {kEcgPanel, plot_panel()},
         {kStatePanel, state_panel()}}},
       {"globalVariables", Json::object()},

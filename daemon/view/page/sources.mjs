@@ -38,7 +38,7 @@ export function factsOf(status) {
   ];
   if (status.latency_short) facts.push({text: "pipeline.latency_ms is too short for these sources", bad: true});
   if (status.releases_missed > 0) facts.push({text: `${status.releases_missed} releases missed`, bad: true});
-  if (status.features_shed > 0) facts.push({text: `${status.features_shed} features not looked for: too little computing time`, bad: true});
+  if (status.features_shed > 0) facts.push({text: `${status.features_shed === 1 ? "1 feature" : `${status.features_shed} features`} not looked for: too little computing time`, bad: true});
   status.ecg_leads.forEach((lead, i) => {
     if (lead === "flat" || lead === "off" || lead === "noisy") {
       facts.push({text: `${i ? "second" : "first"} lead of the ECG ${lead}`, bad: true});

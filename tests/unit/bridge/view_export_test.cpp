@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "daemon/bridge/messages/view_layout.hpp"
 #include "daemon/bridge/messages/view_names.hpp"
@@ -360,7 +362,14 @@ TEST_F(ViewExport, TheLayoutShowsTopicsThatAreThere) {
   std::ifstream in(files_.layout);
   const auto layout = nlohmann::json::parse(in, nullptr, false);
   ASSERT_TRUE(layout.is_object());
-  EXPECT_EQ(layout, nlohmann::json::parse(view_layout("tracker")));
+  auto aimed = layout;
+  const auto anywhere = nlohmann::json::parse(view_layout("tracker"));
+  for (const char* key : {"distance", "phi", "thetaOffset", "targetOffset"}) {
+    auto& eye = aimed["configById"]["3D!perimap"]["cameraState"];
+    EXPECT_NE(eye.at(key), anywhere["configById"]["3D!perimap"]["cameraState"].at(key)) << "it looks at the surface";
+    eye[key] = anywhere["configById"]["3D!perimap"]["cameraState"].at(key);
+  }
+  EXPECT_EQ(aimed, anywhere);
   auto reader = RecordingReader::open(files_.output);
   ASSERT_TRUE(reader);
   const auto& panels = layout.at("configById");
@@ -383,6 +392,21 @@ TEST_F(ViewExport, TheLayoutShowsTopicsThatAreThere) {
   }
   EXPECT_EQ(panels.at("3D!perimap").at("followTf"), "tracker");
   EXPECT_TRUE(nlohmann::json::accept(view_layout("\xFF")));
+}
+
+// By the viewers' angles: theta turns the second axis' negative half towards the first axis' negative one.
+TEST(ViewLayout, LooksFromWhereItWasTold) {
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  const ViewAim aim{{30.0, -200.0, 500.0}, {90.0, -150.0, 440.0}};
+  const auto layout = nlohmann::json::parse(view_layout("tracker", aim));
+  const auto& eye = layout.at("configById").at("3D!perimap").at("cameraState");
+  const double r = eye.at("distance"), phi = eye.at("phi").get<double>() * kDegree;
+  const double theta = -eye.at("thetaOffset").get<double>() * kDegree;
+  const Vector3d from(r * std::sin(phi) * std::sin(theta), -r * std::sin(phi) * std::cos(theta), r * std::cos(phi));
+  const auto at = eye.at("targetOffset").get<std::vector<double>>();
+  EXPECT_LT((1e3 * (Vector3d(at[0], at[1], at[2]) + from) - aim.from).norm(), 1e-9);
+  // From nowhere else: it stands where it looks.
+  EXPECT_EQ(view_layout("tracker", ViewAim{aim.at, aim.at}), view_layout("tracker"));
 }
 
 }  // namespace
