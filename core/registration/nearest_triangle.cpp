@@ -52,7 +52,7 @@ struct NearestTriangle::Tree {
 
 NearestTriangle::NearestTriangle(const TriangleMesh& mesh)
     : mesh_(mesh),
-      normals_(mesh.vertices.size(), Vector3d::Zero()),
+      normals_(vertex_normals(mesh)),
       border_edges_(mesh.triangles.size(), 0),
       on_border_(mesh.vertices.size(), 0) {
   std::vector<TreeEntry> entries;
@@ -61,10 +61,7 @@ NearestTriangle::NearestTriangle(const TriangleMesh& mesh)
     const auto& triangle = mesh.triangles[t];
     const Vector3d &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]], &c = mesh.vertices[triangle[2]];
     entries.emplace_back(TreeBox(tree_point(a.cwiseMin(b).cwiseMin(c)), tree_point(a.cwiseMax(b).cwiseMax(c))), t);
-    const Vector3d normal = (b - a).cross(c - a);
-    for (const std::uint32_t vertex : triangle) normals_[vertex] += normal;
   }
-  for (Vector3d& normal : normals_) normal.normalize();
   for_each_edge(mesh.triangles, [this](std::span<const MeshSide> sides) {
     if (sides.size() != 1) return;
     border_edges_[sides[0].triangle] |= static_cast<std::uint8_t>(1U << sides[0].side);

@@ -5,10 +5,14 @@
 #include <cmath>
 #include <utility>
 
+#include "core/surface/six_elements.hpp"
+
 namespace perimap {
 namespace {
 
 constexpr int kLowHarmonics = 2;
+// Places at once, so that their matrices stay in the processor's cache.
+constexpr std::size_t kBlock = 128;
 
 tl::unexpected<SurfaceRefusal> refuse(SurfaceRefusalKind kind, std::string message) {
   return tl::unexpected(SurfaceRefusal{kind, std::move(message)});
@@ -17,18 +21,6 @@ tl::unexpected<SurfaceRefusal> refuse(SurfaceRefusalKind kind, std::string messa
 Vector3d coefficients_of(const SurfaceEvidence& evidence, const BasisLayout& layout, int element) {
   const int n = layout.size();
   return {evidence.x(element), evidence.x(n + element), evidence.x(2 * n + element)};
-}
-
-Matrix3d from_six(const Eigen::Ref<const Eigen::Matrix<double, 6, 1>>& c) {
-  Matrix3d m;
-  m << c(0), c(1), c(2), c(1), c(3), c(4), c(2), c(4), c(5);
-  return m;
-}
-
-Eigen::Matrix<double, 6, 1> to_six(const Matrix3d& m) {
-  Eigen::Matrix<double, 6, 1> c;
-  c << m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2);
-  return c;
 }
 
 std::string of_feature(std::uint32_t id) { return "feature " + std::to_string(id); }
@@ -245,13 +237,65 @@ PredictedPlaces PeriodicSurface::predict(std::span<const Vector2d> places) const
   out.coefficients_W_mm.setZero(3 * V, layout_.size());
   out.covariances_W_mm2.setZero(6, V);
   out.support.resize(places.size());
-  // So that a block's matrices stay in the processor's cache.
-  constexpr std::size_t kBlock = 128;
   for (std::size_t first = 0; first < places.size(); first += kBlock) {
     const std::size_t count = std::min(kBlock, places.size() - first);
     predict_block(places.subspan(first, count), static_cast<Eigen::Index>(first), out);
   }
   return out;
+}
+
+void PeriodicSurface::add_motion(const Eigen::Matrix3Xd& p_W_mm, Eigen::Index first, Eigen::MatrixXd& coefficients_W_mm,
+                                 Matrix6Xd& covariance_A_mm2) const {
+  const Eigen::Index V = p_W_mm.cols();
+  const Matrix3d& R_WA = chart_.X_WA.R;
+  const Eigen::ArrayXXd r_mm = distances(p_W_mm_, p_W_mm);
+  for (const HarmonicGroup group : kEveryHarmonicGroup) {
+    const auto& motion = motion_[static_cast<std::size_t>(group)];
+    if (!motion) continue;
+    const MotionField::Prediction predicted = motion->at(r_mm);
+    covariance_A_mm2 += predicted.covariance_A_mm2;
+    const auto [band_first, band_end] = bands_of(layout_, group);
+    for (int band = band_first; band < band_end; ++band) {
+      const BandPlace place = band_place(layout_, band);
+      const Eigen::Index b = band - band_first;
+      for (Eigen::Index v = 0; v < V; ++v) {
+        const auto across = predicted.across_mm.row(v).segment<4>(4 * b);
+        const auto along = predicted.along_mm.row(v).segment<2>(2 * b);
+        coefficients_W_mm.block<3, 1>(3 * (first + v), place.cosine) =
+            R_WA * Vector3d(across(0), across(1), along(0));
+        coefficients_W_mm.block<3, 1>(3 * (first + v), place.sine) =
+            R_WA * Vector3d(across(2), across(3), along(1));
+      }
+    }
+  }
+}
+
+PredictedMotion PeriodicSurface::motion_at(const Eigen::Matrix3Xd& p_W_mm) const {
+  PredictedMotion out;
+  const Eigen::Index V = p_W_mm.cols();
+  out.coefficients_W_mm.setZero(3 * V, layout_.size());
+  out.covariances_W_mm2.resize(6, V);
+  const Matrix3d& R_WA = chart_.X_WA.R;
+  for (Eigen::Index first = 0; first < V; first += static_cast<Eigen::Index>(kBlock)) {
+    const Eigen::Index count = std::min(static_cast<Eigen::Index>(kBlock), V - first);
+    Matrix6Xd covariance_A_mm2 = Matrix6Xd::Zero(6, count);
+    add_motion(p_W_mm.middleCols(first, count), first, out.coefficients_W_mm, covariance_A_mm2);
+    for (Eigen::Index v = 0; v < count; ++v) {
+      out.covariances_W_mm2.col(first + v) = to_six(R_WA * from_six(covariance_A_mm2.col(v)) * R_WA.transpose());
+    }
+  }
+  return out;
+}
+
+Matrix3d PeriodicSurface::unknown_motion_W_mm2() const {
+  Vector3d variances_A = Vector3d::Zero();
+  for (const auto& motion : motion_) {
+    if (!motion) continue;
+    // Cosine and sine have half of the cycle each.
+    const double across = motion->variances_across().sum();
+    variances_A += Vector3d(across, across, motion->variances_along().sum());
+  }
+  return chart_.X_WA.R * variances_A.asDiagonal() * chart_.X_WA.R.transpose();
 }
 
 void PeriodicSurface::predict_block(std::span<const Vector2d> places, Eigen::Index first, PredictedPlaces& out) const {
@@ -269,26 +313,7 @@ void PeriodicSurface::predict_block(std::span<const Vector2d> places, Eigen::Ind
     const double variance_mm2 = depth.variance_mm2(v) + turning_variance_mm2(s_mm.col(v), depth.depth_mm(v));
     covariance_A_mm2.col(v) = variance_mm2 * to_six(ray_A * ray_A.transpose());
   }
-  const Eigen::ArrayXXd r_mm = distances(p_W_mm_, p_W_mm);
-  for (const HarmonicGroup group : kEveryHarmonicGroup) {
-    const auto& motion = motion_[static_cast<std::size_t>(group)];
-    if (!motion) continue;
-    const MotionField::Prediction predicted = motion->at(r_mm);
-    covariance_A_mm2 += predicted.covariance_A_mm2;
-    const auto [band_first, band_end] = bands_of(layout_, group);
-    for (int band = band_first; band < band_end; ++band) {
-      const BandPlace place = band_place(layout_, band);
-      const Eigen::Index b = band - band_first;
-      for (Eigen::Index v = 0; v < V; ++v) {
-        const auto across = predicted.across_mm.row(v).segment<4>(4 * b);
-        const auto along = predicted.along_mm.row(v).segment<2>(2 * b);
-        out.coefficients_W_mm.block<3, 1>(3 * (first + v), place.cosine) =
-            R_WA * Vector3d(across(0), across(1), along(0));
-        out.coefficients_W_mm.block<3, 1>(3 * (first + v), place.sine) =
-            R_WA * Vector3d(across(2), across(3), along(1));
-      }
-    }
-  }
+  add_motion(p_W_mm, first, out.coefficients_W_mm, covariance_A_mm2);
   const double bound_mm2 = settings_.largest_deviation_mm * settings_.largest_deviation_mm;
   for (Eigen::Index v = 0; v < V; ++v) {
     const Matrix3d covariance_A = from_six(covariance_A_mm2.col(v));

@@ -63,6 +63,12 @@ struct PredictedPlaces {
   std::vector<Support> support;       // V
 };
 
+// What moves at V places in space, without where they are.
+struct PredictedMotion {
+  Eigen::MatrixXd coefficients_W_mm;  // 3 V x basis, as of PredictedPlaces; the mean's are 0
+  Matrix6Xd covariances_W_mm2;        // 6 x V, mean over the cycle
+};
+
 // Each feature beside what all others make of it: what the surface is worth, with no truth needed.
 struct SurfaceAgreement {
   double rms_mm = 0.0;  // of the position, over cycle and features
@@ -99,6 +105,12 @@ class PeriodicSurface {
   // At places of the chart (mm). Those without support have figures all the same, and are to be refused.
   [[nodiscard]] PredictedPlaces predict(std::span<const Vector2d> places) const;
 
+  // At mean places in space, 3 x V, mm, W.
+  [[nodiscard]] PredictedMotion motion_at(const Eigen::Matrix3Xd& p_W_mm) const;
+  // Of a place that no feature tells anything of, the position's variance by its motion, W, mean over the cycle.
+  [[nodiscard]] Matrix3d unknown_motion_W_mm2() const;
+
+  [[nodiscard]] const SurfaceSettings& settings() const noexcept { return settings_; }
   [[nodiscard]] const SurfaceAgreement& agreement() const noexcept { return agreement_; }
   // The features it rests on, how many they are, and the ids of those that contradict their neighbours and were left
   // out.
@@ -116,6 +128,9 @@ class PeriodicSurface {
   [[nodiscard]] std::vector<double> leave_one_out();
   [[nodiscard]] bool leave_out_contradicted();
   void predict_block(std::span<const Vector2d> places, Eigen::Index first, PredictedPlaces& out) const;
+  // Into the rows of places `first` and on, and on top of the covariances in the chart's axes, 6 x V.
+  void add_motion(const Eigen::Matrix3Xd& p_W_mm, Eigen::Index first, Eigen::MatrixXd& coefficients_W_mm,
+                  Matrix6Xd& covariance_A_mm2) const;
 
   BasisLayout layout_;
   SurfaceSettings settings_;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/surface/six_elements.hpp"
+
 namespace perimap {
 namespace {
 
@@ -128,10 +130,7 @@ EvaluatedSurface::EvaluatedSurface(const SurfaceMesh& mesh)
       deviations_(mesh.vertices()) {
   Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
   for (Eigen::Index v = 0; v < mesh.vertices(); ++v) {
-    const auto c = mesh.covariances_W_mm2.col(v);
-    Matrix3d covariance;
-    covariance << c(0), c(1), c(2), c(1), c(3), c(4), c(2), c(4), c(5);
-    solver.computeDirect(covariance, Eigen::EigenvaluesOnly);
+    solver.computeDirect(from_six(mesh.covariances_W_mm2.col(v)), Eigen::EigenvaluesOnly);
     largest_mm2_(v) = solver.eigenvalues()(2);
   }
 }
