@@ -508,6 +508,8 @@ inline const char* describe_mesh_reason(std::uint8_t reason) noexcept {
       return "the features' numbers make no surface";
     case perimap_MESH_REASON_NOTHING_SUPPORTED:
       return "the features are too uncertain for a surface";
+    case perimap_MESH_REASON_NOT_THE_MODEL:
+      return "the model of the organ does not lie where the surface is seen";
     default:
       return "there is no surface, for a reason that this client does not know";
   }

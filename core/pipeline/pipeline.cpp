@@ -84,7 +84,7 @@ Pipeline::Parts::Parts(const PipelineSettings& of, FrameTrace* kept_trace)
           {settings.respiration.search.shortest_period, settings.respiration.search.longest_period}, counters, trace),
       team(settings.workers),
       finder(settings, counters),
-      surface_maker(settings.estimator.layout, slots.size(), kMeshVertices, settings.lockstep),
+      surface_maker(settings.estimator.layout, slots.size(), kMeshVertices, settings.lockstep, settings.organ_model),
       starter(settings, slots, surface_maker),
       watcher(settings),
       scope(settings.turned_scope || settings.watch_scope ? std::make_unique<ScopeWatch>(settings, counters) : nullptr),

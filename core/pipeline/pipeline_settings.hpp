@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <optional>
 
 #include "core/calibration/turned_scope.hpp"
@@ -19,6 +20,8 @@
 #include "core/time/instant.hpp"
 
 namespace perimap {
+
+struct OrganModel;
 
 struct FeatureSettings {
   int maximum = 120;
@@ -61,6 +64,7 @@ struct PipelineSettings {
   bool shedding = true;  // of features that the budget does not suffice for; not in lockstep
   Duration validity = std::chrono::milliseconds(200);
   UseBounds use_within_mm{5.0, 3.0, 2.0};
+  std::shared_ptr<const OrganModel> organ_model;  // the topology of the surface; null: its own
   bool phase_from_image = true;
   bool law_from_image = false;                      // clock.law holds until the images show another
   Duration image_alone = std::chrono::seconds(10);  // the images carry the phase on so long without the ECG

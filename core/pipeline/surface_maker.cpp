@@ -10,8 +10,9 @@ constexpr std::uint64_t kFitsAKernel = 4;
 
 }  // namespace
 
-SurfaceMaker::SurfaceMaker(const BasisLayout& layout, std::size_t features, std::size_t vertices, bool lockstep)
-    : layout_(layout), vertices_(vertices), hand_over_(lockstep) {
+SurfaceMaker::SurfaceMaker(const BasisLayout& layout, std::size_t features, std::size_t vertices, bool lockstep,
+                           std::shared_ptr<const OrganModel> model)
+    : layout_(layout), vertices_(vertices), model_(std::move(model)), hand_over_(lockstep) {
   job_.evidence.reserve(features);
 }
 
@@ -58,7 +59,8 @@ void SurfaceMaker::make() {
   if (surface) {
     ++fits_;
     kernels_ = surface->kernels();
-    made->mesh = mesh_of(*surface, vertices_);
+    made->of_model = model_ != nullptr;
+    made->mesh = model_ ? mesh_of(*surface, *model_) : mesh_of(*surface, vertices_);
     // After support is decided: a set-up that is a little wrong moves all of it, and hides no place.
     for (const int diagonal : {0, 3, 5}) {
       made->mesh.covariances_W_mm2.row(diagonal).array() += job_.setup_variance_mm2;

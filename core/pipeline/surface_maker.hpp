@@ -12,6 +12,7 @@
 #include "core/phase/phase_law.hpp"
 #include "core/realtime/background_round.hpp"
 #include "core/realtime/counter.hpp"
+#include "core/surface/model_mesh.hpp"
 #include "core/surface/periodic_surface.hpp"
 #include "core/surface/surface_mesh.hpp"
 #include "core/time/instant.hpp"
@@ -39,6 +40,7 @@ struct MadeSurface {
   std::optional<PeriodicSurface> surface;  // without a value: refused
   SurfaceRefusal refusal;
   SurfaceMesh mesh;
+  bool of_model = false;  // the mesh has the vertices of a preoperative model
 };
 
 // Of new features, since start. Written by the mapper thread.
@@ -51,7 +53,9 @@ struct StartsOnSurface {
 // any thread that is not of the real-time path.
 class SurfaceMaker {
  public:
-  SurfaceMaker(const BasisLayout& layout, std::size_t features, std::size_t vertices, bool lockstep);
+  // `model`: what the mesh has for its topology; without one it is of about `vertices` of its own.
+  SurfaceMaker(const BasisLayout& layout, std::size_t features, std::size_t vertices, bool lockstep,
+               std::shared_ptr<const OrganModel> model = nullptr);
 
   // Mapper: the job to fill; null while one is under way. Its vector has room for all features.
   [[nodiscard]] SurfaceJob* job() noexcept;
@@ -80,6 +84,7 @@ class SurfaceMaker {
 
   BasisLayout layout_;
   std::size_t vertices_;
+  std::shared_ptr<const OrganModel> model_;
   StartsOnSurface starts_;
   BackgroundRound hand_over_;
   SurfaceJob job_;     // handed over: the maker's while one is under way

@@ -130,10 +130,10 @@ double volume_mm3(const TriangleMesh& mesh, double& unsigned_mm3) {
 
 std::optional<Error> wrong_size(double size_mm) {
   if (size_mm < kSmallest_mm) {
-    return Error{"is " + length_text(size_mm) + " large: are its lengths in metres? Then say --unit m"};
+    return Error{"is " + length_text(size_mm) + " large: are its lengths in metres? Then its unit is m"};
   }
   if (size_mm > kLargest_mm) {
-    return Error{"is " + length_text(size_mm) + " large: are its lengths in mm? Then say --unit mm"};
+    return Error{"is " + length_text(size_mm) + " large: are its lengths in mm? Then its unit is mm"};
   }
   return std::nullopt;
 }

@@ -71,15 +71,15 @@ class DepthMeasurement {
   }
 
   // `covariance_mm2`: of the mean place p by the model, n its outward normal.
-  [[nodiscard]] Seen update(Eigen::Index v, const Vector3d& p, const Vector3d& n, const Matrix3d& covariance_mm2) const {
+  [[nodiscard]] Seen update(Eigen::Index v, const Vector3d& p, const Vector3d& n,
+                            const Matrix3d& covariance_mm2) const {
     Seen seen{false, p, covariance_mm2};
     const SurfaceChart::Place& place = places_[static_cast<std::size_t>(v)];
     if (!(place.depth_mm > 0.0) || surface_.support().at(place.s) != Support::kSupported) return seen;
     const Vector3d ray = surface_.chart().ray_W(place.s);
     const double along = n.dot(ray);
     if (!(-along > kFacingCosine * ray.norm())) return seen;
-    const double variance_mm2 =
-        depth_.variance_mm2(v) + surface_.turning_variance_mm2(place.s, depth_.depth_mm(v));
+    const double variance_mm2 = depth_.variance_mm2(v) + surface_.turning_variance_mm2(place.s, depth_.depth_mm(v));
     const double r = along * (depth_.depth_mm(v) - place.depth_mm);
     const Vector3d Sigma_n = covariance_mm2 * n;
     const double innovation_mm2 = n.dot(Sigma_n) + along * along * variance_mm2;

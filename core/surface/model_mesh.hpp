@@ -1,13 +1,14 @@
-// The surface with a preoperative model of the organ for its topology: the model's vertices, set in motion by the features.
+// The surface with a preoperative model of the organ for its topology: the model's vertices, set in motion by the
+// features.
 //
-// A vertex lies at m in W at the phase phi_0 at which the model was imaged, and moves as the field of motion does at its
-// mean place (MotionField). With the harmonics h(phi; p) of the field,
+// A vertex lies at m in W at the phase phi_0 at which the model was imaged, and moves as the field of motion does at
+// its mean place (MotionField). With the harmonics h(phi; p) of the field,
 //
 //   p = m - h(phi_0; p),   p(phi) = p + h(phi; p),
 //
-// and p is found by repetition. How far the model's shape and registration are off goes into the covariance of p, and so
-// does what is not known of h(phi_0; p). Where the features tell how deep the surface lies (DepthField), the vertex is
-// moved along its normal by one step of a Kalman filter with that depth for its measurement: on the surface that is
+// and p is found by repetition. How far the model's shape and registration are off goes into the covariance of p, and
+// so does what is not known of h(phi_0; p). Where the features tell how deep the surface lies (DepthField), the vertex
+// is moved along its normal by one step of a Kalman filter with that depth for its measurement: on the surface that is
 // seen, along it as the registration has it. docs/design/surface.md.
 #pragma once
 
@@ -20,7 +21,7 @@
 namespace perimap {
 
 struct OrganModel {
-  TriangleMesh mesh_W;             // mm, at `phase_rad`
+  TriangleMesh mesh_W;              // mm, at `phase_rad`
   std::vector<Vector3d> normals_W;  // vertex_normals() of it
   double phase_rad = 0.0;
   double shape_mm = 1.0;         // its error along its normals, standard deviation

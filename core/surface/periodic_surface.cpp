@@ -261,10 +261,8 @@ void PeriodicSurface::add_motion(const Eigen::Matrix3Xd& p_W_mm, Eigen::Index fi
       for (Eigen::Index v = 0; v < V; ++v) {
         const auto across = predicted.across_mm.row(v).segment<4>(4 * b);
         const auto along = predicted.along_mm.row(v).segment<2>(2 * b);
-        coefficients_W_mm.block<3, 1>(3 * (first + v), place.cosine) =
-            R_WA * Vector3d(across(0), across(1), along(0));
-        coefficients_W_mm.block<3, 1>(3 * (first + v), place.sine) =
-            R_WA * Vector3d(across(2), across(3), along(1));
+        coefficients_W_mm.block<3, 1>(3 * (first + v), place.cosine) = R_WA * Vector3d(across(0), across(1), along(0));
+        coefficients_W_mm.block<3, 1>(3 * (first + v), place.sine) = R_WA * Vector3d(across(2), across(3), along(1));
       }
     }
   }

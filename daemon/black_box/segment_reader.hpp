@@ -7,9 +7,9 @@
 #include <string_view>
 
 #include "core/error/expected.hpp"
-#include "daemon/digest/digest.hpp"
 #include "daemon/black_box/entry.hpp"
 #include "daemon/black_box/segment_header.hpp"
+#include "daemon/digest/digest.hpp"
 
 namespace perimap::black_box {
 

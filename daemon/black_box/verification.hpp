@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/error/expected.hpp"
-#include "daemon/digest/digest.hpp"
 #include "daemon/black_box/entry.hpp"
+#include "daemon/digest/digest.hpp"
 
 namespace perimap::black_box {
 

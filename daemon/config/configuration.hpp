@@ -186,6 +186,17 @@ struct UseConfiguration {
   bool operator==(const UseConfiguration&) const = default;
 };
 
+// A preoperative model of the organ, in the frame that poses are registered to.
+struct ModelConfiguration {
+  std::optional<std::filesystem::path> file;  // none: the surface's topology is its own
+  double unit_mm = 1.0;                       // of its coordinates
+  double phase = 0.75;                        // when it was imaged, as a share of the heart's cycle
+  double shape_mm = 1.5;                      // what its shape may be off by along its normals
+  double registration_mm = 1.0;               // what its place at the organ may be off by in each direction
+
+  bool operator==(const ModelConfiguration&) const = default;
+};
+
 struct RealtimeConfiguration {
   int priority = 0;  // SCHED_FIFO; 0: not requested
   bool lock_memory = true;
@@ -265,6 +276,7 @@ struct Configuration {
   FeaturesConfiguration features;
   EstimationConfiguration estimation;
   UseConfiguration use;
+  ModelConfiguration model;
   RealtimeConfiguration realtime;
   DdsConfiguration dds;
   RecordingConfiguration recording;

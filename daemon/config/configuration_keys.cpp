@@ -352,6 +352,19 @@ void add_running(std::vector<ConfigurationKey>& keys) {
               "a surface may be shown where 95 % of errors are within so much; each surface says whether they are")
       .number("measure_mm", 0.1, 100, PERIMAP_MEMBER(use.measure_mm), "likewise, to measure in it")
       .number("contact_mm", 0.1, 100, PERIMAP_MEMBER(use.contact_mm), "likewise, to act in contact with it");
+  const std::array<std::pair<std::string_view, double>, 2> units{{{"mm", 1.0}, {"m", 1000.0}}};
+  Section("model", keys)
+      .file("file", PERIMAP_MEMBER(model.file),
+            "a surface of the organ that was imaged before (STL, PLY, OBJ, VTK), in the frame of tracker.registration: "
+            "the published mesh has its vertices, set in motion; none: the mesh is laid through the features")
+      .choice("unit", units, PERIMAP_MEMBER(model.unit_mm), "of its coordinates")
+      .number("phase", 0, 1, PERIMAP_MEMBER(model.phase),
+              "when it was imaged, as a share of the time from one R peak to the next")
+      .number("shape_mm", 0.05, 20, PERIMAP_MEMBER(model.shape_mm),
+              "what its shape may be off by along its normals, standard deviation")
+      .number("registration_mm", 0.05, 20, PERIMAP_MEMBER(model.registration_mm),
+              "what its place at the organ may be off by in each direction, standard deviation, as `perimap refine` "
+              "tells it");
   Section("realtime", keys)
       .integer("priority", 0, 98, PERIMAP_MEMBER(realtime.priority), "SCHED_FIFO priority; 0: not requested")
       .flag("lock_memory", PERIMAP_MEMBER(realtime.lock_memory), "keeps all memory in RAM")

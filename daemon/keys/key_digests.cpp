@@ -38,8 +38,8 @@ Expected<void> check_key_digests(const fs::path& folder) {
     auto content = read_text_file(folder / name, kLargestFile, "file of keys");
     if (!content) return tl::unexpected(content.error());
     if (told->find(key_digests({{name, *content}})) == std::string::npos) {
-      return fail(fmt::format("{}: is not as it was issued (by its digest in {})", (folder / name).string(),
-                              file.string()));
+      return fail(
+          fmt::format("{}: is not as it was issued (by its digest in {})", (folder / name).string(), file.string()));
     }
     contents.emplace_back(name, *std::move(content));
   }

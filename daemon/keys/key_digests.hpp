@@ -1,5 +1,5 @@
-// The digests of a key folder's files, by which a byte that is another is noticed wherever it stands: what reads PEM and
-// S/MIME passes over line ends and headers, and what looks at a signature over what is not signed.
+// The digests of a key folder's files, by which a byte that is another is noticed wherever it stands: what reads PEM
+// and S/MIME passes over line ends and headers, and what looks at a signature over what is not signed.
 #pragma once
 
 #include <filesystem>

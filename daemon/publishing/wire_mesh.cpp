@@ -65,7 +65,7 @@ void WireMesh::fill(const MadeSurface& made) {
   if (!made.surface) {
     say_none(reason_of(made.refusal.kind));
   } else if (made.mesh.triangles.empty()) {
-    say_none(perimap_MESH_REASON_NOTHING_SUPPORTED);
+    say_none(made.of_model ? perimap_MESH_REASON_NOT_THE_MODEL : perimap_MESH_REASON_NOTHING_SUPPORTED);
   } else {
     wire_.state = perimap_MESH_THERE;
     wire_.reason = perimap_MESH_REASON_NONE;

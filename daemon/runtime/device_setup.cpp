@@ -11,6 +11,7 @@
 #include "daemon/config/ecg_inputs.hpp"
 #include "daemon/config/tracked_tools.hpp"
 #include "daemon/runtime/calibration_fit.hpp"
+#include "daemon/runtime/configured_model.hpp"
 #include "daemon/runtime/configured_scope.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/ecg/can_ecg.hpp"
@@ -355,6 +356,8 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
   auto devices = named_devices(configuration, configuration_file);
   if (!devices) append(wrong, std::move(devices.error()));
   append(wrong, missing_devices(configuration));
+  auto model = configured_model(configuration.model);
+  if (!model) append(wrong, std::move(model.error()));
   if (!wrong.empty()) return wrong_setup(told_in(configuration_file, std::move(wrong)));
   if (auto* playback = std::get_if<CameraPlayback>(&*devices->camera)) {
     playback->reader.require_frame_size(basis.camera.width, basis.camera.height);
@@ -364,6 +367,7 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
   }
   PipelineSettings pipeline = pipeline_settings(configuration, basis.camera);
   pipeline.turned_scope = basis.turned_scope;
+  pipeline.organ_model = *std::move(model);
   const Identity identity{configuration.source.name, first_stream(pipeline), configuration.source.world_frame};
   return DeviceSetup{std::move(configuration), pipeline, identity, std::move(*devices)};
 }

@@ -10,6 +10,7 @@
 #include "daemon/config/surface_traffic.hpp"
 #include "daemon/config/wrong_key.hpp"
 #include "daemon/runtime/calibration_fit.hpp"
+#include "daemon/runtime/configured_model.hpp"
 #include "daemon/runtime/configured_scope.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/calibration/turned_scope_file.hpp"
@@ -210,10 +211,13 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
                                  "whose turn a second sensor tells",
                                  recording, channels::kSecondSensor)});
   }
+  auto model = configured_model(basis->configuration.model);
+  if (!model) wrong.insert(wrong.end(), model.error().begin(), model.error().end());
   if (!wrong.empty()) return wrong_setup(told_of(configuration_file, recording, std::move(wrong)));
   reader->require_frame_size(basis->camera.width, basis->camera.height);
   PipelineSettings pipeline = pipeline_settings(basis->configuration, basis->camera);
   pipeline.turned_scope = basis->turned_scope;
+  pipeline.organ_model = *std::move(model);
   const Identity identity{basis->configuration.source.name, first_stream(pipeline),
                           basis->configuration.source.world_frame};
   return ReplaySetup{std::move(basis->configuration), pipeline,          identity, basis->utc_minus_monotonic,

@@ -11,8 +11,8 @@ namespace perimap {
 // line of UTF-8 without spaces, keys in order. Without it such an object reads as well when a digit of it is another.
 [[nodiscard]] nlohmann::json sealed_json(nlohmann::json object);
 
-// Of an object with that key: it says what it said when it was written. An object without it is anybody's, and right. The
-// error says what to do, and is for a message that names the file.
+// Of an object with that key: it says what it said when it was written. An object without it is anybody's, and right.
+// The error says what to do, and is for a message that names the file.
 [[nodiscard]] Expected<void> check_json_seal(const nlohmann::json& object);
 
 }  // namespace perimap

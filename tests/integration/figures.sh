@@ -15,3 +15,8 @@ at_most() {
   awk -v v="$2" -v b="$3" 'BEGIN { exit !(v != "" && v + 0 <= b + 0) }' || fail "$1: $2, expected at most $3"
   echo "$1: $2 (at most $3)"
 }
+# at_least WHAT VALUE BOUND
+at_least() {
+  awk -v v="$2" -v b="$3" 'BEGIN { exit !(v != "" && v + 0 >= b + 0) }' || fail "$1: $2, expected at least $3"
+  echo "$1: $2 (at least $3)"
+}

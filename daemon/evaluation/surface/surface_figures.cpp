@@ -139,6 +139,7 @@ nlohmann::json to_json(const SurfaceFigures& figures) {
                          {"features_contradicted", figures.contradicted},
                          {"features_begun", figures.begun},
                          {"features_contradicting", figures.contradicting},
+                         {"model", to_json(figures.model)},
                          {"refusal", figures.refusal}};
   for (std::size_t h = 1; h < kSurfaceHorizons_ms.size(); ++h) {
     json[fmt::format("rms_{}_ms_mm", kSurfaceHorizons_ms[h])] = json_number(figures.horizons[h].rms_mm);
@@ -151,6 +152,7 @@ std::string to_text(const SurfaceFigures& figures) {
   if (figures.instants == 0 || figures.points == 0) {
     return fmt::format("surface     none from 15 s on{}{}", figures.refusal.empty() ? "" : ": ", figures.refusal);
   }
+  const std::string model = to_text(figures.model);
   return fmt::format(
       "surface     RMS {} mm, 95th percentile {} mm, NEES/3 {} ({} points seen well, not on the rim; {} instants from "
       "15 s "
@@ -158,7 +160,7 @@ std::string to_text(const SurfaceFigures& figures) {
       "            rim of 5 mm, and beyond it: RMS {} mm, NEES/3 {}; {} ms ahead {} mm, {} ms ahead {} mm\n"
       "            coverage {} of what was seen at 60 degrees at most, {} of what was seen at all; 90 % after {} s\n"
       "            within the features: Gaussian process {} (95 % {}), thin plate {} ({}), barycentric {} ({}) mm\n"
-      "            leave one out: RMS {} mm, normalised {} ({} features, {} contradict their neighbours)",
+      "            leave one out: RMS {} mm, normalised {} ({} features, {} contradict their neighbours){}{}",
       plain(figures.horizons[0].rms_mm, 3), plain(figures.p95_mm, 2), plain(figures.horizons[0].nees, 2),
       figures.points, figures.instants, plain(figures.rim_rms_mm, 3), plain(figures.rim_nees, 1),
       kSurfaceHorizons_ms[1], plain(figures.horizons[1].rms_mm, 3), kSurfaceHorizons_ms[2],
@@ -166,7 +168,8 @@ std::string to_text(const SurfaceFigures& figures) {
       plain(figures.time_to_90_percent_s, 0), plain(figures.gaussian_process.rms_mm, 3),
       plain(figures.gaussian_process.p95_mm, 2), plain(figures.thin_plate.rms_mm, 3),
       plain(figures.thin_plate.p95_mm, 2), plain(figures.barycentric.rms_mm, 3), plain(figures.barycentric.p95_mm, 2),
-      plain(figures.agreement_rms_mm, 3), plain(figures.agreement_nees, 2), figures.features, figures.contradicted);
+      plain(figures.agreement_rms_mm, 3), plain(figures.agreement_nees, 2), figures.features, figures.contradicted,
+      model.empty() ? "" : "\n            ", model);
 }
 
 }  // namespace perimap

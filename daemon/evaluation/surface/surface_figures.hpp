@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/evaluation/report/accuracy.hpp"
+#include "daemon/evaluation/surface/model_score.hpp"
 
 namespace perimap {
 
@@ -42,6 +43,7 @@ struct SurfaceFigures {
   std::size_t contradicted = 0;     // that it left out
   std::uint64_t begun = 0;          // new features that started on it, over the session
   std::uint64_t contradicting = 0;  // and whose matches contradicted it
+  ModelFigures model;               // where the mesh is of a preoperative model
   std::string refusal;              // of the last instant at which there was none
 };
 
@@ -65,6 +67,8 @@ class SurfaceTally {
   void add(std::size_t horizon, const Error& error);
   void add_compared(double gaussian_process_mm, double barycentric_mm, double thin_plate_mm);
 
+  // The instant that was begun counts for all figures.
+  [[nodiscard]] bool settled() const noexcept { return settled_; }
   [[nodiscard]] SurfaceFigures figures() const;
 
  private:

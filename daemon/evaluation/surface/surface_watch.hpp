@@ -9,6 +9,7 @@
 #include "core/pipeline/pipeline.hpp"
 #include "core/pipeline/surface_maker.hpp"
 #include "daemon/evaluation/report/recorded_truth.hpp"
+#include "daemon/evaluation/surface/model_score.hpp"
 #include "daemon/evaluation/surface/seen_surface.hpp"
 #include "daemon/evaluation/surface/surface_figures.hpp"
 
@@ -43,6 +44,7 @@ class SurfaceWatch {
   std::shared_ptr<const MadeSurface> made_;
   std::string refusal_;
   SurfaceTally tally_;
+  ModelScore model_;
 };
 
 }  // namespace perimap

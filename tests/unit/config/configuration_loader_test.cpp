@@ -306,7 +306,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{
             "UnknownSection", "version = 1\n[traker]\n",
             "test.toml:2:2: key 'traker': expected one of version, source, replay, camera, tracker, setup, ecg, phase, "
-            "respiration, pipeline, features, estimation, use, realtime, dds, recording, status, log, control, "
+            "respiration, pipeline, features, estimation, use, model, realtime, dds, recording, status, log, control, "
             "checkpoint, blackbox, got an unknown key"},
         Wrong{"UnknownKey", "version = 1\n[phase]\nlow = 1\n",
               "test.toml:3:1: key 'phase.low': expected one of law, lost_after_s, from_image, image_alone_s, "

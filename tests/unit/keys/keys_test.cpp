@@ -233,9 +233,9 @@ TEST_F(Keys, DamagedOnesAreNeverTakenForWhole) {
   ASSERT_EQ(by.revoke("p", kNow - days(1)).value_or(0), 1U);  // so that a list that cannot be read would show
   ASSERT_TRUE(by.issue(KeyRole::kPublisher, "p", lasting(days(365)), true));
   ASSERT_EQ(refusal(keys), "in order");
-  constexpr std::array kNames{dds::key_files::kAuthority,  dds::key_files::kCertificate, dds::key_files::kKey,
-                              dds::key_files::kRevoked,    dds::key_files::kGovernance,  dds::key_files::kPermissions,
-                              kKeyDigests};
+  constexpr std::array kNames{
+      dds::key_files::kAuthority,  dds::key_files::kCertificate, dds::key_files::kKey, dds::key_files::kRevoked,
+      dds::key_files::kGovernance, dds::key_files::kPermissions, kKeyDigests};
   test::Damage damage;
   for (int trial = 0; trial < test::Damage::kCopies; ++trial) {
     const fs::path file = keys / kNames.at(damage.one_of(kNames.size()));

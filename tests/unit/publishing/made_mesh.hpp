@@ -3,9 +3,11 @@
 
 #include <array>
 #include <cmath>
+#include <memory>
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "core/phase/cardiac_clock_tracker.hpp"
 #include "core/pipeline/surface_maker.hpp"
@@ -19,8 +21,8 @@ namespace perimap::test {
 // Makes one job after the other, as housekeeping does.
 class ServedMaker {
  public:
-  explicit ServedMaker(std::size_t vertices)
-      : maker_(kLayout, 200, vertices, true), thread_([this] { maker_.serve(); }) {}
+  explicit ServedMaker(std::size_t vertices, std::shared_ptr<const OrganModel> model = nullptr)
+      : maker_(kLayout, 200, vertices, true, std::move(model)), thread_([this] { maker_.serve(); }) {}
   ServedMaker(const ServedMaker&) = delete;
   ServedMaker& operator=(const ServedMaker&) = delete;
   ~ServedMaker() {

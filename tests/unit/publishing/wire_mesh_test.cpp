@@ -120,6 +120,34 @@ TEST(WireMesh, SaysWhyThereIsNone) {
   EXPECT_EQ(reason_of(uncertain), perimap_MESH_REASON_NOTHING_SUPPORTED);
 }
 
+// A tetrahedron before the features, and one where they are not.
+std::shared_ptr<const OrganModel> model_at(const Vector3d& place_mm) {
+  auto model = std::make_shared<OrganModel>();
+  model->mesh_W = {{place_mm, place_mm + Vector3d(0, 6, 0), place_mm + Vector3d(6, 0, 0), place_mm + Vector3d(2, 2, 4)},
+                   {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}}};
+  model->normals_W = vertex_normals(model->mesh_W);
+  return model;
+}
+
+TEST(WireMesh, OfAModelHasAllVerticesOfItAndSaysWhereItLiesElsewhere) {
+  test::ServedMaker on_it(500, model_at(test::MadeOrgan::mean_place({-2.0, -2.0})));
+  WireMesh wire = wire_mesh();
+  on_it.make(features(60), kCapture);
+  const perimap_SurfaceMesh* mesh = wire.news(*on_it, kCapture, seconds(0));
+  ASSERT_NE(mesh, nullptr);
+  EXPECT_EQ(mesh->state, perimap_MESH_THERE);
+  EXPECT_EQ(mesh->vertex_states._length, 4U);
+  EXPECT_GE(mesh->triangles._length, 3U);
+
+  test::ServedMaker elsewhere(500, model_at({0.0, 0.0, 500.0}));
+  WireMesh other = wire_mesh();
+  elsewhere.make(features(60), kCapture);
+  mesh = other.news(*elsewhere, kCapture, seconds(0));
+  ASSERT_NE(mesh, nullptr);
+  EXPECT_EQ(mesh->state, perimap_MESH_NONE);
+  EXPECT_EQ(mesh->reason, perimap_MESH_REASON_NOT_THE_MODEL);
+}
+
 TEST(WireMesh, IsReadByThoseWhoKnowXcdr1Alone) {
   // Cyclone restricts a type that needs XCDR2 in its descriptor.
   EXPECT_EQ(perimap_SurfaceMesh_desc.m_flagset & DDS_TOPIC_RESTRICT_DATA_REPRESENTATION, 0U);

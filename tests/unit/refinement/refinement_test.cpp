@@ -194,7 +194,7 @@ TEST_F(RefinementTest, WhyNoSurfaceWasPublishedIsSaid) {
 TEST_F(RefinementTest, WhatIsNoModelIsNamedByItsFile) {
   record(true, true);
   source_.unit_mm = 1000.0;
-  EXPECT_THAT(refusal(), HasSubstr("heart.ply: is 155 m large: are its lengths in mm? Then say --unit mm"));
+  EXPECT_THAT(refusal(), HasSubstr("heart.ply: is 155 m large: are its lengths in mm? Then its unit is mm"));
   source_.unit_mm = 1.0;
   TriangleMesh mirrored = egg_.model();
   for (Vector3d& p : mirrored.vertices) p.z() = -p.z();

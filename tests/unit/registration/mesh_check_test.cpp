@@ -74,8 +74,8 @@ TEST(MeshCheck, WhatIsNoSurfaceOfAnOrganIsRefused) {
                 m.triangles = {{0, 0, 1}, {1, 2, 1}};
               }),
               HasSubstr("no triangle with an area"));
-  EXPECT_THAT(scaled(1e-3), HasSubstr("are its lengths in metres? Then say --unit m"));
-  EXPECT_THAT(scaled(1e3), HasSubstr("are its lengths in mm? Then say --unit mm"));
+  EXPECT_THAT(scaled(1e-3), HasSubstr("are its lengths in metres? Then its unit is m"));
+  EXPECT_THAT(scaled(1e3), HasSubstr("are its lengths in mm? Then its unit is mm"));
   EXPECT_THAT(changed([](TriangleMesh& m) {
                 for (Vector3d& p : m.vertices) p.x() = -p.x();
               }),

@@ -87,9 +87,9 @@ Off off(const SurfaceMesh& mesh, const OrganModel& model) {
     ++off.vertices;
     for (int k = 0; k < 12; ++k) {
       const double phase_rad = k * std::numbers::pi / 6.0;
-      const Vector3d e = mesh.coefficients_W_mm.middleRows<3>(3 * static_cast<Eigen::Index>(v)) *
-                             basis_at(kLayout, phase_rad) -
-                         position(bearing(v), phase_rad);
+      const Vector3d e =
+          mesh.coefficients_W_mm.middleRows<3>(3 * static_cast<Eigen::Index>(v)) * basis_at(kLayout, phase_rad) -
+          position(bearing(v), phase_rad);
       sum += e.squaredNorm();
       along += std::pow(e.dot(model.normals_W[v]), 2);
       nees += e.dot(covariance_at(mesh, v).inverse() * e);
@@ -130,8 +130,9 @@ TEST(ModelMesh, SaysOfWhatNobodySeesThatItIsNotKnown) {
     const bool behind = v >= kSide * kSide;
     if (behind || r > farthest_mm || r < hole_mm) EXPECT_EQ(mesh.support[v], Support::kUncertain) << v;
     if (!behind) continue;
-    EXPECT_EQ(mesh.coefficients_W_mm.middleRows<3>(3 * static_cast<Eigen::Index>(v)).rightCols(kLayout.size() - 1).norm(),
-              0.0);
+    EXPECT_EQ(
+        mesh.coefficients_W_mm.middleRows<3>(3 * static_cast<Eigen::Index>(v)).rightCols(kLayout.size() - 1).norm(),
+        0.0);
     EXPECT_GT(covariance_at(mesh, v).trace(), 4.0) << "it may move as what is seen does";
   }
   ASSERT_FALSE(mesh.triangles.empty());
