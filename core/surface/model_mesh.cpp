@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
+#include <vector>
 
 #include "core/periodic/basis.hpp"
 #include "core/surface/six_elements.hpp"
@@ -51,52 +52,57 @@ Moving moving(const PeriodicSurface& surface, const Eigen::Matrix3Xd& m_W_mm, do
   return at;
 }
 
-// One vertex beside the surface that is seen at its bearing.
+// Mean places beside the surface that is seen.
 struct Seen {
-  bool supported = false;
-  Vector3d p_W_mm = Vector3d::Zero();
-  Matrix3d covariance_mm2 = Matrix3d::Zero();  // of the mean place
+  Eigen::Matrix3Xd p_W_mm;
+  std::vector<Matrix3d> covariances_mm2;
+  std::vector<bool> supported;
 };
 
-class DepthMeasurement {
- public:
-  DepthMeasurement(const PeriodicSurface& surface, const Eigen::Matrix3Xd& p_W_mm) : surface_(surface) {
-    Eigen::Matrix2Xd s_mm(2, p_W_mm.cols());
-    places_.reserve(static_cast<std::size_t>(p_W_mm.cols()));
-    for (Eigen::Index v = 0; v < p_W_mm.cols(); ++v) {
-      places_.push_back(surface.chart().place_of(p_W_mm.col(v)));
-      s_mm.col(v) = places_.back().s;
+// The depth that is seen at the bearing of each place, as a measurement of it along the model's normal. Where the
+// surface is seen obliquely, a place that is moved has another bearing: the measurement is taken anew there, and the
+// step is made again from where the model has it (an iterated Kalman filter).
+Seen on_what_is_seen(const PeriodicSurface& surface, const Eigen::Matrix3Xd& p_W_mm, const Eigen::Matrix3Xd& normals_W,
+                     std::vector<Matrix3d> covariances_mm2) {
+  constexpr int kIterations = 3;
+  const Eigen::Index V = p_W_mm.cols();
+  Seen seen{p_W_mm, std::move(covariances_mm2), std::vector<bool>(static_cast<std::size_t>(V), false)};
+  const double bound_mm = surface.settings().largest_deviation_mm;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    std::vector<SurfaceChart::Place> places;
+    Eigen::Matrix2Xd s_mm(2, V);
+    for (Eigen::Index v = 0; v < V; ++v) {
+      places.push_back(surface.chart().place_of(seen.p_W_mm.col(v)));
+      s_mm.col(v) = places.back().s;
     }
-    depth_ = surface.depth().at(s_mm);
+    const DepthField::Prediction depth = surface.depth().at(s_mm);
+    for (Eigen::Index v = 0; v < V; ++v) {
+      const auto i = static_cast<std::size_t>(v);
+      const SurfaceChart::Place& place = places[i];
+      const Vector3d n = normals_W.col(v);
+      const Vector3d ray = surface.chart().ray_W(place.s);
+      const double along = n.dot(ray);
+      const bool faced = -along > kFacingCosine * ray.norm();
+      if (!(place.depth_mm > 0.0) || !faced || surface.support().at(place.s) != Support::kSupported) {
+        seen.supported[i] = false;
+        continue;
+      }
+      const Vector3d moved = seen.p_W_mm.col(v) - p_W_mm.col(v);
+      const double innovation_mm = along * (depth.depth_mm(v) - place.depth_mm) + n.dot(moved);
+      const double variance_mm2 = depth.variance_mm2(v) + surface.turning_variance_mm2(place.s, depth.depth_mm(v));
+      const Vector3d Sigma_n = seen.covariances_mm2[i] * n;
+      const double innovation_mm2 = n.dot(Sigma_n) + along * along * variance_mm2;
+      const bool agrees = innovation_mm * innovation_mm <= kContradiction * kContradiction * innovation_mm2;
+      const Vector3d K = Sigma_n / innovation_mm2;
+      const Matrix3d after_mm2 = seen.covariances_mm2[i] - K * Sigma_n.transpose();
+      seen.supported[i] = agrees && n.dot(after_mm2 * n) <= bound_mm * bound_mm;
+      if (!agrees) continue;
+      seen.p_W_mm.col(v) = p_W_mm.col(v) + K * innovation_mm;
+      if (iteration + 1 == kIterations) seen.covariances_mm2[i] = after_mm2;
+    }
   }
-
-  // `covariance_mm2`: of the mean place p by the model, n its outward normal.
-  [[nodiscard]] Seen update(Eigen::Index v, const Vector3d& p, const Vector3d& n,
-                            const Matrix3d& covariance_mm2) const {
-    Seen seen{false, p, covariance_mm2};
-    const SurfaceChart::Place& place = places_[static_cast<std::size_t>(v)];
-    if (!(place.depth_mm > 0.0) || surface_.support().at(place.s) != Support::kSupported) return seen;
-    const Vector3d ray = surface_.chart().ray_W(place.s);
-    const double along = n.dot(ray);
-    if (!(-along > kFacingCosine * ray.norm())) return seen;
-    const double variance_mm2 = depth_.variance_mm2(v) + surface_.turning_variance_mm2(place.s, depth_.depth_mm(v));
-    const double r = along * (depth_.depth_mm(v) - place.depth_mm);
-    const Vector3d Sigma_n = covariance_mm2 * n;
-    const double innovation_mm2 = n.dot(Sigma_n) + along * along * variance_mm2;
-    if (!(r * r <= kContradiction * kContradiction * innovation_mm2)) return seen;
-    const Vector3d K = Sigma_n / innovation_mm2;
-    seen.p_W_mm += K * r;
-    seen.covariance_mm2 -= K * Sigma_n.transpose();
-    const double bound_mm = surface_.settings().largest_deviation_mm;
-    seen.supported = n.dot(seen.covariance_mm2 * n) <= bound_mm * bound_mm;
-    return seen;
-  }
-
- private:
-  const PeriodicSurface& surface_;
-  std::vector<SurfaceChart::Place> places_;
-  DepthField::Prediction depth_;
-};
+  return seen;
+}
 
 }  // namespace
 
@@ -122,17 +128,22 @@ SurfaceMesh mesh_of(const PeriodicSurface& surface, const OrganModel& model) {
     m_W_mm.col(static_cast<Eigen::Index>(k)) = at_rest.vertices[static_cast<std::size_t>(near[k])];
   }
   const Moving at = moving(surface, m_W_mm, model.phase_rad);
-  const DepthMeasurement depth(surface, at.p_W_mm);
+  Eigen::Matrix3Xd normals_W(3, m_W_mm.cols());
+  std::vector<Matrix3d> covariances_mm2;
   for (std::size_t k = 0; k < near.size(); ++k) {
     const auto from = static_cast<Eigen::Index>(k);
-    const auto i = static_cast<std::size_t>(near[k]);
-    const Vector3d& n = model.normals_W[i];
-    const Matrix3d motion_mm2 = from_six(at.motion.covariances_W_mm2.col(from));
-    const Seen seen = depth.update(from, at.p_W_mm.col(from), n, model_covariance(model, n) + motion_mm2);
+    normals_W.col(from) = model.normals_W[static_cast<std::size_t>(near[k])];
+    covariances_mm2.emplace_back(model_covariance(model, normals_W.col(from)) +
+                                 from_six(at.motion.covariances_W_mm2.col(from)));
+  }
+  const Seen seen = on_what_is_seen(surface, at.p_W_mm, normals_W, std::move(covariances_mm2));
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    const auto from = static_cast<Eigen::Index>(k);
     mesh.coefficients_W_mm.middleRows<3>(3 * near[k]) = at.motion.coefficients_W_mm.middleRows<3>(3 * from);
-    mesh.coefficients_W_mm.block<3, 1>(3 * near[k], 0) = seen.p_W_mm;
-    mesh.covariances_W_mm2.col(near[k]) = to_six(seen.covariance_mm2 + motion_mm2);
-    if (seen.supported) mesh.support[i] = Support::kSupported;
+    mesh.coefficients_W_mm.block<3, 1>(3 * near[k], 0) = seen.p_W_mm.col(from);
+    mesh.covariances_W_mm2.col(near[k]) =
+        to_six(seen.covariances_mm2[k] + from_six(at.motion.covariances_W_mm2.col(from)));
+    if (seen.supported[k]) mesh.support[static_cast<std::size_t>(near[k])] = Support::kSupported;
   }
   for (const TriangleMesh::Triangle& triangle : at_rest.triangles) {
     const bool supported = std::all_of(triangle.begin(), triangle.end(),

@@ -8,7 +8,7 @@
 //
 // and p is found by repetition. How far the model's shape and registration are off goes into the covariance of p, and
 // so does what is not known of h(phi_0; p). Where the features tell how deep the surface lies (DepthField), the vertex
-// is moved along its normal by one step of a Kalman filter with that depth for its measurement: on the surface that is
+// is moved along its normal by an iterated Kalman filter with that depth for its measurement: on the surface that is
 // seen, along it as the registration has it. docs/design/surface.md.
 #pragma once
 
