@@ -57,7 +57,7 @@ bool BeatDecision::in_burst(Instant now) const noexcept {
 }
 
 bool BeatDecision::noisy(Instant now) const noexcept {
-  if (disturbed(now) > settings_.some_noise) return true;
+  if (in_steady_noise() || disturbed(now) > settings_.some_noise) return true;
   if (!overdue(now)) return false;
   const auto waits = waiting_.begin();
   return disturbed_at_ > familiar_at_ ||

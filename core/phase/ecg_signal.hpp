@@ -8,7 +8,7 @@ namespace perimap {
 enum class EcgSignal : std::uint8_t {
   kLearning,  // nothing has stood out from the noise yet, or for some cycles
   kGood,
-  kNoisy,    // disturbances of a beat's size within the last seconds
+  kNoisy,    // disturbances of a beat's size within the last seconds, or noise that comes near to beats all the time
   kFlat,     // the value has hardly changed: a lead that is off, or an amplifier at its limit
   kLeadOff,  // said by the device, samples that are missing, or a line that swings as no heart does
   kRepeated  // what was heard seconds before comes again bit for bit

@@ -43,7 +43,7 @@ Json scene_panel(const std::string& world_frame, const std::optional<ViewAim>& a
   }
   return {{"followTf", world_frame},
           {"followMode", "follow-none"},
-          {"scene", {{"transforms", {{"axisScale", 0.02}, {"labelSize", 0.01}}}}},
+          {"scene", {{"transforms", {{"axisScale", 0.02}, {"labelSize", 0.003}}}}},
           {"cameraState",
            {{"perspective", true},
             {"distance", distance_m},

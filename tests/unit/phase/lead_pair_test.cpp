@@ -301,6 +301,30 @@ TEST(LeadPair, BeatsComeInOrderOfTimeAndNoNearerThanVentriclesContract) {
 }
 
 // A wide beat in both leads is premature, whichever lead gives its time; each lead has its own usual shape.
+// Noise that is always there is no disturbance, but no lead is good in it: what it misses tells nothing against the
+// other.
+TEST(LeadPair, ALeadInSteadyNoiseThatComesNearToItsBeatsSpoilsNothing) {
+  Heart h = heart(62);
+  std::mt19937 generator(620);
+  std::normal_distribution<float> noise(0.0F, 0.12F);
+  for (float& mV : h.second) mV += noise(generator);
+  const Heard heard = listen(h.first, h.second);
+  const Score both = score(heard, h.beats_s, 20.0, 140.0);
+  EXPECT_EQ(both.missed, 0);
+  EXPECT_EQ(both.extra, 0);
+  const auto pair = std::make_unique<LeadPair>();
+  int noisy = 0, told = 0;
+  for (std::size_t i = 0; i < h.first.size(); ++i) {
+    const Instant t(from_seconds(static_cast<double>(i) / kRate_hz));
+    static_cast<void>(pair->push(t, h.first[i], h.second[i]));
+    if (i < sample(40.0)) continue;
+    ++told;
+    noisy += pair->signal(1) == EcgSignal::kNoisy ? 1 : 0;
+    EXPECT_EQ(pair->signal(0), EcgSignal::kGood);
+  }
+  EXPECT_GT(noisy, told * 9 / 10);
+}
+
 TEST(LeadPair, ClassesGoByTheShapeInTheLeadThatGivesTheTime) {
   Heart h = heart(60);
   std::vector<double> wide_s;
