@@ -66,6 +66,7 @@ struct Pipeline::Parts {
   FrameHandle mapped_before;  // its buffer is still taken; without one before the first frame
   ReleasePlan plan;
   std::array<SurfaceComposer, kReleaseStreams.size()> composers;  // one a stream
+  CardiacClock composed_heart;                                    // of the last release
   // Relaxed: a message by itself; the mapper's wake-up follows it.
   std::atomic<bool> forget_asked{false};
   std::atomic<bool> move_asked{false};
@@ -233,11 +234,16 @@ const SurfaceSample& Pipeline::compose(const Release& release) noexcept {
   }
   parts_->phase_cells.publisher_heart.update();
   parts_->phase_cells.publisher_breath.update();
-  const CardiacClock heart = parts_->phase_cells.publisher_heart.front().clock(ecg.front(), release.deadline);
+  parts_->composed_heart = parts_->phase_cells.publisher_heart.front().clock(ecg.front(), release.deadline);
   const SurfaceSample& sample = parts_->composers[index_of(release.stream)].compose(
-      release, heart, parts_->phase_cells.publisher_breath.front(), parts_->publisher_view);
+      release, parts_->composed_heart, parts_->phase_cells.publisher_breath.front(), parts_->publisher_view);
   parts_->tell_due();
   return sample;
+}
+
+const CardiacClock& Pipeline::composed_heart() const noexcept { return parts_->composed_heart; }
+const RespiratoryClock& Pipeline::composed_breath() const noexcept {
+  return parts_->phase_cells.publisher_breath.front();
 }
 
 CardiacClock Pipeline::status_clock(Instant now) noexcept {

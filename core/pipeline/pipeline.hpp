@@ -88,6 +88,9 @@ class Pipeline {
   void leave_out_missed(Instant now) noexcept;
   // Publisher thread: the surface of one release, with all that is known now. Valid until the next call for its stream.
   [[nodiscard]] const SurfaceSample& compose(const Release& release) noexcept;
+  // Publisher thread, after compose(): the clocks that it went by.
+  [[nodiscard]] const CardiacClock& composed_heart() const noexcept;
+  [[nodiscard]] const RespiratoryClock& composed_breath() const noexcept;
   // Publisher thread, after compose(): it was sent, and counts from now on.
   void sent(const SurfaceSample& sample) noexcept;
   // Publisher thread: what was composed last for its stream is not sent, its time has passed. It counts as missed, and

@@ -1,18 +1,14 @@
 #include "daemon/publishing/wire_mesh.hpp"
 
 #include <algorithm>
-#include <chrono>
 
+#include "core/pipeline/mesh_validity.hpp"
 #include "core/pipeline/surface_maker.hpp"
 #include "daemon/publishing/wire_states.hpp"
 #include "daemon/publishing/wire_text.hpp"
 
 namespace perimap {
 namespace {
-
-// After the newest frame that it knows of. One is made each second, and adopted half a second later: when this has
-// passed, some have not come.
-constexpr Duration kMeshValid = std::chrono::seconds(5);
 
 std::uint8_t reason_of(SurfaceRefusalKind kind) noexcept {
   switch (kind) {
