@@ -90,13 +90,14 @@ std::unique_ptr<LoggedBlackBox> make_black_box(Logging& logging, const Configura
 template <class MakeFeeder>
 Outcome run_session(const Console& console, const std::string& configuration_file, const Configuration& given,
                     const Configuration& configuration, const PipelineSettings& settings, const Identity& identity,
-                    Signals& signals, const MakeFeeder& make_feeder) {
+                    const std::vector<WatchedTool>& tools, Signals& signals, const MakeFeeder& make_feeder) {
   Logging logging(console.name(), configuration.log.level);
   if (!configuration.dds.enabled) {
     return refuse(told_in(configuration_file, {{"dds.enabled", "expected true, since nothing else publishes"}}),
                   ExitCode::kWrongUsage);
   }
   RuntimeSettings runtime = runtime_settings(configuration, identity);
+  runtime.tools = tools;
   ExpiryNews expiry;
   if (configuration.dds.security) {
     // With words, before DDS looks at them: it would say no more than that it is not allowed.
@@ -113,6 +114,7 @@ Outcome run_session(const Console& console, const std::string& configuration_fil
   dds.membership = {configuration.dds.domain, configuration.dds.security};
   dds.surface_deadline = configuration.dds.surface_deadline;
   dds.surface_lifespan = configuration.dds.surface_lifespan;
+  dds.tools = !tools.empty();
   dds.identity = runtime.identity;
   auto publication = DdsPublication::create(dds);
   if (!publication) return refuse(publication.error());
@@ -202,7 +204,7 @@ Outcome run(const std::string& configuration_file, const Console& console) {
     auto setup = prepare_devices(configuration_file, *given);
     if (!setup) return refuse(setup.error());
     return run_session(console, configuration_file, *given, setup->configuration, setup->pipeline, setup->identity,
-                       signals, [&setup, &configuration_file](SensorEntrance& entrance) {
+                       setup->tools, signals, [&setup, &configuration_file](SensorEntrance& entrance) {
                          return std::make_unique<DeviceFeeder>(std::move(setup->devices), &entrance,
                                                                prepare_recording(configuration_file, *setup));
                        });
@@ -223,7 +225,7 @@ Outcome run(const std::string& configuration_file, const Console& console) {
   auto setup = prepare_replay(given->replay.recording->string(), configuration_file, ReadMode::kStrict);
   if (!setup) return refuse(setup.error());
   return run_session(console, configuration_file, *given, setup->configuration, setup->pipeline, setup->identity,
-                     signals, [&setup](SensorEntrance& entrance) {
+                     setup->tools, signals, [&setup](SensorEntrance& entrance) {
                        return std::make_unique<ReplayFeeder>(std::move(setup->reader), SensorIntake{&entrance});
                      });
 }

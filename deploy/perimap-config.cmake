@@ -1,5 +1,5 @@
 # find_package(perimap [COMPONENTS client core]) gives
-# perimap::client the C types of perimap.idl and perimap_mesh.idl, made by Cyclone DDS' compiler for the project that
+# perimap::client the C types of perimap.idl, perimap_mesh.idl and perimap_tool.idl, made by Cyclone DDS' compiler for the project that
 # asks,
 #                    with perimap_client.hpp, perimap_mesh_client.hpp, perimap_publisher_watch.hpp and perimap_use.hpp;
 #                    the project's languages must be C and CXX
@@ -14,7 +14,8 @@ if(NOT CycloneDDS_FOUND)
   set(perimap_client_lacks "CycloneDDS")
 elseif(NOT TARGET perimap::client)
   get_filename_component(perimap_data ${CMAKE_CURRENT_LIST_DIR} DIRECTORY)
-  idlc_generate(TARGET perimap_client FILES ${perimap_data}/perimap.idl ${perimap_data}/perimap_mesh.idl)
+  idlc_generate(TARGET perimap_client FILES ${perimap_data}/perimap.idl ${perimap_data}/perimap_mesh.idl
+    ${perimap_data}/perimap_tool.idl)
   find_path(perimap_INCLUDE_DIR perimap_client.hpp HINTS ${perimap_data}/../../include REQUIRED)
   target_include_directories(perimap_client INTERFACE ${perimap_INCLUDE_DIR})
   target_link_libraries(perimap_client INTERFACE CycloneDDS::ddsc)

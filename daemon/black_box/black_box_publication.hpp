@@ -17,6 +17,7 @@ class BlackBoxPublication final : public Publication {
   }
   void surface_model(const perimap_SurfaceModel& model) override { first_.surface_model(model); }
   void surface_mesh(const perimap_SurfaceMesh& mesh) override { first_.surface_mesh(mesh); }
+  void tool(const perimap_ToolDistance& distance) override { first_.tool(distance); }
   void phase(const perimap_Phase& phase) override {
     first_.phase(phase);
     box_.phase(phase);

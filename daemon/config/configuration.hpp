@@ -70,6 +70,7 @@ struct TrackerConfiguration {
   std::optional<std::filesystem::path> patient_tool_definition;   // NDI, uploaded
   std::vector<std::filesystem::path> instrument_definitions;      // NDI, uploaded; beside `instruments`
   std::optional<std::filesystem::path> pointer_calibration;       // its tip
+  std::vector<std::filesystem::path> instrument_calibrations;     // tips, each of the instrument that it names
   bool igtl_stamps_by_arrival = false;                            // not by the server's stamps
   double frame_rate_hz = 60.0;                                    // of NDI's frame numbers
   double translation_IW_mm[3] = {0.0, 0.0, 0.0};                  // registration X_IW

@@ -156,6 +156,9 @@ void add_tracker(std::vector<ConfigurationKey>& keys) {
              "tool definitions, likewise, of further instruments; each has the name of its file")
       .file("pointer_calibration", PERIMAP_MEMBER(tracker.pointer_calibration),
             "the pointer's tip, as `perimap calibrate tool --output` writes it; one of another tool is refused")
+      .files(
+          "instrument_calibrations", kMostInstruments, PERIMAP_MEMBER(tracker.instrument_calibrations),
+          "tips of instruments, likewise, each of the tool that it says; their distance from the surface is published")
       .number("frame_rate_hz", 1, 1000, PERIMAP_MEMBER(tracker.frame_rate_hz), "of the ndi tracker's frame numbers")
       .choice(
           "igtl_stamps", igtl_stamps, PERIMAP_MEMBER(tracker.igtl_stamps_by_arrival),

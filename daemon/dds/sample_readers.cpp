@@ -5,7 +5,7 @@
 
 namespace perimap {
 
-Expected<SampleReaders> SampleReaders::create(const dds::Membership& membership, bool all_topics) {
+Expected<SampleReaders> SampleReaders::create(const dds::Membership& membership, bool all_topics, bool with_tools) {
   auto participant = dds::Participant::create(membership);
   if (!participant) {
     return tl::unexpected(participant.error());
@@ -27,13 +27,22 @@ Expected<SampleReaders> SampleReaders::create(const dds::Membership& membership,
   if (all_topics) {
     conditions.insert(conditions.end(), {models->condition(), meshes->condition(), phases->condition()});
   }
+  std::optional<dds::Reader<perimap_ToolDistance>> tools;
+  if (with_tools) {
+    auto created = dds::Reader<perimap_ToolDistance>::create(*participant);
+    if (!created && !membership.security) return tl::unexpected(created.error());
+    if (created) {
+      conditions.push_back(created->condition());
+      tools.emplace(std::move(*created));
+    }
+  }
   for (const dds_entity_t condition : conditions) {
     if (auto attached = wait_set->attach(condition); !attached) {
       return tl::unexpected(attached.error());
     }
   }
-  return SampleReaders{std::move(*participant), std::move(*surfaces), std::move(*models),  std::move(*meshes),
-                       std::move(*phases),      std::move(*statuses), std::move(*wait_set)};
+  return SampleReaders{std::move(*participant), std::move(*surfaces), std::move(*models), std::move(*meshes),
+                       std::move(*phases),      std::move(*statuses), std::move(tools),   std::move(*wait_set)};
 }
 
 }  // namespace perimap

@@ -36,6 +36,12 @@ const TopicDescription& topic_of<perimap_SurfaceMesh>() noexcept {
 }
 
 template <>
+const TopicDescription& topic_of<perimap_ToolDistance>() noexcept {
+  static const TopicDescription topic{"perimap/tool", &perimap_ToolDistance_desc, false};
+  return topic;
+}
+
+template <>
 const TopicDescription& topic_of<perimap_Phase>() noexcept {
   static const TopicDescription topic{"perimap/phase", &perimap_Phase_desc, false};
   return topic;

@@ -11,6 +11,7 @@ extern "C" {
 #include "perimap.h"
 #include "perimap_guidance.h"
 #include "perimap_mesh.h"
+#include "perimap_tool.h"
 }
 
 namespace perimap::dds {
@@ -32,6 +33,8 @@ template <>
 [[nodiscard]] const TopicDescription& topic_of<perimap_SurfaceModel>() noexcept;
 template <>
 [[nodiscard]] const TopicDescription& topic_of<perimap_SurfaceMesh>() noexcept;
+template <>
+[[nodiscard]] const TopicDescription& topic_of<perimap_ToolDistance>() noexcept;
 template <>
 [[nodiscard]] const TopicDescription& topic_of<perimap_Phase>() noexcept;
 template <>

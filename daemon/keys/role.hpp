@@ -9,7 +9,7 @@ namespace perimap {
 
 enum class KeyRole { kPublisher, kDisplay, kControlLoop, kRecorder, kBridge };
 
-inline constexpr std::size_t kMostRoleTopics = 6;
+inline constexpr std::size_t kMostRoleTopics = 7;
 
 // Topics as DDS Security matches them: a name, or a pattern with `*`.
 struct RoleRights {
@@ -25,20 +25,20 @@ inline constexpr std::array<RoleRights, 5> kRoles = {
     {{KeyRole::kPublisher,
       "publisher",
       "perimapd, and calibrations from its devices: publishes every topic",
-      {"perimap/surface", "perimap/surface_model", "perimap/surface_mesh", "perimap/phase", "perimap/status",
-       "perimap/guidance"},
+      {"perimap/surface", "perimap/surface_model", "perimap/surface_mesh", "perimap/tool", "perimap/phase",
+       "perimap/status", "perimap/guidance"},
       {"perimap/*"}},
      {KeyRole::kDisplay,
       "display",
       "navigation software, perimap watch, a page: reads every topic that is published today",
       {},
-      {"perimap/surface", "perimap/surface_model", "perimap/surface_mesh", "perimap/phase", "perimap/status",
-       "perimap/guidance"}},
+      {"perimap/surface", "perimap/surface_model", "perimap/surface_mesh", "perimap/tool", "perimap/phase",
+       "perimap/status", "perimap/guidance"}},
      {KeyRole::kControlLoop,
       "control-loop",
       "an instrument's control: reads what it steers by, and not the mesh",
       {},
-      {"perimap/surface", "perimap/surface_model", "perimap/phase", "perimap/status"}},
+      {"perimap/surface", "perimap/surface_model", "perimap/tool", "perimap/phase", "perimap/status"}},
      {KeyRole::kRecorder, "recorder", "perimap watch --record: reads all of perimap's topics", {}, {"perimap/*"}},
      {KeyRole::kBridge,
       "bridge",

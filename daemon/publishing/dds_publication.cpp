@@ -14,6 +14,12 @@ Expected<std::unique_ptr<DdsPublication>> DdsPublication::create(const DdsSettin
   if (!model) return tl::unexpected(model.error());
   auto mesh = dds::Writer<perimap_SurfaceMesh>::create(*participant);
   if (!mesh) return tl::unexpected(mesh.error());
+  std::optional<dds::Writer<perimap_ToolDistance>> tool;
+  if (settings.tools) {
+    auto created = dds::Writer<perimap_ToolDistance>::create(*participant);
+    if (!created) return tl::unexpected(created.error());
+    tool.emplace(std::move(*created));
+  }
   auto phase = dds::Writer<perimap_Phase>::create(*participant);
   if (!phase) return tl::unexpected(phase.error());
   auto status = dds::Writer<perimap_Status>::create(*participant);
@@ -30,9 +36,9 @@ Expected<std::unique_ptr<DdsPublication>> DdsPublication::create(const DdsSettin
         "one are found, others are not",
         settings.membership.domain);
   }
-  return std::unique_ptr<DdsPublication>(new DdsPublication(settings, std::move(*participant), std::move(*surface),
-                                                            std::move(*model), std::move(*mesh), std::move(*phase),
-                                                            std::move(*status), std::move(name_watch)));
+  return std::unique_ptr<DdsPublication>(
+      new DdsPublication(settings, std::move(*participant), std::move(*surface), std::move(*model), std::move(*mesh),
+                         std::move(tool), std::move(*phase), std::move(*status), std::move(name_watch)));
 }
 
 // Ten times a second.
@@ -81,6 +87,7 @@ void DdsPublication::tell_refused_readers() {
   look_at(mesh_, dds::topic_of<perimap_SurfaceMesh>());
   look_at(phase_, dds::topic_of<perimap_Phase>());
   look_at(status_, dds::topic_of<perimap_Status>());
+  if (tool_) look_at(*tool_, dds::topic_of<perimap_ToolDistance>());
 }
 
 void DdsPublication::tell_failures() {

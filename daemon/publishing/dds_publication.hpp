@@ -24,6 +24,9 @@ struct DdsSettings {
   dds::Membership membership = 0;
   Duration surface_deadline{0};  // offered period of `surface`; 0: none
   Duration surface_lifespan{0};  // 0: none
+  // There are tools to tell of: keys of DDS Security that were issued before there was the topic lack it, and go on to
+  // be enough for those who have none.
+  bool tools = false;
   // So long without a failure: writes succeed again, for the log.
   Duration writes_well_after = std::chrono::seconds(5);
   // Who publishes: another that does under this name is told. Without a source nobody is looked for.
@@ -39,6 +42,9 @@ class DdsPublication final : public Publication {
   void surface(const perimap_Surface& sample) override { count(surface_.write(sample)); }
   void surface_model(const perimap_SurfaceModel& model) override { count(model_.write(model)); }
   void surface_mesh(const perimap_SurfaceMesh& mesh) override { count(mesh_.write(mesh)); }
+  void tool(const perimap_ToolDistance& distance) override {
+    if (tool_) count(tool_->write(distance));
+  }
   void phase(const perimap_Phase& phase) override;
   void status(const perimap_Status& status) override;
   [[nodiscard]] bool another_publisher() const noexcept override {
@@ -51,13 +57,14 @@ class DdsPublication final : public Publication {
  private:
   DdsPublication(const DdsSettings& settings, dds::Participant participant, dds::Writer<perimap_Surface> surface,
                  dds::Writer<perimap_SurfaceModel> model, dds::Writer<perimap_SurfaceMesh> mesh,
-                 dds::Writer<perimap_Phase> phase, dds::Writer<perimap_Status> status,
-                 std::optional<NameWatch> name_watch)
+                 std::optional<dds::Writer<perimap_ToolDistance>> tool, dds::Writer<perimap_Phase> phase,
+                 dds::Writer<perimap_Status> status, std::optional<NameWatch> name_watch)
       : settings_(settings),
         participant_(std::move(participant)),
         surface_(std::move(surface)),
         model_(std::move(model)),
         mesh_(std::move(mesh)),
+        tool_(std::move(tool)),
         phase_(std::move(phase)),
         status_(std::move(status)),
         name_watch_(std::move(name_watch)) {}
@@ -72,16 +79,17 @@ class DdsPublication final : public Publication {
   dds::Writer<perimap_Surface> surface_;
   dds::Writer<perimap_SurfaceModel> model_;
   dds::Writer<perimap_SurfaceMesh> mesh_;
+  std::optional<dds::Writer<perimap_ToolDistance>> tool_;  // without tools there is none
   dds::Writer<perimap_Phase> phase_;
   dds::Writer<perimap_Status> status_;
   std::optional<NameWatch> name_watch_;  // the status thread's own
   // Relaxed: a statistic that orders nothing.
   std::atomic<bool> another_publisher_{false};
-  // Relaxed: a statistic that orders nothing. Two threads publish, so it is added to atomically.
+  // Relaxed: a statistic that orders nothing. Three threads publish, so it is added to atomically.
   std::atomic<std::uint64_t> failures_{0};
   std::atomic<dds_return_t> last_error_{DDS_RETCODE_OK};
   // The status thread's own.
-  std::array<ReaderWatch, 5> reader_watches_;  // one a topic
+  std::array<ReaderWatch, 6> reader_watches_;  // one a topic
   bool failing_ = false;
   Instant last_seen_;  // that one had failed
   std::uint64_t failures_seen_ = 0;

@@ -3,12 +3,14 @@
 
 #include <perimap.h>
 #include <perimap_mesh.h>
+#include <perimap_tool.h>
 
 #include "core/time/instant.hpp"
 
 namespace perimap {
 
-// surface() is called by the publisher thread, the others by the status thread.
+// surface() is called by the publisher thread, tool() by the thread that tells of tools, the others by the status
+// thread; in virtual time one thread calls all.
 class Publication {
  public:
   Publication() = default;
@@ -19,6 +21,7 @@ class Publication {
   virtual void surface(const perimap_Surface& sample) = 0;
   virtual void surface_model(const perimap_SurfaceModel& model) = 0;
   virtual void surface_mesh(const perimap_SurfaceMesh& /*mesh*/) {}
+  virtual void tool(const perimap_ToolDistance& /*distance*/) {}
   virtual void phase(const perimap_Phase& phase) = 0;
   virtual void status(const perimap_Status& status) = 0;
 

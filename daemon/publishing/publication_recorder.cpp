@@ -9,6 +9,7 @@ namespace perimap {
 namespace {
 
 constexpr std::size_t kBuffers = 1024;  // of the fastest clock and as fast a camera, half a second
+constexpr std::size_t kTools = 4096;    // eight tools, likewise
 
 }  // namespace
 
@@ -26,7 +27,8 @@ PublicationRecorder::PublicationRecorder(SampleRecorder recorder, bool virtual_t
       virtual_time_(virtual_time),
       buffers_(kBuffers),
       free_(kBuffers),
-      filled_(kBuffers) {
+      filled_(kBuffers),
+      tools_(kTools) {
   for (std::size_t i = 0; i < buffers_.size(); ++i) {
     buffers_[i].features.resize(maximum_features);
     static_cast<void>(free_.push(i));
@@ -59,6 +61,12 @@ void PublicationRecorder::surface_mesh(const perimap_SurfaceMesh& mesh) {
   keep_first_error(recorder_.write(mesh, from_ns(mesh.time_ns)));
 }
 
+void PublicationRecorder::tool(const perimap_ToolDistance& distance) {
+  if (virtual_time_) drain();
+  const Instant receipt = virtual_time_ ? from_ns(distance.release_time_ns) : MonotonicClock::now();
+  if (!tools_.push({receipt, distance})) ++tools_not_recorded_;
+}
+
 void PublicationRecorder::phase(const perimap_Phase& phase) {
   drain();
   keep_first_error(recorder_.write(phase, from_ns(phase.time_ns)));
@@ -71,13 +79,17 @@ void PublicationRecorder::drain() {
     keep_first_error(recorder_.write(sample, buffers_[i].receipt));
     static_cast<void>(free_.push(i));
   }
+  ToldTool told;
+  while (tools_.pop(told)) keep_first_error(recorder_.write(told.sample, told.receipt));
 }
 
 Expected<void> PublicationRecorder::finish() {
   drain();
   keep_first_error(recorder_.finish());
   if (!first_error_) return first_error_;
-  if (not_recorded_ > 0) return fail(fmt::format("{} samples were published but not recorded", not_recorded_));
+  if (const std::uint64_t lost = not_recorded_ + tools_not_recorded_; lost > 0) {
+    return fail(fmt::format("{} samples were published but not recorded", lost));
+  }
   return {};
 }
 

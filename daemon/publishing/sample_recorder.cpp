@@ -72,6 +72,16 @@ Expected<void> SampleRecorder::write(const perimap_SurfaceMesh& mesh, Instant re
   return writer_.write(mesh_, mesh, receipt, from_ns(mesh.time_ns), short_sequence(mesh.sample_sequence));
 }
 
+Expected<void> SampleRecorder::write(const perimap_ToolDistance& distance, Instant receipt) {
+  if (!tool_) {
+    auto added = writer_.add_channel<perimap_ToolDistance>(channels::kTool);
+    if (!added) return tl::unexpected(added.error());
+    tool_ = *added;
+  }
+  return writer_.write(*tool_, distance, receipt, from_ns(distance.release_time_ns),
+                       short_sequence(distance.sample_sequence));
+}
+
 Expected<void> SampleRecorder::write(const perimap_Phase& phase, Instant receipt) {
   return writer_.write(phase_, phase, receipt, from_ns(phase.time_ns), short_sequence(phase.sample_sequence));
 }

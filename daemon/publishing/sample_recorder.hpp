@@ -3,8 +3,10 @@
 
 #include <perimap.h>
 #include <perimap_mesh.h>
+#include <perimap_tool.h>
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "core/error/expected.hpp"
@@ -14,8 +16,8 @@
 
 namespace perimap {
 
-// Log time is the receipt, publish time the sample's own: release_time_ns of a surface, time_ns of the others. The file
-// has its name when finish() has succeeded.
+// Log time is the receipt, publish time the sample's own: release_time_ns of a surface and of a tool's distance,
+// time_ns of the others. The file has its name when finish() has succeeded.
 class SampleRecorder {
  public:
   // What becomes of a file that could not be finished: what a replay gives can be had again, what was received cannot.
@@ -28,6 +30,7 @@ class SampleRecorder {
   [[nodiscard]] Expected<void> write(const perimap_Surface& surface, Instant receipt);
   [[nodiscard]] Expected<void> write(const perimap_SurfaceModel& model, Instant receipt);
   [[nodiscard]] Expected<void> write(const perimap_SurfaceMesh& mesh, Instant receipt);
+  [[nodiscard]] Expected<void> write(const perimap_ToolDistance& distance, Instant receipt);
   [[nodiscard]] Expected<void> write(const perimap_Phase& phase, Instant receipt);
   [[nodiscard]] Expected<void> write(const perimap_Status& status, Instant receipt);
   // An error says where what was kept is.
@@ -49,6 +52,7 @@ class SampleRecorder {
   ChannelId surface_;
   ChannelId model_;
   ChannelId mesh_;
+  std::optional<ChannelId> tool_;  // from the first distance on
   ChannelId phase_;
   ChannelId status_;
 };

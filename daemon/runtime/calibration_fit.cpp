@@ -9,6 +9,7 @@
 
 #include "daemon/config/tracked_tools.hpp"
 #include "daemon/runtime/configured_scope.hpp"
+#include "daemon/runtime/tool_tips.hpp"
 #include "drivers/calibration/calibration_facts.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/calibration/tool_tip.hpp"
@@ -193,6 +194,7 @@ WrongKeys wrong_calibrations(const Configuration& configuration) {
                         fmt::format("one of \"{}\"", *tool),
                         "the tip is another tool's; measure it with `perimap calibrate tool`"));
   }
+  append(all, wrong_tips(c));
   return all;
 }
 

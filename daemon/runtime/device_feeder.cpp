@@ -97,6 +97,9 @@ DeviceFeeder::DeviceFeeder(Devices devices, SensorEntrance* entrance, DeviceReco
   }
 }
 
+// Of the tracker alone: a playback in the camera's place has frames.
+void DeviceFeeder::give_tools_to(ToolTeller* tools) { intake_.tools = tools; }
+
 void DeviceFeeder::start(ThreadLauncher& threads) {
   if (recording_.recorder) recording_.recorder->start(threads);
   if (devices_.tracker) {

@@ -59,6 +59,7 @@ class DeviceFeeder final : public SensorFeeder {
   DeviceFeeder& operator=(const DeviceFeeder&) = delete;
   ~DeviceFeeder() override { stop(); }
 
+  void give_tools_to(ToolTeller* tools) override;
   void start(ThreadLauncher& threads) override;
   void stop() override;
   void tick() override;

@@ -13,6 +13,7 @@
 #include "daemon/runtime/calibration_fit.hpp"
 #include "daemon/runtime/configured_model.hpp"
 #include "daemon/runtime/configured_scope.hpp"
+#include "daemon/runtime/tool_tips.hpp"
 #include "drivers/calibration/calibration_file.hpp"
 #include "drivers/ecg/can_ecg.hpp"
 #include "drivers/recording/channels.hpp"
@@ -369,7 +370,8 @@ tl::expected<DeviceSetup, SetupError> prepare_devices(const std::filesystem::pat
   pipeline.turned_scope = basis.turned_scope;
   pipeline.organ_model = *std::move(model);
   const Identity identity{configuration.source.name, first_stream(pipeline), configuration.source.world_frame};
-  return DeviceSetup{std::move(configuration), pipeline, identity, std::move(*devices)};
+  auto tools = watched_tools(devices->tracker->tools, configuration.tracker);
+  return DeviceSetup{std::move(configuration), pipeline, identity, std::move(*devices), std::move(tools)};
 }
 
 }  // namespace perimap

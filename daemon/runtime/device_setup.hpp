@@ -59,7 +59,8 @@ struct DeviceSetup {
   Configuration configuration;
   PipelineSettings pipeline;
   Identity identity;
-  Devices devices;  // all that a map takes: of ECG and R trigger one may be missing
+  Devices devices;                      // all that a map takes: of ECG and R trigger one may be missing
+  std::vector<WatchedTool> tools = {};  // whose distance from the surface is told
 };
 
 // Whether the configuration names devices; otherwise it is for a replay.

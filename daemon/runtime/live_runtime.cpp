@@ -42,7 +42,8 @@ LiveRuntime::LiveRuntime(Pipeline& pipeline, const RuntimeSettings& settings, Pu
       wire_model_(settings.identity),
       wire_mesh_(settings.identity),
       wire_phase_(settings.identity),
-      wire_statuses_(wire_statuses(settings.identity, pipeline.settings())) {}
+      wire_statuses_(wire_statuses(settings.identity, pipeline.settings())),
+      tools_(tool_teller(pipeline, settings.identity, settings.tools, publication)) {}
 
 void LiveRuntime::start() {
   memory_locked_ = lock_memory(settings_.lock_memory);
@@ -60,6 +61,7 @@ void LiveRuntime::start() {
   if (ScopeWatch* scope = pipeline_.scope()) {
     housekeepers_.push_back(threads_.launch("scope", housekeeping, [scope] { scope->serve(); }));
   }
+  if (tools_) housekeepers_.push_back(threads_.launch("tools", housekeeping, [this] { tools_->serve(); }));
   mapper_ = threads_.launch("mapper", ThreadRole::kMapper, [this] { run_mapper(); });
   publisher_ = threads_.launch("publisher", ThreadRole::kPublisher, [this] { run_publisher(); });
   status_ = threads_.launch("status", housekeeping, [this] { run_status(); });
@@ -88,6 +90,7 @@ void LiveRuntime::stop() {
   pipeline_.surface_maker().dismiss();
   pipeline_.setup_watcher().dismiss();
   if (ScopeWatch* scope = pipeline_.scope()) scope->dismiss();
+  if (tools_) tools_->dismiss();
   for (std::thread& housekeeper : housekeepers_) housekeeper.join();
 }
 
@@ -184,6 +187,7 @@ void LiveRuntime::run_publisher() {
     const Instant written = MonotonicClock::now();
     stream.dds_write.add(written - ready);
     pipeline_.sent(surface);
+    if (tools_) tools_->sent(surface);
     stream.count_tardiness(ready - release.deadline);
     if (FrameTrace* const trace = pipeline_.trace()) {
       trace->releases.add({release, surface.update_late, begin, composed, ready, written});

@@ -14,6 +14,7 @@
 #include "core/phase/respiratory_clock.hpp"
 #include "core/realtime/counter.hpp"
 #include "core/realtime/wakeup.hpp"
+#include "core/tool/tool_distance.hpp"
 #include "daemon/publishing/identity.hpp"
 #include "daemon/publishing/recent_counts.hpp"
 #include "daemon/publishing/wire_mesh.hpp"
@@ -21,6 +22,7 @@
 #include "daemon/publishing/wire_status.hpp"
 #include "daemon/publishing/wire_surface.hpp"
 #include "daemon/runtime/thread_launcher.hpp"
+#include "daemon/runtime/tool_teller.hpp"
 
 namespace perimap {
 
@@ -35,13 +37,15 @@ struct RuntimeSettings {
   Duration model_interval = std::chrono::milliseconds(500);
   Duration status_interval = std::chrono::seconds(1);
   Duration stalled_after = std::chrono::milliseconds(500);
+  std::vector<WatchedTool> tools;       // whose distance from the surface is told
   std::int64_t keys_expire_utc_ns = 0;  // of DDS Security; 0: there are none
 };
 
 inline constexpr Duration kLongestPublisherRound = std::chrono::milliseconds(100);
 
-// Threads: mapper, workers, publisher (real-time when permitted), finder, starter, surface, setup-watch, scope where it
-// is asked for, status. Sources are launched by their owner, with threads(), and push into pipeline.entrance().
+// Threads: mapper, workers, publisher (real-time when permitted), finder, starter, surface, setup-watch, scope and
+// tools where they are asked for, status. Sources are launched by their owner, with threads(), and push into
+// pipeline.entrance().
 class LiveRuntime {
  public:
   // `pipeline` and `publication` must outlive it. `on_status_tick` is called by the status thread every
@@ -57,6 +61,9 @@ class LiveRuntime {
   void start();
   // For sources and others that are not the runtime's own. Joined before this ends.
   [[nodiscard]] ThreadLauncher& threads() noexcept { return threads_; }
+
+  // Takes what the tracker tells of other tools; null where none is told of.
+  [[nodiscard]] ToolTeller* tools() noexcept { return tools_.get(); }
 
   // Tells that no more frames will come: the surfaces of those that came are still released.
   void end_of_sources() noexcept;
@@ -99,6 +106,7 @@ class LiveRuntime {
   WireMesh wire_mesh_;
   WirePhase wire_phase_;
   std::vector<WireStatus> wire_statuses_;  // of the streams that are published
+  std::unique_ptr<ToolTeller> tools_;      // null where no tool is told of
   RecentCounts recent_;
   mutable std::mutex beliefs_mutex_;
   Beliefs beliefs_;

@@ -49,7 +49,9 @@ LiveSession::LiveSession(Pipeline& pipeline, const RuntimeSettings& settings, Pu
       feeder_(std::move(feeder)),
       on_tick_(std::move(on_tick)),
       identity_(settings.identity),
-      service_status_(settings.identity) {}
+      service_status_(settings.identity) {
+  feeder_->give_tools_to(runtime_.tools());
+}
 
 LiveSession::~LiveSession() = default;
 

@@ -26,7 +26,7 @@ constexpr Duration kReportInterval = std::chrono::milliseconds(500);
 }  // namespace
 
 LockstepRuntime::LockstepRuntime(Pipeline& pipeline, const Identity& identity, Duration utc_minus_monotonic,
-                                 Publication& publication)
+                                 Publication& publication, const std::vector<WatchedTool>& tools)
     : pipeline_(pipeline),
       utc_minus_monotonic_(utc_minus_monotonic),
       publication_(publication),
@@ -34,7 +34,8 @@ LockstepRuntime::LockstepRuntime(Pipeline& pipeline, const Identity& identity, D
       wire_model_(identity),
       wire_mesh_(identity),
       wire_phase_(identity),
-      wire_statuses_(wire_statuses(identity, pipeline.settings())) {
+      wire_statuses_(wire_statuses(identity, pipeline.settings())),
+      tools_(tool_teller(pipeline, identity, tools, publication)) {
   for (int i = 0; i < pipeline_.team().size(); ++i) {
     threads_.emplace_back([this, i] { pipeline_.team().serve(i); });
   }
@@ -68,6 +69,8 @@ void LockstepRuntime::deliver(const ReplayEvent& event) {
     static_cast<void>(entrance.push_frame(frame->stamp, frame->image(), frame->colour()));
     pipeline_.drain_stamps(now_);
     frame_waits_ = entrance.pop_frame(frame_);
+  } else if (const auto* other = std::get_if<ToolSample>(&event)) {
+    if (tools_) tools_->push(*other);
   } else if (const auto* pose = std::get_if<TrackerSample>(&event)) {
     entrance.push_pose(*pose);
     pipeline_.drain_poses();
@@ -129,6 +132,7 @@ void LockstepRuntime::release() {
   const SurfaceSample& surface = pipeline_.compose(release);
   publication_.surface(wire.fill(surface, utc_minus_monotonic_));
   pipeline_.sent(surface);
+  if (tools_) tools_->tell(surface, utc_minus_monotonic_);
   if (now_ >= next_reports_) {
     publish_reports(now_);
     next_reports_ = now_ + kReportInterval;

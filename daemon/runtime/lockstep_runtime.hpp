@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <thread>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "daemon/publishing/wire_model.hpp"
 #include "daemon/publishing/wire_status.hpp"
 #include "daemon/publishing/wire_surface.hpp"
+#include "daemon/runtime/tool_teller.hpp"
 #include "drivers/recording/replay_reader.hpp"
 
 namespace perimap {
@@ -23,7 +25,9 @@ class Publication;
 // pipeline would go on. Needs a pipeline with settings().lockstep. Used by one thread.
 class LockstepRuntime {
  public:
-  LockstepRuntime(Pipeline& pipeline, const Identity& identity, Duration utc_minus_monotonic, Publication& publication);
+  // `tools`: whose distance from the surface is told.
+  LockstepRuntime(Pipeline& pipeline, const Identity& identity, Duration utc_minus_monotonic, Publication& publication,
+                  const std::vector<WatchedTool>& tools = {});
   LockstepRuntime(const LockstepRuntime&) = delete;
   LockstepRuntime& operator=(const LockstepRuntime&) = delete;
   ~LockstepRuntime();
@@ -53,6 +57,7 @@ class LockstepRuntime {
   WireMesh wire_mesh_;
   WirePhase wire_phase_;
   std::vector<WireStatus> wire_statuses_;  // of the streams that are published
+  std::unique_ptr<ToolTeller> tools_;      // null where no tool is told of
   std::vector<std::thread> threads_;
   bool frame_waits_ = false;
   FrameHandle frame_;

@@ -105,6 +105,8 @@ void ReplayFeeder::deliver() {
     }
     if (const auto* frame = std::get_if<FrameEvent>(&*event)) {
       intake_.frame(frame->as_it_came(), frame->image(), frame->colour());
+    } else if (const auto* other = std::get_if<ToolSample>(&*event)) {
+      intake_.other_tool(*other);
     } else if (const auto* pose = std::get_if<TrackerSample>(&*event)) {
       intake_.pose(*pose);
     } else if (const auto* tool = std::get_if<ToolPose>(&*event)) {

@@ -31,6 +31,7 @@ class ReplayFeeder final : public SensorFeeder {
   ReplayFeeder& operator=(const ReplayFeeder&) = delete;
   ~ReplayFeeder() override { stop(); }
 
+  void give_tools_to(ToolTeller* tools) override { intake_.tools = tools; }
   void start(ThreadLauncher& threads) override;
   void stop() override;
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "daemon/config/configuration_loader.hpp"
@@ -12,7 +13,9 @@
 #include "daemon/runtime/calibration_fit.hpp"
 #include "daemon/runtime/configured_model.hpp"
 #include "daemon/runtime/configured_scope.hpp"
+#include "daemon/runtime/tool_tips.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/calibration/tool_tip.hpp"
 #include "drivers/calibration/turned_scope_file.hpp"
 #include "drivers/recording/channels.hpp"
 
@@ -63,6 +66,24 @@ Expected<RecordingFacts> read_facts(const std::string& path, ReadMode mode) {
   facts.utc_minus_monotonic = Duration((*info)->utc_minus_monotonic_ns);
   if ((*info)->world_frame_id != nullptr) facts.world_frame = (*info)->world_frame_id;
   return facts;
+}
+
+// Tips that a recording has with it, by the names of their tools.
+Expected<std::map<std::string, TipInTool>> read_tips(const std::string& path, ReadMode mode) {
+  auto reader = RecordingReader::open(path, mode);
+  if (!reader) return tl::unexpected(reader.error());
+  constexpr std::string_view kEnd = ".json";
+  std::map<std::string, TipInTool> tips;
+  for (const std::string& name : reader->attachment_names()) {
+    if (!name.starts_with(attachments::kTips) || !name.ends_with(kEnd)) continue;
+    const auto text = reader->attachment(name);
+    if (!text) return tl::unexpected(text.error());
+    const auto tip = parse_tool_tip(*text, fmt::format("{}:{}", path, name));
+    if (!tip) return tl::unexpected(tip.error());
+    const std::size_t length = name.size() - attachments::kTips.size() - kEnd.size();
+    tips[name.substr(attachments::kTips.size(), length)] = {tip->tip_T, tip->covariance_T};
+  }
+  return tips;
 }
 
 // In the file, or where there is none in the recording's own configuration.
@@ -199,7 +220,7 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
     if (basis->second_sensor) basis->configuration.tracker.second_sensor = basis->second_sensor;
     wrong = wrong_calibrations(basis->configuration);
   }
-  auto reader = ReplayReader::open(recording, mode);
+  auto reader = ReplayReader::open_with_tools(recording, mode);
   if (!reader) return tl::unexpected(std::move(reader.error()));
   if (basis->configuration.ecg.r_trigger && !reader->has_r_trigger()) {
     wrong.push_back({"ecg.r_trigger", fmt::format("expected false, since {} holds no channel {}, got true", recording,
@@ -220,8 +241,14 @@ tl::expected<ReplaySetup, SetupError> prepare_replay(const std::string& recordin
   pipeline.organ_model = *std::move(model);
   const Identity identity{basis->configuration.source.name, first_stream(pipeline),
                           basis->configuration.source.world_frame};
-  return ReplaySetup{std::move(basis->configuration), pipeline,          identity, basis->utc_minus_monotonic,
-                     std::move(basis->passed_over),   std::move(*reader)};
+  const auto tips = read_tips(recording, mode);
+  if (!tips) return tl::unexpected(SetupError{tips.error(), false});
+  auto tools = watched_tools(reader->tools(), basis->configuration.tracker, [&](const std::string& name) {
+    const auto tip = tips->find(name);
+    return tip == tips->end() ? std::nullopt : std::optional<TipInTool>(tip->second);
+  });
+  return ReplaySetup{std::move(basis->configuration), pipeline,           identity,        basis->utc_minus_monotonic,
+                     std::move(basis->passed_over),   std::move(*reader), std::move(tools)};
 }
 
 RuntimeSettings runtime_settings(const Configuration& configuration, const Identity& identity) {

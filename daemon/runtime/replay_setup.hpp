@@ -21,9 +21,10 @@ struct ReplaySetup {
   Configuration configuration;  // effective: defaults, then the recording's own, then the file's
   PipelineSettings pipeline;
   Identity identity;
-  Duration utc_minus_monotonic{0};  // of the recording
-  std::vector<Error> passed_over;   // keys of its configuration that do not describe the session (ReadMode::kWhole)
-  ReplayReader reader;              // at the first event
+  Duration utc_minus_monotonic{0};      // of the recording
+  std::vector<Error> passed_over;       // keys of its configuration that do not describe the session (ReadMode::kWhole)
+  ReplayReader reader;                  // at the first event
+  std::vector<WatchedTool> tools = {};  // whose distance from the surface is told
 };
 
 // What a recording and a configuration file over it come to.

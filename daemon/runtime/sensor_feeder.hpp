@@ -11,9 +11,15 @@
 
 namespace perimap {
 
+class ToolTeller;
+
 class SensorFeeder {
  public:
   virtual ~SensorFeeder() = default;
+
+  // Before start(): what takes the readings of tools whose distance is told; null where there are none. It must outlive
+  // stop().
+  virtual void give_tools_to(ToolTeller* /*tools*/) {}
 
   // `threads` must outlive stop().
   virtual void start(ThreadLauncher& threads) = 0;

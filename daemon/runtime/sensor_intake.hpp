@@ -7,6 +7,7 @@
 
 #include "core/pipeline/sensor_entrance.hpp"
 #include "daemon/runtime/session_recorder.hpp"
+#include "daemon/runtime/tool_teller.hpp"
 #include "drivers/image/camera_frame.hpp"
 
 namespace perimap {
@@ -27,6 +28,7 @@ struct SensorIntake {
   SessionRecorder* recorder = nullptr;
   FrameObserver* observer = nullptr;
   std::array<std::optional<std::size_t>, kToolRoles> roles{};  // by ToolRole: which ToolSample::tool has it
+  ToolTeller* tools = nullptr;
 
   // To the pipeline first: it is the one in a hurry.
   void frame(const CameraFrame& as_it_came, const GreyImage& grey, const ColourImage& colour) const noexcept {
@@ -43,7 +45,12 @@ struct SensorIntake {
     for (std::size_t role = 0; role < roles.size(); ++role) {
       if (sample.tool == roles[role]) tool_pose({static_cast<ToolRole>(role), sample});
     }
+    other_tool(sample);
     if (recorder != nullptr) recorder->tool(sample);
+  }
+  // Of a recording; not recorded again.
+  void other_tool(const ToolSample& sample) const noexcept {
+    if (tools != nullptr) tools->push(sample);
   }
   // Of a recording; not recorded again.
   void tool_pose(const ToolPose& pose) const noexcept {

@@ -13,7 +13,10 @@ inline constexpr std::string_view kTrackerPose = "tracker/pose";  // perimap::Tr
 // "tracker/patient_tool", "tracker/instrument/NAME".
 inline constexpr std::string_view kTrackedTools = "tracker/";
 inline constexpr std::string_view kSecondSensor = "tracker/second_sensor";  // that tells how the scope is turned
-inline constexpr std::string_view kPatientTool = "tracker/patient_tool";    // that is moved as the organ is moved
+// Those of which a distance from the surface is told.
+inline constexpr std::string_view kPointer = "tracker/pointer";
+inline constexpr std::string_view kInstruments = "tracker/instrument/";
+inline constexpr std::string_view kPatientTool = "tracker/patient_tool";  // that is moved as the organ is moved
 inline constexpr std::string_view kTrackerViewer = "tracker/viewer";  // foxglove::PoseInFrame, metres, valid poses only
 inline constexpr std::string_view kEcgSamples = "ecg/samples";        // perimap::EcgSamples
 // Of the same device, measured together with those and with their count and stamps: each message stands right before
@@ -31,12 +34,15 @@ inline constexpr std::string_view kTruthMotion = "truth/motion";        // perim
 inline constexpr std::string_view kTruthCamera = "truth/camera";        // perimap::TruthCamera
 inline constexpr std::string_view kTruthProcedure = "truth/procedure";  // perimap::TruthProcedure, with a procedure
 inline constexpr std::string_view kTruthTrace = "truth/trace";          // perimap::TruthTrace, with a motion trace
-inline constexpr std::string_view kTruthEvent = "truth/event";          // perimap::TruthEvent, likewise
+// Of the tip of a tool, by its name of those below kTrackedTools: "truth/tool/instrument/NAME", perimap::TruthTool.
+inline constexpr std::string_view kTruthTool = "truth/tool/";
+inline constexpr std::string_view kTruthEvent = "truth/event";  // perimap::TruthEvent, likewise
 
 // What was published.
 inline constexpr std::string_view kSurface = "surface";             // perimap::Surface
 inline constexpr std::string_view kSurfaceModel = "surface_model";  // perimap::SurfaceModel
 inline constexpr std::string_view kSurfaceMesh = "surface_mesh";    // perimap::SurfaceMesh
+inline constexpr std::string_view kTool = "tool";                   // perimap::ToolDistance
 inline constexpr std::string_view kPhase = "phase";                 // perimap::Phase
 inline constexpr std::string_view kStatus = "status";               // perimap::Status
 
@@ -48,6 +54,8 @@ inline constexpr std::string_view kCalibration = "calibration.yaml";
 inline constexpr std::string_view kConfiguration = "configuration.toml";
 inline constexpr std::string_view kProcedure = "procedure.toml";  // of a simulation
 inline constexpr std::string_view kTurnedScope = "turned_scope.json";
+// The tip of a tool, "tip/NAME.json" by its name of those below channels::kTrackedTools.
+inline constexpr std::string_view kTips = "tip/";
 inline constexpr std::string_view kVerification = "verification.json";  // what perimap verify said last before it
 
 }  // namespace perimap::attachments

@@ -122,17 +122,39 @@ void speed_up(ReplayEvent& event, Instant origin, double speed) {
              event);
 }
 
-Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode) {
-  auto reader = RecordingReader::open(path, mode);
-  if (!reader) return tl::unexpected(reader.error());
+std::vector<std::string_view> ReplayReader::sensor_channels(const RecordingReader& reader) {
   std::vector<std::string_view> wanted(kSensorChannels.begin(), kSensorChannels.end());
-  for (const RecordedChannel& channel : reader->channels()) {
+  for (const RecordedChannel& channel : reader.channels()) {
     for (const std::string_view optional : {channels::kSecondSensor, channels::kPatientTool, channels::kEcgSecondLead,
                                             channels::kRTrigger, channels::kRespirationSamples}) {
       if (channel.name == optional) wanted.push_back(optional);
     }
   }
+  return wanted;
+}
+
+Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode) {
+  auto reader = RecordingReader::open(path, mode);
+  if (!reader) return tl::unexpected(reader.error());
+  const auto wanted = sensor_channels(*reader);
   return select(std::move(*reader), wanted);
+}
+
+Expected<ReplayReader> ReplayReader::open_with_tools(const std::string& path, ReadMode mode) {
+  auto reader = RecordingReader::open(path, mode);
+  if (!reader) return tl::unexpected(reader.error());
+  std::vector<std::string> tools;
+  for (const RecordedChannel& channel : reader->channels()) {
+    if (channel.name != channels::kPointer && !channel.name.starts_with(channels::kInstruments)) continue;
+    tools.emplace_back(channel.name.substr(channels::kTrackedTools.size()));
+  }
+  std::vector<std::string> names;
+  for (const std::string& tool : tools) names.push_back(std::string(channels::kTrackedTools) + tool);
+  auto wanted = sensor_channels(*reader);
+  wanted.insert(wanted.end(), names.begin(), names.end());
+  auto selected = select(std::move(*reader), wanted);
+  if (selected) selected->tools_ = std::move(tools);
+  return selected;
 }
 
 Expected<ReplayReader> ReplayReader::open(const std::string& path, ReadMode mode,
@@ -208,6 +230,15 @@ std::vector<Error> ReplayReader::damage() const {
   return all;
 }
 
+Expected<std::optional<ReplayEvent>> ReplayReader::other_tool_event(const RecordedMessage& message) {
+  const auto pose = pose_of(reader_, message);
+  if (!pose) return tl::unexpected(pose.error());
+  ToolSample sample{*pose};
+  const auto name = std::find(tools_.begin(), tools_.end(), message.channel.substr(channels::kTrackedTools.size()));
+  sample.tool = static_cast<std::size_t>(name - tools_.begin());
+  return std::optional<ReplayEvent>(sample);
+}
+
 Expected<std::optional<ReplayEvent>> ReplayReader::next() {
   for (;;) {
     const auto message = reader_.next();
@@ -227,8 +258,9 @@ Expected<std::optional<ReplayEvent>> ReplayReader::event_of(const RecordedMessag
         m, fmt::format("arrival {} ns lies before its own source time {} ns", to_ns(m.arrival), to_ns(m.source_time)));
   }
   last_arrival_ = m.arrival;
-  return m.channel == channels::kCameraImage    ? frame_event(m)
-         : m.channel == channels::kTrackerPose  ? pose_event(reader_, m)
+  return m.channel == channels::kCameraImage                                                ? frame_event(m)
+         : m.channel == channels::kTrackerPose                                              ? pose_event(reader_, m)
+         : m.channel == channels::kPointer || m.channel.starts_with(channels::kInstruments) ? other_tool_event(m)
          : m.channel == channels::kSecondSensor ? tool_event(reader_, m, ToolRole::kSecondSensor)
          : m.channel == channels::kPatientTool  ? tool_event(reader_, m, ToolRole::kPatient)
          : m.channel == channels::kEcgSamples || m.channel == channels::kEcgSecondLead ? ecg_event(m)

@@ -48,7 +48,8 @@ struct FrameEvent {
   [[nodiscard]] CameraFrame as_it_came() const noexcept;
 };
 
-using ReplayEvent = std::variant<FrameEvent, TrackerSample, ToolPose, EcgBlock, RTriggerPulse, RespirationBlock>;
+using ReplayEvent =
+    std::variant<FrameEvent, TrackerSample, ToolPose, EcgBlock, RTriggerPulse, RespirationBlock, ToolSample>;
 
 // A silence of all devices that is longer is a break in the session, however long: a replay goes on after so much of
 // it. Of what was known before nothing holds then; a phase is lost within seconds.
@@ -68,6 +69,8 @@ class ReplayReader {
   // Fails when the recording has no camera, tracker or ECG channel. Poses of tools that have a role, triggers and
   // breaths are given where there are any.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode);
+  // Those and, of each other tracked tool that has a tip, its readings: ToolSample::tool is its place in tools().
+  [[nodiscard]] static Expected<ReplayReader> open_with_tools(const std::string& path, ReadMode mode);
   // Of these of the sensors' channels alone; fails when one of them is not there.
   [[nodiscard]] static Expected<ReplayReader> open(const std::string& path, ReadMode mode,
                                                    std::span<const std::string_view> channels);
@@ -76,6 +79,9 @@ class ReplayReader {
   [[nodiscard]] bool has_r_trigger() const { return has(channels::kRTrigger); }
   [[nodiscard]] bool has_second_sensor() const { return has(channels::kSecondSensor); }
   [[nodiscard]] bool has_respiration() const { return has(channels::kRespirationSamples); }
+
+  // Names of the tools that it was opened with, as those of a live tracker: "pointer", "instrument/NAME".
+  [[nodiscard]] const std::vector<std::string>& tools() const noexcept { return tools_; }
 
   // The next event; nullopt at the end. Channels other than the sensors' are passed over.
   [[nodiscard]] Expected<std::optional<ReplayEvent>> next();
@@ -96,6 +102,8 @@ class ReplayReader {
   explicit ReplayReader(RecordingReader reader) : reader_(std::move(reader)) {}
 
   [[nodiscard]] bool has(std::string_view channel) const;
+  [[nodiscard]] static std::vector<std::string_view> sensor_channels(const RecordingReader& reader);
+  [[nodiscard]] Expected<std::optional<ReplayEvent>> other_tool_event(const RecordedMessage& message);
   [[nodiscard]] static Expected<ReplayReader> select(RecordingReader reader,
                                                      std::span<const std::string_view> channels);
   [[nodiscard]] Expected<std::optional<ReplayEvent>> event_of(const RecordedMessage& message);
@@ -103,6 +111,7 @@ class ReplayReader {
   [[nodiscard]] Expected<std::optional<ReplayEvent>> ecg_event(const RecordedMessage& message);
 
   RecordingReader reader_;
+  std::vector<std::string> tools_;
   RecordedFrame frame_;
   EcgBlock second_lead_;  // the last one; it waits for the first lead's
   bool keeps_frames_ = false;

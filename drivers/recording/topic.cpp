@@ -17,6 +17,10 @@ TopicType topic_type<perimap_SurfaceMesh>() noexcept {
   return {&perimap_SurfaceMesh_desc, kPerimapMeshSchemaText};
 }
 template <>
+TopicType topic_type<perimap_ToolDistance>() noexcept {
+  return {&perimap_ToolDistance_desc, kPerimapToolSchemaText};
+}
+template <>
 TopicType topic_type<perimap_Phase>() noexcept {
   return {&perimap_Phase_desc, kPerimapSchemaText};
 }
@@ -63,6 +67,10 @@ TopicType topic_type<perimap_TruthEvent>() noexcept {
 template <>
 TopicType topic_type<perimap_TruthProcedure>() noexcept {
   return {&perimap_TruthProcedure_desc, kPerimapProcedureSchemaText};
+}
+template <>
+TopicType topic_type<perimap_TruthTool>() noexcept {
+  return {&perimap_TruthTool_desc, kPerimapToolSchemaText};
 }
 template <>
 TopicType topic_type<perimap_TruthTrace>() noexcept {

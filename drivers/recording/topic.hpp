@@ -5,6 +5,7 @@
 #include <perimap.h>
 #include <perimap_mesh.h>
 #include <perimap_procedure.h>
+#include <perimap_tool.h>
 #include <perimap_trace.h>
 
 #include <string_view>
@@ -34,6 +35,8 @@ template <>
 template <>
 [[nodiscard]] TopicType topic_type<perimap_SurfaceMesh>() noexcept;
 template <>
+[[nodiscard]] TopicType topic_type<perimap_ToolDistance>() noexcept;
+template <>
 [[nodiscard]] TopicType topic_type<perimap_Phase>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<perimap_Status>() noexcept;
@@ -57,6 +60,8 @@ template <>
 [[nodiscard]] TopicType topic_type<perimap_TruthEvent>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<perimap_TruthProcedure>() noexcept;
+template <>
+[[nodiscard]] TopicType topic_type<perimap_TruthTool>() noexcept;
 template <>
 [[nodiscard]] TopicType topic_type<perimap_TruthTrace>() noexcept;
 template <>

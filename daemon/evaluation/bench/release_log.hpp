@@ -30,6 +30,7 @@ class ReleaseLog final : public Publication {
   void surface(const perimap_Surface& sample) override;
   void surface_model(const perimap_SurfaceModel& model) override { next_.surface_model(model); }
   void surface_mesh(const perimap_SurfaceMesh& mesh) override { next_.surface_mesh(mesh); }
+  void tool(const perimap_ToolDistance& distance) override { next_.tool(distance); }
   void phase(const perimap_Phase& phase) override { next_.phase(phase); }
   void status(const perimap_Status& status) override { next_.status(status); }
 

@@ -133,7 +133,8 @@ Outcome watch(const WatchOptions& options, const Console& console) {
     }
     recorder.emplace(std::move(*created));
   }
-  Expected<SampleReaders> readers = SampleReaders::create({options.domain, options.security}, recorder.has_value());
+  Expected<SampleReaders> readers =
+      SampleReaders::create({options.domain, options.security}, recorder.has_value(), true);
   if (!readers) {
     return refuse(readers.error());
   }

@@ -36,6 +36,11 @@ void ReplayPublication::surface_mesh(const perimap_SurfaceMesh& mesh) {
   if (dds_ != nullptr) dds_->surface_mesh(mesh);
 }
 
+void ReplayPublication::tool(const perimap_ToolDistance& distance) {
+  if (recorder_ != nullptr) recorder_->tool(distance);
+  if (dds_ != nullptr) dds_->tool(distance);
+}
+
 void ReplayPublication::phase(const perimap_Phase& phase) {
   if (recorder_ != nullptr) recorder_->phase(phase);
   if (dds_ != nullptr) dds_->phase(phase);

@@ -24,6 +24,7 @@ class ReplayPublication final : public Publication {
   void surface(const perimap_Surface& sample) override;
   void surface_model(const perimap_SurfaceModel& model) override;
   void surface_mesh(const perimap_SurfaceMesh& mesh) override;
+  void tool(const perimap_ToolDistance& distance) override;
   void phase(const perimap_Phase& phase) override;
   void status(const perimap_Status& status) override;
 

@@ -80,7 +80,7 @@ using FrameProgress = std::function<void(std::uint64_t frames)>;
 Expected<bool> run_lockstep(Pipeline& pipeline, const ReplaySetup& setup, const NextEvent& next,
                             Publication& publication, StopSignal& stop, const FrameProgress& progress,
                             std::vector<Error>& damage, std::optional<SurfaceWatch>& surface) {
-  LockstepRuntime runtime(pipeline, setup.identity, setup.utc_minus_monotonic, publication);
+  LockstepRuntime runtime(pipeline, setup.identity, setup.utc_minus_monotonic, publication, setup.tools);
   std::uint64_t shown = 0;
   for (;;) {
     auto event = next();
@@ -108,8 +108,10 @@ Expected<bool> run_lockstep(Pipeline& pipeline, const ReplaySetup& setup, const 
 
 Expected<bool> run_live(Pipeline& pipeline, ReplaySetup& setup, Publication& publication, StopSignal& stop,
                         const FrameProgress& progress) {
-  LiveSession session(pipeline, runtime_settings(setup.configuration, setup.identity), publication,
-                      std::move(setup.reader), [&] { progress(pipeline.counters().frames.get()); });
+  RuntimeSettings runtime = runtime_settings(setup.configuration, setup.identity);
+  runtime.tools = setup.tools;
+  LiveSession session(pipeline, runtime, publication, std::move(setup.reader),
+                      [&] { progress(pipeline.counters().frames.get()); });
   return session.run(stop).map([&stop] { return stop.requested(); });
 }
 
@@ -169,7 +171,9 @@ tl::expected<ReplayReport, SetupError> run_replay(
   std::unique_ptr<DdsPublication> dds;
   if (options.dds) {
     const DdsConfiguration& c = setup->configuration.dds;
-    auto created = DdsPublication::create({{c.domain, c.security}, c.surface_deadline, c.surface_lifespan});
+    DdsSettings settings{{c.domain, c.security}, c.surface_deadline, c.surface_lifespan};
+    settings.tools = !setup->tools.empty();
+    auto created = DdsPublication::create(settings);
     if (!created) return failed(created.error());
     dds = std::move(*created);
   }

@@ -83,6 +83,10 @@ void SampleReceiver::receive() {
       statistics_.hear(status, receipt, writer);
       statistics_.add(status);
     });
+    if (readers_.tools) {
+      receive_samples(*readers_.tools, receipt,
+                      [&](const perimap_ToolDistance& tool, std::uint64_t) { statistics_.add(tool); });
+    }
     if (recorder_) {
       receive_samples(readers_.models, receipt, [](const perimap_SurfaceModel&, std::uint64_t) {});
       receive_samples(readers_.meshes, receipt, [](const perimap_SurfaceMesh&, std::uint64_t) {});

@@ -9,6 +9,7 @@
 #include "daemon/evaluation/watch/watch_text.hpp"
 #include "daemon/publishing/setup_text.hpp"
 #include "daemon/publishing/status_text.hpp"
+#include "daemon/publishing/tool_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 #include "drivers/json/json_text.hpp"
 
@@ -99,6 +100,9 @@ std::string report_line(const StreamReport& report) {
                         last.cardiac_phase_deviation_rad / kDegree,
                         last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian, features_text(last), state_text(last));
   }
+  if (!at_odds(report.hearing)) {
+    for (const ToolReport& tool : report.tools) line += " | " + tool_words(tool.last);
+  }
   if (report.status) line += stages_text(*report.status);
   if (report.status && report.status->status.setup.state == perimap_SETUP_DOUBTED) {
     line += " | set-up " + setup_words(report.status->status.setup);
@@ -122,6 +126,9 @@ std::string summary_text(const StreamReport& report) {
   if (report.last) {
     text += fmt::format("  last surface: {}; {}\n", state_text(*report.last), features_text(*report.last));
     if (report.last->uses) text += fmt::format("  it may be used to: {}\n", uses_words(*report.last->uses));
+  }
+  for (const ToolReport& tool : report.tools) {
+    text += fmt::format("  tool {}; {} received, {} lost\n", tool_words(tool.last), tool.received, tool.missing);
   }
   if (report.status) text += fmt::format("  set-up: {}\n", setup_words(report.status->status.setup));
   if (report.status && !report.status->stages.empty()) text += stage_table(*report.status);
@@ -158,6 +165,16 @@ std::string report_json(const StreamReport& report, ReportKind kind) {
     json["features"] = std::move(features);
     if (last.uses) json["uses"] = uses_json(*last.uses);
     json["median_deviation_mm"] = last.median_deviation_mm ? Json(*last.median_deviation_mm) : Json(nullptr);
+  }
+  if (!report.tools.empty()) {
+    Json tools = Json::array();
+    for (const ToolReport& tool : report.tools) {
+      Json one = tool_json(tool.last);
+      one["received"] = tool.received;
+      one["missing"] = tool.missing;
+      tools.push_back(std::move(one));
+    }
+    json["tools"] = std::move(tools);
   }
   if (report.status) {
     json["status"] = status_json(report.status->status, report.status->stages, report.status->sources);

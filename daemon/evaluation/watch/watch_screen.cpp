@@ -11,6 +11,7 @@
 #include "daemon/evaluation/watch/watch_text.hpp"
 #include "daemon/publishing/advice.hpp"
 #include "daemon/publishing/setup_text.hpp"
+#include "daemon/publishing/tool_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 
 namespace perimap {
@@ -97,6 +98,7 @@ std::string stream_text(const StreamReport& report, bool colours) {
     text += row("heart", fmt::format("phase {:.0f} +- {:.1f} deg, {:.1f}/min", last.cardiac_phase_rad / kDegree,
                                      last.cardiac_phase_deviation_rad / kDegree,
                                      last.cardiac_phase_rate_rad_per_s * kPerMinutePerRadian));
+    for (const ToolReport& tool : report.tools) text += row("tool", printable(tool_words(tool.last)));
   }
   text += row("received",
               fmt::format("{:.1f}/s, {} lost, {} after their validity, {} restarts",

@@ -97,6 +97,29 @@ void WatchStatistics::add(const perimap_Status& status) {
   streams_[{status.source, status.stream}].status = std::move(digest);
 }
 
+void WatchStatistics::add(const perimap_ToolDistance& tool) {
+  Tool& kept = tools_[{tool.source, tool.tool}];
+  for (ToolReport* report : {&kept.interval, &kept.total}) {
+    const std::uint64_t before = kept.total.received > 0 ? report->last.sample_sequence : 0;
+    const bool goes_on = before > 0 && tool.sample_sequence > before &&
+                         std::memcmp(report->last.run_id, tool.run_id, sizeof tool.run_id) == 0;
+    if (goes_on) report->missing += tool.sample_sequence - before - 1;
+    ++report->received;
+    report->last = tool;
+  }
+}
+
+std::vector<ToolReport> WatchStatistics::tools_with(const Key& key, ToolReport Tool::*tally) const {
+  std::vector<ToolReport> all;
+  // "clock" comes before "frame".
+  const auto next = std::next(streams_.find(key));
+  if (next != streams_.end() && next->first.first == key.first) return all;
+  for (const auto& [of, tool] : tools_) {
+    if (of.first == key.first && (tool.*tally).received > 0) all.push_back(tool.*tally);
+  }
+  return all;
+}
+
 StreamReport WatchStatistics::report(const Key& key, const Stream& stream, const Tally& tally, Duration length) {
   return {key.first,
           key.second,
@@ -111,14 +134,17 @@ StreamReport WatchStatistics::report(const Key& key, const Stream& stream, const
           tally.lateness.spread(),
           tally.jitter.spread(),
           stream.last,
-          stream.status};
+          stream.status,
+          {}};
 }
 
 std::vector<StreamReport> WatchStatistics::take_interval(Duration length) {
   std::vector<StreamReport> reports;
   for (auto& [key, stream] : streams_) {
     reports.push_back(report(key, stream, std::exchange(stream.interval, {}), length));
+    reports.back().tools = tools_with(key, &Tool::interval);
   }
+  for (auto& [key, tool] : tools_) tool.interval.received = tool.interval.missing = 0;
   return reports;
 }
 
@@ -126,6 +152,7 @@ std::vector<StreamReport> WatchStatistics::totals() const {
   std::vector<StreamReport> reports;
   for (const auto& [key, stream] : streams_) {
     reports.push_back(report(key, stream, stream.total, stream.last_receipt - stream.first_receipt));
+    reports.back().tools = tools_with(key, &Tool::total);
   }
   return reports;
 }

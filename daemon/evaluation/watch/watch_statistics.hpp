@@ -2,6 +2,7 @@
 #pragma once
 
 #include <perimap.h>
+#include <perimap_tool.h>
 
 #include <array>
 #include <cstdint>
@@ -39,6 +40,13 @@ struct StatusDigest {
   std::vector<perimap_SourceStatus> sources;
 };
 
+// What was told of one tool over some time.
+struct ToolReport {
+  perimap_ToolDistance last{};
+  std::uint64_t received = 0;
+  std::uint64_t missing = 0;  // sequence numbers that never came, between samples that did
+};
+
 // What one stream of one source did over some time.
 struct StreamReport {
   std::string source;
@@ -55,6 +63,7 @@ struct StreamReport {
   DurationSpread jitter;  // |receipt interval minus release interval| of neighbouring samples
   std::optional<SurfaceDigest> last;
   std::optional<StatusDigest> status;
+  std::vector<ToolReport> tools;  // of the source, with the stream that they are told with; by name
 };
 
 // One thread at a time. Latencies make sense on the publisher's host only, whose CLOCK_MONOTONIC the samples carry.
@@ -64,6 +73,7 @@ class WatchStatistics {
   // Returns the surface in brief.
   SurfaceDigest add(const perimap_Surface& surface, Instant receipt, std::uint64_t writer = 0);
   void add(const perimap_Status& status);
+  void add(const perimap_ToolDistance& tool);
   // What it says of its publisher: in which run, and whether there are two.
   void hear(const perimap_Status& status, Instant receipt, std::uint64_t writer);
 
@@ -99,9 +109,17 @@ class WatchStatistics {
   };
   using Key = std::pair<std::string, std::string>;
 
+  struct Tool {
+    ToolReport interval;
+    ToolReport total;
+  };
+  // Of the source, when `key` is the stream that its tools are told with: that of its frames where there is one.
+  [[nodiscard]] std::vector<ToolReport> tools_with(const Key& key, ToolReport Tool::*tally) const;
+
   static StreamReport report(const Key& key, const Stream& stream, const Tally& tally, Duration length);
 
   std::map<Key, Stream> streams_;
+  std::map<Key, Tool> tools_;                                 // by source and name
   std::map<std::string, client::PublisherWatch> publishers_;  // by source
   std::uint64_t surfaces_ = 0;
 };

@@ -7,9 +7,10 @@
 
 namespace perimap::test {
 
-using EveryType = std::tuple<perimap_Surface, perimap_SurfaceModel, perimap_SurfaceMesh, perimap_Phase, perimap_Status,
-                             perimap_TrackerPose, perimap_EcgSamples, perimap_RTriggerPulse, perimap_RespirationSamples,
-                             perimap_RecordingInfo, perimap_TruthMesh, perimap_TruthMotion, perimap_TruthCamera,
+using EveryType = std::tuple<perimap_Surface, perimap_SurfaceModel, perimap_SurfaceMesh, perimap_ToolDistance,
+                             perimap_Phase, perimap_Status, perimap_TrackerPose, perimap_EcgSamples,
+                             perimap_RTriggerPulse, perimap_RespirationSamples, perimap_RecordingInfo,
+                             perimap_TruthMesh, perimap_TruthMotion, perimap_TruthCamera, perimap_TruthTool,
                              foxglove_RawImage, foxglove_CompressedImage, foxglove_PoseInFrame>;
 
 // Calls visit.operator()<T>() for every one.

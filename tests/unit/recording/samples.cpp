@@ -325,6 +325,43 @@ void fill(Filler& next, perimap_SurfaceMesh& s) {
   next.sequence(s.triangles, 3);
 }
 
+void fill(Filler& next, perimap_ToolDistance& s) {
+  next(s.source);
+  next(s.tool);
+  next(s.frame_id);
+  next(s.run_id);
+  next(s.sample_sequence);
+  next(s.surface_sequence);
+  next(s.release_time_ns);
+  next(s.release_utc_ns);
+  next(s.time_ns);
+  next(s.valid_until_ns);
+  next(s.state);
+  next(s.reason);
+  next(s.surface_state);
+  next(s.surface_reason);
+  next(s.touches);
+  next(s.tip_known);
+  next(s.last_seen_time_ns);
+  next(s.tip_W_mm);
+  next(s.tip_velocity_W_mm_per_s);
+  next(s.tip_covariance_W_mm2);
+  next(s.nearest_W_mm);
+  next(s.normal_W);
+  next(s.states);
+  next(s.reasons);
+  next(s.distances_mm);
+  next(s.deviations_mm);
+  next(s.rates_mm_per_s);
+}
+
+void fill(Filler& next, perimap_TruthTool& s) {
+  next(s.time_ns);
+  next(s.tip_W_mm);
+  next(s.distance_mm);
+  next(s.touches);
+}
+
 void fill(Filler& next, perimap_TrackerPose& s) {
   next(s.source_time_ns);
   next(s.device_frame);
@@ -439,6 +476,7 @@ Sample<T> make_sample(unsigned seed) {
 template Sample<perimap_Surface> make_sample(unsigned);
 template Sample<perimap_SurfaceModel> make_sample(unsigned);
 template Sample<perimap_SurfaceMesh> make_sample(unsigned);
+template Sample<perimap_ToolDistance> make_sample(unsigned);
 template Sample<perimap_Phase> make_sample(unsigned);
 template Sample<perimap_Status> make_sample(unsigned);
 template Sample<perimap_TrackerPose> make_sample(unsigned);
@@ -449,6 +487,7 @@ template Sample<perimap_RecordingInfo> make_sample(unsigned);
 template Sample<perimap_TruthMesh> make_sample(unsigned);
 template Sample<perimap_TruthMotion> make_sample(unsigned);
 template Sample<perimap_TruthCamera> make_sample(unsigned);
+template Sample<perimap_TruthTool> make_sample(unsigned);
 template Sample<foxglove_RawImage> make_sample(unsigned);
 template Sample<foxglove_CompressedImage> make_sample(unsigned);
 template Sample<foxglove_PoseInFrame> make_sample(unsigned);

@@ -177,6 +177,40 @@ json to_json(const perimap_SurfaceMesh& s) {
           MEMBER(triangles)};
 }
 template <>
+json to_json(const perimap_ToolDistance& s) {
+  return {MEMBER(source),
+          MEMBER(tool),
+          MEMBER(frame_id),
+          MEMBER(run_id),
+          MEMBER(sample_sequence),
+          MEMBER(surface_sequence),
+          MEMBER(release_time_ns),
+          MEMBER(release_utc_ns),
+          MEMBER(time_ns),
+          MEMBER(valid_until_ns),
+          MEMBER(state),
+          MEMBER(reason),
+          MEMBER(surface_state),
+          MEMBER(surface_reason),
+          MEMBER(touches),
+          MEMBER(tip_known),
+          MEMBER(last_seen_time_ns),
+          MEMBER(tip_W_mm),
+          MEMBER(tip_velocity_W_mm_per_s),
+          MEMBER(tip_covariance_W_mm2),
+          MEMBER(nearest_W_mm),
+          MEMBER(normal_W),
+          MEMBER(states),
+          MEMBER(reasons),
+          MEMBER(distances_mm),
+          MEMBER(deviations_mm),
+          MEMBER(rates_mm_per_s)};
+}
+template <>
+json to_json(const perimap_TruthTool& s) {
+  return {MEMBER(time_ns), MEMBER(tip_W_mm), MEMBER(distance_mm), MEMBER(touches)};
+}
+template <>
 json to_json(const perimap_Phase& s) {
   return {MEMBER(source),
           MEMBER(stream),

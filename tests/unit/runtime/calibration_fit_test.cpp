@@ -191,6 +191,26 @@ TEST_F(CalibrationFit, ATipOfAnotherToolIsRefused) {
   }
 }
 
+TEST_F(CalibrationFit, ATipOfAnInstrumentIsOfOneThatTheTrackerHas) {
+  TrackerConfiguration& c = configuration_.tracker;
+  c.protocol = TrackerConfiguration::Protocol::kNdi;
+  c.instruments = {"0E", "0F"};
+  const auto tip_of = [this](const char* file, const std::string& tool) {
+    return write(file, R"({"tip_mm": [0, 0, 150], "covariance": [[1, 0, 0], [0, 1, 0], [0, 0, 1]])" + tool + "}");
+  };
+  const auto error_of = [&](std::vector<std::filesystem::path> files) {
+    c.instrument_calibrations = std::move(files);
+    const auto fits = calibrations_fit(configuration_);
+    return fits ? std::string() : fits.error().message;
+  };
+  const auto first = tip_of("e.json", R"(, "tool": "E")"), second = tip_of("f.json", R"(, "tool": "instrument/0F")");
+  EXPECT_EQ(error_of({first, second}), "");
+  EXPECT_THAT(error_of({tip_of("g.json", R"(, "tool": "10")")}), HasSubstr("'tracker.instruments', got one of \"10\""));
+  EXPECT_THAT(error_of({tip_of("h.json", "")}), HasSubstr("does not say of which tool"));
+  EXPECT_THAT(error_of({first, tip_of("i.json", R"(, "tool": "E")")}), HasSubstr("got a second one of \"E\""));
+  EXPECT_THAT(error_of({write("j.json", "{")}), HasSubstr("perimap calibrate tool"));
+}
+
 TEST_F(CalibrationFit, ATipThatCannotBeReadIsRefused) {
   configuration_.tracker.pointer = "0C";
   for (const char* text :

@@ -256,5 +256,54 @@ TEST_F(TwoPublishers, ARestartIsARestart) {
   EXPECT_EQ(totals().hearing, client::Hearing::kUse);
 }
 
+perimap_ToolDistance tool(std::uint64_t sequence, const char* name = "instrument/probe") {
+  perimap_ToolDistance tool{};
+  dds::assign(tool.source, "a");
+  dds::assign(tool.tool, name);
+  tool.sample_sequence = sequence;
+  tool.state = perimap_TOOL_GOOD;
+  tool.distances_mm[0] = 3.21;
+  tool.deviations_mm[0] = 0.4;
+  tool.rates_mm_per_s[0] = -12.0;
+  return tool;
+}
+
+TEST(WatchStatistics, TellsOfEachToolWhatWasHeardLastAndWhatNeverCame) {
+  WatchStatistics statistics;
+  statistics.add(surface(1), release_of(surface(1)));
+  for (const std::uint64_t sequence : {1U, 2U, 5U}) statistics.add(tool(sequence));
+  statistics.add(tool(1, "pointer"));
+  const auto reports = statistics.take_interval(seconds(1));
+  ASSERT_EQ(reports.size(), 1U);
+  ASSERT_EQ(reports[0].tools.size(), 2U);
+  EXPECT_EQ(reports[0].tools[0].received, 3U);
+  EXPECT_EQ(reports[0].tools[0].missing, 2U);
+  EXPECT_THAT(report_line(reports[0]), HasSubstr("instrument/probe 3.2 +- 0.4 mm, -12 mm/s"));
+  const auto json = nlohmann::json::parse(report_json(reports[0], ReportKind::kInterval));
+  EXPECT_EQ(json["tools"][0]["tool"], "instrument/probe");
+  EXPECT_EQ(json["tools"][0]["distances_mm"][0], 3.21);
+  // What has not been heard since is not told again.
+  statistics.add(tool(6));
+  const auto next = statistics.take_interval(seconds(1));
+  ASSERT_EQ(next[0].tools.size(), 1U);
+  EXPECT_EQ(next[0].tools[0].missing, 0U);
+  EXPECT_EQ(statistics.totals()[0].tools[0].received, 4U);
+}
+
+TEST(WatchStatistics, AToolThatIsNotKnownIsSaidSoAndHasNoNumbers) {
+  WatchStatistics statistics;
+  statistics.add(surface(1), release_of(surface(1)));
+  perimap_ToolDistance lost = tool(1);
+  lost.state = perimap_TOOL_INVALID;
+  lost.reason = perimap_TOOL_REASON_NOT_SEEN;
+  lost.distances_mm[0] = std::nan("");
+  statistics.add(lost);
+  const StreamReport report = statistics.totals()[0];
+  EXPECT_THAT(report_line(report), HasSubstr("instrument/probe: the tracker does not see it"));
+  const auto json = nlohmann::json::parse(report_json(report, ReportKind::kSummary));
+  EXPECT_TRUE(json["tools"][0]["distances_mm"][0].is_null());
+  EXPECT_EQ(json["tools"][0]["reason"], "not_seen");
+}
+
 }  // namespace
 }  // namespace perimap
