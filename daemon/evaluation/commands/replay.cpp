@@ -50,7 +50,7 @@ tl::expected<UnrecordedSession, Refusal> simulate(const std::string& text) {
   if (!simulation) {
     return refuse(told_of_option(kSimulated, simulation.error()), ExitCode::kWrongUsage);
   }
-  auto session = UnrecordedSession::create(*std::move(simulation), options->noise, options->threads);
+  auto session = UnrecordedSession::create(*std::move(simulation), options->noise, options->threads, options->tool);
   if (!session) return refuse(session.error());
   return *std::move(session);
 }

@@ -14,6 +14,16 @@ ReplayPublication::ReplayPublication(const RecordedTruth* truth, const std::vect
   }
 }
 
+void ReplayPublication::judge_tools(const ToolTruths& truths) {
+  for (const auto& [tool, truth] : truths) tools_.emplace(tool, truth);
+}
+
+std::map<std::string, ToolFigures> ReplayPublication::tools() const {
+  std::map<std::string, ToolFigures> all;
+  for (const auto& [tool, tally] : tools_) all.emplace(tool, tally.figures());
+  return all;
+}
+
 void ReplayPublication::surface(const perimap_Surface& sample) {
   if (recorder_ != nullptr) recorder_->surface(sample);
   if (dds_ != nullptr) dds_->surface(sample);
@@ -39,6 +49,7 @@ void ReplayPublication::surface_mesh(const perimap_SurfaceMesh& mesh) {
 void ReplayPublication::tool(const perimap_ToolDistance& distance) {
   if (recorder_ != nullptr) recorder_->tool(distance);
   if (dds_ != nullptr) dds_->tool(distance);
+  if (const auto tally = tools_.find(distance.tool); tally != tools_.end()) tally->second.add(distance);
 }
 
 void ReplayPublication::phase(const perimap_Phase& phase) {

@@ -73,6 +73,7 @@ std::string to_text(const ReplayReport& report) {
     if (s.procedure) text += to_text(*s.procedure);
   }
   if (report.surface) text += to_text(*report.surface) + "\n";
+  for (const auto& [tool, figures] : report.tools) text += to_text(tool, figures) + "\n";
   if (!report.has_truth) {
     text += fmt::format("no ground truth in this recording: {} features converged\n", report.features_converged);
   }
@@ -90,6 +91,11 @@ nlohmann::json to_json(const ReplayReport& report) {
     if (s.procedure) place["procedure"] = to_json(*s.procedure);
   }
   if (report.surface) json["surface"] = to_json(*report.surface);
+  // The first one's, and where there are several all by their names.
+  if (!report.tools.empty()) json["tool"] = to_json(report.tools.begin()->second);
+  if (report.tools.size() > 1) {
+    for (const auto& [tool, figures] : report.tools) json["tools"][tool] = to_json(figures);
+  }
   json["setup"] = setup_json(report.setup);
   json["breath_s"] = to_seconds(report.breathing.period());
   json["breath_suspected"] = report.breathing.suspected;

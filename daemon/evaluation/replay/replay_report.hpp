@@ -4,6 +4,7 @@
 #include <perimap.h>
 
 #include <cstdint>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -16,6 +17,7 @@
 #include "daemon/evaluation/procedure/procedure_score.hpp"
 #include "daemon/evaluation/report/accuracy.hpp"
 #include "daemon/evaluation/surface/surface_figures.hpp"
+#include "daemon/evaluation/tool/tool_figures.hpp"
 
 namespace perimap {
 
@@ -40,7 +42,8 @@ struct ReplayReport {
   std::uint64_t frames = 0, frames_without_pose = 0, features_converged = 0;
   std::vector<Stream> streams;  // at least one
   std::vector<Stage> stages;
-  std::optional<SurfaceFigures> surface;  // in lockstep, where there is a truth
+  std::optional<SurfaceFigures> surface;     // in lockstep, where there is a truth
+  std::map<std::string, ToolFigures> tools;  // by name: in lockstep, of those that have a truth
   RespiratoryClock breathing;
   perimap_SetupWatch setup{};
   nlohmann::json counts;  // of the first stream's status, and of the sources

@@ -178,6 +178,9 @@ tl::expected<ReplayReport, SetupError> run_replay(
     dds = std::move(*created);
   }
   ReplayPublication publication(*truth ? &**truth : nullptr, *beats, recorder.get(), dds.get());
+  const auto tool_truths = load_tool_truths(options.recording, options.mode);
+  if (!tool_truths) return failed(tool_truths.error());
+  if (options.lockstep) publication.judge_tools(*tool_truths);
   Pipeline pipeline(setup->pipeline);
   const std::uint64_t all = *truth ? (*truth)->captures.size() : 0;
   const FrameProgress frames_done = [&progress, all](std::uint64_t frames) { progress(frames, all); };
@@ -198,6 +201,7 @@ tl::expected<ReplayReport, SetupError> run_replay(
   report.has_truth = truth->has_value();
   report.damage = std::move(damage);
   if (surface) report.surface = surface->figures();
+  report.tools = publication.tools();
   return report;
 }
 

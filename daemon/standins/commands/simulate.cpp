@@ -39,6 +39,7 @@ struct SimulateOptions {
   unsigned threads = 0;
   bool force = false;
   std::filesystem::path procedure;  // to write the one that is simulated to
+  bool tool = false;                // a tracked probe touches the heart
   std::filesystem::path untold;     // a second recording of the same, without its set-up; empty: none
 
   [[nodiscard]] unsigned thread_count() const { return rendering_threads(threads); }
@@ -113,6 +114,7 @@ std::vector<SimulatedRecording> planned(const SimulateOptions& options) {
         fmt::format("{}-{}mm{}", options.out.stem().string(), noise_mm, options.out.extension().string()));
     recordings.push_back({path, options.simulation.noise(noise_mm)});
   }
+  for (SimulatedRecording& recording : recordings) recording.tool = options.tool;
   return recordings;
 }
 
@@ -199,6 +201,7 @@ Expected<void> check(const SimulateOptions& options) {
   if (!options.procedure.empty() && !options.simulation.has_procedure()) {
     return fail("--write-procedure: expected --procedure, whose script it writes");
   }
+  if (of_bench && options.tool) return fail("--tool: expected --scene heart; a bench has a pointer of its own");
   if (of_bench && !options.tracker_noises_mm.empty()) {
     return fail("--tracker-noises: expected --scene heart; a bench has one, --tracker-noise");
   }
@@ -231,6 +234,9 @@ void add_simulate_command(Commands& commands) {
       "--untold", options->untold,
       "Of a heart: write a second recording of the same, without the set-up that OUT has attached (lens, "
       "hand-eye, clocks, noise), as what devices give that nobody has measured");
+  command.add_flag("--tool", options->tool,
+                   "Of a heart: a tracked probe touches it now and then; its true distance from the surface, and its "
+                   "tip, are in the recording");
   command
       .add_option("--tracker-noises", options->tracker_noises_mm,
                   "Several position noises, mm, from one rendering: OUT-0mm.mcap, OUT-1.4mm.mcap for 0,1.4")

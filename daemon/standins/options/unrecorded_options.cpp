@@ -43,17 +43,19 @@ Expected<UnrecordedOptions> parse_words(const std::vector<std::string>& words) {
   SimulationOptions simulation;
   ScopeOptions scope;
   unsigned threads = 0;
+  bool tool = false;
   const auto parsed = parse_nested_options(words, [&](Command& command) {
     simulation.add_to(command);
     simulation.add_procedure_to(command);
     scope.add_to(command);
     command.add_option("--threads", threads)->check(Range(1U, 256U));
+    command.add_flag("--tool", tool);
   });
   if (!parsed) return tl::unexpected(parsed.error());
   if (auto sound = scope.check(std::nullopt); !sound) return tl::unexpected(sound.error());
   auto settings = heart_settings(simulation, scope);
   if (!settings) return tl::unexpected(settings.error());
-  return UnrecordedOptions{*std::move(settings), simulation.noise(), rendering_threads(threads)};
+  return UnrecordedOptions{*std::move(settings), simulation.noise(), rendering_threads(threads), tool};
 }
 
 }  // namespace

@@ -12,6 +12,7 @@ struct UnrecordedOptions {
   SimulationSettings settings;
   TrackerNoise noise;
   unsigned threads = 1;  // that render
+  bool tool = false;     // a tracked probe touches the heart
 };
 
 // `text`: options of `perimap simulate`, taken apart as a shell would. What concerns files that it writes, or a bench,

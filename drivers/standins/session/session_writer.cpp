@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -19,6 +20,7 @@
 #include "drivers/standins/procedure/procedure_text.hpp"
 #include "drivers/standins/session/calibrated_scope.hpp"
 #include "drivers/standins/simulator/frame_renderer.hpp"
+#include "drivers/standins/simulator/simulated_tool.hpp"
 #include "drivers/standins/truth/truth_messages.hpp"
 
 namespace perimap {
@@ -97,7 +99,9 @@ class SessionWriter {
  private:
   SessionWriter(const Simulation& simulation, const SimulatedRecording& recording, WholeFile file,
                 RecordingWriter writer)
-      : simulation_(simulation), recording_(recording), file_(std::move(file)), writer_(std::move(writer)) {}
+      : simulation_(simulation), recording_(recording), file_(std::move(file)), writer_(std::move(writer)) {
+    if (recording_.tool) probe_.emplace(simulation_);
+  }
 
   Expected<void> write_frame(const Simulation::Frame& frame, std::span<const std::uint8_t> pixels) {
     if (!pixels.empty()) {
@@ -126,7 +130,23 @@ class SessionWriter {
         .and_then([&]() -> Expected<void> {
           if (!simulation_.settings().patient_tool) return {};
           return write_pose(patient_, simulation_.patient_sample(index, noise));
+        })
+        .and_then([&]() -> Expected<void> {
+          if (!probe_) return {};
+          return write_probe(index);
         });
+  }
+
+  Expected<void> write_probe(std::size_t index) {
+    const TrackerSample sample = probe_->sample(index, recording_.noise);
+    const ToolTruth& truth = probe_->truth(index);
+    const perimap_TruthTool message{to_ns(truth.time),
+                                    {truth.tip_W_mm.x(), truth.tip_W_mm.y(), truth.tip_W_mm.z()},
+                                    truth.distance_mm,
+                                    truth.touches};
+    return write_pose(probe_channel_, sample).and_then([&] {
+      return writer_.write(truth_probe_, message, sample.arrival, sample.source_time, sample.device_frame);
+    });
   }
 
   Expected<void> write_pose(ChannelId channel, const TrackerSample& sample) {
@@ -202,6 +222,7 @@ class SessionWriter {
       respiration_ = *respiration;
     }
 
+    if (auto begun = begin_probe(); !begun) return begun;
     if (auto begun = begin_procedure(); !begun) return begun;
     if (auto begun = begin_trace(); !begun) return begun;
 
@@ -228,6 +249,19 @@ class SessionWriter {
                         simulated_configuration(simulation_, recording_.noise));
         })
         .and_then([&] { return attach_turned_scope(); });
+  }
+
+  Expected<void> begin_probe() {
+    if (!probe_) return {};
+    const std::string name = "instrument/" + SimulatedTool::kName;
+    const auto poses = writer_.add_channel<perimap_TrackerPose>(std::string(channels::kTrackedTools) + name);
+    if (!poses) return tl::unexpected(poses.error());
+    const auto truth = writer_.add_channel<perimap_TruthTool>(std::string(channels::kTruthTool) + name);
+    if (!truth) return tl::unexpected(truth.error());
+    probe_channel_ = *poses;
+    truth_probe_ = *truth;
+    if (!recording_.set_up_told) return {};
+    return attach(std::string(attachments::kTips) + name + ".json", "application/json", SimulatedTool::calibration());
   }
 
   // Its script, and where it moves the organ; its events follow in their time.
@@ -275,6 +309,8 @@ class SessionWriter {
   std::size_t events_written_ = 0;
   ChannelId truth_event_;
   ChannelId image_, truth_camera_, tracker_, second_, patient_, viewer_, ecg_, respiration_;
+  ChannelId probe_channel_, truth_probe_;
+  std::optional<SimulatedTool> probe_;  // where there is one
   std::vector<std::uint8_t> packed_;
 };
 

@@ -17,6 +17,8 @@ struct SimulatedRecording {
   TrackerNoise noise;
   // Whether lens, hand-eye, clocks and noise are attached; where not, it is as of devices that nobody has measured.
   bool set_up_told = true;
+  // A probe is tracked beside the scope (SimulatedTool), with its truth and, where the set-up is told, its tip.
+  bool tool = false;
 };
 
 // What perimapd needs to know about this session, as a configuration file.

@@ -34,10 +34,10 @@ FrameEvent RenderedEvents::next_frame() {
 }
 
 Expected<UnrecordedSession> UnrecordedSession::create(Simulation simulation, const TrackerNoise& noise,
-                                                      unsigned threads) {
+                                                      unsigned threads, bool tool) {
   auto file = UnnamedFile::create();
   if (!file) return tl::unexpected(file.error());
-  if (auto written = write_without_pictures(simulation, {file->path(), noise}); !written) {
+  if (auto written = write_without_pictures(simulation, {file->path(), noise, true, tool}); !written) {
     return tl::unexpected(written.error());
   }
   return UnrecordedSession(std::make_unique<const Simulation>(std::move(simulation)), *std::move(file), threads);

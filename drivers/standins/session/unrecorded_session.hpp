@@ -41,9 +41,9 @@ class RenderedEvents {
 // like one. The pictures are rendered ahead as they are wanted, and are gone when they were used.
 class UnrecordedSession {
  public:
-  // Renders on so many threads; what is replayed does not depend on their number.
+  // Renders on so many threads; what is replayed does not depend on their number. `tool`: as of a SimulatedRecording.
   [[nodiscard]] static Expected<UnrecordedSession> create(Simulation simulation, const TrackerNoise& noise,
-                                                          unsigned threads);
+                                                          unsigned threads, bool tool = false);
 
   // All but the pictures, as a file that only this process sees, for as long as this lives.
   [[nodiscard]] std::string recording() const { return sensors_.path(); }

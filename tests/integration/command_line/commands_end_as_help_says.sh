@@ -48,6 +48,7 @@ fi
 
 # CODE TEXT ARGUMENT...
 ends 2 "OUT is required" simulate
+ends 2 "--tool: expected --scene heart" simulate x.mcap --scene board --tool
 ends 2 "--zoom: expected --field-stop" simulate x.mcap --zoom 2
 ends 1 "none/x.mcap" simulate none/x.mcap --duration 1 --size 160x120
 ends 2 "key 'phase.law'" replay r.mcap -c broken.toml
