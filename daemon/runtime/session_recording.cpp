@@ -10,8 +10,10 @@
 #include "daemon/config/configuration_loader.hpp"
 #include "daemon/config/configuration_text.hpp"
 #include "daemon/config/tracked_tools.hpp"
+#include "daemon/runtime/tool_tips.hpp"
 #include "daemon/runtime/utc_offset.hpp"
 #include "drivers/calibration/calibration_file.hpp"
+#include "drivers/calibration/tool_tip.hpp"
 #include "drivers/recording/channels.hpp"
 
 namespace perimap {
@@ -39,8 +41,13 @@ SensorRecordingFacts recording_facts(const Configuration& configuration, const s
   session.camera.repeats_allowed |= configuration.camera.plays_video_in_loop();
   facts.configuration = session_toml(session);
   facts.r_trigger = configuration.ecg.r_trigger;
-  for (const std::string& tool : tracked_tool_names(configuration.tracker)) {
+  const std::vector<std::string> names = tracked_tool_names(configuration.tracker);
+  for (const std::string& tool : names) {
     facts.tools.push_back(tool.empty() ? tool : std::string(channels::kTrackedTools) + tool);
+  }
+  for (const WatchedTool& tool : watched_tools(names, configuration.tracker)) {
+    if (!tool.tip) continue;
+    facts.tips.emplace_back(tool.name, format_tool_tip({tool.tip->p_OT_mm, tool.tip->covariance_O_mm2}, tool.name));
   }
   facts.second_lead = configuration.ecg.second_channel > 0;
   facts.respiration = configuration.respiration.device_channel > 0;

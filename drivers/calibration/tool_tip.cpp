@@ -51,4 +51,16 @@ Expected<ToolTip> parse_tool_tip(std::string_view text, std::string_view name) {
   return tip;
 }
 
+std::string format_tool_tip(const ToolTip& tip, const std::string& tool) {
+  nlohmann::ordered_json json;
+  json["tool"] = tool;
+  for (const double value : tip.tip_T) json["tip_mm"].push_back(value);
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    nlohmann::ordered_json of_row;
+    for (Eigen::Index column = 0; column < 3; ++column) of_row.push_back(tip.covariance_T(row, column));
+    json["covariance"].push_back(std::move(of_row));
+  }
+  return json.dump(2) + "\n";
+}
+
 }  // namespace perimap

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 #include "core/error/expected.hpp"
@@ -19,5 +20,8 @@ struct ToolTip {
 
 // The same from memory; `name` stands in messages.
 [[nodiscard]] Expected<ToolTip> parse_tool_tip(std::string_view text, std::string_view name);
+
+// What parse_tool_tip() reads; `tool`: of which it is.
+[[nodiscard]] std::string format_tool_tip(const ToolTip& tip, const std::string& tool);
 
 }  // namespace perimap

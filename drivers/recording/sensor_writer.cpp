@@ -72,6 +72,13 @@ Expected<void> SensorWriter::begin(const SensorRecordingFacts& facts, Instant be
           .and_then([&] { return attach(attachments::kConfiguration, "application/toml", facts.configuration); })
           .and_then([&] { return attach(attachments::kTurnedScope, "application/json", facts.turned_scope); })
           .and_then([&] { return attach(attachments::kVerification, "application/json", facts.verification); })
+          .and_then([&]() -> Expected<void> {
+            for (const auto& [tool, text] : facts.tips) {
+              const std::string name = std::string(attachments::kTips) + tool + ".json";
+              if (auto attached = attach(name, "application/json", text); !attached) return attached;
+            }
+            return {};
+          })
           .and_then([&] { return writer_.write(info_channel, info, begin, begin, 0); });
   // On the disk at once: a crash must not lose what the rest is read by.
   return begun.and_then([this] { return flush(); });

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/error/expected.hpp"
@@ -32,6 +33,8 @@ struct SensorRecordingFacts {
   bool respiration = false;                   // there is a respiration channel
   bool second_lead = false;                   // the ECG has two leads
   std::vector<std::string> tools = {};  // channels of other tracked tools, by ToolSample::tool; empty: not recorded
+  // Of tools, by their names ("instrument/NAME"): their tips, as `perimap calibrate tool --output` writes them.
+  std::vector<std::pair<std::string, std::string>> tips = {};
 };
 
 // Not for the real-time path. Messages must be written in order of `arrival`, which a replay keeps to; it is not before

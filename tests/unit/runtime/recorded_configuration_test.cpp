@@ -84,6 +84,29 @@ TEST(RecordedConfiguration, OfAVideoThatWasPlayedInALoopSaysThatItsPicturesMayCo
   EXPECT_FALSE(pipeline_of(live).pictures_may_loop);
 }
 
+TEST(RecordedConfiguration, BringsTheTipsOfItsToolsAlong) {
+  const BegunRecording recording;
+  const std::string tip = recording.folder() + "/probe.json";
+  std::ofstream(tip) << R"({"tool": "0E", "tip_mm": [1, 2, 150.5],)"
+                     << R"("covariance": [[0.04, 0.01, 0], [0.01, 0.09, 0], [0, 0, 0.16]]})";
+  Configuration live;
+  live.tracker.protocol = TrackerConfiguration::Protocol::kNdi;
+  live.tracker.pointer = "0C";
+  live.tracker.instruments = {"0E"};
+  live.tracker.instrument_calibrations = {tip};
+  record(recording, recording_facts(live, camera(), "test"));
+  const auto setup = prepare_replay(recording.file(), std::nullopt, ReadMode::kStrict);
+  ASSERT_TRUE(setup) << setup.error().error.message;
+  ASSERT_EQ(setup->tools.size(), 2U);
+  EXPECT_EQ(setup->tools[0].name, "pointer");
+  EXPECT_FALSE(setup->tools[0].tip);
+  EXPECT_EQ(setup->tools[1].name, "instrument/0E");
+  ASSERT_TRUE(setup->tools[1].tip);
+  EXPECT_EQ(setup->tools[1].tip->p_OT_mm, Vector3d(1.0, 2.0, 150.5));
+  EXPECT_EQ(setup->tools[1].tip->covariance_O_mm2(1, 1), 0.09);
+  EXPECT_EQ(setup->tools[1].tip->covariance_O_mm2(0, 1), 0.01);
+}
+
 TEST(RecordedConfiguration, AHandEyeOfAnotherSensorThanWasRecordedIsRefused) {
   Configuration live;
   live.tracker.protocol = TrackerConfiguration::Protocol::kNdi;
