@@ -199,9 +199,13 @@ TEST(Paced, MovesEveryInstantOfEveryKindOfEvent) {
   respiration.first_sample_time = measured;
   respiration.arrival = arrival;
   respiration.sample_period = milliseconds(40);
-  std::vector<ReplayEvent> events = {
-      frame(0, milliseconds(2000)),     pose,       ToolPose{ToolRole::kSecondSensor, pose}, ecg,
-      RTriggerPulse{measured, arrival}, respiration};
+  std::vector<ReplayEvent> events = {frame(0, milliseconds(2000)),
+                                     pose,
+                                     ToolPose{ToolRole::kSecondSensor, pose},
+                                     ecg,
+                                     RTriggerPulse{measured, arrival},
+                                     respiration,
+                                     ToolSample{pose, 1}};
   ASSERT_EQ(events.size(), std::variant_size_v<ReplayEvent>);
 
   const ReplayEdit edit = paced(1, 2.0, std::chrono::seconds(10));
@@ -223,6 +227,7 @@ TEST(Paced, MovesEveryInstantOfEveryKindOfEvent) {
   EXPECT_EQ(std::get<RTriggerPulse>(events[4]).time, measured_then);
   EXPECT_EQ(std::get<RespirationBlock>(events[5]).first_sample_time, measured_then);
   EXPECT_EQ(std::get<RespirationBlock>(events[5]).sample_period, milliseconds(20));
+  EXPECT_EQ(std::get<ToolSample>(events[6]).source_time, measured_then);
 }
 
 }  // namespace

@@ -81,6 +81,7 @@ TEST(VerificationRecord, GarbledTextIsRefusedByName) {
                                    {"touch_error_mm", "0.8"},
                                    {"clock_error_ms_deviation", {1.0}}}) {
     nlohmann::json json = nlohmann::json::parse(format_verification(result().dump(), set_up()));
+    json.erase("perimap_crc32");  // else that is what is told
     json[key] = value;
     const auto record = parse_verification(json.dump(), "v.json");
     ASSERT_FALSE(record) << key;
@@ -91,11 +92,15 @@ TEST(VerificationRecord, GarbledTextIsRefusedByName) {
                                    {"lens", nlohmann::json::array_t(100, 1.0)},
                                    {"turned_scope", std::string(1000, 'x')}}) {
     nlohmann::json json = nlohmann::json::parse(format_verification(result().dump(), set_up()));
+    json.erase("perimap_crc32");
     json["set_up"][key] = value;
     const auto record = parse_verification(json.dump(), "v.json");
     ASSERT_FALSE(record) << key;
     EXPECT_THAT(record.error().message, HasSubstr(std::string("v.json: key 'set_up.") + key + "'"));
   }
+  nlohmann::json changed = nlohmann::json::parse(format_verification(result().dump(), set_up()));
+  changed["passed"] = !changed["passed"].get<bool>();
+  EXPECT_THAT(parse_verification(changed.dump(), "v.json").error().message, HasSubstr("v.json: it does not say what"));
   const std::string whole = format_verification(result().dump(), set_up());
   for (std::size_t length = 0; length + 2 < whole.size(); length += 7) {
     EXPECT_FALSE(parse_verification(whole.substr(0, length), "v.json")) << length;
