@@ -45,7 +45,6 @@ class TipTrack {
   TipTrack(const PoseHistorySettings& tracker, const TipInTool& tip) noexcept : tracker_(tracker), tip_(tip) {}
 
   void add(const TrackerSample& sample) noexcept;
-  void forget() noexcept { *this = TipTrack(tracker_, tip_); }
 
   // Stamp of the last reading with a pose, on the camera's clock; none before the first.
   [[nodiscard]] std::optional<Instant> last_seen() const noexcept { return last_seen_; }

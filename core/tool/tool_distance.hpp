@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "core/geometry/pose.hpp"
@@ -72,6 +73,9 @@ struct SurfaceRelease {
   RespiratoryClock breath;
 };
 
+// The publisher hands it over, and a copy takes no memory.
+static_assert(std::is_trivially_copyable_v<SurfaceRelease>);
+
 struct WatchedTool {
   std::string name;              // "pointer", "instrument/NAME"
   std::size_t tool = 0;          // as ToolSample::tool
@@ -86,12 +90,10 @@ class ToolDistances {
   // `tracker`: the noise of readings. `vertices`: that a mesh has, about.
   ToolDistances(std::vector<WatchedTool> tools, const PoseHistorySettings& tracker, std::size_t vertices);
 
-  [[nodiscard]] std::span<const WatchedTool> tools() const noexcept { return tools_; }
-
   // Of a tool that is not watched, it is passed over.
   void add(const ToolSample& sample) noexcept;
 
-  // By tools(); valid until the next call. `made`: what was adopted last; null where there is nothing.
+  // In the order of the tools; valid until the next call. `made`: what was adopted last; null where there is nothing.
   [[nodiscard]] std::span<const ToolDistance> at(const SurfaceRelease& release,
                                                  const std::shared_ptr<const MadeSurface>& made);
 

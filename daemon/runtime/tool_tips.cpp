@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <set>
 #include <string_view>
+#include <utility>
 
 #include "daemon/config/tracked_tools.hpp"
 #include "drivers/calibration/calibration_facts.hpp"

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/json/json_seal.hpp"
+#include "drivers/json/json_text.hpp"
 #include "drivers/text_file/text_file.hpp"
 
 namespace perimap {
@@ -60,7 +61,7 @@ std::string format_tool_tip(const ToolTip& tip, const std::string& tool) {
     for (Eigen::Index column = 0; column < 3; ++column) of_row.push_back(tip.covariance_T(row, column));
     json["covariance"].push_back(std::move(of_row));
   }
-  return json.dump(2) + "\n";
+  return json_document(json);
 }
 
 }  // namespace perimap

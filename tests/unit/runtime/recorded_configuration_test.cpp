@@ -107,6 +107,18 @@ TEST(RecordedConfiguration, BringsTheTipsOfItsToolsAlong) {
   EXPECT_EQ(setup->tools[1].tip->covariance_O_mm2(0, 1), 0.01);
 }
 
+TEST(RecordedConfiguration, ATipThatCannotBeReadIsRefusedByItsName) {
+  for (const char* text : {"", "{", "[]", R"({"tip_mm": [0, 0]})", R"({"tip_mm": [0, 0, 1e9], "covariance": []})"}) {
+    SensorRecordingFacts facts = recording_facts(Configuration(), camera(), "test");
+    facts.tips.emplace_back("pointer", text);
+    const BegunRecording recording;
+    record(recording, facts);
+    const auto setup = prepare_replay(recording.file(), std::nullopt, ReadMode::kStrict);
+    ASSERT_FALSE(setup) << text;
+    EXPECT_THAT(setup.error().error.message, HasSubstr(":tip/pointer.json: "));
+  }
+}
+
 TEST(RecordedConfiguration, AHandEyeOfAnotherSensorThanWasRecordedIsRefused) {
   Configuration live;
   live.tracker.protocol = TrackerConfiguration::Protocol::kNdi;

@@ -38,6 +38,13 @@ TEST(SampleRecorder, WhatIsWrittenIsReadBackWithReceiptAndSourceTimes) {
   ASSERT_TRUE(recorder->write(model, from_ns(3000)));
   perimap_Status status{};
   ASSERT_TRUE(recorder->write(status, from_ns(3000)));
+  perimap_ToolDistance tool{};
+  dds::assign(tool.tool, "pointer");
+  tool.release_time_ns = 2001;
+  tool.distances_mm[2] = 4.5;
+  for (tool.sample_sequence = 1; tool.sample_sequence <= 2; ++tool.sample_sequence) {
+    ASSERT_TRUE(recorder->write(tool, from_ns(3001)));
+  }
   ASSERT_TRUE(recorder->finish());
 
   Expected<RecordingReader> reader = RecordingReader::open(name);
@@ -52,6 +59,13 @@ TEST(SampleRecorder, WhatIsWrittenIsReadBackWithReceiptAndSourceTimes) {
       EXPECT_EQ((*read)->features._buffer[0].id, 42U);
       EXPECT_EQ(recorded.arrival, from_ns(2000 + recorded.sequence));
       EXPECT_EQ(recorded.source_time, from_ns(1000 + recorded.sequence));
+    } else if (recorded.type == "perimap::ToolDistance") {
+      const auto read = reader->decode<perimap_ToolDistance>(recorded);
+      ASSERT_TRUE(read) << read.error().message;
+      EXPECT_EQ(recorded.channel, "tool");
+      EXPECT_EQ(recorded.source_time, from_ns(2001));
+      EXPECT_STREQ((*read)->tool, "pointer");
+      EXPECT_EQ((*read)->distances_mm[2], 4.5);
     } else if (recorded.type == "perimap::RecordingInfo") {
       const auto read = reader->decode<perimap_RecordingInfo>(recorded);
       ASSERT_TRUE(read) << read.error().message;
@@ -59,11 +73,9 @@ TEST(SampleRecorder, WhatIsWrittenIsReadBackWithReceiptAndSourceTimes) {
       EXPECT_STREQ((*read)->world_frame_id, "tracker");
     }
   }
-  const std::map<std::string, int> expected{{"perimap::RecordingInfo", 1},
-                                            {"perimap::Surface", 3},
-                                            {"perimap::SurfaceModel", 1},
-                                            {"perimap::Phase", 1},
-                                            {"perimap::Status", 1}};
+  const std::map<std::string, int> expected{{"perimap::RecordingInfo", 1}, {"perimap::Surface", 3},
+                                            {"perimap::SurfaceModel", 1},  {"perimap::ToolDistance", 2},
+                                            {"perimap::Phase", 1},         {"perimap::Status", 1}};
   EXPECT_EQ(messages, expected);
   std::filesystem::remove(name);
 }
