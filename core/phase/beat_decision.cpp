@@ -19,7 +19,7 @@ void BeatDecision::forget() noexcept {
   rr_deviation_ = 0.05;
   beats_told_ = 0;
   changed_count_ = 0;
-  disturbances_ = 0.0;
+  disturbances_.clear();
   count_ = 0;
   has_last_ = has_sure_ = false;
 }
@@ -46,21 +46,17 @@ bool BeatDecision::learning(Instant now) const noexcept {
   return !in_burst(now) || since_s > to_seconds(settings_.longer_than_bursts);
 }
 
-double BeatDecision::disturbed(Instant t) const noexcept {
-  return disturbances_ * std::exp(-std::max(to_seconds(t - disturbed_at_), 0.0) / settings_.disturbance_memory_s);
-}
-
 bool BeatDecision::in_burst(Instant now) const noexcept {
   if (!beats_.known() || !clusters_.any_settled()) return false;
   const bool beats_come = now - familiar_at_ < settings_.beats_come;
-  return disturbed(now) > (beats_come ? settings_.much_noise : settings_.burst);
+  return disturbances_.at(now) > (beats_come ? settings_.much_noise : settings_.burst);
 }
 
 bool BeatDecision::noisy(Instant now) const noexcept {
-  if (in_steady_noise() || disturbed(now) > settings_.some_noise) return true;
+  if (disturbances_.near_to_beats(beats_) || disturbances_.at(now) > settings_.some_noise) return true;
   if (!overdue(now)) return false;
   const auto waits = waiting_.begin();
-  return disturbed_at_ > familiar_at_ ||
+  return disturbances_.last_at() > familiar_at_ ||
          std::any_of(waits, waits + count_, [&](const Waiting& waiting) { return strange(waiting); });
 }
 
@@ -91,9 +87,9 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
                      candidate.energy > settings_.cluster_of_top * levels_.top_energy();
   int learnt = -1;
   if (large) {
-    const Surroundings around = in_burst(now)                                      ? Surroundings::kBurst
-                                : disturbed(candidate.time) < settings_.some_noise ? Surroundings::kCalm
-                                                                                   : Surroundings::kDisturbed;
+    const Surroundings around = in_burst(now)                                             ? Surroundings::kBurst
+                                : disturbances_.at(candidate.time) < settings_.some_noise ? Surroundings::kCalm
+                                                                                          : Surroundings::kDisturbed;
     learnt = clusters_.learn(candidate.shape, candidate.points_up, around, candidate.time);
     if (waiting.cluster >= 0 && learnt != waiting.cluster && !clusters_.recurs(waiting.cluster)) waiting.cluster = -1;
   }
@@ -113,11 +109,11 @@ void BeatDecision::consider(const QrsCandidate& candidate, Duration one_complex,
   if (learnt >= 0) note_crowding(waiting);
   const bool too_large = beats_.known() && candidate.energy > settings_.too_large * beats_.energy();
   if (too_large && !clusters_.has_a_beats_shape(candidate.shape, settings_.very_familiar)) {
-    note_disturbance(candidate.time, 1.0);
+    disturbances_.note(candidate.time, 1.0);
   }
   // Where a step is large it is no beat, whatever follows; the lead may be off within the second.
   if (candidate.step > settings_.pure_step && strange(waiting)) {
-    note_disturbance(candidate.time, 1.0);
+    disturbances_.note(candidate.time, 1.0);
     waiting.noted = true;
   }
   int at = count_;
@@ -140,7 +136,7 @@ void BeatDecision::note_crowding(const Waiting& waiting) noexcept {
   // Before any kind is settled a P wave looks like a QRS complex as well.
   if (waiting.log_odds < settings_.qrs_like || !clusters_.any_settled()) return;
   const Duration longest = within_cycle(settings_.crowd_to, settings_.crowd_of_cycle);
-  if (complexes_.crowded(longest)) note_disturbance(waiting.candidate.time, 0.7);
+  if (complexes_.crowded(longest)) disturbances_.note(waiting.candidate.time, 0.7);
 }
 
 double BeatDecision::like(const Waiting& waiting) const noexcept {
@@ -149,7 +145,7 @@ double BeatDecision::like(const Waiting& waiting) const noexcept {
   // speaks for no beat.
   const bool of_waves = clusters_.log_odds(waiting.cluster) < 0.0;
   if (!of_waves && !clusters_.settled(waiting.cluster)) return 0.0;
-  const double small = std::pow(std::min(waiting.gain, 1.0), noisiness());
+  const double small = std::pow(std::min(waiting.gain, 1.0), disturbances_.noisiness(beats_));
   return likeness(waiting.correlation, of_waves ? std::max(waiting.gain, 1.0) : small);
 }
 
@@ -162,7 +158,7 @@ bool BeatDecision::followed_by_none(const Waiting& waiting) const noexcept {
 
 // Noise that stands where a beat is due, or a beat: nobody can tell.
 bool BeatDecision::unknown_in_noise(const Waiting& waiting) const noexcept {
-  return clusters_.any_settled() && disturbed(waiting.candidate.time) > settings_.burst && !familiar(waiting);
+  return clusters_.any_settled() && disturbances_.at(waiting.candidate.time) > settings_.burst && !familiar(waiting);
 }
 
 // Like a settled kind that looks like a QRS complex.
@@ -172,21 +168,15 @@ bool BeatDecision::of_settled_beats(const Waiting& waiting) const noexcept {
 }
 
 bool BeatDecision::familiar(const Waiting& waiting) const noexcept {
-  return of_settled_beats(waiting) && !unlike_any_beat(waiting.candidate);
-}
-
-// The line goes to another level, or what is too fast for a heart is nearly as large: an electrode that moves, arcs.
-bool BeatDecision::unlike_any_beat(const QrsCandidate& candidate) const noexcept {
-  return candidate.step > settings_.most_step ||
-         candidate.rough - levels_.usual_roughness() > settings_.most_rough * candidate.energy;
+  return of_settled_beats(waiting) && !disturbances_.unlike_any_beat(waiting.candidate);
 }
 
 bool BeatDecision::strange(const Waiting& waiting) const noexcept {
   const bool another = waiting.correlation < settings_.familiar &&
                        !clusters_.has_a_beats_shape(waiting.candidate.shape, settings_.very_familiar);
   return beats_.known() && beats_.size(waiting.candidate) > settings_.size_of_disturbance &&
-         stands_out(waiting, levels_.noise()) &&
-         (another || (unlike_any_beat(waiting.candidate) && !of_known_kind(waiting)));
+         disturbances_.stands_out(waiting.candidate, levels_.noise()) &&
+         (another || (disturbances_.unlike_any_beat(waiting.candidate) && !of_known_kind(waiting)));
 }
 
 // Whatever the line about it does: a wave of a settled kind, as T waves are, and a beat of a kind that has recurred for
@@ -216,7 +206,8 @@ EvidenceOf<ComplexEvidence> BeatDecision::complex_evidence(const Waiting& waitin
 // Bare noise recurs as well as beats do, if not as exactly, and there is nothing yet to hold it against.
 bool BeatDecision::lost_at_start(const Waiting& waiting) const noexcept {
   if (std::min(beats_told_, told_since_silence_) >= settings_.beats_at_start) return false;
-  return !familiar(waiting) && waiting.correlation < settings_.exactly_alike && !stands_out(waiting, levels_.quiet());
+  return !familiar(waiting) && waiting.correlation < settings_.exactly_alike &&
+         !disturbances_.stands_out(waiting.candidate, levels_.quiet());
 }
 
 double BeatDecision::by_itself(const Waiting& waiting) const noexcept {
@@ -229,7 +220,7 @@ void BeatDecision::weigh(Instant now) noexcept {
   evaluated_at_ = now;
   BeatContext context;
   context.any_recurs = clusters_.any_settled();
-  const double in_noise = in_steady_noise() ? settings_.most_disturbances * noisiness() : 0.0;
+  const double in_noise = disturbances_.steady(beats_);
   for (int i = 0; i < count_; ++i) {
     Waiting& waiting = waiting_[static_cast<std::size_t>(i)];
     waiting.log_odds = by_itself(waiting);
@@ -237,7 +228,7 @@ void BeatDecision::weigh(Instant now) noexcept {
     context.like = like(waiting);
     context.gain = waiting.gain;
     context.cluster_log_odds = context.like > 0.0 ? clusters_.log_odds(waiting.cluster) : 0.0;
-    waiting.disturbed = disturbed(waiting.candidate.time);
+    waiting.disturbed = disturbances_.at(waiting.candidate.time);
     context.disturbed = std::max(waiting.disturbed, in_noise);
     context.strangers = 0.0;
     for (int k = 0; k < count_; ++k) {
@@ -354,12 +345,7 @@ void BeatDecision::accept(int index, Instant now) noexcept {
 }
 
 void BeatDecision::refuse(const Waiting& waiting) noexcept {
-  if (strange(waiting) && !waiting.noted) note_disturbance(waiting.candidate.time, 1.0);
-}
-
-void BeatDecision::note_disturbance(Instant t, double weight) noexcept {
-  disturbances_ = std::min(disturbed(t) + weight, settings_.most_disturbances);
-  disturbed_at_ = std::max(t, disturbed_at_);
+  if (strange(waiting) && !waiting.noted) disturbances_.note(waiting.candidate.time, 1.0);
 }
 
 BeatCircumstances BeatDecision::circumstances(const Waiting& waiting, bool familiar, Instant now) const noexcept {
@@ -372,15 +358,15 @@ BeatCircumstances BeatDecision::circumstances(const Waiting& waiting, bool famil
   }
   beat.usual_of_cycle = std::min(std::exp(clusters_.log_of_cycle(waiting.cluster)), 1.0);
   beat.spread = rhythm_.spread;
-  beat.disturbed = disturbed(now);
+  beat.disturbed = disturbances_.at(now);
   beat.familiar = familiar;
   beat.long_known = familiar && now - clusters_.born(waiting.cluster) > settings_.longer_than_bursts;
   beat.any_known = clusters_.any_recurs();
   beat.heard_for_long = now - since_ > settings_.longer_than_bursts;
-  beat.unlike_any_beat = unlike_any_beat(waiting.candidate);
+  beat.unlike_any_beat = disturbances_.unlike_any_beat(waiting.candidate);
   beat.may_be_followed = clusters_.followers(waiting.cluster) >= settings_.followed_by_chance;
   beat.rivalled = clusters_.rivals(waiting.cluster) >= settings_.rivalled;
-  beat.in_steady_noise = in_steady_noise();
+  beat.in_steady_noise = disturbances_.near_to_beats(beats_);
   beat.lost_in_noise = unknown_in_noise(waiting);
   return beat;
 }
@@ -389,14 +375,14 @@ BeatCircumstances BeatDecision::circumstances(const Waiting& waiting, bool famil
 // electrodes sit elsewhere. They are the usual beats from now on.
 void BeatDecision::follow_change(const Waiting& waiting, bool familiar) noexcept {
   const bool alike = !familiar && clusters_.recurs(waiting.cluster) && waiting.correlation >= settings_.familiar &&
-                     !unlike_any_beat(waiting.candidate);
+                     !disturbances_.unlike_any_beat(waiting.candidate);
   changed_count_ = !alike ? 0 : waiting.cluster == changed_to_ ? changed_count_ + 1 : 1;
   changed_to_ = waiting.cluster;
   if (changed_count_ < settings_.changed_after) return;
   changed_count_ = 0;
   clusters_.settle(waiting.cluster);
   beats_.forget_size();
-  disturbances_ = 0.0;
+  disturbances_.clear();
 }
 
 // What is told in a beat's place may be something else: like no kind, and in noise, where the line stays away, or more
@@ -404,7 +390,7 @@ void BeatDecision::follow_change(const Waiting& waiting, bool familiar) noexcept
 bool BeatDecision::anywhere(const Waiting& waiting) const noexcept {
   if (unknown_in_noise(waiting)) return true;
   if (!clusters_.any_settled() || familiar(waiting) || of_known_kind(waiting)) return false;
-  return unlike_any_beat(waiting.candidate) || waiting.log_odds < 0.0;
+  return disturbances_.unlike_any_beat(waiting.candidate) || waiting.log_odds < 0.0;
 }
 
 // A complex has its R peak where its kind has, but one that is not exactly like it where its largest wave is. In noise,
@@ -436,7 +422,7 @@ void BeatDecision::tell(const Waiting& waiting, Instant now) noexcept {
   peak.shape = candidate.shape;
   peak.deviation = anywhere(waiting) ? from_seconds(settings_.doubtful_deviation_s) : r.deviation;
   peak.confidence = confidence(circumstances(waiting, familiar, now), settings_);
-  if (strange(waiting) && !waiting.noted) note_disturbance(candidate.time, 0.5);
+  if (strange(waiting) && !waiting.noted) disturbances_.note(candidate.time, 0.5);
   if (familiar) familiar_at_ = candidate.time;
   as_before_ = as_before_ || (familiar && std::abs(std::log(waiting.gain)) < settings_.same_gain);
   if (peak.time <= now && queue_count_ < kQueue) {

@@ -13,6 +13,7 @@
 #include "core/phase/beat_levels.hpp"
 #include "core/phase/beat_path.hpp"
 #include "core/phase/ecg_levels.hpp"
+#include "core/phase/line_disturbances.hpp"
 #include "core/phase/pondered.hpp"
 #include "core/phase/qrs_candidate.hpp"
 #include "core/phase/qrs_clusters.hpp"
@@ -27,7 +28,7 @@ namespace perimap {
 class BeatDecision {
  public:
   BeatDecision(const DecisionSettings& settings, const EcgLevels& levels) noexcept
-      : settings_(settings), levels_(levels), complexes_(settings) {}
+      : settings_(settings), levels_(levels), complexes_(settings), disturbances_(settings, levels) {}
 
   // A complex was measured. `one_complex`: what is nearer to another is the same.
   void consider(const QrsCandidate& candidate, Duration one_complex, Instant now) noexcept;
@@ -62,7 +63,7 @@ class BeatDecision {
   [[nodiscard]] bool in_burst(Instant now) const noexcept;
   // So many disturbances, and no beat of a known kind among them, that the lead may be off.
   [[nodiscard]] bool chaotic(Instant now) const noexcept {
-    return disturbed(now) > settings_.chaos && now - familiar_at_ > settings_.chaos_after;
+    return disturbances_.at(now) > settings_.chaos && now - familiar_at_ > settings_.chaos_after;
   }
 
  private:
@@ -84,14 +85,7 @@ class BeatDecision {
   [[nodiscard]] Duration within_cycle(Duration longest, double share) const noexcept;
   void note_crowding(const Waiting& waiting) noexcept;
   [[nodiscard]] EvidenceOf<ComplexEvidence> complex_evidence(const Waiting& waiting) const noexcept;
-  // From bare noise of that level.
-  [[nodiscard]] bool stands_out(const Waiting& waiting, double noise) const noexcept {
-    return waiting.candidate.energy >= std::exp(settings_.stand_out) * noise;
-  }
   [[nodiscard]] bool lost_at_start(const Waiting& waiting) const noexcept;
-  // Of the noise that is always there, and whether that comes near to the beats.
-  [[nodiscard]] double noisiness() const noexcept { return beats_.noisiness(levels_.noise(), settings_); }
-  [[nodiscard]] bool in_steady_noise() const noexcept { return noisiness() > settings_.near_to_beats; }
   [[nodiscard]] double by_itself(const Waiting& waiting) const noexcept;
   void weigh(Instant now) noexcept;
   [[nodiscard]] double like(const Waiting& waiting) const noexcept;  // to its cluster, where that recurs
@@ -99,7 +93,6 @@ class BeatDecision {
   [[nodiscard]] bool unknown_in_noise(const Waiting& waiting) const noexcept;
   [[nodiscard]] bool of_settled_beats(const Waiting& waiting) const noexcept;
   [[nodiscard]] bool familiar(const Waiting& waiting) const noexcept;
-  [[nodiscard]] bool unlike_any_beat(const QrsCandidate& candidate) const noexcept;
   [[nodiscard]] bool strange(const Waiting& waiting) const noexcept;
   [[nodiscard]] bool of_known_kind(const Waiting& waiting) const noexcept;
   [[nodiscard]] double odds_after(const QrsCandidate& last, const Waiting& waiting) const noexcept;
@@ -110,12 +103,10 @@ class BeatDecision {
   [[nodiscard]] bool anywhere(const Waiting& waiting) const noexcept;
   [[nodiscard]] QrsWave r_wave(const Waiting& waiting) const noexcept;
   void refuse(const Waiting& waiting) noexcept;
-  void note_disturbance(Instant t, double weight) noexcept;
   [[nodiscard]] BeatCircumstances circumstances(const Waiting& waiting, bool familiar, Instant now) const noexcept;
   void remove(int index, int count) noexcept;
   void learn_rhythm(const Waiting& waiting) noexcept;
   void follow_change(const Waiting& waiting, bool familiar) noexcept;
-  [[nodiscard]] double disturbed(Instant t) const noexcept;
 
   const DecisionSettings& settings_;
   const EcgLevels& levels_;
@@ -141,8 +132,7 @@ class BeatDecision {
   bool as_before_ = false;
   int changed_to_ = -1;    // the cluster of the last beat, when it was of no settled kind,
   int changed_count_ = 0;  // and how many in a row were of it
-  double disturbances_ = 0.0;
-  Instant disturbed_at_;
+  LineDisturbances disturbances_;
   Instant familiar_at_;  // of the last beat of a settled kind
   Instant evaluated_at_;
 

@@ -21,7 +21,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MUTATED = """rhythm_scatter beat_classer beat_confidence beat_decision beat_kinds beat_levels beat_path candidate_finder
-ecg_filter ecg_levels ecg_line lead_agreement lead_pair qrs_candidate qrs_clusters qrs_evidence qrs_shape r_peak_detector
+ecg_filter ecg_levels ecg_line lead_agreement lead_pair line_disturbances qrs_candidate qrs_clusters qrs_evidence qrs_shape r_peak_detector
 recent_complexes r_peak_detector_settings ventricular_evidence rhythm_monitor rr_predictor""".split()
 BESIDE = """sample_rate cardiac_clock cardiac_clock_tracker ectopic_rhythm end_trust cycle_posterior phase_law law_choice
 r_trigger""".split()
