@@ -358,7 +358,7 @@ void add_running(std::vector<ConfigurationKey>& keys) {
   const std::array<std::pair<std::string_view, double>, 2> units{{{"mm", 1.0}, {"m", 1000.0}}};
   Section("model", keys)
       .file("file", PERIMAP_MEMBER(model.file),
-            "a surface of the organ that was imaged before (STL, PLY, OBJ, VTK), in the frame of tracker.registration: "
+            "a surface of the organ that was imaged before (STL, PLY, OBJ, VTK), in the frame I of the registration: "
             "the published mesh has its vertices, set in motion; none: the mesh is laid through the features")
       .choice("unit", units, PERIMAP_MEMBER(model.unit_mm), "of its coordinates")
       .number("phase", 0, 1, PERIMAP_MEMBER(model.phase),
