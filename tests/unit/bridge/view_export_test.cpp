@@ -12,6 +12,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <random>
 
 #include "daemon/bridge/messages/view_layout.hpp"
 #include "daemon/bridge/messages/view_names.hpp"

@@ -128,7 +128,9 @@ TEST(ModelMesh, SaysOfWhatNobodySeesThatItIsNotKnown) {
   for (std::size_t v = 0; v < mesh.support.size(); ++v) {
     const double r = bearing(v % (kSide * kSide)).norm();
     const bool behind = v >= kSide * kSide;
-    if (behind || r > farthest_mm || r < hole_mm) EXPECT_EQ(mesh.support[v], Support::kUncertain) << v;
+    if (behind || r > farthest_mm || r < hole_mm) {
+      EXPECT_EQ(mesh.support[v], Support::kUncertain) << v;
+    }
     if (!behind) continue;
     EXPECT_EQ(
         mesh.coefficients_W_mm.middleRows<3>(3 * static_cast<Eigen::Index>(v)).rightCols(kLayout.size() - 1).norm(),
