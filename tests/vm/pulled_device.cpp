@@ -52,7 +52,7 @@ int run(pid_t pid, perimap_SourceKind kind, int times, const std::string& pull, 
   std::vector<perimap_SourceState> as_gone{perimap_SOURCE_CLOSED};
   if (kind != perimap_SOURCE_R_TRIGGER) as_gone.push_back(perimap_SOURCE_STALLED);
   std::vector<Duration> gone, back;
-  long descriptors_first = 0, resident_first_kB = 0;
+  long descriptors_first = 0, memory_first_kB = 0;
   for (int i = 0; i < times; ++i) {
     const Instant pulled = MonotonicClock::now();
     if (std::system(pull.c_str()) != 0) return fail(pull);
@@ -70,13 +70,13 @@ int run(pid_t pid, perimap_SourceKind kind, int times, const std::string& pull, 
     back.push_back(*again);
     if (i > 0) continue;
     descriptors_first = descriptors_of(pid);
-    resident_first_kB = resident_kB_of(pid);
+    memory_first_kB = own_memory_kB_of(pid);
   }
   fmt::print("{} times: told after {}; OK again after {}; descriptors {} and {}, memory {} and {} kB\n", times,
-             spread(gone), spread(back), descriptors_first, descriptors_of(pid), resident_first_kB,
-             resident_kB_of(pid));
+             spread(gone), spread(back), descriptors_first, descriptors_of(pid), memory_first_kB,
+             own_memory_kB_of(pid));
   if (descriptors_of(pid) > descriptors_first) return fail("descriptors leak");
-  if (resident_kB_of(pid) > resident_first_kB + kMoreMemory_kB) return fail("memory leaks");
+  if (own_memory_kB_of(pid) > memory_first_kB + kMoreMemory_kB) return fail("memory leaks");
   return 0;
 }
 

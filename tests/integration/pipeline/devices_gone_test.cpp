@@ -91,7 +91,7 @@ class Daemon {
   }
   [[nodiscard]] bool runs() const { return kill(pid_, 0) == 0 && waitpid(pid_, nullptr, WNOHANG) == 0; }
   [[nodiscard]] long descriptors() const { return descriptors_of(pid_); }
-  [[nodiscard]] long resident_kB() const { return resident_kB_of(pid_); }
+  [[nodiscard]] long own_memory_kB() const { return own_memory_kB_of(pid_); }
 
  private:
   pid_t pid_ = 0;
@@ -316,14 +316,14 @@ TEST_P(DevicesGone, AreToldOfAndRecoverUnderLoadTwentyTimes) {
   std::vector<Gap> ecg_gaps;
   // Of moments in which both devices are there and the surface is good.
   std::vector<long> descriptors;
-  std::vector<long> resident_kB;
+  std::vector<long> memory_kB;
   for (int round = 1; round <= kUnplugs; ++round) {
     ASSERT_NO_FATAL_FAILURE(unplug_and_replug(tracker, ecg, tracker_gaps, ecg_gaps)) << "round " << round;
     ASSERT_TRUE(daemon.runs()) << "round " << round;
     if (round % kRoundsToGood != 0) continue;
     ASSERT_TRUE(good_again()) << "round " << round;
     descriptors.push_back(daemon.descriptors());
-    resident_kB.push_back(daemon.resident_kB());
+    memory_kB.push_back(daemon.own_memory_kB());
   }
   tracker.print("unplugged");
   ecg.print("unplugged");
@@ -341,11 +341,11 @@ TEST_P(DevicesGone, AreToldOfAndRecoverUnderLoadTwentyTimes) {
   }
   fmt::print("{} of {} surfaces received, the longest pause {:.0f} ms\n", surfaces.size(), sent,
              1e3 * to_seconds(longest));
-  fmt::print("descriptors {}, resident memory {} kB, after {} rounds each\n", fmt::join(descriptors, " "),
-             fmt::join(resident_kB, " "), kRoundsToGood);
+  fmt::print("descriptors {}, memory of its own {} kB, after {} rounds each\n", fmt::join(descriptors, " "),
+             fmt::join(memory_kB, " "), kRoundsToGood);
   EXPECT_LT(longest, seconds(10));
   EXPECT_EQ(descriptors.back(), descriptors.front());
-  EXPECT_LE(resident_kB.back() - resident_kB.front(), 4096);
+  EXPECT_LE(memory_kB.back() - memory_kB.front(), 4096);
   EXPECT_EQ(daemon.stop(), 0) << "it did not end by itself";
 }
 

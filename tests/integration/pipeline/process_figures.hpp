@@ -22,10 +22,11 @@ inline long descriptors_of(pid_t pid) {
 }
 
 // 0: there is no such process.
-inline long resident_kB_of(pid_t pid) {
+// Of its own: the pages of programs and libraries come and go as the kernel likes.
+inline long own_memory_kB_of(pid_t pid) {
   std::ifstream status(fmt::format("/proc/{}/status", pid));
   for (std::string line; std::getline(status, line);) {
-    if (line.starts_with("VmRSS:")) return std::strtol(line.c_str() + 6, nullptr, 10);
+    if (line.starts_with("RssAnon:")) return std::strtol(line.c_str() + 8, nullptr, 10);
   }
   return 0;
 }
