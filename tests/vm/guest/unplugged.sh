@@ -25,7 +25,7 @@ holds /tmp/again "afterwards a sample a frame, none lost" "x.received > 20 && x.
 
 # R peaks from a trigger, and the ECG beside it.
 trigger_line 0.3 0.5
-printf 'r_trigger = true\nr_trigger_port = "/dev/ttyACM0"\n' >> /etc/perimap/perimapd.toml
+sed -i '/^\[ecg\]/a r_trigger = true\nr_trigger_port = "/dev/ttyACM0"' /etc/perimap/perimapd.toml
 systemctl restart perimapd || fail "the service does not start with a trigger"
 daemon=$(systemctl show -P MainPID perimapd)
 received 5 /tmp/trigger
