@@ -55,6 +55,17 @@ distortion_coefficients: !!opencv-matrix
 END
 }
 
+# ecg_and_dds_toml: what the configurations below end with
+ecg_and_dds_toml() {
+  cat << END
+[ecg]
+protocol = "cyton"
+port = "$line"
+[dds]
+domain = $domain
+END
+}
+
 # still_toml VIDEO CALIBRATION: a configuration with a video for a camera, before a tracker that keeps still (tool 0B)
 still_toml() {
   cat << END
@@ -66,12 +77,8 @@ calibration = "$2"
 protocol = "ndi"
 port = "tcp:127.0.0.1:$port"
 sensor = "0B"
-[ecg]
-protocol = "cyton"
-port = "$line"
-[dds]
-domain = $domain
 END
+  ecg_and_dds_toml
 }
 
 # devices_toml RECORDING: a configuration for them, with the recording's frames for a camera
@@ -85,10 +92,6 @@ playback_start_s = $start
 protocol = "ndi"
 port = "tcp:127.0.0.1:$port"
 frame_rate_hz = 100
-[ecg]
-protocol = "cyton"
-port = "$line"
-[dds]
-domain = $domain
 END
+  ecg_and_dds_toml
 }
