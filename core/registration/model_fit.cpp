@@ -11,6 +11,7 @@
 #include "core/angle/angle.hpp"
 #include "core/registration/nearest_triangle.hpp"
 #include "core/registration/residual_covariance.hpp"
+#include "core/surface/six_elements.hpp"
 
 namespace perimap {
 namespace {
@@ -42,9 +43,7 @@ std::string text(const char* format, Numbers... numbers) {
 }
 
 Matrix3d symmetric_root(const Eigen::Matrix<double, 6, 1>& c) {
-  Matrix3d covariance;
-  covariance << c(0), c(1), c(2), c(1), c(3), c(4), c(2), c(4), c(5);
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(covariance);
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(from_six(c));
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
          eigen.eigenvectors().transpose();
 }

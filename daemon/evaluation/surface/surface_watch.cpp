@@ -10,6 +10,7 @@
 #include "core/pipeline/phase_spread.hpp"
 #include "core/pipeline/pipeline_counters.hpp"
 #include "core/pipeline/pipeline_settings.hpp"
+#include "core/surface/six_elements.hpp"
 #include "daemon/evaluation/surface/surface_baselines.hpp"
 
 namespace perimap {
@@ -132,9 +133,7 @@ void SurfaceWatch::score_instant(const Scene& scene, std::size_t horizon, Instan
     const auto c = scene.predicted.coefficients_W_mm.middleRows<3>(3 * v);
     const Vector3d p = c * b;
     const Vector3d truth = seen_.position(point, vertices);
-    const auto six = scene.predicted.covariances_W_mm2.col(v);
-    Matrix3d covariance;
-    covariance << six(0), six(1), six(2), six(1), six(3), six(4), six(2), six(4), six(5);
+    Matrix3d covariance = from_six(scene.predicted.covariances_W_mm2.col(v));
     covariance += phase_spread(p, c * about.earlier, c * about.later) + breath_mm2 * Matrix3d::Identity();
     const Vector3d e = p - truth;
     const bool on_rim = seen_.on_rim(point);
